@@ -1,0 +1,17 @@
+# abs_hil_room(NAME SOURCES ... KNOWS ... USES ...): the library of one room. KNOWS names the rooms that it may include,
+# USES other libraries that its public headers need, PRIVATE ones that only its sources need.
+function(abs_hil_room name)
+  cmake_parse_arguments(ROOM "" "" "SOURCES;KNOWS;USES;PRIVATE" ${ARGN})
+  if(ROOM_SOURCES)
+    add_library(abs_hil_${name} STATIC ${ROOM_SOURCES})
+    set(scope PUBLIC)
+    target_link_libraries(abs_hil_${name} PRIVATE abs_hil_warnings ${ROOM_PRIVATE})
+  else()
+    add_library(abs_hil_${name} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  add_library(abs_hil::${name} ALIAS abs_hil_${name})
+  target_include_directories(abs_hil_${name} ${scope} ${PROJECT_SOURCE_DIR}/include)
+  list(TRANSFORM ROOM_KNOWS PREPEND abs_hil_)
+  target_link_libraries(abs_hil_${name} ${scope} ${ROOM_KNOWS} ${ROOM_USES})
+endfunction()

@@ -1,0 +1,41 @@
+#pragma once
+
+#include "abs_hil/rig/measurement.hpp"
+
+namespace abs_hil::control {
+
+/// What a slip controller sees in one cycle. SI units.
+struct SlipInput {
+  double dt_s{0.0};           ///< time since the previous step, > 0; ignored by `reset`
+  rig::WheelSpeeds speeds{};  ///< estimated wheel speeds
+  double slip{0.0};           ///< estimated slip (5)
+  double slip_ref{0.0};       ///< wanted slip, in (0, 1)
+  /// Mean over the past interval of the brake torque estimated to act (the command itself for an ideal actuator), N m.
+  double mean_brake_torque_Nm{0.0};
+  double brake_torque_Nm{0.0};      ///< brake torque estimated to act now, N m
+  double max_brake_torque_Nm{0.0};  ///< largest torque the actuator can give, > 0, may be infinite; the least is 0
+};
+
+/// What a slip controller wants. The torque may lie outside what the actuator can give: it is limited afterwards.
+struct SlipOutput {
+  double brake_torque_Nm{0.0};
+  double slip_velocity_error_m_s{0.0};  ///< e_v of (13)
+  double theta_est_N{0.0};              ///< estimated peak tyre force, NaN for controllers that estimate none
+};
+
+/// A slip controller: a pure function of its inputs and its own state, which knows nothing of boards, clocks and files.
+/// `reset` and `step` run in the real-time thread: no allocation, lock, system call, exception or log call.
+class SlipController {
+ public:
+  SlipController() = default;
+  SlipController(const SlipController&) = delete;
+  SlipController& operator=(const SlipController&) = delete;
+  virtual ~SlipController() = default;
+
+  /// Start of braking: forget the past and take the state from this measurement.
+  virtual void reset(const SlipInput& input) noexcept = 0;
+  /// One control period. Called for the first time in the same cycle as `reset`, with the same input and dt_s = 0.
+  [[nodiscard]] virtual SlipOutput step(const SlipInput& input) noexcept = 0;
+};
+
+}  // namespace abs_hil::control

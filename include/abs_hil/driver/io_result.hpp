@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <stdexcept>
+#include <string_view>
+
+namespace abs_hil::driver {
+
+/// What went wrong at the board, as a number the real-time thread can carry.
+enum class IoError : std::uint8_t {
+  none = 0,
+  not_active,          ///< read or write outside activate ... deactivate: nothing was sent
+  no_answer,           ///< the board did not answer in time
+  disconnected,        ///< the board is gone (unplugged, interface down, all-ones)
+  read_back_mismatch,  ///< a register does not hold what was written
+  implausible_answer,  ///< an answer outside what the board can say
+};
+
+[[nodiscard]] constexpr std::string_view description(IoError error) noexcept {
+  switch (error) {
+    case IoError::none: return "none";
+    case IoError::not_active: return "driver is not active";
+    case IoError::no_answer: return "board did not answer in time";
+    case IoError::disconnected: return "board is gone";
+    case IoError::read_back_mismatch: return "register does not read back what was written";
+    case IoError::implausible_answer: return "answer outside what the board can say";
+  }
+  return "unknown error";
+}
+
+/// Result of one read or write. `where` is the register offset, CAN id or endpoint concerned, `errno_value` the
+/// system's error if it had one.
+struct [[nodiscard]] IoResult {
+  IoError error{IoError::none};
+  std::uint32_t where{0};
+  int errno_value{0};
+  [[nodiscard]] constexpr bool ok() const noexcept { return error == IoError::none; }
+};
+
+/// The backend or something it needs is not there, cannot be opened or is not what it should be. The message names the
+/// thing and the fix; the program ends with status 3.
+class Unavailable : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace abs_hil::driver

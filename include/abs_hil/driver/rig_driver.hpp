@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "abs_hil/driver/io_result.hpp"
+#include "abs_hil/rig/command.hpp"
+#include "abs_hil/rig/cycle_record.hpp"
+#include "abs_hil/rig/measurement.hpp"
+
+namespace abs_hil::driver {
+
+/// Life of a driver: configure -> activate -> (read, write)* -> deactivate; activate again goes on from `inactive`.
+/// `failed` latches: after an I/O error the outputs are made safe and only a new `configure` leads out of it.
+enum class DriverState : std::uint8_t { unconfigured, inactive, active, failed };
+
+/// One rig behind one board, real or simulated. The public functions keep the lifecycle for every backend alike:
+/// nothing is written while inactive, and an error in `write` makes the outputs safe before it returns. Backends
+/// implement the private `do_` functions and call `deactivate()` in their own destructors (a base class destructor
+/// comes too late).
+///
+/// `read` and `write` are called from the real-time thread: they never throw, allocate, lock or wait beyond the bound
+/// the backend documents. The other functions may do all that and are called before and after the run.
+class RigDriver {
+ public:
+  RigDriver() = default;
+  RigDriver(const RigDriver&) = delete;
+  RigDriver& operator=(const RigDriver&) = delete;
+  virtual ~RigDriver() = default;
+
+  /// Opens and checks the board; writes nothing that could move anything. Throws Unavailable.
+  void configure();
+  /// Takes the outputs over in the safe state and starts the counters at 0. Throws Unavailable; then nothing is active.
+  /// @param now_ns monotonic time, the origin of a simulated rig's time
+  void activate(std::int64_t now_ns);
+  /// Latches and reads the board's inputs as of `now_ns`, which never decreases from call to call.
+  IoResult read(std::int64_t now_ns, rig::Measurement& measurement) noexcept;
+  /// Sends a command. Refused with `not_active`, nothing sent, unless active.
+  IoResult write(const rig::Command& command) noexcept;
+  /// Leaves the outputs in the safe state: drive 0, brake 0, motor disabled, verified where the board reads back.
+  /// Harmless when repeated. The result tells whether the safe state is known to have reached the board.
+  IoResult deactivate() noexcept;
+
+  [[nodiscard]] DriverState state() const noexcept { return state_; }
+  [[nodiscard]] virtual std::string_view name() const noexcept = 0;
+  /// The simulator's truth of the last `read`, for logs alone; NaN from hardware.
+  [[nodiscard]] virtual rig::PlantTruth truth() const noexcept { return {}; }
+
+ private:
+  virtual void do_configure() = 0;
+  virtual void do_activate(std::int64_t now_ns) = 0;
+  virtual IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept = 0;
+  virtual IoResult do_write(const rig::Command& command) noexcept = 0;
+  /// Writes the safe state whatever went before, and tries all outputs even when one fails.
+  virtual IoResult do_make_safe() noexcept = 0;
+
+  DriverState state_{DriverState::unconfigured};
+};
+
+}  // namespace abs_hil::driver

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <type_traits>
+
+#include "abs_hil/rig/command.hpp"
+#include "abs_hil/rig/measurement.hpp"
+#include "abs_hil/rig/phase.hpp"
+#include "abs_hil/rig/reason.hpp"
+
+namespace abs_hil::rig {
+
+/// What only a simulator knows, for logs and metrics alone: nothing that controls may read it. NaN on hardware.
+struct PlantTruth {
+  WheelSpeeds speeds{unknown, unknown};
+  double slip{unknown};
+  double brake_torque_Nm{unknown};  ///< torque that acts on the upper wheel
+  double theta_N{unknown};          ///< peak tyre force theta of (10)
+};
+
+/// What the estimators and the controller made of a measurement. NaN where the phase does not compute it.
+struct ControlState {
+  WheelSpeeds speeds_est{};
+  double slip_est{0.0};
+  double slip_ref{0.0};
+  double slip_velocity_error_m_s{unknown};  ///< e_v of (13), from the estimates
+  double brake_torque_ref_Nm{0.0};          ///< torque asked for, after limiting
+  double brake_torque_est_Nm{0.0};          ///< torque estimated to act now, through (6)-(7)
+  double theta_est_N{unknown};
+};
+
+/// Durations within one cycle, ns. `wakeup_latency_ns` is the lateness of the wake-up against its tick.
+struct CycleTiming {
+  std::int64_t wakeup_latency_ns{0};
+  std::int64_t read_ns{0};
+  std::int64_t control_ns{0};
+  std::int64_t write_ns{0};
+  std::int64_t cycle_ns{0};          ///< wake-up to end of write
+  std::uint32_t periods_skipped{0};  ///< ticks missed before this one
+};
+
+/// Everything about one cycle: measurement of tick n and the command computed from it. The real-time thread pushes it
+/// whole into the ring; everything else (CSV, LCM, metrics) is derived from it. Trivially copyable.
+struct CycleRecord {
+  std::uint64_t sequence{0};  ///< counts cycles from 0; a gap is a dropped record
+  std::int64_t stamp_ns{0};   ///< monotonic clock at the wake-up
+  double time_s{0.0};         ///< since the start of the run
+  Phase phase{Phase::idle};
+  Reason reason{Reason::none};  ///< why this phase was entered or the command refused; none if nothing happened
+  double reason_value{0.0};     ///< the value that led to it, in the SI unit of its quantity
+  Measurement measurement{};
+  ControlState control{};
+  Command command{};  ///< as it passed the gate
+  PlantTruth truth{};
+  CycleTiming timing{};
+};
+static_assert(std::is_trivially_copyable_v<CycleRecord>);
+
+/// Speeds for metrics: the truth where the backend knows it, else the estimates.
+[[nodiscard]] inline WheelSpeeds best_speeds(const CycleRecord& record) noexcept {
+  return std::isnan(record.truth.speeds.omega2_rad_s) ? record.control.speeds_est : record.truth.speeds;
+}
+
+/// Slip for metrics, as `best_speeds`.
+[[nodiscard]] inline double best_slip(const CycleRecord& record) noexcept {
+  return std::isnan(record.truth.slip) ? record.control.slip_est : record.truth.slip;
+}
+
+}  // namespace abs_hil::rig

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+
+namespace abs_hil::rig {
+
+inline constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+/// Angular speeds of both wheels, rad/s.
+struct WheelSpeeds {
+  double omega1_rad_s{0.0};  ///< upper wheel
+  double omega2_rad_s{0.0};  ///< lower wheel
+};
+
+/// What a board returns in one cycle: counts, never speeds. Trivially copyable.
+struct Measurement {
+  std::int64_t time_ns{0};        ///< monotonic time at which the counters were read
+  std::int32_t upper_counts{0};   ///< upper wheel's encoder counter; wraps around at 32 bit
+  std::int32_t lower_counts{0};   ///< lower wheel's encoder counter; wraps around at 32 bit
+  double supply_V{unknown};       ///< power supply, NaN where the board cannot tell
+  double temperature_C{unknown};  ///< power stage, NaN where the board cannot tell
+  std::uint32_t trip_flags{0};    ///< the board's own interlocks, 0 = none tripped
+  /// Only the simulator with `plant.ideal_sensors` sets this; no hardware ever does. Estimators take it as it is.
+  std::optional<WheelSpeeds> ideal_speeds{};
+};
+
+}  // namespace abs_hil::rig

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace abs_hil::rig {
+
+/// Why a phase changed, a command was refused or a run ended. Plain numbers, so that the real-time thread can hand them
+/// on without a string; `description` turns them into words where there is time. Append only: logs hold the numbers.
+enum class Reason : std::uint16_t {
+  none = 0,
+  // the sequence goes on
+  run_started = 1,
+  start_speed_given = 2,
+  speed_threshold_reached = 3,
+  upper_wheel_peak_detected = 4,
+  phase_duration_over = 5,
+  end_speed_reached = 6,
+  standstill_reached = 7,
+  sequence_complete = 8,
+  slip_control_left_at_low_speed = 9,
+  // the run ends early because somebody asked for it
+  interrupt_signal = 32,
+  terminate_signal = 33,
+  stop_command = 34,
+  // the run ends early by a fault or limit
+  phase_time_limit = 64,
+  overspeed = 65,
+  command_not_finite = 66,
+  estimate_not_finite = 67,
+  driver_read_failed = 68,
+  driver_write_failed = 69,
+  board_interlock_tripped = 70,
+  consecutive_overruns = 71,
+};
+
+/// In words, for events, logs and summaries.
+[[nodiscard]] constexpr std::string_view description(Reason reason) noexcept {
+  switch (reason) {
+    case Reason::none: return "none";
+    case Reason::run_started: return "run started";
+    case Reason::start_speed_given: return "braking starts at once from the given start speed";
+    case Reason::speed_threshold_reached: return "upper wheel reached its speed threshold";
+    case Reason::upper_wheel_peak_detected: return "upper wheel stopped gaining speed";
+    case Reason::phase_duration_over: return "phase lasted its set time";
+    case Reason::end_speed_reached: return "car speed below the experiment's end speed";
+    case Reason::standstill_reached: return "both wheels stand still";
+    case Reason::sequence_complete: return "experiment ran to its end";
+    case Reason::slip_control_left_at_low_speed: return "car speed below the least speed for slip control";
+    case Reason::interrupt_signal: return "interrupted (SIGINT)";
+    case Reason::terminate_signal: return "terminated (SIGTERM)";
+    case Reason::stop_command: return "stopped by a command on ABS_COMMAND";
+    case Reason::phase_time_limit: return "phase exceeded its time limit";
+    case Reason::overspeed: return "wheel speed above the limit";
+    case Reason::command_not_finite: return "command was not a finite number";
+    case Reason::estimate_not_finite: return "speed estimate was not a finite number";
+    case Reason::driver_read_failed: return "reading the board failed";
+    case Reason::driver_write_failed: return "writing to the board failed";
+    case Reason::board_interlock_tripped: return "the board's own interlock tripped";
+    case Reason::consecutive_overruns: return "too many consecutive overruns";
+  }
+  return "unknown reason";
+}
+
+/// True for reasons that latch: the run is over and only a new one goes on.
+[[nodiscard]] constexpr bool is_fault(Reason reason) noexcept {
+  return static_cast<std::uint16_t>(reason) >= static_cast<std::uint16_t>(Reason::phase_time_limit);
+}
+
+/// True for reasons that come from outside: a signal or a stop command.
+[[nodiscard]] constexpr bool is_stop_request(Reason reason) noexcept {
+  return reason == Reason::interrupt_signal || reason == Reason::terminate_signal || reason == Reason::stop_command;
+}
+
+}  // namespace abs_hil::rig

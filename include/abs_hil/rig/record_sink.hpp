@@ -1,0 +1,21 @@
+#pragma once
+
+#include "abs_hil/rig/cycle_record.hpp"
+
+namespace abs_hil::rig {
+
+/// Takes the records of a run, in order, outside the real-time thread: CSV, LCM, event log, metrics.
+class RecordSink {
+ public:
+  RecordSink() = default;
+  RecordSink(const RecordSink&) = delete;
+  RecordSink& operator=(const RecordSink&) = delete;
+  virtual ~RecordSink() = default;
+
+  /// `distance_m` is the car's way since braking started (0 before).
+  virtual void consume(const CycleRecord& record, double distance_m) = 0;
+  /// No more records come: write out what is buffered. Throws std::runtime_error, naming the file, when data was lost.
+  virtual void finish() {}
+};
+
+}  // namespace abs_hil::rig

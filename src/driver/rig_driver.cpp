@@ -1,0 +1,46 @@
+#include "abs_hil/driver/rig_driver.hpp"
+
+#include <string>
+
+namespace abs_hil::driver {
+
+void RigDriver::configure() {
+  static_cast<void>(deactivate());
+  state_ = DriverState::unconfigured;
+  do_configure();
+  state_ = DriverState::inactive;
+}
+
+void RigDriver::activate(std::int64_t now_ns) {
+  if (state_ == DriverState::active) return;
+  if (state_ != DriverState::inactive) {
+    throw Unavailable(std::string(name()) + ": activate() needs a configured driver; call configure() first");
+  }
+  do_activate(now_ns);
+  state_ = DriverState::active;
+}
+
+IoResult RigDriver::read(std::int64_t now_ns, rig::Measurement& measurement) noexcept {
+  if (state_ != DriverState::active) return {IoError::not_active};
+  return do_read(now_ns, measurement);
+}
+
+IoResult RigDriver::write(const rig::Command& command) noexcept {
+  if (state_ != DriverState::active) return {IoError::not_active};
+  const IoResult result = do_write(command);
+  if (!result.ok()) {
+    state_ = DriverState::failed;
+    // The first error is the one to report, even when making safe fails as well.
+    static_cast<void>(do_make_safe());
+  }
+  return result;
+}
+
+IoResult RigDriver::deactivate() noexcept {
+  if (state_ != DriverState::active && state_ != DriverState::failed) return {};
+  const IoResult result = do_make_safe();
+  if (state_ == DriverState::active) state_ = DriverState::inactive;
+  return result;
+}
+
+}  // namespace abs_hil::driver
