@@ -14,14 +14,17 @@ class BrakeActuator {
 
   /// The brake has been released for long.
   void reset() noexcept;
-  /// Lets `dt_s` pass under the duty (the torque, if ideal) of the last `command`.
+  /// Lets `dt_s` pass under the duty (the torque, if ideal) of the last `command`: exact solution of (6).
   void advance(double dt_s) noexcept;
-  /// Takes note of what is sent now.
+  /// Takes note of what is sent now: the duty in [0, 1] counts, or, if ideal, the torque, >= 0.
   void command(double duty, double torque_Nm) noexcept;
 
+  /// Duty in [0, max_duty] for a wanted torque; with an ideal actuator only for the record.
   [[nodiscard]] double duty_for(double torque_Nm) const noexcept;
-  /// What the actuator makes of a wanted torque: 0 ... max_torque_Nm.
+  /// Static torque that comes of a wanted one: within [0, max_torque_Nm], and 0 or b(u0) for torques that the dead
+  /// zone makes unreachable.
   [[nodiscard]] double limited(double torque_Nm) const noexcept;
+  /// b(max_duty); infinite if ideal.
   [[nodiscard]] double max_torque_Nm() const noexcept { return max_torque_Nm_; }
   [[nodiscard]] double torque_Nm() const noexcept { return torque_Nm_; }            ///< estimated, now
   [[nodiscard]] double mean_torque_Nm() const noexcept { return mean_torque_Nm_; }  ///< over the last `advance`

@@ -4,18 +4,10 @@
 #include <span>
 #include <string_view>
 
-#include "abs_hil/control/options.hpp"
+#include "abs_hil/control/controller_context.hpp"
 #include "abs_hil/control/slip_controller.hpp"
-#include "abs_hil/rig/parameters.hpp"
 
 namespace abs_hil::control {
-
-/// What every controller may know when it is made: the options and the rig's nominal parameters. A controller that
-/// adapts to theta does not look at `rig.tyre.theta_N`.
-struct ControllerContext {
-  const ControlOptions& options;
-  const rig::RigParameters& rig;
-};
 
 /// One line of the table of controllers.
 struct ControllerEntry {
@@ -27,8 +19,9 @@ struct ControllerEntry {
 /// All controllers, in the order in which `abs_hil list` shows them.
 [[nodiscard]] std::span<const ControllerEntry> controllers() noexcept;
 
-/// Makes the controller named `name`. Throws std::invalid_argument, naming the known ones, for an unknown name and for
-/// options that are not usable (Q not positive definite, say). Not real-time safe: called once before a run.
+/// Makes the controller named `name`. Throws std::invalid_argument, naming the nearest and all known ones, for an
+/// unknown name, and for options that are not usable (Q not positive definite, say). Not real-time safe: called once
+/// before a run.
 [[nodiscard]] std::unique_ptr<SlipController> make_controller(std::string_view name, const ControllerContext& context);
 
 }  // namespace abs_hil::control

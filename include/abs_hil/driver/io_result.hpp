@@ -9,11 +9,12 @@ namespace abs_hil::driver {
 /// What went wrong at the board, as a number the real-time thread can carry.
 enum class IoError : std::uint8_t {
   none = 0,
-  not_active,          ///< read or write outside activate ... deactivate: nothing was sent
-  no_answer,           ///< the board did not answer in time
-  disconnected,        ///< the board is gone (unplugged, interface down, all-ones)
-  read_back_mismatch,  ///< a register does not hold what was written
-  implausible_answer,  ///< an answer outside what the board can say
+  not_active,            ///< read or write outside activate ... deactivate: nothing was sent
+  no_answer,             ///< the board did not answer in time
+  disconnected,          ///< the board is gone (unplugged, interface down, all-ones)
+  read_back_mismatch,    ///< a register does not hold what was written
+  implausible_answer,    ///< an answer outside what the board can say
+  command_out_of_range,  ///< a command that no gate lets through: a duty not in [0, 1], a torque < 0, not finite
 };
 
 [[nodiscard]] constexpr std::string_view description(IoError error) noexcept {
@@ -24,6 +25,7 @@ enum class IoError : std::uint8_t {
     case IoError::disconnected: return "board is gone";
     case IoError::read_back_mismatch: return "register does not read back what was written";
     case IoError::implausible_answer: return "answer outside what the board can say";
+    case IoError::command_out_of_range: return "command is not finite or outside its range";
   }
   return "unknown error";
 }

@@ -13,4 +13,7 @@ struct PlantOptions {
   double max_step_s{500e-6};             ///< largest integration step, > 0; a test shows the error at the default
 };
 
+/// Throws std::invalid_argument, naming the configuration key, its value and its range, if an option is outside it.
+void check(const PlantOptions& options);
+
 }  // namespace abs_hil::plant_sim

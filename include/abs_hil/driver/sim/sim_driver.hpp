@@ -18,6 +18,7 @@ struct SimStart {
 /// time given to `read`, under the command of the last `write`, so that a late cycle meets a plant that has moved on.
 class SimDriver final : public RigDriver {
  public:
+  /// Throws std::invalid_argument if an option or the start speed is outside its range.
   SimDriver(const plant_sim::PlantOptions& plant, const SimStart& start);
   ~SimDriver() override;
 
@@ -37,7 +38,9 @@ class SimDriver final : public RigDriver {
   plant_sim::Plant plant_;
   SimStart start_;
   plant_sim::PlantInput input_{};
-  std::int64_t time_ns_{0};
+  std::int64_t time_ns_{0};       ///< when the plant's state holds
+  double upper_offset_rad_{0.0};  ///< where within a count the upper wheel's encoder started
+  double lower_offset_rad_{0.0};  ///< where within a count the lower wheel's encoder started
 };
 
 }  // namespace abs_hil::driver

@@ -1,0 +1,56 @@
+#include "command_line.hpp"
+
+#include "abs_hil/settings/config_error.hpp"
+#include "abs_hil/settings/config_file.hpp"
+#include "abs_hil/settings/key_table.hpp"
+
+namespace abs_hil::app {
+
+namespace {
+
+runtime::RealtimeMode realtime_mode(const std::string& name) {
+  if (name == "require") return runtime::RealtimeMode::require;
+  return name == "off" ? runtime::RealtimeMode::off : runtime::RealtimeMode::prefer;
+}
+
+void check_together(const RunRequest& request) {
+  const settings::Settings& s = request.settings;
+  if (s.backend == "rig" && request.outputs.fast) {
+    throw settings::ConfigError("--fast: the rig runs in real time only; leave it out or use --backend sim");
+  }
+  if (s.backend == "rig" && s.experiment.start_speed_rad_s > 0.0) {
+    throw settings::ConfigError(
+        "experiment.start_speed_rad_s: a real wheel does not start at speed; leave it out or use --backend sim");
+  }
+  if (s.control.adaptive.theta_min_N >= s.control.adaptive.theta_max_N) {
+    throw settings::ConfigError("control.adaptive.theta_min_N: must be less than control.adaptive.theta_max_N");
+  }
+}
+
+}  // namespace
+
+RunRequest merge(const RunOptions& options) {
+  RunRequest request{.outputs = options.outputs};
+  settings::Settings& s = request.settings;
+  settings::KeyTable keys(s);
+  s.backend = options.backend;
+  s.realtime.mode = realtime_mode(options.realtime);
+  if (options.plant) s.plant_name = *options.plant;
+  settings::load_file(settings::plant_file(s.plant_name), keys, "plant");
+  if (options.config_file) settings::load_file(*options.config_file, keys);
+
+  const auto set = [&keys](const char* key, const std::optional<std::string>& value, const char* option) {
+    if (value) keys.set_text(std::string(key) + '=' + *value, option);
+  };
+  set("control.controller", options.controller, "--controller");
+  set("experiment.name", options.experiment, "--experiment");
+  set("control.slip_ref", options.slip_ref, "--slip-ref");
+  set("control.rate_Hz", options.rate_Hz, "--rate");
+  set("run.seed", options.seed, "--seed");
+  for (const std::string& assignment : options.assignments) keys.set_text(assignment, "--set");
+  check_together(request);
+  request.config_json = keys.to_json().dump();
+  return request;
+}
+
+}  // namespace abs_hil::app

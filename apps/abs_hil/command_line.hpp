@@ -1,0 +1,47 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abs_hil/settings/settings.hpp"
+
+namespace abs_hil::app {
+
+/// Where a run's records go, and whether it runs in virtual time.
+struct OutputOptions {
+  bool fast{false};
+  std::optional<std::string> csv_file{};
+  std::optional<std::string> log_file{};
+  std::optional<std::string> summary_file{};
+  std::optional<std::string> lcm_url{};
+  bool no_lcm{false};
+};
+
+/// The options of `abs_hil` as typed, before they are merged with files.
+struct RunOptions {
+  std::string backend{"sim"};
+  std::optional<std::string> config_file{};
+  std::optional<std::string> plant{};
+  std::optional<std::string> controller{};
+  std::optional<std::string> experiment{};
+  std::optional<std::string> slip_ref{};
+  std::optional<std::string> rate_Hz{};
+  std::optional<std::string> seed{};
+  std::vector<std::string> assignments{};
+  std::string realtime{"prefer"};
+  OutputOptions outputs{};
+};
+
+/// A run as it will be: the effective configuration and where its records go.
+struct RunRequest {
+  settings::Settings settings{};
+  std::string config_json{};  ///< the effective configuration
+  OutputOptions outputs{};
+};
+
+/// Merges defaults, plant file, configuration file, named options and assignments, later ones winning. Throws
+/// settings::ConfigError.
+[[nodiscard]] RunRequest merge(const RunOptions& options);
+
+}  // namespace abs_hil::app

@@ -1,0 +1,77 @@
+#include "run_outputs.hpp"
+
+#include "abs_hil/settings/config_error.hpp"
+#include "abs_hil/telemetry/file_error.hpp"
+
+namespace abs_hil::app {
+
+namespace {
+/// Event times of runs in virtual time count from here (1 January 2000), so that the log is the same on every run.
+constexpr std::int64_t virtual_epoch_us = 946'684'800'000'000;
+}  // namespace
+
+RunOutputs::RunOutputs(const RunRequest& request)
+    : metrics_(request.settings.plant.rig.wheels.r2_m, request.settings.experiment.end_speed_m_s) {
+  try {
+    if (request.outputs.csv_file) csv_.emplace(*request.outputs.csv_file);
+    if (request.outputs.summary_file) summary_.emplace(*request.outputs.summary_file);
+    if (request.outputs.log_file) {
+      log_.emplace(*request.outputs.log_file, request.outputs.fast ? std::optional(virtual_epoch_us) : std::nullopt);
+    }
+  } catch (const std::runtime_error& error) {
+    throw settings::ConfigError(error.what());
+  }
+  // In virtual time 8,000 messages would burst onto the network at once: only when asked for by name.
+  if (!request.outputs.no_lcm && (!request.outputs.fast || request.outputs.lcm_url))
+    lcm_.emplace(request.outputs.lcm_url.value_or(""));
+  if (log_ || lcm_) open_stream(request);
+  if (!request.outputs.fast) status_line_.emplace([this] { return snapshot(); });
+}
+
+void RunOutputs::open_stream(const RunRequest& request) {
+  const settings::Settings& s = request.settings;
+  stream_.emplace(
+      telemetry::StreamOptions{.channel_prefix = s.telemetry.channel_prefix,
+                               .telemetry_every_cycles = static_cast<std::uint32_t>(s.telemetry.decimation)},
+      telemetry::ExperimentInfo{.experiment = s.experiment.name,
+                                .controller = s.control.controller,
+                                .plant = s.plant_name,
+                                .backend = s.backend,
+                                .config_json = request.config_json,
+                                .version = ABS_HIL_VERSION},
+      [this] { return snapshot(); });
+  if (log_) stream_->add(*log_);
+  if (lcm_) {
+    stream_->add(*lcm_);
+    commands_.emplace(*lcm_, *stream_, [] {});
+  }
+}
+
+std::vector<rig::RecordSink*> RunOutputs::sinks() {
+  std::vector<rig::RecordSink*> sinks{&metrics_};
+  if (csv_) sinks.push_back(&*csv_);
+  if (stream_) sinks.push_back(&*stream_);
+  if (status_line_ && status_line_->active()) sinks.push_back(&*status_line_);
+  return sinks;
+}
+
+void RunOutputs::poll() {
+  if (commands_) commands_->poll();
+}
+
+telemetry::StatusSnapshot RunOutputs::snapshot() const {
+  if (session_ == nullptr) return {};
+  const runtime::CyclicExecutive& executive = session_->executive();
+  return {.cycles = executive.counters().cycles,
+          .overruns = executive.counters().overruns,
+          .telemetry_drops = session_->record_drops(),
+          .realtime = session_->realtime(),
+          .wakeup_latency = executive.wakeup_latency().summary(),
+          .cycle_time = executive.cycle_time().summary()};
+}
+
+void RunOutputs::write(const analysis::RunSummary& summary) {
+  if (summary_) summary_->write(summary);
+}
+
+}  // namespace abs_hil::app

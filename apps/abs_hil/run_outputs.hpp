@@ -1,0 +1,53 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "abs_hil/analysis/run_metrics.hpp"
+#include "abs_hil/analysis/run_summary.hpp"
+#include "abs_hil/experiment/run_session.hpp"
+#include "abs_hil/rig/record_sink.hpp"
+#include "abs_hil/telemetry/command_listener.hpp"
+#include "abs_hil/telemetry/csv_sink.hpp"
+#include "abs_hil/telemetry/lcm_outlet.hpp"
+#include "abs_hil/telemetry/log_outlet.hpp"
+#include "abs_hil/telemetry/message_stream.hpp"
+#include "abs_hil/telemetry/status_line.hpp"
+#include "command_line.hpp"
+
+namespace abs_hil::app {
+
+/// Everything a run's records go to, opened before anything moves: metrics, CSV, LCM, event log, summary, status line.
+class RunOutputs {
+ public:
+  /// Throws telemetry::FileError or std::runtime_error as settings::ConfigError for files that cannot be written, and
+  /// telemetry::LcmError without a network.
+  explicit RunOutputs(const RunRequest& request);
+
+  [[nodiscard]] std::vector<rig::RecordSink*> sinks();
+  /// Lets ABS_STATUS and the status line look at the run, which must outlive the outputs' use.
+  void watch(const experiment::RunSession& session) { session_ = &session; }
+  /// Takes in commands from LCM.
+  void poll();
+  [[nodiscard]] bool stop_requested() const { return commands_ && commands_->stop_requested(); }
+  [[nodiscard]] analysis::Metrics metrics() const { return metrics_.metrics(); }
+  [[nodiscard]] std::uint64_t publish_failures() const { return stream_ ? stream_->failures() : 0; }
+  void write(const analysis::RunSummary& summary);
+
+ private:
+  [[nodiscard]] telemetry::StatusSnapshot snapshot() const;
+  void open_stream(const RunRequest& request);
+
+  const experiment::RunSession* session_{nullptr};
+  analysis::RunMetrics metrics_;
+  std::optional<telemetry::CsvSink> csv_;
+  std::optional<analysis::SummaryFile> summary_;
+  std::optional<telemetry::LogOutlet> log_;
+  std::optional<telemetry::LcmOutlet> lcm_;
+  std::optional<telemetry::MessageStream> stream_;
+  std::optional<telemetry::CommandListener> commands_;
+  std::optional<telemetry::StatusLine> status_line_;
+};
+
+}  // namespace abs_hil::app

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "abs_hil/analysis/run_metrics.hpp"
+#include "abs_hil/rig/duration_quantiles.hpp"
+
+namespace abs_hil::analysis {
+
+/// Everything a run's summary says.
+struct RunSummary {
+  std::string result;  ///< "completed", "fault" or "stopped"
+  std::string reason;
+  std::string controller;
+  std::string plant;
+  std::string backend;
+  std::string experiment;
+  Metrics metrics{};
+  std::uint64_t cycles{0};
+  std::uint64_t overruns{0};
+  std::uint64_t telemetry_drops{0};
+  std::uint64_t publish_failures{0};
+  bool realtime{false};      ///< every step of the real-time set-up was obtained
+  bool virtual_time{false};  ///< --fast: the timing figures say nothing of this machine
+  bool truth_known{false};   ///< metrics come from the simulator's truth, not from estimates
+  rig::DurationQuantiles wakeup_latency{};
+  rig::DurationQuantiles cycle_time{};
+  nlohmann::ordered_json config{};
+};
+
+/// The summary as JSON, field names as in docs/telemetry.md; NaN becomes null.
+[[nodiscard]] nlohmann::ordered_json to_json(const RunSummary& summary);
+/// The summary for people, a few lines.
+[[nodiscard]] std::string to_text(const RunSummary& summary);
+
+/// A summary file that is either whole or not there: opened beside its place before the run, so that a bad path is
+/// known before anything moves, and renamed into place once written.
+class SummaryFile {
+ public:
+  /// Throws std::runtime_error, naming path, reason and fix, if the file cannot be created.
+  explicit SummaryFile(std::filesystem::path path);
+  SummaryFile(const SummaryFile&) = delete;
+  SummaryFile& operator=(const SummaryFile&) = delete;
+  ~SummaryFile();
+  /// Throws std::runtime_error if the file cannot be written.
+  void write(const RunSummary& summary);
+
+ private:
+  std::filesystem::path path_;
+  std::filesystem::path part_;
+};
+
+}  // namespace abs_hil::analysis

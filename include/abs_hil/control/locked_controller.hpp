@@ -1,0 +1,22 @@
+#pragma once
+
+#include "abs_hil/control/controller_context.hpp"
+#include "abs_hil/control/slip_controller.hpp"
+
+namespace abs_hil::control {
+
+/// Full brake torque throughout, whatever the slip: what happens without ABS, the reference for the slip controllers.
+/// It asks for the actuator's largest torque, or for b(1) of (7) where the actuator has no limit. theta_est_N is NaN.
+class LockedController final : public SlipController {
+ public:
+  explicit LockedController(const ControllerContext& context) noexcept;
+
+  void reset(const SlipInput& input) noexcept override;
+  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
+
+ private:
+  rig::WheelParameters wheels_;
+  double full_torque_Nm_;
+};
+
+}  // namespace abs_hil::control

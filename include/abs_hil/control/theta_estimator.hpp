@@ -1,0 +1,53 @@
+#pragma once
+
+#include "abs_hil/control/options.hpp"
+#include "abs_hil/rig/parameters.hpp"
+
+namespace abs_hil::control {
+
+/// What passed between two control cycles, as the adaptation sees it.
+struct AdaptationInterval {
+  double dt_s{0.0};                 ///< > 0
+  double omega1_before_rad_s{0.0};  ///< upper wheel at its start ...
+  double omega1_after_rad_s{0.0};   ///< ... and its end; linear in between
+  double brake_torque_Nm{0.0};      ///< mean torque that acted
+  double phi{0.0};                  ///< mean of phi(slip)
+  double weighted_error{0.0};       ///< mean of k(slip_ref) B'P [I; e_v]
+};
+
+/// Estimate of the peak tyre force theta by (17)-(18):
+///   omega1_hat' = (r1/J1) theta_hat phi - (d1 omega1 + M10 + Tb)/J1,    zeta' = -gamma phi k B'P [I; e_v],
+///   theta_hat   = zeta + gamma ka1 (J1/r1) (omega1 - omega1_hat).
+/// The sign before ka1 is plus: with the minus printed in (18) the estimation error grows wherever phi > 0
+/// (docs/theory.md, and a test shows both).
+///
+/// zeta and omega1_hat act on the controller through theta_hat alone, and (18) differentiated along (17) closes in it:
+///   theta_hat' = zeta' + gamma ka1 (F - phi theta_hat),   F = (J1 omega1' + d1 omega1 + M10 + Tb)/r1,
+/// where F is the tyre force that the upper wheel's motion tells. So theta_hat itself is the state here. That is the
+/// same estimator, and it makes freezing (hold) and projection (clamp) free of wind-up and of jumps. The equation is
+/// linear, and solved exactly for F, phi and zeta' at their means over the interval: stable for any gain and rate.
+///
+/// Adaptation is frozen for phi <= 0 (rolling free, traction), where V' <= 0 of Theorem 3.1 does not hold.
+/// Real-time safe.
+class ThetaEstimator {
+ public:
+  /// @param options  gamma, ka1, zeta0, theta_min_N <= theta_max_N; AdaptiveController checks them
+  ThetaEstimator(const AdaptiveOptions& options, const rig::WheelParameters& wheels) noexcept;
+
+  /// omega1_hat = omega1, so theta_hat = zeta0, projected.
+  void reset() noexcept;
+  void update(const AdaptationInterval& past) noexcept;
+
+  [[nodiscard]] double theta_N() const noexcept { return theta_N_; }
+
+ private:
+  rig::WheelParameters wheels_;
+  double gamma_;
+  double innovation_gain_;  ///< gamma ka1
+  double zeta0_N_;
+  double theta_min_N_;
+  double theta_max_N_;
+  double theta_N_;
+};
+
+}  // namespace abs_hil::control

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "abs_hil/control/brake_actuator.hpp"
+#include "abs_hil/control/options.hpp"
+#include "abs_hil/control/slip_controller.hpp"
+#include "abs_hil/control/tracking_observer.hpp"
+#include "abs_hil/experiment/sequence.hpp"
+#include "abs_hil/rig/parameters.hpp"
+#include "abs_hil/runtime/cycle_logic.hpp"
+
+namespace abs_hil::experiment {
+
+/// What a run's logic is made of.
+struct RunLogicParts {
+  const control::ControlOptions& control;
+  const rig::RigParameters& rig;  ///< nominal parameters, as the controller knows them
+  std::unique_ptr<control::SlipController> controller;
+  Sequence sequence;
+  bool ideal_actuator{false};
+  double max_brake_duty{1.0};     ///< as the gate limits it
+  double start_speed_rad_s{0.0};  ///< both wheels' speed at the first measurement
+};
+
+/// estimate -> sequence -> control of one run: from counts to the command wanted.
+class RunLogic final : public runtime::CycleLogic {
+ public:
+  explicit RunLogic(RunLogicParts parts);
+
+  [[nodiscard]] rig::Command step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept override;
+  void commanded(const rig::Command& command) noexcept override;
+  void end_early(rig::Reason reason, double value) noexcept override { sequence_.end_early(reason, value); }
+  [[nodiscard]] bool finished() const noexcept override { return sequence_.finished(); }
+  /// Why the run ended; `none` while it has not.
+  [[nodiscard]] rig::Reason end_reason() const noexcept { return end_.reason; }
+  [[nodiscard]] double end_value() const noexcept { return end_.value; }
+
+ private:
+  void estimate(const rig::Measurement& measurement, double dt_s) noexcept;
+  [[nodiscard]] double slip_control(double dt_s, bool entered, rig::ControlState& state) noexcept;
+
+  const rig::WheelParameters wheels_;
+  const double slip_ref_;
+  const double start_speed_rad_s_;
+  std::unique_ptr<control::SlipController> controller_;
+  Sequence sequence_;
+  control::TrackingObserver upper_;
+  control::TrackingObserver lower_;
+  control::BrakeActuator actuator_;
+  rig::WheelSpeeds speeds_{};
+  double slip_{0.0};
+  Sequence::Change end_{};
+  bool stands_still_{false};
+  bool started_{false};
+  std::int64_t start_ns_{0};
+  std::int64_t last_ns_{0};
+};
+
+}  // namespace abs_hil::experiment

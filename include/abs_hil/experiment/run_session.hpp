@@ -1,0 +1,71 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "abs_hil/driver/rig_driver.hpp"
+#include "abs_hil/experiment/run_logic.hpp"
+#include "abs_hil/rig/record_sink.hpp"
+#include "abs_hil/runtime/clock.hpp"
+#include "abs_hil/runtime/command_gate.hpp"
+#include "abs_hil/runtime/cyclic_executive.hpp"
+#include "abs_hil/runtime/realtime_setup.hpp"
+#include "abs_hil/runtime/record_pump.hpp"
+
+namespace abs_hil::experiment {
+
+/// How a run went, as far as the executive can tell; the metrics of braking come from the records.
+struct RunOutcome {
+  rig::Reason reason{rig::Reason::none};
+  double reason_value{0.0};
+  driver::IoResult io_error{};    ///< the driver's last error
+  driver::IoResult safe_state{};  ///< did the safe state reach the board at the end?
+  runtime::RealtimeReport realtime{};
+  bool ran{false};  ///< false: real time was required and not to be had; nothing moved
+  [[nodiscard]] bool completed() const noexcept { return reason == rig::Reason::sequence_complete; }
+};
+
+/// One run, from an unconfigured driver to the safe state. Owns what the real-time thread works on and keeps the slow
+/// side, the sinks, in the calling thread.
+class RunSession {
+ public:
+  /// @param sinks get every record, in this order, in the thread that calls `run_...`
+  RunSession(runtime::Clock& clock, driver::RigDriver& driver, RunLogicParts parts,
+             const runtime::GateOptions& gate_options, std::vector<rig::RecordSink*> sinks);
+
+  /// Asked every few milliseconds of a run in real time, every second of one in virtual time, outside the real-time
+  /// thread: a reason other than `none` ends the run in an orderly way.
+  using Poll = std::function<rig::Reason()>;
+
+  /// Runs in the calling thread as fast as it can: for a virtual clock.
+  /// Both throw driver::Unavailable if the driver cannot start, and what a sink throws when it finishes; the rig is in
+  /// the safe state whichever way they end.
+  RunOutcome run_fast(const Poll& poll);
+  /// Runs the cycle in a thread of its own with the real-time set-up of `options`.
+  RunOutcome run_realtime(const runtime::RealtimeOptions& options, const Poll& poll);
+
+  [[nodiscard]] const runtime::CyclicExecutive& executive() const noexcept { return executive_; }
+  [[nodiscard]] const runtime::CommandGate& gate() const noexcept { return gate_; }
+  [[nodiscard]] std::uint64_t record_drops() const noexcept { return ring_.drops(); }
+  /// True once the run's thread has obtained real time.
+  [[nodiscard]] bool realtime() const noexcept { return realtime_.realtime(); }
+  /// How the run went, after it.
+  [[nodiscard]] RunOutcome outcome() const;
+  [[nodiscard]] const rig::CycleRecord& latest() const noexcept { return pump_.latest(); }
+
+ private:
+  runtime::Clock& clock_;
+  driver::RigDriver& driver_;
+  RunLogic logic_;
+  runtime::CommandGate gate_;
+  runtime::RecordRing ring_;
+  runtime::CyclicExecutive executive_;
+  runtime::RecordPump pump_;
+  runtime::RealtimeReport realtime_{};
+  driver::IoResult safe_state_{};
+  bool ran_{false};
+};
+
+}  // namespace abs_hil::experiment

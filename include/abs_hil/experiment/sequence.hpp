@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "abs_hil/rig/measurement.hpp"
+#include "abs_hil/rig/phase.hpp"
+#include "abs_hil/rig/reason.hpp"
+
+namespace abs_hil::experiment {
+
+/// What drives the brake during a phase.
+enum class BrakeAction : std::uint8_t { released, torque, slip_control };
+
+/// What ends a phase. Speeds are estimates.
+enum class EndKind : std::uint8_t {
+  duration,           ///< value: s since the phase began
+  upper_speed_above,  ///< value: rad/s of the upper wheel
+  upper_wheel_peak,   ///< value: s without a new maximum of the upper wheel's speed
+  car_speed_below,    ///< value: m/s
+  standstill,         ///< both wheels stand; no value
+};
+
+struct EndCondition {
+  EndKind kind{EndKind::duration};
+  double value{0.0};
+  rig::Reason reason{rig::Reason::none};  ///< noted when this condition ends the phase
+};
+
+/// One phase: what acts, and what ends it, whichever condition comes first. Outlasting the time limit is a fault.
+struct PhasePlan {
+  rig::Phase phase{rig::Phase::idle};
+  double motor_duty{0.0};
+  BrakeAction brake{BrakeAction::released};
+  double brake_torque_Nm{0.0};  ///< for BrakeAction::torque
+  std::vector<EndCondition> ends_on{};
+  double time_limit_s{0.0};  ///< > 0
+};
+
+/// What the sequence looks at in each cycle.
+struct SequenceInput {
+  double time_s{0.0};  ///< since the start of the run, never decreasing
+  rig::WheelSpeeds speeds{};
+  double car_speed_m_s{0.0};
+  bool stands_still{false};
+};
+
+/// Steps through the phases of an experiment. `update` is real-time safe; the plans are made before the run.
+class Sequence {
+ public:
+  /// Throws std::invalid_argument for an empty list, a phase without an end or without a time limit.
+  explicit Sequence(std::vector<PhasePlan> plans);
+
+  struct Change {
+    bool entered{false};  ///< a phase begins in this cycle
+    rig::Reason reason{rig::Reason::none};
+    double value{0.0};
+  };
+  /// Enters the first phase on the first call, afterwards the next one as soon as an end condition holds.
+  Change update(const SequenceInput& input) noexcept;
+  /// Leaves the plans for the phase `stopped` (stop request) or `fault`, for one last cycle. The first reason stays.
+  void end_early(rig::Reason reason, double value) noexcept;
+
+  /// The phase that acts in this cycle.
+  [[nodiscard]] const PhasePlan& current() const noexcept { return ended_ ? last_ : plans_[index_]; }
+  /// True in the run's last cycle: the safe command goes out in it.
+  [[nodiscard]] bool finished() const noexcept { return ended_; }
+
+ private:
+  [[nodiscard]] const EndCondition* ending(const SequenceInput& input) noexcept;
+  void enter(std::size_t index, const SequenceInput& input) noexcept;
+  Change end(rig::Phase phase, rig::Reason reason, double value) noexcept;
+
+  std::vector<PhasePlan> plans_;
+  PhasePlan last_{};
+  std::size_t index_{0};
+  bool started_{false};
+  bool ended_{false};
+  rig::Reason early_reason_{rig::Reason::none};
+  double early_value_{0.0};
+  double entered_at_s_{0.0};
+  double peak_speed_rad_s_{0.0};
+  double peak_at_s_{0.0};
+};
+
+}  // namespace abs_hil::experiment

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+
+namespace abs_hil::runtime {
+
+/// Monotonic time in ns, injected so that the same cycle runs in real time, in virtual time and in tests.
+class Clock {
+ public:
+  Clock() = default;
+  Clock(const Clock&) = delete;
+  Clock& operator=(const Clock&) = delete;
+  virtual ~Clock() = default;
+  [[nodiscard]] virtual std::int64_t now_ns() noexcept = 0;
+  /// Returns at `time_ns` or later; at once if that has passed.
+  virtual void sleep_until(std::int64_t time_ns) noexcept = 0;
+};
+
+/// CLOCK_MONOTONIC with absolute sleeps. Real-time safe.
+class MonotonicClock final : public Clock {
+ public:
+  [[nodiscard]] std::int64_t now_ns() noexcept override;
+  void sleep_until(std::int64_t time_ns) noexcept override;
+};
+
+/// Time that passes only by sleeping: every wake-up is exact and every computation takes no time.
+class VirtualClock final : public Clock {
+ public:
+  [[nodiscard]] std::int64_t now_ns() noexcept override { return now_ns_; }
+  void sleep_until(std::int64_t time_ns) noexcept override {
+    if (time_ns > now_ns_) now_ns_ = time_ns;
+  }
+
+ private:
+  std::int64_t now_ns_{0};
+};
+
+}  // namespace abs_hil::runtime

@@ -1,0 +1,30 @@
+#pragma once
+
+#include "abs_hil/rig/command.hpp"
+#include "abs_hil/rig/cycle_record.hpp"
+#include "abs_hil/rig/measurement.hpp"
+#include "abs_hil/rig/reason.hpp"
+
+namespace abs_hil::runtime {
+
+/// The middle of the cycle, "estimate, sequence, control", as the executive sees it. All functions run in the real-time
+/// thread: no allocation, lock, system call, exception or log call.
+class CycleLogic {
+ public:
+  CycleLogic() = default;
+  CycleLogic(const CycleLogic&) = delete;
+  CycleLogic& operator=(const CycleLogic&) = delete;
+  virtual ~CycleLogic() = default;
+
+  /// One cycle: takes the measurement, fills `record.phase`, `.reason`, `.reason_value` and `.control`, and returns the
+  /// command wanted. A pure function of the measurements so far.
+  [[nodiscard]] virtual rig::Command step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept = 0;
+  /// What the gate let pass of it, and the rig now does.
+  virtual void commanded(const rig::Command& command) noexcept = 0;
+  /// The run must end: a stop was requested, or a fault was found outside. Takes effect in the next `step`.
+  virtual void end_early(rig::Reason reason, double value) noexcept = 0;
+  /// True once the step just made was the run's last.
+  [[nodiscard]] virtual bool finished() const noexcept = 0;
+};
+
+}  // namespace abs_hil::runtime

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "abs_hil/control/options.hpp"
+#include "abs_hil/driver/factory.hpp"
+#include "abs_hil/experiment/options.hpp"
+#include "abs_hil/plant_sim/options.hpp"
+#include "abs_hil/runtime/command_gate.hpp"
+#include "abs_hil/runtime/realtime_setup.hpp"
+
+namespace abs_hil::settings {
+
+/// Everything below `telemetry.` in the configuration.
+struct TelemetryOptions {
+  std::string channel_prefix{"ABS_"};
+  std::int32_t decimation{1};  ///< one ABS_TELEMETRY message every so many cycles, >= 1
+};
+
+/// One effective configuration: the defaults, then the plant's file, then the configuration file, then the command
+/// line.
+struct Settings {
+  plant_sim::PlantOptions plant{};
+  control::ControlOptions control{};
+  experiment::ExperimentOptions experiment{};
+  driver::DriverOptions driver{};
+  runtime::GateOptions gate{};
+  runtime::RealtimeOptions realtime{};
+  TelemetryOptions telemetry{};
+  std::string plant_name{"paper-table1"};
+  std::string backend{"sim"};
+  std::int64_t seed{1};
+};
+
+}  // namespace abs_hil::settings

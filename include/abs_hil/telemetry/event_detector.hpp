@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "abs_hil/rig/cycle_record.hpp"
+
+namespace abs_hil::telemetry {
+
+/// Values of event_t.kind.
+namespace event_kind {
+inline constexpr std::string_view phase = "phase";
+inline constexpr std::string_view fault = "fault";
+inline constexpr std::string_view limit = "limit";
+inline constexpr std::string_view command = "command";
+}  // namespace event_kind
+
+/// An event that a record gave rise to.
+struct DetectedEvent {
+  std::string_view kind;
+  std::string message;  ///< for people, one line
+};
+
+/// Finds events in the stream of records, so that the real-time thread handles numbers only. One event for each change
+/// of phase and each new reason, however many records repeat it or are missing in between.
+class EventDetector {
+ public:
+  /// Call with every record, in order. The first always gives an event.
+  [[nodiscard]] std::optional<DetectedEvent> observe(const rig::CycleRecord& record);
+
+ private:
+  struct Seen {
+    std::uint64_t sequence;
+    rig::Phase phase;
+    rig::Reason reason;
+  };
+  std::optional<Seen> last_;
+};
+
+}  // namespace abs_hil::telemetry

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abs_hil/rig/record_sink.hpp"
+#include "abs_hil/telemetry/event_detector.hpp"
+#include "abs_hil/telemetry/message_codec.hpp"
+#include "abs_hil/telemetry/outlet.hpp"
+#include "abs_hil/telemetry/status_snapshot.hpp"
+
+namespace abs_hil::telemetry {
+
+/// What is being run, for ABS_EXPERIMENT.
+struct ExperimentInfo {
+  std::string experiment;
+  std::string controller;
+  std::string plant;
+  std::string backend;
+  std::string config_json;  ///< effective configuration
+  std::string version;
+};
+
+/// How often messages go out.
+struct StreamOptions {
+  std::string channel_prefix{"ABS_"};       ///< letters, digits, '_', '-' and '/'; at most 48 characters
+  std::uint32_t telemetry_every_cycles{1};  ///< decimation of TELEMETRY, >= 1
+  double status_period_s{1.0};              ///< of run time, > 0
+  double experiment_period_s{5.0};          ///< of run time, > 0
+};
+
+/// Turns records into the messages of the ABS_ channels and gives the same ones to every outlet. Each channel's
+/// sequence is consecutive from 0; all stamps and times are those of the records, so that a run on virtual time gives
+/// the same bytes again. Used from one thread.
+class MessageStream : public rig::RecordSink {
+ public:
+  /// Throws std::invalid_argument for an option out of range, naming it.
+  MessageStream(StreamOptions options, ExperimentInfo experiment, StatusSource status);
+
+  /// `outlet` must outlive the stream. Before the first record.
+  void add(Outlet& outlet) { outlets_.push_back(&outlet); }
+
+  void consume(const rig::CycleRecord& record, double distance_m) override;
+  /// Sends a last ABS_STATUS and finishes every outlet, then throws the first FileError of theirs.
+  void finish() override;
+
+  /// An event of kind "command": the answer to a message on ABS_COMMAND.
+  void answer_command(rig::Reason reason, std::string message, double value);
+
+  [[nodiscard]] const std::string& command_channel() const noexcept { return command_channel_; }
+  /// Run time of the latest record, s.
+  [[nodiscard]] double time_s() const noexcept { return latest_.time_s; }
+  /// Messages that outlets could not pass on.
+  [[nodiscard]] std::uint64_t failures() const noexcept;
+
+ private:
+  struct Channel {
+    std::string name;
+    std::int64_t next_sequence{0};
+  };
+  template <class Message>
+  void send(Channel& channel, Message& message);
+  void send_event(std::string_view kind, rig::Reason reason, double value, std::string message);
+  void send_status();
+  void send_experiment();
+
+  StreamOptions options_;
+  StatusSource status_;
+  std::vector<Outlet*> outlets_;
+  Channel telemetry_;
+  Channel status_channel_;
+  Channel event_;
+  Channel experiment_;
+  std::string command_channel_;
+  experiment_t experiment_message_{};
+  EventDetector detector_;
+  EncodeBuffer buffer_;
+  rig::CycleRecord latest_{};
+  std::uint64_t next_telemetry_cycle_{0};
+  double next_status_s_{0.0};
+  double next_experiment_s_{0.0};
+  bool started_{false};
+  bool finished_{false};
+};
+
+}  // namespace abs_hil::telemetry

@@ -1,0 +1,122 @@
+#include "abs_hil/analysis/run_summary.hpp"
+
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <stdexcept>
+#include <utility>
+
+namespace abs_hil::analysis {
+
+namespace {
+
+nlohmann::ordered_json number(double value) {
+  return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
+}
+
+nlohmann::ordered_json to_json(const rig::DurationQuantiles& q) {
+  return {
+      {"p50", number(q.p50_us)}, {"p99", number(q.p99_us)}, {"p99_9", number(q.p99_9_us)}, {"max", number(q.max_us)}};
+}
+
+std::string shown(double value, int decimals, std::string_view unit) {
+  return std::isfinite(value) ? fmt::format("{:.{}f}{}{}", value, decimals, unit.empty() ? "" : " ", unit) : "-";
+}
+
+}  // namespace
+
+nlohmann::ordered_json to_json(const RunSummary& s) {
+  const Metrics& m = s.metrics;
+  return {{"result", s.result},
+          {"reason", s.reason},
+          {"controller", s.controller},
+          {"plant", s.plant},
+          {"backend", s.backend},
+          {"experiment", s.experiment},
+          {"brake_start_s", number(m.brake_start_s)},
+          {"stop_time_s", number(m.stop_time_s)},
+          {"stop_distance_m", number(m.stop_distance_m)},
+          {"slip_rms", number(m.slip_rms)},
+          {"slip_settling_s", number(m.slip_settling_s)},
+          {"theta_final_N", number(m.theta_final_N)},
+          {"theta_settling_s", number(m.theta_settling_s)},
+          {"torque_total_variation_Nm", number(m.torque_total_variation_Nm)},
+          {"truth_known", s.truth_known},
+          {"cycles", s.cycles},
+          {"overruns", s.overruns},
+          {"realtime", s.realtime},
+          {"virtual_time", s.virtual_time},
+          {"wakeup_latency_us", to_json(s.wakeup_latency)},
+          {"cycle_time_us", to_json(s.cycle_time)},
+          {"telemetry_drops", s.telemetry_drops},
+          {"publish_failures", s.publish_failures},
+          {"config", s.config}};
+}
+
+std::string to_text(const RunSummary& s) {
+  const Metrics& m = s.metrics;
+  std::string text = fmt::format("{}: {}\n", s.result, s.reason);
+  const auto line = [&text](std::string_view name, const std::string& value) {
+    text += fmt::format("  {:<22}{}\n", name, value);
+  };
+  line("experiment",
+       fmt::format("{}, controller {}, plant {}, backend {}", s.experiment, s.controller, s.plant, s.backend));
+  line("braking started at", shown(m.brake_start_s, 3, "s"));
+  line("stop time", shown(m.stop_time_s, 3, "s"));
+  line("stop distance", shown(m.stop_distance_m, 2, "m"));
+  line("slip error",
+       fmt::format("{} RMS, settled after {}", shown(m.slip_rms, 4, ""), shown(m.slip_settling_s, 3, "s")));
+  line("theta estimate",
+       fmt::format("{}, settled after {}", shown(m.theta_final_N, 2, "N"), shown(m.theta_settling_s, 3, "s")));
+  line("torque variation", shown(m.torque_total_variation_Nm, 1, "N m"));
+  line("cycles", fmt::format("{}, {} overruns, {} records dropped, {} messages not sent", s.cycles, s.overruns,
+                             s.telemetry_drops, s.publish_failures));
+  if (s.virtual_time) {
+    line("timing", "virtual time (--fast): no latencies to report");
+  } else {
+    const auto quantiles = [](const rig::DurationQuantiles& q) {
+      return fmt::format("p50 {:.0f}, p99 {:.0f}, p99.9 {:.0f}, max {:.0f} us", q.p50_us, q.p99_us, q.p99_9_us,
+                         q.max_us);
+    };
+    line("wake-up latency", quantiles(s.wakeup_latency));
+    line("cycle time", quantiles(s.cycle_time));
+    if (!s.realtime) line("real time", "NOT obtained: late cycles are to be expected");
+  }
+  if (!s.truth_known) line("note", "speeds and slip are estimates: this backend knows no truth");
+  return text;
+}
+
+SummaryFile::SummaryFile(std::filesystem::path path) : path_(std::move(path)), part_(path_) {
+  part_ += ".part";
+  std::error_code ignored;
+  const bool is_directory = std::filesystem::is_directory(path_, ignored);
+  errno = 0;
+  if (is_directory || !std::ofstream(part_)) {
+    throw std::runtime_error(
+        fmt::format("cannot write the summary to \"{}\": {}; give a path in an existing, writable directory",
+                    path_.string(), is_directory ? "it is a directory" : std::strerror(errno)));
+  }
+}
+
+SummaryFile::~SummaryFile() {
+  std::error_code ignored;
+  std::filesystem::remove(part_, ignored);
+}
+
+void SummaryFile::write(const RunSummary& summary) {
+  errno = 0;
+  std::ofstream file(part_);
+  file << to_json(summary).dump(2) << '\n';
+  file.close();
+  std::error_code error;
+  if (file) std::filesystem::rename(part_, path_, error);
+  if (!file || error) {
+    throw std::runtime_error(fmt::format("cannot write the summary to \"{}\": {}", path_.string(),
+                                         error ? error.message() : std::strerror(errno)));
+  }
+}
+
+}  // namespace abs_hil::analysis

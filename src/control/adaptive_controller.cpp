@@ -1,0 +1,73 @@
+#include "abs_hil/control/adaptive_controller.hpp"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "abs_hil/control/lyapunov.hpp"
+#include "abs_hil/rig/tyre_curve.hpp"
+
+namespace abs_hil::control {
+namespace {
+
+const AdaptiveOptions& checked(const AdaptiveOptions& options) {
+  const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
+  if (!positive(options.gamma) || !positive(options.ka1)) {
+    throw std::invalid_argument("adaptive.gamma and adaptive.ka1 must be > 0");
+  }
+  if (!(options.theta_min_N <= options.theta_max_N)) {
+    throw std::invalid_argument("adaptive.theta_min_N must not exceed adaptive.theta_max_N");
+  }
+  if (!std::isfinite(options.zeta0)) throw std::invalid_argument("adaptive.zeta0 must be finite");
+  return options;
+}
+
+/// Row 2 of P, since B = [0; 1].
+Eigen::RowVector2d error_weights(const AdaptiveOptions& options) {
+  Eigen::Matrix2d Q;
+  Q << options.q11, options.q12, options.q12, options.q22;
+  return solve_lyapunov(error_dynamics_matrix(options.ks0, options.ks1), Q).row(1);
+}
+
+}  // namespace
+
+AdaptiveController::AdaptiveController(const ControllerContext& context)
+    : wheels_{context.rig.wheels},
+      tyre_{context.rig.tyre},
+      dynamics_{context},
+      theta_{checked(context.options.adaptive), context.rig.wheels},
+      error_weights_{error_weights(context.options.adaptive)} {}
+
+void AdaptiveController::reset(const SlipInput& input) noexcept {
+  integral_.reset(slip_velocity_error_m_s(wheels_, input.speeds, input.slip_ref), input.slip_ref);
+  theta_.reset();
+  omega1_rad_s_ = input.speeds.omega1_rad_s;
+  slip_ = input.slip;
+}
+
+SlipOutput AdaptiveController::step(const SlipInput& input) noexcept {
+  const double error_m_s = slip_velocity_error_m_s(wheels_, input.speeds, input.slip_ref);
+  integral_.advance(input.dt_s, error_m_s, input.slip_ref, wheels_.r2_m * input.speeds.omega2_rad_s);
+  // Half way between the two slips: half the error of the trapezoid where phi bends most.
+  const double past_phi = rig::normalised_tyre_force(tyre_, 0.5 * (slip_ + input.slip));
+  adapt(input, past_phi);
+
+  const double torque_Nm =
+      dynamics_.brake_torque_Nm(input, integral_.value_m(), error_m_s, theta_.theta_N(), past_phi);
+  integral_.note_request(torque_Nm, input.max_brake_torque_Nm);
+  return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
+}
+
+void AdaptiveController::adapt(const SlipInput& input, double past_phi) noexcept {
+  const double weighted_error =
+      error_weights_[0] * integral_.mean_value_m() + error_weights_[1] * integral_.mean_error_m_s();
+  theta_.update({.dt_s = input.dt_s,
+                 .omega1_before_rad_s = omega1_rad_s_,
+                 .omega1_after_rad_s = input.speeds.omega1_rad_s,
+                 .brake_torque_Nm = input.mean_brake_torque_Nm,
+                 .phi = past_phi,
+                 .weighted_error = rig::slip_velocity_gain(wheels_, input.slip_ref) * weighted_error});
+  omega1_rad_s_ = input.speeds.omega1_rad_s;
+  slip_ = input.slip;
+}
+
+}  // namespace abs_hil::control

@@ -1,0 +1,35 @@
+#include "abs_hil/control/nominal_controller.hpp"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "abs_hil/rig/tyre_curve.hpp"
+
+namespace abs_hil::control {
+
+NominalController::NominalController(const ControllerContext& context)
+    : wheels_{context.rig.wheels},
+      tyre_{context.rig.tyre},
+      dynamics_{context},
+      theta0_N_{context.options.nominal.theta0_N != 0.0 ? context.options.nominal.theta0_N
+                                                        : context.rig.tyre.theta_N} {
+  if (!(theta0_N_ > 0.0 && std::isfinite(theta0_N_))) {
+    throw std::invalid_argument("nominal.theta0_N must be > 0, or 0 for the plant's own");
+  }
+}
+
+void NominalController::reset(const SlipInput& input) noexcept {
+  integral_.reset(slip_velocity_error_m_s(wheels_, input.speeds, input.slip_ref), input.slip_ref);
+}
+
+SlipOutput NominalController::step(const SlipInput& input) noexcept {
+  const double error_m_s = slip_velocity_error_m_s(wheels_, input.speeds, input.slip_ref);
+  integral_.advance(input.dt_s, error_m_s, input.slip_ref, wheels_.r2_m * input.speeds.omega2_rad_s);
+
+  const double phi = rig::normalised_tyre_force(tyre_, input.slip);
+  const double torque_Nm = dynamics_.brake_torque_Nm(input, integral_.value_m(), error_m_s, theta0_N_, phi);
+  integral_.note_request(torque_Nm, input.max_brake_torque_Nm);
+  return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta0_N_};
+}
+
+}  // namespace abs_hil::control

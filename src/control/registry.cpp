@@ -1,0 +1,67 @@
+#include "abs_hil/control/registry.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "abs_hil/control/adaptive_controller.hpp"
+#include "abs_hil/control/locked_controller.hpp"
+#include "abs_hil/control/nominal_controller.hpp"
+
+namespace abs_hil::control {
+namespace {
+
+template <class Controller>
+std::unique_ptr<SlipController> make(const ControllerContext& context) {
+  return std::make_unique<Controller>(context);
+}
+
+/// A new controller is one file pair and one line here.
+constexpr std::array table{
+    ControllerEntry{"adaptive", "adaptive slip control, estimates the peak tyre force: (17)-(18) of the paper",
+                    &make<AdaptiveController>},
+    ControllerEntry{"nominal", "slip control with a known peak tyre force: (16) of the paper",
+                    &make<NominalController>},
+    ControllerEntry{"locked", "full brake torque throughout: the reference without ABS", &make<LockedController>},
+};
+
+/// Least number of letters to insert, delete or replace to turn one word into the other (Levenshtein).
+std::size_t edit_distance(std::string_view from, std::string_view to) {
+  std::vector<std::size_t> row(to.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < to.size(); ++j) {
+      const std::size_t replaced = diagonal + (from[i] == to[j] ? 0U : 1U);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({row[j] + 1, row[j + 1] + 1, replaced});
+    }
+  }
+  return row[to.size()];
+}
+
+std::string unknown_name_message(std::string_view name) {
+  const auto nearest = std::ranges::min_element(
+      table, {}, [name](const ControllerEntry& entry) { return edit_distance(name, entry.name); });
+  std::string message = "unknown controller '" + std::string(name) + "'; did you mean '" + std::string(nearest->name) +
+                        "'? Known controllers:";
+  for (const ControllerEntry& entry : table) message += " " + std::string(entry.name);
+  return message;
+}
+
+}  // namespace
+
+std::span<const ControllerEntry> controllers() noexcept { return table; }
+
+std::unique_ptr<SlipController> make_controller(std::string_view name, const ControllerContext& context) {
+  const auto entry = std::ranges::find(table, name, &ControllerEntry::name);
+  if (entry == table.end()) throw std::invalid_argument(unknown_name_message(name));
+  return entry->make(context);
+}
+
+}  // namespace abs_hil::control

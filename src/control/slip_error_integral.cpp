@@ -1,0 +1,37 @@
+#include "abs_hil/control/slip_error_integral.hpp"
+
+namespace abs_hil::control {
+
+void SlipErrorIntegral::reset(double error_m_s, double slip_ref) noexcept {
+  *this = SlipErrorIntegral{};
+  error_m_s_ = error_m_s;
+  mean_error_m_s_ = error_m_s;
+  slip_ref_ = slip_ref;
+}
+
+void SlipErrorIntegral::advance(double dt_s, double error_m_s, double slip_ref, double v_x_m_s) noexcept {
+  // A reference that changes now changes e_v by a jump that the past interval did not see.
+  const double error_before_change = error_m_s + (slip_ref - slip_ref_) * v_x_m_s;
+  mean_error_m_s_ = 0.5 * (error_m_s_ + error_before_change);
+  error_m_s_ = error_m_s;
+  slip_ref_ = slip_ref;
+
+  // The torque holds -ks0 I: a negative error drives it up, a positive one down.
+  const bool winds_up = (request_ == Request::above && mean_error_m_s_ < 0.0) ||
+                        (request_ == Request::below && mean_error_m_s_ > 0.0);
+  const double increment_m = winds_up ? 0.0 : mean_error_m_s_ * dt_s;
+  mean_value_m_ = value_m_ + 0.5 * increment_m;
+  value_m_ += increment_m;
+}
+
+void SlipErrorIntegral::note_request(double torque_Nm, double max_torque_Nm) noexcept {
+  if (torque_Nm > max_torque_Nm) {
+    request_ = Request::above;
+  } else if (torque_Nm < 0.0) {
+    request_ = Request::below;
+  } else {
+    request_ = Request::within_range;
+  }
+}
+
+}  // namespace abs_hil::control

@@ -1,0 +1,35 @@
+#include "abs_hil/control/theta_estimator.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace abs_hil::control {
+
+ThetaEstimator::ThetaEstimator(const AdaptiveOptions& options, const rig::WheelParameters& wheels) noexcept
+    : wheels_{wheels},
+      gamma_{options.gamma},
+      innovation_gain_{options.gamma * options.ka1},
+      zeta0_N_{std::clamp(options.zeta0, options.theta_min_N, options.theta_max_N)},
+      theta_min_N_{options.theta_min_N},
+      theta_max_N_{options.theta_max_N},
+      theta_N_{zeta0_N_} {}
+
+void ThetaEstimator::reset() noexcept { theta_N_ = zeta0_N_; }
+
+void ThetaEstimator::update(const AdaptationInterval& past) noexcept {
+  if (!(past.phi > 0.0 && past.dt_s > 0.0)) return;
+  const auto& w = wheels_;
+  const double omega1_rate = (past.omega1_after_rad_s - past.omega1_before_rad_s) / past.dt_s;
+  const double omega1_mean = 0.5 * (past.omega1_before_rad_s + past.omega1_after_rad_s);
+  const double tyre_force_N =
+      (w.J1_kg_m2 * omega1_rate + w.d1_Nms_rad * omega1_mean + w.M10_Nm + past.brake_torque_Nm) / w.r1_m;
+  const double zeta_rate = -gamma_ * past.phi * past.weighted_error;
+
+  // theta' = rate_now - decay (theta - theta_now): over dt it covers (1 - exp(-decay dt))/decay of the present rate.
+  const double rate_now = zeta_rate + innovation_gain_ * (tyre_force_N - past.phi * theta_N_);
+  const double decay = innovation_gain_ * past.phi;
+  const double theta_N = theta_N_ - std::expm1(-decay * past.dt_s) / decay * rate_now;
+  theta_N_ = std::clamp(theta_N, theta_min_N_, theta_max_N_);
+}
+
+}  // namespace abs_hil::control

@@ -1,0 +1,66 @@
+#include "abs_hil/control/tracking_observer.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "abs_hil/rig/encoder_scale.hpp"
+
+namespace abs_hil::control {
+
+TrackingObserver::TrackingObserver(const ObserverOptions& options, std::int32_t counts_per_rev) noexcept
+    : bandwidth_rad_s_{options.bandwidth_rad_s},
+      standstill_time_s_{options.standstill_time_s},
+      rad_per_count_{rig::radians_per_count(counts_per_rev)} {}
+
+void TrackingObserver::reset(std::int32_t counts, double omega_rad_s) noexcept {
+  counts_ = counts;
+  angle_error_rad_ = 0.0;
+  omega_rad_s_ = omega_rad_s;
+  alpha_rad_s2_ = 0.0;
+  still_s_ = 0.0;
+}
+
+void TrackingObserver::update(std::int32_t counts, double dt_s) noexcept {
+  if (!(dt_s > 0.0)) return;  // the travel then counts for the next interval
+  const std::int32_t travel = rig::counts_between(counts_, counts);
+  counts_ = counts;
+  still_s_ = travel == 0 ? still_s_ + dt_s : 0.0;
+  if (stands_still()) {
+    angle_error_rad_ = 0.0;
+    omega_rad_s_ = 0.0;
+    alpha_rad_s2_ = 0.0;
+    return;
+  }
+  predict_and_correct(static_cast<double>(travel) * rad_per_count_, dt_s);
+  if (travel == 0) bound_by_silence();
+}
+
+void TrackingObserver::predict_and_correct(double travel_rad, double dt_s) noexcept {
+  // Fading-memory gains that put all three poles of the discrete filter at p = exp(-bandwidth dt); q = 1 - p.
+  const double q = -std::expm1(-bandwidth_rad_s_ * dt_s);
+  const double p = 1.0 - q;
+  const double angle_gain = 1.0 - p * p * p;
+  const double omega_gain = 1.5 * q * q * (1.0 + p) / dt_s;
+  const double alpha_gain = q * q * q / (dt_s * dt_s);
+
+  const double omega_predicted = omega_rad_s_ + alpha_rad_s2_ * dt_s;
+  const double turned_rad = 0.5 * (omega_rad_s_ + omega_predicted) * dt_s;
+  const double residual_rad = travel_rad - (angle_error_rad_ + turned_rad);
+
+  // Estimate less reading: the prediction is off by -residual, of which the angle gain takes its part away.
+  angle_error_rad_ = (angle_gain - 1.0) * residual_rad;
+  omega_rad_s_ = omega_predicted + omega_gain * residual_rad;
+  alpha_rad_s2_ += alpha_gain * residual_rad;
+}
+
+void TrackingObserver::bound_by_silence() noexcept {
+  // Less than one count passed since the last one came: the mean speed is below one count per that time, the present
+  // speed below twice that under constant acceleration. Without this the filter would swing through zero after a wheel
+  // locks, and ring after a lone count.
+  const double bound_rad_s = 2.0 * rad_per_count_ / still_s_;
+  if (std::abs(omega_rad_s_) <= bound_rad_s) return;
+  omega_rad_s_ = std::copysign(bound_rad_s, omega_rad_s_);
+  if (alpha_rad_s2_ * omega_rad_s_ > 0.0) alpha_rad_s2_ = 0.0;
+}
+
+}  // namespace abs_hil::control

@@ -1,0 +1,83 @@
+#include "abs_hil/driver/sim/sim_driver.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <stdexcept>
+#include <string>
+
+#include "abs_hil/plant_sim/encoder.hpp"
+#include "abs_hil/rig/encoder_scale.hpp"
+
+namespace abs_hil::driver {
+namespace {
+
+constexpr double duty_steps = 4095.0;  ///< the card's PWM has 12 bits
+
+bool is_duty(double value) noexcept { return value >= 0.0 && value <= 1.0; }  // false for NaN
+
+double quantised(double duty) noexcept { return std::round(duty * duty_steps) / duty_steps; }
+
+/// A number in [0, 1) from the generator's upper 32 bits: the same with every standard library, and far enough from 1
+/// that no rounding reaches the next count.
+double fraction_of_count(std::mt19937_64& generator) { return static_cast<double>(generator() >> 32U) * 0x1p-32; }
+
+}  // namespace
+
+SimDriver::SimDriver(const plant_sim::PlantOptions& plant, const SimStart& start) : plant_(plant), start_(start) {
+  if (!std::isfinite(start.start_speed_rad_s) || start.start_speed_rad_s < 0.0) {
+    throw std::invalid_argument("start speed " + std::to_string(start.start_speed_rad_s) +
+                                " rad/s: must be finite and >= 0");
+  }
+}
+
+SimDriver::~SimDriver() { static_cast<void>(deactivate()); }
+
+rig::PlantTruth SimDriver::truth() const noexcept { return plant_.truth(); }
+
+void SimDriver::do_configure() {}  // the plant's options were checked when it was made
+
+void SimDriver::do_activate(std::int64_t now_ns) {
+  std::mt19937_64 generator(start_.seed);
+  const double count_rad = rig::radians_per_count(plant_.options().rig.encoder_counts_per_rev);
+  upper_offset_rad_ = fraction_of_count(generator) * count_rad;
+  lower_offset_rad_ = fraction_of_count(generator) * count_rad;
+  plant_.reset({.omega1_rad_s = start_.start_speed_rad_s, .omega2_rad_s = start_.start_speed_rad_s});
+  input_ = {};
+  time_ns_ = now_ns;
+}
+
+IoResult SimDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept {
+  if (now_ns > time_ns_) {
+    plant_.advance(static_cast<double>(now_ns - time_ns_) * 1e-9, input_);
+    time_ns_ = now_ns;
+  }
+  const plant_sim::PlantState& state = plant_.state();
+  const std::int32_t counts_per_rev = plant_.options().rig.encoder_counts_per_rev;
+  measurement = {};
+  measurement.time_ns = time_ns_;
+  measurement.upper_counts = plant_sim::encoder_counts(state.angle1_rad + upper_offset_rad_, counts_per_rev);
+  measurement.lower_counts = plant_sim::encoder_counts(state.angle2_rad + lower_offset_rad_, counts_per_rev);
+  if (plant_.options().ideal_sensors) {
+    measurement.ideal_speeds = rig::WheelSpeeds{state.omega1_rad_s, state.omega2_rad_s};
+  }
+  return {};
+}
+
+IoResult SimDriver::do_write(const rig::Command& command) noexcept {
+  const bool torque_fits = std::isfinite(command.brake_torque_Nm) && command.brake_torque_Nm >= 0.0;
+  if (!is_duty(command.motor_duty) || !is_duty(command.brake_duty) || !torque_fits) {
+    return {IoError::command_out_of_range};
+  }
+  input_.motor_duty = command.motor_enable ? quantised(command.motor_duty) : 0.0;
+  input_.brake_duty = plant_.options().ideal_actuator ? command.brake_duty : quantised(command.brake_duty);
+  input_.brake_torque_Nm = command.brake_torque_Nm;
+  return {};
+}
+
+IoResult SimDriver::do_make_safe() noexcept {
+  input_ = {};
+  return {};
+}
+
+}  // namespace abs_hil::driver

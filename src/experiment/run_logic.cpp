@@ -1,0 +1,103 @@
+#include "abs_hil/experiment/run_logic.hpp"
+
+#include <utility>
+
+#include "abs_hil/rig/tyre_curve.hpp"
+
+namespace abs_hil::experiment {
+
+namespace {
+constexpr double s_per_ns = 1e-9;
+/// Below this car speed the estimated slip would be encoder noise over next to nothing; slip control has ended by then.
+constexpr double slip_floor_m_s = 0.1;
+}  // namespace
+
+RunLogic::RunLogic(RunLogicParts parts)
+    : wheels_(parts.rig.wheels),
+      slip_ref_(parts.control.slip_ref),
+      start_speed_rad_s_(parts.start_speed_rad_s),
+      controller_(std::move(parts.controller)),
+      sequence_(std::move(parts.sequence)),
+      upper_(parts.control.observer, parts.rig.encoder_counts_per_rev),
+      lower_(parts.control.observer, parts.rig.encoder_counts_per_rev),
+      actuator_(parts.rig.brake, parts.ideal_actuator, parts.max_brake_duty) {}
+
+void RunLogic::estimate(const rig::Measurement& measurement, double dt_s) noexcept {
+  if (!started_) {
+    upper_.reset(measurement.upper_counts, start_speed_rad_s_);
+    lower_.reset(measurement.lower_counts, start_speed_rad_s_);
+    actuator_.reset();
+  } else if (dt_s > 0.0) {
+    upper_.update(measurement.upper_counts, dt_s);
+    lower_.update(measurement.lower_counts, dt_s);
+    actuator_.advance(dt_s);
+  }
+  if (measurement.ideal_speeds) {
+    speeds_ = *measurement.ideal_speeds;
+    stands_still_ = speeds_.omega1_rad_s == 0.0 && speeds_.omega2_rad_s == 0.0;
+  } else {
+    speeds_ = {upper_.omega_rad_s(), lower_.omega_rad_s()};
+    stands_still_ = upper_.stands_still() && lower_.stands_still();
+  }
+  slip_ = rig::wheel_slip(wheels_.r1_m * speeds_.omega1_rad_s, wheels_.r2_m * speeds_.omega2_rad_s, slip_floor_m_s);
+}
+
+double RunLogic::slip_control(double dt_s, bool entered, rig::ControlState& state) noexcept {
+  control::SlipInput input{.dt_s = entered ? 0.0 : dt_s,
+                           .speeds = speeds_,
+                           .slip = slip_,
+                           .slip_ref = slip_ref_,
+                           .mean_brake_torque_Nm = actuator_.mean_torque_Nm(),
+                           .brake_torque_Nm = actuator_.torque_Nm(),
+                           .max_brake_torque_Nm = actuator_.max_torque_Nm()};
+  if (entered) controller_->reset(input);
+  const control::SlipOutput output = controller_->step(input);
+  state.slip_velocity_error_m_s = output.slip_velocity_error_m_s;
+  state.theta_est_N = output.theta_est_N;
+  return output.brake_torque_Nm;
+}
+
+rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept {
+  if (!started_) start_ns_ = last_ns_ = measurement.time_ns;
+  const double dt_s = static_cast<double>(measurement.time_ns - last_ns_) * s_per_ns;
+  last_ns_ = measurement.time_ns;
+  estimate(measurement, dt_s);
+  started_ = true;
+
+  const Sequence::Change change =
+      sequence_.update({.time_s = static_cast<double>(measurement.time_ns - start_ns_) * s_per_ns,
+                        .speeds = speeds_,
+                        .car_speed_m_s = wheels_.r2_m * speeds_.omega2_rad_s,
+                        .stands_still = stands_still_});
+  if (change.entered && sequence_.finished()) end_ = change;
+  const PhasePlan& plan = sequence_.current();
+  record.phase = plan.phase;
+  record.reason = change.reason;
+  record.reason_value = change.value;
+
+  rig::ControlState& state = record.control;
+  state.speeds_est = speeds_;
+  state.slip_est = slip_;
+  state.slip_ref = slip_ref_;
+  state.brake_torque_est_Nm = actuator_.torque_Nm();
+
+  double torque_Nm = 0.0;
+  if (plan.brake == BrakeAction::slip_control) {
+    torque_Nm = slip_control(dt_s, change.entered, state);
+  } else if (plan.brake == BrakeAction::torque) {
+    torque_Nm = plan.brake_torque_Nm;
+  }
+  torque_Nm = actuator_.limited(torque_Nm);
+  state.brake_torque_ref_Nm = torque_Nm;
+
+  return {.motor_duty = plan.motor_duty,
+          .brake_duty = actuator_.duty_for(torque_Nm),
+          .motor_enable = plan.motor_duty > 0.0,
+          .brake_torque_Nm = torque_Nm};
+}
+
+void RunLogic::commanded(const rig::Command& command) noexcept {
+  actuator_.command(command.brake_duty, command.brake_torque_Nm);
+}
+
+}  // namespace abs_hil::experiment

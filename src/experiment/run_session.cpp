@@ -1,0 +1,115 @@
+#include "abs_hil/experiment/run_session.hpp"
+
+#include <cmath>
+#include <future>
+#include <thread>
+#include <utility>
+
+namespace abs_hil::experiment {
+
+namespace {
+
+constexpr std::int64_t poll_interval_ns = 2'000'000;
+/// Records the ring holds: 0.8 s at 10 kHz, time enough for a slow disk.
+constexpr std::size_t ring_capacity = 8192;
+constexpr int fast_cycles_per_drain = 1000;
+
+std::int64_t period_ns_for(double rate_Hz) noexcept { return std::llround(1e9 / rate_Hz); }
+
+/// Leaves the rig in the safe state however the run ends.
+class ActiveDriver {
+ public:
+  ActiveDriver(driver::RigDriver& driver, std::int64_t now_ns) : driver_(driver) {
+    driver_.configure();
+    driver_.activate(now_ns);
+  }
+  ActiveDriver(const ActiveDriver&) = delete;
+  ActiveDriver& operator=(const ActiveDriver&) = delete;
+  ~ActiveDriver() { static_cast<void>(driver_.deactivate()); }
+
+ private:
+  driver::RigDriver& driver_;
+};
+
+}  // namespace
+
+RunSession::RunSession(runtime::Clock& clock, driver::RigDriver& driver, RunLogicParts parts,
+                       const runtime::GateOptions& gate_options, std::vector<rig::RecordSink*> sinks)
+    : clock_(clock),
+      driver_(driver),
+      logic_(std::move(parts)),
+      gate_(gate_options),
+      ring_(ring_capacity),
+      executive_(clock, driver, logic_, gate_, ring_, period_ns_for(parts.control.rate_Hz)),
+      pump_(ring_, parts.rig.wheels.r2_m, std::move(sinks)) {}
+
+RunOutcome RunSession::outcome() const {
+  return {.reason = logic_.end_reason(),
+          .reason_value = logic_.end_value(),
+          .io_error = executive_.io_error(),
+          .safe_state = safe_state_,
+          .realtime = realtime_,
+          .ran = ran_};
+}
+
+RunOutcome RunSession::run_fast(const Poll& poll) {
+  const ActiveDriver active(driver_, clock_.now_ns());
+  ran_ = true;
+  bool running = true;
+  while (running) {
+    for (int i = 0; i < fast_cycles_per_drain && running; ++i) running = executive_.step();
+    pump_.drain();
+    if (const rig::Reason stop = poll(); stop != rig::Reason::none) executive_.request_stop(stop);
+  }
+  safe_state_ = driver_.deactivate();
+  pump_.finish();
+  return outcome();
+}
+
+RunOutcome RunSession::run_realtime(const runtime::RealtimeOptions& options, const Poll& poll) {
+  std::promise<runtime::RealtimeReport> set_up;
+  std::promise<bool> go;
+  std::atomic<bool> running{true};
+  std::jthread cycle([&] {
+    set_up.set_value(runtime::set_up_realtime(options));
+    if (go.get_future().get()) {
+      while (executive_.step()) {
+      }
+      // Here and not in the slow thread: nothing must delay the safe state.
+      safe_state_ = driver_.deactivate();
+    }
+    running.store(false, std::memory_order_release);
+  });
+
+  realtime_ = set_up.get_future().get();
+  if (options.mode == runtime::RealtimeMode::require && !realtime_.realtime()) {
+    go.set_value(false);
+    return outcome();
+  }
+  try {
+    driver_.configure();
+    driver_.activate(clock_.now_ns());
+  } catch (...) {
+    go.set_value(false);
+    throw;
+  }
+  ran_ = true;
+  go.set_value(true);
+  try {
+    while (running.load(std::memory_order_acquire)) {
+      pump_.drain();
+      if (const rig::Reason stop = poll(); stop != rig::Reason::none) executive_.request_stop(stop);
+      clock_.sleep_until(clock_.now_ns() + poll_interval_ns);
+    }
+  } catch (...) {
+    // Without its slow side the run is worthless: end it in order, then report.
+    executive_.request_stop(rig::Reason::terminate_signal);
+    cycle.join();
+    throw;
+  }
+  cycle.join();
+  pump_.finish();
+  return outcome();
+}
+
+}  // namespace abs_hil::experiment

@@ -1,0 +1,88 @@
+#include "abs_hil/experiment/sequence.hpp"
+
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace abs_hil::experiment {
+
+namespace {
+/// Encoder noise must not count as a new maximum of the wheel's speed.
+constexpr double peak_margin_rad_s = 0.2;
+}  // namespace
+
+Sequence::Sequence(std::vector<PhasePlan> plans) : plans_(std::move(plans)) {
+  if (plans_.empty()) throw std::invalid_argument("a sequence needs at least one phase");
+  for (const PhasePlan& plan : plans_) {
+    const std::string name(rig::name_of(plan.phase));
+    if (plan.ends_on.empty()) throw std::invalid_argument("phase " + name + " has no end condition");
+    if (!(plan.time_limit_s > 0.0)) throw std::invalid_argument("phase " + name + " has no time limit above 0 s");
+  }
+}
+
+void Sequence::enter(std::size_t index, const SequenceInput& input) noexcept {
+  index_ = index;
+  started_ = true;
+  entered_at_s_ = input.time_s;
+  peak_speed_rad_s_ = input.speeds.omega1_rad_s;
+  peak_at_s_ = input.time_s;
+}
+
+const EndCondition* Sequence::ending(const SequenceInput& input) noexcept {
+  if (input.speeds.omega1_rad_s > peak_speed_rad_s_ + peak_margin_rad_s) {
+    peak_speed_rad_s_ = input.speeds.omega1_rad_s;
+    peak_at_s_ = input.time_s;
+  }
+  const auto holds = [&](const EndCondition& condition) {
+    switch (condition.kind) {
+      case EndKind::duration: return input.time_s - entered_at_s_ >= condition.value;
+      case EndKind::upper_speed_above: return input.speeds.omega1_rad_s >= condition.value;
+      // A wheel that has not started to turn has no peak yet.
+      case EndKind::upper_wheel_peak:
+        return peak_speed_rad_s_ > peak_margin_rad_s && input.time_s - peak_at_s_ >= condition.value;
+      case EndKind::car_speed_below: return input.car_speed_m_s < condition.value;
+      case EndKind::standstill: return input.stands_still;
+    }
+    return false;
+  };
+  for (const EndCondition& condition : plans_[index_].ends_on) {
+    if (holds(condition)) return &condition;
+  }
+  return nullptr;
+}
+
+Sequence::Change Sequence::end(rig::Phase phase, rig::Reason reason, double value) noexcept {
+  ended_ = true;
+  last_.phase = phase;
+  return {true, reason, value};
+}
+
+Sequence::Change Sequence::update(const SequenceInput& input) noexcept {
+  if (ended_) return {};
+  if (early_reason_ != rig::Reason::none) {
+    const bool stop = rig::is_stop_request(early_reason_);
+    return end(stop ? rig::Phase::stopped : rig::Phase::fault, early_reason_, early_value_);
+  }
+  if (!started_) {
+    enter(0, input);
+    return {true, rig::Reason::run_started, input.speeds.omega2_rad_s};
+  }
+  if (const EndCondition* condition = ending(input)) {
+    if (index_ + 1 == plans_.size()) return end(rig::Phase::stopped, rig::Reason::sequence_complete, input.time_s);
+    enter(index_ + 1, input);
+    return {true, condition->reason, condition->value};
+  }
+  const double lasted_s = input.time_s - entered_at_s_;
+  if (lasted_s > plans_[index_].time_limit_s) {
+    return end(rig::Phase::fault, rig::Reason::phase_time_limit, lasted_s);
+  }
+  return {};
+}
+
+void Sequence::end_early(rig::Reason reason, double value) noexcept {
+  if (early_reason_ != rig::Reason::none) return;
+  early_reason_ = reason;
+  early_value_ = value;
+}
+
+}  // namespace abs_hil::experiment

@@ -1,0 +1,130 @@
+// The table of all configuration keys: name, unit, meaning, place, range.
+
+#include "abs_hil/control/registry.hpp"
+#include "abs_hil/experiment/experiments.hpp"
+#include "abs_hil/settings/key_table.hpp"
+
+namespace abs_hil::settings {
+
+namespace {
+
+constexpr Range positive(double most) { return {0.0, most, true, false}; }
+constexpr Range from_zero(double most) { return {0.0, most, false, false}; }
+constexpr Range between(double least, double most) { return {least, most, false, false}; }
+constexpr Range open(double least, double most) { return {least, most, true, true}; }
+
+void add_plant_keys(std::vector<Key>& keys, plant_sim::PlantOptions& p) {
+  rig::WheelParameters& w = p.rig.wheels;
+  rig::BrakeParameters& b = p.rig.brake;
+  keys.insert(keys.end(),
+              {
+                  {"plant.theta_N", "N", "peak tyre force, theta = mu D of (10)", &p.rig.tyre.theta_N, positive(500)},
+                  {"plant.B", "", "tyre stiffness factor of (4)", &p.rig.tyre.B, positive(200)},
+                  {"plant.C", "", "tyre shape factor of (4)", &p.rig.tyre.C, positive(2)},
+                  {"plant.r1_m", "m", "upper wheel radius", &w.r1_m, between(0.01, 1)},
+                  {"plant.r2_m", "m", "lower wheel radius", &w.r2_m, between(0.01, 1)},
+                  {"plant.J1_kg_m2", "kg m^2", "upper wheel moment of inertia", &w.J1_kg_m2, between(1e-4, 1)},
+                  {"plant.J2_kg_m2", "kg m^2", "lower wheel moment of inertia", &w.J2_kg_m2, between(1e-4, 1)},
+                  {"plant.d1_Nms_rad", "N m s/rad", "upper wheel viscous friction", &w.d1_Nms_rad, from_zero(0.1)},
+                  {"plant.d2_Nms_rad", "N m s/rad", "lower wheel viscous friction", &w.d2_Nms_rad, from_zero(0.1)},
+                  {"plant.M10_Nm", "N m", "upper wheel Coulomb friction", &w.M10_Nm, from_zero(10)},
+                  {"plant.M20_Nm", "N m", "lower wheel Coulomb friction", &w.M20_Nm, from_zero(10)},
+                  {"plant.b1_Nm", "N m", "slope of the brake map (7)", &b.b1_Nm, positive(1000)},
+                  {"plant.b2_Nm", "N m", "offset of the brake map (7)", &b.b2_Nm, between(-1000, 1000)},
+                  {"plant.u0", "", "brake duty below which there is no torque (7)", &b.u0, {0, 1, false, true}},
+                  {"plant.c31_per_s", "1/s", "inverse time constant of the brake (6)", &b.c31_per_s, positive(1000)},
+                  {"plant.motor_stall_torque_Nm", "N m", "drive motor's torque at standstill and full duty",
+                   &p.rig.motor.stall_torque_Nm, positive(100)},
+                  {"plant.motor_no_load_speed_rad_s", "rad/s", "drive motor's no-load speed",
+                   &p.rig.motor.no_load_speed_rad_s, positive(2000)},
+                  {"plant.encoder_counts_per_rev", "", "encoder counts per revolution", &p.rig.encoder_counts_per_rev,
+                   between(4, 1'000'000)},
+                  {"plant.ideal_actuator", "", "simulation: the torque asked for acts at once", &p.ideal_actuator},
+                  {"plant.ideal_sensors", "", "simulation: controllers get the true speeds", &p.ideal_sensors},
+                  {"plant.slip_regularisation_m_s", "m/s", "simulation: least car speed that (5) divides by",
+                   &p.slip_regularisation_m_s, between(1e-3, 0.1)},
+                  {"plant.max_step_s", "s", "simulation: largest integration step", &p.max_step_s, between(1e-6, 2e-3)},
+              });
+}
+
+void add_control_keys(std::vector<Key>& keys, control::ControlOptions& c) {
+  std::vector<std::string_view> names;
+  for (const control::ControllerEntry& entry : control::controllers()) names.push_back(entry.name);
+  control::AdaptiveOptions& a = c.adaptive;
+  keys.insert(
+      keys.end(),
+      {
+          {"control.controller", "", "slip controller", &c.controller, {}, names},
+          {"control.rate_Hz", "Hz", "control cycles per second", &c.rate_Hz, between(100, 10'000)},
+          {"control.slip_ref", "", "wanted slip", &c.slip_ref, open(0, 1)},
+          {"control.v_min_m_s", "m/s", "car speed below which slip control ends", &c.v_min_m_s, between(0.05, 5)},
+          {"control.adaptive.gamma", "", "adaptation gain of (17)", &a.gamma, positive(1e4)},
+          {"control.adaptive.ks0", "1/s^2", "integral gain of (16), (18)", &a.ks0, positive(1e6)},
+          {"control.adaptive.ks1", "1/s", "proportional gain of (16), (18)", &a.ks1, positive(1e4)},
+          {"control.adaptive.ka1", "", "innovation's weight in (18)", &a.ka1, positive(1e3)},
+          {"control.adaptive.zeta0", "N", "zeta(0) of (17)", &a.zeta0, between(-500, 500)},
+          {"control.adaptive.q11", "", "Q of PA + A'P = -2Q", &a.q11, positive(1e6)},
+          {"control.adaptive.q12", "", "Q of PA + A'P = -2Q", &a.q12, between(-1e6, 1e6)},
+          {"control.adaptive.q22", "", "Q of PA + A'P = -2Q", &a.q22, positive(1e6)},
+          {"control.adaptive.theta_min_N", "N", "least theta the estimate may take", &a.theta_min_N, from_zero(500)},
+          {"control.adaptive.theta_max_N", "N", "largest theta the estimate may take", &a.theta_max_N, positive(1000)},
+          {"control.nominal.theta0_N", "N", "theta that (16) believes in; 0: the plant's", &c.nominal.theta0_N,
+           from_zero(500)},
+          {"control.observer.bandwidth_rad_s", "rad/s", "speed observer's triple pole", &c.observer.bandwidth_rad_s,
+           between(5, 2000)},
+          {"control.observer.standstill_time_s", "s", "time without a count after which a wheel stands",
+           &c.observer.standstill_time_s, between(0.005, 1)},
+      });
+}
+
+void add_experiment_keys(std::vector<Key>& keys, experiment::ExperimentOptions& e) {
+  std::vector<std::string_view> names;
+  for (const experiment::ExperimentEntry& entry : experiment::experiments()) names.push_back(entry.name);
+  keys.insert(
+      keys.end(),
+      {
+          {"experiment.name", "", "experiment", &e.name, {}, names},
+          {"experiment.start_speed_rad_s", "rad/s", "simulation: brake at once from this speed; 0: accelerate first",
+           &e.start_speed_rad_s, from_zero(1000)},
+          {"experiment.end_speed_m_s", "m/s", "car speed at which braking counts as done", &e.end_speed_m_s,
+           between(0.02, 50)},
+          {"experiment.cut", "", "what cuts the motor", &e.cut, {}, {"threshold", "peak"}},
+          {"experiment.cut_speed_rad_s", "rad/s", "upper wheel's speed that cuts the motor", &e.cut_speed_rad_s,
+           positive(1000)},
+          {"experiment.peak_wait_s", "s", "time without a new maximum that counts as a peak", &e.peak_wait_s,
+           between(0.05, 10)},
+          {"experiment.motor_duty", "", "drive PWM while accelerating", &e.motor_duty, positive(1)},
+          {"experiment.idle_s", "s", "time before the motor starts", &e.idle_s, from_zero(60)},
+          {"experiment.coast_s", "s", "time between motor off and brake on", &e.coast_s, from_zero(60)},
+          {"experiment.hold_torque_Nm", "N m", "brake torque from the end of slip control to standstill",
+           &e.hold_torque_Nm, from_zero(100)},
+          {"experiment.stopped_s", "s", "time recorded after standstill", &e.stopped_s, from_zero(60)},
+          {"experiment.accelerate_limit_s", "s", "time limit of acceleration", &e.accelerate_limit_s, positive(600)},
+          {"experiment.brake_limit_s", "s", "time limit of braking", &e.brake_limit_s, positive(600)},
+          {"experiment.hold_limit_s", "s", "time limit of holding", &e.hold_limit_s, positive(600)},
+      });
+}
+
+}  // namespace
+
+KeyTable::KeyTable(Settings& s) {
+  add_plant_keys(keys_, s.plant);
+  add_control_keys(keys_, s.control);
+  add_experiment_keys(keys_, s.experiment);
+  keys_.insert(
+      keys_.end(),
+      {
+          {"driver.kind", "", "board behind --backend rig", &s.driver.kind, {}, {"none"}},
+          {"gate.motor_duty_max", "", "largest drive PWM that may reach the rig", &s.gate.motor_duty_max, positive(1)},
+          {"gate.brake_duty_max", "", "largest brake PWM that may reach the rig", &s.gate.brake_duty_max, positive(1)},
+          {"gate.overspeed_rad_s", "rad/s", "speed of either wheel that is a fault", &s.gate.overspeed_rad_s,
+           positive(2000)},
+          {"realtime.priority", "", "SCHED_FIFO priority", &s.realtime.priority, between(1, 98)},
+          {"telemetry.channel_prefix", "", "prefix of the LCM channels", &s.telemetry.channel_prefix},
+          {"telemetry.decimation", "", "cycles for each telemetry message", &s.telemetry.decimation,
+           between(1, 10'000)},
+          {"run.seed", "", "seed of everything random in the simulator", &s.seed, from_zero(9e15)},
+      });
+}
+
+}  // namespace abs_hil::settings

@@ -1,0 +1,28 @@
+#include "abs_hil/telemetry/event_detector.hpp"
+
+namespace abs_hil::telemetry {
+
+std::optional<DetectedEvent> EventDetector::observe(const rig::CycleRecord& record) {
+  const bool first = !last_;
+  const bool phase_changed = first || record.phase != last_->phase;
+  const bool reason_is_new = record.reason != rig::Reason::none && (first || record.reason != last_->reason);
+  const rig::Phase phase_before = first ? record.phase : last_->phase;
+  const std::uint64_t records_lost = first ? record.sequence : record.sequence - last_->sequence - 1;
+  last_ = Seen{record.sequence, record.phase, record.reason};
+  if (!phase_changed && !reason_is_new) return std::nullopt;
+
+  DetectedEvent event;
+  if (rig::is_fault(record.reason) || (phase_changed && record.phase == rig::Phase::fault)) {
+    event.kind = event_kind::fault;
+  } else {
+    event.kind = phase_changed ? event_kind::phase : event_kind::limit;
+  }
+  if (phase_before != record.phase) event.message.append(rig::name_of(phase_before)).append(" -> ");
+  event.message.append(rig::name_of(record.phase));
+  if (record.reason != rig::Reason::none) event.message.append(": ").append(rig::description(record.reason));
+  // A change may have happened, with its reason, in a record that never arrived.
+  if (records_lost > 0) event.message.append(" (").append(std::to_string(records_lost)).append(" records lost before)");
+  return event;
+}
+
+}  // namespace abs_hil::telemetry

@@ -1,0 +1,49 @@
+#include "abs_hil/telemetry/lcm_outlet.hpp"
+
+#include <limits>
+#include <utility>
+
+#include "abs_hil/telemetry/lcm_url.hpp"
+#include "abs_hil/telemetry/route_probe.hpp"
+
+namespace abs_hil::telemetry {
+namespace {
+
+/// tcpq connects, blocks and prints two lines at every publish while its server is away: ask it once in so many
+/// seconds.
+constexpr double tcpq_retry_s = 1.0;
+
+std::string checked(std::string url) {
+  if (url.empty()) url = default_lcm_url();
+  const RouteProbe probe = probe_lcm_route(url);
+  if (!probe.usable) throw LcmError("LCM cannot use '" + url + "': " + probe.problem + ". To mend it:\n" + probe.fix);
+  return url;
+}
+
+}  // namespace
+
+LcmOutlet::LcmOutlet(std::string url)
+    : url_(checked(std::move(url))),
+      provider_(parse_lcm_url(url_).provider),
+      lcm_(url_),
+      next_try_s_(-std::numeric_limits<double>::infinity()) {
+  if (!lcm_.good()) {
+    const std::string need = probe_lcm_route(url_).fix;
+    throw LcmError("LCM does not start with '" + url_ + "'" + (need.empty() ? "" : " (" + need + ")") +
+                   "; check the URL, or run without LCM");
+  }
+}
+
+void LcmOutlet::send(const std::string& channel, std::span<const std::uint8_t> message, double time_s) noexcept {
+  if (time_s < next_try_s_) {
+    ++failures_;
+    return;
+  }
+  const int result =
+      lcm_publish(lcm_.getUnderlyingLCM(), channel.c_str(), message.data(), static_cast<unsigned int>(message.size()));
+  if (result == 0) return;
+  ++failures_;
+  if (provider_ == "tcpq") next_try_s_ = time_s + tcpq_retry_s;
+}
+
+}  // namespace abs_hil::telemetry

@@ -1,0 +1,66 @@
+#include "abs_hil/telemetry/log_outlet.hpp"
+
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "abs_hil/telemetry/file_error.hpp"
+
+namespace abs_hil::telemetry {
+namespace {
+
+constexpr std::size_t block_bytes = 64 * 1024;
+
+std::int64_t wall_clock_us() {
+  using std::chrono::duration_cast, std::chrono::microseconds, std::chrono::system_clock;
+  return duration_cast<microseconds>(system_clock::now().time_since_epoch()).count();
+}
+
+}  // namespace
+
+LogOutlet::LogOutlet(std::filesystem::path path, std::optional<std::int64_t> epoch_us)
+    : path_(std::move(path)), epoch_us_(epoch_us) {
+  errno = 0;
+  file_ = std::make_unique<lcm::LogFile>(path_.string(), "w");
+  if (!file_->good()) throw FileError("event log", path_, errno != 0 ? errno : EIO);
+  // The default buffer is 4 KiB, a write for every dozen cycles; without memory for ours that one stays.
+  (void)std::setvbuf(file_->getFilePtr(), nullptr, _IOFBF, block_bytes);
+}
+
+LogOutlet::~LogOutlet() = default;
+
+void LogOutlet::send(const std::string& channel, std::span<const std::uint8_t> message, double time_s) noexcept {
+  if (!file_ || error_number_ != 0) {  // after a short write the file has no valid end to append to
+    ++failures_;
+    return;
+  }
+  const std::int64_t run_time_us = std::llround(time_s * 1e6);
+  if (!epoch_us_) epoch_us_ = wall_clock_us() - run_time_us;
+  event_.timestamp = *epoch_us_ + run_time_us;
+  event_.channel = channel;
+  event_.datalen = static_cast<std::int32_t>(message.size());
+  event_.data = const_cast<std::uint8_t*>(message.data());  // LCM only reads it
+  errno = 0;
+  if (file_->writeEvent(&event_) != 0) {
+    ++failures_;
+    note_failure(errno);
+  }
+}
+
+void LogOutlet::finish() {
+  if (file_) {
+    // LogFile's destructor flushes too, but tells nobody how that went.
+    errno = 0;
+    if (std::fflush(file_->getFilePtr()) != 0) note_failure(errno);
+    file_.reset();
+  }
+  if (error_number_ != 0) throw FileError("event log", path_, error_number_);
+}
+
+void LogOutlet::note_failure(int error_number) noexcept {
+  if (error_number_ == 0) error_number_ = error_number != 0 ? error_number : EIO;
+}
+
+}  // namespace abs_hil::telemetry

@@ -1,0 +1,141 @@
+#include "abs_hil/telemetry/message_stream.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <exception>
+#include <stdexcept>
+#include <utility>
+
+#include "abs_hil/telemetry/file_error.hpp"
+
+namespace abs_hil::telemetry {
+namespace {
+
+void check(const StreamOptions& options) {
+  constexpr std::size_t prefix_max = 48;  // LCM's limit is 63 characters with the name
+  const auto allowed = [](unsigned char c) {
+    // Without regular-expression characters, as a subscription is one.
+    return c < 0x80 && (std::isalnum(c) != 0 || c == '_' || c == '-' || c == '/');
+  };
+  const std::string& prefix = options.channel_prefix;
+  if (prefix.size() > prefix_max || !std::all_of(prefix.begin(), prefix.end(), allowed)) {
+    throw std::invalid_argument("channel prefix '" + printable(prefix, 80) +
+                                "': at most 48 letters, digits, '_', '-' and '/'");
+  }
+  if (options.telemetry_every_cycles == 0) throw std::invalid_argument("telemetry_every_cycles must be at least 1");
+  if (!(options.status_period_s > 0.0)) throw std::invalid_argument("status_period_s must be above 0");
+  if (!(options.experiment_period_s > 0.0)) throw std::invalid_argument("experiment_period_s must be above 0");
+}
+
+/// The next time on the grid of `period_s` after `now_s`, so that late messages do not shift those to come.
+double next_on_grid(double now_s, double period_s) { return (std::floor(now_s / period_s + 1e-9) + 1.0) * period_s; }
+
+}  // namespace
+
+MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, StatusSource status)
+    : options_(std::move(options)), status_(std::move(status)) {
+  check(options_);
+  telemetry_.name = options_.channel_prefix + "TELEMETRY";
+  status_channel_.name = options_.channel_prefix + "STATUS";
+  event_.name = options_.channel_prefix + "EVENT";
+  experiment_.name = options_.channel_prefix + "EXPERIMENT";
+  command_channel_ = options_.channel_prefix + "COMMAND";
+  experiment_message_.experiment = std::move(experiment.experiment);
+  experiment_message_.controller = std::move(experiment.controller);
+  experiment_message_.plant = std::move(experiment.plant);
+  experiment_message_.backend = std::move(experiment.backend);
+  experiment_message_.config_json = std::move(experiment.config_json);
+  experiment_message_.version = std::move(experiment.version);
+}
+
+void MessageStream::consume(const rig::CycleRecord& record, double distance_m) {
+  latest_ = record;
+  if (!started_ || record.time_s >= next_experiment_s_) {
+    send_experiment();
+    next_experiment_s_ = next_on_grid(record.time_s, options_.experiment_period_s);
+  }
+  if (auto event = detector_.observe(record)) {
+    send_event(event->kind, record.reason, record.reason_value, std::move(event->message));
+  }
+  if (record.sequence >= next_telemetry_cycle_) {
+    telemetry_t message = to_message(record, distance_m, 0);
+    send(telemetry_, message);
+    next_telemetry_cycle_ = (record.sequence / options_.telemetry_every_cycles + 1) * options_.telemetry_every_cycles;
+  }
+  if (!started_ || record.time_s >= next_status_s_) {
+    send_status();
+    next_status_s_ = next_on_grid(record.time_s, options_.status_period_s);
+  }
+  started_ = true;
+}
+
+void MessageStream::finish() {
+  if (finished_) return;
+  finished_ = true;
+  if (started_) send_status();
+  std::exception_ptr first_error;
+  for (Outlet* outlet : outlets_) {
+    try {
+      outlet->finish();
+    } catch (const FileError&) {
+      if (!first_error) first_error = std::current_exception();
+    }
+  }
+  if (first_error) std::rethrow_exception(first_error);
+}
+
+void MessageStream::answer_command(rig::Reason reason, std::string message, double value) {
+  send_event(event_kind::command, reason, value, std::move(message));
+}
+
+std::uint64_t MessageStream::failures() const noexcept {
+  std::uint64_t sum = 0;
+  for (const Outlet* outlet : outlets_) sum += outlet->failures();
+  return sum;
+}
+
+template <class Message>
+void MessageStream::send(Channel& channel, Message& message) {
+  message.stamp_ns = latest_.stamp_ns;
+  message.sequence = channel.next_sequence++;
+  const auto bytes = buffer_.encode(message);
+  for (Outlet* outlet : outlets_) outlet->send(channel.name, bytes, latest_.time_s);
+}
+
+void MessageStream::send_event(std::string_view kind, rig::Reason reason, double value, std::string message) {
+  event_t event{};
+  event.time_s = latest_.time_s;
+  event.kind = kind;
+  event.phase = static_cast<std::int8_t>(latest_.phase);
+  event.reason = static_cast<std::int16_t>(reason);
+  event.reason_text = rig::description(reason);
+  event.value = value;
+  event.message = std::move(message);
+  send(event_, event);
+}
+
+void MessageStream::send_status() {
+  const StatusSnapshot snapshot = status_ ? status_() : StatusSnapshot{};
+  status_t m{};
+  m.time_s = latest_.time_s;
+  m.phase = static_cast<std::int8_t>(latest_.phase);
+  m.cycles = static_cast<std::int64_t>(snapshot.cycles);
+  m.overruns = static_cast<std::int64_t>(snapshot.overruns);
+  m.telemetry_drops = static_cast<std::int64_t>(snapshot.telemetry_drops);
+  m.publish_failures = static_cast<std::int64_t>(failures());
+  m.realtime = static_cast<std::int8_t>(snapshot.realtime);
+  m.wakeup_latency_p50_us = snapshot.wakeup_latency.p50_us;
+  m.wakeup_latency_p99_us = snapshot.wakeup_latency.p99_us;
+  m.wakeup_latency_p99_9_us = snapshot.wakeup_latency.p99_9_us;
+  m.wakeup_latency_max_us = snapshot.wakeup_latency.max_us;
+  m.cycle_time_p50_us = snapshot.cycle_time.p50_us;
+  m.cycle_time_p99_us = snapshot.cycle_time.p99_us;
+  m.cycle_time_p99_9_us = snapshot.cycle_time.p99_9_us;
+  m.cycle_time_max_us = snapshot.cycle_time.max_us;
+  send(status_channel_, m);
+}
+
+void MessageStream::send_experiment() { send(experiment_, experiment_message_); }
+
+}  // namespace abs_hil::telemetry

@@ -1,0 +1,80 @@
+#include "abs_hil/telemetry/status_line.hpp"
+
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <string>
+#include <utility>
+
+namespace abs_hil::telemetry {
+namespace {
+
+constexpr std::int64_t draw_period_ns = 100'000'000;
+constexpr std::string_view erase_line = "\r\x1b[K";
+
+int columns_of(int file) {
+  winsize size{};
+  return ::ioctl(file, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
+}
+
+}  // namespace
+
+std::string format_status_line(const rig::CycleRecord& record, const StatusSnapshot& status) {
+  const rig::WheelSpeeds speeds = rig::best_speeds(record);
+  const std::string_view phase = rig::name_of(record.phase);
+  std::array<char, 256> text{};
+  const int size = std::snprintf(
+      text.data(), text.size(), "%-10.*s ω1 %6.1f  ω2 %6.1f rad/s  slip %5.2f  θ̂ %6.2f N  overruns %llu  drops %llu",
+      static_cast<int>(phase.size()), phase.data(), speeds.omega1_rad_s, speeds.omega2_rad_s, rig::best_slip(record),
+      record.control.theta_est_N, static_cast<unsigned long long>(status.overruns),
+      static_cast<unsigned long long>(status.telemetry_drops));
+  // A speed of 1e300 fills the buffer; what there is room for will do.
+  if (size < 0) return {};
+  return {text.data(), std::min(static_cast<std::size_t>(size), text.size() - 1)};
+}
+
+std::string_view cut_to_columns(std::string_view text, int columns) noexcept {
+  int used = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    const bool continuation = (byte & 0xC0U) == 0x80U;
+    const bool combining = byte == 0xCC;  // U+0300 to U+033F: the hat of theta
+    if (continuation || combining) continue;
+    if (used == columns) return text.substr(0, i);
+    ++used;
+  }
+  return text;
+}
+
+StatusLine::StatusLine(StatusSource status, int file)
+    : status_(std::move(status)), file_(file), active_(::isatty(file) == 1) {}
+
+StatusLine::~StatusLine() { erase(); }
+
+void StatusLine::consume(const rig::CycleRecord& record, double /*distance_m*/) {
+  if (!active_ || (next_draw_ns_ && record.stamp_ns < *next_draw_ns_)) return;
+  next_draw_ns_ = record.stamp_ns + draw_period_ns;
+  const std::string text = format_status_line(record, status_ ? status_() : StatusSnapshot{});
+  std::string line(erase_line);
+  line += cut_to_columns(text, columns_of(file_) - 1);  // a full line would make some terminals scroll
+  put(line);
+  drawn_ = true;
+}
+
+void StatusLine::erase() noexcept {
+  if (drawn_) put(erase_line);
+  drawn_ = false;
+}
+
+void StatusLine::put(std::string_view text) noexcept {
+  pollfd ready{file_, POLLOUT, 0};
+  if (::poll(&ready, 1, 0) <= 0 || (ready.revents & POLLOUT) == 0) return;
+  // Nothing to be done about a failure here: the line is a courtesy.
+  [[maybe_unused]] const auto written = ::write(file_, text.data(), text.size());
+}
+
+}  // namespace abs_hil::telemetry

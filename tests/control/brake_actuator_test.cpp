@@ -1,0 +1,102 @@
+#include "abs_hil/control/brake_actuator.hpp"
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "catch.hpp"
+
+using namespace abs_hil;
+using Catch::Matchers::WithinAbs;
+
+namespace {
+
+const rig::BrakeParameters brake{};
+
+double map_Nm(double duty) { return duty >= brake.u0 ? brake.b1_Nm * duty + brake.b2_Nm : 0.0; }
+
+}  // namespace
+
+TEST_CASE("The inverse of the brake map gives back every torque that the map can give") {
+  const control::BrakeActuator actuator{brake, false, 1.0};
+  const double least = map_Nm(brake.u0), most = map_Nm(1.0);
+  CHECK_THAT(actuator.max_torque_Nm(), WithinAbs(most, 1e-12));
+  for (double torque = least; torque <= most; torque += 0.01) {
+    const double duty = actuator.duty_for(torque);
+    CHECK((duty >= brake.u0 && duty <= 1.0));
+    CHECK_THAT(map_Nm(duty), WithinAbs(torque, 1e-12));
+    CHECK_THAT(actuator.limited(torque), WithinAbs(torque, 1e-12));
+  }
+}
+
+TEST_CASE("Torques beyond the map are limited, those in the dead zone go to the nearer end of it") {
+  const control::BrakeActuator actuator{brake, false, 1.0};
+  const double least = map_Nm(brake.u0);
+  CHECK(actuator.limited(-3.0) == 0.0);
+  CHECK(actuator.duty_for(-3.0) == 0.0);
+  CHECK(actuator.limited(0.49 * least) == 0.0);
+  CHECK(actuator.duty_for(0.49 * least) == 0.0);
+  CHECK_THAT(actuator.limited(0.51 * least), WithinAbs(least, 1e-12));
+  CHECK_THAT(actuator.limited(1000.0), WithinAbs(map_Nm(1.0), 1e-12));
+  CHECK(actuator.duty_for(1000.0) == 1.0);
+
+  const control::BrakeActuator weaker{brake, false, 0.8};
+  CHECK_THAT(weaker.max_torque_Nm(), WithinAbs(map_Nm(0.8), 1e-12));
+  CHECK_THAT(weaker.limited(1000.0), WithinAbs(map_Nm(0.8), 1e-12));
+  CHECK(weaker.duty_for(1000.0) == 0.8);
+}
+
+TEST_CASE("The lag's torque and its mean are exact for any step, also a jittering one") {
+  control::BrakeActuator actuator{brake, false, 1.0};
+  std::mt19937 random{3};
+  std::uniform_real_distribution<double> step_s{1e-5, 0.05}, duty{0.0, 1.0};
+  double torque = 0.0;
+  for (int i = 0; i < 300; ++i) {
+    const double u = duty(random), dt = step_s(random);
+    actuator.command(u, std::numeric_limits<double>::quiet_NaN());  // on the rig the duty alone acts
+    actuator.advance(dt);
+    // Independent: Tb' = c31 (b(u) - Tb) by fine RK4, its mean by Simpson's rule over the same steps.
+    const double target = map_Nm(u);
+    const int n = 400;
+    const double h = dt / n;
+    double integral = 0.0;
+    for (int j = 0; j < n; ++j) {
+      const auto rate = [&](double y) { return brake.c31_per_s * (target - y); };
+      const double k1 = rate(torque), k2 = rate(torque + h / 2 * k1), k3 = rate(torque + h / 2 * k2),
+                   k4 = rate(torque + h * k3);
+      const double next = torque + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+      const double middle = (torque + next) / 2 + h / 8 * (rate(torque) - rate(next));
+      integral += h / 6 * (torque + 4 * middle + next);
+      torque = next;
+    }
+    CHECK_THAT(actuator.torque_Nm(), WithinAbs(torque, 1e-9));
+    CHECK_THAT(actuator.mean_torque_Nm(), WithinAbs(integral / dt, 1e-9));
+  }
+}
+
+TEST_CASE("Full brake reaches 63.2 % of its torque after one time constant") {
+  control::BrakeActuator actuator{brake, false, 1.0};
+  actuator.command(1.0, 0.0);
+  for (int i = 0; i < 7; ++i) actuator.advance(1.0 / brake.c31_per_s / 7.0);
+  CHECK_THAT(actuator.torque_Nm() / actuator.max_torque_Nm(), WithinAbs(1.0 - std::exp(-1.0), 1e-12));
+  actuator.reset();
+  CHECK(actuator.torque_Nm() == 0.0);
+  actuator.advance(0.01);
+  CHECK(actuator.torque_Nm() == 0.0);
+}
+
+TEST_CASE("With an ideal actuator the torque asked for acts at once, without limits") {
+  control::BrakeActuator actuator{brake, true, 1.0};
+  CHECK(std::isinf(actuator.max_torque_Nm()));
+  CHECK(actuator.limited(50.0) == 50.0);
+  CHECK(actuator.limited(0.01) == 0.01);
+  CHECK(actuator.limited(-1.0) == 0.0);
+  CHECK(actuator.duty_for(50.0) == 1.0);
+  actuator.command(0.0, 12.5);
+  CHECK(actuator.torque_Nm() == 12.5);
+  actuator.advance(0.003);
+  CHECK(actuator.mean_torque_Nm() == 12.5);
+  actuator.command(0.0, 4.0);
+  CHECK(actuator.torque_Nm() == 4.0);
+  CHECK(actuator.mean_torque_Nm() == 12.5);  // still that of the past interval
+}

@@ -1,0 +1,77 @@
+#include "abs_hil/control/registry.hpp"
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "catch.hpp"
+
+using namespace abs_hil;
+using Catch::Matchers::Contains;
+
+TEST_CASE("Every controller in the table can be made and brakes") {
+  const control::ControlOptions options;
+  const rig::RigParameters parameters;
+  REQUIRE(control::controllers().size() >= 3);
+  for (const auto& entry : control::controllers()) {
+    CAPTURE(entry.name);
+    CHECK_FALSE(entry.summary.empty());
+    const auto controller = control::make_controller(entry.name, {options, parameters});
+    const control::SlipInput input{.speeds = {150.0, 170.0},
+                                   .slip = 0.113,
+                                   .slip_ref = 0.15,
+                                   .max_brake_torque_Nm = std::numeric_limits<double>::infinity()};
+    controller->reset(input);
+    const auto output = controller->step(input);
+    CHECK(output.brake_torque_Nm > 0.0);
+    CHECK(output.slip_velocity_error_m_s ==
+          Catch::Detail::Approx(0.85 * 0.0990 * 170.0 - 0.0995 * 150.0).epsilon(1e-12));
+  }
+}
+
+TEST_CASE("An unknown name is answered with the nearest and all known ones") {
+  const control::ControlOptions options;
+  const rig::RigParameters parameters;
+  CHECK_THROWS_WITH(control::make_controller("adaptve", {options, parameters}),
+                    Contains("'adaptve'") && Contains("did you mean 'adaptive'") && Contains("nominal") &&
+                        Contains("locked"));
+  CHECK_THROWS_WITH(control::make_controller("loked", {options, parameters}), Contains("did you mean 'locked'"));
+  CHECK_THROWS_AS(control::make_controller("", {options, parameters}), std::invalid_argument);
+}
+
+TEST_CASE("Options that are not usable are refused when the controller is made") {
+  using Spoil = std::function<void(control::ControlOptions&)>;
+  const auto refused = [](std::string_view name, const Spoil& spoil) {
+    control::ControlOptions options;
+    const rig::RigParameters parameters;
+    spoil(options);
+    CHECK_THROWS_AS(control::make_controller(name, {options, parameters}), std::invalid_argument);
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  refused("adaptive", [](auto& o) { o.adaptive.gamma = 0.0; });
+  refused("adaptive", [](auto& o) { o.adaptive.ka1 = -1.0; });
+  refused("adaptive", [](auto& o) { o.adaptive.q12 = 2.0; });
+  refused("adaptive", [](auto& o) { o.adaptive.theta_min_N = 200.0; });
+  refused("adaptive", [=](auto& o) { o.adaptive.zeta0 = nan; });
+  refused("adaptive", [](auto& o) { o.rate_Hz = 0.0; });
+  for (const std::string_view name : {"adaptive", "nominal"}) {
+    refused(name, [](auto& o) { o.adaptive.ks0 = 0.0; });
+    refused(name, [=](auto& o) { o.adaptive.ks1 = nan; });
+    refused(name, [](auto& o) { o.v_min_m_s = 0.0; });
+  }
+  refused("nominal", [](auto& o) { o.nominal.theta0_N = -5.0; });
+}
+
+TEST_CASE("The locked controller asks for all that there is, and estimates nothing") {
+  const control::ControlOptions options;
+  const rig::RigParameters parameters;
+  const auto locked = control::make_controller("locked", {options, parameters});
+  control::SlipInput input{.speeds = {0.0, 170.0}, .slip = 1.0, .slip_ref = 0.15, .max_brake_torque_Nm = 4.0};
+  locked->reset(input);
+  CHECK(locked->step(input).brake_torque_Nm == 4.0);
+  CHECK(std::isnan(locked->step(input).theta_est_N));
+  input.max_brake_torque_Nm = std::numeric_limits<double>::infinity();
+  CHECK(locked->step(input).brake_torque_Nm == Catch::Detail::Approx(15.24 - 6.21));
+}

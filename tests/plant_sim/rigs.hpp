@@ -1,0 +1,26 @@
+#pragma once
+
+#include "abs_hil/plant_sim/plant.hpp"
+
+// Rigs for tests: Table 1 with parts of the physics taken away.
+namespace abs_hil::plant_sim {
+
+/// The wheels do not touch, but for a force that changes no speed by more than 1e-10 rad/s in a second.
+inline PlantOptions wheels_apart() {
+  PlantOptions options;
+  options.rig.tyre.theta_N = 1e-12;
+  return options;
+}
+
+/// No bearing friction at all.
+inline PlantOptions frictionless() {
+  PlantOptions options;
+  options.rig.wheels.d1_Nms_rad = options.rig.wheels.d2_Nms_rad = 0.0;
+  options.rig.wheels.M10_Nm = options.rig.wheels.M20_Nm = 0.0;
+  return options;
+}
+
+/// Both wheels turning at the same speed, where the paper's braking starts.
+inline constexpr PlantState rolling_at_170{.omega1_rad_s = 170.0, .omega2_rad_s = 170.0};
+
+}  // namespace abs_hil::plant_sim

@@ -1,0 +1,169 @@
+#include "abs_hil/telemetry/message_codec.hpp"
+
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "catch.hpp"
+#include "telemetry/message_capture.hpp"
+#include "telemetry/sample_records.hpp"
+
+namespace abs_hil::telemetry {
+namespace {
+
+telemetry_t through_bytes(const telemetry_t& message) {
+  EncodeBuffer buffer(1);  // has to grow
+  const auto bytes = buffer.encode(message);
+  return test::decoded<telemetry_t>({bytes.begin(), bytes.end()});
+}
+
+void check_same(double actual, double expected) {
+  CHECK(std::bit_cast<std::uint64_t>(actual) == std::bit_cast<std::uint64_t>(expected));
+}
+
+void check_fields(const rig::CycleRecord& r, double distance_m) {
+  const telemetry_t m = through_bytes(to_message(r, distance_m, 99));
+  CHECK(m.stamp_ns == r.stamp_ns);
+  CHECK(m.sequence == 99);
+  CHECK(m.cycle == static_cast<std::int64_t>(r.sequence));
+  check_same(m.time_s, r.time_s);
+  CHECK(m.phase == static_cast<int>(r.phase));
+  CHECK(m.reason == static_cast<int>(r.reason));
+  check_same(m.reason_value, r.reason_value);
+  check_same(m.omega1_rad_s, r.truth.speeds.omega1_rad_s);
+  check_same(m.omega2_rad_s, r.truth.speeds.omega2_rad_s);
+  check_same(m.omega1_est_rad_s, r.control.speeds_est.omega1_rad_s);
+  check_same(m.omega2_est_rad_s, r.control.speeds_est.omega2_rad_s);
+  check_same(m.slip, r.truth.slip);
+  check_same(m.slip_est, r.control.slip_est);
+  check_same(m.slip_ref, r.control.slip_ref);
+  check_same(m.brake_torque_Nm, r.truth.brake_torque_Nm);
+  check_same(m.brake_torque_ref_Nm, r.control.brake_torque_ref_Nm);
+  check_same(m.brake_torque_est_Nm, r.control.brake_torque_est_Nm);
+  check_same(m.brake_pwm, r.command.brake_duty);
+  check_same(m.motor_pwm, r.command.motor_duty);
+  CHECK((m.motor_enable != 0) == r.command.motor_enable);
+  check_same(m.theta_N, r.truth.theta_N);
+  check_same(m.theta_est_N, r.control.theta_est_N);
+  check_same(m.distance_m, distance_m);
+  check_same(m.slip_velocity_error_m_s, r.control.slip_velocity_error_m_s);
+  CHECK(m.upper_counts == r.measurement.upper_counts);
+  CHECK(m.lower_counts == r.measurement.lower_counts);
+  check_same(m.supply_V, r.measurement.supply_V);
+  check_same(m.temperature_C, r.measurement.temperature_C);
+  CHECK(m.trip_flags == static_cast<std::int64_t>(r.measurement.trip_flags));
+  CHECK(m.wakeup_latency_ns == r.timing.wakeup_latency_ns);
+  CHECK(m.read_ns == r.timing.read_ns);
+  CHECK(m.control_ns == r.timing.control_ns);
+  CHECK(m.write_ns == r.timing.write_ns);
+  CHECK(m.cycle_ns == r.timing.cycle_ns);
+  CHECK(m.periods_skipped == static_cast<std::int64_t>(r.timing.periods_skipped));
+}
+
+TEST_CASE("every field of a record arrives") {
+  rig::CycleRecord r = test::sample_record(12345);
+  r.reason = rig::Reason::overspeed;
+  r.reason_value = 181.5;
+  check_fields(r, 0.125);
+}
+
+TEST_CASE("the default record arrives, NaN and all") { check_fields({}, 0.0); }
+
+TEST_CASE("extreme values arrive") {
+  using Double = std::numeric_limits<double>;
+  using Int = std::numeric_limits<std::int64_t>;
+  rig::CycleRecord r = test::sample_record(1);
+  r.sequence = static_cast<std::uint64_t>(Int::max());
+  r.stamp_ns = Int::min();
+  r.time_s = Double::max();
+  r.phase = rig::Phase::fault;
+  r.reason = rig::Reason::consecutive_overruns;
+  r.reason_value = -Double::infinity();
+  r.truth.speeds = {-0.0, Double::denorm_min()};
+  r.control.theta_est_N = Double::infinity();
+  r.measurement.upper_counts = std::numeric_limits<std::int32_t>::min();
+  r.measurement.lower_counts = std::numeric_limits<std::int32_t>::max();
+  r.measurement.trip_flags = 0xFFFFFFFFU;
+  r.timing = {Int::min(), Int::max(), -1, 0, Int::max(), 0xFFFFFFFFU};
+  check_fields(r, -Double::max());
+}
+
+command_t stop_command() {
+  command_t command{};
+  command.stamp_ns = 1;
+  command.sequence = 2;
+  command.command = "stop";
+  command.argument = "now";
+  command.token = "abc";
+  return command;
+}
+
+test::Bytes bytes_of(const command_t& command) {
+  EncodeBuffer buffer;
+  const auto bytes = buffer.encode(command);
+  return {bytes.begin(), bytes.end()};
+}
+
+TEST_CASE("a well-formed command is decoded") {
+  const auto [command, problem] = decode_command(bytes_of(stop_command()));
+  CHECK(problem.empty());
+  CHECK(command.command == "stop");
+  CHECK(command.argument == "now");
+  CHECK(command.token == "abc");
+}
+
+TEST_CASE("a command cut short anywhere is refused") {
+  const test::Bytes whole = bytes_of(stop_command());
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    INFO("cut to " << size);
+    CHECK_FALSE(decode_command(std::span(whole).first(size)).problem.empty());
+  }
+}
+
+TEST_CASE("string lengths that lie are refused, those included that the generated decoder trips over") {
+  const std::size_t first_length_at = 8 + 8 + 8;
+  for (const std::uint32_t lie : {0U, 0xFFFFFFFFU, 0x80000000U, 0x7FFFFFFFU, 4U, 6U, 1000U}) {
+    test::Bytes packet = bytes_of(stop_command());
+    for (std::size_t i = 0; i < 4; ++i) {
+      packet[first_length_at + i] = static_cast<std::uint8_t>(lie >> (24U - 8U * static_cast<unsigned>(i)));
+    }
+    INFO("length " << lie);
+    CHECK_FALSE(decode_command(packet).problem.empty());
+  }
+}
+
+TEST_CASE("every single changed byte is either refused or gives strings within the packet") {
+  const test::Bytes whole = bytes_of(stop_command());
+  for (std::size_t at = 0; at < whole.size(); ++at) {
+    for (const unsigned change : {0x01U, 0x80U, 0xFFU}) {
+      test::Bytes packet = whole;
+      packet[at] = static_cast<std::uint8_t>(packet[at] ^ change);
+      const auto [command, problem] = decode_command(packet);
+      CHECK((!problem.empty() || command.command.size() < packet.size()));
+      if (at < 8) CHECK_FALSE(problem.empty());
+    }
+  }
+}
+
+TEST_CASE("another type's message is refused by its fingerprint") {
+  EncodeBuffer buffer;
+  CHECK_THAT(std::string(decode_command(buffer.encode(telemetry_t{})).problem),
+             Catch::Matchers::Contains("fingerprint"));
+}
+
+TEST_CASE("a string with a NUL inside is encoded as far as it goes and decodes again") {
+  command_t command = stop_command();
+  command.token = std::string("a\0b", 3);
+  const auto result = decode_command(bytes_of(command));
+  CHECK(result.problem.empty());
+  CHECK(result.command.token == "a");
+}
+
+TEST_CASE("text from the network is made fit to print") {
+  CHECK(printable("stop\n\x1b[2J\xce", 64) == "stop??[2J?");
+  CHECK(printable("abcdef", 3) == "abc...");
+}
+
+}  // namespace
+}  // namespace abs_hil::telemetry

@@ -1,0 +1,115 @@
+#include "abs_hil/telemetry/status_line.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <string>
+
+#include "catch.hpp"
+#include "telemetry/sample_records.hpp"
+
+namespace abs_hil::telemetry {
+namespace {
+
+/// Both ends of a pseudo-terminal: the line is written to `terminal`.
+struct Terminal {
+  int screen{::posix_openpt(O_RDWR | O_NOCTTY)};
+  int terminal{-1};
+  Terminal() {
+    REQUIRE(screen >= 0);
+    REQUIRE(::grantpt(screen) == 0);
+    REQUIRE(::unlockpt(screen) == 0);
+    terminal = ::open(::ptsname(screen), O_RDWR | O_NOCTTY);
+    REQUIRE(terminal >= 0);
+  }
+  Terminal(const Terminal&) = delete;
+  Terminal& operator=(const Terminal&) = delete;
+  ~Terminal() {
+    ::close(terminal);
+    ::close(screen);
+  }
+  std::string shown() const {
+    std::string text;
+    pollfd ready{screen, POLLIN, 0};
+    char buffer[4096];
+    while (::poll(&ready, 1, 0) > 0) {
+      const ssize_t n = ::read(screen, buffer, sizeof buffer);
+      if (n <= 0) break;
+      text.append(buffer, static_cast<std::size_t>(n));
+    }
+    return text;
+  }
+};
+
+std::size_t count_of(const std::string& text, const std::string& part) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++count;
+  return count;
+}
+
+TEST_CASE("the line shows phase, speeds, slip, estimate, overruns and drops") {
+  rig::CycleRecord r = test::sample_record(0);
+  r.truth.speeds = {123.44, 150.0};
+  r.truth.slip = 0.18;
+  r.control.theta_est_N = 22.876;
+  StatusSnapshot status;
+  status.overruns = 3;
+  status.telemetry_drops = 4;
+  CHECK(format_status_line(r, status) ==
+        "brake      ω1  123.4  ω2  150.0 rad/s  slip  0.18  θ̂  22.88 N  overruns 3  drops 4");
+}
+
+TEST_CASE("a line of huge numbers is cut, not overrun") {
+  rig::CycleRecord r = test::sample_record(0);
+  r.truth.speeds = {1e300, -1e300};
+  CHECK(format_status_line(r, {}).size() == 255);
+}
+
+TEST_CASE("a text is cut at columns, not bytes") {
+  CHECK(cut_to_columns("abc", 5) == "abc");
+  CHECK(cut_to_columns("abc", 2) == "ab");
+  CHECK(cut_to_columns("ω1", 1) == "ω");
+  CHECK(cut_to_columns("θ̂x", 1) == "θ̂");
+  CHECK(cut_to_columns("abc", -1).size() == 3);
+}
+
+TEST_CASE("a terminal shows the line at most ten times a second and nothing after the end") {
+  const Terminal pty;
+  StatusLine line({}, pty.terminal);
+  REQUIRE(line.active());
+  for (std::uint64_t i = 0; i < 1000; ++i) line.consume(test::sample_record(i), 0.0);  // one second at 1 kHz
+  line.finish();
+  const std::string shown = pty.shown();
+  CHECK(count_of(shown, "brake") == 10);
+  CHECK(shown.ends_with("\r\x1b[K"));
+}
+
+TEST_CASE("a held terminal is skipped, not waited for") {
+  const Terminal pty;
+  StatusLine line({}, pty.terminal);
+  REQUIRE(::tcflow(pty.terminal, TCOOFF) == 0);
+  for (std::uint64_t i = 0; i < 300; ++i) line.consume(test::sample_record(i), 0.0);
+  CHECK(pty.shown().empty());
+  REQUIRE(::tcflow(pty.terminal, TCOON) == 0);
+}
+
+TEST_CASE("what is not a terminal stays untouched") {
+  int ends[2];
+  REQUIRE(::pipe(ends) == 0);
+  {
+    StatusLine line({}, ends[1]);
+    CHECK_FALSE(line.active());
+    line.consume(test::sample_record(0), 0.0);
+    line.finish();
+  }
+  pollfd ready{ends[0], POLLIN, 0};
+  CHECK(::poll(&ready, 1, 0) == 0);
+  ::close(ends[0]);
+  ::close(ends[1]);
+}
+
+}  // namespace
+}  // namespace abs_hil::telemetry
