@@ -1,3 +1,6 @@
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
 #include <CLI/CLI.hpp>
 #include <exception>
 #include <stdexcept>
@@ -71,6 +74,9 @@ int fail(int status, const std::exception& error) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // Messages go to stderr; stdout is for results.
+  spdlog::set_default_logger(spdlog::stderr_color_mt("abs_hil"));
+  spdlog::set_pattern("%n: %^%l%$: %v");
   try {
     return dispatch(argc, argv);
   } catch (const settings::ConfigError& error) {

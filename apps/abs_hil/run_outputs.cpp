@@ -2,6 +2,7 @@
 
 #include "abs_hil/settings/config_error.hpp"
 #include "abs_hil/telemetry/file_error.hpp"
+#include "abs_hil/telemetry/lcm_url.hpp"
 
 namespace abs_hil::app {
 
@@ -12,6 +13,13 @@ constexpr std::int64_t virtual_epoch_us = 946'684'800'000'000;
 
 RunOutputs::RunOutputs(const RunRequest& request)
     : metrics_(request.settings.plant.rig.wheels.r2_m, request.settings.experiment.end_speed_m_s) {
+  // Whether there is a network is asked first: files are not touched in vain.
+  // In virtual time 8,000 messages would burst onto the network at once: only when asked for by name.
+  if (!request.outputs.no_lcm && (!request.outputs.fast || request.outputs.lcm_url)) {
+    const std::string url = request.outputs.lcm_url.value_or(telemetry::default_lcm_url());
+    static_cast<void>(telemetry::parse_lcm_url(url));  // a malformed one is a usage error, not a missing network
+    lcm_.emplace(url);
+  }
   try {
     if (request.outputs.csv_file) csv_.emplace(*request.outputs.csv_file);
     if (request.outputs.summary_file) summary_.emplace(*request.outputs.summary_file);
@@ -21,9 +29,6 @@ RunOutputs::RunOutputs(const RunRequest& request)
   } catch (const std::runtime_error& error) {
     throw settings::ConfigError(error.what());
   }
-  // In virtual time 8,000 messages would burst onto the network at once: only when asked for by name.
-  if (!request.outputs.no_lcm && (!request.outputs.fast || request.outputs.lcm_url))
-    lcm_.emplace(request.outputs.lcm_url.value_or(""));
   if (log_ || lcm_) open_stream(request);
   if (!request.outputs.fast) status_line_.emplace([this] { return snapshot(); });
 }

@@ -51,8 +51,7 @@ SlipOutput AdaptiveController::step(const SlipInput& input) noexcept {
   const double past_phi = rig::normalised_tyre_force(tyre_, 0.5 * (slip_ + input.slip));
   adapt(input, past_phi);
 
-  const double torque_Nm =
-      dynamics_.brake_torque_Nm(input, integral_.value_m(), error_m_s, theta_.theta_N(), past_phi);
+  const double torque_Nm = dynamics_.brake_torque_Nm(input, integral_.value_m(), error_m_s, theta_.theta_N(), past_phi);
   integral_.note_request(torque_Nm, input.max_brake_torque_Nm);
   return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
 }

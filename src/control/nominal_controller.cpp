@@ -11,8 +11,7 @@ NominalController::NominalController(const ControllerContext& context)
     : wheels_{context.rig.wheels},
       tyre_{context.rig.tyre},
       dynamics_{context},
-      theta0_N_{context.options.nominal.theta0_N != 0.0 ? context.options.nominal.theta0_N
-                                                        : context.rig.tyre.theta_N} {
+      theta0_N_{context.options.nominal.theta0_N != 0.0 ? context.options.nominal.theta0_N : context.rig.tyre.theta_N} {
   if (!(theta0_N_ > 0.0 && std::isfinite(theta0_N_))) {
     throw std::invalid_argument("nominal.theta0_N must be > 0, or 0 for the plant's own");
   }

@@ -39,8 +39,8 @@ double SlipErrorDynamics::brake_torque_Nm(const SlipInput& input, double integra
   // In the middle of the period: e_v on the wanted trajectory, v_x by (9).
   const double error_mid = error_at_mid_[0] * integral_m + error_at_mid_[1] * error_m_s;
   const double v_x = w.r2_m * input.speeds.omega2_rad_s;
-  const double v_x_rate = -w.r2_m / w.J2_kg_m2 *
-                          (w.r2_m * theta_N * recent_phi + w.d2_Nms_rad * input.speeds.omega2_rad_s + w.M20_Nm);
+  const double v_x_rate =
+      -w.r2_m / w.J2_kg_m2 * (w.r2_m * theta_N * recent_phi + w.d2_Nms_rad * input.speeds.omega2_rad_s + w.M20_Nm);
   const double v_x_mid = v_x + half_period_s_ * v_x_rate;
   // slip = slip_ref + e_v/v_x by (12)-(13); only its change is predicted, so that h -> 0 leaves the measured slip.
   const double slip_mid =

@@ -17,8 +17,8 @@ void SlipErrorIntegral::advance(double dt_s, double error_m_s, double slip_ref, 
   slip_ref_ = slip_ref;
 
   // The torque holds -ks0 I: a negative error drives it up, a positive one down.
-  const bool winds_up = (request_ == Request::above && mean_error_m_s_ < 0.0) ||
-                        (request_ == Request::below && mean_error_m_s_ > 0.0);
+  const bool winds_up =
+      (request_ == Request::above && mean_error_m_s_ < 0.0) || (request_ == Request::below && mean_error_m_s_ > 0.0);
   const double increment_m = winds_up ? 0.0 : mean_error_m_s_ * dt_s;
   mean_value_m_ = value_m_ + 0.5 * increment_m;
   value_m_ += increment_m;

@@ -54,10 +54,10 @@ void TrackingObserver::predict_and_correct(double travel_rad, double dt_s) noexc
 }
 
 void TrackingObserver::bound_by_silence() noexcept {
-  // Less than one count passed since the last one came: the mean speed is below one count per that time, the present
-  // speed below twice that under constant acceleration. Without this the filter would swing through zero after a wheel
-  // locks, and ring after a lone count.
-  const double bound_rad_s = 2.0 * rad_per_count_ / still_s_;
+  // The wheel has stayed within one count for the time T since the last one came. Under constant acceleration, also
+  // through a reversal, its speed then is below 4 counts per T. Without this bound the filter would swing through zero
+  // after a wheel locks, and ring after a lone count.
+  const double bound_rad_s = 4.0 * rad_per_count_ / still_s_;
   if (std::abs(omega_rad_s_) <= bound_rad_s) return;
   omega_rad_s_ = std::copysign(bound_rad_s, omega_rad_s_);
   if (alpha_rad_s2_ * omega_rad_s_ > 0.0) alpha_rad_s2_ = 0.0;

@@ -135,16 +135,16 @@ inline Result brake(const Setup& s, control::SlipController& controller) {
     const double slip = (v_x - w.r1_m * x.omega1) / v_x;
     if (n > 0) result.stop_distance_m += 0.5 * h * (v_before + v_x);
     v_before = v_x;
-    const rig::WheelSpeeds speeds = s.encoders ? rig::WheelSpeeds{upper.omega_rad_s(), lower.omega_rad_s()}
-                                               : rig::WheelSpeeds{x.omega1, x.omega2};
-    control::SlipInput input{.dt_s = n > 0 ? h : 0.0,
-                             .speeds = speeds,
-                             .slip = rig::wheel_slip(w.r1_m * speeds.omega1_rad_s, w.r2_m * speeds.omega2_rad_s,
-                                                     s.options.v_min_m_s),
-                             .slip_ref = s.options.slip_ref,
-                             .mean_brake_torque_Nm = actuator.mean_torque_Nm(),
-                             .brake_torque_Nm = actuator.torque_Nm(),
-                             .max_brake_torque_Nm = actuator.max_torque_Nm()};
+    const rig::WheelSpeeds speeds =
+        s.encoders ? rig::WheelSpeeds{upper.omega_rad_s(), lower.omega_rad_s()} : rig::WheelSpeeds{x.omega1, x.omega2};
+    control::SlipInput input{
+        .dt_s = n > 0 ? h : 0.0,
+        .speeds = speeds,
+        .slip = rig::wheel_slip(w.r1_m * speeds.omega1_rad_s, w.r2_m * speeds.omega2_rad_s, s.options.v_min_m_s),
+        .slip_ref = s.options.slip_ref,
+        .mean_brake_torque_Nm = actuator.mean_torque_Nm(),
+        .brake_torque_Nm = actuator.torque_Nm(),
+        .max_brake_torque_Nm = actuator.max_torque_Nm()};
     if (n == 0) controller.reset(input);
     const control::SlipOutput output = controller.step(input);
     const double wanted = actuator.limited(output.brake_torque_Nm);

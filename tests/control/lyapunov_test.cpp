@@ -1,5 +1,6 @@
 #include "abs_hil/control/lyapunov.hpp"
 
+#include <Eigen/LU>
 #include <limits>
 #include <random>
 #include <stdexcept>
@@ -39,7 +40,8 @@ TEST_CASE("The Lyapunov equation is solved for random Q and gains") {
 
 TEST_CASE("P for Table 1's gains is the one worked out by hand") {
   const double ks0 = 19.0, ks1 = 32.0, q11 = 2.0, q12 = 0.3, q22 = 1.5;
-  const Eigen::Matrix2d P = control::solve_lyapunov(control::error_dynamics_matrix(ks0, ks1), matrix(q11, q12, q12, q22));
+  const Eigen::Matrix2d P =
+      control::solve_lyapunov(control::error_dynamics_matrix(ks0, ks1), matrix(q11, q12, q12, q22));
   const double p12 = q11 / ks0;
   const double p22 = (q22 + p12) / ks1;
   const double p11 = ks1 * p12 + ks0 * p22 - 2.0 * q12;

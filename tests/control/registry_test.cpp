@@ -16,7 +16,7 @@ TEST_CASE("Every controller in the table can be made and brakes") {
   const rig::RigParameters parameters;
   REQUIRE(control::controllers().size() >= 3);
   for (const auto& entry : control::controllers()) {
-    CAPTURE(entry.name);
+    CAPTURE(std::string(entry.name));
     CHECK_FALSE(entry.summary.empty());
     const auto controller = control::make_controller(entry.name, {options, parameters});
     const control::SlipInput input{.speeds = {150.0, 170.0},
@@ -34,9 +34,9 @@ TEST_CASE("Every controller in the table can be made and brakes") {
 TEST_CASE("An unknown name is answered with the nearest and all known ones") {
   const control::ControlOptions options;
   const rig::RigParameters parameters;
-  CHECK_THROWS_WITH(control::make_controller("adaptve", {options, parameters}),
-                    Contains("'adaptve'") && Contains("did you mean 'adaptive'") && Contains("nominal") &&
-                        Contains("locked"));
+  CHECK_THROWS_WITH(
+      control::make_controller("adaptve", {options, parameters}),
+      Contains("'adaptve'") && Contains("did you mean 'adaptive'") && Contains("nominal") && Contains("locked"));
   CHECK_THROWS_WITH(control::make_controller("loked", {options, parameters}), Contains("did you mean 'locked'"));
   CHECK_THROWS_AS(control::make_controller("", {options, parameters}), std::invalid_argument);
 }

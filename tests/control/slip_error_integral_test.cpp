@@ -39,8 +39,8 @@ TEST_CASE("The integral stands while the torque is limited and e_v would push it
     double request_Nm, error_m_s;
     bool integrates;
   };
-  const Case cases[] = {{5.0, -1.0, true},  {5.0, 1.0, true},  {9.5, -1.0, false},
-                        {9.5, 1.0, true},   {-0.5, 1.0, false}, {-0.5, -1.0, true}};
+  const Case cases[] = {{5.0, -1.0, true}, {5.0, 1.0, true},   {9.5, -1.0, false},
+                        {9.5, 1.0, true},  {-0.5, 1.0, false}, {-0.5, -1.0, true}};
   for (const auto& c : cases) {
     CAPTURE(c.request_Nm, c.error_m_s);
     control::SlipErrorIntegral integral;

@@ -75,6 +75,38 @@ TEST_CASE("A released wheel breaks away when the falling brake torque lets the t
   CHECK_THAT(plant.slip(), WithinAbs(0.0, 1e-3));
 }
 
+TEST_CASE("A held wheel pulled barely harder than its rising friction comes to stand again at once") {
+  // Locked, slip is 1. The brake torque rises at c31 (9.03 - Tb), so the wheel slides for 2 excess / that rate: from
+  // far below the rounding of any step to many microseconds.
+  const double pull_Nm = 0.0995 * 23.0 * std::sin(1.68 * std::atan(28.0));
+  const double excess_Nm = GENERATE(1e-15, 1e-12, 1e-9, 1e-6, 1e-5, 1e-3);
+  Plant plant{PlantOptions{}};
+  plant.reset({.omega2_rad_s = 100.0, .brake_torque_Nm = pull_Nm - 0.0032 - excess_Nm});
+  plant.advance(2e-3, {.brake_duty = 1.0});
+  CHECK(plant.state().omega1_rad_s == 0.0);
+  CHECK(plant.state().angle1_rad >= 0.0);
+  // J1 w1' = excess - rate t leads to the angle 2 excess^3 / (3 J1 rate^2).
+  const double rate_Nm_s = 20.37 * (9.03 - (pull_Nm - 0.0032));
+  const double angle_rad = 2.0 * std::pow(excess_Nm, 3) / (3.0 * 7.54e-3 * rate_Nm_s * rate_Nm_s);
+  CHECK_THAT(plant.state().angle1_rad, WithinAbs(angle_rad, 0.01 * angle_rad + 1e-16));
+}
+
+TEST_CASE("A pull within rounding of the friction neither moves the wheel nor stalls the simulation") {
+  PlantOptions options;
+  options.ideal_actuator = true;
+  Plant plant(options);
+  plant.reset({.omega2_rad_s = 100.0});
+  double torque_Nm = options.rig.wheels.r1_m * plant.tyre_force_N() - options.rig.wheels.M10_Nm;
+  for (int i = 0; i < 8; ++i) torque_Nm = std::nextafter(torque_Nm, 0.0);
+  for (int i = 0; i < 16; ++i) {
+    plant.reset({.omega2_rad_s = 100.0});
+    plant.advance(0.1, {.brake_torque_Nm = torque_Nm});
+    CHECK(plant.state().omega1_rad_s >= 0.0);
+    CHECK(plant.state().omega1_rad_s < 1e-12);
+    torque_Nm = std::nextafter(torque_Nm, 10.0);
+  }
+}
+
 TEST_CASE("Both wheels may stop within one substep, in either order or at once") {
   // Constant deceleration, so that the way to standstill is w^2 / 2c exactly. All stops are within the first 500 us.
   PlantOptions options = wheels_apart();
@@ -107,12 +139,26 @@ TEST_CASE("The motor moves the standing lower wheel only beyond its friction") {
 }
 
 TEST_CASE("Started from rest with the brake full on, the upper wheel holds while the lower one turns under it") {
-  Plant plant{PlantOptions{}};
+  PlantOptions options;
+  options.rig.tyre.theta_N = 10.0;  // r2 theta is well below the motor's torque
+  Plant plant(options);
   plant.reset({.brake_torque_Nm = 9.03});
   plant.advance(0.5, {.motor_duty = 1.0, .brake_duty = 1.0});
   CHECK(plant.state().omega1_rad_s == 0.0);
   CHECK(plant.state().omega2_rad_s > 1.0);
   CHECK(plant.slip() == 1.0);
+}
+
+TEST_CASE("Against a braked wheel with more grip than the motor has torque, the lower wheel creeps below 1 mm/s") {
+  // The regularised slip turns static friction between the wheels into a slow creep; this bounds it.
+  const PlantOptions options;
+  Plant plant(options);
+  plant.reset({.brake_torque_Nm = 9.03});
+  plant.advance(0.5, {.motor_duty = 1.0, .brake_duty = 1.0});
+  CHECK(plant.state().omega1_rad_s == 0.0);
+  CHECK(plant.state().omega2_rad_s * options.rig.wheels.r2_m < 1e-3);
+  CHECK_THAT(plant.tyre_force_N() * options.rig.wheels.r2_m,
+             WithinAbs(options.rig.motor.stall_torque_Nm - options.rig.wheels.M20_Nm, 1e-3));
 }
 
 TEST_CASE("A reversed rig mirrors the forward one exactly") {

@@ -33,7 +33,7 @@ struct StreamOptions {
 
 /// Turns records into the messages of the ABS_ channels and gives the same ones to every outlet. Each channel's
 /// sequence is consecutive from 0; all stamps and times are those of the records, so that a run on virtual time gives
-/// the same bytes again. Used from one thread.
+/// the same bytes again. One stream for each run, used from one thread.
 class MessageStream : public rig::RecordSink {
  public:
   /// Throws std::invalid_argument for an option out of range, naming it.

@@ -1,0 +1,103 @@
+#include "abs_hil/analysis/run_metrics.hpp"
+
+#include <cmath>
+
+#include "catch.hpp"
+
+using namespace abs_hil;
+using namespace abs_hil::analysis;
+using Catch::Matchers::WithinAbs;
+
+namespace {
+
+constexpr double r2_m = 0.1;
+constexpr double start_m_s = 10.0;
+constexpr double deceleration_m_s2 = 5.0;
+
+/// A car that brakes at a constant 5 m/s^2 from 10 m/s, from 1 s on, with the slip and the estimate given.
+template <typename Slip, typename Theta>
+Metrics brake(Slip slip, Theta theta_est_N, double end_speed_m_s = 0.5, bool truth = true) {
+  RunMetrics metrics(r2_m, end_speed_m_s);
+  double distance_m = 0.0;
+  double last_v_m_s = start_m_s;
+  for (int tick = 0; tick <= 4000; ++tick) {
+    const double time_s = 1e-3 * tick;
+    const double since_s = time_s - 1.0;
+    const double v_m_s = since_s <= 0.0 ? start_m_s : std::max(0.0, start_m_s - deceleration_m_s2 * since_s);
+    if (since_s > 0.0) distance_m += 0.5e-3 * (v_m_s + last_v_m_s);
+    last_v_m_s = v_m_s;
+    rig::CycleRecord record;
+    record.time_s = time_s;
+    record.phase = since_s < 0.0 ? rig::Phase::accelerate : rig::Phase::brake;
+    rig::WheelSpeeds speeds{0.0, v_m_s / r2_m};
+    if (truth) {
+      record.truth.speeds = speeds;
+      record.truth.slip = slip(since_s);
+      record.truth.theta_N = 20.0;
+    } else {
+      record.control.speeds_est = speeds;
+      record.control.slip_est = slip(since_s);
+    }
+    record.control.slip_ref = 0.15;
+    record.control.theta_est_N = theta_est_N(since_s);
+    record.control.brake_torque_ref_Nm = tick % 2 == 0 ? 1.0 : 1.5;
+    metrics.consume(record, distance_m);
+  }
+  return metrics.metrics();
+}
+
+constexpr auto on_target = [](double) { return 0.15; };
+constexpr auto exact = [](double) { return 20.0; };
+
+}  // namespace
+
+TEST_CASE("stop time and distance of a constant deceleration") {
+  const Metrics m = brake(on_target, exact);
+  CHECK_THAT(m.brake_start_s, WithinAbs(1.0, 1e-9));
+  // First tick below 0.5 m/s: 9.5 / 5 = 1.9 s is not below it yet.
+  CHECK_THAT(m.stop_time_s, WithinAbs(1.901, 1e-9));
+  CHECK_THAT(m.stop_distance_m, WithinAbs(10.0 * 1.901 - 2.5 * 1.901 * 1.901, 1e-6));
+}
+
+TEST_CASE("slip RMS looks at t > 0.3 s and v_x > 3 m/s only") {
+  const auto slip = [](double since_s) {
+    // One tick wider than what counts, so that rounding of the ticks at either end does not matter.
+    const bool counted = since_s > 0.2995 && start_m_s - deceleration_m_s2 * since_s > 2.9995;
+    return counted ? 0.15 + 0.02 : 0.9;
+  };
+  CHECK_THAT(brake(slip, exact).slip_rms, WithinAbs(0.02, 1e-9));
+}
+
+TEST_CASE("settling is the start of the last stay within the band") {
+  const auto slip = [](double since_s) { return since_s < 0.2 || (since_s > 0.4 && since_s < 0.5) ? 0.3 : 0.16; };
+  const auto theta = [](double since_s) { return since_s < 0.25 ? 0.0 : 20.9; };
+  const Metrics m = brake(slip, theta);
+  CHECK_THAT(m.slip_settling_s, WithinAbs(0.5, 1.1e-3));
+  CHECK_THAT(m.theta_settling_s, WithinAbs(0.25, 1.1e-3));
+  CHECK(m.theta_final_N == 20.9);
+}
+
+TEST_CASE("what never settles has no settling time") {
+  const Metrics m = brake([](double) { return 0.5; }, [](double) { return 10.0; });
+  CHECK(std::isnan(m.slip_settling_s));
+  CHECK(std::isnan(m.theta_settling_s));
+}
+
+TEST_CASE("total variation sums the steps of the torque asked for") {
+  const Metrics m = brake(on_target, exact);
+  CHECK_THAT(m.torque_total_variation_Nm, WithinAbs(3000 * 0.5, 1e-6));
+}
+
+TEST_CASE("without truth the estimates count, and theta has nothing to settle to") {
+  const Metrics m = brake(on_target, exact, 0.5, false);
+  CHECK_THAT(m.stop_time_s, WithinAbs(1.901, 1e-9));
+  CHECK_THAT(m.slip_rms, WithinAbs(0.0, 1e-12));
+  CHECK(std::isnan(m.theta_settling_s));
+}
+
+TEST_CASE("a run that never brakes has no figures") {
+  RunMetrics metrics(r2_m, 0.3);
+  metrics.consume({}, 0.0);
+  CHECK(std::isnan(metrics.metrics().brake_start_s));
+  CHECK(std::isnan(metrics.metrics().stop_time_s));
+}

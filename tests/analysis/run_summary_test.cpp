@@ -1,0 +1,68 @@
+#include "abs_hil/analysis/run_summary.hpp"
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "catch.hpp"
+
+using namespace abs_hil::analysis;
+using Catch::Matchers::Contains;
+
+namespace {
+
+std::filesystem::path temporary_path() {
+  return std::filesystem::temp_directory_path() / ("abs_hil_summary_test_" + std::to_string(getpid()) + ".json");
+}
+
+}  // namespace
+
+TEST_CASE("the summary has the fields that scripts rely on, and null for what is not known") {
+  RunSummary summary;
+  summary.metrics.stop_time_s = 2.5;
+  const auto json = to_json(summary);
+  for (const char* field :
+       {"result", "reason", "controller", "plant", "backend", "brake_start_s", "stop_time_s", "stop_distance_m",
+        "slip_rms", "slip_settling_s", "theta_final_N", "theta_settling_s", "torque_total_variation_Nm", "cycles",
+        "overruns", "wakeup_latency_us", "cycle_time_us", "telemetry_drops", "config"}) {
+    INFO(field);
+    CHECK(json.contains(field));
+  }
+  CHECK(json["stop_time_s"] == 2.5);
+  CHECK(json["slip_rms"].is_null());
+  for (const char* quantile : {"p50", "p99", "p99_9", "max"}) CHECK(json["wakeup_latency_us"].contains(quantile));
+}
+
+TEST_CASE("the text says when real time was not obtained and when there is no truth") {
+  RunSummary summary;
+  CHECK_THAT(to_text(summary), Contains("NOT obtained") && Contains("estimates"));
+  summary.realtime = true;
+  summary.truth_known = true;
+  CHECK_THAT(to_text(summary), !Contains("NOT obtained") && !Contains("estimates: "));
+  summary.virtual_time = true;
+  CHECK_THAT(to_text(summary), Contains("virtual time"));
+}
+
+TEST_CASE("a summary file is whole or not there") {
+  const auto path = temporary_path();
+  { SummaryFile abandoned(path); }
+  CHECK_FALSE(std::filesystem::exists(path));
+  CHECK_FALSE(std::filesystem::exists(path.string() + ".part"));
+  {
+    SummaryFile file(path);
+    CHECK_FALSE(std::filesystem::exists(path));
+    file.write({});
+  }
+  std::ifstream written(path);
+  CHECK(nlohmann::json::parse(written).contains("stop_time_s"));
+  CHECK_FALSE(std::filesystem::exists(path.string() + ".part"));
+  std::filesystem::remove(path);
+}
+
+TEST_CASE("a place that cannot be written to is known at once") {
+  CHECK_THROWS_WITH(SummaryFile("/nonexistent/dir/s.json"),
+                    Contains("/nonexistent/dir/s.json") && Contains("existing"));
+  CHECK_THROWS_WITH(SummaryFile(std::filesystem::temp_directory_path()), Contains("directory"));
+}

@@ -1,0 +1,78 @@
+"""Bad input: status 2 (3 for what is not there), one clear line on stderr, and nothing written."""
+import unittest
+
+from program import ProgramTest
+
+
+class BadInput(ProgramTest):
+    def refused(self, args, words, status=2):
+        with self.subTest(args=args):
+            csv = self.folder / 'run.csv'
+            summary = self.folder / 'summary.json'
+            result = self.run_program('--fast', '--no-lcm', '--csv', csv, '--summary', summary, *args)
+            self.assertEqual(result.returncode, status, result.stderr)
+            lines = result.stderr.strip().splitlines()
+            self.assertEqual(len(lines), 1, result.stderr)
+            for word in words:
+                self.assertIn(word, lines[0])
+            self.assertFalse(summary.exists())
+            self.assertFalse(csv.exists(), 'a refused run must not touch files')
+
+    def test_configuration_values(self):
+        self.refused(['--set', 'plant.thetaN=3'], ['plant.thetaN', 'plant.theta_N'])
+        self.refused(['--set', 'plant.theta_N=-5'], ['plant.theta_N', '-5', '(0, 500]', 'N'])
+        self.refused(['--set', 'plant.theta_N=nan'], ['plant.theta_N', 'nan'])
+        self.refused(['--set', 'plant.theta_N=abc'], ['plant.theta_N', 'abc'])
+        self.refused(['--set', 'control.rate_Hz=0'], ['control.rate_Hz', '[100, 10000]'])
+        self.refused(['--set', 'control.adaptive.ks1=inf'], ['control.adaptive.ks1'])
+        self.refused(['--set', 'plant.theta_N'], ['key=value'])
+        self.refused(['--slip-ref', '1.5'], ['--slip-ref', '1.5', '(0, 1)'])
+        self.refused(['--rate', '50'], ['--rate', '50'])
+        self.refused(['--seed', '-1'], ['--seed'])
+
+    def test_values_that_do_not_go_together(self):
+        self.refused(['--set', 'control.adaptive.theta_min_N=60', '--set', 'control.adaptive.theta_max_N=50'],
+                     ['theta_min_N', 'theta_max_N'])
+        self.refused(['--set', 'control.adaptive.q12=5'], ['Q'])
+
+    def test_names(self):
+        self.refused(['--controller', 'nope'], ['nope', 'adaptive'])
+        self.refused(['--plant', 'paper-table9'], ['paper-table9', 'paper-table1'])
+        self.refused(['--experiment', 'parade'], ['parade', 'paper'])
+        self.refused(['--backend', 'moon'], ['moon', 'sim'])
+        self.refused(['--bogus'], ['--bogus'])
+        self.refused(['--rt', 'perhaps'], ['perhaps'])
+
+    def test_files(self):
+        self.refused(['--plant', '/nonexistent.toml'], ['/nonexistent.toml'])
+        self.refused(['--config', '/nonexistent.toml'], ['/nonexistent.toml'])
+        bad = self.folder / 'bad.toml'
+        bad.write_text('[plant]\nx=')
+        self.refused(['--config', bad], ['bad.toml:2'])
+        bad.write_text('[plant]\ntheta_N = 30\n\n[control]\nslipref = 0.1\n')
+        self.refused(['--config', bad], ['bad.toml:5', 'control.slip_ref'])
+
+    def test_output_paths(self):
+        for option in ('--csv', '--log', '--summary'):
+            result = self.run_program('--fast', '--no-lcm', option, '/nonexistent/dir/file')
+            self.assertEqual(result.returncode, 2, result.stderr)
+            self.assertIn('/nonexistent/dir/file', result.stderr)
+
+    def test_lcm_url(self):
+        result = self.run_program('--fast', '--lcm-url', 'nonsense')
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertIn('nonsense', result.stderr)
+
+    def test_rig_without_a_board(self):
+        result = self.run_program('--backend', 'rig', '--no-lcm')
+        self.assertEqual(result.returncode, 3, result.stderr)
+        self.assertIn('driver.kind', result.stderr)
+
+    def test_what_only_the_simulator_can_do(self):
+        for args in (['--fast'], ['--set', 'experiment.start_speed_rad_s=100']):
+            result = self.run_program('--backend', 'rig', '--no-lcm', *args)
+            self.assertEqual(result.returncode, 2, result.stderr)
+
+
+if __name__ == '__main__':
+    unittest.main()

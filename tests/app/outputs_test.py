@@ -1,0 +1,108 @@
+"""What a run leaves behind: CSV, summary, event log, words on stdout."""
+import hashlib
+import math
+import unittest
+
+from program import ProgramTest
+
+HEADER = ('time_s,phase,omega1_rad_s,omega2_rad_s,omega1_est_rad_s,omega2_est_rad_s,slip,slip_est,slip_ref,'
+          'brake_torque_Nm,brake_torque_ref_Nm,brake_torque_est_Nm,brake_pwm,motor_pwm,motor_enable,theta_N,'
+          'theta_est_N,distance_m,slip_velocity_error_m_s')
+PHASES = ['idle', 'accelerate', 'coast', 'brake', 'hold', 'stopped']
+
+
+class Outputs(ProgramTest):
+    def test_csv(self):
+        path = self.folder / 'run.csv'
+        self.fast('--csv', path)
+        self.assertEqual(path.read_text().splitlines()[0], HEADER)
+        rows = self.rows(path)
+        seen = list(dict.fromkeys(row['phase'] for row in rows))
+        self.assertEqual(seen, PHASES)
+        self.assertEqual(float(rows[0]['time_s']), 0.0)
+        steps = [float(b['time_s']) - float(a['time_s']) for a, b in zip(rows, rows[1:])]
+        self.assertLess(max(abs(step - 1e-3) for step in steps), 1e-9)
+        for row in rows:
+            self.assertGreaterEqual(float(row['omega1_rad_s']), 0.0)
+            self.assertGreaterEqual(float(row['omega2_rad_s']), 0.0)
+            if row['phase'] != 'brake':
+                self.assertTrue(math.isnan(float(row['theta_est_N'])))
+
+    def test_summary_agrees_with_the_csv(self):
+        csv, summary = self.folder / 'run.csv', self.folder / 'summary.json'
+        self.fast('--csv', csv, '--summary', summary)
+        rows, s = self.rows(csv), self.summary(summary)
+        braking = [i for i, row in enumerate(rows) if row['phase'] == 'brake']
+        first = braking[0]
+        self.assertAlmostEqual(s['brake_start_s'], float(rows[first]['time_s']), places=9)
+        # Recomputed here from the rows, by the definitions of docs/telemetry.md.
+        v = [0.099 * float(row['omega2_rad_s']) for row in rows]
+        t = [float(row['time_s']) for row in rows]
+        stop = next(i for i in range(first, len(rows)) if v[i] < 0.3)
+        self.assertAlmostEqual(s['stop_time_s'], t[stop] - t[first], places=9)
+        distance = sum((v[i] + v[i - 1]) / 2 * (t[i] - t[i - 1]) for i in range(first + 1, stop + 1))
+        self.assertAlmostEqual(s['stop_distance_m'], distance, places=6)
+        squares = [(float(rows[i]['slip']) - 0.15) ** 2 for i in braking if t[i] - t[first] > 0.3 and v[i] > 3]
+        self.assertAlmostEqual(s['slip_rms'], math.sqrt(sum(squares) / len(squares)), places=6)
+        self.assertEqual(s['cycles'], len(rows))
+        self.assertEqual((s['overruns'], s['telemetry_drops']), (0, 0))
+        self.assertEqual(s['result'], 'completed')
+        self.assertEqual(s['config']['plant']['theta_N'], 23.0)
+
+    def test_effective_configuration_feeds_back(self):
+        summary = self.folder / 'summary.json'
+        config = self.folder / 'config.toml'
+        config.write_text('[control]\nslip_ref = 0.2\n[control.adaptive]\nka1 = 2\n')
+        self.fast('--config', config, '--set', 'control.adaptive.ka1=3', '--slip-ref', '0.1', '--summary', summary)
+        control = self.summary(summary)['config']['control']
+        self.assertEqual((control['slip_ref'], control['adaptive']['ka1']), (0.1, 3.0))
+
+    def test_same_seed_same_bytes(self):
+        def digest(seed, rate):
+            csv, log = self.folder / 'run.csv', self.folder / 'run.lcmlog'
+            self.fast('--seed', seed, '--rate', rate, '--csv', csv, '--log', log)
+            return [hashlib.sha256(path.read_bytes()).hexdigest() for path in (csv, log)]
+        for rate in (1000, 3000):
+            self.assertEqual(digest(7, rate), digest(7, rate))
+        self.assertNotEqual(digest(7, 1000)[0], digest(8, 1000)[0])
+
+    def test_rates(self):
+        for rate in (100, 10000):
+            summary = self.folder / 'summary.json'
+            self.fast('--rate', rate, '--summary', summary)
+            self.assertAlmostEqual(self.summary(summary)['stop_time_s'], 2.33, delta=0.05)
+
+    def test_plants(self):
+        summary = self.folder / 'summary.json'
+        self.fast('--plant', 'paper-timing', '--summary', summary)
+        self.assertAlmostEqual(self.summary(summary)['stop_time_s'], 1.2, delta=0.05)
+
+    def test_full_disk_is_said(self):
+        result = self.run_program('--fast', '--no-lcm', '--csv', '/dev/full')
+        self.assertEqual(result.returncode, 1)
+        self.assertIn('/dev/full', result.stderr)
+        self.assertIn('stop distance', result.stdout)
+
+    def test_fault_status(self):
+        summary = self.folder / 'summary.json'
+        result = self.run_program('--fast', '--no-lcm', '--set', 'experiment.accelerate_limit_s=2', '--summary', summary)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn('time limit', result.stderr)
+        self.assertEqual(self.summary(summary)['result'], 'fault')
+        self.assertIsNone(self.summary(summary)['stop_time_s'])
+
+    def test_list(self):
+        words = self.run_program('list').stdout
+        for name in ('adaptive', 'nominal', 'paper-table1', 'paper-timing', 'paper', 'sim', 'rig'):
+            self.assertIn(name, words)
+        self.assertIn('plant.theta_N', self.run_program('list', '--keys').stdout)
+
+    def test_environment_names_the_configuration(self):
+        (self.folder / 'plants').mkdir()
+        (self.folder / 'plants' / 'mine.toml').write_text('description = "mine"\n[plant]\ntheta_N = 30\n')
+        result = self.run_program('--fast', '--no-lcm', '--plant', 'mine', env={'ABS_HIL_CONFIG_DIR': str(self.folder)})
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,35 @@
+"""Runs abs_hil for the tests of the program: unittest with a temporary folder and the path of the binary."""
+import csv
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PROGRAM = sys.argv.pop(1) if len(sys.argv) > 1 else 'build/release/bin/abs_hil'
+
+
+class ProgramTest(unittest.TestCase):
+    def setUp(self):
+        self._folder = tempfile.TemporaryDirectory()
+        self.folder = pathlib.Path(self._folder.name)
+
+    def tearDown(self):
+        self._folder.cleanup()
+
+    def run_program(self, *args, **kwargs):
+        return subprocess.run([PROGRAM, *map(str, args)], capture_output=True, text=True, timeout=60, **kwargs)
+
+    def fast(self, *args):
+        """A run in virtual time that must end well."""
+        result = self.run_program('--backend', 'sim', '--fast', '--no-lcm', *args)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result
+
+    def rows(self, path):
+        with open(path, newline='') as file:
+            return list(csv.DictReader(file))
+
+    def summary(self, path):
+        return json.loads(pathlib.Path(path).read_text())

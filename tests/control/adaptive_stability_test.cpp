@@ -1,0 +1,161 @@
+// Theorem 3.1 in closed loop: the Lyapunov function, and the sign of (18).
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "abs_hil/control/adaptive_controller.hpp"
+#include "abs_hil/control/lyapunov.hpp"
+#include "catch.hpp"
+#include "control/braking_bench.hpp"
+
+using namespace abs_hil;
+using Catch::Matchers::WithinAbs;
+
+namespace {
+
+struct LyapunovRun {
+  std::vector<double> V, V_rate_expected, phi;
+};
+
+/// V of Theorem 3.1 and the -x'Qx - ka1 phi theta~^2 that its derivative should be, from the plant's true state.
+LyapunovRun lyapunov_run(const bench::Setup& s) {
+  const auto& o = s.options.adaptive;
+  const double p12 = o.q11 / o.ks0, p22 = (o.q22 + p12) / o.ks1;  // PA + A'P = -2Q by hand
+  const double p11 = o.ks1 * p12 + o.ks0 * p22 - 2 * o.q12;
+  const auto run = bench::brake(s, "adaptive");
+  LyapunovRun result;
+  double I = 0.0, before = 0.0;
+  for (const auto& tick : run.ticks) {
+    const double e = bench::e_v(s.rig.wheels, tick.omega1, tick.omega2, s.options.slip_ref);
+    if (tick.t > 0) I += (before + e) / 2 / s.options.rate_Hz;
+    before = e;
+    const double error = s.rig.tyre.theta_N - tick.output.theta_est_N;
+    const double phi = std::sin(s.rig.tyre.C * std::atan(s.rig.tyre.B * tick.slip));
+    result.V.push_back((p11 * I * I + 2 * p12 * I * e + p22 * e * e + error * error / o.gamma) / 2);
+    result.V_rate_expected.push_back(-(o.q11 * I * I + 2 * o.q12 * I * e + o.q22 * e * e) -
+                                     o.ka1 * phi * error * error);
+    result.phi.push_back(phi);
+  }
+  return result;
+}
+
+/// The adaptive controller put together from its parts, so that the sign of (18) can be chosen: ka1 < 0 is the
+/// printed one. AdaptiveController itself refuses that.
+class Assembled final : public control::SlipController {
+ public:
+  explicit Assembled(const bench::Setup& s)
+      : setup_{s}, dynamics_{{s.options, s.rig}}, theta_{s.options.adaptive, s.rig.wheels} {
+    const auto& o = s.options.adaptive;
+    Eigen::Matrix2d Q;
+    Q << o.q11, o.q12, o.q12, o.q22;
+    weights_ = control::solve_lyapunov(control::error_dynamics_matrix(o.ks0, o.ks1), Q).row(1);
+  }
+  void reset(const control::SlipInput& in) noexcept override {
+    before_ = in;
+    theta_.reset();
+    integral_.reset(error(in), in.slip_ref);
+  }
+  control::SlipOutput step(const control::SlipInput& in) noexcept override {
+    integral_.advance(in.dt_s, error(in), in.slip_ref, setup_.rig.wheels.r2_m * in.speeds.omega2_rad_s);
+    const double phi = rig::normalised_tyre_force(setup_.rig.tyre, (before_.slip + in.slip) / 2);
+    theta_.update({in.dt_s, before_.speeds.omega1_rad_s, in.speeds.omega1_rad_s, in.mean_brake_torque_Nm, phi,
+                   rig::slip_velocity_gain(setup_.rig.wheels, in.slip_ref) *
+                       (weights_[0] * integral_.mean_value_m() + weights_[1] * integral_.mean_error_m_s())});
+    before_ = in;
+    const double torque = dynamics_.brake_torque_Nm(in, integral_.value_m(), error(in), theta_.theta_N(), phi);
+    integral_.note_request(torque, in.max_brake_torque_Nm);
+    return {torque, error(in), theta_.theta_N()};
+  }
+
+ private:
+  double error(const control::SlipInput& in) const {
+    return bench::e_v(setup_.rig.wheels, in.speeds.omega1_rad_s, in.speeds.omega2_rad_s, in.slip_ref);
+  }
+  const bench::Setup& setup_;
+  control::SlipErrorDynamics dynamics_;
+  control::SlipErrorIntegral integral_;
+  control::ThetaEstimator theta_;
+  Eigen::RowVector2d weights_;
+  control::SlipInput before_;
+};
+
+}  // namespace
+
+TEST_CASE("V never grows and its derivative is -x'Qx - ka1 phi theta~^2") {
+  std::mt19937 random{2024};
+  const auto between = [&random](double low, double high) {
+    return std::uniform_real_distribution<double>{low, high}(random);
+  };
+  for (int i = 0; i < 12; ++i) {
+    CAPTURE(i);
+    bench::Setup s;
+    s.plant_step_s = 1e-4;
+    s.options.rate_Hz = 10000.0;
+    s.options.slip_ref = between(0.08, 0.3);
+    s.rig.tyre.theta_N = between(10.0, 60.0);
+    s.rig.tyre.B = between(15.0, 35.0);
+    s.rig.tyre.C = between(1.3, 1.8);
+    auto& o = s.options.adaptive;
+    o.gamma = between(5.0, 50.0);
+    o.ks0 = between(5.0, 50.0);
+    o.ks1 = between(15.0, 60.0);
+    o.ka1 = between(0.3, 3.0);
+    o.q11 = between(0.5, 3.0);
+    o.q22 = between(0.5, 3.0);
+    o.q12 = between(-0.4, 0.4);
+    o.theta_min_N = -1000.0;
+    o.theta_max_N = 1000.0;
+    o.zeta0 = between(0.5, 1.4) * s.rig.tyre.theta_N;
+    s.omega2_start = between(80.0, 180.0);
+    s.omega1_start = s.omega2_start * s.rig.wheels.r2_m / s.rig.wheels.r1_m * (1.0 - between(0.02, 0.06));
+    s.max_time_s = 0.5;
+    const auto run = lyapunov_run(s);
+    REQUIRE(run.V.size() > 4000);
+    const double scale = *std::max_element(run.V.begin(), run.V.end());
+    double steepest = 0.0;
+    for (const double rate : run.V_rate_expected) steepest = std::max(steepest, std::abs(rate));
+    for (std::size_t n = 1; n + 1 < run.V.size(); ++n) {
+      REQUIRE(run.phi[n] > 0.0);
+      REQUIRE(run.V[n + 1] <= run.V[n] + 1e-7 * scale);
+      const double rate = (run.V[n + 1] - run.V[n - 1]) / 2 * s.options.rate_Hz;
+      REQUIRE_THAT(rate, WithinAbs(run.V_rate_expected[n], 0.005 * steepest));
+    }
+  }
+}
+
+TEST_CASE("In closed loop the plus sign converges and the printed sign of (18) diverges") {
+  const auto theta_error_N = [](double ka1, double at_s) {
+    bench::Setup s;
+    s.options.adaptive.ka1 = ka1;
+    s.options.adaptive.theta_min_N = -1e6;
+    s.options.adaptive.theta_max_N = 1e6;
+    s.options.adaptive.zeta0 = 0.98 * s.rig.tyre.theta_N;
+    s.max_time_s = at_s;
+    Assembled controller{s};
+    const auto run = bench::brake(s, controller);
+    double worst = 0.0;
+    for (const auto& tick : run.ticks) {
+      const double error = std::abs(s.rig.tyre.theta_N - tick.output.theta_est_N);
+      if (tick.t > 0.7 * at_s) worst = std::max(worst, error);
+    }
+    return worst;
+  };
+  const double at_start = 0.02 * 23.0;
+  CHECK(theta_error_N(1.0, 0.4) < 0.1 * at_start);
+  CHECK(theta_error_N(-1.0, 0.4) > 20.0 * at_start);
+  CHECK(theta_error_N(-1.0, 0.4) > 3.0 * theta_error_N(-1.0, 0.25));
+}
+
+TEST_CASE("What the last test assembles is the adaptive controller") {
+  bench::Setup s;
+  s.ideal_actuator = false;
+  s.encoders = true;
+  Assembled assembled{s};
+  const auto ours = bench::brake(s, assembled), theirs = bench::brake(s, "adaptive");
+  REQUIRE(ours.ticks.size() == theirs.ticks.size());
+  for (std::size_t n = 0; n < ours.ticks.size(); ++n) {
+    REQUIRE_THAT(ours.ticks[n].output.brake_torque_Nm, WithinAbs(theirs.ticks[n].output.brake_torque_Nm, 1e-9));
+  }
+}

@@ -1,0 +1,105 @@
+#include "abs_hil/experiment/sequence.hpp"
+
+#include <stdexcept>
+
+#include "catch.hpp"
+
+using namespace abs_hil::experiment;
+using abs_hil::rig::Phase;
+using abs_hil::rig::Reason;
+
+namespace {
+
+Sequence two_phases(EndCondition first_end) {
+  return Sequence({{.phase = Phase::accelerate, .motor_duty = 0.8, .ends_on = {first_end}, .time_limit_s = 5.0},
+                   {.phase = Phase::brake,
+                    .brake = BrakeAction::slip_control,
+                    .ends_on = {{EndKind::duration, 1.0, Reason::phase_duration_over}},
+                    .time_limit_s = 2.0}});
+}
+
+SequenceInput at(double time_s, double omega1_rad_s = 0.0) {
+  return {.time_s = time_s, .speeds = {omega1_rad_s, omega1_rad_s}, .car_speed_m_s = 0.099 * omega1_rad_s};
+}
+
+}  // namespace
+
+TEST_CASE("phases follow one another in the cycle in which a condition holds") {
+  Sequence sequence = two_phases({EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached});
+  const auto first = sequence.update(at(0.0));
+  CHECK(first.entered);
+  CHECK(first.reason == Reason::run_started);
+  CHECK(sequence.current().motor_duty == 0.8);
+  CHECK_FALSE(sequence.update(at(1.0, 99.9)).entered);
+  const auto second = sequence.update(at(1.1, 100.0));
+  CHECK(second.entered);
+  CHECK(second.reason == Reason::speed_threshold_reached);
+  CHECK(sequence.current().phase == Phase::brake);
+  CHECK(sequence.current().motor_duty == 0.0);
+  CHECK_FALSE(sequence.finished());
+  const auto end = sequence.update(at(2.2));
+  CHECK(end.reason == Reason::sequence_complete);
+  CHECK(sequence.finished());
+  CHECK(sequence.current().phase == Phase::stopped);
+  CHECK(sequence.current().brake == BrakeAction::released);
+}
+
+TEST_CASE("outlasting a time limit is a fault that says how long it took") {
+  Sequence sequence = two_phases({EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached});
+  sequence.update(at(0.0));
+  CHECK_FALSE(sequence.update(at(5.0, 50.0)).entered);
+  const auto end = sequence.update(at(5.01, 50.0));
+  CHECK(end.reason == Reason::phase_time_limit);
+  CHECK_THAT(end.value, Catch::Matchers::WithinAbs(5.01, 1e-12));
+  CHECK(sequence.current().phase == Phase::fault);
+  CHECK(sequence.current().motor_duty == 0.0);
+  CHECK(sequence.finished());
+}
+
+TEST_CASE("a peak is a maximum that nothing has topped for a while, not the stillness before the start") {
+  Sequence sequence = two_phases({EndKind::upper_wheel_peak, 0.3, Reason::upper_wheel_peak_detected});
+  sequence.update(at(0.0));
+  CHECK_FALSE(sequence.update(at(0.5)).entered);
+  double time_s = 0.5;
+  for (double speed = 1.0; speed <= 150.0; speed += 1.0)
+    CHECK_FALSE(sequence.update(at(time_s += 0.01, speed)).entered);
+  CHECK_FALSE(sequence.update(at(time_s + 0.29, 150.05)).entered);
+  CHECK(sequence.update(at(time_s + 0.301, 149.9)).reason == Reason::upper_wheel_peak_detected);
+}
+
+TEST_CASE("car speed and standstill end phases") {
+  Sequence slow = two_phases({EndKind::car_speed_below, 0.3, Reason::end_speed_reached});
+  slow.update(at(0.0, 50.0));
+  CHECK_FALSE(slow.update(at(0.1, 0.3 / 0.099 + 0.01)).entered);
+  CHECK(slow.update(at(0.2, 0.3 / 0.099 - 0.01)).reason == Reason::end_speed_reached);
+
+  Sequence still = two_phases({EndKind::standstill, 0.0, Reason::standstill_reached});
+  still.update(at(0.0));
+  CHECK_FALSE(still.update(at(0.1)).entered);
+  SequenceInput standing = at(0.2);
+  standing.stands_still = true;
+  CHECK(still.update(standing).reason == Reason::standstill_reached);
+}
+
+TEST_CASE("ending early: a stop request stops, a fault faults, and the first reason stays") {
+  for (const auto& [reason, phase] :
+       {std::pair{Reason::interrupt_signal, Phase::stopped}, std::pair{Reason::overspeed, Phase::fault}}) {
+    Sequence sequence = two_phases({EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached});
+    sequence.update(at(0.0));
+    sequence.end_early(reason, 7.0);
+    sequence.end_early(Reason::driver_read_failed, 8.0);
+    const auto end = sequence.update(at(0.1, 200.0));
+    CHECK(end.reason == reason);
+    CHECK(end.value == 7.0);
+    CHECK(sequence.current().phase == phase);
+    CHECK(sequence.current().motor_duty == 0.0);
+    CHECK(sequence.finished());
+  }
+}
+
+TEST_CASE("plans that could never end are refused") {
+  CHECK_THROWS_AS(Sequence({}), std::invalid_argument);
+  CHECK_THROWS_AS(Sequence({{.phase = Phase::idle, .time_limit_s = 1.0}}), std::invalid_argument);
+  CHECK_THROWS_AS(Sequence({{.phase = Phase::idle, .ends_on = {{EndKind::duration, 1.0, Reason::none}}}}),
+                  std::invalid_argument);
+}

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "abs_hil/analysis/run_metrics.hpp"
+#include "abs_hil/control/registry.hpp"
+#include "abs_hil/driver/sim/sim_driver.hpp"
+#include "abs_hil/experiment/experiments.hpp"
+#include "abs_hil/experiment/run_session.hpp"
+
+namespace abs_hil::experiment::test {
+
+/// Keeps every record.
+class Recorder final : public rig::RecordSink {
+ public:
+  void consume(const rig::CycleRecord& record, double distance_m) override {
+    records.push_back(record);
+    distances_m.push_back(distance_m);
+  }
+  std::vector<rig::CycleRecord> records;
+  std::vector<double> distances_m;
+};
+
+/// What a simulated run is to be.
+struct Setup {
+  plant_sim::PlantOptions plant{};
+  control::ControlOptions control{};
+  ExperimentOptions experiment{};
+  runtime::GateOptions gate{};
+  std::uint64_t seed{1};
+};
+
+/// What came of it.
+struct Result {
+  RunOutcome outcome{};
+  analysis::Metrics metrics{};
+  std::vector<rig::CycleRecord> records{};
+  std::vector<double> distances_m{};
+
+  /// Records of one phase, in order.
+  [[nodiscard]] std::vector<rig::CycleRecord> in_phase(rig::Phase phase) const {
+    std::vector<rig::CycleRecord> chosen;
+    for (const auto& record : records) {
+      if (record.phase == phase) chosen.push_back(record);
+    }
+    return chosen;
+  }
+};
+
+inline RunLogicParts logic_parts(const Setup& setup) {
+  return {.control = setup.control,
+          .rig = setup.plant.rig,
+          .controller = control::make_controller(setup.control.controller, {setup.control, setup.plant.rig}),
+          .sequence = Sequence(plan_experiment(setup.experiment, setup.control.v_min_m_s)),
+          .ideal_actuator = setup.plant.ideal_actuator,
+          .max_brake_duty = setup.gate.brake_duty_max,
+          .start_speed_rad_s = setup.experiment.start_speed_rad_s};
+}
+
+/// Runs it in virtual time, on the same code as the program.
+inline Result run(
+    const Setup& setup, const RunSession::Poll& poll = [] { return rig::Reason::none; }) {
+  runtime::VirtualClock clock;
+  driver::SimDriver driver(setup.plant, {.seed = setup.seed, .start_speed_rad_s = setup.experiment.start_speed_rad_s});
+  Recorder recorder;
+  analysis::RunMetrics metrics(setup.plant.rig.wheels.r2_m, setup.experiment.end_speed_m_s);
+  RunSession session(clock, driver, logic_parts(setup), setup.gate, {&recorder, &metrics});
+  const RunOutcome outcome = session.run_fast(poll);
+  return {outcome, metrics.metrics(), std::move(recorder.records), std::move(recorder.distances_m)};
+}
+
+/// Braking at once from 170 rad/s, as the paper's initial conditions.
+inline Setup braking(const std::string& controller) {
+  Setup setup;
+  setup.control.controller = controller;
+  setup.experiment.start_speed_rad_s = 170.0;
+  return setup;
+}
+
+inline Setup ideal_braking(const std::string& controller) {
+  Setup setup = braking(controller);
+  setup.plant.ideal_actuator = true;
+  setup.plant.ideal_sensors = true;
+  return setup;
+}
+
+}  // namespace abs_hil::experiment::test
