@@ -1,6 +1,7 @@
 #include "abs_hil/control/slip_error_dynamics.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <unsupported/Eigen/MatrixFunctions>
 
@@ -20,9 +21,10 @@ SlipErrorDynamics::SlipErrorDynamics(const ControllerContext& context)
       v_min_m_s_{context.options.v_min_m_s},
       half_period_s_{0.5 / context.options.rate_Hz} {
   const auto& gains = context.options.adaptive;
-  if (!(gains.ks0 > 0.0 && gains.ks1 > 0.0)) throw std::invalid_argument("ks0 and ks1 must be > 0");
-  if (!(context.options.rate_Hz > 0.0)) throw std::invalid_argument("the control rate must be > 0");
-  if (!(v_min_m_s_ > 0.0)) throw std::invalid_argument("v_min_m_s must be > 0");
+  const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
+  if (!positive(gains.ks0) || !positive(gains.ks1)) throw std::invalid_argument("ks0 and ks1 must be > 0");
+  if (!positive(context.options.rate_Hz)) throw std::invalid_argument("the control rate must be > 0");
+  if (!positive(v_min_m_s_)) throw std::invalid_argument("v_min_m_s must be > 0");
 
   const Eigen::Matrix2d A = error_dynamics_matrix(gains.ks0, gains.ks1);
   const Eigen::Matrix2d half = (A * half_period_s_).exp();

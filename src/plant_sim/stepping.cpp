@@ -9,7 +9,7 @@
 namespace abs_hil::plant_sim {
 namespace {
 
-/// Step over time constant of the slip dynamics. RK4 is stable up to 2.78; tests/plant_sim/accuracy.test.cpp shows what
+/// Step over time constant of the slip dynamics. RK4 is stable up to 2.78; tests/plant_sim/accuracy_test.cpp shows what
 /// error this value leaves.
 constexpr double slip_time_constant_fraction = 0.3;
 /// A wheel that breaks away and is held again within this time was pulled no harder than its friction, but for

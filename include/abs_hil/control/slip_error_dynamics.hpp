@@ -30,12 +30,12 @@ namespace abs_hil::control {
 /// - The first two terms, the wanted e_v', become the mean of e_v' over the period along the wanted trajectory: row 2
 ///   of (exp(A h) - 1)/h times [I; e_v]. So e_v meets that trajectory at every tick whatever the rate; for h -> 0 it is
 ///   the printed law.
-/// - The other terms, which cancel what the plant does by itself, are means over the period too, since phi changes by
-///   a quarter within 1 ms when braking starts. The slip they are taken at is predicted with the model, along the
-///   wanted trajectory, never by differentiating measurements, so that prediction does not amplify noise.
+/// - The other terms, which cancel what the plant does by itself, are taken in the middle of the period, since phi
+///   changes by a quarter within 1 ms when braking starts. The slip there is predicted with the model along the wanted
+///   trajectory, never by differentiating measurements, so that prediction does not amplify noise.
 class SlipErrorDynamics {
  public:
-  /// Throws std::invalid_argument for ks0, ks1 or the control rate not > 0.
+  /// Throws std::invalid_argument for ks0, ks1, the control rate or v_min_m_s not > 0.
   explicit SlipErrorDynamics(const ControllerContext& context);
 
   /// @param integral_m  I, integral of e_v

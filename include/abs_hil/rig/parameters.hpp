@@ -37,7 +37,7 @@ struct BrakeParameters {
 /// no-load speed set to 220 rad/s (170 rad/s is reached at 0.78 of it), the stall torque is the root of "full duty from
 /// rest brings the upper wheel to 170 rad/s in 6.15 s", bisected on the simulated plant of Table 1. The lumped model
 /// without slip, J w' = K - M - (K/w0 + d) w with both wheels' J, d, M referred to the lower one, gives 2.1077 N m in
-/// closed form; slip in traction accounts for the rest. tests/plant_sim/drive_motor.test.cpp checks both.
+/// closed form; slip in traction accounts for the rest. tests/plant_sim/actuators_test.cpp checks both.
 struct DriveMotorParameters {
   double stall_torque_Nm{2.1122};     ///< torque at standstill and full duty, > 0
   double no_load_speed_rad_s{220.0};  ///< speed at which back-EMF cancels the supply, > 0
