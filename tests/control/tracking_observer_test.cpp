@@ -16,7 +16,7 @@ using Catch::Matchers::WithinRel;
 
 namespace {
 
-const control::ObserverOptions options{};
+const control::ObserverOptions options{.bandwidth_rad_s = 100.0};  // the noise bounds below are for this one
 
 }  // namespace
 

@@ -90,3 +90,11 @@ TEST_CASE("every shipped plant loads, sets every plant key and says what it is")
     CHECK_NOTHROW(load_file(plant_file(plant.name), table, "plant"));
   }
 }
+
+TEST_CASE("plant paper-table1 is what the defaults are") {
+  Settings defaults;
+  Settings loaded;
+  KeyTable table(loaded);
+  load_file(plant_file("paper-table1"), table, "plant");
+  CHECK(table.to_json() == KeyTable(defaults).to_json());
+}

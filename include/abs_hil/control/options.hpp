@@ -26,7 +26,7 @@ struct NominalOptions {
 
 /// Third-order tracking observer of the wheel speeds.
 struct ObserverOptions {
-  double bandwidth_rad_s{100.0};   ///< triple pole, > 0
+  double bandwidth_rad_s{150.0};   ///< triple pole, > 0
   double standstill_time_s{0.05};  ///< a wheel whose count has not changed for this long stands still
 };
 

@@ -17,7 +17,7 @@ struct StatusSnapshot {
   rig::DurationQuantiles cycle_time{};
 };
 
-/// Called from the telemetry thread, at most ten times a second. Empty: everything is shown as zero.
+/// Called from the telemetry thread, at most ten times a second. Empty: counts are 0 and durations NaN.
 using StatusSource = std::function<StatusSnapshot()>;
 
 }  // namespace abs_hil::telemetry
