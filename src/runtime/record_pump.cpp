@@ -18,10 +18,10 @@ void RecordPump::add_distance(const rig::CycleRecord& record) noexcept {
   }
 }
 
-std::size_t RecordPump::drain() {
+std::size_t RecordPump::drain(std::size_t at_most) {
   std::size_t count = 0;
   rig::CycleRecord record;
-  while (ring_.pop(record)) {
+  while (count < at_most && ring_.pop(record)) {
     add_distance(record);
     latest_ = record;
     for (rig::RecordSink* sink : sinks_) sink->consume(record, distance_m_);

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "abs_hil/rig/record_sink.hpp"
@@ -15,8 +17,8 @@ class RecordPump {
   /// @param r2_m lower wheel's radius
   RecordPump(RecordRing& ring, double r2_m, std::vector<rig::RecordSink*> sinks);
 
-  /// Hands on all that is there. Returns the number of records.
-  std::size_t drain();
+  /// Hands on what is there, at most so many records. Returns their number.
+  std::size_t drain(std::size_t at_most = std::numeric_limits<std::size_t>::max());
   /// Drains and finishes every sink, also when one of them throws; the first exception is thrown on.
   void finish();
 
