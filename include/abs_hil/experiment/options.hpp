@@ -18,8 +18,8 @@ struct ExperimentOptions {
   double hold_torque_Nm{2.0};       ///< brake torque from the end of slip control to standstill; 0 lets the rig run out
   double stopped_s{0.1};            ///< recorded after standstill, >= 0
   double accelerate_limit_s{20.0};  ///< time limits: a phase that lasts longer is a fault, > 0
-  double brake_limit_s{10.0};
-  double hold_limit_s{10.0};
+  double brake_limit_s{30.0};
+  double hold_limit_s{30.0};
 };
 
 }  // namespace abs_hil::experiment

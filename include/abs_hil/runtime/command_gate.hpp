@@ -14,7 +14,7 @@ namespace abs_hil::runtime {
 struct GateOptions {
   double motor_duty_max{1.0};     ///< in (0, 1]
   double brake_duty_max{1.0};     ///< in (0, 1]; the maker's driver caps the real brake at 0.7
-  double overspeed_rad_s{220.0};  ///< either wheel above this latches a fault, > 0
+  double overspeed_rad_s{250.0};  ///< either wheel above this latches a fault, > 0
 };
 
 /// What the gate did to a command.
