@@ -9,24 +9,32 @@
 #include <vector>
 
 #include "abs_hil/control/adaptive_controller.hpp"
+#include "abs_hil/control/five_phase_controller.hpp"
 #include "abs_hil/control/locked_controller.hpp"
 #include "abs_hil/control/nominal_controller.hpp"
+#include "abs_hil/control/pi_controller.hpp"
+#include "abs_hil/control/relay_controller.hpp"
+#include "abs_hil/control/sliding_mode_controller.hpp"
+#include "abs_hil/control/smooth_sliding_mode_controller.hpp"
+#include "abs_hil/control/super_twisting_controller.hpp"
 
 namespace abs_hil::control {
 namespace {
 
-template <class Controller>
-std::unique_ptr<SlipController> make(const ControllerContext& context) {
-  return std::make_unique<Controller>(context);
-}
-
-/// A new controller is one file pair and one line here.
+/// A new controller is one file pair and one line here (docs/writing-a-controller.md).
 constexpr std::array table{
-    ControllerEntry{"adaptive", "adaptive slip control, estimates the peak tyre force: (17)-(18) of the paper",
-                    &make<AdaptiveController>},
-    ControllerEntry{"nominal", "slip control with a known peak tyre force: (16) of the paper",
-                    &make<NominalController>},
-    ControllerEntry{"locked", "full brake torque throughout: the reference without ABS", &make<LockedController>},
+    controller_entry<AdaptiveController>(
+        "adaptive", "adaptive slip control, estimates the peak tyre force: (17)-(18) of the paper"),
+    controller_entry<NominalController>("nominal", "slip control with a known peak tyre force: (16) of the paper"),
+    controller_entry<SlidingModeController>("sliding-mode",
+                                            "textbook sliding mode, the paper's own baseline is not public: chatters"),
+    controller_entry<SmoothSlidingModeController>("sliding-mode-smooth", "sliding mode with a boundary layer"),
+    controller_entry<SuperTwistingController>("super-twisting", "second-order sliding mode with a continuous torque"),
+    controller_entry<PiController>("pi", "speed-scheduled PI with the measured tyre force fed forward"),
+    controller_entry<RelayController>("relay",
+                                      "brake on below a slip threshold, off above: the rig maker's demonstration"),
+    controller_entry<FivePhaseController>("five-phase", "production-style wheel deceleration thresholds, no slip"),
+    controller_entry<LockedController>("locked", "full brake torque throughout: the reference without ABS"),
 };
 
 /// Least number of letters to insert, delete or replace to turn one word into the other (Levenshtein).

@@ -33,10 +33,17 @@ void RunLogic::estimate(const rig::Measurement& measurement, double dt_s) noexce
     actuator_.advance(dt_s);
   }
   if (measurement.ideal_speeds) {
+    // The mean over the past cycle, without the encoders' and the observer's errors: what true speeds can tell.
+    if (started_ && dt_s > 0.0) {
+      alpha1_rad_s2_ = (measurement.ideal_speeds->omega1_rad_s - speeds_.omega1_rad_s) / dt_s;
+      alpha2_rad_s2_ = (measurement.ideal_speeds->omega2_rad_s - speeds_.omega2_rad_s) / dt_s;
+    }
     speeds_ = *measurement.ideal_speeds;
     stands_still_ = speeds_.omega1_rad_s == 0.0 && speeds_.omega2_rad_s == 0.0;
   } else {
     speeds_ = {upper_.omega_rad_s(), lower_.omega_rad_s()};
+    alpha1_rad_s2_ = upper_.alpha_rad_s2();
+    alpha2_rad_s2_ = lower_.alpha_rad_s2();
     stands_still_ = upper_.stands_still() && lower_.stands_still();
   }
   slip_ = rig::wheel_slip(wheels_.r1_m * speeds_.omega1_rad_s, wheels_.r2_m * speeds_.omega2_rad_s, slip_floor_m_s);
@@ -49,7 +56,9 @@ double RunLogic::slip_control(double dt_s, bool entered, rig::ControlState& stat
                            .slip_ref = slip_ref_,
                            .mean_brake_torque_Nm = actuator_.mean_torque_Nm(),
                            .brake_torque_Nm = actuator_.torque_Nm(),
-                           .max_brake_torque_Nm = actuator_.max_torque_Nm()};
+                           .max_brake_torque_Nm = actuator_.max_torque_Nm(),
+                           .alpha1_rad_s2 = alpha1_rad_s2_,
+                           .alpha2_rad_s2 = alpha2_rad_s2_};
   if (entered) controller_->reset(input);
   const control::SlipOutput output = controller_->step(input);
   state.slip_velocity_error_m_s = output.slip_velocity_error_m_s;

@@ -1,5 +1,7 @@
 // The table of all configuration keys: name, unit, meaning, place, range.
 
+#include <array>
+
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/experiment/experiments.hpp"
 #include "abs_hil/settings/key_table.hpp"
@@ -77,6 +79,79 @@ void add_control_keys(std::vector<Key>& keys, control::ControlOptions& c) {
       });
 }
 
+void add_switching_keys(std::vector<Key>& keys, control::SwitchingAdaptationOptions& o,
+                        const std::array<std::string_view, 4>& names) {
+  keys.insert(keys.end(), {
+                              {names[0], "", "gain of theta_hat' = -gamma k phi sign(e_v)", &o.gamma, from_zero(1e4)},
+                              {names[1], "N", "first estimate of theta", &o.theta0_N, from_zero(500)},
+                              {names[2], "N", "least theta the estimate may take", &o.theta_min_N, from_zero(500)},
+                              {names[3], "N", "largest theta the estimate may take", &o.theta_max_N, positive(1000)},
+                          });
+}
+
+void add_sliding_keys(std::vector<Key>& keys, control::ControlOptions& c) {
+  keys.insert(
+      keys.end(),
+      {
+          {"control.sliding_mode.gain_m_s2", "m/s^2", "K of -K sign(e_v)", &c.sliding_mode.gain_m_s2, positive(200)},
+          {"control.sliding_mode_smooth.gain_m_s2", "m/s^2", "K of -K sat(e_v/width)", &c.sliding_mode_smooth.gain_m_s2,
+           positive(200)},
+          {"control.sliding_mode_smooth.boundary_m_s", "m/s", "width of the boundary layer in e_v",
+           &c.sliding_mode_smooth.boundary_m_s, between(1e-3, 10)},
+          {"control.super_twisting.k1", "m^0.5/s^1.5", "gain of sqrt|e_v|", &c.super_twisting.k1, positive(200)},
+          {"control.super_twisting.k2", "m/s^3", "gain of the integral of sign(e_v)", &c.super_twisting.k2,
+           positive(5000)},
+      });
+  add_switching_keys(keys, c.sliding_mode.adaptation,
+                     {"control.sliding_mode.gamma", "control.sliding_mode.theta0_N", "control.sliding_mode.theta_min_N",
+                      "control.sliding_mode.theta_max_N"});
+  add_switching_keys(keys, c.sliding_mode_smooth.adaptation,
+                     {"control.sliding_mode_smooth.gamma", "control.sliding_mode_smooth.theta0_N",
+                      "control.sliding_mode_smooth.theta_min_N", "control.sliding_mode_smooth.theta_max_N"});
+  add_switching_keys(keys, c.super_twisting.adaptation,
+                     {"control.super_twisting.gamma", "control.super_twisting.theta0_N",
+                      "control.super_twisting.theta_min_N", "control.super_twisting.theta_max_N"});
+}
+
+void add_classic_keys(std::vector<Key>& keys, control::ControlOptions& c) {
+  control::FivePhaseOptions& f = c.five_phase;
+  keys.insert(keys.end(),
+              {
+                  {"control.relay.threshold",
+                   "",
+                   "slip above which the brake is released; 0: control.slip_ref",
+                   &c.relay.threshold,
+                   {0, 1, false, true}},
+                  {"control.pi.kp_per_s", "1/s", "proportional gain on e_v", &c.pi.kp_per_s, positive(1000)},
+                  {"control.pi.ki_per_s2", "1/s^2", "integral gain on e_v", &c.pi.ki_per_s2, from_zero(1e4)},
+                  {"control.pi.feed_forward", "", "share of the measured tyre force fed forward", &c.pi.feed_forward,
+                   between(0, 1)},
+                  {"control.five_phase.hold_below_m_s2",
+                   "m/s^2",
+                   "wheel acceleration below which the torque is held",
+                   &f.hold_below_m_s2,
+                   {-500, 0, false, true}},
+                  {"control.five_phase.release_below_m_s2",
+                   "m/s^2",
+                   "... below which it is released",
+                   &f.release_below_m_s2,
+                   {-500, 0, false, true}},
+                  {"control.five_phase.recover_above_m_s2", "m/s^2", "... above which releasing ends",
+                   &f.recover_above_m_s2, between(-500, 500)},
+                  {"control.five_phase.reapply_below_m_s2", "m/s^2",
+                   "... below which, after its peak, it is re-applied", &f.reapply_below_m_s2, between(-500, 500)},
+                  {"control.five_phase.hold_limit_s", "s", "longest hold before the torque is re-applied",
+                   &f.hold_limit_s, positive(5)},
+                  {"control.five_phase.recover_limit_s", "s", "longest wait for the wheel to come back",
+                   &f.recover_limit_s, positive(5)},
+                  {"control.five_phase.apply_Nm_s", "N m/s", "torque ramp of the first application", &f.apply_Nm_s,
+                   positive(1e4)},
+                  {"control.five_phase.release_Nm_s", "N m/s", "torque ramp down", &f.release_Nm_s, positive(1e4)},
+                  {"control.five_phase.reapply_Nm_s", "N m/s", "torque ramp of the re-application", &f.reapply_Nm_s,
+                   positive(1e4)},
+              });
+}
+
 void add_experiment_keys(std::vector<Key>& keys, experiment::ExperimentOptions& e) {
   std::vector<std::string_view> names;
   for (const experiment::ExperimentEntry& entry : experiment::experiments()) names.push_back(entry.name);
@@ -110,6 +185,8 @@ void add_experiment_keys(std::vector<Key>& keys, experiment::ExperimentOptions& 
 KeyTable::KeyTable(Settings& s) {
   add_plant_keys(keys_, s.plant);
   add_control_keys(keys_, s.control);
+  add_sliding_keys(keys_, s.control);
+  add_classic_keys(keys_, s.control);
   add_experiment_keys(keys_, s.experiment);
   keys_.insert(
       keys_.end(),

@@ -16,7 +16,7 @@ class LockedController final : public SlipController {
 
  private:
   rig::WheelParameters wheels_;
-  double full_torque_Nm_;
+  rig::BrakeParameters brake_;
 };
 
 }  // namespace abs_hil::control

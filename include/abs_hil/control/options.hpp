@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include "abs_hil/control/rival_options.hpp"
+
 namespace abs_hil::control {
 
 /// Gains of the slip velocity error's dynamics e_v'' + ks1 e_v' + ks0 e_v = 0 and of the adaptation (17)-(18); Table 1.
@@ -38,6 +40,12 @@ struct ControlOptions {
   double v_min_m_s{0.3};   ///< below this car speed slip control hands over to the sequence, > 0
   AdaptiveOptions adaptive{};
   NominalOptions nominal{};
+  SlidingModeOptions sliding_mode{};
+  SmoothSlidingModeOptions sliding_mode_smooth{};
+  SuperTwistingOptions super_twisting{};
+  RelayOptions relay{};
+  PiOptions pi{};
+  FivePhaseOptions five_phase{};
   ObserverOptions observer{};
 };
 

@@ -16,6 +16,15 @@ struct ControllerEntry {
   std::unique_ptr<SlipController> (*make)(const ControllerContext&);
 };
 
+/// The entry of a class with the constructor `Controller(const ControllerContext&)`: a line of the table, or, for a
+/// controller that lives outside this library, what its own program goes on with.
+template <class Controller>
+[[nodiscard]] constexpr ControllerEntry controller_entry(std::string_view name, std::string_view summary) noexcept {
+  return {name, summary, [](const ControllerContext& context) -> std::unique_ptr<SlipController> {
+            return std::make_unique<Controller>(context);
+          }};
+}
+
 /// All controllers, in the order in which `abs_hil list` shows them.
 [[nodiscard]] std::span<const ControllerEntry> controllers() noexcept;
 

@@ -14,6 +14,8 @@ struct SlipInput {
   double mean_brake_torque_Nm{0.0};
   double brake_torque_Nm{0.0};      ///< brake torque estimated to act now, N m
   double max_brake_torque_Nm{0.0};  ///< largest torque the actuator can give, > 0, may be infinite; the least is 0
+  double alpha1_rad_s2{0.0};        ///< estimated acceleration of the upper wheel
+  double alpha2_rad_s2{0.0};        ///< estimated acceleration of the lower wheel
 };
 
 /// What a slip controller wants. The torque may lie outside what the actuator can give: it is limited afterwards.

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "abs_hil/control/controller_context.hpp"
+#include "abs_hil/control/equivalent_control.hpp"
 #include "abs_hil/control/slip_controller.hpp"
 
 namespace abs_hil::control {
@@ -30,9 +31,7 @@ namespace abs_hil::control {
 /// - The first two terms, the wanted e_v', become the mean of e_v' over the period along the wanted trajectory: row 2
 ///   of (exp(A h) - 1)/h times [I; e_v]. So e_v meets that trajectory at every tick whatever the rate; for h -> 0 it is
 ///   the printed law.
-/// - The other terms, which cancel what the plant does by itself, are taken in the middle of the period, since phi
-///   changes by a quarter within 1 ms when braking starts. The slip there is predicted with the model along the wanted
-///   trajectory, never by differentiating measurements, so that prediction does not amplify noise.
+/// - The other terms, which cancel what the plant does by itself, are EquivalentControl's.
 class SlipErrorDynamics {
  public:
   /// Throws std::invalid_argument for ks0, ks1, the control rate or v_min_m_s not > 0.
@@ -47,10 +46,7 @@ class SlipErrorDynamics {
                                        double recent_phi) const noexcept;
 
  private:
-  rig::WheelParameters wheels_;
-  rig::TyreParameters tyre_;
-  double v_min_m_s_;
-  double half_period_s_;
+  EquivalentControl equivalent_;
   Eigen::RowVector2d mean_rate_;     ///< row 2 of (exp(A h) - 1)/h, 1/s^2 and 1/s
   Eigen::RowVector2d error_at_mid_;  ///< row 2 of exp(A h/2): e_v in the middle of the period
 };

@@ -51,6 +51,8 @@ class RunLogic final : public runtime::CycleLogic {
   control::BrakeActuator actuator_;
   rig::WheelSpeeds speeds_{};
   double slip_{0.0};
+  double alpha1_rad_s2_{0.0};
+  double alpha2_rad_s2_{0.0};
   Sequence::Change end_{};
   bool stands_still_{false};
   bool started_{false};

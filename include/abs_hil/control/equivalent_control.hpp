@@ -1,0 +1,41 @@
+#pragma once
+
+#include "abs_hil/control/controller_context.hpp"
+#include "abs_hil/control/slip_controller.hpp"
+
+namespace abs_hil::control {
+
+/// How a law wants e_v to move during the coming period.
+struct WantedMotion {
+  double mean_rate_m_s2{0.0};    ///< mean of e_v' over the period
+  double error_at_mid_m_s{0.0};  ///< e_v in its middle
+};
+
+/// Equivalent control, the part that all slip laws share: from (14), e_v' = -k theta phi(slip) - friction drift +
+/// (r1/J1) Tb, so the torque that makes e_v move as a law wants is
+///   Tb = (J1/r1) ( wanted e_v' + k(slip_ref) theta phi(slip) + friction drift ).
+/// The torque is held for a period, so the terms that cancel what the plant does by itself are taken in the middle of
+/// it: phi changes by a quarter within 1 ms when braking starts. The slip there is predicted with the model along the
+/// wanted motion, never by differentiating measurements, so that prediction does not amplify noise.
+class EquivalentControl {
+ public:
+  /// Throws std::invalid_argument for a control rate or v_min_m_s not > 0.
+  explicit EquivalentControl(const ControllerContext& context);
+
+  /// @param error_m_s  e_v of `input`
+  /// @param theta_N  peak tyre force, known or estimated
+  /// @param recent_phi  phi(slip), now or half a cycle ago: v_x is predicted with it, and changes little
+  /// @return brake torque to hold for one period, N m; may lie outside what the actuator can give. Real-time safe.
+  [[nodiscard]] double brake_torque_Nm(const SlipInput& input, double error_m_s, const WantedMotion& wanted,
+                                       double theta_N, double recent_phi) const noexcept;
+
+  [[nodiscard]] double period_s() const noexcept { return 2.0 * half_period_s_; }
+
+ private:
+  rig::WheelParameters wheels_;
+  rig::TyreParameters tyre_;
+  double v_min_m_s_;
+  double half_period_s_;
+};
+
+}  // namespace abs_hil::control

@@ -1,0 +1,32 @@
+#pragma once
+
+#include "abs_hil/control/options.hpp"
+
+namespace abs_hil::control {
+
+/// Estimate of the peak tyre force that belongs to a sliding-mode law,
+///   theta_hat' = -gamma k(slip_ref) phi(slip) s,   s in [-1, 1] standing for sign(e_v),
+/// projected onto [theta_min_N, theta_max_N]. With e_v' = -k phi (theta - theta_hat) - K s + d it makes
+/// V = |e_v| + (theta - theta_hat)^2/(2 gamma) fall at K - |d| or faster until e_v = 0 (docs/theory-rivals.md), for
+/// either sign of phi. Real-time safe.
+class SwitchingThetaEstimator {
+ public:
+  /// Throws std::invalid_argument for a gain or bounds out of range.
+  explicit SwitchingThetaEstimator(const SwitchingAdaptationOptions& options);
+
+  void reset() noexcept { theta_N_ = theta0_N_; }
+  /// @param gain_phi  k(slip_ref) phi(slip), mean over the past interval
+  /// @param switching  s of the past interval
+  void update(double dt_s, double gain_phi, double switching) noexcept;
+
+  [[nodiscard]] double theta_N() const noexcept { return theta_N_; }
+
+ private:
+  double gamma_;
+  double theta0_N_;
+  double theta_min_N_;
+  double theta_max_N_;
+  double theta_N_;
+};
+
+}  // namespace abs_hil::control

@@ -1,0 +1,45 @@
+#include "abs_hil/control/pi_controller.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "abs_hil/control/slip_error_dynamics.hpp"
+
+namespace abs_hil::control {
+
+double measured_equivalent_torque_Nm(const rig::WheelParameters& wheels, const SlipInput& input) noexcept {
+  const auto& w = wheels;
+  const double tyre_force_N =
+      std::max(0.0, -(w.J2_kg_m2 * input.alpha2_rad_s2 + w.d2_Nms_rad * input.speeds.omega2_rad_s + w.M20_Nm) / w.r2_m);
+  return w.J1_kg_m2 / w.r1_m *
+         (rig::slip_velocity_gain(w, input.slip_ref) * tyre_force_N +
+          friction_drift_m_s2(w, input.speeds, input.slip_ref));
+}
+
+PiController::PiController(const ControllerContext& context)
+    : wheels_{context.rig.wheels},
+      kp_per_s_{-std::expm1(-context.options.pi.kp_per_s / context.options.rate_Hz) * context.options.rate_Hz},
+      ki_per_s2_{context.options.pi.ki_per_s2},
+      feed_forward_{context.options.pi.feed_forward} {
+  if (!(context.options.rate_Hz > 0.0)) throw std::invalid_argument("the control rate must be > 0");
+  if (!(context.options.pi.kp_per_s > 0.0)) throw std::invalid_argument("pi.kp_per_s must be > 0");
+  if (!(ki_per_s2_ >= 0.0)) throw std::invalid_argument("pi.ki_per_s2 must be >= 0");
+  if (!(feed_forward_ >= 0.0 && feed_forward_ <= 1.0)) throw std::invalid_argument("pi.feed_forward must be in [0, 1]");
+}
+
+void PiController::reset(const SlipInput& input) noexcept {
+  integral_.reset(slip_velocity_error_m_s(wheels_, input.speeds, input.slip_ref), input.slip_ref);
+}
+
+SlipOutput PiController::step(const SlipInput& input) noexcept {
+  const double error_m_s = slip_velocity_error_m_s(wheels_, input.speeds, input.slip_ref);
+  integral_.advance(input.dt_s, error_m_s, input.slip_ref, wheels_.r2_m * input.speeds.omega2_rad_s);
+  const double feedback_m_s2 = -kp_per_s_ * error_m_s - ki_per_s2_ * integral_.value_m();
+  const double torque_Nm =
+      feed_forward_ * measured_equivalent_torque_Nm(wheels_, input) + wheels_.J1_kg_m2 / wheels_.r1_m * feedback_m_s2;
+  integral_.note_request(torque_Nm, input.max_brake_torque_Nm);
+  return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = rig::unknown};
+}
+
+}  // namespace abs_hil::control

@@ -1,0 +1,24 @@
+#include "abs_hil/control/relay_controller.hpp"
+
+#include <stdexcept>
+
+#include "abs_hil/control/full_torque.hpp"
+#include "abs_hil/control/slip_error_dynamics.hpp"
+
+namespace abs_hil::control {
+
+RelayController::RelayController(const ControllerContext& context)
+    : wheels_{context.rig.wheels}, brake_{context.rig.brake}, threshold_{context.options.relay.threshold} {
+  if (!(threshold_ >= 0.0 && threshold_ < 1.0)) throw std::invalid_argument("relay.threshold must be in [0, 1)");
+}
+
+void RelayController::reset(const SlipInput&) noexcept {}
+
+SlipOutput RelayController::step(const SlipInput& input) noexcept {
+  const double threshold = threshold_ > 0.0 ? threshold_ : input.slip_ref;
+  return {.brake_torque_Nm = input.slip > threshold ? 0.0 : full_torque_Nm(brake_, input.max_brake_torque_Nm),
+          .slip_velocity_error_m_s = slip_velocity_error_m_s(wheels_, input.speeds, input.slip_ref),
+          .theta_est_N = rig::unknown};
+}
+
+}  // namespace abs_hil::control

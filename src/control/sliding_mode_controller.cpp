@@ -1,0 +1,21 @@
+#include "abs_hil/control/sliding_mode_controller.hpp"
+
+#include <stdexcept>
+
+namespace abs_hil::control {
+
+SlidingModeController::SlidingModeController(const ControllerContext& context)
+    : surface_{context, context.options.sliding_mode.adaptation}, gain_m_s2_{context.options.sliding_mode.gain_m_s2} {
+  if (!(gain_m_s2_ > 0.0)) throw std::invalid_argument("sliding_mode.gain_m_s2 must be > 0");
+}
+
+SlipOutput SlidingModeController::step(const SlipInput& input) noexcept {
+  const double error_m_s = surface_.observe(input);
+  const double sign = error_m_s > 0.0 ? 1.0 : (error_m_s < 0.0 ? -1.0 : 0.0);
+  const double rate_m_s2 = -gain_m_s2_ * sign;
+  const WantedMotion wanted{.mean_rate_m_s2 = rate_m_s2,
+                            .error_at_mid_m_s = error_m_s + 0.5 * surface_.period_s() * rate_m_s2};
+  return surface_.drive(input, error_m_s, wanted, sign);
+}
+
+}  // namespace abs_hil::control
