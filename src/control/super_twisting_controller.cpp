@@ -1,5 +1,6 @@
 #include "abs_hil/control/super_twisting_controller.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -7,20 +8,14 @@ namespace abs_hil::control {
 
 SuperTwistingStep super_twisting_step(double error_m_s, double integral_m_s2, double k1, double k2,
                                       double period_s) noexcept {
-  // e+ + h k1 sqrt|e+| s + h^2 k2 s = e + h z with s in sign(e+): solved by e+ = 0 while the right side is within
-  // h^2 k2, else quadratic in sqrt|e+|.
   const double h = period_s;
-  const double right_side = error_m_s + h * integral_m_s2;
-  const double reach = h * h * k2;
-  if (std::abs(right_side) <= reach) {
-    const double sign = right_side / reach;
-    return {.error_m_s = 0.0, .integral_m_s2 = integral_m_s2 - h * k2 * sign, .sign = sign};
-  }
-  const double sign = std::copysign(1.0, right_side);
-  const double rest = std::abs(right_side) - reach;
-  // sqrt|e+| without the cancellation of -b + sqrt(b^2 + 4 rest).
-  const double root = 2.0 * rest / (h * k1 + std::sqrt(h * h * k1 * k1 + 4.0 * rest));
-  return {.error_m_s = sign * root * root, .integral_m_s2 = integral_m_s2 - h * k2 * sign, .sign = sign};
+  const double size = std::abs(error_m_s);
+  // sqrt|e+| of |e+| + h k1 sqrt|e+| = |e|, without the cancellation of -b + sqrt(b^2 + 4|e|).
+  const double root = 2.0 * size / (h * k1 + std::sqrt(h * h * k1 * k1 + 4.0 * size));
+  const double sign = std::clamp(error_m_s / (h * h * k2), -1.0, 1.0);
+  return {.root_rate_m_s2 = std::copysign(k1 * root, -error_m_s),
+          .integral_m_s2 = integral_m_s2 - h * k2 * sign,
+          .sign = sign};
 }
 
 SuperTwistingController::SuperTwistingController(const ControllerContext& context)
@@ -39,8 +34,9 @@ SlipOutput SuperTwistingController::step(const SlipInput& input) noexcept {
   const double error_m_s = surface_.observe(input);
   const double period_s = surface_.period_s();
   const SuperTwistingStep next = super_twisting_step(error_m_s, integral_m_s2_, k1_, k2_, period_s);
-  const WantedMotion wanted{.mean_rate_m_s2 = (next.error_m_s - error_m_s) / period_s,
-                            .error_at_mid_m_s = 0.5 * (error_m_s + next.error_m_s)};
+  // z makes up for what the model misses, so the root alone is how e_v is expected to move.
+  const WantedMotion wanted{.mean_rate_m_s2 = next.root_rate_m_s2 + next.integral_m_s2,
+                            .error_at_mid_m_s = error_m_s + 0.5 * period_s * next.root_rate_m_s2};
   const SlipOutput output = surface_.drive(input, error_m_s, wanted, next.sign);
   if (!surface_.winds_up(next.integral_m_s2 - integral_m_s2_)) integral_m_s2_ = next.integral_m_s2;
   return output;

@@ -124,6 +124,7 @@ inline Result brake(const Setup& s, control::SlipController& controller) {
   double square_sum = 0.0;
   int square_count = 0;
   double v_before = 0.0;
+  rig::WheelSpeeds speeds_before{s.omega1_start, s.omega2_start};
   for (int n = 0;; ++n) {
     const double t = n * h;
     if (n > 0 && s.encoders) {
@@ -144,7 +145,10 @@ inline Result brake(const Setup& s, control::SlipController& controller) {
         .slip_ref = s.options.slip_ref,
         .mean_brake_torque_Nm = actuator.mean_torque_Nm(),
         .brake_torque_Nm = actuator.torque_Nm(),
-        .max_brake_torque_Nm = actuator.max_torque_Nm()};
+        .max_brake_torque_Nm = actuator.max_torque_Nm(),
+        .alpha1_rad_s2 = s.encoders ? upper.alpha_rad_s2() : (speeds.omega1_rad_s - speeds_before.omega1_rad_s) / h,
+        .alpha2_rad_s2 = s.encoders ? lower.alpha_rad_s2() : (speeds.omega2_rad_s - speeds_before.omega2_rad_s) / h};
+    speeds_before = speeds;
     if (n == 0) controller.reset(input);
     const control::SlipOutput output = controller.step(input);
     const double wanted = actuator.limited(output.brake_torque_Nm);

@@ -33,8 +33,8 @@ struct RelayOptions {
 
 struct PiOptions {
   double kp_per_s{32.0};     ///< proportional gain on the slip times car speed, > 0
-  double ki_per_s2{19.0};    ///< integral gain, >= 0
-  double feed_forward{1.0};  ///< share of the measured tyre force's torque that is fed forward, 0 ... 1
+  double ki_per_s2{56.0};    ///< integral gain, >= 0
+  double feed_forward{0.2};  ///< share of the measured tyre force's torque that is fed forward, 0 ... 1
 };
 
 /// Accelerations are those of the wheel's circumference, r1 omega1'.

@@ -6,13 +6,15 @@ namespace abs_hil::control {
 
 /// One period of the super-twisting algorithm e' = -k1 sqrt|e| sign(e) + z, z' = -k2 sign(e).
 struct SuperTwistingStep {
-  double error_m_s{0.0};      ///< e at the end of the period
-  double integral_m_s2{0.0};  ///< z at the end of the period
-  double sign{0.0};           ///< the value of the set-valued sign(e) taken, in [-1, 1]
+  double root_rate_m_s2{0.0};  ///< -k1 sqrt|e| sign(e), mean over the period
+  double integral_m_s2{0.0};   ///< z for the period
+  double sign{0.0};            ///< what stood for sign(e), in [-1, 1]
 };
 
-/// Backward Euler step, with e, z and the set-valued sign at the period's end: does not chatter at any rate, reaches
-/// (0, 0) exactly and is continuous in (e, z) (docs/theory-rivals.md). Real-time safe.
+/// Semi-implicit step: sqrt|e| is taken at the period's end, where e+ = e - h k1 sqrt|e+| sign(e+), and the sign is
+/// sat(e/(h^2 k2)), so that z never moves by more than takes e to 0. Continuous in e and z; close to 0 it becomes the
+/// deadbeat pair u = z - 2 e/h, z+ = z - e/h, which ends the chatter at any rate and leaves e = O(h^2) under a
+/// perturbation of bounded slope (docs/theory-rivals.md). Real-time safe.
 [[nodiscard]] SuperTwistingStep super_twisting_step(double error_m_s, double integral_m_s2, double k1, double k2,
                                                     double period_s) noexcept;
 
