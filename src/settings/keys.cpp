@@ -117,11 +117,8 @@ void add_classic_keys(std::vector<Key>& keys, control::ControlOptions& c) {
   control::FivePhaseOptions& f = c.five_phase;
   keys.insert(keys.end(),
               {
-                  {"control.relay.threshold",
-                   "",
-                   "slip above which the brake is released; 0: control.slip_ref",
-                   &c.relay.threshold,
-                   {0, 1, false, true}},
+                  {"control.relay.threshold", "", "slip that releases the brake; 0: control.slip_ref",
+                   &c.relay.threshold, from_zero(0.99)},
                   {"control.pi.kp_per_s", "1/s", "proportional gain on e_v", &c.pi.kp_per_s, positive(1000)},
                   {"control.pi.ki_per_s2", "1/s^2", "integral gain on e_v", &c.pi.ki_per_s2, from_zero(1e4)},
                   {"control.pi.feed_forward", "", "share of the measured tyre force fed forward", &c.pi.feed_forward,

@@ -34,3 +34,65 @@ TEST_CASE("an unknown experiment names the known ones") {
   CHECK_THROWS_WITH(plan_experiment(options, 0.3),
                     Catch::Matchers::Contains("parade") && Catch::Matchers::Contains("paper"));
 }
+
+namespace {
+
+/// Writes down what it sees.
+class Probe final : public control::SlipController {
+ public:
+  explicit Probe(control::SlipInput& seen) : seen_{seen} {}
+  void reset(const control::SlipInput&) noexcept override {}
+  [[nodiscard]] control::SlipOutput step(const control::SlipInput& input) noexcept override {
+    seen_ = input;
+    return {};
+  }
+
+ private:
+  control::SlipInput& seen_;
+};
+
+}  // namespace
+
+TEST_CASE("controllers see accelerations: the observers', or the mean over the past cycle where speeds are true") {
+  for (const bool ideal : {false, true}) {
+    control::SlipInput seen;
+    RunLogicParts parts = logic_parts(braking("adaptive"));
+    const control::ObserverOptions observer = parts.control.observer;
+    const std::int32_t per_rev = parts.rig.encoder_counts_per_rev;
+    parts.controller = std::make_unique<Probe>(seen);
+    RunLogic logic(std::move(parts));
+    control::TrackingObserver upper(observer, per_rev), lower(observer, per_rev);
+    rig::CycleRecord record;
+    double omega1_before = 0.0, omega2_before = 0.0;
+    for (int n = 0; n <= 300; ++n) {
+      // Both wheels slow down steadily, the upper one at 90 rad/s^2, the lower one at 70.
+      const double t = 1e-3 * n;
+      const double omega1 = 170.0 - 90.0 * t, omega2 = 170.0 - 70.0 * t;
+      const auto counts = [&](double omega, double alpha) {
+        return static_cast<std::int32_t>((omega * t + 0.5 * alpha * t * t) / rig::radians_per_count(per_rev));
+      };
+      rig::Measurement measurement{
+          .time_ns = n * 1'000'000, .upper_counts = counts(170.0, -90.0), .lower_counts = counts(170.0, -70.0)};
+      if (ideal) measurement.ideal_speeds = rig::WheelSpeeds{omega1, omega2};
+      static_cast<void>(logic.step(measurement, record));
+      logic.commanded(rig::safe_command);
+      if (n == 0) {
+        upper.reset(0, 170.0);
+        lower.reset(0, 170.0);
+        CHECK(seen.alpha1_rad_s2 == 0.0);
+        CHECK(seen.alpha2_rad_s2 == 0.0);
+      } else {
+        upper.update(measurement.upper_counts, 1e-3);
+        lower.update(measurement.lower_counts, 1e-3);
+        const double alpha1 = ideal ? (omega1 - omega1_before) / 1e-3 : upper.alpha_rad_s2();
+        const double alpha2 = ideal ? (omega2 - omega2_before) / 1e-3 : lower.alpha_rad_s2();
+        CHECK_THAT(seen.alpha1_rad_s2, Catch::Matchers::WithinAbs(alpha1, 1e-6));
+        CHECK_THAT(seen.alpha2_rad_s2, Catch::Matchers::WithinAbs(alpha2, 1e-6));
+      }
+      omega1_before = omega1;
+      omega2_before = omega2;
+    }
+    CHECK_THAT(seen.alpha1_rad_s2, Catch::Matchers::WithinAbs(-90.0, ideal ? 1e-6 : 5.0));
+    CHECK_THAT(seen.alpha2_rad_s2, Catch::Matchers::WithinAbs(-70.0, ideal ? 1e-6 : 5.0));
+  }
+}
