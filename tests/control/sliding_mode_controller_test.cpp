@@ -1,5 +1,9 @@
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
+#include <stdexcept>
+#include <string_view>
 
 #include "catch.hpp"
 #include "control/rival_bench.hpp"
@@ -172,5 +176,25 @@ TEST_CASE("The boundary layer ends the chatter at every rate, however thin it is
     // Inside the layer e_v settles where K e_v/width makes up for the mismatch; adaptation takes that to 0.
     const auto& late = run.ticks[static_cast<std::size_t>(1.5 * rate_Hz)];
     CHECK_THAT(late.output.slip_velocity_error_m_s, WithinAbs(0.0, 0.05));
+  }
+}
+
+TEST_CASE("Gains of the sliding-mode laws that are not usable are refused") {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto refused = [](std::string_view name, auto&& spoil) {
+    control::ControlOptions options;
+    const rig::RigParameters rig;
+    CHECK_NOTHROW(control::make_controller(name, {options, rig}));
+    spoil(options);
+    CHECK_THROWS_AS(control::make_controller(name, {options, rig}), std::invalid_argument);
+  };
+  refused("sliding-mode", [](auto& o) { o.sliding_mode.gain_m_s2 = 0.0; });
+  refused("sliding-mode", [](auto& o) { o.sliding_mode.adaptation.gamma = -1.0; });
+  refused("sliding-mode-smooth", [](auto& o) { o.sliding_mode_smooth.boundary_m_s = 0.0; });
+  refused("sliding-mode-smooth", [=](auto& o) { o.sliding_mode_smooth.gain_m_s2 = nan; });
+  refused("super-twisting", [](auto& o) { o.super_twisting.k1 = 0.0; });
+  refused("super-twisting", [=](auto& o) { o.super_twisting.k2 = nan; });
+  for (const std::string_view name : {"sliding-mode", "sliding-mode-smooth", "super-twisting", "pi", "five-phase"}) {
+    refused(name, [](auto& o) { o.rate_Hz = 0.0; });
   }
 }

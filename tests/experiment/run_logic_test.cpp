@@ -1,5 +1,11 @@
 #include "abs_hil/experiment/run_logic.hpp"
 
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include "abs_hil/control/tracking_observer.hpp"
+#include "abs_hil/rig/encoder_scale.hpp"
 #include "catch.hpp"
 #include "simulated_run.hpp"
 
@@ -56,7 +62,8 @@ class Probe final : public control::SlipController {
 TEST_CASE("controllers see accelerations: the observers', or the mean over the past cycle where speeds are true") {
   for (const bool ideal : {false, true}) {
     control::SlipInput seen;
-    RunLogicParts parts = logic_parts(braking("adaptive"));
+    const auto setup = braking("adaptive");
+    RunLogicParts parts = logic_parts(setup);
     const control::ObserverOptions observer = parts.control.observer;
     const std::int32_t per_rev = parts.rig.encoder_counts_per_rev;
     parts.controller = std::make_unique<Probe>(seen);
