@@ -1,5 +1,6 @@
 #include "command_line.hpp"
 
+#include "abs_hil/experiment/experiments.hpp"
 #include "abs_hil/settings/config_error.hpp"
 #include "abs_hil/settings/config_file.hpp"
 #include "abs_hil/settings/key_table.hpp"
@@ -21,6 +22,11 @@ void check_together(const RunRequest& request) {
   if (s.backend == "rig" && s.experiment.start_speed_rad_s > 0.0) {
     throw settings::ConfigError(
         "experiment.start_speed_rad_s: a real wheel does not start at speed; leave it out or use --backend sim");
+  }
+  if (s.backend == "rig" && !s.plant.friction_profile.empty()) {
+    throw settings::ConfigError(
+        "plant.friction_profile: only a simulated road changes its friction; leave it out, choose another experiment "
+        "than friction-jump, or use --backend sim");
   }
   if (s.control.adaptive.theta_min_N >= s.control.adaptive.theta_max_N) {
     throw settings::ConfigError("control.adaptive.theta_min_N: must be less than control.adaptive.theta_max_N");
@@ -48,6 +54,9 @@ RunRequest merge(const RunOptions& options) {
   set("control.rate_Hz", options.rate_Hz, "--rate");
   set("run.seed", options.seed, "--seed");
   for (const std::string& assignment : options.assignments) keys.set_text(assignment, "--set");
+  if (s.plant.friction_profile.empty()) {
+    s.plant.friction_profile = experiment::friction_profile_of(s.experiment.name);
+  }
   check_together(request);
   request.config_json = keys.to_json().dump();
   return request;

@@ -50,14 +50,27 @@ std::vector<PhasePlan> plan_paper(const ExperimentOptions& o, double v_min_m_s) 
   return plans;
 }
 
-constexpr std::array<ExperimentEntry, 1> entries{{
+/// Grip that falls to 12 / 23 for 0.4 s in mid-braking: on paper-table1 theta goes 23, 12, 23 N. Early enough to be
+/// over above 3 m/s on every plant.
+constexpr std::string_view half_grip = "braking time: 1; 0.521739 at 0.6; 1 at 1";
+
+constexpr std::array<ExperimentEntry, 2> entries{{
     {"paper", "start, accelerate, cut the motor at the upper wheel's maximum, brake under slip control to a stop",
      plan_paper},
+    {"friction-jump", "as paper, with grip that falls to 12/23 from 0.6 s to 1 s of braking (simulation only)",
+     plan_paper, half_grip},
 }};
 
 }  // namespace
 
 std::span<const ExperimentEntry> experiments() noexcept { return entries; }
+
+std::string_view friction_profile_of(std::string_view experiment) noexcept {
+  for (const ExperimentEntry& entry : entries) {
+    if (entry.name == experiment) return entry.friction_profile;
+  }
+  return {};
+}
 
 std::vector<PhasePlan> plan_experiment(const ExperimentOptions& options, double v_min_m_s) {
   std::string known;

@@ -33,6 +33,21 @@ void check(const PlantOptions& options) {
   require_positive("B", tyre.B);
   require(tyre.C > 0.0 && tyre.C <= 2.0, "C", tyre.C, "in (0, 2]");
 
+  require_positive("mu_peak", options.mu_peak);
+
+  const IntecoMuParameters& mu = options.inteco_mu;
+  require(true, "mu_w1", mu.w1, "finite");
+  require(true, "mu_w2", mu.w2, "finite");
+  require(true, "mu_w3", mu.w3, "finite");
+  require(true, "mu_w4", mu.w4, "finite");
+  require_positive("mu_a", mu.a);
+  require(mu.p >= 1.0 && mu.p <= 10.0, "mu_p", mu.p, "in [1, 10]");
+
+  require_positive("lever_Mg_Nm", options.lever.Mg_Nm);
+  require_positive("lever_L_m", options.lever.L_m);
+  require(options.lever.phi_deg > 0.0 && options.lever.phi_deg <= 90.0, "lever_phi_deg", options.lever.phi_deg,
+          "in (0, 90]");
+
   const rig::BrakeParameters& brake = options.rig.brake;
   require_positive("b1_Nm", brake.b1_Nm);
   require(true, "b2_Nm", brake.b2_Nm, "finite");

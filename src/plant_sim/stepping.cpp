@@ -26,37 +26,38 @@ StateVector stepped(const TorqueBalance& balance, const StateVector& x, double s
   return end;
 }
 
-/// The step that `max_step_s` and the slip dynamics allow. Their time constant v_x / (theta B C (r1^2/J1 + r2^2/J2))
-/// falls with the car speed; a held wheel has no part in them.
-double step_limit_s(const PlantOptions& options, const Sliding& sliding, const StateVector& x) noexcept {
-  const rig::WheelParameters& w = options.rig.wheels;
+/// The step that `max_step_s` and the slip dynamics allow. Their time constant, which for the magic formula is
+/// v_x / (theta B C (r1^2/J1 + r2^2/J2)), falls with the car speed; a held wheel has no part in them.
+double step_limit_s(const TorqueBalance& balance, const StateVector& x, double max_step_s) noexcept {
+  const rig::WheelParameters& w = balance.model.wheels();
+  const Sliding& sliding = balance.sliding;
   const double mobility_per_kg = (sliding.upper != 0.0 ? w.r1_m * w.r1_m / w.J1_kg_m2 : 0.0) +
                                  (sliding.lower != 0.0 ? w.r2_m * w.r2_m / w.J2_kg_m2 : 0.0);
-  const double rate_per_s = tyre_damping_bound_Ns_m(options, x[omega2]) * mobility_per_kg;
-  return std::min(options.max_step_s, slip_time_constant_fraction / rate_per_s);
+  const ContactState steepest{x[omega1], x[omega2], x[brake_torque], sliding.upper, balance.friction.highest};
+  const double rate_per_s = balance.model.damping_bound_Ns_m(steepest) * mobility_per_kg;
+  return std::min(max_step_s, slip_time_constant_fraction / rate_per_s);
 }
 
 /// The shortest step, within 10^-12 of `step_s`, after which `margin` is negative; it is so after `step_s`.
-double event_step_s(const PlantOptions& options, const TorqueBalance& balance, const StateVector& x,
-                    double step_s) noexcept {
+double event_step_s(const TorqueBalance& balance, const StateVector& x, double step_s) noexcept {
   double before_s = 0.0;
   double after_s = step_s;
   for (int i = 0; i < event_bisections; ++i) {
     const double middle_s = 0.5 * (before_s + after_s);
     const StateVector middle = stepped(balance, x, middle_s);
-    (margin(options, balance.held, balance.sliding, middle) < 0.0 ? after_s : before_s) = middle_s;
+    (margin(balance, middle, middle_s) < 0.0 ? after_s : before_s) = middle_s;
   }
   return after_s;
 }
 
-/// Goes on from `x` to the first stop or break-away before `step_s`, or for all of it. Returns the time passed.
-double substep(const PlantOptions& options, TorqueBalance& balance, double step_s, StateVector& x) noexcept {
+/// Goes on from `x` to the first event before `step_s`, or for all of it. Returns the time passed.
+double substep(TorqueBalance& balance, double step_s, StateVector& x) noexcept {
   const StateVector whole = stepped(balance, x, step_s);
-  if (!(margin(options, balance.held, balance.sliding, whole) < 0.0)) {
+  if (!(margin(balance, whole, step_s) < 0.0)) {
     x = whole;
     return step_s;
   }
-  double taken_s = event_step_s(options, balance, x, step_s);
+  double taken_s = event_step_s(balance, x, step_s);
   StateVector end = stepped(balance, x, taken_s);
   const bool upper_stops = balance.sliding.upper * end[omega1] < 0.0;
   const bool lower_stops = balance.sliding.lower * end[omega2] < 0.0;
@@ -81,19 +82,26 @@ void stand(const HeldTorques& held, double duration_s, StateVector& x) noexcept 
 
 }  // namespace
 
-void integrate(const PlantOptions& options, const HeldTorques& held, double duration_s, StateVector& x) noexcept {
+void integrate(const WheelModel& model, double max_step_s, const HeldTorques& held, double duration_s,
+               FrictionCourse& course, StateVector& x) noexcept {
   double left_s = duration_s;
   while (left_s > 0.0) {
-    if (stands_for_good(options, held, x)) {
+    if (stands_for_good(model, held, x)) {
       stand(held, left_s, x);
-      return;
+      course.pass(left_s);
+      break;
     }
-    TorqueBalance balance{options, held, sliding_from(options, held, x)};
+    TorqueBalance balance{model, held, course.present(x[angle2]), {}};
+    balance.sliding = sliding_from(balance, x);
     // Equal parts of what is left; the last part is what is left, so the interval ends exactly.
-    const double parts = std::ceil(left_s / step_limit_s(options, balance.sliding, x));
-    const double step_s = parts > 1.0 ? left_s / parts : left_s;
-    left_s -= substep(options, balance, step_s, x);
+    const double interval_s = std::min(left_s, course.time_left_s());
+    const double parts = std::ceil(interval_s / step_limit_s(balance, x, max_step_s));
+    const double taken_s = substep(balance, parts > 1.0 ? interval_s / parts : interval_s, x);
+    left_s -= taken_s;
+    course.pass(taken_s);
+    course.settle(x[angle2]);
   }
+  course.settle(x[angle2]);
 }
 
 }  // namespace abs_hil::plant_sim

@@ -4,8 +4,10 @@
 
 namespace abs_hil::plant_sim {
 
-/// Integrates `x` over `duration_s` > 0 under held inputs with fourth-order Runge-Kutta steps that end exactly at the
-/// interval's end and at every instant at which a wheel stops or breaks away. Allocates nothing.
-void integrate(const PlantOptions& options, const HeldTorques& held, double duration_s, StateVector& x) noexcept;
+/// Integrates `x` over `duration_s` > 0 under held inputs with fourth-order Runge-Kutta steps of at most `max_step_s`
+/// that end exactly at the interval's end and at every instant at which a wheel stops or breaks away or a piece of the
+/// friction profile ends. Allocates nothing.
+void integrate(const WheelModel& model, double max_step_s, const HeldTorques& held, double duration_s,
+               FrictionCourse& course, StateVector& x) noexcept;
 
 }  // namespace abs_hil::plant_sim

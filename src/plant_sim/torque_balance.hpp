@@ -5,7 +5,6 @@
 
 #include "abs_hil/plant_sim/plant.hpp"
 #include "abs_hil/rig/brake_map.hpp"
-#include "tyre_force.hpp"
 
 namespace abs_hil::plant_sim {
 
@@ -51,16 +50,24 @@ struct HeldTorques {
   return held.motor_stall_Nm - held.motor_back_emf_Nms * omega2_rad_s;
 }
 
-/// The right-hand side of (1), (2) and (6) for a given way of sliding. The tyre force is odd in the slip, without the
-/// factor s(r2 omega2 - r1 omega1) printed in (1), which would turn it round in traction (docs/theory.md).
+/// The right-hand side of (1), (2) and (6) for a given way of sliding and along one piece of the friction profile. The
+/// tyre force is odd in the slip, without the factor s(r2 omega2 - r1 omega1) printed in (1), which would turn it round
+/// in traction (docs/theory.md).
 struct TorqueBalance {
-  const PlantOptions& options;
+  const WheelModel& model;
   const HeldTorques& held;
+  PresentFriction friction;
   Sliding sliding;
 
-  void operator()(const StateVector& x, StateVector& dxdt, double /*time_s*/) const noexcept {
-    const rig::WheelParameters& wheels = options.rig.wheels;
-    const double force_N = tyre_force_N(options, x[omega1], x[omega2]);
+  /// @param time_s  since `friction` holds
+  [[nodiscard]] double tyre_force_N(const StateVector& x, double time_s) const noexcept {
+    return model.tyre_force_N(
+        {x[omega1], x[omega2], x[brake_torque], sliding.upper, friction.after(time_s, x[angle2])});
+  }
+
+  void operator()(const StateVector& x, StateVector& dxdt, double time_s) const noexcept {
+    const rig::WheelParameters& wheels = model.wheels();
+    const double force_N = tyre_force_N(x, time_s);
     const double dry1_Nm = wheels.M10_Nm + x[brake_torque];
     dxdt[omega1] =
         sliding.upper == 0.0

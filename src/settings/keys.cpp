@@ -20,7 +20,9 @@ void add_plant_keys(std::vector<Key>& keys, plant_sim::PlantOptions& p) {
   rig::BrakeParameters& b = p.rig.brake;
   keys.insert(keys.end(),
               {
-                  {"plant.theta_N", "N", "peak tyre force, theta = mu D of (10)", &p.rig.tyre.theta_N, positive(500)},
+                  {"plant.theta_N", "N",
+                   "peak tyre force, theta = mu D of (10); with load lever only what controllers are told",
+                   &p.rig.tyre.theta_N, positive(500)},
                   {"plant.B", "", "tyre stiffness factor of (4)", &p.rig.tyre.B, positive(200)},
                   {"plant.C", "", "tyre shape factor of (4)", &p.rig.tyre.C, positive(2)},
                   {"plant.r1_m", "m", "upper wheel radius", &w.r1_m, between(0.01, 1)},
@@ -47,6 +49,31 @@ void add_plant_keys(std::vector<Key>& keys, plant_sim::PlantOptions& p) {
                    &p.slip_regularisation_m_s, between(1e-3, 0.1)},
                   {"plant.max_step_s", "s", "simulation: largest integration step", &p.max_step_s, between(1e-6, 2e-3)},
               });
+}
+
+/// Tyre, load and road: simulation only.
+void add_contact_keys(std::vector<Key>& keys, plant_sim::PlantOptions& p) {
+  plant_sim::IntecoMuParameters& mu = p.inteco_mu;
+  keys.insert(
+      keys.end(),
+      {
+          {"plant.tyre", "", "simulation: friction curve", &p.tyre, {}, {"magic-formula", "inteco-mu"}},
+          {"plant.load", "", "simulation: normal force", &p.load, {}, {"constant", "lever"}},
+          {"plant.mu_peak", "", "simulation: peak friction coefficient of tyre magic-formula under load lever",
+           &p.mu_peak, positive(5)},
+          {"plant.mu_w1", "", "simulation: tyre inteco-mu, coefficient of slip", &mu.w1, between(-10, 10)},
+          {"plant.mu_w2", "", "simulation: tyre inteco-mu, coefficient of slip^2", &mu.w2, between(-10, 10)},
+          {"plant.mu_w3", "", "simulation: tyre inteco-mu, coefficient of slip^3", &mu.w3, between(-10, 10)},
+          {"plant.mu_w4", "", "simulation: tyre inteco-mu, height of the saturating term", &mu.w4, between(-10, 10)},
+          {"plant.mu_a", "", "simulation: tyre inteco-mu, slip^p at half of the saturating term", &mu.a, positive(10)},
+          {"plant.mu_p", "", "simulation: tyre inteco-mu, exponent of the saturating term", &mu.p, between(1, 10)},
+          {"plant.lever_Mg_Nm", "N m", "simulation: load lever, moment of its weight", &p.lever.Mg_Nm, positive(1000)},
+          {"plant.lever_L_m", "m", "simulation: load lever, from pivot to contact", &p.lever.L_m, between(0.01, 10)},
+          {"plant.lever_phi_deg", "deg", "simulation: load lever, angle between its line and the contact's normal",
+           &p.lever.phi_deg, positive(90)},
+          {"plant.friction_profile", "", "simulation: friction over time or distance (docs/plants.md)",
+           &p.friction_profile},
+      });
 }
 
 void add_control_keys(std::vector<Key>& keys, control::ControlOptions& c) {
@@ -181,6 +208,7 @@ void add_experiment_keys(std::vector<Key>& keys, experiment::ExperimentOptions& 
 
 KeyTable::KeyTable(Settings& s) {
   add_plant_keys(keys_, s.plant);
+  add_contact_keys(keys_, s.plant);
   add_control_keys(keys_, s.control);
   add_sliding_keys(keys_, s.control);
   add_classic_keys(keys_, s.control);

@@ -1,6 +1,8 @@
 #pragma once
 
+#include "abs_hil/plant_sim/friction_course.hpp"
 #include "abs_hil/plant_sim/options.hpp"
+#include "abs_hil/plant_sim/wheel_model.hpp"
 #include "abs_hil/rig/cycle_record.hpp"
 #include "abs_hil/rig/measurement.hpp"
 
@@ -22,14 +24,16 @@ struct PlantState {
   double brake_torque_Nm{0.0};
 };
 
-/// The paper's plant (1)-(11) with the corrections of docs/theory.md: odd tyre force, set-valued Coulomb friction (a
+/// The rig's mechanics (1)-(11) with the corrections of docs/theory.md: odd tyre force, set-valued Coulomb friction (a
 /// wheel that stands stays at exactly 0 until the torques on it exceed its friction), brake lag and map, drive motor
-/// with back-EMF. Deterministic; `advance` allocates nothing and does not throw.
+/// with back-EMF; with one of several tyre and load models and a road whose friction may change (docs/plants.md).
+/// Deterministic; `advance` allocates nothing and does not throw.
 class Plant {
  public:
   /// Throws std::invalid_argument if an option is outside its range.
   explicit Plant(const PlantOptions& options);
 
+  /// Back to the start of the friction profile, too.
   void reset(const PlantState& state) noexcept;
   /// Lets `duration_s` >= 0 pass under `input`.
   void advance(double duration_s, const PlantInput& input) noexcept;
@@ -37,11 +41,18 @@ class Plant {
   [[nodiscard]] const PlantState& state() const noexcept { return state_; }
   [[nodiscard]] double slip() const noexcept;
   [[nodiscard]] double tyre_force_N() const noexcept;
+  /// Of the road at the contact, over that of the tyre model: the friction profile's present value.
+  [[nodiscard]] double friction() const noexcept;
+  /// `theta_N` is the largest braking force that any slip would give now (WheelModel::peak_force_N).
   [[nodiscard]] rig::PlantTruth truth() const noexcept;
   [[nodiscard]] const PlantOptions& options() const noexcept { return options_; }
 
  private:
+  [[nodiscard]] ContactState contact() const noexcept;
+
   PlantOptions options_;
+  FrictionCourse course_;
+  WheelModel model_;
   PlantState state_{};
 };
 

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <limits>
+#include <string_view>
+#include <vector>
+
+namespace abs_hil::plant_sim {
+
+/// Friction of the road, over that of the tyre model, along an axis: constant pieces and ramps. Written as
+///
+///     AXIS: VALUE; VALUE at POSITION; VALUE from POSITION to POSITION; ...
+///
+/// with the values in (0, 10]. The first value holds from the start; "at" jumps to a new one, "from ... to" goes there
+/// in a straight line. AXIS is "time" (s) or "distance" (m rolled by the lower wheel) since the start of the run, or
+/// "braking time" or "braking distance" since the brake was first applied, before which the first value holds.
+/// For instance "braking time: 1; 0.5 at 0.6; 1 from 1 to 1.2". An empty text is friction 1 throughout.
+class FrictionProfile {
+ public:
+  enum class Axis { time, distance };
+
+  /// Friction along one piece: value + slope (position - begin), up to `end`.
+  struct Piece {
+    double begin{0.0};
+    double end{std::numeric_limits<double>::infinity()};
+    double value{1.0};
+    double slope{0.0};
+  };
+
+  /// Throws std::invalid_argument, naming plant.friction_profile, the part that is wrong and what is valid.
+  explicit FrictionProfile(std::string_view text = {});
+
+  [[nodiscard]] Axis axis() const noexcept { return axis_; }
+  /// Positions count from the first application of the brake, not from the start.
+  [[nodiscard]] bool from_braking() const noexcept { return from_braking_; }
+  /// In order, without gaps, at least one; the last has no end.
+  [[nodiscard]] const std::vector<Piece>& pieces() const noexcept { return pieces_; }
+  /// Highest value anywhere.
+  [[nodiscard]] double highest() const noexcept;
+
+ private:
+  Axis axis_{Axis::time};
+  bool from_braking_{false};
+  std::vector<Piece> pieces_;
+};
+
+}  // namespace abs_hil::plant_sim

@@ -1,0 +1,77 @@
+#pragma once
+
+#include "abs_hil/plant_sim/load_models.hpp"
+#include "abs_hil/plant_sim/tyre_models.hpp"
+
+namespace abs_hil::plant_sim {
+
+/// What the tyre force depends on at one instant.
+struct ContactState {
+  double omega1_rad_s{0.0};
+  double omega2_rad_s{0.0};
+  double brake_torque_Nm{0.0};
+  double upper_sliding{0.0};  ///< way the upper wheel slides in its bearing and brake: +1, -1, or 0 held by them
+  double friction{1.0};       ///< of the road at the contact, over that of the tyre model
+};
+
+/// Two wheels in contact: their parameters, a tyre and a load model. Real-time safe but for the constructor.
+class WheelModel {
+ public:
+  /// Throws std::invalid_argument for a model that is not known or not possible.
+  /// @param friction_at_most  highest value of the friction profile
+  WheelModel(const PlantOptions& options, double friction_at_most)
+      : wheels_(options.rig.wheels),
+        tyre_(make_tyre_model(options)),
+        load_(make_load_model(options, std::visit([](const auto& tyre) { return tyre.peak_mu(); }, tyre_),
+                              friction_at_most)) {}
+
+  [[nodiscard]] const rig::WheelParameters& wheels() const noexcept { return wheels_; }
+
+  /// Slip by the tyre model's definition, positive in braking.
+  [[nodiscard]] double slip(double omega1_rad_s, double omega2_rad_s) const noexcept {
+    return std::visit(
+        [&](const auto& tyre) { return tyre.slip(wheels_.r1_m * omega1_rad_s, wheels_.r2_m * omega2_rad_s); }, tyre_);
+  }
+
+  /// Tyre force, N: positive when it drives the upper wheel forward and brakes the lower one.
+  [[nodiscard]] double tyre_force_N(const ContactState& c) const noexcept {
+    const double shape = std::visit(
+        [&](const auto& tyre) {
+          return tyre.shape(tyre.slip(wheels_.r1_m * c.omega1_rad_s, wheels_.r2_m * c.omega2_rad_s));
+        },
+        tyre_);
+    return force_N(c.friction * shape, c);
+  }
+
+  /// The largest braking force that any slip would give now, N: theta of (10). With the lever it rises with the torques
+  /// on the upper wheel, and is told for those that act.
+  [[nodiscard]] double peak_force_N(const ContactState& c) const noexcept { return force_N(c.friction, c); }
+
+  /// The steepest that the tyre force can rise with the difference of the circumferential speeds, N s/m, whatever the
+  /// slip is now: it bounds how stiff the slip dynamics are.
+  [[nodiscard]] double damping_bound_Ns_m(const ContactState& c) const noexcept {
+    const double steepest_s_m = std::visit(
+        [&](const auto& tyre) {
+          return tyre.steepest_s_m(wheels_.r1_m * c.omega1_rad_s, wheels_.r2_m * c.omega2_rad_s);
+        },
+        tyre_);
+    const UpperWheelTorques torques = upper_torques(c);
+    return std::visit([&](const auto& load) { return load.steepest_N(c.friction, torques); }, load_) * c.friction *
+           steepest_s_m;
+  }
+
+ private:
+  [[nodiscard]] UpperWheelTorques upper_torques(const ContactState& c) const noexcept {
+    return {c.upper_sliding, wheels_.M10_Nm + c.brake_torque_Nm, wheels_.d1_Nms_rad * c.omega1_rad_s};
+  }
+  [[nodiscard]] double force_N(double shape, const ContactState& c) const noexcept {
+    const UpperWheelTorques torques = upper_torques(c);
+    return std::visit([&](const auto& load) { return load.force_N(shape, torques); }, load_);
+  }
+
+  rig::WheelParameters wheels_;
+  TyreModel tyre_;
+  LoadModel load_;
+};
+
+}  // namespace abs_hil::plant_sim

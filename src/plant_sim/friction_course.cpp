@@ -1,0 +1,47 @@
+#include "abs_hil/plant_sim/friction_course.hpp"
+
+#include <algorithm>
+
+namespace abs_hil::plant_sim {
+
+void FrictionCourse::start(double angle2_rad) noexcept {
+  index_ = 0;
+  time_s_ = 0.0;
+  origin_time_s_ = 0.0;
+  origin_angle2_rad_ = angle2_rad;
+  counting_ = !profile_.from_braking();
+}
+
+void FrictionCourse::brake_applied(double angle2_rad) noexcept {
+  if (counting_) return;
+  counting_ = true;
+  origin_time_s_ = time_s_;
+  origin_angle2_rad_ = angle2_rad;
+}
+
+void FrictionCourse::settle(double angle2_rad) noexcept {
+  if (!counting_) return;
+  // The last piece ends at infinity. The comparisons are those of the integration, so that no rounding comes between.
+  while (along_time() ? time_left_s() <= 0.0 : angle2_rad >= end_angle2_rad()) ++index_;
+}
+
+double FrictionCourse::time_left_s() const noexcept {
+  if (!counting_ || !along_time()) return std::numeric_limits<double>::infinity();
+  return origin_time_s_ + piece().end - time_s_;
+}
+
+PresentFriction FrictionCourse::present(double angle2_rad) const noexcept {
+  const FrictionProfile::Piece& p = piece();
+  PresentFriction now{.value = p.value, .angle2_rad = angle2_rad, .highest = p.value};
+  if (!counting_) return now;
+  if (p.slope != 0.0) {
+    const double position = along_time() ? time_s_ - origin_time_s_ : r2_m_ * (angle2_rad - origin_angle2_rad_);
+    now.value += p.slope * std::clamp(position - p.begin, 0.0, p.end - p.begin);
+    now.highest = std::max(p.value, p.value + p.slope * (p.end - p.begin));
+    (along_time() ? now.per_s : now.per_rad) = along_time() ? p.slope : p.slope * r2_m_;
+  }
+  if (!along_time()) now.end_angle2_rad = end_angle2_rad();
+  return now;
+}
+
+}  // namespace abs_hil::plant_sim

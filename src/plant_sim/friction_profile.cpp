@@ -1,0 +1,120 @@
+#include "abs_hil/plant_sim/friction_profile.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace abs_hil::plant_sim {
+namespace {
+
+constexpr double highest_friction = 10.0;
+
+[[noreturn]] void refuse(std::string_view part, const std::string& problem) {
+  throw std::invalid_argument("plant.friction_profile: \"" + std::string(part) + "\" " + problem);
+}
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(" \t");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
+}
+
+/// Cuts the text up to `separator` off `rest`, all of it if there is none.
+std::string_view cut(std::string_view& rest, char separator) {
+  const std::size_t at = rest.find(separator);
+  const std::string_view head = rest.substr(0, at);
+  rest = at == std::string_view::npos ? std::string_view{} : rest.substr(at + 1);
+  return trimmed(head);
+}
+
+std::vector<std::string_view> words_of(std::string_view text) {
+  std::vector<std::string_view> words;
+  while (!(text = trimmed(text)).empty()) words.push_back(cut(text, ' '));
+  return words;
+}
+
+double number(std::string_view word, std::string_view part) {
+  double value = 0.0;
+  const char* end = word.data() + word.size();
+  const auto [at, error] = std::from_chars(word.data(), end, value);
+  if (error != std::errc() || at != end || !std::isfinite(value)) {
+    refuse(part, "holds \"" + std::string(word) + "\" where a number belongs");
+  }
+  return value;
+}
+
+double friction(std::string_view word, std::string_view part) {
+  const double value = number(word, part);
+  if (!(value > 0.0 && value <= highest_friction)) refuse(part, "gives a friction that is not in (0, 10]");
+  return value;
+}
+
+struct Change {
+  double begin;
+  double end;
+  double value;
+};
+
+Change change(std::string_view part) {
+  const std::vector<std::string_view> words = words_of(part);
+  if (words.size() == 3 && words[1] == "at") {
+    const double at = number(words[2], part);
+    return {at, at, friction(words[0], part)};
+  }
+  if (words.size() == 5 && words[1] == "from" && words[3] == "to") {
+    const Change ramp{number(words[2], part), number(words[4], part), friction(words[0], part)};
+    if (!(ramp.begin < ramp.end)) refuse(part, "must end after it begins");
+    return ramp;
+  }
+  refuse(part,
+         "is no change; write \"VALUE at POSITION\" or \"VALUE from POSITION to POSITION\", as in \"0.5 at 0.8\"");
+}
+
+}  // namespace
+
+FrictionProfile::FrictionProfile(std::string_view text) : pieces_{{}} {
+  if (trimmed(text).empty()) return;
+  const std::string_view whole = trimmed(text);
+  if (whole.find(':') == std::string_view::npos) {
+    refuse(whole, "names no axis; begin with \"time:\", \"distance:\", \"braking time:\" or \"braking distance:\"");
+  }
+  std::string_view rest = whole;
+  const std::string_view head = cut(rest, ':');
+  const std::vector<std::string_view> axis = words_of(head);
+  from_braking_ = axis.size() == 2 && axis.front() == "braking";
+  if ((axis.size() != 1 && !from_braking_) || (axis.back() != "time" && axis.back() != "distance")) {
+    refuse(head, "is no axis; write time, distance, braking time or braking distance");
+  }
+  axis_ = axis.back() == "time" ? Axis::time : Axis::distance;
+
+  const std::string_view first = cut(rest, ';');
+  pieces_.front().value = friction(first, first);
+  double jumped_at = 0.0;
+  while (!trimmed(rest).empty()) {
+    const std::string_view part = cut(rest, ';');
+    const Change next = change(part);
+    Piece& last = pieces_.back();
+    if (next.begin < last.begin) refuse(part, "must not begin before the change before it has ended");
+    const bool jump = next.begin == next.end;
+    if (jump && next.begin == jumped_at) refuse(part, "must come after the jump before it, and after 0");
+    const double before = last.value;
+    last.end = next.begin;
+    if (last.end == last.begin) pieces_.pop_back();
+    if (jump) {
+      jumped_at = next.begin;
+    } else {
+      pieces_.push_back({next.begin, next.end, before, (next.value - before) / (next.end - next.begin)});
+    }
+    pieces_.push_back({.begin = next.end, .value = next.value});
+  }
+}
+
+double FrictionProfile::highest() const noexcept {
+  double highest = 0.0;
+  for (const Piece& piece : pieces_) highest = std::max(highest, piece.value);
+  return highest;
+}
+
+}  // namespace abs_hil::plant_sim

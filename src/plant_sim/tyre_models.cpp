@@ -1,0 +1,58 @@
+#include "abs_hil/plant_sim/tyre_models.hpp"
+
+#include <stdexcept>
+
+namespace abs_hil::plant_sim {
+namespace {
+
+constexpr double square(double x) noexcept { return x * x; }
+
+}  // namespace
+
+IntecoMu::IntecoMu(const PlantOptions& options)
+    : mu_(options.inteco_mu), regularisation_m_s_(options.slip_regularisation_m_s), peak_mu_(highest()) {
+  if (!(peak_mu_ > 0.0)) {
+    throw std::invalid_argument(
+        "plant.mu_w4 = " + std::to_string(mu_.w4) +
+        ": the friction curve of plant.mu_w1 ... mu_p is nowhere positive; raise plant.mu_w4 (published: 0.40663)");
+  }
+  steepest_shape_ = slope_bound() / peak_mu_;
+}
+
+/// The highest point of the curve on [0, 1], which need not be a smooth maximum: the published curve is highest at 1.
+double IntecoMu::highest() const noexcept {
+  // Samples that lie closer at small slips, where the knee is; then a golden-section search around the best.
+  constexpr int samples = 200;
+  const auto sample = [](int i) { return square(static_cast<double>(i) / samples); };
+  int best = 0;
+  for (int i = 1; i <= samples; ++i) {
+    if (friction_coefficient(sample(i)) > friction_coefficient(sample(best))) best = i;
+  }
+  double left = sample(std::max(best - 1, 0));
+  double right = sample(std::min(best + 1, samples));
+  constexpr double golden = 0.6180339887498949;
+  for (int i = 0; i < 40; ++i) {
+    const double a = right - golden * (right - left);
+    const double b = left + golden * (right - left);
+    (friction_coefficient(a) < friction_coefficient(b) ? left : right) =
+        friction_coefficient(a) < friction_coefficient(b) ? a : b;
+  }
+  return std::max(friction_coefficient(0.5 * (left + right)), friction_coefficient(sample(best)));
+}
+
+/// Bound on |mu'| over [0, 1]. The saturating term is steepest where s^p = a (p - 1) / (p + 1), its turning point; the
+/// polynomial's slope is bounded term by term.
+double IntecoMu::slope_bound() const noexcept {
+  const double power = mu_.a * (mu_.p - 1.0) / (mu_.p + 1.0);
+  const double s = std::pow(power, 1.0 / mu_.p);
+  const double saturating = std::abs(mu_.w4) * mu_.a * mu_.p * std::pow(s, mu_.p - 1.0) / square(mu_.a + power);
+  return saturating + std::abs(mu_.w1) + 2.0 * std::abs(mu_.w2) + 3.0 * std::abs(mu_.w3);
+}
+
+TyreModel make_tyre_model(const PlantOptions& options) {
+  if (options.tyre == "magic-formula") return MagicFormula(options);
+  if (options.tyre == "inteco-mu") return IntecoMu(options);
+  throw std::invalid_argument("plant.tyre = \"" + options.tyre + "\": must be magic-formula or inteco-mu");
+}
+
+}  // namespace abs_hil::plant_sim
