@@ -32,12 +32,11 @@ double FrictionCourse::time_left_s() const noexcept {
 
 PresentFriction FrictionCourse::present(double angle2_rad) const noexcept {
   const FrictionProfile::Piece& p = piece();
-  PresentFriction now{.value = p.value, .angle2_rad = angle2_rad, .highest = p.value};
+  PresentFriction now{.value = p.value, .angle2_rad = angle2_rad, .highest = p.highest()};
   if (!counting_) return now;
   if (p.slope != 0.0) {
     const double position = along_time() ? time_s_ - origin_time_s_ : r2_m_ * (angle2_rad - origin_angle2_rad_);
-    now.value += p.slope * std::clamp(position - p.begin, 0.0, p.end - p.begin);
-    now.highest = std::max(p.value, p.value + p.slope * (p.end - p.begin));
+    now.value = p.at(std::clamp(position, p.begin, p.end));
     (along_time() ? now.per_s : now.per_rad) = along_time() ? p.slope : p.slope * r2_m_;
   }
   if (!along_time()) now.end_angle2_rad = end_angle2_rad();

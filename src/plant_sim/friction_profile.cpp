@@ -113,7 +113,7 @@ FrictionProfile::FrictionProfile(std::string_view text) : pieces_{{}} {
 
 double FrictionProfile::highest() const noexcept {
   double highest = 0.0;
-  for (const Piece& piece : pieces_) highest = std::max(highest, piece.value);
+  for (const Piece& piece : pieces_) highest = std::max(highest, piece.highest());
   return highest;
 }
 

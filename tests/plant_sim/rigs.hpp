@@ -20,6 +20,16 @@ inline PlantOptions frictionless() {
   return options;
 }
 
+/// The maker's model (config/plants/inteco-manual.toml).
+inline PlantOptions inteco_manual() {
+  PlantOptions options;
+  options.rig.wheels.J1_kg_m2 = 7.53e-3;
+  options.rig.tyre = {34.31, 19.49, 1.2694};
+  options.tyre = "inteco-mu";
+  options.load = "lever";
+  return options;
+}
+
 /// Both wheels turning at the same speed, where the paper's braking starts.
 inline constexpr PlantState rolling_at_170{.omega1_rad_s = 170.0, .omega2_rad_s = 170.0};
 

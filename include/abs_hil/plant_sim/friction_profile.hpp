@@ -24,6 +24,10 @@ class FrictionProfile {
     double end{std::numeric_limits<double>::infinity()};
     double value{1.0};
     double slope{0.0};
+
+    /// Friction at `position` within the piece.
+    [[nodiscard]] double at(double position) const noexcept { return value + slope * (position - begin); }
+    [[nodiscard]] double highest() const noexcept { return slope > 0.0 ? at(end) : value; }
   };
 
   /// Throws std::invalid_argument, naming plant.friction_profile, the part that is wrong and what is valid.

@@ -1,0 +1,95 @@
+#include "abs_hil/plant_sim/friction_profile.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "catch.hpp"
+
+using abs_hil::plant_sim::FrictionProfile;
+using Catch::Matchers::Contains;
+using Catch::Matchers::WithinRel;
+
+namespace {
+
+std::string error_of(const std::string& text) {
+  try {
+    const FrictionProfile profile(text);
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+}  // namespace
+
+TEST_CASE("No text is friction 1 throughout") {
+  for (const char* text : {"", "  "}) {
+    const FrictionProfile profile(text);
+    REQUIRE(profile.pieces().size() == 1);
+    CHECK(profile.pieces()[0].value == 1.0);
+    CHECK(profile.pieces()[0].slope == 0.0);
+    CHECK(std::isinf(profile.pieces()[0].end));
+    CHECK(profile.highest() == 1.0);
+  }
+}
+
+TEST_CASE("Jumps and ramps become pieces without gaps") {
+  const FrictionProfile profile(" braking distance : 1 ;0.5 at 2;  1.5 from 2.5 to 4.5; 0.25 at 4.5 ; 1 from 6 to 7;");
+  CHECK(profile.axis() == FrictionProfile::Axis::distance);
+  CHECK(profile.from_braking());
+  CHECK(profile.highest() == 1.5);
+  struct Expected {
+    double begin, end, value, slope;
+  };
+  const Expected expected[] = {{0, 2, 1, 0},      {2, 2.5, 0.5, 0},   {2.5, 4.5, 0.5, 0.5},
+                               {4.5, 6, 0.25, 0}, {6, 7, 0.25, 0.75}, {7, INFINITY, 1, 0}};
+  REQUIRE(profile.pieces().size() == std::size(expected));
+  for (std::size_t i = 0; i < std::size(expected); ++i) {
+    INFO(i);
+    CHECK(profile.pieces()[i].begin == expected[i].begin);
+    CHECK(profile.pieces()[i].end == expected[i].end);
+    CHECK(profile.pieces()[i].value == expected[i].value);
+    CHECK(profile.pieces()[i].slope == expected[i].slope);
+  }
+}
+
+TEST_CASE("A ramp may begin at 0, right after a jump and right after a ramp") {
+  const FrictionProfile profile("time: 1; 0.5 from 0 to 1; 2 from 1 to 2; 1 at 3; 0.5 from 3 to 4");
+  REQUIRE(profile.pieces().size() == 5);
+  CHECK(profile.pieces()[0].slope == -0.5);
+  CHECK(profile.pieces()[1].slope == 1.5);
+  CHECK(profile.pieces()[3].value == 1.0);
+  CHECK(profile.axis() == FrictionProfile::Axis::time);
+  CHECK_FALSE(profile.from_braking());
+}
+
+TEST_CASE("What is no profile is refused with the part that is wrong") {
+  const auto [text, error] = GENERATE(table<const char*, const char*>({
+      {"1; 0.5 at 2", "\"1; 0.5 at 2\" names no axis; begin with \"time:\", \"distance:\", \"braking time:\""},
+      {"way: 1", "\"way\" is no axis; write time, distance, braking time or braking distance"},
+      {"time distance: 1", "\"time distance\" is no axis"},
+      {"braking: 1", "\"braking\" is no axis"},
+      {": 1", "\"\" is no axis"},
+      {"time:", "\"\" holds \"\" where a number belongs"},
+      {"time: 0.5 at 1", "\"0.5 at 1\" holds \"0.5 at 1\" where a number belongs"},
+      {"time: 1; 0.5", "\"0.5\" is no change; write \"VALUE at POSITION\" or \"VALUE from POSITION to POSITION\""},
+      {"time: 1;; 0.5 at 1", "\"\" is no change"},
+      {"time: 1; 0.5 at", "\"0.5 at\" is no change"},
+      {"time: 1; 0.5 from 1 until 2", "is no change"},
+      {"time: 1; 0.5 at soon", "\"0.5 at soon\" holds \"soon\" where a number belongs"},
+      {"time: 1; 0.5 at 1s", "holds \"1s\" where a number belongs"},
+      {"time: 1; 0.5 at nan", "holds \"nan\" where a number belongs"},
+      {"time: 1; 0.5 at inf", "holds \"inf\" where a number belongs"},
+      {"time: 0", "\"0\" gives a friction that is not in (0, 10]"},
+      {"time: 1; -1 at 1", "\"-1 at 1\" gives a friction that is not in (0, 10]"},
+      {"time: 1; 11 at 1", "\"11 at 1\" gives a friction that is not in (0, 10]"},
+      {"time: 1; 0.5 from 2 to 2", "\"0.5 from 2 to 2\" must end after it begins"},
+      {"time: 1; 0.5 at 2; 1 at 1", "\"1 at 1\" must not begin before the change before it has ended"},
+      {"time: 1; 0.5 from 1 to 3; 1 at 2", "\"1 at 2\" must not begin before the change before it has ended"},
+      {"time: 1; 0.5 at -1", "\"0.5 at -1\" must not begin before the change before it has ended"},
+      {"time: 1; 0.5 at 2; 1 at 2", "\"1 at 2\" must come after the jump before it, and after 0"},
+      {"time: 1; 0.5 at 0", "\"0.5 at 0\" must come after the jump before it, and after 0"},
+  }));
+  CHECK_THAT(error_of(text), Contains(std::string("plant.friction_profile: ")) && Contains(error));
+}
