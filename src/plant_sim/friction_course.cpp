@@ -3,6 +3,12 @@
 #include <algorithm>
 
 namespace abs_hil::plant_sim {
+namespace {
+
+/// What the sum of a run's intervals may miss an instant by; a piece that ends so soon has ended.
+constexpr double time_rounding_s = 1e-11;
+
+}  // namespace
 
 void FrictionCourse::start(double angle2_rad) noexcept {
   index_ = 0;
@@ -21,8 +27,8 @@ void FrictionCourse::brake_applied(double angle2_rad) noexcept {
 
 void FrictionCourse::settle(double angle2_rad) noexcept {
   if (!counting_) return;
-  // The last piece ends at infinity. The comparisons are those of the integration, so that no rounding comes between.
-  while (along_time() ? time_left_s() <= 0.0 : angle2_rad >= end_angle2_rad()) ++index_;
+  // The last piece ends at infinity. Along the way the comparison is the integration's own.
+  while (along_time() ? time_left_s() <= time_rounding_s : angle2_rad >= end_angle2_rad()) ++index_;
 }
 
 double FrictionCourse::time_left_s() const noexcept {

@@ -35,6 +35,12 @@ class BadInput(ProgramTest):
                      ['theta_min_N', 'theta_max_N'])
         self.refused(['--set', 'control.adaptive.q12=5'], ['Q'])
 
+    def test_road(self):
+        self.refused(['--set', 'plant.friction_profile=time: 1; 0.5 at soon'],
+                     ['plant.friction_profile', '0.5 at soon', 'number'])
+        self.refused(['--set', 'plant.tyre=pacejka'], ['plant.tyre', 'pacejka', 'magic-formula', 'inteco-mu'])
+        self.refused(['--plant', 'inteco-manual', '--set', 'plant.friction_profile=time: 9'], ['plant.load', 'wedge'])
+
     def test_names(self):
         self.refused(['--controller', 'nope'], ['nope', 'adaptive'])
         self.refused(['--plant', 'paper-table9'], ['paper-table9', 'paper-table1'])
@@ -69,7 +75,8 @@ class BadInput(ProgramTest):
         self.assertIn('driver.kind', result.stderr)
 
     def test_what_only_the_simulator_can_do(self):
-        for args in (['--fast'], ['--set', 'experiment.start_speed_rad_s=100']):
+        for args in (['--fast'], ['--set', 'experiment.start_speed_rad_s=100'],
+                     ['--experiment', 'friction-jump'], ['--set', 'plant.friction_profile=time: 0.5']):
             result = self.run_program('--backend', 'rig', '--no-lcm', *args)
             self.assertEqual(result.returncode, 2, result.stderr)
 

@@ -103,6 +103,17 @@ class Outputs(ProgramTest):
         result = self.run_program('--fast', '--no-lcm', '--plant', 'mine', env={'ABS_HIL_CONFIG_DIR': str(self.folder)})
         self.assertEqual(result.returncode, 0, result.stderr)
 
+    def test_a_changing_road_is_in_the_record_and_the_configuration(self):
+        csv, summary = self.folder / 'run.csv', self.folder / 'summary.json'
+        self.fast('--experiment', 'friction-jump', '--set', 'experiment.start_speed_rad_s=170', '--csv', csv,
+                  '--summary', summary)
+        thetas = [round(float(row['theta_N'])) for row in self.rows(csv)]
+        self.assertEqual(thetas[:600] + thetas[1000:], [23] * (len(thetas) - 400))
+        self.assertEqual(thetas[600:1000], [12] * 400)
+        self.assertIn('braking time', self.summary(summary)['config']['plant']['friction_profile'])
+        self.fast('--experiment', 'friction-jump', '--set', 'plant.friction_profile=time: 0.5', '--csv', csv)
+        self.assertEqual({row['theta_N'] for row in self.rows(csv)}, {'11.5'})
+
 
 if __name__ == '__main__':
     unittest.main()

@@ -98,3 +98,27 @@ TEST_CASE("plant paper-table1 is what the defaults are") {
   load_file(plant_file("paper-table1"), table, "plant");
   CHECK(table.to_json() == KeyTable(defaults).to_json());
 }
+
+TEST_CASE("the maker's plant carries the manual's numbers, its models, and the fit that controllers are told") {
+  Settings settings;
+  KeyTable table(settings);
+  load_file(plant_file("inteco-manual"), table, "plant");
+  const auto& p = settings.plant;
+  CHECK(p.tyre == "inteco-mu");
+  CHECK(p.load == "lever");
+  CHECK(p.inteco_mu.w1 == -0.04240011450454);
+  CHECK(p.inteco_mu.w2 == 2.9375e-10);
+  CHECK(p.inteco_mu.w3 == 0.03508217905067);
+  CHECK(p.inteco_mu.w4 == 0.40662691102315);
+  CHECK(p.inteco_mu.a == 0.00025724985785);
+  CHECK(p.inteco_mu.p == 2.09945271667129);
+  CHECK(p.lever.Mg_Nm == 19.62);
+  CHECK(p.lever.L_m == 0.370);
+  CHECK(p.lever.phi_deg == 65.61);
+  CHECK(p.rig.wheels.J1_kg_m2 == 7.53e-3);
+  CHECK(p.rig.wheels.d1_Nms_rad == 1.1874e-4);
+  CHECK(p.rig.tyre.theta_N == 34.31);
+  CHECK(p.rig.tyre.B == 19.49);
+  CHECK(p.rig.tyre.C == 1.2694);
+  CHECK(p.friction_profile.empty());
+}
