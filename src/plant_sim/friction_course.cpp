@@ -25,18 +25,13 @@ void FrictionCourse::brake_applied(double angle2_rad) noexcept {
   origin_angle2_rad_ = angle2_rad;
 }
 
-void FrictionCourse::settle(double angle2_rad) noexcept {
+void FrictionCourse::settle_on_changes(double angle2_rad) noexcept {
   if (!counting_) return;
   // The last piece ends at infinity. Along the way the comparison is the integration's own.
   while (along_time() ? time_left_s() <= time_rounding_s : angle2_rad >= end_angle2_rad()) ++index_;
 }
 
-double FrictionCourse::time_left_s() const noexcept {
-  if (!counting_ || !along_time()) return std::numeric_limits<double>::infinity();
-  return origin_time_s_ + piece().end - time_s_;
-}
-
-PresentFriction FrictionCourse::present(double angle2_rad) const noexcept {
+PresentFriction FrictionCourse::present_of_changes(double angle2_rad) const noexcept {
   const FrictionProfile::Piece& p = piece();
   PresentFriction now{.value = p.value, .angle2_rad = angle2_rad, .highest = p.highest()};
   if (!counting_) return now;

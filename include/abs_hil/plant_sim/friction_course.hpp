@@ -27,7 +27,13 @@ struct PresentFriction {
 class FrictionCourse {
  public:
   /// @param r2_m  radius of the lower wheel
-  FrictionCourse(const FrictionProfile& profile, double r2_m) : profile_(profile), r2_m_(r2_m) { start(0.0); }
+  FrictionCourse(const FrictionProfile& profile, double r2_m)
+      : profile_(profile),
+        r2_m_(r2_m),
+        changes_(profile.pieces().size() > 1),
+        constant_(profile.pieces().front().value) {
+    start(0.0);
+  }
 
   [[nodiscard]] const FrictionProfile& profile() const noexcept { return profile_; }
 
@@ -38,19 +44,31 @@ class FrictionCourse {
   /// Lets time pass.
   void pass(double duration_s) noexcept { time_s_ += duration_s; }
   /// Goes on to the piece that holds from now on.
-  void settle(double angle2_rad) noexcept;
+  void settle(double angle2_rad) noexcept {
+    if (changes_) settle_on_changes(angle2_rad);
+  }
 
   /// Time until the piece ends; infinite if it ends with the distance or not at all.
-  [[nodiscard]] double time_left_s() const noexcept;
-  [[nodiscard]] PresentFriction present(double angle2_rad) const noexcept;
+  [[nodiscard]] double time_left_s() const noexcept {
+    if (!changes_ || !counting_ || !along_time()) return std::numeric_limits<double>::infinity();
+    return origin_time_s_ + piece().end - time_s_;
+  }
+  [[nodiscard]] PresentFriction present(double angle2_rad) const noexcept {
+    if (changes_) return present_of_changes(angle2_rad);
+    return {.value = constant_, .angle2_rad = angle2_rad, .highest = constant_};
+  }
 
  private:
+  void settle_on_changes(double angle2_rad) noexcept;
+  [[nodiscard]] PresentFriction present_of_changes(double angle2_rad) const noexcept;
   [[nodiscard]] bool along_time() const noexcept { return profile_.axis() == FrictionProfile::Axis::time; }
   [[nodiscard]] const FrictionProfile::Piece& piece() const noexcept { return profile_.pieces()[index_]; }
   [[nodiscard]] double end_angle2_rad() const noexcept { return origin_angle2_rad_ + piece().end / r2_m_; }
 
   FrictionProfile profile_;
   double r2_m_;
+  bool changes_;     ///< else it costs next to nothing
+  double constant_;  ///< friction where it does not change
   std::size_t index_{0};
   double time_s_{0.0};
   double origin_time_s_{0.0};
