@@ -19,6 +19,10 @@ void check_together(const RunRequest& request) {
   if (s.backend == "rig" && request.outputs.fast) {
     throw settings::ConfigError("--fast: the rig runs in real time only; leave it out or use --backend sim");
   }
+  if (request.outputs.fast && request.outputs.histogram_file) {
+    throw settings::ConfigError(
+        "--histogram: in virtual time (--fast) there are no latencies to measure; leave one of the two out");
+  }
   if (s.backend == "rig" && s.experiment.start_speed_rad_s > 0.0) {
     throw settings::ConfigError(
         "experiment.start_speed_rad_s: a real wheel does not start at speed; leave it out or use --backend sim");

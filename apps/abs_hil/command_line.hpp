@@ -14,6 +14,7 @@ struct OutputOptions {
   std::optional<std::string> csv_file{};
   std::optional<std::string> log_file{};
   std::optional<std::string> summary_file{};
+  std::optional<std::string> histogram_file{};
   std::optional<std::string> lcm_url{};
   bool no_lcm{false};
 };

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
+#include "abs_hil/experiment/run_session.hpp"
 #include "command_line.hpp"
 
 namespace abs_hil::app {
@@ -11,9 +11,15 @@ namespace abs_hil::app {
 int run(const RunRequest& request);
 /// `abs_hil list`: controllers, plants, experiments and backends, or all configuration keys.
 int list(bool keys);
-/// `abs_hil doctor`: checks this machine, all of it or the one named, and says how to mend what falls short.
-int doctor(const std::string& only);
-/// What `doctor` can check.
-[[nodiscard]] std::vector<std::string> doctor_checks();
+/// `abs_hil doctor`: examines this computer, all of it or the one check named, and says how to mend what falls short.
+int doctor(const RunRequest& request, const std::string& only, bool json);
+/// `abs_hil latency`: runs the real cycle on the simulated rig for a while and judges how well this computer keeps
+/// time.
+int latency(const RunRequest& request, double duration_s, bool json);
+
+/// The exit status of a run that has ended so.
+[[nodiscard]] int status_of(const experiment::RunOutcome& outcome);
+/// Why a run that requires real time did not start.
+[[nodiscard]] std::string realtime_refusal(const runtime::RealtimeReport& report);
 
 }  // namespace abs_hil::app

@@ -1,48 +1,33 @@
+#include "abs_hil/diagnosis/doctor.hpp"
+
 #include <fmt/format.h>
 
-#include <thread>
+#include <nlohmann/json.hpp>
 
-#include "abs_hil/runtime/realtime_setup.hpp"
 #include "abs_hil/telemetry/lcm_url.hpp"
-#include "abs_hil/telemetry/route_probe.hpp"
 #include "commands.hpp"
 #include "exit_status.hpp"
+#include "run_parts.hpp"
 
 namespace abs_hil::app {
 
-namespace {
-
-bool report(bool good, const std::string& what, const std::string& problem, const std::string& fix) {
-  fmt::print("{}  {}\n", good ? "ok  " : "FAIL", what);
-  if (!good) fmt::print("      {}\n      to mend it:\n{}\n", problem, fix);
-  return good;
-}
-
-bool check_lcm() {
-  const std::string url = telemetry::default_lcm_url();
-  const telemetry::RouteProbe probe = telemetry::probe_lcm_route(url);
-  return report(probe.usable, "LCM route for " + url, probe.problem, probe.fix);
-}
-
-bool check_realtime() {
-  // In a thread of its own: what is obtained is obtained for good.
-  runtime::RealtimeReport result;
-  std::jthread([&result] { result = runtime::set_up_realtime({}); }).join();
-  bool good = true;
-  for (const auto& step : result.steps)
-    good = report(step.obtained, step.what, step.detail, "      " + step.fix) && good;
-  return good;
-}
-
-}  // namespace
-
-std::vector<std::string> doctor_checks() { return {"lcm", "realtime"}; }
-
-int doctor(const std::string& only) {
-  bool good = true;
-  if (only.empty() || only == "lcm") good = check_lcm() && good;
-  if (only.empty() || only == "realtime") good = check_realtime() && good;
-  return good ? exit_completed : exit_unavailable;
+int doctor(const RunRequest& request, const std::string& only, bool json) {
+  const settings::Settings& s = request.settings;
+  const diagnosis::Examination examination{.only = only,
+                                           .lcm_url = telemetry::default_lcm_url(),
+                                           .realtime = s.realtime,
+                                           .backend = s.backend,
+                                           .make_driver = [&s] { return make_driver(s); }};
+  const std::vector<diagnosis::Finding> findings = diagnosis::examine(examination);
+  const bool well = diagnosis::turned_out_well(examination, findings);
+  if (json) {
+    const nlohmann::ordered_json report{
+        {"backend", s.backend}, {"well", well}, {"findings", diagnosis::to_json(findings)}};
+    fmt::print("{}\n", report.dump(2));
+  } else {
+    fmt::print("{}", diagnosis::to_text(findings));
+  }
+  return well ? exit_completed : exit_unavailable;
 }
 
 }  // namespace abs_hil::app

@@ -5,6 +5,7 @@
 #include <exception>
 #include <stdexcept>
 
+#include "abs_hil/diagnosis/doctor.hpp"
 #include "abs_hil/driver/io_result.hpp"
 #include "abs_hil/settings/config_error.hpp"
 #include "abs_hil/telemetry/file_error.hpp"
@@ -16,29 +17,76 @@ namespace {
 
 using namespace abs_hil;
 
-void add_run_options(CLI::App& cli, app::RunOptions& o) {
+void add_backend_option(CLI::App& cli, app::RunOptions& o) {
   cli.add_option("--backend", o.backend, "sim or rig")->check(CLI::IsMember({"sim", "rig"}))->capture_default_str();
+}
+
+/// What belongs to the configuration and not to one run.
+void add_configuration_options(CLI::App& cli, app::RunOptions& o) {
   cli.add_option("--config", o.config_file, "TOML file with any configuration values")->type_name("FILE");
   cli.add_option("--plant", o.plant, "plant by name or TOML file")->type_name("NAME|FILE");
   cli.add_option("--controller", o.controller, "slip controller")->type_name("NAME");
-  cli.add_option("--experiment", o.experiment, "experiment")->type_name("NAME");
-  cli.add_option("--slip-ref", o.slip_ref, "wanted slip, in (0, 1)")->type_name("X");
-  cli.add_option("--rate", o.rate_Hz, "control cycles per second, 100 to 10000")->type_name("HZ");
-  cli.add_flag("--fast", o.outputs.fast, "virtual time, as fast as the machine can");
-  cli.add_option("--seed", o.seed, "seed of everything random in the simulator")->type_name("N");
   cli.add_option("--set", o.assignments, "set any configuration value (abs_hil list --keys)")
       ->type_name("key=value")
       ->take_all()
       ->allow_extra_args(false);
+}
+
+void add_timing_options(CLI::App& cli, app::RunOptions& o) {
+  cli.add_option("--rate", o.rate_Hz, "control cycles per second, 100 to 10000")->type_name("HZ");
+  cli.add_option("--rt", o.realtime, "real-time scheduling")
+      ->check(CLI::IsMember({"require", "prefer", "off"}))
+      ->capture_default_str();
+  cli.add_option("--histogram", o.outputs.histogram_file, "write latency histograms in cyclictest's format")
+      ->type_name("FILE");
+}
+
+void add_run_options(CLI::App& cli, app::RunOptions& o) {
+  add_backend_option(cli, o);
+  add_configuration_options(cli, o);
+  cli.add_option("--experiment", o.experiment, "experiment")->type_name("NAME");
+  cli.add_option("--slip-ref", o.slip_ref, "wanted slip, in (0, 1)")->type_name("X");
+  add_timing_options(cli, o);
+  cli.add_flag("--fast", o.outputs.fast, "virtual time, as fast as the machine can");
+  cli.add_option("--seed", o.seed, "seed of everything random in the simulator")->type_name("N");
   cli.add_option("--csv", o.outputs.csv_file, "write every cycle to a CSV file")->type_name("FILE");
   cli.add_option("--log", o.outputs.log_file, "write an LCM event log (.lcmlog)")->type_name("FILE");
   cli.add_option("--summary", o.outputs.summary_file, "write the summary as JSON")->type_name("FILE");
   auto* url =
       cli.add_option("--lcm-url", o.outputs.lcm_url, "LCM network (default: LCM_DEFAULT_URL, else UDP multicast)");
   cli.add_flag("--no-lcm", o.outputs.no_lcm, "do not publish")->excludes(url);
-  cli.add_option("--rt", o.realtime, "real-time scheduling")
-      ->check(CLI::IsMember({"require", "prefer", "off"}))
-      ->capture_default_str();
+}
+
+/// The command `abs_hil doctor` as typed.
+struct DoctorCommand {
+  app::RunOptions options{};
+  std::string only{};
+  bool json{false};
+  CLI::App* parser{nullptr};
+};
+
+void add_doctor(CLI::App& cli, DoctorCommand& command) {
+  command.parser = cli.add_subcommand("doctor", "what this machine can do, each shortcoming with its fix");
+  add_backend_option(*command.parser, command.options);
+  add_configuration_options(*command.parser, command.options);
+  command.parser->add_option("--only", command.only, "one check alone")->check(CLI::IsMember(diagnosis::check_names()));
+  command.parser->add_flag("--json", command.json, "for programs");
+}
+
+/// The command `abs_hil latency` as typed.
+struct LatencyCommand {
+  app::RunOptions options{};
+  double duration_s{10.0};
+  bool json{false};
+  CLI::App* parser{nullptr};
+};
+
+void add_latency(CLI::App& cli, LatencyCommand& command) {
+  command.parser = cli.add_subcommand("latency", "run the real cycle on the simulated rig and judge this machine");
+  add_configuration_options(*command.parser, command.options);
+  add_timing_options(*command.parser, command.options);
+  command.parser->add_option("--duration", command.duration_s, "how long, s")->type_name("S")->capture_default_str();
+  command.parser->add_flag("--json", command.json, "for programs");
 }
 
 int dispatch(int argc, char** argv) {
@@ -51,9 +99,10 @@ int dispatch(int argc, char** argv) {
   auto* list = cli.add_subcommand("list", "controllers, plants, experiments, backends");
   bool keys = false;
   list->add_flag("--keys", keys, "all configuration values with unit and range");
-  auto* doctor = cli.add_subcommand("doctor", "what this machine can do, each shortcoming with its fix");
-  std::string only;
-  doctor->add_option("--only", only, "one check alone")->check(CLI::IsMember(app::doctor_checks()));
+  DoctorCommand doctor;
+  add_doctor(cli, doctor);
+  LatencyCommand latency;
+  add_latency(cli, latency);
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -62,7 +111,8 @@ int dispatch(int argc, char** argv) {
     return app::exit_usage;
   }
   if (list->parsed()) return app::list(keys);
-  if (doctor->parsed()) return app::doctor(only);
+  if (doctor.parser->parsed()) return app::doctor(app::merge(doctor.options), doctor.only, doctor.json);
+  if (latency.parser->parsed()) return app::latency(app::merge(latency.options), latency.duration_s, latency.json);
   return app::run(app::merge(options));
 }
 

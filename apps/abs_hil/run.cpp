@@ -1,43 +1,25 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "abs_hil/analysis/run_metrics.hpp"
 #include "abs_hil/analysis/run_summary.hpp"
-#include "abs_hil/control/registry.hpp"
-#include "abs_hil/driver/factory.hpp"
-#include "abs_hil/driver/sim/sim_driver.hpp"
 #include "abs_hil/experiment/experiments.hpp"
 #include "abs_hil/experiment/run_session.hpp"
-#include "abs_hil/settings/config_error.hpp"
+#include "abs_hil/runtime/overrun_reporter.hpp"
 #include "abs_hil/telemetry/file_error.hpp"
 #include "commands.hpp"
 #include "exit_status.hpp"
 #include "run_outputs.hpp"
+#include "run_parts.hpp"
 #include "signals.hpp"
 
 namespace abs_hil::app {
 
 namespace {
-
-std::unique_ptr<driver::RigDriver> make_driver(const settings::Settings& s) {
-  if (s.backend == "rig") return driver::make_rig_driver(s.driver);
-  return std::make_unique<driver::SimDriver>(s.plant,
-                                             driver::SimStart{.seed = static_cast<std::uint64_t>(s.seed),
-                                                              .start_speed_rad_s = s.experiment.start_speed_rad_s});
-}
-
-experiment::RunLogicParts make_logic(const settings::Settings& s) {
-  return {.control = s.control,
-          .rig = s.plant.rig,
-          .controller = control::make_controller(s.control.controller, {s.control, s.plant.rig}),
-          .sequence = experiment::Sequence(experiment::plan_experiment(s.experiment, s.control.v_min_m_s)),
-          .ideal_actuator = s.plant.ideal_actuator,
-          .max_brake_duty = s.gate.brake_duty_max,
-          .start_speed_rad_s = s.experiment.start_speed_rad_s};
-}
 
 std::string reason_text(const experiment::RunOutcome& outcome) {
   std::string text(rig::description(outcome.reason));
@@ -59,18 +41,44 @@ analysis::RunSummary summarise(const RunRequest& request, const experiment::RunS
           .backend = s.backend,
           .experiment = s.experiment.name,
           .metrics = outputs.metrics(),
-          .cycles = session.executive().counters().cycles,
-          .overruns = session.executive().counters().overruns,
+          .cycles = session.executive().statistics().cycles(),
           .telemetry_drops = session.record_drops(),
           .publish_failures = outputs.publish_failures(),
           .realtime = outcome.realtime.realtime(),
           .virtual_time = request.outputs.fast,
           .truth_known = s.backend == "sim",
-          .wakeup_latency =
-              request.outputs.fast ? rig::DurationQuantiles{} : session.executive().wakeup_latency().summary(),
-          .cycle_time = request.outputs.fast ? rig::DurationQuantiles{} : session.executive().cycle_time().summary(),
+          .timing = request.outputs.fast ? rig::TimingSummary{} : session.executive().statistics().summary(),
           .config = nlohmann::ordered_json::parse(request.config_json)};
 }
+
+/// What a run in real time says about its timing while it goes on.
+class TimingWatch {
+ public:
+  TimingWatch(const RunRequest& request, const experiment::RunSession& session, runtime::OverrunReporter& reporter)
+      : session_(session),
+        reporter_(reporter),
+        real_time_wanted_(!request.outputs.fast && request.settings.realtime.mode != runtime::RealtimeMode::off) {}
+
+  void poll() {
+    if (std::exchange(real_time_wanted_, false)) {
+      const runtime::RealtimeReport report = session_.outcome().realtime;
+      const std::string shortcomings = report.shortcomings();
+      if (!report.realtime()) {
+        spdlog::warn("NOT IN REAL TIME: late cycles, wrong brake torques are to be expected\n{}", shortcomings);
+      } else if (!shortcomings.empty()) {
+        spdlog::info("in real time, but not all that helps was obtained\n{}", shortcomings);
+      }
+    }
+    if (const auto late = reporter_.message(session_.executive().statistics().overruns())) spdlog::warn("{}", *late);
+  }
+
+ private:
+  const experiment::RunSession& session_;
+  runtime::OverrunReporter& reporter_;
+  bool real_time_wanted_;
+};
+
+}  // namespace
 
 int status_of(const experiment::RunOutcome& outcome) {
   if (outcome.completed()) return exit_completed;
@@ -79,25 +87,28 @@ int status_of(const experiment::RunOutcome& outcome) {
   return exit_ended_early;
 }
 
-}  // namespace
+std::string realtime_refusal(const runtime::RealtimeReport& report) {
+  return "--rt require: real time is not to be had on this machine; nothing has moved\n" + report.shortcomings();
+}
 
 int run(const RunRequest& request) {
   const settings::Settings& s = request.settings;
   const std::unique_ptr<driver::RigDriver> driver = make_driver(s);
-  experiment::RunLogicParts logic = make_logic(s);
+  experiment::RunLogicParts logic = make_logic(s, experiment::plan_experiment(s.experiment, s.control.v_min_m_s));
   RunOutputs outputs(request);
   runtime::MonotonicClock real_clock;
   runtime::VirtualClock virtual_clock;
   runtime::Clock& clock = request.outputs.fast ? static_cast<runtime::Clock&>(virtual_clock) : real_clock;
-  experiment::RunSession session(clock, *driver, std::move(logic), s.gate, outputs.sinks());
+  runtime::OverrunReporter late_cycles(std::llround(1e9 / s.control.rate_Hz));
+  std::vector<rig::RecordSink*> sinks = outputs.sinks();
+  if (!request.outputs.fast) sinks.push_back(&late_cycles);
+  experiment::RunSession session(clock, *driver, std::move(logic), s.gate, std::move(sinks), s.realtime.overruns);
+  TimingWatch timing(request, session, late_cycles);
   outputs.watch(session);
   note_signals();
 
-  bool warned = request.outputs.fast || s.realtime.mode != runtime::RealtimeMode::prefer;
   const auto poll = [&] {
-    if (!std::exchange(warned, true) && !session.realtime()) {
-      spdlog::warn("NOT in real time: expect late cycles\n{}", session.outcome().realtime.failures());
-    }
+    timing.poll();
     outputs.poll();
     if (const rig::Reason signal = signalled(); signal != rig::Reason::none) return signal;
     return outputs.stop_requested() ? rig::Reason::stop_command : rig::Reason::none;
@@ -112,11 +123,10 @@ int run(const RunRequest& request) {
     outcome = session.outcome();
   }
   if (!outcome.ran) {
-    throw driver::Unavailable("--rt require: real time is not to be had on this machine\n" +
-                              outcome.realtime.failures());
+    throw driver::Unavailable(realtime_refusal(outcome.realtime));
   }
   const analysis::RunSummary summary = summarise(request, session, outcome, outputs);
-  outputs.write(summary);
+  outputs.write(summary, session.executive().statistics());
   fmt::print("{}", analysis::to_text(summary));
   if (!outcome.completed()) spdlog::error("run ended early: {}", summary.reason);
   if (!outcome.safe_state.ok()) {

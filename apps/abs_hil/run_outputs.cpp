@@ -23,6 +23,7 @@ RunOutputs::RunOutputs(const RunRequest& request)
   try {
     if (request.outputs.csv_file) csv_.emplace(*request.outputs.csv_file);
     if (request.outputs.summary_file) summary_.emplace(*request.outputs.summary_file);
+    if (request.outputs.histogram_file) histogram_.emplace(*request.outputs.histogram_file);
     if (request.outputs.log_file) {
       log_.emplace(*request.outputs.log_file, request.outputs.fast ? std::optional(virtual_epoch_us) : std::nullopt);
     }
@@ -66,17 +67,23 @@ void RunOutputs::poll() {
 
 telemetry::StatusSnapshot RunOutputs::snapshot() const {
   if (session_ == nullptr) return {};
-  const runtime::CyclicExecutive& executive = session_->executive();
-  return {.cycles = executive.counters().cycles,
-          .overruns = executive.counters().overruns,
+  const runtime::CycleStatistics& statistics = session_->executive().statistics();
+  const rig::TimingSummary timing = statistics.summary();
+  return {.cycles = statistics.cycles(),
+          .overruns = timing.overruns.total,
           .telemetry_drops = session_->record_drops(),
           .realtime = session_->realtime(),
-          .wakeup_latency = executive.wakeup_latency().summary(),
-          .cycle_time = executive.cycle_time().summary()};
+          .wakeup_latency = timing.wakeup_latency,
+          .cycle_time = timing.cycle_time,
+          .read = timing.read,
+          .control = timing.control,
+          .write = timing.write,
+          .late = timing.overruns};
 }
 
-void RunOutputs::write(const analysis::RunSummary& summary) {
+void RunOutputs::write(const analysis::RunSummary& summary, const runtime::CycleStatistics& statistics) {
   if (summary_) summary_->write(summary);
+  if (histogram_) histogram_->write(statistics);
 }
 
 }  // namespace abs_hil::app

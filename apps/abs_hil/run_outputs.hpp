@@ -8,6 +8,7 @@
 #include "abs_hil/analysis/run_summary.hpp"
 #include "abs_hil/experiment/run_session.hpp"
 #include "abs_hil/rig/record_sink.hpp"
+#include "abs_hil/runtime/histogram_file.hpp"
 #include "abs_hil/telemetry/command_listener.hpp"
 #include "abs_hil/telemetry/csv_sink.hpp"
 #include "abs_hil/telemetry/lcm_outlet.hpp"
@@ -33,7 +34,8 @@ class RunOutputs {
   [[nodiscard]] bool stop_requested() const { return commands_ && commands_->stop_requested(); }
   [[nodiscard]] analysis::Metrics metrics() const { return metrics_.metrics(); }
   [[nodiscard]] std::uint64_t publish_failures() const { return stream_ ? stream_->failures() : 0; }
-  void write(const analysis::RunSummary& summary);
+  /// Writes summary and histogram where they were asked for. Throws std::runtime_error.
+  void write(const analysis::RunSummary& summary, const runtime::CycleStatistics& statistics);
 
  private:
   [[nodiscard]] telemetry::StatusSnapshot snapshot() const;
@@ -43,6 +45,7 @@ class RunOutputs {
   analysis::RunMetrics metrics_;
   std::optional<telemetry::CsvSink> csv_;
   std::optional<analysis::SummaryFile> summary_;
+  std::optional<runtime::HistogramFile> histogram_;
   std::optional<telemetry::LogOutlet> log_;
   std::optional<telemetry::LcmOutlet> lcm_;
   std::optional<telemetry::MessageStream> stream_;

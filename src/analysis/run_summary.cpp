@@ -22,8 +22,36 @@ nlohmann::ordered_json to_json(const rig::DurationQuantiles& q) {
       {"p50", number(q.p50_us)}, {"p99", number(q.p99_us)}, {"p99_9", number(q.p99_9_us)}, {"max", number(q.max_us)}};
 }
 
+nlohmann::ordered_json by_cause(const rig::OverrunCounts& counts) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (std::size_t i = 1; i < rig::overrun_cause_count; ++i) {
+    json[std::string(rig::name_of(static_cast<rig::OverrunCause>(i)))] = counts.by_cause[i];
+  }
+  return json;
+}
+
 std::string shown(double value, int decimals, std::string_view unit) {
   return std::isfinite(value) ? fmt::format("{:.{}f}{}{}", value, decimals, unit.empty() ? "" : " ", unit) : "-";
+}
+
+template <typename Line>
+void add_timing(const rig::TimingSummary& timing, const Line& line) {
+  const auto quantiles = [](const rig::DurationQuantiles& q) {
+    return fmt::format("p50 {:.0f}, p99 {:.0f}, p99.9 {:.0f}, max {:.0f} us", q.p50_us, q.p99_us, q.p99_9_us, q.max_us);
+  };
+  line("wake-up latency", quantiles(timing.wakeup_latency));
+  line("read", quantiles(timing.read));
+  line("control", quantiles(timing.control));
+  line("write", quantiles(timing.write));
+  line("cycle time", quantiles(timing.cycle_time));
+  if (timing.overruns.total > 0) {
+    std::string causes;
+    for (std::size_t i = 1; i < rig::overrun_cause_count; ++i) {
+      causes += fmt::format("{} {}, ", rig::name_of(static_cast<rig::OverrunCause>(i)), timing.overruns.by_cause[i]);
+    }
+    line("late because of", fmt::format("{}at most {} in a row, {} ticks missed", causes, timing.overruns.longest_run,
+                                        timing.overruns.ticks_missed));
+  }
 }
 
 }  // namespace
@@ -46,11 +74,18 @@ nlohmann::ordered_json to_json(const RunSummary& s) {
           {"torque_total_variation_Nm", number(m.torque_total_variation_Nm)},
           {"truth_known", s.truth_known},
           {"cycles", s.cycles},
-          {"overruns", s.overruns},
+          {"overruns", s.timing.overruns.total},
+          {"overruns_by_cause", by_cause(s.timing.overruns)},
+          {"overruns_startup", s.timing.overruns.startup},
+          {"overruns_longest_run", s.timing.overruns.longest_run},
+          {"ticks_missed", s.timing.overruns.ticks_missed},
           {"realtime", s.realtime},
           {"virtual_time", s.virtual_time},
-          {"wakeup_latency_us", to_json(s.wakeup_latency)},
-          {"cycle_time_us", to_json(s.cycle_time)},
+          {"wakeup_latency_us", to_json(s.timing.wakeup_latency)},
+          {"read_us", to_json(s.timing.read)},
+          {"control_us", to_json(s.timing.control)},
+          {"write_us", to_json(s.timing.write)},
+          {"cycle_time_us", to_json(s.timing.cycle_time)},
           {"telemetry_drops", s.telemetry_drops},
           {"publish_failures", s.publish_failures},
           {"config", s.config}};
@@ -72,17 +107,12 @@ std::string to_text(const RunSummary& s) {
   line("theta estimate",
        fmt::format("{}, settled after {}", shown(m.theta_final_N, 2, "N"), shown(m.theta_settling_s, 3, "s")));
   line("torque variation", shown(m.torque_total_variation_Nm, 1, "N m"));
-  line("cycles", fmt::format("{}, {} overruns, {} records dropped, {} messages not sent", s.cycles, s.overruns,
-                             s.telemetry_drops, s.publish_failures));
+  line("cycles", fmt::format("{}, {} overruns, {} records dropped, {} messages not sent", s.cycles,
+                             s.timing.overruns.total, s.telemetry_drops, s.publish_failures));
   if (s.virtual_time) {
     line("timing", "virtual time (--fast): no latencies to report");
   } else {
-    const auto quantiles = [](const rig::DurationQuantiles& q) {
-      return fmt::format("p50 {:.0f}, p99 {:.0f}, p99.9 {:.0f}, max {:.0f} us", q.p50_us, q.p99_us, q.p99_9_us,
-                         q.max_us);
-    };
-    line("wake-up latency", quantiles(s.wakeup_latency));
-    line("cycle time", quantiles(s.cycle_time));
+    add_timing(s.timing, line);
     if (!s.realtime) line("real time", "NOT obtained: late cycles are to be expected");
   }
   if (!s.truth_known) line("note", "speeds and slip are estimates: this backend knows no truth");

@@ -38,13 +38,14 @@ class ActiveDriver {
 }  // namespace
 
 RunSession::RunSession(runtime::Clock& clock, driver::RigDriver& driver, RunLogicParts parts,
-                       const runtime::GateOptions& gate_options, std::vector<rig::RecordSink*> sinks)
+                       const runtime::GateOptions& gate_options, std::vector<rig::RecordSink*> sinks,
+                       const runtime::OverrunOptions& overruns)
     : clock_(clock),
       driver_(driver),
       logic_(std::move(parts)),
       gate_(gate_options),
       ring_(ring_capacity),
-      executive_(clock, driver, logic_, gate_, ring_, period_ns_for(parts.control.rate_Hz)),
+      executive_(clock, driver, logic_, gate_, ring_, period_ns_for(parts.control.rate_Hz), overruns),
       pump_(ring_, parts.rig.wheels.r2_m, std::move(sinks)) {}
 
 RunOutcome RunSession::outcome() const {
@@ -75,7 +76,8 @@ RunOutcome RunSession::run_realtime(const runtime::RealtimeOptions& options, con
   std::promise<bool> go;
   std::atomic<bool> running{true};
   std::jthread cycle([&] {
-    set_up.set_value(runtime::set_up_realtime(options));
+    const runtime::RealtimeScope realtime(options);
+    set_up.set_value(realtime.report());
     if (go.get_future().get()) {
       while (executive_.step()) {
       }

@@ -1,15 +1,41 @@
 #include "abs_hil/runtime/cyclic_executive.hpp"
 
+#include <algorithm>
+#include <array>
+#include <utility>
+
 namespace abs_hil::runtime {
 
 namespace {
 constexpr double s_per_ns = 1e-9;
 static_assert(std::atomic<rig::Reason>::is_always_lock_free, "request_stop is called from signal handlers");
+
+std::uint64_t count_of(int value) noexcept { return static_cast<std::uint64_t>(std::max(value, 0)); }
+
+/// The part that took longest; of equal ones the first.
+rig::OverrunCause longest_part(const rig::CycleTiming& timing, std::int64_t record_ns) noexcept {
+  using Part = std::pair<std::int64_t, rig::OverrunCause>;
+  const std::array<Part, 5> parts{{{timing.wakeup_latency_ns, rig::OverrunCause::wakeup},
+                                   {timing.read_ns, rig::OverrunCause::read},
+                                   {timing.control_ns, rig::OverrunCause::control},
+                                   {timing.write_ns, rig::OverrunCause::write},
+                                   {record_ns, rig::OverrunCause::record}}};
+  return std::max_element(parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.first < b.first; })
+      ->second;
+}
 }  // namespace
 
 CyclicExecutive::CyclicExecutive(Clock& clock, driver::RigDriver& driver, CycleLogic& logic, CommandGate& gate,
-                                 RecordRing& ring, std::int64_t period_ns) noexcept
-    : clock_(clock), driver_(driver), logic_(logic), gate_(gate), ring_(ring), period_ns_(period_ns) {}
+                                 RecordRing& ring, std::int64_t period_ns, const OverrunOptions& overruns)
+    : clock_(clock),
+      driver_(driver),
+      logic_(logic),
+      gate_(gate),
+      ring_(ring),
+      period_ns_(period_ns),
+      startup_cycles_(count_of(overruns.startup_cycles)),
+      max_consecutive_(count_of(overruns.max_consecutive)),
+      statistics_(std::make_unique<CycleStatistics>()) {}
 
 void CyclicExecutive::request_stop(rig::Reason reason) noexcept {
   rig::Reason none = rig::Reason::none;
@@ -21,8 +47,8 @@ bool CyclicExecutive::step() noexcept {
   clock_.sleep_until(tick_ns_);
   rig::CycleRecord record;
   run_cycle(record);
-  ring_.push(record);
-  schedule_next(record);
+  keep(record);
+  schedule_next(record.timing);
   return !logic_.finished();
 }
 
@@ -33,7 +59,9 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   record.stamp_ns = woken_ns;
   record.time_s = static_cast<double>(woken_ns - start_ns_) * s_per_ns;
   record.timing.wakeup_latency_ns = woken_ns - tick_ns_;
+  record.timing.record_ns = record_ns_;
   record.timing.periods_skipped = periods_skipped_;
+  record.timing.overrun_cause = overrun_cause_;
 
   const driver::IoResult read = driver_.read(woken_ns, measurement_);
   if (!read.ok()) {
@@ -71,18 +99,38 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   record.timing.cycle_ns = written_ns - woken_ns;
 }
 
-void CyclicExecutive::schedule_next(rig::CycleRecord& record) noexcept {
-  wakeup_latency_.add(record.timing.wakeup_latency_ns);
-  cycle_time_.add(record.timing.cycle_ns);
-  counters_.cycles.store(sequence_, std::memory_order_relaxed);
-  tick_ns_ += period_ns_;
-  const std::int64_t late_ns = clock_.now_ns() - tick_ns_;
+void CyclicExecutive::keep(const rig::CycleRecord& record) noexcept {
+  statistics_->count_cycle();
+  if (!starting_up()) statistics_->add(record.timing);
+  ring_.push(record);
+}
+
+void CyclicExecutive::schedule_next(const rig::CycleTiming& timing) noexcept {
+  const std::int64_t now_ns = clock_.now_ns();
+  record_ns_ = now_ns - (tick_ns_ + timing.wakeup_latency_ns + timing.cycle_ns);
   periods_skipped_ = 0;
-  if (late_ns >= 0) {
-    const std::int64_t missed = late_ns / period_ns_ + 1;
-    tick_ns_ += missed * period_ns_;
-    periods_skipped_ = static_cast<std::uint32_t>(missed);
-    counters_.overruns.store(counters_.overruns.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+  overrun_cause_ = rig::OverrunCause::none;
+  tick_ns_ += period_ns_;
+  if (now_ns < tick_ns_) {
+    statistics_->count_cycle_in_time();
+    return;
+  }
+  const std::int64_t missed = (now_ns - tick_ns_) / period_ns_ + 1;
+  tick_ns_ += missed * period_ns_;
+  count_late(timing, missed);
+}
+
+void CyclicExecutive::count_late(const rig::CycleTiming& timing, std::int64_t ticks_missed) noexcept {
+  periods_skipped_ = static_cast<std::uint32_t>(ticks_missed);
+  overrun_cause_ = longest_part(timing, record_ns_);
+  if (starting_up()) {
+    statistics_->count_startup_overrun();
+    return;
+  }
+  const std::uint64_t in_a_row = statistics_->count_overrun(overrun_cause_, static_cast<std::uint64_t>(ticks_missed));
+  // The next cycle finds the fault latched and sends the safe command.
+  if (in_a_row == max_consecutive_) {
+    gate_.latch(rig::Reason::consecutive_overruns, static_cast<double>(in_a_row));
   }
 }
 

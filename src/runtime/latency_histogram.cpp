@@ -3,45 +3,56 @@
 #include <algorithm>
 #include <cmath>
 
+#include "abs_hil/runtime/single_writer.hpp"
+
 namespace abs_hil::runtime {
 
 namespace {
 constexpr std::int64_t ns_per_us = 1000;
 
-/// Adds one for a single writer: a plain load and store, cheaper than a locked read-modify-write.
-template <typename Integer>
-void increment(std::atomic<Integer>& counter) noexcept {
-  counter.store(counter.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-}
+constexpr double in_us(std::int64_t ns) noexcept { return static_cast<double>(ns) / static_cast<double>(ns_per_us); }
 }  // namespace
 
 void LatencyHistogram::add(std::int64_t duration_ns) noexcept {
   const std::int64_t ns = std::max<std::int64_t>(duration_ns, 0);
   const auto bin = static_cast<std::size_t>(ns / ns_per_us);
   if (bin < bins) {
-    increment(counts_[bin]);
+    add_as_single_writer(counts_[bin], std::uint32_t{1});
   } else {
-    increment(overflows_);
+    add_as_single_writer(overflows_, std::uint64_t{1});
   }
-  increment(count_);
+  add_as_single_writer(count_, std::uint64_t{1});
+  add_as_single_writer(sum_ns_, ns);
+  if (ns < min_ns_.load(std::memory_order_relaxed)) min_ns_.store(ns, std::memory_order_relaxed);
   if (ns > max_ns()) max_ns_.store(ns, std::memory_order_relaxed);
 }
 
-double LatencyHistogram::quantile_us(double fraction) const noexcept {
-  const double max_us = static_cast<double>(max_ns()) / static_cast<double>(ns_per_us);
-  const auto rank = static_cast<std::uint64_t>(std::ceil(fraction * static_cast<double>(count())));
-  std::uint64_t seen = 0;
-  for (std::size_t bin = 0; bin < bins; ++bin) {
-    seen += in_bin(bin);
-    if (seen >= rank) return std::min(static_cast<double>(bin + 1), max_us);
-  }
-  return max_us;
+std::int64_t LatencyHistogram::min_ns() const noexcept {
+  return count() == 0 ? 0 : min_ns_.load(std::memory_order_relaxed);
 }
 
 rig::DurationQuantiles LatencyHistogram::summary() const noexcept {
-  if (count() == 0) return {};
-  return {quantile_us(0.5), quantile_us(0.99), quantile_us(0.999),
-          static_cast<double>(max_ns()) / static_cast<double>(ns_per_us)};
+  const std::uint64_t total = count();
+  if (total == 0) return {};
+  const double max_us = in_us(max_ns());
+  rig::DurationQuantiles result{max_us, max_us, max_us, max_us};
+
+  struct Wanted {
+    double fraction;
+    double& value_us;
+  };
+  const std::array<Wanted, 3> wanted{{{0.5, result.p50_us}, {0.99, result.p99_us}, {0.999, result.p99_9_us}}};
+  std::size_t next = 0;
+  std::uint64_t seen = 0;
+  // Leaves at the last quantile: few of the bins are ever looked at.
+  for (std::size_t bin = 0; bin < bins && next < wanted.size(); ++bin) {
+    seen += in_bin(bin);
+    while (next < wanted.size() &&
+           static_cast<double>(seen) >= std::ceil(wanted[next].fraction * static_cast<double>(total))) {
+      wanted[next++].value_us = std::min(static_cast<double>(bin + 1), max_us);
+    }
+  }
+  return result;
 }
 
 }  // namespace abs_hil::runtime

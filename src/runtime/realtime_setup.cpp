@@ -1,79 +1,142 @@
 #include "abs_hil/runtime/realtime_setup.hpp"
 
+#include <fcntl.h>
 #include <pthread.h>
 #include <sched.h>
-#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
-#include <cstddef>
+#include <cstdint>
 #include <cstring>
+
+#include "memory_locking.hpp"
+#include "realtime_fixes.hpp"
 
 namespace abs_hil::runtime {
 
 namespace {
 
-RealtimeStep lock_memory() {
-  RealtimeStep step{"memory locked (mlockall)", true, {}, {}};
-  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
-    step.obtained = false;
-    step.detail = std::strerror(errno);
-    step.fix =
-        "add '@realtime - memlock unlimited' to /etc/security/limits.d/realtime.conf, join group realtime, "
-        "log in again; or: sudo setcap cap_ipc_lock,cap_sys_nice+ep $(command -v abs_hil)";
-  }
-  return step;
+std::string limit_text(int resource) {
+  rlimit limit{};
+  if (getrlimit(static_cast<__rlimit_resource>(resource), &limit) != 0) return "unknown";
+  return limit.rlim_cur == RLIM_INFINITY ? "unlimited" : std::to_string(limit.rlim_cur);
 }
 
 RealtimeStep schedule_fifo(int priority) {
-  RealtimeStep step{"SCHED_FIFO priority " + std::to_string(priority), true, {}, {}};
+  RealtimeStep step{.what = "SCHED_FIFO priority " + std::to_string(priority)};
   sched_param wanted{};
   wanted.sched_priority = priority;
-  int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &wanted);  // returns its error, leaves errno alone
-  int policy = 0;
+  // pthread functions return their error and leave errno alone.
+  const int set_error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &wanted);
+  int policy = SCHED_OTHER;
   sched_param got{};
-  if (error == 0) error = pthread_getschedparam(pthread_self(), &policy, &got);
-  if (error != 0 || policy != SCHED_FIFO || got.sched_priority != priority) {
-    step.obtained = false;
-    step.detail = error != 0 ? std::strerror(error) : "the kernel kept another policy";
-    step.fix =
-        "add '@realtime - rtprio 98' to /etc/security/limits.d/realtime.conf, join group realtime, log in "
-        "again; or: sudo setcap cap_ipc_lock,cap_sys_nice+ep $(command -v abs_hil)";
+  const int get_error = pthread_getschedparam(pthread_self(), &policy, &got);
+  step.obtained = set_error == 0 && get_error == 0 && policy == SCHED_FIFO && got.sched_priority == priority;
+  if (step.obtained) {
+    step.detail = "read back from the scheduler";
+  } else {
+    step.detail = set_error != 0 ? std::strerror(set_error) : "the scheduler kept another policy";
+    step.detail += " (RLIMIT_RTPRIO " + limit_text(RLIMIT_RTPRIO) + ")";
+    step.fix = fifo_fix(priority);
   }
   return step;
 }
 
-/// Touches the stack that the cycle will use, so that no page of it is faulted in later.
-void prefault_stack() {
-  constexpr std::size_t stack_bytes = 256 * 1024;
-  std::array<volatile unsigned char, stack_bytes> pages;
-  for (std::size_t at = 0; at < stack_bytes; at += 1024) pages[at] = 0;
+RealtimeStep bind_to_cpu(int cpu) {
+  RealtimeStep step{.what = "bound to CPU " + std::to_string(cpu)};
+  cpu_set_t wanted;
+  CPU_ZERO(&wanted);
+  CPU_SET(static_cast<std::size_t>(cpu), &wanted);
+  const int set_error = pthread_setaffinity_np(pthread_self(), sizeof wanted, &wanted);
+  cpu_set_t got;
+  CPU_ZERO(&got);
+  const int get_error = pthread_getaffinity_np(pthread_self(), sizeof got, &got);
+  step.obtained = set_error == 0 && get_error == 0 && CPU_EQUAL(&wanted, &got);
+  if (step.obtained) {
+    step.detail = "runs on CPU " + std::to_string(sched_getcpu());
+  } else {
+    step.detail = set_error == EINVAL ? "there is no such CPU, or this process may not use it"
+                                      : std::strerror(set_error != 0 ? set_error : get_error);
+    step.fix = "taskset -cp $$   # shows the CPUs that may be used; then --set realtime.cpu=N, or -1 for any";
+  }
+  return step;
+}
+
+RealtimeStep least_timer_slack() {
+  RealtimeStep step{.what = "timer slack 1 ns", .required = false};
+  constexpr unsigned long least_ns = 1;  // 0 would mean the default, 50 us
+  const int set = prctl(PR_SET_TIMERSLACK, least_ns, 0, 0, 0);
+  const int error = errno;
+  const int got_ns = prctl(PR_GET_TIMERSLACK, 0, 0, 0, 0);
+  step.obtained = set == 0 && got_ns >= 0 && got_ns <= static_cast<int>(least_ns);
+  step.detail = set == 0 ? "slack is " + std::to_string(got_ns) + " ns" : std::strerror(error);
+  if (!step.obtained) step.fix = "none needed under SCHED_FIFO, which has no slack";
+  return step;
 }
 
 }  // namespace
 
 bool RealtimeReport::realtime() const noexcept {
-  return !steps.empty() && std::all_of(steps.begin(), steps.end(), [](const RealtimeStep& s) { return s.obtained; });
+  return !steps.empty() &&
+         std::all_of(steps.begin(), steps.end(), [](const RealtimeStep& s) { return s.obtained || !s.required; });
 }
 
-std::string RealtimeReport::failures() const {
+std::string RealtimeReport::shortcomings() const {
   std::string text;
+  std::vector<std::string_view> fixes;
   for (const RealtimeStep& step : steps) {
     if (step.obtained) continue;
-    if (!text.empty()) text += '\n';
-    text += "not obtained: " + step.what + ": " + step.detail + "; to mend it: " + step.fix;
+    text += "  not obtained" + std::string(step.required ? "" : " (helpful, not required)") + ": " + step.what + ": " +
+            step.detail + "\n";
+    if (std::find(fixes.begin(), fixes.end(), step.fix) == fixes.end()) fixes.push_back(step.fix);
+  }
+  if (text.empty()) return text;
+  text += "  to mend it:";
+  for (const std::string_view fix : fixes) {
+    text += "\n    ";
+    for (const char c : fix) text += c == '\n' ? std::string("\n    ") : std::string(1, c);
   }
   return text;
 }
 
-RealtimeReport set_up_realtime(const RealtimeOptions& options) {
-  RealtimeReport report;
-  if (options.mode == RealtimeMode::off) return report;
-  report.steps.push_back(lock_memory());
-  report.steps.push_back(schedule_fifo(options.priority));
-  prefault_stack();
-  return report;
+RealtimeScope::RealtimeScope(const RealtimeOptions& options) {
+  if (options.mode == RealtimeMode::off) return;
+  report_.steps.push_back(lock_memory());
+  report_.steps.push_back(prefault_heap());
+  report_.steps.push_back(prefault_stack());
+  if (options.cpu >= 0) report_.steps.push_back(bind_to_cpu(options.cpu));
+  // Before SCHED_FIFO: a real-time thread has no slack to set.
+  report_.steps.push_back(least_timer_slack());
+  report_.steps.push_back(schedule_fifo(options.priority));
+  hold_cpu_latency();
+}
+
+RealtimeScope::~RealtimeScope() {
+  if (cpu_latency_file_ >= 0) ::close(cpu_latency_file_);
+}
+
+// The kernel keeps the CPUs in states with an exit latency of at most the value written (us), as long as the file stays
+// open: Documentation/power/pm_qos_interface.rst.
+void RealtimeScope::hold_cpu_latency() {
+  constexpr const char* device = "/dev/cpu_dma_latency";
+  RealtimeStep step{.what = std::string(device) + " held at 0", .required = false};
+  cpu_latency_file_ = ::open(device, O_RDWR | O_CLOEXEC);
+  constexpr std::int32_t none_us = 0;
+  std::int32_t got_us = -1;
+  errno = 0;
+  const bool written = cpu_latency_file_ >= 0 && ::write(cpu_latency_file_, &none_us, sizeof none_us) == sizeof none_us;
+  const int error = errno;
+  step.obtained = written && ::pread(cpu_latency_file_, &got_us, sizeof got_us, 0) == sizeof got_us && got_us == 0;
+  if (step.obtained) {
+    step.detail = "the kernel's limit reads 0 us";
+  } else {
+    step.detail = written ? "the kernel's limit is still " + std::to_string(got_us) + " us" : std::strerror(error);
+    step.fix = error == ENOENT ? "none: this kernel has no CPU latency control (CONFIG_CPU_IDLE)" : cpu_latency_fix();
+  }
+  report_.steps.push_back(std::move(step));
 }
 
 }  // namespace abs_hil::runtime

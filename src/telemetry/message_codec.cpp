@@ -88,6 +88,8 @@ telemetry_t to_message(const rig::CycleRecord& record, double distance_m, std::i
   m.write_ns = record.timing.write_ns;
   m.cycle_ns = record.timing.cycle_ns;
   m.periods_skipped = record.timing.periods_skipped;
+  m.record_ns = record.timing.record_ns;
+  m.overrun_cause = static_cast<std::int8_t>(record.timing.overrun_cause);
   return m;
 }
 

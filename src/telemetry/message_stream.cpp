@@ -31,6 +31,31 @@ void check(const StreamOptions& options) {
 /// The next time on the grid of `period_s` after `now_s`, so that late messages do not shift those to come.
 double next_on_grid(double now_s, double period_s) { return (std::floor(now_s / period_s + 1e-9) + 1.0) * period_s; }
 
+void put_parts(const StatusSnapshot& snapshot, status_t& m) {
+  m.read_p50_us = snapshot.read.p50_us;
+  m.read_p99_us = snapshot.read.p99_us;
+  m.read_p99_9_us = snapshot.read.p99_9_us;
+  m.read_max_us = snapshot.read.max_us;
+  m.control_p50_us = snapshot.control.p50_us;
+  m.control_p99_us = snapshot.control.p99_us;
+  m.control_p99_9_us = snapshot.control.p99_9_us;
+  m.control_max_us = snapshot.control.max_us;
+  m.write_p50_us = snapshot.write.p50_us;
+  m.write_p99_us = snapshot.write.p99_us;
+  m.write_p99_9_us = snapshot.write.p99_9_us;
+  m.write_max_us = snapshot.write.max_us;
+
+  const auto late = [&snapshot](rig::OverrunCause cause) { return static_cast<std::int64_t>(snapshot.late.of(cause)); };
+  m.overruns_wakeup = late(rig::OverrunCause::wakeup);
+  m.overruns_read = late(rig::OverrunCause::read);
+  m.overruns_control = late(rig::OverrunCause::control);
+  m.overruns_write = late(rig::OverrunCause::write);
+  m.overruns_record = late(rig::OverrunCause::record);
+  m.overruns_startup = static_cast<std::int64_t>(snapshot.late.startup);
+  m.overruns_longest_run = static_cast<std::int64_t>(snapshot.late.longest_run);
+  m.ticks_missed = static_cast<std::int64_t>(snapshot.late.ticks_missed);
+}
+
 }  // namespace
 
 MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, StatusSource status)
@@ -133,6 +158,7 @@ void MessageStream::send_status() {
   m.cycle_time_p99_us = snapshot.cycle_time.p99_us;
   m.cycle_time_p99_9_us = snapshot.cycle_time.p99_9_us;
   m.cycle_time_max_us = snapshot.cycle_time.max_us;
+  put_parts(snapshot, m);
   send(status_channel_, m);
 }
 

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <string>
 #include <utility>
@@ -21,6 +22,19 @@ int columns_of(int file) {
   return ::ioctl(file, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
 }
 
+/// Wake-up latency and cycle time as p50/p99/p99.9/max; empty while nothing has been measured.
+std::array<char, 128> timing_text(const StatusSnapshot& status) {
+  std::array<char, 128> text{};
+  const rig::DurationQuantiles& wakeup = status.wakeup_latency;
+  const rig::DurationQuantiles& cycle = status.cycle_time;
+  if (std::isfinite(wakeup.p50_us) && std::isfinite(cycle.p50_us)) {
+    std::snprintf(text.data(), text.size(), "  wake-up %.0f/%.0f/%.0f/%.0f  cycle %.0f/%.0f/%.0f/%.0f us",
+                  wakeup.p50_us, wakeup.p99_us, wakeup.p99_9_us, wakeup.max_us, cycle.p50_us, cycle.p99_us,
+                  cycle.p99_9_us, cycle.max_us);
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string format_status_line(const rig::CycleRecord& record, const StatusSnapshot& status) {
@@ -28,10 +42,10 @@ std::string format_status_line(const rig::CycleRecord& record, const StatusSnaps
   const std::string_view phase = rig::name_of(record.phase);
   std::array<char, 256> text{};
   const int size = std::snprintf(
-      text.data(), text.size(), "%-10.*s ω1 %6.1f  ω2 %6.1f rad/s  slip %5.2f  θ̂ %6.2f N  overruns %llu  drops %llu",
+      text.data(), text.size(), "%-10.*s ω1 %6.1f  ω2 %6.1f rad/s  slip %5.2f  θ̂ %6.2f N  overruns %llu  drops %llu%s",
       static_cast<int>(phase.size()), phase.data(), speeds.omega1_rad_s, speeds.omega2_rad_s, rig::best_slip(record),
       record.control.theta_est_N, static_cast<unsigned long long>(status.overruns),
-      static_cast<unsigned long long>(status.telemetry_drops));
+      static_cast<unsigned long long>(status.telemetry_drops), timing_text(status).data());
   // A speed of 1e300 fills the buffer; what there is room for will do.
   if (size < 0) return {};
   return {text.data(), std::min(static_cast<std::size_t>(size), text.size() - 1)};

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "abs_hil/analysis/run_metrics.hpp"
-#include "abs_hil/rig/duration_quantiles.hpp"
+#include "abs_hil/rig/timing_summary.hpp"
 
 namespace abs_hil::analysis {
 
@@ -20,14 +20,12 @@ struct RunSummary {
   std::string experiment;
   Metrics metrics{};
   std::uint64_t cycles{0};
-  std::uint64_t overruns{0};
   std::uint64_t telemetry_drops{0};
   std::uint64_t publish_failures{0};
-  bool realtime{false};      ///< every step of the real-time set-up was obtained
+  bool realtime{false};      ///< every required step of the real-time set-up was obtained
   bool virtual_time{false};  ///< --fast: the timing figures say nothing of this machine
   bool truth_known{false};   ///< metrics come from the simulator's truth, not from estimates
-  rig::DurationQuantiles wakeup_latency{};
-  rig::DurationQuantiles cycle_time{};
+  rig::TimingSummary timing{};
   nlohmann::ordered_json config{};
 };
 

@@ -33,7 +33,8 @@ class RunSession {
  public:
   /// @param sinks get every record, in this order, in the thread that calls `run_...`
   RunSession(runtime::Clock& clock, driver::RigDriver& driver, RunLogicParts parts,
-             const runtime::GateOptions& gate_options, std::vector<rig::RecordSink*> sinks);
+             const runtime::GateOptions& gate_options, std::vector<rig::RecordSink*> sinks,
+             const runtime::OverrunOptions& overruns = {});
 
   /// Asked every few milliseconds of a run in real time, every second of one in virtual time, outside the real-time
   /// thread: a reason other than `none` ends the run in an orderly way.

@@ -6,6 +6,7 @@
 
 #include "abs_hil/rig/command.hpp"
 #include "abs_hil/rig/measurement.hpp"
+#include "abs_hil/rig/overrun_cause.hpp"
 #include "abs_hil/rig/phase.hpp"
 #include "abs_hil/rig/reason.hpp"
 
@@ -37,7 +38,9 @@ struct CycleTiming {
   std::int64_t control_ns{0};
   std::int64_t write_ns{0};
   std::int64_t cycle_ns{0};          ///< wake-up to end of write
+  std::int64_t record_ns{0};         ///< recording of the cycle before: this one's is not over when it is written down
   std::uint32_t periods_skipped{0};  ///< ticks missed before this one
+  OverrunCause overrun_cause{OverrunCause::none};  ///< why they were missed
 };
 
 /// Everything about one cycle: measurement of tick n and the command computed from it. The real-time thread pushes it

@@ -10,7 +10,8 @@
 
 namespace abs_hil::telemetry {
 
-/// The text of the status line: phase, speeds, slip, theta estimate, overruns, drops. UTF-8, no line end.
+/// The text of the status line: phase, speeds, slip, theta estimate, overruns, drops, then wake-up latency and cycle
+/// time as p50/p99/p99.9/max. UTF-8, no line end.
 [[nodiscard]] std::string format_status_line(const rig::CycleRecord& record, const StatusSnapshot& status);
 
 /// `text` cut to `columns` of a terminal; combining marks take none.

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "abs_hil/rig/duration_quantiles.hpp"
+#include "abs_hil/rig/timing_summary.hpp"
 
 namespace abs_hil::telemetry {
 
@@ -15,6 +15,10 @@ struct StatusSnapshot {
   bool realtime{false};              ///< real-time scheduling and locked memory are in force
   rig::DurationQuantiles wakeup_latency{};
   rig::DurationQuantiles cycle_time{};
+  rig::DurationQuantiles read{};
+  rig::DurationQuantiles control{};
+  rig::DurationQuantiles write{};
+  rig::OverrunCounts late{};  ///< `overruns` by cause
 };
 
 /// Called from the telemetry thread, at most ten times a second. Empty: counts are 0 and durations NaN.

@@ -1,0 +1,46 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "abs_hil/diagnosis/latency_verdict.hpp"
+#include "abs_hil/experiment/run_session.hpp"
+#include "abs_hil/experiment/timing_load.hpp"
+#include "abs_hil/runtime/histogram_file.hpp"
+#include "abs_hil/settings/config_error.hpp"
+#include "commands.hpp"
+#include "exit_status.hpp"
+#include "run_parts.hpp"
+#include "signals.hpp"
+
+namespace abs_hil::app {
+
+int latency(const RunRequest& request, double duration_s, bool json) {
+  const settings::Settings& s = request.settings;
+  std::optional<runtime::HistogramFile> histogram;
+  try {
+    if (request.outputs.histogram_file) histogram.emplace(*request.outputs.histogram_file);
+  } catch (const std::runtime_error& error) {
+    throw settings::ConfigError(error.what());
+  }
+  const std::unique_ptr<driver::RigDriver> driver = make_driver(s);
+  runtime::MonotonicClock clock;
+  experiment::RunSession session(clock, *driver, make_logic(s, experiment::plan_timing_load(duration_s)), s.gate, {},
+                                 s.realtime.overruns);
+  note_signals();
+  const diagnosis::MachineFacts facts = diagnosis::read_machine_facts();
+  const experiment::RunOutcome outcome = session.run_realtime(s.realtime, signalled);
+  if (!outcome.ran) throw driver::Unavailable(realtime_refusal(outcome.realtime));
+
+  const runtime::CycleStatistics& statistics = session.executive().statistics();
+  const diagnosis::LatencyRun run{.rate_Hz = s.control.rate_Hz,
+                                  .duration_s = duration_s,
+                                  .cycles = statistics.cycles(),
+                                  .realtime = outcome.realtime.realtime(),
+                                  .timing = statistics.summary()};
+  if (histogram) histogram->write(statistics);
+  fmt::print("{}", json ? to_json(run, facts).dump(2) + "\n" : to_text(run, facts));
+  return status_of(outcome);
+}
+
+}  // namespace abs_hil::app

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "abs_hil/diagnosis/finding.hpp"
+
+namespace abs_hil::diagnosis {
+
+/// An RT-DAC4/PCI in this computer: PLX 9030 bridge, vendor 0x10B5, device 0x2497.
+struct PciBoard {
+  std::string address;       ///< domain:bus:device.function, as lspci -D shows it
+  std::string bound_driver;  ///< kernel driver that owns it; empty: none, as it should be
+  bool enabled{false};       ///< its I/O ports answer
+  bool accessible{false};    ///< this process may read and write its registers (resource2)
+};
+
+/// @param root where /sys is, for tests
+[[nodiscard]] std::vector<PciBoard> find_pci_boards(const std::filesystem::path& root = "/");
+/// Findings of the check "boards": each board with its driver binding and access. No board is a note.
+[[nodiscard]] std::vector<Finding> judge(const std::vector<PciBoard>& boards);
+
+/// A CAN network interface.
+struct CanInterface {
+  std::string name;
+  bool up{false};
+};
+
+/// @param root where /sys is, for tests
+[[nodiscard]] std::vector<CanInterface> find_can_interfaces(const std::filesystem::path& root = "/");
+/// Whether this kernel makes CAN sockets (PF_CAN, raw).
+[[nodiscard]] bool has_can_sockets() noexcept;
+/// Findings of the check "can". No interface, or none in the kernel, is a note.
+[[nodiscard]] std::vector<Finding> judge(const std::vector<CanInterface>& interfaces, bool can_sockets);
+
+}  // namespace abs_hil::diagnosis

@@ -1,0 +1,120 @@
+#include "abs_hil/diagnosis/board_scan.hpp"
+
+#include <fcntl.h>
+#include <linux/can.h>
+#include <net/if.h>
+#include <net/if_arp.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "text_file.hpp"
+
+namespace abs_hil::diagnosis {
+
+namespace {
+
+namespace fs = std::filesystem;
+// Numbers of the PLX 9030 bridge on the RT-DAC4/PCI.
+constexpr std::string_view pci_vendor = "0x10b5";
+constexpr std::string_view pci_device = "0x2497";
+
+/// The entries of a folder by name; none if it is not there.
+std::vector<fs::path> entries(const fs::path& folder) {
+  std::vector<fs::path> found;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) found.push_back(entry.path());
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+/// Opening a resource file touches no register.
+bool can_read_and_write(const fs::path& file) {
+  const int descriptor = ::open(file.c_str(), O_RDWR | O_CLOEXEC);
+  if (descriptor >= 0) ::close(descriptor);
+  return descriptor >= 0;
+}
+
+Finding judge_board(const PciBoard& board) {
+  Finding f{.check = "boards", .what = "RT-DAC4/PCI at " + board.address};
+  const std::string folder = "/sys/bus/pci/devices/" + board.address;
+  const auto add = [&f](const std::string& detail, const std::string& fix) {
+    f.standing = Standing::warning;
+    f.detail += (f.detail.empty() ? "" : "; ") + detail;
+    f.fix += (f.fix.empty() ? "" : "\n") + fix;
+  };
+  if (!board.bound_driver.empty()) {
+    add("owned by the kernel driver " + board.bound_driver,
+        "echo " + board.address + " | sudo tee " + folder + "/driver/unbind");
+  }
+  if (!board.enabled) add("not enabled", "echo 1 | sudo tee " + folder + "/enable");
+  if (!board.accessible) {
+    add("registers not accessible to this user",
+        "sudo chgrp realtime " + folder + "/resource2 && sudo chmod g+rw " + folder + "/resource2");
+  }
+  if (f.detail.empty()) f.detail = "no kernel driver, enabled, registers accessible";
+  return f;
+}
+
+}  // namespace
+
+std::vector<PciBoard> find_pci_boards(const fs::path& root) {
+  std::vector<PciBoard> boards;
+  for (const fs::path& device : entries(root / "sys/bus/pci/devices")) {
+    if (first_line(device / "vendor") != pci_vendor || first_line(device / "device") != pci_device) continue;
+    std::error_code none_bound;
+    const fs::path driver = fs::read_symlink(device / "driver", none_bound);
+    boards.push_back({.address = device.filename().string(),
+                      .bound_driver = none_bound ? "" : driver.filename().string(),
+                      .enabled = first_line(device / "enable", "0") != "0",
+                      .accessible = can_read_and_write(device / "resource2")});
+  }
+  return boards;
+}
+
+std::vector<Finding> judge(const std::vector<PciBoard>& boards) {
+  if (boards.empty()) {
+    return {{.check = "boards", .what = "no RT-DAC4/PCI (10b5:2497) found", .standing = Standing::note}};
+  }
+  std::vector<Finding> findings;
+  for (const PciBoard& board : boards) findings.push_back(judge_board(board));
+  return findings;
+}
+
+std::vector<CanInterface> find_can_interfaces(const fs::path& root) {
+  std::vector<CanInterface> interfaces;
+  for (const fs::path& net : entries(root / "sys/class/net")) {
+    if (first_line(net / "type") != std::to_string(ARPHRD_CAN)) continue;
+    const unsigned long flags = std::strtoul(first_line(net / "flags", "0").c_str(), nullptr, 0);
+    interfaces.push_back({.name = net.filename().string(), .up = (flags & IFF_UP) != 0});
+  }
+  return interfaces;
+}
+
+bool has_can_sockets() noexcept {
+  const int socket = ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
+  if (socket >= 0) ::close(socket);
+  return socket >= 0;
+}
+
+std::vector<Finding> judge(const std::vector<CanInterface>& interfaces, bool can_sockets) {
+  if (interfaces.empty()) {
+    return {{.check = "can",
+             .what = "no CAN interface",
+             .standing = Standing::note,
+             .detail = can_sockets ? "" : "this kernel makes no CAN sockets either (sudo modprobe can_raw)"}};
+  }
+  std::vector<Finding> findings;
+  for (const CanInterface& can : interfaces) {
+    Finding f{.check = "can", .what = "CAN interface " + can.name, .detail = can.up ? "up" : "down"};
+    if (!can.up) {
+      f.standing = Standing::warning;
+      f.fix = "sudo ip link set " + can.name + " up type can bitrate 500000   # with your bus's bit rate";
+    }
+    findings.push_back(std::move(f));
+  }
+  return findings;
+}
+
+}  // namespace abs_hil::diagnosis

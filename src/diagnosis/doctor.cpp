@@ -1,0 +1,116 @@
+#include "abs_hil/diagnosis/doctor.hpp"
+
+#include <sys/resource.h>
+
+#include <array>
+#include <filesystem>
+#include <thread>
+#include <utility>
+
+#include "abs_hil/diagnosis/board_scan.hpp"
+#include "abs_hil/diagnosis/machine_facts.hpp"
+#include "abs_hil/telemetry/route_probe.hpp"
+
+namespace abs_hil::diagnosis {
+
+namespace {
+
+using Findings = std::vector<Finding>;
+
+Findings machine_part(std::string_view check) {
+  Findings part;
+  for (Finding& finding : judge(read_machine_facts())) {
+    if (finding.check == check) part.push_back(std::move(finding));
+  }
+  return part;
+}
+
+/// rtkit hands out SCHED_RR up to priority 20 and limits the CPU time of who takes it: no use here, but many desktops
+/// have it and their users ask.
+Finding rtkit_finding() {
+  const bool there = std::filesystem::exists("/usr/libexec/rtkit-daemon");
+  return {.check = "realtime",
+          .what = there ? "rtkit is installed" : "rtkit is not installed",
+          .standing = Standing::note,
+          .detail = "not used: it grants SCHED_RR up to priority 20 and 200 ms of CPU time, not SCHED_FIFO"};
+}
+
+Findings check_realtime(const Examination& e) {
+  runtime::RealtimeOptions options = e.realtime;
+  options.mode = runtime::RealtimeMode::prefer;
+  runtime::RealtimeReport report;
+  // In a thread of its own: what it obtains ends with it.
+  std::jthread([&] { report = runtime::RealtimeScope(options).report(); }).join();
+  Findings findings;
+  for (const runtime::RealtimeStep& step : report.steps) {
+    const Standing shortfall = step.required ? Standing::warning : Standing::note;
+    findings.push_back({.check = "realtime",
+                        .what = step.what,
+                        .standing = step.obtained ? Standing::good : shortfall,
+                        .detail = step.detail,
+                        .fix = step.fix});
+  }
+  findings.push_back(rtkit_finding());
+  return findings;
+}
+
+Findings check_lcm(const Examination& e) {
+  const telemetry::RouteProbe probe = telemetry::probe_lcm_route(e.lcm_url);
+  Finding finding{.check = "lcm", .what = "LCM route for " + e.lcm_url};
+  if (!probe.usable) {
+    finding.standing = Standing::warning;
+    finding.detail = probe.problem;
+    finding.fix = probe.fix + "\nor run without: --no-lcm";
+  }
+  return {std::move(finding)};
+}
+
+Findings check_backend(const Examination& e) {
+  Finding finding{.check = "backend", .what = "backend " + e.backend, .detail = "can run"};
+  try {
+    const std::unique_ptr<driver::RigDriver> driver = e.make_driver();
+    driver->configure();
+  } catch (const driver::Unavailable& error) {
+    finding.standing = Standing::failure;
+    finding.detail = error.what();
+  }
+  return {std::move(finding)};
+}
+
+struct Check {
+  std::string_view name;
+  Findings (*make)(const Examination&);
+};
+constexpr std::array<Check, 8> checks{{
+    {"kernel", [](const Examination&) { return machine_part("kernel"); }},
+    {"realtime", check_realtime},
+    {"clock", [](const Examination&) { return machine_part("clock"); }},
+    {"cpu", [](const Examination&) { return machine_part("cpu"); }},
+    {"lcm", check_lcm},
+    {"can", [](const Examination&) { return judge(find_can_interfaces(), has_can_sockets()); }},
+    {"boards", [](const Examination&) { return judge(find_pci_boards()); }},
+    {"backend", check_backend},
+}};
+
+}  // namespace
+
+std::vector<std::string> check_names() {
+  std::vector<std::string> names;
+  for (const Check& check : checks) names.emplace_back(check.name);
+  return names;
+}
+
+std::vector<Finding> examine(const Examination& examination) {
+  Findings all;
+  for (const Check& check : checks) {
+    if (!examination.only.empty() && examination.only != check.name) continue;
+    for (Finding& finding : check.make(examination)) all.push_back(std::move(finding));
+  }
+  return all;
+}
+
+bool turned_out_well(const Examination& examination, std::span<const Finding> findings) {
+  return worst(findings) < (examination.only.empty() ? Standing::failure : Standing::warning);
+}
+
+}  // namespace abs_hil::diagnosis

@@ -1,0 +1,132 @@
+#include "abs_hil/diagnosis/machine_facts.hpp"
+
+#include <cstdlib>
+#include <set>
+
+#include "text_file.hpp"
+
+namespace abs_hil::diagnosis {
+
+namespace {
+
+namespace fs = std::filesystem;
+const std::string unknown = "unknown";
+
+/// "none voluntary (full)" -> "full": how the kernel marks the choice that is in force.
+std::string chosen(const std::string& choices) {
+  const auto from = choices.find('(');
+  const auto to = choices.find(')', from);
+  return from == std::string::npos || to == std::string::npos ? "" : choices.substr(from + 1, to - from - 1);
+}
+
+std::string preemption_model(const fs::path& root) {
+  if (first_line(root / "sys/kernel/realtime") == "1") return "PREEMPT_RT";  // only such kernels have the file
+  const std::string version = first_line(root / "proc/sys/kernel/version");
+  if (version.find("PREEMPT_RT") != std::string::npos) return "PREEMPT_RT";
+  if (version.find("PREEMPT_DYNAMIC") != std::string::npos) {
+    const std::string mode = chosen(first_line(root / "sys/kernel/debug/sched/preempt"));
+    return mode.empty() ? "dynamic, mode unknown" : mode;
+  }
+  return version.find("PREEMPT") != std::string::npos ? "full" : version.empty() ? unknown : "none or voluntary";
+}
+
+/// The value of `key` in /proc/cpuinfo.
+std::string cpuinfo(const fs::path& root, std::string_view key) {
+  std::ifstream stream(root / "proc/cpuinfo");
+  for (std::string line; std::getline(stream, line);) {
+    const auto colon = line.find(": ");
+    if (line.starts_with(key) && colon != std::string::npos) return line.substr(colon + 2);
+  }
+  return {};
+}
+
+std::string governors(const fs::path& root) {
+  std::set<std::string> found;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(root / "sys/devices/system/cpu", ignored)) {
+    if (const std::string name = first_line(entry.path() / "cpufreq/scaling_governor"); !name.empty()) {
+      found.insert(name);
+    }
+  }
+  std::string text;
+  for (const std::string& name : found) text += (text.empty() ? "" : ", ") + name;
+  return text.empty() ? "none" : text;
+}
+
+Finding kernel_finding(const MachineFacts& facts) {
+  Finding f{.check = "kernel", .what = "kernel " + facts.kernel, .detail = "preemption: " + facts.preemption};
+  if (facts.preemption != "PREEMPT_RT") {
+    f.standing = Standing::warning;
+    f.fix = "sudo apt install linux-image-rt-amd64   # then reboot into it";
+    f.detail += "; without PREEMPT_RT a busy kernel delays wake-ups by milliseconds";
+  }
+  return f;
+}
+
+Finding clock_finding(const MachineFacts& facts) {
+  Finding f{.check = "clock", .what = "clock source " + facts.clock_source};
+  // Others than these are read by a system call, at a microsecond and more: vdso(7), arch/x86/include/asm/vdso.
+  for (const std::string_view quick : {"tsc", "kvm-clock", "hyperv_clocksource_tsc_page", "arch_sys_counter"}) {
+    if (facts.clock_source == quick) return f;
+  }
+  f.standing = Standing::warning;
+  f.detail = "reading it takes a system call, five times a cycle";
+  f.fix =
+      "cat /sys/devices/system/clocksource/clocksource0/available_clocksource\n"
+      "echo tsc | sudo tee /sys/devices/system/clocksource/clocksource0/current_clocksource";
+  return f;
+}
+
+Finding governor_finding(const MachineFacts& facts) {
+  Finding f{.check = "cpu", .what = "CPU governor " + facts.governor};
+  if (facts.governor == "none") {
+    f.standing = Standing::note;
+    f.detail = "frequencies are not scaled by this kernel";
+  } else if (facts.governor != "performance") {
+    f.standing = Standing::warning;
+    f.detail = "a clock that changes with the load makes cycles of uneven length";
+    f.fix = "echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor";
+  }
+  return f;
+}
+
+Finding isolation_finding(const MachineFacts& facts) {
+  Finding f{.check = "cpu", .what = "isolated CPUs: " + facts.isolated_cpus, .standing = Standing::note};
+  f.detail = "of " + facts.online_cpus;
+  if (facts.isolated_cpus == "none") {
+    f.detail +=
+        "; a CPU of its own keeps other work away from the cycle: kernel parameters isolcpus=N nohz_full=N "
+        "rcu_nocbs=N, then --set realtime.cpu=N";
+  }
+  return f;
+}
+
+}  // namespace
+
+MachineFacts read_machine_facts(const fs::path& root) {
+  const fs::path cpus = root / "sys/devices/system/cpu";
+  const fs::path clock = root / "sys/devices/system/clocksource/clocksource0/current_clocksource";
+  return {.kernel = first_line(root / "proc/sys/kernel/osrelease", unknown),
+          .preemption = preemption_model(root),
+          .clock_source = first_line(clock, unknown),
+          .governor = governors(root),
+          .isolated_cpus = first_line(cpus / "isolated", "none"),
+          .online_cpus = first_line(cpus / "online", unknown),
+          .cpu_model = cpuinfo(root, "model name"),
+          .virtual_machine = cpuinfo(root, "flags").find(" hypervisor") != std::string::npos,
+          .load_1min = std::strtod(first_line(root / "proc/loadavg").c_str(), nullptr)};
+}
+
+std::vector<Finding> judge(const MachineFacts& facts) {
+  std::vector<Finding> findings{kernel_finding(facts), clock_finding(facts), governor_finding(facts),
+                                isolation_finding(facts)};
+  if (facts.virtual_machine) {
+    findings.push_back({.check = "cpu",
+                        .what = "this is a virtual machine",
+                        .standing = Standing::note,
+                        .detail = "its host decides when it runs: worst latencies are the host's, not this system's"});
+  }
+  return findings;
+}
+
+}  // namespace abs_hil::diagnosis

@@ -1,0 +1,14 @@
+#pragma once
+
+#include "abs_hil/runtime/realtime_setup.hpp"
+
+namespace abs_hil::runtime {
+
+/// Locks all memory of this process, present and future.
+[[nodiscard]] RealtimeStep lock_memory();
+/// Lets the heap grow once, keep what it has and be in memory.
+[[nodiscard]] RealtimeStep prefault_heap();
+/// Touches the part of the calling thread's stack that a cycle may use.
+[[nodiscard]] RealtimeStep prefault_stack();
+
+}  // namespace abs_hil::runtime
