@@ -21,6 +21,7 @@ MAY_KNOW = {
     'experiment': {'rig', 'control', 'driver', 'runtime', 'plant_sim'},
     'telemetry': {'rig', 'lcmtypes'},
     'analysis': {'rig'},
+    'diagnosis': {'rig', 'driver', 'runtime', 'telemetry'},
     'settings': {'rig', 'control', 'plant_sim', 'driver', 'runtime', 'experiment'},
 }
 # room -> libraries that are none of its business

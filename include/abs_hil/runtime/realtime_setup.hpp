@@ -24,8 +24,8 @@ struct RealtimeStep {
   bool obtained{false};
   /// Whether real time depends on it. What is merely helpful (C-states, timer slack) is reported, not required.
   bool required{true};
-  std::string detail;  ///< what was observed
-  std::string fix;     ///< the commands that mend it, one a line; empty if obtained
+  std::string detail{};  ///< what was observed
+  std::string fix{};     ///< the commands that mend it, one a line; empty if obtained
 };
 
 /// Result of setting up this process and the calling thread for real time.

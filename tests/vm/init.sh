@@ -1,0 +1,36 @@
+#!/bin/busybox sh
+# First process of the virtual machine: shows the host's files, read-only under a scratch layer, runs /command in them
+# and ends the machine. Output goes to the second serial line, the exit status to the first.
+export PATH=/bin:/sbin:/usr/bin:/usr/sbin
+mount -t devtmpfs dev /dev
+mount -t proc proc /proc
+mount -t sysfs sys /sys
+for module in $(cat /modules-to-load); do modprobe "$module" || echo "modprobe $module failed"; done
+
+mkdir -p /host /scratch /root
+mount -t tmpfs scratch /scratch
+mkdir /scratch/upper /scratch/work
+mount -t 9p -o trans=virtio,version=9p2000.L,ro,msize=262144,cache=loose host /host || echo "9p: no host files"
+mount -t overlay -o lowerdir=/host,upperdir=/scratch/upper,workdir=/scratch/work root /root
+for folder in proc sys dev; do mkdir -p /root/$folder; mount -o bind /$folder /root/$folder; done
+mkdir -p /root/dev/shm /root/dev/pts /root/run
+mount -t tmpfs shm /root/dev/shm
+mount -t devpts pts /root/dev/pts
+mount -t tmpfs run /root/run
+version=$(uname -r)
+mkdir -p "/root/lib/modules/$version"
+mount -o bind "/lib/modules/$version" "/root/lib/modules/$version"
+if grep -q with_out_folder /proc/cmdline; then
+  mkdir -p /root/out
+  mount -t 9p -o trans=virtio,version=9p2000.L,msize=262144 out /root/out
+fi
+ip link set lo up
+
+cp /command /root/run/command
+stty -F /dev/ttyS1 raw -echo
+setsid chroot /root /bin/bash /run/command >/dev/ttyS1 2>&1 </dev/null
+status=$?
+sync
+echo "vm-exit $status" >/dev/ttyS0
+printf '\001' | dd of=/dev/port bs=1 seek=244 2>/dev/null # QEMU's isa-debug-exit ends the machine at once
+poweroff -f
