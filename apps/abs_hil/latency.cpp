@@ -16,7 +16,8 @@
 namespace abs_hil::app {
 
 int latency(const RunRequest& request, double duration_s, bool json) {
-  const settings::Settings& s = request.settings;
+  settings::Settings s = request.settings;
+  s.experiment.start_speed_rad_s = experiment::timing_load_start_speed_rad_s;
   std::optional<runtime::HistogramFile> histogram;
   try {
     if (request.outputs.histogram_file) histogram.emplace(*request.outputs.histogram_file);

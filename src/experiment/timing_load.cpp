@@ -10,7 +10,7 @@ namespace {
 
 constexpr double longest_s = 86'400.0;
 constexpr double accelerate_s = 1.0;
-constexpr double brake_s = 0.5;
+constexpr double brake_s = 0.3;
 
 PhasePlan timed(rig::Phase phase, double duration_s) {
   constexpr double slack_s = 1.0;

@@ -11,7 +11,8 @@
 # Status 125: the machine ended without a status; its console is on stderr.
 set -euo pipefail
 here=$(dirname "$(realpath "$0")")
-PATH=$PATH:/sbin:/usr/sbin
+PATH=$PATH:/usr/sbin:/sbin  # modprobe, depmod
+
 
 modules='' out='' cpus=2 memory=1G limit_s=120 accelerator='tcg,thread=multi' boot_arguments=''
 qemu_arguments=()

@@ -9,9 +9,18 @@
 
 namespace abs_hil::runtime {
 
+/// The memory that a ring works on. Tests put a model in its place that plays through every interleaving and every
+/// value a load may return.
+struct NativeMemory {
+  template <typename T>
+  using Atomic = std::atomic<T>;
+  template <typename T>
+  using Slot = T;
+};
+
 /// Bounded queue from one producer thread to one consumer thread. A full ring drops the new element and counts it: the
 /// producer, the real-time thread, never waits. `push` is real-time safe: no lock, allocation or system call.
-template <typename T>
+template <typename T, typename Memory = NativeMemory>
 class SpscRing {
   static_assert(std::is_trivially_copyable_v<T>, "elements are copied without running code of theirs");
 
@@ -52,13 +61,15 @@ class SpscRing {
     return static_cast<std::size_t>(position) & (slots_.size() - 1);
   }
 
+  using Counter = typename Memory::template Atomic<std::uint64_t>;
+
   static constexpr std::size_t cache_line = 64;
-  std::vector<T> slots_;
+  std::vector<typename Memory::template Slot<T>> slots_;
   // Producer and consumer write to lines of their own, so that neither slows the other down.
-  alignas(cache_line) std::atomic<std::uint64_t> tail_{0};
+  alignas(cache_line) Counter tail_{0};
   std::uint64_t known_head_{0};  ///< producer's last look at head_
-  std::atomic<std::uint64_t> drops_{0};
-  alignas(cache_line) std::atomic<std::uint64_t> head_{0};
+  Counter drops_{0};
+  alignas(cache_line) Counter head_{0};
 };
 
 }  // namespace abs_hil::runtime

@@ -1,0 +1,60 @@
+// What callgrind counts the instructions of: one function for each thing that has a budget (instruction_budget.py).
+
+#include <cstdlib>
+#include <memory>
+
+#include "abs_hil/driver/sim/sim_driver.hpp"
+#include "abs_hil/runtime/cyclic_executive.hpp"
+#include "experiment/simulated_run.hpp"
+
+using namespace abs_hil;
+
+extern "C" {
+
+/// Both speed observers, sequence, adaptive controller, actuator, then the gate: the control part of a cycle.
+[[gnu::noinline]] runtime::GateResult counted_control(experiment::RunLogic& logic, runtime::CommandGate& gate,
+                                                      const rig::Measurement& measurement, rig::CycleRecord& record) {
+  const rig::Command wanted = logic.step(measurement, record);
+  const runtime::GateResult gated = gate.check(wanted, record.control.speeds_est);
+  logic.commanded(gated.command);
+  return gated;
+}
+
+[[gnu::noinline]] bool counted_ring_push(runtime::RecordRing& ring, const rig::CycleRecord& record) {
+  return ring.push(record);
+}
+
+[[gnu::noinline]] void counted_statistics(runtime::CycleStatistics& statistics, const rig::CycleTiming& timing) {
+  statistics.add(timing);
+}
+
+}  // extern "C"
+
+/// Brakes from 170 rad/s under slip control; prints in how many cycles.
+int main() {
+  const experiment::test::Setup setup = experiment::test::braking("adaptive");
+  driver::SimDriver driver(setup.plant, {.seed = 1, .start_speed_rad_s = setup.experiment.start_speed_rad_s});
+  driver.configure();
+  driver.activate(0);
+  experiment::RunLogic logic(experiment::test::logic_parts(setup));
+  runtime::CommandGate gate(setup.gate);
+  runtime::RecordRing ring(64);
+  const auto statistics = std::make_unique<runtime::CycleStatistics>();
+
+  rig::Measurement measurement;
+  rig::CycleRecord record, taken;
+  int cycles = 0;
+  for (bool braking = true; braking; ++cycles) {
+    record = {};
+    if (!driver.read(cycles * std::int64_t{1'000'000}, measurement).ok()) return EXIT_FAILURE;
+    const runtime::GateResult gated = counted_control(logic, gate, measurement, record);
+    if (!driver.write(gated.command).ok()) return EXIT_FAILURE;
+    braking = record.phase == rig::Phase::brake;
+    record.timing = {.wakeup_latency_ns = 20'000, .read_ns = 3'000, .control_ns = 1'000, .write_ns = 500};
+    counted_statistics(*statistics, record.timing);
+    if (!counted_ring_push(ring, record)) return EXIT_FAILURE;
+    ring.pop(taken);
+  }
+  std::printf("%d\n", cycles);
+  return cycles > 2'000 ? EXIT_SUCCESS : EXIT_FAILURE;
+}

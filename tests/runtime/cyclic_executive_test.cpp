@@ -1,0 +1,125 @@
+#include "abs_hil/runtime/cyclic_executive.hpp"
+
+#include "catch.hpp"
+#include "scripted_parts.hpp"
+
+using namespace abs_hil;
+using namespace abs_hil::runtime;
+using namespace abs_hil::runtime::test;
+
+TEST_CASE("cycles in time are on absolute ticks, whatever they take") {
+  Bench bench;
+  for (int i = 0; i < 100; ++i) {
+    REQUIRE(bench.cycle({.wakeup_ns = i % 7 * 10 * us, .read_ns = i % 5 * 50 * us, .control_ns = i % 3 * 100 * us}));
+  }
+  for (std::size_t i = 1; i < bench.clock.asked_ns.size(); ++i) {
+    CHECK(bench.clock.asked_ns[i] - bench.clock.asked_ns[0] == static_cast<std::int64_t>(i) * ms);
+  }
+  CHECK(bench.executive.statistics().cycles() == 100);
+  CHECK(bench.executive.statistics().overruns().total == 0);
+}
+
+TEST_CASE("every part of a cycle is timed") {
+  Bench bench;
+  bench.cycle({.wakeup_ns = 11 * us, .read_ns = 22 * us, .control_ns = 33 * us, .write_ns = 44 * us});
+  const rig::CycleTiming timing = bench.record().timing;
+  CHECK(timing.wakeup_latency_ns == 11 * us);
+  CHECK(timing.read_ns == 22 * us);
+  CHECK(timing.control_ns == 33 * us);
+  CHECK(timing.write_ns == 44 * us);
+  CHECK(timing.cycle_ns == 99 * us);
+  const rig::TimingSummary summary = bench.executive.statistics().summary();
+  CHECK(summary.wakeup_latency.max_us == 11.0);
+  CHECK(summary.read.max_us == 22.0);
+  CHECK(summary.control.max_us == 33.0);
+  CHECK(summary.write.max_us == 44.0);
+  CHECK(summary.cycle_time.max_us == 99.0);
+}
+
+TEST_CASE("records carry the time since the start and consecutive numbers") {
+  Bench bench;
+  for (int i = 0; i < 3; ++i) bench.cycle();
+  for (std::uint64_t i = 0; i < 3; ++i) {
+    const rig::CycleRecord record = bench.record();
+    CHECK(record.sequence == i);
+    CHECK_THAT(record.time_s, Catch::Matchers::WithinAbs(1e-3 * static_cast<double>(i), 1e-12));
+    CHECK(record.command.brake_duty == 0.5);
+  }
+}
+
+TEST_CASE("a stop request ends the run at the next cycle with the safe command; the first reason stays") {
+  Bench bench;
+  REQUIRE(bench.cycle());
+  bench.executive.request_stop(rig::Reason::interrupt_signal);
+  bench.executive.request_stop(rig::Reason::stop_command);
+  CHECK_FALSE(bench.cycle());
+  CHECK(bench.logic.ended_by == rig::Reason::interrupt_signal);
+  CHECK(bench.driver.written.back().brake_duty == 0.0);
+}
+
+TEST_CASE("a failed read latches a fault in the same cycle") {
+  Bench bench;
+  REQUIRE(bench.cycle());
+  bench.driver.read_result = {driver::IoError::no_answer, 0x54};
+  CHECK_FALSE(bench.cycle());
+  CHECK(bench.gate.fault() == rig::Reason::driver_read_failed);
+  CHECK(bench.driver.written.back().brake_duty == 0.0);
+  CHECK(bench.executive.io_error().error == driver::IoError::no_answer);
+  CHECK(bench.executive.io_error().where == 0x54U);
+}
+
+TEST_CASE("a tripped interlock of the board latches a fault") {
+  Bench bench;
+  REQUIRE(bench.cycle());
+  bench.driver.trip_flags = 2;
+  CHECK_FALSE(bench.cycle());
+  CHECK(bench.gate.fault() == rig::Reason::board_interlock_tripped);
+  CHECK(bench.gate.fault_value() == 2.0);
+}
+
+TEST_CASE("a failed write latches a fault, makes the board safe and ends the run") {
+  Bench bench;
+  REQUIRE(bench.cycle());
+  bench.driver.write_result = {driver::IoError::read_back_mismatch, 0x6C};
+  REQUIRE(bench.cycle());  // the write is this cycle's last act: the next one is the run's last
+  CHECK(bench.driver.made_safe == 1);
+  CHECK(bench.gate.fault() == rig::Reason::driver_write_failed);
+  CHECK_FALSE(bench.cycle());
+  CHECK(bench.logic.ended_by == rig::Reason::driver_write_failed);
+}
+
+TEST_CASE("a full ring drops records, counts them and delays nothing") {
+  Bench bench({.startup_cycles = 0, .max_consecutive = 0}, 4);
+  for (int i = 0; i < 10; ++i) REQUIRE(bench.cycle());
+  CHECK(bench.ring.drops() == 6);
+  CHECK(bench.record().sequence == 0);
+  CHECK(bench.executive.statistics().cycles() == 10);
+}
+
+TEST_CASE("any rate from 100 Hz to 10 kHz keeps its period to the nanosecond") {
+  for (const std::int64_t period_ns : {10 * ms, 5 * ms, ms, 200 * us, 100 * us}) {
+    Bench bench;
+    CyclicExecutive executive(bench.clock, bench.driver, bench.logic, bench.gate, bench.ring, period_ns);
+    bench.clock.asked_ns.clear();
+    for (int i = 0; i < 1000; ++i) executive.step();
+    CHECK(bench.clock.asked_ns.back() - bench.clock.asked_ns.front() == 999 * period_ns);
+  }
+}
+
+TEST_CASE("virtual time passes by sleeping alone") {
+  VirtualClock clock;
+  clock.sleep_until(5 * ms);
+  CHECK(clock.now_ns() == 5 * ms);
+  clock.sleep_until(3 * ms);
+  CHECK(clock.now_ns() == 5 * ms);
+}
+
+TEST_CASE("the monotonic clock never wakes early and returns at once for the past") {
+  MonotonicClock clock;
+  for (int i = 0; i < 20; ++i) {
+    const std::int64_t until_ns = clock.now_ns() + 200 * us;
+    clock.sleep_until(until_ns);
+    CHECK(clock.now_ns() >= until_ns);
+  }
+  clock.sleep_until(0);
+}

@@ -1,0 +1,163 @@
+// Cycles that are late: whole periods are skipped, the phase stays, the part to blame is named, too many are a fault.
+
+#include <vector>
+
+#include "abs_hil/runtime/cyclic_executive.hpp"
+#include "abs_hil/runtime/overrun_reporter.hpp"
+#include "catch.hpp"
+#include "scripted_parts.hpp"
+
+using namespace abs_hil;
+using namespace abs_hil::runtime;
+using namespace abs_hil::runtime::test;
+
+TEST_CASE("a late cycle skips whole periods, keeps the phase and is not caught up with") {
+  Bench bench;
+  bench.cycle();
+  bench.cycle({.read_ns = 3'400 * us});  // from tick 1 into the period of tick 4
+  bench.cycle();
+  bench.cycle();
+  const std::vector<std::int64_t>& asked = bench.clock.asked_ns;
+  CHECK(asked[2] - asked[0] == 5 * ms);
+  CHECK(asked[3] - asked[0] == 6 * ms);
+  const rig::OverrunCounts counts = bench.executive.statistics().overruns();
+  CHECK(counts.total == 1);
+  CHECK(counts.ticks_missed == 3);
+  bench.record();
+  CHECK(bench.record().timing.periods_skipped == 0);
+  const rig::CycleRecord after = bench.record();
+  CHECK(after.timing.periods_skipped == 3);
+  CHECK(after.timing.overrun_cause == rig::OverrunCause::read);
+  CHECK(bench.record().timing.periods_skipped == 0);
+}
+
+TEST_CASE("a cycle that ends exactly at the next tick is late, one that ends a nanosecond before is not") {
+  Bench bench;
+  bench.cycle({.control_ns = ms - 1});
+  CHECK(bench.executive.statistics().overruns().total == 0);
+  bench.cycle({.control_ns = ms});
+  CHECK(bench.executive.statistics().overruns().total == 1);
+  CHECK(bench.executive.statistics().overruns().ticks_missed == 1);
+}
+
+TEST_CASE("a late cycle is put down to the part that took longest") {
+  struct Case {
+    CycleScript script;
+    rig::OverrunCause cause;
+  };
+  const std::vector<Case> cases{
+      {{.wakeup_ns = 900 * us, .read_ns = 200 * us}, rig::OverrunCause::wakeup},
+      {{.wakeup_ns = 100 * us, .read_ns = 950 * us}, rig::OverrunCause::read},
+      {{.read_ns = 400 * us, .control_ns = 700 * us}, rig::OverrunCause::control},
+      {{.control_ns = 300 * us, .write_ns = 800 * us}, rig::OverrunCause::write},
+  };
+  Bench bench;
+  for (const Case& c : cases) {
+    bench.cycle(c.script);
+    CHECK(bench.executive.statistics().overruns().of(c.cause) == 1);
+  }
+  CHECK(bench.executive.statistics().overruns().total == cases.size());
+}
+
+namespace {
+/// Time passes when the clock is asked for it after the write: as if the ring or the statistics had been slow.
+class SlowRecordingClock final : public Clock {
+ public:
+  [[nodiscard]] std::int64_t now_ns() noexcept override {
+    constexpr int asked_after_recording = 5;  // wake-up, read, control, write, then this
+    if (sleeps == 2 && ++asked == asked_after_recording) time_ns += 1'500 * us;
+    return time_ns;
+  }
+  void sleep_until(std::int64_t until_ns) noexcept override {
+    ++sleeps;
+    time_ns = std::max(time_ns, until_ns);
+  }
+  std::int64_t time_ns{0};
+  int sleeps{0};
+  int asked{0};
+};
+}  // namespace
+
+TEST_CASE("slow recording is named too, in the record that follows") {
+  Bench bench;
+  SlowRecordingClock clock;
+  CyclicExecutive executive(clock, bench.driver, bench.logic, bench.gate, bench.ring, ms,
+                            {.startup_cycles = 0, .max_consecutive = 0});
+  for (int i = 0; i < 3; ++i) executive.step();
+  CHECK(executive.statistics().overruns().of(rig::OverrunCause::record) == 1);
+  bench.record();
+  bench.record();
+  const rig::CycleRecord after = bench.record();
+  CHECK(after.timing.record_ns == 1'500 * us);
+  CHECK(after.timing.overrun_cause == rig::OverrunCause::record);
+}
+
+TEST_CASE("start-up cycles are neither counted as late nor measured") {
+  Bench bench({.startup_cycles = 3, .max_consecutive = 1});
+  for (int i = 0; i < 3; ++i) REQUIRE(bench.cycle({.read_ns = 5 * ms}));
+  REQUIRE(bench.cycle({.read_ns = 10 * us}));
+  const rig::OverrunCounts counts = bench.executive.statistics().overruns();
+  CHECK(counts.total == 0);
+  CHECK(counts.startup == 3);
+  CHECK(bench.executive.statistics().read().count() == 1);
+  CHECK(bench.executive.statistics().read().max_ns() == 10 * us);
+  CHECK(bench.gate.fault() == rig::Reason::none);
+
+  REQUIRE(bench.cycle({.read_ns = 5 * ms}));  // the fourth-but-one is not start-up any more
+  CHECK(bench.executive.statistics().overruns().total == 1);
+}
+
+TEST_CASE("so many late cycles in a row latch a fault; one in time between them starts the count again") {
+  Bench bench({.startup_cycles = 0, .max_consecutive = 3});
+  const CycleScript late{.control_ns = 1'200 * us};
+  REQUIRE(bench.cycle(late));
+  REQUIRE(bench.cycle(late));
+  REQUIRE(bench.cycle());
+  REQUIRE(bench.cycle(late));
+  REQUIRE(bench.cycle(late));
+  CHECK(bench.gate.fault() == rig::Reason::none);
+  REQUIRE(bench.cycle(late));
+  CHECK(bench.gate.fault() == rig::Reason::consecutive_overruns);
+  CHECK(bench.gate.fault_value() == 3.0);
+  CHECK_FALSE(bench.cycle());
+  CHECK(bench.logic.ended_by == rig::Reason::consecutive_overruns);
+  CHECK(bench.driver.written.back().brake_duty == 0.0);
+  CHECK(bench.executive.statistics().overruns().longest_run == 3);
+}
+
+TEST_CASE("with a limit of 0 late cycles never end the run") {
+  Bench bench;
+  for (int i = 0; i < 1000; ++i) REQUIRE(bench.cycle({.control_ns = 1'200 * us}));
+  CHECK(bench.gate.fault() == rig::Reason::none);
+  CHECK(bench.executive.statistics().overruns().longest_run == 1000);
+}
+
+TEST_CASE("late cycles are told of once a second at most, with the latest part by part") {
+  Bench bench;
+  OverrunReporter reporter(ms);
+  int messages = 0;
+  std::string last;
+  for (int i = 0; i < 2'500; ++i) {
+    // Every second cycle is late, so that 2,500 cycles last 3.75 s.
+    bench.cycle(i % 2 == 0 ? CycleScript{.wakeup_ns = 20 * us, .read_ns = 1'300 * us} : CycleScript{});
+    reporter.consume(bench.record(), 0.0);
+    if (const auto message = reporter.message(bench.executive.statistics().overruns())) {
+      ++messages;
+      last = *message;
+    }
+  }
+  CHECK(messages == 4);
+  CHECK(bench.executive.statistics().overruns().total == 1'250);
+  CHECK(last.find("because of read: expected 1000 us, woke 20 us late, read 1300") != std::string::npos);
+  CHECK(std::stoul(last) >= 999);  // the count it begins with is unthrottled: late every 3 ms for 3 s
+}
+
+TEST_CASE("without late cycles there is nothing to tell") {
+  Bench bench;
+  OverrunReporter reporter(ms);
+  for (int i = 0; i < 100; ++i) {
+    bench.cycle();
+    reporter.consume(bench.record(), 0.0);
+    CHECK_FALSE(reporter.message(bench.executive.statistics().overruns()));
+  }
+}

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <utility>
+
+#include "experiment/simulated_run.hpp"
+
+namespace abs_hil::runtime::test {
+
+/// Commits an offence in one cycle, to show that a proof would find it.
+class PlantedLogic final : public CycleLogic {
+ public:
+  using Offence = void (*)();
+  PlantedLogic(CycleLogic& inner, Offence offence, int in_cycle)
+      : inner_(inner), offence_(offence), cycles_left_(in_cycle) {}
+
+  [[nodiscard]] rig::Command step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept override {
+    if (offence_ != nullptr && cycles_left_-- == 0) offence_();
+    return inner_.step(measurement, record);
+  }
+  void commanded(const rig::Command& command) noexcept override { inner_.commanded(command); }
+  void end_early(rig::Reason reason, double value) noexcept override { inner_.end_early(reason, value); }
+  [[nodiscard]] bool finished() const noexcept override { return inner_.finished(); }
+
+ private:
+  CycleLogic& inner_;
+  Offence offence_;
+  int cycles_left_;
+};
+
+/// A whole experiment's cycle on the simulated rig, step by step, with nothing but the cycle's own thread: what the
+/// real-time thread runs.
+class WatchedRun {
+ public:
+  static constexpr int offence_cycle = 500;
+
+  WatchedRun(Clock& clock, const std::string& controller, double rate_Hz, double start_speed_rad_s,
+             PlantedLogic::Offence offence = nullptr)
+      : setup_(setup(controller, rate_Hz, start_speed_rad_s)),
+        driver_(setup_.plant, {.seed = 1, .start_speed_rad_s = start_speed_rad_s}),
+        logic_(experiment::test::logic_parts(setup_)),
+        planted_(logic_, offence, offence_cycle),
+        gate_(setup_.gate),
+        ring_(1024),  // full after so many cycles: dropping is part of what is proven
+        executive_(clock, driver_, planted_, gate_, ring_, static_cast<std::int64_t>(1e9 / rate_Hz)) {
+    driver_.configure();
+    driver_.activate(clock.now_ns());
+  }
+  /// False after the run's last cycle.
+  bool cycle() noexcept { return executive_.step(); }
+  [[nodiscard]] std::uint64_t cycles() const { return executive_.statistics().cycles(); }
+  [[nodiscard]] rig::Reason end_reason() const { return logic_.end_reason(); }
+
+ private:
+  static experiment::test::Setup setup(const std::string& controller, double rate_Hz, double start_speed_rad_s) {
+    experiment::test::Setup s;
+    s.control.controller = controller;
+    s.control.rate_Hz = rate_Hz;
+    s.experiment.start_speed_rad_s = start_speed_rad_s;
+    return s;
+  }
+
+  experiment::test::Setup setup_;
+  driver::SimDriver driver_;
+  experiment::RunLogic logic_;
+  PlantedLogic planted_;
+  CommandGate gate_;
+  RecordRing ring_;
+  CyclicExecutive executive_;
+};
+
+/// Every controller that `abs_hil list` shows.
+inline std::vector<std::string> all_controllers() {
+  std::vector<std::string> names;
+  for (const auto& entry : control::controllers()) names.emplace_back(entry.name);
+  return names;
+}
+
+}  // namespace abs_hil::runtime::test

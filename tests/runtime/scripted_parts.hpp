@@ -1,0 +1,139 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "abs_hil/driver/rig_driver.hpp"
+#include "abs_hil/runtime/clock.hpp"
+#include "abs_hil/runtime/command_gate.hpp"
+#include "abs_hil/runtime/cycle_logic.hpp"
+#include "abs_hil/runtime/cyclic_executive.hpp"
+
+namespace abs_hil::runtime::test {
+
+inline constexpr std::int64_t us = 1'000;
+inline constexpr std::int64_t ms = 1'000'000;
+
+/// How long each part of one cycle takes.
+struct CycleScript {
+  std::int64_t wakeup_ns{0};
+  std::int64_t read_ns{0};
+  std::int64_t control_ns{0};
+  std::int64_t write_ns{0};
+};
+
+/// Time that passes as told: late wake-ups, and whatever the parts of a cycle take.
+class ScriptedClock final : public Clock {
+ public:
+  [[nodiscard]] std::int64_t now_ns() noexcept override { return time_ns_; }
+  void sleep_until(std::int64_t time_ns) noexcept override {
+    asked_ns.push_back(time_ns);
+    time_ns_ = std::max(time_ns_, time_ns) + wakeup_ns;
+  }
+  void pass(std::int64_t duration_ns) noexcept { time_ns_ += duration_ns; }
+
+  std::int64_t wakeup_ns{0};
+  std::vector<std::int64_t> asked_ns;  ///< every wake-up time asked for
+
+ private:
+  std::int64_t time_ns_{1'000 * ms};
+};
+
+/// A driver that answers what it is told to, after the time it is told to take.
+class ScriptedDriver final : public driver::RigDriver {
+ public:
+  explicit ScriptedDriver(ScriptedClock& clock) : clock_(clock) {
+    configure();
+    activate(0);
+  }
+  ~ScriptedDriver() override { static_cast<void>(deactivate()); }
+  [[nodiscard]] std::string_view name() const noexcept override { return "scripted"; }
+
+  CycleScript script{};
+  driver::IoResult read_result{};
+  driver::IoResult write_result{};
+  std::uint32_t trip_flags{0};
+  std::vector<rig::Command> written;
+  int made_safe{0};
+
+ private:
+  void do_configure() override {}
+  void do_activate(std::int64_t) override {}
+  driver::IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override {
+    clock_.pass(script.read_ns);
+    measurement.time_ns = now_ns;
+    measurement.trip_flags = trip_flags;
+    return read_result;
+  }
+  driver::IoResult do_write(const rig::Command& command) noexcept override {
+    clock_.pass(script.write_ns);
+    written.push_back(command);
+    return write_result;
+  }
+  driver::IoResult do_make_safe() noexcept override {
+    ++made_safe;
+    return {};
+  }
+
+  ScriptedClock& clock_;
+};
+
+/// Asks for the same command in every cycle; ends as the sequence would: one last cycle with the safe command.
+class ScriptedLogic final : public CycleLogic {
+ public:
+  explicit ScriptedLogic(ScriptedClock& clock) : clock_(clock) {}
+
+  [[nodiscard]] rig::Command step(const rig::Measurement&, rig::CycleRecord& record) noexcept override {
+    clock_.pass(script.control_ns);
+    finished_ = ended_by != rig::Reason::none;
+    record.phase = finished_ ? rig::Phase::fault : rig::Phase::brake;
+    record.reason = ended_by;
+    return finished_ ? rig::safe_command : wanted;
+  }
+  void commanded(const rig::Command& command) noexcept override { last = command; }
+  void end_early(rig::Reason reason, double value) noexcept override {
+    if (ended_by != rig::Reason::none) return;
+    ended_by = reason;
+    ended_value = value;
+  }
+  [[nodiscard]] bool finished() const noexcept override { return finished_; }
+
+  CycleScript script{};
+  rig::Command wanted{.brake_duty = 0.5};
+  rig::Command last{};
+  rig::Reason ended_by{rig::Reason::none};
+  double ended_value{0.0};
+
+ private:
+  ScriptedClock& clock_;
+  bool finished_{false};
+};
+
+/// An executive on scripted parts, at 1 kHz.
+struct Bench {
+  explicit Bench(const OverrunOptions& overruns = {.startup_cycles = 0, .max_consecutive = 0},
+                 std::size_t ring_capacity = 1024)
+      : ring(ring_capacity), executive(clock, driver, logic, gate, ring, ms, overruns) {}
+
+  bool cycle(const CycleScript& script = {}) {
+    clock.wakeup_ns = script.wakeup_ns;
+    driver.script = script;
+    logic.script = script;
+    return executive.step();
+  }
+  rig::CycleRecord record() {
+    rig::CycleRecord record;
+    ring.pop(record);
+    return record;
+  }
+
+  ScriptedClock clock{};
+  ScriptedDriver driver{clock};
+  ScriptedLogic logic{clock};
+  CommandGate gate{GateOptions{}};
+  RecordRing ring;
+  CyclicExecutive executive;
+};
+
+}  // namespace abs_hil::runtime::test
