@@ -51,7 +51,7 @@ Explorer::Verdict play_all(int pushes, int pops, Explorer::Weakened weakened = E
 }  // namespace
 
 TEST_CASE("no interleaving loses, repeats, reorders or tears an element") {
-  for (const auto& [pushes, pops] : {std::pair{2, 2}, std::pair{3, 2}, std::pair{4, 3}, std::pair{5, 3}}) {
+  for (const auto& [pushes, pops] : {std::pair{2, 2}, std::pair{3, 2}, std::pair{4, 3}}) {
     const Explorer::Verdict verdict = play_all(pushes, pops);
     CAPTURE(pushes, pops, verdict.executions);
     CHECK(verdict.races == 0);

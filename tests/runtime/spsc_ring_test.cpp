@@ -32,7 +32,7 @@ TEST_CASE("in one thread the ring behaves as a bounded queue that drops the newe
   std::deque<int> model;
   std::uint64_t drops = 0;
   std::mt19937 random(1);
-  for (int i = 0; i < 100'000; ++i) {
+  for (int i = 0; i < 20'000; ++i) {
     if (random() % 2 == 0) {
       const bool fits = model.size() < ring.capacity();
       REQUIRE(ring.push(i) == fits);
