@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# Installs the Debian packages of scripts/packages.txt that are not there yet. Harmless when repeated.
+# setup.sh [LIST]: installs the Debian packages of scripts/LIST (packages.txt, or packages-vm.txt for the tests in a
+# virtual machine) that are not there yet. Harmless when repeated.
 set -euo pipefail
 here=$(dirname "$(realpath "$0")")
 
-mapfile -t wanted < <(sed 's/#.*//; s/[[:space:]]*$//; /^$/d' "$here/packages.txt")
+mapfile -t wanted < <(sed 's/#.*//; s/[[:space:]]*$//; /^$/d' "$here/${1:-packages.txt}")
 missing=()
 for package in "${wanted[@]}"; do
   [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)" = installed ] || missing+=("$package")

@@ -1,10 +1,12 @@
 #!/usr/bin/env bash
-# The tests: sets up, builds and runs ctest on one preset (default: release); further arguments go to ctest.
+# The tests: sets up, builds and runs ctest on one preset (default: release); further arguments go to ctest. Where
+# CI=true or ABS_HIL_REQUIRE_VM=1 the tests in a virtual machine must not be skipped, and what they need is installed.
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
 
 preset=${1:-release}
 [ $# -gt 0 ] && shift
 scripts/setup.sh
+if [ "${CI:-}" = true ] || [ "${ABS_HIL_REQUIRE_VM:-}" = 1 ]; then scripts/setup.sh packages-vm.txt; fi
 scripts/build.sh "$preset"
 ctest --preset "$preset" -j "$(nproc)" "$@"

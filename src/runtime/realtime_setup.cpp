@@ -123,10 +123,10 @@ RealtimeScope::~RealtimeScope() {
 void RealtimeScope::hold_cpu_latency() {
   constexpr const char* device = "/dev/cpu_dma_latency";
   RealtimeStep step{.what = std::string(device) + " held at 0", .required = false};
+  errno = 0;
   cpu_latency_file_ = ::open(device, O_RDWR | O_CLOEXEC);
   constexpr std::int32_t none_us = 0;
   std::int32_t got_us = -1;
-  errno = 0;
   const bool written = cpu_latency_file_ >= 0 && ::write(cpu_latency_file_, &none_us, sizeof none_us) == sizeof none_us;
   const int error = errno;
   step.obtained = written && ::pread(cpu_latency_file_, &got_us, sizeof got_us, 0) == sizeof got_us && got_us == 0;

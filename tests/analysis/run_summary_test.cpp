@@ -35,6 +35,28 @@ TEST_CASE("the summary has the fields that scripts rely on, and null for what is
   for (const char* quantile : {"p50", "p99", "p99_9", "max"}) CHECK(json["wakeup_latency_us"].contains(quantile));
 }
 
+TEST_CASE("every part of the cycle has its quantiles, and late cycles their causes") {
+  RunSummary summary;
+  summary.realtime = true;
+  summary.telemetry_drops = 3;
+  summary.timing.read = {1.0, 2.0, 3.0, 4.0};
+  summary.timing.overruns = {
+      .total = 15, .startup = 6, .ticks_missed = 40, .longest_run = 7, .by_cause = {0, 1, 2, 3, 4, 5}};
+  const auto json = to_json(summary);
+  for (const char* part : {"wakeup_latency_us", "read_us", "control_us", "write_us", "cycle_time_us"}) {
+    for (const char* quantile : {"p50", "p99", "p99_9", "max"}) CHECK(json[part].contains(quantile));
+  }
+  CHECK(json["read_us"]["p99_9"] == 3.0);
+  CHECK(json["overruns"] == 15);
+  CHECK(json["overruns_by_cause"].dump() == R"({"wakeup":1,"read":2,"control":3,"write":4,"record":5})");
+  CHECK(json["overruns_startup"] == 6);
+  CHECK(json["overruns_longest_run"] == 7);
+  CHECK(json["ticks_missed"] == 40);
+  CHECK(json["telemetry_drops"] == 3);
+  CHECK_THAT(to_text(summary),
+             Contains("control 3") && Contains("at most 7 in a row") && Contains("3 records dropped"));
+}
+
 TEST_CASE("the text says when real time was not obtained and when there is no truth") {
   RunSummary summary;
   CHECK_THAT(to_text(summary), Contains("NOT obtained") && Contains("estimates"));

@@ -23,6 +23,7 @@ try without_capabilities "$scratch/abs_hil" "${run[@]}" --rt require --csv "$scr
 says 'not obtained: SCHED_FIFO priority 80: Operation not permitted (RLIMIT_RTPRIO'
 says 'not obtained: memory locked (mlockall)'
 says 'rtprio 98'
+! grep -q ': Success' "$scratch/err" || fail 'a reason is an errno read too late'
 says '/etc/security/limits.d/'
 says "setcap cap_sys_nice,cap_ipc_lock+ep $scratch/abs_hil"
 [ "$(wc -l <"$scratch/require.csv")" -le 1 ] || fail 'cycles ran although real time was required'

@@ -33,6 +33,7 @@ TEST_CASE("every step says what was observed, and how to mend what failed") {
   for (const RealtimeStep& step : report.steps) {
     CAPTURE(step.what);
     CHECK_FALSE(step.detail.empty());
+    CHECK(step.detail != "Success");  // an errno read too late
     CHECK(step.obtained == step.fix.empty());
   }
 }
