@@ -1,5 +1,6 @@
 // What callgrind counts the instructions of: one function for each thing that has a budget (instruction_budget.py).
 
+#include <cstdio>
 #include <cstdlib>
 #include <memory>
 
@@ -12,12 +13,11 @@ using namespace abs_hil;
 extern "C" {
 
 /// Both speed observers, sequence, adaptive controller, actuator, then the gate: the control part of a cycle.
-[[gnu::noinline]] runtime::GateResult counted_control(experiment::RunLogic& logic, runtime::CommandGate& gate,
-                                                      const rig::Measurement& measurement, rig::CycleRecord& record) {
+[[gnu::noinline]] void counted_control(experiment::RunLogic& logic, runtime::CommandGate& gate,
+                                       const rig::Measurement& measurement, rig::CycleRecord& record) {
   const rig::Command wanted = logic.step(measurement, record);
-  const runtime::GateResult gated = gate.check(wanted, record.control.speeds_est);
-  logic.commanded(gated.command);
-  return gated;
+  record.command = gate.check(wanted, record.control.speeds_est).command;
+  logic.commanded(record.command);
 }
 
 [[gnu::noinline]] bool counted_ring_push(runtime::RecordRing& ring, const rig::CycleRecord& record) {
@@ -47,8 +47,8 @@ int main() {
   for (bool braking = true; braking; ++cycles) {
     record = {};
     if (!driver.read(cycles * std::int64_t{1'000'000}, measurement).ok()) return EXIT_FAILURE;
-    const runtime::GateResult gated = counted_control(logic, gate, measurement, record);
-    if (!driver.write(gated.command).ok()) return EXIT_FAILURE;
+    counted_control(logic, gate, measurement, record);
+    if (!driver.write(record.command).ok()) return EXIT_FAILURE;
     braking = record.phase == rig::Phase::brake;
     record.timing = {.wakeup_latency_ns = 20'000, .read_ns = 3'000, .control_ns = 1'000, .write_ns = 500};
     counted_statistics(*statistics, record.timing);

@@ -76,6 +76,7 @@ RunOutcome RunSession::run_realtime(const runtime::RealtimeOptions& options, con
   std::promise<bool> go;
   std::atomic<bool> running{true};
   std::jthread cycle([&] {
+    runtime::keep_signals_away();
     const runtime::RealtimeScope realtime(options);
     set_up.set_value(realtime.report());
     if (go.get_future().get()) {

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstdint>
 #include <cstring>
 
@@ -100,6 +101,12 @@ std::string RealtimeReport::shortcomings() const {
     for (const char c : fix) text += c == '\n' ? std::string("\n    ") : std::string(1, c);
   }
   return text;
+}
+
+void keep_signals_away() noexcept {
+  sigset_t all;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, nullptr);  // cannot fail with these arguments
 }
 
 RealtimeScope::RealtimeScope(const RealtimeOptions& options) {

@@ -4,6 +4,7 @@
 #include <sched.h>
 
 #include <algorithm>
+#include <csignal>
 #include <thread>
 
 #include "catch.hpp"
@@ -66,6 +67,19 @@ TEST_CASE("the caller's own scheduling is left alone") {
   sched_param parameters{};
   pthread_getschedparam(pthread_self(), &policy, &parameters);
   CHECK(policy == SCHED_OTHER);
+}
+
+TEST_CASE("signals are kept away from the cycle's thread and left to the others") {
+  sigset_t cycle, other;
+  std::jthread([&] {
+    keep_signals_away();
+    pthread_sigmask(SIG_SETMASK, nullptr, &cycle);
+  }).join();
+  pthread_sigmask(SIG_SETMASK, nullptr, &other);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    CHECK(sigismember(&cycle, signal) == 1);
+    CHECK(sigismember(&other, signal) == 0);
+  }
 }
 
 TEST_CASE("what is merely helpful does not decide; fixes are told once") {

@@ -37,6 +37,9 @@ struct RealtimeReport {
   [[nodiscard]] std::string shortcomings() const;
 };
 
+/// Blocks all signals for the calling thread, so that another one runs their handlers.
+void keep_signals_away() noexcept;
+
 /// Real time for the thread that makes it, which is the one that will run the cycle; before its first one. Locks and
 /// prefaults memory (process), binds to a CPU, sets timer slack, SCHED_FIFO (thread) and keeps the CPUs out of deep
 /// C-states for as long as it lives; each step is read back. Never throws because of missing permissions: the report
