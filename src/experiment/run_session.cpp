@@ -10,8 +10,8 @@ namespace abs_hil::experiment {
 namespace {
 
 constexpr std::int64_t poll_interval_ns = 2'000'000;
-/// After this thread was held up it hands on what has gathered in bursts of this size: LCM's receivers queue 30 messages
-/// of a channel and drop the rest.
+/// After this thread was held up it hands on what has gathered in bursts of this size: LCM's receivers queue 30
+/// messages of a channel and drop the rest.
 constexpr std::size_t records_per_burst = 16;
 constexpr std::int64_t burst_interval_ns = 500'000;
 /// Records the ring holds: 0.8 s at 10 kHz, time enough for a slow disk.
@@ -45,8 +45,15 @@ RunSession::RunSession(runtime::Clock& clock, driver::RigDriver& driver, RunLogi
       logic_(std::move(parts)),
       gate_(gate_options),
       ring_(ring_capacity),
-      executive_(clock, driver, logic_, gate_, ring_, period_ns_for(parts.control.rate_Hz), overruns),
+      period_ns_(period_ns_for(parts.control.rate_Hz)),
+      executive_(clock, driver, logic_, gate_, ring_, period_ns_, overruns),
       pump_(ring_, parts.rig.wheels.r2_m, std::move(sinks)) {}
+
+std::int64_t RunSession::between_ticks(std::int64_t time_ns) const noexcept {
+  const rig::CycleRecord& latest = pump_.latest();
+  const std::int64_t tick_ns = latest.stamp_ns - latest.timing.wakeup_latency_ns;
+  return time_ns - (time_ns - tick_ns) % period_ns_ + period_ns_ / 2;
+}
 
 RunOutcome RunSession::outcome() const {
   return {.reason = logic_.end_reason(),
