@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "abs_hil/experiment/run_session.hpp"
@@ -13,9 +14,15 @@ int run(const RunRequest& request);
 int list(bool keys);
 /// `abs_hil doctor`: examines this computer, all of it or the one check named, and says how to mend what falls short.
 int doctor(const RunRequest& request, const std::string& only, bool json);
+/// What `abs_hil latency` takes beside a run's configuration.
+struct LatencyOptions {
+  double duration_s{10.0};
+  std::optional<int> second_offset_us{};  ///< begin at a whole second plus this
+  bool json{false};
+};
 /// `abs_hil latency`: runs the real cycle on the simulated rig for a while and judges how well this computer keeps
 /// time.
-int latency(const RunRequest& request, double duration_s, bool json);
+int latency(const RunRequest& request, const LatencyOptions& options);
 
 /// The exit status of a run that has ended so.
 [[nodiscard]] int status_of(const experiment::RunOutcome& outcome);

@@ -15,7 +15,7 @@
 
 namespace abs_hil::app {
 
-int latency(const RunRequest& request, double duration_s, bool json) {
+int latency(const RunRequest& request, const LatencyOptions& options) {
   settings::Settings s = request.settings;
   s.experiment.start_speed_rad_s = experiment::timing_load_start_speed_rad_s;
   std::optional<runtime::HistogramFile> histogram;
@@ -26,8 +26,9 @@ int latency(const RunRequest& request, double duration_s, bool json) {
   }
   const std::unique_ptr<driver::RigDriver> driver = make_driver(s);
   runtime::MonotonicClock clock;
-  experiment::RunSession session(clock, *driver, make_logic(s, experiment::plan_timing_load(duration_s)), s.gate, {},
-                                 s.realtime.overruns);
+  experiment::RunSession session(clock, *driver, make_logic(s, experiment::plan_timing_load(options.duration_s)),
+                                 s.gate, {}, s.realtime.overruns);
+  if (options.second_offset_us) session.align_to_second(std::int64_t{*options.second_offset_us} * 1000);
   note_signals();
   const diagnosis::MachineFacts facts = diagnosis::read_machine_facts();
   const experiment::RunOutcome outcome = session.run_realtime(s.realtime, signalled);
@@ -35,12 +36,12 @@ int latency(const RunRequest& request, double duration_s, bool json) {
 
   const runtime::CycleStatistics& statistics = session.executive().statistics();
   const diagnosis::LatencyRun run{.rate_Hz = s.control.rate_Hz,
-                                  .duration_s = duration_s,
+                                  .duration_s = options.duration_s,
                                   .cycles = statistics.cycles(),
                                   .realtime = outcome.realtime.realtime(),
                                   .timing = statistics.summary()};
   if (histogram) histogram->write(statistics);
-  fmt::print("{}", json ? to_json(run, facts).dump(2) + "\n" : to_text(run, facts));
+  fmt::print("{}", options.json ? to_json(run, facts).dump(2) + "\n" : to_text(run, facts));
   return status_of(outcome);
 }
 

@@ -76,8 +76,7 @@ void add_doctor(CLI::App& cli, DoctorCommand& command) {
 /// The command `abs_hil latency` as typed.
 struct LatencyCommand {
   app::RunOptions options{};
-  double duration_s{10.0};
-  bool json{false};
+  app::LatencyOptions latency{};
   CLI::App* parser{nullptr};
 };
 
@@ -85,8 +84,15 @@ void add_latency(CLI::App& cli, LatencyCommand& command) {
   command.parser = cli.add_subcommand("latency", "run the real cycle on the simulated rig and judge this machine");
   add_configuration_options(*command.parser, command.options);
   add_timing_options(*command.parser, command.options);
-  command.parser->add_option("--duration", command.duration_s, "how long, s")->type_name("S")->capture_default_str();
-  command.parser->add_flag("--json", command.json, "for programs");
+  command.parser->add_option("--duration", command.latency.duration_s, "how long, s")
+      ->type_name("S")
+      ->capture_default_str();
+  command.parser
+      ->add_option("--secaligned", command.latency.second_offset_us,
+                   "begin at a whole second plus so many us, as cyclictest's option of that name")
+      ->type_name("US")
+      ->check(CLI::Range(0, 999'999));
+  command.parser->add_flag("--json", command.latency.json, "for programs");
 }
 
 int dispatch(int argc, char** argv) {
@@ -112,7 +118,7 @@ int dispatch(int argc, char** argv) {
   }
   if (list->parsed()) return app::list(keys);
   if (doctor.parser->parsed()) return app::doctor(app::merge(doctor.options), doctor.only, doctor.json);
-  if (latency.parser->parsed()) return app::latency(app::merge(latency.options), latency.duration_s, latency.json);
+  if (latency.parser->parsed()) return app::latency(app::merge(latency.options), latency.latency);
   return app::run(app::merge(options));
 }
 

@@ -20,6 +20,14 @@ constexpr int fast_cycles_per_drain = 1000;
 
 std::int64_t period_ns_for(double rate_Hz) noexcept { return std::llround(1e9 / rate_Hz); }
 
+/// Time that the cycle's thread has to get going.
+constexpr std::int64_t start_margin_ns = 100'000'000;
+
+std::int64_t next_second_ns(std::int64_t now_ns) noexcept {
+  constexpr std::int64_t second_ns = 1'000'000'000;
+  return (now_ns / second_ns + 1) * second_ns;
+}
+
 /// Leaves the rig in the safe state however the run ends.
 class ActiveDriver {
  public:
@@ -102,7 +110,13 @@ RunOutcome RunSession::run_realtime(const runtime::RealtimeOptions& options, con
   }
   try {
     driver_.configure();
-    driver_.activate(clock_.now_ns());
+    std::int64_t start_ns = clock_.now_ns();
+    if (second_offset_ns_ >= 0) {
+      start_ns = next_second_ns(start_ns + start_margin_ns) + second_offset_ns_;
+      executive_.start_at(start_ns);
+    }
+    // A simulated rig's time begins with the first cycle.
+    driver_.activate(start_ns);
   } catch (...) {
     go.set_value(false);
     throw;

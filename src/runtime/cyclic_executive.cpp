@@ -43,7 +43,7 @@ void CyclicExecutive::request_stop(rig::Reason reason) noexcept {
 }
 
 bool CyclicExecutive::step() noexcept {
-  if (sequence_ == 0) tick_ns_ = clock_.now_ns();
+  if (sequence_ == 0) tick_ns_ = first_tick_ns_ < 0 ? clock_.now_ns() : first_tick_ns_;
   clock_.sleep_until(tick_ns_);
   rig::CycleRecord record;
   run_cycle(record);

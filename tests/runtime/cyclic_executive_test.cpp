@@ -19,6 +19,14 @@ TEST_CASE("cycles in time are on absolute ticks, whatever they take") {
   CHECK(bench.executive.statistics().overruns().total == 0);
 }
 
+TEST_CASE("the first tick may be set") {
+  Bench bench;
+  bench.executive.start_at(3'500 * ms);
+  bench.cycle();
+  bench.cycle();
+  CHECK(bench.clock.asked_ns == std::vector<std::int64_t>{3'500 * ms, 3'501 * ms});
+}
+
 TEST_CASE("every part of a cycle is timed") {
   Bench bench;
   bench.cycle({.wakeup_ns = 11 * us, .read_ns = 22 * us, .control_ns = 33 * us, .write_ns = 44 * us});

@@ -23,6 +23,17 @@ def cyclictest_max_us(text):
     return int(re.search(r'Max:\s*(\d+)', text).group(1))
 
 
+def together(runs):
+    """Several runs as one: counts added, the worst of each figure."""
+    def worst(part):
+        return {figure: max(run[part][figure] for run in runs) for figure in ('p50', 'p99', 'p99_9', 'max')}
+    whole = {count: sum(run[count] for run in runs)
+             for count in ('cycles', 'ticks_missed', 'overruns', 'overruns_startup')}
+    whole['realtime'] = all(run['realtime'] for run in runs)
+    whole['overruns_by_cause'] = [run['overruns_by_cause'] for run in runs if run['overruns']]
+    return {**whole, 'wakeup_latency_us': worst('wakeup_latency_us'), 'cycle_time_us': worst('cycle_time_us')}
+
+
 def problems_of(name, compared, run, cyclictest_us):
     found = []
     if not run['realtime']:
@@ -57,8 +68,9 @@ def main():
         problems = []
         print('              cycles  missed   cyclictest max   wake-up p50   p99  p99.9    max   cycle max (us)')
         for name, compared in CASES.items():
-            run = json.loads((pathlib.Path(out) / f'{name}.json').read_text())
-            cyclictest_us = cyclictest_max_us((pathlib.Path(out) / f'{name}.cyclictest').read_text())
+            run = together([json.loads(file.read_text()) for file in pathlib.Path(out).glob(f'{name}.*.json')])
+            cyclictest_us = max(cyclictest_max_us(file.read_text())
+                                for file in pathlib.Path(out).glob(f'{name}.*.cyclictest'))
             wakeup = run['wakeup_latency_us']
             print(f'{name:<12} {run["cycles"]:>7} {run["ticks_missed"]:>7} {cyclictest_us:>16} {wakeup["p50"]:>13.0f} '
                   f'{wakeup["p99"]:>5.0f} {wakeup["p99_9"]:>6.0f} {wakeup["max"]:>6.1f} '

@@ -47,6 +47,10 @@ class RunSession {
   /// Runs the cycle in a thread of its own with the real-time set-up of `options`.
   RunOutcome run_realtime(const runtime::RealtimeOptions& options, const Poll& poll);
 
+  /// Lets a run in real time begin at the next whole second of the clock plus `offset_ns`, >= 0, so that its ticks lie
+  /// where those of `cyclictest --secaligned` do.
+  void align_to_second(std::int64_t offset_ns) noexcept { second_offset_ns_ = offset_ns; }
+
   [[nodiscard]] const runtime::CyclicExecutive& executive() const noexcept { return executive_; }
   [[nodiscard]] const runtime::CommandGate& gate() const noexcept { return gate_; }
   [[nodiscard]] std::uint64_t record_drops() const noexcept { return ring_.drops(); }
@@ -66,6 +70,7 @@ class RunSession {
   runtime::CommandGate gate_;
   runtime::RecordRing ring_;
   std::int64_t period_ns_;
+  std::int64_t second_offset_ns_{-1};  ///< < 0: begin at once
   runtime::CyclicExecutive executive_;
   runtime::RecordPump pump_;
   runtime::RealtimeReport realtime_{};

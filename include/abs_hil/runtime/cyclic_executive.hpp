@@ -33,6 +33,8 @@ class CyclicExecutive {
   CyclicExecutive(Clock& clock, driver::RigDriver& driver, CycleLogic& logic, CommandGate& gate, RecordRing& ring,
                   std::int64_t period_ns, const OverrunOptions& overruns = {});
 
+  /// The first tick, instead of the moment of the first step. Before the first step.
+  void start_at(std::int64_t first_tick_ns) noexcept { first_tick_ns_ = first_tick_ns; }
   /// Sleeps until the next tick and runs one cycle. False after the run's last cycle.
   bool step() noexcept;
   /// Ends the run in an orderly way at the next cycle. Any thread or signal handler may call it; the first reason
@@ -59,6 +61,7 @@ class CyclicExecutive {
   std::int64_t period_ns_;
   std::uint64_t startup_cycles_;
   std::uint64_t max_consecutive_;
+  std::int64_t first_tick_ns_{-1};  ///< < 0: at once
   std::int64_t tick_ns_{0};
   std::int64_t start_ns_{0};
   std::uint64_t sequence_{0};
