@@ -22,6 +22,7 @@ MAY_KNOW = {
     'telemetry': {'rig', 'lcmtypes'},
     'analysis': {'rig'},
     'settings': {'rig', 'control', 'plant_sim', 'driver', 'runtime', 'experiment'},
+    'comparison': {'rig', 'control', 'plant_sim', 'driver', 'driver/sim', 'runtime', 'experiment', 'analysis', 'settings'},
 }
 # room -> libraries that are none of its business
 NEVER_INCLUDES = {
@@ -32,6 +33,7 @@ NEVER_INCLUDES = {
     'driver/sim': r'^(lcm|spdlog|nlohmann|toml\+\+|CLI)/',
     'runtime': r'^(lcm|boost|nlohmann|toml\+\+|CLI)/',
     'experiment': r'^(lcm|boost|CLI)/',
+    'comparison': r'^(lcm|spdlog|boost|CLI)/',
 }
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 
