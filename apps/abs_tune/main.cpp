@@ -51,7 +51,7 @@ void tune(const std::string& controller, const Options& o) {
                   controller, fmt::join(o.plants, ","), o.cases, o.search.generations, o.search.seed);
   const std::string text = comparison::to_toml(controller, result, comment);
   file.write(text);
-  fmt::print("{}\n", text);
+  fmt::print("{}: cost {:.5f}, with the gains so far {:.5f}\n{}\n", controller, result.cost, result.start_cost, text);
 }
 
 int run(int argc, char** argv) {

@@ -168,13 +168,13 @@ TuningResult tune(std::string_view controller, const TrainingSet& training, cons
   const std::size_t size = search.population > 0 ? search.population : std::clamp<std::size_t>(8 * dimensions, 16, 40);
   std::mt19937_64 generator(search.seed);
 
-  std::vector<Point> population{judge.start()};
-  while (population.size() < size) {
-    Point& point = population.emplace_back(dimensions);
+  // The gains there are now have no place in the first generation: the search must find the same whatever they are.
+  TuningResult result{.start_cost = judge.costs({judge.start()}).front()};
+  std::vector<Point> population(size, Point(dimensions));
+  for (Point& point : population) {
     for (double& coordinate : point) coordinate = uniform(generator);
   }
   std::vector<double> costs = judge.costs(population);
-  TuningResult result{.start_cost = costs.front()};
   const auto best = [&costs] {
     return static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
   };
@@ -199,8 +199,7 @@ std::string to_toml(std::string_view controller, const TuningResult& result, std
   const std::span<const TunedKey> keys = tuned_keys(controller);
   const std::string_view table = keys.front().name.substr(0, keys.front().name.rfind('.'));
   std::string text = fmt::format("# {}\n", comment);
-  text += fmt::format("# Mean cost {:.5f} after {} candidates, {:.5f} with the gains that the search started from.\n",
-                      result.cost, result.evaluations, result.start_cost);
+  text += fmt::format("# Mean cost {:.5f} after {} candidates.\n", result.cost, result.evaluations);
   text += fmt::format("description = \"Gains of {} found by abs_tune\"\n\n[{}]\n", controller, table);
   for (std::size_t d = 0; d < keys.size(); ++d) {
     const std::string number = fmt::format("{}", result.values[d]);

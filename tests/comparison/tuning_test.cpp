@@ -65,12 +65,14 @@ TEST_CASE("the search finds better gains than bad ones, the same with any number
   training.plants[0].control.adaptive.gamma = 1.0;
   SearchOptions search{.generations = 3, .population = 8, .seed = 5, .threads = 1};
   const TuningResult found = tune("adaptive", training, search);
-  CHECK(found.evaluations == 8 * 4);
+  CHECK(found.evaluations == 1 + 8 * 4);
   CHECK(found.cost < 0.98 * found.start_cost);
   search.threads = 3;
   const TuningResult again = tune("adaptive", training, search);
   CHECK(again.values == found.values);
   CHECK(again.cost == found.cost);
+  training.plants[0].control.adaptive.ks1 = 32.0;  // where it comes from makes no difference
+  CHECK(tune("adaptive", training, search).values == found.values);
   search.seed = 6;
   CHECK(tune("adaptive", training, search).values != found.values);
 }

@@ -64,11 +64,11 @@ struct SearchOptions {
 struct TuningResult {
   std::vector<double> values{};  ///< one for each key, rounded to three digits
   double cost{0.0};              ///< of these rounded values, mean over the training set
-  double start_cost{0.0};        ///< of the gains that the search started from
+  double start_cost{0.0};        ///< of the gains in `training.plants`, for comparison
   std::size_t evaluations{0};
 };
 
-/// Searches for the gains of `controller`, beginning with those in `training.plants` as one of the candidates.
+/// Searches for the gains of `controller`. What they are in `training.plants` has no influence.
 /// @param progress called after each generation with its number and the best cost
 /// Throws std::invalid_argument for a controller without keys to tune or an empty training set.
 [[nodiscard]] TuningResult tune(std::string_view controller, const TrainingSet& training, const SearchOptions& search,
