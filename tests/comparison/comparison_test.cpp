@@ -13,7 +13,7 @@ TEST_CASE("the report is the same, byte for byte, with any number of threads") {
   const Comparison once = compare(plan);
   const std::string text = to_text(tabulate(plan, once));
   const std::string runs = runs_csv(plan, once);
-  for (const std::size_t threads : {2, 7}) {
+  for (const std::size_t threads : {2U, 7U}) {
     plan.threads = threads;
     const Comparison again = compare(plan);
     CHECK(to_text(tabulate(plan, again)) == text);

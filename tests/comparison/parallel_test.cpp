@@ -9,7 +9,7 @@
 using namespace abs_hil::comparison;
 
 TEST_CASE("each index is called once, with any number of threads") {
-  for (const std::size_t threads : {0, 1, 2, 7, 64}) {
+  for (const std::size_t threads : {0U, 1U, 2U, 7U, 64U}) {
     std::vector<std::atomic<int>> calls(50);
     for_each_index(calls.size(), threads, [&](std::size_t i) { ++calls[i]; });
     for (const auto& count : calls) CHECK(count == 1);
