@@ -30,7 +30,7 @@ set key top right samplen 2
 set xrange [6:7.8]
 set xlabel "time / s"
 set ylabel "$3"
-$5
+${5:-}
 plot "$data/sliding-mode.csv" using "time_s":($4) with lines lw 1.5 lc rgb "#999999" title "sliding-mode", \
      "$data/adaptive.csv" using "time_s":($4) with lines lw 1.5 lc rgb "#000000" title "adaptive"
 PLOT

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <random>
 #include <stdexcept>
 
@@ -137,7 +138,16 @@ plant_sim::PlantOptions perturbed(const plant_sim::PlantOptions& nominal, const 
   rig::TyreParameters& t = plant.rig.tyre;
   t.B *= p.B;
   t.C = std::min(largest_C, t.C * p.C);
-  t.theta_N *= p.theta;
+  // B stretches the slip axis: the maker's curve depends on slip through s^p/a.
+  plant_sim::IntecoMuParameters& mu = plant.inteco_mu;
+  mu.a /= std::pow(p.B, mu.p);
+  if (plant.load == "lever") {
+    // The force is friction times load: theta is no parameter there.
+    plant.mu_peak *= p.theta;
+    for (double* weight : {&mu.w1, &mu.w2, &mu.w3, &mu.w4}) *weight *= p.theta;
+  } else {
+    t.theta_N *= p.theta;
+  }
   return plant;
 }
 

@@ -1,5 +1,6 @@
 #include "abs_hil/comparison/variation.hpp"
 
+#include <cmath>
 #include <set>
 #include <vector>
 
@@ -84,6 +85,23 @@ TEST_CASE("a perturbation reaches the parameter that it names") {
   CHECK_THAT(plant.rig.brake.c31_per_s, WithinRel(1.05 * nominal.rig.brake.c31_per_s, 1e-14));
   CHECK_THAT(plant.rig.tyre.B, WithinRel(0.95 * nominal.rig.tyre.B, 1e-14));
   CHECK_THAT(plant.rig.tyre.theta_N, WithinRel(1.08 * nominal.rig.tyre.theta_N, 1e-14));
+}
+
+TEST_CASE("with the maker's curve and lever theta scales the friction and B the slip axis") {
+  plant_sim::PlantOptions nominal;
+  nominal.tyre = "inteco-mu";
+  nominal.load = "lever";
+  Perturbation p;
+  p.theta = 0.9;
+  p.B = 1.1;
+  const plant_sim::PlantOptions plant = perturbed(nominal, p);
+  const auto mu = [](const plant_sim::IntecoMuParameters& m, double s) {
+    return m.w4 * std::pow(s, m.p) / (m.a + std::pow(s, m.p));
+  };
+  for (const double slip : {0.01, 0.05, 0.3}) {
+    CHECK_THAT(mu(plant.inteco_mu, slip), WithinRel(0.9 * mu(nominal.inteco_mu, 1.1 * slip), 1e-12));
+  }
+  CHECK(plant.rig.tyre.theta_N == nominal.rig.tyre.theta_N);
 }
 
 TEST_CASE("every plant of the widest series is a valid one") {

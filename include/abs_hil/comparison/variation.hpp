@@ -13,8 +13,8 @@ namespace abs_hil::comparison {
 struct Variation {
   double wheels{0.0};  ///< inertias and bearing friction, each wheel's own: J1, J2, d1, d2, M10, M20
   double brake{0.0};   ///< gain of the whole map b(u), its threshold u0 and the lag's c31
-  double tyre{0.0};    ///< shape of the tyre curve: B and C
-  double theta{0.0};   ///< peak tyre force
+  double tyre{0.0};    ///< shape of the tyre curve: B and C, or the slip axis of the maker's curve
+  double theta{0.0};   ///< peak tyre force: theta, or with the lever the friction coefficient
   double radii{0.0};   ///< r1 and r2: measured with a caliper, so 0 unless asked for; an error is an error of all slip
   bool phase{false};   ///< where within a count each encoder starts
 
