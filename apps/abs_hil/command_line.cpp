@@ -45,6 +45,7 @@ RunRequest merge(const RunOptions& options) {
   settings::KeyTable keys(s);
   s.backend = options.backend;
   s.realtime.mode = realtime_mode(options.realtime);
+  for (const std::string& assignment : options.defaults) keys.set_text(assignment, "default");
   if (options.plant) s.plant_name = *options.plant;
   settings::load_file(settings::plant_file(s.plant_name), keys, "plant");
   if (options.config_file) settings::load_file(*options.config_file, keys);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,9 +31,24 @@ struct RunOptions {
   std::optional<std::string> slip_ref{};
   std::optional<std::string> rate_Hz{};
   std::optional<std::string> seed{};
+  std::vector<std::string> defaults{};  ///< assignments that files and options may override
   std::vector<std::string> assignments{};
   std::string realtime{"prefer"};
   OutputOptions outputs{};
+};
+
+/// The options of `abs_hil compare` as typed.
+struct CompareOptions {
+  RunOptions run{};  ///< plant, configuration file and assignments are taken from it
+  std::vector<std::string> controllers{"adaptive", "sliding-mode"};
+  std::size_t repeat{100};
+  std::uint64_t seed{1};
+  std::optional<std::string> vary{};
+  std::size_t threads{0};  ///< 0: as many as the machine runs at once
+  std::optional<std::string> json_file{};
+  std::optional<std::string> csv_file{};
+  std::optional<std::string> markdown_file{};
+  std::optional<std::string> runs_file{};
 };
 
 /// A run as it will be: the effective configuration and where its records go.

@@ -10,6 +10,8 @@ namespace abs_hil::app {
 
 /// Runs an experiment and returns the exit status. Throws what the parts throw: see main.cpp.
 int run(const RunRequest& request);
+/// `abs_hil compare`: controllers side by side in simulation. Throws settings::ConfigError and std::invalid_argument.
+int compare(const CompareOptions& options);
 /// `abs_hil list`: controllers, plants, experiments and backends, or all configuration keys.
 int list(bool keys);
 /// `abs_hil doctor`: examines this computer, all of it or the one check named, and says how to mend what falls short.

@@ -95,6 +95,46 @@ void add_latency(CLI::App& cli, LatencyCommand& command) {
   command.parser->add_flag("--json", command.latency.json, "for programs");
 }
 
+CLI::App* add_compare(CLI::App& cli, app::CompareOptions& o) {
+  auto* compare = cli.add_subcommand("compare", "controllers side by side in simulation, over the same varied plants");
+  compare->add_option("--plant", o.run.plant, "plant by name or TOML file")->type_name("NAME|FILE");
+  compare->add_option("--controllers", o.controllers, "controllers, the first is what the others are set against")
+      ->type_name("A,B,...")
+      ->delimiter(',')
+      ->capture_default_str();
+  compare->add_option("--repeat", o.repeat, "runs of each controller")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
+  compare->add_option("--seed", o.seed, "seed of the series of plants")->type_name("N")->capture_default_str();
+  compare->add_option("--vary", o.vary, "what varies: parameters (wheels, brake, tyre), theta, radii, phase, or none")
+      ->type_name("SPEC")
+      ->default_str("parameters=0.1,theta=0.1,phase");
+  compare->add_option("--config", o.run.config_file, "TOML file with any configuration values")->type_name("FILE");
+  compare->add_option("--set", o.run.assignments, "set any configuration value (abs_hil list --keys)")
+      ->type_name("key=value")
+      ->take_all()
+      ->allow_extra_args(false);
+  compare->add_option("--threads", o.threads, "threads; 0: one for each processor; changes no figure")
+      ->type_name("N")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  compare->add_option("--json", o.json_file, "write the table as JSON")->type_name("FILE");
+  compare->add_option("--csv", o.csv_file, "write the table as CSV")->type_name("FILE");
+  compare->add_option("--markdown", o.markdown_file, "write the table as Markdown")->type_name("FILE");
+  compare->add_option("--runs", o.runs_file, "write the single runs as CSV")->type_name("FILE");
+  return compare;
+}
+
+/// Options of a run have no say in `compare`: better refused than ignored.
+void refuse_run_options(const CLI::App& cli) {
+  for (const CLI::Option* option : cli.get_options()) {
+    if (option->count() > 0) {
+      throw settings::ConfigError(option->get_name() + ": give the options of compare after the word compare");
+    }
+  }
+}
+
 int dispatch(int argc, char** argv) {
   CLI::App cli{"Driver, adaptive slip controller and simulator of the Inteco ABS laboratory rig"};
   cli.name("abs_hil");
@@ -109,6 +149,8 @@ int dispatch(int argc, char** argv) {
   add_doctor(cli, doctor);
   LatencyCommand latency;
   add_latency(cli, latency);
+  app::CompareOptions compare_options;
+  const auto* compare = add_compare(cli, compare_options);
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -119,6 +161,10 @@ int dispatch(int argc, char** argv) {
   if (list->parsed()) return app::list(keys);
   if (doctor.parser->parsed()) return app::doctor(app::merge(doctor.options), doctor.only, doctor.json);
   if (latency.parser->parsed()) return app::latency(app::merge(latency.options), latency.latency);
+  if (compare->parsed()) {
+    refuse_run_options(cli);
+    return app::compare(compare_options);
+  }
   return app::run(app::merge(options));
 }
 

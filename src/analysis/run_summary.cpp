@@ -2,11 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <cerrno>
 #include <cmath>
-#include <cstring>
-#include <fstream>
-#include <stdexcept>
 #include <utility>
 
 namespace abs_hil::analysis {
@@ -72,6 +68,10 @@ nlohmann::ordered_json to_json(const RunSummary& s) {
           {"theta_final_N", number(m.theta_final_N)},
           {"theta_settling_s", number(m.theta_settling_s)},
           {"torque_total_variation_Nm", number(m.torque_total_variation_Nm)},
+          {"slip_overshoot", number(m.slip_overshoot)},
+          {"time_locked_s", number(m.time_locked_s)},
+          {"theta_error_final", number(m.theta_error_final)},
+          {"theta_error_rms", number(m.theta_error_rms)},
           {"truth_known", s.truth_known},
           {"cycles", s.cycles},
           {"overruns", s.timing.overruns.total},
@@ -119,34 +119,8 @@ std::string to_text(const RunSummary& s) {
   return text;
 }
 
-SummaryFile::SummaryFile(std::filesystem::path path) : path_(std::move(path)), part_(path_) {
-  part_ += ".part";
-  std::error_code ignored;
-  const bool is_directory = std::filesystem::is_directory(path_, ignored);
-  errno = 0;
-  if (is_directory || !std::ofstream(part_)) {
-    throw std::runtime_error(
-        fmt::format("cannot write the summary to \"{}\": {}; give a path in an existing, writable directory",
-                    path_.string(), is_directory ? "it is a directory" : std::strerror(errno)));
-  }
-}
+SummaryFile::SummaryFile(std::filesystem::path path) : file_(std::move(path), "the summary") {}
 
-SummaryFile::~SummaryFile() {
-  std::error_code ignored;
-  std::filesystem::remove(part_, ignored);
-}
-
-void SummaryFile::write(const RunSummary& summary) {
-  errno = 0;
-  std::ofstream file(part_);
-  file << to_json(summary).dump(2) << '\n';
-  file.close();
-  std::error_code error;
-  if (file) std::filesystem::rename(part_, path_, error);
-  if (!file || error) {
-    throw std::runtime_error(fmt::format("cannot write the summary to \"{}\": {}", path_.string(),
-                                         error ? error.message() : std::strerror(errno)));
-  }
-}
+void SummaryFile::write(const RunSummary& summary) { file_.write(to_json(summary).dump(2) + '\n'); }
 
 }  // namespace abs_hil::analysis

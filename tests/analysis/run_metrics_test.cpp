@@ -88,6 +88,47 @@ TEST_CASE("total variation sums the steps of the torque asked for") {
   CHECK_THAT(m.torque_total_variation_Nm, WithinAbs(3000 * 0.5, 1e-6));
 }
 
+TEST_CASE("overshoot is the most that slip exceeds its reference by, above 3 m/s only") {
+  const auto peak = [](double since_s) { return since_s > 0.5 && since_s < 0.6 ? 0.25 : (since_s > 1.45 ? 1.0 : 0.1); };
+  CHECK_THAT(brake(peak, exact).slip_overshoot, WithinAbs(0.10, 1e-12));
+  CHECK(brake([](double) { return 0.1; }, exact).slip_overshoot == 0.0);
+}
+
+TEST_CASE("time locked counts the cycles with slip above 0.95 and v_x above 3 m/s") {
+  // 0.25 s at high speed count; from 3 m/s (1.4 s) on the wheel may lock.
+  const auto slip = [](double since_s) {
+    return (since_s > 0.4995 && since_s < 0.7495) || since_s > 1.3995 ? 0.96 : 0.15;
+  };
+  CHECK_THAT(brake(slip, exact).time_locked_s, WithinAbs(0.25, 1e-9));
+  CHECK(brake([](double) { return 0.94; }, exact).time_locked_s == 0.0);
+}
+
+TEST_CASE("errors of the estimate of theta are relative to the truth") {
+  const auto theta = [](double since_s) { return since_s < 0.25 ? 0.0 : 22.0; };
+  const Metrics m = brake(on_target, theta);
+  CHECK_THAT(m.theta_error_final, WithinAbs(0.1, 1e-12));
+  CHECK_THAT(m.theta_error_rms, WithinAbs(0.1, 1e-12));
+  CHECK(std::isnan(brake(on_target, theta, 0.5, false).theta_error_rms));
+}
+
+TEST_CASE("the metrics are complete once the stop is known and phase brake is over") {
+  RunMetrics metrics(r2_m, 0.5);
+  rig::CycleRecord record;
+  record.truth = {.speeds = {0.0, 10.0}, .slip = 0.15, .brake_torque_Nm = 1.0, .theta_N = 20.0};
+  metrics.consume(record, 0.0);
+  CHECK_FALSE(metrics.complete());
+  record.phase = rig::Phase::brake;
+  metrics.consume(record, 0.0);
+  record.time_s = 0.1;
+  record.truth.speeds.omega2_rad_s = 1.0;
+  metrics.consume(record, 0.0);
+  CHECK(metrics.metrics().stop_time_s == 0.1);
+  CHECK_FALSE(metrics.complete());
+  record.phase = rig::Phase::hold;
+  metrics.consume(record, 0.0);
+  CHECK(metrics.complete());
+}
+
 TEST_CASE("without truth the estimates count, and theta has nothing to settle to") {
   const Metrics m = brake(on_target, exact, 0.5, false);
   CHECK_THAT(m.stop_time_s, WithinAbs(1.901, 1e-9));

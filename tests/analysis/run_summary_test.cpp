@@ -23,10 +23,29 @@ TEST_CASE("the summary has the fields that scripts rely on, and null for what is
   RunSummary summary;
   summary.metrics.stop_time_s = 2.5;
   const auto json = to_json(summary);
-  for (const char* field :
-       {"result", "reason", "controller", "plant", "backend", "brake_start_s", "stop_time_s", "stop_distance_m",
-        "slip_rms", "slip_settling_s", "theta_final_N", "theta_settling_s", "torque_total_variation_Nm", "cycles",
-        "overruns", "wakeup_latency_us", "cycle_time_us", "telemetry_drops", "config"}) {
+  for (const char* field : {"result",
+                            "reason",
+                            "controller",
+                            "plant",
+                            "backend",
+                            "brake_start_s",
+                            "stop_time_s",
+                            "stop_distance_m",
+                            "slip_rms",
+                            "slip_settling_s",
+                            "theta_final_N",
+                            "theta_settling_s",
+                            "torque_total_variation_Nm",
+                            "slip_overshoot",
+                            "time_locked_s",
+                            "theta_error_final",
+                            "theta_error_rms",
+                            "cycles",
+                            "overruns",
+                            "wakeup_latency_us",
+                            "cycle_time_us",
+                            "telemetry_drops",
+                            "config"}) {
     INFO(field);
     CHECK(json.contains(field));
   }

@@ -19,15 +19,15 @@ TEST_CASE("Every controller in the table can be made and brakes") {
     CAPTURE(std::string(entry.name));
     CHECK_FALSE(entry.summary.empty());
     const auto controller = control::make_controller(entry.name, {options, parameters});
-    const control::SlipInput input{.speeds = {150.0, 170.0},
-                                   .slip = 0.113,
+    const control::SlipInput input{.speeds = {164.0, 170.0},
+                                   .slip = 0.0304,
                                    .slip_ref = 0.15,
                                    .max_brake_torque_Nm = std::numeric_limits<double>::infinity()};
     controller->reset(input);
     const auto output = controller->step(input);
     CHECK(output.brake_torque_Nm > 0.0);
     CHECK(output.slip_velocity_error_m_s ==
-          Catch::Detail::Approx(0.85 * 0.0990 * 170.0 - 0.0995 * 150.0).epsilon(1e-12));
+          Catch::Detail::Approx(0.85 * 0.0990 * 170.0 - 0.0995 * 164.0).epsilon(1e-12));
   }
 }
 

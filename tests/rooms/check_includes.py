@@ -23,6 +23,7 @@ MAY_KNOW = {
     'analysis': {'rig'},
     'diagnosis': {'rig', 'driver', 'runtime', 'telemetry'},
     'settings': {'rig', 'control', 'plant_sim', 'driver', 'runtime', 'experiment'},
+    'comparison': {'rig', 'control', 'plant_sim', 'driver', 'driver/sim', 'runtime', 'experiment', 'analysis', 'settings'},
 }
 # room -> libraries that are none of its business
 NEVER_INCLUDES = {
@@ -33,6 +34,7 @@ NEVER_INCLUDES = {
     'driver/sim': r'^(lcm|spdlog|nlohmann|toml\+\+|CLI)/',
     'runtime': r'^(lcm|boost|nlohmann|toml\+\+|CLI)/',
     'experiment': r'^(lcm|boost|CLI)/',
+    'comparison': r'^(lcm|spdlog|boost|CLI)/',
 }
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 

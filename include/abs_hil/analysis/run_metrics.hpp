@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cmath>
+#include <cstdint>
+
 #include "abs_hil/rig/record_sink.hpp"
 
 namespace abs_hil::analysis {
@@ -15,6 +18,10 @@ struct Metrics {
   double theta_final_N{rig::unknown};     ///< last estimate while v_x > 3 m/s
   double theta_settling_s{rig::unknown};  ///< after which the estimate stays within 5 % of the truth while v_x > 3 m/s
   double torque_total_variation_Nm{rig::unknown};  ///< of the torque asked for, over phase brake: measures chatter
+  double slip_overshoot{rig::unknown};     ///< most that slip exceeds slip_ref by while v_x > 3 m/s; 0 if it never does
+  double time_locked_s{rig::unknown};      ///< time braked with slip > 0.95 while v_x > 3 m/s
+  double theta_error_final{rig::unknown};  ///< theta_final_N over the true theta then, less 1
+  double theta_error_rms{rig::unknown};    ///< of the estimate over the truth less 1, where slip_rms looks
 };
 
 /// Computes the metrics from the records as they come, without storing them.
@@ -26,6 +33,8 @@ class RunMetrics final : public rig::RecordSink {
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
   [[nodiscard]] Metrics metrics() const;
+  /// True once the stop is known and braking is over: no later record changes a metric.
+  [[nodiscard]] bool complete() const noexcept { return !braking_ && !std::isnan(metrics_.stop_time_s); }
 
  private:
   /// Since when a quantity has stayed within its band, counted from the start of braking.
@@ -50,7 +59,10 @@ class RunMetrics final : public rig::RecordSink {
   Settling slip_settling_{};
   Settling theta_settling_{};
   double slip_square_sum_{0.0};
+  double theta_square_sum_{0.0};
   std::uint64_t slip_samples_{0};
+  bool braking_{false};
+  double last_time_s_{rig::unknown};
   double last_torque_Nm_{rig::unknown};
 };
 

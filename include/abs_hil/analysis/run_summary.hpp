@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "abs_hil/analysis/result_file.hpp"
 #include "abs_hil/analysis/run_metrics.hpp"
 #include "abs_hil/rig/timing_summary.hpp"
 
@@ -34,21 +35,16 @@ struct RunSummary {
 /// The summary for people, a few lines.
 [[nodiscard]] std::string to_text(const RunSummary& summary);
 
-/// A summary file that is either whole or not there: opened beside its place before the run, so that a bad path is
-/// known before anything moves, and renamed into place once written.
+/// A summary file that is either whole or not there (see ResultFile).
 class SummaryFile {
  public:
   /// Throws std::runtime_error, naming path, reason and fix, if the file cannot be created.
   explicit SummaryFile(std::filesystem::path path);
-  SummaryFile(const SummaryFile&) = delete;
-  SummaryFile& operator=(const SummaryFile&) = delete;
-  ~SummaryFile();
   /// Throws std::runtime_error if the file cannot be written.
   void write(const RunSummary& summary);
 
  private:
-  std::filesystem::path path_;
-  std::filesystem::path part_;
+  ResultFile file_;
 };
 
 }  // namespace abs_hil::analysis

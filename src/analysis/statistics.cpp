@@ -1,0 +1,67 @@
+#include "abs_hil/analysis/statistics.hpp"
+
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+namespace abs_hil::analysis {
+
+namespace {
+
+constexpr double upper_probability = 0.975;  // two-sided 95 %
+constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+
+void require_pairs(std::span<const double> values, std::span<const double> base) {
+  if (values.size() != base.size()) throw std::invalid_argument("paired samples must have the same length");
+}
+
+}  // namespace
+
+double student_t_quantile(double probability, double degrees_of_freedom) {
+  return boost::math::quantile(boost::math::students_t(degrees_of_freedom), probability);
+}
+
+Estimate estimate_mean(std::span<const double> values) {
+  Estimate result{.mean = missing, .standard_deviation = missing, .low = missing, .high = missing};
+  double sum = 0.0;
+  for (const double value : values) {
+    if (std::isnan(value)) continue;
+    sum += value;
+    ++result.n;
+  }
+  if (result.n == 0) return result;
+  const double n = static_cast<double>(result.n);
+  result.mean = sum / n;
+  if (result.n < 2) return result;
+  double squares = 0.0;
+  for (const double value : values) {
+    if (!std::isnan(value)) squares += (value - result.mean) * (value - result.mean);
+  }
+  result.standard_deviation = std::sqrt(squares / (n - 1.0));
+  const double half = student_t_quantile(upper_probability, n - 1.0) * result.standard_deviation / std::sqrt(n);
+  result.low = result.mean - half;
+  result.high = result.mean + half;
+  return result;
+}
+
+Estimate estimate_difference(std::span<const double> values, std::span<const double> base) {
+  require_pairs(values, base);
+  std::vector<double> differences(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) differences[i] = values[i] - base[i];
+  return estimate_mean(differences);
+}
+
+Estimate estimate_ratio(std::span<const double> values, std::span<const double> base) {
+  require_pairs(values, base);
+  std::vector<double> logarithms(values.size(), missing);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (values[i] > 0.0 && base[i] > 0.0) logarithms[i] = std::log(values[i] / base[i]);
+  }
+  Estimate result = estimate_mean(logarithms);
+  for (double* value : {&result.mean, &result.low, &result.high}) *value = std::exp(*value);
+  return result;
+}
+
+}  // namespace abs_hil::analysis

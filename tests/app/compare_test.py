@@ -1,0 +1,80 @@
+"""abs_hil compare as its users run it: the same table whatever the threads, files that agree, bad input refused."""
+import json
+import unittest
+
+from program import ProgramTest
+
+SMALL = ('compare', '--controllers', 'adaptive,sliding-mode', '--repeat', '4', '--seed', '3')
+
+
+class Compare(ProgramTest):
+    def test_same_bytes_with_any_number_of_threads(self):
+        outputs = {self.run_program(*SMALL, '--threads', threads).stdout for threads in (1, 2, 7)}
+        self.assertEqual(len(outputs), 1)
+        self.assertIn('adaptive / sliding-mode: stop time', outputs.pop())
+        self.assertEqual(self.run_program(*SMALL, '--threads', 2).stderr, '')
+
+    def test_files_agree(self):
+        names = {kind: self.folder / f'table.{kind}' for kind in ('json', 'csv', 'markdown', 'runs')}
+        result = self.run_program(*SMALL, *(arg for kind, path in names.items() for arg in (f'--{kind}', path)))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        table = json.loads(names['json'].read_text())
+        self.assertEqual(table['config']['experiment']['start_speed_rad_s'], 170)
+        runs = self.rows(names['runs'])
+        self.assertEqual(len(runs), 8)
+        for controller in table['controllers']:
+            times = [float(run['stop_time_s']) for run in runs if run['controller'] == controller['name']]
+            mean = controller['metrics']['stop_time_s']['mean']
+            self.assertAlmostEqual(sum(times) / len(times), mean, places=12)
+            self.assertIn(f'{mean:.3f}', names['markdown'].read_text())
+            rows = [row for row in self.rows(names['csv'])
+                    if row['controller'] == controller['name'] and row['metric'] == 'stop_time_s']
+            self.assertEqual(float(rows[0]['mean']), mean)
+
+    def test_start_speed_of_the_configuration_counts(self):
+        config = self.folder / 'slow.toml'
+        config.write_text('[experiment]\nstart_speed_rad_s = 100.0\n')
+        args = ('compare', '--controllers', 'adaptive', '--repeat', '1')
+        self.assertIn('from 100 rad/s', self.run_program(*args, '--config', config).stdout)
+        self.assertIn('from 170 rad/s', self.run_program(*args).stdout)
+        self.assertIn('from 90 rad/s', self.run_program(
+            *args, '--config', config, '--set', 'experiment.start_speed_rad_s=90').stdout)
+
+    def test_a_single_run_of_the_nominal_plant_is_the_program_s_own(self):
+        summary = self.folder / 's.json'
+        self.fast('--set', 'experiment.start_speed_rad_s=170', '--summary', summary)
+        table = self.folder / 't.json'
+        self.run_program('compare', '--controllers', 'adaptive', '--repeat', 1, '--vary', 'none', '--json', table)
+        metrics = json.loads(table.read_text())['controllers'][0]['metrics']
+        for key in ('stop_time_s', 'stop_distance_m', 'slip_rms', 'torque_total_variation_Nm', 'slip_overshoot'):
+            self.assertEqual(metrics[key]['mean'], self.summary(summary)[key], key)
+
+    def test_bad_input(self):
+        for args, words in ((('--controllers', 'adaptive,nope'), ['nope']),
+                            (('--controllers', 'adaptive,adaptive'), ['twice']),
+                            (('--repeat', '0'), ['--repeat']),
+                            (('--repeat', '-3'), ['--repeat']),
+                            (('--vary', 'thetta=0.1'), ['thetta', 'theta']),
+                            (('--vary', 'theta=7'), ['theta=7', '[0, 0.5]']),
+                            (('--plant', 'moon'), ['moon']),
+                            (('--set', 'plant.thetaN=3'), ['plant.theta_N']),
+                            (('--threads', '-1'), ['--threads']),
+                            (('--seed', 'x'), ['--seed']),
+                            (('--json', '/nonexistent/dir/t.json'), ['/nonexistent/dir/t.json'])):
+            with self.subTest(args=args):
+                result = self.run_program('compare', *args)
+                self.assertEqual(result.returncode, 2, result.stderr)
+                self.assertEqual(result.stdout, '')
+                lines = result.stderr.strip().splitlines()
+                self.assertEqual(len(lines), 1, result.stderr)
+                for word in words:
+                    self.assertIn(word, lines[0])
+
+    def test_options_of_a_run_are_not_silently_ignored(self):
+        result = self.run_program('--plant', 'paper-timing', 'compare', '--repeat', 1)
+        self.assertEqual(result.returncode, 2)
+        self.assertIn('--plant', result.stderr)
+
+
+if __name__ == '__main__':
+    unittest.main()
