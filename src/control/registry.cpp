@@ -8,7 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "abs_hil/control/adaptive_actuator_controller.hpp"
 #include "abs_hil/control/adaptive_controller.hpp"
+#include "abs_hil/control/adaptive_peak_controller.hpp"
 #include "abs_hil/control/five_phase_controller.hpp"
 #include "abs_hil/control/locked_controller.hpp"
 #include "abs_hil/control/nominal_controller.hpp"
@@ -25,6 +27,10 @@ namespace {
 constexpr std::array table{
     controller_entry<AdaptiveController>(
         "adaptive", "adaptive slip control, estimates the peak tyre force: (17)-(18) of the paper"),
+    controller_entry<AdaptiveActuatorController>("adaptive-actuator",
+                                                 "adaptive slip control that steps back through the brake's lag (6)"),
+    controller_entry<AdaptivePeakController>("adaptive-peak",
+                                             "seeks the slip of peak friction by itself, told nothing of the tyre"),
     controller_entry<NominalController>("nominal", "slip control with a known peak tyre force: (16) of the paper"),
     controller_entry<SlidingModeController>("sliding-mode",
                                             "textbook sliding mode, the paper's own baseline is not public: chatters"),

@@ -17,16 +17,21 @@ ThetaEstimator::ThetaEstimator(const AdaptiveOptions& options, const rig::WheelP
 void ThetaEstimator::reset() noexcept { theta_N_ = zeta0_N_; }
 
 void ThetaEstimator::update(const AdaptationInterval& past) noexcept {
-  if (!(past.phi > 0.0 && past.dt_s > 0.0)) return;
+  if (!(past.dt_s > 0.0)) return;
   const auto& w = wheels_;
   const double omega1_rate = (past.omega1_after_rad_s - past.omega1_before_rad_s) / past.dt_s;
   const double omega1_mean = 0.5 * (past.omega1_before_rad_s + past.omega1_after_rad_s);
   const double tyre_force_N =
       (w.J1_kg_m2 * omega1_rate + w.d1_Nms_rad * omega1_mean + w.M10_Nm + past.brake_torque_Nm) / w.r1_m;
+  update(ForceInterval{past.dt_s, tyre_force_N, past.phi, past.weighted_error});
+}
+
+void ThetaEstimator::update(const ForceInterval& past) noexcept {
+  if (!(past.phi > 0.0 && past.dt_s > 0.0)) return;
   const double zeta_rate = -gamma_ * past.phi * past.weighted_error;
 
   // theta' = rate_now - decay (theta - theta_now): over dt it covers (1 - exp(-decay dt))/decay of the present rate.
-  const double rate_now = zeta_rate + innovation_gain_ * (tyre_force_N - past.phi * theta_N_);
+  const double rate_now = zeta_rate + innovation_gain_ * (past.tyre_force_N - past.phi * theta_N_);
   const double decay = innovation_gain_ * past.phi;
   const double theta_N = theta_N_ - std::expm1(-decay * past.dt_s) / decay * rate_now;
   theta_N_ = std::clamp(theta_N, theta_min_N_, theta_max_N_);

@@ -1,7 +1,9 @@
 #include "abs_hil/experiment/run_logic.hpp"
 
+#include <cmath>
 #include <utility>
 
+#include "abs_hil/rig/encoder_scale.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 
 namespace abs_hil::experiment {
@@ -14,6 +16,7 @@ constexpr double slip_floor_m_s = 0.1;
 
 RunLogic::RunLogic(RunLogicParts parts)
     : wheels_(parts.rig.wheels),
+      rad_per_count_(rig::radians_per_count(parts.rig.encoder_counts_per_rev)),
       slip_ref_(parts.control.slip_ref),
       start_speed_rad_s_(parts.start_speed_rad_s),
       controller_(std::move(parts.controller)),
@@ -32,6 +35,7 @@ void RunLogic::estimate(const rig::Measurement& measurement, double dt_s) noexce
     lower_.update(measurement.lower_counts, dt_s);
     actuator_.advance(dt_s);
   }
+  note_travel(measurement, dt_s);
   if (measurement.ideal_speeds) {
     // The mean over the past cycle, without the encoders' and the observer's errors: what true speeds can tell.
     if (started_ && dt_s > 0.0) {
@@ -49,6 +53,19 @@ void RunLogic::estimate(const rig::Measurement& measurement, double dt_s) noexce
   slip_ = rig::wheel_slip(wheels_.r1_m * speeds_.omega1_rad_s, wheels_.r2_m * speeds_.omega2_rad_s, slip_floor_m_s);
 }
 
+void RunLogic::note_travel(const rig::Measurement& measurement, double dt_s) noexcept {
+  if (measurement.ideal_speeds) {
+    const rig::WheelSpeeds& now = *measurement.ideal_speeds;
+    upper_travel_rad_ = 0.5 * (speeds_.omega1_rad_s + now.omega1_rad_s) * dt_s;
+    lower_travel_rad_ = 0.5 * (speeds_.omega2_rad_s + now.omega2_rad_s) * dt_s;
+  } else if (started_) {
+    upper_travel_rad_ = rig::counts_between(upper_counts_, measurement.upper_counts) * rad_per_count_;
+    lower_travel_rad_ = rig::counts_between(lower_counts_, measurement.lower_counts) * rad_per_count_;
+  }
+  upper_counts_ = measurement.upper_counts;
+  lower_counts_ = measurement.lower_counts;
+}
+
 double RunLogic::slip_control(double dt_s, bool entered, rig::ControlState& state) noexcept {
   control::SlipInput input{.dt_s = entered ? 0.0 : dt_s,
                            .speeds = speeds_,
@@ -58,11 +75,14 @@ double RunLogic::slip_control(double dt_s, bool entered, rig::ControlState& stat
                            .brake_torque_Nm = actuator_.torque_Nm(),
                            .max_brake_torque_Nm = actuator_.max_torque_Nm(),
                            .alpha1_rad_s2 = alpha1_rad_s2_,
-                           .alpha2_rad_s2 = alpha2_rad_s2_};
+                           .alpha2_rad_s2 = alpha2_rad_s2_,
+                           .upper_travel_rad = upper_travel_rad_,
+                           .lower_travel_rad = lower_travel_rad_};
   if (entered) controller_->reset(input);
   const control::SlipOutput output = controller_->step(input);
   state.slip_velocity_error_m_s = output.slip_velocity_error_m_s;
   state.theta_est_N = output.theta_est_N;
+  if (!std::isnan(output.slip_ref)) state.slip_ref = output.slip_ref;
   return output.brake_torque_Nm;
 }
 

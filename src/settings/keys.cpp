@@ -176,6 +176,78 @@ void add_classic_keys(std::vector<Key>& keys, control::ControlOptions& c) {
               });
 }
 
+void add_adaptive_actuator_keys(std::vector<Key>& keys, control::AdaptiveActuatorOptions& c) {
+  control::AdaptiveOptions& a = c.law;
+  keys.insert(
+      keys.end(),
+      {
+          {"control.adaptive_actuator.gamma", "", "adaptation gain of (17)", &a.gamma, positive(1e4)},
+          {"control.adaptive_actuator.ks0", "1/s^2", "integral gain of (18)", &a.ks0, positive(1e6)},
+          {"control.adaptive_actuator.ks1", "1/s", "proportional gain of (18)", &a.ks1, positive(1e4)},
+          {"control.adaptive_actuator.ka1", "", "innovation's weight in (18)", &a.ka1, positive(1e3)},
+          {"control.adaptive_actuator.zeta0", "N", "zeta(0) of (17)", &a.zeta0, between(-500, 500)},
+          {"control.adaptive_actuator.q11", "", "Q of PA + A'P = -2Q", &a.q11, positive(1e6)},
+          {"control.adaptive_actuator.q12", "", "Q of PA + A'P = -2Q", &a.q12, between(-1e6, 1e6)},
+          {"control.adaptive_actuator.q22", "", "Q of PA + A'P = -2Q", &a.q22, positive(1e6)},
+          {"control.adaptive_actuator.theta_min_N", "N", "least theta the estimate may take", &a.theta_min_N,
+           from_zero(500)},
+          {"control.adaptive_actuator.theta_max_N", "N", "largest theta the estimate may take", &a.theta_max_N,
+           positive(1000)},
+          {"control.adaptive_actuator.lag_gain_per_s", "1/s", "decay of the torque error that the brake's lag leaves",
+           &c.lag_gain_per_s, positive(1e4)},
+          {"control.adaptive_actuator.lag_weight_s2", "s^2", "weight of that error in the Lyapunov function",
+           &c.lag_weight_s2, positive(1e3)},
+          {"control.adaptive_actuator.force_rate_N2_s", "N^2/s", "force observer: how fast the tyre force may change",
+           &c.observer.force_rate_N2_s, positive(1e9)},
+          {"control.adaptive_actuator.brake_rate_Nm2_s", "(N m)^2/s",
+           "force observer: how fast the brake model's error may change", &c.observer.brake_rate_Nm2_s, positive(1e6)},
+      });
+}
+
+void add_adaptive_peak_keys(std::vector<Key>& keys, control::AdaptivePeakOptions& c) {
+  control::SlipPeakOptions& p = c.peak;
+  keys.insert(
+      keys.end(),
+      {
+          {"control.adaptive_peak.ks0", "1/s^2", "integral gain of the slip loop", &c.ks0, positive(1e6)},
+          {"control.adaptive_peak.ks1", "1/s", "proportional gain of the slip loop", &c.ks1, positive(1e4)},
+          {"control.adaptive_peak.lag_gain_per_s", "1/s", "decay of the torque error that the brake's lag leaves",
+           &c.lag_gain_per_s, positive(1e4)},
+          {"control.adaptive_peak.slip_min", "", "least slip reference", &c.slip_min, open(0, 1)},
+          {"control.adaptive_peak.slip_max", "", "largest slip reference", &c.slip_max, open(0, 1)},
+          {"control.adaptive_peak.slip_start", "", "slip reference at the start of braking", &c.slip_start, open(0, 1)},
+          {"control.adaptive_peak.slip_rate_per_s", "1/s", "fastest change of the slip reference", &c.slip_rate_per_s,
+           positive(100)},
+          {"control.adaptive_peak.search_part",
+           "",
+           "amplitude of the search as a part of the reference",
+           &c.search_part,
+           {0, 1, false, true}},
+          {"control.adaptive_peak.search_min", "", "least amplitude of the search, as a slip", &c.search_min,
+           between(0, 0.1)},
+          {"control.adaptive_peak.search_rad_s", "rad/s", "frequency of the search", &c.search_rad_s, positive(1000)},
+          {"control.adaptive_peak.peak_slip0", "", "first guess of the peak's slip", &p.peak_slip0, open(0, 1)},
+          {"control.adaptive_peak.peak_force0_N", "N", "first guess of the peak's force", &p.peak_force0_N,
+           positive(500)},
+          {"control.adaptive_peak.force_drift_per_s", "1/s", "variance of ln force gained per second",
+           &p.force_drift_per_s, positive(100)},
+          {"control.adaptive_peak.slip_drift_per_s", "1/s", "variance of ln slip gained per second",
+           &p.slip_drift_per_s, positive(100)},
+          {"control.adaptive_peak.shape_drift_per_s", "1/s", "variance of the curve's shape gained per second",
+           &p.shape_drift_per_s, positive(100)},
+          {"control.adaptive_peak.force_noise_N2_s", "N^2 s", "intensity of the force estimate's noise",
+           &p.force_noise_N2_s, positive(100)},
+          {"control.adaptive_peak.jump_level", "", "unexplained part of the peak force that is a friction jump",
+           &p.jump_level, positive(10)},
+          {"control.adaptive_peak.jump_hold_s", "s", "time after a jump in which only the level is learnt",
+           &p.jump_hold_s, from_zero(1)},
+          {"control.adaptive_peak.force_rate_N2_s", "N^2/s", "force observer: how fast the tyre force may change",
+           &c.observer.force_rate_N2_s, positive(1e9)},
+          {"control.adaptive_peak.brake_rate_Nm2_s", "(N m)^2/s",
+           "force observer: how fast the brake model's error may change", &c.observer.brake_rate_Nm2_s, positive(1e6)},
+      });
+}
+
 void add_experiment_keys(std::vector<Key>& keys, experiment::ExperimentOptions& e) {
   std::vector<std::string_view> names;
   for (const experiment::ExperimentEntry& entry : experiment::experiments()) names.push_back(entry.name);
@@ -212,6 +284,8 @@ KeyTable::KeyTable(Settings& s) {
   add_control_keys(keys_, s.control);
   add_sliding_keys(keys_, s.control);
   add_classic_keys(keys_, s.control);
+  add_adaptive_actuator_keys(keys_, s.control.adaptive_actuator);
+  add_adaptive_peak_keys(keys_, s.control.adaptive_peak);
   add_experiment_keys(keys_, s.experiment);
   keys_.insert(
       keys_.end(),

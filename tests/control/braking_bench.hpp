@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "abs_hil/control/brake_actuator.hpp"
@@ -28,13 +29,17 @@ struct PlantState {
 
 struct Setup {
   rig::RigParameters rig{};
+  std::optional<rig::RigParameters> plant{};  ///< the plant's own parameters; empty: those of `rig`, as believed
   control::ControlOptions options{};
   bool ideal_actuator{true};
   bool encoders{false};
   double omega1_start{170.0}, omega2_start{170.0};
   double max_time_s{10.0};
   double plant_step_s{20e-6};
-  std::function<double(double)> theta_at{};  ///< theta(t), instead of rig.tyre.theta_N
+  std::function<double(double)> theta_at{};  ///< theta(t), instead of tyre.theta_N
+  double angle1_start{0.3e-3}, angle2_start{1.1e-3};
+
+  [[nodiscard]] const rig::RigParameters& true_rig() const { return plant ? *plant : rig; }
 };
 
 struct Tick {
@@ -67,16 +72,17 @@ inline std::array<double, 2> closed_form(double integral0, double error0, double
 
 /// RK4 of (11) over `dt`, with the torque of an ideal actuator held, or b(u) held behind the lag (6).
 inline void integrate(PlantState& x, const Setup& s, double theta, double target_Nm, double dt) {
-  const auto& w = s.rig.wheels;
+  const auto& truth = s.true_rig();
+  const auto& w = truth.wheels;
   using Vector = std::array<double, 6>;
   const auto rate = [&](const Vector& y) -> Vector {
     const double v_x = w.r2_m * y[1];
     const double slip = (v_x - w.r1_m * y[0]) / v_x;
-    const double force = theta * std::sin(s.rig.tyre.C * std::atan(s.rig.tyre.B * slip));
+    const double force = theta * std::sin(truth.tyre.C * std::atan(truth.tyre.B * slip));
     double rate1 = (w.r1_m * force - (w.d1_Nms_rad * y[0] + w.M10_Nm + y[2])) / w.J1_kg_m2;
     if (y[0] <= 0.0 && rate1 < 0.0) rate1 = 0.0;  // held by the brake
     const double rate2 = (-w.r2_m * force - (w.d2_Nms_rad * y[1] + w.M20_Nm)) / w.J2_kg_m2;
-    return {rate1, rate2, s.ideal_actuator ? 0.0 : s.rig.brake.c31_per_s * (target_Nm - y[2]), y[0], y[1], v_x};
+    return {rate1, rate2, s.ideal_actuator ? 0.0 : truth.brake.c31_per_s * (target_Nm - y[2]), y[0], y[1], v_x};
   };
   if (s.ideal_actuator) x.torque = target_Nm;
   const auto plus = [](const Vector& a, const Vector& b, double f) {
@@ -102,8 +108,9 @@ inline std::int32_t counts_at(double angle, std::int32_t per_rev) {
 /// Brakes with `controller` from the start speeds until v_x < v_min, as the runtime does cycle by cycle.
 inline Result brake(const Setup& s, control::SlipController& controller) {
   const double h = 1.0 / s.options.rate_Hz;
-  const auto& w = s.rig.wheels;
-  PlantState x{.omega1 = s.omega1_start, .omega2 = s.omega2_start, .angle1 = 0.3e-3, .angle2 = 1.1e-3};
+  const auto& w = s.true_rig().wheels;
+  const auto& believed = s.rig.wheels;
+  PlantState x{.omega1 = s.omega1_start, .omega2 = s.omega2_start, .angle1 = s.angle1_start, .angle2 = s.angle2_start};
   control::BrakeActuator actuator{s.rig.brake, s.ideal_actuator, 1.0};
   control::TrackingObserver upper{s.options.observer, s.rig.encoder_counts_per_rev};
   control::TrackingObserver lower{s.options.observer, s.rig.encoder_counts_per_rev};
@@ -125,6 +132,11 @@ inline Result brake(const Setup& s, control::SlipController& controller) {
   int square_count = 0;
   double v_before = 0.0;
   rig::WheelSpeeds speeds_before{s.omega1_start, s.omega2_start};
+  double angle1_before = x.angle1, angle2_before = x.angle2;
+  const auto travel = [&](double now, double before) {
+    if (!s.encoders) return now - before;
+    return (counts_at(now, per_rev) - counts_at(before, per_rev)) * 2 * std::numbers::pi / per_rev;
+  };
   for (int n = 0;; ++n) {
     const double t = n * h;
     if (n > 0 && s.encoders) {
@@ -141,13 +153,18 @@ inline Result brake(const Setup& s, control::SlipController& controller) {
     control::SlipInput input{
         .dt_s = n > 0 ? h : 0.0,
         .speeds = speeds,
-        .slip = rig::wheel_slip(w.r1_m * speeds.omega1_rad_s, w.r2_m * speeds.omega2_rad_s, s.options.v_min_m_s),
+        .slip = rig::wheel_slip(believed.r1_m * speeds.omega1_rad_s, believed.r2_m * speeds.omega2_rad_s,
+                                s.options.v_min_m_s),
         .slip_ref = s.options.slip_ref,
         .mean_brake_torque_Nm = actuator.mean_torque_Nm(),
         .brake_torque_Nm = actuator.torque_Nm(),
         .max_brake_torque_Nm = actuator.max_torque_Nm(),
         .alpha1_rad_s2 = s.encoders ? upper.alpha_rad_s2() : (speeds.omega1_rad_s - speeds_before.omega1_rad_s) / h,
-        .alpha2_rad_s2 = s.encoders ? lower.alpha_rad_s2() : (speeds.omega2_rad_s - speeds_before.omega2_rad_s) / h};
+        .alpha2_rad_s2 = s.encoders ? lower.alpha_rad_s2() : (speeds.omega2_rad_s - speeds_before.omega2_rad_s) / h,
+        .upper_travel_rad = travel(x.angle1, angle1_before),
+        .lower_travel_rad = travel(x.angle2, angle2_before)};
+    angle1_before = x.angle1;
+    angle2_before = x.angle2;
     speeds_before = speeds;
     if (n == 0) controller.reset(input);
     const control::SlipOutput output = controller.step(input);
@@ -164,8 +181,8 @@ inline Result brake(const Setup& s, control::SlipController& controller) {
       break;
     }
     if (t > s.max_time_s) break;
-    const double theta = s.theta_at ? s.theta_at(t + h / 2) : s.rig.tyre.theta_N;
-    const auto& b = s.rig.brake;
+    const double theta = s.theta_at ? s.theta_at(t + h / 2) : s.true_rig().tyre.theta_N;
+    const auto& b = s.true_rig().brake;
     const double map_Nm = duty >= b.u0 ? b.b1_Nm * duty + b.b2_Nm : 0.0;  // (7)
     integrate(x, s, theta, s.ideal_actuator ? wanted : map_Nm, h);
   }

@@ -19,15 +19,16 @@ TEST_CASE("Every controller in the table can be made and brakes") {
     CAPTURE(std::string(entry.name));
     CHECK_FALSE(entry.summary.empty());
     const auto controller = control::make_controller(entry.name, {options, parameters});
-    const control::SlipInput input{.speeds = {164.0, 170.0},
-                                   .slip = 0.0304,
+    const control::SlipInput input{.speeds = {168.0, 170.0},
+                                   .slip = 0.0068,
                                    .slip_ref = 0.15,
                                    .max_brake_torque_Nm = std::numeric_limits<double>::infinity()};
     controller->reset(input);
     const auto output = controller->step(input);
     CHECK(output.brake_torque_Nm > 0.0);
+    const double slip_ref = std::isnan(output.slip_ref) ? input.slip_ref : output.slip_ref;
     CHECK(output.slip_velocity_error_m_s ==
-          Catch::Detail::Approx(0.85 * 0.0990 * 170.0 - 0.0995 * 164.0).epsilon(1e-12));
+          Catch::Detail::Approx((1 - slip_ref) * 0.0990 * 170.0 - 0.0995 * 168.0).epsilon(1e-12));
   }
 }
 
@@ -61,6 +62,17 @@ TEST_CASE("Options that are not usable are refused when the controller is made")
     refused(name, [=](auto& o) { o.adaptive.ks1 = nan; });
     refused(name, [](auto& o) { o.v_min_m_s = 0.0; });
   }
+  refused("adaptive-actuator", [](auto& o) { o.adaptive_actuator.law.gamma = 0.0; });
+  refused("adaptive-actuator", [](auto& o) { o.adaptive_actuator.lag_gain_per_s = 0.0; });
+  refused("adaptive-actuator", [](auto& o) { o.adaptive_actuator.lag_weight_s2 = -1.0; });
+  refused("adaptive-actuator", [](auto& o) { o.adaptive_actuator.observer.force_rate_N2_s = 0.0; });
+  refused("adaptive-peak", [](auto& o) { o.adaptive_peak.ks1 = 0.0; });
+  refused("adaptive-peak", [](auto& o) { o.adaptive_peak.slip_min = 0.4; });
+  refused("adaptive-peak", [](auto& o) { o.adaptive_peak.slip_start = 0.5; });
+  refused("adaptive-peak", [](auto& o) { o.adaptive_peak.search_part = 1.0; });
+  refused("adaptive-peak", [](auto& o) { o.adaptive_peak.peak.peak_slip0 = 0.5; });
+  refused("adaptive-peak", [](auto& o) { o.adaptive_peak.peak.force_noise_N2_s = 0.0; });
+  refused("adaptive-peak", [=](auto& o) { o.adaptive_peak.observer.brake_rate_Nm2_s = nan; });
   refused("nominal", [](auto& o) { o.nominal.theta0_N = -5.0; });
 }
 

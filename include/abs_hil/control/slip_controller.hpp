@@ -16,13 +16,18 @@ struct SlipInput {
   double max_brake_torque_Nm{0.0};  ///< largest torque the actuator can give, > 0, may be infinite; the least is 0
   double alpha1_rad_s2{0.0};        ///< estimated acceleration of the upper wheel
   double alpha2_rad_s2{0.0};        ///< estimated acceleration of the lower wheel
+  /// Angles turned over the past interval, by the encoders (by the speeds, where those are ideal), rad; NaN if unknown.
+  double upper_travel_rad{rig::unknown};
+  double lower_travel_rad{rig::unknown};
 };
 
-/// What a slip controller wants. The torque may lie outside what the actuator can give: it is limited afterwards.
+/// What a slip controller wants. The torque is the static one, b(u) of (7), asked of the actuator: behind the lag (6)
+/// it acts later. It may lie outside what the actuator can give: it is limited afterwards.
 struct SlipOutput {
   double brake_torque_Nm{0.0};
   double slip_velocity_error_m_s{0.0};  ///< e_v of (13)
   double theta_est_N{0.0};              ///< estimated peak tyre force, NaN for controllers that estimate none
+  double slip_ref{rig::unknown};        ///< slip that it follows, if it chooses it itself; NaN: that of the input
 };
 
 /// A slip controller: a pure function of its inputs and its own state, which knows nothing of boards, clocks and files.

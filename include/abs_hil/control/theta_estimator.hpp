@@ -15,6 +15,14 @@ struct AdaptationInterval {
   double weighted_error{0.0};       ///< mean of k(slip_ref) B'P [I; e_v]
 };
 
+/// The same, where the tyre force is known by itself.
+struct ForceInterval {
+  double dt_s{0.0};            ///< > 0
+  double tyre_force_N{0.0};    ///< mean of F, see ThetaEstimator
+  double phi{0.0};             ///< mean of phi(slip)
+  double weighted_error{0.0};  ///< as in AdaptationInterval
+};
+
 /// Estimate of the peak tyre force theta by (17)-(18):
 ///   omega1_hat' = (r1/J1) theta_hat phi - (d1 omega1 + M10 + Tb)/J1,    zeta' = -gamma phi k B'P [I; e_v],
 ///   theta_hat   = zeta + gamma ka1 (J1/r1) (omega1 - omega1_hat).
@@ -37,6 +45,7 @@ class ThetaEstimator {
   /// omega1_hat = omega1, so theta_hat = zeta0, projected.
   void reset() noexcept;
   void update(const AdaptationInterval& past) noexcept;
+  void update(const ForceInterval& past) noexcept;
 
   [[nodiscard]] double theta_N() const noexcept { return theta_N_; }
 

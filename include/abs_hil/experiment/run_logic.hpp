@@ -39,9 +39,11 @@ class RunLogic final : public runtime::CycleLogic {
 
  private:
   void estimate(const rig::Measurement& measurement, double dt_s) noexcept;
+  void note_travel(const rig::Measurement& measurement, double dt_s) noexcept;
   [[nodiscard]] double slip_control(double dt_s, bool entered, rig::ControlState& state) noexcept;
 
   const rig::WheelParameters wheels_;
+  const double rad_per_count_;
   const double slip_ref_;
   const double start_speed_rad_s_;
   std::unique_ptr<control::SlipController> controller_;
@@ -50,6 +52,10 @@ class RunLogic final : public runtime::CycleLogic {
   control::TrackingObserver lower_;
   control::BrakeActuator actuator_;
   rig::WheelSpeeds speeds_{};
+  std::int32_t upper_counts_{0};
+  std::int32_t lower_counts_{0};
+  double upper_travel_rad_{0.0};  ///< over the past interval
+  double lower_travel_rad_{0.0};
   double slip_{0.0};
   double alpha1_rad_s2_{0.0};
   double alpha2_rad_s2_{0.0};

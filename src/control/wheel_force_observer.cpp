@@ -1,0 +1,122 @@
+#include "abs_hil/control/wheel_force_observer.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "abs_hil/rig/encoder_scale.hpp"
+
+namespace abs_hil::control {
+namespace {
+
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Gain = Eigen::Matrix<double, 6, 2>;
+
+/// Transition of (angle1, omega1, angle2, omega2, F, D) over `dt`.
+Matrix6 transition(const rig::WheelParameters& w, double dt) {
+  Matrix6 rate = Matrix6::Zero();
+  rate(0, 1) = rate(2, 3) = 1.0;
+  rate(1, 1) = -w.d1_Nms_rad / w.J1_kg_m2;
+  rate(1, 4) = w.r1_m / w.J1_kg_m2;
+  rate(1, 5) = -1.0 / w.J1_kg_m2;
+  rate(3, 3) = -w.d2_Nms_rad / w.J2_kg_m2;
+  rate(3, 4) = -w.r2_m / w.J2_kg_m2;
+  const Matrix6 step = rate * dt;
+  return Matrix6::Identity() + step + step * step / 2.0 + step * step * step / 6.0;
+}
+
+/// Gain of the steady state of the Riccati recursion.
+Gain steady_gain(const Matrix6& A, const Matrix6& Q, double angle_variance) {
+  constexpr int recursions = 20'000;
+  Eigen::Matrix<double, 2, 6> C = Eigen::Matrix<double, 2, 6>::Zero();
+  C(0, 0) = C(1, 2) = 1.0;
+  const Eigen::Matrix2d R = angle_variance * Eigen::Matrix2d::Identity();
+  Matrix6 P = Matrix6::Identity();
+  Gain gain = Gain::Zero();
+  for (int i = 0; i < recursions; ++i) {
+    const Matrix6 predicted = A * P * A.transpose() + Q;
+    const Eigen::Matrix2d innovation = C * predicted * C.transpose() + R;
+    const Gain next = predicted * C.transpose() * innovation.inverse();
+    P = (Matrix6::Identity() - next * C) * predicted;
+    P = (0.5 * (P + P.transpose())).eval();
+    const bool settled = (next - gain).cwiseAbs().maxCoeff() < 1e-12 * next.cwiseAbs().maxCoeff();
+    gain = next;
+    if (settled) break;
+  }
+  return gain;
+}
+
+/// Steady lag of the estimate behind a force that rises evenly.
+double ramp_delay(const Matrix6& A, const Gain& gain, double dt) {
+  // Error e = truth - estimate after each correction: e+ = (1 - K C)(A e + one step of the ramp in F).
+  Eigen::Matrix<double, 2, 6> C = Eigen::Matrix<double, 2, 6>::Zero();
+  C(0, 0) = C(1, 2) = 1.0;
+  const Matrix6 correction = Matrix6::Identity() - gain * C;
+  Eigen::Matrix<double, 6, 1> drive = Eigen::Matrix<double, 6, 1>::Zero();
+  drive[4] = dt;
+  const Eigen::Matrix<double, 6, 1> error =
+      (Matrix6::Identity() - correction * A).fullPivLu().solve(correction * drive);
+  return error[4];
+}
+
+}  // namespace
+
+WheelForceObserver::WheelForceObserver(const ForceObserverOptions& options, const rig::RigParameters& rig,
+                                       double rate_Hz)
+    : wheels_{rig.wheels} {
+  if (!(options.force_rate_N2_s > 0.0 && options.brake_rate_Nm2_s > 0.0 && rate_Hz > 0.0)) {
+    throw std::invalid_argument("the force observer's noise intensities and the control rate must be > 0");
+  }
+  const double dt = 1.0 / rate_Hz;
+  const Matrix6 A = transition(wheels_, dt);
+  Matrix6 Q = Matrix6::Zero();
+  Q(4, 4) = options.force_rate_N2_s * dt;
+  Q(5, 5) = options.brake_rate_Nm2_s * dt;
+  const double count_rad = rig::radians_per_count(rig.encoder_counts_per_rev);
+  gain_ = steady_gain(A, Q, count_rad * count_rad / 12.0);
+  force_delay_s_ = ramp_delay(A, gain_, dt);
+}
+
+void WheelForceObserver::reset(const rig::WheelSpeeds& speeds) noexcept {
+  state_.setZero();
+  state_[omega1] = speeds.omega1_rad_s;
+  state_[omega2] = speeds.omega2_rad_s;
+  last_speeds_ = speeds;
+}
+
+void WheelForceObserver::predict(double dt_s, double brake_torque_Nm) noexcept {
+  const auto& w = wheels_;
+  const double alpha1 =
+      (w.r1_m * state_[force] - w.d1_Nms_rad * state_[omega1] - w.M10_Nm - brake_torque_Nm - state_[brake_error]) /
+      w.J1_kg_m2;
+  const double alpha2 = (-w.r2_m * state_[force] - w.d2_Nms_rad * state_[omega2] - w.M20_Nm) / w.J2_kg_m2;
+  // The brake stops a wheel, it does not turn it back.
+  const double omega1_after = std::max(0.0, state_[omega1] + alpha1 * dt_s);
+  const double omega2_after = std::max(0.0, state_[omega2] + alpha2 * dt_s);
+  state_[angle1] += 0.5 * (state_[omega1] + omega1_after) * dt_s;
+  state_[angle2] += 0.5 * (state_[omega2] + omega2_after) * dt_s;
+  state_[omega1] = omega1_after;
+  state_[omega2] = omega2_after;
+}
+
+void WheelForceObserver::update(const SlipInput& input) noexcept {
+  if (!(input.dt_s > 0.0)) return;
+  double upper_rad = input.upper_travel_rad;
+  double lower_rad = input.lower_travel_rad;
+  if (std::isnan(upper_rad) || std::isnan(lower_rad)) {
+    upper_rad = 0.5 * (last_speeds_.omega1_rad_s + input.speeds.omega1_rad_s) * input.dt_s;
+    lower_rad = 0.5 * (last_speeds_.omega2_rad_s + input.speeds.omega2_rad_s) * input.dt_s;
+  }
+  last_speeds_ = input.speeds;
+
+  predict(input.dt_s, input.mean_brake_torque_Nm);
+  const Eigen::Vector2d residual{upper_rad - state_[angle1], lower_rad - state_[angle2]};
+  state_ += gain_ * residual;
+  state_[angle1] -= upper_rad;
+  state_[angle2] -= lower_rad;
+  state_[omega1] = std::max(0.0, state_[omega1]);
+  state_[omega2] = std::max(0.0, state_[omega2]);
+}
+
+}  // namespace abs_hil::control
