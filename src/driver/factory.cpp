@@ -1,6 +1,10 @@
 #include "abs_hil/driver/factory.hpp"
 
 #include <array>
+#include <vector>
+
+#include "abs_hil/driver/pci/discovery.hpp"
+#include "abs_hil/driver/pci/pci_driver.hpp"
 
 namespace abs_hil::driver {
 
@@ -12,9 +16,44 @@ std::span<const BackendEntry> backends() noexcept {
   return entries;
 }
 
-std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options) {
+std::span<const std::string_view> board_kinds() noexcept {
+  static constexpr std::array<std::string_view, 1> kinds{"pci"};
+  return kinds;
+}
+
+std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options, bool lock_step) {
+  if (options.kind == "pci") {
+    return std::make_unique<pci::PciDriver>(options.pci,
+                                            [pci = options.pci, lock_step] { return pci::open_card(pci, lock_step); });
+  }
   throw Unavailable("backend rig: driver.kind = \"" + options.kind +
-                    "\": this build drives no board yet; use --backend sim");
+                    "\": this build does not drive that board; use driver.kind=pci or --backend sim");
+}
+
+BoardReport look_for_board(const DriverOptions& options) {
+  BoardReport report;
+  report.what = "board for --backend rig: RT-DAC4/PCI (driver.kind=" + options.kind + ")";
+  try {
+    const std::vector<std::string> cards = pci::find_cards(options.pci.root);
+    report.usable = !cards.empty();
+    for (const std::string& card : cards) report.what += ", " + card;
+    if (cards.empty()) {
+      report.problem = "none in " + options.pci.root + " (vendor 0x10b5, device 0x2497)";
+      report.fix = "lspci -nn -d 10b5:2497 should show it; docs/rig-setup.md. Without the rig use --backend sim";
+    }
+  } catch (const Unavailable& error) {
+    report.problem = error.what();
+    report.fix = "docs/rig-setup.md. Without the rig use --backend sim";
+  }
+  return report;
+}
+
+std::string verification_note(const DriverOptions& options) {
+  if (options.verified_on_hardware) return {};
+  return "backend rig, driver.kind=" + options.kind +
+         ": not verified on hardware. Its registers come from the maker's documents and were tried on an emulator "
+         "alone: "
+         "go through docs/rig-setup.md with abs_hil commission, then set driver.verified_on_hardware=true";
 }
 
 }  // namespace abs_hil::driver
