@@ -30,24 +30,6 @@ std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options, bool lo
                     "\": this build does not drive that board; use driver.kind=pci or --backend sim");
 }
 
-BoardReport look_for_board(const DriverOptions& options) {
-  BoardReport report;
-  report.what = "board for --backend rig: RT-DAC4/PCI (driver.kind=" + options.kind + ")";
-  try {
-    const std::vector<std::string> cards = pci::find_cards(options.pci.root);
-    report.usable = !cards.empty();
-    for (const std::string& card : cards) report.what += ", " + card;
-    if (cards.empty()) {
-      report.problem = "none in " + options.pci.root + " (vendor 0x10b5, device 0x2497)";
-      report.fix = "lspci -nn -d 10b5:2497 should show it; docs/rig-setup.md. Without the rig use --backend sim";
-    }
-  } catch (const Unavailable& error) {
-    report.problem = error.what();
-    report.fix = "docs/rig-setup.md. Without the rig use --backend sim";
-  }
-  return report;
-}
-
 std::string verification_note(const DriverOptions& options) {
   if (options.verified_on_hardware) return {};
   return "backend rig, driver.kind=" + options.kind +

@@ -67,8 +67,8 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   if (!read.ok()) {
     io_error_ = read;
     gate_.latch(rig::Reason::driver_read_failed, static_cast<double>(read.error));
-  } else if (measurement_.trip_flags != 0) {
-    gate_.latch(rig::Reason::board_interlock_tripped, static_cast<double>(measurement_.trip_flags));
+  } else {
+    gate_.watch_board(measurement_);
   }
   record.measurement = measurement_;
   record.truth = driver_.truth();

@@ -35,16 +35,6 @@ struct BackendEntry {
 /// @param lock_step  drive an emulator's time (`options.emulated`, `--fast`)
 [[nodiscard]] std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options, bool lock_step = false);
 
-/// What `abs_hil doctor` says about the boards of one kind on this machine.
-struct BoardReport {
-  bool usable{false};
-  std::string what{};  ///< the board, and how many there are
-  std::string problem{};
-  std::string fix{};
-};
-/// Looks for the board that `options.kind` names, without opening or writing anything.
-[[nodiscard]] BoardReport look_for_board(const DriverOptions& options);
-
 /// "not verified on hardware ..." until the configuration says otherwise; empty then.
 [[nodiscard]] std::string verification_note(const DriverOptions& options);
 
