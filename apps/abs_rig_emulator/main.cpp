@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sched.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -45,6 +46,7 @@ struct Arguments {
   std::uint32_t bar_bytes{256};
   std::string bar_kind{"io"};
   int cpu{-1};
+  int priority{81};
 };
 
 void add_card_options(CLI::App& cli, emulator::CardOptions& card) {
@@ -80,6 +82,9 @@ void add_options(CLI::App& cli, Arguments& a) {
       ->check(CLI::IsMember({"io", "memory"}))
       ->capture_default_str();
   cli.add_option("--cpu", a.cpu, "CPU to run on: the client's, for short accesses");
+  cli.add_option("--priority", a.priority, "SCHED_FIFO priority, above the client's; 0: none")
+      ->check(CLI::Range(0, 98))
+      ->capture_default_str();
   add_card_options(cli, a.emulator.card);
   cli.footer(std::string("Control commands (--command, --control):\n") + app::EmulatedCard::commands());
 }
@@ -159,12 +164,24 @@ void pin_to(int cpu) {
   }
 }
 
+/// As quick to answer as a card would be, if permitted: an emulator waits for its turn, a card never does.
+void take_priority(const Arguments& a) {
+  if (a.priority == 0 || a.emulator.lock_step) return;
+  sched_param wanted{};
+  wanted.sched_priority = a.priority;
+  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0 || sched_setscheduler(0, SCHED_FIFO, &wanted) != 0) {
+    say(std::string("not in real time (") + std::strerror(errno) +
+        "): slow answers are to be expected; see abs_hil doctor, or --priority 0");
+  }
+}
+
 int serve(Arguments& a) {
   read_plant(a);
   app::EmulatedCard card(a.emulator);
   for (const std::string& fault : a.faults) static_cast<void>(card.obey("fault " + fault));
   for (const std::string& command : a.commands) static_cast<void>(card.obey(command));
   pin_to(a.cpu);
+  take_priority(a);
   std::filesystem::create_directories(a.pci_root);
   app::FuseTree tree(a.pci_root, a.bdfs, files_of(a), card);
   const driver::pci::FileDescriptor control = open_control(a.control_fifo);

@@ -1,6 +1,7 @@
 #include "abs_hil/driver/factory.hpp"
 
 #include <array>
+#include <ctime>
 #include <vector>
 
 #include "abs_hil/driver/pci/discovery.hpp"
@@ -21,10 +22,22 @@ std::span<const std::string_view> board_kinds() noexcept {
   return kinds;
 }
 
+namespace {
+
+/// CLOCK_MONOTONIC without a system call.
+std::int64_t monotonic_ns() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
+
+}  // namespace
+
 std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options, bool lock_step) {
   if (options.kind == "pci") {
-    return std::make_unique<pci::PciDriver>(options.pci,
-                                            [pci = options.pci, lock_step] { return pci::open_card(pci, lock_step); });
+    return std::make_unique<pci::PciDriver>(
+        options.pci, [pci = options.pci, lock_step] { return pci::open_card(pci, lock_step); },
+        lock_step ? nullptr : monotonic_ns);
   }
   throw Unavailable("backend rig: driver.kind = \"" + options.kind +
                     "\": this build does not drive that board; use driver.kind=pci or --backend sim");

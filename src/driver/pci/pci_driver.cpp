@@ -14,6 +14,8 @@ namespace {
 constexpr double s_per_ns = 1e-9;
 /// Counts that an encoder may jump beyond what its speed explains: vibration, and the reads' own lateness.
 constexpr double plausible_slack_counts = 256.0;
+/// Counters whose reading took longer belong to no one instant: at 170 rad/s it is 28 counts. They are read once more.
+constexpr std::int64_t late_reading_ns = 250'000;
 
 bool is_duty(double value) noexcept { return value >= 0.0 && value <= 1.0; }  // false for NaN
 
@@ -56,10 +58,11 @@ class PciDriver::Access {
   std::uint32_t all_ones_at_{0};
 };
 
-PciDriver::PciDriver(const PciOptions& options, OpenCard open_card)
+PciDriver::PciDriver(const PciOptions& options, OpenCard open_card, ReadClock read_clock)
     : options_(options),
       mode_(options.pwm_mode == "8-bit" ? PwmMode::bits_8 : PwmMode::bits_12),
-      open_card_(std::move(open_card)) {
+      open_card_(std::move(open_card)),
+      read_clock_(read_clock) {
   for (const auto& [key, sign] : {std::pair("driver.pci.lower_sign", options.lower_sign),
                                   std::pair("driver.pci.upper_sign", options.upper_sign)}) {
     if (sign != 1 && sign != -1) {
@@ -154,8 +157,8 @@ void PciDriver::read_health(Access& card, std::uint32_t offset) noexcept {
   }
 }
 
-bool PciDriver::plausible(std::int64_t now_ns, const std::array<std::int32_t, 2>& before) const noexcept {
-  const double elapsed_s = static_cast<double>(now_ns - last_read_ns_) * s_per_ns;
+bool PciDriver::plausible(std::int64_t read_ns, const std::array<std::int32_t, 2>& before) const noexcept {
+  const double elapsed_s = static_cast<double>(read_ns - last_read_ns_) * s_per_ns;
   const double most = plausible_slack_counts + options_.plausible_speed_rad_s * elapsed_s /
                                                    rig::radians_per_count(options_.encoder_counts_per_rev);
   for (std::size_t wheel = 0; wheel < counts_.size(); ++wheel) {
@@ -174,6 +177,18 @@ IoResult PciDriver::checked_for_absence(const Access& card) noexcept {
   return card.result();
 }
 
+bool PciDriver::read_wheels_at(Access& card, std::int64_t& read_ns) noexcept {
+  if (read_clock_ == nullptr) {
+    read_wheels(card);
+    return true;
+  }
+  const std::int64_t before_ns = read_clock_();
+  read_wheels(card);
+  const std::int64_t took_ns = read_clock_() - before_ns;
+  read_ns = before_ns + took_ns / 2;
+  return took_ns < late_reading_ns || !card.result().ok();
+}
+
 IoResult PciDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept {
   if (card_.time) {
     const IoResult result = card_.time->advance_to(emulated_ns_ + now_ns - activated_ns_);
@@ -181,15 +196,16 @@ IoResult PciDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) 
   }
   const std::array<std::int32_t, 2> before = counts_;
   Access card(*card_.window);
-  read_wheels(card);
+  std::int64_t read_ns = now_ns;
+  if (!read_wheels_at(card, read_ns)) static_cast<void>(read_wheels_at(card, read_ns));
   read_health(card, health_registers[next_health_]);
   if (const IoResult result = checked_for_absence(card); !result.ok()) return result;
-  if (!plausible(now_ns, before)) return {IoError::implausible_answer, reg::encoder_counter};
+  if (!plausible(read_ns, before)) return {IoError::implausible_answer, reg::encoder_counter};
   next_health_ = (next_health_ + 1) % health_registers.size();
-  last_read_ns_ = now_ns;
+  last_read_ns_ = read_ns;
 
   measurement = {};
-  measurement.time_ns = now_ns;
+  measurement.time_ns = read_ns;
   measurement.upper_counts = counts_[0];
   measurement.lower_counts = counts_[1];
   measurement.trip_flags = health_[0];

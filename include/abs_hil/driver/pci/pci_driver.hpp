@@ -27,16 +27,20 @@ inline constexpr std::size_t accesses_per_cycle = accesses_in_read + accesses_in
 
 /// The RT-DAC4/PCI with ABS logic. Not verified on hardware.
 ///
-/// `read` and `write` take `accesses_per_cycle` register accesses together, about 1 us each on PCI, and at most four
-/// more when an answer looks like that of a card that is gone or has tripped. The motor enable is this driver's own
+/// `read` and `write` take `accesses_per_cycle` register accesses together, about 1 us each on PCI, and four more
+/// when the counters' reading was held up, and at most four more when an answer looks like that of a card that is gone
+/// or has tripped. The motor enable is this driver's own
 /// gate: the ABS logic has no such bit. After a crash the card is assumed to go on with its last duties: it has no
 /// known watchdog.
 class PciDriver final : public RigDriver {
  public:
   using OpenCard = std::function<Card()>;
+  using ReadClock = std::int64_t (*)() noexcept;
   /// Throws std::invalid_argument, naming the key, if an option is outside its range.
   /// @param open_card called by `configure`; throws Unavailable
-  PciDriver(const PciOptions& options, OpenCard open_card);
+  /// @param read_clock  the clock that `now_ns` comes from: counters are stamped with the middle of their reading, so
+  ///                    that a late answer does not look like speed. None in virtual time, where reading takes none.
+  PciDriver(const PciOptions& options, OpenCard open_card, ReadClock read_clock = nullptr);
   ~PciDriver() override;
 
   [[nodiscard]] std::string_view name() const noexcept override { return "pci"; }
@@ -54,16 +58,19 @@ class PciDriver final : public RigDriver {
 
   void take_over(Access& card) noexcept;
   void read_wheels(Access& card) noexcept;
+  /// Reads both counters and stamps them; false if that took too long.
+  bool read_wheels_at(Access& card, std::int64_t& read_ns) noexcept;
   void read_health(Access& card, std::uint32_t offset) noexcept;
   void write_pwm(Access& card, Pwm pwm, std::uint32_t width) noexcept;
   [[nodiscard]] bool tripped_to_zero(Access& card, std::uint32_t width_read) noexcept;
-  [[nodiscard]] bool plausible(std::int64_t now_ns, const std::array<std::int32_t, 2>& before) const noexcept;
+  [[nodiscard]] bool plausible(std::int64_t read_ns, const std::array<std::int32_t, 2>& before) const noexcept;
   [[nodiscard]] IoResult checked_for_absence(const Access& card) noexcept;
 
   PciOptions options_;
   PwmMode mode_;
   OpenCard open_card_;
   Card card_{};
+  ReadClock read_clock_;
   std::uint32_t version_{0};
   std::uint32_t channel_counts_{0};
 
