@@ -20,7 +20,8 @@ int doctor(const RunRequest& request, const std::string& only, bool json) {
                                            .backend = s.backend,
                                            .make_driver = [&s] { return make_driver(s, false); }};
   std::vector<diagnosis::Finding> findings = diagnosis::examine(examination);
-  if (const std::string note = driver::verification_note(s.driver); !note.empty() && (only.empty() || only == "boards")) {
+  if (const std::string note = driver::verification_note(s.driver);
+      !note.empty() && (only.empty() || only == "boards")) {
     findings.push_back({.check = "boards", .what = note, .standing = diagnosis::Standing::note});
   }
   const bool well = diagnosis::turned_out_well(examination, findings);

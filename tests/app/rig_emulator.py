@@ -52,9 +52,23 @@ class Emulator:
         part = answer[answer.index('drive '):].split(',')
         return float(part[0].split()[1]), float(part[1].split()[1])
 
+    def lower_speed(self):
+        return float(self.command('status').split('lower ')[1].split()[0])
+
+    def time_s(self):
+        return float(self.command('status').split('time ')[1].split()[0])
+
+    def turn(self, wheel, revolutions):
+        """By hand: over some time, as the driver takes nothing faster for a wheel."""
+        start = self.time_s()
+        while self.time_s() < start + 0.02:
+            pass
+        self.command(f'turn {wheel} {revolutions}')
+
     def kill(self):
         self.process.kill()
         self.process.wait()
+        self.process.stdout.close()
         subprocess.run(['umount', '-l', self.root], stderr=subprocess.DEVNULL)
 
     def end(self):
@@ -69,15 +83,22 @@ class RigTest(ProgramTest):
     def setUp(self):
         super().setUp()
         self._emulators = []
+        self._programs = []
 
     def tearDown(self):
+        for program in self._programs:
+            if program.poll() is None:
+                program.kill()
+                program.communicate()
         for emulator in self._emulators:
             if emulator.process.poll() is None:
                 emulator.end()
         super().tearDown()  # removes the folder, in which nothing may be mounted any more
 
     def emulator(self, *args):
-        self._emulators.append(Emulator(self.folder, *args))
+        folder = self.folder / str(len(self._emulators))
+        folder.mkdir()
+        self._emulators.append(Emulator(folder, *args))
         return self._emulators[-1]
 
     def lock_step(self, emulator, *args):
@@ -85,5 +106,7 @@ class RigTest(ProgramTest):
                                 f'driver.pci.root={emulator.root}', *args)
 
     def real_time(self, emulator, *args):
-        return subprocess.Popen([PROGRAM, '--backend', 'rig', '--no-lcm', '--set', f'driver.pci.root={emulator.root}',
-                                 *map(str, args)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self._programs.append(subprocess.Popen(
+            [PROGRAM, '--backend', 'rig', '--no-lcm', '--set', f'driver.pci.root={emulator.root}', *map(str, args)],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
+        return self._programs[-1]
