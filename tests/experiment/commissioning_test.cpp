@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "driver/pci/model_card.hpp"
 #include "catch.hpp"
+#include "driver/pci/model_card.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::Contains;

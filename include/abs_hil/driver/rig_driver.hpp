@@ -13,8 +13,8 @@
 namespace abs_hil::driver {
 
 /// Life of a driver: configure -> activate -> (read, write)* -> deactivate; activate again goes on from `inactive`.
-/// `failed` latches: after a failed write the outputs are made safe and only a new `configure` leads out of it. A failed
-/// read leaves the driver active: whether one lost answer matters is for the caller to say.
+/// `failed` latches: after a failed write the outputs are made safe and only a new `configure` leads out of it. A
+/// failed read leaves the driver active: whether one lost answer matters is for the caller to say.
 enum class DriverState : std::uint8_t { unconfigured, inactive, active, failed };
 
 /// One rig behind one board, real or simulated. The public functions keep the lifecycle for every backend alike:

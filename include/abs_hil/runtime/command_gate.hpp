@@ -46,8 +46,8 @@ class CommandGate {
 
   /// @param speeds the speeds estimated from the latest measurement
   [[nodiscard]] GateResult check(const rig::Command& wanted, const rig::WheelSpeeds& speeds) noexcept;
-  /// Latches what the board reports about itself: a trip of its own interlocks, supply, temperature. What it cannot tell
-  /// (NaN) is no fault.
+  /// Latches what the board reports about itself: a trip of its own interlocks, supply, temperature. What it cannot
+  /// tell (NaN) is no fault.
   void watch_board(const rig::Measurement& measurement) noexcept;
   /// Latches a fault found elsewhere (driver, executive). The first one stays.
   void latch(rig::Reason fault, double value) noexcept;

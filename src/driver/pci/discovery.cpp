@@ -66,8 +66,8 @@ std::string choose(const PciOptions& options) {
   }
   const std::vector<std::string> cards = find_cards(root);
   if (cards.empty()) {
-    refuse("no RT-DAC4/PCI card (" + hex(vendor_id) + ":" + hex(device_id) + ") in " + options.root + "; " +
-           how_to_look + ". Without the rig use --backend sim");
+    refuse("no RT-DAC4/PCI card (driver.kind=pci, " + hex(vendor_id) + ":" + hex(device_id) + ") in " + options.root +
+           "; " + how_to_look + ". Without the rig use --backend sim");
   }
   if (cards.size() > 1) {
     refuse(std::to_string(cards.size()) + " cards in " + options.root + ": " + joined(cards) +

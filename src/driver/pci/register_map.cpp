@@ -52,9 +52,9 @@ constexpr std::array table{
     Register{reg::temperature_max, "highest temperature", "deg C", "raw", documented, checked, limit_open},
     Register{reg::trip_flags, "trip flags", "", "bit 1 supply; bits 0 and 2 temperature and overspeed", documented,
              in_turn, "which of bits 0 and 2 is temperature and which overspeed: any bit counts as a trip"},
-    Register{reg::temperature_high, "temperature sensor, high time", "", "235 - 400 high / low is deg C", documented,
+    Register{reg::temperature_high, "temperature sensor, high time", "", "235 - 400 high / low is deg C", inferred,
              in_turn},
-    Register{reg::temperature_low, "temperature sensor, low time", "", "as the high time", documented, in_turn,
+    Register{reg::temperature_low, "temperature sensor, low time", "", "as the high time", inferred, in_turn,
              "what it shows without a sensor; 0 is taken for none"},
 };
 
