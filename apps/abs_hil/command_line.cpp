@@ -1,5 +1,7 @@
 #include "command_line.hpp"
 
+#include <algorithm>
+
 #include "abs_hil/experiment/experiments.hpp"
 #include "abs_hil/settings/config_error.hpp"
 #include "abs_hil/settings/config_file.hpp"
@@ -16,8 +18,11 @@ runtime::RealtimeMode realtime_mode(const std::string& name) {
 
 void check_together(const RunRequest& request) {
   const settings::Settings& s = request.settings;
-  if (s.backend == "rig" && request.outputs.fast) {
-    throw settings::ConfigError("--fast: the rig runs in real time only; leave it out or use --backend sim");
+  if (s.backend == "rig" && request.outputs.fast && !s.driver.emulated) {
+    throw settings::ConfigError(
+        "--fast: the rig runs in real time only; leave it out, use --backend sim, or for an emulator in lock-step "
+        "(never "
+        "hardware) --set driver.emulated=true");
   }
   if (request.outputs.fast && request.outputs.histogram_file) {
     throw settings::ConfigError(
@@ -35,6 +40,14 @@ void check_together(const RunRequest& request) {
   if (s.control.adaptive.theta_min_N >= s.control.adaptive.theta_max_N) {
     throw settings::ConfigError("control.adaptive.theta_min_N: must be less than control.adaptive.theta_max_N");
   }
+}
+
+/// What the board's driver never sends the gate and the controller's anti-windup must know, and its checks of counts
+/// need the wheels' encoders.
+void apply_board_limits(settings::Settings& s) {
+  s.gate.brake_duty_max = std::min(s.gate.brake_duty_max, s.driver.pci.brake_duty_max);
+  s.gate.motor_duty_max = std::min(s.gate.motor_duty_max, s.driver.pci.motor_duty_max);
+  s.driver.pci.encoder_counts_per_rev = s.plant.rig.encoder_counts_per_rev;
 }
 
 }  // namespace
@@ -63,6 +76,7 @@ RunRequest merge(const RunOptions& options) {
     s.plant.friction_profile = experiment::friction_profile_of(s.experiment.name);
   }
   check_together(request);
+  if (s.backend == "rig") apply_board_limits(s);
   request.config_json = keys.to_json().dump();
   return request;
 }

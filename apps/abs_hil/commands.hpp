@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "abs_hil/experiment/commissioning.hpp"
 #include "abs_hil/experiment/run_session.hpp"
 #include "command_line.hpp"
 
@@ -25,6 +26,8 @@ struct LatencyOptions {
 /// `abs_hil latency`: runs the real cycle on the simulated rig for a while and judges how well this computer keeps
 /// time.
 int latency(const RunRequest& request, const LatencyOptions& options);
+/// `abs_hil commission`: first steps with a rig, each asked for. Throws driver::Unavailable.
+int commission(const RunRequest& request, const experiment::CommissioningOptions& options);
 
 /// The exit status of a run that has ended so.
 [[nodiscard]] int status_of(const experiment::RunOutcome& outcome);

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "abs_hil/driver/factory.hpp"
 #include "abs_hil/telemetry/lcm_url.hpp"
 #include "commands.hpp"
 #include "exit_status.hpp"
@@ -17,8 +18,12 @@ int doctor(const RunRequest& request, const std::string& only, bool json) {
                                            .lcm_url = telemetry::default_lcm_url(),
                                            .realtime = s.realtime,
                                            .backend = s.backend,
-                                           .make_driver = [&s] { return make_driver(s); }};
-  const std::vector<diagnosis::Finding> findings = diagnosis::examine(examination);
+                                           .make_driver = [&s] { return make_driver(s, false); }};
+  std::vector<diagnosis::Finding> findings = diagnosis::examine(examination);
+  if (const std::string note = driver::verification_note(s.driver);
+      !note.empty() && (only.empty() || only == "boards")) {
+    findings.push_back({.check = "boards", .what = note, .standing = diagnosis::Standing::note});
+  }
   const bool well = diagnosis::turned_out_well(examination, findings);
   if (json) {
     const nlohmann::ordered_json report{

@@ -24,7 +24,7 @@ int latency(const RunRequest& request, const LatencyOptions& options) {
   } catch (const std::runtime_error& error) {
     throw settings::ConfigError(error.what());
   }
-  const std::unique_ptr<driver::RigDriver> driver = make_driver(s);
+  const std::unique_ptr<driver::RigDriver> driver = make_driver(s, false);
   runtime::MonotonicClock clock;
   experiment::RunSession session(clock, *driver, make_logic(s, experiment::plan_timing_load(options.duration_s)),
                                  s.gate, {}, s.realtime.overruns);

@@ -135,6 +135,22 @@ void refuse_run_options(const CLI::App& cli) {
   }
 }
 
+/// The command `abs_hil commission` as typed.
+struct CommissionCommand {
+  app::RunOptions options{.backend = "rig"};
+  experiment::CommissioningOptions pulses{};
+  CLI::App* parser{nullptr};
+};
+
+void add_commission(CLI::App& cli, CommissionCommand& command) {
+  command.parser = cli.add_subcommand("commission", "first steps with a real rig, each asked for");
+  add_configuration_options(*command.parser, command.options);
+  command.parser->add_option("--drive-duty", command.pulses.drive_duty, "of the drive pulse, at most 0.3")
+      ->capture_default_str();
+  command.parser->add_option("--brake-duty", command.pulses.brake_duty, "of the brake pulse, at most 0.7")
+      ->capture_default_str();
+}
+
 int dispatch(int argc, char** argv) {
   CLI::App cli{"Driver, adaptive slip controller and simulator of the Inteco ABS laboratory rig"};
   cli.name("abs_hil");
@@ -151,6 +167,8 @@ int dispatch(int argc, char** argv) {
   add_latency(cli, latency);
   app::CompareOptions compare_options;
   const auto* compare = add_compare(cli, compare_options);
+  CommissionCommand commission;
+  add_commission(cli, commission);
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -165,6 +183,7 @@ int dispatch(int argc, char** argv) {
     refuse_run_options(cli);
     return app::compare(compare_options);
   }
+  if (commission.parser->parsed()) return app::commission(app::merge(commission.options), commission.pulses);
   return app::run(app::merge(options));
 }
 

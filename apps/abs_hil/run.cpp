@@ -11,6 +11,7 @@
 #include "abs_hil/experiment/run_session.hpp"
 #include "abs_hil/runtime/overrun_reporter.hpp"
 #include "abs_hil/telemetry/file_error.hpp"
+#include "board_notes.hpp"
 #include "commands.hpp"
 #include "exit_status.hpp"
 #include "run_outputs.hpp"
@@ -25,7 +26,7 @@ std::string reason_text(const experiment::RunOutcome& outcome) {
   std::string text(rig::description(outcome.reason));
   if (rig::is_fault(outcome.reason)) text += fmt::format(" (value {:.6g})", outcome.reason_value);
   if (!outcome.io_error.ok()) {
-    text += fmt::format(": {} at {:#x}", driver::description(outcome.io_error.error), outcome.io_error.where);
+    text += ": " + driver::error_text(outcome.io_error);
   }
   return text;
 }
@@ -93,7 +94,7 @@ std::string realtime_refusal(const runtime::RealtimeReport& report) {
 
 int run(const RunRequest& request) {
   const settings::Settings& s = request.settings;
-  const std::unique_ptr<driver::RigDriver> driver = make_driver(s);
+  const std::unique_ptr<driver::RigDriver> driver = make_driver(s, request.outputs.fast);
   experiment::RunLogicParts logic = make_logic(s, experiment::plan_experiment(s.experiment, s.control.v_min_m_s));
   RunOutputs outputs(request);
   runtime::MonotonicClock real_clock;
@@ -106,8 +107,10 @@ int run(const RunRequest& request) {
   TimingWatch timing(request, session, late_cycles);
   outputs.watch(session);
   note_signals();
+  BoardNotes board_notes(s, *driver);
 
   const auto poll = [&] {
+    board_notes.log_once();
     timing.poll();
     outputs.poll();
     if (const rig::Reason signal = signalled(); signal != rig::Reason::none) return signal;
@@ -125,12 +128,16 @@ int run(const RunRequest& request) {
   if (!outcome.ran) {
     throw driver::Unavailable(realtime_refusal(outcome.realtime));
   }
+  board_notes.log_once();
   const analysis::RunSummary summary = summarise(request, session, outcome, outputs);
   outputs.write(summary, session.executive().statistics());
   fmt::print("{}", analysis::to_text(summary));
   if (!outcome.completed()) spdlog::error("run ended early: {}", summary.reason);
   if (!outcome.safe_state.ok()) {
-    spdlog::error("the safe state may not have reached the board: {}", driver::description(outcome.safe_state.error));
+    spdlog::error(
+        "the safe state may not have reached the board ({}): its PWMs may hold their last duties. Press the "
+        "E-stop and switch the rig off",
+        driver::error_text(outcome.safe_state));
   }
   if (!lost.empty()) {
     spdlog::error("recorded data was lost: {}", lost);

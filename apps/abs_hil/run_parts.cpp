@@ -8,8 +8,8 @@
 
 namespace abs_hil::app {
 
-std::unique_ptr<driver::RigDriver> make_driver(const settings::Settings& s) {
-  if (s.backend == "rig") return driver::make_rig_driver(s.driver);
+std::unique_ptr<driver::RigDriver> make_driver(const settings::Settings& s, bool fast) {
+  if (s.backend == "rig") return driver::make_rig_driver(s.driver, fast);
   return std::make_unique<driver::SimDriver>(s.plant,
                                              driver::SimStart{.seed = static_cast<std::uint64_t>(s.seed),
                                                               .start_speed_rad_s = s.experiment.start_speed_rad_s});

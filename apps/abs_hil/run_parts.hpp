@@ -10,8 +10,8 @@
 
 namespace abs_hil::app {
 
-/// The driver of the backend that the settings name. Throws driver::Unavailable.
-[[nodiscard]] std::unique_ptr<driver::RigDriver> make_driver(const settings::Settings& settings);
+/// The driver of the backend that the settings name; with `fast` it runs in virtual time. Throws driver::Unavailable.
+[[nodiscard]] std::unique_ptr<driver::RigDriver> make_driver(const settings::Settings& settings, bool fast);
 /// What a run's logic is made of. Throws std::invalid_argument. `settings` must outlive the construction of the logic.
 [[nodiscard]] experiment::RunLogicParts make_logic(const settings::Settings& settings,
                                                    std::vector<experiment::PhasePlan> plans);

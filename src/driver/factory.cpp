@@ -1,6 +1,11 @@
 #include "abs_hil/driver/factory.hpp"
 
 #include <array>
+#include <ctime>
+#include <vector>
+
+#include "abs_hil/driver/pci/discovery.hpp"
+#include "abs_hil/driver/pci/pci_driver.hpp"
 
 namespace abs_hil::driver {
 
@@ -12,9 +17,38 @@ std::span<const BackendEntry> backends() noexcept {
   return entries;
 }
 
-std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options) {
+std::span<const std::string_view> board_kinds() noexcept {
+  static constexpr std::array<std::string_view, 1> kinds{"pci"};
+  return kinds;
+}
+
+namespace {
+
+/// CLOCK_MONOTONIC without a system call.
+std::int64_t monotonic_ns() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
+
+}  // namespace
+
+std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options, bool lock_step) {
+  if (options.kind == "pci") {
+    return std::make_unique<pci::PciDriver>(
+        options.pci, [pci = options.pci, lock_step] { return pci::open_card(pci, lock_step); },
+        lock_step ? nullptr : monotonic_ns);
+  }
   throw Unavailable("backend rig: driver.kind = \"" + options.kind +
-                    "\": this build drives no board yet; use --backend sim");
+                    "\": this build does not drive that board; use driver.kind=pci or --backend sim");
+}
+
+std::string verification_note(const DriverOptions& options) {
+  if (options.verified_on_hardware) return {};
+  return "backend rig, driver.kind=" + options.kind +
+         ": not verified on hardware. Its registers come from the maker's documents and were tried on an emulator "
+         "alone: "
+         "go through docs/rig-setup.md with abs_hil commission, then set driver.verified_on_hardware=true";
 }
 
 }  // namespace abs_hil::driver

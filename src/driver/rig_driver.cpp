@@ -1,8 +1,19 @@
 #include "abs_hil/driver/rig_driver.hpp"
 
+#include <array>
+#include <cstdio>
+#include <cstring>
 #include <string>
 
 namespace abs_hil::driver {
+
+std::string error_text(const IoResult& result) {
+  std::array<char, 16> place{};
+  std::snprintf(place.data(), place.size(), " at 0x%x", result.where);
+  std::string text = std::string(description(result.error)) + place.data();
+  if (result.errno_value != 0) text += std::string(": ") + std::strerror(result.errno_value);
+  return text;
+}
 
 void RigDriver::configure() {
   static_cast<void>(deactivate());

@@ -11,6 +11,17 @@ void CommandGate::latch(rig::Reason fault, double value) noexcept {
   fault_value_ = value;
 }
 
+void CommandGate::watch_board(const rig::Measurement& measurement) noexcept {
+  if (const std::uint32_t flags = measurement.trip_flags; flags != 0) {
+    latch(flags == rig::trip::supply ? rig::Reason::board_supply_tripped : rig::Reason::board_interlock_tripped,
+          static_cast<double>(flags));
+  } else if (measurement.supply_V < options_.supply_min_V) {
+    latch(rig::Reason::board_supply_low, measurement.supply_V);
+  } else if (measurement.temperature_C > options_.temperature_max_C) {
+    latch(rig::Reason::board_too_hot, measurement.temperature_C);
+  }
+}
+
 GateResult CommandGate::check(const rig::Command& wanted, const rig::WheelSpeeds& speeds) noexcept {
   for (const double value : {wanted.motor_duty, wanted.brake_duty, wanted.brake_torque_Nm}) {
     if (!std::isfinite(value)) latch(rig::Reason::command_not_finite, value);

@@ -65,10 +65,10 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
 
   const driver::IoResult read = driver_.read(woken_ns, measurement_);
   if (!read.ok()) {
-    io_error_ = read;
+    if (io_error_.ok()) io_error_ = read;
     gate_.latch(rig::Reason::driver_read_failed, static_cast<double>(read.error));
-  } else if (measurement_.trip_flags != 0) {
-    gate_.latch(rig::Reason::board_interlock_tripped, static_cast<double>(measurement_.trip_flags));
+  } else {
+    gate_.watch_board(measurement_);
   }
   record.measurement = measurement_;
   record.truth = driver_.truth();
@@ -86,7 +86,7 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
 
   const driver::IoResult written = driver_.write(gated.command);
   if (!written.ok()) {
-    io_error_ = written;
+    if (io_error_.ok()) io_error_ = written;
     gate_.latch(rig::Reason::driver_write_failed, static_cast<double>(written.error));
     logic_.end_early(rig::Reason::driver_write_failed, static_cast<double>(written.error));
   }

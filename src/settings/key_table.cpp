@@ -49,7 +49,12 @@ void assign_number(const Key& key, Number& target, const Value& value, std::stri
 Value parse_value(std::string_view text) {
   if (text == "true" || text == "false") return text == "true";
   const char* end = text.data() + text.size();
+  const bool is_hex = text.starts_with("0x") || text.starts_with("0X");
   std::int64_t integer = 0;
+  if (is_hex) {
+    const auto [at, error] = std::from_chars(text.data() + 2, end, integer, 16);
+    if (error == std::errc() && at == end) return integer;
+  }
   if (const auto [at, error] = std::from_chars(text.data(), end, integer); error == std::errc() && at == end) {
     return integer;
   }

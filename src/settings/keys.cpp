@@ -5,6 +5,7 @@
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/experiment/experiments.hpp"
 #include "abs_hil/settings/key_table.hpp"
+#include "driver_keys.hpp"
 
 namespace abs_hil::settings {
 
@@ -287,14 +288,18 @@ KeyTable::KeyTable(Settings& s) {
   add_adaptive_actuator_keys(keys_, s.control.adaptive_actuator);
   add_adaptive_peak_keys(keys_, s.control.adaptive_peak);
   add_experiment_keys(keys_, s.experiment);
+  add_driver_keys(keys_, s.driver);
   keys_.insert(
       keys_.end(),
       {
-          {"driver.kind", "", "board behind --backend rig", &s.driver.kind, {}, {"none"}},
           {"gate.motor_duty_max", "", "largest drive PWM that may reach the rig", &s.gate.motor_duty_max, positive(1)},
           {"gate.brake_duty_max", "", "largest brake PWM that may reach the rig", &s.gate.brake_duty_max, positive(1)},
           {"gate.overspeed_rad_s", "rad/s", "speed of either wheel that is a fault", &s.gate.overspeed_rad_s,
            positive(2000)},
+          {"gate.supply_min_V", "V", "a board that reports a lower supply is a fault; 0: never", &s.gate.supply_min_V,
+           from_zero(100)},
+          {"gate.temperature_max_C", "deg C", "a board that reports more is a fault", &s.gate.temperature_max_C,
+           positive(300)},
           {"realtime.priority", "", "SCHED_FIFO priority", &s.realtime.priority, between(1, 98)},
           {"realtime.cpu", "", "CPU that the cycle is bound to; -1: any", &s.realtime.cpu, between(-1, 1023)},
           {"realtime.startup_cycles", "", "first cycles of a run, not counted as late or measured",

@@ -5,13 +5,19 @@
 #include <string>
 #include <string_view>
 
+#include "abs_hil/driver/pci/options.hpp"
 #include "abs_hil/driver/rig_driver.hpp"
 
 namespace abs_hil::driver {
 
 /// Everything below `driver.` in the configuration.
 struct DriverOptions {
-  std::string kind{"none"};  ///< the board behind `--backend rig`
+  std::string kind{"pci"};  ///< the board behind `--backend rig`
+  /// The board is an emulator. With `--fast` its time is driven in lock-step; refused where there is no emulator.
+  bool emulated{false};
+  /// Set by a lab that has gone through docs/rig-setup.md on its own rig; until then doctor and log say otherwise.
+  bool verified_on_hardware{false};
+  pci::PciOptions pci{};
 };
 
 struct BackendEntry {
@@ -21,7 +27,15 @@ struct BackendEntry {
 /// What `--backend` takes. The simulated one is made by `SimDriver` itself: only driver/sim knows the plant.
 [[nodiscard]] std::span<const BackendEntry> backends() noexcept;
 
-/// The real rig behind the board that `options.kind` names. Throws Unavailable, with what to do, if there is none.
-[[nodiscard]] std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options);
+/// The boards that `driver.kind` knows.
+[[nodiscard]] std::span<const std::string_view> board_kinds() noexcept;
+
+/// The rig behind the board that `options.kind` names; its `configure` looks for the board. Throws
+/// std::invalid_argument for an option outside its range, Unavailable for a kind that this build does not drive.
+/// @param lock_step  drive an emulator's time (`options.emulated`, `--fast`)
+[[nodiscard]] std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options, bool lock_step = false);
+
+/// "not verified on hardware ..." until the configuration says otherwise; empty then.
+[[nodiscard]] std::string verification_note(const DriverOptions& options);
 
 }  // namespace abs_hil::driver

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <stdexcept>
+#include <string>
 #include <string_view>
 
 namespace abs_hil::driver {
@@ -38,6 +39,9 @@ struct [[nodiscard]] IoResult {
   int errno_value{0};
   [[nodiscard]] constexpr bool ok() const noexcept { return error == IoError::none; }
 };
+
+/// In words for messages: error, place and the system's own words if it had any. Not real-time safe.
+[[nodiscard]] std::string error_text(const IoResult& result);
 
 /// The backend or something it needs is not there, cannot be opened or is not what it should be. The message names the
 /// thing and the fix; the program ends with status 3.

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "abs_hil/driver/io_result.hpp"
 #include "abs_hil/rig/command.hpp"
@@ -11,8 +13,8 @@
 namespace abs_hil::driver {
 
 /// Life of a driver: configure -> activate -> (read, write)* -> deactivate; activate again goes on from `inactive`.
-/// `failed` latches: after a failed write the outputs are made safe and only a new `configure` leads out of it. A failed
-/// read leaves the driver active: whether one lost answer matters is for the caller to say.
+/// `failed` latches: after a failed write the outputs are made safe and only a new `configure` leads out of it. A
+/// failed read leaves the driver active: whether one lost answer matters is for the caller to say.
 enum class DriverState : std::uint8_t { unconfigured, inactive, active, failed };
 
 /// One rig behind one board, real or simulated. The public functions keep the lifecycle for every backend alike:
@@ -46,6 +48,10 @@ class RigDriver {
   [[nodiscard]] virtual std::string_view name() const noexcept = 0;
   /// The simulator's truth of the last `read`, for logs alone; NaN from hardware.
   [[nodiscard]] virtual rig::PlantTruth truth() const noexcept { return {}; }
+  /// What `configure` found out about the board, a line each, for the log. Empty before it, and from a simulator.
+  [[nodiscard]] virtual std::vector<std::string> notes() const { return {}; }
+  /// All that the configured board lets itself be asked without anything being written, a line each, for people.
+  [[nodiscard]] virtual std::vector<std::string> inspection() { return {}; }
 
  private:
   virtual void do_configure() = 0;

@@ -20,7 +20,7 @@ namespace abs_hil::experiment {
 struct RunOutcome {
   rig::Reason reason{rig::Reason::none};
   double reason_value{0.0};
-  driver::IoResult io_error{};    ///< the driver's last error
+  driver::IoResult io_error{};    ///< the driver's first error
   driver::IoResult safe_state{};  ///< did the safe state reach the board at the end?
   runtime::RealtimeReport realtime{};
   bool ran{false};  ///< false: real time was required and not to be had; nothing moved

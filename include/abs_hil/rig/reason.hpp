@@ -32,6 +32,9 @@ enum class Reason : std::uint16_t {
   driver_write_failed = 69,
   board_interlock_tripped = 70,
   consecutive_overruns = 71,
+  board_supply_tripped = 80,
+  board_supply_low = 81,
+  board_too_hot = 82,
 };
 
 /// In words, for events, logs and summaries.
@@ -58,6 +61,9 @@ enum class Reason : std::uint16_t {
     case Reason::driver_write_failed: return "writing to the board failed";
     case Reason::board_interlock_tripped: return "the board's own interlock tripped";
     case Reason::consecutive_overruns: return "too many consecutive overruns";
+    case Reason::board_supply_tripped: return "the board's own interlock tripped: supply undervoltage";
+    case Reason::board_supply_low: return "the board's supply is below gate.supply_min_V";
+    case Reason::board_too_hot: return "the board is hotter than gate.temperature_max_C";
   }
   return "unknown reason";
 }

@@ -15,6 +15,9 @@ struct GateOptions {
   double motor_duty_max{1.0};     ///< in (0, 1]
   double brake_duty_max{1.0};     ///< in (0, 1]; the maker's driver caps the real brake at 0.7
   double overspeed_rad_s{250.0};  ///< either wheel above this latches a fault, > 0
+  double supply_min_V{0.0};       ///< a board that reports less latches a fault, >= 0; 0: never
+  /// A board that reports more latches a fault, deg C. Ours: the board's own limit is not public.
+  double temperature_max_C{90.0};
 };
 
 /// What the gate did to a command.
@@ -43,6 +46,9 @@ class CommandGate {
 
   /// @param speeds the speeds estimated from the latest measurement
   [[nodiscard]] GateResult check(const rig::Command& wanted, const rig::WheelSpeeds& speeds) noexcept;
+  /// Latches what the board reports about itself: a trip of its own interlocks, supply, temperature. What it cannot
+  /// tell (NaN) is no fault.
+  void watch_board(const rig::Measurement& measurement) noexcept;
   /// Latches a fault found elsewhere (driver, executive). The first one stays.
   void latch(rig::Reason fault, double value) noexcept;
 

@@ -43,7 +43,7 @@ class CyclicExecutive {
 
   /// How it keeps time; other threads may look while it runs.
   [[nodiscard]] const CycleStatistics& statistics() const noexcept { return *statistics_; }
-  /// The last error of the driver, for the report.
+  /// The first error of the driver, for the report: later ones follow from it.
   [[nodiscard]] const driver::IoResult& io_error() const noexcept { return io_error_; }
 
  private:

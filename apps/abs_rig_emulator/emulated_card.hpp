@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <fstream>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "abs_hil/emulator/card_model.hpp"
+#include "abs_hil/emulator/register_faults.hpp"
+#include "fuse_tree.hpp"
+
+namespace abs_hil::app {
+
+/// What the emulator is started with.
+struct EmulatorOptions {
+  emulator::CardOptions card{};
+  std::uint64_t seed{1};
+  bool lock_step{false};
+  std::string truth_file{};    ///< CSV of what no register shows; empty: none
+  std::string traffic_file{};  ///< every register access; empty: none
+};
+
+/// The card behind the tree's files: time, registers, faults, logs and the control commands.
+class EmulatedCard final : public FileHandler {
+ public:
+  /// Throws std::invalid_argument, or std::runtime_error if a file cannot be written.
+  explicit EmulatedCard(const EmulatorOptions& options);
+
+  [[nodiscard]] int open(std::string_view name) override;
+  [[nodiscard]] int read(std::string_view name, std::uint64_t offset, void* data, std::size_t size) override;
+  [[nodiscard]] int write(std::string_view name, std::uint64_t offset, const void* data, std::size_t size) override;
+  [[nodiscard]] bool present() const override { return present_; }
+
+  /// Lets the rig go on to the wall clock; in lock-step it waits for the client.
+  void catch_up();
+  /// One control command; returns its answer. Throws std::invalid_argument for what it does not know.
+  std::string obey(std::string_view line);
+  /// The commands `obey` knows, one a line.
+  [[nodiscard]] static const char* commands();
+  /// Duties on the wire now, one line.
+  [[nodiscard]] std::string status() const;
+
+ private:
+  void go_on_to(std::int64_t time_ns);
+  void log_truth();
+  void record(char direction, std::uint64_t offset, std::uint32_t value);
+  void record_to(const std::string& file);
+
+  emulator::CardModel model_;
+  emulator::FaultyCard faulty_;
+  bool lock_step_;
+  bool present_{true};
+  bool permission_denied_{false};
+  std::int64_t started_ns_{0};
+  std::int64_t next_truth_ns_{0};
+  std::ofstream truth_{};
+  std::ofstream traffic_{};
+};
+
+}  // namespace abs_hil::app

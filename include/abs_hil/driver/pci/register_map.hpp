@@ -1,0 +1,122 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string_view>
+
+namespace abs_hil::driver::pci {
+
+// RT-DAC4/PCI with ABS logic, from the maker's driver sources. Nothing here has been tried on hardware.
+
+inline constexpr std::uint32_t vendor_id = 0x10B5;       ///< PLX
+inline constexpr std::uint32_t device_id = 0x2497;       ///< PCI 9030 as the maker programs it
+inline constexpr std::uint32_t window_bytes = 256;       ///< BAR 2, I/O ports, 32-bit accesses
+inline constexpr std::uint32_t all_ones = ~0U;           ///< what a bus answers where no card is
+inline constexpr double board_clock_Hz = 40e6;           ///< PWM and velocity periods count this
+inline constexpr double encoder_lines_per_rev = 1024.0;  ///< the velocity registers count lines, not quadrature edges
+
+/// Offsets in the window, bytes.
+namespace reg {
+inline constexpr std::uint32_t bitstream_version = 0x00;
+inline constexpr std::uint32_t channel_counts = 0x04;
+inline constexpr std::uint32_t supply = 0x38;
+inline constexpr std::uint32_t dio_direction_low = 0x40;
+inline constexpr std::uint32_t dio_direction_high = 0x44;
+inline constexpr std::uint32_t dio_value_low = 0x48;
+inline constexpr std::uint32_t dio_value_high = 0x4C;
+inline constexpr std::uint32_t velocity_period = 0x50;
+inline constexpr std::uint32_t velocity_lower = 0x54;
+inline constexpr std::uint32_t velocity_upper = 0x58;
+inline constexpr std::uint32_t velocity_limit = 0x5C;
+inline constexpr std::uint32_t pwm_index = 0x60;
+inline constexpr std::uint32_t pwm_mode = 0x64;
+inline constexpr std::uint32_t pwm_prescaler = 0x68;
+inline constexpr std::uint32_t pwm_width = 0x6C;
+inline constexpr std::uint32_t encoder_index = 0x80;
+inline constexpr std::uint32_t encoder_reset = 0x84;
+inline constexpr std::uint32_t encoder_counter = 0x88;
+inline constexpr std::uint32_t start_resistors = 0x90;
+inline constexpr std::uint32_t r1_low = 0x94;
+inline constexpr std::uint32_t r1_high = 0x98;
+inline constexpr std::uint32_t r2_low = 0x9C;
+inline constexpr std::uint32_t r2_high = 0xA0;
+inline constexpr std::uint32_t supply_min = 0xA4;
+inline constexpr std::uint32_t temperature_max = 0xA8;
+inline constexpr std::uint32_t trip_flags = 0xAC;
+inline constexpr std::uint32_t temperature_high = 0xB4;
+inline constexpr std::uint32_t temperature_low = 0xB8;
+}  // namespace reg
+
+/// How well a fact about the card is known.
+enum class Standing : std::uint8_t {
+  documented,  ///< read in the maker's own driver sources or manual
+  inferred,    ///< concluded from them, not said there
+  unknown,     ///< sources are silent or disagree: never relied on
+};
+[[nodiscard]] std::string_view name_of(Standing standing) noexcept;
+
+/// What this driver does with a register.
+enum class Use : std::uint8_t {
+  never,         ///< listed for completeness
+  checked,       ///< read once, in `configure`
+  every_cycle,   ///< read or written in every cycle
+  in_turn,       ///< one of these in every cycle, in turn
+  at_activation  ///< written and verified when the outputs are taken over
+};
+[[nodiscard]] std::string_view name_of(Use use) noexcept;
+
+struct Register {
+  std::uint32_t offset;
+  std::string_view name;
+  std::string_view unit;     ///< of the value after conversion; empty for pure numbers and bits
+  std::string_view meaning;  ///< bits, conversion
+  Standing standing;         ///< of offset and meaning
+  Use use;
+  std::string_view open{};  ///< what is not known about it; empty: nothing
+};
+/// Every register of the ABS logic, in order of offset. Source of all of them: the maker's driver sources (the sources'
+/// disagreements are in `open`).
+[[nodiscard]] std::span<const Register> registers() noexcept;
+/// Name of the register at an offset; "unknown register" if there is none.
+[[nodiscard]] std::string_view register_name(std::uint32_t offset) noexcept;
+
+/// Index of a PWM channel (register 60).
+enum class Pwm : std::uint32_t { drive = 0, brake = 1 };
+/// Counting width of the PWMs (register 64).
+enum class PwmMode : std::uint32_t { bits_8 = 0, bits_12 = 1 };
+
+/// Largest width, which is duty 1.
+[[nodiscard]] constexpr std::uint32_t full_width(PwmMode mode) noexcept {
+  return mode == PwmMode::bits_12 ? 4095 : 255;
+}
+/// PWM frequency, Hz: 40 MHz / ((prescaler + 1) full width).
+[[nodiscard]] constexpr double pwm_frequency_Hz(PwmMode mode, std::uint32_t prescaler) noexcept {
+  return board_clock_Hz / ((static_cast<double>(prescaler) + 1.0) * static_cast<double>(full_width(mode)));
+}
+/// Width register for a duty in [0, 1], rounded, but never above the cap in [0, 1].
+[[nodiscard]] constexpr std::uint32_t pwm_width_for(PwmMode mode, double duty, double duty_max) noexcept {
+  const double full = static_cast<double>(full_width(mode));
+  constexpr double rounding_slack = 1e-9;  // a cap that is exactly a width may come out a hair below it
+  const auto cap = static_cast<std::uint32_t>(duty_max * full + rounding_slack);
+  const auto width = static_cast<std::uint32_t>(duty * full + 0.5);
+  return width < cap ? width : cap;
+}
+
+/// Registers 38 and A4: V. 0 means that there is no supply.
+[[nodiscard]] constexpr double supply_V(std::uint32_t raw) noexcept {
+  return raw == 0 ? 0.0 : 92000.0 / static_cast<double>(raw);
+}
+/// Registers B4 (high) and B8 (low): deg C; NaN if the sensor does not pulse (low = 0).
+[[nodiscard]] constexpr double temperature_C(std::uint32_t high, std::uint32_t low) noexcept {
+  if (low == 0) return std::numeric_limits<double>::quiet_NaN();
+  return 235.0 - 400.0 * static_cast<double>(high) / static_cast<double>(low);
+}
+/// Registers 54, 58 and 5C (low 16 bits) with register 50: rad/s; NaN if the period is 0.
+[[nodiscard]] double velocity_rad_s(std::uint32_t raw, std::uint32_t period_ticks) noexcept;
+
+/// Bit 1 of register AC is the supply. Bits 0 and 2 are temperature and overspeed, in an order the sources disagree on.
+inline constexpr std::uint32_t supply_trip_bit = 1U << 1U;
+
+}  // namespace abs_hil::driver::pci

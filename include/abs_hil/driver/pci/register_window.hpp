@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+
+#include "abs_hil/driver/io_result.hpp"
+
+namespace abs_hil::driver::pci {
+
+/// The 32-bit registers of one card, by byte offset from the start of its BAR. Real-time safe: no exception, allocation
+/// or lock; each access takes as long as the bus does.
+class RegisterWindow {
+ public:
+  RegisterWindow() = default;
+  RegisterWindow(const RegisterWindow&) = delete;
+  RegisterWindow& operator=(const RegisterWindow&) = delete;
+  virtual ~RegisterWindow() = default;
+
+  /// `value` is untouched on error. `IoResult::where` is the offset.
+  virtual IoResult read32(std::uint32_t offset, std::uint32_t& value) noexcept = 0;
+  virtual IoResult write32(std::uint32_t offset, std::uint32_t value) noexcept = 0;
+};
+
+/// The clock of an emulated card in lock-step: it stands still until told to go on. No hardware has one.
+class EmulatedTime {
+ public:
+  EmulatedTime() = default;
+  EmulatedTime(const EmulatedTime&) = delete;
+  EmulatedTime& operator=(const EmulatedTime&) = delete;
+  virtual ~EmulatedTime() = default;
+
+  virtual IoResult now(std::int64_t& time_ns) noexcept = 0;
+  /// Lets the emulated rig go on to `time_ns`; returns when it is there.
+  virtual IoResult advance_to(std::int64_t time_ns) noexcept = 0;
+};
+
+}  // namespace abs_hil::driver::pci

@@ -1,0 +1,257 @@
+#include "abs_hil/driver/pci/pci_driver.hpp"
+
+#include <bit>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "abs_hil/rig/encoder_scale.hpp"
+
+namespace abs_hil::driver::pci {
+
+namespace {
+
+constexpr double s_per_ns = 1e-9;
+/// Counts that an encoder may jump beyond what its speed explains: vibration, and the reads' own lateness.
+constexpr double plausible_slack_counts = 256.0;
+/// Counters whose reading took longer belong to no one instant: at 170 rad/s it is 28 counts. They are read once more.
+constexpr std::int64_t late_reading_ns = 250'000;
+
+bool is_duty(double value) noexcept { return value >= 0.0 && value <= 1.0; }  // false for NaN
+
+std::int32_t with_sign(std::uint32_t raw, std::int32_t sign) noexcept {
+  return std::bit_cast<std::int32_t>(sign < 0 ? 0U - raw : raw);  // unsigned: the most negative count has no negative
+}
+
+}  // namespace
+
+/// One piece of work on the card: the first error ends it, later accesses are left out.
+class PciDriver::Access {
+ public:
+  explicit Access(RegisterWindow& window) noexcept : window_(window) {}
+
+  /// The value read; 0 once something has failed.
+  std::uint32_t read(std::uint32_t offset) noexcept {
+    std::uint32_t value = 0;
+    if (result_.ok()) result_ = window_.read32(offset, value);
+    if (result_.ok() && value == all_ones) {
+      saw_all_ones_ = true;
+      all_ones_at_ = offset;
+    }
+    return value;
+  }
+  void write(std::uint32_t offset, std::uint32_t value) noexcept {
+    if (result_.ok()) result_ = window_.write32(offset, value);
+  }
+  void fail(IoError error, std::uint32_t where) noexcept {
+    if (result_.ok()) result_ = {error, where};
+  }
+
+  [[nodiscard]] const IoResult& result() const noexcept { return result_; }
+  [[nodiscard]] bool saw_all_ones() const noexcept { return saw_all_ones_; }
+  [[nodiscard]] std::uint32_t all_ones_at() const noexcept { return all_ones_at_; }
+
+ private:
+  RegisterWindow& window_;
+  IoResult result_{};
+  bool saw_all_ones_{false};
+  std::uint32_t all_ones_at_{0};
+};
+
+PciDriver::PciDriver(const PciOptions& options, OpenCard open_card, ReadClock read_clock)
+    : options_(options),
+      mode_(options.pwm_mode == "8-bit" ? PwmMode::bits_8 : PwmMode::bits_12),
+      open_card_(std::move(open_card)),
+      read_clock_(read_clock) {
+  for (const auto& [key, sign] : {std::pair("driver.pci.lower_sign", options.lower_sign),
+                                  std::pair("driver.pci.upper_sign", options.upper_sign)}) {
+    if (sign != 1 && sign != -1) {
+      throw std::invalid_argument(std::string(key) + " = " + std::to_string(sign) + ": give 1 or -1");
+    }
+  }
+  if (options.lower_channel == options.upper_channel) {
+    throw std::invalid_argument("driver.pci.lower_channel = driver.pci.upper_channel = " +
+                                std::to_string(options.upper_channel) + ": each wheel has an encoder of its own");
+  }
+}
+
+PciDriver::~PciDriver() { static_cast<void>(deactivate()); }
+
+void PciDriver::do_configure() {
+  card_ = {};  // gives the lock back, should it be ours
+  card_ = open_card_();
+  Access card(*card_.window);
+  version_ = card.read(reg::bitstream_version);
+  channel_counts_ = card.read(reg::channel_counts);
+  const auto refuse = [this](const std::string& what) {
+    const std::string text = "backend rig: card " + card_.place + ": " + what + "; nothing was written";
+    card_ = {};
+    throw Unavailable(text);
+  };
+  if (const IoResult& result = card.result(); !result.ok()) refuse(error_text(result));
+  if (version_ == all_ones) {
+    refuse("answers all ones: it is not on the bus (no power, not seated, or its I/O decoding is disabled)");
+  }
+  constexpr std::uint32_t low_16_bits = 0xFFFF;
+  if (options_.bitstream >= 0 && (version_ & low_16_bits) != static_cast<std::uint32_t>(options_.bitstream)) {
+    refuse("bitstream version " + std::to_string(version_ & low_16_bits) + " is not the configured " +
+           std::to_string(options_.bitstream) +
+           " (driver.pci.bitstream): another logic has other registers; load the ABS logic or correct the key");
+  }
+}
+
+void PciDriver::take_over(Access& card) noexcept {
+  for (const Pwm pwm : {Pwm::drive, Pwm::brake}) {
+    write_pwm(card, pwm, 0);  // before mode and prescaler: they must not turn an old width into a pulse
+    for (const auto& [offset, value] :
+         {std::pair(reg::pwm_mode, static_cast<std::uint32_t>(mode_)),
+          std::pair(reg::pwm_prescaler, static_cast<std::uint32_t>(options_.pwm_prescaler))}) {
+      card.write(offset, value);
+      if (card.read(offset) != value) card.fail(IoError::read_back_mismatch, offset);
+    }
+  }
+  // The mask holds the counters at 0 as long as its bits are set.
+  card.write(reg::encoder_reset, (1U << static_cast<std::uint32_t>(options_.upper_channel)) |
+                                     (1U << static_cast<std::uint32_t>(options_.lower_channel)));
+  card.write(reg::encoder_reset, 0);
+  read_wheels(card);
+  for (const std::uint32_t offset : health_registers) read_health(card, offset);
+}
+
+void PciDriver::do_activate(std::int64_t now_ns) {
+  Access card(*card_.window);
+  health_ = {};
+  next_health_ = 0;
+  counts_ = {};
+  activated_ns_ = last_read_ns_ = now_ns;
+  IoResult result{};
+  if (card_.time) result = card_.time->now(emulated_ns_);
+  if (result.ok()) {
+    take_over(card);
+    result = checked_for_absence(card);
+  }
+  // Between reset and reading no wheel turns further than this.
+  constexpr std::int64_t reset_takes_at_most_ns = 100'000'000;
+  if (result.ok() && !plausible(now_ns + reset_takes_at_most_ns, {0, 0})) {
+    result = {IoError::implausible_answer, reg::encoder_reset};
+  }
+  if (!result.ok()) {
+    static_cast<void>(do_make_safe());
+    throw Unavailable("backend rig: card " + card_.place + ": taking over the outputs failed: " + error_text(result));
+  }
+}
+
+void PciDriver::read_wheels(Access& card) noexcept {
+  card.write(reg::encoder_index, static_cast<std::uint32_t>(options_.upper_channel));
+  const std::uint32_t upper = card.read(reg::encoder_counter);
+  card.write(reg::encoder_index, static_cast<std::uint32_t>(options_.lower_channel));
+  const std::uint32_t lower = card.read(reg::encoder_counter);
+  if (card.result().ok()) counts_ = {with_sign(upper, options_.upper_sign), with_sign(lower, options_.lower_sign)};
+}
+
+void PciDriver::read_health(Access& card, std::uint32_t offset) noexcept {
+  const std::uint32_t value = card.read(offset);
+  if (!card.result().ok()) return;
+  for (std::size_t i = 0; i < health_registers.size(); ++i) {
+    if (health_registers[i] == offset) health_[i] = value;
+  }
+}
+
+bool PciDriver::plausible(std::int64_t read_ns, const std::array<std::int32_t, 2>& before) const noexcept {
+  const double elapsed_s = static_cast<double>(read_ns - last_read_ns_) * s_per_ns;
+  const double most = plausible_slack_counts + options_.plausible_speed_rad_s * elapsed_s /
+                                                   rig::radians_per_count(options_.encoder_counts_per_rev);
+  for (std::size_t wheel = 0; wheel < counts_.size(); ++wheel) {
+    if (std::abs(static_cast<double>(rig::counts_between(before[wheel], counts_[wheel]))) > most) return false;
+  }
+  return true;
+}
+
+IoResult PciDriver::checked_for_absence(const Access& card) noexcept {
+  if (!card.saw_all_ones()) return card.result();
+  // All ones may be a count of -1. A card that is gone shows them everywhere.
+  std::uint32_t version = 0;
+  const IoResult result = card_.window->read32(reg::bitstream_version, version);
+  if (!result.ok()) return result;
+  if (version == all_ones) return {IoError::disconnected, card.all_ones_at()};
+  return card.result();
+}
+
+bool PciDriver::read_wheels_at(Access& card, std::int64_t& read_ns) noexcept {
+  if (read_clock_ == nullptr) {
+    read_wheels(card);
+    return true;
+  }
+  const std::int64_t before_ns = read_clock_();
+  read_wheels(card);
+  const std::int64_t took_ns = read_clock_() - before_ns;
+  read_ns = before_ns + took_ns / 2;
+  return took_ns < late_reading_ns || !card.result().ok();
+}
+
+IoResult PciDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept {
+  if (card_.time) {
+    const IoResult result = card_.time->advance_to(emulated_ns_ + now_ns - activated_ns_);
+    if (!result.ok()) return result;
+  }
+  const std::array<std::int32_t, 2> before = counts_;
+  Access card(*card_.window);
+  std::int64_t read_ns = now_ns;
+  if (!read_wheels_at(card, read_ns)) static_cast<void>(read_wheels_at(card, read_ns));
+  read_health(card, health_registers[next_health_]);
+  if (const IoResult result = checked_for_absence(card); !result.ok()) return result;
+  if (!plausible(read_ns, before)) return {IoError::implausible_answer, reg::encoder_counter};
+  next_health_ = (next_health_ + 1) % health_registers.size();
+  last_read_ns_ = read_ns;
+
+  measurement = {};
+  measurement.time_ns = read_ns;
+  measurement.upper_counts = counts_[0];
+  measurement.lower_counts = counts_[1];
+  measurement.trip_flags = health_[0];
+  measurement.supply_V = supply_V(health_[1]);
+  measurement.temperature_C = temperature_C(health_[2], health_[3]);
+  return {};
+}
+
+bool PciDriver::tripped_to_zero(Access& card, std::uint32_t width_read) noexcept {
+  if (width_read != 0) return false;
+  // Whether the width reads 0 while the FPGA holds the outputs off is not known. If so it is the trip that must be
+  // reported, with the next measurement, and not the register.
+  read_health(card, reg::trip_flags);
+  return card.result().ok() && health_[0] != 0;
+}
+
+void PciDriver::write_pwm(Access& card, Pwm pwm, std::uint32_t width) noexcept {
+  card.write(reg::pwm_index, static_cast<std::uint32_t>(pwm));
+  card.write(reg::pwm_width, width);
+  const std::uint32_t width_read = card.read(reg::pwm_width);
+  if (!card.result().ok() || width_read == width) return;
+  if (!tripped_to_zero(card, width_read)) card.fail(IoError::read_back_mismatch, reg::pwm_width);
+}
+
+IoResult PciDriver::do_write(const rig::Command& command) noexcept {
+  const bool torque_fits = std::isfinite(command.brake_torque_Nm) && command.brake_torque_Nm >= 0.0;
+  if (!is_duty(command.motor_duty) || !is_duty(command.brake_duty) || !torque_fits) {
+    return {IoError::command_out_of_range};
+  }
+  const double motor_duty = command.motor_enable ? command.motor_duty : 0.0;
+  Access card(*card_.window);
+  write_pwm(card, Pwm::drive, pwm_width_for(mode_, motor_duty, options_.motor_duty_max));
+  write_pwm(card, Pwm::brake, pwm_width_for(mode_, command.brake_duty, options_.brake_duty_max));
+  return checked_for_absence(card);
+}
+
+IoResult PciDriver::do_make_safe() noexcept {
+  if (!card_.window) return {IoError::disconnected};
+  // Each output is tried whatever became of the other, the motor first; the first error is reported.
+  IoResult first{};
+  for (const Pwm pwm : {Pwm::drive, Pwm::brake}) {
+    Access card(*card_.window);
+    write_pwm(card, pwm, 0);
+    if (const IoResult result = checked_for_absence(card); first.ok()) first = result;
+  }
+  return first;
+}
+
+}  // namespace abs_hil::driver::pci

@@ -1,0 +1,99 @@
+#include "abs_hil/driver/pci/register_map.hpp"
+
+#include <numbers>
+
+namespace abs_hil::driver::pci {
+
+namespace {
+
+using enum Standing;
+using enum Use;
+
+constexpr std::string_view abs_only = "in the board's generic logic this is an ADC or DAC: check the bitstream first";
+constexpr std::string_view limit_open = "whether the host may write it, and its power-on value";
+
+constexpr std::array table{
+    Register{reg::bitstream_version, "bitstream version", "", "low 16 bits", documented, checked,
+             "the version word of the ABS logic"},
+    Register{reg::channel_counts, "channel counts", "", "bits 15:12 counters, 11:8 timers", documented, checked},
+    Register{reg::supply, "supply", "V", "92000 / raw; 0 = none", documented, in_turn},
+    Register{reg::dio_direction_low, "digital I/O direction, low half", "", "a bit each", documented, never,
+             "which lines the ABS logic wires to anything"},
+    Register{reg::dio_direction_high, "digital I/O direction, high half", "", "a bit each", documented, never,
+             "as the low half"},
+    Register{reg::dio_value_low, "digital I/O value, low half", "", "a bit each", documented, never, "as direction"},
+    Register{reg::dio_value_high, "digital I/O value, high half", "", "a bit each", documented, never, "as direction"},
+    Register{reg::velocity_period, "velocity period", "s", "raw / 40 MHz", documented, checked, "its power-on value"},
+    Register{reg::velocity_lower, "velocity of the lower wheel", "rad/s",
+             "low 16 bits; 2 pi raw (40 MHz / velocity period) / 1024", documented, checked,
+             "how it shows backward motion"},
+    Register{reg::velocity_upper, "velocity of the upper wheel", "rad/s", "as the lower wheel's", documented, checked,
+             "as the lower wheel's"},
+    Register{reg::velocity_limit, "overspeed limit", "rad/s", "as the velocities", documented, checked, limit_open},
+    Register{reg::pwm_index, "PWM index", "", "0 drive, 1 brake: what 64, 68 and 6C speak of", documented, every_cycle},
+    Register{reg::pwm_mode, "PWM mode", "", "0 = 8-bit, 1 = 12-bit; reads back", documented, at_activation},
+    Register{reg::pwm_prescaler, "PWM prescaler", "", "f = 40 MHz / ((prescaler + 1) full width); reads back",
+             documented, at_activation, "how many bits it has"},
+    Register{reg::pwm_width, "PWM width", "", "high time, 0 ... 255 or 4095; reads back", documented, every_cycle,
+             "whether it reads 0 while an interlock holds the outputs off"},
+    Register{reg::encoder_index, "encoder index", "", "0 lower wheel, 1 upper wheel, 2 lever: what 88 speaks of",
+             documented, every_cycle},
+    Register{reg::encoder_reset, "encoder reset", "", "bits 0-2, a channel each; its counter is 0 while the bit is set",
+             documented, at_activation},
+    Register{reg::encoder_counter, "encoder counter", "counts", "32-bit signed, of the indexed encoder", documented,
+             every_cycle, "which way is forward: the wiring decides"},
+    Register{reg::start_resistors, "start resistors", "", "bit 0 R1, bit 1 R2", documented, never,
+             "whether the host should switch them"},
+    Register{reg::r1_low, "R1 low threshold", "", "", documented, never, "its unit"},
+    Register{reg::r1_high, "R1 high threshold", "", "", documented, never, "its unit"},
+    Register{reg::r2_low, "R2 low threshold", "", "", documented, never, "its unit"},
+    Register{reg::r2_high, "R2 high threshold", "", "", documented, never, abs_only},
+    Register{reg::supply_min, "least supply", "V", "92000 / raw", documented, checked, limit_open},
+    Register{reg::temperature_max, "highest temperature", "deg C", "raw", documented, checked, limit_open},
+    Register{reg::trip_flags, "trip flags", "", "bit 1 supply; bits 0 and 2 temperature and overspeed", documented,
+             in_turn, "which of bits 0 and 2 is temperature and which overspeed: any bit counts as a trip"},
+    Register{reg::temperature_high, "temperature sensor, high time", "", "235 - 400 high / low is deg C", inferred,
+             in_turn},
+    Register{reg::temperature_low, "temperature sensor, low time", "", "as the high time", inferred, in_turn,
+             "what it shows without a sensor; 0 is taken for none"},
+};
+
+}  // namespace
+
+std::string_view name_of(Standing standing) noexcept {
+  switch (standing) {
+    case documented: return "documented";
+    case inferred: return "inferred";
+    case unknown: return "unknown";
+  }
+  return "unknown";
+}
+
+std::string_view name_of(Use use) noexcept {
+  switch (use) {
+    case never: return "not used";
+    case checked: return "read once";
+    case every_cycle: return "every cycle";
+    case in_turn: return "in turn";
+    case at_activation: return "at activation";
+  }
+  return "not used";
+}
+
+std::span<const Register> registers() noexcept { return table; }
+
+std::string_view register_name(std::uint32_t offset) noexcept {
+  for (const Register& entry : table) {
+    if (entry.offset == offset) return entry.name;
+  }
+  return "unknown register";
+}
+
+double velocity_rad_s(std::uint32_t raw, std::uint32_t period_ticks) noexcept {
+  if (period_ticks == 0) return std::numeric_limits<double>::quiet_NaN();
+  constexpr std::uint32_t low_16_bits = 0xFFFF;
+  return 2.0 * std::numbers::pi * static_cast<double>(raw & low_16_bits) *
+         (board_clock_Hz / static_cast<double>(period_ticks)) / encoder_lines_per_rev;
+}
+
+}  // namespace abs_hil::driver::pci

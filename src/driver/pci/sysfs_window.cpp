@@ -1,0 +1,127 @@
+#include "abs_hil/driver/pci/sysfs_window.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
+#include <unistd.h>
+
+#include <bit>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <string>
+
+namespace abs_hil::driver::pci {
+
+static_assert(std::endian::native == std::endian::little, "PCI registers and the kernel's files are little-endian");
+
+namespace {
+
+[[noreturn]] void refuse(const std::filesystem::path& file, const std::string& problem) {
+  throw Unavailable("backend rig: " + file.string() + ": " + problem);
+}
+
+int open_for_access(const std::filesystem::path& file) {
+  const int fd = ::open(file.c_str(), O_RDWR | O_CLOEXEC);
+  if (fd >= 0) return fd;
+  const int error = errno;
+  if (error == EACCES || error == EPERM) {
+    refuse(file, std::string("permission denied (") + std::strerror(error) +
+                     "): install config/udev/70-abs-hil.rules and join the group abs_hil (docs/rig-setup.md)");
+  }
+  refuse(file, std::string("cannot be opened: ") + std::strerror(error));
+}
+
+/// Name of a process from /proc; empty if it cannot be told.
+std::string process_name(long pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/comm");
+  std::string name;
+  std::getline(file, name);
+  return name;
+}
+
+/// Who holds the flock of an open file, from /proc/locks ("7: FLOCK ADVISORY WRITE 4711 00:3a:42 0 EOF").
+std::string lock_holder(int fd) {
+  struct stat status {};
+  if (::fstat(fd, &status) != 0) return "another process";
+  std::ifstream locks("/proc/locks");
+  for (std::string line; std::getline(locks, line);) {
+    long pid = 0;
+    unsigned int major_number = 0;
+    unsigned int minor_number = 0;
+    unsigned long inode = 0;
+    const char* at = std::strstr(line.c_str(), "FLOCK");
+    if (at == nullptr ||
+        std::sscanf(at, "FLOCK %*s %*s %ld %x:%x:%lu", &pid, &major_number, &minor_number, &inode) != 4)
+      continue;
+    if (inode != status.st_ino || makedev(major_number, minor_number) != status.st_dev) continue;
+    const std::string name = process_name(pid);
+    return "process " + std::to_string(pid) + (name.empty() ? "" : " (" + name + ")");
+  }
+  return "another process (lsof on the file tells which)";
+}
+
+/// One whole access; what is not whole failed.
+template <typename Access>
+IoResult whole_access(std::uint32_t where, ssize_t size, Access access) noexcept {
+  constexpr int attempts = 3;  // a signal may interrupt; it must not hold the cycle up for ever
+  for (int attempt = 0; attempt < attempts; ++attempt) {
+    const ssize_t done = access();
+    if (done == size) return {};
+    if (done >= 0) return {IoError::disconnected, where, 0};  // end of file: the BAR is gone
+    if (errno != EINTR) return {io_error_for(errno), where, errno};
+  }
+  return {IoError::no_answer, where, EINTR};
+}
+
+}  // namespace
+
+FileDescriptor::~FileDescriptor() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+IoError io_error_for(int errno_value) noexcept {
+  // A card that left the bus gives ENODEV, a dead FUSE server ENOTCONN or ECONNABORTED.
+  switch (errno_value) {
+    case EAGAIN:
+    case EBUSY:
+    case EINTR:
+    case ETIMEDOUT: return IoError::no_answer;
+    default: return IoError::disconnected;
+  }
+}
+
+SysfsWindow::SysfsWindow(const std::filesystem::path& resource_file) : file_(open_for_access(resource_file)) {
+  if (::flock(file_.get(), LOCK_EX | LOCK_NB) == 0) return;
+  const int error = errno;
+  if (error != EWOULDBLOCK) refuse(resource_file, std::string("cannot be locked: ") + std::strerror(error));
+  refuse(resource_file, "the card is in use by " + lock_holder(file_.get()) +
+                            "; a card has exactly one owner: end that process first");
+}
+
+IoResult SysfsWindow::read32(std::uint32_t offset, std::uint32_t& value) noexcept {
+  std::uint32_t word = 0;
+  const IoResult result = whole_access(
+      offset, sizeof word, [&] { return ::pread(file_.get(), &word, sizeof word, static_cast<off_t>(offset)); });
+  if (result.ok()) value = word;
+  return result;
+}
+
+IoResult SysfsWindow::write32(std::uint32_t offset, std::uint32_t value) noexcept {
+  return whole_access(offset, sizeof value,
+                      [&] { return ::pwrite(file_.get(), &value, sizeof value, static_cast<off_t>(offset)); });
+}
+
+EmulatedTimeFile::EmulatedTimeFile(const std::filesystem::path& file) : file_(open_for_access(file)) {}
+
+IoResult EmulatedTimeFile::now(std::int64_t& time_ns) noexcept {
+  return whole_access(0, sizeof time_ns, [&] { return ::pread(file_.get(), &time_ns, sizeof time_ns, 0); });
+}
+
+IoResult EmulatedTimeFile::advance_to(std::int64_t time_ns) noexcept {
+  return whole_access(0, sizeof time_ns, [&] { return ::pwrite(file_.get(), &time_ns, sizeof time_ns, 0); });
+}
+
+}  // namespace abs_hil::driver::pci

@@ -1,0 +1,192 @@
+#include "abs_hil/emulator/card_model.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include "abs_hil/plant_sim/encoder.hpp"
+
+namespace abs_hil::emulator {
+
+namespace {
+
+constexpr double clock_Hz = 40e6;
+constexpr double lines_per_rev = 1024.0;
+constexpr double supply_scale_V = 92000.0;
+/// Sensor pulse, low time; the ratio of high to low time carries the temperature.
+constexpr std::uint32_t temperature_low_time = 100'000;
+/// Slower than this a wheel counts as stopped: less than a line in a velocity period.
+constexpr double standstill_rad_s = 0.5;
+
+std::uint32_t rounded(double value) noexcept {
+  return static_cast<std::uint32_t>(std::llround(std::clamp(value, 0.0, 4.0e9)));
+}
+
+std::uint32_t supply_raw(double volts) noexcept { return volts > 0.0 ? rounded(supply_scale_V / volts) : 0; }
+
+}  // namespace
+
+CardModel::CardModel(const CardOptions& options) : options_(options), plant_(options.plant) {
+  if (options.overspeed_bit != 0 && options.overspeed_bit != 2) {
+    throw std::invalid_argument("overspeed bit " + std::to_string(options.overspeed_bit) + ": give 0 or 2");
+  }
+  if (!(options.start_speed_rad_s >= 0.0) || !std::isfinite(options.start_speed_rad_s)) {
+    throw std::invalid_argument("start speed " + std::to_string(options.start_speed_rad_s) +
+                                " rad/s: must be finite and >= 0");
+  }
+  plant_.reset({.omega1_rad_s = options.start_speed_rad_s, .omega2_rad_s = options.start_speed_rad_s});
+  constexpr double seconds_per_minute = 60.0;
+  plain_[0x50 / 4] = options.velocity_period;
+  plain_[0x5C / 4] = velocity(options.overspeed_rpm * 2.0 * std::numbers::pi / seconds_per_minute);
+  plain_[0xA4 / 4] = supply_raw(options.supply_min_V);
+  plain_[0xA8 / 4] = options.temperature_max_C;
+}
+
+std::uint32_t CardModel::velocity(double omega_rad_s) const noexcept {
+  const double lines_per_s = std::abs(omega_rad_s) / (2.0 * std::numbers::pi) * lines_per_rev;
+  return std::min(rounded(lines_per_s * static_cast<double>(plain_[0x50 / 4]) / clock_Hz), 0xFFFFU);
+}
+
+std::uint32_t CardModel::raw_count(std::uint32_t channel) const noexcept {
+  const plant_sim::PlantState& s = plant_.state();
+  const std::int32_t per_rev = options_.plant.rig.encoder_counts_per_rev;
+  switch (channel) {
+    case 0: return std::bit_cast<std::uint32_t>(plant_sim::encoder_counts(s.angle2_rad, per_rev));  // lower wheel
+    case 1: return std::bit_cast<std::uint32_t>(plant_sim::encoder_counts(s.angle1_rad, per_rev));  // upper wheel
+    default: return 0;                                                                              // lever: at rest
+  }
+}
+
+std::uint32_t CardModel::read_pwm(std::uint32_t offset) const noexcept {
+  if (pwm_index_ >= pwm_count) return 0;
+  const PwmChannel& channel = pwm_[pwm_index_];
+  if (offset == 0x64) return channel.mode;
+  return offset == 0x68 ? channel.prescaler : channel.width;
+}
+
+void CardModel::write_pwm(std::uint32_t offset, std::uint32_t value) noexcept {
+  if (pwm_index_ >= pwm_count) return;
+  PwmChannel& channel = pwm_[pwm_index_];
+  if (offset == 0x64) {
+    channel.mode = value & 1U;
+  } else if (offset == 0x68) {
+    channel.prescaler = value & 0xFFFFU;
+  } else if (!options_.trip_clears_width || trip_flags() == 0) {
+    channel.width = value & 0xFFFU;
+  }
+}
+
+std::uint32_t CardModel::read32(std::uint32_t offset) const noexcept {
+  const plant_sim::PlantState& s = plant_.state();
+  switch (offset) {
+    case 0x00: return options_.bitstream_version;
+    case 0x04: return options_.channel_counts;
+    case 0x38: return supply_raw(options_.supply_V);
+    case 0x54: return velocity(s.omega2_rad_s);
+    case 0x58: return velocity(s.omega1_rad_s);
+    case 0x60: return pwm_index_;
+    case 0x64:
+    case 0x68:
+    case 0x6C: return read_pwm(offset);
+    case 0x80: return encoder_index_;
+    case 0x84: return reset_mask_;
+    case 0x88:
+      if (encoder_index_ >= encoder_count || (reset_mask_ >> encoder_index_ & 1U) != 0) return 0;
+      return raw_count(encoder_index_) - zero_[encoder_index_];
+    case 0xAC: return trip_flags();
+    case 0xB4: return rounded((235.0 - options_.temperature_C) / 400.0 * temperature_low_time);
+    case 0xB8: return temperature_low_time;
+    default: return offset < bytes ? plain_[offset / 4] : 0;
+  }
+}
+
+void CardModel::write32(std::uint32_t offset, std::uint32_t value) noexcept {
+  switch (offset) {
+    case 0x60: pwm_index_ = value; break;
+    case 0x64:
+    case 0x68:
+    case 0x6C: write_pwm(offset, value); break;
+    case 0x80: encoder_index_ = value; break;
+    case 0x84:
+      // A counter is held at 0 as long as its bit is set, and counts from there once the bit is cleared.
+      for (std::uint32_t channel = 0; channel < encoder_count; ++channel) {
+        if (((reset_mask_ | value) >> channel & 1U) != 0) zero_[channel] = raw_count(channel);
+      }
+      reset_mask_ = value & 7U;
+      break;
+    // Digital I/O, velocity period, start resistors, limits: whether the host may write them is not known; here it may.
+    case 0x40:
+    case 0x44:
+    case 0x48:
+    case 0x4C:
+    case 0x50:
+    case 0x5C:
+    case 0x90:
+    case 0x94:
+    case 0x98:
+    case 0x9C:
+    case 0xA0:
+    case 0xA4:
+    case 0xA8: plain_[offset / 4] = value; break;
+    default: break;
+  }
+}
+
+std::uint32_t CardModel::trip_flags() const noexcept {
+  const std::uint32_t supply_raw_now = supply_raw(options_.supply_V);
+  const bool supply_low = supply_raw_now == 0 || (plain_[0xA4 / 4] != 0 && supply_raw_now > plain_[0xA4 / 4]);
+  const bool too_hot = options_.temperature_C > static_cast<double>(plain_[0xA8 / 4]);
+  const std::uint32_t temperature_bit = 2U - options_.overspeed_bit;
+  return (supply_low ? 2U : 0U) | (overspeed_latched_ ? 1U << options_.overspeed_bit : 0U) |
+         (too_hot ? 1U << temperature_bit : 0U);
+}
+
+Outputs CardModel::outputs() const noexcept {
+  if (trip_flags() != 0) return {};
+  const auto duty = [](const PwmChannel& channel) {
+    const std::uint32_t full = channel.mode == 1 ? 4095 : 255;
+    return static_cast<double>(std::min(channel.width, full)) / static_cast<double>(full);
+  };
+  return {.drive_duty = emergency_stop_ ? 0.0 : duty(pwm_[0]), .brake_duty = duty(pwm_[1])};
+}
+
+void CardModel::trip_overspeed() noexcept {
+  overspeed_latched_ = true;
+  watch_limits();
+}
+
+void CardModel::watch_limits() noexcept {
+  const plant_sim::PlantState& s = plant_.state();
+  const bool stopped = std::max(std::abs(s.omega1_rad_s), std::abs(s.omega2_rad_s)) < standstill_rad_s;
+  const std::uint32_t limit = plain_[0x5C / 4];
+  if (std::max(velocity(s.omega1_rad_s), velocity(s.omega2_rad_s)) > limit) {
+    overspeed_latched_ = true;
+  } else if (stopped) {
+    overspeed_latched_ = false;
+  }
+  if (options_.trip_clears_width && trip_flags() != 0) {
+    for (PwmChannel& channel : pwm_) channel.width = 0;
+  }
+}
+
+void CardModel::turn_by_hand(bool upper_wheel, double revolutions) noexcept {
+  plant_sim::PlantState state = plant_.state();
+  (upper_wheel ? state.angle1_rad : state.angle2_rad) += revolutions * 2.0 * std::numbers::pi;
+  plant_.reset(state);
+}
+
+void CardModel::advance_to(std::int64_t time_ns) noexcept {
+  while (time_ns_ < time_ns) {
+    // Steps end on multiples of 100 us wherever the host's accesses fall.
+    const std::int64_t next = std::min(time_ns, (time_ns_ / step_ns + 1) * step_ns);
+    const Outputs out = outputs();
+    plant_.advance(static_cast<double>(next - time_ns_) * 1e-9,
+                   {.motor_duty = out.drive_duty, .brake_duty = out.brake_duty});
+    time_ns_ = next;
+    watch_limits();
+  }
+}
+
+}  // namespace abs_hil::emulator

@@ -1,0 +1,247 @@
+#include "abs_hil/experiment/commissioning.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <stdexcept>
+#include <utility>
+
+#include "abs_hil/rig/encoder_scale.hpp"
+
+namespace abs_hil::experiment {
+
+namespace {
+
+constexpr std::int64_t cycle_ns = 1'000'000;
+constexpr double s_per_ns = 1e-9;
+/// An eighth of a revolution of 4096 counts: a turn by hand is more, trembling is less.
+constexpr std::int32_t turned_counts = 512;
+/// What a wheel that nobody touches may move meanwhile.
+constexpr std::int32_t still_counts = 64;
+/// A wheel that moves less in this time stands.
+constexpr std::int64_t standstill_ns = 500'000'000;
+
+template <typename... Values>
+std::string formatted(const char* format, Values... values) {
+  std::array<char, 400> text{};
+  std::snprintf(text.data(), text.size(), format, values...);
+  return text.data();
+}
+
+void require(bool in_range, const char* what, double value, const char* range) {
+  if (!in_range) throw std::invalid_argument(formatted("%s %g: give a number in %s", what, value, range));
+}
+
+/// Leaves the rig safe however a step ends.
+class SafeAtEnd {
+ public:
+  explicit SafeAtEnd(driver::RigDriver& driver) : driver_(driver) {}
+  SafeAtEnd(const SafeAtEnd&) = delete;
+  SafeAtEnd& operator=(const SafeAtEnd&) = delete;
+  ~SafeAtEnd() { static_cast<void>(driver_.deactivate()); }
+
+ private:
+  driver::RigDriver& driver_;
+};
+
+}  // namespace
+
+Commissioning::Commissioning(driver::RigDriver& driver, runtime::Clock& clock, Dialog& dialog,
+                             const CommissioningOptions& options, std::function<bool()> stop_requested)
+    : driver_(driver), clock_(clock), dialog_(dialog), options_(options), stop_requested_(std::move(stop_requested)) {
+  require(options.drive_duty > 0.0 && options.drive_duty <= 0.3, "drive duty", options.drive_duty, "(0, 0.3]");
+  require(options.drive_pulse_s > 0.0 && options.drive_pulse_s <= 1.0, "drive pulse", options.drive_pulse_s,
+          "(0, 1] s");
+  require(options.brake_duty > 0.0 && options.brake_duty <= 0.7, "brake duty", options.brake_duty, "(0, 0.7]");
+  require(options.brake_pulse_s > 0.0 && options.brake_pulse_s <= 1.0, "brake pulse", options.brake_pulse_s,
+          "(0, 1] s");
+  require(options.run_out_limit_s > 0.0, "run-out limit", options.run_out_limit_s, "(0, inf) s");
+}
+
+CommissioningResult Commissioning::unless_stopped(CommissioningResult result) const {
+  return stop_requested_() ? CommissioningResult::interrupted : result;
+}
+
+CommissioningResult Commissioning::run() {
+  const SafeAtEnd safe(driver_);
+  for (const auto step : {&Commissioning::read_board, &Commissioning::turn_by_hand, &Commissioning::drive_pulse,
+                          &Commissioning::brake_pulse}) {
+    const CommissioningResult result = (this->*step)();
+    if (result != CommissioningResult::passed) return unless_stopped(result);
+  }
+  const driver::IoResult result = driver_.deactivate();
+  if (!result.ok()) {
+    dialog_.tell("the safe state is not known to have reached the board: " + driver::error_text(result));
+    return CommissioningResult::failed;
+  }
+  return CommissioningResult::passed;
+}
+
+bool Commissioning::read(rig::Measurement& measurement) {
+  const driver::IoResult result = driver_.read(clock_.now_ns(), measurement);
+  if (!result.ok()) {
+    dialog_.tell("FAILED: reading the board: " + driver::error_text(result));
+  } else if (measurement.trip_flags != 0) {
+    dialog_.tell(
+        formatted("FAILED: the board's interlocks have tripped, flags 0x%x (0x2: supply)", measurement.trip_flags));
+  }
+  return result.ok() && measurement.trip_flags == 0;
+}
+
+CommissioningResult Commissioning::read_board() {
+  if (!dialog_.ask("Step 1 of 4: open the board and read all it has. Nothing is written, nothing can move. Go on?")) {
+    return CommissioningResult::declined;
+  }
+  driver_.configure();
+  for (const std::string& line : driver_.notes()) dialog_.tell("  " + line);
+  for (const std::string& line : driver_.inspection()) dialog_.tell("  " + line);
+  dialog_.tell("ok: compare version, supply, temperature and limits with what you know of your board");
+  return CommissioningResult::passed;
+}
+
+bool Commissioning::judge_turn(Wheel wheel, const Travel& travel) {
+  const bool upper = wheel == Wheel::upper;
+  const char* name = upper ? "upper" : "lower";
+  const std::int32_t turned = upper ? travel.upper : travel.lower;
+  const std::int32_t other = upper ? travel.lower : travel.upper;
+  if (std::abs(turned) < turned_counts && std::abs(other) >= turned_counts) {
+    dialog_.tell("FAILED: the other wheel's counter moved: swap driver.pci.upper_channel and driver.pci.lower_channel");
+  } else if (std::abs(turned) < turned_counts) {
+    dialog_.tell(
+        formatted("FAILED: %d counts: too few. Turn further, or look at the encoder's cable and channel", turned));
+  } else if (std::abs(other) > still_counts) {
+    dialog_.tell(
+        formatted("FAILED: the other wheel moved too, by %d counts: lift the upper wheel off the lower one", other));
+  } else if (turned < 0) {
+    dialog_.tell(formatted("FAILED: %d counts, backwards: change the sign of driver.pci.%s_sign", turned, name));
+  } else {
+    dialog_.tell(formatted("ok: %d counts forward, %.2f turns at 4096 a turn", turned, turned / 4096.0));
+    return true;
+  }
+  return false;
+}
+
+CommissioningResult Commissioning::turn_by_hand() {
+  if (!dialog_.ask(
+          "Step 2 of 4: both PWMs are set to 0 and the counters to 0; then you turn the wheels by hand. Press the "
+          "E-stop, lift the upper wheel off the lower one. Go on?")) {
+    return CommissioningResult::declined;
+  }
+  driver_.activate(clock_.now_ns());
+  for (const Wheel wheel : {Wheel::upper, Wheel::lower}) {
+    rig::Measurement before;
+    rig::Measurement after;
+    if (!read(before)) return CommissioningResult::failed;
+    const std::string name = wheel == Wheel::upper ? "UPPER" : "LOWER";
+    if (!dialog_.wait_until_done("Turn the " + name +
+                                 " wheel about half a turn in the direction of driving, then Enter")) {
+      return CommissioningResult::declined;
+    }
+    if (!read(after)) return CommissioningResult::failed;
+    const Travel travel{.upper = rig::counts_between(before.upper_counts, after.upper_counts),
+                        .lower = rig::counts_between(before.lower_counts, after.lower_counts),
+                        .read = true};
+    if (!judge_turn(wheel, travel)) return CommissioningResult::failed;
+  }
+  return CommissioningResult::passed;
+}
+
+bool Commissioning::pulse(const rig::Command& command, double duration_s, Travel& travel) {
+  rig::Measurement first;
+  rig::Measurement now;
+  if (!read(first)) return false;
+  const std::int64_t start_ns = clock_.now_ns();
+  const std::int64_t end_ns = start_ns + std::llround(duration_s / s_per_ns);
+  bool good = true;
+  for (std::int64_t tick_ns = start_ns; good && tick_ns < end_ns && !stop_requested_(); tick_ns += cycle_ns) {
+    clock_.sleep_until(tick_ns);
+    good = read(now);
+    if (!good || clock_.now_ns() >= end_ns) break;
+    if (const driver::IoResult result = driver_.write(command); !result.ok()) {
+      dialog_.tell("FAILED: writing to the board: " + driver::error_text(result));
+      good = false;
+    }
+  }
+  if (const driver::IoResult result = driver_.write(rig::safe_command); good && !result.ok()) {
+    dialog_.tell("FAILED: ending the pulse: " + driver::error_text(result));
+    good = false;
+  }
+  if (!good || !read(now)) return false;
+  travel = {.upper = rig::counts_between(first.upper_counts, now.upper_counts),
+            .lower = rig::counts_between(first.lower_counts, now.lower_counts),
+            .read = true};
+  return true;
+}
+
+bool Commissioning::wait_for_standstill() {
+  rig::Measurement last;
+  if (!read(last)) return false;
+  const std::int64_t limit_ns = clock_.now_ns() + std::llround(options_.run_out_limit_s / s_per_ns);
+  std::int64_t still_since_ns = clock_.now_ns();
+  while (clock_.now_ns() - still_since_ns < standstill_ns) {
+    if (stop_requested_()) return false;
+    if (clock_.now_ns() > limit_ns) {
+      dialog_.tell("FAILED: the wheels do not come to rest");
+      return false;
+    }
+    clock_.sleep_until(clock_.now_ns() + cycle_ns);
+    rig::Measurement now;
+    if (!read(now)) return false;
+    if (now.upper_counts != last.upper_counts || now.lower_counts != last.lower_counts) {
+      still_since_ns = clock_.now_ns();
+    }
+    last = now;
+  }
+  return true;
+}
+
+CommissioningResult Commissioning::drive_pulse() {
+  if (!dialog_.ask(
+          formatted("Step 3 of 4: the drive gets duty %.2f for %.2f s. Close the cover, stand clear, a hand at the "
+                    "E-stop; release the E-stop and let the upper wheel down. Go on?",
+                    options_.drive_duty, options_.drive_pulse_s))) {
+    return CommissioningResult::declined;
+  }
+  Travel travel;
+  if (!pulse({.motor_duty = options_.drive_duty, .motor_enable = true}, options_.drive_pulse_s, travel)) {
+    return CommissioningResult::failed;
+  }
+  if (stop_requested_()) return CommissioningResult::interrupted;
+  if (travel.lower <= still_counts) {
+    dialog_.tell(
+        formatted("FAILED: the lower wheel moved %d counts. 0: E-stop still pressed, rig not switched on, or too "
+                  "small a duty (--drive-duty). Below 0: motor polarity against encoder sign",
+                  travel.lower));
+    return CommissioningResult::failed;
+  }
+  dialog_.tell(formatted("ok: lower wheel %d counts forward, upper wheel %d; waiting for standstill", travel.lower,
+                         travel.upper));
+  return wait_for_standstill() ? CommissioningResult::passed : CommissioningResult::failed;
+}
+
+CommissioningResult Commissioning::brake_pulse() {
+  if (!dialog_.ask(
+          formatted("Step 4 of 4: the brake of the standing upper wheel gets duty %.2f for %.2f s. Keep your hands "
+                    "out of it. Go on?",
+                    options_.brake_duty, options_.brake_pulse_s))) {
+    return CommissioningResult::declined;
+  }
+  Travel travel;
+  if (!pulse({.brake_duty = options_.brake_duty}, options_.brake_pulse_s, travel)) return CommissioningResult::failed;
+  if (stop_requested_()) return CommissioningResult::interrupted;
+  if (std::abs(travel.upper) > still_counts || std::abs(travel.lower) > still_counts) {
+    dialog_.tell(
+        formatted("FAILED: a brake moves nothing, but the upper wheel went %d and the lower %d counts: are drive "
+                  "and brake exchanged?",
+                  travel.upper, travel.lower));
+    return CommissioningResult::failed;
+  }
+  if (!dialog_.ask("Did the brake grip and let go again, as could be seen or heard?")) {
+    dialog_.tell("FAILED: look at the brake's supply and cable, and at the dead zone (plant.u0)");
+    return CommissioningResult::failed;
+  }
+  return CommissioningResult::passed;
+}
+
+}  // namespace abs_hil::experiment

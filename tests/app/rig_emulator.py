@@ -1,0 +1,112 @@
+"""The emulated rig as a process of its own, for the tests of --backend rig."""
+import os
+import shutil
+import subprocess
+import sys
+
+from program import PROGRAM, ProgramTest
+
+EMULATOR = os.path.join(os.path.dirname(PROGRAM), 'abs_rig_emulator')
+
+
+def why_not():
+    """Why FUSE trees cannot be served here; None if they can."""
+    if not os.path.exists(EMULATOR):
+        return f'{EMULATOR} was not built (libfuse3-dev)'
+    if not os.access('/dev/fuse', os.W_OK):
+        return '/dev/fuse is not there or not writable (modprobe fuse)'
+    if os.getuid() != 0 and not shutil.which('fusermount3'):
+        return 'no fusermount3 (package fuse3)'
+    return None
+
+
+def skip_unless_possible():
+    reason = why_not()
+    if reason:
+        print(f'SKIPPED: {reason}')
+        sys.exit(77)
+
+
+class Emulator:
+    """A running abs_rig_emulator; `command` returns its answer once it has been obeyed."""
+
+    def __init__(self, folder, *args):
+        self.root, self.control, self.truth = folder / 'pci', folder / 'control', folder / 'truth.csv'
+        self.process = subprocess.Popen(
+            [EMULATOR, '--pci-root', self.root, '--control', self.control, '--truth', self.truth, *map(str, args)],
+            stdout=subprocess.PIPE, text=True)
+        self.lines = []
+        line = self.process.stdout.readline()
+        while line and not line.startswith('ready'):  # "not in real time" may come before
+            line = self.process.stdout.readline()
+        assert line.startswith('ready'), 'the emulator did not start'
+
+    def command(self, text):
+        with open(self.control, 'w') as fifo:
+            fifo.write(text + '\n')
+        return self.process.stdout.readline()
+
+    def wire(self):
+        """Duties (drive, brake) that act on the rig now."""
+        answer = self.command('status')
+        part = answer[answer.index('drive '):].split(',')
+        return float(part[0].split()[1]), float(part[1].split()[1])
+
+    def lower_speed(self):
+        return float(self.command('status').split('lower ')[1].split()[0])
+
+    def time_s(self):
+        return float(self.command('status').split('time ')[1].split()[0])
+
+    def turn(self, wheel, revolutions):
+        """By hand: over some time, as the driver takes nothing faster for a wheel."""
+        start = self.time_s()
+        while self.time_s() < start + 0.02:
+            pass
+        self.command(f'turn {wheel} {revolutions}')
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()
+        subprocess.run(['umount', '-l', self.root], stderr=subprocess.DEVNULL)
+
+    def end(self):
+        if self.process.poll() is None:
+            self.process.terminate()
+        self.process.stdout.read()
+        self.process.stdout.close()
+        return self.process.wait(timeout=20)
+
+
+class RigTest(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        self._emulators = []
+        self._programs = []
+
+    def tearDown(self):
+        for program in self._programs:
+            if program.poll() is None:
+                program.kill()
+                program.communicate()
+        for emulator in self._emulators:
+            if emulator.process.poll() is None:
+                emulator.end()
+        super().tearDown()  # removes the folder, in which nothing may be mounted any more
+
+    def emulator(self, *args):
+        folder = self.folder / str(len(self._emulators))
+        folder.mkdir()
+        self._emulators.append(Emulator(folder, *args))
+        return self._emulators[-1]
+
+    def lock_step(self, emulator, *args):
+        return self.run_program('--backend', 'rig', '--fast', '--no-lcm', '--set', 'driver.emulated=true', '--set',
+                                f'driver.pci.root={emulator.root}', *args)
+
+    def real_time(self, emulator, *args):
+        self._programs.append(subprocess.Popen(
+            [PROGRAM, '--backend', 'rig', '--no-lcm', '--set', f'driver.pci.root={emulator.root}', *map(str, args)],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
+        return self._programs[-1]

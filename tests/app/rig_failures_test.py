@@ -1,0 +1,158 @@
+"""What goes wrong with a card, one row each: reason, exit status, and what is left on the wire."""
+import signal
+import subprocess
+import time
+import unittest
+
+from rig_emulator import RigTest, skip_unless_possible
+
+SAFE = (0.0, 0.0)
+
+# name, arguments of the emulator, arguments of abs_hil, exit status, words on stderr
+REFUSED = [
+    ('all ones', ['--command', 'all-ones on'], [], 3, 'answers all ones'),
+    ('other bitstream', ['--bitstream', '0x123'], ['driver.pci.bitstream=0x124'], 3,
+     'bitstream version 291 is not the configured 292'),
+    ('wrong device', ['--device', '0x9030'], [], 3, 'no RT-DAC4/PCI card'),
+    ('wrong vendor', ['--vendor', '0x8086'], [], 3, 'no RT-DAC4/PCI card'),
+    ('wrong device by address', ['--device', '0x9030'], ['driver.pci.bdf=0000:03:00.0'], 3, '0x10b5:0x9030, not the'),
+    ('several cards', ['--bdf', '0000:03:00.0', '--bdf', '0000:04:00.0'], [], 3, '0000:03:00.0, 0000:04:00.0'),
+    ('BAR too small', ['--bar-bytes', 128], [], 3, 'has 128 bytes'),
+    ('BAR in memory', ['--bar-kind', 'memory'], [], 3, 'is memory, not I/O ports'),
+    ('permission denied', ['--command', 'deny on'], [], 3, 'permission denied'),
+    ('unplugged', ['--command', 'unplug'], [], 3, 'no RT-DAC4/PCI card'),
+    ('PWM does not hold its mode', ['--fault', '64:wrong=1'], [], 3, 'at 0x64'),
+    ('supply tripped already', ['--command', 'supply 5'], [], 1, 'interlock tripped: supply undervoltage'),
+    ('sign that is none', [], ['driver.pci.upper_sign=0'], 2, 'driver.pci.upper_sign = 0'),
+    ('no such kind', [], ['driver.kind=isa'], 2, 'driver.kind'),
+]
+
+# name, command while accelerating, words on stderr; None: the wire is not there any more to be looked at
+BROKEN = [
+    ('unplugged', 'unplug', 'board is gone', 'held'),
+    ('all ones', 'all-ones on', 'board is gone', 'held'),
+    ('overspeed (bit 0)', 'overspeed', "the board's own interlock tripped (value 1)", 'safe'),
+    ('supply', 'supply 5', 'interlock tripped: supply undervoltage', 'safe'),
+    ('temperature (bit 2)', 'temperature 95', "the board's own interlock tripped (value 4)", 'safe'),
+    ('encoder off', 'fault 88:off', 'at 0x88', 'safe'),
+    ('encoder nonsense', 'fault 88:garbage', 'answer outside what the board can say', 'safe'),
+    ('PWM reads back otherwise', 'fault 6c:wrong=1', 'register does not read back what was written at 0x6c', 'safe'),
+]
+
+
+class RigFailures(RigTest):
+    def test_refused_before_anything_moves(self):
+        for name, emulator_args, settings, status, words in REFUSED:
+            with self.subTest(name):
+                traffic = self.folder / 'traffic'
+                emulator = self.emulator('--record', traffic, '--lock-step', *emulator_args)
+                result = self.lock_step(emulator, *(a for s in settings for a in ('--set', s)))
+                self.assertEqual(result.returncode, status, result.stderr)
+                self.assertIn(words, result.stderr)
+                self.assertEqual(emulator.wire(), SAFE)
+                emulator.end()
+                written = [line for line in traffic.read_text().splitlines() if line.startswith('W 6C')]
+                self.assertFalse([line for line in written if not line.endswith(' 00000000')], 'only zeros')
+                if status != 1 and 'at 0x64' not in words:
+                    self.assertNotIn('W ', traffic.read_text(), 'nothing is written to what is not the card')
+
+    def test_second_owner_is_told_who_holds_the_card(self):
+        emulator = self.emulator()
+        first = self.real_time(emulator)
+        self.wait_until_driving(emulator)
+        second = self.real_time(emulator)
+        _, errors = second.communicate(timeout=20)
+        self.assertEqual(second.returncode, 3)
+        self.assertIn(f'in use by process {first.pid} (abs_hil)', errors)
+        self.assertGreater(emulator.wire()[0], 0.9, 'the first one goes on')
+        first.send_signal(signal.SIGINT)
+        first.communicate(timeout=20)
+        self.assertEqual(first.returncode, 130)
+        self.assertEqual(emulator.wire(), SAFE)
+
+    def wait_until_driving(self, emulator):
+        deadline = time.monotonic() + 20
+        # A turning wheel, too: an overspeed latched at standstill would be let go at once.
+        while emulator.wire()[0] < 0.9 or emulator.lower_speed() < 5:
+            self.assertLess(time.monotonic(), deadline, 'the drive was never switched on')
+
+    def test_broken_while_running(self):
+        for name, command, words, wire in BROKEN:
+            with self.subTest(name):
+                emulator = self.emulator('--overspeed-bit', 0, '--temperature-max', 90)
+                program = self.real_time(emulator, '--set', 'gate.temperature_max_C=200')
+                self.wait_until_driving(emulator)
+                emulator.command(command)
+                _, errors = program.communicate(timeout=20)
+                self.assertEqual(program.returncode, 1, errors)
+                self.assertIn(words, errors)
+                if wire == 'safe':
+                    self.assertEqual(emulator.wire(), SAFE)
+                else:
+                    # Nothing can reach the wire: the PWMs hold, and the user is told to act.
+                    self.assertIn('the safe state may not have reached the board', errors)
+                    self.assertGreater(emulator.wire()[0], 0.9)
+                emulator.end()
+
+    def test_emulator_killed(self):
+        emulator = self.emulator()
+        program = self.real_time(emulator)
+        self.wait_until_driving(emulator)
+        emulator.kill()
+        _, errors = program.communicate(timeout=20)
+        self.assertEqual(program.returncode, 1, errors)
+        self.assertIn('board is gone', errors)
+
+    def test_client_ended_by_signals(self):
+        for number, status, drive in ((signal.SIGTERM, 143, 0.0), (signal.SIGINT, 130, 0.0), (signal.SIGKILL, -9, 1.0)):
+            with self.subTest(signal=number):
+                emulator = self.emulator()
+                program = self.real_time(emulator)
+                self.wait_until_driving(emulator)
+                program.send_signal(number)
+                program.communicate(timeout=20)
+                self.assertEqual(program.returncode, status)
+                # No watchdog is known: after SIGKILL the drive holds. The next owner takes it over at 0.
+                self.assertEqual(emulator.wire()[0], drive)
+                emulator.end()
+
+    def test_host_limits_on_supply_and_temperature(self):
+        for setting, command, words in (('gate.supply_min_V=20', 'supply 18', 'supply is below gate.supply_min_V'),
+                                        ('gate.temperature_max_C=60', 'temperature 70', 'hotter than gate.temp')):
+            with self.subTest(setting):
+                emulator = self.emulator('--lock-step', '--command', command)
+                result = self.lock_step(emulator, '--set', setting)
+                self.assertEqual(result.returncode, 1, result.stderr)
+                self.assertIn(words, result.stderr)
+                self.assertEqual(emulator.wire(), SAFE)
+                emulator.end()
+
+    def test_commission_by_hand(self):
+        emulator = self.emulator()
+        arguments = [self.program_path(), 'commission', '--set', f'driver.pci.root={emulator.root}']
+        program = subprocess.Popen(arguments, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   text=True, bufsize=1)
+        said = ''
+        while line := program.stdout.readline():
+            said += line
+            if '[y/N]' in line:
+                self.assertEqual(emulator.wire(), SAFE, f'while it asks: {line}')
+                program.stdin.write('y\n')
+            elif line.startswith('Turn the '):
+                emulator.turn('upper' if 'UPPER' in line else 'lower', 0.5)
+                program.stdin.write('\n')
+        program.communicate(timeout=20)
+        self.assertEqual(program.returncode, 0, said)
+        self.assertEqual(said.count('[y/N]'), 5)
+        self.assertIn('bitstream version', said)
+        self.assertIn('All four steps passed', said)
+        self.assertEqual(emulator.wire(), SAFE)
+
+    def program_path(self):
+        from program import PROGRAM
+        return PROGRAM
+
+
+if __name__ == '__main__':
+    skip_unless_possible()
+    unittest.main()

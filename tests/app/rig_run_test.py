@@ -1,0 +1,94 @@
+"""The paper's experiment through --backend rig, on the emulated card in another process."""
+import pathlib
+import re
+import unittest
+
+from rig_emulator import RigTest, skip_unless_possible
+
+DOCUMENT = pathlib.Path(__file__).parents[2] / 'docs' / 'rig-setup.md'
+
+
+def documented_cycle():
+    """The accesses that docs/rig-setup.md gives for one cycle: (direction, offset, value or a word for it)."""
+    block = re.search(r'```register-traffic\n(.*?)```', DOCUMENT.read_text(), re.S).group(1)
+    return [tuple(line.split('#')[0].split()) for line in block.splitlines() if line.strip()]
+
+
+class RigRun(RigTest):
+    def test_lock_step_agrees_with_the_simulator(self):
+        emulator = self.emulator('--lock-step')
+        rig, sim = self.folder / 'rig.json', self.folder / 'sim.json'
+        result = self.lock_step(emulator, '--summary', rig)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn('not verified on hardware', result.stderr)
+        self.assertIn('11 register accesses a cycle', result.stderr)
+        # The rig's brake is capped at 0.7; the comparison is with the same cap.
+        self.fast('--summary', sim, '--set', 'gate.brake_duty_max=0.7')
+        r, s = self.summary(rig), self.summary(sim)
+        self.assertEqual(r['config']['gate']['brake_duty_max'], 0.7)
+        for key in ('stop_time_s', 'stop_distance_m', 'theta_final_N', 'brake_start_s'):
+            self.assertAlmostEqual(r[key] / s[key], 1.0, delta=0.01, msg=key)
+        self.assertEqual(emulator.wire(), (0.0, 0.0))
+
+    def test_lock_step_repeats_to_the_byte(self):
+        runs = []
+        for name in ('a', 'b'):
+            emulator = self.emulator('--lock-step', '--start-speed', 60)
+            csv = self.folder / name
+            self.assertEqual(self.lock_step(emulator, '--csv', csv, '--set', 'experiment.cut_speed_rad_s=70').returncode,
+                             0)
+            emulator.end()
+            runs.append(csv.read_bytes())
+        self.assertEqual(runs[0], runs[1])
+
+    def test_no_ground_truth_reaches_the_client(self):
+        emulator = self.emulator('--lock-step')
+        csv = self.folder / 'run.csv'
+        self.assertEqual(self.lock_step(emulator, '--csv', csv, '--set', 'experiment.cut_speed_rad_s=30').returncode, 0)
+        for row in self.rows(csv):
+            for column in ('omega1_rad_s', 'omega2_rad_s', 'slip', 'brake_torque_Nm', 'theta_N'):
+                self.assertEqual(row[column], 'NaN', column)
+        emulator.end()
+        truth = self.rows(emulator.truth)
+        self.assertAlmostEqual(max(float(row['omega1_rad_s']) for row in truth), 30, delta=1)
+
+    def test_traffic_of_a_cycle_is_the_documented_one(self):
+        traffic = self.folder / 'traffic'
+        emulator = self.emulator('--lock-step', '--record', traffic)
+        csv = self.folder / 'run.csv'
+        self.assertEqual(self.lock_step(emulator, '--csv', csv, '--set', 'experiment.cut_speed_rad_s=30').returncode, 0)
+        emulator.end()
+        accesses = [line.split() for line in traffic.read_text().splitlines()]
+        cycle = documented_cycle()
+        self.assertEqual(len(cycle), 11)
+        cycles = len(self.rows(csv))
+        in_turn = ('AC', '38', 'B4', 'B8')
+        # Before the first cycle: two reads of `configure`, and the take-over. After the last one: the safe state.
+        start = next(i for i in range(2, len(accesses)) if accesses[i][1] == 'B8') + 1
+        self.assertEqual(len(accesses), start + cycles * len(cycle) + 6)
+        for number in range(cycles):
+            for place, (direction, offset, value) in enumerate(cycle):
+                got = accesses[start + number * len(cycle) + place]
+                wanted = in_turn[number % 4] if offset == 'health' else offset
+                self.assertEqual(got[:2], [direction, wanted], f'cycle {number}, access {place}')
+                if value in ('0', '1'):
+                    self.assertEqual(int(got[2], 16), int(value), f'cycle {number}, access {place}')
+                if value == 'same':
+                    self.assertEqual(got[2], accesses[start + number * len(cycle) + place - 1][2])
+        self.assertEqual([' '.join(a) for a in accesses[-6:]],
+                         ['W 60 00000000', 'W 6C 00000000', 'R 6C 00000000', 'W 60 00000001', 'W 6C 00000000',
+                          'R 6C 00000000'])
+
+    def test_fast_needs_an_emulator_in_lock_step(self):
+        emulator = self.emulator()
+        result = self.run_program('--backend', 'rig', '--fast', '--no-lcm', '--set', f'driver.pci.root={emulator.root}')
+        self.assertEqual(result.returncode, 2)
+        self.assertIn('driver.emulated=true', result.stderr)
+        result = self.lock_step(emulator)
+        self.assertEqual(result.returncode, 3)
+        self.assertIn('has no file emulated_time_ns: it is hardware', result.stderr)
+
+
+if __name__ == '__main__':
+    skip_unless_possible()
+    unittest.main()

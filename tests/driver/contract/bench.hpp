@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "abs_hil/driver/rig_driver.hpp"
+
+namespace abs_hil::test {
+
+/// One backend with a rig behind it whose wheels turn at 60 rad/s when it is made, in virtual time.
+class Bench {
+ public:
+  Bench() = default;
+  Bench(const Bench&) = delete;
+  Bench& operator=(const Bench&) = delete;
+  virtual ~Bench() = default;
+
+  [[nodiscard]] virtual driver::RigDriver& driver() = 0;
+  /// Runs the driver's destructor.
+  virtual void destroy_driver() = 0;
+  /// What acts on the rig now.
+  struct Wire {
+    double drive_duty{0.0};
+    double brake_duty{0.0};
+  };
+  [[nodiscard]] virtual Wire wire() = 0;
+  /// How often anything was written to the board since the bench was made; a simulator, which has no registers, counts
+  /// none and says so.
+  [[nodiscard]] virtual std::uint64_t writes() = 0;
+  [[nodiscard]] virtual bool has_registers() const { return true; }
+  /// From now on the brake output does not take what is written; false if this backend cannot fail so.
+  [[nodiscard]] virtual bool break_brake_output() = 0;
+};
+
+/// Made by each backend's own file. Returns null, having said why, where it cannot be had.
+[[nodiscard]] std::unique_ptr<Bench> make_bench();
+
+inline constexpr double bench_speed_rad_s = 60.0;
+
+}  // namespace abs_hil::test

@@ -1,0 +1,173 @@
+#include "abs_hil/driver/pci/discovery.hpp"
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "abs_hil/driver/io_result.hpp"
+#include "abs_hil/driver/pci/sysfs_window.hpp"
+#include "catch.hpp"
+
+using namespace abs_hil::driver;
+using namespace abs_hil::driver::pci;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// A tree of ordinary files that looks like /sys/bus/pci/devices.
+class Tree {
+ public:
+  Tree() {
+    std::string pattern = (fs::temp_directory_path() / "abs_hil_pci.XXXXXX").string();
+    root = ::mkdtemp(pattern.data());
+    options.root = root.string();
+  }
+  Tree(const Tree&) = delete;
+  Tree& operator=(const Tree&) = delete;
+  ~Tree() {
+    std::error_code ignored;
+    fs::remove_all(root, ignored);
+  }
+  void add(const std::string& bdf, const std::string& vendor = "0x10b5", const std::string& device = "0x2497") const {
+    fs::create_directories(root / bdf);
+    put(bdf, "vendor", vendor + "\n");
+    put(bdf, "device", device + "\n");
+    bar(bdf, "0x000000000000e000 0x000000000000e0ff 0x0000000000040101");
+    put(bdf, "resource2", std::string(256, '\0'));
+  }
+  void bar(const std::string& bdf, const std::string& line) const {
+    const std::string none = "0x0000000000000000 0x0000000000000000 0x0000000000000000\n";
+    put(bdf, "resource", none + none + line + "\n" + none);
+  }
+  void put(const std::string& bdf, const std::string& file, const std::string& text) const {
+    std::ofstream(root / bdf / file) << text;
+  }
+
+  fs::path root;
+  PciOptions options{};
+};
+
+std::string refusal(const PciOptions& options, bool lock_step = false) {
+  try {
+    static_cast<void>(open_card(options, lock_step));
+  } catch (const Unavailable& error) {
+    return error.what();
+  }
+  return "opened";
+}
+
+using Catch::Matchers::Contains;
+
+}  // namespace
+
+TEST_CASE("The one card among other devices is found, opened and read") {
+  const Tree tree;
+  tree.add("0000:00:02.0", "0x8086", "0x1234");
+  tree.add("0000:04:01.0");
+  tree.add("0000:05:00.0", "0x10b5", "0x9030");
+  CHECK(find_cards(tree.root) == std::vector<std::string>{"0000:04:01.0"});
+  const Card card = open_card(tree.options, false);
+  CHECK(card.time == nullptr);
+  REQUIRE(card.window->write32(0x6C, 0x01020304).ok());
+  std::uint32_t value = 0;
+  REQUIRE(card.window->read32(0x6C, value).ok());
+  CHECK(value == 0x01020304);
+  std::ifstream file(tree.root / "0000:04:01.0" / "resource2", std::ios::binary);
+  file.seekg(0x6C);
+  CHECK(file.get() == 4);  // little-endian, at the register's offset
+}
+
+TEST_CASE("Each thing that may be wrong is refused with its own words") {
+  Tree tree;
+  CHECK_THAT(refusal(tree.options), Contains("no RT-DAC4/PCI card") && Contains(tree.root.string()));
+  tree.add("0000:04:01.0");
+
+  SECTION("no such folder") {
+    tree.options.root += "/nowhere";
+    CHECK_THAT(refusal(tree.options), Contains("cannot look for PCI devices") && Contains("driver.pci.root"));
+  }
+  SECTION("several cards") {
+    tree.add("0000:05:01.0");
+    CHECK_THAT(refusal(tree.options),
+               Contains("2 cards") && Contains("0000:04:01.0, 0000:05:01.0") && Contains("driver.pci.bdf="));
+    tree.options.bdf = "0000:05:01.0";
+    CHECK(refusal(tree.options) == "opened");
+  }
+  SECTION("address of nothing") {
+    tree.options.bdf = "0000:09:00.0";
+    CHECK_THAT(refusal(tree.options), Contains("no PCI device 0000:09:00.0"));
+  }
+  SECTION("address of another device") {
+    tree.add("0000:00:02.0", "0x8086", "0x1234");
+    tree.options.bdf = "0000:00:02.0";
+    CHECK_THAT(refusal(tree.options), Contains("0x8086:0x1234"));
+  }
+  SECTION("memory BAR") {
+    tree.bar("0000:04:01.0", "0x00000000f7000000 0x00000000f70000ff 0x0000000000040200");
+    CHECK_THAT(refusal(tree.options), Contains("is memory, not I/O ports"));
+  }
+  SECTION("small BAR") {
+    tree.bar("0000:04:01.0", "0x000000000000e000 0x000000000000e07f 0x0000000000040101");
+    CHECK_THAT(refusal(tree.options), Contains("has 128 bytes; the register map needs 256"));
+  }
+  SECTION("small file behind a BAR that claims more") {
+    tree.put("0000:04:01.0", "resource2", std::string(64, '\0'));
+    CHECK_THAT(refusal(tree.options), Contains("has 64 bytes"));
+  }
+  SECTION("no BAR 2") {
+    tree.bar("0000:04:01.0", "0x0000000000000000 0x0000000000000000 0x0000000000000000");
+    CHECK_THAT(refusal(tree.options), Contains("BAR 2 is not there"));
+  }
+  SECTION("no table of regions") {
+    tree.bar("0000:04:01.0", "nonsense");
+    CHECK_THAT(refusal(tree.options), Contains("\"nonsense\" is not a region"));
+    fs::remove(tree.root / "0000:04:01.0" / "resource");
+    CHECK_THAT(refusal(tree.options), Contains("cannot be read as far as BAR 2"));
+  }
+  SECTION("no resource file") {
+    fs::remove(tree.root / "0000:04:01.0" / "resource2");
+    CHECK_THAT(refusal(tree.options), Contains("cannot be opened: No such file"));
+  }
+}
+
+TEST_CASE("A card has one owner; a second one is told who holds it, and gets it once it is free") {
+  const Tree tree;
+  tree.add("0000:04:01.0");
+  {
+    const Card first = open_card(tree.options, false);
+    CHECK_THAT(refusal(tree.options),
+               Contains("in use by process " + std::to_string(::getpid())) && Contains("exactly one owner"));
+  }
+  CHECK(refusal(tree.options) == "opened");
+}
+
+TEST_CASE("Lock-step is for an emulator that waits for it, and for nothing else") {
+  const Tree tree;
+  tree.add("0000:04:01.0");
+  CHECK_THAT(refusal(tree.options, true), Contains("has no file emulated_time_ns: it is hardware"));
+  tree.put("0000:04:01.0", emulated_time_file, std::string(8, '\0'));
+  CHECK_THAT(refusal(tree.options, false), Contains("emulator in lock-step"));
+  Card card = open_card(tree.options, true);
+  REQUIRE(card.time != nullptr);
+  REQUIRE(card.time->advance_to(123'456'789'012).ok());
+  std::int64_t now_ns = 0;
+  REQUIRE(card.time->now(now_ns).ok());
+  CHECK(now_ns == 123'456'789'012);
+}
+
+TEST_CASE("An access that the kernel cuts short means that the card is gone") {
+  const Tree tree;
+  tree.add("0000:04:01.0");
+  const Card card = open_card(tree.options, false);
+  fs::resize_file(tree.root / "0000:04:01.0" / "resource2", 0);
+  std::uint32_t value = 7;
+  const IoResult result = card.window->read32(0x88, value);
+  CHECK(result.error == IoError::disconnected);
+  CHECK(result.where == 0x88);
+  CHECK(value == 7);
+  CHECK(io_error_for(ENODEV) == IoError::disconnected);
+  CHECK(io_error_for(ENOTCONN) == IoError::disconnected);
+  CHECK(io_error_for(ETIMEDOUT) == IoError::no_answer);
+}

@@ -1,0 +1,164 @@
+#include "abs_hil/experiment/commissioning.hpp"
+
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "catch.hpp"
+#include "driver/pci/model_card.hpp"
+
+using namespace abs_hil;
+using Catch::Matchers::Contains;
+using experiment::CommissioningResult;
+
+namespace {
+
+/// Plays the person: yes to everything but one question, and does something with the rig when asked to.
+class Person final : public experiment::Dialog {
+ public:
+  void tell(const std::string& text) override { said += text + '\n'; }
+  bool ask(const std::string& question) override {
+    asked.push_back(question);
+    before_answer();
+    return static_cast<int>(asked.size()) != no_to;
+  }
+  bool wait_until_done(const std::string& text) override {
+    take_time();
+    turn(text.find("UPPER") != std::string::npos);
+    return true;
+  }
+
+  std::string said{};
+  std::vector<std::string> asked{};
+  int no_to{0};
+  std::function<void(bool upper)> turn{[](bool) {}};
+  std::function<void()> take_time{[] {}};
+  std::function<void()> before_answer{[] {}};
+};
+
+struct Lab {
+  explicit Lab(const driver::pci::PciOptions& options = {}) : driver(options, card.opener()) {
+    person.turn = [this](bool upper) { card.model.turn_by_hand(upper, 0.5); };
+    person.take_time = [this] { clock.sleep_until(clock.now_ns() + 2'000'000'000); };
+    // Nothing may act while a question stands.
+    person.before_answer = [this] {
+      CHECK(card.model.outputs().drive_duty == 0.0);
+      CHECK(card.model.outputs().brake_duty == 0.0);
+    };
+  }
+  CommissioningResult run() {
+    return experiment::Commissioning(driver, clock, person, {}, [this] { return stop; }).run();
+  }
+
+  test::ModelCard card{};
+  driver::pci::PciDriver driver;
+  runtime::VirtualClock clock{};
+  Person person{};
+  bool stop{false};
+};
+
+double largest_width(const test::ModelCard& card) {
+  double most = 0.0;
+  for (const auto& access : card.traffic) {
+    if (access.is_write && access.offset == 0x6C) most = std::max(most, static_cast<double>(access.value) / 4095.0);
+  }
+  return most;
+}
+
+}  // namespace
+
+TEST_CASE("A good rig passes all four steps, each asked for, and is safe after") {
+  Lab lab;
+  CHECK(lab.run() == CommissioningResult::passed);
+  INFO(lab.person.said);
+  CHECK(lab.person.asked.size() == 5);
+  CHECK_THAT(lab.person.said, Contains("ok: 2048 counts forward, 0.50 turns"));
+  CHECK(lab.card.model.outputs().brake_duty == 0.0);
+  CHECK(lab.driver.state() == driver::DriverState::inactive);
+  CHECK(largest_width(lab.card) <= 0.5 + 1.0 / 4095.0);  // the brake's pulse is the largest
+}
+
+TEST_CASE("A no ends it there: before the second step nothing was written, before the third nothing but zeros") {
+  for (int step = 1; step <= 4; ++step) {
+    Lab lab;
+    lab.person.no_to = step;
+    CHECK(lab.run() == CommissioningResult::declined);
+    CHECK(static_cast<int>(lab.person.asked.size()) == step);
+    const bool wrote =
+        std::any_of(lab.card.traffic.begin(), lab.card.traffic.end(), [](auto& a) { return a.is_write; });
+    CHECK(wrote == (step > 2));
+    CHECK((largest_width(lab.card) > 0.0) == (step > 3));
+  }
+}
+
+TEST_CASE("What is wired otherwise is found and named with its key") {
+  driver::pci::PciOptions options;
+  std::string words;
+  SECTION("sign of the upper wheel") {
+    options.upper_sign = -1;
+    words = "change the sign of driver.pci.upper_sign";
+  }
+  SECTION("sign of the lower wheel") {
+    options.lower_sign = -1;
+    words = "change the sign of driver.pci.lower_sign";
+  }
+  SECTION("channels") {
+    options.upper_channel = 0;
+    options.lower_channel = 1;
+    words = "swap driver.pci.upper_channel and driver.pci.lower_channel";
+  }
+  Lab lab(options);
+  CHECK(lab.run() == CommissioningResult::failed);
+  CHECK_THAT(lab.person.said, Contains(words));
+  CHECK(largest_width(lab.card) == 0.0);  // nothing moved by itself
+}
+
+TEST_CASE("Wheels that do not turn, or turn each other, are found") {
+  Lab lab;
+  std::string words;
+  SECTION("no turn") {
+    lab.person.turn = [](bool) {};
+    words = "too few";
+  }
+  SECTION("wheels in contact") {
+    lab.person.turn = [&lab](bool upper) {
+      lab.card.model.turn_by_hand(upper, 0.5);
+      lab.card.model.turn_by_hand(!upper, -0.5);
+    };
+    words = "lift the upper wheel";
+  }
+  SECTION("E-stop pressed during the drive pulse") {
+    lab.card.model.press_emergency_stop(true);
+    words = "E-stop still pressed";
+  }
+  CHECK(lab.run() == CommissioningResult::failed);
+  CHECK_THAT(lab.person.said, Contains(words));
+}
+
+TEST_CASE("A tripped interlock and a request to stop end a pulse at once") {
+  Lab lab;
+  SECTION("trip") {
+    lab.person.before_answer = [&lab] {
+      if (lab.person.asked.size() == 3) lab.card.model.set_supply_V(5.0);
+    };
+    CHECK(lab.run() == CommissioningResult::failed);
+    CHECK_THAT(lab.person.said, Contains("interlocks have tripped"));
+  }
+  SECTION("stop") {
+    lab.person.before_answer = [&lab] { lab.stop = lab.person.asked.size() == 3; };
+    CHECK(lab.run() == CommissioningResult::interrupted);
+  }
+  CHECK(lab.card.model.outputs().drive_duty == 0.0);
+  CHECK(lab.clock.now_ns() < 4'100'000'000);
+}
+
+TEST_CASE("Pulses that could run away are refused") {
+  Lab lab;
+  CHECK_THROWS_AS(
+      experiment::Commissioning(lab.driver, lab.clock, lab.person, {.drive_duty = 0.31}, [] { return false; }),
+      std::invalid_argument);
+  CHECK_THROWS_AS(
+      experiment::Commissioning(lab.driver, lab.clock, lab.person, {.brake_duty = 0.71}, [] { return false; }),
+      std::invalid_argument);
+}
