@@ -83,8 +83,7 @@ TEST_CASE("a tripped interlock of the board latches a fault") {
   const std::uint32_t flags = GENERATE(1U, 2U, 4U);
   bench.driver.trip_flags = flags;
   CHECK_FALSE(bench.cycle());
-  CHECK(bench.gate.fault() ==
-        (flags == 2U ? rig::Reason::board_supply_tripped : rig::Reason::board_interlock_tripped));
+  CHECK(bench.gate.fault() == (flags == 2U ? rig::Reason::board_supply_tripped : rig::Reason::board_interlock_tripped));
   CHECK(bench.gate.fault_value() == static_cast<double>(flags));
 }
 
