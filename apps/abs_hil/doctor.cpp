@@ -18,6 +18,7 @@ int doctor(const RunRequest& request, const std::string& only, bool json) {
                                            .lcm_url = telemetry::default_lcm_url(),
                                            .realtime = s.realtime,
                                            .backend = s.backend,
+                                           .pci_devices = s.driver.pci.root,
                                            .make_driver = [&s] { return make_driver(s, false); }};
   std::vector<diagnosis::Finding> findings = diagnosis::examine(examination);
   if (const std::string note = driver::verification_note(s.driver);

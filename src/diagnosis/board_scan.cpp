@@ -38,7 +38,7 @@ bool can_read_and_write(const fs::path& file) {
 
 Finding judge_board(const PciBoard& board) {
   Finding f{.check = "boards", .what = "RT-DAC4/PCI at " + board.address};
-  const std::string folder = "/sys/bus/pci/devices/" + board.address;
+  const std::string folder = board.folder.string();
   const auto add = [&f](const std::string& detail, const std::string& fix) {
     f.standing = Standing::warning;
     f.detail += (f.detail.empty() ? "" : "; ") + detail;
@@ -50,8 +50,9 @@ Finding judge_board(const PciBoard& board) {
   }
   if (!board.enabled) add("not enabled", "echo 1 | sudo tee " + folder + "/enable");
   if (!board.accessible) {
-    add("registers not accessible to this user",
-        "sudo chgrp realtime " + folder + "/resource2 && sudo chmod g+rw " + folder + "/resource2");
+    add("registers not accessible to this user", "sudo chgrp abs_hil " + folder + "/resource2 && sudo chmod g+rw " +
+                                                     folder +
+                                                     "/resource2; for good: the udev rule of docs/rig-setup.md");
   }
   if (f.detail.empty()) f.detail = "no kernel driver, enabled, registers accessible";
   return f;
@@ -59,13 +60,14 @@ Finding judge_board(const PciBoard& board) {
 
 }  // namespace
 
-std::vector<PciBoard> find_pci_boards(const fs::path& root) {
+std::vector<PciBoard> find_pci_boards(const fs::path& devices) {
   std::vector<PciBoard> boards;
-  for (const fs::path& device : entries(root / "sys/bus/pci/devices")) {
+  for (const fs::path& device : entries(devices)) {
     if (first_line(device / "vendor") != pci_vendor || first_line(device / "device") != pci_device) continue;
     std::error_code none_bound;
     const fs::path driver = fs::read_symlink(device / "driver", none_bound);
     boards.push_back({.address = device.filename().string(),
+                      .folder = device,
                       .bound_driver = none_bound ? "" : driver.filename().string(),
                       .enabled = first_line(device / "enable", "0") != "0",
                       .accessible = can_read_and_write(device / "resource2")});

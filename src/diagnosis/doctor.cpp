@@ -88,7 +88,7 @@ constexpr std::array<Check, 8> checks{{
     {"cpu", [](const Examination&) { return machine_part("cpu"); }},
     {"lcm", check_lcm},
     {"can", [](const Examination&) { return judge(find_can_interfaces(), has_can_sockets()); }},
-    {"boards", [](const Examination&) { return judge(find_pci_boards()); }},
+    {"boards", [](const Examination& e) { return judge(find_pci_boards(e.pci_devices)); }},
     {"backend", check_backend},
 }};
 

@@ -23,7 +23,7 @@ TEST_CASE("cards are found by vendor and device among others, with binding and a
   put_card(system, "0000:04:00.0", "0");
   system.link(devices + "0000:04:00.0/driver", "../../../../bus/pci/drivers/uio_pci_generic");
   system.put(devices + "0000:00:01.0/vendor", "0x8086").put(devices + "0000:00:01.0/device", "0x2497");
-  const auto boards = find_pci_boards(system.root());
+  const auto boards = find_pci_boards(system.root() / devices);
   REQUIRE(boards.size() == 2);
   CHECK(boards[0].address == "0000:03:00.0");
   CHECK(boards[0].bound_driver.empty());
@@ -43,14 +43,14 @@ TEST_CASE("registers that cannot be opened are told of with the fix") {
   FakeSystem system;
   put_card(system, "0000:03:00.0", "1");
   std::filesystem::remove(system.root() / (devices + "0000:03:00.0/resource2"));
-  const auto findings = judge(find_pci_boards(system.root()));
+  const auto findings = judge(find_pci_boards(system.root() / devices));
   CHECK(findings.front().standing == Standing::warning);
   CHECK(findings.front().fix.find("chmod g+rw") != std::string::npos);
 }
 
 TEST_CASE("no card is a note: the simulated rig needs none") {
   FakeSystem system;
-  CHECK(worst(judge(find_pci_boards(system.root()))) == Standing::note);
+  CHECK(worst(judge(find_pci_boards(system.root() / devices))) == Standing::note);
 }
 
 TEST_CASE("CAN interfaces are found by their type; one that is down is a warning") {

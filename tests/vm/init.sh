@@ -7,28 +7,28 @@ mount -t proc proc /proc
 mount -t sysfs sys /sys
 for module in $(cat /modules-to-load); do modprobe "$module" || echo "modprobe $module failed"; done
 
-mkdir -p /host /scratch /root
+mkdir -p /host /scratch /guest
 mount -t tmpfs scratch /scratch
 mkdir /scratch/upper /scratch/work
 mount -t 9p -o trans=virtio,version=9p2000.L,ro,msize=262144,cache=loose host /host || echo "9p: no host files"
-mount -t overlay -o lowerdir=/host,upperdir=/scratch/upper,workdir=/scratch/work root /root
-for folder in proc sys dev; do mkdir -p /root/$folder; mount -o bind /$folder /root/$folder; done
-mkdir -p /root/dev/shm /root/dev/pts /root/run
-mount -t tmpfs shm /root/dev/shm
-mount -t devpts pts /root/dev/pts
-mount -t tmpfs run /root/run
+mount -t overlay -o lowerdir=/host,upperdir=/scratch/upper,workdir=/scratch/work root /guest
+for folder in proc sys dev; do mkdir -p /guest/$folder; mount -o bind /$folder /guest/$folder; done
+mkdir -p /guest/dev/shm /guest/dev/pts /guest/run
+mount -t tmpfs shm /guest/dev/shm
+mount -t devpts pts /guest/dev/pts
+mount -t tmpfs run /guest/run
 version=$(uname -r)
-mkdir -p "/root/lib/modules/$version"
-mount -o bind "/lib/modules/$version" "/root/lib/modules/$version"
+mkdir -p "/guest/lib/modules/$version"
+mount -o bind "/lib/modules/$version" "/guest/lib/modules/$version"
 if grep -q with_out_folder /proc/cmdline; then
-  mkdir -p /root/out
-  mount -t 9p -o trans=virtio,version=9p2000.L,msize=262144 out /root/out
+  mkdir -p /guest/out
+  mount -t 9p -o trans=virtio,version=9p2000.L,msize=262144 out /guest/out
 fi
 ip link set lo up
 
-cp /command /root/run/command
+cp /command /guest/run/command
 stty -F /dev/ttyS1 raw -echo
-setsid chroot /root /bin/bash /run/command >/dev/ttyS1 2>&1 </dev/null
+setsid chroot /guest /bin/bash /run/command >/dev/ttyS1 2>&1 </dev/null
 status=$?
 sync
 echo "vm-exit $status" >/dev/ttyS0
