@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <thread>
 #include <utility>
 
 #include "abs_hil/analysis/run_metrics.hpp"
@@ -92,10 +93,26 @@ std::string realtime_refusal(const runtime::RealtimeReport& report) {
   return "--rt require: real time is not to be had on this machine; nothing has moved\n" + report.shortcomings();
 }
 
+namespace {
+
+/// What the run cannot do without is asked for before its files are opened: an earlier run's stay whole. Throws
+/// driver::Unavailable. The run itself obtains both anew.
+void require_resources(const RunRequest& request, driver::RigDriver& driver) {
+  driver.configure();
+  if (request.outputs.fast || request.settings.realtime.mode != runtime::RealtimeMode::require) return;
+  runtime::RealtimeReport report;
+  // In a thread of its own, which takes the scheduling class with it when it ends.
+  std::jthread([&] { report = runtime::RealtimeScope(request.settings.realtime).report(); }).join();
+  if (!report.realtime()) throw driver::Unavailable(realtime_refusal(report));
+}
+
+}  // namespace
+
 int run(const RunRequest& request) {
   const settings::Settings& s = request.settings;
   const std::unique_ptr<driver::RigDriver> driver = make_driver(s, request.outputs.fast);
   experiment::RunLogicParts logic = make_logic(s, experiment::plan_experiment(s.experiment, s.control.v_min_m_s));
+  require_resources(request, *driver);
   RunOutputs outputs(request);
   runtime::MonotonicClock real_clock;
   runtime::VirtualClock virtual_clock;

@@ -74,6 +74,18 @@ class BadInput(ProgramTest):
         self.assertEqual(result.returncode, 3, result.stderr)
         self.assertIn('driver.kind', result.stderr)
 
+    def test_a_run_that_cannot_start_leaves_earlier_files_whole(self):
+        empty = self.folder / 'no-cards'
+        empty.mkdir()
+        earlier = {option: self.folder / f'earlier{option}' for option in ('--csv', '--log', '--summary')}
+        for path in earlier.values():
+            path.write_text('of an earlier run')
+        outputs = [word for option, path in earlier.items() for word in (option, path)]
+        result = self.run_program('--backend', 'rig', '--no-lcm', '--set', f'driver.pci.root={empty}', *outputs)
+        self.assertEqual(result.returncode, 3, result.stderr)
+        for path in earlier.values():
+            self.assertEqual(path.read_text(), 'of an earlier run')
+
     def test_what_only_the_simulator_can_do(self):
         for args in (['--fast'], ['--set', 'experiment.start_speed_rad_s=100'],
                      ['--experiment', 'friction-jump'], ['--set', 'plant.friction_profile=time: 0.5']):
