@@ -13,7 +13,8 @@ arguments=("$@")
 says_lcm=no
 for argument in "${arguments[@]}"; do
   case "$argument" in
-    --no-lcm | --lcm-url | --lcm-url=* | --fast | list | doctor | --help | --version) says_lcm=yes ;;
+    --no-lcm | --lcm-url | --lcm-url=* | --fast | --help | --version) says_lcm=yes ;;
+    list | doctor | latency | compare | commission) says_lcm=yes ;;
   esac
 done
 if [ "$says_lcm" = no ] && ! "$program" doctor --only lcm; then
