@@ -47,6 +47,7 @@ std::optional<std::string> OverrunReporter::message(const rig::OverrunCounts& co
       in_us(late_->timing.wakeup_latency_ns), in_us(late_->timing.read_ns), in_us(late_->timing.control_ns),
       in_us(late_->timing.write_ns), in_us(late_->record_ns));
   told_ = counts.total;
+  late_.reset();  // the counters run ahead of the records: the next message waits for a late cycle of its own
   return size > 0 ? std::optional<std::string>(text.data()) : std::nullopt;
 }
 
