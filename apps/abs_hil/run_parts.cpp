@@ -2,7 +2,6 @@
 
 #include <utility>
 
-#include "abs_hil/control/registry.hpp"
 #include "abs_hil/driver/factory.hpp"
 #include "abs_hil/driver/sim/sim_driver.hpp"
 
@@ -16,13 +15,8 @@ std::unique_ptr<driver::RigDriver> make_driver(const settings::Settings& s, bool
 }
 
 experiment::RunLogicParts make_logic(const settings::Settings& s, std::vector<experiment::PhasePlan> plans) {
-  return {.control = s.control,
-          .rig = s.plant.rig,
-          .controller = control::make_controller(s.control.controller, {s.control, s.plant.rig}),
-          .sequence = experiment::Sequence(std::move(plans)),
-          .ideal_actuator = s.plant.ideal_actuator,
-          .max_brake_duty = s.gate.brake_duty_max,
-          .start_speed_rad_s = s.experiment.start_speed_rad_s};
+  return experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate, s.experiment,
+                                      std::move(plans));
 }
 
 }  // namespace abs_hil::app

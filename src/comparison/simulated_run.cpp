@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "abs_hil/control/registry.hpp"
 #include "abs_hil/driver/sim/sim_driver.hpp"
 #include "abs_hil/experiment/experiments.hpp"
 #include "abs_hil/experiment/run_logic.hpp"
@@ -19,22 +18,14 @@ namespace {
 /// compute.
 constexpr std::size_t ring_capacity = 2;
 
-experiment::RunLogicParts logic_parts(const settings::Settings& s) {
-  return {.control = s.control,
-          .rig = s.plant.rig,
-          .controller = control::make_controller(s.control.controller, {s.control, s.plant.rig}),
-          .sequence = experiment::Sequence(experiment::plan_experiment(s.experiment, s.control.v_min_m_s)),
-          .ideal_actuator = s.plant.ideal_actuator,
-          .max_brake_duty = s.gate.brake_duty_max,
-          .start_speed_rad_s = s.experiment.start_speed_rad_s};
-}
-
 }  // namespace
 
 RunResult simulate(const settings::Settings& settings, const plant_sim::PlantOptions& plant, std::uint64_t seed) {
   runtime::VirtualClock clock;
   driver::SimDriver driver(plant, {.seed = seed, .start_speed_rad_s = settings.experiment.start_speed_rad_s});
-  experiment::RunLogic logic(logic_parts(settings));
+  experiment::RunLogic logic(experiment::make_logic_parts(
+      settings.control, settings.plant.rig, settings.plant.ideal_actuator, settings.gate, settings.experiment,
+      experiment::plan_experiment(settings.experiment, settings.control.v_min_m_s)));
   runtime::CommandGate gate(settings.gate);
   runtime::RecordRing ring(ring_capacity);
   runtime::CyclicExecutive executive(clock, driver, logic, gate, ring, std::llround(1e9 / settings.control.rate_Hz));

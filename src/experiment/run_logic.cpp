@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "abs_hil/control/registry.hpp"
 #include "abs_hil/rig/encoder_scale.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 
@@ -13,6 +14,18 @@ constexpr double s_per_ns = 1e-9;
 /// Below this car speed the estimated slip would be encoder noise over next to nothing; slip control has ended by then.
 constexpr double slip_floor_m_s = 0.1;
 }  // namespace
+
+RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig::RigParameters& rig,
+                               bool ideal_actuator, const runtime::GateOptions& gate,
+                               const ExperimentOptions& experiment, std::vector<PhasePlan> plans) {
+  return {.control = control,
+          .rig = rig,
+          .controller = control::make_controller(control.controller, {control, rig}),
+          .sequence = Sequence(std::move(plans)),
+          .ideal_actuator = ideal_actuator,
+          .max_brake_duty = gate.brake_duty_max,
+          .start_speed_rad_s = experiment.start_speed_rad_s};
+}
 
 RunLogic::RunLogic(RunLogicParts parts)
     : wheels_(parts.rig.wheels),

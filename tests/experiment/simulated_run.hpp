@@ -51,13 +51,8 @@ struct Result {
 };
 
 inline RunLogicParts logic_parts(const Setup& setup) {
-  return {.control = setup.control,
-          .rig = setup.plant.rig,
-          .controller = control::make_controller(setup.control.controller, {setup.control, setup.plant.rig}),
-          .sequence = Sequence(plan_experiment(setup.experiment, setup.control.v_min_m_s)),
-          .ideal_actuator = setup.plant.ideal_actuator,
-          .max_brake_duty = setup.gate.brake_duty_max,
-          .start_speed_rad_s = setup.experiment.start_speed_rad_s};
+  return make_logic_parts(setup.control, setup.plant.rig, setup.plant.ideal_actuator, setup.gate, setup.experiment,
+                          plan_experiment(setup.experiment, setup.control.v_min_m_s));
 }
 
 /// Runs it in virtual time, on the same code as the program.

@@ -2,13 +2,16 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "abs_hil/control/brake_actuator.hpp"
 #include "abs_hil/control/options.hpp"
 #include "abs_hil/control/slip_controller.hpp"
 #include "abs_hil/control/tracking_observer.hpp"
+#include "abs_hil/experiment/options.hpp"
 #include "abs_hil/experiment/sequence.hpp"
 #include "abs_hil/rig/parameters.hpp"
+#include "abs_hil/runtime/command_gate.hpp"
 #include "abs_hil/runtime/cycle_logic.hpp"
 
 namespace abs_hil::experiment {
@@ -23,6 +26,12 @@ struct RunLogicParts {
   double max_brake_duty{1.0};     ///< as the gate limits it
   double start_speed_rad_s{0.0};  ///< both wheels' speed at the first measurement
 };
+
+/// The parts of a run with the controller that `control` names. Throws std::invalid_argument for options that are not
+/// usable. `control` and `rig` must outlive the construction of the logic.
+[[nodiscard]] RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig::RigParameters& rig,
+                                             bool ideal_actuator, const runtime::GateOptions& gate,
+                                             const ExperimentOptions& experiment, std::vector<PhasePlan> plans);
 
 /// estimate -> sequence -> control of one run: from counts to the command wanted.
 class RunLogic final : public runtime::CycleLogic {
