@@ -63,6 +63,16 @@ Value parse_value(std::string_view text) {
   return std::string(text);
 }
 
+/// Texts go into JSON (summary, logs), which holds UTF-8 only.
+bool is_utf8(const std::string& text) {
+  try {
+    static_cast<void>(nlohmann::json(text).dump());
+    return true;
+  } catch (const nlohmann::json::type_error&) {
+    return false;
+  }
+}
+
 nlohmann::ordered_json value_of(const Key& key) {
   return std::visit([](const auto* target) { return nlohmann::ordered_json(*target); }, key.target);
 }
@@ -101,6 +111,9 @@ void KeyTable::set(std::string_view name, const Value& value, std::string_view o
           const bool known =
               text != nullptr &&
               (key.allowed.empty() || std::find(key.allowed.begin(), key.allowed.end(), *text) != key.allowed.end());
+          if (known && !is_utf8(*text)) {
+            throw ConfigError(fmt::format("{}: {} is not UTF-8 text; give UTF-8 ({})", origin, key.name, key.meaning));
+          }
           if (!known) {
             refuse(key, shown(value),
                    key.allowed.empty() ? "text" : fmt::format("one of {}", fmt::join(key.allowed, ", ")), origin);
