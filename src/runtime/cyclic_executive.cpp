@@ -66,7 +66,7 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   const driver::IoResult read = driver_.read(woken_ns, measurement_);
   if (!read.ok()) {
     if (io_error_.ok()) io_error_ = read;
-    gate_.latch(rig::Reason::driver_read_failed, static_cast<double>(read.error));
+    gate_.latch(driver::reason_of(read, rig::Reason::driver_read_failed), static_cast<double>(read.error));
   } else {
     gate_.watch_board(measurement_);
   }
@@ -87,8 +87,9 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   const driver::IoResult written = driver_.write(gated.command);
   if (!written.ok()) {
     if (io_error_.ok()) io_error_ = written;
-    gate_.latch(rig::Reason::driver_write_failed, static_cast<double>(written.error));
-    logic_.end_early(rig::Reason::driver_write_failed, static_cast<double>(written.error));
+    const rig::Reason reason = driver::reason_of(written, rig::Reason::driver_write_failed);
+    gate_.latch(reason, static_cast<double>(written.error));
+    logic_.end_early(reason, static_cast<double>(written.error));
   }
   logic_.commanded(gated.command);
   const std::int64_t written_ns = clock_.now_ns();

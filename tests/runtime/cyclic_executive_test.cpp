@@ -76,6 +76,17 @@ TEST_CASE("a failed read latches a fault in the same cycle") {
   CHECK(bench.executive.io_error().where == 0x54U);
 }
 
+TEST_CASE("a backend's own reason stands in the log instead of the general one") {
+  Bench bench;
+  REQUIRE(bench.cycle());
+  SECTION("reading") { bench.driver.read_result = {driver::IoError::stalled, 0x84, 0, rig::Reason::usb_stalled}; }
+  SECTION("writing") { bench.driver.write_result = {driver::IoError::stalled, 0x02, 0, rig::Reason::usb_stalled}; }
+  while (bench.cycle()) {
+  }
+  CHECK(bench.gate.fault() == rig::Reason::usb_stalled);
+  CHECK(bench.logic.ended_by == rig::Reason::usb_stalled);
+}
+
 TEST_CASE("a tripped interlock of the board latches a fault") {
   Bench bench;
   REQUIRE(bench.cycle());

@@ -5,6 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include "abs_hil/rig/reason.hpp"
+
 namespace abs_hil::driver {
 
 /// What went wrong at the board, as a number the real-time thread can carry.
@@ -16,6 +18,8 @@ enum class IoError : std::uint8_t {
   read_back_mismatch,    ///< a register does not hold what was written
   implausible_answer,    ///< an answer outside what the board can say
   command_out_of_range,  ///< a command that no gate lets through: a duty not in [0, 1], a torque < 0, not finite
+  stalled,               ///< the board refuses the transfer (USB STALL)
+  incomplete_answer,     ///< an answer of the wrong length
 };
 
 [[nodiscard]] constexpr std::string_view description(IoError error) noexcept {
@@ -27,18 +31,27 @@ enum class IoError : std::uint8_t {
     case IoError::read_back_mismatch: return "register does not read back what was written";
     case IoError::implausible_answer: return "answer outside what the board can say";
     case IoError::command_out_of_range: return "command is not finite or outside its range";
+    case IoError::stalled: return "board refuses the transfer (STALL)";
+    case IoError::incomplete_answer: return "answer of the wrong length";
   }
   return "unknown error";
 }
 
 /// Result of one read or write. `where` is the register offset, CAN id or endpoint concerned, `errno_value` the
-/// system's error if it had one.
+/// system's error if it had one. `reason` is the backend's own word for logs; with none the cycle's
+/// `driver_read_failed` or `driver_write_failed` stands.
 struct [[nodiscard]] IoResult {
   IoError error{IoError::none};
   std::uint32_t where{0};
   int errno_value{0};
+  rig::Reason reason{rig::Reason::none};
   [[nodiscard]] constexpr bool ok() const noexcept { return error == IoError::none; }
 };
+
+/// The backend's own reason, or `otherwise` if it gives none.
+[[nodiscard]] constexpr rig::Reason reason_of(const IoResult& result, rig::Reason otherwise) noexcept {
+  return result.reason == rig::Reason::none ? otherwise : result.reason;
+}
 
 /// In words for messages: error, place and the system's own words if it had any. Not real-time safe.
 [[nodiscard]] std::string error_text(const IoResult& result);

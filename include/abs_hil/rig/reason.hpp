@@ -35,6 +35,13 @@ enum class Reason : std::uint16_t {
   board_supply_tripped = 80,
   board_supply_low = 81,
   board_too_hot = 82,
+  usb_unplugged = 120,
+  usb_stalled = 121,
+  usb_short_frame = 122,
+  usb_no_answer = 123,
+  usb_not_a_frame = 124,
+  usb_outputs_not_taken = 125,
+  usb_transfer_failed = 126,
 };
 
 /// In words, for events, logs and summaries.
@@ -64,6 +71,14 @@ enum class Reason : std::uint16_t {
     case Reason::board_supply_tripped: return "the board's own interlock tripped: supply undervoltage";
     case Reason::board_supply_low: return "the board's supply is below gate.supply_min_V";
     case Reason::board_too_hot: return "the board is hotter than gate.temperature_max_C";
+    case Reason::usb_unplugged: return "USB board unplugged: its outputs hold, press the E-stop";
+    case Reason::usb_stalled: return "USB board refused a transfer (STALL)";
+    case Reason::usb_short_frame: return "USB board sent a frame of the wrong length";
+    case Reason::usb_no_answer:
+      return "USB board did not answer in time too often: its outputs may hold, press the E-stop";
+    case Reason::usb_not_a_frame: return "USB board sent what is none of its frames";
+    case Reason::usb_outputs_not_taken: return "USB board does not show the duties that were sent";
+    case Reason::usb_transfer_failed: return "USB transfer failed";
   }
   return "unknown reason";
 }
