@@ -1,5 +1,7 @@
 #include "command_line.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "abs_hil/experiment/experiments.hpp"
@@ -78,6 +80,9 @@ RunRequest merge(const RunOptions& options) {
   check_together(request);
   if (s.backend == "rig") apply_board_limits(s);
   request.config_json = keys.to_json().dump();
+  request.config_toml = fmt::format(
+      "# Effective configuration of a run; the same again: abs_hil --backend {} --plant {} --config THIS_FILE\n{}",
+      s.backend, s.plant_name, keys.to_toml());
   return request;
 }
 

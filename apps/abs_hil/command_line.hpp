@@ -19,6 +19,11 @@ struct OutputOptions {
   std::optional<std::string> histogram_file{};
   std::optional<std::string> lcm_url{};
   bool no_lcm{false};
+  std::optional<std::string> run_folder{};  ///< --out: new or empty
+  bool no_run_folder{false};                ///< --no-out
+
+  /// True if a run's records go to files that were named one by one.
+  [[nodiscard]] bool names_files() const { return csv_file || log_file || summary_file || histogram_file; }
 };
 
 /// The options of `abs_hil` as typed, before they are merged with files.
@@ -55,7 +60,9 @@ struct CompareOptions {
 struct RunRequest {
   settings::Settings settings{};
   std::string config_json{};  ///< the effective configuration
+  std::string config_toml{};  ///< the same, as a file for --config
   OutputOptions outputs{};
+  std::vector<std::string> command_line{};  ///< as typed, for the record
 };
 
 /// Merges defaults, plant file, configuration file, named options and assignments, later ones winning. Throws

@@ -52,6 +52,10 @@ void add_run_options(CLI::App& cli, app::RunOptions& o) {
   cli.add_option("--csv", o.outputs.csv_file, "write every cycle to a CSV file")->type_name("FILE");
   cli.add_option("--log", o.outputs.log_file, "write an LCM event log (.lcmlog)")->type_name("FILE");
   cli.add_option("--summary", o.outputs.summary_file, "write the summary as JSON")->type_name("FILE");
+  auto* out = cli.add_option("--out", o.outputs.run_folder,
+                             "folder for all of the run's record, new or empty (default: one below runs/)")
+                  ->type_name("DIR");
+  cli.add_flag("--no-out", o.outputs.no_run_folder, "no run folder")->excludes(out);
   auto* url =
       cli.add_option("--lcm-url", o.outputs.lcm_url, "LCM network (default: LCM_DEFAULT_URL, else UDP multicast)");
   cli.add_flag("--no-lcm", o.outputs.no_lcm, "do not publish")->excludes(url);
@@ -184,7 +188,9 @@ int dispatch(int argc, char** argv) {
     return app::compare(compare_options);
   }
   if (commission.parser->parsed()) return app::commission(app::merge(commission.options), commission.pulses);
-  return app::run(app::merge(options));
+  app::RunRequest request = app::merge(options);
+  request.command_line.assign(argv, argv + argc);
+  return app::run(request);
 }
 
 int fail(int status, const std::exception& error) {

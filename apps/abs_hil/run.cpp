@@ -53,6 +53,19 @@ analysis::RunSummary summarise(const RunRequest& request, const experiment::RunS
           .config = nlohmann::ordered_json::parse(request.config_json)};
 }
 
+archive::RunEnvironment environment(const RunRequest& request, const driver::RigDriver& driver,
+                                    const experiment::RunOutcome& outcome) {
+  const settings::Settings& s = request.settings;
+  return {.command_line = request.command_line,
+          .backend = s.backend,
+          .board = std::string(driver.name()),
+          .board_notes = driver.notes(),
+          .emulated = s.backend == "rig" && s.driver.emulated,
+          .virtual_time = request.outputs.fast,
+          .realtime = outcome.realtime.realtime(),
+          .realtime_shortcomings = request.outputs.fast ? std::string() : outcome.realtime.shortcomings()};
+}
+
 /// What a run in real time says about its timing while it goes on.
 class TimingWatch {
  public:
@@ -147,8 +160,9 @@ int run(const RunRequest& request) {
   }
   board_notes.log_once();
   const analysis::RunSummary summary = summarise(request, session, outcome, outputs);
-  outputs.write(summary, session.executive().statistics());
+  outputs.write(summary, session.executive().statistics(), environment(request, *driver, outcome));
   fmt::print("{}", analysis::to_text(summary));
+  if (outputs.folder()) fmt::print("  {:<22}{}\n", "run folder", outputs.folder()->path().string());
   if (!outcome.completed()) spdlog::error("run ended early: {}", summary.reason);
   if (!outcome.safe_state.ok()) {
     spdlog::error(

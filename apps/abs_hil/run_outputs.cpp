@@ -1,5 +1,9 @@
 #include "run_outputs.hpp"
 
+#include <spdlog/spdlog.h>
+
+#include <ctime>
+
 #include "abs_hil/settings/config_error.hpp"
 #include "abs_hil/telemetry/file_error.hpp"
 #include "abs_hil/telemetry/lcm_url.hpp"
@@ -21,17 +25,51 @@ RunOutputs::RunOutputs(const RunRequest& request)
     lcm_.emplace(url);
   }
   try {
-    if (request.outputs.csv_file) csv_.emplace(*request.outputs.csv_file);
-    if (request.outputs.summary_file) summary_.emplace(*request.outputs.summary_file);
-    if (request.outputs.histogram_file) histogram_.emplace(*request.outputs.histogram_file);
-    if (request.outputs.log_file) {
-      log_.emplace(*request.outputs.log_file, request.outputs.fast ? std::optional(virtual_epoch_us) : std::nullopt);
-    }
+    // The files named one by one first: a bad path leaves no folder behind.
+    open_files(request.outputs);
+    open_folder(request);
   } catch (const std::runtime_error& error) {
     throw settings::ConfigError(error.what());
   }
-  if (log_ || lcm_) open_stream(request);
+  if (!log_.empty() || lcm_) open_stream(request);
   if (!request.outputs.fast) status_line_.emplace([this] { return snapshot(); });
+}
+
+void RunOutputs::open_files(const OutputOptions& outputs) {
+  if (outputs.csv_file) csv_.emplace_back(*outputs.csv_file);
+  if (outputs.summary_file) summary_.emplace_back(*outputs.summary_file);
+  if (outputs.histogram_file) histogram_.emplace_back(*outputs.histogram_file);
+  if (outputs.log_file) {
+    log_.emplace_back(*outputs.log_file, outputs.fast ? std::optional(virtual_epoch_us) : std::nullopt);
+  }
+}
+
+void RunOutputs::open_folder(const RunRequest& request) {
+  const OutputOptions& o = request.outputs;
+  if (o.run_folder) {
+    folder_.emplace(*o.run_folder);
+  } else {
+    // A run in virtual time can be had again from its command line: it leaves no folder unless asked to.
+    const std::filesystem::path runs = archive::default_runs_dir();
+    if (o.fast || o.no_run_folder || o.names_files() || runs.empty()) return;
+    const std::time_t now = std::time(nullptr);
+    std::tm local{};
+    localtime_r(&now, &local);
+    try {
+      folder_.emplace(archive::unused_folder(runs, local, request.settings.experiment.name));
+    } catch (const archive::FolderError& error) {
+      // Nobody asked for it: the run is worth more than its record.
+      spdlog::warn("this run leaves no folder: {} (--no-out: none wanted)", error.what());
+      return;
+    }
+  }
+  folder_->write(archive::file::config, std::string_view(request.config_toml));
+  open_files({.fast = o.fast,
+              .csv_file = folder_->of(archive::file::csv),
+              .log_file = folder_->of(archive::file::log),
+              .summary_file = folder_->of(archive::file::summary),
+              .histogram_file = o.fast ? std::nullopt : std::optional(folder_->of(archive::file::histogram).string())});
+  events_.emplace(folder_->of(archive::file::events));
 }
 
 void RunOutputs::open_stream(const RunRequest& request) {
@@ -46,7 +84,7 @@ void RunOutputs::open_stream(const RunRequest& request) {
                                 .config_json = request.config_json,
                                 .version = ABS_HIL_VERSION},
       [this] { return snapshot(); });
-  if (log_) stream_->add(*log_);
+  for (telemetry::LogOutlet& log : log_) stream_->add(log);
   if (lcm_) {
     stream_->add(*lcm_);
     commands_.emplace(*lcm_, *stream_, [] {});
@@ -55,7 +93,8 @@ void RunOutputs::open_stream(const RunRequest& request) {
 
 std::vector<rig::RecordSink*> RunOutputs::sinks() {
   std::vector<rig::RecordSink*> sinks{&metrics_};
-  if (csv_) sinks.push_back(&*csv_);
+  for (telemetry::CsvSink& csv : csv_) sinks.push_back(&csv);
+  if (events_) sinks.push_back(&*events_);
   if (stream_) sinks.push_back(&*stream_);
   if (status_line_ && status_line_->active()) sinks.push_back(&*status_line_);
   return sinks;
@@ -81,9 +120,13 @@ telemetry::StatusSnapshot RunOutputs::snapshot() const {
           .late = timing.overruns};
 }
 
-void RunOutputs::write(const analysis::RunSummary& summary, const runtime::CycleStatistics& statistics) {
-  if (summary_) summary_->write(summary);
-  if (histogram_) histogram_->write(statistics);
+void RunOutputs::write(const analysis::RunSummary& summary, const runtime::CycleStatistics& statistics,
+                       const archive::RunEnvironment& environment) {
+  for (analysis::SummaryFile& file : summary_) file.write(summary);
+  for (runtime::HistogramFile& file : histogram_) file.write(statistics);
+  if (!folder_) return;
+  folder_->write(archive::file::environment, archive::environment_json(environment));
+  folder_->seal();
 }
 
 }  // namespace abs_hil::app

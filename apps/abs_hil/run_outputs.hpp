@@ -1,16 +1,21 @@
 #pragma once
 
+#include <list>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "abs_hil/analysis/run_metrics.hpp"
 #include "abs_hil/analysis/run_summary.hpp"
+#include "abs_hil/archive/environment.hpp"
+#include "abs_hil/archive/run_folder.hpp"
 #include "abs_hil/experiment/run_session.hpp"
 #include "abs_hil/rig/record_sink.hpp"
 #include "abs_hil/runtime/histogram_file.hpp"
 #include "abs_hil/telemetry/command_listener.hpp"
 #include "abs_hil/telemetry/csv_sink.hpp"
+#include "abs_hil/telemetry/event_csv.hpp"
 #include "abs_hil/telemetry/lcm_outlet.hpp"
 #include "abs_hil/telemetry/log_outlet.hpp"
 #include "abs_hil/telemetry/message_stream.hpp"
@@ -19,11 +24,12 @@
 
 namespace abs_hil::app {
 
-/// Everything a run's records go to, opened before anything moves: metrics, CSV, LCM, event log, summary, status line.
+/// Everything a run's records go to, opened before anything moves: metrics, CSV, LCM, event log, summary, status line,
+/// a folder with all of them.
 class RunOutputs {
  public:
-  /// Throws telemetry::FileError or std::runtime_error as settings::ConfigError for files that cannot be written, and
-  /// telemetry::LcmError without a network.
+  /// Throws telemetry::FileError or std::runtime_error as settings::ConfigError for files and folders that cannot be
+  /// written, and telemetry::LcmError without a network.
   explicit RunOutputs(const RunRequest& request);
 
   [[nodiscard]] std::vector<rig::RecordSink*> sinks();
@@ -34,19 +40,27 @@ class RunOutputs {
   [[nodiscard]] bool stop_requested() const { return commands_ && commands_->stop_requested(); }
   [[nodiscard]] analysis::Metrics metrics() const { return metrics_.metrics(); }
   [[nodiscard]] std::uint64_t publish_failures() const { return stream_ ? stream_->failures() : 0; }
-  /// Writes summary and histogram where they were asked for. Throws std::runtime_error.
-  void write(const analysis::RunSummary& summary, const runtime::CycleStatistics& statistics);
+  /// Writes summary and histogram where they were asked for, and completes the run folder. Throws std::runtime_error.
+  void write(const analysis::RunSummary& summary, const runtime::CycleStatistics& statistics,
+             const archive::RunEnvironment& environment);
+  /// The run folder, if there is one.
+  [[nodiscard]] const std::optional<archive::RunFolder>& folder() const noexcept { return folder_; }
 
  private:
   [[nodiscard]] telemetry::StatusSnapshot snapshot() const;
+  void open_folder(const RunRequest& request);
+  void open_files(const OutputOptions& outputs);
   void open_stream(const RunRequest& request);
 
   const experiment::RunSession* session_{nullptr};
   analysis::RunMetrics metrics_;
-  std::optional<telemetry::CsvSink> csv_;
-  std::optional<analysis::SummaryFile> summary_;
-  std::optional<runtime::HistogramFile> histogram_;
-  std::optional<telemetry::LogOutlet> log_;
+  std::optional<archive::RunFolder> folder_;
+  // Of each as many as there are places: the run folder and the file named.
+  std::list<telemetry::CsvSink> csv_;
+  std::list<analysis::SummaryFile> summary_;
+  std::list<runtime::HistogramFile> histogram_;
+  std::list<telemetry::LogOutlet> log_;
+  std::optional<telemetry::EventCsv> events_;
   std::optional<telemetry::LcmOutlet> lcm_;
   std::optional<telemetry::MessageStream> stream_;
   std::optional<telemetry::CommandListener> commands_;

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <type_traits>
+#include <utility>
 
 #include "abs_hil/settings/config_error.hpp"
 #include "nearest_name.hpp"
@@ -136,6 +138,30 @@ void KeyTable::set_text(std::string_view assignment, std::string_view origin) {
   const std::string_view text = assignment.substr(equals + 1);
   const bool wants_text = std::holds_alternative<std::string*>(find(name, origin).target);
   set(name, wants_text ? Value(std::string(text)) : parse_value(text), origin);
+}
+
+std::string KeyTable::to_toml() const {
+  // Tables in the order of their first key, each once, whatever the order of the keys.
+  std::vector<std::pair<std::string_view, std::string>> tables;
+  for (const Key& key : keys_) {
+    const std::size_t dot = key.name.rfind('.');
+    const std::string_view table = key.name.substr(0, dot);
+    auto at = std::find_if(tables.begin(), tables.end(), [&](const auto& known) { return known.first == table; });
+    if (at == tables.end()) at = tables.insert(tables.end(), {table, fmt::format("\n[{}]\n", table)});
+    // A number as short as reads back to the same; a text as JSON writes it, which TOML reads alike.
+    const std::string value = std::visit(
+        [](const auto* target) {
+          if constexpr (std::is_same_v<std::decay_t<decltype(*target)>, std::string>)
+            return nlohmann::json(*target).dump();
+          else
+            return fmt::format("{}", *target);
+        },
+        key.target);
+    at->second += fmt::format("{} = {}\n", key.name.substr(dot + 1), value);
+  }
+  std::string text;
+  for (const auto& [name, values] : tables) text += values;
+  return text;
 }
 
 nlohmann::ordered_json KeyTable::to_json() const {

@@ -1,6 +1,7 @@
 """Runs abs_hil for the tests of the program: unittest with a temporary folder and the path of the binary."""
 import csv
 import json
+import os
 import pathlib
 import subprocess
 import sys
@@ -8,6 +9,9 @@ import tempfile
 import unittest
 
 PROGRAM = sys.argv.pop(1) if len(sys.argv) > 1 else 'build/release/bin/abs_hil'
+
+# Runs that name no place for their record leave none.
+os.environ['ABS_HIL_RUNS_DIR'] = ''
 
 
 class ProgramTest(unittest.TestCase):

@@ -22,6 +22,7 @@ MAY_KNOW = {
     'experiment': {'rig', 'control', 'driver', 'runtime', 'plant_sim'},
     'telemetry': {'rig', 'lcmtypes'},
     'analysis': {'rig'},
+    'archive': set(),
     'diagnosis': {'rig', 'driver', 'runtime', 'telemetry'},
     'settings': {'rig', 'control', 'plant_sim', 'driver', 'runtime', 'experiment'},
     'comparison': {'rig', 'control', 'plant_sim', 'driver', 'driver/sim', 'runtime', 'experiment', 'analysis', 'settings'},

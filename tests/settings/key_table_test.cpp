@@ -114,3 +114,13 @@ TEST_CASE("the effective configuration is nested like a file and complete") {
   for (const auto& item : flat.items()) leaves += item.value().is_primitive() ? 1 : 0;
   CHECK(leaves == f.table.keys().size());
 }
+
+TEST_CASE("the effective configuration as TOML names every table once and every value as it is") {
+  Fixture f;
+  f.table.set("telemetry.channel_prefix", std::string("with \"quotes\" and \\"), "test");
+  f.table.set("plant.theta_N", 0.1 + 0.2, "test");
+  const std::string text = f.table.to_toml();
+  CHECK_THAT(text, Contains("channel_prefix = \"with \\\"quotes\\\" and \\\\\""));
+  CHECK_THAT(text, Contains("theta_N = 0.30000000000000004\n"));
+  CHECK(text.find("[control]\n") == text.rfind("[control]\n"));
+}

@@ -49,6 +49,8 @@ class KeyTable {
   [[nodiscard]] const std::vector<Key>& keys() const noexcept { return keys_; }
   /// The effective configuration, nested as in a file.
   [[nodiscard]] nlohmann::ordered_json to_json() const;
+  /// The effective configuration as a TOML file that load_file reads back to the same values.
+  [[nodiscard]] std::string to_toml() const;
 
  private:
   [[nodiscard]] const Key& find(std::string_view name, std::string_view origin) const;
