@@ -1,0 +1,38 @@
+"""The messages of abs_hil: what a running experiment publishes over LCM and what its event logs (.lcmlog) hold.
+
+    import abs_hil
+    message = abs_hil.decode(data)                  # whichever of the types it is
+    message = abs_hil.telemetry_t.decode(data)      # this one, else ValueError
+
+Every field with its unit and range: lcmtypes/*.lcm. Decoding needs nothing but Python; receiving live messages and
+reading event logs needs LCM's own module (pip install lcm).
+"""
+import importlib
+import pkgutil
+
+#: name -> class of every message type
+TYPES = {}
+for _module in pkgutil.iter_modules(__path__):
+    if _module.name.endswith('_t'):
+        TYPES[_module.name] = getattr(importlib.import_module(f'{__name__}.{_module.name}'), _module.name)
+globals().update(TYPES)
+
+#: names of the values of the field `phase`, as in the CSV
+PHASES = ('idle', 'accelerate', 'coast', 'brake', 'hold', 'stopped', 'fault')
+
+_BY_FINGERPRINT = {type_._get_packed_fingerprint(): type_ for type_ in TYPES.values()}
+
+
+def decode(data):
+    """The message in `data` (bytes), whichever type it is. ValueError if it is none of abs_hil's or damaged."""
+    type_ = _BY_FINGERPRINT.get(bytes(data[:8]))
+    if type_ is None:
+        raise ValueError(f'not a message of abs_hil: fingerprint {bytes(data[:8]).hex()}, known are '
+                         + ', '.join(f'{name} {t._get_packed_fingerprint().hex()}' for name, t in TYPES.items()))
+    try:
+        message = type_.decode(data)
+    except Exception as error:  # the generated decoders let struct.error and UnicodeDecodeError through
+        raise ValueError(f'damaged {type_.__name__} of {len(data)} bytes: {error}') from error
+    if message.encode() != bytes(data):  # they take a last string that is cut short, and bytes behind the end
+        raise ValueError(f'damaged {type_.__name__} of {len(data)} bytes: its length is not that of its fields')
+    return message

@@ -1,0 +1,105 @@
+"""The message types as their users meet them: every field documented, Python and Java with the published fingerprints,
+and Python's decode() on whole, damaged and foreign messages.
+
+usage: types_test.py LCMTYPES PYTHON_MODULE_DIR [JAVA TYPES_JAR LCM_JAR FINGERPRINTS_CLASS_DIR]
+"""
+import pathlib
+import re
+import subprocess
+import sys
+import unittest
+
+LCMTYPES, MODULE_DIR, *JAVA = sys.argv[1:]
+sys.argv[1:] = []
+sys.path.insert(0, MODULE_DIR)
+import abs_hil  # noqa: E402  (the module under test)
+
+FIELD = re.compile(r'^ *(?P<type>\w+) +(?P<name>\w+); *(?P<comment>//.*)?$')
+RANGE = re.compile(r'>=|<=|> 0|in \[|\bany\b|one of')
+UNIT_IN_NAME = {'_ns': 'ns', '_us': 'us', '_s': 's', '_rad_s': 'rad/s', '_m_s': 'm/s', '_Nm': 'N m', '_N': 'N', '_m': 'm',
+                '_V': 'V', '_C': 'Celsius'}
+
+
+def published():
+    lines = pathlib.Path(LCMTYPES, 'fingerprints.txt').read_text().splitlines()
+    return dict(line.split() for line in lines if line and not line.startswith('#'))
+
+
+def undocumented(text):
+    """What is wrong with the comments of a .lcm file's fields."""
+    wrong = []
+    for number, line in enumerate(text.splitlines(), 1):
+        field = FIELD.match(line)
+        if not field or field['type'] == 'package':
+            continue
+        comment = field['comment'] or ''
+        if not comment:
+            wrong.append(f'line {number}: {field["name"]} has no comment')
+        elif field['type'] not in ('string', 'boolean') and not RANGE.search(comment):
+            wrong.append(f'line {number}: {field["name"]} has no range')
+        suffix = next((s for s in sorted(UNIT_IN_NAME, key=len, reverse=True) if field['name'].endswith(s)), None)
+        if comment and suffix and not re.search(rf'\b{UNIT_IN_NAME[suffix]}\b', comment):
+            # "99th percentile, us": a unit in the name must be the unit in the comment
+            wrong.append(f'line {number}: {field["name"]} names no {UNIT_IN_NAME[suffix]}')
+    return wrong
+
+
+class Types(unittest.TestCase):
+    def test_every_field_has_unit_and_range(self):
+        for file in sorted(pathlib.Path(LCMTYPES).glob('*.lcm')):
+            with self.subTest(file.name):
+                self.assertEqual(undocumented(file.read_text()), [])
+
+    def test_missing_comments_units_and_ranges_are_found(self):
+        self.assertEqual(len(undocumented('double a_s;\ndouble b_s;  // b, s\ndouble c_s;  // c, ns, >= 0\n')), 3)
+
+    def test_files_list_and_module_hold_the_same_types(self):
+        files = {file.stem for file in pathlib.Path(LCMTYPES).glob('*.lcm')}
+        self.assertEqual(files, set(published()), 'lcmtypes/*.lcm and fingerprints.txt')
+        self.assertEqual(files, set(abs_hil.TYPES), 'lcmtypes/*.lcm and the Python module')
+
+    def test_python_fingerprints(self):
+        found = {name: type_._get_packed_fingerprint().hex() for name, type_ in abs_hil.TYPES.items()}
+        self.assertEqual(found, published(), 'a published type must not change: see lcmtypes/README.md')
+
+    def test_java_fingerprints(self):
+        if not JAVA:
+            self.skipTest('built without Java')
+        java, *classpath = JAVA
+        text = subprocess.run([java, '-cp', ':'.join(classpath), 'Fingerprints', *published()], check=True,
+                              capture_output=True, text=True, timeout=60).stdout
+        found = dict(line.split() for line in text.splitlines())
+        self.assertEqual(found, published(), 'a published type must not change: see lcmtypes/README.md')
+
+
+class Decode(unittest.TestCase):
+    def event(self):
+        event = abs_hil.event_t()
+        event.sequence, event.kind, event.value = 7, 'phase', 0.1 + 0.2
+        event.message = 'Schlupf größer als 0,2'
+        return event
+
+    def test_any_message_comes_back_as_its_own_type(self):
+        for type_ in abs_hil.TYPES.values():
+            self.assertIsInstance(abs_hil.decode(type_().encode()), type_)
+        back = abs_hil.decode(self.event().encode())
+        self.assertEqual((back.sequence, back.kind, back.value, back.message),
+                         (7, 'phase', 0.1 + 0.2, 'Schlupf größer als 0,2'))
+
+    def test_damaged_and_foreign_messages_are_value_errors(self):
+        whole = self.event().encode()
+        for size in range(len(whole)):
+            with self.assertRaises(ValueError):
+                abs_hil.decode(whole[:size])
+        with self.assertRaisesRegex(ValueError, 'damaged event_t'):
+            abs_hil.decode(whole + b'x')
+        with self.assertRaisesRegex(ValueError, '0000000000000001.*telemetry_t'):
+            abs_hil.decode(bytes(7) + b'\x01' + whole[8:])
+
+    def test_phases_are_those_of_the_type(self):
+        for number, name in enumerate(abs_hil.PHASES):
+            self.assertEqual(getattr(abs_hil.telemetry_t, f'PHASE_{name.upper()}'), number)
+
+
+if __name__ == '__main__':
+    unittest.main()
