@@ -72,6 +72,7 @@ fs::path config_dir() {
     const fs::path program = fs::read_symlink("/proc/self/exe", error);
     if (!error) places.push_back(program.parent_path().parent_path() / "share" / "abs_hil" / "config");
     places.emplace_back(ABS_HIL_SOURCE_CONFIG_DIR);
+    places.emplace_back(ABS_HIL_INSTALLED_CONFIG_DIR);  // for a program elsewhere that links the installed library
   }
   for (const fs::path& place : places) {
     if (fs::is_directory(place, error)) return place;

@@ -1,0 +1,62 @@
+# What `cmake --install` puts where. Two components: runtime (programs, configuration) and development (headers,
+# libraries, find_package(abs_hil)).
+include(CMakePackageConfigHelpers)
+
+set(abs_hil_cmake_dir ${CMAKE_INSTALL_LIBDIR}/cmake/abs_hil)
+
+# Programs and what they need.
+set(programs abs_hil_program abs_tune)
+foreach(optional abs_rig_emulator abs_report abs_guardian)
+  if(TARGET ${optional})
+    list(APPEND programs ${optional})
+  endif()
+endforeach()
+install(TARGETS ${programs} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
+install(DIRECTORY config/ DESTINATION ${CMAKE_INSTALL_DATADIR}/abs_hil/config COMPONENT runtime PATTERN udev EXCLUDE)
+install(FILES config/udev/70-abs-hil.rules DESTINATION ${ABS_HIL_UDEV_DIR} COMPONENT runtime)
+install(FILES packaging/abs_hil.sysusers DESTINATION ${ABS_HIL_SYSUSERS_DIR} RENAME abs_hil.conf COMPONENT runtime)
+install(FILES completion/abs_hil.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME abs_hil
+  COMPONENT runtime)
+install(FILES README.md CHANGELOG.md CITATION.cff DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
+install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
+
+# Manual pages are the programs' own --help, so that they never lag behind.
+find_program(HELP2MAN_EXECUTABLE help2man)
+if(HELP2MAN_EXECUTABLE)
+  set(manual_pages)
+  foreach(program ${programs})
+    get_target_property(output_name ${program} OUTPUT_NAME)
+    if(NOT output_name)
+      set(output_name ${program})
+    endif()
+    set(page ${CMAKE_BINARY_DIR}/man/${output_name}.1)
+    add_custom_command(OUTPUT ${page}.gz
+      COMMAND ${CMAKE_COMMAND} -E make_directory ${CMAKE_BINARY_DIR}/man
+      COMMAND ${HELP2MAN_EXECUTABLE} --no-info --version-string ${PROJECT_VERSION} --source "abs_hil ${PROJECT_VERSION}"
+        --include ${PROJECT_SOURCE_DIR}/packaging/${output_name}.h2m --output ${page} $<TARGET_FILE:${program}>
+      COMMAND gzip -9nf ${page}
+      DEPENDS ${program} ${PROJECT_SOURCE_DIR}/packaging/${output_name}.h2m
+      VERBATIM)
+    list(APPEND manual_pages ${page}.gz)
+  endforeach()
+  add_custom_target(abs_hil_manual_pages ALL DEPENDS ${manual_pages})
+  install(FILES ${manual_pages} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
+else()
+  message(STATUS "help2man is not installed: no manual pages")
+endif()
+
+# The rooms as libraries, for programs that bring a controller of their own.
+get_property(abs_hil_rooms GLOBAL PROPERTY ABS_HIL_ROOMS)
+install(TARGETS ${abs_hil_rooms} EXPORT abs_hil_targets
+  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/abs_hil COMPONENT development)
+install(EXPORT abs_hil_targets NAMESPACE abs_hil:: DESTINATION ${abs_hil_cmake_dir} COMPONENT development)
+install(DIRECTORY include/abs_hil DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development)
+install(DIRECTORY ${CMAKE_BINARY_DIR}/lcmtypes/cpp/abs_hil DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+  COMPONENT development)
+install(DIRECTORY lcmtypes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/abs_hil/lcmtypes COMPONENT development
+  FILES_MATCHING PATTERN *.lcm)
+configure_package_config_file(packaging/abs_hilConfig.cmake.in ${CMAKE_BINARY_DIR}/abs_hilConfig.cmake
+  INSTALL_DESTINATION ${abs_hil_cmake_dir})
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/abs_hilConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_BINARY_DIR}/abs_hilConfig.cmake ${CMAKE_BINARY_DIR}/abs_hilConfigVersion.cmake cmake/FindLCM.cmake
+  DESTINATION ${abs_hil_cmake_dir} COMPONENT development)

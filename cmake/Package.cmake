@@ -1,0 +1,55 @@
+# `cpack` makes two Debian packages: abs-hil (programs) and libabs-hil-dev (find_package(abs_hil)). scripts/package.sh
+# builds and checks them.
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_VENDOR "abs_hil")
+set(ABS_HIL_MAINTAINER "The abs_hil authors <abs-hil@no-address.invalid>" CACHE STRING
+  "Name and address of who answers for the Debian packages")
+set(CPACK_PACKAGE_CONTACT ${ABS_HIL_MAINTAINER})
+set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
+set(CPACK_STRIP_FILES ON)
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_COMPONENTS_ALL runtime development)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_DEBIAN_ENABLE_COMPONENT_DEPENDS OFF)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
+
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME abs-hil)
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "adduser")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS "liblcm-bin, gnuplot-nox, fuse3")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS "libabs-hil-dev, liblcm-java, default-jre")
+set(CPACK_DEBIAN_RUNTIME_DESCRIPTION
+  "real-time driver and slip controller of an ABS rig
+ Drives the Inteco ABS laboratory rig, or simulates it: starts the wheel,
+ accelerates it, cuts the motor and brakes it to a stop under slip control
+ in a real-time thread, and publishes every cycle over LCM.")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/packaging/postinst)
+
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libabs-hil-dev)
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
+  "abs-hil (= ${PROJECT_VERSION}), libeigen3-dev, libboost-dev, liblcm-dev, liblcm-bin, libfmt-dev, libspdlog-dev, libtomlplusplus-dev, nlohmann-json3-dev, libcli11-dev, libusb-1.0-0-dev")
+set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION
+  "controllers and real-time loop of abs-hil as libraries
+ Headers, static libraries and CMake configuration of abs-hil, for programs
+ that bring a slip controller of their own.")
+
+# Debian wants a compressed changelog and a copyright file in each package's own folder of documents.
+foreach(package abs-hil libabs-hil-dev)
+  configure_file(packaging/changelog.Debian.in ${CMAKE_BINARY_DIR}/packaging/${package}/changelog @ONLY)
+endforeach()
+find_program(GZIP_EXECUTABLE gzip)
+foreach(pair "abs-hil:runtime" "libabs-hil-dev:development")
+  string(REPLACE ":" ";" pair "${pair}")
+  list(GET pair 0 package)
+  list(GET pair 1 component)
+  execute_process(COMMAND ${GZIP_EXECUTABLE} -9nf changelog
+    WORKING_DIRECTORY ${CMAKE_BINARY_DIR}/packaging/${package})
+  install(FILES ${CMAKE_BINARY_DIR}/packaging/${package}/changelog.gz
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package} RENAME changelog.gz COMPONENT ${component})
+  install(FILES packaging/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package} COMPONENT ${component})
+endforeach()
+include(CPack)

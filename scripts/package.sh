@@ -1,0 +1,12 @@
+#!/usr/bin/env bash
+# Makes the Debian packages abs-hil and libabs-hil-dev in build/release/packages and checks them with lintian.
+set -euo pipefail
+cd "$(dirname "$(realpath "$0")")/.."
+
+scripts/setup.sh packages-package.txt
+scripts/build.sh release
+rm -rf build/release/packages
+(cd build/release && cpack -B packages >cpack.log 2>&1) || { cat build/release/cpack.log; exit 1; }
+rm -rf build/release/packages/_CPack_Packages
+ls -l build/release/packages/*.deb
+lintian --fail-on error --allow-root build/release/packages/*.deb
