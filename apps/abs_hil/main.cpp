@@ -5,6 +5,7 @@
 #include <exception>
 #include <stdexcept>
 
+#include "abs_hil/app/program.hpp"
 #include "abs_hil/diagnosis/doctor.hpp"
 #include "abs_hil/driver/io_result.hpp"
 #include "abs_hil/settings/config_error.hpp"
@@ -13,9 +14,9 @@
 #include "commands.hpp"
 #include "exit_status.hpp"
 
-namespace {
+namespace abs_hil {
 
-using namespace abs_hil;
+namespace {
 
 void add_backend_option(CLI::App& cli, app::RunOptions& o) {
   cli.add_option("--backend", o.backend, "sim or rig")->check(CLI::IsMember({"sim", "rig"}))->capture_default_str();
@@ -200,11 +201,12 @@ int fail(int status, const std::exception& error) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int app::run_program(int argc, char** argv, std::span<const control::ControllerEntry> own) {
   // Messages go to stderr; stdout is for results.
   spdlog::set_default_logger(spdlog::stderr_color_mt("abs_hil"));
   spdlog::set_pattern("%n: %^%l%$: %v");
   try {
+    for (const control::ControllerEntry& entry : own) control::register_controller(entry);
     return dispatch(argc, argv);
   } catch (const settings::ConfigError& error) {
     return fail(app::exit_usage, error);
@@ -218,3 +220,5 @@ int main(int argc, char** argv) {
     return fail(app::exit_ended_early, error);
   }
 }
+
+}  // namespace abs_hil

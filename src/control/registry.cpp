@@ -24,7 +24,7 @@ namespace abs_hil::control {
 namespace {
 
 /// A new controller is one file pair and one line here (docs/writing-a-controller.md).
-constexpr std::array table{
+constexpr std::array own_table{
     controller_entry<AdaptiveController>(
         "adaptive", "adaptive slip control, estimates the peak tyre force: (17)-(18) of the paper"),
     controller_entry<AdaptiveActuatorController>("adaptive-actuator",
@@ -42,6 +42,11 @@ constexpr std::array table{
     controller_entry<FivePhaseController>("five-phase", "production-style wheel deceleration thresholds, no slip"),
     controller_entry<LockedController>("locked", "full brake torque throughout: the reference without ABS"),
 };
+
+std::vector<ControllerEntry>& table() noexcept {
+  static std::vector<ControllerEntry> entries{own_table.begin(), own_table.end()};
+  return entries;
+}
 
 /// Least number of letters to insert, delete or replace to turn one word into the other (Levenshtein).
 std::size_t edit_distance(std::string_view from, std::string_view to) {
@@ -61,20 +66,29 @@ std::size_t edit_distance(std::string_view from, std::string_view to) {
 
 std::string unknown_name_message(std::string_view name) {
   const auto nearest = std::ranges::min_element(
-      table, {}, [name](const ControllerEntry& entry) { return edit_distance(name, entry.name); });
+      table(), {}, [name](const ControllerEntry& entry) { return edit_distance(name, entry.name); });
   std::string message = "unknown controller '" + std::string(name) + "'; did you mean '" + std::string(nearest->name) +
                         "'? Known controllers:";
-  for (const ControllerEntry& entry : table) message += " " + std::string(entry.name);
+  for (const ControllerEntry& entry : table()) message += " " + std::string(entry.name);
   return message;
 }
 
 }  // namespace
 
-std::span<const ControllerEntry> controllers() noexcept { return table; }
+std::span<const ControllerEntry> controllers() noexcept { return table(); }
+
+void register_controller(const ControllerEntry& entry) {
+  if (entry.name.empty() || entry.make == nullptr) throw std::invalid_argument("a controller needs a name and a maker");
+  if (std::ranges::find(table(), entry.name, &ControllerEntry::name) != table().end()) {
+    throw std::invalid_argument("a controller named '" + std::string(entry.name) +
+                                "' is there already; choose another name");
+  }
+  table().push_back(entry);
+}
 
 std::unique_ptr<SlipController> make_controller(std::string_view name, const ControllerContext& context) {
-  const auto entry = std::ranges::find(table, name, &ControllerEntry::name);
-  if (entry == table.end()) throw std::invalid_argument(unknown_name_message(name));
+  const auto entry = std::ranges::find(table(), name, &ControllerEntry::name);
+  if (entry == table().end()) throw std::invalid_argument(unknown_name_message(name));
   return entry->make(context);
 }
 

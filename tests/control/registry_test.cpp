@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "abs_hil/control/locked_controller.hpp"
 #include "catch.hpp"
 
 using namespace abs_hil;
@@ -40,6 +41,19 @@ TEST_CASE("An unknown name is answered with the nearest and all known ones") {
       Contains("'adaptve'") && Contains("did you mean 'adaptive'") && Contains("nominal") && Contains("locked"));
   CHECK_THROWS_WITH(control::make_controller("loked", {options, parameters}), Contains("did you mean 'locked'"));
   CHECK_THROWS_AS(control::make_controller("", {options, parameters}), std::invalid_argument);
+}
+
+TEST_CASE("A registered controller stands beside ours; a taken or empty name is refused") {
+  constexpr auto entry = control::controller_entry<control::LockedController>("own-locked", "as locked");
+  const std::size_t before = control::controllers().size();
+  control::register_controller(entry);
+  REQUIRE(control::controllers().size() == before + 1);
+  CHECK(control::controllers().back().name == "own-locked");
+  const control::ControlOptions options;
+  const rig::RigParameters parameters;
+  CHECK(control::make_controller("own-locked", {options, parameters}) != nullptr);
+  CHECK_THROWS_WITH(control::register_controller(entry), Contains("'own-locked' is there already"));
+  CHECK_THROWS_AS(control::register_controller({"", "none", entry.make}), std::invalid_argument);
 }
 
 TEST_CASE("Options that are not usable are refused when the controller is made") {

@@ -25,6 +25,7 @@ MAY_KNOW = {
     'archive': set(),
     'diagnosis': {'rig', 'driver', 'runtime', 'telemetry'},
     'settings': {'rig', 'control', 'plant_sim', 'driver', 'runtime', 'experiment'},
+    'app': {'control'},  # the program's public face; the program itself, apps/, knows everything
     'comparison': {'rig', 'control', 'plant_sim', 'driver', 'driver/sim', 'runtime', 'experiment', 'analysis', 'settings'},
 }
 # room -> libraries that are none of its business

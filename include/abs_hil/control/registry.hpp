@@ -25,8 +25,13 @@ template <class Controller>
           }};
 }
 
-/// All controllers, in the order in which `abs_hil list` shows them.
+/// All controllers, in the order in which `abs_hil list` shows them: ours, then those registered. The span is good
+/// until the next one is registered.
 [[nodiscard]] std::span<const ControllerEntry> controllers() noexcept;
+
+/// Adds a controller that lives outside this library. Throws std::invalid_argument for an empty name or one that is
+/// taken. To be called before anything else of this library is used: not thread-safe.
+void register_controller(const ControllerEntry& entry);
 
 /// Makes the controller named `name`. Throws std::invalid_argument, naming the nearest and all known ones, for an
 /// unknown name, and for options that are not usable (Q not positive definite, say). Not real-time safe: called once

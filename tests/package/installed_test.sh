@@ -1,0 +1,37 @@
+#!/usr/bin/env bash
+# installed_test.sh BUILD_FOLDER SOURCE_FOLDER: installs the build into a scratch prefix, runs the installed program away
+# from the source tree, and builds and runs examples/own_controller against the installation.
+set -euo pipefail
+build=$(realpath "$1") source=$(realpath "$2")
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+
+cmake --install "$build" --prefix "$scratch/usr" >"$scratch/install.log" || { cat "$scratch/install.log"; exit 1; }
+cd "$scratch"
+usr/bin/abs_hil --backend sim --fast --no-lcm --csv run.csv >run.txt
+grep -q "completed" run.txt || { echo "the installed program's run did not complete:"; cat run.txt; exit 1; }
+for plant in paper-table1 paper-timing inteco-manual; do
+  [ -f "usr/share/abs_hil/config/plants/$plant.toml" ] || { echo "$plant.toml is not installed"; exit 1; }
+done
+
+# Outside the source tree, and without a way back to it.
+cp -r "$source/examples/own_controller" example
+if grep -r "$source" usr/lib*/*/cmake/abs_hil usr/lib*/cmake/abs_hil 2>/dev/null; then
+  echo "the installed CMake files refer to the source tree"
+  exit 1
+fi
+cmake -S example -B example/build -DCMAKE_PREFIX_PATH="$scratch/usr" \
+  ${CMAKE_CXX_COMPILER_LAUNCHER:+-DCMAKE_CXX_COMPILER_LAUNCHER="$CMAKE_CXX_COMPILER_LAUNCHER"} >cmake.log ||
+  { cat cmake.log; exit 1; }
+cmake --build example/build >build.log || { cat build.log; exit 1; }
+example/build/my_abs_hil list | grep -q "^  proportional" || { echo "my_abs_hil does not list its controller"; exit 1; }
+export ABS_HIL_CONFIG_DIR=$scratch/usr/share/abs_hil/config
+example/build/my_abs_hil --fast --no-lcm --controller proportional --set experiment.start_speed_rad_s=170 \
+  --summary own.json >/dev/null
+python3 - <<'PYTHON'
+import json
+run = json.load(open('own.json'))
+assert run['controller'] == 'proportional' and run['result'] == 'completed', run
+assert 0 < run['stop_time_s'] < 3.19, run['stop_time_s']  # a locked wheel takes 3.19 s
+print('own controller: stopped in %.3f s, %.2f m' % (run['stop_time_s'], run['stop_distance_m']))
+PYTHON
