@@ -8,6 +8,7 @@
 #include "abs_hil/settings/config_error.hpp"
 #include "abs_hil/settings/config_file.hpp"
 #include "abs_hil/settings/key_table.hpp"
+#include "abs_hil/settings/unsafe_settings.hpp"
 
 namespace abs_hil::app {
 
@@ -77,7 +78,9 @@ RunRequest merge(const RunOptions& options) {
   if (s.plant.friction_profile.empty()) {
     s.plant.friction_profile = experiment::friction_profile_of(s.experiment.name);
   }
+  for (const std::string& injection : options.injections) s.inject += (s.inject.empty() ? "" : ",") + injection;
   check_together(request);
+  settings::refuse_unsafe(s, keys);
   if (s.backend == "rig") apply_board_limits(s);
   request.config_json = keys.to_json().dump();
   request.config_toml = fmt::format(

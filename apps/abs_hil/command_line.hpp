@@ -38,6 +38,7 @@ struct RunOptions {
   std::optional<std::string> seed{};
   std::vector<std::string> defaults{};  ///< assignments that files and options may override
   std::vector<std::string> assignments{};
+  std::vector<std::string> injections{};  ///< faults to inject, beside those of run.inject
   std::string realtime{"prefer"};
   OutputOptions outputs{};
 };

@@ -50,6 +50,12 @@ void add_run_options(CLI::App& cli, app::RunOptions& o) {
   add_timing_options(cli, o);
   cli.add_flag("--fast", o.outputs.fast, "virtual time, as fast as the machine can");
   cli.add_option("--seed", o.seed, "seed of everything random in the simulator")->type_name("N");
+  cli.add_option("--inject", o.injections,
+                 "inject a fault, PHASE@SIGNAL:KIND[=PARAMETER][+DELAY][~DURATION], as brake@encoder_upper:stuck+0.2s; "
+                 "simulator and emulators only")
+      ->type_name("FAULT")
+      ->take_all()
+      ->allow_extra_args(false);
   cli.add_option("--csv", o.outputs.csv_file, "write every cycle to a CSV file")->type_name("FILE");
   cli.add_option("--log", o.outputs.log_file, "write an LCM event log (.lcmlog)")->type_name("FILE");
   cli.add_option("--summary", o.outputs.summary_file, "write the summary as JSON")->type_name("FILE");

@@ -123,13 +123,13 @@ void require_resources(const RunRequest& request, driver::RigDriver& driver) {
 
 int run(const RunRequest& request) {
   const settings::Settings& s = request.settings;
-  const std::unique_ptr<driver::RigDriver> driver = make_driver(s, request.outputs.fast);
-  experiment::RunLogicParts logic = make_logic(s, experiment::plan_experiment(s.experiment, s.control.v_min_m_s));
-  require_resources(request, *driver);
-  RunOutputs outputs(request);
   runtime::MonotonicClock real_clock;
   runtime::VirtualClock virtual_clock;
   runtime::Clock& clock = request.outputs.fast ? static_cast<runtime::Clock&>(virtual_clock) : real_clock;
+  const std::unique_ptr<driver::RigDriver> driver = with_faults(make_driver(s, request.outputs.fast), s, clock);
+  experiment::RunLogicParts logic = make_logic(s, experiment::plan_experiment(s.experiment, s.control.v_min_m_s));
+  require_resources(request, *driver);
+  RunOutputs outputs(request);
   runtime::OverrunReporter late_cycles(std::llround(1e9 / s.control.rate_Hz));
   std::vector<rig::RecordSink*> sinks = outputs.sinks();
   if (!request.outputs.fast) sinks.push_back(&late_cycles);

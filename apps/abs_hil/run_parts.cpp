@@ -1,9 +1,13 @@
 #include "run_parts.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <utility>
 
 #include "abs_hil/driver/factory.hpp"
+#include "abs_hil/driver/injection/injecting_driver.hpp"
 #include "abs_hil/driver/sim/sim_driver.hpp"
+#include "abs_hil/settings/unsafe_settings.hpp"
 
 namespace abs_hil::app {
 
@@ -12,6 +16,16 @@ std::unique_ptr<driver::RigDriver> make_driver(const settings::Settings& s, bool
   return std::make_unique<driver::SimDriver>(s.plant,
                                              driver::SimStart{.seed = static_cast<std::uint64_t>(s.seed),
                                                               .start_speed_rad_s = s.experiment.start_speed_rad_s});
+}
+
+std::unique_ptr<driver::RigDriver> with_faults(std::unique_ptr<driver::RigDriver> driver, const settings::Settings& s,
+                                               runtime::Clock& clock) {
+  std::vector<driver::Injection> injections = settings::injections_of(s);
+  if (injections.empty()) return driver;
+  for (const driver::Injection& injection : injections) spdlog::warn("fault injected: {}", driver::to_text(injection));
+  return std::make_unique<driver::InjectingDriver>(
+      std::move(driver), std::move(injections), static_cast<std::uint64_t>(s.seed),
+      [&clock](std::int64_t duration_ns) { clock.sleep_until(clock.now_ns() + duration_ns); });
 }
 
 experiment::RunLogicParts make_logic(const settings::Settings& s, std::vector<experiment::PhasePlan> plans) {

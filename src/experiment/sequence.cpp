@@ -1,5 +1,6 @@
 #include "abs_hil/experiment/sequence.hpp"
 
+#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -9,6 +10,27 @@ namespace abs_hil::experiment {
 namespace {
 /// Encoder noise must not count as a new maximum of the wheel's speed.
 constexpr double peak_margin_rad_s = 0.2;
+/// The longest that any phase may last: nothing runs for ever.
+constexpr double longest_phase_s = 600.0;
+
+/// What no phase may ask of the rig, wherever it was written. Throws std::invalid_argument.
+void check_safe(const PhasePlan& plan, const std::string& name) {
+  const auto refuse = [&name](const std::string& what) { throw std::invalid_argument("phase " + name + what); };
+  if (!(plan.time_limit_s > 0.0 && plan.time_limit_s <= longest_phase_s)) {
+    refuse(": time limit " + std::to_string(plan.time_limit_s) + " s: give one in (0, 600] s, no phase lasts for ever");
+  }
+  if (!(plan.motor_duty >= 0.0 && plan.motor_duty <= 1.0)) {
+    refuse(": motor duty " + std::to_string(plan.motor_duty) + ": give one in [0, 1]");
+  }
+  if (!(plan.brake_torque_Nm >= 0.0 && std::isfinite(plan.brake_torque_Nm))) {
+    refuse(": brake torque " + std::to_string(plan.brake_torque_Nm) + " N m: give a finite one, >= 0");
+  }
+  const bool brakes =
+      plan.brake == BrakeAction::slip_control || (plan.brake == BrakeAction::torque && plan.brake_torque_Nm > 0.0);
+  if (plan.motor_duty > 0.0 && brakes && !plan.motor_with_brake) {
+    refuse(": motor and brake together: leave one of them out, or say that it is meant (motor_with_brake)");
+  }
+}
 }  // namespace
 
 Sequence::Sequence(std::vector<PhasePlan> plans) : plans_(std::move(plans)) {
@@ -16,7 +38,7 @@ Sequence::Sequence(std::vector<PhasePlan> plans) : plans_(std::move(plans)) {
   for (const PhasePlan& plan : plans_) {
     const std::string name(rig::name_of(plan.phase));
     if (plan.ends_on.empty()) throw std::invalid_argument("phase " + name + " has no end condition");
-    if (!(plan.time_limit_s > 0.0)) throw std::invalid_argument("phase " + name + " has no time limit above 0 s");
+    check_safe(plan, name);
   }
 }
 

@@ -79,6 +79,7 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   }
   if (gate_.fault() != rig::Reason::none) logic_.end_early(gate_.fault(), gate_.fault_value());
   const rig::Command wanted = logic_.step(measurement_, record);
+  driver_.note_phase(record.phase);
   const GateResult gated = gate_.check(wanted, record.control.speeds_est);
   record.command = gated.command;
   if (gated.fault != rig::Reason::none) logic_.end_early(gated.fault, gated.fault_value);

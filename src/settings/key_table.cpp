@@ -126,6 +126,7 @@ void KeyTable::set(std::string_view name, const Value& value, std::string_view o
         }
       },
       key.target);
+  set_.emplace(name);
 }
 
 void KeyTable::set_text(std::string_view assignment, std::string_view origin) {

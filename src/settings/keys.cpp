@@ -309,6 +309,8 @@ KeyTable::KeyTable(Settings& s) {
           {"telemetry.channel_prefix", "", "prefix of the LCM channels", &s.telemetry.channel_prefix},
           {"telemetry.decimation", "", "cycles for each telemetry message", &s.telemetry.decimation,
            between(1, 10'000)},
+          {"run.inject", "", "faults to inject, separated by commas (docs/fault-injection.md); never on hardware",
+           &s.inject},
           {"run.seed", "", "seed of everything random in the simulator", &s.seed, from_zero(9e15)},
       });
 }

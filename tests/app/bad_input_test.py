@@ -86,6 +86,36 @@ class BadInput(ProgramTest):
         for path in earlier.values():
             self.assertEqual(path.read_text(), 'of an earlier run')
 
+    def test_injected_faults(self):
+        self.refused(['--inject', 'brake@wheel:stuck'], ['wheel', 'encoder_upper', 'brake@encoder_upper:stuck+0.2s'])
+        self.refused(['--inject', 'brake@read:bent'], ['bent', 'intermittent'])
+        self.refused(['--set', 'run.inject=sleep@read:off'], ['sleep', 'accelerate'])
+
+    def test_no_faults_into_hardware(self):
+        fault = ['--inject', 'brake@encoder_upper:stuck+0.2s']
+        for args, words in ((fault, ['driver.emulated=true', 'never']),
+                            (['--set', 'run.inject=hold@write:off'], ['hold@write:off', 'never']),
+                            ([*fault, '--set', 'driver.emulated=true'], ['/sys/bus/pci/devices', 'real cards']),
+                            ([*fault, '--set', 'driver.emulated=true', '--set', 'driver.pci.root=/proc/../sys/bus'],
+                             ['real cards'])):
+            result = self.run_program('--backend', 'rig', '--no-lcm', *args)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            for word in words:
+                self.assertIn(word, result.stderr)
+
+    def test_caps_above_the_rigs(self):
+        for args, words in ((['--set', 'gate.brake_duty_max=0.9'], ['gate.brake_duty_max', '0.9', '0.7', 'driver.pci']),
+                            (['--set', 'gate.motor_duty_max=0.8', '--set', 'driver.pci.motor_duty_max=0.6'],
+                             ['gate.motor_duty_max', '0.8', '0.6'])):
+            result = self.run_program('--backend', 'rig', '--no-lcm', *args)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            for word in words:
+                self.assertIn(word, result.stderr)
+
+    def test_no_run_without_an_end(self):
+        for key in ('accelerate_limit_s', 'brake_limit_s', 'hold_limit_s', 'idle_s', 'coast_s', 'stopped_s'):
+            self.refused(['--set', f'experiment.{key}=inf'], [f'experiment.{key}', 'inf'])
+
     def test_what_only_the_simulator_can_do(self):
         for args in (['--fast'], ['--set', 'experiment.start_speed_rad_s=100'],
                      ['--experiment', 'friction-jump'], ['--set', 'plant.friction_profile=time: 0.5']):

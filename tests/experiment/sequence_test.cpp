@@ -1,5 +1,6 @@
 #include "abs_hil/experiment/sequence.hpp"
 
+#include <limits>
 #include <stdexcept>
 
 #include "catch.hpp"
@@ -23,6 +24,39 @@ SequenceInput at(double time_s, double omega1_rad_s = 0.0) {
 }
 
 }  // namespace
+
+TEST_CASE("what no phase may ask for is refused by name") {
+  const PhasePlan sound{.phase = Phase::hold,
+                        .motor_duty = 0.3,
+                        .ends_on = {{EndKind::duration, 1.0, Reason::phase_duration_over}},
+                        .time_limit_s = 600.0};
+  CHECK_NOTHROW(Sequence({sound}));
+  const auto refused = [&](auto&& change, const char* what) {
+    PhasePlan plan = sound;
+    change(plan);
+    CHECK_THROWS_WITH(Sequence({plan}), Catch::Matchers::Contains("hold") && Catch::Matchers::Contains(what));
+  };
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  refused([](PhasePlan& p) { p.time_limit_s = infinite; }, "time limit inf");
+  refused([](PhasePlan& p) { p.time_limit_s = 600.1; }, "(0, 600]");
+  refused([](PhasePlan& p) { p.time_limit_s = 0.0; }, "time limit");
+  refused([](PhasePlan& p) { p.motor_duty = 1.01; }, "[0, 1]");
+  refused([](PhasePlan& p) { p.motor_duty = -0.01; }, "[0, 1]");
+  refused([](PhasePlan& p) { p.motor_duty = std::numeric_limits<double>::quiet_NaN(); }, "[0, 1]");
+  refused([](PhasePlan& p) { p.brake_torque_Nm = infinite; }, "brake torque inf");
+  refused([](PhasePlan& p) { p.brake_torque_Nm = -1.0; }, "brake torque");
+  refused([](PhasePlan& p) { p.brake = BrakeAction::slip_control; }, "motor_with_brake");
+  refused(
+      [](PhasePlan& p) {
+        p.brake = BrakeAction::torque;
+        p.brake_torque_Nm = 1.0;
+      },
+      "motor_with_brake");
+  PhasePlan meant = sound;
+  meant.brake = BrakeAction::slip_control;
+  meant.motor_with_brake = true;
+  CHECK_NOTHROW(Sequence({meant}));
+}
 
 TEST_CASE("phases follow one another in the cycle in which a condition holds") {
   Sequence sequence = two_phases({EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached});

@@ -44,6 +44,9 @@ class RigDriver {
   /// Harmless when repeated. The result tells whether the safe state is known to have reached the board.
   IoResult deactivate() noexcept;
 
+  /// The phase whose command is written next: for injected faults alone (InjectingDriver), no board needs to know.
+  virtual void note_phase(rig::Phase /*phase*/) noexcept {}
+
   [[nodiscard]] DriverState state() const noexcept { return state_; }
   [[nodiscard]] virtual std::string_view name() const noexcept = 0;
   /// The simulator's truth of the last `read`, for logs alone; NaN from hardware.

@@ -35,7 +35,8 @@ struct PhasePlan {
   BrakeAction brake{BrakeAction::released};
   double brake_torque_Nm{0.0};  ///< for BrakeAction::torque
   std::vector<EndCondition> ends_on{};
-  double time_limit_s{0.0};  ///< > 0
+  double time_limit_s{0.0};      ///< in (0, 600]
+  bool motor_with_brake{false};  ///< motor and brake may act together in this phase: only where it is asked for
 };
 
 /// What the sequence looks at in each cycle.
@@ -49,7 +50,8 @@ struct SequenceInput {
 /// Steps through the phases of an experiment. `update` is real-time safe; the plans are made before the run.
 class Sequence {
  public:
-  /// Throws std::invalid_argument for an empty list, a phase without an end or without a time limit.
+  /// Throws std::invalid_argument for an empty list and for an unsafe phase: without an end or a finite time limit,
+  /// with a duty or torque outside its range, with motor and brake together that does not say `motor_with_brake`.
   explicit Sequence(std::vector<PhasePlan> plans);
 
   struct Change {

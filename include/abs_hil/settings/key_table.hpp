@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -47,6 +49,8 @@ class KeyTable {
   void set_text(std::string_view assignment, std::string_view origin);
 
   [[nodiscard]] const std::vector<Key>& keys() const noexcept { return keys_; }
+  /// True if a file or an option gave the value, and not the default alone.
+  [[nodiscard]] bool was_set(std::string_view name) const { return set_.contains(name); }
   /// The effective configuration, nested as in a file.
   [[nodiscard]] nlohmann::ordered_json to_json() const;
   /// The effective configuration as a TOML file that load_file reads back to the same values.
@@ -56,6 +60,7 @@ class KeyTable {
   [[nodiscard]] const Key& find(std::string_view name, std::string_view origin) const;
 
   std::vector<Key> keys_;
+  std::set<std::string, std::less<>> set_;  ///< names of the values that were given
 };
 
 }  // namespace abs_hil::settings

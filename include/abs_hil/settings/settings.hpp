@@ -31,6 +31,7 @@ struct Settings {
   std::string plant_name{"paper-table1"};
   std::string backend{"sim"};
   std::int64_t seed{1};
+  std::string inject{};  ///< faults to inject, separated by commas (driver/injection); empty: none
 };
 
 }  // namespace abs_hil::settings

@@ -1,0 +1,187 @@
+#include "abs_hil/driver/injection/injection.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <stdexcept>
+
+namespace abs_hil::driver {
+
+namespace {
+
+constexpr std::array<std::string_view, injection_signal_count> signals{
+    "encoder_upper", "encoder_lower", "encoders",  "stamp",     "supply", "temperature",
+    "trip",          "read",          "motor_pwm", "brake_pwm", "enable", "write"};
+constexpr std::array<std::string_view, injection_kind_count> kinds{"ok",    "off",  "stuck",   "garbage",
+                                                                   "wrong", "slow", "delayed", "intermittent"};
+constexpr std::array<rig::Phase, 6> phases{rig::Phase::idle,  rig::Phase::accelerate, rig::Phase::coast,
+                                           rig::Phase::brake, rig::Phase::hold,       rig::Phase::stopped};
+constexpr std::string_view any_phase = "any";
+constexpr double longest_delay_s = 600.0;
+/// The longest that what `delayed` and `slow` hold back: so much is kept in memory at 10 kHz.
+constexpr double longest_holding_s = 0.5;
+
+template <std::size_t n>
+std::string listed(const std::array<std::string_view, n>& names) {
+  std::string text;
+  for (const std::string_view name : names) {
+    if (!text.empty()) text += ' ';
+    text += name;
+  }
+  return text;
+}
+
+[[noreturn]] void refuse(std::string_view text, std::string_view part, const std::string& valid) {
+  throw std::invalid_argument("injection \"" + std::string(text) + "\": \"" + std::string(part) + "\": " + valid +
+                              "; write PHASE@SIGNAL:KIND[=PARAMETER][+DELAY][~DURATION], as in "
+                              "brake@encoder_upper:stuck+0.2s");
+}
+
+bool is_number(std::string_view text, double& value) {
+  const auto [at, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && at == text.data() + text.size() && std::isfinite(value);
+}
+
+/// "0.2s", "200ms".
+bool is_time(std::string_view text, double& seconds) {
+  const bool milli = text.ends_with("ms");
+  if (!text.ends_with('s') || !is_number(text.substr(0, text.size() - (milli ? 2 : 1)), seconds)) return false;
+  if (milli) seconds *= 1e-3;
+  return true;
+}
+
+/// What a kind takes as its parameter on a signal: its range and the value if none is given.
+struct Parameter {
+  enum class Unit : std::uint8_t { none, number, time } unit{Unit::none};
+  double least{0.0};
+  double most{0.0};
+  double otherwise{0.0};
+};
+
+Parameter parameter_of(InjectionSignal signal, InjectionKind kind) {
+  using enum InjectionSignal;
+  switch (kind) {
+    case InjectionKind::slow:
+      // A slow call holds up the cycle; anything else is renewed so seldom.
+      if (signal == read || signal == write) return {Parameter::Unit::time, 1e-6, longest_holding_s, 0.002};
+      return {Parameter::Unit::time, 1e-6, longest_holding_s, 0.05};
+    case InjectionKind::delayed: return {Parameter::Unit::time, 1e-6, longest_holding_s, 0.05};
+    case InjectionKind::intermittent: return {Parameter::Unit::number, 1e-6, 1.0, 0.5};
+    case InjectionKind::wrong:
+      if (signal == encoder_upper || signal == encoder_lower) return {Parameter::Unit::number, -10.0, 10.0, -1.0};
+      if (signal == stamp) return {Parameter::Unit::number, -10.0, 10.0, 2.0};
+      if (signal == temperature) return {Parameter::Unit::number, -300.0, 300.0, 100.0};
+      if (signal == supply || signal == motor_pwm || signal == brake_pwm || signal == write) {
+        return {Parameter::Unit::number, 0.0, 10.0, 0.5};
+      }
+      return {};
+    default: return {};
+  }
+}
+
+template <std::size_t n>
+std::size_t place_of(std::string_view text, std::string_view part, const std::array<std::string_view, n>& names,
+                     const char* what) {
+  for (std::size_t i = 0; i < n; ++i) {
+    if (names[i] == part) return i;
+  }
+  refuse(text, part, std::string("not a ") + what + "; known: " + listed(names));
+}
+
+std::optional<rig::Phase> phase_of(std::string_view text, std::string_view part) {
+  if (part == any_phase) return std::nullopt;
+  std::string known;
+  for (const rig::Phase phase : phases) {
+    if (rig::name_of(phase) == part) return phase;
+    known += std::string(rig::name_of(phase)) + ' ';
+  }
+  refuse(text, part, "not a phase; known: " + known + std::string(any_phase));
+}
+
+/// Cuts off and returns what follows the last `mark`; nothing if there is none.
+std::optional<std::string_view> cut(std::string_view& rest, char mark) {
+  const std::size_t at = rest.rfind(mark);
+  if (at == std::string_view::npos) return std::nullopt;
+  const std::string_view tail = rest.substr(at + 1);
+  rest = rest.substr(0, at);
+  return tail;
+}
+
+void read_parameter(std::string_view text, const std::optional<std::string_view>& given, Injection& injection) {
+  const Parameter wanted = parameter_of(injection.signal, injection.kind);
+  injection.parameter = wanted.otherwise;
+  if (!given) return;
+  const std::string what = std::string(name_of(injection.signal)) + ':' + std::string(name_of(injection.kind));
+  if (wanted.unit == Parameter::Unit::none) refuse(text, *given, what + " takes no parameter");
+  const bool time = wanted.unit == Parameter::Unit::time;
+  const bool known = time ? is_time(*given, injection.parameter) : is_number(*given, injection.parameter);
+  if (!known || injection.parameter < wanted.least || injection.parameter > wanted.most) {
+    std::array<char, 96> range{};
+    std::snprintf(range.data(), range.size(), " takes a %s in [%g, %g]%s", time ? "time" : "number", wanted.least,
+                  wanted.most, time ? " s, as 0.05s or 50ms" : "");
+    refuse(text, *given, what + range.data());
+  }
+}
+
+}  // namespace
+
+std::string_view name_of(InjectionSignal signal) noexcept { return signals[static_cast<std::size_t>(signal)]; }
+std::string_view name_of(InjectionKind kind) noexcept { return kinds[static_cast<std::size_t>(kind)]; }
+
+Injection parse_injection(std::string_view text) {
+  Injection injection;
+  std::string_view rest = text;
+  if (const auto duration = cut(rest, '~')) {
+    if (!is_time(*duration, injection.duration_s) || injection.duration_s <= 0.0) {
+      refuse(text, *duration, "not a duration above 0, as 0.5s or 500ms");
+    }
+  }
+  if (const auto delay = cut(rest, '+')) {
+    if (!is_time(*delay, injection.delay_s) || injection.delay_s < 0.0 || injection.delay_s > longest_delay_s) {
+      refuse(text, *delay, "not a delay in [0, 600] s, as 0.2s or 200ms");
+    }
+  }
+  const auto parameter = cut(rest, '=');
+  const auto kind = cut(rest, ':');
+  if (!kind) refuse(text, rest, "no \":KIND\"; known: " + listed(kinds));
+  const auto signal = cut(rest, '@');
+  if (!signal) refuse(text, rest, "no \"PHASE@\" before the signal");
+  injection.phase = phase_of(text, rest);
+  injection.signal = static_cast<InjectionSignal>(place_of(text, *signal, signals, "signal"));
+  injection.kind = static_cast<InjectionKind>(place_of(text, *kind, kinds, "kind"));
+  read_parameter(text, parameter, injection);
+  return injection;
+}
+
+std::vector<Injection> parse_injections(std::string_view list) {
+  constexpr std::string_view separators = ", \t";
+  std::vector<Injection> injections;
+  for (std::size_t at = list.find_first_not_of(separators); at != std::string_view::npos;
+       at = list.find_first_not_of(separators, at)) {
+    const std::size_t end = std::min(list.find_first_of(separators, at), list.size());
+    injections.push_back(parse_injection(list.substr(at, end - at)));
+    at = end;
+  }
+  return injections;
+}
+
+std::string to_text(const Injection& injection) {
+  const Parameter parameter = parameter_of(injection.signal, injection.kind);
+  const auto number = [](const char* format, double value) {
+    std::array<char, 48> text{};
+    std::snprintf(text.data(), text.size(), format, value);
+    return std::string(text.data());
+  };
+  std::string text(injection.phase ? rig::name_of(*injection.phase) : any_phase);
+  text += '@' + std::string(name_of(injection.signal)) + ':' + std::string(name_of(injection.kind));
+  if (parameter.unit != Parameter::Unit::none) {
+    text += number(parameter.unit == Parameter::Unit::time ? "=%.15gs" : "=%.15g", injection.parameter);
+  }
+  if (injection.delay_s > 0.0) text += number("+%.15gs", injection.delay_s);
+  if (std::isfinite(injection.duration_s)) text += number("~%.15gs", injection.duration_s);
+  return text;
+}
+
+}  // namespace abs_hil::driver

@@ -1,0 +1,60 @@
+#include "abs_hil/settings/unsafe_settings.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "abs_hil/settings/config_error.hpp"
+
+namespace abs_hil::settings {
+
+namespace {
+
+/// The kernel's own files are of real cards, whatever driver.emulated says.
+bool is_of_the_kernel(const std::string& folder) {
+  std::error_code error;
+  return std::filesystem::weakly_canonical(folder, error).string().starts_with("/sys/");
+}
+
+void refuse_injection_into_hardware(const Settings& s) {
+  const std::vector<driver::Injection> injections = injections_of(s);
+  if (injections.empty() || s.backend != "rig") return;
+  const std::string fault = driver::to_text(injections.front());
+  if (!s.driver.emulated) {
+    throw ConfigError(
+        fmt::format("--inject {}: faults are never injected into real hardware; use --backend sim, or for an emulator "
+                    "(never hardware) --set driver.emulated=true",
+                    fault));
+  }
+  if (s.driver.kind == "pci" && is_of_the_kernel(s.driver.pci.root)) {
+    throw ConfigError(
+        fmt::format("--inject {}: driver.emulated=true, but driver.pci.root = {} holds the real cards; give the "
+                    "emulator's folder",
+                    fault, s.driver.pci.root));
+  }
+}
+
+void refuse_cap_above_board(const KeyTable& keys, std::string_view key, double value, std::string_view board_key,
+                            double board_value) {
+  if (!keys.was_set(key) || value <= board_value) return;
+  throw ConfigError(fmt::format("{} = {}: the board sends at most {} ({}); give a number in (0, {}]", key, value,
+                                board_value, board_key, board_value));
+}
+
+}  // namespace
+
+std::vector<driver::Injection> injections_of(const Settings& settings) {
+  return driver::parse_injections(settings.inject);
+}
+
+void refuse_unsafe(const Settings& s, const KeyTable& keys) {
+  refuse_injection_into_hardware(s);
+  if (s.backend == "rig" && s.driver.kind == "pci") {
+    refuse_cap_above_board(keys, "gate.brake_duty_max", s.gate.brake_duty_max, "driver.pci.brake_duty_max",
+                           s.driver.pci.brake_duty_max);
+    refuse_cap_above_board(keys, "gate.motor_duty_max", s.gate.motor_duty_max, "driver.pci.motor_duty_max",
+                           s.driver.pci.motor_duty_max);
+  }
+}
+
+}  // namespace abs_hil::settings
