@@ -24,7 +24,8 @@ class Proportional final : public SlipController {
   abs_hil::rig::WheelParameters wheels_;
 };
 
-constexpr ControllerEntry own[]{controller_entry<Proportional>("proportional", "torque proportional to the slip error")};
+constexpr ControllerEntry own[]{
+    controller_entry<Proportional>("proportional", "torque proportional to the slip error")};
 
 }  // namespace
 

@@ -31,6 +31,7 @@ fi
 
 scratch=$(mktemp -d)
 # Ends what this script left running, which `jobs` knows, and nothing else.
+# shellcheck disable=SC2154  # job: the loop variable
 trap 'for job in $(jobs -p); do kill "$job" 2>/dev/null; done; rm -rf "$scratch"' EXIT
 
 fail() { echo "FAILED: $*"; exit 1; }

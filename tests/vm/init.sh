@@ -1,10 +1,12 @@
 #!/bin/busybox sh
+# shellcheck shell=dash
 # First process of the virtual machine: shows the host's files, read-only under a scratch layer, runs /command in them
 # and ends the machine. Output goes to the second serial line, the exit status to the first.
 export PATH=/bin:/sbin:/usr/bin:/usr/sbin
 mount -t devtmpfs dev /dev
 mount -t proc proc /proc
 mount -t sysfs sys /sys
+# shellcheck disable=SC2013  # a list of words
 for module in $(cat /modules-to-load); do modprobe "$module" || echo "modprobe $module failed"; done
 
 mkdir -p /host /scratch /guest

@@ -25,4 +25,5 @@ for _ in 1 2; do
 done
 measure loaded_1kHz 1000
 measure loaded_5kHz 5000
-kill $(jobs -p)
+mapfile -t load < <(jobs -p)
+kill "${load[@]}"
