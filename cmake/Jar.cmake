@@ -1,6 +1,7 @@
 # ABS_HIL_JAVA: true where jars can be built, that is with a JDK and LCM's own jar. Without them all but lcm-spy's
 # view of our messages is built just the same.
-# abs_hil_jar(NAME OUTPUT FILE SOURCES ... CLASSPATH JARS...): compiles the sources into a jar, target NAME_jar.
+# abs_hil_jar(NAME OUTPUT FILE SOURCES ... CLASSPATH JARS... [MANIFEST FILE]): compiles the sources into a jar, target
+# NAME_jar.
 
 find_package(Java QUIET COMPONENTS Development)
 get_filename_component(_lcm_bin ${LCM_GEN_EXECUTABLE} DIRECTORY)
@@ -39,18 +40,22 @@ if(NOT DEFINED ABS_HIL_JAVA)
 endif()
 
 function(abs_hil_jar name)
-  cmake_parse_arguments(JAR "" "OUTPUT" "SOURCES;CLASSPATH" ${ARGN})
+  cmake_parse_arguments(JAR "" "OUTPUT;MANIFEST" "SOURCES;CLASSPATH" ${ARGN})
   set(classes ${CMAKE_CURRENT_BINARY_DIR}/${name}_classes)
   get_filename_component(output_dir ${JAR_OUTPUT} DIRECTORY)
   list(JOIN JAR_CLASSPATH ":" classpath)
+  set(create cf ${JAR_OUTPUT})
+  if(JAR_MANIFEST)
+    set(create cfm ${JAR_OUTPUT} ${JAR_MANIFEST})
+  endif()
   add_custom_command(OUTPUT ${JAR_OUTPUT}
     COMMAND ${CMAKE_COMMAND} -E rm -rf ${classes}
     COMMAND ${CMAKE_COMMAND} -E make_directory ${classes} ${output_dir}
     # -options: that old releases are going out of support is known.
     COMMAND ${Java_JAVAC_EXECUTABLE} --release ${ABS_HIL_JAVA_RELEASE} -Xlint:all,-options,-serial,-processing -Werror
       -encoding UTF-8 -cp ${classpath} -d ${classes} ${JAR_SOURCES}
-    COMMAND ${Java_JAR_EXECUTABLE} cf ${JAR_OUTPUT} -C ${classes} .
-    DEPENDS ${JAR_SOURCES} ${JAR_CLASSPATH}
+    COMMAND ${Java_JAR_EXECUTABLE} ${create} -C ${classes} .
+    DEPENDS ${JAR_SOURCES} ${JAR_CLASSPATH} ${JAR_MANIFEST}
     COMMENT "Building ${name}.jar"
     VERBATIM)
   add_custom_target(${name}_jar ALL DEPENDS ${JAR_OUTPUT})
