@@ -13,6 +13,7 @@
 #include "abs_hil/telemetry/lcm_outlet.hpp"
 #include "commands.hpp"
 #include "exit_status.hpp"
+#include "recording_commands.hpp"
 
 namespace abs_hil {
 
@@ -180,6 +181,10 @@ int dispatch(int argc, char** argv) {
   const auto* compare = add_compare(cli, compare_options);
   CommissionCommand commission;
   add_commission(cli, commission);
+  app::ReplayCommand replay_command;
+  app::add_replay(cli, replay_command);
+  app::ConvertCommand convert_command;
+  app::add_convert(cli, convert_command);
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -195,6 +200,8 @@ int dispatch(int argc, char** argv) {
     return app::compare(compare_options);
   }
   if (commission.parser->parsed()) return app::commission(app::merge(commission.options), commission.pulses);
+  if (replay_command.parser->parsed()) return app::replay_run(replay_command);
+  if (convert_command.parser->parsed()) return app::convert(convert_command);
   app::RunRequest request = app::merge(options);
   request.command_line.assign(argv, argv + argc);
   return app::run(request);

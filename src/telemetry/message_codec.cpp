@@ -3,6 +3,8 @@
 #include <bit>
 #include <limits>
 
+#include "abs_hil/telemetry/checked_decode.hpp"
+
 namespace abs_hil::telemetry {
 namespace {
 
@@ -14,37 +16,6 @@ static_assert(telemetry_t::PHASE_BRAKE == static_cast<int>(rig::Phase::brake));
 static_assert(telemetry_t::PHASE_HOLD == static_cast<int>(rig::Phase::hold));
 static_assert(telemetry_t::PHASE_STOPPED == static_cast<int>(rig::Phase::stopped));
 static_assert(telemetry_t::PHASE_FAULT == static_cast<int>(rig::Phase::fault));
-
-/// Reads LCM's big-endian numbers and checks strings, never beyond the end.
-class PacketChecker {
- public:
-  explicit PacketChecker(std::span<const std::uint8_t> packet) : rest_(packet) {}
-
-  bool skip(std::size_t bytes) {
-    if (rest_.size() < bytes) return false;
-    rest_ = rest_.subspan(bytes);
-    return true;
-  }
-
-  template <class Unsigned>
-  bool read(Unsigned& value) {
-    if (rest_.size() < sizeof value) return false;
-    std::uint64_t bits = 0;
-    for (std::size_t i = 0; i < sizeof value; ++i) bits = bits << 8U | rest_[i];
-    value = static_cast<Unsigned>(bits);
-    return skip(sizeof value);
-  }
-
-  /// A string is its length with the final NUL, then its bytes with the NUL.
-  bool skip_string() {
-    std::uint32_t length = 0;
-    if (!read(length) || length == 0 || length > rest_.size()) return false;
-    return rest_[length - 1] == 0 && skip(length);
-  }
-
- private:
-  std::span<const std::uint8_t> rest_;
-};
 
 }  // namespace
 
@@ -93,21 +64,56 @@ telemetry_t to_message(const rig::CycleRecord& record, double distance_m, std::i
   return m;
 }
 
-DecodedCommand decode_command(std::span<const std::uint8_t> packet) {
-  PacketChecker checker(packet);
-  std::uint64_t fingerprint = 0;
-  if (!checker.read(fingerprint)) return {{}, "shorter than a fingerprint"};
-  if (fingerprint != std::bit_cast<std::uint64_t>(static_cast<std::int64_t>(command_t::getHash()))) {
-    return {{}, "not an abs_hil.command_t (wrong fingerprint)"};
-  }
-  const bool sound =
-      checker.skip(2 * sizeof(std::int64_t)) && checker.skip_string() && checker.skip_string() && checker.skip_string();
-  if (!sound) return {{}, "truncated or damaged"};
+rig::CycleRecord to_record(const telemetry_t& m) noexcept {
+  rig::CycleRecord r;
+  r.sequence = std::bit_cast<std::uint64_t>(m.cycle);
+  r.stamp_ns = m.stamp_ns;
+  r.time_s = m.time_s;
+  r.phase = m.phase >= 0 && m.phase <= telemetry_t::PHASE_FAULT ? static_cast<rig::Phase>(m.phase) : rig::Phase::fault;
+  r.reason = static_cast<rig::Reason>(m.reason);
+  r.reason_value = m.reason_value;
 
+  r.truth = {.speeds = {m.omega1_rad_s, m.omega2_rad_s},
+             .slip = m.slip,
+             .brake_torque_Nm = m.brake_torque_Nm,
+             .theta_N = m.theta_N};
+  r.control = {.speeds_est = {m.omega1_est_rad_s, m.omega2_est_rad_s},
+               .slip_est = m.slip_est,
+               .slip_ref = m.slip_ref,
+               .slip_velocity_error_m_s = m.slip_velocity_error_m_s,
+               .brake_torque_ref_Nm = m.brake_torque_ref_Nm,
+               .brake_torque_est_Nm = m.brake_torque_est_Nm,
+               .theta_est_N = m.theta_est_N};
+  r.command = {.motor_duty = m.motor_pwm, .brake_duty = m.brake_pwm, .motor_enable = m.motor_enable != 0};
+
+  r.measurement.time_ns = m.stamp_ns;
+  r.measurement.upper_counts = m.upper_counts;
+  r.measurement.lower_counts = m.lower_counts;
+  r.measurement.supply_V = m.supply_V;
+  r.measurement.temperature_C = m.temperature_C;
+  r.measurement.trip_flags = static_cast<std::uint32_t>(m.trip_flags);
+
+  r.timing.wakeup_latency_ns = m.wakeup_latency_ns;
+  r.timing.read_ns = m.read_ns;
+  r.timing.control_ns = m.control_ns;
+  r.timing.write_ns = m.write_ns;
+  r.timing.cycle_ns = m.cycle_ns;
+  r.timing.record_ns = m.record_ns;
+  r.timing.periods_skipped = static_cast<std::uint32_t>(m.periods_skipped);
+  r.timing.overrun_cause = static_cast<rig::OverrunCause>(m.overrun_cause);
+  return r;
+}
+
+measurement_t measured_at(const rig::CycleRecord& record) noexcept {
+  measurement_t m{};
+  m.cycle = std::bit_cast<std::int64_t>(record.sequence);
+  m.measured_ns = record.measurement.time_ns;
+  return m;
+}
+
+DecodedCommand decode_command(std::span<const std::uint8_t> packet) {
   DecodedCommand decoded;
-  if (decoded.command.decode(packet.data(), 0, static_cast<int>(packet.size())) < 0) {
-    decoded.problem = "truncated or damaged";
-  }
+  decoded.problem = decode_checked(packet, decoded.command);
   return decoded;
 }
 

@@ -63,6 +63,7 @@ MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, S
   check(options_);
   telemetry_.name = options_.channel_prefix + "TELEMETRY";
   status_channel_.name = options_.channel_prefix + "STATUS";
+  measurement_.name = options_.channel_prefix + "MEASUREMENT";
   event_.name = options_.channel_prefix + "EVENT";
   experiment_.name = options_.channel_prefix + "EXPERIMENT";
   command_channel_ = options_.channel_prefix + "COMMAND";
@@ -86,6 +87,10 @@ void MessageStream::consume(const rig::CycleRecord& record, double distance_m) {
   if (record.sequence >= next_telemetry_cycle_) {
     telemetry_t message = to_message(record, distance_m, 0);
     send(telemetry_, message);
+    if (record.measurement.time_ns != record.stamp_ns) {
+      measurement_t measurement = measured_at(record);
+      send(measurement_, measurement);
+    }
     next_telemetry_cycle_ = (record.sequence / options_.telemetry_every_cycles + 1) * options_.telemetry_every_cycles;
   }
   if (!started_ || record.time_s >= next_status_s_) {

@@ -27,6 +27,7 @@ MAY_KNOW = {
     'settings': {'rig', 'control', 'plant_sim', 'driver', 'runtime', 'experiment'},
     'app': {'control'},  # the program's public face; the program itself, apps/, knows everything
     'comparison': {'rig', 'control', 'plant_sim', 'driver', 'driver/sim', 'runtime', 'experiment', 'analysis', 'settings'},
+    'replay': {'rig', 'control', 'driver', 'driver/sim', 'runtime', 'experiment', 'settings', 'telemetry', 'lcmtypes'},
 }
 # room -> libraries that are none of its business
 NEVER_INCLUDES = {

@@ -11,6 +11,7 @@
 #include "abs_hil/command_t.hpp"
 #include "abs_hil/event_t.hpp"
 #include "abs_hil/experiment_t.hpp"
+#include "abs_hil/measurement_t.hpp"
 #include "abs_hil/rig/cycle_record.hpp"
 #include "abs_hil/status_t.hpp"
 #include "abs_hil/telemetry_t.hpp"
@@ -19,6 +20,12 @@ namespace abs_hil::telemetry {
 
 /// The record as a message. `distance_m`: the car's way since braking started; `sequence`: of the channel.
 [[nodiscard]] telemetry_t to_message(const rig::CycleRecord& record, double distance_m, std::int64_t sequence) noexcept;
+
+/// The inverse of to_message, as far as the message goes: the command's torque and true speeds handed to the controller
+/// are not in it, and the counters' time is the stamp (measurement_t says otherwise where it is not).
+[[nodiscard]] rig::CycleRecord to_record(const telemetry_t& message) noexcept;
+/// The record's cycle and the time of its counters.
+[[nodiscard]] measurement_t measured_at(const rig::CycleRecord& record) noexcept;
 
 /// A buffer that messages are encoded into; it grows to the largest and allocates no more after that.
 class EncodeBuffer {
@@ -47,8 +54,7 @@ struct DecodedCommand {
   std::string_view problem{};
 };
 
-/// Decodes what anybody on the network may have sent. Unlike the generated decode(), which trusts lengths (a string of
-/// length 0 or less throws or worse), it checks every one first. Never throws but std::bad_alloc.
+/// decode_checked for command_t.
 [[nodiscard]] DecodedCommand decode_command(std::span<const std::uint8_t> packet);
 
 /// `text` cut to `max_bytes` with control and non-ASCII bytes replaced by '?', fit for logs and terminals.

@@ -70,6 +70,7 @@ class MessageStream : public rig::RecordSink {
   StatusSource status_;
   std::vector<Outlet*> outlets_;
   Channel telemetry_;
+  Channel measurement_;
   Channel status_channel_;
   Channel event_;
   Channel experiment_;

@@ -1,0 +1,110 @@
+#include "abs_hil/replay/check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <map>
+#include <string_view>
+
+#include "abs_hil/telemetry/message_codec.hpp"
+
+namespace abs_hil::replay {
+
+namespace {
+
+constexpr std::array<std::string_view, 8> durations{"wakeup_latency_ns", "read_ns",      "control_ns",
+                                                    "write_ns",          "cycle_ns",     "periods_skipped",
+                                                    "record_ns",         "overrun_cause"};
+
+/// A field as bits, to compare, and as text, to show.
+struct FieldValue {
+  std::uint64_t bits;
+  std::string text;
+};
+
+std::map<std::string_view, FieldValue> values_of(const telemetry_t& message) {
+  std::map<std::string_view, FieldValue> values;
+  telemetry::visit_fields(message, [&values](std::string_view name, const auto& value) {
+    using Value = std::decay_t<decltype(value)>;
+    if constexpr (std::is_same_v<Value, double>) {
+      values[name] = {std::bit_cast<std::uint64_t>(value), fmt::format("{} ({:a})", value, value)};
+    } else {
+      values[name] = {static_cast<std::uint64_t>(static_cast<std::int64_t>(value)), fmt::format("{}", value)};
+    }
+  });
+  return values;
+}
+
+bool same_bits(const telemetry_t& a, const telemetry_t& b) {
+  telemetry::EncodeBuffer first, second;
+  const auto bytes_a = first.encode(a);
+  const auto bytes_b = second.encode(b);
+  return std::equal(bytes_a.begin(), bytes_a.end(), bytes_b.begin(), bytes_b.end());
+}
+
+/// Compares a rerun with the recording; one line about it.
+bool compare(const RecordedRun& run, const std::vector<RerunCycle>& rerun, bool with_timing, const std::string& what,
+             CheckResult& result) {
+  const std::size_t common = std::min(run.cycles.size(), rerun.size());
+  for (std::size_t n = 0; n < common; ++n) {
+    const telemetry_t& recorded = run.cycles[n];
+    telemetry_t computed = telemetry::to_message(rerun[n].record, rerun[n].distance_m, recorded.sequence);
+    if (ended_from_outside(recorded)) computed.reason_value = recorded.reason_value;
+    if (same_bits(recorded, computed)) continue;
+    const Difference difference = first_difference(recorded, computed, with_timing);
+    if (difference.field.empty()) continue;
+    result.lines.push_back(
+        fmt::format("{}: DIFFERENT from cycle {} (t = {:.6f} s) on: {} was recorded as {}, comes to {}", what, n,
+                    recorded.time_s, difference.field, difference.recorded, difference.computed));
+    return false;
+  }
+  if (run.cycles.size() != rerun.size()) {
+    result.lines.push_back(fmt::format("{}: DIFFERENT: {} cycles were recorded, the run comes to its end after {}",
+                                       what, run.cycles.size(), rerun.size()));
+    return false;
+  }
+  result.lines.push_back(fmt::format("{}: {} cycles bit-equal", what, common));
+  return true;
+}
+
+}  // namespace
+
+Difference first_difference(const telemetry_t& recorded, const telemetry_t& computed, bool with_timing) {
+  const auto a = values_of(recorded);
+  const auto b = values_of(computed);
+  Difference difference;
+  // In the order of the message, which is that of cause and effect less the estimates.
+  telemetry::visit_fields(recorded, [&](std::string_view name, const auto&) {
+    const bool is_duration = std::find(durations.begin(), durations.end(), name) != durations.end();
+    if (!difference.field.empty() || (is_duration && !with_timing)) return;
+    if (a.at(name).bits != b.at(name).bits) difference = {std::string(name), a.at(name).text, b.at(name).text};
+  });
+  return difference;
+}
+
+CheckResult check(const RecordedRun& run) {
+  const settings::Settings settings = settings_of(run);
+  CheckResult result;
+  const auto compared = [&](const std::vector<RerunCycle>& rerun, bool with_timing, const std::string& what) {
+    result.equal = compare(run, rerun, with_timing, what, result) && result.equal;
+  };
+  compared(rerun_open_loop(run, settings), run.virtual_time,
+           "open loop (commands, phases and estimates from the recorded measurements)");
+  const std::string simulation = "simulation (counts and true motion too, from the seed on)";
+  if (run.experiment.backend != "sim") {
+    result.lines.push_back(simulation + ": not possible, the backend was " + run.experiment.backend);
+  } else if (!settings.inject.empty()) {
+    result.lines.push_back(simulation + ": left out, faults were injected (run.inject)");
+  } else if (!run.virtual_time && settings.experiment.start_speed_rad_s > 0.0) {
+    result.lines.push_back(simulation +
+                           ": not possible, how far the wheels had run before the first cycle is not recorded "
+                           "(experiment.start_speed_rad_s in real time)");
+  } else {
+    compared(rerun_simulation(run, settings), run.virtual_time, simulation);
+  }
+  return result;
+}
+
+}  // namespace abs_hil::replay

@@ -1,0 +1,149 @@
+#include "abs_hil/replay/recorded_run.hpp"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "abs_hil/settings/config_error.hpp"
+#include "abs_hil/settings/config_json.hpp"
+#include "abs_hil/settings/key_table.hpp"
+#include "abs_hil/telemetry/checked_decode.hpp"
+
+namespace abs_hil::replay {
+
+namespace {
+
+using telemetry::RecordingError;
+
+/// Sorts a recording's events into a run and checks them one by one.
+class Collector {
+ public:
+  explicit Collector(std::string name) : name_(std::move(name)) {}
+
+  void take(const telemetry::LogEvent& event) {
+    const std::int64_t fingerprint = telemetry::fingerprint_of(event.data);
+    const auto is = [fingerprint]<class Message>(const Message&) {
+      return fingerprint == static_cast<std::int64_t>(Message::getHash());
+    };
+    ++events_;
+    if (is(telemetry_t{})) {
+      take_cycle(decoded<telemetry_t>(event), event.channel);
+    } else if (is(experiment_t{})) {
+      take_experiment(decoded<experiment_t>(event));
+    } else if (is(measurement_t{})) {
+      measurements_.push_back(decoded<measurement_t>(event));
+    } else if (is(event_t{})) {
+      run_.events.push_back(decoded<event_t>(event));
+    } else if (is(adjustment_t{})) {
+      run_.adjustments.push_back(decoded<adjustment_t>(event));
+    } else if (is(status_t{})) {
+      static_cast<void>(decoded<status_t>(event));
+    } else if (!channel_.empty() && event.channel == channel_) {
+      fail("a message on " + channel_ + " is no telemetry_t");
+    }
+  }
+
+  RecordedRun finish() {
+    if (run_.cycles.empty()) fail("holds no telemetry of abs_hil (no telemetry_t message)");
+    if (!has_experiment_)
+      fail("holds no configuration (no experiment_t message): record with --log, or longer than 5 s");
+    for (const telemetry_t& cycle : run_.cycles) run_.measured_ns.push_back(cycle.stamp_ns);
+    for (const measurement_t& measurement : measurements_) {
+      if (measurement.cycle < 0 || static_cast<std::size_t>(measurement.cycle) >= run_.cycles.size()) {
+        fail("a measurement_t of cycle " + std::to_string(measurement.cycle) + ", which is not there");
+      }
+      run_.measured_ns[static_cast<std::size_t>(measurement.cycle)] = measurement.measured_ns;
+    }
+    run_.virtual_time = std::all_of(run_.cycles.begin(), run_.cycles.end(), [](const telemetry_t& cycle) {
+      return cycle.wakeup_latency_ns == 0 && cycle.cycle_ns == 0 && cycle.record_ns == 0;
+    });
+    return std::move(run_);
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const { throw RecordingError("'" + name_ + "': " + what); }
+
+  template <class Message>
+  Message decoded(const telemetry::LogEvent& event) {
+    Message message{};
+    const std::string_view problem = telemetry::decode_checked(event.data, message);
+    if (!problem.empty()) {
+      fail("event " + std::to_string(event.number) + " on " + event.channel + ": " + std::string(problem));
+    }
+    return message;
+  }
+
+  void take_cycle(telemetry_t cycle, const std::string& channel) {
+    if (channel_.empty()) channel_ = channel;
+    if (channel != channel_) fail("telemetry on two channels, " + channel_ + " and " + channel + ": one run at a time");
+    const auto expected = static_cast<std::int64_t>(run_.cycles.size());
+    if (cycle.cycle != expected) fail(gap(expected, cycle));
+    if (cycle.phase < telemetry_t::PHASE_IDLE || cycle.phase > telemetry_t::PHASE_FAULT) {
+      fail("cycle " + std::to_string(cycle.cycle) + " is damaged: phase " + std::to_string(cycle.phase));
+    }
+    if (!run_.cycles.empty() && cycle.stamp_ns < run_.cycles.back().stamp_ns) {
+      fail("cycle " + std::to_string(cycle.cycle) + " is damaged: its stamp lies before that of the cycle before");
+    }
+    run_.cycles.push_back(std::move(cycle));
+  }
+
+  std::string gap(std::int64_t expected, const telemetry_t& found) const {
+    const std::string where =
+        "cycle " + std::to_string(found.cycle) + " where cycle " + std::to_string(expected) + " should be: ";
+    if (expected == 0) return where + "a replay needs the run from its first cycle on";
+    if (found.cycle == 0) return where + "a second run begins; give a recording of one run";
+    if (found.sequence == expected) {
+      return where +
+             "not every cycle was published (telemetry.decimation, or drops); record with --log and "
+             "telemetry.decimation=1";
+    }
+    return where + "messages are missing or damaged; record with --log, which loses none";
+  }
+
+  void take_experiment(experiment_t experiment) {
+    if (!has_experiment_) run_.experiment = experiment;
+    has_experiment_ = true;
+    const experiment_t& first = run_.experiment;
+    if (experiment.config_json != first.config_json || experiment.controller != first.controller ||
+        experiment.backend != first.backend || experiment.plant != first.plant ||
+        experiment.experiment != first.experiment) {
+      fail("two configurations in one recording (message " + std::to_string(experiment.sequence) +
+           " on the experiment's channel): damaged, or more than one run");
+    }
+  }
+
+  std::string name_;
+  std::string channel_;  ///< of the telemetry
+  RecordedRun run_{};
+  std::vector<measurement_t> measurements_{};
+  std::int64_t events_{0};
+  bool has_experiment_{false};
+};
+
+}  // namespace
+
+RecordedRun read_run(const std::filesystem::path& recording) {
+  Collector collector(recording.string());
+  telemetry::for_each_event(recording, [&collector](const telemetry::LogEvent& event) { collector.take(event); });
+  return collector.finish();
+}
+
+settings::Settings settings_of(const RecordedRun& run, const Changes& changes) {
+  settings::Settings settings;
+  settings::KeyTable keys(settings);
+  const auto config = nlohmann::ordered_json::parse(run.experiment.config_json, nullptr, false);
+  if (config.is_discarded()) throw RecordingError("the recorded configuration is no JSON: the recording is damaged");
+  try {
+    // Keys of another version do not matter as long as --check finds the same commands.
+    static_cast<void>(settings::load_json(config, keys, "recorded configuration"));
+  } catch (const settings::ConfigError& error) {
+    throw RecordingError(error.what());
+  }
+  settings.plant_name = run.experiment.plant;
+  settings.backend = run.experiment.backend;
+  if (changes.controller) keys.set_text("control.controller=" + *changes.controller, "--controller");
+  for (const std::string& assignment : changes.assignments) keys.set_text(assignment, "--set");
+  return settings;
+}
+
+}  // namespace abs_hil::replay

@@ -1,0 +1,158 @@
+#include "abs_hil/replay/rerun.hpp"
+
+#include <bit>
+#include <cmath>
+#include <utility>
+
+#include "abs_hil/driver/sim/sim_driver.hpp"
+#include "abs_hil/experiment/experiments.hpp"
+#include "abs_hil/experiment/run_logic.hpp"
+#include "abs_hil/runtime/clock.hpp"
+#include "abs_hil/runtime/cyclic_executive.hpp"
+#include "abs_hil/runtime/record_pump.hpp"
+#include "abs_hil/telemetry/message_codec.hpp"
+
+namespace abs_hil::replay {
+
+namespace {
+
+constexpr std::size_t ring_capacity = 2;  // emptied after every cycle
+
+/// Time that stands still within a cycle and moves to the recorded stamp of the next.
+class RecordedClock final : public runtime::Clock {
+ public:
+  explicit RecordedClock(std::int64_t start_ns) : now_ns_(start_ns) {}
+  [[nodiscard]] std::int64_t now_ns() noexcept override { return now_ns_; }
+  void sleep_until(std::int64_t /*time_ns*/) noexcept override {}
+  void set(std::int64_t now_ns) noexcept { now_ns_ = now_ns; }
+
+ private:
+  std::int64_t now_ns_;
+};
+
+/// A rig that does again what was recorded, whatever is asked of it.
+class RecordedRig final : public driver::RigDriver {
+ public:
+  RecordedRig(const RecordedRun& run, bool ideal_sensors) : run_(run), ideal_sensors_(ideal_sensors) {}
+  ~RecordedRig() override { static_cast<void>(deactivate()); }
+
+  [[nodiscard]] std::string_view name() const noexcept override { return "recorded"; }
+  [[nodiscard]] rig::PlantTruth truth() const noexcept override { return truth_; }
+
+ private:
+  void do_configure() override {}
+  void do_activate(std::int64_t /*now_ns*/) override {}
+  driver::IoResult do_read(std::int64_t /*now_ns*/, rig::Measurement& measurement) noexcept override {
+    const rig::CycleRecord record = telemetry::to_record(run_.cycles[next_]);
+    measurement = record.measurement;
+    measurement.time_ns = run_.measured_ns[next_];
+    truth_ = record.truth;
+    // The simulator hands its true speeds to the controller then.
+    if (ideal_sensors_) measurement.ideal_speeds = truth_.speeds;
+    ++next_;
+    return {};
+  }
+  driver::IoResult do_write(const rig::Command& /*command*/) noexcept override { return {}; }
+  driver::IoResult do_make_safe() noexcept override { return {}; }
+
+  const RecordedRun& run_;
+  bool ideal_sensors_;
+  std::size_t next_{0};
+  rig::PlantTruth truth_{};
+};
+
+/// The run's logic, except that what acted on the rig is what was recorded.
+class RecordedActuation final : public runtime::CycleLogic {
+ public:
+  RecordedActuation(experiment::RunLogic& logic, const RecordedRun& run) : logic_(logic), run_(run) {}
+
+  [[nodiscard]] rig::Command step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept override {
+    cycle_ = record.sequence;
+    return logic_.step(measurement, record);
+  }
+  void commanded(const rig::Command& command) noexcept override {
+    const telemetry_t& recorded = run_.cycles[cycle_];
+    rig::Command acted = telemetry::to_record(recorded).command;
+    const bool same =
+        std::bit_cast<std::uint64_t>(acted.brake_duty) == std::bit_cast<std::uint64_t>(command.brake_duty);
+    const bool ended = recorded.phase == telemetry_t::PHASE_STOPPED || recorded.phase == telemetry_t::PHASE_FAULT;
+    acted.brake_torque_Nm = same ? command.brake_torque_Nm : (ended ? 0.0 : recorded.brake_torque_ref_Nm);
+    logic_.commanded(acted);
+  }
+  void end_early(rig::Reason reason, double value) noexcept override { logic_.end_early(reason, value); }
+  [[nodiscard]] bool finished() const noexcept override { return logic_.finished(); }
+
+ private:
+  experiment::RunLogic& logic_;
+  const RecordedRun& run_;
+  std::uint64_t cycle_{0};
+};
+
+class Collected final : public rig::RecordSink {
+ public:
+  void consume(const rig::CycleRecord& record, double distance_m) override { cycles.push_back({record, distance_m}); }
+  std::vector<RerunCycle> cycles;
+};
+
+experiment::RunLogicParts logic_parts(const settings::Settings& s) {
+  return experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate, s.experiment,
+                                      experiment::plan_experiment(s.experiment, s.control.v_min_m_s));
+}
+
+/// Runs the program's own cycle at the recorded times.
+std::vector<RerunCycle> rerun(const RecordedRun& run, const settings::Settings& s, driver::RigDriver& rig,
+                              runtime::CycleLogic& cycle_logic) {
+  RecordedClock clock(run.cycles.front().stamp_ns);
+  runtime::CommandGate gate(s.gate);
+  runtime::RecordRing ring(ring_capacity);
+  // Lateness is recorded, not met again: it must not count here.
+  runtime::CyclicExecutive executive(clock, rig, cycle_logic, gate, ring, std::llround(1e9 / s.control.rate_Hz),
+                                     {.startup_cycles = 0, .max_consecutive = 0});
+  Collected collected;
+  runtime::RecordPump pump(ring, s.plant.rig.wheels.r2_m, {&collected});
+  rig.configure();
+  rig.activate(clock.now_ns());
+  for (const telemetry_t& cycle : run.cycles) {
+    clock.set(cycle.stamp_ns);
+    if (ended_from_outside(cycle)) executive.request_stop(static_cast<rig::Reason>(cycle.reason));
+    const bool goes_on = executive.step();
+    pump.drain();
+    if (!goes_on) break;
+  }
+  return std::move(collected.cycles);
+}
+
+}  // namespace
+
+bool ended_from_outside(const telemetry_t& cycle) noexcept {
+  if (cycle.phase != telemetry_t::PHASE_STOPPED && cycle.phase != telemetry_t::PHASE_FAULT) return false;
+  const auto reason = static_cast<rig::Reason>(cycle.reason);
+  switch (reason) {
+    // Found by sequence, gate or logic from the measurements.
+    case rig::Reason::phase_time_limit:
+    case rig::Reason::overspeed:
+    case rig::Reason::command_not_finite:
+    case rig::Reason::estimate_not_finite:
+    case rig::Reason::board_interlock_tripped:
+    case rig::Reason::board_supply_tripped:
+    case rig::Reason::board_supply_low:
+    case rig::Reason::board_too_hot: return false;
+    default: return rig::is_fault(reason) || rig::is_stop_request(reason);
+  }
+}
+
+std::vector<RerunCycle> rerun_open_loop(const RecordedRun& run, const settings::Settings& settings) {
+  experiment::RunLogic logic(logic_parts(settings));
+  RecordedActuation actuation(logic, run);
+  RecordedRig rig(run, settings.plant.ideal_sensors);
+  return rerun(run, settings, rig, actuation);
+}
+
+std::vector<RerunCycle> rerun_simulation(const RecordedRun& run, const settings::Settings& settings) {
+  experiment::RunLogic logic(logic_parts(settings));
+  driver::SimDriver rig(settings.plant, {.seed = static_cast<std::uint64_t>(settings.seed),
+                                         .start_speed_rad_s = settings.experiment.start_speed_rad_s});
+  return rerun(run, settings, rig, logic);
+}
+
+}  // namespace abs_hil::replay

@@ -1,0 +1,105 @@
+#include "abs_hil/telemetry/event_log.hpp"
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <limits>
+#include <utility>
+
+#include "abs_hil/telemetry/file_error.hpp"
+
+namespace abs_hil::telemetry {
+namespace {
+
+constexpr std::uint32_t sync_word = 0xEDA1DA01;
+constexpr std::size_t header_bytes = 28;  // sync, number, timestamp, length of channel, length of data
+constexpr std::uint32_t channel_max_bytes = 63;
+constexpr std::uint32_t data_max_bytes = 1U << 28U;  // LCM's own limit
+
+template <class Unsigned>
+Unsigned big_endian(const std::uint8_t* bytes) {
+  Unsigned value = 0;
+  for (std::size_t i = 0; i < sizeof value; ++i) value = static_cast<Unsigned>(value << 8U | bytes[i]);
+  return value;
+}
+
+template <class Unsigned>
+std::uint8_t* put_big_endian(std::uint8_t* to, Unsigned value) {
+  for (std::size_t i = 0; i < sizeof value; ++i)
+    *to++ = static_cast<std::uint8_t>(value >> (8 * (sizeof value - 1 - i)));
+  return to;
+}
+
+}  // namespace
+
+EventLogReader::EventLogReader(std::filesystem::path path)
+    : path_(std::move(path)), file_(std::fopen(path_.c_str(), "rb")) {
+  std::error_code error;
+  if (file_) size_ = std::filesystem::file_size(path_, error);
+  if (!file_ || error) {
+    throw RecordingError("'" + path_.string() + "': " + (file_ ? "not a file" : std::strerror(errno)) +
+                         "; give an LCM event log (.lcmlog), as --log writes it");
+  }
+}
+
+void EventLogReader::fail(const std::string& what) const {
+  throw RecordingError("'" + path_.string() + "': event " + std::to_string(events_) + " at byte " +
+                       std::to_string(at_) + ": " + what);
+}
+
+std::optional<LogEvent> EventLogReader::next() {
+  std::array<std::uint8_t, header_bytes> header{};
+  const std::size_t read = std::fread(header.data(), 1, header.size(), file_.get());
+  if (read == 0 && std::feof(file_.get()) != 0) return std::nullopt;
+  if (read >= sizeof sync_word && big_endian<std::uint32_t>(header.data()) != sync_word) {
+    fail(events_ == 0 ? "not an LCM event log" : "damaged: no event begins here");
+  }
+  if (read != header.size()) fail(events_ == 0 ? "not an LCM event log" : "the file is cut off");
+  LogEvent event;
+  event.number = static_cast<std::int64_t>(big_endian<std::uint64_t>(&header[4]));
+  event.timestamp_us = static_cast<std::int64_t>(big_endian<std::uint64_t>(&header[12]));
+  const auto channel_bytes = big_endian<std::uint32_t>(&header[20]);
+  const auto data_bytes = big_endian<std::uint32_t>(&header[24]);
+  if (channel_bytes == 0 || channel_bytes > channel_max_bytes || data_bytes > data_max_bytes) {
+    fail("damaged: lengths that no event has");
+  }
+  if (event.number < events_) fail("damaged: event number " + std::to_string(event.number));
+  // Before anything is made room for: lengths may be anything.
+  if (size_ - at_ < header_bytes + std::uint64_t{channel_bytes} + data_bytes) fail("the file is cut off");
+  event.channel.resize(channel_bytes);
+  event.data.resize(data_bytes);
+  if (std::fread(event.channel.data(), 1, channel_bytes, file_.get()) != channel_bytes ||
+      std::fread(event.data.data(), 1, data_bytes, file_.get()) != data_bytes) {
+    fail("the file is cut off");
+  }
+  at_ += header_bytes + channel_bytes + data_bytes;
+  events_ = event.number == std::numeric_limits<std::int64_t>::max() ? event.number : event.number + 1;
+  return event;
+}
+
+EventLogWriter::EventLogWriter(std::filesystem::path path)
+    : path_(std::move(path)), file_(std::fopen(path_.c_str(), "wb")) {
+  if (!file_) throw FileError("event log", path_, errno);
+}
+
+void EventLogWriter::write(const LogEvent& event) {
+  std::array<std::uint8_t, header_bytes> header{};
+  std::uint8_t* to = put_big_endian(header.data(), sync_word);
+  to = put_big_endian(to, static_cast<std::uint64_t>(event.number));
+  to = put_big_endian(to, static_cast<std::uint64_t>(event.timestamp_us));
+  to = put_big_endian(to, static_cast<std::uint32_t>(event.channel.size()));
+  put_big_endian(to, static_cast<std::uint32_t>(event.data.size()));
+  const auto put = [this](const void* bytes, std::size_t size) {
+    if (size != 0 && std::fwrite(bytes, 1, size, file_.get()) != size) throw FileError("event log", path_, errno);
+  };
+  put(header.data(), header.size());
+  put(event.channel.data(), event.channel.size());
+  put(event.data.data(), event.data.size());
+}
+
+void EventLogWriter::finish() {
+  errno = 0;
+  if (std::fclose(file_.release()) != 0) throw FileError("event log", path_, errno != 0 ? errno : EIO);
+}
+
+}  // namespace abs_hil::telemetry

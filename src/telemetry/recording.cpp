@@ -1,0 +1,368 @@
+#include "abs_hil/telemetry/recording.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "abs_hil/rig/phase.hpp"
+#include "abs_hil/telemetry/checked_decode.hpp"
+#include "abs_hil/telemetry/csv_sink.hpp"
+#include "abs_hil/telemetry/file_error.hpp"
+#include "abs_hil/telemetry/message_codec.hpp"
+#include "csv_text.hpp"
+
+namespace abs_hil::telemetry {
+namespace {
+
+namespace fs = std::filesystem;
+using Bytes = std::vector<std::uint8_t>;
+using Fields = std::vector<std::string>;
+
+constexpr std::string_view envelope = "log_event,log_time_us,channel,type";
+constexpr std::size_t envelope_columns = 4;
+constexpr std::string_view raw_type = "raw";
+
+/// Columns of --csv, which go first, by name; in other files none.
+template <class Message>
+bool goes_first(std::string_view name) {
+  if constexpr (!std::same_as<Message, telemetry_t>) return false;
+  std::string_view rest = csv_header;
+  while (!rest.empty()) {
+    const std::size_t comma = std::min(rest.find(','), rest.size());
+    if (rest.substr(0, comma) == name) return true;
+    rest.remove_prefix(std::min(comma + 1, rest.size()));
+  }
+  return false;
+}
+
+/// The columns of --csv stand in another order than telemetry_t's fields.
+constexpr std::string_view first_columns(std::string_view type) {
+  return type == type_name<telemetry_t> ? csv_header : std::string_view{};
+}
+
+template <class Message>
+std::string header_of() {
+  std::string header(first_columns(type_name<Message>));
+  Message message{};
+  visit_fields(message, [&header](std::string_view name, const auto&) {
+    if (!goes_first<Message>(name)) header.append(header.empty() ? "" : ",").append(name);
+  });
+  return header.append(",").append(envelope);
+}
+
+void put_envelope(CsvRow& row, const LogEvent& event, std::string_view type) {
+  row("", event.number);
+  row("", event.timestamp_us);
+  row("", event.channel);
+  row.text(type);
+}
+
+template <class Message>
+std::string row_of(const Message& message, const LogEvent& event) {
+  CsvRow row;
+  if constexpr (std::same_as<Message, telemetry_t>) {
+    std::map<std::string_view, std::string> texts;
+    visit_fields(message, [&texts](std::string_view name, const auto& value) {
+      CsvRow one;
+      one(name, value);
+      texts[name] = one.row();
+    });
+    texts["phase"] = rig::name_of(static_cast<rig::Phase>(message.phase));
+    std::string_view rest = csv_header;
+    while (!rest.empty()) {
+      const std::size_t comma = std::min(rest.find(','), rest.size());
+      row.text(texts[rest.substr(0, comma)]);
+      rest.remove_prefix(std::min(comma + 1, rest.size()));
+    }
+  }
+  visit_fields(message, [&row](std::string_view name, const auto& value) {
+    if (!goes_first<Message>(name)) row(name, value);
+  });
+  put_envelope(row, event, type_name<Message>);
+  return row.row();
+}
+
+/// Sets a message's fields from the texts of a row.
+class FieldTexts {
+ public:
+  FieldTexts(const std::map<std::string, std::size_t, std::less<>>& columns, const Fields& fields)
+      : columns_(columns), fields_(fields) {}
+
+  template <class Number>
+    requires std::is_arithmetic_v<Number>
+  void operator()(std::string_view name, Number& value) {
+    const std::string* text = find(name);
+    if (text == nullptr) return;
+    if (name == "phase") {
+      for (int phase = 0; phase <= telemetry_t::PHASE_FAULT; ++phase) {
+        if (*text != rig::name_of(static_cast<rig::Phase>(phase))) continue;
+        value = static_cast<Number>(phase);
+        return;
+      }
+    }
+    if (!parse_number(*text, value)) problem_ = std::string(name) + ": '" + *text + "' is no such number";
+  }
+  void operator()(std::string_view name, std::string& value) {
+    if (const std::string* text = find(name)) value = *text;
+  }
+  [[nodiscard]] const std::string& problem() const noexcept { return problem_; }
+
+ private:
+  const std::string* find(std::string_view name) {
+    const auto column = columns_.find(name);
+    if (column != columns_.end()) return &fields_[column->second];
+    problem_ = "no column " + std::string(name);
+    return nullptr;
+  }
+  const std::map<std::string, std::size_t, std::less<>>& columns_;
+  const Fields& fields_;
+  std::string problem_;
+};
+
+template <class Message>
+Bytes encoded(const Message& message) {
+  EncodeBuffer buffer;
+  const auto bytes = buffer.encode(message);
+  return {bytes.begin(), bytes.end()};
+}
+
+using Columns = std::map<std::string, std::size_t, std::less<>>;
+
+Columns columns_of(const Fields& header) {
+  Columns columns;
+  for (std::size_t i = 0; i < header.size(); ++i) columns[header[i]] = i;
+  return columns;
+}
+
+Fields split_header(std::string_view header) {
+  Fields names;
+  while (!header.empty()) {
+    const std::size_t comma = std::min(header.find(','), header.size());
+    names.emplace_back(header.substr(0, comma));
+    header.remove_prefix(std::min(comma + 1, header.size()));
+  }
+  return names;
+}
+
+/// What an event looks like in CSV: the type and header of its file and its row.
+struct EventText {
+  std::string type;
+  std::string header;
+  std::string row;
+};
+
+/// A row is only as good as what comes out of it again.
+template <class Message>
+bool comes_back(const EventText& text, const LogEvent& event) {
+  std::FILE* memory = ::fmemopen(const_cast<char*>(text.row.data()), text.row.size(), "r");
+  if (memory == nullptr) return false;
+  const detail::FilePointer owner(memory);
+  static const Columns columns = columns_of(split_header(header_of<Message>()));
+  Fields fields;
+  if (!CsvRows(memory).next(fields) || fields.size() != columns.size()) return false;
+  Message message{};
+  FieldTexts texts(columns, fields);
+  visit_fields(message, texts);
+  return texts.problem().empty() && encoded(message) == event.data;
+}
+
+EventText text_of(const LogEvent& event) {
+  EventText text;
+  const std::int64_t fingerprint = fingerprint_of(event.data);
+  for_each_message_type([&]<class Message>() {
+    if (!text.row.empty() || fingerprint != static_cast<std::int64_t>(Message::getHash())) return;
+    Message message{};
+    if (!decode_checked(event.data, message).empty()) return;
+    EventText made{std::string(type_name<Message>), header_of<Message>(), row_of(message, event)};
+    if (comes_back<Message>(made, event)) text = std::move(made);
+  });
+  if (!text.row.empty()) return text;
+  CsvRow row;
+  row.text(CsvRow::hexadecimal(event.data.data(), event.data.size()));
+  put_envelope(row, event, raw_type);
+  return {std::string(raw_type), std::string("data_hex,").append(envelope), row.row()};
+}
+
+/// RUN.csv -> RUN.PART.csv.
+fs::path beside(const fs::path& csv, const std::string& part) {
+  std::string clean = part;
+  std::replace(clean.begin(), clean.end(), '/', '_');
+  fs::path path = csv;
+  path.replace_filename(csv.stem().string() + '.' + clean + ".csv");
+  return path;
+}
+
+/// The files of one conversion, opened as they are needed.
+class CsvFiles {
+ public:
+  explicit CsvFiles(fs::path main) : main_(std::move(main)) {}
+
+  void write(const LogEvent& event, const EventText& text) {
+    const bool is_main = text.type == type_name<telemetry_t> && (channel_.empty() || channel_ == event.channel);
+    if (is_main) channel_ = event.channel;
+    const std::string key = is_main ? std::string() : text.type == raw_type ? text.type : event.channel + text.type;
+    auto file = files_.find(key);
+    if (file == files_.end()) {
+      fs::path path = main_;
+      if (!is_main) path = beside(main_, text.type == raw_type ? text.type : event.channel);
+      if (paths_.contains(path)) path = beside(main_, event.channel + '.' + text.type);
+      paths_.insert({path, 0});
+      file = open(key, path, text.header);
+    }
+    put(file->second, text.row);
+  }
+
+  void finish() {
+    if (!files_.contains({})) open({}, main_, header_of<telemetry_t>());  // a recording without telemetry
+    for (auto& [key, file] : files_) {
+      errno = 0;
+      if (std::fclose(file.stream.release()) != 0) throw FileError("CSV file", file.path, errno != 0 ? errno : EIO);
+    }
+  }
+
+ private:
+  struct File {
+    fs::path path;
+    detail::FilePointer stream;
+  };
+  std::map<std::string, File>::iterator open(const std::string& key, const fs::path& path, const std::string& header) {
+    detail::FilePointer opened(std::fopen(path.c_str(), "wb"));
+    if (!opened) throw FileError("CSV file", path, errno);
+    const auto file = files_.emplace(key, File{path, std::move(opened)}).first;
+    put(file->second, header);
+    return file;
+  }
+  static void put(File& file, const std::string& line) {
+    const bool whole = std::fwrite(line.data(), 1, line.size(), file.stream.get()) == line.size();
+    if (!whole || std::fputc('\n', file.stream.get()) == EOF) throw FileError("CSV file", file.path, errno);
+  }
+  fs::path main_;
+  std::string channel_;  ///< of the telemetry in the main file
+  std::map<std::string, File> files_;
+  std::map<fs::path, int> paths_;
+};
+
+/// RUN.csv and all RUN.*.csv beside it.
+std::vector<fs::path> csv_parts(const fs::path& csv) {
+  std::vector<fs::path> parts;
+  const std::string prefix = csv.stem().string() + '.';
+  std::error_code error;
+  const fs::path folder = csv.has_parent_path() ? csv.parent_path() : fs::path(".");
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const fs::path name = entry.path().filename();
+    const bool is_part = name.extension() == ".csv" && name.string().starts_with(prefix) && name != csv.filename();
+    if (is_part) parts.push_back(entry.path());
+  }
+  std::sort(parts.begin(), parts.end());
+  return parts;
+}
+
+[[noreturn]] void fail(const fs::path& path, std::uint64_t row, const std::string& what) {
+  throw RecordingError("'" + path.string() + "': row " + std::to_string(row) + ": " + what);
+}
+
+/// Message bytes of one row; fails where the row does not give them.
+Bytes data_of(const fs::path& path, std::uint64_t row, const Columns& columns, const Fields& fields) {
+  const std::string& type = fields[columns.at("type")];
+  if (type == raw_type && columns.contains("data_hex")) {
+    if (auto bytes = bytes_of_hexadecimal(fields[columns.at("data_hex")])) return std::move(*bytes);
+    fail(path, row, "data_hex: not hexadecimal digits");
+  }
+  std::optional<Bytes> data;
+  for_each_message_type([&]<class Message>() {
+    if (type != type_name<Message>) return;
+    Message message{};
+    FieldTexts texts(columns, fields);
+    visit_fields(message, texts);
+    if (!texts.problem().empty()) fail(path, row, texts.problem());
+    data = encoded(message);
+  });
+  if (!data) fail(path, row, "type '" + type + "' is not known");
+  return std::move(*data);
+}
+
+void read_csv(const fs::path& path, std::map<std::int64_t, LogEvent>& events) {
+  const detail::FilePointer file(std::fopen(path.c_str(), "rb"));
+  if (!file) throw RecordingError("'" + path.string() + "': " + std::strerror(errno));
+  CsvRows rows(file.get());
+  Fields header;
+  const bool any = rows.next(header);
+  const Columns columns = columns_of(header);
+  const bool whole = columns.contains("log_event") && columns.contains("log_time_us") && columns.contains("channel") &&
+                     columns.contains("type");
+  if (!any || !whole) {
+    throw RecordingError("'" + path.string() + "': no columns " + std::string(envelope) +
+                         ": a run's --csv holds neither encoder counts nor configuration; give its event log (--log), "
+                         "or CSV that abs_hil convert made of one");
+  }
+  Fields fields;
+  while (rows.next(fields)) {
+    if (fields.size() != header.size()) {
+      fail(path, rows.row(), std::to_string(fields.size()) + " fields instead of " + std::to_string(header.size()));
+    }
+    LogEvent event;
+    if (!parse_number(fields[columns.at("log_event")], event.number) ||
+        !parse_number(fields[columns.at("log_time_us")], event.timestamp_us)) {
+      fail(path, rows.row(), "log_event or log_time_us is no whole number");
+    }
+    event.channel = fields[columns.at("channel")];
+    event.data = data_of(path, rows.row(), columns, fields);
+    const std::int64_t number = event.number;
+    if (!events.emplace(number, std::move(event)).second) {
+      fail(path, rows.row(), "log_event " + std::to_string(number) + " is there twice");
+    }
+  }
+}
+
+std::map<std::int64_t, LogEvent> read_all_csv(const fs::path& csv) {
+  std::map<std::int64_t, LogEvent> events;
+  read_csv(csv, events);
+  for (const fs::path& part : csv_parts(csv)) read_csv(part, events);
+  return events;
+}
+
+}  // namespace
+
+ConversionCounts log_to_csv(const fs::path& log, const fs::path& csv) {
+  EventLogReader reader(log);
+  for (const fs::path& part : csv_parts(csv)) {
+    throw RecordingError("'" + part.string() + "' is there already and would be taken for a part of '" + csv.string() +
+                         "'; remove it, or choose another name");
+  }
+  CsvFiles files(csv);
+  ConversionCounts counts;
+  while (const auto event = reader.next()) {
+    const EventText text = text_of(*event);
+    files.write(*event, text);
+    ++counts.events;
+    if (text.type == raw_type) ++counts.raw;
+  }
+  files.finish();
+  return counts;
+}
+
+ConversionCounts csv_to_log(const fs::path& csv, const fs::path& log) {
+  const auto events = read_all_csv(csv);
+  EventLogWriter writer(log);
+  ConversionCounts counts;
+  for (const auto& [number, event] : events) {
+    writer.write(event);
+    ++counts.events;
+  }
+  writer.finish();
+  return counts;
+}
+
+void for_each_event(const fs::path& recording, const std::function<void(const LogEvent&)>& take) {
+  if (recording.extension() == ".csv") {
+    for (const auto& [number, event] : read_all_csv(recording)) take(event);
+    return;
+  }
+  EventLogReader reader(recording);
+  while (const auto event = reader.next()) take(*event);
+}
+
+}  // namespace abs_hil::telemetry

@@ -1,0 +1,80 @@
+"""abs_hil replay and convert, as their users run them."""
+import random
+import unittest
+
+from program import ProgramTest
+
+
+class Replay(ProgramTest):
+    def record(self, *args):
+        log = self.folder / 'run.lcmlog'
+        self.fast('--log', log, *args)
+        return log
+
+    def test_check_of_an_untouched_run(self):
+        result = self.run_program('replay', self.record(), '--check')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(result.stdout.count('bit-equal'), 2)
+
+    def test_check_of_damaged_logs(self):
+        whole = self.record('--set', 'experiment.start_speed_rad_s=60').read_bytes()
+        damaged = self.folder / 'damaged.lcmlog'
+        generator = random.Random(1)
+        for place in (len(whole) // 3, len(whole) // 2, len(whole) * 4 // 5):
+            damaged.write_bytes(whole[:place] + generator.randbytes(64) + whole[place + 64:])
+            result = self.run_program('replay', damaged, '--check')
+            self.assertIn(result.returncode, (1, 2))
+            self.assertTrue(result.stderr)
+        damaged.write_bytes(whole[:len(whole) // 2])
+        result = self.run_program('replay', damaged, '--check')
+        self.assertEqual(result.returncode, 2)
+        self.assertIn('cut off', result.stderr)
+
+    def test_not_a_log(self):
+        for path in ('/etc/passwd', '/dev/null', self.folder, self.folder / 'none.lcmlog'):
+            result = self.run_program('replay', path, '--check')
+            self.assertEqual(result.returncode, 2, result.stderr)
+            self.assertIn(str(path), result.stderr)
+
+    def test_decimated_log_is_refused(self):
+        result = self.run_program('replay', self.record('--set', 'telemetry.decimation=10'), '--check')
+        self.assertEqual(result.returncode, 2)
+        self.assertIn('telemetry.decimation', result.stderr)
+
+    def test_real_time_run(self):
+        log = self.folder / 'real.lcmlog'
+        self.run_program('--no-lcm', '--log', log, '--rt', 'off', '--set', 'experiment.cut_speed_rad_s=10', '--set',
+                         'experiment.accelerate_limit_s=0.5')  # ends with a fault: that comes out again as well
+        result = self.run_program('replay', log, '--check')
+        self.assertEqual(result.returncode, 0, result.stderr + result.stdout)
+        self.assertEqual(result.stdout.count('bit-equal'), 2)
+
+    def test_other_controller(self):
+        log, csv = self.record(), self.folder / 'would.csv'
+        result = self.run_program('replay', log, '--controller', 'nominal', '--set', 'control.nominal.theta0_N=30',
+                                  '--csv', csv)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn('nominal', result.stdout)
+        braking = [row for row in self.rows(csv) if row['phase'] == 'brake']
+        self.assertEqual({row['theta_est_N'] for row in braking}, {'30'})
+        for wrong in (('--controller', 'nosuch'), ('--set', 'control.slip_ref=7'), ('--check', '--controller', 'pi')):
+            self.assertEqual(self.run_program('replay', log, *wrong).returncode, 2)
+
+    def test_the_same_controller_with_its_own_gains_differs_in_nothing(self):
+        log, csv, own = self.folder / 'run.lcmlog', self.folder / 'would.csv', self.folder / 'own.csv'
+        self.fast('--log', log, '--csv', own)
+        self.assertEqual(self.run_program('replay', log, '--csv', csv).returncode, 0)
+        self.assertEqual(csv.read_bytes(), own.read_bytes())
+
+    def test_convert(self):
+        log, csv, back = self.record(), self.folder / 'made.csv', self.folder / 'back.lcmlog'
+        self.assertEqual(self.run_program('convert', log, csv).returncode, 0)
+        self.assertEqual(self.run_program('convert', csv, back).returncode, 0)
+        self.assertEqual(log.read_bytes(), back.read_bytes())
+        self.assertEqual(self.run_program('replay', csv, '--check').returncode, 0)
+        self.assertEqual(self.run_program('convert', log, back).returncode, 2)
+        self.assertIn('.csv', self.run_program('convert', log, back).stderr)
+
+
+if __name__ == '__main__':
+    unittest.main()

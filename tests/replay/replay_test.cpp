@@ -1,0 +1,228 @@
+// Runs recorded by the program's own parts, replayed, checked and damaged.
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "abs_hil/replay/check.hpp"
+#include "abs_hil/replay/report.hpp"
+#include "abs_hil/settings/config_error.hpp"
+#include "abs_hil/settings/config_file.hpp"
+#include "abs_hil/telemetry/log_outlet.hpp"
+#include "abs_hil/telemetry/message_stream.hpp"
+#include "catch.hpp"
+#include "experiment/simulated_run.hpp"
+#include "telemetry/sample_records.hpp"
+
+namespace abs_hil::replay {
+namespace {
+
+using telemetry::test::ScratchDirectory;
+
+/// What is recorded: key=value, and whether a stop request ends it.
+struct Recipe {
+  std::vector<std::string> assignments{};
+  std::uint32_t decimation{1};
+  rig::Reason stop{rig::Reason::none};
+  std::int64_t measured_late_ns{0};  ///< as a board that reads its counters after the wake-up
+};
+
+/// Hands records on with another time of measurement, as from a board.
+class LateMeasurement final : public rig::RecordSink {
+ public:
+  LateMeasurement(rig::RecordSink& next, std::int64_t late_ns) : next_(next), late_ns_(late_ns) {}
+  void consume(const rig::CycleRecord& record, double distance_m) override {
+    rig::CycleRecord late = record;
+    late.measurement.time_ns += late_ns_;
+    next_.consume(late, distance_m);
+  }
+  void finish() override { next_.finish(); }
+
+ private:
+  rig::RecordSink& next_;
+  std::int64_t late_ns_;
+};
+
+void record_run(const std::filesystem::path& path, const Recipe& recipe) {
+  settings::Settings s;
+  settings::KeyTable keys(s);
+  settings::load_file(settings::plant_file(s.plant_name), keys, "plant");
+  keys.set_text("experiment.start_speed_rad_s=100", "test");
+  for (const std::string& assignment : recipe.assignments) keys.set_text(assignment, "test");
+  telemetry::LogOutlet log(path, 0);
+  telemetry::MessageStream stream(
+      {.telemetry_every_cycles = recipe.decimation},
+      {s.experiment.name, s.control.controller, s.plant_name, s.backend, keys.to_json().dump(), "test"}, {});
+  stream.add(log);
+  LateMeasurement late(stream, recipe.measured_late_ns);
+  runtime::VirtualClock clock;
+  driver::SimDriver driver(
+      s.plant, {.seed = static_cast<std::uint64_t>(s.seed), .start_speed_rad_s = s.experiment.start_speed_rad_s});
+  experiment::RunSession session(
+      clock, driver,
+      experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate, s.experiment,
+                                   experiment::plan_experiment(s.experiment, s.control.v_min_m_s)),
+      s.gate, {&late});
+  session.run_fast([&recipe] { return recipe.stop; });
+}
+
+std::string content(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+TEST_CASE("a recorded run comes out again bit by bit, whatever the controller and the rate") {
+  const ScratchDirectory scratch;
+  for (const char* controller : {"adaptive", "adaptive-actuator", "adaptive-peak", "nominal", "sliding-mode",
+                                 "sliding-mode-smooth", "super-twisting", "pi", "relay", "five-phase", "locked"}) {
+    INFO(controller);
+    record_run(scratch / "run.lcmlog", {{std::string("control.controller=") + controller, "control.rate_Hz=700"}});
+    const RecordedRun run = read_run(scratch / "run.lcmlog");
+    CHECK(run.virtual_time);
+    const CheckResult result = check(run);
+    CHECK(result.equal);
+    CHECK(result.lines.size() == 2);
+  }
+}
+
+TEST_CASE("ideal sensors, ideal actuator, faults and stop requests come out again") {
+  const ScratchDirectory scratch;
+  const std::vector<Recipe> recipes{
+      {{"plant.ideal_sensors=true", "plant.ideal_actuator=true"}},
+      {{"plant.ideal_actuator=true"}},
+      {{"experiment.brake_limit_s=0.5"}},                                   // phase_time_limit
+      {{"gate.overspeed_rad_s=99"}},                                        // overspeed, found by the gate
+      {{"experiment.brake_limit_s=30"}, 1, rig::Reason::interrupt_signal},  // from outside, after 1000 cycles
+      {{"plant.friction_profile=braking time: 1; 0.5 at 0.3"}},
+  };
+  for (const Recipe& recipe : recipes) {
+    INFO(recipe.assignments.front());
+    record_run(scratch / "run.lcmlog", recipe);
+    const CheckResult result = check(read_run(scratch / "run.lcmlog"));
+    INFO(result.lines.back());
+    CHECK(result.equal);
+  }
+}
+
+TEST_CASE("a board's own time of measurement is recorded, and a replay needs it") {
+  const ScratchDirectory scratch;
+  record_run(scratch / "run.lcmlog", {.measured_late_ns = 1});
+  const RecordedRun run = read_run(scratch / "run.lcmlog");
+  CHECK(run.measured_ns[5] == run.cycles[5].stamp_ns + 1);
+  // The simulator's counters were read at the stamp: 1 ns later everywhere is the same run.
+  CHECK(rerun_open_loop(run, settings_of(run)).size() == run.cycles.size());
+}
+
+TEST_CASE("any changed bit of a measurement, estimate or command is found and named") {
+  const ScratchDirectory scratch;
+  record_run(scratch / "run.lcmlog", {});
+  const RecordedRun whole = read_run(scratch / "run.lcmlog");
+  const auto found = [&](const std::function<void(telemetry_t&)>& change) {
+    RecordedRun run = whole;
+    change(run.cycles[400]);
+    const CheckResult result = check(run);
+    CHECK_FALSE(result.equal);
+    return result.lines.front();
+  };
+  using Catch::Matchers::Contains;
+  const auto next_bit = [](double& value) { value = std::nextafter(value, 1e9); };
+  CHECK_THAT(found([&](telemetry_t& m) { next_bit(m.brake_pwm); }), Contains("cycle 400 ") && Contains("brake_pwm"));
+  CHECK_THAT(found([&](telemetry_t& m) { next_bit(m.theta_est_N); }), Contains("theta_est_N"));
+  CHECK_THAT(found([](telemetry_t& m) { ++m.upper_counts; }), Contains("omega1_est_rad_s"));
+  CHECK_THAT(found([](telemetry_t& m) { m.phase = telemetry_t::PHASE_HOLD; }), Contains("phase"));
+  CHECK_THAT(found([](telemetry_t& m) { m.motor_enable = 1; }), Contains("motor_enable"));
+  // Durations are part of a run with --fast only: there they are 0.
+  RecordedRun late = whole;
+  late.cycles[400].read_ns = 7;
+  CHECK_FALSE(check(late).equal);
+  late.virtual_time = false;
+  CHECK(check(late).equal);
+  // The end is part of it.
+  RecordedRun longer = whole;
+  longer.cycles.push_back(longer.cycles.back());
+  ++longer.cycles.back().cycle;
+  longer.measured_ns.push_back(longer.cycles.back().stamp_ns);
+  CHECK_THAT(check(longer).lines.front(), Contains("comes to its end after"));
+}
+
+TEST_CASE("another seed, gain or controller in the configuration is found") {
+  const ScratchDirectory scratch;
+  record_run(scratch / "run.lcmlog", {});
+  const RecordedRun whole = read_run(scratch / "run.lcmlog");
+  const auto with = [&](const char* table, const char* key, const nlohmann::ordered_json& value) {
+    RecordedRun run = whole;
+    auto config = nlohmann::ordered_json::parse(run.experiment.config_json);
+    config[table][key] = value;
+    run.experiment.config_json = config.dump();
+    return check(run);
+  };
+  CHECK_FALSE(with("control", "slip_ref", 0.1500001).equal);
+  CHECK_FALSE(with("control", "controller", "pi").equal);
+  const CheckResult seed = with("run", "seed", 2);
+  CHECK_FALSE(seed.equal);
+  CHECK(seed.lines[0].find("bit-equal") != std::string::npos);  // open loop the seed has no say
+  CHECK(seed.lines[1].find("DIFFERENT") != std::string::npos);
+  CHECK_THROWS_AS(with("control", "slip_ref", 2.0), telemetry::RecordingError);
+}
+
+TEST_CASE("another controller sees the same run: same measurements and estimates, other commands") {
+  const ScratchDirectory scratch;
+  record_run(scratch / "run.lcmlog", {});
+  const RecordedRun run = read_run(scratch / "run.lcmlog");
+  const auto rerun =
+      rerun_open_loop(run, settings_of(run, {.controller = "nominal", .assignments = {"control.nominal.theta0_N=30"}}));
+  REQUIRE(rerun.size() == run.cycles.size());
+  double difference = 0.0;
+  for (std::size_t n = 0; n < rerun.size(); ++n) {
+    CHECK(rerun[n].record.control.speeds_est.omega1_rad_s == run.cycles[n].omega1_est_rad_s);
+    CHECK(static_cast<int>(rerun[n].record.phase) == run.cycles[n].phase);
+    // The torque that acted is the recorded command's, whoever is asked.
+    CHECK(rerun[n].record.control.brake_torque_est_Nm == run.cycles[n].brake_torque_est_Nm);
+    difference =
+        std::max(difference, std::abs(rerun[n].record.control.brake_torque_ref_Nm - run.cycles[n].brake_torque_ref_Nm));
+  }
+  CHECK(difference > 0.5);
+  const std::string text = report(run, settings_of(run, {.controller = "nominal", .assignments = {}}), rerun);
+  CHECK(text.find("nominal") != std::string::npos);
+  CHECK_THROWS_AS(settings_of(run, {.controller = "nosuch", .assignments = {}}), settings::ConfigError);
+}
+
+TEST_CASE("recordings that do not hold the whole run are refused with the reason") {
+  const ScratchDirectory scratch;
+  using Catch::Matchers::Contains;
+  record_run(scratch / "few.lcmlog", {.decimation = 10});
+  CHECK_THROWS_WITH(read_run(scratch / "few.lcmlog"), Contains("telemetry.decimation"));
+  record_run(scratch / "run.lcmlog", {});
+  const std::string whole = content(scratch / "run.lcmlog");
+  const auto read_bytes = [&](const std::string& bytes) {
+    std::ofstream(scratch / "x.lcmlog", std::ios::binary) << bytes;
+    return read_run(scratch / "x.lcmlog");
+  };
+  CHECK_THROWS_WITH(read_bytes(whole.substr(0, whole.size() - 20)), Contains("cut off"));
+  CHECK_THROWS_WITH(read_bytes(""), Contains("no telemetry"));
+  CHECK_THROWS_WITH(read_bytes(whole + whole), Contains("damaged: event number"));
+}
+
+TEST_CASE("64 random bytes anywhere are an error or a difference, never a crash and rarely unseen") {
+  const ScratchDirectory scratch;
+  record_run(scratch / "run.lcmlog", {{"experiment.start_speed_rad_s=30"}});
+  const std::string whole = content(scratch / "run.lcmlog");
+  std::mt19937_64 generator(3);
+  int unseen = 0;
+  constexpr int trials = 60;
+  for (int trial = 0; trial < trials; ++trial) {
+    std::string bytes = whole;
+    const std::size_t at = generator() % (bytes.size() - 64);
+    for (std::size_t i = 0; i < 64; ++i) bytes[at + i] = static_cast<char>(generator());
+    std::ofstream(scratch / "x.lcmlog", std::ios::binary) << bytes;
+    try {
+      if (check(read_run(scratch / "x.lcmlog")).equal) ++unseen;
+    } catch (const telemetry::RecordingError&) {
+    }
+  }
+  // Only ABS_STATUS and ABS_EVENT are not part of the comparison.
+  CHECK(unseen <= trials / 20);
+}
+
+}  // namespace
+}  // namespace abs_hil::replay

@@ -1,0 +1,168 @@
+#include "abs_hil/telemetry/recording.hpp"
+
+#include <cmath>
+#include <fstream>
+#include <iterator>
+
+#include "abs_hil/telemetry/csv_sink.hpp"
+#include "abs_hil/telemetry/log_outlet.hpp"
+#include "abs_hil/telemetry/message_stream.hpp"
+#include "catch.hpp"
+#include "telemetry/message_capture.hpp"
+#include "telemetry/sample_records.hpp"
+
+namespace abs_hil::telemetry {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string content(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void put(const fs::path& path, const std::string& bytes) { std::ofstream(path, std::ios::binary) << bytes; }
+
+/// A log with all kinds of messages, and a CSV of the same run.
+void record(const fs::path& log_path, const fs::path& csv_path) {
+  LogOutlet log(log_path, 1'000'000);
+  CsvSink csv(csv_path);
+  MessageStream stream({}, {"paper", "adaptive", "a, \"plant\"\nof two lines", "sim", R"({"a":{"b":[1,"x"]}})", "0"},
+                       {});
+  stream.add(log);
+  for (std::uint64_t n = 0; n < 1200; ++n) {
+    rig::CycleRecord r = test::sample_record(n);
+    if (n % 7 == 0) r.measurement.time_ns += 40;  // a board's own time
+    if (n % 5 == 0) r.control.theta_est_N = rig::unknown;
+    if (n % 11 == 0) r.truth.theta_N = -rig::unknown;  // NaN with a sign
+    if (n == 600) r.phase = rig::Phase::hold;
+    if (n == 13) r.truth.slip = -0.0;
+    if (n == 14) r.truth.slip = 5e-324;
+    stream.consume(r, 0.1 * static_cast<double>(n));
+    csv.consume(r, 0.1 * static_cast<double>(n));
+  }
+  stream.answer_command(rig::Reason::none, "quoted \"text\", with comma", 1.0);
+  stream.finish();
+  csv.finish();
+}
+
+TEST_CASE("event log to CSV and back gives the same bytes") {
+  const test::ScratchDirectory scratch;
+  record(scratch / "run.lcmlog", scratch / "own.csv");
+  const ConversionCounts there = log_to_csv(scratch / "run.lcmlog", scratch / "made.csv");
+  CHECK(there.raw == 0);
+  CHECK(fs::exists(scratch / "made.ABS_EVENT.csv"));
+  const ConversionCounts back = csv_to_log(scratch / "made.csv", scratch / "back.lcmlog");
+  CHECK(there.events == back.events);
+  CHECK(content(scratch / "run.lcmlog") == content(scratch / "back.lcmlog"));
+}
+
+TEST_CASE("the CSV begins with the columns of --csv, and they hold the same text") {
+  const test::ScratchDirectory scratch;
+  record(scratch / "run.lcmlog", scratch / "own.csv");
+  log_to_csv(scratch / "run.lcmlog", scratch / "made.csv");
+  std::ifstream made(scratch / "made.csv"), own(scratch / "own.csv");
+  std::string made_line, own_line;
+  int rows = 0;
+  while (std::getline(own, own_line)) {
+    REQUIRE(std::getline(made, made_line));
+    // A NaN with a sign keeps it here, as it must come out again.
+    for (std::size_t at; (at = made_line.find("-NaN")) != std::string::npos;) made_line.erase(at, 1);
+    CHECK(made_line.starts_with(own_line + ','));
+    ++rows;
+  }
+  CHECK(rows == 1201);
+}
+
+TEST_CASE("what is of no type of ours, or damaged, comes through as it is") {
+  const test::ScratchDirectory scratch;
+  {
+    EventLogWriter log(scratch / "odd.lcmlog");
+    telemetry_t m{};
+    m.motor_enable = 5;  // no truth value, but it is what was sent
+    m.phase = 3;
+    EncodeBuffer buffer;
+    const auto bytes = buffer.encode(m);
+    log.write({.number = 0, .timestamp_us = 5, .channel = "OTHER", .data = {1, 2, 3, 0xFF}});
+    log.write({.number = 4, .timestamp_us = -5, .channel = "ABS_TELEMETRY", .data = {bytes.begin(), bytes.end()}});
+    log.write({.number = 5, .timestamp_us = 6, .channel = "ABS_TELEMETRY", .data = {bytes.begin(), bytes.end() - 1}});
+    log.write({.number = 9, .timestamp_us = 7, .channel = "EMPTY", .data = {}});
+    m.phase = 77;
+    const auto odd_phase = buffer.encode(m);
+    log.write(
+        {.number = 10, .timestamp_us = 8, .channel = "ABS_TELEMETRY", .data = {odd_phase.begin(), odd_phase.end()}});
+    m.theta_N = std::bit_cast<double>(std::uint64_t{0x7FF8'0000'0000'1234});  // a NaN with something in it
+    const auto odd_nan = buffer.encode(m);
+    log.write({.number = 11, .timestamp_us = 9, .channel = "rig2/TELEMETRY", .data = {odd_nan.begin(), odd_nan.end()}});
+    log.finish();
+  }
+  const ConversionCounts counts = log_to_csv(scratch / "odd.lcmlog", scratch / "odd.csv");
+  CHECK(counts.events == 6);
+  CHECK(counts.raw == 5);
+  csv_to_log(scratch / "odd.csv", scratch / "back.lcmlog");
+  CHECK(content(scratch / "odd.lcmlog") == content(scratch / "back.lcmlog"));
+}
+
+TEST_CASE("a log with another number of rigs keeps each channel in a file of its own") {
+  const test::ScratchDirectory scratch;
+  telemetry_t m{};
+  EncodeBuffer buffer;
+  const auto bytes = buffer.encode(m);
+  const std::vector<std::uint8_t> data(bytes.begin(), bytes.end());
+  EventLogWriter log(scratch / "two.lcmlog");
+  for (int n = 0; n < 6; ++n) log.write({n, n, n % 2 == 0 ? "A_TELEMETRY" : "B/TELEMETRY", data});
+  log.finish();
+  CHECK(log_to_csv(scratch / "two.lcmlog", scratch / "two.csv").raw == 0);
+  CHECK(fs::exists(scratch / "two.B_TELEMETRY.csv"));
+  csv_to_log(scratch / "two.csv", scratch / "back.lcmlog");
+  CHECK(content(scratch / "two.lcmlog") == content(scratch / "back.lcmlog"));
+}
+
+TEST_CASE("a damaged log is an error that names the place, wherever it is cut or overwritten") {
+  const test::ScratchDirectory scratch;
+  record(scratch / "run.lcmlog", scratch / "own.csv");
+  const std::string whole = content(scratch / "run.lcmlog").substr(0, 3000);
+  const auto count_events = [&](const std::string& bytes) {
+    put(scratch / "x.lcmlog", bytes);
+    int events = 0;
+    for_each_event(scratch / "x.lcmlog", [&events](const LogEvent&) { ++events; });
+    return events;
+  };
+  using Catch::Matchers::Contains;
+  CHECK_THROWS_WITH(count_events(whole), Contains("cut off") && Contains("x.lcmlog"));
+  CHECK_THROWS_WITH(count_events("hello, world, this is no event log"), Contains("not an LCM event log"));
+  CHECK_THROWS_WITH(count_events("short"), Contains("not an LCM event log"));
+  CHECK(count_events("") == 0);
+  std::string damaged = content(scratch / "run.lcmlog");
+  const std::size_t second = damaged.find("\xED\xA1\xDA\x01", 10);
+  REQUIRE(second != std::string::npos);
+  std::string sync = damaged, length = damaged, number = damaged;
+  sync[second] = 'x';
+  CHECK_THROWS_WITH(count_events(sync), Contains("damaged") && Contains("event 1 at byte " + std::to_string(second)));
+  length[second + 24] = '\x7F';
+  CHECK_THROWS_WITH(count_events(length), Contains("lengths"));
+  length = damaged;
+  length[second + 25] = '\x7F';
+  CHECK_THROWS_WITH(count_events(length), Contains("cut off"));
+  number[second + 4] = '\x80';
+  CHECK_THROWS_WITH(count_events(number), Contains("event number"));
+  CHECK_THROWS_AS(EventLogReader(scratch / "none.lcmlog"), RecordingError);
+}
+
+TEST_CASE("CSV that is not of a recording is refused by name") {
+  const test::ScratchDirectory scratch;
+  record(scratch / "run.lcmlog", scratch / "own.csv");
+  using Catch::Matchers::Contains;
+  CHECK_THROWS_WITH(csv_to_log(scratch / "own.csv", scratch / "back.lcmlog"), Contains("encoder counts"));
+  log_to_csv(scratch / "run.lcmlog", scratch / "made.csv");
+  CHECK_THROWS_WITH(log_to_csv(scratch / "run.lcmlog", scratch / "made.csv"), Contains("is there already"));
+  std::string text = content(scratch / "made.csv");
+  const std::size_t row = text.find('\n') + 1;
+  put(scratch / "bad.csv", text.substr(0, row) + "abc" + text.substr(row));
+  CHECK_THROWS_WITH(csv_to_log(scratch / "bad.csv", scratch / "back.lcmlog"), Contains("row 2") && Contains("time_s"));
+  put(scratch / "few.csv", text.substr(0, row) + "1,2\n");
+  CHECK_THROWS_WITH(csv_to_log(scratch / "few.csv", scratch / "back.lcmlog"), Contains("2 fields"));
+}
+
+}  // namespace
+}  // namespace abs_hil::telemetry
