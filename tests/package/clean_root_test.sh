@@ -1,0 +1,51 @@
+#!/usr/bin/env bash
+# clean_root_test.sh [ROOT]: makes a bare Debian 12 in ROOT (default: a scratch folder; one made before is used again),
+# installs build/release/packages' .deb there and runs it, then tries the README's two commands in a fresh clone of this
+# tree's HEAD. Needs root, debootstrap and a Debian mirror. Everything is mounted in a namespace of its own.
+set -euo pipefail
+source=$(realpath "$(dirname "$(realpath "$0")")/../..")
+
+if [ "${ABS_HIL_CLEAN_ROOT_INNER:-}" != 1 ]; then
+  root=${1:-$(mktemp -d /var/tmp/abs_hil_clean_root.XXXXXX)}
+  [ $# -gt 0 ] || trap 'rm -rf --one-file-system "$root"' EXIT
+  ABS_HIL_CLEAN_ROOT_INNER=1 unshare --mount --propagation private "$(realpath "$0")" "$root"
+  exit
+fi
+
+root=$1
+mirror=${DEBIAN_MIRROR:-http://deb.debian.org/debian}
+step() { echo "clean root: $*, at $SECONDS s"; }
+inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"; }
+
+if [ ! -e "$root/etc/debian_version" ]; then
+  step "debootstrap"
+  debootstrap --variant=minbase --include=ca-certificates,git bookworm "$root" "$mirror" >"$root.log" 2>&1 || { tail -20 "$root.log"; exit 1; }
+  rm -f "$root.log"
+fi
+cp /etc/resolv.conf "$root/etc/resolv.conf"
+mount -t proc proc "$root/proc"
+mount -t sysfs sys "$root/sys"
+mount --rbind /dev "$root/dev"
+inside apt-get update -qq
+
+step "install the package"
+cp "$source"/build/release/packages/abs-hil_*.deb "$root/tmp/"
+inside bash -c 'apt-get install -y -qq --no-install-recommends /tmp/abs-hil_*.deb >/tmp/install.log 2>&1 || { tail -20 /tmp/install.log; exit 1; }'
+step "run the installed program"
+inside abs_hil --backend sim --fast --no-lcm | grep -m 1 completed
+inside sh -c 'getent group abs_hil >/dev/null || { echo "the package made no group abs_hil"; exit 1; }'
+inside apt-get purge -y -qq abs-hil >/dev/null
+
+step "fresh clone"
+rm -rf "$root/root/abs_hil"
+git clone -q "file://$source" "$root/root/abs_hil"
+# A cache of compiled objects from outside is used where there is one: its path and what it holds change no result.
+if [ -n "${CCACHE_DIR:-}" ] || [ -d "$HOME/.cache/ccache" ]; then
+  mkdir -p "$root/root/.cache/ccache" "$root/root/.config/ccache"
+  mount --bind "${CCACHE_DIR:-$HOME/.cache/ccache}" "$root/root/.cache/ccache"
+fi
+step "first command: scripts/run.sh"
+inside bash -c 'cd /root/abs_hil && scripts/run.sh >/tmp/run.log 2>&1 || { tail -30 /tmp/run.log; exit 1; }; grep -m 1 "^completed" /tmp/run.log'
+step "second command: scripts/test.sh"
+inside bash -c 'cd /root/abs_hil && scripts/test.sh >/tmp/test.log 2>&1 || { tail -40 /tmp/test.log; exit 1; }; grep -E "tests passed|Skipped" /tmp/test.log'
+step "done"
