@@ -127,7 +127,7 @@ class Scratch:
         except subprocess.TimeoutExpired:
             return f'not over after {TIMEOUT_S} s'
         if printed is None:
-                told = re.search(r'#.*\bstatus (\d+)', command)
+            told = re.search(r'#.*\bstatus (\d+)', command)
             expected = int(told.group(1)) if told else 0
             return None if done.returncode == expected else f'status {done.returncode}:\n{done.stdout[-1500:]}'
         squeezed = ' '.join(done.stdout.split())

@@ -46,7 +46,9 @@ struct Injection {
 };
 
 /// "brake@encoder_upper:stuck+0.2s", in general
-///   PHASE@SIGNAL:KIND[=PARAMETER][+DELAY][~DURATION]
+///
+///     PHASE@SIGNAL:KIND[=PARAMETER][+DELAY][~DURATION]
+///
 /// with PHASE one of idle accelerate coast brake hold stopped any, times as 0.2s or 200ms. Throws
 /// std::invalid_argument, naming the part, what is allowed in its place and an example.
 [[nodiscard]] Injection parse_injection(std::string_view text);
