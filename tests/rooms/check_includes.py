@@ -23,6 +23,7 @@ MAY_KNOW = {
     'telemetry': {'rig', 'lcmtypes'},
     'analysis': {'rig'},
     'archive': set(),
+    'report': {'rig', 'analysis'},
     'diagnosis': {'rig', 'driver', 'runtime', 'telemetry'},
     'settings': {'rig', 'control', 'plant_sim', 'driver', 'runtime', 'experiment'},
     'app': {'control'},  # the program's public face; the program itself, apps/, knows everything
@@ -39,6 +40,7 @@ NEVER_INCLUDES = {
     'emulator': r'^(lcm|spdlog|nlohmann|toml\+\+|CLI)/',
     'runtime': r'^(lcm|boost|nlohmann|toml\+\+|CLI)/',
     'experiment': r'^(lcm|boost|CLI)/',
+    'report': r'^(lcm|spdlog|boost|CLI)/',
     'comparison': r'^(lcm|spdlog|boost|CLI)/',
 }
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abs_hil/report/figure.hpp"
+#include "abs_hil/report/run_files.hpp"
+#include "abs_hil/report/run_survey.hpp"
+#include "series.hpp"
+
+namespace abs_hil::report {
+
+/// By which a file is known as a page of ours.
+inline constexpr std::string_view page_mark = "<meta name=\"generator\" content=\"abs_report";
+
+/// A figure and its picture, ready to stand in the page.
+struct Picture {
+  const Figure* figure;
+  std::string svg;
+};
+
+struct PageContents {
+  std::string title{};
+  std::string version{};
+  const std::vector<RunFiles>* runs{nullptr};
+  const std::vector<RunSurvey>* surveys{nullptr};
+  std::vector<Picture> pictures{};
+  std::vector<std::string> general_notes{};
+  std::vector<SeriesStudy> studies{};
+  std::vector<std::string> study_names{};
+};
+
+/// A whole page around a body. @param body HTML
+[[nodiscard]] std::string page_around(const std::string& title, const std::string& version, const std::string& body);
+[[nodiscard]] std::string picture_html(const Picture& picture);
+[[nodiscard]] std::string section(const std::string& heading, const std::string& html);
+
+/// The general report.
+[[nodiscard]] std::string report_page(const PageContents& contents);
+/// The paper's comparison: run 0 in the adaptive controller's place, run 1 in the sliding mode's.
+[[nodiscard]] std::string paper_page(const PageContents& contents);
+
+}  // namespace abs_hil::report

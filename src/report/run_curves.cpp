@@ -1,0 +1,59 @@
+#include "abs_hil/report/run_curves.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "abs_hil/report/csv_reader.hpp"
+
+namespace abs_hil::report {
+
+namespace {
+
+/// As analysis::RunMetrics: below, the paper calls the performance "no longer relevant".
+constexpr double least_speed_m_s = 3.0;
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+struct Collector {
+  const Request* request;
+  std::size_t column;
+  std::size_t minus;
+  bool subtracts;
+  Envelope envelope;
+  Range relevant{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+};
+
+}  // namespace
+
+std::map<std::string, Course> read_curves(const RunFiles& run, const RunSurvey& survey,
+                                          const std::vector<Request>& requests, std::size_t most_stretches) {
+  CsvReader csv(run.csv);
+  std::vector<Collector> collectors;
+  for (const Request& request : requests) {
+    const bool subtracts = !request.minus.empty();
+    const std::size_t column = csv.column(request.column);
+    collectors.push_back(
+        {&request, column, subtracts ? csv.column(request.minus) : column, subtracts, Envelope(most_stretches)});
+  }
+  const std::size_t speed = csv.column(survey.knows("omega2_rad_s") ? "omega2_rad_s" : "omega2_est_rad_s");
+  while (csv.next()) {
+    const double time_s = csv.time_s();
+    const bool braking = csv.phase() == "brake";
+    const bool relevant = braking && survey.r2_m * csv.values()[speed] > least_speed_m_s;
+    for (Collector& c : collectors) {
+      if (time_s < c.request->window.from_s || time_s > c.request->window.to_s) continue;
+      double value = csv.values()[c.column];
+      if (c.subtracts) value -= csv.values()[c.minus];
+      if (c.request->braking_only && !braking) value = unknown;
+      c.envelope.add(time_s - c.request->window.zero_s, value);
+      if (relevant && std::isfinite(value)) {
+        c.relevant = {std::min(c.relevant.first, value), std::max(c.relevant.second, value)};
+      }
+    }
+  }
+  std::map<std::string, Course> courses;
+  for (const Collector& c : collectors) courses[c.request->name] = {c.envelope.points(), c.relevant};
+  return courses;
+}
+
+}  // namespace abs_hil::report

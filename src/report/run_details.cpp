@@ -1,0 +1,177 @@
+#include "run_details.hpp"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+#include "abs_hil/report/input_error.hpp"
+#include "abs_hil/report/text.hpp"
+
+namespace abs_hil::report {
+
+namespace {
+
+/// Side files are small; a larger one is something else, and reading it whole would take all memory.
+constexpr std::uintmax_t most_bytes = 64U << 20U;
+/// The greatest bin of a histogram that is believed, 10 s: more would take memory for nothing.
+constexpr std::uint64_t most_us = 10'000'000;
+constexpr std::size_t event_fields = 5;
+
+std::string read_text(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (!error && size > most_bytes) {
+    throw InputError(fmt::format("{}: {} bytes are too many for this kind of file", path.string(), size));
+  }
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  if (!file) {
+    throw InputError(fmt::format("cannot read \"{}\": {}", path.string(), std::strerror(errno != 0 ? errno : EIO)));
+  }
+  return text.str();
+}
+
+void flatten(const nlohmann::ordered_json& json, const std::string& prefix, std::map<std::string, std::string>& flat) {
+  for (const auto& [key, value] : json.items()) {
+    const std::string name = prefix + clean_text(key, 60);
+    if (value.is_object()) {
+      flatten(value, name + '.', flat);
+    } else {
+      flat[name] = clean_text(value.is_string() ? value.get<std::string>() : value.dump());
+    }
+  }
+}
+
+void flatten(const toml::table& table, const std::string& prefix, std::map<std::string, std::string>& flat) {
+  for (const auto& [key, value] : table) {
+    const std::string name = prefix + clean_text(key.str(), 60);
+    if (const toml::table* inner = value.as_table()) {
+      flatten(*inner, name + '.', flat);
+      continue;
+    }
+    std::ostringstream text;
+    if (const auto* string = value.as_string()) {
+      text << string->get();
+    } else if (const auto* number = value.as_floating_point()) {
+      text << nlohmann::ordered_json(number->get()).dump();  // written as in the summary, so that both compare
+    } else {
+      text << toml::node_view<const toml::node>(value);
+    }
+    flat[name] = clean_text(text.str());
+  }
+}
+
+/// Fields of a CSV line; in double quotes they may hold commas, and "" stands for ".
+std::vector<std::string> fields_of(const std::string& line) {
+  std::vector<std::string> fields(1);
+  bool quoted = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (line[i] == '"' && quoted && i + 1 < line.size() && line[i + 1] == '"') {
+      fields.back() += line[++i];
+    } else if (line[i] == '"') {
+      quoted = !quoted;
+    } else if (line[i] == ',' && !quoted) {
+      fields.emplace_back();
+    } else {
+      fields.back() += line[i];
+    }
+  }
+  return fields;
+}
+
+}  // namespace
+
+nlohmann::ordered_json read_json(const std::filesystem::path& path) {
+  try {
+    auto json = nlohmann::ordered_json::parse(read_text(path));
+    if (!json.is_object()) throw InputError(path, 1, "an object is expected");
+    return json;
+  } catch (const nlohmann::ordered_json::exception& error) {
+    throw InputError(fmt::format("{}: no valid JSON: {}", path.string(), clean_text(error.what())));
+  }
+}
+
+std::map<std::string, std::string> flattened(const nlohmann::ordered_json& json) {
+  std::map<std::string, std::string> flat;
+  flatten(json, "", flat);
+  return flat;
+}
+
+std::map<std::string, std::string> read_toml(const std::filesystem::path& path) {
+  try {
+    std::map<std::string, std::string> flat;
+    flatten(toml::parse(read_text(path)), "", flat);
+    return flat;
+  } catch (const toml::parse_error& error) {
+    throw InputError(path, error.source().begin.line, clean_text(error.description()));
+  }
+}
+
+std::vector<RunEvent> read_events(const std::filesystem::path& path) {
+  std::istringstream lines(read_text(path));
+  std::string line;
+  std::getline(lines, line);
+  if (!line.starts_with("time_s,event,phase,reason,value")) {
+    throw InputError(path, 1, "the header must begin with \"time_s,event,phase,reason,value\"");
+  }
+  std::vector<RunEvent> events;
+  for (std::size_t number = 2; std::getline(lines, line); ++number) {
+    const bool cut_off = lines.eof();  // no line end: what a crash leaves behind
+    const std::vector<std::string> fields = fields_of(line);
+    RunEvent event;
+    const bool complete = fields.size() >= event_fields;
+    const char* const begin = fields[0].data();
+    const auto parsed = std::from_chars(begin, begin + fields[0].size(), event.time_s);
+    if (!complete || parsed.ec != std::errc{} || parsed.ptr != begin + fields[0].size()) {
+      if (cut_off) break;
+      throw InputError(path, number, fmt::format("no event: \"{}\"", clean_text(line, 60)));
+    }
+    event.event = clean_text(fields[1], 40);
+    event.phase = clean_text(fields[2], 40);
+    event.reason = clean_text(fields[3]);
+    event.value = clean_text(fields[4], 40);
+    events.push_back(std::move(event));
+  }
+  return events;
+}
+
+TimingHistogram read_histogram(const std::filesystem::path& path) {
+  std::istringstream lines(read_text(path));
+  TimingHistogram histogram;
+  std::string line;
+  for (std::size_t number = 1; std::getline(lines, line); ++number) {
+    if (number == 1 && !line.starts_with("# abs_hil, us;")) {
+      throw InputError(path, 1, "this is no histogram of abs_hil: it must begin with \"# abs_hil, us;\"");
+    }
+    constexpr std::string_view overflow_title = "# Histogram Overflows:";
+    const bool overflow = line.starts_with(overflow_title);
+    if (line.empty() || (line.front() == '#' && !overflow)) continue;
+    std::istringstream fields(overflow ? line.substr(overflow_title.size()) : line);
+    std::uint64_t bin_us = 0;
+    if (!overflow) fields >> bin_us;
+    std::array<std::uint64_t, TimingHistogram::parts.size()> counts{};
+    for (std::uint64_t& count : counts) fields >> count;
+    if (!fields || bin_us > most_us) {
+      throw InputError(path, number, fmt::format("no line of a histogram: \"{}\"", clean_text(line, 60)));
+    }
+    for (std::size_t part = 0; part < counts.size(); ++part) {
+      if (overflow) {
+        histogram.overflows[part] = counts[part];
+        continue;
+      }
+      auto& bins = histogram.counts[part];
+      if (bins.size() <= bin_us) bins.resize(bin_us + 1, 0);
+      bins[bin_us] += counts[part];
+    }
+  }
+  return histogram;
+}
+
+}  // namespace abs_hil::report

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "abs_hil/report/run_files.hpp"
+
+/// The files beside a run's CSV, each read whole: they are small. All throw InputError for a file that cannot be read.
+namespace abs_hil::report {
+
+[[nodiscard]] nlohmann::ordered_json read_json(const std::filesystem::path& path);
+/// Keys dotted, values as text. @param json an object
+[[nodiscard]] std::map<std::string, std::string> flattened(const nlohmann::ordered_json& json);
+[[nodiscard]] std::map<std::string, std::string> read_toml(const std::filesystem::path& path);
+[[nodiscard]] std::vector<RunEvent> read_events(const std::filesystem::path& path);
+[[nodiscard]] TimingHistogram read_histogram(const std::filesystem::path& path);
+
+}  // namespace abs_hil::report

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "abs_hil/report/run_files.hpp"
+#include "abs_hil/report/run_survey.hpp"
+
+/// Parts of the page as HTML; empty where there is nothing to show.
+namespace abs_hil::report {
+
+[[nodiscard]] std::string metrics_table(const std::vector<RunFiles>& runs, const std::vector<RunSurvey>& surveys);
+[[nodiscard]] std::string timing_table(const std::vector<RunFiles>& runs);
+[[nodiscard]] std::string differences_table(const std::vector<RunFiles>& runs);
+[[nodiscard]] std::string events_table(const std::vector<RunFiles>& runs, const std::vector<RunSurvey>& surveys);
+[[nodiscard]] std::string environment_table(const std::vector<RunFiles>& runs);
+[[nodiscard]] std::string notes_list(const std::vector<RunFiles>& runs, const std::vector<RunSurvey>& surveys,
+                                     const std::vector<std::string>& general);
+
+}  // namespace abs_hil::report
