@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The tests: sets up, builds and runs ctest on one preset (default: release); further arguments go to ctest. Where
 # CI=true or ABS_HIL_REQUIRE_VM=1 the tests in a virtual machine must not be skipped, and what they need is installed;
-# where CI=true, what the tests of abs-spy and of LCM's Python module need as well.
+# where CI=true, what the tests of abs-spy, of LCM's Python module and of abs_report need as well.
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
 
@@ -9,6 +9,10 @@ preset=${1:-release}
 [ $# -gt 0 ] && shift
 scripts/setup.sh
 if [ "${CI:-}" = true ] || [ "${ABS_HIL_REQUIRE_VM:-}" = 1 ]; then scripts/setup.sh packages-vm.txt; fi
-if [ "${CI:-}" = true ]; then scripts/setup.sh packages-spy.txt; scripts/setup_lcm_python.sh; fi
+if [ "${CI:-}" = true ]; then
+  scripts/setup.sh packages-spy.txt
+  scripts/setup.sh packages-report.txt
+  scripts/setup_lcm_python.sh
+fi
 scripts/build.sh "$preset"
 ctest --preset "$preset" -j "$(nproc)" "$@"

@@ -40,9 +40,11 @@ Axis axis_around(Range range, int wanted) {
     const double steps = value / step;
     return step * (direction < 0.0 ? std::floor(steps) : std::ceil(steps));
   };
-  // Zero stays the end of an axis that begins there.
-  const double low = range.first >= 0.0 && range.first < margin ? 0.0 : range.first - margin;
-  return {rounded(low, -1.0), rounded(range.second + margin, 1.0), step};
+  const double high = rounded(range.second + margin, 1.0);
+  // Zero stays the end of an axis that begins there, and a hair below it is no whole step.
+  if (range.first >= 0.0 && range.first < margin) return {0.0, high, step};
+  if (range.first < 0.0 && range.first > -2.0 * margin) return {range.first - 0.5 * margin, high, step};
+  return {rounded(range.first - margin, -1.0), high, step};
 }
 
 Range values_within(const Panel& panel, Range x) {

@@ -213,12 +213,16 @@ class FigureMaker {
   [[nodiscard]] Figure speed_figure(const std::string& id, const std::string& heading, const std::string& quantity,
                                     int wheel) const {
     Figure figure = begin(id, heading, estimated_note(fmt::format("omega{}_rad_s", wheel)));
+    if (wheel == 1) {
+      figure.caption += " In this and the following figures the background is grey outside braking";
+      figure.caption += runs_.size() == 1 ? "." : fmt::format(" of {}.", runs_.front().name);
+    }
     Panel panel{.y_label = fmt::format("{{/:Italic ω}}_{} / (rad/s)", wheel), .height_px = 240.0};
-    add_all(panel, quantity);
     if (runs_.size() == 1 && truth_everywhere(fmt::format("omega{}_rad_s", wheel))) {
-      add_curve(panel, 0, quantity + "_est", second_style());
+      add_curve(panel, 0, quantity + "_est", second_style());  // on top: dashed, so that the other shows through
       figure.legend = {{"wheel", style(0), Drawn::line}, {"estimate", second_style(), Drawn::line}};
     }
+    add_all(panel, quantity);
     figure.panels.push_back(std::move(panel));
     return figure;
   }

@@ -18,8 +18,8 @@ struct RunEvent {
   std::string phase{};
   std::string reason{};
   std::string value{};
-  /// Neither a change of phase nor something else that belongs to every run.
-  [[nodiscard]] bool unusual() const { return event != "phase"; }
+  /// Neither a change of phase nor the regular end, which every run has.
+  [[nodiscard]] bool unusual() const { return event != "phase" && !(event == "limit" && phase == "stopped"); }
 };
 
 /// Cycles counted by how long a part of them took, as abs_hil --histogram writes them.

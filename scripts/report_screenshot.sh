@@ -1,0 +1,22 @@
+#!/usr/bin/env bash
+# Makes docs/figures/report.png: part of abs_report's page of two runs of the paper's experiment, as a browser shows it.
+# usage: scripts/report_screenshot.sh [PICTURE.png]      (needs build/release, or ABS_BIN=FOLDER of the programs)
+set -euo pipefail
+cd "$(dirname "$(realpath "$0")")/.."
+picture=$(realpath "${1:-docs/figures/report.png}")
+programs=${ABS_BIN:-build/release/bin}
+[ -x "$programs/abs_report" ] || { echo "$0: $programs/abs_report is missing: run scripts/build.sh first" >&2; exit 3; }
+command -v chromium >/dev/null ||
+  { echo "$0: chromium is missing: scripts/setup.sh packages-report.txt" >&2; exit 3; }
+data=$(mktemp -d)
+trap 'rm -r "$data"' EXIT
+
+for controller in adaptive sliding-mode; do
+  "$programs/abs_hil" --backend sim --fast --no-lcm --controller "$controller" --out "$data/$controller" >/dev/null
+done
+"$programs/abs_report" "$data/adaptive" "$data/sliding-mode" --output "$data/report.html" >/dev/null
+# From figure 7 on: slip, torque, the estimate of theta.
+chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --user-data-dir="$data/profile" \
+  --force-device-scale-factor=1.4 --window-size=900,1420 --screenshot="$picture" "file://$data/report.html#figure-fig7" \
+  >/dev/null 2>&1
+echo "$picture"

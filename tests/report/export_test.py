@@ -1,0 +1,93 @@
+"""The exports hold the rows as they are, and the examples that load them in Octave and Python get the summary's figures."""
+import csv
+import io
+import json
+import math
+import os
+import pathlib
+import shutil
+import struct
+import subprocess
+import sys
+import unittest
+
+from program import MUST_NOT_SKIP, ReportTest
+
+EXAMPLES = pathlib.Path(__file__).resolve().parents[2] / 'examples' / 'load_run'
+
+
+class Export(ReportTest):
+    def setUp(self):
+        super().setUp()
+        self.runs = [self.make_run(name, '--controller', name) for name in ('adaptive', 'locked')]
+
+    def expected_line(self, run):
+        s = self.summary(run)
+        return (f'{run.name} ({s["controller"]}): stop time {s["stop_time_s"]:.3f} s, distance '
+                f'{s["stop_distance_m"]:.3f} m, slip RMS error {s["slip_rms"]:.5f}')
+
+    def test_csv_is_all_rows_bit_by_bit(self):
+        rows = list(csv.DictReader(io.StringIO(self.report('--csv', *self.runs).stdout.decode())))
+        original = [{'run': run.name, **row} for run in self.runs for row in self.rows(run)]
+        self.assertEqual(len(rows), len(original))
+        for row, wanted in zip(rows, original):
+            self.assertEqual((row['run'], row['phase']), (wanted['run'], wanted['phase']))
+            for column in ('time_s', 'slip', 'theta_est_N', 'distance_m', 'motor_enable'):
+                self.assertEqual(struct.pack('d', float(row[column])), struct.pack('d', float(wanted[column])))
+
+    def test_columns_are_chosen(self):
+        lines = self.report('--csv', '--columns', 'time_s,slip', self.runs[0]).stdout.decode().splitlines()
+        self.assertEqual(lines[0], 'run,time_s,slip')
+        said = self.report('--csv', '--columns', 'time_s,slope', self.runs[0], status=2).stderr.decode()
+        self.assertIn('no column "slope"', said)
+
+    def test_json(self):
+        data = json.loads(self.report('--json', *self.runs).stdout)
+        self.assertEqual([run['name'] for run in data['runs']], ['adaptive', 'locked'])
+        for run, folder in zip(data['runs'], self.runs):
+            rows = self.rows(folder)
+            self.assertEqual(run['columns']['phase'], [row['phase'] for row in rows])
+            self.assertEqual(run['columns']['slip'], [float(row['slip']) for row in rows])
+            theta = [float(row['theta_est_N']) for row in rows]
+            self.assertEqual(run['columns']['theta_est_N'], [None if math.isnan(v) else v for v in theta])
+            self.assertEqual(run['summary'], self.summary(folder))
+
+    def test_python_example(self):
+        (self.folder / 'runs.json').write_bytes(self.report('--json', *self.runs).stdout)
+        said = subprocess.run([sys.executable, EXAMPLES / 'load_run.py', self.folder / 'runs.json'], check=True,
+                              capture_output=True, text=True).stdout
+        self.assertEqual(said.splitlines(), [self.expected_line(run) for run in self.runs])
+
+    def test_octave_example(self):
+        if not shutil.which('octave'):
+            self.assertFalse(MUST_NOT_SKIP, 'octave is missing: scripts/setup.sh packages-report.txt')
+            self.skipTest('octave is missing: scripts/setup.sh packages-report.txt installs it')
+        self.report('--octave', *self.runs, '--output', 'runs.mat')
+        octave = ['octave', '--quiet', '--no-gui', '--no-history']
+        environment = {**os.environ, 'HOME': str(self.folder)}
+        said = subprocess.run([*octave, EXAMPLES / 'load_run.m', self.folder / 'runs.mat'], check=True,
+                              capture_output=True, text=True, env=environment).stdout
+        self.assertEqual(said.splitlines(), [self.expected_line(run) for run in self.runs])
+        check = ("d = load('runs.mat'); for k = 1:2; r = d.runs(k); "
+                 "printf('%d %.17g %.17g %d %s\\n', numel(r.time_s), sum(r.slip), r.distance_m(end), "
+                 "sum(isnan(r.theta_est_N)), strjoin(r.phase_names, ' ')); end")
+        lines = subprocess.run([*octave, '--eval', check], check=True, capture_output=True, text=True, cwd=self.folder,
+                               env=environment).stdout.splitlines()
+        for line, folder in zip(lines, self.runs):
+            rows = self.rows(folder)
+            count, slips, distance, unknown, *phases = line.split()
+            self.assertEqual(int(count), len(rows))
+            self.assertAlmostEqual(float(slips), math.fsum(float(row['slip']) for row in rows), delta=1e-9)
+            self.assertEqual(float(distance), float(rows[-1]['distance_m']))
+            self.assertEqual(int(unknown), sum(math.isnan(float(row['theta_est_N'])) for row in rows))
+            self.assertEqual(phases, list(dict.fromkeys(row['phase'] for row in rows)))
+
+    def test_nothing_is_overwritten(self):
+        (self.folder / 'x.csv').write_text('precious')
+        self.assertIn('exists', self.report('--csv', self.runs[0], '--output', 'x.csv', status=2).stderr.decode())
+        self.assertEqual((self.folder / 'x.csv').read_text(), 'precious')
+        self.assertIn('--csv', self.report('--csv', '--json', self.runs[0], status=2).stderr.decode())
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,221 @@
+"""abs_report on runs of abs_hil: what the page holds, and what it makes of broken, incomplete and hostile runs."""
+import json
+import os
+import shutil
+import unittest
+
+from page_reader import PageReader
+from program import ReportTest, need
+
+FIGURES = ['course', 'fig5', 'fig6', 'fig7', 'fig8', 'fig9', 'fig10']
+TRUTH = ('omega1_rad_s', 'omega2_rad_s', 'slip', 'brake_torque_Nm', 'theta_N')
+need('gnuplot', 'gnuplot-nox')
+
+
+class Page(ReportTest):
+    def test_two_runs(self):
+        a = self.make_run('a', '--controller', 'adaptive')
+        b = self.make_run('b', '--controller', 'sliding-mode')
+        page, _ = self.page(a, b)
+        read = PageReader(page)
+        self.assertEqual(list(read.figures), FIGURES)
+        summaries = [self.summary(a), self.summary(b)]
+        for run, summary in enumerate(summaries, 1):
+            self.assertEqual(read.cell('metrics', 'stop time / s', run), f'{summary["stop_time_s"]:.3f}')
+            self.assertEqual(read.cell('metrics', 'stop distance / m', run), f'{summary["stop_distance_m"]:.2f}')
+            self.assertEqual(read.cell('metrics', 'slip RMS error', run), f'{summary["slip_rms"]:.4f}')
+        change = 100.0 * (summaries[1]['stop_time_s'] / summaries[0]['stop_time_s'] - 1.0)
+        self.assertEqual(read.cell('metrics', 'stop time / s', 3), f'{change:+.1f} %'.replace('-', '−'))
+        differences = {line[0]: line[1:] for line in read.tables['differences'][1:]}
+        self.assertEqual(differences, {'control.controller': ['adaptive', 'sliding-mode']})
+        self.assertNotIn('script', read.elements)
+        self.assertNotIn('://', page.replace('http://www.w3.org/', ''), 'the page must not need a network')
+
+    def test_the_same_page_twice(self):
+        a = self.make_run('a')
+        self.assertEqual(self.page(a)[0], self.page(a)[0])
+
+    def test_csv_alone_gives_the_summarys_figures(self):
+        a = self.make_run('a')
+        summary = self.summary(a)
+        shutil.copy(a / 'run.csv', self.folder / 'alone.csv')
+        page, said = self.page(self.folder / 'alone.csv')
+        self.assertIn('a CSV file alone', said)
+        read = PageReader(page)
+        self.assertEqual(list(read.figures), FIGURES)
+        for row, key, decimals in (('stop time / s', 'stop_time_s', 3), ('stop distance / m', 'stop_distance_m', 2),
+                                   ('slip RMS error', 'slip_rms', 4), ('slip overshoot', 'slip_overshoot', 4),
+                                   ('estimate of θ at 3 m/s / N', 'theta_final_N', 2),
+                                   ('variation of torque asked for / (N m)', 'torque_total_variation_Nm', 1)):
+            self.assertEqual(read.cell('metrics', row), f'{summary[key]:.{decimals}f}')
+
+    def test_rig_run_without_truth(self):
+        a = self.make_run('a')
+
+        def forget(row):
+            for column in TRUTH:
+                row[column] = 'NaN'
+        self.rewrite(a, forget)
+        page, _ = self.page(a)
+        read = PageReader(page)
+        self.assertEqual(list(read.figures), FIGURES)
+        self.assertEqual(read.cell('metrics', 'speeds and slip'), 'estimates')
+        self.assertIn('Estimated from the encoders', page)
+        self.assertIn('know no true θ', page)
+        self.assertEqual([curve['quantity'] for curve in read.figures['fig9']], ['theta_est'])
+        rows = [row for row in self.rows(a) if row['phase'] == 'brake']
+        self.assertGreaterEqual(read.curve('fig7', 'a', 1)['said'], len(rows) - 2)
+
+    def test_missing_and_broken_side_files_are_said(self):
+        a = self.make_run('a')
+        os.remove(a / 'events.csv')
+        (a / 'environment.json').write_text('{"kernel": ')
+        page, said = self.page(a)
+        self.assertIn('no events.csv', said)
+        self.assertIn('environment.json: no valid JSON', said)
+        self.assertIn('no events.csv', page)
+
+    def test_run_without_braking_shows_all_of_it(self):
+        a = self.make_run('a')
+        self.rewrite(a, lambda row: row.update(phase='coast'))
+        read = PageReader(self.page(a)[0])
+        self.assertEqual(list(read.figures), FIGURES)
+        self.assertEqual(read.curve('fig10', 'a', 1)['run'], 1)
+
+    def test_fault_stands_on_the_time_axis_and_in_the_table(self):
+        a = self.make_run('a')
+
+        def fault(row):
+            if float(row['time_s']) > 7.0:
+                row['phase'] = 'fault'
+        self.rewrite(a, fault)
+        events = (a / 'events.csv').read_text().splitlines()
+        (a / 'events.csv').write_text('\n'.join([*events[:4], '7.0,fault,fault,"wheel speed, above the limit",251.5', '']))
+        page, _ = self.page(a)
+        read = PageReader(page)
+        self.assertEqual([line for line in read.tables['events'] if line[2] == 'fault'],
+                         [['7.000', 'a', 'fault', 'fault', 'wheel speed, above the limit', '251.5']])
+        self.assertEqual([c['drawn'] for c in read.figures['course'] if c['quantity'] == 'events'], [1])
+        self.assertIn('>fault<', page)
+
+    def test_summary_of_another_run_is_noticed(self):
+        a, b = self.make_run('a'), self.make_run('b', '--controller', 'locked')
+        shutil.copy(b / 'summary.json', a / 'summary.json')
+        self.assertIn('stop_time_s: the summary says', self.page(a)[1])
+
+    def test_hostile_names_stay_text(self):
+        a = self.make_run('a')
+        name = '<img src=x onerror=alert(1)>\'"`touch pwned`$(touch pwned)&'
+        hostile = self.folder / name
+        a.rename(hostile)
+        summary = self.summary(hostile)
+        for key in ('controller', 'plant', 'experiment', 'reason', 'result', 'backend'):
+            summary[key] = '</table><script>alert(1)</script>'
+        summary['config']['<script>'] = '<svg onload=alert(1)>'
+        (hostile / 'summary.json').write_text(json.dumps(summary))
+        (hostile / 'events.csv').write_text('time_s,event,phase,reason,value\n1,<b>,<i>,"<u>",<s>\n')
+        self.rewrite(hostile, lambda row: row.update(phase='<q>' if row['phase'] == 'hold' else row['phase']))
+        page, _ = self.page(hostile, self.make_run('b'), '--title', '<h6>')
+        read = PageReader(page)
+        self.assertEqual(list(read.figures), FIGURES)
+        for tag in ('script', 'img', 'b', 'i', 'u', 's', 'q', 'h6'):
+            self.assertEqual(read.elements.get(tag, 0), len(read.figures) if tag == 'b' else 0, tag)
+        self.assertFalse((self.folder / 'pwned').exists())
+
+    def test_paper(self):
+        a, b = self.make_run('a', '--controller', 'adaptive'), self.make_run('b', '--controller', 'sliding-mode')
+        read = PageReader(self.page('--paper', b, a)[0])
+        self.assertEqual(list(read.figures), FIGURES[1:])
+        ours = 100.0 * (self.summary(a)['stop_time_s'] / self.summary(b)['stop_time_s'] - 1.0)
+        self.assertEqual(read.cell('claims', 'stop time, adaptive against sliding mode', 1), '−6.7 %')
+        self.assertEqual(read.cell('claims', 'stop time, adaptive against sliding mode', 2),
+                         f'{ours:+.1f} %'.replace('-', '−'))
+        self.assertIn('--paper compares two runs', self.report('--paper', a, status=2).stderr.decode())
+
+
+class Series(ReportTest):
+    def test_means_over_what_was_varied(self):
+        series = self.folder / 'series'
+        stops = {}
+        for number in range(1, 7):
+            theta = (20, 23, 26)[(number - 1) % 3]
+            folder = self.make_run(f'series/run-{number:04}', '--set', f'plant.theta_N={theta}', '--seed', str(number))
+            stops.setdefault(theta, []).append(self.summary(folder)['stop_time_s'])
+        (series / 'series.json').write_text('{}')
+        (series / 'run-0007').mkdir()
+        page, said = self.page(series)
+        self.assertIn('run-0007 has not finished', said)
+        read = PageReader(page)
+        self.assertEqual(list(read.figures), ['series1', *FIGURES])
+        lines = [line for line in read.tables['series'][1:] if line[1] == 'stop time / s']
+        self.assertEqual([line[0] for line in lines], ['theta_N = 20.0', 'theta_N = 23.0', 'theta_N = 26.0'])
+        for line, (_, times) in zip(lines, sorted(stops.items())):
+            mean = sum(times) / 2.0
+            self.assertEqual(line[2:4], ['2', f'{mean:.4f}'])
+            half = 12.7062 * abs(times[0] - times[1]) / 2.0  # t(0.975, 1) s / sqrt(2)
+            low, high = (float(end.replace('−', '-')) for end in line[5].split(' to '))
+            self.assertAlmostEqual(low, mean - half, delta=2e-4)
+            self.assertAlmostEqual(high, mean + half, delta=2e-4)
+        every = [c for c in read.figures['series1'] if c['quantity'] == 'stop_time_s']
+        self.assertEqual([(c['said'], c['drawn']) for c in every], [(6, 6)])
+        self.assertEqual(len([c for c in read.figures['fig5'] if c['quantity'] == 'omega1']), 6)
+
+
+class Files(ReportTest):
+    def test_report_stands_here_and_replaces_only_reports(self):
+        a = self.make_run('a')
+        self.report(a)
+        self.assertGreater((self.folder / 'report.html').stat().st_size, 50_000)
+        self.report(a)
+        (self.folder / 'thesis.html').write_text('<html>years of work</html>')
+        said = self.report(a, '--output', 'thesis.html', status=2).stderr.decode()
+        self.assertIn('is no report of abs_report', said)
+        self.assertEqual((self.folder / 'thesis.html').read_text(), '<html>years of work</html>')
+        self.report(a, '--output', 'thesis.html', '--force')
+
+    def test_figures_as_files(self):
+        a = self.make_run('a')
+        for kind, magic in (('svg', b'<?xml'), ('png', b'\x89PNG'), ('pdf', b'%PDF')):
+            self.report(a, '--figures', kind, '--format', kind, '--output', f'{kind}.html')
+            files = {path.stem: path for path in (self.folder / kind).iterdir()}
+            self.assertEqual(sorted(files), sorted(FIGURES))
+            for path in files.values():
+                self.assertEqual(path.read_bytes()[:len(magic)], magic)
+        self.assertIn('exists', self.report(a, '--figures', 'svg', status=2).stderr.decode())
+
+    def test_bad_input(self):
+        a = self.make_run('a')
+        lines = (a / 'run.csv').read_text().splitlines(keepends=True)
+        broken = self.folder / 'broken.csv'
+        for text, says in (
+                ([], 'broken.csv:1: the file is empty'),
+                (lines[:1], 'broken.csv:1: no rows after the header'),
+                ([lines[0], lines[1][:9]], 'broken.csv:2: the only row is cut off'),
+                ([*lines[:50], 'garbage\n', *lines[50:]], 'broken.csv:51: time_s: "garbage" is not a number'),
+                ([*lines[:50], *lines[20:]], 'broken.csv:51: time_s goes back'),
+                (['time_s,phase\n', '0,idle\n'], 'broken.csv:1: the header lacks omega1_rad_s'),
+                (['\x7fELF\x01\x01\x00' * 30_000], 'broken.csv:1: ')):
+            broken.write_text(''.join(text))
+            self.assertIn(says, self.report(broken, status=2).stderr.decode())
+            self.assertFalse((self.folder / 'report.html').exists())
+        (self.folder / 'empty').mkdir()
+        for args, says in (((self.folder / 'empty',), 'neither a run\'s folder'), (('nowhere',), 'does not exist'),
+                           ((), 'RUN'), ((a, '--window', '3:2'), '--window 3:2'), ((a, '--format', 'gif'), '--format'),
+                           ((a, '--label', 'x', '--label', 'y'), '2 labels for 1 runs'),
+                           ((a, '--columns', 'slip'), '--columns')):
+            self.assertIn(says, self.report(*args, status=2).stderr.decode())
+
+    def test_row_cut_off_by_a_crash_is_left_out_and_said(self):
+        a = self.make_run('a')
+        text = (a / 'run.csv').read_text()
+        (a / 'run.csv').write_text(text[:len(text) // 10 * 9])
+        self.assertIn('is cut off, as after a crash', self.page(a)[1])
+
+    def test_without_gnuplot(self):
+        a = self.make_run('a')
+        said = self.report(a, status=3, env={'PATH': str(self.folder)}).stderr.decode()
+        self.assertIn('apt-get install gnuplot-nox', said)
+
+
+if __name__ == '__main__':
+    unittest.main()
