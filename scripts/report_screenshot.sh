@@ -15,8 +15,10 @@ for controller in adaptive sliding-mode; do
   "$programs/abs_hil" --backend sim --fast --no-lcm --controller "$controller" --out "$data/$controller" >/dev/null
 done
 "$programs/abs_report" "$data/adaptive" "$data/sliding-mode" --output "$data/report.html" >/dev/null
-# From figure 7 on: slip, torque, the estimate of theta.
+# Two of the page's figures: slip and torque.
+hidden='h1, h2, p, footer, details, .wide, #notes, figure:not(#figure-fig7):not(#figure-fig8)'
+sed -i "s|</head>|<style>$hidden { display: none } body { margin: 0 auto } figure { margin: 0 0 1.4em }</style></head>|" \
+  "$data/report.html"
 chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --user-data-dir="$data/profile" \
-  --force-device-scale-factor=1.4 --window-size=900,1420 --screenshot="$picture" "file://$data/report.html#figure-fig7" \
-  >/dev/null 2>&1
+  --force-device-scale-factor=1.4 --window-size=900,1105 --screenshot="$picture" "file://$data/report.html" >/dev/null 2>&1
 echo "$picture"
