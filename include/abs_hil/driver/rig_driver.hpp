@@ -53,6 +53,8 @@ class RigDriver {
   [[nodiscard]] virtual rig::PlantTruth truth() const noexcept { return {}; }
   /// What `configure` found out about the board, a line each, for the log. Empty before it, and from a simulator.
   [[nodiscard]] virtual std::vector<std::string> notes() const { return {}; }
+  /// What the run's traffic came to, a line each, for the log after a run. Empty from backends that count none.
+  [[nodiscard]] virtual std::vector<std::string> tally() const { return {}; }
   /// All that the configured board lets itself be asked without anything being written, a line each, for people.
   [[nodiscard]] virtual std::vector<std::string> inspection() { return {}; }
 

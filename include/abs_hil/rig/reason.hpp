@@ -35,6 +35,21 @@ enum class Reason : std::uint16_t {
   board_supply_tripped = 80,
   board_supply_low = 81,
   board_too_hot = 82,
+  can_node_silent = 100,
+  can_frames_stale = 101,
+  can_frames_duplicated = 102,
+  can_frames_out_of_order = 103,
+  can_frame_wrong_length = 104,
+  can_frames_forged = 105,
+  can_values_implausible = 106,
+  can_too_many_frames = 107,
+  can_send_queue_full = 108,
+  can_bus_off = 109,
+  can_error_passive = 110,
+  can_interface_down = 111,
+  can_node_latched = 112,
+  can_node_restarted = 113,
+  can_outputs_not_taken = 114,
   usb_unplugged = 120,
   usb_stalled = 121,
   usb_short_frame = 122,
@@ -71,6 +86,21 @@ enum class Reason : std::uint16_t {
     case Reason::board_supply_tripped: return "the board's own interlock tripped: supply undervoltage";
     case Reason::board_supply_low: return "the board's supply is below gate.supply_min_V";
     case Reason::board_too_hot: return "the board is hotter than gate.temperature_max_C";
+    case Reason::can_node_silent: return "CAN node did not answer too often: its watchdog takes the outputs to zero";
+    case Reason::can_frames_stale: return "CAN node answers with old sequence numbers";
+    case Reason::can_frames_duplicated: return "CAN frames come twice: two nodes, or one that repeats itself";
+    case Reason::can_frames_out_of_order: return "CAN frames come out of order or ahead of what was asked";
+    case Reason::can_frame_wrong_length: return "CAN frames have the wrong length";
+    case Reason::can_frames_forged: return "CAN frames with the node's identifiers are not the node's (wrong check)";
+    case Reason::can_values_implausible: return "CAN node sends values that cannot be";
+    case Reason::can_too_many_frames: return "CAN frames come faster than they can be read";
+    case Reason::can_send_queue_full: return "CAN interface takes no more frames: the bus is blocked";
+    case Reason::can_bus_off: return "CAN controller is bus-off";
+    case Reason::can_error_passive: return "CAN controller is error-passive";
+    case Reason::can_interface_down: return "CAN interface is down or gone";
+    case Reason::can_node_latched: return "CAN node has cut its outputs by itself";
+    case Reason::can_node_restarted: return "CAN node was restarted or replaced";
+    case Reason::can_outputs_not_taken: return "CAN node does not apply the duties that were sent";
     case Reason::usb_unplugged: return "USB board unplugged: its outputs hold, press the E-stop";
     case Reason::usb_stalled: return "USB board refused a transfer (STALL)";
     case Reason::usb_short_frame: return "USB board sent a frame of the wrong length";

@@ -30,6 +30,8 @@ class Bench {
   [[nodiscard]] virtual bool has_registers() const { return true; }
   /// From now on the brake output does not take what is written; false if this backend cannot fail so.
   [[nodiscard]] virtual bool break_brake_output() = 0;
+  /// Cycles until such a failure shows in `read`; 0: `write` itself reads back.
+  [[nodiscard]] virtual int read_back_cycles() const { return 0; }
 };
 
 /// Made by each backend's own file. Returns null, having said why, where it cannot be had.

@@ -173,8 +173,18 @@ TEST_CASE("An output that does not take its value is found, and the other output
     return;
   }
   const rig::Command both{.motor_duty = 0.5, .brake_duty = 0.6, .motor_enable = true};
-  CHECK(bench->driver().write(both).error == IoError::read_back_mismatch);
-  CHECK(bench->driver().state() == DriverState::failed);
+  driver::IoResult result = bench->driver().write(both);
+  if (bench->read_back_cycles() == 0) {
+    CHECK(bench->driver().state() == DriverState::failed);
+  } else {
+    // What the board applies comes with its answers. A failed read leaves the driver active, the drive at 0.
+    REQUIRE(result.ok());
+    rig::Measurement measurement;
+    for (int i = 1; i <= bench->read_back_cycles() && result.ok(); ++i)
+      result = bench->driver().read(i * ms, measurement);
+    CHECK(bench->driver().state() == DriverState::active);
+  }
+  CHECK(result.error == IoError::read_back_mismatch);
   CHECK(bench->wire().drive_duty == 0.0);
 }
 

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+namespace abs_hil::driver::can {
+
+/// Leaky bucket: single losses are borne, sustained loss trips. Latches until `reset`.
+class LossBucket {
+ public:
+  constexpr LossBucket(std::int32_t cost, std::int32_t relief, std::int32_t limit) noexcept
+      : cost_(cost), relief_(relief), limit_(limit) {}
+
+  constexpr void lost() noexcept {
+    level_ = std::min(level_ + cost_, limit_);
+    if (level_ >= limit_) tripped_ = true;
+  }
+  constexpr void good() noexcept { level_ = std::max(level_ - relief_, 0); }
+  constexpr void reset() noexcept {
+    level_ = 0;
+    tripped_ = false;
+  }
+  [[nodiscard]] constexpr bool tripped() const noexcept { return tripped_; }
+  [[nodiscard]] constexpr std::int32_t level() const noexcept { return level_; }
+
+ private:
+  std::int32_t cost_;
+  std::int32_t relief_;
+  std::int32_t limit_;
+  std::int32_t level_{0};
+  bool tripped_{false};
+};
+
+}  // namespace abs_hil::driver::can

@@ -1,0 +1,242 @@
+// The life of the driver: options, handshake with the node, commands.
+
+#include "abs_hil/driver/can/can_driver.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "abs_hil/driver/can/bus_load.hpp"
+#include "abs_hil/driver/can/signal_codec.hpp"
+
+namespace abs_hil::driver::can {
+
+namespace {
+
+constexpr std::int64_t ns_per_us = 1000;
+constexpr std::int64_t handshake_timeout_ns = 20'000'000;
+constexpr int handshake_attempts = 3;
+/// The emulator's answer in lock-step may take as long as its computer likes: time stands still.
+constexpr std::int64_t lock_step_timeout_ns = 1'000'000'000;
+/// Of the period: the rest is for the controller and the command.
+constexpr double answer_share = 0.6;
+constexpr double most_answer_share = 0.8;
+
+bool is_duty(double value) noexcept { return value >= 0.0 && value <= 1.0; }  // false for NaN
+
+void check_sign(const char* key, std::int32_t sign) {
+  if (sign == 1 || sign == -1) return;
+  throw std::invalid_argument(std::string(key) + " = " + std::to_string(sign) + ": give 1 or -1");
+}
+
+std::int64_t answer_timeout_ns(const CanOptions& options, bool lock_step) {
+  const double period_ns = 1e9 / options.rate_Hz;
+  const std::int64_t timeout_ns = options.answer_timeout_us * ns_per_us;
+  if (lock_step) return timeout_ns > 0 ? timeout_ns : lock_step_timeout_ns;
+  if (timeout_ns == 0) return static_cast<std::int64_t>(answer_share * period_ns);
+  if (timeout_ns < 0 || static_cast<double>(timeout_ns) > most_answer_share * period_ns) {
+    throw std::invalid_argument("driver.can.answer_timeout_us = " + std::to_string(options.answer_timeout_us) +
+                                ": give at most " +
+                                std::to_string(static_cast<std::int64_t>(most_answer_share * period_ns) / ns_per_us) +
+                                " us, 80 % of the period, or 0");
+  }
+  return timeout_ns;
+}
+
+}  // namespace
+
+CanDriver::CanDriver(const CanOptions& options, OpenLink open_link, bool lock_step)
+    : options_(options),
+      open_link_(std::move(open_link)),
+      lock_step_(lock_step),
+      answer_timeout_ns_(answer_timeout_ns(options, lock_step)),
+      bucket_(options.loss_cost, options.loss_relief, options.loss_limit) {
+  check_sign("driver.can.upper_sign", options.upper_sign);
+  check_sign("driver.can.lower_sign", options.lower_sign);
+}
+
+CanDriver::~CanDriver() { static_cast<void>(deactivate()); }
+
+Frame CanDriver::in_format(Frame frame) const noexcept {
+  frame.fd = fd_;
+  return frame;
+}
+
+bool CanDriver::await(bool (CanDriver::*heard)(const NodeMessage&) noexcept, std::int64_t timeout_ns) noexcept {
+  const std::int64_t deadline_ns = monotonic_ns() + timeout_ns;
+  constexpr int most_frames = 1000;  // a babbling bus must not hold the handshake up for ever
+  Frame frame;
+  for (int i = 0; i < most_frames; ++i) {
+    const ReceiveOutcome outcome = link_.socket->receive(frame, deadline_ns).outcome;
+    if (outcome == ReceiveOutcome::malformed) continue;
+    if (outcome != ReceiveOutcome::frame) return false;
+    const Decoded decoded = decode(frame);
+    if (decoded.error == DecodeError::none && (this->*heard)(decoded.message)) return true;
+  }
+  return false;
+}
+
+bool CanDriver::hears_identity(const NodeMessage& message) noexcept {
+  const auto* identity = std::get_if<IdentityMessage>(&message);
+  if (identity == nullptr) return false;
+  identity_ = *identity;
+  return true;
+}
+
+bool CanDriver::hears_safe(const NodeMessage& message) noexcept {
+  if (const auto* status = std::get_if<StatusMessage>(&message)) heard_state_ = status->state == NodeState::inactive;
+  if (const auto* outputs = std::get_if<OutputsMessage>(&message)) heard_outputs_ = outputs->applied == RawDuties{};
+  return heard_state_ && heard_outputs_;
+}
+
+bool CanDriver::hears_active(const NodeMessage& message) noexcept {
+  take_message(message);
+  if (const auto* status = std::get_if<StatusMessage>(&message)) heard_state_ = status->state == NodeState::active;
+  if (const auto* outputs = std::get_if<OutputsMessage>(&message)) heard_outputs_ = outputs->applied == RawDuties{};
+  return heard_state_ && heard_outputs_;
+}
+
+void CanDriver::identify() {
+  for (int attempt = 0; attempt < handshake_attempts; ++attempt) {
+    static_cast<void>(link_.socket->send(control_frame({.request = Request::identify})));
+    if (await(&CanDriver::hears_identity, handshake_timeout_ns)) return;
+  }
+  throw Unavailable("backend rig: " + link_.place +
+                    ": no node answers; is it powered, on the same bit rate, the bus terminated? (docs/can.md)");
+}
+
+void CanDriver::do_configure() {
+  link_ = {};
+  counters_ = {};
+  link_ = open_link_();
+  identify();
+  const std::string node = "backend rig: the node on " + link_.place;
+  if (identity_.protocol != protocol_version) {
+    throw Unavailable(node + " speaks protocol " + std::to_string(identity_.protocol) + ", this program " +
+                      std::to_string(protocol_version) + " (docs/can.md)");
+  }
+  const bool waits_for_lock_step = (identity_.features & feature::lock_step) != 0;
+  if (lock_step_ && !waits_for_lock_step) {
+    throw Unavailable(node +
+                      " keeps its own time: it is hardware, or an emulator in real time. Leave --fast out, or start "
+                      "abs_rig_emulator --lock-step");
+  }
+  if (!lock_step_ && waits_for_lock_step) {
+    throw Unavailable(node +
+                      " is an emulator in lock-step, whose time stands still without --fast and --set "
+                      "driver.emulated=true; or start abs_rig_emulator without --lock-step");
+  }
+  const bool node_can_fd = (identity_.features & feature::can_fd) != 0;
+  if (options_.fd == "on" && !node_can_fd) {
+    throw Unavailable(node + " has no CAN FD (driver.can.fd=on): set driver.can.fd=auto");
+  }
+  fd_ = options_.fd == "on" || (options_.fd == "auto" && link_.can_fd && node_can_fd);
+  if (!link_.facts || link_.facts->bit_rate == 0) return;
+  const BusLoad load = bus_load(options_.rate_Hz, link_.facts->bit_rate, link_.facts->data_bit_rate, fd_);
+  if (load.share > 1.0) {
+    throw Unavailable("backend rig: " + link_.place + " at " + std::to_string(link_.facts->bit_rate) +
+                      " bit/s cannot carry " + std::to_string(static_cast<int>(options_.rate_Hz)) +
+                      " cycles a second (" + std::to_string(static_cast<int>(std::ceil(100 * load.share))) +
+                      " % at worst): raise the bit rate, use CAN FD or lower --rate");
+  }
+}
+
+IoResult CanDriver::activate_node() noexcept {
+  heard_state_ = heard_outputs_ = false;
+  const ControlMessage control{.request = Request::activate,
+                               .nonce = identity_.nonce,
+                               .watchdog_ms = static_cast<std::uint16_t>(options_.watchdog_ms),
+                               .sequence = command_sequence_};
+  if (const IoResult result = sent(link_.socket->send(control_frame(control)), id::control); !result.ok()) {
+    return result;
+  }
+  if (await(&CanDriver::hears_active, handshake_timeout_ns)) return {};
+  return {IoError::no_answer, id::control, 0, rig::Reason::can_node_silent};
+}
+
+void CanDriver::do_activate(std::int64_t now_ns) {
+  link_.socket->drain();
+  identify();  // the nonce of the activation before is spent
+  bucket_.reset();
+  tracker_.reset(sync_);
+  commanded_ = {};
+  outputs_known_ = any_answer_ = false;
+  raw_counts_ = counts_ = {};
+  trip_flags_ = 0;
+  latch_reason_ = LatchReason::none;
+  supply_V_ = temperature_C_ = rig::unknown;
+  drops_seen_ = link_.socket->dropped();
+  last_now_ns_ = now_ns;
+  IoResult result = activate_node();
+  for (int attempt = 0; result.ok() && !any_answer_ && attempt < handshake_attempts; ++attempt) {
+    result = exchange(now_ns);
+  }
+  if (result.ok() && !any_answer_) result = {IoError::no_answer, id::latch, 0, rig::Reason::can_node_silent};
+  if (!result.ok()) {
+    static_cast<void>(do_make_safe());
+    std::string why = error_text(result);
+    if (result.reason != rig::Reason::none) why = std::string(rig::description(result.reason)) + "; " + why;
+    throw Unavailable("backend rig: the node on " + link_.place + " could not be activated: " + why);
+  }
+  bucket_.reset();
+}
+
+IoResult CanDriver::sent(const SendResult& result, std::uint32_t identifier) noexcept {
+  switch (result.outcome) {
+    case SendOutcome::sent: return {};
+    case SendOutcome::full: note(Anomaly::queue_full); return {};
+    case SendOutcome::down:
+      return {IoError::disconnected, identifier, result.errno_value, rig::Reason::can_interface_down};
+    case SendOutcome::failed: break;
+  }
+  return {IoError::disconnected, identifier, result.errno_value};
+}
+
+IoResult CanDriver::do_write(const rig::Command& command) noexcept {
+  const bool torque_fits = std::isfinite(command.brake_torque_Nm) && command.brake_torque_Nm >= 0.0;
+  if (!is_duty(command.motor_duty) || !is_duty(command.brake_duty) || !torque_fits) {
+    return {IoError::command_out_of_range};
+  }
+  const double brake = std::min(command.brake_duty, options_.brake_duty_max);
+  const double drive = command.motor_enable ? std::min(command.motor_duty, options_.motor_duty_max) : 0.0;
+  const RawDuties duties{.brake = static_cast<std::uint16_t>(nearest_raw(signal::brake_duty, brake)),
+                         .drive = static_cast<std::uint16_t>(nearest_raw(signal::drive_duty, drive))};
+  commanded_[++command_sequence_] = duties;
+  const Frame frame = command_frame({.duties = duties,
+                                     .drive_enable = command.motor_enable,
+                                     .heartbeat = tracker_.last_sequence(),
+                                     .sequence = command_sequence_});
+  const IoResult result = sent(link_.socket->send(in_format(frame)), id::command);
+  return result.ok() && bucket_.tripped() ? tripped() : result;
+}
+
+void CanDriver::send_zero() noexcept {
+  commanded_[++command_sequence_] = {};
+  static_cast<void>(link_.socket->send(
+      in_format(command_frame({.heartbeat = tracker_.last_sequence(), .sequence = command_sequence_}))));
+}
+
+IoResult CanDriver::deactivate_node() noexcept {
+  heard_state_ = heard_outputs_ = false;
+  const SendResult result = link_.socket->send(control_frame({.request = Request::deactivate}));
+  if (result.outcome == SendOutcome::down || result.outcome == SendOutcome::failed) {
+    return {IoError::disconnected, id::control, result.errno_value};
+  }
+  if (await(&CanDriver::hears_safe, handshake_timeout_ns)) return {};
+  return {IoError::no_answer, id::control};
+}
+
+IoResult CanDriver::do_make_safe() noexcept {
+  if (!link_.socket) return {IoError::disconnected};
+  link_.socket->drain();  // what the node said before does not count
+  IoResult result{};
+  for (int attempt = 0; attempt < handshake_attempts; ++attempt) {
+    send_zero();
+    result = deactivate_node();
+    if (result.ok()) return {};
+  }
+  return result;
+}
+
+}  // namespace abs_hil::driver::can

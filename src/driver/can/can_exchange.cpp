@@ -1,0 +1,285 @@
+// One cycle of the driver: SYNC out, answer in, and what it is worth.
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdlib>
+
+#include "abs_hil/driver/can/can_driver.hpp"
+#include "abs_hil/driver/can/error_frame.hpp"
+#include "abs_hil/rig/encoder_scale.hpp"
+
+namespace abs_hil::driver::can {
+
+namespace {
+
+constexpr double s_per_ns = 1e-9;
+constexpr std::int64_t ns_per_us = 1000;
+/// Frames that one cycle reads at most: an answer has 4.
+constexpr int most_frames_in_a_cycle = 64;
+/// Counts that an encoder may jump beyond what its speed explains: vibration, and the bus's own lateness.
+constexpr double plausible_slack_counts = 256.0;
+/// The node's clock and ours may disagree about one interval by so much: it answers when it likes within the timeout.
+constexpr std::int64_t clock_slack_ns = 10'000'000;
+
+/// Counts travelled from one reading of a counter of `bits` bits to the next.
+std::int32_t travelled(std::int32_t before, std::int32_t after, unsigned bits) noexcept {
+  const unsigned unused = 32U - bits;
+  const std::uint32_t difference = std::bit_cast<std::uint32_t>(after) - std::bit_cast<std::uint32_t>(before);
+  return std::bit_cast<std::int32_t>(difference << unused) >> unused;
+}
+
+IoError error_of(Anomaly anomaly) noexcept {
+  switch (anomaly) {
+    case Anomaly::wrong_length: return IoError::incomplete_answer;
+    case Anomaly::forged:
+    case Anomaly::implausible:
+    case Anomaly::duplicate:
+    case Anomaly::out_of_order:
+    case Anomaly::stale: return IoError::implausible_answer;
+    default: return IoError::no_answer;
+  }
+}
+
+rig::Reason reason_of(Anomaly anomaly) noexcept {
+  switch (anomaly) {
+    case Anomaly::none:
+    case Anomaly::missing: return rig::Reason::can_node_silent;
+    case Anomaly::queue_full: return rig::Reason::can_send_queue_full;
+    case Anomaly::stale: return rig::Reason::can_frames_stale;
+    case Anomaly::out_of_order: return rig::Reason::can_frames_out_of_order;
+    case Anomaly::duplicate: return rig::Reason::can_frames_duplicated;
+    case Anomaly::too_many: return rig::Reason::can_too_many_frames;
+    case Anomaly::implausible: return rig::Reason::can_values_implausible;
+    case Anomaly::forged: return rig::Reason::can_frames_forged;
+    case Anomaly::wrong_length: return rig::Reason::can_frame_wrong_length;
+  }
+  return rig::Reason::can_node_silent;
+}
+
+}  // namespace
+
+void CanDriver::count(Anomaly anomaly) noexcept {
+  switch (anomaly) {
+    case Anomaly::stale: ++counters_.stale; break;
+    case Anomaly::out_of_order: ++counters_.out_of_order; break;
+    case Anomaly::duplicate: ++counters_.duplicates; break;
+    case Anomaly::implausible: ++counters_.implausible; break;
+    case Anomaly::forged: ++counters_.forged; break;
+    case Anomaly::wrong_length: ++counters_.wrong_length; break;
+    case Anomaly::queue_full: ++counters_.queue_full; break;
+    case Anomaly::missing: ++counters_.lost; break;
+    case Anomaly::too_many:
+    case Anomaly::none: break;
+  }
+}
+
+void CanDriver::note(Anomaly anomaly) noexcept {
+  if (anomaly == Anomaly::none) return;
+  count(anomaly);
+  worst_ = std::max(worst_, anomaly);
+  // An answer that comes late has been counted as lost already.
+  if (anomaly != Anomaly::stale) bucket_.lost();
+}
+
+IoResult CanDriver::send_sync(std::int64_t now_ns) noexcept {
+  ++counters_.cycles;
+  tracker_.expect(++sync_);
+  worst_ = Anomaly::none;
+  worst_id_ = 0;
+  if (lock_step_) {
+    if (const IoResult result = sent(link_.socket->send(time_frame(now_ns)), id::time); !result.ok()) return result;
+  }
+  sent_ns_ = monotonic_ns();
+  return sent(link_.socket->send(in_format(sync_frame(sync_))), id::sync);
+}
+
+IoResult CanDriver::take_error_frame(const Frame& frame) noexcept {
+  ++counters_.error_frames;
+  const BusReport report = bus_report(frame);
+  if (report.bus_off) return {IoError::disconnected, frame.id, 0, rig::Reason::can_bus_off};
+  if (report.error_passive) return {IoError::no_answer, frame.id, 0, rig::Reason::can_error_passive};
+  if (report.error_warning) ++counters_.error_warnings;
+  if (report.receive_overflow) note(Anomaly::too_many);
+  return {};
+}
+
+void CanDriver::take_outputs(RawDuties applied, std::uint8_t command_sequence) noexcept {
+  outputs_known_ = true;
+  applied_ = applied;
+  applied_sequence_ = command_sequence;
+}
+
+void CanDriver::take_message(const NodeMessage& message) noexcept {
+  if (const auto* status = std::get_if<StatusMessage>(&message)) {
+    trip_flags_ = status->trip_flags;
+    supply_V_ = status->supply_V;
+    temperature_C_ = status->temperature_C;
+    latch_reason_ = status->latch_reason;
+  } else if (const auto* outputs = std::get_if<OutputsMessage>(&message)) {
+    take_outputs(outputs->applied, outputs->command_sequence);
+    // Those before the activation are none of this run's.
+    if (any_answer_) counters_.rejected_by_node += static_cast<std::uint8_t>(outputs->rejected - rejected_seen_);
+    rejected_seen_ = outputs->rejected;
+  } else if (const auto* encoders = std::get_if<EncodersMessage>(&message)) {
+    note(tracker_.take(*encoders));
+  } else if (const auto* latch = std::get_if<LatchMessage>(&message)) {
+    note(tracker_.take(*latch));
+  } else if (const auto* measurement = std::get_if<MeasurementMessage>(&message)) {
+    const Anomaly anomaly = tracker_.take(*measurement);
+    note(anomaly);
+    if (anomaly != Anomaly::none) return;
+    trip_flags_ = measurement->trip_flags;
+    take_outputs(measurement->applied, measurement->command_sequence);
+  }
+}
+
+IoResult CanDriver::take(const Frame& frame) noexcept {
+  if (frame.error) return take_error_frame(frame);
+  const Anomaly before = worst_;
+  const Decoded decoded = decode(frame);
+  switch (decoded.error) {
+    case DecodeError::none:
+      take_message(decoded.message);
+      received_ns_ = frame.received_ns;
+      break;
+    case DecodeError::unknown_identifier: ++counters_.ignored; break;
+    case DecodeError::wrong_length: note(Anomaly::wrong_length); break;
+    case DecodeError::wrong_check: note(Anomaly::forged); break;
+    case DecodeError::out_of_range: note(Anomaly::implausible); break;
+  }
+  if (worst_ != before) worst_id_ = frame.id;
+  return {};
+}
+
+IoResult CanDriver::collect() noexcept {
+  const std::int64_t deadline_ns = sent_ns_ + answer_timeout_ns_;
+  Frame frame;
+  for (int i = 0; !tracker_.complete(); ++i) {
+    if (i == most_frames_in_a_cycle) {
+      note(Anomaly::too_many);
+      return {};
+    }
+    const ReceiveResult received = link_.socket->receive(frame, deadline_ns);
+    switch (received.outcome) {
+      case ReceiveOutcome::frame: break;
+      case ReceiveOutcome::nothing: return {};
+      case ReceiveOutcome::malformed: note(Anomaly::wrong_length); continue;
+      case ReceiveOutcome::down:
+        return {IoError::disconnected, id::latch, received.errno_value, rig::Reason::can_interface_down};
+      case ReceiveOutcome::failed: return {IoError::disconnected, id::latch, received.errno_value};
+    }
+    if (const IoResult result = take(frame); !result.ok()) return result;
+  }
+  return {};
+}
+
+void CanDriver::watch_drops() noexcept {
+  const std::uint32_t dropped = link_.socket->dropped();
+  if (dropped == drops_seen_) return;
+  counters_.dropped_by_kernel += dropped - drops_seen_;
+  drops_seen_ = dropped;
+  note(Anomaly::too_many);
+}
+
+IoResult CanDriver::tripped() noexcept {
+  // Silence has many causes: the interface knows some of them.
+  if (worst_ <= Anomaly::queue_full) {
+    switch (link_.standing()) {
+      case Link::Standing::running: break;
+      case Link::Standing::down: return {IoError::disconnected, id::sync, 0, rig::Reason::can_interface_down};
+      case Link::Standing::no_carrier: return {IoError::disconnected, id::sync, 0, rig::Reason::can_bus_off};
+    }
+  }
+  return {error_of(worst_), worst_id_ != 0 ? worst_id_ : id::sync, 0, can::reason_of(worst_)};
+}
+
+bool CanDriver::advance_counts(const Answer& answer, std::int64_t elapsed_ns) noexcept {
+  const std::array<std::int32_t, 2> raw{answer.upper_counts, answer.lower_counts};
+  const std::array<std::int32_t, 2> signs{options_.upper_sign, options_.lower_sign};
+  const double most = plausible_slack_counts + options_.plausible_speed_rad_s * static_cast<double>(elapsed_ns) *
+                                                   s_per_ns / rig::radians_per_count(options_.encoder_counts_per_rev);
+  for (std::size_t wheel = 0; wheel < raw.size(); ++wheel) {
+    const std::int32_t moved = travelled(raw_counts_[wheel], raw[wheel], answer.count_bits);
+    if (std::abs(static_cast<double>(moved)) > most) return false;
+    const auto step = static_cast<std::uint32_t>(moved) * static_cast<std::uint32_t>(signs[wheel]);
+    counts_[wheel] = std::bit_cast<std::int32_t>(std::bit_cast<std::uint32_t>(counts_[wheel]) + step);
+  }
+  raw_counts_ = raw;
+  return true;
+}
+
+std::int64_t CanDriver::latch_time_ns(const Answer& answer, std::int64_t now_ns) const noexcept {
+  if (lock_step_) return now_ns;
+  const std::int64_t received_ns = std::max(received_ns_, sent_ns_);
+  if (!any_answer_) return sent_ns_ + (received_ns - sent_ns_) / 2;
+  // The node's clock tells the interval best; SYNC and answer tell between which times of ours it lies.
+  const std::uint32_t interval_us = answer.node_time_us - node_time_us_;
+  return std::clamp(latched_ns_ + std::int64_t{interval_us} * ns_per_us, sent_ns_, received_ns);
+}
+
+IoResult CanDriver::judge_answer(std::int64_t now_ns) noexcept {
+  const Answer& answer = tracker_.answer();
+  if (answer.state == NodeState::inactive) {
+    return {IoError::implausible_answer, id::latch, 0, rig::Reason::can_node_restarted};
+  }
+  if (answer.state == NodeState::latched) {
+    return {IoError::read_back_mismatch, id::latch, 0, rig::Reason::can_node_latched};
+  }
+  const std::int64_t time_ns = latch_time_ns(answer, now_ns);
+  const std::int64_t node_interval_ns = std::int64_t{answer.node_time_us - node_time_us_} * ns_per_us;
+  const std::int64_t interval_ns = any_answer_ ? time_ns - latched_ns_ : 0;
+  if (any_answer_ && std::abs(node_interval_ns - interval_ns) > clock_slack_ns) {
+    return {IoError::implausible_answer, id::latch, 0, rig::Reason::can_node_restarted};
+  }
+  // Between activation and first answer no wheel turns further than this.
+  constexpr std::int64_t first_interval_ns = 200'000'000;
+  if (!advance_counts(answer, any_answer_ ? interval_ns : first_interval_ns)) {
+    return {IoError::implausible_answer, id::encoders, 0, rig::Reason::can_values_implausible};
+  }
+  const bool outputs_follow = !outputs_known_ || trip_flags_ != 0 || applied_ == commanded_[applied_sequence_];
+  outputs_known_ = false;
+  if (!outputs_follow) {
+    return {IoError::read_back_mismatch, id::outputs, 0, rig::Reason::can_outputs_not_taken};
+  }
+  node_time_us_ = answer.node_time_us;
+  latched_ns_ = time_ns;
+  any_answer_ = true;
+  counters_.longest_answer_ns = std::max(counters_.longest_answer_ns, received_ns_ - sent_ns_);
+  return {};
+}
+
+IoResult CanDriver::judge(std::int64_t now_ns) noexcept {
+  watch_drops();
+  if (!tracker_.complete()) {
+    note(Anomaly::missing);
+    return bucket_.tripped() ? tripped() : IoResult{};
+  }
+  if (const IoResult result = judge_answer(now_ns); !result.ok()) return result;
+  if (bucket_.tripped()) return tripped();
+  bucket_.good();
+  return {};
+}
+
+IoResult CanDriver::exchange(std::int64_t now_ns) noexcept {
+  if (const IoResult result = send_sync(now_ns); !result.ok()) return result;
+  if (const IoResult result = collect(); !result.ok()) return result;
+  return judge(now_ns);
+}
+
+IoResult CanDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept {
+  if (const IoResult result = exchange(now_ns); !result.ok()) {
+    send_zero();  // at once: whoever called may take its time
+    return result;
+  }
+  measurement = {};
+  measurement.time_ns = latched_ns_;
+  measurement.upper_counts = counts_[0];
+  measurement.lower_counts = counts_[1];
+  measurement.supply_V = supply_V_;
+  measurement.temperature_C = temperature_C_;
+  measurement.trip_flags = trip_flags_;
+  return {};
+}
+
+}  // namespace abs_hil::driver::can

@@ -1,0 +1,100 @@
+// What the driver can say in words about its bus and its node.
+
+#include <array>
+#include <cstdio>
+
+#include "abs_hil/driver/can/bus_load.hpp"
+#include "abs_hil/driver/can/can_driver.hpp"
+
+namespace abs_hil::driver::can {
+
+namespace {
+
+template <typename... Values>
+std::string formatted(const char* format, Values... values) {
+  std::array<char, 320> text{};
+  std::snprintf(text.data(), text.size(), format, values...);
+  return text.data();
+}
+
+std::string load_text(double rate_Hz, double bit_rate, double data_bit_rate, bool fd) {
+  const BusLoad load = bus_load(rate_Hz, bit_rate, data_bit_rate, fd);
+  return formatted("bus load at most %.1f %% at %.0f cycles a second and %.0f bit/s; answer within %.0f us of the SYNC",
+                   100.0 * load.share, rate_Hz, bit_rate, 1e6 * load.answer_s);
+}
+
+}  // namespace
+
+std::vector<std::string> CanDriver::notes() const {
+  if (!link_.socket) return {};
+  std::vector<std::string> notes;
+  notes.push_back(formatted(
+      "%s: node with protocol %u answers%s; %s frames", link_.place.c_str(), static_cast<unsigned>(identity_.protocol),
+      (identity_.features & feature::lock_step) != 0 ? ", an emulator in lock-step" : "", fd_ ? "CAN FD" : "classic"));
+  const double bit_rate = link_.facts ? static_cast<double>(link_.facts->bit_rate) : 0.0;
+  if (bit_rate > 0.0) {
+    notes.push_back(load_text(options_.rate_Hz, bit_rate, static_cast<double>(link_.facts->data_bit_rate), fd_));
+  } else {
+    constexpr double megabit = 1e6;
+    notes.push_back("no bit rate of its own; on a real bus " +
+                    load_text(options_.rate_Hz, megabit, fd_ ? 5 * megabit : 0.0, fd_));
+  }
+  notes.push_back(
+      formatted("the node zeroes its outputs %d ms after the last valid command; the run ends at %d points "
+                "of loss (%d each, %d off for each good answer)",
+                options_.watchdog_ms, options_.loss_limit, options_.loss_cost, options_.loss_relief));
+  return notes;
+}
+
+std::vector<std::string> CanDriver::tally() const {
+  const CanCounters& c = counters_;
+  using Number = unsigned long long;
+  std::vector<std::string> lines;
+  lines.push_back(formatted("CAN: %llu cycles, %llu without an answer in time; longest answer %.0f us",
+                            static_cast<Number>(c.cycles), static_cast<Number>(c.lost),
+                            static_cast<double>(c.longest_answer_ns) * 1e-3));
+  const std::uint64_t odd = c.stale + c.duplicates + c.out_of_order + c.wrong_length + c.forged + c.implausible +
+                            c.queue_full + c.error_frames + c.dropped_by_kernel + c.rejected_by_node;
+  if (odd == 0) return lines;
+  lines.push_back(
+      formatted("CAN frames: %llu stale, %llu duplicate, %llu out of order, %llu of wrong length, %llu forged, "
+                "%llu implausible; %llu dropped by the kernel",
+                static_cast<Number>(c.stale), static_cast<Number>(c.duplicates), static_cast<Number>(c.out_of_order),
+                static_cast<Number>(c.wrong_length), static_cast<Number>(c.forged), static_cast<Number>(c.implausible),
+                static_cast<Number>(c.dropped_by_kernel)));
+  lines.push_back(
+      formatted("CAN bus: send queue full %llu times, %llu error frames (%llu warnings), %llu commands "
+                "rejected by the node",
+                static_cast<Number>(c.queue_full), static_cast<Number>(c.error_frames),
+                static_cast<Number>(c.error_warnings), static_cast<Number>(c.rejected_by_node)));
+  return lines;
+}
+
+std::vector<std::string> CanDriver::inspection() {
+  if (!link_.socket) return {};
+  std::vector<std::string> lines = notes();
+  link_.socket->drain();
+  tracker_.reset(sync_);
+  heard_state_ = false;
+  // An inactive node answers a SYNC too, and nothing moves by it.
+  tracker_.expect(++sync_);
+  static_cast<void>(link_.socket->send(sync_frame(sync_)));
+  sent_ns_ = monotonic_ns();
+  static_cast<void>(collect());
+  if (!tracker_.complete()) {
+    lines.emplace_back("no answer to a SYNC");
+    return lines;
+  }
+  const Answer& answer = tracker_.answer();
+  lines.push_back(formatted("counters: upper wheel %d, lower wheel %d, lever %d", answer.upper_counts,
+                            answer.lower_counts, answer.lever_counts));
+  lines.push_back(formatted("node's clock %.6f s, state %s", 1e-6 * answer.node_time_us,
+                            answer.state == NodeState::inactive ? "inactive"
+                            : answer.state == NodeState::active ? "active"
+                                                                : "latched"));
+  lines.push_back(formatted("supply %.2f V, temperature %.1f deg C, trip flags 0x%x (NaN: not told yet)", supply_V_,
+                            temperature_C_, trip_flags_));
+  return lines;
+}
+
+}  // namespace abs_hil::driver::can

@@ -1,0 +1,134 @@
+#include "abs_hil/driver/can/frame_socket.hpp"
+
+#include <fcntl.h>
+#include <linux/can.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <ctime>
+
+namespace abs_hil::driver::can {
+
+namespace {
+
+constexpr std::int64_t ns_per_s = 1'000'000'000;
+
+std::int64_t clock_ns(clockid_t clock) noexcept {
+  timespec now{};
+  clock_gettime(clock, &now);
+  return std::int64_t{now.tv_sec} * ns_per_s + now.tv_nsec;
+}
+
+bool is_full(int error) noexcept { return error == EAGAIN || error == EWOULDBLOCK || error == ENOBUFS; }
+
+bool is_down(int error) noexcept {
+  // An interface that is gone gives ENODEV or ENXIO; a closed other end of a socket pair EPIPE or ECONNRESET.
+  return error == ENETDOWN || error == ENODEV || error == ENXIO || error == EPIPE || error == ECONNRESET ||
+         error == ENOTCONN || error == ECONNREFUSED;
+}
+
+/// The kernel stamps in the settable clock: how long ago that was is the same in both.
+std::int64_t monotonic_of(const timespec& realtime) noexcept {
+  const std::int64_t stamp_ns = std::int64_t{realtime.tv_sec} * ns_per_s + realtime.tv_nsec;
+  const std::int64_t age_ns = std::max<std::int64_t>(0, clock_ns(CLOCK_REALTIME) - stamp_ns);
+  return monotonic_ns() - std::min(age_ns, ns_per_s);  // a clock that was set makes no age of years
+}
+
+void unpack(const canfd_frame& raw, std::size_t size, Frame& frame) noexcept {
+  frame = {};
+  frame.fd = size == CANFD_MTU;
+  frame.error = (raw.can_id & CAN_ERR_FLAG) != 0;
+  // Extended and remote frames keep their flags, so that they are no one's identifier.
+  frame.id = frame.error ? raw.can_id & CAN_ERR_MASK : raw.can_id;
+  frame.length = std::min<std::uint8_t>(raw.len, frame.fd ? CANFD_MAX_DLEN : CAN_MAX_DLEN);
+  std::memcpy(frame.data.data(), raw.data, frame.length);
+}
+
+}  // namespace
+
+std::int64_t monotonic_ns() noexcept { return clock_ns(CLOCK_MONOTONIC); }
+
+FrameSocket::FrameSocket(int descriptor) noexcept : descriptor_(descriptor) {
+  ::fcntl(descriptor_, F_SETFL, ::fcntl(descriptor_, F_GETFL) | O_NONBLOCK);
+  const int on = 1;
+  // Niceties: without them a frame counts as received when it is read, and drops show as losses.
+  ::setsockopt(descriptor_, SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);
+  ::setsockopt(descriptor_, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on);
+}
+
+FrameSocket::~FrameSocket() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+SendResult FrameSocket::send(const Frame& frame) noexcept {
+  canfd_frame raw{};
+  raw.can_id = frame.id;
+  raw.len = frame.length;
+  if (frame.fd) raw.flags = CANFD_BRS;
+  std::memcpy(raw.data, frame.data.data(), std::min<std::size_t>(frame.length, sizeof raw.data));
+  const std::size_t size = frame.fd ? CANFD_MTU : CAN_MTU;
+  if (::send(descriptor_, &raw, size, MSG_DONTWAIT | MSG_NOSIGNAL) == static_cast<ssize_t>(size)) return {};
+  if (is_full(errno)) return {SendOutcome::full, errno};
+  return {is_down(errno) ? SendOutcome::down : SendOutcome::failed, errno};
+}
+
+ReceiveResult FrameSocket::take(Frame& frame) noexcept {
+  canfd_frame raw{};
+  iovec part{&raw, sizeof raw};
+  alignas(cmsghdr) char control[CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t))];
+  msghdr message{};
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  message.msg_control = control;
+  message.msg_controllen = sizeof control;
+  const ssize_t size = ::recvmsg(descriptor_, &message, MSG_DONTWAIT);
+  if (size < 0) {
+    if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR) return {};
+    return {is_down(errno) ? ReceiveOutcome::down : ReceiveOutcome::failed, errno};
+  }
+  if (size == 0) return {ReceiveOutcome::down, EPIPE};  // the other end has closed; CAN sockets never say so
+  if (size != CAN_MTU && size != CANFD_MTU) return {ReceiveOutcome::malformed};
+  unpack(raw, static_cast<std::size_t>(size), frame);
+  for (cmsghdr* c = CMSG_FIRSTHDR(&message); c != nullptr; c = CMSG_NXTHDR(&message, c)) {
+    if (c->cmsg_level != SOL_SOCKET) continue;
+    if (c->cmsg_type == SO_TIMESTAMPNS) {
+      timespec stamp{};
+      std::memcpy(&stamp, CMSG_DATA(c), sizeof stamp);
+      frame.received_ns = monotonic_of(stamp);
+    } else if (c->cmsg_type == SO_RXQ_OVFL) {
+      std::memcpy(&dropped_, CMSG_DATA(c), sizeof dropped_);
+    }
+  }
+  if (frame.received_ns == 0) frame.received_ns = monotonic_ns();
+  return {ReceiveOutcome::frame};
+}
+
+ReceiveResult FrameSocket::receive(Frame& frame, std::int64_t deadline_ns) noexcept {
+  for (;;) {
+    const ReceiveResult result = take(frame);
+    if (result.outcome != ReceiveOutcome::nothing) return result;
+    const std::int64_t left_ns = deadline_ns - monotonic_ns();
+    if (left_ns <= 0) return result;
+    pollfd waiting{descriptor_, POLLIN, 0};
+    const timespec limit{static_cast<time_t>(left_ns / ns_per_s), static_cast<long>(left_ns % ns_per_s)};
+    static_cast<void>(::ppoll(&waiting, 1, &limit, nullptr));
+  }
+}
+
+bool FrameSocket::ask_interface(ifreq& request) const noexcept {
+  return ::ioctl(descriptor_, SIOCGIFFLAGS, &request) == 0;
+}
+
+void FrameSocket::drain() noexcept {
+  constexpr int most_frames = 10'000;
+  Frame ignored;
+  for (int i = 0; i < most_frames && take(ignored).outcome == ReceiveOutcome::frame; ++i) {
+  }
+}
+
+}  // namespace abs_hil::driver::can

@@ -1,0 +1,126 @@
+#include "abs_hil/driver/can/link.hpp"
+
+#include <linux/can.h>
+#include <linux/can/error.h>
+#include <linux/can/raw.h>
+#include <net/if.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <vector>
+
+#include "abs_hil/driver/can/protocol.hpp"
+#include "abs_hil/driver/io_result.hpp"
+
+namespace abs_hil::driver::can {
+
+namespace {
+
+[[noreturn]] void refuse(const std::string& what) { throw Unavailable("backend rig: " + what); }
+
+std::string system_words(int error) { return std::strerror(error); }
+
+void set_option(int descriptor, int name, const void* value, socklen_t size, const char* what) {
+  if (::setsockopt(descriptor, SOL_CAN_RAW, name, value, size) != 0) {
+    const int error = errno;
+    ::close(descriptor);
+    refuse(std::string("CAN socket: ") + what + ": " + system_words(error));
+  }
+}
+
+/// Only what the node sends: all else is dropped in the kernel, however much there is of it.
+std::vector<can_filter> node_filters() {
+  std::vector<can_filter> filters;
+  for (const Message& message : messages()) {
+    if (message.from_node) filters.push_back({message.id, CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG});
+  }
+  return filters;
+}
+
+int open_raw_socket(const InterfaceFacts& facts, bool fd_frames) {
+  const int descriptor = ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
+  if (descriptor < 0) {
+    refuse("no CAN socket: " + system_words(errno) + "; sudo modprobe can_raw, if this kernel has it");
+  }
+  const std::vector<can_filter> filters = node_filters();
+  set_option(descriptor, CAN_RAW_FILTER, filters.data(), static_cast<socklen_t>(filters.size() * sizeof(can_filter)),
+             "filters");
+  const can_err_mask_t all_errors = CAN_ERR_MASK;
+  set_option(descriptor, CAN_RAW_ERR_FILTER, &all_errors, sizeof all_errors, "error frames");
+  const int on = 1;
+  if (fd_frames) set_option(descriptor, CAN_RAW_FD_FRAMES, &on, sizeof on, "CAN FD frames");
+  sockaddr_can address{};
+  address.can_family = AF_CAN;
+  address.can_ifindex = static_cast<int>(::if_nametoindex(facts.name.c_str()));
+  if (::bind(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    const int error = errno;
+    ::close(descriptor);
+    refuse("CAN interface " + facts.name + ": cannot be opened: " + system_words(error));
+  }
+  return descriptor;
+}
+
+Link open_interface(const CanOptions& options) {
+  const std::optional<InterfaceFacts> facts = find_interface(options.interface);
+  if (!facts) {
+    std::string known;
+    for (const InterfaceFacts& other : can_interfaces()) known += (known.empty() ? "" : ", ") + other.name;
+    refuse("no CAN interface " + options.interface + " (driver.can.interface); there " +
+           (known.empty() ? "is none: plug the adapter in, load its kernel module (docs/can.md)" : "are " + known));
+  }
+  if (const auto problem = problem_of(*facts)) {
+    refuse("CAN interface " + facts->name + " is " + problem->what + ": " + problem->fix);
+  }
+  if (options.fd == "on" && !facts->can_fd) {
+    refuse("CAN interface " + facts->name + " takes no CAN FD frames (driver.can.fd=on): sudo ip link set " +
+           facts->name + " type can bitrate 1000000 dbitrate 5000000 fd on, or driver.can.fd=auto");
+  }
+  return {.socket = std::make_unique<FrameSocket>(open_raw_socket(*facts, facts->can_fd)),
+          .place = "CAN interface " + facts->name,
+          .can_fd = facts->can_fd,
+          .facts = facts};
+}
+
+Link open_unix_socket(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.empty() || path.size() >= sizeof address.sun_path) {
+    refuse("driver.can.interface = unix:" + path + ": give a path of 1 to " +
+           std::to_string(sizeof address.sun_path - 1) + " characters");
+  }
+  std::memcpy(address.sun_path, path.c_str(), path.size());
+  const int descriptor = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
+  if (descriptor < 0) refuse("no AF_UNIX socket: " + system_words(errno));
+  if (::connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    const int error = errno;
+    ::close(descriptor);
+    refuse("socket " + path + " (driver.can.interface): " + system_words(error) +
+           "; start abs_rig_emulator --can unix:" + path);
+  }
+  return {.socket = std::make_unique<FrameSocket>(descriptor), .place = "socket " + path, .can_fd = true};
+}
+
+}  // namespace
+
+Link::Standing Link::standing() const noexcept {
+  if (!facts) return Standing::running;
+  ifreq request{};
+  std::memcpy(request.ifr_name, facts->name.c_str(), std::min<std::size_t>(facts->name.size(), IFNAMSIZ - 1));
+  if (!socket->ask_interface(request)) return Standing::down;
+  const auto flags = static_cast<unsigned>(request.ifr_flags);
+  if ((flags & IFF_UP) == 0) return Standing::down;
+  return (flags & IFF_RUNNING) == 0 ? Standing::no_carrier : Standing::running;
+}
+
+Link open_link(const CanOptions& options) {
+  const std::string prefix(unix_prefix);
+  return options.interface.starts_with(prefix) ? open_unix_socket(options.interface.substr(prefix.size()))
+                                               : open_interface(options);
+}
+
+}  // namespace abs_hil::driver::can

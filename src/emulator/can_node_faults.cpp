@@ -1,0 +1,165 @@
+#include "abs_hil/emulator/can_node_faults.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace abs_hil::emulator {
+
+namespace {
+
+struct Kind {
+  std::string_view name;
+  NodeFaultKind kind;
+  unsigned most;  ///< largest number; 0: takes none
+};
+using enum NodeFaultKind;
+constexpr std::array<Kind, 14> kinds{{{"ok", ok, 0},
+                                      {"silent", silent, 0},
+                                      {"deaf", deaf, 0},
+                                      {"drop", drop, 100'000},
+                                      {"no-status", no_status, 0},
+                                      {"stale", stale, 127},
+                                      {"ahead", ahead, 127},
+                                      {"stuck", stuck, 0},
+                                      {"duplicate", duplicate, 0},
+                                      {"swapped", swapped, 0},
+                                      {"wrong-size", wrong_size, 8},
+                                      {"corrupt", corrupt, 0},
+                                      {"nonsense", nonsense, 0},
+                                      {"babble", babble, 100}}};
+
+[[noreturn]] void refuse(std::string_view text) {
+  throw std::invalid_argument("fault \"" + std::string(text) + "\": give one of " + NodeFaults::known());
+}
+
+bool is_measurement(const BusFrame& frame) { return frame.id >= 0x92 && frame.id <= 0x94; }
+
+/// Place of the sequence in any of the node's frames but ABS_IDENTITY.
+std::size_t sequence_place(const BusFrame& frame) { return frame.length - 2U; }
+
+void shift_sequence(BusFrame& frame, unsigned by) {
+  if (frame.id == 0x9A) return;
+  std::uint8_t& sequence = frame.data[sequence_place(frame)];
+  sequence = static_cast<std::uint8_t>(sequence + by);
+  seal(frame);
+}
+
+}  // namespace
+
+void seal(BusFrame& frame) noexcept {
+  unsigned crc = 0xFF;
+  const auto add = [&crc](unsigned byte) {
+    crc ^= byte;
+    for (int bit = 0; bit < 8; ++bit) crc = (crc & 0x80U) != 0 ? (crc << 1U ^ 0x11DU) : crc << 1U;
+  };
+  add(frame.id & 0xFFU);
+  add(frame.id >> 8U);
+  for (std::size_t i = 0; i + 1 < frame.length; ++i) add(frame.data[i]);
+  frame.data[frame.length - 1U] = static_cast<std::uint8_t>(crc ^ 0xFFU);
+}
+
+const char* NodeFaults::known() {
+  return "ok silent deaf drop=ANSWERS no-status stale=N ahead=N stuck duplicate swapped wrong-size=BYTES corrupt "
+         "nonsense "
+         "babble=FRAMES";
+}
+
+void NodeFaults::set(std::string_view text) {
+  const std::size_t equals = text.find('=');
+  const std::string_view name = text.substr(0, equals);
+  for (const Kind& kind : kinds) {
+    if (kind.name != name) continue;
+    unsigned number = 0;
+    if ((kind.most > 0) != (equals != std::string_view::npos)) refuse(text);
+    if (kind.most > 0) {
+      const std::string_view digits = text.substr(equals + 1);
+      const auto [at, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+      if (error != std::errc() || at != digits.data() + digits.size() || number > kind.most) refuse(text);
+    }
+    kind_ = kind.kind;
+    number_ = number;
+    kept_.clear();
+    return;
+  }
+  refuse(text);
+}
+
+bool NodeFaults::hears(const BusFrame& frame) const noexcept { return kind_ != deaf || frame.id != 0x81; }
+
+void NodeFaults::prepend_babble(std::vector<BusFrame>& frames) {
+  std::vector<BusFrame> all;
+  for (unsigned i = 0; i < number_; ++i) {
+    BusFrame other{.id = 0x100 + static_cast<std::uint32_t>(random_() % 0x600), .length = 8};
+    BusFrame forged{.id = 0x92 + static_cast<std::uint32_t>(random_() % 2), .length = 8};
+    for (std::size_t byte = 0; byte < 8; ++byte) {
+      other.data[byte] = static_cast<std::uint8_t>(random_());
+      forged.data[byte] = static_cast<std::uint8_t>(random_());
+    }
+    all.push_back(other);
+    all.push_back(forged);
+  }
+  all.insert(all.end(), frames.begin(), frames.end());
+  frames = std::move(all);
+}
+
+std::vector<BusFrame> NodeFaults::changed(std::vector<BusFrame> frames) {
+  switch (kind_) {
+    case silent: frames.clear(); break;
+    case drop:
+      if (number_ > 0) frames.clear();
+      if (number_ <= 1) {
+        kind_ = ok;
+      } else {
+        --number_;
+      }
+      break;
+    case no_status: std::erase_if(frames, [](const BusFrame& f) { return f.id == 0x90 || f.id == 0x91; }); break;
+    case stale:
+      for (BusFrame& frame : frames) shift_sequence(frame, 256U - number_);
+      break;
+    case ahead:
+      for (BusFrame& frame : frames) shift_sequence(frame, number_);
+      break;
+    case stuck:
+      if (kept_.empty()) kept_ = frames;
+      frames = kept_;
+      break;
+    case duplicate: {
+      std::vector<BusFrame> twice;
+      for (const BusFrame& frame : frames) twice.insert(twice.end(), 2, frame);
+      frames = std::move(twice);
+      break;
+    }
+    case swapped: std::reverse(frames.begin(), frames.end()); break;
+    case wrong_size:
+      for (BusFrame& frame : frames) frame.length = static_cast<std::uint8_t>(number_);
+      break;
+    case corrupt:
+      for (BusFrame& frame : frames) frame.data[frame.length - 1U] ^= 0x55U;
+      break;
+    case nonsense:
+      for (BusFrame& frame : frames) {
+        if (frame.id != 0x92 && frame.id != 0x94) continue;
+        frame.data[2] = static_cast<std::uint8_t>(random_());
+        seal(frame);
+      }
+      break;
+    case babble: prepend_babble(frames); break;
+    case ok:
+    case deaf: break;
+  }
+  return frames;
+}
+
+std::vector<BusFrame> NodeFaults::answer(std::vector<BusFrame> frames) {
+  const bool to_sync = std::any_of(frames.begin(), frames.end(), is_measurement);
+  // Answers to ABS_CONTROL are changed only by what keeps the node from speaking or garbles it.
+  const bool always = kind_ == silent || kind_ == wrong_size || kind_ == corrupt;
+  return frames.empty() || (!to_sync && !always) ? frames : changed(std::move(frames));
+}
+
+}  // namespace abs_hil::emulator

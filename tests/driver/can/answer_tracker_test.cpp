@@ -1,0 +1,89 @@
+#include "abs_hil/driver/can/answer_tracker.hpp"
+
+#include "abs_hil/driver/can/loss_bucket.hpp"
+#include "catch.hpp"
+
+using namespace abs_hil::driver::can;
+
+namespace {
+
+EncodersMessage encoders(unsigned sequence) {
+  return {.upper_counts = 1, .lower_counts = 2, .sequence = static_cast<std::uint8_t>(sequence)};
+}
+LatchMessage latch(unsigned sequence) {
+  return {.node_time_us = 3, .state = NodeState::active, .sequence = static_cast<std::uint8_t>(sequence)};
+}
+
+}  // namespace
+
+TEST_CASE("An answer is whole with both its frames, and numbers wrap") {
+  AnswerTracker tracker;
+  tracker.reset(253);
+  for (unsigned cycle = 254; cycle < 600; ++cycle) {
+    tracker.expect(static_cast<std::uint8_t>(cycle));
+    CHECK_FALSE(tracker.complete());
+    CHECK(tracker.take(encoders(cycle)) == Anomaly::none);
+    CHECK_FALSE(tracker.complete());
+    CHECK(tracker.take(latch(cycle)) == Anomaly::none);
+    REQUIRE(tracker.complete());
+    CHECK(tracker.last_sequence() == static_cast<std::uint8_t>(cycle));
+    CHECK(tracker.answer().upper_counts == 1);
+    CHECK(tracker.answer().node_time_us == 3);
+  }
+}
+
+TEST_CASE("Frames that belong to no answer are told apart") {
+  AnswerTracker tracker;
+  tracker.reset(9);
+  tracker.expect(10);
+  CHECK(tracker.take(encoders(10)) == Anomaly::none);
+  CHECK(tracker.take(encoders(10)) == Anomaly::duplicate);
+  CHECK(tracker.take(latch(11)) == Anomaly::out_of_order);
+  CHECK(tracker.take(latch(9)) == Anomaly::stale);  // 9 was never answered
+  CHECK_FALSE(tracker.complete());
+  CHECK(tracker.take(latch(10)) == Anomaly::none);
+  CHECK(tracker.take(latch(10)) == Anomaly::duplicate);
+
+  tracker.expect(11);
+  CHECK(tracker.take(encoders(10)) == Anomaly::duplicate);  // 10 was answered already
+  CHECK(tracker.take(encoders(8)) == Anomaly::stale);
+  CHECK(tracker.take(latch(11)) == Anomaly::none);
+  CHECK(tracker.take(encoders(11)) == Anomaly::out_of_order);  // the latch comes last
+  CHECK(tracker.complete());
+
+  tracker.expect(12);  // lost
+  tracker.expect(13);
+  CHECK(tracker.take(latch(12)) == Anomaly::stale);
+  CHECK(tracker.take(MeasurementMessage{.sequence = 13}) == Anomaly::none);
+  CHECK(tracker.complete());
+  CHECK(tracker.answer().count_bits == 32);
+  CHECK(tracker.take(MeasurementMessage{.sequence = 13}) == Anomaly::duplicate);
+}
+
+TEST_CASE("The bucket bears single losses, trips at sustained loss, and latches") {
+  LossBucket bucket(2, 1, 10);
+  for (int i = 0; i < 100; ++i) {  // one loss in three cycles: what flows in flows out
+    bucket.lost();
+    bucket.good();
+    bucket.good();
+  }
+  CHECK_FALSE(bucket.tripped());
+  CHECK(bucket.level() == 0);
+  int losses = 0;
+  while (!bucket.tripped()) {
+    bucket.lost();
+    ++losses;
+  }
+  CHECK(losses == 5);
+  for (int i = 0; i < 100; ++i) bucket.good();
+  CHECK(bucket.tripped());
+  bucket.reset();
+  CHECK_FALSE(bucket.tripped());
+  for (int i = 0; i < 8; ++i) {  // every other cycle lost: +1 each pair, the ninth loss reaches 8 + 2
+    bucket.lost();
+    bucket.good();
+  }
+  CHECK_FALSE(bucket.tripped());
+  bucket.lost();
+  CHECK(bucket.tripped());
+}

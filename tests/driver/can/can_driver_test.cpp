@@ -1,0 +1,143 @@
+#include "abs_hil/driver/can/can_driver.hpp"
+
+#include <numbers>
+
+#include "catch.hpp"
+#include "node_on_socket.hpp"
+
+using namespace abs_hil;
+using driver::can::CanDriver;
+using driver::can::CanOptions;
+using test::NodeOnSocket;
+
+namespace {
+
+constexpr std::int64_t ms = 1'000'000;
+
+/// A driver, active on its node at 60 rad/s.
+struct Active {
+  explicit Active(CanOptions options = {}, bool fd = false, double speed_rad_s = 60.0)
+      : node({.start_speed_rad_s = speed_rad_s}), driver(options, node.opener(fd), true) {
+    driver.configure();
+    driver.activate(0);
+  }
+  /// A cycle with a command, as a run makes it.
+  driver::IoResult cycle(const rig::Command& command = {}) {
+    const driver::IoResult result = driver.read(now_ns += ms, measurement);
+    return result.ok() ? driver.write(command) : result;
+  }
+  NodeOnSocket node;
+  CanDriver driver;
+  rig::Measurement measurement{};
+  std::int64_t now_ns{0};
+};
+
+}  // namespace
+
+TEST_CASE("Counts go on across the wrap of the node's counters") {
+  constexpr std::int32_t per_rev = 1'000'000;  // 24 bits are over in 0.6 s
+  emulator::CanNodeOptions options{.start_speed_rad_s = 170.0};
+  options.plant.rig.encoder_counts_per_rev = per_rev;
+  for (const bool fd : {false, true}) {
+    NodeOnSocket node(options);
+    CanDriver driver({.encoder_counts_per_rev = per_rev}, node.opener(fd), true);
+    driver.configure();
+    driver.activate(0);
+    rig::Measurement measurement;
+    for (std::int64_t now_ns = ms; now_ns <= 800 * ms; now_ns += ms) REQUIRE(driver.read(now_ns, measurement).ok());
+    const double turned_rad =
+        node.with_node([](emulator::CanNode& n, emulator::NodeFaults&) { return n.plant().state().angle1_rad; });
+    const double counts = turned_rad / (2.0 * std::numbers::pi) * per_rev;
+    CHECK(counts > (1 << 24));
+    CHECK(std::abs(measurement.upper_counts - counts) <= 1.0);
+  }
+}
+
+TEST_CASE("Signs turn the counters round") {
+  Active forward;
+  Active backward({.upper_sign = -1, .lower_sign = -1});
+  for (int i = 0; i < 20; ++i) {
+    REQUIRE(forward.cycle().ok());
+    REQUIRE(backward.cycle().ok());
+  }
+  CHECK(forward.measurement.upper_counts > 500);
+  CHECK(backward.measurement.upper_counts == -forward.measurement.upper_counts);
+  CHECK(backward.measurement.lower_counts == -forward.measurement.lower_counts);
+}
+
+TEST_CASE("The brake's cap holds on the wire; the drive only while enabled") {
+  Active rig;
+  REQUIRE(rig.cycle({.brake_duty = 1.0}).ok());
+  CHECK(rig.node.wire().brake_duty == 0.7);
+  REQUIRE(rig.cycle({.motor_duty = 1.0}).ok());
+  CHECK(rig.node.wire().drive_duty == 0.0);
+  REQUIRE(rig.cycle({.motor_duty = 1.0, .motor_enable = true}).ok());
+  CHECK(rig.node.wire().drive_duty == 1.0);
+}
+
+TEST_CASE("The node's watchdog zeroes the outputs when commands stop, and only a new activation clears it") {
+  Active rig({.watchdog_ms = 20});
+  REQUIRE(rig.cycle({.brake_duty = 0.5}).ok());
+  const auto since_command_ns = [&] { return rig.now_ns; };
+  const std::int64_t commanded_ns = since_command_ns();
+  driver::IoResult result{};
+  while (result.ok() && rig.now_ns < 100 * ms) {
+    CHECK((rig.node.wire().brake_duty == 0.5) == (rig.now_ns - commanded_ns < 20 * ms));
+    result = rig.driver.read(rig.now_ns += ms, rig.measurement);
+  }
+  CHECK(rig.now_ns - commanded_ns == 20 * ms);
+  CHECK(result.reason == rig::Reason::can_node_latched);
+  CHECK(rig.node.wire().brake_duty == 0.0);
+  // Commands alone do not wake it.
+  for (int i = 0; i < 5; ++i) {
+    CHECK(rig.driver.write({.brake_duty = 0.5}).ok());
+    CHECK(rig.driver.read(rig.now_ns += ms, rig.measurement).reason == rig::Reason::can_node_latched);
+  }
+  CHECK(rig.node.wire().brake_duty == 0.0);
+  CHECK(rig.driver.deactivate().ok());
+  rig.driver.activate(rig.now_ns);
+  REQUIRE(rig.cycle({.brake_duty = 0.5}).ok());
+  CHECK(rig.node.wire().brake_duty == 0.5);
+}
+
+TEST_CASE("What the node says of itself reaches the measurement") {
+  Active rig;
+  rig.node.with_node([](emulator::CanNode& node, emulator::NodeFaults&) {
+    node.set_supply_V(11.0);
+    node.set_temperature_C(65.0);
+  });
+  for (int i = 0; i < 11; ++i) static_cast<void>(rig.cycle());
+  CHECK_THAT(rig.measurement.supply_V, Catch::Matchers::WithinAbs(11.0, 1e-3));
+  CHECK_THAT(rig.measurement.temperature_C, Catch::Matchers::WithinAbs(65.0, 1e-2));
+  CHECK(rig.measurement.trip_flags == rig::trip::supply);
+}
+
+TEST_CASE("Options are checked, each with its key") {
+  using Catch::Matchers::Contains;
+  const auto made = [](const CanOptions& options) {
+    CanDriver(
+        options, [] { return driver::can::Link{}; }, false);
+  };
+  CHECK_THROWS_WITH(made({.upper_sign = 0}), Contains("driver.can.upper_sign = 0"));
+  CHECK_THROWS_WITH(made({.answer_timeout_us = 801}), Contains("at most 800 us"));
+  CHECK_NOTHROW(made({.answer_timeout_us = 800}));
+}
+
+TEST_CASE("A node that keeps other time than asked for is refused; nothing is written") {
+  NodeOnSocket node({});
+  CanDriver real_time({}, node.opener(), false);
+  CHECK_THROWS_WITH(real_time.configure(), Catch::Matchers::Contains("emulator in lock-step"));
+  CHECK(node.with_node([](emulator::CanNode& n, emulator::NodeFaults&) { return n.writes(); }) == 0);
+}
+
+TEST_CASE("Silence at configure and at activation is told") {
+  NodeOnSocket node({});
+  CanDriver rig({.answer_timeout_us = 1000}, node.opener(), true);
+  node.fault("silent");
+  CHECK_THROWS_WITH(rig.configure(), Catch::Matchers::Contains("no node answers"));
+  node.fault("ok");
+  rig.configure();
+  node.fault("silent");
+  CHECK_THROWS_AS(rig.activate(0), driver::Unavailable);
+  CHECK(rig.state() == driver::DriverState::inactive);
+}

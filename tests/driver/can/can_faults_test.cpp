@@ -1,0 +1,199 @@
+// What goes wrong on the bus: the reason, how soon, and what is left on the wire.
+
+#include <linux/can/error.h>
+
+#include "abs_hil/driver/can/signal_codec.hpp"
+#include "catch.hpp"
+#include "node_on_socket.hpp"
+
+using namespace abs_hil;
+using driver::can::CanDriver;
+using driver::can::CanOptions;
+using rig::Reason;
+using test::NodeOnSocket;
+
+namespace {
+
+constexpr std::int64_t ms = 1'000'000;
+
+struct Active {
+  explicit Active(bool fd = false, CanOptions options = {.answer_timeout_us = 2000})
+      : node({.start_speed_rad_s = 60.0}), driver(options, node.opener(fd), true) {
+    driver.configure();
+    driver.activate(0);
+    for (int i = 0; i < 20; ++i) REQUIRE(cycle().ok());
+    REQUIRE(node.wire().brake_duty == 0.5);
+  }
+  driver::IoResult cycle() {
+    const driver::IoResult result = driver.read(now_ns += ms, measurement);
+    return result.ok() ? driver.write({.brake_duty = 0.5}) : result;
+  }
+  /// Cycles until one fails; its result.
+  driver::IoResult until_failure(int most_cycles) {
+    driver::IoResult result{};
+    for (cycles = 0; result.ok() && cycles < most_cycles; ++cycles) result = cycle();
+    return result;
+  }
+  NodeOnSocket node;
+  CanDriver driver;
+  rig::Measurement measurement{};
+  std::int64_t now_ns{0};
+  int cycles{0};
+};
+
+can_frame error_frame(std::uint32_t kind, std::uint8_t controller = 0) {
+  can_frame frame{};
+  frame.can_id = CAN_ERR_FLAG | kind;
+  frame.can_dlc = CAN_ERR_DLC;
+  frame.data[1] = controller;
+  return frame;
+}
+
+}  // namespace
+
+TEST_CASE("Each fault of the node has its reason, within the bucket's patience, and the brake is off") {
+  struct Case {
+    const char* fault;
+    Reason reason;
+    int cycles;     ///< at most
+    int cycles_fd;  ///< one frame instead of two tells the same
+  };
+  const std::vector<Case> cases{{"silent", Reason::can_node_silent, 5, 5},
+                                {"stale=20", Reason::can_frames_stale, 5, 5},
+                                {"stuck", Reason::can_frames_duplicated, 3, 4},
+                                {"ahead=3", Reason::can_frames_out_of_order, 2, 3},
+                                {"duplicate", Reason::can_frames_duplicated, 10, 10},
+                                {"wrong-size=7", Reason::can_frame_wrong_length, 2, 3},
+                                {"wrong-size=0", Reason::can_frame_wrong_length, 2, 3},
+                                {"corrupt", Reason::can_frames_forged, 2, 3},
+                                {"nonsense", Reason::can_values_implausible, 3, 3},
+                                {"babble=10", Reason::can_frames_forged, 1, 1}};
+  for (const bool fd : {false, true}) {
+    for (const Case& c : cases) {
+      INFO(c.fault << (fd ? " with CAN FD" : ""));
+      Active rig(fd);
+      rig.node.fault(c.fault);
+      const driver::IoResult result = rig.until_failure(50);
+      CHECK_FALSE(result.ok());
+      CHECK(result.reason == c.reason);
+      CHECK(rig.cycles <= (fd ? c.cycles_fd : c.cycles));
+      CHECK(rig.driver.state() == driver::DriverState::active);
+      CHECK(rig.node.wire().brake_duty == 0.0);
+    }
+  }
+}
+
+TEST_CASE("Answers the wrong way round are told") {
+  Active rig;
+  rig.node.fault("swapped");
+  CHECK(rig.until_failure(20).reason == Reason::can_frames_out_of_order);
+}
+
+TEST_CASE("Single losses are borne: the measurement before is handed out again, with its time") {
+  Active rig;
+  const rig::Measurement before = rig.measurement;
+  rig.node.fault("drop=4");
+  for (int i = 0; i < 4; ++i) {
+    REQUIRE(rig.cycle().ok());
+    CHECK(rig.measurement.time_ns == before.time_ns);
+    CHECK(rig.measurement.upper_counts == before.upper_counts);
+  }
+  for (int i = 0; i < 20; ++i) REQUIRE(rig.cycle().ok());
+  CHECK(rig.measurement.time_ns == rig.now_ns);
+  CHECK(rig.driver.counters().lost == 4);
+  CHECK(rig.node.wire().brake_duty == 0.5);
+}
+
+TEST_CASE("Losses of every third answer are borne for ever, of every second one not") {
+  for (const int every : {3, 2}) {
+    Active rig;
+    driver::IoResult result{};
+    for (int i = 0; i < 200 && result.ok(); ++i) {
+      if (i % every == 0) rig.node.fault("drop=1");
+      result = rig.cycle();
+    }
+    CHECK(result.ok() == (every == 3));
+    if (every == 2) CHECK(result.reason == Reason::can_node_silent);
+  }
+}
+
+TEST_CASE("The controller's states: bus-off and error-passive end the run at once, warnings and bus errors do not") {
+  Active warned;
+  warned.node.inject(error_frame(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_WARNING));
+  warned.node.inject(error_frame(CAN_ERR_PROT));
+  CHECK(warned.cycle().ok());
+  CHECK(warned.driver.counters().error_frames == 2);
+  CHECK(warned.driver.counters().error_warnings == 1);
+
+  Active passive;
+  passive.node.inject(error_frame(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE));
+  CHECK(passive.cycle().reason == Reason::can_error_passive);
+
+  Active off;
+  off.node.inject(error_frame(CAN_ERR_BUSOFF));
+  const driver::IoResult result = off.cycle();
+  CHECK(result.reason == Reason::can_bus_off);
+  CHECK(result.error == driver::IoError::disconnected);
+}
+
+TEST_CASE("An interface that goes away is told, and so is that the safe state cannot be confirmed") {
+  Active rig;
+  rig.node.hang_up();
+  const driver::IoResult result = rig.cycle();
+  CHECK(result.reason == Reason::can_interface_down);
+  CHECK(rig.driver.deactivate().error == driver::IoError::disconnected);
+}
+
+TEST_CASE("A node that takes no commands latches by its watchdog and is told") {
+  Active rig;
+  rig.node.fault("deaf");
+  CHECK(rig.until_failure(50).reason == Reason::can_node_latched);
+  CHECK(rig.cycles == 20);
+
+  Active same(false, {.answer_timeout_us = 2000});
+  same.node.fault("no-status");
+  for (int i = 0; i < 30; ++i) REQUIRE(same.cycle().ok());
+}
+
+TEST_CASE("A node that starts anew in mid-run is told") {
+  Active rig;
+  // Another node of the same kind takes over: powered on later, inactive.
+  rig.node.with_node([](emulator::CanNode& node, emulator::NodeFaults&) {
+    node = emulator::CanNode({.start_speed_rad_s = 60.0, .lock_step = true});
+  });
+  CHECK(rig.until_failure(5).reason == Reason::can_node_restarted);
+  CHECK(rig.node.wire().brake_duty == 0.0);
+}
+
+TEST_CASE("Forged, repeated and old commands neither act nor feed the node's watchdog") {
+  Active rig;
+  emulator::BusFrame forged{.id = 0x81, .length = 8, .data = {0x10, 0x27}};
+  const auto now = [&] {
+    return rig.node.with_node([](emulator::CanNode& n, emulator::NodeFaults&) { return n.last_command_ns(); });
+  };
+  const std::int64_t fed_ns = now();
+  rig.node.send_to_node(forged);  // wrong check
+  emulator::seal(forged);
+  rig.node.send_to_node(forged);  // old sequence
+  CHECK(rig.node.wire().brake_duty == 0.5);
+  CHECK(now() == fed_ns);
+  CHECK(rig.node.with_node([](emulator::CanNode& n, emulator::NodeFaults&) { return n.rejected(); }) == 2);
+  // A stream of them is an attack or a second host: the node cuts its outputs.
+  for (int i = 0; i < 10; ++i) rig.node.send_to_node(forged);
+  CHECK(rig.node.wire().brake_duty == 0.0);
+  CHECK(rig.cycle().reason == Reason::can_node_latched);
+}
+
+TEST_CASE("Commands computed from old measurements do not feed the watchdog") {
+  Active rig;
+  // The driver hears nothing any more but, told to bear it, goes on commanding: the node's own view must end that.
+  Active patient(false, {.watchdog_ms = 20, .answer_timeout_us = 500, .loss_limit = 1'000'000});
+  patient.node.fault("silent");
+  int cycles = 0;
+  while (patient.node.wire().brake_duty > 0.0 && cycles < 60) {
+    REQUIRE(patient.cycle().ok());
+    ++cycles;
+  }
+  CHECK(cycles >= 8 + 9);   // 8 measurements old are allowed, then the node's bucket fills by 2 a command ...
+  CHECK(cycles <= 8 + 20);  // ... or the watchdog ends it
+}

@@ -1,0 +1,122 @@
+#include "abs_hil/driver/can/frame_socket.hpp"
+
+#include <linux/can.h>
+#include <linux/can/error.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <utility>
+
+#include "abs_hil/driver/can/error_frame.hpp"
+#include "catch.hpp"
+
+using namespace abs_hil::driver::can;
+
+namespace {
+
+struct Pair {
+  Pair() { REQUIRE(::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) == 0); }
+  Pair(const Pair&) = delete;
+  Pair& operator=(const Pair&) = delete;
+  ~Pair() { ::close(ends[1]); }
+  std::array<int, 2> ends{};
+};
+
+}  // namespace
+
+TEST_CASE("Frames go out and come in as the kernel's structures, with a time stamp") {
+  Pair pair;
+  FrameSocket socket(pair.ends[0]);
+  Frame frame{.id = 0x81, .length = 3, .data = {1, 2, 3}};
+  CHECK(socket.send(frame).outcome == SendOutcome::sent);
+  can_frame raw{};
+  REQUIRE(::recv(pair.ends[1], &raw, sizeof raw, 0) == CAN_MTU);
+  CHECK(raw.can_id == 0x81);
+  CHECK(raw.can_dlc == 3);
+  CHECK(raw.data[2] == 3);
+
+  raw.can_id = 0x92;
+  const std::int64_t before_ns = monotonic_ns();
+  REQUIRE(::send(pair.ends[1], &raw, sizeof raw, 0) == CAN_MTU);
+  Frame received;
+  CHECK(socket.receive(received, 0).outcome == ReceiveOutcome::frame);
+  CHECK(received.id == 0x92);
+  CHECK(received.length == 3);
+  CHECK_FALSE(received.fd);
+  CHECK_FALSE(received.error);
+  CHECK(received.received_ns >= before_ns - 1'000'000);
+  CHECK(received.received_ns <= monotonic_ns());
+  CHECK(socket.receive(received, 0).outcome == ReceiveOutcome::nothing);
+}
+
+TEST_CASE("FD frames, extended frames, sizes that are none") {
+  Pair pair;
+  FrameSocket socket(pair.ends[0]);
+  Frame frame{.id = 0x94, .length = 24, .fd = true};
+  CHECK(socket.send(frame).outcome == SendOutcome::sent);
+  canfd_frame raw{};
+  REQUIRE(::recv(pair.ends[1], &raw, sizeof raw, 0) == CANFD_MTU);
+  CHECK(raw.len == 24);
+  raw.len = 255;  // no length that a frame can have
+  static_cast<void>(::send(pair.ends[1], &raw, CANFD_MTU, 0));
+  Frame received;
+  CHECK(socket.receive(received, 0).outcome == ReceiveOutcome::frame);
+  CHECK(received.length == CANFD_MAX_DLEN);
+  CHECK(received.fd);
+
+  can_frame extended{};
+  extended.can_id = 0x92U | CAN_EFF_FLAG;
+  static_cast<void>(::send(pair.ends[1], &extended, sizeof extended, 0));
+  CHECK(socket.receive(received, 0).outcome == ReceiveOutcome::frame);
+  CHECK(received.id != 0x92);
+
+  static_cast<void>(::send(pair.ends[1], &raw, 5, 0));
+  CHECK(socket.receive(received, 0).outcome == ReceiveOutcome::malformed);
+}
+
+TEST_CASE("A full queue is told as such, not as success; a closed end as down") {
+  Pair pair;
+  FrameSocket socket(pair.ends[0]);
+  Frame frame{.id = 0x81, .length = 8};
+  int sent = 0;
+  SendResult result = socket.send(frame);
+  while (result.outcome == SendOutcome::sent && sent < 1'000'000) {
+    ++sent;
+    result = socket.send(frame);
+  }
+  CHECK(result.outcome == SendOutcome::full);
+  CHECK(sent > 0);
+  ::shutdown(pair.ends[1], SHUT_RDWR);
+  CHECK(socket.send(frame).outcome == SendOutcome::down);
+  Frame received;
+  CHECK(socket.receive(received, 0).outcome == ReceiveOutcome::down);
+}
+
+TEST_CASE("Error frames tell the controller's state") {
+  Pair pair;
+  FrameSocket socket(pair.ends[0]);
+  const auto report_of = [&](std::uint32_t kind, std::uint8_t controller) {
+    can_frame raw{};
+    raw.can_id = CAN_ERR_FLAG | kind;
+    raw.can_dlc = CAN_ERR_DLC;
+    raw.data[1] = controller;
+    static_cast<void>(::send(pair.ends[1], &raw, sizeof raw, 0));
+    Frame received;
+    REQUIRE(socket.receive(received, 0).outcome == ReceiveOutcome::frame);
+    REQUIRE(received.error);
+    return bus_report(received);
+  };
+  CHECK(report_of(CAN_ERR_BUSOFF, 0).bus_off);
+  CHECK(report_of(CAN_ERR_RESTARTED, 0).restarted);
+  CHECK(report_of(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE).error_passive);
+  CHECK(report_of(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE).error_passive);
+  CHECK(report_of(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_OVERFLOW).receive_overflow);
+  const BusReport warning = report_of(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_WARNING);
+  CHECK(warning.error_warning);
+  CHECK_FALSE(warning.error_passive);
+  CHECK_FALSE(warning.bus_off);
+  const BusReport other = report_of(CAN_ERR_ACK, CAN_ERR_CRTL_TX_PASSIVE);  // data[1] means nothing without CRTL
+  CHECK(other.other);
+  CHECK_FALSE(other.error_passive);
+}

@@ -1,0 +1,110 @@
+#pragma once
+
+#include <linux/can.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cstring>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "abs_hil/driver/can/can_driver.hpp"
+#include "abs_hil/emulator/can_node.hpp"
+#include "abs_hil/emulator/can_node_faults.hpp"
+
+namespace abs_hil::test {
+
+/// The emulated node in lock-step at the other end of a socket pair, in a thread of its own.
+class NodeOnSocket {
+ public:
+  explicit NodeOnSocket(emulator::CanNodeOptions options) : node_(in_lock_step(std::move(options))) {
+    if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends_.data()) != 0) std::abort();
+    thread_ = std::jthread([this](const std::stop_token& stop) { serve(stop); });
+  }
+  NodeOnSocket(const NodeOnSocket&) = delete;
+  NodeOnSocket& operator=(const NodeOnSocket&) = delete;
+  ~NodeOnSocket() {
+    thread_.request_stop();
+    thread_.join();
+    for (const int end : ends_) ::close(end);
+  }
+
+  /// A link to it; each is a socket of its own.
+  [[nodiscard]] driver::can::CanDriver::OpenLink opener(bool can_fd = false) {
+    return [this, can_fd] {
+      return driver::can::Link{.socket = std::make_unique<driver::can::FrameSocket>(::dup(ends_[0])),
+                               .place = "socket pair",
+                               .can_fd = can_fd};
+    };
+  }
+  /// Work with the node once it has taken all that was sent to it so far.
+  template <typename Work>
+  auto with_node(Work work) {
+    const std::scoped_lock lock(mutex_);
+    take_all();
+    return work(node_, faults_);
+  }
+  void fault(const std::string& text) {
+    with_node([&](emulator::CanNode&, emulator::NodeFaults& faults) { faults.set(text); });
+  }
+  [[nodiscard]] emulator::Outputs wire() {
+    return with_node([](emulator::CanNode& node, emulator::NodeFaults&) { return node.outputs(); });
+  }
+  /// Anything at all to the driver, as if from the bus.
+  void inject(const void* data, std::size_t size) { static_cast<void>(::send(ends_[1], data, size, MSG_NOSIGNAL)); }
+  void inject(const can_frame& frame) { inject(&frame, sizeof frame); }
+  /// To the node, as another one on the bus would.
+  void send_to_node(const emulator::BusFrame& frame) {
+    with_node([&](emulator::CanNode& node, emulator::NodeFaults&) { node.receive(frame); });
+  }
+  /// The driver finds its end of the pair closed.
+  void hang_up() { ::shutdown(ends_[1], SHUT_RDWR); }
+
+ private:
+  static emulator::CanNodeOptions in_lock_step(emulator::CanNodeOptions options) {
+    options.lock_step = true;
+    return options;
+  }
+  void serve(const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      pollfd waiting{ends_[1], POLLIN, 0};
+      if (::poll(&waiting, 1, 20) <= 0) continue;
+      const std::scoped_lock lock(mutex_);
+      if (!take_all()) return;
+    }
+  }
+  /// False once the pair is closed.
+  bool take_all() {
+    for (;;) {
+      canfd_frame raw{};
+      const ssize_t size = ::recv(ends_[1], &raw, sizeof raw, MSG_DONTWAIT);
+      if (size == 0) return false;
+      if (size < 0) return true;
+      emulator::BusFrame frame{.id = raw.can_id, .length = raw.len, .fd = size == CANFD_MTU};
+      std::memcpy(frame.data.data(), raw.data, sizeof raw.data);
+      if (!faults_.hears(frame)) continue;
+      node_.receive(frame);
+      for (const emulator::BusFrame& answer : faults_.answer(node_.take_answers())) send(answer);
+    }
+  }
+  void send(const emulator::BusFrame& frame) {
+    canfd_frame raw{};
+    raw.can_id = frame.id;
+    raw.len = frame.length;
+    std::memcpy(raw.data, frame.data.data(), sizeof raw.data);
+    inject(&raw, frame.fd ? CANFD_MTU : CAN_MTU);
+  }
+
+  std::array<int, 2> ends_{};  ///< driver's, node's
+  std::mutex mutex_;
+  emulator::CanNode node_;
+  emulator::NodeFaults faults_{1};
+  std::jthread thread_;
+};
+
+}  // namespace abs_hil::test
