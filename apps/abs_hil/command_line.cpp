@@ -48,9 +48,15 @@ void check_together(const RunRequest& request) {
 /// What the board's driver never sends the gate and the controller's anti-windup must know, and its checks of counts
 /// need the wheels' encoders.
 void apply_board_limits(settings::Settings& s) {
-  s.gate.brake_duty_max = std::min(s.gate.brake_duty_max, s.driver.pci.brake_duty_max);
-  s.gate.motor_duty_max = std::min(s.gate.motor_duty_max, s.driver.pci.motor_duty_max);
+  const auto cap = [&s](const auto& board) {
+    s.gate.brake_duty_max = std::min(s.gate.brake_duty_max, board.brake_duty_max);
+    s.gate.motor_duty_max = std::min(s.gate.motor_duty_max, board.motor_duty_max);
+  };
+  if (s.driver.kind == "pci") cap(s.driver.pci);
+  if (s.driver.kind == "can") cap(s.driver.can);
   s.driver.pci.encoder_counts_per_rev = s.plant.rig.encoder_counts_per_rev;
+  s.driver.can.encoder_counts_per_rev = s.plant.rig.encoder_counts_per_rev;
+  s.driver.can.rate_Hz = s.control.rate_Hz;
 }
 
 }  // namespace

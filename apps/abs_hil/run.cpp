@@ -163,12 +163,11 @@ int run(const RunRequest& request) {
   outputs.write(summary, session.executive().statistics(), environment(request, *driver, outcome));
   fmt::print("{}", analysis::to_text(summary));
   if (outputs.folder()) fmt::print("  {:<22}{}\n", "run folder", outputs.folder()->path().string());
+  for (const std::string& line : driver->tally()) spdlog::info("{}", line);
   if (!outcome.completed()) spdlog::error("run ended early: {}", summary.reason);
   if (!outcome.safe_state.ok()) {
-    spdlog::error(
-        "the safe state may not have reached the board ({}): its PWMs may hold their last duties. Press the "
-        "E-stop and switch the rig off",
-        driver::error_text(outcome.safe_state));
+    spdlog::error("the safe state may not have reached the board ({}): {}. Press the E-stop and switch the rig off",
+                  driver::error_text(outcome.safe_state), driver->what_holds_unsafe());
   }
   if (!lost.empty()) {
     spdlog::error("recorded data was lost: {}", lost);

@@ -3,14 +3,13 @@
 #include <fmt/format.h>
 
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <stdexcept>
-#include <utility>
 #include <vector>
 
 #include "abs_hil/driver/pci/discovery.hpp"
 #include "abs_hil/runtime/clock.hpp"
+#include "control_fifo.hpp"
 
 namespace abs_hil::app {
 
@@ -29,33 +28,6 @@ void open_for_writing(std::ofstream& stream, const std::string& file) {
   stream.close();
   stream.open(file);
   if (!stream) throw std::runtime_error(file + ": cannot be written: " + std::strerror(errno));
-}
-
-double number_in(std::string_view text) {
-  double value = 0.0;
-  const auto [at, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || at != text.data() + text.size()) {
-    throw std::invalid_argument("\"" + std::string(text) + "\" is not a number");
-  }
-  return value;
-}
-
-bool on_or_off(std::string_view text) {
-  if (text != "on" && text != "off") throw std::invalid_argument("\"" + std::string(text) + "\": give on or off");
-  return text == "on";
-}
-
-std::vector<std::string> words_of(std::string_view line) {
-  std::vector<std::string> words;
-  std::string word;
-  for (const char c : std::string(line) + ' ') {
-    if (c != ' ' && c != '\t' && c != '\r') {
-      word += c;
-    } else if (!word.empty()) {
-      words.push_back(std::exchange(word, {}));
-    }
-  }
-  return words;
 }
 
 }  // namespace

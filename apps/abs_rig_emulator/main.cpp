@@ -1,12 +1,10 @@
-// The device side of the rig as a process of its own: an emulated RT-DAC4/PCI with the simulated rig behind it, served
-// as a tree like /sys/bus/pci/devices (docs/rig-setup.md).
+// The device side of the rig as a process of its own, with the simulated rig behind it: an emulated RT-DAC4/PCI, served
+// as a tree like /sys/bus/pci/devices (docs/rig-setup.md), or a CAN I/O node (docs/can.md).
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
 #include <sched.h>
 #include <sys/mman.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -18,11 +16,13 @@
 #include <vector>
 
 #include "abs_hil/driver/pci/discovery.hpp"
-#include "abs_hil/driver/pci/sysfs_window.hpp"
 #include "abs_hil/settings/config_error.hpp"
 #include "abs_hil/settings/config_file.hpp"
 #include "abs_hil/settings/key_table.hpp"
+#include "bus_socket.hpp"
+#include "control_fifo.hpp"
 #include "emulated_card.hpp"
+#include "emulated_node.hpp"
 #include "fuse_tree.hpp"
 
 namespace {
@@ -35,6 +35,8 @@ static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may touc
 struct Arguments {
   app::EmulatorOptions emulator{};
   std::string pci_root{};
+  std::string can_interface{};
+  std::uint16_t watchdog_ms{20};
   std::vector<std::string> bdfs{"0000:03:00.0"};
   std::string plant{"paper-table1"};
   std::vector<std::string> assignments{};
@@ -62,9 +64,15 @@ void add_card_options(CLI::App& cli, emulator::CardOptions& card) {
 }
 
 void add_options(CLI::App& cli, Arguments& a) {
-  cli.add_option("--pci-root", a.pci_root, "folder to mount the tree at; made if it is not there")
-      ->required()
+  auto* board = cli.add_option_group("board", "what the rig is behind");
+  board->add_option("--pci-root", a.pci_root, "a card: folder to mount its tree at; made if it is not there")
       ->type_name("DIR");
+  board->add_option("--can", a.can_interface, "a CAN I/O node: interface, or unix:PATH to listen at in its place")
+      ->type_name("IFACE");
+  board->require_option(1);
+  cli.add_option("--watchdog-ms", a.watchdog_ms, "of the CAN node, until its activation says otherwise")
+      ->check(CLI::Range(1, 10'000))
+      ->capture_default_str();
   cli.add_option("--bdf", a.bdfs, "the card's address; repeated: more cards, for show")->capture_default_str();
   cli.add_option("--plant", a.plant, "plant by name or TOML file")->capture_default_str();
   cli.add_option("--set", a.assignments, "any plant value, plant.theta_N=30 say")->allow_extra_args(false);
@@ -86,7 +94,8 @@ void add_options(CLI::App& cli, Arguments& a) {
       ->check(CLI::Range(0, 98))
       ->capture_default_str();
   add_card_options(cli, a.emulator.card);
-  cli.footer(std::string("Control commands (--command, --control):\n") + app::EmulatedCard::commands());
+  cli.footer(std::string("Control commands (--command, --control) of a card:\n") + app::EmulatedCard::commands() +
+             "of a CAN node:\n" + app::EmulatedNode::commands());
 }
 
 void read_plant(Arguments& a) {
@@ -120,40 +129,6 @@ std::vector<app::ServedFile> files_of(const Arguments& a) {
   return files;
 }
 
-driver::pci::FileDescriptor open_control(const std::string& fifo) {
-  if (fifo.empty()) return driver::pci::FileDescriptor(-1);
-  if (::mkfifo(fifo.c_str(), 0600) != 0 && errno != EEXIST) {
-    throw std::runtime_error(fifo + ": cannot be made: " + std::strerror(errno));
-  }
-  // For writing too: else it would be at its end whenever no one writes.
-  const int fd = ::open(fifo.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
-  if (fd < 0) throw std::runtime_error(fifo + ": cannot be opened: " + std::strerror(errno));
-  return driver::pci::FileDescriptor(fd);
-}
-
-void say(const std::string& text) {
-  fmt::print("{}\n", text);
-  std::fflush(stdout);
-}
-
-void obey(app::EmulatedCard& card, const std::string& line) {
-  try {
-    say(line + ": " + card.obey(line));
-  } catch (const std::exception& error) {
-    say(line + ": error: " + error.what());
-  }
-}
-
-void take_commands(int fd, std::string& pending, app::EmulatedCard& card) {
-  std::array<char, 512> buffer{};
-  const ssize_t got = ::read(fd, buffer.data(), buffer.size());
-  if (got > 0) pending.append(buffer.data(), static_cast<std::size_t>(got));
-  for (std::size_t end = pending.find('\n'); end != std::string::npos; end = pending.find('\n')) {
-    obey(card, pending.substr(0, end));
-    pending.erase(0, end + 1);
-  }
-}
-
 void pin_to(int cpu) {
   if (cpu < 0) return;
   cpu_set_t set;
@@ -170,13 +145,45 @@ void take_priority(const Arguments& a) {
   sched_param wanted{};
   wanted.sched_priority = a.priority;
   if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0 || sched_setscheduler(0, SCHED_FIFO, &wanted) != 0) {
-    say(std::string("not in real time (") + std::strerror(errno) +
-        "): slow answers are to be expected; see abs_hil doctor, or --priority 0");
+    app::say(std::string("not in real time (") + std::strerror(errno) +
+             "): slow answers are to be expected; see abs_hil doctor, or --priority 0");
   }
+}
+
+/// Frames catch up with the clock by themselves; between them the rig goes on every ms, in steps of 100 us.
+constexpr timespec idle{.tv_sec = 0, .tv_nsec = 1'000'000};
+
+int serve_node(const Arguments& a) {
+  app::BusSocket bus(a.can_interface);
+  app::EmulatedNode node({.plant = a.emulator.card.plant,
+                          .start_speed_rad_s = a.emulator.card.start_speed_rad_s,
+                          .watchdog_ms = a.watchdog_ms,
+                          .lock_step = a.emulator.lock_step,
+                          .can_fd = bus.can_fd(),
+                          .supply_min_V = a.emulator.card.supply_min_V,
+                          .temperature_max_C = static_cast<double>(a.emulator.card.temperature_max_C),
+                          .overspeed_rpm = a.emulator.card.overspeed_rpm},
+                         a.emulator.seed);
+  for (const std::string& fault : a.faults) static_cast<void>(node.obey("fault " + fault));
+  for (const std::string& command : a.commands) static_cast<void>(node.obey(command));
+  pin_to(a.cpu);
+  take_priority(a);
+  app::ControlFifo control(a.control_fifo);
+  app::say("ready: CAN node on " + a.can_interface);
+  while (!stop_requested) {
+    std::array<pollfd, 2> ready{{{bus.descriptor(), POLLIN, 0}, {control.descriptor(), POLLIN, 0}}};
+    static_cast<void>(::ppoll(ready.data(), ready.size(), &idle, nullptr));
+    if (ready[0].revents != 0) node.serve(bus);
+    if (ready[1].revents != 0) control.take([&node](const std::string& line) { return node.obey(line); });
+    node.catch_up();
+  }
+  app::say("ended: " + node.status());
+  return 0;
 }
 
 int serve(Arguments& a) {
   read_plant(a);
+  if (!a.can_interface.empty()) return serve_node(a);
   app::EmulatedCard card(a.emulator);
   for (const std::string& fault : a.faults) static_cast<void>(card.obey("fault " + fault));
   for (const std::string& command : a.commands) static_cast<void>(card.obey(command));
@@ -184,21 +191,18 @@ int serve(Arguments& a) {
   take_priority(a);
   std::filesystem::create_directories(a.pci_root);
   app::FuseTree tree(a.pci_root, a.bdfs, files_of(a), card);
-  const driver::pci::FileDescriptor control = open_control(a.control_fifo);
-  say("ready: card " + a.bdfs.front() + " in " + a.pci_root);
+  app::ControlFifo control(a.control_fifo);
+  app::say("ready: card " + a.bdfs.front() + " in " + a.pci_root);
 
-  // Accesses catch up with the clock by themselves; between them the rig goes on every ms, in steps of 100 us.
-  constexpr timespec idle{.tv_sec = 0, .tv_nsec = 1'000'000};
-  std::string pending;
   bool serving = true;
   while (serving && !stop_requested) {
-    std::array<pollfd, 2> ready{{{tree.descriptor(), POLLIN, 0}, {control.get(), POLLIN, 0}}};
+    std::array<pollfd, 2> ready{{{tree.descriptor(), POLLIN, 0}, {control.descriptor(), POLLIN, 0}}};
     static_cast<void>(::ppoll(ready.data(), ready.size(), &idle, nullptr));
     if (ready[0].revents != 0) serving = tree.serve_one();
-    if (ready[1].revents != 0) take_commands(control.get(), pending, card);
+    if (ready[1].revents != 0) control.take([&card](const std::string& line) { return card.obey(line); });
     card.catch_up();
   }
-  say("ended: " + card.status());
+  app::say("ended: " + card.status());
   return 0;
 }
 
@@ -208,7 +212,7 @@ int main(int argc, char** argv) {
   struct sigaction action {};
   action.sa_handler = [](int) { stop_requested = true; };
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
-  CLI::App cli{"The ABS rig behind an emulated RT-DAC4/PCI card, as a tree of files like sysfs'"};
+  CLI::App cli{"The ABS rig behind an emulated board: RT-DAC4/PCI card or CAN I/O node"};
   Arguments arguments;
   add_options(cli, arguments);
   try {

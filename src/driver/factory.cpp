@@ -4,6 +4,8 @@
 #include <ctime>
 #include <vector>
 
+#include "abs_hil/driver/can/can_driver.hpp"
+#include "abs_hil/driver/can/link.hpp"
 #include "abs_hil/driver/pci/discovery.hpp"
 #include "abs_hil/driver/pci/pci_driver.hpp"
 
@@ -18,7 +20,7 @@ std::span<const BackendEntry> backends() noexcept {
 }
 
 std::span<const std::string_view> board_kinds() noexcept {
-  static constexpr std::array<std::string_view, 1> kinds{"pci"};
+  static constexpr std::array<std::string_view, 2> kinds{"pci", "can"};
   return kinds;
 }
 
@@ -39,12 +41,22 @@ std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options, bool lo
         options.pci, [pci = options.pci, lock_step] { return pci::open_card(pci, lock_step); },
         lock_step ? nullptr : monotonic_ns);
   }
+  if (options.kind == "can") {
+    return std::make_unique<can::CanDriver>(
+        options.can, [can = options.can] { return can::open_link(can); }, lock_step);
+  }
   throw Unavailable("backend rig: driver.kind = \"" + options.kind +
-                    "\": this build does not drive that board; use driver.kind=pci or --backend sim");
+                    "\": this build does not drive that board; use driver.kind=pci, driver.kind=can or --backend sim");
 }
 
 std::string verification_note(const DriverOptions& options) {
   if (options.verified_on_hardware) return {};
+  if (options.kind == "can") {
+    return "backend rig, driver.kind=can: not verified on hardware. The protocol is this project's own (docs/can.md) "
+           "and "
+           "was tried on an emulated node alone: go through docs/can.md, \"What is not verified\", then set "
+           "driver.verified_on_hardware=true";
+  }
   return "backend rig, driver.kind=" + options.kind +
          ": not verified on hardware. Its registers come from the maker's documents and were tried on an emulator "
          "alone: "

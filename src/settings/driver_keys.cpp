@@ -1,5 +1,7 @@
 #include "driver_keys.hpp"
 
+#include "can_keys.hpp"
+
 namespace abs_hil::settings {
 
 namespace {
@@ -53,6 +55,7 @@ void add_driver_keys(std::vector<Key>& keys, driver::DriverOptions& d) {
            &d.verified_on_hardware},
       });
   add_pci_keys(keys, d.pci);
+  add_can_keys(keys, d.can);
 }
 
 }  // namespace abs_hil::settings

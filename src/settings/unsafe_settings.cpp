@@ -16,6 +16,12 @@ bool is_of_the_kernel(const std::string& folder) {
   return std::filesystem::weakly_canonical(folder, error).string().starts_with("/sys/");
 }
 
+/// A network interface with a device behind it is an adapter; vcan has none, nor has a socket in place of a bus.
+bool is_an_adapter(const std::string& interface) {
+  std::error_code ignored;
+  return std::filesystem::exists("/sys/class/net/" + interface + "/device", ignored);
+}
+
 void refuse_injection_into_hardware(const Settings& s) {
   const std::vector<driver::Injection> injections = injections_of(s);
   if (injections.empty() || s.backend != "rig") return;
@@ -31,6 +37,12 @@ void refuse_injection_into_hardware(const Settings& s) {
         fmt::format("--inject {}: driver.emulated=true, but driver.pci.root = {} holds the real cards; give the "
                     "emulator's folder",
                     fault, s.driver.pci.root));
+  }
+  if (s.driver.kind == "can" && is_an_adapter(s.driver.can.interface)) {
+    throw ConfigError(fmt::format(
+        "--inject {}: driver.emulated=true, but driver.can.interface = {} is an adapter to a real bus; give "
+        "a vcan interface or an emulator's socket",
+        fault, s.driver.can.interface));
   }
 }
 
@@ -49,6 +61,12 @@ std::vector<driver::Injection> injections_of(const Settings& settings) {
 
 void refuse_unsafe(const Settings& s, const KeyTable& keys) {
   refuse_injection_into_hardware(s);
+  if (s.backend == "rig" && s.driver.kind == "can") {
+    refuse_cap_above_board(keys, "gate.brake_duty_max", s.gate.brake_duty_max, "driver.can.brake_duty_max",
+                           s.driver.can.brake_duty_max);
+    refuse_cap_above_board(keys, "gate.motor_duty_max", s.gate.motor_duty_max, "driver.can.motor_duty_max",
+                           s.driver.can.motor_duty_max);
+  }
   if (s.backend == "rig" && s.driver.kind == "pci") {
     refuse_cap_above_board(keys, "gate.brake_duty_max", s.gate.brake_duty_max, "driver.pci.brake_duty_max",
                            s.driver.pci.brake_duty_max);

@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "abs_hil/driver/can/options.hpp"
 #include "abs_hil/driver/pci/options.hpp"
 #include "abs_hil/driver/rig_driver.hpp"
 
@@ -18,6 +19,7 @@ struct DriverOptions {
   /// Set by a lab that has gone through docs/rig-setup.md on its own rig; until then doctor and log say otherwise.
   bool verified_on_hardware{false};
   pci::PciOptions pci{};
+  can::CanOptions can{};
 };
 
 struct BackendEntry {

@@ -55,6 +55,10 @@ class RigDriver {
   [[nodiscard]] virtual std::vector<std::string> notes() const { return {}; }
   /// What the run's traffic came to, a line each, for the log after a run. Empty from backends that count none.
   [[nodiscard]] virtual std::vector<std::string> tally() const { return {}; }
+  /// What the rig does when the safe state did not reach the board, for people.
+  [[nodiscard]] virtual std::string_view what_holds_unsafe() const noexcept {
+    return "its PWMs may hold their last duties";
+  }
   /// All that the configured board lets itself be asked without anything being written, a line each, for people.
   [[nodiscard]] virtual std::vector<std::string> inspection() { return {}; }
 

@@ -54,6 +54,9 @@ class CanDriver final : public RigDriver {
   [[nodiscard]] std::string_view name() const noexcept override { return "can"; }
   [[nodiscard]] std::vector<std::string> notes() const override;
   [[nodiscard]] std::vector<std::string> tally() const override;
+  [[nodiscard]] std::string_view what_holds_unsafe() const noexcept override {
+    return "the node's watchdog should have zeroed them, if the node works";
+  }
   [[nodiscard]] std::vector<std::string> inspection() override;
   [[nodiscard]] const CanCounters& counters() const noexcept { return counters_; }
 

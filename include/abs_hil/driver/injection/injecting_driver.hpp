@@ -30,6 +30,8 @@ class InjectingDriver final : public RigDriver {
   [[nodiscard]] std::string_view name() const noexcept override { return inner_->name(); }
   [[nodiscard]] rig::PlantTruth truth() const noexcept override { return inner_->truth(); }
   [[nodiscard]] std::vector<std::string> notes() const override;
+  [[nodiscard]] std::vector<std::string> tally() const override { return inner_->tally(); }
+  [[nodiscard]] std::string_view what_holds_unsafe() const noexcept override { return inner_->what_holds_unsafe(); }
   [[nodiscard]] std::vector<std::string> inspection() override { return inner_->inspection(); }
   void note_phase(rig::Phase phase) noexcept override;
   [[nodiscard]] const RigDriver& inner() const noexcept { return *inner_; }

@@ -1,0 +1,78 @@
+#include "control_fifo.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+namespace abs_hil::app {
+
+void say(const std::string& text) {
+  fmt::print("{}\n", text);
+  std::fflush(stdout);
+}
+
+std::vector<std::string> words_of(std::string_view line) {
+  std::vector<std::string> words;
+  std::string word;
+  for (const char c : std::string(line) + ' ') {
+    if (c != ' ' && c != '\t' && c != '\r') {
+      word += c;
+    } else if (!word.empty()) {
+      words.push_back(std::exchange(word, {}));
+    }
+  }
+  return words;
+}
+
+double number_in(std::string_view text) {
+  double value = 0.0;
+  const auto [at, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || at != text.data() + text.size()) {
+    throw std::invalid_argument("\"" + std::string(text) + "\" is not a number");
+  }
+  return value;
+}
+
+bool on_or_off(std::string_view text) {
+  if (text != "on" && text != "off") throw std::invalid_argument("\"" + std::string(text) + "\": give on or off");
+  return text == "on";
+}
+
+ControlFifo::ControlFifo(const std::string& path) {
+  if (path.empty()) return;
+  if (::mkfifo(path.c_str(), 0600) != 0 && errno != EEXIST) {
+    throw std::runtime_error(path + ": cannot be made: " + std::strerror(errno));
+  }
+  // For writing too: else it would be at its end whenever no one writes.
+  descriptor_ = ::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor_ < 0) throw std::runtime_error(path + ": cannot be opened: " + std::strerror(errno));
+}
+
+ControlFifo::~ControlFifo() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+void ControlFifo::take(const Obey& obey) {
+  std::array<char, 512> buffer{};
+  const ssize_t got = ::read(descriptor_, buffer.data(), buffer.size());
+  if (got > 0) pending_.append(buffer.data(), static_cast<std::size_t>(got));
+  for (std::size_t end = pending_.find('\n'); end != std::string::npos; end = pending_.find('\n')) {
+    const std::string line = pending_.substr(0, end);
+    pending_.erase(0, end + 1);
+    try {
+      say(line + ": " + obey(line));
+    } catch (const std::exception& error) {
+      say(line + ": error: " + error.what());
+    }
+  }
+}
+
+}  // namespace abs_hil::app

@@ -1,0 +1,90 @@
+"""The paper's experiment through driver.kind=can, against the emulated node in another process. Outcomes are asserted,
+never timing; tests/vm has the same on real kernels' CAN."""
+import unittest
+
+from can_emulator import CanTest, skip_unless_possible
+
+SAFE = (0.0, 0.0)
+# fault that the node has from its first second on, words on stderr
+BROKEN = [
+    ('silent', 'CAN node did not answer too often'),
+    ('stale=20', 'CAN node answers with old sequence numbers'),
+    ('wrong-size=6', 'CAN frames have the wrong length'),
+    ('babble=10', "are not the node's (wrong check)"),
+]
+
+
+class CanRun(CanTest):
+    def test_lock_step_agrees_with_the_simulator(self):
+        rig, sim = self.folder / 'rig.json', self.folder / 'sim.json'
+        self.fast('--summary', sim, '--set', 'gate.brake_duty_max=0.7')
+        for fd in ('off', 'on'):
+            node = self.node('--lock-step')
+            result = self.lock_step(node, '--summary', rig, '--set', f'driver.can.fd={fd}')
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn('not verified on hardware', result.stderr)
+            self.assertIn('CAN FD frames' if fd == 'on' else 'classic frames', result.stderr)
+            self.assertIn('cycles, 0 without an answer in time', result.stderr)
+            r, s = self.summary(rig), self.summary(sim)
+            self.assertEqual(r['config']['gate']['brake_duty_max'], 0.7)
+            for key in ('stop_time_s', 'stop_distance_m', 'theta_final_N', 'brake_start_s'):
+                self.assertAlmostEqual(r[key] / s[key], 1.0, delta=0.01, msg=key)
+            self.assertEqual(node.wire(), SAFE)
+            node.end()
+
+    def test_lock_step_repeats_to_the_byte(self):
+        runs = []
+        for name in ('a', 'b'):
+            node = self.node('--lock-step', '--start-speed', 60)
+            csv = self.folder / name
+            result = self.lock_step(node, '--csv', csv, '--set', 'experiment.cut_speed_rad_s=70')
+            self.assertEqual(result.returncode, 0, result.stderr)
+            runs.append(csv.read_bytes())
+        self.assertEqual(runs[0], runs[1])
+
+    def test_broken_node_in_lock_step(self):
+        for fault, words in BROKEN:
+            with self.subTest(fault):
+                node = self.node('--lock-step', '--command', 'supply 24')
+                # The fault begins with the run's first cycles: the handshake is let through.
+                program = self.real_time(node, '--fast', '--set', 'driver.emulated=true', '--set',
+                                         'driver.can.answer_timeout_us=8000', '--set', 'experiment.idle_s=60',
+                                         '--set', 'experiment.accelerate_limit_s=600')
+                while 'active' not in node.command('status').replace('inactive', ''):
+                    pass
+                node.command(f'fault {fault}')
+                _, errors = program.communicate(timeout=60)
+                self.assertEqual(program.returncode, 1, errors)
+                self.assertIn(words, errors)
+                node.command('fault ok')
+                self.assertEqual(node.wire(), SAFE)
+
+    def test_fast_needs_lock_step_and_real_time_its_own_time(self):
+        node = self.node()
+        result = self.lock_step(node)
+        self.assertEqual(result.returncode, 3)
+        self.assertIn('keeps its own time', result.stderr)
+        result = self.run_program(*self.arguments(self.node('--lock-step')))
+        self.assertEqual(result.returncode, 3)
+        self.assertIn('an emulator in lock-step', result.stderr)
+
+    def test_bad_input(self):
+        node = self.node()
+        for setting, status, words in (
+                ('driver.can.interface=can99', 3, 'can99'),
+                ('driver.can.interface=unix:/nowhere/bus', 3, 'start abs_rig_emulator --can unix:/nowhere/bus'),
+                ('driver.can.fd=perhaps', 2, 'auto, on, off'),
+                ('driver.can.watchdog_ms=1', 2, '[5, 10000]'),
+                ('driver.can.answer_timeout_us=900', 2, 'at most 800 us'),
+                ('driver.can.upper_sign=0', 2, 'give 1 or -1'),
+                ('gate.brake_duty_max=0.9', 2, 'driver.can.brake_duty_max')):
+            with self.subTest(setting):
+                result = self.run_program(*self.arguments(node, '--set', setting))
+                self.assertEqual(result.returncode, status, result.stderr)
+                self.assertIn(words, result.stderr)
+        self.assertIn('inactive', node.command('status'))
+
+
+if __name__ == '__main__':
+    skip_unless_possible()
+    unittest.main()
