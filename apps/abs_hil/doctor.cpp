@@ -18,6 +18,7 @@ int doctor(const RunRequest& request, const std::string& only, bool json) {
                                            .lcm_url = telemetry::default_lcm_url(),
                                            .realtime = s.realtime,
                                            .backend = s.backend,
+                                           .rate_Hz = s.control.rate_Hz,
                                            .pci_devices = s.driver.pci.root,
                                            .make_driver = [&s] { return make_driver(s, false); }};
   std::vector<diagnosis::Finding> findings = diagnosis::examine(examination);

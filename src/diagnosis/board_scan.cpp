@@ -1,10 +1,6 @@
 #include "abs_hil/diagnosis/board_scan.hpp"
 
 #include <fcntl.h>
-#include <linux/can.h>
-#include <net/if.h>
-#include <net/if_arp.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -81,41 +77,6 @@ std::vector<Finding> judge(const std::vector<PciBoard>& boards) {
   }
   std::vector<Finding> findings;
   for (const PciBoard& board : boards) findings.push_back(judge_board(board));
-  return findings;
-}
-
-std::vector<CanInterface> find_can_interfaces(const fs::path& root) {
-  std::vector<CanInterface> interfaces;
-  for (const fs::path& net : entries(root / "sys/class/net")) {
-    if (first_line(net / "type") != std::to_string(ARPHRD_CAN)) continue;
-    const unsigned long flags = std::strtoul(first_line(net / "flags", "0").c_str(), nullptr, 0);
-    interfaces.push_back({.name = net.filename().string(), .up = (flags & IFF_UP) != 0});
-  }
-  return interfaces;
-}
-
-bool has_can_sockets() noexcept {
-  const int socket = ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
-  if (socket >= 0) ::close(socket);
-  return socket >= 0;
-}
-
-std::vector<Finding> judge(const std::vector<CanInterface>& interfaces, bool can_sockets) {
-  if (interfaces.empty()) {
-    return {{.check = "can",
-             .what = "no CAN interface",
-             .standing = Standing::note,
-             .detail = can_sockets ? "" : "this kernel makes no CAN sockets either (sudo modprobe can_raw)"}};
-  }
-  std::vector<Finding> findings;
-  for (const CanInterface& can : interfaces) {
-    Finding f{.check = "can", .what = "CAN interface " + can.name, .detail = can.up ? "up" : "down"};
-    if (!can.up) {
-      f.standing = Standing::warning;
-      f.fix = "sudo ip link set " + can.name + " up type can bitrate 500000   # with your bus's bit rate";
-    }
-    findings.push_back(std::move(f));
-  }
   return findings;
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "abs_hil/diagnosis/board_scan.hpp"
+#include "abs_hil/diagnosis/can_scan.hpp"
 #include "abs_hil/diagnosis/machine_facts.hpp"
 #include "abs_hil/telemetry/route_probe.hpp"
 
@@ -65,6 +66,14 @@ Findings check_lcm(const Examination& e) {
   return {std::move(finding)};
 }
 
+Findings check_can(const Examination& e) {
+  try {
+    return judge(driver::can::can_interfaces(), has_can_sockets(), e.rate_Hz);
+  } catch (const driver::Unavailable& error) {
+    return {{.check = "can", .what = "CAN interfaces", .standing = Standing::note, .detail = error.what()}};
+  }
+}
+
 Findings check_backend(const Examination& e) {
   Finding finding{.check = "backend", .what = "backend " + e.backend, .detail = "can run"};
   try {
@@ -87,7 +96,7 @@ constexpr std::array<Check, 8> checks{{
     {"clock", [](const Examination&) { return machine_part("clock"); }},
     {"cpu", [](const Examination&) { return machine_part("cpu"); }},
     {"lcm", check_lcm},
-    {"can", [](const Examination&) { return judge(find_can_interfaces(), has_can_sockets()); }},
+    {"can", check_can},
     {"boards", [](const Examination& e) { return judge(find_pci_boards(e.pci_devices)); }},
     {"backend", check_backend},
 }};

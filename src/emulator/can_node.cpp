@@ -181,7 +181,8 @@ void CanNode::on_sync(const BusFrame& frame) {
   ++syncs_;
   const bool fd = frame.fd && options_.can_fd;
   // The slow frames first: the answer ends with the frame that the host waits for.
-  if (std::exchange(status_due_, false) || syncs_ % slow_every == 0) send_status();
+  const bool in_trouble = trip_flags() != 0 || state_ == State::latched;  // told with every answer: one may be lost
+  if (std::exchange(status_due_, false) || in_trouble || syncs_ % slow_every == 0) send_status();
   if (!fd && syncs_ % slow_every == slow_every / 2) send_outputs();
   send_encoders(fd);
 }

@@ -52,17 +52,3 @@ TEST_CASE("no card is a note: the simulated rig needs none") {
   FakeSystem system;
   CHECK(worst(judge(find_pci_boards(system.root() / devices))) == Standing::note);
 }
-
-TEST_CASE("CAN interfaces are found by their type; one that is down is a warning") {
-  FakeSystem system;
-  system.put("sys/class/net/can0/type", "280").put("sys/class/net/can0/flags", "0x40081");
-  system.put("sys/class/net/can1/type", "280").put("sys/class/net/can1/flags", "0x40080");
-  system.put("sys/class/net/eth0/type", "1").put("sys/class/net/eth0/flags", "0x1003");
-  const auto interfaces = find_can_interfaces(system.root());
-  REQUIRE(interfaces.size() == 2);
-  const auto findings = judge(interfaces, true);
-  CHECK(findings[0].standing == Standing::good);
-  CHECK(findings[1].standing == Standing::warning);
-  CHECK(findings[1].fix.find("ip link set can1 up") != std::string::npos);
-  CHECK(judge(std::vector<CanInterface>{}, false).front().detail.find("can_raw") != std::string::npos);
-}

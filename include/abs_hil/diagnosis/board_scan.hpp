@@ -22,17 +22,4 @@ struct PciBoard {
 /// Findings of the check "boards": each board with its driver binding and access. No board is a note.
 [[nodiscard]] std::vector<Finding> judge(const std::vector<PciBoard>& boards);
 
-/// A CAN network interface.
-struct CanInterface {
-  std::string name;
-  bool up{false};
-};
-
-/// @param root where /sys is, for tests
-[[nodiscard]] std::vector<CanInterface> find_can_interfaces(const std::filesystem::path& root = "/");
-/// Whether this kernel makes CAN sockets (PF_CAN, raw).
-[[nodiscard]] bool has_can_sockets() noexcept;
-/// Findings of the check "can". No interface, or none in the kernel, is a note.
-[[nodiscard]] std::vector<Finding> judge(const std::vector<CanInterface>& interfaces, bool can_sockets);
-
 }  // namespace abs_hil::diagnosis

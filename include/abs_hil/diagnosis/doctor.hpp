@@ -20,6 +20,7 @@ struct Examination {
   std::string lcm_url{};
   runtime::RealtimeOptions realtime{};
   std::string backend{"sim"};
+  double rate_Hz{1000.0};                           ///< cycles per second, for the load of a bus
   std::string pci_devices{"/sys/bus/pci/devices"};  ///< where PCI devices are looked for
   /// Makes the driver of the backend; may throw driver::Unavailable, as may its `configure`.
   std::function<std::unique_ptr<driver::RigDriver>()> make_driver{};

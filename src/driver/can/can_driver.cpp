@@ -15,7 +15,7 @@ namespace abs_hil::driver::can {
 namespace {
 
 constexpr std::int64_t ns_per_us = 1000;
-constexpr std::int64_t handshake_timeout_ns = 20'000'000;
+constexpr std::int64_t handshake_timeout_ns = 100'000'000;
 constexpr int handshake_attempts = 3;
 /// The emulator's answer in lock-step may take as long as its computer likes: time stands still.
 constexpr std::int64_t lock_step_timeout_ns = 1'000'000'000;
@@ -91,9 +91,14 @@ bool CanDriver::hears_safe(const NodeMessage& message) noexcept {
 }
 
 bool CanDriver::hears_active(const NodeMessage& message) noexcept {
-  take_message(message);
-  if (const auto* status = std::get_if<StatusMessage>(&message)) heard_state_ = status->state == NodeState::active;
-  if (const auto* outputs = std::get_if<OutputsMessage>(&message)) heard_outputs_ = outputs->applied == RawDuties{};
+  if (const auto* status = std::get_if<StatusMessage>(&message)) {
+    take_status(*status);
+    heard_state_ = status->state == NodeState::active;
+  }
+  if (const auto* outputs = std::get_if<OutputsMessage>(&message)) {
+    take_outputs(*outputs);
+    heard_outputs_ = outputs->applied == RawDuties{};
+  }
   return heard_state_ && heard_outputs_;
 }
 

@@ -110,17 +110,29 @@ void CanDriver::take_outputs(RawDuties applied, std::uint8_t command_sequence) n
   applied_sequence_ = command_sequence;
 }
 
+void CanDriver::take_status(const StatusMessage& status) noexcept {
+  trip_flags_ = status.trip_flags;
+  supply_V_ = status.supply_V;
+  temperature_C_ = status.temperature_C;
+  latch_reason_ = status.latch_reason;
+}
+
+void CanDriver::take_outputs(const OutputsMessage& outputs) noexcept {
+  take_outputs(outputs.applied, outputs.command_sequence);
+  // Those before the activation are none of this run's.
+  if (any_answer_) counters_.rejected_by_node += static_cast<std::uint8_t>(outputs.rejected - rejected_seen_);
+  rejected_seen_ = outputs.rejected;
+}
+
 void CanDriver::take_message(const NodeMessage& message) noexcept {
   if (const auto* status = std::get_if<StatusMessage>(&message)) {
-    trip_flags_ = status->trip_flags;
-    supply_V_ = status->supply_V;
-    temperature_C_ = status->temperature_C;
-    latch_reason_ = status->latch_reason;
+    const Anomaly anomaly = tracker_.place(status->sequence);
+    note(anomaly);
+    if (anomaly == Anomaly::none) take_status(*status);
   } else if (const auto* outputs = std::get_if<OutputsMessage>(&message)) {
-    take_outputs(outputs->applied, outputs->command_sequence);
-    // Those before the activation are none of this run's.
-    if (any_answer_) counters_.rejected_by_node += static_cast<std::uint8_t>(outputs->rejected - rejected_seen_);
-    rejected_seen_ = outputs->rejected;
+    const Anomaly anomaly = tracker_.place(outputs->sequence);
+    note(anomaly);
+    if (anomaly == Anomaly::none) take_outputs(*outputs);
   } else if (const auto* encoders = std::get_if<EncodersMessage>(&message)) {
     note(tracker_.take(*encoders));
   } else if (const auto* latch = std::get_if<LatchMessage>(&message)) {

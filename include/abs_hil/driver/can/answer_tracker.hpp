@@ -43,6 +43,8 @@ class AnswerTracker {
   Anomaly take(const LatchMessage& latch) noexcept;
   Anomaly take(const MeasurementMessage& measurement) noexcept;
 
+  /// `none` if a frame with this sequence belongs to the SYNC expected.
+  [[nodiscard]] Anomaly place(std::uint8_t sequence) const noexcept;
   [[nodiscard]] bool complete() const noexcept { return has_encoders_ && has_latch_; }
   /// The answer to the SYNC expected, once complete.
   [[nodiscard]] const Answer& answer() const noexcept { return answer_; }
@@ -50,8 +52,6 @@ class AnswerTracker {
   [[nodiscard]] std::uint8_t last_sequence() const noexcept { return last_; }
 
  private:
-  /// `none` if a frame with this sequence belongs to the SYNC expected.
-  [[nodiscard]] Anomaly place(std::uint8_t sequence) const noexcept;
   void note_complete() noexcept;
 
   std::uint8_t expected_{0};

@@ -83,6 +83,8 @@ class CanDriver final : public RigDriver {
   [[nodiscard]] IoResult take(const Frame& frame) noexcept;
   [[nodiscard]] IoResult take_error_frame(const Frame& frame) noexcept;
   void take_message(const NodeMessage& message) noexcept;
+  void take_status(const StatusMessage& status) noexcept;
+  void take_outputs(const OutputsMessage& outputs) noexcept;
   void take_outputs(RawDuties applied, std::uint8_t command_sequence) noexcept;
   void note(Anomaly anomaly) noexcept;
   void count(Anomaly anomaly) noexcept;

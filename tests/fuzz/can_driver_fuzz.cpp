@@ -1,0 +1,120 @@
+// Any bytes as frames and as datagrams at the driver's side of the bus: no value past the decoder is out of its range.
+// Input: any number of records "kind, identifier, length, data ...".
+#include <linux/can.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <variant>
+
+#include "abs_hil/driver/can/answer_tracker.hpp"
+#include "abs_hil/driver/can/error_frame.hpp"
+#include "abs_hil/driver/can/frame_socket.hpp"
+#include "abs_hil/driver/can/messages.hpp"
+#include "abs_hil/driver/can/signal_codec.hpp"
+
+namespace {
+
+using namespace abs_hil::driver::can;
+
+void expect(bool holds) {
+  if (!holds) std::abort();
+}
+
+/// Takes the input apart; 0 once it is used up.
+class Input {
+ public:
+  Input(const std::uint8_t* data, std::size_t size) : at_(data), left_(size) {}
+  [[nodiscard]] bool empty() const { return left_ == 0; }
+  std::uint8_t byte() {
+    if (left_ == 0) return 0;
+    --left_;
+    return *at_++;
+  }
+
+ private:
+  const std::uint8_t* at_;
+  std::size_t left_;
+};
+
+/// Identifiers of the protocol come more often than others, right checks more often than by chance.
+Frame frame_in(Input& input) {
+  Frame frame;
+  const unsigned kind = input.byte();
+  const auto known = messages();
+  frame.id = (kind & 1U) != 0 ? known[input.byte() % known.size()].id : input.byte() * 8U + input.byte() % 8U;
+  frame.fd = (kind & 2U) != 0;
+  frame.error = (kind & 4U) != 0;
+  const Message* message = find_message(frame.id);
+  frame.length = (kind & 8U) != 0 && message != nullptr
+                     ? message->bytes
+                     : static_cast<std::uint8_t>(input.byte() % (Frame::most_bytes + 1));
+  if (!frame.fd && frame.length > 8) frame.length = 8;
+  for (std::size_t i = 0; i < frame.length; ++i) frame.data[i] = input.byte();
+  if ((kind & 16U) != 0 && frame.length > 0) frame.data[frame.length - 1U] = checksum(frame);
+  return frame;
+}
+
+void expect_duties(const RawDuties& duties) { expect(duties.brake <= 10000 && duties.drive <= 10000); }
+
+void expect_in_range(const Decoded& decoded, AnswerTracker& tracker) {
+  expect((decoded.error == DecodeError::none) != std::holds_alternative<std::monostate>(decoded.message));
+  if (const auto* status = std::get_if<StatusMessage>(&decoded.message)) {
+    expect(status->trip_flags <= 7 && static_cast<unsigned>(status->state) <= 2);
+    expect(static_cast<unsigned>(status->latch_reason) <= 2);
+    expect(std::isnan(status->supply_V) || (status->supply_V >= 0.0 && status->supply_V < 65.535));
+    expect(std::isnan(status->temperature_C) || (status->temperature_C > -327.68 && status->temperature_C <= 300.0));
+  } else if (const auto* outputs = std::get_if<OutputsMessage>(&decoded.message)) {
+    expect_duties(outputs->applied);
+  } else if (const auto* encoders = std::get_if<EncodersMessage>(&decoded.message)) {
+    expect(std::abs(encoders->upper_counts) <= 1 << 23 && std::abs(encoders->lower_counts) <= 1 << 23);
+    static_cast<void>(tracker.take(*encoders));
+  } else if (const auto* latch = std::get_if<LatchMessage>(&decoded.message)) {
+    expect(std::abs(latch->lever_counts) <= 2048 && static_cast<unsigned>(latch->state) <= 2);
+    static_cast<void>(tracker.take(*latch));
+  } else if (const auto* measurement = std::get_if<MeasurementMessage>(&decoded.message)) {
+    expect_duties(measurement->applied);
+    expect(measurement->trip_flags <= 7 && static_cast<unsigned>(measurement->state) <= 2);
+    static_cast<void>(tracker.take(*measurement));
+  }
+}
+
+/// The same bytes as datagrams of any size, through the socket that makes frames of them.
+void through_socket(Input input, AnswerTracker& tracker) {
+  std::array<int, 2> ends{};
+  if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0) return;
+  FrameSocket socket(ends[0]);
+  for (int i = 0; i < 8 && !input.empty(); ++i) {
+    std::array<std::uint8_t, 80> datagram{};
+    const std::uint8_t choice = input.byte();
+    const std::size_t size = choice < 96 ? CAN_MTU : choice < 192 ? CANFD_MTU : choice % datagram.size() + 1;
+    for (std::size_t at = 0; at < size; ++at) datagram[at] = input.byte();
+    static_cast<void>(::send(ends[1], datagram.data(), size, MSG_DONTWAIT | MSG_NOSIGNAL));
+    Frame frame;
+    const ReceiveOutcome outcome = socket.receive(frame, 0).outcome;
+    expect((outcome == ReceiveOutcome::frame) == (size == CAN_MTU || size == CANFD_MTU));
+    if (outcome != ReceiveOutcome::frame) continue;
+    expect(frame.length <= (frame.fd ? 64 : 8));
+    if (frame.error) static_cast<void>(bus_report(frame));
+    expect_in_range(decode(frame), tracker);
+  }
+  ::close(ends[1]);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  Input input(data, size);
+  AnswerTracker tracker;
+  tracker.expect(input.byte());
+  through_socket(input, tracker);
+  while (!input.empty()) {
+    const Frame frame = frame_in(input);
+    if (frame.error) static_cast<void>(bus_report(frame));
+    expect_in_range(decode(frame), tracker);
+  }
+  return 0;
+}
