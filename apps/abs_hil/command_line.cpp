@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "abs_hil/experiment/experiments.hpp"
 #include "abs_hil/settings/config_error.hpp"
@@ -31,6 +32,12 @@ void check_together(const RunRequest& request) {
     throw settings::ConfigError(
         "--histogram: in virtual time (--fast) there are no latencies to measure; leave one of the two out");
   }
+  if (s.backend == "rig" && s.driver.kind == "usb" && !request.outputs.fast &&
+      s.driver.usb.answer_timeout_us * s.control.rate_Hz >= 1e6) {
+    throw settings::ConfigError("driver.usb.answer_timeout_us = " + std::to_string(s.driver.usb.answer_timeout_us) +
+                                ": a cycle must not wait longer than its period; give less than " +
+                                std::to_string(std::llround(1e6 / s.control.rate_Hz)) + " or a lower control.rate_Hz");
+  }
   if (s.backend == "rig" && s.experiment.start_speed_rad_s > 0.0) {
     throw settings::ConfigError(
         "experiment.start_speed_rad_s: a real wheel does not start at speed; leave it out or use --backend sim");
@@ -54,8 +61,10 @@ void apply_board_limits(settings::Settings& s) {
   };
   if (s.driver.kind == "pci") cap(s.driver.pci);
   if (s.driver.kind == "can") cap(s.driver.can);
+  if (s.driver.kind == "usb") cap(s.driver.usb);
   s.driver.pci.encoder_counts_per_rev = s.plant.rig.encoder_counts_per_rev;
   s.driver.can.encoder_counts_per_rev = s.plant.rig.encoder_counts_per_rev;
+  s.driver.usb.encoder_counts_per_rev = s.plant.rig.encoder_counts_per_rev;
   s.driver.can.rate_Hz = s.control.rate_Hz;
 }
 

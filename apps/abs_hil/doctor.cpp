@@ -20,6 +20,7 @@ int doctor(const RunRequest& request, const std::string& only, bool json) {
                                            .backend = s.backend,
                                            .rate_Hz = s.control.rate_Hz,
                                            .pci_devices = s.driver.pci.root,
+                                           .usb = s.driver.usb,
                                            .make_driver = [&s] { return make_driver(s, false); }};
   std::vector<diagnosis::Finding> findings = diagnosis::examine(examination);
   if (const std::string note = driver::verification_note(s.driver);

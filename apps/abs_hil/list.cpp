@@ -44,6 +44,8 @@ int list(bool keys) {
   for (const auto& entry : experiment::experiments()) print(entry.name, entry.summary);
   fmt::print("backends\n");
   for (const auto& entry : driver::backends()) print(entry.name, entry.summary);
+  fmt::print("boards (driver.kind of backend rig; none of them verified on hardware)\n");
+  for (const auto& entry : driver::boards()) print(entry.name, entry.summary);
   return exit_completed;
 }
 

@@ -10,6 +10,7 @@
 #include "abs_hil/driver/pci/discovery.hpp"
 #include "abs_hil/runtime/clock.hpp"
 #include "control_fifo.hpp"
+#include "truth_file.hpp"
 
 namespace abs_hil::app {
 
@@ -22,12 +23,6 @@ std::int64_t monotonic_ns() { return runtime::MonotonicClock().now_ns(); }
 void wait_for(std::int64_t duration_ns) {
   runtime::MonotonicClock clock;
   clock.sleep_until(clock.now_ns() + duration_ns);
-}
-
-void open_for_writing(std::ofstream& stream, const std::string& file) {
-  stream.close();
-  stream.open(file);
-  if (!stream) throw std::runtime_error(file + ": cannot be written: " + std::strerror(errno));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // The device side of the rig as a process of its own, with the simulated rig behind it: an emulated RT-DAC4/PCI, served
-// as a tree like /sys/bus/pci/devices (docs/rig-setup.md), or a CAN I/O node (docs/can.md).
+// as a tree like /sys/bus/pci/devices (docs/rig-setup.md), a CAN I/O node (docs/can.md), or an RT-DAC/USB2 plugged into
+// the kernel's virtual host controller (docs/usb.md).
 
 #include <fmt/format.h>
 #include <poll.h>
@@ -23,6 +24,7 @@
 #include "control_fifo.hpp"
 #include "emulated_card.hpp"
 #include "emulated_node.hpp"
+#include "emulated_usb.hpp"
 #include "fuse_tree.hpp"
 
 namespace {
@@ -36,6 +38,8 @@ struct Arguments {
   app::EmulatorOptions emulator{};
   std::string pci_root{};
   std::string can_interface{};
+  app::UsbEmulatorOptions usb{};
+  bool use_usb{false};
   std::uint16_t watchdog_ms{20};
   std::vector<std::string> bdfs{"0000:03:00.0"};
   std::string plant{"paper-table1"};
@@ -63,12 +67,23 @@ void add_card_options(CLI::App& cli, emulator::CardOptions& card) {
   cli.add_flag("--trip-clears-width", card.trip_clears_width, "a trip zeroes the PWM width registers too: not known");
 }
 
+void add_usb_options(CLI::App& cli, app::UsbEmulatorOptions& usb) {
+  cli.add_option("--usb-serial", usb.identity.serial, "what the USB board says it is")->capture_default_str();
+  cli.add_option("--usb-manufacturer", usb.identity.manufacturer, "what it says it is")->capture_default_str();
+  cli.add_option("--vhci", usb.controller, "folder of the virtual host controller")->capture_default_str();
+  cli.add_flag("!--hide-outputs", usb.board.shows_outputs, "its frames do not show what was sent: not known");
+  cli.add_option("--enable-line", usb.board.enable_line, "its digital line without which the drive does nothing");
+  cli.add_option("--when-braking", usb.when_braking, "its control command, obeyed once the brake has acted for 0.3 s")
+      ->allow_extra_args(false);
+}
+
 void add_options(CLI::App& cli, Arguments& a) {
   auto* board = cli.add_option_group("board", "what the rig is behind");
   board->add_option("--pci-root", a.pci_root, "a card: folder to mount its tree at; made if it is not there")
       ->type_name("DIR");
   board->add_option("--can", a.can_interface, "a CAN I/O node: interface, or unix:PATH to listen at in its place")
       ->type_name("IFACE");
+  board->add_flag("--usb", a.use_usb, "a USB board, plugged into this computer's vhci_hcd (root)");
   board->require_option(1);
   cli.add_option("--watchdog-ms", a.watchdog_ms, "of the CAN node, until its activation says otherwise")
       ->check(CLI::Range(1, 10'000))
@@ -94,8 +109,9 @@ void add_options(CLI::App& cli, Arguments& a) {
       ->check(CLI::Range(0, 98))
       ->capture_default_str();
   add_card_options(cli, a.emulator.card);
+  add_usb_options(cli, a.usb);
   cli.footer(std::string("Control commands (--command, --control) of a card:\n") + app::EmulatedCard::commands() +
-             "of a CAN node:\n" + app::EmulatedNode::commands());
+             "of a CAN node:\n" + app::EmulatedNode::commands() + "of a USB board:\n" + app::EmulatedUsb::commands());
 }
 
 void read_plant(Arguments& a) {
@@ -181,8 +197,34 @@ int serve_node(const Arguments& a) {
   return 0;
 }
 
+int serve_usb(Arguments& a) {
+  a.usb.board.plant = a.emulator.card.plant;
+  a.usb.board.start_speed_rad_s = a.emulator.card.start_speed_rad_s;
+  a.usb.seed = a.emulator.seed;
+  a.usb.lock_step = a.emulator.lock_step;
+  a.usb.truth_file = a.emulator.truth_file;
+  pin_to(a.cpu);
+  take_priority(a);
+  app::EmulatedUsb board(a.usb);
+  for (const std::string& fault : a.faults) static_cast<void>(board.obey("fault " + fault));
+  for (const std::string& command : a.commands) static_cast<void>(board.obey(command));
+  app::ControlFifo control(a.control_fifo);
+  app::say("ready: " + board.place());
+  bool serving = true;
+  while (serving && !stop_requested) {
+    std::array<pollfd, 2> ready{{{board.descriptor(), POLLIN, 0}, {control.descriptor(), POLLIN, 0}}};
+    static_cast<void>(::ppoll(ready.data(), ready.size(), &idle, nullptr));
+    if (ready[0].revents != 0) serving = board.serve();
+    if (ready[1].revents != 0) control.take([&board](const std::string& line) { return board.obey(line); });
+    board.catch_up();
+  }
+  app::say("ended: " + board.status());
+  return 0;
+}
+
 int serve(Arguments& a) {
   read_plant(a);
+  if (a.use_usb) return serve_usb(a);
   if (!a.can_interface.empty()) return serve_node(a);
   app::EmulatedCard card(a.emulator);
   for (const std::string& fault : a.faults) static_cast<void>(card.obey("fault " + fault));
@@ -212,7 +254,7 @@ int main(int argc, char** argv) {
   struct sigaction action {};
   action.sa_handler = [](int) { stop_requested = true; };
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
-  CLI::App cli{"The ABS rig behind an emulated board: RT-DAC4/PCI card or CAN I/O node"};
+  CLI::App cli{"The ABS rig behind an emulated board: RT-DAC4/PCI card, CAN I/O node or RT-DAC/USB2"};
   Arguments arguments;
   add_options(cli, arguments);
   try {

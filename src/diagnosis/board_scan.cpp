@@ -80,4 +80,28 @@ std::vector<Finding> judge(const std::vector<PciBoard>& boards) {
   return findings;
 }
 
+std::vector<Finding> judge(const std::vector<driver::usb::UsbDevice>& boards) {
+  if (boards.empty()) {
+    return {{.check = "boards",
+             .what = "no RT-DAC/USB2 found",
+             .standing = Standing::note,
+             .detail = "looked for by driver.usb.manufacturer, .vendor_id, .product_id and .serial"}};
+  }
+  std::vector<Finding> findings;
+  for (const driver::usb::UsbDevice& board : boards) {
+    Finding f{
+        .check = "boards",
+        .what = "RT-DAC/USB2 " + board.text(),
+        .detail = "\"" + board.manufacturer + "\", \"" + board.product + "\"; this driver is unverified on hardware"};
+    if (!can_read_and_write(board.node)) {
+      f.standing = Standing::warning;
+      f.detail += "; " + board.node.string() + " not accessible to this user";
+      f.fix = "put this line into /etc/udev/rules.d/70-abs-hil.rules and plug the board in again (docs/usb.md):\n" +
+              driver::usb::udev_rule(board);
+    }
+    findings.push_back(std::move(f));
+  }
+  return findings;
+}
+
 }  // namespace abs_hil::diagnosis

@@ -86,6 +86,12 @@ Findings check_backend(const Examination& e) {
   return {std::move(finding)};
 }
 
+Findings check_boards(const Examination& e) {
+  Findings findings = judge(find_pci_boards(e.pci_devices));
+  for (Finding& finding : judge(driver::usb::find_boards(e.usb))) findings.push_back(std::move(finding));
+  return findings;
+}
+
 struct Check {
   std::string_view name;
   Findings (*make)(const Examination&);
@@ -97,7 +103,7 @@ constexpr std::array<Check, 8> checks{{
     {"cpu", [](const Examination&) { return machine_part("cpu"); }},
     {"lcm", check_lcm},
     {"can", check_can},
-    {"boards", [](const Examination& e) { return judge(find_pci_boards(e.pci_devices)); }},
+    {"boards", check_boards},
     {"backend", check_backend},
 }};
 

@@ -8,6 +8,8 @@
 #include "abs_hil/driver/can/link.hpp"
 #include "abs_hil/driver/pci/discovery.hpp"
 #include "abs_hil/driver/pci/pci_driver.hpp"
+#include "abs_hil/driver/usb/libusb_link.hpp"
+#include "abs_hil/driver/usb/usb_driver.hpp"
 
 namespace abs_hil::driver {
 
@@ -19,9 +21,13 @@ std::span<const BackendEntry> backends() noexcept {
   return entries;
 }
 
-std::span<const std::string_view> board_kinds() noexcept {
-  static constexpr std::array<std::string_view, 2> kinds{"pci", "can"};
-  return kinds;
+std::span<const BackendEntry> boards() noexcept {
+  static constexpr std::array<BackendEntry, 3> entries{{
+      {"pci", "RT-DAC4/PCI with ABS logic; unverified on hardware"},
+      {"can", "CAN I/O node of this project's own protocol (docs/can.md); unverified on hardware"},
+      {"usb", "RT-DAC/USB2 with generic logic; unverified on hardware"},
+  }};
+  return entries;
 }
 
 namespace {
@@ -45,6 +51,14 @@ std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options, bool lo
     return std::make_unique<can::CanDriver>(
         options.can, [can = options.can] { return can::open_link(can); }, lock_step);
   }
+  if (options.kind == "usb") {
+    return std::make_unique<usb::UsbDriver>(
+        options.usb,
+        [usb = options.usb, lock_step, emulated = options.emulated] {
+          return usb::open_board(usb, lock_step, emulated);
+        },
+        lock_step ? nullptr : monotonic_ns);
+  }
   throw Unavailable("backend rig: driver.kind = \"" + options.kind +
                     "\": this build does not drive that board; use driver.kind=pci, driver.kind=can or --backend sim");
 }
@@ -56,6 +70,11 @@ std::string verification_note(const DriverOptions& options) {
            "and "
            "was tried on an emulated node alone: go through docs/can.md, \"What is not verified\", then set "
            "driver.verified_on_hardware=true";
+  }
+  if (options.kind == "usb") {
+    return "backend rig, driver.kind=usb: not verified on hardware. Its words come from the maker's documents and were "
+           "tried on an emulator alone, and no watchdog of the board is known: go through docs/usb.md and "
+           "docs/rig-setup.md with abs_hil commission, then set driver.verified_on_hardware=true";
   }
   return "backend rig, driver.kind=" + options.kind +
          ": not verified on hardware. Its registers come from the maker's documents and were tried on an emulator "

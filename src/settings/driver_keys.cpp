@@ -1,6 +1,7 @@
 #include "driver_keys.hpp"
 
 #include "can_keys.hpp"
+#include "usb_keys.hpp"
 
 namespace abs_hil::settings {
 
@@ -45,7 +46,8 @@ void add_pci_keys(std::vector<Key>& keys, driver::pci::PciOptions& p) {
 }  // namespace
 
 void add_driver_keys(std::vector<Key>& keys, driver::DriverOptions& d) {
-  const auto kinds = driver::board_kinds();
+  std::vector<std::string_view> kinds;
+  for (const driver::BackendEntry& board : driver::boards()) kinds.push_back(board.name);
   keys.insert(
       keys.end(),
       {
@@ -56,6 +58,7 @@ void add_driver_keys(std::vector<Key>& keys, driver::DriverOptions& d) {
       });
   add_pci_keys(keys, d.pci);
   add_can_keys(keys, d.can);
+  add_usb_keys(keys, d.usb);
 }
 
 }  // namespace abs_hil::settings

@@ -73,6 +73,12 @@ void refuse_unsafe(const Settings& s, const KeyTable& keys) {
     refuse_cap_above_board(keys, "gate.motor_duty_max", s.gate.motor_duty_max, "driver.pci.motor_duty_max",
                            s.driver.pci.motor_duty_max);
   }
+  if (s.backend == "rig" && s.driver.kind == "usb") {
+    refuse_cap_above_board(keys, "gate.brake_duty_max", s.gate.brake_duty_max, "driver.usb.brake_duty_max",
+                           s.driver.usb.brake_duty_max);
+    refuse_cap_above_board(keys, "gate.motor_duty_max", s.gate.motor_duty_max, "driver.usb.motor_duty_max",
+                           s.driver.usb.motor_duty_max);
+  }
 }
 
 }  // namespace abs_hil::settings

@@ -18,6 +18,16 @@ class BadInput(ProgramTest):
             self.assertFalse(summary.exists())
             self.assertFalse(csv.exists(), 'a refused run must not touch files')
 
+    def test_usb_board(self):
+        usb = ['--backend', 'rig', '--set', 'driver.kind=usb', '--set', 'driver.emulated=true']
+        none = ['--set', f'driver.usb.sysfs_root={self.folder}']
+        self.refused([*usb, *none], ['no RT-DAC/USB2 board', 'driver.usb.manufacturer="InTeCo"'], status=3)
+        self.refused([*usb, '--set', 'driver.usb.enable_line=15'], ['driver.usb.enable_line', '[-1, 14]'])
+        self.refused([*usb, '--set', 'driver.usb.drive_pwm=1'], ['driver.usb.drive_pwm = driver.usb.brake_pwm = 1'])
+        late = self.run_program('--backend', 'rig', '--no-lcm', '--set', 'driver.kind=usb', '--rate', '2000')
+        self.assertEqual(late.returncode, 2, late.stderr)
+        self.assertIn('a cycle must not wait longer than its period; give less than 500', late.stderr)
+
     def test_configuration_values(self):
         self.refused(['--set', 'plant.thetaN=3'], ['plant.thetaN', 'plant.theta_N'])
         self.refused(['--set', 'plant.theta_N=-5'], ['plant.theta_N', '-5', '(0, 500]', 'N'])

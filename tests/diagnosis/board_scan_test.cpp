@@ -52,3 +52,22 @@ TEST_CASE("no card is a note: the simulated rig needs none") {
   FakeSystem system;
   CHECK(worst(judge(find_pci_boards(system.root() / devices))) == Standing::note);
 }
+
+TEST_CASE("USB boards: none is a note; one that may not be opened gets its udev rule; all are called unverified") {
+  CHECK(worst(judge(std::vector<abs_hil::driver::usb::UsbDevice>{})) == Standing::note);
+  FakeSystem system;
+  system.put("dev/001/002", "");
+  abs_hil::driver::usb::UsbDevice board{.address = "1-1",
+                                        .vendor_id = 0x04B4,
+                                        .product_id = 0x1003,
+                                        .manufacturer = "InTeCo",
+                                        .node = system.root() / "dev/001/002"};
+  const Finding good = judge(std::vector{board}).front();
+  CHECK(good.standing == Standing::good);
+  CHECK(good.what.find("04b4:1003 at 1-1") != std::string::npos);
+  CHECK(good.detail.find("unverified on hardware") != std::string::npos);
+  board.node = system.root() / "dev/001/003";
+  const Finding closed = judge(std::vector{board}).front();
+  CHECK(closed.standing == Standing::warning);
+  CHECK(closed.fix.find(R"(ATTR{idVendor}=="04b4")") != std::string::npos);
+}

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "abs_hil/diagnosis/finding.hpp"
+#include "abs_hil/driver/usb/discovery.hpp"
 
 namespace abs_hil::diagnosis {
 
@@ -21,5 +22,8 @@ struct PciBoard {
 [[nodiscard]] std::vector<PciBoard> find_pci_boards(const std::filesystem::path& devices);
 /// Findings of the check "boards": each board with its driver binding and access. No board is a note.
 [[nodiscard]] std::vector<Finding> judge(const std::vector<PciBoard>& boards);
+
+/// The same for USB boards; each names the board, that it is not verified on hardware, and whether it may be opened.
+[[nodiscard]] std::vector<Finding> judge(const std::vector<driver::usb::UsbDevice>& boards);
 
 }  // namespace abs_hil::diagnosis

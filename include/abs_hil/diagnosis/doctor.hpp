@@ -7,6 +7,7 @@
 
 #include "abs_hil/diagnosis/finding.hpp"
 #include "abs_hil/driver/rig_driver.hpp"
+#include "abs_hil/driver/usb/options.hpp"
 #include "abs_hil/runtime/realtime_setup.hpp"
 
 namespace abs_hil::diagnosis {
@@ -22,6 +23,7 @@ struct Examination {
   std::string backend{"sim"};
   double rate_Hz{1000.0};                           ///< cycles per second, for the load of a bus
   std::string pci_devices{"/sys/bus/pci/devices"};  ///< where PCI devices are looked for
+  driver::usb::UsbOptions usb{};                    ///< which USB devices are boards
   /// Makes the driver of the backend; may throw driver::Unavailable, as may its `configure`.
   std::function<std::unique_ptr<driver::RigDriver>()> make_driver{};
 };

@@ -8,6 +8,7 @@
 #include "abs_hil/driver/can/options.hpp"
 #include "abs_hil/driver/pci/options.hpp"
 #include "abs_hil/driver/rig_driver.hpp"
+#include "abs_hil/driver/usb/options.hpp"
 
 namespace abs_hil::driver {
 
@@ -20,6 +21,7 @@ struct DriverOptions {
   bool verified_on_hardware{false};
   pci::PciOptions pci{};
   can::CanOptions can{};
+  usb::UsbOptions usb{};
 };
 
 struct BackendEntry {
@@ -30,7 +32,7 @@ struct BackendEntry {
 [[nodiscard]] std::span<const BackendEntry> backends() noexcept;
 
 /// The boards that `driver.kind` knows.
-[[nodiscard]] std::span<const std::string_view> board_kinds() noexcept;
+[[nodiscard]] std::span<const BackendEntry> boards() noexcept;
 
 /// The rig behind the board that `options.kind` names; its `configure` looks for the board. Throws
 /// std::invalid_argument for an option outside its range, Unavailable for a kind that this build does not drive.

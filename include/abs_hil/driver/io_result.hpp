@@ -20,6 +20,7 @@ enum class IoError : std::uint8_t {
   command_out_of_range,  ///< a command that no gate lets through: a duty not in [0, 1], a torque < 0, not finite
   stalled,               ///< the board refuses the transfer (USB STALL)
   incomplete_answer,     ///< an answer of the wrong length
+  transfer_failed,       ///< the bus gave up on a transfer
 };
 
 [[nodiscard]] constexpr std::string_view description(IoError error) noexcept {
@@ -33,6 +34,7 @@ enum class IoError : std::uint8_t {
     case IoError::command_out_of_range: return "command is not finite or outside its range";
     case IoError::stalled: return "board refuses the transfer (STALL)";
     case IoError::incomplete_answer: return "answer of the wrong length";
+    case IoError::transfer_failed: return "transfer failed on the bus";
   }
   return "unknown error";
 }

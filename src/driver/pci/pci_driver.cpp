@@ -1,23 +1,17 @@
 #include "abs_hil/driver/pci/pci_driver.hpp"
 
 #include <bit>
-#include <cmath>
 #include <stdexcept>
 #include <utility>
 
-#include "abs_hil/rig/encoder_scale.hpp"
+#include "abs_hil/driver/plausibility.hpp"
 
 namespace abs_hil::driver::pci {
 
 namespace {
 
-constexpr double s_per_ns = 1e-9;
-/// Counts that an encoder may jump beyond what its speed explains: vibration, and the reads' own lateness.
-constexpr double plausible_slack_counts = 256.0;
 /// Counters whose reading took longer belong to no one instant: at 170 rad/s it is 28 counts. They are read once more.
 constexpr std::int64_t late_reading_ns = 250'000;
-
-bool is_duty(double value) noexcept { return value >= 0.0 && value <= 1.0; }  // false for NaN
 
 std::int32_t with_sign(std::uint32_t raw, std::int32_t sign) noexcept {
   return std::bit_cast<std::int32_t>(sign < 0 ? 0U - raw : raw);  // unsigned: the most negative count has no negative
@@ -158,11 +152,11 @@ void PciDriver::read_health(Access& card, std::uint32_t offset) noexcept {
 }
 
 bool PciDriver::plausible(std::int64_t read_ns, const std::array<std::int32_t, 2>& before) const noexcept {
-  const double elapsed_s = static_cast<double>(read_ns - last_read_ns_) * s_per_ns;
-  const double most = plausible_slack_counts + options_.plausible_speed_rad_s * elapsed_s /
-                                                   rig::radians_per_count(options_.encoder_counts_per_rev);
   for (std::size_t wheel = 0; wheel < counts_.size(); ++wheel) {
-    if (std::abs(static_cast<double>(rig::counts_between(before[wheel], counts_[wheel]))) > most) return false;
+    if (!plausible_travel(before[wheel], counts_[wheel], read_ns - last_read_ns_, options_.plausible_speed_rad_s,
+                          options_.encoder_counts_per_rev)) {
+      return false;
+    }
   }
   return true;
 }
@@ -231,10 +225,7 @@ void PciDriver::write_pwm(Access& card, Pwm pwm, std::uint32_t width) noexcept {
 }
 
 IoResult PciDriver::do_write(const rig::Command& command) noexcept {
-  const bool torque_fits = std::isfinite(command.brake_torque_Nm) && command.brake_torque_Nm >= 0.0;
-  if (!is_duty(command.motor_duty) || !is_duty(command.brake_duty) || !torque_fits) {
-    return {IoError::command_out_of_range};
-  }
+  if (!in_range(command)) return {IoError::command_out_of_range};
   const double motor_duty = command.motor_enable ? command.motor_duty : 0.0;
   Access card(*card_.window);
   write_pwm(card, Pwm::drive, pwm_width_for(mode_, motor_duty, options_.motor_duty_max));

@@ -60,15 +60,6 @@ constexpr std::array table{
 
 }  // namespace
 
-std::string_view name_of(Standing standing) noexcept {
-  switch (standing) {
-    case documented: return "documented";
-    case inferred: return "inferred";
-    case unknown: return "unknown";
-  }
-  return "unknown";
-}
-
 std::string_view name_of(Use use) noexcept {
   switch (use) {
     case never: return "not used";

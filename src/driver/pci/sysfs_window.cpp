@@ -78,10 +78,6 @@ IoResult whole_access(std::uint32_t where, ssize_t size, Access access) noexcept
 
 }  // namespace
 
-FileDescriptor::~FileDescriptor() {
-  if (fd_ >= 0) ::close(fd_);
-}
-
 IoError io_error_for(int errno_value) noexcept {
   // A card that left the bus gives ENODEV, a dead FUSE server ENOTCONN or ECONNABORTED.
   switch (errno_value) {

@@ -28,6 +28,8 @@ class Bench {
   /// none and says so.
   [[nodiscard]] virtual std::uint64_t writes() = 0;
   [[nodiscard]] virtual bool has_registers() const { return true; }
+  /// Whether the board tells its supply and temperature.
+  [[nodiscard]] virtual bool tells_health() const { return has_registers(); }
   /// From now on the brake output does not take what is written; false if this backend cannot fail so.
   [[nodiscard]] virtual bool break_brake_output() = 0;
   /// Cycles until such a failure shows in `read`; 0: `write` itself reads back.

@@ -6,6 +6,9 @@
 #include <span>
 #include <string_view>
 
+#include "abs_hil/driver/pwm.hpp"
+#include "abs_hil/driver/standing.hpp"
+
 namespace abs_hil::driver::pci {
 
 // RT-DAC4/PCI with ABS logic, from the maker's driver sources. Nothing here has been tried on hardware.
@@ -14,7 +17,6 @@ inline constexpr std::uint32_t vendor_id = 0x10B5;       ///< PLX
 inline constexpr std::uint32_t device_id = 0x2497;       ///< PCI 9030 as the maker programs it
 inline constexpr std::uint32_t window_bytes = 256;       ///< BAR 2, I/O ports, 32-bit accesses
 inline constexpr std::uint32_t all_ones = ~0U;           ///< what a bus answers where no card is
-inline constexpr double board_clock_Hz = 40e6;           ///< PWM and velocity periods count this
 inline constexpr double encoder_lines_per_rev = 1024.0;  ///< the velocity registers count lines, not quadrature edges
 
 /// Offsets in the window, bytes.
@@ -49,13 +51,8 @@ inline constexpr std::uint32_t temperature_high = 0xB4;
 inline constexpr std::uint32_t temperature_low = 0xB8;
 }  // namespace reg
 
-/// How well a fact about the card is known.
-enum class Standing : std::uint8_t {
-  documented,  ///< read in the maker's own driver sources or manual
-  inferred,    ///< concluded from them, not said there
-  unknown,     ///< sources are silent or disagree: never relied on
-};
-[[nodiscard]] std::string_view name_of(Standing standing) noexcept;
+using driver::name_of;
+using driver::Standing;
 
 /// What this driver does with a register.
 enum class Use : std::uint8_t {
@@ -84,34 +81,27 @@ struct Register {
 
 /// Index of a PWM channel (register 60).
 enum class Pwm : std::uint32_t { drive = 0, brake = 1 };
-/// Counting width of the PWMs (register 64).
-enum class PwmMode : std::uint32_t { bits_8 = 0, bits_12 = 1 };
+// Register 64 is a PwmMode.
+using driver::board_clock_Hz;
+using driver::full_width;
+using driver::pwm_frequency_Hz;
+using driver::pwm_width_for;
+using driver::PwmMode;
 
-/// Largest width, which is duty 1.
-[[nodiscard]] constexpr std::uint32_t full_width(PwmMode mode) noexcept {
-  return mode == PwmMode::bits_12 ? 4095 : 255;
-}
-/// PWM frequency, Hz: 40 MHz / ((prescaler + 1) full width).
-[[nodiscard]] constexpr double pwm_frequency_Hz(PwmMode mode, std::uint32_t prescaler) noexcept {
-  return board_clock_Hz / ((static_cast<double>(prescaler) + 1.0) * static_cast<double>(full_width(mode)));
-}
-/// Width register for a duty in [0, 1], rounded, but never above the cap in [0, 1].
-[[nodiscard]] constexpr std::uint32_t pwm_width_for(PwmMode mode, double duty, double duty_max) noexcept {
-  const double full = static_cast<double>(full_width(mode));
-  constexpr double rounding_slack = 1e-9;  // a cap that is exactly a width may come out a hair below it
-  const auto cap = static_cast<std::uint32_t>(duty_max * full + rounding_slack);
-  const auto width = static_cast<std::uint32_t>(duty * full + 0.5);
-  return width < cap ? width : cap;
-}
-
-/// Registers 38 and A4: V. 0 means that there is no supply.
+/// Registers 38 and A4: V. 0 means that there is no supply; NaN above 100 V, which nothing in this rig has.
 [[nodiscard]] constexpr double supply_V(std::uint32_t raw) noexcept {
-  return raw == 0 ? 0.0 : 92000.0 / static_cast<double>(raw);
+  constexpr double most_V = 100.0;
+  if (raw == 0) return 0.0;
+  const double volts = 92000.0 / static_cast<double>(raw);
+  return volts <= most_V ? volts : std::numeric_limits<double>::quiet_NaN();
 }
-/// Registers B4 (high) and B8 (low): deg C; NaN if the sensor does not pulse (low = 0).
+/// Registers B4 (high) and B8 (low): deg C; NaN if the sensor does not pulse (low = 0), and below -100 deg C, which no
+/// power stage is. The formula itself cannot exceed 235.
 [[nodiscard]] constexpr double temperature_C(std::uint32_t high, std::uint32_t low) noexcept {
+  constexpr double least_C = -100.0;
   if (low == 0) return std::numeric_limits<double>::quiet_NaN();
-  return 235.0 - 400.0 * static_cast<double>(high) / static_cast<double>(low);
+  const double celsius = 235.0 - 400.0 * static_cast<double>(high) / static_cast<double>(low);
+  return celsius >= least_C ? celsius : std::numeric_limits<double>::quiet_NaN();
 }
 /// Registers 54, 58 and 5C (low 16 bits) with register 50: rad/s; NaN if the period is 0.
 [[nodiscard]] double velocity_rad_s(std::uint32_t raw, std::uint32_t period_ticks) noexcept;

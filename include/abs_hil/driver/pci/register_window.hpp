@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "abs_hil/driver/emulated_time.hpp"
 #include "abs_hil/driver/io_result.hpp"
 
 namespace abs_hil::driver::pci {
@@ -20,17 +21,6 @@ class RegisterWindow {
   virtual IoResult write32(std::uint32_t offset, std::uint32_t value) noexcept = 0;
 };
 
-/// The clock of an emulated card in lock-step: it stands still until told to go on. No hardware has one.
-class EmulatedTime {
- public:
-  EmulatedTime() = default;
-  EmulatedTime(const EmulatedTime&) = delete;
-  EmulatedTime& operator=(const EmulatedTime&) = delete;
-  virtual ~EmulatedTime() = default;
-
-  virtual IoResult now(std::int64_t& time_ns) noexcept = 0;
-  /// Lets the emulated rig go on to `time_ns`; returns when it is there.
-  virtual IoResult advance_to(std::int64_t time_ns) noexcept = 0;
-};
+using driver::EmulatedTime;
 
 }  // namespace abs_hil::driver::pci

@@ -3,24 +3,12 @@
 #include <filesystem>
 #include <memory>
 
+#include "abs_hil/driver/file_descriptor.hpp"
 #include "abs_hil/driver/pci/register_window.hpp"
 
 namespace abs_hil::driver::pci {
 
-/// An open file that closes itself.
-class FileDescriptor {
- public:
-  explicit FileDescriptor(int fd) noexcept : fd_(fd) {}
-  FileDescriptor(FileDescriptor&& other) noexcept : fd_(other.fd_) { other.fd_ = -1; }
-  FileDescriptor& operator=(FileDescriptor&&) = delete;
-  FileDescriptor(const FileDescriptor&) = delete;
-  FileDescriptor& operator=(const FileDescriptor&) = delete;
-  ~FileDescriptor();
-  [[nodiscard]] int get() const noexcept { return fd_; }
-
- private:
-  int fd_;
-};
+using driver::FileDescriptor;
 
 /// The registers behind sysfs' `resource2`: for an I/O BAR the kernel turns a 4-byte pread or pwrite at the register's
 /// offset into one 32-bit port access (Documentation/PCI/sysfs-pci.rst). Exactly one process may own a card, because

@@ -1,0 +1,212 @@
+#include "emulated_usb.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+#include "abs_hil/runtime/clock.hpp"
+#include "control_fifo.hpp"
+#include "truth_file.hpp"
+
+namespace abs_hil::app {
+
+namespace {
+
+constexpr std::int64_t truth_period_ns = 1'000'000;
+constexpr std::int64_t mid_braking_ns = 300'000'000;
+
+std::int64_t monotonic_ns() { return runtime::MonotonicClock().now_ns(); }
+
+/// The first free port for high speed: lines "hs 0000 004 000 ...", where 004 is free.
+int free_port(const std::string& controller) {
+  std::ifstream status(controller + "/status");
+  if (!status) {
+    throw std::runtime_error(controller + "/status: " + std::strerror(errno) +
+                             "; the kernel's virtual USB host controller is needed: sudo modprobe vhci_hcd");
+  }
+  std::string line;
+  while (std::getline(status, line)) {
+    std::istringstream words(line);
+    std::string speed;
+    int port = 0;
+    int state = 0;
+    constexpr int is_free = 4;
+    if (words >> speed >> port >> state && speed == "hs" && state == is_free) return port;
+  }
+  throw std::runtime_error(controller + ": all its high-speed ports are taken");
+}
+
+}  // namespace
+
+EmulatedUsb::EmulatedUsb(const UsbEmulatorOptions& options)
+    : options_(options),
+      board_(options.board),
+      device_(board_, options.identity, options.seed,
+              options.lock_step ? emulator::UsbipDevice::GoOnTo([this](std::int64_t time_ns) { go_on_to(time_ns); })
+                                : emulator::UsbipDevice::GoOnTo()),
+      started_ns_(monotonic_ns()) {
+  for (const std::string& command : options.when_braking) {
+    if (command == "plug") throw std::invalid_argument("--when-braking plug: nothing is unplugged then");
+  }
+  if (!options.truth_file.empty()) {
+    open_for_writing(truth_, options.truth_file);
+    truth_ << "time_s,omega1_rad_s,omega2_rad_s,slip,brake_torque_Nm,theta_N,drive_duty,brake_duty\n";
+  }
+  plug_in();
+}
+
+void EmulatedUsb::plug_in() {
+  const int port = free_port(options_.controller);
+  std::array<int, 2> pair{};
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair.data()) != 0) {
+    throw std::runtime_error(std::string("no socket pair: ") + std::strerror(errno));
+  }
+  driver::FileDescriptor ours(pair[0]);
+  const driver::FileDescriptor kernels(pair[1]);
+  constexpr int any_device_id = 0x10002;
+  constexpr int high_speed = 3;
+  std::ofstream attach(options_.controller + "/attach");
+  attach << fmt::format("{} {} {} {}", port, kernels.get(), any_device_id, high_speed) << std::flush;
+  if (!attach) {
+    throw std::runtime_error(options_.controller + "/attach: cannot be written: " + std::strerror(errno) +
+                             "; run as root");
+  }
+  host_ = std::move(ours);
+  device_.reconnect();
+  // The kernel asks who is there; until it has set a configuration nobody can use the board.
+  const std::int64_t started_ns = monotonic_ns();
+  constexpr std::int64_t longest_ns = 20'000'000'000;
+  while (!device_.configured()) {
+    pollfd ready{host_.get(), POLLIN, 0};
+    static_cast<void>(::poll(&ready, 1, 100));
+    if ((ready.revents != 0 && !serve()) || monotonic_ns() - started_ns > longest_ns) {
+      throw std::runtime_error(options_.controller + ": the kernel does not take the board; see dmesg");
+    }
+  }
+}
+
+void EmulatedUsb::unplug() {
+  host_ = driver::FileDescriptor(-1);  // closing is pulling the cable
+}
+
+void EmulatedUsb::send(const std::vector<std::uint8_t>& replies) {
+  std::size_t sent = 0;
+  while (sent < replies.size() && host_.get() >= 0) {
+    const ssize_t part = ::send(host_.get(), replies.data() + sent, replies.size() - sent, MSG_NOSIGNAL);
+    if (part < 0 && errno == EINTR) continue;
+    if (part <= 0) unplug();
+    sent += static_cast<std::size_t>(part > 0 ? part : 0);
+  }
+}
+
+bool EmulatedUsb::serve() {
+  if (host_.get() < 0) return true;
+  catch_up();
+  std::array<std::uint8_t, 4096> buffer;
+  const ssize_t got = ::recv(host_.get(), buffer.data(), buffer.size(), MSG_DONTWAIT);
+  if (got < 0 && (errno == EAGAIN || errno == EINTR)) return true;
+  if (got <= 0) return false;  // the controller has let go of it
+  std::vector<std::uint8_t> replies;
+  device_.receive(std::span(buffer).first(static_cast<std::size_t>(got)), monotonic_ns(), replies);
+  send(replies);
+  return true;
+}
+
+void EmulatedUsb::log_truth() {
+  const rig::PlantTruth truth = board_.plant().truth();
+  const emulator::Outputs out = board_.outputs();
+  truth_ << fmt::format("{:.6f},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.6f},{:.6f}\n",
+                        static_cast<double>(board_.time_ns()) * 1e-9, truth.speeds.omega1_rad_s,
+                        truth.speeds.omega2_rad_s, truth.slip, truth.brake_torque_Nm, truth.theta_N, out.drive_duty,
+                        out.brake_duty);
+}
+
+void EmulatedUsb::go_on_to(std::int64_t time_ns) {
+  while (truth_.is_open() && next_truth_ns_ <= time_ns) {
+    board_.advance_to(next_truth_ns_);
+    log_truth();
+    next_truth_ns_ += truth_period_ns;
+  }
+  board_.advance_to(time_ns);
+  watch_brake();
+}
+
+void EmulatedUsb::watch_brake() {
+  if (options_.when_braking.empty()) return;
+  if (board_.outputs().brake_duty == 0.0) {
+    brake_since_ns_ = -1;
+  } else if (brake_since_ns_ < 0) {
+    brake_since_ns_ = board_.time_ns();
+  } else if (board_.time_ns() - brake_since_ns_ >= mid_braking_ns) {
+    for (const std::string& command : std::exchange(options_.when_braking, {})) {
+      fmt::print("while braking: {}: {}\n", command, obey(command));
+    }
+    std::fflush(stdout);
+  }
+}
+
+void EmulatedUsb::catch_up() {
+  if (!options_.lock_step) go_on_to(monotonic_ns() - started_ns_);
+  std::vector<std::uint8_t> replies;
+  device_.answer_late_ones(monotonic_ns(), replies);
+  send(replies);
+}
+
+std::string EmulatedUsb::place() const {
+  return fmt::format("board {:04x}:{:04x} \"{}\" at {}", options_.identity.vendor_id, options_.identity.product_id,
+                     options_.identity.manufacturer, options_.controller);
+}
+
+std::string EmulatedUsb::status() const {
+  const emulator::Outputs out = board_.outputs();
+  const auto& state = board_.plant().state();
+  return fmt::format(
+      "time {:.3f} s, drive {:.4f}, brake {:.4f}, upper {:.2f} rad/s, lower {:.2f} rad/s, frames {}, nonsense {}, JTAG "
+      "{}",
+      static_cast<double>(board_.time_ns()) * 1e-9, out.drive_duty, out.brake_duty, state.omega1_rad_s,
+      state.omega2_rad_s, board_.frames_taken(), board_.nonsense(), device_.jtag_transfers());
+}
+
+const char* EmulatedUsb::commands() {
+  return "fault KIND                      ok | stall in|out [once] | length BYTES | silent | late US [COUNT] | "
+         "garbage\n"
+         "unplug | plug                   the cable; the outputs hold\n"
+         "break-brake on|off              the brake's PWM does not take what is written\n"
+         "estop on|off                    the emergency stop: cuts the drive only\n"
+         "turn upper|lower REVOLUTIONS    a wheel is turned by hand\n"
+         "status                          duties on the wire, speeds, frames taken\n";
+}
+
+std::string EmulatedUsb::obey(std::string_view line) {
+  const std::vector<std::string> words = words_of(line);
+  const auto is = [&words](std::string_view name, std::size_t arguments) {
+    return words[0] == name && words.size() == arguments + 1;
+  };
+  if (words.empty()) return {};
+  if (words[0] == "fault") {
+    device_.faults.set(line.substr(line.find("fault") + 5));
+  } else if (is("unplug", 0)) {
+    unplug();
+  } else if (is("plug", 0)) {
+    if (host_.get() < 0) plug_in();
+  } else if (is("break-brake", 1)) {
+    board_.break_brake(on_or_off(words[1]));
+  } else if (is("estop", 1)) {
+    board_.press_emergency_stop(on_or_off(words[1]));
+  } else if (is("turn", 2) && (words[1] == "upper" || words[1] == "lower")) {
+    board_.turn_by_hand(words[1] == "upper", number_in(words[2]));
+  } else if (!is("status", 0)) {
+    throw std::invalid_argument("unknown command \"" + std::string(line) + "\"; known are\n" + commands());
+  }
+  return status();
+}
+
+}  // namespace abs_hil::app

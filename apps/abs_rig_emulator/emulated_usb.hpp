@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <fstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abs_hil/driver/file_descriptor.hpp"
+#include "abs_hil/emulator/usb_board_model.hpp"
+#include "abs_hil/emulator/usbip_device.hpp"
+
+namespace abs_hil::app {
+
+/// What the emulated USB board is started with.
+struct UsbEmulatorOptions {
+  emulator::UsbBoardOptions board{};
+  emulator::UsbIdentity identity{};
+  std::string controller{"/sys/devices/platform/vhci_hcd.0"};  ///< the kernel's virtual host controller
+  std::uint64_t seed{1};
+  bool lock_step{false};
+  std::string truth_file{};                 ///< CSV of what no frame shows; empty: none
+  std::vector<std::string> when_braking{};  ///< commands obeyed once the brake has acted for 0.3 s
+};
+
+/// The board, plugged into this computer's virtual USB host controller (vhci_hcd) through a socket pair.
+class EmulatedUsb {
+ public:
+  /// Plugs the board in. Throws std::invalid_argument, or std::runtime_error if there is no controller to plug it into.
+  explicit EmulatedUsb(const UsbEmulatorOptions& options);
+
+  [[nodiscard]] int descriptor() const { return host_.get(); }
+  bool serve();
+  void catch_up();
+  std::string obey(std::string_view line);
+  [[nodiscard]] std::string status() const;
+  [[nodiscard]] std::string place() const;
+  /// The commands `obey` knows, one a line.
+  [[nodiscard]] static const char* commands();
+
+ private:
+  void plug_in();
+  void unplug();
+  void go_on_to(std::int64_t time_ns);
+  void log_truth();
+  void watch_brake();
+  void send(const std::vector<std::uint8_t>& replies);
+
+  UsbEmulatorOptions options_;
+  emulator::UsbBoardModel board_;
+  emulator::UsbipDevice device_;
+  driver::FileDescriptor host_{-1};
+  std::int64_t started_ns_;
+  std::int64_t next_truth_ns_{0};
+  std::int64_t brake_since_ns_{-1};
+  std::ofstream truth_{};
+};
+
+}  // namespace abs_hil::app

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+
+namespace abs_hil::driver {
+
+// PWM outputs of the maker's RT-DAC4 and RT-DAC boards.
+
+/// PWM and velocity periods of the RT-DAC4/PCI count this.
+inline constexpr double board_clock_Hz = 40e6;
+
+/// Counting width of a PWM.
+enum class PwmMode : std::uint32_t { bits_8 = 0, bits_12 = 1 };
+
+/// Largest width, which is duty 1.
+[[nodiscard]] constexpr std::uint32_t full_width(PwmMode mode) noexcept {
+  return mode == PwmMode::bits_12 ? 4095 : 255;
+}
+/// PWM frequency, Hz: 40 MHz / ((prescaler + 1) full width).
+[[nodiscard]] constexpr double pwm_frequency_Hz(PwmMode mode, std::uint32_t prescaler) noexcept {
+  return board_clock_Hz / ((static_cast<double>(prescaler) + 1.0) * static_cast<double>(full_width(mode)));
+}
+/// Width register for a duty in [0, 1], rounded, but never above the cap in [0, 1].
+[[nodiscard]] constexpr std::uint32_t pwm_width_for(PwmMode mode, double duty, double duty_max) noexcept {
+  const double full = static_cast<double>(full_width(mode));
+  constexpr double rounding_slack = 1e-9;  // a cap that is exactly a width may come out a hair below it
+  const auto cap = static_cast<std::uint32_t>(duty_max * full + rounding_slack);
+  const auto width = static_cast<std::uint32_t>(duty * full + 0.5);
+  return width < cap ? width : cap;
+}
+
+}  // namespace abs_hil::driver

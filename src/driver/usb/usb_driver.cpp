@@ -1,0 +1,257 @@
+#include "abs_hil/driver/usb/usb_driver.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <stdexcept>
+#include <tuple>
+#include <utility>
+
+#include "abs_hil/driver/plausibility.hpp"
+
+namespace abs_hil::driver::usb {
+
+namespace {
+
+constexpr std::int64_t ns_per_us = 1000;
+/// Outside the cycle nothing presses.
+constexpr std::int64_t patient_ns = 500'000'000;
+
+std::int32_t with_sign(std::uint32_t raw, std::int32_t sign) noexcept {
+  return std::bit_cast<std::int32_t>(sign < 0 ? 0U - raw : raw);  // unsigned: the most negative count has no negative
+}
+
+rig::Reason reason_for(IoError error) noexcept {
+  switch (error) {
+    case IoError::disconnected: return rig::Reason::usb_unplugged;
+    case IoError::stalled: return rig::Reason::usb_stalled;
+    case IoError::incomplete_answer: return rig::Reason::usb_short_frame;
+    case IoError::no_answer: return rig::Reason::usb_no_answer;
+    case IoError::implausible_answer: return rig::Reason::usb_not_a_frame;
+    case IoError::read_back_mismatch: return rig::Reason::usb_outputs_not_taken;
+    case IoError::transfer_failed: return rig::Reason::usb_transfer_failed;
+    default: return rig::Reason::none;
+  }
+}
+
+IoResult with_reason(IoResult result) noexcept {
+  if (!result.ok()) result.reason = reason_for(result.error);
+  return result;
+}
+
+}  // namespace
+
+UsbDriver::UsbDriver(const UsbOptions& options, OpenBoard open_board, ReadClock read_clock)
+    : options_(options),
+      mode_(options.pwm_mode == "8-bit" ? PwmMode::bits_8 : PwmMode::bits_12),
+      open_board_(std::move(open_board)),
+      read_clock_(read_clock) {
+  for (const auto& [key, sign] : {std::pair("driver.usb.lower_sign", options.lower_sign),
+                                  std::pair("driver.usb.upper_sign", options.upper_sign)}) {
+    if (sign != 1 && sign != -1) {
+      throw std::invalid_argument(std::string(key) + " = " + std::to_string(sign) + ": give 1 or -1");
+    }
+  }
+  if (options.lower_channel == options.upper_channel) {
+    throw std::invalid_argument("driver.usb.lower_channel = driver.usb.upper_channel = " +
+                                std::to_string(options.upper_channel) + ": each wheel has an encoder of its own");
+  }
+  if (options.drive_pwm == options.brake_pwm) {
+    throw std::invalid_argument("driver.usb.drive_pwm = driver.usb.brake_pwm = " + std::to_string(options.brake_pwm) +
+                                ": drive and brake have a PWM each");
+  }
+}
+
+UsbDriver::~UsbDriver() { static_cast<void>(deactivate()); }
+
+std::int64_t UsbDriver::clock_ns(std::int64_t otherwise) const noexcept {
+  return read_clock_ == nullptr ? otherwise : read_clock_();
+}
+
+void UsbDriver::do_configure() {
+  board_ = {};  // gives the board back, should it be ours
+  board_ = open_board_();
+  const auto refuse = [this](const std::string& what) {
+    const std::string text = "backend rig: USB board " + board_.place + ": " + what + "; no output was written";
+    board_ = {};
+    throw Unavailable(text);
+  };
+  IoResult result = board_.link->request();
+  std::span<const std::uint8_t> bytes;
+  if (result.ok()) result = board_.link->receive(patient_ns, bytes);
+  if (!result.ok()) refuse("its first frame did not come: " + error_text(result));
+  Contents contents;
+  if (decode(bytes, options_, contents) != IoError::none) {
+    refuse("its first frame has " + std::to_string(bytes.size()) + " bytes, not " + std::to_string(frame_bytes) +
+           ": another logic, or another device");
+  }
+  std::copy(bytes.begin(), bytes.end(), shown_.begin());
+  identity_ = contents.identity;
+  if (options_.version >= 0 && identity_[word::version] != options_.version) {
+    refuse("version word " + std::to_string(identity_[word::version]) + " is not the configured " +
+           std::to_string(options_.version) +
+           " (driver.usb.version): another logic has other words; load the right logic or correct the key");
+  }
+}
+
+void UsbDriver::put_command(std::uint32_t drive_width, std::uint32_t brake_width, bool enable) noexcept {
+  const auto put = [this](std::int32_t channel, const PwmWords& words) {
+    const std::size_t at = word::pwm + pwm_words * static_cast<std::size_t>(channel);
+    for (std::size_t i = 0; i < words.size(); ++i) put_payload(frame_, at + i, words[i]);
+  };
+  const auto mode = static_cast<std::uint32_t>(mode_);
+  const auto prescaler = static_cast<std::uint32_t>(options_.pwm_prescaler);
+  drive_sent_ = pwm_words_for(mode, prescaler, drive_width);
+  brake_sent_ = pwm_words_for(mode, prescaler, brake_width);
+  put(options_.drive_pwm, drive_sent_);
+  put(options_.brake_pwm, brake_sent_);
+  if (options_.enable_line < 0) return;
+  const std::uint32_t line = 1U << static_cast<std::uint32_t>(options_.enable_line);
+  const std::uint32_t others = word_at(frame_, word::digital_out) & ~line;
+  digital_sent_ = static_cast<std::uint16_t>(others | (enable != options_.enable_inverted ? line : 0U));
+  put_payload(frame_, word::digital_out, digital_sent_);
+  put_payload(frame_, word::digital_direction, word_at(frame_, word::digital_direction) & ~line);
+}
+
+IoResult UsbDriver::checked(const Contents& contents) const noexcept {
+  if (contents.identity != identity_) return {IoError::implausible_answer, endpoint_in};
+  if (!options_.verify_outputs) return {};
+  const std::uint32_t line = options_.enable_line < 0 ? 0U : 1U << static_cast<std::uint32_t>(options_.enable_line);
+  const bool as_sent = contents.drive == drive_sent_ && contents.brake == brake_sent_ &&
+                       ((contents.digital_out ^ digital_sent_) & line) == 0;
+  return as_sent ? IoResult{} : IoResult{IoError::read_back_mismatch, endpoint_in};
+}
+
+IoResult UsbDriver::fresh_frame(std::int64_t timeout_ns, Contents& contents, std::int64_t& read_ns) noexcept {
+  FrameLink& link = *board_.link;
+  std::span<const std::uint8_t> bytes;
+  const std::int64_t deadline_ns = clock_ns(0) + timeout_ns;
+  if (link.answer_outstanding()) {
+    if (const IoResult late = link.receive(timeout_ns, bytes); !late.ok()) return late;
+  }
+  const std::int64_t asked_ns = clock_ns(read_ns);
+  if (const IoResult result = link.request(); !result.ok()) return result;
+  const std::int64_t left_ns = deadline_ns - clock_ns(0);
+  if (const IoResult result = link.receive(left_ns > 0 ? left_ns : 0, bytes); !result.ok()) return result;
+  read_ns = asked_ns + (clock_ns(asked_ns) - asked_ns) / 2;
+  if (const IoError error = decode(bytes, options_, contents); error != IoError::none) return {error, endpoint_in};
+  return checked(contents);
+}
+
+IoResult UsbDriver::send_safe() noexcept {
+  put_command(0, 0, false);
+  IoResult result = board_.link->send(frame_);
+  if (result.ok()) result = board_.link->flush(patient_ns);
+  if (!result.ok() || !options_.verify_outputs) return result;
+  Contents contents;
+  std::int64_t ignored = 0;
+  return fresh_frame(patient_ns, contents, ignored);
+}
+
+IoResult UsbDriver::take_over(Contents& contents) noexcept {
+  // Mode and prescaler as they are, widths 0, before they are changed: they must not turn an old width into a pulse.
+  for (const std::int32_t channel : {options_.drive_pwm, options_.brake_pwm}) {
+    put_payload(frame_, word::pwm + pwm_words * static_cast<std::size_t>(channel) + 2, 0);
+  }
+  IoResult result = board_.link->send(frame_);
+  if (result.ok()) result = board_.link->flush(patient_ns);
+  if (result.ok()) result = send_safe();
+  std::int64_t ignored = 0;
+  if (result.ok()) result = fresh_frame(patient_ns, contents, ignored);
+  return result;
+}
+
+void UsbDriver::do_activate(std::int64_t now_ns) {
+  frame_ = frame_from(shown_);
+  bucket_.empty();
+  frames_lost_ = 0;
+  lost_this_cycle_ = false;
+  activated_ns_ = now_ns;
+  IoResult result{};
+  if (board_.time) result = board_.time->now(emulated_ns_);
+  if (result.ok()) result = take_over(zero_);
+  if (!result.ok()) {
+    static_cast<void>(do_make_safe());
+    std::string text =
+        "backend rig: USB board " + board_.place + ": taking over the outputs failed: " + error_text(result);
+    if (result.error == IoError::read_back_mismatch) {
+      text +=
+          ". Its frames do not show the PWM words that were sent. Whether the real board does is not known: if yours "
+          "does not, set driver.usb.verify_outputs=false; the safe state is then sent but never verified";
+    }
+    throw Unavailable(text);
+  }
+  last_ = {};
+  last_.time_ns = now_ns;
+}
+
+void UsbDriver::take_counts(const Contents& contents, std::array<std::int32_t, 2>& counts) const noexcept {
+  counts = {with_sign(contents.upper_raw - zero_.upper_raw, options_.upper_sign),
+            with_sign(contents.lower_raw - zero_.lower_raw, options_.lower_sign)};
+}
+
+IoResult UsbDriver::lost_frame() noexcept {
+  ++frames_lost_;
+  if (bucket_.lost()) return {};
+  return failed({IoError::no_answer, endpoint_in});
+}
+
+IoResult UsbDriver::failed(const IoResult& result) noexcept {
+  put_command(0, 0, false);
+  static_cast<void>(board_.link->send(frame_));
+  return with_reason(result);
+}
+
+IoResult UsbDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept {
+  lost_this_cycle_ = false;
+  if (board_.time) {
+    const IoResult result = board_.time->advance_to(emulated_ns_ + now_ns - activated_ns_);
+    if (!result.ok()) return with_reason(result);
+  }
+  Contents contents;
+  std::int64_t read_ns = now_ns;
+  IoResult result = fresh_frame(options_.answer_timeout_us * ns_per_us, contents, read_ns);
+  if (result.error == IoError::no_answer) {
+    measurement = last_;
+    lost_this_cycle_ = true;
+    return lost_frame();
+  }
+  if (!result.ok()) return failed(result);
+  std::array<std::int32_t, 2> counts{};
+  take_counts(contents, counts);
+  const auto plausible = [&](std::int32_t before, std::int32_t after) {
+    return plausible_travel(before, after, read_ns - last_.time_ns, options_.plausible_speed_rad_s,
+                            options_.encoder_counts_per_rev);
+  };
+  if (!plausible(last_.upper_counts, counts[0]) || !plausible(last_.lower_counts, counts[1])) {
+    return failed({IoError::implausible_answer, endpoint_in});
+  }
+  bucket_.good();
+  last_.time_ns = read_ns;
+  last_.upper_counts = counts[0];
+  last_.lower_counts = counts[1];
+  measurement = last_;  // the generic logic knows neither supply nor temperature nor interlocks
+  return {};
+}
+
+IoResult UsbDriver::do_write(const rig::Command& command) noexcept {
+  if (!in_range(command)) return {IoError::command_out_of_range};
+  const double motor_duty = command.motor_enable ? command.motor_duty : 0.0;
+  const auto sent_before = std::tuple(drive_sent_, brake_sent_, digital_sent_);
+  put_command(pwm_width_for(mode_, motor_duty, options_.motor_duty_max),
+              pwm_width_for(mode_, command.brake_duty, options_.brake_duty_max), command.motor_enable);
+  const IoResult result = board_.link->send(frame_);
+  if (result.error != IoError::no_answer) return with_reason(result);
+  std::tie(drive_sent_, brake_sent_, digital_sent_) = sent_before;
+  // A cycle counts once. Without a read nobody else would notice a board that takes nothing.
+  return std::exchange(lost_this_cycle_, false) ? IoResult{} : lost_frame();
+}
+
+IoResult UsbDriver::do_make_safe() noexcept {
+  if (!board_.link) return {IoError::disconnected};
+  IoResult result = send_safe();
+  if (result.ok() || result.error == IoError::disconnected) return with_reason(result);
+  board_.link->recover();
+  return with_reason(send_safe());
+}
+
+}  // namespace abs_hil::driver::usb

@@ -1,0 +1,123 @@
+#include "abs_hil/emulator/usb_board_model.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+
+#include "abs_hil/plant_sim/encoder.hpp"
+
+namespace abs_hil::emulator {
+
+namespace {
+
+/// Words that the host sets: digital mode, direction and out; PWM; encoder set-up; timers; ADC gain; DAC.
+constexpr bool host_sets(std::size_t word) noexcept {
+  return (word >= 10 && word <= 15) || (word >= 20 && word <= 52) || (word >= 70 && word <= 75) ||
+         (word >= 200 && word <= 203) || (word >= 220 && word <= 223);
+}
+
+void check_channels(const char* what, std::uint32_t a, std::uint32_t b, std::uint32_t count) {
+  if (a < count && b < count && a != b) return;
+  throw std::invalid_argument(std::string(what) + " channels " + std::to_string(a) + " and " + std::to_string(b) +
+                              ": give two different ones below " + std::to_string(count));
+}
+
+}  // namespace
+
+UsbBoardModel::UsbBoardModel(const UsbBoardOptions& options) : options_(options), plant_(options.plant) {
+  check_channels("PWM", options.drive_pwm, options.brake_pwm, 10);
+  check_channels("encoder", options.lower_encoder, options.upper_encoder, 8);
+  if (options.enable_line > 14) {
+    throw std::invalid_argument("enable line " + std::to_string(options.enable_line) + ": give -1 to 14");
+  }
+  if (!(options.start_speed_rad_s >= 0.0) || !std::isfinite(options.start_speed_rad_s)) {
+    throw std::invalid_argument("start speed " + std::to_string(options.start_speed_rad_s) +
+                                " rad/s: must be finite and >= 0");
+  }
+  plant_.reset({.omega1_rad_s = options.start_speed_rad_s, .omega2_rad_s = options.start_speed_rad_s});
+  written_[12] = written_[13] = 0x7FFF;  // all lines are inputs at power-on
+}
+
+UsbBoardModel::Taken UsbBoardModel::take(std::span<const std::uint8_t> transfer) noexcept {
+  const auto nonsense = [this] {
+    ++nonsense_;
+    return Taken::nonsense;
+  };
+  if (transfer.size() == 4 && transfer[0] == 0xFF && transfer[1] == 0x8F && transfer[2] == 0 && transfer[3] == 0) {
+    return Taken::request;
+  }
+  if (transfer.size() != frame_bytes || transfer[0] != 0x0F || transfer[1] != 0x8F) return nonsense();
+  for (std::size_t high_byte = 3; high_byte < frame_bytes; high_byte += 2) {
+    if (transfer[high_byte] > 0x7F) return nonsense();
+  }
+  ++frames_taken_;
+  for (std::size_t word = 1; word < words; ++word) {
+    if (!host_sets(word)) continue;
+    written_[word] = static_cast<std::uint16_t>(transfer[2 * word] + 256U * transfer[2 * word + 1]);
+  }
+  if (brake_broken_) ++written_[22 + 3 * options_.brake_pwm];
+  return Taken::frame;
+}
+
+UsbBoardModel::Image UsbBoardModel::image() const noexcept {
+  std::array<std::uint16_t, words> shown{};
+  // "ABSEMU", the date as two words, and so many of everything; all of it ours.
+  const std::array<std::uint16_t, 9> identity{options_.version, 0x4241, 0x4553, 0x554D, 0x2026,
+                                              0x1121,           0x0A08, 0x0004, 0x1004};
+  std::copy(identity.begin(), identity.end(), shown.begin());
+  if (options_.shows_outputs) {
+    for (std::size_t word = 10; word < words; ++word) shown[word] = written_[word];
+  }
+  const plant_sim::PlantState& s = plant_.state();
+  const std::int32_t per_rev = options_.plant.rig.encoder_counts_per_rev;
+  const auto show_counter = [&](std::uint32_t channel, double angle_rad) {
+    const auto count = std::bit_cast<std::uint32_t>(plant_sim::encoder_counts(angle_rad, per_rev));
+    shown[53 + 2 * channel] = static_cast<std::uint16_t>(count & 0xFFFFU);
+    shown[54 + 2 * channel] = static_cast<std::uint16_t>(count >> 16U);
+  };
+  show_counter(options_.upper_encoder, s.angle1_rad);
+  show_counter(options_.lower_encoder, s.angle2_rad);
+  Image image{};
+  for (std::size_t word = 0; word < words; ++word) {
+    image[2 * word] = static_cast<std::uint8_t>(shown[word] % 256U);
+    image[2 * word + 1] = static_cast<std::uint8_t>(shown[word] / 256U);
+  }
+  return image;
+}
+
+double UsbBoardModel::duty(std::uint32_t channel) const noexcept {
+  const bool twelve_bits = (written_[21 + 3 * channel] & 2U) != 0;
+  const std::uint32_t full = twelve_bits ? 4095 : 255;
+  return static_cast<double>(std::min<std::uint32_t>(written_[22 + 3 * channel], full)) / static_cast<double>(full);
+}
+
+Outputs UsbBoardModel::outputs() const noexcept {
+  bool enabled = !emergency_stop_;
+  if (options_.enable_line >= 0) {
+    const std::uint32_t line = 1U << static_cast<std::uint32_t>(options_.enable_line);
+    enabled = enabled && (written_[12] & line) == 0 && (written_[14] & line) != 0;
+  }
+  return {.drive_duty = enabled ? duty(options_.drive_pwm) : 0.0, .brake_duty = duty(options_.brake_pwm)};
+}
+
+void UsbBoardModel::turn_by_hand(bool upper_wheel, double revolutions) noexcept {
+  plant_sim::PlantState state = plant_.state();
+  (upper_wheel ? state.angle1_rad : state.angle2_rad) += revolutions * 2.0 * std::numbers::pi;
+  plant_.reset(state);
+}
+
+void UsbBoardModel::advance_to(std::int64_t time_ns) noexcept {
+  while (time_ns_ < time_ns) {
+    // Steps end on multiples of 100 us wherever the host's transfers fall.
+    const std::int64_t next = std::min(time_ns, (time_ns_ / step_ns + 1) * step_ns);
+    const Outputs out = outputs();
+    plant_.advance(static_cast<double>(next - time_ns_) * 1e-9,
+                   {.motor_duty = out.drive_duty, .brake_duty = out.brake_duty});
+    time_ns_ = next;
+  }
+}
+
+}  // namespace abs_hil::emulator

@@ -1,0 +1,69 @@
+#include "abs_hil/emulator/usb_faults.hpp"
+
+#include <charconv>
+#include <stdexcept>
+#include <string>
+
+namespace abs_hil::emulator {
+
+namespace {
+
+[[noreturn]] void refuse(std::string_view text) {
+  throw std::invalid_argument("fault \"" + std::string(text) +
+                              "\": give ok, stall in|out [once], length BYTES (0 to 512), silent, late US [COUNT], or "
+                              "garbage");
+}
+
+std::vector<std::string_view> words_of(std::string_view text) {
+  std::vector<std::string_view> words;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find(' '), text.size());
+    if (end > 0) words.push_back(text.substr(0, end));
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return words;
+}
+
+std::int64_t number_in(std::string_view word, std::int64_t most, std::string_view whole) {
+  std::int64_t value = 0;
+  const auto [at, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (error != std::errc() || at != word.data() + word.size() || value < 0 || value > most) refuse(whole);
+  return value;
+}
+
+}  // namespace
+
+void UsbFaults::set(std::string_view text) {
+  const std::vector<std::string_view> words = words_of(text);
+  const auto is = [&words](std::string_view name, std::size_t least, std::size_t most) {
+    return !words.empty() && words[0] == name && words.size() > least && words.size() <= most + 1;
+  };
+  constexpr std::int64_t longest_answer = 512;
+  constexpr std::int64_t latest_us = 10'000'000;
+  if (is("ok", 0, 0)) {
+    *this = {};
+  } else if (is("stall", 1, 2) && (words[1] == "in" || words[1] == "out") &&
+             (words.size() == 2 || words[2] == "once")) {
+    (words[1] == "in" ? stall_in : stall_out) = words.size() == 3 ? Stall::once : Stall::on;
+  } else if (is("length", 1, 1)) {
+    length = static_cast<std::size_t>(number_in(words[1], longest_answer, text));
+  } else if (is("silent", 0, 0)) {
+    silent = true;
+  } else if (is("late", 1, 2)) {
+    late_ns = number_in(words[1], latest_us, text) * 1000;
+    late_count = words.size() == 3 ? static_cast<std::uint32_t>(number_in(words[2], latest_us, text)) : 0;
+  } else if (is("garbage", 0, 0)) {
+    garbage = true;
+  } else {
+    refuse(text);
+  }
+}
+
+void UsbFaults::spoil(std::vector<std::uint8_t>& answer, std::mt19937_64& random) const {
+  if (garbage) {
+    for (std::uint8_t& byte : answer) byte = static_cast<std::uint8_t>(random() >> 56U);
+  }
+  if (length) answer.resize(*length);
+}
+
+}  // namespace abs_hil::emulator

@@ -1,0 +1,34 @@
+#include "../usb/model_board.hpp"
+#include "bench.hpp"
+
+namespace abs_hil::test {
+
+namespace {
+
+class UsbModelBench final : public Bench {
+ public:
+  driver::RigDriver& driver() override { return *driver_; }
+  void destroy_driver() override { driver_.reset(); }
+  Wire wire() override {
+    const emulator::Outputs out = board_.model.outputs();
+    return {out.drive_duty, out.brake_duty};
+  }
+  std::uint64_t writes() override { return board_.model.frames_taken(); }
+  bool break_brake_output() override {
+    board_.model.break_brake(true);
+    return true;
+  }
+  [[nodiscard]] int read_back_cycles() const override { return 1; }
+  [[nodiscard]] bool tells_health() const override { return false; }
+
+ private:
+  ModelBoard board_{{.start_speed_rad_s = bench_speed_rad_s}};
+  std::unique_ptr<driver::usb::UsbDriver> driver_ =
+      std::make_unique<driver::usb::UsbDriver>(driver::usb::UsbOptions{}, board_.opener());
+};
+
+}  // namespace
+
+std::unique_ptr<Bench> make_bench() { return std::make_unique<UsbModelBench>(); }
+
+}  // namespace abs_hil::test
