@@ -8,12 +8,14 @@ import os
 import pathlib
 import subprocess
 import sys
+import time
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / 'app'))
 from program import PROGRAM, ProgramTest  # noqa: E402
 
 EMULATOR = os.path.join(os.path.dirname(PROGRAM), 'abs_rig_emulator')
+DEVICES = pathlib.Path('/sys/bus/usb/devices')
 SAFE = (0.0, 0.0)
 UNSAFE_WORDS = 'the safe state may not have reached the board'
 
@@ -55,29 +57,37 @@ class Emulator:
         return float(part[0]), float(part[1].split()[1])
 
     def end(self):
+        if self.process.returncode is not None:
+            return ''
         self.process.terminate()
         text = self.process.stdout.read()
         self.process.stdout.close()
         self.process.wait(timeout=20)
+        while any(line.read_text().strip() == 'InTeCo' for line in DEVICES.glob('*/manufacturer')):
+            time.sleep(0.05)  # the kernel takes its time to see that it is gone
         return text
 
 
 class UsbTest(ProgramTest):
     def setUp(self):
         super().setUp()
-        self.emulators = []
+        self.boards = 0
+        self.board = None
 
     def tearDown(self):
-        for emulator in self.emulators:
-            if emulator.process.poll() is None:
-                emulator.end()
+        if self.board:
+            self.board.end()
         super().tearDown()
 
     def emulator(self, *args):
-        folder = self.folder / str(len(self.emulators))
+        """A new board, the one before unplugged."""
+        if self.board:
+            self.board.end()
+        self.boards += 1
+        folder = self.folder / str(self.boards)
         folder.mkdir()
-        self.emulators.append(Emulator(folder, *args))
-        return self.emulators[-1]
+        self.board = Emulator(folder, *args)
+        return self.board
 
     def rig(self, *args):
         return subprocess.run([PROGRAM, '--backend', 'rig', '--no-lcm', '--set', 'driver.kind=usb', '--set',
@@ -141,7 +151,6 @@ class LockStep(UsbTest):
                     self.assertEqual(brake, 0.0)
                 else:
                     self.assertAlmostEqual(brake, 1 / 4095, delta=1e-4)
-                emulator.end()
 
     def test_late_answers_pass_until_there_are_too_many(self):
         for late, status in ((3, 0), (200, 1)):
@@ -152,10 +161,9 @@ class LockStep(UsbTest):
                 if status == 0:
                     self.assertIn(f'{late} cycles without their frame', result.stderr)
                 self.assertEqual(emulator.wire(), SAFE)
-                emulator.end()
 
     def test_doctor_and_owner(self):
-        emulator = self.emulator('--lock-step', '--usb-serial', '77')
+        self.emulator('--lock-step', '--usb-serial', '77')
         doctor = self.run_program('doctor', '--only', 'boards')
         self.assertEqual(doctor.returncode, 0, doctor.stdout)
         self.assertIn('RT-DAC/USB2 1209:0001 serial 77', doctor.stdout)
@@ -166,7 +174,6 @@ class LockStep(UsbTest):
         real_time = self.rig()
         self.assertEqual(real_time.returncode, 3)
         self.assertIn('is an emulator in lock-step', real_time.stderr)
-        emulator.end()
 
 
 class RealTime(UsbTest):
@@ -183,7 +190,6 @@ class RealTime(UsbTest):
                 f'{s["result"]}, {s["cycles"]} cycles, overruns {s["overruns"]}, stop distance '
                 f'{s["stop_distance_m"]} m, cycle time us {s["cycle_time_us"]}, {lost}' if s else result.stderr))
             self.assertEqual(emulator.wire(), SAFE)
-            emulator.end()
             if result.returncode == 0 and s['overruns'] == 0 and ' 0 cycles without' in ''.join(lost):
                 held.append((rate, s))
         self.assertTrue(held, 'no rate was held')
