@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# The main job: sets up, builds, and runs the paper's experiment in real time on the simulated rig, or whatever the
-# arguments ask of abs_hil. Without a route for LCM's multicast it says what to type and records to a log instead.
+# The main job: sets up, builds, runs the paper's experiment in real time on the simulated rig and makes a report of it,
+# below runs/; with arguments, whatever they ask of abs_hil. Without a route for LCM's multicast it says what to type and
+# records to a log instead.
 set -euo pipefail
 root=$(realpath "$(dirname "$(realpath "$0")")/..")
 
@@ -9,7 +10,11 @@ root=$(realpath "$(dirname "$(realpath "$0")")/..")
 program="$root/build/release/bin/abs_hil"
 
 arguments=("$@")
-[ $# -gt 0 ] || arguments=(--backend sim)
+folder=""
+if [ $# -eq 0 ]; then
+  folder="$root/runs/$(date +%Y%m%d-%H%M%S)-paper"
+  arguments=(--backend sim --out "$folder")
+fi
 says_lcm=no
 for argument in "${arguments[@]}"; do
   case "$argument" in
@@ -18,10 +23,18 @@ for argument in "${arguments[@]}"; do
   esac
 done
 if [ "$says_lcm" = no ] && ! "$program" doctor --only lcm; then
-  mkdir -p "$root/runs"
-  log="$root/runs/$(date +%Y-%m-%dT%H-%M-%S).lcmlog"
-  echo "run: no LCM over UDP, see above; this run's telemetry goes to $log (lcm-logplayer replays it)"
   arguments+=(--no-lcm)
-  case " ${arguments[*]} " in *" --log"*) ;; *) arguments+=(--log "$log") ;; esac
+  log="${folder:+$folder/run.lcmlog}"
+  if [ -z "$log" ]; then
+    mkdir -p "$root/runs"
+    log="$root/runs/$(date +%Y-%m-%dT%H-%M-%S).lcmlog"
+    case " ${arguments[*]} " in *" --log"*) ;; *) arguments+=(--log "$log") ;; esac
+  fi
+  echo "run: no LCM over UDP, see above; this run's telemetry goes to $log (lcm-logplayer replays it)"
 fi
-exec "$program" "${arguments[@]}"
+[ -n "$folder" ] || exec "$program" "${arguments[@]}"
+status=0
+"$program" "${arguments[@]}" || status=$?
+# A run that a fault ended has something to show as well; one that never began has nothing.
+if [ -s "$folder/run.csv" ]; then "$root/build/release/bin/abs_report" "$folder" --output "$folder/report.html" || true; fi
+exit "$status"

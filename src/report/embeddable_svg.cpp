@@ -32,10 +32,15 @@ void mark_plot(std::string& svg, const std::string& gnuplot_id, const std::strin
 
 }  // namespace
 
+std::string with_common_fonts(std::string svg) {
+  replace_all(svg, "font-family=\"Liberation Serif\"", "font-family=\"Liberation Serif,Times New Roman,Times,serif\"");
+  return svg;
+}
+
 std::string embeddable_svg(const std::string& picture, const Figure& figure) {
   const std::size_t begin = picture.find("<svg");
   if (begin == std::string::npos) throw std::runtime_error("gnuplot's picture is no SVG");
-  std::string svg = picture.substr(begin);
+  std::string svg = with_common_fonts(picture.substr(begin));
   for (std::size_t p = 0; p < figure.panels.size(); ++p) {
     const std::vector<Curve>& curves = figure.panels[p].curves;
     const char letter = static_cast<char>('a' + p);
@@ -55,7 +60,6 @@ std::string embeddable_svg(const std::string& picture, const Figure& figure) {
   }
   replace_all(svg, "gpPt", figure.id + "_point");
   replace_all(svg, "gnuplot_canvas", figure.id + "_canvas");
-  replace_all(svg, "font-family=\"Liberation Serif\"", "font-family=\"Liberation Serif,Times New Roman,Times,serif\"");
   svg.replace(0, 4,
               fmt::format("<svg id=\"{}\" role=\"img\" aria-label=\"{}\"", figure.id, html_escape(figure.heading)));
   return svg;

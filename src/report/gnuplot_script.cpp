@@ -16,15 +16,16 @@ constexpr double left_px = 78.0;
 constexpr double right_px = 18.0;
 constexpr double bottom_px = 52.0;
 constexpr double gap_px = 16.0;
+constexpr double log_gap_px = 22.0;  ///< powers of ten stand higher
 constexpr double own_axis_gap_px = 54.0;
 constexpr double legend_row_px = 19.0;
 constexpr double label_row_px = 17.0;
 constexpr double top_px = 8.0;
 constexpr double font_px = 14.0;
 constexpr double small_font_px = 12.0;
-constexpr double character_px = 6.6;        ///< of the font, on average
-constexpr double small_character_px = 5.8;  ///< of the small font
-constexpr double legend_sample_px = 62.0;
+constexpr double legend_character_px = 8.4;  ///< as gnuplot reckons when it lays out a legend
+constexpr double small_character_px = 5.8;   ///< of the small font
+constexpr double legend_sample_px = 76.0;
 constexpr double inner_px = width_px - left_px - right_px;
 constexpr int x_marks = 8;
 constexpr double px_a_mark = 34.0;
@@ -37,19 +38,24 @@ void say(Lines& script, fmt::format_string<Args...> format, Args&&... args) {
   script += '\n';
 }
 
+double gap_below(const Panel& panel) {
+  if (panel.x_range) return own_axis_gap_px;
+  return panel.log_y ? log_gap_px : gap_px;
+}
+
 /// Where everything stands, in pixels from the top.
 struct Layout {
   explicit Layout(const Figure& figure) {
     std::size_t longest = 1;
     for (const LegendEntry& entry : figure.legend) longest = std::max(longest, length_of(entry.text));
-    const double entry_px = static_cast<double>(longest) * character_px + legend_sample_px;
+    const double entry_px = static_cast<double>(longest) * legend_character_px + legend_sample_px;
     columns = std::max<std::size_t>(1, static_cast<std::size_t>(inner_px / entry_px));
     columns = std::max<std::size_t>(1, std::min(columns, figure.legend.size()));
     const std::size_t rows = (figure.legend.size() + columns - 1) / columns;
     labels_px = top_px + static_cast<double>(rows) * legend_row_px;
     double at_px = labels_px + (figure.shades.empty() && figure.marks.empty() ? 4.0 : label_row_px);
     for (std::size_t i = 0; i < figure.panels.size(); ++i) {
-      if (i > 0) at_px += figure.panels[i - 1].x_range ? own_axis_gap_px : gap_px;
+      if (i > 0) at_px += gap_below(figure.panels[i - 1]);
       tops_px.push_back(at_px);
       at_px += figure.panels[i].height_px;
     }
@@ -188,7 +194,9 @@ void add_axes(Lines& script, const Panel& panel, Range x, bool labelled, const s
   say(script, "set xlabel {} offset 0,0.7", gnuplot_quote(labelled ? x_label : ""));
   const Range y = panel.y_range.value_or(values_within(panel, x));
   if (panel.log_y) {
-    say(script, "set logscale y; set format y '10^{{%T}}'; set ytics 10 enhanced font ''; set yrange [{:.9g}:{:.9g}]",
+    say(script,
+        "set logscale y; set format y '10^{{%T}}'; set ytics 10 enhanced font ''; set mytics 1; set yrange "
+        "[{:.9g}:{:.9g}]",
         y.first, y.second);
   } else {
     const int wanted = std::max(2, static_cast<int>(panel.height_px / px_a_mark));

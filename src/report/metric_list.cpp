@@ -25,7 +25,7 @@ constexpr std::array<Metric, 12> list{{
     {"time_locked_s", "time locked / s", 3, &Metrics::time_locked_s},
     {"torque_total_variation_Nm", "variation of torque asked for / (N m)", 1, &Metrics::torque_total_variation_Nm},
     {"theta_final_N", "estimate of θ at 3 m/s / N", 2, &Metrics::theta_final_N},
-    {"theta_error_final", "relative error of it", 4, &Metrics::theta_error_final},
+    {"theta_error_final", "relative error of θ at 3 m/s", 4, &Metrics::theta_error_final},
     {"theta_error_rms", "relative RMS error of θ", 4, &Metrics::theta_error_rms},
     {"theta_settling_s", "estimate of θ settled after / s", 3, &Metrics::theta_settling_s},
 }};

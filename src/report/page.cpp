@@ -29,7 +29,8 @@ figcaption b { font-weight: 600; }
 table { border-collapse: collapse; font-size: .9em; border-top: 1.5px solid #222; border-bottom: 1.5px solid #222; }
 thead tr { border-bottom: 1px solid #222; }
 th, td { padding: .18em .8em .18em 0; text-align: left; vertical-align: top; font-weight: 400; }
-thead th { font-weight: 600; overflow-wrap: anywhere; }
+thead th { font-weight: 600; }
+tbody th { white-space: nowrap; }
 table.numbers td, table.numbers thead th:not(:first-child) { text-align: right; font-variant-numeric: tabular-nums; }
 td { overflow-wrap: break-word; max-width: 26em; }
 #notes { font-size: .92em; color: #333; }

@@ -146,8 +146,12 @@ std::vector<fs::path> write_figures(const Report& report, const fs::path& folder
   const TemporaryFolder drawn;
   draw(report.figures, format, drawn.path());
   for (const fs::path& path : paths) {
-    fs::copy_file(drawn.path() / path.filename(), path, fs::copy_options::overwrite_existing, error);
-    if (error) throw InputError(fmt::format("cannot write \"{}\": {}", path.string(), error.message()));
+    std::string picture = read_picture(drawn.path() / path.filename());
+    if (format == PictureFormat::svg) picture = with_common_fonts(std::move(picture));
+    std::ofstream file(path, std::ios::binary);
+    file << picture;
+    file.close();
+    if (!file) throw InputError(fmt::format("cannot write \"{}\"; give a writable folder", path.string()));
   }
   return paths;
 }

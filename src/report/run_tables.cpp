@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <set>
 
 #include "abs_hil/report/text.hpp"
@@ -60,7 +61,8 @@ std::vector<RunEvent> events_of(const RunFiles& run, const RunSurvey& survey) {
 std::string metrics_table(const std::vector<RunFiles>& runs, const std::vector<RunSurvey>& surveys) {
   Table table{"metrics", header_of(runs), {}, true};
   const bool pair = runs.size() == 2;
-  if (pair) table.header.push_back("second against first");
+  std::string shared;  // what many runs have in common is said once
+  if (pair) table.header.emplace_back("second against first");
   for (const auto& [key, name] : std::array<std::pair<const char*, const char*>, 6>{{{"result", "result"},
                                                                                      {"reason", "reason"},
                                                                                      {"experiment", "experiment"},
@@ -70,6 +72,11 @@ std::string metrics_table(const std::vector<RunFiles>& runs, const std::vector<R
     std::vector<std::string> row{name};
     for (const RunFiles& run : runs) row.push_back(text_or_dash(run.text(key)));
     if (std::all_of(row.begin() + 1, row.end(), [](const std::string& cell) { return cell == "–"; })) continue;
+    if (runs.size() > most_columns &&
+        std::adjacent_find(row.begin() + 1, row.end(), std::not_equal_to<>()) == row.end()) {
+      shared += fmt::format("{}{}: {}", shared.empty() ? "" : "; ", name, row[1]);
+      continue;
+    }
     if (pair) row.emplace_back();
     table.rows.push_back(std::move(row));
   }
@@ -93,7 +100,8 @@ std::string metrics_table(const std::vector<RunFiles>& runs, const std::vector<R
   for (const RunSurvey& survey : surveys) rows.push_back(fmt::format("{}", survey.rows));
   if (pair) rows.emplace_back();
   table.rows.push_back(std::move(rows));
-  return arranged(table, runs.size());
+  return (shared.empty() ? "" : fmt::format("<p>All runs: {}.</p>\n", html_escape(shared))) +
+         arranged(table, runs.size());
 }
 
 std::string timing_table(const std::vector<RunFiles>& runs) {

@@ -52,6 +52,7 @@ std::string label_of(const RunFiles& run, const std::vector<std::string>& keys) 
 std::vector<double> values_of(const Metric& m, const SeriesGroup& group, const std::vector<RunFiles>& runs,
                               const std::vector<RunSurvey>& surveys) {
   std::vector<double> values;
+  values.reserve(group.runs.size());
   for (const std::size_t r : group.runs) values.push_back(value_of(m, runs[r], surveys[r]));
   return values;
 }
@@ -59,10 +60,11 @@ std::vector<double> values_of(const Metric& m, const SeriesGroup& group, const s
 /// Places of the groups on the x axis: their values, if these are numbers and tell them apart, else 1, 2, 3, ...
 std::vector<double> places_of(const SeriesStudy& study) {
   std::vector<double> places;
+  places.reserve(study.groups.size());
   const bool by_value = study.keys.size() == 1 && study.groups.size() > 1 &&
                         std::all_of(study.groups.begin(), study.groups.end(), [](const auto& g) { return g.value; });
   for (std::size_t g = 0; g < study.groups.size(); ++g) {
-    places.push_back(by_value ? *study.groups[g].value : static_cast<double>(g + 1));
+    places.push_back(by_value ? study.groups[g].value.value_or(0.0) : static_cast<double>(g + 1));
   }
   return places;
 }
@@ -72,6 +74,7 @@ std::vector<double> places_of(const SeriesStudy& study) {
 SeriesStudy study(const Series& series, const std::vector<RunFiles>& runs) {
   SeriesStudy study;
   std::vector<RunFiles> own;
+  own.reserve(series.runs.size());
   for (const std::size_t r : series.runs) own.push_back(runs[r]);
   for (const std::string& key : differing_keys(own)) {
     if (key != "run.seed") study.keys.push_back(key);  // the seed makes runs differ; it is not what is studied
@@ -97,7 +100,7 @@ std::string series_table(const SeriesStudy& study, const std::vector<RunFiles>& 
                          const std::vector<RunSurvey>& surveys) {
   std::string varied;
   for (const std::string& key : study.keys) varied += (varied.empty() ? "" : ", ") + key;
-  Table table{"series", {varied.empty() ? "nothing varied but the seed" : varied, "figure"}, {}, true};
+  Table table{"series", {"figure", varied.empty() ? "nothing varied but the seed" : varied}, {}, true};
   for (const char* column : {"runs", "mean", "standard deviation", "95 % interval of the mean"}) {
     table.header.emplace_back(column);
   }
@@ -107,7 +110,7 @@ std::string series_table(const SeriesStudy& study, const std::vector<RunFiles>& 
       const analysis::Estimate e = analysis::estimate_mean(values_of(m, group, runs, surveys));
       if (e.n == 0) continue;
       table.rows.push_back(
-          {group.label, std::string(m.name), fmt::format("{}", e.n), shown(e.mean, m.decimals + 1),
+          {std::string(m.name), group.label, fmt::format("{}", e.n), shown(e.mean, m.decimals + 1),
            shown(e.standard_deviation, m.decimals + 1),
            e.n < 2 ? "–" : fmt::format("{} to {}", shown(e.low, m.decimals + 1), shown(e.high, m.decimals + 1))});
     }
@@ -129,7 +132,8 @@ Figure series_figure(const std::string& id, const SeriesStudy& study, const std:
   const auto [low, high] = std::minmax_element(places.begin(), places.end());
   const double room = *high > *low ? 0.06 * (*high - *low) : 0.5;
   figure.x_range = Range{*low - room, *high + room};
-  const Style run_marks{"#56B4E9", "solid", 1.0, 6};
+  const double beside = 0.012 * (figure.x_range->second - figure.x_range->first);
+  const Style run_marks{"#0072B2", "solid", 1.0, 6};
   const Style mean_marks{"#000000", "solid", 1.2, 7};
   for (std::size_t i = 0; i < shown_metrics.size(); ++i) {
     const Metric& m = metric(shown_metrics[i]);
@@ -139,7 +143,7 @@ Figure series_figure(const std::string& id, const SeriesStudy& study, const std:
     for (std::size_t g = 0; g < study.groups.size(); ++g) {
       const std::vector<double> values = values_of(m, study.groups[g], runs, surveys);
       for (const double value : values) {
-        if (std::isfinite(value)) every.points.push_back({places[g], value});
+        if (std::isfinite(value)) every.points.push_back({places[g] + beside, value});
       }
       const analysis::Estimate e = analysis::estimate_mean(values);
       if (e.n < 2) continue;
@@ -156,7 +160,8 @@ Figure series_figure(const std::string& id, const SeriesStudy& study, const std:
   }
   figure.legend = {{"runs", run_marks, Drawn::markers}, {"mean, 95 % interval", mean_marks, Drawn::intervals}};
   figure.caption =
-      "Circles: runs; dots with bars: mean of the runs with the same values and its 95 % confidence interval.";
+      "Circles: runs, drawn a little to the right; dots with bars: mean of the runs with the same values and its 95 % "
+      "confidence interval.";
   if (!by_value) {
     std::string groups;
     for (std::size_t g = 0; g < study.groups.size() && g < most_tics; ++g) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "abs_hil/report/run_figures.hpp"
@@ -13,6 +14,7 @@ namespace {
 constexpr double bins_a_decade = 10.0;
 constexpr double panel_px = 105.0;
 constexpr std::size_t most_runs = 7;
+constexpr double none = std::numeric_limits<double>::quiet_NaN();
 
 /// Lower ends, in us, of bins of about equal width on a logarithmic axis that hold whole microseconds: 0, 1, 2, ...
 std::vector<std::size_t> bin_edges(std::size_t last_us) {
@@ -26,19 +28,26 @@ std::vector<std::size_t> bin_edges(std::size_t last_us) {
 
 double place_of(std::size_t edge_us) { return edge_us == 0 ? 0.5 : static_cast<double>(edge_us); }
 
-/// Share of the cycles by duration, as the outline of its bars.
+/// Share of the cycles by duration, as the outline of its bars; nothing where no cycle is.
 std::vector<Point> outline(const std::vector<std::uint64_t>& counts, double total, double floor) {
   std::vector<Point> points;
   const std::vector<std::size_t> edges = bin_edges(counts.size());
   for (std::size_t i = 0; i + 1 < edges.size(); ++i) {
     const auto from = counts.begin() + static_cast<std::ptrdiff_t>(std::min(edges[i], counts.size()));
     const auto to = counts.begin() + static_cast<std::ptrdiff_t>(std::min(edges[i + 1], counts.size()));
-    const double share = std::max(floor, static_cast<double>(std::accumulate(from, to, std::uint64_t{0})) / total);
-    if (points.empty()) points.push_back({place_of(edges[i]), floor});
-    points.push_back({place_of(edges[i]), share});
+    const double share = static_cast<double>(std::accumulate(from, to, std::uint64_t{0})) / total;
+    const double left = place_of(edges[i]);
+    const bool open = !points.empty() && !std::isnan(points.back().y);
+    if (share <= 0.0) {
+      if (open) points.insert(points.end(), {{left, floor}, {left, none}});
+      continue;
+    }
+    if (!open) points.push_back({left, floor});
+    points.push_back({left, share});
     points.push_back({place_of(edges[i + 1]), share});
   }
-  if (!points.empty()) points.push_back({points.back().x, floor});
+  if (!points.empty() && !std::isnan(points.back().y)) points.push_back({points.back().x, floor});
+  if (!points.empty() && std::isnan(points.back().y)) points.pop_back();
   return points;
 }
 

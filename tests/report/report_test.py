@@ -147,8 +147,8 @@ class Series(ReportTest):
         self.assertIn('run-0007 has not finished', said)
         read = PageReader(page)
         self.assertEqual(list(read.figures), ['series1', *FIGURES])
-        lines = [line for line in read.tables['series'][1:] if line[1] == 'stop time / s']
-        self.assertEqual([line[0] for line in lines], ['theta_N = 20.0', 'theta_N = 23.0', 'theta_N = 26.0'])
+        lines = [line for line in read.tables['series'][1:] if line[0] == 'stop time / s']
+        self.assertEqual([line[1] for line in lines], ['theta_N = 20.0', 'theta_N = 23.0', 'theta_N = 26.0'])
         for line, (_, times) in zip(lines, sorted(stops.items())):
             mean = sum(times) / 2.0
             self.assertEqual(line[2:4], ['2', f'{mean:.4f}'])
