@@ -132,7 +132,7 @@ void CanNode::watch() {
 void CanNode::advance_to(std::int64_t time_ns) {
   while (time_ns_ < time_ns) {
     std::int64_t next = std::min(time_ns, (time_ns_ / step_ns + 1) * step_ns);
-    const bool guarded = state_ == State::active && last_command_ns_ >= 0;
+    const bool guarded = state_ == State::active && (brake_ > 0.0 || drive_ > 0.0);
     if (guarded) next = std::clamp(watchdog_ends_ns(), time_ns_, next);
     const Outputs out = outputs();
     plant_.advance(static_cast<double>(next - time_ns_) * 1e-9,

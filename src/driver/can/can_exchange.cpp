@@ -195,13 +195,9 @@ void CanDriver::watch_drops() noexcept {
 }
 
 IoResult CanDriver::tripped() noexcept {
-  // Silence has many causes: the interface knows some of them.
-  if (worst_ <= Anomaly::queue_full) {
-    switch (link_.standing()) {
-      case Link::Standing::running: break;
-      case Link::Standing::down: return {IoError::disconnected, id::sync, 0, rig::Reason::can_interface_down};
-      case Link::Standing::no_carrier: return {IoError::disconnected, id::sync, 0, rig::Reason::can_bus_off};
-    }
+  // Silence has many causes: the interface knows one of them. Bus-off has come as an error frame.
+  if (worst_ <= Anomaly::queue_full && !link_.running()) {
+    return {IoError::disconnected, id::sync, 0, rig::Reason::can_interface_down};
   }
   return {error_of(worst_), worst_id_ != 0 ? worst_id_ : id::sync, 0, can::reason_of(worst_)};
 }

@@ -107,14 +107,14 @@ Link open_unix_socket(const std::string& path) {
 
 }  // namespace
 
-Link::Standing Link::standing() const noexcept {
-  if (!facts) return Standing::running;
+bool Link::running() const noexcept {
+  if (!facts) return true;
   ifreq request{};
   std::memcpy(request.ifr_name, facts->name.c_str(), std::min<std::size_t>(facts->name.size(), IFNAMSIZ - 1));
-  if (!socket->ask_interface(request)) return Standing::down;
+  if (!socket->ask_interface(request)) return false;
   const auto flags = static_cast<unsigned>(request.ifr_flags);
-  if ((flags & IFF_UP) == 0) return Standing::down;
-  return (flags & IFF_RUNNING) == 0 ? Standing::no_carrier : Standing::running;
+  // On its way down an interface loses its carrier first.
+  return (flags & IFF_UP) != 0 && (flags & IFF_RUNNING) != 0;
 }
 
 Link open_link(const CanOptions& options) {

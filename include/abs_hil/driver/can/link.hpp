@@ -17,9 +17,8 @@ struct Link {
   bool can_fd{false};                     ///< carries CAN FD frames
   std::optional<InterfaceFacts> facts{};  ///< of a real interface
 
-  /// What the interface itself says, asked when answers fail to come; a system call.
-  enum class Standing : std::uint8_t { running, no_carrier, down };
-  [[nodiscard]] Standing standing() const noexcept;
+  /// Whether the interface is up and has its carrier, asked when answers fail to come; a system call.
+  [[nodiscard]] bool running() const noexcept;
 };
 
 /// Opens the interface that the options name: raw CAN with kernel filters for the node's identifiers and with error
