@@ -7,6 +7,7 @@
 #   -s N, -m MEM  CPUs (2) and memory (1G)
 #   -t SECONDS    time limit on this computer's clock (120)
 #   -V            virtual time: one CPU whose clock counts instructions (8 ns each), so that timing repeats itself
+#   -F            the same with 2 ns each: where two programs and a simulated rig share that CPU
 # Status 77: QEMU or the kernel cannot be had here, the reason on stderr (1 where CI=true or ABS_HIL_REQUIRE_VM=1).
 # Status 125: the machine ended without a status; its console is on stderr.
 set -euo pipefail
@@ -16,7 +17,7 @@ PATH=$PATH:/usr/sbin:/sbin  # modprobe, depmod
 
 modules='' out='' cpus=2 memory=1G limit_s=120 accelerator='tcg,thread=multi' boot_arguments=''
 qemu_arguments=()
-while getopts M:q:o:s:m:t:V option; do
+while getopts M:q:o:s:m:t:VF option; do
   case $option in
     M) modules=$OPTARG ;;
     q) read -ra words <<<"$OPTARG"; qemu_arguments+=("${words[@]}") ;;
@@ -25,6 +26,7 @@ while getopts M:q:o:s:m:t:V option; do
     m) memory=$OPTARG ;;
     t) limit_s=$OPTARG ;;
     V) cpus=1 accelerator='tcg,thread=single'; qemu_arguments+=(-icount 'shift=3,sleep=off') ;;
+    F) cpus=1 accelerator='tcg,thread=single'; qemu_arguments+=(-icount 'shift=1,sleep=off') ;;
     *) exit 2 ;;
   esac
 done

@@ -92,7 +92,8 @@ ReceiveResult FrameSocket::take(Frame& frame) noexcept {
     return {is_down(errno) ? ReceiveOutcome::down : ReceiveOutcome::failed, errno};
   }
   if (size == 0) return {ReceiveOutcome::down, EPIPE};  // the other end has closed; CAN sockets never say so
-  if (size != CAN_MTU && size != CANFD_MTU) return {ReceiveOutcome::malformed};
+  const bool whole = (message.msg_flags & MSG_TRUNC) == 0;
+  if (!whole || (size != CAN_MTU && size != CANFD_MTU)) return {ReceiveOutcome::malformed};
   unpack(raw, static_cast<std::size_t>(size), frame);
   for (cmsghdr* c = CMSG_FIRSTHDR(&message); c != nullptr; c = CMSG_NXTHDR(&message, c)) {
     if (c->cmsg_level != SOL_SOCKET) continue;

@@ -73,6 +73,9 @@ TEST_CASE("FD frames, extended frames, sizes that are none") {
 
   static_cast<void>(::send(pair.ends[1], &raw, 5, 0));
   CHECK(socket.receive(received, 0).outcome == ReceiveOutcome::malformed);
+  const std::array<unsigned char, 79> too_long{};  // cut off where an FD frame ends
+  static_cast<void>(::send(pair.ends[1], too_long.data(), too_long.size(), 0));
+  CHECK(socket.receive(received, 0).outcome == ReceiveOutcome::malformed);
 }
 
 TEST_CASE("A full queue is told as such, not as success; a closed end as down") {
