@@ -177,27 +177,31 @@ class LockStep(UsbTest):
 
 
 class RealTime(UsbTest):
-    def test_paper_on_the_guests_clock(self):
-        held = []
-        for rate in (1000, 500, 100):
-            emulator = self.emulator()
-            summary = self.folder / f'{rate}.json'
-            result = self.rig('--rt', 'prefer', '--rate', rate, '--summary', summary, '--set',
-                              f'driver.usb.answer_timeout_us={800_000 // rate}')
-            s = self.summary(summary) if summary.exists() else None
-            lost = [line for line in result.stderr.splitlines() if 'without their frame' in line]
-            self.report(f'{rate} Hz: status {result.returncode}, ' + (
-                f'{s["result"]}, {s["cycles"]} cycles, overruns {s["overruns"]}, stop distance '
-                f'{s["stop_distance_m"]} m, cycle time us {s["cycle_time_us"]}, {lost}' if s else result.stderr))
-            self.assertEqual(emulator.wire(), SAFE)
-            if result.returncode == 0 and s['overruns'] == 0 and ' 0 cycles without' in ''.join(lost):
-                held.append((rate, s))
-        self.assertTrue(held, 'no rate was held')
-        for rate, s in held:
-            sim = self.folder / f'sim{rate}.json'
-            self.fast('--rate', rate, '--summary', sim, '--set', 'gate.brake_duty_max=0.7')
-            self.report(f'{rate} Hz held; simulated stop distance {self.summary(sim)["stop_distance_m"]} m')
-            self.assertAlmostEqual(s['stop_distance_m'] / self.summary(sim)['stop_distance_m'], 1.0, delta=0.01)
+    """The outcome is asserted at the vendor's own rate, never timing; the figures are for people."""
+
+    def run_at(self, rate):
+        emulator = self.emulator()
+        summary = self.folder / f'{rate}.json'
+        result = self.rig('--rt', 'prefer', '--rate', rate, '--summary', summary, '--set',
+                          f'driver.usb.answer_timeout_us={800_000 // rate}')
+        s = self.summary(summary)
+        lost = [line for line in result.stderr.splitlines() if 'without their frame' in line]
+        self.report(f'{rate} Hz: status {result.returncode}, {s["result"]}, {s["cycles"]} cycles, overruns '
+                    f'{s["overruns"]}, stop distance {s["stop_distance_m"]} m, cycle time us {s["cycle_time_us"]}, {lost}')
+        self.assertEqual(emulator.wire(), SAFE)
+        return result, s
+
+    def test_vendors_100_Hz(self):
+        result, s = self.run_at(100)
+        self.assertEqual((result.returncode, s['result'], s['telemetry_drops']), (0, 'completed', 0), result.stderr)
+
+    def test_faster_completes_or_says_why(self):
+        for rate in (1000, 500):
+            with self.subTest(rate=rate):
+                result, s = self.run_at(rate)
+                self.assertIn((result.returncode, s['result']), ((0, 'completed'), (1, 'fault')), result.stderr)
+                if s['result'] == 'fault':
+                    self.assertRegex(s['reason'], 'did not answer in time too often|consecutive overruns')
 
 
 if __name__ == '__main__':
