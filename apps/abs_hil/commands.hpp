@@ -5,6 +5,7 @@
 
 #include "abs_hil/experiment/commissioning.hpp"
 #include "abs_hil/experiment/run_session.hpp"
+#include "abs_hil/watch/watch_session.hpp"
 #include "command_line.hpp"
 
 namespace abs_hil::app {
@@ -26,6 +27,8 @@ struct LatencyOptions {
 /// `abs_hil latency`: runs the real cycle on the simulated rig for a while and judges how well this computer keeps
 /// time.
 int latency(const RunRequest& request, const LatencyOptions& options);
+/// `abs_hil watch`: a running experiment in this terminal. Throws what watch::watch throws.
+int watch(const watch::WatchOptions& options);
 /// `abs_hil commission`: first steps with a rig, each asked for. Throws driver::Unavailable.
 int commission(const RunRequest& request, const experiment::CommissioningOptions& options);
 

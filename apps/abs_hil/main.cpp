@@ -138,11 +138,12 @@ CLI::App* add_compare(CLI::App& cli, app::CompareOptions& o) {
   return compare;
 }
 
-/// Options of a run have no say in `compare`: better refused than ignored.
-void refuse_run_options(const CLI::App& cli) {
+/// Options of a run have no say in such a command: better refused than ignored.
+void refuse_run_options(const CLI::App& cli, const std::string& command) {
   for (const CLI::Option* option : cli.get_options()) {
     if (option->count() > 0) {
-      throw settings::ConfigError(option->get_name() + ": give the options of compare after the word compare");
+      throw settings::ConfigError(option->get_name() + ": give the options of " + command + " after the word " +
+                                  command);
     }
   }
 }
@@ -161,6 +162,22 @@ void add_commission(CLI::App& cli, CommissionCommand& command) {
       ->capture_default_str();
   command.parser->add_option("--brake-duty", command.pulses.brake_duty, "of the brake pulse, at most 0.7")
       ->capture_default_str();
+}
+
+CLI::App* add_watch(CLI::App& cli, watch::WatchOptions& o) {
+  auto* watch = cli.add_subcommand("watch", "a running experiment in this terminal, over LCM; q quits");
+  watch->add_option("--lcm-url", o.url, "LCM network (default: LCM_DEFAULT_URL, else UDP multicast)");
+  watch->add_option("--prefix", o.prefix, "of the channels, the run's telemetry.channel_prefix")->capture_default_str();
+  watch->add_option("--window", o.window_s, "width of the plots, 1 to 60 s")->type_name("S")->capture_default_str();
+  watch->add_flag("--ascii", o.ascii, "ASCII alone, where the terminal shows braille badly");
+  auto* plain =
+      watch->add_flag("--plain", o.plain, "a line a second instead of a screen; always so without a terminal");
+  auto* once = watch->add_flag("--once", o.once, "one picture as text; status 3 if no message comes")->excludes(plain);
+  watch->add_option("--timeout", o.once_timeout_s, "how long --once waits for it")
+      ->type_name("S")
+      ->capture_default_str()
+      ->needs(once);
+  return watch;
 }
 
 int dispatch(int argc, char** argv) {
@@ -185,6 +202,8 @@ int dispatch(int argc, char** argv) {
   app::add_replay(cli, replay_command);
   app::ConvertCommand convert_command;
   app::add_convert(cli, convert_command);
+  watch::WatchOptions watch_options;
+  const auto* watch = add_watch(cli, watch_options);
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -196,8 +215,12 @@ int dispatch(int argc, char** argv) {
   if (doctor.parser->parsed()) return app::doctor(app::merge(doctor.options), doctor.only, doctor.json);
   if (latency.parser->parsed()) return app::latency(app::merge(latency.options), latency.latency);
   if (compare->parsed()) {
-    refuse_run_options(cli);
+    refuse_run_options(cli, "compare");
     return app::compare(compare_options);
+  }
+  if (watch->parsed()) {
+    refuse_run_options(cli, "watch");
+    return app::watch(watch_options);
   }
   if (commission.parser->parsed()) return app::commission(app::merge(commission.options), commission.pulses);
   if (replay_command.parser->parsed()) return app::replay_run(replay_command);

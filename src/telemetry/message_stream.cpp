@@ -13,16 +13,7 @@ namespace abs_hil::telemetry {
 namespace {
 
 void check(const StreamOptions& options) {
-  constexpr std::size_t prefix_max = 48;  // LCM's limit is 63 characters with the name
-  const auto allowed = [](unsigned char c) {
-    // Without regular-expression characters, as a subscription is one.
-    return c < 0x80 && (std::isalnum(c) != 0 || c == '_' || c == '-' || c == '/');
-  };
-  const std::string& prefix = options.channel_prefix;
-  if (prefix.size() > prefix_max || !std::all_of(prefix.begin(), prefix.end(), allowed)) {
-    throw std::invalid_argument("channel prefix '" + printable(prefix, 80) +
-                                "': at most 48 letters, digits, '_', '-' and '/'");
-  }
+  check_channel_prefix(options.channel_prefix);
   if (options.telemetry_every_cycles == 0) throw std::invalid_argument("telemetry_every_cycles must be at least 1");
   if (!(options.status_period_s > 0.0)) throw std::invalid_argument("status_period_s must be above 0");
   if (!(options.experiment_period_s > 0.0)) throw std::invalid_argument("experiment_period_s must be above 0");
@@ -57,6 +48,18 @@ void put_parts(const StatusSnapshot& snapshot, status_t& m) {
 }
 
 }  // namespace
+
+void check_channel_prefix(std::string_view prefix) {
+  constexpr std::size_t prefix_max = 48;  // LCM's limit is 63 characters with the name
+  const auto allowed = [](unsigned char c) {
+    // Without regular-expression characters, as a subscription is one.
+    return c < 0x80 && (std::isalnum(c) != 0 || c == '_' || c == '-' || c == '/');
+  };
+  if (prefix.size() > prefix_max || !std::all_of(prefix.begin(), prefix.end(), allowed)) {
+    throw std::invalid_argument("channel prefix '" + printable(prefix, 80) +
+                                "': at most 48 letters, digits, '_', '-' and '/'");
+  }
+}
 
 MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, StatusSource status)
     : options_(std::move(options)), status_(std::move(status)) {

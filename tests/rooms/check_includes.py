@@ -21,6 +21,7 @@ MAY_KNOW = {
     'runtime': {'rig', 'driver'},
     'experiment': {'rig', 'control', 'driver', 'runtime', 'plant_sim'},
     'telemetry': {'rig', 'lcmtypes'},
+    'watch': {'rig', 'telemetry', 'lcmtypes'},
     'analysis': {'rig'},
     'archive': set(),
     'report': {'rig', 'analysis'},

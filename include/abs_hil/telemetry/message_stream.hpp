@@ -31,6 +31,9 @@ struct StreamOptions {
   double experiment_period_s{5.0};          ///< of run time, > 0
 };
 
+/// Throws std::invalid_argument, naming the prefix and what it may hold, for one that is no StreamOptions' prefix.
+void check_channel_prefix(std::string_view prefix);
+
 /// Turns records into the messages of the ABS_ channels and gives the same ones to every outlet. Each channel's
 /// sequence is consecutive from 0; all stamps and times are those of the records, so that a run on virtual time gives
 /// the same bytes again. One stream for each run, used from one thread.

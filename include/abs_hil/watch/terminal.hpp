@@ -1,0 +1,34 @@
+#pragma once
+
+#include "abs_hil/watch/cell_grid.hpp"
+
+namespace abs_hil::watch {
+
+/// The terminal at stdin and stdout as a screen (ncurses). The destructor gives it back as it was, and so do the
+/// signals that end a program without destructors (SIGQUIT, SIGSEGV, SIGABRT ...). One at a time.
+class Terminal {
+ public:
+  /// Throws std::runtime_error when stdin or stdout is no terminal, or of a type (TERM) that nobody knows.
+  Terminal();
+  ~Terminal();
+  Terminal(const Terminal&) = delete;
+  Terminal& operator=(const Terminal&) = delete;
+
+  [[nodiscard]] int columns() const noexcept;
+  [[nodiscard]] int rows() const noexcept;
+  /// True where the locale's characters are UTF-8.
+  [[nodiscard]] bool unicode() const noexcept { return unicode_; }
+
+  void show(const CellGrid& grid);
+  /// The next key typed, 0 if there is none. Also takes note of a new size.
+  [[nodiscard]] int key();
+
+ private:
+  bool unicode_;
+  bool colours_{false};
+};
+
+/// True if stdin and stdout are terminals.
+[[nodiscard]] bool is_terminal() noexcept;
+
+}  // namespace abs_hil::watch
