@@ -25,7 +25,7 @@ struct Words {
   std::string_view omega1, omega2, theta_est, theta, micro, dot;
 };
 constexpr Words unicode_words{"ω1", "ω2", "θ̂", "θ", "µs", " · "};
-constexpr Words ascii_words{"w1", "w2", "theta_est", "theta", "us", ", "};
+constexpr Words ascii_words{"w1", "w2", "theta", "theta", "us", ", "};
 
 const Words& words_of(const ScreenOptions& options) { return options.unicode ? unicode_words : ascii_words; }
 
@@ -71,9 +71,9 @@ bool is_silent(const RunView& view, std::int64_t now_ns) {
 
 std::string values_text(const RunView& view, const Words& words) {
   const Sample& s = view.samples().back();
-  return fmt::format("{} {:>6} {} {:>6} rad/s  slip {:>6} wanted {:>5}  {} {:>6} N", words.omega1,
-                     number(s.omega1_rad_s, 1), words.omega2, number(s.omega2_rad_s, 1), number(s.slip, 3),
-                     number(s.slip_ref, 3), words.theta_est, number(s.theta_est_N, 2));
+  return fmt::format("{} {:>5} {} {:>5} rad/s  slip {:>6}/{:<5}  {} {:>6} N", words.omega1, number(s.omega1_rad_s, 1),
+                     words.omega2, number(s.omega2_rad_s, 1), number(s.slip, 3), number(s.slip_ref, 3), words.theta_est,
+                     number(s.theta_est_N, 2));
 }
 
 /// Why the run ended in a fault, by the event or, if that was lost, by the reason in the telemetry.
@@ -108,14 +108,16 @@ class Screen {
 
  private:
   void draw_head() {
-    int column = grid_.write(0, 0, "abs_hil watch  ", Style::bold);
+    const int column = grid_.write(0, 0, "abs_hil watch  ", Style::bold);
     if (const auto& e = view_.experiment()) {
-      column = grid_.write(column, 0,
-                           fmt::format("{}{}{}{}{}{}{}", e->experiment, words_.dot, e->controller, words_.dot, e->plant,
-                                       words_.dot, e->backend));
+      grid_.write(column, 0,
+                  fmt::format("{}{}{}{}{}{}{}", e->experiment, words_.dot, e->controller, words_.dot, e->plant,
+                              words_.dot, e->backend));
     }
     const std::string text = liveness(view_, now_ns_);
-    const int at = std::max(column + 2, grid_.columns() - columns_of(text));
+    // Over the names, if there is no room for both.
+    const int at = std::max(0, grid_.columns() - columns_of(text));
+    grid_.write(at - 2, 0, "  ");
     const Style silent = has_ended(view_) ? Style::dim : Style::alarm;
     grid_.write(at, 0, text, is_silent(view_, now_ns_) ? silent : Style::good);
   }
@@ -138,7 +140,7 @@ class Screen {
     const rig::Phase phase = phase_of(view_.telemetry() ? view_.telemetry()->phase : view_.status()->phase);
     const double time_s = view_.telemetry() ? view_.telemetry()->time_s : view_.status()->time_s;
     int column = grid_.write(0, 1, rig::name_of(phase), style_of(phase));
-    column = grid_.write(std::max(column + 1, 11), 1, fmt::format("{:>8} s  ", number(time_s, 3)), Style::bold);
+    column = grid_.write(std::max(column + 1, 11), 1, fmt::format("{:>7} s  ", number(time_s, 3)), Style::bold);
     if (phase == rig::Phase::fault && view_.telemetry()) {
       grid_.write(column, 1, fault_text(view_), Style::alarm);
     } else if (!view_.samples().empty()) {
@@ -274,7 +276,7 @@ std::string one_line(const RunView& view, std::int64_t now_ns, const ScreenOptio
   const std::string live = liveness(view, now_ns);
   if (!view.telemetry()) return live;
   const rig::Phase phase = phase_of(view.telemetry()->phase);
-  std::string line = fmt::format("{:10} {:>8} s", rig::name_of(phase), number(view.telemetry()->time_s, 3));
+  std::string line = fmt::format("{:10} {:>7} s", rig::name_of(phase), number(view.telemetry()->time_s, 3));
   if (phase == rig::Phase::fault) line += "  " + fault_text(view);
   if (!view.samples().empty()) line += "  " + values_text(view, words_of(options));
   if (const auto& s = view.status()) line += fmt::format("  overruns {}  drops {}", s->overruns, s->telemetry_drops);

@@ -1,13 +1,14 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
+#include <string>
+#include <utility>
 
 #include "abs_hil/event_t.hpp"
 #include "abs_hil/experiment_t.hpp"
+#include "abs_hil/rig/measurement.hpp"
 #include "abs_hil/status_t.hpp"
 #include "abs_hil/telemetry_t.hpp"
-#include "abs_hil/rig/measurement.hpp"
 #include "abs_hil/watch/run_view.hpp"
 
 namespace abs_hil::watch::test {
@@ -42,11 +43,11 @@ inline status_t status(std::int64_t sequence) {
   return m;
 }
 
-inline event_t event(std::int64_t sequence, const char* kind, const char* message) {
+inline event_t event(std::int64_t sequence, std::string kind, std::string message) {
   event_t m{};
   m.sequence = sequence;
-  m.kind = kind;
-  m.message = message;
+  m.kind = std::move(kind);
+  m.message = std::move(message);
   return m;
 }
 
