@@ -17,6 +17,7 @@ struct OutputOptions {
   std::optional<std::string> log_file{};
   std::optional<std::string> summary_file{};
   std::optional<std::string> histogram_file{};
+  std::optional<std::string> recorder_dir{};  ///< --recorder: where the flight record goes after a fault
   std::optional<std::string> lcm_url{};
   bool no_lcm{false};
   std::optional<std::string> run_folder{};  ///< --out: new or empty

@@ -58,7 +58,9 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
       return exit_ended_early;
     case experiment::CommissioningResult::failed: return exit_ended_early;
     case experiment::CommissioningResult::interrupted:
-      return signalled() == rig::Reason::interrupt_signal ? exit_interrupted : exit_terminated;
+      return signalled() == rig::Reason::interrupt_signal ? exit_interrupted
+             : signalled() == rig::Reason::hangup_signal  ? exit_hung_up
+                                                          : exit_terminated;
   }
   return exit_ended_early;
 }

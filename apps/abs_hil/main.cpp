@@ -14,6 +14,7 @@
 #include "commands.hpp"
 #include "exit_status.hpp"
 #include "recording_commands.hpp"
+#include "signals.hpp"
 
 namespace abs_hil {
 
@@ -60,6 +61,8 @@ void add_run_options(CLI::App& cli, app::RunOptions& o) {
   cli.add_option("--csv", o.outputs.csv_file, "write every cycle to a CSV file")->type_name("FILE");
   cli.add_option("--log", o.outputs.log_file, "write an LCM event log (.lcmlog)")->type_name("FILE");
   cli.add_option("--summary", o.outputs.summary_file, "write the summary as JSON")->type_name("FILE");
+  cli.add_option("--recorder", o.outputs.recorder_dir, "folder for the last 2 s of a run that a fault ends")
+      ->type_name("DIR");
   auto* out = cli.add_option("--out", o.outputs.run_folder,
                              "folder for all of the run's record, new or empty (default: one below runs/)")
                   ->type_name("DIR");
@@ -238,6 +241,7 @@ int fail(int status, const std::exception& error) {
 }  // namespace
 
 int app::run_program(int argc, char** argv, std::span<const control::ControllerEntry> own) {
+  app::survive_closed_terminals();
   // Messages go to stderr; stdout is for results.
   spdlog::set_default_logger(spdlog::stderr_color_mt("abs_hil"));
   spdlog::set_pattern("%n: %^%l%$: %v");

@@ -1,13 +1,17 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <nlohmann/json.hpp>
 #include <thread>
 #include <utility>
 
 #include "abs_hil/analysis/run_metrics.hpp"
 #include "abs_hil/analysis/run_summary.hpp"
+#include "abs_hil/driver/safe_state_writer.hpp"
 #include "abs_hil/experiment/experiments.hpp"
 #include "abs_hil/experiment/run_session.hpp"
 #include "abs_hil/runtime/overrun_reporter.hpp"
@@ -17,6 +21,7 @@
 #include "exit_status.hpp"
 #include "run_outputs.hpp"
 #include "run_parts.hpp"
+#include "run_watch.hpp"
 #include "signals.hpp"
 
 namespace abs_hil::app {
@@ -46,6 +51,7 @@ analysis::RunSummary summarise(const RunRequest& request, const experiment::RunS
           .cycles = session.executive().statistics().cycles(),
           .telemetry_drops = session.record_drops(),
           .publish_failures = outputs.publish_failures(),
+          .csv_rows_lost = outputs.csv_rows_lost(),
           .realtime = outcome.realtime.realtime(),
           .virtual_time = request.outputs.fast,
           .truth_known = s.backend == "sim",
@@ -99,6 +105,7 @@ int status_of(const experiment::RunOutcome& outcome) {
   if (outcome.completed()) return exit_completed;
   if (outcome.reason == rig::Reason::interrupt_signal) return exit_interrupted;
   if (outcome.reason == rig::Reason::terminate_signal) return exit_terminated;
+  if (outcome.reason == rig::Reason::hangup_signal) return exit_hung_up;
   return exit_ended_early;
 }
 
@@ -108,10 +115,21 @@ std::string realtime_refusal(const runtime::RealtimeReport& report) {
 
 namespace {
 
+/// As far as that can be told before it stands guard.
+void require_guardian(const RunRequest& request) {
+  if (!wants_guardian(request)) return;
+  static_cast<void>(driver::make_safe_state_writer(request.settings.driver));
+  const std::string program = guardian::guardian_program();
+  if (::access(program.c_str(), X_OK) == 0) return;
+  throw driver::Unavailable("guardian: " + program + ": " + std::strerror(errno) +
+                            ": it belongs beside abs_hil, which drives a rig beside its guardian only");
+}
+
 /// What the run cannot do without is asked for before its files are opened: an earlier run's stay whole. Throws
 /// driver::Unavailable. The run itself obtains both anew.
 void require_resources(const RunRequest& request, driver::RigDriver& driver) {
   driver.configure();
+  require_guardian(request);
   if (request.outputs.fast || request.settings.realtime.mode != runtime::RealtimeMode::require) return;
   runtime::RealtimeReport report;
   // In a thread of its own, which takes the scheduling class with it when it ends.
@@ -136,13 +154,18 @@ int run(const RunRequest& request) {
   experiment::RunSession session(clock, *driver, std::move(logic), s.gate, std::move(sinks), s.realtime.overruns);
   TimingWatch timing(request, session, late_cycles);
   outputs.watch(session);
+  RunWatch run_watch(
+      request, flight_record_prefix(request, outputs.folder() ? outputs.folder()->path() : std::filesystem::path()));
+  run_watch.watch(session);
   note_signals();
+  SignalsStop signals(session, s.backend == "sim" || run_watch.has_guardian());
   BoardNotes board_notes(s, *driver);
 
   const auto poll = [&] {
     board_notes.log_once();
     timing.poll();
     outputs.poll();
+    if (const rig::Reason guardian = run_watch.poll(); guardian != rig::Reason::none) return guardian;
     if (const rig::Reason signal = signalled(); signal != rig::Reason::none) return signal;
     return outputs.stop_requested() ? rig::Reason::stop_command : rig::Reason::none;
   };
@@ -158,8 +181,12 @@ int run(const RunRequest& request) {
   if (!outcome.ran) {
     throw driver::Unavailable(realtime_refusal(outcome.realtime));
   }
+  signals.allow_leaving();
   board_notes.log_once();
   const analysis::RunSummary summary = summarise(request, session, outcome, outputs);
+  if (rig::is_fault(outcome.reason)) {
+    run_watch.write_record(request, outcome.reason, outcome.reason_value, summary.reason);
+  }
   outputs.write(summary, session.executive().statistics(), environment(request, *driver, outcome));
   fmt::print("{}", analysis::to_text(summary));
   if (outputs.folder()) fmt::print("  {:<22}{}\n", "run folder", outputs.folder()->path().string());
@@ -169,6 +196,7 @@ int run(const RunRequest& request) {
     spdlog::error("the safe state may not have reached the board ({}): {}. Press the E-stop and switch the rig off",
                   driver::error_text(outcome.safe_state), driver->what_holds_unsafe());
   }
+  run_watch.end();
   if (!lost.empty()) {
     spdlog::error("recorded data was lost: {}", lost);
     return exit_ended_early;

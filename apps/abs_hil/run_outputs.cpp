@@ -13,6 +13,8 @@ namespace abs_hil::app {
 namespace {
 /// Event times of runs in virtual time count from here (1 January 2000), so that the log is the same on every run.
 constexpr std::int64_t virtual_epoch_us = 946'684'800'000'000;
+/// Half of the 100 ms that a killed program may lose of its files: the slow side itself may come late.
+constexpr std::int64_t write_period_ns = 50'000'000;
 }  // namespace
 
 RunOutputs::RunOutputs(const RunRequest& request)
@@ -36,11 +38,12 @@ RunOutputs::RunOutputs(const RunRequest& request)
 }
 
 void RunOutputs::open_files(const OutputOptions& outputs) {
-  if (outputs.csv_file) csv_.emplace_back(*outputs.csv_file);
+  if (outputs.csv_file) csv_.emplace_back(*outputs.csv_file, outputs.fast ? 0 : write_period_ns);
   if (outputs.summary_file) summary_.emplace_back(*outputs.summary_file);
   if (outputs.histogram_file) histogram_.emplace_back(*outputs.histogram_file);
   if (outputs.log_file) {
-    log_.emplace_back(*outputs.log_file, outputs.fast ? std::optional(virtual_epoch_us) : std::nullopt);
+    log_.emplace_back(*outputs.log_file, outputs.fast ? std::optional(virtual_epoch_us) : std::nullopt,
+                      outputs.fast ? 0.0 : static_cast<double>(write_period_ns) * 1e-9);
   }
 }
 
@@ -102,6 +105,12 @@ std::vector<rig::RecordSink*> RunOutputs::sinks() {
 
 void RunOutputs::poll() {
   if (commands_) commands_->poll();
+}
+
+std::uint64_t RunOutputs::csv_rows_lost() const {
+  std::uint64_t lost = 0;
+  for (const telemetry::CsvSink& csv : csv_) lost += csv.rows_lost();
+  return lost;
 }
 
 telemetry::StatusSnapshot RunOutputs::snapshot() const {

@@ -40,6 +40,7 @@ class RunOutputs {
   [[nodiscard]] bool stop_requested() const { return commands_ && commands_->stop_requested(); }
   [[nodiscard]] analysis::Metrics metrics() const { return metrics_.metrics(); }
   [[nodiscard]] std::uint64_t publish_failures() const { return stream_ ? stream_->failures() : 0; }
+  [[nodiscard]] std::uint64_t csv_rows_lost() const;
   /// Writes summary and histogram where they were asked for, and completes the run folder. Throws std::runtime_error.
   void write(const analysis::RunSummary& summary, const runtime::CycleStatistics& statistics,
              const archive::RunEnvironment& environment);

@@ -88,6 +88,7 @@ nlohmann::ordered_json to_json(const RunSummary& s) {
           {"cycle_time_us", to_json(s.timing.cycle_time)},
           {"telemetry_drops", s.telemetry_drops},
           {"publish_failures", s.publish_failures},
+          {"csv_rows_lost", s.csv_rows_lost},
           {"config", s.config}};
 }
 
@@ -109,6 +110,7 @@ std::string to_text(const RunSummary& s) {
   line("torque variation", shown(m.torque_total_variation_Nm, 1, "N m"));
   line("cycles", fmt::format("{}, {} overruns, {} records dropped, {} messages not sent", s.cycles,
                              s.timing.overruns.total, s.telemetry_drops, s.publish_failures));
+  if (s.csv_rows_lost > 0) line("CSV rows lost", fmt::format("{}", s.csv_rows_lost));
   if (s.virtual_time) {
     line("timing", "virtual time (--fast): no latencies to report");
   } else {

@@ -53,6 +53,12 @@ bool CyclicExecutive::step() noexcept {
 }
 
 void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
+  if (watch_ != nullptr) {
+    watch_->beat();
+    if (watch_->guardian_lost()) {
+      gate_.latch(rig::Reason::guardian_silent, static_cast<double>(watch_->silent_cycles()));
+    }
+  }
   const std::int64_t woken_ns = clock_.now_ns();
   if (sequence_ == 0) start_ns_ = woken_ns;
   record.sequence = sequence_++;
@@ -105,6 +111,7 @@ void CyclicExecutive::keep(const rig::CycleRecord& record) noexcept {
   statistics_->count_cycle();
   if (!starting_up()) statistics_->add(record.timing);
   ring_.push(record);
+  if (watch_ != nullptr) watch_->keep(record);
 }
 
 void CyclicExecutive::schedule_next(const rig::CycleTiming& timing) noexcept {

@@ -6,6 +6,7 @@
 #include "abs_hil/experiment/experiments.hpp"
 #include "abs_hil/settings/key_table.hpp"
 #include "driver_keys.hpp"
+#include "guardian_keys.hpp"
 
 namespace abs_hil::settings {
 
@@ -289,6 +290,7 @@ KeyTable::KeyTable(Settings& s) {
   add_adaptive_peak_keys(keys_, s.control.adaptive_peak);
   add_experiment_keys(keys_, s.experiment);
   add_driver_keys(keys_, s.driver);
+  add_guardian_keys(keys_, s.guardian);
   keys_.insert(
       keys_.end(),
       {

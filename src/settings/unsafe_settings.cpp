@@ -46,6 +46,14 @@ void refuse_injection_into_hardware(const Settings& s) {
   }
 }
 
+void refuse_hardware_without_guardian(const Settings& s) {
+  if (s.backend != "rig" || s.guardian.enabled) return;
+  if (s.driver.emulated && (s.driver.kind != "pci" || !is_of_the_kernel(s.driver.pci.root))) return;
+  throw ConfigError(
+      "guardian.enabled = false: a real rig is driven beside a guardian only, as its PWMs are assumed to hold when the "
+      "program dies; leave it out, or for an emulator (never hardware) --set driver.emulated=true");
+}
+
 void refuse_cap_above_board(const KeyTable& keys, std::string_view key, double value, std::string_view board_key,
                             double board_value) {
   if (!keys.was_set(key) || value <= board_value) return;
@@ -61,6 +69,7 @@ std::vector<driver::Injection> injections_of(const Settings& settings) {
 
 void refuse_unsafe(const Settings& s, const KeyTable& keys) {
   refuse_injection_into_hardware(s);
+  refuse_hardware_without_guardian(s);
   if (s.backend == "rig" && s.driver.kind == "can") {
     refuse_cap_above_board(keys, "gate.brake_duty_max", s.gate.brake_duty_max, "driver.can.brake_duty_max",
                            s.driver.can.brake_duty_max);

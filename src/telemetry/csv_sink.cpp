@@ -62,7 +62,8 @@ std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, ch
   return row.size();
 }
 
-CsvSink::CsvSink(std::filesystem::path path) : path_(std::move(path)), buffer_(block_bytes) {
+CsvSink::CsvSink(std::filesystem::path path, std::int64_t write_period_ns)
+    : path_(std::move(path)), buffer_(block_bytes), write_period_ns_(write_period_ns) {
   do {
     file_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   } while (file_ < 0 && errno == EINTR);
@@ -76,6 +77,11 @@ CsvSink::~CsvSink() { close(); }
 void CsvSink::consume(const rig::CycleRecord& record, double distance_m) {
   char row[csv_row_max_bytes];
   append(row, format_csv_row(record, distance_m, row));
+  ++rows_buffered_;
+  if (write_period_ns_ > 0 && record.stamp_ns - last_write_ns_ >= write_period_ns_) {
+    flush();
+    last_write_ns_ = record.stamp_ns;
+  }
 }
 
 void CsvSink::finish() {
@@ -84,14 +90,9 @@ void CsvSink::finish() {
 }
 
 void CsvSink::append(const char* text, std::size_t size) noexcept {
-  while (size > 0) {
-    const std::size_t part = std::min(size, buffer_.size() - used_bytes_);
-    std::memcpy(buffer_.data() + used_bytes_, text, part);
-    used_bytes_ += part;
-    text += part;
-    size -= part;
-    if (used_bytes_ == buffer_.size()) flush();
-  }
+  if (size > buffer_.size() - used_bytes_) flush();  // whole rows only: no reader finds half of one at a block's end
+  std::memcpy(buffer_.data() + used_bytes_, text, size);
+  used_bytes_ += size;
 }
 
 void CsvSink::flush() noexcept {
@@ -105,6 +106,8 @@ void CsvSink::flush() noexcept {
       error_number_ = n == 0 ? EIO : errno;
     }
   }
+  if (failed()) rows_lost_ += rows_buffered_;
+  rows_buffered_ = 0;
   used_bytes_ = 0;
 }
 

@@ -20,8 +20,8 @@ std::int64_t wall_clock_us() {
 
 }  // namespace
 
-LogOutlet::LogOutlet(std::filesystem::path path, std::optional<std::int64_t> epoch_us)
-    : path_(std::move(path)), epoch_us_(epoch_us) {
+LogOutlet::LogOutlet(std::filesystem::path path, std::optional<std::int64_t> epoch_us, double write_period_s)
+    : path_(std::move(path)), epoch_us_(epoch_us), write_period_s_(write_period_s) {
   errno = 0;
   file_ = std::make_unique<lcm::LogFile>(path_.string(), "w");
   if (!file_->good()) throw FileError("event log", path_, errno != 0 ? errno : EIO);
@@ -43,23 +43,35 @@ void LogOutlet::send(const std::string& channel, std::span<const std::uint8_t> m
   event_.datalen = static_cast<std::int32_t>(message.size());
   event_.data = const_cast<std::uint8_t*>(message.data());  // LCM only reads it
   errno = 0;
+  ++buffered_;
   if (file_->writeEvent(&event_) != 0) {
-    ++failures_;
     note_failure(errno);
+  } else if (write_period_s_ > 0.0 && time_s - last_write_s_ >= write_period_s_) {
+    write_out(time_s);
   }
+}
+
+void LogOutlet::write_out(double time_s) noexcept {
+  errno = 0;
+  if (std::fflush(file_->getFilePtr()) != 0) {
+    note_failure(errno);
+  } else {
+    buffered_ = 0;
+  }
+  last_write_s_ = time_s;
 }
 
 void LogOutlet::finish() {
   if (file_) {
     // LogFile's destructor flushes too, but tells nobody how that went.
-    errno = 0;
-    if (std::fflush(file_->getFilePtr()) != 0) note_failure(errno);
+    write_out(last_write_s_);
     file_.reset();
   }
   if (error_number_ != 0) throw FileError("event log", path_, error_number_);
 }
 
 void LogOutlet::note_failure(int error_number) noexcept {
+  failures_ += std::exchange(buffered_, 0);
   if (error_number_ == 0) error_number_ = error_number != 0 ? error_number : EIO;
 }
 

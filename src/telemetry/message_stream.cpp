@@ -122,6 +122,10 @@ void MessageStream::answer_command(rig::Reason reason, std::string message, doub
   send_event(event_kind::command, reason, value, std::move(message));
 }
 
+void MessageStream::report_fault(rig::Reason reason, double value, std::string message) {
+  send_event(event_kind::fault, reason, value, std::move(message));
+}
+
 std::uint64_t MessageStream::failures() const noexcept {
   std::uint64_t sum = 0;
   for (const Outlet* outlet : outlets_) sum += outlet->failures();

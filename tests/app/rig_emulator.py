@@ -105,8 +105,10 @@ class RigTest(ProgramTest):
         return self.run_program('--backend', 'rig', '--fast', '--no-lcm', '--set', 'driver.emulated=true', '--set',
                                 f'driver.pci.root={emulator.root}', *args)
 
-    def real_time(self, emulator, *args):
+    def real_time(self, emulator, *args, guardian_timeout_ms=1000):
+        """Patient with this computer's own pauses: a guardian must not end a run that only waits for its turn."""
         self._programs.append(subprocess.Popen(
-            [PROGRAM, '--backend', 'rig', '--no-lcm', '--set', f'driver.pci.root={emulator.root}', *map(str, args)],
+            [os.path.abspath(PROGRAM), '--backend', 'rig', '--no-lcm', '--set', f'driver.pci.root={emulator.root}',
+             '--set', f'guardian.timeout_ms={guardian_timeout_ms}', *map(str, args)], cwd=self.folder,
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
         return self._programs[-1]

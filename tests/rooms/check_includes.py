@@ -19,6 +19,7 @@ MAY_KNOW = {
     'driver/sim': {'rig', 'driver', 'plant_sim'},
     'emulator': {'rig', 'plant_sim'},
     'runtime': {'rig', 'driver'},
+    'guardian': {'rig', 'driver', 'runtime'},
     'experiment': {'rig', 'control', 'driver', 'runtime', 'plant_sim'},
     'telemetry': {'rig', 'lcmtypes'},
     'watch': {'rig', 'telemetry', 'lcmtypes'},
@@ -26,9 +27,9 @@ MAY_KNOW = {
     'archive': set(),
     'report': {'rig', 'analysis'},
     'diagnosis': {'rig', 'driver', 'runtime', 'telemetry'},
-    'settings': {'rig', 'control', 'plant_sim', 'driver', 'runtime', 'experiment'},
+    'settings': {'rig', 'control', 'plant_sim', 'driver', 'runtime', 'guardian', 'experiment'},
     'app': {'control'},  # the program's public face; the program itself, apps/, knows everything
-    'comparison': {'rig', 'control', 'plant_sim', 'driver', 'driver/sim', 'runtime', 'experiment', 'analysis', 'settings'},
+    'comparison': {'rig', 'control', 'plant_sim', 'driver', 'driver/sim', 'runtime', 'guardian', 'experiment', 'analysis', 'settings'},
     'replay': {'rig', 'control', 'driver', 'driver/sim', 'runtime', 'experiment', 'settings', 'telemetry', 'lcmtypes'},
 }
 # room -> libraries that are none of its business
@@ -40,6 +41,7 @@ NEVER_INCLUDES = {
     'driver/sim': r'^(lcm|spdlog|nlohmann|toml\+\+|CLI)/',
     'emulator': r'^(lcm|spdlog|nlohmann|toml\+\+|CLI)/',
     'runtime': r'^(lcm|boost|nlohmann|toml\+\+|CLI)/',
+    'guardian': r'^(lcm|spdlog|boost|toml\+\+|CLI)/',
     'experiment': r'^(lcm|boost|CLI)/',
     'report': r'^(lcm|spdlog|boost|CLI)/',
     'comparison': r'^(lcm|spdlog|boost|CLI)/',

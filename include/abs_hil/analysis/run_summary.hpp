@@ -23,6 +23,7 @@ struct RunSummary {
   std::uint64_t cycles{0};
   std::uint64_t telemetry_drops{0};
   std::uint64_t publish_failures{0};
+  std::uint64_t csv_rows_lost{0};
   bool realtime{false};      ///< every required step of the real-time set-up was obtained
   bool virtual_time{false};  ///< --fast: the timing figures say nothing of this machine
   bool truth_known{false};   ///< metrics come from the simulator's truth, not from estimates

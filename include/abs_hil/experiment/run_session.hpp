@@ -51,6 +51,13 @@ class RunSession {
   /// where those of `cyclictest --secaligned` do.
   void align_to_second(std::int64_t offset_ns) noexcept { second_offset_ns_ = offset_ns; }
 
+  /// For runs in real time: `guard` stands by from between configuration and activation of the driver until its outputs
+  /// are released. Both must outlive the run.
+  void guard_with(runtime::RunGuard& guard) noexcept { guard_ = &guard; }
+  void watch_with(runtime::CycleWatch& watch) noexcept { executive_.watch_with(watch); }
+  /// Ends the run in an orderly way at its next cycle. Any thread or signal handler may call it.
+  void request_stop(rig::Reason reason) noexcept { executive_.request_stop(reason); }
+
   [[nodiscard]] const runtime::CyclicExecutive& executive() const noexcept { return executive_; }
   [[nodiscard]] const runtime::CommandGate& gate() const noexcept { return gate_; }
   [[nodiscard]] std::uint64_t record_drops() const noexcept { return ring_.drops(); }
@@ -74,6 +81,7 @@ class RunSession {
   runtime::CyclicExecutive executive_;
   runtime::RecordPump pump_;
   runtime::RealtimeReport realtime_{};
+  runtime::RunGuard* guard_{nullptr};
   driver::IoResult safe_state_{};
   bool ran_{false};
 };

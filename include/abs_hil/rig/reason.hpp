@@ -23,6 +23,7 @@ enum class Reason : std::uint16_t {
   interrupt_signal = 32,
   terminate_signal = 33,
   stop_command = 34,
+  hangup_signal = 35,
   // the run ends early by a fault or limit
   phase_time_limit = 64,
   overspeed = 65,
@@ -57,6 +58,12 @@ enum class Reason : std::uint16_t {
   usb_not_a_frame = 124,
   usb_outputs_not_taken = 125,
   usb_transfer_failed = 126,
+  // the guardian, and what it acts upon (docs/dead-man.md)
+  guardian_died = 160,
+  guardian_silent = 161,
+  controller_died = 162,
+  controller_silent = 163,
+  safe_state_unverified = 164,
 };
 
 /// In words, for events, logs and summaries.
@@ -75,6 +82,7 @@ enum class Reason : std::uint16_t {
     case Reason::interrupt_signal: return "interrupted (SIGINT)";
     case Reason::terminate_signal: return "terminated (SIGTERM)";
     case Reason::stop_command: return "stopped by a command on ABS_COMMAND";
+    case Reason::hangup_signal: return "terminal closed (SIGHUP)";
     case Reason::phase_time_limit: return "phase exceeded its time limit";
     case Reason::overspeed: return "wheel speed above the limit";
     case Reason::command_not_finite: return "command was not a finite number";
@@ -109,6 +117,11 @@ enum class Reason : std::uint16_t {
     case Reason::usb_not_a_frame: return "USB board sent what is none of its frames";
     case Reason::usb_outputs_not_taken: return "USB board does not show the duties that were sent";
     case Reason::usb_transfer_failed: return "USB transfer failed";
+    case Reason::guardian_died: return "the guardian process died; without it nothing may move";
+    case Reason::guardian_silent: return "the guardian process gave no sign of life; without it nothing may move";
+    case Reason::controller_died: return "the controller process died";
+    case Reason::controller_silent: return "the controller gave no sign of life for guardian.timeout_ms";
+    case Reason::safe_state_unverified: return "the controller could not verify the safe state";
   }
   return "unknown reason";
 }
@@ -120,7 +133,8 @@ enum class Reason : std::uint16_t {
 
 /// True for reasons that come from outside: a signal or a stop command.
 [[nodiscard]] constexpr bool is_stop_request(Reason reason) noexcept {
-  return reason == Reason::interrupt_signal || reason == Reason::terminate_signal || reason == Reason::stop_command;
+  return reason == Reason::interrupt_signal || reason == Reason::terminate_signal || reason == Reason::stop_command ||
+         reason == Reason::hangup_signal;
 }
 
 }  // namespace abs_hil::rig

@@ -10,6 +10,7 @@
 #include "abs_hil/runtime/command_gate.hpp"
 #include "abs_hil/runtime/cycle_logic.hpp"
 #include "abs_hil/runtime/cycle_statistics.hpp"
+#include "abs_hil/runtime/cycle_watch.hpp"
 #include "abs_hil/runtime/spsc_ring.hpp"
 
 namespace abs_hil::runtime {
@@ -35,6 +36,9 @@ class CyclicExecutive {
 
   /// The first tick, instead of the moment of the first step. Before the first step.
   void start_at(std::int64_t first_tick_ns) noexcept { first_tick_ns_ = first_tick_ns; }
+  /// Gives signs of life, keeps records for after a fault, and latches a fault when the guardian is lost. `watch` must
+  /// outlive the executive's use. Before the first step.
+  void watch_with(CycleWatch& watch) noexcept { watch_ = &watch; }
   /// Sleeps until the next tick and runs one cycle. False after the run's last cycle.
   bool step() noexcept;
   /// Ends the run in an orderly way at the next cycle. Any thread or signal handler may call it; the first reason
@@ -58,6 +62,7 @@ class CyclicExecutive {
   CycleLogic& logic_;
   CommandGate& gate_;
   RecordRing& ring_;
+  CycleWatch* watch_{nullptr};
   std::int64_t period_ns_;
   std::uint64_t startup_cycles_;
   std::uint64_t max_consecutive_;

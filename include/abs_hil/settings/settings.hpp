@@ -6,6 +6,7 @@
 #include "abs_hil/control/options.hpp"
 #include "abs_hil/driver/factory.hpp"
 #include "abs_hil/experiment/options.hpp"
+#include "abs_hil/guardian/options.hpp"
 #include "abs_hil/plant_sim/options.hpp"
 #include "abs_hil/runtime/command_gate.hpp"
 #include "abs_hil/runtime/realtime_setup.hpp"
@@ -26,6 +27,7 @@ struct Settings {
   experiment::ExperimentOptions experiment{};
   driver::DriverOptions driver{};
   runtime::GateOptions gate{};
+  guardian::GuardianOptions guardian{};
   runtime::RealtimeOptions realtime{};
   TelemetryOptions telemetry{};
   std::string plant_name{"paper-table1"};

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string_view>
 #include <vector>
@@ -22,11 +23,13 @@ inline constexpr std::size_t csv_row_max_bytes = 640;
 /// bit-exactly; NaN is `NaN`. The same on every locale.
 std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, char (&out)[csv_row_max_bytes]) noexcept;
 
-/// One row a cycle into a file, written in blocks of 64 KiB.
+/// One row a cycle into a file, written in blocks of at most 64 KiB of whole rows.
 class CsvSink : public rig::RecordSink {
  public:
   /// Creates or empties the file. Throws FileError when it cannot be opened.
-  explicit CsvSink(std::filesystem::path path);
+  /// @param write_period_ns  rows older than this, by the records' stamps, are handed to the kernel, so that a program
+  ///                         that is killed loses no more; 0: only when a block is full
+  explicit CsvSink(std::filesystem::path path, std::int64_t write_period_ns = 0);
   /// Writes out what is buffered, if finish() was not called; a failure then goes unseen.
   ~CsvSink() override;
 
@@ -36,6 +39,8 @@ class CsvSink : public rig::RecordSink {
 
   /// True once a write failed: what comes after is not in the file.
   [[nodiscard]] bool failed() const noexcept { return error_number_ != 0; }
+  /// Rows that are not in the file, or in part only.
+  [[nodiscard]] std::uint64_t rows_lost() const noexcept { return rows_lost_; }
 
  private:
   void append(const char* text, std::size_t size) noexcept;
@@ -44,7 +49,11 @@ class CsvSink : public rig::RecordSink {
 
   std::filesystem::path path_;
   std::vector<char> buffer_;
+  std::int64_t write_period_ns_;
+  std::int64_t last_write_ns_{0};  ///< stamp of the record after which rows were last written
   std::size_t used_bytes_{0};
+  std::uint64_t rows_buffered_{0};
+  std::uint64_t rows_lost_{0};
   int file_{-1};
   int error_number_{0};  ///< errno of the first write that failed
 };

@@ -52,6 +52,9 @@ class MessageStream : public rig::RecordSink {
   /// An event of kind "command": the answer to a message on ABS_COMMAND.
   void answer_command(rig::Reason reason, std::string message, double value);
 
+  /// An event of kind "fault" beside those that the records give rise to: one found outside of the cycle.
+  void report_fault(rig::Reason reason, double value, std::string message);
+
   [[nodiscard]] const std::string& command_channel() const noexcept { return command_channel_; }
   /// Run time of the latest record, s.
   [[nodiscard]] double time_s() const noexcept { return latest_.time_s; }

@@ -152,4 +152,10 @@ Card open_card(const PciOptions& options, bool lock_step) {
   return card;
 }
 
+std::unique_ptr<RegisterWindow> open_beside_owner(const PciOptions& options) {
+  const fs::path folder = fs::path(options.root) / choose(options);
+  check_bar(folder);
+  return std::make_unique<SysfsWindow>(folder / "resource2", WindowUse::guardian);
+}
+
 }  // namespace abs_hil::driver::pci

@@ -63,6 +63,38 @@ std::string lock_holder(int fd) {
   return "another process (lsof on the file tells which)";
 }
 
+/// Process that stands guard over the card with a lock of fcntl's; 0 if there is none, or it is this one.
+pid_t guardian_of(int fd) {
+  struct flock lock {};
+  lock.l_type = F_WRLCK;
+  lock.l_whence = SEEK_SET;
+  return ::fcntl(fd, F_GETLK, &lock) == 0 && lock.l_type != F_UNLCK ? lock.l_pid : 0;
+}
+
+[[noreturn]] void refuse_while_guarded(const std::filesystem::path& file, pid_t guardian) {
+  refuse(file, "process " + std::to_string(guardian) + " (" + process_name(guardian) +
+                   ") still brings the card into the safe state after an earlier run; wait until it has ended");
+}
+
+void become_owner(const std::filesystem::path& file, int fd) {
+  if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
+    const int error = errno;
+    if (error != EWOULDBLOCK) refuse(file, std::string("cannot be locked: ") + std::strerror(error));
+    refuse(file, "the card is in use by " + lock_holder(fd) + "; a card has exactly one owner: end that process first");
+  }
+  if (const pid_t guardian = guardian_of(fd); guardian != 0) refuse_while_guarded(file, guardian);
+}
+
+void become_guardian(const std::filesystem::path& file, int fd) {
+  struct flock lock {};
+  lock.l_type = F_WRLCK;
+  lock.l_whence = SEEK_SET;
+  if (::fcntl(fd, F_SETLK, &lock) == 0) return;
+  const int error = errno;
+  if (const pid_t guardian = guardian_of(fd); guardian != 0) refuse_while_guarded(file, guardian);
+  refuse(file, std::string("cannot be locked: ") + std::strerror(error));
+}
+
 /// One whole access; what is not whole failed.
 template <typename Access>
 IoResult whole_access(std::uint32_t where, ssize_t size, Access access) noexcept {
@@ -89,12 +121,13 @@ IoError io_error_for(int errno_value) noexcept {
   }
 }
 
-SysfsWindow::SysfsWindow(const std::filesystem::path& resource_file) : file_(open_for_access(resource_file)) {
-  if (::flock(file_.get(), LOCK_EX | LOCK_NB) == 0) return;
-  const int error = errno;
-  if (error != EWOULDBLOCK) refuse(resource_file, std::string("cannot be locked: ") + std::strerror(error));
-  refuse(resource_file, "the card is in use by " + lock_holder(file_.get()) +
-                            "; a card has exactly one owner: end that process first");
+SysfsWindow::SysfsWindow(const std::filesystem::path& resource_file, WindowUse use)
+    : file_(open_for_access(resource_file)) {
+  if (use == WindowUse::guardian) {
+    become_guardian(resource_file, file_.get());
+  } else {
+    become_owner(resource_file, file_.get());
+  }
 }
 
 IoResult SysfsWindow::read32(std::uint32_t offset, std::uint32_t& value) noexcept {

@@ -36,6 +36,10 @@ struct BarInfo {
 ///                   an emulator that waits for lock-step is refused
 [[nodiscard]] Card open_card(const PciOptions& options, bool lock_step);
 
+/// The registers of the same card for a guardian: found and checked in the same way, not locked as an owner locks them.
+/// Throws Unavailable; also if another guardian still makes that card safe.
+[[nodiscard]] std::unique_ptr<RegisterWindow> open_beside_owner(const PciOptions& options);
+
 /// Beside the card's files in an emulator in lock-step, and never on hardware.
 inline constexpr const char* emulated_time_file = "emulated_time_ns";
 

@@ -1,0 +1,209 @@
+#include "abs_hil/guardian/guardian_process.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <utility>
+
+#include "abs_hil/driver/io_result.hpp"
+#include "abs_hil/guardian/linux_process.hpp"
+
+namespace abs_hil::guardian {
+
+namespace {
+
+constexpr int ready_within_ms = 5000;
+constexpr int ends_within_ms = 500;
+
+[[noreturn]] void refuse(const std::string& what) {
+  throw driver::Unavailable("guardian: " + what +
+                            ". Without a guardian nothing may move: a program that dies would leave the motor driven "
+                            "(docs/dead-man.md)");
+}
+
+[[noreturn]] void refuse(const std::string& what, int error) { refuse(what + ": " + std::strerror(error)); }
+
+/// A descriptor above those that the child finds, which closes itself.
+class HighDescriptor {
+ public:
+  /// Takes `fd` over if `ours`, else copies it.
+  HighDescriptor(int fd, bool ours) {
+    constexpr int above = 10;
+    if (fd < 0) refuse("a descriptor could not be opened", errno);
+    fd_ = ::fcntl(fd, F_DUPFD_CLOEXEC, above);
+    const int error = errno;
+    if (ours) ::close(fd);
+    if (fd_ < 0) refuse("a descriptor could not be copied", error);
+  }
+  HighDescriptor(const HighDescriptor&) = delete;
+  HighDescriptor& operator=(const HighDescriptor&) = delete;
+  ~HighDescriptor() { ::close(fd_); }
+  [[nodiscard]] int get() const noexcept { return fd_; }
+
+ private:
+  int fd_{-1};
+};
+
+int text_in_memory(const std::string& text) {
+  const int fd = ::memfd_create("abs_hil brief", MFD_CLOEXEC);
+  if (fd < 0) return -1;
+  if (::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size())) return fd;
+  ::close(fd);
+  errno = EIO;
+  return -1;
+}
+
+class SpawnSetUp {
+ public:
+  SpawnSetUp() {
+    posix_spawn_file_actions_init(&actions);
+    posix_spawnattr_init(&attributes);
+    sigset_t none;
+    sigset_t all;
+    sigemptyset(&none);
+    sigfillset(&all);
+    posix_spawnattr_setsigmask(&attributes, &none);
+    posix_spawnattr_setsigdefault(&attributes, &all);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  }
+  SpawnSetUp(const SpawnSetUp&) = delete;
+  SpawnSetUp& operator=(const SpawnSetUp&) = delete;
+  ~SpawnSetUp() {
+    posix_spawn_file_actions_destroy(&actions);
+    posix_spawnattr_destroy(&attributes);
+  }
+  posix_spawn_file_actions_t actions{};
+  posix_spawnattr_t attributes{};
+};
+
+}  // namespace
+
+std::string guardian_program() {
+  std::error_code error;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  const std::filesystem::path beside = self.parent_path() / "abs_guardian";
+  // A program of somebody's own that runs ours from the library has the installed one.
+  const std::filesystem::path installed = std::filesystem::path(ABS_HIL_INSTALLED_BIN_DIR) / "abs_guardian";
+  if (!std::filesystem::exists(beside, error) && std::filesystem::exists(installed, error)) return installed.string();
+  return beside.string();
+}
+
+GuardianProcess::GuardianProcess(SharedRegion& region, std::string program, std::string brief_json)
+    : region_(region), program_(std::move(program)), brief_(std::move(brief_json)) {}
+
+GuardianProcess::~GuardianProcess() { static_cast<void>(end()); }
+
+void GuardianProcess::stand_guard() {
+  start();
+  try {
+    wait_until_ready();
+  } catch (...) {
+    ::kill(pid_, SIGKILL);
+    static_cast<void>(end());
+    throw;
+  }
+}
+
+void GuardianProcess::start() {
+  std::array<int, 2> pipe{-1, -1};
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) refuse("no pipe", errno);
+  ready_ = pipe[0];
+  const HighDescriptor ready(pipe[1], true);
+  const HighDescriptor region(region_.descriptor(), false);
+  const HighDescriptor controller(open_pidfd(::getpid()), true);
+  const HighDescriptor brief(text_in_memory(brief_), true);
+
+  SpawnSetUp set_up;
+  for (const auto& [from, to] : {std::pair(region.get(), inherited_region),
+                                 {controller.get(), inherited_controller},
+                                 {ready.get(), inherited_ready},
+                                 {brief.get(), inherited_brief}}) {
+    posix_spawn_file_actions_adddup2(&set_up.actions, from, to);
+  }
+  posix_spawn_file_actions_addclosefrom_np(&set_up.actions, inherited_brief + 1);
+  std::string name = program_;
+  std::array<char*, 2> arguments{name.data(), nullptr};
+  const int error =
+      ::posix_spawn(&pid_, program_.c_str(), &set_up.actions, &set_up.attributes, arguments.data(), environ);
+  if (error != 0) {
+    pid_ = 0;
+    refuse(program_ + " cannot be started", error);
+  }
+  pidfd_ = open_pidfd(pid_);
+  if (pidfd_ < 0) {
+    const int reason = errno;
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+    pid_ = 0;
+    refuse("no pidfd", reason);
+  }
+}
+
+void GuardianProcess::wait_until_ready() {
+  std::string said;
+  for (;;) {
+    pollfd readable{ready_, POLLIN, 0};
+    const int ready = ::poll(&readable, 1, ready_within_ms);
+    if (ready < 0 && errno == EINTR) continue;
+    if (ready <= 0) refuse(program_ + " was not ready within " + std::to_string(ready_within_ms / 1000) + " s");
+    std::array<char, 512> part{};
+    const ssize_t got = ::read(ready_, part.data(), part.size());
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) break;
+    said.append(part.data(), static_cast<std::size_t>(got));
+  }
+  constexpr std::string_view ready_word = "ready ";
+  constexpr std::string_view error_word = "error ";
+  if (said.starts_with(error_word)) refuse(said.substr(error_word.size()));
+  if (!said.starts_with(ready_word)) refuse(program_ + " ended before it was ready");
+  notes_ = said.substr(ready_word.size());
+}
+
+void GuardianProcess::outputs_released(bool safe) noexcept {
+  region_.set_stage(safe ? Stage::released : Stage::handed_over);
+}
+
+bool GuardianProcess::ended_within(int timeout_ms) const noexcept {
+  pollfd ended{pidfd_, POLLIN, 0};
+  int ready = 0;
+  do {
+    ready = ::poll(&ended, 1, timeout_ms);
+  } while (ready < 0 && errno == EINTR);
+  return ready > 0;
+}
+
+bool GuardianProcess::alive() const noexcept { return pid_ == 0 || !ended_within(0); }
+
+GuardianProcess::Farewell GuardianProcess::end() noexcept {
+  if (ready_ >= 0) ::close(std::exchange(ready_, -1));
+  if (pid_ == 0) return Farewell::none;
+  const bool handed_over = region_.stage() == Stage::handed_over;
+  // One that has work to do looks at its outputs alone.
+  if (!handed_over) region_.set_stage(Stage::closed);
+  const bool ended = ended_within(ends_within_ms);
+  if (handed_over) region_.set_stage(Stage::closed);
+  Farewell farewell = Farewell::insisting;
+  if (!ended && !handed_over) ::kill(pid_, SIGKILL);  // stopped or hung: the outputs are safe without it
+  if (ended || !handed_over) {
+    int status = 0;
+    while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
+    }
+    farewell = WIFEXITED(status) && WEXITSTATUS(status) == 0 ? Farewell::ended : Farewell::failed;
+  }
+  ::close(std::exchange(pidfd_, -1));
+  pid_ = 0;
+  return farewell;
+}
+
+}  // namespace abs_hil::guardian

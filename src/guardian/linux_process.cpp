@@ -1,0 +1,34 @@
+#include "abs_hil/guardian/linux_process.hpp"
+
+#include <poll.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <ctime>
+
+namespace abs_hil::guardian {
+
+int open_pidfd(pid_t process) noexcept {
+  constexpr unsigned int close_on_exec = 0;  // pidfds always are
+  return static_cast<int>(::syscall(SYS_pidfd_open, process, close_on_exec));
+}
+
+bool LinuxProcess::gone_by(std::int64_t time_ns) noexcept {
+  constexpr std::int64_t ns_per_s = 1'000'000'000;
+  runtime::MonotonicClock clock;
+  for (;;) {
+    const std::int64_t left_ns = std::max<std::int64_t>(0, time_ns - clock.now_ns());
+    const timespec left{.tv_sec = static_cast<time_t>(left_ns / ns_per_s), .tv_nsec = left_ns % ns_per_s};
+    pollfd ended{pidfd_, POLLIN, 0};
+    const int ready = ::ppoll(&ended, 1, &left, nullptr);
+    if (ready > 0) return true;  // POLLIN, or a descriptor that is none: nobody to guard
+    if (ready == 0 || errno != EINTR) return false;
+  }
+}
+
+void LinuxProcess::end() noexcept { static_cast<void>(::syscall(SYS_pidfd_send_signal, pidfd_, SIGKILL, nullptr, 0)); }
+
+}  // namespace abs_hil::guardian

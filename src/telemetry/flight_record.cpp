@@ -1,0 +1,107 @@
+#include "abs_hil/telemetry/flight_record.hpp"
+
+#include <cerrno>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <fstream>
+
+#include "abs_hil/telemetry/csv_sink.hpp"
+#include "abs_hil/telemetry/file_error.hpp"
+#include "abs_hil/telemetry/log_outlet.hpp"
+
+namespace abs_hil::telemetry {
+namespace {
+
+constexpr double us_per_ns = 1e-3;
+
+void add_number(std::string& row, double value) {
+  row += ',';
+  if (std::isnan(value)) {
+    row += "NaN";
+    return;
+  }
+  char text[32];
+  row.append(text, std::to_chars(text, text + sizeof text, value).ptr);
+}
+
+std::string extra_columns(const rig::CycleRecord& r) {
+  std::string row = ',' + std::to_string(r.sequence) + ',' + std::to_string(r.stamp_ns) + ',' +
+                    std::to_string(r.measurement.upper_counts) + ',' + std::to_string(r.measurement.lower_counts);
+  add_number(row, r.measurement.supply_V);
+  add_number(row, r.measurement.temperature_C);
+  row += ',' + std::to_string(r.measurement.trip_flags) + ',' + std::to_string(static_cast<int>(r.reason));
+  add_number(row, r.reason_value);
+  add_number(row, static_cast<double>(r.timing.wakeup_latency_ns) * us_per_ns);
+  add_number(row, static_cast<double>(r.timing.cycle_ns) * us_per_ns);
+  return row + '\n';
+}
+
+std::int64_t wall_clock_us() {
+  using std::chrono::duration_cast, std::chrono::microseconds, std::chrono::system_clock;
+  return duration_cast<microseconds>(system_clock::now().time_since_epoch()).count();
+}
+
+void write_text(const std::filesystem::path& path, const std::string& text, std::string_view kind) {
+  errno = 0;
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) throw FileError(kind, path, errno != 0 ? errno : EIO);
+}
+
+void write_csv(const std::filesystem::path& path, const FlightRecord& record) {
+  std::string text(csv_header);
+  text.append(flight_csv_extra_header).append("\n");
+  char row[csv_row_max_bytes];
+  for (const rig::CycleRecord& r : record.records) {
+    text.append(row, format_csv_row(r, rig::unknown, row) - 1);  // without its line end
+    text += extra_columns(r);
+  }
+  write_text(path, text, "flight record");
+}
+
+void write_log(const std::filesystem::path& path, const FlightRecord& record, const ExperimentInfo& experiment,
+               const std::string& channel_prefix) {
+  // The last record is taken to be of now.
+  const double last_s = record.records.empty() ? 0.0 : record.records.back().time_s;
+  LogOutlet outlet(path, wall_clock_us() - std::llround(last_s * 1e6));
+  MessageStream stream({.channel_prefix = channel_prefix}, experiment, nullptr);
+  stream.add(outlet);
+  for (const rig::CycleRecord& r : record.records) stream.consume(r, rig::unknown);
+  stream.report_fault(record.reason, record.reason_value, record.account);
+  stream.finish();
+}
+
+}  // namespace
+
+std::vector<std::filesystem::path> write_flight_record(const std::filesystem::path& prefix, const FlightRecord& record,
+                                                       const ExperimentInfo& experiment,
+                                                       const std::string& channel_prefix,
+                                                       std::vector<std::string>& problems) {
+  std::vector<std::filesystem::path> written;
+  const auto attempt = [&](const char* extension, auto&& write) {
+    std::filesystem::path path = prefix;
+    path += extension;
+    try {
+      write(path);
+      written.push_back(std::move(path));
+    } catch (const std::exception& error) {
+      problems.emplace_back(error.what());
+    }
+  };
+  attempt(".txt", [&](const auto& path) {
+    write_text(path,
+               "reason " + std::to_string(static_cast<int>(record.reason)) + ": " +
+                   std::string(rig::description(record.reason)) + '\n' + record.account +
+                   std::to_string(record.records.size()) + " cycles recorded\n",
+               "flight record");
+  });
+  attempt(".csv", [&](const auto& path) { write_csv(path, record); });
+  attempt(".lcmlog", [&](const auto& path) { write_log(path, record, experiment, channel_prefix); });
+  return written;
+}
+
+}  // namespace abs_hil::telemetry

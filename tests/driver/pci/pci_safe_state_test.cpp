@@ -1,0 +1,137 @@
+// The safe state from a second process: whatever access the owner was killed in, both PWMs are 0 afterwards.
+
+#include "abs_hil/driver/pci/pci_safe_state.hpp"
+
+#include "abs_hil/driver/pci/pci_driver.hpp"
+#include "catch.hpp"
+#include "model_card.hpp"
+
+using namespace abs_hil;
+using namespace abs_hil::driver;
+using test::ModelCard;
+using test::ModelWindow;
+
+namespace {
+
+constexpr rig::Command driving{.motor_duty = 0.9, .motor_enable = true};
+constexpr rig::Command braking{.brake_duty = 0.6};
+
+/// Accesses beyond the first `left` ones do not happen: the process is stopped there.
+class StoppedWindow final : public pci::RegisterWindow {
+ public:
+  StoppedWindow(ModelCard& card, int& left) : inner_(card), left_(left) {}
+  IoResult read32(std::uint32_t offset, std::uint32_t& value) noexcept override {
+    return left_-- > 0 ? inner_.read32(offset, value) : IoResult{IoError::disconnected};
+  }
+  IoResult write32(std::uint32_t offset, std::uint32_t value) noexcept override {
+    return left_-- > 0 ? inner_.write32(offset, value) : IoResult{IoError::disconnected};
+  }
+
+ private:
+  ModelWindow inner_;
+  int& left_;
+};
+
+pci::PciSafeState safe_state_of(ModelCard& card) {
+  return pci::PciSafeState([&card] { return std::make_unique<ModelWindow>(card); });
+}
+
+bool both_zero(const ModelCard& card) {
+  return card.model.outputs().drive_duty == 0.0 && card.model.outputs().brake_duty == 0.0;
+}
+
+}  // namespace
+
+TEST_CASE("both PWMs are 0 whichever access of its cycle the owner was killed in, in every phase") {
+  for (const rig::Command& before : {rig::safe_command, driving, braking}) {
+    for (const rig::Command& command : {rig::safe_command, driving, braking}) {
+      for (int accesses = 0; accesses <= static_cast<int>(pci::accesses_per_cycle); ++accesses) {
+        ModelCard card;
+        int left = 1'000'000;
+        {
+          pci::PciDriver owner({}, [&card, &left] {
+            return pci::Card{.window = std::make_unique<StoppedWindow>(card, left), .place = "test"};
+          });
+          owner.configure();
+          owner.activate(0);
+          rig::Measurement measurement;
+          REQUIRE(owner.read(1'000'000, measurement).ok());
+          REQUIRE(owner.write(before).ok());
+          left = accesses;
+          static_cast<void>(owner.read(2'000'000, measurement));
+          static_cast<void>(owner.write(command));
+          left = 0;
+        }
+        pci::PciSafeState guardian = safe_state_of(card);
+        guardian.prepare();
+        CAPTURE(before.motor_duty, before.brake_duty, command.motor_duty, command.brake_duty, accesses);
+        CHECK(guardian.make_safe().ok());
+        CHECK(both_zero(card));
+      }
+    }
+  }
+}
+
+TEST_CASE("why the owner must be ended first: one that goes on between index and data undoes the safe state") {
+  ModelCard card;
+  ModelWindow owner(card);
+  REQUIRE(owner.write32(0x60, 1).ok());  // index: brake; stopped here
+  pci::PciSafeState guardian = safe_state_of(card);
+  guardian.prepare();
+  REQUIRE(guardian.make_safe().ok());
+  REQUIRE(both_zero(card));
+  REQUIRE(owner.write32(0x6C, 2000).ok());  // goes on
+  CHECK_FALSE(both_zero(card));
+}
+
+TEST_CASE("preparing writes nothing") {
+  ModelCard card;
+  pci::PciSafeState guardian = safe_state_of(card);
+  guardian.prepare();
+  CHECK(card.traffic.empty());
+}
+
+TEST_CASE("a width that does not become 0 is not taken for safe, and the other PWM is tried all the same") {
+  ModelCard card;
+  ModelWindow owner(card);
+  for (const std::uint32_t pwm : {0U, 1U}) {
+    REQUIRE(owner.write32(0x60, pwm).ok());
+    REQUIRE(owner.write32(0x6C, 3000).ok());
+  }
+  card.faulty.set("6c:wrong=1");
+  pci::PciSafeState guardian = safe_state_of(card);
+  guardian.prepare();
+  const IoResult result = guardian.make_safe();
+  CHECK(result.error == IoError::read_back_mismatch);
+  CHECK(result.where == 0x6C);
+  CHECK(both_zero(card));  // the fault is in the reading
+}
+
+TEST_CASE("all ones is a card that is gone, not a width") {
+  ModelCard card;
+  pci::PciSafeState guardian = safe_state_of(card);
+  guardian.prepare();
+  card.faulty.answer_all_ones(true);
+  CHECK(guardian.make_safe().error == IoError::disconnected);
+}
+
+TEST_CASE("a card that comes back is opened anew") {
+  ModelCard card;
+  ModelWindow owner(card);
+  REQUIRE(owner.write32(0x60, 0).ok());
+  REQUIRE(owner.write32(0x6C, 3000).ok());
+  int opened = 0;
+  pci::PciSafeState guardian([&] {
+    ++opened;
+    if (card.unplugged) throw Unavailable("gone");
+    return std::make_unique<ModelWindow>(card);
+  });
+  guardian.prepare();
+  card.unplugged = true;
+  CHECK(guardian.make_safe().error == IoError::disconnected);
+  CHECK(guardian.make_safe().error == IoError::disconnected);
+  card.unplugged = false;
+  CHECK(guardian.make_safe().ok());
+  CHECK(opened == 3);
+  CHECK(both_zero(card));
+}

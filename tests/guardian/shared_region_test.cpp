@@ -1,0 +1,71 @@
+#include "abs_hil/guardian/shared_region.hpp"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <stdexcept>
+
+#include "abs_hil/guardian/brief.hpp"
+#include "catch.hpp"
+
+using namespace abs_hil;
+using namespace abs_hil::guardian;
+
+TEST_CASE("what one process writes, another reads, also after the writer was killed") {
+  SharedRegion region(16);
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    SharedRegion mine = SharedRegion::attach(region.descriptor());
+    for (std::uint64_t n = 0; n < 20; ++n) {
+      rig::CycleRecord record;
+      record.sequence = n;
+      mine.recorder().push(record);
+    }
+    mine.panel().cycle_beats.store(20);
+    mine.set_stage(Stage::handed_over);
+    ::kill(::getpid(), SIGKILL);
+  }
+  int status = 0;
+  REQUIRE(::waitpid(child, &status, 0) == child);
+  CHECK(WIFSIGNALED(status));
+  CHECK(region.stage() == Stage::handed_over);
+  CHECK(region.panel().cycle_beats.load() == 20);
+  const auto records = region.recorder().contents();
+  REQUIRE(records.size() == 16);
+  CHECK(records.front().sequence == 4);
+  CHECK(records.back().sequence == 19);
+}
+
+TEST_CASE("nobody can cut the region short under the other's feet") {
+  const SharedRegion region(4);
+  CHECK(::ftruncate(region.descriptor(), 0) != 0);
+}
+
+TEST_CASE("another build's region, or something else altogether, is refused") {
+  const int other = ::memfd_create("other", MFD_ALLOW_SEALING);
+  REQUIRE(::ftruncate(other, 65536) == 0);
+  CHECK_THROWS_WITH(SharedRegion::attach(other), Catch::Matchers::Contains("not the shared memory of a run"));
+  REQUIRE(::fcntl(other, F_ADD_SEALS, F_SEAL_SHRINK) == 0);
+  CHECK_THROWS_WITH(SharedRegion::attach(other), Catch::Matchers::Contains("another build"));
+  ::close(other);
+  CHECK_THROWS(SharedRegion::attach(other));
+}
+
+TEST_CASE("a brief reads back, and what is none is refused") {
+  const Brief brief{.config_json = R"({"a": {"b": "\"x\""}})",
+                    .experiment = "e",
+                    .controller = "c",
+                    .plant = "p",
+                    .backend = "rig",
+                    .version = "1",
+                    .realtime = "prefer",
+                    .record_prefix = "/tmp/a b/recorder"};
+  const Brief read = parse_brief(to_json(brief));
+  CHECK(read.config_json == brief.config_json);
+  CHECK(read.record_prefix == brief.record_prefix);
+  CHECK_THROWS_WITH(parse_brief("{}"), Catch::Matchers::Contains("not a brief"));
+  CHECK_THROWS_WITH(parse_brief("nonsense"), Catch::Matchers::Contains("not a brief"));
+}
