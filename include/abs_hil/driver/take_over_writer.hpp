@@ -1,0 +1,30 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <utility>
+
+#include "abs_hil/driver/rig_driver.hpp"
+#include "abs_hil/driver/safe_state_writer.hpp"
+
+namespace abs_hil::driver {
+
+/// The safe state of a board that has one owner at a time, or a handshake: once its owner is gone, a driver of our own
+/// takes it over, which makes its outputs safe, and lets it go again, which verifies that. Nothing can be opened
+/// beforehand, so that the first try takes as long as the board's `configure` and `activate`.
+class TakeOverWriter final : public SafeStateWriter {
+ public:
+  using MakeDriver = std::function<std::unique_ptr<RigDriver>()>;
+  /// @param make_driver  throws std::invalid_argument or Unavailable
+  explicit TakeOverWriter(MakeDriver make_driver) : make_driver_(std::move(make_driver)) {}
+
+  [[nodiscard]] std::string_view name() const noexcept override { return "take-over"; }
+  void prepare() override { driver_ = make_driver_(); }
+  [[nodiscard]] IoResult make_safe() noexcept override;
+
+ private:
+  MakeDriver make_driver_;
+  std::unique_ptr<RigDriver> driver_{};
+};
+
+}  // namespace abs_hil::driver
