@@ -135,6 +135,33 @@ TEST_CASE("rows survive the block boundaries of a long file, with or without fin
   }
 }
 
+TEST_CASE("with a write period the file is never further behind than that, and ends with a whole row") {
+  const test::ScratchDirectory scratch;
+  constexpr std::int64_t period_ns = 50'000'000;
+  constexpr std::int64_t cycle_ns = 1'000'000;
+  CsvSink sink(scratch / "run.csv", period_ns);
+  for (std::uint64_t i = 0; i < 400; ++i) {
+    rig::CycleRecord record = test::sample_record(i);
+    record.stamp_ns = static_cast<std::int64_t>(i + 1) * cycle_ns;
+    sink.consume(record, 0.0);
+    const auto lines = lines_of(scratch / "run.csv");  // what a reader finds if the program is killed now
+    if (i < 50) continue;
+    REQUIRE(lines.size() + 50 >= i + 2);
+    REQUIRE(lines.back() + "\n" == row_of(test::sample_record(lines.size() - 2), 0.0));
+  }
+}
+
+TEST_CASE("rows that did not reach the disk are counted") {
+  CsvSink sink("/dev/full", 10'000'000);
+  for (std::uint64_t i = 0; i < 100; ++i) {
+    rig::CycleRecord record = test::sample_record(i);
+    record.stamp_ns = static_cast<std::int64_t>(i + 1) * 1'000'000;
+    sink.consume(record, 0.0);
+  }
+  CHECK_THROWS_AS(sink.finish(), FileError);
+  CHECK(sink.rows_lost() == 100);
+}
+
 TEST_CASE("a full disk is told by finish(), not by a crash") {
   CsvSink sink("/dev/full");
   for (std::uint64_t i = 0; i < 1000; ++i) sink.consume(test::sample_record(i), 0.0);
