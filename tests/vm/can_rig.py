@@ -47,12 +47,12 @@ class Node:
         found = re.search(r'drive ([\d.]+), brake ([\d.]+)', self.command('status'))
         return float(found[1]), float(found[2])
 
-    def wait_for(self, wanted):
-        for _ in range(3000):
+    def wait_for(self, wanted, program):
+        while program.poll() is None:
             if wanted(*self.wire()):
                 return
             time.sleep(0.003)
-        raise AssertionError(f'the duties wanted were never seen: {self.lines[-3:]}')
+        raise AssertionError(f'ended before the duties wanted were seen: {self.lines[-3:]}, {program.stderr.read()}')
 
     def zeroed(self):
         """The last time its outputs went to zero: (why, ms since the last valid command)."""
@@ -134,12 +134,12 @@ class CanRigTest(unittest.TestCase):
 
     def accelerating(self, node, *args):
         program = self.start(*args)
-        node.wait_for(lambda drive, brake: drive > 0.9)
+        node.wait_for(lambda drive, brake: drive > 0.9, program)
         return program
 
     def braking(self, node, *args):
         program = self.start('--set', 'experiment.cut_speed_rad_s=60', *args)
-        node.wait_for(lambda drive, brake: brake > 0.3)
+        node.wait_for(lambda drive, brake: brake > 0.3, program)
         return program
 
     def check_paper_run(self, program):

@@ -11,7 +11,9 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
+#include <thread>
 #include <vector>
 
 #include "abs_hil/driver/can/protocol.hpp"
@@ -65,8 +67,20 @@ int open_raw_socket(const InterfaceFacts& facts, bool fd_frames) {
   return descriptor;
 }
 
+/// An interface that has just been set up gets its carrier a little later (the kernel's linkwatch: up to 1 s).
+std::optional<InterfaceFacts> find_settled_interface(const std::string& name) {
+  constexpr int attempts = 40;
+  constexpr std::chrono::milliseconds pause{50};
+  std::optional<InterfaceFacts> facts = find_interface(name);
+  for (int i = 0; i < attempts && facts && facts->up && !facts->running && facts->state != "bus-off"; ++i) {
+    std::this_thread::sleep_for(pause);
+    facts = find_interface(name);
+  }
+  return facts;
+}
+
 Link open_interface(const CanOptions& options) {
-  const std::optional<InterfaceFacts> facts = find_interface(options.interface);
+  const std::optional<InterfaceFacts> facts = find_settled_interface(options.interface);
   if (!facts) {
     std::string known;
     for (const InterfaceFacts& other : can_interfaces()) known += (known.empty() ? "" : ", ") + other.name;
