@@ -93,6 +93,13 @@ class Slcan(CanRigTest):
         self.check_ended(program, 'CAN controller is bus-off')
         self.assertEqual(self.check_zero_in_time(node), 'watchdog')
 
+    def test_error_passive_in_acceleration(self):
+        node = self.node()
+        program = self.accelerating(node)
+        ADAPTER.say('sp050130\r')
+        self.check_ended(program, 'CAN controller is error-passive')
+        self.check_zero_in_time(node)
+
     def test_error_warning_is_borne(self):
         node = self.node()
         program = self.braking(node)

@@ -1,5 +1,6 @@
 """A small reader of DBC files and of candump's logs: enough to decode what the CAN tests record, independent of the
 program's own tables. Little-endian signals only, as config/can/abs_rig.dbc has them."""
+import pathlib
 import re
 
 MESSAGE = re.compile(r'BO_ (\d+) (\w+): (\d+) (\w+)')
@@ -11,7 +12,7 @@ LOGGED = re.compile(r'\((\d+\.\d+)\) (\w+) ([0-9A-F]+)(##.|#)([0-9A-F]*)')
 class Dbc:
     def __init__(self, path):
         self.messages = {}
-        for line in open(path, encoding='utf-8'):
+        for line in pathlib.Path(path).read_text(encoding='utf-8').splitlines():
             if found := MESSAGE.match(line):
                 signals = {}
                 self.messages[int(found[1])] = (found[2], int(found[3]), signals)
@@ -39,6 +40,6 @@ class Dbc:
 
 def frames_of(path):
     """(time_s, identifier, data) of each frame in a log of candump -L."""
-    for line in open(path, encoding='ascii'):
+    for line in pathlib.Path(path).read_text(encoding='ascii').splitlines():
         if found := LOGGED.match(line):
             yield float(found[1]), int(found[3], 16), bytes.fromhex(found[5])
