@@ -20,6 +20,18 @@ runtime::RealtimeMode realtime_mode(const std::string& name) {
   return name == "off" ? runtime::RealtimeMode::off : runtime::RealtimeMode::prefer;
 }
 
+/// A run that waits for its start must be able to get it.
+void check_start(const RunRequest& request) {
+  const settings::Settings& s = request.settings;
+  const auto refuse = [](const char* why) { throw settings::ConfigError(std::string("--wait-for-start: ") + why); };
+  if (!s.commands.enabled) refuse("nobody could give the start; add --set commands.enabled=true and commands.key_file");
+  if (request.outputs.no_lcm) refuse("the start comes over LCM; leave out --no-lcm");
+  if (request.outputs.fast) refuse("virtual time waits for nobody; leave out --fast");
+  if (s.experiment.start_speed_rad_s > 0.0) {
+    refuse("wheels that turn from the start would run down meanwhile; leave out experiment.start_speed_rad_s");
+  }
+}
+
 void check_together(const RunRequest& request) {
   const settings::Settings& s = request.settings;
   if (s.backend == "rig" && request.outputs.fast && !s.driver.emulated) {
@@ -47,6 +59,7 @@ void check_together(const RunRequest& request) {
         "plant.friction_profile: only a simulated road changes its friction; leave it out, choose another experiment "
         "than friction-jump, or use --backend sim");
   }
+  if (s.experiment.wait_for_start) check_start(request);
   if (s.control.adaptive.theta_min_N >= s.control.adaptive.theta_max_N) {
     throw settings::ConfigError("control.adaptive.theta_min_N: must be less than control.adaptive.theta_max_N");
   }
@@ -94,6 +107,7 @@ RunRequest merge(const RunOptions& options) {
     s.plant.friction_profile = experiment::friction_profile_of(s.experiment.name);
   }
   for (const std::string& injection : options.injections) s.inject += (s.inject.empty() ? "" : ",") + injection;
+  if (options.wait_for_start) keys.set_text("experiment.wait_for_start=true", "--wait-for-start");
   check_together(request);
   settings::refuse_unsafe(s, keys);
   if (s.backend == "rig") apply_board_limits(s);

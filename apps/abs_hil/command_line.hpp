@@ -39,6 +39,7 @@ struct RunOptions {
   std::optional<std::string> seed{};
   std::vector<std::string> defaults{};  ///< assignments that files and options may override
   std::vector<std::string> assignments{};
+  bool wait_for_start{false};
   std::vector<std::string> injections{};  ///< faults to inject, beside those of run.inject
   std::string realtime{"prefer"};
   OutputOptions outputs{};

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "abs_hil/experiment/commissioning.hpp"
 #include "abs_hil/experiment/run_session.hpp"
@@ -31,6 +32,14 @@ int latency(const RunRequest& request, const LatencyOptions& options);
 int watch(const watch::WatchOptions& options);
 /// `abs_hil commission`: first steps with a rig, each asked for. Throws driver::Unavailable.
 int commission(const RunRequest& request, const experiment::CommissioningOptions& options);
+
+/// What `abs_hil send` takes.
+struct SendOptions {
+  std::vector<std::string> order{};  ///< "stop", "start", "slip-ref X", "gain NAME X"
+  double timeout_s{3.0};
+};
+/// `abs_hil send`: a command to a running abs_hil; waits for its answer. Throws settings::ConfigError, LcmError.
+int send(const RunRequest& request, const SendOptions& options);
 
 /// The exit status of a run that has ended so.
 [[nodiscard]] int status_of(const experiment::RunOutcome& outcome);

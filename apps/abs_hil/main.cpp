@@ -50,6 +50,7 @@ void add_run_options(CLI::App& cli, app::RunOptions& o) {
   cli.add_option("--experiment", o.experiment, "experiment")->type_name("NAME");
   cli.add_option("--slip-ref", o.slip_ref, "wanted slip, in (0, 1)")->type_name("X");
   add_timing_options(cli, o);
+  cli.add_flag("--wait-for-start", o.wait_for_start, "stay idle until abs_hil send start (needs commands.enabled)");
   cli.add_flag("--fast", o.outputs.fast, "virtual time, as fast as the machine can");
   cli.add_option("--seed", o.seed, "seed of everything random in the simulator")->type_name("N");
   cli.add_option("--inject", o.injections,
@@ -183,6 +184,31 @@ CLI::App* add_watch(CLI::App& cli, watch::WatchOptions& o) {
   return watch;
 }
 
+/// The command `abs_hil send` as typed.
+struct SendCommand {
+  app::RunOptions options{};
+  app::SendOptions send{};
+  CLI::App* parser{nullptr};
+};
+
+void add_send(CLI::App& cli, SendCommand& command) {
+  command.parser = cli.add_subcommand("send", "a command to a running abs_hil over LCM");
+  command.parser->add_option("order", command.send.order, "stop | start | slip-ref X | gain NAME X")
+      ->required()
+      ->expected(1, 3);
+  command.parser->add_option("--config", command.options.config_file, "TOML file with commands.key_file")
+      ->type_name("FILE");
+  command.parser->add_option("--set", command.options.assignments, "set any configuration value")
+      ->type_name("key=value")
+      ->take_all()
+      ->allow_extra_args(false);
+  command.parser->add_option("--lcm-url", command.options.outputs.lcm_url, "LCM network");
+  command.parser->add_option("--timeout", command.send.timeout_s, "how long to wait for the answer, s")
+      ->type_name("S")
+      ->check(CLI::Range(0.1, 60.0))
+      ->capture_default_str();
+}
+
 int dispatch(int argc, char** argv) {
   CLI::App cli{"Driver, adaptive slip controller and simulator of the Inteco ABS laboratory rig"};
   cli.name("abs_hil");
@@ -207,6 +233,8 @@ int dispatch(int argc, char** argv) {
   app::add_convert(cli, convert_command);
   watch::WatchOptions watch_options;
   const auto* watch = add_watch(cli, watch_options);
+  SendCommand send;
+  add_send(cli, send);
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -226,6 +254,7 @@ int dispatch(int argc, char** argv) {
     return app::watch(watch_options);
   }
   if (commission.parser->parsed()) return app::commission(app::merge(commission.options), commission.pulses);
+  if (send.parser->parsed()) return app::send(app::merge(send.options), send.send);
   if (replay_command.parser->parsed()) return app::replay_run(replay_command);
   if (convert_command.parser->parsed()) return app::convert(convert_command);
   app::RunRequest request = app::merge(options);

@@ -90,7 +90,11 @@ void RunOutputs::open_stream(const RunRequest& request) {
   for (telemetry::LogOutlet& log : log_) stream_->add(log);
   if (lcm_) {
     stream_->add(*lcm_);
-    commands_.emplace(*lcm_, *stream_, [] {});
+    if (!request.outputs.fast) steering_.emplace(s, *stream_);
+    // In the listening thread: the cycle that follows finds the request.
+    commands_.emplace(*lcm_, *stream_, [this] {
+      if (session_ != nullptr) session_->request_stop(rig::Reason::stop_command);
+    });
   }
 }
 
@@ -99,8 +103,18 @@ std::vector<rig::RecordSink*> RunOutputs::sinks() {
   for (telemetry::CsvSink& csv : csv_) sinks.push_back(&csv);
   if (events_) sinks.push_back(&*events_);
   if (stream_) sinks.push_back(&*stream_);
+  if (steering_) sinks.push_back(&*steering_);  // its messages are of the record that the stream has just had
   if (status_line_ && status_line_->active()) sinks.push_back(&*status_line_);
   return sinks;
+}
+
+void RunOutputs::watch(experiment::RunSession& session) {
+  session_ = &session;
+  if (!steering_ || !commands_) return;
+  steering_->drive(session.adjustments());
+  steering_->count(*commands_);
+  commands_->set_judge([this](const command2_t& command) { return steering_->judge(command); });
+  commands_->listen();
 }
 
 void RunOutputs::poll() {

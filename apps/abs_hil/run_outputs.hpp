@@ -13,6 +13,7 @@
 #include "abs_hil/experiment/run_session.hpp"
 #include "abs_hil/rig/record_sink.hpp"
 #include "abs_hil/runtime/histogram_file.hpp"
+#include "abs_hil/steering/steering.hpp"
 #include "abs_hil/telemetry/command_listener.hpp"
 #include "abs_hil/telemetry/csv_sink.hpp"
 #include "abs_hil/telemetry/event_csv.hpp"
@@ -34,7 +35,8 @@ class RunOutputs {
 
   [[nodiscard]] std::vector<rig::RecordSink*> sinks();
   /// Lets ABS_STATUS and the status line look at the run, which must outlive the outputs' use.
-  void watch(const experiment::RunSession& session) { session_ = &session; }
+  /// From here on commands are taken as well.
+  void watch(experiment::RunSession& session);
   /// Takes in commands from LCM.
   void poll();
   [[nodiscard]] bool stop_requested() const { return commands_ && commands_->stop_requested(); }
@@ -53,7 +55,7 @@ class RunOutputs {
   void open_files(const OutputOptions& outputs);
   void open_stream(const RunRequest& request);
 
-  const experiment::RunSession* session_{nullptr};
+  experiment::RunSession* session_{nullptr};
   analysis::RunMetrics metrics_;
   std::optional<archive::RunFolder> folder_;
   // Of each as many as there are places: the run folder and the file named.
@@ -64,6 +66,7 @@ class RunOutputs {
   std::optional<telemetry::EventCsv> events_;
   std::optional<telemetry::LcmOutlet> lcm_;
   std::optional<telemetry::MessageStream> stream_;
+  std::optional<steering::Steering> steering_;
   std::optional<telemetry::CommandListener> commands_;
   std::optional<telemetry::StatusLine> status_line_;
 };

@@ -16,8 +16,7 @@ namespace abs_hil::app {
 /// The same driver with the settings' faults planted before it; unchanged without any. `clock` must outlive it. Throws
 /// std::invalid_argument for faults that cannot be read.
 [[nodiscard]] std::unique_ptr<driver::RigDriver> with_faults(std::unique_ptr<driver::RigDriver> driver,
-                                                             const settings::Settings& settings,
-                                                             runtime::Clock& clock);
+                                                             const settings::Settings& settings, runtime::Clock& clock);
 /// What a run's logic is made of. Throws std::invalid_argument. `settings` must outlive the construction of the logic.
 [[nodiscard]] experiment::RunLogicParts make_logic(const settings::Settings& settings,
                                                    std::vector<experiment::PhasePlan> plans);

@@ -141,4 +141,17 @@ double AdaptiveActuatorController::through_lag(const SlipInput& input, double wa
   return command_Nm;
 }
 
+bool AdaptiveActuatorController::take_over(const SlipController& before) noexcept {
+  const auto* other = dynamic_cast<const AdaptiveActuatorController*>(&before);
+  if (other == nullptr) return false;
+  integral_ = other->integral_;
+  theta_.take_over(other->theta_);
+  wheels_observer_.take_over(other->wheels_observer_);
+  omega1_rad_s_ = other->omega1_rad_s_;
+  slip_ = other->slip_;
+  tuning_ = other->tuning_;
+  limited_ = other->limited_;
+  return true;
+}
+
 }  // namespace abs_hil::control

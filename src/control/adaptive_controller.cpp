@@ -44,4 +44,14 @@ void AdaptiveController::adapt(const SlipInput& input, double past_phi) noexcept
   slip_ = input.slip;
 }
 
+bool AdaptiveController::take_over(const SlipController& before) noexcept {
+  const auto* other = dynamic_cast<const AdaptiveController*>(&before);
+  if (other == nullptr) return false;
+  integral_ = other->integral_;
+  theta_.take_over(other->theta_);
+  omega1_rad_s_ = other->omega1_rad_s_;
+  slip_ = other->slip_;
+  return true;
+}
+
 }  // namespace abs_hil::control

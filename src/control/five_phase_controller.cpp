@@ -102,4 +102,15 @@ SlipOutput FivePhaseController::step(const SlipInput& input) noexcept {
           .theta_est_N = rig::unknown};
 }
 
+bool FivePhaseController::take_over(const SlipController& before) noexcept {
+  const auto* other = dynamic_cast<const FivePhaseController*>(&before);
+  if (other == nullptr) return false;
+  phase_ = other->phase_;
+  in_phase_s_ = other->in_phase_s_;
+  at_zero_s_ = other->at_zero_s_;
+  accelerated_ = other->accelerated_;
+  torque_Nm_ = other->torque_Nm_;
+  return true;
+}
+
 }  // namespace abs_hil::control

@@ -31,4 +31,11 @@ SlipOutput NominalController::step(const SlipInput& input) noexcept {
   return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta0_N_};
 }
 
+bool NominalController::take_over(const SlipController& before) noexcept {
+  const auto* other = dynamic_cast<const NominalController*>(&before);
+  if (other == nullptr) return false;
+  integral_ = other->integral_;
+  return true;
+}
+
 }  // namespace abs_hil::control

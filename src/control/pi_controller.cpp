@@ -42,4 +42,11 @@ SlipOutput PiController::step(const SlipInput& input) noexcept {
   return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = rig::unknown};
 }
 
+bool PiController::take_over(const SlipController& before) noexcept {
+  const auto* other = dynamic_cast<const PiController*>(&before);
+  if (other == nullptr) return false;
+  integral_ = other->integral_;
+  return true;
+}
+
 }  // namespace abs_hil::control

@@ -21,4 +21,8 @@ SlipOutput RelayController::step(const SlipInput& input) noexcept {
           .theta_est_N = rig::unknown};
 }
 
+bool RelayController::take_over(const SlipController& before) noexcept {
+  return dynamic_cast<const RelayController*>(&before) != nullptr;
+}
+
 }  // namespace abs_hil::control

@@ -18,4 +18,11 @@ SlipOutput SlidingModeController::step(const SlipInput& input) noexcept {
   return surface_.drive(input, error_m_s, wanted, sign);
 }
 
+bool SlidingModeController::take_over(const SlipController& before) noexcept {
+  const auto* other = dynamic_cast<const SlidingModeController*>(&before);
+  if (other == nullptr) return false;
+  surface_.take_over(other->surface_);
+  return true;
+}
+
 }  // namespace abs_hil::control

@@ -15,6 +15,14 @@ void SlidingSurface::reset(const SlipInput& input) noexcept {
   excess_ = 0.0;
 }
 
+void SlidingSurface::take_over(const SlidingSurface& before) noexcept {
+  theta_.take_over(before.theta_);
+  slip_ = before.slip_;
+  past_phi_ = before.past_phi_;
+  switching_ = before.switching_;
+  excess_ = before.excess_;
+}
+
 double SlidingSurface::observe(const SlipInput& input) noexcept {
   past_phi_ = rig::normalised_tyre_force(tyre_, 0.5 * (slip_ + input.slip));
   slip_ = input.slip;

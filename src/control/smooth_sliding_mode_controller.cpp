@@ -33,4 +33,11 @@ SlipOutput SmoothSlidingModeController::step(const SlipInput& input) noexcept {
   return surface_.drive(input, error_m_s, wanted, -wanted.mean_rate_m_s2 / gain_m_s2_);
 }
 
+bool SmoothSlidingModeController::take_over(const SlipController& before) noexcept {
+  const auto* other = dynamic_cast<const SmoothSlidingModeController*>(&before);
+  if (other == nullptr) return false;
+  surface_.take_over(other->surface_);
+  return true;
+}
+
 }  // namespace abs_hil::control

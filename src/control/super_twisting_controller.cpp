@@ -42,4 +42,12 @@ SlipOutput SuperTwistingController::step(const SlipInput& input) noexcept {
   return output;
 }
 
+bool SuperTwistingController::take_over(const SlipController& before) noexcept {
+  const auto* other = dynamic_cast<const SuperTwistingController*>(&before);
+  if (other == nullptr) return false;
+  surface_.take_over(other->surface_);
+  integral_m_s2_ = other->integral_m_s2_;
+  return true;
+}
+
 }  // namespace abs_hil::control

@@ -16,6 +16,10 @@ ThetaEstimator::ThetaEstimator(const AdaptiveOptions& options, const rig::WheelP
 
 void ThetaEstimator::reset() noexcept { theta_N_ = zeta0_N_; }
 
+void ThetaEstimator::take_over(const ThetaEstimator& before) noexcept {
+  theta_N_ = std::clamp(before.theta_N_, theta_min_N_, theta_max_N_);
+}
+
 void ThetaEstimator::update(const AdaptationInterval& past) noexcept {
   if (!(past.dt_s > 0.0)) return;
   const auto& w = wheels_;

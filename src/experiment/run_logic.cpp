@@ -13,11 +13,20 @@ namespace {
 constexpr double s_per_ns = 1e-9;
 /// Below this car speed the estimated slip would be encoder noise over next to nothing; slip control has ended by then.
 constexpr double slip_floor_m_s = 0.1;
+constexpr double bump_fades_s = 0.05;  ///< about the brake's own lag
+constexpr double bump_gone_Nm = 1e-6;
+/// How long a run waits for its start.
+constexpr double start_limit_s = 600.0;
 }  // namespace
 
 RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig::RigParameters& rig,
                                bool ideal_actuator, const runtime::GateOptions& gate,
                                const ExperimentOptions& experiment, std::vector<PhasePlan> plans) {
+  if (experiment.wait_for_start) {
+    plans.insert(plans.begin(), {.phase = rig::Phase::idle,
+                                 .ends_on = {{EndKind::start_command, 0.0, rig::Reason::start_command}},
+                                 .time_limit_s = start_limit_s});
+  }
   return {.control = control,
           .rig = rig,
           .controller = control::make_controller(control.controller, {control, rig}),
@@ -93,10 +102,43 @@ double RunLogic::slip_control(double dt_s, bool entered, rig::ControlState& stat
                            .lower_travel_rad = lower_travel_rad_};
   if (entered) controller_->reset(input);
   const control::SlipOutput output = controller_->step(input);
+  if (entered) bump_Nm_ = 0.0;
   state.slip_velocity_error_m_s = output.slip_velocity_error_m_s;
   state.theta_est_N = output.theta_est_N;
   if (!std::isnan(output.slip_ref)) state.slip_ref = output.slip_ref;
-  return output.brake_torque_Nm;
+  return without_bump(output.brake_torque_Nm, input);
+}
+
+/// Changed gains act at once on how the torque moves, not on where it stands: what they would make it jump by fades out
+/// within some 50 ms, while integral and estimates go on as they are.
+double RunLogic::without_bump(double torque_Nm, const control::SlipInput& input) noexcept {
+  if (replaced_ != nullptr) {
+    bump_Nm_ += replaced_->step(input).brake_torque_Nm - torque_Nm;
+    if (!std::isfinite(bump_Nm_)) bump_Nm_ = 0.0;
+  } else if (bump_Nm_ != 0.0) {
+    bump_Nm_ *= std::exp(-input.dt_s / bump_fades_s);
+    if (std::abs(bump_Nm_) < bump_gone_Nm) bump_Nm_ = 0.0;
+  }
+  return torque_Nm + bump_Nm_;
+}
+
+void RunLogic::adjust(rig::CycleRecord& record) noexcept {
+  AdjustmentMailbox::Arrived arrived{};
+  if (!adjustments_.take(arrived)) return;
+  switch (arrived.kind) {
+    case Adjustment::Kind::start: start_given_ = true; return;  // the record of the phase that follows says so
+    case Adjustment::Kind::slip_ref:
+      slip_ref_ = arrived.slip_ref;
+      record.reason = rig::Reason::slip_reference_changed;
+      break;
+    case Adjustment::Kind::controller:
+      static_cast<void>(arrived.controller->take_over(*controller_));
+      replaced_ = controller_.release();
+      controller_.reset(arrived.controller);
+      record.reason = rig::Reason::gain_changed;
+      break;
+  }
+  record.reason_value = arrived.number;
 }
 
 rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept {
@@ -110,12 +152,14 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
       sequence_.update({.time_s = static_cast<double>(measurement.time_ns - start_ns_) * s_per_ns,
                         .speeds = speeds_,
                         .car_speed_m_s = wheels_.r2_m * speeds_.omega2_rad_s,
-                        .stands_still = stands_still_});
+                        .stands_still = stands_still_,
+                        .start_given = start_given_});
   if (change.entered && sequence_.finished()) end_ = change;
   const PhasePlan& plan = sequence_.current();
   record.phase = plan.phase;
   record.reason = change.reason;
   record.reason_value = change.value;
+  if (!change.entered) adjust(record);
 
   rig::ControlState& state = record.control;
   state.speeds_est = speeds_;
@@ -129,6 +173,7 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
   } else if (plan.brake == BrakeAction::torque) {
     torque_Nm = plan.brake_torque_Nm;
   }
+  if (replaced_ != nullptr) adjustments_.retire(std::exchange(replaced_, nullptr));
   torque_Nm = actuator_.limited(torque_Nm);
   state.brake_torque_ref_Nm = torque_Nm;
 

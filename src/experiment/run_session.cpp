@@ -138,6 +138,7 @@ RunOutcome RunSession::run_realtime(const runtime::RealtimeOptions& options, con
     throw;
   }
   cycle.join();
+  static_cast<void>(poll());  // what ended the run wants its answer
   pump_.finish();
   return outcome();
 }

@@ -64,6 +64,7 @@ const EndCondition* Sequence::ending(const SequenceInput& input) noexcept {
         return peak_speed_rad_s_ > peak_margin_rad_s && input.time_s - peak_at_s_ >= condition.value;
       case EndKind::car_speed_below: return input.car_speed_m_s < condition.value;
       case EndKind::standstill: return input.stands_still;
+      case EndKind::start_command: return input.start_given;
     }
     return false;
   };

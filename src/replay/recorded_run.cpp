@@ -54,6 +54,9 @@ class Collector {
       }
       run_.measured_ns[static_cast<std::size_t>(measurement.cycle)] = measurement.measured_ns;
     }
+    for (std::size_t n = 1; n < run_.adjustments.size(); ++n) {
+      if (run_.adjustments[n].cycle < run_.adjustments[n - 1].cycle) fail("adjustments out of order: damaged");
+    }
     run_.virtual_time = std::all_of(run_.cycles.begin(), run_.cycles.end(), [](const telemetry_t& cycle) {
       return cycle.wakeup_latency_ns == 0 && cycle.cycle_ns == 0 && cycle.record_ns == 0;
     });

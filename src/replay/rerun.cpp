@@ -10,6 +10,8 @@
 #include "abs_hil/runtime/clock.hpp"
 #include "abs_hil/runtime/cyclic_executive.hpp"
 #include "abs_hil/runtime/record_pump.hpp"
+#include "abs_hil/settings/config_error.hpp"
+#include "abs_hil/settings/live_settings.hpp"
 #include "abs_hil/telemetry/message_codec.hpp"
 
 namespace abs_hil::replay {
@@ -99,9 +101,30 @@ experiment::RunLogicParts logic_parts(const settings::Settings& s) {
                                       experiment::plan_experiment(s.experiment, s.control.v_min_m_s));
 }
 
+constexpr std::string_view start_name = "start";
+
+/// The cycle that takes a change out of the mailbox; a given start shows in the one after.
+std::int64_t put_before(const adjustment_t& adjustment) {
+  return adjustment.name == start_name ? adjustment.cycle - 1 : adjustment.cycle;
+}
+
+void put(const adjustment_t& adjustment, settings::LiveSettings& live, experiment::AdjustmentMailbox& mailbox) {
+  if (adjustment.name == start_name) {
+    static_cast<void>(mailbox.put({}));
+    return;
+  }
+  try {
+    static_cast<void>(mailbox.put(live.set(live.resolve(adjustment.name), adjustment.value)));
+  } catch (const settings::ConfigError&) {
+    // A gain of the recorded controller, which another one has not.
+  }
+}
+
 /// Runs the program's own cycle at the recorded times.
 std::vector<RerunCycle> rerun(const RecordedRun& run, const settings::Settings& s, driver::RigDriver& rig,
-                              runtime::CycleLogic& cycle_logic) {
+                              runtime::CycleLogic& cycle_logic, experiment::AdjustmentMailbox& mailbox) {
+  settings::LiveSettings live(s);
+  auto adjustment = run.adjustments.begin();
   RecordedClock clock(run.cycles.front().stamp_ns);
   runtime::CommandGate gate(s.gate);
   runtime::RecordRing ring(ring_capacity);
@@ -114,6 +137,9 @@ std::vector<RerunCycle> rerun(const RecordedRun& run, const settings::Settings& 
   rig.activate(clock.now_ns());
   for (const telemetry_t& cycle : run.cycles) {
     clock.set(cycle.stamp_ns);
+    for (; adjustment != run.adjustments.end() && put_before(*adjustment) <= cycle.cycle; ++adjustment) {
+      put(*adjustment, live, mailbox);
+    }
     if (ended_from_outside(cycle)) executive.request_stop(static_cast<rig::Reason>(cycle.reason));
     const bool goes_on = executive.step();
     pump.drain();
@@ -145,14 +171,14 @@ std::vector<RerunCycle> rerun_open_loop(const RecordedRun& run, const settings::
   experiment::RunLogic logic(logic_parts(settings));
   RecordedActuation actuation(logic, run);
   RecordedRig rig(run, settings.plant.ideal_sensors);
-  return rerun(run, settings, rig, actuation);
+  return rerun(run, settings, rig, actuation, logic.adjustments());
 }
 
 std::vector<RerunCycle> rerun_simulation(const RecordedRun& run, const settings::Settings& settings) {
   experiment::RunLogic logic(logic_parts(settings));
   driver::SimDriver rig(settings.plant, {.seed = static_cast<std::uint64_t>(settings.seed),
                                          .start_speed_rad_s = settings.experiment.start_speed_rad_s});
-  return rerun(run, settings, rig, logic);
+  return rerun(run, settings, rig, logic, logic.adjustments());
 }
 
 }  // namespace abs_hil::replay

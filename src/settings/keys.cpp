@@ -5,6 +5,7 @@
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/experiment/experiments.hpp"
 #include "abs_hil/settings/key_table.hpp"
+#include "command_keys.hpp"
 #include "driver_keys.hpp"
 #include "guardian_keys.hpp"
 
@@ -291,6 +292,7 @@ KeyTable::KeyTable(Settings& s) {
   add_experiment_keys(keys_, s.experiment);
   add_driver_keys(keys_, s.driver);
   add_guardian_keys(keys_, s.guardian);
+  add_command_keys(keys_, s);
   keys_.insert(
       keys_.end(),
       {

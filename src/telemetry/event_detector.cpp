@@ -5,7 +5,9 @@ namespace abs_hil::telemetry {
 std::optional<DetectedEvent> EventDetector::observe(const rig::CycleRecord& record) {
   const bool first = !last_;
   const bool phase_changed = first || record.phase != last_->phase;
-  const bool reason_is_new = record.reason != rig::Reason::none && (first || record.reason != last_->reason);
+  // What a command changed is told in the answer to it.
+  const bool reason_is_new = record.reason != rig::Reason::none && !rig::is_adjustment(record.reason) &&
+                             (first || record.reason != last_->reason);
   const rig::Phase phase_before = first ? record.phase : last_->phase;
   const std::uint64_t records_lost = first ? record.sequence : record.sequence - last_->sequence - 1;
   last_ = Seen{record.sequence, record.phase, record.reason};

@@ -66,6 +66,8 @@ MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, S
   check(options_);
   telemetry_.name = options_.channel_prefix + "TELEMETRY";
   status_channel_.name = options_.channel_prefix + "STATUS";
+  adjustment_.name = options_.channel_prefix + "ADJUSTMENT";
+  command_state_.name = options_.channel_prefix + "COMMAND_STATE";
   measurement_.name = options_.channel_prefix + "MEASUREMENT";
   event_.name = options_.channel_prefix + "EVENT";
   experiment_.name = options_.channel_prefix + "EXPERIMENT";
@@ -125,6 +127,16 @@ void MessageStream::answer_command(rig::Reason reason, std::string message, doub
 void MessageStream::report_fault(rig::Reason reason, double value, std::string message) {
   send_event(event_kind::fault, reason, value, std::move(message));
 }
+
+void MessageStream::send_adjustment(std::string name, double value) {
+  adjustment_t message{};
+  message.cycle = static_cast<std::int64_t>(latest_.sequence);
+  message.name = std::move(name);
+  message.value = value;
+  send(adjustment_, message);
+}
+
+void MessageStream::send_command_state(command_state_t state) { send(command_state_, state); }
 
 std::uint64_t MessageStream::failures() const noexcept {
   std::uint64_t sum = 0;

@@ -30,6 +30,7 @@ MAY_KNOW = {
     'settings': {'rig', 'control', 'plant_sim', 'driver', 'runtime', 'guardian', 'experiment'},
     'app': {'control'},  # the program's public face; the program itself, apps/, knows everything
     'comparison': {'rig', 'control', 'plant_sim', 'driver', 'driver/sim', 'runtime', 'guardian', 'experiment', 'analysis', 'settings'},
+    'steering': {'rig', 'control', 'runtime', 'experiment', 'settings', 'telemetry', 'lcmtypes'},
     'replay': {'rig', 'control', 'driver', 'driver/sim', 'runtime', 'experiment', 'settings', 'telemetry', 'lcmtypes'},
 }
 # room -> libraries that are none of its business

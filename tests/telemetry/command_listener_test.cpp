@@ -65,7 +65,7 @@ TEST_CASE("anything else is refused and told why") {
   const auto answers = bench.answers();
   REQUIRE(answers.size() == 5);
   CHECK(answers[0].message == "refused 'start': only 'stop' is accepted (token 't')");
-  CHECK(answers[0].reason == 0);
+  CHECK(answers[0].reason == static_cast<int>(rig::Reason::command_unknown));
 }
 
 TEST_CASE("garbage, truncated, foreign and oversized packets are counted and answered, nothing more") {

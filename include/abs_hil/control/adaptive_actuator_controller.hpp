@@ -26,6 +26,7 @@ class AdaptiveActuatorController final : public SlipController {
 
   void reset(const SlipInput& input) noexcept override;
   [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
+  [[nodiscard]] bool take_over(const SlipController& before) noexcept override;
 
  private:
   [[nodiscard]] SlipInput observed(const SlipInput& input) const noexcept;

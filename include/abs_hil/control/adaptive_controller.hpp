@@ -19,6 +19,7 @@ class AdaptiveController final : public SlipController {
 
   void reset(const SlipInput& input) noexcept override;
   [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
+  [[nodiscard]] bool take_over(const SlipController& before) noexcept override;
 
  private:
   void adapt(const SlipInput& input, double past_phi) noexcept;

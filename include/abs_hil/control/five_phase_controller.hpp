@@ -30,6 +30,7 @@ class FivePhaseController final : public SlipController {
 
   void reset(const SlipInput& input) noexcept override;
   [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
+  [[nodiscard]] bool take_over(const SlipController& before) noexcept override;
 
   [[nodiscard]] BrakePhase phase() const noexcept { return phase_; }
 

@@ -23,6 +23,7 @@ class PiController final : public SlipController {
 
   void reset(const SlipInput& input) noexcept override;
   [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
+  [[nodiscard]] bool take_over(const SlipController& before) noexcept override;
 
  private:
   rig::WheelParameters wheels_;

@@ -13,6 +13,8 @@ class SlidingSurface {
   SlidingSurface(const ControllerContext& context, const SwitchingAdaptationOptions& adaptation);
 
   void reset(const SlipInput& input) noexcept;
+  /// Goes on from where the other stands.
+  void take_over(const SlidingSurface& before) noexcept;
   /// Adapts theta_hat over the past interval. It stands while the torque asked for lay outside what the actuator can
   /// give and adaptation would drive it further out (anti-windup).
   /// @return e_v now

@@ -43,6 +43,12 @@ class SlipController {
   virtual void reset(const SlipInput& input) noexcept = 0;
   /// One control period. Called for the first time in the same cycle as `reset`, with the same input and dt_s = 0.
   [[nodiscard]] virtual SlipOutput step(const SlipInput& input) noexcept = 0;
+  /// Goes on from where `before` stands, a controller of the same class with other gains: integrals and estimates are
+  /// kept (an estimate within its new bounds), so that gains can be changed while it brakes. False, and nothing
+  /// changed, for another class; the default for laws that cannot do so.
+  [[nodiscard]] virtual bool take_over(const SlipController& before) noexcept;
 };
+
+inline bool SlipController::take_over(const SlipController& /*before*/) noexcept { return false; }
 
 }  // namespace abs_hil::control

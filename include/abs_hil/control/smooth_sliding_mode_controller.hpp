@@ -20,6 +20,7 @@ class SmoothSlidingModeController final : public SlipController {
 
   void reset(const SlipInput& input) noexcept override { surface_.reset(input); }
   [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
+  [[nodiscard]] bool take_over(const SlipController& before) noexcept override;
 
  private:
   SlidingSurface surface_;

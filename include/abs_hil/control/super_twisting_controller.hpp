@@ -30,6 +30,7 @@ class SuperTwistingController final : public SlipController {
 
   void reset(const SlipInput& input) noexcept override;
   [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
+  [[nodiscard]] bool take_over(const SlipController& before) noexcept override;
 
  private:
   SlidingSurface surface_;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+
 #include "abs_hil/control/options.hpp"
 
 namespace abs_hil::control {
@@ -15,6 +17,10 @@ class SwitchingThetaEstimator {
   explicit SwitchingThetaEstimator(const SwitchingAdaptationOptions& options);
 
   void reset() noexcept { theta_N_ = theta0_N_; }
+  /// Goes on with the other's estimate, within the own bounds.
+  void take_over(const SwitchingThetaEstimator& before) noexcept {
+    theta_N_ = std::clamp(before.theta_N_, theta_min_N_, theta_max_N_);
+  }
   /// @param gain_phi  k(slip_ref) phi(slip), mean over the past interval
   /// @param switching  s of the past interval
   void update(double dt_s, double gain_phi, double switching) noexcept;

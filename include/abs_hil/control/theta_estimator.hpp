@@ -44,6 +44,8 @@ class ThetaEstimator {
 
   /// omega1_hat = omega1, so theta_hat = zeta0, projected.
   void reset() noexcept;
+  /// Goes on with the other's estimate, within the own bounds.
+  void take_over(const ThetaEstimator& before) noexcept;
   void update(const AdaptationInterval& past) noexcept;
   void update(const ForceInterval& past) noexcept;
 

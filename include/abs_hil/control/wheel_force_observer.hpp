@@ -23,6 +23,11 @@ class WheelForceObserver {
 
   /// Starts from these speeds, without force.
   void reset(const rig::WheelSpeeds& speeds) noexcept;
+  /// Goes on with the other's estimates.
+  void take_over(const WheelForceObserver& before) noexcept {
+    state_ = before.state_;
+    last_speeds_ = before.last_speeds_;
+  }
   /// One interval. Where the travel is unknown, that of `input.speeds` counts.
   void update(const SlipInput& input) noexcept;
 

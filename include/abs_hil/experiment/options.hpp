@@ -7,6 +7,7 @@ namespace abs_hil::experiment {
 /// Everything below `experiment.` in the configuration.
 struct ExperimentOptions {
   std::string name{"paper"};
+  bool wait_for_start{false};       ///< stay idle until a command gives the start
   double start_speed_rad_s{0.0};    ///< > 0: start braking at once from this speed of both wheels (simulation only)
   double end_speed_m_s{0.3};        ///< car speed at which braking counts as done, > 0
   std::string cut{"threshold"};     ///< what cuts the motor: "threshold" or "peak" of the upper wheel's speed

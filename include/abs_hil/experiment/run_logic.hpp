@@ -8,6 +8,7 @@
 #include "abs_hil/control/options.hpp"
 #include "abs_hil/control/slip_controller.hpp"
 #include "abs_hil/control/tracking_observer.hpp"
+#include "abs_hil/experiment/adjustment.hpp"
 #include "abs_hil/experiment/options.hpp"
 #include "abs_hil/experiment/sequence.hpp"
 #include "abs_hil/rig/parameters.hpp"
@@ -45,15 +46,20 @@ class RunLogic final : public runtime::CycleLogic {
   /// Why the run ended; `none` while it has not.
   [[nodiscard]] rig::Reason end_reason() const noexcept { return end_.reason; }
   [[nodiscard]] double end_value() const noexcept { return end_.value; }
+  /// Changes put here take effect one a cycle, in cycles in which no phase begins. The record of the cycle says so: its
+  /// reason is an adjustment's and its value the change's number (for the start, in the cycle after: 0).
+  [[nodiscard]] AdjustmentMailbox& adjustments() noexcept { return adjustments_; }
 
  private:
+  void adjust(rig::CycleRecord& record) noexcept;
+  [[nodiscard]] double without_bump(double torque_Nm, const control::SlipInput& input) noexcept;
   void estimate(const rig::Measurement& measurement, double dt_s) noexcept;
   void note_travel(const rig::Measurement& measurement, double dt_s) noexcept;
   [[nodiscard]] double slip_control(double dt_s, bool entered, rig::ControlState& state) noexcept;
 
   const rig::WheelParameters wheels_;
   const double rad_per_count_;
-  const double slip_ref_;
+  double slip_ref_;
   const double start_speed_rad_s_;
   std::unique_ptr<control::SlipController> controller_;
   Sequence sequence_;
@@ -68,6 +74,11 @@ class RunLogic final : public runtime::CycleLogic {
   double slip_{0.0};
   double alpha1_rad_s2_{0.0};
   double alpha2_rad_s2_{0.0};
+  AdjustmentMailbox adjustments_;
+  /// The controller whose gains were changed in this cycle, until its last torque is known.
+  control::SlipController* replaced_{nullptr};
+  double bump_Nm_{0.0};  ///< what the torque still owes to the gains before
+  bool start_given_{false};
   Sequence::Change end_{};
   bool stands_still_{false};
   bool started_{false};

@@ -58,6 +58,8 @@ class RunSession {
   /// Ends the run in an orderly way at its next cycle. Any thread or signal handler may call it.
   void request_stop(rig::Reason reason) noexcept { executive_.request_stop(reason); }
 
+  /// For one slow thread, while it runs.
+  [[nodiscard]] AdjustmentMailbox& adjustments() noexcept { return logic_.adjustments(); }
   [[nodiscard]] const runtime::CyclicExecutive& executive() const noexcept { return executive_; }
   [[nodiscard]] const runtime::CommandGate& gate() const noexcept { return gate_; }
   [[nodiscard]] std::uint64_t record_drops() const noexcept { return ring_.drops(); }

@@ -20,6 +20,7 @@ enum class EndKind : std::uint8_t {
   upper_wheel_peak,   ///< value: s without a new maximum of the upper wheel's speed
   car_speed_below,    ///< value: m/s
   standstill,         ///< both wheels stand; no value
+  start_command,      ///< somebody gave the start; no value
 };
 
 struct EndCondition {
@@ -45,6 +46,7 @@ struct SequenceInput {
   rig::WheelSpeeds speeds{};
   double car_speed_m_s{0.0};
   bool stands_still{false};
+  bool start_given{false};  ///< by a command
 };
 
 /// Steps through the phases of an experiment. `update` is real-time safe; the plans are made before the run.

@@ -24,6 +24,18 @@ enum class Reason : std::uint16_t {
   terminate_signal = 33,
   stop_command = 34,
   hangup_signal = 35,
+  // the run goes on, changed by a command
+  gain_changed = 37,
+  slip_reference_changed = 38,
+  start_command = 39,
+  // why a command is refused; the run goes on
+  commands_not_enabled = 40,
+  command_not_authentic = 41,
+  command_repeated = 42,
+  command_unknown = 43,
+  command_out_of_range = 44,
+  command_malformed = 45,
+  command_not_now = 46,
   // the run ends early by a fault or limit
   phase_time_limit = 64,
   overspeed = 65,
@@ -83,6 +95,16 @@ enum class Reason : std::uint16_t {
     case Reason::terminate_signal: return "terminated (SIGTERM)";
     case Reason::stop_command: return "stopped by a command on ABS_COMMAND";
     case Reason::hangup_signal: return "terminal closed (SIGHUP)";
+    case Reason::gain_changed: return "gain changed by a command";
+    case Reason::slip_reference_changed: return "slip reference changed by a command";
+    case Reason::start_command: return "started by a command";
+    case Reason::commands_not_enabled: return "commands other than stop are not enabled";
+    case Reason::command_not_authentic: return "command does not prove that its sender may give it";
+    case Reason::command_repeated: return "command was received before";
+    case Reason::command_unknown: return "command is not known";
+    case Reason::command_out_of_range: return "command's value is out of range";
+    case Reason::command_malformed: return "packet is no command";
+    case Reason::command_not_now: return "command cannot be carried out now";
     case Reason::phase_time_limit: return "phase exceeded its time limit";
     case Reason::overspeed: return "wheel speed above the limit";
     case Reason::command_not_finite: return "command was not a finite number";
@@ -129,6 +151,11 @@ enum class Reason : std::uint16_t {
 /// True for reasons that latch: the run is over and only a new one goes on.
 [[nodiscard]] constexpr bool is_fault(Reason reason) noexcept {
   return static_cast<std::uint16_t>(reason) >= static_cast<std::uint16_t>(Reason::phase_time_limit);
+}
+
+/// True for changes that a command made to a run that goes on.
+[[nodiscard]] constexpr bool is_adjustment(Reason reason) noexcept {
+  return reason == Reason::gain_changed || reason == Reason::slip_reference_changed || reason == Reason::start_command;
 }
 
 /// True for reasons that come from outside: a signal or a stop command.

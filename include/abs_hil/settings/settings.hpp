@@ -19,6 +19,13 @@ struct TelemetryOptions {
   std::int32_t decimation{1};  ///< one ABS_TELEMETRY message every so many cycles, >= 1
 };
 
+/// Everything below `commands.` in the configuration.
+struct CommandOptions {
+  bool enabled{false};     ///< commands other than `stop` are taken over LCM
+  std::string key_file{};  ///< with the secret that senders must know; its contents are no configuration value, which
+                           ///< is published
+};
+
 /// One effective configuration: the defaults, then the plant's file, then the configuration file, then the command
 /// line.
 struct Settings {
@@ -30,6 +37,7 @@ struct Settings {
   guardian::GuardianOptions guardian{};
   runtime::RealtimeOptions realtime{};
   TelemetryOptions telemetry{};
+  CommandOptions commands{};
   std::string plant_name{"paper-table1"};
   std::string backend{"sim"};
   std::int64_t seed{1};

@@ -8,6 +8,7 @@
 #include "abs_hil/rig/record_sink.hpp"
 #include "abs_hil/telemetry/event_detector.hpp"
 #include "abs_hil/telemetry/message_codec.hpp"
+#include "abs_hil/telemetry/message_fields.hpp"
 #include "abs_hil/telemetry/outlet.hpp"
 #include "abs_hil/telemetry/status_snapshot.hpp"
 
@@ -54,6 +55,10 @@ class MessageStream : public rig::RecordSink {
 
   /// An event of kind "fault" beside those that the records give rise to: one found outside of the cycle.
   void report_fault(rig::Reason reason, double value, std::string message);
+  /// A change that took effect in the latest record's cycle, on ABS_ADJUSTMENT.
+  void send_adjustment(std::string name, double value);
+  /// What senders of commands need to know, on ABS_COMMAND_STATE; stamp and sequence are filled in.
+  void send_command_state(command_state_t state);
 
   [[nodiscard]] const std::string& command_channel() const noexcept { return command_channel_; }
   /// Run time of the latest record, s.
@@ -77,6 +82,8 @@ class MessageStream : public rig::RecordSink {
   std::vector<Outlet*> outlets_;
   Channel telemetry_;
   Channel measurement_;
+  Channel adjustment_;
+  Channel command_state_;
   Channel status_channel_;
   Channel event_;
   Channel experiment_;

@@ -1,0 +1,205 @@
+"""Commands to a running abs_hil over UDP multicast, in a network namespace of its own: each taken, refused with its
+reason, or shrugged off; stop within two cycles. Status 77 where no namespace can be made.
+
+usage: commands_test.py PROGRAM PRIVATE_NETWORK_SCRIPT PYTHON_MODULE_DIR
+"""
+import hashlib
+import hmac
+import os
+import pathlib
+import random
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+
+GROUP, PORT = '239.255.76.67', 7667
+SHORT, LONG = 0x4C433032, 0x4C433033  # LCM's packets: whole messages, fragments
+CYCLE_NS = 1_000_000
+
+
+class Wire:
+    """LCM's multicast by hand, so that anything at all can be sent."""
+
+    def __init__(self):
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+        self.number = 0
+
+    def raw(self, data):
+        try:
+            self.socket.sendto(data, (GROUP, PORT))
+        except OSError:
+            pass  # a full buffer: the flood is as fast as it gets
+
+    def message(self, channel, data):
+        self.number += 1
+        self.raw(struct.pack('>II', SHORT, self.number) + channel + b'\0' + data)
+
+    def fragment(self, size, offset, number, count, data):
+        self.number += 1
+        self.raw(struct.pack('>IIIIHH', LONG, self.number, size, offset, number, count) + data)
+
+
+def command2(key, session, sequence, command, name='', value=0.0):
+    message = abs_hil.command2_t()
+    message.session, message.sequence, message.sender = session, sequence, 'wire'
+    message.command, message.name, message.value, message.mac = command, name, value, ''
+    message.mac = hmac.new(key.encode(), message.encode(), hashlib.sha256).hexdigest()
+    return message.encode()
+
+
+def events_of(path):
+    """(channel, message) of every message in an event log."""
+    data, at, found = path.read_bytes(), 0, []
+    while at + 28 <= len(data):
+        _, _, _, channel_size, size = struct.unpack_from('>IqqII', data, at)
+        at += 28 + channel_size + size
+        if at <= len(data):
+            found.append((data[at - size - channel_size:at - size].decode(), abs_hil.decode(data[at - size:at])))
+    return found
+
+
+class Run:
+    def __init__(self, folder, *options):
+        self.log = pathlib.Path(folder, f'{time.monotonic_ns()}.lcmlog')
+        self.process = subprocess.Popen([PROGRAM, '--log', self.log, *options], stdout=subprocess.PIPE,
+                                        stderr=subprocess.PIPE, text=True)
+        time.sleep(1.5)
+
+    def end(self):
+        self.output = self.process.communicate(timeout=60)
+        self.messages = events_of(self.log)
+        self.answers = [m for c, m in self.messages if c == 'ABS_EVENT' and m.kind == 'command']
+        return self.process.returncode
+
+
+def send(*words):
+    result = subprocess.run([PROGRAM, 'send', *KEY, *words], capture_output=True, text=True, timeout=30)
+    return result.returncode, result.stdout + result.stderr
+
+
+def check(holds, what, *shown):
+    if not holds:
+        sys.exit(f'FAILED: {what}: {shown}')
+    print(f'ok: {what}', flush=True)
+
+
+def live_changes(folder, key):
+    run = Run(folder, '--wait-for-start', '--set', 'commands.enabled=true', *KEY)
+    for words, status, text in [(('slip-ref', '0.12'), 0, 'control.slip_ref = 0.12'), (('gain', 'ka1', '2'), 0, 'ka1 = 2'),
+                                (('gain', 'control.adaptive.gamma', '30'), 0, 'gamma = 30'),
+                                (('slip-ref', '1.5'), 1, '(0, 1)'), (('gain', 'gamma', '-1'), 1, '(0, 10000]'),
+                                (('gain', 'control.rate_Hz', '100'), 1, 'cannot be changed'),
+                                (('gain', 'nosuch', '1'), 1, 'no key'), (('gain', 'zeta0', '1'), 1, 'cannot be changed')]:
+        found, said = send(*words)
+        check(found == status and text in said, f'send {" ".join(words)}', found, said)
+    # What was heard on the wire is of no use a second time, forged or changed neither.
+    state = [m for c, m in events_of(run.log) if c == 'ABS_COMMAND_STATE'][-1]
+    wire, good = Wire(), command2(key, state.session, state.last_sequence + 1000, 'slip-ref', value=0.2)
+    wire.message(b'ABS_COMMAND', good)
+    wire.message(b'ABS_COMMAND', good)
+    wire.message(b'ABS_COMMAND', command2('another key 0123456789', state.session, 1 << 40, 'slip-ref', value=0.3))
+    wire.message(b'ABS_COMMAND', command2(key, '0' * 32, 1 << 41, 'slip-ref', value=0.3))
+    time.sleep(0.3)
+    check(send('start')[0] == 0, 'send start')
+    time.sleep(6.4)
+    found, said = send('gain', 'ka1', '3')
+    check(found == 0, 'a gain while it drives', said)
+    check(send('start')[0] == 1, 'a second start is refused')
+    check(run.end() == 0, 'the run goes to its end', run.output)
+    reasons = [m.reason for m in run.answers if 'wire' in m.message]
+    check(reasons == [42, 41, 42, 38] or sorted(reasons) == [38, 41, 42, 42], 'repeated, forged, of another session',
+          reasons)
+    check(subprocess.run([PROGRAM, 'replay', run.log, '--check']).returncode == 0, 'the changed run comes out again')
+    refs = {m.slip_ref for c, m in run.messages if c == 'ABS_TELEMETRY' and m.phase == m.PHASE_BRAKE}
+    check(refs == {0.2}, 'the slip reference was followed', refs)
+
+
+def not_enabled(folder):
+    run = Run(folder)
+    found, said = send('slip-ref', '0.2')
+    check(found == 1 and 'commands.enabled' in said, 'commands are off unless enabled', found, said)
+    found, said = send('stop')
+    check(found == 0 and 'stop accepted' in said, 'stop needs nothing', found, said)
+    check(run.end() == 1, 'and ends the run')
+    found, said = send('--timeout', '0.5', 'stop')
+    check(found == 3 and 'no answer' in said, 'nobody there', found, said)
+
+
+def stop_latency(folder, tries, flood):
+    late = []
+    for _ in range(tries):
+        run, wire = Run(folder), Wire()
+        stop = abs_hil.command_t()
+        stop.command = 'stop'
+        data = stop.encode()
+        if flood:
+            for _ in range(2000):
+                wire.message(b'ABS_COMMAND', os.urandom(60))
+            time.sleep(0.05)
+        sent_ns = time.monotonic_ns()
+        wire.message(b'ABS_COMMAND', data)
+        run.end()
+        stamps = [m.stamp_ns for c, m in run.messages if c == 'ABS_TELEMETRY']
+        ended = next(m for c, m in run.messages if c == 'ABS_TELEMETRY' and m.reason == 34)
+        late.append(sum(sent_ns < stamp <= ended.stamp_ns for stamp in stamps))
+    print(f'stop{" after a flood" if flood else ""}: cycles from sending to the safe command: {sorted(late)}')
+    check(sorted(late)[len(late) // 2] <= 2, 'stop works within 2 cycles (median; wall clock)', late)
+
+
+def garbage(folder):
+    run, wire, generator = Run(folder), Wire(), random.Random(5)
+    before = abs_hil.command_t()
+    before.command = 'stop'
+    whole = before.encode()
+    for _ in range(200):
+        wire.raw(generator.randbytes(generator.randrange(0, 300)))                                   # no LCM at all
+        wire.message(b'ABS_COMMAND', generator.randbytes(generator.randrange(0, 200)))               # garbage
+        wire.message(b'ABS_COMMAND', whole[:generator.randrange(len(whole))])                        # truncated
+        wire.message(b'ABS_COMMAND', abs_hil.event_t().encode())                                     # another type
+        wire.message(b'ABS_COMMAND', bytes(3000))                                                    # too long
+        wire.message(b'ABS_TELEMETRY', generator.randbytes(100))                                     # on another channel
+        wire.raw(struct.pack('>II', SHORT, 1) + b'C' * 200)                                          # name without end
+        wire.fragment(generator.randrange(1, 1 << 20), generator.randrange(1 << 20), generator.randrange(9),
+                      generator.randrange(9), b'ABS_COMMAND\0' + generator.randbytes(100))
+        wire.fragment(20_000, 0, 0, 3, b'ABS_COMMAND\0' + bytes(1000))                               # never completed
+        time.sleep(0.002)
+    for _ in range(20_000):
+        wire.message(b'ABS_COMMAND', whole[:-2] + b'xx')                                             # as fast as it goes
+    check(run.end() == 0, 'garbage, fragments and a flood end no run', run.output)
+    counts = [m for c, m in run.messages if c == 'ABS_COMMAND_STATE'][-1]
+    check(counts.malformed > 500 and counts.stops == 0, 'they are counted and ignored',
+          counts.malformed, counts.dropped, counts.stops)
+    cycles = [m.cycle for c, m in run.messages if c == 'ABS_TELEMETRY']
+    check(cycles == list(range(len(cycles))), 'no record was lost', len(cycles))
+    check(len(run.answers) <= 12 * 12, 'a flood gets no flood of answers', len(run.answers))
+    print(f'malformed {counts.malformed}, dropped {counts.dropped}')
+
+
+def main():
+    global abs_hil, PROGRAM, KEY
+    PROGRAM, private_network, module = sys.argv[1:4]
+    if 'inside' not in sys.argv:
+        os.execv(private_network, [private_network, sys.executable, __file__, *sys.argv[1:4], 'inside'])
+    sys.path.insert(0, module)
+    import abs_hil
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        key = 'a secret of the lab, 32 characters'
+        path = pathlib.Path(folder, 'commands.key')
+        path.write_text(key + '\n')
+        path.chmod(0o600)
+        KEY = ['--set', f'commands.key_file={path}']
+        os.environ['ABS_HIL_RUNS_DIR'] = folder
+        live_changes(folder, key)
+        not_enabled(folder)
+        stop_latency(folder, 5, False)
+        stop_latency(folder, 3, True)
+        garbage(folder)
+
+
+if __name__ == '__main__':
+    main()

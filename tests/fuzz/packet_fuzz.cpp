@@ -1,0 +1,35 @@
+// What anybody may send: every decoder of ours on the same bytes. A packet that is taken must come out of the encoder
+// as it came in.
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <span>
+#include <vector>
+
+#include "abs_hil/telemetry/checked_decode.hpp"
+#include "abs_hil/telemetry/message_codec.hpp"
+
+using namespace abs_hil;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size < 1) return 0;
+  // The fingerprint is a wall that chance does not pass: the first byte chooses the type instead.
+  int type = 0;
+  telemetry::for_each_message_type([&]<class Message>() {
+    if (type++ != data[0] % 9) return;
+    std::vector<std::uint8_t> packet;
+    const auto fingerprint = static_cast<std::uint64_t>(Message::getHash());
+    for (int shift = 56; shift >= 0; shift -= 8) packet.push_back(static_cast<std::uint8_t>(fingerprint >> shift));
+    packet.insert(packet.end(), data + 1, data + size);
+    Message message{};
+    if (!telemetry::decode_checked(packet, message).empty()) return;
+    telemetry::EncodeBuffer buffer;
+    const auto again = buffer.encode(message);
+    if (!std::equal(again.begin(), again.end(), packet.begin(), packet.end())) std::abort();
+  });
+  const std::span<const std::uint8_t> raw(data, size);
+  const auto decoded = telemetry::decode_command(raw);
+  if (decoded.problem.empty() && decoded.command.command.size() > size) std::abort();
+  static_cast<void>(telemetry::printable(decoded.command.token, 64));
+  return 0;
+}
