@@ -33,8 +33,18 @@ if [ "$says_lcm" = no ] && ! "$program" doctor --only lcm; then
   echo "run: no LCM over UDP, see above; this run's telemetry goes to $log (lcm-logplayer replays it)"
 fi
 [ -n "$folder" ] || exec "$program" "${arguments[@]}"
+"$program" "${arguments[@]}" &
+pid=$!
+# Ctrl-C reaches the program by itself; a second signal would stop it at once. The others are handed on.
+trap : INT
+trap 'kill -TERM "$pid"' TERM
+trap 'kill -HUP "$pid"' HUP
 status=0
-"$program" "${arguments[@]}" || status=$?
+wait "$pid" || status=$?
+while kill -0 "$pid" 2>/dev/null; do  # a signal interrupts the waiting, not the run
+  status=0
+  wait "$pid" || status=$?
+done
 # A run that a fault ended has something to show as well; one that never began has nothing.
 if [ -s "$folder/run.csv" ]; then "$root/build/release/bin/abs_report" "$folder" --output "$folder/report.html" || true; fi
 exit "$status"
