@@ -16,8 +16,13 @@ extern "C" {
 [[gnu::noinline]] void counted_control(experiment::RunLogic& logic, runtime::CommandGate& gate,
                                        const rig::Measurement& measurement, rig::CycleRecord& record) {
   const rig::Command wanted = logic.step(measurement, record);
-  record.command = gate.check(wanted, record.control.speeds_est).command;
+  record.command = gate.check(wanted, {record.control.speeds_est, record.phase, measurement.time_ns}).command;
   logic.commanded(record.command);
+}
+
+/// The gate's look at the measurement.
+[[gnu::noinline]] void counted_watch(runtime::CommandGate& gate, const rig::Measurement& measurement) {
+  gate.watch(measurement, measurement.time_ns);
 }
 
 [[gnu::noinline]] bool counted_ring_push(runtime::RecordRing& ring, const rig::CycleRecord& record) {
@@ -37,7 +42,7 @@ int main() {
   driver.configure();
   driver.activate(0);
   experiment::RunLogic logic(experiment::test::logic_parts(setup));
-  runtime::CommandGate gate(setup.gate);
+  runtime::CommandGate gate = logic.make_gate(setup.gate);
   runtime::RecordRing ring(64);
   const auto statistics = std::make_unique<runtime::CycleStatistics>();
 
@@ -47,6 +52,7 @@ int main() {
   for (bool braking = true; braking; ++cycles) {
     record = {};
     if (!driver.read(cycles * std::int64_t{1'000'000}, measurement).ok()) return EXIT_FAILURE;
+    counted_watch(gate, measurement);
     counted_control(logic, gate, measurement, record);
     if (!driver.write(record.command).ok()) return EXIT_FAILURE;
     braking = record.phase == rig::Phase::brake;

@@ -56,6 +56,7 @@ analysis::RunSummary summarise(const RunRequest& request, const experiment::RunS
           .virtual_time = request.outputs.fast,
           .truth_known = s.backend == "sim",
           .timing = request.outputs.fast ? rig::TimingSummary{} : session.executive().statistics().summary(),
+          .gate = session.gate().counts(),
           .config = nlohmann::ordered_json::parse(request.config_json)};
 }
 

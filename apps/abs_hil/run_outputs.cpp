@@ -134,6 +134,7 @@ telemetry::StatusSnapshot RunOutputs::snapshot() const {
   return {.cycles = statistics.cycles(),
           .overruns = timing.overruns.total,
           .telemetry_drops = session_->record_drops(),
+          .gate_interventions = rig::interventions(session_->gate().counts()),
           .realtime = session_->realtime(),
           .wakeup_latency = timing.wakeup_latency,
           .cycle_time = timing.cycle_time,

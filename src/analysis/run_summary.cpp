@@ -26,6 +26,24 @@ nlohmann::ordered_json by_cause(const rig::OverrunCounts& counts) {
   return json;
 }
 
+nlohmann::ordered_json to_json(const rig::GateCounts& counts) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    json[std::string(rig::name_of(static_cast<rig::GateAction>(i)))] = counts[i];
+  }
+  return json;
+}
+
+/// "motor_rate_limited 3, refused 1"
+std::string interventions_text(const rig::GateCounts& counts) {
+  std::string text;
+  for (std::size_t i = 1; i < counts.size(); ++i) {
+    if (counts[i] == 0) continue;
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", rig::name_of(static_cast<rig::GateAction>(i)), counts[i]);
+  }
+  return text;
+}
+
 std::string shown(double value, int decimals, std::string_view unit) {
   return std::isfinite(value) ? fmt::format("{:.{}f}{}{}", value, decimals, unit.empty() ? "" : " ", unit) : "-";
 }
@@ -89,6 +107,7 @@ nlohmann::ordered_json to_json(const RunSummary& s) {
           {"telemetry_drops", s.telemetry_drops},
           {"publish_failures", s.publish_failures},
           {"csv_rows_lost", s.csv_rows_lost},
+          {"gate", to_json(s.gate)},
           {"config", s.config}};
 }
 
@@ -111,6 +130,7 @@ std::string to_text(const RunSummary& s) {
   line("cycles", fmt::format("{}, {} overruns, {} records dropped, {} messages not sent", s.cycles,
                              s.timing.overruns.total, s.telemetry_drops, s.publish_failures));
   if (s.csv_rows_lost > 0) line("CSV rows lost", fmt::format("{}", s.csv_rows_lost));
+  if (rig::interventions(s.gate) > 0) line("command gate", interventions_text(s.gate));
   if (s.virtual_time) {
     line("timing", "virtual time (--fast): no latencies to report");
   } else {

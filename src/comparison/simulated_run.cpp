@@ -26,7 +26,7 @@ RunResult simulate(const settings::Settings& settings, const plant_sim::PlantOpt
   experiment::RunLogic logic(experiment::make_logic_parts(
       settings.control, settings.plant.rig, settings.plant.ideal_actuator, settings.gate, settings.experiment,
       experiment::plan_experiment(settings.experiment, settings.control.v_min_m_s)));
-  runtime::CommandGate gate(settings.gate);
+  runtime::CommandGate gate = logic.make_gate(settings.gate);
   runtime::RecordRing ring(ring_capacity);
   runtime::CyclicExecutive executive(clock, driver, logic, gate, ring, std::llround(1e9 / settings.control.rate_Hz));
   analysis::RunMetrics metrics(plant.rig.wheels.r2_m, settings.experiment.end_speed_m_s);

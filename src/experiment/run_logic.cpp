@@ -37,7 +37,9 @@ RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig
 }
 
 RunLogic::RunLogic(RunLogicParts parts)
-    : wheels_(parts.rig.wheels),
+    : rig_(parts.rig),
+      ideal_actuator_(parts.ideal_actuator),
+      wheels_(parts.rig.wheels),
       rad_per_count_(rig::radians_per_count(parts.rig.encoder_counts_per_rev)),
       slip_ref_(parts.control.slip_ref),
       start_speed_rad_s_(parts.start_speed_rad_s),

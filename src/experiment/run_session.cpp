@@ -51,7 +51,7 @@ RunSession::RunSession(runtime::Clock& clock, driver::RigDriver& driver, RunLogi
     : clock_(clock),
       driver_(driver),
       logic_(std::move(parts)),
-      gate_(gate_options),
+      gate_(logic_.make_gate(gate_options)),
       ring_(ring_capacity),
       period_ns_(period_ns_for(parts.control.rate_Hz)),
       executive_(clock, driver, logic_, gate_, ring_, period_ns_, overruns),

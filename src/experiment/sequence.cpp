@@ -42,6 +42,17 @@ Sequence::Sequence(std::vector<PhasePlan> plans) : plans_(std::move(plans)) {
   }
 }
 
+runtime::PhasePermissions Sequence::permissions() const noexcept {
+  runtime::PhasePermissions permissions{};
+  for (const PhasePlan& plan : plans_) {
+    runtime::PhasePermission& may = permissions[static_cast<std::size_t>(plan.phase)];
+    may.motor = may.motor || plan.motor_duty > 0.0;
+    may.brake = may.brake || plan.brake != BrakeAction::released;
+    may.together = may.together || plan.motor_with_brake;
+  }
+  return permissions;
+}
+
 void Sequence::enter(std::size_t index, const SequenceInput& input) noexcept {
   index_ = index;
   started_ = true;

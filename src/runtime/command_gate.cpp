@@ -3,60 +3,145 @@
 #include <algorithm>
 #include <cmath>
 
+#include "abs_hil/runtime/single_writer.hpp"
+
 namespace abs_hil::runtime {
 
-void CommandGate::latch(rig::Reason fault, double value) noexcept {
-  if (fault_ != rig::Reason::none) return;
+namespace {
+
+using rig::Reason;
+
+constexpr double s_per_ns = 1e-9;
+/// Rounding must not make a step that the limit just allows look like one it does not.
+constexpr double rounding = 1e-9;
+
+bool brakes(const rig::Command& command) noexcept { return command.brake_duty > 0.0 || command.brake_torque_Nm > 0.0; }
+
+void stop_motor(rig::Command& command) noexcept {
+  command.motor_duty = 0.0;
+  command.motor_enable = false;
+}
+
+}  // namespace
+
+void CommandGate::latch(Reason fault, double value) noexcept {
+  if (fault_ != Reason::none) return;
   fault_ = fault;
   fault_value_ = value;
 }
 
+void CommandGate::note(GateAction action) noexcept {
+  last_action_ = action;
+  add_as_single_writer(counts_[static_cast<std::size_t>(action)], std::uint64_t{1});
+}
+
+rig::GateCounts CommandGate::counts() const noexcept {
+  rig::GateCounts counts{};
+  for (std::size_t i = 0; i < counts.size(); ++i) counts[i] = counts_[i].load(std::memory_order_relaxed);
+  return counts;
+}
+
+bool CommandGate::watch(const rig::Measurement& measurement, std::int64_t now_ns) noexcept {
+  watch_board(measurement);
+  if (watching_) watch_wheels(measurement, now_ns);
+  return strides_.usable();
+}
+
 void CommandGate::watch_board(const rig::Measurement& measurement) noexcept {
   if (const std::uint32_t flags = measurement.trip_flags; flags != 0) {
-    latch(flags == rig::trip::supply ? rig::Reason::board_supply_tripped : rig::Reason::board_interlock_tripped,
-          static_cast<double>(flags));
-  } else if (measurement.supply_V < options_.supply_min_V) {
-    latch(rig::Reason::board_supply_low, measurement.supply_V);
-  } else if (measurement.temperature_C > options_.temperature_max_C) {
-    latch(rig::Reason::board_too_hot, measurement.temperature_C);
+    latch(flags == rig::trip::supply ? Reason::board_supply_tripped : Reason::board_interlock_tripped, flags);
+  }
+  if (measurement.supply_V < options_.supply_min_V) latch(Reason::board_supply_low, measurement.supply_V);
+  if (measurement.temperature_C > options_.temperature_max_C) latch(Reason::board_too_hot, measurement.temperature_C);
+  // A board that could tell and no longer can: 1 for its supply, 2 for its temperature.
+  if (supply_known_ && std::isnan(measurement.supply_V)) latch(Reason::board_health_lost, 1.0);
+  if (temperature_known_ && std::isnan(measurement.temperature_C)) latch(Reason::board_health_lost, 2.0);
+  supply_known_ = !std::isnan(measurement.supply_V);
+  temperature_known_ = !std::isnan(measurement.temperature_C);
+}
+
+void CommandGate::watch_wheels(const rig::Measurement& measurement, std::int64_t now_ns) noexcept {
+  Finding finding = strides_.update(measurement, now_ns, sent_);
+  if (strides_.complete()) {
+    finding = encoders_.update(strides_.stride());
+    if (finding.sound()) finding = response_.update(strides_.stride(), encoders_.brake_torque_Nm());
+  }
+  if (!finding.sound()) latch(finding.reason, finding.value);
+}
+
+void CommandGate::require_finite(const rig::Command& wanted, const rig::WheelSpeeds& speeds) noexcept {
+  for (const double value : {wanted.motor_duty, wanted.brake_duty, wanted.brake_torque_Nm}) {
+    if (!std::isfinite(value)) latch(Reason::command_not_finite, value);
+  }
+  for (const double speed : {speeds.omega1_rad_s, speeds.omega2_rad_s}) {
+    if (!std::isfinite(speed)) latch(Reason::estimate_not_finite, speed);
+    if (std::abs(speed) > options_.overspeed_rad_s) latch(Reason::overspeed, std::abs(speed));
   }
 }
 
-GateResult CommandGate::check(const rig::Command& wanted, const rig::WheelSpeeds& speeds) noexcept {
-  for (const double value : {wanted.motor_duty, wanted.brake_duty, wanted.brake_torque_Nm}) {
-    if (!std::isfinite(value)) latch(rig::Reason::command_not_finite, value);
-  }
-  const double fastest = std::max(std::abs(speeds.omega1_rad_s), std::abs(speeds.omega2_rad_s));
-  if (!std::isfinite(speeds.omega1_rad_s) || !std::isfinite(speeds.omega2_rad_s)) {
-    latch(rig::Reason::estimate_not_finite, speeds.omega1_rad_s + speeds.omega2_rad_s);
-  } else if (fastest > options_.overspeed_rad_s) {
-    latch(rig::Reason::overspeed, fastest);
-  }
+double CommandGate::limited(double duty, double most, GateAction action) noexcept {
+  const double within = std::clamp(duty, 0.0, most);
+  if (within != duty) note(action);
+  return within;
+}
 
+double CommandGate::rising(double duty, double before, double rate_per_s, double elapsed_s,
+                           GateAction action) noexcept {
+  const double most = before + rate_per_s * elapsed_s;
+  if (duty <= most + rounding) return duty;
+  note(action);
+  return most;
+}
+
+void CommandGate::interlock(rig::Command& command, const PhasePermission& may) noexcept {
+  if (command.motor_duty > 0.0 && !command.motor_enable) {
+    stop_motor(command);
+    note(GateAction::motor_blocked_by_disable);
+  }
+  if (command.motor_duty > 0.0 && !may.motor) {
+    stop_motor(command);
+    note(GateAction::motor_blocked_by_phase);
+  }
+  if (brakes(command) && !may.brake) {
+    command.brake_duty = 0.0;
+    command.brake_torque_Nm = 0.0;
+    note(GateAction::brake_blocked_by_phase);
+  }
+  if (command.motor_duty > 0.0 && brakes(command) && !may.together) {
+    stop_motor(command);
+    note(GateAction::motor_blocked_by_brake);
+  }
+}
+
+GateResult CommandGate::check(const rig::Command& wanted, const GateInput& input) noexcept {
+  last_action_ = GateAction::passed;
+  require_finite(wanted, input.speeds);
   GateResult result;
-  if (fault_ != rig::Reason::none) {
-    result.action = GateAction::refused;
+  if (fault_ != Reason::none) {
+    note(GateAction::refused);
     result.fault = fault_;
     result.fault_value = fault_value_;
   } else {
-    result.command = wanted;
     rig::Command& command = result.command;
+    command = wanted;
     command.brake_torque_Nm = std::max(0.0, wanted.brake_torque_Nm);
-    command.brake_duty = std::clamp(wanted.brake_duty, 0.0, options_.brake_duty_max);
-    if (command.brake_duty != wanted.brake_duty) result.action = GateAction::brake_clamped;
-    command.motor_duty = std::clamp(wanted.motor_duty, 0.0, options_.motor_duty_max);
-    if (command.motor_duty != wanted.motor_duty) result.action = GateAction::motor_clamped;
-    if (command.motor_duty > 0.0 && !command.motor_enable) {
-      command.motor_duty = 0.0;
-      result.action = GateAction::motor_blocked_by_disable;
+    command.brake_duty = limited(wanted.brake_duty, options_.brake_duty_max, GateAction::brake_clamped);
+    command.motor_duty = limited(wanted.motor_duty, options_.motor_duty_max, GateAction::motor_clamped);
+    // Before the first command the outputs have been 0 for longer than any rise takes.
+    if (has_sent_) {
+      const double elapsed_s = static_cast<double>(input.now_ns - sent_ns_) * s_per_ns;
+      command.brake_duty = rising(command.brake_duty, sent_.brake_duty, options_.brake_rate_per_s, elapsed_s,
+                                  GateAction::brake_rate_limited);
+      command.motor_duty = rising(command.motor_duty, sent_.motor_duty, options_.motor_rate_per_s, elapsed_s,
+                                  GateAction::motor_rate_limited);
     }
-    if (command.motor_duty > 0.0 && (command.brake_duty > 0.0 || command.brake_torque_Nm > 0.0)) {
-      command.motor_duty = 0.0;
-      command.motor_enable = false;
-      result.action = GateAction::motor_blocked_by_brake;
-    }
+    interlock(command, permissions_[static_cast<std::size_t>(input.phase)]);
+    if (last_action_ == GateAction::passed) note(GateAction::passed);
   }
-  ++counts_[static_cast<std::size_t>(result.action)];
+  sent_ = result.command;
+  sent_ns_ = input.now_ns;
+  has_sent_ = true;
+  result.action = last_action_;
   return result;
 }
 

@@ -69,12 +69,13 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   record.timing.periods_skipped = periods_skipped_;
   record.timing.overrun_cause = overrun_cause_;
 
-  const driver::IoResult read = driver_.read(woken_ns, measurement_);
+  rig::Measurement latest;
+  const driver::IoResult read = driver_.read(woken_ns, latest);
   if (!read.ok()) {
     if (io_error_.ok()) io_error_ = read;
     gate_.latch(driver::reason_of(read, rig::Reason::driver_read_failed), static_cast<double>(read.error));
-  } else {
-    gate_.watch_board(measurement_);
+  } else if (gate_.watch(latest, woken_ns) || record.sequence == 0) {
+    measurement_ = latest;
   }
   record.measurement = measurement_;
   record.truth = driver_.truth();
@@ -86,7 +87,7 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   if (gate_.fault() != rig::Reason::none) logic_.end_early(gate_.fault(), gate_.fault_value());
   const rig::Command wanted = logic_.step(measurement_, record);
   driver_.note_phase(record.phase);
-  const GateResult gated = gate_.check(wanted, record.control.speeds_est);
+  const GateResult gated = gate_.check(wanted, {record.control.speeds_est, record.phase, woken_ns});
   record.command = gated.command;
   if (gated.fault != rig::Reason::none) logic_.end_early(gated.fault, gated.fault_value);
   const std::int64_t control_ns = clock_.now_ns();

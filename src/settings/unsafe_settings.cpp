@@ -61,6 +61,15 @@ void refuse_cap_above_board(const KeyTable& keys, std::string_view key, double v
                                 board_value, board_key, board_value));
 }
 
+template <typename BoardOptions>
+void refuse_caps_above(const Settings& s, const KeyTable& keys, const BoardOptions& board) {
+  const std::string prefix = "driver." + s.driver.kind + '.';
+  refuse_cap_above_board(keys, "gate.brake_duty_max", s.gate.brake_duty_max, prefix + "brake_duty_max",
+                         board.brake_duty_max);
+  refuse_cap_above_board(keys, "gate.motor_duty_max", s.gate.motor_duty_max, prefix + "motor_duty_max",
+                         board.motor_duty_max);
+}
+
 }  // namespace
 
 std::vector<driver::Injection> injections_of(const Settings& settings) {
@@ -76,18 +85,10 @@ void refuse_unsafe(const Settings& s, const KeyTable& keys) {
     refuse_cap_above_board(keys, "gate.motor_duty_max", s.gate.motor_duty_max, "driver.can.motor_duty_max",
                            s.driver.can.motor_duty_max);
   }
-  if (s.backend == "rig" && s.driver.kind == "pci") {
-    refuse_cap_above_board(keys, "gate.brake_duty_max", s.gate.brake_duty_max, "driver.pci.brake_duty_max",
-                           s.driver.pci.brake_duty_max);
-    refuse_cap_above_board(keys, "gate.motor_duty_max", s.gate.motor_duty_max, "driver.pci.motor_duty_max",
-                           s.driver.pci.motor_duty_max);
-  }
-  if (s.backend == "rig" && s.driver.kind == "usb") {
-    refuse_cap_above_board(keys, "gate.brake_duty_max", s.gate.brake_duty_max, "driver.usb.brake_duty_max",
-                           s.driver.usb.brake_duty_max);
-    refuse_cap_above_board(keys, "gate.motor_duty_max", s.gate.motor_duty_max, "driver.usb.motor_duty_max",
-                           s.driver.usb.motor_duty_max);
-  }
+  if (s.backend != "rig") return;
+  if (s.driver.kind == "pci") refuse_caps_above(s, keys, s.driver.pci);
+  if (s.driver.kind == "can") refuse_caps_above(s, keys, s.driver.can);
+  if (s.driver.kind == "usb") refuse_caps_above(s, keys, s.driver.usb);
 }
 
 }  // namespace abs_hil::settings

@@ -42,10 +42,12 @@ std::string format_status_line(const rig::CycleRecord& record, const StatusSnaps
   const std::string_view phase = rig::name_of(record.phase);
   std::array<char, 256> text{};
   const int size = std::snprintf(
-      text.data(), text.size(), "%-10.*s ω1 %6.1f  ω2 %6.1f rad/s  slip %5.2f  θ̂ %6.2f N  overruns %llu  drops %llu%s",
+      text.data(), text.size(),
+      "%-10.*s ω1 %6.1f  ω2 %6.1f rad/s  slip %5.2f  θ̂ %6.2f N  overruns %llu  drops %llu  gate %llu%s",
       static_cast<int>(phase.size()), phase.data(), speeds.omega1_rad_s, speeds.omega2_rad_s, rig::best_slip(record),
       record.control.theta_est_N, static_cast<unsigned long long>(status.overruns),
-      static_cast<unsigned long long>(status.telemetry_drops), timing_text(status).data());
+      static_cast<unsigned long long>(status.telemetry_drops),
+      static_cast<unsigned long long>(status.gate_interventions), timing_text(status).data());
   // A speed of 1e300 fills the buffer; what there is room for will do.
   if (size < 0) return {};
   return {text.data(), std::min(static_cast<std::size_t>(size), text.size() - 1)};

@@ -23,7 +23,7 @@ TEST_CASE("What the board reports about itself becomes the fault's reason and va
       {{.supply_V = 0.0, .temperature_C = 200.0, .trip_flags = 2}, Reason::board_supply_tripped, 2.0},
   }));
   runtime::CommandGate gate({.supply_min_V = 12.0, .temperature_max_C = 80.0});
-  gate.watch_board(row.measurement);
+  gate.watch(row.measurement, 0);
   CHECK(gate.fault() == row.reason);
   CHECK(gate.fault_value() == row.value);
   const runtime::GateResult result = gate.check({.brake_duty = 0.5}, {});

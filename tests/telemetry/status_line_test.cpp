@@ -58,8 +58,9 @@ TEST_CASE("the line shows phase, speeds, slip, estimate, overruns and drops") {
   StatusSnapshot status;
   status.overruns = 3;
   status.telemetry_drops = 4;
+  status.gate_interventions = 5;
   CHECK(format_status_line(r, status) ==
-        "brake      ω1  123.4  ω2  150.0 rad/s  slip  0.18  θ̂  22.88 N  overruns 3  drops 4");
+        "brake      ω1  123.4  ω2  150.0 rad/s  slip  0.18  θ̂  22.88 N  overruns 3  drops 4  gate 5");
 }
 
 TEST_CASE("a line of huge numbers is cut, not overrun") {

@@ -7,6 +7,7 @@
 
 #include "abs_hil/analysis/result_file.hpp"
 #include "abs_hil/analysis/run_metrics.hpp"
+#include "abs_hil/rig/gate_counts.hpp"
 #include "abs_hil/rig/timing_summary.hpp"
 
 namespace abs_hil::analysis {
@@ -28,6 +29,7 @@ struct RunSummary {
   bool virtual_time{false};  ///< --fast: the timing figures say nothing of this machine
   bool truth_known{false};   ///< metrics come from the simulator's truth, not from estimates
   rig::TimingSummary timing{};
+  rig::GateCounts gate{};  ///< what the command gate did to the commands
   nlohmann::ordered_json config{};
 };
 

@@ -43,6 +43,11 @@ class RunLogic final : public runtime::CycleLogic {
   void commanded(const rig::Command& command) noexcept override;
   void end_early(rig::Reason reason, double value) noexcept override { sequence_.end_early(reason, value); }
   [[nodiscard]] bool finished() const noexcept override { return sequence_.finished(); }
+  /// The gate of this run: its options, what the plans permit, what the rig's physics allows.
+  [[nodiscard]] runtime::CommandGate make_gate(const runtime::GateOptions& options) const noexcept {
+    return runtime::CommandGate(options, sequence_.permissions(),
+                                runtime::watch_limits(rig_, ideal_actuator_, options));
+  }
   /// Why the run ended; `none` while it has not.
   [[nodiscard]] rig::Reason end_reason() const noexcept { return end_.reason; }
   [[nodiscard]] double end_value() const noexcept { return end_.value; }
@@ -57,6 +62,8 @@ class RunLogic final : public runtime::CycleLogic {
   void note_travel(const rig::Measurement& measurement, double dt_s) noexcept;
   [[nodiscard]] double slip_control(double dt_s, bool entered, rig::ControlState& state) noexcept;
 
+  const rig::RigParameters rig_;
+  const bool ideal_actuator_;
   const rig::WheelParameters wheels_;
   const double rad_per_count_;
   double slip_ref_;

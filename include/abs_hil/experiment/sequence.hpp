@@ -7,6 +7,7 @@
 #include "abs_hil/rig/measurement.hpp"
 #include "abs_hil/rig/phase.hpp"
 #include "abs_hil/rig/reason.hpp"
+#include "abs_hil/runtime/gate_options.hpp"
 
 namespace abs_hil::experiment {
 
@@ -66,6 +67,8 @@ class Sequence {
   /// Leaves the plans for the phase `stopped` (stop request) or `fault`, for one last cycle. The first reason stays.
   void end_early(rig::Reason reason, double value) noexcept;
 
+  /// What the plans let act in each phase.
+  [[nodiscard]] runtime::PhasePermissions permissions() const noexcept;
   /// The phase that acts in this cycle.
   [[nodiscard]] const PhasePlan& current() const noexcept { return ended_ ? last_ : plans_[index_]; }
   /// True in the run's last cycle: the safe command goes out in it.

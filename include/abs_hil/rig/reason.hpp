@@ -70,6 +70,21 @@ enum class Reason : std::uint16_t {
   usb_not_a_frame = 124,
   usb_outputs_not_taken = 125,
   usb_transfer_failed = 126,
+  // what the gate's plausibility checks find (docs/safety.md)
+  encoder_upper_stuck = 130,
+  encoder_lower_stuck = 131,
+  encoder_upper_jumped = 132,
+  encoder_lower_jumped = 133,
+  encoder_upper_reversed = 134,
+  encoder_lower_reversed = 135,
+  encoders_lost = 136,
+  encoders_disagree = 137,
+  slip_implausible = 138,
+  samples_missing = 139,
+  speed_rises_with_motor_off = 140,
+  motor_no_response = 141,
+  brake_no_response = 142,
+  board_health_lost = 143,
   // the guardian, and what it acts upon (docs/dead-man.md)
   guardian_died = 160,
   guardian_silent = 161,
@@ -139,6 +154,21 @@ enum class Reason : std::uint16_t {
     case Reason::usb_not_a_frame: return "USB board sent what is none of its frames";
     case Reason::usb_outputs_not_taken: return "USB board does not show the duties that were sent";
     case Reason::usb_transfer_failed: return "USB transfer failed";
+    case Reason::encoder_upper_stuck: return "upper wheel's encoder stands still though the wheel cannot";
+    case Reason::encoder_lower_stuck: return "lower wheel's encoder stands still though the wheel cannot";
+    case Reason::encoder_upper_jumped: return "upper wheel's encoder shows speeds that the wheel cannot have";
+    case Reason::encoder_lower_jumped: return "lower wheel's encoder shows speeds that the wheel cannot have";
+    case Reason::encoder_upper_reversed: return "upper wheel's encoder counts backwards";
+    case Reason::encoder_lower_reversed: return "lower wheel's encoder counts backwards";
+    case Reason::encoders_lost: return "both encoders stand still though the wheels cannot";
+    case Reason::encoders_disagree: return "wheels differ in speed with the brake long released: an encoder drifts";
+    case Reason::slip_implausible:
+      return "slip outside what the tyre can do: the braked wheel is the faster one (encoders swapped?)";
+    case Reason::samples_missing: return "no fresh measurement";
+    case Reason::speed_rises_with_motor_off: return "wheels gain speed with the motor off";
+    case Reason::motor_no_response: return "motor on and the wheels do not gain speed";
+    case Reason::brake_no_response: return "brake on and the wheels do not lose speed";
+    case Reason::board_health_lost: return "the board no longer reports its supply or temperature";
     case Reason::guardian_died: return "the guardian process died; without it nothing may move";
     case Reason::guardian_silent: return "the guardian process gave no sign of life; without it nothing may move";
     case Reason::controller_died: return "the controller process died";

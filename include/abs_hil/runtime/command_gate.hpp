@@ -1,69 +1,97 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 
 #include "abs_hil/rig/command.hpp"
+#include "abs_hil/rig/gate_counts.hpp"
 #include "abs_hil/rig/measurement.hpp"
+#include "abs_hil/rig/phase.hpp"
 #include "abs_hil/rig/reason.hpp"
+#include "abs_hil/runtime/encoder_watch.hpp"
+#include "abs_hil/runtime/gate_options.hpp"
+#include "abs_hil/runtime/response_watch.hpp"
+#include "abs_hil/runtime/stride.hpp"
+#include "abs_hil/runtime/watch_limits.hpp"
 
 namespace abs_hil::runtime {
 
-/// Limits of what may reach the rig, whatever asks for it.
-struct GateOptions {
-  double motor_duty_max{1.0};     ///< in (0, 1]
-  double brake_duty_max{1.0};     ///< in (0, 1]; the maker's driver caps the real brake at 0.7
-  double overspeed_rad_s{250.0};  ///< either wheel above this latches a fault, > 0
-  double supply_min_V{0.0};       ///< a board that reports less latches a fault, >= 0; 0: never
-  /// A board that reports more latches a fault, deg C. Ours: the board's own limit is not public.
-  double temperature_max_C{90.0};
-};
+using rig::gate_action_count;
+using rig::GateAction;
 
-/// What the gate did to a command.
-enum class GateAction : std::uint8_t {
-  passed = 0,
-  motor_clamped,
-  brake_clamped,
-  motor_blocked_by_brake,    ///< motor and brake never act together: the brake wins
-  motor_blocked_by_disable,  ///< motor duty without motor_enable
-  refused,                   ///< the safe command went out instead; a fault is latched
+/// What the gate is told beside the command.
+struct GateInput {
+  rig::WheelSpeeds speeds{};  ///< estimated from the latest measurement
+  rig::Phase phase{rig::Phase::idle};
+  std::int64_t now_ns{0};  ///< the cycle's wake-up
 };
-inline constexpr std::size_t gate_action_count = 6;
 
 struct GateResult {
-  rig::Command command{};  ///< what may be sent
-  GateAction action{GateAction::passed};
-  rig::Reason fault{rig::Reason::none};  ///< the latched fault, once there is one
+  rig::Command command{};                 ///< what may be sent
+  GateAction action{GateAction::passed};  ///< the last one taken
+  rig::Reason fault{rig::Reason::none};   ///< the latched fault, once there is one
   double fault_value{0.0};
 };
 
-/// Stands between controller and driver and trusts neither: finite, then magnitude, then interlocks. A fault latches;
-/// from then on only the safe command passes, until a new run makes a new gate. Real-time safe.
+/// Stands between controller and driver and trusts neither: finite, range, rate, interlocks, and what is measured must
+/// agree with physics and with what was sent. A fault latches; from then on only the safe command passes, until a new
+/// run makes a new gate. docs/safety.md has every check with its reason. Real-time safe.
 class CommandGate {
  public:
-  explicit CommandGate(const GateOptions& options) noexcept : options_(options) {}
+  /// @param permissions what each phase's plan lets act
+  /// @param limits      what physics allows; without them measurements are not judged
+  explicit CommandGate(const GateOptions& options, const PhasePermissions& permissions = any_phase(),
+                       const WatchLimits& limits = {}) noexcept
+      : options_(options),
+        permissions_(permissions),
+        watching_(limits.enabled),
+        strides_(limits),
+        encoders_(limits),
+        response_(limits) {}
 
-  /// @param speeds the speeds estimated from the latest measurement
-  [[nodiscard]] GateResult check(const rig::Command& wanted, const rig::WheelSpeeds& speeds) noexcept;
-  /// Latches what the board reports about itself: a trip of its own interlocks, supply, temperature. What it cannot
-  /// tell (NaN) is no fault.
-  void watch_board(const rig::Measurement& measurement) noexcept;
+  /// Takes a cycle's measurement before anything is made of it: latches what the board reports about itself and what
+  /// cannot be true of the wheels.
+  /// @return false if nothing may be made of it: stale, or a counter has leapt. The one before then stands.
+  bool watch(const rig::Measurement& measurement, std::int64_t now_ns) noexcept;
+  [[nodiscard]] GateResult check(const rig::Command& wanted, const GateInput& input) noexcept;
   /// Latches a fault found elsewhere (driver, executive). The first one stays.
   void latch(rig::Reason fault, double value) noexcept;
 
   [[nodiscard]] rig::Reason fault() const noexcept { return fault_; }
   [[nodiscard]] double fault_value() const noexcept { return fault_value_; }
-  /// How often each action was taken.
+  /// How often each action was taken; any thread may ask.
+  [[nodiscard]] rig::GateCounts counts() const noexcept;
   [[nodiscard]] std::uint64_t count(GateAction action) const noexcept {
-    return counts_[static_cast<std::size_t>(action)];
+    return counts_[static_cast<std::size_t>(action)].load(std::memory_order_relaxed);
   }
 
  private:
+  void watch_board(const rig::Measurement& measurement) noexcept;
+  void watch_wheels(const rig::Measurement& measurement, std::int64_t now_ns) noexcept;
+  void require_finite(const rig::Command& wanted, const rig::WheelSpeeds& speeds) noexcept;
+  [[nodiscard]] double limited(double duty, double most, GateAction action) noexcept;
+  [[nodiscard]] double rising(double duty, double before, double rate_per_s, double elapsed_s,
+                              GateAction action) noexcept;
+  void interlock(rig::Command& command, const PhasePermission& may) noexcept;
+  void note(GateAction action) noexcept;
+
   GateOptions options_;
+  PhasePermissions permissions_;
+  bool watching_;
+  StrideMaker strides_;
+  EncoderWatch encoders_;
+  ResponseWatch response_;
+  rig::Command sent_{};
+  bool has_sent_{false};
+  std::int64_t sent_ns_{0};
+  bool supply_known_{false};
+  bool temperature_known_{false};
+  GateAction last_action_{GateAction::passed};
   rig::Reason fault_{rig::Reason::none};
   double fault_value_{0.0};
-  std::array<std::uint64_t, gate_action_count> counts_{};
+  std::array<std::atomic<std::uint64_t>, gate_action_count> counts_{};  ///< one thread alone adds
 };
 
 }  // namespace abs_hil::runtime

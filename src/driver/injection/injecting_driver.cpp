@@ -28,6 +28,14 @@ constexpr NumberFaults duty_faults{.wrong = scaled_duty};
 constexpr NumberFaults torque_faults{.garbage_most = 10.0, .wrong = scaled};
 constexpr NumberFaults enable_faults{.garbage_most = 2.0, .whole = true, .wrong = inverted};
 
+/// NaN is the same as NaN here: not known.
+bool differ(double a, double b) noexcept { return a != b && !(std::isnan(a) && std::isnan(b)); }
+
+bool differ(const rig::Measurement& a, const rig::Measurement& b) noexcept {
+  return a.time_ns != b.time_ns || a.upper_counts != b.upper_counts || a.lower_counts != b.lower_counts ||
+         differ(a.supply_V, b.supply_V) || differ(a.temperature_C, b.temperature_C) || a.trip_flags != b.trip_flags;
+}
+
 std::int32_t any_counts(std::mt19937_64& random) noexcept {
   return std::bit_cast<std::int32_t>(static_cast<std::uint32_t>(random() >> 32U));
 }
@@ -62,7 +70,7 @@ void InjectingDriver::do_activate(std::int64_t now_ns) {
   inner_->activate(now_ns);
   random_.seed(seed_);
   now_ns_ = now_ns;
-  first_fault_ns_ = -1;
+  first_effect_ns_ = -1;
   first_read_ = true;
   for (Planned& planned : planned_) planned.entered_ns = planned.injection.phase ? -1 : now_ns;
 }
@@ -73,7 +81,11 @@ void InjectingDriver::note_phase(rig::Phase phase) noexcept {
   }
 }
 
-ActiveFault InjectingDriver::fault_of(InjectionSignal signal) noexcept {
+void InjectingDriver::note_effect(bool differs) noexcept {
+  if (differs && first_effect_ns_ < 0) first_effect_ns_ = now_ns_;
+}
+
+ActiveFault InjectingDriver::fault_of(InjectionSignal signal) const noexcept {
   // The one that began last acts; `ok` among them ends what was before it.
   std::int64_t latest_ns = -1;
   ActiveFault fault{};
@@ -86,7 +98,6 @@ ActiveFault InjectingDriver::fault_of(InjectionSignal signal) noexcept {
     latest_ns = begins_ns;
     fault = {planned.injection.kind, planned.injection.parameter};
   }
-  if (fault.kind != InjectionKind::ok && first_fault_ns_ < 0) first_fault_ns_ = now_ns_;
   return fault;
 }
 
@@ -99,9 +110,12 @@ IoResult InjectingDriver::do_read(std::int64_t now_ns, rig::Measurement& measure
     lower_.start(measurement.lower_counts);
     delivered_ = measurement;
   }
+  const rig::Measurement sound = measurement;
   fail_encoders(measurement);
   fail_numbers(measurement);
   const IoResult result = fail_whole_answer(measurement);
+  note_effect(!result.ok() || differ(sound, measurement) ||
+              fault_of(InjectionSignal::read).kind == InjectionKind::slow);
   if (result.ok()) delivered_ = measurement;
   return result;
 }
@@ -187,13 +201,19 @@ IoResult InjectingDriver::fail_whole_answer(rig::Measurement& measurement) noexc
 
 IoResult InjectingDriver::do_write(const rig::Command& command) noexcept {
   rig::Command sent = command;
-  if (const IoResult result = fail_whole_command(sent); !result.ok()) return result;
+  if (const IoResult result = fail_whole_command(sent); !result.ok()) {
+    note_effect(true);
+    return result;
+  }
   sent.motor_duty = motor_.pass(sent.motor_duty, fault_of(InjectionSignal::motor_pwm), now_ns_, random_);
   const ActiveFault brake = fault_of(InjectionSignal::brake_pwm);
   sent.brake_duty = brake_.pass(sent.brake_duty, brake, now_ns_, random_);
   sent.brake_torque_Nm = brake_torque_.pass(sent.brake_torque_Nm, brake, now_ns_, random_);
   const ActiveFault enable = fault_of(InjectionSignal::enable);
   sent.motor_enable = enable_.pass(sent.motor_enable ? 1.0 : 0.0, enable, now_ns_, random_) > 0.5;
+  note_effect(sent.motor_duty != command.motor_duty || sent.brake_duty != command.brake_duty ||
+              sent.brake_torque_Nm != command.brake_torque_Nm || sent.motor_enable != command.motor_enable ||
+              fault_of(InjectionSignal::write).kind == InjectionKind::slow);
   sent_ = sent;
   return inner_->write(sent);
 }

@@ -81,9 +81,9 @@ TEST_CASE("a fault begins with its phase and delay, and ends with its duration")
   CHECK(bench.measurement.upper_counts == 300);
   bench.cycles(2);  // the phase is entered in the cycle at 4 ms; the fault begins at 6 ms
   CHECK(bench.measurement.upper_counts == 500);
-  CHECK(bench.driver.first_fault_ns() == -1);
+  CHECK(bench.driver.first_effect_ns() == -1);
   bench.cycles(1);
-  CHECK(bench.driver.first_fault_ns() == 6 * ms);
+  CHECK(bench.driver.first_effect_ns() == 6 * ms);
   bench.cycles(2);  // 6, 7, 8 ms: stuck
   CHECK(bench.measurement.upper_counts == 500);
   CHECK(bench.measurement.lower_counts == 960);

@@ -41,7 +41,7 @@ class WatchedRun {
         driver_(setup_.plant, {.seed = 1, .start_speed_rad_s = start_speed_rad_s}),
         logic_(experiment::test::logic_parts(setup_)),
         planted_(logic_, offence, offence_cycle),
-        gate_(setup_.gate),
+        gate_(logic_.make_gate(setup_.gate)),
         ring_(1024),  // full after so many cycles: dropping is part of what is proven
         executive_(clock, driver_, planted_, gate_, ring_, static_cast<std::int64_t>(1e9 / rate_Hz)) {
     driver_.configure();

@@ -35,8 +35,8 @@ class InjectingDriver final : public RigDriver {
   [[nodiscard]] std::vector<std::string> inspection() override { return inner_->inspection(); }
   void note_phase(rig::Phase phase) noexcept override;
   [[nodiscard]] const RigDriver& inner() const noexcept { return *inner_; }
-  /// Time of the first read or write that an injection other than `ok` acted on; -1 while none has.
-  [[nodiscard]] std::int64_t first_fault_ns() const noexcept { return first_fault_ns_; }
+  /// Time of the first read or write in which a fault made a difference; -1 while none has.
+  [[nodiscard]] std::int64_t first_effect_ns() const noexcept { return first_effect_ns_; }
 
  private:
   struct Planned {
@@ -50,7 +50,8 @@ class InjectingDriver final : public RigDriver {
   IoResult do_write(const rig::Command& command) noexcept override;
   IoResult do_make_safe() noexcept override { return inner_->deactivate(); }
 
-  [[nodiscard]] ActiveFault fault_of(InjectionSignal signal) noexcept;
+  [[nodiscard]] ActiveFault fault_of(InjectionSignal signal) const noexcept;
+  void note_effect(bool differs) noexcept;
   IoResult fail_whole_answer(rig::Measurement& measurement) noexcept;
   void fail_encoders(rig::Measurement& measurement) noexcept;
   void fail_numbers(rig::Measurement& measurement) noexcept;
@@ -62,7 +63,7 @@ class InjectingDriver final : public RigDriver {
   PassTime pass_time_;
   std::mt19937_64 random_{};
   std::int64_t now_ns_{0};
-  std::int64_t first_fault_ns_{-1};
+  std::int64_t first_effect_ns_{-1};
   bool first_read_{true};
 
   EncoderChannel upper_{};

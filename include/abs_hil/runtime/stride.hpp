@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+
+#include "abs_hil/rig/command.hpp"
+#include "abs_hil/rig/measurement.hpp"
+#include "abs_hil/rig/reason.hpp"
+#include "abs_hil/runtime/watch_limits.hpp"
+
+namespace abs_hil::runtime {
+
+/// A fault found, or none.
+struct Finding {
+  rig::Reason reason{rig::Reason::none};
+  double value{0.0};
+  [[nodiscard]] bool sound() const noexcept { return reason == rig::Reason::none; }
+};
+
+/// What the wheels did over a stretch of about 2 ms, long enough for the encoders to tell, and what was sent meanwhile.
+struct Stride {
+  double dt_s{0.0};
+  double omega1_rad_s{0.0};  ///< mean over the stretch, from counts alone
+  double omega2_rad_s{0.0};
+  double resolution_rad_s{0.0};  ///< what two counts are in this time
+  double brake_target_Nm{0.0};   ///< mean of b(u), or of the torque asked for with an ideal actuator
+  double motor_duty{0.0};        ///< mean
+};
+
+/// Judges whether measurements are fresh and joins them to strides. Real-time safe.
+class StrideMaker {
+ public:
+  explicit StrideMaker(const WatchLimits& limits) noexcept : limits_(limits) {}
+
+  /// Takes a measurement and the command that has acted since the one before.
+  /// @param now_ns the cycle's wake-up, on the clock of the stamps
+  Finding update(const rig::Measurement& measurement, std::int64_t now_ns, const rig::Command& sent) noexcept;
+  /// True if the latest measurement may be used: fresh, and no counter has leapt.
+  [[nodiscard]] bool usable() const noexcept { return usable_; }
+  /// True if the latest update completed a stride.
+  [[nodiscard]] bool complete() const noexcept { return complete_; }
+  [[nodiscard]] const Stride& stride() const noexcept { return stride_; }
+
+ private:
+  [[nodiscard]] bool fresh(std::int64_t stamp_ns, std::int64_t now_ns) noexcept;
+  void begin(const rig::Measurement& measurement) noexcept;
+
+  [[nodiscard]] bool leaps(std::int32_t before, std::int32_t now, double since_s) const noexcept;
+
+  WatchLimits limits_;
+  bool started_{false};
+  bool usable_{true};
+  bool complete_{false};
+  int stale_cycles_{0};
+  std::int64_t fresh_ns_{0};  ///< the cycle of the latest fresh measurement
+  std::int64_t stamp_ns_{0};  ///< its stamp
+  std::int32_t upper_{0};     ///< its counts
+  std::int32_t lower_{0};
+  std::int64_t begin_ns_{0};  ///< of the stride
+  std::int32_t begin_upper_{0};
+  std::int32_t begin_lower_{0};
+  double brake_impulse_Nms_{0.0};  ///< of b(u) over the stride
+  double motor_duty_s_{0.0};
+  Stride stride_{};
+};
+
+}  // namespace abs_hil::runtime

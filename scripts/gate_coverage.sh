@@ -1,0 +1,22 @@
+#!/usr/bin/env bash
+# Line and branch coverage of the command gate and its plausibility checks by the test `gate` alone: status 1 below 100 %.
+# Builds just these files, without optimisation; needs gcovr (packages-coverage.txt). Status 77 without it.
+set -euo pipefail
+cd "$(dirname "$(realpath "$0")")/.."
+command -v gcovr >/dev/null || { echo "SKIPPED: gcovr is not installed (scripts/setup.sh packages-coverage.txt)"; exit 77; }
+
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+objects=()
+for source in src/runtime/{command_gate,encoder_watch,response_watch,stride,watch_limits}.cpp tests/runtime/gate/*.cpp; do
+  object=$folder/$(basename "$source" .cpp).o
+  flags=()
+  case $source in src/*) flags=(--coverage) ;; esac
+  "${CXX:-g++}" -std=c++20 -O0 "${flags[@]}" -Iinclude -Itests -c "$PWD/$source" -o "$object"
+  objects+=("$object")
+done
+"${CXX:-g++}" --coverage -o "$folder/test_gate" "${objects[@]}" -lCatch2WithMain
+"$folder/test_gate" | tail -2
+gcovr --root . --object-directory "$folder" "$folder" --filter 'src/runtime/' --filter 'include/abs_hil/runtime/' \
+  --exclude-throw-branches --exclude-unreachable-branches --branches --fail-under-line 100 --fail-under-branch 100 ||
+  { echo "gate coverage: below 100 %"; exit 1; }

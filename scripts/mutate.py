@@ -1,0 +1,244 @@
+#!/usr/bin/env python3
+"""usage: mutate.py [--list] [--jobs N] [--only FILE] [--report FILE]
+
+Mutation run of the command gate and its plausibility checks: changes one thing at a time in their sources (a relation, an
+operator, a constant, a condition, a statement left out), compiles that file alone without optimisation, links it with the
+test `gate` and runs it. A mutant that the tests do not notice has survived. Survivors must be listed, with the reason why
+they change nothing, in EQUIVALENT below; status 1 if one is not, or if a listed one is killed after all.
+
+Takes some minutes; run on demand. Results: docs/quality-mutation.md.
+"""
+import argparse
+import concurrent.futures
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+SOURCES = ['command_gate', 'stride', 'encoder_watch', 'response_watch', 'watch_limits']
+TESTS = sorted((ROOT / 'tests/runtime/gate').glob('*_test.cpp'))
+COMPILE = ['g++', '-std=c++20', '-O0', '-fPIC', '-I', ROOT / 'include', '-I', ROOT / 'tests']
+
+RELATIONS = {'<=': ['<', '>'], '>=': ['>', '<'], '<': ['<=', '>='], '>': ['>=', '<='], '==': ['!='], '!=': ['==']}
+ARITHMETIC = {'+': '-', '-': '+', '*': '/', '/': '*'}
+
+# (file, the line's text, what was changed) -> why no test can tell. Kept in EQUIVALENT_FILE.
+EQUIVALENT_FILE = ROOT / 'scripts' / 'mutate_equivalent.txt'
+
+
+def code_of(text):
+    """The text with comments and strings blanked out, same length."""
+    blank = lambda match: re.sub(r'[^\n]', ' ', match.group())
+    text = re.sub(r'//[^\n]*', blank, text)
+    return re.sub(r'"(?:\\.|[^"\\])*"', blank, text)
+
+
+def mutants_of(name):
+    """Yields (line number, what, mutated text)."""
+    text = (ROOT / 'src/runtime' / f'{name}.cpp').read_text()
+    code = code_of(text)
+    begin = code.index('namespace abs_hil::runtime {')
+
+    def at(start, end, new, what):
+        line = text.count('\n', 0, start) + 1
+        return line, what, text[:start] + new + text[end:]
+
+    for match in re.finditer(r'(?<![<>=!&|+*/-])(<=|>=|==|!=|<|>)(?![<>=])', code):
+        start, end = match.span()
+        if start < begin or code[start - 1] != ' ' or code[end] != ' ':  # templates and arrows
+            continue
+        for new in RELATIONS[match.group()]:
+            yield at(start, end, new, f'{match.group()} -> {new}')
+    for match in re.finditer(r' ([-+*/]) ', code):
+        start, end = match.span(1)
+        if start >= begin:
+            yield at(start, end, ARITHMETIC[match.group(1)], f'{match.group(1)} -> {ARITHMETIC[match.group(1)]}')
+    for match in re.finditer(r' ([-+*])= ', code):
+        start, end = match.span(1)
+        if start >= begin:
+            yield at(start, end + 1, '=', f'{match.group(1)}= -> =')
+            new = '-' if match.group(1) == '+' else '+'
+            yield at(start, end, new, f'{match.group(1)}= -> {new}=')
+    for match in re.finditer(r'\+\+', code):
+        start, end = match.span()
+        if start >= begin and 'for (' not in text[text.rfind('\n', 0, start):start]:
+            yield at(start, end, '', '++ left out')
+    for match in re.finditer(r'(?<![\w.])(\d+(?:\.\d+)?(?:e-?\d+)?)(?![\w.])', code):
+        start, end = match.span()
+        line_text = text[text.rfind('\n', 0, start) + 1:text.find('\n', end)]
+        if start < begin or 'std::uint64_t' in line_text or 'size_t i' in line_text:
+            continue
+        value = match.group()
+        if float(value) == 0:
+            yield at(start, end, '1' if '.' not in value else '1.0', f'{value} -> 1')
+        else:
+            for factor in (1.1, 0.9) if '.' in value or 'e' in value else (2, 0):
+                new = repr(float(value) * factor) if '.' in value or 'e' in value else str(int(float(value) * factor))
+                yield at(start, end, new, f'{value} -> {new}')
+    for match in re.finditer(r'&&|\|\|', code):
+        start, end = match.span()
+        if start >= begin:
+            new = '||' if match.group() == '&&' else '&&'
+            yield at(start, end, new, f'{match.group()} -> {new}')
+    for match in re.finditer(r'(?<=[\s(])!(?=[\w(])', code):
+        start, end = match.span()
+        if start >= begin:
+            yield at(start, end, '', '! left out')
+    for match in re.finditer(r'\b(true|false)\b', code):
+        start, end = match.span()
+        if start >= begin:
+            yield at(start, end, {'true': 'false', 'false': 'true'}[match.group()], f'{match.group()} turned round')
+    for match in re.finditer(r'std::(min|max)\(', code):
+        start, end = match.span(1)
+        if start >= begin:
+            new = {'min': 'max', 'max': 'min'}[match.group(1)]
+            yield at(start, end, new, f'{match.group(1)} -> {new}')
+    # A condition that is always or never true.
+    for match in re.finditer(r'\bif \(', code):
+        depth, end = 1, match.end()
+        while depth:
+            depth += {'(': 1, ')': -1}.get(code[end], 0)
+            end += 1
+        inside = text[match.end():end - 1]
+        if match.start() < begin:
+            continue
+        for new in ('true', 'false'):
+            if ';' in inside:  # with an initialiser
+                head, _ = inside.rsplit(';', 1)
+                yield at(match.end(), end - 1, f'{head}; {new}', f'if ({new})')
+            else:
+                yield at(match.end(), end - 1, new, f'if ({new})')
+    # A statement left out: assignments and calls that stand alone in their lines.
+    for match in re.finditer(r'^( +)([\w.\[\]>:-]+(?: [-+*]?= [^;{}]*|\([^;{}]*\)));$', code, re.MULTILINE):
+        if match.start() >= begin and not re.match(r'\s*(return|const|using|case)\b', match.group()):
+            yield at(match.start(2), match.end(), ';', 'left out')
+
+
+def run_quietly(*command, **options):
+    return subprocess.run([str(word) for word in command], capture_output=True, text=True, **options)
+
+
+def require(result):
+    if result.returncode:
+        sys.exit(result.stderr or result.stdout)
+
+
+class Bench:
+    """The tests as one program; what they test as a shared object beside it, so that a mutant costs one short
+    compilation, with the headers compiled before, and one short link."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        (folder / 'headers.hpp').write_text('#include <algorithm>\n#include <array>\n#include <atomic>\n#include <cmath>\n'
+                                            '#include <utility>\n#include "abs_hil/runtime/command_gate.hpp"\n'
+                                            '#include "abs_hil/rig/brake_map.hpp"\n'
+                                            '#include "abs_hil/rig/encoder_scale.hpp"\n')
+        require(run_quietly(*COMPILE, '-w', '-x', 'c++-header', folder / 'headers.hpp', '-o',
+                            folder / 'headers.hpp.gch'))
+        self.objects = {name: folder / f'{name}.o' for name in SOURCES}
+        for name, target in self.objects.items():
+            require(self.compile(ROOT / 'src/runtime' / f'{name}.cpp', target))
+        self.place = folder / 'base'
+        self.place.mkdir()
+        require(self.link(self.objects.values(), self.place))
+        tests = []
+        for source in TESTS:
+            tests.append(folder / f'{source.stem}.o')
+            require(run_quietly(*COMPILE, '-w', '-c', source, '-o', tests[-1]))
+        self.program = folder / 'test_gate'
+        require(run_quietly('g++', '-o', self.program, *tests, f'-L{self.place}', '-lgate', '-lCatch2WithMain'))
+        if self.run(self.place) != 0:
+            sys.exit('the tests fail without any mutation')
+
+    def compile(self, source, target):
+        return run_quietly(*COMPILE, '-w', '-include', self.folder / 'headers.hpp', '-c', source, '-o', target)
+
+    def link(self, objects, place):
+        return run_quietly('g++', '-shared', '-o', place / 'libgate.so', *objects)
+
+    def run(self, place):
+        try:
+            return run_quietly(self.program, '-a', timeout=60, env={'LD_LIBRARY_PATH': str(place)}).returncode
+        except subprocess.TimeoutExpired:
+            return 1
+
+    def verdict(self, number, name, mutated):
+        place = self.folder / str(number)
+        place.mkdir()
+        try:
+            (place / 'mutant.cpp').write_text(mutated)
+            if self.compile(place / 'mutant.cpp', place / 'mutant.o').returncode:
+                return 'not compilable'
+            others = [path for other, path in self.objects.items() if other != name]
+            if self.link([place / 'mutant.o', *others], place).returncode:
+                return 'not compilable'
+            return 'killed' if self.run(place) else 'survived'
+        finally:
+            shutil.rmtree(place)
+
+
+def equivalents():
+    """(file, line's text, what) -> reason."""
+    known = {}
+    for line in EQUIVALENT_FILE.read_text().splitlines():
+        if line and not line.startswith('#'):
+            file, text, what, reason = (part.strip() for part in line.split('@@'))
+            known[file, text, what] = reason
+    return known
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--list', action='store_true', help='show the mutants and end')
+    parser.add_argument('--jobs', type=int, default=max(1, (os.cpu_count() or 2) - 1))
+    parser.add_argument('--only', choices=SOURCES)
+    parser.add_argument('--report', type=pathlib.Path, help='write the counts as a Markdown table')
+    arguments = parser.parse_args()
+    names = [arguments.only] if arguments.only else SOURCES
+    mutants = [(name, *mutant) for name in names for mutant in mutants_of(name)]
+    if arguments.list:
+        for name, line, what, _ in mutants:
+            print(f'{name}.cpp:{line}: {what}')
+        print(len(mutants))
+        return 0
+    known = equivalents()
+    counts = {name: {'killed': 0, 'equivalent': 0, 'survived': 0, 'not compilable': 0} for name in names}
+    bad = 0
+    used = set()
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = pathlib.Path(temporary)
+        bench = Bench(folder)
+        with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
+            results = [(m, pool.submit(bench.verdict, i, m[0], m[3])) for i, m in enumerate(mutants)]
+            for (name, line, what, _), future in results:
+                result = future.result()
+                text = (ROOT / 'src/runtime' / f'{name}.cpp').read_text().splitlines()[line - 1].strip()
+                key = (name, text, what)
+                if result == 'survived' and key in known:
+                    used.add(key)
+                    result = 'equivalent'
+                elif result == 'survived':
+                    bad += 1
+                    print(f'SURVIVED {name}.cpp:{line}: {what}: {text}', flush=True)
+                counts[name][result] += 1
+    for key in known:
+        if key[0] in names and key not in used:
+            bad += 1
+            print(f'listed as equivalent, but killed or gone: {" @@ ".join(key)}')
+    table = '| file | mutants | killed | equivalent | survived |\n|---|---|---|---|---|\n'
+    for name in names:
+        c = counts[name]
+        total = c['killed'] + c['equivalent'] + c['survived']
+        table += f'| `{name}.cpp` | {total} | {c["killed"]} | {c["equivalent"]} | {c["survived"]} |\n'
+    print(table, end='')
+    if arguments.report:
+        arguments.report.write_text(table)
+    return 1 if bad else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

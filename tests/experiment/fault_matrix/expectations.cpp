@@ -1,0 +1,179 @@
+// What must come of each fault: the classes and bounds of docs/safety.md, "What is found, and how soon".
+
+#include "matrix.hpp"
+
+namespace abs_hil::experiment::test {
+
+namespace {
+
+using driver::InjectionKind;
+using driver::InjectionSignal;
+using rig::Phase;
+using rig::Reason;
+
+constexpr double at_once_s = 0.002;    ///< board flags, I/O errors, leaping counters
+constexpr double missing_s = 0.025;    ///< no fresh measurement
+constexpr double overruns_s = 0.160;   ///< 50 late cycles of 3 ms
+constexpr double encoder_s = 0.25;     ///< an encoder that does not follow its wheel, from rest too
+constexpr double lost_counts_s = 0.5;  ///< ... that follows it now and then
+constexpr double response_s = 0.5;     ///< an output that does not follow its command
+constexpr double random_s = 5.0;       ///< outputs at random: when they happen to contradict the command
+constexpr double half_motor_s = 20.0;  ///< a motor at half duty does its work; what else is wrong shows in braking
+
+bool before(Phase phase, Phase other) { return static_cast<int>(phase) < static_cast<int>(other); }
+
+Expectation encoder(const driver::Injection& injection, Reason stuck, Reason jumped, Reason reversed) {
+  // A few turns a second in the end: too slow for stuck and reversed to show before the run is over.
+  const bool slow_wheels = !before(*injection.phase, Phase::hold);
+  switch (injection.kind) {
+    case InjectionKind::off:
+      return {{stuck, jumped, Reason::encoders_lost, Reason::motor_no_response}, false, encoder_s};
+    case InjectionKind::stuck:
+    case InjectionKind::slow:
+      return {{stuck, jumped, Reason::encoders_lost, Reason::encoders_disagree, Reason::motor_no_response,
+               Reason::encoder_lower_stuck},
+              slow_wheels,
+              response_s};
+    case InjectionKind::garbage: return {{jumped}, false, at_once_s};
+    case InjectionKind::wrong: return {{reversed, jumped}, slow_wheels, encoder_s};
+    case InjectionKind::delayed:
+      // From rest nothing shows but a worse stop; at speed the counter first stands.
+      return {{stuck, Reason::encoders_lost, Reason::encoder_lower_stuck},
+              slow_wheels || before(*injection.phase, Phase::coast),
+              encoder_s};
+    case InjectionKind::intermittent:
+      return {{stuck, jumped, Reason::encoders_disagree, Reason::encoders_lost, Reason::encoder_lower_stuck,
+               Reason::encoder_lower_jumped},
+              slow_wheels,
+              lost_counts_s};
+    case InjectionKind::ok: break;
+  }
+  return {{}, true};
+}
+
+Expectation both_encoders(const driver::Injection& injection) {
+  Expectation expectation =
+      encoder(injection, Reason::encoders_lost, Reason::encoder_upper_jumped, Reason::encoder_lower_jumped);
+  if (injection.kind == InjectionKind::wrong) {
+    // Swapped wheels that roll on each other show the same speeds: found when they are braked.
+    expectation.reasons.push_back(Reason::slip_implausible);
+    expectation.bound_s = before(*injection.phase, Phase::brake) ? 10.0 : encoder_s;
+  }
+  return expectation;
+}
+
+Expectation stamp(InjectionKind kind) {
+  // Good stamps in between are enough to go on with.
+  if (kind == InjectionKind::intermittent) return {{Reason::samples_missing}, true, missing_s};
+  return {{Reason::samples_missing}, kind == InjectionKind::ok, missing_s};
+}
+
+Expectation board_number(InjectionKind kind, Reason bad) {
+  const bool shows = kind == InjectionKind::garbage ||
+                     (kind == InjectionKind::off && bad == Reason::board_supply_low) ||
+                     (kind == InjectionKind::intermittent && bad == Reason::board_supply_low);
+  // The simulator knows neither supply nor temperature: what is not there cannot be wrong or late.
+  return {{bad}, !shows, 0.03};
+}
+
+Expectation trip(InjectionKind kind) {
+  const bool shows =
+      kind == InjectionKind::garbage || kind == InjectionKind::wrong || kind == InjectionKind::intermittent;
+  return {{Reason::board_interlock_tripped, Reason::board_supply_tripped}, !shows, 0.03};
+}
+
+Expectation read(InjectionKind kind) {
+  switch (kind) {
+    case InjectionKind::off:
+    case InjectionKind::wrong: return {{Reason::driver_read_failed}, false, at_once_s};
+    case InjectionKind::intermittent: return {{Reason::driver_read_failed}, false, 0.03};
+    case InjectionKind::stuck:
+    case InjectionKind::delayed: return {{Reason::samples_missing}, false, missing_s};
+    case InjectionKind::slow: return {{Reason::consecutive_overruns}, false, overruns_s};
+    case InjectionKind::garbage:
+      return {{Reason::board_interlock_tripped, Reason::board_supply_tripped, Reason::board_supply_low,
+               Reason::samples_missing},
+              false,
+              at_once_s};
+    case InjectionKind::ok: break;
+  }
+  return {{}, true};
+}
+
+/// Drive PWM and enable: the same to the wheels.
+Expectation drive(const driver::Injection& injection) {
+  const bool driven = before(*injection.phase, Phase::coast);
+  switch (injection.kind) {
+    case InjectionKind::off: return {{Reason::motor_no_response}, !driven, response_s};
+    case InjectionKind::stuck:
+      // At the duty it had: right while accelerating, and the enable takes it away afterwards.
+      return {{Reason::motor_no_response}, injection.phase != Phase::idle, response_s};
+    case InjectionKind::wrong:
+      return {{Reason::motor_no_response}, injection.signal == InjectionSignal::motor_pwm || !driven, response_s};
+    default: return {{Reason::motor_no_response}, true, half_motor_s};
+  }
+}
+
+Expectation brake(const driver::Injection& injection) {
+  const bool late = injection.phase == Phase::hold || injection.phase == Phase::stopped;
+  switch (injection.kind) {
+    case InjectionKind::off:
+    case InjectionKind::wrong: return {{Reason::brake_no_response}, late, response_s};
+    case InjectionKind::stuck:
+      // From braking on it stays on: the rig stops with a locked wheel.
+      return {{Reason::brake_no_response}, !before(*injection.phase, Phase::brake), response_s};
+    case InjectionKind::garbage:
+      return {{Reason::brake_no_response, Reason::motor_no_response, Reason::encoder_upper_stuck,
+               Reason::encoders_disagree},
+              !before(*injection.phase, Phase::coast),
+              random_s};
+    default: return {{Reason::brake_no_response}, true, response_s};
+  }
+}
+
+Expectation write(const driver::Injection& injection) {
+  const bool late = injection.phase == Phase::hold || injection.phase == Phase::stopped;
+  switch (injection.kind) {
+    case InjectionKind::off: return {{Reason::driver_write_failed}, false, at_once_s};
+    case InjectionKind::intermittent: return {{Reason::driver_write_failed}, false, 0.03};
+    case InjectionKind::slow: return {{Reason::consecutive_overruns}, false, overruns_s};
+    case InjectionKind::stuck:
+      return {{Reason::motor_no_response, Reason::brake_no_response, Reason::speed_rises_with_motor_off},
+              !before(*injection.phase, Phase::brake),
+              response_s};
+    case InjectionKind::wrong:
+      return {{Reason::brake_no_response}, late, before(*injection.phase, Phase::coast) ? half_motor_s : response_s};
+    case InjectionKind::garbage:
+      return {{Reason::motor_no_response, Reason::brake_no_response, Reason::speed_rises_with_motor_off,
+               Reason::encoder_upper_stuck, Reason::encoders_disagree},
+              late,
+              random_s};
+    default: return {{Reason::brake_no_response}, true, response_s};
+  }
+}
+
+}  // namespace
+
+Expectation expected(const driver::Injection& injection) {
+  switch (injection.signal) {
+    case InjectionSignal::encoder_upper:
+      return encoder(injection, Reason::encoder_upper_stuck, Reason::encoder_upper_jumped,
+                     Reason::encoder_upper_reversed);
+    case InjectionSignal::encoder_lower:
+      return encoder(injection, Reason::encoder_lower_stuck, Reason::encoder_lower_jumped,
+                     Reason::encoder_lower_reversed);
+    case InjectionSignal::encoders: return both_encoders(injection);
+    case InjectionSignal::stamp: return stamp(injection.kind);
+    case InjectionSignal::supply: return board_number(injection.kind, Reason::board_supply_low);
+    case InjectionSignal::temperature: return board_number(injection.kind, Reason::board_too_hot);
+    case InjectionSignal::trip: return trip(injection.kind);
+    case InjectionSignal::read: return read(injection.kind);
+    case InjectionSignal::motor_pwm:
+    case InjectionSignal::enable: return drive(injection);
+    case InjectionSignal::brake_pwm: return brake(injection);
+    case InjectionSignal::write: return write(injection);
+  }
+  return {};
+}
+
+}  // namespace abs_hil::experiment::test

@@ -1,0 +1,96 @@
+// Sound runs of every kind: the gate's plausibility checks find nothing in any of them.
+
+#include <filesystem>
+
+#include "abs_hil/comparison/simulated_run.hpp"
+#include "abs_hil/comparison/variation.hpp"
+#include "abs_hil/control/registry.hpp"
+#include "abs_hil/experiment/experiments.hpp"
+#include "abs_hil/settings/config_file.hpp"
+#include "abs_hil/settings/key_table.hpp"
+#include "catch.hpp"
+#include "simulated_run.hpp"
+
+using namespace abs_hil;
+using namespace abs_hil::experiment;
+
+namespace {
+
+settings::Settings configured(const std::string& plant, const std::string& experiment, std::string_view controller,
+                              double rate_Hz) {
+  settings::Settings s;
+  settings::KeyTable keys(s);
+  settings::load_file(settings::plant_file(plant), keys, "plant");
+  s.plant.friction_profile = friction_profile_of(experiment);
+  s.experiment.name = experiment;
+  s.control.controller = controller;
+  s.control.rate_Hz = rate_Hz;
+  return s;
+}
+
+rig::Reason end_of(const settings::Settings& s) {
+  const test::Setup setup{s.plant, s.control, s.experiment, s.gate, static_cast<std::uint64_t>(s.seed)};
+  return test::run(setup).outcome.reason;
+}
+
+const std::vector<std::string> plants{"paper-table1", "paper-timing", "inteco-manual"};
+
+}  // namespace
+
+TEST_CASE("no controller on any plant at any rate trips a check") {
+  int runs = 0;
+  for (const auto& experiment : experiments()) {
+    for (const std::string& plant : plants) {
+      for (const auto& controller : control::controllers()) {
+        for (const double rate_Hz : {500.0, 1000.0, 5000.0}) {
+          CAPTURE(experiment.name, plant, controller.name, rate_Hz);
+          CHECK(end_of(configured(plant, std::string(experiment.name), controller.name, rate_Hz)) ==
+                rig::Reason::sequence_complete);
+          ++runs;
+        }
+      }
+    }
+  }
+  CHECK(runs >= 2 * 3 * 6 * 3);
+}
+
+TEST_CASE("nor do ideal sensors and actuators, other seeds and other encoders") {
+  for (const auto& controller : control::controllers()) {
+    CAPTURE(controller.name);
+    settings::Settings s = configured("paper-table1", "paper", controller.name, 1000.0);
+    s.experiment.start_speed_rad_s = 170.0;
+    s.plant.ideal_sensors = true;
+    CHECK(end_of(s) == rig::Reason::sequence_complete);
+    s.plant.ideal_actuator = true;
+    CHECK(end_of(s) == rig::Reason::sequence_complete);
+    s.plant.ideal_sensors = false;
+    CHECK(end_of(s) == rig::Reason::sequence_complete);
+    s.plant.ideal_actuator = false;
+    for (const std::int32_t counts_per_rev : {512, 20'000}) {
+      s.plant.rig.encoder_counts_per_rev = counts_per_rev;
+      CHECK(end_of(s) == rig::Reason::sequence_complete);
+    }
+    s.plant.rig.encoder_counts_per_rev = 4096;
+    for (s.seed = 2; s.seed < 6; ++s.seed) CHECK(end_of(s) == rig::Reason::sequence_complete);
+  }
+}
+
+TEST_CASE("nor do plants that stray by 20 % from what the gate believes, from rest to standstill") {
+  const auto variation = comparison::Variation::parse("parameters=0.2,theta=0.2,phase");
+  for (const std::string& plant : plants) {
+    for (const char* controller : {"adaptive", "relay", "locked", "sliding-mode"}) {
+      const settings::Settings nominal = configured(plant, "paper", controller, 1000.0);
+      for (std::uint64_t index = 0; index < 5; ++index) {
+        CAPTURE(plant, controller, index);
+        const comparison::Perturbation drawn = comparison::draw(variation, 7, index);
+        runtime::VirtualClock clock;
+        driver::SimDriver driver(comparison::perturbed(nominal.plant, drawn), {.seed = drawn.sensor_seed});
+        RunSession session(clock, driver,
+                           make_logic_parts(nominal.control, nominal.plant.rig, false, nominal.gate, nominal.experiment,
+                                            plan_experiment(nominal.experiment, nominal.control.v_min_m_s)),
+                           nominal.gate, {});
+        CHECK(session.run_fast([] { return rig::Reason::none; }).reason == rig::Reason::sequence_complete);
+      }
+    }
+  }
+}

@@ -1,0 +1,281 @@
+#include "abs_hil/runtime/command_gate.hpp"
+
+#include <limits>
+#include <string>
+#include <tuple>
+
+#include "catch.hpp"
+
+using namespace abs_hil;
+using namespace abs_hil::runtime;
+using rig::Phase;
+using rig::Reason;
+
+namespace {
+constexpr GateInput moderate{{100.0, 100.0}, Phase::brake, 0};
+constexpr std::int64_t ms = 1'000'000;
+constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+bool is_safe(const rig::Command& command) {
+  return command.motor_duty == 0.0 && command.brake_duty == 0.0 && !command.motor_enable &&
+         command.brake_torque_Nm == 0.0;
+}
+}  // namespace
+
+TEST_CASE("a sound command passes unchanged") {
+  CommandGate gate(GateOptions{});
+  const GateResult result = gate.check({.brake_duty = 0.7, .brake_torque_Nm = 4.0}, moderate);
+  CHECK(result.action == GateAction::passed);
+  CHECK(result.command.brake_duty == 0.7);
+  CHECK(result.command.brake_torque_Nm == 4.0);
+  CHECK(gate.count(GateAction::passed) == 1);
+}
+
+TEST_CASE("duties are limited, and that is counted") {
+  CommandGate gate({.motor_duty_max = 0.8, .brake_duty_max = 0.7});
+  CHECK(gate.check({.brake_duty = 0.9}, moderate).command.brake_duty == 0.7);
+  CHECK(gate.check({.brake_duty = -0.1}, moderate).command.brake_duty == 0.0);
+  CHECK(gate.check({.motor_duty = 1.0, .motor_enable = true}, {.now_ns = ms}).command.motor_duty == 0.8);
+  CHECK(gate.count(GateAction::brake_clamped) == 2);
+  CHECK(gate.count(GateAction::motor_clamped) == 1);
+}
+
+TEST_CASE("the motor never turns against the brake, nor without its enable") {
+  CommandGate gate(GateOptions{});
+  const GateResult both = gate.check({.motor_duty = 1.0, .brake_duty = 0.5, .motor_enable = true}, moderate);
+  CHECK(both.action == GateAction::motor_blocked_by_brake);
+  CHECK(both.command.motor_duty == 0.0);
+  CHECK_FALSE(both.command.motor_enable);
+  CHECK(both.command.brake_duty == 0.5);
+  const GateResult disabled = gate.check({.motor_duty = 1.0}, {.now_ns = ms});
+  CHECK(disabled.action == GateAction::motor_blocked_by_disable);
+  CHECK(disabled.command.motor_duty == 0.0);
+}
+
+TEST_CASE("what is not finite latches a fault; from then on only the safe command passes") {
+  for (const double bad : {not_a_number, infinite, -infinite}) {
+    CommandGate gate(GateOptions{});
+    CHECK(is_safe(gate.check({.brake_duty = bad}, moderate).command));
+    CHECK(gate.fault() == rig::Reason::command_not_finite);
+    const GateResult later = gate.check({.brake_duty = 0.5}, moderate);
+    CHECK(is_safe(later.command));
+    CHECK(later.action == GateAction::refused);
+    CHECK(later.fault == rig::Reason::command_not_finite);
+
+    CommandGate blind(GateOptions{});
+    CHECK(is_safe(blind.check({.brake_duty = 0.5}, {.speeds = {bad, 1.0}}).command));
+    CHECK(blind.fault() == rig::Reason::estimate_not_finite);
+    CommandGate other(GateOptions{});
+    CHECK(is_safe(other.check({.brake_duty = 0.5}, {.speeds = {1.0, bad}}).command));
+    CHECK(other.fault() == rig::Reason::estimate_not_finite);
+    CommandGate torque(GateOptions{});
+    CHECK(is_safe(torque.check({.brake_torque_Nm = bad}, moderate).command));
+    CHECK(torque.fault() == rig::Reason::command_not_finite);
+  }
+}
+
+TEST_CASE("overspeed of either wheel, either way round, latches; the limit itself does not") {
+  const double limit = GateOptions{}.overspeed_rad_s;
+  for (const rig::WheelSpeeds speeds : {rig::WheelSpeeds{limit + 0.1, 0.0}, rig::WheelSpeeds{0.0, -limit - 0.1}}) {
+    CommandGate gate(GateOptions{});
+    CHECK(gate.check({.motor_duty = 1.0, .motor_enable = true}, {.speeds = {limit, limit}}).action ==
+          GateAction::passed);
+    CHECK(is_safe(gate.check({.motor_duty = 1.0, .motor_enable = true}, {.speeds = speeds}).command));
+    CHECK(gate.fault() == rig::Reason::overspeed);
+    CHECK(gate.fault_value() == limit + 0.1);
+  }
+}
+
+TEST_CASE("the first fault stays") {
+  CommandGate gate(GateOptions{});
+  gate.latch(rig::Reason::driver_read_failed, 2.0);
+  gate.latch(rig::Reason::overspeed, 300.0);
+  CHECK(gate.fault() == rig::Reason::driver_read_failed);
+  CHECK(gate.fault_value() == 2.0);
+}
+
+TEST_CASE("what the limits just allow passes, and is not counted as limited") {
+  CommandGate gate({.motor_duty_max = 0.8, .brake_duty_max = 0.7});
+  CHECK(gate.check({.brake_duty = 0.7}, moderate).command.brake_duty == 0.7);
+  CHECK(gate.check({.motor_duty = 0.8, .motor_enable = true}, moderate).action == GateAction::motor_rate_limited);
+  CHECK(gate.check({}, {.now_ns = ms}).command.brake_duty == 0.0);
+  CHECK(gate.check({.motor_duty = 0.8, .motor_enable = true}, {.now_ns = 2 * ms}).action == GateAction::passed);
+  CHECK(gate.count(GateAction::brake_clamped) == 0);
+  CHECK(gate.count(GateAction::motor_clamped) == 0);
+}
+
+TEST_CASE("a torque below 0 becomes 0") {
+  CommandGate gate(GateOptions{});
+  CHECK(gate.check({.brake_torque_Nm = -1.0}, moderate).command.brake_torque_Nm == 0.0);
+}
+
+TEST_CASE("duties rise no faster than their rates by real elapsed time, and fall at once") {
+  CommandGate gate({.motor_rate_per_s = 100.0, .brake_rate_per_s = 50.0});
+  const auto check = [&](const rig::Command& wanted, std::int64_t at_ms) {
+    return gate.check(wanted, {.phase = Phase::brake, .now_ns = at_ms * ms});
+  };
+  static_cast<void>(check({.brake_duty = 0.2}, 0));  // the first: the outputs have been 0 for long
+  CHECK(gate.count(GateAction::brake_rate_limited) == 0);
+  CHECK(check({.brake_duty = 1.0}, 2).command.brake_duty == Approx(0.3));
+  CHECK(gate.count(GateAction::brake_rate_limited) == 1);
+  CHECK(check({.brake_duty = 0.4}, 4).command.brake_duty == 0.4);  // just what the rate allows
+  CHECK(gate.count(GateAction::brake_rate_limited) == 1);
+  CHECK(check({.brake_duty = 1.0}, 14).command.brake_duty == Approx(0.9));
+  CHECK(check({.brake_duty = 0.0}, 15).command.brake_duty == 0.0);
+  CHECK(check({.brake_duty = 1.0}, 16).command.brake_duty == Approx(0.05));
+  const GateResult motor = check({.motor_duty = 0.7, .motor_enable = true}, 18);
+  CHECK(motor.command.motor_duty == Approx(0.2));
+  CHECK(motor.action == GateAction::motor_rate_limited);
+  CHECK(gate.count(GateAction::motor_rate_limited) == 1);
+  CHECK(check({.motor_duty = 0.1, .motor_enable = true}, 19).command.motor_duty == 0.1);
+  // Time that stands still or runs back lets nothing rise.
+  CHECK(check({.motor_duty = 0.2, .motor_enable = true}, 19).command.motor_duty == Approx(0.1));
+}
+
+TEST_CASE("motor and brake act only in the phases whose plan has them, together only where it says so") {
+  PhasePermissions permissions{};
+  permissions[static_cast<std::size_t>(Phase::accelerate)] = {.motor = true};
+  permissions[static_cast<std::size_t>(Phase::brake)] = {.brake = true};
+  permissions[static_cast<std::size_t>(Phase::hold)] = {.motor = true, .brake = true, .together = true};
+  const rig::Command driving{.motor_duty = 0.5, .motor_enable = true};
+  const rig::Command braking{.brake_duty = 0.5, .brake_torque_Nm = 1.0};
+  const rig::Command both{.motor_duty = 0.5, .brake_duty = 0.5, .motor_enable = true, .brake_torque_Nm = 1.0};
+  const auto in = [&](Phase phase, const rig::Command& wanted) {
+    CommandGate gate(GateOptions{}, permissions);
+    return gate.check(wanted, {.phase = phase});
+  };
+  CHECK(in(Phase::accelerate, driving).action == GateAction::passed);
+  CHECK(in(Phase::accelerate, driving).command.motor_enable);
+  CHECK(in(Phase::brake, braking).action == GateAction::passed);
+  CHECK(in(Phase::hold, both).action == GateAction::passed);
+  CHECK(in(Phase::hold, both).command.motor_duty == 0.5);
+  CHECK(in(Phase::brake, driving).action == GateAction::motor_blocked_by_phase);
+  CHECK(is_safe(in(Phase::brake, driving).command));
+  CHECK(in(Phase::accelerate, braking).action == GateAction::brake_blocked_by_phase);
+  CHECK(is_safe(in(Phase::accelerate, braking).command));
+  CHECK(in(Phase::accelerate, {.brake_torque_Nm = 1.0}).action == GateAction::brake_blocked_by_phase);
+  for (const Phase phase : {Phase::idle, Phase::coast, Phase::stopped, Phase::fault}) {
+    CHECK(is_safe(in(phase, both).command));
+    CHECK(is_safe(in(phase, driving).command));
+    CHECK(is_safe(in(phase, braking).command));
+  }
+}
+
+TEST_CASE("every action is counted, several of one command too") {
+  CommandGate gate({.motor_duty_max = 0.5, .brake_duty_max = 0.5});
+  static_cast<void>(gate.check({}, moderate));
+  CHECK(gate.count(GateAction::passed) == 1);
+  static_cast<void>(gate.check({.motor_duty = 0.9, .brake_duty = 0.9}, {.now_ns = ms}));
+  gate.latch(Reason::overspeed, 1.0);
+  static_cast<void>(gate.check({}, moderate));
+  static_cast<void>(gate.check({}, moderate));
+  const rig::GateCounts counts = gate.counts();
+  CHECK(counts[static_cast<std::size_t>(GateAction::passed)] == 1);
+  CHECK(counts[static_cast<std::size_t>(GateAction::motor_clamped)] == 1);
+  CHECK(counts[static_cast<std::size_t>(GateAction::brake_clamped)] == 1);
+  CHECK(counts[static_cast<std::size_t>(GateAction::motor_blocked_by_disable)] == 1);
+  CHECK(counts[static_cast<std::size_t>(GateAction::refused)] == 2);
+  CHECK(rig::interventions(counts) == 5);
+  CHECK(rig::name_of(GateAction::brake_blocked_by_phase) == "brake_blocked_by_phase");
+}
+
+TEST_CASE("a motor that is not enabled stays so, and the result says what was done to this command alone") {
+  CommandGate gate(GateOptions{});
+  CHECK_FALSE(gate.check({.motor_duty = 0.5}, moderate).command.motor_enable);
+  const GateResult next = gate.check({.motor_enable = true}, {.now_ns = ms});
+  CHECK(next.action == GateAction::passed);
+  CHECK(next.command.motor_enable);
+  CHECK(next.fault == Reason::none);
+  CHECK(next.fault_value == 0.0);
+}
+
+TEST_CASE("what the board reports of itself latches") {
+  struct Row {
+    rig::Measurement measurement;
+    Reason reason;
+    double value;
+  };
+  const Row row = GENERATE(values<Row>({
+      {{.trip_flags = 1}, Reason::board_interlock_tripped, 1.0},
+      {{.trip_flags = 2}, Reason::board_supply_tripped, 2.0},
+      {{.trip_flags = 6}, Reason::board_interlock_tripped, 6.0},
+      {{.supply_V = 11.9}, Reason::board_supply_low, 11.9},
+      {{.supply_V = 12.0}, Reason::none, 0.0},
+      {{.temperature_C = 80.1}, Reason::board_too_hot, 80.1},
+      {{.temperature_C = 80.0}, Reason::none, 0.0},
+      {{}, Reason::none, 0.0},  // NaN: the board cannot tell
+  }));
+  CommandGate gate({.supply_min_V = 12.0, .temperature_max_C = 80.0});
+  std::ignore = gate.watch(row.measurement, 0);
+  CHECK(gate.fault() == row.reason);
+  CHECK(gate.fault_value() == row.value);
+}
+
+TEST_CASE("a board that no longer reports its health is a fault, one that never did is none") {
+  CommandGate supply(GateOptions{});
+  std::ignore = supply.watch({.supply_V = 24.0}, 0);
+  std::ignore = supply.watch({}, ms);
+  CHECK(supply.fault() == Reason::board_health_lost);
+  CHECK(supply.fault_value() == 1.0);
+  CommandGate temperature(GateOptions{});
+  std::ignore = temperature.watch({.temperature_C = 30.0}, 0);
+  std::ignore = temperature.watch({.supply_V = 24.0}, ms);
+  CHECK(temperature.fault() == Reason::board_health_lost);
+  CHECK(temperature.fault_value() == 2.0);
+  CommandGate never(GateOptions{});
+  std::ignore = never.watch({}, 0);
+  std::ignore = never.watch({}, ms);
+  CHECK(never.fault() == Reason::none);
+}
+
+namespace {
+
+/// Feeds a gate that watches with wheels that turn at given speeds, at 1 kHz.
+struct WatchedWheels {
+  explicit WatchedWheels(const WatchLimits& limits) : gate(GateOptions{}, any_phase(), limits) {}
+  void run(double omega1_rad_s, double omega2_rad_s, int cycles, const rig::Command& command = {}) {
+    for (int i = 0; i < cycles; ++i) {
+      now_ns += ms;
+      angle1 += omega1_rad_s * 1e-3;
+      angle2 += omega2_rad_s * 1e-3;
+      std::ignore = gate.watch({.time_ns = now_ns,
+                                .upper_counts = static_cast<std::int32_t>(angle1 * 651.8986),
+                                .lower_counts = static_cast<std::int32_t>(angle2 * 651.8986)},
+                               now_ns);
+      static_cast<void>(gate.check(command, {.phase = Phase::brake, .now_ns = now_ns}));
+    }
+  }
+  CommandGate gate;
+  std::int64_t now_ns{0};
+  double angle1{0.0};
+  double angle2{0.0};
+};
+
+WatchLimits paper_limits() { return watch_limits({}, false, {}); }
+
+}  // namespace
+
+TEST_CASE("the gate watches the wheels: encoders, response to what it sent, samples") {
+  WatchedWheels sound(paper_limits());
+  sound.run(100.0, 100.0, 1000);
+  CHECK(sound.gate.fault() == Reason::none);
+  sound.run(0.0, 100.0, 10);
+  CHECK(sound.gate.fault() == Reason::encoder_upper_stuck);
+
+  WatchedWheels rolling_on(paper_limits());
+  rolling_on.run(100.0, 100.0, 700, {.brake_duty = 0.7});
+  CHECK(rolling_on.gate.fault() == Reason::brake_no_response);
+
+  WatchedWheels silent(paper_limits());
+  silent.run(100.0, 100.0, 10);
+  for (int i = 0; i < 30; ++i) std::ignore = silent.gate.watch({.time_ns = 10 * ms}, (10 + i) * ms);
+  CHECK(silent.gate.fault() == Reason::samples_missing);
+  CHECK_FALSE(silent.gate.watch({.time_ns = 10 * ms}, 40 * ms));
+  CHECK(CommandGate(GateOptions{}, any_phase(), paper_limits()).watch({.time_ns = ms}, ms));
+
+  WatchedWheels unwatched({});
+  unwatched.run(100.0, 100.0, 10);
+  unwatched.run(0.0, 100.0, 10);
+  CHECK(unwatched.gate.fault() == Reason::none);
+}

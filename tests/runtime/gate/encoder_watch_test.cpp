@@ -1,0 +1,245 @@
+#include "abs_hil/runtime/encoder_watch.hpp"
+
+#include <cmath>
+
+#include "catch.hpp"
+
+using namespace abs_hil;
+using namespace abs_hil::runtime;
+using rig::Reason;
+using Verdict = SpeedInterval::Verdict;
+
+namespace {
+
+constexpr double dt_s = 0.002;
+constexpr double resolution_rad_s = 2.0 * 6.283185307179586 / 4096.0 / dt_s;
+
+WatchLimits limits() { return watch_limits({}, false, {.overspeed_rad_s = 250.0, .free_slip_max = 0.15}); }
+
+Stride stride(double omega1_rad_s, double omega2_rad_s, double brake_Nm = 0.0) {
+  return {.dt_s = dt_s,
+          .omega1_rad_s = omega1_rad_s,
+          .omega2_rad_s = omega2_rad_s,
+          .resolution_rad_s = resolution_rad_s,
+          .brake_target_Nm = brake_Nm};
+}
+
+/// What is found in `count` strides at these speeds.
+Finding run(EncoderWatch& watch, int count, double omega1_rad_s, double omega2_rad_s, double brake_Nm = 0.0) {
+  for (int i = 0; i < count; ++i) {
+    const Finding found = watch.update(stride(omega1_rad_s, omega2_rad_s, brake_Nm));
+    if (!found.sound()) return found;
+  }
+  return {};
+}
+
+}  // namespace
+
+TEST_CASE("a wheel's speed stays within what it can gain and lose") {
+  // Gains 100, loses 200 rad/s^2. After 100 rad/s the next 10 ms allow 93.5 less, and 104.5 plus, the reading's slack.
+  const auto doubtful_at = [](double omega_rad_s) {
+    SpeedInterval interval(100.0, 200.0, 250.0);
+    CHECK(interval.update(100.0, 1.0, 0.01) == Verdict::sound);
+    CHECK(interval.update(omega_rad_s, 1.0, 0.01) == Verdict::sound);
+    return interval.doubtful();
+  };
+  CHECK_FALSE(doubtful_at(91.2));
+  CHECK(doubtful_at(91.0));
+  CHECK_FALSE(doubtful_at(107.0));
+  CHECK(doubtful_at(107.2));
+}
+
+TEST_CASE("the interval widens while readings are outside, and narrows with each that is not") {
+  SpeedInterval interval(100.0, 200.0, 250.0);
+  static_cast<void>(interval.update(100.0, 1.0, 0.01));
+  static_cast<void>(interval.update(80.0, 1.0, 0.01));  // low 93.5
+  CHECK(interval.doubtful());
+  static_cast<void>(interval.update(90.0, 1.0, 0.01));  // low 91.5, 90 + 2.35 reaches it
+  CHECK_FALSE(interval.doubtful());
+  static_cast<void>(interval.update(107.0, 1.0, 0.01));  // high was narrowed to 93.35, now 94.35
+  CHECK(interval.doubtful());
+  // Low is what was known at 91.5, not 90 - 2.35 - 2: the better of the two.
+  SpeedInterval twice(100.0, 200.0, 250.0);
+  static_cast<void>(twice.update(100.0, 1.0, 0.01));
+  static_cast<void>(twice.update(92.0, 1.0, 0.01));  // low stays 93.5, high 95.38
+  static_cast<void>(twice.update(88.0, 1.0, 0.01));  // low 91.5: 88 + 2.32 is below
+  CHECK(twice.doubtful());
+  SpeedInterval high(100.0, 200.0, 250.0);
+  static_cast<void>(high.update(100.0, 1.0, 0.01));
+  static_cast<void>(high.update(106.5, 1.0, 0.01));  // high stays 104.5, low 101.9
+  static_cast<void>(high.update(108.5, 1.0, 0.01));  // high 105.5: 108.5 - 2.63 is above
+  CHECK(high.doubtful());
+}
+
+TEST_CASE("a wheel may swing back a little after it has stopped, no more") {
+  const auto doubtful_at = [](double omega_rad_s) {
+    SpeedInterval interval(100.0, 200.0, 250.0);
+    for (int i = 0; i < 50; ++i) static_cast<void>(interval.update(0.0, 1.0, 0.01));
+    static_cast<void>(interval.update(omega_rad_s, 1.0, 0.01));
+    return interval.doubtful();
+  };
+  CHECK_FALSE(doubtful_at(-2.9));
+  CHECK(doubtful_at(-3.2));
+}
+
+TEST_CASE("the first reading may be any speed up to the fastest, none below standstill") {
+  const auto doubtful_at = [](double omega_rad_s) {
+    SpeedInterval interval(100.0, 200.0, 250.0);
+    static_cast<void>(interval.update(omega_rad_s, 1.0, 0.001));
+    return interval.doubtful();
+  };
+  CHECK_FALSE(doubtful_at(0.0));
+  CHECK_FALSE(doubtful_at(250.0));
+  CHECK(doubtful_at(330.0));
+  CHECK(doubtful_at(-6.0));
+}
+
+TEST_CASE("three readings in a row make a fault, fewer do not") {
+  SpeedInterval interval(100.0, 200.0, 250.0);
+  static_cast<void>(interval.update(100.0, 1.0, 0.01));
+  CHECK(interval.update(0.0, 1.0, 0.01) == Verdict::sound);
+  CHECK(interval.update(0.0, 1.0, 0.01) == Verdict::sound);
+  CHECK(interval.update(96.0, 1.0, 0.01) == Verdict::sound);
+  CHECK_FALSE(interval.doubtful());
+  CHECK(interval.update(0.0, 1.0, 0.01) == Verdict::sound);
+  CHECK(interval.update(0.0, 1.0, 0.01) == Verdict::sound);
+  CHECK(interval.update(0.0, 1.0, 0.01) == Verdict::stuck);
+}
+
+TEST_CASE("what the readings are tells stuck, reversed and jumping apart") {
+  const auto verdict_of = [](double omega_rad_s) {
+    SpeedInterval interval(100.0, 200.0, 250.0);
+    static_cast<void>(interval.update(100.0, 1.0, 0.01));
+    static_cast<void>(interval.update(omega_rad_s, 1.0, 0.01));
+    static_cast<void>(interval.update(omega_rad_s, 1.0, 0.01));
+    return interval.update(omega_rad_s, 1.0, 0.01);
+  };
+  CHECK(verdict_of(0.0) == Verdict::stuck);
+  CHECK(verdict_of(0.9) == Verdict::stuck);
+  CHECK(verdict_of(-0.9) == Verdict::stuck);
+  CHECK(verdict_of(-5.0) == Verdict::reversed);
+  CHECK(verdict_of(-100.0) == Verdict::reversed);
+  CHECK(verdict_of(5.0) == Verdict::jumped);
+  CHECK(verdict_of(200.0) == Verdict::jumped);
+}
+
+TEST_CASE("each encoder's fault has its own reason") {
+  struct Row {
+    double omega1, omega2;
+    Reason reason;
+    double value;
+  };
+  const Row row = GENERATE(values<Row>({{0.0, 100.0, Reason::encoder_upper_stuck, 0.0},
+                                        {-100.0, 100.0, Reason::encoder_upper_reversed, -100.0},
+                                        {150.0, 100.0, Reason::encoder_upper_jumped, 150.0},
+                                        {100.0, 0.0, Reason::encoder_lower_stuck, 0.0},
+                                        {100.0, -100.0, Reason::encoder_lower_reversed, -100.0},
+                                        {100.0, 150.0, Reason::encoder_lower_jumped, 150.0},
+                                        {0.0, 0.0, Reason::encoders_lost, 0.0},
+                                        {-100.0, -100.0, Reason::encoder_upper_reversed, -100.0}}));
+  EncoderWatch watch(limits());
+  CHECK(run(watch, 20, 100.0, 100.0).sound());
+  CHECK(run(watch, 2, row.omega1, row.omega2).sound());
+  const Finding found = watch.update(stride(row.omega1, row.omega2));
+  CHECK(found.reason == row.reason);
+  CHECK(found.value == row.value);
+}
+
+TEST_CASE("both are lost only if both stand: one that stands and one in doubt for a moment") {
+  EncoderWatch watch(limits());
+  CHECK(run(watch, 20, 100.0, 100.0).sound());
+  CHECK(run(watch, 2, 100.0, 0.0).sound());
+  CHECK(run(watch, 1, 0.0, 0.0).reason == Reason::encoders_lost);
+}
+
+TEST_CASE("a wheel that its brake locks is no fault, at the rate of the whole brake torque") {
+  EncoderWatch watch(limits());
+  double omega1 = 170.0;
+  CHECK(run(watch, 20, omega1, 170.0).sound());
+  for (int i = 0; i < 200; ++i) {
+    omega1 = std::max(0.0, omega1 - (9.03 + 2.2885) / 7.54e-3 * dt_s);
+    CHECK(watch.update(stride(omega1, 170.0 - 40.0 * dt_s * i, 9.03)).sound());
+  }
+}
+
+TEST_CASE("the lag between command and brake torque") {
+  EncoderWatch watch(limits());
+  static_cast<void>(watch.update(stride(100.0, 100.0, 3.0)));
+  const double share = 20.37 * dt_s;
+  CHECK(watch.brake_torque_Nm() == Approx(3.0 * share / (1.0 + share)));
+  for (int i = 0; i < 500; ++i) static_cast<void>(watch.update(stride(100.0, 100.0, 3.0)));
+  CHECK(watch.brake_torque_Nm() == Approx(3.0));
+  EncoderWatch ideal(watch_limits({}, true, {}));
+  static_cast<void>(ideal.update(stride(100.0, 100.0, 3.0)));
+  CHECK(ideal.brake_torque_Nm() == 3.0);
+}
+
+TEST_CASE("with the brake long released the wheels roll on each other") {
+  const auto found = [](double omega1, double omega2) {
+    EncoderWatch watch(limits());
+    return run(watch, 60, omega1, omega2).reason;
+  };
+  // Allowed: 0.3 m/s + 15 % of the faster one + two counts, in m/s: 1.937 at 100 rad/s.
+  CHECK(found(81.0, 100.0) == Reason::none);
+  CHECK(found(79.5, 100.0) == Reason::encoders_disagree);
+  CHECK(found(118.7, 100.0) == Reason::none);
+  CHECK(found(124.0, 100.0) == Reason::encoders_disagree);
+  // and near standstill
+  CHECK(found(0.0, 5.0) == Reason::none);
+  CHECK(found(0.0, 6.0) == Reason::encoder_upper_stuck);
+  CHECK(found(6.0, 0.0) == Reason::encoder_lower_stuck);
+  EncoderWatch watch(limits());
+  CHECK(run(watch, 60, 75.0, 100.0).value == Approx(0.0995 * 75.0 - 0.099 * 100.0));
+}
+
+TEST_CASE("a disagreement must last a tenth of a second, and begins anew after agreement") {
+  EncoderWatch watch(limits());
+  CHECK(run(watch, 49, 75.0, 100.0).sound());
+  CHECK(run(watch, 2, 75.0, 100.0).reason == Reason::encoders_disagree);
+  EncoderWatch again(limits());
+  CHECK(run(again, 45, 75.0, 75.0 * 1.25).sound());
+  CHECK(run(again, 1, 75.0, 75.0 * 1.22).sound());
+  CHECK(run(again, 45, 75.0, 75.0 * 1.25).sound());
+}
+
+TEST_CASE("a wheel that was braked has three seconds to roll along again") {
+  EncoderWatch watch(limits());
+  CHECK(run(watch, 1, 75.0, 100.0, 0.5).sound());
+  CHECK(run(watch, 1499, 75.0, 100.0).sound());
+  CHECK(run(watch, 40, 75.0, 100.0).sound());
+  CHECK(run(watch, 20, 75.0, 100.0).reason == Reason::encoders_disagree);
+}
+
+TEST_CASE("a braked wheel is not the faster one") {
+  // The torque passes 1 N m after about 10 strides (3 N m through the lag), counts after 0.15 s more, and must then
+  // show the impossible for 0.05 s.
+  EncoderWatch watch(limits());
+  CHECK(run(watch, 105, 110.0, 100.0, 3.0).sound());
+  const Finding found = run(watch, 10, 110.0, 100.0, 3.0);
+  CHECK(found.reason == Reason::slip_implausible);
+  CHECK(found.value == Approx(1.0 - 0.0995 * 110.0 / (0.099 * 100.0)));
+  const auto reason = [](double omega1, double omega2, double brake_Nm) {
+    EncoderWatch w(limits());
+    return run(w, 400, omega1, omega2, brake_Nm).reason;
+  };
+  CHECK(reason(103.5, 100.0, 3.0) == Reason::none);  // 4 % faster
+  CHECK(reason(105.5, 100.0, 3.0) == Reason::slip_implausible);
+  CHECK(reason(33.0, 30.0, 3.0) == Reason::none);  // below 3 m/s
+  CHECK(reason(34.0, 31.0, 3.0) == Reason::slip_implausible);
+  CHECK(reason(110.0, 100.0, 0.98) == Reason::none);
+  CHECK(reason(110.0, 100.0, 1.02) == Reason::slip_implausible);
+}
+
+TEST_CASE("the faster braked wheel must last, and begins anew") {
+  EncoderWatch watch(limits());
+  CHECK(run(watch, 150, 100.0, 100.0, 3.0).sound());
+  CHECK(run(watch, 24, 110.0, 100.0, 3.0).sound());
+  CHECK(run(watch, 1, 104.0, 100.0, 3.0).sound());
+  CHECK(run(watch, 24, 110.0, 100.0, 3.0).sound());
+  CHECK(run(watch, 2, 110.0, 100.0, 3.0).reason == Reason::slip_implausible);
+  // A brake that lets go in between begins anew too.
+  EncoderWatch pulsed(limits());
+  CHECK(run(pulsed, 80, 110.0, 100.0, 3.0).sound());
+  CHECK(run(pulsed, 60, 100.0, 100.0, 0.1).sound());
+  CHECK(run(pulsed, 80, 110.0, 100.0, 3.0).sound());
+}

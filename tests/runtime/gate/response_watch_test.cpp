@@ -1,0 +1,177 @@
+#include "abs_hil/runtime/response_watch.hpp"
+
+#include "catch.hpp"
+
+using namespace abs_hil;
+using namespace abs_hil::runtime;
+using rig::Reason;
+
+namespace {
+
+constexpr double dt_s = 0.002;
+/// Momentum of both wheels at 1 rad/s, kg m/s: J1 / r1 + J2 / r2.
+constexpr double inertia_kg_m = 7.54e-3 / 0.0995 + 25.6e-3 / 0.099;
+
+struct Bench {
+  ResponseWatch watch{watch_limits({}, false, {})};
+  double omega1{0.0}, omega2{0.0};
+
+  /// Strides with both wheels changing speed steadily; what is found first.
+  Finding run(int count, double rad_s2, double motor_duty = 0.0, double brake_Nm = 0.0) {
+    for (int i = 0; i < count; ++i) {
+      omega1 += rad_s2 * dt_s;
+      omega2 += rad_s2 * dt_s;
+      const Finding found = watch.update(
+          {.dt_s = dt_s, .omega1_rad_s = omega1, .omega2_rad_s = omega2, .motor_duty = motor_duty}, brake_Nm);
+      if (!found.sound()) return found;
+    }
+    return {};
+  }
+};
+
+/// Two windows and a little, from equal speeds of both wheels.
+Finding found(double omega_rad_s, double rad_s2, double motor_duty = 0.0, double brake_Nm = 0.0) {
+  Bench bench{.omega1 = omega_rad_s, .omega2 = omega_rad_s};
+  return bench.run(103, rad_s2, motor_duty, brake_Nm);
+}
+
+}  // namespace
+
+TEST_CASE("wheels do not gain speed with the motor off") {
+  // 0.25 kg m/s in a window of 0.1 s is 7.48 rad/s^2.
+  CHECK(found(50.0, 7.3).sound());
+  const Finding rising = found(50.0, 7.8);
+  CHECK(rising.reason == Reason::speed_rises_with_motor_off);
+  CHECK(rising.value == Approx(7.8 * 0.1 * inertia_kg_m).epsilon(0.03));
+  CHECK(found(50.0, 0.0).sound());
+  CHECK(found(50.0, -30.0).sound());
+}
+
+TEST_CASE("each wheel counts with its inertia over its radius") {
+  // The upper wheel alone at 33 rad/s^2, the lower one at 9.7: 0.25 kg m/s each.
+  Bench upper;
+  Finding finding{};
+  for (int i = 0; i < 103 && finding.sound(); ++i) {
+    finding = upper.watch.update({.dt_s = dt_s, .omega1_rad_s = 34.0 * dt_s * i}, 0.0);
+  }
+  CHECK(finding.reason == Reason::speed_rises_with_motor_off);
+  CHECK(finding.value == Approx(34.0 * 0.1 * 7.54e-3 / 0.0995).epsilon(0.03));
+  Bench lower;
+  finding = {};
+  for (int i = 0; i < 103 && finding.sound(); ++i) {
+    finding = lower.watch.update({.dt_s = dt_s, .omega2_rad_s = 10.0 * dt_s * i}, 0.0);
+  }
+  CHECK(finding.value == Approx(10.0 * 0.1 * 25.6e-3 / 0.099).epsilon(0.03));
+}
+
+TEST_CASE("while the motor is on, and in the window in which it ends, speed may rise") {
+  CHECK(found(50.0, 30.0, 1e-3).sound());
+  Bench ended{.omega1 = 50.0, .omega2 = 50.0};
+  CHECK(ended.run(52, 30.0, 1.0).sound());
+  CHECK(ended.run(30, 30.0).sound());  // within the second window
+  CHECK(ended.run(22, 0.0).sound());
+  Bench begun{.omega1 = 50.0, .omega2 = 50.0};
+  CHECK(begun.run(60, 0.0).sound());
+  CHECK(begun.run(43, 30.0, 1.0).sound());
+  Bench still_on{.omega1 = 50.0, .omega2 = 50.0};
+  CHECK(still_on.run(60, 30.0, 1.0).sound());
+  CHECK(still_on.run(100, 30.0).sound());
+  CHECK(still_on.run(103, 30.0).reason == Reason::speed_rises_with_motor_off);
+}
+
+TEST_CASE("nothing is said before two windows have passed") {
+  Bench bench{.omega1 = 50.0, .omega2 = 50.0};
+  CHECK(bench.run(98, 60.0).sound());
+  CHECK(bench.run(5, 60.0).reason == Reason::speed_rises_with_motor_off);
+}
+
+TEST_CASE("the motor accelerates the wheels by at least a quarter of what it should") {
+  // From rest at full duty: (2.1122 - 2 0.0925) / 0.099 0.1 s = 1.947 kg m/s; a quarter is 14.6 rad/s^2.
+  CHECK(found(0.0, 15.2, 1.0).sound());
+  const Finding weak = found(0.0, 13.6, 1.0);
+  CHECK(weak.reason == Reason::motor_no_response);
+  CHECK(weak.value == Approx(13.6 * 0.1 * inertia_kg_m).epsilon(0.03));
+  // What duty 0.228 should give at rest is 0.3 kg m/s: less is not looked for.
+  CHECK(found(0.0, 0.0, 0.222).sound());
+  CHECK(found(0.0, 0.0, 0.234).reason == Reason::motor_no_response);
+  // Back-EMF and twice the friction: 0.3 kg m/s at 161.7 rad/s.
+  CHECK(found(160.0, 0.0, 1.0).reason == Reason::motor_no_response);
+  CHECK(found(163.5, 0.0, 1.0).sound());
+}
+
+TEST_CASE("both windows count towards what the motor should give") {
+  Bench late;
+  CHECK(late.run(51, 0.0).sound());
+  // One window of full duty counts half: 0.87 of them, 14.6 rad/s^2 in one window moves the mean by half as much.
+  CHECK(late.run(50, 20.0, 1.0).sound());
+  Bench never;
+  CHECK(never.run(51, 0.0).sound());
+  CHECK(never.run(52, 0.0, 1.0).reason == Reason::motor_no_response);
+  Bench only_before;
+  CHECK(only_before.run(50, 0.0, 1.0).sound());
+  CHECK(only_before.run(53, 0.0).reason == Reason::motor_no_response);
+}
+
+TEST_CASE("a motor that works against the brake is not judged") {
+  CHECK(found(0.0, 0.0, 1.0, 0.11).sound());
+  CHECK(found(0.0, 0.0, 1.0, 0.09).reason == Reason::motor_no_response);
+  Bench braked_before;
+  CHECK(braked_before.run(20, 0.0, 1.0, 0.5).sound());
+  CHECK(braked_before.run(83, 0.0, 1.0).sound());
+  CHECK(braked_before.run(53, 0.0, 1.0).reason == Reason::motor_no_response);
+  Bench braked_after;
+  CHECK(braked_after.run(70, 0.0, 1.0).sound());
+  CHECK(braked_after.run(33, 0.0, 1.0, 0.5).sound());
+}
+
+TEST_CASE("the brake takes at least three tenths of what it should") {
+  // 3 N m / 0.0995 m 0.1 s = 3.015 kg m/s; three tenths are 27.05 rad/s^2.
+  CHECK(found(100.0, -27.7, 0.0, 3.0).sound());
+  const Finding weak = found(100.0, -26.4, 0.0, 3.0);
+  CHECK(weak.reason == Reason::brake_no_response);
+  CHECK(weak.value == Approx(-26.4 * 0.1 * inertia_kg_m).epsilon(0.03));
+  CHECK(found(100.0, 0.0, 0.0, 1.45).sound());
+  CHECK(found(100.0, 0.0, 0.0, 1.55).reason == Reason::brake_no_response);
+  // Momentum above 5 kg m/s, 14.95 rad/s, only.
+  CHECK(found(14.8, 0.0, 0.0, 3.0).sound());
+  CHECK(found(15.1, 0.0, 0.0, 3.0).reason == Reason::brake_no_response);
+}
+
+TEST_CASE("the brake is judged only while it acts in earnest through both windows, on a wheel that rolls, motor off") {
+  Bench weak_before{.omega1 = 100.0, .omega2 = 100.0};
+  CHECK(weak_before.run(1, 0.0, 0.0, 1.0).sound());
+  CHECK(weak_before.run(102, 0.0, 0.0, 3.0).sound());
+  CHECK(weak_before.run(53, 0.0, 0.0, 3.0).reason == Reason::brake_no_response);
+  Bench weak_now{.omega1 = 100.0, .omega2 = 100.0};
+  CHECK(weak_now.run(90, 0.0, 0.0, 3.0).sound());
+  CHECK(weak_now.run(13, 0.0, 0.0, 1.0).sound());
+
+  // Rolling is half the speed or more: r1 omega1 >= 0.5 r2 omega2.
+  Bench slow{.omega1 = 49.0, .omega2 = 100.0};
+  CHECK(slow.run(103, 0.0, 0.0, 3.0).sound());
+  Bench fast{.omega1 = 50.5, .omega2 = 100.0};
+  CHECK(fast.run(103, 0.0, 0.0, 3.0).reason == Reason::brake_no_response);
+  Bench locked_before{.omega1 = 0.0, .omega2 = 100.0};
+  CHECK(locked_before.run(1, 0.0, 0.0, 3.0).sound());
+  locked_before.omega1 = 100.0;
+  CHECK(locked_before.run(102, 0.0, 0.0, 3.0).sound());
+  CHECK(locked_before.run(53, 0.0, 0.0, 3.0).reason == Reason::brake_no_response);
+  Bench locked_now{.omega1 = 100.0, .omega2 = 100.0};
+  CHECK(locked_now.run(80, 0.0, 0.0, 3.0).sound());
+  locked_now.omega1 = 0.0;
+  CHECK(locked_now.run(1, 0.0, 0.0, 3.0).sound());
+  locked_now.omega1 = 100.0;
+  CHECK(locked_now.run(22, 0.0, 0.0, 3.0).sound());
+
+  CHECK(found(100.0, 0.0, 0.01, 3.0).sound());
+}
+
+TEST_CASE("both windows count towards what the brake should take") {
+  Bench harder{.omega1 = 100.0, .omega2 = 100.0};
+  CHECK(harder.run(51, -20.0, 0.0, 2.0).sound());
+  // The mean of 2 and 4 N m is 3: 27 rad/s^2.
+  CHECK(harder.run(52, -34.5, 0.0, 4.0).sound());
+  Bench too_little{.omega1 = 100.0, .omega2 = 100.0};
+  CHECK(too_little.run(51, -26.0, 0.0, 2.0).sound());
+  CHECK(too_little.run(52, -26.0, 0.0, 4.0).reason == Reason::brake_no_response);
+}
