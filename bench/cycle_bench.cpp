@@ -75,7 +75,7 @@ void controller_step(benchmark::State& state, std::string_view name) {
 void gate(benchmark::State& state) {
   runtime::CommandGate gate{runtime::GateOptions{}};
   for_each_record(state, [&](const rig::CycleRecord& record) {
-    benchmark::DoNotOptimize(gate.check(record.command, record.control.speeds_est));
+    benchmark::DoNotOptimize(gate.check(record.command, {record.control.speeds_est, record.phase, record.stamp_ns}));
   });
 }
 
