@@ -37,7 +37,8 @@ void CommandGate::note(GateAction action) noexcept {
 
 rig::GateCounts CommandGate::counts() const noexcept {
   rig::GateCounts counts{};
-  for (std::size_t i = 0; i < counts.size(); ++i) counts[i] = counts_[i].load(std::memory_order_relaxed);
+  std::transform(counts_.begin(), counts_.end(), counts.begin(),
+                 [](const auto& count) { return count.load(std::memory_order_relaxed); });
   return counts;
 }
 
@@ -66,7 +67,7 @@ void CommandGate::watch_wheels(const rig::Measurement& measurement, std::int64_t
     finding = encoders_.update(strides_.stride());
     if (finding.sound()) finding = response_.update(strides_.stride(), encoders_.brake_torque_Nm());
   }
-  if (!finding.sound()) latch(finding.reason, finding.value);
+  latch(finding.reason, finding.value);
 }
 
 void CommandGate::require_finite(const rig::Command& wanted, const rig::WheelSpeeds& speeds) noexcept {

@@ -91,6 +91,9 @@ TEST_CASE("the first fault stays") {
   CommandGate gate(GateOptions{});
   gate.latch(rig::Reason::driver_read_failed, 2.0);
   gate.latch(rig::Reason::overspeed, 300.0);
+  const GateResult refused = gate.check({}, moderate);
+  CHECK(refused.fault == rig::Reason::driver_read_failed);
+  CHECK(refused.fault_value == 2.0);
   CHECK(gate.fault() == rig::Reason::driver_read_failed);
   CHECK(gate.fault_value() == 2.0);
 }
@@ -277,5 +280,6 @@ TEST_CASE("the gate watches the wheels: encoders, response to what it sent, samp
   WatchedWheels unwatched({});
   unwatched.run(100.0, 100.0, 10);
   unwatched.run(0.0, 100.0, 10);
+  for (int i = 0; i < 30; ++i) CHECK(unwatched.gate.watch({.time_ns = 10 * ms}, (20 + i) * ms));
   CHECK(unwatched.gate.fault() == Reason::none);
 }
