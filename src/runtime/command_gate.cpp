@@ -14,6 +14,8 @@ using rig::Reason;
 constexpr double s_per_ns = 1e-9;
 /// Rounding must not make a step that the limit just allows look like one it does not.
 constexpr double rounding = 1e-9;
+/// A reading that took longer was held up somewhere between its counters and its stamp.
+constexpr std::int64_t prompt_reading_ns = 500'000;
 
 bool brakes(const rig::Command& command) noexcept { return command.brake_duty > 0.0 || command.brake_torque_Nm > 0.0; }
 
@@ -42,9 +44,9 @@ rig::GateCounts CommandGate::counts() const noexcept {
   return counts;
 }
 
-bool CommandGate::watch(const rig::Measurement& measurement, std::int64_t now_ns) noexcept {
+bool CommandGate::watch(const rig::Measurement& measurement, std::int64_t now_ns, std::int64_t reading_ns) noexcept {
   watch_board(measurement);
-  if (watching_) watch_wheels(measurement, now_ns);
+  if (watching_) watch_wheels(measurement, now_ns, reading_ns <= prompt_reading_ns);
   return strides_.usable();
 }
 
@@ -61,8 +63,8 @@ void CommandGate::watch_board(const rig::Measurement& measurement) noexcept {
   temperature_known_ = !std::isnan(measurement.temperature_C);
 }
 
-void CommandGate::watch_wheels(const rig::Measurement& measurement, std::int64_t now_ns) noexcept {
-  Finding finding = strides_.update(measurement, now_ns, sent_);
+void CommandGate::watch_wheels(const rig::Measurement& measurement, std::int64_t now_ns, bool prompt) noexcept {
+  Finding finding = strides_.update(measurement, now_ns, sent_, prompt);
   if (strides_.complete()) {
     finding = encoders_.update(strides_.stride());
     if (finding.sound()) finding = response_.update(strides_.stride(), encoders_.brake_torque_Nm());

@@ -71,15 +71,15 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
 
   rig::Measurement latest;
   const driver::IoResult read = driver_.read(woken_ns, latest);
+  const std::int64_t read_ns = clock_.now_ns();
   if (!read.ok()) {
     if (io_error_.ok()) io_error_ = read;
     gate_.latch(driver::reason_of(read, rig::Reason::driver_read_failed), static_cast<double>(read.error));
-  } else if (gate_.watch(latest, woken_ns) || record.sequence == 0) {
+  } else if (gate_.watch(latest, woken_ns, read_ns - woken_ns) || record.sequence == 0) {
     measurement_ = latest;
   }
   record.measurement = measurement_;
   record.truth = driver_.truth();
-  const std::int64_t read_ns = clock_.now_ns();
 
   if (const rig::Reason stop = stop_request_.load(std::memory_order_relaxed); stop != rig::Reason::none) {
     logic_.end_early(stop, 0.0);

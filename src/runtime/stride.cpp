@@ -43,8 +43,8 @@ bool StrideMaker::leaps(std::int32_t before, std::int32_t now, double since_s) c
   return turned_rad > 2.0 * limits_.overspeed_rad_s * (since_s + leap_slack_s);
 }
 
-Finding StrideMaker::update(const rig::Measurement& measurement, std::int64_t now_ns,
-                            const rig::Command& sent) noexcept {
+Finding StrideMaker::update(const rig::Measurement& measurement, std::int64_t now_ns, const rig::Command& sent,
+                            bool prompt) noexcept {
   complete_ = false;
   usable_ = fresh(measurement.time_ns, now_ns);
   if (!usable_) {
@@ -61,6 +61,11 @@ Finding StrideMaker::update(const rig::Measurement& measurement, std::int64_t no
     begin(measurement);
     return {};
   }
+  const double brake_Nm =
+      limits_.ideal_actuator ? sent.brake_torque_Nm : rig::brake_torque_at(limits_.brake, sent.brake_duty);
+  brake_impulse_Nms_ += brake_Nm * since_s;
+  motor_duty_s_ += sent.motor_duty * since_s;
+  if (!prompt) return {};
   const bool upper_leaps = leaps(upper_before, upper_, since_s);
   usable_ = !upper_leaps && !leaps(lower_before, lower_, since_s);
   if (!usable_) {
@@ -69,10 +74,6 @@ Finding StrideMaker::update(const rig::Measurement& measurement, std::int64_t no
     return {upper_leaps ? rig::Reason::encoder_upper_jumped : rig::Reason::encoder_lower_jumped,
             leapt * limits_.rad_per_count};
   }
-  const double brake_Nm =
-      limits_.ideal_actuator ? sent.brake_torque_Nm : rig::brake_torque_at(limits_.brake, sent.brake_duty);
-  brake_impulse_Nms_ += brake_Nm * since_s;
-  motor_duty_s_ += sent.motor_duty * since_s;
 
   const double dt_s = static_cast<double>(measurement.time_ns - begin_ns_) * s_per_ns;
   if (dt_s < stride_s) return {};

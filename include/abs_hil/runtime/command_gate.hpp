@@ -54,7 +54,8 @@ class CommandGate {
   /// Takes a cycle's measurement before anything is made of it: latches what the board reports about itself and what
   /// cannot be true of the wheels.
   /// @return false if nothing may be made of it: stale, or a counter has leapt. The one before then stands.
-  bool watch(const rig::Measurement& measurement, std::int64_t now_ns) noexcept;
+  /// @param reading_ns how long the reading took: one that was held up is not judged
+  bool watch(const rig::Measurement& measurement, std::int64_t now_ns, std::int64_t reading_ns = 0) noexcept;
   [[nodiscard]] GateResult check(const rig::Command& wanted, const GateInput& input) noexcept;
   /// Latches a fault found elsewhere (driver, executive). The first one stays.
   void latch(rig::Reason fault, double value) noexcept;
@@ -69,7 +70,7 @@ class CommandGate {
 
  private:
   void watch_board(const rig::Measurement& measurement) noexcept;
-  void watch_wheels(const rig::Measurement& measurement, std::int64_t now_ns) noexcept;
+  void watch_wheels(const rig::Measurement& measurement, std::int64_t now_ns, bool prompt) noexcept;
   void require_finite(const rig::Command& wanted, const rig::WheelSpeeds& speeds) noexcept;
   [[nodiscard]] double limited(double duty, double most, GateAction action) noexcept;
   [[nodiscard]] double rising(double duty, double before, double rate_per_s, double elapsed_s,

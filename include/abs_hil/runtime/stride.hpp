@@ -32,8 +32,10 @@ class StrideMaker {
   explicit StrideMaker(const WatchLimits& limits) noexcept : limits_(limits) {}
 
   /// Takes a measurement and the command that has acted since the one before.
-  /// @param now_ns the cycle's wake-up, on the clock of the stamps
-  Finding update(const rig::Measurement& measurement, std::int64_t now_ns, const rig::Command& sent) noexcept;
+  /// @param now_ns  the cycle's wake-up, on the clock of the stamps
+  /// @param prompt  the reading was not held up, so that its stamp holds for its counts: no stride ends on another
+  Finding update(const rig::Measurement& measurement, std::int64_t now_ns, const rig::Command& sent,
+                 bool prompt = true) noexcept;
   /// True if the latest measurement may be used: fresh, and no counter has leapt.
   [[nodiscard]] bool usable() const noexcept { return usable_; }
   /// True if the latest update completed a stride.

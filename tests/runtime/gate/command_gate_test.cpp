@@ -277,6 +277,15 @@ TEST_CASE("the gate watches the wheels: encoders, response to what it sent, samp
   CHECK_FALSE(silent.gate.watch({.time_ns = 10 * ms}, 40 * ms));
   CHECK(CommandGate(GateOptions{}, any_phase(), paper_limits()).watch({.time_ns = ms}, ms));
 
+  // A reading of half a millisecond is judged, a longer one is not.
+  for (const bool judged : {true, false}) {
+    WatchedWheels held_up(paper_limits());
+    held_up.run(100.0, 100.0, 10);
+    std::ignore =
+        held_up.gate.watch({.time_ns = 11 * ms, .upper_counts = 100'000}, 11 * ms, judged ? 500'000 : 500'001);
+    CHECK((held_up.gate.fault() == Reason::encoder_upper_jumped) == judged);
+  }
+
   WatchedWheels unwatched({});
   unwatched.run(100.0, 100.0, 10);
   unwatched.run(0.0, 100.0, 10);

@@ -135,6 +135,19 @@ TEST_CASE("a counter that leaps is found in the same cycle, and its measurement 
   }
 }
 
+TEST_CASE("no stride ends on a reading that was held up, nor is it judged") {
+  StrideMaker maker(limits());
+  CHECK(maker.update(at(1 * ms), 1 * ms, {}).sound());
+  CHECK(maker.update(at(4 * ms, 20'000), 4 * ms, {.motor_duty = 0.5}, false).sound());
+  CHECK(maker.usable());
+  CHECK_FALSE(maker.complete());
+  CHECK(maker.update(at(5 * ms, 20'100), 5 * ms, {.motor_duty = 0.5}).sound());
+  REQUIRE(maker.complete());
+  CHECK(maker.stride().dt_s == Approx(0.004));
+  CHECK(maker.stride().omega1_rad_s == Approx(20'100 * rad_per_count / 0.004));
+  CHECK(maker.stride().motor_duty == Approx(0.5));
+}
+
 TEST_CASE("a stale measurement is not used") {
   StrideMaker maker(limits());
   CHECK(maker.usable());
