@@ -1,6 +1,7 @@
 #include "abs_hil/runtime/encoder_watch.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace abs_hil::runtime {
@@ -21,6 +22,17 @@ constexpr double braked_after_s = 0.15;
 constexpr double slip_speed_m_s = 3.0;
 constexpr double ahead_part = 0.05;
 constexpr double ahead_max_s = 0.05;
+
+/// By verdict.
+using Reasons = std::array<Reason, 4>;
+constexpr Reasons upper_reasons{Reason::none, Reason::encoder_upper_stuck, Reason::encoder_upper_reversed,
+                                Reason::encoder_upper_jumped};
+constexpr Reasons lower_reasons{Reason::none, Reason::encoder_lower_stuck, Reason::encoder_lower_reversed,
+                                Reason::encoder_lower_jumped};
+
+Reason reason_of(SpeedInterval::Verdict verdict, const Reasons& reasons) noexcept {
+  return reasons[static_cast<std::size_t>(verdict)];
+}
 
 }  // namespace
 
@@ -67,19 +79,8 @@ Finding EncoderWatch::judge_speeds(const Stride& stride) noexcept {
   const Verdict lower = lower_.update(stride.omega2_rad_s, stride.resolution_rad_s, stride.dt_s);
   const bool both_doubtful = upper_.doubtful() && lower_.doubtful();
   if (both_doubtful && (upper == Verdict::stuck || lower == Verdict::stuck)) return {Reason::encoders_lost, 0.0};
-  switch (upper) {
-    case Verdict::stuck: return {Reason::encoder_upper_stuck, stride.omega1_rad_s};
-    case Verdict::reversed: return {Reason::encoder_upper_reversed, stride.omega1_rad_s};
-    case Verdict::jumped: return {Reason::encoder_upper_jumped, stride.omega1_rad_s};
-    case Verdict::sound: break;
-  }
-  switch (lower) {
-    case Verdict::stuck: return {Reason::encoder_lower_stuck, stride.omega2_rad_s};
-    case Verdict::reversed: return {Reason::encoder_lower_reversed, stride.omega2_rad_s};
-    case Verdict::jumped: return {Reason::encoder_lower_jumped, stride.omega2_rad_s};
-    case Verdict::sound: break;
-  }
-  return {};
+  if (upper != Verdict::sound) return {reason_of(upper, upper_reasons), stride.omega1_rad_s};
+  return {reason_of(lower, lower_reasons), stride.omega2_rad_s};
 }
 
 Finding EncoderWatch::judge_rolling(const Stride& stride) noexcept {

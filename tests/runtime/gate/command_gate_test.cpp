@@ -226,6 +226,9 @@ TEST_CASE("a board that no longer reports its health is a fault, one that never 
   std::ignore = temperature.watch({.supply_V = 24.0}, ms);
   CHECK(temperature.fault() == Reason::board_health_lost);
   CHECK(temperature.fault_value() == 2.0);
+  CommandGate healthy(GateOptions{});
+  for (int i = 0; i < 3; ++i) std::ignore = healthy.watch({.supply_V = 24.0, .temperature_C = 30.0}, i * ms);
+  CHECK(healthy.fault() == Reason::none);
   CommandGate never(GateOptions{});
   std::ignore = never.watch({}, 0);
   std::ignore = never.watch({}, ms);

@@ -113,8 +113,8 @@ TEST_CASE("both windows count towards what the motor should give") {
 }
 
 TEST_CASE("a motor that works against the brake is not judged") {
-  CHECK(found(0.0, 0.0, 1.0, 0.11).sound());
-  CHECK(found(0.0, 0.0, 1.0, 0.09).reason == Reason::motor_no_response);
+  CHECK(found(0.0, 0.0, 1.0, 0.105).sound());
+  CHECK(found(0.0, 0.0, 1.0, 0.095).reason == Reason::motor_no_response);
   Bench braked_before;
   CHECK(braked_before.run(20, 0.0, 1.0, 0.5).sound());
   CHECK(braked_before.run(83, 0.0, 1.0).sound());
