@@ -45,7 +45,7 @@ TEST_CASE("every fault in every phase ends safe, recorded to the last cycle, for
     if (c.survived()) {
       CHECK(expectation.may_survive);
     } else {
-      CHECK(std::count(expectation.reasons.begin(), expectation.reasons.end(), c.reason) == 1);
+      CHECK(std::count(expectation.reasons.begin(), expectation.reasons.end(), c.reason) > 0);
       CHECK(c.reaction_s <= expectation.bound_s);
     }
   }

@@ -12,8 +12,14 @@ constexpr double dt_s = 0.002;
 /// Momentum of both wheels at 1 rad/s, kg m/s: J1 / r1 + J2 / r2.
 constexpr double inertia_kg_m = 7.54e-3 / 0.0995 + 25.6e-3 / 0.099;
 
+WatchLimits paper_limits() {
+  const rig::RigParameters rig{};
+  const GateOptions options{};
+  return watch_limits(rig, false, options);
+}
+
 struct Bench {
-  ResponseWatch watch{watch_limits({}, false, {})};
+  ResponseWatch watch{paper_limits()};
   double omega1{0.0}, omega2{0.0};
 
   /// Strides with both wheels changing speed steadily; what is found first.
