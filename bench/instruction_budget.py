@@ -17,7 +17,7 @@ BUDGETS = [
      ['abs_hil::control::TrackingObserver::update*', 'abs_hil::control::AdaptiveController::step*',
       'abs_hil::runtime::CommandGate::check*'], 1000),
     ('the same with sequence and actuator: all of "control"', ['counted_control'], 1500),
-    ('plausibility of the measurement', ['counted_watch'], 200),
+    ('plausibility of the measurement', ['counted_watch'], 300),
     ('ring push of one record', ['counted_ring_push'], 150),
     ('five histograms', ['counted_statistics'], 200),
 ]
