@@ -27,7 +27,7 @@ struct Bench {
     rig::CycleRecord record;
     REQUIRE(driver.read(now_ns, measurement).ok());
     const rig::Command wanted = logic.step(measurement, record);
-    record.command = gate.check(wanted, record.control.speeds_est).command;
+    record.command = gate.check(wanted, {record.control.speeds_est, record.phase, now_ns}).command;
     REQUIRE(driver.write(record.command).ok());
     logic.commanded(record.command);
     now_ns += ms;
