@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "abs_hil/control/registry.hpp"
+#include "abs_hil/rig/brake_map.hpp"
 #include "abs_hil/rig/encoder_scale.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 
@@ -21,7 +22,8 @@ constexpr double start_limit_s = 600.0;
 
 RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig::RigParameters& rig,
                                bool ideal_actuator, const runtime::GateOptions& gate,
-                               const ExperimentOptions& experiment, std::vector<PhasePlan> plans) {
+                               const ExperimentOptions& experiment, std::vector<PhasePlan> plans,
+                               const SequenceLimits& limits) {
   if (experiment.wait_for_start) {
     plans.insert(plans.begin(), {.phase = rig::Phase::idle,
                                  .ends_on = {{EndKind::start_command, 0.0, rig::Reason::start_command}},
@@ -30,7 +32,7 @@ RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig
   return {.control = control,
           .rig = rig,
           .controller = control::make_controller(control.controller, {control, rig}),
-          .sequence = Sequence(std::move(plans)),
+          .sequence = Sequence(std::move(plans), limits),
           .ideal_actuator = ideal_actuator,
           .max_brake_duty = gate.brake_duty_max,
           .start_speed_rad_s = experiment.start_speed_rad_s};
@@ -42,6 +44,7 @@ RunLogic::RunLogic(RunLogicParts parts)
       wheels_(parts.rig.wheels),
       rad_per_count_(rig::radians_per_count(parts.rig.encoder_counts_per_rev)),
       slip_ref_(parts.control.slip_ref),
+      brake_(parts.rig.brake),
       start_speed_rad_s_(parts.start_speed_rad_s),
       controller_(std::move(parts.controller)),
       sequence_(std::move(parts.sequence)),
@@ -86,6 +89,7 @@ void RunLogic::note_travel(const rig::Measurement& measurement, double dt_s) noe
     upper_travel_rad_ = rig::counts_between(upper_counts_, measurement.upper_counts) * rad_per_count_;
     lower_travel_rad_ = rig::counts_between(lower_counts_, measurement.lower_counts) * rad_per_count_;
   }
+  distance_m_ += wheels_.r2_m * lower_travel_rad_;
   upper_counts_ = measurement.upper_counts;
   lower_counts_ = measurement.lower_counts;
 }
@@ -94,7 +98,7 @@ double RunLogic::slip_control(double dt_s, bool entered, rig::ControlState& stat
   control::SlipInput input{.dt_s = entered ? 0.0 : dt_s,
                            .speeds = speeds_,
                            .slip = slip_,
-                           .slip_ref = slip_ref_,
+                           .slip_ref = state.slip_ref,
                            .mean_brake_torque_Nm = actuator_.mean_torque_Nm(),
                            .brake_torque_Nm = actuator_.torque_Nm(),
                            .max_brake_torque_Nm = actuator_.max_torque_Nm(),
@@ -155,10 +159,13 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
                         .speeds = speeds_,
                         .car_speed_m_s = wheels_.r2_m * speeds_.omega2_rad_s,
                         .stands_still = stands_still_,
-                        .start_given = start_given_});
+                        .start_given = start_given_,
+                        .slip = slip_,
+                        .distance_m = distance_m_});
   if (change.entered && sequence_.finished()) end_ = change;
   const PhasePlan& plan = sequence_.current();
   record.phase = plan.phase;
+  record.phase_index = static_cast<std::uint16_t>(sequence_.index());
   record.reason = change.reason;
   record.reason_value = change.value;
   if (!change.entered) adjust(record);
@@ -169,20 +176,35 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
   state.slip_ref = slip_ref_;
   state.brake_torque_est_Nm = actuator_.torque_Nm();
 
+  const double phase_time_s = sequence_.phase_time_s();
   double torque_Nm = 0.0;
-  if (plan.brake == BrakeAction::slip_control) {
-    torque_Nm = slip_control(dt_s, change.entered, state);
-  } else if (plan.brake == BrakeAction::torque) {
-    torque_Nm = plan.brake_torque_Nm;
+  double brake_duty = 0.0;
+  if (plan.brake == BrakeAction::duty) {
+    brake_duty = plan.brake_duty_at(phase_time_s);
+    torque_Nm = rig::brake_torque_at(brake_, brake_duty);
+  } else {
+    torque_Nm = actuator_.limited(wanted_torque_Nm(plan, dt_s, change.entered, state));
+    brake_duty = actuator_.duty_for(torque_Nm);
   }
   if (replaced_ != nullptr) adjustments_.retire(std::exchange(replaced_, nullptr));
-  torque_Nm = actuator_.limited(torque_Nm);
   state.brake_torque_ref_Nm = torque_Nm;
 
-  return {.motor_duty = plan.motor_duty,
-          .brake_duty = actuator_.duty_for(torque_Nm),
-          .motor_enable = plan.motor_duty > 0.0,
+  const double motor_duty = plan.motor_duty_at(phase_time_s);
+  return {.motor_duty = motor_duty,
+          .brake_duty = brake_duty,
+          .motor_enable = motor_duty > 0.0,
           .brake_torque_Nm = torque_Nm};
+}
+
+double RunLogic::wanted_torque_Nm(const PhasePlan& plan, double dt_s, bool entered, rig::ControlState& state) noexcept {
+  switch (plan.brake) {
+    case BrakeAction::released:
+    case BrakeAction::duty: return 0.0;
+    case BrakeAction::torque: return plan.brake_torque_Nm_at(sequence_.phase_time_s());
+    case BrakeAction::slip_control: break;
+  }
+  if (!plan.slip_ref_course.empty()) state.slip_ref = plan.slip_ref_course.at(sequence_.phase_time_s());
+  return slip_control(dt_s, entered, state);
 }
 
 void RunLogic::commanded(const rig::Command& command) noexcept {

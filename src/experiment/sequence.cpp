@@ -33,7 +33,8 @@ void check_safe(const PhasePlan& plan, const std::string& name) {
 }
 }  // namespace
 
-Sequence::Sequence(std::vector<PhasePlan> plans) : plans_(std::move(plans)) {
+Sequence::Sequence(std::vector<PhasePlan> plans, const SequenceLimits& limits)
+    : plans_(std::move(plans)), limits_(limits) {
   if (plans_.empty()) throw std::invalid_argument("a sequence needs at least one phase");
   for (const PhasePlan& plan : plans_) {
     const std::string name(rig::name_of(plan.phase));
@@ -57,8 +58,34 @@ void Sequence::enter(std::size_t index, const SequenceInput& input) noexcept {
   index_ = index;
   started_ = true;
   entered_at_s_ = input.time_s;
+  entered_at_m_ = input.distance_m;
   peak_speed_rad_s_ = input.speeds.omega1_rad_s;
   peak_at_s_ = input.time_s;
+}
+
+bool Sequence::holds(const EndCondition& condition, const SequenceInput& input) const noexcept {
+  const double value = condition.value;
+  switch (condition.kind) {
+    case EndKind::duration: return input.time_s - entered_at_s_ >= value;
+    case EndKind::upper_speed_above: return input.speeds.omega1_rad_s >= value;
+    case EndKind::upper_speed_below: return input.speeds.omega1_rad_s < value;
+    // A wheel that has not started to turn has no peak yet.
+    case EndKind::upper_wheel_peak: return peak_speed_rad_s_ > peak_margin_rad_s && input.time_s - peak_at_s_ >= value;
+    case EndKind::lower_speed_above: return input.speeds.omega2_rad_s >= value;
+    case EndKind::lower_speed_below: return input.speeds.omega2_rad_s < value;
+    case EndKind::car_speed_above: return input.car_speed_m_s >= value;
+    case EndKind::car_speed_below: return input.car_speed_m_s < value;
+    case EndKind::standstill: return input.stands_still;
+    case EndKind::start_command: return input.start_given;
+    case EndKind::slip_above: return input.slip >= value;
+    case EndKind::slip_below: return input.slip < value;
+    case EndKind::distance: return input.distance_m - entered_at_m_ >= value;
+    case EndKind::all: break;
+  }
+  for (const EndCondition& part : condition.parts) {
+    if (!holds(part, input)) return false;
+  }
+  return !condition.parts.empty();
 }
 
 const EndCondition* Sequence::ending(const SequenceInput& input) noexcept {
@@ -66,21 +93,8 @@ const EndCondition* Sequence::ending(const SequenceInput& input) noexcept {
     peak_speed_rad_s_ = input.speeds.omega1_rad_s;
     peak_at_s_ = input.time_s;
   }
-  const auto holds = [&](const EndCondition& condition) {
-    switch (condition.kind) {
-      case EndKind::duration: return input.time_s - entered_at_s_ >= condition.value;
-      case EndKind::upper_speed_above: return input.speeds.omega1_rad_s >= condition.value;
-      // A wheel that has not started to turn has no peak yet.
-      case EndKind::upper_wheel_peak:
-        return peak_speed_rad_s_ > peak_margin_rad_s && input.time_s - peak_at_s_ >= condition.value;
-      case EndKind::car_speed_below: return input.car_speed_m_s < condition.value;
-      case EndKind::standstill: return input.stands_still;
-      case EndKind::start_command: return input.start_given;
-    }
-    return false;
-  };
   for (const EndCondition& condition : plans_[index_].ends_on) {
-    if (holds(condition)) return &condition;
+    if (holds(condition, input)) return &condition;
   }
   return nullptr;
 }
@@ -93,6 +107,7 @@ Sequence::Change Sequence::end(rig::Phase phase, rig::Reason reason, double valu
 
 Sequence::Change Sequence::update(const SequenceInput& input) noexcept {
   if (ended_) return {};
+  now_s_ = input.time_s;
   if (early_reason_ != rig::Reason::none) {
     const bool stop = rig::is_stop_request(early_reason_);
     return end(stop ? rig::Phase::stopped : rig::Phase::fault, early_reason_, early_value_);
@@ -105,6 +120,10 @@ Sequence::Change Sequence::update(const SequenceInput& input) noexcept {
     if (index_ + 1 == plans_.size()) return end(rig::Phase::stopped, rig::Reason::sequence_complete, input.time_s);
     enter(index_ + 1, input);
     return {true, condition->reason, condition->value};
+  }
+  if (input.time_s > limits_.run_time_s) return end(rig::Phase::fault, rig::Reason::run_time_limit, input.time_s);
+  if (input.distance_m > limits_.distance_m) {
+    return end(rig::Phase::fault, rig::Reason::run_distance_limit, input.distance_m);
   }
   const double lasted_s = input.time_s - entered_at_s_;
   if (lasted_s > plans_[index_].time_limit_s) {

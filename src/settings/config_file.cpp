@@ -7,7 +7,7 @@
 #include <cstdlib>
 
 #include "abs_hil/settings/config_error.hpp"
-#include "nearest_name.hpp"
+#include "abs_hil/settings/nearest_name.hpp"
 
 namespace abs_hil::settings {
 

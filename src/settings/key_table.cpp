@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "abs_hil/settings/config_error.hpp"
-#include "nearest_name.hpp"
+#include "abs_hil/settings/nearest_name.hpp"
 
 namespace abs_hil::settings {
 
@@ -89,6 +89,10 @@ std::string Range::text() const {
   return fmt::format("{}{}, {}{}", least_open ? '(' : '[', least, most, most_open ? ')' : ']');
 }
 
+Value parse_value(const Key& key, std::string_view text) {
+  return std::holds_alternative<std::string*>(key.target) ? Value(std::string(text)) : parse_value(text);
+}
+
 const Key& KeyTable::find(std::string_view name, std::string_view origin) const {
   std::vector<std::string_view> names;
   for (const Key& key : keys_) {
@@ -137,8 +141,7 @@ void KeyTable::set_text(std::string_view assignment, std::string_view origin) {
   }
   const std::string_view name = assignment.substr(0, equals);
   const std::string_view text = assignment.substr(equals + 1);
-  const bool wants_text = std::holds_alternative<std::string*>(find(name, origin).target);
-  set(name, wants_text ? Value(std::string(text)) : parse_value(text), origin);
+  set(name, parse_value(find(name, origin), text), origin);
 }
 
 std::string KeyTable::to_toml() const {

@@ -29,9 +29,10 @@ MAY_KNOW = {
     'diagnosis': {'rig', 'driver', 'runtime', 'telemetry'},
     'settings': {'rig', 'control', 'plant_sim', 'driver', 'runtime', 'guardian', 'experiment'},
     'app': {'control'},  # the program's public face; the program itself, apps/, knows everything
-    'comparison': {'rig', 'control', 'plant_sim', 'driver', 'driver/sim', 'runtime', 'guardian', 'experiment', 'analysis', 'settings'},
     'steering': {'rig', 'control', 'runtime', 'experiment', 'settings', 'telemetry', 'lcmtypes'},
-    'replay': {'rig', 'control', 'driver', 'driver/sim', 'runtime', 'experiment', 'settings', 'telemetry', 'lcmtypes'},
+    'replay': {'rig', 'control', 'driver', 'driver/sim', 'runtime', 'experiment', 'script', 'settings', 'telemetry', 'lcmtypes'},
+    'script': {'rig', 'experiment', 'settings'},
+    'comparison': {'rig', 'script', 'control', 'plant_sim', 'driver', 'driver/sim', 'runtime', 'guardian', 'experiment', 'analysis', 'settings'},
 }
 # room -> libraries that are none of its business
 NEVER_INCLUDES = {

@@ -32,7 +32,8 @@ struct RunLogicParts {
 /// usable. `control` and `rig` must outlive the construction of the logic.
 [[nodiscard]] RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig::RigParameters& rig,
                                              bool ideal_actuator, const runtime::GateOptions& gate,
-                                             const ExperimentOptions& experiment, std::vector<PhasePlan> plans);
+                                             const ExperimentOptions& experiment, std::vector<PhasePlan> plans,
+                                             const SequenceLimits& limits = {});
 
 /// estimate -> sequence -> control of one run: from counts to the command wanted.
 class RunLogic final : public runtime::CycleLogic {
@@ -61,12 +62,15 @@ class RunLogic final : public runtime::CycleLogic {
   void estimate(const rig::Measurement& measurement, double dt_s) noexcept;
   void note_travel(const rig::Measurement& measurement, double dt_s) noexcept;
   [[nodiscard]] double slip_control(double dt_s, bool entered, rig::ControlState& state) noexcept;
+  [[nodiscard]] double wanted_torque_Nm(const PhasePlan& plan, double dt_s, bool entered,
+                                        rig::ControlState& state) noexcept;
 
   const rig::RigParameters rig_;
   const bool ideal_actuator_;
   const rig::WheelParameters wheels_;
   const double rad_per_count_;
   double slip_ref_;
+  const rig::BrakeParameters brake_;
   const double start_speed_rad_s_;
   std::unique_ptr<control::SlipController> controller_;
   Sequence sequence_;
@@ -78,6 +82,7 @@ class RunLogic final : public runtime::CycleLogic {
   std::int32_t lower_counts_{0};
   double upper_travel_rad_{0.0};  ///< over the past interval
   double lower_travel_rad_{0.0};
+  double distance_m_{0.0};  ///< that the car has come since the run began
   double slip_{0.0};
   double alpha1_rad_s2_{0.0};
   double alpha2_rad_s2_{0.0};

@@ -50,8 +50,9 @@ struct CycleRecord {
   std::int64_t stamp_ns{0};   ///< monotonic clock at the wake-up
   double time_s{0.0};         ///< since the start of the run
   Phase phase{Phase::idle};
-  Reason reason{Reason::none};  ///< why this phase was entered or the command refused; none if nothing happened
-  double reason_value{0.0};     ///< the value that led to it, in the SI unit of its quantity
+  std::uint16_t phase_index{0};  ///< counts the phases of the experiment from 0; the last again in an early end
+  Reason reason{Reason::none};   ///< why this phase was entered or the command refused; none if nothing happened
+  double reason_value{0.0};      ///< the value that led to it, in the SI unit of its quantity
   Measurement measurement{};
   ControlState control{};
   Command command{};  ///< as it passed the gate

@@ -19,6 +19,10 @@ enum class Reason : std::uint16_t {
   standstill_reached = 7,
   sequence_complete = 8,
   slip_control_left_at_low_speed = 9,
+  speed_condition_met = 20,
+  slip_condition_met = 21,
+  distance_reached = 22,
+  all_conditions_met = 23,
   // the run ends early because somebody asked for it
   interrupt_signal = 32,
   terminate_signal = 33,
@@ -91,6 +95,9 @@ enum class Reason : std::uint16_t {
   controller_died = 162,
   controller_silent = 163,
   safe_state_unverified = 164,
+  // limits of an experiment's script
+  run_time_limit = 200,
+  run_distance_limit = 201,
 };
 
 /// In words, for events, logs and summaries.
@@ -106,6 +113,10 @@ enum class Reason : std::uint16_t {
     case Reason::standstill_reached: return "both wheels stand still";
     case Reason::sequence_complete: return "experiment ran to its end";
     case Reason::slip_control_left_at_low_speed: return "car speed below the least speed for slip control";
+    case Reason::speed_condition_met: return "speed reached the value that ends the phase";
+    case Reason::slip_condition_met: return "slip reached the value that ends the phase";
+    case Reason::distance_reached: return "car came the distance that ends the phase";
+    case Reason::all_conditions_met: return "all conditions that end the phase hold";
     case Reason::interrupt_signal: return "interrupted (SIGINT)";
     case Reason::terminate_signal: return "terminated (SIGTERM)";
     case Reason::stop_command: return "stopped by a command on ABS_COMMAND";
@@ -174,6 +185,8 @@ enum class Reason : std::uint16_t {
     case Reason::controller_died: return "the controller process died";
     case Reason::controller_silent: return "the controller gave no sign of life for guardian.timeout_ms";
     case Reason::safe_state_unverified: return "the controller could not verify the safe state";
+    case Reason::run_time_limit: return "run exceeded the experiment's time limit";
+    case Reason::run_distance_limit: return "car came further than the experiment's limit";
   }
   return "unknown reason";
 }

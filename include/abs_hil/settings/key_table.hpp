@@ -36,6 +36,9 @@ struct Key {
 /// A value from a file or from the command line, before it is known what it should be.
 using Value = std::variant<double, std::int64_t, bool, std::string>;
 
+/// `text` as a value for that key: as it is where the key wants text, else as a TOML file would hold it.
+[[nodiscard]] Value parse_value(const Key& key, std::string_view text);
+
 /// Every configuration value by its dotted name: the one place that knows names, units and ranges.
 class KeyTable {
  public:
