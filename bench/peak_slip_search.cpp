@@ -41,7 +41,7 @@ Braking brake(const Setup& setup, const rig::RigParameters& believed) {
       {.control = setup.control,
        .rig = believed,
        .controller = control::make_controller(setup.control.controller, {setup.control, believed}),
-       .sequence = experiment::Sequence(experiment::plan_experiment(setup.experiment, setup.control.v_min_m_s)),
+       .sequence = experiment::Sequence(experiment::test::phases_of(setup)),
        .max_brake_duty = setup.gate.brake_duty_max,
        .start_speed_rad_s = setup.experiment.start_speed_rad_s},
       setup.gate, {&recorder, &metrics});

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
-#include "abs_hil/experiment/experiments.hpp"
+#include "abs_hil/script/library.hpp"
+#include "abs_hil/script/plan.hpp"
 #include "abs_hil/settings/config_error.hpp"
 #include "abs_hil/settings/config_file.hpp"
 #include "abs_hil/settings/key_table.hpp"
@@ -29,6 +31,24 @@ void check_start(const RunRequest& request) {
   if (request.outputs.fast) refuse("virtual time waits for nobody; leave out --fast");
   if (s.experiment.start_speed_rad_s > 0.0) {
     refuse("wheels that turn from the start would run down meanwhile; leave out experiment.start_speed_rad_s");
+  }
+}
+
+/// What only a simulated plant can do, and what may be done to an emulator but never to hardware.
+void refuse_events(const script::Script& script, bool emulated) {
+  for (const script::EventScript& event : script.events) {
+    if (event.friction) {
+      throw settings::ConfigError(
+          fmt::format("{}: [[event]] friction: only a simulated road changes its friction; run experiment {} with "
+                      "--backend sim, or leave its events out for the rig",
+                      script.at(event.place), script.name));
+    }
+    if (!emulated) {
+      throw settings::ConfigError(
+          fmt::format("{}: [[event]] inject: faults are never injected into real hardware; run experiment {} with "
+                      "--backend sim, or leave its events out for the rig",
+                      script.at(event.place), script.name));
+    }
   }
 }
 
@@ -56,10 +76,10 @@ void check_together(const RunRequest& request) {
   }
   if (s.backend == "rig" && !s.plant.friction_profile.empty()) {
     throw settings::ConfigError(
-        "plant.friction_profile: only a simulated road changes its friction; leave it out, choose another experiment "
-        "than friction-jump, or use --backend sim");
+        "plant.friction_profile: only a simulated road changes its friction; leave it out or use --backend sim");
   }
   if (s.experiment.wait_for_start) check_start(request);
+  if (s.backend == "rig") refuse_events(*request.script, s.driver.emulated);
   if (s.control.adaptive.theta_min_N >= s.control.adaptive.theta_max_N) {
     throw settings::ConfigError("control.adaptive.theta_min_N: must be less than control.adaptive.theta_max_N");
   }
@@ -83,15 +103,20 @@ void apply_board_limits(settings::Settings& s) {
 
 }  // namespace
 
-RunRequest merge(const RunOptions& options) {
-  RunRequest request{.outputs = options.outputs};
-  settings::Settings& s = request.settings;
-  settings::KeyTable keys(s);
+namespace {
+
+/// Everything but what the script asks for beyond its settings.
+void fill(settings::Settings& s, settings::KeyTable& keys, const RunOptions& options, const script::Script* script) {
   s.backend = options.backend;
   s.realtime.mode = realtime_mode(options.realtime);
   for (const std::string& assignment : options.defaults) keys.set_text(assignment, "default");
   if (options.plant) s.plant_name = *options.plant;
   settings::load_file(settings::plant_file(s.plant_name), keys, "plant");
+  if (script != nullptr) {
+    for (const script::Setting& setting : script->settings) {
+      keys.set(setting.key, setting.value, script->at(setting.place));
+    }
+  }
   if (options.config_file) settings::load_file(*options.config_file, keys);
 
   const auto set = [&keys](const char* key, const std::optional<std::string>& value, const char* option) {
@@ -103,15 +128,36 @@ RunRequest merge(const RunOptions& options) {
   set("control.rate_Hz", options.rate_Hz, "--rate");
   set("run.seed", options.seed, "--seed");
   for (const std::string& assignment : options.assignments) keys.set_text(assignment, "--set");
-  if (s.plant.friction_profile.empty()) {
-    s.plant.friction_profile = experiment::friction_profile_of(s.experiment.name);
-  }
   for (const std::string& injection : options.injections) s.inject += (s.inject.empty() ? "" : ",") + injection;
   if (options.wait_for_start) keys.set_text("experiment.wait_for_start=true", "--wait-for-start");
+}
+
+/// Which experiment it is, options and files together say; its settings stand below theirs.
+std::shared_ptr<const script::Script> script_of(const RunOptions& options) {
+  settings::Settings settings;
+  settings::KeyTable keys(settings);
+  fill(settings, keys, options, nullptr);
+  return script::find(settings.experiment.name);
+}
+
+}  // namespace
+
+RunRequest merge(const RunOptions& options) {
+  RunRequest request;
+  request.script = script_of(options);
+  request.outputs = options.outputs;
+  settings::Settings& s = request.settings;
+  const script::Script& script = *request.script;
+  settings::KeyTable keys(s);
+  fill(s, keys, options, &script);
   check_together(request);
+  script::apply(script, s);
   settings::refuse_unsafe(s, keys);
   if (s.backend == "rig") apply_board_limits(s);
-  request.config_json = keys.to_json().dump();
+  nlohmann::ordered_json config = keys.to_json();
+  config["experiment_script"] = script.text;
+  if (!script.files.empty()) config["experiment_files"] = script.files;
+  request.config_json = config.dump();
   request.config_toml = fmt::format(
       "# Effective configuration of a run; the same again: abs_hil --backend {} --plant {} --config THIS_FILE\n{}",
       s.backend, s.plant_name, keys.to_toml());

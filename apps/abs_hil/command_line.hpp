@@ -2,10 +2,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "abs_hil/script/script.hpp"
 #include "abs_hil/settings/settings.hpp"
 
 namespace abs_hil::app {
@@ -62,14 +64,15 @@ struct CompareOptions {
 /// A run as it will be: the effective configuration and where its records go.
 struct RunRequest {
   settings::Settings settings{};
-  std::string config_json{};  ///< the effective configuration
-  std::string config_toml{};  ///< the same, as a file for --config
+  std::shared_ptr<const script::Script> script{};  ///< what is run
+  std::string config_json{};                       ///< the effective configuration
+  std::string config_toml{};                       ///< the same, as a file for --config
   OutputOptions outputs{};
   std::vector<std::string> command_line{};  ///< as typed, for the record
 };
 
-/// Merges defaults, plant file, configuration file, named options and assignments, later ones winning. Throws
-/// settings::ConfigError.
+/// Merges defaults, plant file, the script's settings, configuration file, named options and assignments, later ones
+/// winning. Throws settings::ConfigError.
 [[nodiscard]] RunRequest merge(const RunOptions& options);
 
 }  // namespace abs_hil::app

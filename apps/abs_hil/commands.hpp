@@ -17,6 +17,10 @@ int run(const RunRequest& request);
 int compare(const CompareOptions& options);
 /// `abs_hil list`: controllers, plants, experiments and backends, or all configuration keys.
 int list(bool keys);
+/// `abs_hil validate`: says in words what an experiment does and whether it stays within the limits of its backend.
+int validate(const RunRequest& request);
+/// `abs_hil validate --schema`: the JSON Schema of experiment files.
+int print_schema();
 /// `abs_hil doctor`: examines this computer, all of it or the one check named, and says how to mend what falls short.
 int doctor(const RunRequest& request, const std::string& only, bool json);
 /// What `abs_hil latency` takes beside a run's configuration.

@@ -2,7 +2,7 @@
 
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/driver/factory.hpp"
-#include "abs_hil/experiment/experiments.hpp"
+#include "abs_hil/script/library.hpp"
 #include "abs_hil/settings/config_file.hpp"
 #include "abs_hil/settings/key_table.hpp"
 #include "commands.hpp"
@@ -41,7 +41,7 @@ int list(bool keys) {
   fmt::print("plants\n");
   for (const auto& entry : settings::known_plants()) print(entry.name, entry.description);
   fmt::print("experiments\n");
-  for (const auto& entry : experiment::experiments()) print(entry.name, entry.summary);
+  for (const auto& script : script::known_experiments()) print(script->name, script->description);
   fmt::print("backends\n");
   for (const auto& entry : driver::backends()) print(entry.name, entry.summary);
   fmt::print("boards (driver.kind of backend rig; none of them verified on hardware)\n");

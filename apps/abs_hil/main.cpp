@@ -47,7 +47,7 @@ void add_timing_options(CLI::App& cli, app::RunOptions& o) {
 void add_run_options(CLI::App& cli, app::RunOptions& o) {
   add_backend_option(cli, o);
   add_configuration_options(cli, o);
-  cli.add_option("--experiment", o.experiment, "experiment")->type_name("NAME");
+  cli.add_option("--experiment", o.experiment, "experiment by name or TOML file")->type_name("NAME|FILE");
   cli.add_option("--slip-ref", o.slip_ref, "wanted slip, in (0, 1)")->type_name("X");
   add_timing_options(cli, o);
   cli.add_flag("--wait-for-start", o.wait_for_start, "stay idle until abs_hil send start (needs commands.enabled)");
@@ -209,6 +209,23 @@ void add_send(CLI::App& cli, SendCommand& command) {
       ->capture_default_str();
 }
 
+/// The command `abs_hil validate` as typed.
+struct ValidateCommand {
+  app::RunOptions options{};
+  bool schema{false};
+  CLI::App* parser{nullptr};
+};
+
+void add_validate(CLI::App& cli, ValidateCommand& command) {
+  command.parser =
+      cli.add_subcommand("validate", "say what an experiment does, and whether it stays within the limits");
+  command.parser->add_option("EXPERIMENT", command.options.experiment, "experiment by name or TOML file")
+      ->type_name("NAME|FILE");
+  command.parser->add_flag("--schema", command.schema, "print the JSON Schema of experiment files instead");
+  add_backend_option(*command.parser, command.options);
+  add_configuration_options(*command.parser, command.options);
+}
+
 int dispatch(int argc, char** argv) {
   CLI::App cli{"Driver, adaptive slip controller and simulator of the Inteco ABS laboratory rig"};
   cli.name("abs_hil");
@@ -225,6 +242,8 @@ int dispatch(int argc, char** argv) {
   add_latency(cli, latency);
   app::CompareOptions compare_options;
   const auto* compare = add_compare(cli, compare_options);
+  ValidateCommand validate;
+  add_validate(cli, validate);
   CommissionCommand commission;
   add_commission(cli, commission);
   app::ReplayCommand replay_command;
@@ -245,6 +264,9 @@ int dispatch(int argc, char** argv) {
   if (list->parsed()) return app::list(keys);
   if (doctor.parser->parsed()) return app::doctor(app::merge(doctor.options), doctor.only, doctor.json);
   if (latency.parser->parsed()) return app::latency(app::merge(latency.options), latency.latency);
+  if (validate.parser->parsed()) {
+    return validate.schema ? app::print_schema() : app::validate(app::merge(validate.options));
+  }
   if (compare->parsed()) {
     refuse_run_options(cli, "compare");
     return app::compare(compare_options);

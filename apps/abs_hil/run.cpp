@@ -12,9 +12,9 @@
 #include "abs_hil/analysis/run_metrics.hpp"
 #include "abs_hil/analysis/run_summary.hpp"
 #include "abs_hil/driver/safe_state_writer.hpp"
-#include "abs_hil/experiment/experiments.hpp"
 #include "abs_hil/experiment/run_session.hpp"
 #include "abs_hil/runtime/overrun_reporter.hpp"
+#include "abs_hil/script/plan.hpp"
 #include "abs_hil/telemetry/file_error.hpp"
 #include "board_notes.hpp"
 #include "commands.hpp"
@@ -146,7 +146,9 @@ int run(const RunRequest& request) {
   runtime::VirtualClock virtual_clock;
   runtime::Clock& clock = request.outputs.fast ? static_cast<runtime::Clock&>(virtual_clock) : real_clock;
   const std::unique_ptr<driver::RigDriver> driver = with_faults(make_driver(s, request.outputs.fast), s, clock);
-  experiment::RunLogicParts logic = make_logic(s, experiment::plan_experiment(s.experiment, s.control.v_min_m_s));
+  script::Plan plan = script::plan(*request.script, s);
+  for (const std::string& problem : script::beyond_limits(plan, s)) spdlog::warn("{}; it is held to that", problem);
+  experiment::RunLogicParts logic = make_logic(s, std::move(plan.phases), plan.limits);
   require_resources(request, *driver);
   RunOutputs outputs(request);
   runtime::OverrunReporter late_cycles(std::llround(1e9 / s.control.rate_Hz));

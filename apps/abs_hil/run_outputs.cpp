@@ -67,6 +67,8 @@ void RunOutputs::open_folder(const RunRequest& request) {
     }
   }
   folder_->write(archive::file::config, std::string_view(request.config_toml));
+  folder_->write(archive::file::experiment, std::string_view(request.script->text));
+  for (const auto& [name, text] : request.script->files) folder_->write(name, std::string_view(text));
   open_files({.fast = o.fast,
               .csv_file = folder_->of(archive::file::csv),
               .log_file = folder_->of(archive::file::log),

@@ -28,9 +28,10 @@ std::unique_ptr<driver::RigDriver> with_faults(std::unique_ptr<driver::RigDriver
       [&clock](std::int64_t duration_ns) { clock.sleep_until(clock.now_ns() + duration_ns); });
 }
 
-experiment::RunLogicParts make_logic(const settings::Settings& s, std::vector<experiment::PhasePlan> plans) {
+experiment::RunLogicParts make_logic(const settings::Settings& s, std::vector<experiment::PhasePlan> plans,
+                                     const experiment::SequenceLimits& limits) {
   return experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate, s.experiment,
-                                      std::move(plans));
+                                      std::move(plans), limits);
 }
 
 }  // namespace abs_hil::app

@@ -19,6 +19,7 @@ namespace abs_hil::app {
                                                              const settings::Settings& settings, runtime::Clock& clock);
 /// What a run's logic is made of. Throws std::invalid_argument. `settings` must outlive the construction of the logic.
 [[nodiscard]] experiment::RunLogicParts make_logic(const settings::Settings& settings,
-                                                   std::vector<experiment::PhasePlan> plans);
+                                                   std::vector<experiment::PhasePlan> plans,
+                                                   const experiment::SequenceLimits& limits = {});
 
 }  // namespace abs_hil::app

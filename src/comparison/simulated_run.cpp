@@ -1,14 +1,15 @@
 #include "abs_hil/comparison/simulated_run.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "abs_hil/driver/sim/sim_driver.hpp"
-#include "abs_hil/experiment/experiments.hpp"
 #include "abs_hil/experiment/run_logic.hpp"
 #include "abs_hil/runtime/clock.hpp"
 #include "abs_hil/runtime/command_gate.hpp"
 #include "abs_hil/runtime/cyclic_executive.hpp"
 #include "abs_hil/runtime/record_pump.hpp"
+#include "abs_hil/script/plan.hpp"
 
 namespace abs_hil::comparison {
 
@@ -23,9 +24,10 @@ constexpr std::size_t ring_capacity = 2;
 RunResult simulate(const settings::Settings& settings, const plant_sim::PlantOptions& plant, std::uint64_t seed) {
   runtime::VirtualClock clock;
   driver::SimDriver driver(plant, {.seed = seed, .start_speed_rad_s = settings.experiment.start_speed_rad_s});
-  experiment::RunLogic logic(experiment::make_logic_parts(
-      settings.control, settings.plant.rig, settings.plant.ideal_actuator, settings.gate, settings.experiment,
-      experiment::plan_experiment(settings.experiment, settings.control.v_min_m_s)));
+  script::Plan plan = script::plan(settings);
+  experiment::RunLogic logic(experiment::make_logic_parts(settings.control, settings.plant.rig,
+                                                          settings.plant.ideal_actuator, settings.gate,
+                                                          settings.experiment, std::move(plan.phases), plan.limits));
   runtime::CommandGate gate = logic.make_gate(settings.gate);
   runtime::RecordRing ring(ring_capacity);
   runtime::CyclicExecutive executive(clock, driver, logic, gate, ring, std::llround(1e9 / settings.control.rate_Hz));

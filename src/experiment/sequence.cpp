@@ -1,6 +1,8 @@
 #include "abs_hil/experiment/sequence.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -25,9 +27,22 @@ void check_safe(const PhasePlan& plan, const std::string& name) {
   if (!(plan.brake_torque_Nm >= 0.0 && std::isfinite(plan.brake_torque_Nm))) {
     refuse(": brake torque " + std::to_string(plan.brake_torque_Nm) + " N m: give a finite one, >= 0");
   }
-  const bool brakes =
-      plan.brake == BrakeAction::slip_control || (plan.brake == BrakeAction::torque && plan.brake_torque_Nm > 0.0);
-  if (plan.motor_duty > 0.0 && brakes && !plan.motor_with_brake) {
+  const auto lies_within = [](const Course& course, double least, double most) {
+    return std::all_of(course.points().begin(), course.points().end(),
+                       [=](const Course::Point& point) { return point.value >= least && point.value <= most; });
+  };
+  constexpr double unbounded = std::numeric_limits<double>::max();
+  if (!lies_within(plan.motor_course, 0.0, 1.0)) refuse(": motor duties: give them in [0, 1]");
+  if (!(plan.brake_duty >= 0.0 && plan.brake_duty <= 1.0)) refuse(": brake duty: give one in [0, 1]");
+  if (!lies_within(plan.brake_course, 0.0, plan.brake == BrakeAction::duty ? 1.0 : unbounded)) {
+    refuse(": brake duties in [0, 1], brake torques >= 0");
+  }
+  if (!lies_within(plan.slip_ref_course, 0.0, 1.0)) refuse(": slip references: give them in (0, 1)");
+  const bool brakes = plan.brake == BrakeAction::slip_control ||
+                      (plan.brake == BrakeAction::torque && plan.brake_torque_Nm > 0.0) ||
+                      (plan.brake == BrakeAction::duty && plan.brake_duty > 0.0) || !plan.brake_course.empty();
+  const bool drives = plan.motor_duty > 0.0 || !plan.motor_course.empty();
+  if (drives && brakes && !plan.motor_with_brake) {
     refuse(": motor and brake together: leave one of them out, or say that it is meant (motor_with_brake)");
   }
 }

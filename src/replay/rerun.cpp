@@ -2,14 +2,16 @@
 
 #include <bit>
 #include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
 
 #include "abs_hil/driver/sim/sim_driver.hpp"
-#include "abs_hil/experiment/experiments.hpp"
 #include "abs_hil/experiment/run_logic.hpp"
 #include "abs_hil/runtime/clock.hpp"
 #include "abs_hil/runtime/cyclic_executive.hpp"
 #include "abs_hil/runtime/record_pump.hpp"
+#include "abs_hil/script/plan.hpp"
 #include "abs_hil/settings/config_error.hpp"
 #include "abs_hil/settings/live_settings.hpp"
 #include "abs_hil/telemetry/message_codec.hpp"
@@ -96,9 +98,25 @@ class Collected final : public rig::RecordSink {
   std::vector<RerunCycle> cycles;
 };
 
-experiment::RunLogicParts logic_parts(const settings::Settings& s) {
+/// The recorded script; for a recording without one that of the name.
+script::Plan plan_of(const RecordedRun& run, const settings::Settings& s) {
+  const auto config = nlohmann::json::parse(run.experiment.config_json, nullptr, false);
+  if (!config.is_object() || !config.contains("experiment_script") || !config["experiment_script"].is_string()) {
+    return script::plan(s);
+  }
+  const auto files = config.value("experiment_files", nlohmann::json::object());
+  const auto read_file = [&files](const std::string& name) -> std::optional<std::string> {
+    const auto file = files.find(name);
+    if (file == files.end() || !file->is_string()) return std::nullopt;
+    return file->get<std::string>();
+  };
+  return script::plan(script::parse(config["experiment_script"].get<std::string>(), "recorded script", read_file), s);
+}
+
+experiment::RunLogicParts logic_parts(const RecordedRun& run, const settings::Settings& s) {
+  script::Plan plan = plan_of(run, s);
   return experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate, s.experiment,
-                                      experiment::plan_experiment(s.experiment, s.control.v_min_m_s));
+                                      std::move(plan.phases), plan.limits);
 }
 
 constexpr std::string_view start_name = "start";
@@ -156,6 +174,8 @@ bool ended_from_outside(const telemetry_t& cycle) noexcept {
   switch (reason) {
     // Found by sequence, gate or logic from the measurements.
     case rig::Reason::phase_time_limit:
+    case rig::Reason::run_time_limit:
+    case rig::Reason::run_distance_limit:
     case rig::Reason::overspeed:
     case rig::Reason::command_not_finite:
     case rig::Reason::estimate_not_finite:
@@ -168,14 +188,14 @@ bool ended_from_outside(const telemetry_t& cycle) noexcept {
 }
 
 std::vector<RerunCycle> rerun_open_loop(const RecordedRun& run, const settings::Settings& settings) {
-  experiment::RunLogic logic(logic_parts(settings));
+  experiment::RunLogic logic(logic_parts(run, settings));
   RecordedActuation actuation(logic, run);
   RecordedRig rig(run, settings.plant.ideal_sensors);
   return rerun(run, settings, rig, actuation, logic.adjustments());
 }
 
 std::vector<RerunCycle> rerun_simulation(const RecordedRun& run, const settings::Settings& settings) {
-  experiment::RunLogic logic(logic_parts(settings));
+  experiment::RunLogic logic(logic_parts(run, settings));
   driver::SimDriver rig(settings.plant, {.seed = static_cast<std::uint64_t>(settings.seed),
                                          .start_speed_rad_s = settings.experiment.start_speed_rad_s});
   return rerun(run, settings, rig, logic, logic.adjustments());

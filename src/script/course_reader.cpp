@@ -56,7 +56,8 @@ class CourseReader {
     if (has("from") || has("to") || has("over")) {
       const Number from = value("from");
       const Number to = value("to");
-      course_.points = {{seconds(0.0, from.place), from}, {reader_.number(need("over", "a ramp")), to}};
+      const Number over = reader_.number(need("over", "a ramp"));
+      course_.points = {{seconds(0.0, from.place), from}, {over, to}};
     } else if (has("before") || has("after") || has("at")) {
       const Number before = value("before");
       const Number after = value("after");
@@ -140,8 +141,9 @@ class CourseReader {
 
   void read_profile(const Entry& entry, const FileReader& read_file, std::map<std::string, std::string>& files) {
     const std::string name = reader_.text(entry);
-    if (name.empty() || name.starts_with('/') || name.find("..") != std::string::npos) {
-      source_.fail(entry.place, fmt::format("file = \"{}\": name a file beside the script or below it", name));
+    if (name.empty() || name.find('/') != std::string::npos || !name.ends_with(".csv")) {
+      source_.fail(entry.place,
+                   fmt::format("file = \"{}\": name a .csv file beside the script, without a folder", name));
     }
     if (outer_.field->quantity != Quantity::none && !outer_.has_suffix) {
       source_.fail(entry.place, fmt::format("file = \"{}\": its values have no unit; name it in the key {}{} = ...",

@@ -8,6 +8,9 @@ namespace {
 
 constexpr double longest_s = 86'400.0;
 constexpr settings::Range duration{0.0, longest_s};
+/// No phase lasts longer, whatever it waits for (experiment::Sequence), its slack of a second included.
+constexpr settings::Range phase_limit{0.0, 600.0, true, false};
+constexpr settings::Range phase_duration{0.0, 599.0};
 constexpr settings::Range span{0.0, longest_s, true, false};
 constexpr settings::Range wheel_speed{0.0, 2000.0};
 constexpr settings::Range car_speed{0.0, 200.0};
@@ -95,7 +98,7 @@ const Grammar& phase_grammar() {
           {.name = "motor", .shape = Shape::motor, .meaning = "drive PWM of the lower wheel's motor", .range = duty},
           {.name = "brake",
            .shape = Shape::brake,
-           .meaning = "what drives the brake",
+           .meaning = "what drives the brake; or a table of duty, torque_Nm or slip_ref",
            .allowed = {"off", "controller"},
            .grammar = &brake_grammar()},
           {.name = "until",
@@ -107,7 +110,7 @@ const Grammar& phase_grammar() {
            .shape = Shape::number,
            .meaning = "a phase that lasts longer is a fault; may be left out if the phase ends by its duration",
            .quantity = Quantity::time,
-           .range = span},
+           .range = phase_limit},
       }};
   return grammar;
 }
@@ -121,7 +124,7 @@ const Grammar& until_grammar() {
       grammar.fields.push_back(
           {.name = name, .shape = Shape::number, .meaning = meaning, .quantity = quantity, .range = range});
     };
-    add("lasts", time, duration, "the phase has lasted this long");
+    add("lasts", time, phase_duration, "the phase has lasted this long");
     add("upper_speed_above", angular_speed, wheel_speed, "the upper wheel is at least this fast");
     add("upper_speed_below", angular_speed, wheel_speed, "the upper wheel is slower than this");
     add("upper_wheel_peak", time, span, "the upper wheel has gained no speed for this long");
@@ -235,7 +238,7 @@ const Grammar& limits_grammar() {
 const Grammar& event_grammar() {
   static const Grammar grammar{
       "[[event]]",
-      "One thing that happens to the simulated plant: friction, a parameter, or a fault",
+      "One thing that happens to the simulated plant",
       {
           {.name = "at", .shape = Shape::number, .meaning = "when", .quantity = Quantity::time, .range = duration},
           {.name = "counted_from",
@@ -251,10 +254,9 @@ const Grammar& event_grammar() {
            .shape = Shape::number,
            .meaning = "friction of the road from then on, over that of the tyre model",
            .range = {0.0, 10.0, true, false}},
-          {.name = "parameter",
+          {.name = "inject",
            .shape = Shape::text,
-           .meaning = "a parameter of the plant that drifts (docs/plants.md)"},
-          {.name = "to", .shape = Shape::number, .meaning = "the parameter's value from then on", .range = anything},
+           .meaning = "a fault at the I/O seam, as after --inject; it says itself when (docs/fault-injection.md)"},
       }};
   return grammar;
 }

@@ -17,7 +17,12 @@ namespace fs = std::filesystem;
 
 namespace {
 
-fs::path experiments_dir() { return settings::config_dir() / "experiments"; }
+/// A configuration folder of one's own need not hold experiments.
+fs::path experiments_dir() {
+  const fs::path named = settings::config_dir() / "experiments";
+  std::error_code error;
+  return fs::is_directory(named, error) ? named : settings::own_config_dir() / "experiments";
+}
 
 std::vector<std::string> known_names() {
   std::vector<std::string> names;

@@ -212,6 +212,11 @@ void apply(const Script& script, settings::Settings& s) {
   tighten(s.gate.overspeed_rad_s, limits.wheel_speed);
   tighten(s.gate.motor_duty_max, limits.motor_duty);
   tighten(s.gate.brake_duty_max, limits.brake_duty);
+  if (s.inject.empty()) {
+    for (const EventScript& event : script.events) {
+      if (!event.inject.empty()) s.inject += (s.inject.empty() ? "" : ",") + event.inject;
+    }
+  }
   if (s.plant.friction_profile.empty()) s.plant.friction_profile = friction_profile(script);
 }
 

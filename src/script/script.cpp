@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "abs_hil/settings/config_error.hpp"
+#include "abs_hil/settings/unsafe_settings.hpp"
 #include "reader.hpp"
 
 namespace abs_hil::script {
@@ -50,7 +51,9 @@ class Parser {
  private:
   PhaseScript read_phase(const toml::table& table, Place place) {
     const TableReader reader(source_, table, phase_grammar(), place);
-    PhaseScript phase{.name = reader.text(*reader.find("name")), .place = reader.place()};
+    PhaseScript phase;
+    phase.name = reader.text(*reader.find("name"));
+    phase.place = reader.place();
     check_name(phase, reader);
     if (const Entry* kind = reader.find("kind")) phase.kind = kind_of_name(reader.choice(*kind));
     phase.when = reader.optional_when();
@@ -131,25 +134,36 @@ class Parser {
 
   EventScript read_event(const toml::table& table, Place place) {
     const TableReader reader(source_, table, event_grammar(), place);
-    EventScript event{.over = reader.optional_number("over"),
-                      .friction = reader.optional_number("friction"),
-                      .parameter = reader.text_or_empty("parameter"),
-                      .place = reader.place()};
-    if (event.friction.has_value() == !event.parameter.empty()) {
-      source_.fail(reader.place(), "an event is one change: give friction, or parameter and to");
-    }
+    EventScript event;
+    event.over = reader.optional_number("over");
+    event.friction = reader.optional_number("friction");
+    event.place = reader.place();
+    if (const Entry* inject = reader.find("inject")) return read_fault(reader, *inject);
+    if (!event.friction) source_.fail(reader.place(), "the event changes nothing; give friction or inject");
     const Entry* at = reader.find("at");
     if (at == nullptr) source_.fail(reader.place(), "the event has no \"at_s\" (when); give one");
     event.at = reader.number(*at);
     if (const Entry* from = reader.find("counted_from")) event.from_braking = reader.choice(*from) == "braking";
-    const Entry* to = reader.find("to");
-    if ((to != nullptr) == event.parameter.empty()) {
-      source_.fail(reader.place(), event.parameter.empty() ? "to belongs to a parameter; friction carries its own value"
-                                                           : "the parameter has no \"to\"; give its new value");
-    }
-    if (to != nullptr) event.to = reader.number(*to);
-    for (const auto& number : {std::optional(event.at), event.over, event.friction, std::optional(event.to)}) {
+    for (const auto& number : {std::optional(event.at), event.over, event.friction}) {
       if (number && !number->key.empty()) source_.fail(number->place, "an event takes numbers, not $keys");
+    }
+    return event;
+  }
+
+  EventScript read_fault(const TableReader& reader, const Entry& entry) const {
+    if (reader.entries().size() != 1) {
+      source_.fail(entry.key_place,
+                   "inject stands alone in its event: it says itself when, as in \"brake@write:fail+0.2s\"");
+    }
+    EventScript event;
+    event.inject = reader.text(entry);
+    event.place = reader.place();
+    settings::Settings settings;
+    settings.inject = event.inject;
+    try {
+      if (settings::injections_of(settings).empty()) source_.fail(entry.place, "inject is empty; give a fault");
+    } catch (const std::invalid_argument& error) {
+      source_.fail(entry.place, error.what());
     }
     return event;
   }

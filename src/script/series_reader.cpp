@@ -43,7 +43,8 @@ void add_settings(const Source& source, const toml::table& table, const std::str
     const Place place = place_of(name.source());
     static_cast<void>(source.key(key, place));
     refuse_foreign(source, key, place);
-    Setting setting{key, value_of(source, key, node), place_of(node.source())};
+    settings::Value value = value_of(source, key, node);
+    Setting setting{key, std::move(value), place_of(node.source())};
     source.check_value(key, setting.value, setting.place);
     settings.push_back(std::move(setting));
   }

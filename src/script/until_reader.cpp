@@ -34,7 +34,9 @@ std::vector<ConditionScript> read_list(const Source& source, const TableReader& 
                                        Depth depth);
 
 ConditionScript read_condition(const Source& source, const TableReader& reader, Depth depth) {
-  ConditionScript condition{.when = reader.optional_when(), .place = reader.place()};
+  ConditionScript condition;
+  condition.when = reader.optional_when();
+  condition.place = reader.place();
   const Entry* what = nullptr;
   for (const Entry& entry : reader.entries()) {
     if (entry.field->name == "when") continue;

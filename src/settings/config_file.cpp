@@ -63,22 +63,33 @@ void load_file(const fs::path& file, KeyTable& keys, std::string_view only_table
   set_values(table, {}, file, keys);
 }
 
-fs::path config_dir() {
+namespace {
+
+/// The first of the places that is a folder.
+fs::path first_folder(const std::vector<fs::path>& places) {
   std::error_code error;
-  std::vector<fs::path> places;
-  if (const char* given = std::getenv("ABS_HIL_CONFIG_DIR"); given != nullptr) {
-    places.emplace_back(given);
-  } else {
-    const fs::path program = fs::read_symlink("/proc/self/exe", error);
-    if (!error) places.push_back(program.parent_path().parent_path() / "share" / "abs_hil" / "config");
-    places.emplace_back(ABS_HIL_SOURCE_CONFIG_DIR);
-    places.emplace_back(ABS_HIL_INSTALLED_CONFIG_DIR);  // for a program elsewhere that links the installed library
-  }
   for (const fs::path& place : places) {
     if (fs::is_directory(place, error)) return place;
   }
   throw ConfigError(fmt::format("no configuration folder at {}; set ABS_HIL_CONFIG_DIR to the project's config/",
                                 places.back().string()));
+}
+
+}  // namespace
+
+fs::path own_config_dir() {
+  std::error_code error;
+  std::vector<fs::path> places;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  if (!error) places.push_back(program.parent_path().parent_path() / "share" / "abs_hil" / "config");
+  places.emplace_back(ABS_HIL_SOURCE_CONFIG_DIR);
+  places.emplace_back(ABS_HIL_INSTALLED_CONFIG_DIR);  // for a program elsewhere that links the installed library
+  return first_folder(places);
+}
+
+fs::path config_dir() {
+  const char* given = std::getenv("ABS_HIL_CONFIG_DIR");
+  return given != nullptr ? first_folder({given}) : own_config_dir();
 }
 
 fs::path plant_file(std::string_view name_or_file) {

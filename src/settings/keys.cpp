@@ -3,7 +3,6 @@
 #include <array>
 
 #include "abs_hil/control/registry.hpp"
-#include "abs_hil/experiment/experiments.hpp"
 #include "abs_hil/settings/key_table.hpp"
 #include "command_keys.hpp"
 #include "driver_keys.hpp"
@@ -252,12 +251,10 @@ void add_adaptive_peak_keys(std::vector<Key>& keys, control::AdaptivePeakOptions
 }
 
 void add_experiment_keys(std::vector<Key>& keys, experiment::ExperimentOptions& e) {
-  std::vector<std::string_view> names;
-  for (const experiment::ExperimentEntry& entry : experiment::experiments()) names.push_back(entry.name);
   keys.insert(
       keys.end(),
       {
-          {"experiment.name", "", "experiment", &e.name, {}, names},
+          {"experiment.name", "", "experiment by name or TOML file", &e.name},
           {"experiment.start_speed_rad_s", "rad/s", "simulation: brake at once from this speed; 0: accelerate first",
            &e.start_speed_rad_s, from_zero(1000)},
           {"experiment.end_speed_m_s", "m/s", "car speed at which braking counts as done", &e.end_speed_m_s,

@@ -34,13 +34,6 @@ TEST_CASE("the torque estimate follows what was sent, not what was asked for") {
   CHECK(record.control.brake_torque_est_Nm == 0.0);
 }
 
-TEST_CASE("an unknown experiment names the known ones") {
-  ExperimentOptions options;
-  options.name = "parade";
-  CHECK_THROWS_WITH(plan_experiment(options, 0.3),
-                    Catch::Matchers::Contains("parade") && Catch::Matchers::Contains("paper"));
-}
-
 namespace {
 
 /// Writes down what it sees.

@@ -8,8 +8,8 @@
 #include "abs_hil/analysis/run_metrics.hpp"
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/driver/sim/sim_driver.hpp"
-#include "abs_hil/experiment/experiments.hpp"
 #include "abs_hil/experiment/run_session.hpp"
+#include "abs_hil/script/plan.hpp"
 
 namespace abs_hil::experiment::test {
 
@@ -50,9 +50,15 @@ struct Result {
   }
 };
 
+/// The phases of the experiment that the setup names.
+inline std::vector<PhasePlan> phases_of(const Setup& setup) {
+  settings::Settings settings{.plant = setup.plant, .control = setup.control, .experiment = setup.experiment};
+  return script::plan(settings).phases;
+}
+
 inline RunLogicParts logic_parts(const Setup& setup) {
   return make_logic_parts(setup.control, setup.plant.rig, setup.plant.ideal_actuator, setup.gate, setup.experiment,
-                          plan_experiment(setup.experiment, setup.control.v_min_m_s));
+                          phases_of(setup));
 }
 
 /// Runs it in virtual time, on the same code as the program.

@@ -6,6 +6,7 @@
 
 #include "abs_hil/replay/check.hpp"
 #include "abs_hil/replay/report.hpp"
+#include "abs_hil/script/plan.hpp"
 #include "abs_hil/settings/config_error.hpp"
 #include "abs_hil/settings/config_file.hpp"
 #include "abs_hil/telemetry/log_outlet.hpp"
@@ -58,11 +59,10 @@ void record_run(const std::filesystem::path& path, const Recipe& recipe) {
   runtime::VirtualClock clock;
   driver::SimDriver driver(
       s.plant, {.seed = static_cast<std::uint64_t>(s.seed), .start_speed_rad_s = s.experiment.start_speed_rad_s});
-  experiment::RunSession session(
-      clock, driver,
-      experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate, s.experiment,
-                                   experiment::plan_experiment(s.experiment, s.control.v_min_m_s)),
-      s.gate, {&late});
+  experiment::RunSession session(clock, driver,
+                                 experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate,
+                                                              s.experiment, script::plan(s).phases),
+                                 s.gate, {&late});
   session.run_fast([&recipe] { return recipe.stop; });
 }
 

@@ -81,8 +81,7 @@ struct EventScript {
   bool from_braking{false};
   std::optional<Number> over{};
   std::optional<Number> friction{};
-  std::string parameter{};  ///< not empty: it goes to `to`
-  Number to{};
+  std::string inject{};  ///< not empty: a fault, and nothing else here counts
   Place place{};
 };
 

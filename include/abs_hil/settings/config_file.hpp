@@ -17,6 +17,9 @@ void load_file(const std::filesystem::path& file, KeyTable& table, std::string_v
 /// the program, else the source tree's. Throws ConfigError if there is none.
 [[nodiscard]] std::filesystem::path config_dir();
 
+/// The same, whatever the environment says: what came with the program.
+[[nodiscard]] std::filesystem::path own_config_dir();
+
 /// A plant by name or file: `name` alone is config_dir()/plants/name.toml. Throws ConfigError, naming the known ones.
 [[nodiscard]] std::filesystem::path plant_file(std::string_view name_or_file);
 

@@ -1,0 +1,121 @@
+#include "abs_hil/script/explain.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "abs_hil/script/plan.hpp"
+
+namespace abs_hil::script {
+
+namespace {
+
+using experiment::BrakeAction;
+using experiment::EndKind;
+
+std::string number(double value) { return fmt::format("{:.6g}", value); }
+
+std::string in_words(const experiment::Course& course, std::string_view unit) {
+  std::string text;
+  for (const auto& point : course.points()) {
+    text += fmt::format("{}{}{} at {} s", text.empty() ? "" : ", ", number(point.value), unit, number(point.time_s));
+    if (text.size() > 120) return fmt::format("{}, ... ({} points)", text, course.points().size());
+  }
+  return text;
+}
+
+std::string in_words(const experiment::Course& course, double constant, std::string_view unit) {
+  return course.empty() ? number(constant) + std::string(unit) : in_words(course, unit);
+}
+
+std::string in_words(const experiment::EndCondition& end) {
+  const std::string value = number(end.value);
+  switch (end.kind) {
+    case EndKind::duration: return fmt::format("it has lasted {} s", value);
+    case EndKind::upper_speed_above: return fmt::format("the upper wheel reaches {} rad/s", value);
+    case EndKind::upper_speed_below: return fmt::format("the upper wheel is slower than {} rad/s", value);
+    case EndKind::upper_wheel_peak: return fmt::format("the upper wheel has gained no speed for {} s", value);
+    case EndKind::lower_speed_above: return fmt::format("the lower wheel reaches {} rad/s", value);
+    case EndKind::lower_speed_below: return fmt::format("the lower wheel is slower than {} rad/s", value);
+    case EndKind::car_speed_above: return fmt::format("the car reaches {} m/s", value);
+    case EndKind::car_speed_below:
+      return fmt::format(
+          "the car is slower than {} m/s{}", value,
+          end.reason == rig::Reason::slip_control_left_at_low_speed ? " (least speed for slip control)" : "");
+    case EndKind::standstill: return "both wheels stand";
+    case EndKind::slip_above: return fmt::format("the slip reaches {}", value);
+    case EndKind::slip_below: return fmt::format("the slip is less than {}", value);
+    case EndKind::distance: return fmt::format("the car has come {} m in it", value);
+    case EndKind::all: break;
+  }
+  std::string text;
+  for (const experiment::EndCondition& part : end.parts) text += (text.empty() ? "" : " and ") + in_words(part);
+  return text;
+}
+
+std::string brake_in_words(const experiment::PhasePlan& phase, const settings::Settings& s) {
+  switch (phase.brake) {
+    case BrakeAction::released: return "off";
+    case BrakeAction::torque: return "torque " + in_words(phase.brake_course, phase.brake_torque_Nm, " N m");
+    case BrakeAction::duty: return "duty " + in_words(phase.brake_course, phase.brake_duty, "");
+    case BrakeAction::slip_control: break;
+  }
+  return fmt::format("controller {}, slip reference {}", s.control.controller,
+                     in_words(phase.slip_ref_course, s.control.slip_ref, ""));
+}
+
+std::string in_words(const settings::Value& value) {
+  return std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
+}
+
+void add_series(const SeriesScript& series, const settings::Settings& s, std::string& text) {
+  if (!series.given) return;
+  std::size_t runs = series.seeds.empty() ? static_cast<std::size_t>(series.repeat) : series.seeds.size();
+  std::string varied;
+  for (const Varied& v : series.vary) {
+    runs *= v.values.size();
+    std::string values;
+    for (const settings::Value& value : v.values) values += (values.empty() ? "" : ", ") + in_words(value);
+    varied += fmt::format("  {}: {}\n", v.key, values);
+  }
+  const std::string seeds =
+      series.seeds.empty() ? fmt::format("{} of each with seeds from {}", series.repeat, series.seed.value_or(s.seed))
+                           : fmt::format("with the seeds {}", fmt::join(series.seeds, ", "));
+  text +=
+      fmt::format("Series of {} runs, {}, in real time {} s apart\n{}", runs, seeds, number(series.pause_s), varied);
+}
+
+}  // namespace
+
+std::string explain(const Script& script, const settings::Settings& settings) {
+  settings::Settings s = settings;
+  apply(script, s);
+  const Plan plan = script::plan(script, s);
+  std::string text =
+      fmt::format("{}: {}\n", script.name, script.description.empty() ? "no description" : script.description);
+  for (std::size_t i = 0; i < plan.phases.size(); ++i) {
+    const experiment::PhasePlan& phase = plan.phases[i];
+    std::string ends;
+    for (const experiment::EndCondition& end : phase.ends_on) ends += (ends.empty() ? "" : ", or ") + in_words(end);
+    text += fmt::format("{}. {} ({}): motor {}, brake {}\n   until {}; a fault after {} s\n", i + 1,
+                        plan.phase_names[i], rig::name_of(phase.phase),
+                        phase.motor_course.empty() && phase.motor_duty == 0.0
+                            ? "off"
+                            : "duty " + in_words(phase.motor_course, phase.motor_duty, ""),
+                        brake_in_words(phase, s), ends, number(phase.time_limit_s));
+  }
+  text += fmt::format("Limits: wheels {} rad/s, motor duty {}, brake duty {}", number(s.gate.overspeed_rad_s),
+                      number(s.gate.motor_duty_max), number(s.gate.brake_duty_max));
+  if (std::isfinite(plan.limits.run_time_s)) text += fmt::format(", run {} s", number(plan.limits.run_time_s));
+  if (std::isfinite(plan.limits.distance_m)) text += fmt::format(", distance {} m", number(plan.limits.distance_m));
+  text += '\n';
+  if (!s.plant.friction_profile.empty()) text += fmt::format("Road (simulation only): {}\n", s.plant.friction_profile);
+  if (!s.inject.empty()) text += fmt::format("Faults (never on hardware): {}\n", s.inject);
+  for (const Setting& setting : script.settings)
+    text += fmt::format("Setting: {} = {}\n", setting.key, in_words(setting.value));
+  if (!script.analysis.empty()) text += fmt::format("Analysis: {}\n", script.analysis);
+  add_series(script.series, s, text);
+  return text;
+}
+
+}  // namespace abs_hil::script

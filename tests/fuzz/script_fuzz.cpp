@@ -1,0 +1,57 @@
+// Any text as an experiment file: refused with a ConfigError in one line, or a script that can be explained, planned
+// and run through a sequence without a number that is not finite.
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <optional>
+#include <string>
+
+#include "abs_hil/experiment/sequence.hpp"
+#include "abs_hil/script/explain.hpp"
+#include "abs_hil/script/plan.hpp"
+#include "abs_hil/settings/config_error.hpp"
+
+namespace {
+
+using namespace abs_hil;
+
+void expect(bool holds) {
+  if (!holds) std::abort();
+}
+
+void use(const script::Script& script) {
+  settings::Settings settings;
+  script::apply(script, settings);
+  static_cast<void>(script::explain(script, settings));
+  const script::Plan plan = script::plan(script, settings);
+  expect(!plan.phases.empty() && plan.phases.size() == plan.phase_names.size());
+  static_cast<void>(script::beyond_limits(plan, settings));
+  experiment::Sequence sequence(plan.phases, plan.limits);
+  for (int i = 0; i < 50; ++i) {
+    sequence.update(
+        {.time_s = i * 0.1, .speeds = {i * 10.0, i * 10.0}, .car_speed_m_s = i * 1.0, .distance_m = i * 0.5});
+    const experiment::PhasePlan& now = sequence.current();
+    const double time_s = sequence.phase_time_s();
+    expect(now.motor_duty_at(time_s) >= 0.0 && now.motor_duty_at(time_s) <= 1.0);
+    expect(std::isfinite(now.brake_torque_Nm_at(time_s)) && std::isfinite(now.brake_duty_at(time_s)));
+    if (!now.slip_ref_course.empty())
+      expect(now.slip_ref_course.at(time_s) > 0.0 && now.slip_ref_course.at(time_s) < 1.0);
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string text(reinterpret_cast<const char*>(data), size);
+  const auto read_file = [](const std::string& name) -> std::optional<std::string> {
+    if (name == "profile.csv") return "time_s,value\n0,0.1\n1,0.2\n";
+    return std::nullopt;
+  };
+  try {
+    use(script::parse(text, "fuzz.toml", read_file));
+  } catch (const settings::ConfigError& error) {
+    const std::string message = error.what();
+    expect(!message.empty() && message.find('\n') == std::string::npos);
+  }
+  return 0;
+}
