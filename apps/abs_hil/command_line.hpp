@@ -2,9 +2,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "abs_hil/script/script.hpp"
@@ -69,6 +71,8 @@ struct RunRequest {
   std::string config_toml{};                       ///< the same, as a file for --config
   OutputOptions outputs{};
   std::vector<std::string> command_line{};  ///< as typed, for the record
+  /// Not empty: a run of a series, which prints nothing but faults and tells now and then which phase it is in.
+  std::function<void(std::string_view phase)> in_series{};
 };
 
 /// Merges defaults, plant file, the script's settings, configuration file, named options and assignments, later ones

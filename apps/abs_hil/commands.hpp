@@ -13,6 +13,9 @@ namespace abs_hil::app {
 
 /// Runs an experiment and returns the exit status. Throws what the parts throw: see main.cpp.
 int run(const RunRequest& request);
+/// Runs the series of `base.script`, each run merged anew from the options as typed, and returns the exit status.
+/// Throws as `run`.
+int run_series(const RunOptions& options, const RunRequest& base);
 /// `abs_hil compare`: controllers side by side in simulation. Throws settings::ConfigError and std::invalid_argument.
 int compare(const CompareOptions& options);
 /// `abs_hil list`: controllers, plants, experiments and backends, or all configuration keys.

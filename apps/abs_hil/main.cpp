@@ -281,7 +281,7 @@ int dispatch(int argc, char** argv) {
   if (convert_command.parser->parsed()) return app::convert(convert_command);
   app::RunRequest request = app::merge(options);
   request.command_line.assign(argv, argv + argc);
-  return app::run(request);
+  return request.script->series.given ? app::run_series(options, request) : app::run(request);
 }
 
 int fail(int status, const std::exception& error) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -57,7 +58,8 @@ analysis::RunSummary summarise(const RunRequest& request, const experiment::RunS
           .truth_known = s.backend == "sim",
           .timing = request.outputs.fast ? rig::TimingSummary{} : session.executive().statistics().summary(),
           .gate = session.gate().counts(),
-          .config = nlohmann::ordered_json::parse(request.config_json)};
+          .config = nlohmann::ordered_json::parse(request.config_json),
+          .friction_curve = outputs.friction_curve_json()};
 }
 
 archive::RunEnvironment environment(const RunRequest& request, const driver::RigDriver& driver,
@@ -147,6 +149,9 @@ int run(const RunRequest& request) {
   runtime::Clock& clock = request.outputs.fast ? static_cast<runtime::Clock&>(virtual_clock) : real_clock;
   const std::unique_ptr<driver::RigDriver> driver = with_faults(make_driver(s, request.outputs.fast), s, clock);
   script::Plan plan = script::plan(*request.script, s);
+  std::vector<std::string> phase_names = plan.phase_names;
+  // The logic puts a phase before the first then.
+  if (s.experiment.wait_for_start) phase_names.insert(phase_names.begin(), "waiting for the start");
   for (const std::string& problem : script::beyond_limits(plan, s)) spdlog::warn("{}; it is held to that", problem);
   experiment::RunLogicParts logic = make_logic(s, std::move(plan.phases), plan.limits);
   require_resources(request, *driver);
@@ -161,13 +166,18 @@ int run(const RunRequest& request) {
       request, flight_record_prefix(request, outputs.folder() ? outputs.folder()->path() : std::filesystem::path()));
   run_watch.watch(session);
   note_signals();
-  SignalsStop signals(session, s.backend == "sim" || run_watch.has_guardian());
+  // The handler knows one run: of a series in virtual time, several at once, each asks for itself.
+  std::optional<SignalsStop> signals;
+  if (!request.in_series || !request.outputs.fast) {
+    signals.emplace(session, s.backend == "sim" || run_watch.has_guardian());
+  }
   BoardNotes board_notes(s, *driver);
 
   const auto poll = [&] {
     board_notes.log_once();
     timing.poll();
     outputs.poll();
+    if (request.in_series) request.in_series(phase_names.at(session.latest().phase_index));
     if (const rig::Reason guardian = run_watch.poll(); guardian != rig::Reason::none) return guardian;
     if (const rig::Reason signal = signalled(); signal != rig::Reason::none) return signal;
     return outputs.stop_requested() ? rig::Reason::stop_command : rig::Reason::none;
@@ -184,15 +194,17 @@ int run(const RunRequest& request) {
   if (!outcome.ran) {
     throw driver::Unavailable(realtime_refusal(outcome.realtime));
   }
-  signals.allow_leaving();
+  if (signals) signals->allow_leaving();
   board_notes.log_once();
   const analysis::RunSummary summary = summarise(request, session, outcome, outputs);
   if (rig::is_fault(outcome.reason)) {
     run_watch.write_record(request, outcome.reason, outcome.reason_value, summary.reason);
   }
   outputs.write(summary, session.executive().statistics(), environment(request, *driver, outcome));
-  fmt::print("{}", analysis::to_text(summary));
-  if (outputs.folder()) fmt::print("  {:<22}{}\n", "run folder", outputs.folder()->path().string());
+  if (!request.in_series) {
+    fmt::print("{}", analysis::to_text(summary));
+    if (outputs.folder()) fmt::print("  {:<22}{}\n", "run folder", outputs.folder()->path().string());
+  }
   for (const std::string& line : driver->tally()) spdlog::info("{}", line);
   if (!outcome.completed()) spdlog::error("run ended early: {}", summary.reason);
   if (!outcome.safe_state.ok()) {

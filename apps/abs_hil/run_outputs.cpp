@@ -33,8 +33,12 @@ RunOutputs::RunOutputs(const RunRequest& request)
   } catch (const std::runtime_error& error) {
     throw settings::ConfigError(error.what());
   }
+  if (request.script->analysis == "friction-curve") {
+    const rig::RigParameters& rig = request.settings.plant.rig;
+    friction_curve_.emplace(rig.wheels, rig.encoder_counts_per_rev);
+  }
   if (!log_.empty() || lcm_) open_stream(request);
-  if (!request.outputs.fast) status_line_.emplace([this] { return snapshot(); });
+  if (!request.outputs.fast && !request.in_series) status_line_.emplace([this] { return snapshot(); });
 }
 
 void RunOutputs::open_files(const OutputOptions& outputs) {
@@ -102,6 +106,7 @@ void RunOutputs::open_stream(const RunRequest& request) {
 
 std::vector<rig::RecordSink*> RunOutputs::sinks() {
   std::vector<rig::RecordSink*> sinks{&metrics_};
+  if (friction_curve_) sinks.push_back(&*friction_curve_);
   for (telemetry::CsvSink& csv : csv_) sinks.push_back(&csv);
   if (events_) sinks.push_back(&*events_);
   if (stream_) sinks.push_back(&*stream_);
@@ -117,6 +122,10 @@ void RunOutputs::watch(experiment::RunSession& session) {
   steering_->count(*commands_);
   commands_->set_judge([this](const command2_t& command) { return steering_->judge(command); });
   commands_->listen();
+}
+
+nlohmann::ordered_json RunOutputs::friction_curve_json() const {
+  return friction_curve_ ? analysis::to_json(friction_curve_->result()) : nlohmann::ordered_json();
 }
 
 void RunOutputs::poll() {
@@ -151,6 +160,8 @@ void RunOutputs::write(const analysis::RunSummary& summary, const runtime::Cycle
   for (analysis::SummaryFile& file : summary_) file.write(summary);
   for (runtime::HistogramFile& file : histogram_) file.write(statistics);
   if (!folder_) return;
+  if (friction_curve_)
+    folder_->write("friction_curve.csv", std::string_view(analysis::to_csv(friction_curve_->result())));
   folder_->write(archive::file::environment, archive::environment_json(environment));
   folder_->seal();
 }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "abs_hil/analysis/friction_curve.hpp"
 #include "abs_hil/analysis/run_metrics.hpp"
 #include "abs_hil/analysis/run_summary.hpp"
 #include "abs_hil/archive/environment.hpp"
@@ -46,6 +47,8 @@ class RunOutputs {
   /// Writes summary and histogram where they were asked for, and completes the run folder. Throws std::runtime_error.
   void write(const analysis::RunSummary& summary, const runtime::CycleStatistics& statistics,
              const archive::RunEnvironment& environment);
+  /// What the script's analysis found; null without one.
+  [[nodiscard]] nlohmann::ordered_json friction_curve_json() const;
   /// The run folder, if there is one.
   [[nodiscard]] const std::optional<archive::RunFolder>& folder() const noexcept { return folder_; }
 
@@ -57,6 +60,7 @@ class RunOutputs {
 
   experiment::RunSession* session_{nullptr};
   analysis::RunMetrics metrics_;
+  std::optional<analysis::FrictionCurve> friction_curve_;
   std::optional<archive::RunFolder> folder_;
   // Of each as many as there are places: the run folder and the file named.
   std::list<telemetry::CsvSink> csv_;

@@ -72,43 +72,45 @@ void add_timing(const rig::TimingSummary& timing, const Line& line) {
 
 nlohmann::ordered_json to_json(const RunSummary& s) {
   const Metrics& m = s.metrics;
-  return {{"result", s.result},
-          {"reason", s.reason},
-          {"controller", s.controller},
-          {"plant", s.plant},
-          {"backend", s.backend},
-          {"experiment", s.experiment},
-          {"brake_start_s", number(m.brake_start_s)},
-          {"stop_time_s", number(m.stop_time_s)},
-          {"stop_distance_m", number(m.stop_distance_m)},
-          {"slip_rms", number(m.slip_rms)},
-          {"slip_settling_s", number(m.slip_settling_s)},
-          {"theta_final_N", number(m.theta_final_N)},
-          {"theta_settling_s", number(m.theta_settling_s)},
-          {"torque_total_variation_Nm", number(m.torque_total_variation_Nm)},
-          {"slip_overshoot", number(m.slip_overshoot)},
-          {"time_locked_s", number(m.time_locked_s)},
-          {"theta_error_final", number(m.theta_error_final)},
-          {"theta_error_rms", number(m.theta_error_rms)},
-          {"truth_known", s.truth_known},
-          {"cycles", s.cycles},
-          {"overruns", s.timing.overruns.total},
-          {"overruns_by_cause", by_cause(s.timing.overruns)},
-          {"overruns_startup", s.timing.overruns.startup},
-          {"overruns_longest_run", s.timing.overruns.longest_run},
-          {"ticks_missed", s.timing.overruns.ticks_missed},
-          {"realtime", s.realtime},
-          {"virtual_time", s.virtual_time},
-          {"wakeup_latency_us", to_json(s.timing.wakeup_latency)},
-          {"read_us", to_json(s.timing.read)},
-          {"control_us", to_json(s.timing.control)},
-          {"write_us", to_json(s.timing.write)},
-          {"cycle_time_us", to_json(s.timing.cycle_time)},
-          {"telemetry_drops", s.telemetry_drops},
-          {"publish_failures", s.publish_failures},
-          {"csv_rows_lost", s.csv_rows_lost},
-          {"gate", to_json(s.gate)},
-          {"config", s.config}};
+  nlohmann::ordered_json json{{"result", s.result},
+                              {"reason", s.reason},
+                              {"controller", s.controller},
+                              {"plant", s.plant},
+                              {"backend", s.backend},
+                              {"experiment", s.experiment},
+                              {"brake_start_s", number(m.brake_start_s)},
+                              {"stop_time_s", number(m.stop_time_s)},
+                              {"stop_distance_m", number(m.stop_distance_m)},
+                              {"slip_rms", number(m.slip_rms)},
+                              {"slip_settling_s", number(m.slip_settling_s)},
+                              {"theta_final_N", number(m.theta_final_N)},
+                              {"theta_settling_s", number(m.theta_settling_s)},
+                              {"torque_total_variation_Nm", number(m.torque_total_variation_Nm)},
+                              {"slip_overshoot", number(m.slip_overshoot)},
+                              {"time_locked_s", number(m.time_locked_s)},
+                              {"theta_error_final", number(m.theta_error_final)},
+                              {"theta_error_rms", number(m.theta_error_rms)},
+                              {"truth_known", s.truth_known},
+                              {"cycles", s.cycles},
+                              {"overruns", s.timing.overruns.total},
+                              {"overruns_by_cause", by_cause(s.timing.overruns)},
+                              {"overruns_startup", s.timing.overruns.startup},
+                              {"overruns_longest_run", s.timing.overruns.longest_run},
+                              {"ticks_missed", s.timing.overruns.ticks_missed},
+                              {"realtime", s.realtime},
+                              {"virtual_time", s.virtual_time},
+                              {"wakeup_latency_us", to_json(s.timing.wakeup_latency)},
+                              {"read_us", to_json(s.timing.read)},
+                              {"control_us", to_json(s.timing.control)},
+                              {"write_us", to_json(s.timing.write)},
+                              {"cycle_time_us", to_json(s.timing.cycle_time)},
+                              {"telemetry_drops", s.telemetry_drops},
+                              {"publish_failures", s.publish_failures},
+                              {"csv_rows_lost", s.csv_rows_lost},
+                              {"gate", to_json(s.gate)},
+                              {"config", s.config}};
+  if (!s.friction_curve.is_null()) json["friction_curve"] = s.friction_curve;
+  return json;
 }
 
 std::string to_text(const RunSummary& s) {
@@ -126,6 +128,13 @@ std::string to_text(const RunSummary& s) {
        fmt::format("{} RMS, settled after {}", shown(m.slip_rms, 4, ""), shown(m.slip_settling_s, 3, "s")));
   line("theta estimate",
        fmt::format("{}, settled after {}", shown(m.theta_final_N, 2, "N"), shown(m.theta_settling_s, 3, "s")));
+  if (!s.friction_curve.is_null()) {
+    const auto value = [&s](const char* name) {
+      return s.friction_curve[name].is_number() ? s.friction_curve[name].get<double>() : rig::unknown;
+    };
+    line("friction curve",
+         fmt::format("peak {} at slip {}", shown(value("peak_force_N"), 2, "N"), shown(value("peak_slip"), 4, "")));
+  }
   line("torque variation", shown(m.torque_total_variation_Nm, 1, "N m"));
   line("cycles", fmt::format("{}, {} overruns, {} records dropped, {} messages not sent", s.cycles,
                              s.timing.overruns.total, s.telemetry_drops, s.publish_failures));

@@ -62,7 +62,7 @@ runtime::PhasePermissions Sequence::permissions() const noexcept {
   runtime::PhasePermissions permissions{};
   for (const PhasePlan& plan : plans_) {
     runtime::PhasePermission& may = permissions[static_cast<std::size_t>(plan.phase)];
-    may.motor = may.motor || plan.motor_duty > 0.0;
+    may.motor = may.motor || plan.motor_duty > 0.0 || !plan.motor_course.empty();
     may.brake = may.brake || plan.brake != BrakeAction::released;
     may.together = may.together || plan.motor_with_brake;
   }

@@ -43,6 +43,7 @@ std::string in_words(const experiment::EndCondition& end) {
           "the car is slower than {} m/s{}", value,
           end.reason == rig::Reason::slip_control_left_at_low_speed ? " (least speed for slip control)" : "");
     case EndKind::standstill: return "both wheels stand";
+    case EndKind::start_command: return "the start is given";
     case EndKind::slip_above: return fmt::format("the slip reaches {}", value);
     case EndKind::slip_below: return fmt::format("the slip is less than {}", value);
     case EndKind::distance: return fmt::format("the car has come {} m in it", value);

@@ -49,6 +49,7 @@ Reason reason_of(EndKind kind) {
     case EndKind::upper_wheel_peak: return Reason::upper_wheel_peak_detected;
     case EndKind::car_speed_below: return Reason::end_speed_reached;
     case EndKind::standstill: return Reason::standstill_reached;
+    case EndKind::start_command: return Reason::start_command;
     case EndKind::upper_speed_below:
     case EndKind::lower_speed_above:
     case EndKind::lower_speed_below:

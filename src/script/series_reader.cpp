@@ -10,7 +10,8 @@ namespace {
 
 constexpr std::size_t most_runs = 100'000;
 /// What a script does not set: who runs it, and on what, is not its business.
-constexpr std::array<std::string_view, 3> not_for_scripts{"driver.", "realtime.", "experiment.name"};
+constexpr std::array<std::string_view, 5> not_for_scripts{"driver.", "realtime.", "guardian.", "commands.",
+                                                          "experiment.name"};
 
 void refuse_foreign(const Source& source, std::string_view key, Place place) {
   for (const std::string_view start : not_for_scripts) {

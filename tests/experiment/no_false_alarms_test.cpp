@@ -5,7 +5,8 @@
 #include "abs_hil/comparison/simulated_run.hpp"
 #include "abs_hil/comparison/variation.hpp"
 #include "abs_hil/control/registry.hpp"
-#include "abs_hil/experiment/experiments.hpp"
+#include "abs_hil/script/library.hpp"
+#include "abs_hil/script/plan.hpp"
 #include "abs_hil/settings/config_file.hpp"
 #include "abs_hil/settings/key_table.hpp"
 #include "catch.hpp"
@@ -21,7 +22,7 @@ settings::Settings configured(const std::string& plant, const std::string& exper
   settings::Settings s;
   settings::KeyTable keys(s);
   settings::load_file(settings::plant_file(plant), keys, "plant");
-  s.plant.friction_profile = friction_profile_of(experiment);
+  s.plant.friction_profile = script::friction_profile(*script::find(experiment));
   s.experiment.name = experiment;
   s.control.controller = controller;
   s.control.rate_Hz = rate_Hz;
@@ -87,7 +88,7 @@ TEST_CASE("nor do plants that stray by 20 % from what the gate believes, from re
         driver::SimDriver driver(comparison::perturbed(nominal.plant, drawn), {.seed = drawn.sensor_seed});
         RunSession session(clock, driver,
                            make_logic_parts(nominal.control, nominal.plant.rig, false, nominal.gate, nominal.experiment,
-                                            plan_experiment(nominal.experiment, nominal.control.v_min_m_s)),
+                                            script::plan(nominal).phases),
                            nominal.gate, {});
         CHECK(session.run_fast([] { return rig::Reason::none; }).reason == rig::Reason::sequence_complete);
       }

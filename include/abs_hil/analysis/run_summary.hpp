@@ -31,6 +31,7 @@ struct RunSummary {
   rig::TimingSummary timing{};
   rig::GateCounts gate{};  ///< what the command gate did to the commands
   nlohmann::ordered_json config{};
+  nlohmann::ordered_json friction_curve{};  ///< what the experiment's analysis found; null without one
 };
 
 /// The summary as JSON, field names as in docs/telemetry.md; NaN becomes null.

@@ -1,0 +1,202 @@
+#include "abs_hil/script/series.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "abs_hil/archive/series_folder.hpp"
+#include "abs_hil/comparison/parallel.hpp"
+#include "abs_hil/settings/config_error.hpp"
+#include "commands.hpp"
+#include "exit_status.hpp"
+#include "signals.hpp"
+
+namespace abs_hil::app {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// How far a series is, on stderr: on a terminal one line that changes, else a line for every tenth of it.
+class Progress {
+ public:
+  Progress(std::size_t runs, std::size_t done) : runs_(runs), done_(done), at_start_(done) {}
+
+  /// @param what the run, @param phase where it stands; empty for one that has ended
+  void show(const std::string& what, std::string_view phase) {
+    const std::scoped_lock lock(mutex_);
+    const auto now = Clock::now();
+    if (!terminal_ || (!phase.empty() && now - shown_ < std::chrono::milliseconds(100))) return;
+    shown_ = now;
+    fmt::print(stderr, "\r\033[K{} of {} runs, {} left; {}{}{}", done_, runs_, left(), what, phase.empty() ? "" : ": ",
+               phase);
+    std::fflush(stderr);
+  }
+  void count(const std::string& what) {
+    {
+      const std::scoped_lock lock(mutex_);
+      ++done_;
+      const std::size_t tenth = std::max<std::size_t>(1, runs_ / 10);
+      if (!terminal_ && (done_ % tenth == 0 || done_ == runs_)) {
+        fmt::print(stderr, "{} of {} runs, {} left\n", done_, runs_, left());
+      }
+    }
+    show(what, {});
+  }
+  void end() const {
+    if (terminal_) fmt::print(stderr, "\r\033[K");
+  }
+
+ private:
+  [[nodiscard]] std::string left() const {
+    if (done_ == at_start_) return "? s";
+    const double spent_s = std::chrono::duration<double>(Clock::now() - start_).count();
+    const double left_s = spent_s / static_cast<double>(done_ - at_start_) * static_cast<double>(runs_ - done_);
+    return left_s < 90.0 ? fmt::format("{:.0f} s", left_s) : fmt::format("{:.0f} min", left_s / 60.0);
+  }
+
+  std::size_t runs_;
+  std::size_t done_;
+  std::size_t at_start_;
+  bool terminal_{isatty(STDERR_FILENO) == 1};
+  Clock::time_point start_{Clock::now()};
+  Clock::time_point shown_{};
+  std::mutex mutex_{};
+};
+
+std::string in_words(const script::SeriesMember& member) {
+  std::string text;
+  for (const auto& [key, value] : member.varied) text += fmt::format("{} = {}, ", key, script::text_of(value));
+  return text + fmt::format("seed {}", member.seed);
+}
+
+nlohmann::ordered_json varied_json(const script::SeriesMember& member) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (const auto& [key, value] : member.varied) {
+    std::visit([&json, &key = key](const auto& v) { json[key] = v; }, value);
+  }
+  return json;
+}
+
+RunOptions options_of(const RunOptions& common, const script::SeriesMember& member) {
+  RunOptions options = common;
+  for (const auto& [key, value] : member.varied) {
+    options.assignments.push_back(fmt::format("{}={}", key, script::text_of(value)));
+  }
+  options.seed = std::to_string(member.seed);
+  return options;
+}
+
+/// Where the series goes; none if nobody wants a folder. Throws settings::ConfigError.
+std::unique_ptr<archive::SeriesFolder> open_folder(const RunRequest& base, std::vector<archive::SeriesEntry> entries) {
+  const OutputOptions& o = base.outputs;
+  std::unique_ptr<archive::SeriesFolder> folder;
+  std::filesystem::path path;
+  if (o.run_folder) {
+    path = *o.run_folder;
+  } else {
+    const std::filesystem::path runs = archive::default_runs_dir();
+    if (o.no_run_folder || runs.empty()) return folder;
+    const std::time_t now = std::time(nullptr);
+    std::tm local{};
+    localtime_r(&now, &local);
+    path = archive::unused_folder(runs, local, base.settings.experiment.name);
+  }
+  try {
+    folder = std::make_unique<archive::SeriesFolder>(
+        path, archive::sha256_of(base.config_json + base.settings.plant_name + base.settings.backend),
+        base.script->name, std::move(entries));
+  } catch (const archive::FolderError& error) {
+    throw settings::ConfigError(error.what());
+  }
+  return folder;
+}
+
+/// A signal ended the run: it is to be done again.
+bool is_interrupted(int status) { return status > 128; }
+
+/// The brake cools; false if the person at the rig wants to stop.
+bool pause(double duration_s) {
+  const auto end = Clock::now() + std::chrono::duration<double>(duration_s);
+  while (Clock::now() < end && signalled() == rig::Reason::none)
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  return signalled() == rig::Reason::none;
+}
+
+}  // namespace
+
+int run_series(const RunOptions& common, const RunRequest& base) {
+  if (base.outputs.names_files()) {
+    throw settings::ConfigError(fmt::format(
+        "{}: a series of runs does not fit in one file; give --out DIR in place of --csv, --log, --summary and "
+        "--histogram",
+        base.script->path));
+  }
+  const std::vector<script::SeriesMember> members = script::members_of(base.script->series, base.settings.seed);
+  std::vector<archive::SeriesEntry> entries;
+  // Every run's configuration is checked before the first one moves anything.
+  for (const script::SeriesMember& member : members) {
+    static_cast<void>(merge(options_of(common, member)));
+    entries.push_back({.varied = varied_json(member), .seed = member.seed});
+  }
+  const std::unique_ptr<archive::SeriesFolder> folder = open_folder(base, std::move(entries));
+  std::vector<std::size_t> left;
+  std::atomic<std::size_t> ended_early{0};
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    if (!folder || !folder->done(i))
+      left.push_back(i);
+    else if (folder->status(i) != "completed")
+      ++ended_early;
+  }
+  if (folder && folder->resumed())
+    spdlog::info("{} of {} runs are there already", members.size() - left.size(), members.size());
+
+  note_signals();
+  Progress progress(members.size(), members.size() - left.size());
+  std::atomic<int> interrupted{0};
+  const auto one = [&](std::size_t k) {
+    if (interrupted != 0 || signalled() != rig::Reason::none) return;
+    const std::size_t i = left[k];
+    const std::string what = fmt::format("{}, {}", archive::SeriesFolder::name_of(i), in_words(members[i]));
+    RunRequest request = merge(options_of(common, members[i]));
+    request.command_line = base.command_line;
+    request.in_series = [&progress, &what](std::string_view phase) { progress.show(what, phase); };
+    request.outputs.run_folder.reset();
+    request.outputs.no_run_folder = true;
+    if (folder) request.outputs.run_folder = folder->begin(i).string();
+    const int status = run(request);
+    if (is_interrupted(status)) {
+      interrupted = status;
+      return;
+    }
+    if (status != exit_completed) ++ended_early;
+    if (folder) folder->end(i, status == exit_completed ? "completed" : "fault");
+    progress.count(what);
+    if (!base.outputs.fast && k + 1 < left.size()) static_cast<void>(pause(base.script->series.pause_s));
+  };
+  // In virtual time as many at once as the machine has processors; at the rig one after the other.
+  comparison::for_each_index(
+      left.size(), base.outputs.fast && base.settings.backend == "sim" ? comparison::machine_threads() : 1, one);
+  progress.end();
+  if (interrupted == 0 && signalled() != rig::Reason::none) {
+    experiment::RunOutcome outcome;
+    outcome.reason = signalled();
+    interrupted = status_of(outcome);
+  }
+  fmt::print("series {}: {} runs, {} ended early{}{}\n", base.script->name, members.size(), ended_early.load(),
+             interrupted != 0 ? ", interrupted: the same command goes on with it" : "",
+             folder ? ", in " + folder->path().string() : std::string());
+  if (interrupted != 0) return interrupted;
+  return ended_early == 0 ? exit_completed : exit_ended_early;
+}
+
+}  // namespace abs_hil::app
