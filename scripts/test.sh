@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# The tests: sets up, builds and runs ctest on one preset (default: release); further arguments go to ctest. Where
+# The tests: sets up, builds and runs ctest on one preset (default: release); further arguments go to ctest, without any
+# those labelled on-demand are left out (long ones: ctest -L on-demand runs them). Where
 # CI=true or ABS_HIL_REQUIRE_VM=1 the tests in a virtual machine must not be skipped, and what they need is installed;
 # where CI=true, what the tests of abs-spy, of LCM's Python module and of abs_report need as well.
 set -euo pipefail
@@ -15,4 +16,5 @@ if [ "${CI:-}" = true ]; then
   scripts/setup_lcm_python.sh
 fi
 scripts/build.sh "$preset"
+[ $# -gt 0 ] || set -- -LE on-demand
 ctest --preset "$preset" -j "$(nproc)" "$@"
