@@ -40,19 +40,27 @@ const std::vector<std::string> plants{"paper-table1", "paper-timing", "inteco-ma
 
 TEST_CASE("no controller on any plant at any rate trips a check") {
   int runs = 0;
-  for (const auto& experiment : experiments()) {
+  for (const std::string experiment : {"paper", "friction-jump"}) {
     for (const std::string& plant : plants) {
       for (const auto& controller : control::controllers()) {
         for (const double rate_Hz : {500.0, 1000.0, 5000.0}) {
-          CAPTURE(experiment.name, plant, controller.name, rate_Hz);
-          CHECK(end_of(configured(plant, std::string(experiment.name), controller.name, rate_Hz)) ==
-                rig::Reason::sequence_complete);
+          CAPTURE(experiment, plant, controller.name, rate_Hz);
+          CHECK(end_of(configured(plant, experiment, controller.name, rate_Hz)) == rig::Reason::sequence_complete);
           ++runs;
         }
       }
     }
   }
   CHECK(runs >= 2 * 3 * 6 * 3);
+}
+
+TEST_CASE("nor do the other experiments") {
+  for (const auto& known : script::known_experiments()) {
+    for (const std::string& plant : plants) {
+      CAPTURE(known->name, plant);
+      CHECK(end_of(configured(plant, known->name, "adaptive", 1000.0)) == rig::Reason::sequence_complete);
+    }
+  }
 }
 
 TEST_CASE("nor do ideal sensors and actuators, other seeds and other encoders") {
