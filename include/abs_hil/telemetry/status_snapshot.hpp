@@ -10,10 +10,10 @@ namespace abs_hil::telemetry {
 /// What only the owner of the run knows and ABS_STATUS and the status line show. All counts since the start.
 struct StatusSnapshot {
   std::uint64_t cycles{0};
-  std::uint64_t overruns{0};         ///< cycles that missed at least one tick
-  std::uint64_t telemetry_drops{0};  ///< records that found the ring full
+  std::uint64_t overruns{0};            ///< cycles that missed at least one tick
+  std::uint64_t telemetry_drops{0};     ///< records that found the ring full
   std::uint64_t gate_interventions{0};  ///< commands that the gate limited, blocked or refused
-  bool realtime{false};              ///< real-time scheduling and locked memory are in force
+  bool realtime{false};                 ///< real-time scheduling and locked memory are in force
   rig::DurationQuantiles wakeup_latency{};
   rig::DurationQuantiles cycle_time{};
   rig::DurationQuantiles read{};
