@@ -25,5 +25,5 @@ for _ in 1 2; do
 done
 measure loaded_1kHz 1000
 measure loaded_5kHz 5000
-mapfile -t load < <(jobs -p)
-kill "${load[@]}"
+# shellcheck disable=SC2046  # a list of numbers; the guest has no /dev/fd for a process substitution
+kill $(jobs -p)
