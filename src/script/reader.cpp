@@ -84,7 +84,7 @@ std::string_view kind_of(const toml::node& node) {
 }
 
 TableReader::TableReader(const Source& source, const toml::table& table, const Grammar& grammar, Place place)
-    : source_(source), grammar_(grammar), place_(table.source().begin.line > 0 ? place_of(table.source()) : place) {
+    : source_(source), place_(table.source().begin.line > 0 ? place_of(table.source()) : place) {
   for (const auto& [key, node] : table) {
     Entry entry{.field = grammar.find(key.str()),
                 .key = std::string(key.str()),

@@ -70,7 +70,6 @@ class TableReader {
 
  private:
   const Source& source_;
-  const Grammar& grammar_;
   Place place_;
   std::vector<Entry> entries_;
 };
