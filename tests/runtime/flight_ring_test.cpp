@@ -60,12 +60,13 @@ TEST_CASE("a record that its writer was killed in the midst of is left out, the 
 TEST_CASE("a reader in the midst of writing never sees a record put together from two") {
   std::vector<FlightSlot> slots(3);
   std::atomic<bool> done{false};
+  std::atomic<std::size_t> seen{0};
   std::thread writer([&] {
     FlightRing ring(slots);
-    for (std::uint64_t n = 0; n < 200'000; ++n) ring.push(numbered(n));
+    // On a busy machine the reader may not have had its turn by then.
+    for (std::uint64_t n = 0; n < 200'000 || (seen == 0 && n < 1'000'000'000); ++n) ring.push(numbered(n));
     done = true;
   });
-  std::size_t seen = 0;
   bool whole = true;
   const FlightRing reader(slots);
   do {
