@@ -15,7 +15,7 @@ fi
 root=$1
 mirror=${DEBIAN_MIRROR:-http://deb.debian.org/debian}
 step() { echo "clean root: $*, at $SECONDS s"; }
-inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"; }
+inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/srv LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"; }
 
 if [ ! -e "$root/etc/debian_version" ]; then
   step "debootstrap"
@@ -37,15 +37,15 @@ inside sh -c 'getent group abs_hil >/dev/null || { echo "the package made no gro
 inside apt-get purge -y -qq abs-hil >/dev/null
 
 step "fresh clone"
-rm -rf "$root/root/abs_hil"
-git clone -q "file://$source" "$root/root/abs_hil"
+rm -rf "$root/srv/abs_hil"
+git clone -q "file://$source" "$root/srv/abs_hil"
 # A cache of compiled objects from outside is used where there is one: its path and what it holds change no result.
 if [ -n "${CCACHE_DIR:-}" ] || [ -d "$HOME/.cache/ccache" ]; then
-  mkdir -p "$root/root/.cache/ccache" "$root/root/.config/ccache"
-  mount --bind "${CCACHE_DIR:-$HOME/.cache/ccache}" "$root/root/.cache/ccache"
+  mkdir -p "$root/srv/.cache/ccache" "$root/srv/.config/ccache"
+  mount --bind "${CCACHE_DIR:-$HOME/.cache/ccache}" "$root/srv/.cache/ccache"
 fi
 step "first command: scripts/run.sh"
-inside bash -c 'cd /root/abs_hil && scripts/run.sh >/tmp/run.log 2>&1 || { tail -30 /tmp/run.log; exit 1; }; grep -m 1 "^completed" /tmp/run.log'
+inside bash -c 'cd /srv/abs_hil && scripts/run.sh >/tmp/run.log 2>&1 || { tail -30 /tmp/run.log; exit 1; }; grep -m 1 "^completed" /tmp/run.log'
 step "second command: scripts/test.sh"
-inside bash -c 'cd /root/abs_hil && scripts/test.sh >/tmp/test.log 2>&1 || { tail -40 /tmp/test.log; exit 1; }; grep -E "tests passed|Skipped" /tmp/test.log'
+inside bash -c 'cd /srv/abs_hil && scripts/test.sh >/tmp/test.log 2>&1 || { tail -40 /tmp/test.log; exit 1; }; grep -E "tests passed|Skipped" /tmp/test.log'
 step "done"
