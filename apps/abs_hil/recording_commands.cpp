@@ -53,7 +53,8 @@ int replay_run(const ReplayCommand& command) {
     const replay::RecordedRun run = replay::read_run(command.recording);
     if (command.check) return check_again(run);
     const settings::Settings settings = replay::settings_of(run, command.changes);
-    const std::vector<replay::RerunCycle> rerun = replay::rerun_open_loop(run, settings);
+    const std::vector<replay::RerunCycle> rerun =
+        replay::rerun_open_loop(run, settings, replay::WheelFaults::as_recorded);
     fmt::print("{}", replay::report(run, settings, rerun));
     if (command.csv_file) {
       telemetry::CsvSink csv(*command.csv_file);

@@ -51,7 +51,7 @@ bool compare(const RecordedRun& run, const std::vector<RerunCycle>& rerun, bool 
   for (std::size_t n = 0; n < common; ++n) {
     const telemetry_t& recorded = run.cycles[n];
     telemetry_t computed = telemetry::to_message(rerun[n].record, rerun[n].distance_m, recorded.sequence);
-    if (ended_from_outside(recorded)) computed.reason_value = recorded.reason_value;
+    if (ended_from_outside(run, n, WheelFaults::found_again)) computed.reason_value = recorded.reason_value;
     if (same_bits(recorded, computed)) continue;
     const Difference difference = first_difference(recorded, computed, with_timing);
     if (difference.field.empty()) continue;
@@ -90,7 +90,7 @@ CheckResult check(const RecordedRun& run) {
   const auto compared = [&](const std::vector<RerunCycle>& rerun, bool with_timing, const std::string& what) {
     result.equal = compare(run, rerun, with_timing, what, result) && result.equal;
   };
-  compared(rerun_open_loop(run, settings), run.virtual_time,
+  compared(rerun_open_loop(run, settings, WheelFaults::found_again), run.virtual_time,
            "open loop (commands, phases and estimates from the recorded measurements)");
   const std::string simulation = "simulation (counts and true motion too, from the seed on)";
   if (run.experiment.backend != "sim") {

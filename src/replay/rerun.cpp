@@ -37,7 +37,8 @@ class RecordedClock final : public runtime::Clock {
 /// A rig that does again what was recorded, whatever is asked of it.
 class RecordedRig final : public driver::RigDriver {
  public:
-  RecordedRig(const RecordedRun& run, bool ideal_sensors) : run_(run), ideal_sensors_(ideal_sensors) {}
+  RecordedRig(const RecordedRun& run, const settings::Settings& s)
+      : run_(run), ideal_sensors_(s.plant.ideal_sensors), injected_(!s.inject.empty()) {}
   ~RecordedRig() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "recorded"; }
@@ -51,8 +52,9 @@ class RecordedRig final : public driver::RigDriver {
     measurement = record.measurement;
     measurement.time_ns = run_.measured_ns[next_];
     truth_ = record.truth;
-    // The simulator hands its true speeds to the controller then.
-    if (ideal_sensors_) measurement.ideal_speeds = truth_.speeds;
+    // The simulator hands its true speeds to the controller then; what an injected fault made of them it took as it
+    // was.
+    if (ideal_sensors_) measurement.ideal_speeds = injected_ ? record.control.speeds_est : truth_.speeds;
     ++next_;
     return {};
   }
@@ -61,8 +63,36 @@ class RecordedRig final : public driver::RigDriver {
 
   const RecordedRun& run_;
   bool ideal_sensors_;
+  bool injected_;
   std::size_t next_{0};
   rig::PlantTruth truth_{};
+};
+
+/// A rig whose reading takes as long as it was recorded to: the gate judges no counts that came late.
+class TimedReading final : public driver::RigDriver {
+ public:
+  TimedReading(driver::RigDriver& rig, const RecordedRun& run, RecordedClock& clock)
+      : rig_(rig), run_(run), clock_(clock) {}
+  ~TimedReading() override { static_cast<void>(deactivate()); }
+
+  [[nodiscard]] std::string_view name() const noexcept override { return rig_.name(); }
+  [[nodiscard]] rig::PlantTruth truth() const noexcept override { return rig_.truth(); }
+
+ private:
+  void do_configure() override { rig_.configure(); }
+  void do_activate(std::int64_t now_ns) override { rig_.activate(now_ns); }
+  driver::IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override {
+    const driver::IoResult result = rig_.read(now_ns, measurement);
+    clock_.set(now_ns + run_.cycles[next_++].read_ns);
+    return result;
+  }
+  driver::IoResult do_write(const rig::Command& command) noexcept override { return rig_.write(command); }
+  driver::IoResult do_make_safe() noexcept override { return rig_.deactivate(); }
+
+  driver::RigDriver& rig_;
+  const RecordedRun& run_;
+  RecordedClock& clock_;
+  std::size_t next_{0};
 };
 
 /// The run's logic, except that what acted on the rig is what was recorded.
@@ -139,12 +169,13 @@ void put(const adjustment_t& adjustment, settings::LiveSettings& live, experimen
 }
 
 /// Runs the program's own cycle at the recorded times.
-std::vector<RerunCycle> rerun(const RecordedRun& run, const settings::Settings& s, driver::RigDriver& rig,
-                              runtime::CycleLogic& cycle_logic, experiment::AdjustmentMailbox& mailbox) {
+std::vector<RerunCycle> rerun(const RecordedRun& run, const settings::Settings& s, driver::RigDriver& backend,
+                              runtime::CycleLogic& cycle_logic, experiment::AdjustmentMailbox& mailbox,
+                              runtime::CommandGate& gate, WheelFaults faults) {
   settings::LiveSettings live(s);
   auto adjustment = run.adjustments.begin();
   RecordedClock clock(run.cycles.front().stamp_ns);
-  runtime::CommandGate gate(s.gate);
+  TimedReading rig(backend, run, clock);
   runtime::RecordRing ring(ring_capacity);
   // Lateness is recorded, not met again: it must not count here.
   runtime::CyclicExecutive executive(clock, rig, cycle_logic, gate, ring, std::llround(1e9 / s.control.rate_Hz),
@@ -153,12 +184,13 @@ std::vector<RerunCycle> rerun(const RecordedRun& run, const settings::Settings& 
   runtime::RecordPump pump(ring, s.plant.rig.wheels.r2_m, {&collected});
   rig.configure();
   rig.activate(clock.now_ns());
-  for (const telemetry_t& cycle : run.cycles) {
+  for (std::size_t n = 0; n < run.cycles.size(); ++n) {
+    const telemetry_t& cycle = run.cycles[n];
     clock.set(cycle.stamp_ns);
     for (; adjustment != run.adjustments.end() && put_before(*adjustment) <= cycle.cycle; ++adjustment) {
       put(*adjustment, live, mailbox);
     }
-    if (ended_from_outside(cycle)) executive.request_stop(static_cast<rig::Reason>(cycle.reason));
+    if (ended_from_outside(run, n, faults)) executive.request_stop(static_cast<rig::Reason>(cycle.reason));
     const bool goes_on = executive.step();
     pump.drain();
     if (!goes_on) break;
@@ -168,7 +200,8 @@ std::vector<RerunCycle> rerun(const RecordedRun& run, const settings::Settings& 
 
 }  // namespace
 
-bool ended_from_outside(const telemetry_t& cycle) noexcept {
+bool ended_from_outside(const RecordedRun& run, std::size_t n, WheelFaults faults) noexcept {
+  const telemetry_t& cycle = run.cycles[n];
   if (cycle.phase != telemetry_t::PHASE_STOPPED && cycle.phase != telemetry_t::PHASE_FAULT) return false;
   const auto reason = static_cast<rig::Reason>(cycle.reason);
   switch (reason) {
@@ -182,23 +215,46 @@ bool ended_from_outside(const telemetry_t& cycle) noexcept {
     case rig::Reason::board_interlock_tripped:
     case rig::Reason::board_supply_tripped:
     case rig::Reason::board_supply_low:
-    case rig::Reason::board_too_hot: return false;
+    case rig::Reason::board_too_hot:
+    case rig::Reason::board_health_lost: return false;
+    case rig::Reason::encoder_upper_jumped:
+    case rig::Reason::encoder_lower_jumped:
+      // Counts that leap within one cycle are refused: the recording holds those of the cycle before in their place.
+      if (n > 0 && run.measured_ns[n] == run.measured_ns[n - 1]) return true;
+      return faults == WheelFaults::as_recorded;
+    case rig::Reason::encoder_upper_stuck:
+    case rig::Reason::encoder_lower_stuck:
+    case rig::Reason::encoder_upper_reversed:
+    case rig::Reason::encoder_lower_reversed:
+    case rig::Reason::encoders_lost:
+    case rig::Reason::encoders_disagree:
+    case rig::Reason::slip_implausible:
+    case rig::Reason::samples_missing:
+    case rig::Reason::speed_rises_with_motor_off:
+    case rig::Reason::motor_no_response:
+    case rig::Reason::brake_no_response: return faults == WheelFaults::as_recorded;
     default: return rig::is_fault(reason) || rig::is_stop_request(reason);
   }
 }
 
-std::vector<RerunCycle> rerun_open_loop(const RecordedRun& run, const settings::Settings& settings) {
+std::vector<RerunCycle> rerun_open_loop(const RecordedRun& run, const settings::Settings& settings,
+                                        WheelFaults faults) {
   experiment::RunLogic logic(logic_parts(run, settings));
   RecordedActuation actuation(logic, run);
-  RecordedRig rig(run, settings.plant.ideal_sensors);
-  return rerun(run, settings, rig, actuation, logic.adjustments());
+  RecordedRig rig(run, settings);
+  // What another controller would have sent never acted: the wheels cannot be held against it.
+  runtime::CommandGate gate = faults == WheelFaults::found_again
+                                  ? logic.make_gate(settings.gate)
+                                  : runtime::CommandGate(settings.gate, logic.permissions());
+  return rerun(run, settings, rig, actuation, logic.adjustments(), gate, faults);
 }
 
 std::vector<RerunCycle> rerun_simulation(const RecordedRun& run, const settings::Settings& settings) {
   experiment::RunLogic logic(logic_parts(run, settings));
   driver::SimDriver rig(settings.plant, {.seed = static_cast<std::uint64_t>(settings.seed),
                                          .start_speed_rad_s = settings.experiment.start_speed_rad_s});
-  return rerun(run, settings, rig, logic, logic.adjustments());
+  runtime::CommandGate gate = logic.make_gate(settings.gate);
+  return rerun(run, settings, rig, logic, logic.adjustments(), gate, WheelFaults::found_again);
 }
 
 }  // namespace abs_hil::replay

@@ -16,6 +16,21 @@ class Replay(ProgramTest):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual(result.stdout.count('bit-equal'), 2)
 
+    def test_check_of_runs_that_ended_by_an_implausible_wheel(self):
+        log = self.folder / 'run.lcmlog'
+        for fault, number in (('brake@encoder_upper:stuck+0.2s', 130), ('coast@encoders:garbage', 132),
+                              ('accelerate@motor_pwm:off+0.5s', 141), ('brake@brake_pwm:off', 142)):
+            with self.subTest(fault):
+                result = self.run_program('--fast', '--no-lcm', '--log', log, '--inject', fault)
+                self.assertEqual(result.returncode, 1, result.stderr)
+                result = self.run_program('replay', log, '--check')
+                self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+                self.assertEqual(result.stdout.count('bit-equal'), 1)
+                self.assertIn('faults were injected', result.stdout)
+                # It is the fault that comes out again, in its cycle.
+                self.assertEqual(self.run_program('convert', log, self.folder / f'{number}.csv').returncode, 0)
+                self.assertEqual(int(self.rows(self.folder / f'{number}.csv')[-1]['reason']), number)
+
     def test_check_of_damaged_logs(self):
         whole = self.record('--set', 'experiment.start_speed_rad_s=60').read_bytes()
         damaged = self.folder / 'damaged.lcmlog'

@@ -4,11 +4,13 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "abs_hil/driver/injection/injecting_driver.hpp"
 #include "abs_hil/replay/check.hpp"
 #include "abs_hil/replay/report.hpp"
 #include "abs_hil/script/plan.hpp"
 #include "abs_hil/settings/config_error.hpp"
 #include "abs_hil/settings/config_file.hpp"
+#include "abs_hil/settings/unsafe_settings.hpp"
 #include "abs_hil/telemetry/log_outlet.hpp"
 #include "abs_hil/telemetry/message_stream.hpp"
 #include "catch.hpp"
@@ -57,8 +59,12 @@ void record_run(const std::filesystem::path& path, const Recipe& recipe) {
   stream.add(log);
   LateMeasurement late(stream, recipe.measured_late_ns);
   runtime::VirtualClock clock;
-  driver::SimDriver driver(
-      s.plant, {.seed = static_cast<std::uint64_t>(s.seed), .start_speed_rad_s = s.experiment.start_speed_rad_s});
+  driver::InjectingDriver driver(
+      std::make_unique<driver::SimDriver>(s.plant,
+                                          driver::SimStart{.seed = static_cast<std::uint64_t>(s.seed),
+                                                           .start_speed_rad_s = s.experiment.start_speed_rad_s}),
+      settings::injections_of(s), static_cast<std::uint64_t>(s.seed),
+      [&clock](std::int64_t duration_ns) { clock.sleep_until(clock.now_ns() + duration_ns); });
   experiment::RunSession session(clock, driver,
                                  experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate,
                                                               s.experiment, script::plan(s).phases),
@@ -104,13 +110,52 @@ TEST_CASE("ideal sensors, ideal actuator, faults and stop requests come out agai
   }
 }
 
+TEST_CASE("every fault that the gate finds in the wheels comes out again") {
+  const ScratchDirectory scratch;
+  const std::vector<std::pair<const char*, rig::Reason>> faults{
+      {"brake@encoder_upper:stuck+0.1s", rig::Reason::encoder_upper_stuck},
+      {"coast@encoder_lower:stuck", rig::Reason::encoder_lower_stuck},
+      {"brake@encoder_upper:garbage+0.1s", rig::Reason::encoder_upper_jumped},  // refused: not in the recording
+      {"brake@encoder_lower:garbage+0.1s", rig::Reason::encoder_lower_jumped},
+      {"coast@encoder_upper:wrong+0.1s", rig::Reason::encoder_upper_reversed},
+      {"coast@encoder_lower:wrong+0.1s", rig::Reason::encoder_lower_reversed},
+      {"coast@encoders:stuck+0.1s", rig::Reason::encoders_lost},
+      {"accelerate@encoder_upper:slow+0.1s", rig::Reason::encoders_disagree},
+      {"brake@encoders:wrong", rig::Reason::encoder_lower_jumped},
+      {"brake@read:stuck+0.1s", rig::Reason::samples_missing},
+      {"accelerate@stamp:off+0.1s", rig::Reason::samples_missing},
+      {"brake@stamp:intermittent+0.1s", rig::Reason::sequence_complete},  // measurements refused on the way
+      // Readings that were held up are not judged, and what a counter shows then goes on to the estimates.
+      {"brake@read:slow=0.9ms,brake@encoder_upper:garbage+0.1s", rig::Reason::overspeed},
+      {"accelerate@write:stuck+1s", rig::Reason::speed_rises_with_motor_off},
+      {"accelerate@motor_pwm:off+0.1s", rig::Reason::motor_no_response},
+      {"brake@brake_pwm:off", rig::Reason::brake_no_response},
+  };
+  for (const auto& [fault, reason] : faults) {
+    for (const bool ideal_sensors : {false, true}) {
+      INFO(fault << (ideal_sensors ? ", ideal sensors" : ""));
+      record_run(scratch / "run.lcmlog", {{"experiment.start_speed_rad_s=0", std::string("run.inject=") + fault,
+                                           std::string("plant.ideal_sensors=") + (ideal_sensors ? "true" : "false")}});
+      const RecordedRun run = read_run(scratch / "run.lcmlog");
+      // A failing encoder's ideal speed may leap before its counts tell.
+      if (!ideal_sensors) CHECK(run.cycles.back().reason == static_cast<int>(reason));
+      const CheckResult result = check(run);
+      INFO(result.lines.front());
+      CHECK(result.equal);
+      // What another controller would have done ends there, too.
+      CHECK(rerun_open_loop(run, settings_of(run, {.controller = "pi"}), WheelFaults::as_recorded).size() ==
+            run.cycles.size());
+    }
+  }
+}
+
 TEST_CASE("a board's own time of measurement is recorded, and a replay needs it") {
   const ScratchDirectory scratch;
   record_run(scratch / "run.lcmlog", {.measured_late_ns = 1});
   const RecordedRun run = read_run(scratch / "run.lcmlog");
   CHECK(run.measured_ns[5] == run.cycles[5].stamp_ns + 1);
   // The simulator's counters were read at the stamp: 1 ns later everywhere is the same run.
-  CHECK(rerun_open_loop(run, settings_of(run)).size() == run.cycles.size());
+  CHECK(rerun_open_loop(run, settings_of(run), WheelFaults::found_again).size() == run.cycles.size());
 }
 
 TEST_CASE("any changed bit of a measurement, estimate or command is found and named") {
@@ -170,7 +215,8 @@ TEST_CASE("another controller sees the same run: same measurements and estimates
   record_run(scratch / "run.lcmlog", {});
   const RecordedRun run = read_run(scratch / "run.lcmlog");
   const auto rerun =
-      rerun_open_loop(run, settings_of(run, {.controller = "nominal", .assignments = {"control.nominal.theta0_N=30"}}));
+      rerun_open_loop(run, settings_of(run, {.controller = "nominal", .assignments = {"control.nominal.theta0_N=30"}}),
+                      WheelFaults::as_recorded);
   REQUIRE(rerun.size() == run.cycles.size());
   double difference = 0.0;
   for (std::size_t n = 0; n < rerun.size(); ++n) {

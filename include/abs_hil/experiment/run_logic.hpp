@@ -49,6 +49,8 @@ class RunLogic final : public runtime::CycleLogic {
     return runtime::CommandGate(options, sequence_.permissions(),
                                 runtime::watch_limits(rig_, ideal_actuator_, options));
   }
+  /// What each phase's plan lets act.
+  [[nodiscard]] runtime::PhasePermissions permissions() const noexcept { return sequence_.permissions(); }
   /// Why the run ended; `none` while it has not.
   [[nodiscard]] rig::Reason end_reason() const noexcept { return end_.reason; }
   [[nodiscard]] double end_value() const noexcept { return end_.value; }
