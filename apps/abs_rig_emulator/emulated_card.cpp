@@ -112,6 +112,16 @@ std::string EmulatedCard::status() const {
       state.omega2_rad_s, model_.trip_flags());
 }
 
+std::string EmulatedCard::widths() const {
+  const emulator::PwmWidths& w = model_.pwm_widths();
+  const auto text = [start_ns = lock_step_ ? 0 : started_ns_](std::int64_t time_ns) {
+    return fmt::format("{} ns", start_ns + time_ns);
+  };
+  return fmt::format("drive {}, brake {}, {}, last written at {}", w.drive, w.brake,
+                     w.drive == 0 && w.brake == 0 ? "both 0 since " + text(w.zero_since_ns) : "not both 0",
+                     text(w.last_written_ns));
+}
+
 const char* EmulatedCard::commands() {
   return "fault OFFSET:KIND[=PARAMETER]   one register: ok stuck wrong= slow= delayed= intermittent= off garbage\n"
          "unplug | plug                   the card's files vanish, come back\n"
@@ -122,6 +132,8 @@ const char* EmulatedCard::commands() {
          "overspeed                       latches the overspeed interlock until the wheels stop\n"
          "turn upper|lower REVOLUTIONS    a wheel is turned by hand\n"
          "record FILE | record off        register accesses: R or W, offset, value\n"
+         "widths                          both PWM width registers; since when both are 0 and when last written, ns of "
+         "CLOCK_MONOTONIC, in lock-step of the card's time\n"
          "status                          duties on the wire, speeds, trip flags\n";
 }
 
@@ -156,6 +168,8 @@ std::string EmulatedCard::obey(std::string_view line) {
     } else {
       record_to(words[1]);
     }
+  } else if (is("widths", 0)) {
+    return widths();
   } else if (!is("status", 0)) {
     throw std::invalid_argument("unknown command \"" + std::string(line) + "\"; known are\n" + commands());
   }

@@ -41,6 +41,8 @@ class EmulatedCard final : public FileHandler {
   [[nodiscard]] static const char* commands();
   /// Duties on the wire now, one line.
   [[nodiscard]] std::string status() const;
+  /// Both PWMs' width registers and their times, one line.
+  [[nodiscard]] std::string widths() const;
 
  private:
   void go_on_to(std::int64_t time_ns);

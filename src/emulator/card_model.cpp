@@ -76,6 +76,15 @@ void CardModel::write_pwm(std::uint32_t offset, std::uint32_t value) noexcept {
   } else if (!options_.trip_clears_width || trip_flags() == 0) {
     channel.width = value & 0xFFFU;
   }
+  if (offset == 0x6C) note_widths(time_ns_);
+}
+
+void CardModel::note_widths(std::int64_t written_ns) noexcept {
+  const bool were_zero = widths_.drive == 0 && widths_.brake == 0;
+  widths_.drive = pwm_[0].width;
+  widths_.brake = pwm_[1].width;
+  widths_.last_written_ns = written_ns;
+  if (!were_zero) widths_.zero_since_ns = time_ns_;
 }
 
 std::uint32_t CardModel::read32(std::uint32_t offset) const noexcept {
@@ -168,6 +177,7 @@ void CardModel::watch_limits() noexcept {
   }
   if (options_.trip_clears_width && trip_flags() != 0) {
     for (PwmChannel& channel : pwm_) channel.width = 0;
+    note_widths(widths_.last_written_ns);
   }
 }
 

@@ -47,6 +47,39 @@ TEST_CASE("PWM registers belong to the indexed channel and read back") {
   CHECK(card.outputs().brake_duty == 2000.0 / 4095.0);
 }
 
+TEST_CASE("Since when both widths are 0, and when either was last written") {
+  CardModel card({});
+  CHECK(card.pwm_widths().zero_since_ns == 0);
+  card.advance_to(1 * ms);
+  set_width(card, 0, 1000);
+  card.advance_to(2 * ms);
+  set_width(card, 1, 2000);
+  CHECK(card.pwm_widths().drive == 1000);
+  CHECK(card.pwm_widths().brake == 2000);
+  card.advance_to(3 * ms);
+  set_width(card, 0, 0);
+  CHECK(card.pwm_widths().brake == 2000);
+  card.advance_to(4 * ms);
+  set_width(card, 1, 0);
+  card.advance_to(5 * ms);
+  CHECK(card.pwm_widths().zero_since_ns == 4 * ms);
+  CHECK(card.pwm_widths().last_written_ns == 4 * ms);
+  set_width(card, 0, 0);
+  CHECK(card.pwm_widths().zero_since_ns == 4 * ms);
+  CHECK(card.pwm_widths().last_written_ns == 5 * ms);
+}
+
+TEST_CASE("A trip that clears the widths is no write of the host's") {
+  CardModel card({.start_speed_rad_s = 50.0, .trip_clears_width = true});
+  card.advance_to(1 * ms);
+  set_width(card, 0, 1000);
+  card.advance_to(2 * ms);
+  card.trip_overspeed();
+  CHECK(card.pwm_widths().drive == 0);
+  CHECK(card.pwm_widths().zero_since_ns == 2 * ms);
+  CHECK(card.pwm_widths().last_written_ns == 1 * ms);
+}
+
 TEST_CASE("Counters are held at 0 as long as their bit of the mask is set, each by itself") {
   CardModel card({.start_speed_rad_s = 10.0});
   card.advance_to(100 * ms);

@@ -14,6 +14,14 @@ struct Outputs {
   double brake_duty{0.0};
 };
 
+/// Both PWMs' width registers, and when they were as they are; times on the card's clock, 0 at power-on.
+struct PwmWidths {
+  std::uint32_t drive{0};
+  std::uint32_t brake{0};
+  std::int64_t zero_since_ns{0};    ///< since when both have been 0; of no meaning while one is not
+  std::int64_t last_written_ns{0};  ///< the host's last write to either, of whatever value
+};
+
 /// The RT-DAC4/PCI with ABS logic as a host sees it: 256 bytes of 32-bit registers with their side effects, and behind
 /// them the rig. Written from the register facts alone, without the driver's tables. There is no watchdog: without a
 /// host the PWMs hold.
@@ -42,6 +50,8 @@ class CardModel {
   [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }
   [[nodiscard]] Outputs outputs() const noexcept;
   [[nodiscard]] std::uint32_t trip_flags() const noexcept;
+  /// The registers behind the outputs, whatever mode, interlocks and E-stop make of them.
+  [[nodiscard]] const PwmWidths& pwm_widths() const noexcept { return widths_; }
   /// True speeds and torques, for the emulator's own log: no register shows them.
   [[nodiscard]] const plant_sim::Plant& plant() const noexcept { return plant_; }
 
@@ -54,6 +64,7 @@ class CardModel {
   static constexpr std::uint32_t pwm_count = 2;
   static constexpr std::uint32_t encoder_count = 3;
 
+  void note_widths(std::int64_t written_ns) noexcept;
   [[nodiscard]] std::uint32_t read_pwm(std::uint32_t offset) const noexcept;
   void write_pwm(std::uint32_t offset, std::uint32_t value) noexcept;
   [[nodiscard]] std::uint32_t raw_count(std::uint32_t channel) const noexcept;
@@ -65,6 +76,7 @@ class CardModel {
   std::int64_t time_ns_{0};
   std::uint32_t pwm_index_{0};
   std::array<PwmChannel, pwm_count> pwm_{};
+  PwmWidths widths_{};
   std::uint32_t encoder_index_{0};
   std::uint32_t reset_mask_{0};
   std::array<std::uint32_t, encoder_count> zero_{};  ///< raw count at which each counter shows 0
