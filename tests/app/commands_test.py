@@ -1,7 +1,9 @@
 """Commands to a running abs_hil over UDP multicast, in a network namespace of its own: each taken, refused with its
 reason, or shrugged off; stop within two cycles. Status 77 where no namespace can be made.
 
-usage: commands_test.py PROGRAM PRIVATE_NETWORK_SCRIPT PYTHON_MODULE_DIR
+usage: commands_test.py PROGRAM PRIVATE_NETWORK_SCRIPT PYTHON_MODULE_DIR [stop]
+  stop  stop alone, each try within two cycles, for a clock that stands still for nobody else's work (tests/vm); else
+        their median is
 """
 import hashlib
 import hmac
@@ -9,6 +11,7 @@ import os
 import pathlib
 import random
 import socket
+import statistics
 import struct
 import subprocess
 import sys
@@ -68,6 +71,14 @@ class Run:
         self.process = subprocess.Popen([PROGRAM, '--log', self.log, *options], stdout=subprocess.PIPE,
                                         stderr=subprocess.PIPE, text=True)
         time.sleep(1.5)
+
+    def wait_for_cycles(self):
+        """Until it is under way, however long the program took to start."""
+        deadline = time.monotonic() + 20
+        while not self.log.exists() or b'ABS_TELEMETRY' not in self.log.read_bytes():
+            if time.monotonic() > deadline:
+                sys.exit('FAILED: no cycle within 20 s')
+            time.sleep(0.05)
 
     def end(self):
         self.output = self.process.communicate(timeout=60)
@@ -129,10 +140,11 @@ def not_enabled(folder):
     check(found == 3 and 'no answer' in said, 'nobody there', found, said)
 
 
-def stop_latency(folder, tries, flood):
+def stop_latency(folder, tries, flood, judge=statistics.median_low):
     late = []
     for _ in range(tries):
         run, wire = Run(folder), Wire()
+        run.wait_for_cycles()
         stop = abs_hil.command_t()
         stop.command = 'stop'
         data = stop.encode()
@@ -147,7 +159,7 @@ def stop_latency(folder, tries, flood):
         ended = next(m for c, m in run.messages if c == 'ABS_TELEMETRY' and m.reason == 34)
         late.append(sum(sent_ns < stamp <= ended.stamp_ns for stamp in stamps))
     print(f'stop{" after a flood" if flood else ""}: cycles from sending to the safe command: {sorted(late)}')
-    check(sorted(late)[len(late) // 2] <= 2, 'stop works within 2 cycles (median; wall clock)', late)
+    check(judge(late) <= 2, f'stop works within 2 cycles ({judge.__name__})', late)
 
 
 def garbage(folder):
@@ -183,7 +195,7 @@ def main():
     global abs_hil, PROGRAM, KEY
     PROGRAM, private_network, module = sys.argv[1:4]
     if 'inside' not in sys.argv:
-        os.execv(private_network, [private_network, sys.executable, __file__, *sys.argv[1:4], 'inside'])
+        os.execv(private_network, [private_network, sys.executable, __file__, *sys.argv[1:], 'inside'])
     sys.path.insert(0, module)
     import abs_hil
     with tempfile.TemporaryDirectory() as folder:
@@ -194,6 +206,10 @@ def main():
         path.chmod(0o600)
         KEY = ['--set', f'commands.key_file={path}']
         os.environ['ABS_HIL_RUNS_DIR'] = folder
+        if 'stop' in sys.argv:
+            stop_latency(folder, 10, False, max)
+            stop_latency(folder, 5, True, max)
+            return
         live_changes(folder, key)
         not_enabled(folder)
         stop_latency(folder, 5, False)
