@@ -104,13 +104,12 @@ class Guardian(RigTest):
                     program = self.start(emulator, PATIENT_MS, *settings(*EXPERIMENT))
                     self.wait_for_phase(emulator, program, phase)
                     guardian = guardian_of(program.pid)
-                    before = time.monotonic()
+                    before_ns = time.monotonic_ns()
                     program.send_signal(number)
                     program.wait(timeout=20)  # a stopped one, too: its guardian ends it
-                    wait_until(lambda: emulator.wire() == SAFE, 'the outputs hold')
-                    took_ms[number].append((time.monotonic() - before) * 1e3)
                     self.wait_until_guardian_ended(guardian)
                     self.assertEqual(emulator.wire(), SAFE)
+                    took_ms[number].append(self.ms_until_zero(emulator, before_ns))
                     _, words = program.communicate(timeout=20)
                     self.assertIn('drive 0 and brake 0 written and read back', words)
                     self.assertIn('gave no sign of life' if number == signal.SIGSTOP else 'process died', words)
@@ -119,6 +118,13 @@ class Guardian(RigTest):
                     emulator.end()
         for number, times in took_ms.items():
             print(f'{number.name}: both PWMs 0 after (ms)', *(f'{t:.1f}' for t in sorted(times)))
+
+    def ms_until_zero(self, emulator, since_ns):
+        """By the card's clock; 0 if nothing was driven."""
+        widths = emulator.widths()
+        self.assertEqual((widths.drive, widths.brake), (0, 0))
+        self.assertGreater(widths.last_written_ns, since_ns)
+        return max(0, widths.zero_since_ns - since_ns) * 1e-6
 
     def check_record(self):
         """Whole rows at full rate, up to the end; the log is read by LCM's own reader in another test."""
@@ -134,14 +140,19 @@ class Guardian(RigTest):
         self.assertGreater(next(self.record.glob('*.lcmlog')).stat().st_size, 300 * len(rows))
 
     def test_guardian_ends_first(self):
-        for number, words in ((signal.SIGKILL, 'the guardian process died'),
-                              (signal.SIGSTOP, 'the guardian process gave no sign of life')):
-            with self.subTest(number.name):
+        died, silent = 'the guardian process died', 'the guardian process gave no sign of life'
+        took_ms = []
+        for number, phase, words in (*((signal.SIGKILL, phase, died) for phase in PHASES),
+                                     (signal.SIGSEGV, 'accelerate', died), (signal.SIGSTOP, 'accelerate', silent),
+                                     (signal.SIGSTOP, 'brake', silent)):
+            with self.subTest(signal=number.name, phase=phase):
                 emulator = self.emulator()
-                summary, csv_file = self.folder / f'{number}.json', self.folder / f'{number}.csv'
-                program = self.start(emulator, PATIENT_MS, '--summary', summary, '--csv', csv_file)
-                self.wait_for_phase(emulator, program, 'accelerate')
+                summary, csv_file = self.folder / f'{number}{phase}.json', self.folder / f'{number}{phase}.csv'
+                program = self.start(emulator, PATIENT_MS, *settings(*EXPERIMENT), '--summary', summary, '--csv',
+                                     csv_file)
+                self.wait_for_phase(emulator, program, phase)
                 guardian = guardian_of(program.pid)
+                before_ns = time.monotonic_ns()
                 os.kill(guardian, number)
                 _, errors = program.communicate(timeout=20)
                 self.assertEqual(program.returncode, 1, errors)
@@ -150,7 +161,9 @@ class Guardian(RigTest):
                 self.assertEqual(self.summary(summary)['result'], 'fault')
                 self.assertEqual(self.rows(csv_file)[-1]['phase'], 'fault')
                 self.assertIsNone(guardian_of(program.pid))
+                took_ms.append(f'{number.name} {phase} {self.ms_until_zero(emulator, before_ns):.1f}')
                 emulator.end()
+        print('guardian first, both PWMs 0 after (ms):', ', '.join(took_ms))
 
     def test_terminal_signals_do_not_reach_the_guardian(self):
         emulator = self.emulator()

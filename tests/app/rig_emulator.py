@@ -1,8 +1,10 @@
 """The emulated rig as a process of its own, for the tests of --backend rig."""
 import os
+import re
 import shutil
 import subprocess
 import sys
+import typing
 
 from program import PROGRAM, ProgramTest
 
@@ -25,6 +27,14 @@ def skip_unless_possible():
     if reason:
         print(f'SKIPPED: {reason}')
         sys.exit(77)
+
+
+class Widths(typing.NamedTuple):
+    """Of both PWMs; times in ns of CLOCK_MONOTONIC."""
+    drive: int
+    brake: int
+    zero_since_ns: int | None  # None: not both are 0
+    last_written_ns: int
 
 
 class Emulator:
@@ -51,6 +61,12 @@ class Emulator:
         answer = self.command('status')
         part = answer[answer.index('drive '):].split(',')
         return float(part[0].split()[1]), float(part[1].split()[1])
+
+    def widths(self):
+        """Both PWM width registers by the card's own account."""
+        found = re.search(r'drive (\d+), brake (\d+), (?:not both 0|both 0 since (\d+) ns), last written at (\d+) ns',
+                          self.command('widths'))
+        return Widths(*(number and int(number) for number in found.groups()))
 
     def lower_speed(self):
         return float(self.command('status').split('lower ')[1].split()[0])
