@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -58,7 +59,7 @@ class ScratchDirectory {
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
  private:
-  inline static int next_ = 0;
+  inline static std::atomic<int> next_{0};
   std::filesystem::path path_;
 };
 

@@ -68,12 +68,23 @@ Expectation stamp(InjectionKind kind) {
   return {{Reason::samples_missing}, kind == InjectionKind::ok, missing_s};
 }
 
-Expectation board_number(InjectionKind kind, Reason bad) {
-  const bool shows = kind == InjectionKind::garbage ||
-                     (kind == InjectionKind::off && bad == Reason::board_supply_low) ||
-                     (kind == InjectionKind::intermittent && bad == Reason::board_supply_low);
-  // The simulator knows neither supply nor temperature: what is not there cannot be wrong or late.
-  return {{bad}, !shows, 0.03};
+/// What the board reports about itself; what the simulator does not know cannot be wrong or late.
+Expectation supply(Backend backend, InjectionKind kind) {
+  const bool shows = kind == InjectionKind::garbage || kind == InjectionKind::off ||
+                     kind == InjectionKind::intermittent ||
+                     (kind == InjectionKind::wrong && backend == Backend::card);  // half of 24 V
+  return {{Reason::board_supply_low}, !shows, kind == InjectionKind::intermittent ? 0.03 : at_once_s};
+}
+
+Expectation temperature(Backend backend, InjectionKind kind) {
+  const bool told = backend == Backend::card;
+  switch (kind) {
+    case InjectionKind::garbage: return {{Reason::board_too_hot}, false, 0.03};
+    case InjectionKind::wrong: return {{Reason::board_too_hot}, !told, at_once_s};  // by 100 K
+    case InjectionKind::off: return {{Reason::board_health_lost}, !told, at_once_s};
+    case InjectionKind::intermittent: return {{Reason::board_health_lost}, !told, 0.03};
+    default: return {{}, true};
+  }
 }
 
 Expectation trip(InjectionKind kind) {
@@ -131,7 +142,7 @@ Expectation brake(const driver::Injection& injection) {
   }
 }
 
-Expectation write(const driver::Injection& injection) {
+Expectation write(Backend backend, const driver::Injection& injection) {
   const bool late = injection.phase == Phase::hold || injection.phase == Phase::stopped;
   switch (injection.kind) {
     case InjectionKind::off: return {{Reason::driver_write_failed}, false, at_once_s};
@@ -146,7 +157,8 @@ Expectation write(const driver::Injection& injection) {
     case InjectionKind::garbage:
       return {{Reason::motor_no_response, Reason::brake_no_response, Reason::speed_rises_with_motor_off,
                Reason::encoder_upper_stuck, Reason::encoders_disagree},
-              late,
+              // Capped at 0.7 as on the card, a random brake does about what was asked for.
+              late || (backend == Backend::card && !before(*injection.phase, Phase::coast)),
               random_s};
     default: return {{Reason::brake_no_response}, true, response_s};
   }
@@ -154,7 +166,7 @@ Expectation write(const driver::Injection& injection) {
 
 }  // namespace
 
-Expectation expected(const driver::Injection& injection) {
+Expectation expected(Backend backend, const driver::Injection& injection) {
   switch (injection.signal) {
     case InjectionSignal::encoder_upper:
       return encoder(injection, Reason::encoder_upper_stuck, Reason::encoder_upper_jumped,
@@ -164,14 +176,14 @@ Expectation expected(const driver::Injection& injection) {
                      Reason::encoder_lower_reversed);
     case InjectionSignal::encoders: return both_encoders(injection);
     case InjectionSignal::stamp: return stamp(injection.kind);
-    case InjectionSignal::supply: return board_number(injection.kind, Reason::board_supply_low);
-    case InjectionSignal::temperature: return board_number(injection.kind, Reason::board_too_hot);
+    case InjectionSignal::supply: return supply(backend, injection.kind);
+    case InjectionSignal::temperature: return temperature(backend, injection.kind);
     case InjectionSignal::trip: return trip(injection.kind);
     case InjectionSignal::read: return read(injection.kind);
     case InjectionSignal::motor_pwm:
     case InjectionSignal::enable: return drive(injection);
     case InjectionSignal::brake_pwm: return brake(injection);
-    case InjectionSignal::write: return write(injection);
+    case InjectionSignal::write: return write(backend, injection);
   }
   return {};
 }

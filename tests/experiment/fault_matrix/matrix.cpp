@@ -1,11 +1,13 @@
 #include "matrix.hpp"
 
-#include <array>
 #include <memory>
 #include <utility>
 
 #include "abs_hil/driver/injection/injecting_driver.hpp"
+#include "abs_hil/telemetry/csv_sink.hpp"
 #include "experiment/simulated_run.hpp"
+#include "kept_files.hpp"
+#include "matrix_rig.hpp"
 
 namespace abs_hil::experiment::test {
 
@@ -13,55 +15,68 @@ namespace {
 
 using rig::Phase;
 
-constexpr std::array phases{Phase::idle, Phase::accelerate, Phase::coast, Phase::brake, Phase::hold, Phase::stopped};
-
 /// The paper's experiment with longer pauses, so that a fault has time to act in each phase.
-Setup matrix_setup() {
+Setup matrix_setup(Backend backend) {
   Setup setup;
   setup.control.controller = "adaptive";
   setup.experiment.idle_s = 0.3;
   setup.experiment.coast_s = 0.3;
   setup.experiment.stopped_s = 0.3;
   setup.gate.supply_min_V = 15.0;
+  if (backend == Backend::card) setup.gate.brake_duty_max = 0.7;  // the driver's own cap
   return setup;
 }
 
-MatrixCase run_with(std::vector<driver::Injection> injections) {
-  const Setup setup = matrix_setup();
+constexpr std::size_t recorder_slots = 2000;  ///< 2 s, as the program's
+
+MatrixCase run_with(Backend backend, std::vector<driver::Injection> injections, const std::filesystem::path& folder) {
+  const Setup setup = matrix_setup(backend);
   runtime::VirtualClock clock;
-  auto sim = std::make_unique<driver::SimDriver>(setup.plant, driver::SimStart{.seed = setup.seed});
-  const driver::SimDriver& rig = *sim;
-  driver::InjectingDriver driver(std::move(sim), std::move(injections), 1, [&clock](std::int64_t duration_ns) {
+  const std::unique_ptr<MatrixRig> rig = make_matrix_rig(backend, setup);
+  driver::InjectingDriver driver(rig->driver(), std::move(injections), 1, [&clock](std::int64_t duration_ns) {
     clock.sleep_until(clock.now_ns() + duration_ns);
   });
+  std::vector<runtime::FlightSlot> slots(recorder_slots);
+  runtime::FlightRing flight(slots);
+  runtime::WatchPanel panel;
+  runtime::CycleWatch watch(panel, flight);
   Recorder recorder;
   analysis::RunMetrics metrics(setup.plant.rig.wheels.r2_m, setup.experiment.end_speed_m_s);
-  RunSession session(clock, driver, logic_parts(setup), setup.gate, {&recorder, &metrics});
+  telemetry::CsvSink csv(folder / "run.csv");
+  RunSession session(clock, driver, logic_parts(setup), setup.gate, {&recorder, &metrics, &csv});
+  session.watch_with(watch);
   const RunOutcome outcome = session.run_fast([] { return rig::Reason::none; });
 
   MatrixCase result{.reason = outcome.reason, .metrics = metrics.metrics()};
   const rig::CycleRecord& last = recorder.records.back();
   const std::int64_t effect_ns = driver.first_effect_ns();
   result.reaction_s = effect_ns < 0 ? 0.0 : static_cast<double>(clock.now_ns() - effect_ns) * 1e-9;
-  const plant_sim::PlantInput& wire = rig.outputs();
-  result.safe = outcome.safe_state.ok() && wire.motor_duty == 0.0 && wire.brake_duty == 0.0 &&
-                wire.brake_torque_Nm == 0.0 && last.command.motor_duty == 0.0 && last.command.brake_duty == 0.0 &&
-                !last.command.motor_enable;
+  result.safe = outcome.safe_state.ok() && rig->at_rest() && last.command.motor_duty == 0.0 &&
+                last.command.brake_duty == 0.0 && !last.command.motor_enable;
   result.complete = session.record_drops() == 0 && last.reason == outcome.reason &&
                     recorder.records.size() == session.executive().statistics().cycles();
   for (std::size_t i = 0; i < recorder.records.size(); ++i) {
     result.complete = result.complete && recorder.records[i].sequence == i;
+  }
+  result.lost = fault_of_csv(folder / "run.csv", recorder.records);
+  if (result.lost.empty() && !result.survived()) {
+    result.lost = fault_of_recorder(flight, slots.size(), recorder.records, folder / "recorder");
   }
   return result;
 }
 
 }  // namespace
 
-std::vector<driver::Injection> all_injections() {
+std::vector<rig::Phase> phases_of(Backend backend) {
+  if (backend == Backend::card) return {Phase::accelerate, Phase::brake};
+  return {Phase::idle, Phase::accelerate, Phase::coast, Phase::brake, Phase::hold, Phase::stopped};
+}
+
+std::vector<driver::Injection> all_injections(Backend backend) {
   std::vector<driver::Injection> all;
   for (std::size_t signal = 0; signal < driver::injection_signal_count; ++signal) {
     for (std::size_t kind = 0; kind < driver::injection_kind_count; ++kind) {
-      for (const Phase phase : phases) {
+      for (const Phase phase : phases_of(backend)) {
         // Holding lasts some 30 ms.
         const std::string delay = phase == Phase::hold ? "+10ms" : "+100ms";
         all.push_back(
@@ -74,12 +89,14 @@ std::vector<driver::Injection> all_injections() {
   return all;
 }
 
-MatrixCase run_case(const driver::Injection& injection) {
-  MatrixCase result = run_with({injection});
+MatrixCase run_case(Backend backend, const driver::Injection& injection, const std::filesystem::path& folder) {
+  MatrixCase result = run_with(backend, {injection}, folder);
   result.injection = injection;
   return result;
 }
 
-analysis::Metrics metrics_without_fault() { return run_with({}).metrics; }
+analysis::Metrics metrics_without_fault(Backend backend, const std::filesystem::path& folder) {
+  return run_with(backend, {}, folder).metrics;
+}
 
 }  // namespace abs_hil::experiment::test

@@ -1,27 +1,40 @@
-// Every signal x every kind of fault x every phase, on the virtual clock.
+// Every signal x every kind of fault x every phase, on the virtual clock, on the simulated rig and on the
+// emulated card.
 
 #include "matrix.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <sstream>
 
 #include "catch.hpp"
+#include "telemetry/sample_records.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::experiment::test;
 
 namespace {
 
-const std::vector<MatrixCase>& all_cases() {
-  static const std::vector<MatrixCase> cases = [] {
-    std::vector<MatrixCase> run;
-    for (const driver::Injection& injection : all_injections()) run.push_back(run_case(injection));
-    return run;
+Matrix run_all(Backend backend) {
+  const telemetry::test::ScratchDirectory folder;
+  Matrix matrix{.nominal_m = metrics_without_fault(backend, folder.path()).stop_distance_m};
+  for (const driver::Injection& injection : all_injections(backend)) {
+    matrix.cases.push_back(run_case(backend, injection, folder.path()));
+  }
+  return matrix;
+}
+
+const Matrix& matrix_of(Backend backend) {
+  static const std::array<Matrix, 2> both = [] {
+    std::future<Matrix> card = std::async(std::launch::async, run_all, Backend::card);
+    Matrix sim = run_all(Backend::sim);
+    return std::array{std::move(sim), card.get()};
   }();
-  return cases;
+  return both[static_cast<std::size_t>(backend)];
 }
 
 /// How much longer the way to a stop may get in a run that goes on.
@@ -37,11 +50,13 @@ bool touches_braking(const driver::Injection& injection) {
 }  // namespace
 
 TEST_CASE("every fault in every phase ends safe, recorded to the last cycle, for the right reason and in time") {
-  for (const MatrixCase& c : all_cases()) {
-    const Expectation expectation = expected(c.injection);
-    CAPTURE(driver::to_text(c.injection), static_cast<int>(c.reason), c.reaction_s);
+  const Backend backend = GENERATE(Backend::sim, Backend::card);
+  for (const MatrixCase& c : matrix_of(backend).cases) {
+    const Expectation expectation = expected(backend, c.injection);
+    CAPTURE(driver::to_text(c.injection), static_cast<int>(backend), static_cast<int>(c.reason), c.reaction_s);
     CHECK(c.safe);
     CHECK(c.complete);
+    CHECK(c.lost == "");
     if (c.survived()) {
       CHECK(expectation.may_survive);
     } else {
@@ -52,17 +67,17 @@ TEST_CASE("every fault in every phase ends safe, recorded to the last cycle, for
 }
 
 TEST_CASE("a run that goes on in spite of a fault keeps within the stated degradation") {
-  const double nominal_m = metrics_without_fault().stop_distance_m;
-  for (const MatrixCase& c : all_cases()) {
+  const Matrix& matrix = matrix_of(GENERATE(Backend::sim, Backend::card));
+  for (const MatrixCase& c : matrix.cases) {
     if (!c.survived()) continue;
     CAPTURE(driver::to_text(c.injection));
     const bool none = c.injection.kind == driver::InjectionKind::ok || !touches_braking(c.injection);
-    CHECK(c.metrics.stop_distance_m < nominal_m * (none ? longest_undisturbed : longest_degraded));
+    CHECK(c.metrics.stop_distance_m < matrix.nominal_m * (none ? longest_undisturbed : longest_degraded));
   }
 }
 
 TEST_CASE("docs/fault-matrix.md is what the runs give") {
-  const std::string text = page(all_cases());
+  const std::string text = page(matrix_of(Backend::sim), matrix_of(Backend::card));
   if (const char* file = std::getenv("ABS_HIL_WRITE_FAULT_MATRIX"); file != nullptr) {
     std::ofstream(file) << text;
     return;

@@ -1,5 +1,6 @@
 // docs/fault-matrix.md as text.
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <map>
@@ -29,47 +30,67 @@ constexpr const char* introduction = R"(# Fault matrix
 
 Written by `scripts/fault_matrix.sh` from the runs of the test `fault_matrix`, which fails when this page is out of date: do
 not edit. Every signal, every kind of fault, every phase: the paper's experiment (adaptive, plant `paper-table1`, 1 kHz,
-seed 1, idle, coast and stopped 0.3 s long) on the simulated rig and the virtual clock, with one fault that begins 100 ms
-(hold: 10 ms) into the phase and stays. [fault-injection.md](fault-injection.md) says what each fault does,
-[safety.md](safety.md) what must come of it and why.
+seed 1, idle, coast and stopped 0.3 s long) on the virtual clock, with one fault that begins 100 ms (hold: 10 ms) into the
+phase and stays. On the simulated rig; then, with faults while accelerating and while braking, with the driver of the PCI
+card on the registers of the emulated card, whose brake is capped at 0.7. [fault-injection.md](fault-injection.md) says
+what each fault does, [safety.md](safety.md) what must come of it and why.
 
 A number is the reason of the stop (below), with the time from the first reading or command in which the fault made a
-difference to the end of the cycle after which the safe state was on the simulated wire. "goes on": the run went to its end,
-with the stopping distance's change where there is one.
-In all runs the safe state was reached and the record was whole.
+difference to the end of the cycle after which the safe state was on the wire. "goes on": the run went to its end, with the
+stopping distance's change where there is one.
+In all runs the safe state was reached and the CSV held every cycle up to the last; after every fault the flight recorder
+held the last 2 s and the reason, in memory and in its three files.
 )";
 
 }  // namespace
 
-std::string page(const std::vector<MatrixCase>& cases) {
-  const double nominal_m = metrics_without_fault().stop_distance_m;
-  std::string text = introduction;
-  std::map<int, std::string> reasons;
-  std::size_t stopped = 0;
+namespace {
+
+std::string table_head(Backend backend) {
+  std::string names = "\n\n| fault |";
+  std::string rule = "\n|---|";
+  for (const rig::Phase phase : phases_of(backend)) {
+    names.append(" ").append(rig::name_of(phase)).append(" |");
+    rule += "---|";
+  }
+  return names + rule;
+}
+
+/// The tables of one backend, a section for each signal; notes the reasons met.
+std::string tables(const Matrix& matrix, Backend backend, std::map<int, std::string>& reasons) {
+  std::string text;
   std::string signal;
   std::string kind;
-  for (const MatrixCase& c : cases) {
+  for (const MatrixCase& c : matrix.cases) {
     if (c.injection.kind == driver::InjectionKind::ok) continue;
     if (driver::name_of(c.injection.signal) != signal) {
       signal = driver::name_of(c.injection.signal);
-      text += "\n## " + signal +
-              "\n\n| fault | idle | accelerate | coast | brake | hold | stopped |\n|---|---|---|---|---|---|---|";
+      text += "\n### " + signal + (backend == Backend::card ? ", on the card" : ", simulated") + table_head(backend);
     }
     if (driver::name_of(c.injection.kind) != kind) {
       kind = driver::name_of(c.injection.kind);
       text += "\n| " + kind + " |";
     }
-    text += ' ' + cell(c, nominal_m) + " |";
-    if (c.injection.phase == rig::Phase::stopped && c.injection.kind == driver::InjectionKind::intermittent)
+    text += ' ' + cell(c, matrix.nominal_m) + " |";
+    if (c.injection.phase == phases_of(backend).back() && c.injection.kind == driver::InjectionKind::intermittent)
       text += '\n';
-    if (c.survived()) continue;
-    ++stopped;
-    reasons[static_cast<int>(c.reason)] = rig::description(c.reason);
+    if (!c.survived()) reasons[static_cast<int>(c.reason)] = rig::description(c.reason);
   }
+  const auto stopped = static_cast<std::size_t>(
+      std::count_if(matrix.cases.begin(), matrix.cases.end(), [](const MatrixCase& c) { return !c.survived(); }));
+  return text + formatted("\n%zu runs, `ok` (no fault) included; %zu stopped, %zu went on.\n", matrix.cases.size(),
+                          stopped, matrix.cases.size() - stopped);
+}
+
+}  // namespace
+
+std::string page(const Matrix& sim, const Matrix& card) {
+  std::map<int, std::string> reasons;
+  std::string text = introduction;
+  text += "\n## On the simulated rig\n" + tables(sim, Backend::sim, reasons);
+  text += "\n## On the emulated card\n" + tables(card, Backend::card, reasons);
   text += "\n## Reasons\n\n| number | reason |\n|---|---|\n";
   for (const auto& [number, words] : reasons) text += "| " + std::to_string(number) + " | " + words + " |\n";
-  text += formatted("\n%zu runs, `ok` (no fault) included; %zu stopped, %zu went on.\n", cases.size(), stopped,
-                    cases.size() - stopped);
   return text;
 }
 

@@ -1,0 +1,49 @@
+#include "matrix_rig.hpp"
+
+#include "driver/pci/model_card.hpp"
+#include "experiment/simulated_run.hpp"
+
+namespace abs_hil::experiment::test {
+
+namespace {
+
+class SimulatedRig final : public MatrixRig {
+ public:
+  explicit SimulatedRig(const Setup& setup)
+      : made_(std::make_unique<driver::SimDriver>(setup.plant, driver::SimStart{.seed = setup.seed})),
+        sim_(made_.get()) {}
+  std::unique_ptr<driver::RigDriver> driver() override { return std::move(made_); }
+  bool at_rest() const override {
+    const plant_sim::PlantInput& wire = sim_->outputs();
+    return wire.motor_duty == 0.0 && wire.brake_duty == 0.0 && wire.brake_torque_Nm == 0.0;
+  }
+
+ private:
+  std::unique_ptr<driver::SimDriver> made_;
+  const driver::SimDriver* sim_;
+};
+
+/// The registers of the emulated card, which only goes on with the driver's time.
+class EmulatedCard final : public MatrixRig {
+ public:
+  explicit EmulatedCard(const Setup& setup) : card_({.plant = setup.plant}) {}
+  std::unique_ptr<driver::RigDriver> driver() override {
+    return std::make_unique<driver::pci::PciDriver>(driver::pci::PciOptions{}, card_.opener());
+  }
+  bool at_rest() const override {
+    const emulator::Outputs out = card_.model.outputs();
+    return out.drive_duty == 0.0 && out.brake_duty == 0.0;
+  }
+
+ private:
+  abs_hil::test::ModelCard card_;
+};
+
+}  // namespace
+
+std::unique_ptr<MatrixRig> make_matrix_rig(Backend backend, const Setup& setup) {
+  if (backend == Backend::card) return std::make_unique<EmulatedCard>(setup);
+  return std::make_unique<SimulatedRig>(setup);
+}
+
+}  // namespace abs_hil::experiment::test
