@@ -13,7 +13,7 @@ if [ "${CI:-}" = true ] || [ "${ABS_HIL_REQUIRE_VM:-}" = 1 ]; then scripts/setup
 if [ "${CI:-}" = true ]; then
   scripts/setup.sh packages-spy.txt
   scripts/setup.sh packages-report.txt
-  scripts/setup_lcm_python.sh
+  scripts/setup_python.sh
 fi
 scripts/build.sh "$preset"
 [ $# -gt 0 ] || set -- -LE on-demand

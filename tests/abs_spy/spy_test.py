@@ -178,7 +178,7 @@ def kinds():
         found.append(("LCM of Python's package", {'PATH': os.path.dirname(LCM_PYTHON) + ':' + os.environ['PATH']},
                       '/site-packages/share/java/lcm.jar'))
     else:
-        print(f'not tried: a newer LCM ({LCM_PYTHON} is missing; scripts/setup_lcm_python.sh)')
+        print(f'not tried: a newer LCM ({LCM_PYTHON} is missing; scripts/setup_python.sh)')
     return found or [('Java', {}, '/lcm.jar')]
 
 

@@ -175,7 +175,7 @@ def main():
     if 'inside' not in sys.argv:
         probe = ['sh', '-c', 'exec "$0" -c "import lcm"', lcm_python]
         if subprocess.run(probe, capture_output=True).returncode != 0:
-            skip(f"{lcm_python} with LCM's Python module is missing; scripts/setup_lcm_python.sh installs it")
+            skip(f"{lcm_python} with LCM's Python module is missing; scripts/setup_python.sh installs it")
         os.execv(private_network, [private_network, lcm_python, __file__, *sys.argv[1:6], 'inside'])
     sys.path.insert(0, module_dir)
     global lcm, abs_hil

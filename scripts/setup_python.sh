@@ -1,0 +1,15 @@
+#!/usr/bin/env bash
+# Python modules that Debian 12 does not package, from PyPI into build/python, a virtual environment of its own: lcm, with
+# LCM's tools of that version, lcm-spy among them, and cantools, which tests read config/can/abs_rig.dbc with. Harmless
+# when repeated.
+set -euo pipefail
+cd "$(dirname "$(realpath "$0")")/.."
+
+environment=build/python
+if "$environment/bin/python" -c 'import lcm, cantools, setuptools, wheel' 2>/dev/null; then
+  echo "setup: $environment has lcm and cantools"
+  exit 0
+fi
+python3 -m venv "$environment" || { echo "setup: install python3-venv" >&2; exit 3; }
+"$environment/bin/pip" install --quiet --disable-pip-version-check 'lcm==1.5.3' 'cantools==45.1.0' 'setuptools>=61' wheel
+echo "setup: installed lcm 1.5.3 and cantools 45.1.0 into $environment"
