@@ -75,7 +75,8 @@ rig::Reason RunWatch::poll() {
     }
   }
   // One that has taken the outputs over ends in order.
-  const bool on_duty = region_.stage() == guardian::Stage::guarded;
+  const guardian::Stage stage = region_.stage();
+  const bool on_duty = stage == guardian::Stage::guarded || stage == guardian::Stage::making_safe;
   return on_duty && !guardian_->alive() ? rig::Reason::guardian_died : rig::Reason::none;
 }
 

@@ -42,14 +42,19 @@ IoResult RigDriver::write(const rig::Command& command) noexcept {
   if (!result.ok()) {
     state_ = DriverState::failed;
     // The first error is the one to report, even when making safe fails as well.
-    static_cast<void>(do_make_safe());
+    static_cast<void>(make_safe());
   }
   return result;
 }
 
+IoResult RigDriver::make_safe() noexcept {
+  if (listener_ != nullptr) listener_->making_safe();
+  return do_make_safe();
+}
+
 IoResult RigDriver::deactivate() noexcept {
   if (state_ != DriverState::active && state_ != DriverState::failed) return {};
-  const IoResult result = do_make_safe();
+  const IoResult result = make_safe();
   if (state_ == DriverState::active) state_ = DriverState::inactive;
   return result;
 }

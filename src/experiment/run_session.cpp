@@ -99,6 +99,7 @@ RunOutcome RunSession::run_realtime(const runtime::RealtimeOptions& options, con
       }
       // Here and not in the slow thread: nothing must delay the safe state.
       safe_state_ = driver_.deactivate();
+      driver_.tell_before_making_safe(nullptr);
       if (guard_ != nullptr) guard_->outputs_released(safe_state_.ok());
     }
     running.store(false, std::memory_order_release);
@@ -111,7 +112,10 @@ RunOutcome RunSession::run_realtime(const runtime::RealtimeOptions& options, con
   }
   try {
     driver_.configure();
-    if (guard_ != nullptr) guard_->stand_guard();
+    if (guard_ != nullptr) {
+      guard_->stand_guard();
+      driver_.tell_before_making_safe(guard_);
+    }
     std::int64_t start_ns = clock_.now_ns();
     if (second_offset_ns_ >= 0) {
       start_ns = next_second_ns(start_ns + start_margin_ns) + second_offset_ns_;
@@ -120,6 +124,7 @@ RunOutcome RunSession::run_realtime(const runtime::RealtimeOptions& options, con
     // A simulated rig's time begins with the first cycle.
     driver_.activate(start_ns);
   } catch (...) {
+    driver_.tell_before_making_safe(nullptr);
     go.set_value(false);
     throw;
   }

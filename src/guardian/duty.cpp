@@ -32,7 +32,7 @@ Duty::Duty(runtime::Clock& clock, ControllerProcess& controller, SharedRegion& r
       timeout_ns_(static_cast<std::int64_t>(options.timeout_ms * ns_per_ms)),
       insist_ns_(static_cast<std::int64_t>(options.insist_s * ns_per_s)),
       look_period_ns_(look_period_for(timeout_ns_)),
-      sentry_(timeout_ns_, look_period_ns_) {}
+      sentry_(timeout_ns_, look_period_ns_, writer.owner_needs_ns()) {}
 
 DutyReport Duty::run() noexcept {
   std::int64_t next_look_ns = clock_.now_ns();

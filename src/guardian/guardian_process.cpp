@@ -170,6 +170,8 @@ void GuardianProcess::wait_until_ready() {
   notes_ = said.substr(ready_word.size());
 }
 
+void GuardianProcess::making_safe() noexcept { region_.set_stage(Stage::making_safe); }
+
 void GuardianProcess::outputs_released(bool safe) noexcept {
   region_.set_stage(safe ? Stage::released : Stage::handed_over);
 }

@@ -25,7 +25,10 @@ Verdict Sentry::look(const Sight& sight) noexcept {
     reason_ = rig::Reason::controller_died;
     return sight.stage == Stage::released ? Verdict::dismissed : Verdict::make_safe;
   }
-  if (sight.stage == Stage::guarded && silence_ns_ >= timeout_ns_) {
+  const bool silent = sight.stage == Stage::guarded       ? silence_ns_ >= timeout_ns_
+                      : sight.stage == Stage::making_safe ? silence_ns_ >= timeout_ns_ + making_safe_ns_
+                                                          : false;
+  if (silent) {
     reason_ = rig::Reason::controller_silent;
     return Verdict::make_safe;
   }

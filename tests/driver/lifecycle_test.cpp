@@ -112,6 +112,26 @@ TEST_CASE("A failed write makes the outputs safe before it returns, and latches"
   CHECK(driver.write({}).ok());
 }
 
+TEST_CASE("Whoever listens is told before the outputs are made safe, by a failed write as by the end") {
+  ScriptedDriver driver;
+  struct Listener final : MakingSafeListener {
+    explicit Listener(std::vector<std::string>& calls) : calls_(calls) {}
+    void making_safe() noexcept override { calls_.emplace_back("told"); }
+    std::vector<std::string>& calls_;
+  } listener(driver.calls);
+  driver.tell_before_making_safe(&listener);
+  driver.configure();
+  driver.activate(0);
+  driver.write_error = IoError::no_answer;
+  static_cast<void>(driver.write({}));
+  static_cast<void>(driver.deactivate());
+  CHECK(driver.calls == std::vector<std::string>{"configure", "activate", "write", "told", "safe", "told", "safe"});
+  driver.tell_before_making_safe(nullptr);
+  static_cast<void>(driver.deactivate());
+  CHECK(driver.calls.back() == "safe");
+  CHECK(driver.calls.size() == 8);
+}
+
 TEST_CASE("A failed read reports its error and leaves the outputs to the caller's next write") {
   ScriptedDriver driver;
   driver.configure();

@@ -73,6 +73,7 @@ class ScriptedWriter final : public driver::SafeStateWriter {
     if (fails_first-- > 0) return {driver::IoError::no_answer, 0x6C};
     return {};
   }
+  [[nodiscard]] std::int64_t owner_needs_ns() const noexcept override { return 300 * ms; }
   int fails_first{0};
 
  private:

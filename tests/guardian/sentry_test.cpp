@@ -80,6 +80,26 @@ TEST_CASE("released outputs need no signs of life, and a controller that dies th
   CHECK(sentry.reason() == rig::Reason::controller_died);
 }
 
+TEST_CASE("a controller that waits for its board to confirm the safe state has so much longer, and no more") {
+  constexpr std::int64_t board_needs_ns = 300 * ms;
+  Sentry sentry(timeout_ns, period_ns, board_needs_ns);
+  std::int64_t now_ns = 0;
+  REQUIRE(sentry.look({.now_ns = now_ns, .cycle_beats = 9}) == Verdict::wait);
+  while (sentry.look({.now_ns = now_ns += period_ns, .cycle_beats = 9, .stage = Stage::making_safe}) == Verdict::wait) {
+    REQUIRE(now_ns < timeout_ns + board_needs_ns);
+  }
+  CHECK(now_ns >= timeout_ns + board_needs_ns);
+  CHECK(sentry.reason() == rig::Reason::controller_silent);
+  CHECK(sentry.must_end_controller());
+}
+
+TEST_CASE("a controller that dies while it makes its board safe has not done so") {
+  Sentry sentry(timeout_ns, period_ns, 300 * ms);
+  const Sight died{.now_ns = 0, .cycle_beats = 9, .stage = Stage::making_safe, .controller_gone = true};
+  CHECK(sentry.look(died) == Verdict::make_safe);
+  CHECK(sentry.reason() == rig::Reason::controller_died);
+}
+
 TEST_CASE("a run that was closed in order dismisses the guardian, the process' end or not") {
   for (const bool gone : {false, true}) {
     Sentry sentry(timeout_ns, period_ns);

@@ -17,6 +17,16 @@ namespace abs_hil::driver {
 /// failed read leaves the driver active: whether one lost answer matters is for the caller to say.
 enum class DriverState : std::uint8_t { unconfigured, inactive, active, failed };
 
+/// Told before a driver begins to make its outputs safe, which may take up to `make_safe_bound_ns`. Real-time safe.
+class MakingSafeListener {
+ public:
+  MakingSafeListener() = default;
+  MakingSafeListener(const MakingSafeListener&) = delete;
+  MakingSafeListener& operator=(const MakingSafeListener&) = delete;
+  virtual ~MakingSafeListener() = default;
+  virtual void making_safe() noexcept = 0;
+};
+
 /// One rig behind one board, real or simulated. The public functions keep the lifecycle for every backend alike:
 /// nothing is written while inactive, and an error in `write` makes the outputs safe before it returns. Backends
 /// implement the private `do_` functions and call `deactivate()` in their own destructors (a base class destructor
@@ -47,6 +57,12 @@ class RigDriver {
   /// The phase whose command is written next: for injected faults alone (InjectingDriver), no board needs to know.
   virtual void note_phase(rig::Phase /*phase*/) noexcept {}
 
+  /// The longest that a failed `write`, or `deactivate`, waits for the board to confirm the safe state, ns. 0: it does
+  /// not wait, the board's accesses are all that it takes.
+  [[nodiscard]] virtual std::int64_t make_safe_bound_ns() const noexcept { return 0; }
+  /// @param listener  outlives the driver's use, or null for none. Called by the thread that makes safe.
+  virtual void tell_before_making_safe(MakingSafeListener* listener) noexcept { listener_ = listener; }
+
   [[nodiscard]] DriverState state() const noexcept { return state_; }
   [[nodiscard]] virtual std::string_view name() const noexcept = 0;
   /// The simulator's truth of the last `read`, for logs alone; NaN from hardware.
@@ -70,7 +86,10 @@ class RigDriver {
   /// Writes the safe state whatever went before, and tries all outputs even when one fails.
   virtual IoResult do_make_safe() noexcept = 0;
 
+  IoResult make_safe() noexcept;
+
   DriverState state_{DriverState::unconfigured};
+  MakingSafeListener* listener_{nullptr};
 };
 
 }  // namespace abs_hil::driver

@@ -20,6 +20,9 @@ class TakeOverWriter final : public SafeStateWriter {
 
   [[nodiscard]] std::string_view name() const noexcept override { return "take-over"; }
   void prepare() override { driver_ = make_driver_(); }
+  [[nodiscard]] std::int64_t owner_needs_ns() const noexcept override {
+    return driver_ ? driver_->make_safe_bound_ns() : 0;
+  }
   [[nodiscard]] IoResult make_safe() noexcept override;
 
  private:

@@ -21,7 +21,7 @@ enum InheritedDescriptor : int {
 [[nodiscard]] std::string guardian_program();
 
 /// The guardian as the controller sees it: a child process in a session of its own, so that a terminal's Ctrl-C or end
-/// does not reach it. Used from one thread, `outputs_released` excepted.
+/// does not reach it. Used from one thread, `making_safe` and `outputs_released` excepted.
 class GuardianProcess final : public runtime::RunGuard {
  public:
   /// @param region  must outlive it
@@ -32,6 +32,7 @@ class GuardianProcess final : public runtime::RunGuard {
 
   /// Starts it and waits until it has its own handle on the outputs, at most 5 s. Throws driver::Unavailable.
   void stand_guard() override;
+  void making_safe() noexcept override;
   void outputs_released(bool safe) noexcept override;
 
   /// False once it has ended, for whatever cause. True before it was started.

@@ -29,8 +29,10 @@ class Sentry {
  public:
   /// @param timeout_ns  without a sign of life, > 0
   /// @param look_period_ns  between two looks, > 0; the verdict comes at most one of them after the timeout
-  Sentry(std::int64_t timeout_ns, std::int64_t look_period_ns) noexcept
-      : timeout_ns_(timeout_ns), look_period_ns_(look_period_ns) {}
+  /// @param making_safe_ns  how much more silence is due to a controller that waits for its board's word that it is
+  ///                        safe, >= 0
+  Sentry(std::int64_t timeout_ns, std::int64_t look_period_ns, std::int64_t making_safe_ns = 0) noexcept
+      : timeout_ns_(timeout_ns), look_period_ns_(look_period_ns), making_safe_ns_(making_safe_ns) {}
 
   [[nodiscard]] Verdict look(const Sight& sight) noexcept;
   /// Why the safe state is needed; `none` while it is not. Also set when the controller died after it had released its
@@ -46,6 +48,7 @@ class Sentry {
 
   std::int64_t timeout_ns_;
   std::int64_t look_period_ns_;
+  std::int64_t making_safe_ns_;
   std::int64_t last_look_ns_{0};
   std::uint64_t last_beats_{0};
   std::int64_t silence_ns_{0};

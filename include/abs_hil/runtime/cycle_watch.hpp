@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdint>
 
+#include "abs_hil/driver/rig_driver.hpp"
 #include "abs_hil/runtime/flight_ring.hpp"
 
 namespace abs_hil::runtime {
@@ -45,13 +46,8 @@ class CycleWatch {
 };
 
 /// Whoever must stand by before outputs may be enabled, and be told when they are safe again.
-class RunGuard {
+class RunGuard : public driver::MakingSafeListener {
  public:
-  RunGuard() = default;
-  RunGuard(const RunGuard&) = delete;
-  RunGuard& operator=(const RunGuard&) = delete;
-  virtual ~RunGuard() = default;
-
   /// The driver is configured and inactive. Throws driver::Unavailable: then the run does not start.
   virtual void stand_guard() = 0;
   /// The driver was deactivated; called by the thread that did so. Real-time safe.

@@ -232,6 +232,8 @@ IoResult CanDriver::deactivate_node() noexcept {
   return {IoError::no_answer, id::control};
 }
 
+std::int64_t CanDriver::make_safe_bound_ns() const noexcept { return handshake_attempts * handshake_timeout_ns; }
+
 IoResult CanDriver::do_make_safe() noexcept {
   if (!link_.socket) return {IoError::disconnected};
   link_.socket->drain();  // what the node said before does not count

@@ -15,6 +15,8 @@ namespace {
 constexpr std::int64_t ns_per_us = 1000;
 /// Outside the cycle nothing presses.
 constexpr std::int64_t patient_ns = 500'000'000;
+/// Of FrameLink::recover on a board that is failing: cancelled transfers and cleared halts have a second each there.
+constexpr std::int64_t recovery_bound_ns = 8'000'000'000;
 
 std::int32_t with_sign(std::uint32_t raw, std::int32_t sign) noexcept {
   return std::bit_cast<std::int32_t>(sign < 0 ? 0U - raw : raw);  // unsigned: the most negative count has no negative
@@ -244,6 +246,11 @@ IoResult UsbDriver::do_write(const rig::Command& command) noexcept {
   std::tie(drive_sent_, brake_sent_, digital_sent_) = sent_before;
   // A cycle counts once. Without a read nobody else would notice a board that takes nothing.
   return std::exchange(lost_this_cycle_, false) ? IoResult{} : lost_frame();
+}
+
+std::int64_t UsbDriver::make_safe_bound_ns() const noexcept {
+  // Two tries, each of which waits for the board to take the frame and to show it, and the recovery between them.
+  return 2 * 2 * patient_ns + recovery_bound_ns;
 }
 
 IoResult UsbDriver::do_make_safe() noexcept {

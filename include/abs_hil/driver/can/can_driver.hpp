@@ -58,6 +58,7 @@ class CanDriver final : public RigDriver {
     return "the node's watchdog should have zeroed them, if the node works";
   }
   [[nodiscard]] std::vector<std::string> inspection() override;
+  [[nodiscard]] std::int64_t make_safe_bound_ns() const noexcept override;
   [[nodiscard]] const CanCounters& counters() const noexcept { return counters_; }
 
  private:

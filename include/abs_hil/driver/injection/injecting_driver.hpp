@@ -33,6 +33,10 @@ class InjectingDriver final : public RigDriver {
   [[nodiscard]] std::vector<std::string> tally() const override { return inner_->tally(); }
   [[nodiscard]] std::string_view what_holds_unsafe() const noexcept override { return inner_->what_holds_unsafe(); }
   [[nodiscard]] std::vector<std::string> inspection() override { return inner_->inspection(); }
+  [[nodiscard]] std::int64_t make_safe_bound_ns() const noexcept override { return inner_->make_safe_bound_ns(); }
+  void tell_before_making_safe(MakingSafeListener* listener) noexcept override {
+    inner_->tell_before_making_safe(listener);
+  }
   void note_phase(rig::Phase phase) noexcept override;
   [[nodiscard]] const RigDriver& inner() const noexcept { return *inner_; }
   /// Time of the first read or write in which a fault made a difference; -1 while none has.

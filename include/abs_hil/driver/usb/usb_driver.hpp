@@ -56,6 +56,7 @@ class UsbDriver final : public RigDriver {
   [[nodiscard]] std::vector<std::string> notes() const override;
   [[nodiscard]] std::vector<std::string> inspection() override;
   [[nodiscard]] std::vector<std::string> tally() const override;
+  [[nodiscard]] std::int64_t make_safe_bound_ns() const noexcept override;
   [[nodiscard]] std::string_view what_holds_unsafe() const noexcept override {
     return "its PWMs may hold their last duties, as no watchdog of the board is known";
   }
