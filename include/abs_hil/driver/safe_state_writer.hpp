@@ -21,7 +21,7 @@ class SafeStateWriter {
   [[nodiscard]] virtual std::string_view name() const noexcept = 0;
   /// Opens what can be opened beside the owner, and writes nothing. Before anything is activated. Throws Unavailable.
   virtual void prepare() = 0;
-  /// The longest that the board's owner itself takes to make it safe, ns (RigDriver::make_safe_bound_ns). After `prepare`.
+  /// The longest that the board's owner takes to make it safe, ns (RigDriver::make_safe_bound_ns). After `prepare`.
   [[nodiscard]] virtual std::int64_t owner_needs_ns() const noexcept { return 0; }
   /// Drive 0, brake 0, motor disabled, each tried whatever became of the others, then read back (or, where the board
   /// tells of itself only, seen in what it says). `ok` means: known to be so. May be called again and again; opens the
