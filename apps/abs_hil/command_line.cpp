@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "abs_hil/script/events.hpp"
 #include "abs_hil/script/library.hpp"
 #include "abs_hil/script/plan.hpp"
 #include "abs_hil/settings/config_error.hpp"
@@ -37,11 +38,11 @@ void check_start(const RunRequest& request) {
 /// What only a simulated plant can do, and what may be done to an emulator but never to hardware.
 void refuse_events(const script::Script& script, bool emulated) {
   for (const script::EventScript& event : script.events) {
-    if (event.friction) {
+    for (const script::Change& change : event.changes) {
       throw settings::ConfigError(
-          fmt::format("{}: [[event]] friction: only a simulated road changes its friction; run experiment {} with "
+          fmt::format("{}: [[event]] {}: only a simulated plant can be told to change; run experiment {} with "
                       "--backend sim, or leave its events out for the rig",
-                      script.at(event.place), script.name));
+                      script.at(event.place), change.what, script.name));
     }
     if (!emulated) {
       throw settings::ConfigError(
@@ -49,6 +50,16 @@ void refuse_events(const script::Script& script, bool emulated) {
                       "--backend sim, or leave its events out for the rig",
                       script.at(event.place), script.name));
     }
+  }
+}
+
+/// The same, asked for by the configuration.
+void refuse_profiles(settings::Settings& s) {
+  for (const script::ChangingPart& part : script::changing_parts()) {
+    if (part.profile(s).empty()) continue;
+    throw settings::ConfigError(
+        fmt::format("plant.{}_profile: only a simulated plant can be told to change; leave it out or use --backend sim",
+                    part.what));
   }
 }
 
@@ -73,10 +84,6 @@ void check_together(const RunRequest& request) {
   if (s.backend == "rig" && s.experiment.start_speed_rad_s > 0.0) {
     throw settings::ConfigError(
         "experiment.start_speed_rad_s: a real wheel does not start at speed; leave it out or use --backend sim");
-  }
-  if (s.backend == "rig" && !s.plant.friction_profile.empty()) {
-    throw settings::ConfigError(
-        "plant.friction_profile: only a simulated road changes its friction; leave it out or use --backend sim");
   }
   if (s.experiment.wait_for_start) check_start(request);
   if (s.backend == "rig") refuse_events(*request.script, s.driver.emulated);
@@ -150,6 +157,7 @@ RunRequest merge(const RunOptions& options) {
   const script::Script& script = *request.script;
   settings::KeyTable keys(s);
   fill(s, keys, options, &script);
+  if (s.backend == "rig") refuse_profiles(s);
   check_together(request);
   script::apply(script, s);
   settings::refuse_unsafe(s, keys);

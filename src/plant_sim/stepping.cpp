@@ -83,7 +83,7 @@ void stand(const HeldTorques& held, double duration_s, StateVector& x) noexcept 
 }  // namespace
 
 void integrate(const WheelModel& model, double max_step_s, const HeldTorques& held, double duration_s,
-               FrictionCourse& course, StateVector& x) noexcept {
+               FactorCourse& course, StateVector& x) noexcept {
   double left_s = duration_s;
   while (left_s > 0.0) {
     if (stands_for_good(model, held, x)) {

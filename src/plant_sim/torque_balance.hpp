@@ -56,7 +56,7 @@ struct HeldTorques {
 struct TorqueBalance {
   const WheelModel& model;
   const HeldTorques& held;
-  PresentFriction friction;
+  PresentFactor friction;
   Sliding sliding;
 
   /// @param time_s  since `friction` holds

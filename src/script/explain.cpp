@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "abs_hil/script/events.hpp"
 #include "abs_hil/script/plan.hpp"
 
 namespace abs_hil::script {
@@ -110,7 +111,10 @@ std::string explain(const Script& script, const settings::Settings& settings) {
   if (std::isfinite(plan.limits.run_time_s)) text += fmt::format(", run {} s", number(plan.limits.run_time_s));
   if (std::isfinite(plan.limits.distance_m)) text += fmt::format(", distance {} m", number(plan.limits.distance_m));
   text += '\n';
-  if (!s.plant.friction_profile.empty()) text += fmt::format("Road (simulation only): {}\n", s.plant.friction_profile);
+  for (const ChangingPart& part : changing_parts()) {
+    const std::string& profile = part.profile(s);
+    if (!profile.empty()) text += fmt::format("Simulation only: {}, a factor over {}\n", part.in_words, profile);
+  }
   if (!s.inject.empty()) text += fmt::format("Faults (never on hardware): {}\n", s.inject);
   for (const Setting& setting : script.settings)
     text += fmt::format("Setting: {} = {}\n", setting.key, in_words(setting.value));

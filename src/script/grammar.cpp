@@ -19,6 +19,7 @@ constexpr settings::Range duty{0.0, 1.0};
 constexpr settings::Range torque{0.0, 100.0};
 constexpr settings::Range slip{0.0, 1.0, true, true};
 constexpr settings::Range any_slip{-1.0, 1.0};
+constexpr settings::Range factor{0.0, 10.0, true, false};
 constexpr settings::Range anything{-1e9, 1e9};
 
 }  // namespace
@@ -250,10 +251,33 @@ const Grammar& event_grammar() {
            .meaning = "how long the change takes; without: a jump",
            .quantity = Quantity::time,
            .range = span},
+          {.name = "until",
+           .shape = Shape::number,
+           .meaning = "when the change has ended, in place of over",
+           .quantity = Quantity::time,
+           .range = span},
           {.name = "friction",
            .shape = Shape::number,
            .meaning = "friction of the road from then on, over that of the tyre model",
-           .range = {0.0, 10.0, true, false}},
+           .range = factor},
+          {.name = "brake_torque",
+           .shape = Shape::number,
+           .meaning = "torque of the brake from then on, over that of its map: fading",
+           .range = factor},
+          {.name = "motor_torque",
+           .shape = Shape::number,
+           .meaning = "torque of the motor from then on, over that of the plant's parameters",
+           .range = factor},
+          {.name = "upper_bearing",
+           .shape = Shape::number,
+           .meaning =
+               "friction of the upper wheel's bearing (M10, d1) from then on, over that of the plant's parameters",
+           .range = factor},
+          {.name = "lower_bearing",
+           .shape = Shape::number,
+           .meaning =
+               "friction of the lower wheel's bearing (M20, d2) from then on, over that of the plant's parameters",
+           .range = factor},
           {.name = "inject",
            .shape = Shape::text,
            .meaning = "a fault at the I/O seam, as after --inject; it says itself when (docs/fault-injection.md)"},

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "abs_hil/rig/brake_map.hpp"
+#include "abs_hil/script/events.hpp"
 #include "abs_hil/script/library.hpp"
 #include "abs_hil/settings/config_error.hpp"
 
@@ -218,7 +219,9 @@ void apply(const Script& script, settings::Settings& s) {
       if (!event.inject.empty()) s.inject += (s.inject.empty() ? "" : ",") + event.inject;
     }
   }
-  if (s.plant.friction_profile.empty()) s.plant.friction_profile = friction_profile(script);
+  for (const ChangingPart& part : changing_parts()) {
+    if (part.profile(s).empty()) part.profile(s) = profile(script, part.what);
+  }
 }
 
 std::vector<std::string> beyond_limits(const Plan& plan, const settings::Settings& s) {
@@ -248,28 +251,6 @@ std::vector<std::string> beyond_limits(const Plan& plan, const settings::Setting
     }
   }
   return problems;
-}
-
-std::string friction_profile(const Script& script) {
-  std::string profile;
-  const EventScript* first = nullptr;
-  for (const EventScript& event : script.events) {
-    if (!event.friction) continue;
-    if (first == nullptr) {
-      first = &event;
-      profile = fmt::format("{}: 1", event.from_braking ? "braking time" : "time");
-    }
-    if (event.from_braking != first->from_braking) {
-      throw settings::ConfigError(
-          fmt::format("{}: this change of friction is counted from {}, that in line {} is not; count "
-                      "them from the same",
-                      script.at(event.place), event.from_braking ? "braking" : "the start", first->place.line));
-    }
-    profile += event.over ? fmt::format("; {} from {} to {}", event.friction->value, event.at.value,
-                                        event.at.value + event.over->value)
-                          : fmt::format("; {} at {}", event.friction->value, event.at.value);
-  }
-  return profile;
 }
 
 }  // namespace abs_hil::script

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "abs_hil/script/events.hpp"
 #include "abs_hil/settings/config_error.hpp"
 #include "abs_hil/settings/unsafe_settings.hpp"
 #include "reader.hpp"
@@ -44,6 +45,7 @@ class Parser {
     if (const Entry* events = root.find("event")) {
       for (const toml::table* event : root.tables(*events)) script_.events.push_back(read_event(*event, events->place));
     }
+    for (const ChangingPart& part : changing_parts()) static_cast<void>(profile(script_, part.what));
     script_.settings = read_settings(source_, root);
     script_.series = read_series(source_, root);
   }
@@ -135,25 +137,50 @@ class Parser {
   EventScript read_event(const toml::table& table, Place place) {
     const TableReader reader(source_, table, event_grammar(), place);
     EventScript event;
-    event.over = reader.optional_number("over");
-    event.friction = reader.optional_number("friction");
     event.place = reader.place();
     if (const Entry* inject = reader.find("inject")) return read_fault(reader, *inject);
-    if (!event.friction) source_.fail(reader.place(), "the event changes nothing; give friction or inject");
+    for (const ChangingPart& part : changing_parts()) {
+      if (const Entry* entry = reader.find(part.what))
+        event.changes.push_back({part.what, plain_number(reader, *entry)});
+    }
+    if (event.changes.empty()) {
+      source_.fail(reader.place(),
+                   "the event changes nothing; give friction, brake_torque, motor_torque, "
+                   "upper_bearing, lower_bearing or inject");
+    }
     const Entry* at = reader.find("at");
     if (at == nullptr) source_.fail(reader.place(), "the event has no \"at_s\" (when); give one");
-    event.at = reader.number(*at);
+    event.at_s = event.end_s = plain_number(reader, *at);
     if (const Entry* from = reader.find("counted_from")) event.from_braking = reader.choice(*from) == "braking";
-    for (const auto& number : {std::optional(event.at), event.over, event.friction}) {
-      if (number && !number->key.empty()) source_.fail(number->place, "an event takes numbers, not $keys");
-    }
+    const Entry* over = reader.find("over");
+    if (over != nullptr) event.end_s += plain_number(reader, *over);
+    if (const Entry* until = reader.find("until")) read_end(*until, over, reader, event);
     return event;
+  }
+
+  void read_end(const Entry& until, const Entry* over, const TableReader& reader, EventScript& event) const {
+    if (over != nullptr) {
+      source_.fail(until.key_place, fmt::format("{} and {} both say how long the change takes; leave one of them out",
+                                                over->key, until.key));
+    }
+    event.end_s = plain_number(reader, until);
+    if (event.end_s <= event.at_s) {
+      source_.fail(until.place, fmt::format("{} = {}: the change begins at {} s; give a later end, or leave it out for "
+                                            "a jump",
+                                            until.key, shown(*until.node), event.at_s));
+    }
+  }
+
+  double plain_number(const TableReader& reader, const Entry& entry) const {
+    const Number number = reader.number(entry);
+    if (!number.key.empty()) source_.fail(number.place, "an event takes numbers, not $keys");
+    return number.value;
   }
 
   EventScript read_fault(const TableReader& reader, const Entry& entry) const {
     if (reader.entries().size() != 1) {
       source_.fail(entry.key_place,
-                   "inject stands alone in its event: it says itself when, as in \"brake@write:fail+0.2s\"");
+                   "inject stands alone in its event: it says itself when, as in \"brake@write:off+0.2s\"");
     }
     EventScript event;
     event.inject = reader.text(entry);

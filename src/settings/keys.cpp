@@ -75,6 +75,14 @@ void add_contact_keys(std::vector<Key>& keys, plant_sim::PlantOptions& p) {
            &p.lever.phi_deg, positive(90)},
           {"plant.friction_profile", "", "simulation: friction over time or distance (docs/plants.md)",
            &p.friction_profile},
+          {"plant.brake_torque_profile", "", "simulation: factor over the brake's torque, over time (docs/plants.md)",
+           &p.drift.brake_torque},
+          {"plant.motor_torque_profile", "", "simulation: factor over the motor's torque, over time (docs/plants.md)",
+           &p.drift.motor_torque},
+          {"plant.upper_bearing_profile", "", "simulation: factor over M10 and d1, over time (docs/plants.md)",
+           &p.drift.upper_bearing},
+          {"plant.lower_bearing_profile", "", "simulation: factor over M20 and d2, over time (docs/plants.md)",
+           &p.drift.lower_bearing},
       });
 }
 

@@ -127,10 +127,30 @@ class BadInput(ProgramTest):
             self.refused(['--set', f'experiment.{key}=inf'], [f'experiment.{key}', 'inf'])
 
     def test_what_only_the_simulator_can_do(self):
-        for args in (['--fast'], ['--set', 'experiment.start_speed_rad_s=100'],
-                     ['--experiment', 'friction-jump'], ['--set', 'plant.friction_profile=time: 0.5']):
+        for args, words in ((['--fast'], ['--fast']),
+                            (['--set', 'experiment.start_speed_rad_s=100'], ['experiment.start_speed_rad_s']),
+                            (['--experiment', 'friction-jump'], ['friction-jump.toml:4:1', '[[event]] friction',
+                                                                 'friction-jump with --backend sim']),
+                            (['--set', 'plant.friction_profile=time: 0.5'], ['plant.friction_profile']),
+                            (['--set', 'plant.brake_torque_profile=time: 0.5'], ['plant.brake_torque_profile'])):
             result = self.run_program('--backend', 'rig', '--no-lcm', *args)
             self.assertEqual(result.returncode, 2, result.stderr)
+            for word in words:
+                self.assertIn(word, result.stderr)
+
+    def test_events_of_a_script_of_ones_own_on_the_rig(self):
+        phase = '[[phase]]\nname = "brake"\nbrake = "controller"\nuntil = { lasts_s = 1 }\n'
+        for event in ('friction = 0.5', 'brake_torque = 0.5', 'motor_torque = 0.5', 'upper_bearing = 2',
+                      'lower_bearing = 2'):
+            script = self.folder / 'mine.toml'
+            script.write_text(f'{phase}[[event]]\nat_s = 0.2\nuntil_s = 0.5\n{event}\n')
+            result = self.run_program('--backend', 'rig', '--no-lcm', '--experiment', script)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            self.assertIn(f'mine.toml:5:1: [[event]] {event.split()[0]}: only a simulated plant', result.stderr)
+        script.write_text(f'{phase}[[event]]\ninject = "brake@write:off+0.2s"\n')
+        result = self.run_program('--backend', 'rig', '--no-lcm', '--experiment', script)
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertIn('mine.toml:5:1: [[event]] inject: faults are never injected into real hardware', result.stderr)
 
 
 if __name__ == '__main__':

@@ -5,6 +5,7 @@
 #include "abs_hil/comparison/simulated_run.hpp"
 #include "abs_hil/comparison/variation.hpp"
 #include "abs_hil/control/registry.hpp"
+#include "abs_hil/script/events.hpp"
 #include "abs_hil/script/library.hpp"
 #include "abs_hil/script/plan.hpp"
 #include "abs_hil/settings/config_file.hpp"
@@ -22,7 +23,7 @@ settings::Settings configured(const std::string& plant, const std::string& exper
   settings::Settings s;
   settings::KeyTable keys(s);
   settings::load_file(settings::plant_file(plant), keys, "plant");
-  s.plant.friction_profile = script::friction_profile(*script::find(experiment));
+  s.plant.friction_profile = script::profile(*script::find(experiment), "friction");
   s.experiment.name = experiment;
   s.control.controller = controller;
   s.control.rate_Hz = rate_Hz;

@@ -5,7 +5,7 @@
 #include <type_traits>
 #include <variant>
 
-#include "abs_hil/plant_sim/friction_profile.hpp"
+#include "abs_hil/plant_sim/factor_profile.hpp"
 #include "abs_hil/settings/config_error.hpp"
 #include "abs_hil/settings/key_table.hpp"
 
@@ -42,7 +42,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     } catch (const abs_hil::settings::ConfigError&) {
     }
     try {
-      const abs_hil::plant_sim::FrictionProfile profile(line);
+      const abs_hil::plant_sim::FactorProfile profile(line);
       expect(profile.highest() > 0.0 && profile.highest() <= 10.0 && !profile.pieces().empty());
     } catch (const std::invalid_argument&) {
     }

@@ -36,6 +36,13 @@ def sign(x):
     return (x > 0) - (x < 0)
 
 
+def ramp(before, after, begin, end):
+    """Factor that goes from one value to another, and its profile as the program's configuration has it."""
+    def factor(time):
+        return before + (after - before) * min(max((time - begin) / (end - begin), 0.0), 1.0)
+    return factor, f'time: {before}; {after} from {begin} to {end}'
+
+
 class Rig:
     """State y = [w1, w2, Tb]; inputs and friction held within a call of `run`."""
 
@@ -44,6 +51,20 @@ class Rig:
         self.maker = self.p['tyre'] == 'inteco-mu'
         self.ideal = ideal
         self.hold = [False, False]
+        self.time = 0.0
+        self.drift = {}
+
+    def drifted(self, time):
+        """The parameters at that time."""
+        p = dict(self.p)
+        for part, keys in (('upper_bearing', ('M10_Nm', 'd1_Nms_rad')), ('lower_bearing', ('M20_Nm', 'd2_Nms_rad')),
+                           ('motor_torque', ('motor_stall_torque_Nm',))):
+            for key in keys:
+                p[key] *= self.factor(part, time)
+        return p
+
+    def factor(self, part, time):
+        return self.drift[part](time) if part in self.drift else 1.0
 
     def slip(self, w1, w2):
         v1, v2 = self.p['r1_m'] * w1, self.p['r2_m'] * w2
@@ -53,8 +74,8 @@ class Rig:
             return float(sign(v2 - v1))
         return (v2 - v1) / max(abs(v2) if abs(v2) > abs(v1) else abs(v1), 0.02)
 
-    def force(self, w1, w2, torque, friction):
-        p, slip = self.p, self.slip(w1, w2)
+    def force(self, p, w1, w2, torque, friction):
+        slip = self.slip(w1, w2)
         if not self.maker:
             return friction * p['theta_N'] * math.sin(p['C'] * math.atan(p['B'] * slip))
         s, size = sign(slip), abs(slip)
@@ -68,23 +89,25 @@ class Rig:
         pressing = p['lever_Mg_Nm'] + sign(w1) * (torque + p['M10_Nm']) + p['d1_Nms_rad'] * w1
         return s * mu * max(0.0, pressing) / arm
 
-    def rates(self, y, target, motor, friction):
-        p = self.p
+    def rates(self, y, time, target, motor, friction):
+        p = self.drifted(time) if self.drift else self.p
         w1, w2, torque = y
-        force = self.force(w1, w2, torque, friction)
+        force = self.force(p, w1, w2, torque, friction)
         drive = p['motor_stall_torque_Nm'] * motor * (1 - w2 / p['motor_no_load_speed_rad_s'])
         d1 = 0.0 if self.hold[0] else (p['r1_m'] * force - p['d1_Nms_rad'] * w1
                                        - self.way[0] * (p['M10_Nm'] + torque)) / p['J1_kg_m2']
         d2 = 0.0 if self.hold[1] else (drive - p['r2_m'] * force - p['d2_Nms_rad'] * w2
                                        - self.way[1] * p['M20_Nm']) / p['J2_kg_m2']
-        return d1, d2, 0.0 if self.ideal else p['c31_per_s'] * (target - torque)
+        if self.ideal:
+            return d1, d2, 0.0
+        return d1, d2, p['c31_per_s'] * (self.factor('brake_torque', time) * target - torque)
 
     def settle(self, y, motor, friction):
         """Decides for each wheel that stands whether its friction holds it."""
-        p = self.p
+        p = self.drifted(self.time)
         self.hold = [y[0] == 0.0, y[1] == 0.0]
         self.way = [sign(y[0]), sign(y[1])]
-        force = self.force(*y, friction)
+        force = self.force(p, *y, friction)
         pull1 = p['r1_m'] * force
         pull2 = p['motor_stall_torque_Nm'] * motor - p['r2_m'] * force
         if self.hold[0] and abs(pull1) > p['M10_Nm'] + y[2]:
@@ -95,8 +118,9 @@ class Rig:
     def step(self, y, h, *inputs):
         """One step and its error estimate over the tolerated error."""
         k = []
-        for row in A:
-            k.append(self.rates([v + h * sum(a * r[i] for a, r in zip(row, k)) for i, v in enumerate(y)], *inputs))
+        for c, row in zip(C, A):
+            at = [v + h * sum(a * r[i] for a, r in zip(row, k)) for i, v in enumerate(y)]
+            k.append(self.rates(at, self.time + c * h, *inputs))
         end = [v + h * sum(a * r[i] for a, r in zip(A[6], k)) for i, v in enumerate(y)]
         error = [abs(h * sum(e * r[i] for e, r in zip(E, k))) for i in range(3)]
         return end, max(e / (1e-9 + 1e-9 * abs(v)) for e, v in zip(error, end))
@@ -108,6 +132,7 @@ class Rig:
         while duration > 0.0:
             self.settle(y, motor, friction)
             if all(self.hold):  # nothing turns within this tick: only the lag
+                target *= self.factor('brake_torque', self.time)
                 return [0.0, 0.0, y[2] if self.ideal else
                         target + (y[2] - target) * math.exp(-self.p['c31_per_s'] * duration)]
             h = min(h, duration)
@@ -121,6 +146,7 @@ class Rig:
                 continue
             y = [0.0 if c else v for c, v in zip(crossing + [False], end)]
             duration -= h
+            self.time += h
             self.h = h = h * min(5.0, 0.9 * max(error, 1e-4) ** -0.2)
         return y
 
@@ -146,12 +172,15 @@ def target_of(rig, row):
     return rig.p['b1_Nm'] * duty + rig.p['b2_Nm'] if duty >= rig.p['u0'] else 0.0
 
 
-def deviation(program, plant, controller, *settings, ideal=False, window=None, cuts=((0.0, 1.0),)):
+def deviation(program, plant, controller, *settings, ideal=False, window=None, cuts=((0.0, 1.0),), drift=None):
     """Largest deviation of any speed (over the speed, at least 1 rad/s) or torque (over 1 N m), of time and of way.
 
-    cuts: friction from each instant on; window: seconds after which the state is taken over from the record."""
+    cuts: friction from each instant on; drift: parts of the plant that change, each with its `ramp`; window: seconds after which the state is taken over from the record."""
+    drift = drift or {}
+    settings += tuple(f'plant.{part}_profile={profile}' for part, (_, profile) in drift.items())
     rows = recorded(program, plant, controller, *settings, *(['plant.ideal_actuator=true'] if ideal else []))
     rig = Rig(plant, ideal)
+    rig.drift = {part: factor for part, (factor, _) in drift.items()}
     y = [rows[0]['omega1_rad_s'], rows[0]['omega2_rad_s'], rows[0]['brake_torque_Nm']]
     taken_over, worst, way, recorded_way, r2 = 0.0, 0.0, 0.0, 0.0, rig.p['r2_m']
     for row, after in zip(rows, rows[1:]):
@@ -162,6 +191,7 @@ def deviation(program, plant, controller, *settings, ideal=False, window=None, c
         motor = round(row['motor_pwm'] * row['motor_enable'] * 4095) / 4095
         points = [now] + [at for at, _ in cuts if now < at < end] + [end]
         for begin, until in zip(points, points[1:]):
+            rig.time = begin
             friction = [value for at, value in cuts if at <= begin + 1e-12][-1]
             y = rig.run(y, until - begin, target_of(rig, row), motor, friction)
         way += 0.5 * r2 * (before + y[1]) * (end - now)
@@ -177,11 +207,14 @@ def main():
     braking = 'experiment.start_speed_rad_s=170'
     jumps = 'plant.friction_profile=time: 1; 0.5 at 0.2003; 0.8 at 0.4107'
     cuts = ((0.0, 1.0), (0.2003, 0.5), (0.4107, 0.8))
+    drift = {'brake_torque': ramp(1, 0.6, 6.5, 7.5), 'motor_torque': ramp(1, 0.9, 2, 4),
+             'upper_bearing': ramp(1, 3, 1, 7), 'lower_bearing': ramp(1, 2, 3, 7)}
     failures = 0
     for plant in ('paper-table1', 'inteco-manual'):
         window = 0.05 if plant == 'paper-table1' else None
         for what, found in (
                 ('run-up and lock to standstill', deviation(program, plant, 'locked')),
+                ('the same while all parts drift', deviation(program, plant, 'locked', drift=drift)),
                 ('lock over jumps of friction', deviation(program, plant, 'locked', braking, jumps, cuts=cuts)),
                 ('slip control, ideal actuator',
                  deviation(program, plant, 'adaptive', braking, 'plant.ideal_sensors=true', ideal=True, window=window)),

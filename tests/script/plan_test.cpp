@@ -1,5 +1,6 @@
 #include "abs_hil/script/plan.hpp"
 
+#include "abs_hil/script/events.hpp"
 #include "abs_hil/script/library.hpp"
 #include "catch.hpp"
 
@@ -91,11 +92,26 @@ TEST_CASE("friction events make a profile; the configuration's own stays") {
   const std::string event = "[[event]]\nat_s = 1\nfriction = 0.5\ncounted_from = \"braking\"\n";
   const Script script = parsed(std::string(brake) + event +
                                "[[event]]\nat_s = 2\nover_s = 0.5\nfriction = 1\ncounted_from = \"braking\"\n");
-  CHECK(friction_profile(script) == "braking time: 1; 0.5 at 1; 1 from 2 to 2.5");
+  CHECK(profile(script, "friction") == "braking time: 1; 0.5 at 1; 1 from 2 to 2.5");
   settings::Settings s;
   s.plant.friction_profile = "time: 0.7";
   apply(script, s);
   CHECK(s.plant.friction_profile == "time: 0.7");
-  const Script mixed = parsed(std::string(brake) + event + "[[event]]\nat_s = 2\nfriction = 1\n");
-  CHECK_THROWS_WITH(friction_profile(mixed), Contains("counted from"));
+}
+
+TEST_CASE("every part of the plant drifts by its own events, on its own clock") {
+  const Script script = parsed(std::string(brake) +
+                               "[[event]]\nat_s = 0\nbrake_torque = \"80 %\"\nfriction = 0.9\n"
+                               "[[event]]\nat_s = 1\nuntil = \"1.5 min\"\nbrake_torque = 0.5\nlower_bearing = 3\n"
+                               "[[event]]\nat_s = 2\nover_s = 1\nupper_bearing = 2\ncounted_from = \"braking\"\n"
+                               "[[event]]\nat_s = 90\nbrake_torque = 1\nmotor_torque = 0.7\n"
+                               "[[event]]\nat_s = 91\nbrake_torque = 0.8\n");
+  settings::Settings s;
+  s.plant.drift.motor_torque = "time: 0.4";
+  apply(script, s);
+  CHECK(s.plant.friction_profile == "time: 0.9");
+  CHECK(s.plant.drift.brake_torque == "time: 0.8; 0.5 from 1 to 90; 1 at 90; 0.8 at 91");
+  CHECK(s.plant.drift.upper_bearing == "braking time: 1; 2 from 2 to 3");
+  CHECK(s.plant.drift.lower_bearing == "time: 1; 3 from 1 to 90");
+  CHECK(s.plant.drift.motor_torque == "time: 0.4");
 }

@@ -79,7 +79,8 @@ control.slip_ref = { from = 0.1, to = 0.2, steps = 3 }
   CHECK(first.at_most->value == 60.0);
   CHECK(script.phases[1].brake_course->points.size() == 3);
   CHECK(script.limits.run_time->value == 30.0);
-  CHECK(script.events[0].over->value == 0.2);
+  CHECK(script.events[0].at_s == 1.0);
+  CHECK(script.events[0].end_s == 1.2);
   CHECK(script.series.repeat == 3);
   CHECK(script.series.seed == 7);
   CHECK(script.series.pause_s == 60.0);

@@ -24,6 +24,14 @@ struct LeverParameters {
   double phi_deg{65.61};  ///< angle between the normal in the point of contact and the line L, in (0, 90]
 };
 
+/// Factors over parameters of the plant that go with time, see FactorProfile; empty: 1 throughout.
+struct DriftProfiles {
+  std::string brake_torque{};   ///< over the torque that the brake's map gives
+  std::string motor_torque{};   ///< over the drive motor's torque
+  std::string upper_bearing{};  ///< over M10 and d1
+  std::string lower_bearing{};  ///< over M20 and d2
+};
+
 /// The simulated rig. `rig` holds its true parameters.
 struct PlantOptions {
   rig::RigParameters rig{};
@@ -32,7 +40,8 @@ struct PlantOptions {
   double mu_peak{0.4};                   ///< peak of the magic formula's friction curve, used with the lever only, > 0
   IntecoMuParameters inteco_mu{};        ///< for tyre "inteco-mu"
   LeverParameters lever{};               ///< for load "lever"
-  std::string friction_profile{};        ///< friction over time or distance, see FrictionProfile; empty: none
+  std::string friction_profile{};        ///< friction over time or distance, see FactorProfile; empty: none
+  DriftProfiles drift{};                 ///< what else changes while it runs
   bool ideal_actuator{false};            ///< the torque asked for acts at once, without map, lag and saturation
   bool ideal_sensors{false};             ///< measurements carry the true speeds
   double slip_regularisation_m_s{0.02};  ///< (5) divides by at least this car speed, > 0

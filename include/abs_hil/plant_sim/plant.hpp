@@ -1,6 +1,7 @@
 #pragma once
 
-#include "abs_hil/plant_sim/friction_course.hpp"
+#include "abs_hil/plant_sim/drift.hpp"
+#include "abs_hil/plant_sim/factor_course.hpp"
 #include "abs_hil/plant_sim/options.hpp"
 #include "abs_hil/plant_sim/wheel_model.hpp"
 #include "abs_hil/rig/cycle_record.hpp"
@@ -26,14 +27,15 @@ struct PlantState {
 
 /// The rig's mechanics (1)-(11) with the corrections of docs/theory.md: odd tyre force, set-valued Coulomb friction (a
 /// wheel that stands stays at exactly 0 until the torques on it exceed its friction), brake lag and map, drive motor
-/// with back-EMF; with one of several tyre and load models and a road whose friction may change (docs/plants.md).
+/// with back-EMF; with one of several tyre and load models, a road whose friction may change and parts that may drift
+/// (docs/plants.md).
 /// Deterministic; `advance` allocates nothing and does not throw.
 class Plant {
  public:
   /// Throws std::invalid_argument if an option is outside its range.
   explicit Plant(const PlantOptions& options);
 
-  /// Back to the start of the friction profile, too.
+  /// Back to the start of every profile, too.
   void reset(const PlantState& state) noexcept;
   /// Lets `duration_s` >= 0 pass under `input`.
   void advance(double duration_s, const PlantInput& input) noexcept;
@@ -49,9 +51,11 @@ class Plant {
 
  private:
   [[nodiscard]] ContactState contact() const noexcept;
+  void let_bearings_drift(const DriftFactors& factors) noexcept;
 
   PlantOptions options_;
-  FrictionCourse course_;
+  FactorCourse course_;
+  Drift drift_;
   WheelModel model_;
   PlantState state_{};
 };

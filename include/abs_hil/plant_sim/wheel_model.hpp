@@ -26,6 +26,8 @@ class WheelModel {
                               friction_at_most)) {}
 
   [[nodiscard]] const rig::WheelParameters& wheels() const noexcept { return wheels_; }
+  /// Other wheels, or rather: the same with drifted bearings.
+  void set_wheels(const rig::WheelParameters& wheels) noexcept { wheels_ = wheels; }
 
   /// Slip by the tyre model's definition, positive in braking.
   [[nodiscard]] double slip(double omega1_rad_s, double omega2_rad_s) const noexcept {

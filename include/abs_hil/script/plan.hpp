@@ -38,7 +38,4 @@ void apply(const Script& script, settings::Settings& settings);
 /// would be held to the limits.
 [[nodiscard]] std::vector<std::string> beyond_limits(const Plan& plan, const settings::Settings& settings);
 
-/// The friction profile (plant.friction_profile) that the script's events make; empty: none.
-[[nodiscard]] std::string friction_profile(const Script& script);
-
 }  // namespace abs_hil::script

@@ -75,12 +75,18 @@ struct LimitsScript {
   std::optional<Number> distance{};
 };
 
+/// Something of the simulated plant that an event multiplies.
+struct Change {
+  std::string_view what;  ///< as in changing_parts(): "friction"
+  double factor{1.0};
+};
+
 /// Something that happens to the simulated plant.
 struct EventScript {
-  Number at{};
+  double at_s{0.0};
+  double end_s{0.0};  ///< the same as `at_s` for a jump
   bool from_braking{false};
-  std::optional<Number> over{};
-  std::optional<Number> friction{};
+  std::vector<Change> changes{};
   std::string inject{};  ///< not empty: a fault, and nothing else here counts
   Place place{};
 };

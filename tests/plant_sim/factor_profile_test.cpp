@@ -1,4 +1,4 @@
-#include "abs_hil/plant_sim/friction_profile.hpp"
+#include "abs_hil/plant_sim/factor_profile.hpp"
 
 #include <cmath>
 #include <stdexcept>
@@ -6,7 +6,7 @@
 
 #include "catch.hpp"
 
-using abs_hil::plant_sim::FrictionProfile;
+using abs_hil::plant_sim::FactorProfile;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinRel;
 
@@ -14,7 +14,7 @@ namespace {
 
 std::string error_of(const std::string& text) {
   try {
-    const FrictionProfile profile(text);
+    const FactorProfile profile(text);
   } catch (const std::invalid_argument& error) {
     return error.what();
   }
@@ -25,7 +25,7 @@ std::string error_of(const std::string& text) {
 
 TEST_CASE("No text is friction 1 throughout") {
   for (const char* text : {"", "  "}) {
-    const FrictionProfile profile(text);
+    const FactorProfile profile(text);
     REQUIRE(profile.pieces().size() == 1);
     CHECK(profile.pieces()[0].value == 1.0);
     CHECK(profile.pieces()[0].slope == 0.0);
@@ -35,8 +35,8 @@ TEST_CASE("No text is friction 1 throughout") {
 }
 
 TEST_CASE("Jumps and ramps become pieces without gaps") {
-  const FrictionProfile profile(" braking distance : 1 ;0.5 at 2;  1.5 from 2.5 to 4.5; 0.25 at 4.5 ; 1 from 6 to 7;");
-  CHECK(profile.axis() == FrictionProfile::Axis::distance);
+  const FactorProfile profile(" braking distance : 1 ;0.5 at 2;  1.5 from 2.5 to 4.5; 0.25 at 4.5 ; 1 from 6 to 7;");
+  CHECK(profile.axis() == FactorProfile::Axis::distance);
   CHECK(profile.from_braking());
   CHECK(profile.highest() == 1.5);
   struct Expected {
@@ -55,12 +55,12 @@ TEST_CASE("Jumps and ramps become pieces without gaps") {
 }
 
 TEST_CASE("A ramp may begin at 0, right after a jump and right after a ramp") {
-  const FrictionProfile profile("time: 1; 0.5 from 0 to 1; 2 from 1 to 2; 1 at 3; 0.5 from 3 to 4");
+  const FactorProfile profile("time: 1; 0.5 from 0 to 1; 2 from 1 to 2; 1 at 3; 0.5 from 3 to 4");
   REQUIRE(profile.pieces().size() == 5);
   CHECK(profile.pieces()[0].slope == -0.5);
   CHECK(profile.pieces()[1].slope == 1.5);
   CHECK(profile.pieces()[3].value == 1.0);
-  CHECK(profile.axis() == FrictionProfile::Axis::time);
+  CHECK(profile.axis() == FactorProfile::Axis::time);
   CHECK_FALSE(profile.from_braking());
 }
 
@@ -81,9 +81,9 @@ TEST_CASE("What is no profile is refused with the part that is wrong") {
       {"time: 1; 0.5 at 1s", "holds \"1s\" where a number belongs"},
       {"time: 1; 0.5 at nan", "holds \"nan\" where a number belongs"},
       {"time: 1; 0.5 at inf", "holds \"inf\" where a number belongs"},
-      {"time: 0", "\"0\" gives a friction that is not in (0, 10]"},
-      {"time: 1; -1 at 1", "\"-1 at 1\" gives a friction that is not in (0, 10]"},
-      {"time: 1; 11 at 1", "\"11 at 1\" gives a friction that is not in (0, 10]"},
+      {"time: 0", "\"0\" gives a factor that is not in (0, 10]"},
+      {"time: 1; -1 at 1", "\"-1 at 1\" gives a factor that is not in (0, 10]"},
+      {"time: 1; 11 at 1", "\"11 at 1\" gives a factor that is not in (0, 10]"},
       {"time: 1; 0.5 from 2 to 2", "\"0.5 from 2 to 2\" must end after it begins"},
       {"time: 1; 0.5 at 2; 1 at 1", "\"1 at 1\" must not begin before the change before it has ended"},
       {"time: 1; 0.5 from 1 to 3; 1 at 2", "\"1 at 2\" must not begin before the change before it has ended"},

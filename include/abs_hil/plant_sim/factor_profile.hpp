@@ -6,32 +6,35 @@
 
 namespace abs_hil::plant_sim {
 
-/// Friction of the road, over that of the tyre model, along an axis: constant pieces and ramps. Written as
+/// How a factor over a parameter of the plant goes along an axis: constant pieces and ramps. Written as
 ///
 ///     AXIS: VALUE; VALUE at POSITION; VALUE from POSITION to POSITION; ...
 ///
 /// with the values in (0, 10]. The first value holds from the start; "at" jumps to a new one, "from ... to" goes there
 /// in a straight line. AXIS is "time" (s) or "distance" (m rolled by the lower wheel) since the start of the run, or
 /// "braking time" or "braking distance" since the brake was first applied, before which the first value holds.
-/// For instance "braking time: 1; 0.5 at 0.6; 1 from 1 to 1.2". An empty text is friction 1 throughout.
-class FrictionProfile {
+/// For instance "braking time: 1; 0.5 at 0.6; 1 from 1 to 1.2". An empty text is a factor of 1 throughout.
+class FactorProfile {
  public:
   enum class Axis { time, distance };
+  enum class Axes { time_or_distance, time_only };
 
-  /// Friction along one piece: value + slope (position - begin), up to `end`.
+  /// The factor along one piece: value + slope (position - begin), up to `end`.
   struct Piece {
     double begin{0.0};
     double end{std::numeric_limits<double>::infinity()};
     double value{1.0};
     double slope{0.0};
 
-    /// Friction at `position` within the piece.
+    /// The factor at `position` within the piece.
     [[nodiscard]] double at(double position) const noexcept { return value + slope * (position - begin); }
     [[nodiscard]] double highest() const noexcept { return slope > 0.0 ? at(end) : value; }
   };
 
-  /// Throws std::invalid_argument, naming plant.friction_profile, the part that is wrong and what is valid.
-  explicit FrictionProfile(std::string_view text = {});
+  /// Throws std::invalid_argument, naming `key`, the part that is wrong and what is valid.
+  /// @param axes  what the factor may go along
+  explicit FactorProfile(std::string_view text = {}, std::string_view key = "plant.friction_profile",
+                         Axes axes = Axes::time_or_distance);
 
   [[nodiscard]] Axis axis() const noexcept { return axis_; }
   /// Positions count from the first application of the brake, not from the start.
@@ -42,6 +45,8 @@ class FrictionProfile {
   [[nodiscard]] double highest() const noexcept;
 
  private:
+  void read(std::string_view text, Axes axes);
+
   Axis axis_{Axis::time};
   bool from_braking_{false};
   std::vector<Piece> pieces_;

@@ -1,4 +1,4 @@
-#include "abs_hil/plant_sim/friction_profile.hpp"
+#include "abs_hil/plant_sim/factor_profile.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -9,10 +9,10 @@
 namespace abs_hil::plant_sim {
 namespace {
 
-constexpr double highest_friction = 10.0;
+constexpr double highest_factor = 10.0;
 
 [[noreturn]] void refuse(std::string_view part, const std::string& problem) {
-  throw std::invalid_argument("plant.friction_profile: \"" + std::string(part) + "\" " + problem);
+  throw std::invalid_argument("\"" + std::string(part) + "\" " + problem);
 }
 
 std::string_view trimmed(std::string_view text) {
@@ -45,9 +45,9 @@ double number(std::string_view word, std::string_view part) {
   return value;
 }
 
-double friction(std::string_view word, std::string_view part) {
+double factor(std::string_view word, std::string_view part) {
   const double value = number(word, part);
-  if (!(value > 0.0 && value <= highest_friction)) refuse(part, "gives a friction that is not in (0, 10]");
+  if (!(value > 0.0 && value <= highest_factor)) refuse(part, "gives a factor that is not in (0, 10]");
   return value;
 }
 
@@ -61,10 +61,10 @@ Change change(std::string_view part) {
   const std::vector<std::string_view> words = words_of(part);
   if (words.size() == 3 && words[1] == "at") {
     const double at = number(words[2], part);
-    return {at, at, friction(words[0], part)};
+    return {at, at, factor(words[0], part)};
   }
   if (words.size() == 5 && words[1] == "from" && words[3] == "to") {
-    const Change ramp{number(words[2], part), number(words[4], part), friction(words[0], part)};
+    const Change ramp{number(words[2], part), number(words[4], part), factor(words[0], part)};
     if (!(ramp.begin < ramp.end)) refuse(part, "must end after it begins");
     return ramp;
   }
@@ -74,23 +74,35 @@ Change change(std::string_view part) {
 
 }  // namespace
 
-FrictionProfile::FrictionProfile(std::string_view text) : pieces_{{}} {
+FactorProfile::FactorProfile(std::string_view text, std::string_view key, Axes axes) : pieces_{{}} {
+  try {
+    read(text, axes);
+  } catch (const std::invalid_argument& problem) {
+    throw std::invalid_argument(std::string(key) + ": " + problem.what());
+  }
+}
+
+void FactorProfile::read(std::string_view text, Axes axes) {
   if (trimmed(text).empty()) return;
+  const bool time_only = axes == Axes::time_only;
   const std::string_view whole = trimmed(text);
   if (whole.find(':') == std::string_view::npos) {
-    refuse(whole, "names no axis; begin with \"time:\", \"distance:\", \"braking time:\" or \"braking distance:\"");
+    refuse(whole, time_only ? "names no axis; begin with \"time:\" or \"braking time:\""
+                            : "names no axis; begin with \"time:\", \"distance:\", \"braking time:\" or "
+                              "\"braking distance:\"");
   }
   std::string_view rest = whole;
   const std::string_view head = cut(rest, ':');
   const std::vector<std::string_view> axis = words_of(head);
   from_braking_ = axis.size() == 2 && axis.front() == "braking";
-  if ((axis.size() != 1 && !from_braking_) || (axis.back() != "time" && axis.back() != "distance")) {
-    refuse(head, "is no axis; write time, distance, braking time or braking distance");
+  if ((axis.size() != 1 && !from_braking_) || (axis.back() != "time" && (axis.back() != "distance" || time_only))) {
+    refuse(head, time_only ? "is no axis here; write time or braking time"
+                           : "is no axis; write time, distance, braking time or braking distance");
   }
   axis_ = axis.back() == "time" ? Axis::time : Axis::distance;
 
   const std::string_view first = cut(rest, ';');
-  pieces_.front().value = friction(first, first);
+  pieces_.front().value = factor(first, first);
   double jumped_at = 0.0;
   while (!trimmed(rest).empty()) {
     const std::string_view part = cut(rest, ';');
@@ -111,7 +123,7 @@ FrictionProfile::FrictionProfile(std::string_view text) : pieces_{{}} {
   }
 }
 
-double FrictionProfile::highest() const noexcept {
+double FactorProfile::highest() const noexcept {
   double highest = 0.0;
   for (const Piece& piece : pieces_) highest = std::max(highest, piece.highest());
   return highest;

@@ -1,4 +1,4 @@
-#include "abs_hil/plant_sim/friction_course.hpp"
+#include "abs_hil/plant_sim/factor_course.hpp"
 
 #include <algorithm>
 
@@ -10,7 +10,7 @@ constexpr double time_rounding_s = 1e-11;
 
 }  // namespace
 
-void FrictionCourse::start(double angle2_rad) noexcept {
+void FactorCourse::start(double angle2_rad) noexcept {
   index_ = 0;
   time_s_ = 0.0;
   origin_time_s_ = 0.0;
@@ -18,22 +18,22 @@ void FrictionCourse::start(double angle2_rad) noexcept {
   counting_ = !profile_.from_braking();
 }
 
-void FrictionCourse::brake_applied(double angle2_rad) noexcept {
+void FactorCourse::brake_applied(double angle2_rad) noexcept {
   if (counting_) return;
   counting_ = true;
   origin_time_s_ = time_s_;
   origin_angle2_rad_ = angle2_rad;
 }
 
-void FrictionCourse::settle_on_changes(double angle2_rad) noexcept {
+void FactorCourse::settle_on_changes(double angle2_rad) noexcept {
   if (!counting_) return;
   // The last piece ends at infinity. Along the way the comparison is the integration's own.
   while (along_time() ? time_left_s() <= time_rounding_s : angle2_rad >= end_angle2_rad()) ++index_;
 }
 
-PresentFriction FrictionCourse::present_of_changes(double angle2_rad) const noexcept {
-  const FrictionProfile::Piece& p = piece();
-  PresentFriction now{.value = p.value, .angle2_rad = angle2_rad, .highest = p.highest()};
+PresentFactor FactorCourse::present_of_changes(double angle2_rad) const noexcept {
+  const FactorProfile::Piece& p = piece();
+  PresentFactor now{.value = p.value, .angle2_rad = angle2_rad, .highest = p.highest()};
   if (!counting_) return now;
   if (p.slope != 0.0) {
     const double position = along_time() ? time_s_ - origin_time_s_ : r2_m_ * (angle2_rad - origin_angle2_rad_);

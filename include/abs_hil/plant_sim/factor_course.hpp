@@ -3,13 +3,13 @@
 #include <cstddef>
 #include <limits>
 
-#include "abs_hil/plant_sim/friction_profile.hpp"
+#include "abs_hil/plant_sim/factor_profile.hpp"
 
 namespace abs_hil::plant_sim {
 
-/// Friction from one instant on, until the piece of the profile ends: linear in the time since and in the lower wheel's
+/// A factor from one instant on, until the piece of the profile ends: linear in the time since and in the lower wheel's
 /// angle.
-struct PresentFriction {
+struct PresentFactor {
   double value{1.0};
   double per_s{0.0};
   double per_rad{0.0};
@@ -22,12 +22,12 @@ struct PresentFriction {
   }
 };
 
-/// How far a plant has come along its friction profile. Pieces that are passed do not return, should the lower wheel
+/// How far a plant has come along a profile. Pieces that are passed do not return, should the lower wheel
 /// roll back. Real-time safe but for the constructor.
-class FrictionCourse {
+class FactorCourse {
  public:
   /// @param r2_m  radius of the lower wheel
-  FrictionCourse(const FrictionProfile& profile, double r2_m)
+  FactorCourse(const FactorProfile& profile, double r2_m)
       : profile_(profile),
         r2_m_(r2_m),
         changes_(profile.pieces().size() > 1),
@@ -35,7 +35,7 @@ class FrictionCourse {
     start(0.0);
   }
 
-  [[nodiscard]] const FrictionProfile& profile() const noexcept { return profile_; }
+  [[nodiscard]] const FactorProfile& profile() const noexcept { return profile_; }
 
   /// Back to the start, with the lower wheel at that angle.
   void start(double angle2_rad) noexcept;
@@ -53,22 +53,24 @@ class FrictionCourse {
     if (!changes_ || !counting_ || !along_time()) return std::numeric_limits<double>::infinity();
     return origin_time_s_ + piece().end - time_s_;
   }
-  [[nodiscard]] PresentFriction present(double angle2_rad) const noexcept {
+  /// False: the factor is 1 throughout.
+  [[nodiscard]] bool changes_anything() const noexcept { return changes_ || constant_ != 1.0; }
+  [[nodiscard]] PresentFactor present(double angle2_rad) const noexcept {
     if (changes_) return present_of_changes(angle2_rad);
     return {.value = constant_, .angle2_rad = angle2_rad, .highest = constant_};
   }
 
  private:
   void settle_on_changes(double angle2_rad) noexcept;
-  [[nodiscard]] PresentFriction present_of_changes(double angle2_rad) const noexcept;
-  [[nodiscard]] bool along_time() const noexcept { return profile_.axis() == FrictionProfile::Axis::time; }
-  [[nodiscard]] const FrictionProfile::Piece& piece() const noexcept { return profile_.pieces()[index_]; }
+  [[nodiscard]] PresentFactor present_of_changes(double angle2_rad) const noexcept;
+  [[nodiscard]] bool along_time() const noexcept { return profile_.axis() == FactorProfile::Axis::time; }
+  [[nodiscard]] const FactorProfile::Piece& piece() const noexcept { return profile_.pieces()[index_]; }
   [[nodiscard]] double end_angle2_rad() const noexcept { return origin_angle2_rad_ + piece().end / r2_m_; }
 
-  FrictionProfile profile_;
+  FactorProfile profile_;
   double r2_m_;
   bool changes_;     ///< else it costs next to nothing
-  double constant_;  ///< friction where it does not change
+  double constant_;  ///< the factor where it does not change
   std::size_t index_{0};
   double time_s_{0.0};
   double origin_time_s_{0.0};
