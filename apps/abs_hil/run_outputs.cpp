@@ -83,16 +83,17 @@ void RunOutputs::open_folder(const RunRequest& request) {
 
 void RunOutputs::open_stream(const RunRequest& request) {
   const settings::Settings& s = request.settings;
-  stream_.emplace(
-      telemetry::StreamOptions{.channel_prefix = s.telemetry.channel_prefix,
-                               .telemetry_every_cycles = static_cast<std::uint32_t>(s.telemetry.decimation)},
-      telemetry::ExperimentInfo{.experiment = s.experiment.name,
-                                .controller = s.control.controller,
-                                .plant = s.plant_name,
-                                .backend = s.backend,
-                                .config_json = request.config_json,
-                                .version = ABS_HIL_VERSION},
-      [this] { return snapshot(); });
+  stream_.emplace(telemetry::StreamOptions{.channel_prefix = s.telemetry.channel_prefix,
+                                           .telemetry_every_cycles = static_cast<std::uint32_t>(s.telemetry.decimation),
+                                           .status_period_s = s.telemetry.status_period_s,
+                                           .experiment_period_s = s.telemetry.experiment_period_s},
+                  telemetry::ExperimentInfo{.experiment = s.experiment.name,
+                                            .controller = s.control.controller,
+                                            .plant = s.plant_name,
+                                            .backend = s.backend,
+                                            .config_json = request.config_json,
+                                            .version = ABS_HIL_VERSION},
+                  [this] { return snapshot(); });
   for (telemetry::LogOutlet& log : log_) stream_->add(log);
   if (lcm_) {
     stream_->add(*lcm_);

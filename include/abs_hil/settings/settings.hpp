@@ -16,7 +16,9 @@ namespace abs_hil::settings {
 /// Everything below `telemetry.` in the configuration.
 struct TelemetryOptions {
   std::string channel_prefix{"ABS_"};
-  std::int32_t decimation{1};  ///< one ABS_TELEMETRY message every so many cycles, >= 1
+  std::int32_t decimation{1};       ///< one ABS_TELEMETRY message every so many cycles, >= 1
+  double status_period_s{1.0};      ///< from one ABS_STATUS to the next, run time, > 0
+  double experiment_period_s{5.0};  ///< from one ABS_EXPERIMENT to the next, run time, > 0
 };
 
 /// Everything below `commands.` in the configuration.
