@@ -3,6 +3,8 @@
 #include <poll.h>
 #include <pthread.h>
 #include <signal.h>
+#include <sys/socket.h>
+#include <sys/time.h>
 
 #include <chrono>
 #include <cstring>
@@ -10,6 +12,8 @@
 #include <utility>
 
 #include "abs_hil/telemetry/checked_decode.hpp"
+#include "abs_hil/telemetry/lcm_url.hpp"
+#include "abs_hil/telemetry/tcpq_server.hpp"
 
 namespace abs_hil::telemetry {
 namespace {
@@ -20,8 +24,10 @@ constexpr int answers_per_second = 10;
 constexpr std::size_t shown_text_max_bytes = 64;
 constexpr int thread_wait_ms = 50;
 constexpr std::chrono::seconds reconnect_after{1};
+constexpr int tcpq_timeout_ms = 200;
 /// LCM queues 30 messages if nobody says otherwise, and a flood would push a stop out.
 constexpr int lcm_queue_capacity = 1024;
+constexpr std::string_view too_long = "too long for a command";
 
 }  // namespace
 
@@ -29,6 +35,11 @@ CommandListener::CommandListener(LcmOutlet& outlet, MessageStream& stream, std::
     : outlet_(outlet), stream_(stream), on_stop_(std::move(on_stop)) {
   // A log file has nothing to say, and its descriptor for waiting is not one to poll.
   if (outlet_.provider() == "file") return;
+  if (outlet_.provider() == "udpm") {
+    udpm_.emplace(outlet_.url(), stream_.command_channel());
+    listening_ = true;
+    return;
+  }
   if (outlet_.provider() == "memq") {
     lcm_ = outlet_.lcm().getUnderlyingLCM();
   } else {
@@ -36,6 +47,11 @@ CommandListener::CommandListener(LcmOutlet& outlet, MessageStream& stream, std::
     if (!own_lcm_->good()) return;
     lcm_ = own_lcm_->getUnderlyingLCM();
   }
+  subscribe();
+  listening_ = true;
+}
+
+void CommandListener::subscribe() {
   subscription_ = lcm_subscribe(lcm_, stream_.command_channel().c_str(), &on_packet, this);
   lcm_subscription_set_queue_capacity(subscription_, lcm_queue_capacity);
 }
@@ -45,11 +61,12 @@ CommandListener::~CommandListener() {
     thread_.request_stop();
     thread_.join();
   }
-  if (subscription_ != nullptr) lcm_unsubscribe(lcm_, subscription_);
+  // An LCM object of its own takes its subscription with it; tcpq would look for its server once more.
+  if (!own_lcm_ && subscription_ != nullptr) lcm_unsubscribe(lcm_, subscription_);
 }
 
 void CommandListener::listen() {
-  if (subscription_ == nullptr || thread_.joinable()) return;
+  if (!listening() || thread_.joinable()) return;
   thread_ = std::jthread([this](const std::stop_token& stop) { listen_until(stop); });
 }
 
@@ -58,25 +75,45 @@ void CommandListener::listen_until(const std::stop_token& stop) {
   sigset_t all;
   sigfillset(&all);
   pthread_sigmask(SIG_BLOCK, &all, nullptr);
+  const Endpoint server = outlet_.provider() == "tcpq" ? endpoint_of(parse_lcm_url(outlet_.url())) : Endpoint{};
   while (!stop.stop_requested()) {
-    const bool connected = lcm_get_fileno(lcm_) >= 0;
+    const bool connected = file_descriptor() >= 0;
     if (receive(thread_wait_ms) || connected) continue;
-    // tcpq without its server: handling connects again, noisily; not more often than publishing does.
+    // tcpq without its server: looked for not more often than publishing does.
     for (auto waited = std::chrono::milliseconds(0); waited < reconnect_after && !stop.stop_requested();
          waited += std::chrono::milliseconds(thread_wait_ms)) {
       std::this_thread::sleep_for(std::chrono::milliseconds(thread_wait_ms));
     }
-    static_cast<void>(lcm_handle(lcm_));
+    if (stop.stop_requested() || ask_tcpq_server(server, tcpq_timeout_ms) != TcpqServer::answers) continue;
+    // This connects again. Handling would, too, and then wait for a message without end.
+    lcm_unsubscribe(lcm_, subscription_);
+    subscribe();
   }
 }
 
 bool CommandListener::receive(int timeout_ms) {
   // Not lcm_handle_timeout: its select() does not survive descriptors of -1 (tcpq without server) or above 1023.
-  pollfd ready{lcm_get_fileno(lcm_), POLLIN, 0};
-  if (ready.fd < 0 || ::poll(&ready, 1, timeout_ms) <= 0 || lcm_handle(lcm_) != 0) return false;
+  pollfd ready{file_descriptor(), POLLIN, 0};
+  if (ready.fd < 0 || ::poll(&ready, 1, timeout_ms) <= 0) return false;
+  if (udpm_) {
+    const UdpmReceiver::Arrival arrival = udpm_->next();
+    dropped_by_kernel_.store(udpm_->dropped(), std::memory_order_relaxed);
+    if (arrival.too_long) {
+      hand_over(Problem{too_long}, false);
+    } else if (arrival.any) {
+      take(arrival.payload);
+    }
+    return true;
+  }
+  if (outlet_.provider() == "tcpq") {
+    // A server that stands still within a message must not keep the run from ending.
+    constexpr timeval timeout{.tv_sec = 0, .tv_usec = tcpq_timeout_ms * 1000};
+    static_cast<void>(::setsockopt(ready.fd, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout));
+  }
+  if (lcm_handle(lcm_) != 0) return false;
   if (!std::exchange(packet_.arrived, false)) return true;
   if (packet_.size > packet_.bytes.size()) {
-    hand_over(Problem{"too long for a command"}, false);
+    hand_over(Problem{too_long}, false);
   } else {
     take(std::span(packet_.bytes).first(packet_.size));
   }
@@ -84,7 +121,7 @@ bool CommandListener::receive(int timeout_ms) {
 }
 
 void CommandListener::poll() {
-  if (subscription_ == nullptr) return;
+  if (!listening()) return;
   for (int i = 0; i < packets_per_poll && !thread_.joinable(); ++i) {
     if (!receive(0)) break;
   }
@@ -184,7 +221,7 @@ CommandListener::Counts CommandListener::counts() const noexcept {
   return {.stops = stops_.load(std::memory_order_relaxed),
           .refused = refused_,
           .malformed = malformed_,
-          .dropped = dropped_.load(std::memory_order_relaxed)};
+          .dropped = dropped_.load(std::memory_order_relaxed) + dropped_by_kernel_.load(std::memory_order_relaxed)};
 }
 
 }  // namespace abs_hil::telemetry

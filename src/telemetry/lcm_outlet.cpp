@@ -5,6 +5,7 @@
 
 #include "abs_hil/telemetry/lcm_url.hpp"
 #include "abs_hil/telemetry/route_probe.hpp"
+#include "abs_hil/telemetry/tcpq_server.hpp"
 
 namespace abs_hil::telemetry {
 namespace {
@@ -12,11 +13,17 @@ namespace {
 /// tcpq connects, blocks and prints two lines at every publish while its server is away: ask it once in so many
 /// seconds.
 constexpr double tcpq_retry_s = 1.0;
+constexpr int tcpq_start_timeout_ms = 2'000;
+constexpr int tcpq_retry_timeout_ms = 200;
 
 std::string checked(std::string url) {
   if (url.empty()) url = default_lcm_url();
   const RouteProbe probe = probe_lcm_route(url);
   if (!probe.usable) throw LcmError("LCM cannot use '" + url + "': " + probe.problem + ". To mend it:\n" + probe.fix);
+  const LcmUrl parts = parse_lcm_url(url);
+  if (parts.provider == "tcpq" && ask_tcpq_server(endpoint_of(parts), tcpq_start_timeout_ms) == TcpqServer::silent) {
+    throw LcmError("the tcpq server of '" + url + "' does not answer: start it anew, or check the URL");
+  }
   return url;
 }
 
@@ -25,6 +32,7 @@ std::string checked(std::string url) {
 LcmOutlet::LcmOutlet(std::string url)
     : url_(checked(std::move(url))),
       provider_(parse_lcm_url(url_).provider),
+      server_(provider_ == "tcpq" ? endpoint_of(parse_lcm_url(url_)) : Endpoint{}),
       lcm_(url_),
       next_try_s_(-std::numeric_limits<double>::infinity()) {
   if (!lcm_.good()) {
@@ -39,11 +47,23 @@ void LcmOutlet::send(const std::string& channel, std::span<const std::uint8_t> m
     ++failures_;
     return;
   }
+  if (provider_ == "tcpq" && !tcpq_ready(time_s)) {
+    ++failures_;
+    return;
+  }
   const int result =
       lcm_publish(lcm_.getUnderlyingLCM(), channel.c_str(), message.data(), static_cast<unsigned int>(message.size()));
   if (result == 0) return;
   ++failures_;
   if (provider_ == "tcpq") next_try_s_ = time_s + tcpq_retry_s;
+}
+
+bool LcmOutlet::tcpq_ready(double time_s) noexcept {
+  const int socket = lcm_get_fileno(lcm_.getUnderlyingLCM());
+  if (socket >= 0) return takes_without_waiting(socket);
+  if (ask_tcpq_server(server_, tcpq_retry_timeout_ms) == TcpqServer::answers) return true;
+  next_try_s_ = time_s + tcpq_retry_s;
+  return false;
 }
 
 }  // namespace abs_hil::telemetry

@@ -22,7 +22,6 @@ using Bytes = std::vector<std::uint8_t>;
 using Fields = std::vector<std::string>;
 
 constexpr std::string_view envelope = "log_event,log_time_us,channel,type";
-constexpr std::size_t envelope_columns = 4;
 constexpr std::string_view raw_type = "raw";
 
 /// Columns of --csv, which go first, by name; in other files none.

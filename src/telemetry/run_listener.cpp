@@ -2,35 +2,51 @@
 
 #include <poll.h>
 
+#include <chrono>
 #include <cstdint>
 #include <new>
 #include <span>
 #include <utility>
 
 #include "abs_hil/telemetry/checked_decode.hpp"
+#include "abs_hil/telemetry/lcm_url.hpp"
 #include "abs_hil/telemetry/message_stream.hpp"
+#include "abs_hil/telemetry/tcpq_server.hpp"
 
 namespace abs_hil::telemetry {
 namespace {
 
 /// LCM's queue holds 30 messages, 30 ms of telemetry, if nobody says otherwise.
 constexpr int queue_messages = 20'000;
+constexpr std::chrono::seconds look_period{1};
+constexpr int look_timeout_ms = 100;
 
 }  // namespace
 
 RunListener::RunListener(std::string url, const std::string& channel_prefix, RunObserver& observer)
-    : network_(std::move(url)), observer_(observer) {
-  check_channel_prefix(channel_prefix);
-  subscribe<telemetry_t>(channel_prefix + "TELEMETRY");
-  subscribe<status_t>(channel_prefix + "STATUS");
-  subscribe<event_t>(channel_prefix + "EVENT");
-  subscribe<experiment_t>(channel_prefix + "EXPERIMENT");
+    : network_(std::move(url)), observer_(observer), prefix_(channel_prefix) {
+  check_channel_prefix(prefix_);
+  subscribe();
 }
 
-RunListener::~RunListener() {
+void RunListener::subscribe() {
+  subscribe<telemetry_t>(prefix_ + "TELEMETRY");
+  subscribe<status_t>(prefix_ + "STATUS");
+  subscribe<event_t>(prefix_ + "EVENT");
+  subscribe<experiment_t>(prefix_ + "EXPERIMENT");
+}
+
+void RunListener::look_for_server() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_look_) return;
+  next_look_ = now + look_period;
+  if (ask_tcpq_server(endpoint_of(parse_lcm_url(network_.url())), look_timeout_ms) != TcpqServer::answers) return;
+  // This connects again. Handling would, too, and then wait for a message without end.
   for (lcm_subscription_t* subscription : subscriptions_) {
     lcm_unsubscribe(network_.lcm().getUnderlyingLCM(), subscription);
   }
+  subscriptions_.clear();
+  subscribe();
 }
 
 template <class Message>
@@ -63,8 +79,8 @@ void RunListener::poll(int messages_max) {
   for (int i = 0; i < messages_max; ++i) {
     // Not lcm_handle_timeout: its select() does not survive descriptors of -1 (tcpq without server) or above 1023.
     pollfd ready{file_descriptor(), POLLIN, 0};
-    // Without a descriptor LCM's own handle() is what connects again.
-    if (ready.fd >= 0 && ::poll(&ready, 1, 0) <= 0) return;
+    if (ready.fd < 0) return look_for_server();
+    if (::poll(&ready, 1, 0) <= 0) return;
     const bool handled = network_.lcm().handle() == 0;
     if (std::exchange(out_of_memory_, false)) throw std::bad_alloc();
     if (!handled) return;

@@ -1,5 +1,5 @@
-// What anybody may send: every decoder of ours on the same bytes. A packet that is taken must come out of the encoder
-// as it came in.
+// What anybody may send: every decoder of ours on the same bytes, and the reader of LCM's own framing. A packet that is
+// taken must come out of the encoder as it came in; a payload must lie within its datagram.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "abs_hil/telemetry/checked_decode.hpp"
+#include "abs_hil/telemetry/lcm_packet.hpp"
 #include "abs_hil/telemetry/message_codec.hpp"
 
 using namespace abs_hil;
@@ -31,5 +32,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto decoded = telemetry::decode_command(raw);
   if (decoded.problem.empty() && decoded.command.command.size() > size) std::abort();
   static_cast<void>(telemetry::printable(decoded.command.token, 64));
+
+  // As it came, and behind each magic word, which chance does not pass either.
+  for (const char magic : {'\0', '2', '3'}) {
+    std::vector<std::uint8_t> datagram(raw.begin(), raw.end());
+    if (magic != '\0') datagram.insert(datagram.begin(), {'L', 'C', '0', static_cast<std::uint8_t>(magic)});
+    const auto packet = telemetry::look_at(datagram, "ABS_COMMAND");
+    const bool message = packet.kind == telemetry::LcmPacket::Kind::message;
+    if (message != (packet.payload.data() != nullptr)) std::abort();
+    if (!message) continue;
+    const std::uint8_t* const end = datagram.data() + datagram.size();
+    if (packet.payload.data() < datagram.data() || packet.payload.data() + packet.payload.size() != end) std::abort();
+  }
   return 0;
 }

@@ -1,4 +1,5 @@
-// The programs of network_test.sh: a paced publisher, a checking subscriber, a checker of logs.
+// The programs of the tests over a network: a paced publisher, a checking subscriber, a subscriber that counts what it
+// lost, a checker of logs.
 #include <poll.h>
 
 #include <chrono>
@@ -14,6 +15,7 @@
 #include "abs_hil/telemetry/lcm_outlet.hpp"
 #include "abs_hil/telemetry/log_outlet.hpp"
 #include "abs_hil/telemetry/message_stream.hpp"
+#include "abs_hil/telemetry/run_listener.hpp"
 #include "telemetry/sample_records.hpp"
 
 namespace abs_hil::telemetry {
@@ -64,7 +66,8 @@ int publish(const std::string& url, std::uint64_t count, int period_us, const ch
   stream.add(outlet);
   stream.add(log);
   CommandListener listener(outlet, stream, {});
-  auto wake_up = std::chrono::steady_clock::now();
+  const auto start = std::chrono::steady_clock::now();
+  auto wake_up = start;
   std::uint64_t sent = 0;
   for (; sent < count && !listener.stop_requested(); ++sent) {
     stream.consume(test::sample_record(sent), 0.0);
@@ -72,8 +75,9 @@ int publish(const std::string& url, std::uint64_t count, int period_us, const ch
     std::this_thread::sleep_until(wake_up += std::chrono::microseconds(period_us));
   }
   stream.finish();
-  std::printf("published %llu, failures %llu, stops %llu\n", static_cast<unsigned long long>(sent),
-              static_cast<unsigned long long>(outlet.failures()),
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  std::printf("published %llu in %.3f s, failures %llu, stops %llu\n", static_cast<unsigned long long>(sent),
+              elapsed.count(), static_cast<unsigned long long>(outlet.failures()),
               static_cast<unsigned long long>(listener.counts().stops));
   return outlet.failures() == 0 ? 0 : 1;
 }
@@ -91,6 +95,51 @@ int subscribe(const std::string& url, std::int64_t count) {
   // Until nothing has come for 2 s; 20 s for the first.
   while (::poll(&ready, 1, checker.telemetry_count() == 0 ? 20'000 : 2'000) > 0) lcm.handle();
   return checker.verdict(count) ? 0 : 1;
+}
+
+/// Counts telemetry by its sequence numbers, as one who shows or keeps it would.
+class LossCounter : public RunObserver {
+ public:
+  void take(const telemetry_t& message) override {
+    ++received;
+    if (message.sequence < next) return;  // late: counted as lost before
+    lost += message.sequence - next;
+    next = message.sequence + 1;
+  }
+  void take(const status_t& message) override { status = message; }
+  void take(const event_t& /*message*/) override {}
+  void take(const experiment_t& /*message*/) override {}
+  void take_malformed() override { ++malformed; }
+
+  std::int64_t received{0};
+  std::int64_t next{0};
+  std::int64_t lost{0};
+  std::int64_t malformed{0};
+  status_t status{};
+};
+
+/// Until nothing has come for `silence_s`, 30 s for the first.
+int receive(const std::string& url, int silence_s) {
+  LossCounter counter;
+  RunListener listener(url, "ABS_", counter);
+  std::printf("listening\n");
+  std::fflush(stdout);
+  const auto now = [] { return std::chrono::steady_clock::now(); };
+  auto end = now() + std::chrono::seconds(30);
+  while (now() < end) {
+    pollfd ready{listener.file_descriptor(), POLLIN, 0};
+    if (::poll(&ready, 1, 100) > 0 || ready.fd < 0) {
+      const std::int64_t before = counter.received;
+      listener.poll();
+      if (counter.received != before) end = now() + std::chrono::seconds(silence_s);
+    }
+  }
+  std::printf(R"({"received": %lld, "lost": %lld, "malformed": %lld, "run_drops": %lld, "run_failures": %lld})"
+              "\n",
+              static_cast<long long>(counter.received), static_cast<long long>(counter.lost),
+              static_cast<long long>(counter.malformed), static_cast<long long>(counter.status.telemetry_drops),
+              static_cast<long long>(counter.status.publish_failures));
+  return 0;
 }
 
 int check_log(const std::string& path, std::int64_t count) {
@@ -118,11 +167,13 @@ int run(int argc, char** argv) {
     return publish(url_or_path, std::strtoull(argv[3], nullptr, 10), std::atoi(argv[4]), argv[5]);
   }
   if (verb == "subscribe" && argc == 4) return subscribe(url_or_path, std::atoll(argv[3]));
+  if (verb == "receive" && argc == 4) return receive(url_or_path, std::atoi(argv[3]));
   if (verb == "check-log" && argc == 4) return check_log(url_or_path, std::atoll(argv[3]));
   if (verb == "command" && argc == 4) return command(url_or_path, argv[3]);
   std::fprintf(
       stderr,
-      "usage: publish URL COUNT PERIOD_US LOG | subscribe URL COUNT | check-log PATH COUNT | command URL TEXT\n");
+      "usage: publish URL COUNT PERIOD_US LOG | subscribe URL COUNT | receive URL SILENCE_S | check-log PATH COUNT | "
+      "command URL TEXT\n");
   return 2;
 }
 

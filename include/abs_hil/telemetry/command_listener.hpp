@@ -18,6 +18,7 @@
 
 #include "abs_hil/telemetry/lcm_outlet.hpp"
 #include "abs_hil/telemetry/message_stream.hpp"
+#include "abs_hil/telemetry/udpm_receiver.hpp"
 
 namespace abs_hil::telemetry {
 
@@ -41,11 +42,14 @@ class CommandListener {
     std::uint64_t stops{0};
     std::uint64_t refused{0};    ///< well-formed, but unknown or not permitted
     std::uint64_t malformed{0};  ///< garbage, truncated, or of another type
-    std::uint64_t dropped{0};    ///< arrived faster than they could be answered; stops are never among them
+    /// Came faster than they could be answered, stops never among them; and what the kernel dropped of all channels,
+    /// as it came faster than it could be looked at.
+    std::uint64_t dropped{0};
   };
 
   /// Outlet and stream must outlive the listener. `on_stop` is called once for every stop; it must not throw, and after
-  /// listen() it is called in the listening thread. With udpm this process receives its own traffic too.
+  /// listen() it is called in the listening thread. With udpm this process receives its own traffic too, without
+  /// liblcm (udpm_receiver.hpp). Throws LcmError where udpm's group cannot be joined.
   CommandListener(LcmOutlet& outlet, MessageStream& stream, std::function<void()> on_stop);
   CommandListener(const CommandListener&) = delete;
   CommandListener& operator=(const CommandListener&) = delete;
@@ -60,12 +64,13 @@ class CommandListener {
   void poll();
 
   /// False where the provider cannot receive (file://).
-  [[nodiscard]] bool listening() const noexcept { return subscription_ != nullptr; }
+  [[nodiscard]] bool listening() const noexcept { return listening_; }
   [[nodiscard]] bool stop_requested() const noexcept { return stops_.load(std::memory_order_acquire) > 0; }
   [[nodiscard]] Counts counts() const noexcept;
 
  private:
-  static constexpr std::size_t max_packet_bytes = 2048;
+  static constexpr std::size_t max_packet_bytes = UdpmReceiver::payload_max;
+  /// As it came through liblcm.
   struct Packet {
     std::array<std::uint8_t, max_packet_bytes> bytes;
     std::size_t size{0};  ///< as received; larger than `bytes` if it did not fit
@@ -78,10 +83,12 @@ class CommandListener {
   using Arrival = std::variant<Problem, command_t, command2_t>;
 
   static void on_packet(const lcm_recv_buf_t* received, const char* channel, void* self) noexcept;
+  [[nodiscard]] int file_descriptor() noexcept { return udpm_ ? udpm_->file_descriptor() : lcm_get_fileno(lcm_); }
   /// Handles one packet if one is there within `timeout_ms`. False if none came or nothing can be received now.
   bool receive(int timeout_ms);
   void take(std::span<const std::uint8_t> packet);
   void hand_over(Arrival arrival, bool is_stop);
+  void subscribe();
   void listen_until(const std::stop_token& stop);
   void answer(const Arrival& arrival);
   void say(rig::Reason reason, std::string message, std::uint64_t count, bool always);
@@ -90,15 +97,19 @@ class CommandListener {
   MessageStream& stream_;
   std::function<void()> on_stop_;
   CommandJudge judge_;
-  /// Of its own, so that what floods in cannot hold up what goes out; memq:// delivers within one object only.
+  std::optional<UdpmReceiver> udpm_;
+  /// Where it is not udpm. Of its own, so that what floods in cannot hold up what goes out; memq:// delivers within one
+  /// object only.
   std::unique_ptr<lcm::LCM> own_lcm_;
   lcm_t* lcm_{nullptr};
   lcm_subscription_t* subscription_{nullptr};
+  bool listening_{false};
   Packet packet_{};
   std::mutex mutex_;  ///< of the two slow threads
   std::deque<Arrival> arrivals_;
   std::atomic<std::uint64_t> stops_{0};
   std::atomic<std::uint64_t> dropped_{0};
+  std::atomic<std::uint64_t> dropped_by_kernel_{0};
   std::uint64_t stops_answered_{0};
   std::uint64_t refused_{0};
   std::uint64_t malformed_{0};

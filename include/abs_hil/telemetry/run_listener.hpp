@@ -2,6 +2,7 @@
 
 #include <lcm/lcm.h>
 
+#include <chrono>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -36,7 +37,6 @@ class RunListener {
   /// `url`: empty for default_lcm_url(). Throws LcmError when there is no route or LCM does not start, and
   /// std::invalid_argument for a prefix that MessageStream would refuse. `observer` must outlive the listener.
   RunListener(std::string url, const std::string& channel_prefix, RunObserver& observer);
-  ~RunListener();
   RunListener(const RunListener&) = delete;
   RunListener& operator=(const RunListener&) = delete;
 
@@ -52,9 +52,14 @@ class RunListener {
   static void on_packet(const lcm_recv_buf_t* received, const char* channel, void* self) noexcept;
   template <class Message>
   void subscribe(const std::string& channel);
+  void subscribe();
+  /// Of tcpq, once a second at most.
+  void look_for_server();
 
   LcmOutlet network_;
   RunObserver& observer_;
+  std::string prefix_;
+  std::chrono::steady_clock::time_point next_look_{};
   std::vector<lcm_subscription_t*> subscriptions_;
   bool out_of_memory_{false};
 };

@@ -1,0 +1,100 @@
+#include "abs_hil/telemetry/udpm_receiver.hpp"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <system_error>
+#include <utility>
+
+#include "abs_hil/telemetry/lcm_outlet.hpp"
+#include "abs_hil/telemetry/lcm_url.hpp"
+
+namespace abs_hil::telemetry {
+namespace {
+
+constexpr int datagrams_per_look = 256;
+
+/// recv_buf_size of the URL's options, 0 where there is none.
+int wanted_buffer_bytes(std::string_view options) {
+  constexpr std::string_view name = "recv_buf_size=";
+  const std::size_t at = options.find(name);
+  int bytes = 0;
+  if (at == std::string_view::npos) return bytes;
+  const std::string_view digits = options.substr(at + name.size());
+  std::from_chars(digits.data(), digits.data() + digits.size(), bytes);
+  return bytes;
+}
+
+bool set(int socket, int level, int option, int value) {
+  return ::setsockopt(socket, level, option, &value, sizeof value) == 0;
+}
+
+/// True, or errno says what is wrong.
+bool join(int socket, const sockaddr_in& group, int buffer_bytes) {
+  // LCM's own sockets at this port, and others of ours, ask for it too.
+  if (!set(socket, SOL_SOCKET, SO_REUSEADDR, 1)) return false;
+  // Bound to the group: what is sent to this computer's own address does not get here.
+  if (::bind(socket, reinterpret_cast<const sockaddr*>(&group), sizeof group) != 0) return false;
+  ip_mreq membership{};
+  membership.imr_multiaddr = group.sin_addr;
+  membership.imr_interface.s_addr = htonl(INADDR_ANY);
+  if (::setsockopt(socket, IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership, sizeof membership) != 0) return false;
+  // As much as the kernel permits (net.core.rmem_max), and a count of what it drops: without them it works as well.
+  if (buffer_bytes > 0) static_cast<void>(set(socket, SOL_SOCKET, SO_RCVBUF, buffer_bytes));
+  static_cast<void>(set(socket, SOL_SOCKET, SO_RXQ_OVFL, 1));
+  return true;
+}
+
+}  // namespace
+
+UdpmReceiver::UdpmReceiver(const std::string& url, std::string channel) : channel_(std::move(channel)) {
+  const LcmUrl parts = parse_lcm_url(url);
+  const Endpoint endpoint = endpoint_of(parts);
+  sockaddr_in group{};
+  group.sin_family = AF_INET;
+  group.sin_port = htons(endpoint.port);
+  errno = EINVAL;
+  if (::inet_pton(AF_INET, endpoint.address.c_str(), &group.sin_addr) == 1) {
+    socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (socket_ >= 0 && join(socket_, group, wanted_buffer_bytes(parts.options))) return;
+  }
+  const std::string reason = std::generic_category().message(errno);
+  if (socket_ >= 0) ::close(socket_);
+  throw LcmError("commands cannot be received at " + endpoint.address + ":" + std::to_string(endpoint.port) + ": " +
+                 reason);
+}
+
+UdpmReceiver::~UdpmReceiver() { ::close(socket_); }
+
+UdpmReceiver::Arrival UdpmReceiver::next() noexcept {
+  for (int i = 0; i < datagrams_per_look; ++i) {
+    iovec into{datagram_.data(), datagram_.size()};
+    alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(std::uint32_t)) + 64> control{};
+    msghdr message{};
+    message.msg_iov = &into;
+    message.msg_iovlen = 1;
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
+    const ssize_t size = ::recvmsg(socket_, &message, 0);
+    if (size < 0) return {};
+    for (cmsghdr* note = CMSG_FIRSTHDR(&message); note != nullptr; note = CMSG_NXTHDR(&message, note)) {
+      if (note->cmsg_level != SOL_SOCKET || note->cmsg_type != SO_RXQ_OVFL) continue;
+      std::uint32_t seen = 0;
+      std::memcpy(&seen, CMSG_DATA(note), sizeof seen);
+      dropped_ += seen - std::exchange(dropped_seen_, seen);
+    }
+    const LcmPacket packet = look_at(std::span(datagram_).first(static_cast<std::size_t>(size)), channel_);
+    if (packet.kind == LcmPacket::Kind::other) continue;
+    const bool cut = (message.msg_flags & MSG_TRUNC) != 0;
+    const bool too_long = cut || packet.kind == LcmPacket::Kind::fragmented || packet.payload.size() > payload_max;
+    return {.any = true, .too_long = too_long, .payload = packet.payload};
+  }
+  return {};
+}
+
+}  // namespace abs_hil::telemetry
