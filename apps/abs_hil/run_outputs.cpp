@@ -123,6 +123,10 @@ void RunOutputs::watch(experiment::RunSession& session) {
   steering_->count(*commands_);
   commands_->set_judge([this](const command2_t& command) { return steering_->judge(command); });
   commands_->listen();
+  stream_->set_farewell([this] {
+    commands_->poll();
+    steering_->refuse_pending();
+  });
 }
 
 nlohmann::ordered_json RunOutputs::friction_curve_json() const {

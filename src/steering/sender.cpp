@@ -14,6 +14,7 @@
 #include "abs_hil/telemetry/checked_decode.hpp"
 #include "abs_hil/telemetry/lcm_outlet.hpp"
 #include "abs_hil/telemetry/message_codec.hpp"
+#include "abs_hil/telemetry_t.hpp"
 
 namespace abs_hil::steering {
 
@@ -21,6 +22,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds stop_again{50};
+/// A run's slow side ends within this time after its last cycle.
+constexpr std::chrono::seconds last_words{1};
 
 /// Listens to one program's answers.
 class Answers {
@@ -48,6 +51,7 @@ class Answers {
   }
 
   std::optional<event_t> answer{};
+  std::optional<event_t> ending{};  ///< the run's last phase, if it began while we listened
   std::optional<command_state_t> state{};
 
  private:
@@ -57,7 +61,10 @@ class Answers {
   static void on_event(const lcm_recv_buf_t* received, const char* /*channel*/, void* self) {
     auto& answers = *static_cast<Answers*>(self);
     event_t event{};
-    if (!telemetry::decode_checked(bytes(received), event).empty() || event.kind != "command") return;
+    if (!telemetry::decode_checked(bytes(received), event).empty()) return;
+    const bool last_phase = event.phase == telemetry_t::PHASE_STOPPED || event.phase == telemetry_t::PHASE_FAULT;
+    if (last_phase && event.kind != "command") answers.ending = event;
+    if (event.kind != "command") return;
     if (event.message.find('\'' + answers.sender_ + '\'') != std::string::npos) answers.answer = std::move(event);
   }
   static void on_state(const lcm_recv_buf_t* received, const char* /*channel*/, void* self) {
@@ -131,8 +138,14 @@ Reply send(const Order& order, const SenderOptions& options) {
   command.value = order.value;
   command.sender = sender;
   command.mac = mac_of(command, key);
+  answers.ending.reset();  // of a run before
   publish(lcm, channel, command);
-  answers.wait(end, answered);
+  answers.wait(end, [&] { return answered() || answers.ending; });
+  // What ended the run is published before what the end of the run did to a command.
+  if (!answered() && answers.ending) answers.wait(std::min(end, Clock::now() + last_words), answered);
+  if (!answered() && answers.ending) {
+    return {Outcome::refused, "no answer, as the run ended: " + telemetry::printable(answers.ending->message, 200)};
+  }
   return reply_of(answers.answer);
 }
 

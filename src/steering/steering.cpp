@@ -52,6 +52,7 @@ std::optional<telemetry::CommandAnswer> Steering::judge(const command2_t& comman
 telemetry::CommandAnswer Steering::carry_out(const command2_t& command, bool& taken) {
   using rig::Reason;
   if (mailbox_ == nullptr) return {Reason::command_not_now, "the run has not begun"};
+  if (over_) return {Reason::command_not_now, "the run has ended"};
   experiment::Adjustment adjustment;
   Pending pending{.key = {}, .value = command.value, .sender = command.sender};
   if (command.command == "start") {
@@ -85,6 +86,22 @@ void Steering::settle(rig::Reason reason, std::map<std::uint32_t, Pending>::iter
   pending_.erase(pending);
 }
 
+void Steering::refuse_pending() {
+  over_ = true;
+  for (const auto& [number, pending] : pending_) {
+    ++refused_at_end_;
+    const bool start = pending.key == start_name;
+    const std::string what = start ? "start" : fmt::format("{} = {}", pending.key, pending.value);
+    stream_.answer_command(rig::Reason::command_not_now,
+                           fmt::format("refused: {}: the run ended before it could take effect (sender '{}')", what,
+                                       shown(pending.sender)),
+                           pending.value);
+  }
+  pending_.clear();
+  // Those who look at the counts find the last ones, too.
+  if (mailbox_ != nullptr) send_state();
+}
+
 void Steering::consume(const rig::CycleRecord& record, double /*distance_m*/) {
   if (record.reason == rig::Reason::start_command) {
     for (auto it = pending_.begin(); it != pending_.end(); ++it) {
@@ -114,7 +131,7 @@ void Steering::send_state() {
   if (listener_ != nullptr) {
     const telemetry::CommandListener::Counts counts = listener_->counts();
     state.stops = static_cast<std::int64_t>(counts.stops);
-    state.refused = static_cast<std::int64_t>(counts.refused);
+    state.refused = static_cast<std::int64_t>(counts.refused + refused_at_end_);
     state.malformed = static_cast<std::int64_t>(counts.malformed);
     state.dropped = static_cast<std::int64_t>(counts.dropped);
   }

@@ -140,6 +140,36 @@ def not_enabled(folder):
     check(found == 3 and 'no answer' in said, 'nobody there', found, said)
 
 
+def run_ends_meanwhile():
+    """A run, played here, that ends between a command and its answer."""
+    ears = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    ears.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    ears.bind((GROUP, PORT))
+    ears.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(GROUP) + socket.inet_aton('0.0.0.0'))
+    ears.settimeout(0.05)
+    wire, state = Wire(), abs_hil.command_state_t()
+    state.enabled, state.session = True, 'f' * 32
+    sender = subprocess.Popen([PROGRAM, 'send', *KEY, '--timeout', '30', 'slip-ref', '0.2'], stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE, text=True)
+    for _ in range(400):
+        wire.message(b'ABS_COMMAND_STATE', state.encode())
+        try:
+            heard = any(b'ABS_COMMAND\0' in ears.recv(65536) for _ in range(20))
+        except TimeoutError:
+            heard = False
+        if heard:
+            break
+    check(heard, 'the command is sent')
+    end = abs_hil.event_t()
+    end.kind, end.phase, end.message = 'phase', abs_hil.telemetry_t.PHASE_STOPPED, 'brake -> stopped: all done'
+    wire.message(b'ABS_EVENT', end.encode())
+    started = time.monotonic()
+    said = ''.join(sender.communicate(timeout=30))
+    check(sender.returncode == 1 and 'the run ended: brake -> stopped: all done' in said, 'send says that the run ended',
+          sender.returncode, said)
+    check(time.monotonic() - started < 15, 'and does not wait for an answer that cannot come')
+
+
 def stop_latency(folder, tries, flood, judge=statistics.median_low):
     late = []
     for _ in range(tries):
@@ -193,7 +223,7 @@ def garbage(folder):
 
 def main():
     global abs_hil, PROGRAM, KEY
-    PROGRAM, private_network, module = sys.argv[1:4]
+    PROGRAM, private_network, module = map(os.path.abspath, sys.argv[1:4])
     if 'inside' not in sys.argv:
         os.execv(private_network, [private_network, sys.executable, __file__, *sys.argv[1:], 'inside'])
     sys.path.insert(0, module)
@@ -212,6 +242,7 @@ def main():
             return
         live_changes(folder, key)
         not_enabled(folder)
+        run_ends_meanwhile()
         stop_latency(folder, 5, False)
         stop_latency(folder, 3, True)
         garbage(folder)

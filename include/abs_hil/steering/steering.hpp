@@ -32,6 +32,9 @@ class Steering final : public rig::RecordSink {
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
 
+  /// The run is over: refuses what has not taken effect, and all that is put before the judge from now on.
+  void refuse_pending();
+
   [[nodiscard]] bool enabled() const noexcept { return authority_.has_value(); }
 
  private:
@@ -52,7 +55,9 @@ class Steering final : public rig::RecordSink {
   const telemetry::CommandListener* listener_{nullptr};
   std::map<std::uint32_t, Pending> pending_{};
   std::uint64_t accepted_{0};
+  std::uint64_t refused_at_end_{0};
   bool waiting_;
+  bool over_{false};
   double next_state_s_{0.0};
 };
 

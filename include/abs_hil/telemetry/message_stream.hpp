@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "abs_hil/rig/record_sink.hpp"
@@ -46,8 +48,12 @@ class MessageStream : public rig::RecordSink {
   /// `outlet` must outlive the stream. Before the first record.
   void add(Outlet& outlet) { outlets_.push_back(&outlet); }
 
+  /// What has to be said last, after the last record: called once, at the beginning of finish().
+  void set_farewell(std::function<void()> farewell) { farewell_ = std::move(farewell); }
+
   void consume(const rig::CycleRecord& record, double distance_m) override;
-  /// Sends a last ABS_STATUS and finishes every outlet, then throws the first FileError of theirs.
+  /// Sends what the farewell has to say and a last ABS_STATUS, and finishes every outlet, then throws the first
+  /// FileError of theirs.
   void finish() override;
 
   /// An event of kind "command": the answer to a message on ABS_COMMAND.
@@ -95,6 +101,7 @@ class MessageStream : public rig::RecordSink {
   std::uint64_t next_telemetry_cycle_{0};
   double next_status_s_{0.0};
   double next_experiment_s_{0.0};
+  std::function<void()> farewell_;
   bool started_{false};
   bool finished_{false};
 };
