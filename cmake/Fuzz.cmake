@@ -1,4 +1,4 @@
-# abs_hil_fuzz(NAME SOURCES ... USES ...): the fuzz target NAME, a program with LLVMFuzzerTestOneInput. Preset `fuzz`
+# abs_hil_fuzz(NAME SOURCES ... USES ...): the fuzz target NAME, a program with LLVMFuzzerTestOneInput. Preset `asan`
 # (clang) builds it with libFuzzer for scripts/fuzz.sh. Every other build makes a plain program of it that runs the kept
 # corpus, tests/fuzz/corpus/NAME, once through: ctest entry fuzz_corpus_NAME.
 option(ABS_HIL_FUZZ "Build the fuzz targets with libFuzzer (needs clang)" OFF)

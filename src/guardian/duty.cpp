@@ -44,7 +44,8 @@ DutyReport Duty::run() noexcept {
     region_.panel().guardian_beats.store(++beats, std::memory_order_relaxed);
     // What the controller said last, which is final if it is gone.
     sight.stage = region_.stage();
-    sight.cycle_beats = region_.panel().cycle_beats.load(std::memory_order_relaxed);
+    sight.cycle_beats = region_.panel().cycle_beats.load(std::memory_order_relaxed) +
+                        region_.panel().safe_beats.load(std::memory_order_relaxed);
     sight.now_ns = clock_.now_ns();
     const Verdict verdict = sentry_.look(sight);
     if (verdict == Verdict::wait) continue;

@@ -170,7 +170,11 @@ void GuardianProcess::wait_until_ready() {
   notes_ = said.substr(ready_word.size());
 }
 
-void GuardianProcess::making_safe() noexcept { region_.set_stage(Stage::making_safe); }
+void GuardianProcess::making_safe() noexcept {
+  region_.set_stage(Stage::making_safe);
+  // A failed write makes the outputs safe, and the end of the run once more, with no cycle between: each has its time.
+  region_.panel().safe_beats.fetch_add(1, std::memory_order_relaxed);
+}
 
 void GuardianProcess::outputs_released(bool safe) noexcept {
   region_.set_stage(safe ? Stage::released : Stage::handed_over);

@@ -142,3 +142,31 @@ TEST_CASE("reports say who, why and how fast") {
   CHECK_THAT(text, Catch::Matchers::Contains("process 4711") && Catch::Matchers::Contains("reason 163") &&
                        Catch::Matchers::Contains("SIGKILL") && Catch::Matchers::Contains("at try 1"));
 }
+
+TEST_CASE("a controller that makes its board safe twice, a wait each time, has its time for both") {
+  Post post;
+  post.last_cycle_ns = then_ns;
+  post.clock.happens = [&post](std::int64_t now_ns) {
+    auto& panel = post.region.panel();
+    if (now_ns < then_ns) return panel.cycle_beats.store(static_cast<std::uint64_t>(now_ns / ms));
+    if (now_ns > then_ns + 580 * ms) return post.region.set_stage(Stage::closed);
+    post.region.set_stage(Stage::making_safe);
+    panel.safe_beats.store(now_ns < then_ns + 290 * ms ? 1 : 2);
+  };
+  const DutyReport report = post.run();
+  CHECK(report.reason == rig::Reason::none);
+  CHECK_FALSE(report.acted);
+  CHECK(post.story.empty());
+}
+
+TEST_CASE("a controller that never comes back from making its board safe is ended after that board's time") {
+  Post post;
+  post.last_cycle_ns = then_ns;
+  post.stage_at_ns = then_ns;
+  post.stage = Stage::making_safe;
+  const DutyReport report = post.run();
+  CHECK(report.reason == rig::Reason::controller_silent);
+  const std::int64_t allowed_ns = 20 * ms + post.writer.owner_needs_ns();
+  CHECK(report.noticed_ns - then_ns >= allowed_ns - ms);
+  CHECK(report.noticed_ns - then_ns <= allowed_ns + 2 * post.duty.look_period_ns());
+}

@@ -10,7 +10,7 @@ namespace abs_hil::guardian {
 /// What the guardian sees when it looks.
 struct Sight {
   std::int64_t now_ns{0};        ///< its own clock
-  std::uint64_t cycle_beats{0};  ///< 0: no cycle has begun yet
+  std::uint64_t cycle_beats{0};  ///< signs of life of the cycle's thread; 0: no cycle has begun yet
   Stage stage{Stage::guarded};   ///< read before `controller_gone`
   bool controller_gone{false};   ///< the process has ended, all its threads
 };

@@ -11,7 +11,8 @@ namespace abs_hil::runtime {
 /// Signs of life between the cycle and a guardian in another process. Counts, not times: a computer that stood still
 /// as a whole makes nobody look dead. Each word has one writer and a cache line of its own.
 struct WatchPanel {
-  alignas(64) std::atomic<std::uint64_t> cycle_beats{0};     ///< the cycle's thread: one at the start of each cycle
+  alignas(64) std::atomic<std::uint64_t> cycle_beats{0};  ///< the cycle's thread: one at the start of each cycle
+  alignas(64) std::atomic<std::uint64_t> safe_beats{0};   ///< the cycle's thread: one before it makes the outputs safe
   alignas(64) std::atomic<std::uint64_t> guardian_beats{0};  ///< the guardian: one each time it looks
 };
 
