@@ -4,6 +4,7 @@
 #define NCURSES_WIDECHAR 1
 #define NCURSES_NOMACROS 1
 #include <curses.h>
+#include <fcntl.h>
 #include <langinfo.h>
 #include <term.h>
 #include <termios.h>
@@ -98,6 +99,13 @@ Terminal::Terminal() : unicode_(locale_is_utf8()) {
                              "' is not known here; set TERM=vt100, or use --plain");
   }
   rescue.size = 0;
+  // liblcm tells there that it connects, and why it cannot: in the midst of the picture.
+  if (::isatty(STDERR_FILENO) == 1) {
+    const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+    stderr_ = ::fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3);
+    if (nowhere >= 0 && stderr_ >= 0) ::dup2(nowhere, STDERR_FILENO);
+    if (nowhere >= 0) ::close(nowhere);
+  }
   for (const char* capability : {"sgr0", "cnorm", "rmcup"}) append_capability(capability);
   catch_fatal_signals();
   ::cbreak();
@@ -117,6 +125,10 @@ Terminal::Terminal() : unicode_(locale_is_utf8()) {
 
 Terminal::~Terminal() {
   ::endwin();
+  if (stderr_ >= 0) {
+    ::dup2(stderr_, STDERR_FILENO);
+    ::close(stderr_);
+  }
   leave_fatal_signals();
 }
 

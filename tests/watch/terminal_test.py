@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import termios
+import threading
 import time
 
 PROGRAM, PRIVATE_NETWORK, MODULE_DIR = map(os.path.abspath, sys.argv[1:4])
@@ -93,7 +94,7 @@ class Vt100:
 class Watcher:
     """abs_hil watch on a pty."""
 
-    def __init__(self, *arguments, term='vt100', locale='C.UTF-8'):
+    def __init__(self, *arguments, term='vt100', locale='C.UTF-8', stderr_too=False):
         self.master, self.slave = pty.openpty()
         fcntl.ioctl(self.slave, termios.TIOCSWINSZ, struct.pack('HHHH', ROWS, COLUMNS, 0, 0))
         self.before = termios.tcgetattr(self.slave)
@@ -101,7 +102,7 @@ class Watcher:
         self.screen = Vt100()
         self.known = term == 'vt100'
         self.process = subprocess.Popen([PROGRAM, 'watch', *arguments], stdin=self.slave, stdout=self.slave,
-                                        stderr=subprocess.PIPE, start_new_session=True,
+                                        stderr=self.slave if stderr_too else subprocess.PIPE, start_new_session=True,
                                         env={**os.environ, 'TERM': term, 'LC_ALL': locale})
 
     def read(self, seconds):
@@ -221,6 +222,54 @@ def odd_terminals():
     print('ASCII, a small window, an unknown terminal')
 
 
+class TcpqServer:
+    """One subscriber's end of LCM's tcpq server: the first who subscribes gets a message and is hung up on, those who come
+    after get nothing."""
+
+    def __init__(self):
+        self.subscribed = 0
+        self.socket = socket.create_server(('127.0.0.1', 7700))
+        threading.Thread(target=self.serve, daemon=True).start()
+
+    def serve(self):
+        while True:
+            connection, _ = self.socket.accept()
+            threading.Thread(target=self.answer, args=(connection,), daemon=True).start()
+
+    def answer(self, connection):
+        with connection:
+            connection.recv(8)
+            connection.sendall(struct.pack('>II', 0x287617fa, 0x0100))
+            if not connection.recv(4096):
+                return  # it only asked whether there is a server
+            self.subscribed += 1
+            if self.subscribed == 1:
+                message = abs_hil.telemetry_t()
+                message.phase = message.PHASE_ACCELERATE
+                data, channel = message.encode(), b'ABS_TELEMETRY'
+                connection.sendall(struct.pack('>II', 1, len(channel)) + channel + struct.pack('>I', len(data)) + data)
+                time.sleep(0.5)
+                return
+            while connection.recv(4096):
+                pass
+
+
+def tcpq_server_comes_and_goes():
+    server = TcpqServer()
+    watcher = Watcher('--lcm-url', 'tcpq://127.0.0.1:7700', stderr_too=True)
+    watcher.until('accelerate', 10)
+    for _ in range(100):
+        watcher.read(0.1)
+        if server.subscribed == 2:
+            break
+    assert server.subscribed == 2, 'the watcher has not found the server again'
+    watcher.until(r'no messages for [2-9]\.\d s', 10)
+    assert 'LCM' not in watcher.screen.text(), watcher.screen.text()
+    os.write(watcher.master, b'q')
+    watcher.ends(0)
+    print('a tcpq server that hangs up is found again, and says nothing in the picture')
+
+
 def without_terminal():
     def watch(*arguments, **options):
         return subprocess.run([PROGRAM, 'watch', *arguments], capture_output=True, text=True, timeout=60, **options)
@@ -260,6 +309,7 @@ def main():
         watched_run()
         given_back()
         odd_terminals()
+        tcpq_server_comes_and_goes()
         without_terminal()
 
 

@@ -4,8 +4,9 @@
 
 namespace abs_hil::watch {
 
-/// The terminal at stdin and stdout as a screen (ncurses). The destructor gives it back as it was, and so do the
-/// signals that end a program without destructors (SIGQUIT, SIGSEGV, SIGABRT ...). One at a time.
+/// The terminal at stdin and stdout as a screen (ncurses); what libraries write to stderr does not get into it. The
+/// destructor gives it back as it was, and so do the signals that end a program without destructors (SIGQUIT, SIGSEGV,
+/// SIGABRT ...). One at a time.
 class Terminal {
  public:
   /// Throws std::runtime_error when stdin or stdout is no terminal, or of a type (TERM) that nobody knows.
@@ -25,6 +26,7 @@ class Terminal {
 
  private:
   bool unicode_;
+  int stderr_{-1};  ///< kept for later if it is a terminal too
   bool colours_{false};
 };
 
