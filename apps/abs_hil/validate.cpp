@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "abs_hil/plant_sim/plant.hpp"
 #include "abs_hil/script/explain.hpp"
 #include "abs_hil/script/library.hpp"
 #include "abs_hil/script/plan.hpp"
@@ -11,10 +12,13 @@ namespace abs_hil::app {
 int validate(const RunRequest& request) {
   const script::Script& script = *request.script;
   fmt::print("{}", script::explain(script, request.settings));
-  const std::vector<std::string> problems =
-      script::beyond_limits(script::plan(script, request.settings), request.settings);
+  const script::Plan plan = script::plan(script, request.settings);
+  const std::vector<std::string> problems = script::beyond_limits(plan, request.settings);
   for (const std::string& problem : problems) fmt::print(stderr, "abs_hil: {}: {}\n", script.path, problem);
   if (!problems.empty()) return exit_usage;
+  // What only shows when a run is made.
+  static_cast<void>(experiment::Sequence(plan.phases, plan.limits));
+  if (request.settings.backend == "sim") static_cast<void>(plant_sim::Plant(request.settings.plant));
   fmt::print("Within the limits of backend {}, plant {}.{}\n", request.settings.backend, request.settings.plant_name,
              script.events.empty() ? "" : " Its events happen in simulation only: --backend rig refuses it.");
   return exit_completed;
