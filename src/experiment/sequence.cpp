@@ -78,7 +78,7 @@ void Sequence::enter(std::size_t index, const SequenceInput& input) noexcept {
   peak_at_s_ = input.time_s;
 }
 
-bool Sequence::holds(const EndCondition& condition, const SequenceInput& input) const noexcept {
+inline bool Sequence::holds(const EndCondition& condition, const SequenceInput& input) const noexcept {
   const double value = condition.value;
   switch (condition.kind) {
     case EndKind::duration: return input.time_s - entered_at_s_ >= value;
@@ -95,12 +95,16 @@ bool Sequence::holds(const EndCondition& condition, const SequenceInput& input) 
     case EndKind::slip_above: return input.slip >= value;
     case EndKind::slip_below: return input.slip < value;
     case EndKind::distance: return input.distance_m - entered_at_m_ >= value;
-    case EndKind::all: break;
+    case EndKind::all: return all_hold(condition.parts, input);
   }
-  for (const EndCondition& part : condition.parts) {
+  return false;
+}
+
+bool Sequence::all_hold(const std::vector<EndCondition>& parts, const SequenceInput& input) const noexcept {
+  for (const EndCondition& part : parts) {
     if (!holds(part, input)) return false;
   }
-  return !condition.parts.empty();
+  return !parts.empty();
 }
 
 const EndCondition* Sequence::ending(const SequenceInput& input) noexcept {

@@ -143,12 +143,19 @@ class Planner {
                                               script_.at(phase.place), phase.name));
     }
     plan.time_limit_s = time_limit_s(phase, plan);
-    if (phase.brake == BrakeAction::slip_control) {
+    if (phase.brake == BrakeAction::slip_control && !ends_above(settings_.control.v_min_m_s, plan)) {
       // The laws are steep in 1 / v_x: below this speed no script keeps them on.
       plan.ends_on.push_back(
           {EndKind::car_speed_below, settings_.control.v_min_m_s, Reason::slip_control_left_at_low_speed});
     }
     return plan;
+  }
+
+  /// It ends by itself before the car is slower than that.
+  [[nodiscard]] static bool ends_above(double v_min_m_s, const experiment::PhasePlan& plan) {
+    return std::any_of(plan.ends_on.begin(), plan.ends_on.end(), [=](const experiment::EndCondition& end) {
+      return end.kind == EndKind::car_speed_below && end.value >= v_min_m_s;
+    });
   }
 
   [[nodiscard]] double time_limit_s(const PhaseScript& phase, const experiment::PhasePlan& plan) const {

@@ -49,6 +49,21 @@ TEST_CASE("slip control always ends at the least speed for it, whatever the scri
   CHECK(made.phases[0].slip_ref_course.at(1.0) == 0.2);
 }
 
+TEST_CASE("where a phase ends no later by itself, the least speed is not asked for twice") {
+  settings::Settings s;
+  s.experiment.end_speed_m_s = s.control.v_min_m_s = 0.3;
+  CHECK(plan(*find("paper"), s).phases[3].ends_on.size() == 1);
+  s.control.v_min_m_s = 0.4;
+  const auto ends = plan(*find("paper"), s).phases[3].ends_on;
+  REQUIRE(ends.size() == 2);
+  CHECK(ends[1].value == 0.4);
+  // One that asks for more than the speed need not come in time.
+  const Script both = parsed(
+      "[[phase]]\nname = \"a\"\nbrake = \"controller\"\nat_most_s = 3\n"
+      "until.all = [{ car_speed_below_m_s = 1 }, { distance_m = 5 }]\n");
+  CHECK(plan(both, s).phases[0].ends_on.size() == 2);
+}
+
 TEST_CASE("a configuration value out of the range it is used in is refused with its key") {
   settings::Settings s;
   s.experiment.hold_torque_Nm = 1.0;

@@ -115,6 +115,7 @@ class Sequence {
  private:
   [[nodiscard]] const EndCondition* ending(const SequenceInput& input) noexcept;
   [[nodiscard]] bool holds(const EndCondition& condition, const SequenceInput& input) const noexcept;
+  [[nodiscard]] bool all_hold(const std::vector<EndCondition>& parts, const SequenceInput& input) const noexcept;
   void enter(std::size_t index, const SequenceInput& input) noexcept;
   Change end(rig::Phase phase, rig::Reason reason, double value) noexcept;
 
