@@ -4,13 +4,14 @@ namespace abs_hil::telemetry {
 
 std::optional<DetectedEvent> EventDetector::observe(const rig::CycleRecord& record) {
   const bool first = !last_;
-  const bool phase_changed = first || record.phase != last_->phase;
+  // An experiment may have two phases of one kind in a row.
+  const bool phase_changed = first || record.phase != last_->phase || record.phase_index != last_->phase_index;
   // What a command changed is told in the answer to it.
   const bool reason_is_new = record.reason != rig::Reason::none && !rig::is_adjustment(record.reason) &&
                              (first || record.reason != last_->reason);
   const rig::Phase phase_before = first ? record.phase : last_->phase;
   const std::uint64_t records_lost = first ? record.sequence : record.sequence - last_->sequence - 1;
-  last_ = Seen{record.sequence, record.phase, record.reason};
+  last_ = Seen{record.sequence, record.phase, record.phase_index, record.reason};
   if (!phase_changed && !reason_is_new) return std::nullopt;
 
   DetectedEvent event;
@@ -19,7 +20,7 @@ std::optional<DetectedEvent> EventDetector::observe(const rig::CycleRecord& reco
   } else {
     event.kind = phase_changed ? event_kind::phase : event_kind::limit;
   }
-  if (phase_before != record.phase) event.message.append(rig::name_of(phase_before)).append(" -> ");
+  if (phase_changed && !first) event.message.append(rig::name_of(phase_before)).append(" -> ");
   event.message.append(rig::name_of(record.phase));
   if (record.reason != rig::Reason::none) event.message.append(": ").append(rig::description(record.reason));
   // A change may have happened, with its reason, in a record that never arrived.

@@ -35,6 +35,20 @@ TEST_CASE("one event for each change of phase, with its reason") {
   CHECK_FALSE(detector.observe(record(3, Phase::brake)));
 }
 
+TEST_CASE("two phases of one kind in a row are two, for whatever reason the first ended") {
+  EventDetector detector;
+  (void)detector.observe(record(0, Phase::brake, Reason::run_started));
+  rig::CycleRecord next = record(1, Phase::brake, Reason::all_conditions_met);
+  next.phase_index = 1;
+  const auto event = detector.observe(next);
+  REQUIRE(event);
+  CHECK(event->kind == event_kind::phase);
+  CHECK(event->message == "brake -> brake: all conditions that end the phase hold");
+  CHECK_FALSE(detector.observe(next));
+  next.phase_index = 2;
+  CHECK(detector.observe(next)->kind == event_kind::phase);
+}
+
 TEST_CASE("a reason that stays on the records gives one event") {
   EventDetector detector;
   (void)detector.observe(record(0, Phase::brake, Reason::start_speed_given));

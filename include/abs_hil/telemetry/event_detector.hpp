@@ -34,6 +34,7 @@ class EventDetector {
   struct Seen {
     std::uint64_t sequence;
     rig::Phase phase;
+    std::uint16_t phase_index;
     rig::Reason reason;
   };
   std::optional<Seen> last_;
