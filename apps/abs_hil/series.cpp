@@ -29,13 +29,15 @@ using Clock = std::chrono::steady_clock;
 /// How far a series is, on stderr: on a terminal one line that changes, else a line for every tenth of it.
 class Progress {
  public:
-  Progress(std::size_t runs, std::size_t done) : runs_(runs), done_(done), at_start_(done) {}
+  /// @param pause_s  between two runs; 0 where there is none
+  Progress(std::size_t runs, std::size_t done, double pause_s)
+      : runs_(runs), done_(done), at_start_(done), pause_s_(pause_s) {}
 
   /// @param what the run, @param phase where it stands; empty for one that has ended
-  void show(const std::string& what, std::string_view phase) {
+  void show(const std::string& what, std::string_view phase, bool at_once = false) {
     const std::scoped_lock lock(mutex_);
     const auto now = Clock::now();
-    if (!terminal_ || (!phase.empty() && now - shown_ < std::chrono::milliseconds(100))) return;
+    if (!terminal_ || (!phase.empty() && !at_once && now - shown_ < std::chrono::milliseconds(100))) return;
     shown_ = now;
     fmt::print(stderr, "\r\033[K{} of {} runs, {} left; {}{}{}", done_, runs_, left(), what, phase.empty() ? "" : ": ",
                phase);
@@ -52,6 +54,11 @@ class Progress {
     }
     show(what, {});
   }
+  void paused() {
+    const std::scoped_lock lock(mutex_);
+    ++pauses_;
+  }
+  [[nodiscard]] std::size_t done() const noexcept { return done_; }
   void end() const {
     if (terminal_) fmt::print(stderr, "\r\033[K");
   }
@@ -59,14 +66,17 @@ class Progress {
  private:
   [[nodiscard]] std::string left() const {
     if (done_ == at_start_) return "? s";
-    const double spent_s = std::chrono::duration<double>(Clock::now() - start_).count();
-    const double left_s = spent_s / static_cast<double>(done_ - at_start_) * static_cast<double>(runs_ - done_);
+    const double spent_s = std::chrono::duration<double>(Clock::now() - start_).count() - pauses_ * pause_s_;
+    const double runs_s = spent_s / static_cast<double>(done_ - at_start_) * static_cast<double>(runs_ - done_);
+    const double left_s = runs_s + (static_cast<double>(runs_ - at_start_ - 1) - pauses_) * pause_s_;
     return left_s < 90.0 ? fmt::format("{:.0f} s", left_s) : fmt::format("{:.0f} min", left_s / 60.0);
   }
 
   std::size_t runs_;
   std::size_t done_;
   std::size_t at_start_;
+  double pause_s_;
+  int pauses_{0};  ///< that are over
   bool terminal_{isatty(STDERR_FILENO) == 1};
   Clock::time_point start_{Clock::now()};
   Clock::time_point shown_{};
@@ -161,7 +171,8 @@ int run_series(const RunOptions& common, const RunRequest& base) {
     spdlog::info("{} of {} runs are there already", members.size() - left.size(), members.size());
 
   note_signals();
-  Progress progress(members.size(), members.size() - left.size());
+  const double pause_s = base.outputs.fast ? 0.0 : base.script->series.pause_s;
+  Progress progress(members.size(), members.size() - left.size(), pause_s);
   std::atomic<int> interrupted{0};
   const auto one = [&](std::size_t k) {
     if (interrupted != 0 || signalled() != rig::Reason::none) return;
@@ -181,7 +192,10 @@ int run_series(const RunOptions& common, const RunRequest& base) {
     if (status != exit_completed) ++ended_early;
     if (folder) folder->end(i, status == exit_completed ? "completed" : "fault");
     progress.count(what);
-    if (!base.outputs.fast && k + 1 < left.size()) static_cast<void>(pause(base.script->series.pause_s));
+    if (pause_s > 0.0 && k + 1 < left.size()) {
+      progress.show(what, fmt::format("over; pause of {:.6g} s before the next", pause_s), true);
+      if (pause(pause_s)) progress.paused();
+    }
   };
   // In virtual time as many at once as the machine has processors; at the rig one after the other.
   comparison::for_each_index(
@@ -192,9 +206,14 @@ int run_series(const RunOptions& common, const RunRequest& base) {
     outcome.reason = signalled();
     interrupted = status_of(outcome);
   }
-  fmt::print("series {}: {} runs, {} ended early{}{}\n", base.script->name, members.size(), ended_early.load(),
-             interrupted != 0 ? ", interrupted: the same command goes on with it" : "",
-             folder ? ", in " + folder->path().string() : std::string());
+  const std::string where = folder ? ", in " + folder->path().string() : std::string();
+  if (interrupted != 0) {
+    fmt::print("series {}: interrupted with {} of {} runs done, {} ended early{}{}\n", base.script->name,
+               progress.done(), members.size(), ended_early.load(), where,
+               folder ? "; the same command with --out " + folder->path().string() + " goes on" : "");
+  } else {
+    fmt::print("series {}: {} runs, {} ended early{}\n", base.script->name, members.size(), ended_early.load(), where);
+  }
   if (interrupted != 0) return interrupted;
   return ended_early == 0 ? exit_completed : exit_ended_early;
 }

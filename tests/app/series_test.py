@@ -1,6 +1,7 @@
 """Experiment files and series, as users run them."""
 import json
 import os
+import re
 import signal
 import subprocess
 import time
@@ -68,8 +69,9 @@ class Series(ProgramTest):
         program.send_signal(signal.SIGINT)
         words, errors = program.communicate(timeout=30)
         self.assertEqual(program.returncode, 130, errors)
-        self.assertIn('the same command goes on', words)
         done = [run['folder'] for run in self.index(out) if run['status'] == 'completed']
+        self.assertIn(f'interrupted with {len(done)} of 4 runs done, 0 ended early, in {out}', words)
+        self.assertIn(f'the same command with --out {out} goes on', words)
         self.assertTrue(0 < len(done) < 4)
         before = {name: (out / name / 'SHA256SUMS').read_bytes() for name in done}
         result = subprocess.run(command, capture_output=True, text=True, timeout=60)
@@ -87,6 +89,12 @@ class Series(ProgramTest):
         result = self.fast('--experiment', script, '--out', self.folder / 'out')
         self.assertIn('20 of 20 runs', result.stderr)
         self.assertIn('20 runs, 0 ended early', result.stdout)
+
+    def test_the_time_left_counts_the_pauses(self):
+        script = self.script(SHORT + '[series]\nrepeat = 2\npause_s = 3\n')
+        result = self.run_program('--no-lcm', '--rt', 'off', '--experiment', script, '--out', self.folder / 'out')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertGreaterEqual(int(re.search(r'1 of 2 runs, (\d+) s left', result.stderr).group(1)), 3)
 
     def test_a_fault_does_not_stop_the_others(self):
         script = self.script(SHORT + '[vary]\ngate.overspeed_rad_s = [50, 250]\n')
