@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "abs_hil/report/text.hpp"
 #include "run_tables.hpp"
 
@@ -88,7 +90,16 @@ std::string report_page(const PageContents& contents) {
   const std::vector<RunFiles>& runs = *contents.runs;
   const std::vector<RunSurvey>& surveys = *contents.surveys;
   std::string lead = fmt::format("{} run{}", runs.size(), runs.size() == 1 ? "" : "s");
-  if (!runs.front().text("experiment").empty()) lead += ", experiment " + runs.front().text("experiment");
+  std::vector<std::string> experiments;
+  for (const RunFiles& run : runs) {
+    const std::string name = run.text("experiment");
+    if (!name.empty() && std::find(experiments.begin(), experiments.end(), name) == experiments.end()) {
+      experiments.push_back(name);
+    }
+  }
+  if (!experiments.empty()) {
+    lead += fmt::format(", experiment{} {}", experiments.size() == 1 ? "" : "s", fmt::join(experiments, ", "));
+  }
   std::string body = fmt::format("<p class=\"lead\">{}</p>\n", html_escape(lead));
   body += series_sections(contents);
   const std::string metrics = metrics_table(runs, surveys);

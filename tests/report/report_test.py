@@ -31,6 +31,10 @@ class Page(ReportTest):
         self.assertNotIn('script', read.elements)
         self.assertNotIn('://', page.replace('http://www.w3.org/', ''), 'the page must not need a network')
 
+    def test_runs_of_several_experiments_are_named(self):
+        a, b = self.make_run('a'), self.make_run('b', '--experiment', 'brake-step')
+        self.assertIn('3 runs, experiments paper, brake-step</p>', self.page(a, b, a)[0])
+
     def test_the_same_page_twice(self):
         a = self.make_run('a')
         self.assertEqual(self.page(a)[0], self.page(a)[0])
