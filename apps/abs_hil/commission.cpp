@@ -2,12 +2,14 @@
 
 #include <cstdio>
 #include <iostream>
+#include <optional>
 #include <string>
 
 #include "abs_hil/driver/factory.hpp"
 #include "abs_hil/experiment/commissioning.hpp"
 #include "commands.hpp"
 #include "exit_status.hpp"
+#include "run_watch.hpp"
 #include "signals.hpp"
 
 namespace abs_hil::app {
@@ -33,6 +35,42 @@ class Terminal final : public experiment::Dialog {
   }
 };
 
+/// A guardian for each pulse: at other times the outputs are 0 and the program waits for a person, silently.
+class GuardedPulse final : public experiment::PulseGuard {
+ public:
+  GuardedPulse(const RunRequest& request, driver::RigDriver& driver) : request_(request), driver_(driver) {}
+  ~GuardedPulse() override { driver_.tell_before_making_safe(nullptr); }
+
+  void begin() override {
+    if (!wants_guardian(request_)) return;
+    region_.emplace(1);
+    watch_.emplace(region_->panel(), region_->recorder());
+    guardian_.emplace(*region_, guardian::guardian_program(), guardian_brief(request_, {}));
+    guardian_->stand_guard();
+    driver_.tell_before_making_safe(&*guardian_);
+  }
+  [[nodiscard]] bool beat() noexcept override {
+    if (!guardian_) return true;
+    watch_->beat();
+    return guardian_->alive();
+  }
+  void end(bool safe) noexcept override {
+    if (!guardian_) return;
+    driver_.tell_before_making_safe(nullptr);
+    guardian_->outputs_released(safe);
+    static_cast<void>(guardian_->end());
+    guardian_.reset();
+  }
+
+ private:
+  const RunRequest& request_;
+  driver::RigDriver& driver_;
+  // The guardian goes before what it works on.
+  std::optional<guardian::SharedRegion> region_{};
+  std::optional<runtime::CycleWatch> watch_{};
+  std::optional<guardian::GuardianProcess> guardian_{};
+};
+
 }  // namespace
 
 int commission(const RunRequest& request, const experiment::CommissioningOptions& options) {
@@ -43,8 +81,9 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
   note_signals();
   terminal.tell(
       "Commissioning, in four steps, each asked for first. docs/rig-setup.md says what must be done before.\n"
-      "The E-stop cuts the drive only, not the brake. If this program dies, the PWMs are assumed to hold.");
-  experiment::Commissioning commissioning(*driver, clock, terminal, options,
+      "The E-stop cuts the drive only, not the brake. A guardian stands by during each pulse (docs/dead-man.md).");
+  GuardedPulse guard(request, *driver);
+  experiment::Commissioning commissioning(*driver, clock, terminal, guard, options,
                                           [] { return signalled() != rig::Reason::none; });
   switch (commissioning.run()) {
     case experiment::CommissioningResult::passed:

@@ -41,22 +41,25 @@ bool wants_guardian(const RunRequest& request) {
   return request.settings.backend == "rig" && !request.outputs.fast && request.settings.guardian.enabled;
 }
 
+std::string guardian_brief(const RunRequest& request, const std::filesystem::path& record_prefix) {
+  const settings::Settings& s = request.settings;
+  return to_json(guardian::Brief{.config_json = request.config_json,
+                                 .experiment = s.experiment.name,
+                                 .controller = s.control.controller,
+                                 .plant = s.plant_name,
+                                 .backend = s.backend,
+                                 .version = ABS_HIL_VERSION,
+                                 .realtime = name_of(s.realtime.mode),
+                                 .record_prefix = record_prefix.string()});
+}
+
 RunWatch::RunWatch(const RunRequest& request, std::filesystem::path record_prefix)
     : record_prefix_(std::move(record_prefix)),
       region_(runtime::FlightRing::slots_for(recorded_s, request.settings.control.rate_Hz)),
       cycle_watch_(region_.panel(), region_.recorder(),
                    wants_guardian(request) ? silent_cycles_max(request.settings) : 0) {
   if (!wants_guardian(request)) return;
-  const settings::Settings& s = request.settings;
-  guardian_.emplace(region_, guardian::guardian_program(),
-                    to_json(guardian::Brief{.config_json = request.config_json,
-                                            .experiment = s.experiment.name,
-                                            .controller = s.control.controller,
-                                            .plant = s.plant_name,
-                                            .backend = s.backend,
-                                            .version = ABS_HIL_VERSION,
-                                            .realtime = name_of(s.realtime.mode),
-                                            .record_prefix = record_prefix_.string()}));
+  guardian_.emplace(region_, guardian::guardian_program(), guardian_brief(request, record_prefix_));
 }
 
 void RunWatch::watch(experiment::RunSession& session) {

@@ -14,6 +14,9 @@ namespace abs_hil::app {
 /// Whether a run needs a guardian: in real time on a board. In simulation and in virtual time nothing real moves.
 [[nodiscard]] bool wants_guardian(const RunRequest& request);
 
+/// What the guardian of a run is told, as JSON.
+[[nodiscard]] std::string guardian_brief(const RunRequest& request, const std::filesystem::path& record_prefix);
+
 /// Who watches over a run: the flight recorder always, the guardian beside a run in real time on a board.
 class RunWatch {
  public:

@@ -47,9 +47,14 @@ class SafeAtEnd {
 
 }  // namespace
 
-Commissioning::Commissioning(driver::RigDriver& driver, runtime::Clock& clock, Dialog& dialog,
+Commissioning::Commissioning(driver::RigDriver& driver, runtime::Clock& clock, Dialog& dialog, PulseGuard& guard,
                              const CommissioningOptions& options, std::function<bool()> stop_requested)
-    : driver_(driver), clock_(clock), dialog_(dialog), options_(options), stop_requested_(std::move(stop_requested)) {
+    : driver_(driver),
+      clock_(clock),
+      dialog_(dialog),
+      guard_(guard),
+      options_(options),
+      stop_requested_(std::move(stop_requested)) {
   require(options.drive_duty > 0.0 && options.drive_duty <= 0.3, "drive duty", options.drive_duty, "(0, 0.3]");
   require(options.drive_pulse_s > 0.0 && options.drive_pulse_s <= 1.0, "drive pulse", options.drive_pulse_s,
           "(0, 1] s");
@@ -147,24 +152,35 @@ CommissioningResult Commissioning::turn_by_hand() {
   return CommissioningResult::passed;
 }
 
+bool Commissioning::drive(const rig::Command& command, std::int64_t end_ns) {
+  rig::Measurement now;
+  for (std::int64_t tick_ns = clock_.now_ns(); tick_ns < end_ns && !stop_requested_(); tick_ns += cycle_ns) {
+    clock_.sleep_until(tick_ns);
+    if (!guard_.beat()) {
+      dialog_.tell("FAILED: the guardian has died: the pulse was cut short");
+      return false;
+    }
+    if (!read(now)) return false;
+    if (clock_.now_ns() >= end_ns) break;
+    if (const driver::IoResult result = driver_.write(command); !result.ok()) {
+      dialog_.tell("FAILED: writing to the board: " + driver::error_text(result));
+      return false;
+    }
+  }
+  return true;
+}
+
 bool Commissioning::pulse(const rig::Command& command, double duration_s, Travel& travel) {
   rig::Measurement first;
   rig::Measurement now;
-  if (!read(first)) return false;
-  const std::int64_t start_ns = clock_.now_ns();
-  const std::int64_t end_ns = start_ns + std::llround(duration_s / s_per_ns);
-  bool good = true;
-  for (std::int64_t tick_ns = start_ns; good && tick_ns < end_ns && !stop_requested_(); tick_ns += cycle_ns) {
-    clock_.sleep_until(tick_ns);
-    good = read(now);
-    if (!good || clock_.now_ns() >= end_ns) break;
-    if (const driver::IoResult result = driver_.write(command); !result.ok()) {
-      dialog_.tell("FAILED: writing to the board: " + driver::error_text(result));
-      good = false;
-    }
-  }
-  if (const driver::IoResult result = driver_.write(rig::safe_command); good && !result.ok()) {
-    dialog_.tell("FAILED: ending the pulse: " + driver::error_text(result));
+  guard_.begin();
+  bool good = read(first) && drive(command, clock_.now_ns() + std::llround(duration_s / s_per_ns));
+  // A driver that failed has made its outputs safe, and tells how that went once more.
+  const driver::IoResult ended =
+      driver_.state() == driver::DriverState::active ? driver_.write(rig::safe_command) : driver_.deactivate();
+  guard_.end(ended.ok());
+  if (good && !ended.ok()) {
+    dialog_.tell("FAILED: ending the pulse: " + driver::error_text(ended));
     good = false;
   }
   if (!good || !read(now)) return false;

@@ -128,7 +128,9 @@ class RigFailures(RigTest):
 
     def test_commission_by_hand(self):
         emulator = self.emulator()
-        arguments = [self.program_path(), 'commission', '--set', f'driver.pci.root={emulator.root}']
+        # A guardian patient with this computer's pauses.
+        arguments = [self.program_path(), 'commission', '--set', f'driver.pci.root={emulator.root}', '--set',
+                     'guardian.timeout_ms=1000']
         program = subprocess.Popen(arguments, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                    text=True, bufsize=1)
         said = ''
@@ -146,6 +148,34 @@ class RigFailures(RigTest):
         self.assertIn('bitstream version', said)
         self.assertIn('All four steps passed', said)
         self.assertEqual(emulator.wire(), SAFE)
+
+    def test_commissioning_that_dies_in_its_pulse_leaves_nothing_driven(self):
+        for number in (signal.SIGKILL, signal.SIGSTOP):
+            with self.subTest(number.name):
+                emulator = self.emulator()
+                program = subprocess.Popen(
+                    [self.program_path(), 'commission', '--set', f'driver.pci.root={emulator.root}', '--set',
+                     'guardian.timeout_ms=500'], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                    text=True, bufsize=1)
+                self._programs.append(program)
+                while line := program.stdout.readline():
+                    if '[y/N]' in line:
+                        program.stdin.write('y\n')
+                        if 'Step 3' in line:
+                            break
+                    elif line.startswith('Turn the '):
+                        emulator.turn('upper' if 'UPPER' in line else 'lower', 0.5)
+                        program.stdin.write('\n')
+                deadline = time.monotonic() + 20
+                while emulator.wire()[0] == 0.0:
+                    self.assertLess(time.monotonic(), deadline, 'no pulse')
+                program.send_signal(number)
+                while emulator.wire() != SAFE:
+                    self.assertLess(time.monotonic(), deadline, 'the outputs hold')
+                program.kill()
+                program.communicate(timeout=20)
+                self.assertEqual(emulator.wire(), SAFE)
+                emulator.end()
 
     def program_path(self):
         from program import PROGRAM

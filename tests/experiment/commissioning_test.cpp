@@ -37,6 +37,32 @@ class Person final : public experiment::Dialog {
   std::function<void()> before_answer{[] {}};
 };
 
+/// Writes down what it is told, beside the outputs at that moment.
+class Guard final : public experiment::PulseGuard {
+ public:
+  explicit Guard(const test::ModelCard& card) : card_(card) {}
+  void begin() override {
+    ++begun;
+    acting = true;
+    CHECK(card_.model.outputs().drive_duty == 0.0);
+    if (refuses) throw driver::Unavailable("no guardian");
+  }
+  [[nodiscard]] bool beat() noexcept override { return ++beats != dies_at; }
+  void end(bool safe) noexcept override {
+    acting = false;
+    ended_safe += safe ? 1 : 0;
+  }
+  int begun{0};
+  int beats{0};
+  int dies_at{0};
+  int ended_safe{0};
+  bool acting{false};
+  bool refuses{false};
+
+ private:
+  const test::ModelCard& card_;
+};
+
 struct Lab {
   explicit Lab(const driver::pci::PciOptions& options = {}) : driver(options, card.opener()) {
     person.turn = [this](bool upper) { card.model.turn_by_hand(upper, 0.5); };
@@ -48,13 +74,14 @@ struct Lab {
     };
   }
   CommissioningResult run() {
-    return experiment::Commissioning(driver, clock, person, {}, [this] { return stop; }).run();
+    return experiment::Commissioning(driver, clock, person, guard, {}, [this] { return stop; }).run();
   }
 
   test::ModelCard card{};
   driver::pci::PciDriver driver;
   runtime::VirtualClock clock{};
   Person person{};
+  Guard guard{card};
   bool stop{false};
 };
 
@@ -77,6 +104,27 @@ TEST_CASE("A good rig passes all four steps, each asked for, and is safe after")
   CHECK(lab.card.model.outputs().brake_duty == 0.0);
   CHECK(lab.driver.state() == driver::DriverState::inactive);
   CHECK(largest_width(lab.card) <= 0.5 + 1.0 / 4095.0);  // the brake's pulse is the largest
+}
+
+TEST_CASE("Each pulse has its guard, from before it until the outputs are 0 again") {
+  Lab lab;
+  CHECK(lab.run() == CommissioningResult::passed);
+  CHECK(lab.guard.begun == 2);
+  CHECK(lab.guard.ended_safe == 2);
+  CHECK(lab.guard.beats >= 600);  // once a millisecond
+
+  Lab dying;
+  dying.guard.dies_at = 50;
+  CHECK(dying.run() == CommissioningResult::failed);
+  CHECK_THAT(dying.person.said, Contains("the guardian has died"));
+  CHECK(dying.guard.beats == 50);
+  CHECK(dying.guard.ended_safe == 1);
+  CHECK(dying.card.model.outputs().drive_duty == 0.0);
+
+  Lab alone;
+  alone.guard.refuses = true;
+  CHECK_THROWS_AS(alone.run(), driver::Unavailable);
+  CHECK(largest_width(alone.card) == 0.0);
 }
 
 TEST_CASE("A no ends it there: before the second step nothing was written, before the third nothing but zeros") {
@@ -155,10 +203,10 @@ TEST_CASE("A tripped interlock and a request to stop end a pulse at once") {
 
 TEST_CASE("Pulses that could run away are refused") {
   Lab lab;
-  CHECK_THROWS_AS(
-      experiment::Commissioning(lab.driver, lab.clock, lab.person, {.drive_duty = 0.31}, [] { return false; }),
-      std::invalid_argument);
-  CHECK_THROWS_AS(
-      experiment::Commissioning(lab.driver, lab.clock, lab.person, {.brake_duty = 0.71}, [] { return false; }),
-      std::invalid_argument);
+  CHECK_THROWS_AS(experiment::Commissioning(lab.driver, lab.clock, lab.person, lab.guard, {.drive_duty = 0.31},
+                                            [] { return false; }),
+                  std::invalid_argument);
+  CHECK_THROWS_AS(experiment::Commissioning(lab.driver, lab.clock, lab.person, lab.guard, {.brake_duty = 0.71},
+                                            [] { return false; }),
+                  std::invalid_argument);
 }
