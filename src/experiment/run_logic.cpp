@@ -32,7 +32,8 @@ RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig
   return {.control = control,
           .rig = rig,
           .controller = control::make_controller(control.controller, {control, rig}),
-          .sequence = Sequence(std::move(plans), limits),
+          .sequence = Sequence(std::move(plans), limits,
+                               {.duty = experiment.stop_brake_duty, .limit_s = experiment.stop_brake_limit_s}),
           .ideal_actuator = ideal_actuator,
           .max_brake_duty = gate.brake_duty_max,
           .start_speed_rad_s = experiment.start_speed_rad_s};

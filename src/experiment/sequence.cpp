@@ -48,8 +48,14 @@ void check_safe(const PhasePlan& plan, const std::string& name) {
 }
 }  // namespace
 
-Sequence::Sequence(std::vector<PhasePlan> plans, const SequenceLimits& limits)
-    : plans_(std::move(plans)), limits_(limits) {
+Sequence::Sequence(std::vector<PhasePlan> plans, const SequenceLimits& limits, const StopBrake& stop_brake)
+    : plans_(std::move(plans)),
+      limits_(limits),
+      stop_plan_{.phase = rig::Phase::hold,
+                 .brake = stop_brake.duty > 0.0 ? BrakeAction::duty : BrakeAction::released,
+                 .brake_duty = stop_brake.duty,
+                 .time_limit_s = stop_brake.limit_s} {
+  check_safe(stop_plan_, "after a stop request");
   if (plans_.empty()) throw std::invalid_argument("a sequence needs at least one phase");
   for (const PhasePlan& plan : plans_) {
     const std::string name(rig::name_of(plan.phase));
@@ -66,6 +72,7 @@ runtime::PhasePermissions Sequence::permissions() const noexcept {
     may.brake = may.brake || plan.brake != BrakeAction::released;
     may.together = may.together || plan.motor_with_brake;
   }
+  if (stop_plan_.brake == BrakeAction::duty) permissions[static_cast<std::size_t>(stop_plan_.phase)].brake = true;
   return permissions;
 }
 
@@ -124,12 +131,21 @@ Sequence::Change Sequence::end(rig::Phase phase, rig::Reason reason, double valu
   return {true, reason, value};
 }
 
+Sequence::Change Sequence::stop(const SequenceInput& input) noexcept {
+  const bool brakes = stop_plan_.brake == BrakeAction::duty && started_ && !input.stands_still;
+  const bool in_time = !stopping_ || input.time_s - entered_at_s_ < stop_plan_.time_limit_s;
+  if (!brakes || !in_time) return end(rig::Phase::stopped, early_reason_, early_value_);
+  if (stopping_) return {};
+  enter(index_, input);
+  stopping_ = true;
+  return {true, early_reason_, early_value_};
+}
+
 Sequence::Change Sequence::update(const SequenceInput& input) noexcept {
   if (ended_) return {};
   now_s_ = input.time_s;
   if (early_reason_ != rig::Reason::none) {
-    const bool stop = rig::is_stop_request(early_reason_);
-    return end(stop ? rig::Phase::stopped : rig::Phase::fault, early_reason_, early_value_);
+    return rig::is_stop_request(early_reason_) ? stop(input) : end(rig::Phase::fault, early_reason_, early_value_);
   }
   if (!started_) {
     enter(0, input);
@@ -152,7 +168,7 @@ Sequence::Change Sequence::update(const SequenceInput& input) noexcept {
 }
 
 void Sequence::end_early(rig::Reason reason, double value) noexcept {
-  if (early_reason_ != rig::Reason::none) return;
+  if (early_reason_ != rig::Reason::none && !(stopping_ && rig::is_fault(reason))) return;
   early_reason_ = reason;
   early_value_ = value;
 }

@@ -202,8 +202,9 @@ std::vector<RerunCycle> rerun(const RecordedRun& run, const settings::Settings& 
 
 bool ended_from_outside(const RecordedRun& run, std::size_t n, WheelFaults faults) noexcept {
   const telemetry_t& cycle = run.cycles[n];
-  if (cycle.phase != telemetry_t::PHASE_STOPPED && cycle.phase != telemetry_t::PHASE_FAULT) return false;
   const auto reason = static_cast<rig::Reason>(cycle.reason);
+  if (rig::is_stop_request(reason)) return true;  // the brake for a stop may act first
+  if (cycle.phase != telemetry_t::PHASE_STOPPED && cycle.phase != telemetry_t::PHASE_FAULT) return false;
   switch (reason) {
     // Found by sequence, gate or logic from the measurements.
     case rig::Reason::phase_time_limit:
@@ -233,7 +234,7 @@ bool ended_from_outside(const RecordedRun& run, std::size_t n, WheelFaults fault
     case rig::Reason::speed_rises_with_motor_off:
     case rig::Reason::motor_no_response:
     case rig::Reason::brake_no_response: return faults == WheelFaults::as_recorded;
-    default: return rig::is_fault(reason) || rig::is_stop_request(reason);
+    default: return rig::is_fault(reason);
   }
 }
 

@@ -281,6 +281,9 @@ void add_experiment_keys(std::vector<Key>& keys, experiment::ExperimentOptions& 
           {"experiment.accelerate_limit_s", "s", "time limit of acceleration", &e.accelerate_limit_s, positive(600)},
           {"experiment.brake_limit_s", "s", "time limit of braking", &e.brake_limit_s, positive(600)},
           {"experiment.hold_limit_s", "s", "time limit of holding", &e.hold_limit_s, positive(600)},
+          {"experiment.stop_brake_duty", "", "brake PWM from a stop request to standstill; 0: released at once",
+           &e.stop_brake_duty, from_zero(1)},
+          {"experiment.stop_brake_limit_s", "s", "... but no longer than this", &e.stop_brake_limit_s, positive(60)},
       });
 }
 

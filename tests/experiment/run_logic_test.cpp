@@ -96,3 +96,30 @@ TEST_CASE("controllers see accelerations: the observers', or the mean over the p
     CHECK_THAT(seen.alpha2_rad_s2, Catch::Matchers::WithinAbs(-70.0, ideal ? 1e-6 : 5.0));
   }
 }
+
+TEST_CASE("the brake for a stop request acts within the gate's cap, until standstill, and is released at the end") {
+  Setup setup;
+  setup.experiment.stop_brake_duty = 0.9;
+  setup.gate.brake_duty_max = 0.7;
+  // Asked for after a second of acceleration.
+  const Result result = run(setup, [] { return rig::Reason::terminate_signal; });
+  CHECK(result.outcome.reason == rig::Reason::terminate_signal);
+  CHECK(result.outcome.safe_state.ok());
+  const auto braking = result.in_phase(rig::Phase::hold);
+  REQUIRE(braking.size() > 100);
+  CHECK(braking.front().reason == rig::Reason::terminate_signal);
+  CHECK(braking.front().truth.speeds.omega2_rad_s > 20.0);
+  for (const rig::CycleRecord& record : braking) {
+    CHECK(record.command.motor_duty == 0.0);
+    CHECK(record.command.brake_duty == 0.7);
+  }
+  const rig::CycleRecord& last = result.records.back();
+  CHECK(last.phase == rig::Phase::stopped);
+  CHECK(last.command.brake_duty == 0.0);
+  CHECK(last.truth.speeds.omega2_rad_s < 0.5);
+
+  setup.experiment.stop_brake_limit_s = 0.2;
+  CHECK(run(setup, [] { return rig::Reason::terminate_signal; }).in_phase(rig::Phase::hold).size() == 200);
+  setup.experiment.stop_brake_duty = 0.0;
+  CHECK(run(setup, [] { return rig::Reason::terminate_signal; }).in_phase(rig::Phase::hold).empty());
+}

@@ -2,6 +2,7 @@
 
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "catch.hpp"
 
@@ -129,6 +130,66 @@ TEST_CASE("ending early: a stop request stops, a fault faults, and the first rea
     CHECK(sequence.current().motor_duty == 0.0);
     CHECK(sequence.finished());
   }
+}
+
+TEST_CASE("a stop request may brake first: motor off, until standstill, for its time, and a fault ends that at once") {
+  const auto stopping = [](StopBrake brake, Reason reason) {
+    Sequence sequence({{.phase = Phase::accelerate,
+                        .motor_duty = 0.8,
+                        .ends_on = {{EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached}},
+                        .time_limit_s = 5.0}},
+                      {}, brake);
+    CHECK(sequence.permissions()[static_cast<std::size_t>(Phase::hold)].brake == (brake.duty > 0.0));
+    sequence.update(at(0.0));
+    sequence.end_early(reason, 0.0);
+    return sequence;
+  };
+  SequenceInput standing = at(1.5);
+  standing.stands_still = true;
+  {
+    Sequence sequence = stopping({.duty = 0.6, .limit_s = 2.0}, Reason::interrupt_signal);
+    const Sequence::Change begun = sequence.update(at(1.0, 50.0));
+    CHECK(begun.entered);
+    CHECK(begun.reason == Reason::interrupt_signal);
+    CHECK(sequence.current().phase == Phase::hold);
+    CHECK(sequence.current().motor_duty_at(0.0) == 0.0);
+    CHECK(sequence.current().brake_duty_at(0.0) == 0.6);
+    sequence.end_early(Reason::terminate_signal, 0.0);  // asked again
+    CHECK_FALSE(sequence.update(at(2.9, 50.0)).entered);
+    CHECK_FALSE(sequence.finished());
+    CHECK(sequence.update(at(3.0, 50.0)).reason == Reason::interrupt_signal);  // its 2 s are over
+    CHECK(sequence.finished());
+    CHECK(sequence.current().brake == BrakeAction::released);
+    CHECK(sequence.current().phase == Phase::stopped);
+  }
+  {
+    Sequence sequence = stopping({.duty = 0.6}, Reason::stop_command);
+    sequence.update(at(1.0, 50.0));
+    CHECK(sequence.update(standing).reason == Reason::stop_command);
+    CHECK(sequence.finished());
+  }
+  {
+    Sequence sequence = stopping({.duty = 0.6}, Reason::hangup_signal);
+    sequence.update(at(1.0, 50.0));
+    sequence.end_early(Reason::driver_read_failed, 8.0);
+    CHECK(sequence.update(at(1.001, 50.0)).reason == Reason::driver_read_failed);
+    CHECK(sequence.current().phase == Phase::fault);
+    CHECK(sequence.current().brake == BrakeAction::released);
+  }
+  {
+    Sequence sequence = stopping({.duty = 0.6}, Reason::interrupt_signal);
+    sequence.update(standing);  // nothing turns
+    CHECK(sequence.finished());
+  }
+  for (const auto& [brake, reason] :
+       {std::pair(StopBrake{}, Reason::interrupt_signal), std::pair(StopBrake{.duty = 0.6}, Reason::guardian_died)}) {
+    Sequence sequence = stopping(brake, reason);
+    sequence.update(at(1.0, 50.0));
+    CHECK(sequence.finished());
+  }
+  CHECK_THROWS_WITH(stopping({.duty = 1.2}, Reason::none),
+                    Catch::Matchers::Contains("after a stop request: brake duty"));
+  CHECK_THROWS_AS(stopping({.duty = 0.6, .limit_s = 0.0}, Reason::none), std::invalid_argument);
 }
 
 TEST_CASE("plans that could never end are refused") {

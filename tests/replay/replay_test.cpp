@@ -99,6 +99,7 @@ TEST_CASE("ideal sensors, ideal actuator, faults and stop requests come out agai
       {{"experiment.brake_limit_s=0.5"}},                                   // phase_time_limit
       {{"gate.overspeed_rad_s=99"}},                                        // overspeed, found by the gate
       {{"experiment.brake_limit_s=30"}, 1, rig::Reason::interrupt_signal},  // from outside, after 1000 cycles
+      {{"experiment.brake_limit_s=30", "experiment.stop_brake_duty=0.5"}, 1, rig::Reason::interrupt_signal},
       {{"plant.friction_profile=braking time: 1; 0.5 at 0.3"}},
   };
   for (const Recipe& recipe : recipes) {

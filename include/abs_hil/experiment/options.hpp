@@ -21,6 +21,8 @@ struct ExperimentOptions {
   double accelerate_limit_s{20.0};  ///< time limits: a phase that lasts longer is a fault, > 0
   double brake_limit_s{30.0};
   double hold_limit_s{30.0};
+  double stop_brake_duty{0.0};     ///< brake PWM after a stop request, until standstill, in [0, 1]; 0: released at once
+  double stop_brake_limit_s{5.0};  ///< ... but no longer than this, > 0
 };
 
 }  // namespace abs_hil::experiment

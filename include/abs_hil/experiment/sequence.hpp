@@ -73,6 +73,12 @@ struct SequenceLimits {
   double distance_m{std::numeric_limits<double>::infinity()};  ///< that the car comes since the run began
 };
 
+/// The brake after a stop request: motor off, this duty until standstill, then released.
+struct StopBrake {
+  double duty{0.0};     ///< in [0, 1]; 0: the run ends at once
+  double limit_s{5.0};  ///< the longest, > 0
+};
+
 /// What the sequence looks at in each cycle.
 struct SequenceInput {
   double time_s{0.0};  ///< since the start of the run, never decreasing
@@ -89,7 +95,7 @@ class Sequence {
  public:
   /// Throws std::invalid_argument for an empty list and for an unsafe phase: without an end or a finite time limit,
   /// with a duty or torque outside its range, with motor and brake together that does not say `motor_with_brake`.
-  explicit Sequence(std::vector<PhasePlan> plans, const SequenceLimits& limits = {});
+  explicit Sequence(std::vector<PhasePlan> plans, const SequenceLimits& limits = {}, const StopBrake& stop_brake = {});
 
   struct Change {
     bool entered{false};  ///< a phase begins in this cycle
@@ -98,14 +104,18 @@ class Sequence {
   };
   /// Enters the first phase on the first call, afterwards the next one as soon as an end condition holds.
   Change update(const SequenceInput& input) noexcept;
-  /// Leaves the plans for the phase `stopped` (stop request) or `fault`, for one last cycle. The first reason stays.
+  /// Leaves the plans for the phase `stopped` (stop request) or `fault`, for one last cycle. With a brake for it a stop
+  /// request leads through the phase `hold` first. The first reason stays, but for a fault in that phase.
   void end_early(rig::Reason reason, double value) noexcept;
 
   /// What the plans let act in each phase.
   [[nodiscard]] runtime::PhasePermissions permissions() const noexcept;
   /// The phase that acts in this cycle.
-  [[nodiscard]] const PhasePlan& current() const noexcept { return ended_ ? last_ : plans_[index_]; }
-  /// Its place among the plans, from 0.
+  [[nodiscard]] const PhasePlan& current() const noexcept {
+    if (ended_) return last_;
+    return stopping_ ? stop_plan_ : plans_[index_];
+  }
+  /// Its place among the plans, from 0; after a stop request that of the one which it interrupted.
   [[nodiscard]] std::size_t index() const noexcept { return index_; }
   /// How long it has acted, s.
   [[nodiscard]] double phase_time_s() const noexcept { return now_s_ - entered_at_s_; }
@@ -117,13 +127,16 @@ class Sequence {
   [[nodiscard]] bool holds(const EndCondition& condition, const SequenceInput& input) const noexcept;
   [[nodiscard]] bool all_hold(const std::vector<EndCondition>& parts, const SequenceInput& input) const noexcept;
   void enter(std::size_t index, const SequenceInput& input) noexcept;
+  Change stop(const SequenceInput& input) noexcept;
   Change end(rig::Phase phase, rig::Reason reason, double value) noexcept;
 
   std::vector<PhasePlan> plans_;
   SequenceLimits limits_;
+  PhasePlan stop_plan_;
   PhasePlan last_{};
   std::size_t index_{0};
   bool started_{false};
+  bool stopping_{false};  ///< the brake for a stop acts
   bool ended_{false};
   rig::Reason early_reason_{rig::Reason::none};
   double early_value_{0.0};

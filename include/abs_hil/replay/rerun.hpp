@@ -32,7 +32,8 @@ enum class WheelFaults : std::uint8_t {
 /// wheels are found again.
 [[nodiscard]] std::vector<RerunCycle> rerun_simulation(const RecordedRun& run, const settings::Settings& settings);
 
-/// True if cycle `n` ended the run for a reason that a rerun cannot find by itself and takes from the recording.
+/// True if in cycle `n` the run came, or began to come, to an end for a reason that a rerun cannot find by itself and
+/// takes from the recording.
 [[nodiscard]] bool ended_from_outside(const RecordedRun& run, std::size_t n, WheelFaults faults) noexcept;
 
 }  // namespace abs_hil::replay
