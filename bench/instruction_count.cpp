@@ -3,8 +3,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <vector>
 
 #include "abs_hil/driver/sim/sim_driver.hpp"
+#include "abs_hil/runtime/cycle_watch.hpp"
 #include "abs_hil/runtime/cyclic_executive.hpp"
 #include "experiment/simulated_run.hpp"
 
@@ -29,6 +31,14 @@ extern "C" {
   return ring.push(record);
 }
 
+/// Sign of life, a look for the guardian's, and the flight recorder.
+[[gnu::noinline]] bool counted_watchers(runtime::CycleWatch& watch, const rig::CycleRecord& record) {
+  watch.beat();
+  const bool lost = watch.guardian_lost();
+  watch.keep(record);
+  return lost;
+}
+
 [[gnu::noinline]] void counted_statistics(runtime::CycleStatistics& statistics, const rig::CycleTiming& timing) {
   statistics.add(timing);
 }
@@ -44,6 +54,10 @@ int main() {
   experiment::RunLogic logic(experiment::test::logic_parts(setup));
   runtime::CommandGate gate = logic.make_gate(setup.gate);
   runtime::RecordRing ring(64);
+  std::vector<runtime::FlightSlot> slots(2000);
+  runtime::FlightRing recorder(slots);
+  runtime::WatchPanel panel;
+  runtime::CycleWatch watch(panel, recorder, 1'000'000);
   const auto statistics = std::make_unique<runtime::CycleStatistics>();
 
   rig::Measurement measurement;
@@ -59,6 +73,7 @@ int main() {
     record.timing = {.wakeup_latency_ns = 20'000, .read_ns = 3'000, .control_ns = 1'000, .write_ns = 500};
     counted_statistics(*statistics, record.timing);
     if (!counted_ring_push(ring, record)) return EXIT_FAILURE;
+    if (counted_watchers(watch, record)) return EXIT_FAILURE;
     ring.pop(taken);
   }
   std::printf("%d\n", cycles);

@@ -25,6 +25,7 @@ Offences offences_of(const std::string& controller, PlantedLogic::Offence offenc
   }
   REQUIRE(run.end_reason() == rig::Reason::sequence_complete);
   REQUIRE(run.cycles() > 8'000);
+  REQUIRE(run.beats() == run.cycles());
   return found;
 }
 

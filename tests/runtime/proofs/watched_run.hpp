@@ -30,7 +30,7 @@ class PlantedLogic final : public CycleLogic {
 };
 
 /// A whole experiment's cycle on the simulated rig, step by step, with nothing but the cycle's own thread: what the
-/// real-time thread runs.
+/// real-time thread runs, the gate's plausibility checks, signs of life and flight recorder included.
 class WatchedRun {
  public:
   static constexpr int offence_cycle = 500;
@@ -43,16 +43,25 @@ class WatchedRun {
         planted_(logic_, offence, offence_cycle),
         gate_(logic_.make_gate(setup_.gate)),
         ring_(1024),  // full after so many cycles: dropping is part of what is proven
+        slots_(FlightRing::slots_for(2.0, rate_Hz)),
+        recorder_(slots_),
+        watch_(panel_, recorder_, guardian_never_lost),
         executive_(clock, driver_, planted_, gate_, ring_, static_cast<std::int64_t>(1e9 / rate_Hz)) {
+    executive_.watch_with(watch_);
     driver_.configure();
     driver_.activate(clock.now_ns());
   }
   /// False after the run's last cycle.
   bool cycle() noexcept { return executive_.step(); }
+  /// Cycles that gave a sign of life, each of them kept by the flight recorder.
+  [[nodiscard]] std::uint64_t beats() const { return panel_.cycle_beats.load(); }
   [[nodiscard]] std::uint64_t cycles() const { return executive_.statistics().cycles(); }
   [[nodiscard]] rig::Reason end_reason() const { return logic_.end_reason(); }
 
  private:
+  /// It is looked for in each cycle, and nobody is there.
+  static constexpr std::uint64_t guardian_never_lost = 1'000'000'000;
+
   static experiment::test::Setup setup(const std::string& controller, double rate_Hz, double start_speed_rad_s) {
     experiment::test::Setup s;
     s.control.controller = controller;
@@ -67,6 +76,10 @@ class WatchedRun {
   PlantedLogic planted_;
   CommandGate gate_;
   RecordRing ring_;
+  std::vector<FlightSlot> slots_;
+  FlightRing recorder_;
+  WatchPanel panel_{};
+  CycleWatch watch_;
   CyclicExecutive executive_;
 };
 
