@@ -34,7 +34,8 @@ constexpr int exit_not_started = 3;
 /// What ends programs from a terminal, a service manager or a closed pipe is not for the guardian: it ends when the
 /// controller is done.
 void ignore_signals() {
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGTSTP, SIGTTIN, SIGTTOU, SIGUSR1, SIGUSR2}) {
+  for (const int signal :
+       {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGTSTP, SIGTTIN, SIGTTOU, SIGUSR1, SIGUSR2, SIGXFSZ}) {
     std::signal(signal, SIG_IGN);
   }
 }

@@ -4,6 +4,7 @@
 
 #include <cerrno>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -200,10 +201,13 @@ int run(const RunRequest& request) {
   if (rig::is_fault(outcome.reason)) {
     run_watch.write_record(request, outcome.reason, outcome.reason_value, summary.reason);
   }
-  outputs.write(summary, session.executive().statistics(), environment(request, *driver, outcome));
+  const std::vector<std::string> unwritten =
+      outputs.write(summary, session.executive().statistics(), environment(request, *driver, outcome));
   if (!request.in_series) {
-    fmt::print("{}", analysis::to_text(summary));
-    if (outputs.folder()) fmt::print("  {:<22}{}\n", "run folder", outputs.folder()->path().string());
+    std::string text = analysis::to_text(summary);
+    if (outputs.folder()) text += fmt::format("  {:<22}{}\n", "run folder", outputs.folder()->path().string());
+    // A terminal that has gone takes nothing: no reason to end otherwise than the run did.
+    static_cast<void>(std::fputs(text.c_str(), stdout));
   }
   for (const std::string& line : driver->tally()) spdlog::info("{}", line);
   if (!outcome.completed()) spdlog::error("run ended early: {}", summary.reason);
@@ -212,10 +216,9 @@ int run(const RunRequest& request) {
                   driver::error_text(outcome.safe_state), driver->what_holds_unsafe());
   }
   run_watch.end();
-  if (!lost.empty()) {
-    spdlog::error("recorded data was lost: {}", lost);
-    return exit_ended_early;
-  }
+  for (const std::string& problem : unwritten) spdlog::error("{}", problem);
+  if (!lost.empty()) spdlog::error("recorded data was lost: {}", lost);
+  if (!lost.empty() || !unwritten.empty()) return exit_ended_early;
   return status_of(outcome);
 }
 

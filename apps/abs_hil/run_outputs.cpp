@@ -160,15 +160,28 @@ telemetry::StatusSnapshot RunOutputs::snapshot() const {
           .late = timing.overruns};
 }
 
-void RunOutputs::write(const analysis::RunSummary& summary, const runtime::CycleStatistics& statistics,
-                       const archive::RunEnvironment& environment) {
-  for (analysis::SummaryFile& file : summary_) file.write(summary);
-  for (runtime::HistogramFile& file : histogram_) file.write(statistics);
-  if (!folder_) return;
-  if (friction_curve_)
-    folder_->write("friction_curve.csv", std::string_view(analysis::to_csv(friction_curve_->result())));
-  folder_->write(archive::file::environment, archive::environment_json(environment));
-  folder_->seal();
+std::vector<std::string> RunOutputs::write(const analysis::RunSummary& summary,
+                                           const runtime::CycleStatistics& statistics,
+                                           const archive::RunEnvironment& environment) {
+  std::vector<std::string> problems;
+  const auto attempt = [&problems](auto&& work) {
+    try {
+      work();
+    } catch (const std::runtime_error& error) {
+      problems.emplace_back(error.what());
+    }
+  };
+  for (analysis::SummaryFile& file : summary_) attempt([&] { file.write(summary); });
+  for (runtime::HistogramFile& file : histogram_) attempt([&] { file.write(statistics); });
+  if (!folder_) return problems;
+  attempt([&] {
+    if (friction_curve_) {
+      folder_->write("friction_curve.csv", std::string_view(analysis::to_csv(friction_curve_->result())));
+    }
+    folder_->write(archive::file::environment, archive::environment_json(environment));
+    folder_->seal();
+  });
+  return problems;
 }
 
 }  // namespace abs_hil::app

@@ -44,9 +44,11 @@ class RunOutputs {
   [[nodiscard]] analysis::Metrics metrics() const { return metrics_.metrics(); }
   [[nodiscard]] std::uint64_t publish_failures() const { return stream_ ? stream_->failures() : 0; }
   [[nodiscard]] std::uint64_t csv_rows_lost() const;
-  /// Writes summary and histogram where they were asked for, and completes the run folder. Throws std::runtime_error.
-  void write(const analysis::RunSummary& summary, const runtime::CycleStatistics& statistics,
-             const archive::RunEnvironment& environment);
+  /// Writes summary and histogram where they were asked for, and completes the run folder: each is tried whatever
+  /// became of the others. Returns what could not be written, in words.
+  [[nodiscard]] std::vector<std::string> write(const analysis::RunSummary& summary,
+                                               const runtime::CycleStatistics& statistics,
+                                               const archive::RunEnvironment& environment);
   /// What the script's analysis found; null without one.
   [[nodiscard]] nlohmann::ordered_json friction_curve_json() const;
   /// The run folder, if there is one.
