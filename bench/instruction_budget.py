@@ -19,6 +19,7 @@ BUDGETS = [
     # 1,500 until the sequence took conditions from experiment files and controllers could be adjusted live (some 40).
     ('the same with sequence and actuator: all of "control"', ['counted_control'], 1550),
     ('plausibility of the measurement', ['counted_watch'], 300),
+    ("sign of life, look for the guardian's, flight recorder", ['counted_watchers'], 400),
     ('ring push of one record', ['counted_ring_push'], 150),
     ('five histograms', ['counted_statistics'], 200),
 ]
