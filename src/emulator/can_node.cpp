@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <stdexcept>
 #include <utility>
+
+#include "abs_hil/rig/formatted_text.hpp"
+#include "rig_behind.hpp"
 
 namespace abs_hil::emulator {
 
@@ -20,7 +22,6 @@ constexpr unsigned most_heartbeat_age = 8;
 /// Rejected commands cost 2, accepted ones give back 1: at this level the node latches.
 constexpr int reject_limit = 20;
 constexpr unsigned slow_every = 10;
-constexpr double standstill_rad_s = 0.5;
 
 std::array<std::uint8_t, 256> crc_table() {
   std::array<std::uint8_t, 256> table{};
@@ -56,23 +57,13 @@ bool sound(const BusFrame& frame, unsigned length) {
   return frame.length == length && frame.data[length - 1] == crc_of(frame);
 }
 
-std::string number(const char* format, double value) {
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), format, value);
-  return text.data();
-}
-
 }  // namespace
 
 CanNode::CanNode(const CanNodeOptions& options) : options_(options), plant_(options.plant) {
-  if (!(options.start_speed_rad_s >= 0.0) || !std::isfinite(options.start_speed_rad_s)) {
-    throw std::invalid_argument("start speed " + std::to_string(options.start_speed_rad_s) +
-                                " rad/s: must be finite and >= 0");
-  }
   if (options.watchdog_ms < 1 || options.watchdog_ms > 10000) {
     throw std::invalid_argument("watchdog " + std::to_string(options.watchdog_ms) + " ms: give 1 to 10000");
   }
-  plant_.reset({.omega1_rad_s = options.start_speed_rad_s, .omega2_rad_s = options.start_speed_rad_s});
+  start_wheels(plant_, options.start_speed_rad_s);
 }
 
 std::uint32_t CanNode::trip_flags() const noexcept {
@@ -104,8 +95,8 @@ void CanNode::note_outputs(const std::string& why) {
   if (nonzero_ && !nonzero) {
     const double since_ms = static_cast<double>(time_ns_ - last_command_ns_) * 1e-6;
     events_.push_back(
-        {time_ns_,
-         "outputs zero: " + why + (last_command_ns_ < 0 ? "" : number("; last valid command %.3f ms ago", since_ms))});
+        {time_ns_, "outputs zero: " + why +
+                       (last_command_ns_ < 0 ? "" : rig::formatted("; last valid command %.3f ms ago", since_ms))});
   } else if (!nonzero_ && nonzero) {
     events_.push_back({time_ns_, "outputs on"});
   }
@@ -113,10 +104,8 @@ void CanNode::note_outputs(const std::string& why) {
 }
 
 void CanNode::watch() {
-  const plant_sim::PlantState& s = plant_.state();
-  const double fastest = std::max(std::abs(s.omega1_rad_s), std::abs(s.omega2_rad_s));
-  constexpr double seconds_per_minute = 60.0;
-  if (fastest > options_.overspeed_rpm * 2.0 * std::numbers::pi / seconds_per_minute) {
+  const double fastest = fastest_rad_s(plant_);
+  if (fastest > rad_s_of_rpm(options_.overspeed_rpm)) {
     overspeed_latched_ = true;
   } else if (fastest < standstill_rad_s) {
     overspeed_latched_ = false;
@@ -124,19 +113,17 @@ void CanNode::watch() {
   if (trip_flags() != trip_told_) {
     trip_told_ = trip_flags();
     status_due_ = true;
-    events_.push_back({time_ns_, number("trip flags %.0f", trip_told_)});
+    events_.push_back({time_ns_, rig::formatted("trip flags %u", trip_told_)});
     note_outputs("interlock");
   }
 }
 
 void CanNode::advance_to(std::int64_t time_ns) {
   while (time_ns_ < time_ns) {
-    std::int64_t next = std::min(time_ns, (time_ns_ / step_ns + 1) * step_ns);
+    std::int64_t next = step_end_ns(time_ns_, time_ns, step_ns);
     const bool guarded = state_ == State::active && (brake_ > 0.0 || drive_ > 0.0);
     if (guarded) next = std::clamp(watchdog_ends_ns(), time_ns_, next);
-    const Outputs out = outputs();
-    plant_.advance(static_cast<double>(next - time_ns_) * 1e-9,
-                   {.motor_duty = out.drive_duty, .brake_duty = out.brake_duty});
+    step(plant_, next - time_ns_, outputs());
     time_ns_ = next;
     if (guarded && time_ns_ >= watchdog_ends_ns()) {
       become(State::latched, 1, "watchdog");

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "abs_hil/plant_sim/encoder.hpp"
+#include "rig_behind.hpp"
 
 namespace abs_hil::emulator {
 
@@ -17,8 +18,6 @@ constexpr double lines_per_rev = 1024.0;
 constexpr double supply_scale_V = 92000.0;
 /// Sensor pulse, low time; the ratio of high to low time carries the temperature.
 constexpr std::uint32_t temperature_low_time = 100'000;
-/// Slower than this a wheel counts as stopped: less than a line in a velocity period.
-constexpr double standstill_rad_s = 0.5;
 
 std::uint32_t rounded(double value) noexcept {
   return static_cast<std::uint32_t>(std::llround(std::clamp(value, 0.0, 4.0e9)));
@@ -32,14 +31,9 @@ CardModel::CardModel(const CardOptions& options) : options_(options), plant_(opt
   if (options.overspeed_bit != 0 && options.overspeed_bit != 2) {
     throw std::invalid_argument("overspeed bit " + std::to_string(options.overspeed_bit) + ": give 0 or 2");
   }
-  if (!(options.start_speed_rad_s >= 0.0) || !std::isfinite(options.start_speed_rad_s)) {
-    throw std::invalid_argument("start speed " + std::to_string(options.start_speed_rad_s) +
-                                " rad/s: must be finite and >= 0");
-  }
-  plant_.reset({.omega1_rad_s = options.start_speed_rad_s, .omega2_rad_s = options.start_speed_rad_s});
-  constexpr double seconds_per_minute = 60.0;
+  start_wheels(plant_, options.start_speed_rad_s);
   plain_[0x50 / 4] = options.velocity_period;
-  plain_[0x5C / 4] = velocity(options.overspeed_rpm * 2.0 * std::numbers::pi / seconds_per_minute);
+  plain_[0x5C / 4] = velocity(rad_s_of_rpm(options.overspeed_rpm));
   plain_[0xA4 / 4] = supply_raw(options.supply_min_V);
   plain_[0xA8 / 4] = options.temperature_max_C;
 }
@@ -167,12 +161,10 @@ void CardModel::trip_overspeed() noexcept {
 }
 
 void CardModel::watch_limits() noexcept {
-  const plant_sim::PlantState& s = plant_.state();
-  const bool stopped = std::max(std::abs(s.omega1_rad_s), std::abs(s.omega2_rad_s)) < standstill_rad_s;
-  const std::uint32_t limit = plain_[0x5C / 4];
-  if (std::max(velocity(s.omega1_rad_s), velocity(s.omega2_rad_s)) > limit) {
+  const double fastest = fastest_rad_s(plant_);
+  if (velocity(fastest) > plain_[0x5C / 4]) {
     overspeed_latched_ = true;
-  } else if (stopped) {
+  } else if (fastest < standstill_rad_s) {
     overspeed_latched_ = false;
   }
   if (options_.trip_clears_width && trip_flags() != 0) {
@@ -182,18 +174,13 @@ void CardModel::watch_limits() noexcept {
 }
 
 void CardModel::turn_by_hand(bool upper_wheel, double revolutions) noexcept {
-  plant_sim::PlantState state = plant_.state();
-  (upper_wheel ? state.angle1_rad : state.angle2_rad) += revolutions * 2.0 * std::numbers::pi;
-  plant_.reset(state);
+  turn_wheel(plant_, upper_wheel, revolutions);
 }
 
 void CardModel::advance_to(std::int64_t time_ns) noexcept {
   while (time_ns_ < time_ns) {
-    // Steps end on multiples of 100 us wherever the host's accesses fall.
-    const std::int64_t next = std::min(time_ns, (time_ns_ / step_ns + 1) * step_ns);
-    const Outputs out = outputs();
-    plant_.advance(static_cast<double>(next - time_ns_) * 1e-9,
-                   {.motor_duty = out.drive_duty, .brake_duty = out.brake_duty});
+    const std::int64_t next = step_end_ns(time_ns_, time_ns, step_ns);
+    step(plant_, next - time_ns_, outputs());
     time_ns_ = next;
     watch_limits();
   }

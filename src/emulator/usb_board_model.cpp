@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
-#include <numbers>
 #include <stdexcept>
 #include <string>
 
 #include "abs_hil/plant_sim/encoder.hpp"
+#include "rig_behind.hpp"
 
 namespace abs_hil::emulator {
 
@@ -33,11 +32,7 @@ UsbBoardModel::UsbBoardModel(const UsbBoardOptions& options) : options_(options)
   if (options.enable_line > 14) {
     throw std::invalid_argument("enable line " + std::to_string(options.enable_line) + ": give -1 to 14");
   }
-  if (!(options.start_speed_rad_s >= 0.0) || !std::isfinite(options.start_speed_rad_s)) {
-    throw std::invalid_argument("start speed " + std::to_string(options.start_speed_rad_s) +
-                                " rad/s: must be finite and >= 0");
-  }
-  plant_.reset({.omega1_rad_s = options.start_speed_rad_s, .omega2_rad_s = options.start_speed_rad_s});
+  start_wheels(plant_, options.start_speed_rad_s);
   written_[12] = written_[13] = 0x7FFF;  // all lines are inputs at power-on
 }
 
@@ -104,18 +99,13 @@ Outputs UsbBoardModel::outputs() const noexcept {
 }
 
 void UsbBoardModel::turn_by_hand(bool upper_wheel, double revolutions) noexcept {
-  plant_sim::PlantState state = plant_.state();
-  (upper_wheel ? state.angle1_rad : state.angle2_rad) += revolutions * 2.0 * std::numbers::pi;
-  plant_.reset(state);
+  turn_wheel(plant_, upper_wheel, revolutions);
 }
 
 void UsbBoardModel::advance_to(std::int64_t time_ns) noexcept {
   while (time_ns_ < time_ns) {
-    // Steps end on multiples of 100 us wherever the host's transfers fall.
-    const std::int64_t next = std::min(time_ns, (time_ns_ / step_ns + 1) * step_ns);
-    const Outputs out = outputs();
-    plant_.advance(static_cast<double>(next - time_ns_) * 1e-9,
-                   {.motor_duty = out.drive_duty, .brake_duty = out.brake_duty});
+    const std::int64_t next = step_end_ns(time_ns_, time_ns, step_ns);
+    step(plant_, next - time_ns_, outputs());
     time_ns_ = next;
   }
 }

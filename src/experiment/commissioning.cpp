@@ -1,17 +1,18 @@
 #include "abs_hil/experiment/commissioning.hpp"
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <stdexcept>
 #include <utility>
 
 #include "abs_hil/rig/encoder_scale.hpp"
+#include "abs_hil/rig/formatted_text.hpp"
 
 namespace abs_hil::experiment {
 
 namespace {
+
+using rig::formatted;
 
 constexpr std::int64_t cycle_ns = 1'000'000;
 constexpr double s_per_ns = 1e-9;
@@ -21,13 +22,6 @@ constexpr std::int32_t turned_counts = 512;
 constexpr std::int32_t still_counts = 64;
 /// A wheel that moves less in this time stands.
 constexpr std::int64_t standstill_ns = 500'000'000;
-
-template <typename... Values>
-std::string formatted(const char* format, Values... values) {
-  std::array<char, 400> text{};
-  std::snprintf(text.data(), text.size(), format, values...);
-  return text.data();
-}
 
 void require(bool in_range, const char* what, double value, const char* range) {
   if (!in_range) throw std::invalid_argument(formatted("%s %g: give a number in %s", what, value, range));

@@ -1,21 +1,14 @@
 // What the driver can say in words about its bus and its node.
 
-#include <array>
-#include <cstdio>
-
 #include "abs_hil/driver/can/bus_load.hpp"
 #include "abs_hil/driver/can/can_driver.hpp"
+#include "abs_hil/rig/formatted_text.hpp"
 
 namespace abs_hil::driver::can {
 
 namespace {
 
-template <typename... Values>
-std::string formatted(const char* format, Values... values) {
-  std::array<char, 320> text{};
-  std::snprintf(text.data(), text.size(), format, values...);
-  return text.data();
-}
+using rig::formatted;
 
 std::string load_text(double rate_Hz, double bit_rate, double data_bit_rate, bool fd) {
   const BusLoad load = bus_load(rate_Hz, bit_rate, data_bit_rate, fd);

@@ -4,8 +4,9 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <stdexcept>
+
+#include "abs_hil/rig/formatted_text.hpp"
 
 namespace abs_hil::driver {
 
@@ -118,10 +119,9 @@ void read_parameter(std::string_view text, const std::optional<std::string_view>
   const bool time = wanted.unit == Parameter::Unit::time;
   const bool known = time ? is_time(*given, injection.parameter) : is_number(*given, injection.parameter);
   if (!known || injection.parameter < wanted.least || injection.parameter > wanted.most) {
-    std::array<char, 96> range{};
-    std::snprintf(range.data(), range.size(), " takes a %s in [%g, %g]%s", time ? "time" : "number", wanted.least,
-                  wanted.most, time ? " s, as 0.05s or 50ms" : "");
-    refuse(text, *given, what + range.data());
+    refuse(text, *given,
+           what + rig::formatted(" takes a %s in [%g, %g]%s", time ? "time" : "number", wanted.least, wanted.most,
+                                 time ? " s, as 0.05s or 50ms" : ""));
   }
 }
 
@@ -169,18 +169,13 @@ std::vector<Injection> parse_injections(std::string_view list) {
 
 std::string to_text(const Injection& injection) {
   const Parameter parameter = parameter_of(injection.signal, injection.kind);
-  const auto number = [](const char* format, double value) {
-    std::array<char, 48> text{};
-    std::snprintf(text.data(), text.size(), format, value);
-    return std::string(text.data());
-  };
   std::string text(injection.phase ? rig::name_of(*injection.phase) : any_phase);
   text += '@' + std::string(name_of(injection.signal)) + ':' + std::string(name_of(injection.kind));
   if (parameter.unit != Parameter::Unit::none) {
-    text += number(parameter.unit == Parameter::Unit::time ? "=%.15gs" : "=%.15g", injection.parameter);
+    text += rig::formatted(parameter.unit == Parameter::Unit::time ? "=%.15gs" : "=%.15g", injection.parameter);
   }
-  if (injection.delay_s > 0.0) text += number("+%.15gs", injection.delay_s);
-  if (std::isfinite(injection.duration_s)) text += number("~%.15gs", injection.duration_s);
+  if (injection.delay_s > 0.0) text += rig::formatted("+%.15gs", injection.delay_s);
+  if (std::isfinite(injection.duration_s)) text += rig::formatted("~%.15gs", injection.duration_s);
   return text;
 }
 

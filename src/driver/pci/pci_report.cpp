@@ -1,20 +1,13 @@
 // What the driver can say in words about its card.
 
-#include <array>
-#include <cstdio>
-
 #include "abs_hil/driver/pci/pci_driver.hpp"
+#include "abs_hil/rig/formatted_text.hpp"
 
 namespace abs_hil::driver::pci {
 
 namespace {
 
-template <typename... Values>
-std::string formatted(const char* format, Values... values) {
-  std::array<char, 320> text{};
-  std::snprintf(text.data(), text.size(), format, values...);
-  return text.data();
-}
+using rig::formatted;
 
 std::string converted(std::uint32_t offset, std::uint32_t raw, std::uint32_t velocity_period) {
   switch (offset) {

@@ -1,20 +1,13 @@
 // What the driver can say in words about its board.
 
-#include <array>
-#include <cstdio>
-
 #include "abs_hil/driver/usb/usb_driver.hpp"
+#include "abs_hil/rig/formatted_text.hpp"
 
 namespace abs_hil::driver::usb {
 
 namespace {
 
-template <typename... Values>
-std::string formatted(const char* format, Values... values) {
-  std::array<char, 400> text{};
-  std::snprintf(text.data(), text.size(), format, values...);
-  return text.data();
-}
+using rig::formatted;
 
 std::string text_of(std::string_view view) { return std::string(view); }
 
