@@ -7,43 +7,14 @@
 
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <stdexcept>
-#include <utility>
 
 namespace abs_hil::app {
 
 void say(const std::string& text) {
   fmt::print("{}\n", text);
   std::fflush(stdout);
-}
-
-std::vector<std::string> words_of(std::string_view line) {
-  std::vector<std::string> words;
-  std::string word;
-  for (const char c : std::string(line) + ' ') {
-    if (c != ' ' && c != '\t' && c != '\r') {
-      word += c;
-    } else if (!word.empty()) {
-      words.push_back(std::exchange(word, {}));
-    }
-  }
-  return words;
-}
-
-double number_in(std::string_view text) {
-  double value = 0.0;
-  const auto [at, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || at != text.data() + text.size()) {
-    throw std::invalid_argument("\"" + std::string(text) + "\" is not a number");
-  }
-  return value;
-}
-
-bool on_or_off(std::string_view text) {
-  if (text != "on" && text != "off") throw std::invalid_argument("\"" + std::string(text) + "\": give on or off");
-  return text == "on";
 }
 
 ControlFifo::ControlFifo(const std::string& path) {

@@ -2,20 +2,11 @@
 
 #include <functional>
 #include <string>
-#include <string_view>
-#include <vector>
 
 namespace abs_hil::app {
 
 /// A line of output, seen at once by who waits for it.
 void say(const std::string& text);
-
-/// The words of a control command.
-[[nodiscard]] std::vector<std::string> words_of(std::string_view line);
-/// Throws std::invalid_argument for what is no number.
-[[nodiscard]] double number_in(std::string_view text);
-/// Throws std::invalid_argument for what is neither "on" nor "off".
-[[nodiscard]] bool on_or_off(std::string_view text);
 
 /// FIFO that commands are taken from while the emulator runs. Without a path there is none.
 class ControlFifo {

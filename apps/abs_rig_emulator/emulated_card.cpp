@@ -4,19 +4,14 @@
 
 #include <cerrno>
 #include <cstring>
-#include <stdexcept>
-#include <vector>
 
 #include "abs_hil/driver/pci/discovery.hpp"
 #include "abs_hil/runtime/clock.hpp"
-#include "control_fifo.hpp"
-#include "truth_file.hpp"
+#include "control_command.hpp"
 
 namespace abs_hil::app {
 
 namespace {
-
-constexpr std::int64_t truth_period_ns = 1'000'000;
 
 std::int64_t monotonic_ns() { return runtime::MonotonicClock().now_ns(); }
 
@@ -28,36 +23,18 @@ void wait_for(std::int64_t duration_ns) {
 }  // namespace
 
 EmulatedCard::EmulatedCard(const EmulatorOptions& options)
-    : model_(options.card), faulty_(model_, options.seed), lock_step_(options.lock_step), started_ns_(monotonic_ns()) {
-  if (!options.truth_file.empty()) {
-    open_for_writing(truth_, options.truth_file);
-    truth_ << "time_s,omega1_rad_s,omega2_rad_s,slip,brake_torque_Nm,theta_N,drive_duty,brake_duty,trip_flags\n";
-  }
+    : model_(options.card),
+      faulty_(model_, options.seed),
+      lock_step_(options.lock_step),
+      started_ns_(monotonic_ns()),
+      truth_(options.truth_file, true) {
   if (!options.traffic_file.empty()) record_to(options.traffic_file);
 }
 
 void EmulatedCard::record_to(const std::string& file) { open_for_writing(traffic_, file); }
 
-void EmulatedCard::log_truth() {
-  const rig::PlantTruth truth = model_.plant().truth();
-  const emulator::Outputs out = model_.outputs();
-  truth_ << fmt::format("{:.6f},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.6f},{:.6f},{}\n",
-                        static_cast<double>(model_.time_ns()) * 1e-9, truth.speeds.omega1_rad_s,
-                        truth.speeds.omega2_rad_s, truth.slip, truth.brake_torque_Nm, truth.theta_N, out.drive_duty,
-                        out.brake_duty, model_.trip_flags());
-}
-
-void EmulatedCard::go_on_to(std::int64_t time_ns) {
-  while (truth_.is_open() && next_truth_ns_ <= time_ns) {
-    model_.advance_to(next_truth_ns_);
-    log_truth();
-    next_truth_ns_ += truth_period_ns;
-  }
-  model_.advance_to(time_ns);
-}
-
 void EmulatedCard::catch_up() {
-  if (!lock_step_) go_on_to(monotonic_ns() - started_ns_);
+  if (!lock_step_) truth_.advance(model_, monotonic_ns() - started_ns_);
 }
 
 void EmulatedCard::record(char direction, std::uint64_t offset, std::uint32_t value) {
@@ -89,7 +66,7 @@ int EmulatedCard::write(std::string_view name, std::uint64_t offset, const void*
     std::int64_t time_ns = 0;
     if (offset != 0 || size != sizeof time_ns) return -EINVAL;
     std::memcpy(&time_ns, data, sizeof time_ns);
-    go_on_to(time_ns);
+    truth_.advance(model_, time_ns);
     return sizeof time_ns;
   }
   if (size != sizeof(std::uint32_t) || offset % 4 != 0 || offset >= emulator::CardModel::bytes) return -EINVAL;
@@ -139,39 +116,26 @@ const char* EmulatedCard::commands() {
 
 std::string EmulatedCard::obey(std::string_view line) {
   catch_up();
-  const std::vector<std::string> words = words_of(line);
-  const auto is = [&words](std::string_view name, std::size_t arguments) {
-    return words[0] == name && words.size() == arguments + 1;
-  };
-  if (words.empty()) return {};
-  if (is("fault", 1)) {
-    faulty_.set(words[1]);
-  } else if (is("unplug", 0) || is("plug", 0)) {
-    present_ = words[0] == "plug";
-  } else if (is("all-ones", 1)) {
-    faulty_.answer_all_ones(on_or_off(words[1]));
-  } else if (is("deny", 1)) {
-    permission_denied_ = on_or_off(words[1]);
-  } else if (is("estop", 1)) {
-    model_.press_emergency_stop(on_or_off(words[1]));
-  } else if (is("supply", 1)) {
-    model_.set_supply_V(number_in(words[1]));
-  } else if (is("temperature", 1)) {
-    model_.set_temperature_C(number_in(words[1]));
-  } else if (is("overspeed", 0)) {
-    model_.trip_overspeed();
-  } else if (is("turn", 2) && (words[1] == "upper" || words[1] == "lower")) {
-    model_.turn_by_hand(words[1] == "upper", number_in(words[2]));
-  } else if (is("record", 1)) {
-    if (words[1] == "off") {
+  const ControlCommand command(line);
+  if (command.empty()) return {};
+  if (command.is("fault", 1)) {
+    faulty_.set(command.text(1));
+  } else if (command.is("unplug", 0) || command.is("plug", 0)) {
+    present_ = command.name() == "plug";
+  } else if (command.is("all-ones", 1)) {
+    faulty_.answer_all_ones(command.on(1));
+  } else if (command.is("deny", 1)) {
+    permission_denied_ = command.on(1);
+  } else if (command.is("record", 1)) {
+    if (command.text(1) == "off") {
       traffic_.close();
     } else {
-      record_to(words[1]);
+      record_to(command.text(1));
     }
-  } else if (is("widths", 0)) {
+  } else if (command.is("widths", 0)) {
     return widths();
-  } else if (!is("status", 0)) {
-    throw std::invalid_argument("unknown command \"" + std::string(line) + "\"; known are\n" + commands());
+  } else if (!obey_surroundings(model_, command) && !obey_turn(model_, command) && !command.is("status", 0)) {
+    command.refuse(commands());
   }
   return status();
 }

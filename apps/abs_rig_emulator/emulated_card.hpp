@@ -10,6 +10,7 @@
 #include "abs_hil/emulator/card_model.hpp"
 #include "abs_hil/emulator/register_faults.hpp"
 #include "fuse_tree.hpp"
+#include "truth_file.hpp"
 
 namespace abs_hil::app {
 
@@ -45,8 +46,6 @@ class EmulatedCard final : public FileHandler {
   [[nodiscard]] std::string widths() const;
 
  private:
-  void go_on_to(std::int64_t time_ns);
-  void log_truth();
   void record(char direction, std::uint64_t offset, std::uint32_t value);
   void record_to(const std::string& file);
 
@@ -56,8 +55,7 @@ class EmulatedCard final : public FileHandler {
   bool present_{true};
   bool permission_denied_{false};
   std::int64_t started_ns_{0};
-  std::int64_t next_truth_ns_{0};
-  std::ofstream truth_{};
+  TruthFile truth_;
   std::ofstream traffic_{};
 };
 

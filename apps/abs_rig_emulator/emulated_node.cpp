@@ -2,10 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <stdexcept>
-#include <vector>
-
 #include "abs_hil/runtime/clock.hpp"
+#include "control_command.hpp"
 #include "control_fifo.hpp"
 
 namespace abs_hil::app {
@@ -78,27 +76,16 @@ const char* EmulatedNode::commands() {
 
 std::string EmulatedNode::obey(std::string_view line) {
   catch_up();
-  const std::vector<std::string> words = words_of(line);
-  const auto is = [&words](std::string_view name, std::size_t arguments) {
-    return words[0] == name && words.size() == arguments + 1;
-  };
-  if (words.empty()) return {};
-  if (is("fault", 1)) {
-    faults_.set(words[1]);
-  } else if (is("restart", 0)) {
+  const ControlCommand command(line);
+  if (command.empty()) return {};
+  if (command.is("fault", 1)) {
+    faults_.set(command.text(1));
+  } else if (command.is("restart", 0)) {
     power_on();
-  } else if (is("estop", 1)) {
-    node_.press_emergency_stop(on_or_off(words[1]));
-  } else if (is("supply", 1)) {
-    node_.set_supply_V(number_in(words[1]));
-  } else if (is("temperature", 1)) {
-    node_.set_temperature_C(number_in(words[1]));
-  } else if (is("overspeed", 0)) {
-    node_.trip_overspeed();
-  } else if (is("brake-error", 1)) {
-    node_.break_brake_output(number_in(words[1]));
-  } else if (!is("status", 0)) {
-    throw std::invalid_argument("unknown command \"" + std::string(line) + "\"; known are\n" + commands());
+  } else if (command.is("brake-error", 1)) {
+    node_.break_brake_output(command.number(1));
+  } else if (!obey_surroundings(node_, command) && !command.is("status", 0)) {
+    command.refuse(commands());
   }
   return status();
 }

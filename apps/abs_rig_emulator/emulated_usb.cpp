@@ -8,19 +8,18 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
 
 #include "abs_hil/runtime/clock.hpp"
-#include "control_fifo.hpp"
-#include "truth_file.hpp"
+#include "control_command.hpp"
 
 namespace abs_hil::app {
 
 namespace {
 
-constexpr std::int64_t truth_period_ns = 1'000'000;
 constexpr std::int64_t mid_braking_ns = 300'000'000;
 
 std::int64_t monotonic_ns() { return runtime::MonotonicClock().now_ns(); }
@@ -52,13 +51,10 @@ EmulatedUsb::EmulatedUsb(const UsbEmulatorOptions& options)
       device_(board_, options.identity, options.seed,
               options.lock_step ? emulator::UsbipDevice::GoOnTo([this](std::int64_t time_ns) { go_on_to(time_ns); })
                                 : emulator::UsbipDevice::GoOnTo()),
-      started_ns_(monotonic_ns()) {
+      started_ns_(monotonic_ns()),
+      truth_(options.truth_file, false) {
   for (const std::string& command : options.when_braking) {
     if (command == "plug") throw std::invalid_argument("--when-braking plug: nothing is unplugged then");
-  }
-  if (!options.truth_file.empty()) {
-    open_for_writing(truth_, options.truth_file);
-    truth_ << "time_s,omega1_rad_s,omega2_rad_s,slip,brake_torque_Nm,theta_N,drive_duty,brake_duty\n";
   }
   plug_in();
 }
@@ -120,22 +116,8 @@ bool EmulatedUsb::serve() {
   return true;
 }
 
-void EmulatedUsb::log_truth() {
-  const rig::PlantTruth truth = board_.plant().truth();
-  const emulator::Outputs out = board_.outputs();
-  truth_ << fmt::format("{:.6f},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.6f},{:.6f}\n",
-                        static_cast<double>(board_.time_ns()) * 1e-9, truth.speeds.omega1_rad_s,
-                        truth.speeds.omega2_rad_s, truth.slip, truth.brake_torque_Nm, truth.theta_N, out.drive_duty,
-                        out.brake_duty);
-}
-
 void EmulatedUsb::go_on_to(std::int64_t time_ns) {
-  while (truth_.is_open() && next_truth_ns_ <= time_ns) {
-    board_.advance_to(next_truth_ns_);
-    log_truth();
-    next_truth_ns_ += truth_period_ns;
-  }
-  board_.advance_to(time_ns);
+  truth_.advance(board_, time_ns);
   watch_brake();
 }
 
@@ -186,25 +168,20 @@ const char* EmulatedUsb::commands() {
 }
 
 std::string EmulatedUsb::obey(std::string_view line) {
-  const std::vector<std::string> words = words_of(line);
-  const auto is = [&words](std::string_view name, std::size_t arguments) {
-    return words[0] == name && words.size() == arguments + 1;
-  };
-  if (words.empty()) return {};
-  if (words[0] == "fault") {
+  const ControlCommand command(line);
+  if (command.empty()) return {};
+  if (command.name() == "fault") {
     device_.faults.set(line.substr(line.find("fault") + 5));
-  } else if (is("unplug", 0)) {
+  } else if (command.is("unplug", 0)) {
     unplug();
-  } else if (is("plug", 0)) {
+  } else if (command.is("plug", 0)) {
     if (host_.get() < 0) plug_in();
-  } else if (is("break-brake", 1)) {
-    board_.break_brake(on_or_off(words[1]));
-  } else if (is("estop", 1)) {
-    board_.press_emergency_stop(on_or_off(words[1]));
-  } else if (is("turn", 2) && (words[1] == "upper" || words[1] == "lower")) {
-    board_.turn_by_hand(words[1] == "upper", number_in(words[2]));
-  } else if (!is("status", 0)) {
-    throw std::invalid_argument("unknown command \"" + std::string(line) + "\"; known are\n" + commands());
+  } else if (command.is("break-brake", 1)) {
+    board_.break_brake(command.on(1));
+  } else if (command.is("estop", 1)) {
+    board_.press_emergency_stop(command.on(1));
+  } else if (!obey_turn(board_, command) && !command.is("status", 0)) {
+    command.refuse(commands());
   }
   return status();
 }

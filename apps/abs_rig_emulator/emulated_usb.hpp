@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <fstream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -9,6 +8,7 @@
 #include "abs_hil/driver/file_descriptor.hpp"
 #include "abs_hil/emulator/usb_board_model.hpp"
 #include "abs_hil/emulator/usbip_device.hpp"
+#include "truth_file.hpp"
 
 namespace abs_hil::app {
 
@@ -42,7 +42,6 @@ class EmulatedUsb {
   void plug_in();
   void unplug();
   void go_on_to(std::int64_t time_ns);
-  void log_truth();
   void watch_brake();
   void send(const std::vector<std::uint8_t>& replies);
 
@@ -51,9 +50,8 @@ class EmulatedUsb {
   emulator::UsbipDevice device_;
   driver::FileDescriptor host_{-1};
   std::int64_t started_ns_;
-  std::int64_t next_truth_ns_{0};
   std::int64_t brake_since_ns_{-1};
-  std::ofstream truth_{};
+  TruthFile truth_;
 };
 
 }  // namespace abs_hil::app

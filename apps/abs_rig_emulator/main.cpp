@@ -169,6 +169,30 @@ void take_priority(const Arguments& a) {
 /// Frames catch up with the clock by themselves; between them the rig goes on every ms, in steps of 100 us.
 constexpr timespec idle{.tv_sec = 0, .tv_nsec = 1'000'000};
 
+template <typename Board>
+void obey_first(const Arguments& a, Board& board) {
+  for (const std::string& fault : a.faults) static_cast<void>(board.obey("fault " + fault));
+  for (const std::string& command : a.commands) static_cast<void>(board.obey(command));
+}
+
+/// Serves the host, at the descriptor that `host` gives, and the control FIFO until a signal or until `serve_host` says
+/// that the host has gone for good.
+template <typename Board, typename Host, typename ServeHost>
+int serve_until_stopped(const Arguments& a, Board& board, const std::string& place, Host host, ServeHost serve_host) {
+  app::ControlFifo control(a.control_fifo);
+  app::say("ready: " + place);
+  bool serving = true;
+  while (serving && !stop_requested) {
+    std::array<pollfd, 2> ready{{{host(), POLLIN, 0}, {control.descriptor(), POLLIN, 0}}};
+    static_cast<void>(::ppoll(ready.data(), ready.size(), &idle, nullptr));
+    if (ready[0].revents != 0) serving = serve_host();
+    if (ready[1].revents != 0) control.take([&board](const std::string& line) { return board.obey(line); });
+    board.catch_up();
+  }
+  app::say("ended: " + board.status());
+  return 0;
+}
+
 int serve_node(const Arguments& a) {
   app::BusSocket bus(a.can_interface);
   app::EmulatedNode node({.plant = a.emulator.card.plant,
@@ -180,21 +204,12 @@ int serve_node(const Arguments& a) {
                           .temperature_max_C = static_cast<double>(a.emulator.card.temperature_max_C),
                           .overspeed_rpm = a.emulator.card.overspeed_rpm},
                          a.emulator.seed);
-  for (const std::string& fault : a.faults) static_cast<void>(node.obey("fault " + fault));
-  for (const std::string& command : a.commands) static_cast<void>(node.obey(command));
+  obey_first(a, node);
   pin_to(a.cpu);
   take_priority(a);
-  app::ControlFifo control(a.control_fifo);
-  app::say("ready: CAN node on " + a.can_interface);
-  while (!stop_requested) {
-    std::array<pollfd, 2> ready{{{bus.descriptor(), POLLIN, 0}, {control.descriptor(), POLLIN, 0}}};
-    static_cast<void>(::ppoll(ready.data(), ready.size(), &idle, nullptr));
-    if (ready[0].revents != 0) node.serve(bus);
-    if (ready[1].revents != 0) control.take([&node](const std::string& line) { return node.obey(line); });
-    node.catch_up();
-  }
-  app::say("ended: " + node.status());
-  return 0;
+  return serve_until_stopped(
+      a, node, "CAN node on " + a.can_interface, [&bus] { return bus.descriptor(); },
+      [&node, &bus] { return node.serve(bus), true; });
 }
 
 int serve_usb(Arguments& a) {
@@ -206,20 +221,9 @@ int serve_usb(Arguments& a) {
   pin_to(a.cpu);
   take_priority(a);
   app::EmulatedUsb board(a.usb);
-  for (const std::string& fault : a.faults) static_cast<void>(board.obey("fault " + fault));
-  for (const std::string& command : a.commands) static_cast<void>(board.obey(command));
-  app::ControlFifo control(a.control_fifo);
-  app::say("ready: " + board.place());
-  bool serving = true;
-  while (serving && !stop_requested) {
-    std::array<pollfd, 2> ready{{{board.descriptor(), POLLIN, 0}, {control.descriptor(), POLLIN, 0}}};
-    static_cast<void>(::ppoll(ready.data(), ready.size(), &idle, nullptr));
-    if (ready[0].revents != 0) serving = board.serve();
-    if (ready[1].revents != 0) control.take([&board](const std::string& line) { return board.obey(line); });
-    board.catch_up();
-  }
-  app::say("ended: " + board.status());
-  return 0;
+  obey_first(a, board);
+  return serve_until_stopped(
+      a, board, board.place(), [&board] { return board.descriptor(); }, [&board] { return board.serve(); });
 }
 
 int serve(Arguments& a) {
@@ -227,25 +231,14 @@ int serve(Arguments& a) {
   if (a.use_usb) return serve_usb(a);
   if (!a.can_interface.empty()) return serve_node(a);
   app::EmulatedCard card(a.emulator);
-  for (const std::string& fault : a.faults) static_cast<void>(card.obey("fault " + fault));
-  for (const std::string& command : a.commands) static_cast<void>(card.obey(command));
+  obey_first(a, card);
   pin_to(a.cpu);
   take_priority(a);
   std::filesystem::create_directories(a.pci_root);
   app::FuseTree tree(a.pci_root, a.bdfs, files_of(a), card);
-  app::ControlFifo control(a.control_fifo);
-  app::say("ready: card " + a.bdfs.front() + " in " + a.pci_root);
-
-  bool serving = true;
-  while (serving && !stop_requested) {
-    std::array<pollfd, 2> ready{{{tree.descriptor(), POLLIN, 0}, {control.descriptor(), POLLIN, 0}}};
-    static_cast<void>(::ppoll(ready.data(), ready.size(), &idle, nullptr));
-    if (ready[0].revents != 0) serving = tree.serve_one();
-    if (ready[1].revents != 0) control.take([&card](const std::string& line) { return card.obey(line); });
-    card.catch_up();
-  }
-  app::say("ended: " + card.status());
-  return 0;
+  return serve_until_stopped(
+      a, card, "card " + a.bdfs.front() + " in " + a.pci_root, [&tree] { return tree.descriptor(); },
+      [&tree] { return tree.serve_one(); });
 }
 
 }  // namespace
