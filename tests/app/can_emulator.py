@@ -1,57 +1,23 @@
 """The emulated CAN node as a process of its own, behind a socket in place of a bus, for the tests of driver.kind=can."""
-import os
-import re
 import subprocess
 import sys
 
+from emulator_process import EMULATOR, EmulatorProcess
 from program import PROGRAM, ProgramTest
-
-EMULATOR = os.path.join(os.path.dirname(PROGRAM), 'abs_rig_emulator')
 
 
 def skip_unless_possible():
-    if not os.path.exists(EMULATOR):
+    if not EMULATOR.exists():
         print(f'SKIPPED: {EMULATOR} was not built (libfuse3-dev)')
         sys.exit(77)
 
 
-class Node:
-    """A running abs_rig_emulator --can; `command` returns its answer once it has been obeyed."""
+class Node(EmulatorProcess):
+    """A running abs_rig_emulator --can."""
 
     def __init__(self, folder, *args):
-        self.interface, self.control = f'unix:{folder / "bus"}', folder / 'control'
-        self.events = []
-        self.process = subprocess.Popen([EMULATOR, '--can', self.interface, '--control', self.control, *map(str, args)],
-                                        stdout=subprocess.PIPE, text=True)
-        line = self.process.stdout.readline()
-        while line and not line.startswith('ready'):  # "not in real time" may come before
-            line = self.process.stdout.readline()
-        assert line.startswith('ready'), 'the emulator did not start'
-
-    def command(self, text):
-        with open(self.control, 'w') as fifo:
-            fifo.write(text + '\n')
-        return self._line_that_starts_with(f'{text}: ')
-
-    def _line_that_starts_with(self, start):
-        for line in self.process.stdout:
-            if line.startswith('event '):
-                self.events.append(line.strip())
-            elif line.startswith(start):
-                return line
-        raise AssertionError(f'the emulator ended without a line "{start}"')
-
-    def wire(self):
-        """Duties (drive, brake) that act on the rig now."""
-        found = re.search(r'drive ([\d.]+), brake ([\d.]+)', self.command('status'))
-        return float(found[1]), float(found[2])
-
-    def end(self):
-        if self.process.poll() is None:
-            self.process.terminate()
-            self._line_that_starts_with('ended')
-        self.process.stdout.close()
-        return self.process.wait(timeout=20)
+        self.interface = f'unix:{folder / "bus"}'
+        super().__init__(folder, '--can', self.interface, *args)
 
 
 class CanTest(ProgramTest):
@@ -66,9 +32,7 @@ class CanTest(ProgramTest):
                 program.kill()
                 program.communicate()
         for node in self._nodes:
-            node.process.kill()
-            node.process.wait()
-            node.process.stdout.close()
+            node.kill()
         super().tearDown()
 
     def node(self, *args):

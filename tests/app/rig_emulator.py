@@ -6,14 +6,13 @@ import subprocess
 import sys
 import typing
 
+from emulator_process import EMULATOR, EmulatorProcess
 from program import PROGRAM, ProgramTest
-
-EMULATOR = os.path.join(os.path.dirname(PROGRAM), 'abs_rig_emulator')
 
 
 def why_not():
     """Why FUSE trees cannot be served here; None if they can."""
-    if not os.path.exists(EMULATOR):
+    if not EMULATOR.exists():
         return f'{EMULATOR} was not built (libfuse3-dev)'
     if not os.access('/dev/fuse', os.W_OK):
         return '/dev/fuse is not there or not writable (modprobe fuse)'
@@ -37,30 +36,12 @@ class Widths(typing.NamedTuple):
     last_written_ns: int
 
 
-class Emulator:
-    """A running abs_rig_emulator; `command` returns its answer once it has been obeyed."""
+class Emulator(EmulatorProcess):
+    """A running abs_rig_emulator --pci-root."""
 
     def __init__(self, folder, *args):
-        self.root, self.control, self.truth = folder / 'pci', folder / 'control', folder / 'truth.csv'
-        self.process = subprocess.Popen(
-            [EMULATOR, '--pci-root', self.root, '--control', self.control, '--truth', self.truth, *map(str, args)],
-            stdout=subprocess.PIPE, text=True)
-        self.lines = []
-        line = self.process.stdout.readline()
-        while line and not line.startswith('ready'):  # "not in real time" may come before
-            line = self.process.stdout.readline()
-        assert line.startswith('ready'), 'the emulator did not start'
-
-    def command(self, text):
-        with open(self.control, 'w') as fifo:
-            fifo.write(text + '\n')
-        return self.process.stdout.readline()
-
-    def wire(self):
-        """Duties (drive, brake) that act on the rig now."""
-        answer = self.command('status')
-        part = answer[answer.index('drive '):].split(',')
-        return float(part[0].split()[1]), float(part[1].split()[1])
+        self.root, self.truth = folder / 'pci', folder / 'truth.csv'
+        super().__init__(folder, '--pci-root', self.root, '--truth', self.truth, *args)
 
     def widths(self):
         """Both PWM width registers by the card's own account."""
@@ -82,17 +63,8 @@ class Emulator:
         self.command(f'turn {wheel} {revolutions}')
 
     def kill(self):
-        self.process.kill()
-        self.process.wait()
-        self.process.stdout.close()
+        super().kill()
         subprocess.run(['umount', '-l', self.root], stderr=subprocess.DEVNULL)
-
-    def end(self):
-        if self.process.poll() is None:
-            self.process.terminate()
-        self.process.stdout.read()
-        self.process.stdout.close()
-        return self.process.wait(timeout=20)
 
 
 class RigTest(ProgramTest):
@@ -107,8 +79,7 @@ class RigTest(ProgramTest):
                 program.kill()
                 program.communicate()
         for emulator in self._emulators:
-            if emulator.process.poll() is None:
-                emulator.end()
+            emulator.end()
         super().tearDown()  # removes the folder, in which nothing may be mounted any more
 
     def emulator(self, *args):

@@ -1,9 +1,8 @@
 """Within the virtual machine: driver.kind=can between two emulated Kvaser controllers with the kernel's real driver."""
-import os
 import subprocess
 import unittest
 
-from can_rig import CanRigTest, shell
+from can_rig import PROGRAM, CanRigTest, shell
 
 
 class Kvaser(CanRigTest):
@@ -16,7 +15,7 @@ class Kvaser(CanRigTest):
     def test_1_paper(self):
         self.node()
         self.check_paper_run(self.start())
-        out = subprocess.run([os.environ['ABS_HIL_PROGRAM'], 'doctor', '--only', 'can'], capture_output=True, text=True)
+        out = subprocess.run([PROGRAM, 'doctor', '--only', 'can'], capture_output=True, text=True)
         self.assertIn('1000000 bit/s', out.stdout)
         self.assertIn('error-active', out.stdout)
 

@@ -1,16 +1,18 @@
 """Within the virtual machine: the emulated CAN node and abs_hil as processes, and what both tests of CAN ask of them."""
 import csv
 import json
-import os
 import pathlib
 import re
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
 
-PROGRAM = pathlib.Path(os.environ['ABS_HIL_PROGRAM']).resolve()
-EMULATOR = PROGRAM.parent / 'abs_rig_emulator'
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / 'app'))
+from emulator_process import EmulatorProcess  # noqa: E402
+from program import PROGRAM  # noqa: E402
+
 WATCHDOG_MS = 20
 # The plant from standstill is stiff, and the emulator shares one slow CPU with the program: ten times fewer steps there.
 PLANT = ['--set', 'plant.slip_regularisation_m_s=0.1']
@@ -22,30 +24,12 @@ def shell(command):
     return done.stdout
 
 
-class Node:
+class Node(EmulatorProcess):
     """A running abs_rig_emulator --can."""
 
     def __init__(self, folder, interface, *args):
-        self.interface, self.control, self.lines = interface, folder / 'control', []
-        self.process = subprocess.Popen([EMULATOR, '--can', interface, '--control', self.control, *PLANT, *map(str, args)],
-                                        stdout=subprocess.PIPE, text=True)
-        self.line('ready')
-
-    def line(self, start):
-        for line in self.process.stdout:
-            self.lines.append(line.strip())
-            if line.startswith(start):
-                return line
-        raise AssertionError(f'the emulator ended without "{start}": {self.lines}')
-
-    def command(self, text):
-        with open(self.control, 'w') as fifo:
-            fifo.write(text + '\n')
-        return self.line(f'{text}: ')
-
-    def wire(self):
-        found = re.search(r'drive ([\d.]+), brake ([\d.]+)', self.command('status'))
-        return float(found[1]), float(found[2])
+        self.interface = interface
+        super().__init__(folder, '--can', interface, *PLANT, *args)
 
     def wait_for(self, wanted, program):
         while program.poll() is None:
@@ -60,12 +44,6 @@ class Node:
         event = [line for line in self.lines if 'outputs zero' in line][-1]
         found = re.search(r'outputs zero: (.*); last valid command ([\d.]+) ms ago', event)
         return found[1], float(found[2])
-
-    def end(self):
-        if self.process.poll() is None:
-            self.process.kill()
-        self.process.wait()
-        self.process.stdout.close()
 
 
 class CanRigTest(unittest.TestCase):
@@ -86,7 +64,7 @@ class CanRigTest(unittest.TestCase):
         folder = self.folder / f'node{len(self.ends)}'
         folder.mkdir()
         node = Node(folder, self.node_side, *args)
-        self.ends.append(node.end)
+        self.ends.append(node.kill)
         return node
 
     def start(self, *args):

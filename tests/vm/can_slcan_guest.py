@@ -80,7 +80,7 @@ class Slcan(CanRigTest):
     def node(self, *args):
         bus = self.folder / 'bus'
         node = Node(self.folder, f'unix:{bus}', *args)
-        self.ends.append(node.end)
+        self.ends.append(node.kill)
         ADAPTER.connect(str(bus))
         self.ends.append(ADAPTER.disconnect)
         return node

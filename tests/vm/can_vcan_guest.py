@@ -1,5 +1,4 @@
-"""Within the virtual machine: driver.kind=can on vcan. Argument: Paper or Faults."""
-import os
+"""Within the virtual machine: driver.kind=can on vcan. Arguments: ABS_HIL, then Paper or Faults."""
 import pathlib
 import random
 import socket
@@ -9,7 +8,7 @@ import threading
 import time
 import unittest
 
-from can_rig import CanRigTest, shell
+from can_rig import PROGRAM, CanRigTest, shell
 from dbc import Dbc, frames_of
 
 DBC = pathlib.Path(__file__).parents[2] / 'config' / 'can' / 'abs_rig.dbc'
@@ -63,7 +62,7 @@ class Paper(Vcan):
         dump.terminate()
         dump.wait()
         self.check_recording(log, self.summary()['cycles'])
-        subprocess.run([os.environ['ABS_HIL_PROGRAM'], 'doctor', '--only', 'can'], check=True)
+        subprocess.run([PROGRAM, 'doctor', '--only', 'can'], check=True)
 
     def check_recording(self, log, cycles):
         dbc, counts, brake, last = Dbc(DBC), {}, 0.0, {}

@@ -12,9 +12,9 @@ import time
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / 'app'))
+from emulator_process import EmulatorProcess  # noqa: E402
 from program import PROGRAM, ProgramTest  # noqa: E402
 
-EMULATOR = os.path.join(os.path.dirname(PROGRAM), 'abs_rig_emulator')
 DEVICES = pathlib.Path('/sys/bus/usb/devices')
 SAFE = (0.0, 0.0)
 # What breaks breaks in braking: a computer under emulation need not go through the whole acceleration each time.
@@ -37,38 +37,14 @@ BROKEN = [
 ]
 
 
-class Emulator:
+class Emulator(EmulatorProcess):
     def __init__(self, folder, *args):
-        self.control = folder / 'control'
-        self.process = subprocess.Popen([EMULATOR, '--usb', '--control', self.control, *map(str, args)],
-                                        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-        line = self.process.stdout.readline()
-        while line and not line.startswith('ready'):
-            line = self.process.stdout.readline()
-        assert line.startswith('ready'), 'the emulator did not start'
-
-    def command(self, text):
-        with open(self.control, 'w') as fifo:
-            fifo.write(text + '\n')
-        line = self.process.stdout.readline()
-        while line.startswith('while braking'):
-            line = self.process.stdout.readline()
-        return line
-
-    def wire(self):
-        part = self.command('status').split('drive ')[1].split(',')
-        return float(part[0]), float(part[1].split()[1])
+        super().__init__(folder, '--usb', *args)
 
     def end(self):
-        if self.process.returncode is not None:
-            return ''
-        self.process.terminate()
-        text = self.process.stdout.read()
-        self.process.stdout.close()
-        self.process.wait(timeout=20)
+        super().end()
         while any(line.read_text().strip() == 'InTeCo' for line in DEVICES.glob('*/manufacturer')):
             time.sleep(0.05)  # the kernel takes its time to see that it is gone
-        return text
 
 
 class UsbTest(ProgramTest):
