@@ -4,20 +4,14 @@
 #include <sstream>
 
 #include "catch.hpp"
+#include "temporary_folder.hpp"
 
 using namespace abs_hil::archive;
 namespace fs = std::filesystem;
 
 namespace {
 
-struct TemporaryFolder {
-  TemporaryFolder() {
-    std::string name = (fs::temp_directory_path() / "abs_hil_XXXXXX").string();
-    path = ::mkdtemp(name.data());
-  }
-  ~TemporaryFolder() { fs::remove_all(path); }
-  fs::path path;
-};
+using abs_hil::test::TemporaryFolder;
 
 std::string text_of(const fs::path& path) {
   std::ifstream file(path);

@@ -3,6 +3,7 @@
 #include <fstream>
 
 #include "catch.hpp"
+#include "temporary_folder.hpp"
 
 using namespace abs_hil::archive;
 namespace fs = std::filesystem;
@@ -10,14 +11,7 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-struct TemporaryFolder {
-  TemporaryFolder() {
-    std::string name = (fs::temp_directory_path() / "abs_hil_XXXXXX").string();
-    path = ::mkdtemp(name.data());
-  }
-  ~TemporaryFolder() { fs::remove_all(path); }
-  fs::path path;
-};
+using abs_hil::test::TemporaryFolder;
 
 std::vector<SeriesEntry> three() { return {{.seed = 1}, {.seed = 2}, {.seed = 3}}; }
 

@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <variant>
 
 #include "abs_hil/driver/can/answer_tracker.hpp"
@@ -15,30 +14,12 @@
 #include "abs_hil/driver/can/frame_socket.hpp"
 #include "abs_hil/driver/can/messages.hpp"
 #include "abs_hil/driver/can/signal_codec.hpp"
+#include "fuzz_input.hpp"
 
 namespace {
 
 using namespace abs_hil::driver::can;
-
-void expect(bool holds) {
-  if (!holds) std::abort();
-}
-
-/// Takes the input apart; 0 once it is used up.
-class Input {
- public:
-  Input(const std::uint8_t* data, std::size_t size) : at_(data), left_(size) {}
-  [[nodiscard]] bool empty() const { return left_ == 0; }
-  std::uint8_t byte() {
-    if (left_ == 0) return 0;
-    --left_;
-    return *at_++;
-  }
-
- private:
-  const std::uint8_t* at_;
-  std::size_t left_;
-};
+using namespace abs_hil::fuzz;
 
 /// Identifiers of the protocol come more often than others, right checks more often than by chance.
 Frame frame_in(Input& input) {

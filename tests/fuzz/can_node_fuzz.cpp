@@ -2,34 +2,16 @@
 // and whatever it answers the driver's decoder takes. Input: records "kind, identifier, length, data ...".
 #include <algorithm>
 #include <cstdint>
-#include <cstdlib>
 
 #include "abs_hil/driver/can/messages.hpp"
 #include "abs_hil/emulator/can_node.hpp"
 #include "abs_hil/emulator/can_node_faults.hpp"
+#include "fuzz_input.hpp"
 
 namespace {
 
 using namespace abs_hil;
-
-void expect(bool holds) {
-  if (!holds) std::abort();
-}
-
-class Input {
- public:
-  Input(const std::uint8_t* data, std::size_t size) : at_(data), left_(size) {}
-  [[nodiscard]] bool empty() const { return left_ == 0; }
-  std::uint8_t byte() {
-    if (left_ == 0) return 0;
-    --left_;
-    return *at_++;
-  }
-
- private:
-  const std::uint8_t* at_;
-  std::size_t left_;
-};
+using namespace abs_hil::fuzz;
 
 emulator::BusFrame frame_in(Input& input) {
   const unsigned kind = input.byte();

@@ -1,30 +1,27 @@
 // A card whose registers hold anything: the driver neither crashes nor makes a measurement of it that no rig can give.
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <memory>
 #include <span>
 
 #include "abs_hil/driver/pci/pci_driver.hpp"
 #include "abs_hil/driver/plausibility.hpp"
+#include "fuzz_input.hpp"
 
 namespace {
 
 using namespace abs_hil;
 using namespace abs_hil::driver;
-
-void expect(bool holds) {
-  if (!holds) std::abort();
-}
+using namespace abs_hil::fuzz;
 
 /// Answers with what was written, except where the input says otherwise: then with its bytes, or not at all.
 class FuzzedWindow final : public pci::RegisterWindow {
  public:
-  explicit FuzzedWindow(std::span<const std::uint8_t>& input) : input_(input) {}
+  explicit FuzzedWindow(Input& input) : input_(input) {}
   IoResult read32(std::uint32_t offset, std::uint32_t& value) noexcept override {
     const bool indexed =
         offset == pci::reg::pwm_mode || offset == pci::reg::pwm_prescaler || offset == pci::reg::pwm_width;
-    const std::uint8_t how = byte();
+    const std::uint8_t how = input_.byte();
     if (how == 0xFF) return {IoError::no_answer, offset};
     if (indexed && how < 0xF0) {
       value = written_[offset / 4];
@@ -33,7 +30,7 @@ class FuzzedWindow final : public pci::RegisterWindow {
       value = count_;
     } else {
       value = 0;
-      for (int i = 0; i < 4; ++i) value = value << 8U | byte();
+      for (int i = 0; i < 4; ++i) value = value << 8U | input_.byte();
     }
     return {};
   }
@@ -45,13 +42,7 @@ class FuzzedWindow final : public pci::RegisterWindow {
   }
 
  private:
-  std::uint8_t byte() noexcept {
-    if (input_.empty()) return 0;
-    const std::uint8_t value = input_[0];
-    input_ = input_.subspan(1);
-    return value;
-  }
-  std::span<const std::uint8_t>& input_;
+  Input& input_;
   std::array<std::uint32_t, pci::window_bytes / 4> written_{};
   std::uint32_t count_{0};
 };
@@ -63,7 +54,7 @@ bool nan_or_within(double value, double least, double most) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  std::span<const std::uint8_t> input(data, size);
+  Input input(data, size);
   pci::PciOptions options;
   pci::PciDriver driver(options, [&input] {
     pci::Card card{.place = "fuzzed"};

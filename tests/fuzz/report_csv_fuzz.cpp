@@ -2,7 +2,6 @@
 #include <unistd.h>
 
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -12,12 +11,11 @@
 #include "abs_hil/report/input_error.hpp"
 #include "abs_hil/report/run_survey.hpp"
 #include "abs_hil/report/text.hpp"
+#include "fuzz_input.hpp"
 
 namespace {
 
-void expect(bool holds) {
-  if (!holds) std::abort();
-}
+using abs_hil::fuzz::expect;
 
 const std::filesystem::path& file() {
   static const std::filesystem::path path =

@@ -2,7 +2,6 @@
 // and run through a sequence without a number that is not finite.
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <optional>
 #include <string>
 
@@ -10,14 +9,12 @@
 #include "abs_hil/script/explain.hpp"
 #include "abs_hil/script/plan.hpp"
 #include "abs_hil/settings/config_error.hpp"
+#include "fuzz_input.hpp"
 
 namespace {
 
 using namespace abs_hil;
-
-void expect(bool holds) {
-  if (!holds) std::abort();
-}
+using abs_hil::fuzz::expect;
 
 void use(const script::Script& script) {
   settings::Settings settings;

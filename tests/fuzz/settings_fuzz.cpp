@@ -1,6 +1,5 @@
 // Any lines of `key=value`: each is refused with a ConfigError or leaves every number within its range.
 #include <cstdint>
-#include <cstdlib>
 #include <string_view>
 #include <type_traits>
 #include <variant>
@@ -8,12 +7,11 @@
 #include "abs_hil/plant_sim/factor_profile.hpp"
 #include "abs_hil/settings/config_error.hpp"
 #include "abs_hil/settings/key_table.hpp"
+#include "fuzz_input.hpp"
 
 namespace {
 
-void expect(bool holds) {
-  if (!holds) std::abort();
-}
+using abs_hil::fuzz::expect;
 
 void expect_in_range(const abs_hil::settings::KeyTable& table) {
   for (const abs_hil::settings::Key& key : table.keys()) {

@@ -3,41 +3,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <memory>
 
 #include "abs_hil/driver/plausibility.hpp"
 #include "abs_hil/driver/usb/usb_driver.hpp"
+#include "fuzz_input.hpp"
 
 namespace {
 
 using namespace abs_hil;
 using namespace abs_hil::driver;
-
-void expect(bool holds) {
-  if (!holds) std::abort();
-}
-
-/// The first bytes decide on the options and on how the rest is cut into answers.
-class Input {
- public:
-  Input(const std::uint8_t* data, std::size_t size) : rest_(data, size) {}
-  std::uint8_t byte() {
-    if (rest_.empty()) return 0;
-    const std::uint8_t value = rest_[0];
-    rest_ = rest_.subspan(1);
-    return value;
-  }
-  std::span<const std::uint8_t> bytes(std::size_t count) {
-    const auto part = rest_.first(std::min(count, rest_.size()));
-    rest_ = rest_.subspan(part.size());
-    return part;
-  }
-  [[nodiscard]] bool empty() const { return rest_.empty(); }
-
- private:
-  std::span<const std::uint8_t> rest_;
-};
+using namespace abs_hil::fuzz;
 
 /// A first frame like a board's, and every later answer as the input has it; short ones too.
 class FuzzedLink final : public usb::FrameLink {

@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "abs_hil/plant_sim/plant.hpp"
+#include "brake_courses.hpp"
 #include "catch.hpp"
 #include "rigs.hpp"
 
@@ -11,26 +12,7 @@ using Catch::Matchers::WithinRel;
 TEST_CASE("A locked wheel stands at exactly zero, never below, until both stand for good") {
   Plant plant{PlantOptions{}};
   plant.reset(rolling_at_170);
-  const PlantInput full_brake{.brake_duty = 1.0};
-  int locked_at = -1;
-  int standing_at = -1;
-  for (int tick = 0; tick < 4000; ++tick) {
-    plant.advance(1e-3, full_brake);
-    const PlantState& s = plant.state();
-    REQUIRE(s.omega1_rad_s >= 0.0);
-    REQUIRE(s.omega2_rad_s >= 0.0);
-    if (s.omega1_rad_s == 0.0 && locked_at < 0) locked_at = tick;
-    if (locked_at >= 0) REQUIRE(s.omega1_rad_s == 0.0);
-    if (s.omega2_rad_s == 0.0 && standing_at < 0) standing_at = tick;
-    if (standing_at >= 0) REQUIRE(s.omega2_rad_s == 0.0);
-  }
-  CHECK(locked_at > 0);
-  CHECK(standing_at > locked_at);
-  const PlantState at_rest = plant.state();
-  plant.advance(3600.0, {});
-  CHECK(plant.state().angle1_rad == at_rest.angle1_rad);
-  CHECK(plant.state().angle2_rad == at_rest.angle2_rad);
-  CHECK(plant.slip() == 0.0);
+  check_locks_then_stands(plant, 4000);
 }
 
 TEST_CASE("A standing pair takes no substeps") {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "abs_hil/plant_sim/plant.hpp"
+#include "brake_courses.hpp"
 #include "catch.hpp"
 #include "rigs.hpp"
 
@@ -132,42 +133,15 @@ TEST_CASE("Without the motor the maker's plant never gains energy") {
     plant.reset({.omega1_rad_s = between(-scale, scale),
                  .omega2_rad_s = trial % 5 == 0 ? 0.0 : between(-scale, scale),
                  .brake_torque_Nm = between(0.0, 9.0)});
-    const auto energy_J = [&] {
-      const PlantState& s = plant.state();
-      return 0.5 * (J1 * s.omega1_rad_s * s.omega1_rad_s + J2 * s.omega2_rad_s * s.omega2_rad_s);
-    };
-    double before_J = energy_J();
-    for (int tick = 0; tick < 100; ++tick) {
-      plant.advance(between(0.1e-3, 2e-3), {.brake_duty = between(0.0, 1.0)});
-      const double after_J = energy_J();
-      INFO("trial " << trial << ", tick " << tick << ": " << before_J << " J to " << after_J << " J");
-      REQUIRE(after_J <= before_J * (1.0 + 1e-12));
-      before_J = after_J;
-    }
+    INFO("trial " << trial);
+    require_energy_never_rises(plant, J1, J2, between);
   }
 }
 
 TEST_CASE("The maker's plant locks, stands at exactly 0 and stays there; released before, it breaks away") {
   Plant plant(inteco_manual());
   plant.reset(rolling_at_170);
-  int locked_at = -1;
-  int standing_at = -1;
-  for (int tick = 0; tick < 2000; ++tick) {
-    plant.advance(1e-3, {.brake_duty = 1.0});
-    const PlantState& s = plant.state();
-    REQUIRE(s.omega1_rad_s >= 0.0);
-    REQUIRE(s.omega2_rad_s >= 0.0);
-    if (s.omega1_rad_s == 0.0 && locked_at < 0) locked_at = tick;
-    if (locked_at >= 0) REQUIRE(s.omega1_rad_s == 0.0);
-    if (s.omega2_rad_s == 0.0 && standing_at < 0) standing_at = tick;
-    if (standing_at >= 0) REQUIRE(s.omega2_rad_s == 0.0);
-  }
-  CHECK(locked_at > 0);
-  CHECK(standing_at > locked_at);
-  const double angle_rad = plant.state().angle2_rad;
-  plant.advance(3600.0, {});
-  CHECK(plant.state().angle2_rad == angle_rad);
-  CHECK(plant.slip() == 0.0);
+  check_locks_then_stands(plant, 2000);
 
   // From 9 N m the brake's lag needs log(9 / 3.29532) / c31 to fall to M1 = r1 F - M10.
   plant.reset({.omega2_rad_s = 100.0, .brake_torque_Nm = 9.0});

@@ -193,7 +193,7 @@ TEST_CASE("a motor that is not enabled stays so, and the result says what was do
   CHECK(next.fault_value == 0.0);
 }
 
-TEST_CASE("what the board reports of itself latches") {
+TEST_CASE("what the board reports of itself latches and makes the command safe") {
   struct Row {
     rig::Measurement measurement;
     Reason reason;
@@ -202,17 +202,22 @@ TEST_CASE("what the board reports of itself latches") {
   const Row row = GENERATE(values<Row>({
       {{.trip_flags = 1}, Reason::board_interlock_tripped, 1.0},
       {{.trip_flags = 2}, Reason::board_supply_tripped, 2.0},
+      {{.trip_flags = 3}, Reason::board_interlock_tripped, 3.0},
+      {{.trip_flags = 4}, Reason::board_interlock_tripped, 4.0},
       {{.trip_flags = 6}, Reason::board_interlock_tripped, 6.0},
       {{.supply_V = 11.9}, Reason::board_supply_low, 11.9},
       {{.supply_V = 12.0}, Reason::none, 0.0},
       {{.temperature_C = 80.1}, Reason::board_too_hot, 80.1},
       {{.temperature_C = 80.0}, Reason::none, 0.0},
       {{}, Reason::none, 0.0},  // NaN: the board cannot tell
+      {{.supply_V = 0.0, .temperature_C = 200.0, .trip_flags = 2}, Reason::board_supply_tripped, 2.0},
   }));
   CommandGate gate({.supply_min_V = 12.0, .temperature_max_C = 80.0});
   std::ignore = gate.watch(row.measurement, 0);
   CHECK(gate.fault() == row.reason);
   CHECK(gate.fault_value() == row.value);
+  const GateResult result = gate.check({.brake_duty = 0.5}, {});
+  CHECK((result.command.brake_duty == 0.0) == (row.reason != Reason::none));
 }
 
 TEST_CASE("a board that no longer reports its health is a fault, one that never did is none") {
