@@ -1,3 +1,5 @@
+#include "abs_hil/app/program.hpp"
+
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -5,7 +7,6 @@
 #include <exception>
 #include <stdexcept>
 
-#include "abs_hil/app/program.hpp"
 #include "abs_hil/diagnosis/doctor.hpp"
 #include "abs_hil/driver/io_result.hpp"
 #include "abs_hil/settings/config_error.hpp"
