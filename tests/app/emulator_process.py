@@ -3,9 +3,9 @@ import pathlib
 import re
 import subprocess
 
-import program
+from program import PROGRAM, ProgramTest
 
-EMULATOR = pathlib.Path(program.PROGRAM).parent / 'abs_rig_emulator'
+EMULATOR = pathlib.Path(PROGRAM).parent / 'abs_rig_emulator'
 
 
 class EmulatorProcess:
@@ -50,3 +50,34 @@ class EmulatorProcess:
             self.lines += self.process.stdout.read().splitlines()
             self.process.stdout.close()
         return self.process.wait(timeout=20)
+
+
+class EmulatorTest(ProgramTest):
+    """Ends the programs and then the emulators that a test started, however it ends."""
+
+    def setUp(self):
+        super().setUp()
+        self._emulators = []
+        self._programs = []
+
+    def tearDown(self):
+        for running in self._programs:
+            if running.poll() is None:
+                running.kill()
+                running.communicate()
+        for emulator in self._emulators:
+            emulator.end()
+        super().tearDown()  # removes the folder, in which nothing may be mounted any more
+
+    def start_emulator(self, kind, *args):
+        """An EmulatorProcess of this kind with a folder of its own."""
+        folder = self.folder / str(len(self._emulators))
+        folder.mkdir()
+        self._emulators.append(kind(folder, *args))
+        return self._emulators[-1]
+
+    def start_program(self, *args):
+        """abs_hil in this test's folder."""
+        self._programs.append(subprocess.Popen([pathlib.Path(PROGRAM).resolve(), *map(str, args)], cwd=self.folder,
+                                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
+        return self._programs[-1]

@@ -6,8 +6,7 @@ import subprocess
 import sys
 import typing
 
-from emulator_process import EMULATOR, EmulatorProcess
-from program import PROGRAM, ProgramTest
+from emulator_process import EMULATOR, EmulatorProcess, EmulatorTest
 
 
 def why_not():
@@ -67,26 +66,9 @@ class Emulator(EmulatorProcess):
         subprocess.run(['umount', '-l', self.root], stderr=subprocess.DEVNULL)
 
 
-class RigTest(ProgramTest):
-    def setUp(self):
-        super().setUp()
-        self._emulators = []
-        self._programs = []
-
-    def tearDown(self):
-        for program in self._programs:
-            if program.poll() is None:
-                program.kill()
-                program.communicate()
-        for emulator in self._emulators:
-            emulator.end()
-        super().tearDown()  # removes the folder, in which nothing may be mounted any more
-
+class RigTest(EmulatorTest):
     def emulator(self, *args):
-        folder = self.folder / str(len(self._emulators))
-        folder.mkdir()
-        self._emulators.append(Emulator(folder, *args))
-        return self._emulators[-1]
+        return self.start_emulator(Emulator, *args)
 
     def lock_step(self, emulator, *args):
         return self.run_program('--backend', 'rig', '--fast', '--no-lcm', '--set', 'driver.emulated=true', '--set',
@@ -94,8 +76,5 @@ class RigTest(ProgramTest):
 
     def real_time(self, emulator, *args, guardian_timeout_ms=1000):
         """Patient with this computer's own pauses: a guardian must not end a run that only waits for its turn."""
-        self._programs.append(subprocess.Popen(
-            [os.path.abspath(PROGRAM), '--backend', 'rig', '--no-lcm', '--set', f'driver.pci.root={emulator.root}',
-             '--set', f'guardian.timeout_ms={guardian_timeout_ms}', *map(str, args)], cwd=self.folder,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
-        return self._programs[-1]
+        return self.start_program('--backend', 'rig', '--no-lcm', '--set', f'driver.pci.root={emulator.root}', '--set',
+                                  f'guardian.timeout_ms={guardian_timeout_ms}', *args)

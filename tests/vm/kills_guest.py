@@ -24,7 +24,8 @@ import time
 import typing
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / 'app'))
-from rig_emulator import PROGRAM, Emulator  # noqa: E402
+from program import PROGRAM  # noqa: E402
+from rig_emulator import Emulator  # noqa: E402
 
 BOUND_MS = 50
 # A register access over FUSE takes 0.07 ms here: eleven of them and the plant leave 1 kHz no time to spare.
