@@ -9,6 +9,7 @@
 #include "abs_hil/control/lyapunov.hpp"
 #include "catch.hpp"
 #include "control/braking_bench.hpp"
+#include "control/drawn_gains.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;
@@ -97,17 +98,8 @@ TEST_CASE("V never grows and its derivative is -x'Qx - ka1 phi theta~^2") {
     s.rig.tyre.theta_N = between(10.0, 60.0);
     s.rig.tyre.B = between(15.0, 35.0);
     s.rig.tyre.C = between(1.3, 1.8);
-    auto& o = s.options.adaptive;
-    o.gamma = between(5.0, 50.0);
-    o.ks0 = between(5.0, 50.0);
-    o.ks1 = between(15.0, 60.0);
-    o.ka1 = between(0.3, 3.0);
-    o.q11 = between(0.5, 3.0);
-    o.q22 = between(0.5, 3.0);
-    o.q12 = between(-0.4, 0.4);
-    o.theta_min_N = -1000.0;
-    o.theta_max_N = 1000.0;
-    o.zeta0 = between(0.5, 1.4) * s.rig.tyre.theta_N;
+    bench::draw_gains(s.options.adaptive, between);
+    s.options.adaptive.zeta0 = between(0.5, 1.4) * s.rig.tyre.theta_N;
     s.omega2_start = between(80.0, 180.0);
     s.omega1_start = s.omega2_start * s.rig.wheels.r2_m / s.rig.wheels.r1_m * (1.0 - between(0.02, 0.06));
     s.max_time_s = 0.5;

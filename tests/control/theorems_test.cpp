@@ -10,6 +10,7 @@
 
 #include "catch.hpp"
 #include "control/braking_bench.hpp"
+#include "control/drawn_gains.hpp"
 
 using namespace abs_hil;
 
@@ -34,16 +35,7 @@ bench::Setup any_rig() {
   w.M20_Nm = between(0.0, 0.2);
   s.rig.tyre = {.theta_N = between(10.0, 60.0), .B = between(10.0, 40.0), .C = between(1.2, 1.9)};
   s.options.slip_ref = between(0.03, 0.3);
-  auto& o = s.options.adaptive;
-  o.gamma = between(5.0, 50.0);
-  o.ks0 = between(5.0, 50.0);
-  o.ks1 = between(15.0, 60.0);
-  o.ka1 = between(0.3, 3.0);
-  o.q11 = between(0.5, 3.0);
-  o.q22 = between(0.5, 3.0);
-  o.q12 = between(-0.4, 0.4);
-  o.theta_min_N = -1000.0;
-  o.theta_max_N = 1000.0;
+  bench::draw_gains(s.options.adaptive, between);
   s.omega2_start = between(100.0, 180.0);
   s.omega1_start = s.omega2_start * w.r2_m / w.r1_m * (1.0 - s.options.slip_ref * between(0.7, 1.3));
   s.options.rate_Hz = 10'000.0;

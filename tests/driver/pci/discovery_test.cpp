@@ -1,7 +1,5 @@
 #include "abs_hil/driver/pci/discovery.hpp"
 
-#include <unistd.h>
-
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -9,6 +7,7 @@
 #include "abs_hil/driver/io_result.hpp"
 #include "abs_hil/driver/pci/sysfs_window.hpp"
 #include "catch.hpp"
+#include "temporary_folder.hpp"
 
 using namespace abs_hil::driver;
 using namespace abs_hil::driver::pci;
@@ -18,18 +17,10 @@ namespace {
 
 /// A tree of ordinary files that looks like /sys/bus/pci/devices.
 class Tree {
+  abs_hil::test::TemporaryFolder folder_{};
+
  public:
-  Tree() {
-    std::string pattern = (fs::temp_directory_path() / "abs_hil_pci.XXXXXX").string();
-    root = ::mkdtemp(pattern.data());
-    options.root = root.string();
-  }
-  Tree(const Tree&) = delete;
-  Tree& operator=(const Tree&) = delete;
-  ~Tree() {
-    std::error_code ignored;
-    fs::remove_all(root, ignored);
-  }
+  Tree() { options.root = root.string(); }
   void add(const std::string& bdf, const std::string& vendor = "0x10b5", const std::string& device = "0x2497") const {
     fs::create_directories(root / bdf);
     put(bdf, "vendor", vendor + "\n");
@@ -45,7 +36,7 @@ class Tree {
     std::ofstream(root / bdf / file) << text;
   }
 
-  fs::path root;
+  const fs::path& root = folder_.path;
   PciOptions options{};
 };
 

@@ -106,7 +106,4 @@ using driver::PwmMode;
 /// Registers 54, 58 and 5C (low 16 bits) with register 50: rad/s; NaN if the period is 0.
 [[nodiscard]] double velocity_rad_s(std::uint32_t raw, std::uint32_t period_ticks) noexcept;
 
-/// Bit 1 of register AC is the supply. Bits 0 and 2 are temperature and overspeed, in an order the sources disagree on.
-inline constexpr std::uint32_t supply_trip_bit = 1U << 1U;
-
 }  // namespace abs_hil::driver::pci
