@@ -49,8 +49,9 @@ std::string read_key(const std::filesystem::path& file) {
         "> commands.key), then --set commands.key_file=commands.key");
   }
   struct stat facts {};
-  if (::stat(file.c_str(), &facts) != 0)
+  if (::stat(file.c_str(), &facts) != 0) {
     refuse(file, std::string("cannot be read: ") + std::strerror(errno) + make_one);
+  }
   if (!S_ISREG(facts.st_mode)) refuse(file, "is no file" + make_one);
   if ((facts.st_mode & S_IRWXO) != 0) refuse(file, "is open to everybody: chmod o= " + file.string());
   std::ifstream stream(file, std::ios::binary);

@@ -95,8 +95,9 @@ void publish(lcm_t* lcm, const std::string& channel, const Message& message) {
 }
 
 Reply reply_of(const std::optional<event_t>& answer) {
-  if (!answer)
+  if (!answer) {
     return {Outcome::no_answer, "no answer: is abs_hil running, on this network and with this channel prefix?"};
+  }
   const auto reason = static_cast<rig::Reason>(answer->reason);
   const bool accepted = reason == rig::Reason::stop_command || rig::is_adjustment(reason);
   return {accepted ? Outcome::accepted : Outcome::refused, answer->message};

@@ -72,7 +72,7 @@ class CommandListener {
   static constexpr std::size_t max_packet_bytes = UdpmReceiver::payload_max;
   /// As it came through liblcm.
   struct Packet {
-    std::array<std::uint8_t, max_packet_bytes> bytes;
+    std::array<std::uint8_t, max_packet_bytes> bytes{};
     std::size_t size{0};  ///< as received; larger than `bytes` if it did not fit
     bool arrived{false};
   };
