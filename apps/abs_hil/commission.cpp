@@ -50,7 +50,7 @@ class GuardedPulse final : public experiment::PulseGuard {
     driver_.tell_before_making_safe(&*guardian_);
   }
   [[nodiscard]] bool beat() noexcept override {
-    if (!guardian_) return true;
+    if (!guardian_ || !watch_) return true;
     watch_->beat();
     return guardian_->alive();
   }
