@@ -33,7 +33,7 @@ TEST_CASE("The table covers the whole frame, without gap or overlap, each group 
 }
 
 TEST_CASE("A frame to the board: the mark, and no other word with bit 15") {
-  const Frame shown = any_frame(GENERATE(1, 2, 3));
+  const Frame shown = any_frame(GENERATE(1U, 2U, 3U));
   const Frame frame = frame_from(shown);
   CHECK(frame[0] == 0x0F);
   CHECK(frame[1] == 0x8F);
