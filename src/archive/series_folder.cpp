@@ -14,8 +14,9 @@ namespace {
 void move_to(const fs::path& from, const fs::path& to) {
   std::error_code error;
   fs::rename(from, to, error);
-  if (error)
+  if (error) {
     throw FolderError(fmt::format("cannot rename \"{}\" to \"{}\": {}", from.string(), to.string(), error.message()));
+  }
 }
 
 }  // namespace
@@ -78,7 +79,7 @@ std::string SeriesFolder::status(std::size_t run) const {
 }
 
 fs::path SeriesFolder::begin(std::size_t run) {
-  const fs::path part = path_ / (name_of(run) + ".part");
+  fs::path part = path_ / (name_of(run) + ".part");
   if (fs::exists(part)) {
     fs::path kept;
     for (int i = 1; kept.empty() || fs::exists(kept); ++i) {

@@ -46,8 +46,9 @@ ControllerColumn column_of(const std::string& name, const std::vector<RunResult>
   for (const ComparedMetric& metric : metrics) {
     const std::vector<double> values = values_of(runs, metric);
     column.means.push_back(analysis::estimate_mean(values));
-    if (first != nullptr)
+    if (first != nullptr) {
       column.differences.push_back(analysis::estimate_difference(values, values_of(*first, metric)));
+    }
   }
   return column;
 }

@@ -77,6 +77,7 @@ bool follows_slip_reference(std::string_view controller) noexcept { return contr
 
 std::vector<std::string_view> tunable_controllers() {
   std::vector<std::string_view> names;
+  names.reserve(table.size());
   for (const Entry& entry : table) names.push_back(entry.controller);
   return names;
 }

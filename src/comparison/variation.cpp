@@ -84,7 +84,7 @@ Variation Variation::parse(std::string_view text) {
 
 std::string Variation::text() const {
   std::string text;
-  const auto add = [&text](std::string entry) { text += (text.empty() ? "" : ",") + entry; };
+  const auto add = [&text](const std::string& entry) { text += (text.empty() ? "" : ",") + entry; };
   const auto add_magnitude = [&add](std::string_view name, double magnitude) {
     if (magnitude > 0.0) add(fmt::format("{}={}", name, magnitude));
   };

@@ -66,7 +66,6 @@ class WheelModel {
   [[nodiscard]] UpperWheelTorques upper_torques(const ContactState& c) const noexcept {
     return {c.upper_sliding, wheels_.M10_Nm + c.brake_torque_Nm, wheels_.d1_Nms_rad * c.omega1_rad_s};
   }
-  // NOLINTNEXTLINE(bugprone-exception-escape): a variant that was never assigned to always holds a value
   [[nodiscard]] double force_N(double shape, const ContactState& c) const noexcept {
     const UpperWheelTorques torques = upper_torques(c);
     return std::visit([&](const auto& load) { return load.force_N(shape, torques); }, load_);
