@@ -15,7 +15,8 @@ using test::NodeOnSocket;
 namespace {
 
 constexpr std::int64_t ms = 1'000'000;
-/// The node answers from a thread of its own, which a busy computer may hold up: in lock-step no cycle is short of time.
+/// The node answers from a thread of its own, which a busy computer may hold up: in lock-step no cycle is short of
+/// time.
 constexpr std::int32_t patient_us = 30'000;
 
 struct Active {
