@@ -66,7 +66,8 @@ std::string shown(const toml::node& node) {
   if (text.size() > longest_shown) {
     std::size_t end = longest_shown;
     while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
-    text = text.substr(0, end) + "...";
+    text.resize(end);
+    text += "...";
   }
   return text;
 }

@@ -68,7 +68,8 @@ TcpqServer ask_tcpq_server(const Endpoint& endpoint, int timeout_ms) noexcept {
   if (::send(socket.get(), greeting.data(), sizeof greeting, MSG_NOSIGNAL) != sizeof greeting) {
     return TcpqServer::absent;
   }
-  std::array<std::uint8_t, 2 * sizeof(std::uint32_t)> answer{};
+  constexpr std::size_t answer_bytes = 8;
+  std::array<std::uint8_t, answer_bytes> answer{};
   for (std::size_t got = 0; got < answer.size();) {
     if (!deadline.wait(socket.get(), POLLIN)) return TcpqServer::silent;
     const ssize_t size = ::recv(socket.get(), answer.data() + got, answer.size() - got, 0);
