@@ -36,7 +36,7 @@ Eigen::Matrix2d solve_lyapunov(const Eigen::Matrix2d& A, const Eigen::Matrix2d& 
   const Eigen::Vector4d solution = map.fullPivLu().solve(right_side);
 
   const Eigen::Matrix2d P = Eigen::Map<const Eigen::Matrix2d>(solution.data());
-  const Eigen::Matrix2d symmetric = 0.5 * (P + P.transpose());
+  Eigen::Matrix2d symmetric = 0.5 * (P + P.transpose());
   if (!is_positive_definite(symmetric)) throw std::invalid_argument("the error dynamics A must be stable");
   return symmetric;
 }

@@ -76,6 +76,7 @@ std::vector<Finding> judge(const std::vector<PciBoard>& boards) {
     return {{.check = "boards", .what = "no RT-DAC4/PCI (10b5:2497) found", .standing = Standing::note}};
   }
   std::vector<Finding> findings;
+  findings.reserve(boards.size());
   for (const PciBoard& board : boards) findings.push_back(judge_board(board));
   return findings;
 }

@@ -111,6 +111,7 @@ constexpr std::array<Check, 8> checks{{
 
 std::vector<std::string> check_names() {
   std::vector<std::string> names;
+  names.reserve(checks.size());
   for (const Check& check : checks) names.emplace_back(check.name);
   return names;
 }

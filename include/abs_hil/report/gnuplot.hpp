@@ -37,7 +37,7 @@ void draw(const std::vector<Figure>& figures, PictureFormat format, const std::f
 /// An SVG of gnuplot's with other fonts named beside ours, for machines that do not have it.
 [[nodiscard]] std::string with_common_fonts(std::string svg);
 
-/// A picture of gnuplot's made part of a page: bare <svg> element, curves marked with class, run, quantity and number
+/// A picture of gnuplot's made part of a page: a bare `svg` element, curves marked with class, run, quantity and number
 /// of points, names that do not clash with those of other pictures.
 [[nodiscard]] std::string embeddable_svg(const std::string& svg, const Figure& figure);
 
