@@ -118,7 +118,9 @@ void add_options(CLI::App& cli, Options& o) {
   add_export("--json", report::ExportFormat::json, "runs with summaries, one array a column");
   add_export("--octave", report::ExportFormat::octave, "MAT-file for Octave, MATLAB, SciPy");
   formats->require_option(0, 1);
-  cli.add_option("--columns", o.columns, "columns to export, separated by commas (default: all)")->delimiter(',');
+  cli.add_option("--columns", o.columns, "columns to export, separated by commas (default: all)")
+      ->allow_extra_args(false)
+      ->delimiter(',');
 }
 
 int run(int argc, char** argv) {

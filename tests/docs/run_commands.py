@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """usage: run_commands.py ROOT BUILD [PAGE...] | --self-test
 
-Runs every command that README.md, CONTRIBUTING.md and docs/*.md show, block by block, each block in a scratch folder that
+Runs every command that README.md, CONTRIBUTING.md and docs/*.md show, page by page, each page in a scratch folder that
 looks like the top of the tree. A command must end with status 0, within its time. What cannot be run here stands in
 not_run.txt, with the reason; an entry there that matches nothing is an error, as is a command that is neither.
 
@@ -106,7 +106,7 @@ class Exceptions:
 
 
 class Scratch:
-    """A folder with the tree's entries as links, our programs on the PATH, and servers that end with the block."""
+    """A folder with the tree's entries as links, our programs on the PATH, and servers."""
 
     def __init__(self, root, build):
         self.folder = tempfile.TemporaryDirectory()
@@ -144,19 +144,23 @@ class Scratch:
             return f'ended with status {server.returncode}:\n{server.stdout.read().decode()[-1500:]}'
         return None
 
-    def close(self):
+    def end_servers(self):
         for server in reversed(self.servers):
             if server.poll() is None:
                 os.killpg(server.pid, signal.SIGTERM)
                 server.wait(timeout=20)
+        self.servers = []
+
+    def close(self):
+        self.end_servers()
         self.folder.cleanup()
 
 
 def check(root, build, pages, exceptions):
     wrong, ran, skipped = [], 0, []
     for page in pages:
+        scratch = Scratch(root, build)
         for block in blocks(page.read_text()):
-            scratch = Scratch(root, build)
             for command, printed in commands(block):
                 reason = exceptions.reason(command)
                 if reason:
@@ -169,7 +173,8 @@ def check(root, build, pages, exceptions):
                       f'{time.monotonic() - start:.1f} s', flush=True)
                 if fault:
                     wrong.append(f'{page.relative_to(root)}: {command}\n  {fault}')
-            scratch.close()
+            scratch.end_servers()
+        scratch.close()
     print(f'{ran} commands run, {len(skipped)} not run:')
     print('\n'.join('  ' + line for line in skipped))
     return wrong, ran

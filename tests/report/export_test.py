@@ -36,8 +36,9 @@ class Export(ReportTest):
                 self.assertEqual(struct.pack('d', float(row[column])), struct.pack('d', float(wanted[column])))
 
     def test_columns_are_chosen(self):
-        lines = self.report('--csv', '--columns', 'time_s,slip', self.runs[0]).stdout.decode().splitlines()
+        lines = self.report('--csv', '--columns', 'time_s,slip', *self.runs).stdout.decode().splitlines()
         self.assertEqual(lines[0], 'run,time_s,slip')
+        self.assertEqual({line.split(',')[0] for line in lines[1:]}, {'adaptive', 'locked'})
         said = self.report('--csv', '--columns', 'time_s,slope', self.runs[0], status=2).stderr.decode()
         self.assertIn('no column "slope"', said)
 
