@@ -86,7 +86,7 @@ class TimingWatch {
 
   void poll() {
     if (std::exchange(real_time_wanted_, false)) {
-      const runtime::RealtimeReport report = session_.outcome().realtime;
+      const runtime::RealtimeReport& report = session_.realtime_report();
       const std::string shortcomings = report.shortcomings();
       if (!report.realtime()) {
         spdlog::warn("NOT IN REAL TIME: late cycles, wrong brake torques are to be expected\n{}", shortcomings);

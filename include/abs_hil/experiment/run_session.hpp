@@ -65,7 +65,9 @@ class RunSession {
   [[nodiscard]] std::uint64_t record_drops() const noexcept { return ring_.drops(); }
   /// True once the run's thread has obtained real time.
   [[nodiscard]] bool realtime() const noexcept { return realtime_.realtime(); }
-  /// How the run went, after it.
+  /// What it obtained. For the slow thread, from its first poll on.
+  [[nodiscard]] const runtime::RealtimeReport& realtime_report() const noexcept { return realtime_; }
+  /// How the run went. After it: the cycle's own thread writes what this reads.
   [[nodiscard]] RunOutcome outcome() const;
   [[nodiscard]] const rig::CycleRecord& latest() const noexcept { return pump_.latest(); }
 
