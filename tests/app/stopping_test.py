@@ -28,6 +28,15 @@ class Stopping(ProgramTest):
             time.sleep(0.02)
         return program
 
+    def wait_for_speed(self, program, omega2_rad_s):
+        deadline, seen = time.monotonic() + 20, 0.0
+        while seen < omega2_rad_s:
+            self.assertLess(time.monotonic(), deadline, f'no more than {seen} rad/s')
+            self.assertIsNone(program.poll(), 'it ended by itself')
+            time.sleep(0.02)
+            head, *rows = self.csv.read_text().split('\n')[:-1]  # whole rows
+            seen = float(rows[-1].split(',')[head.split(',').index('omega2_rad_s')])
+
     def end(self, program):
         if program.poll() is None:
             program.kill()
@@ -46,6 +55,7 @@ class Stopping(ProgramTest):
                 # The first one brakes for a minute: wheels that nothing brakes run on for longer.
                 program = self.start('--set', 'experiment.stop_brake_duty=0.01', '--set',
                                      'experiment.stop_brake_limit_s=60')
+                self.wait_for_speed(program, 20.0)  # at standstill the brake would have nothing to do
                 program.send_signal(signal.SIGINT)
                 deadline = time.monotonic() + 20
                 while b',hold,' not in self.csv.read_bytes()[-3000:]:
@@ -59,7 +69,7 @@ class Stopping(ProgramTest):
 
     def test_brake_for_a_stop(self):
         program = self.start('--set', 'experiment.stop_brake_duty=0.6')
-        time.sleep(0.5)  # some speed to brake from
+        self.wait_for_speed(program, 20.0)
         program.send_signal(signal.SIGTERM)
         self.assert_stopped_in_order(program, 143)
         braking = [row for row in self.rows(self.csv) if row['phase'] == 'hold']
