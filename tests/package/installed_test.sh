@@ -20,7 +20,7 @@ if grep -r "$source" usr/lib*/*/cmake/abs_hil usr/lib*/cmake/abs_hil 2>/dev/null
   echo "the installed CMake files refer to the source tree"
   exit 1
 fi
-cmake -S example -B example/build -DCMAKE_PREFIX_PATH="$scratch/usr" \
+cmake -G Ninja -S example -B example/build -DCMAKE_PREFIX_PATH="$scratch/usr" \
   ${CMAKE_CXX_COMPILER_LAUNCHER:+-DCMAKE_CXX_COMPILER_LAUNCHER="$CMAKE_CXX_COMPILER_LAUNCHER"} >cmake.log ||
   { cat cmake.log; exit 1; }
 cmake --build example/build >build.log || { cat build.log; exit 1; }
