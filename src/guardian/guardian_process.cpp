@@ -195,10 +195,9 @@ GuardianProcess::Farewell GuardianProcess::end() noexcept {
   if (ready_ >= 0) ::close(std::exchange(ready_, -1));
   if (pid_ == 0) return Farewell::none;
   const bool handed_over = region_.stage() == Stage::handed_over;
-  // One that has work to do looks at its outputs alone.
+  // Outputs that were handed over stay so: a guardian that is held up must find them so, however late.
   if (!handed_over) region_.set_stage(Stage::closed);
   const bool ended = ended_within(ends_within_ms);
-  if (handed_over) region_.set_stage(Stage::closed);
   Farewell farewell = Farewell::insisting;
   if (!ended && !handed_over) ::kill(pid_, SIGKILL);  // stopped or hung: the outputs are safe without it
   if (ended || !handed_over) {

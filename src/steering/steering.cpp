@@ -54,16 +54,16 @@ telemetry::CommandAnswer Steering::carry_out(const command2_t& command, bool& ta
   if (mailbox_ == nullptr) return {Reason::command_not_now, "the run has not begun"};
   if (over_) return {Reason::command_not_now, "the run has ended"};
   experiment::Adjustment adjustment;
+  settings::LiveSettings changed = live_;
   Pending pending{.key = {}, .value = command.value, .sender = command.sender};
   if (command.command == "start") {
     if (!waiting_) return {Reason::command_not_now, "the run does not wait for its start (--wait-for-start)"};
-    waiting_ = false;
     pending.key = start_name;
     pending.value = 0.0;
   } else if (command.command == "slip-ref" || command.command == "gain") {
     try {
-      pending.key = live_.resolve(command.command == "gain" ? shown(command.name) : "control.slip_ref");
-      adjustment = live_.set(pending.key, command.value);
+      pending.key = changed.resolve(command.command == "gain" ? shown(command.name) : "control.slip_ref");
+      adjustment = changed.set(pending.key, command.value);
     } catch (const settings::ConfigError& error) {
       return {Reason::command_out_of_range, error.what()};
     }
@@ -72,6 +72,8 @@ telemetry::CommandAnswer Steering::carry_out(const command2_t& command, bool& ta
   }
   const std::uint32_t number = mailbox_->put(std::move(adjustment));
   if (number == 0) return {Reason::command_not_now, "too many changes at once: send it again"};
+  if (pending.key == start_name) waiting_ = false;
+  live_ = std::move(changed);
   pending_.emplace(number, std::move(pending));
   taken = true;
   return {};

@@ -20,6 +20,7 @@ settings::Settings with_commands(const std::filesystem::path& key_file) {
   settings::Settings settings;
   settings.commands.enabled = true;
   settings.commands.key_file = key_file.string();
+  settings.experiment.wait_for_start = true;
   return settings;
 }
 
@@ -45,11 +46,12 @@ struct Bench {
     stream.consume(record, 0.0);
     steering.consume(record, 0.0);
   }
-  command2_t slip_ref(std::int64_t sequence, double value) {
+  command2_t slip_ref(std::int64_t sequence, double value) { return command(sequence, "slip-ref", value); }
+  command2_t command(std::int64_t sequence, const std::string& what, double value) {
     command2_t command{};
     command.session = captured.all<command_state_t>("ABS_COMMAND_STATE").back().session;
     command.sequence = sequence;
-    command.command = "slip-ref";
+    command.command = what;
     command.value = value;
     command.sender = std::to_string(sequence);
     command.mac = mac_of(command, key);
@@ -93,6 +95,22 @@ TEST_CASE("after the run's end a command is refused with that reason") {
   REQUIRE(answer.has_value());
   CHECK(answer->reason == rig::Reason::command_not_now);
   CHECK(answer->message == "refused 'slip-ref': the run has ended");
+}
+
+TEST_CASE("a change that found no room leaves nothing behind, and can be sent again") {
+  Bench bench;
+  std::int64_t sequence = 0;
+  std::optional<telemetry::CommandAnswer> answer;
+  while (!answer) answer = bench.steering.judge(bench.slip_ref(++sequence, 0.1));
+  CHECK(answer->message == "refused 'slip-ref': too many changes at once: send it again");
+  CHECK(bench.steering.judge(bench.command(++sequence, "start", 0.0)).has_value());
+
+  experiment::AdjustmentMailbox::Arrived arrived{};
+  while (bench.mailbox.take(arrived)) {
+  }
+  CHECK_FALSE(bench.steering.judge(bench.command(++sequence, "start", 0.0)).has_value());
+  REQUIRE(bench.mailbox.take(arrived));
+  CHECK(arrived.kind == experiment::Adjustment::Kind::start);
 }
 
 }  // namespace

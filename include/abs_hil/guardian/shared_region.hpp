@@ -14,7 +14,7 @@ enum class Stage : std::uint32_t {
   guarded = 0,      ///< outputs may be driven
   released = 1,     ///< the controller has brought the outputs into the safe state and verified it
   handed_over = 2,  ///< the controller has given the outputs up without knowing them safe: it writes zeros only
-  closed = 3,       ///< the run is over, its files are written
+  closed = 3,       ///< the run is over, its files are written; never after handed_over
   making_safe = 4,  ///< the controller waits for the board to confirm the safe state, which takes its time
 };
 

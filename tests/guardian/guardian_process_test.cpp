@@ -1,0 +1,47 @@
+#include "abs_hil/guardian/guardian_process.hpp"
+
+#include <sys/stat.h>
+
+#include <csignal>
+#include <fstream>
+
+#include "abs_hil/guardian/linux_process.hpp"
+#include "catch.hpp"
+#include "temporary_folder.hpp"
+
+namespace abs_hil::guardian {
+namespace {
+
+/// A guardian that says that it is ready and then does nothing, as one that the computer holds up.
+std::string held_up_guardian(const std::filesystem::path& folder) {
+  const std::string program = folder / "abs_guardian";
+  const std::string ready = std::to_string(inherited_ready);
+  std::ofstream(program) << "#!/bin/sh\nprintf 'ready ' >&" << ready << "\nexec " << ready << ">&-\nexec sleep 20\n";
+  ::chmod(program.c_str(), S_IRWXU);
+  return program;
+}
+
+TEST_CASE("outputs that were handed over stay so until their guardian has seen it") {
+  const test::TemporaryFolder folder;
+  SharedRegion region(1);
+  GuardianProcess guardian(region, held_up_guardian(folder.path), "{}");
+  guardian.stand_guard();
+  const pid_t pid = guardian.pid();
+  guardian.outputs_released(false);
+  CHECK(guardian.end() == GuardianProcess::Farewell::insisting);
+  CHECK(region.stage() == Stage::handed_over);
+  REQUIRE(::kill(pid, SIGKILL) == 0);  // it was left alone to go on
+}
+
+TEST_CASE("a guardian that hangs although the outputs are safe is ended") {
+  const test::TemporaryFolder folder;
+  SharedRegion region(1);
+  GuardianProcess guardian(region, held_up_guardian(folder.path), "{}");
+  guardian.stand_guard();
+  guardian.outputs_released(true);
+  CHECK(guardian.end() == GuardianProcess::Farewell::failed);
+  CHECK(region.stage() == Stage::closed);
+}
+
+}  // namespace
+}  // namespace abs_hil::guardian
