@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -19,6 +18,7 @@
 #include "abs_hil/control/sliding_mode_controller.hpp"
 #include "abs_hil/control/smooth_sliding_mode_controller.hpp"
 #include "abs_hil/control/super_twisting_controller.hpp"
+#include "abs_hil/rig/nearest_name.hpp"
 
 namespace abs_hil::control {
 namespace {
@@ -48,25 +48,9 @@ std::vector<ControllerEntry>& table() noexcept {
   return entries;
 }
 
-/// Least number of letters to insert, delete or replace to turn one word into the other (Levenshtein).
-std::size_t edit_distance(std::string_view from, std::string_view to) {
-  std::vector<std::size_t> row(to.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i + 1;
-    for (std::size_t j = 0; j < to.size(); ++j) {
-      const std::size_t replaced = diagonal + (from[i] == to[j] ? 0U : 1U);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({row[j] + 1, row[j + 1] + 1, replaced});
-    }
-  }
-  return row[to.size()];
-}
-
 std::string unknown_name_message(std::string_view name) {
   const auto nearest = std::ranges::min_element(
-      table(), {}, [name](const ControllerEntry& entry) { return edit_distance(name, entry.name); });
+      table(), {}, [name](const ControllerEntry& entry) { return rig::edit_distance(name, entry.name); });
   std::string message = "unknown controller '" + std::string(name) + "'; did you mean '" + std::string(nearest->name) +
                         "'? Known controllers:";
   for (const ControllerEntry& entry : table()) message += " " + std::string(entry.name);

@@ -25,7 +25,6 @@ class Collector {
     const auto is = [fingerprint]<class Message>(const Message&) {
       return fingerprint == static_cast<std::int64_t>(Message::getHash());
     };
-    ++events_;
     if (is(telemetry_t{})) {
       take_cycle(decoded<telemetry_t>(event), event.channel);
     } else if (is(experiment_t{})) {
@@ -119,7 +118,6 @@ class Collector {
   std::string channel_;  ///< of the telemetry
   RecordedRun run_{};
   std::vector<measurement_t> measurements_{};
-  std::int64_t events_{0};
   bool has_experiment_{false};
 };
 

@@ -6,6 +6,7 @@
 
 #include "abs_hil/script/events.hpp"
 #include "abs_hil/script/plan.hpp"
+#include "abs_hil/script/series.hpp"
 
 namespace abs_hil::script {
 
@@ -17,10 +18,19 @@ using experiment::EndKind;
 std::string number(double value) { return fmt::format("{:.6g}", value); }
 
 std::string in_words(const experiment::Course& course, std::string_view unit) {
-  std::string text;
-  for (const auto& point : course.points()) {
-    text += fmt::format("{}{}{} at {} s", text.empty() ? "" : ", ", number(point.value), unit, number(point.time_s));
-    if (text.size() > 120) return fmt::format("{}, ... ({} points)", text, course.points().size());
+  constexpr std::size_t longest = 120;
+  const auto& points = course.points();
+  std::string text = fmt::format("{}{}", number(points.front().value), unit);
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const auto& before = points[i - 1];
+    const auto& point = points[i];
+    if (point.value == before.value) continue;
+    const bool step = course.between() == experiment::Between::hold || point.time_s == before.time_s;
+    text += step ? fmt::format(", from {} s on ", number(point.time_s))
+                 : fmt::format(", from {} s to {} s {} to ", number(before.time_s), number(point.time_s),
+                               point.value > before.value ? "rising" : "falling");
+    text += fmt::format("{}{}", number(point.value), unit);
+    if (text.size() > longest) return fmt::format("{}, ... ({} points)", text, points.size());
   }
   return text;
 }
@@ -66,10 +76,6 @@ std::string brake_in_words(const experiment::PhasePlan& phase, const settings::S
                      in_words(phase.slip_ref_course, s.control.slip_ref, ""));
 }
 
-std::string in_words(const settings::Value& value) {
-  return std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
-}
-
 void add_series(const SeriesScript& series, const settings::Settings& s, std::string& text) {
   if (!series.given) return;
   std::size_t runs = series.seeds.empty() ? static_cast<std::size_t>(series.repeat) : series.seeds.size();
@@ -77,7 +83,7 @@ void add_series(const SeriesScript& series, const settings::Settings& s, std::st
   for (const Varied& v : series.vary) {
     runs *= v.values.size();
     std::string values;
-    for (const settings::Value& value : v.values) values += (values.empty() ? "" : ", ") + in_words(value);
+    for (const settings::Value& value : v.values) values += (values.empty() ? "" : ", ") + text_of(value);
     varied += fmt::format("  {}: {}\n", v.key, values);
   }
   const std::string seeds =
@@ -117,7 +123,7 @@ std::string explain(const Script& script, const settings::Settings& settings) {
   }
   if (!s.inject.empty()) text += fmt::format("Faults (never on hardware): {}\n", s.inject);
   for (const Setting& setting : script.settings)
-    text += fmt::format("Setting: {} = {}\n", setting.key, in_words(setting.value));
+    text += fmt::format("Setting: {} = {}\n", setting.key, text_of(setting.value));
   if (!script.analysis.empty()) text += fmt::format("Analysis: {}\n", script.analysis);
   add_series(script.series, s, text);
   return text;

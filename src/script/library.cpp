@@ -7,9 +7,9 @@
 #include <map>
 #include <mutex>
 
+#include "abs_hil/rig/nearest_name.hpp"
 #include "abs_hil/settings/config_error.hpp"
 #include "abs_hil/settings/config_file.hpp"
-#include "abs_hil/settings/nearest_name.hpp"
 
 namespace abs_hil::script {
 
@@ -43,7 +43,7 @@ fs::path file_of(const std::string& name_or_file) {
   const std::vector<std::string_view> views(known.begin(), known.end());
   throw settings::ConfigError(
       fmt::format("--experiment: unknown experiment \"{}\"; the nearest known is {}; known: {}; or give a TOML file",
-                  name_or_file, settings::nearest_name(name_or_file, views), fmt::join(known, ", ")));
+                  name_or_file, rig::nearest_name(name_or_file, views), fmt::join(known, ", ")));
 }
 
 std::shared_ptr<const Script> read_once(const std::string& name, const fs::path& file) {

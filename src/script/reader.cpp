@@ -6,8 +6,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "abs_hil/rig/nearest_name.hpp"
 #include "abs_hil/settings/config_error.hpp"
-#include "abs_hil/settings/nearest_name.hpp"
 
 namespace abs_hil::script {
 
@@ -48,7 +48,7 @@ const settings::Key& Source::key(std::string_view name, Place place) const {
   }
   fail(place,
        fmt::format("unknown configuration key \"{}\"; the nearest known key is \"{}\" (abs_hil list --keys shows all)",
-                   name, settings::nearest_name(name, names)));
+                   name, rig::nearest_name(name, names)));
 }
 
 void Source::check_value(std::string_view name, const settings::Value& value, Place place) const {
@@ -96,7 +96,7 @@ TableReader::TableReader(const Source& source, const toml::table& table, const G
       const std::vector<std::string> names = grammar.spellings();
       source.fail(entry.key_place,
                   fmt::format("unknown key \"{}\" in {}; the nearest known key is \"{}\"; known: {}", entry.key,
-                              grammar.title, settings::nearest_name(entry.key, names), fmt::join(names, ", ")));
+                              grammar.title, rig::nearest_name(entry.key, names), fmt::join(names, ", ")));
     }
     entry.has_suffix = entry.key.size() > entry.field->name.size();
     if (const Entry* other = find(entry.field->name)) {

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "abs_hil/rig/nearest_name.hpp"
 #include "abs_hil/settings/config_error.hpp"
-#include "abs_hil/settings/nearest_name.hpp"
 
 namespace abs_hil::settings {
 
@@ -102,7 +102,7 @@ fs::path plant_file(std::string_view name_or_file) {
   for (const PlantEntry& plant : known) names.push_back(plant.name);
   throw ConfigError(
       fmt::format("--plant: unknown plant \"{}\"; the nearest known is {}; known: {}; or give a TOML file",
-                  name_or_file, nearest_name(name_or_file, names), fmt::join(names, ", ")));
+                  name_or_file, rig::nearest_name(name_or_file, names), fmt::join(names, ", ")));
 }
 
 std::vector<PlantEntry> known_plants() {

@@ -8,8 +8,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "abs_hil/rig/nearest_name.hpp"
 #include "abs_hil/settings/config_error.hpp"
-#include "abs_hil/settings/nearest_name.hpp"
 
 namespace abs_hil::settings {
 
@@ -100,7 +100,7 @@ const Key& KeyTable::find(std::string_view name, std::string_view origin) const 
     names.push_back(key.name);
   }
   throw ConfigError(fmt::format("{}: unknown key {}; the nearest known key is {} (abs_hil list --keys shows all)",
-                                origin, name, nearest_name(name, names)));
+                                origin, name, rig::nearest_name(name, names)));
 }
 
 void KeyTable::set(std::string_view name, const Value& value, std::string_view origin) {

@@ -22,6 +22,10 @@ bool is_an_adapter(const std::string& interface) {
   return std::filesystem::exists("/sys/class/net/" + interface + "/device", ignored);
 }
 
+bool names_real_cards(const Settings& s) { return s.driver.kind == "pci" && is_of_the_kernel(s.driver.pci.root); }
+
+bool names_an_adapter(const Settings& s) { return s.driver.kind == "can" && is_an_adapter(s.driver.can.interface); }
+
 void refuse_injection_into_hardware(const Settings& s) {
   const std::vector<driver::Injection> injections = injections_of(s);
   if (injections.empty() || s.backend != "rig") return;
@@ -32,13 +36,13 @@ void refuse_injection_into_hardware(const Settings& s) {
                     "(never hardware) --set driver.emulated=true",
                     fault));
   }
-  if (s.driver.kind == "pci" && is_of_the_kernel(s.driver.pci.root)) {
+  if (names_real_cards(s)) {
     throw ConfigError(
         fmt::format("--inject {}: driver.emulated=true, but driver.pci.root = {} holds the real cards; give the "
                     "emulator's folder",
                     fault, s.driver.pci.root));
   }
-  if (s.driver.kind == "can" && is_an_adapter(s.driver.can.interface)) {
+  if (names_an_adapter(s)) {
     throw ConfigError(fmt::format(
         "--inject {}: driver.emulated=true, but driver.can.interface = {} is an adapter to a real bus; give "
         "a vcan interface or an emulator's socket",
@@ -48,7 +52,7 @@ void refuse_injection_into_hardware(const Settings& s) {
 
 void refuse_hardware_without_guardian(const Settings& s) {
   if (s.backend != "rig" || s.guardian.enabled) return;
-  if (s.driver.emulated && (s.driver.kind != "pci" || !is_of_the_kernel(s.driver.pci.root))) return;
+  if (s.driver.emulated && !names_real_cards(s) && !names_an_adapter(s)) return;
   throw ConfigError(
       "guardian.enabled = false: a real rig is driven beside a guardian only, as its PWMs are assumed to hold when the "
       "program dies; leave it out, or for an emulator (never hardware) --set driver.emulated=true");
@@ -79,12 +83,6 @@ std::vector<driver::Injection> injections_of(const Settings& settings) {
 void refuse_unsafe(const Settings& s, const KeyTable& keys) {
   refuse_injection_into_hardware(s);
   refuse_hardware_without_guardian(s);
-  if (s.backend == "rig" && s.driver.kind == "can") {
-    refuse_cap_above_board(keys, "gate.brake_duty_max", s.gate.brake_duty_max, "driver.can.brake_duty_max",
-                           s.driver.can.brake_duty_max);
-    refuse_cap_above_board(keys, "gate.motor_duty_max", s.gate.motor_duty_max, "driver.can.motor_duty_max",
-                           s.driver.can.motor_duty_max);
-  }
   if (s.backend != "rig") return;
   if (s.driver.kind == "pci") refuse_caps_above(s, keys, s.driver.pci);
   if (s.driver.kind == "can") refuse_caps_above(s, keys, s.driver.can);

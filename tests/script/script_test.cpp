@@ -113,3 +113,20 @@ TEST_CASE("the explanation holds what acts, what ends it and how often") {
                         Contains("until the car is slower than 0.3 m/s") && Contains("a fault after 30 s"));
   CHECK_THAT(explain(*find("series-of-ten"), settings), Contains("Series of 10 runs") && Contains("30 s apart"));
 }
+
+TEST_CASE("the explanation tells steps from slopes") {
+  const settings::Settings settings;
+  CHECK_THAT(explain(*find("brake-step"), settings),
+             Contains("brake torque 0.5 N m, from 0.5 s on 1 N m, from 1 s on 2 N m\n"));
+  CHECK_THAT(explain(*find("slip-sweep"), settings),
+             Contains("slip reference 0.01, from 0 s to 1.2 s rising to 0.2\n"));
+  const auto words_for = [&settings](const std::string& points) {
+    return explain(parsed("[[phase]]\nname = \"brake\"\nbrake = { duty = { points = " + points +
+                          " } }\nuntil = { lasts_s = 1 }\n[[phase]]\nname = \"stopped\"\nuntil = { lasts_s = 1 }\n"),
+                   settings);
+  };
+  CHECK_THAT(words_for("[[0, 0.1], [1, 0.1], [1, 0.3], [2, 0.3]]"), Contains("brake duty 0.1, from 1 s on 0.3\n"));
+  CHECK_THAT(words_for("[[0.5, 0.2]]"), Contains("brake duty 0.2\n"));
+  CHECK_THAT(words_for("[[0, 0.2], [1, 0], [1, 0.2]]"),
+             Contains("brake duty 0.2, from 0 s to 1 s falling to 0, from 1 s on 0.2\n"));
+}

@@ -24,6 +24,7 @@ class Course {
 
   [[nodiscard]] bool empty() const noexcept { return points_.empty(); }
   [[nodiscard]] const std::vector<Point>& points() const noexcept { return points_; }
+  [[nodiscard]] Between between() const noexcept { return between_; }
   /// The value at that time; the course must not be empty.
   [[nodiscard]] double at(double time_s) const noexcept;
 

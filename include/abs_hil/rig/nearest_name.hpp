@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-namespace abs_hil::settings {
+namespace abs_hil::rig {
 
 /// Levenshtein distance of two names.
 [[nodiscard]] inline std::size_t edit_distance(std::string_view a, std::string_view b) {
@@ -38,4 +38,4 @@ template <typename Names>
   return best;
 }
 
-}  // namespace abs_hil::settings
+}  // namespace abs_hil::rig
