@@ -1,5 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <string>
+
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/driver/factory.hpp"
 #include "abs_hil/script/library.hpp"
@@ -14,18 +17,27 @@ namespace {
 
 void print(std::string_view name, std::string_view summary) { fmt::print("  {:<20}{}\n", name, summary); }
 
+std::string value_of(const settings::Key& key) {
+  return std::visit([](const auto* value) { return fmt::format("{}", *value); }, key.target);
+}
+
+std::string valid_of(const settings::Key& key) {
+  if (std::holds_alternative<bool*>(key.target)) return "true or false";
+  if (!std::holds_alternative<std::string*>(key.target)) return key.range.text();
+  return key.allowed.empty() ? "text" : fmt::format("{}", fmt::join(key.allowed, " | "));
+}
+
 void list_keys() {
   settings::Settings settings;
   const settings::KeyTable table(settings);
+  std::size_t name_width = 0, value_width = 0;
   for (const settings::Key& key : table.keys()) {
-    const bool is_flag = std::holds_alternative<bool*>(key.target);
-    const bool is_text = std::holds_alternative<std::string*>(key.target);
-    const std::string valid = is_flag ? "true or false"
-                              : is_text
-                                  ? (key.allowed.empty() ? "text" : fmt::format("{}", fmt::join(key.allowed, " | ")))
-                                  : key.range.text();
-    const std::string value = std::visit([](const auto* v) { return fmt::format("{}", *v); }, key.target);
-    fmt::print("{:<38}{:<16}{}{}{}; {}\n", key.name, value, valid, key.unit.empty() ? "" : " ", key.unit, key.meaning);
+    name_width = std::max(name_width, key.name.size());
+    value_width = std::max(value_width, value_of(key).size());
+  }
+  for (const settings::Key& key : table.keys()) {
+    fmt::print("{:<{}}  {:<{}}  {}{}{}; {}\n", key.name, name_width, value_of(key), value_width, valid_of(key),
+               key.unit.empty() ? "" : " ", key.unit, key.meaning);
   }
 }
 

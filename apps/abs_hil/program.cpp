@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <exception>
 #include <stdexcept>
+#include <string>
 
 #include "abs_hil/diagnosis/doctor.hpp"
 #include "abs_hil/driver/io_result.hpp"
@@ -140,6 +141,7 @@ CLI::App* add_compare(CLI::App& cli, app::CompareOptions& o) {
   compare->add_option("--csv", o.csv_file, "write the table as CSV")->type_name("FILE");
   compare->add_option("--markdown", o.markdown_file, "write the table as Markdown")->type_name("FILE");
   compare->add_option("--runs", o.runs_file, "write the single runs as CSV")->type_name("FILE");
+  compare->footer("Runs that are there already are set side by side by abs_report RUN RUN.");
   return compare;
 }
 
@@ -259,7 +261,9 @@ int dispatch(int argc, char** argv) {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return cli.exit(error);  // --help, --version
-    fprintf(stderr, "abs_hil: %s (abs_hil --help shows all options)\n", error.what());
+    const auto asked = cli.get_subcommands();
+    const std::string command = asked.empty() ? "abs_hil" : "abs_hil " + asked.front()->get_name();
+    fprintf(stderr, "abs_hil: %s (%s --help shows all options)\n", error.what(), command.c_str());
     return app::exit_usage;
   }
   if (list->parsed()) return app::list(keys);

@@ -4,6 +4,8 @@
 #include <Eigen/LU>
 #include <stdexcept>
 
+#include "abs_hil/rig/formatted_text.hpp"
+
 namespace abs_hil::control {
 namespace {
 
@@ -27,7 +29,10 @@ Eigen::Matrix4d kronecker(const Eigen::Matrix2d& left, const Eigen::Matrix2d& ri
 
 Eigen::Matrix2d solve_lyapunov(const Eigen::Matrix2d& A, const Eigen::Matrix2d& Q) {
   if (!Q.allFinite() || !Q.isApprox(Q.transpose()) || !is_positive_definite(Q)) {
-    throw std::invalid_argument("Q must be symmetric and positive definite (q11 > 0, q22 > 0, q11 q22 > q12^2)");
+    throw std::invalid_argument(
+        rig::formatted("Q = [%g %g; %g %g] is not valid; it must be symmetric and positive definite: q11 > 0, q22 > 0, "
+                       "q11 q22 > q12^2",
+                       Q(0, 0), Q(0, 1), Q(1, 0), Q(1, 1)));
   }
   // With vec() stacking columns, vec(P A) = (A' (x) I) vec(P) and vec(A' P) = (I (x) A') vec(P).
   const Eigen::Matrix2d identity = Eigen::Matrix2d::Identity();

@@ -48,7 +48,7 @@ const settings::Key& Source::key(std::string_view name, Place place) const {
   }
   fail(place,
        fmt::format("unknown configuration key \"{}\"; the nearest known key is \"{}\" (abs_hil list --keys shows all)",
-                   name, rig::nearest_name(name, names)));
+                   name, fmt::join(rig::nearest_keys(name, names), "\" or \"")));
 }
 
 void Source::check_value(std::string_view name, const settings::Value& value, Place place) const {

@@ -100,7 +100,7 @@ const Key& KeyTable::find(std::string_view name, std::string_view origin) const 
     names.push_back(key.name);
   }
   throw ConfigError(fmt::format("{}: unknown key {}; the nearest known key is {} (abs_hil list --keys shows all)",
-                                origin, name, rig::nearest_name(name, names)));
+                                origin, name, fmt::join(rig::nearest_keys(name, names), " or ")));
 }
 
 void KeyTable::set(std::string_view name, const Value& value, std::string_view origin) {

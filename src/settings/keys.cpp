@@ -97,14 +97,14 @@ void add_control_keys(std::vector<Key>& keys, control::ControlOptions& c) {
           {"control.rate_Hz", "Hz", "control cycles per second", &c.rate_Hz, between(100, 10'000)},
           {"control.slip_ref", "", "wanted slip", &c.slip_ref, open(0, 1)},
           {"control.v_min_m_s", "m/s", "car speed below which slip control ends", &c.v_min_m_s, between(0.05, 5)},
-          {"control.adaptive.gamma", "", "adaptation gain of (17)", &a.gamma, positive(1e4)},
+          {"control.adaptive.gamma", "kg^2/s^2", "adaptation gain of (17)", &a.gamma, positive(1e4)},
           {"control.adaptive.ks0", "1/s^2", "integral gain of (16), (18)", &a.ks0, positive(1e6)},
           {"control.adaptive.ks1", "1/s", "proportional gain of (16), (18)", &a.ks1, positive(1e4)},
-          {"control.adaptive.ka1", "", "innovation's weight in (18)", &a.ka1, positive(1e3)},
+          {"control.adaptive.ka1", "s/kg^2", "innovation's weight in (18)", &a.ka1, positive(1e3)},
           {"control.adaptive.zeta0", "N", "zeta(0) of (17)", &a.zeta0, between(-500, 500)},
-          {"control.adaptive.q11", "", "Q of PA + A'P = -2Q", &a.q11, positive(1e6)},
-          {"control.adaptive.q12", "", "Q of PA + A'P = -2Q", &a.q12, between(-1e6, 1e6)},
-          {"control.adaptive.q22", "", "Q of PA + A'P = -2Q", &a.q22, positive(1e6)},
+          {"control.adaptive.q11", "1/s^3", "Q of PA + A'P = -2Q", &a.q11, positive(1e6)},
+          {"control.adaptive.q12", "1/s^2", "Q of PA + A'P = -2Q", &a.q12, between(-1e6, 1e6)},
+          {"control.adaptive.q22", "1/s", "Q of PA + A'P = -2Q", &a.q22, positive(1e6)},
           {"control.adaptive.theta_min_N", "N", "least theta the estimate may take", &a.theta_min_N, from_zero(500)},
           {"control.adaptive.theta_max_N", "N", "largest theta the estimate may take", &a.theta_max_N, positive(1000)},
           {"control.nominal.theta0_N", "N", "theta that (16) believes in; 0: the plant's", &c.nominal.theta0_N,
@@ -118,12 +118,13 @@ void add_control_keys(std::vector<Key>& keys, control::ControlOptions& c) {
 
 void add_switching_keys(std::vector<Key>& keys, control::SwitchingAdaptationOptions& o,
                         const std::array<std::string_view, 4>& names) {
-  keys.insert(keys.end(), {
-                              {names[0], "", "gain of theta_hat' = -gamma k phi sign(e_v)", &o.gamma, from_zero(1e4)},
-                              {names[1], "N", "first estimate of theta", &o.theta0_N, from_zero(500)},
-                              {names[2], "N", "least theta the estimate may take", &o.theta_min_N, from_zero(500)},
-                              {names[3], "N", "largest theta the estimate may take", &o.theta_max_N, positive(1000)},
-                          });
+  keys.insert(keys.end(),
+              {
+                  {names[0], "kg^2 m/s^3", "gain of theta_hat' = -gamma k phi sign(e_v)", &o.gamma, from_zero(1e4)},
+                  {names[1], "N", "first estimate of theta", &o.theta0_N, from_zero(500)},
+                  {names[2], "N", "least theta the estimate may take", &o.theta_min_N, from_zero(500)},
+                  {names[3], "N", "largest theta the estimate may take", &o.theta_max_N, positive(1000)},
+              });
 }
 
 void add_sliding_keys(std::vector<Key>& keys, control::ControlOptions& c) {
@@ -191,14 +192,14 @@ void add_adaptive_actuator_keys(std::vector<Key>& keys, control::AdaptiveActuato
   keys.insert(
       keys.end(),
       {
-          {"control.adaptive_actuator.gamma", "", "adaptation gain of (17)", &a.gamma, positive(1e4)},
+          {"control.adaptive_actuator.gamma", "kg^2/s^2", "adaptation gain of (17)", &a.gamma, positive(1e4)},
           {"control.adaptive_actuator.ks0", "1/s^2", "integral gain of (18)", &a.ks0, positive(1e6)},
           {"control.adaptive_actuator.ks1", "1/s", "proportional gain of (18)", &a.ks1, positive(1e4)},
-          {"control.adaptive_actuator.ka1", "", "innovation's weight in (18)", &a.ka1, positive(1e3)},
+          {"control.adaptive_actuator.ka1", "s/kg^2", "innovation's weight in (18)", &a.ka1, positive(1e3)},
           {"control.adaptive_actuator.zeta0", "N", "zeta(0) of (17)", &a.zeta0, between(-500, 500)},
-          {"control.adaptive_actuator.q11", "", "Q of PA + A'P = -2Q", &a.q11, positive(1e6)},
-          {"control.adaptive_actuator.q12", "", "Q of PA + A'P = -2Q", &a.q12, between(-1e6, 1e6)},
-          {"control.adaptive_actuator.q22", "", "Q of PA + A'P = -2Q", &a.q22, positive(1e6)},
+          {"control.adaptive_actuator.q11", "1/s^3", "Q of PA + A'P = -2Q", &a.q11, positive(1e6)},
+          {"control.adaptive_actuator.q12", "1/s^2", "Q of PA + A'P = -2Q", &a.q12, between(-1e6, 1e6)},
+          {"control.adaptive_actuator.q22", "1/s", "Q of PA + A'P = -2Q", &a.q22, positive(1e6)},
           {"control.adaptive_actuator.theta_min_N", "N", "least theta the estimate may take", &a.theta_min_N,
            from_zero(500)},
           {"control.adaptive_actuator.theta_max_N", "N", "largest theta the estimate may take", &a.theta_max_N,

@@ -95,7 +95,27 @@ class Outputs(ProgramTest):
         words = self.run_program('list').stdout
         for name in ('adaptive', 'nominal', 'paper-table1', 'paper-timing', 'paper', 'sim', 'rig'):
             self.assertIn(name, words)
-        self.assertIn('plant.theta_N', self.run_program('list', '--keys').stdout)
+
+    def test_each_key_is_listed_with_its_value_in_a_column_of_its_own(self):
+        summary = self.folder / 'summary.json'
+        self.fast('--set', 'experiment.start_speed_rad_s=170', '--summary', summary)
+
+        def names(table, prefix=''):
+            for name, value in table.items():
+                yield from names(value, f'{prefix}{name}.') if isinstance(value, dict) else [prefix + name]
+
+        config = self.summary(summary)['config']
+        del config['experiment_script']  # no key: the script's text
+        lines = self.run_program('list', '--keys').stdout.splitlines()
+        self.assertEqual(sorted(line.split()[0] for line in lines), sorted(names(config)))
+        listed = {line.split()[0]: line.split()[1] for line in lines}
+        self.assertEqual(listed['control.sliding_mode_smooth.boundary_m_s'], '2.29')
+
+    def test_a_wrong_argument_points_to_the_help_of_its_command(self):
+        for command, arguments in (('abs_hil', ['--bogus']), ('abs_hil list', ['list', '--bogus'])):
+            result = self.run_program(*arguments)
+            self.assertEqual(result.returncode, 2)
+            self.assertIn(f'({command} --help shows all options)', result.stderr)
 
     def test_environment_names_the_configuration(self):
         (self.folder / 'plants').mkdir()

@@ -47,6 +47,15 @@ TEST_CASE("an unknown key names the nearest known one") {
   CHECK_THAT(error_of(f.table, "plant.thetaN=3"), Contains("unknown key plant.thetaN") && Contains("plant.theta_N"));
 }
 
+TEST_CASE("the end or the middle of a key's name is answered with the keys that hold it") {
+  Fixture f;
+  CHECK_THAT(error_of(f.table, "slip_ref=0.1"), Contains("the nearest known key is control.slip_ref ("));
+  CHECK_THAT(error_of(f.table, "ka1=2"),
+             Contains("the nearest known key is control.adaptive.ka1 or control.adaptive_actuator.ka1 ("));
+  CHECK_THAT(error_of(f.table, "pi.kp=2"), Contains("the nearest known key is control.pi.kp_per_s ("));
+  CHECK_THAT(error_of(f.table, "adaptive.gama=2"), Contains("the nearest known key is control.adaptive.gamma ("));
+}
+
 TEST_CASE("a bad value names key, value, range and unit, and changes nothing") {
   Fixture f;
   const std::string error = error_of(f.table, "plant.theta_N=-5");

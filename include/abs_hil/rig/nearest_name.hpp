@@ -38,4 +38,31 @@ template <typename Names>
   return best;
 }
 
+/// What to offer in place of the unknown dotted key `name`, which may lack its first parts: the keys with a tail (the
+/// whole key, or what follows one of its dots) that is `name`; else up to three of which a tail begins with it; else
+/// those with the nearest tail.
+[[nodiscard]] inline std::vector<std::string_view> nearest_keys(std::string_view name,
+                                                                const std::vector<std::string_view>& keys) {
+  std::vector<std::string_view> nearest, begun;
+  std::size_t least = std::string_view::npos;
+  for (const std::string_view key : keys) {
+    std::size_t distance = std::string_view::npos;
+    bool begins = false;
+    for (std::size_t start = 0; start != std::string_view::npos; start = key.find('.', start)) {
+      if (start > 0) ++start;
+      const std::string_view tail = key.substr(start);
+      distance = std::min(distance, edit_distance(name, tail));
+      begins = begins || (name.size() > 1 && tail.substr(0, name.size()) == name);
+    }
+    if (begins) begun.push_back(key);
+    if (distance < least) nearest.clear();
+    if (distance <= least) nearest.push_back(key);
+    least = std::min(least, distance);
+  }
+  constexpr std::size_t readable = 3;
+  if (least == 0 || begun.empty()) return nearest;
+  if (begun.size() <= readable) return begun;
+  return {nearest_name(name, begun)};
+}
+
 }  // namespace abs_hil::rig
