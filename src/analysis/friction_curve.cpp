@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "abs_hil/analysis/json_number.hpp"
 #include "abs_hil/rig/encoder_scale.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 
@@ -142,11 +143,8 @@ std::string to_csv(const FrictionCurveResult& result) {
 }
 
 nlohmann::ordered_json to_json(const FrictionCurveResult& result) {
-  const auto number = [](double value) {
-    return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
-  };
-  return {{"peak_force_N", number(result.peak_force_N)},
-          {"peak_slip", number(result.peak_slip)},
+  return {{"peak_force_N", number_or_null(result.peak_force_N)},
+          {"peak_slip", number_or_null(result.peak_slip)},
           {"points", result.points.size()}};
 }
 

@@ -7,7 +7,6 @@ namespace abs_hil::analysis {
 namespace {
 constexpr double rms_start_s = 0.3;
 /// Slower than this the slip dynamics stiffen as 1 / v_x and the paper calls the performance "no longer relevant".
-constexpr double least_speed_m_s = 3.0;
 constexpr double slip_band = 0.02;
 constexpr double theta_band = 0.05;
 /// A wheel that keeps less than a twentieth of the car's speed gives no more steering than one that stands.
@@ -22,7 +21,7 @@ void RunMetrics::consume_braking(const rig::CycleRecord& record, double since_br
     metrics_.torque_total_variation_Nm += std::abs(torque_Nm - last_torque_Nm_);
   }
   last_torque_Nm_ = torque_Nm;
-  if (v_x_m_s <= least_speed_m_s) return;
+  if (v_x_m_s <= least_judged_speed_m_s) return;
 
   const double slip = rig::best_slip(record);
   const double slip_error = slip - record.control.slip_ref;

@@ -5,17 +5,17 @@
 #include <cmath>
 #include <utility>
 
+#include "abs_hil/analysis/json_number.hpp"
+
 namespace abs_hil::analysis {
 
 namespace {
 
-nlohmann::ordered_json number(double value) {
-  return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
-}
-
 nlohmann::ordered_json to_json(const rig::DurationQuantiles& q) {
-  return {
-      {"p50", number(q.p50_us)}, {"p99", number(q.p99_us)}, {"p99_9", number(q.p99_9_us)}, {"max", number(q.max_us)}};
+  return {{"p50", number_or_null(q.p50_us)},
+          {"p99", number_or_null(q.p99_us)},
+          {"p99_9", number_or_null(q.p99_9_us)},
+          {"max", number_or_null(q.max_us)}};
 }
 
 nlohmann::ordered_json by_cause(const rig::OverrunCounts& counts) {
@@ -78,18 +78,18 @@ nlohmann::ordered_json to_json(const RunSummary& s) {
                               {"plant", s.plant},
                               {"backend", s.backend},
                               {"experiment", s.experiment},
-                              {"brake_start_s", number(m.brake_start_s)},
-                              {"stop_time_s", number(m.stop_time_s)},
-                              {"stop_distance_m", number(m.stop_distance_m)},
-                              {"slip_rms", number(m.slip_rms)},
-                              {"slip_settling_s", number(m.slip_settling_s)},
-                              {"theta_final_N", number(m.theta_final_N)},
-                              {"theta_settling_s", number(m.theta_settling_s)},
-                              {"torque_total_variation_Nm", number(m.torque_total_variation_Nm)},
-                              {"slip_overshoot", number(m.slip_overshoot)},
-                              {"time_locked_s", number(m.time_locked_s)},
-                              {"theta_error_final", number(m.theta_error_final)},
-                              {"theta_error_rms", number(m.theta_error_rms)},
+                              {"brake_start_s", number_or_null(m.brake_start_s)},
+                              {"stop_time_s", number_or_null(m.stop_time_s)},
+                              {"stop_distance_m", number_or_null(m.stop_distance_m)},
+                              {"slip_rms", number_or_null(m.slip_rms)},
+                              {"slip_settling_s", number_or_null(m.slip_settling_s)},
+                              {"theta_final_N", number_or_null(m.theta_final_N)},
+                              {"theta_settling_s", number_or_null(m.theta_settling_s)},
+                              {"torque_total_variation_Nm", number_or_null(m.torque_total_variation_Nm)},
+                              {"slip_overshoot", number_or_null(m.slip_overshoot)},
+                              {"time_locked_s", number_or_null(m.time_locked_s)},
+                              {"theta_error_final", number_or_null(m.theta_error_final)},
+                              {"theta_error_rms", number_or_null(m.theta_error_rms)},
                               {"truth_known", s.truth_known},
                               {"cycles", s.cycles},
                               {"overruns", s.timing.overruns.total},

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "abs_hil/analysis/json_number.hpp"
 #include "abs_hil/comparison/comparison_table.hpp"
 
 namespace abs_hil::comparison {
@@ -122,16 +123,12 @@ std::string ratio_line(const PaperRatio& r) {
       100.0 * paper_saving);
 }
 
-nlohmann::ordered_json number(double value) {
-  return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
-}
-
 nlohmann::ordered_json json_of(const Estimate& e) {
   return {{"n", e.n},
-          {"mean", number(e.mean)},
-          {"standard_deviation", number(e.standard_deviation)},
-          {"ci95_low", number(e.low)},
-          {"ci95_high", number(e.high)}};
+          {"mean", analysis::number_or_null(e.mean)},
+          {"standard_deviation", analysis::number_or_null(e.standard_deviation)},
+          {"ci95_low", analysis::number_or_null(e.low)},
+          {"ci95_high", analysis::number_or_null(e.high)}};
 }
 
 }  // namespace

@@ -4,6 +4,9 @@
 
 namespace abs_hil::report {
 
+/// Height that a mark of a y axis has.
+inline constexpr double px_a_mark = 34.0;
+
 /// An axis from `low` to `high` with a mark every `step`.
 struct Axis {
   double low;

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "abs_hil/report/text.hpp"
+#include "plant_changes.hpp"
 
 namespace abs_hil::report {
 
@@ -35,6 +36,9 @@ Panel phase_strips(const std::vector<RunFiles>& runs, const std::vector<RunSurve
     }
     for (const PhaseInterval& phase : surveys[r].phases) {
       if (phase.phase == "fault" && runs[r].events.empty()) events.points.push_back({phase.from_s, bottom + 0.5});
+    }
+    for (const PlantChange& change : plant_changes(runs[r], surveys[r])) {
+      if (events.points.size() < most_bars) events.points.push_back({change.time_s, bottom + 0.5});
     }
     if (!events.points.empty()) panel.curves.push_back(std::move(events));
   }

@@ -11,11 +11,11 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <sstream>
 #include <stdexcept>
 
 #include "abs_hil/report/input_error.hpp"
 #include "abs_hil/report/text.hpp"
+#include "run_details.hpp"
 
 namespace abs_hil::report {
 
@@ -26,13 +26,6 @@ namespace {
 constexpr const char* script_name = "figures.gp";
 constexpr const char* words_name = "gnuplot.log";
 constexpr int not_found_status = 127;  ///< what posix_spawnp's child may end with instead of an error (POSIX)
-
-std::string read_all(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 /// Ends with the program's exit status, -1 for a signal. Throws UnavailableError if there is no such program.
 int run_gnuplot(const fs::path& folder) {
@@ -89,7 +82,7 @@ void draw(const std::vector<Figure>& figures, PictureFormat format, const fs::pa
     const auto size = fs::file_size(folder / fmt::format("{}.{}", figure.id, extension_of(format)), error);
     if (status == 0 && !error && size > 0) continue;
     throw std::runtime_error(fmt::format("gnuplot did not draw {} (status {}): {}", figure.id, status,
-                                         clean_text(read_all(folder / words_name), 500)));
+                                         clean_text(read_text(folder / words_name), 500)));
   }
 }
 

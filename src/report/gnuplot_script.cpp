@@ -28,7 +28,6 @@ constexpr double small_character_px = 5.8;   ///< of the small font
 constexpr double legend_sample_px = 94.0;
 constexpr double inner_px = width_px - left_px - right_px;
 constexpr int x_marks = 8;
-constexpr double px_a_mark = 34.0;
 
 using Lines = std::string;
 

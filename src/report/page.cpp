@@ -123,7 +123,7 @@ std::string report_page(const PageContents& contents) {
   body += section("Real time", real_time);
   body += section("Events", folded("events", events_table(runs, surveys), runs.size() <= most_open_rows));
   body += section("Environment", folded("machines and builds", environment_table(runs), false));
-  body += section("Notes", notes_list(runs, surveys, contents.general_notes));
+  body += section("Notes", notes_list(contents.notes));
   return page_around(contents.title, contents.version, body);
 }
 

@@ -26,7 +26,7 @@ struct PageContents {
   const std::vector<RunFiles>* runs{nullptr};
   const std::vector<RunSurvey>* surveys{nullptr};
   std::vector<Picture> pictures{};
-  std::vector<std::string> general_notes{};
+  std::vector<std::string> notes{};
   std::vector<SeriesStudy> studies{};
   std::vector<std::string> study_names{};
 };

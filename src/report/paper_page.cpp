@@ -126,7 +126,7 @@ std::string paper_page(const PageContents& contents) {
   body += section("Figure by figure", pictures);
   body += section("Figures of merit", metrics_table(runs, *contents.surveys));
   body += section("Differences in configuration", differences_table(runs));
-  body += section("Notes", notes_list(runs, *contents.surveys, contents.general_notes));
+  body += section("Notes", notes_list(contents.notes));
   return page_around(contents.title, contents.version, body);
 }
 

@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <fstream>
-#include <sstream>
 #include <stdexcept>
 
 #include "abs_hil/report/input_error.hpp"
 #include "abs_hil/report/text.hpp"
-#include "metric_list.hpp"
 #include "page.hpp"
+#include "run_details.hpp"
+#include "run_tables.hpp"
 #include "series.hpp"
 
 namespace abs_hil::report {
@@ -28,13 +28,6 @@ std::string read_file(const fs::path& path, std::size_t most) {
   file.read(text.data(), static_cast<std::streamsize>(most));
   text.resize(static_cast<std::size_t>(file.gcount()));
   return text;
-}
-
-std::string read_picture(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
 }
 
 /// The adaptive controller's run first, as the page of the paper has it.
@@ -82,26 +75,12 @@ void group_styles(const std::vector<SeriesStudy>& studies, std::size_t runs, Run
   options.groups = std::move(groups);
 }
 
-void collect_notes(const PageContents& contents, std::vector<std::string>& notes) {
-  notes = contents.general_notes;
-  for (std::size_t r = 0; r < contents.runs->size(); ++r) {
-    const RunFiles& run = (*contents.runs)[r];
-    for (const std::string& note : run.notes) notes.push_back(run.name + ": " + note);
-    if ((*contents.surveys)[r].truncated) {
-      notes.push_back(fmt::format("{}: the last row of {} is cut off, as after a crash; it is left out", run.name,
-                                  run.csv.string()));
-    }
-    for (const std::string& note : contradictions(run, (*contents.surveys)[r])) notes.push_back(run.name + ": " + note);
-  }
-}
-
 }  // namespace
 
 Report make_report(const ReportOptions& options) {
   FoundRuns found = find_runs(options.runs, options.labels);
+  if (options.paper) order_for_paper(found.runs, found.notes);
   PageContents contents;
-  contents.general_notes = found.notes;
-  if (options.paper) order_for_paper(found.runs, contents.general_notes);
   std::vector<RunSurvey> surveys;
   for (const RunFiles& run : found.runs) surveys.push_back(survey(run));
 
@@ -120,14 +99,14 @@ Report make_report(const ReportOptions& options) {
   const TemporaryFolder folder;
   draw(report.figures, PictureFormat::svg, folder.path());
   for (const Figure& figure : report.figures) {
-    contents.pictures.push_back({&figure, embeddable_svg(read_picture(folder.path() / (figure.id + ".svg")), figure)});
+    contents.pictures.push_back({&figure, embeddable_svg(read_text(folder.path() / (figure.id + ".svg")), figure)});
   }
   contents.title = title_of(options, found.runs, found.series);
   contents.version = options.version;
   contents.runs = &found.runs;
   contents.surveys = &surveys;
+  contents.notes = report.notes = all_notes(found.runs, surveys, found.notes);
   report.html = options.paper ? paper_page(contents) : report_page(contents);
-  collect_notes(contents, report.notes);
   return report;
 }
 
@@ -146,7 +125,7 @@ std::vector<fs::path> write_figures(const Report& report, const fs::path& folder
   const TemporaryFolder drawn;
   draw(report.figures, format, drawn.path());
   for (const fs::path& path : paths) {
-    std::string picture = read_picture(drawn.path() / path.filename());
+    std::string picture = read_text(drawn.path() / path.filename());
     if (format == PictureFormat::svg) picture = with_common_fonts(std::move(picture));
     std::ofstream file(path, std::ios::binary);
     file << picture;

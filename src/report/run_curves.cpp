@@ -39,7 +39,7 @@ std::map<std::string, Course> read_curves(const RunFiles& run, const RunSurvey& 
   while (csv.next()) {
     const double time_s = csv.time_s();
     const bool braking = csv.phase() == "brake";
-    const bool relevant = braking && survey.r2_m * csv.values()[speed] > least_speed_m_s;
+    const bool relevant = braking && survey.r2_m * csv.values()[speed] > analysis::least_judged_speed_m_s;
     for (Collector& c : collectors) {
       if (time_s < c.request->window.from_s || time_s > c.request->window.to_s) continue;
       double value = csv.values()[c.column];

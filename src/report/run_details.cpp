@@ -22,22 +22,6 @@ constexpr std::uintmax_t most_bytes = 64U << 20U;
 constexpr std::uint64_t most_us = 10'000'000;
 constexpr std::size_t event_fields = 5;
 
-std::string read_text(const std::filesystem::path& path) {
-  std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (!error && size > most_bytes) {
-    throw InputError(fmt::format("{}: {} bytes are too many for this kind of file", path.string(), size));
-  }
-  errno = 0;
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  if (!file) {
-    throw InputError(fmt::format("cannot read \"{}\": {}", path.string(), std::strerror(errno != 0 ? errno : EIO)));
-  }
-  return text.str();
-}
-
 void flatten(const nlohmann::ordered_json& json, const std::string& prefix, std::map<std::string, std::string>& flat) {
   for (const auto& [key, value] : json.items()) {
     const std::string name = prefix + clean_text(key, 60);
@@ -87,6 +71,22 @@ std::vector<std::string> fields_of(const std::string& line) {
 }
 
 }  // namespace
+
+std::string read_text(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (!error && size > most_bytes) {
+    throw InputError(fmt::format("{}: {} bytes are too many for this kind of file", path.string(), size));
+  }
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  if (!file) {
+    throw InputError(fmt::format("cannot read \"{}\": {}", path.string(), std::strerror(errno != 0 ? errno : EIO)));
+  }
+  return text.str();
+}
 
 nlohmann::ordered_json read_json(const std::filesystem::path& path) {
   try {

@@ -11,6 +11,7 @@
 /// The files beside a run's CSV, each read whole: they are small. All throw InputError for a file that cannot be read.
 namespace abs_hil::report {
 
+[[nodiscard]] std::string read_text(const std::filesystem::path& path);
 [[nodiscard]] nlohmann::ordered_json read_json(const std::filesystem::path& path);
 /// Keys dotted, values as text. @param json an object
 [[nodiscard]] std::map<std::string, std::string> flattened(const nlohmann::ordered_json& json);

@@ -7,10 +7,12 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <utility>
 
 #include "abs_hil/report/run_curves.hpp"
 #include "axis.hpp"
 #include "course_figure.hpp"
+#include "plant_changes.hpp"
 
 namespace abs_hil::report {
 
@@ -132,7 +134,7 @@ class FigureMaker {
     return entries;
   }
 
-  /// Phases of the first run as background, faults of all runs as lines.
+  /// Phases of the first run as background; faults, and changes of the simulated rig, of all runs as lines.
   void add_phases() {
     for (const PhaseInterval& phase : surveys_.front().phases) {
       if (shades_.size() == most_shades) break;
@@ -147,7 +149,19 @@ class FigureMaker {
           marks_.push_back({event.time_s - windows_[r].zero_s, event.event, event.event == "fault"});
         }
       }
+      for (PlantChange& change : plant_changes(runs_[r], surveys_[r])) {
+        mark_once({change.time_s - windows_[r].zero_s, std::move(change.label), false});
+      }
     }
+  }
+
+  /// Runs of one experiment change alike.
+  void mark_once(Mark mark) {
+    constexpr double same_s = 1e-6;
+    const bool known = std::any_of(marks_.begin(), marks_.end(), [&](const Mark& other) {
+      return other.label == mark.label && std::abs(other.x - mark.x) < same_s;
+    });
+    if (!known && marks_.size() < most_shades) marks_.push_back(std::move(mark));
   }
 
   [[nodiscard]] Figure begin(std::string id, std::string heading, std::string caption) const {
@@ -199,7 +213,7 @@ class FigureMaker {
       }
     }
     if (!any) return std::nullopt;
-    const Axis axis = axis_around(range, static_cast<int>(double_panel_px / 34.0));
+    const Axis axis = axis_around(range, static_cast<int>(double_panel_px / px_a_mark));
     return Range{axis.low, axis.high};
   }
 

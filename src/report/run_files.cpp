@@ -96,7 +96,8 @@ std::vector<fs::path> run_folders_of(const fs::path& series) {
   std::vector<fs::path> folders;
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(series, error)) {
-    if (entry.is_directory(error) && entry.path().filename().string().starts_with("run-")) {
+    std::error_code ignored;  // a link that leads nowhere is no run
+    if (entry.is_directory(ignored) && entry.path().filename().string().starts_with("run-")) {
       folders.push_back(entry.path());
     }
   }

@@ -6,13 +6,14 @@
 
 #include "abs_hil/report/csv_reader.hpp"
 #include "abs_hil/report/input_error.hpp"
+#include "abs_hil/rig/parameters.hpp"
 
 namespace abs_hil::report {
 
 namespace {
 
 /// The paper's, for runs without a configuration.
-constexpr double paper_r2_m = 0.099;
+constexpr double paper_r2_m = rig::WheelParameters{}.r2_m;
 constexpr double default_end_speed_m_s = 0.3;
 
 /// Turns rows back into the records that they were written from, as far as metrics need them.

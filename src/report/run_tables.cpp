@@ -192,16 +192,21 @@ std::string environment_table(const std::vector<RunFiles>& runs) {
   return arranged(table, runs.size());
 }
 
-std::string notes_list(const std::vector<RunFiles>& runs, const std::vector<RunSurvey>& surveys,
-                       const std::vector<std::string>& general) {
-  std::string items;
-  const auto add = [&items](const std::string& text) { items += fmt::format("<li>{}</li>\n", html_escape(text)); };
-  for (const std::string& note : general) add(note);
+std::vector<std::string> all_notes(const std::vector<RunFiles>& runs, const std::vector<RunSurvey>& surveys,
+                                   const std::vector<std::string>& general) {
+  std::vector<std::string> notes = general;
   for (std::size_t r = 0; r < runs.size(); ++r) {
-    for (const std::string& note : runs[r].notes) add(runs[r].name + ": " + note);
-    if (surveys[r].truncated) add(runs[r].name + ": the CSV ends within a row, as after a crash; that row is left out");
-    for (const std::string& note : contradictions(runs[r], surveys[r])) add(runs[r].name + ": " + note);
+    const auto add = [&](const std::string& note) { notes.push_back(runs[r].name + ": " + note); };
+    for (const std::string& note : runs[r].notes) add(note);
+    if (surveys[r].truncated) add("the last row of the CSV is cut off, as after a crash; it is left out");
+    for (const std::string& note : contradictions(runs[r], surveys[r])) add(note);
   }
+  return notes;
+}
+
+std::string notes_list(const std::vector<std::string>& notes) {
+  std::string items;
+  for (const std::string& note : notes) items += fmt::format("<li>{}</li>\n", html_escape(note));
   return items.empty() ? "" : "<ul id=\"notes\">\n" + items + "</ul>\n";
 }
 

@@ -14,7 +14,11 @@ namespace abs_hil::report {
 [[nodiscard]] std::string differences_table(const std::vector<RunFiles>& runs);
 [[nodiscard]] std::string events_table(const std::vector<RunFiles>& runs, const std::vector<RunSurvey>& surveys);
 [[nodiscard]] std::string environment_table(const std::vector<RunFiles>& runs);
-[[nodiscard]] std::string notes_list(const std::vector<RunFiles>& runs, const std::vector<RunSurvey>& surveys,
-                                     const std::vector<std::string>& general);
+[[nodiscard]] std::string notes_list(const std::vector<std::string>& notes);
+
+/// The general notes, then what is missing or odd of each run.
+[[nodiscard]] std::vector<std::string> all_notes(const std::vector<RunFiles>& runs,
+                                                 const std::vector<RunSurvey>& surveys,
+                                                 const std::vector<std::string>& general);
 
 }  // namespace abs_hil::report

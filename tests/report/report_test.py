@@ -102,6 +102,14 @@ class Page(ReportTest):
         self.assertEqual([c['drawn'] for c in read.figures['course'] if c['quantity'] == 'events'], [1])
         self.assertIn('>fault<', page)
 
+    def test_changes_of_the_simulated_rig_stand_on_the_time_axis(self):
+        a, b = (self.make_run(name, '--experiment', 'friction-jump') for name in 'ab')
+        page, _ = self.page(a)
+        self.assertEqual([c['drawn'] for c in PageReader(page).figures['course'] if c['quantity'] == 'events'], [2])
+        for label in ('>friction × 0.522<', '>friction × 1<'):
+            self.assertEqual(page.count(label), len(FIGURES) - 1, label)
+            self.assertEqual(self.page(a, b)[0].count(label), len(FIGURES) - 1, 'once for runs that change alike')
+
     def test_summary_of_another_run_is_noticed(self):
         a, b = self.make_run('a'), self.make_run('b', '--controller', 'locked')
         shutil.copy(b / 'summary.json', a / 'summary.json')
@@ -166,6 +174,12 @@ class Series(ReportTest):
 
 
 class Files(ReportTest):
+    def test_link_to_nowhere_is_no_run(self):
+        (self.folder / 'none' / 'x').mkdir(parents=True)
+        (self.folder / 'none' / 'x').rmdir()
+        (self.folder / 'none' / 'run-0001').symlink_to('nowhere')
+        self.assertIn('is neither a run\'s folder', self.report('none', status=2).stderr.decode())
+
     def test_report_stands_here_and_replaces_only_reports(self):
         a = self.make_run('a')
         self.report(a)

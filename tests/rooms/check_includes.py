@@ -25,7 +25,7 @@ MAY_KNOW = {
     'watch': {'rig', 'telemetry', 'lcmtypes'},
     'analysis': {'rig'},
     'archive': set(),
-    'report': {'rig', 'analysis'},
+    'report': {'rig', 'plant_sim', 'analysis'},
     'diagnosis': {'rig', 'driver', 'runtime', 'telemetry'},
     'settings': {'rig', 'control', 'plant_sim', 'driver', 'runtime', 'guardian', 'experiment'},
     'app': {'control'},  # the program's public face; the program itself, apps/, knows everything

@@ -7,6 +7,9 @@
 
 namespace abs_hil::analysis {
 
+/// Car speed above which slip and its estimates are judged: below, a count of an encoder is a large part of them.
+inline constexpr double least_judged_speed_m_s = 3.0;
+
 /// What a braking run was worth. NaN where a run does not get that far or the backend cannot know. Speeds and slip are
 /// the true ones where the backend knows them, else the estimates.
 struct Metrics {
