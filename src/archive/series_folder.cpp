@@ -2,7 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <fstream>
+#include <optional>
 #include <utility>
 
 namespace abs_hil::archive {
@@ -17,6 +21,12 @@ void move_to(const fs::path& from, const fs::path& to) {
   if (error) {
     throw FolderError(fmt::format("cannot rename \"{}\" to \"{}\": {}", from.string(), to.string(), error.message()));
   }
+}
+
+/// A text of an object that somebody may have damaged; nothing if there is none.
+std::optional<std::string> text_of(const nlohmann::ordered_json& object, const char* key) {
+  if (!object.is_object() || !object.contains(key) || !object[key].is_string()) return std::nullopt;
+  return object[key].get<std::string>();
 }
 
 }  // namespace
@@ -38,8 +48,9 @@ std::string SeriesFolder::name_of(std::size_t run) { return fmt::format("run-{:0
 void SeriesFolder::read_index(const std::string& identity) {
   const fs::path index = path_ / series_index;
   const auto json = nlohmann::ordered_json::parse(std::ifstream(index), nullptr, false);
-  const bool whole = json.is_object() && json.contains("runs") && json["runs"].is_array() &&
-                     json["runs"].size() == runs_.size() && json.value("identity", std::string()) == identity;
+  const auto has_status = [](const nlohmann::ordered_json& run) { return text_of(run, "status").has_value(); };
+  const bool whole = text_of(json, "identity") == identity && json.contains("runs") && json["runs"].is_array() &&
+                     json["runs"].size() == runs_.size() && std::ranges::all_of(json["runs"], has_status);
   if (!whole) {
     throw FolderError(fmt::format(
         "--out: \"{}\" holds another series (script, configuration or seeds differ, or its {} is damaged); name "
@@ -49,7 +60,7 @@ void SeriesFolder::read_index(const std::string& identity) {
   for (std::size_t i = 0; i < runs_.size(); ++i) {
     // What counts is the folder: the index may be one run behind when the program was killed.
     const bool there = fs::is_directory(path_ / name_of(i));
-    const std::string status = json["runs"][i].value("status", std::string("planned"));
+    const std::string status = *text_of(json["runs"][i], "status");
     if (there) runs_[i].status = status == "planned" ? "completed" : status;
   }
 }
@@ -64,10 +75,13 @@ void SeriesFolder::write_index() const {
   const fs::path index = path_ / series_index;
   fs::path part = index;
   part += ".part";
+  errno = 0;
   std::ofstream file(part, std::ios::binary);
   file << json.dump(2) << '\n';
   file.close();
-  if (!file) throw FolderError(fmt::format("cannot write \"{}\"", part.string()));
+  if (!file) {
+    throw FolderError(fmt::format("cannot write \"{}\": {}", part.string(), std::strerror(errno != 0 ? errno : EIO)));
+  }
   move_to(part, index);
 }
 

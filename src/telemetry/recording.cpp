@@ -5,6 +5,7 @@
 #include <cstring>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "abs_hil/rig/phase.hpp"
@@ -20,21 +21,32 @@ namespace {
 namespace fs = std::filesystem;
 using Bytes = std::vector<std::uint8_t>;
 using Fields = std::vector<std::string>;
+using Columns = std::map<std::string, std::size_t, std::less<>>;  ///< place of each name
 
 constexpr std::string_view envelope = "log_event,log_time_us,channel,type";
 constexpr std::string_view raw_type = "raw";
+
+Fields split_header(std::string_view header) {
+  Fields names;
+  while (!header.empty()) {
+    const std::size_t comma = std::min(header.find(','), header.size());
+    names.emplace_back(header.substr(0, comma));
+    header.remove_prefix(std::min(comma + 1, header.size()));
+  }
+  return names;
+}
+
+/// The columns of --csv, in their order.
+const Fields& csv_columns() {
+  static const Fields columns = split_header(csv_header);
+  return columns;
+}
 
 /// Columns of --csv, which go first, by name; in other files none.
 template <class Message>
 bool goes_first(std::string_view name) {
   if constexpr (!std::same_as<Message, telemetry_t>) return false;
-  std::string_view rest = csv_header;
-  while (!rest.empty()) {
-    const std::size_t comma = std::min(rest.find(','), rest.size());
-    if (rest.substr(0, comma) == name) return true;
-    rest.remove_prefix(std::min(comma + 1, rest.size()));
-  }
-  return false;
+  return std::ranges::find(csv_columns(), name) != csv_columns().end();
 }
 
 /// The columns of --csv stand in another order than telemetry_t's fields.
@@ -70,12 +82,7 @@ std::string row_of(const Message& message, const LogEvent& event) {
       texts[name] = one.row();
     });
     texts["phase"] = rig::name_of(static_cast<rig::Phase>(message.phase));
-    std::string_view rest = csv_header;
-    while (!rest.empty()) {
-      const std::size_t comma = std::min(rest.find(','), rest.size());
-      row.text(texts[rest.substr(0, comma)]);
-      rest.remove_prefix(std::min(comma + 1, rest.size()));
-    }
+    for (const std::string& column : csv_columns()) row.text(texts[column]);
   }
   visit_fields(message, [&row](std::string_view name, const auto& value) {
     if (!goes_first<Message>(name)) row(name, value);
@@ -87,8 +94,7 @@ std::string row_of(const Message& message, const LogEvent& event) {
 /// Sets a message's fields from the texts of a row.
 class FieldTexts {
  public:
-  FieldTexts(const std::map<std::string, std::size_t, std::less<>>& columns, const Fields& fields)
-      : columns_(columns), fields_(fields) {}
+  FieldTexts(const Columns& columns, const Fields& fields) : columns_(columns), fields_(fields) {}
 
   template <class Number>
     requires std::is_arithmetic_v<Number>
@@ -116,7 +122,7 @@ class FieldTexts {
     problem_ = "no column " + std::string(name);
     return nullptr;
   }
-  const std::map<std::string, std::size_t, std::less<>>& columns_;
+  const Columns& columns_;
   const Fields& fields_;
   std::string problem_;
 };
@@ -128,22 +134,10 @@ Bytes encoded(const Message& message) {
   return {bytes.begin(), bytes.end()};
 }
 
-using Columns = std::map<std::string, std::size_t, std::less<>>;
-
 Columns columns_of(const Fields& header) {
   Columns columns;
   for (std::size_t i = 0; i < header.size(); ++i) columns[header[i]] = i;
   return columns;
-}
-
-Fields split_header(std::string_view header) {
-  Fields names;
-  while (!header.empty()) {
-    const std::size_t comma = std::min(header.find(','), header.size());
-    names.emplace_back(header.substr(0, comma));
-    header.remove_prefix(std::min(comma + 1, header.size()));
-  }
-  return names;
 }
 
 /// What an event looks like in CSV: the type and header of its file and its row.
@@ -205,11 +199,8 @@ class CsvFiles {
     const std::string key = is_main ? std::string() : text.type == raw_type ? text.type : event.channel + text.type;
     auto file = files_.find(key);
     if (file == files_.end()) {
-      fs::path path = main_;
-      if (!is_main) path = beside(main_, text.type == raw_type ? text.type : event.channel);
-      if (paths_.contains(path)) path = beside(main_, event.channel + '.' + text.type);
-      paths_.insert({path, 0});
-      file = open(key, path, text.header);
+      file = open(key, is_main ? main_ : unused(text.type == raw_type ? text.type : event.channel, text.type),
+                  text.header);
     }
     put(file->second, text.row);
   }
@@ -227,6 +218,14 @@ class CsvFiles {
     fs::path path;
     detail::FilePointer stream;
   };
+  /// Channels may differ in what no file name tells apart, and a channel may carry several types.
+  fs::path unused(const std::string& part, const std::string& type) {
+    fs::path path = beside(main_, part);
+    if (paths_.contains(path)) path = beside(main_, part + '.' + type);
+    for (int n = 2; paths_.contains(path); ++n) path = beside(main_, part + '.' + type + '.' + std::to_string(n));
+    paths_.insert(path);
+    return path;
+  }
   std::map<std::string, File>::iterator open(const std::string& key, const fs::path& path, const std::string& header) {
     detail::FilePointer opened(std::fopen(path.c_str(), "wb"));
     if (!opened) throw FileError("CSV file", path, errno);
@@ -241,7 +240,7 @@ class CsvFiles {
   fs::path main_;
   std::string channel_;  ///< of the telemetry in the main file
   std::map<std::string, File> files_;
-  std::map<fs::path, int> paths_;
+  std::set<fs::path> paths_;  ///< beside the main file
 };
 
 /// RUN.csv and all RUN.*.csv beside it.

@@ -54,6 +54,11 @@ TEST_CASE("a folder of another series, or of anything else, is refused") {
   CHECK_THROWS_WITH(SeriesFolder(path, "id", "paper", {}), Contains("another series"));
   std::ofstream(path / "series.json") << "{";
   CHECK_THROWS_WITH(SeriesFolder(path, "id", "paper", three()), Contains("another series"));
+  std::ofstream(path / "series.json") << R"({"identity": 1, "runs": [{}, {}, {}]})";
+  CHECK_THROWS_AS(SeriesFolder(path, "id", "paper", three()), FolderError);
+  std::ofstream(path / "series.json") << R"({"identity": "id", "runs": [1, null, {"status": 2}]})";
+  fs::create_directory(path / "run-0003");
+  CHECK_THROWS_WITH(SeriesFolder(path, "id", "paper", three()), Contains("another series"));
   std::ofstream(place.path / "mine") << "x";
   CHECK_THROWS_WITH(SeriesFolder(place.path, "id", "paper", three()), Contains("not empty"));
 }

@@ -118,6 +118,24 @@ TEST_CASE("a log with another number of rigs keeps each channel in a file of its
   CHECK(content(scratch / "two.lcmlog") == content(scratch / "back.lcmlog"));
 }
 
+TEST_CASE("channels whose names make the same file name get files of their own") {
+  const test::ScratchDirectory scratch;
+  telemetry_t m{};
+  EncodeBuffer buffer;
+  const auto bytes = buffer.encode(m);
+  const std::vector<std::uint8_t> data(bytes.begin(), bytes.end());
+  EventLogWriter log(scratch / "many.lcmlog");
+  std::int64_t n = 0;
+  for (const char* channel : {"MAIN", "A/B/C", "A_B/C", "A/B_C", "A_B_C"}) {
+    log.write({n, n, channel, data});
+    ++n;
+  }
+  log.finish();
+  CHECK(log_to_csv(scratch / "many.lcmlog", scratch / "many.csv").events == 5);
+  CHECK(csv_to_log(scratch / "many.csv", scratch / "back.lcmlog").events == 5);
+  CHECK(content(scratch / "many.lcmlog") == content(scratch / "back.lcmlog"));
+}
+
 TEST_CASE("a damaged log is an error that names the place, wherever it is cut or overwritten") {
   const test::ScratchDirectory scratch;
   record(scratch / "run.lcmlog", scratch / "own.csv");

@@ -4,6 +4,14 @@
 
 namespace abs_hil::driver {
 
+void EncoderChannel::start(std::int32_t counts) noexcept {
+  last_ = delivered_ = counts;
+  fraction_ = 0.0;
+  held_ = 0;
+  renewed_ns_ = 0;
+  line_.clear();
+}
+
 std::int32_t EncoderChannel::travel(std::int32_t counts) noexcept {
   const std::int32_t travelled = rig::counts_between(last_, counts);
   last_ = counts;
@@ -56,8 +64,15 @@ std::int32_t EncoderChannel::pass(std::int32_t travel, const ActiveFault& fault,
   return delivered_;
 }
 
+void NumberChannel::start() noexcept {
+  delivered_ = 0.0;
+  renewed_ns_ = 0;
+  line_.clear();
+}
+
 double NumberChannel::pass(double value, const ActiveFault& fault, std::int64_t now_ns,
                            std::mt19937_64& random) noexcept {
+  if (fault.kind != InjectionKind::delayed) line_.clear();
   switch (fault.kind) {
     case InjectionKind::ok:
       delivered_ = value;

@@ -10,6 +10,7 @@ namespace abs_hil::driver {
 
 namespace {
 
+constexpr double longest_run_s = 1e9;  ///< a duration beyond it, infinity included, is no end
 constexpr double not_known = std::numeric_limits<double>::quiet_NaN();
 
 double scaled_duty(double duty, double factor) noexcept { return std::clamp(duty * factor, 0.0, 1.0); }
@@ -72,6 +73,14 @@ void InjectingDriver::do_activate(std::int64_t now_ns) {
   now_ns_ = now_ns;
   first_effect_ns_ = -1;
   first_read_ = true;
+  delivered_ = {};
+  sent_ = {};
+  for (NumberChannel* channel :
+       {&stamp_, &supply_, &temperature_, &trip_, &motor_, &brake_, &brake_torque_, &enable_}) {
+    channel->start();
+  }
+  answers_.clear();
+  commands_.clear();
   for (Planned& planned : planned_) planned.entered_ns = planned.injection.phase ? -1 : now_ns;
 }
 
@@ -92,8 +101,7 @@ ActiveFault InjectingDriver::fault_of(InjectionSignal signal) const noexcept {
   for (const Planned& planned : planned_) {
     if (planned.injection.signal != signal || planned.entered_ns < 0) continue;
     const std::int64_t begins_ns = planned.entered_ns + ns_of(planned.injection.delay_s);
-    const bool over =
-        std::isfinite(planned.injection.duration_s) && now_ns_ >= begins_ns + ns_of(planned.injection.duration_s);
+    const bool over = now_ns_ - begins_ns >= ns_of(std::min(planned.injection.duration_s, longest_run_s));
     if (now_ns_ < begins_ns || over || begins_ns < latest_ns) continue;
     latest_ns = begins_ns;
     fault = {planned.injection.kind, planned.injection.parameter};
@@ -169,6 +177,7 @@ void InjectingDriver::fail_numbers(rig::Measurement& measurement) noexcept {
 
 IoResult InjectingDriver::fail_whole_answer(rig::Measurement& measurement) noexcept {
   const ActiveFault fault = fault_of(InjectionSignal::read);
+  if (fault.kind != InjectionKind::delayed) answers_.clear();
   switch (fault.kind) {
     case InjectionKind::ok: break;
     case InjectionKind::off: return {IoError::no_answer};
@@ -220,6 +229,7 @@ IoResult InjectingDriver::do_write(const rig::Command& command) noexcept {
 
 IoResult InjectingDriver::fail_whole_command(rig::Command& command) noexcept {
   const ActiveFault fault = fault_of(InjectionSignal::write);
+  if (fault.kind != InjectionKind::delayed) commands_.clear();
   switch (fault.kind) {
     case InjectionKind::ok: break;
     case InjectionKind::off: return {IoError::no_answer};

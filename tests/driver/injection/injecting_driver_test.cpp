@@ -247,3 +247,34 @@ TEST_CASE("the later fault acts, and ok heals") {
   bench.cycles(2);
   CHECK(bench.measurement.supply_V == 29.0);
 }
+
+TEST_CASE("a delay that comes again begins with what is there then") {
+  Bench supply("any@supply:delayed=2ms+2ms~3ms,any@supply:delayed=2ms+10ms");
+  supply.cycles(10);
+  CHECK(supply.measurement.supply_V == 33.0);  // of the ninth, the last without it
+  Bench answer("any@read:delayed=2ms+2ms~3ms,any@read:delayed=2ms+10ms");
+  answer.cycles(10);
+  CHECK(answer.measurement.time_ns == 9 * ms);
+  Bench command("any@write:delayed=2ms+2ms~3ms,any@write:delayed=2ms+10ms");
+  for (int i = 1; i <= 10; ++i) command.cycle(rig::Phase::brake, {.brake_duty = 0.01 * i});
+  CHECK(command.rig.last.brake_duty == Approx(0.09));
+}
+
+TEST_CASE("a run's faults know nothing of the run before it") {
+  Bench bench("any@write:delayed=4ms,any@encoder_upper:delayed=4ms,any@supply:delayed=4ms");
+  for (int i = 0; i < 3; ++i) bench.cycle(rig::Phase::accelerate, {.motor_duty = 0.8, .motor_enable = true});
+  REQUIRE(bench.driver.deactivate().ok());
+  bench.driver.activate(bench.time_ns);
+  for (int i = 0; i < 3; ++i) {
+    bench.cycle();
+    CHECK(bench.rig.last.motor_duty == 0.0);
+    CHECK(bench.measurement.upper_counts == 400);
+    CHECK(bench.measurement.supply_V == 0.0);
+  }
+}
+
+TEST_CASE("a duration beyond all runs is no end") {
+  Bench bench("any@supply:off~1e30s");
+  bench.cycles(3);
+  CHECK(bench.measurement.supply_V == 0.0);
+}

@@ -44,6 +44,7 @@ class DelayLine {
     --size_;
     return true;
   }
+  void clear() noexcept { size_ = 0; }
 
  private:
   static constexpr std::size_t capacity = 5001;  ///< half a second at 10 kHz
@@ -62,8 +63,8 @@ class DelayLine {
 /// counter goes on from where it then is.
 class EncoderChannel {
  public:
-  /// Begins with the counter's first reading.
-  void start(std::int32_t counts) noexcept { last_ = delivered_ = counts; }
+  /// Begins anew with the counter's first reading.
+  void start(std::int32_t counts) noexcept;
   /// Counts travelled since the reading before.
   [[nodiscard]] std::int32_t travel(std::int32_t counts) noexcept;
   /// What is delivered of `travel` under the fault.
@@ -95,6 +96,8 @@ struct NumberFaults {
 class NumberChannel {
  public:
   explicit NumberChannel(const NumberFaults& faults) : faults_(faults) {}
+  /// Begins anew: nothing has been delivered.
+  void start() noexcept;
   [[nodiscard]] double pass(double value, const ActiveFault& fault, std::int64_t now_ns,
                             std::mt19937_64& random) noexcept;
 
