@@ -141,6 +141,35 @@ void require_resources(const RunRequest& request, driver::RigDriver& driver) {
   if (!report.realtime()) throw driver::Unavailable(realtime_refusal(report));
 }
 
+/// The run is over: writes its record, tells how it ended, dismisses the guardian. Returns the exit status.
+/// @param lost  why recorded data was lost; empty: none was
+int conclude(const RunRequest& request, const experiment::RunSession& session, const experiment::RunOutcome& outcome,
+             driver::RigDriver& driver, RunOutputs& outputs, RunWatch& run_watch, const std::string& lost) {
+  if (!outcome.safe_state.ok()) {
+    spdlog::error("the safe state may not have reached the board ({}): {}. Press the E-stop and switch the rig off",
+                  driver::error_text(outcome.safe_state), driver.what_holds_unsafe());
+  }
+  const analysis::RunSummary summary = summarise(request, session, outcome, outputs);
+  if (rig::is_fault(outcome.reason)) {
+    run_watch.write_record(request, outcome.reason, outcome.reason_value, summary.reason);
+  }
+  const std::vector<std::string> unwritten =
+      outputs.write(summary, session.executive().statistics(), environment(request, driver, outcome));
+  if (!request.in_series) {
+    std::string text = analysis::to_text(summary);
+    if (outputs.folder()) text += fmt::format("  {:<22}{}\n", "run folder", outputs.folder()->path().string());
+    // A terminal that has gone takes nothing: no reason to end otherwise than the run did.
+    static_cast<void>(std::fputs(text.c_str(), stdout));
+  }
+  for (const std::string& line : driver.tally()) spdlog::info("{}", line);
+  if (!outcome.completed()) spdlog::error("run ended early: {}", summary.reason);
+  run_watch.end();
+  for (const std::string& problem : unwritten) spdlog::error("{}", problem);
+  if (!lost.empty()) spdlog::error("recorded data was lost: {}", lost);
+  if (!lost.empty() || !unwritten.empty()) return exit_ended_early;
+  return status_of(outcome);
+}
+
 }  // namespace
 
 int run(const RunRequest& request) {
@@ -197,29 +226,7 @@ int run(const RunRequest& request) {
   }
   if (signals) signals->allow_leaving();
   board_notes.log_once();
-  const analysis::RunSummary summary = summarise(request, session, outcome, outputs);
-  if (rig::is_fault(outcome.reason)) {
-    run_watch.write_record(request, outcome.reason, outcome.reason_value, summary.reason);
-  }
-  const std::vector<std::string> unwritten =
-      outputs.write(summary, session.executive().statistics(), environment(request, *driver, outcome));
-  if (!request.in_series) {
-    std::string text = analysis::to_text(summary);
-    if (outputs.folder()) text += fmt::format("  {:<22}{}\n", "run folder", outputs.folder()->path().string());
-    // A terminal that has gone takes nothing: no reason to end otherwise than the run did.
-    static_cast<void>(std::fputs(text.c_str(), stdout));
-  }
-  for (const std::string& line : driver->tally()) spdlog::info("{}", line);
-  if (!outcome.completed()) spdlog::error("run ended early: {}", summary.reason);
-  if (!outcome.safe_state.ok()) {
-    spdlog::error("the safe state may not have reached the board ({}): {}. Press the E-stop and switch the rig off",
-                  driver::error_text(outcome.safe_state), driver->what_holds_unsafe());
-  }
-  run_watch.end();
-  for (const std::string& problem : unwritten) spdlog::error("{}", problem);
-  if (!lost.empty()) spdlog::error("recorded data was lost: {}", lost);
-  if (!lost.empty() || !unwritten.empty()) return exit_ended_early;
-  return status_of(outcome);
+  return conclude(request, session, outcome, *driver, outputs, run_watch, lost);
 }
 
 }  // namespace abs_hil::app

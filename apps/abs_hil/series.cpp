@@ -83,7 +83,7 @@ class Progress {
   std::mutex mutex_{};
 };
 
-std::string in_words(const script::SeriesMember& member) {
+std::string text_of(const script::SeriesMember& member) {
   std::string text;
   for (const auto& [key, value] : member.varied) text += fmt::format("{} = {}, ", key, script::text_of(value));
   return text + fmt::format("seed {}", member.seed);
@@ -142,6 +142,111 @@ bool pause(double duration_s) {
   return signalled() == rig::Reason::none;
 }
 
+/// The runs of a series that are still to be done.
+class SeriesRun {
+ public:
+  /// @param folder  may be null. All must outlive it.
+  SeriesRun(const RunOptions& common, const RunRequest& base, const std::vector<script::SeriesMember>& members,
+            archive::SeriesFolder* folder)
+      : common_(common),
+        base_(base),
+        members_(members),
+        folder_(folder),
+        left_(left_of(members.size(), folder)),
+        pause_s_(base.outputs.fast ? 0.0 : base.script->series.pause_s),
+        progress_(members.size(), members.size() - left_.size(), pause_s_) {
+    for (std::size_t i = 0; folder != nullptr && i < members.size(); ++i) {
+      if (folder->done(i) && folder->status(i) != completed) ++ended_early_;
+    }
+    if (folder != nullptr && folder->resumed()) {
+      spdlog::info("{} of {} runs are there already", members.size() - left_.size(), members.size());
+    }
+  }
+
+  /// Does them; returns the program's exit status.
+  int run_all() {
+    // In virtual time as many at once as the machine has processors; at the rig one after the other.
+    const bool at_once = base_.outputs.fast && base_.settings.backend == "sim";
+    comparison::for_each_index(left_.size(), at_once ? comparison::machine_threads() : 1,
+                               [this](std::size_t k) { run_one(k); });
+    progress_.end();
+    if (interrupted_ == 0 && signalled() != rig::Reason::none) {
+      experiment::RunOutcome outcome;
+      outcome.reason = signalled();
+      interrupted_ = status_of(outcome);
+    }
+    fmt::print("{}\n", in_words());
+    if (interrupted_ != 0) return interrupted_;
+    return ended_early_ == 0 ? exit_completed : exit_ended_early;
+  }
+
+ private:
+  static constexpr const char* completed = "completed";
+
+  static std::vector<std::size_t> left_of(std::size_t runs, const archive::SeriesFolder* folder) {
+    std::vector<std::size_t> left;
+    for (std::size_t i = 0; i < runs; ++i) {
+      if (folder == nullptr || !folder->done(i)) left.push_back(i);
+    }
+    return left;
+  }
+
+  void run_one(std::size_t k) {
+    if (interrupted_ != 0 || halted_by_ != 0 || signalled() != rig::Reason::none) return;
+    const std::size_t i = left_[k];
+    const std::string what = fmt::format("{}, {}", archive::SeriesFolder::name_of(i), text_of(members_[i]));
+    RunRequest request = merge(options_of(common_, members_[i]));
+    request.command_line = base_.command_line;
+    request.in_series = [this, &what](std::string_view phase) { progress_.show(what, phase); };
+    request.outputs.run_folder.reset();
+    request.outputs.no_run_folder = true;
+    if (folder_ != nullptr) request.outputs.run_folder = folder_->begin(i).string();
+    const int status = run(request);
+    if (is_interrupted(status)) {
+      interrupted_ = status;
+      return;
+    }
+    if (status != exit_completed) {
+      ++ended_early_;
+      // A fault of the rig, or somebody stopped it: nothing moves again before a person has looked.
+      if (base_.settings.backend == "rig") halted_by_ = i + 1;
+    }
+    if (folder_ != nullptr) folder_->end(i, status == exit_completed ? completed : "fault");
+    progress_.count(what);
+    if (pause_s_ > 0.0 && k + 1 < left_.size() && halted_by_ == 0) {
+      progress_.show(what, fmt::format("over; pause of {:.6g} s before the next", pause_s_), true);
+      if (pause(pause_s_)) progress_.paused();
+    }
+  }
+
+  [[nodiscard]] std::string in_words() const {
+    const std::string where = folder_ != nullptr ? ", in " + folder_->path().string() : std::string();
+    const bool cut_short = interrupted_ != 0 || (halted_by_ != 0 && progress_.done() < members_.size());
+    if (!cut_short) {
+      return fmt::format("series {}: {} runs, {} ended early{}", base_.script->name, members_.size(),
+                         ended_early_.load(), where);
+    }
+    const std::string why =
+        interrupted_ != 0 ? "interrupted"
+                          : fmt::format("ended because {} ended early", archive::SeriesFolder::name_of(halted_by_ - 1));
+    return fmt::format(
+        "series {}: {} with {} of {} runs done, {} ended early{}{}", base_.script->name, why, progress_.done(),
+        members_.size(), ended_early_.load(), where,
+        folder_ != nullptr ? "; the same command with --out " + folder_->path().string() + " goes on" : "");
+  }
+
+  const RunOptions& common_;
+  const RunRequest& base_;
+  const std::vector<script::SeriesMember>& members_;
+  archive::SeriesFolder* folder_;
+  std::vector<std::size_t> left_;
+  double pause_s_;
+  Progress progress_;
+  std::atomic<std::size_t> ended_early_{0};
+  std::atomic<int> interrupted_{0};
+  std::atomic<std::size_t> halted_by_{0};  ///< number of the run at a rig that ended early, from 1; 0: none
+};
+
 }  // namespace
 
 int run_series(const RunOptions& common, const RunRequest& base) {
@@ -159,63 +264,8 @@ int run_series(const RunOptions& common, const RunRequest& base) {
     entries.push_back({.varied = varied_json(member), .seed = member.seed});
   }
   const std::unique_ptr<archive::SeriesFolder> folder = open_folder(base, std::move(entries));
-  std::vector<std::size_t> left;
-  std::atomic<std::size_t> ended_early{0};
-  for (std::size_t i = 0; i < members.size(); ++i) {
-    if (!folder || !folder->done(i))
-      left.push_back(i);
-    else if (folder->status(i) != "completed")
-      ++ended_early;
-  }
-  if (folder && folder->resumed())
-    spdlog::info("{} of {} runs are there already", members.size() - left.size(), members.size());
-
   note_signals();
-  const double pause_s = base.outputs.fast ? 0.0 : base.script->series.pause_s;
-  Progress progress(members.size(), members.size() - left.size(), pause_s);
-  std::atomic<int> interrupted{0};
-  const auto one = [&](std::size_t k) {
-    if (interrupted != 0 || signalled() != rig::Reason::none) return;
-    const std::size_t i = left[k];
-    const std::string what = fmt::format("{}, {}", archive::SeriesFolder::name_of(i), in_words(members[i]));
-    RunRequest request = merge(options_of(common, members[i]));
-    request.command_line = base.command_line;
-    request.in_series = [&progress, &what](std::string_view phase) { progress.show(what, phase); };
-    request.outputs.run_folder.reset();
-    request.outputs.no_run_folder = true;
-    if (folder) request.outputs.run_folder = folder->begin(i).string();
-    const int status = run(request);
-    if (is_interrupted(status)) {
-      interrupted = status;
-      return;
-    }
-    if (status != exit_completed) ++ended_early;
-    if (folder) folder->end(i, status == exit_completed ? "completed" : "fault");
-    progress.count(what);
-    if (pause_s > 0.0 && k + 1 < left.size()) {
-      progress.show(what, fmt::format("over; pause of {:.6g} s before the next", pause_s), true);
-      if (pause(pause_s)) progress.paused();
-    }
-  };
-  // In virtual time as many at once as the machine has processors; at the rig one after the other.
-  comparison::for_each_index(
-      left.size(), base.outputs.fast && base.settings.backend == "sim" ? comparison::machine_threads() : 1, one);
-  progress.end();
-  if (interrupted == 0 && signalled() != rig::Reason::none) {
-    experiment::RunOutcome outcome;
-    outcome.reason = signalled();
-    interrupted = status_of(outcome);
-  }
-  const std::string where = folder ? ", in " + folder->path().string() : std::string();
-  if (interrupted != 0) {
-    fmt::print("series {}: interrupted with {} of {} runs done, {} ended early{}{}\n", base.script->name,
-               progress.done(), members.size(), ended_early.load(), where,
-               folder ? "; the same command with --out " + folder->path().string() + " goes on" : "");
-  } else {
-    fmt::print("series {}: {} runs, {} ended early{}\n", base.script->name, members.size(), ended_early.load(), where);
-  }
-  if (interrupted != 0) return interrupted;
-  return ended_early == 0 ? exit_completed : exit_ended_early;
+  return SeriesRun(common, base, members, folder.get()).run_all();
 }
 
 }  // namespace abs_hil::app

@@ -1,5 +1,6 @@
 """The paper's experiment through driver.kind=can, against the emulated node in another process. Outcomes are asserted,
 never timing; tests/vm has the same on real kernels' CAN."""
+import json
 import unittest
 
 from can_emulator import CanTest, skip_unless_possible
@@ -12,6 +13,21 @@ BROKEN = [
     ('wrong-size=6', 'CAN frames have the wrong length'),
     ('babble=10', "are not the node's (wrong check)"),
 ]
+# the first run's limit is below the speed that it accelerates to
+SERIES = '''
+[[phase]]
+name = "accelerate"
+motor = 1.0
+until = { upper_speed_above_rad_s = 60 }
+at_most_s = 20
+[[phase]]
+name = "hold"
+brake = { torque_Nm = 2 }
+until = { standstill = true }
+at_most_s = 20
+[vary]
+gate.overspeed_rad_s = [50, 250]
+'''
 
 
 class CanRun(CanTest):
@@ -41,6 +57,22 @@ class CanRun(CanTest):
             self.assertEqual(result.returncode, 0, result.stderr)
             runs.append(csv.read_bytes())
         self.assertEqual(runs[0], runs[1])
+
+    def test_nothing_moves_again_by_itself_after_a_run_of_a_series_ended_early(self):
+        node = self.node('--lock-step')
+        script = self.folder / 'mine.toml'
+        script.write_text(SERIES)
+        series = ['--backend', 'rig', '--fast', '--no-lcm', '--set', 'driver.kind=can', '--set', 'driver.emulated=true',
+                  '--set', f'driver.can.interface={node.interface}', '--experiment', script, '--out', self.folder / 'out']
+        result = self.run_program(*series)
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn('run-0001 ended early', result.stdout)
+        self.assertIn('1 of 2 runs done', result.stdout)
+        self.assertFalse((self.folder / 'out' / 'run-0002').exists())
+        result = self.run_program(*series)
+        self.assertEqual(result.returncode, 1, result.stderr)
+        index = json.loads((self.folder / 'out' / 'series.json').read_text())
+        self.assertEqual([run['status'] for run in index['runs']], ['fault', 'completed'])
 
     def test_broken_node_in_lock_step(self):
         for fault, words in BROKEN:
