@@ -3,8 +3,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <algorithm>
-
+#include "abs_hil/driver/io_result.hpp"
+#include "abs_hil/driver/pci/discovery.hpp"
 #include "text_file.hpp"
 
 namespace abs_hil::diagnosis {
@@ -12,17 +12,12 @@ namespace abs_hil::diagnosis {
 namespace {
 
 namespace fs = std::filesystem;
-// Numbers of the PLX 9030 bridge on the RT-DAC4/PCI.
-constexpr std::string_view pci_vendor = "0x10b5";
-constexpr std::string_view pci_device = "0x2497";
 
-/// The entries of a folder by name; none if it is not there.
-std::vector<fs::path> entries(const fs::path& folder) {
-  std::vector<fs::path> found;
-  std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(folder, ignored)) found.push_back(entry.path());
-  std::sort(found.begin(), found.end());
-  return found;
+/// Addresses of the cards below a folder; none if it is not there.
+std::vector<std::string> addresses(const fs::path& devices) try {
+  return driver::pci::find_cards(devices);
+} catch (const driver::Unavailable&) {
+  return {};
 }
 
 /// Opening a resource file touches no register.
@@ -58,11 +53,11 @@ Finding judge_board(const PciBoard& board) {
 
 std::vector<PciBoard> find_pci_boards(const fs::path& devices) {
   std::vector<PciBoard> boards;
-  for (const fs::path& device : entries(devices)) {
-    if (first_line(device / "vendor") != pci_vendor || first_line(device / "device") != pci_device) continue;
+  for (const std::string& address : addresses(devices)) {
+    const fs::path device = devices / address;
     std::error_code none_bound;
     const fs::path driver = fs::read_symlink(device / "driver", none_bound);
-    boards.push_back({.address = device.filename().string(),
+    boards.push_back({.address = address,
                       .folder = device,
                       .bound_driver = none_bound ? "" : driver.filename().string(),
                       .enabled = first_line(device / "enable", "0") != "0",

@@ -17,7 +17,7 @@ constexpr double clock_Hz = 40e6;
 constexpr double lines_per_rev = 1024.0;
 constexpr double supply_scale_V = 92000.0;
 /// Sensor pulse, low time; the ratio of high to low time carries the temperature.
-constexpr std::uint32_t temperature_low_time = 100'000;
+constexpr std::uint32_t temperature_low_ticks = 100'000;
 
 std::uint32_t rounded(double value) noexcept {
   return static_cast<std::uint32_t>(std::llround(std::clamp(value, 0.0, 4.0e9)));
@@ -32,7 +32,7 @@ CardModel::CardModel(const CardOptions& options) : options_(options), plant_(opt
     throw std::invalid_argument("overspeed bit " + std::to_string(options.overspeed_bit) + ": give 0 or 2");
   }
   start_wheels(plant_, options.start_speed_rad_s);
-  plain_[0x50 / 4] = options.velocity_period;
+  plain_[0x50 / 4] = options.velocity_period_ticks;
   plain_[0x5C / 4] = velocity(rad_s_of_rpm(options.overspeed_rpm));
   plain_[0xA4 / 4] = supply_raw(options.supply_min_V);
   plain_[0xA8 / 4] = options.temperature_max_C;
@@ -99,8 +99,8 @@ std::uint32_t CardModel::read32(std::uint32_t offset) const noexcept {
       if (encoder_index_ >= encoder_count || (reset_mask_ >> encoder_index_ & 1U) != 0) return 0;
       return raw_count(encoder_index_) - zero_[encoder_index_];
     case 0xAC: return trip_flags();
-    case 0xB4: return rounded((235.0 - options_.temperature_C) / 400.0 * temperature_low_time);
-    case 0xB8: return temperature_low_time;
+    case 0xB4: return rounded((235.0 - options_.temperature_C) / 400.0 * temperature_low_ticks);
+    case 0xB8: return temperature_low_ticks;
     default: return offset < bytes ? plain_[offset / 4] : 0;
   }
 }

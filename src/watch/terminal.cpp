@@ -62,11 +62,6 @@ void leave_fatal_signals() {
   for (const int signal : fatal_signals) std::signal(signal, SIG_DFL);
 }
 
-bool locale_is_utf8() {
-  // Characters alone: numbers keep their decimal points.
-  return std::setlocale(LC_CTYPE, "") != nullptr && std::string_view(::nl_langinfo(CODESET)) == "UTF-8";
-}
-
 short colour_of(Style style) {
   switch (style) {
     case Style::alarm: return COLOR_RED;
@@ -87,6 +82,11 @@ attr_t attributes_of(Style style) {
 }
 
 }  // namespace
+
+bool locale_is_utf8() {
+  // Characters alone: numbers keep their decimal points.
+  return std::setlocale(LC_CTYPE, "") != nullptr && std::string_view(::nl_langinfo(CODESET)) == "UTF-8";
+}
 
 bool is_terminal() noexcept { return ::isatty(STDIN_FILENO) == 1 && ::isatty(STDOUT_FILENO) == 1; }
 

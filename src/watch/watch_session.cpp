@@ -1,18 +1,15 @@
 #include "abs_hil/watch/watch_session.hpp"
 
 #include <fmt/format.h>
-#include <langinfo.h>
 #include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <clocale>
 #include <cstdint>
 #include <cstdio>
 #include <stdexcept>
-#include <string_view>
 
 #include "abs_hil/telemetry/run_listener.hpp"
 #include "abs_hil/watch/run_view.hpp"
@@ -31,10 +28,6 @@ constexpr int picture_rows = 32;
 std::int64_t monotonic_ns() {
   using std::chrono::duration_cast, std::chrono::nanoseconds, std::chrono::steady_clock;
   return duration_cast<nanoseconds>(steady_clock::now().time_since_epoch()).count();
-}
-
-bool stdout_takes_utf8() {
-  return std::setlocale(LC_CTYPE, "") != nullptr && std::string_view(::nl_langinfo(CODESET)) == "UTF-8";
 }
 
 /// Messages into a view, stamped on arrival.
@@ -79,7 +72,7 @@ class Session {
   }
 
   WatchEnd in_lines() {
-    screen_.unicode = stdout_takes_utf8() && !options_.ascii;
+    screen_.unicode = locale_is_utf8() && !options_.ascii;
     std::int64_t next_ns = monotonic_ns() + line_period_ns;
     while (!stop_()) {
       wait(next_ns, false);
@@ -91,7 +84,7 @@ class Session {
   }
 
   WatchEnd one_picture() {
-    screen_.unicode = stdout_takes_utf8() && !options_.ascii;
+    screen_.unicode = locale_is_utf8() && !options_.ascii;
     screen_.columns = picture_columns;
     screen_.rows = picture_rows;
     const std::int64_t start_ns = monotonic_ns();

@@ -33,4 +33,7 @@ class Terminal {
 /// True if stdin and stdout are terminals.
 [[nodiscard]] bool is_terminal() noexcept;
 
+/// True where the locale that the environment names writes UTF-8. Sets the program's LC_CTYPE to it.
+[[nodiscard]] bool locale_is_utf8();
+
 }  // namespace abs_hil::watch

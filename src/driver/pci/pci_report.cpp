@@ -9,7 +9,7 @@ namespace {
 
 using rig::formatted;
 
-std::string converted(std::uint32_t offset, std::uint32_t raw, std::uint32_t velocity_period) {
+std::string converted(std::uint32_t offset, std::uint32_t raw, std::uint32_t velocity_period_ticks) {
   switch (offset) {
     case reg::supply:
     case reg::supply_min: return formatted("%.2f V", supply_V(raw));
@@ -17,7 +17,7 @@ std::string converted(std::uint32_t offset, std::uint32_t raw, std::uint32_t vel
     case reg::velocity_period: return formatted("%.4g s", static_cast<double>(raw) / board_clock_Hz);
     case reg::velocity_lower:
     case reg::velocity_upper:
-    case reg::velocity_limit: return formatted("%.2f rad/s", velocity_rad_s(raw, velocity_period));
+    case reg::velocity_limit: return formatted("%.2f rad/s", velocity_rad_s(raw, velocity_period_ticks));
     default: return {};
   }
 }
@@ -44,14 +44,14 @@ std::vector<std::string> PciDriver::notes() const {
 
 std::vector<std::string> PciDriver::inspection() {
   if (!card_.window) return {};
-  std::uint32_t period = 0;
-  static_cast<void>(card_.window->read32(reg::velocity_period, period));  // 0 makes the velocities NaN
+  std::uint32_t period_ticks = 0;
+  static_cast<void>(card_.window->read32(reg::velocity_period, period_ticks));  // 0 makes the velocities NaN
   std::vector<std::string> lines;
   for (const Register& entry : registers()) {
     std::uint32_t raw = 0;
     const IoResult result = card_.window->read32(entry.offset, raw);
     std::string line = formatted("%02X  %-34s", entry.offset, std::string(entry.name).c_str());
-    line += result.ok() ? formatted("0x%08x  %-12s", raw, converted(entry.offset, raw, period).c_str())
+    line += result.ok() ? formatted("0x%08x  %-12s", raw, converted(entry.offset, raw, period_ticks).c_str())
                         : formatted("%-24s", error_text(result).c_str());
     line += formatted("%-14s", std::string(name_of(entry.standing)).c_str());
     line += std::string(name_of(entry.use));

@@ -132,7 +132,7 @@ TEST_CASE("A node that keeps other time than asked for is refused; nothing is wr
 
 TEST_CASE("Silence at configure and at activation is told") {
   NodeOnSocket node({});
-  CanDriver rig({.answer_timeout_us = 1000}, node.opener(), true);
+  CanDriver rig({}, node.opener(), true);
   node.fault("silent");
   CHECK_THROWS_WITH(rig.configure(), Catch::Matchers::Contains("no node answers"));
   node.fault("ok");

@@ -19,28 +19,28 @@
 
 namespace abs_hil::test {
 
-/// The emulated node in lock-step at the other end of a socket pair, in a thread of its own.
+/// The emulated node in lock-step at the other end of a socket pair.
 class NodeOnSocket {
  public:
   explicit NodeOnSocket(emulator::CanNodeOptions options) : node_(in_lock_step(std::move(options))) {
     if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends_.data()) != 0) std::abort();
-    thread_ = std::jthread([this](const std::stop_token& stop) { serve(stop); });
   }
   NodeOnSocket(const NodeOnSocket&) = delete;
   NodeOnSocket& operator=(const NodeOnSocket&) = delete;
   ~NodeOnSocket() {
-    thread_.request_stop();
-    thread_.join();
+    thread_ = {};
     for (const int end : ends_) ::close(end);
   }
 
-  /// A link to it; each is a socket of its own.
+  /// A link to it; each is a socket of its own. The node has answered before the driver listens: no wait, and no
+  /// outcome that a busy computer decides.
   [[nodiscard]] driver::can::CanDriver::OpenLink opener(bool can_fd = false) {
-    return [this, can_fd] {
-      return driver::can::Link{.socket = std::make_unique<driver::can::FrameSocket>(::dup(ends_[0])),
-                               .place = "socket pair",
-                               .can_fd = can_fd};
-    };
+    return [this, can_fd] { return link(std::make_unique<PromptSocket>(::dup(ends_[0]), *this), can_fd); };
+  }
+  /// A link to the node in a thread of its own, with which the driver works as with a real one.
+  [[nodiscard]] driver::can::CanDriver::OpenLink opener_to_thread() {
+    thread_ = std::jthread([this](const std::stop_token& stop) { serve(stop); });
+    return [this] { return link(std::make_unique<driver::can::FrameSocket>(::dup(ends_[0])), false); };
   }
   /// Work with the node once it has taken all that was sent to it so far.
   template <typename Work>
@@ -66,6 +66,20 @@ class NodeOnSocket {
   void hang_up() { ::shutdown(ends_[1], SHUT_RDWR); }
 
  private:
+  class PromptSocket final : public driver::can::FrameSocket {
+   public:
+    PromptSocket(int descriptor, NodeOnSocket& node) : FrameSocket(descriptor), node_(node) {}
+    driver::can::ReceiveResult receive(driver::can::Frame& frame, std::int64_t /*deadline_ns*/) noexcept override {
+      node_.with_node([](emulator::CanNode&, emulator::NodeFaults&) {});
+      return FrameSocket::receive(frame, 0);
+    }
+
+   private:
+    NodeOnSocket& node_;
+  };
+  static driver::can::Link link(std::unique_ptr<driver::can::FrameSocket> socket, bool can_fd) {
+    return {.socket = std::move(socket), .place = "socket pair", .can_fd = can_fd};
+  }
   static emulator::CanNodeOptions in_lock_step(emulator::CanNodeOptions options) {
     options.lock_step = true;
     return options;

@@ -35,7 +35,7 @@ class CanBench final : public Bench {
   NodeOnSocket node_{{.start_speed_rad_s = bench_speed_rad_s}};
   // The contract lets time pass without commands, which the node's watchdog would not.
   std::unique_ptr<driver::can::CanDriver> driver_ = std::make_unique<driver::can::CanDriver>(
-      driver::can::CanOptions{.watchdog_ms = 10'000, .answer_timeout_us = 30'000}, node_.opener(with_fd), true);
+      driver::can::CanOptions{.watchdog_ms = 10'000}, node_.opener(with_fd), true);
 };
 
 }  // namespace

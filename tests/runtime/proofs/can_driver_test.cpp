@@ -12,7 +12,7 @@ TEST_CASE("read and write of the CAN driver neither allocate nor lock, whatever 
   for (const char* fault : {"ok", "drop=3", "babble=20", "wrong-size=5", "silent"}) {
     INFO(fault);
     abs_hil::test::NodeOnSocket node({.start_speed_rad_s = 60.0});
-    driver::can::CanDriver driver({.answer_timeout_us = 2000}, node.opener(), true);
+    driver::can::CanDriver driver({.answer_timeout_us = 2000}, node.opener_to_thread(), true);
     driver.configure();
     driver.activate(0);
     node.fault(fault);

@@ -41,11 +41,11 @@ class FrameSocket {
   explicit FrameSocket(int descriptor) noexcept;
   FrameSocket(const FrameSocket&) = delete;
   FrameSocket& operator=(const FrameSocket&) = delete;
-  ~FrameSocket();
+  virtual ~FrameSocket();
 
   SendResult send(const Frame& frame) noexcept;
   /// @param deadline_ns monotonic clock; in the past: takes what is there and never waits
-  ReceiveResult receive(Frame& frame, std::int64_t deadline_ns) noexcept;
+  virtual ReceiveResult receive(Frame& frame, std::int64_t deadline_ns) noexcept;
   /// Frames that the kernel dropped because this socket's queue was full, since it was opened.
   [[nodiscard]] std::uint32_t dropped() const noexcept { return dropped_; }
   /// Throws away what has been received so far; bounded.
