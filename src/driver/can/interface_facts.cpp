@@ -134,37 +134,39 @@ void ask_for_links(int descriptor) {
 
 }  // namespace
 
+bool take_links(std::span<const unsigned char> answer, std::vector<InterfaceFacts>& found) {
+  while (answer.size() >= sizeof(nlmsghdr)) {
+    nlmsghdr head;
+    std::memcpy(&head, answer.data(), sizeof head);
+    if (head.nlmsg_len < sizeof head || head.nlmsg_len > answer.size() || head.nlmsg_type == NLMSG_DONE ||
+        head.nlmsg_type == NLMSG_ERROR) {
+      return true;
+    }
+    ifinfomsg info{};
+    const std::size_t body = NLMSG_ALIGN(sizeof info);
+    if (head.nlmsg_type == RTM_NEWLINK && head.nlmsg_len >= NLMSG_LENGTH(body)) {
+      std::memcpy(&info, answer.data() + NLMSG_LENGTH(0), sizeof info);
+      if (info.ifi_type == ARPHRD_CAN) {
+        found.push_back(facts_in(info, answer.data() + NLMSG_LENGTH(body), head.nlmsg_len - NLMSG_LENGTH(body)));
+      }
+    }
+    answer = answer.subspan(std::min<std::size_t>(NLMSG_ALIGN(head.nlmsg_len), answer.size()));
+  }
+  return false;
+}
+
 std::vector<InterfaceFacts> can_interfaces() {
   const Netlink netlink;
   ask_for_links(netlink.get());
   std::vector<InterfaceFacts> found;
   alignas(nlmsghdr) static thread_local std::array<unsigned char, 65536> buffer;
-  for (;;) {
+  for (bool done = false; !done;) {
     const ssize_t got = ::recv(netlink.get(), buffer.data(), buffer.size(), 0);
     if (got < 0) refuse("the kernel's answer cannot be read");
-    std::size_t left = static_cast<std::size_t>(got);
-    const unsigned char* at = buffer.data();
-    while (left >= sizeof(nlmsghdr)) {
-      nlmsghdr head;
-      std::memcpy(&head, at, sizeof head);
-      if (head.nlmsg_len < sizeof head || head.nlmsg_len > left || head.nlmsg_type == NLMSG_DONE ||
-          head.nlmsg_type == NLMSG_ERROR) {
-        std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
-        return found;
-      }
-      ifinfomsg info{};
-      const std::size_t body = NLMSG_ALIGN(sizeof info);
-      if (head.nlmsg_type == RTM_NEWLINK && head.nlmsg_len >= NLMSG_LENGTH(body)) {
-        std::memcpy(&info, at + NLMSG_LENGTH(0), sizeof info);
-        if (info.ifi_type == ARPHRD_CAN) {
-          found.push_back(facts_in(info, at + NLMSG_LENGTH(body), head.nlmsg_len - NLMSG_LENGTH(body)));
-        }
-      }
-      const std::size_t step = std::min<std::size_t>(NLMSG_ALIGN(head.nlmsg_len), left);
-      at += step;
-      left -= step;
-    }
+    done = take_links(std::span(buffer).first(static_cast<std::size_t>(got)), found);
   }
+  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+  return found;
 }
 
 std::optional<InterfaceFacts> find_interface(const std::string& name) {

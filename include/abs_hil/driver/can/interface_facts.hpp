@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,9 @@ struct InterfaceFacts {
 
 /// All interfaces of type CAN, by name. Empty where there is none. Throws Unavailable if the kernel cannot be asked.
 [[nodiscard]] std::vector<InterfaceFacts> can_interfaces();
+/// Takes one answer of the kernel apart (messages of rtnetlink, RTM_NEWLINK among them) and adds its interfaces of type
+/// CAN. True at the end of all answers, which is also where an error or a message that cannot be true stands.
+[[nodiscard]] bool take_links(std::span<const unsigned char> answer, std::vector<InterfaceFacts>& found);
 /// One of them; nothing if there is none of this name.
 [[nodiscard]] std::optional<InterfaceFacts> find_interface(const std::string& name);
 
