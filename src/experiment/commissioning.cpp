@@ -101,11 +101,15 @@ CommissioningResult Commissioning::read_board() {
 
 bool Commissioning::judge_turn(Wheel wheel, const Travel& travel) {
   const bool upper = wheel == Wheel::upper;
-  const char* name = upper ? "upper" : "lower";
+  const std::string board(driver_.name());
   const std::int32_t turned = upper ? travel.upper : travel.lower;
   const std::int32_t other = upper ? travel.lower : travel.upper;
   if (std::abs(turned) < turned_counts && std::abs(other) >= turned_counts) {
-    dialog_.tell("FAILED: the other wheel's counter moved: swap driver.pci.upper_channel and driver.pci.lower_channel");
+    // The CAN node has no channels to choose from.
+    const std::string fix = board == "can"
+                                ? "exchange the two encoders at the node"
+                                : "swap driver." + board + ".upper_channel and driver." + board + ".lower_channel";
+    dialog_.tell("FAILED: the other wheel's counter moved: " + fix);
   } else if (std::abs(turned) < turned_counts) {
     dialog_.tell(
         formatted("FAILED: %d counts: too few. Turn further, or look at the encoder's cable and channel", turned));
@@ -113,7 +117,8 @@ bool Commissioning::judge_turn(Wheel wheel, const Travel& travel) {
     dialog_.tell(
         formatted("FAILED: the other wheel moved too, by %d counts: lift the upper wheel off the lower one", other));
   } else if (turned < 0) {
-    dialog_.tell(formatted("FAILED: %d counts, backwards: change the sign of driver.pci.%s_sign", turned, name));
+    dialog_.tell(formatted("FAILED: %d counts, backwards: change the sign of driver.%s.%s_sign", turned, board.c_str(),
+                           upper ? "upper" : "lower"));
   } else {
     dialog_.tell(formatted("ok: %d counts forward, %.2f turns at 4096 a turn", turned, turned / 4096.0));
     return true;
@@ -139,8 +144,7 @@ CommissioningResult Commissioning::turn_by_hand() {
     }
     if (!read(after)) return CommissioningResult::failed;
     const Travel travel{.upper = rig::counts_between(before.upper_counts, after.upper_counts),
-                        .lower = rig::counts_between(before.lower_counts, after.lower_counts),
-                        .read = true};
+                        .lower = rig::counts_between(before.lower_counts, after.lower_counts)};
     if (!judge_turn(wheel, travel)) return CommissioningResult::failed;
   }
   return CommissioningResult::passed;
@@ -179,8 +183,7 @@ bool Commissioning::pulse(const rig::Command& command, double duration_s, Travel
   }
   if (!good || !read(now)) return false;
   travel = {.upper = rig::counts_between(first.upper_counts, now.upper_counts),
-            .lower = rig::counts_between(first.lower_counts, now.lower_counts),
-            .read = true};
+            .lower = rig::counts_between(first.lower_counts, now.lower_counts)};
   return true;
 }
 

@@ -85,6 +85,27 @@ struct Lab {
   bool stop{false};
 };
 
+/// A board of another kind, of which the counters alone matter.
+class OtherBoard final : public driver::RigDriver {
+ public:
+  explicit OtherBoard(std::string_view kind) : kind_(kind) {}
+  [[nodiscard]] std::string_view name() const noexcept override { return kind_; }
+  rig::Measurement counters{};
+
+ private:
+  void do_configure() override {}
+  void do_activate(std::int64_t /*now_ns*/) override {}
+  driver::IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override {
+    measurement = counters;
+    measurement.time_ns = now_ns;
+    return {};
+  }
+  driver::IoResult do_write(const rig::Command& /*command*/) noexcept override { return {}; }
+  driver::IoResult do_make_safe() noexcept override { return {}; }
+
+  std::string_view kind_;
+};
+
 double largest_width(const test::ModelCard& card) {
   double most = 0.0;
   for (const auto& access : card.traffic) {
@@ -160,6 +181,29 @@ TEST_CASE("What is wired otherwise is found and named with its key") {
   CHECK(lab.run() == CommissioningResult::failed);
   CHECK_THAT(lab.person.said, Contains(words));
   CHECK(largest_width(lab.card) == 0.0);  // nothing moved by itself
+}
+
+TEST_CASE("Keys are named that the board has") {
+  const auto said_of = [](std::string_view kind, std::int32_t upper_counts, std::int32_t lower_counts) {
+    OtherBoard board(kind);
+    test::ModelCard unused;
+    Guard guard(unused);
+    runtime::VirtualClock clock;
+    Person person;
+    person.turn = [&](bool) {
+      board.counters.upper_counts += upper_counts;
+      board.counters.lower_counts += lower_counts;
+    };
+    CHECK(experiment::Commissioning(board, clock, person, guard, {}, [] { return false; }).run() ==
+          CommissioningResult::failed);
+    return person.said;
+  };
+  CHECK_THAT(said_of("usb", -2048, 0), Contains("change the sign of driver.usb.upper_sign"));
+  CHECK_THAT(said_of("can", -2048, 0), Contains("change the sign of driver.can.upper_sign"));
+  CHECK_THAT(said_of("usb", 0, 2048), Contains("swap driver.usb.upper_channel and driver.usb.lower_channel"));
+  const std::string node = said_of("can", 0, 2048);
+  CHECK_THAT(node, Contains("exchange the two encoders at the node"));
+  CHECK_THAT(node, !Contains("_channel"));
 }
 
 TEST_CASE("Wheels that do not turn, or turn each other, are found") {

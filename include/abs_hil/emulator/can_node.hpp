@@ -70,8 +70,6 @@ class CanNode {
   [[nodiscard]] State state() const noexcept { return state_; }
   [[nodiscard]] std::uint32_t trip_flags() const noexcept;
   [[nodiscard]] const plant_sim::Plant& plant() const noexcept { return plant_; }
-  /// When a command was last accepted; -1: none since the activation.
-  [[nodiscard]] std::int64_t last_command_ns() const noexcept { return last_command_ns_; }
   /// Activations, deactivations and commands that came in, valid or not.
   [[nodiscard]] std::uint64_t writes() const noexcept { return writes_; }
   [[nodiscard]] std::uint64_t rejected() const noexcept { return rejected_; }
@@ -109,7 +107,7 @@ class CanNode {
   std::uint16_t nonce_{0x1234};
   std::uint8_t sync_sequence_{0};
   std::uint8_t command_sequence_{0};
-  std::int64_t last_command_ns_{-1};
+  std::int64_t last_command_ns_{-1};  ///< when one was last accepted; -1: none since the activation
   int reject_level_{0};
   std::uint64_t rejected_{0};
   std::uint64_t writes_{0};

@@ -69,7 +69,6 @@ class Commissioning {
   struct Travel {
     std::int32_t upper{0};
     std::int32_t lower{0};
-    bool read{false};  ///< false: an error, already told
   };
 
   [[nodiscard]] CommissioningResult read_board();

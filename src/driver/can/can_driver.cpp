@@ -172,7 +172,6 @@ void CanDriver::do_activate(std::int64_t now_ns) {
   latch_reason_ = LatchReason::none;
   supply_V_ = temperature_C_ = rig::unknown;
   drops_seen_ = link_.socket->dropped();
-  last_now_ns_ = now_ns;
   IoResult result = activate_node();
   for (int attempt = 0; result.ok() && !any_answer_ && attempt < handshake_attempts; ++attempt) {
     result = exchange(now_ns);

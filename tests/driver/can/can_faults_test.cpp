@@ -167,20 +167,27 @@ TEST_CASE("A node that starts anew in mid-run is told") {
 TEST_CASE("Forged, repeated and old commands neither act nor feed the node's watchdog") {
   Active rig;
   emulator::BusFrame forged{.id = 0x81, .length = 8, .data = {0x10, 0x27}};
-  const auto now = [&] {
-    return rig.node.with_node([](emulator::CanNode& n, emulator::NodeFaults&) { return n.last_command_ns(); });
-  };
-  const std::int64_t fed_ns = now();
-  rig.node.send_to_node(forged);  // wrong check
-  emulator::seal(forged);
-  rig.node.send_to_node(forged);  // old sequence
-  CHECK(rig.node.wire().brake_duty == 0.5);
-  CHECK(now() == fed_ns);
-  CHECK(rig.node.with_node([](emulator::CanNode& n, emulator::NodeFaults&) { return n.rejected(); }) == 2);
-  // A stream of them is an attack or a second host: the node cuts its outputs.
-  for (int i = 0; i < 10; ++i) rig.node.send_to_node(forged);
+  emulator::BusFrame old = forged;  // its check is right, its sequence was used before
+  emulator::seal(old);
+  const std::int64_t commanded_ns = rig.now_ns;
+  while (rig.now_ns - commanded_ns < 20 * ms) {
+    CHECK(rig.node.wire().brake_duty == 0.5);
+    rig.now_ns += ms;
+    const bool answers = rig.driver.read(rig.now_ns, rig.measurement).ok();
+    CHECK(answers == (rig.now_ns - commanded_ns < 20 * ms));
+    if (rig.now_ns - commanded_ns == 15 * ms) {
+      rig.node.send_to_node(forged);
+      rig.node.send_to_node(old);
+      CHECK(rig.node.with_node([](emulator::CanNode& n, emulator::NodeFaults&) { return n.rejected(); }) == 2);
+    }
+  }
   CHECK(rig.node.wire().brake_duty == 0.0);
-  CHECK(rig.cycle().reason == Reason::can_node_latched);
+
+  // A stream of them is an attack or a second host: the node cuts its outputs.
+  Active attacked;
+  for (int i = 0; i < 12; ++i) attacked.node.send_to_node(old);
+  CHECK(attacked.node.wire().brake_duty == 0.0);
+  CHECK(attacked.cycle().reason == Reason::can_node_latched);
 }
 
 TEST_CASE("Commands computed from old measurements do not feed the watchdog") {

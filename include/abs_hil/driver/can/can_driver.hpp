@@ -44,7 +44,6 @@ struct CanCounters {
 class CanDriver final : public RigDriver {
  public:
   using OpenLink = std::function<Link()>;
-  using ReadClock = std::int64_t (*)() noexcept;
   /// Throws std::invalid_argument, naming the key, if an option is outside its range.
   /// @param open_link  called by `configure`; throws Unavailable
   /// @param lock_step  the node is an emulator whose time is driven by this driver's; refused by any other node
@@ -129,7 +128,6 @@ class CanDriver final : public RigDriver {
   std::array<std::int32_t, 2> counts_{};      ///< 32 bits, with their signs
   std::uint32_t node_time_us_{0};
   std::int64_t latched_ns_{0};
-  std::int64_t last_now_ns_{0};
   double supply_V_{rig::unknown};
   double temperature_C_{rig::unknown};
   std::uint32_t trip_flags_{0};

@@ -21,7 +21,6 @@ class LossBucket {
     tripped_ = false;
   }
   [[nodiscard]] constexpr bool tripped() const noexcept { return tripped_; }
-  [[nodiscard]] constexpr std::int32_t level() const noexcept { return level_; }
 
  private:
   std::int32_t cost_;
