@@ -9,6 +9,8 @@
 
 #include "abs_hil/driver/can/bus_load.hpp"
 #include "abs_hil/driver/can/signal_codec.hpp"
+#include "abs_hil/driver/encoder_sign.hpp"
+#include "abs_hil/driver/plausibility.hpp"
 
 namespace abs_hil::driver::can {
 
@@ -22,13 +24,6 @@ constexpr std::int64_t lock_step_timeout_ns = 1'000'000'000;
 /// Of the period: the rest is for the controller and the command.
 constexpr double answer_share = 0.6;
 constexpr double most_answer_share = 0.8;
-
-bool is_duty(double value) noexcept { return value >= 0.0 && value <= 1.0; }  // false for NaN
-
-void check_sign(const char* key, std::int32_t sign) {
-  if (sign == 1 || sign == -1) return;
-  throw std::invalid_argument(std::string(key) + " = " + std::to_string(sign) + ": give 1 or -1");
-}
 
 std::int64_t answer_timeout_ns(const CanOptions& options, bool lock_step) {
   const double period_ns = 1e9 / options.rate_Hz;
@@ -198,10 +193,7 @@ IoResult CanDriver::sent(const SendResult& result, std::uint32_t identifier) noe
 }
 
 IoResult CanDriver::do_write(const rig::Command& command) noexcept {
-  const bool torque_fits = std::isfinite(command.brake_torque_Nm) && command.brake_torque_Nm >= 0.0;
-  if (!is_duty(command.motor_duty) || !is_duty(command.brake_duty) || !torque_fits) {
-    return {IoError::command_out_of_range};
-  }
+  if (!driver::in_range(command)) return {IoError::command_out_of_range};
   const double brake = std::min(command.brake_duty, options_.brake_duty_max);
   const double drive = command.motor_enable ? std::min(command.motor_duty, options_.motor_duty_max) : 0.0;
   const RawDuties duties{.brake = static_cast<std::uint16_t>(nearest_raw(signal::brake_duty, brake)),

@@ -128,7 +128,9 @@ bool FrameSocket::ask_interface(ifreq& request) const noexcept {
 void FrameSocket::drain() noexcept {
   constexpr int most_frames = 10'000;
   Frame ignored;
-  for (int i = 0; i < most_frames && take(ignored).outcome == ReceiveOutcome::frame; ++i) {
+  for (int i = 0; i < most_frames; ++i) {
+    const ReceiveOutcome outcome = take(ignored).outcome;
+    if (outcome != ReceiveOutcome::frame && outcome != ReceiveOutcome::malformed) return;
   }
 }
 

@@ -1,9 +1,9 @@
 #include "abs_hil/driver/pci/pci_driver.hpp"
 
-#include <bit>
 #include <stdexcept>
 #include <utility>
 
+#include "abs_hil/driver/encoder_sign.hpp"
 #include "abs_hil/driver/plausibility.hpp"
 
 namespace abs_hil::driver::pci {
@@ -12,10 +12,6 @@ namespace {
 
 /// Counters whose reading took longer belong to no one instant: at 170 rad/s it is 28 counts. They are read once more.
 constexpr std::int64_t late_reading_ns = 250'000;
-
-std::int32_t with_sign(std::uint32_t raw, std::int32_t sign) noexcept {
-  return std::bit_cast<std::int32_t>(sign < 0 ? 0U - raw : raw);  // unsigned: the most negative count has no negative
-}
 
 }  // namespace
 
@@ -57,12 +53,8 @@ PciDriver::PciDriver(const PciOptions& options, OpenCard open_card, ReadClock re
       mode_(options.pwm_mode == "8-bit" ? PwmMode::bits_8 : PwmMode::bits_12),
       open_card_(std::move(open_card)),
       read_clock_(read_clock) {
-  for (const auto& [key, sign] : {std::pair("driver.pci.lower_sign", options.lower_sign),
-                                  std::pair("driver.pci.upper_sign", options.upper_sign)}) {
-    if (sign != 1 && sign != -1) {
-      throw std::invalid_argument(std::string(key) + " = " + std::to_string(sign) + ": give 1 or -1");
-    }
-  }
+  check_sign("driver.pci.lower_sign", options.lower_sign);
+  check_sign("driver.pci.upper_sign", options.upper_sign);
   if (options.lower_channel == options.upper_channel) {
     throw std::invalid_argument("driver.pci.lower_channel = driver.pci.upper_channel = " +
                                 std::to_string(options.upper_channel) + ": each wheel has an encoder of its own");

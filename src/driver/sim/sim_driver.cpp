@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "abs_hil/driver/plausibility.hpp"
 #include "abs_hil/plant_sim/encoder.hpp"
 #include "abs_hil/rig/encoder_scale.hpp"
 
@@ -13,8 +14,6 @@ namespace abs_hil::driver {
 namespace {
 
 constexpr double duty_steps = 4095.0;  ///< the card's PWM has 12 bits
-
-bool is_duty(double value) noexcept { return value >= 0.0 && value <= 1.0; }  // false for NaN
 
 double quantised(double duty) noexcept { return std::round(duty * duty_steps) / duty_steps; }
 
@@ -65,10 +64,7 @@ IoResult SimDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) 
 }
 
 IoResult SimDriver::do_write(const rig::Command& command) noexcept {
-  const bool torque_fits = std::isfinite(command.brake_torque_Nm) && command.brake_torque_Nm >= 0.0;
-  if (!is_duty(command.motor_duty) || !is_duty(command.brake_duty) || !torque_fits) {
-    return {IoError::command_out_of_range};
-  }
+  if (!in_range(command)) return {IoError::command_out_of_range};
   input_.motor_duty = command.motor_enable ? quantised(command.motor_duty) : 0.0;
   input_.brake_duty = plant_.options().ideal_actuator ? command.brake_duty : quantised(command.brake_duty);
   input_.brake_torque_Nm = command.brake_torque_Nm;

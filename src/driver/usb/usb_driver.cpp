@@ -1,11 +1,11 @@
 #include "abs_hil/driver/usb/usb_driver.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
 
+#include "abs_hil/driver/encoder_sign.hpp"
 #include "abs_hil/driver/plausibility.hpp"
 
 namespace abs_hil::driver::usb {
@@ -17,10 +17,6 @@ constexpr std::int64_t ns_per_us = 1000;
 constexpr std::int64_t patient_ns = 500'000'000;
 /// Of FrameLink::recover on a board that is failing: cancelled transfers and cleared halts have a second each there.
 constexpr std::int64_t recovery_bound_ns = 8'000'000'000;
-
-std::int32_t with_sign(std::uint32_t raw, std::int32_t sign) noexcept {
-  return std::bit_cast<std::int32_t>(sign < 0 ? 0U - raw : raw);  // unsigned: the most negative count has no negative
-}
 
 rig::Reason reason_for(IoError error) noexcept {
   switch (error) {
@@ -47,12 +43,8 @@ UsbDriver::UsbDriver(const UsbOptions& options, OpenBoard open_board, ReadClock 
       mode_(options.pwm_mode == "8-bit" ? PwmMode::bits_8 : PwmMode::bits_12),
       open_board_(std::move(open_board)),
       read_clock_(read_clock) {
-  for (const auto& [key, sign] : {std::pair("driver.usb.lower_sign", options.lower_sign),
-                                  std::pair("driver.usb.upper_sign", options.upper_sign)}) {
-    if (sign != 1 && sign != -1) {
-      throw std::invalid_argument(std::string(key) + " = " + std::to_string(sign) + ": give 1 or -1");
-    }
-  }
+  check_sign("driver.usb.lower_sign", options.lower_sign);
+  check_sign("driver.usb.upper_sign", options.upper_sign);
   if (options.lower_channel == options.upper_channel) {
     throw std::invalid_argument("driver.usb.lower_channel = driver.usb.upper_channel = " +
                                 std::to_string(options.upper_channel) + ": each wheel has an encoder of its own");
@@ -164,7 +156,7 @@ IoResult UsbDriver::take_over(Contents& contents) noexcept {
 
 void UsbDriver::do_activate(std::int64_t now_ns) {
   frame_ = frame_from(shown_);
-  bucket_.empty();
+  bucket_.reset();
   frames_lost_ = 0;
   lost_this_cycle_ = false;
   activated_ns_ = now_ns;
@@ -193,7 +185,8 @@ void UsbDriver::take_counts(const Contents& contents, std::array<std::int32_t, 2
 
 IoResult UsbDriver::lost_frame() noexcept {
   ++frames_lost_;
-  if (bucket_.lost()) return {};
+  bucket_.lost();
+  if (!bucket_.tripped()) return {};
   return failed({IoError::no_answer, endpoint_in});
 }
 

@@ -1,6 +1,6 @@
 #include "abs_hil/driver/can/answer_tracker.hpp"
 
-#include "abs_hil/driver/can/loss_bucket.hpp"
+#include "abs_hil/driver/loss_bucket.hpp"
 #include "catch.hpp"
 
 using namespace abs_hil::driver::can;
@@ -61,7 +61,7 @@ TEST_CASE("Frames that belong to no answer are told apart") {
 }
 
 TEST_CASE("The bucket bears single losses, trips at sustained loss, and latches") {
-  LossBucket bucket(2, 1, 10);
+  abs_hil::driver::LossBucket bucket(2, 1, 10);
   for (int i = 0; i < 100; ++i) {  // one loss in three cycles: what flows in flows out
     bucket.lost();
     bucket.good();

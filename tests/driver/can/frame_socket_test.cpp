@@ -78,6 +78,19 @@ TEST_CASE("FD frames, extended frames, sizes that are none") {
   CHECK(socket.receive(received, 0).outcome == ReceiveOutcome::malformed);
 }
 
+TEST_CASE("What is thrown away is all that has come, no frame among it or not") {
+  Pair pair;
+  FrameSocket socket(pair.ends[0]);
+  can_frame raw{};
+  raw.can_id = 0x92;
+  REQUIRE(::send(pair.ends[1], &raw, sizeof raw, 0) == CAN_MTU);
+  REQUIRE(::send(pair.ends[1], &raw, 5, 0) == 5);
+  REQUIRE(::send(pair.ends[1], &raw, sizeof raw, 0) == CAN_MTU);
+  socket.drain();
+  Frame received;
+  CHECK(socket.receive(received, 0).outcome == ReceiveOutcome::nothing);
+}
+
 TEST_CASE("A full queue is told as such, not as success; a closed end as down") {
   Pair pair;
   FrameSocket socket(pair.ends[0]);

@@ -38,22 +38,6 @@ struct Running {
 
 }  // namespace
 
-TEST_CASE("The bucket: the fifth loss in a row fills it; one loss in three never does") {
-  usb::LeakyBucket bucket;
-  for (int i = 0; i < 4; ++i) CHECK(bucket.lost());
-  CHECK_FALSE(bucket.lost());
-  bucket.empty();
-  for (int i = 0; i < 1000; ++i) {
-    REQUIRE(bucket.lost());
-    bucket.good();
-    bucket.good();
-  }
-  bucket.empty();
-  int pairs = 0;
-  for (; bucket.lost(); ++pairs) bucket.good();  // one in two does, in time
-  CHECK(pairs == 8);
-}
-
 TEST_CASE("A cycle without its frame keeps the measurement of the one before, stamp and all") {
   Running run;
   const rig::Measurement before = run.measurement;

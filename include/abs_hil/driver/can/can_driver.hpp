@@ -9,9 +9,9 @@
 
 #include "abs_hil/driver/can/answer_tracker.hpp"
 #include "abs_hil/driver/can/link.hpp"
-#include "abs_hil/driver/can/loss_bucket.hpp"
 #include "abs_hil/driver/can/messages.hpp"
 #include "abs_hil/driver/can/options.hpp"
+#include "abs_hil/driver/loss_bucket.hpp"
 #include "abs_hil/driver/rig_driver.hpp"
 
 namespace abs_hil::driver::can {

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "abs_hil/driver/loss_bucket.hpp"
 #include "abs_hil/driver/pwm.hpp"
 #include "abs_hil/driver/rig_driver.hpp"
 #include "abs_hil/driver/usb/frame.hpp"
@@ -14,24 +15,6 @@
 #include "abs_hil/driver/usb/options.hpp"
 
 namespace abs_hil::driver::usb {
-
-/// Lets single losses pass and finds sustained ones, as LinuxCNC's hostmot2 does: +2 for a cycle without its frame, -1
-/// for one with it, full at 10: the fifth loss in a row.
-class LeakyBucket {
- public:
-  static constexpr std::int32_t limit = 10;
-  /// False when it is full.
-  constexpr bool lost() noexcept {
-    level_ += level_ < limit ? 2 : 0;
-    return level_ < limit;
-  }
-  constexpr void good() noexcept { level_ -= level_ > 0 ? 1 : 0; }
-  constexpr void empty() noexcept { level_ = 0; }
-  [[nodiscard]] constexpr std::int32_t level() const noexcept { return level_; }
-
- private:
-  std::int32_t level_{0};
-};
 
 /// The RT-DAC/USB2 with generic logic. Not verified on hardware.
 ///
@@ -99,7 +82,7 @@ class UsbDriver final : public RigDriver {
   std::int64_t emulated_ns_{0};   ///< the emulator's time then
   Contents zero_{};               ///< counters then
   rig::Measurement last_{};
-  LeakyBucket bucket_{};
+  LossBucket bucket_{2, 1, 10};  ///< the fifth loss in a row trips it
   bool lost_this_cycle_{false};
   std::uint64_t frames_lost_{0};
 };

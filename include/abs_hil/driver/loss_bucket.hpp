@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <cstdint>
 
-namespace abs_hil::driver::can {
+namespace abs_hil::driver {
 
-/// Leaky bucket: single losses are borne, sustained loss trips. Latches until `reset`.
+/// Leaky bucket, as LinuxCNC's hostmot2 has it: single losses are borne, sustained loss trips. Latches until `reset`.
+/// Real-time safe.
 class LossBucket {
  public:
+  /// @param cost  level that a loss adds, > 0
+  /// @param relief  level that a good cycle takes away, > 0
+  /// @param limit  level at which it trips, > 0
   constexpr LossBucket(std::int32_t cost, std::int32_t relief, std::int32_t limit) noexcept
       : cost_(cost), relief_(relief), limit_(limit) {}
 
@@ -30,4 +34,4 @@ class LossBucket {
   bool tripped_{false};
 };
 
-}  // namespace abs_hil::driver::can
+}  // namespace abs_hil::driver

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+
+namespace abs_hil::driver {
+
+/// A counter as the driver hands it on, turned round by a sign of -1. Real-time safe.
+[[nodiscard]] inline std::int32_t with_sign(std::uint32_t raw, std::int32_t sign) noexcept {
+  return std::bit_cast<std::int32_t>(sign < 0 ? 0U - raw : raw);  // unsigned: the most negative count has no negative
+}
+
+/// Throws std::invalid_argument, naming the key, unless `sign` is 1 or -1.
+inline void check_sign(const char* key, std::int32_t sign) {
+  if (sign == 1 || sign == -1) return;
+  throw std::invalid_argument(std::string(key) + " = " + std::to_string(sign) + ": give 1 or -1");
+}
+
+}  // namespace abs_hil::driver
