@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # lint.sh [CHECK...]: the static checks format, shell, cppcheck, tidy (default: all, quick ones first). Each finding is an
-# error. tidy looks at every source of src/ and apps/; lint.sh tidy FILE... at those only.
+# error. tidy looks at every source of src/ and apps/ that has changed since nothing was found in it; lint.sh tidy FILE...
+# at the units of those only.
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
 
@@ -18,10 +19,9 @@ check_cppcheck() {
 }
 
 check_tidy() {
-  scripts/build.sh release >/dev/null  # generated headers and compile_commands.json
-  local files=("$@")
-  [ $# -gt 0 ] || mapfile -t files < <(git ls-files 'src/*.cpp' 'apps/*.cpp')
-  printf '%s\n' "${files[@]}" | xargs -P "$(nproc)" -n 4 clang-tidy-16 -p build/release --quiet 2>/dev/null
+  scripts/setup.sh packages-clang.txt
+  scripts/build.sh clang >/dev/null  # generated headers, and what includes what
+  scripts/tidy.py "$@"
 }
 
 scripts/setup.sh packages-lint.txt

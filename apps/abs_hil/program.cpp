@@ -149,8 +149,8 @@ CLI::App* add_compare(CLI::App& cli, app::CompareOptions& o) {
 void refuse_run_options(const CLI::App& cli, const std::string& command) {
   for (const CLI::Option* option : cli.get_options()) {
     if (option->count() > 0) {
-      throw settings::ConfigError(option->get_name() + ": give the options of " + command + " after the word " +
-                                  command);
+      throw settings::ConfigError(
+          fmt::format("{}: give the options of {} after the word {}", option->get_name(), command, command));
     }
   }
 }

@@ -157,7 +157,8 @@ int conclude(const RunRequest& request, const experiment::RunSession& session, c
       outputs.write(summary, session.executive().statistics(), environment(request, driver, outcome));
   if (!request.in_series) {
     std::string text = analysis::to_text(summary);
-    if (outputs.folder()) text += fmt::format("  {:<22}{}\n", "run folder", outputs.folder()->path().string());
+    if (const auto& folder = outputs.folder())
+      text += fmt::format("  {:<22}{}\n", "run folder", folder->path().string());
     // A terminal that has gone takes nothing: no reason to end otherwise than the run did.
     static_cast<void>(std::fputs(text.c_str(), stdout));
   }
@@ -192,8 +193,8 @@ int run(const RunRequest& request) {
   experiment::RunSession session(clock, *driver, std::move(logic), s.gate, std::move(sinks), s.realtime.overruns);
   TimingWatch timing(request, session, late_cycles);
   outputs.watch(session);
-  RunWatch run_watch(
-      request, flight_record_prefix(request, outputs.folder() ? outputs.folder()->path() : std::filesystem::path()));
+  const auto& folder = outputs.folder();
+  RunWatch run_watch(request, flight_record_prefix(request, folder ? folder->path() : std::filesystem::path()));
   run_watch.watch(session);
   note_signals();
   // The handler knows one run: of a series in virtual time, several at once, each asks for itself.

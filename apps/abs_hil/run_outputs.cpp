@@ -118,7 +118,7 @@ std::vector<rig::RecordSink*> RunOutputs::sinks() {
 
 void RunOutputs::watch(experiment::RunSession& session) {
   session_ = &session;
-  if (!steering_ || !commands_) return;
+  if (!steering_ || !commands_ || !stream_) return;
   steering_->drive(session.adjustments());
   steering_->count(*commands_);
   commands_->set_judge([this](const command2_t& command) { return steering_->judge(command); });

@@ -137,8 +137,9 @@ bool is_interrupted(int status) { return status > 128; }
 /// The brake cools; false if the person at the rig wants to stop.
 bool pause(double duration_s) {
   const auto end = Clock::now() + std::chrono::duration<double>(duration_s);
-  while (Clock::now() < end && signalled() == rig::Reason::none)
+  while (Clock::now() < end && signalled() == rig::Reason::none) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
   return signalled() == rig::Reason::none;
 }
 

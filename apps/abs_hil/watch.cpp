@@ -9,8 +9,9 @@
 namespace abs_hil::app {
 
 int watch(const watch::WatchOptions& options) {
-  if (!options.url.empty())
+  if (!options.url.empty()) {
     static_cast<void>(telemetry::parse_lcm_url(options.url));  // a usage error, no missing network
+  }
   note_signals();
   const watch::WatchEnd end = watch::watch(options, [] { return signalled() != rig::Reason::none; });
   if (end == watch::WatchEnd::nothing_received) {

@@ -52,9 +52,9 @@ report::WindowChoice parse_window(const std::string& text) {
   throw report::InputError("--window " + text + ": give brake, run, or FROM:TO in seconds with FROM < TO");
 }
 
-int export_rows(const Options& o) {
-  const report::ExportOptions options{o.report.runs, o.report.labels, o.columns, *o.export_as};
-  const bool binary = *o.export_as == report::ExportFormat::octave;
+int export_rows(const Options& o, report::ExportFormat format) {
+  const report::ExportOptions options{o.report.runs, o.report.labels, o.columns, format};
+  const bool binary = format == report::ExportFormat::octave;
   if (o.output.empty()) {
     if (binary && ::isatty(STDOUT_FILENO) != 0) {
       throw report::InputError("--octave writes a binary file: give --output RUN.mat, or a pipe");
@@ -69,8 +69,9 @@ int export_rows(const Options& o) {
     throw report::InputError("\"" + o.output + "\" exists; give another --output, or --force to replace it");
   }
   std::ofstream file(o.output, std::ios::binary);
-  if (!file)
+  if (!file) {
     throw report::InputError("cannot write \"" + o.output + "\"; give a path in an existing, writable directory");
+  }
   say(report::export_runs(options, file));
   file.close();
   if (!file) throw std::runtime_error("cannot write \"" + o.output + "\"");
@@ -143,7 +144,7 @@ int run(int argc, char** argv) {
   if (o.export_as && (o.report.paper || !o.figures.empty())) {
     throw report::InputError("--paper and --figures make a page, --csv, --json and --octave export rows: choose one");
   }
-  return o.export_as ? export_rows(o) : write_report(o);
+  return o.export_as ? export_rows(o, *o.export_as) : write_report(o);
 }
 
 }  // namespace

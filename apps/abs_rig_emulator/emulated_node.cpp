@@ -2,15 +2,13 @@
 
 #include <fmt/format.h>
 
-#include "abs_hil/runtime/clock.hpp"
+#include "abs_hil/driver/monotonic_time.hpp"
 #include "control_command.hpp"
 #include "control_fifo.hpp"
 
 namespace abs_hil::app {
 
 namespace {
-
-std::int64_t monotonic_ns() { return runtime::MonotonicClock().now_ns(); }
 
 const char* name_of(emulator::CanNode::State state) {
   switch (state) {
@@ -24,11 +22,11 @@ const char* name_of(emulator::CanNode::State state) {
 }  // namespace
 
 EmulatedNode::EmulatedNode(const emulator::CanNodeOptions& options, std::uint64_t seed)
-    : options_(options), node_(options), faults_(seed), started_ns_(monotonic_ns()) {}
+    : options_(options), node_(options), faults_(seed), started_ns_(driver::monotonic_ns()) {}
 
 void EmulatedNode::power_on() {
   node_ = emulator::CanNode(options_);
-  started_ns_ = monotonic_ns();
+  started_ns_ = driver::monotonic_ns();
 }
 
 void EmulatedNode::log_events() {
@@ -38,7 +36,7 @@ void EmulatedNode::log_events() {
 }
 
 void EmulatedNode::catch_up() {
-  if (!options_.lock_step) node_.advance_to(monotonic_ns() - started_ns_);
+  if (!options_.lock_step) node_.advance_to(driver::monotonic_ns() - started_ns_);
   log_events();
 }
 
@@ -46,7 +44,7 @@ void EmulatedNode::serve(BusSocket& bus) {
   emulator::BusFrame frame;
   while (bus.receive(frame)) {
     if (!faults_.hears(frame)) continue;
-    if (!options_.lock_step) node_.advance_to(monotonic_ns() - started_ns_);
+    if (!options_.lock_step) node_.advance_to(driver::monotonic_ns() - started_ns_);
     node_.receive(frame);
     for (const emulator::BusFrame& answer : faults_.answer(node_.take_answers())) bus.send(answer);
   }

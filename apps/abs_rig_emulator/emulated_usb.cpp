@@ -13,7 +13,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "abs_hil/runtime/clock.hpp"
+#include "abs_hil/driver/monotonic_time.hpp"
 #include "control_command.hpp"
 
 namespace abs_hil::app {
@@ -21,8 +21,6 @@ namespace abs_hil::app {
 namespace {
 
 constexpr std::int64_t mid_braking_ns = 300'000'000;
-
-std::int64_t monotonic_ns() { return runtime::MonotonicClock().now_ns(); }
 
 /// The first free port for high speed: lines "hs 0000 004 000 ...", where 004 is free.
 int free_port(const std::string& controller) {
@@ -51,7 +49,7 @@ EmulatedUsb::EmulatedUsb(const UsbEmulatorOptions& options)
       device_(board_, options.identity, options.seed,
               options.lock_step ? emulator::UsbipDevice::GoOnTo([this](std::int64_t time_ns) { go_on_to(time_ns); })
                                 : emulator::UsbipDevice::GoOnTo()),
-      started_ns_(monotonic_ns()),
+      started_ns_(driver::monotonic_ns()),
       truth_(options.truth_file, false) {
   for (const std::string& command : options.when_braking) {
     if (command == "plug") throw std::invalid_argument("--when-braking plug: nothing is unplugged then");
@@ -78,12 +76,12 @@ void EmulatedUsb::plug_in() {
   host_ = std::move(ours);
   device_.reconnect();
   // The kernel asks who is there; until it has set a configuration nobody can use the board.
-  const std::int64_t started_ns = monotonic_ns();
+  const std::int64_t started_ns = driver::monotonic_ns();
   constexpr std::int64_t longest_ns = 20'000'000'000;
   while (!device_.configured()) {
     pollfd ready{host_.get(), POLLIN, 0};
     static_cast<void>(::poll(&ready, 1, 100));
-    if ((ready.revents != 0 && !serve()) || monotonic_ns() - started_ns > longest_ns) {
+    if ((ready.revents != 0 && !serve()) || driver::monotonic_ns() - started_ns > longest_ns) {
       throw std::runtime_error(options_.controller + ": the kernel does not take the board; see dmesg");
     }
   }
@@ -106,12 +104,12 @@ void EmulatedUsb::send(const std::vector<std::uint8_t>& replies) {
 bool EmulatedUsb::serve() {
   if (host_.get() < 0) return true;
   catch_up();
-  std::array<std::uint8_t, 4096> buffer;
+  std::array<std::uint8_t, 4096> buffer{};
   const ssize_t got = ::recv(host_.get(), buffer.data(), buffer.size(), MSG_DONTWAIT);
   if (got < 0 && (errno == EAGAIN || errno == EINTR)) return true;
   if (got <= 0) return false;  // the controller has let go of it
   std::vector<std::uint8_t> replies;
-  device_.receive(std::span(buffer).first(static_cast<std::size_t>(got)), monotonic_ns(), replies);
+  device_.receive(std::span(buffer).first(static_cast<std::size_t>(got)), driver::monotonic_ns(), replies);
   send(replies);
   return true;
 }
@@ -136,9 +134,9 @@ void EmulatedUsb::watch_brake() {
 }
 
 void EmulatedUsb::catch_up() {
-  if (!options_.lock_step) go_on_to(monotonic_ns() - started_ns_);
+  if (!options_.lock_step) go_on_to(driver::monotonic_ns() - started_ns_);
   std::vector<std::uint8_t> replies;
-  device_.answer_late_ones(monotonic_ns(), replies);
+  device_.answer_late_ones(driver::monotonic_ns(), replies);
   send(replies);
 }
 

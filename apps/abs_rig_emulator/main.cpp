@@ -241,12 +241,7 @@ int serve(Arguments& a) {
       [&tree] { return tree.serve_one(); });
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  struct sigaction action {};
-  action.sa_handler = [](int) { stop_requested = true; };
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
+int run(int argc, char** argv) {
   CLI::App cli{"The ABS rig behind an emulated board: RT-DAC4/PCI card, CAN I/O node or RT-DAC/USB2"};
   Arguments arguments;
   add_options(cli, arguments);
@@ -255,6 +250,17 @@ int main(int argc, char** argv) {
     return serve(arguments);
   } catch (const CLI::ParseError& error) {
     return error.get_exit_code() == 0 ? cli.exit(error) : (cli.exit(error), 2);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  struct sigaction action {};
+  action.sa_handler = [](int) { stop_requested = true; };
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
+  try {
+    return run(argc, argv);
   } catch (const settings::ConfigError& error) {
     fmt::print(stderr, "abs_rig_emulator: {}\n", error.what());
     return 2;

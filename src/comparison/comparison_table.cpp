@@ -10,7 +10,7 @@ namespace {
 
 using analysis::Metrics;
 
-constexpr std::array<ComparedMetric, 10> metrics{{
+constexpr std::array<ComparedMetric, 10> all_metrics{{
     {"stop_time_s", "stop time", "s", 3, &Metrics::stop_time_s},
     {"stop_distance_m", "stop distance", "m", 2, &Metrics::stop_distance_m},
     {"slip_rms", "slip RMS error", "", 4, &Metrics::slip_rms},
@@ -43,7 +43,7 @@ ControllerColumn column_of(const std::string& name, const std::vector<RunResult>
                           .runs = runs.size(),
                           .faults = count([](const RunResult& run) { return !run.stopped(); }),
                           .locked = count([](const RunResult& run) { return run.metrics.time_locked_s > 0.0; })};
-  for (const ComparedMetric& metric : metrics) {
+  for (const ComparedMetric& metric : all_metrics) {
     const std::vector<double> values = values_of(runs, metric);
     column.means.push_back(analysis::estimate_mean(values));
     if (first != nullptr) {
@@ -73,7 +73,7 @@ std::optional<PaperRatio> paper_ratio(const ComparisonPlan& plan, const Comparis
 
 }  // namespace
 
-std::span<const ComparedMetric> compared_metrics() noexcept { return metrics; }
+std::span<const ComparedMetric> compared_metrics() noexcept { return all_metrics; }
 
 ComparisonTable tabulate(const ComparisonPlan& plan, const Comparison& comparison) {
   ComparisonTable table{.plant = plan.settings.plant_name,

@@ -54,7 +54,7 @@ struct Entry {
   std::string_view controller;
   std::span<const TunedKey> keys;
 };
-constexpr std::array<Entry, 7> table{{
+constexpr std::array<Entry, 7> tuned_controllers{{
     {"adaptive", adaptive},
     {"sliding-mode", sliding_mode},
     {"sliding-mode-smooth", sliding_mode_smooth},
@@ -67,7 +67,7 @@ constexpr std::array<Entry, 7> table{{
 }  // namespace
 
 std::span<const TunedKey> tuned_keys(std::string_view controller) noexcept {
-  for (const Entry& entry : table) {
+  for (const Entry& entry : tuned_controllers) {
     if (entry.controller == controller) return entry.keys;
   }
   return {};
@@ -77,8 +77,8 @@ bool follows_slip_reference(std::string_view controller) noexcept { return contr
 
 std::vector<std::string_view> tunable_controllers() {
   std::vector<std::string_view> names;
-  names.reserve(table.size());
-  for (const Entry& entry : table) names.push_back(entry.controller);
+  names.reserve(tuned_controllers.size());
+  for (const Entry& entry : tuned_controllers) names.push_back(entry.controller);
   return names;
 }
 

@@ -1,11 +1,11 @@
 #include "abs_hil/driver/factory.hpp"
 
 #include <array>
-#include <ctime>
 #include <vector>
 
 #include "abs_hil/driver/can/can_driver.hpp"
 #include "abs_hil/driver/can/link.hpp"
+#include "abs_hil/driver/monotonic_time.hpp"
 #include "abs_hil/driver/pci/discovery.hpp"
 #include "abs_hil/driver/pci/pci_driver.hpp"
 #include "abs_hil/driver/usb/libusb_link.hpp"
@@ -29,17 +29,6 @@ std::span<const BackendEntry> boards() noexcept {
   }};
   return entries;
 }
-
-namespace {
-
-/// CLOCK_MONOTONIC without a system call.
-std::int64_t monotonic_ns() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
-
-}  // namespace
 
 std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options, bool lock_step) {
   if (options.kind == "pci") {

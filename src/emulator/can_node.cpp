@@ -7,13 +7,13 @@
 #include <utility>
 
 #include "abs_hil/rig/formatted_text.hpp"
+#include "abs_hil/rig/time_units.hpp"
 #include "rig_behind.hpp"
 
 namespace abs_hil::emulator {
 
 namespace {
 
-constexpr std::int64_t ns_per_ms = 1'000'000;
 constexpr double full_duty = 10000.0;
 /// A command may be so many steps ahead of the last one: the ones between were lost.
 constexpr unsigned most_commands_lost = 16;
@@ -77,7 +77,7 @@ Outputs CanNode::outputs() const noexcept {
 }
 
 std::int64_t CanNode::watchdog_ends_ns() const noexcept {
-  return last_command_ns_ + std::int64_t{options_.watchdog_ms} * ns_per_ms;
+  return last_command_ns_ + std::int64_t{options_.watchdog_ms} * rig::ns_per_ms;
 }
 
 void CanNode::become(State state, std::uint8_t latch_reason, const std::string& why) {
@@ -286,7 +286,7 @@ void CanNode::send_encoders(bool fd) {
   send(encoders);
   BusFrame latch{.id = 0x93, .length = 8};
   put_bytes(latch, 0, 4, time_us);
-  put_bytes(latch, 4, 2, static_cast<std::int64_t>(static_cast<unsigned>(state_) << 12U));  // the lever is at rest
+  put_bytes(latch, 4, 2, std::int64_t{static_cast<unsigned>(state_)} << 12U);  // the lever is at rest
   latch.data[6] = sync_sequence_;
   send(latch);
 }

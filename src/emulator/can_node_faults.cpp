@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
-#include <stdexcept>
-#include <string>
 #include <utility>
+
+#include "fault_text.hpp"
 
 namespace abs_hil::emulator {
 
@@ -16,25 +15,20 @@ struct Kind {
   NodeFaultKind kind;
   unsigned most;  ///< largest number; 0: takes none
 };
-using enum NodeFaultKind;
-constexpr std::array<Kind, 14> kinds{{{"ok", ok, 0},
-                                      {"silent", silent, 0},
-                                      {"deaf", deaf, 0},
-                                      {"drop", drop, 100'000},
-                                      {"no-status", no_status, 0},
-                                      {"stale", stale, 127},
-                                      {"ahead", ahead, 127},
-                                      {"stuck", stuck, 0},
-                                      {"duplicate", duplicate, 0},
-                                      {"swapped", swapped, 0},
-                                      {"wrong-size", wrong_size, 8},
-                                      {"corrupt", corrupt, 0},
-                                      {"nonsense", nonsense, 0},
-                                      {"babble", babble, 100}}};
-
-[[noreturn]] void refuse(std::string_view text) {
-  throw std::invalid_argument("fault \"" + std::string(text) + "\": give one of " + NodeFaults::known());
-}
+constexpr std::array<Kind, 14> node_faults{{{"ok", NodeFaultKind::ok, 0},
+                                            {"silent", NodeFaultKind::silent, 0},
+                                            {"deaf", NodeFaultKind::deaf, 0},
+                                            {"drop", NodeFaultKind::drop, 100'000},
+                                            {"no-status", NodeFaultKind::no_status, 0},
+                                            {"stale", NodeFaultKind::stale, 127},
+                                            {"ahead", NodeFaultKind::ahead, 127},
+                                            {"stuck", NodeFaultKind::stuck, 0},
+                                            {"duplicate", NodeFaultKind::duplicate, 0},
+                                            {"swapped", NodeFaultKind::swapped, 0},
+                                            {"wrong-size", NodeFaultKind::wrong_size, 8},
+                                            {"corrupt", NodeFaultKind::corrupt, 0},
+                                            {"nonsense", NodeFaultKind::nonsense, 0},
+                                            {"babble", NodeFaultKind::babble, 100}}};
 
 bool is_measurement(const BusFrame& frame) { return frame.id >= 0x92 && frame.id <= 0x94; }
 
@@ -69,26 +63,29 @@ const char* NodeFaults::known() {
 }
 
 void NodeFaults::set(std::string_view text) {
+  const std::string valid = std::string("one of ") + known();
   const std::size_t equals = text.find('=');
   const std::string_view name = text.substr(0, equals);
-  for (const Kind& kind : kinds) {
+  for (const Kind& kind : node_faults) {
     if (kind.name != name) continue;
     unsigned number = 0;
-    if ((kind.most > 0) != (equals != std::string_view::npos)) refuse(text);
+    if ((kind.most > 0) != (equals != std::string_view::npos)) refuse_fault(text, valid);
     if (kind.most > 0) {
-      const std::string_view digits = text.substr(equals + 1);
-      const auto [at, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
-      if (error != std::errc() || at != digits.data() + digits.size() || number > kind.most) refuse(text);
+      const auto given = number_in<unsigned>(text.substr(equals + 1));
+      if (!given || *given > kind.most) refuse_fault(text, valid);
+      number = *given;
     }
     kind_ = kind.kind;
     number_ = number;
     kept_.clear();
     return;
   }
-  refuse(text);
+  refuse_fault(text, valid);
 }
 
-bool NodeFaults::hears(const BusFrame& frame) const noexcept { return kind_ != deaf || frame.id != 0x81; }
+bool NodeFaults::hears(const BusFrame& frame) const noexcept {
+  return kind_ != NodeFaultKind::deaf || frame.id != 0x81;
+}
 
 void NodeFaults::prepend_babble(std::vector<BusFrame>& frames) {
   std::vector<BusFrame> all;
@@ -107,6 +104,7 @@ void NodeFaults::prepend_babble(std::vector<BusFrame>& frames) {
 }
 
 std::vector<BusFrame> NodeFaults::changed(std::vector<BusFrame> frames) {
+  using enum NodeFaultKind;
   switch (kind_) {
     case silent: frames.clear(); break;
     case drop:
@@ -156,6 +154,7 @@ std::vector<BusFrame> NodeFaults::changed(std::vector<BusFrame> frames) {
 }
 
 std::vector<BusFrame> NodeFaults::answer(std::vector<BusFrame> frames) {
+  using enum NodeFaultKind;
   const bool to_sync = std::any_of(frames.begin(), frames.end(), is_measurement);
   // Answers to ABS_CONTROL are changed only by what keeps the node from speaking or garbles it.
   const bool always = kind_ == silent || kind_ == wrong_size || kind_ == corrupt;

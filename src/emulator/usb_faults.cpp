@@ -1,18 +1,15 @@
 #include "abs_hil/emulator/usb_faults.hpp"
 
-#include <charconv>
-#include <stdexcept>
-#include <string>
+#include <algorithm>
+
+#include "fault_text.hpp"
 
 namespace abs_hil::emulator {
 
 namespace {
 
-[[noreturn]] void refuse(std::string_view text) {
-  throw std::invalid_argument("fault \"" + std::string(text) +
-                              "\": give ok, stall in|out [once], length BYTES (0 to 512), silent, late US [COUNT], or "
-                              "garbage");
-}
+constexpr std::string_view valid_usb_fault =
+    "ok, stall in|out [once], length BYTES (0 to 512), silent, late US [COUNT], or garbage";
 
 std::vector<std::string_view> words_of(std::string_view text) {
   std::vector<std::string_view> words;
@@ -24,11 +21,10 @@ std::vector<std::string_view> words_of(std::string_view text) {
   return words;
 }
 
-std::int64_t number_in(std::string_view word, std::int64_t most, std::string_view whole) {
-  std::int64_t value = 0;
-  const auto [at, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc() || at != word.data() + word.size() || value < 0 || value > most) refuse(whole);
-  return value;
+std::int64_t at_most(std::int64_t most, std::string_view word, std::string_view whole) {
+  const auto value = number_in<std::int64_t>(word);
+  if (!value || *value < 0 || *value > most) refuse_fault(whole, valid_usb_fault);
+  return *value;
 }
 
 }  // namespace
@@ -46,16 +42,16 @@ void UsbFaults::set(std::string_view text) {
              (words.size() == 2 || words[2] == "once")) {
     (words[1] == "in" ? stall_in : stall_out) = words.size() == 3 ? Stall::once : Stall::on;
   } else if (is("length", 1, 1)) {
-    length = static_cast<std::size_t>(number_in(words[1], longest_answer, text));
+    length = static_cast<std::size_t>(at_most(longest_answer, words[1], text));
   } else if (is("silent", 0, 0)) {
     silent = true;
   } else if (is("late", 1, 2)) {
-    late_ns = number_in(words[1], latest_us, text) * 1000;
-    late_count = words.size() == 3 ? static_cast<std::uint32_t>(number_in(words[2], latest_us, text)) : 0;
+    late_ns = at_most(latest_us, words[1], text) * 1000;
+    late_count = words.size() == 3 ? static_cast<std::uint32_t>(at_most(latest_us, words[2], text)) : 0;
   } else if (is("garbage", 0, 0)) {
     garbage = true;
   } else {
-    refuse(text);
+    refuse_fault(text, valid_usb_fault);
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "abs_hil/rig/encoder_scale.hpp"
 #include "abs_hil/rig/formatted_text.hpp"
+#include "abs_hil/rig/time_units.hpp"
 
 namespace abs_hil::experiment {
 
@@ -15,7 +16,6 @@ namespace {
 using rig::formatted;
 
 constexpr std::int64_t cycle_ns = 1'000'000;
-constexpr double s_per_ns = 1e-9;
 /// An eighth of a revolution of 4096 counts: a turn by hand is more, trembling is less.
 constexpr std::int32_t turned_counts = 512;
 /// What a wheel that nobody touches may move meanwhile.
@@ -172,7 +172,7 @@ bool Commissioning::pulse(const rig::Command& command, double duration_s, Travel
   rig::Measurement first;
   rig::Measurement now;
   guard_.begin();
-  bool good = read(first) && drive(command, clock_.now_ns() + std::llround(duration_s / s_per_ns));
+  bool good = read(first) && drive(command, clock_.now_ns() + std::llround(duration_s / rig::s_per_ns));
   // A driver that failed has made its outputs safe, and tells how that went once more.
   const driver::IoResult ended =
       driver_.state() == driver::DriverState::active ? driver_.write(rig::safe_command) : driver_.deactivate();
@@ -190,7 +190,7 @@ bool Commissioning::pulse(const rig::Command& command, double duration_s, Travel
 bool Commissioning::wait_for_standstill() {
   rig::Measurement last;
   if (!read(last)) return false;
-  const std::int64_t limit_ns = clock_.now_ns() + std::llround(options_.run_out_limit_s / s_per_ns);
+  const std::int64_t limit_ns = clock_.now_ns() + std::llround(options_.run_out_limit_s / rig::s_per_ns);
   std::int64_t still_since_ns = clock_.now_ns();
   while (clock_.now_ns() - still_since_ns < standstill_ns) {
     if (stop_requested_()) return false;

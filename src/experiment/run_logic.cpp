@@ -6,12 +6,12 @@
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/rig/brake_map.hpp"
 #include "abs_hil/rig/encoder_scale.hpp"
+#include "abs_hil/rig/time_units.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 
 namespace abs_hil::experiment {
 
 namespace {
-constexpr double s_per_ns = 1e-9;
 /// Below this car speed the estimated slip would be encoder noise over next to nothing; slip control has ended by then.
 constexpr double slip_floor_m_s = 0.1;
 constexpr double bump_fades_s = 0.05;  ///< about the brake's own lag
@@ -150,13 +150,13 @@ void RunLogic::adjust(rig::CycleRecord& record) noexcept {
 
 rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept {
   if (!started_) start_ns_ = last_ns_ = measurement.time_ns;
-  const double dt_s = static_cast<double>(measurement.time_ns - last_ns_) * s_per_ns;
+  const double dt_s = static_cast<double>(measurement.time_ns - last_ns_) * rig::s_per_ns;
   last_ns_ = measurement.time_ns;
   estimate(measurement, dt_s);
   started_ = true;
 
   const Sequence::Change change =
-      sequence_.update({.time_s = static_cast<double>(measurement.time_ns - start_ns_) * s_per_ns,
+      sequence_.update({.time_s = static_cast<double>(measurement.time_ns - start_ns_) * rig::s_per_ns,
                         .speeds = speeds_,
                         .car_speed_m_s = wheels_.r2_m * speeds_.omega2_rad_s,
                         .stands_still = stands_still_,

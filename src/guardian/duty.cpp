@@ -2,12 +2,12 @@
 
 #include <algorithm>
 
+#include "abs_hil/rig/time_units.hpp"
+
 namespace abs_hil::guardian {
 
 namespace {
 
-constexpr double ns_per_ms = 1e6;
-constexpr double ns_per_s = 1e9;
 /// A killed process ends within microseconds, unless the kernel is in the midst of an access of its.
 constexpr std::int64_t end_wait_ns = 5'000'000;
 constexpr int quick_tries = 100;
@@ -29,8 +29,8 @@ Duty::Duty(runtime::Clock& clock, ControllerProcess& controller, SharedRegion& r
       controller_(controller),
       region_(region),
       writer_(writer),
-      timeout_ns_(static_cast<std::int64_t>(options.timeout_ms * ns_per_ms)),
-      insist_ns_(static_cast<std::int64_t>(options.insist_s * ns_per_s)),
+      timeout_ns_(static_cast<std::int64_t>(options.timeout_ms * rig::ns_per_ms)),
+      insist_ns_(static_cast<std::int64_t>(options.insist_s * rig::ns_per_s)),
       look_period_ns_(look_period_for(timeout_ns_)),
       sentry_(timeout_ns_, look_period_ns_, writer.owner_needs_ns()) {}
 

@@ -9,6 +9,8 @@
 #include <csignal>
 #include <ctime>
 
+#include "abs_hil/rig/time_units.hpp"
+
 namespace abs_hil::guardian {
 
 int open_pidfd(pid_t process) noexcept {
@@ -17,11 +19,10 @@ int open_pidfd(pid_t process) noexcept {
 }
 
 bool LinuxProcess::gone_by(std::int64_t time_ns) noexcept {
-  constexpr std::int64_t ns_per_s = 1'000'000'000;
   runtime::MonotonicClock clock;
   for (;;) {
     const std::int64_t left_ns = std::max<std::int64_t>(0, time_ns - clock.now_ns());
-    const timespec left{.tv_sec = static_cast<time_t>(left_ns / ns_per_s), .tv_nsec = left_ns % ns_per_s};
+    const timespec left{.tv_sec = static_cast<time_t>(left_ns / rig::ns_per_s), .tv_nsec = left_ns % rig::ns_per_s};
     pollfd ended{pidfd_, POLLIN, 0};
     const int ready = ::ppoll(&ended, 1, &left, nullptr);
     if (ready > 0) return true;  // POLLIN, or a descriptor that is none: nobody to guard

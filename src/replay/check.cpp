@@ -20,7 +20,7 @@ constexpr std::array<std::string_view, 8> durations{"wakeup_latency_ns", "read_n
 
 /// A field as bits, to compare, and as text, to show.
 struct FieldValue {
-  std::uint64_t bits;
+  std::uint64_t bits{};
   std::string text;
 };
 

@@ -44,8 +44,9 @@ class Collector {
 
   RecordedRun finish() {
     if (run_.cycles.empty()) fail("holds no telemetry of abs_hil (no telemetry_t message)");
-    if (!has_experiment_)
+    if (!has_experiment_) {
       fail("holds no configuration (no experiment_t message): record with --log, or longer than 5 s");
+    }
     for (const telemetry_t& cycle : run_.cycles) run_.measured_ns.push_back(cycle.stamp_ns);
     for (const measurement_t& measurement : measurements_) {
       if (measurement.cycle < 0 || static_cast<std::size_t>(measurement.cycle) >= run_.cycles.size()) {
@@ -86,10 +87,10 @@ class Collector {
     if (!run_.cycles.empty() && cycle.stamp_ns < run_.cycles.back().stamp_ns) {
       fail("cycle " + std::to_string(cycle.cycle) + " is damaged: its stamp lies before that of the cycle before");
     }
-    run_.cycles.push_back(std::move(cycle));
+    run_.cycles.push_back(cycle);
   }
 
-  std::string gap(std::int64_t expected, const telemetry_t& found) const {
+  [[nodiscard]] std::string gap(std::int64_t expected, const telemetry_t& found) const {
     const std::string where =
         "cycle " + std::to_string(found.cycle) + " where cycle " + std::to_string(expected) + " should be: ";
     if (expected == 0) return where + "a replay needs the run from its first cycle on";
@@ -102,7 +103,7 @@ class Collector {
     return where + "messages are missing or damaged; record with --log, which loses none";
   }
 
-  void take_experiment(experiment_t experiment) {
+  void take_experiment(const experiment_t& experiment) {
     if (!has_experiment_) run_.experiment = experiment;
     has_experiment_ = true;
     const experiment_t& first = run_.experiment;

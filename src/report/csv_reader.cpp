@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::size_t block_bytes = 1U << 20U;
 /// No row of a run is near that long: a file with a longer line is something else.
-constexpr std::size_t longest_line_bytes = 64U * 1024U;
+constexpr std::size_t longest_line_bytes = 65'536;
 constexpr std::size_t shown_characters = 40;
 constexpr double no_number = std::numeric_limits<double>::quiet_NaN();
 

@@ -44,6 +44,7 @@ std::string number(double value, std::string_view unknown) {
 
 std::vector<std::size_t> places_of(const CsvReader& csv, const std::vector<std::string>& columns) {
   std::vector<std::size_t> places;
+  places.reserve(columns.size());
   for (const std::string& column : columns) places.push_back(csv.column(column));
   return places;
 }

@@ -56,7 +56,7 @@ std::string series_sections(const PageContents& contents) {
     std::string html = series_table(contents.studies[i], *contents.runs, *contents.surveys);
     if (contents.studies[i].groups.size() > most_open_rows) html = folded("table", html, false);
     while (next < contents.pictures.size() && !contents.pictures[next].figure->id.starts_with("series")) ++next;
-    if (next < contents.pictures.size()) html = picture_html(contents.pictures[next++]) + html;
+    if (next < contents.pictures.size()) html.insert(0, picture_html(contents.pictures[next++]));
     body += section("Series " + contents.study_names[i], html);
   }
   return body;

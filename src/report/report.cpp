@@ -82,6 +82,7 @@ Report make_report(const ReportOptions& options) {
   if (options.paper) order_for_paper(found.runs, found.notes);
   PageContents contents;
   std::vector<RunSurvey> surveys;
+  surveys.reserve(found.runs.size());
   for (const RunFiles& run : found.runs) surveys.push_back(survey(run));
 
   Report report;

@@ -49,6 +49,7 @@ std::string count_of(const RunFiles& run, const std::string& key) {
 std::vector<RunEvent> events_of(const RunFiles& run, const RunSurvey& survey) {
   if (!run.events.empty()) return run.events;
   std::vector<RunEvent> events;
+  events.reserve(survey.phases.size());
   for (const PhaseInterval& phase : survey.phases) {
     events.push_back({phase.from_s, phase.phase == "fault" ? "fault" : "phase", phase.phase, "", ""});
   }

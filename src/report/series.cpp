@@ -82,6 +82,7 @@ SeriesStudy study(const Series& series, const std::vector<RunFiles>& runs) {
   std::map<std::vector<std::string>, std::size_t> known;
   for (const std::size_t r : series.runs) {
     std::vector<std::string> values;
+    values.reserve(study.keys.size());
     for (const std::string& key : study.keys) values.push_back(value_in(runs[r], key));
     const auto [entry, is_new] = known.emplace(values, study.groups.size());
     if (is_new) {

@@ -100,8 +100,9 @@ std::optional<Figure> timing_figure(const std::vector<RunFiles>& runs) {
       "Share of the cycles by duration: (a) lateness of the wake-up, (b) reading the board, (c) control, (d) writing, "
       "(e) the whole cycle. Bins are about a tenth of a decade wide and hold whole microseconds, the first one all "
       "below 1 µs; the axis ends below one cycle.";
-  if (overflows > 0)
+  if (overflows > 0) {
     figure.caption += fmt::format(" {} durations beyond the histograms' range are not shown.", overflows);
+  }
   return figure;
 }
 

@@ -3,20 +3,18 @@
 #include <cerrno>
 #include <ctime>
 
-namespace abs_hil::runtime {
+#include "abs_hil/rig/time_units.hpp"
 
-namespace {
-constexpr std::int64_t ns_per_s = 1'000'000'000;
-}
+namespace abs_hil::runtime {
 
 std::int64_t MonotonicClock::now_ns() noexcept {
   timespec now{};
   clock_gettime(CLOCK_MONOTONIC, &now);  // vDSO: no system call
-  return static_cast<std::int64_t>(now.tv_sec) * ns_per_s + now.tv_nsec;
+  return static_cast<std::int64_t>(now.tv_sec) * rig::ns_per_s + now.tv_nsec;
 }
 
 void MonotonicClock::sleep_until(std::int64_t time_ns) noexcept {
-  const timespec until{static_cast<time_t>(time_ns / ns_per_s), static_cast<long>(time_ns % ns_per_s)};
+  const timespec until{static_cast<time_t>(time_ns / rig::ns_per_s), static_cast<long>(time_ns % rig::ns_per_s)};
   // clock_nanosleep returns its error; a signal handled by this thread must not shorten the period.
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "abs_hil/rig/time_units.hpp"
 #include "abs_hil/runtime/single_writer.hpp"
 
 namespace abs_hil::runtime {
@@ -11,7 +12,6 @@ namespace {
 
 using rig::Reason;
 
-constexpr double s_per_ns = 1e-9;
 /// Rounding must not make a step that the limit just allows look like one it does not.
 constexpr double rounding = 1e-9;
 /// A reading that took longer was held up somewhere between its counters and its stamp.
@@ -133,7 +133,7 @@ void CommandGate::interlock(rig::Command& command, const PhasePermission& may) n
     command.motor_duty = limited(wanted.motor_duty, options_.motor_duty_max, GateAction::motor_clamped);
     // Before the first command the outputs have been 0 for longer than any rise takes.
     if (has_sent_) {
-      const double elapsed_s = static_cast<double>(input.now_ns - sent_ns_) * s_per_ns;
+      const double elapsed_s = static_cast<double>(input.now_ns - sent_ns_) * rig::s_per_ns;
       command.brake_duty = rising(command.brake_duty, sent_.brake_duty, options_.brake_rate_per_s, elapsed_s,
                                   GateAction::brake_rate_limited);
       command.motor_duty = rising(command.motor_duty, sent_.motor_duty, options_.motor_rate_per_s, elapsed_s,

@@ -4,10 +4,11 @@
 #include <array>
 #include <utility>
 
+#include "abs_hil/rig/time_units.hpp"
+
 namespace abs_hil::runtime {
 
 namespace {
-constexpr double s_per_ns = 1e-9;
 static_assert(std::atomic<rig::Reason>::is_always_lock_free, "request_stop is called from signal handlers");
 
 std::uint64_t count_of(int value) noexcept { return static_cast<std::uint64_t>(std::max(value, 0)); }
@@ -63,7 +64,7 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   if (sequence_ == 0) start_ns_ = woken_ns;
   record.sequence = sequence_++;
   record.stamp_ns = woken_ns;
-  record.time_s = static_cast<double>(woken_ns - start_ns_) * s_per_ns;
+  record.time_s = static_cast<double>(woken_ns - start_ns_) * rig::s_per_ns;
   record.timing.wakeup_latency_ns = woken_ns - tick_ns_;
   record.timing.record_ns = record_ns_;
   record.timing.periods_skipped = periods_skipped_;

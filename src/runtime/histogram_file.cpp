@@ -9,18 +9,19 @@
 #include <stdexcept>
 #include <utility>
 
+#include "abs_hil/rig/time_units.hpp"
+
 namespace abs_hil::runtime {
 
 namespace {
 
-constexpr std::int64_t ns_per_us = 1000;
 using Columns = std::array<const LatencyHistogram*, 5>;
 
 /// One past the last bin in use, at least one.
 std::size_t bins_in_use(const Columns& columns) {
   std::size_t used = 1;
   for (const LatencyHistogram* column : columns) {
-    const auto greatest = static_cast<std::size_t>(column->max_ns() / ns_per_us);
+    const auto greatest = static_cast<std::size_t>(column->max_ns() / rig::ns_per_us);
     used = std::max(used, std::min(greatest + 1, LatencyHistogram::bins));
   }
   return used;
@@ -62,7 +63,7 @@ std::string cyclictest_histogram(const CycleStatistics& statistics) {
     text += '\n';
   }
   using Histogram = const LatencyHistogram&;
-  const auto us = [](std::int64_t ns) { return static_cast<unsigned long long>(ns / ns_per_us); };
+  const auto us = [](std::int64_t ns) { return static_cast<unsigned long long>(ns / rig::ns_per_us); };
   append_line(text, "# Total:", " %09llu", columns, [](Histogram h) { return h.count() - h.overflows(); });
   append_line(text, "# Min Latencies:", " %05llu", columns, [us](Histogram h) { return us(h.min_ns()); });
   append_line(text, "# Avg Latencies:", " %05llu", columns,

@@ -3,19 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "abs_hil/rig/time_units.hpp"
 #include "abs_hil/runtime/single_writer.hpp"
 
 namespace abs_hil::runtime {
 
-namespace {
-constexpr std::int64_t ns_per_us = 1000;
-
-constexpr double in_us(std::int64_t ns) noexcept { return static_cast<double>(ns) / static_cast<double>(ns_per_us); }
-}  // namespace
-
 void LatencyHistogram::add(std::int64_t duration_ns) noexcept {
   const std::int64_t ns = std::max<std::int64_t>(duration_ns, 0);
-  const auto bin = static_cast<std::size_t>(ns / ns_per_us);
+  const auto bin = static_cast<std::size_t>(ns / rig::ns_per_us);
   if (bin < bins) {
     add_as_single_writer(counts_[bin], std::uint32_t{1});
   } else {
@@ -34,7 +29,7 @@ std::int64_t LatencyHistogram::min_ns() const noexcept {
 rig::DurationQuantiles LatencyHistogram::summary() const noexcept {
   const std::uint64_t total = count();
   if (total == 0) return {};
-  const double max_us = in_us(max_ns());
+  const double max_us = rig::in_us(max_ns());
   rig::DurationQuantiles result{max_us, max_us, max_us, max_us};
 
   struct Wanted {

@@ -18,8 +18,8 @@ namespace abs_hil::runtime {
 
 namespace {
 
-constexpr std::size_t heap_bytes = 4 * 1024 * 1024;
-constexpr std::size_t stack_bytes = 256 * 1024;
+constexpr std::size_t heap_bytes = 4U << 20U;
+constexpr std::size_t stack_bytes = 256U << 10U;
 constexpr std::size_t page_bytes = 4096;
 
 /// "VmLck" of /proc/self/status, kB; 0 if it cannot be read.
@@ -45,6 +45,7 @@ long faults() {
 
 /// Touches the stack below this frame; returns the page faults that this took.
 [[gnu::noinline]] long touch_stack() {
+  // Written by touch(). NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init)
   std::array<volatile unsigned char, stack_bytes> pages;
   const long before = faults();
   touch(pages.data(), pages.size());

@@ -3,13 +3,13 @@
 #include <array>
 #include <cstdio>
 
+#include "abs_hil/rig/time_units.hpp"
+
 namespace abs_hil::runtime {
 
 namespace {
 
 constexpr std::int64_t message_period_ns = 1'000'000'000;
-
-double in_us(std::int64_t ns) { return static_cast<double>(ns) * 1e-3; }
 
 unsigned long long count_of(const rig::OverrunCounts& counts, rig::OverrunCause cause) { return counts.of(cause); }
 
@@ -43,9 +43,9 @@ std::optional<std::string> OverrunReporter::message(const rig::OverrunCounts& co
       count_of(counts, rig::OverrunCause::wakeup), count_of(counts, rig::OverrunCause::read),
       count_of(counts, rig::OverrunCause::control), count_of(counts, rig::OverrunCause::write),
       count_of(counts, rig::OverrunCause::record), static_cast<unsigned long long>(counts.ticks_missed), late_->time_s,
-      late_->ticks_missed, static_cast<int>(cause.size()), cause.data(), in_us(period_ns_),
-      in_us(late_->timing.wakeup_latency_ns), in_us(late_->timing.read_ns), in_us(late_->timing.control_ns),
-      in_us(late_->timing.write_ns), in_us(late_->record_ns));
+      late_->ticks_missed, static_cast<int>(cause.size()), cause.data(), rig::in_us(period_ns_),
+      rig::in_us(late_->timing.wakeup_latency_ns), rig::in_us(late_->timing.read_ns),
+      rig::in_us(late_->timing.control_ns), rig::in_us(late_->timing.write_ns), rig::in_us(late_->record_ns));
   told_ = counts.total;
   late_.reset();  // the counters run ahead of the records: the next message waits for a late cycle of its own
   return size > 0 ? std::optional<std::string>(text.data()) : std::nullopt;

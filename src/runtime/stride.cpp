@@ -5,11 +5,11 @@
 
 #include "abs_hil/rig/brake_map.hpp"
 #include "abs_hil/rig/encoder_scale.hpp"
+#include "abs_hil/rig/time_units.hpp"
 
 namespace abs_hil::runtime {
 
 namespace {
-constexpr double s_per_ns = 1e-9;
 /// A little under two cycles at 1 kHz, so that jitter does not make three of them.
 constexpr double stride_s = 1.8e-3;
 /// One held-up answer is no fault, however long it took.
@@ -28,7 +28,7 @@ void StrideMaker::begin(const rig::Measurement& measurement) noexcept {
 }
 
 bool StrideMaker::fresh(std::int64_t stamp_ns, std::int64_t now_ns) noexcept {
-  const bool recent = std::abs(static_cast<double>(now_ns - stamp_ns)) * s_per_ns <= limits_.sample_age_max_s;
+  const bool recent = std::abs(static_cast<double>(now_ns - stamp_ns)) * rig::s_per_ns <= limits_.sample_age_max_s;
   if (!recent || (started_ && stamp_ns <= stamp_ns_)) {
     ++stale_cycles_;
     return false;
@@ -48,11 +48,11 @@ Finding StrideMaker::update(const rig::Measurement& measurement, std::int64_t no
   complete_ = false;
   usable_ = fresh(measurement.time_ns, now_ns);
   if (!usable_) {
-    const double missing_s = static_cast<double>(now_ns - fresh_ns_) * s_per_ns;
+    const double missing_s = static_cast<double>(now_ns - fresh_ns_) * rig::s_per_ns;
     const bool lost = stale_cycles_ >= stale_cycles_max && missing_s >= limits_.sample_age_max_s;
     return lost ? Finding{rig::Reason::samples_missing, missing_s} : Finding{};
   }
-  const double since_s = static_cast<double>(measurement.time_ns - stamp_ns_) * s_per_ns;
+  const double since_s = static_cast<double>(measurement.time_ns - stamp_ns_) * rig::s_per_ns;
   const std::int32_t upper_before = std::exchange(upper_, measurement.upper_counts);
   const std::int32_t lower_before = std::exchange(lower_, measurement.lower_counts);
   stamp_ns_ = measurement.time_ns;
@@ -75,7 +75,7 @@ Finding StrideMaker::update(const rig::Measurement& measurement, std::int64_t no
             leapt * limits_.rad_per_count};
   }
 
-  const double dt_s = static_cast<double>(measurement.time_ns - begin_ns_) * s_per_ns;
+  const double dt_s = static_cast<double>(measurement.time_ns - begin_ns_) * rig::s_per_ns;
   if (dt_s < stride_s) return {};
   const double rad_s_per_count = limits_.rad_per_count / dt_s;
   stride_ = {.dt_s = dt_s,

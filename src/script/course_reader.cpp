@@ -80,7 +80,7 @@ class CourseReader {
  private:
   [[nodiscard]] bool has(std::string_view name) const { return reader_.find(name) != nullptr; }
 
-  const Entry& need(std::string_view name, std::string_view form) const {
+  [[nodiscard]] const Entry& need(std::string_view name, std::string_view form) const {
     const Entry* entry = reader_.find(name);
     if (entry == nullptr) {
       source_.fail(
@@ -91,7 +91,7 @@ class CourseReader {
     }
     return *entry;
   }
-  Number value(std::string_view name) const {
+  [[nodiscard]] Number value(std::string_view name) const {
     const Entry& entry = need(name, name == "from" || name == "to" ? "a ramp" : "a step");
     return values_.read(*entry.node, entry.key);
   }
@@ -134,8 +134,9 @@ class CourseReader {
       const Place place = place_of(node.source());
       const auto* pair = node.as_array();
       const bool whole = pair != nullptr && pair->size() == 2 && pair->get(0)->is_number();
-      if (!whole) source_.fail(place, fmt::format("points holds {}: give [time in s, value]", shown(node)));
-      add_point(*pair->get(0)->value<double>(), values_.read(*pair->get(1), "a point"), place);
+      const auto time_s = whole ? pair->get(0)->value<double>() : std::nullopt;
+      if (!time_s) source_.fail(place, fmt::format("points holds {}: give [time in s, value]", shown(node)));
+      add_point(*time_s, values_.read(*pair->get(1), "a point"), place);
     }
   }
 

@@ -6,12 +6,12 @@ namespace abs_hil::script {
 
 namespace {
 
-constexpr double longest_s = 86'400.0;
-constexpr settings::Range duration{0.0, longest_s};
+constexpr double day_s = 86'400.0;
+constexpr settings::Range duration{0.0, day_s};
 /// No phase lasts longer, whatever it waits for (experiment::Sequence), its slack of a second included.
 constexpr settings::Range phase_limit{0.0, 600.0, true, false};
 constexpr settings::Range phase_duration{0.0, 599.0};
-constexpr settings::Range span{0.0, longest_s, true, false};
+constexpr settings::Range span{0.0, day_s, true, false};
 constexpr settings::Range wheel_speed{0.0, 2000.0};
 constexpr settings::Range car_speed{0.0, 200.0};
 constexpr settings::Range way{0.0, 1e5, true, false};
@@ -38,8 +38,9 @@ std::vector<std::string> Grammar::spellings() const {
   std::vector<std::string> names;
   for (const Field& field : fields) {
     names.emplace_back(field.name);
-    if (field.quantity != Quantity::none)
+    if (field.quantity != Quantity::none) {
       names.push_back(std::string(field.name) + std::string(suffix_of(field.quantity)));
+    }
   }
   return names;
 }

@@ -35,9 +35,9 @@ std::vector<std::string> known_names() {
 }
 
 fs::path file_of(const std::string& name_or_file) {
-  const fs::path given(name_or_file);
+  fs::path given(name_or_file);
   if (given.has_parent_path() || given.extension() == ".toml") return given;
-  const fs::path named = experiments_dir() / (name_or_file + ".toml");
+  fs::path named = experiments_dir() / (name_or_file + ".toml");
   if (std::error_code error; fs::is_regular_file(named, error)) return named;
   const std::vector<std::string> known = known_names();
   const std::vector<std::string_view> views(known.begin(), known.end());

@@ -31,10 +31,11 @@ std::optional<double> number_of(const settings::Key& key) {
   return std::visit(
       [](const auto* target) -> std::optional<double> {
         using Target = std::decay_t<decltype(*target)>;
-        if constexpr (std::is_arithmetic_v<Target> && !std::is_same_v<Target, bool>)
+        if constexpr (std::is_arithmetic_v<Target> && !std::is_same_v<Target, bool>) {
           return static_cast<double>(*target);
-        else
+        } else {
           return std::nullopt;
+        }
       },
       key.target);
 }
@@ -100,6 +101,7 @@ class Planner {
 
   [[nodiscard]] experiment::Course course(const CourseScript& script) const {
     std::vector<experiment::Course::Point> points;
+    points.reserve(script.points.size());
     for (const auto& [time, number] : script.points) points.push_back({value(time), value(number)});
     try {
       return experiment::Course(std::move(points), script.between);

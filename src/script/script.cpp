@@ -140,8 +140,9 @@ class Parser {
     event.place = reader.place();
     if (const Entry* inject = reader.find("inject")) return read_fault(reader, *inject);
     for (const ChangingPart& part : changing_parts()) {
-      if (const Entry* entry = reader.find(part.what))
+      if (const Entry* entry = reader.find(part.what)) {
         event.changes.push_back({part.what, plain_number(reader, *entry)});
+      }
     }
     if (event.changes.empty()) {
       source_.fail(reader.place(),
@@ -171,13 +172,13 @@ class Parser {
     }
   }
 
-  double plain_number(const TableReader& reader, const Entry& entry) const {
+  [[nodiscard]] double plain_number(const TableReader& reader, const Entry& entry) const {
     const Number number = reader.number(entry);
     if (!number.key.empty()) source_.fail(number.place, "an event takes numbers, not $keys");
     return number.value;
   }
 
-  EventScript read_fault(const TableReader& reader, const Entry& entry) const {
+  [[nodiscard]] EventScript read_fault(const TableReader& reader, const Entry& entry) const {
     if (reader.entries().size() != 1) {
       source_.fail(entry.key_place,
                    "inject stands alone in its event: it says itself when, as in \"brake@write:off+0.2s\"");

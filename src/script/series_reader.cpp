@@ -56,8 +56,9 @@ Varied read_steps(const Source& source, const std::string& key, const toml::tabl
   const Number from = reader.number(*reader.find("from"));
   const Number to = reader.number(*reader.find("to"));
   const std::int64_t steps = reader.whole(*reader.find("steps"));
-  if (!from.key.empty() || !to.key.empty())
+  if (!from.key.empty() || !to.key.empty()) {
     source.fail(reader.place(), fmt::format("{}: give numbers, not $keys", key));
+  }
   Varied varied{key, {}, reader.place()};
   for (std::int64_t i = 0; i < steps; ++i) {
     const double part = static_cast<double>(i) / static_cast<double>(steps - 1);

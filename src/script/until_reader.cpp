@@ -71,8 +71,9 @@ ConditionScript read_condition(const Source& source, const TableReader& reader, 
   }
   if (condition.kind == EndKind::standstill) {
     const auto* flag = what->node->as_boolean();
-    if (flag == nullptr || !flag->get())
+    if (flag == nullptr || !flag->get()) {
       source.fail(what->place, fmt::format("standstill = {}: write true", shown(*what->node)));
+    }
   } else {
     condition.value = reader.number(*what);
   }

@@ -1,10 +1,10 @@
 #include "can_keys.hpp"
 
+#include "board_ranges.hpp"
+
 namespace abs_hil::settings {
 
 void add_can_keys(std::vector<Key>& keys, driver::can::CanOptions& c) {
-  constexpr Range duty_cap{0.0, 1.0, true, false};
-  constexpr Range direction{-1.0, 1.0};
   keys.insert(
       keys.end(),
       {
@@ -26,11 +26,13 @@ void add_can_keys(std::vector<Key>& keys, driver::can::CanOptions& c) {
            "longest wait for the node's answer, at most 80 % of the period; 0: 60 % of it",
            &c.answer_timeout_us,
            {0, 8000}},
-          {"driver.can.motor_duty_max", "", "largest drive PWM the driver sends", &c.motor_duty_max, duty_cap},
+          {"driver.can.motor_duty_max", "", "largest drive PWM the driver sends", &c.motor_duty_max, board_duty_cap},
           {"driver.can.brake_duty_max", "", "largest brake PWM the driver sends; caps gate.brake_duty_max",
-           &c.brake_duty_max, duty_cap},
-          {"driver.can.lower_sign", "", "1, or -1 if the counter counts down going forward", &c.lower_sign, direction},
-          {"driver.can.upper_sign", "", "1, or -1 if the counter counts down going forward", &c.upper_sign, direction},
+           &c.brake_duty_max, board_duty_cap},
+          {"driver.can.lower_sign", "", "1, or -1 if the counter counts down going forward", &c.lower_sign,
+           counting_direction},
+          {"driver.can.upper_sign", "", "1, or -1 if the counter counts down going forward", &c.upper_sign,
+           counting_direction},
           {"driver.can.loss_cost", "", "points that a lost or wrong frame costs", &c.loss_cost, {0, 1000}},
           {"driver.can.loss_relief", "", "points that a good answer takes off", &c.loss_relief, {0, 1000}},
           {"driver.can.loss_limit", "", "points that end the run", &c.loss_limit, {1, 1'000'000}},

@@ -93,12 +93,13 @@ fs::path config_dir() {
 }
 
 fs::path plant_file(std::string_view name_or_file) {
-  const fs::path given(name_or_file);
+  fs::path given(name_or_file);
   if (given.has_parent_path() || given.extension() == ".toml") return given;
-  const fs::path named = config_dir() / "plants" / fmt::format("{}.toml", name_or_file);
+  fs::path named = config_dir() / "plants" / fmt::format("{}.toml", name_or_file);
   if (std::error_code error; fs::is_regular_file(named, error)) return named;
   std::vector<std::string_view> names;
   const std::vector<PlantEntry> known = known_plants();
+  names.reserve(known.size());
   for (const PlantEntry& plant : known) names.push_back(plant.name);
   throw ConfigError(
       fmt::format("--plant: unknown plant \"{}\"; the nearest known is {}; known: {}; or give a TOML file",

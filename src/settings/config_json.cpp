@@ -1,5 +1,7 @@
 #include "abs_hil/settings/config_json.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
@@ -13,7 +15,7 @@ void set_values(const nlohmann::ordered_json& node, const std::string& name, Key
                 std::vector<std::string>& unknown) {
   if (node.is_object()) {
     for (const auto& [key, value] : node.items()) {
-      set_values(value, name.empty() ? key : name + '.' + key, table, origin, unknown);
+      set_values(value, name.empty() ? key : fmt::format("{}.{}", name, key), table, origin, unknown);
     }
     return;
   }

@@ -1,5 +1,6 @@
 #include "driver_keys.hpp"
 
+#include "board_ranges.hpp"
 #include "can_keys.hpp"
 #include "usb_keys.hpp"
 
@@ -7,9 +8,7 @@ namespace abs_hil::settings {
 
 namespace {
 
-constexpr Range duty_cap{0.0, 1.0, true, false};
-constexpr Range encoder_channel{0.0, 2.0};
-constexpr Range direction{-1.0, 1.0};
+constexpr Range pci_encoder_channel{0.0, 2.0};
 
 void add_pci_keys(std::vector<Key>& keys, driver::pci::PciOptions& p) {
   keys.insert(
@@ -22,19 +21,21 @@ void add_pci_keys(std::vector<Key>& keys, driver::pci::PciOptions& p) {
            "version word that the card must show; -1: not compared",
            &p.bitstream,
            {-1, 65535}},
-          {"driver.pci.motor_duty_max", "", "largest drive PWM the driver sends", &p.motor_duty_max, duty_cap},
+          {"driver.pci.motor_duty_max", "", "largest drive PWM the driver sends", &p.motor_duty_max, board_duty_cap},
           {"driver.pci.brake_duty_max", "", "largest brake PWM the driver sends; caps gate.brake_duty_max",
-           &p.brake_duty_max, duty_cap},
+           &p.brake_duty_max, board_duty_cap},
           {"driver.pci.pwm_mode", "", "counting width of the PWMs", &p.pwm_mode, {}, {"8-bit", "12-bit"}},
           {"driver.pci.pwm_prescaler",
            "",
            "PWM frequency is 40 MHz / ((prescaler + 1) 255 or 4095)",
            &p.pwm_prescaler,
            {0, 65535}},
-          {"driver.pci.lower_channel", "", "encoder channel of the lower wheel", &p.lower_channel, encoder_channel},
-          {"driver.pci.upper_channel", "", "encoder channel of the upper wheel", &p.upper_channel, encoder_channel},
-          {"driver.pci.lower_sign", "", "1, or -1 if the channel counts down going forward", &p.lower_sign, direction},
-          {"driver.pci.upper_sign", "", "1, or -1 if the channel counts down going forward", &p.upper_sign, direction},
+          {"driver.pci.lower_channel", "", "encoder channel of the lower wheel", &p.lower_channel, pci_encoder_channel},
+          {"driver.pci.upper_channel", "", "encoder channel of the upper wheel", &p.upper_channel, pci_encoder_channel},
+          {"driver.pci.lower_sign", "", "1, or -1 if the channel counts down going forward", &p.lower_sign,
+           counting_direction},
+          {"driver.pci.upper_sign", "", "1, or -1 if the channel counts down going forward", &p.upper_sign,
+           counting_direction},
           {"driver.pci.plausible_speed_rad_s",
            "rad/s",
            "a counter that goes faster is a fault",

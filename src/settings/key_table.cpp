@@ -18,10 +18,11 @@ namespace {
 std::string shown(const Value& value) {
   return std::visit(
       [](const auto& v) -> std::string {
-        if constexpr (std::is_same_v<std::decay_t<decltype(v)>, std::string>)
+        if constexpr (std::is_same_v<std::decay_t<decltype(v)>, std::string>) {
           return '"' + v + '"';
-        else
+        } else {
           return fmt::format("{}", v);
+        }
       },
       value);
 }
@@ -155,10 +156,11 @@ std::string KeyTable::to_toml() const {
     // A number as short as reads back to the same; a text as JSON writes it, which TOML reads alike.
     const std::string value = std::visit(
         [](const auto* target) {
-          if constexpr (std::is_same_v<std::decay_t<decltype(*target)>, std::string>)
+          if constexpr (std::is_same_v<std::decay_t<decltype(*target)>, std::string>) {
             return nlohmann::json(*target).dump();
-          else
+          } else {
             return fmt::format("{}", *target);
+          }
         },
         key.target);
     at->second += fmt::format("{} = {}\n", key.name.substr(dot + 1), value);

@@ -41,7 +41,7 @@ std::string LiveSettings::resolve(std::string_view name) const {
   const KeyTable keys(copy);
   const std::string& controller = settings_.control.controller;
   for (const std::string& prefix : {std::string(), std::string("control."), section_of(controller)}) {
-    const std::string key = prefix + std::string(name);
+    std::string key = prefix + std::string(name);
     const auto is_named = [&key](const Key& known) { return known.name == key; };
     if (std::none_of(keys.keys().begin(), keys.keys().end(), is_named)) continue;
     if (may_change(key, controller)) return key;

@@ -1,14 +1,14 @@
 #include "usb_keys.hpp"
 
+#include "board_ranges.hpp"
+
 namespace abs_hil::settings {
 
 namespace {
 
 constexpr Range any_or_id{-1, 65535};
 constexpr Range pwm_channel{0, 9};
-constexpr Range encoder_channel{0, 7};
-constexpr Range direction{-1, 1};
-constexpr Range duty_cap{0.0, 1.0, true, false};
+constexpr Range usb_encoder_channel{0, 7};
 constexpr Range line_or_none{-1, 14};
 
 }  // namespace
@@ -28,13 +28,15 @@ void add_usb_keys(std::vector<Key>& keys, driver::usb::UsbOptions& u) {
           {"driver.usb.brake_pwm", "", "PWM channel of the brake", &u.brake_pwm, pwm_channel},
           {"driver.usb.enable_line", "", "digital line that enables the motor; -1: none", &u.enable_line, line_or_none},
           {"driver.usb.enable_inverted", "", "the line is low while the motor is enabled", &u.enable_inverted},
-          {"driver.usb.lower_channel", "", "encoder channel of the lower wheel", &u.lower_channel, encoder_channel},
-          {"driver.usb.upper_channel", "", "encoder channel of the upper wheel", &u.upper_channel, encoder_channel},
-          {"driver.usb.lower_sign", "", "1, or -1 if the channel counts down going forward", &u.lower_sign, direction},
-          {"driver.usb.upper_sign", "", "1, or -1 if the channel counts down going forward", &u.upper_sign, direction},
-          {"driver.usb.motor_duty_max", "", "largest drive PWM the driver sends", &u.motor_duty_max, duty_cap},
+          {"driver.usb.lower_channel", "", "encoder channel of the lower wheel", &u.lower_channel, usb_encoder_channel},
+          {"driver.usb.upper_channel", "", "encoder channel of the upper wheel", &u.upper_channel, usb_encoder_channel},
+          {"driver.usb.lower_sign", "", "1, or -1 if the channel counts down going forward", &u.lower_sign,
+           counting_direction},
+          {"driver.usb.upper_sign", "", "1, or -1 if the channel counts down going forward", &u.upper_sign,
+           counting_direction},
+          {"driver.usb.motor_duty_max", "", "largest drive PWM the driver sends", &u.motor_duty_max, board_duty_cap},
           {"driver.usb.brake_duty_max", "", "largest brake PWM the driver sends; caps gate.brake_duty_max",
-           &u.brake_duty_max, duty_cap},
+           &u.brake_duty_max, board_duty_cap},
           {"driver.usb.pwm_mode", "", "counting width of the PWMs", &u.pwm_mode, {}, {"8-bit", "12-bit"}},
           {"driver.usb.pwm_prescaler", "", "PWM frequency: clock / ((prescaler + 1) 255 or 4095)", &u.pwm_prescaler,
            Range{0, 65535}},

@@ -107,7 +107,7 @@ bool CommandListener::receive(int timeout_ms) {
   }
   if (outlet_.provider() == "tcpq") {
     // A server that stands still within a message must not keep the run from ending.
-    constexpr timeval timeout{.tv_sec = 0, .tv_usec = tcpq_timeout_ms * 1000};
+    constexpr timeval timeout{.tv_sec = 0, .tv_usec = suseconds_t{tcpq_timeout_ms} * 1000};
     static_cast<void>(::setsockopt(ready.fd, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout));
   }
   if (lcm_handle(lcm_) != 0) return false;

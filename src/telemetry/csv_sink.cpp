@@ -15,8 +15,8 @@
 namespace abs_hil::telemetry {
 namespace {
 
-constexpr std::size_t block_bytes = 64 * 1024;
-constexpr std::string_view file_kind = "CSV file";
+constexpr std::size_t block_bytes = 65'536;
+constexpr std::string_view csv_kind = "CSV file";
 
 /// Appends to a row that is known to be large enough.
 class RowWriter {
@@ -67,7 +67,7 @@ CsvSink::CsvSink(std::filesystem::path path, std::int64_t write_period_ns)
   do {
     file_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   } while (file_ < 0 && errno == EINTR);
-  if (file_ < 0) throw FileError(file_kind, path_, errno);
+  if (file_ < 0) throw FileError(csv_kind, path_, errno);
   append(csv_header.data(), csv_header.size());
   append("\n", 1);
 }
@@ -86,7 +86,7 @@ void CsvSink::consume(const rig::CycleRecord& record, double distance_m) {
 
 void CsvSink::finish() {
   close();
-  if (failed()) throw FileError(file_kind, path_, error_number_);
+  if (failed()) throw FileError(csv_kind, path_, error_number_);
 }
 
 void CsvSink::append(const char* text, std::size_t size) noexcept {

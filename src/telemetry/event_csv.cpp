@@ -13,7 +13,7 @@ namespace abs_hil::telemetry {
 
 namespace {
 
-constexpr std::string_view file_kind = "list of events";
+constexpr std::string_view event_list_kind = "list of events";
 
 void append_number(std::string& text, double value) {
   if (std::isnan(value)) {
@@ -29,7 +29,7 @@ void append_number(std::string& text, double value) {
 EventCsv::EventCsv(std::filesystem::path path) : path_(std::move(path)), text_(event_csv_header) {
   text_ += '\n';
   errno = 0;
-  if (!std::ofstream(path_)) throw FileError(file_kind, path_, errno);
+  if (!std::ofstream(path_)) throw FileError(event_list_kind, path_, errno);
 }
 
 void EventCsv::consume(const rig::CycleRecord& record, double /*distance_m*/) {
@@ -48,7 +48,7 @@ void EventCsv::finish() {
   std::ofstream file(path_, std::ios::binary);
   file << text_;
   file.close();
-  if (!file) throw FileError(file_kind, path_, errno != 0 ? errno : EIO);
+  if (!file) throw FileError(event_list_kind, path_, errno != 0 ? errno : EIO);
 }
 
 }  // namespace abs_hil::telemetry

@@ -25,8 +25,9 @@ Unsigned big_endian(const std::uint8_t* bytes) {
 
 template <class Unsigned>
 std::uint8_t* put_big_endian(std::uint8_t* to, Unsigned value) {
-  for (std::size_t i = 0; i < sizeof value; ++i)
+  for (std::size_t i = 0; i < sizeof value; ++i) {
     *to++ = static_cast<std::uint8_t>(value >> (8 * (sizeof value - 1 - i)));
+  }
   return to;
 }
 

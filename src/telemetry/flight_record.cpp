@@ -2,20 +2,19 @@
 
 #include <cerrno>
 #include <charconv>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <exception>
 #include <fstream>
 
+#include "abs_hil/rig/time_units.hpp"
 #include "abs_hil/telemetry/csv_sink.hpp"
 #include "abs_hil/telemetry/file_error.hpp"
 #include "abs_hil/telemetry/log_outlet.hpp"
+#include "wall_clock.hpp"
 
 namespace abs_hil::telemetry {
 namespace {
-
-constexpr double us_per_ns = 1e-3;
 
 void add_number(std::string& row, double value) {
   row += ',';
@@ -34,14 +33,9 @@ std::string extra_columns(const rig::CycleRecord& r) {
   add_number(row, r.measurement.temperature_C);
   row += ',' + std::to_string(r.measurement.trip_flags) + ',' + std::to_string(static_cast<int>(r.reason));
   add_number(row, r.reason_value);
-  add_number(row, static_cast<double>(r.timing.wakeup_latency_ns) * us_per_ns);
-  add_number(row, static_cast<double>(r.timing.cycle_ns) * us_per_ns);
+  add_number(row, rig::in_us(r.timing.wakeup_latency_ns));
+  add_number(row, rig::in_us(r.timing.cycle_ns));
   return row + '\n';
-}
-
-std::int64_t wall_clock_us() {
-  using std::chrono::duration_cast, std::chrono::microseconds, std::chrono::system_clock;
-  return duration_cast<microseconds>(system_clock::now().time_since_epoch()).count();
 }
 
 void write_text(const std::filesystem::path& path, const std::string& text, std::string_view kind) {

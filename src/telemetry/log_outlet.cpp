@@ -1,22 +1,17 @@
 #include "abs_hil/telemetry/log_outlet.hpp"
 
 #include <cerrno>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <utility>
 
 #include "abs_hil/telemetry/file_error.hpp"
+#include "wall_clock.hpp"
 
 namespace abs_hil::telemetry {
 namespace {
 
-constexpr std::size_t block_bytes = 64 * 1024;
-
-std::int64_t wall_clock_us() {
-  using std::chrono::duration_cast, std::chrono::microseconds, std::chrono::system_clock;
-  return duration_cast<microseconds>(system_clock::now().time_since_epoch()).count();
-}
+constexpr std::size_t log_buffer_bytes = 65'536;
 
 }  // namespace
 
@@ -26,7 +21,7 @@ LogOutlet::LogOutlet(std::filesystem::path path, std::optional<std::int64_t> epo
   file_ = std::make_unique<lcm::LogFile>(path_.string(), "w");
   if (!file_->good()) throw FileError("event log", path_, errno != 0 ? errno : EIO);
   // The default buffer is 4 KiB, a write for every dozen cycles; without memory for ours that one stays.
-  (void)std::setvbuf(file_->getFilePtr(), nullptr, _IOFBF, block_bytes);
+  (void)std::setvbuf(file_->getFilePtr(), nullptr, _IOFBF, log_buffer_bytes);
 }
 
 LogOutlet::~LogOutlet() = default;

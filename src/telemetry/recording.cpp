@@ -12,7 +12,6 @@
 #include "abs_hil/telemetry/checked_decode.hpp"
 #include "abs_hil/telemetry/csv_sink.hpp"
 #include "abs_hil/telemetry/file_error.hpp"
-#include "abs_hil/telemetry/hexadecimal.hpp"
 #include "abs_hil/telemetry/message_codec.hpp"
 #include "csv_text.hpp"
 
@@ -175,7 +174,7 @@ EventText text_of(const LogEvent& event) {
   });
   if (!text.row.empty()) return text;
   CsvRow row;
-  row.text(hexadecimal(event.data));
+  row.text(CsvRow::hexadecimal(event.data.data(), event.data.size()));
   put_envelope(row, event, raw_type);
   return {std::string(raw_type), std::string("data_hex,").append(envelope), row.row()};
 }
@@ -333,7 +332,7 @@ ConversionCounts log_to_csv(const fs::path& log, const fs::path& csv) {
   }
   CsvFiles files(csv);
   ConversionCounts counts;
-  while (const auto event = reader.next()) {
+  for (auto event = reader.next(); event.has_value(); event = reader.next()) {
     const EventText text = text_of(*event);
     files.write(*event, text);
     ++counts.events;
@@ -361,7 +360,7 @@ void for_each_event(const fs::path& recording, const std::function<void(const Lo
     return;
   }
   EventLogReader reader(recording);
-  while (const auto event = reader.next()) take(*event);
+  for (auto event = reader.next(); event.has_value(); event = reader.next()) take(*event);
 }
 
 }  // namespace abs_hil::telemetry

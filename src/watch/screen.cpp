@@ -35,8 +35,9 @@ rig::Phase phase_of(std::int8_t number) {
 }
 
 bool has_ended(const RunView& view) {
-  if (!view.telemetry()) return false;
-  const rig::Phase phase = phase_of(view.telemetry()->phase);
+  const auto& telemetry = view.telemetry();
+  if (!telemetry) return false;
+  const rig::Phase phase = phase_of(telemetry->phase);
   return phase == rig::Phase::stopped || phase == rig::Phase::fault;
 }
 
@@ -81,7 +82,8 @@ std::string fault_text(const RunView& view) {
   for (const event_t& event : view.events()) {
     if (event.kind == "fault") return event.message.empty() ? event.reason_text : event.message;
   }
-  const auto reason = static_cast<rig::Reason>(view.telemetry()->reason);
+  const auto& telemetry = view.telemetry();
+  const auto reason = telemetry ? static_cast<rig::Reason>(telemetry->reason) : rig::Reason::none;
   return reason == rig::Reason::none ? "reason not received" : std::string(rig::description(reason));
 }
 
@@ -137,11 +139,21 @@ class Screen {
   }
 
   void draw_state() {
-    const rig::Phase phase = phase_of(view_.telemetry() ? view_.telemetry()->phase : view_.status()->phase);
-    const double time_s = view_.telemetry() ? view_.telemetry()->time_s : view_.status()->time_s;
+    const auto& telemetry = view_.telemetry();
+    const auto& status = view_.status();
+    std::int8_t number_of_phase = telemetry_t::PHASE_IDLE;
+    double time_s = 0.0;
+    if (telemetry) {
+      number_of_phase = telemetry->phase;
+      time_s = telemetry->time_s;
+    } else if (status) {
+      number_of_phase = status->phase;
+      time_s = status->time_s;
+    }
+    const rig::Phase phase = phase_of(number_of_phase);
     int column = grid_.write(0, 1, rig::name_of(phase), style_of(phase));
     column = grid_.write(std::max(column + 1, 11), 1, fmt::format("{:>7} s  ", number(time_s, 3)), Style::bold);
-    if (phase == rig::Phase::fault && view_.telemetry()) {
+    if (phase == rig::Phase::fault && telemetry) {
       grid_.write(column, 1, fault_text(view_), Style::alarm);
     } else if (!view_.samples().empty()) {
       grid_.write(column, 1, values_text(view_, words_));
@@ -273,10 +285,11 @@ CellGrid draw_screen(const RunView& view, std::int64_t now_ns, const ScreenOptio
 }
 
 std::string one_line(const RunView& view, std::int64_t now_ns, const ScreenOptions& options) {
-  const std::string live = liveness(view, now_ns);
-  if (!view.telemetry()) return live;
-  const rig::Phase phase = phase_of(view.telemetry()->phase);
-  std::string line = fmt::format("{:10} {:>7} s", rig::name_of(phase), number(view.telemetry()->time_s, 3));
+  std::string live = liveness(view, now_ns);
+  const auto& telemetry = view.telemetry();
+  if (!telemetry) return live;
+  const rig::Phase phase = phase_of(telemetry->phase);
+  std::string line = fmt::format("{:10} {:>7} s", rig::name_of(phase), number(telemetry->time_s, 3));
   if (phase == rig::Phase::fault) line += "  " + fault_text(view);
   if (!view.samples().empty()) line += "  " + values_text(view, words_of(options));
   if (const auto& s = view.status()) line += fmt::format("  overruns {}  drops {}", s->overruns, s->telemetry_drops);

@@ -38,7 +38,7 @@ Rescue rescue;
 
 void append_capability(const char* name) {
   const char* text = ::tigetstr(name);
-  if (text == nullptr || text == reinterpret_cast<const char*>(-1)) return;
+  if (text == nullptr || reinterpret_cast<std::intptr_t>(text) == -1) return;  // terminfo: -1 is "no string"
   const std::size_t size = std::min(std::strlen(text), rescue.text.size() - rescue.size);
   std::memcpy(rescue.text.data() + rescue.size, text, size);
   rescue.size += size;

@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "abs_hil/rig/time_units.hpp"
 #include "abs_hil/telemetry/run_listener.hpp"
 #include "abs_hil/watch/run_view.hpp"
 #include "abs_hil/watch/screen.hpp"
@@ -19,9 +20,8 @@
 namespace abs_hil::watch {
 namespace {
 
-constexpr std::int64_t ns_per_ms = 1'000'000;
-constexpr std::int64_t draw_period_ns = 100 * ns_per_ms;
-constexpr std::int64_t line_period_ns = 1'000 * ns_per_ms;
+constexpr std::int64_t draw_period_ns = 100 * rig::ns_per_ms;
+constexpr std::int64_t line_period_ns = 1'000 * rig::ns_per_ms;
 constexpr int picture_columns = 100;
 constexpr int picture_rows = 32;
 
@@ -107,9 +107,9 @@ class Session {
  private:
   /// Takes messages until `until_ns`, a key or a signal. True if the terminal's other end has gone.
   bool wait(std::int64_t until_ns, bool keys) {
-    const std::int64_t left_ms = (until_ns - monotonic_ns() + ns_per_ms - 1) / ns_per_ms;
+    const std::int64_t left_ms = (until_ns - monotonic_ns() + rig::ns_per_ms - 1) / rig::ns_per_ms;
     std::array<pollfd, 2> ready{pollfd{listener_.file_descriptor(), POLLIN, 0}, pollfd{STDIN_FILENO, POLLIN, 0}};
-    const auto timeout_ms = static_cast<int>(std::clamp<std::int64_t>(left_ms, 0, draw_period_ns / ns_per_ms));
+    const auto timeout_ms = static_cast<int>(std::clamp<std::int64_t>(left_ms, 0, draw_period_ns / rig::ns_per_ms));
     if (::poll(ready.data(), keys ? 2 : 1, timeout_ms) < 0) return false;  // EINTR: the caller asks why
     // Also without descriptor, a tcpq server being away: LCM then tries to reach it again.
     if (ready[0].fd < 0 || ready[0].revents != 0) listener_.poll();

@@ -3,7 +3,6 @@
 #include "catch.hpp"
 #include "telemetry/message_capture.hpp"
 #include "telemetry/sample_records.hpp"
-#include "temporary_folder.hpp"
 
 namespace abs_hil::telemetry {
 namespace {
@@ -119,7 +118,7 @@ TEST_CASE("without a server there is nothing to hear, and polling is harmless") 
 }
 
 TEST_CASE("a log file as LCM network is not listened to") {
-  const abs_hil::test::TemporaryFolder scratch;
+  const test::ScratchDirectory scratch;
   LcmOutlet outlet("file://" + (scratch / "x.lcmlog").string() + "?mode=w");
   MessageStream stream({}, {}, {});
   CommandListener listener(outlet, stream, {});

@@ -10,7 +10,6 @@
 #include "abs_hil/telemetry/message_stream.hpp"
 #include "catch.hpp"
 #include "telemetry/sample_records.hpp"
-#include "temporary_folder.hpp"
 
 namespace abs_hil::telemetry {
 namespace {
@@ -34,7 +33,7 @@ void measure(const char* what, Consume consume) {
 }
 
 TEST_CASE("cost of a record", "[.][cost]") {
-  const abs_hil::test::TemporaryFolder scratch;
+  const test::ScratchDirectory scratch;
   measure("making the sample record alone", [](const rig::CycleRecord& r) {
     if (r.time_s < 0.0) std::puts("never");
   });

@@ -5,6 +5,7 @@
 
 #include "abs_hil/rig/command.hpp"
 #include "abs_hil/rig/encoder_scale.hpp"
+#include "abs_hil/rig/time_units.hpp"
 
 namespace abs_hil::driver {
 
@@ -21,9 +22,8 @@ namespace abs_hil::driver {
                                            double speed_rad_s, std::int32_t counts_per_rev) noexcept {
   /// Counts that an encoder may jump beyond what its speed explains: vibration, and the reads' own lateness.
   constexpr double slack_counts = 256.0;
-  constexpr double s_per_ns = 1e-9;
-  const double most =
-      slack_counts + speed_rad_s * static_cast<double>(elapsed_ns) * s_per_ns / rig::radians_per_count(counts_per_rev);
+  const double most = slack_counts + speed_rad_s * static_cast<double>(elapsed_ns) * rig::s_per_ns /
+                                         rig::radians_per_count(counts_per_rev);
   return std::abs(static_cast<double>(rig::counts_between(before, after))) <= most;
 }
 

@@ -25,6 +25,7 @@ enum class PwmMode : std::uint32_t { bits_8 = 0, bits_12 = 1 };
   const double full = static_cast<double>(full_width(mode));
   constexpr double rounding_slack = 1e-9;  // a cap that is exactly a width may come out a hair below it
   const auto cap = static_cast<std::uint32_t>(duty_max * full + rounding_slack);
+  // lround is not constexpr. NOLINTNEXTLINE(bugprone-incorrect-roundings)
   const auto width = static_cast<std::uint32_t>(duty * full + 0.5);
   return width < cap ? width : cap;
 }

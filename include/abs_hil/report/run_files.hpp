@@ -30,7 +30,7 @@ struct TimingHistogram {
 };
 
 /// What is known of a run besides its rows. Everything but the CSV may be missing; `notes` say what is.
-struct RunFiles {
+struct RunFiles {       // NOLINT(bugprone-exception-escape): JSON's move constructor is noexcept all the same
   std::string name{};   ///< of folder or file; made unlike those of the other runs
   std::string label{};  ///< name, and the controller where it is known
   std::filesystem::path csv{};

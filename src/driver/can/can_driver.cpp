@@ -10,13 +10,14 @@
 #include "abs_hil/driver/can/bus_load.hpp"
 #include "abs_hil/driver/can/signal_codec.hpp"
 #include "abs_hil/driver/encoder_sign.hpp"
+#include "abs_hil/driver/monotonic_time.hpp"
 #include "abs_hil/driver/plausibility.hpp"
+#include "abs_hil/rig/time_units.hpp"
 
 namespace abs_hil::driver::can {
 
 namespace {
 
-constexpr std::int64_t ns_per_us = 1000;
 constexpr std::int64_t handshake_timeout_ns = 100'000'000;
 constexpr int handshake_attempts = 3;
 /// The emulator's answer in lock-step may take as long as its computer likes: time stands still.
@@ -27,14 +28,14 @@ constexpr double most_answer_share = 0.8;
 
 std::int64_t answer_timeout_ns(const CanOptions& options, bool lock_step) {
   const double period_ns = 1e9 / options.rate_Hz;
-  const std::int64_t timeout_ns = options.answer_timeout_us * ns_per_us;
+  const std::int64_t timeout_ns = options.answer_timeout_us * rig::ns_per_us;
   if (lock_step) return timeout_ns > 0 ? timeout_ns : lock_step_timeout_ns;
   if (timeout_ns == 0) return static_cast<std::int64_t>(answer_share * period_ns);
   if (timeout_ns < 0 || static_cast<double>(timeout_ns) > most_answer_share * period_ns) {
-    throw std::invalid_argument("driver.can.answer_timeout_us = " + std::to_string(options.answer_timeout_us) +
-                                ": give at most " +
-                                std::to_string(static_cast<std::int64_t>(most_answer_share * period_ns) / ns_per_us) +
-                                " us, 80 % of the period, or 0");
+    throw std::invalid_argument(
+        "driver.can.answer_timeout_us = " + std::to_string(options.answer_timeout_us) + ": give at most " +
+        std::to_string(static_cast<std::int64_t>(most_answer_share * period_ns) / rig::ns_per_us) +
+        " us, 80 % of the period, or 0");
   }
   return timeout_ns;
 }

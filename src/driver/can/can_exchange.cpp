@@ -7,14 +7,14 @@
 
 #include "abs_hil/driver/can/can_driver.hpp"
 #include "abs_hil/driver/can/error_frame.hpp"
+#include "abs_hil/driver/monotonic_time.hpp"
 #include "abs_hil/rig/encoder_scale.hpp"
+#include "abs_hil/rig/time_units.hpp"
 
 namespace abs_hil::driver::can {
 
 namespace {
 
-constexpr double s_per_ns = 1e-9;
-constexpr std::int64_t ns_per_us = 1000;
 /// Frames that one cycle reads at most: an answer has 4.
 constexpr int most_frames_in_a_cycle = 64;
 /// Counts that an encoder may jump beyond what its speed explains: vibration, and the bus's own lateness.
@@ -206,7 +206,8 @@ bool CanDriver::advance_counts(const Answer& answer, std::int64_t elapsed_ns) no
   const std::array<std::int32_t, 2> raw{answer.upper_counts, answer.lower_counts};
   const std::array<std::int32_t, 2> signs{options_.upper_sign, options_.lower_sign};
   const double most = plausible_slack_counts + options_.plausible_speed_rad_s * static_cast<double>(elapsed_ns) *
-                                                   s_per_ns / rig::radians_per_count(options_.encoder_counts_per_rev);
+                                                   rig::s_per_ns /
+                                                   rig::radians_per_count(options_.encoder_counts_per_rev);
   for (std::size_t wheel = 0; wheel < raw.size(); ++wheel) {
     const std::int32_t moved = travelled(raw_counts_[wheel], raw[wheel], answer.count_bits);
     if (std::abs(static_cast<double>(moved)) > most) return false;
@@ -223,7 +224,7 @@ std::int64_t CanDriver::latch_time_ns(const Answer& answer, std::int64_t now_ns)
   if (!any_answer_) return sent_ns_ + (received_ns - sent_ns_) / 2;
   // The node's clock tells the interval best; SYNC and answer tell between which times of ours it lies.
   const std::uint32_t interval_us = answer.node_time_us - node_time_us_;
-  return std::clamp(latched_ns_ + std::int64_t{interval_us} * ns_per_us, sent_ns_, received_ns);
+  return std::clamp(latched_ns_ + std::int64_t{interval_us} * rig::ns_per_us, sent_ns_, received_ns);
 }
 
 IoResult CanDriver::judge_answer(std::int64_t now_ns) noexcept {
@@ -235,7 +236,7 @@ IoResult CanDriver::judge_answer(std::int64_t now_ns) noexcept {
     return {IoError::read_back_mismatch, id::latch, 0, rig::Reason::can_node_latched};
   }
   const std::int64_t time_ns = latch_time_ns(answer, now_ns);
-  const std::int64_t node_interval_ns = std::int64_t{answer.node_time_us - node_time_us_} * ns_per_us;
+  const std::int64_t node_interval_ns = std::int64_t{answer.node_time_us - node_time_us_} * rig::ns_per_us;
   const std::int64_t interval_ns = any_answer_ ? time_ns - latched_ns_ : 0;
   if (any_answer_ && std::abs(node_interval_ns - interval_ns) > clock_slack_ns) {
     return {IoError::implausible_answer, id::latch, 0, rig::Reason::can_node_restarted};

@@ -2,6 +2,7 @@
 
 #include "abs_hil/driver/can/bus_load.hpp"
 #include "abs_hil/driver/can/can_driver.hpp"
+#include "abs_hil/driver/monotonic_time.hpp"
 #include "abs_hil/rig/formatted_text.hpp"
 
 namespace abs_hil::driver::can {
@@ -24,9 +25,9 @@ std::vector<std::string> CanDriver::notes() const {
   notes.push_back(formatted(
       "%s: node with protocol %u answers%s; %s frames", link_.place.c_str(), static_cast<unsigned>(identity_.protocol),
       (identity_.features & feature::lock_step) != 0 ? ", an emulator in lock-step" : "", fd_ ? "CAN FD" : "classic"));
-  const double bit_rate = link_.facts ? static_cast<double>(link_.facts->bit_rate) : 0.0;
-  if (bit_rate > 0.0) {
-    notes.push_back(load_text(options_.rate_Hz, bit_rate, static_cast<double>(link_.facts->data_bit_rate), fd_));
+  if (const auto& facts = link_.facts; facts && facts->bit_rate > 0) {
+    notes.push_back(load_text(options_.rate_Hz, static_cast<double>(facts->bit_rate),
+                              static_cast<double>(facts->data_bit_rate), fd_));
   } else {
     constexpr double megabit = 1e6;
     notes.push_back("no bit rate of its own; on a real bus " +

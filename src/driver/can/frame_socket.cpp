@@ -12,17 +12,14 @@
 #include <cstring>
 #include <ctime>
 
+#include "abs_hil/driver/monotonic_time.hpp"
+#include "abs_hil/rig/time_units.hpp"
+
 namespace abs_hil::driver::can {
 
 namespace {
 
-constexpr std::int64_t ns_per_s = 1'000'000'000;
-
-std::int64_t clock_ns(clockid_t clock) noexcept {
-  timespec now{};
-  clock_gettime(clock, &now);
-  return std::int64_t{now.tv_sec} * ns_per_s + now.tv_nsec;
-}
+std::int64_t ns_of(const timespec& time) noexcept { return std::int64_t{time.tv_sec} * rig::ns_per_s + time.tv_nsec; }
 
 bool is_full(int error) noexcept { return error == EAGAIN || error == EWOULDBLOCK || error == ENOBUFS; }
 
@@ -34,9 +31,10 @@ bool is_down(int error) noexcept {
 
 /// The kernel stamps in the settable clock: how long ago that was is the same in both.
 std::int64_t monotonic_of(const timespec& realtime) noexcept {
-  const std::int64_t stamp_ns = std::int64_t{realtime.tv_sec} * ns_per_s + realtime.tv_nsec;
-  const std::int64_t age_ns = std::max<std::int64_t>(0, clock_ns(CLOCK_REALTIME) - stamp_ns);
-  return monotonic_ns() - std::min(age_ns, ns_per_s);  // a clock that was set makes no age of years
+  timespec now{};
+  clock_gettime(CLOCK_REALTIME, &now);
+  const std::int64_t age_ns = std::max<std::int64_t>(0, ns_of(now) - ns_of(realtime));
+  return monotonic_ns() - std::min(age_ns, rig::ns_per_s);  // a clock that was set makes no age of years
 }
 
 void unpack(const canfd_frame& raw, std::size_t size, Frame& frame) noexcept {
@@ -50,8 +48,6 @@ void unpack(const canfd_frame& raw, std::size_t size, Frame& frame) noexcept {
 }
 
 }  // namespace
-
-std::int64_t monotonic_ns() noexcept { return clock_ns(CLOCK_MONOTONIC); }
 
 FrameSocket::FrameSocket(int descriptor) noexcept : descriptor_(descriptor) {
   ::fcntl(descriptor_, F_SETFL, ::fcntl(descriptor_, F_GETFL) | O_NONBLOCK);
@@ -116,7 +112,7 @@ ReceiveResult FrameSocket::receive(Frame& frame, std::int64_t deadline_ns) noexc
     const std::int64_t left_ns = deadline_ns - monotonic_ns();
     if (left_ns <= 0) return result;
     pollfd waiting{descriptor_, POLLIN, 0};
-    const timespec limit{static_cast<time_t>(left_ns / ns_per_s), static_cast<long>(left_ns % ns_per_s)};
+    const timespec limit{static_cast<time_t>(left_ns / rig::ns_per_s), static_cast<long>(left_ns % rig::ns_per_s)};
     static_cast<void>(::ppoll(&waiting, 1, &limit, nullptr));
   }
 }

@@ -28,7 +28,7 @@ using Visit = std::function<void(unsigned type, const void* data, std::size_t si
 void for_each(const void* data, std::size_t size, const Visit& visit) {
   const auto* at = static_cast<const unsigned char*>(data);
   while (size >= sizeof(rtattr)) {
-    rtattr head;
+    rtattr head{};
     std::memcpy(&head, at, sizeof head);
     if (head.rta_len < sizeof head || head.rta_len > size) return;
     visit(head.rta_type & NLA_TYPE_MASK, at + RTA_LENGTH(0), head.rta_len - RTA_LENGTH(0));
@@ -122,7 +122,7 @@ class Netlink {
 
 void ask_for_links(int descriptor) {
   struct {
-    nlmsghdr head;
+    nlmsghdr head{};
     ifinfomsg info;
   } request{};
   request.head.nlmsg_len = sizeof request;
@@ -136,7 +136,7 @@ void ask_for_links(int descriptor) {
 
 bool take_links(std::span<const unsigned char> answer, std::vector<InterfaceFacts>& found) {
   while (answer.size() >= sizeof(nlmsghdr)) {
-    nlmsghdr head;
+    nlmsghdr head{};
     std::memcpy(&head, answer.data(), sizeof head);
     if (head.nlmsg_len < sizeof head || head.nlmsg_len > answer.size() || head.nlmsg_type == NLMSG_DONE ||
         head.nlmsg_type == NLMSG_ERROR) {

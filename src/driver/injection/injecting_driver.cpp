@@ -43,7 +43,7 @@ std::int32_t any_counts(std::mt19937_64& random) noexcept {
 
 }  // namespace
 
-InjectingDriver::InjectingDriver(std::unique_ptr<RigDriver> inner, std::vector<Injection> injections,
+InjectingDriver::InjectingDriver(std::unique_ptr<RigDriver> inner, const std::vector<Injection>& injections,
                                  std::uint64_t seed, PassTime pass_time)
     : inner_(std::move(inner)),
       seed_(seed),

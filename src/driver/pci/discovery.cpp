@@ -79,8 +79,9 @@ std::string choose(const PciOptions& options) {
 void check_bar(const fs::path& folder) {
   const BarInfo bar = read_bar2(folder);
   const std::string place = (folder / "resource").string() + ": BAR 2 ";
-  if (bar.bytes == 0)
+  if (bar.bytes == 0) {
     refuse(place + "is not there; the card must have " + std::to_string(window_bytes) + " bytes of it");
+  }
   if (!bar.io_ports) {
     refuse(place + "is memory, not I/O ports: another card or another board logic; nothing was written");
   }

@@ -54,8 +54,9 @@ std::string lock_holder(int fd) {
     unsigned long inode = 0;
     const char* at = std::strstr(line.c_str(), "FLOCK");
     if (at == nullptr ||
-        std::sscanf(at, "FLOCK %*s %*s %ld %x:%x:%lu", &pid, &major_number, &minor_number, &inode) != 4)
+        std::sscanf(at, "FLOCK %*s %*s %ld %x:%x:%lu", &pid, &major_number, &minor_number, &inode) != 4) {
       continue;
+    }
     if (inode != status.st_ino || makedev(major_number, minor_number) != status.st_dev) continue;
     const std::string name = process_name(pid);
     return "process " + std::to_string(pid) + (name.empty() ? "" : " (" + name + ")");

@@ -10,18 +10,14 @@
 #include <ctime>
 #include <string>
 
+#include "abs_hil/driver/monotonic_time.hpp"
+#include "abs_hil/rig/time_units.hpp"
+
 namespace abs_hil::driver::usb {
 
 namespace {
 
-constexpr std::int64_t ns_per_s = 1'000'000'000;
-constexpr std::int64_t give_up_ns = ns_per_s;
-
-std::int64_t monotonic_ns() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return std::int64_t{now.tv_sec} * ns_per_s + now.tv_nsec;
-}
+constexpr std::int64_t give_up_ns = rig::ns_per_s;
 
 [[noreturn]] void refuse(const UsbDevice& device, const std::string& what) {
   throw Unavailable("backend rig: USB board " + device.text() + ": " + what);
@@ -151,7 +147,7 @@ void LibusbLink::on_done(libusb_transfer* transfer) {
 }
 
 void LibusbLink::handle_events(std::int64_t timeout_ns, int* completed) noexcept {
-  timeval timeout{.tv_sec = timeout_ns / ns_per_s, .tv_usec = timeout_ns % ns_per_s / 1000};
+  timeval timeout{.tv_sec = timeout_ns / rig::ns_per_s, .tv_usec = timeout_ns % rig::ns_per_s / 1000};
   libusb_handle_events_timeout_completed(context_, &timeout, completed);
 }
 

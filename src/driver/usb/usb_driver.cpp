@@ -7,12 +7,12 @@
 
 #include "abs_hil/driver/encoder_sign.hpp"
 #include "abs_hil/driver/plausibility.hpp"
+#include "abs_hil/rig/time_units.hpp"
 
 namespace abs_hil::driver::usb {
 
 namespace {
 
-constexpr std::int64_t ns_per_us = 1000;
 /// Outside the cycle nothing presses.
 constexpr std::int64_t patient_ns = 500'000'000;
 /// Of FrameLink::recover on a board that is failing: cancelled transfers and cleared halts have a second each there.
@@ -204,7 +204,7 @@ IoResult UsbDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) 
   }
   Contents contents;
   std::int64_t read_ns = now_ns;
-  IoResult result = fresh_frame(options_.answer_timeout_us * ns_per_us, contents, read_ns);
+  IoResult result = fresh_frame(options_.answer_timeout_us * rig::ns_per_us, contents, read_ns);
   if (result.error == IoError::no_answer) {
     measurement = last_;
     lost_this_cycle_ = true;
@@ -243,7 +243,7 @@ IoResult UsbDriver::do_write(const rig::Command& command) noexcept {
 
 std::int64_t UsbDriver::make_safe_bound_ns() const noexcept {
   // Two tries, each of which waits for the board to take the frame and to show it, and the recovery between them.
-  return 2 * 2 * patient_ns + recovery_bound_ns;
+  return std::int64_t{2} * 2 * patient_ns + recovery_bound_ns;
 }
 
 IoResult UsbDriver::do_make_safe() noexcept {

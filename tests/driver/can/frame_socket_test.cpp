@@ -9,9 +9,11 @@
 #include <utility>
 
 #include "abs_hil/driver/can/error_frame.hpp"
+#include "abs_hil/driver/monotonic_time.hpp"
 #include "catch.hpp"
 
 using namespace abs_hil::driver::can;
+using abs_hil::driver::monotonic_ns;
 
 namespace {
 

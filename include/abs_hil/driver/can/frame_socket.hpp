@@ -60,7 +60,4 @@ class FrameSocket {
   std::uint32_t dropped_{0};
 };
 
-/// CLOCK_MONOTONIC, ns, without a system call.
-[[nodiscard]] std::int64_t monotonic_ns() noexcept;
-
 }  // namespace abs_hil::driver::can

@@ -23,7 +23,7 @@ class InjectingDriver final : public RigDriver {
   /// Lets time pass in the calling thread, ns: what slow calls take.
   using PassTime = std::function<void(std::int64_t duration_ns)>;
   /// @param pass_time may be empty; then slow calls take no time
-  InjectingDriver(std::unique_ptr<RigDriver> inner, std::vector<Injection> injections, std::uint64_t seed,
+  InjectingDriver(std::unique_ptr<RigDriver> inner, const std::vector<Injection>& injections, std::uint64_t seed,
                   PassTime pass_time);
   ~InjectingDriver() override;
 

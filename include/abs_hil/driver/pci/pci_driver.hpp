@@ -21,16 +21,17 @@ inline constexpr std::array health_registers{reg::trip_flags, reg::supply, reg::
 /// Register accesses of one cycle, always the same number (docs/rig-setup.md lists them): index and counter of two
 /// encoders, one of the health registers, index, width and read-back of two PWMs. The index is written before every
 /// access to indexed data, though the card keeps it: were it ever not what we think, brake duty would go to the drive.
-inline constexpr std::size_t accesses_in_read = 2 * 2 + 1;
-inline constexpr std::size_t accesses_in_write = 2 * 3;
+inline constexpr std::size_t accesses_in_read = 2U * 2U + 1U;
+inline constexpr std::size_t accesses_in_write = 2U * 3U;
 inline constexpr std::size_t accesses_per_cycle = accesses_in_read + accesses_in_write;
 
 /// The RT-DAC4/PCI with ABS logic. Not verified on hardware.
 ///
 /// `read` and `write` take `accesses_per_cycle` register accesses together, about 1 us each on PCI, and four more
 /// when the counters' reading was held up, and at most four more when an answer looks like that of a card that is gone
-/// or has tripped. The motor enable is this driver's own gate: the ABS logic has no such bit. After a crash the card is
-/// assumed to go on with its last duties: it has no known watchdog.
+/// or has tripped. The motor enable is this driver's own
+/// gate: the ABS logic has no such bit. After a crash the card is assumed to go on with its last duties: it has no
+/// known watchdog.
 class PciDriver final : public RigDriver {
  public:
   using OpenCard = std::function<Card()>;

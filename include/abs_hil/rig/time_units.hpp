@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstdint>
+
+namespace abs_hil::rig {
+
+/// Times are integers in ns wherever a clock is read, and seconds in double wherever dynamics are computed.
+inline constexpr std::int64_t ns_per_us = 1'000;
+inline constexpr std::int64_t ns_per_ms = 1'000'000;
+inline constexpr std::int64_t ns_per_s = 1'000'000'000;
+inline constexpr double s_per_ns = 1e-9;
+
+[[nodiscard]] constexpr double in_us(std::int64_t ns) noexcept {
+  return static_cast<double>(ns) / static_cast<double>(ns_per_us);
+}
+
+}  // namespace abs_hil::rig

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+
+namespace abs_hil::telemetry {
+
+/// us since 1970, as LCM stamps messages.
+[[nodiscard]] inline std::int64_t wall_clock_us() {
+  using std::chrono::duration_cast, std::chrono::microseconds, std::chrono::system_clock;
+  return duration_cast<microseconds>(system_clock::now().time_since_epoch()).count();
+}
+
+}  // namespace abs_hil::telemetry
