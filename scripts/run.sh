@@ -20,7 +20,7 @@ says_lcm=no
 for argument in "${arguments[@]}"; do
   case "$argument" in
     --no-lcm | --lcm-url | --lcm-url=* | --fast | --help | --version) says_lcm=yes ;;
-    list | doctor | latency | compare | commission) says_lcm=yes ;;
+    list | doctor | latency | compare | validate | commission | watch | send | replay | convert) says_lcm=yes ;;
   esac
 done
 if [ "$says_lcm" = no ] && ! "$program" doctor --only lcm; then

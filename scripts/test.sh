@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # The tests: sets up, builds and runs ctest on one preset (default: release); further arguments go to ctest, without any
-# those labelled on-demand are left out (long ones: ctest -L on-demand runs them). Where
-# CI=true or ABS_HIL_REQUIRE_VM=1 the tests in a virtual machine must not be skipped;
-# where CI=true, what the tests of abs-spy, of Python modules and of abs_report need is installed as well.
+# those labelled on-demand are left out (long ones: ctest -L on-demand runs them). Where CI=true or ABS_HIL_REQUIRE_VM=1
+# the tests in a virtual machine must not be skipped; where CI=true, what the tests of abs-spy, of Python modules and of
+# abs_report need is installed as well.
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
 

@@ -23,6 +23,8 @@ class TemporaryFolder {
     std::filesystem::remove_all(path, ignored);
   }
 
+  [[nodiscard]] std::filesystem::path operator/(const char* name) const { return path / name; }
+
   std::filesystem::path path{};
 };
 

@@ -68,8 +68,7 @@ void check_together(const RunRequest& request) {
   if (s.backend == "rig" && request.outputs.fast && !s.driver.emulated) {
     throw settings::ConfigError(
         "--fast: the rig runs in real time only; leave it out, use --backend sim, or for an emulator in lock-step "
-        "(never "
-        "hardware) --set driver.emulated=true");
+        "(never hardware) --set driver.emulated=true");
   }
   if (request.outputs.fast && request.outputs.histogram_file) {
     throw settings::ConfigError(
@@ -107,10 +106,6 @@ void apply_board_limits(settings::Settings& s) {
   s.driver.usb.encoder_counts_per_rev = s.plant.rig.encoder_counts_per_rev;
   s.driver.can.rate_Hz = s.control.rate_Hz;
 }
-
-}  // namespace
-
-namespace {
 
 /// Everything but what the script asks for beyond its settings.
 void fill(settings::Settings& s, settings::KeyTable& keys, const RunOptions& options, const script::Script* script) {

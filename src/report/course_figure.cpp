@@ -24,7 +24,7 @@ Panel phase_strips(const std::vector<RunFiles>& runs, const std::vector<RunSurve
   panel.grid = false;
   for (std::size_t r = 0; r < strips; ++r) {
     const double bottom = static_cast<double>(strips - 1 - r);
-    panel.y_tics.emplace_back(bottom + 0.5, clean_text(runs[r].name, short_name_characters));
+    panel.y_tics.emplace_back(bottom + 0.5, strips == 1 ? "" : clean_text(runs[r].name, short_name_characters));
     for (std::size_t i = 0; i < std::min(surveys[r].phases.size(), most_bars); ++i) {
       const PhaseInterval& phase = surveys[r].phases[i];
       panel.bars.push_back(

@@ -52,7 +52,16 @@ void refuse_injection_into_hardware(const Settings& s) {
 
 void refuse_hardware_without_guardian(const Settings& s) {
   if (s.backend != "rig" || s.guardian.enabled) return;
-  if (s.driver.emulated && !names_real_cards(s) && !names_an_adapter(s)) return;
+  if (s.driver.emulated) {
+    const std::string real = names_real_cards(s)   ? "driver.pci.root = " + s.driver.pci.root
+                             : names_an_adapter(s) ? "driver.can.interface = " + s.driver.can.interface
+                                                   : std::string();
+    if (real.empty()) return;
+    throw ConfigError(fmt::format(
+        "guardian.enabled = false: driver.emulated=true, but {} is of real hardware, which is driven beside a guardian "
+        "only; leave it out, or name the emulator's",
+        real));
+  }
   throw ConfigError(
       "guardian.enabled = false: a real rig is driven beside a guardian only, as its PWMs are assumed to hold when the "
       "program dies; leave it out, or for an emulator (never hardware) --set driver.emulated=true");

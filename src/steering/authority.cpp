@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "abs_hil/settings/config_error.hpp"
+#include "abs_hil/telemetry/hexadecimal.hpp"
 #include "abs_hil/telemetry/message_codec.hpp"
 
 namespace abs_hil::steering {
@@ -24,16 +25,6 @@ namespace {
 
 constexpr std::size_t key_min_characters = 16;
 constexpr std::size_t session_bytes = 16;
-
-std::string hexadecimal(std::span<const unsigned char> bytes) {
-  constexpr std::string_view digits = "0123456789abcdef";
-  std::string text;
-  for (const unsigned char byte : bytes) {
-    text += digits[byte >> 4U];
-    text += digits[byte & 0xFU];
-  }
-  return text;
-}
 
 [[noreturn]] void refuse(const std::filesystem::path& file, const std::string& why) {
   throw settings::ConfigError("commands.key_file: '" + file.string() + "' " + why);
@@ -73,7 +64,7 @@ std::string mac_of(const command2_t& command, const std::string& key) {
       nullptr) {
     throw std::runtime_error("OpenSSL cannot make an HMAC-SHA-256");
   }
-  return hexadecimal(std::span(mac).first(size));
+  return telemetry::hexadecimal(std::span(mac).first(size));
 }
 
 Authority::Authority(std::string key) : key_(std::move(key)) {
@@ -81,7 +72,7 @@ Authority::Authority(std::string key) : key_(std::move(key)) {
   if (RAND_bytes(random.data(), static_cast<int>(random.size())) != 1) {
     throw std::runtime_error("no random numbers to be had for the session of commands");
   }
-  session_ = hexadecimal(random);
+  session_ = telemetry::hexadecimal(random);
 }
 
 rig::Reason Authority::judge(const command2_t& command) {

@@ -42,16 +42,6 @@ class CsvRow {
   }
   [[nodiscard]] const std::string& row() const noexcept { return row_; }
 
-  static std::string hexadecimal(const std::uint8_t* bytes, std::size_t size) {
-    constexpr std::string_view digits = "0123456789abcdef";
-    std::string text;
-    for (std::size_t i = 0; i < size; ++i) {
-      text += digits[bytes[i] >> 4U];
-      text += digits[bytes[i] & 0xFU];
-    }
-    return text;
-  }
-
  private:
   template <class Number>
   void number(Number value) {

@@ -12,6 +12,7 @@
 #include "abs_hil/telemetry/checked_decode.hpp"
 #include "abs_hil/telemetry/csv_sink.hpp"
 #include "abs_hil/telemetry/file_error.hpp"
+#include "abs_hil/telemetry/hexadecimal.hpp"
 #include "abs_hil/telemetry/message_codec.hpp"
 #include "csv_text.hpp"
 
@@ -174,7 +175,7 @@ EventText text_of(const LogEvent& event) {
   });
   if (!text.row.empty()) return text;
   CsvRow row;
-  row.text(CsvRow::hexadecimal(event.data.data(), event.data.size()));
+  row.text(hexadecimal(event.data));
   put_envelope(row, event, raw_type);
   return {std::string(raw_type), std::string("data_hex,").append(envelope), row.row()};
 }

@@ -35,6 +35,10 @@ class EmulatorProcess:
         found = re.search(r'drive ([\d.]+), brake ([\d.]+)', self.command('status'))
         return float(found[1]), float(found[2])
 
+    def time_s(self):
+        """The board's own time; in lock-step it goes on with the program's cycles alone."""
+        return float(self.command('status').split('time ')[1].split()[0])
+
     def end(self):
         """Ends it if it still runs; returns its exit status."""
         if self.process.poll() is None:

@@ -51,9 +51,6 @@ class Emulator(EmulatorProcess):
     def lower_speed(self):
         return float(self.command('status').split('lower ')[1].split()[0])
 
-    def time_s(self):
-        return float(self.command('status').split('time ')[1].split()[0])
-
     def turn(self, wheel, revolutions):
         """By hand: over some time, as the driver takes nothing faster for a wheel."""
         start = self.time_s()

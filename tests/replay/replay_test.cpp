@@ -16,11 +16,12 @@
 #include "catch.hpp"
 #include "experiment/simulated_run.hpp"
 #include "telemetry/sample_records.hpp"
+#include "temporary_folder.hpp"
 
 namespace abs_hil::replay {
 namespace {
 
-using telemetry::test::ScratchDirectory;
+using abs_hil::test::TemporaryFolder;
 
 /// What is recorded: key=value, and whether a stop request ends it.
 struct Recipe {
@@ -78,7 +79,7 @@ std::string content(const std::filesystem::path& path) {
 }
 
 TEST_CASE("a recorded run comes out again bit by bit, whatever the controller and the rate") {
-  const ScratchDirectory scratch;
+  const TemporaryFolder scratch;
   for (const char* controller : {"adaptive", "adaptive-actuator", "adaptive-peak", "nominal", "sliding-mode",
                                  "sliding-mode-smooth", "super-twisting", "pi", "relay", "five-phase", "locked"}) {
     INFO(controller);
@@ -92,7 +93,7 @@ TEST_CASE("a recorded run comes out again bit by bit, whatever the controller an
 }
 
 TEST_CASE("ideal sensors, ideal actuator, faults and stop requests come out again") {
-  const ScratchDirectory scratch;
+  const TemporaryFolder scratch;
   const std::vector<Recipe> recipes{
       {{"plant.ideal_sensors=true", "plant.ideal_actuator=true"}},
       {{"plant.ideal_actuator=true"}},
@@ -112,7 +113,7 @@ TEST_CASE("ideal sensors, ideal actuator, faults and stop requests come out agai
 }
 
 TEST_CASE("every fault that the gate finds in the wheels comes out again") {
-  const ScratchDirectory scratch;
+  const TemporaryFolder scratch;
   const std::vector<std::pair<const char*, rig::Reason>> faults{
       {"brake@encoder_upper:stuck+0.1s", rig::Reason::encoder_upper_stuck},
       {"coast@encoder_lower:stuck", rig::Reason::encoder_lower_stuck},
@@ -151,7 +152,7 @@ TEST_CASE("every fault that the gate finds in the wheels comes out again") {
 }
 
 TEST_CASE("a board's own time of measurement is recorded, and a replay needs it") {
-  const ScratchDirectory scratch;
+  const TemporaryFolder scratch;
   record_run(scratch / "run.lcmlog", {.measured_late_ns = 1});
   const RecordedRun run = read_run(scratch / "run.lcmlog");
   CHECK(run.measured_ns[5] == run.cycles[5].stamp_ns + 1);
@@ -160,7 +161,7 @@ TEST_CASE("a board's own time of measurement is recorded, and a replay needs it"
 }
 
 TEST_CASE("any changed bit of a measurement, estimate or command is found and named") {
-  const ScratchDirectory scratch;
+  const TemporaryFolder scratch;
   record_run(scratch / "run.lcmlog", {});
   const RecordedRun whole = read_run(scratch / "run.lcmlog");
   const auto found = [&](const std::function<void(telemetry_t&)>& change) {
@@ -192,7 +193,7 @@ TEST_CASE("any changed bit of a measurement, estimate or command is found and na
 }
 
 TEST_CASE("another seed, gain or controller in the configuration is found") {
-  const ScratchDirectory scratch;
+  const TemporaryFolder scratch;
   record_run(scratch / "run.lcmlog", {});
   const RecordedRun whole = read_run(scratch / "run.lcmlog");
   const auto with = [&](const char* table, const char* key, const nlohmann::ordered_json& value) {
@@ -212,7 +213,7 @@ TEST_CASE("another seed, gain or controller in the configuration is found") {
 }
 
 TEST_CASE("another controller sees the same run: same measurements and estimates, other commands") {
-  const ScratchDirectory scratch;
+  const TemporaryFolder scratch;
   record_run(scratch / "run.lcmlog", {});
   const RecordedRun run = read_run(scratch / "run.lcmlog");
   const auto rerun =
@@ -235,7 +236,7 @@ TEST_CASE("another controller sees the same run: same measurements and estimates
 }
 
 TEST_CASE("recordings that do not hold the whole run are refused with the reason") {
-  const ScratchDirectory scratch;
+  const TemporaryFolder scratch;
   using Catch::Matchers::Contains;
   record_run(scratch / "few.lcmlog", {.decimation = 10});
   CHECK_THROWS_WITH(read_run(scratch / "few.lcmlog"), Contains("telemetry.decimation"));
@@ -251,7 +252,7 @@ TEST_CASE("recordings that do not hold the whole run are refused with the reason
 }
 
 TEST_CASE("64 random bytes anywhere are an error or a difference, never a crash and rarely unseen") {
-  const ScratchDirectory scratch;
+  const TemporaryFolder scratch;
   record_run(scratch / "run.lcmlog", {{"experiment.start_speed_rad_s=30"}});
   const std::string whole = content(scratch / "run.lcmlog");
   std::mt19937_64 generator(3);

@@ -35,6 +35,11 @@ class Page(ReportTest):
         a, b = self.make_run('a'), self.make_run('b', '--experiment', 'brake-step')
         self.assertIn('3 runs, experiments paper, brake-step</p>', self.page(a, b, a)[0])
 
+    def test_the_strip_of_phases_names_its_run_only_beside_another(self):
+        one, other = self.make_run('a-name-longer-than-the-margin'), self.make_run('b')
+        self.assertIn('a-name-l', self.page(one, other)[0].replace('a-name-longer', ''))
+        self.assertNotIn('a-name-l', self.page(one)[0].replace('a-name-longer', ''))
+
     def test_the_same_page_twice(self):
         a = self.make_run('a')
         self.assertEqual(self.page(a)[0], self.page(a)[0])

@@ -7,6 +7,7 @@
 #include "catch.hpp"
 #include "telemetry/message_capture.hpp"
 #include "telemetry/sample_records.hpp"
+#include "temporary_folder.hpp"
 
 namespace abs_hil::steering {
 namespace {
@@ -26,7 +27,7 @@ settings::Settings with_commands(const std::filesystem::path& key_file) {
 
 /// A run whose real-time thread takes changes only when told to; what it says is captured.
 struct Bench {
-  telemetry::test::ScratchDirectory scratch;
+  abs_hil::test::TemporaryFolder scratch;
   telemetry::test::CapturingOutlet captured;
   telemetry::MessageStream stream{{}, {}, {}};
   Steering steering{with_commands(scratch / "key"), stream};

@@ -3,6 +3,7 @@
 #include "catch.hpp"
 #include "telemetry/message_capture.hpp"
 #include "telemetry/sample_records.hpp"
+#include "temporary_folder.hpp"
 
 namespace abs_hil::telemetry {
 namespace {
@@ -118,7 +119,7 @@ TEST_CASE("without a server there is nothing to hear, and polling is harmless") 
 }
 
 TEST_CASE("a log file as LCM network is not listened to") {
-  const test::ScratchDirectory scratch;
+  const abs_hil::test::TemporaryFolder scratch;
   LcmOutlet outlet("file://" + (scratch / "x.lcmlog").string() + "?mode=w");
   MessageStream stream({}, {}, {});
   CommandListener listener(outlet, stream, {});

@@ -10,6 +10,7 @@
 #include "abs_hil/telemetry/message_stream.hpp"
 #include "catch.hpp"
 #include "telemetry/sample_records.hpp"
+#include "temporary_folder.hpp"
 
 namespace abs_hil::telemetry {
 namespace {
@@ -33,7 +34,7 @@ void measure(const char* what, Consume consume) {
 }
 
 TEST_CASE("cost of a record", "[.][cost]") {
-  const test::ScratchDirectory scratch;
+  const abs_hil::test::TemporaryFolder scratch;
   measure("making the sample record alone", [](const rig::CycleRecord& r) {
     if (r.time_s < 0.0) std::puts("never");
   });

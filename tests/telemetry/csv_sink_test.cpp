@@ -13,6 +13,7 @@
 #include "abs_hil/telemetry/file_error.hpp"
 #include "catch.hpp"
 #include "telemetry/sample_records.hpp"
+#include "temporary_folder.hpp"
 
 namespace abs_hil::telemetry {
 namespace {
@@ -51,7 +52,7 @@ TEST_CASE("the CSV header is the contract's, to the letter") {
 }
 
 TEST_CASE("every CSV column holds its quantity, bit-exactly") {
-  const test::ScratchDirectory scratch;
+  const abs_hil::test::TemporaryFolder scratch;
   const rig::CycleRecord r = test::sample_record(7);
   const double distance_m = 1.0 / 7.0;
   {
@@ -121,7 +122,7 @@ TEST_CASE("extreme values fit a row and read back") {
 }
 
 TEST_CASE("rows survive the block boundaries of a long file, with or without finish()") {
-  const test::ScratchDirectory scratch;
+  const abs_hil::test::TemporaryFolder scratch;
   constexpr std::uint64_t rows = 2000;  // some ten blocks
   for (const bool finish : {true, false}) {
     {
@@ -136,7 +137,7 @@ TEST_CASE("rows survive the block boundaries of a long file, with or without fin
 }
 
 TEST_CASE("with a write period the file is never further behind than that, and ends with a whole row") {
-  const test::ScratchDirectory scratch;
+  const abs_hil::test::TemporaryFolder scratch;
   constexpr std::int64_t period_ns = 50'000'000;
   constexpr std::int64_t cycle_ns = 1'000'000;
   CsvSink sink(scratch / "run.csv", period_ns);
@@ -183,12 +184,12 @@ TEST_CASE("a full disk is noticed even if everything fitted the buffer") {
 }
 
 TEST_CASE("a path that cannot be opened is refused with path, reason and fix") {
-  const test::ScratchDirectory scratch;
-  const auto missing = scratch.path() / "nowhere" / "run.csv";
+  const abs_hil::test::TemporaryFolder scratch;
+  const auto missing = scratch.path / "nowhere" / "run.csv";
   CHECK_THROWS_WITH(CsvSink(missing), Catch::Matchers::Contains(missing.string()) &&
                                           Catch::Matchers::Contains("No such file or directory") &&
                                           Catch::Matchers::Contains("mkdir -p"));
-  CHECK_THROWS_WITH(CsvSink(scratch.path()), Catch::Matchers::Contains("add a file name"));
+  CHECK_THROWS_WITH(CsvSink(scratch.path), Catch::Matchers::Contains("add a file name"));
   CHECK_THROWS_WITH(CsvSink("/dev/null/run.csv"), Catch::Matchers::Contains("choose another path"));
 }
 
@@ -197,10 +198,10 @@ TEST_CASE("a directory without write permission is refused") {
     WARN("skipped: root may write anywhere");
     return;
   }
-  const test::ScratchDirectory scratch;
-  std::filesystem::permissions(scratch.path(), std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
+  const abs_hil::test::TemporaryFolder scratch;
+  std::filesystem::permissions(scratch.path, std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
   CHECK_THROWS_WITH(CsvSink(scratch / "run.csv"), Catch::Matchers::Contains("Permission denied"));
-  std::filesystem::permissions(scratch.path(), std::filesystem::perms::owner_all);
+  std::filesystem::permissions(scratch.path, std::filesystem::perms::owner_all);
 }
 
 }  // namespace

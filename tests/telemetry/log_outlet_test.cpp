@@ -10,6 +10,7 @@
 #include "catch.hpp"
 #include "telemetry/message_capture.hpp"
 #include "telemetry/sample_records.hpp"
+#include "temporary_folder.hpp"
 
 namespace abs_hil::telemetry {
 namespace {
@@ -31,7 +32,7 @@ std::string bytes_of(const std::filesystem::path& path) {
 }
 
 TEST_CASE("a log read back holds every record, consecutively, at its run time") {
-  const test::ScratchDirectory scratch;
+  const abs_hil::test::TemporaryFolder scratch;
   constexpr std::int64_t epoch_us = 1'000'000'000;
   write_log(scratch / "run.lcmlog", epoch_us);
 
@@ -62,14 +63,14 @@ TEST_CASE("a log read back holds every record, consecutively, at its run time") 
 }
 
 TEST_CASE("logs on virtual time are byte-identical") {
-  const test::ScratchDirectory scratch;
+  const abs_hil::test::TemporaryFolder scratch;
   write_log(scratch / "a.lcmlog", 0);
   write_log(scratch / "b.lcmlog", 0);
   CHECK(bytes_of(scratch / "a.lcmlog") == bytes_of(scratch / "b.lcmlog"));
 }
 
 TEST_CASE("without an epoch the times are wall clock with the spacing of the records") {
-  const test::ScratchDirectory scratch;
+  const abs_hil::test::TemporaryFolder scratch;
   write_log(scratch / "run.lcmlog", std::nullopt);
   lcm::LogFile log((scratch / "run.lcmlog").string(), "r");
   REQUIRE(log.good());
@@ -102,12 +103,12 @@ TEST_CASE("a full disk is noticed even if everything fitted the buffer of the lo
 }
 
 TEST_CASE("a log that cannot be opened is refused with path, reason and fix") {
-  const test::ScratchDirectory scratch;
-  const auto missing = scratch.path() / "nowhere" / "run.lcmlog";
+  const abs_hil::test::TemporaryFolder scratch;
+  const auto missing = scratch.path / "nowhere" / "run.lcmlog";
   CHECK_THROWS_WITH(LogOutlet(missing), Catch::Matchers::Contains(missing.string()) &&
                                             Catch::Matchers::Contains("No such file or directory") &&
                                             Catch::Matchers::Contains("mkdir -p"));
-  CHECK_THROWS_WITH(LogOutlet(scratch.path()), Catch::Matchers::Contains("add a file name"));
+  CHECK_THROWS_WITH(LogOutlet(scratch.path), Catch::Matchers::Contains("add a file name"));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "catch.hpp"
 #include "telemetry/message_capture.hpp"
 #include "telemetry/sample_records.hpp"
+#include "temporary_folder.hpp"
 
 namespace abs_hil::telemetry {
 namespace {
@@ -47,7 +48,7 @@ void record(const fs::path& log_path, const fs::path& csv_path) {
 }
 
 TEST_CASE("event log to CSV and back gives the same bytes") {
-  const test::ScratchDirectory scratch;
+  const abs_hil::test::TemporaryFolder scratch;
   record(scratch / "run.lcmlog", scratch / "own.csv");
   const ConversionCounts there = log_to_csv(scratch / "run.lcmlog", scratch / "made.csv");
   CHECK(there.raw == 0);
@@ -58,7 +59,7 @@ TEST_CASE("event log to CSV and back gives the same bytes") {
 }
 
 TEST_CASE("the CSV begins with the columns of --csv, and they hold the same text") {
-  const test::ScratchDirectory scratch;
+  const abs_hil::test::TemporaryFolder scratch;
   record(scratch / "run.lcmlog", scratch / "own.csv");
   log_to_csv(scratch / "run.lcmlog", scratch / "made.csv");
   std::ifstream made(scratch / "made.csv"), own(scratch / "own.csv");
@@ -75,7 +76,7 @@ TEST_CASE("the CSV begins with the columns of --csv, and they hold the same text
 }
 
 TEST_CASE("what is of no type of ours, or damaged, comes through as it is") {
-  const test::ScratchDirectory scratch;
+  const abs_hil::test::TemporaryFolder scratch;
   {
     EventLogWriter log(scratch / "odd.lcmlog");
     telemetry_t m{};
@@ -104,7 +105,7 @@ TEST_CASE("what is of no type of ours, or damaged, comes through as it is") {
 }
 
 TEST_CASE("a log with another number of rigs keeps each channel in a file of its own") {
-  const test::ScratchDirectory scratch;
+  const abs_hil::test::TemporaryFolder scratch;
   telemetry_t m{};
   EncodeBuffer buffer;
   const auto bytes = buffer.encode(m);
@@ -119,7 +120,7 @@ TEST_CASE("a log with another number of rigs keeps each channel in a file of its
 }
 
 TEST_CASE("channels whose names make the same file name get files of their own") {
-  const test::ScratchDirectory scratch;
+  const abs_hil::test::TemporaryFolder scratch;
   telemetry_t m{};
   EncodeBuffer buffer;
   const auto bytes = buffer.encode(m);
@@ -137,7 +138,7 @@ TEST_CASE("channels whose names make the same file name get files of their own")
 }
 
 TEST_CASE("a damaged log is an error that names the place, wherever it is cut or overwritten") {
-  const test::ScratchDirectory scratch;
+  const abs_hil::test::TemporaryFolder scratch;
   record(scratch / "run.lcmlog", scratch / "own.csv");
   const std::string whole = content(scratch / "run.lcmlog").substr(0, 3000);
   const auto count_events = [&](const std::string& bytes) {
@@ -168,7 +169,7 @@ TEST_CASE("a damaged log is an error that names the place, wherever it is cut or
 }
 
 TEST_CASE("CSV that is not of a recording is refused by name") {
-  const test::ScratchDirectory scratch;
+  const abs_hil::test::TemporaryFolder scratch;
   record(scratch / "run.lcmlog", scratch / "own.csv");
   using Catch::Matchers::Contains;
   CHECK_THROWS_WITH(csv_to_log(scratch / "own.csv", scratch / "back.lcmlog"), Contains("encoder counts"));

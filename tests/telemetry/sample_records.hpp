@@ -1,11 +1,6 @@
 #pragma once
 
-#include <unistd.h>
-
-#include <atomic>
 #include <cstdint>
-#include <filesystem>
-#include <string>
 
 #include "abs_hil/rig/cycle_record.hpp"
 
@@ -40,27 +35,5 @@ inline rig::CycleRecord sample_record(std::uint64_t sequence) {
   r.timing = {101, 102, 103, 104, 105, 2};
   return r;
 }
-
-/// A path in a directory of this process that is removed at the end of the test.
-class ScratchDirectory {
- public:
-  ScratchDirectory()
-      : path_(std::filesystem::temp_directory_path() /
-              ("abs_hil_telemetry_" + std::to_string(::getpid()) + "_" + std::to_string(next_++))) {
-    std::filesystem::create_directories(path_);
-  }
-  ScratchDirectory(const ScratchDirectory&) = delete;
-  ScratchDirectory& operator=(const ScratchDirectory&) = delete;
-  ~ScratchDirectory() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  [[nodiscard]] std::filesystem::path operator/(const char* name) const { return path_ / name; }
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  inline static std::atomic<int> next_{0};
-  std::filesystem::path path_;
-};
 
 }  // namespace abs_hil::telemetry::test

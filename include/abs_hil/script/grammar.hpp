@@ -22,8 +22,7 @@ enum class Quantity : std::uint8_t { none, time, angular_speed, speed, distance,
 /// The units that may stand behind a number, "s, ms, min" for a time.
 [[nodiscard]] std::string units_text(Quantity quantity);
 /// `text` as number and unit, "20 ms", in SI units. Nothing if it is not of that form; for pure numbers the only unit
-/// is
-/// "%".
+/// is "%".
 [[nodiscard]] std::optional<double> parse_quantity(std::string_view text, Quantity quantity) noexcept;
 
 /// What a field's value looks like.

@@ -13,6 +13,7 @@
 
 #include "catch.hpp"
 #include "telemetry/sample_records.hpp"
+#include "temporary_folder.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::experiment::test;
@@ -20,10 +21,10 @@ using namespace abs_hil::experiment::test;
 namespace {
 
 Matrix run_all(Backend backend) {
-  const telemetry::test::ScratchDirectory folder;
-  Matrix matrix{.nominal_m = metrics_without_fault(backend, folder.path()).stop_distance_m};
+  const abs_hil::test::TemporaryFolder folder;
+  Matrix matrix{.nominal_m = metrics_without_fault(backend, folder.path).stop_distance_m};
   for (const driver::Injection& injection : all_injections(backend)) {
-    matrix.cases.push_back(run_case(backend, injection, folder.path()));
+    matrix.cases.push_back(run_case(backend, injection, folder.path));
   }
   return matrix;
 }

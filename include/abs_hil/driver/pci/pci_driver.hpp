@@ -29,9 +29,8 @@ inline constexpr std::size_t accesses_per_cycle = accesses_in_read + accesses_in
 ///
 /// `read` and `write` take `accesses_per_cycle` register accesses together, about 1 us each on PCI, and four more
 /// when the counters' reading was held up, and at most four more when an answer looks like that of a card that is gone
-/// or has tripped. The motor enable is this driver's own
-/// gate: the ABS logic has no such bit. After a crash the card is assumed to go on with its last duties: it has no
-/// known watchdog.
+/// or has tripped. The motor enable is this driver's own gate: the ABS logic has no such bit. After a crash the card is
+/// assumed to go on with its last duties: it has no known watchdog.
 class PciDriver final : public RigDriver {
  public:
   using OpenCard = std::function<Card()>;
