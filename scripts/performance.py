@@ -39,7 +39,7 @@ def bench(program):
 
 
 def whole_process(arguments, environment=None):
-    """Median CPU ms and peak MB of a command."""
+    """Median CPU ms and peak MB of a command and what it starts."""
     cpu_ms, peak_mb = [], 0.0
     for _ in range(REPETITIONS):
         pid = os.posix_spawn(arguments[0], arguments, environment or os.environ,
@@ -52,6 +52,16 @@ def whole_process(arguments, environment=None):
     return statistics.median(cpu_ms), peak_mb
 
 
+def report_of_two_runs():
+    """Median CPU ms and peak MB of abs_report over the paper's experiment under two controllers."""
+    with tempfile.TemporaryDirectory() as scratch:
+        runs = [f'{scratch}/{controller}' for controller in ('adaptive', 'sliding-mode')]
+        for run in runs:
+            subprocess.run([BIN / 'abs_hil', '--fast', '--no-lcm', '--controller', pathlib.Path(run).name, '--out', run],
+                           check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        return whole_process([str(BIN / 'abs_report'), *runs, '--output', f'{scratch}/report', '--force'])
+
+
 def elsewhere():
     """(name, ms, error) of the same braking in other languages, where they are installed."""
     rows = []
@@ -59,9 +69,12 @@ def elsewhere():
     if shutil.which('octave'):
         rows += subprocess.run(['octave', '--no-gui', '--quiet', scripts / 'braking.m'], check=True, capture_output=True,
                                text=True).stdout.splitlines()
-    if subprocess.run([sys.executable, '-c', 'import scipy'], capture_output=True).returncode == 0:
-        rows += subprocess.run([sys.executable, scripts / 'braking.py'], check=True, capture_output=True,
-                               text=True).stdout.splitlines()
+    # Debian's own Python first: python3-scipy is found by no other.
+    for python in ('/usr/bin/python3', sys.executable):
+        if subprocess.run([python, '-c', 'import scipy'], capture_output=True).returncode == 0:
+            rows += subprocess.run([python, scripts / 'braking.py'], check=True, capture_output=True,
+                                   text=True).stdout.splitlines()
+            break
     return [(name, float(ms), float(error)) for name, ms, error in (row.split() for row in rows)]
 
 
@@ -106,6 +119,7 @@ def page():
     cycle, telemetry, fast, compare = (bench(f'bench_{name}') for name in ('cycle', 'telemetry', 'fast_run', 'compare'))
     program = str(BIN / 'abs_hil')
     process_ms, process_mb = whole_process([program, '--backend', 'sim', '--fast', '--no-lcm', '--no-out'])
+    report_ms, report_mb = report_of_two_runs()
     counted = instructions()
     text = f'''# Performance
 
@@ -131,6 +145,7 @@ wheel's speed at any tick from RK4 at 1 µs (Octave's and SciPy's: from their ow
     ['braking alone, nominal controller', shown_ns(fast['braking_run/nominal'][0])],
     ['braking alone, adaptive controller', shown_ns(fast['braking_run/adaptive'][0])],
     ['one run of `compare`, adaptive', shown_ns(compare['one_run/adaptive'][0])],
+    ['a report of two runs, whole process with gnuplot's', f'{report_ms:.3g} ms, {report_mb:.0f} MB at most'],
     ['`compare`, 1,000 runs on varied plants, wall clock', shown_ns(compare['thousand_runs'][1]['real_time'] * 1e6)],
 ])}
 
