@@ -81,9 +81,10 @@ void add_options(CLI::App& cli, Arguments& a) {
   auto* board = cli.add_option_group("board", "what the rig is behind");
   board->add_option("--pci-root", a.pci_root, "a card: folder to mount its tree at; made if it is not there")
       ->type_name("DIR");
-  board->add_option("--can", a.can_interface, "a CAN I/O node: interface, or unix:PATH to listen at in its place")
-      ->type_name("IFACE");
-  board->add_flag("--usb", a.use_usb, "a USB board, plugged into this computer's vhci_hcd (root)");
+  CLI::Option* can =
+      board->add_option("--can", a.can_interface, "a CAN I/O node: interface, or unix:PATH to listen at in its place")
+          ->type_name("IFACE");
+  CLI::Option* usb = board->add_flag("--usb", a.use_usb, "a USB board, plugged into this computer's vhci_hcd (root)");
   board->require_option(1);
   cli.add_option("--watchdog-ms", a.watchdog_ms, "of the CAN node, until its activation says otherwise")
       ->check(CLI::Range(1, 10'000))
@@ -96,8 +97,10 @@ void add_options(CLI::App& cli, Arguments& a) {
   cli.add_option("--fault", a.faults, "fault of one register from the start, 88:stuck say")->allow_extra_args(false);
   cli.add_option("--command", a.commands, "any control command, obeyed at the start")->allow_extra_args(false);
   cli.add_option("--control", a.control_fifo, "FIFO to take commands from while running; made if it is not there");
-  cli.add_option("--truth", a.emulator.truth_file, "CSV of what no register shows, every ms");
-  cli.add_option("--record", a.emulator.traffic_file, "every register access, one a line");
+  cli.add_option("--truth", a.emulator.truth_file, "CSV of what no register or frame shows, every ms")->excludes(can);
+  cli.add_option("--record", a.emulator.traffic_file, "every register access to the card, one a line")
+      ->excludes(can)
+      ->excludes(usb);
   cli.add_option("--vendor", a.vendor, "what the card says it is")->capture_default_str();
   cli.add_option("--device", a.device, "what the card says it is")->capture_default_str();
   cli.add_option("--bar-bytes", a.bar_bytes, "size of BAR 2")->capture_default_str();

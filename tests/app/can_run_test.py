@@ -1,9 +1,11 @@
 """The paper's experiment through driver.kind=can, against the emulated node in another process. Outcomes are asserted,
 never timing; tests/vm has the same on real kernels' CAN."""
 import json
+import subprocess
 import unittest
 
 from can_emulator import CanTest, skip_unless_possible
+from emulator_process import EMULATOR
 
 SAFE = (0.0, 0.0)
 # fault that the node has from its first second on, words on stderr
@@ -115,6 +117,16 @@ class CanRun(CanTest):
                 self.assertEqual(result.returncode, status, result.stderr)
                 self.assertIn(words, result.stderr)
         self.assertIn('inactive', node.command('status'))
+
+    def test_what_the_emulated_node_cannot_write_is_refused(self):
+        for option in ('--truth', '--record'):
+            with self.subTest(option):
+                file = self.folder / 'file'
+                result = subprocess.run([EMULATOR, '--can', f'unix:{self.folder}/bus', option, file], capture_output=True,
+                                        text=True, timeout=20)
+                self.assertEqual(result.returncode, 2, result.stderr)
+                self.assertIn(option, result.stderr)
+                self.assertFalse(file.exists())
 
 
 if __name__ == '__main__':

@@ -80,6 +80,10 @@ class EmulatorTest(ProgramTest):
         self._emulators.append(kind(folder, *args))
         return self._emulators[-1]
 
+    def run_program(self, *args, **kwargs):
+        """abs_hil in this test's folder: the flight record of a fault goes there."""
+        return super().run_program(*args, **{'cwd': self.folder, **kwargs})
+
     def start_program(self, *args):
         """abs_hil in this test's folder."""
         self._programs.append(subprocess.Popen([pathlib.Path(PROGRAM).resolve(), *map(str, args)], cwd=self.folder,
