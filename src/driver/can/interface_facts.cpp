@@ -123,7 +123,7 @@ class Netlink {
 void ask_for_links(int descriptor) {
   struct {
     nlmsghdr head{};
-    ifinfomsg info;
+    ifinfomsg info{};
   } request{};
   request.head.nlmsg_len = sizeof request;
   request.head.nlmsg_type = RTM_GETLINK;

@@ -28,6 +28,7 @@ std::int64_t raw_value(const Frame& frame, const Signal& signal) noexcept {
     const std::uint64_t bit = (frame.data[place / bits_per_byte] >> (place % bits_per_byte)) & 1U;
     raw |= bit << number;
   }
+  if (signal.bits == 0) return 0;
   const std::uint64_t sign_bit = std::uint64_t{1} << (signal.bits - 1U);
   if (signal.is_signed && (raw & sign_bit) != 0) raw |= ~((sign_bit << 1U) - 1U);
   return static_cast<std::int64_t>(raw);

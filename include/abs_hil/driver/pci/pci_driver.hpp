@@ -21,8 +21,8 @@ inline constexpr std::array health_registers{reg::trip_flags, reg::supply, reg::
 /// Register accesses of one cycle, always the same number (docs/rig-setup.md lists them): index and counter of two
 /// encoders, one of the health registers, index, width and read-back of two PWMs. The index is written before every
 /// access to indexed data, though the card keeps it: were it ever not what we think, brake duty would go to the drive.
-inline constexpr std::size_t accesses_in_read = 2U * 2U + 1U;
-inline constexpr std::size_t accesses_in_write = 2U * 3U;
+inline constexpr std::size_t accesses_in_read = std::size_t{2} * 2 + 1;
+inline constexpr std::size_t accesses_in_write = std::size_t{2} * 3;
 inline constexpr std::size_t accesses_per_cycle = accesses_in_read + accesses_in_write;
 
 /// The RT-DAC4/PCI with ABS logic. Not verified on hardware.
