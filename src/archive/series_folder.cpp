@@ -60,7 +60,7 @@ void SeriesFolder::read_index(const std::string& identity) {
   for (std::size_t i = 0; i < runs_.size(); ++i) {
     // What counts is the folder: the index may be one run behind when the program was killed.
     const bool there = fs::is_directory(path_ / name_of(i));
-    const std::string status = *text_of(json["runs"][i], "status");
+    const std::string status = text_of(json["runs"][i], "status").value_or("");
     if (there) runs_[i].status = status == "planned" ? "completed" : status;
   }
 }

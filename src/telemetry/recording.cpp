@@ -222,8 +222,9 @@ class CsvFiles {
   /// Channels may differ in what no file name tells apart, and a channel may carry several types.
   fs::path unused(const std::string& part, const std::string& type) {
     fs::path path = beside(main_, part);
-    if (paths_.contains(path)) path = beside(main_, part + '.' + type);
-    for (int n = 2; paths_.contains(path); ++n) path = beside(main_, part + '.' + type + '.' + std::to_string(n));
+    const std::string typed = part + '.' + type;
+    if (paths_.contains(path)) path = beside(main_, typed);
+    for (int n = 2; paths_.contains(path); ++n) path = beside(main_, (typed + '.').append(std::to_string(n)));
     paths_.insert(path);
     return path;
   }
@@ -333,7 +334,9 @@ ConversionCounts log_to_csv(const fs::path& log, const fs::path& csv) {
   }
   CsvFiles files(csv);
   ConversionCounts counts;
-  for (auto event = reader.next(); event.has_value(); event = reader.next()) {
+  for (;;) {
+    const auto event = reader.next();
+    if (!event) break;
     const EventText text = text_of(*event);
     files.write(*event, text);
     ++counts.events;
@@ -361,7 +364,11 @@ void for_each_event(const fs::path& recording, const std::function<void(const Lo
     return;
   }
   EventLogReader reader(recording);
-  for (auto event = reader.next(); event.has_value(); event = reader.next()) take(*event);
+  for (;;) {
+    const auto event = reader.next();
+    if (!event) return;
+    take(*event);
+  }
 }
 
 }  // namespace abs_hil::telemetry
