@@ -122,8 +122,9 @@ std::string explain(const Script& script, const settings::Settings& settings) {
     if (!profile.empty()) text += fmt::format("Simulation only: {}, a factor over {}\n", part.in_words, profile);
   }
   if (!s.inject.empty()) text += fmt::format("Faults (never on hardware): {}\n", s.inject);
-  for (const Setting& setting : script.settings)
+  for (const Setting& setting : script.settings) {
     text += fmt::format("Setting: {} = {}\n", setting.key, text_of(setting.value));
+  }
   if (!script.analysis.empty()) text += fmt::format("Analysis: {}\n", script.analysis);
   add_series(script.series, s, text);
   return text;
