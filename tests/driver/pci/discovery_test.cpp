@@ -1,5 +1,10 @@
 #include "abs_hil/driver/pci/discovery.hpp"
 
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -134,6 +139,46 @@ TEST_CASE("A card has one owner; a second one is told who holds it, and gets it 
   CHECK(refusal(tree.options) == "opened");
 }
 
+TEST_CASE("A guardian stands beside the owner; its own process may, any other that comes is told of it and kept away") {
+  const Tree tree;
+  tree.add("0000:04:01.0");
+  std::array<int, 2> to_parent{};
+  std::array<int, 2> to_child{};
+  REQUIRE(::pipe(to_parent.data()) == 0);
+  REQUIRE(::pipe(to_child.data()) == 0);
+  const pid_t guardian = ::fork();
+  if (guardian == 0) {  // nothing of Catch's in here
+    ::close(to_child[1]);
+    char byte = 'r';
+    try {
+      const auto window = open_beside_owner(tree.options);
+      if (!window->write32(0x6C, 0).ok()) byte = 'w';
+      static_cast<void>(::write(to_parent[1], &byte, 1));
+      static_cast<void>(::read(to_child[0], &byte, 1));  // until the parent closes its end
+    } catch (...) {
+      byte = 'x';
+      static_cast<void>(::write(to_parent[1], &byte, 1));
+    }
+    ::_exit(0);
+  }
+  REQUIRE(guardian > 0);
+  char byte = 0;
+  REQUIRE(::read(to_parent[0], &byte, 1) == 1);
+  CHECK(byte == 'r');
+  const std::string told = "process " + std::to_string(guardian);
+  CHECK_THAT(refusal(tree.options), Contains(told) && Contains("still brings the card into the safe state"));
+  CHECK_THROWS_WITH(open_beside_owner(tree.options), Contains(told) && Contains("still brings the card"));
+
+  ::close(to_child[1]);
+  REQUIRE(::waitpid(guardian, nullptr, 0) == guardian);
+  for (const int fd : {to_child[0], to_parent[0], to_parent[1]}) ::close(fd);
+  const Card owner = open_card(tree.options, false);
+  const auto beside = open_beside_owner(tree.options);
+  std::uint32_t value = 1;
+  CHECK(beside->read32(0x6C, value).ok());
+  CHECK(value == 0);
+}
+
 TEST_CASE("Lock-step is for an emulator that waits for it, and for nothing else") {
   const Tree tree;
   tree.add("0000:04:01.0");
@@ -160,5 +205,5 @@ TEST_CASE("An access that the kernel cuts short means that the card is gone") {
   CHECK(value == 7);
   CHECK(io_error_for(ENODEV) == IoError::disconnected);
   CHECK(io_error_for(ENOTCONN) == IoError::disconnected);
-  CHECK(io_error_for(ETIMEDOUT) == IoError::no_answer);
+  for (const int passing : {EAGAIN, EBUSY, EINTR, ETIMEDOUT}) CHECK(io_error_for(passing) == IoError::no_answer);
 }
