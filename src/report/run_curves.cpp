@@ -10,8 +10,6 @@ namespace abs_hil::report {
 
 namespace {
 
-/// As analysis::RunMetrics: below, the paper calls the performance "no longer relevant".
-constexpr double least_speed_m_s = 3.0;
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
 struct Collector {
