@@ -26,12 +26,13 @@ class Person final : public experiment::Dialog {
   bool wait_until_done(const std::string& text) override {
     take_time();
     turn(text.find("UPPER") != std::string::npos);
-    return true;
+    return !gives_up;
   }
 
   std::string said{};
   std::vector<std::string> asked{};
   int no_to{0};
+  bool gives_up{false};
   std::function<void(bool upper)> turn{[](bool) {}};
   std::function<void()> take_time{[] {}};
   std::function<void()> before_answer{[] {}};
@@ -85,25 +86,51 @@ struct Lab {
   bool stop{false};
 };
 
-/// A board of another kind, of which the counters alone matter.
+/// A board of another kind: counters, and what comes of reading, writing and making safe.
 class OtherBoard final : public driver::RigDriver {
  public:
   explicit OtherBoard(std::string_view kind) : kind_(kind) {}
   [[nodiscard]] std::string_view name() const noexcept override { return kind_; }
   rig::Measurement counters{};
+  std::function<driver::IoResult()> on_read{[] { return driver::IoResult{}; }};
+  std::function<driver::IoResult(const rig::Command&)> on_write{[](const rig::Command&) { return driver::IoResult{}; }};
+  driver::IoResult made_safe{};
 
  private:
   void do_configure() override {}
   void do_activate(std::int64_t /*now_ns*/) override {}
   driver::IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override {
+    const driver::IoResult result = on_read();
     measurement = counters;
     measurement.time_ns = now_ns;
-    return {};
+    return result;
   }
-  driver::IoResult do_write(const rig::Command& /*command*/) noexcept override { return {}; }
-  driver::IoResult do_make_safe() noexcept override { return {}; }
+  driver::IoResult do_write(const rig::Command& command) noexcept override { return on_write(command); }
+  driver::IoResult do_make_safe() noexcept override { return made_safe; }
 
   std::string_view kind_;
+};
+
+/// A rig on such a board that does what it should: each test lets one thing go wrong.
+struct OtherLab {
+  OtherLab() {
+    person.turn = [this](bool upper) { (upper ? board.counters.upper_counts : board.counters.lower_counts) += 2048; };
+    board.on_write = [this](const rig::Command& command) {
+      if (command.motor_duty > 0.0) ++board.counters.lower_counts;
+      return driver::IoResult{};
+    };
+  }
+  CommissioningResult run() {
+    return experiment::Commissioning(board, clock, person, guard, options, [this] { return stop; }).run();
+  }
+
+  OtherBoard board{"usb"};
+  test::ModelCard unused{};
+  Guard guard{unused};
+  runtime::VirtualClock clock{};
+  Person person{};
+  experiment::CommissioningOptions options{};
+  bool stop{false};
 };
 
 double largest_width(const test::ModelCard& card) {
@@ -253,4 +280,86 @@ TEST_CASE("Pulses that could run away are refused") {
   CHECK_THROWS_AS(experiment::Commissioning(lab.driver, lab.clock, lab.person, lab.guard, {.brake_duty = 0.71},
                                             [] { return false; }),
                   std::invalid_argument);
+}
+
+TEST_CASE("A board that fails in a pulse ends it, and says at what") {
+  OtherLab lab;
+  std::string words;
+  int pulses_ended_safe = 1;
+  SECTION("reading") {
+    lab.board.on_read = [&lab]() -> driver::IoResult {
+      return {lab.guard.beats < 10 ? driver::IoError::none : driver::IoError::no_answer};
+    };
+    words = "FAILED: reading the board: board did not answer in time";
+  }
+  SECTION("writing") {
+    lab.board.on_write = [](const rig::Command& command) -> driver::IoResult {
+      return {command.motor_duty > 0.0 ? driver::IoError::stalled : driver::IoError::none};
+    };
+    words = "FAILED: writing to the board: board refuses the transfer";
+  }
+  SECTION("the zeros at its end") {
+    lab.board.on_write = [](const rig::Command& command) -> driver::IoResult {
+      return {command.motor_duty > 0.0 ? driver::IoError::none : driver::IoError::disconnected};
+    };
+    words = "FAILED: ending the pulse: board is gone";
+    pulses_ended_safe = 0;
+  }
+  CHECK(lab.run() == CommissioningResult::failed);
+  CHECK_THAT(lab.person.said, Contains(words));
+  CHECK(lab.guard.begun == 1);
+  CHECK(lab.guard.ended_safe == pulses_ended_safe);
+  CHECK_FALSE(lab.guard.acting);
+  CHECK(lab.person.asked.size() == 3);
+}
+
+TEST_CASE("After the pulses: wheels that do not stop, a brake that drives, one that does not grip") {
+  OtherLab lab;
+  std::string words;
+  SECTION("no standstill") {
+    lab.board.on_read = [&lab] {
+      if (lab.guard.begun > 0) ++lab.board.counters.lower_counts;
+      return driver::IoResult{};
+    };
+    words = "the wheels do not come to rest";
+  }
+  SECTION("drive and brake exchanged") {
+    lab.board.on_write = [&lab](const rig::Command& command) {
+      if (command.motor_duty > 0.0 || command.brake_duty > 0.0) ++lab.board.counters.lower_counts;
+      return driver::IoResult{};
+    };
+    words = "are drive and brake exchanged?";
+  }
+  SECTION("nothing seen of the brake") {
+    lab.person.no_to = 5;
+    words = "look at the brake's supply and cable";
+  }
+  CHECK(lab.run() == CommissioningResult::failed);
+  CHECK_THAT(lab.person.said, Contains(words));
+  CHECK(lab.board.state() == driver::DriverState::inactive);
+}
+
+TEST_CASE("A safe state that did not reach the board is no success") {
+  OtherLab lab;
+  lab.person.before_answer = [&lab] {
+    if (lab.person.asked.size() == 5) lab.board.made_safe = {driver::IoError::disconnected};
+  };
+  CHECK(lab.run() == CommissioningResult::failed);
+  CHECK_THAT(lab.person.said, Contains("the safe state is not known to have reached the board: board is gone"));
+}
+
+TEST_CASE("Whoever stops turning by hand, or stops while the wheels run out, ends it there") {
+  OtherLab leaving;
+  leaving.person.gives_up = true;
+  CHECK(leaving.run() == CommissioningResult::declined);
+  CHECK(leaving.guard.begun == 0);
+
+  OtherLab stopping;
+  stopping.board.on_read = [&] {
+    stopping.stop = stopping.guard.ended_safe == 1 && stopping.clock.now_ns() > 1'000'000'000;
+    if (stopping.guard.begun > 0) ++stopping.board.counters.lower_counts;  // running on
+    return driver::IoResult{};
+  };
+  CHECK(stopping.run() == CommissioningResult::interrupted);
+  CHECK(stopping.guard.begun == 1);
 }
