@@ -6,6 +6,7 @@
 #include "node_on_socket.hpp"
 
 using namespace abs_hil;
+using Catch::Matchers::Contains;
 using driver::can::CanDriver;
 using driver::can::CanOptions;
 using test::NodeOnSocket;
@@ -31,6 +32,15 @@ struct Active {
   rig::Measurement measurement{};
   std::int64_t now_ns{0};
 };
+
+/// The socket pair as if it were the CAN interface of these facts.
+CanDriver::OpenLink as_interface(NodeOnSocket& node, driver::can::InterfaceFacts facts) {
+  return [open = node.opener(), facts = std::move(facts)] {
+    driver::can::Link link = open();
+    link.facts = facts;
+    return link;
+  };
+}
 
 }  // namespace
 
@@ -140,4 +150,37 @@ TEST_CASE("Silence at configure and at activation is told") {
   node.fault("silent");
   CHECK_THROWS_AS(rig.activate(0), driver::Unavailable);
   CHECK(rig.state() == driver::DriverState::inactive);
+}
+
+TEST_CASE("A bus too slow for the rate of the cycle is refused; one that carries it has its load in the notes") {
+  NodeOnSocket node({});
+  // A cycle's frames take more than 500 bits at worst and less than 1000.
+  CanDriver slow({}, as_interface(node, {.name = "nowhere0", .bit_rate = 500'000}), true);
+  CHECK_THROWS_WITH(slow.configure(), Contains("500000 bit/s cannot carry 1000 cycles a second") &&
+                                          Contains("raise the bit rate, use CAN FD or lower --rate"));
+  CanDriver good({}, as_interface(node, {.name = "nowhere0", .bit_rate = 1'000'000}), true);
+  good.configure();
+  CHECK_THAT(good.notes().at(1), Contains("bus load") && !Contains("no bit rate of its own"));
+}
+
+TEST_CASE("A node that falls silent because its interface is gone: the interface is the reason") {
+  NodeOnSocket node({.start_speed_rad_s = 60.0});
+  CanDriver driver({}, as_interface(node, {.name = "nowhere0", .bit_rate = 1'000'000}), true);
+  driver.configure();
+  driver.activate(0);
+  node.fault("silent");
+  rig::Measurement measurement;
+  driver::IoResult result{};
+  for (std::int64_t now_ns = ms; result.ok() && now_ns < 20 * ms; now_ns += ms) {
+    result = driver.read(now_ns, measurement);
+  }
+  CHECK(result.error == driver::IoError::disconnected);
+  CHECK(result.reason == rig::Reason::can_interface_down);
+}
+
+TEST_CASE("A socket in place of a bus that is not there is refused with what mends it") {
+  const auto opening = [](const std::string& path) { return driver::can::open_link({.interface = "unix:" + path}); };
+  CHECK_THROWS_WITH(opening(""), Contains("give a path of 1 to 107 characters"));
+  CHECK_THROWS_WITH(opening(std::string(108, 'x')), Contains("give a path of 1 to 107 characters"));
+  CHECK_THROWS_WITH(opening("/nowhere/node"), Contains("No such file") && Contains("start abs_rig_emulator --can"));
 }
