@@ -22,11 +22,16 @@ constexpr std::uintmax_t most_bytes = 64U << 20U;
 constexpr std::uint64_t most_us = 10'000'000;
 constexpr std::size_t event_fields = 5;
 
+/// The summary has 23.0 where config.toml has 23: here both are 23, so that they compare.
+std::string number_text(double value) { return fmt::format("{}", value); }
+
 void flatten(const nlohmann::ordered_json& json, const std::string& prefix, std::map<std::string, std::string>& flat) {
   for (const auto& [key, value] : json.items()) {
     const std::string name = prefix + clean_text(key, 60);
     if (value.is_object()) {
       flatten(value, name + '.', flat);
+    } else if (value.is_number_float()) {
+      flat[name] = number_text(value.get<double>());
     } else {
       flat[name] = clean_text(value.is_string() ? value.get<std::string>() : value.dump());
     }
@@ -44,7 +49,7 @@ void flatten(const toml::table& table, const std::string& prefix, std::map<std::
     if (const auto* string = value.as_string()) {
       text << string->get();
     } else if (const auto* number = value.as_floating_point()) {
-      text << nlohmann::ordered_json(number->get()).dump();  // written as in the summary, so that both compare
+      text << number_text(number->get());
     } else {
       text << toml::node_view<const toml::node>(value);
     }

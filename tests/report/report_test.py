@@ -165,7 +165,7 @@ class Series(ReportTest):
         read = PageReader(page)
         self.assertEqual(list(read.figures), ['series1', *FIGURES])
         lines = [line for line in read.tables['series'][1:] if line[0] == 'stop time / s']
-        self.assertEqual([line[1] for line in lines], ['theta_N = 20.0', 'theta_N = 23.0', 'theta_N = 26.0'])
+        self.assertEqual([line[1] for line in lines], ['theta_N = 20', 'theta_N = 23', 'theta_N = 26'])
         for line, (_, times) in zip(lines, sorted(stops.items())):
             mean = sum(times) / 2.0
             self.assertEqual(line[2:4], ['2', f'{mean:.4f}'])

@@ -35,7 +35,7 @@ struct RunFiles {       // NOLINT(bugprone-exception-escape): JSON's move constr
   std::string label{};  ///< name, and the controller where it is known
   std::filesystem::path csv{};
   std::filesystem::path folder{};  ///< empty for a bare CSV file
-  nlohmann::ordered_json summary{};
+  nlohmann::ordered_json summary = nlohmann::ordered_json::object();
   std::map<std::string, std::string> config{};       ///< effective configuration by dotted key
   std::map<std::string, std::string> environment{};  ///< kernel, build, board, by dotted key
   std::vector<RunEvent> events{};
