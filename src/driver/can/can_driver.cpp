@@ -165,7 +165,6 @@ void CanDriver::do_activate(std::int64_t now_ns) {
   outputs_known_ = any_answer_ = false;
   raw_counts_ = counts_ = {};
   trip_flags_ = 0;
-  latch_reason_ = LatchReason::none;
   supply_V_ = temperature_C_ = rig::unknown;
   drops_seen_ = link_.socket->dropped();
   IoResult result = activate_node();

@@ -114,7 +114,6 @@ void CanDriver::take_status(const StatusMessage& status) noexcept {
   trip_flags_ = status.trip_flags;
   supply_V_ = status.supply_V;
   temperature_C_ = status.temperature_C;
-  latch_reason_ = status.latch_reason;
 }
 
 void CanDriver::take_outputs(const OutputsMessage& outputs) noexcept {

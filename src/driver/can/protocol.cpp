@@ -41,15 +41,6 @@ constexpr std::array table{
 
 }  // namespace
 
-std::string_view description(LatchReason reason) noexcept {
-  switch (reason) {
-    case LatchReason::none: return "none";
-    case LatchReason::watchdog: return "no valid command within the watchdog's time";
-    case LatchReason::commands_rejected: return "too many invalid commands";
-  }
-  return "unknown";
-}
-
 std::span<const Message> messages() noexcept { return table; }
 
 const Message* find_message(std::uint32_t identifier) noexcept {

@@ -131,7 +131,6 @@ class CanDriver final : public RigDriver {
   double supply_V_{rig::unknown};
   double temperature_C_{rig::unknown};
   std::uint32_t trip_flags_{0};
-  LatchReason latch_reason_{LatchReason::none};
 
   // What was commanded, by sequence.
   std::uint8_t command_sequence_{0};

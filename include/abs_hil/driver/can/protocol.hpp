@@ -58,7 +58,6 @@ enum class Request : std::uint8_t { identify = 1, activate = 2, deactivate = 3 }
 enum class NodeState : std::uint8_t { inactive = 0, active = 1, latched = 2 };
 /// Why the node latched.
 enum class LatchReason : std::uint8_t { none = 0, watchdog = 1, commands_rejected = 2 };
-[[nodiscard]] std::string_view description(LatchReason reason) noexcept;
 /// Bits of ABS_IDENTITY's features.
 namespace feature {
 inline constexpr std::uint8_t lock_step = 1U << 0U;  ///< an emulator whose time is driven by ABS_TIME
