@@ -33,6 +33,12 @@ struct Active {
   std::int64_t now_ns{0};
 };
 
+std::string joined(const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += line + '\n';
+  return text;
+}
+
 /// The socket pair as if it were the CAN interface of these facts.
 CanDriver::OpenLink as_interface(NodeOnSocket& node, driver::can::InterfaceFacts facts) {
   return [open = node.opener(), facts = std::move(facts)] {
@@ -183,4 +189,32 @@ TEST_CASE("A socket in place of a bus that is not there is refused with what men
   CHECK_THROWS_WITH(opening(""), Contains("give a path of 1 to 107 characters"));
   CHECK_THROWS_WITH(opening(std::string(108, 'x')), Contains("give a path of 1 to 107 characters"));
   CHECK_THROWS_WITH(opening("/nowhere/node"), Contains("No such file") && Contains("start abs_rig_emulator --can"));
+}
+
+TEST_CASE("Inspection asks a node that stays inactive; its silence is told") {
+  NodeOnSocket node({.start_speed_rad_s = 60.0});
+  CanDriver driver({}, node.opener(), true);
+  driver.configure();
+  const std::string told = joined(driver.inspection());
+  CHECK_THAT(told, Contains("counters: upper wheel") && Contains("state inactive") && Contains("trip flags 0x0"));
+  CHECK(node.with_node([](emulator::CanNode& n, emulator::NodeFaults&) { return n.state(); }) ==
+        emulator::CanNode::State::inactive);
+  node.fault("silent");
+  CHECK_THAT(joined(driver.inspection()), Contains("no answer to a SYNC") && !Contains("counters:"));
+}
+
+TEST_CASE("The tally is one line after a good run, and names what was odd after another") {
+  Active good;
+  for (int i = 0; i < 20; ++i) REQUIRE(good.cycle().ok());
+  CHECK(good.driver.tally().size() == 1);
+
+  Active odd;
+  odd.node.fault("wrong-size=7");
+  while (odd.cycle().ok()) {
+  }
+  const std::string told = joined(odd.driver.tally());
+  const std::uint64_t wrong = odd.driver.counters().wrong_length;
+  CHECK(wrong > 0);
+  CHECK_THAT(told, Contains(" " + std::to_string(wrong) + " of wrong length"));
+  CHECK_THAT(told, Contains("0 stale, 0 duplicate, 0 out of order") && Contains("send queue full 0 times"));
 }
