@@ -53,15 +53,8 @@ RunSession::RunSession(runtime::Clock& clock, driver::RigDriver& driver, RunLogi
       logic_(std::move(parts)),
       gate_(logic_.make_gate(gate_options)),
       ring_(ring_capacity),
-      period_ns_(period_ns_for(parts.control.rate_Hz)),
-      executive_(clock, driver, logic_, gate_, ring_, period_ns_, overruns),
+      executive_(clock, driver, logic_, gate_, ring_, period_ns_for(parts.control.rate_Hz), overruns),
       pump_(ring_, parts.rig.wheels.r2_m, std::move(sinks)) {}
-
-std::int64_t RunSession::between_ticks(std::int64_t time_ns) const noexcept {
-  const rig::CycleRecord& latest = pump_.latest();
-  const std::int64_t tick_ns = latest.stamp_ns - latest.timing.wakeup_latency_ns;
-  return time_ns - (time_ns - tick_ns) % period_ns_ + period_ns_ / 2;
-}
 
 RunOutcome RunSession::outcome() const {
   return {.reason = logic_.end_reason(),

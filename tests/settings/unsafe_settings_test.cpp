@@ -64,3 +64,26 @@ TEST_CASE("An adapter to a real bus is hardware") {
   settings.guardian.enabled = true;
   CHECK(refusal(settings).empty());
 }
+
+TEST_CASE("Faults are injected into simulations and emulators alone") {
+  Settings settings;
+  settings.inject = "brake@encoder_upper:stuck";
+  CHECK(refusal(settings).empty());
+  settings.backend = "rig";
+  CHECK_THAT(refusal(settings), Contains("--inject") && Contains("never injected into real hardware"));
+  settings.driver.emulated = true;
+  settings.driver.kind = "pci";
+  settings.driver.pci.root = "/sys/bus/pci/devices";
+  CHECK_THAT(refusal(settings), Contains("driver.pci.root = /sys/bus/pci/devices holds the real cards"));
+  settings.driver.pci.root = "/tmp";
+  CHECK(refusal(settings).empty());
+  settings.driver.kind = "can";
+  settings.driver.can.interface = "unix:/tmp/bus";
+  CHECK(refusal(settings).empty());
+  settings.driver.can.interface = an_adapter();
+  if (settings.driver.can.interface.empty()) {
+    WARN("this computer has no network adapter to try it with");
+    return;
+  }
+  CHECK_THAT(refusal(settings), Contains("is an adapter to a real bus; give a vcan interface"));
+}

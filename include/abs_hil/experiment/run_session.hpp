@@ -72,15 +72,11 @@ class RunSession {
   [[nodiscard]] const rig::CycleRecord& latest() const noexcept { return pump_.latest(); }
 
  private:
-  /// The middle between two ticks near `time_ns`: there the slow side's own timer does not delay the cycle's.
-  [[nodiscard]] std::int64_t between_ticks(std::int64_t time_ns) const noexcept;
-
   runtime::Clock& clock_;
   driver::RigDriver& driver_;
   RunLogic logic_;
   runtime::CommandGate gate_;
   runtime::RecordRing ring_;
-  std::int64_t period_ns_;
   std::int64_t second_offset_ns_{-1};  ///< < 0: begin at once
   runtime::CyclicExecutive executive_;
   runtime::RecordPump pump_;
