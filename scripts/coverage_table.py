@@ -1,41 +1,80 @@
 #!/usr/bin/env python3
-"""usage: coverage_table.py COVERAGE.json: gcovr's JSON as a Markdown table of the rooms, then the least covered files."""
+"""usage: coverage_table.py LINES.lcov PAGE
+
+Writes what llvm-cov exports as Markdown tables into PAGE, between `<!-- begin NAME -->` and `<!-- end NAME -->`: `rooms`, and `files`,
+those with the most lines not reached. Status 1 where less than 95 % of the lines outside apps are reached.
+"""
 import collections
-import json
 import pathlib
+import re
 import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+LEAST_LINES_PERCENT = 95.0
+FILES_SHOWN = 15
 
 
 def room_of(name):
     parts = pathlib.PurePath(name).parts
     parts = parts[2:] if parts[0] == 'include' else parts[1:] if parts[0] == 'src' else parts
-    if parts[0] == 'driver' and len(parts) > 2:
-        return '/'.join(parts[:2])
-    return parts[0]
+    return '/'.join(parts[:2]) if parts[0] == 'driver' and len(parts) > 2 else parts[0]
 
 
 def percent(reached, of):
     return f'{100.0 * reached / of:.1f} %' if of else '-'
 
 
+def table(head, rows):
+    lines = ['| ' + ' | '.join(head) + ' |', '|' + '---|' * len(head)]
+    return '\n'.join(lines + ['| ' + ' | '.join(str(cell) for cell in row) + ' |' for row in rows])
+
+
+def counts_of_files(export):
+    """{file: lines reached, lines, branches reached, branches}, files named from the project's root."""
+    counts = {}
+    for line in export.splitlines():
+        kind, _, rest = line.partition(':')
+        if kind == 'SF':
+            now = counts.setdefault(str(pathlib.Path(rest).resolve().relative_to(ROOT)), [0, 0, 0, 0])
+        elif kind == 'DA':
+            now[0] += rest.split(',')[1] != '0'
+            now[1] += 1
+        elif kind == 'BRDA':
+            now[2] += rest.split(',')[3] not in ('0', '-')
+            now[3] += 1
+    return counts
+
+
+def put(text, name, content):
+    marked = re.compile(rf'(<!-- begin {name} -->\n).*?(<!-- end {name} -->)', re.DOTALL)
+    if not marked.search(text):
+        sys.exit(f'coverage_table.py: the page has no <!-- begin {name} --> with its <!-- end {name} -->')
+    return marked.sub(lambda found: f'{found[1]}{content}\n{found[2]}', text)
+
+
 def main():
-    files = json.load(open(sys.argv[1]))['files']
+    if len(sys.argv) != 3:
+        sys.exit(__doc__)
+    page = pathlib.Path(sys.argv[2])
     rooms = collections.defaultdict(lambda: [0, 0, 0, 0])
-    weakest = []
-    for file in files:
-        lines = [line for line in file['lines'] if not line.get('gcovr/noncode')]
-        branches = [branch for line in lines for branch in line['branches']]
-        counts = [sum(line['count'] > 0 for line in lines), len(lines), sum(b['count'] > 0 for b in branches), len(branches)]
-        rooms[room_of(file['file'])] = [a + b for a, b in zip(rooms[room_of(file['file'])], counts)]
-        weakest.append((counts[1] - counts[0], file['file'], counts))
-    outside = [sum(counts[i] for room, counts in rooms.items() if room != 'apps') for i in range(4)]
-    print('| room | lines | reached | branches | reached |\n|---|---|---|---|---|')
-    for room, c in [*sorted(rooms.items()), ('**all outside apps**', outside)]:
-        print(f'| {room} | {c[1]} | {percent(c[0], c[1])} | {c[3]} | {percent(c[2], c[3])} |')
-    print('\n| most lines not reached in | lines | reached |\n|---|---|---|')
-    for missed, name, c in sorted(weakest, reverse=True)[:12]:
-        if missed:
-            print(f'| `{name}` | {c[1]} | {percent(c[0], c[1])} |')
+    files = []
+    for name, counts in counts_of_files(pathlib.Path(sys.argv[1]).read_text()).items():
+        rooms[room_of(name)] = [a + b for a, b in zip(rooms[room_of(name)], counts)]
+        files.append((counts[1] - counts[0], name, counts))
+    apps = rooms.pop('apps')
+    outside = [sum(column) for column in zip(*rooms.values())]
+    rows = [*sorted(rooms.items()), ('**all outside apps**', outside), ('apps', apps)]
+    text = put(page.read_text(), 'rooms', table(
+        ['room', 'lines', 'reached', 'branches', 'reached'],
+        [[room, c[1], percent(c[0], c[1]), c[3], percent(c[2], c[3])] for room, c in rows]))
+    weakest = sorted((file for file in files if file[0]), key=lambda file: (-file[0], file[1]))[:FILES_SHOWN]
+    page.write_text(put(text, 'files', table(
+        ['file', 'lines', 'not reached', 'reached'],
+        [[f'`{name}`', c[1], missed, percent(c[0], c[1])] for missed, name, c in weakest])))
+    reached = 100.0 * outside[0] / outside[1]
+    print(f'coverage: {reached:.1f} % of the lines outside apps')
+    if reached < LEAST_LINES_PERCENT:
+        sys.exit(f'coverage: at least {LEAST_LINES_PERCENT:.0f} % of them must be reached')
 
 
 if __name__ == '__main__':
