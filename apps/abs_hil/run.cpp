@@ -157,8 +157,9 @@ int conclude(const RunRequest& request, const experiment::RunSession& session, c
       outputs.write(summary, session.executive().statistics(), environment(request, driver, outcome));
   if (!request.in_series) {
     std::string text = analysis::to_text(summary);
-    if (const auto& folder = outputs.folder())
+    if (const auto& folder = outputs.folder()) {
       text += fmt::format("  {:<22}{}\n", "run folder", folder->path().string());
+    }
     // A terminal that has gone takes nothing: no reason to end otherwise than the run did.
     static_cast<void>(std::fputs(text.c_str(), stdout));
   }
