@@ -70,7 +70,7 @@ void finish_with_board(LibusbStandIn& usb, libusb_transfer* transfer) {
   std::size_t bytes = 0;
   if (usb.in_status == LIBUSB_TRANSFER_COMPLETED) {
     bytes = std::min(usb.answers.front().size(), static_cast<std::size_t>(transfer->length));
-    std::memcpy(transfer->buffer, usb.answers.front().data(), bytes);
+    std::copy_n(usb.answers.front().begin(), bytes, transfer->buffer);  // an answer may be empty
     usb.answers.pop_front();
   }
   finish(transfer, usb.in_status, bytes);
