@@ -85,7 +85,13 @@ def instructions():
 
 
 def shown_ns(ns):
+    if ns >= 1e9:
+        return f'{ns / 1e9:.3g} s'
     return f'{ns / 1e6:.3g} ms' if ns >= 1e6 else f'{ns / 1e3:.3g} µs' if ns >= 1e3 else f'{ns:.3g} ns'
+
+
+def shown_ratio(ratio):
+    return f'{ratio:.0f}' if ratio >= 10 else f'{ratio:.2g}'
 
 
 def table(head, rows):
@@ -134,7 +140,7 @@ One braking from 170 rad/s under a constant duty, 2 s in ticks of 1 ms. The erro
 wheel's speed at any tick from RK4 at 1 µs (Octave's and SciPy's: from their own finest solution).
 
 {table(['integrator', 'ms', 'ours is', 'error, rad/s'],
-       [[INTEGRATION_NAMES[name], f'{ms:.3g}', f'{ms / ours:.2g} × as fast' if name != 'plant' else '', f'{error:.1g}']
+       [[INTEGRATION_NAMES[name], f'{ms:.3g}', f'{shown_ratio(ms / ours)} × as fast' if name != 'plant' else '', f'{error:.1g}']
         for name, ms, error in integration])}
 
 ## Whole runs
