@@ -166,7 +166,8 @@ steps.
 
 {table(['what', 'time'], [[f'`{name}`', shown_ns(ns)] for name, (ns, _) in sorted(telemetry.items())])}
 
-`publish_in_process` is LCM's memq; over UDP a publish costs 8 to 43 µs in the caller, which is never the real-time thread.
+`publish_in_process` is LCM's memq. Over UDP a publish makes system calls as well (not measured here); its caller is never
+the real-time thread.
 '''
     if counted:
         text += f'''

@@ -27,7 +27,7 @@ MATCHERS = ['--checks=-clang-analyzer-*,-bugprone-suspicious-include',
 
 
 def units():
-    """{unit: (its sources, the compiler's flags)}, ours alone."""
+    """{unit: (its sources, the compiler's flags, its object)}."""
     found = {}
     for entry in json.loads((BUILD / 'compile_commands.json').read_text()):
         unit = pathlib.Path(entry['file'])
@@ -68,8 +68,8 @@ def key_of(sources, flags, files, digests, fixed):
 def findings(arguments):
     done = subprocess.run([TIDY, '--quiet', f'--config-file={ROOT}/.clang-tidy', *arguments], cwd=BUILD, capture_output=True,
                           text=True)
-    if done.returncode and not done.stdout:
-        return done.stderr
+    if done.returncode and not done.stdout:  # it was killed, or could not begin
+        return done.stderr or f'{TIDY} {" ".join(arguments[:2])} ended with status {done.returncode}\n'
     return done.stdout
 
 
@@ -82,7 +82,7 @@ def examine(unit, sources, flags):
 def main():
     wanted = {str(pathlib.Path(name).resolve()) for name in sys.argv[1:]}
     version = subprocess.run([TIDY, '--version'], check=True, capture_output=True, text=True).stdout
-    fixed = version + (ROOT / '.clang-tidy').read_text() + pathlib.Path(__file__).read_text()
+    fixed = version + (ROOT / '.clang-tidy').read_text() + portable(MATCHERS)
     included, digests = everything_included(), Digests()
     CACHE.mkdir(parents=True, exist_ok=True)
     start, known, jobs = time.monotonic(), 0, {}
