@@ -106,7 +106,10 @@ class LossCounter : public RunObserver {
     lost += message.sequence - next;
     next = message.sequence + 1;
   }
-  void take(const status_t& message) override { status = message; }
+  void take(const status_t& message) override {
+    status = message;
+    subscribed = true;
+  }
   void take(const event_t& /*message*/) override {}
   void take(const experiment_t& /*message*/) override {}
   void take_malformed() override { ++malformed; }
@@ -116,12 +119,31 @@ class LossCounter : public RunObserver {
   std::int64_t lost{0};
   std::int64_t malformed{0};
   status_t status{};
+  bool subscribed{false};
 };
+
+/// A tcpq server hears of a subscription when its thread comes to it, up to some 0.1 s later. Waits until it hands on
+/// what another client publishes. Of one client the server takes everything in order, and telemetry is subscribed to
+/// before the status. False if that does not come within 10 s.
+bool await_subscription(const std::string& url, RunListener& listener, const LossCounter& counter) {
+  lcm::LCM other(url);
+  const status_t message{};
+  for (int tries = 0; tries < 1'000 && !counter.subscribed; ++tries) {
+    if (other.publish("ABS_STATUS", &message) != 0) return false;
+    pollfd ready{listener.file_descriptor(), POLLIN, 0};
+    if (::poll(&ready, 1, 10) > 0) listener.poll();
+  }
+  return counter.subscribed;
+}
 
 /// Until nothing has come for `silence_s`, 30 s for the first.
 int receive(const std::string& url, int silence_s) {
   LossCounter counter;
   RunListener listener(url, "ABS_", counter);
+  if (url.starts_with("tcpq:") && !await_subscription(url, listener, counter)) {
+    std::fprintf(stderr, "the server of %s does not hand on what is published\n", url.c_str());
+    return 3;
+  }
   std::printf("listening\n");
   std::fflush(stdout);
   const auto now = [] { return std::chrono::steady_clock::now(); };
