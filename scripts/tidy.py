@@ -50,8 +50,10 @@ def everything_included():
 
 
 class Digests(dict):
+    """Of files' contents; what was made by the build names this clone's folder."""
+
     def __missing__(self, file):
-        self[file] = hashlib.sha256(file.read_bytes()).hexdigest()
+        self[file] = hashlib.sha256(file.read_bytes().replace(bytes(ROOT), b'.')).hexdigest()
         return self[file]
 
 
@@ -61,7 +63,8 @@ def portable(text):
 
 def key_of(sources, flags, files, digests, fixed):
     parts = [fixed, *map(portable, sources), *map(portable, flags)]
-    parts += sorted(f'{portable(file)} {digests[file]}' for file in files)
+    # Every commit changes the revision, and nothing that there is to find.
+    parts += sorted(f'{portable(file)} {digests[file]}' for file in files if file.name != 'abs_hil_revision.hpp')
     return hashlib.sha256('\n'.join(parts).encode()).hexdigest()
 
 
