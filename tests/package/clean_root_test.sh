@@ -7,7 +7,8 @@ set -euo pipefail
 source=$(realpath "$(dirname "$(realpath "$0")")/../..")
 
 if [ "${1:-}" = --without-vm ]; then
-  export ABS_HIL_CLEAN_ROOT_TESTS="release -LE 'vm|on-demand'"
+  # Tests in real time may try twice, as in .ci/run.
+  export ABS_HIL_CLEAN_ROOT_TESTS="release -LE 'vm|on-demand' --repeat until-pass:2"
   shift
 fi
 if [ "${ABS_HIL_CLEAN_ROOT_INNER:-}" != 1 ]; then
