@@ -19,6 +19,7 @@ if [ "${ABS_HIL_CLEAN_ROOT_INNER:-}" != 1 ]; then
 fi
 
 root=$1
+chmod 755 "$root"  # mktemp's is closed to others than root, and so were everything in it
 mirror=${DEBIAN_MIRROR:-http://deb.debian.org/debian}
 step() { echo "clean root: $*, at $SECONDS s"; }
 inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/srv LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"; }

@@ -19,7 +19,7 @@ says() { grep -q -- "$1" "$scratch/err" || fail "no '$1' in: $(cat "$scratch/err
 
 echo '-- require: refused with what, why and the fix; nothing has moved'
 try without_capabilities "$scratch/abs_hil" "${run[@]}" --rt require --csv "$scratch/require.csv"
-[ $status = 3 ] || fail "require without privileges gave $status"
+[ $status = 3 ] || fail "require without privileges gave $status: $(cat "$scratch/err")"
 says 'not obtained: SCHED_FIFO priority 80: Operation not permitted (RLIMIT_RTPRIO'
 says 'not obtained: memory locked (mlockall)'
 says 'rtprio 98'
@@ -30,13 +30,13 @@ says "setcap cap_sys_nice,cap_ipc_lock+ep $scratch/abs_hil"
 
 echo '-- prefer: runs, says so once and loudly, and in the summary'
 try without_capabilities "$scratch/abs_hil" "${run[@]}" --rt prefer --summary "$scratch/prefer.json"
-[ $status = 0 ] || fail "prefer without privileges gave $status"
+[ $status = 0 ] || fail "prefer without privileges gave $status: $(cat "$scratch/err")"
 [ "$(grep -c 'NOT IN REAL TIME' "$scratch/err")" = 1 ] || fail "not said once: $(cat "$scratch/err")"
 grep -q '"realtime": false' "$scratch/prefer.json" || fail 'the summary does not say so'
 
 echo '-- off: runs and says nothing of it'
 try without_capabilities "$scratch/abs_hil" "${run[@]}" --rt off --summary "$scratch/off.json"
-[ $status = 0 ] || fail "off gave $status"
+[ $status = 0 ] || fail "off gave $status: $(cat "$scratch/err")"
 ! grep -q 'REAL TIME' "$scratch/err" || fail 'off warns'
 grep -q '"realtime": false' "$scratch/off.json" || fail 'off claims real time'
 
