@@ -63,7 +63,7 @@ def portable(text):
 
 def key_of(sources, flags, files, digests, fixed):
     parts = [fixed, *map(portable, sources), *map(portable, flags)]
-    # Every commit changes the revision, and nothing that there is to find.
+    # The revision changes with every commit and can hold no finding.
     parts += sorted(f'{portable(file)} {digests[file]}' for file in files if file.name != 'abs_hil_revision.hpp')
     return hashlib.sha256('\n'.join(parts).encode()).hexdigest()
 

@@ -7,8 +7,7 @@ set -euo pipefail
 source=$(realpath "$(dirname "$(realpath "$0")")/../..")
 
 if [ "${1:-}" = --without-vm ]; then
-  # Tests in real time may try twice, as in .ci/run.
-  export ABS_HIL_CLEAN_ROOT_TESTS="release -LE 'vm|on-demand' --repeat until-pass:2"
+  export ABS_HIL_CLEAN_ROOT_TESTS="release -LE 'vm|on-demand'"
   shift
 fi
 if [ "${ABS_HIL_CLEAN_ROOT_INNER:-}" != 1 ]; then

@@ -61,7 +61,7 @@ echo '-- live: a subscriber and lcm-logger'
 "$helper" subscribe "$url" $records &
 subscriber=$!
 # lcm-logger holds 30 messages, and no more whatever its URL says: 30 ms at 1 kHz, which a virtual machine's host or disk
-# can take. Slower, 150 ms, and with precedence it misses none (1 kHz and 10 kHz: app_subscribers).
+# can take. Slower, 150 ms, and with precedence it misses none (it at 1 kHz: app_interop; 1 and 10 kHz: app_subscribers).
 period_us=5000
 precedence=''
 chrt -f 10 true 2>/dev/null && precedence='chrt -f 10'
