@@ -73,6 +73,8 @@ struct RunRequest {
   std::vector<std::string> command_line{};  ///< as typed, for the record
   /// Not empty: a run of a series, which prints nothing but faults and tells now and then which phase it is in.
   std::function<void(std::string_view phase)> in_series{};
+  /// Called after such a run if somebody has sent it a stop, in time for it or not.
+  std::function<void()> stop_was_sent{};
 };
 
 /// Merges defaults, plant file, the script's settings, configuration file, named options and assignments, later ones

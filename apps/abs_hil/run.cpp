@@ -228,6 +228,7 @@ int run(const RunRequest& request) {
   }
   if (signals) signals->allow_leaving();
   board_notes.log_once();
+  if (request.stop_was_sent && outputs.stop_requested()) request.stop_was_sent();
   return conclude(request, session, outcome, *driver, outputs, run_watch, lost);
 }
 

@@ -124,7 +124,7 @@ void RunOutputs::watch(experiment::RunSession& session) {
   commands_->set_judge([this](const command2_t& command) { return steering_->judge(command); });
   commands_->listen();
   stream_->set_farewell([this] {
-    commands_->poll();
+    commands_->finish();
     steering_->refuse_pending();
   });
 }

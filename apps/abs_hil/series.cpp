@@ -11,13 +11,13 @@
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "abs_hil/archive/series_folder.hpp"
 #include "abs_hil/comparison/parallel.hpp"
 #include "abs_hil/settings/config_error.hpp"
 #include "commands.hpp"
 #include "exit_status.hpp"
+#include "series_pause.hpp"
 #include "signals.hpp"
 
 namespace abs_hil::app {
@@ -134,15 +134,6 @@ std::unique_ptr<archive::SeriesFolder> open_folder(const RunRequest& base, std::
 /// A signal ended the run: it is to be done again.
 bool is_interrupted(int status) { return status > 128; }
 
-/// The brake cools; false if the person at the rig wants to stop.
-bool pause(double duration_s) {
-  const auto end = Clock::now() + std::chrono::duration<double>(duration_s);
-  while (Clock::now() < end && signalled() == rig::Reason::none) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  }
-  return signalled() == rig::Reason::none;
-}
-
 /// The runs of a series that are still to be done.
 class SeriesRun {
  public:
@@ -178,7 +169,7 @@ class SeriesRun {
     }
     fmt::print("{}\n", in_words());
     if (interrupted_ != 0) return interrupted_;
-    return ended_early_ == 0 ? exit_completed : exit_ended_early;
+    return ended_early_ == 0 && !cut_short() ? exit_completed : exit_ended_early;
   }
 
  private:
@@ -193,12 +184,13 @@ class SeriesRun {
   }
 
   void run_one(std::size_t k) {
-    if (interrupted_ != 0 || halted_by_ != 0 || signalled() != rig::Reason::none) return;
+    if (interrupted_ != 0 || halted_by_ != 0 || stopped_ || signalled() != rig::Reason::none) return;
     const std::size_t i = left_[k];
     const std::string what = fmt::format("{}, {}", archive::SeriesFolder::name_of(i), text_of(members_[i]));
     RunRequest request = merge(options_of(common_, members_[i]));
     request.command_line = base_.command_line;
     request.in_series = [this, &what](std::string_view phase) { progress_.show(what, phase); };
+    request.stop_was_sent = [this] { stopped_ = true; };
     request.outputs.run_folder.reset();
     request.outputs.no_run_folder = true;
     if (folder_ != nullptr) request.outputs.run_folder = folder_->begin(i).string();
@@ -214,22 +206,30 @@ class SeriesRun {
     }
     if (folder_ != nullptr) folder_->end(i, status == exit_completed ? completed : "fault");
     progress_.count(what);
-    if (pause_s_ > 0.0 && k + 1 < left_.size() && halted_by_ == 0) {
+    if (pause_s_ > 0.0 && k + 1 < left_.size() && halted_by_ == 0 && !stopped_) {
       progress_.show(what, fmt::format("over; pause of {:.6g} s before the next", pause_s_), true);
-      if (pause(pause_s_)) progress_.paused();
+      const rig::Reason reason = pause_between_runs(request, pause_s_);
+      if (reason == rig::Reason::none) progress_.paused();
+      if (reason == rig::Reason::stop_command) stopped_ = true;
     }
+  }
+
+  /// Not all runs were done.
+  [[nodiscard]] bool cut_short() const {
+    return interrupted_ != 0 || ((halted_by_ != 0 || stopped_) && progress_.done() < members_.size());
   }
 
   [[nodiscard]] std::string in_words() const {
     const std::string where = folder_ != nullptr ? ", in " + folder_->path().string() : std::string();
-    const bool cut_short = interrupted_ != 0 || (halted_by_ != 0 && progress_.done() < members_.size());
-    if (!cut_short) {
+    if (!cut_short()) {
       return fmt::format("series {}: {} runs, {} ended early{}", base_.script->name, members_.size(),
                          ended_early_.load(), where);
     }
-    const std::string why =
-        interrupted_ != 0 ? "interrupted"
-                          : fmt::format("ended because {} ended early", archive::SeriesFolder::name_of(halted_by_ - 1));
+    std::string why = "interrupted";
+    if (interrupted_ == 0) {
+      why = stopped_ ? "ended by a stop command"
+                     : fmt::format("ended because {} ended early", archive::SeriesFolder::name_of(halted_by_ - 1));
+    }
     return fmt::format(
         "series {}: {} with {} of {} runs done, {} ended early{}{}", base_.script->name, why, progress_.done(),
         members_.size(), ended_early_.load(), where,
@@ -245,6 +245,7 @@ class SeriesRun {
   Progress progress_;
   std::atomic<std::size_t> ended_early_{0};
   std::atomic<int> interrupted_{0};
+  std::atomic<bool> stopped_{false};       ///< somebody sent a stop, to a run or between two
   std::atomic<std::size_t> halted_by_{0};  ///< number of the run at a rig that ended early, from 1; 0: none
 };
 

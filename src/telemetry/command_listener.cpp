@@ -18,7 +18,7 @@
 namespace abs_hil::telemetry {
 namespace {
 
-constexpr int packets_per_poll = 32;
+constexpr std::size_t packets_per_poll = 32;
 constexpr std::size_t most_waiting = 64;
 constexpr int answers_per_second = 10;
 constexpr std::size_t shown_text_max_bytes = 64;
@@ -57,12 +57,21 @@ void CommandListener::subscribe() {
 }
 
 CommandListener::~CommandListener() {
-  if (thread_.joinable()) {
-    thread_.request_stop();
-    thread_.join();
-  }
+  end_thread();
   // An LCM object of its own takes its subscription with it; tcpq would look for its server once more.
   if (!own_lcm_ && subscription_ != nullptr) lcm_unsubscribe(lcm_, subscription_);
+}
+
+void CommandListener::end_thread() {
+  if (!thread_.joinable()) return;
+  thread_.request_stop();
+  thread_.join();
+}
+
+void CommandListener::finish() {
+  end_thread();
+  listening_ = false;
+  answer_waiting(most_waiting);
 }
 
 void CommandListener::listen() {
@@ -122,10 +131,14 @@ bool CommandListener::receive(int timeout_ms) {
 
 void CommandListener::poll() {
   if (!listening()) return;
-  for (int i = 0; i < packets_per_poll && !thread_.joinable(); ++i) {
+  for (std::size_t i = 0; i < packets_per_poll && !thread_.joinable(); ++i) {
     if (!receive(0)) break;
   }
-  for (int i = 0; i < packets_per_poll; ++i) {
+  answer_waiting(packets_per_poll);
+}
+
+void CommandListener::answer_waiting(std::size_t at_most) {
+  for (std::size_t i = 0; i < at_most; ++i) {
     Arrival arrival;
     {
       const std::lock_guard lock(mutex_);

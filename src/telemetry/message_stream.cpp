@@ -121,6 +121,11 @@ void MessageStream::finish() {
   if (first_error) std::rethrow_exception(first_error);
 }
 
+void MessageStream::pass_time(std::int64_t stamp_ns, double time_s) noexcept {
+  latest_.stamp_ns = stamp_ns;
+  latest_.time_s = time_s;
+}
+
 void MessageStream::answer_command(rig::Reason reason, std::string message, double value) {
   send_event(event_kind::command, reason, value, std::move(message));
 }

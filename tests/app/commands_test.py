@@ -7,6 +7,7 @@ usage: commands_test.py PROGRAM PRIVATE_NETWORK_SCRIPT PYTHON_MODULE_DIR [stop]
 """
 import hashlib
 import hmac
+import json
 import os
 import pathlib
 import random
@@ -44,6 +45,29 @@ class Wire:
     def fragment(self, size, offset, number, count, data):
         self.number += 1
         self.raw(struct.pack('>IIIIHH', LONG, self.number, size, offset, number, count) + data)
+
+
+class Ear:
+    """Hears what goes over LCM's multicast from now on."""
+
+    def __init__(self):
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        self.socket.bind((GROUP, PORT))
+        self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, struct.pack('=4sI', socket.inet_aton(GROUP), 0))
+
+    def heard(self, channel, silence_s):
+        """The messages on a channel, until nothing at all has come for so long."""
+        self.socket.settimeout(silence_s)
+        while True:
+            try:
+                packet = self.socket.recv(65536)
+            except TimeoutError:
+                return
+            name, _, data = packet[8:].partition(b'\0')
+            if struct.unpack('>I', packet[:4])[0] == SHORT and name == channel.encode():
+                yield abs_hil.decode(data)
 
 
 def command2(key, session, sequence, command, name='', value=0.0):
@@ -221,6 +245,54 @@ def garbage(folder):
     print(f'malformed {counts.malformed}, dropped {counts.dropped}')
 
 
+def series(folder, key):
+    """A stop ends the whole series, in a run or between two; the same command goes on with the next run."""
+    script, out = pathlib.Path(folder, 'series.toml'), pathlib.Path(folder, 'series')
+    script.write_text('[settings]\nexperiment.start_speed_rad_s = 60\n[[phase]]\nname = "brake"\nbrake = "controller"\n'
+                      'until = { car_speed_below_m_s = 1 }\nat_most_s = 20\n'
+                      '[[phase]]\nname = "stopped"\nuntil = { lasts_s = 0.5 }\n[series]\nrepeat = 3\npause_s = 60\n')
+
+    def statuses():
+        return [run['status'] for run in json.loads((out / 'series.json').read_text())['runs']]
+
+    def begin():
+        return subprocess.Popen([PROGRAM, '--rt', 'off', '--experiment', script, '--out', out, '--set',
+                                 'commands.enabled=true', *KEY], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    def wait_for(holds, what):
+        deadline = time.monotonic() + 30
+        while not holds():
+            if time.monotonic() > deadline:
+                sys.exit(f'FAILED: {what} within 30 s')
+            time.sleep(0.02)
+
+    program = begin()
+    wait_for(lambda: (out / 'series.json').exists() and statuses()[0] == 'completed', 'the first run ends')
+    ear, wire, answers = Ear(), Wire(), []
+
+    def refused():
+        wire.message(b'ABS_COMMAND', command2(key, '0' * 32, 1, 'slip-ref', value=0.3))
+        answers.extend(ear.heard('ABS_EVENT', 0.2))
+        return any('wire' in answer.message for answer in answers)
+
+    wait_for(refused, 'an answer comes')
+    answer = answers[-1]
+    check(answer.reason == 46 and 'wire' in answer.message and answer.stamp_ns > 0, 'a change between two runs is refused',
+          answer.reason, answer.message)
+    found, said = send('stop')
+    check(found == 0 and 'stop accepted' in said, 'a stop between two runs is taken', found, said)
+    words, errors = program.communicate(timeout=20)
+    check(program.returncode == 1 and 'ended by a stop command with 1 of 3 runs done, 0 ended early' in words,
+          'and ends the series', program.returncode, words, errors)
+    program = begin()
+    wait_for((out / 'run-0002' / 'run.lcmlog').exists, 'the second run begins')
+    found, said = send('stop')
+    check(found == 0, 'a stop in the second run', found, said)
+    words, errors = program.communicate(timeout=20)
+    check(program.returncode == 1 and 'ended by a stop command with 2 of 3 runs done' in words,
+          'ends the series, too', program.returncode, words, errors)
+
+
 def main():
     global abs_hil, PROGRAM, KEY
     PROGRAM, private_network, module = map(os.path.abspath, sys.argv[1:4])
@@ -245,6 +317,7 @@ def main():
         run_ends_meanwhile()
         stop_latency(folder, 5, False)
         stop_latency(folder, 3, True)
+        series(folder, key)
         garbage(folder)
 
 

@@ -1,5 +1,7 @@
 #include "abs_hil/telemetry/command_listener.hpp"
 
+#include <thread>
+
 #include "catch.hpp"
 #include "telemetry/message_capture.hpp"
 #include "telemetry/sample_records.hpp"
@@ -108,6 +110,26 @@ TEST_CASE("a flood gets few answers, but a stop in it is heard and answered") {
   bench.send("flood");
   bench.listener.poll();
   CHECK(bench.answers().size() == 12);
+}
+
+TEST_CASE("a stop that the thread took in is answered at the end; what comes later is not taken in") {
+  Bench bench;
+  bench.listener.listen();
+  bench.send("stop", "me");
+  while (!bench.listener.stop_requested()) std::this_thread::yield();
+  bench.stream.pass_time(7'000'000'000, 3.5);
+  bench.listener.finish();
+  const auto answers = bench.answers();
+  REQUIRE(answers.size() == 1);
+  CHECK(answers[0].message == "stop accepted (token 'me')");
+  CHECK(answers[0].stamp_ns == 7'000'000'000);
+  CHECK(answers[0].time_s == 3.5);
+
+  bench.send("stop", "too late");
+  bench.listener.poll();
+  CHECK_FALSE(bench.listener.listening());
+  CHECK(bench.listener.counts().stops == 1);
+  CHECK(bench.answers().size() == 1);
 }
 
 TEST_CASE("without a server there is nothing to hear, and polling is harmless") {

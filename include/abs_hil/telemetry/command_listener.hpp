@@ -62,8 +62,11 @@ class CommandListener {
   /// Answers what has arrived, at most 32 messages, and receives it first where there is no thread. Never waits. To be
   /// called from the stream's thread, some 10 to 100 times a second.
   void poll();
+  /// Takes in nothing from now on, and answers what has arrived: no stop is taken without an answer. Waits for the
+  /// thread, 50 ms at most (tcpq: 200 ms). From the stream's thread.
+  void finish();
 
-  /// False where the provider cannot receive (file://).
+  /// False where the provider cannot receive (file://), and after finish().
   [[nodiscard]] bool listening() const noexcept { return listening_; }
   [[nodiscard]] bool stop_requested() const noexcept { return stops_.load(std::memory_order_acquire) > 0; }
   [[nodiscard]] Counts counts() const noexcept;
@@ -89,6 +92,8 @@ class CommandListener {
   void take(std::span<const std::uint8_t> packet);
   void hand_over(Arrival arrival, bool is_stop);
   void subscribe();
+  void end_thread();
+  void answer_waiting(std::size_t at_most);
   void listen_until(const std::stop_token& stop);
   void answer(const Arrival& arrival);
   void say(rig::Reason reason, std::string message, std::uint64_t count, bool always);

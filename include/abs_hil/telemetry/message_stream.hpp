@@ -56,6 +56,9 @@ class MessageStream : public rig::RecordSink {
   /// FileError of theirs.
   void finish() override;
 
+  /// Where no records come, as between two runs: what is sent from now on is of this time.
+  void pass_time(std::int64_t stamp_ns, double time_s) noexcept;
+
   /// An event of kind "command": the answer to a message on ABS_COMMAND.
   void answer_command(rig::Reason reason, std::string message, double value);
 
@@ -67,7 +70,7 @@ class MessageStream : public rig::RecordSink {
   void send_command_state(command_state_t state);
 
   [[nodiscard]] const std::string& command_channel() const noexcept { return command_channel_; }
-  /// Run time of the latest record, s.
+  /// Run time of the latest record, or that which pass_time() gave; s.
   [[nodiscard]] double time_s() const noexcept { return latest_.time_s; }
   /// Messages that outlets could not pass on.
   [[nodiscard]] std::uint64_t failures() const noexcept;
