@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <optional>
+#include <string>
 #include <thread>
 
 #include "abs_hil/telemetry/command_listener.hpp"
@@ -26,9 +27,9 @@ class StopListener {
         commands_(lcm_, stream_, {}) {
     stream_.add(lcm_);
     commands_.set_judge([](const command2_t& command) {
-      return telemetry::CommandAnswer{
-          rig::Reason::command_not_now,
-          "refused '" + telemetry::printable(command.command, 64) + "': between two runs of a series only stop is taken"};
+      const std::string shown = telemetry::printable(command.command, 64);
+      return telemetry::CommandAnswer{rig::Reason::command_not_now,
+                                      "refused '" + shown + "': between two runs of a series only stop is taken"};
     });
     commands_.listen();
   }

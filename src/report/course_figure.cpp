@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "abs_hil/report/text.hpp"
-#include "plant_changes.hpp"
 
 namespace abs_hil::report {
 
@@ -22,9 +21,12 @@ Panel phase_strips(const std::vector<RunFiles>& runs, const std::vector<RunSurve
   Panel panel{.y_label = "", .y_range = Range{0.0, static_cast<double>(strips)}};
   panel.height_px = std::max(30.0, strip_px * static_cast<double>(strips));
   panel.grid = false;
+  std::vector<std::string> names;
+  for (std::size_t r = 0; r < strips; ++r) names.push_back(strips == 1 ? "" : runs[r].name);
+  names = short_names(names, short_name_characters);
   for (std::size_t r = 0; r < strips; ++r) {
     const double bottom = static_cast<double>(strips - 1 - r);
-    panel.y_tics.emplace_back(bottom + 0.5, strips == 1 ? "" : clean_text(runs[r].name, short_name_characters));
+    panel.y_tics.emplace_back(bottom + 0.5, names[r]);
     for (std::size_t i = 0; i < std::min(surveys[r].phases.size(), most_bars); ++i) {
       const PhaseInterval& phase = surveys[r].phases[i];
       panel.bars.push_back(
@@ -37,7 +39,7 @@ Panel phase_strips(const std::vector<RunFiles>& runs, const std::vector<RunSurve
     for (const PhaseInterval& phase : surveys[r].phases) {
       if (phase.phase == "fault" && runs[r].events.empty()) events.points.push_back({phase.from_s, bottom + 0.5});
     }
-    for (const PlantChange& change : plant_changes(runs[r], surveys[r])) {
+    for (const PlantChange& change : surveys[r].plant_changes) {
       if (events.points.size() < most_bars) events.points.push_back({change.time_s, bottom + 0.5});
     }
     if (!events.points.empty()) panel.curves.push_back(std::move(events));

@@ -6,8 +6,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "abs_hil/plant_sim/factor_profile.hpp"
-
 namespace abs_hil::report {
 
 namespace {
@@ -22,33 +20,53 @@ constexpr std::array<std::pair<const char*, const char*>, 5> profiles{{
     {"plant.lower_bearing_profile", "lower bearing"},
 }};
 
-void add_changes(const FactorProfile& profile, const char* what, const RunSurvey& survey,
-                 std::vector<PlantChange>& changes) {
-  if (profile.axis() != FactorProfile::Axis::time || (profile.from_braking() && !survey.brakes())) return;
-  const double zero_s = profile.from_braking() ? survey.brake_from_s : 0.0;
-  for (std::size_t i = 1; i < profile.pieces().size(); ++i) {
-    const FactorProfile::Piece& piece = profile.pieces()[i];
-    const double time_s = zero_s + piece.begin;
-    if (time_s > survey.to_s) return;
-    changes.push_back(
-        {time_s, piece.slope == 0.0 ? fmt::format("{} × {:.3g}", what, piece.value) : fmt::format("{} drifts", what)});
-  }
+std::string label_of(const std::string& what, const FactorProfile::Piece& piece) {
+  return piece.slope == 0.0 ? fmt::format("{} × {:.3g}", what, piece.value) : fmt::format("{} drifts", what);
 }
 
 }  // namespace
 
-std::vector<PlantChange> plant_changes(const RunFiles& run, const RunSurvey& survey) {
-  std::vector<PlantChange> changes;
+PlantChangeFinder::PlantChangeFinder(const RunFiles& run) {
   for (const auto& [key, what] : profiles) {
     const auto text = run.config.find(key);
     if (text == run.config.end()) continue;
     try {
-      add_changes(FactorProfile(text->second, key), what, survey, changes);
+      courses_.push_back({.what = what, .profile = FactorProfile(text->second, key)});
     } catch (const std::invalid_argument&) {
       // Another version's or a hand's: the run is worth showing without its marks.
     }
   }
-  return changes;
+}
+
+void PlantChangeFinder::see(double time_s, bool braking, double road_speed_m_s) {
+  if (std::exchange(started_, true)) rolled_m_ += 0.5 * (time_s - last_time_s_) * (last_speed_m_s_ + road_speed_m_s);
+  last_time_s_ = time_s;
+  last_speed_m_s_ = road_speed_m_s;
+  for (Course& course : courses_) {
+    if (!course.counting && (braking || !course.profile.from_braking())) {
+      course.counting = true;
+      if (course.profile.from_braking()) {
+        course.origin = course.profile.axis() == FactorProfile::Axis::time ? time_s : rolled_m_;
+      }
+    }
+    if (course.counting) advance(course, time_s, rolled_m_);
+  }
+}
+
+void PlantChangeFinder::advance(Course& course, double time_s, double rolled_m) {
+  const auto& pieces = course.profile.pieces();
+  const bool along_time = course.profile.axis() == FactorProfile::Axis::time;
+  const double position = (along_time ? time_s : rolled_m) - course.origin;
+  while (course.piece + 1 < pieces.size() && position >= pieces[course.piece + 1].begin) {
+    const FactorProfile::Piece& piece = pieces[++course.piece];
+    course.changes.push_back({along_time ? course.origin + piece.begin : time_s, label_of(course.what, piece)});
+  }
+}
+
+std::vector<PlantChange> PlantChangeFinder::changes() const {
+  std::vector<PlantChange> all;
+  for (const Course& course : courses_) all.insert(all.end(), course.changes.begin(), course.changes.end());
+  return all;
 }
 
 }  // namespace abs_hil::report

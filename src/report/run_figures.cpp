@@ -12,7 +12,6 @@
 #include "abs_hil/report/run_curves.hpp"
 #include "axis.hpp"
 #include "course_figure.hpp"
-#include "plant_changes.hpp"
 
 namespace abs_hil::report {
 
@@ -149,8 +148,8 @@ class FigureMaker {
           marks_.push_back({event.time_s - windows_[r].zero_s, event.event, event.event == "fault"});
         }
       }
-      for (PlantChange& change : plant_changes(runs_[r], surveys_[r])) {
-        mark_once({change.time_s - windows_[r].zero_s, std::move(change.label), false});
+      for (const PlantChange& change : surveys_[r].plant_changes) {
+        mark_once({change.time_s - windows_[r].zero_s, change.label, false});
       }
     }
   }

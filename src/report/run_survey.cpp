@@ -7,6 +7,7 @@
 #include "abs_hil/report/csv_reader.hpp"
 #include "abs_hil/report/input_error.hpp"
 #include "abs_hil/rig/parameters.hpp"
+#include "plant_changes.hpp"
 
 namespace abs_hil::report {
 
@@ -69,6 +70,7 @@ RunSurvey survey(const RunFiles& run) {
   RunSurvey survey;
   survey.r2_m = run.config_number("plant.r2_m", paper_r2_m);
   analysis::RunMetrics metrics(survey.r2_m, run.config_number("experiment.end_speed_m_s", default_end_speed_m_s));
+  PlantChangeFinder plant_changes(run);
   std::vector<bool> known(csv.columns().size(), false);
   bool braking = false;
   while (csv.next()) {
@@ -82,7 +84,9 @@ RunSurvey survey(const RunFiles& run) {
     for (std::size_t i = 0; i < known.size(); ++i) {
       if (!known[i] && !std::isnan(csv.values()[i])) known[i] = true;
     }
-    metrics.consume(maker.record(csv), maker.distance_m(csv));
+    const rig::CycleRecord record = maker.record(csv);
+    metrics.consume(record, maker.distance_m(csv));
+    plant_changes.see(time_s, braking, survey.r2_m * record.truth.speeds.omega2_rad_s);
   }
   if (survey.rows == 0) {
     throw InputError(run.csv, csv.truncated() ? 2 : 1,
@@ -92,6 +96,7 @@ RunSurvey survey(const RunFiles& run) {
   for (std::size_t i = 0; i < known.size(); ++i) {
     if (known[i]) survey.known_columns.push_back(csv.columns()[i]);
   }
+  survey.plant_changes = plant_changes.changes();
   survey.truncated = csv.truncated();
   survey.metrics = metrics.metrics();
   return survey;

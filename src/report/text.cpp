@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <map>
 
 namespace abs_hil::report {
 
@@ -49,6 +50,16 @@ bool is_control(std::string_view character) {
          (character >= "\u2066" && character <= "\u2069");
 }
 
+/// Bytes that two names begin with alike, as far as whole characters; some of the shorter one are always left.
+std::size_t common_bytes(std::string_view a, std::string_view b) {
+  constexpr std::size_t left = 2;
+  const std::size_t size = std::min(a.size(), b.size());
+  std::size_t n = 0;
+  while (n + left < size && a[n] == b[n]) ++n;
+  while (n > 0 && is_continuation(a[n])) --n;
+  return n;
+}
+
 std::string with_minus(std::string text) {
   if (text.starts_with('-')) text.replace(0, 1, minus);
   if (const auto exponent = text.find("e-"); exponent != std::string::npos) text.replace(exponent + 1, 1, minus);
@@ -68,6 +79,22 @@ std::string clean_text(std::string_view text, std::size_t most_characters) {
     text.remove_prefix(character.size());
   }
   return clean;
+}
+
+std::vector<std::string> short_names(const std::vector<std::string>& names, std::size_t most_characters) {
+  std::map<std::string, std::vector<std::size_t>> alike;
+  std::vector<std::string> shorts;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    shorts.push_back(clean_text(names[i], most_characters));
+    alike[shorts.back()].push_back(i);
+  }
+  for (const auto& [_, group] : alike) {
+    if (group.size() == 1) continue;
+    std::size_t begin = std::string::npos;
+    for (const std::size_t i : group) begin = std::min(begin, common_bytes(names[group.front()], names[i]));
+    for (const std::size_t i : group) shorts[i] = "\u2026" + clean_text(names[i].substr(begin), most_characters - 1);
+  }
+  return shorts;
 }
 
 std::string html_escape(std::string_view text) {

@@ -1,6 +1,8 @@
 #include "abs_hil/report/text.hpp"
 
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "catch.hpp"
 
@@ -24,6 +26,15 @@ TEST_CASE("Cleaned text is valid UTF-8 without control characters") {
                    "evil") == "\uFFFDevil");  // right-to-left override
   CHECK(clean_text("ααααα", 3) == "ααα…");
   CHECK(length_of("λ = 0.15") == 8);
+}
+
+TEST_CASE("Names cut short stay apart") {
+  using Names = std::vector<std::string>;
+  CHECK(short_names({"paper", "sliding-mode"}, 8) == Names{"paper", "sliding-…"});
+  CHECK(short_names({"2026-05-04-paper", "steep", "2026-05-07-paper"}, 8) == Names{"…4-paper", "steep", "…7-paper"});
+  CHECK(short_names({"afternoon", "afternoon (2)"}, 8) == Names{"…on", "…on (2)"});
+  CHECK(short_names({"Schlüssel-ä-rot", "Schlüssel-ö-rot"}, 8) == Names{"…ä-rot", "…ö-rot"});
+  CHECK(short_names({"", ""}, 8) == Names{"…", "…"});
 }
 
 TEST_CASE("Numbers are shown with a true minus sign and no minus zero") {

@@ -16,6 +16,12 @@ struct PhaseInterval {
   double to_s{0.0};
 };
 
+/// The simulated rig became another one while the run went on.
+struct PlantChange {
+  double time_s{0.0};   ///< since the start of the run
+  std::string label{};  ///< plain: "friction × 0.5", "friction drifts" where a slope begins
+};
+
 /// What a first reading of a run's rows tells.
 struct RunSurvey {
   std::size_t rows{0};
@@ -24,6 +30,7 @@ struct RunSurvey {
   std::vector<PhaseInterval> phases{};                            ///< in order; at most `most_phases`
   double brake_from_s{std::numeric_limits<double>::quiet_NaN()};  ///< start of the first braking; NaN without any
   double brake_to_s{std::numeric_limits<double>::quiet_NaN()};    ///< end of the last
+  std::vector<PlantChange> plant_changes{};                       ///< as the configuration says; those it reached
   bool truncated{false};                                          ///< the file ends within a row
   std::vector<std::string> known_columns{};                       ///< those with at least one number
   analysis::Metrics metrics{};                                    ///< computed from the rows
