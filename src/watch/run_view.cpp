@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "abs_hil/telemetry/event_detector.hpp"
 #include "abs_hil/telemetry/message_codec.hpp"
 
 namespace abs_hil::watch {
@@ -67,8 +68,13 @@ void RunView::take(const status_t& message, std::int64_t now_ns) {
 }
 
 void RunView::take(const event_t& message, std::int64_t now_ns) {
-  if (!admit(message.sequence, event_sequence_, now_ns)) return;
-  event_sequence_ = message.sequence;
+  if (message.kind == telemetry::event_kind::command && message.sequence <= event_sequence_) {
+    // Given between two runs of a series, where numbers begin anew: the run that has ended stays in view.
+    last_received_ns_ = now_ns;
+  } else {
+    if (!admit(message.sequence, event_sequence_, now_ns)) return;
+    event_sequence_ = message.sequence;
+  }
   events_.push_front(message);
   event_t& event = events_.front();
   for (std::string* text : {&event.kind, &event.reason_text, &event.message}) make_printable(*text);

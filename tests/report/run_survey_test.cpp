@@ -1,21 +1,17 @@
 #include "abs_hil/report/run_survey.hpp"
 
-#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <fstream>
 
+#include "abs_hil/report/csv_reader.hpp"
 #include "catch.hpp"
 #include "temporary_folder.hpp"
 
 namespace abs_hil::report {
 namespace {
-
-constexpr const char* header =
-    "time_s,phase,omega1_rad_s,omega2_rad_s,omega1_est_rad_s,omega2_est_rad_s,slip,slip_est,slip_ref,brake_torque_Nm,"
-    "brake_torque_ref_Nm,brake_torque_est_Nm,brake_pwm,motor_pwm,motor_enable,theta_N,theta_est_N,distance_m,"
-    "slip_velocity_error_m_s\n";
 
 /// The changes of a rig that rolls at 10 m/s and is braked from 1 s on with 2 m/s^2, a row every 10 ms.
 std::vector<PlantChange> changes_along(const std::string& key, const std::string& profile, bool truth_known = true) {
@@ -26,7 +22,7 @@ std::vector<PlantChange> changes_along(const std::string& key, const std::string
   run.config["plant.r2_m"] = fmt::format("{}", r2_m);
   run.config[key] = profile;
   std::ofstream csv(run.csv);
-  csv << header;
+  csv << fmt::format("{}\n", fmt::join(contract_columns(), ","));
   for (int i = 0; i <= 300; ++i) {
     const double time_s = i * 0.01;
     const double braking_s = std::max(0.0, time_s - 1.0);

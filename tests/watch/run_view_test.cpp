@@ -94,6 +94,20 @@ TEST_CASE("a publisher that starts again is another run, whichever message comes
   CHECK(view.lost() == 0);
 }
 
+TEST_CASE("an answer between two runs of a series leaves the run that has ended in view") {
+  RunView view(10.0);
+  for (std::int64_t i = 0; i < 30; ++i) view.take(event(i, "phase", "x"), 0);
+  feed(view, 0, 3000);
+  view.take(event(0, "command", "stop accepted"), 5000 * ms);
+  CHECK(view.runs() == 1);
+  CHECK(view.samples().size() == 3000);
+  CHECK(view.events().front().message == "stop accepted");
+  CHECK(view.silence_s(5000 * ms) == 0.0);
+  view.take(event(0, "phase", "run started"), 9000 * ms);
+  CHECK(view.runs() == 2);
+  CHECK(view.samples().empty());
+}
+
 TEST_CASE("silence and rate are those of the watcher's clock") {
   RunView view(10.0);
   CHECK_FALSE(view.silence_s(0));
