@@ -10,6 +10,8 @@ if [ "${1:-}" = --without-vm ]; then
   export ABS_HIL_CLEAN_ROOT_TESTS="release -LE 'vm|on-demand'"
   shift
 fi
+compgen -G "$source/build/release/packages/abs-hil_*.deb" >/dev/null ||
+  { echo "clean root: no abs-hil_*.deb in $source/build/release/packages: make it first, with scripts/package.sh" >&2; exit 2; }
 if [ "${ABS_HIL_CLEAN_ROOT_INNER:-}" != 1 ]; then
   root=${1:-$(mktemp -d /var/tmp/abs_hil_clean_root.XXXXXX)}
   [ $# -gt 0 ] || trap 'rm -rf --one-file-system "$root"' EXIT
