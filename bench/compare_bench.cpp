@@ -2,12 +2,12 @@
 
 #include <benchmark/benchmark.h>
 
-#include "abs_hil/comparison/comparison.hpp"
-#include "abs_hil/comparison/parallel.hpp"
+#include "study/comparison.hpp"
+#include "study/parallel.hpp"
 
 namespace {
 
-using namespace abs_hil::comparison;
+using namespace abs_hil::study;
 
 ComparisonPlan plan(std::size_t repeat, std::size_t threads) {
   ComparisonPlan plan{.controllers = {"adaptive", "sliding-mode"}, .repeat = repeat, .seed = 3, .threads = threads};

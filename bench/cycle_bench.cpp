@@ -5,9 +5,9 @@
 
 #include <vector>
 
-#include "abs_hil/control/tracking_observer.hpp"
-#include "abs_hil/runtime/spsc_ring.hpp"
+#include "control/tracking_observer.hpp"
 #include "experiment/simulated_run.hpp"
+#include "runtime/spsc_ring.hpp"
 
 namespace {
 

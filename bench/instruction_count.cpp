@@ -5,10 +5,10 @@
 #include <memory>
 #include <vector>
 
-#include "abs_hil/driver/sim/sim_driver.hpp"
-#include "abs_hil/runtime/cycle_watch.hpp"
-#include "abs_hil/runtime/cyclic_executive.hpp"
+#include "driver/sim/sim_driver.hpp"
 #include "experiment/simulated_run.hpp"
+#include "runtime/cyclic_executive.hpp"
+#include "runtime/heartbeat.hpp"
 
 using namespace abs_hil;
 
@@ -32,7 +32,7 @@ extern "C" {
 }
 
 /// Sign of life, a look for the guardian's, and the flight recorder.
-[[gnu::noinline]] bool counted_watchers(runtime::CycleWatch& watch, const rig::CycleRecord& record) {
+[[gnu::noinline]] bool counted_watchers(runtime::Heartbeat& watch, const rig::CycleRecord& record) {
   watch.beat();
   const bool lost = watch.guardian_lost();
   watch.keep(record);
@@ -56,8 +56,8 @@ int main() {
   runtime::RecordRing ring(64);
   std::vector<runtime::FlightSlot> slots(2000);
   runtime::FlightRing recorder(slots);
-  runtime::WatchPanel panel;
-  runtime::CycleWatch watch(panel, recorder, 1'000'000);
+  runtime::HeartbeatPanel panel;
+  runtime::Heartbeat watch(panel, recorder, 1'000'000);
   const auto statistics = std::make_unique<runtime::CycleStatistics>();
 
   rig::Measurement measurement;

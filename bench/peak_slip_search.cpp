@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "abs_hil/settings/config_file.hpp"
-#include "abs_hil/settings/settings.hpp"
+#include "config/config_file.hpp"
+#include "config/settings.hpp"
 #include "experiment/simulated_run.hpp"
 
 namespace {
@@ -82,9 +82,9 @@ Best best_constant_slip(const Setup& setup) {
 }
 
 Setup plant(const std::string& name, const std::string& friction) {
-  settings::Settings s;
-  settings::KeyTable table(s);
-  settings::load_file(settings::plant_file(name), table, "plant");
+  config::Settings s;
+  config::KeyTable table(s);
+  config::load_file(config::plant_file(name), table, "plant");
   Setup setup = experiment::test::braking("adaptive-peak");
   setup.plant = s.plant;
   setup.plant.friction_profile = friction;

@@ -7,11 +7,11 @@
 #include <filesystem>
 #include <vector>
 
-#include "abs_hil/telemetry/csv_sink.hpp"
-#include "abs_hil/telemetry/lcm_outlet.hpp"
-#include "abs_hil/telemetry/log_outlet.hpp"
-#include "abs_hil/telemetry/message_codec.hpp"
 #include "experiment/simulated_run.hpp"
+#include "telemetry/csv_sink.hpp"
+#include "telemetry/lcm_outlet.hpp"
+#include "telemetry/log_outlet.hpp"
+#include "telemetry/message_codec.hpp"
 
 namespace {
 

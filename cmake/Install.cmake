@@ -5,7 +5,7 @@ include(CMakePackageConfigHelpers)
 set(abs_hil_cmake_dir ${CMAKE_INSTALL_LIBDIR}/cmake/abs_hil)
 
 # Programs and what they need.
-set(programs abs_hil_program abs_tune)
+set(programs abs_hil_executable abs_tune)
 foreach(optional abs_rig_emulator abs_report abs_guardian)
   if(TARGET ${optional})
     list(APPEND programs ${optional})

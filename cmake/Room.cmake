@@ -1,21 +1,76 @@
-# abs_hil_room(NAME SOURCES ... KNOWS ... USES ...): the library of one room. KNOWS names the rooms that it may include,
-# USES other libraries that its public headers need, PRIVATE ones that only its sources need.
+# abs_hil_room(NAME SOURCES ... USES ... PRIVATE ...): the library of one room of the table (cmake/Rooms.cmake). USES
+# names libraries that its headers need, PRIVATE ones that only its sources need.
+#
+# Public headers stand in include/abs_hil/NAME and are included as "abs_hil/NAME/x.hpp"; the others stand beside their
+# sources in src/NAME and are included as "NAME/x.hpp". Each room has an include folder of its own that holds nothing
+# but links to these two. A room's sources see its own and those of the rooms that it may know, and no others: rooms are
+# linked privately, so what a known room knows is not seen.
+include(Rooms)
+
+option(ABS_HIL_UNITY "Compile the sources of a room together: half the time from scratch, more after a small change" ON)
+set(ABS_HIL_ROOM_FOLDERS ${CMAKE_BINARY_DIR}/rooms)
+set(room_lines "room\tholds\tmay know\n")
+set(ABS_HIL_ROOM_NAMES)
+foreach(row IN LISTS ABS_HIL_ROOM_TABLE)
+  string(REPLACE " | " ";" row "${row} ")
+  list(GET row 0 room)
+  list(GET row 1 holds)
+  list(GET row 2 knows)
+  string(STRIP "${knows}" knows)
+  string(APPEND room_lines "${room}\t${holds}\t${knows}\n")
+  string(REPLACE " " ";" ABS_HIL_KNOWN_TO_${room} "${knows}")
+  foreach(known IN LISTS ABS_HIL_KNOWN_TO_${room})
+    if(NOT known IN_LIST ABS_HIL_ROOM_NAMES)
+      message(FATAL_ERROR "cmake/Rooms.cmake: ${room} may not know ${known}, which does not stand above it")
+    endif()
+  endforeach()
+  list(APPEND ABS_HIL_ROOM_NAMES ${room})
+endforeach()
+file(WRITE ${CMAKE_BINARY_DIR}/rooms.tsv "${room_lines}")
+
+# The include folder of one room.
+function(abs_hil_room_folder room)
+  set(folder ${ABS_HIL_ROOM_FOLDERS}/${room})
+  file(MAKE_DIRECTORY ${folder}/abs_hil)
+  set(sources ${PROJECT_SOURCE_DIR}/src/${room})
+  set(headers ${PROJECT_SOURCE_DIR}/include/abs_hil/${room})
+  if(EXISTS ${sources})
+    file(CREATE_LINK ${sources} ${folder}/${room} SYMBOLIC)
+  endif()
+  if(EXISTS ${headers})
+    file(CREATE_LINK ${headers} ${folder}/abs_hil/${room} SYMBOLIC)
+  endif()
+endfunction()
+
 function(abs_hil_room name)
-  cmake_parse_arguments(ROOM "" "" "SOURCES;KNOWS;USES;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ROOM "" "" "SOURCES;USES;PRIVATE" ${ARGN})
+  if(NOT name IN_LIST ABS_HIL_ROOM_NAMES)
+    message(FATAL_ERROR "cmake/Rooms.cmake has no room ${name}")
+  endif()
+  set(known ${ABS_HIL_KNOWN_TO_${name}})
+  list(TRANSFORM known PREPEND abs_hil_)
+  abs_hil_room_folder(${name})
+  set(folder $<BUILD_INTERFACE:${ABS_HIL_ROOM_FOLDERS}/${name}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   if(ROOM_SOURCES)
     add_library(abs_hil_${name} STATIC ${ROOM_SOURCES})
-    set(scope PUBLIC)
-    target_link_libraries(abs_hil_${name} PRIVATE $<BUILD_INTERFACE:abs_hil_warnings> ${ROOM_PRIVATE})
+    target_link_libraries(abs_hil_${name} PUBLIC ${ROOM_USES}
+      PRIVATE $<BUILD_INTERFACE:abs_hil_warnings> ${known} ${ROOM_PRIVATE})
+    target_include_directories(abs_hil_${name} PUBLIC ${folder})
+    # Several sources at a time: most of a source's cost are the headers that its neighbours need as well.
+    set_target_properties(abs_hil_${name} PROPERTIES UNITY_BUILD ${ABS_HIL_UNITY} UNITY_BUILD_BATCH_SIZE 12)
   else()
     add_library(abs_hil_${name} INTERFACE)
-    set(scope INTERFACE)
+    target_link_libraries(abs_hil_${name} INTERFACE ${ROOM_USES})
+    target_include_directories(abs_hil_${name} INTERFACE ${folder})
   endif()
   add_library(abs_hil::${name} ALIAS abs_hil_${name})
-  target_include_directories(abs_hil_${name} ${scope}
-    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-  list(TRANSFORM ROOM_KNOWS PREPEND abs_hil_)
-  target_link_libraries(abs_hil_${name} ${scope} ${ROOM_KNOWS} ${ROOM_USES})
   # Installed, a room has the name that it has here: abs_hil::NAME (cmake/Install.cmake).
   set_target_properties(abs_hil_${name} PROPERTIES EXPORT_NAME ${name})
   set_property(GLOBAL APPEND PROPERTY ABS_HIL_ROOMS abs_hil_${name})
 endfunction()
+
+# Tests and benchmarks look into every room: the include folders of all, and nothing to link.
+add_library(abs_hil_every_room INTERFACE)
+list(TRANSFORM ABS_HIL_ROOM_NAMES PREPEND ${ABS_HIL_ROOM_FOLDERS}/ OUTPUT_VARIABLE every_room_folder)
+target_include_directories(abs_hil_every_room INTERFACE ${every_room_folder})
+target_link_libraries(abs_hil_every_room INTERFACE Eigen3::Eigen abs_hil_lcmtypes)

@@ -13,15 +13,15 @@
 #include <string>
 #include <string_view>
 
-#include "abs_hil/driver/safe_state_writer.hpp"
-#include "abs_hil/guardian/brief.hpp"
-#include "abs_hil/guardian/duty.hpp"
-#include "abs_hil/guardian/guardian_process.hpp"
-#include "abs_hil/guardian/linux_process.hpp"
-#include "abs_hil/runtime/realtime_setup.hpp"
-#include "abs_hil/settings/config_json.hpp"
-#include "abs_hil/settings/key_table.hpp"
-#include "abs_hil/telemetry/flight_record.hpp"
+#include "config/config_json.hpp"
+#include "config/key_table.hpp"
+#include "driver/factory.hpp"
+#include "guardian/guardian_loop.hpp"
+#include "guardian/guardian_process.hpp"
+#include "guardian/launch_config.hpp"
+#include "guardian/linux_process.hpp"
+#include "runtime/realtime_setup.hpp"
+#include "telemetry/flight_record.hpp"
 
 namespace {
 
@@ -62,7 +62,7 @@ std::string inherited_text(int fd) {
   return text;
 }
 
-runtime::RealtimeOptions realtime_options(const settings::Settings& s, const std::string& mode) {
+runtime::RealtimeOptions realtime_options(const config::Settings& s, const std::string& mode) {
   // Above the controller: one that runs wild must not keep its guardian from the processor.
   constexpr int highest = 99;
   runtime::RealtimeOptions options{.priority = std::min(s.realtime.priority + 1, highest)};
@@ -74,20 +74,20 @@ runtime::RealtimeOptions realtime_options(const settings::Settings& s, const std
 
 /// Everything that a guardian on duty needs, made before the controller goes on.
 struct Post {
-  guardian::Brief brief{};
-  settings::Settings settings{};
+  guardian::LaunchConfig brief{};
+  config::Settings settings{};
   std::unique_ptr<driver::SafeStateWriter> writer{};
   std::unique_ptr<runtime::RealtimeScope> realtime{};
 };
 
 Post take_post() {
-  Post post{.brief = guardian::parse_brief(inherited_text(guardian::inherited_brief))};
-  settings::KeyTable keys(post.settings);
+  Post post{.brief = guardian::parse_launch_config(inherited_text(guardian::inherited_launch_config))};
+  config::KeyTable keys(post.settings);
   // No more than it needs: whatever else the controller knows, names of its own controllers say, may be unknown here.
   const auto config = nlohmann::ordered_json::parse(post.brief.config_json);
   for (const char* table : {"driver", "guardian", "realtime", "telemetry"}) {
     const nlohmann::ordered_json part{{table, config.at(table)}};
-    static_cast<void>(settings::load_json(part, keys, "the controller's configuration"));
+    static_cast<void>(config::load_json(part, keys, "the controller's configuration"));
   }
   post.writer = driver::make_safe_state_writer(post.settings.driver);
   post.writer->prepare();
@@ -99,10 +99,10 @@ Post take_post() {
   return post;
 }
 
-void leave_record(const Post& post, const guardian::SharedRegion& region, const guardian::DutyReport& report,
+void leave_record(const Post& post, const guardian::SharedRegion& region, const guardian::GuardianReport& report,
                   std::string account) {
   if (post.brief.record_prefix.empty()) return;
-  const settings::Settings& s = post.settings;
+  const config::Settings& s = post.settings;
   const auto records = region.recorder().contents();
   std::vector<std::string> problems;
   const auto files = telemetry::write_flight_record(post.brief.record_prefix,
@@ -127,11 +127,11 @@ int stand_guard() {
   guardian::LinuxProcess controller(guardian::inherited_controller);
   const Post post = take_post();
   runtime::MonotonicClock clock;
-  guardian::Duty duty(clock, controller, region, *post.writer, post.settings.guardian);
+  guardian::GuardianLoop duty(clock, controller, region, *post.writer, post.settings.guardian);
   const bool prefers = post.brief.realtime == "prefer" && !post.realtime->report().realtime();
   tell_controller("ready " + (prefers ? post.realtime->report().shortcomings() : std::string()));
 
-  const guardian::DutyReport report = duty.run();
+  const guardian::GuardianReport report = duty.run();
   if (report.reason == rig::Reason::none) return exit_verified;
   // From here on nothing is urgent any more.
   const std::string account = guardian::to_text(report, controller_pid);
@@ -151,7 +151,7 @@ int main(int argc, char** argv) {
         "(docs/dead-man.md).");
     return 0;
   }
-  if (argc != 1 || ::fcntl(guardian::inherited_brief, F_GETFD) < 0) {
+  if (argc != 1 || ::fcntl(guardian::inherited_launch_config, F_GETFD) < 0) {
     std::fputs("abs_guardian: the dead-man beside a run; abs_hil starts it by itself (docs/dead-man.md)\n", stderr);
     return 2;
   }

@@ -1,3 +1,3 @@
-#include "abs_hil/app/program.hpp"
+#include "abs_hil/program/program.hpp"
 
-int main(int argc, char** argv) { return abs_hil::app::run_program(argc, argv); }
+int main(int argc, char** argv) { return abs_hil::program::run_program(argc, argv); }

@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "abs_hil/analysis/result_file.hpp"
-#include "abs_hil/report/export.hpp"
-#include "abs_hil/report/input_error.hpp"
-#include "abs_hil/report/report.hpp"
+#include "analysis/result_file.hpp"
+#include "report/export.hpp"
+#include "report/input_error.hpp"
+#include "report/report.hpp"
 
 namespace {
 

@@ -14,7 +14,7 @@
 #include <cstring>
 #include <stdexcept>
 
-namespace abs_hil::app {
+namespace abs_hil::program {
 
 namespace {
 
@@ -98,4 +98,4 @@ void BusSocket::send(const emulator::BusFrame& frame) {
   static_cast<void>(::send(client_, &raw, frame.fd ? CANFD_MTU : CAN_MTU, MSG_DONTWAIT | MSG_NOSIGNAL));
 }
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::program

@@ -2,9 +2,9 @@
 
 #include <string>
 
-#include "abs_hil/emulator/can_node.hpp"
+#include "emulator/can_node.hpp"
 
-namespace abs_hil::app {
+namespace abs_hil::program {
 
 /// The emulated node's end of the bus: a raw CAN socket, or for "unix:PATH" an AF_UNIX socket of type SOCK_SEQPACKET
 /// that it listens on, one client at a time.
@@ -34,4 +34,4 @@ class BusSocket {
   std::string path_{};
 };
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::program

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
-namespace abs_hil::app {
+namespace abs_hil::program {
 
 ControlCommand::ControlCommand(std::string_view line) : line_(line) {
   std::string word;
@@ -41,4 +41,4 @@ void ControlCommand::refuse(const char* known) const {
   throw std::invalid_argument("unknown command \"" + line_ + "\"; known are\n" + known);
 }
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::program

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-namespace abs_hil::app {
+namespace abs_hil::program {
 
 /// One line of control: a name and its arguments.
 class ControlCommand {
@@ -55,4 +55,4 @@ bool obey_turn(Board& board, const ControlCommand& command) {
   return true;
 }
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::program

@@ -10,7 +10,7 @@
 #include <cstring>
 #include <stdexcept>
 
-namespace abs_hil::app {
+namespace abs_hil::program {
 
 void say(const std::string& text) {
   fmt::print("{}\n", text);
@@ -46,4 +46,4 @@ void ControlFifo::take(const Obey& obey) {
   }
 }
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::program

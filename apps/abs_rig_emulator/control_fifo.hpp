@@ -3,7 +3,7 @@
 #include <functional>
 #include <string>
 
-namespace abs_hil::app {
+namespace abs_hil::program {
 
 /// A line of output, seen at once by who waits for it.
 void say(const std::string& text);
@@ -28,4 +28,4 @@ class ControlFifo {
   std::string pending_{};
 };
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::program

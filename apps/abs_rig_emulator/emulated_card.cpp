@@ -5,11 +5,11 @@
 #include <cerrno>
 #include <cstring>
 
-#include "abs_hil/driver/pci/discovery.hpp"
-#include "abs_hil/runtime/clock.hpp"
 #include "control_command.hpp"
+#include "driver/pci/discovery.hpp"
+#include "runtime/clock.hpp"
 
-namespace abs_hil::app {
+namespace abs_hil::program {
 
 namespace {
 
@@ -140,4 +140,4 @@ std::string EmulatedCard::obey(std::string_view line) {
   return status();
 }
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::program

@@ -7,12 +7,12 @@
 #include <string>
 #include <string_view>
 
-#include "abs_hil/emulator/card_model.hpp"
-#include "abs_hil/emulator/register_faults.hpp"
+#include "emulator/card_model.hpp"
+#include "emulator/register_faults.hpp"
 #include "fuse_tree.hpp"
 #include "truth_file.hpp"
 
-namespace abs_hil::app {
+namespace abs_hil::program {
 
 /// What the emulator is started with.
 struct EmulatorOptions {
@@ -59,4 +59,4 @@ class EmulatedCard final : public FileHandler {
   std::ofstream traffic_{};
 };
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::program

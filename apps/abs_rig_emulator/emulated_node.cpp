@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include "abs_hil/driver/monotonic_time.hpp"
 #include "control_command.hpp"
 #include "control_fifo.hpp"
+#include "driver/monotonic_time.hpp"
 
-namespace abs_hil::app {
+namespace abs_hil::program {
 
 namespace {
 
@@ -88,4 +88,4 @@ std::string EmulatedNode::obey(std::string_view line) {
   return status();
 }
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::program

@@ -4,11 +4,11 @@
 #include <string>
 #include <string_view>
 
-#include "abs_hil/emulator/can_node.hpp"
-#include "abs_hil/emulator/can_node_faults.hpp"
 #include "bus_socket.hpp"
+#include "emulator/can_node.hpp"
+#include "emulator/can_node_faults.hpp"
 
-namespace abs_hil::app {
+namespace abs_hil::program {
 
 /// The CAN I/O node on its bus: time, faults, log and the control commands.
 class EmulatedNode {
@@ -37,4 +37,4 @@ class EmulatedNode {
   std::int64_t started_ns_{0};
 };
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::program

@@ -13,10 +13,10 @@
 #include <stdexcept>
 #include <utility>
 
-#include "abs_hil/driver/monotonic_time.hpp"
 #include "control_command.hpp"
+#include "driver/monotonic_time.hpp"
 
-namespace abs_hil::app {
+namespace abs_hil::program {
 
 namespace {
 
@@ -184,4 +184,4 @@ std::string EmulatedUsb::obey(std::string_view line) {
   return status();
 }
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::program

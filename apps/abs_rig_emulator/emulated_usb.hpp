@@ -5,12 +5,12 @@
 #include <string_view>
 #include <vector>
 
-#include "abs_hil/driver/file_descriptor.hpp"
-#include "abs_hil/emulator/usb_board_model.hpp"
-#include "abs_hil/emulator/usbip_device.hpp"
+#include "driver/file_descriptor.hpp"
+#include "emulator/usb_board_model.hpp"
+#include "emulator/usbip_device.hpp"
 #include "truth_file.hpp"
 
-namespace abs_hil::app {
+namespace abs_hil::program {
 
 /// What the emulated USB board is started with.
 struct UsbEmulatorOptions {
@@ -54,4 +54,4 @@ class EmulatedUsb {
   TruthFile truth_;
 };
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::program

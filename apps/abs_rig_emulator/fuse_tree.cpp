@@ -10,7 +10,7 @@
 #include <cstring>
 #include <stdexcept>
 
-namespace abs_hil::app {
+namespace abs_hil::program {
 
 struct FuseTree::State {
   std::vector<std::string> folders;
@@ -225,4 +225,4 @@ bool FuseTree::serve_one() {
   return fuse_session_exited(state_->session) == 0;
 }
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::program

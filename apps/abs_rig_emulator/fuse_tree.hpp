@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-namespace abs_hil::app {
+namespace abs_hil::program {
 
 /// One file of the tree below the card's folder.
 struct ServedFile {
@@ -54,4 +54,4 @@ class FuseTree {
   State* state_;
 };
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::program

@@ -16,12 +16,12 @@
 #include <string>
 #include <vector>
 
-#include "abs_hil/driver/pci/discovery.hpp"
-#include "abs_hil/settings/config_error.hpp"
-#include "abs_hil/settings/config_file.hpp"
-#include "abs_hil/settings/key_table.hpp"
 #include "bus_socket.hpp"
+#include "config/config_error.hpp"
+#include "config/config_file.hpp"
+#include "config/key_table.hpp"
 #include "control_fifo.hpp"
+#include "driver/pci/discovery.hpp"
 #include "emulated_card.hpp"
 #include "emulated_node.hpp"
 #include "emulated_usb.hpp"
@@ -35,10 +35,10 @@ std::atomic<bool> stop_requested{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may touch nothing else");
 
 struct Arguments {
-  app::EmulatorOptions emulator{};
+  program::EmulatorOptions emulator{};
   std::string pci_root{};
   std::string can_interface{};
-  app::UsbEmulatorOptions usb{};
+  program::UsbEmulatorOptions usb{};
   bool use_usb{false};
   std::uint16_t watchdog_ms{20};
   std::vector<std::string> bdfs{"0000:03:00.0"};
@@ -67,7 +67,7 @@ void add_card_options(CLI::App& cli, emulator::CardOptions& card) {
   cli.add_flag("--trip-clears-width", card.trip_clears_width, "a trip zeroes the PWM width registers too: not known");
 }
 
-void add_usb_options(CLI::App& cli, app::UsbEmulatorOptions& usb) {
+void add_usb_options(CLI::App& cli, program::UsbEmulatorOptions& usb) {
   cli.add_option("--usb-serial", usb.identity.serial, "what the USB board says it is")->capture_default_str();
   cli.add_option("--usb-manufacturer", usb.identity.manufacturer, "what it says it is")->capture_default_str();
   cli.add_option("--vhci", usb.controller, "folder of the virtual host controller")->capture_default_str();
@@ -113,17 +113,18 @@ void add_options(CLI::App& cli, Arguments& a) {
       ->capture_default_str();
   add_card_options(cli, a.emulator.card);
   add_usb_options(cli, a.usb);
-  cli.footer(std::string("Control commands (--command, --control) of a card:\n") + app::EmulatedCard::commands() +
-             "of a CAN node:\n" + app::EmulatedNode::commands() + "of a USB board:\n" + app::EmulatedUsb::commands());
+  cli.footer(std::string("Control commands (--command, --control) of a card:\n") + program::EmulatedCard::commands() +
+             "of a CAN node:\n" + program::EmulatedNode::commands() + "of a USB board:\n" +
+             program::EmulatedUsb::commands());
 }
 
 void read_plant(Arguments& a) {
-  settings::Settings s;
-  settings::KeyTable keys(s);
-  settings::load_file(settings::plant_file(a.plant), keys, "plant");
+  config::Settings s;
+  config::KeyTable keys(s);
+  config::load_file(config::plant_file(a.plant), keys, "plant");
   for (const std::string& assignment : a.assignments) {
     if (!assignment.starts_with("plant.")) {
-      throw settings::ConfigError("--set " + assignment + ": the emulator takes plant values alone");
+      throw config::ConfigError("--set " + assignment + ": the emulator takes plant values alone");
     }
     keys.set_text(assignment, "--set");
   }
@@ -131,17 +132,18 @@ void read_plant(Arguments& a) {
 }
 
 /// The files of sysfs that a driver looks at.
-std::vector<app::ServedFile> files_of(const Arguments& a) {
+std::vector<program::ServedFile> files_of(const Arguments& a) {
   constexpr std::uint64_t bar_start = 0xE000;
   const std::string flags = a.bar_kind == "io" ? "0x0000000000040101" : "0x0000000000040200";
   const std::string none = "0x0000000000000000 0x0000000000000000 0x0000000000000000\n";
   const std::string bar2 = fmt::format("0x{:016x} 0x{:016x} {}\n", bar_start, bar_start + a.bar_bytes - 1, flags);
-  std::vector<app::ServedFile> files{{.name = "vendor", .content = a.vendor + "\n"},
-                                     {.name = "device", .content = a.device + "\n"},
-                                     {.name = "class", .content = "0x068000\n"},
-                                     {.name = "enable", .content = "1\n"},
-                                     {.name = "resource", .content = none + none + bar2 + none + none + none + none},
-                                     {.name = "resource2", .bytes = a.bar_bytes, .registers = true, .mode = 0600}};
+  std::vector<program::ServedFile> files{
+      {.name = "vendor", .content = a.vendor + "\n"},
+      {.name = "device", .content = a.device + "\n"},
+      {.name = "class", .content = "0x068000\n"},
+      {.name = "enable", .content = "1\n"},
+      {.name = "resource", .content = none + none + bar2 + none + none + none + none},
+      {.name = "resource2", .bytes = a.bar_bytes, .registers = true, .mode = 0600}};
   if (a.emulator.lock_step) {
     files.push_back({.name = driver::pci::emulated_time_file, .bytes = 8, .registers = true, .mode = 0600});
   }
@@ -164,8 +166,8 @@ void take_priority(const Arguments& a) {
   sched_param wanted{};
   wanted.sched_priority = a.priority;
   if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0 || sched_setscheduler(0, SCHED_FIFO, &wanted) != 0) {
-    app::say(std::string("not in real time (") + std::strerror(errno) +
-             "): slow answers are to be expected; see abs_hil doctor, or --priority 0");
+    program::say(std::string("not in real time (") + std::strerror(errno) +
+                 "): slow answers are to be expected; see abs_hil doctor, or --priority 0");
   }
 }
 
@@ -182,8 +184,8 @@ void obey_first(const Arguments& a, Board& board) {
 /// that the host has gone for good.
 template <typename Board, typename Host, typename ServeHost>
 int serve_until_stopped(const Arguments& a, Board& board, const std::string& place, Host host, ServeHost serve_host) {
-  app::ControlFifo control(a.control_fifo);
-  app::say("ready: " + place);
+  program::ControlFifo control(a.control_fifo);
+  program::say("ready: " + place);
   bool serving = true;
   while (serving && !stop_requested) {
     std::array<pollfd, 2> ready{{{host(), POLLIN, 0}, {control.descriptor(), POLLIN, 0}}};
@@ -192,21 +194,21 @@ int serve_until_stopped(const Arguments& a, Board& board, const std::string& pla
     if (ready[1].revents != 0) control.take([&board](const std::string& line) { return board.obey(line); });
     board.catch_up();
   }
-  app::say("ended: " + board.status());
+  program::say("ended: " + board.status());
   return 0;
 }
 
 int serve_node(const Arguments& a) {
-  app::BusSocket bus(a.can_interface);
-  app::EmulatedNode node({.plant = a.emulator.card.plant,
-                          .start_speed_rad_s = a.emulator.card.start_speed_rad_s,
-                          .watchdog_ms = a.watchdog_ms,
-                          .lock_step = a.emulator.lock_step,
-                          .can_fd = bus.can_fd(),
-                          .supply_min_V = a.emulator.card.supply_min_V,
-                          .temperature_max_C = static_cast<double>(a.emulator.card.temperature_max_C),
-                          .overspeed_rpm = a.emulator.card.overspeed_rpm},
-                         a.emulator.seed);
+  program::BusSocket bus(a.can_interface);
+  program::EmulatedNode node({.plant = a.emulator.card.plant,
+                              .start_speed_rad_s = a.emulator.card.start_speed_rad_s,
+                              .watchdog_ms = a.watchdog_ms,
+                              .lock_step = a.emulator.lock_step,
+                              .can_fd = bus.can_fd(),
+                              .supply_min_V = a.emulator.card.supply_min_V,
+                              .temperature_max_C = static_cast<double>(a.emulator.card.temperature_max_C),
+                              .overspeed_rpm = a.emulator.card.overspeed_rpm},
+                             a.emulator.seed);
   obey_first(a, node);
   pin_to(a.cpu);
   take_priority(a);
@@ -223,7 +225,7 @@ int serve_usb(Arguments& a) {
   a.usb.truth_file = a.emulator.truth_file;
   pin_to(a.cpu);
   take_priority(a);
-  app::EmulatedUsb board(a.usb);
+  program::EmulatedUsb board(a.usb);
   obey_first(a, board);
   return serve_until_stopped(
       a, board, board.place(), [&board] { return board.descriptor(); }, [&board] { return board.serve(); });
@@ -233,12 +235,12 @@ int serve(Arguments& a) {
   read_plant(a);
   if (a.use_usb) return serve_usb(a);
   if (!a.can_interface.empty()) return serve_node(a);
-  app::EmulatedCard card(a.emulator);
+  program::EmulatedCard card(a.emulator);
   obey_first(a, card);
   pin_to(a.cpu);
   take_priority(a);
   std::filesystem::create_directories(a.pci_root);
-  app::FuseTree tree(a.pci_root, a.bdfs, files_of(a), card);
+  program::FuseTree tree(a.pci_root, a.bdfs, files_of(a), card);
   return serve_until_stopped(
       a, card, "card " + a.bdfs.front() + " in " + a.pci_root, [&tree] { return tree.descriptor(); },
       [&tree] { return tree.serve_one(); });
@@ -264,7 +266,7 @@ int main(int argc, char** argv) {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
   try {
     return run(argc, argv);
-  } catch (const settings::ConfigError& error) {
+  } catch (const config::ConfigError& error) {
     fmt::print(stderr, "abs_rig_emulator: {}\n", error.what());
     return 2;
   } catch (const std::invalid_argument& error) {

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <stdexcept>
 
-namespace abs_hil::app {
+namespace abs_hil::program {
 
 void open_for_writing(std::ofstream& stream, const std::string& file) {
   stream.close();
@@ -27,4 +27,4 @@ void TruthFile::write(std::int64_t time_ns, const rig::PlantTruth& truth, const 
                          truth.theta_N, out.drive_duty, out.brake_duty);
 }
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::program

@@ -4,10 +4,10 @@
 #include <fstream>
 #include <string>
 
-#include "abs_hil/emulator/card_model.hpp"
 #include "abs_hil/rig/cycle_record.hpp"
+#include "emulator/card_model.hpp"
 
-namespace abs_hil::app {
+namespace abs_hil::program {
 
 /// Opens a file that the emulator writes aside, truth or traffic. Throws std::runtime_error.
 void open_for_writing(std::ofstream& stream, const std::string& file);
@@ -40,4 +40,4 @@ class TruthFile {
   std::int64_t next_ns_{0};
 };
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::program

@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "abs_hil/analysis/result_file.hpp"
-#include "abs_hil/comparison/parallel.hpp"
-#include "abs_hil/comparison/tuning.hpp"
-#include "abs_hil/settings/config_error.hpp"
-#include "abs_hil/settings/config_file.hpp"
-#include "abs_hil/settings/key_table.hpp"
+#include "analysis/result_file.hpp"
+#include "config/config_error.hpp"
+#include "config/config_file.hpp"
+#include "config/key_table.hpp"
+#include "study/parallel.hpp"
+#include "study/tuning.hpp"
 
 namespace {
 
@@ -25,16 +25,16 @@ struct Options {
   std::vector<std::string> plants{"paper-table1", "paper-timing"};
   std::string folder{};
   std::size_t cases{6};
-  comparison::SearchOptions search{};
+  study::SearchOptions search{};
 };
 
-comparison::TrainingSet training_set(const Options& o) {
-  comparison::TrainingSet training{.cases_per_plant = o.cases};
+study::TrainingSet training_set(const Options& o) {
+  study::TrainingSet training{.cases_per_plant = o.cases};
   for (const std::string& plant : o.plants) {
-    settings::Settings& s = training.plants.emplace_back();
-    settings::KeyTable keys(s);
+    config::Settings& s = training.plants.emplace_back();
+    config::KeyTable keys(s);
     s.plant_name = plant;
-    settings::load_file(settings::plant_file(plant), keys, "plant");
+    config::load_file(config::plant_file(plant), keys, "plant");
     s.experiment.start_speed_rad_s = start_speed_rad_s;
   }
   return training;
@@ -43,13 +43,13 @@ comparison::TrainingSet training_set(const Options& o) {
 void tune(const std::string& controller, const Options& o) {
   const std::filesystem::path path = std::filesystem::path(o.folder) / (controller + ".toml");
   analysis::ResultFile file(path, "the gains");
-  const auto result = comparison::tune(controller, training_set(o), o.search, [&](std::size_t generation, double cost) {
+  const auto result = study::tune(controller, training_set(o), o.search, [&](std::size_t generation, double cost) {
     fmt::print(stderr, "{}: generation {} of {}, cost {:.5f}\n", controller, generation, o.search.generations, cost);
   });
   const std::string comment =
       fmt::format("abs_tune --controllers {} --plants {} --cases {} --generations {} --seed {} (docs/comparison.md)",
                   controller, fmt::join(o.plants, ","), o.cases, o.search.generations, o.search.seed);
-  const std::string text = comparison::to_toml(controller, result, comment);
+  const std::string text = study::to_toml(controller, result, comment);
   file.write(text);
   fmt::print("{}: cost {:.5f}, with the gains so far {:.5f}\n{}\n", controller, result.cost, result.start_cost, text);
 }
@@ -66,7 +66,7 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(1, 10'000))
       ->capture_default_str();
   cli.add_option("--seed", o.search.seed, "seed of the search")->capture_default_str();
-  o.search.threads = comparison::machine_threads();
+  o.search.threads = study::machine_threads();
   cli.add_option("--threads", o.search.threads, "changes no figure")->check(CLI::Range(1, 1024));
   try {
     cli.parse(argc, argv);
@@ -76,7 +76,7 @@ int run(int argc, char** argv) {
     return 2;
   }
   if (o.controllers.empty()) {
-    for (const std::string_view name : comparison::tunable_controllers()) o.controllers.emplace_back(name);
+    for (const std::string_view name : study::tunable_controllers()) o.controllers.emplace_back(name);
   }
   for (const std::string& controller : o.controllers) tune(controller, o);
   return 0;

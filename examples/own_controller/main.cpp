@@ -1,6 +1,6 @@
 // abs_hil with a controller of one's own: on the simulated rig and on the real one, with every option of abs_hil.
-#include <abs_hil/app/program.hpp>
 #include <abs_hil/control/slip_error_dynamics.hpp>
+#include <abs_hil/program/program.hpp>
 
 namespace {
 
@@ -29,4 +29,4 @@ constexpr ControllerEntry own[]{
 
 }  // namespace
 
-int main(int argc, char** argv) { return abs_hil::app::run_program(argc, argv, own); }
+int main(int argc, char** argv) { return abs_hil::program::run_program(argc, argv, own); }

@@ -1,4 +1,4 @@
-#include "abs_hil/analysis/friction_curve.hpp"
+#include "analysis/friction_curve.hpp"
 
 #include <fmt/format.h>
 
@@ -7,9 +7,9 @@
 #include <array>
 #include <cmath>
 
-#include "abs_hil/analysis/json_number.hpp"
 #include "abs_hil/rig/encoder_scale.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
+#include "analysis/json_number.hpp"
 
 namespace abs_hil::analysis {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/analysis/result_file.hpp"
+#include "analysis/result_file.hpp"
 
 #include <fmt/format.h>
 

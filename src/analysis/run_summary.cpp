@@ -1,11 +1,11 @@
-#include "abs_hil/analysis/run_summary.hpp"
+#include "analysis/run_summary.hpp"
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <utility>
 
-#include "abs_hil/analysis/json_number.hpp"
+#include "analysis/json_number.hpp"
 
 namespace abs_hil::analysis {
 

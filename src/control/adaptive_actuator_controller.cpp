@@ -1,11 +1,11 @@
-#include "abs_hil/control/adaptive_actuator_controller.hpp"
+#include "control/adaptive_actuator_controller.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
-#include "abs_hil/control/adaptive_gains.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
+#include "control/adaptive_gains.hpp"
 
 namespace abs_hil::control {
 namespace {

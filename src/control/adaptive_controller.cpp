@@ -1,7 +1,7 @@
-#include "abs_hil/control/adaptive_controller.hpp"
+#include "control/adaptive_controller.hpp"
 
-#include "abs_hil/control/adaptive_gains.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
+#include "control/adaptive_gains.hpp"
 
 namespace abs_hil::control {
 

@@ -1,10 +1,10 @@
-#include "abs_hil/control/adaptive_gains.hpp"
+#include "control/adaptive_gains.hpp"
 
 #include <cmath>
 #include <stdexcept>
 
-#include "abs_hil/control/lyapunov.hpp"
 #include "abs_hil/control/slip_error_dynamics.hpp"
+#include "control/lyapunov.hpp"
 
 namespace abs_hil::control {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/control/brake_actuator.hpp"
+#include "control/brake_actuator.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "abs_hil/control/equivalent_control.hpp"
+#include "control/equivalent_control.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,11 @@
-#include "abs_hil/control/five_phase_controller.hpp"
+#include "control/five_phase_controller.hpp"
 
 #include <algorithm>
 #include <limits>
 #include <stdexcept>
 
-#include "abs_hil/control/full_torque.hpp"
 #include "abs_hil/control/slip_error_dynamics.hpp"
+#include "control/full_torque.hpp"
 
 namespace abs_hil::control {
 namespace {

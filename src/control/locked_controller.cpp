@@ -1,7 +1,7 @@
-#include "abs_hil/control/locked_controller.hpp"
+#include "control/locked_controller.hpp"
 
-#include "abs_hil/control/full_torque.hpp"
 #include "abs_hil/control/slip_error_dynamics.hpp"
+#include "control/full_torque.hpp"
 
 namespace abs_hil::control {
 

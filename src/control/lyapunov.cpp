@@ -1,10 +1,10 @@
-#include "abs_hil/control/lyapunov.hpp"
+#include "control/lyapunov.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <stdexcept>
 
-#include "abs_hil/rig/formatted_text.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::control {
 namespace {

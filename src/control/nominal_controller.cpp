@@ -1,4 +1,4 @@
-#include "abs_hil/control/nominal_controller.hpp"
+#include "control/nominal_controller.hpp"
 
 #include <cmath>
 #include <stdexcept>

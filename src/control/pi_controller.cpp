@@ -1,4 +1,4 @@
-#include "abs_hil/control/pi_controller.hpp"
+#include "control/pi_controller.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -7,18 +7,18 @@
 #include <string>
 #include <vector>
 
-#include "abs_hil/control/adaptive_actuator_controller.hpp"
-#include "abs_hil/control/adaptive_controller.hpp"
-#include "abs_hil/control/adaptive_peak_controller.hpp"
-#include "abs_hil/control/five_phase_controller.hpp"
-#include "abs_hil/control/locked_controller.hpp"
-#include "abs_hil/control/nominal_controller.hpp"
-#include "abs_hil/control/pi_controller.hpp"
-#include "abs_hil/control/relay_controller.hpp"
-#include "abs_hil/control/sliding_mode_controller.hpp"
-#include "abs_hil/control/smooth_sliding_mode_controller.hpp"
-#include "abs_hil/control/super_twisting_controller.hpp"
-#include "abs_hil/rig/nearest_name.hpp"
+#include "control/adaptive_actuator_controller.hpp"
+#include "control/adaptive_controller.hpp"
+#include "control/adaptive_peak_controller.hpp"
+#include "control/five_phase_controller.hpp"
+#include "control/locked_controller.hpp"
+#include "control/nominal_controller.hpp"
+#include "control/pi_controller.hpp"
+#include "control/relay_controller.hpp"
+#include "control/sliding_mode_controller.hpp"
+#include "control/smooth_sliding_mode_controller.hpp"
+#include "control/super_twisting_controller.hpp"
+#include "rig/nearest_name.hpp"
 
 namespace abs_hil::control {
 namespace {

@@ -1,9 +1,9 @@
-#include "abs_hil/control/relay_controller.hpp"
+#include "control/relay_controller.hpp"
 
 #include <stdexcept>
 
-#include "abs_hil/control/full_torque.hpp"
 #include "abs_hil/control/slip_error_dynamics.hpp"
+#include "control/full_torque.hpp"
 
 namespace abs_hil::control {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/control/sliding_mode_controller.hpp"
+#include "control/sliding_mode_controller.hpp"
 
 #include <stdexcept>
 

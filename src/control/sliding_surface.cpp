@@ -1,4 +1,4 @@
-#include "abs_hil/control/sliding_surface.hpp"
+#include "control/sliding_surface.hpp"
 
 #include "abs_hil/control/slip_error_dynamics.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"

@@ -1,4 +1,4 @@
-#include "abs_hil/control/slip_error_integral.hpp"
+#include "control/slip_error_integral.hpp"
 
 namespace abs_hil::control {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/control/slip_peak_estimator.hpp"
+#include "control/slip_peak_estimator.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -47,9 +47,9 @@ SlipPeakEstimator::SlipPeakEstimator(const SlipPeakOptions& options, double slip
       log_slip_min_{std::log(slip_min)},
       log_slip_max_{std::log(slip_max)},
       sample_variance_N2_{options.force_noise_N2_s * rate_Hz},
-      stride_{at_least_one(kept_every_s * rate_Hz)},
-      window_{at_least_one(jump_window_s * rate_Hz / static_cast<double>(stride_))},
-      rollback_{at_least_one(rollback_s * rate_Hz / static_cast<double>(stride_))} {
+      speed_window_{at_least_one(kept_every_s * rate_Hz)},
+      window_{at_least_one(jump_window_s * rate_Hz / static_cast<double>(speed_window_))},
+      rollback_{at_least_one(rollback_s * rate_Hz / static_cast<double>(speed_window_))} {
   const auto& o = options;
   if (!(0.0 < slip_min && slip_min < slip_max && rate_Hz > 0.0)) {
     throw std::invalid_argument("the peak's slip needs bounds 0 < slip_min < slip_max and a control rate > 0");
@@ -95,7 +95,7 @@ void SlipPeakEstimator::update(double dt_s, double slip, double force_N) noexcep
 }
 
 void SlipPeakEstimator::keep(double slip, double force_N) noexcept {
-  if (cycle_++ % stride_ != 0) return;
+  if (cycle_++ % speed_window_ != 0) return;
   samples_[kept_count_++ % samples_.size()] = {slip, force_N, state_};
 }
 

@@ -1,4 +1,4 @@
-#include "abs_hil/control/smooth_sliding_mode_controller.hpp"
+#include "control/smooth_sliding_mode_controller.hpp"
 
 #include <algorithm>
 #include <cmath>

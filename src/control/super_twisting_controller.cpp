@@ -1,4 +1,4 @@
-#include "abs_hil/control/super_twisting_controller.hpp"
+#include "control/super_twisting_controller.hpp"
 
 #include <algorithm>
 #include <cmath>

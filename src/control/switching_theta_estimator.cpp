@@ -1,4 +1,4 @@
-#include "abs_hil/control/switching_theta_estimator.hpp"
+#include "control/switching_theta_estimator.hpp"
 
 #include <algorithm>
 #include <cmath>

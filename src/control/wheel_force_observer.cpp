@@ -1,4 +1,4 @@
-#include "abs_hil/control/wheel_force_observer.hpp"
+#include "control/wheel_force_observer.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>

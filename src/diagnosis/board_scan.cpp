@@ -1,11 +1,11 @@
-#include "abs_hil/diagnosis/board_scan.hpp"
+#include "diagnosis/board_scan.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>
 
 #include "abs_hil/driver/io_result.hpp"
-#include "abs_hil/driver/pci/discovery.hpp"
-#include "text_file.hpp"
+#include "diagnosis/text_file.hpp"
+#include "driver/pci/discovery.hpp"
 
 namespace abs_hil::diagnosis {
 

@@ -1,11 +1,11 @@
-#include "abs_hil/diagnosis/can_scan.hpp"
+#include "diagnosis/can_scan.hpp"
 
 #include <fmt/format.h>
 #include <linux/can.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "abs_hil/driver/can/bus_load.hpp"
+#include "driver/can/bus_load.hpp"
 
 namespace abs_hil::diagnosis {
 

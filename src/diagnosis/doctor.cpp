@@ -1,4 +1,4 @@
-#include "abs_hil/diagnosis/doctor.hpp"
+#include "diagnosis/doctor.hpp"
 
 #include <sys/resource.h>
 
@@ -7,10 +7,10 @@
 #include <thread>
 #include <utility>
 
-#include "abs_hil/diagnosis/board_scan.hpp"
-#include "abs_hil/diagnosis/can_scan.hpp"
-#include "abs_hil/diagnosis/machine_facts.hpp"
-#include "abs_hil/telemetry/route_probe.hpp"
+#include "diagnosis/board_scan.hpp"
+#include "diagnosis/can_scan.hpp"
+#include "diagnosis/machine_facts.hpp"
+#include "telemetry/route_probe.hpp"
 
 namespace abs_hil::diagnosis {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/diagnosis/finding.hpp"
+#include "diagnosis/finding.hpp"
 
 #include <fmt/format.h>
 

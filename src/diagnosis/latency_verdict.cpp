@@ -1,4 +1,4 @@
-#include "abs_hil/diagnosis/latency_verdict.hpp"
+#include "diagnosis/latency_verdict.hpp"
 
 #include <fmt/format.h>
 

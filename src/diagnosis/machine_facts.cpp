@@ -1,9 +1,9 @@
-#include "abs_hil/diagnosis/machine_facts.hpp"
+#include "diagnosis/machine_facts.hpp"
 
 #include <cstdlib>
 #include <set>
 
-#include "text_file.hpp"
+#include "diagnosis/text_file.hpp"
 
 namespace abs_hil::diagnosis {
 

@@ -1,15 +1,17 @@
-#include "abs_hil/driver/factory.hpp"
+#include "driver/factory.hpp"
 
 #include <array>
 #include <vector>
 
-#include "abs_hil/driver/can/can_driver.hpp"
-#include "abs_hil/driver/can/link.hpp"
-#include "abs_hil/driver/monotonic_time.hpp"
-#include "abs_hil/driver/pci/discovery.hpp"
-#include "abs_hil/driver/pci/pci_driver.hpp"
-#include "abs_hil/driver/usb/libusb_link.hpp"
-#include "abs_hil/driver/usb/usb_driver.hpp"
+#include "driver/can/can_driver.hpp"
+#include "driver/can/link.hpp"
+#include "driver/monotonic_time.hpp"
+#include "driver/pci/discovery.hpp"
+#include "driver/pci/pci_driver.hpp"
+#include "driver/pci/pci_safe_state.hpp"
+#include "driver/take_over_writer.hpp"
+#include "driver/usb/libusb_link.hpp"
+#include "driver/usb/usb_driver.hpp"
 
 namespace abs_hil::driver {
 
@@ -69,6 +71,11 @@ std::string verification_note(const DriverOptions& options) {
          ": not verified on hardware. Its registers come from the maker's documents and were tried on an emulator "
          "alone: "
          "go through docs/rig-setup.md with abs_hil commission, then set driver.verified_on_hardware=true";
+}
+
+std::unique_ptr<SafeStateWriter> make_safe_state_writer(const DriverOptions& options) {
+  if (options.kind == "pci") return std::make_unique<pci::PciSafeState>(options.pci);
+  return std::make_unique<TakeOverWriter>([options] { return make_rig_driver(options); });
 }
 
 }  // namespace abs_hil::driver

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/file_descriptor.hpp"
+#include "driver/file_descriptor.hpp"
 
 #include <unistd.h>
 

@@ -1,6 +1,6 @@
-#include "abs_hil/driver/take_over_writer.hpp"
+#include "driver/take_over_writer.hpp"
 
-#include "abs_hil/driver/monotonic_time.hpp"
+#include "driver/monotonic_time.hpp"
 
 namespace abs_hil::driver {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/emulator/can_node.hpp"
+#include "emulator/can_node.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,9 +6,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "abs_hil/rig/formatted_text.hpp"
 #include "abs_hil/rig/time_units.hpp"
-#include "rig_behind.hpp"
+#include "emulator/rig_behind.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::emulator {
 

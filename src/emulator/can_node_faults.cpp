@@ -1,10 +1,10 @@
-#include "abs_hil/emulator/can_node_faults.hpp"
+#include "emulator/can_node_faults.hpp"
 
 #include <algorithm>
 #include <array>
 #include <utility>
 
-#include "fault_text.hpp"
+#include "emulator/fault_text.hpp"
 
 namespace abs_hil::emulator {
 

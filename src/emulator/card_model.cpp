@@ -1,4 +1,4 @@
-#include "abs_hil/emulator/card_model.hpp"
+#include "emulator/card_model.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -6,8 +6,8 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "abs_hil/plant_sim/encoder.hpp"
-#include "rig_behind.hpp"
+#include "emulator/rig_behind.hpp"
+#include "plant_sim/encoder.hpp"
 
 namespace abs_hil::emulator {
 
@@ -157,10 +157,10 @@ Outputs CardModel::outputs() const noexcept {
 
 void CardModel::trip_overspeed() noexcept {
   overspeed_latched_ = true;
-  watch_limits();
+  plausibility_limits();
 }
 
-void CardModel::watch_limits() noexcept {
+void CardModel::plausibility_limits() noexcept {
   const double fastest = fastest_rad_s(plant_);
   if (velocity(fastest) > plain_[0x5C / 4]) {
     overspeed_latched_ = true;
@@ -182,7 +182,7 @@ void CardModel::advance_to(std::int64_t time_ns) noexcept {
     const std::int64_t next = step_end_ns(time_ns_, time_ns, step_ns);
     step(plant_, next - time_ns_, outputs());
     time_ns_ = next;
-    watch_limits();
+    plausibility_limits();
   }
 }
 

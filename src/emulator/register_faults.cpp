@@ -1,11 +1,11 @@
-#include "abs_hil/emulator/register_faults.hpp"
+#include "emulator/register_faults.hpp"
 
 #include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
 
-#include "fault_text.hpp"
+#include "emulator/fault_text.hpp"
 
 namespace abs_hil::emulator {
 

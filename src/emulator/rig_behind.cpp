@@ -1,4 +1,4 @@
-#include "rig_behind.hpp"
+#include "emulator/rig_behind.hpp"
 
 #include <algorithm>
 #include <cmath>

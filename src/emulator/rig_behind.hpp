@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "abs_hil/emulator/card_model.hpp"
 #include "abs_hil/plant_sim/plant.hpp"
+#include "emulator/card_model.hpp"
 
 namespace abs_hil::emulator {
 

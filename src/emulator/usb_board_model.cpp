@@ -1,12 +1,12 @@
-#include "abs_hil/emulator/usb_board_model.hpp"
+#include "emulator/usb_board_model.hpp"
 
 #include <algorithm>
 #include <bit>
 #include <stdexcept>
 #include <string>
 
-#include "abs_hil/plant_sim/encoder.hpp"
-#include "rig_behind.hpp"
+#include "emulator/rig_behind.hpp"
+#include "plant_sim/encoder.hpp"
 
 namespace abs_hil::emulator {
 

@@ -1,8 +1,8 @@
-#include "abs_hil/emulator/usb_faults.hpp"
+#include "emulator/usb_faults.hpp"
 
 #include <algorithm>
 
-#include "fault_text.hpp"
+#include "emulator/fault_text.hpp"
 
 namespace abs_hil::emulator {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/emulator/usbip_device.hpp"
+#include "emulator/usbip_device.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "abs_hil/experiment/adjustment.hpp"
+#include "experiment/adjustment.hpp"
 
 namespace abs_hil::experiment {
 

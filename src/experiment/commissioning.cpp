@@ -1,4 +1,4 @@
-#include "abs_hil/experiment/commissioning.hpp"
+#include "experiment/commissioning.hpp"
 
 #include <cmath>
 #include <cstdlib>
@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "abs_hil/rig/encoder_scale.hpp"
-#include "abs_hil/rig/formatted_text.hpp"
 #include "abs_hil/rig/time_units.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::experiment {
 

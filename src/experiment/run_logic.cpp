@@ -1,4 +1,4 @@
-#include "abs_hil/experiment/run_logic.hpp"
+#include "experiment/run_logic.hpp"
 
 #include <cmath>
 #include <utility>

@@ -1,4 +1,4 @@
-#include "abs_hil/experiment/run_session.hpp"
+#include "experiment/run_session.hpp"
 
 #include <cmath>
 #include <future>

@@ -1,4 +1,4 @@
-#include "abs_hil/experiment/sequence.hpp"
+#include "experiment/sequence.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -27,9 +27,9 @@ void check_safe(const PhasePlan& plan, const std::string& name) {
   if (!(plan.brake_torque_Nm >= 0.0 && std::isfinite(plan.brake_torque_Nm))) {
     refuse(": brake torque " + std::to_string(plan.brake_torque_Nm) + " N m: give a finite one, >= 0");
   }
-  const auto lies_within = [](const Course& course, double least, double most) {
-    return std::all_of(course.points().begin(), course.points().end(),
-                       [=](const Course::Point& point) { return point.value >= least && point.value <= most; });
+  const auto lies_within = [](const Profile& profile, double least, double most) {
+    return std::all_of(profile.points().begin(), profile.points().end(),
+                       [=](const Profile::Point& point) { return point.value >= least && point.value <= most; });
   };
   constexpr double unbounded = std::numeric_limits<double>::max();
   if (!lies_within(plan.motor_course, 0.0, 1.0)) refuse(": motor duties: give them in [0, 1]");

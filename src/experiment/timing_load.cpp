@@ -1,4 +1,4 @@
-#include "abs_hil/experiment/timing_load.hpp"
+#include "experiment/timing_load.hpp"
 
 #include <algorithm>
 #include <stdexcept>

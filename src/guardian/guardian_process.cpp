@@ -1,4 +1,4 @@
-#include "abs_hil/guardian/guardian_process.hpp"
+#include "guardian/guardian_process.hpp"
 
 #include <fcntl.h>
 #include <poll.h>
@@ -15,7 +15,7 @@
 #include <utility>
 
 #include "abs_hil/driver/io_result.hpp"
-#include "abs_hil/guardian/linux_process.hpp"
+#include "guardian/linux_process.hpp"
 
 namespace abs_hil::guardian {
 
@@ -128,10 +128,10 @@ void GuardianProcess::start() {
   for (const auto& [from, to] : {std::pair(region.get(), inherited_region),
                                  {controller.get(), inherited_controller},
                                  {ready.get(), inherited_ready},
-                                 {brief.get(), inherited_brief}}) {
+                                 {brief.get(), inherited_launch_config}}) {
     posix_spawn_file_actions_adddup2(&set_up.actions, from, to);
   }
-  posix_spawn_file_actions_addclosefrom_np(&set_up.actions, inherited_brief + 1);
+  posix_spawn_file_actions_addclosefrom_np(&set_up.actions, inherited_launch_config + 1);
   std::string name = program_;
   std::array<char*, 2> arguments{name.data(), nullptr};
   const int error =
@@ -191,20 +191,20 @@ bool GuardianProcess::ended_within(int timeout_ms) const noexcept {
 
 bool GuardianProcess::alive() const noexcept { return pid_ == 0 || !ended_within(0); }
 
-GuardianProcess::Farewell GuardianProcess::end() noexcept {
+GuardianProcess::GuardianExit GuardianProcess::end() noexcept {
   if (ready_ >= 0) ::close(std::exchange(ready_, -1));
-  if (pid_ == 0) return Farewell::none;
+  if (pid_ == 0) return GuardianExit::none;
   const bool handed_over = region_.stage() == Stage::handed_over;
   // Outputs that were handed over stay so: a guardian that is held up must find them so, however late.
   if (!handed_over) region_.set_stage(Stage::closed);
   const bool ended = ended_within(ends_within_ms);
-  Farewell farewell = Farewell::insisting;
+  GuardianExit farewell = GuardianExit::insisting;
   if (!ended && !handed_over) ::kill(pid_, SIGKILL);  // stopped or hung: the outputs are safe without it
   if (ended || !handed_over) {
     int status = 0;
     while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
     }
-    farewell = WIFEXITED(status) && WEXITSTATUS(status) == 0 ? Farewell::ended : Farewell::failed;
+    farewell = WIFEXITED(status) && WEXITSTATUS(status) == 0 ? GuardianExit::ended : GuardianExit::failed;
   }
   ::close(std::exchange(pidfd_, -1));
   pid_ = 0;

@@ -1,4 +1,4 @@
-#include "abs_hil/guardian/linux_process.hpp"
+#include "guardian/linux_process.hpp"
 
 #include <poll.h>
 #include <sys/syscall.h>

@@ -1,4 +1,4 @@
-#include "abs_hil/guardian/shared_region.hpp"
+#include "guardian/shared_region.hpp"
 
 #include <fcntl.h>
 #include <sys/mman.h>

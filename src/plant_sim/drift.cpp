@@ -5,8 +5,8 @@
 namespace abs_hil::plant_sim {
 namespace {
 
-/// A course over time alone: the wheel's angle and radius have no part in it.
-FactorCourse over_time(const std::string& profile, const char* key) {
+/// A profile over time alone: the wheel's angle and radius have no part in it.
+FactorProgress over_time(const std::string& profile, const char* key) {
   return {FactorProfile(profile, key, FactorProfile::Axes::time_only), 1.0};
 }
 
@@ -21,33 +21,34 @@ Drift::Drift(const DriftProfiles& profiles)
            lower_bearing_.changes_anything()) {}
 
 void Drift::start() noexcept {
-  for (FactorCourse* course : {&brake_torque_, &motor_torque_, &upper_bearing_, &lower_bearing_}) course->start(0.0);
+  for (FactorProgress* profile : {&brake_torque_, &motor_torque_, &upper_bearing_, &lower_bearing_})
+    profile->start(0.0);
 }
 
 void Drift::brake_applied() noexcept {
-  for (FactorCourse* course : {&brake_torque_, &motor_torque_, &upper_bearing_, &lower_bearing_}) {
-    course->brake_applied(0.0);
+  for (FactorProgress* profile : {&brake_torque_, &motor_torque_, &upper_bearing_, &lower_bearing_}) {
+    profile->brake_applied(0.0);
   }
 }
 
 double Drift::part_s(double left_s, double max_step_s) const noexcept {
   double part_s = left_s;
-  for (const FactorCourse* course : {&brake_torque_, &motor_torque_, &upper_bearing_, &lower_bearing_}) {
-    part_s = std::min(part_s, course->time_left_s());
-    if (course->present(0.0).per_s != 0.0) part_s = std::min(part_s, max_step_s);
+  for (const FactorProgress* profile : {&brake_torque_, &motor_torque_, &upper_bearing_, &lower_bearing_}) {
+    part_s = std::min(part_s, profile->time_left_s());
+    if (profile->present(0.0).per_s != 0.0) part_s = std::min(part_s, max_step_s);
   }
   return part_s;
 }
 
 void Drift::pass(double duration_s) noexcept {
-  for (FactorCourse* course : {&brake_torque_, &motor_torque_, &upper_bearing_, &lower_bearing_}) {
-    course->pass(duration_s);
-    course->settle(0.0);
+  for (FactorProgress* profile : {&brake_torque_, &motor_torque_, &upper_bearing_, &lower_bearing_}) {
+    profile->pass(duration_s);
+    profile->settle(0.0);
   }
 }
 
 DriftFactors Drift::after(double time_s) const noexcept {
-  const auto factor = [time_s](const FactorCourse& course) { return course.present(0.0).after(time_s, 0.0); };
+  const auto factor = [time_s](const FactorProgress& profile) { return profile.present(0.0).after(time_s, 0.0); };
   return {factor(brake_torque_), factor(motor_torque_), factor(upper_bearing_), factor(lower_bearing_)};
 }
 

@@ -1,4 +1,4 @@
-#include "dry_friction.hpp"
+#include "plant_sim/dry_friction.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "torque_balance.hpp"
+#include "plant_sim/torque_balance.hpp"
 
 // Set-valued Coulomb friction: s1 and s2 of (1) and (2) at speed 0 take whatever value in [-1, 1] keeps the wheel
 // standing, if there is one.

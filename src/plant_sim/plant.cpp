@@ -1,7 +1,7 @@
 #include "abs_hil/plant_sim/plant.hpp"
 
-#include "dry_friction.hpp"
-#include "stepping.hpp"
+#include "plant_sim/dry_friction.hpp"
+#include "plant_sim/stepping.hpp"
 
 namespace abs_hil::plant_sim {
 namespace {
@@ -32,15 +32,15 @@ HeldTorques drifted(HeldTorques held, const DriftFactors& factors) noexcept {
 
 Plant::Plant(const PlantOptions& options)
     : options_(checked(options)),
-      course_(FactorProfile(options.friction_profile), options.rig.wheels.r2_m),
+      profile_(FactorProfile(options.friction_profile), options.rig.wheels.r2_m),
       drift_(options.drift),
-      model_(options, course_.profile().highest()) {
+      model_(options, profile_.profile().highest()) {
   let_bearings_drift(drift_.after(0.0));
 }
 
 void Plant::reset(const PlantState& state) noexcept {
   state_ = state;
-  course_.start(state.angle2_rad);
+  profile_.start(state.angle2_rad);
   if (!drift_.any()) return;
   drift_.start();
   let_bearings_drift(drift_.after(0.0));
@@ -59,13 +59,13 @@ void Plant::advance(double duration_s, const PlantInput& input) noexcept {
   if (!(duration_s > 0.0)) return;
   const HeldTorques held = resolve(options_, input);
   if (held.brake_target_Nm > 0.0) {
-    course_.brake_applied(state_.angle2_rad);
+    profile_.brake_applied(state_.angle2_rad);
     drift_.brake_applied();
   }
   StateVector x = vector_of(state_);
   const auto go_on = [&](const HeldTorques& torques, double part_s) {
     if (options_.ideal_actuator) x[brake_torque] = torques.brake_target_Nm;
-    integrate(model_, options_.max_step_s, torques, part_s, course_, x);
+    integrate(model_, options_.max_step_s, torques, part_s, profile_, x);
   };
   if (drift_.any()) {
     // Within a part the factors stand at those of its middle.
@@ -88,7 +88,7 @@ double Plant::slip() const noexcept { return model_.slip(state_.omega1_rad_s, st
 
 ContactState Plant::contact() const noexcept {
   const StateVector x = vector_of(state_);
-  const PresentFactor friction = course_.present(state_.angle2_rad);
+  const PresentFactor friction = profile_.present(state_.angle2_rad);
   const HeldTorques no_inputs{};
   const Sliding sliding = sliding_from({model_, no_inputs, friction, {}}, x);
   return {state_.omega1_rad_s, state_.omega2_rad_s, state_.brake_torque_Nm, sliding.upper, friction.value};
@@ -96,7 +96,7 @@ ContactState Plant::contact() const noexcept {
 
 double Plant::tyre_force_N() const noexcept { return model_.tyre_force_N(contact()); }
 
-double Plant::friction() const noexcept { return course_.present(state_.angle2_rad).value; }
+double Plant::friction() const noexcept { return profile_.present(state_.angle2_rad).value; }
 
 rig::PlantTruth Plant::truth() const noexcept {
   return {{state_.omega1_rad_s, state_.omega2_rad_s}, slip(), state_.brake_torque_Nm, model_.peak_force_N(contact())};

@@ -1,10 +1,10 @@
-#include "stepping.hpp"
+#include "plant_sim/stepping.hpp"
 
 #include <algorithm>
 #include <boost/numeric/odeint/stepper/runge_kutta4.hpp>
 #include <cmath>
 
-#include "dry_friction.hpp"
+#include "plant_sim/dry_friction.hpp"
 
 namespace abs_hil::plant_sim {
 namespace {
@@ -83,25 +83,25 @@ void stand(const HeldTorques& held, double duration_s, StateVector& x) noexcept 
 }  // namespace
 
 void integrate(const WheelModel& model, double max_step_s, const HeldTorques& held, double duration_s,
-               FactorCourse& course, StateVector& x) noexcept {
+               FactorProgress& profile, StateVector& x) noexcept {
   double left_s = duration_s;
   while (left_s > 0.0) {
     if (stands_for_good(model, held, x)) {
       stand(held, left_s, x);
-      course.pass(left_s);
+      profile.pass(left_s);
       break;
     }
-    TorqueBalance balance{model, held, course.present(x[angle2]), {}};
+    TorqueBalance balance{model, held, profile.present(x[angle2]), {}};
     balance.sliding = sliding_from(balance, x);
     // Equal parts of what is left; the last part is what is left, so the interval ends exactly.
-    const double interval_s = std::min(left_s, course.time_left_s());
+    const double interval_s = std::min(left_s, profile.time_left_s());
     const double parts = std::ceil(interval_s / step_limit_s(balance, x, max_step_s));
     const double taken_s = substep(balance, parts > 1.0 ? interval_s / parts : interval_s, x);
     left_s -= taken_s;
-    course.pass(taken_s);
-    course.settle(x[angle2]);
+    profile.pass(taken_s);
+    profile.settle(x[angle2]);
   }
-  course.settle(x[angle2]);
+  profile.settle(x[angle2]);
 }
 
 }  // namespace abs_hil::plant_sim

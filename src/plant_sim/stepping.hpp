@@ -1,6 +1,6 @@
 #pragma once
 
-#include "torque_balance.hpp"
+#include "plant_sim/torque_balance.hpp"
 
 namespace abs_hil::plant_sim {
 
@@ -8,6 +8,6 @@ namespace abs_hil::plant_sim {
 /// that end exactly at the interval's end and at every instant at which a wheel stops or breaks away or a piece of the
 /// friction profile ends. Allocates nothing.
 void integrate(const WheelModel& model, double max_step_s, const HeldTorques& held, double duration_s,
-               FactorCourse& course, StateVector& x) noexcept;
+               FactorProgress& profile, StateVector& x) noexcept;
 
 }  // namespace abs_hil::plant_sim

@@ -1,4 +1,4 @@
-#include "abs_hil/replay/check.hpp"
+#include "replay/check.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <map>
 #include <string_view>
 
-#include "abs_hil/telemetry/message_codec.hpp"
+#include "telemetry/message_codec.hpp"
 
 namespace abs_hil::replay {
 
@@ -85,7 +85,7 @@ Difference first_difference(const telemetry_t& recorded, const telemetry_t& comp
 }
 
 CheckResult check(const RecordedRun& run) {
-  const settings::Settings settings = settings_of(run);
+  const config::Settings settings = settings_of(run);
   CheckResult result;
   const auto compared = [&](const std::vector<RerunCycle>& rerun, bool with_timing, const std::string& what) {
     result.equal = compare(run, rerun, with_timing, what, result) && result.equal;

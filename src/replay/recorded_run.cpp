@@ -1,13 +1,13 @@
-#include "abs_hil/replay/recorded_run.hpp"
+#include "replay/recorded_run.hpp"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "abs_hil/settings/config_error.hpp"
-#include "abs_hil/settings/config_json.hpp"
-#include "abs_hil/settings/key_table.hpp"
-#include "abs_hil/telemetry/checked_decode.hpp"
+#include "config/config_error.hpp"
+#include "config/config_json.hpp"
+#include "config/key_table.hpp"
+#include "telemetry/checked_decode.hpp"
 
 namespace abs_hil::replay {
 
@@ -130,15 +130,15 @@ RecordedRun read_run(const std::filesystem::path& recording) {
   return collector.finish();
 }
 
-settings::Settings settings_of(const RecordedRun& run, const Changes& changes) {
-  settings::Settings settings;
-  settings::KeyTable keys(settings);
+config::Settings settings_of(const RecordedRun& run, const Changes& changes) {
+  config::Settings settings;
+  config::KeyTable keys(settings);
   const auto config = nlohmann::ordered_json::parse(run.experiment.config_json, nullptr, false);
   if (config.is_discarded()) throw RecordingError("the recorded configuration is no JSON: the recording is damaged");
   try {
     // Keys of another version do not matter as long as --check finds the same commands.
-    static_cast<void>(settings::load_json(config, keys, "recorded configuration"));
-  } catch (const settings::ConfigError& error) {
+    static_cast<void>(config::load_json(config, keys, "recorded configuration"));
+  } catch (const config::ConfigError& error) {
     throw RecordingError(error.what());
   }
   settings.plant_name = run.experiment.plant;

@@ -1,11 +1,11 @@
-#include "abs_hil/replay/report.hpp"
+#include "replay/report.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "abs_hil/telemetry/message_codec.hpp"
+#include "telemetry/message_codec.hpp"
 
 namespace abs_hil::replay {
 
@@ -38,7 +38,7 @@ std::string row(const std::string& name, double recorded, double replayed) {
 
 }  // namespace
 
-std::string report(const RecordedRun& run, const settings::Settings& replayed, const std::vector<RerunCycle>& rerun) {
+std::string report(const RecordedRun& run, const config::Settings& replayed, const std::vector<RerunCycle>& rerun) {
   TorqueFigures before, after;
   double square_sum = 0.0, largest = 0.0, largest_at_s = 0.0;
   std::size_t braking = 0;

@@ -1,4 +1,4 @@
-#include "abs_hil/replay/rerun.hpp"
+#include "replay/rerun.hpp"
 
 #include <bit>
 #include <cmath>
@@ -6,15 +6,15 @@
 #include <optional>
 #include <utility>
 
-#include "abs_hil/driver/sim/sim_driver.hpp"
-#include "abs_hil/experiment/run_logic.hpp"
-#include "abs_hil/runtime/clock.hpp"
-#include "abs_hil/runtime/cyclic_executive.hpp"
-#include "abs_hil/runtime/record_pump.hpp"
-#include "abs_hil/script/plan.hpp"
-#include "abs_hil/settings/config_error.hpp"
-#include "abs_hil/settings/live_settings.hpp"
-#include "abs_hil/telemetry/message_codec.hpp"
+#include "config/config_error.hpp"
+#include "config/live_settings.hpp"
+#include "config/plan.hpp"
+#include "driver/sim/sim_driver.hpp"
+#include "experiment/run_logic.hpp"
+#include "runtime/clock.hpp"
+#include "runtime/cyclic_executive.hpp"
+#include "runtime/record_pump.hpp"
+#include "telemetry/message_codec.hpp"
 
 namespace abs_hil::replay {
 
@@ -37,7 +37,7 @@ class RecordedClock final : public runtime::Clock {
 /// A rig that does again what was recorded, whatever is asked of it.
 class RecordedRig final : public driver::RigDriver {
  public:
-  RecordedRig(const RecordedRun& run, const settings::Settings& s)
+  RecordedRig(const RecordedRun& run, const config::Settings& s)
       : run_(run), ideal_sensors_(s.plant.ideal_sensors), injected_(!s.inject.empty()) {}
   ~RecordedRig() override { static_cast<void>(deactivate()); }
 
@@ -129,10 +129,10 @@ class Collected final : public rig::RecordSink {
 };
 
 /// The recorded script; for a recording without one that of the name.
-script::Plan plan_of(const RecordedRun& run, const settings::Settings& s) {
+config::Plan plan_of(const RecordedRun& run, const config::Settings& s) {
   const auto config = nlohmann::json::parse(run.experiment.config_json, nullptr, false);
   if (!config.is_object() || !config.contains("experiment_script") || !config["experiment_script"].is_string()) {
-    return script::plan(s);
+    return config::plan(s);
   }
   const auto files = config.value("experiment_files", nlohmann::json::object());
   const auto read_file = [&files](const std::string& name) -> std::optional<std::string> {
@@ -140,11 +140,11 @@ script::Plan plan_of(const RecordedRun& run, const settings::Settings& s) {
     if (file == files.end() || !file->is_string()) return std::nullopt;
     return file->get<std::string>();
   };
-  return script::plan(script::parse(config["experiment_script"].get<std::string>(), "recorded script", read_file), s);
+  return config::plan(config::parse(config["experiment_script"].get<std::string>(), "recorded script", read_file), s);
 }
 
-experiment::RunLogicParts logic_parts(const RecordedRun& run, const settings::Settings& s) {
-  script::Plan plan = plan_of(run, s);
+experiment::RunLogicParts logic_parts(const RecordedRun& run, const config::Settings& s) {
+  config::Plan plan = plan_of(run, s);
   return experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate, s.experiment,
                                       std::move(plan.phases), plan.limits);
 }
@@ -156,23 +156,23 @@ std::int64_t put_before(const adjustment_t& adjustment) {
   return adjustment.name == start_name ? adjustment.cycle - 1 : adjustment.cycle;
 }
 
-void put(const adjustment_t& adjustment, settings::LiveSettings& live, experiment::AdjustmentMailbox& mailbox) {
+void put(const adjustment_t& adjustment, config::LiveSettings& live, experiment::AdjustmentMailbox& mailbox) {
   if (adjustment.name == start_name) {
     static_cast<void>(mailbox.put({}));
     return;
   }
   try {
     static_cast<void>(mailbox.put(live.set(live.resolve(adjustment.name), adjustment.value)));
-  } catch (const settings::ConfigError&) {
+  } catch (const config::ConfigError&) {
     // A gain of the recorded controller, which another one has not.
   }
 }
 
 /// Runs the program's own cycle at the recorded times.
-std::vector<RerunCycle> rerun(const RecordedRun& run, const settings::Settings& s, driver::RigDriver& backend,
+std::vector<RerunCycle> rerun(const RecordedRun& run, const config::Settings& s, driver::RigDriver& backend,
                               runtime::CycleLogic& cycle_logic, experiment::AdjustmentMailbox& mailbox,
                               runtime::CommandGate& gate, WheelFaults faults) {
-  settings::LiveSettings live(s);
+  config::LiveSettings live(s);
   auto adjustment = run.adjustments.begin();
   RecordedClock clock(run.cycles.front().stamp_ns);
   TimedReading rig(backend, run, clock);
@@ -238,8 +238,7 @@ bool ended_from_outside(const RecordedRun& run, std::size_t n, WheelFaults fault
   }
 }
 
-std::vector<RerunCycle> rerun_open_loop(const RecordedRun& run, const settings::Settings& settings,
-                                        WheelFaults faults) {
+std::vector<RerunCycle> rerun_open_loop(const RecordedRun& run, const config::Settings& settings, WheelFaults faults) {
   experiment::RunLogic logic(logic_parts(run, settings));
   RecordedActuation actuation(logic, run);
   RecordedRig rig(run, settings);
@@ -250,7 +249,7 @@ std::vector<RerunCycle> rerun_open_loop(const RecordedRun& run, const settings::
   return rerun(run, settings, rig, actuation, logic.adjustments(), gate, faults);
 }
 
-std::vector<RerunCycle> rerun_simulation(const RecordedRun& run, const settings::Settings& settings) {
+std::vector<RerunCycle> rerun_simulation(const RecordedRun& run, const config::Settings& settings) {
   experiment::RunLogic logic(logic_parts(run, settings));
   driver::SimDriver rig(settings.plant, {.seed = static_cast<std::uint64_t>(settings.seed),
                                          .start_speed_rad_s = settings.experiment.start_speed_rad_s});

@@ -1,4 +1,4 @@
-#include "axis.hpp"
+#include "report/axis.hpp"
 
 #include <algorithm>
 #include <cmath>

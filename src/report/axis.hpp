@@ -1,6 +1,6 @@
 #pragma once
 
-#include "abs_hil/report/figure.hpp"
+#include "report/figure.hpp"
 
 namespace abs_hil::report {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/report/csv_reader.hpp"
+#include "report/csv_reader.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -12,8 +12,8 @@
 #include <limits>
 #include <utility>
 
-#include "abs_hil/report/input_error.hpp"
-#include "abs_hil/report/text.hpp"
+#include "report/input_error.hpp"
+#include "report/text.hpp"
 
 namespace abs_hil::report {
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "abs_hil/report/gnuplot.hpp"
-#include "abs_hil/report/text.hpp"
+#include "report/gnuplot.hpp"
+#include "report/text.hpp"
 
 namespace abs_hil::report {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/report/export.hpp"
+#include "report/export.hpp"
 
 #include <fmt/format.h>
 
@@ -6,11 +6,11 @@
 #include <cmath>
 #include <ostream>
 
-#include "abs_hil/report/csv_reader.hpp"
-#include "abs_hil/report/input_error.hpp"
-#include "abs_hil/report/run_files.hpp"
-#include "abs_hil/report/text.hpp"
-#include "mat_file.hpp"
+#include "report/csv_reader.hpp"
+#include "report/input_error.hpp"
+#include "report/mat_file.hpp"
+#include "report/run_files.hpp"
+#include "report/text.hpp"
 
 namespace abs_hil::report {
 

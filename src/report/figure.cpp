@@ -1,4 +1,4 @@
-#include "abs_hil/report/figure.hpp"
+#include "report/figure.hpp"
 
 #include <array>
 #include <string_view>

@@ -1,4 +1,4 @@
-#include "abs_hil/report/gnuplot.hpp"
+#include "report/gnuplot.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -13,9 +13,9 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "abs_hil/report/input_error.hpp"
-#include "abs_hil/report/text.hpp"
-#include "run_details.hpp"
+#include "report/input_error.hpp"
+#include "report/run_details.hpp"
+#include "report/text.hpp"
 
 namespace abs_hil::report {
 

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "abs_hil/report/gnuplot.hpp"
-#include "abs_hil/report/text.hpp"
-#include "axis.hpp"
+#include "report/axis.hpp"
+#include "report/gnuplot.hpp"
+#include "report/text.hpp"
 
 namespace abs_hil::report {
 

@@ -1,4 +1,4 @@
-#include "mat_file.hpp"
+#include "report/mat_file.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "metric_list.hpp"
+#include "report/metric_list.hpp"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "abs_hil/report/text.hpp"
+#include "report/text.hpp"
 
 namespace abs_hil::report {
 

@@ -5,8 +5,8 @@
 #include <string_view>
 #include <vector>
 
-#include "abs_hil/report/run_files.hpp"
-#include "abs_hil/report/run_survey.hpp"
+#include "report/run_files.hpp"
+#include "report/run_survey.hpp"
 
 namespace abs_hil::report {
 

@@ -1,11 +1,11 @@
-#include "page.hpp"
+#include "report/page.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "abs_hil/report/text.hpp"
-#include "run_tables.hpp"
+#include "report/run_tables.hpp"
+#include "report/text.hpp"
 
 namespace abs_hil::report {
 
@@ -110,7 +110,7 @@ std::string report_page(const PageContents& contents) {
     if (picture.figure->id.starts_with("series")) continue;
     (picture.figure->id == "timing" ? timing : pictures) += picture_html(picture);
   }
-  body += section(runs.size() == 1 ? "Course of the run" : "Courses of the runs", pictures);
+  body += section(runs.size() == 1 ? "Profile of the run" : "Courses of the runs", pictures);
   const std::string differences = differences_table(runs);
   if (runs.size() > 1) {
     body +=

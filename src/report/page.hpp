@@ -4,10 +4,10 @@
 #include <string_view>
 #include <vector>
 
-#include "abs_hil/report/figure.hpp"
-#include "abs_hil/report/run_files.hpp"
-#include "abs_hil/report/run_survey.hpp"
-#include "series.hpp"
+#include "report/figure.hpp"
+#include "report/run_files.hpp"
+#include "report/run_survey.hpp"
+#include "report/series_page.hpp"
 
 namespace abs_hil::report {
 

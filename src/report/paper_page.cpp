@@ -3,11 +3,11 @@
 #include <cmath>
 #include <map>
 
-#include "abs_hil/report/text.hpp"
-#include "metric_list.hpp"
-#include "page.hpp"
-#include "run_tables.hpp"
-#include "table.hpp"
+#include "report/metric_list.hpp"
+#include "report/page.hpp"
+#include "report/run_tables.hpp"
+#include "report/table.hpp"
+#include "report/text.hpp"
 
 namespace abs_hil::report {
 

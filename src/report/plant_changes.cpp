@@ -1,4 +1,4 @@
-#include "plant_changes.hpp"
+#include "report/plant_changes.hpp"
 
 #include <fmt/format.h>
 
@@ -42,30 +42,30 @@ void PlantChangeFinder::see(double time_s, bool braking, double road_speed_m_s) 
   if (std::exchange(started_, true)) rolled_m_ += 0.5 * (time_s - last_time_s_) * (last_speed_m_s_ + road_speed_m_s);
   last_time_s_ = time_s;
   last_speed_m_s_ = road_speed_m_s;
-  for (Course& course : courses_) {
-    if (!course.counting && (braking || !course.profile.from_braking())) {
-      course.counting = true;
-      if (course.profile.from_braking()) {
-        course.origin = course.profile.axis() == FactorProfile::Axis::time ? time_s : rolled_m_;
+  for (Profile& profile : courses_) {
+    if (!profile.counting && (braking || !profile.profile.from_braking())) {
+      profile.counting = true;
+      if (profile.profile.from_braking()) {
+        profile.origin = profile.profile.axis() == FactorProfile::Axis::time ? time_s : rolled_m_;
       }
     }
-    if (course.counting) advance(course, time_s, rolled_m_);
+    if (profile.counting) advance(profile, time_s, rolled_m_);
   }
 }
 
-void PlantChangeFinder::advance(Course& course, double time_s, double rolled_m) {
-  const auto& pieces = course.profile.pieces();
-  const bool along_time = course.profile.axis() == FactorProfile::Axis::time;
-  const double position = (along_time ? time_s : rolled_m) - course.origin;
-  while (course.piece + 1 < pieces.size() && position >= pieces[course.piece + 1].begin) {
-    const FactorProfile::Piece& piece = pieces[++course.piece];
-    course.changes.push_back({along_time ? course.origin + piece.begin : time_s, label_of(course.what, piece)});
+void PlantChangeFinder::advance(Profile& profile, double time_s, double rolled_m) {
+  const auto& pieces = profile.profile.pieces();
+  const bool along_time = profile.profile.axis() == FactorProfile::Axis::time;
+  const double position = (along_time ? time_s : rolled_m) - profile.origin;
+  while (profile.piece + 1 < pieces.size() && position >= pieces[profile.piece + 1].begin) {
+    const FactorProfile::Piece& piece = pieces[++profile.piece];
+    profile.changes.push_back({along_time ? profile.origin + piece.begin : time_s, label_of(profile.what, piece)});
   }
 }
 
 std::vector<PlantChange> PlantChangeFinder::changes() const {
   std::vector<PlantChange> all;
-  for (const Course& course : courses_) all.insert(all.end(), course.changes.begin(), course.changes.end());
+  for (const Profile& profile : courses_) all.insert(all.end(), profile.changes.begin(), profile.changes.end());
   return all;
 }
 

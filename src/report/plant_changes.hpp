@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "abs_hil/plant_sim/factor_profile.hpp"
-#include "abs_hil/report/run_files.hpp"
-#include "abs_hil/report/run_survey.hpp"
+#include "report/run_files.hpp"
+#include "report/run_survey.hpp"
 
 namespace abs_hil::report {
 
@@ -26,7 +26,7 @@ class PlantChangeFinder {
 
  private:
   /// One parameter's profile, and how far the run has come in it.
-  struct Course {
+  struct Profile {
     std::string what;
     plant_sim::FactorProfile profile;
     bool counting{false};
@@ -34,9 +34,9 @@ class PlantChangeFinder {
     std::size_t piece{0};  ///< present one
     std::vector<PlantChange> changes{};
   };
-  static void advance(Course& course, double time_s, double rolled_m);
+  static void advance(Profile& profile, double time_s, double rolled_m);
 
-  std::vector<Course> courses_;
+  std::vector<Profile> courses_;
   bool started_{false};
   double rolled_m_{0.0};  ///< since the first row, by the trapezoidal rule
   double last_time_s_{0.0};

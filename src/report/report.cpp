@@ -1,16 +1,16 @@
-#include "abs_hil/report/report.hpp"
+#include "report/report.hpp"
 
 #include <fmt/format.h>
 
 #include <fstream>
 #include <stdexcept>
 
-#include "abs_hil/report/input_error.hpp"
-#include "abs_hil/report/text.hpp"
-#include "page.hpp"
-#include "run_details.hpp"
-#include "run_tables.hpp"
-#include "series.hpp"
+#include "report/input_error.hpp"
+#include "report/page.hpp"
+#include "report/run_details.hpp"
+#include "report/run_tables.hpp"
+#include "report/series_page.hpp"
+#include "report/text.hpp"
 
 namespace abs_hil::report {
 

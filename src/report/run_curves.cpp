@@ -1,10 +1,10 @@
-#include "abs_hil/report/run_curves.hpp"
+#include "report/run_curves.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "abs_hil/report/csv_reader.hpp"
+#include "report/csv_reader.hpp"
 
 namespace abs_hil::report {
 
@@ -17,21 +17,21 @@ struct Collector {
   std::size_t column;
   std::size_t minus;
   bool subtracts;
-  Envelope envelope;
+  Decimation envelope;
   Range relevant{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
 };
 
 }  // namespace
 
-std::map<std::string, Course> read_curves(const RunFiles& run, const RunSurvey& survey,
-                                          const std::vector<Request>& requests, std::size_t most_stretches) {
+std::map<std::string, Profile> read_curves(const RunFiles& run, const RunSurvey& survey,
+                                           const std::vector<Request>& requests, std::size_t most_stretches) {
   CsvReader csv(run.csv);
   std::vector<Collector> collectors;
   for (const Request& request : requests) {
     const bool subtracts = !request.minus.empty();
     const std::size_t column = csv.column(request.column);
     collectors.push_back(
-        {&request, column, subtracts ? csv.column(request.minus) : column, subtracts, Envelope(most_stretches)});
+        {&request, column, subtracts ? csv.column(request.minus) : column, subtracts, Decimation(most_stretches)});
   }
   const std::size_t speed = csv.column(survey.knows("omega2_rad_s") ? "omega2_rad_s" : "omega2_est_rad_s");
   while (csv.next()) {
@@ -49,9 +49,9 @@ std::map<std::string, Course> read_curves(const RunFiles& run, const RunSurvey& 
       }
     }
   }
-  std::map<std::string, Course> courses;
-  for (const Collector& c : collectors) courses[c.request->name] = {c.envelope.points(), c.relevant};
-  return courses;
+  std::map<std::string, Profile> profiles;
+  for (const Collector& c : collectors) profiles[c.request->name] = {c.envelope.points(), c.relevant};
+  return profiles;
 }
 
 }  // namespace abs_hil::report

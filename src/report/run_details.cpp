@@ -1,4 +1,4 @@
-#include "run_details.hpp"
+#include "report/run_details.hpp"
 
 #include <fmt/format.h>
 #include <toml++/toml.h>
@@ -9,8 +9,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "abs_hil/report/input_error.hpp"
-#include "abs_hil/report/text.hpp"
+#include "report/input_error.hpp"
+#include "report/text.hpp"
 
 namespace abs_hil::report {
 

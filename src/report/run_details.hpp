@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "abs_hil/report/run_files.hpp"
+#include "report/run_files.hpp"
 
 /// The files beside a run's CSV, each read whole: they are small. All throw InputError for a file that cannot be read.
 namespace abs_hil::report {

@@ -1,4 +1,4 @@
-#include "abs_hil/report/run_figures.hpp"
+#include "report/run_figures.hpp"
 
 #include <fmt/format.h>
 
@@ -9,9 +9,9 @@
 #include <map>
 #include <utility>
 
-#include "abs_hil/report/run_curves.hpp"
-#include "axis.hpp"
-#include "course_figure.hpp"
+#include "report/axis.hpp"
+#include "report/profile_figure.hpp"
+#include "report/run_curves.hpp"
 
 namespace abs_hil::report {
 
@@ -98,7 +98,7 @@ class FigureMaker {
 
   [[nodiscard]] std::vector<Figure> figures() const {
     std::vector<Figure> figures;
-    figures.push_back(course_figure(
+    figures.push_back(profile_figure(
         runs_, surveys_, courses_, [this](std::size_t r) { return style(r); }, legend()));
     figures.push_back(speed_figure("fig5", "Figure 5. Upper wheel speed", "omega1", 1));
     figures.push_back(speed_figure("fig6", "Figure 6. Lower wheel speed", "omega2", 2));
@@ -203,9 +203,9 @@ class FigureMaker {
   [[nodiscard]] std::optional<Range> relevant(const std::vector<std::string>& quantities, Range least) const {
     Range range = least;
     bool any = false;
-    for (const auto& courses : courses_) {
+    for (const auto& profiles : courses_) {
       for (const std::string& quantity : quantities) {
-        const Range r = courses.at(quantity).relevant;
+        const Range r = profiles.at(quantity).relevant;
         if (r.first > r.second) continue;
         range = {std::min(range.first, r.first), std::max(range.second, r.second)};
         any = true;

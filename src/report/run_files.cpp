@@ -1,4 +1,4 @@
-#include "abs_hil/report/run_files.hpp"
+#include "report/run_files.hpp"
 
 #include <fmt/format.h>
 
@@ -7,9 +7,9 @@
 #include <limits>
 #include <set>
 
-#include "abs_hil/report/input_error.hpp"
-#include "abs_hil/report/text.hpp"
-#include "run_details.hpp"
+#include "report/input_error.hpp"
+#include "report/run_details.hpp"
+#include "report/text.hpp"
 
 namespace abs_hil::report {
 

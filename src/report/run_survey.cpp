@@ -1,13 +1,13 @@
-#include "abs_hil/report/run_survey.hpp"
+#include "report/run_survey.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "abs_hil/report/csv_reader.hpp"
-#include "abs_hil/report/input_error.hpp"
 #include "abs_hil/rig/parameters.hpp"
-#include "plant_changes.hpp"
+#include "report/csv_reader.hpp"
+#include "report/input_error.hpp"
+#include "report/plant_changes.hpp"
 
 namespace abs_hil::report {
 

@@ -1,4 +1,4 @@
-#include "run_tables.hpp"
+#include "report/run_tables.hpp"
 
 #include <fmt/format.h>
 
@@ -8,9 +8,9 @@
 #include <functional>
 #include <set>
 
-#include "abs_hil/report/text.hpp"
-#include "metric_list.hpp"
-#include "table.hpp"
+#include "report/metric_list.hpp"
+#include "report/table.hpp"
+#include "report/text.hpp"
 
 namespace abs_hil::report {
 

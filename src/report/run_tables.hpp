@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "abs_hil/report/run_files.hpp"
-#include "abs_hil/report/run_survey.hpp"
+#include "report/run_files.hpp"
+#include "report/run_survey.hpp"
 
 /// Parts of the page as HTML; empty where there is nothing to show.
 namespace abs_hil::report {

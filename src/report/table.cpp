@@ -1,8 +1,8 @@
-#include "table.hpp"
+#include "report/table.hpp"
 
 #include <fmt/format.h>
 
-#include "abs_hil/report/text.hpp"
+#include "report/text.hpp"
 
 namespace abs_hil::report {
 

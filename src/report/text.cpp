@@ -1,4 +1,4 @@
-#include "abs_hil/report/text.hpp"
+#include "report/text.hpp"
 
 #include <fmt/format.h>
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numeric>
 
-#include "abs_hil/report/run_figures.hpp"
+#include "report/run_figures.hpp"
 
 namespace abs_hil::report {
 

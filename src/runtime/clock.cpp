@@ -1,4 +1,4 @@
-#include "abs_hil/runtime/clock.hpp"
+#include "runtime/clock.hpp"
 
 #include <cerrno>
 #include <ctime>

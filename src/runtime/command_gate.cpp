@@ -1,10 +1,10 @@
-#include "abs_hil/runtime/command_gate.hpp"
+#include "runtime/command_gate.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "abs_hil/rig/time_units.hpp"
-#include "abs_hil/runtime/single_writer.hpp"
+#include "runtime/single_writer.hpp"
 
 namespace abs_hil::runtime {
 
@@ -47,7 +47,7 @@ rig::GateCounts CommandGate::counts() const noexcept {
 bool CommandGate::watch(const rig::Measurement& measurement, std::int64_t now_ns, std::int64_t reading_ns) noexcept {
   watch_board(measurement);
   if (watching_) watch_wheels(measurement, now_ns, reading_ns <= prompt_reading_ns);
-  return strides_.usable();
+  return speed_windows_.usable();
 }
 
 void CommandGate::watch_board(const rig::Measurement& measurement) noexcept {
@@ -64,10 +64,10 @@ void CommandGate::watch_board(const rig::Measurement& measurement) noexcept {
 }
 
 void CommandGate::watch_wheels(const rig::Measurement& measurement, std::int64_t now_ns, bool prompt) noexcept {
-  Finding finding = strides_.update(measurement, now_ns, sent_, prompt);
-  if (strides_.complete()) {
-    finding = encoders_.update(strides_.stride());
-    if (finding.sound()) finding = response_.update(strides_.stride(), encoders_.brake_torque_Nm());
+  CheckResult finding = speed_windows_.update(measurement, now_ns, sent_, prompt);
+  if (speed_windows_.complete()) {
+    finding = encoders_.update(speed_windows_.speed_window());
+    if (finding.sound()) finding = response_.update(speed_windows_.speed_window(), encoders_.brake_torque_Nm());
   }
   latch(finding.reason, finding.value);
 }

@@ -1,6 +1,6 @@
-#include "abs_hil/runtime/cycle_statistics.hpp"
+#include "runtime/cycle_statistics.hpp"
 
-#include "abs_hil/runtime/single_writer.hpp"
+#include "runtime/single_writer.hpp"
 
 namespace abs_hil::runtime {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/runtime/flight_ring.hpp"
+#include "runtime/flight_ring.hpp"
 
 #include <algorithm>
 #include <cmath>

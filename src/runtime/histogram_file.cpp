@@ -1,4 +1,4 @@
-#include "abs_hil/runtime/histogram_file.hpp"
+#include "runtime/histogram_file.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,10 +1,10 @@
-#include "abs_hil/runtime/latency_histogram.hpp"
+#include "runtime/latency_histogram.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "abs_hil/rig/time_units.hpp"
-#include "abs_hil/runtime/single_writer.hpp"
+#include "runtime/single_writer.hpp"
 
 namespace abs_hil::runtime {
 

@@ -1,4 +1,4 @@
-#include "memory_locking.hpp"
+#include "runtime/memory_locking.hpp"
 
 #include <malloc.h>
 #include <sys/mman.h>
@@ -12,7 +12,7 @@
 #include <cstring>
 #include <fstream>
 
-#include "realtime_fixes.hpp"
+#include "runtime/realtime_fixes.hpp"
 
 namespace abs_hil::runtime {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "abs_hil/runtime/realtime_setup.hpp"
+#include "runtime/realtime_setup.hpp"
 
 namespace abs_hil::runtime {
 

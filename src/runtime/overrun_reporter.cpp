@@ -1,4 +1,4 @@
-#include "abs_hil/runtime/overrun_reporter.hpp"
+#include "runtime/overrun_reporter.hpp"
 
 #include <array>
 #include <cstdio>

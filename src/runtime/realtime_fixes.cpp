@@ -1,4 +1,4 @@
-#include "realtime_fixes.hpp"
+#include "runtime/realtime_fixes.hpp"
 
 #include <sys/resource.h>
 #include <unistd.h>

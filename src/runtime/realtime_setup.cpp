@@ -1,4 +1,4 @@
-#include "abs_hil/runtime/realtime_setup.hpp"
+#include "runtime/realtime_setup.hpp"
 
 #include <fcntl.h>
 #include <pthread.h>
@@ -13,8 +13,8 @@
 #include <cstdint>
 #include <cstring>
 
-#include "memory_locking.hpp"
-#include "realtime_fixes.hpp"
+#include "runtime/memory_locking.hpp"
+#include "runtime/realtime_fixes.hpp"
 
 namespace abs_hil::runtime {
 

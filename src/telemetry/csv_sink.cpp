@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/csv_sink.hpp"
+#include "telemetry/csv_sink.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -10,7 +10,7 @@
 #include <cstring>
 #include <utility>
 
-#include "abs_hil/telemetry/file_error.hpp"
+#include "telemetry/file_error.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/event_csv.hpp"
+#include "telemetry/event_csv.hpp"
 
 #include <array>
 #include <cerrno>
@@ -7,7 +7,7 @@
 #include <fstream>
 #include <utility>
 
-#include "abs_hil/telemetry/file_error.hpp"
+#include "telemetry/file_error.hpp"
 
 namespace abs_hil::telemetry {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/event_detector.hpp"
+#include "telemetry/event_detector.hpp"
 
 namespace abs_hil::telemetry {
 

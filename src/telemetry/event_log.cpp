@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/event_log.hpp"
+#include "telemetry/event_log.hpp"
 
 #include <array>
 #include <cerrno>
@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "abs_hil/telemetry/file_error.hpp"
+#include "telemetry/file_error.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/file_error.hpp"
+#include "telemetry/file_error.hpp"
 
 #include <cerrno>
 #include <string>

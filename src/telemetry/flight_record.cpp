@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/flight_record.hpp"
+#include "telemetry/flight_record.hpp"
 
 #include <cerrno>
 #include <charconv>
@@ -8,10 +8,10 @@
 #include <fstream>
 
 #include "abs_hil/rig/time_units.hpp"
-#include "abs_hil/telemetry/csv_sink.hpp"
-#include "abs_hil/telemetry/file_error.hpp"
-#include "abs_hil/telemetry/log_outlet.hpp"
-#include "wall_clock.hpp"
+#include "telemetry/csv_sink.hpp"
+#include "telemetry/file_error.hpp"
+#include "telemetry/log_outlet.hpp"
+#include "telemetry/wall_clock.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

@@ -1,11 +1,11 @@
-#include "abs_hil/telemetry/lcm_outlet.hpp"
+#include "telemetry/lcm_outlet.hpp"
 
 #include <limits>
 #include <utility>
 
-#include "abs_hil/telemetry/lcm_url.hpp"
-#include "abs_hil/telemetry/route_probe.hpp"
-#include "abs_hil/telemetry/tcpq_server.hpp"
+#include "telemetry/lcm_url.hpp"
+#include "telemetry/route_probe.hpp"
+#include "telemetry/tcpq_server.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

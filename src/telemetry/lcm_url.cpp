@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/lcm_url.hpp"
+#include "telemetry/lcm_url.hpp"
 
 #include <charconv>
 #include <cstdlib>

@@ -1,12 +1,12 @@
-#include "abs_hil/telemetry/log_outlet.hpp"
+#include "telemetry/log_outlet.hpp"
 
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <utility>
 
-#include "abs_hil/telemetry/file_error.hpp"
-#include "wall_clock.hpp"
+#include "telemetry/file_error.hpp"
+#include "telemetry/wall_clock.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

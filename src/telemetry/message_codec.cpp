@@ -1,9 +1,9 @@
-#include "abs_hil/telemetry/message_codec.hpp"
+#include "telemetry/message_codec.hpp"
 
 #include <bit>
 #include <limits>
 
-#include "abs_hil/telemetry/checked_decode.hpp"
+#include "telemetry/checked_decode.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/message_stream.hpp"
+#include "telemetry/message_stream.hpp"
 
 #include <algorithm>
 #include <cctype>
@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "abs_hil/telemetry/file_error.hpp"
+#include "telemetry/file_error.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/recording.hpp"
+#include "telemetry/recording.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -9,12 +9,12 @@
 #include <utility>
 
 #include "abs_hil/rig/phase.hpp"
-#include "abs_hil/telemetry/checked_decode.hpp"
-#include "abs_hil/telemetry/csv_sink.hpp"
-#include "abs_hil/telemetry/file_error.hpp"
-#include "abs_hil/telemetry/hexadecimal.hpp"
-#include "abs_hil/telemetry/message_codec.hpp"
-#include "csv_text.hpp"
+#include "telemetry/checked_decode.hpp"
+#include "telemetry/csv_sink.hpp"
+#include "telemetry/csv_text.hpp"
+#include "telemetry/file_error.hpp"
+#include "telemetry/hexadecimal.hpp"
+#include "telemetry/message_codec.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

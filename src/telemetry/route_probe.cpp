@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/route_probe.hpp"
+#include "telemetry/route_probe.hpp"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "abs_hil/telemetry/lcm_url.hpp"
+#include "telemetry/lcm_url.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

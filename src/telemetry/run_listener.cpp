@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/run_listener.hpp"
+#include "telemetry/run_listener.hpp"
 
 #include <poll.h>
 
@@ -8,10 +8,10 @@
 #include <span>
 #include <utility>
 
-#include "abs_hil/telemetry/checked_decode.hpp"
-#include "abs_hil/telemetry/lcm_url.hpp"
-#include "abs_hil/telemetry/message_stream.hpp"
-#include "abs_hil/telemetry/tcpq_server.hpp"
+#include "telemetry/checked_decode.hpp"
+#include "telemetry/lcm_url.hpp"
+#include "telemetry/message_stream.hpp"
+#include "telemetry/tcpq_server.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/tcpq_server.hpp"
+#include "telemetry/tcpq_server.hpp"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>

@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/udpm_receiver.hpp"
+#include "telemetry/udpm_receiver.hpp"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -11,8 +11,8 @@
 #include <system_error>
 #include <utility>
 
-#include "abs_hil/telemetry/lcm_outlet.hpp"
-#include "abs_hil/telemetry/lcm_url.hpp"
+#include "telemetry/lcm_outlet.hpp"
+#include "telemetry/lcm_url.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

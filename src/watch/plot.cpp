@@ -1,4 +1,4 @@
-#include "abs_hil/watch/plot.hpp"
+#include "watch/plot.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,10 +1,10 @@
-#include "abs_hil/watch/run_view.hpp"
+#include "watch/run_view.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "abs_hil/telemetry/event_detector.hpp"
-#include "abs_hil/telemetry/message_codec.hpp"
+#include "telemetry/event_detector.hpp"
+#include "telemetry/message_codec.hpp"
 
 namespace abs_hil::watch {
 namespace {

@@ -1,4 +1,4 @@
-#include "abs_hil/watch/screen.hpp"
+#include "watch/screen.hpp"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 
 #include "abs_hil/rig/phase.hpp"
 #include "abs_hil/rig/reason.hpp"
-#include "abs_hil/watch/plot.hpp"
+#include "watch/plot.hpp"
 
 namespace abs_hil::watch {
 namespace {

@@ -1,4 +1,4 @@
-#include "abs_hil/watch/terminal.hpp"
+#include "watch/terminal.hpp"
 
 // The wide characters of ncurses.
 #define NCURSES_WIDECHAR 1

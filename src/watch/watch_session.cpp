@@ -1,4 +1,4 @@
-#include "abs_hil/watch/watch_session.hpp"
+#include "watch/watch_session.hpp"
 
 #include <fmt/format.h>
 #include <poll.h>
@@ -12,10 +12,10 @@
 #include <stdexcept>
 
 #include "abs_hil/rig/time_units.hpp"
-#include "abs_hil/telemetry/run_listener.hpp"
-#include "abs_hil/watch/run_view.hpp"
-#include "abs_hil/watch/screen.hpp"
-#include "abs_hil/watch/terminal.hpp"
+#include "telemetry/run_listener.hpp"
+#include "watch/run_view.hpp"
+#include "watch/screen.hpp"
+#include "watch/terminal.hpp"
 
 namespace abs_hil::watch {
 namespace {

@@ -1,4 +1,4 @@
-#include "abs_hil/analysis/run_metrics.hpp"
+#include "analysis/run_metrics.hpp"
 
 #include <cmath>
 

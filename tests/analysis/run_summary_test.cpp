@@ -1,4 +1,4 @@
-#include "abs_hil/analysis/run_summary.hpp"
+#include "analysis/run_summary.hpp"
 
 #include <unistd.h>
 

@@ -1,4 +1,4 @@
-#include "abs_hil/analysis/statistics.hpp"
+#include "analysis/statistics.hpp"
 
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "abs_hil/control/adaptive_controller.hpp"
+#include "control/adaptive_controller.hpp"
 
 #include <algorithm>
 #include <cmath>

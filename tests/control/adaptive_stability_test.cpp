@@ -5,11 +5,11 @@
 #include <random>
 #include <vector>
 
-#include "abs_hil/control/adaptive_controller.hpp"
-#include "abs_hil/control/lyapunov.hpp"
 #include "catch.hpp"
+#include "control/adaptive_controller.hpp"
 #include "control/braking_bench.hpp"
 #include "control/drawn_gains.hpp"
+#include "control/lyapunov.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;

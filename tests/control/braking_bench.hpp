@@ -9,13 +9,13 @@
 #include <optional>
 #include <vector>
 
-#include "abs_hil/control/brake_actuator.hpp"
 #include "abs_hil/control/options.hpp"
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/control/slip_controller.hpp"
-#include "abs_hil/control/tracking_observer.hpp"
 #include "abs_hil/rig/parameters.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
+#include "control/brake_actuator.hpp"
+#include "control/tracking_observer.hpp"
 
 /// A plant and a control loop of the tests' own: plain RK4 of (11), independent of plant_sim.
 namespace bench {

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <random>
 
-#include "abs_hil/control/pi_controller.hpp"
 #include "catch.hpp"
+#include "control/pi_controller.hpp"
 #include "control/rival_bench.hpp"
 
 using namespace abs_hil;

@@ -1,4 +1,4 @@
-#include "abs_hil/control/five_phase_controller.hpp"
+#include "control/five_phase_controller.hpp"
 
 #include <stdexcept>
 #include <vector>

@@ -1,4 +1,4 @@
-#include "abs_hil/control/lyapunov.hpp"
+#include "control/lyapunov.hpp"
 
 #include <Eigen/LU>
 #include <limits>

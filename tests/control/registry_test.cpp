@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "abs_hil/control/locked_controller.hpp"
 #include "catch.hpp"
+#include "control/locked_controller.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::Contains;

@@ -1,4 +1,4 @@
-#include "abs_hil/control/slip_peak_estimator.hpp"
+#include "control/slip_peak_estimator.hpp"
 
 #include <cmath>
 #include <functional>

@@ -1,4 +1,4 @@
-#include "abs_hil/control/theta_estimator.hpp"
+#include "control/theta_estimator.hpp"
 
 #include <algorithm>
 #include <cmath>

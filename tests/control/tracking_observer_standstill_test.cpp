@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "abs_hil/control/tracking_observer.hpp"
 #include "catch.hpp"
+#include "control/tracking_observer.hpp"
 #include "control/wheel_encoder.hpp"
 
 using namespace abs_hil;

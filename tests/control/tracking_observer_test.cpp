@@ -1,4 +1,4 @@
-#include "abs_hil/control/tracking_observer.hpp"
+#include "control/tracking_observer.hpp"
 
 #include <cmath>
 #include <limits>

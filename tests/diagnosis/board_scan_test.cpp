@@ -1,4 +1,4 @@
-#include "abs_hil/diagnosis/board_scan.hpp"
+#include "diagnosis/board_scan.hpp"
 
 #include "catch.hpp"
 #include "fake_system.hpp"

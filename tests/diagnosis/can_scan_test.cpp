@@ -1,4 +1,4 @@
-#include "abs_hil/diagnosis/can_scan.hpp"
+#include "diagnosis/can_scan.hpp"
 
 #include "catch.hpp"
 

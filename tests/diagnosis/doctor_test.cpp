@@ -1,4 +1,4 @@
-#include "abs_hil/diagnosis/doctor.hpp"
+#include "diagnosis/doctor.hpp"
 
 #include "catch.hpp"
 

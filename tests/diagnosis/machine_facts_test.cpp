@@ -1,4 +1,4 @@
-#include "abs_hil/diagnosis/machine_facts.hpp"
+#include "diagnosis/machine_facts.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/sim/sim_driver.hpp"
+#include "driver/sim/sim_driver.hpp"
 
 #include <cmath>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/take_over_writer.hpp"
+#include "driver/take_over_writer.hpp"
 
 #include <string>
 #include <vector>

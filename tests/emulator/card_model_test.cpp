@@ -1,6 +1,6 @@
 // The emulated card against the register facts, worked by hand.
 
-#include "abs_hil/emulator/card_model.hpp"
+#include "emulator/card_model.hpp"
 
 #include <bit>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "abs_hil/emulator/register_faults.hpp"
+#include "emulator/register_faults.hpp"
 
 #include <set>
 #include <stdexcept>

@@ -1,11 +1,11 @@
 // The emulated RT-DAC/USB2, by bytes laid out by hand from the facts: no line shared with the driver.
 
-#include "abs_hil/emulator/usb_board_model.hpp"
+#include "emulator/usb_board_model.hpp"
 
 #include <vector>
 
-#include "abs_hil/emulator/usb_faults.hpp"
 #include "catch.hpp"
+#include "emulator/usb_faults.hpp"
 
 using namespace abs_hil::emulator;
 using Catch::Matchers::Contains;

@@ -1,6 +1,6 @@
 // What the kernel's virtual host controller would send and must get, byte for byte (USB/IP protocol).
 
-#include "abs_hil/emulator/usbip_device.hpp"
+#include "emulator/usbip_device.hpp"
 
 #include <cstring>
 

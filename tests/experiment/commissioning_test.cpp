@@ -1,4 +1,4 @@
-#include "abs_hil/experiment/commissioning.hpp"
+#include "experiment/commissioning.hpp"
 
 #include <functional>
 #include <stdexcept>

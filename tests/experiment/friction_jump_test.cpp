@@ -1,8 +1,8 @@
 #include <cmath>
 
-#include "abs_hil/script/events.hpp"
-#include "abs_hil/script/library.hpp"
 #include "catch.hpp"
+#include "config/events.hpp"
+#include "config/library.hpp"
 #include "simulated_run.hpp"
 
 using namespace abs_hil;
@@ -15,7 +15,7 @@ namespace {
 
 Setup friction_jump(Setup setup) {
   setup.experiment.name = "friction-jump";
-  setup.plant.friction_profile = script::profile(*script::find(setup.experiment.name), "friction");
+  setup.plant.friction_profile = config::profile(*config::find(setup.experiment.name), "friction");
   return setup;
 }
 
@@ -31,8 +31,8 @@ Setup on_makers_plant(Setup setup) {
 }  // namespace
 
 TEST_CASE("only friction-jump is about a changing road") {
-  CHECK(script::profile(*script::find("friction-jump"), "friction") == "braking time: 1; 0.521739 at 0.6; 1 at 1");
-  CHECK(script::profile(*script::find("paper"), "friction").empty());
+  CHECK(config::profile(*config::find("friction-jump"), "friction") == "braking time: 1; 0.521739 at 0.6; 1 at 1");
+  CHECK(config::profile(*config::find("paper"), "friction").empty());
 }
 
 TEST_CASE("friction-jump takes theta from 23 to 12 and back to 23 N in mid-braking, after a run-up or at once") {

@@ -2,35 +2,35 @@
 
 #include <filesystem>
 
-#include "abs_hil/comparison/simulated_run.hpp"
-#include "abs_hil/comparison/variation.hpp"
 #include "abs_hil/control/registry.hpp"
-#include "abs_hil/script/events.hpp"
-#include "abs_hil/script/library.hpp"
-#include "abs_hil/script/plan.hpp"
-#include "abs_hil/settings/config_file.hpp"
-#include "abs_hil/settings/key_table.hpp"
 #include "catch.hpp"
+#include "config/config_file.hpp"
+#include "config/events.hpp"
+#include "config/key_table.hpp"
+#include "config/library.hpp"
+#include "config/plan.hpp"
 #include "simulated_run.hpp"
+#include "study/simulated_run.hpp"
+#include "study/variation.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::experiment;
 
 namespace {
 
-settings::Settings configured(const std::string& plant, const std::string& experiment, std::string_view controller,
-                              double rate_Hz) {
-  settings::Settings s;
-  settings::KeyTable keys(s);
-  settings::load_file(settings::plant_file(plant), keys, "plant");
-  s.plant.friction_profile = script::profile(*script::find(experiment), "friction");
+config::Settings configured(const std::string& plant, const std::string& experiment, std::string_view controller,
+                            double rate_Hz) {
+  config::Settings s;
+  config::KeyTable keys(s);
+  config::load_file(config::plant_file(plant), keys, "plant");
+  s.plant.friction_profile = config::profile(*config::find(experiment), "friction");
   s.experiment.name = experiment;
   s.control.controller = controller;
   s.control.rate_Hz = rate_Hz;
   return s;
 }
 
-rig::Reason end_of(const settings::Settings& s) {
+rig::Reason end_of(const config::Settings& s) {
   const test::Setup setup{s.plant, s.control, s.experiment, s.gate, static_cast<std::uint64_t>(s.seed)};
   return test::run(setup).outcome.reason;
 }
@@ -56,7 +56,7 @@ TEST_CASE("no controller on any plant at any rate trips a check") {
 }
 
 TEST_CASE("nor do the other experiments") {
-  for (const auto& known : script::known_experiments()) {
+  for (const auto& known : config::known_experiments()) {
     for (const std::string& plant : plants) {
       CAPTURE(known->name, plant);
       CHECK(end_of(configured(plant, known->name, "adaptive", 1000.0)) == rig::Reason::sequence_complete);
@@ -67,7 +67,7 @@ TEST_CASE("nor do the other experiments") {
 TEST_CASE("nor do ideal sensors and actuators, other seeds and other encoders") {
   for (const auto& controller : control::controllers()) {
     CAPTURE(controller.name);
-    settings::Settings s = configured("paper-table1", "paper", controller.name, 1000.0);
+    config::Settings s = configured("paper-table1", "paper", controller.name, 1000.0);
     s.experiment.start_speed_rad_s = 170.0;
     s.plant.ideal_sensors = true;
     CHECK(end_of(s) == rig::Reason::sequence_complete);
@@ -86,18 +86,18 @@ TEST_CASE("nor do ideal sensors and actuators, other seeds and other encoders") 
 }
 
 TEST_CASE("nor do plants that stray by 20 % from what the gate believes, from rest to standstill") {
-  const auto variation = comparison::Variation::parse("parameters=0.2,theta=0.2,phase");
+  const auto variation = study::Variation::parse("parameters=0.2,theta=0.2,phase");
   for (const std::string& plant : plants) {
     for (const char* controller : {"adaptive", "relay", "locked", "sliding-mode"}) {
-      const settings::Settings nominal = configured(plant, "paper", controller, 1000.0);
+      const config::Settings nominal = configured(plant, "paper", controller, 1000.0);
       for (std::uint64_t index = 0; index < 5; ++index) {
         CAPTURE(plant, controller, index);
-        const comparison::Perturbation drawn = comparison::draw(variation, 7, index);
+        const study::Perturbation drawn = study::draw(variation, 7, index);
         runtime::VirtualClock clock;
-        driver::SimDriver driver(comparison::perturbed(nominal.plant, drawn), {.seed = drawn.sensor_seed});
+        driver::SimDriver driver(study::perturbed(nominal.plant, drawn), {.seed = drawn.sensor_seed});
         RunSession session(clock, driver,
                            make_logic_parts(nominal.control, nominal.plant.rig, false, nominal.gate, nominal.experiment,
-                                            script::plan(nominal).phases),
+                                            config::plan(nominal).phases),
                            nominal.gate, {});
         CHECK(session.run_fast([] { return rig::Reason::none; }).reason == rig::Reason::sequence_complete);
       }

@@ -1,12 +1,12 @@
-#include "abs_hil/experiment/run_logic.hpp"
+#include "experiment/run_logic.hpp"
 
 #include <cstdint>
 #include <memory>
 #include <utility>
 
-#include "abs_hil/control/tracking_observer.hpp"
 #include "abs_hil/rig/encoder_scale.hpp"
 #include "catch.hpp"
+#include "control/tracking_observer.hpp"
 #include "simulated_run.hpp"
 
 using namespace abs_hil;

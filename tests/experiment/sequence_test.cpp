@@ -1,4 +1,4 @@
-#include "abs_hil/experiment/sequence.hpp"
+#include "experiment/sequence.hpp"
 
 #include <limits>
 #include <stdexcept>

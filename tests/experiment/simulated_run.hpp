@@ -5,11 +5,11 @@
 #include <utility>
 #include <vector>
 
-#include "abs_hil/analysis/run_metrics.hpp"
 #include "abs_hil/control/registry.hpp"
-#include "abs_hil/driver/sim/sim_driver.hpp"
-#include "abs_hil/experiment/run_session.hpp"
-#include "abs_hil/script/plan.hpp"
+#include "analysis/run_metrics.hpp"
+#include "config/plan.hpp"
+#include "driver/sim/sim_driver.hpp"
+#include "experiment/run_session.hpp"
 
 namespace abs_hil::experiment::test {
 
@@ -52,8 +52,8 @@ struct Result {
 
 /// The phases of the experiment that the setup names.
 inline std::vector<PhasePlan> phases_of(const Setup& setup) {
-  settings::Settings settings{.plant = setup.plant, .control = setup.control, .experiment = setup.experiment};
-  return script::plan(settings).phases;
+  config::Settings settings{.plant = setup.plant, .control = setup.control, .experiment = setup.experiment};
+  return config::plan(settings).phases;
 }
 
 inline RunLogicParts logic_parts(const Setup& setup) {

@@ -1,7 +1,7 @@
 #include <cmath>
 
-#include "abs_hil/analysis/friction_curve.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
+#include "analysis/friction_curve.hpp"
 #include "catch.hpp"
 #include "simulated_run.hpp"
 

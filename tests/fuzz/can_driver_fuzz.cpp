@@ -9,11 +9,11 @@
 #include <cstdint>
 #include <variant>
 
-#include "abs_hil/driver/can/answer_tracker.hpp"
-#include "abs_hil/driver/can/error_frame.hpp"
-#include "abs_hil/driver/can/frame_socket.hpp"
-#include "abs_hil/driver/can/messages.hpp"
-#include "abs_hil/driver/can/signal_codec.hpp"
+#include "driver/can/answer_tracker.hpp"
+#include "driver/can/error_frame.hpp"
+#include "driver/can/frame_socket.hpp"
+#include "driver/can/messages.hpp"
+#include "driver/can/signal_codec.hpp"
 #include "fuzz_input.hpp"
 
 namespace {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "abs_hil/driver/can/messages.hpp"
-#include "abs_hil/emulator/can_node.hpp"
-#include "abs_hil/emulator/can_node_faults.hpp"
+#include "driver/can/messages.hpp"
+#include "emulator/can_node.hpp"
+#include "emulator/can_node_faults.hpp"
 #include "fuzz_input.hpp"
 
 namespace {

@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "abs_hil/telemetry/checked_decode.hpp"
-#include "abs_hil/telemetry/lcm_packet.hpp"
-#include "abs_hil/telemetry/message_codec.hpp"
+#include "telemetry/checked_decode.hpp"
+#include "telemetry/lcm_packet.hpp"
+#include "telemetry/message_codec.hpp"
 
 using namespace abs_hil;
 

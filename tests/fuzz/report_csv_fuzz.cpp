@@ -6,12 +6,12 @@
 #include <fstream>
 #include <string>
 
-#include "abs_hil/report/csv_reader.hpp"
-#include "abs_hil/report/envelope.hpp"
-#include "abs_hil/report/input_error.hpp"
-#include "abs_hil/report/run_survey.hpp"
-#include "abs_hil/report/text.hpp"
 #include "fuzz_input.hpp"
+#include "report/csv_reader.hpp"
+#include "report/decimation.hpp"
+#include "report/input_error.hpp"
+#include "report/run_survey.hpp"
+#include "report/text.hpp"
 
 namespace {
 
@@ -28,7 +28,7 @@ void read(const std::string& text) {
   std::ofstream(file(), std::ios::binary) << text;
   try {
     abs_hil::report::CsvReader csv(file());
-    abs_hil::report::Envelope envelope(8);
+    abs_hil::report::Decimation envelope(8);
     double last_s = 0.0;
     for (std::size_t rows = 0; csv.next(); ++rows) {
       expect(csv.values().size() == csv.columns().size());

@@ -5,10 +5,10 @@
 #include <optional>
 #include <string>
 
-#include "abs_hil/experiment/sequence.hpp"
-#include "abs_hil/script/explain.hpp"
-#include "abs_hil/script/plan.hpp"
-#include "abs_hil/settings/config_error.hpp"
+#include "config/config_error.hpp"
+#include "config/explain.hpp"
+#include "config/plan.hpp"
+#include "experiment/sequence.hpp"
 #include "fuzz_input.hpp"
 
 namespace {
@@ -16,13 +16,13 @@ namespace {
 using namespace abs_hil;
 using abs_hil::fuzz::expect;
 
-void use(const script::Script& script) {
-  settings::Settings settings;
-  script::apply(script, settings);
-  static_cast<void>(script::explain(script, settings));
-  const script::Plan plan = script::plan(script, settings);
+void use(const config::Script& script) {
+  config::Settings settings;
+  config::apply(script, settings);
+  static_cast<void>(config::explain(script, settings));
+  const config::Plan plan = config::plan(script, settings);
   expect(!plan.phases.empty() && plan.phases.size() == plan.phase_names.size());
-  static_cast<void>(script::beyond_limits(plan, settings));
+  static_cast<void>(config::beyond_limits(plan, settings));
   experiment::Sequence sequence(plan.phases, plan.limits);
   for (int i = 0; i < 50; ++i) {
     sequence.update(
@@ -45,8 +45,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return std::nullopt;
   };
   try {
-    use(script::parse(text, "fuzz.toml", read_file));
-  } catch (const settings::ConfigError& error) {
+    use(config::parse(text, "fuzz.toml", read_file));
+  } catch (const config::ConfigError& error) {
     const std::string message = error.what();
     expect(!message.empty() && message.find('\n') == std::string::npos);
   }

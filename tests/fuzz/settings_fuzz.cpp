@@ -5,16 +5,16 @@
 #include <variant>
 
 #include "abs_hil/plant_sim/factor_profile.hpp"
-#include "abs_hil/settings/config_error.hpp"
-#include "abs_hil/settings/key_table.hpp"
+#include "config/config_error.hpp"
+#include "config/key_table.hpp"
 #include "fuzz_input.hpp"
 
 namespace {
 
 using abs_hil::fuzz::expect;
 
-void expect_in_range(const abs_hil::settings::KeyTable& table) {
-  for (const abs_hil::settings::Key& key : table.keys()) {
+void expect_in_range(const abs_hil::config::KeyTable& table) {
+  for (const abs_hil::config::Key& key : table.keys()) {
     std::visit(
         [&](const auto* value) {
           using Number = std::remove_cvref_t<decltype(*value)>;
@@ -30,14 +30,14 @@ void expect_in_range(const abs_hil::settings::KeyTable& table) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::string_view text(reinterpret_cast<const char*>(data), size);
-  abs_hil::settings::Settings settings;
-  abs_hil::settings::KeyTable table(settings);
+  abs_hil::config::Settings settings;
+  abs_hil::config::KeyTable table(settings);
   while (!text.empty()) {
     const std::string_view line = text.substr(0, text.find('\n'));
     text.remove_prefix(line.size() < text.size() ? line.size() + 1 : text.size());
     try {
       table.set_text(line, "fuzz");
-    } catch (const abs_hil::settings::ConfigError&) {
+    } catch (const abs_hil::config::ConfigError&) {
     }
     try {
       const abs_hil::plant_sim::FactorProfile profile(line);

@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "abs_hil/driver/plausibility.hpp"
-#include "abs_hil/driver/usb/usb_driver.hpp"
+#include "driver/usb/usb_driver.hpp"
 #include "fuzz_input.hpp"
 
 namespace {

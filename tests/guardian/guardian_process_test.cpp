@@ -1,12 +1,12 @@
-#include "abs_hil/guardian/guardian_process.hpp"
+#include "guardian/guardian_process.hpp"
 
 #include <sys/stat.h>
 
 #include <csignal>
 #include <fstream>
 
-#include "abs_hil/guardian/linux_process.hpp"
 #include "catch.hpp"
+#include "guardian/linux_process.hpp"
 #include "temporary_folder.hpp"
 
 namespace abs_hil::guardian {
@@ -28,7 +28,7 @@ TEST_CASE("outputs that were handed over stay so until their guardian has seen i
   guardian.stand_guard();
   const pid_t pid = guardian.pid();
   guardian.outputs_released(false);
-  CHECK(guardian.end() == GuardianProcess::Farewell::insisting);
+  CHECK(guardian.end() == GuardianProcess::GuardianExit::insisting);
   CHECK(region.stage() == Stage::handed_over);
   REQUIRE(::kill(pid, SIGKILL) == 0);  // it was left alone to go on
 }
@@ -39,7 +39,7 @@ TEST_CASE("a guardian that hangs although the outputs are safe is ended") {
   GuardianProcess guardian(region, held_up_guardian(folder.path), "{}");
   guardian.stand_guard();
   guardian.outputs_released(true);
-  CHECK(guardian.end() == GuardianProcess::Farewell::failed);
+  CHECK(guardian.end() == GuardianProcess::GuardianExit::failed);
   CHECK(region.stage() == Stage::closed);
 }
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "abs_hil/guardian/duty.hpp"
+#include "guardian/guardian_loop.hpp"
 
 namespace abs_hil::guardian::test {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/guardian/shared_region.hpp"
+#include "guardian/shared_region.hpp"
 
 #include <fcntl.h>
 #include <sys/mman.h>
@@ -7,8 +7,8 @@
 
 #include <stdexcept>
 
-#include "abs_hil/guardian/brief.hpp"
 #include "catch.hpp"
+#include "guardian/launch_config.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::guardian;
@@ -55,17 +55,17 @@ TEST_CASE("another build's region, or something else altogether, is refused") {
 }
 
 TEST_CASE("a brief reads back, and what is none is refused") {
-  const Brief brief{.config_json = R"({"a": {"b": "\"x\""}})",
-                    .experiment = "e",
-                    .controller = "c",
-                    .plant = "p",
-                    .backend = "rig",
-                    .version = "1",
-                    .realtime = "prefer",
-                    .record_prefix = "/tmp/a b/recorder"};
-  const Brief read = parse_brief(to_json(brief));
+  const LaunchConfig brief{.config_json = R"({"a": {"b": "\"x\""}})",
+                           .experiment = "e",
+                           .controller = "c",
+                           .plant = "p",
+                           .backend = "rig",
+                           .version = "1",
+                           .realtime = "prefer",
+                           .record_prefix = "/tmp/a b/recorder"};
+  const LaunchConfig read = parse_launch_config(to_json(brief));
   CHECK(read.config_json == brief.config_json);
   CHECK(read.record_prefix == brief.record_prefix);
-  CHECK_THROWS_WITH(parse_brief("{}"), Catch::Matchers::Contains("not a brief"));
-  CHECK_THROWS_WITH(parse_brief("nonsense"), Catch::Matchers::Contains("not a brief"));
+  CHECK_THROWS_WITH(parse_launch_config("{}"), Catch::Matchers::Contains("not a brief"));
+  CHECK_THROWS_WITH(parse_launch_config("nonsense"), Catch::Matchers::Contains("not a brief"));
 }

@@ -3,9 +3,9 @@
 
 #include <memory>
 
-#include "abs_hil/driver/take_over_writer.hpp"
 #include "catch.hpp"
 #include "driver/can/node_on_socket.hpp"
+#include "driver/take_over_writer.hpp"
 #include "driver/usb/model_board.hpp"
 
 using namespace abs_hil;

@@ -1,4 +1,4 @@
-#include "abs_hil/plant_sim/encoder.hpp"
+#include "plant_sim/encoder.hpp"
 
 #include <cstdint>
 #include <limits>

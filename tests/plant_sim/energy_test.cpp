@@ -1,7 +1,7 @@
 #include <random>
 
 #include "abs_hil/plant_sim/plant.hpp"
-#include "brake_courses.hpp"
+#include "brake_profiles.hpp"
 #include "catch.hpp"
 
 using namespace abs_hil::plant_sim;

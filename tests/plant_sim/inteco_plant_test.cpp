@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "abs_hil/plant_sim/plant.hpp"
-#include "brake_courses.hpp"
+#include "brake_profiles.hpp"
 #include "catch.hpp"
 #include "rigs.hpp"
 

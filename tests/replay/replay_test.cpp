@@ -4,17 +4,17 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "abs_hil/driver/injection/injecting_driver.hpp"
-#include "abs_hil/replay/check.hpp"
-#include "abs_hil/replay/report.hpp"
-#include "abs_hil/script/plan.hpp"
-#include "abs_hil/settings/config_error.hpp"
-#include "abs_hil/settings/config_file.hpp"
-#include "abs_hil/settings/unsafe_settings.hpp"
-#include "abs_hil/telemetry/log_outlet.hpp"
-#include "abs_hil/telemetry/message_stream.hpp"
 #include "catch.hpp"
+#include "config/config_error.hpp"
+#include "config/config_file.hpp"
+#include "config/plan.hpp"
+#include "config/unsafe_settings.hpp"
+#include "driver/injection/injecting_driver.hpp"
 #include "experiment/simulated_run.hpp"
+#include "replay/check.hpp"
+#include "replay/report.hpp"
+#include "telemetry/log_outlet.hpp"
+#include "telemetry/message_stream.hpp"
 #include "telemetry/sample_records.hpp"
 #include "temporary_folder.hpp"
 
@@ -48,9 +48,9 @@ class LateMeasurement final : public rig::RecordSink {
 };
 
 void record_run(const std::filesystem::path& path, const Recipe& recipe) {
-  settings::Settings s;
-  settings::KeyTable keys(s);
-  settings::load_file(settings::plant_file(s.plant_name), keys, "plant");
+  config::Settings s;
+  config::KeyTable keys(s);
+  config::load_file(config::plant_file(s.plant_name), keys, "plant");
   keys.set_text("experiment.start_speed_rad_s=100", "test");
   for (const std::string& assignment : recipe.assignments) keys.set_text(assignment, "test");
   telemetry::LogOutlet log(path, 0);
@@ -64,11 +64,11 @@ void record_run(const std::filesystem::path& path, const Recipe& recipe) {
       std::make_unique<driver::SimDriver>(s.plant,
                                           driver::SimStart{.seed = static_cast<std::uint64_t>(s.seed),
                                                            .start_speed_rad_s = s.experiment.start_speed_rad_s}),
-      settings::injections_of(s), static_cast<std::uint64_t>(s.seed),
+      config::injections_of(s), static_cast<std::uint64_t>(s.seed),
       [&clock](std::int64_t duration_ns) { clock.sleep_until(clock.now_ns() + duration_ns); });
   experiment::RunSession session(clock, driver,
                                  experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate,
-                                                              s.experiment, script::plan(s).phases),
+                                                              s.experiment, config::plan(s).phases),
                                  s.gate, {&late});
   session.run_fast([&recipe] { return recipe.stop; });
 }
@@ -232,7 +232,7 @@ TEST_CASE("another controller sees the same run: same measurements and estimates
   CHECK(difference > 0.5);
   const std::string text = report(run, settings_of(run, {.controller = "nominal", .assignments = {}}), rerun);
   CHECK(text.find("nominal") != std::string::npos);
-  CHECK_THROWS_AS(settings_of(run, {.controller = "nosuch", .assignments = {}}), settings::ConfigError);
+  CHECK_THROWS_AS(settings_of(run, {.controller = "nosuch", .assignments = {}}), config::ConfigError);
 }
 
 TEST_CASE("recordings that do not hold the whole run are refused with the reason") {

@@ -1,12 +1,12 @@
-#include "abs_hil/report/csv_reader.hpp"
+#include "report/csv_reader.hpp"
 
 #include <unistd.h>
 
 #include <cmath>
 #include <fstream>
 
-#include "abs_hil/report/input_error.hpp"
 #include "catch.hpp"
+#include "report/input_error.hpp"
 
 using abs_hil::report::CsvReader;
 using abs_hil::report::InputError;

@@ -1,7 +1,7 @@
 #include <sstream>
 
-#include "abs_hil/report/gnuplot.hpp"
 #include "catch.hpp"
+#include "report/gnuplot.hpp"
 
 using namespace abs_hil::report;
 

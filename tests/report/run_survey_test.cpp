@@ -1,4 +1,4 @@
-#include "abs_hil/report/run_survey.hpp"
+#include "report/run_survey.hpp"
 
 #include <fmt/ranges.h>
 
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <fstream>
 
-#include "abs_hil/report/csv_reader.hpp"
 #include "catch.hpp"
+#include "report/csv_reader.hpp"
 #include "temporary_folder.hpp"
 
 namespace abs_hil::report {

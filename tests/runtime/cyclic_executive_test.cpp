@@ -1,4 +1,4 @@
-#include "abs_hil/runtime/cyclic_executive.hpp"
+#include "runtime/cyclic_executive.hpp"
 
 #include "catch.hpp"
 #include "scripted_parts.hpp"

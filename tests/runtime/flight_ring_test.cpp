@@ -1,11 +1,11 @@
-#include "abs_hil/runtime/flight_ring.hpp"
+#include "runtime/flight_ring.hpp"
 
 #include <atomic>
 #include <thread>
 #include <vector>
 
-#include "abs_hil/runtime/cycle_watch.hpp"
 #include "catch.hpp"
+#include "runtime/heartbeat.hpp"
 #include "scripted_parts.hpp"
 
 using namespace abs_hil;
@@ -89,10 +89,10 @@ TEST_CASE("two seconds at the cycle's rate") {
 
 TEST_CASE("each cycle gives a sign of life before it writes, and leaves its record") {
   Bench bench;
-  WatchPanel panel;
+  HeartbeatPanel panel;
   std::vector<FlightSlot> slots(8);
   FlightRing recorder(slots);
-  CycleWatch watch(panel, recorder);
+  Heartbeat watch(panel, recorder);
   bench.executive.watch_with(watch);
   for (std::uint64_t n = 1; n <= 3; ++n) {
     bench.cycle();
@@ -107,10 +107,10 @@ TEST_CASE("each cycle gives a sign of life before it writes, and leaves its reco
 TEST_CASE("a guardian that gives no sign of life for so many cycles is a fault, one that is slow is not") {
   constexpr std::uint64_t limit = 5;
   Bench bench;
-  WatchPanel panel;
+  HeartbeatPanel panel;
   std::vector<FlightSlot> slots(8);
   FlightRing recorder(slots);
-  CycleWatch watch(panel, recorder, limit);
+  Heartbeat watch(panel, recorder, limit);
   bench.executive.watch_with(watch);
   for (int n = 0; n < 40; ++n) {
     if (n % 4 == 0) panel.guardian_beats.store(panel.guardian_beats.load() + 1);
@@ -127,10 +127,10 @@ TEST_CASE("a guardian that gives no sign of life for so many cycles is a fault, 
 
 TEST_CASE("without a guardian nobody is missed") {
   Bench bench;
-  WatchPanel panel;
+  HeartbeatPanel panel;
   std::vector<FlightSlot> slots(8);
   FlightRing recorder(slots);
-  CycleWatch watch(panel, recorder, 0);
+  Heartbeat watch(panel, recorder, 0);
   bench.executive.watch_with(watch);
   for (int n = 0; n < 100; ++n) REQUIRE(bench.cycle());
 }

@@ -1,4 +1,4 @@
-#include "abs_hil/runtime/latency_histogram.hpp"
+#include "runtime/latency_histogram.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 #include <sstream>
 #include <vector>
 
-#include "abs_hil/runtime/histogram_file.hpp"
 #include "catch.hpp"
+#include "runtime/histogram_file.hpp"
 
 using namespace abs_hil::runtime;
 

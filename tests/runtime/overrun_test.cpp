@@ -2,9 +2,9 @@
 
 #include <vector>
 
-#include "abs_hil/runtime/cyclic_executive.hpp"
-#include "abs_hil/runtime/overrun_reporter.hpp"
 #include "catch.hpp"
+#include "runtime/cyclic_executive.hpp"
+#include "runtime/overrun_reporter.hpp"
 #include "scripted_parts.hpp"
 
 using namespace abs_hil;

@@ -1,4 +1,4 @@
-#include "abs_hil/runtime/realtime_setup.hpp"
+#include "runtime/realtime_setup.hpp"
 
 #include <pthread.h>
 #include <sched.h>

@@ -1,4 +1,4 @@
-#include "abs_hil/runtime/record_pump.hpp"
+#include "runtime/record_pump.hpp"
 
 #include <stdexcept>
 #include <vector>

@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "abs_hil/driver/rig_driver.hpp"
-#include "abs_hil/runtime/clock.hpp"
-#include "abs_hil/runtime/command_gate.hpp"
-#include "abs_hil/runtime/cycle_logic.hpp"
-#include "abs_hil/runtime/cyclic_executive.hpp"
+#include "runtime/clock.hpp"
+#include "runtime/command_gate.hpp"
+#include "runtime/cycle_logic.hpp"
+#include "runtime/cyclic_executive.hpp"
 
 namespace abs_hil::runtime::test {
 

@@ -3,9 +3,9 @@
 #include <memory>
 #include <vector>
 
-#include "abs_hil/runtime/spsc_ring.hpp"
 #include "catch.hpp"
 #include "memory_model.hpp"
+#include "runtime/spsc_ring.hpp"
 
 using namespace abs_hil::runtime;
 using namespace abs_hil::runtime::test;

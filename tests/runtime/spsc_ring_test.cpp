@@ -1,4 +1,4 @@
-#include "abs_hil/runtime/spsc_ring.hpp"
+#include "runtime/spsc_ring.hpp"
 
 #include <array>
 #include <deque>

@@ -1,10 +1,10 @@
-#include "abs_hil/telemetry/checked_decode.hpp"
+#include "telemetry/checked_decode.hpp"
 
 #include <random>
 
-#include "abs_hil/telemetry/message_codec.hpp"
 #include "catch.hpp"
 #include "telemetry/message_capture.hpp"
+#include "telemetry/message_codec.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

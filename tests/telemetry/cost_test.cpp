@@ -4,11 +4,11 @@
 #include <chrono>
 #include <cstdio>
 
-#include "abs_hil/telemetry/csv_sink.hpp"
-#include "abs_hil/telemetry/lcm_outlet.hpp"
-#include "abs_hil/telemetry/log_outlet.hpp"
-#include "abs_hil/telemetry/message_stream.hpp"
 #include "catch.hpp"
+#include "telemetry/csv_sink.hpp"
+#include "telemetry/lcm_outlet.hpp"
+#include "telemetry/log_outlet.hpp"
+#include "telemetry/message_stream.hpp"
 #include "telemetry/sample_records.hpp"
 #include "temporary_folder.hpp"
 

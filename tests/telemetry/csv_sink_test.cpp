@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/csv_sink.hpp"
+#include "telemetry/csv_sink.hpp"
 
 #include <bit>
 #include <cerrno>
@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "abs_hil/telemetry/file_error.hpp"
 #include "catch.hpp"
+#include "telemetry/file_error.hpp"
 #include "telemetry/sample_records.hpp"
 #include "temporary_folder.hpp"
 

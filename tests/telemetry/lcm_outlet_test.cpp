@@ -1,8 +1,8 @@
-#include "abs_hil/telemetry/lcm_outlet.hpp"
+#include "telemetry/lcm_outlet.hpp"
 
-#include "abs_hil/telemetry/message_stream.hpp"
 #include "catch.hpp"
 #include "telemetry/message_capture.hpp"
+#include "telemetry/message_stream.hpp"
 #include "telemetry/sample_records.hpp"
 
 namespace abs_hil::telemetry {

@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/lcm_packet.hpp"
+#include "telemetry/lcm_packet.hpp"
 
 #include <string>
 #include <vector>

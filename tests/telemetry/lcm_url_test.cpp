@@ -1,10 +1,10 @@
-#include "abs_hil/telemetry/lcm_url.hpp"
+#include "telemetry/lcm_url.hpp"
 
 #include <cstdlib>
 #include <stdexcept>
 
-#include "abs_hil/telemetry/route_probe.hpp"
 #include "catch.hpp"
+#include "telemetry/route_probe.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

@@ -1,14 +1,14 @@
-#include "abs_hil/telemetry/log_outlet.hpp"
+#include "telemetry/log_outlet.hpp"
 
 #include <fstream>
 #include <iterator>
 #include <lcm/lcm-cpp.hpp>
 #include <map>
 
-#include "abs_hil/telemetry/file_error.hpp"
-#include "abs_hil/telemetry/message_stream.hpp"
 #include "catch.hpp"
+#include "telemetry/file_error.hpp"
 #include "telemetry/message_capture.hpp"
+#include "telemetry/message_stream.hpp"
 #include "telemetry/sample_records.hpp"
 #include "temporary_folder.hpp"
 

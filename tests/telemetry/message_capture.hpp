@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "abs_hil/telemetry/lcm_outlet.hpp"
-#include "abs_hil/telemetry/outlet.hpp"
+#include "telemetry/lcm_outlet.hpp"
+#include "telemetry/outlet.hpp"
 
 namespace abs_hil::telemetry::test {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/message_codec.hpp"
+#include "telemetry/message_codec.hpp"
 
 #include <bit>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/message_stream.hpp"
+#include "telemetry/message_stream.hpp"
 
 #include <stdexcept>
 

@@ -11,11 +11,11 @@
 #include <string>
 #include <thread>
 
-#include "abs_hil/telemetry/command_listener.hpp"
-#include "abs_hil/telemetry/lcm_outlet.hpp"
-#include "abs_hil/telemetry/log_outlet.hpp"
-#include "abs_hil/telemetry/message_stream.hpp"
-#include "abs_hil/telemetry/run_listener.hpp"
+#include "commands/command_listener.hpp"
+#include "telemetry/lcm_outlet.hpp"
+#include "telemetry/log_outlet.hpp"
+#include "telemetry/message_stream.hpp"
+#include "telemetry/run_listener.hpp"
 #include "telemetry/sample_records.hpp"
 
 namespace abs_hil::telemetry {

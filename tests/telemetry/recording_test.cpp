@@ -1,14 +1,14 @@
-#include "abs_hil/telemetry/recording.hpp"
+#include "telemetry/recording.hpp"
 
 #include <cmath>
 #include <fstream>
 #include <iterator>
 
-#include "abs_hil/telemetry/csv_sink.hpp"
-#include "abs_hil/telemetry/log_outlet.hpp"
-#include "abs_hil/telemetry/message_stream.hpp"
 #include "catch.hpp"
+#include "telemetry/csv_sink.hpp"
+#include "telemetry/log_outlet.hpp"
 #include "telemetry/message_capture.hpp"
+#include "telemetry/message_stream.hpp"
 #include "telemetry/sample_records.hpp"
 #include "temporary_folder.hpp"
 

@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/status_line.hpp"
+#include "telemetry/status_line.hpp"
 
 #include <fcntl.h>
 #include <poll.h>

@@ -1,4 +1,4 @@
-#include "abs_hil/telemetry/tcpq_server.hpp"
+#include "telemetry/tcpq_server.hpp"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "abs_hil/telemetry/lcm_outlet.hpp"
 #include "catch.hpp"
+#include "telemetry/lcm_outlet.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

@@ -2,11 +2,11 @@
 
 #include <cmath>
 
-#include "abs_hil/telemetry/message_stream.hpp"
-#include "abs_hil/telemetry/status_line.hpp"
 #include "catch.hpp"
 #include "message_capture.hpp"
 #include "sample_records.hpp"
+#include "telemetry/message_stream.hpp"
+#include "telemetry/status_line.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::telemetry;

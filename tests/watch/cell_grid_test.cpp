@@ -1,4 +1,4 @@
-#include "abs_hil/watch/cell_grid.hpp"
+#include "watch/cell_grid.hpp"
 
 #include <string>
 

@@ -9,7 +9,7 @@
 #include "abs_hil/rig/measurement.hpp"
 #include "abs_hil/status_t.hpp"
 #include "abs_hil/telemetry_t.hpp"
-#include "abs_hil/watch/run_view.hpp"
+#include "watch/run_view.hpp"
 
 namespace abs_hil::watch::test {
 

@@ -1,12 +1,12 @@
-#include "abs_hil/watch/plot.hpp"
+#include "watch/plot.hpp"
 
 #include <array>
 #include <cmath>
 #include <deque>
 
-#include "abs_hil/watch/cell_grid.hpp"
 #include "catch.hpp"
 #include "messages.hpp"
+#include "watch/cell_grid.hpp"
 
 using namespace abs_hil::watch;
 using abs_hil::rig::unknown;

@@ -1,4 +1,4 @@
-#include "abs_hil/watch/run_view.hpp"
+#include "watch/run_view.hpp"
 
 #include <limits>
 

@@ -1,4 +1,4 @@
-#include "abs_hil/watch/screen.hpp"
+#include "watch/screen.hpp"
 
 #include <algorithm>
 #include <limits>

@@ -3,8 +3,8 @@
 #include <Eigen/Core>
 
 #include "abs_hil/control/controller_context.hpp"
-#include "abs_hil/control/equivalent_control.hpp"
 #include "abs_hil/control/slip_controller.hpp"
+#include "control/equivalent_control.hpp"
 
 namespace abs_hil::control {
 

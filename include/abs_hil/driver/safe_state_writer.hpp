@@ -1,9 +1,8 @@
 #pragma once
 
-#include <memory>
+#include <cstdint>
 #include <string_view>
 
-#include "abs_hil/driver/factory.hpp"
 #include "abs_hil/driver/io_result.hpp"
 
 namespace abs_hil::driver {
@@ -28,8 +27,5 @@ class SafeStateWriter {
   /// board anew if its handle has died. Bounded by what the board's accesses take.
   [[nodiscard]] virtual IoResult make_safe() noexcept = 0;
 };
-
-/// The one for the board that `options.kind` names. Throws Unavailable for a kind that has none in this build.
-[[nodiscard]] std::unique_ptr<SafeStateWriter> make_safe_state_writer(const DriverOptions& options);
 
 }  // namespace abs_hil::driver

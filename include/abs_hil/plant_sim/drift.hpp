@@ -1,6 +1,6 @@
 #pragma once
 
-#include "abs_hil/plant_sim/factor_course.hpp"
+#include "abs_hil/plant_sim/factor_progress.hpp"
 #include "abs_hil/plant_sim/options.hpp"
 
 namespace abs_hil::plant_sim {
@@ -34,10 +34,10 @@ class Drift {
   [[nodiscard]] DriftFactors after(double time_s) const noexcept;
 
  private:
-  FactorCourse brake_torque_;
-  FactorCourse motor_torque_;
-  FactorCourse upper_bearing_;
-  FactorCourse lower_bearing_;
+  FactorProgress brake_torque_;
+  FactorProgress motor_torque_;
+  FactorProgress upper_bearing_;
+  FactorProgress lower_bearing_;
   bool any_;
 };
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "abs_hil/plant_sim/drift.hpp"
-#include "abs_hil/plant_sim/factor_course.hpp"
+#include "abs_hil/plant_sim/factor_progress.hpp"
 #include "abs_hil/plant_sim/options.hpp"
 #include "abs_hil/plant_sim/wheel_model.hpp"
 #include "abs_hil/rig/cycle_record.hpp"
@@ -54,7 +54,7 @@ class Plant {
   void let_bearings_drift(const DriftFactors& factors) noexcept;
 
   PlantOptions options_;
-  FactorCourse course_;
+  FactorProgress profile_;
   Drift drift_;
   WheelModel model_;
   PlantState state_{};

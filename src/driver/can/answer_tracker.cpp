@@ -1,4 +1,4 @@
-#include "abs_hil/driver/can/answer_tracker.hpp"
+#include "driver/can/answer_tracker.hpp"
 
 namespace abs_hil::driver::can {
 

@@ -1,6 +1,6 @@
-#include "abs_hil/driver/can/bus_load.hpp"
+#include "driver/can/bus_load.hpp"
 
-#include "abs_hil/driver/can/protocol.hpp"
+#include "driver/can/protocol.hpp"
 
 namespace abs_hil::driver::can {
 

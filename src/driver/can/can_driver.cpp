@@ -1,18 +1,18 @@
 // The life of the driver: options, handshake with the node, commands.
 
-#include "abs_hil/driver/can/can_driver.hpp"
+#include "driver/can/can_driver.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
 
-#include "abs_hil/driver/can/bus_load.hpp"
-#include "abs_hil/driver/can/signal_codec.hpp"
 #include "abs_hil/driver/encoder_sign.hpp"
-#include "abs_hil/driver/monotonic_time.hpp"
 #include "abs_hil/driver/plausibility.hpp"
 #include "abs_hil/rig/time_units.hpp"
+#include "driver/can/bus_load.hpp"
+#include "driver/can/signal_codec.hpp"
+#include "driver/monotonic_time.hpp"
 
 namespace abs_hil::driver::can {
 

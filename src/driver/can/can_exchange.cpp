@@ -5,11 +5,11 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "abs_hil/driver/can/can_driver.hpp"
-#include "abs_hil/driver/can/error_frame.hpp"
-#include "abs_hil/driver/monotonic_time.hpp"
 #include "abs_hil/rig/encoder_scale.hpp"
 #include "abs_hil/rig/time_units.hpp"
+#include "driver/can/can_driver.hpp"
+#include "driver/can/error_frame.hpp"
+#include "driver/monotonic_time.hpp"
 
 namespace abs_hil::driver::can {
 

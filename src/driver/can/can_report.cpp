@@ -1,9 +1,9 @@
 // What the driver can say in words about its bus and its node.
 
-#include "abs_hil/driver/can/bus_load.hpp"
-#include "abs_hil/driver/can/can_driver.hpp"
-#include "abs_hil/driver/monotonic_time.hpp"
-#include "abs_hil/rig/formatted_text.hpp"
+#include "driver/can/bus_load.hpp"
+#include "driver/can/can_driver.hpp"
+#include "driver/monotonic_time.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::can {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/can/error_frame.hpp"
+#include "driver/can/error_frame.hpp"
 
 #include <linux/can.h>
 #include <linux/can/error.h>

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/can/frame_socket.hpp"
+#include "driver/can/frame_socket.hpp"
 
 #include <fcntl.h>
 #include <linux/can.h>
@@ -12,8 +12,8 @@
 #include <cstring>
 #include <ctime>
 
-#include "abs_hil/driver/monotonic_time.hpp"
 #include "abs_hil/rig/time_units.hpp"
+#include "driver/monotonic_time.hpp"
 
 namespace abs_hil::driver::can {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/can/interface_facts.hpp"
+#include "driver/can/interface_facts.hpp"
 
 #include <linux/can/netlink.h>
 #include <linux/if_link.h>

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/can/link.hpp"
+#include "driver/can/link.hpp"
 
 #include <linux/can.h>
 #include <linux/can/error.h>
@@ -16,8 +16,8 @@
 #include <thread>
 #include <vector>
 
-#include "abs_hil/driver/can/protocol.hpp"
 #include "abs_hil/driver/io_result.hpp"
+#include "driver/can/protocol.hpp"
 
 namespace abs_hil::driver::can {
 

@@ -1,8 +1,8 @@
-#include "abs_hil/driver/can/messages.hpp"
+#include "driver/can/messages.hpp"
 
 #include <limits>
 
-#include "abs_hil/driver/can/signal_codec.hpp"
+#include "driver/can/signal_codec.hpp"
 
 namespace abs_hil::driver::can {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/can/protocol.hpp"
+#include "driver/can/protocol.hpp"
 
 #include <array>
 

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/can/signal_codec.hpp"
+#include "driver/can/signal_codec.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/injection/fault_channels.hpp"
+#include "driver/injection/fault_channels.hpp"
 
 #include <bit>
 

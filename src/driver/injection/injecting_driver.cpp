@@ -1,4 +1,4 @@
-#include "abs_hil/driver/injection/injecting_driver.hpp"
+#include "driver/injection/injecting_driver.hpp"
 
 #include <algorithm>
 #include <bit>

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/injection/injection.hpp"
+#include "driver/injection/injection.hpp"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "abs_hil/rig/formatted_text.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver {
 

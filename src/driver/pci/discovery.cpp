@@ -1,4 +1,4 @@
-#include "abs_hil/driver/pci/discovery.hpp"
+#include "driver/pci/discovery.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,8 +8,8 @@
 #include <optional>
 #include <system_error>
 
-#include "abs_hil/driver/pci/register_map.hpp"
-#include "abs_hil/driver/pci/sysfs_window.hpp"
+#include "driver/pci/register_map.hpp"
+#include "driver/pci/sysfs_window.hpp"
 
 namespace abs_hil::driver::pci {
 

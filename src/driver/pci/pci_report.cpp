@@ -1,7 +1,7 @@
 // What the driver can say in words about its card.
 
-#include "abs_hil/driver/pci/pci_driver.hpp"
-#include "abs_hil/rig/formatted_text.hpp"
+#include "driver/pci/pci_driver.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::pci {
 

@@ -1,7 +1,7 @@
-#include "abs_hil/driver/pci/pci_safe_state.hpp"
+#include "driver/pci/pci_safe_state.hpp"
 
-#include "abs_hil/driver/pci/discovery.hpp"
-#include "abs_hil/driver/pci/register_map.hpp"
+#include "driver/pci/discovery.hpp"
+#include "driver/pci/register_map.hpp"
 
 namespace abs_hil::driver::pci {
 

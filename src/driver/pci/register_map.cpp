@@ -1,4 +1,4 @@
-#include "abs_hil/driver/pci/register_map.hpp"
+#include "driver/pci/register_map.hpp"
 
 #include <numbers>
 

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/sim/sim_driver.hpp"
+#include "driver/sim/sim_driver.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 #include <string>
 
 #include "abs_hil/driver/plausibility.hpp"
-#include "abs_hil/plant_sim/encoder.hpp"
 #include "abs_hil/rig/encoder_scale.hpp"
+#include "plant_sim/encoder.hpp"
 
 namespace abs_hil::driver {
 namespace {

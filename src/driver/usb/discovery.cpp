@@ -1,4 +1,4 @@
-#include "abs_hil/driver/usb/discovery.hpp"
+#include "driver/usb/discovery.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/usb/libusb_link.hpp"
+#include "driver/usb/libusb_link.hpp"
 
 #include <fcntl.h>
 #include <libusb.h>
@@ -10,8 +10,8 @@
 #include <ctime>
 #include <string>
 
-#include "abs_hil/driver/monotonic_time.hpp"
 #include "abs_hil/rig/time_units.hpp"
+#include "driver/monotonic_time.hpp"
 
 namespace abs_hil::driver::usb {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/usb/usb_driver.hpp"
+#include "driver/usb/usb_driver.hpp"
 
 #include <algorithm>
 #include <stdexcept>

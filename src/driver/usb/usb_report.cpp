@@ -1,7 +1,7 @@
 // What the driver can say in words about its board.
 
-#include "abs_hil/driver/usb/usb_driver.hpp"
-#include "abs_hil/rig/formatted_text.hpp"
+#include "driver/usb/usb_driver.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::usb {
 

@@ -1,7 +1,7 @@
-#include "abs_hil/driver/can/answer_tracker.hpp"
+#include "driver/can/answer_tracker.hpp"
 
-#include "abs_hil/driver/loss_bucket.hpp"
 #include "catch.hpp"
+#include "driver/loss_bucket.hpp"
 
 using namespace abs_hil::driver::can;
 

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/can/bus_load.hpp"
+#include "driver/can/bus_load.hpp"
 
 #include <vector>
 

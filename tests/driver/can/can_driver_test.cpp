@@ -1,4 +1,4 @@
-#include "abs_hil/driver/can/can_driver.hpp"
+#include "driver/can/can_driver.hpp"
 
 #include <numbers>
 

@@ -2,8 +2,8 @@
 
 #include <linux/can/error.h>
 
-#include "abs_hil/driver/can/signal_codec.hpp"
 #include "catch.hpp"
+#include "driver/can/signal_codec.hpp"
 #include "node_on_socket.hpp"
 
 using namespace abs_hil;

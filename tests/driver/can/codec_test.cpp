@@ -1,9 +1,9 @@
 #include <random>
 #include <variant>
 
-#include "abs_hil/driver/can/messages.hpp"
-#include "abs_hil/driver/can/signal_codec.hpp"
 #include "catch.hpp"
+#include "driver/can/messages.hpp"
+#include "driver/can/signal_codec.hpp"
 
 using namespace abs_hil::driver::can;
 

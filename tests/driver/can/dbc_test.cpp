@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "abs_hil/driver/can/protocol.hpp"
 #include "catch.hpp"
+#include "driver/can/protocol.hpp"
 
 using namespace abs_hil::driver::can;
 

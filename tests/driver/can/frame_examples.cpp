@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <random>
 
-#include "abs_hil/driver/can/signal_codec.hpp"
+#include "driver/can/signal_codec.hpp"
 
 using namespace abs_hil::driver::can;
 

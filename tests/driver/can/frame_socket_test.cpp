@@ -1,4 +1,4 @@
-#include "abs_hil/driver/can/frame_socket.hpp"
+#include "driver/can/frame_socket.hpp"
 
 #include <linux/can.h>
 #include <linux/can/error.h>
@@ -8,9 +8,9 @@
 #include <array>
 #include <utility>
 
-#include "abs_hil/driver/can/error_frame.hpp"
-#include "abs_hil/driver/monotonic_time.hpp"
 #include "catch.hpp"
+#include "driver/can/error_frame.hpp"
+#include "driver/monotonic_time.hpp"
 
 using namespace abs_hil::driver::can;
 using abs_hil::driver::monotonic_ns;

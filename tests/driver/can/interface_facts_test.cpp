@@ -1,6 +1,6 @@
 // What the kernel says of its interfaces, in messages put together here by linux/rtnetlink.h and linux/if_link.h.
 
-#include "abs_hil/driver/can/interface_facts.hpp"
+#include "driver/can/interface_facts.hpp"
 
 #include <linux/can/netlink.h>
 #include <linux/if_link.h>

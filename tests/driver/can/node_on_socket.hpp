@@ -13,9 +13,9 @@
 #include <thread>
 #include <vector>
 
-#include "abs_hil/driver/can/can_driver.hpp"
-#include "abs_hil/emulator/can_node.hpp"
-#include "abs_hil/emulator/can_node_faults.hpp"
+#include "driver/can/can_driver.hpp"
+#include "emulator/can_node.hpp"
+#include "emulator/can_node_faults.hpp"
 
 namespace abs_hil::test {
 

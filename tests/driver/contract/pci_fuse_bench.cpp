@@ -13,8 +13,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "abs_hil/driver/factory.hpp"
 #include "bench.hpp"
+#include "driver/factory.hpp"
 
 namespace abs_hil::test {
 

@@ -1,5 +1,5 @@
-#include "abs_hil/driver/sim/sim_driver.hpp"
 #include "bench.hpp"
+#include "driver/sim/sim_driver.hpp"
 
 namespace abs_hil::test {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/injection/injection.hpp"
+#include "driver/injection/injection.hpp"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/pci/discovery.hpp"
+#include "driver/pci/discovery.hpp"
 
 #include <sys/wait.h>
 #include <unistd.h>
@@ -10,8 +10,8 @@
 #include <string>
 
 #include "abs_hil/driver/io_result.hpp"
-#include "abs_hil/driver/pci/sysfs_window.hpp"
 #include "catch.hpp"
+#include "driver/pci/sysfs_window.hpp"
 #include "temporary_folder.hpp"
 
 using namespace abs_hil::driver;

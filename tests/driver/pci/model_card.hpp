@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "abs_hil/driver/pci/pci_driver.hpp"
-#include "abs_hil/emulator/card_model.hpp"
-#include "abs_hil/emulator/register_faults.hpp"
+#include "driver/pci/pci_driver.hpp"
+#include "emulator/card_model.hpp"
+#include "emulator/register_faults.hpp"
 
 namespace abs_hil::test {
 

@@ -1,4 +1,4 @@
-#include "abs_hil/driver/pci/pci_driver.hpp"
+#include "driver/pci/pci_driver.hpp"
 
 #include <algorithm>
 #include <limits>

@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "abs_hil/driver/pci/pci_driver.hpp"
 #include "catch.hpp"
+#include "driver/pci/pci_driver.hpp"
 #include "model_card.hpp"
 
 using namespace abs_hil;

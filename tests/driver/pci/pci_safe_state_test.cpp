@@ -1,9 +1,9 @@
 // The safe state from a second process: whatever access the owner was killed in, both PWMs are 0 afterwards.
 
-#include "abs_hil/driver/pci/pci_safe_state.hpp"
+#include "driver/pci/pci_safe_state.hpp"
 
-#include "abs_hil/driver/pci/pci_driver.hpp"
 #include "catch.hpp"
+#include "driver/pci/pci_driver.hpp"
 #include "model_card.hpp"
 
 using namespace abs_hil;

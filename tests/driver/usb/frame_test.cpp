@@ -1,4 +1,4 @@
-#include "abs_hil/driver/usb/frame.hpp"
+#include "driver/usb/frame.hpp"
 
 #include <random>
 #include <string>

@@ -1,7 +1,7 @@
 // Frames over libusb, and each of its errors, with a stand-in for the library itself. The library and the kernel's own
 // USB are in the test vm_usb.
 
-#include "abs_hil/driver/usb/libusb_link.hpp"
+#include "driver/usb/libusb_link.hpp"
 
 #include <cerrno>
 

@@ -7,9 +7,9 @@
 #include <random>
 #include <vector>
 
-#include "abs_hil/driver/usb/usb_driver.hpp"
-#include "abs_hil/emulator/usb_board_model.hpp"
-#include "abs_hil/emulator/usb_faults.hpp"
+#include "driver/usb/usb_driver.hpp"
+#include "emulator/usb_board_model.hpp"
+#include "emulator/usb_faults.hpp"
 
 namespace abs_hil::test {
 

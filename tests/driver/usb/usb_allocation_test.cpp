@@ -2,8 +2,8 @@
 // not ours to promise (docs/usb.md).
 
 #include "../../runtime/proofs/interposed.hpp"
-#include "abs_hil/driver/usb/usb_driver.hpp"
 #include "catch.hpp"
+#include "driver/usb/usb_driver.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::driver;

@@ -3,10 +3,10 @@
 #include <string>
 
 #include "abs_hil/driver/io_result.hpp"
-#include "abs_hil/driver/usb/discovery.hpp"
-#include "abs_hil/driver/usb/libusb_link.hpp"
 #include "catch.hpp"
 #include "diagnosis/fake_system.hpp"
+#include "driver/usb/discovery.hpp"
+#include "driver/usb/libusb_link.hpp"
 
 using namespace abs_hil::driver;
 using namespace abs_hil::driver::usb;

@@ -1,9 +1,9 @@
-#include "abs_hil/driver/usb/usb_driver.hpp"
+#include "driver/usb/usb_driver.hpp"
 
 #include <string>
 
-#include "abs_hil/driver/factory.hpp"
 #include "catch.hpp"
+#include "driver/factory.hpp"
 #include "model_board.hpp"
 
 using namespace abs_hil;

@@ -1,7 +1,7 @@
 // The board, the cable or a part of either fails: what the driver says, and what is left on the wire.
 
-#include "abs_hil/driver/usb/usb_driver.hpp"
 #include "catch.hpp"
+#include "driver/usb/usb_driver.hpp"
 #include "model_board.hpp"
 
 using namespace abs_hil;

@@ -7,10 +7,10 @@
 #include <sstream>
 #include <string_view>
 
-#include "abs_hil/telemetry/checked_decode.hpp"
-#include "abs_hil/telemetry/csv_sink.hpp"
-#include "abs_hil/telemetry/flight_record.hpp"
-#include "abs_hil/telemetry/recording.hpp"
+#include "telemetry/checked_decode.hpp"
+#include "telemetry/csv_sink.hpp"
+#include "telemetry/flight_record.hpp"
+#include "telemetry/recording.hpp"
 
 namespace abs_hil::experiment::test {
 

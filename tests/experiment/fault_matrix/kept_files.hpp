@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "abs_hil/rig/cycle_record.hpp"
-#include "abs_hil/runtime/flight_ring.hpp"
+#include "runtime/flight_ring.hpp"
 
 namespace abs_hil::experiment::test {
 

@@ -3,11 +3,11 @@
 #include <memory>
 #include <utility>
 
-#include "abs_hil/driver/injection/injecting_driver.hpp"
-#include "abs_hil/telemetry/csv_sink.hpp"
+#include "driver/injection/injecting_driver.hpp"
 #include "experiment/simulated_run.hpp"
 #include "kept_files.hpp"
 #include "matrix_rig.hpp"
+#include "telemetry/csv_sink.hpp"
 
 namespace abs_hil::experiment::test {
 
@@ -38,8 +38,8 @@ MatrixCase run_with(Backend backend, std::vector<driver::Injection> injections, 
   });
   std::vector<runtime::FlightSlot> slots(recorder_slots);
   runtime::FlightRing flight(slots);
-  runtime::WatchPanel panel;
-  runtime::CycleWatch watch(panel, flight);
+  runtime::HeartbeatPanel panel;
+  runtime::Heartbeat watch(panel, flight);
   Recorder recorder;
   analysis::RunMetrics metrics(setup.plant.rig.wheels.r2_m, setup.experiment.end_speed_m_s);
   telemetry::CsvSink csv(folder / "run.csv");

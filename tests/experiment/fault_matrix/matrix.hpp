@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "abs_hil/analysis/run_metrics.hpp"
-#include "abs_hil/driver/injection/injection.hpp"
 #include "abs_hil/rig/reason.hpp"
+#include "analysis/run_metrics.hpp"
+#include "driver/injection/injection.hpp"
 
 namespace abs_hil::experiment::test {
 

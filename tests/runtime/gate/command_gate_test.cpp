@@ -1,4 +1,4 @@
-#include "abs_hil/runtime/command_gate.hpp"
+#include "runtime/command_gate.hpp"
 
 #include <limits>
 #include <string>
@@ -244,7 +244,7 @@ namespace {
 
 /// Feeds a gate that watches with wheels that turn at given speeds, at 1 kHz.
 struct WatchedWheels {
-  explicit WatchedWheels(const WatchLimits& limits) : gate(GateOptions{}, any_phase(), limits) {}
+  explicit WatchedWheels(const PlausibilityLimits& limits) : gate(GateOptions{}, any_phase(), limits) {}
   void run(double omega1_rad_s, double omega2_rad_s, int cycles, const rig::Command& command = {}) {
     for (int i = 0; i < cycles; ++i) {
       now_ns += ms;
@@ -263,7 +263,7 @@ struct WatchedWheels {
   double angle2{0.0};
 };
 
-WatchLimits paper_limits() { return watch_limits({}, false, {}); }
+PlausibilityLimits paper_limits() { return plausibility_limits({}, false, {}); }
 
 }  // namespace
 

@@ -1,8 +1,7 @@
-#include "abs_hil/runtime/encoder_watch.hpp"
-
 #include <cmath>
 
 #include "catch.hpp"
+#include "runtime/encoder_check.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::runtime;
@@ -14,9 +13,11 @@ namespace {
 constexpr double dt_s = 0.002;
 constexpr double resolution_rad_s = 2.0 * 6.283185307179586 / 4096.0 / dt_s;
 
-WatchLimits limits() { return watch_limits({}, false, {.overspeed_rad_s = 250.0, .free_slip_max = 0.15}); }
+PlausibilityLimits limits() {
+  return plausibility_limits({}, false, {.overspeed_rad_s = 250.0, .free_slip_max = 0.15});
+}
 
-Stride stride(double omega1_rad_s, double omega2_rad_s, double brake_Nm = 0.0) {
+SpeedWindow speed_window(double omega1_rad_s, double omega2_rad_s, double brake_Nm = 0.0) {
   return {.dt_s = dt_s,
           .omega1_rad_s = omega1_rad_s,
           .omega2_rad_s = omega2_rad_s,
@@ -24,10 +25,10 @@ Stride stride(double omega1_rad_s, double omega2_rad_s, double brake_Nm = 0.0) {
           .brake_target_Nm = brake_Nm};
 }
 
-/// What is found in `count` strides at these speeds.
-Finding run(EncoderWatch& watch, int count, double omega1_rad_s, double omega2_rad_s, double brake_Nm = 0.0) {
+/// What is found in `count` speed_windows at these speeds.
+CheckResult run(EncoderCheck& watch, int count, double omega1_rad_s, double omega2_rad_s, double brake_Nm = 0.0) {
   for (int i = 0; i < count; ++i) {
-    const Finding found = watch.update(stride(omega1_rad_s, omega2_rad_s, brake_Nm));
+    const CheckResult found = watch.update(speed_window(omega1_rad_s, omega2_rad_s, brake_Nm));
     if (!found.sound()) return found;
   }
   return {};
@@ -137,46 +138,46 @@ TEST_CASE("each encoder's fault has its own reason") {
                                         {100.0, 150.0, Reason::encoder_lower_jumped, 150.0},
                                         {0.0, 0.0, Reason::encoders_lost, 0.0},
                                         {-100.0, -100.0, Reason::encoder_upper_reversed, -100.0}}));
-  EncoderWatch watch(limits());
+  EncoderCheck watch(limits());
   CHECK(run(watch, 20, 100.0, 100.0).sound());
   CHECK(run(watch, 2, row.omega1, row.omega2).sound());
-  const Finding found = watch.update(stride(row.omega1, row.omega2));
+  const CheckResult found = watch.update(speed_window(row.omega1, row.omega2));
   CHECK(found.reason == row.reason);
   CHECK(found.value == row.value);
 }
 
 TEST_CASE("both are lost only if both stand: one that stands and one in doubt for a moment") {
-  EncoderWatch watch(limits());
+  EncoderCheck watch(limits());
   CHECK(run(watch, 20, 100.0, 100.0).sound());
   CHECK(run(watch, 2, 100.0, 0.0).sound());
   CHECK(run(watch, 1, 0.0, 0.0).reason == Reason::encoders_lost);
 }
 
 TEST_CASE("a wheel that its brake locks is no fault, at the rate of the whole brake torque") {
-  EncoderWatch watch(limits());
+  EncoderCheck watch(limits());
   double omega1 = 170.0;
   CHECK(run(watch, 20, omega1, 170.0).sound());
   for (int i = 0; i < 200; ++i) {
     omega1 = std::max(0.0, omega1 - (9.03 + 2.2885) / 7.54e-3 * dt_s);
-    CHECK(watch.update(stride(omega1, 170.0 - 40.0 * dt_s * i, 9.03)).sound());
+    CHECK(watch.update(speed_window(omega1, 170.0 - 40.0 * dt_s * i, 9.03)).sound());
   }
 }
 
 TEST_CASE("the lag between command and brake torque") {
-  EncoderWatch watch(limits());
-  static_cast<void>(watch.update(stride(100.0, 100.0, 3.0)));
+  EncoderCheck watch(limits());
+  static_cast<void>(watch.update(speed_window(100.0, 100.0, 3.0)));
   const double share = 20.37 * dt_s;
   CHECK(watch.brake_torque_Nm() == Approx(3.0 * share / (1.0 + share)));
-  for (int i = 0; i < 500; ++i) static_cast<void>(watch.update(stride(100.0, 100.0, 3.0)));
+  for (int i = 0; i < 500; ++i) static_cast<void>(watch.update(speed_window(100.0, 100.0, 3.0)));
   CHECK(watch.brake_torque_Nm() == Approx(3.0));
-  EncoderWatch ideal(watch_limits({}, true, {}));
-  static_cast<void>(ideal.update(stride(100.0, 100.0, 3.0)));
+  EncoderCheck ideal(plausibility_limits({}, true, {}));
+  static_cast<void>(ideal.update(speed_window(100.0, 100.0, 3.0)));
   CHECK(ideal.brake_torque_Nm() == 3.0);
 }
 
 TEST_CASE("with the brake long released the wheels roll on each other") {
   const auto found = [](double omega1, double omega2) {
-    EncoderWatch watch(limits());
+    EncoderCheck watch(limits());
     return run(watch, 60, omega1, omega2).reason;
   };
   // Allowed: 0.3 m/s + 15 % of the faster one + two counts, in m/s: 1.937 at 100 rad/s.
@@ -188,22 +189,22 @@ TEST_CASE("with the brake long released the wheels roll on each other") {
   CHECK(found(0.0, 5.2) == Reason::none);
   CHECK(found(0.0, 5.5) == Reason::encoder_upper_stuck);
   CHECK(found(6.0, 0.0) == Reason::encoder_lower_stuck);
-  EncoderWatch watch(limits());
+  EncoderCheck watch(limits());
   CHECK(run(watch, 60, 75.0, 100.0).value == Approx(0.0995 * 75.0 - 0.099 * 100.0));
 }
 
 TEST_CASE("a disagreement must last a tenth of a second, and begins anew after agreement") {
-  EncoderWatch watch(limits());
+  EncoderCheck watch(limits());
   CHECK(run(watch, 49, 75.0, 100.0).sound());
   CHECK(run(watch, 2, 75.0, 100.0).reason == Reason::encoders_disagree);
-  EncoderWatch again(limits());
+  EncoderCheck again(limits());
   CHECK(run(again, 45, 75.0, 75.0 * 1.25).sound());
   CHECK(run(again, 1, 75.0, 75.0 * 1.22).sound());
   CHECK(run(again, 45, 75.0, 75.0 * 1.25).sound());
 }
 
 TEST_CASE("a wheel that was braked has three seconds to roll along again") {
-  EncoderWatch watch(limits());
+  EncoderCheck watch(limits());
   CHECK(run(watch, 1, 75.0, 100.0, 0.5).sound());
   CHECK(run(watch, 1499, 75.0, 100.0).sound());
   CHECK(run(watch, 40, 75.0, 100.0).sound());
@@ -211,15 +212,15 @@ TEST_CASE("a wheel that was braked has three seconds to roll along again") {
 }
 
 TEST_CASE("a braked wheel is not the faster one") {
-  // The torque passes 1 N m after about 10 strides (3 N m through the lag), counts after 0.15 s more, and must then
-  // show the impossible for 0.05 s.
-  EncoderWatch watch(limits());
+  // The torque passes 1 N m after about 10 speed_windows (3 N m through the lag), counts after 0.15 s more, and must
+  // then show the impossible for 0.05 s.
+  EncoderCheck watch(limits());
   CHECK(run(watch, 105, 110.0, 100.0, 3.0).sound());
-  const Finding found = run(watch, 10, 110.0, 100.0, 3.0);
+  const CheckResult found = run(watch, 10, 110.0, 100.0, 3.0);
   CHECK(found.reason == Reason::slip_implausible);
   CHECK(found.value == Approx(1.0 - 0.0995 * 110.0 / (0.099 * 100.0)));
   const auto reason = [](double omega1, double omega2, double brake_Nm) {
-    EncoderWatch w(limits());
+    EncoderCheck w(limits());
     return run(w, 400, omega1, omega2, brake_Nm).reason;
   };
   CHECK(reason(104.2, 100.0, 3.0) == Reason::none);  // 4.7 % faster
@@ -231,14 +232,14 @@ TEST_CASE("a braked wheel is not the faster one") {
 }
 
 TEST_CASE("the faster braked wheel must last, and begins anew") {
-  EncoderWatch watch(limits());
+  EncoderCheck watch(limits());
   CHECK(run(watch, 150, 100.0, 100.0, 3.0).sound());
   CHECK(run(watch, 24, 110.0, 100.0, 3.0).sound());
   CHECK(run(watch, 1, 104.0, 100.0, 3.0).sound());
   CHECK(run(watch, 24, 110.0, 100.0, 3.0).sound());
   CHECK(run(watch, 2, 110.0, 100.0, 3.0).reason == Reason::slip_implausible);
   // A brake that lets go in between begins anew too.
-  EncoderWatch pulsed(limits());
+  EncoderCheck pulsed(limits());
   CHECK(run(pulsed, 80, 110.0, 100.0, 3.0).sound());
   CHECK(run(pulsed, 60, 100.0, 100.0, 0.1).sound());
   CHECK(run(pulsed, 80, 110.0, 100.0, 3.0).sound());

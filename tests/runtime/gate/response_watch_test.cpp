@@ -1,6 +1,5 @@
-#include "abs_hil/runtime/response_watch.hpp"
-
 #include "catch.hpp"
+#include "runtime/response_check.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::runtime;
@@ -12,22 +11,22 @@ constexpr double dt_s = 0.002;
 /// Momentum of both wheels at 1 rad/s, kg m/s: J1 / r1 + J2 / r2.
 constexpr double inertia_kg_m = 7.54e-3 / 0.0995 + 25.6e-3 / 0.099;
 
-WatchLimits paper_limits() {
+PlausibilityLimits paper_limits() {
   const rig::RigParameters rig{};
   const GateOptions options{};
-  return watch_limits(rig, false, options);
+  return plausibility_limits(rig, false, options);
 }
 
 struct Bench {
-  ResponseWatch watch{paper_limits()};
+  ResponseCheck watch{paper_limits()};
   double omega1{0.0}, omega2{0.0};
 
   /// Strides with both wheels changing speed steadily; what is found first.
-  Finding run(int count, double rad_s2, double motor_duty = 0.0, double brake_Nm = 0.0) {
+  CheckResult run(int count, double rad_s2, double motor_duty = 0.0, double brake_Nm = 0.0) {
     for (int i = 0; i < count; ++i) {
       omega1 += rad_s2 * dt_s;
       omega2 += rad_s2 * dt_s;
-      const Finding found = watch.update(
+      const CheckResult found = watch.update(
           {.dt_s = dt_s, .omega1_rad_s = omega1, .omega2_rad_s = omega2, .motor_duty = motor_duty}, brake_Nm);
       if (!found.sound()) return found;
     }
@@ -36,7 +35,7 @@ struct Bench {
 };
 
 /// Two windows and a little, from equal speeds of both wheels.
-Finding found(double omega_rad_s, double rad_s2, double motor_duty = 0.0, double brake_Nm = 0.0) {
+CheckResult found(double omega_rad_s, double rad_s2, double motor_duty = 0.0, double brake_Nm = 0.0) {
   Bench bench{.omega1 = omega_rad_s, .omega2 = omega_rad_s};
   return bench.run(103, rad_s2, motor_duty, brake_Nm);
 }
@@ -46,7 +45,7 @@ Finding found(double omega_rad_s, double rad_s2, double motor_duty = 0.0, double
 TEST_CASE("wheels do not gain speed with the motor off") {
   // 0.25 kg m/s in a window of 0.1 s is 7.48 rad/s^2.
   CHECK(found(50.0, 7.3).sound());
-  const Finding rising = found(50.0, 7.8);
+  const CheckResult rising = found(50.0, 7.8);
   CHECK(rising.reason == Reason::speed_rises_with_motor_off);
   CHECK(rising.value == Approx(7.8 * 0.1 * inertia_kg_m).epsilon(0.03));
   CHECK(found(50.0, 0.0).sound());
@@ -56,7 +55,7 @@ TEST_CASE("wheels do not gain speed with the motor off") {
 TEST_CASE("each wheel counts with its inertia over its radius") {
   // The upper wheel alone at 33 rad/s^2, the lower one at 9.7: 0.25 kg m/s each.
   Bench upper;
-  Finding finding{};
+  CheckResult finding{};
   for (int i = 0; i < 103 && finding.sound(); ++i) {
     finding = upper.watch.update({.dt_s = dt_s, .omega1_rad_s = 34.0 * dt_s * i}, 0.0);
   }
@@ -94,7 +93,7 @@ TEST_CASE("nothing is said before two windows have passed") {
 TEST_CASE("the motor accelerates the wheels by at least a quarter of what it should") {
   // From rest at full duty: (2.1122 - 2 0.0925) / 0.099 0.1 s = 1.947 kg m/s; a quarter is 14.6 rad/s^2.
   CHECK(found(0.0, 15.2, 1.0).sound());
-  const Finding weak = found(0.0, 13.6, 1.0);
+  const CheckResult weak = found(0.0, 13.6, 1.0);
   CHECK(weak.reason == Reason::motor_no_response);
   CHECK(weak.value == Approx(13.6 * 0.1 * inertia_kg_m).epsilon(0.03));
   // What duty 0.228 should give at rest is 0.3 kg m/s: less is not looked for.
@@ -133,7 +132,7 @@ TEST_CASE("a motor that works against the brake is not judged") {
 TEST_CASE("the brake takes at least three tenths of what it should") {
   // 3 N m / 0.0995 m 0.1 s = 3.015 kg m/s; three tenths are 27.05 rad/s^2.
   CHECK(found(100.0, -27.7, 0.0, 3.0).sound());
-  const Finding weak = found(100.0, -26.4, 0.0, 3.0);
+  const CheckResult weak = found(100.0, -26.4, 0.0, 3.0);
   CHECK(weak.reason == Reason::brake_no_response);
   CHECK(weak.value == Approx(-26.4 * 0.1 * inertia_kg_m).epsilon(0.03));
   CHECK(found(100.0, 0.0, 0.0, 1.45).sound());

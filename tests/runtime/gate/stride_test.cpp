@@ -1,6 +1,5 @@
-#include "abs_hil/runtime/stride.hpp"
-
 #include "catch.hpp"
+#include "runtime/speed_window.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::runtime;
@@ -12,7 +11,7 @@ constexpr std::int64_t us = 1'000;
 constexpr std::int64_t ms = 1'000'000;
 constexpr double rad_per_count = 6.283185307179586 / 4096.0;
 
-WatchLimits limits() { return watch_limits({}, false, {.sample_age_max_s = 0.02}); }
+PlausibilityLimits limits() { return plausibility_limits({}, false, {.sample_age_max_s = 0.02}); }
 
 rig::Measurement at(std::int64_t time_ns, std::int32_t upper = 0, std::int32_t lower = 0) {
   return {.time_ns = time_ns, .upper_counts = upper, .lower_counts = lower};
@@ -20,59 +19,60 @@ rig::Measurement at(std::int64_t time_ns, std::int32_t upper = 0, std::int32_t l
 
 }  // namespace
 
-TEST_CASE("a stride is complete after about two cycles at 1 kHz, and begins where the one before ended") {
-  StrideMaker maker(limits());
+TEST_CASE("a speed_window is complete after about two cycles at 1 kHz, and begins where the one before ended") {
+  SpeedWindows maker(limits());
   CHECK(maker.update(at(5 * ms, 100, 200), 5 * ms, {}).sound());
   CHECK_FALSE(maker.complete());
   CHECK(maker.update(at(6'790 * us, 140, 260), 6'790 * us, {}).sound());
   CHECK_FALSE(maker.complete());
   CHECK(maker.update(at(7 * ms, 150, 280), 7 * ms, {}).sound());
   REQUIRE(maker.complete());
-  CHECK(maker.stride().dt_s == Approx(0.002));
-  CHECK(maker.stride().omega1_rad_s == Approx(50 * rad_per_count / 0.002));
-  CHECK(maker.stride().omega2_rad_s == Approx(80 * rad_per_count / 0.002));
-  CHECK(maker.stride().resolution_rad_s == Approx(2 * rad_per_count / 0.002));
+  CHECK(maker.speed_window().dt_s == Approx(0.002));
+  CHECK(maker.speed_window().omega1_rad_s == Approx(50 * rad_per_count / 0.002));
+  CHECK(maker.speed_window().omega2_rad_s == Approx(80 * rad_per_count / 0.002));
+  CHECK(maker.speed_window().resolution_rad_s == Approx(2 * rad_per_count / 0.002));
   CHECK(maker.update(at(8 * ms, 150, 280), 8 * ms, {}).sound());
   CHECK_FALSE(maker.complete());
   CHECK(maker.update(at(8'810 * us, 140, 290), 8'810 * us, {}).sound());
   REQUIRE(maker.complete());
-  CHECK(maker.stride().omega1_rad_s == Approx(-10 * rad_per_count / 0.00181));
-  CHECK(maker.stride().omega2_rad_s == Approx(10 * rad_per_count / 0.00181));
+  CHECK(maker.speed_window().omega1_rad_s == Approx(-10 * rad_per_count / 0.00181));
+  CHECK(maker.speed_window().omega2_rad_s == Approx(10 * rad_per_count / 0.00181));
 }
 
 TEST_CASE("commands count as long as they act") {
-  StrideMaker maker(limits());
-  static_cast<void>(maker.update(at(1 * ms), 1 * ms, {.motor_duty = 1.0, .brake_duty = 1.0}));  // before the stride
+  SpeedWindows maker(limits());
+  static_cast<void>(
+      maker.update(at(1 * ms), 1 * ms, {.motor_duty = 1.0, .brake_duty = 1.0}));  // before the speed_window
   static_cast<void>(maker.update(at(2 * ms), 2 * ms, {.motor_duty = 0.4, .brake_duty = 0.5}));
   static_cast<void>(maker.update(at(5 * ms), 5 * ms, {.motor_duty = 0.8, .brake_torque_Nm = 9.0}));
   REQUIRE(maker.complete());
-  CHECK(maker.stride().motor_duty == Approx((0.4 * 1 + 0.8 * 3) / 4.0));
-  CHECK(maker.stride().brake_target_Nm == Approx((15.24 * 0.5 - 6.21) * 1 / 4.0));  // the torque is no hardware's
+  CHECK(maker.speed_window().motor_duty == Approx((0.4 * 1 + 0.8 * 3) / 4.0));
+  CHECK(maker.speed_window().brake_target_Nm == Approx((15.24 * 0.5 - 6.21) * 1 / 4.0));  // the torque is no hardware's
   static_cast<void>(maker.update(at(7 * ms), 7 * ms, {.motor_duty = 0.4, .brake_duty = 0.5}));
-  CHECK(maker.stride().motor_duty == Approx(0.4));
-  CHECK(maker.stride().brake_target_Nm == Approx(15.24 * 0.5 - 6.21));
-  StrideMaker ideal(watch_limits({}, true, {}));
+  CHECK(maker.speed_window().motor_duty == Approx(0.4));
+  CHECK(maker.speed_window().brake_target_Nm == Approx(15.24 * 0.5 - 6.21));
+  SpeedWindows ideal(plausibility_limits({}, true, {}));
   static_cast<void>(ideal.update(at(1 * ms), 1 * ms, {}));
   static_cast<void>(ideal.update(at(3 * ms), 3 * ms, {.brake_duty = 0.5, .brake_torque_Nm = 9.0}));
-  CHECK(ideal.stride().brake_target_Nm == Approx(9.0));
+  CHECK(ideal.speed_window().brake_target_Nm == Approx(9.0));
 }
 
 TEST_CASE("no fresh measurement for 20 ms and five cycles is a fault") {
-  StrideMaker maker(limits());
+  SpeedWindows maker(limits());
   static_cast<void>(maker.update(at(10 * ms), 10 * ms, {}));
   for (int i = 1; i < 20; ++i) CHECK(maker.update(at(10 * ms), (10 + i) * ms, {}).sound());
-  const Finding found = maker.update(at(10 * ms), 30 * ms, {});
+  const CheckResult found = maker.update(at(10 * ms), 30 * ms, {});
   CHECK(found.reason == Reason::samples_missing);
   CHECK(found.value == Approx(0.02));
 }
 
 TEST_CASE("one answer that was held up is no fault, five are") {
-  StrideMaker maker(limits());
+  SpeedWindows maker(limits());
   static_cast<void>(maker.update(at(10 * ms), 10 * ms, {}));
   for (int i = 1; i < 5; ++i) CHECK(maker.update(at(10 * ms), (10 + 100 * i) * ms, {}).sound());
   CHECK_FALSE(maker.update(at(10 * ms), 510 * ms, {}).sound());
 
-  StrideMaker recovering(limits());
+  SpeedWindows recovering(limits());
   static_cast<void>(recovering.update(at(10 * ms), 10 * ms, {}));
   for (int i = 1; i < 5; ++i) CHECK(recovering.update(at(10 * ms), (10 + 100 * i) * ms, {}).sound());
   CHECK(recovering.update(at(411 * ms), 411 * ms, {}).sound());
@@ -81,9 +81,9 @@ TEST_CASE("one answer that was held up is no fault, five are") {
 
 TEST_CASE("stamps from the past, from the future or running back are not fresh") {
   const auto lost = [](auto&& stamp_of) {
-    StrideMaker maker(limits());
+    SpeedWindows maker(limits());
     static_cast<void>(maker.update(at(10 * ms), 10 * ms, {}));
-    Finding found{};
+    CheckResult found{};
     for (std::int64_t now_ms = 11; now_ms <= 40; ++now_ms) {
       found = maker.update(at(stamp_of(now_ms)), now_ms * ms, {});
       if (!found.sound()) break;
@@ -98,58 +98,58 @@ TEST_CASE("stamps from the past, from the future or running back are not fresh")
 }
 
 TEST_CASE("a run whose very first measurements are old never starts") {
-  StrideMaker maker(limits());
-  Finding found{};
+  SpeedWindows maker(limits());
+  CheckResult found{};
   for (std::int64_t now_ms = 1000; now_ms < 1010; ++now_ms) found = maker.update(at(1 * ms), now_ms * ms, {});
   CHECK(found.reason == Reason::samples_missing);
   // A stamp of 0 is as good as any.
-  StrideMaker zero(limits());
+  SpeedWindows zero(limits());
   CHECK(zero.update(at(0, 5), 0, {}).sound());
   CHECK(zero.update(at(2 * ms, 7), 2 * ms, {}).sound());
   REQUIRE(zero.complete());
-  CHECK(zero.stride().omega1_rad_s == Approx(2 * rad_per_count / 0.002));
+  CHECK(zero.speed_window().omega1_rad_s == Approx(2 * rad_per_count / 0.002));
 }
 
 TEST_CASE("a counter that leaps is found in the same cycle, and its measurement is not used") {
   // Twice 250 rad/s over 1 ms and 1 ms more is 1 rad, 651.9 counts.
   for (const std::int32_t sign : {1, -1}) {
-    StrideMaker upper(limits());
+    SpeedWindows upper(limits());
     CHECK(upper.update(at(1 * ms, 1000, 1000), 1 * ms, {}).sound());
     CHECK(upper.usable());
     CHECK(upper.update(at(2 * ms, 1000 + 650 * sign, 1000 - 650 * sign), 2 * ms, {}).sound());
     CHECK(upper.usable());
-    const Finding found = upper.update(at(3 * ms, 1000 + 1304 * sign, 1000), 3 * ms, {});
+    const CheckResult found = upper.update(at(3 * ms, 1000 + 1304 * sign, 1000), 3 * ms, {});
     CHECK(found.reason == Reason::encoder_upper_jumped);
     CHECK(found.value == Approx(654 * sign * rad_per_count));
     CHECK_FALSE(upper.usable());
     CHECK_FALSE(upper.complete());
-    StrideMaker lower(limits());
+    SpeedWindows lower(limits());
     CHECK(lower.update(at(1 * ms), 1 * ms, {}).sound());
-    const Finding below = lower.update(at(3 * ms, 0, 980 * sign), 3 * ms, {});  // 1.5 rad are 977.8 counts
+    const CheckResult below = lower.update(at(3 * ms, 0, 980 * sign), 3 * ms, {});  // 1.5 rad are 977.8 counts
     CHECK(below.reason == Reason::encoder_lower_jumped);
     CHECK(below.value == Approx(980 * sign * rad_per_count));
     CHECK_FALSE(lower.usable());
-    StrideMaker slower(limits());
+    SpeedWindows slower(limits());
     CHECK(slower.update(at(1 * ms), 1 * ms, {}).sound());
     CHECK(slower.update(at(3 * ms, 0, 975 * sign), 3 * ms, {}).sound());
   }
 }
 
-TEST_CASE("no stride ends on a reading that was held up, nor is it judged") {
-  StrideMaker maker(limits());
+TEST_CASE("no speed_window ends on a reading that was held up, nor is it judged") {
+  SpeedWindows maker(limits());
   CHECK(maker.update(at(1 * ms), 1 * ms, {}).sound());
   CHECK(maker.update(at(4 * ms, 20'000), 4 * ms, {.motor_duty = 0.5}, false).sound());
   CHECK(maker.usable());
   CHECK_FALSE(maker.complete());
   CHECK(maker.update(at(5 * ms, 20'100), 5 * ms, {.motor_duty = 0.5}).sound());
   REQUIRE(maker.complete());
-  CHECK(maker.stride().dt_s == Approx(0.004));
-  CHECK(maker.stride().omega1_rad_s == Approx(20'100 * rad_per_count / 0.004));
-  CHECK(maker.stride().motor_duty == Approx(0.5));
+  CHECK(maker.speed_window().dt_s == Approx(0.004));
+  CHECK(maker.speed_window().omega1_rad_s == Approx(20'100 * rad_per_count / 0.004));
+  CHECK(maker.speed_window().motor_duty == Approx(0.5));
 }
 
 TEST_CASE("a stale measurement is not used") {
-  StrideMaker maker(limits());
+  SpeedWindows maker(limits());
   CHECK(maker.usable());
   static_cast<void>(maker.update(at(10 * ms), 10 * ms, {}));
   static_cast<void>(maker.update(at(10 * ms), 11 * ms, {}));

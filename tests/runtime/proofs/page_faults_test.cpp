@@ -5,8 +5,8 @@
 
 #include <thread>
 
-#include "abs_hil/runtime/realtime_setup.hpp"
 #include "catch.hpp"
+#include "runtime/realtime_setup.hpp"
 #include "watched_run.hpp"
 
 using namespace abs_hil;

@@ -78,8 +78,8 @@ class WatchedRun {
   RecordRing ring_;
   std::vector<FlightSlot> slots_;
   FlightRing recorder_;
-  WatchPanel panel_{};
-  CycleWatch watch_;
+  HeartbeatPanel panel_{};
+  Heartbeat watch_;
   CyclicExecutive executive_;
 };
 

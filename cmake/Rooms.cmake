@@ -1,0 +1,26 @@
+# The table of rooms, the only one: name | what it holds | the rooms whose headers it may include. No text may hold a semicolon. The libraries, their
+# include folders, the check of includes (tests/rooms) and the table in docs/architecture.md are made from it. A room
+# knows only rooms above it, so there is no circle.
+set(ABS_HIL_ROOM_TABLE
+  "rig | the vocabulary: measurement, command, parameters, brake map, tyre curve, cycle record, the tables of quantities, reasons and options' rows | "
+  "control | the paper's laws, slip controllers, speed observer, brake actuator model, their options | rig"
+  "plant_sim | the simulated wheels, tyre, brake, motor, encoders, roads, their options | rig"
+  "driver | `RigDriver` and its lifecycle, backends (`driver/pci`, `driver/can`, `driver/usb`), injected faults (`driver/injection`) | rig"
+  "driver_sim | the simulated backend (`driver/sim`) | rig driver plant_sim"
+  "emulator | the device side of the boards, for tests and `abs_rig_emulator`, shares no line with the drivers | rig plant_sim"
+  "runtime | clocks, cyclic executive, command gate with its plausibility checks, rings, histograms, real-time set-up | rig driver"
+  "guardian | the watchdog process beside a run: shared heartbeats, decisions, the process | rig driver runtime"
+  "experiment | sequence of phases, the logic of a run, a run from start to safe state, commissioning | rig control driver runtime"
+  "lcmtypes | the message types, generated from `lcmtypes/*.lcm` | "
+  "telemetry | LCM messages, event log, CSV, flight record, status line | rig lcmtypes"
+  "watch | `abs_hil watch`: the view of a running experiment, its screen, the terminal | rig telemetry lcmtypes"
+  "analysis | metrics, summary | rig"
+  "report | a finished run's files as figures, pages, exports, gnuplot as a child process | rig plant_sim analysis"
+  "run_folder | run folders: layout, environment, checksums, the index of a series | "
+  "diagnosis | the checks of `abs_hil doctor`, the verdict of `abs_hil latency` | rig driver runtime telemetry"
+  "config | configuration keys from the option rows, files, experiment files: grammar, parser, schema, plan | rig control plant_sim driver runtime guardian experiment"
+  "study | simulated runs in this process, controllers side by side over varied plants, search for gains | rig control plant_sim driver driver_sim runtime guardian experiment analysis config"
+  "commands | remote commands over LCM: authority, listener, sender | rig control plant_sim driver runtime guardian experiment config telemetry lcmtypes"
+  "replay | recorded runs through the cycle again: proof of equal commands, other controllers open loop | rig control plant_sim driver driver_sim runtime guardian experiment config telemetry lcmtypes"
+  "program | what `abs_hil` decides between its command line and the other rooms | rig control plant_sim driver driver_sim runtime guardian experiment lcmtypes telemetry watch analysis run_folder diagnosis config study commands replay"
+)

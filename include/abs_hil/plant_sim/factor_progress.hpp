@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstddef>
+#include <limits>
+
+#include "abs_hil/plant_sim/factor_profile.hpp"
+
+namespace abs_hil::plant_sim {
+
+/// A factor from one instant on, until the piece of the profile ends: linear in the time since and in the lower wheel's
+/// angle.
+struct PresentFactor {
+  double value{1.0};
+  double per_s{0.0};
+  double per_rad{0.0};
+  double angle2_rad{0.0};                                          ///< where `value` holds
+  double end_angle2_rad{std::numeric_limits<double>::infinity()};  ///< of the piece, along the distance
+  double highest{1.0};                                             ///< anywhere on the piece
+
+  [[nodiscard]] double after(double time_s, double angle2) const noexcept {
+    return value + per_s * time_s + per_rad * (angle2 - angle2_rad);
+  }
+};
+
+/// How far a plant has come along a profile. Pieces that are passed do not return, should the lower wheel
+/// roll back. Real-time safe but for the constructor.
+class FactorProgress {
+ public:
+  /// @param r2_m  radius of the lower wheel
+  FactorProgress(const FactorProfile& profile, double r2_m)
+      : profile_(profile),
+        r2_m_(r2_m),
+        changes_(profile.pieces().size() > 1),
+        constant_(profile.pieces().front().value) {
+    start(0.0);
+  }
+
+  [[nodiscard]] const FactorProfile& profile() const noexcept { return profile_; }
+
+  /// Back to the start, with the lower wheel at that angle.
+  void start(double angle2_rad) noexcept;
+  /// The brake acts: the origin of profiles that count from braking, the first time.
+  void brake_applied(double angle2_rad) noexcept;
+  /// Lets time pass.
+  void pass(double duration_s) noexcept { time_s_ += duration_s; }
+  /// Goes on to the piece that holds from now on.
+  void settle(double angle2_rad) noexcept {
+    if (changes_) settle_on_changes(angle2_rad);
+  }
+
+  /// Time until the piece ends; infinite if it ends with the distance or not at all.
+  [[nodiscard]] double time_left_s() const noexcept {
+    if (!changes_ || !counting_ || !along_time()) return std::numeric_limits<double>::infinity();
+    return origin_time_s_ + piece().end - time_s_;
+  }
+  /// False: the factor is 1 throughout.
+  [[nodiscard]] bool changes_anything() const noexcept { return changes_ || constant_ != 1.0; }
+  [[nodiscard]] PresentFactor present(double angle2_rad) const noexcept {
+    if (changes_) return present_of_changes(angle2_rad);
+    return {.value = constant_, .angle2_rad = angle2_rad, .highest = constant_};
+  }
+
+ private:
+  void settle_on_changes(double angle2_rad) noexcept;
+  [[nodiscard]] PresentFactor present_of_changes(double angle2_rad) const noexcept;
+  [[nodiscard]] bool along_time() const noexcept { return profile_.axis() == FactorProfile::Axis::time; }
+  [[nodiscard]] const FactorProfile::Piece& piece() const noexcept { return profile_.pieces()[index_]; }
+  [[nodiscard]] double end_angle2_rad() const noexcept { return origin_angle2_rad_ + piece().end / r2_m_; }
+
+  FactorProfile profile_;
+  double r2_m_;
+  bool changes_;     ///< else it costs next to nothing
+  double constant_;  ///< the factor where it does not change
+  std::size_t index_{0};
+  double time_s_{0.0};
+  double origin_time_s_{0.0};
+  double origin_angle2_rad_{0.0};
+  bool counting_{true};  ///< the origin is passed
+};
+
+}  // namespace abs_hil::plant_sim

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "abs_hil/rig/parameters.hpp"
+#include "rig/record_sink.hpp"
+
+namespace abs_hil::analysis {
+
+/// One point of a friction curve.
+struct FrictionPoint {
+  double time_s{0.0};
+  double slip{0.0};
+  double force_N{0.0};
+};
+
+/// The tyre's friction curve as a run went along it, and its peak. NaN where the run did not pass a peak.
+struct FrictionCurveResult {
+  std::vector<FrictionPoint> points{};
+  double peak_force_N{rig::unknown};
+  double peak_slip{rig::unknown};
+};
+
+/// Traces the friction curve from both encoders' counts and the time of their reading alone, over phase `brake`:
+///   force = -(J2 omega2' + d2 omega2 + M20) / r2  (2),   slip (5) from both speeds.
+/// Speeds and deceleration come from cubics fitted by least squares to the counts within 30 ms on either side, which
+/// does not lag, as a filter that runs along with the cycle must. Nothing is assumed of the tyre; wheel parameters are
+/// those that the controller knows. The peak is that of a cubic in ln(slip) through the points above 85 % of the
+/// largest force.
+class FrictionCurve final : public rig::RecordSink {
+ public:
+  FrictionCurve(const rig::WheelParameters& wheels, std::int32_t counts_per_rev);
+
+  void consume(const rig::CycleRecord& record, double distance_m) override;
+  [[nodiscard]] FrictionCurveResult result() const;
+
+ private:
+  struct Sample {
+    double time_s;       ///< of the reading, from the first sample on
+    std::int64_t upper;  ///< counts, unwrapped
+    std::int64_t lower;
+  };
+
+  rig::WheelParameters wheels_;
+  double rad_per_count_;
+  std::vector<Sample> samples_;
+  std::int64_t start_ns_{0};
+  std::int32_t last_upper_{0};
+  std::int32_t last_lower_{0};
+};
+
+/// As CSV: time_s,slip,force_N.
+[[nodiscard]] std::string to_csv(const FrictionCurveResult& result);
+/// For a run's summary: peak_force_N, peak_slip, points.
+[[nodiscard]] nlohmann::ordered_json to_json(const FrictionCurveResult& result);
+
+}  // namespace abs_hil::analysis

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "analysis/result_file.hpp"
+#include "analysis/run_metrics.hpp"
+#include "rig/gate_counts.hpp"
+#include "rig/timing_summary.hpp"
+
+namespace abs_hil::analysis {
+
+/// Everything a run's summary says.
+struct RunSummary {
+  std::string result;  ///< "completed", "fault" or "stopped"
+  std::string reason;
+  std::string controller;
+  std::string plant;
+  std::string backend;
+  std::string experiment;
+  Metrics metrics{};
+  std::uint64_t cycles{0};
+  std::uint64_t telemetry_drops{0};
+  std::uint64_t publish_failures{0};
+  std::uint64_t csv_rows_lost{0};
+  bool realtime{false};      ///< every required step of the real-time set-up was obtained
+  bool virtual_time{false};  ///< --fast: the timing figures say nothing of this machine
+  bool truth_known{false};   ///< metrics come from the simulator's truth, not from estimates
+  rig::TimingSummary timing{};
+  rig::GateCounts gate{};  ///< what the command gate did to the commands
+  nlohmann::ordered_json config{};
+  nlohmann::ordered_json friction_curve{};  ///< what the experiment's analysis found; null without one
+};
+
+/// The summary as JSON, field names as in docs/telemetry.md; NaN becomes null.
+[[nodiscard]] nlohmann::ordered_json to_json(const RunSummary& summary);
+/// The summary for people, a few lines.
+[[nodiscard]] std::string to_text(const RunSummary& summary);
+
+/// A summary file that is either whole or not there (see ResultFile).
+class SummaryFile {
+ public:
+  /// Throws std::runtime_error, naming path, reason and fix, if the file cannot be created.
+  explicit SummaryFile(std::filesystem::path path);
+  /// Throws std::runtime_error if the file cannot be written.
+  void write(const RunSummary& summary);
+
+ private:
+  ResultFile file_;
+};
+
+}  // namespace abs_hil::analysis

@@ -1,0 +1,89 @@
+#include "commands/authority.hpp"
+
+#include <openssl/crypto.h>
+#include <openssl/evp.h>
+#include <openssl/hmac.h>
+#include <openssl/rand.h>
+#include <sys/stat.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <span>
+#include <stdexcept>
+#include <utility>
+
+#include "config/config_error.hpp"
+#include "telemetry/hexadecimal.hpp"
+#include "telemetry/message_codec.hpp"
+
+namespace abs_hil::commands {
+
+namespace {
+
+constexpr std::size_t key_min_characters = 16;
+constexpr std::size_t session_bytes = 16;
+
+[[noreturn]] void refuse(const std::filesystem::path& file, const std::string& why) {
+  throw config::ConfigError("commands.key_file: '" + file.string() + "' " + why);
+}
+
+}  // namespace
+
+std::string read_key(const std::filesystem::path& file) {
+  const std::string make_one = "; make one: (umask 077; openssl rand -hex 32 > " + file.string() + ")";
+  if (file.empty()) {
+    throw config::ConfigError(
+        "commands.key_file: none given; commands need a secret: (umask 077; openssl rand -hex 32 "
+        "> commands.key), then --set commands.key_file=commands.key");
+  }
+  struct stat facts {};
+  if (::stat(file.c_str(), &facts) != 0) {
+    refuse(file, std::string("cannot be read: ") + std::strerror(errno) + make_one);
+  }
+  if (!S_ISREG(facts.st_mode)) refuse(file, "is no file" + make_one);
+  if ((facts.st_mode & S_IRWXO) != 0) refuse(file, "is open to everybody: chmod o= " + file.string());
+  std::ifstream stream(file, std::ios::binary);
+  std::string key{std::istreambuf_iterator<char>(stream), {}};
+  if (!stream) refuse(file, "cannot be read: choose one that you may read");
+  key.erase(key.find_last_not_of(" \t\r\n") + 1);
+  if (key.size() < key_min_characters) refuse(file, "holds less than 16 characters" + make_one);
+  return key;
+}
+
+std::string mac_of(const command2_t& command, const std::string& key) {
+  command2_t bare = command;
+  bare.mac.clear();
+  telemetry::EncodeBuffer buffer;
+  const auto bytes = buffer.encode(bare);
+  std::array<unsigned char, EVP_MAX_MD_SIZE> mac{};
+  unsigned int size = 0;
+  if (HMAC(EVP_sha256(), key.data(), static_cast<int>(key.size()), bytes.data(), bytes.size(), mac.data(), &size) ==
+      nullptr) {
+    throw std::runtime_error("OpenSSL cannot make an HMAC-SHA-256");
+  }
+  return telemetry::hexadecimal(std::span(mac).first(size));
+}
+
+Authority::Authority(std::string key) : key_(std::move(key)) {
+  std::array<unsigned char, session_bytes> random{};
+  if (RAND_bytes(random.data(), static_cast<int>(random.size())) != 1) {
+    throw std::runtime_error("no random numbers to be had for the session of commands");
+  }
+  session_ = telemetry::hexadecimal(random);
+}
+
+rig::Reason Authority::judge(const command2_t& command) {
+  const std::string expected = mac_of(command, key_);
+  // In constant time: the time taken must not tell how much of a guess was right.
+  const bool authentic =
+      command.mac.size() == expected.size() && CRYPTO_memcmp(command.mac.data(), expected.data(), expected.size()) == 0;
+  if (!authentic) return rig::Reason::command_not_authentic;
+  if (command.session != session_ || command.sequence <= last_sequence_) return rig::Reason::command_repeated;
+  last_sequence_ = command.sequence;
+  return rig::Reason::none;
+}
+
+}  // namespace abs_hil::commands

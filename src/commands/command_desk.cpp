@@ -1,0 +1,144 @@
+#include "commands/command_desk.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+
+#include "config/config_error.hpp"
+
+namespace abs_hil::commands {
+
+namespace {
+
+constexpr double state_period_s = 0.5;
+constexpr std::size_t shown_max_bytes = 64;
+constexpr std::string_view start_name = "start";
+
+std::string shown(const std::string& text) { return telemetry::printable(text, shown_max_bytes); }
+
+std::string why(rig::Reason reason) {
+  switch (reason) {
+    case rig::Reason::command_not_authentic: return "its mac does not fit: another key, or not the sender's own";
+    case rig::Reason::command_repeated: return "not of this session, or its sequence was used before";
+    default: return std::string(rig::description(reason));
+  }
+}
+
+}  // namespace
+
+CommandDesk::CommandDesk(const config::Settings& settings, telemetry::MessageStream& stream)
+    : stream_(stream), live_(settings), waiting_(settings.experiment.wait_for_start) {
+  if (settings.commands.enabled) authority_.emplace(read_key(settings.commands.key_file));
+}
+
+std::optional<telemetry::CommandAnswer> CommandDesk::judge(const command2_t& command) {
+  const std::string refused = "refused '" + shown(command.command) + "': ";
+  if (!authority_) {
+    return telemetry::CommandAnswer{rig::Reason::commands_not_enabled,
+                                    refused + "only 'stop' is accepted (commands.enabled)"};
+  }
+  if (const rig::Reason reason = authority_->judge(command); reason != rig::Reason::none) {
+    return telemetry::CommandAnswer{reason, refused + why(reason)};
+  }
+  bool taken = false;
+  telemetry::CommandAnswer answer = carry_out(command, taken);
+  if (taken) return std::nullopt;
+  answer.authentic = true;
+  answer.message = refused + answer.message;
+  return answer;
+}
+
+telemetry::CommandAnswer CommandDesk::carry_out(const command2_t& command, bool& taken) {
+  using rig::Reason;
+  if (mailbox_ == nullptr) return {Reason::command_not_now, "the run has not begun"};
+  if (over_) return {Reason::command_not_now, "the run has ended"};
+  experiment::Adjustment adjustment;
+  config::LiveSettings changed = live_;
+  Pending pending{.key = {}, .value = command.value, .sender = command.sender};
+  if (command.command == "start") {
+    if (!waiting_) return {Reason::command_not_now, "the run does not wait for its start (--wait-for-start)"};
+    pending.key = start_name;
+    pending.value = 0.0;
+  } else if (command.command == "slip-ref" || command.command == "gain") {
+    try {
+      pending.key = changed.resolve(command.command == "gain" ? shown(command.name) : "control.slip_ref");
+      adjustment = changed.set(pending.key, command.value);
+    } catch (const config::ConfigError& error) {
+      return {Reason::command_out_of_range, error.what()};
+    }
+  } else {
+    return {Reason::command_unknown, "known are slip-ref, gain, start, stop"};
+  }
+  const std::uint32_t number = mailbox_->put(std::move(adjustment));
+  if (number == 0) return {Reason::command_not_now, "too many changes at once: send it again"};
+  if (pending.key == start_name) waiting_ = false;
+  live_ = std::move(changed);
+  pending_.emplace(number, std::move(pending));
+  taken = true;
+  return {};
+}
+
+void CommandDesk::settle(rig::Reason reason, std::map<std::uint32_t, Pending>::iterator pending) {
+  const Pending& done = pending->second;
+  ++accepted_;
+  stream_.send_adjustment(done.key, done.value);
+  const std::string what = done.key == start_name ? done.key : fmt::format("{} = {}", done.key, done.value);
+  stream_.answer_command(reason, fmt::format("accepted: {} (sender '{}')", what, shown(done.sender)), done.value);
+  pending_.erase(pending);
+}
+
+void CommandDesk::refuse_pending() {
+  over_ = true;
+  for (const auto& [number, pending] : pending_) {
+    ++refused_at_end_;
+    const bool start = pending.key == start_name;
+    const std::string what = start ? "start" : fmt::format("{} = {}", pending.key, pending.value);
+    stream_.answer_command(rig::Reason::command_not_now,
+                           fmt::format("refused: {}: the run ended before it could take effect (sender '{}')", what,
+                                       shown(pending.sender)),
+                           pending.value);
+  }
+  pending_.clear();
+  // Those who look at the counts find the last ones, too.
+  if (mailbox_ != nullptr) send_state();
+}
+
+void CommandDesk::consume(const rig::CycleRecord& record, double /*distance_m*/) {
+  if (record.reason == rig::Reason::start_command) {
+    for (auto it = pending_.begin(); it != pending_.end(); ++it) {
+      if (it->second.key != start_name) continue;
+      settle(record.reason, it);
+      break;
+    }
+  } else if (rig::is_adjustment(record.reason)) {
+    if (const auto it = pending_.find(static_cast<std::uint32_t>(record.reason_value)); it != pending_.end()) {
+      settle(record.reason, it);
+    }
+  }
+  if (record.time_s >= next_state_s_) {
+    send_state();
+    next_state_s_ = (std::floor(record.time_s / state_period_s) + 1.0) * state_period_s;
+  }
+}
+
+void CommandDesk::send_state() {
+  command_state_t state{};
+  state.enabled = static_cast<std::int8_t>(enabled());
+  state.waiting = static_cast<std::int8_t>(waiting_);
+  if (authority_) {
+    state.session = authority_->session();
+    state.last_sequence = authority_->last_sequence();
+  }
+  if (listener_ != nullptr) {
+    const telemetry::CommandListener::Counts counts = listener_->counts();
+    state.stops = static_cast<std::int64_t>(counts.stops);
+    state.refused = static_cast<std::int64_t>(counts.refused + refused_at_end_);
+    state.malformed = static_cast<std::int64_t>(counts.malformed);
+    state.dropped = static_cast<std::int64_t>(counts.dropped);
+  }
+  state.accepted = static_cast<std::int64_t>(accepted_);
+  stream_.send_command_state(std::move(state));
+}
+
+}  // namespace abs_hil::commands

@@ -1,0 +1,240 @@
+#include "commands/command_listener.hpp"
+
+#include <poll.h>
+#include <pthread.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+
+#include <chrono>
+#include <cstring>
+#include <string>
+#include <utility>
+
+#include "telemetry/checked_decode.hpp"
+#include "telemetry/lcm_url.hpp"
+#include "telemetry/tcpq_server.hpp"
+
+namespace abs_hil::telemetry {
+namespace {
+
+constexpr std::size_t packets_per_poll = 32;
+constexpr std::size_t most_waiting = 64;
+constexpr int answers_per_second = 10;
+constexpr std::size_t shown_text_max_bytes = 64;
+constexpr int thread_wait_ms = 50;
+constexpr std::chrono::seconds reconnect_after{1};
+constexpr int tcpq_timeout_ms = 200;
+/// LCM queues 30 messages if nobody says otherwise, and a flood would push a stop out.
+constexpr int lcm_queue_capacity = 1024;
+constexpr std::string_view too_long = "too long for a command";
+
+}  // namespace
+
+CommandListener::CommandListener(LcmOutlet& outlet, MessageStream& stream, std::function<void()> on_stop)
+    : outlet_(outlet), stream_(stream), on_stop_(std::move(on_stop)) {
+  // A log file has nothing to say, and its descriptor for waiting is not one to poll.
+  if (outlet_.provider() == "file") return;
+  if (outlet_.provider() == "udpm") {
+    udpm_.emplace(outlet_.url(), stream_.command_channel());
+    listening_ = true;
+    return;
+  }
+  if (outlet_.provider() == "memq") {
+    lcm_ = outlet_.lcm().getUnderlyingLCM();
+  } else {
+    own_lcm_ = std::make_unique<lcm::LCM>(outlet_.url());
+    if (!own_lcm_->good()) return;
+    lcm_ = own_lcm_->getUnderlyingLCM();
+  }
+  subscribe();
+  listening_ = true;
+}
+
+void CommandListener::subscribe() {
+  subscription_ = lcm_subscribe(lcm_, stream_.command_channel().c_str(), &on_packet, this);
+  lcm_subscription_set_queue_capacity(subscription_, lcm_queue_capacity);
+}
+
+CommandListener::~CommandListener() {
+  end_thread();
+  // An LCM object of its own takes its subscription with it; tcpq would look for its server once more.
+  if (!own_lcm_ && subscription_ != nullptr) lcm_unsubscribe(lcm_, subscription_);
+}
+
+void CommandListener::end_thread() {
+  if (!thread_.joinable()) return;
+  thread_.request_stop();
+  thread_.join();
+}
+
+void CommandListener::finish() {
+  end_thread();
+  listening_ = false;
+  answer_waiting(most_waiting);
+}
+
+void CommandListener::listen() {
+  if (!listening() || thread_.joinable()) return;
+  thread_ = std::jthread([this](const std::stop_token& stop) { listen_until(stop); });
+}
+
+void CommandListener::listen_until(const std::stop_token& stop) {
+  // Signals are for the main thread.
+  sigset_t all;
+  sigfillset(&all);
+  pthread_sigmask(SIG_BLOCK, &all, nullptr);
+  const Endpoint server = outlet_.provider() == "tcpq" ? endpoint_of(parse_lcm_url(outlet_.url())) : Endpoint{};
+  while (!stop.stop_requested()) {
+    const bool connected = file_descriptor() >= 0;
+    if (receive(thread_wait_ms) || connected) continue;
+    // tcpq without its server: looked for not more often than publishing does.
+    for (auto waited = std::chrono::milliseconds(0); waited < reconnect_after && !stop.stop_requested();
+         waited += std::chrono::milliseconds(thread_wait_ms)) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(thread_wait_ms));
+    }
+    if (stop.stop_requested() || ask_tcpq_server(server, tcpq_timeout_ms) != TcpqServer::answers) continue;
+    // This connects again. Handling would, too, and then wait for a message without end.
+    lcm_unsubscribe(lcm_, subscription_);
+    subscribe();
+  }
+}
+
+bool CommandListener::receive(int timeout_ms) {
+  // Not lcm_handle_timeout: its select() does not survive descriptors of -1 (tcpq without server) or above 1023.
+  pollfd ready{file_descriptor(), POLLIN, 0};
+  if (ready.fd < 0 || ::poll(&ready, 1, timeout_ms) <= 0) return false;
+  if (udpm_) {
+    const UdpmReceiver::Arrival arrival = udpm_->next();
+    dropped_by_kernel_.store(udpm_->dropped(), std::memory_order_relaxed);
+    if (arrival.too_long) {
+      hand_over(Problem{too_long}, false);
+    } else if (arrival.any) {
+      take(arrival.payload);
+    }
+    return true;
+  }
+  if (outlet_.provider() == "tcpq") {
+    // A server that stands still within a message must not keep the run from ending.
+    constexpr timeval timeout{.tv_sec = 0, .tv_usec = suseconds_t{tcpq_timeout_ms} * 1000};
+    static_cast<void>(::setsockopt(ready.fd, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout));
+  }
+  if (lcm_handle(lcm_) != 0) return false;
+  if (!std::exchange(packet_.arrived, false)) return true;
+  if (packet_.size > packet_.bytes.size()) {
+    hand_over(Problem{too_long}, false);
+  } else {
+    take(std::span(packet_.bytes).first(packet_.size));
+  }
+  return true;
+}
+
+void CommandListener::poll() {
+  if (!listening()) return;
+  for (std::size_t i = 0; i < packets_per_poll && !thread_.joinable(); ++i) {
+    if (!receive(0)) break;
+  }
+  answer_waiting(packets_per_poll);
+}
+
+void CommandListener::answer_waiting(std::size_t at_most) {
+  for (std::size_t i = 0; i < at_most; ++i) {
+    Arrival arrival;
+    {
+      const std::lock_guard lock(mutex_);
+      if (arrivals_.empty()) return;
+      arrival = std::move(arrivals_.front());
+      arrivals_.pop_front();
+    }
+    answer(arrival);
+  }
+}
+
+// Only copies: answers are published, and may throw, outside of LCM's C code.
+void CommandListener::on_packet(const lcm_recv_buf_t* received, const char* /*channel*/, void* self) noexcept {
+  Packet& packet = static_cast<CommandListener*>(self)->packet_;
+  packet.size = received->data_size;
+  packet.arrived = true;
+  if (packet.size <= packet.bytes.size()) std::memcpy(packet.bytes.data(), received->data, packet.size);
+}
+
+void CommandListener::take(std::span<const std::uint8_t> packet) {
+  if (fingerprint_of(packet) == static_cast<std::int64_t>(command2_t::getHash())) {
+    command2_t command{};
+    const std::string_view problem = decode_checked(packet, command);
+    if (!problem.empty()) return hand_over(Problem{problem}, false);
+    const bool is_stop = command.command == "stop";
+    return hand_over(std::move(command), is_stop);
+  }
+  auto [command, problem] = decode_command(packet);
+  if (!problem.empty()) return hand_over(Problem{problem}, false);
+  const bool is_stop = command.command == "stop";
+  hand_over(std::move(command), is_stop);
+}
+
+void CommandListener::hand_over(Arrival arrival, bool is_stop) {
+  if (is_stop) {
+    stops_.fetch_add(1, std::memory_order_release);
+    if (on_stop_) on_stop_();
+  }
+  const std::lock_guard lock(mutex_);
+  if (arrivals_.size() < most_waiting) {
+    arrivals_.push_back(std::move(arrival));
+  } else if (is_stop) {
+    arrivals_.front() = std::move(arrival);  // a stop is answered whatever else came
+    dropped_.fetch_add(1, std::memory_order_relaxed);
+  } else {
+    dropped_.fetch_add(1, std::memory_order_relaxed);
+  }
+}
+
+void CommandListener::answer(const Arrival& arrival) {
+  if (const auto* problem = std::get_if<Problem>(&arrival)) {
+    ++malformed_;
+    return say(rig::Reason::command_malformed, std::string("refused a packet: ").append(problem->text), malformed_,
+               false);
+  }
+  const auto* old = std::get_if<command_t>(&arrival);
+  const auto* command = std::get_if<command2_t>(&arrival);
+  const std::string& name = old != nullptr ? old->command : command->command;
+  const std::string from = old != nullptr ? " (token '" + printable(old->token, shown_text_max_bytes) + "')"
+                                          : " (sender '" + printable(command->sender, shown_text_max_bytes) + "')";
+  if (name == "stop") {
+    ++stops_answered_;
+    return say(rig::Reason::stop_command, "stop accepted" + from, stops_answered_, stops_answered_ == 1);
+  }
+  if (command != nullptr && judge_) {
+    const std::optional<CommandAnswer> judged = judge_(*command);
+    if (!judged) return;
+    ++refused_;
+    return say(judged->reason, judged->message + from, refused_, judged->authentic);
+  }
+  ++refused_;
+  const std::string shown = "refused '" + printable(name, shown_text_max_bytes) + "': ";
+  if (command != nullptr) {
+    return say(rig::Reason::commands_not_enabled, shown + "only 'stop' is accepted (commands.enabled)" + from, refused_,
+               false);
+  }
+  say(rig::Reason::command_unknown, shown + "only 'stop' is accepted" + from, refused_, false);
+}
+
+void CommandListener::say(rig::Reason reason, std::string message, std::uint64_t count, bool always) {
+  const double now_s = stream_.time_s();
+  if (now_s - answer_window_start_s_ >= 1.0) {
+    answer_window_start_s_ = now_s;
+    answers_in_window_ = 0;
+  }
+  // A flood must not get a flood of answers.
+  if (!always && answers_in_window_ >= answers_per_second) return;
+  if (!always) ++answers_in_window_;
+  stream_.answer_command(reason, std::move(message), static_cast<double>(count));
+}
+
+CommandListener::Counts CommandListener::counts() const noexcept {
+  return {.stops = stops_.load(std::memory_order_relaxed),
+          .refused = refused_,
+          .malformed = malformed_,
+          .dropped = dropped_.load(std::memory_order_relaxed) + dropped_by_kernel_.load(std::memory_order_relaxed)};
+}
+
+}  // namespace abs_hil::telemetry

@@ -1,0 +1,153 @@
+#include "commands/sender.hpp"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <random>
+#include <span>
+
+#include "abs_hil/rig/reason.hpp"
+#include "abs_hil/telemetry_t.hpp"
+#include "commands/authority.hpp"
+#include "telemetry/checked_decode.hpp"
+#include "telemetry/lcm_outlet.hpp"
+#include "telemetry/message_codec.hpp"
+
+namespace abs_hil::commands {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr std::chrono::milliseconds stop_again{50};
+/// A run's slow side ends within this time after its last cycle.
+constexpr std::chrono::seconds last_words{1};
+
+/// Listens to one program's answers.
+class Answers {
+ public:
+  Answers(lcm_t* lcm, const std::string& prefix, std::string sender) : lcm_(lcm), sender_(std::move(sender)) {
+    events_ = lcm_subscribe(lcm_, (prefix + "EVENT").c_str(), &on_event, this);
+    states_ = lcm_subscribe(lcm_, (prefix + "COMMAND_STATE").c_str(), &on_state, this);
+  }
+  Answers(const Answers&) = delete;
+  Answers& operator=(const Answers&) = delete;
+  ~Answers() {
+    lcm_unsubscribe(lcm_, events_);
+    lcm_unsubscribe(lcm_, states_);
+  }
+
+  /// Takes in what comes until `until`, at the latest until `enough` says so.
+  template <class Enough>
+  void wait(Clock::time_point until, Enough enough) {
+    while (!enough()) {
+      const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - Clock::now()).count();
+      if (left <= 0) return;
+      pollfd ready{lcm_get_fileno(lcm_), POLLIN, 0};
+      if (::poll(&ready, 1, static_cast<int>(left)) > 0 && lcm_handle(lcm_) != 0) return;
+    }
+  }
+
+  std::optional<event_t> answer{};
+  std::optional<event_t> ending{};  ///< the run's last phase, if it began while we listened
+  std::optional<command_state_t> state{};
+
+ private:
+  static std::span<const std::uint8_t> bytes(const lcm_recv_buf_t* received) {
+    return {static_cast<const std::uint8_t*>(received->data), received->data_size};
+  }
+  static void on_event(const lcm_recv_buf_t* received, const char* /*channel*/, void* self) {
+    auto& answers = *static_cast<Answers*>(self);
+    event_t event{};
+    if (!telemetry::decode_checked(bytes(received), event).empty()) return;
+    const bool last_phase = event.phase == telemetry_t::PHASE_STOPPED || event.phase == telemetry_t::PHASE_FAULT;
+    if (last_phase && event.kind != "command") answers.ending = event;
+    if (event.kind != "command") return;
+    if (event.message.find('\'' + answers.sender_ + '\'') != std::string::npos) answers.answer = std::move(event);
+  }
+  static void on_state(const lcm_recv_buf_t* received, const char* /*channel*/, void* self) {
+    command_state_t state{};
+    if (telemetry::decode_checked(bytes(received), state).empty()) {
+      static_cast<Answers*>(self)->state = std::move(state);
+    }
+  }
+
+  lcm_t* lcm_;
+  std::string sender_;
+  lcm_subscription_t* events_;
+  lcm_subscription_t* states_;
+};
+
+std::string unique_sender() {
+  std::random_device random;
+  return "send-" + std::to_string(::getpid()) + '-' + std::to_string(random());
+}
+
+template <class Message>
+void publish(lcm_t* lcm, const std::string& channel, const Message& message) {
+  telemetry::EncodeBuffer buffer;
+  const auto bytes = buffer.encode(message);
+  if (lcm_publish(lcm, channel.c_str(), bytes.data(), static_cast<unsigned int>(bytes.size())) != 0) {
+    throw telemetry::LcmError("the command could not be published on " + channel);
+  }
+}
+
+Reply reply_of(const std::optional<event_t>& answer) {
+  if (!answer) {
+    return {Outcome::no_answer, "no answer: is abs_hil running, on this network and with this channel prefix?"};
+  }
+  const auto reason = static_cast<rig::Reason>(answer->reason);
+  const bool accepted = reason == rig::Reason::stop_command || rig::is_adjustment(reason);
+  return {accepted ? Outcome::accepted : Outcome::refused, answer->message};
+}
+
+}  // namespace
+
+Reply send(const Order& order, const SenderOptions& options) {
+  const bool is_stop = order.command == "stop";
+  const std::string key = is_stop ? std::string() : read_key(options.key_file);
+  telemetry::LcmOutlet outlet(options.url);
+  lcm_t* const lcm = outlet.lcm().getUnderlyingLCM();
+  const std::string sender = unique_sender();
+  const std::string channel = options.channel_prefix + "COMMAND";
+  Answers answers(lcm, options.channel_prefix, sender);
+  const auto end =
+      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.timeout_s));
+  const auto answered = [&answers] { return answers.answer.has_value(); };
+  if (is_stop) {
+    command_t stop{};
+    stop.command = "stop";
+    stop.token = sender;
+    while (!answered() && Clock::now() < end) {
+      publish(lcm, channel, stop);
+      answers.wait(std::min(end, Clock::now() + stop_again), answered);
+    }
+    return reply_of(answers.answer);
+  }
+  answers.wait(end, [&answers] { return answers.state.has_value(); });
+  if (!answers.state) return reply_of(std::nullopt);
+  if (answers.state->enabled == 0) {
+    return {Outcome::refused, "the running abs_hil takes no commands but stop: start it with commands.enabled=true"};
+  }
+  command2_t command{};
+  command.session = answers.state->session;
+  command.sequence = answers.state->last_sequence + 1;
+  command.command = order.command;
+  command.name = order.name;
+  command.value = order.value;
+  command.sender = sender;
+  command.mac = mac_of(command, key);
+  answers.ending.reset();  // of a run before
+  publish(lcm, channel, command);
+  answers.wait(end, [&] { return answered() || answers.ending; });
+  // What ended the run is published before what the end of the run did to a command.
+  if (!answered() && answers.ending) answers.wait(std::min(end, Clock::now() + last_words), answered);
+  if (!answered() && answers.ending) {
+    return {Outcome::refused, "no answer, as the run ended: " + telemetry::printable(answers.ending->message, 200)};
+  }
+  return reply_of(answers.answer);
+}
+
+}  // namespace abs_hil::commands

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "telemetry/message_fields.hpp"
+
+namespace abs_hil::commands {
+
+/// What is to be sent, and where.
+struct Order {
+  std::string command{};  ///< "stop", "slip-ref", "gain", "start"
+  std::string name{};     ///< for "gain"
+  double value{0.0};
+};
+struct SenderOptions {
+  std::string url{};
+  std::string channel_prefix{"ABS_"};
+  std::string key_file{};  ///< not needed for "stop"
+  double timeout_s{3.0};
+};
+
+/// What came of an order.
+enum class Outcome : std::uint8_t { accepted, refused, no_answer };
+struct Reply {
+  Outcome outcome{Outcome::no_answer};
+  std::string message{};  ///< the program's own words, or what is missing
+};
+
+/// Sends an order to a running abs_hil and waits for its answer. A stop needs no key and is sent again and again until
+/// it is answered. Throws telemetry::LcmError without a network and config::ConfigError for the key.
+[[nodiscard]] Reply send(const Order& order, const SenderOptions& options);
+
+}  // namespace abs_hil::commands

@@ -1,0 +1,119 @@
+#include "config/config_file.hpp"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "config/config_error.hpp"
+#include "rig/nearest_name.hpp"
+
+namespace abs_hil::config {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+toml::table parse(const fs::path& file) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) {
+    throw ConfigError(fmt::format("{}: no such file; give the path of a TOML file", file.string()));
+  }
+  try {
+    return toml::parse_file(file.string());
+  } catch (const toml::parse_error& problem) {
+    throw ConfigError(
+        fmt::format("{}:{}: not valid TOML: {}", file.string(), problem.source().begin.line, problem.description()));
+  }
+}
+
+void set_values(const toml::table& table, const std::string& prefix, const fs::path& file, KeyTable& keys) {
+  for (const auto& [key, node] : table) {
+    const std::string name = prefix.empty() ? std::string(key.str()) : prefix + '.' + std::string(key.str());
+    const std::string origin = fmt::format("{}:{}", file.string(), node.source().begin.line);
+    if (const auto* inner = node.as_table()) {
+      set_values(*inner, name, file, keys);
+    } else if (const auto* text = node.as_string()) {
+      keys.set(name, text->get(), origin);
+    } else if (const auto* flag = node.as_boolean()) {
+      keys.set(name, flag->get(), origin);
+    } else if (const auto* integer = node.as_integer()) {
+      keys.set(name, integer->get(), origin);
+    } else if (const auto* real = node.as_floating_point()) {
+      keys.set(name, real->get(), origin);
+    } else {
+      throw ConfigError(fmt::format("{}: {} is neither number, flag nor text", origin, name));
+    }
+  }
+}
+
+}  // namespace
+
+void load_file(const fs::path& file, KeyTable& keys, std::string_view only_table) {
+  toml::table table = parse(file);
+  table.erase("description");
+  if (!only_table.empty()) {
+    for (const auto& [key, node] : table) {
+      if (key.str() == only_table && node.is_table()) continue;
+      throw ConfigError(fmt::format("{}:{}: {} has no place here; this file may hold the table [{}] only",
+                                    file.string(), node.source().begin.line, std::string_view(key.str()), only_table));
+    }
+  }
+  set_values(table, {}, file, keys);
+}
+
+namespace {
+
+/// The first of the places that is a folder.
+fs::path first_folder(const std::vector<fs::path>& places) {
+  std::error_code error;
+  for (const fs::path& place : places) {
+    if (fs::is_directory(place, error)) return place;
+  }
+  throw ConfigError(fmt::format("no configuration folder at {}; set ABS_HIL_CONFIG_DIR to the project's config/",
+                                places.back().string()));
+}
+
+}  // namespace
+
+fs::path own_config_dir() {
+  std::error_code error;
+  std::vector<fs::path> places;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  if (!error) places.push_back(program.parent_path().parent_path() / "share" / "abs_hil" / "config");
+  places.emplace_back(ABS_HIL_SOURCE_CONFIG_DIR);
+  places.emplace_back(ABS_HIL_INSTALLED_CONFIG_DIR);  // for a program elsewhere that links the installed library
+  return first_folder(places);
+}
+
+fs::path config_dir() {
+  const char* given = std::getenv("ABS_HIL_CONFIG_DIR");
+  return given != nullptr ? first_folder({given}) : own_config_dir();
+}
+
+fs::path plant_file(std::string_view name_or_file) {
+  fs::path given(name_or_file);
+  if (given.has_parent_path() || given.extension() == ".toml") return given;
+  fs::path named = config_dir() / "plants" / fmt::format("{}.toml", name_or_file);
+  if (std::error_code error; fs::is_regular_file(named, error)) return named;
+  std::vector<std::string_view> names;
+  const std::vector<PlantEntry> known = known_plants();
+  names.reserve(known.size());
+  for (const PlantEntry& plant : known) names.push_back(plant.name);
+  throw ConfigError(
+      fmt::format("--plant: unknown plant \"{}\"; the nearest known is {}; known: {}; or give a TOML file",
+                  name_or_file, rig::nearest_name(name_or_file, names), fmt::join(names, ", ")));
+}
+
+std::vector<PlantEntry> known_plants() {
+  std::vector<PlantEntry> plants;
+  for (const auto& entry : fs::directory_iterator(config_dir() / "plants")) {
+    if (entry.path().extension() != ".toml") continue;
+    plants.push_back({entry.path().stem().string(), parse(entry.path())["description"].value_or(std::string())});
+  }
+  std::sort(plants.begin(), plants.end(), [](const PlantEntry& a, const PlantEntry& b) { return a.name < b.name; });
+  return plants;
+}
+
+}  // namespace abs_hil::config

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "config/key_table.hpp"
+
+namespace abs_hil::config {
+
+/// Reads a TOML file and sets every value in it. Throws ConfigError, naming file and line.
+/// @param only_table if not empty, the one table that the file may hold ("plant")
+void load_file(const std::filesystem::path& file, KeyTable& table, std::string_view only_table = {});
+
+/// The folder of configuration files that belongs to this program: $ABS_HIL_CONFIG_DIR, else the installed one beside
+/// the program, else the source tree's. Throws ConfigError if there is none.
+[[nodiscard]] std::filesystem::path config_dir();
+
+/// The same, whatever the environment says: what came with the program.
+[[nodiscard]] std::filesystem::path own_config_dir();
+
+/// A plant by name or file: `name` alone is config_dir()/plants/name.toml. Throws ConfigError, naming the known ones.
+[[nodiscard]] std::filesystem::path plant_file(std::string_view name_or_file);
+
+struct PlantEntry {
+  std::string name;
+  std::string description;
+};
+/// The plants in config_dir()/plants, by name.
+[[nodiscard]] std::vector<PlantEntry> known_plants();
+
+}  // namespace abs_hil::config

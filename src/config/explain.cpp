@@ -1,0 +1,133 @@
+#include "config/explain.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "config/events.hpp"
+#include "config/plan.hpp"
+#include "config/series.hpp"
+
+namespace abs_hil::config {
+
+namespace {
+
+using experiment::BrakeAction;
+using experiment::EndKind;
+
+std::string number(double value) { return fmt::format("{:.6g}", value); }
+
+std::string in_words(const experiment::Profile& profile, std::string_view unit) {
+  constexpr std::size_t longest = 120;
+  const auto& points = profile.points();
+  std::string text = fmt::format("{}{}", number(points.front().value), unit);
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const auto& before = points[i - 1];
+    const auto& point = points[i];
+    if (point.value == before.value) continue;
+    const bool step = profile.between() == experiment::Between::hold || point.time_s == before.time_s;
+    text += step ? fmt::format(", from {} s on ", number(point.time_s))
+                 : fmt::format(", from {} s to {} s {} to ", number(before.time_s), number(point.time_s),
+                               point.value > before.value ? "rising" : "falling");
+    text += fmt::format("{}{}", number(point.value), unit);
+    if (text.size() > longest) return fmt::format("{}, ... ({} points)", text, points.size());
+  }
+  return text;
+}
+
+std::string in_words(const experiment::Profile& profile, double constant, std::string_view unit) {
+  return profile.empty() ? number(constant) + std::string(unit) : in_words(profile, unit);
+}
+
+std::string in_words(const experiment::EndCondition& end) {
+  const std::string value = number(end.value);
+  switch (end.kind) {
+    case EndKind::duration: return fmt::format("it has lasted {} s", value);
+    case EndKind::upper_speed_above: return fmt::format("the upper wheel reaches {} rad/s", value);
+    case EndKind::upper_speed_below: return fmt::format("the upper wheel is slower than {} rad/s", value);
+    case EndKind::upper_wheel_peak: return fmt::format("the upper wheel has gained no speed for {} s", value);
+    case EndKind::lower_speed_above: return fmt::format("the lower wheel reaches {} rad/s", value);
+    case EndKind::lower_speed_below: return fmt::format("the lower wheel is slower than {} rad/s", value);
+    case EndKind::car_speed_above: return fmt::format("the car reaches {} m/s", value);
+    case EndKind::car_speed_below:
+      return fmt::format(
+          "the car is slower than {} m/s{}", value,
+          end.reason == rig::Reason::slip_control_left_at_low_speed ? " (least speed for slip control)" : "");
+    case EndKind::standstill: return "both wheels stand";
+    case EndKind::start_command: return "the start is given";
+    case EndKind::slip_above: return fmt::format("the slip reaches {}", value);
+    case EndKind::slip_below: return fmt::format("the slip is less than {}", value);
+    case EndKind::distance: return fmt::format("the car has come {} m in it", value);
+    case EndKind::all: break;
+  }
+  std::string text;
+  for (const experiment::EndCondition& part : end.parts) text += (text.empty() ? "" : " and ") + in_words(part);
+  return text;
+}
+
+std::string brake_in_words(const experiment::PhasePlan& phase, const config::Settings& s) {
+  switch (phase.brake) {
+    case BrakeAction::released: return "off";
+    case BrakeAction::torque: return "torque " + in_words(phase.brake_course, phase.brake_torque_Nm, " N m");
+    case BrakeAction::duty: return "duty " + in_words(phase.brake_course, phase.brake_duty, "");
+    case BrakeAction::slip_control: break;
+  }
+  return fmt::format("controller {}, slip reference {}", s.control.controller,
+                     in_words(phase.slip_ref_course, s.control.slip_ref, ""));
+}
+
+void add_series(const SeriesScript& series, const config::Settings& s, std::string& text) {
+  if (!series.given) return;
+  std::size_t runs = series.seeds.empty() ? static_cast<std::size_t>(series.repeat) : series.seeds.size();
+  std::string varied;
+  for (const Varied& v : series.vary) {
+    runs *= v.values.size();
+    std::string values;
+    for (const config::Value& value : v.values) values += (values.empty() ? "" : ", ") + text_of(value);
+    varied += fmt::format("  {}: {}\n", v.key, values);
+  }
+  const std::string seeds =
+      series.seeds.empty() ? fmt::format("{} of each with seeds from {}", series.repeat, series.seed.value_or(s.seed))
+                           : fmt::format("with the seeds {}", fmt::join(series.seeds, ", "));
+  text +=
+      fmt::format("Series of {} runs, {}, in real time {} s apart\n{}", runs, seeds, number(series.pause_s), varied);
+}
+
+}  // namespace
+
+std::string explain(const Script& script, const config::Settings& settings) {
+  config::Settings s = settings;
+  apply(script, s);
+  const Plan plan = config::plan(script, s);
+  std::string text =
+      fmt::format("{}: {}\n", script.name, script.description.empty() ? "no description" : script.description);
+  for (std::size_t i = 0; i < plan.phases.size(); ++i) {
+    const experiment::PhasePlan& phase = plan.phases[i];
+    std::string ends;
+    for (const experiment::EndCondition& end : phase.ends_on) ends += (ends.empty() ? "" : ", or ") + in_words(end);
+    text += fmt::format("{}. {} ({}): motor {}, brake {}\n   until {}; a fault after {} s\n", i + 1,
+                        plan.phase_names[i], rig::name_of(phase.phase),
+                        phase.motor_course.empty() && phase.motor_duty == 0.0
+                            ? "off"
+                            : "duty " + in_words(phase.motor_course, phase.motor_duty, ""),
+                        brake_in_words(phase, s), ends, number(phase.time_limit_s));
+  }
+  text += fmt::format("Limits: wheels {} rad/s, motor duty {}, brake duty {}", number(s.gate.overspeed_rad_s),
+                      number(s.gate.motor_duty_max), number(s.gate.brake_duty_max));
+  if (std::isfinite(plan.limits.run_time_s)) text += fmt::format(", run {} s", number(plan.limits.run_time_s));
+  if (std::isfinite(plan.limits.distance_m)) text += fmt::format(", distance {} m", number(plan.limits.distance_m));
+  text += '\n';
+  for (const ChangingPart& part : changing_parts()) {
+    const std::string& profile = part.profile(s);
+    if (!profile.empty()) text += fmt::format("Simulation only: {}, a factor over {}\n", part.in_words, profile);
+  }
+  if (!s.inject.empty()) text += fmt::format("Faults (never on hardware): {}\n", s.inject);
+  for (const Setting& setting : script.settings) {
+    text += fmt::format("Setting: {} = {}\n", setting.key, text_of(setting.value));
+  }
+  if (!script.analysis.empty()) text += fmt::format("Analysis: {}\n", script.analysis);
+  add_series(script.series, s, text);
+  return text;
+}
+
+}  // namespace abs_hil::config

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "config/key_table.hpp"
+
+namespace abs_hil::config {
+
+/// What a number measures. In a script a quantity with a unit has it in its key's name (`lasts_s = 2`) or behind the
+/// number (`lasts = "2 s"`); nothing is guessed.
+enum class Quantity : std::uint8_t { none, time, angular_speed, speed, distance, torque };
+
+/// The SI unit as the configuration keys write it: "rad/s"; empty for pure numbers.
+[[nodiscard]] std::string_view unit_of(Quantity quantity) noexcept;
+/// What a key's name ends with to say that unit: "_rad_s"; empty for pure numbers.
+[[nodiscard]] std::string_view suffix_of(Quantity quantity) noexcept;
+/// The units that may stand behind a number, "s, ms, min" for a time.
+[[nodiscard]] std::string units_text(Quantity quantity);
+/// `text` as number and unit, "20 ms", in SI units. Nothing if it is not of that form; for pure numbers the only unit
+/// is "%".
+[[nodiscard]] std::optional<double> parse_quantity(std::string_view text, Quantity quantity) noexcept;
+
+/// What a field's value looks like.
+enum class Shape : std::uint8_t {
+  text,       ///< any text
+  choice,     ///< one of `allowed`
+  flag_true,  ///< `true` alone
+  number,     ///< a number with its quantity, or "$key" for a configuration value
+  whole,      ///< a whole number
+  wholes,     ///< a list of whole numbers
+  condition,  ///< "KEY = VALUE" over the configuration
+  profile,    ///< a number, or a table that says how it goes over the time of the phase
+  motor,      ///< "off" or a profile of duties
+  brake,      ///< "off", "controller" or a table
+  table,      ///< a table of `grammar`
+  tables,     ///< a list of such tables
+  points,     ///< [[time, value], ...]
+  settings,   ///< configuration values, nested or with dotted names
+  grid,       ///< configuration values, each a list or a {from, to, steps}
+};
+
+struct Grammar;
+
+/// One key of a table.
+struct Field {
+  std::string_view name;  ///< without the unit's suffix
+  Shape shape;
+  std::string_view meaning;
+  Quantity quantity{Quantity::none};
+  config::Range range{};                    ///< of numbers, in SI units
+  std::vector<std::string_view> allowed{};  ///< of choices
+  const Grammar* grammar{nullptr};          ///< of tables
+  bool required{false};
+};
+
+/// One kind of table: the single source of what the parser takes, what its errors offer and what the schema says.
+struct Grammar {
+  std::string_view title;  ///< as errors name it: "[[phase]]"
+  std::string_view meaning;
+  std::vector<Field> fields;
+
+  [[nodiscard]] const Field* find(std::string_view name) const noexcept;
+  /// Every spelling that is taken: names with and without the unit's suffix.
+  [[nodiscard]] std::vector<std::string> spellings() const;
+};
+
+[[nodiscard]] const Grammar& script_grammar();
+[[nodiscard]] const Grammar& phase_grammar();
+[[nodiscard]] const Grammar& until_grammar();
+[[nodiscard]] const Grammar& brake_grammar();
+[[nodiscard]] const Grammar& profile_grammar();
+[[nodiscard]] const Grammar& limits_grammar();
+[[nodiscard]] const Grammar& event_grammar();
+[[nodiscard]] const Grammar& series_grammar();
+[[nodiscard]] const Grammar& steps_grammar();
+
+}  // namespace abs_hil::config

@@ -1,0 +1,187 @@
+#include "config/key_table.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <type_traits>
+#include <utility>
+
+#include "config/config_error.hpp"
+#include "rig/nearest_name.hpp"
+
+namespace abs_hil::config {
+
+namespace {
+
+std::string shown(const Value& value) {
+  return std::visit(
+      [](const auto& v) -> std::string {
+        if constexpr (std::is_same_v<std::decay_t<decltype(v)>, std::string>) {
+          return '"' + v + '"';
+        } else {
+          return fmt::format("{}", v);
+        }
+      },
+      value);
+}
+
+[[noreturn]] void refuse(const Key& key, std::string_view value, std::string_view valid, std::string_view origin) {
+  throw ConfigError(fmt::format("{}: {} = {} is not valid; give {}{}{} ({})", origin, key.name, value, valid,
+                                key.unit.empty() ? "" : " ", key.unit, key.meaning));
+}
+
+template <typename Number>
+void assign_number(const Key& key, Number& target, const Value& value, std::string_view origin) {
+  constexpr bool whole = std::is_integral_v<Number>;
+  const std::string valid = fmt::format("a {} in {}", whole ? "whole number" : "number", key.range.text());
+  double number = 0.0;
+  if (const auto* integer = std::get_if<std::int64_t>(&value)) {
+    number = static_cast<double>(*integer);
+  } else if (const auto* real = std::get_if<double>(&value)) {
+    number = *real;
+  } else {
+    refuse(key, shown(value), valid, origin);
+  }
+  if (!key.range.contains(number) || (whole && number != std::floor(number))) refuse(key, shown(value), valid, origin);
+  target = static_cast<Number>(number);
+}
+
+/// A value as a TOML file would hold it: flag, whole number, number, else text.
+Value parse_value(std::string_view text) {
+  if (text == "true" || text == "false") return text == "true";
+  const char* end = text.data() + text.size();
+  const bool is_hex = text.starts_with("0x") || text.starts_with("0X");
+  std::int64_t integer = 0;
+  if (is_hex) {
+    const auto [at, error] = std::from_chars(text.data() + 2, end, integer, 16);
+    if (error == std::errc() && at == end) return integer;
+  }
+  if (const auto [at, error] = std::from_chars(text.data(), end, integer); error == std::errc() && at == end) {
+    return integer;
+  }
+  double real = 0.0;
+  if (const auto [at, error] = std::from_chars(text.data(), end, real); error == std::errc() && at == end) return real;
+  return std::string(text);
+}
+
+/// Texts go into JSON (summary, logs), which holds UTF-8 only.
+bool is_utf8(const std::string& text) {
+  try {
+    static_cast<void>(nlohmann::json(text).dump());
+    return true;
+  } catch (const nlohmann::json::type_error&) {
+    return false;
+  }
+}
+
+nlohmann::ordered_json value_of(const Key& key) {
+  return std::visit([](const auto* target) { return nlohmann::ordered_json(*target); }, key.target);
+}
+
+}  // namespace
+
+bool Range::contains(double value) const noexcept {
+  return (least_open ? value > least : value >= least) && (most_open ? value < most : value <= most);
+}
+
+std::string Range::text() const {
+  return fmt::format("{}{}, {}{}", least_open ? '(' : '[', least, most, most_open ? ')' : ']');
+}
+
+Value parse_value(const Key& key, std::string_view text) {
+  return std::holds_alternative<std::string*>(key.target) ? Value(std::string(text)) : parse_value(text);
+}
+
+const Key& KeyTable::find(std::string_view name, std::string_view origin) const {
+  std::vector<std::string_view> names;
+  for (const Key& key : keys_) {
+    if (key.name == name) return key;
+    names.push_back(key.name);
+  }
+  throw ConfigError(fmt::format("{}: unknown key {}; the nearest known key is {} (abs_hil list --keys shows all)",
+                                origin, name, fmt::join(rig::nearest_keys(name, names), " or ")));
+}
+
+void KeyTable::set(std::string_view name, const Value& value, std::string_view origin) {
+  const Key& key = find(name, origin);
+  std::visit(
+      [&](auto* target) {
+        using Target = std::decay_t<decltype(*target)>;
+        if constexpr (std::is_same_v<Target, bool>) {
+          const auto* flag = std::get_if<bool>(&value);
+          if (flag == nullptr) refuse(key, shown(value), "true or false", origin);
+          *target = *flag;
+        } else if constexpr (std::is_same_v<Target, std::string>) {
+          const auto* text = std::get_if<std::string>(&value);
+          const bool known =
+              text != nullptr &&
+              (key.allowed.empty() || std::find(key.allowed.begin(), key.allowed.end(), *text) != key.allowed.end());
+          if (known && !is_utf8(*text)) {
+            throw ConfigError(fmt::format("{}: {} is not UTF-8 text; give UTF-8 ({})", origin, key.name, key.meaning));
+          }
+          if (!known) {
+            refuse(key, shown(value),
+                   key.allowed.empty() ? "text" : fmt::format("one of {}", fmt::join(key.allowed, ", ")), origin);
+          }
+          *target = *text;
+        } else {
+          assign_number(key, *target, value, origin);
+        }
+      },
+      key.target);
+  set_.emplace(name);
+}
+
+void KeyTable::set_text(std::string_view assignment, std::string_view origin) {
+  const std::size_t equals = assignment.find('=');
+  if (equals == std::string_view::npos || equals == 0) {
+    throw ConfigError(
+        fmt::format("{}: \"{}\" is not an assignment; write key=value, as in plant.theta_N=30", origin, assignment));
+  }
+  const std::string_view name = assignment.substr(0, equals);
+  const std::string_view text = assignment.substr(equals + 1);
+  set(name, parse_value(find(name, origin), text), origin);
+}
+
+std::string KeyTable::to_toml() const {
+  // Tables in the order of their first key, each once, whatever the order of the keys.
+  std::vector<std::pair<std::string_view, std::string>> tables;
+  for (const Key& key : keys_) {
+    const std::size_t dot = key.name.rfind('.');
+    const std::string_view table = key.name.substr(0, dot);
+    auto at = std::find_if(tables.begin(), tables.end(), [&](const auto& known) { return known.first == table; });
+    if (at == tables.end()) at = tables.insert(tables.end(), {table, fmt::format("\n[{}]\n", table)});
+    // A number as short as reads back to the same; a text as JSON writes it, which TOML reads alike.
+    const std::string value = std::visit(
+        [](const auto* target) {
+          if constexpr (std::is_same_v<std::decay_t<decltype(*target)>, std::string>) {
+            return nlohmann::json(*target).dump();
+          } else {
+            return fmt::format("{}", *target);
+          }
+        },
+        key.target);
+    at->second += fmt::format("{} = {}\n", key.name.substr(dot + 1), value);
+  }
+  std::string text;
+  for (const auto& [name, values] : tables) text += values;
+  return text;
+}
+
+nlohmann::ordered_json KeyTable::to_json() const {
+  nlohmann::ordered_json root;
+  for (const Key& key : keys_) {
+    nlohmann::ordered_json* node = &root;
+    std::string_view rest = key.name;
+    for (std::size_t dot = rest.find('.'); dot != std::string_view::npos; dot = rest.find('.')) {
+      node = &(*node)[std::string(rest.substr(0, dot))];
+      rest.remove_prefix(dot + 1);
+    }
+    (*node)[std::string(rest)] = value_of(key);
+  }
+  return root;
+}
+
+}  // namespace abs_hil::config

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "config/settings.hpp"
+
+namespace abs_hil::config {
+
+/// Interval of admissible numbers, ends included unless open.
+struct Range {
+  double least{0.0};
+  double most{0.0};
+  bool least_open{false};
+  bool most_open{false};
+  [[nodiscard]] bool contains(double value) const noexcept;  ///< false for NaN
+  [[nodiscard]] std::string text() const;                    ///< "(0, 1]", say
+};
+
+/// One configuration value: its dotted name, where it is kept, what it may be.
+struct Key {
+  std::string_view name;
+  std::string_view unit;  ///< empty for pure numbers, flags and names
+  std::string_view meaning;
+  std::variant<double*, std::int32_t*, std::int64_t*, bool*, std::string*> target;
+  Range range{};                            ///< for numbers
+  std::vector<std::string_view> allowed{};  ///< for names; empty: any text
+};
+
+/// A value from a file or from the command line, before it is known what it should be.
+using Value = std::variant<double, std::int64_t, bool, std::string>;
+
+/// `text` as a value for that key: as it is where the key wants text, else as a TOML file would hold it.
+[[nodiscard]] Value parse_value(const Key& key, std::string_view text);
+
+/// Every configuration value by its dotted name: the one place that knows names, units and ranges.
+class KeyTable {
+ public:
+  /// Refers to `settings`, which must outlive the table.
+  explicit KeyTable(Settings& settings);
+
+  /// Sets a value. `origin` says where it came from ("--set", "FILE:LINE"). Throws ConfigError for an unknown name
+  /// (with the nearest known one), a value of the wrong kind or out of range; then nothing is changed.
+  void set(std::string_view name, const Value& value, std::string_view origin);
+  /// The same for `name=value` as text.
+  void set_text(std::string_view assignment, std::string_view origin);
+
+  [[nodiscard]] const std::vector<Key>& keys() const noexcept { return keys_; }
+  /// True if a file or an option gave the value, and not the default alone.
+  [[nodiscard]] bool was_set(std::string_view name) const { return set_.contains(name); }
+  /// The effective configuration, nested as in a file.
+  [[nodiscard]] nlohmann::ordered_json to_json() const;
+  /// The effective configuration as a TOML file that load_file reads back to the same values.
+  [[nodiscard]] std::string to_toml() const;
+
+ private:
+  [[nodiscard]] const Key& find(std::string_view name, std::string_view origin) const;
+
+  std::vector<Key> keys_;
+  std::set<std::string, std::less<>> set_;  ///< names of the values that were given
+};
+
+}  // namespace abs_hil::config

@@ -1,0 +1,265 @@
+#include "config/plan.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "abs_hil/rig/brake_map.hpp"
+#include "config/config_error.hpp"
+#include "config/events.hpp"
+#include "config/library.hpp"
+
+namespace abs_hil::config {
+
+namespace {
+
+using experiment::BrakeAction;
+using experiment::EndKind;
+using rig::Reason;
+
+/// Slack on the time limit of phases that end by their duration.
+constexpr double duration_slack_s = 1.0;
+
+const config::Key* find(const config::KeyTable& keys, std::string_view name) {
+  const auto& all = keys.keys();
+  const auto at = std::find_if(all.begin(), all.end(), [name](const config::Key& key) { return key.name == name; });
+  return at == all.end() ? nullptr : &*at;
+}
+
+std::optional<double> number_of(const config::Key& key) {
+  return std::visit(
+      [](const auto* target) -> std::optional<double> {
+        using Target = std::decay_t<decltype(*target)>;
+        if constexpr (std::is_arithmetic_v<Target> && !std::is_same_v<Target, bool>) {
+          return static_cast<double>(*target);
+        } else {
+          return std::nullopt;
+        }
+      },
+      key.target);
+}
+
+std::string text_of(const config::Key& key) {
+  return std::visit([](const auto* target) { return fmt::format("{}", *target); }, key.target);
+}
+
+Reason reason_of(EndKind kind) {
+  switch (kind) {
+    case EndKind::duration: return Reason::phase_duration_over;
+    case EndKind::upper_speed_above: return Reason::speed_threshold_reached;
+    case EndKind::upper_wheel_peak: return Reason::upper_wheel_peak_detected;
+    case EndKind::car_speed_below: return Reason::end_speed_reached;
+    case EndKind::standstill: return Reason::standstill_reached;
+    case EndKind::start_command: return Reason::start_command;
+    case EndKind::upper_speed_below:
+    case EndKind::lower_speed_above:
+    case EndKind::lower_speed_below:
+    case EndKind::car_speed_above: return Reason::speed_condition_met;
+    case EndKind::slip_above:
+    case EndKind::slip_below: return Reason::slip_condition_met;
+    case EndKind::distance: return Reason::distance_reached;
+    case EndKind::all: return Reason::all_conditions_met;
+  }
+  return Reason::none;
+}
+
+/// The CSV's word for a phase that does not say it itself.
+rig::Phase kind_of(const PhaseScript& phase) {
+  if (phase.kind) return *phase.kind;
+  for (const rig::Phase kind : {rig::Phase::idle, rig::Phase::accelerate, rig::Phase::coast, rig::Phase::brake,
+                                rig::Phase::hold, rig::Phase::stopped}) {
+    if (rig::name_of(kind) == phase.name) return kind;
+  }
+  if (phase.brake != BrakeAction::released) return rig::Phase::brake;
+  return phase.motor ? rig::Phase::accelerate : rig::Phase::coast;
+}
+
+class Planner {
+ public:
+  Planner(const Script& script, const config::Settings& settings)
+      : script_(script), settings_(settings), keys_(settings_) {}
+
+  [[nodiscard]] Plan make() const {
+    Plan plan;
+    for (const PhaseScript& phase : script_.phases) {
+      if (phase.when && !holds(*phase.when, keys_)) continue;
+      plan.phases.push_back(planned(phase));
+      plan.phase_names.push_back(phase.name);
+    }
+    if (plan.phases.empty()) {
+      throw config::ConfigError(
+          fmt::format("{}: under this configuration every phase is left out by its \"when\"", script_.path));
+    }
+    if (script_.limits.run_time) plan.limits.run_time_s = value(*script_.limits.run_time);
+    if (script_.limits.distance) plan.limits.distance_m = value(*script_.limits.distance);
+    return plan;
+  }
+
+ private:
+  [[nodiscard]] double value(const Number& number) const { return value_of(script_, number, keys_); }
+
+  [[nodiscard]] experiment::Profile profile(const CourseScript& script) const {
+    std::vector<experiment::Profile::Point> points;
+    points.reserve(script.points.size());
+    for (const auto& [time, number] : script.points) points.push_back({value(time), value(number)});
+    try {
+      return experiment::Profile(std::move(points), script.between);
+    } catch (const std::invalid_argument& error) {
+      throw config::ConfigError(fmt::format("{}: {}", script_.at(script.place), error.what()));
+    }
+  }
+  /// A constant into `constant`, anything else as a profile.
+  [[nodiscard]] experiment::Profile course_or(const std::optional<CourseScript>& script, double& constant) const {
+    if (!script) return {};
+    if (!script->constant()) return profile(*script);
+    constant = value(script->points.front().second);
+    return {};
+  }
+
+  [[nodiscard]] experiment::EndCondition condition(const ConditionScript& script) const {
+    experiment::EndCondition end{.kind = script.kind, .reason = reason_of(script.kind)};
+    if (script.kind == EndKind::all) {
+      for (const ConditionScript& part : script.parts) end.parts.push_back(condition(part));
+    } else if (script.kind != EndKind::standstill) {
+      end.value = value(script.value);
+    }
+    return end;
+  }
+
+  [[nodiscard]] experiment::PhasePlan planned(const PhaseScript& phase) const {
+    experiment::PhasePlan plan{.phase = kind_of(phase), .brake = phase.brake};
+    plan.motor_course = course_or(phase.motor, plan.motor_duty);
+    if (phase.brake == BrakeAction::slip_control) {
+      // A constant too: it stands in place of control.slip_ref.
+      if (phase.brake_course) plan.slip_ref_course = profile(*phase.brake_course);
+    } else {
+      plan.brake_course =
+          course_or(phase.brake_course, phase.brake == BrakeAction::duty ? plan.brake_duty : plan.brake_torque_Nm);
+    }
+    for (const ConditionScript& script : phase.until) {
+      if (!script.when || holds(*script.when, keys_)) plan.ends_on.push_back(condition(script));
+    }
+    if (plan.ends_on.empty()) {
+      throw config::ConfigError(fmt::format("{}: under this configuration phase \"{}\" has no end condition left",
+                                            script_.at(phase.place), phase.name));
+    }
+    plan.time_limit_s = time_limit_s(phase, plan);
+    if (phase.brake == BrakeAction::slip_control && !ends_above(settings_.control.v_min_m_s, plan)) {
+      // The laws are steep in 1 / v_x: below this speed no script keeps them on.
+      plan.ends_on.push_back(
+          {EndKind::car_speed_below, settings_.control.v_min_m_s, Reason::slip_control_left_at_low_speed});
+    }
+    return plan;
+  }
+
+  /// It ends by itself before the car is slower than that.
+  [[nodiscard]] static bool ends_above(double v_min_m_s, const experiment::PhasePlan& plan) {
+    return std::any_of(plan.ends_on.begin(), plan.ends_on.end(), [=](const experiment::EndCondition& end) {
+      return end.kind == EndKind::car_speed_below && end.value >= v_min_m_s;
+    });
+  }
+
+  [[nodiscard]] double time_limit_s(const PhaseScript& phase, const experiment::PhasePlan& plan) const {
+    if (phase.at_most) return value(*phase.at_most);
+    double longest_s = 0.0;
+    for (const experiment::EndCondition& end : plan.ends_on) {
+      if (end.kind == EndKind::duration) longest_s = std::max(longest_s, end.value);
+    }
+    return longest_s + duration_slack_s;
+  }
+
+  const Script& script_;
+  mutable config::Settings settings_;
+  config::KeyTable keys_;
+};
+
+double highest(const experiment::Profile& profile, double constant) {
+  double most = constant;
+  for (const experiment::Profile::Point& point : profile.points()) most = std::max(most, point.value);
+  return most;
+}
+
+}  // namespace
+
+double value_of(const Script& script, const Number& number, const config::KeyTable& keys) {
+  if (number.key.empty()) return number.value;
+  const config::Key* key = find(keys, number.key);
+  const double value = key == nullptr ? std::nan("") : number_of(*key).value_or(std::nan(""));
+  if (!number.range.contains(value)) {
+    throw config::ConfigError(fmt::format("{}: ${} is {} under this configuration; valid here is {}{}{}",
+                                          script.at(number.place), number.key, value, number.range.text(),
+                                          number.unit.empty() ? "" : " ", number.unit));
+  }
+  return value;
+}
+
+bool holds(const When& when, const config::KeyTable& keys) {
+  const config::Key* key = find(keys, when.key);
+  if (key == nullptr) return false;
+  if (const std::optional<double> value = number_of(*key)) {
+    const config::Value wanted = config::parse_value(*key, when.value);
+    const auto* whole = std::get_if<std::int64_t>(&wanted);
+    const double other = whole != nullptr ? static_cast<double>(*whole) : std::get<double>(wanted);
+    if (when.operation == "=") return *value == other;
+    if (when.operation == "!=") return *value != other;
+    if (when.operation == "<") return *value < other;
+    if (when.operation == ">") return *value > other;
+    return when.operation == "<=" ? *value <= other : *value >= other;
+  }
+  return (text_of(*key) == when.value) == (when.operation == "=");
+}
+
+Plan plan(const Script& script, const config::Settings& settings) { return Planner(script, settings).make(); }
+
+Plan plan(const config::Settings& settings) { return plan(*find(settings.experiment.name), settings); }
+
+void apply(const Script& script, config::Settings& s) {
+  const config::KeyTable keys(s);
+  const LimitsScript& limits = script.limits;
+  const auto tighten = [&](double& limit, const std::optional<Number>& wanted) {
+    if (wanted) limit = std::min(limit, value_of(script, *wanted, keys));
+  };
+  tighten(s.gate.overspeed_rad_s, limits.wheel_speed);
+  tighten(s.gate.motor_duty_max, limits.motor_duty);
+  tighten(s.gate.brake_duty_max, limits.brake_duty);
+  if (s.inject.empty()) {
+    for (const EventScript& event : script.events) {
+      if (!event.inject.empty()) s.inject += (s.inject.empty() ? "" : ",") + event.inject;
+    }
+  }
+  for (const ChangingPart& part : changing_parts()) {
+    if (part.profile(s).empty()) part.profile(s) = profile(script, part.what);
+  }
+}
+
+std::vector<std::string> beyond_limits(const Plan& plan, const config::Settings& s) {
+  std::vector<std::string> problems;
+  const double most_torque_Nm =
+      s.plant.ideal_actuator ? 1e9 : rig::brake_torque_at(s.plant.rig.brake, s.gate.brake_duty_max);
+  for (std::size_t i = 0; i < plan.phases.size(); ++i) {
+    const experiment::PhasePlan& phase = plan.phases[i];
+    const auto compare = [&](double wanted, double most, std::string_view what, std::string_view unit) {
+      if (wanted > most) {
+        problems.push_back(fmt::format("phase \"{}\": {} {:.6g}{} is more than {:.6g}{}", plan.phase_names[i], what,
+                                       wanted, unit, most, unit));
+      }
+    };
+    compare(highest(phase.motor_course, phase.motor_duty), s.gate.motor_duty_max, "motor duty", "");
+    compare(highest(phase.brake_course, phase.brake_torque_Nm) * (phase.brake == BrakeAction::torque ? 1.0 : 0.0),
+            most_torque_Nm, "brake torque", " N m");
+    compare(highest(phase.brake_course, phase.brake_duty) * (phase.brake == BrakeAction::duty ? 1.0 : 0.0),
+            s.gate.brake_duty_max, "brake duty", "");
+    for (const experiment::EndCondition& end : phase.ends_on) {
+      if (end.kind == EndKind::upper_speed_above || end.kind == EndKind::lower_speed_above) {
+        compare(end.value, s.gate.overspeed_rad_s, "speed to wait for", " rad/s");
+      }
+      if (end.kind == EndKind::car_speed_above) {
+        compare(end.value / s.plant.rig.wheels.r2_m, s.gate.overspeed_rad_s, "speed to wait for", " rad/s");
+      }
+    }
+  }
+  return problems;
+}
+
+}  // namespace abs_hil::config

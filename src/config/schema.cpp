@@ -1,0 +1,123 @@
+#include <set>
+
+#include "config/explain.hpp"
+#include "config/grammar.hpp"
+
+namespace abs_hil::config {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const Json reference{{"type", "string"}, {"pattern", "^\\$[a-z]"}, {"description", "value of a configuration key"}};
+
+Json bounds(const config::Range& range) {
+  return {{"type", "number"},
+          {range.least_open ? "exclusiveMinimum" : "minimum", range.least},
+          {range.most_open ? "exclusiveMaximum" : "maximum", range.most}};
+}
+
+/// A name for "$defs": letters alone.
+std::string definition_of(const Grammar& grammar) {
+  std::string name;
+  for (const char c : grammar.title) {
+    if ((c >= 'a' && c <= 'z') || c == ' ') name += c == ' ' ? '_' : c;
+  }
+  return name;
+}
+
+Json pointer_to(const Grammar& grammar) { return {{"$ref", "#/$defs/" + definition_of(grammar)}}; }
+
+Json with_unit(const Field& field) {
+  return {{"type", "string"}, {"description", "a number with one of the units " + units_text(field.quantity)}};
+}
+
+Json number(const Field& field, bool unit_is_named) {
+  const bool plain = field.quantity == Quantity::none;
+  if (unit_is_named) return {{"anyOf", {bounds(field.range), reference}}};
+  if (plain) return {{"anyOf", {bounds(field.range), with_unit(field), reference}}};
+  return {{"anyOf", {with_unit(field), reference}}};
+}
+
+Json list_of(Json items) { return {{"type", "array"}, {"items", std::move(items)}, {"minItems", 1}}; }
+
+Json value_of(const Field& field, bool unit_is_named) {
+  switch (field.shape) {
+    case Shape::text:
+    case Shape::condition: return {{"type", "string"}};
+    case Shape::choice: return {{"enum", field.allowed}};
+    case Shape::flag_true: return {{"const", true}};
+    case Shape::number: return number(field, unit_is_named);
+    case Shape::whole: {
+      Json json = bounds(field.range);
+      json["type"] = "integer";
+      return json;
+    }
+    case Shape::wholes: {
+      Json json = bounds(field.range);
+      json["type"] = "integer";
+      return list_of(std::move(json));
+    }
+    case Shape::motor:
+    case Shape::profile: {
+      Json json = number(field, unit_is_named);
+      json["anyOf"].push_back(pointer_to(profile_grammar()));
+      if (field.shape == Shape::motor) json["anyOf"].push_back({{"const", "off"}});
+      return json;
+    }
+    case Shape::brake: return {{"anyOf", {{{"enum", field.allowed}}, pointer_to(*field.grammar)}}};
+    case Shape::table: return pointer_to(*field.grammar);
+    case Shape::tables: return list_of(pointer_to(*field.grammar));
+    case Shape::points:
+      return list_of(
+          {{"type", "array"}, {"minItems", 2}, {"maxItems", 2}, {"items", {{"type", {"number", "string"}}}}});
+    case Shape::settings:
+    case Shape::grid: return {{"type", "object"}};
+  }
+  return {};
+}
+
+Json table(const Grammar& grammar) {
+  Json properties = Json::object();
+  Json required = Json::array();
+  for (const Field& field : grammar.fields) {
+    const auto add = [&](const std::string& name, bool unit_is_named) {
+      Json json = value_of(field, unit_is_named);
+      json["description"] = field.meaning;
+      properties[name] = std::move(json);
+    };
+    add(std::string(field.name), false);
+    if (field.quantity != Quantity::none) add(std::string(field.name) + std::string(suffix_of(field.quantity)), true);
+    if (field.required) required.push_back(field.name);
+  }
+  Json json{{"type", "object"}, {"description", grammar.meaning}, {"properties", std::move(properties)}};
+  if (!required.empty()) json["required"] = std::move(required);
+  json["additionalProperties"] = false;
+  return json;
+}
+
+void define(const Grammar& grammar, Json& definitions) {
+  const std::string name = definition_of(grammar);
+  if (definitions.contains(name)) return;
+  definitions[name] = table(grammar);
+  for (const Field& field : grammar.fields) {
+    if (field.grammar != nullptr) define(*field.grammar, definitions);
+  }
+}
+
+}  // namespace
+
+Json schema() {
+  Json json{{"$schema", "https://json-schema.org/draft/2020-12/schema"}, {"title", "Experiment of abs_hil"}};
+  json.update(table(script_grammar()));
+  Json definitions = Json::object();
+  for (const Field& field : script_grammar().fields) {
+    if (field.grammar != nullptr) define(*field.grammar, definitions);
+  }
+  define(steps_grammar(), definitions);
+  define(profile_grammar(), definitions);
+  json["$defs"] = std::move(definitions);
+  return json;
+}
+
+}  // namespace abs_hil::config

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "abs_hil/control/slip_error_dynamics.hpp"
+#include "control/slip_error_integral.hpp"
+#include "control/theta_estimator.hpp"
+
+namespace abs_hil::control {
+
+/// Adaptive slip controller (17)-(18) of Theorem 3.1: the control law of (16) with theta_hat in the place of theta0,
+///   I' = e_v,   Tb = (J1/r1) ( -ks0 I - ks1 e_v + k(slip_ref) theta_hat phi(slip) + friction drift ),
+/// and theta_hat from ThetaEstimator, which is driven by the brake torque that acts, not by the one asked for. With an
+/// ideal actuator V = ([I; e_v]' P [I; e_v] + (theta - theta_hat)^2/gamma)/2 never grows.
+class AdaptiveController final : public SlipController {
+ public:
+  /// Throws std::invalid_argument for gains, Q or bounds of theta out of range.
+  explicit AdaptiveController(const ControllerContext& context);
+
+  void reset(const SlipInput& input) noexcept override;
+  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
+  [[nodiscard]] bool take_over(const SlipController& before) noexcept override;
+
+ private:
+  void adapt(const SlipInput& input, double past_phi) noexcept;
+
+  rig::WheelParameters wheels_;
+  rig::TyreParameters tyre_;
+  SlipErrorDynamics dynamics_;
+  SlipErrorIntegral integral_;
+  ThetaEstimator theta_;
+  Eigen::RowVector2d error_weights_;  ///< B'P of (17)
+  double omega1_rad_s_{0.0};          ///< of the cycle before, as is the slip
+  double slip_{0.0};
+};
+
+}  // namespace abs_hil::control

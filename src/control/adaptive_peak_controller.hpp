@@ -1,0 +1,51 @@
+#pragma once
+
+#include "abs_hil/control/slip_error_dynamics.hpp"
+#include "abs_hil/control/wheel_motion.hpp"
+#include "control/slip_error_integral.hpp"
+#include "control/slip_peak_estimator.hpp"
+#include "control/wheel_force_observer.hpp"
+
+namespace abs_hil::control {
+
+/// Brakes at the slip of the largest tyre force without being told theta, B, C or a slip reference
+/// (docs/theory-beyond.md): WheelForceObserver gives speeds and tyre force from encoders and brake, SlipPeakEstimator
+/// the peak from slip and force, and the slip loop follows it plus a small sinusoidal search. The loop is that of (16)
+/// with the observed force in the place of theta phi, carried through the brake's lag as in
+/// AdaptiveActuatorController. `rig.tyre` is not looked at. theta_est_N is the estimated peak force, slip_ref its own.
+class AdaptivePeakController final : public SlipController {
+ public:
+  /// Throws std::invalid_argument for options out of range.
+  explicit AdaptivePeakController(const ControllerContext& context);
+
+  void reset(const SlipInput& input) noexcept override;
+  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
+
+ private:
+  /// The slip asked for now, and how fast it changes.
+  struct Reference {
+    double slip;
+    double rate_per_s;
+  };
+
+  void learn(double dt_s, double slip) noexcept;
+  [[nodiscard]] Reference next_reference(double dt_s) noexcept;
+  [[nodiscard]] double command_Nm(const SlipInput& input, double slip, const Reference& reference,
+                                  double error_m_s) const noexcept;
+
+  AdaptivePeakOptions options_;
+  rig::WheelParameters wheels_;
+  BrakeLag lag_;
+  double v_min_m_s_;
+  double period_s_;
+  WheelForceObserver observer_;
+  SlipPeakEstimator peak_;
+  SlipErrorIntegral integral_;
+  double centre_{0.0};  ///< of the search
+  double time_s_{0.0};  ///< since the start of braking
+  /// Slip behind two equal lags that together delay it as long as the force estimate.
+  double half_late_slip_{0.0};
+  double late_slip_{0.0};
+};
+
+}  // namespace abs_hil::control

@@ -1,0 +1,26 @@
+#pragma once
+
+#include "control/sliding_surface.hpp"
+
+namespace abs_hil::control {
+
+/// Sliding-mode slip control, the kind of controller that the paper compares itself with:
+///   Tb = (J1/r1) ( k(slip_ref) theta_hat phi(slip) + friction drift - K sign(e_v) ),
+///   theta_hat' = -gamma k(slip_ref) phi(slip) sign(e_v), projected.
+/// The law and the gains of the paper's own baseline are not public; this is the textbook one for its error (13), not a
+/// copy. The sign is held for a period, so e_v chatters within about K periods of 0: that is the law, not a flaw here.
+class SlidingModeController final : public SlipController {
+ public:
+  /// Throws std::invalid_argument for options out of range.
+  explicit SlidingModeController(const ControllerContext& context);
+
+  void reset(const SlipInput& input) noexcept override { surface_.reset(input); }
+  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
+  [[nodiscard]] bool take_over(const SlipController& before) noexcept override;
+
+ private:
+  SlidingSurface surface_;
+  double gain_m_s2_;
+};
+
+}  // namespace abs_hil::control

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "diagnosis/machine_facts.hpp"
+#include "rig/timing_summary.hpp"
+
+namespace abs_hil::diagnosis {
+
+/// What `abs_hil latency` measured.
+struct LatencyRun {
+  double rate_Hz{0.0};
+  double duration_s{0.0};
+  std::uint64_t cycles{0};
+  bool realtime{false};
+  rig::TimingSummary timing{};
+};
+
+/// How well a computer keeps time.
+enum class Grade : std::uint8_t { very_good, good, usable, unfit };
+[[nodiscard]] std::string_view name_of(Grade grade) noexcept;
+
+/// A grade and what it rests on.
+struct Verdict {
+  Grade jitter{Grade::unfit};    ///< worst wake-up: LinuxCNC's < 20 us very nice, 20-50 good, > 500 unacceptable
+  double in_time{0.0};           ///< share of the ticks that were met, in [0, 1]: libfranka warns below 0.95
+  double left_for_control{0.0};  ///< share of the period left after worst wake-up and p99.9 of the cycle;
+                                 ///< ros2_control's users ask for 0.8
+  Grade overall{Grade::unfit};   ///< the worst of the three
+};
+[[nodiscard]] Verdict judge(const LatencyRun& run) noexcept;
+
+/// Figures, verdict and the machine's facts beside them, for people.
+[[nodiscard]] std::string to_text(const LatencyRun& run, const MachineFacts& facts);
+/// The same for programs.
+[[nodiscard]] nlohmann::ordered_json to_json(const LatencyRun& run, const MachineFacts& facts);
+
+}  // namespace abs_hil::diagnosis

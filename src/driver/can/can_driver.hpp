@@ -1,0 +1,143 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abs_hil/driver/rig_driver.hpp"
+#include "driver/can/answer_tracker.hpp"
+#include "driver/can/link.hpp"
+#include "driver/can/messages.hpp"
+#include "driver/can/options.hpp"
+#include "driver/loss_bucket.hpp"
+
+namespace abs_hil::driver::can {
+
+/// What came and did not come, since `configure`.
+struct CanCounters {
+  std::uint64_t cycles{0};  ///< SYNCs
+  std::uint64_t lost{0};    ///< without a whole answer in time
+  std::uint64_t stale{0};   ///< frames, as all below
+  std::uint64_t duplicates{0};
+  std::uint64_t out_of_order{0};
+  std::uint64_t wrong_length{0};
+  std::uint64_t forged{0};
+  std::uint64_t implausible{0};
+  std::uint64_t ignored{0};  ///< identifiers that are none of the node's
+  std::uint64_t queue_full{0};
+  std::uint64_t error_frames{0};
+  std::uint64_t error_warnings{0};
+  std::uint64_t dropped_by_kernel{0};
+  std::uint64_t rejected_by_node{0};
+  std::int64_t longest_answer_ns{0};
+};
+
+/// The rig behind a CAN I/O node (docs/can.md). Not verified on hardware.
+///
+/// One cycle: `read` sends ABS_SYNC and waits for the answer, at most `driver.can.answer_timeout_us`; `write` sends
+/// ABS_COMMAND and does not wait. Single losses are borne (the measurement before is handed out again, with its time
+/// stamp); sustained loss, and every state of the bus in which the node cannot be reached, fails `read` or `write` with
+/// a reason of its own. Without commands the node's watchdog takes the outputs to zero.
+class CanDriver final : public RigDriver {
+ public:
+  using OpenLink = std::function<Link()>;
+  /// Throws std::invalid_argument, naming the key, if an option is outside its range.
+  /// @param open_link  called by `configure`; throws Unavailable
+  /// @param lock_step  the node is an emulator whose time is driven by this driver's; refused by any other node
+  CanDriver(const CanOptions& options, OpenLink open_link, bool lock_step);
+  ~CanDriver() override;
+
+  [[nodiscard]] std::string_view name() const noexcept override { return "can"; }
+  [[nodiscard]] std::vector<std::string> notes() const override;
+  [[nodiscard]] std::vector<std::string> tally() const override;
+  [[nodiscard]] std::string_view what_holds_unsafe() const noexcept override {
+    return "the node's watchdog should have zeroed them, if the node works";
+  }
+  [[nodiscard]] std::vector<std::string> inspection() override;
+  [[nodiscard]] std::int64_t make_safe_bound_ns() const noexcept override;
+  [[nodiscard]] const CanCounters& counters() const noexcept { return counters_; }
+
+ private:
+  void do_configure() override;
+  void do_activate(std::int64_t now_ns) override;
+  IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override;
+  IoResult do_write(const rig::Command& command) noexcept override;
+  IoResult do_make_safe() noexcept override;
+
+  // The handshake.
+  void identify();
+  [[nodiscard]] IoResult deactivate_node() noexcept;
+  [[nodiscard]] IoResult activate_node() noexcept;
+  [[nodiscard]] bool await(bool (CanDriver::*heard)(const NodeMessage&) noexcept, std::int64_t timeout_ns) noexcept;
+  [[nodiscard]] bool hears_identity(const NodeMessage& message) noexcept;
+  [[nodiscard]] bool hears_safe(const NodeMessage& message) noexcept;
+  [[nodiscard]] bool hears_active(const NodeMessage& message) noexcept;
+
+  // One cycle.
+  [[nodiscard]] IoResult exchange(std::int64_t now_ns) noexcept;
+  [[nodiscard]] IoResult send_sync(std::int64_t now_ns) noexcept;
+  [[nodiscard]] IoResult collect() noexcept;
+  [[nodiscard]] IoResult take(const Frame& frame) noexcept;
+  [[nodiscard]] IoResult take_error_frame(const Frame& frame) noexcept;
+  void take_message(const NodeMessage& message) noexcept;
+  void take_status(const StatusMessage& status) noexcept;
+  void take_outputs(const OutputsMessage& outputs) noexcept;
+  void take_outputs(RawDuties applied, std::uint8_t command_sequence) noexcept;
+  void note(Anomaly anomaly) noexcept;
+  void count(Anomaly anomaly) noexcept;
+  void watch_drops() noexcept;
+  [[nodiscard]] IoResult judge(std::int64_t now_ns) noexcept;
+  [[nodiscard]] IoResult judge_answer(std::int64_t now_ns) noexcept;
+  [[nodiscard]] IoResult tripped() noexcept;
+  [[nodiscard]] bool advance_counts(const Answer& answer, std::int64_t elapsed_ns) noexcept;
+  [[nodiscard]] std::int64_t latch_time_ns(const Answer& answer, std::int64_t now_ns) const noexcept;
+  [[nodiscard]] IoResult sent(const SendResult& result, std::uint32_t identifier) noexcept;
+  void send_zero() noexcept;
+  [[nodiscard]] Frame in_format(Frame frame) const noexcept;
+
+  CanOptions options_;
+  OpenLink open_link_;
+  bool lock_step_;
+  std::int64_t answer_timeout_ns_;
+  Link link_{};
+  bool fd_{false};
+  IdentityMessage identity_{};
+  CanCounters counters_{};
+
+  // Of the handshake.
+  bool heard_state_{false};
+  bool heard_outputs_{false};
+
+  // Of the cycle.
+  LossBucket bucket_;
+  AnswerTracker tracker_{};
+  std::uint8_t sync_{0};
+  std::int64_t sent_ns_{0};
+  std::int64_t received_ns_{0};
+  Anomaly worst_{Anomaly::none};
+  std::uint32_t worst_id_{0};
+  std::uint32_t drops_seen_{0};
+  std::uint8_t rejected_seen_{0};
+
+  // What is known of the rig.
+  bool any_answer_{false};
+  std::array<std::int32_t, 2> raw_counts_{};  ///< upper, lower, as the node has them
+  std::array<std::int32_t, 2> counts_{};      ///< 32 bits, with their signs
+  std::uint32_t node_time_us_{0};
+  std::int64_t latched_ns_{0};
+  double supply_V_{rig::unknown};
+  double temperature_C_{rig::unknown};
+  std::uint32_t trip_flags_{0};
+
+  // What was commanded, by sequence.
+  std::uint8_t command_sequence_{0};
+  std::array<RawDuties, 256> commanded_{};
+  bool outputs_known_{false};
+  RawDuties applied_{};
+  std::uint8_t applied_sequence_{0};
+};
+
+}  // namespace abs_hil::driver::can

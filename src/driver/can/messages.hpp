@@ -1,0 +1,102 @@
+#pragma once
+
+#include <cstdint>
+#include <variant>
+
+#include "driver/can/frame.hpp"
+#include "driver/can/protocol.hpp"
+
+namespace abs_hil::driver::can {
+
+// What the host sends, as frames with check.
+
+[[nodiscard]] Frame time_frame(std::int64_t host_time_ns) noexcept;
+[[nodiscard]] Frame sync_frame(std::uint8_t sequence) noexcept;
+
+/// Duties in steps of 0.0001.
+struct RawDuties {
+  std::uint16_t brake{0};
+  std::uint16_t drive{0};
+  [[nodiscard]] bool operator==(const RawDuties&) const = default;
+};
+struct CommandMessage {
+  RawDuties duties{};
+  bool drive_enable{false};
+  std::uint8_t heartbeat{0};  ///< sequence of the measurement that it was computed from
+  std::uint8_t sequence{0};
+};
+[[nodiscard]] Frame command_frame(const CommandMessage& command) noexcept;
+
+struct ControlMessage {
+  Request request{Request::identify};
+  std::uint16_t nonce{0};        ///< of the node's latest ABS_IDENTITY
+  std::uint16_t watchdog_ms{0};  ///< 0: as it is
+  std::uint8_t sequence{0};      ///< the first command has the next one
+};
+[[nodiscard]] Frame control_frame(const ControlMessage& control) noexcept;
+
+// What the node sends. Every field is within its signal's range.
+
+struct StatusMessage {
+  std::uint32_t trip_flags{0};
+  NodeState state{NodeState::inactive};
+  LatchReason latch_reason{LatchReason::none};
+  double supply_V{0.0};       ///< NaN: the node does not know
+  double temperature_C{0.0};  ///< NaN: the node does not know
+  std::uint8_t sequence{0};   ///< of the SYNC it came with
+};
+struct OutputsMessage {
+  RawDuties applied{};
+  std::uint8_t rejected{0};          ///< commands rejected since power-on, modulo 256
+  std::uint8_t command_sequence{0};  ///< of the last command accepted
+  std::uint8_t sequence{0};
+};
+struct EncodersMessage {
+  std::int32_t upper_counts{0};  ///< 24 bits, wrapping
+  std::int32_t lower_counts{0};
+  std::uint8_t sequence{0};
+};
+struct LatchMessage {
+  std::uint32_t node_time_us{0};  ///< node's clock when it latched the counters
+  std::int32_t lever_counts{0};   ///< 12 bits, wrapping
+  NodeState state{NodeState::inactive};
+  std::uint8_t sequence{0};
+};
+/// CAN FD: encoders, latch and outputs in one.
+struct MeasurementMessage {
+  std::int32_t upper_counts{0};
+  std::int32_t lower_counts{0};
+  std::int32_t lever_counts{0};
+  std::uint32_t node_time_us{0};
+  RawDuties applied{};
+  std::uint32_t trip_flags{0};
+  NodeState state{NodeState::inactive};
+  std::uint8_t command_sequence{0};
+  std::uint8_t sequence{0};
+};
+struct IdentityMessage {
+  std::uint8_t protocol{0};
+  std::uint8_t features{0};
+  std::uint16_t nonce{0};
+  std::uint16_t watchdog_ms{0};
+};
+
+enum class DecodeError : std::uint8_t {
+  none = 0,
+  unknown_identifier,  ///< none of the node's messages
+  wrong_length,        ///< not the message's length, or a format (classic, FD) it does not come in
+  wrong_check,         ///< the check does not match: not from a node of this protocol, or damaged on the way
+  out_of_range,        ///< a signal holds what it cannot
+};
+
+using NodeMessage = std::variant<std::monostate, StatusMessage, OutputsMessage, EncodersMessage, LatchMessage,
+                                 MeasurementMessage, IdentityMessage>;
+
+struct Decoded {
+  DecodeError error{DecodeError::none};
+  NodeMessage message{};  ///< monostate on error
+};
+/// Any frame at all, to a node's message or an error. Real-time safe.
+[[nodiscard]] Decoded decode(const Frame& frame) noexcept;
+
+}  // namespace abs_hil::driver::can

@@ -1,0 +1,88 @@
+#include "guardian/guardian_loop.hpp"
+
+#include <algorithm>
+
+#include "abs_hil/rig/time_units.hpp"
+
+namespace abs_hil::guardian {
+
+namespace {
+
+/// A killed process ends within microseconds, unless the kernel is in the midst of an access of its.
+constexpr std::int64_t end_wait_ns = 5'000'000;
+constexpr int quick_tries = 100;
+constexpr std::int64_t quick_pause_ns = 1'000'000;
+constexpr std::int64_t slow_pause_ns = 50'000'000;
+
+/// Eight looks in the time of the timeout: an eighth more at worst until it is noticed.
+std::int64_t look_period_for(std::int64_t timeout_ns) noexcept {
+  constexpr std::int64_t shortest_ns = 250'000;
+  constexpr std::int64_t longest_ns = 5'000'000;
+  return std::clamp(timeout_ns / 8, shortest_ns, longest_ns);
+}
+
+}  // namespace
+
+GuardianLoop::GuardianLoop(runtime::Clock& clock, ControllerProcess& controller, SharedRegion& region,
+                           driver::SafeStateWriter& writer, const GuardianOptions& options) noexcept
+    : clock_(clock),
+      controller_(controller),
+      region_(region),
+      writer_(writer),
+      timeout_ns_(static_cast<std::int64_t>(options.timeout_ms * rig::ns_per_ms)),
+      insist_ns_(static_cast<std::int64_t>(options.insist_s * rig::ns_per_s)),
+      look_period_ns_(look_period_for(timeout_ns_)),
+      watchdog_(timeout_ns_, look_period_ns_, writer.owner_needs_ns()) {}
+
+GuardianReport GuardianLoop::run() noexcept {
+  std::int64_t next_look_ns = clock_.now_ns();
+  std::uint64_t beats = 0;
+  for (;;) {
+    next_look_ns = std::max(next_look_ns + look_period_ns_, clock_.now_ns());
+    HeartbeatReading sight{};
+    sight.controller_gone = controller_.gone_by(next_look_ns);
+    region_.panel().guardian_beats.store(++beats, std::memory_order_relaxed);
+    // What the controller said last, which is final if it is gone.
+    sight.stage = region_.stage();
+    sight.cycle_beats = region_.panel().cycle_beats.load(std::memory_order_relaxed) +
+                        region_.panel().safe_beats.load(std::memory_order_relaxed);
+    sight.now_ns = clock_.now_ns();
+    const Verdict verdict = watchdog_.look(sight);
+    if (verdict == Verdict::wait) continue;
+
+    GuardianReport report{
+        .reason = watchdog_.reason(), .silence_ns = watchdog_.silence_ns(), .noticed_ns = sight.now_ns};
+    if (sight.controller_gone) report.controller_gone_ns = sight.now_ns;
+    if (verdict == Verdict::make_safe) make_safe(report, sight.stage == Stage::handed_over);
+    return report;
+  }
+}
+
+void GuardianLoop::make_safe(GuardianReport& report, bool handed_over) noexcept {
+  report.acted = true;
+  if (watchdog_.must_end_controller()) controller_.end();
+  bool gone = handed_over || controller_.gone_by(clock_.now_ns() + end_wait_ns);
+  const std::int64_t give_up_ns = clock_.now_ns() + insist_ns_;
+  for (;;) {
+    if (gone && !handed_over && report.controller_gone_ns == 0) report.controller_gone_ns = clock_.now_ns();
+    const driver::IoResult result = writer_.make_safe();
+    ++report.tries;
+    const std::int64_t now_ns = clock_.now_ns();
+    if (report.tries == 1) report.first_written_ns = now_ns;
+    if (!result.ok()) report.last_error = result;
+    if (result.ok() && gone) {
+      report.verified = true;
+      report.verified_ns = now_ns;
+      return;
+    }
+    if (now_ns >= give_up_ns) return;
+    const std::int64_t next_ns = now_ns + (report.tries < quick_tries ? quick_pause_ns : slow_pause_ns);
+    if (gone) {
+      clock_.sleep_until(next_ns);
+    } else {
+      gone = controller_.gone_by(next_ns);
+    }
+  }
+}
+
+}  // namespace abs_hil::guardian

@@ -1,0 +1,107 @@
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <iostream>
+#include <optional>
+#include <string>
+
+#include "driver/factory.hpp"
+#include "experiment/commissioning.hpp"
+#include "program/exit_status.hpp"
+#include "program/run_monitor.hpp"
+#include "program/signals.hpp"
+#include "program/subcommands.hpp"
+
+namespace abs_hil::program {
+
+namespace {
+
+/// Questions on stdout, answers from stdin.
+class Terminal final : public experiment::Dialog {
+ public:
+  void tell(const std::string& text) override {
+    fmt::print("{}\n", text);
+    std::fflush(stdout);
+  }
+  bool ask(const std::string& question) override {
+    tell("\n" + question + " [y/N]");
+    std::string answer;
+    return std::getline(std::cin, answer) && (answer == "y" || answer == "Y" || answer == "yes");
+  }
+  bool wait_until_done(const std::string& text) override {
+    tell(text);
+    std::string line;
+    return static_cast<bool>(std::getline(std::cin, line));
+  }
+};
+
+/// A guardian for each pulse: at other times the outputs are 0 and the program waits for a person, silently.
+class GuardedPulse final : public experiment::PulseGuard {
+ public:
+  GuardedPulse(const RunRequest& request, driver::RigDriver& driver) : request_(request), driver_(driver) {}
+  ~GuardedPulse() override { driver_.tell_before_making_safe(nullptr); }
+
+  void begin() override {
+    if (!wants_guardian(request_)) return;
+    region_.emplace(1);
+    watch_.emplace(region_->panel(), region_->recorder());
+    guardian_.emplace(*region_, guardian::guardian_program(), guardian_brief(request_, {}));
+    guardian_->stand_guard();
+    driver_.tell_before_making_safe(&*guardian_);
+  }
+  [[nodiscard]] bool beat() noexcept override {
+    if (!guardian_ || !watch_) return true;
+    watch_->beat();
+    return guardian_->alive();
+  }
+  void end(bool safe) noexcept override {
+    if (!guardian_) return;
+    driver_.tell_before_making_safe(nullptr);
+    guardian_->outputs_released(safe);
+    static_cast<void>(guardian_->end());
+    guardian_.reset();
+  }
+
+ private:
+  const RunRequest& request_;
+  driver::RigDriver& driver_;
+  // The guardian goes before what it works on.
+  std::optional<guardian::SharedRegion> region_{};
+  std::optional<runtime::Heartbeat> watch_{};
+  std::optional<guardian::GuardianProcess> guardian_{};
+};
+
+}  // namespace
+
+int commission(const RunRequest& request, const experiment::CommissioningOptions& options) {
+  const driver::DriverOptions& driver_options = request.settings.driver;
+  const auto driver = driver::make_rig_driver(driver_options);
+  runtime::MonotonicClock clock;
+  Terminal terminal;
+  note_signals();
+  terminal.tell(
+      "Commissioning, in four steps, each asked for first. docs/rig-setup.md says what must be done before.\n"
+      "The E-stop cuts the drive only, not the brake. A guardian stands by during each pulse (docs/dead-man.md).");
+  GuardedPulse guard(request, *driver);
+  experiment::Commissioning commissioning(*driver, clock, terminal, guard, options,
+                                          [] { return signalled() != rig::Reason::none; });
+  switch (commissioning.run()) {
+    case experiment::CommissioningResult::passed:
+      terminal.tell(driver_options.emulated
+                        ? "All four steps passed, on an emulator: that says nothing about hardware."
+                        : "All four steps passed. Go on with docs/rig-setup.md, \"What is not verified\", and then set "
+                          "driver.verified_on_hardware=true in your configuration.");
+      return exit_completed;
+    case experiment::CommissioningResult::declined:
+      terminal.tell("Stopped as you wished; the outputs are safe.");
+      return exit_ended_early;
+    case experiment::CommissioningResult::failed: return exit_ended_early;
+    case experiment::CommissioningResult::interrupted:
+      return signalled() == rig::Reason::interrupt_signal ? exit_interrupted
+             : signalled() == rig::Reason::hangup_signal  ? exit_hung_up
+                                                          : exit_terminated;
+  }
+  return exit_ended_early;
+}
+
+}  // namespace abs_hil::program

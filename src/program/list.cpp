@@ -1,0 +1,64 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+
+#include "abs_hil/control/registry.hpp"
+#include "config/config_file.hpp"
+#include "config/key_table.hpp"
+#include "config/library.hpp"
+#include "driver/factory.hpp"
+#include "program/exit_status.hpp"
+#include "program/subcommands.hpp"
+
+namespace abs_hil::program {
+
+namespace {
+
+void print(std::string_view name, std::string_view summary) { fmt::print("  {:<20}{}\n", name, summary); }
+
+std::string value_of(const config::Key& key) {
+  return std::visit([](const auto* value) { return fmt::format("{}", *value); }, key.target);
+}
+
+std::string valid_of(const config::Key& key) {
+  if (std::holds_alternative<bool*>(key.target)) return "true or false";
+  if (!std::holds_alternative<std::string*>(key.target)) return key.range.text();
+  return key.allowed.empty() ? "text" : fmt::format("{}", fmt::join(key.allowed, " | "));
+}
+
+void list_keys() {
+  config::Settings settings;
+  const config::KeyTable table(settings);
+  std::size_t name_width = 0, value_width = 0;
+  for (const config::Key& key : table.keys()) {
+    name_width = std::max(name_width, key.name.size());
+    value_width = std::max(value_width, value_of(key).size());
+  }
+  for (const config::Key& key : table.keys()) {
+    fmt::print("{:<{}}  {:<{}}  {}{}{}; {}\n", key.name, name_width, value_of(key), value_width, valid_of(key),
+               key.unit.empty() ? "" : " ", key.unit, key.meaning);
+  }
+}
+
+}  // namespace
+
+int list(bool keys) {
+  if (keys) {
+    list_keys();
+    return exit_completed;
+  }
+  fmt::print("controllers\n");
+  for (const auto& entry : control::controllers()) print(entry.name, entry.summary);
+  fmt::print("plants\n");
+  for (const auto& entry : config::known_plants()) print(entry.name, entry.description);
+  fmt::print("experiments\n");
+  for (const auto& script : config::known_experiments()) print(script->name, script->description);
+  fmt::print("backends\n");
+  for (const auto& entry : driver::backends()) print(entry.name, entry.summary);
+  fmt::print("boards (driver.kind of backend rig; none of them verified on hardware)\n");
+  for (const auto& entry : driver::boards()) print(entry.name, entry.summary);
+  return exit_completed;
+}
+
+}  // namespace abs_hil::program

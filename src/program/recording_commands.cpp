@@ -1,0 +1,94 @@
+#include "program/recording_commands.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <utility>
+
+#include "config/config_error.hpp"
+#include "program/exit_status.hpp"
+#include "replay/check.hpp"
+#include "replay/report.hpp"
+#include "telemetry/csv_sink.hpp"
+
+namespace abs_hil::program {
+
+void add_replay(CLI::App& cli, ReplayCommand& command) {
+  command.parser = cli.add_subcommand("replay", "a recorded run through its own or another controller, open loop");
+  command.parser
+      ->add_option("recording", command.recording, "event log (--log), or CSV that abs_hil convert made of it")
+      ->type_name("LOG")
+      ->required();
+  auto* check = command.parser->add_flag("--check", command.check,
+                                         "run the recorded configuration again: are its commands bit-equal?");
+  command.parser->add_option("--controller", command.changes.controller, "another slip controller")
+      ->type_name("NAME")
+      ->excludes(check);
+  command.parser->add_option("--set", command.changes.assignments, "change a recorded configuration value")
+      ->type_name("key=value")
+      ->take_all()
+      ->allow_extra_args(false)
+      ->excludes(check);
+  command.parser->add_option("--csv", command.csv_file, "write what it would have commanded, with the columns of a run")
+      ->type_name("FILE")
+      ->excludes(check);
+}
+
+namespace {
+
+int check_again(const replay::RecordedRun& run) {
+  const replay::CheckResult result = replay::check(run);
+  for (const std::string& line : result.lines) fmt::print("{}\n", line);
+  if (result.equal) return exit_completed;
+  fmt::print(stderr,
+             "abs_hil: the recorded commands do not come out again: another version, another machine, or a "
+             "damaged recording\n");
+  return exit_ended_early;
+}
+
+}  // namespace
+
+int replay_run(const ReplayCommand& command) {
+  try {
+    const replay::RecordedRun run = replay::read_run(command.recording);
+    if (command.check) return check_again(run);
+    const config::Settings settings = replay::settings_of(run, command.changes);
+    const std::vector<replay::RerunCycle> rerun =
+        replay::rerun_open_loop(run, settings, replay::WheelFaults::as_recorded);
+    fmt::print("{}", replay::report(run, settings, rerun));
+    if (command.csv_file) {
+      telemetry::CsvSink csv(*command.csv_file);
+      for (const replay::RerunCycle& cycle : rerun) csv.consume(cycle.record, cycle.distance_m);
+      csv.finish();
+    }
+    return exit_completed;
+  } catch (const telemetry::RecordingError& error) {
+    throw config::ConfigError(error.what());
+  }
+}
+
+void add_convert(CLI::App& cli, ConvertCommand& command) {
+  command.parser = cli.add_subcommand("convert", "an event log (.lcmlog) to CSV or back, without loss");
+  command.parser->add_option("from", command.from, "event log or CSV")->type_name("IN")->required();
+  command.parser->add_option("to", command.to, "CSV or event log")->type_name("OUT")->required();
+}
+
+int convert(const ConvertCommand& command) {
+  const bool from_csv = std::filesystem::path(command.from).extension() == ".csv";
+  const bool to_csv = std::filesystem::path(command.to).extension() == ".csv";
+  if (from_csv == to_csv) {
+    throw config::ConfigError("convert: one of IN and OUT must end in .csv, the other is the event log");
+  }
+  try {
+    const telemetry::ConversionCounts counts =
+        from_csv ? telemetry::csv_to_log(command.from, command.to) : telemetry::log_to_csv(command.from, command.to);
+    fmt::print("{} events", counts.events);
+    if (counts.raw > 0) fmt::print(", {} of them of no type of ours, as hexadecimal digits", counts.raw);
+    fmt::print("\n");
+    return exit_completed;
+  } catch (const telemetry::RecordingError& error) {
+    throw config::ConfigError(error.what());
+  }
+}
+
+}  // namespace abs_hil::program

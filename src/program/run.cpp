@@ -1,0 +1,235 @@
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "analysis/run_metrics.hpp"
+#include "analysis/run_summary.hpp"
+#include "config/plan.hpp"
+#include "driver/factory.hpp"
+#include "experiment/run_session.hpp"
+#include "program/board_notes.hpp"
+#include "program/exit_status.hpp"
+#include "program/run_monitor.hpp"
+#include "program/run_outputs.hpp"
+#include "program/run_parts.hpp"
+#include "program/signals.hpp"
+#include "program/subcommands.hpp"
+#include "runtime/overrun_reporter.hpp"
+#include "telemetry/file_error.hpp"
+
+namespace abs_hil::program {
+
+namespace {
+
+std::string reason_text(const experiment::RunOutcome& outcome) {
+  std::string text(rig::description(outcome.reason));
+  if (rig::is_fault(outcome.reason)) text += fmt::format(" (value {:.6g})", outcome.reason_value);
+  if (!outcome.io_error.ok()) {
+    text += ": " + driver::error_text(outcome.io_error);
+  }
+  return text;
+}
+
+analysis::RunSummary summarise(const RunRequest& request, const experiment::RunSession& session,
+                               const experiment::RunOutcome& outcome, const RunOutputs& outputs) {
+  const config::Settings& s = request.settings;
+  const std::string result = outcome.completed() ? "completed" : (rig::is_fault(outcome.reason) ? "fault" : "stopped");
+  return {.result = result,
+          .reason = reason_text(outcome),
+          .controller = s.control.controller,
+          .plant = s.plant_name,
+          .backend = s.backend,
+          .experiment = s.experiment.name,
+          .metrics = outputs.metrics(),
+          .cycles = session.executive().statistics().cycles(),
+          .telemetry_drops = session.record_drops(),
+          .publish_failures = outputs.publish_failures(),
+          .csv_rows_lost = outputs.csv_rows_lost(),
+          .realtime = outcome.realtime.realtime(),
+          .virtual_time = request.outputs.fast,
+          .truth_known = s.backend == "sim",
+          .timing = request.outputs.fast ? rig::TimingSummary{} : session.executive().statistics().summary(),
+          .gate = session.gate().counts(),
+          .config = nlohmann::ordered_json::parse(request.config_json),
+          .friction_curve = outputs.friction_curve_json()};
+}
+
+run_folder::RunEnvironment environment(const RunRequest& request, const driver::RigDriver& driver,
+                                       const experiment::RunOutcome& outcome) {
+  const config::Settings& s = request.settings;
+  return {.command_line = request.command_line,
+          .backend = s.backend,
+          .board = std::string(driver.name()),
+          .board_notes = driver.notes(),
+          .emulated = s.backend == "rig" && s.driver.emulated,
+          .virtual_time = request.outputs.fast,
+          .realtime = outcome.realtime.realtime(),
+          .realtime_shortcomings = request.outputs.fast ? std::string() : outcome.realtime.shortcomings()};
+}
+
+/// What a run in real time says about its timing while it goes on.
+class TimingWatch {
+ public:
+  TimingWatch(const RunRequest& request, const experiment::RunSession& session, runtime::OverrunReporter& reporter)
+      : session_(session),
+        reporter_(reporter),
+        real_time_wanted_(!request.outputs.fast && request.settings.realtime.mode != runtime::RealtimeMode::off) {}
+
+  void poll() {
+    if (std::exchange(real_time_wanted_, false)) {
+      const runtime::RealtimeReport& report = session_.realtime_report();
+      const std::string shortcomings = report.shortcomings();
+      if (!report.realtime()) {
+        spdlog::warn("NOT IN REAL TIME: late cycles, wrong brake torques are to be expected\n{}", shortcomings);
+      } else if (!shortcomings.empty()) {
+        spdlog::info("in real time, but not all that helps was obtained\n{}", shortcomings);
+      }
+    }
+    if (const auto late = reporter_.message(session_.executive().statistics().overruns())) spdlog::warn("{}", *late);
+  }
+
+ private:
+  const experiment::RunSession& session_;
+  runtime::OverrunReporter& reporter_;
+  bool real_time_wanted_;
+};
+
+}  // namespace
+
+int status_of(const experiment::RunOutcome& outcome) {
+  if (outcome.completed()) return exit_completed;
+  if (outcome.reason == rig::Reason::interrupt_signal) return exit_interrupted;
+  if (outcome.reason == rig::Reason::terminate_signal) return exit_terminated;
+  if (outcome.reason == rig::Reason::hangup_signal) return exit_hung_up;
+  return exit_ended_early;
+}
+
+std::string realtime_refusal(const runtime::RealtimeReport& report) {
+  return "--rt require: real time is not to be had on this machine; nothing has moved\n" + report.shortcomings();
+}
+
+namespace {
+
+/// As far as that can be told before it stands guard.
+void require_guardian(const RunRequest& request) {
+  if (!wants_guardian(request)) return;
+  static_cast<void>(driver::make_safe_state_writer(request.settings.driver));
+  const std::string program = guardian::guardian_program();
+  if (::access(program.c_str(), X_OK) == 0) return;
+  throw driver::Unavailable("guardian: " + program + ": " + std::strerror(errno) +
+                            ": it belongs beside abs_hil, which drives a rig beside its guardian only");
+}
+
+/// What the run cannot do without is asked for before its files are opened: an earlier run's stay whole. Throws
+/// driver::Unavailable. The run itself obtains both anew.
+void require_resources(const RunRequest& request, driver::RigDriver& driver) {
+  driver.configure();
+  require_guardian(request);
+  if (request.outputs.fast || request.settings.realtime.mode != runtime::RealtimeMode::require) return;
+  runtime::RealtimeReport report;
+  // In a thread of its own, which takes the scheduling class with it when it ends.
+  std::jthread([&] { report = runtime::RealtimeScope(request.settings.realtime).report(); }).join();
+  if (!report.realtime()) throw driver::Unavailable(realtime_refusal(report));
+}
+
+/// The run is over: writes its record, tells how it ended, dismisses the guardian. Returns the exit status.
+/// @param lost  why recorded data was lost; empty: none was
+int conclude(const RunRequest& request, const experiment::RunSession& session, const experiment::RunOutcome& outcome,
+             driver::RigDriver& driver, RunOutputs& outputs, RunMonitor& run_monitor, const std::string& lost) {
+  if (!outcome.safe_state.ok()) {
+    spdlog::error("the safe state may not have reached the board ({}): {}. Press the E-stop and switch the rig off",
+                  driver::error_text(outcome.safe_state), driver.what_holds_unsafe());
+  }
+  const analysis::RunSummary summary = summarise(request, session, outcome, outputs);
+  if (rig::is_fault(outcome.reason)) {
+    run_monitor.write_record(request, outcome.reason, outcome.reason_value, summary.reason);
+  }
+  const std::vector<std::string> unwritten =
+      outputs.write(summary, session.executive().statistics(), environment(request, driver, outcome));
+  if (!request.in_series) {
+    std::string text = analysis::to_text(summary);
+    if (const auto& folder = outputs.folder()) {
+      text += fmt::format("  {:<22}{}\n", "run folder", folder->path().string());
+    }
+    // A terminal that has gone takes nothing: no reason to end otherwise than the run did.
+    static_cast<void>(std::fputs(text.c_str(), stdout));
+  }
+  for (const std::string& line : driver.tally()) spdlog::info("{}", line);
+  if (!outcome.completed()) spdlog::error("run ended early: {}", summary.reason);
+  run_monitor.end();
+  for (const std::string& problem : unwritten) spdlog::error("{}", problem);
+  if (!lost.empty()) spdlog::error("recorded data was lost: {}", lost);
+  if (!lost.empty() || !unwritten.empty()) return exit_ended_early;
+  return status_of(outcome);
+}
+
+}  // namespace
+
+int run(const RunRequest& request) {
+  const config::Settings& s = request.settings;
+  runtime::MonotonicClock real_clock;
+  runtime::VirtualClock virtual_clock;
+  runtime::Clock& clock = request.outputs.fast ? static_cast<runtime::Clock&>(virtual_clock) : real_clock;
+  const std::unique_ptr<driver::RigDriver> driver = with_faults(make_driver(s, request.outputs.fast), s, clock);
+  config::Plan plan = config::plan(*request.script, s);
+  std::vector<std::string> phase_names = plan.phase_names;
+  // The logic puts a phase before the first then.
+  if (s.experiment.wait_for_start) phase_names.insert(phase_names.begin(), "waiting for the start");
+  for (const std::string& problem : config::beyond_limits(plan, s)) spdlog::warn("{}; it is held to that", problem);
+  experiment::RunLogicParts logic = make_logic(s, std::move(plan.phases), plan.limits);
+  require_resources(request, *driver);
+  RunOutputs outputs(request);
+  runtime::OverrunReporter late_cycles(std::llround(1e9 / s.control.rate_Hz));
+  std::vector<rig::RecordSink*> sinks = outputs.sinks();
+  if (!request.outputs.fast) sinks.push_back(&late_cycles);
+  experiment::RunSession session(clock, *driver, std::move(logic), s.gate, std::move(sinks), s.realtime.overruns);
+  TimingWatch timing(request, session, late_cycles);
+  outputs.watch(session);
+  const auto& folder = outputs.folder();
+  RunMonitor run_monitor(request, flight_record_prefix(request, folder ? folder->path() : std::filesystem::path()));
+  run_monitor.watch(session);
+  note_signals();
+  // The handler knows one run: of a series in virtual time, several at once, each asks for itself.
+  std::optional<SignalsStop> signals;
+  if (!request.in_series || !request.outputs.fast) {
+    signals.emplace(session, s.backend == "sim" || run_monitor.has_guardian());
+  }
+  BoardNotes board_notes(s, *driver);
+
+  const auto poll = [&] {
+    board_notes.log_once();
+    timing.poll();
+    outputs.poll();
+    if (request.in_series) request.in_series(phase_names.at(session.latest().phase_index));
+    if (const rig::Reason guardian = run_monitor.poll(); guardian != rig::Reason::none) return guardian;
+    if (const rig::Reason signal = signalled(); signal != rig::Reason::none) return signal;
+    return outputs.stop_requested() ? rig::Reason::stop_command : rig::Reason::none;
+  };
+  experiment::RunOutcome outcome;
+  std::string lost;
+  try {
+    outcome = request.outputs.fast ? session.run_fast(poll) : session.run_realtime(s.realtime, poll);
+  } catch (const telemetry::FileError& error) {
+    // The run itself went on to its end: report it, and that its record is not whole.
+    lost = error.what();
+    outcome = session.outcome();
+  }
+  if (!outcome.ran) {
+    throw driver::Unavailable(realtime_refusal(outcome.realtime));
+  }
+  if (signals) signals->allow_leaving();
+  board_notes.log_once();
+  if (request.stop_was_sent && outputs.stop_requested()) request.stop_was_sent();
+  return conclude(request, session, outcome, *driver, outputs, run_monitor, lost);
+}
+
+}  // namespace abs_hil::program

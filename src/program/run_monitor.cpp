@@ -1,0 +1,142 @@
+#include "program/run_monitor.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <ctime>
+
+#include "config/config_error.hpp"
+#include "guardian/launch_config.hpp"
+#include "telemetry/flight_record.hpp"
+
+namespace abs_hil::program {
+
+namespace {
+
+constexpr double recorded_s = 2.0;
+
+/// The guardian's timeout in cycles, which is what the cycle gives the guardian in turn.
+std::uint64_t silent_cycles_max(const config::Settings& s) {
+  constexpr double s_per_ms = 1e-3;
+  constexpr std::int64_t least = 3;
+  const std::int64_t cycles = std::llround(std::ceil(s.guardian.timeout_ms * s_per_ms * s.control.rate_Hz));
+  return static_cast<std::uint64_t>(std::max(least, cycles));
+}
+
+std::string name_of(runtime::RealtimeMode mode) {
+  switch (mode) {
+    case runtime::RealtimeMode::require: return "require";
+    case runtime::RealtimeMode::prefer: return "prefer";
+    case runtime::RealtimeMode::off: return "off";
+  }
+  return "off";
+}
+
+}  // namespace
+
+bool wants_guardian(const RunRequest& request) {
+  return request.settings.backend == "rig" && !request.outputs.fast && request.settings.guardian.enabled;
+}
+
+std::string guardian_brief(const RunRequest& request, const std::filesystem::path& record_prefix) {
+  const config::Settings& s = request.settings;
+  return to_json(guardian::LaunchConfig{.config_json = request.config_json,
+                                        .experiment = s.experiment.name,
+                                        .controller = s.control.controller,
+                                        .plant = s.plant_name,
+                                        .backend = s.backend,
+                                        .version = ABS_HIL_VERSION,
+                                        .realtime = name_of(s.realtime.mode),
+                                        .record_prefix = record_prefix.string()});
+}
+
+RunMonitor::RunMonitor(const RunRequest& request, std::filesystem::path record_prefix)
+    : record_prefix_(std::move(record_prefix)),
+      region_(runtime::FlightRing::slots_for(recorded_s, request.settings.control.rate_Hz)),
+      cycle_watch_(region_.panel(), region_.recorder(),
+                   wants_guardian(request) ? silent_cycles_max(request.settings) : 0) {
+  if (!wants_guardian(request)) return;
+  guardian_.emplace(region_, guardian::guardian_program(), guardian_brief(request, record_prefix_));
+}
+
+void RunMonitor::watch(experiment::RunSession& session) {
+  session.watch_with(cycle_watch_);
+  if (guardian_) session.guard_with(*guardian_);
+}
+
+rig::Reason RunMonitor::poll() {
+  if (!guardian_ || guardian_->pid() == 0) return rig::Reason::none;
+  if (!std::exchange(told_notes_, true)) {
+    if (guardian_->notes().empty()) {
+      spdlog::info("guardian: process {} stands by", guardian_->pid());
+    } else {
+      spdlog::warn("guardian: process {} stands by, but not in real time: it may act late\n{}", guardian_->pid(),
+                   guardian_->notes());
+    }
+  }
+  // One that has taken the outputs over ends in order.
+  const guardian::Stage stage = region_.stage();
+  const bool on_duty = stage == guardian::Stage::guarded || stage == guardian::Stage::making_safe;
+  return on_duty && !guardian_->alive() ? rig::Reason::guardian_died : rig::Reason::none;
+}
+
+void RunMonitor::write_record(const RunRequest& request, rig::Reason reason, double value, const std::string& account) {
+  if (record_prefix_.empty()) return;
+  const config::Settings& s = request.settings;
+  const auto records = region_.recorder().contents();
+  std::vector<std::string> problems;
+  const auto files = telemetry::write_flight_record(
+      record_prefix_, {.records = records, .reason = reason, .reason_value = value, .account = account + '\n'},
+      {.experiment = s.experiment.name,
+       .controller = s.control.controller,
+       .plant = s.plant_name,
+       .backend = s.backend,
+       .config_json = request.config_json,
+       .version = ABS_HIL_VERSION},
+      s.telemetry.channel_prefix, problems);
+  if (!files.empty()) spdlog::info("flight record: {}", files.front().string());
+  for (const std::string& problem : problems) spdlog::error("flight record: {}", problem);
+}
+
+void RunMonitor::end() {
+  if (!guardian_) return;
+  const pid_t pid = guardian_->pid();
+  switch (guardian_->end()) {
+    case guardian::GuardianProcess::GuardianExit::none:
+    case guardian::GuardianProcess::GuardianExit::ended: return;
+    case guardian::GuardianProcess::GuardianExit::failed:
+      spdlog::error("guardian: process {} did not end in order: see its words above", pid);
+      return;
+    case guardian::GuardianProcess::GuardianExit::insisting:
+      spdlog::error("guardian: process {} goes on trying to make the outputs safe, and tells how that ends", pid);
+  }
+}
+
+std::filesystem::path flight_record_prefix(const RunRequest& request, const std::filesystem::path& run_folder) {
+  const OutputOptions& o = request.outputs;
+  if (!o.recorder_dir && !run_folder.empty()) return run_folder / "recorder";
+  std::filesystem::path folder;
+  if (o.recorder_dir) {
+    folder = *o.recorder_dir;
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (error || ::access(folder.c_str(), W_OK | X_OK) != 0) {
+      throw config::ConfigError(fmt::format("--recorder {}: {}; give a folder that can be made or written to",
+                                            folder.string(), error ? error.message() : std::strerror(errno)));
+    }
+  } else if (o.log_file || o.csv_file || o.summary_file) {
+    folder = std::filesystem::path(o.log_file ? *o.log_file : o.csv_file ? *o.csv_file : *o.summary_file).parent_path();
+    if (folder.empty()) folder = ".";
+  } else if (request.settings.backend == "rig") {
+    folder = ".";
+  } else {
+    return {};
+  }
+  const std::string name = fmt::format("recorder-{:%Y%m%d-%H%M%S}-{}", fmt::localtime(std::time(nullptr)), ::getpid());
+  return std::filesystem::absolute(folder) / name;
+}
+
+}  // namespace abs_hil::program

@@ -1,0 +1,188 @@
+#include "program/run_outputs.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <ctime>
+
+#include "config/config_error.hpp"
+#include "telemetry/file_error.hpp"
+#include "telemetry/lcm_url.hpp"
+
+namespace abs_hil::program {
+
+namespace {
+/// Event times of runs in virtual time count from here (1 January 2000), so that the log is the same on every run.
+constexpr std::int64_t virtual_epoch_us = 946'684'800'000'000;
+/// Half of the 100 ms that a killed program may lose of its files: the slow side itself may come late.
+constexpr std::int64_t write_period_ns = 50'000'000;
+}  // namespace
+
+RunOutputs::RunOutputs(const RunRequest& request)
+    : metrics_(request.settings.plant.rig.wheels.r2_m, request.settings.experiment.end_speed_m_s) {
+  // Whether there is a network is asked first: files are not touched in vain.
+  // In virtual time 8,000 messages would burst onto the network at once: only when asked for by name.
+  if (!request.outputs.no_lcm && (!request.outputs.fast || request.outputs.lcm_url)) {
+    const std::string url = request.outputs.lcm_url.value_or(telemetry::default_lcm_url());
+    static_cast<void>(telemetry::parse_lcm_url(url));  // a malformed one is a usage error, not a missing network
+    lcm_.emplace(url);
+  }
+  try {
+    // The files named one by one first: a bad path leaves no folder behind.
+    open_files(request.outputs);
+    open_folder(request);
+  } catch (const std::runtime_error& error) {
+    throw config::ConfigError(error.what());
+  }
+  if (request.script->analysis == "friction-curve") {
+    const rig::RigParameters& rig = request.settings.plant.rig;
+    friction_curve_.emplace(rig.wheels, rig.encoder_counts_per_rev);
+  }
+  if (!log_.empty() || lcm_) open_stream(request);
+  if (!request.outputs.fast && !request.in_series) status_line_.emplace([this] { return snapshot(); });
+}
+
+void RunOutputs::open_files(const OutputOptions& outputs) {
+  if (outputs.csv_file) csv_.emplace_back(*outputs.csv_file, outputs.fast ? 0 : write_period_ns);
+  if (outputs.summary_file) summary_.emplace_back(*outputs.summary_file);
+  if (outputs.histogram_file) histogram_.emplace_back(*outputs.histogram_file);
+  if (outputs.log_file) {
+    log_.emplace_back(*outputs.log_file, outputs.fast ? std::optional(virtual_epoch_us) : std::nullopt,
+                      outputs.fast ? 0.0 : static_cast<double>(write_period_ns) * 1e-9);
+  }
+}
+
+void RunOutputs::open_folder(const RunRequest& request) {
+  const OutputOptions& o = request.outputs;
+  if (o.run_folder) {
+    folder_.emplace(*o.run_folder);
+  } else {
+    // A run in virtual time can be had again from its command line: it leaves no folder unless asked to.
+    const std::filesystem::path runs = run_folder::default_runs_dir();
+    if (o.fast || o.no_run_folder || o.names_files() || runs.empty()) return;
+    const std::time_t now = std::time(nullptr);
+    std::tm local{};
+    localtime_r(&now, &local);
+    try {
+      folder_.emplace(run_folder::unused_folder(runs, local, request.settings.experiment.name));
+    } catch (const run_folder::FolderError& error) {
+      // Nobody asked for it: the run is worth more than its record.
+      spdlog::warn("this run leaves no folder: {} (--no-out: none wanted)", error.what());
+      return;
+    }
+  }
+  folder_->write(run_folder::file::config, std::string_view(request.config_toml));
+  folder_->write(run_folder::file::experiment, std::string_view(request.script->text));
+  for (const auto& [name, text] : request.script->files) folder_->write(name, std::string_view(text));
+  open_files(
+      {.fast = o.fast,
+       .csv_file = folder_->of(run_folder::file::csv),
+       .log_file = folder_->of(run_folder::file::log),
+       .summary_file = folder_->of(run_folder::file::summary),
+       .histogram_file = o.fast ? std::nullopt : std::optional(folder_->of(run_folder::file::histogram).string())});
+  events_.emplace(folder_->of(run_folder::file::events));
+}
+
+void RunOutputs::open_stream(const RunRequest& request) {
+  const config::Settings& s = request.settings;
+  stream_.emplace(telemetry::StreamOptions{.channel_prefix = s.telemetry.channel_prefix,
+                                           .telemetry_every_cycles = static_cast<std::uint32_t>(s.telemetry.decimation),
+                                           .status_period_s = s.telemetry.status_period_s,
+                                           .experiment_period_s = s.telemetry.experiment_period_s},
+                  telemetry::ExperimentInfo{.experiment = s.experiment.name,
+                                            .controller = s.control.controller,
+                                            .plant = s.plant_name,
+                                            .backend = s.backend,
+                                            .config_json = request.config_json,
+                                            .version = ABS_HIL_VERSION},
+                  [this] { return snapshot(); });
+  for (telemetry::LogOutlet& log : log_) stream_->add(log);
+  if (lcm_) {
+    stream_->add(*lcm_);
+    if (!request.outputs.fast) steering_.emplace(s, *stream_);
+    // In the listening thread: the cycle that follows finds the request.
+    commands_.emplace(*lcm_, *stream_, [this] {
+      if (session_ != nullptr) session_->request_stop(rig::Reason::stop_command);
+    });
+  }
+}
+
+std::vector<rig::RecordSink*> RunOutputs::sinks() {
+  std::vector<rig::RecordSink*> sinks{&metrics_};
+  if (friction_curve_) sinks.push_back(&*friction_curve_);
+  for (telemetry::CsvSink& csv : csv_) sinks.push_back(&csv);
+  if (events_) sinks.push_back(&*events_);
+  if (stream_) sinks.push_back(&*stream_);
+  if (steering_) sinks.push_back(&*steering_);  // its messages are of the record that the stream has just had
+  if (status_line_ && status_line_->active()) sinks.push_back(&*status_line_);
+  return sinks;
+}
+
+void RunOutputs::watch(experiment::RunSession& session) {
+  session_ = &session;
+  if (!steering_ || !commands_ || !stream_) return;
+  steering_->drive(session.adjustments());
+  steering_->count(*commands_);
+  commands_->set_judge([this](const command2_t& command) { return steering_->judge(command); });
+  commands_->listen();
+  stream_->set_farewell([this] {
+    commands_->finish();
+    steering_->refuse_pending();
+  });
+}
+
+nlohmann::ordered_json RunOutputs::friction_curve_json() const {
+  return friction_curve_ ? analysis::to_json(friction_curve_->result()) : nlohmann::ordered_json();
+}
+
+void RunOutputs::poll() {
+  if (commands_) commands_->poll();
+}
+
+std::uint64_t RunOutputs::csv_rows_lost() const {
+  std::uint64_t lost = 0;
+  for (const telemetry::CsvSink& csv : csv_) lost += csv.rows_lost();
+  return lost;
+}
+
+telemetry::StatusSnapshot RunOutputs::snapshot() const {
+  if (session_ == nullptr) return {};
+  const runtime::CycleStatistics& statistics = session_->executive().statistics();
+  const rig::TimingSummary timing = statistics.summary();
+  return {.cycles = statistics.cycles(),
+          .overruns = timing.overruns.total,
+          .telemetry_drops = session_->record_drops(),
+          .gate_interventions = rig::interventions(session_->gate().counts()),
+          .realtime = session_->realtime(),
+          .wakeup_latency = timing.wakeup_latency,
+          .cycle_time = timing.cycle_time,
+          .read = timing.read,
+          .control = timing.control,
+          .write = timing.write,
+          .late = timing.overruns};
+}
+
+std::vector<std::string> RunOutputs::write(const analysis::RunSummary& summary,
+                                           const runtime::CycleStatistics& statistics,
+                                           const run_folder::RunEnvironment& environment) {
+  std::vector<std::string> problems;
+  const auto attempt = [&problems](auto&& work) {
+    try {
+      work();
+    } catch (const std::runtime_error& error) {
+      problems.emplace_back(error.what());
+    }
+  };
+  for (analysis::SummaryFile& file : summary_) attempt([&] { file.write(summary); });
+  for (runtime::HistogramFile& file : histogram_) attempt([&] { file.write(statistics); });
+  if (!folder_) return problems;
+  attempt([&] {
+    if (friction_curve_) {
+      folder_->write("friction_curve.csv", std::string_view(analysis::to_csv(friction_curve_->result())));
+    }
+    folder_->write(run_folder::file::environment, run_folder::environment_json(environment));
+    folder_->seal();
+  });
+  return problems;
+}
+
+}  // namespace abs_hil::program

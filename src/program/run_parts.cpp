@@ -1,0 +1,37 @@
+#include "program/run_parts.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+#include "config/unsafe_settings.hpp"
+#include "driver/factory.hpp"
+#include "driver/injection/injecting_driver.hpp"
+#include "driver/sim/sim_driver.hpp"
+
+namespace abs_hil::program {
+
+std::unique_ptr<driver::RigDriver> make_driver(const config::Settings& s, bool fast) {
+  if (s.backend == "rig") return driver::make_rig_driver(s.driver, fast);
+  return std::make_unique<driver::SimDriver>(s.plant,
+                                             driver::SimStart{.seed = static_cast<std::uint64_t>(s.seed),
+                                                              .start_speed_rad_s = s.experiment.start_speed_rad_s});
+}
+
+std::unique_ptr<driver::RigDriver> with_faults(std::unique_ptr<driver::RigDriver> driver, const config::Settings& s,
+                                               runtime::Clock& clock) {
+  std::vector<driver::Injection> injections = config::injections_of(s);
+  if (injections.empty()) return driver;
+  for (const driver::Injection& injection : injections) spdlog::warn("fault injected: {}", driver::to_text(injection));
+  return std::make_unique<driver::InjectingDriver>(
+      std::move(driver), std::move(injections), static_cast<std::uint64_t>(s.seed),
+      [&clock](std::int64_t duration_ns) { clock.sleep_until(clock.now_ns() + duration_ns); });
+}
+
+experiment::RunLogicParts make_logic(const config::Settings& s, std::vector<experiment::PhasePlan> plans,
+                                     const experiment::SequenceLimits& limits) {
+  return experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate, s.experiment,
+                                      std::move(plans), limits);
+}
+
+}  // namespace abs_hil::program

@@ -1,0 +1,51 @@
+#include <fmt/format.h>
+
+#include <charconv>
+
+#include "commands/sender.hpp"
+#include "config/config_error.hpp"
+#include "program/exit_status.hpp"
+#include "program/subcommands.hpp"
+#include "telemetry/lcm_url.hpp"
+
+namespace abs_hil::program {
+
+namespace {
+
+double number_of(const std::string& text) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) {
+    throw config::ConfigError("send: '" + text + "' is no number");
+  }
+  return value;
+}
+
+commands::Order order_of(const std::vector<std::string>& words) {
+  const std::string& command = words.front();
+  if ((command == "stop" || command == "start") && words.size() == 1) return {.command = command};
+  if (command == "slip-ref" && words.size() == 2) return {.command = command, .value = number_of(words[1])};
+  if (command == "gain" && words.size() == 3) {
+    return {.command = command, .name = words[1], .value = number_of(words[2])};
+  }
+  throw config::ConfigError("send: give one of stop | start | slip-ref X | gain NAME X");
+}
+
+}  // namespace
+
+int send(const RunRequest& request, const SendOptions& options) {
+  const config::Settings& s = request.settings;
+  const commands::Reply reply =
+      commands::send(order_of(options.order), {.url = request.outputs.lcm_url.value_or(telemetry::default_lcm_url()),
+                                               .channel_prefix = s.telemetry.channel_prefix,
+                                               .key_file = s.commands.key_file,
+                                               .timeout_s = options.timeout_s});
+  if (reply.outcome == commands::Outcome::accepted) {
+    fmt::print("{}\n", reply.message);
+    return exit_completed;
+  }
+  fmt::print(stderr, "abs_hil: {}\n", reply.message);
+  return reply.outcome == commands::Outcome::refused ? exit_ended_early : exit_unavailable;
+}
+
+}  // namespace abs_hil::program

@@ -1,0 +1,272 @@
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json.hpp>
+
+#include "config/config_error.hpp"
+#include "config/series.hpp"
+#include "program/exit_status.hpp"
+#include "program/series_pause.hpp"
+#include "program/signals.hpp"
+#include "program/subcommands.hpp"
+#include "run_folder/series_folder.hpp"
+#include "study/parallel.hpp"
+
+namespace abs_hil::program {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// How far a series is, on stderr: on a terminal one line that changes, else a line for every tenth of it.
+class Progress {
+ public:
+  /// @param pause_s  between two runs; 0 where there is none
+  Progress(std::size_t runs, std::size_t done, double pause_s)
+      : runs_(runs), done_(done), at_start_(done), pause_s_(pause_s) {}
+
+  /// @param what the run, @param phase where it stands; empty for one that has ended
+  void show(const std::string& what, std::string_view phase, bool at_once = false) {
+    const std::scoped_lock lock(mutex_);
+    const auto now = Clock::now();
+    if (!terminal_ || (!phase.empty() && !at_once && now - shown_ < std::chrono::milliseconds(100))) return;
+    shown_ = now;
+    fmt::print(stderr, "\r\033[K{} of {} runs, {} left; {}{}{}", done_, runs_, left(), what, phase.empty() ? "" : ": ",
+               phase);
+    std::fflush(stderr);
+  }
+  void count(const std::string& what) {
+    {
+      const std::scoped_lock lock(mutex_);
+      ++done_;
+      const std::size_t tenth = std::max<std::size_t>(1, runs_ / 10);
+      if (!terminal_ && (done_ % tenth == 0 || done_ == runs_)) {
+        fmt::print(stderr, "{} of {} runs, {} left\n", done_, runs_, left());
+      }
+    }
+    show(what, {});
+  }
+  void paused() {
+    const std::scoped_lock lock(mutex_);
+    ++pauses_;
+  }
+  [[nodiscard]] std::size_t done() const noexcept { return done_; }
+  void end() const {
+    if (terminal_) fmt::print(stderr, "\r\033[K");
+  }
+
+ private:
+  [[nodiscard]] std::string left() const {
+    if (done_ == at_start_) return "? s";
+    const double spent_s = std::chrono::duration<double>(Clock::now() - start_).count() - pauses_ * pause_s_;
+    const double runs_s = spent_s / static_cast<double>(done_ - at_start_) * static_cast<double>(runs_ - done_);
+    const double left_s = runs_s + (static_cast<double>(runs_ - at_start_ - 1) - pauses_) * pause_s_;
+    return left_s < 90.0 ? fmt::format("{:.0f} s", left_s) : fmt::format("{:.0f} min", left_s / 60.0);
+  }
+
+  std::size_t runs_;
+  std::size_t done_;
+  std::size_t at_start_;
+  double pause_s_;
+  int pauses_{0};  ///< that are over
+  bool terminal_{isatty(STDERR_FILENO) == 1};
+  Clock::time_point start_{Clock::now()};
+  Clock::time_point shown_{};
+  std::mutex mutex_{};
+};
+
+std::string text_of(const config::SeriesMember& member) {
+  std::string text;
+  for (const auto& [key, value] : member.varied) text += fmt::format("{} = {}, ", key, config::text_of(value));
+  return text + fmt::format("seed {}", member.seed);
+}
+
+nlohmann::ordered_json varied_json(const config::SeriesMember& member) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (const auto& [key, value] : member.varied) {
+    std::visit([&json, &key = key](const auto& v) { json[key] = v; }, value);
+  }
+  return json;
+}
+
+RunOptions options_of(const RunOptions& common, const config::SeriesMember& member) {
+  RunOptions options = common;
+  for (const auto& [key, value] : member.varied) {
+    options.assignments.push_back(fmt::format("{}={}", key, config::text_of(value)));
+  }
+  options.seed = std::to_string(member.seed);
+  return options;
+}
+
+/// Where the series goes; none if nobody wants a folder. Throws config::ConfigError.
+std::unique_ptr<run_folder::SeriesFolder> open_folder(const RunRequest& base,
+                                                      std::vector<run_folder::SeriesEntry> entries) {
+  const OutputOptions& o = base.outputs;
+  std::unique_ptr<run_folder::SeriesFolder> folder;
+  std::filesystem::path path;
+  if (o.run_folder) {
+    path = *o.run_folder;
+  } else {
+    const std::filesystem::path runs = run_folder::default_runs_dir();
+    if (o.no_run_folder || runs.empty()) return folder;
+    const std::time_t now = std::time(nullptr);
+    std::tm local{};
+    localtime_r(&now, &local);
+    path = run_folder::unused_folder(runs, local, base.settings.experiment.name);
+  }
+  try {
+    folder = std::make_unique<run_folder::SeriesFolder>(
+        path, run_folder::sha256_of(base.config_json + base.settings.plant_name + base.settings.backend),
+        base.script->name, std::move(entries));
+  } catch (const run_folder::FolderError& error) {
+    throw config::ConfigError(error.what());
+  }
+  return folder;
+}
+
+/// A signal ended the run: it is to be done again.
+bool is_interrupted(int status) { return status > 128; }
+
+/// The runs of a series that are still to be done.
+class SeriesRun {
+ public:
+  /// @param folder  may be null. All must outlive it.
+  SeriesRun(const RunOptions& common, const RunRequest& base, const std::vector<config::SeriesMember>& members,
+            run_folder::SeriesFolder* folder)
+      : common_(common),
+        base_(base),
+        members_(members),
+        folder_(folder),
+        left_(left_of(members.size(), folder)),
+        pause_s_(base.outputs.fast ? 0.0 : base.script->series.pause_s),
+        progress_(members.size(), members.size() - left_.size(), pause_s_) {
+    for (std::size_t i = 0; folder != nullptr && i < members.size(); ++i) {
+      if (folder->done(i) && folder->status(i) != completed) ++ended_early_;
+    }
+    if (folder != nullptr && folder->resumed()) {
+      spdlog::info("{} of {} runs are there already", members.size() - left_.size(), members.size());
+    }
+  }
+
+  /// Does them; returns the program's exit status.
+  int run_all() {
+    // In virtual time as many at once as the machine has processors; at the rig one after the other.
+    const bool at_once = base_.outputs.fast && base_.settings.backend == "sim";
+    study::for_each_index(left_.size(), at_once ? study::machine_threads() : 1, [this](std::size_t k) { run_one(k); });
+    progress_.end();
+    if (interrupted_ == 0 && signalled() != rig::Reason::none) {
+      experiment::RunOutcome outcome;
+      outcome.reason = signalled();
+      interrupted_ = status_of(outcome);
+    }
+    fmt::print("{}\n", in_words());
+    if (interrupted_ != 0) return interrupted_;
+    return ended_early_ == 0 && !cut_short() ? exit_completed : exit_ended_early;
+  }
+
+ private:
+  static constexpr const char* completed = "completed";
+
+  static std::vector<std::size_t> left_of(std::size_t runs, const run_folder::SeriesFolder* folder) {
+    std::vector<std::size_t> left;
+    for (std::size_t i = 0; i < runs; ++i) {
+      if (folder == nullptr || !folder->done(i)) left.push_back(i);
+    }
+    return left;
+  }
+
+  void run_one(std::size_t k) {
+    if (interrupted_ != 0 || halted_by_ != 0 || stopped_ || signalled() != rig::Reason::none) return;
+    const std::size_t i = left_[k];
+    const std::string what = fmt::format("{}, {}", run_folder::SeriesFolder::name_of(i), text_of(members_[i]));
+    RunRequest request = merge(options_of(common_, members_[i]));
+    request.command_line = base_.command_line;
+    request.in_series = [this, &what](std::string_view phase) { progress_.show(what, phase); };
+    request.stop_was_sent = [this] { stopped_ = true; };
+    request.outputs.run_folder.reset();
+    request.outputs.no_run_folder = true;
+    if (folder_ != nullptr) request.outputs.run_folder = folder_->begin(i).string();
+    const int status = run(request);
+    if (is_interrupted(status)) {
+      interrupted_ = status;
+      return;
+    }
+    if (status != exit_completed) {
+      ++ended_early_;
+      // A fault of the rig, or somebody stopped it: nothing moves again before a person has looked.
+      if (base_.settings.backend == "rig") halted_by_ = i + 1;
+    }
+    if (folder_ != nullptr) folder_->end(i, status == exit_completed ? completed : "fault");
+    progress_.count(what);
+    if (pause_s_ > 0.0 && k + 1 < left_.size() && halted_by_ == 0 && !stopped_) {
+      progress_.show(what, fmt::format("over; pause of {:.6g} s before the next", pause_s_), true);
+      const rig::Reason reason = pause_between_runs(request, pause_s_);
+      if (reason == rig::Reason::none) progress_.paused();
+      if (reason == rig::Reason::stop_command) stopped_ = true;
+    }
+  }
+
+  /// Not all runs were done.
+  [[nodiscard]] bool cut_short() const {
+    return interrupted_ != 0 || ((halted_by_ != 0 || stopped_) && progress_.done() < members_.size());
+  }
+
+  [[nodiscard]] std::string in_words() const {
+    const std::string where = folder_ != nullptr ? ", in " + folder_->path().string() : std::string();
+    if (!cut_short()) {
+      return fmt::format("series {}: {} runs, {} ended early{}", base_.script->name, members_.size(),
+                         ended_early_.load(), where);
+    }
+    std::string why = "interrupted";
+    if (interrupted_ == 0) {
+      why = stopped_ ? "ended by a stop command"
+                     : fmt::format("ended because {} ended early", run_folder::SeriesFolder::name_of(halted_by_ - 1));
+    }
+    return fmt::format(
+        "series {}: {} with {} of {} runs done, {} ended early{}{}", base_.script->name, why, progress_.done(),
+        members_.size(), ended_early_.load(), where,
+        folder_ != nullptr ? "; the same command with --out " + folder_->path().string() + " goes on" : "");
+  }
+
+  const RunOptions& common_;
+  const RunRequest& base_;
+  const std::vector<config::SeriesMember>& members_;
+  run_folder::SeriesFolder* folder_;
+  std::vector<std::size_t> left_;
+  double pause_s_;
+  Progress progress_;
+  std::atomic<std::size_t> ended_early_{0};
+  std::atomic<int> interrupted_{0};
+  std::atomic<bool> stopped_{false};       ///< somebody sent a stop, to a run or between two
+  std::atomic<std::size_t> halted_by_{0};  ///< number of the run at a rig that ended early, from 1; 0: none
+};
+
+}  // namespace
+
+int run_series(const RunOptions& common, const RunRequest& base) {
+  if (base.outputs.names_files()) {
+    throw config::ConfigError(fmt::format(
+        "{}: a series of runs does not fit in one file; give --out DIR in place of --csv, --log, --summary and "
+        "--histogram",
+        base.script->path));
+  }
+  const std::vector<config::SeriesMember> members = config::members_of(base.script->series, base.settings.seed);
+  std::vector<run_folder::SeriesEntry> entries;
+  // Every run's configuration is checked before the first one moves anything.
+  for (const config::SeriesMember& member : members) {
+    static_cast<void>(merge(options_of(common, member)));
+    entries.push_back({.varied = varied_json(member), .seed = member.seed});
+  }
+  const std::unique_ptr<run_folder::SeriesFolder> folder = open_folder(base, std::move(entries));
+  note_signals();
+  return SeriesRun(common, base, members, folder.get()).run_all();
+}
+
+}  // namespace abs_hil::program

@@ -1,0 +1,73 @@
+#include "program/signals.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+
+namespace abs_hil::program {
+
+namespace {
+
+constexpr int exit_of_signal = 128;
+
+std::atomic<rig::Reason> noted{rig::Reason::none};
+std::atomic<experiment::RunSession*> running{nullptr};
+std::atomic<bool> may_leave_now{false};
+static_assert(std::atomic<rig::Reason>::is_always_lock_free &&
+                  std::atomic<experiment::RunSession*>::is_always_lock_free,
+              "a signal handler may touch nothing else");
+
+rig::Reason reason_of(int signal) noexcept {
+  if (signal == SIGINT) return rig::Reason::interrupt_signal;
+  return signal == SIGHUP ? rig::Reason::hangup_signal : rig::Reason::terminate_signal;
+}
+
+void note(int signal) {
+  rig::Reason none = rig::Reason::none;
+  const bool first = noted.compare_exchange_strong(none, reason_of(signal));
+  if (!first && may_leave_now.load()) ::_exit(exit_of_signal + signal);
+  if (experiment::RunSession* session = running.load(); session != nullptr) session->request_stop(reason_of(signal));
+}
+
+bool ignored(int signal) noexcept {
+  struct sigaction current {};
+  return ::sigaction(signal, nullptr, &current) == 0 && current.sa_handler == SIG_IGN;
+}
+
+}  // namespace
+
+void survive_closed_terminals() {
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(fd, F_GETFD) < 0) static_cast<void>(::open("/dev/null", O_RDWR));  // takes the lowest free one
+  }
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file at its size limit is a full disk: the write says so
+}
+
+void note_signals() {
+  struct sigaction action {};
+  action.sa_handler = note;
+  sigemptyset(&action.sa_mask);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    if (signal == SIGHUP && ignored(signal)) continue;
+    ::sigaction(signal, &action, nullptr);
+  }
+}
+
+rig::Reason signalled() noexcept { return noted.load(); }
+
+SignalsStop::SignalsStop(experiment::RunSession& session, bool may_leave) noexcept {
+  may_leave_now = may_leave;
+  running = &session;
+}
+
+SignalsStop::~SignalsStop() {
+  running = nullptr;
+  may_leave_now = true;
+}
+
+void SignalsStop::allow_leaving() noexcept { may_leave_now = true; }
+
+}  // namespace abs_hil::program

@@ -1,0 +1,32 @@
+#include <fmt/format.h>
+
+#include "abs_hil/plant_sim/plant.hpp"
+#include "config/explain.hpp"
+#include "config/library.hpp"
+#include "config/plan.hpp"
+#include "program/exit_status.hpp"
+#include "program/subcommands.hpp"
+
+namespace abs_hil::program {
+
+int validate(const RunRequest& request) {
+  const config::Script& script = *request.script;
+  fmt::print("{}", config::explain(script, request.settings));
+  const config::Plan plan = config::plan(script, request.settings);
+  const std::vector<std::string> problems = config::beyond_limits(plan, request.settings);
+  for (const std::string& problem : problems) fmt::print(stderr, "abs_hil: {}: {}\n", script.path, problem);
+  if (!problems.empty()) return exit_usage;
+  // What only shows when a run is made.
+  static_cast<void>(experiment::Sequence(plan.phases, plan.limits));
+  if (request.settings.backend == "sim") static_cast<void>(plant_sim::Plant(request.settings.plant));
+  fmt::print("Within the limits of backend {}, plant {}.{}\n", request.settings.backend, request.settings.plant_name,
+             script.events.empty() ? "" : " Its events happen in simulation only: --backend rig refuses it.");
+  return exit_completed;
+}
+
+int print_schema() {
+  fmt::print("{}\n", config::schema().dump(2));
+  return exit_completed;
+}
+
+}  // namespace abs_hil::program

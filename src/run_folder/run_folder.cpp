@@ -1,0 +1,81 @@
+#include "run_folder/run_folder.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <utility>
+#include <vector>
+
+namespace abs_hil::run_folder {
+
+namespace fs = std::filesystem;
+
+RunFolder::RunFolder(fs::path path) : path_(std::move(path)) {
+  std::error_code error;
+  if (fs::exists(path_, error) && !fs::is_directory(path_, error)) {
+    throw FolderError(fmt::format("--out: \"{}\" is a file; name a folder that is new or empty", path_.string()));
+  }
+  fs::create_directories(path_, error);
+  if (error) {
+    throw FolderError(fmt::format("--out: cannot create \"{}\": {}; name a folder in a writable place", path_.string(),
+                                  error.message()));
+  }
+  if (!fs::is_empty(path_, error) || error) {
+    throw FolderError(fmt::format(
+        "--out: \"{}\" is not empty; name a folder that is new or empty, nothing is overwritten", path_.string()));
+  }
+}
+
+void RunFolder::write(std::string_view name, std::string_view text) const {
+  const fs::path path = of(name);
+  errno = 0;
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) {
+    throw FolderError(fmt::format("cannot write \"{}\": {}", path.string(), std::strerror(errno != 0 ? errno : EIO)));
+  }
+}
+
+void RunFolder::write(std::string_view name, const nlohmann::ordered_json& json) const {
+  write(name, std::string_view(json.dump(2) + '\n'));
+}
+
+void RunFolder::seal() const {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(path_)) {
+    if (entry.is_regular_file() && entry.path().filename() != file::checksums) {
+      names.push_back(entry.path().filename().string());
+    }
+  }
+  std::sort(names.begin(), names.end());
+  std::string sums;
+  for (const std::string& name : names) sums += fmt::format("{}  {}\n", sha256_of_file(path_ / name), name);
+  write(file::checksums, std::string_view(sums));
+}
+
+fs::path default_runs_dir() {
+  const char* given = std::getenv("ABS_HIL_RUNS_DIR");
+  return given != nullptr ? fs::path(given) : fs::path("runs");
+}
+
+fs::path unused_folder(const fs::path& parent, const std::tm& local_time, std::string_view experiment) {
+  // A script's path becomes its name; what a file name should not hold becomes a dash.
+  std::string name = fs::path(experiment).stem().string();
+  for (char& c : name) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+    if (!plain) c = '-';
+  }
+  const std::string base = fmt::format("{:%Y%m%d-%H%M%S}-{}", local_time, name);
+  fs::path path = parent / base;
+  std::error_code error;
+  for (int i = 2; fs::exists(path, error); ++i) path = parent / fmt::format("{}-{}", base, i);
+  return path;
+}
+
+}  // namespace abs_hil::run_folder

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <ctime>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+namespace abs_hil::run_folder {
+
+/// A folder that cannot be used for a run's record; the message is one line with path, reason and fix.
+class FolderError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Names of what a run folder holds (docs/run-folders.md).
+namespace file {
+inline constexpr std::string_view csv = "run.csv";
+inline constexpr std::string_view log = "run.lcmlog";
+inline constexpr std::string_view summary = "summary.json";
+inline constexpr std::string_view config = "config.toml";
+inline constexpr std::string_view experiment = "experiment.toml";
+inline constexpr std::string_view environment = "environment.json";
+inline constexpr std::string_view events = "events.csv";
+inline constexpr std::string_view histogram = "histogram.txt";
+inline constexpr std::string_view checksums = "SHA256SUMS";
+}  // namespace file
+
+/// The folder of one run: created by the constructor, sealed with checksums at the end.
+class RunFolder {
+ public:
+  /// Creates the folder and those above it. Throws FolderError if it is a file, not empty, or cannot be created.
+  explicit RunFolder(std::filesystem::path path);
+
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+  [[nodiscard]] std::filesystem::path of(std::string_view name) const { return path_ / name; }
+  /// Throws FolderError if the file cannot be written.
+  void write(std::string_view name, std::string_view text) const;
+  void write(std::string_view name, const nlohmann::ordered_json& json) const;
+  /// Writes SHA256SUMS over every file in the folder, in the format of sha256sum: the record is whole.
+  void seal() const;
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// SHA-256 of a file, as 64 hexadecimal digits. Throws FolderError if it cannot be read.
+[[nodiscard]] std::string sha256_of_file(const std::filesystem::path& path);
+/// SHA-256 of a text, as 64 hexadecimal digits.
+[[nodiscard]] std::string sha256_of(std::string_view text);
+
+/// Where runs go whose folder nobody named: $ABS_HIL_RUNS_DIR, else `runs`; empty if that variable is set and empty.
+[[nodiscard]] std::filesystem::path default_runs_dir();
+
+/// A folder below `parent` that does not exist yet: `20261121-134512-paper`, with -2, -3, ... where that is taken.
+/// @param local_time broken-down time of the start
+[[nodiscard]] std::filesystem::path unused_folder(const std::filesystem::path& parent, const std::tm& local_time,
+                                                  std::string_view experiment);
+
+}  // namespace abs_hil::run_folder

@@ -1,0 +1,114 @@
+#include "run_folder/series_folder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <optional>
+#include <utility>
+
+namespace abs_hil::run_folder {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+void move_to(const fs::path& from, const fs::path& to) {
+  std::error_code error;
+  fs::rename(from, to, error);
+  if (error) {
+    throw FolderError(fmt::format("cannot rename \"{}\" to \"{}\": {}", from.string(), to.string(), error.message()));
+  }
+}
+
+/// A text of an object that somebody may have damaged; nothing if there is none.
+std::optional<std::string> text_of(const nlohmann::ordered_json& object, const char* key) {
+  if (!object.is_object() || !object.contains(key) || !object[key].is_string()) return std::nullopt;
+  return object[key].get<std::string>();
+}
+
+}  // namespace
+
+SeriesFolder::SeriesFolder(fs::path path, std::string identity, std::string title, std::vector<SeriesEntry> runs)
+    : path_(std::move(path)), identity_(std::move(identity)), title_(std::move(title)), runs_(std::move(runs)) {
+  std::error_code error;
+  if (fs::exists(path_ / series_index, error)) {
+    read_index(identity_);
+    resumed_ = true;
+  } else {
+    RunFolder checked_and_made(path_);
+    write_index();
+  }
+}
+
+std::string SeriesFolder::name_of(std::size_t run) { return fmt::format("run-{:04}", run + 1); }
+
+void SeriesFolder::read_index(const std::string& identity) {
+  const fs::path index = path_ / series_index;
+  const auto json = nlohmann::ordered_json::parse(std::ifstream(index), nullptr, false);
+  const auto has_status = [](const nlohmann::ordered_json& run) { return text_of(run, "status").has_value(); };
+  const bool whole = text_of(json, "identity") == identity && json.contains("runs") && json["runs"].is_array() &&
+                     json["runs"].size() == runs_.size() && std::ranges::all_of(json["runs"], has_status);
+  if (!whole) {
+    throw FolderError(fmt::format(
+        "--out: \"{}\" holds another series (script, configuration or seeds differ, or its {} is damaged); name "
+        "a folder that is new or empty",
+        path_.string(), series_index));
+  }
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    // What counts is the folder: the index may be one run behind when the program was killed.
+    const bool there = fs::is_directory(path_ / name_of(i));
+    const std::string status = text_of(json["runs"][i], "status").value_or("");
+    if (there) runs_[i].status = status == "planned" ? "completed" : status;
+  }
+}
+
+void SeriesFolder::write_index() const {
+  nlohmann::ordered_json runs = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    runs.push_back(
+        {{"folder", name_of(i)}, {"varied", runs_[i].varied}, {"seed", runs_[i].seed}, {"status", runs_[i].status}});
+  }
+  const nlohmann::ordered_json json{{"experiment", title_}, {"identity", identity_}, {"runs", std::move(runs)}};
+  const fs::path index = path_ / series_index;
+  fs::path part = index;
+  part += ".part";
+  errno = 0;
+  std::ofstream file(part, std::ios::binary);
+  file << json.dump(2) << '\n';
+  file.close();
+  if (!file) {
+    throw FolderError(fmt::format("cannot write \"{}\": {}", part.string(), std::strerror(errno != 0 ? errno : EIO)));
+  }
+  move_to(part, index);
+}
+
+bool SeriesFolder::done(std::size_t run) const { return status(run) != "planned"; }
+
+std::string SeriesFolder::status(std::size_t run) const {
+  const std::scoped_lock lock(mutex_);
+  return runs_.at(run).status;
+}
+
+fs::path SeriesFolder::begin(std::size_t run) {
+  fs::path part = path_ / (name_of(run) + ".part");
+  if (fs::exists(part)) {
+    fs::path kept;
+    for (int i = 1; kept.empty() || fs::exists(kept); ++i) {
+      kept = path_ / fmt::format("{}.interrupted-{}", name_of(run), i);
+    }
+    move_to(part, kept);
+  }
+  return part;
+}
+
+void SeriesFolder::end(std::size_t run, const std::string& status) {
+  const std::scoped_lock lock(mutex_);
+  move_to(path_ / (name_of(run) + ".part"), path_ / name_of(run));
+  runs_.at(run).status = status;
+  write_index();
+}
+
+}  // namespace abs_hil::run_folder

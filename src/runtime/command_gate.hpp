@@ -1,0 +1,98 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+
+#include "abs_hil/rig/command.hpp"
+#include "abs_hil/rig/measurement.hpp"
+#include "abs_hil/rig/phase.hpp"
+#include "abs_hil/rig/reason.hpp"
+#include "rig/gate_counts.hpp"
+#include "runtime/encoder_check.hpp"
+#include "runtime/gate_options.hpp"
+#include "runtime/plausibility_limits.hpp"
+#include "runtime/response_check.hpp"
+#include "runtime/speed_window.hpp"
+
+namespace abs_hil::runtime {
+
+using rig::gate_action_count;
+using rig::GateAction;
+
+/// What the gate is told beside the command.
+struct GateInput {
+  rig::WheelSpeeds speeds{};  ///< estimated from the latest measurement
+  rig::Phase phase{rig::Phase::idle};
+  std::int64_t now_ns{0};  ///< the cycle's wake-up
+};
+
+struct GateResult {
+  rig::Command command{};                 ///< what may be sent
+  GateAction action{GateAction::passed};  ///< the last one taken
+  rig::Reason fault{rig::Reason::none};   ///< the latched fault, once there is one
+  double fault_value{0.0};
+};
+
+/// Stands between controller and driver and trusts neither: finite, range, rate, interlocks, and what is measured must
+/// agree with physics and with what was sent. A fault latches; from then on only the safe command passes, until a new
+/// run makes a new gate. docs/safety.md has every check with its reason. Real-time safe.
+class CommandGate {
+ public:
+  /// @param permissions what each phase's plan lets act
+  /// @param limits      what physics allows; without them measurements are not judged
+  explicit CommandGate(const GateOptions& options, const PhasePermissions& permissions = any_phase(),
+                       const PlausibilityLimits& limits = {}) noexcept
+      : options_(options),
+        permissions_(permissions),
+        watching_(limits.enabled),
+        speed_windows_(limits),
+        encoders_(limits),
+        response_(limits) {}
+
+  /// Takes a cycle's measurement before anything is made of it: latches what the board reports about itself and what
+  /// cannot be true of the wheels.
+  /// @return false if nothing may be made of it: stale, or a counter has leapt. The one before then stands.
+  /// @param reading_ns how long the reading took: one that was held up is not judged
+  bool watch(const rig::Measurement& measurement, std::int64_t now_ns, std::int64_t reading_ns = 0) noexcept;
+  [[nodiscard]] GateResult check(const rig::Command& wanted, const GateInput& input) noexcept;
+  /// Latches a fault found elsewhere (driver, executive). The first one stays.
+  void latch(rig::Reason fault, double value) noexcept;
+
+  [[nodiscard]] rig::Reason fault() const noexcept { return fault_; }
+  [[nodiscard]] double fault_value() const noexcept { return fault_value_; }
+  /// How often each action was taken; any thread may ask.
+  [[nodiscard]] rig::GateCounts counts() const noexcept;
+  [[nodiscard]] std::uint64_t count(GateAction action) const noexcept {
+    return counts_[static_cast<std::size_t>(action)].load(std::memory_order_relaxed);
+  }
+
+ private:
+  void watch_board(const rig::Measurement& measurement) noexcept;
+  void watch_wheels(const rig::Measurement& measurement, std::int64_t now_ns, bool prompt) noexcept;
+  void require_finite(const rig::Command& wanted, const rig::WheelSpeeds& speeds) noexcept;
+  [[nodiscard]] double limited(double duty, double most, GateAction action) noexcept;
+  [[nodiscard]] double rising(double duty, double before, double rate_per_s, double elapsed_s,
+                              GateAction action) noexcept;
+  void interlock(rig::Command& command, const PhasePermission& may) noexcept;
+  void note(GateAction action) noexcept;
+
+  GateOptions options_;
+  PhasePermissions permissions_;
+  bool watching_;
+  SpeedWindows speed_windows_;
+  EncoderCheck encoders_;
+  ResponseCheck response_;
+  rig::Command sent_{};
+  bool has_sent_{false};
+  std::int64_t sent_ns_{0};
+  bool supply_known_{false};
+  bool temperature_known_{false};
+  GateAction last_action_{GateAction::passed};
+  rig::Reason fault_{rig::Reason::none};
+  double fault_value_{0.0};
+  std::array<std::atomic<std::uint64_t>, gate_action_count> counts_{};  ///< one thread alone adds
+};
+
+}  // namespace abs_hil::runtime

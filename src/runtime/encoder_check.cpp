@@ -1,0 +1,108 @@
+#include "runtime/encoder_check.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace abs_hil::runtime {
+
+namespace {
+
+using rig::Reason;
+
+// docs/safety.md, "Where the bounds come from", derives these.
+constexpr double stamp_error_s = 150e-6;  ///< of a stamp against the moment of reading
+constexpr double backwards_rad_s = 2.0;   ///< a wheel that has stopped may swing back so fast
+constexpr int outside_max = 3;            ///< speed_windows
+constexpr double rolled_after_s = 3.0;    ///< a locked wheel, released, rolls along again after this
+constexpr double disagreement_s = 0.1;
+constexpr double disagreement_m_s = 0.3;  ///< beside the share
+constexpr double earnest_brake_Nm = 1.0;
+constexpr double braked_after_s = 0.15;
+constexpr double slip_speed_m_s = 3.0;
+constexpr double ahead_part = 0.05;
+constexpr double ahead_max_s = 0.05;
+
+/// By verdict.
+using Reasons = std::array<Reason, 4>;
+constexpr Reasons upper_reasons{Reason::none, Reason::encoder_upper_stuck, Reason::encoder_upper_reversed,
+                                Reason::encoder_upper_jumped};
+constexpr Reasons lower_reasons{Reason::none, Reason::encoder_lower_stuck, Reason::encoder_lower_reversed,
+                                Reason::encoder_lower_jumped};
+
+Reason reason_of(SpeedInterval::Verdict verdict, const Reasons& reasons) noexcept {
+  return reasons[static_cast<std::size_t>(verdict)];
+}
+
+}  // namespace
+
+SpeedInterval::Verdict SpeedInterval::update(double omega_rad_s, double resolution_rad_s, double dt_s) noexcept {
+  const double slack_rad_s = resolution_rad_s + std::abs(omega_rad_s) * stamp_error_s / dt_s;
+  low_rad_s_ = std::max(low_rad_s_ - loss_rad_s2_ * dt_s, -backwards_rad_s);
+  high_rad_s_ += gain_rad_s2_ * dt_s;
+  if (omega_rad_s + slack_rad_s >= low_rad_s_ && omega_rad_s - slack_rad_s <= high_rad_s_) {
+    // The reading is a mean: at its end the wheel may have left it by what the time allows.
+    low_rad_s_ = std::max(low_rad_s_, omega_rad_s - slack_rad_s - loss_rad_s2_ * dt_s);
+    high_rad_s_ = std::min(high_rad_s_, omega_rad_s + slack_rad_s + gain_rad_s2_ * dt_s);
+    outside_ = 0;
+    return Verdict::sound;
+  }
+  ++outside_;
+  if (outside_ < outside_max) return Verdict::sound;
+  if (omega_rad_s < -slack_rad_s) return Verdict::reversed;
+  return omega_rad_s <= slack_rad_s ? Verdict::stuck : Verdict::jumped;
+}
+
+EncoderCheck::EncoderCheck(const PlausibilityLimits& limits) noexcept
+    : limits_(limits),
+      upper_(limits.upper_gain_rad_s2, limits.upper_loss_rad_s2, limits.overspeed_rad_s),
+      lower_(limits.lower_gain_rad_s2, limits.lower_loss_rad_s2, limits.overspeed_rad_s),
+      free_s_(rolled_after_s) {}
+
+CheckResult EncoderCheck::update(const SpeedWindow& speed_window) noexcept {
+  // (6) by the implicit Euler rule: good to the speed_window's share of the lag, 4 %.
+  const double share = limits_.brake.c31_per_s * speed_window.dt_s;
+  brake_Nm_ = limits_.ideal_actuator ? speed_window.brake_target_Nm
+                                     : (brake_Nm_ + share * speed_window.brake_target_Nm) / (1.0 + share);
+  free_s_ = speed_window.brake_target_Nm > 0.0 ? 0.0 : free_s_ + speed_window.dt_s;
+  braked_s_ = brake_Nm_ >= earnest_brake_Nm ? braked_s_ + speed_window.dt_s : 0.0;
+
+  CheckResult finding = judge_speeds(speed_window);
+  if (finding.sound()) finding = judge_rolling(speed_window);
+  if (finding.sound()) finding = judge_slip(speed_window);
+  return finding;
+}
+
+CheckResult EncoderCheck::judge_speeds(const SpeedWindow& speed_window) noexcept {
+  using Verdict = SpeedInterval::Verdict;
+  const Verdict upper = upper_.update(speed_window.omega1_rad_s, speed_window.resolution_rad_s, speed_window.dt_s);
+  const Verdict lower = lower_.update(speed_window.omega2_rad_s, speed_window.resolution_rad_s, speed_window.dt_s);
+  const bool both_doubtful = upper_.doubtful() && lower_.doubtful();
+  if (both_doubtful && (upper == Verdict::stuck || lower == Verdict::stuck)) return {Reason::encoders_lost, 0.0};
+  if (upper != Verdict::sound) return {reason_of(upper, upper_reasons), speed_window.omega1_rad_s};
+  return {reason_of(lower, lower_reasons), speed_window.omega2_rad_s};
+}
+
+CheckResult EncoderCheck::judge_rolling(const SpeedWindow& speed_window) noexcept {
+  const double v1_m_s = limits_.wheels.r1_m * speed_window.omega1_rad_s;
+  const double v2_m_s = limits_.wheels.r2_m * speed_window.omega2_rad_s;
+  const double allowed_m_s = disagreement_m_s + limits_.free_slip_max * std::max(std::abs(v1_m_s), std::abs(v2_m_s)) +
+                             limits_.wheels.r2_m * speed_window.resolution_rad_s;
+  const bool disagrees = free_s_ >= rolled_after_s && std::abs(v1_m_s - v2_m_s) > allowed_m_s;
+  disagreeing_s_ = disagrees ? disagreeing_s_ + speed_window.dt_s : 0.0;
+  if (disagreeing_s_ < disagreement_s) return {};
+  if (speed_window.omega1_rad_s == 0.0) return {Reason::encoder_upper_stuck, speed_window.omega1_rad_s};
+  if (speed_window.omega2_rad_s == 0.0) return {Reason::encoder_lower_stuck, speed_window.omega2_rad_s};
+  return {Reason::encoders_disagree, v1_m_s - v2_m_s};
+}
+
+CheckResult EncoderCheck::judge_slip(const SpeedWindow& speed_window) noexcept {
+  const double v1_m_s = limits_.wheels.r1_m * speed_window.omega1_rad_s;
+  const double v2_m_s = limits_.wheels.r2_m * speed_window.omega2_rad_s;
+  const bool ahead = braked_s_ >= braked_after_s && v2_m_s > slip_speed_m_s && v1_m_s > (1.0 + ahead_part) * v2_m_s;
+  ahead_s_ = ahead ? ahead_s_ + speed_window.dt_s : 0.0;
+  if (ahead_s_ < ahead_max_s) return {};
+  return {Reason::slip_implausible, 1.0 - v1_m_s / v2_m_s};
+}
+
+}  // namespace abs_hil::runtime

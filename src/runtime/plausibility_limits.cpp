@@ -1,0 +1,33 @@
+#include "runtime/plausibility_limits.hpp"
+
+#include <limits>
+
+#include "abs_hil/rig/brake_map.hpp"
+#include "abs_hil/rig/encoder_scale.hpp"
+
+namespace abs_hil::runtime {
+
+PlausibilityLimits plausibility_limits(const rig::RigParameters& rig, bool ideal_actuator, const GateOptions& options) {
+  constexpr double margin = 2.0;
+  const rig::WheelParameters& w = rig.wheels;
+  const double tyre_N = rig.tyre.theta_N;
+  const double brake_Nm =
+      ideal_actuator ? std::numeric_limits<double>::infinity() : rig::brake_torque_at(rig.brake, 1.0);
+  const double friction1_Nm = w.M10_Nm + w.d1_Nms_rad * options.overspeed_rad_s;
+  const double friction2_Nm = w.M20_Nm + w.d2_Nms_rad * options.overspeed_rad_s;
+  return {.enabled = true,
+          .rad_per_count = rig::radians_per_count(rig.encoder_counts_per_rev),
+          .upper_gain_rad_s2 = margin * w.r1_m * tyre_N / w.J1_kg_m2,
+          .upper_loss_rad_s2 = margin * (w.r1_m * tyre_N + brake_Nm + friction1_Nm) / w.J1_kg_m2,
+          .lower_gain_rad_s2 = margin * (w.r2_m * tyre_N + rig.motor.stall_torque_Nm) / w.J2_kg_m2,
+          .lower_loss_rad_s2 = margin * (w.r2_m * tyre_N + friction2_Nm) / w.J2_kg_m2,
+          .overspeed_rad_s = options.overspeed_rad_s,
+          .sample_age_max_s = options.sample_age_max_s,
+          .free_slip_max = options.free_slip_max,
+          .ideal_actuator = ideal_actuator,
+          .wheels = w,
+          .brake = rig.brake,
+          .motor = rig.motor};
+}
+
+}  // namespace abs_hil::runtime

@@ -1,0 +1,92 @@
+#include "runtime/speed_window.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include "abs_hil/rig/brake_map.hpp"
+#include "abs_hil/rig/encoder_scale.hpp"
+#include "abs_hil/rig/time_units.hpp"
+
+namespace abs_hil::runtime {
+
+namespace {
+/// A little under two cycles at 1 kHz, so that jitter does not make three of them.
+constexpr double stride_s = 1.8e-3;
+/// One held-up answer is no fault, however long it took.
+constexpr int stale_cycles_max = 5;
+constexpr double resolution_counts = 2.0;
+/// No counter goes on by more than twice the overspeed does in the time since the measurement before, and this.
+constexpr double leap_slack_s = 1e-3;
+}  // namespace
+
+void SpeedWindows::begin(const rig::Measurement& measurement) noexcept {
+  begin_ns_ = measurement.time_ns;
+  begin_upper_ = measurement.upper_counts;
+  begin_lower_ = measurement.lower_counts;
+  brake_impulse_Nms_ = 0.0;
+  motor_duty_s_ = 0.0;
+}
+
+bool SpeedWindows::fresh(std::int64_t stamp_ns, std::int64_t now_ns) noexcept {
+  const bool recent = std::abs(static_cast<double>(now_ns - stamp_ns)) * rig::s_per_ns <= limits_.sample_age_max_s;
+  if (!recent || (started_ && stamp_ns <= stamp_ns_)) {
+    ++stale_cycles_;
+    return false;
+  }
+  stale_cycles_ = 0;
+  fresh_ns_ = now_ns;
+  return true;
+}
+
+bool SpeedWindows::leaps(std::int32_t before, std::int32_t now, double since_s) const noexcept {
+  const double turned_rad = std::abs(static_cast<double>(rig::counts_between(before, now))) * limits_.rad_per_count;
+  return turned_rad > 2.0 * limits_.overspeed_rad_s * (since_s + leap_slack_s);
+}
+
+CheckResult SpeedWindows::update(const rig::Measurement& measurement, std::int64_t now_ns, const rig::Command& sent,
+                                 bool prompt) noexcept {
+  complete_ = false;
+  usable_ = fresh(measurement.time_ns, now_ns);
+  if (!usable_) {
+    const double missing_s = static_cast<double>(now_ns - fresh_ns_) * rig::s_per_ns;
+    const bool lost = stale_cycles_ >= stale_cycles_max && missing_s >= limits_.sample_age_max_s;
+    return lost ? CheckResult{rig::Reason::samples_missing, missing_s} : CheckResult{};
+  }
+  const double since_s = static_cast<double>(measurement.time_ns - stamp_ns_) * rig::s_per_ns;
+  const std::int32_t upper_before = std::exchange(upper_, measurement.upper_counts);
+  const std::int32_t lower_before = std::exchange(lower_, measurement.lower_counts);
+  stamp_ns_ = measurement.time_ns;
+  if (!started_) {
+    started_ = true;
+    begin(measurement);
+    return {};
+  }
+  const double brake_Nm =
+      limits_.ideal_actuator ? sent.brake_torque_Nm : rig::brake_torque_at(limits_.brake, sent.brake_duty);
+  brake_impulse_Nms_ += brake_Nm * since_s;
+  motor_duty_s_ += sent.motor_duty * since_s;
+  if (!prompt) return {};
+  const bool upper_leaps = leaps(upper_before, upper_, since_s);
+  usable_ = !upper_leaps && !leaps(lower_before, lower_, since_s);
+  if (!usable_) {
+    const std::int32_t leapt =
+        upper_leaps ? rig::counts_between(upper_before, upper_) : rig::counts_between(lower_before, lower_);
+    return {upper_leaps ? rig::Reason::encoder_upper_jumped : rig::Reason::encoder_lower_jumped,
+            leapt * limits_.rad_per_count};
+  }
+
+  const double dt_s = static_cast<double>(measurement.time_ns - begin_ns_) * rig::s_per_ns;
+  if (dt_s < stride_s) return {};
+  const double rad_s_per_count = limits_.rad_per_count / dt_s;
+  speed_window_ = {.dt_s = dt_s,
+                   .omega1_rad_s = rig::counts_between(begin_upper_, measurement.upper_counts) * rad_s_per_count,
+                   .omega2_rad_s = rig::counts_between(begin_lower_, measurement.lower_counts) * rad_s_per_count,
+                   .resolution_rad_s = resolution_counts * rad_s_per_count,
+                   .brake_target_Nm = brake_impulse_Nms_ / dt_s,
+                   .motor_duty = motor_duty_s_ / dt_s};
+  complete_ = true;
+  begin(measurement);
+  return {};
+}
+
+}  // namespace abs_hil::runtime

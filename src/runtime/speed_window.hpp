@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+
+#include "abs_hil/rig/command.hpp"
+#include "abs_hil/rig/measurement.hpp"
+#include "abs_hil/rig/reason.hpp"
+#include "runtime/plausibility_limits.hpp"
+
+namespace abs_hil::runtime {
+
+/// A fault found, or none.
+struct CheckResult {
+  rig::Reason reason{rig::Reason::none};
+  double value{0.0};
+  [[nodiscard]] bool sound() const noexcept { return reason == rig::Reason::none; }
+};
+
+/// What the wheels did over a stretch of about 2 ms, long enough for the encoders to tell, and what was sent meanwhile.
+struct SpeedWindow {
+  double dt_s{0.0};
+  double omega1_rad_s{0.0};  ///< mean over the stretch, from counts alone
+  double omega2_rad_s{0.0};
+  double resolution_rad_s{0.0};  ///< what two counts are in this time
+  double brake_target_Nm{0.0};   ///< mean of b(u), or of the torque asked for with an ideal actuator
+  double motor_duty{0.0};        ///< mean
+};
+
+/// Judges whether measurements are fresh and joins them to speed_windows. Real-time safe.
+class SpeedWindows {
+ public:
+  explicit SpeedWindows(const PlausibilityLimits& limits) noexcept : limits_(limits) {}
+
+  /// Takes a measurement and the command that has acted since the one before.
+  /// @param now_ns  the cycle's wake-up, on the clock of the stamps
+  /// @param prompt  the reading was not held up, so that its stamp holds for its counts: no speed_window ends on
+  /// another
+  CheckResult update(const rig::Measurement& measurement, std::int64_t now_ns, const rig::Command& sent,
+                     bool prompt = true) noexcept;
+  /// True if the latest measurement may be used: fresh, and no counter has leapt.
+  [[nodiscard]] bool usable() const noexcept { return usable_; }
+  /// True if the latest update completed a speed_window.
+  [[nodiscard]] bool complete() const noexcept { return complete_; }
+  [[nodiscard]] const SpeedWindow& speed_window() const noexcept { return speed_window_; }
+
+ private:
+  [[nodiscard]] bool fresh(std::int64_t stamp_ns, std::int64_t now_ns) noexcept;
+  void begin(const rig::Measurement& measurement) noexcept;
+
+  [[nodiscard]] bool leaps(std::int32_t before, std::int32_t now, double since_s) const noexcept;
+
+  PlausibilityLimits limits_;
+  bool started_{false};
+  bool usable_{true};
+  bool complete_{false};
+  int stale_cycles_{0};
+  std::int64_t fresh_ns_{0};  ///< the cycle of the latest fresh measurement
+  std::int64_t stamp_ns_{0};  ///< its stamp
+  std::int32_t upper_{0};     ///< its counts
+  std::int32_t lower_{0};
+  std::int64_t begin_ns_{0};  ///< of the speed_window
+  std::int32_t begin_upper_{0};
+  std::int32_t begin_lower_{0};
+  double brake_impulse_Nms_{0.0};  ///< of b(u) over the speed_window
+  double motor_duty_s_{0.0};
+  SpeedWindow speed_window_{};
+};
+
+}  // namespace abs_hil::runtime

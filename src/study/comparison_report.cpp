@@ -1,0 +1,220 @@
+// The comparison as text, Markdown, CSV and JSON.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "analysis/json_number.hpp"
+#include "study/comparison_table.hpp"
+
+namespace abs_hil::study {
+
+namespace {
+
+using analysis::Estimate;
+using Cells = std::vector<std::vector<std::string>>;
+
+/// "2.331 ± 0.012", with the number of runs behind it where some have no value.
+std::string shown(const Estimate& e, std::size_t runs, int decimals, bool with_sign) {
+  if (e.n == 0) return "-";
+  std::string text = with_sign ? fmt::format("{:+.{}f}", e.mean, decimals) : fmt::format("{:.{}f}", e.mean, decimals);
+  if (e.n > 1) text += fmt::format(" ± {:.{}f}", e.half_width(), decimals);
+  if (e.n < runs) text += fmt::format(" ({} runs)", e.n);
+  return text;
+}
+
+std::string title_of(const ComparedMetric& metric) {
+  return metric.unit.empty() ? std::string(metric.title) : fmt::format("{} / {}", metric.title, metric.unit);
+}
+
+/// Rows of the means: one a metric, a column for each controller.
+Cells mean_cells(const ComparisonTable& table) {
+  Cells cells{{""}};
+  for (const ControllerColumn& column : table.columns) cells[0].push_back(column.name);
+  for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
+    const ComparedMetric& metric = compared_metrics()[m];
+    std::vector<std::string>& row = cells.emplace_back(1, title_of(metric));
+    for (const ControllerColumn& column : table.columns) {
+      row.push_back(shown(column.means[m], column.runs, metric.decimals, false));
+    }
+  }
+  cells.push_back({"runs ended by a fault"});
+  cells.push_back({"runs that locked"});
+  for (const ControllerColumn& column : table.columns) {
+    cells[cells.size() - 2].push_back(fmt::format("{}", column.faults));
+    cells.back().push_back(fmt::format("{}", column.locked));
+  }
+  return cells;
+}
+
+Cells difference_cells(const ComparisonTable& table) {
+  Cells cells{{fmt::format("less {}", table.columns.front().name)}};
+  for (std::size_t c = 1; c < table.columns.size(); ++c) cells[0].push_back(table.columns[c].name);
+  for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
+    const ComparedMetric& metric = compared_metrics()[m];
+    std::vector<std::string>& row = cells.emplace_back(1, title_of(metric));
+    for (std::size_t c = 1; c < table.columns.size(); ++c) {
+      row.push_back(shown(table.columns[c].differences[m], table.repeat, metric.decimals, true));
+    }
+  }
+  return cells;
+}
+
+/// Characters, not bytes.
+std::size_t width_of(const std::string& text) {
+  return static_cast<std::size_t>(
+      std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+}
+
+std::string aligned(const Cells& cells) {
+  std::vector<std::size_t> widths(cells.front().size(), 0);
+  for (const auto& row : cells) {
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], width_of(row[i]));
+  }
+  std::string text;
+  for (const auto& row : cells) {
+    std::string line;
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      const std::string pad(widths[i] - width_of(row[i]), ' ');
+      line += i == 0 ? row[i] + pad : "   " + pad + row[i];
+    }
+    text += "  " + line + '\n';
+  }
+  return text;
+}
+
+std::string markdown(const Cells& cells) {
+  std::string text;
+  for (std::size_t r = 0; r < cells.size(); ++r) {
+    text += '|';
+    for (const std::string& cell : cells[r]) text += ' ' + cell + " |";
+    text += '\n';
+    if (r > 0) continue;
+    text += "|---|";
+    for (std::size_t i = 1; i < cells[r].size(); ++i) text += "---:|";
+    text += '\n';
+  }
+  return text;
+}
+
+std::string heading(const ComparisonTable& t) {
+  const std::string start =
+      t.start_speed_rad_s > 0.0 ? fmt::format("braking from {} rad/s", t.start_speed_rad_s) : "from standstill";
+  return fmt::format("Plant {}, experiment {}, {} to {} m/s, slip reference {}.\n", t.plant, t.experiment, start,
+                     t.end_speed_m_s, t.slip_ref) +
+         fmt::format("{} run{} of each controller, seed {}, plants varied by {}{}.\n", t.repeat,
+                     t.repeat == 1 ? "" : "s", t.seed, t.variation.text(),
+                     t.repeat > 1 ? "; mean ± half of the 95 % confidence interval" : "");
+}
+
+std::string shown_ratio(const Estimate& ratio) {
+  if (ratio.n == 0) return "-";
+  const std::string mean = fmt::format("{:.4f}", ratio.mean);
+  return ratio.n > 1 ? fmt::format("{} [{:.4f}, {:.4f}]", mean, ratio.low, ratio.high) : mean;
+}
+
+std::string ratio_line(const PaperRatio& r) {
+  return fmt::format(
+      "adaptive / sliding-mode: stop time {}, stop distance {}, torque variation {}; the paper: {:.3f} for time and "
+      "distance ({:.1f} % less).\n",
+      shown_ratio(r.stop_time), shown_ratio(r.stop_distance), shown_ratio(r.torque_total_variation), 1.0 - paper_saving,
+      100.0 * paper_saving);
+}
+
+nlohmann::ordered_json json_of(const Estimate& e) {
+  return {{"n", e.n},
+          {"mean", analysis::number_or_null(e.mean)},
+          {"standard_deviation", analysis::number_or_null(e.standard_deviation)},
+          {"ci95_low", analysis::number_or_null(e.low)},
+          {"ci95_high", analysis::number_or_null(e.high)}};
+}
+
+}  // namespace
+
+std::string to_text(const ComparisonTable& table) {
+  std::string text = heading(table) + '\n' + aligned(mean_cells(table));
+  if (table.columns.size() > 1) {
+    text += "\nDifferences, run by run on the same plants:\n" + aligned(difference_cells(table));
+  }
+  if (table.paper_ratio) text += '\n' + ratio_line(*table.paper_ratio);
+  return text;
+}
+
+std::string to_markdown(const ComparisonTable& table) {
+  std::string text = heading(table) + '\n' + markdown(mean_cells(table));
+  if (table.columns.size() > 1) text += '\n' + markdown(difference_cells(table));
+  if (table.paper_ratio) text += '\n' + ratio_line(*table.paper_ratio);
+  return text;
+}
+
+std::string to_csv(const ComparisonTable& table) {
+  std::string text =
+      "controller,metric,n,mean,standard_deviation,ci95_low,ci95_high,difference,difference_ci95_low,"
+      "difference_ci95_high\n";
+  for (const ControllerColumn& column : table.columns) {
+    for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
+      const Estimate& e = column.means[m];
+      const double unknown = rig::unknown;
+      const Estimate d = column.differences.empty() ? Estimate{.mean = unknown, .low = unknown, .high = unknown}
+                                                    : column.differences[m];
+      text += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", column.name, compared_metrics()[m].key, e.n, e.mean,
+                          e.standard_deviation, e.low, e.high, d.mean, d.low, d.high);
+    }
+  }
+  return text;
+}
+
+std::string to_json(const ComparisonTable& t, const std::string& config_json) {
+  nlohmann::ordered_json controllers = nlohmann::ordered_json::array();
+  for (const ControllerColumn& column : t.columns) {
+    nlohmann::ordered_json means;
+    nlohmann::ordered_json differences;
+    for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
+      const std::string key(compared_metrics()[m].key);
+      means[key] = json_of(column.means[m]);
+      if (!column.differences.empty()) differences[key] = json_of(column.differences[m]);
+    }
+    controllers.push_back({{"name", column.name},
+                           {"runs", column.runs},
+                           {"faults", column.faults},
+                           {"locked", column.locked},
+                           {"metrics", means},
+                           {"difference_from_first", differences}});
+  }
+  nlohmann::ordered_json root{{"plant", t.plant},
+                              {"experiment", t.experiment},
+                              {"start_speed_rad_s", t.start_speed_rad_s},
+                              {"end_speed_m_s", t.end_speed_m_s},
+                              {"slip_ref", t.slip_ref},
+                              {"repeat", t.repeat},
+                              {"seed", t.seed},
+                              {"vary", t.variation.text()},
+                              {"controllers", controllers}};
+  if (t.paper_ratio) {
+    root["adaptive_over_sliding_mode"] = {{"stop_time", json_of(t.paper_ratio->stop_time)},
+                                          {"stop_distance", json_of(t.paper_ratio->stop_distance)},
+                                          {"torque_total_variation", json_of(t.paper_ratio->torque_total_variation)},
+                                          {"paper", 1.0 - paper_saving}};
+  }
+  root["config"] = nlohmann::ordered_json::parse(config_json);
+  return root.dump(2) + '\n';
+}
+
+std::string runs_csv(const ComparisonPlan& plan, const Comparison& comparison) {
+  std::string text = "controller,run,result";
+  for (const ComparedMetric& metric : compared_metrics()) text += ',' + std::string(metric.key);
+  text += '\n';
+  for (std::size_t c = 0; c < plan.controllers.size(); ++c) {
+    for (std::size_t k = 0; k < comparison.results[c].size(); ++k) {
+      const RunResult& run = comparison.results[c][k];
+      text += fmt::format("{},{},{}", plan.controllers[c], k, run.stopped() ? "completed" : "fault");
+      for (const ComparedMetric& metric : compared_metrics()) text += fmt::format(",{}", run.metrics.*metric.value);
+      text += '\n';
+    }
+  }
+  return text;
+}
+
+}  // namespace abs_hil::study

@@ -1,0 +1,49 @@
+#include "study/simulated_run.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include "config/plan.hpp"
+#include "driver/sim/sim_driver.hpp"
+#include "experiment/run_logic.hpp"
+#include "runtime/clock.hpp"
+#include "runtime/command_gate.hpp"
+#include "runtime/cyclic_executive.hpp"
+#include "runtime/record_pump.hpp"
+
+namespace abs_hil::study {
+
+namespace {
+
+/// Emptied after every cycle: RunSession's ring, made for a slow disk, would cost more to clear than the run to
+/// compute.
+constexpr std::size_t ring_capacity = 2;
+
+}  // namespace
+
+RunResult simulate(const config::Settings& settings, const plant_sim::PlantOptions& plant, std::uint64_t seed) {
+  runtime::VirtualClock clock;
+  driver::SimDriver driver(plant, {.seed = seed, .start_speed_rad_s = settings.experiment.start_speed_rad_s});
+  config::Plan plan = config::plan(settings);
+  experiment::RunLogic logic(experiment::make_logic_parts(settings.control, settings.plant.rig,
+                                                          settings.plant.ideal_actuator, settings.gate,
+                                                          settings.experiment, std::move(plan.phases), plan.limits));
+  runtime::CommandGate gate = logic.make_gate(settings.gate);
+  runtime::RecordRing ring(ring_capacity);
+  runtime::CyclicExecutive executive(clock, driver, logic, gate, ring, std::llround(1e9 / settings.control.rate_Hz));
+  analysis::RunMetrics metrics(plant.rig.wheels.r2_m, settings.experiment.end_speed_m_s);
+  runtime::RecordPump pump(ring, plant.rig.wheels.r2_m, {&metrics});
+
+  driver.configure();
+  driver.activate(clock.now_ns());
+  bool running = true;
+  while (running && !metrics.complete()) {
+    running = executive.step();
+    pump.drain();
+  }
+  // The last cycle of a whole sequence ends with a reason that is no fault; an early end by a limit or fault is one.
+  const rig::Reason end = logic.end_reason();
+  return {.metrics = metrics.metrics(), .fault = rig::is_fault(end) ? end : rig::Reason::none};
+}
+
+}  // namespace abs_hil::study

@@ -1,0 +1,154 @@
+#include "study/variation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <random>
+#include <stdexcept>
+
+namespace abs_hil::study {
+
+namespace {
+
+constexpr double standard_magnitude = 0.1;
+constexpr double largest_magnitude = 0.5;
+constexpr double largest_C = 2.0;    ///< above it the tyre force would change sign at large slip
+constexpr double largest_u0 = 0.99;  ///< the dead zone leaves some duty to brake with
+/// Sensor seed of a series that does not vary the phase.
+constexpr std::uint64_t fixed_sensor_seed = 1;
+
+double parse_magnitude(std::string_view entry, std::string_view text) {
+  double value = 0.0;
+  const char* end = text.data() + text.size();
+  const auto [at, error] = std::from_chars(text.data(), end, value);
+  if (error != std::errc() || at != end || !(value >= 0.0 && value <= largest_magnitude)) {
+    throw std::invalid_argument(
+        fmt::format("--vary: \"{}\": give a magnitude in [0, {}], as in theta=0.1", entry, largest_magnitude));
+  }
+  return value;
+}
+
+void parse_entry(std::string_view entry, Variation& v) {
+  if (entry == "phase") {
+    v.phase = true;
+    return;
+  }
+  const std::size_t equals = entry.find('=');
+  const std::string_view name = entry.substr(0, equals);
+  const auto magnitude = [&] {
+    return parse_magnitude(entry, equals == entry.npos ? std::string_view() : entry.substr(equals + 1));
+  };
+  if (name == "parameters") {
+    v.wheels = v.brake = v.tyre = magnitude();
+  } else if (name == "wheels") {
+    v.wheels = magnitude();
+  } else if (name == "brake") {
+    v.brake = magnitude();
+  } else if (name == "tyre") {
+    v.tyre = magnitude();
+  } else if (name == "theta") {
+    v.theta = magnitude();
+  } else if (name == "radii") {
+    v.radii = magnitude();
+  } else {
+    throw std::invalid_argument(fmt::format(
+        "--vary: \"{}\" is not known; known: parameters, wheels, brake, tyre, theta, radii, phase, none", entry));
+  }
+}
+
+/// Uniform in [-1, 1) from the generator's upper 53 bits: the same with every standard library.
+double symmetric(std::mt19937_64& generator) { return static_cast<double>(generator() >> 11U) * 0x1p-52 - 1.0; }
+
+}  // namespace
+
+Variation Variation::standard() noexcept {
+  return {.wheels = standard_magnitude,
+          .brake = standard_magnitude,
+          .tyre = standard_magnitude,
+          .theta = standard_magnitude,
+          .phase = true};
+}
+
+Variation Variation::parse(std::string_view text) {
+  Variation result;
+  if (text == "none") return result;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    parse_entry(text.substr(begin, end - begin), result);
+    begin = end + 1;
+  }
+  return result;
+}
+
+std::string Variation::text() const {
+  std::string text;
+  const auto add = [&text](const std::string& entry) { text += (text.empty() ? "" : ",") + entry; };
+  const auto add_magnitude = [&add](std::string_view name, double magnitude) {
+    if (magnitude > 0.0) add(fmt::format("{}={}", name, magnitude));
+  };
+  if (wheels == brake && brake == tyre) {
+    add_magnitude("parameters", wheels);
+  } else {
+    add_magnitude("wheels", wheels);
+    add_magnitude("brake", brake);
+    add_magnitude("tyre", tyre);
+  }
+  add_magnitude("theta", theta);
+  add_magnitude("radii", radii);
+  if (phase) add("phase");
+  return text.empty() ? "none" : text;
+}
+
+Perturbation draw(const Variation& v, std::uint64_t seed, std::uint64_t index) {
+  std::seed_seq sequence{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32U),
+                         static_cast<std::uint32_t>(index), static_cast<std::uint32_t>(index >> 32U)};
+  std::mt19937_64 generator(sequence);
+  // Every number is drawn, in this order, whether it is used or not.
+  const auto factor = [&generator](double magnitude) { return 1.0 + magnitude * symmetric(generator); };
+  Perturbation p;
+  for (double* wheel : {&p.J1, &p.J2, &p.d1, &p.d2, &p.M10, &p.M20}) *wheel = factor(v.wheels);
+  for (double* brake : {&p.brake_gain, &p.u0, &p.c31}) *brake = factor(v.brake);
+  for (double* tyre : {&p.B, &p.C}) *tyre = factor(v.tyre);
+  p.theta = factor(v.theta);
+  for (double* radius : {&p.r1, &p.r2}) *radius = factor(v.radii);
+  const std::uint64_t sensor_seed = generator();
+  p.sensor_seed = v.phase ? sensor_seed : fixed_sensor_seed;
+  return p;
+}
+
+plant_sim::PlantOptions perturbed(const plant_sim::PlantOptions& nominal, const Perturbation& p) {
+  plant_sim::PlantOptions plant = nominal;
+  rig::WheelParameters& w = plant.rig.wheels;
+  w.J1_kg_m2 *= p.J1;
+  w.J2_kg_m2 *= p.J2;
+  w.d1_Nms_rad *= p.d1;
+  w.d2_Nms_rad *= p.d2;
+  w.M10_Nm *= p.M10;
+  w.M20_Nm *= p.M20;
+  w.r1_m *= p.r1;
+  w.r2_m *= p.r2;
+  // b1 and b2 together: pads that rub better scale the whole map.
+  rig::BrakeParameters& b = plant.rig.brake;
+  b.b1_Nm *= p.brake_gain;
+  b.b2_Nm *= p.brake_gain;
+  b.u0 = std::min(largest_u0, b.u0 * p.u0);
+  b.c31_per_s *= p.c31;
+  rig::TyreParameters& t = plant.rig.tyre;
+  t.B *= p.B;
+  t.C = std::min(largest_C, t.C * p.C);
+  // B stretches the slip axis: the maker's curve depends on slip through s^p/a.
+  plant_sim::IntecoMuParameters& mu = plant.inteco_mu;
+  mu.a /= std::pow(p.B, mu.p);
+  if (plant.load == "lever") {
+    // The force is friction times load: theta is no parameter there.
+    plant.mu_peak *= p.theta;
+    for (double* weight : {&mu.w1, &mu.w2, &mu.w3, &mu.w4}) *weight *= p.theta;
+  } else {
+    t.theta_N *= p.theta;
+  }
+  return plant;
+}
+
+}  // namespace abs_hil::study

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+#include "telemetry/message_fields.hpp"
+
+namespace abs_hil::telemetry {
+
+/// Reads LCM's big-endian fields one by one, never beyond the end. Once a field did not fit nothing is read any more.
+class FieldReader {
+ public:
+  explicit FieldReader(std::span<const std::uint8_t> packet) : rest_(packet) {}
+
+  template <class Number>
+    requires std::is_integral_v<Number>
+  void operator()(std::string_view /*name*/, Number& value) {
+    std::uint64_t bits = 0;
+    if (!read(bits, sizeof value)) return;
+    value = static_cast<Number>(bits);
+  }
+  void operator()(std::string_view /*name*/, double& value) {
+    std::uint64_t bits = 0;
+    if (read(bits, sizeof value)) value = std::bit_cast<double>(bits);
+  }
+  /// A string is its length with the final NUL, then its bytes with the NUL.
+  void operator()(std::string_view /*name*/, std::string& value) {
+    std::uint64_t length = 0;
+    if (!read(length, sizeof(std::int32_t))) return;
+    sound_ = length > 0 && length <= rest_.size() && rest_[length - 1] == 0;
+    if (!sound_) return;
+    value.assign(reinterpret_cast<const char*>(rest_.data()), length - 1);
+    // A NUL within: the generated encoder would cut the text there.
+    sound_ = value.find('\0') == std::string::npos;
+    rest_ = rest_.subspan(length);
+  }
+  [[nodiscard]] bool sound() const noexcept { return sound_; }
+  [[nodiscard]] bool at_end() const noexcept { return rest_.empty(); }
+
+ private:
+  bool read(std::uint64_t& bits, std::size_t bytes) {
+    sound_ = sound_ && rest_.size() >= bytes;
+    if (!sound_) return false;
+    for (std::size_t i = 0; i < bytes; ++i) bits = bits << 8U | rest_[i];
+    rest_ = rest_.subspan(bytes);
+    return true;
+  }
+
+  std::span<const std::uint8_t> rest_;
+  bool sound_{true};
+};
+
+/// The fingerprint that a packet begins with, 0 for one too short to have any.
+[[nodiscard]] inline std::int64_t fingerprint_of(std::span<const std::uint8_t> packet) {
+  std::int64_t fingerprint = 0;
+  FieldReader reader(packet);
+  reader("fingerprint", fingerprint);
+  return fingerprint;
+}
+
+/// Decodes what anybody may have sent or damaged. Unlike the generated decode(), which trusts lengths (a string of
+/// length 0 or less throws or worse), it checks every one first. Returns what is wrong, empty if `message` is valid;
+/// else its fields are not to be used. Throws nothing but std::bad_alloc.
+template <class Message>
+[[nodiscard]] std::string_view decode_checked(std::span<const std::uint8_t> packet, Message& message) {
+  if (packet.size() < sizeof(std::int64_t)) return "shorter than a fingerprint";
+  if (fingerprint_of(packet) != static_cast<std::int64_t>(Message::getHash())) return "wrong fingerprint";
+  FieldReader reader(packet.subspan(sizeof(std::int64_t)));
+  visit_fields(message, reader);
+  if (!reader.sound()) return "truncated or damaged";
+  if (!reader.at_end()) return "longer than its type";
+  return {};
+}
+
+}  // namespace abs_hil::telemetry

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "rig/record_sink.hpp"
+
+namespace abs_hil::telemetry {
+
+/// The CSV's first line, without the line end. Names and order are a contract; columns may be added at the end.
+inline constexpr std::string_view csv_header =
+    "time_s,phase,omega1_rad_s,omega2_rad_s,omega1_est_rad_s,omega2_est_rad_s,slip,slip_est,slip_ref,brake_torque_Nm,"
+    "brake_torque_ref_Nm,brake_torque_est_Nm,brake_pwm,motor_pwm,motor_enable,theta_N,theta_est_N,distance_m,"
+    "slip_velocity_error_m_s";
+
+/// Longest row: 17 doubles of at most 24 characters, their separators, the phase and the flag, with room to spare.
+inline constexpr std::size_t csv_row_max_bytes = 640;
+
+/// Writes a row with its line end to `out` and returns its length. Doubles are the shortest text that reads back
+/// bit-exactly; NaN is `NaN`. The same on every locale.
+std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, char (&out)[csv_row_max_bytes]) noexcept;
+
+/// One row a cycle into a file, written in blocks of at most 64 KiB of whole rows.
+class CsvSink : public rig::RecordSink {
+ public:
+  /// Creates or empties the file. Throws FileError when it cannot be opened.
+  /// @param write_period_ns  rows older than this, by the records' stamps, are handed to the kernel, so that a program
+  ///                         that is killed loses no more; 0: only when a block is full
+  explicit CsvSink(std::filesystem::path path, std::int64_t write_period_ns = 0);
+  /// Writes out what is buffered, if finish() was not called; a failure then goes unseen.
+  ~CsvSink() override;
+
+  void consume(const rig::CycleRecord& record, double distance_m) override;
+  /// Throws FileError when any write failed since the start, as on a full disk. Closes the file in any case.
+  void finish() override;
+
+  /// True once a write failed: what comes after is not in the file.
+  [[nodiscard]] bool failed() const noexcept { return error_number_ != 0; }
+  /// Rows that are not in the file, or in part only.
+  [[nodiscard]] std::uint64_t rows_lost() const noexcept { return rows_lost_; }
+
+ private:
+  void append(const char* text, std::size_t size) noexcept;
+  void flush() noexcept;
+  void close() noexcept;
+
+  std::filesystem::path path_;
+  std::vector<char> buffer_;
+  std::int64_t write_period_ns_;
+  std::int64_t last_write_ns_{0};  ///< stamp of the record after which rows were last written
+  std::size_t used_bytes_{0};
+  std::uint64_t rows_buffered_{0};
+  std::uint64_t rows_lost_{0};
+  int file_{-1};
+  int error_number_{0};  ///< errno of the first write that failed
+};
+
+}  // namespace abs_hil::telemetry

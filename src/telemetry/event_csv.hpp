@@ -1,0 +1,33 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "rig/record_sink.hpp"
+#include "telemetry/event_detector.hpp"
+
+namespace abs_hil::telemetry {
+
+/// First line of events.csv. Names and order are a contract; columns may be added at the end.
+inline constexpr std::string_view event_csv_header = "time_s,event,phase,reason,value";
+
+/// The events of a run (those of ABS_EVENT) as a CSV file: phase changes, faults, limits. `phase` is the phase entered
+/// or acting, `reason` the words of rig::description, `value` what led to it, in the SI unit of its quantity.
+class EventCsv : public rig::RecordSink {
+ public:
+  /// Creates or empties the file. Throws FileError when it cannot be opened.
+  explicit EventCsv(std::filesystem::path path);
+
+  void consume(const rig::CycleRecord& record, double distance_m) override;
+  /// Writes the file. Throws FileError when it cannot be written.
+  void finish() override;
+
+ private:
+  std::filesystem::path path_;
+  std::string text_;
+  EventDetector detector_;
+};
+
+}  // namespace abs_hil::telemetry

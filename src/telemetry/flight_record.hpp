@@ -1,0 +1,35 @@
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "abs_hil/rig/cycle_record.hpp"
+#include "abs_hil/rig/reason.hpp"
+#include "telemetry/message_stream.hpp"
+
+namespace abs_hil::telemetry {
+
+/// What a flight recorder held when something went wrong, and why it is written.
+struct FlightRecord {
+  std::span<const rig::CycleRecord> records;  ///< in order
+  rig::Reason reason{rig::Reason::none};
+  double reason_value{0.0};
+  std::string account{};  ///< in words, several lines: what happened and what was done
+};
+
+/// The columns of the recorder's CSV beyond those of a run's.
+inline constexpr std::string_view flight_csv_extra_header =
+    ",cycle,stamp_ns,upper_counts,lower_counts,supply_V,temperature_C,trip_flags,reason,reason_value,"
+    "wakeup_latency_us,cycle_us";
+
+/// Writes `PREFIX.csv` (a row a cycle, `distance_m` NaN, with more columns than a run's CSV), `PREFIX.lcmlog` (the
+/// messages of a run, then an ABS_EVENT of kind "fault" with the reason) and `PREFIX.txt` (reason and account). Each is
+/// tried whatever becomes of the others. Returns the files written; the problems are appended to `problems`.
+std::vector<std::filesystem::path> write_flight_record(const std::filesystem::path& prefix, const FlightRecord& record,
+                                                       const ExperimentInfo& experiment,
+                                                       const std::string& channel_prefix,
+                                                       std::vector<std::string>& problems);
+
+}  // namespace abs_hil::telemetry

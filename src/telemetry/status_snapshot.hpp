@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "rig/timing_summary.hpp"
+
+namespace abs_hil::telemetry {
+
+/// What only the owner of the run knows and ABS_STATUS and the status line show. All counts since the start.
+struct StatusSnapshot {
+  std::uint64_t cycles{0};
+  std::uint64_t overruns{0};            ///< cycles that missed at least one tick
+  std::uint64_t telemetry_drops{0};     ///< records that found the ring full
+  std::uint64_t gate_interventions{0};  ///< commands that the gate limited, blocked or refused
+  bool realtime{false};                 ///< real-time scheduling and locked memory are in force
+  rig::DurationQuantiles wakeup_latency{};
+  rig::DurationQuantiles cycle_time{};
+  rig::DurationQuantiles read{};
+  rig::DurationQuantiles control{};
+  rig::DurationQuantiles write{};
+  rig::OverrunCounts late{};  ///< `overruns` by cause
+};
+
+/// Called from the telemetry thread, at most ten times a second. Empty: counts are 0 and durations NaN.
+using StatusSource = std::function<StatusSnapshot()>;
+
+}  // namespace abs_hil::telemetry

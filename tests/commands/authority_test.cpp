@@ -1,0 +1,56 @@
+#include "commands/authority.hpp"
+
+#include <sys/stat.h>
+
+#include <fstream>
+
+#include "catch.hpp"
+#include "config/config_error.hpp"
+#include "temporary_folder.hpp"
+
+namespace abs_hil::commands {
+
+using Catch::Matchers::Contains;
+
+TEST_CASE("A key that is no secret, or none at all, is refused with its file and what mends it") {
+  const abs_hil::test::TemporaryFolder scratch;
+  const auto refusal = [](const std::filesystem::path& file) -> std::string {
+    try {
+      static_cast<void>(read_key(file));
+    } catch (const config::ConfigError& error) {
+      return error.what();
+    }
+    return "taken";
+  };
+  const auto with = [&](const std::string& text, mode_t mode) {
+    const std::filesystem::path file = scratch / "key";
+    std::ofstream(file) << text;
+    ::chmod(file.c_str(), mode);
+    return file;
+  };
+  CHECK_THAT(refusal(""), Contains("none given") && Contains("--set commands.key_file=commands.key"));
+  CHECK_THAT(refusal(scratch / "nowhere"),
+             Contains("nowhere' cannot be read: No such file") && Contains("openssl rand"));
+  CHECK_THAT(refusal(scratch.path), Contains("is no file"));
+  const std::string sixteen = "0123456789abcdef";
+  CHECK_THAT(refusal(with(sixteen, S_IRUSR | S_IWUSR | S_IROTH)), Contains("is open to everybody: chmod o= "));
+  CHECK_THAT(refusal(with(sixteen.substr(1) + " \n\n", S_IRUSR | S_IWUSR)), Contains("holds less than 16 characters"));
+  CHECK(read_key(with(sixteen + " \r\n", S_IRUSR | S_IWUSR | S_IRGRP)) == sixteen);
+}
+
+TEST_CASE("A mac says the same for the same message and key, and another for anything else in it") {
+  command2_t command{};
+  command.command = "slip-ref";
+  command.value = 0.15;
+  const std::string key = "0123456789abcdef";
+  const std::string mac = mac_of(command, key);
+  CHECK(mac.size() == 64);
+  CHECK(mac.find_first_not_of("0123456789abcdef") == std::string::npos);
+  CHECK(mac_of(command, key + "0") != mac);
+  command.mac = mac;  // what it carries already is left out
+  CHECK(mac_of(command, key) == mac);
+  command.value = 0.2;
+  CHECK(mac_of(command, key) != mac);
+}
+
+}  // namespace abs_hil::commands

@@ -1,0 +1,118 @@
+#include "commands/command_desk.hpp"
+
+#include <sys/stat.h>
+
+#include <fstream>
+
+#include "catch.hpp"
+#include "telemetry/message_capture.hpp"
+#include "telemetry/sample_records.hpp"
+#include "temporary_folder.hpp"
+
+namespace abs_hil::commands {
+namespace {
+
+using telemetry::test::sample_record;
+constexpr const char* key = "a secret of sixteen characters or more";
+
+config::Settings with_commands(const std::filesystem::path& key_file) {
+  std::ofstream(key_file) << key << '\n';
+  ::chmod(key_file.c_str(), S_IRUSR | S_IWUSR);
+  config::Settings settings;
+  settings.commands.enabled = true;
+  settings.commands.key_file = key_file.string();
+  settings.experiment.wait_for_start = true;
+  return settings;
+}
+
+/// A run whose real-time thread takes changes only when told to; what it says is captured.
+struct Bench {
+  abs_hil::test::TemporaryFolder scratch;
+  telemetry::test::CapturingOutlet captured;
+  telemetry::MessageStream stream{{}, {}, {}};
+  CommandDesk steering{with_commands(scratch / "key"), stream};
+  experiment::AdjustmentMailbox mailbox;
+
+  Bench() {
+    stream.add(captured);
+    steering.drive(mailbox);
+    stream.set_farewell([this] { steering.refuse_pending(); });
+    show(0, rig::Reason::none, 0);
+  }
+  /// The record of cycle `n`.
+  void show(std::uint64_t n, rig::Reason reason, double value) {
+    rig::CycleRecord record = sample_record(n);
+    record.reason = reason;
+    record.reason_value = value;
+    stream.consume(record, 0.0);
+    steering.consume(record, 0.0);
+  }
+  command2_t slip_ref(std::int64_t sequence, double value) { return command(sequence, "slip-ref", value); }
+  command2_t command(std::int64_t sequence, const std::string& what, double value) {
+    command2_t command{};
+    command.session = captured.all<command_state_t>("ABS_COMMAND_STATE").back().session;
+    command.sequence = sequence;
+    command.command = what;
+    command.value = value;
+    command.sender = std::to_string(sequence);
+    command.mac = mac_of(command, key);
+    return command;
+  }
+  [[nodiscard]] std::vector<event_t> answers() const {
+    std::vector<event_t> found;
+    for (const event_t& event : captured.all<event_t>("ABS_EVENT")) {
+      if (event.kind == "command") found.push_back(event);
+    }
+    return found;
+  }
+};
+
+TEST_CASE("a change that the run's end forestalled is refused, one that took effect is not") {
+  Bench bench;
+  REQUIRE_FALSE(bench.steering.judge(bench.slip_ref(1, 0.1)).has_value());
+  REQUIRE_FALSE(bench.steering.judge(bench.slip_ref(2, 0.2)).has_value());
+  bench.show(1, rig::Reason::slip_reference_changed, 1.0);  // the first has reached a cycle
+  CHECK(bench.answers().size() == 1);
+
+  bench.stream.finish();
+  const auto answers = bench.answers();
+  REQUIRE(answers.size() == 2);
+  CHECK(answers[0].reason == static_cast<int>(rig::Reason::slip_reference_changed));
+  CHECK(answers[1].reason == static_cast<int>(rig::Reason::command_not_now));
+  CHECK(answers[1].message ==
+        "refused: control.slip_ref = 0.2: the run ended before it could take effect (sender '2')");
+  const auto states = bench.captured.all<command_state_t>("ABS_COMMAND_STATE");
+  CHECK(states.back().accepted == 1);
+  CHECK(bench.captured.all<adjustment_t>("ABS_ADJUSTMENT").size() == 1);
+
+  bench.stream.finish();  // said once
+  CHECK(bench.answers().size() == 2);
+}
+
+TEST_CASE("after the run's end a command is refused with that reason") {
+  Bench bench;
+  bench.stream.finish();
+  const auto answer = bench.steering.judge(bench.slip_ref(1, 0.1));
+  REQUIRE(answer.has_value());
+  CHECK(answer->reason == rig::Reason::command_not_now);
+  CHECK(answer->message == "refused 'slip-ref': the run has ended");
+}
+
+TEST_CASE("a change that found no room leaves nothing behind, and can be sent again") {
+  Bench bench;
+  std::int64_t sequence = 0;
+  std::optional<telemetry::CommandAnswer> answer;
+  while (!answer) answer = bench.steering.judge(bench.slip_ref(++sequence, 0.1));
+  CHECK(answer->message == "refused 'slip-ref': too many changes at once: send it again");
+  CHECK(bench.steering.judge(bench.command(++sequence, "start", 0.0)).has_value());
+
+  experiment::AdjustmentMailbox::Arrived arrived{};
+  while (bench.mailbox.take(arrived)) {
+  }
+  CHECK_FALSE(bench.steering.judge(bench.command(++sequence, "start", 0.0)).has_value());
+  REQUIRE(bench.mailbox.take(arrived));
+  CHECK(arrived.kind == experiment::Adjustment::Kind::start);
+}
+
+}  // namespace
+}  // namespace abs_hil::commands

@@ -1,0 +1,54 @@
+// Every bad/NAME.toml must be refused with the message in bad/NAME.expected, word for word.
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "catch.hpp"
+#include "config/config_error.hpp"
+#include "config/script.hpp"
+
+using namespace abs_hil;
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string text_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+/// The message without the folder, which is another on every computer; empty if the script is taken.
+std::string refusal_of(const fs::path& path) try {
+  static_cast<void>(config::load(path.string()));
+  return {};
+} catch (const config::ConfigError& error) {
+  std::string message = error.what();
+  const std::string folder = path.parent_path().string() + '/';
+  if (message.starts_with(folder)) message.erase(0, folder.size());
+  return message + '\n';
+}
+
+}  // namespace
+
+TEST_CASE("every bad script is refused with the exact message") {
+  std::vector<fs::path> scripts;
+  for (const auto& entry : fs::directory_iterator(ABS_HIL_BAD_SCRIPTS)) {
+    if (entry.path().extension() == ".toml") scripts.push_back(entry.path());
+  }
+  std::sort(scripts.begin(), scripts.end());
+  CHECK(scripts.size() >= 40);
+  // For a new script: write down what is said, then read it with care.
+  const bool write_down = std::getenv("ABS_HIL_WRITE_EXPECTED") != nullptr;
+  for (const fs::path& path : scripts) {
+    fs::path expected = path;
+    expected.replace_extension(".expected");
+    if (write_down && !fs::exists(expected)) std::ofstream(expected, std::ios::binary) << refusal_of(path);
+    INFO(path.filename().string());
+    CHECK(refusal_of(path) == text_of(expected));
+    CHECK_FALSE(text_of(expected).empty());
+  }
+}

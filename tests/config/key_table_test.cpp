@@ -1,0 +1,135 @@
+#include "config/key_table.hpp"
+
+#include <limits>
+#include <set>
+#include <string>
+
+#include "catch.hpp"
+#include "config/config_error.hpp"
+
+using namespace abs_hil::config;
+using Catch::Matchers::Contains;
+
+namespace {
+
+struct Fixture {
+  Settings settings;
+  KeyTable table{settings};
+};
+
+std::string error_of(KeyTable& table, const std::string& assignment) {
+  try {
+    table.set_text(assignment, "--set");
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+}  // namespace
+
+TEST_CASE("values reach their place by dotted name") {
+  Fixture f;
+  f.table.set_text("plant.theta_N=30", "--set");
+  f.table.set_text("control.adaptive.ka1=2.5", "--set");
+  f.table.set_text("plant.ideal_sensors=true", "--set");
+  f.table.set_text("control.controller=nominal", "--set");
+  f.table.set_text("plant.encoder_counts_per_rev=1024", "--set");
+  CHECK(f.settings.plant.rig.tyre.theta_N == 30.0);
+  CHECK(f.settings.control.adaptive.ka1 == 2.5);
+  CHECK(f.settings.plant.ideal_sensors);
+  CHECK(f.settings.control.controller == "nominal");
+  CHECK(f.settings.plant.rig.encoder_counts_per_rev == 1024);
+}
+
+TEST_CASE("an unknown key names the nearest known one") {
+  Fixture f;
+  CHECK_THAT(error_of(f.table, "plant.thetaN=3"), Contains("unknown key plant.thetaN") && Contains("plant.theta_N"));
+}
+
+TEST_CASE("the end or the middle of a key's name is answered with the keys that hold it") {
+  Fixture f;
+  CHECK_THAT(error_of(f.table, "slip_ref=0.1"), Contains("the nearest known key is control.slip_ref ("));
+  CHECK_THAT(error_of(f.table, "ka1=2"),
+             Contains("the nearest known key is control.adaptive.ka1 or control.adaptive_actuator.ka1 ("));
+  CHECK_THAT(error_of(f.table, "pi.kp=2"), Contains("the nearest known key is control.pi.kp_per_s ("));
+  CHECK_THAT(error_of(f.table, "adaptive.gama=2"), Contains("the nearest known key is control.adaptive.gamma ("));
+}
+
+TEST_CASE("a bad value names key, value, range and unit, and changes nothing") {
+  Fixture f;
+  const std::string error = error_of(f.table, "plant.theta_N=-5");
+  CHECK_THAT(error, Contains("plant.theta_N = -5") && Contains("(0, 500]") && Contains(" N "));
+  CHECK(error.find('\n') == std::string::npos);
+  CHECK(f.settings.plant.rig.tyre.theta_N == 23.0);
+}
+
+TEST_CASE("what is no number, not whole, not finite, not a flag or not a known name is refused") {
+  Fixture f;
+  for (const char* bad :
+       {"plant.theta_N=abc", "plant.theta_N=nan", "plant.theta_N=inf", "plant.theta_N=", "plant.theta_N=3x",
+        "plant.theta_N=true", "plant.encoder_counts_per_rev=10.5", "plant.ideal_sensors=1", "control.controller=nope",
+        "control.slip_ref=1", "control.slip_ref=0", "control.rate_Hz=0", "run.seed=-1", "plant.theta_N", "=3"}) {
+    INFO(bad);
+    CHECK_FALSE(error_of(f.table, bad).empty());
+  }
+}
+
+TEST_CASE("ends of ranges belong to them unless open") {
+  const Range half_open{0.0, 1.0, true, false};
+  CHECK_FALSE(half_open.contains(0.0));
+  CHECK(half_open.contains(1.0));
+  CHECK_FALSE(half_open.contains(std::numeric_limits<double>::quiet_NaN()));
+  CHECK(half_open.text() == "(0, 1]");
+}
+
+TEST_CASE("every default lies within its own range, every key has a meaning, no name stands twice") {
+  Fixture f;
+  std::set<std::string_view> names;
+  for (const Key& key : f.table.keys()) {
+    INFO(key.name);
+    CHECK(names.insert(key.name).second);
+    CHECK_FALSE(key.meaning.empty());
+    if (const auto* number = std::get_if<double*>(&key.target)) CHECK(key.range.contains(**number));
+    if (const auto* whole = std::get_if<std::int32_t*>(&key.target)) CHECK(key.range.contains(**whole));
+    if (const auto* text = std::get_if<std::string*>(&key.target); text != nullptr && !key.allowed.empty()) {
+      CHECK(std::find(key.allowed.begin(), key.allowed.end(), **text) != key.allowed.end());
+    }
+  }
+}
+
+TEST_CASE("the names that scripts rely on exist") {
+  Fixture f;
+  std::set<std::string_view> names;
+  for (const Key& key : f.table.keys()) names.insert(key.name);
+  for (const char* name :
+       {"plant.theta_N", "plant.B", "plant.C", "plant.ideal_actuator", "plant.encoder_counts_per_rev",
+        "plant.ideal_sensors", "control.slip_ref", "control.adaptive.gamma", "control.adaptive.ks0",
+        "control.adaptive.ks1", "control.adaptive.ka1", "control.adaptive.zeta0", "control.rate_Hz",
+        "experiment.start_speed_rad_s", "experiment.end_speed_m_s"}) {
+    INFO(name);
+    CHECK(names.count(name) == 1);
+  }
+}
+
+TEST_CASE("the effective configuration is nested like a file and complete") {
+  Fixture f;
+  f.table.set_text("control.adaptive.ka1=2.5", "--set");
+  const nlohmann::ordered_json json = f.table.to_json();
+  CHECK(json["control"]["adaptive"]["ka1"] == 2.5);
+  CHECK(json["plant"]["encoder_counts_per_rev"] == 4096);
+  std::size_t leaves = 0;
+  const nlohmann::ordered_json flat = json.flatten();
+  for (const auto& item : flat.items()) leaves += item.value().is_primitive() ? 1 : 0;
+  CHECK(leaves == f.table.keys().size());
+}
+
+TEST_CASE("the effective configuration as TOML names every table once and every value as it is") {
+  Fixture f;
+  f.table.set("telemetry.channel_prefix", std::string("with \"quotes\" and \\"), "test");
+  f.table.set("plant.theta_N", 0.1 + 0.2, "test");
+  const std::string text = f.table.to_toml();
+  CHECK_THAT(text, Contains("channel_prefix = \"with \\\"quotes\\\" and \\\\\""));
+  CHECK_THAT(text, Contains("theta_N = 0.30000000000000004\n"));
+  CHECK(text.find("[control]\n") == text.rfind("[control]\n"));
+}

@@ -1,0 +1,132 @@
+#include "config/plan.hpp"
+
+#include "catch.hpp"
+#include "config/events.hpp"
+#include "config/library.hpp"
+
+using namespace abs_hil;
+using namespace abs_hil::config;
+using Catch::Matchers::Contains;
+using experiment::BrakeAction;
+using experiment::EndKind;
+
+namespace {
+
+Script parsed(const std::string& text) {
+  return parse(text, "test.toml", [](const std::string&) { return std::nullopt; });
+}
+
+constexpr const char* brake =
+    "[[phase]]\nname = \"a\"\nbrake = { slip_ref = { from = 0.1, to = 0.3, over_s = 2 } }\n"
+    "until = { lasts_s = 2 }\n";
+
+}  // namespace
+
+TEST_CASE("the paper's script makes the plan that was written in C++ before it") {
+  config::Settings s;
+  const Plan whole = plan(*find("paper"), s);
+  CHECK(whole.phase_names == std::vector<std::string>{"idle", "accelerate", "coast", "brake", "hold", "stopped"});
+  CHECK(whole.phases[1].motor_duty == 1.0);
+  REQUIRE(whole.phases[1].ends_on.size() == 1);
+  CHECK(whole.phases[1].ends_on[0].value == 170.0);
+  CHECK(whole.phases[0].time_limit_s == 1.05);
+  CHECK(whole.phases[4].brake_torque_Nm == 2.0);
+  s.experiment.cut = "peak";
+  CHECK(plan(*find("paper"), s).phases[1].ends_on[0].kind == EndKind::upper_wheel_peak);
+  s.experiment.start_speed_rad_s = 100.0;
+  CHECK(plan(*find("paper"), s).phase_names == std::vector<std::string>{"brake", "hold", "stopped"});
+}
+
+TEST_CASE("slip control always ends at the least speed for it, whatever the script says") {
+  config::Settings s;
+  s.control.v_min_m_s = 0.7;
+  const Plan made = plan(parsed(brake), s);
+  const experiment::EndCondition& last = made.phases[0].ends_on.back();
+  CHECK(last.kind == EndKind::car_speed_below);
+  CHECK(last.value == 0.7);
+  CHECK(last.reason == rig::Reason::slip_control_left_at_low_speed);
+  CHECK(made.phases[0].phase == rig::Phase::brake);
+  CHECK(made.phases[0].slip_ref_course.at(1.0) == 0.2);
+}
+
+TEST_CASE("where a phase ends no later by itself, the least speed is not asked for twice") {
+  config::Settings s;
+  s.experiment.end_speed_m_s = s.control.v_min_m_s = 0.3;
+  CHECK(plan(*find("paper"), s).phases[3].ends_on.size() == 1);
+  s.control.v_min_m_s = 0.4;
+  const auto ends = plan(*find("paper"), s).phases[3].ends_on;
+  REQUIRE(ends.size() == 2);
+  CHECK(ends[1].value == 0.4);
+  // One that asks for more than the speed need not come in time.
+  const Script both = parsed(
+      "[[phase]]\nname = \"a\"\nbrake = \"controller\"\nat_most_s = 3\n"
+      "until.all = [{ car_speed_below_m_s = 1 }, { distance_m = 5 }]\n");
+  CHECK(plan(both, s).phases[0].ends_on.size() == 2);
+}
+
+TEST_CASE("a configuration value out of the range it is used in is refused with its key") {
+  config::Settings s;
+  s.experiment.hold_torque_Nm = 1.0;
+  const Script script =
+      parsed("[[phase]]\nname = \"a\"\nmotor = \"$experiment.motor_duty\"\nuntil = { lasts_s = 1 }\n");
+  s.experiment.motor_duty = 3.0;
+  CHECK_THROWS_WITH(plan(script, s),
+                    Contains("test.toml:3:9") && Contains("$experiment.motor_duty is 3") && Contains("[0, 1]"));
+}
+
+TEST_CASE("a script whose every phase is left out is refused") {
+  const Script script = parsed("[[phase]]\nname = \"a\"\nwhen = \"control.slip_ref > 0.5\"\nuntil = { lasts_s = 1 }\n");
+  CHECK_THROWS_WITH(plan(script, config::Settings{}), Contains("every phase is left out"));
+}
+
+TEST_CASE("limits of a script only tighten") {
+  const Script script =
+      parsed(std::string(brake) + "[limits]\nwheel_speed_rad_s = 100\nbrake_duty = 0.9\nrun_time_s = 5\n");
+  config::Settings s;
+  s.gate.brake_duty_max = 0.7;
+  apply(script, s);
+  CHECK(s.gate.overspeed_rad_s == 100.0);
+  CHECK(s.gate.brake_duty_max == 0.7);
+  CHECK(plan(script, s).limits.run_time_s == 5.0);
+}
+
+TEST_CASE("what goes beyond the rig's limits is named with phase, value and limit") {
+  config::Settings s;
+  s.gate.brake_duty_max = 0.7;
+  const Script script = parsed(
+      "[[phase]]\nname = \"hard\"\nbrake = { torque_Nm = { from = 0, to = 6, over_s = 1 } }\nuntil = { lasts_s = 1 "
+      "}\n");
+  const auto problems = beyond_limits(plan(script, s), s);
+  REQUIRE(problems.size() == 1);
+  CHECK(problems[0] == "phase \"hard\": brake torque 6 N m is more than 4.458 N m");
+  s.gate.brake_duty_max = 1.0;
+  CHECK(beyond_limits(plan(script, s), s).empty());
+}
+
+TEST_CASE("friction events make a profile; the configuration's own stays") {
+  const std::string event = "[[event]]\nat_s = 1\nfriction = 0.5\ncounted_from = \"braking\"\n";
+  const Script script = parsed(std::string(brake) + event +
+                               "[[event]]\nat_s = 2\nover_s = 0.5\nfriction = 1\ncounted_from = \"braking\"\n");
+  CHECK(profile(script, "friction") == "braking time: 1; 0.5 at 1; 1 from 2 to 2.5");
+  config::Settings s;
+  s.plant.friction_profile = "time: 0.7";
+  apply(script, s);
+  CHECK(s.plant.friction_profile == "time: 0.7");
+}
+
+TEST_CASE("every part of the plant drifts by its own events, on its own clock") {
+  const Script script = parsed(std::string(brake) +
+                               "[[event]]\nat_s = 0\nbrake_torque = \"80 %\"\nfriction = 0.9\n"
+                               "[[event]]\nat_s = 1\nuntil = \"1.5 min\"\nbrake_torque = 0.5\nlower_bearing = 3\n"
+                               "[[event]]\nat_s = 2\nover_s = 1\nupper_bearing = 2\ncounted_from = \"braking\"\n"
+                               "[[event]]\nat_s = 90\nbrake_torque = 1\nmotor_torque = 0.7\n"
+                               "[[event]]\nat_s = 91\nbrake_torque = 0.8\n");
+  config::Settings s;
+  s.plant.drift.motor_torque = "time: 0.4";
+  apply(script, s);
+  CHECK(s.plant.friction_profile == "time: 0.9");
+  CHECK(s.plant.drift.brake_torque == "time: 0.8; 0.5 from 1 to 90; 1 at 90; 0.8 at 91");
+  CHECK(s.plant.drift.upper_bearing == "braking time: 1; 2 from 2 to 3");
+  CHECK(s.plant.drift.lower_bearing == "time: 1; 3 from 1 to 90");
+  CHECK(s.plant.drift.motor_torque == "time: 0.4");
+}

@@ -1,0 +1,132 @@
+#include "config/script.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "catch.hpp"
+#include "config/explain.hpp"
+#include "config/library.hpp"
+
+using namespace abs_hil;
+using namespace abs_hil::config;
+using Catch::Matchers::Contains;
+using Catch::Matchers::WithinRel;
+
+namespace {
+
+Script parsed(const std::string& text) {
+  return parse(text, "test.toml", [](const std::string& name) -> std::optional<std::string> {
+    if (name == "ramp.csv") return "time_s,value\r\n0,0\r\n1,0.5\r\n";
+    return std::nullopt;
+  });
+}
+
+}  // namespace
+
+TEST_CASE("quantities come in the units of the trade, and in no other") {
+  CHECK(parse_quantity("20 ms", Quantity::time) == 0.02);
+  CHECK(parse_quantity("1.5min", Quantity::time) == 90.0);
+  CHECK_THAT(*parse_quantity("1700 rpm", Quantity::angular_speed),
+             WithinRel(1700.0 * 2.0 * std::numbers::pi / 60.0, 1e-15));
+  CHECK_THAT(*parse_quantity("36 km/h", Quantity::speed), WithinRel(10.0, 1e-15));
+  CHECK(parse_quantity("-3 mm", Quantity::distance) == -0.003);
+  CHECK(parse_quantity("2 N m", Quantity::torque) == 2.0);
+  CHECK(parse_quantity("60 %", Quantity::none) == 0.6);
+  for (const char* bad : {"", "s", "2", "2 m", "2 S", "2 s s", "0x10 s", "1,5 s", "2 s "}) {
+    CHECK_FALSE(parse_quantity(bad, Quantity::time));
+  }
+}
+
+TEST_CASE("a script is read whole") {
+  const Script script = parsed(R"(
+description = "d"
+author = "a"
+[settings]
+control.slip_ref = 0.1
+[[phase]]
+name = "run-up"
+kind = "accelerate"
+motor = { file = "ramp.csv" }
+until.any = [{ upper_speed_above = "1000 rpm" }, { all = [{ slip_below = 0.1 }, { distance_m = 3 }] }]
+at_most = "1 min"
+[[phase]]
+name = "brake"
+brake = { torque_Nm = { before = 1, after = 2, at = "500 ms" } }
+until = { standstill = true }
+at_most_s = 9
+[limits]
+run_time_s = 30
+[[event]]
+at_s = 1
+friction = 0.5
+over_s = 0.2
+[series]
+repeat = 3
+seed = 7
+pause = "1 min"
+[vary]
+control.controller = ["adaptive", "pi"]
+control.slip_ref = { from = 0.1, to = 0.2, steps = 3 }
+)");
+  REQUIRE(script.phases.size() == 2);
+  const PhaseScript& first = script.phases[0];
+  CHECK(first.kind == rig::Phase::accelerate);
+  CHECK(first.motor->points.size() == 2);
+  CHECK(script.files.at("ramp.csv").starts_with("time_s"));
+  REQUIRE(first.until.size() == 2);
+  CHECK(first.until[1].kind == experiment::EndKind::all);
+  CHECK(first.until[1].parts[1].value.value == 3.0);
+  CHECK(first.at_most->value == 60.0);
+  CHECK(script.phases[1].brake_course->points.size() == 3);
+  CHECK(script.limits.run_time->value == 30.0);
+  CHECK(script.events[0].at_s == 1.0);
+  CHECK(script.events[0].end_s == 1.2);
+  CHECK(script.series.repeat == 3);
+  CHECK(script.series.seed == 7);
+  CHECK(script.series.pause_s == 60.0);
+  REQUIRE(script.series.vary.size() == 2);
+  CHECK(script.series.vary[0].key == "control.controller");
+  CHECK(std::get<double>(script.series.vary[1].values[1]) == 0.15000000000000002);
+}
+
+TEST_CASE("every shipped experiment says what it is and can be explained") {
+  config::Settings settings;
+  const auto known = known_experiments();
+  CHECK(known.size() >= 6);
+  for (const auto& script : known) {
+    INFO(script->name);
+    CHECK_FALSE(script->description.empty());
+    CHECK_THAT(explain(*script, settings), Contains(script->name + ": "));
+  }
+}
+
+TEST_CASE("an unknown experiment names the nearest and all known ones") {
+  CHECK_THROWS_WITH(find("papr"), Contains("papr") && Contains("nearest known is paper") && Contains("friction-jump"));
+  CHECK_THROWS_WITH(find("/nowhere/x.toml"), Contains("/nowhere/x.toml"));
+}
+
+TEST_CASE("the explanation holds what acts, what ends it and how often") {
+  config::Settings settings;
+  const std::string words = explain(*find("paper"), settings);
+  CHECK_THAT(words, Contains("motor duty 1, brake off") && Contains("until the upper wheel reaches 170 rad/s") &&
+                        Contains("brake controller adaptive, slip reference 0.15") &&
+                        Contains("until the car is slower than 0.3 m/s") && Contains("a fault after 30 s"));
+  CHECK_THAT(explain(*find("series-of-ten"), settings), Contains("Series of 10 runs") && Contains("30 s apart"));
+}
+
+TEST_CASE("the explanation tells steps from slopes") {
+  const config::Settings settings;
+  CHECK_THAT(explain(*find("brake-step"), settings),
+             Contains("brake torque 0.5 N m, from 0.5 s on 1 N m, from 1 s on 2 N m\n"));
+  CHECK_THAT(explain(*find("slip-sweep"), settings),
+             Contains("slip reference 0.01, from 0 s to 1.2 s rising to 0.2\n"));
+  const auto words_for = [&settings](const std::string& points) {
+    return explain(parsed("[[phase]]\nname = \"brake\"\nbrake = { duty = { points = " + points +
+                          " } }\nuntil = { lasts_s = 1 }\n[[phase]]\nname = \"stopped\"\nuntil = { lasts_s = 1 }\n"),
+                   settings);
+  };
+  CHECK_THAT(words_for("[[0, 0.1], [1, 0.1], [1, 0.3], [2, 0.3]]"), Contains("brake duty 0.1, from 1 s on 0.3\n"));
+  CHECK_THAT(words_for("[[0.5, 0.2]]"), Contains("brake duty 0.2\n"));
+  CHECK_THAT(words_for("[[0, 0.2], [1, 0], [1, 0.2]]"),
+             Contains("brake duty 0.2, from 0 s to 1 s falling to 0, from 1 s on 0.2\n"));
+}

@@ -1,0 +1,172 @@
+#include "guardian/guardian_loop.hpp"
+
+#include "catch.hpp"
+#include "scripted_parts.hpp"
+
+using namespace abs_hil;
+using namespace abs_hil::guardian;
+using namespace abs_hil::guardian::test;
+
+namespace {
+
+/// A guardian on duty over a controller whose cycles, at 1 kHz, go on until they are told not to.
+struct Post {
+  Post() {
+    clock.happens = [this](std::int64_t now_ns) {
+      if (now_ns < last_cycle_ns && !controller.gone()) {
+        region.panel().cycle_beats.store(static_cast<std::uint64_t>(now_ns / ms));
+      }
+      if (now_ns >= stage_at_ns) region.set_stage(stage);
+    };
+  }
+  GuardianReport run() { return duty.run(); }
+
+  GuardianOptions options{.timeout_ms = 20.0, .insist_s = 0.5};
+  Story story;
+  ScriptedClock clock;
+  ScriptedController controller{clock, story};
+  ScriptedWriter writer{story};
+  SharedRegion region{8};
+  GuardianLoop duty{clock, controller, region, writer, options};
+  std::int64_t last_cycle_ns{INT64_MAX};
+  std::int64_t stage_at_ns{INT64_MAX};
+  Stage stage{Stage::closed};
+};
+
+constexpr std::int64_t then_ns = 1'100 * ms;
+
+}  // namespace
+
+TEST_CASE("a run that ends in order is let go, and nothing is written") {
+  Post post;
+  post.stage_at_ns = then_ns;
+  const GuardianReport report = post.run();
+  CHECK(report.reason == rig::Reason::none);
+  CHECK_FALSE(report.acted);
+  CHECK(post.story.empty());
+  CHECK(post.clock.now_ns() - then_ns <= post.duty.look_period_ns());
+}
+
+TEST_CASE("the guardian gives a sign of life at each of its looks") {
+  Post post;
+  post.stage_at_ns = then_ns;
+  static_cast<void>(post.run());
+  const std::int64_t looks = (then_ns - 1'000 * ms) / post.duty.look_period_ns();
+  CHECK(post.region.panel().guardian_beats.load() >= static_cast<std::uint64_t>(looks));
+}
+
+TEST_CASE("after the controller's death the safe state is written at once") {
+  Post post;
+  post.controller.dies_at_ns = then_ns;
+  const GuardianReport report = post.run();
+  CHECK(report.reason == rig::Reason::controller_died);
+  CHECK(report.verified);
+  CHECK(report.tries == 1);
+  CHECK(post.story == Story{"gone", "write"});
+  CHECK(report.verified_ns - then_ns <= 100 * us);
+}
+
+TEST_CASE("a silent controller is ended, and seen to have ended, before anything is written") {
+  Post post;
+  post.last_cycle_ns = then_ns;
+  const GuardianReport report = post.run();
+  CHECK(report.reason == rig::Reason::controller_silent);
+  CHECK(post.story == Story{"end", "gone", "write"});
+  CHECK(report.verified);
+  CHECK(report.verified_ns - then_ns <= 20 * ms + post.duty.look_period_ns() + 1 * ms);
+  CHECK(report.controller_gone_ns <= report.first_written_ns);
+}
+
+TEST_CASE("a controller that the kernel holds on to is not waited for, but the last word is spoken after its end") {
+  Post post;
+  post.last_cycle_ns = then_ns;
+  post.controller.dying_takes_ns = 40 * ms;
+  const GuardianReport report = post.run();
+  REQUIRE(report.verified);
+  CHECK(report.tries > 2);
+  CHECK(report.first_written_ns - report.noticed_ns <= 6 * ms);
+  const auto gone = std::find(post.story.begin(), post.story.end(), "gone");
+  REQUIRE(gone != post.story.end());
+  CHECK(std::count(gone, post.story.end(), "write") == 1);
+  CHECK(report.verified_ns >= report.controller_gone_ns);
+}
+
+TEST_CASE("what cannot be verified is tried again until it is") {
+  Post post;
+  post.controller.dies_at_ns = then_ns;
+  post.writer.fails_first = 7;
+  const GuardianReport report = post.run();
+  CHECK(report.verified);
+  CHECK(report.tries == 8);
+  CHECK(report.last_error.error == driver::IoError::no_answer);
+  CHECK(report.verified_ns - then_ns <= 8 * ms);
+}
+
+TEST_CASE("a board that is gone for good is given up after guardian.insist_s, and that is told") {
+  Post post;
+  post.controller.dies_at_ns = then_ns;
+  post.writer.fails_first = 1'000'000;
+  const GuardianReport report = post.run();
+  CHECK_FALSE(report.verified);
+  CHECK(post.clock.now_ns() - then_ns >= 500 * ms);
+  CHECK(post.clock.now_ns() - then_ns <= 600 * ms);
+  CHECK_THAT(to_text(report, 4711), Catch::Matchers::Contains("SAFE STATE NOT VERIFIED") &&
+                                        Catch::Matchers::Contains("0x6c") && Catch::Matchers::Contains("E-stop"));
+}
+
+TEST_CASE("outputs that were given up are made safe while their controller lives on") {
+  Post post;
+  post.stage_at_ns = then_ns;
+  post.stage = Stage::handed_over;
+  const GuardianReport report = post.run();
+  CHECK(report.reason == rig::Reason::safe_state_unverified);
+  CHECK(report.verified);
+  CHECK(post.story == Story{"write"});
+}
+
+TEST_CASE("a controller that dies after it released its outputs leaves only a record to be written") {
+  Post post;
+  post.stage = Stage::released;
+  post.stage_at_ns = then_ns;
+  post.controller.dies_at_ns = then_ns + 50 * ms;
+  const GuardianReport report = post.run();
+  CHECK(report.reason == rig::Reason::controller_died);
+  CHECK_FALSE(report.acted);
+  CHECK(post.story == Story{"gone"});
+}
+
+TEST_CASE("reports say who, why and how fast") {
+  Post post;
+  post.last_cycle_ns = then_ns;
+  const std::string text = to_text(post.run(), 4711);
+  CHECK_THAT(text, Catch::Matchers::Contains("process 4711") && Catch::Matchers::Contains("reason 163") &&
+                       Catch::Matchers::Contains("SIGKILL") && Catch::Matchers::Contains("at try 1"));
+}
+
+TEST_CASE("a controller that makes its board safe twice, a wait each time, has its time for both") {
+  Post post;
+  post.last_cycle_ns = then_ns;
+  post.clock.happens = [&post](std::int64_t now_ns) {
+    auto& panel = post.region.panel();
+    if (now_ns < then_ns) return panel.cycle_beats.store(static_cast<std::uint64_t>(now_ns / ms));
+    if (now_ns > then_ns + 580 * ms) return post.region.set_stage(Stage::closed);
+    post.region.set_stage(Stage::making_safe);
+    panel.safe_beats.store(now_ns < then_ns + 290 * ms ? 1 : 2);
+  };
+  const GuardianReport report = post.run();
+  CHECK(report.reason == rig::Reason::none);
+  CHECK_FALSE(report.acted);
+  CHECK(post.story.empty());
+}
+
+TEST_CASE("a controller that never comes back from making its board safe is ended after that board's time") {
+  Post post;
+  post.last_cycle_ns = then_ns;
+  post.stage_at_ns = then_ns;
+  post.stage = Stage::making_safe;
+  const GuardianReport report = post.run();
+  CHECK(report.reason == rig::Reason::controller_silent);
+  const std::int64_t allowed_ns = 20 * ms + post.writer.owner_needs_ns();
+  CHECK(report.noticed_ns - then_ns >= allowed_ns - ms);
+  CHECK(report.noticed_ns - then_ns <= allowed_ns + 2 * post.duty.look_period_ns());
+}

@@ -1,0 +1,65 @@
+#include "run_folder/run_folder.hpp"
+
+#include <fstream>
+#include <sstream>
+
+#include "catch.hpp"
+#include "temporary_folder.hpp"
+
+using namespace abs_hil::run_folder;
+namespace fs = std::filesystem;
+
+namespace {
+
+using abs_hil::test::TemporaryFolder;
+
+std::string text_of(const fs::path& path) {
+  std::ifstream file(path);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+}  // namespace
+
+TEST_CASE("SHA-256 gives the digests of FIPS 180-4's examples") {
+  CHECK(sha256_of("") == "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  CHECK(sha256_of("abc") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  CHECK(sha256_of("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq") ==
+        "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
+}
+
+TEST_CASE("a folder is made with those above it, and sealed with the sums of its files") {
+  const TemporaryFolder place;
+  const RunFolder folder(place.path / "a" / "b");
+  folder.write("z.txt", std::string_view("abc"));
+  folder.write("a.json", nlohmann::ordered_json{{"x", 1}});
+  folder.seal();
+  const std::string sums = text_of(folder.of(file::checksums));
+  CHECK(sums == sha256_of("{\n  \"x\": 1\n}\n") + "  a.json\n" + sha256_of("abc") + "  z.txt\n");
+}
+
+TEST_CASE("a folder that is not empty, a file and a place that cannot be written are refused by name") {
+  const TemporaryFolder place;
+  std::ofstream(place.path / "file") << "x";
+  CHECK_THROWS_WITH(RunFolder(place.path),
+                    Catch::Matchers::Contains(place.path.string()) && Catch::Matchers::Contains("not empty"));
+  CHECK_THROWS_WITH(RunFolder(place.path / "file"), Catch::Matchers::Contains("is a file"));
+  CHECK_THROWS_WITH(RunFolder(place.path / "file" / "below"), Catch::Matchers::Contains("file/below"));
+  CHECK(text_of(place.path / "file") == "x");
+}
+
+TEST_CASE("folders are named by time and experiment, and never taken twice") {
+  const TemporaryFolder place;
+  std::tm time{};
+  time.tm_year = 126;
+  time.tm_mon = 10;
+  time.tm_mday = 21;
+  time.tm_hour = 13;
+  time.tm_min = 4;
+  time.tm_sec = 9;
+  const fs::path first = unused_folder(place.path, time, "labs/ice run.toml");
+  CHECK(first == place.path / "20261121-130409-ice-run");
+  fs::create_directory(first);
+  CHECK(unused_folder(place.path, time, "ice run") == place.path / "20261121-130409-ice-run-2");
+}
