@@ -20,10 +20,12 @@ const AdaptiveOptions& checked(const AdaptiveOptions& options) {
   return options;
 }
 
-Eigen::RowVector2d error_weights(const AdaptiveOptions& options) {
+paper::Gains<double> paper_gains(const AdaptiveOptions& options) {
+  const AdaptiveOptions& o = checked(options);
   Eigen::Matrix2d Q;
-  Q << options.q11, options.q12, options.q12, options.q22;
-  return solve_lyapunov(error_dynamics_matrix(options.ks0, options.ks1), Q).row(1);
+  Q << o.q11, o.q12, o.q12, o.q22;
+  const Eigen::RowVector2d B_transpose_P = solve_lyapunov(error_dynamics_matrix(o.ks0, o.ks1), Q).row(1);
+  return {.ks0 = o.ks0, .ks1 = o.ks1, .gamma = o.gamma, .ka1 = o.ka1, .p12 = B_transpose_P[0], .p22 = B_transpose_P[1]};
 }
 
 }  // namespace abs_hil::control

@@ -13,8 +13,7 @@ double measured_equivalent_torque_Nm(const rig::WheelParameters& wheels, const S
   const double tyre_force_N =
       std::max(0.0, -(w.J2_kg_m2 * input.alpha2_rad_s2 + w.d2_Nms_rad * input.speeds.omega2_rad_s + w.M20_Nm) / w.r2_m);
   return w.J1_kg_m2 / w.r1_m *
-         (rig::slip_velocity_gain(w, input.slip_ref) * tyre_force_N +
-          friction_drift_m_s2(w, input.speeds, input.slip_ref));
+         (slip_velocity_gain(w, input.slip_ref) * tyre_force_N + friction_drift_m_s2(w, input.speeds, input.slip_ref));
 }
 
 PiController::PiController(const ControllerContext& context)

@@ -18,7 +18,7 @@ constexpr double claimed_per_cent = -6.7;
 /// From 6.2 to 7.4 s on its plots.
 constexpr double plotted_stop_s = 1.2;
 
-/// Values of a metric: of the adaptive controller, of its rival.
+/// Values of a metric: of the adaptive controller, of its baseline.
 class Pair {
  public:
   Pair(const PageContents& contents, std::string_view key) : metric_(metric(key)) {

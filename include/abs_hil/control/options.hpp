@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "abs_hil/control/rival_options.hpp"
+#include "abs_hil/control/baseline_options.hpp"
 
 namespace abs_hil::control {
 

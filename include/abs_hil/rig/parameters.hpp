@@ -52,9 +52,4 @@ struct RigParameters {
   std::int32_t encoder_counts_per_rev{4096};  ///< counts per revolution after quadrature decoding, >= 4
 };
 
-/// k(slip_ref) of (15): what a unit of tyre force does to the slip velocity error, 1/kg.
-[[nodiscard]] constexpr double slip_velocity_gain(const WheelParameters& w, double slip_ref) noexcept {
-  return w.r1_m * w.r1_m / w.J1_kg_m2 + (1.0 - slip_ref) * w.r2_m * w.r2_m / w.J2_kg_m2;
-}
-
 }  // namespace abs_hil::rig
