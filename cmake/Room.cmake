@@ -1,5 +1,5 @@
-# abs_hil_room(NAME SOURCES ... KNOWS ... USES ...): the library of one room. KNOWS names the rooms that it may include,
-# USES other libraries that its public headers need, PRIVATE ones that only its sources need.
+# abs_hil_room(NAME SOURCES ... KNOWS ... USES ... PRIVATE ...): the library of one room. KNOWS names the rooms that it
+# may include, USES the other libraries that its public headers need, PRIVATE the libraries that only its sources need.
 function(abs_hil_room name)
   cmake_parse_arguments(ROOM "" "" "SOURCES;KNOWS;USES;PRIVATE" ${ARGN})
   if(ROOM_SOURCES)
@@ -15,7 +15,7 @@ function(abs_hil_room name)
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   list(TRANSFORM ROOM_KNOWS PREPEND abs_hil_)
   target_link_libraries(abs_hil_${name} ${scope} ${ROOM_KNOWS} ${ROOM_USES})
-  # Installed, a room has the name that it has here: abs_hil::NAME (cmake/Install.cmake).
+  # An installed room keeps its name: abs_hil::NAME (cmake/Install.cmake).
   set_target_properties(abs_hil_${name} PROPERTIES EXPORT_NAME ${name})
   set_property(GLOBAL APPEND PROPERTY ABS_HIL_ROOMS abs_hil_${name})
 endfunction()
