@@ -12,7 +12,7 @@ slow_labels='^(slow|vm|bench|docs|on-demand)$'
 preset=${1:-release}
 [ $# -gt 0 ] && shift
 if [ "$preset" = quick ]; then
-  echo "test: quick: builds the programs and the unit tests, then runs for about a minute. Left out: real-time runs," \
+  echo "test: quick: builds the programs and the unit tests, then runs for about a minute. Left out: real-time runs, reports," \
     "network, virtual machine, long simulations (scripts/test.sh runs these too)"
   scripts/setup.sh
   scripts/build.sh release --target abs_hil_quick_tests
