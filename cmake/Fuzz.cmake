@@ -1,6 +1,6 @@
 # abs_hil_fuzz(NAME SOURCES ... USES ...): the fuzz target NAME, a program with LLVMFuzzerTestOneInput. Preset `asan`
-# (clang) builds it with libFuzzer for scripts/fuzz.sh. Every other build makes a plain program of it, which runs the kept
-# corpus, tests/fuzz/corpus/NAME, once. Its ctest entry is fuzz_corpus_NAME.
+# (clang) builds it with libFuzzer for scripts/fuzz.sh. Every other build makes a plain program, which runs the
+# kept corpus, tests/fuzz/corpus/NAME, once. Its ctest entry is fuzz_corpus_NAME.
 option(ABS_HIL_FUZZ "Build the fuzz targets with libFuzzer (needs clang)" OFF)
 
 function(abs_hil_fuzz name)

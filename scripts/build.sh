@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# build.sh [PRESET [ARGUMENT...]]: configures and builds one preset (default: release), with ccache where it is installed.
-# Further arguments go to the build (--target NAME). On a terminal the progress stays on one line; elsewhere a line is
-# printed at each tenth of the steps. Warnings and errors are always printed whole.
+# build.sh [PRESET [ARGUMENT...]]: configures and builds one preset (default: release), with ccache if it is installed.
+# Further arguments go to the build (--target NAME). On a terminal the progress stays on one line. Elsewhere the script
+# prints a line at each tenth of the steps. It always prints warnings and errors whole.
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
 
@@ -15,7 +15,7 @@ fi
 cmake --preset "$preset" "${launcher[@]}" >"/tmp/abs_hil_configure.$$" || { cat "/tmp/abs_hil_configure.$$"; exit 1; }
 rm -f "/tmp/abs_hil_configure.$$"
 
-# Reads ninja's output. Of its progress it prints the first step that completes a tenth; everything else it prints as it is.
+# Reads ninja's output. Prints only those progress lines that complete a tenth of the steps, and all other lines whole.
 print_tenths() {
   local line tenth=0
   while IFS= read -r line; do

@@ -3,7 +3,7 @@
 #   test.sh                  all tests of the preset release but those labelled on-demand, which take longest
 #   test.sh PRESET ...       the same for another preset; ARGUMENTs go to ctest and then choose the tests alone
 #   test.sh quick ...        the preset release without the labels of slow_labels below: about a minute after the build
-# Where CI=true or ABS_HIL_REQUIRE_VM=1 the tests in a virtual machine must not be skipped. Where CI=true the script also
+# With CI=true or ABS_HIL_REQUIRE_VM=1 the tests in a virtual machine must not be skipped. With CI=true the script also
 # installs what the tests of abs-spy, of the Python modules and of abs_report need.
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
@@ -12,8 +12,8 @@ slow_labels='^(slow|vm|bench|docs|on-demand)$'
 preset=${1:-release}
 [ $# -gt 0 ] && shift
 if [ "$preset" = quick ]; then
-  echo "test: quick: builds the programs and the unit tests, then runs for about a minute. Left out: real-time runs, reports," \
-    "network, virtual machine, long simulations (scripts/test.sh runs these too)"
+  echo "test: quick: builds the programs and the unit tests, then runs for about a minute. Left out: real-time runs," \
+    "reports, network, virtual machine, long simulations (scripts/test.sh runs these too)"
   scripts/setup.sh
   scripts/build.sh release --target abs_hil_quick_tests
   ctest --preset release -j "$(nproc)" -LE "$slow_labels" "$@"
@@ -23,11 +23,12 @@ fi
 if [ $# -gt 0 ]; then
   echo "test: builds everything of the preset $preset, then runs: ctest $*"
 else
-  echo "test: builds everything of the preset $preset, then runs all tests but those on demand: 10 minutes or more, most" \
-    "of it real-time runs and tests in a virtual machine (scripts/test.sh quick: about a minute)"
+  echo "test: builds everything of the preset $preset, then runs all tests but those on demand: 10 minutes or more," \
+    "most of it real-time runs and tests in a virtual machine (scripts/test.sh quick: about a minute)"
 fi
-echo "test: a test is skipped and says why where its tools are missing: a virtual machine (packages-vm.txt), abs-spy" \
-  "(packages-spy.txt), a browser and Octave (packages-report.txt), Python modules (setup_python.sh), FUSE, network namespaces"
+echo "test: a test is skipped and says why if its tools are missing: a virtual machine (packages-vm.txt), abs-spy" \
+  "(packages-spy.txt), a browser and Octave (packages-report.txt), Python modules (setup_python.sh), FUSE," \
+  "network namespaces"
 scripts/setup.sh
 # Without these packages the tests in a virtual machine are skipped, unless they must not be.
 scripts/setup.sh packages-vm.txt || { [ "${CI:-}" != true ] && [ "${ABS_HIL_REQUIRE_VM:-}" != 1 ]; }
