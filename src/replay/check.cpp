@@ -8,6 +8,7 @@
 #include <map>
 #include <string_view>
 
+#include "abs_hil/message_fields.hpp"
 #include "abs_hil/telemetry/message_codec.hpp"
 
 namespace abs_hil::replay {

@@ -56,7 +56,8 @@ def room_of(relative):
     """Room of a path below include/abs_hil or src; None for what belongs to none."""
     parts = relative.parts
     if len(parts) < 2:
-        return 'lcmtypes' if relative.name.endswith('_t.hpp') else None  # generated: abs_hil/telemetry_t.hpp
+        generated = relative.name.endswith('_t.hpp') or relative.name == 'message_fields.hpp'
+        return 'lcmtypes' if generated else None
     deeper = '/'.join(parts[:2])
     return deeper if deeper in MAY_KNOW else parts[0]
 

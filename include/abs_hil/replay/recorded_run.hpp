@@ -6,9 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "abs_hil/adjustment_t.hpp"
+#include "abs_hil/event_t.hpp"
+#include "abs_hil/experiment_t.hpp"
 #include "abs_hil/settings/settings.hpp"
-#include "abs_hil/telemetry/message_fields.hpp"
 #include "abs_hil/telemetry/recording.hpp"
+#include "abs_hil/telemetry_t.hpp"
 
 namespace abs_hil::replay {
 

@@ -3,8 +3,6 @@
 #include <cstdint>
 #include <string>
 
-#include "abs_hil/telemetry/message_fields.hpp"
-
 namespace abs_hil::steering {
 
 /// What is to be sent, and where.

@@ -16,6 +16,7 @@
 #include <thread>
 #include <variant>
 
+#include "abs_hil/command2_t.hpp"
 #include "abs_hil/telemetry/lcm_outlet.hpp"
 #include "abs_hil/telemetry/message_stream.hpp"
 #include "abs_hil/telemetry/udpm_receiver.hpp"

@@ -7,10 +7,11 @@
 #include <utility>
 #include <vector>
 
+#include "abs_hil/command_state_t.hpp"
+#include "abs_hil/experiment_t.hpp"
 #include "abs_hil/rig/record_sink.hpp"
 #include "abs_hil/telemetry/event_detector.hpp"
 #include "abs_hil/telemetry/message_codec.hpp"
-#include "abs_hil/telemetry/message_fields.hpp"
 #include "abs_hil/telemetry/outlet.hpp"
 #include "abs_hil/telemetry/status_snapshot.hpp"
 
