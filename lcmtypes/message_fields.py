@@ -34,6 +34,8 @@ struct Field {{
   std::string_view name;
   Value Message::* member;
 }};
+template <class Message, class Value>
+Field(std::string_view, Value Message::*) -> Field<Message, Value>;
 
 /// Name of a message type without its package, as in "telemetry_t".
 template <class Message>
@@ -89,7 +91,7 @@ def header(paths):
     types = {path.stem: fields_of(path) for path in paths}
     text = HEAD.format(includes='\n'.join(f'#include "abs_hil/{type_}.hpp"' for type_ in types))
     for type_, names in types.items():
-        rows = ',\n'.join(f'    Field{{std::string_view("{name}"), &{type_}::{name}}}' for name in names)
+        rows = ',\n'.join(f'    Field{{"{name}", &{type_}::{name}}}' for name in names)
         text += TYPE.format(type=type_, fields=rows)
     return text + TAIL.format(uses='\n'.join(f'  use.template operator()<{type_}>();' for type_ in types))
 
