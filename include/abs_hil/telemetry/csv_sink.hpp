@@ -10,8 +10,8 @@
 
 namespace abs_hil::telemetry {
 
-/// The CSV's first line, without the line end, made from rig/quantities.hpp. Names and order are a contract; columns may
-/// be added at the end.
+/// The CSV's first line, without the line end, made from rig/quantities.hpp. Names and order are a contract; columns
+/// may be added at the end.
 extern const std::string_view csv_header;
 
 /// No row is longer.
