@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "abs_hil/rig/option_check.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 #include "control/adaptive_gains.hpp"
 
@@ -13,10 +14,8 @@ namespace {
 /// The options with this controller's gains in the place where the parts it shares with AdaptiveController look.
 ControlOptions with_own_gains(const ControlOptions& options) {
   const AdaptiveActuatorOptions& own = options.adaptive_actuator;
-  const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
-  if (!positive(own.lag_gain_per_s) || !positive(own.lag_weight_s2)) {
-    throw std::invalid_argument("adaptive_actuator.lag_gain_per_s and adaptive_actuator.lag_weight_s2 must be > 0");
-  }
+  rig::require_valid(own, &AdaptiveActuatorOptions::lag_gain_per_s, "control.adaptive_actuator.");
+  rig::require_valid(own, &AdaptiveActuatorOptions::lag_weight_s2, "control.adaptive_actuator.");
   ControlOptions result = options;
   result.adaptive = own.law;
   return result;

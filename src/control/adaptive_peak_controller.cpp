@@ -4,24 +4,17 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "abs_hil/rig/option_check.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 
 namespace abs_hil::control {
 namespace {
 
 const AdaptivePeakOptions& checked(const AdaptivePeakOptions& o) {
-  if (!(o.ks0 > 0.0 && o.ks1 > 0.0 && o.lag_gain_per_s > 0.0 && o.slip_rate_per_s > 0.0 && o.search_rad_s > 0.0)) {
-    throw std::invalid_argument(
-        "adaptive_peak: ks0, ks1, lag_gain_per_s, slip_rate_per_s and search_rad_s must be > 0");
-  }
-  if (!(0.0 < o.slip_min && o.slip_min < o.slip_max && o.slip_max < 1.0)) {
-    throw std::invalid_argument("adaptive_peak needs 0 < slip_min < slip_max < 1");
-  }
+  rig::require_valid(o, "control.adaptive_peak.");
+  if (!(o.slip_min < o.slip_max)) throw std::invalid_argument("adaptive_peak needs slip_min < slip_max");
   if (!(o.slip_start >= o.slip_min && o.slip_start <= o.slip_max)) {
     throw std::invalid_argument("adaptive_peak.slip_start must lie within [slip_min, slip_max]");
-  }
-  if (!(o.search_part >= 0.0 && o.search_part < 1.0 && o.search_min >= 0.0)) {
-    throw std::invalid_argument("adaptive_peak needs search_part in [0, 1) and search_min >= 0");
   }
   return o;
 }

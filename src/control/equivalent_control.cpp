@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "abs_hil/control/slip_error_dynamics.hpp"
+#include "abs_hil/rig/option_check.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 
 namespace abs_hil::control {
@@ -13,9 +15,8 @@ EquivalentControl::EquivalentControl(const ControllerContext& context)
       tyre_{context.rig.tyre},
       v_min_m_s_{context.options.v_min_m_s},
       half_period_s_{0.5 / context.options.rate_Hz} {
-  const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
-  if (!positive(context.options.rate_Hz)) throw std::invalid_argument("the control rate must be > 0");
-  if (!positive(v_min_m_s_)) throw std::invalid_argument("v_min_m_s must be > 0");
+  if (!(context.options.rate_Hz > 0.0)) throw std::invalid_argument("the control rate must be > 0");
+  rig::require_valid(context.options, &ControlOptions::v_min_m_s, "control.");
 }
 
 double EquivalentControl::brake_torque_Nm(const SlipInput& input, double error_m_s, const WantedMotion& wanted,

@@ -1,8 +1,6 @@
 #include "control/nominal_controller.hpp"
 
-#include <cmath>
-#include <stdexcept>
-
+#include "abs_hil/rig/option_check.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 
 namespace abs_hil::control {
@@ -12,9 +10,7 @@ NominalController::NominalController(const ControllerContext& context)
       tyre_{context.rig.tyre},
       dynamics_{context},
       theta0_N_{context.options.nominal.theta0_N != 0.0 ? context.options.nominal.theta0_N : context.rig.tyre.theta_N} {
-  if (!(theta0_N_ > 0.0 && std::isfinite(theta0_N_))) {
-    throw std::invalid_argument("nominal.theta0_N must be > 0, or 0 for the plant's own");
-  }
+  rig::require_valid(context.options.nominal, "control.nominal.");
 }
 
 void NominalController::reset(const SlipInput& input) noexcept {

@@ -1,8 +1,9 @@
 #include "abs_hil/control/slip_error_dynamics.hpp"
 
 #include <cmath>
-#include <stdexcept>
 #include <unsupported/Eigen/MatrixFunctions>
+
+#include "abs_hil/rig/option_check.hpp"
 
 namespace abs_hil::control {
 
@@ -14,8 +15,8 @@ Eigen::Matrix2d error_dynamics_matrix(double ks0, double ks1) {
 
 SlipErrorDynamics::SlipErrorDynamics(const ControllerContext& context) : equivalent_{context} {
   const auto& gains = context.options.adaptive;
-  const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
-  if (!positive(gains.ks0) || !positive(gains.ks1)) throw std::invalid_argument("ks0 and ks1 must be > 0");
+  rig::require_valid(gains, &AdaptiveOptions::ks0, "control.adaptive.");
+  rig::require_valid(gains, &AdaptiveOptions::ks1, "control.adaptive.");
 
   const Eigen::Matrix2d A = error_dynamics_matrix(gains.ks0, gains.ks1);
   const Eigen::Matrix2d half = (A * (0.5 * equivalent_.period_s())).exp();

@@ -5,10 +5,10 @@
 #include <string>
 #include <type_traits>
 
+#include "abs_hil/rig/quantities.hpp"
 #include "abs_hil/rig/reason.hpp"
 #include "program/exit_status.hpp"
 #include "program/subcommands.hpp"
-#include "abs_hil/rig/quantities.hpp"
 
 namespace abs_hil::program {
 

@@ -12,9 +12,9 @@
 #include <limits>
 #include <utility>
 
+#include "abs_hil/rig/quantities.hpp"
 #include "report/input_error.hpp"
 #include "report/text.hpp"
-#include "abs_hil/rig/quantities.hpp"
 
 namespace abs_hil::report {
 

@@ -8,23 +8,22 @@
 #include <string_view>
 #include <vector>
 
+#include "abs_hil/rig/range.hpp"
 #include "config/settings.hpp"
 #include "study/simulated_run.hpp"
 #include "study/variation.hpp"
 
 namespace abs_hil::study {
 
-/// One configuration value that the search may set, and where it looks.
+/// One configuration value that the search may set.
 struct TunedKey {
-  std::string_view name;  ///< dotted, as for --set
-  double least{0.0};
-  double most{0.0};
-  bool logarithmic{true};  ///< searched by its logarithm: for gains, whose order of magnitude is not known
+  std::string name;  ///< dotted, as for --set
+  rig::SearchRange search;
 };
 
-/// The gains of a controller that the search sets; empty for one without gains to search for. The speed observer, which
-/// all share, is not among them.
-[[nodiscard]] std::span<const TunedKey> tuned_keys(std::string_view controller) noexcept;
+/// The gains of a controller that the search sets: those of its options whose rows give a range for it. Empty for a
+/// controller without them. The speed observer, which all share, is not among them.
+[[nodiscard]] std::vector<TunedKey> tuned_keys(std::string_view controller);
 /// False for five-phase, which neither measures slip nor has a reference for it.
 [[nodiscard]] bool follows_slip_reference(std::string_view controller) noexcept;
 /// The controllers that have such keys.

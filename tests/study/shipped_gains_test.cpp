@@ -43,7 +43,7 @@ TEST_CASE("the recorded gains lie in the ranges searched") {
         if (key.name != tuned.name) continue;
         INFO(tuned.name);
         const double value = *std::get<double*>(key.target);
-        CHECK((value >= tuned.least && value <= tuned.most));
+        CHECK((value >= tuned.search.least && value <= tuned.search.most));
       }
     }
   }
