@@ -51,8 +51,6 @@ install(TARGETS ${abs_hil_rooms} EXPORT abs_hil_targets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/abs_hil COMPONENT development)
 install(EXPORT abs_hil_targets NAMESPACE abs_hil:: DESTINATION ${abs_hil_cmake_dir} COMPONENT development)
 install(DIRECTORY include/abs_hil DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development)
-install(DIRECTORY ${CMAKE_BINARY_DIR}/lcmtypes/cpp/abs_hil DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-  COMPONENT development)
 install(DIRECTORY lcmtypes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/abs_hil/lcmtypes COMPONENT development
   FILES_MATCHING PATTERN *.lcm)
 configure_package_config_file(packaging/abs_hilConfig.cmake.in ${CMAKE_BINARY_DIR}/abs_hilConfig.cmake

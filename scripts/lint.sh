@@ -15,7 +15,7 @@ check_shell() {
 
 check_cppcheck() {
   cppcheck --enable=warning,performance,portability --error-exitcode=1 --inline-suppr --quiet --std=c++20 --language=c++ \
-    -j "$(nproc)" --suppressions-list=.cppcheck-suppressions -I include src apps
+    -j "$(nproc)" --suppressions-list=.cppcheck-suppressions -I include -I src src apps
 }
 
 check_tidy() {

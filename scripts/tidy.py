@@ -24,7 +24,7 @@ TIDY = 'clang-tidy-16'
 CACHE = pathlib.Path(os.environ.get('XDG_CACHE_HOME', pathlib.Path.home() / '.cache')) / 'abs_hil' / 'tidy'
 # A unit includes its sources on purpose.
 MATCHERS = ['--checks=-clang-analyzer-*,-bugprone-suspicious-include',
-            f'--header-filter=^{re.escape(str(ROOT))}/(include/abs_hil|src|apps)/']
+            f'--header-filter=^{re.escape(str(ROOT))}/(include/abs_hil|src|apps|build/clang/rooms)/']
 
 
 def units():

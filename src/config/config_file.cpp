@@ -28,20 +28,21 @@ toml::table parse(const fs::path& file) {
   }
 }
 
-void set_values(const toml::table& table, const std::string& prefix, const fs::path& file, KeyTable& keys) {
+void collect(const toml::table& table, const std::string& prefix, const fs::path& file,
+             std::vector<FileValue>& values) {
   for (const auto& [key, node] : table) {
     const std::string name = prefix.empty() ? std::string(key.str()) : prefix + '.' + std::string(key.str());
     const std::string origin = fmt::format("{}:{}", file.string(), node.source().begin.line);
     if (const auto* inner = node.as_table()) {
-      set_values(*inner, name, file, keys);
+      collect(*inner, name, file, values);
     } else if (const auto* text = node.as_string()) {
-      keys.set(name, text->get(), origin);
+      values.push_back({name, text->get(), origin});
     } else if (const auto* flag = node.as_boolean()) {
-      keys.set(name, flag->get(), origin);
+      values.push_back({name, flag->get(), origin});
     } else if (const auto* integer = node.as_integer()) {
-      keys.set(name, integer->get(), origin);
+      values.push_back({name, integer->get(), origin});
     } else if (const auto* real = node.as_floating_point()) {
-      keys.set(name, real->get(), origin);
+      values.push_back({name, real->get(), origin});
     } else {
       throw ConfigError(fmt::format("{}: {} is neither number, flag nor text", origin, name));
     }
@@ -50,7 +51,7 @@ void set_values(const toml::table& table, const std::string& prefix, const fs::p
 
 }  // namespace
 
-void load_file(const fs::path& file, KeyTable& keys, std::string_view only_table) {
+std::vector<FileValue> read_file(const fs::path& file, std::string_view only_table) {
   toml::table table = parse(file);
   table.erase("description");
   if (!only_table.empty()) {
@@ -60,7 +61,17 @@ void load_file(const fs::path& file, KeyTable& keys, std::string_view only_table
                                     file.string(), node.source().begin.line, std::string_view(key.str()), only_table));
     }
   }
-  set_values(table, {}, file, keys);
+  std::vector<FileValue> values;
+  collect(table, {}, file, values);
+  return values;
+}
+
+void set_all(const std::vector<FileValue>& values, KeyTable& keys) {
+  for (const FileValue& value : values) keys.set(value.name, value.value, value.origin);
+}
+
+void load_file(const fs::path& file, KeyTable& keys, std::string_view only_table) {
+  set_all(read_file(file, only_table), keys);
 }
 
 namespace {

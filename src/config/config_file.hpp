@@ -9,8 +9,19 @@
 
 namespace abs_hil::config {
 
-/// Reads a TOML file and sets every value in it. Throws ConfigError, naming file and line.
+/// One value of a configuration file.
+struct FileValue {
+  std::string name;  ///< dotted
+  Value value;
+  std::string origin;  ///< "FILE:LINE"
+};
+
+/// Reads a TOML file. Throws ConfigError, naming file and line.
 /// @param only_table if not empty, the one table that the file may hold ("plant")
+[[nodiscard]] std::vector<FileValue> read_file(const std::filesystem::path& file, std::string_view only_table = {});
+/// Sets every value, in order. Throws ConfigError for one that its key does not take.
+void set_all(const std::vector<FileValue>& values, KeyTable& table);
+/// Reads a TOML file and sets every value in it.
 void load_file(const std::filesystem::path& file, KeyTable& table, std::string_view only_table = {});
 
 /// The folder of configuration files that belongs to this program: $ABS_HIL_CONFIG_DIR, else the installed one beside

@@ -16,7 +16,7 @@ namespace abs_hil::config {
 
 namespace {
 
-std::string shown(const Value& value) {
+std::string value_text(const Value& value) {
   return std::visit(
       [](const auto& v) -> std::string {
         if constexpr (std::is_same_v<std::decay_t<decltype(v)>, std::string>) {
@@ -42,9 +42,10 @@ void assign_number(const Key& key, Number& target, const Value& value, std::stri
   } else if (const auto* real = std::get_if<double>(&value)) {
     number = *real;
   } else {
-    refuse(key, shown(value), valid, origin);
+    refuse(key, value_text(value), valid, origin);
   }
-  if (!key.range.contains(number) || (whole && number != std::floor(number))) refuse(key, shown(value), valid, origin);
+  if (!key.range.contains(number) || (whole && number != std::floor(number)))
+    refuse(key, value_text(value), valid, origin);
   target = static_cast<Number>(number);
 }
 
@@ -115,12 +116,12 @@ void KeyTable::set(std::string_view name, const Value& value, std::string_view o
         using Target = std::decay_t<decltype(*target)>;
         if constexpr (std::is_same_v<Target, bool>) {
           const auto* flag = std::get_if<bool>(&value);
-          if (flag == nullptr) refuse(key, shown(value), "true or false", origin);
+          if (flag == nullptr) refuse(key, value_text(value), "true or false", origin);
           *target = *flag;
         } else if constexpr (std::is_same_v<Target, std::string>) {
           const auto* text = std::get_if<std::string>(&value);
           if (text == nullptr || !key.allowed.contains(*text)) {
-            refuse(key, shown(value), rig::valid_name_text(key), origin);
+            refuse(key, value_text(value), rig::valid_name_text(key), origin);
           }
           if (!is_utf8(*text)) {
             throw ConfigError(fmt::format("{}: {} is not UTF-8 text; give UTF-8 ({})", origin, key.name, key.meaning));

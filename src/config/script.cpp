@@ -10,7 +10,7 @@
 #include "config/config_error.hpp"
 #include "config/events.hpp"
 #include "config/reader.hpp"
-#include "config/unsafe_settings.hpp"
+#include "driver/injection/injection.hpp"
 
 namespace abs_hil::config {
 
@@ -189,7 +189,7 @@ class Parser {
     config::Settings settings;
     settings.inject = event.inject;
     try {
-      if (config::injections_of(settings).empty()) source_.fail(entry.place, "inject is empty; give a fault");
+      if (driver::parse_injections(settings.inject).empty()) source_.fail(entry.place, "inject is empty; give a fault");
     } catch (const std::invalid_argument& error) {
       source_.fail(entry.place, error.what());
     }

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "config/config_error.hpp"
@@ -12,7 +10,8 @@
 #include "config/key_table.hpp"
 #include "config/library.hpp"
 #include "config/plan.hpp"
-#include "config/unsafe_settings.hpp"
+#include "driver/injection/injection.hpp"
+#include "runtime/board_policy.hpp"
 
 namespace abs_hil::program {
 
@@ -63,63 +62,59 @@ void refuse_profiles(config::Settings& s) {
   }
 }
 
+/// Options that contradict one another.
 void check_together(const RunRequest& request) {
   const config::Settings& s = request.settings;
-  if (s.backend == "rig" && request.outputs.fast && !s.driver.emulated) {
-    throw config::ConfigError(
-        "--fast: the rig runs in real time only; leave it out, use --backend sim, or for an emulator in lock-step "
-        "(never hardware) --set driver.emulated=true");
-  }
   if (request.outputs.fast && request.outputs.histogram_file) {
     throw config::ConfigError(
         "--histogram: in virtual time (--fast) there are no latencies to measure; leave one of the two out");
   }
-  if (s.backend == "rig" && s.driver.kind == "usb" && !request.outputs.fast &&
-      s.driver.usb.answer_timeout_us * s.control.rate_Hz >= 1e6) {
-    throw config::ConfigError("driver.usb.answer_timeout_us = " + std::to_string(s.driver.usb.answer_timeout_us) +
-                              ": a cycle must not wait longer than its period; give less than " +
-                              std::to_string(std::llround(1e6 / s.control.rate_Hz)) + " or a lower control.rate_Hz");
-  }
-  if (s.backend == "rig" && s.experiment.start_speed_rad_s > 0.0) {
-    throw config::ConfigError(
-        "experiment.start_speed_rad_s: a real wheel does not start at speed; leave it out or use --backend sim");
-  }
   if (s.experiment.wait_for_start) check_start(request);
-  if (s.backend == "rig") refuse_events(*request.script, s.driver.emulated);
   if (s.control.adaptive.theta_min_N >= s.control.adaptive.theta_max_N) {
     throw config::ConfigError("control.adaptive.theta_min_N: must be less than control.adaptive.theta_max_N");
   }
 }
 
-/// What the board's driver never sends the gate and the controller's anti-windup must know, and its checks of counts
-/// need the wheels' encoders.
-void apply_board_limits(config::Settings& s) {
-  const auto cap = [&s](const auto& board) {
-    s.gate.brake_duty_max = std::min(s.gate.brake_duty_max, board.brake_duty_max);
-    s.gate.motor_duty_max = std::min(s.gate.motor_duty_max, board.motor_duty_max);
-  };
-  if (s.driver.kind == "pci") cap(s.driver.pci);
-  if (s.driver.kind == "can") cap(s.driver.can);
-  if (s.driver.kind == "usb") cap(s.driver.usb);
-  s.driver.pci.encoder_counts_per_rev = s.plant.rig.encoder_counts_per_rev;
-  s.driver.can.encoder_counts_per_rev = s.plant.rig.encoder_counts_per_rev;
-  s.driver.usb.encoder_counts_per_rev = s.plant.rig.encoder_counts_per_rev;
-  s.driver.can.rate_Hz = s.control.rate_Hz;
+/// The policy of the board, after all settings are known.
+void apply_board_policy(config::Settings& s, const config::KeyTable& keys, bool virtual_time) {
+  runtime::refuse_unsafe_use({.driver = s.driver,
+                              .guarded = s.guardian.enabled,
+                              .virtual_time = virtual_time,
+                              .rate_Hz = s.control.rate_Hz,
+                              .start_speed_rad_s = s.experiment.start_speed_rad_s,
+                              .injections = driver::parse_injections(s.inject)});
+  runtime::refuse_caps_above_board({.brake = keys.was_set("gate.brake_duty_max") ? s.gate.brake_duty_max : 0.0,
+                                    .motor = keys.was_set("gate.motor_duty_max") ? s.gate.motor_duty_max : 0.0},
+                                   s.driver);
+  runtime::apply_board_limits(s.plant.rig, s.control.rate_Hz, s.gate, s.driver);
+}
+
+/// The configuration files of a run, each read once.
+struct Files {
+  std::vector<config::FileValue> plant{};
+  std::vector<config::FileValue> config{};
+};
+
+Files read_files(const RunOptions& options, const std::string& default_plant) {
+  Files files{.plant = config::read_file(config::plant_file(options.plant.value_or(default_plant)), "plant")};
+  if (options.config_file) files.config = config::read_file(*options.config_file);
+  return files;
 }
 
 /// Everything but what the script asks for beyond its settings.
-void fill(config::Settings& s, config::KeyTable& keys, const RunOptions& options, const config::Script* script) {
+void fill(config::Settings& s, config::KeyTable& keys, const RunOptions& options, const Files& files,
+          const config::Script* script) {
   s.backend = options.backend;
   s.realtime.mode = realtime_mode(options.realtime);
   for (const std::string& assignment : options.defaults) keys.set_text(assignment, "default");
   if (options.plant) s.plant_name = *options.plant;
-  config::load_file(config::plant_file(s.plant_name), keys, "plant");
+  config::set_all(files.plant, keys);
   if (script != nullptr) {
     for (const config::Setting& setting : script->settings) {
       keys.set(setting.key, setting.value, script->at(setting.place));
     }
   }
-  if (options.config_file) config::load_file(*options.config_file, keys);
+  config::set_all(files.config, keys);
 
   const auto set = [&keys](const char* key, const std::optional<std::string>& value, const char* option) {
     if (value) keys.set_text(std::string(key) + '=' + *value, option);
@@ -134,11 +129,11 @@ void fill(config::Settings& s, config::KeyTable& keys, const RunOptions& options
   if (options.wait_for_start) keys.set_text("experiment.wait_for_start=true", "--wait-for-start");
 }
 
-/// Which experiment it is, options and files together say; its settings stand below theirs.
-std::shared_ptr<const config::Script> script_of(const RunOptions& options) {
+/// The experiment that options and files name. The settings of its script rank below theirs.
+std::shared_ptr<const config::Script> script_of(const RunOptions& options, const Files& files) {
   config::Settings settings;
   config::KeyTable keys(settings);
-  fill(settings, keys, options, nullptr);
+  fill(settings, keys, options, files, nullptr);
   return config::find(settings.experiment.name);
 }
 
@@ -146,17 +141,21 @@ std::shared_ptr<const config::Script> script_of(const RunOptions& options) {
 
 RunRequest merge(const RunOptions& options) {
   RunRequest request;
-  request.script = script_of(options);
+  const Files files = read_files(options, request.settings.plant_name);
+  request.script = script_of(options, files);
   request.outputs = options.outputs;
   config::Settings& s = request.settings;
   const config::Script& script = *request.script;
   config::KeyTable keys(s);
-  fill(s, keys, options, &script);
-  if (s.backend == "rig") refuse_profiles(s);
+  fill(s, keys, options, files, &script);
   check_together(request);
+  if (s.backend == "rig") {
+    refuse_profiles(s);
+    refuse_events(script, s.driver.emulated);
+  }
   config::apply(script, s);
-  config::refuse_unsafe(s, keys);
-  if (s.backend == "rig") apply_board_limits(s);
+  static_cast<void>(driver::parse_injections(s.inject));  // in simulation too, a fault is spelled right or refused
+  if (s.backend == "rig") apply_board_policy(s, keys, request.outputs.fast);
   nlohmann::ordered_json config = keys.to_json();
   config["experiment_script"] = script.text;
   if (!script.files.empty()) config["experiment_files"] = script.files;

@@ -4,9 +4,9 @@
 
 #include <utility>
 
-#include "config/unsafe_settings.hpp"
 #include "driver/factory.hpp"
 #include "driver/injection/injecting_driver.hpp"
+#include "driver/injection/injection.hpp"
 #include "driver/sim/sim_driver.hpp"
 
 namespace abs_hil::program {
@@ -20,7 +20,7 @@ std::unique_ptr<driver::RigDriver> make_driver(const config::Settings& s, bool f
 
 std::unique_ptr<driver::RigDriver> with_faults(std::unique_ptr<driver::RigDriver> driver, const config::Settings& s,
                                                runtime::Clock& clock) {
-  std::vector<driver::Injection> injections = config::injections_of(s);
+  std::vector<driver::Injection> injections = driver::parse_injections(s.inject);
   if (injections.empty()) return driver;
   for (const driver::Injection& injection : injections) spdlog::warn("fault injected: {}", driver::to_text(injection));
   return std::make_unique<driver::InjectingDriver>(

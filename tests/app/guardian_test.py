@@ -1,4 +1,4 @@
-"""The dead-man: the controller is killed, stopped or crashes in each phase, and the card's PWMs read 0. The times are
+"""The guardian: the controller is killed, stopped or crashes in each phase, and the card's PWMs read 0. The times are
 printed, never asserted: this computer's own pauses reach tens of ms."""
 import csv
 import ctypes

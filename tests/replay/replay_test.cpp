@@ -8,8 +8,8 @@
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "config/plan.hpp"
-#include "config/unsafe_settings.hpp"
 #include "driver/injection/injecting_driver.hpp"
+#include "driver/injection/injection.hpp"
 #include "experiment/simulated_run.hpp"
 #include "replay/check.hpp"
 #include "replay/report.hpp"
@@ -64,7 +64,7 @@ void record_run(const std::filesystem::path& path, const Recipe& recipe) {
       std::make_unique<driver::SimDriver>(s.plant,
                                           driver::SimStart{.seed = static_cast<std::uint64_t>(s.seed),
                                                            .start_speed_rad_s = s.experiment.start_speed_rad_s}),
-      config::injections_of(s), static_cast<std::uint64_t>(s.seed),
+      driver::parse_injections(s.inject), static_cast<std::uint64_t>(s.seed),
       [&clock](std::int64_t duration_ns) { clock.sleep_until(clock.now_ns() + duration_ns); });
   experiment::RunSession session(clock, driver,
                                  experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate,
