@@ -19,9 +19,9 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-SOURCES = ['command_gate', 'stride', 'encoder_watch', 'response_watch', 'watch_limits']
+SOURCES = ['command_gate', 'speed_window', 'encoder_check', 'response_check', 'plausibility_limits']
 TESTS = sorted((ROOT / 'tests/runtime/gate').glob('*_test.cpp'))
-COMPILE = ['g++', '-std=c++20', '-O0', '-fPIC', '-I', ROOT / 'include', '-I', ROOT / 'tests']
+COMPILE = ['g++', '-std=c++20', '-O0', '-fPIC', '-I', ROOT / 'include', '-I', ROOT / 'src', '-I', ROOT / 'tests']
 
 RELATIONS = {'<=': ['<', '>'], '>=': ['>', '<'], '<': ['<=', '>='], '>': ['>=', '<='], '==': ['!='], '!=': ['==']}
 ARITHMETIC = {'+': '-', '-': '+', '*': '/', '/': '*'}
@@ -134,7 +134,7 @@ class Bench:
     def __init__(self, folder):
         self.folder = folder
         (folder / 'headers.hpp').write_text('#include <algorithm>\n#include <array>\n#include <atomic>\n#include <cmath>\n'
-                                            '#include <utility>\n#include "abs_hil/runtime/command_gate.hpp"\n'
+                                            '#include <utility>\n#include "runtime/command_gate.hpp"\n'
                                             '#include "abs_hil/rig/brake_map.hpp"\n'
                                             '#include "abs_hil/rig/encoder_scale.hpp"\n')
         require(run_quietly(*COMPILE, '-w', '-x', 'c++-header', folder / 'headers.hpp', '-o',

@@ -116,10 +116,10 @@ bool EmulatedUsb::serve() {
 
 void EmulatedUsb::go_on_to(std::int64_t time_ns) {
   truth_.advance(board_, time_ns);
-  watch_brake();
+  run_commands_when_braking();
 }
 
-void EmulatedUsb::watch_brake() {
+void EmulatedUsb::run_commands_when_braking() {
   if (options_.when_braking.empty()) return;
   if (board_.outputs().brake_duty == 0.0) {
     brake_since_ns_ = -1;

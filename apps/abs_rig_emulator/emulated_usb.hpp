@@ -42,7 +42,7 @@ class EmulatedUsb {
   void plug_in();
   void unplug();
   void go_on_to(std::int64_t time_ns);
-  void watch_brake();
+  void run_commands_when_braking();
   void send(const std::vector<std::uint8_t>& replies);
 
   UsbEmulatorOptions options_;

@@ -103,7 +103,7 @@ void CanNode::note_outputs(const std::string& why) {
   nonzero_ = nonzero;
 }
 
-void CanNode::watch() {
+void CanNode::check_interlocks() {
   const double fastest = fastest_rad_s(plant_);
   if (fastest > rad_s_of_rpm(options_.overspeed_rpm)) {
     overspeed_latched_ = true;
@@ -128,7 +128,7 @@ void CanNode::advance_to(std::int64_t time_ns) {
     if (guarded && time_ns_ >= watchdog_ends_ns()) {
       become(State::latched, 1, "watchdog");
     }
-    watch();
+    check_interlocks();
   }
 }
 

@@ -82,7 +82,7 @@ class CanNode {
   void activate(const BusFrame& frame);
   void become(State state, std::uint8_t latch_reason, const std::string& why);
   void reject(const char* why);
-  void watch();
+  void check_interlocks();
   void note_outputs(const std::string& why);
   [[nodiscard]] std::int64_t count(bool upper_wheel) const noexcept;
   [[nodiscard]] std::uint64_t duty_raw(double duty) const noexcept;

@@ -157,10 +157,10 @@ Outputs CardModel::outputs() const noexcept {
 
 void CardModel::trip_overspeed() noexcept {
   overspeed_latched_ = true;
-  plausibility_limits();
+  enforce_limits();
 }
 
-void CardModel::plausibility_limits() noexcept {
+void CardModel::enforce_limits() noexcept {
   const double fastest = fastest_rad_s(plant_);
   if (velocity(fastest) > plain_[0x5C / 4]) {
     overspeed_latched_ = true;
@@ -182,7 +182,7 @@ void CardModel::advance_to(std::int64_t time_ns) noexcept {
     const std::int64_t next = step_end_ns(time_ns_, time_ns, step_ns);
     step(plant_, next - time_ns_, outputs());
     time_ns_ = next;
-    plausibility_limits();
+    enforce_limits();
   }
 }
 

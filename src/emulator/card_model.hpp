@@ -69,7 +69,7 @@ class CardModel {
   void write_pwm(std::uint32_t offset, std::uint32_t value) noexcept;
   [[nodiscard]] std::uint32_t raw_count(std::uint32_t channel) const noexcept;
   [[nodiscard]] std::uint32_t velocity(double omega_rad_s) const noexcept;
-  void plausibility_limits() noexcept;
+  void enforce_limits() noexcept;
 
   CardOptions options_;
   plant_sim::Plant plant_;

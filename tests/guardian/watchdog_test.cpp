@@ -24,7 +24,7 @@ std::int64_t watch(Watchdog& sentry, std::int64_t last_cycle_ns, std::int64_t un
 
 }  // namespace
 
-TEST_CASE("as long as cycles go on there is nothing to do") {
+TEST_CASE("the watchdog waits as long as cycles go on") {
   Watchdog sentry(timeout_ns, period_ns);
   CHECK(watch(sentry, INT64_MAX, 10'000 * ms) == -1);
   CHECK(sentry.reason() == rig::Reason::none);
@@ -43,7 +43,7 @@ TEST_CASE("a silent controller is noticed within the timeout and one look, where
   }
 }
 
-TEST_CASE("before the first cycle there is no sign of life to miss") {
+TEST_CASE("before the first cycle a missing heartbeat is no fault") {
   Watchdog sentry(timeout_ns, period_ns);
   for (std::int64_t now_ns = 0; now_ns < 5'000 * ms; now_ns += period_ns) {
     REQUIRE(sentry.look({.now_ns = now_ns, .cycle_beats = 0}) == Verdict::wait);
@@ -62,7 +62,7 @@ TEST_CASE("a computer that stands still as a whole makes nobody look dead") {
   CHECK(sentry.silence_ns() == 0);
 }
 
-TEST_CASE("death is acted upon at once, and the first reason stays") {
+TEST_CASE("the watchdog acts on the controller's death at once, and the first reason stays") {
   Watchdog sentry(timeout_ns, period_ns);
   CHECK(sentry.look({.now_ns = 0, .cycle_beats = 7}) == Verdict::wait);
   CHECK(sentry.look({.now_ns = 1, .cycle_beats = 7, .controller_gone = true}) == Verdict::make_safe);
@@ -71,7 +71,7 @@ TEST_CASE("death is acted upon at once, and the first reason stays") {
   CHECK(sentry.reason() == rig::Reason::controller_died);
 }
 
-TEST_CASE("released outputs need no signs of life, and a controller that dies then has left them safe") {
+TEST_CASE("released outputs need no heartbeat and stay safe if the controller dies") {
   Watchdog sentry(timeout_ns, period_ns);
   for (std::int64_t now_ns = 0; now_ns < 5'000 * ms; now_ns += period_ns) {
     REQUIRE(sentry.look({.now_ns = now_ns, .cycle_beats = 9, .stage = Stage::released}) == Verdict::wait);
@@ -82,7 +82,7 @@ TEST_CASE("released outputs need no signs of life, and a controller that dies th
   CHECK(sentry.reason() == rig::Reason::controller_died);
 }
 
-TEST_CASE("a controller that waits for its board to confirm the safe state has so much longer, and no more") {
+TEST_CASE("a controller that waits for its board to confirm the safe state has that board's time in addition") {
   constexpr std::int64_t board_needs_ns = 300 * ms;
   Watchdog sentry(timeout_ns, period_ns, board_needs_ns);
   std::int64_t now_ns = 0;
@@ -95,14 +95,14 @@ TEST_CASE("a controller that waits for its board to confirm the safe state has s
   CHECK(sentry.must_end_controller());
 }
 
-TEST_CASE("a controller that dies while it makes its board safe has not done so") {
+TEST_CASE("the outputs are not safe if the controller dies while it makes them safe") {
   Watchdog sentry(timeout_ns, period_ns, 300 * ms);
   const HeartbeatReading died{.now_ns = 0, .cycle_beats = 9, .stage = Stage::making_safe, .controller_gone = true};
   CHECK(sentry.look(died) == Verdict::make_safe);
   CHECK(sentry.reason() == rig::Reason::controller_died);
 }
 
-TEST_CASE("a run that was closed in order dismisses the guardian, the process' end or not") {
+TEST_CASE("a run closed in order dismisses the guardian, whether or not the process has ended") {
   for (const bool gone : {false, true}) {
     Watchdog sentry(timeout_ns, period_ns);
     CHECK(sentry.look({.now_ns = 0, .cycle_beats = 9, .stage = Stage::closed, .controller_gone = gone}) ==
@@ -111,7 +111,7 @@ TEST_CASE("a run that was closed in order dismisses the guardian, the process' e
   }
 }
 
-TEST_CASE("outputs given up without being known safe are taken over, without ending their controller") {
+TEST_CASE("the guardian takes over handed-over outputs without ending the controller") {
   Watchdog sentry(timeout_ns, period_ns);
   CHECK(sentry.look({.now_ns = 0, .cycle_beats = 9, .stage = Stage::handed_over}) == Verdict::make_safe);
   CHECK(sentry.reason() == rig::Reason::safe_state_unverified);

@@ -88,7 +88,7 @@ class CanDriver final : public RigDriver {
   void take_outputs(RawDuties applied, std::uint8_t command_sequence) noexcept;
   void note(Anomaly anomaly) noexcept;
   void count(Anomaly anomaly) noexcept;
-  void watch_drops() noexcept;
+  void check_drops() noexcept;
   [[nodiscard]] IoResult judge(std::int64_t now_ns) noexcept;
   [[nodiscard]] IoResult judge_answer(std::int64_t now_ns) noexcept;
   [[nodiscard]] IoResult tripped() noexcept;

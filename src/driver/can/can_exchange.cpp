@@ -185,7 +185,7 @@ IoResult CanDriver::collect() noexcept {
   return {};
 }
 
-void CanDriver::watch_drops() noexcept {
+void CanDriver::check_drops() noexcept {
   const std::uint32_t dropped = link_.socket->dropped();
   if (dropped == drops_seen_) return;
   counters_.dropped_by_kernel += dropped - drops_seen_;
@@ -258,7 +258,7 @@ IoResult CanDriver::judge_answer(std::int64_t now_ns) noexcept {
 }
 
 IoResult CanDriver::judge(std::int64_t now_ns) noexcept {
-  watch_drops();
+  check_drops();
   if (!tracker_.complete()) {
     note(Anomaly::missing);
     return bucket_.tripped() ? tripped() : IoResult{};
