@@ -7,13 +7,13 @@ namespace abs_hil::driver::usb {
 
 /// Everything below `driver.usb.` in the configuration.
 struct UsbOptions {
-  std::string sysfs_root{"/sys/bus/usb/devices"};  ///< where the kernel tells what is plugged in
-  std::string device_root{"/dev/bus/usb"};         ///< folder with BUS/DEVICE, the nodes that libusb opens
+  std::string sysfs_root{"/sys/bus/usb/devices"};  ///< folder in which the kernel lists the devices
+  std::string device_root{"/dev/bus/usb"};         ///< folder with the nodes BUS/DEVICE that libusb opens
   std::int32_t vendor_id{-1};                      ///< 0 ... 65535; -1: any. The maker's is not public
   std::int32_t product_id{-1};                     ///< 0 ... 65535; -1: any. The maker's is not public
-  std::string manufacturer{"InTeCo"};              ///< the device's own word for its maker; empty: not compared
-  std::string serial{};                            ///< which board; empty: the only one
-  std::int32_t version{-1};                        ///< version word that the board must show, 0 ... 65535; -1: any
+  std::string manufacturer{"InTeCo"};              ///< manufacturer string of the device; empty: not compared
+  std::string serial{};                            ///< serial number of the board; empty: the only board
+  std::int32_t version{-1};                        ///< required version word of the board, 0 ... 65535; -1: any
   std::int32_t drive_pwm{0};                       ///< PWM channel of the drive, 0 ... 9
   std::int32_t brake_pwm{1};                       ///< PWM channel of the brake, 0 ... 9
   std::int32_t enable_line{-1};                    ///< digital line that enables the motor, 0 ... 14; -1: none
@@ -26,13 +26,13 @@ struct UsbOptions {
   double brake_duty_max{0.7};                      ///< in (0, 1]; as on the RT-DAC4/PCI
   std::string pwm_mode{"12-bit"};                  ///< "8-bit" or "12-bit"
   std::int32_t pwm_prescaler{60};                  ///< 0 ... 65535; 160 Hz if the board's clock is the PCI board's
-  /// Every frame must show the PWM words that were sent. Whether the board shows them is not known; without it the
-  /// safe state is sent and taken, but not verified.
+  /// Every frame must show the PWM words that were sent. It is not known whether the board shows them. If false, the
+  /// safe state is sent and accepted, but not verified.
   bool verify_outputs{true};
-  std::int32_t answer_timeout_us{500};  ///< longest that a cycle waits for a frame, 50 ... 1000000; below the period
-  /// A counter that goes faster than this tells nonsense; far above what the motor reaches. rad/s, > 0.
+  std::int32_t answer_timeout_us{500};  ///< longest wait of a cycle for its frame, 50 ... 1000000; less than the period
+  /// A counter that moves faster is a fault; far above the motor's top speed. rad/s, > 0.
   double plausible_speed_rad_s{1000.0};
-  std::int32_t encoder_counts_per_rev{4096};  ///< for that check alone; 1024 lines, quadrature
+  std::int32_t encoder_counts_per_rev{4096};  ///< only for that check; 1024 lines, quadrature
 };
 
 }  // namespace abs_hil::driver::usb

@@ -134,7 +134,7 @@ TEST_CASE("A card has one owner; a second one is told who holds it, and gets it 
   {
     const Card first = open_card(tree.options, false);
     CHECK_THAT(refusal(tree.options),
-               Contains("in use by process " + std::to_string(::getpid())) && Contains("exactly one owner"));
+               Contains("in use by process " + std::to_string(::getpid())) && Contains("only one owner"));
   }
   CHECK(refusal(tree.options) == "opened");
 }

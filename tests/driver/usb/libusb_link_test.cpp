@@ -133,7 +133,7 @@ TEST_CASE("A device that cannot be opened is refused with its name and the cause
   SECTION("not to be set") {
     usb.settings[1].alternate = 1;
     usb.setting_error = LIBUSB_ERROR_NOT_FOUND;
-    CHECK_THAT(refusal(), Contains("does not take its setting"));
+    CHECK_THAT(refusal(), Contains("does not accept its alternate setting"));
   }
 }
 

@@ -63,7 +63,7 @@ TEST_CASE("Lock-step is for an emulator that has it, and for nothing else") {
   FakeBus bus;
   bus.plug("1-1", "1209", "InTeCo", "1");
   CHECK_THROWS_WITH(choose_board(bus.options, true, false), Contains("is hardware, or an emulator in real time"));
-  CHECK_THROWS_WITH(choose_board(bus.options, false, true), Contains("is no emulator, though driver.emulated=true"));
+  CHECK_THROWS_WITH(choose_board(bus.options, false, true), Contains("is not an emulator, but driver.emulated=true"));
   bus.plug("1-1", "1209", "InTeCo", "1", "RT-DAC/USB2 emulator in lock-step");
   CHECK(choose_board(bus.options, true, true).address == "1-1");
   CHECK_THROWS_WITH(choose_board(bus.options, false, false), Contains("is an emulator in lock-step"));
