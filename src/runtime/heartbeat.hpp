@@ -20,7 +20,7 @@ struct HeartbeatPanel {
 /// Real-time safe.
 class Heartbeat {
  public:
-  /// @param silent_cycles_max  the guardian counts as lost after so many cycles without its heartbeat; 0: no guardian
+  /// @param silent_cycles_max  the guardian counts as lost after this number of silent cycles; 0: no guardian
   Heartbeat(HeartbeatPanel& panel, FlightRing& recorder, std::uint64_t silent_cycles_max = 0) noexcept
       : panel_(panel), recorder_(recorder), silent_cycles_max_(silent_cycles_max) {}
 

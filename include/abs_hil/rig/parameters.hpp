@@ -32,18 +32,19 @@ struct BrakeParameters {
   double c31_per_s{20.37};  ///< inverse time constant of the lag, > 0
 };
 
-/// Lower wheel's DC motor: Tm = stall_torque * duty * (1 - omega2 / no_load_speed). Not in the paper, so calibrated:
-/// the paper's plots start braking at about 6.2 s from omega1 = 170 rad/s, 0.05 s of which the motor is off. With the
-/// no-load speed set to 220 rad/s (170 rad/s is reached at 0.78 of it), the stall torque is the root of "full duty from
-/// rest brings the upper wheel to 170 rad/s in 6.15 s", bisected on the simulated plant of Table 1. The lumped model
-/// without slip, J w' = K - M - (K/w0 + d) w with both wheels' J, d, M referred to the lower one, gives 2.1077 N m in
-/// closed form; slip in traction accounts for the rest. tests/plant_sim/actuators_test.cpp checks both.
+/// Lower wheel's DC motor: Tm = stall_torque * duty * (1 - omega2 / no_load_speed). The paper does not give these
+/// values, so they are calibrated. In the paper's plots braking starts at about 6.2 s from omega1 = 170 rad/s, and the
+/// motor is off for the last 0.05 s. The no-load speed is set to 220 rad/s (170 rad/s is 0.78 of it). The stall torque
+/// is then the value for which full duty from rest brings the upper wheel to 170 rad/s in 6.15 s, found by bisection on
+/// the simulated plant of Table 1. The lumped model without slip, J w' = K - M - (K/w0 + d) w with both wheels' J, d, M
+/// referred to the lower one, gives 2.1077 N m in closed form; slip in traction explains the difference.
+/// tests/plant_sim/actuators_test.cpp checks both.
 struct DriveMotorParameters {
   double stall_torque_Nm{2.1122};     ///< torque at standstill and full duty, > 0
   double no_load_speed_rad_s{220.0};  ///< speed at which back-EMF cancels the supply, > 0
 };
 
-/// Everything a controller may know of the rig. SI units throughout.
+/// All parameters of the rig that a controller may use, in SI units.
 struct RigParameters {
   WheelParameters wheels;
   TyreParameters tyre;
@@ -52,7 +53,7 @@ struct RigParameters {
   std::int32_t encoder_counts_per_rev{4096};  ///< counts per revolution after quadrature decoding, >= 4
 };
 
-/// k(slip_ref) of (15): what a unit of tyre force does to the slip velocity error, 1/kg.
+/// k(slip_ref) of (15): gain from the tyre force to the derivative of the slip velocity error, 1/kg.
 [[nodiscard]] constexpr double slip_velocity_gain(const WheelParameters& w, double slip_ref) noexcept {
   return w.r1_m * w.r1_m / w.J1_kg_m2 + (1.0 - slip_ref) * w.r2_m * w.r2_m / w.J2_kg_m2;
 }
