@@ -114,7 +114,7 @@ TEST_CASE("Each fault is refused with its own message") {
   }
   SECTION("no BAR 2") {
     tree.bar("0000:04:01.0", "0x0000000000000000 0x0000000000000000 0x0000000000000000");
-    CHECK_THAT(refusal(tree.options), Contains("BAR 2 is not there"));
+    CHECK_THAT(refusal(tree.options), Contains("BAR 2 is missing"));
   }
   SECTION("no table of regions") {
     tree.bar("0000:04:01.0", "nonsense");
