@@ -24,7 +24,7 @@ extern "C" {
 
 /// The gate's look at the measurement.
 [[gnu::noinline]] void counted_watch(runtime::CommandGate& gate, const rig::Measurement& measurement) {
-  gate.watch(measurement, measurement.time_ns);
+  gate.check_measurement(measurement, measurement.time_ns);
 }
 
 [[gnu::noinline]] bool counted_ring_push(runtime::RecordRing& ring, const rig::CycleRecord& record) {

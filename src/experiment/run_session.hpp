@@ -54,7 +54,7 @@ class RunSession {
   /// For runs in real time: `guard` stands by from between configuration and activation of the driver until its outputs
   /// are released. Both must outlive the run.
   void guard_with(runtime::RunGuard& guard) noexcept { guard_ = &guard; }
-  void watch_with(runtime::Heartbeat& watch) noexcept { executive_.watch_with(watch); }
+  void set_heartbeat(runtime::Heartbeat& heartbeat) noexcept { executive_.set_heartbeat(heartbeat); }
   /// Ends the run in an orderly way at its next cycle. Any thread or signal handler may call it.
   void request_stop(rig::Reason reason) noexcept { executive_.request_stop(reason); }
 

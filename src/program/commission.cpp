@@ -46,7 +46,7 @@ class GuardedPulse final : public experiment::PulseGuard {
     region_.emplace(1);
     watch_.emplace(region_->panel(), region_->recorder());
     guardian_.emplace(*region_, guardian::guardian_program(), guardian_brief(request_, {}));
-    guardian_->stand_guard();
+    guardian_->arm();
     driver_.tell_before_making_safe(&*guardian_);
   }
   [[nodiscard]] bool beat() noexcept override {

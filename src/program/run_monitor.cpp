@@ -63,7 +63,7 @@ RunMonitor::RunMonitor(const RunRequest& request, std::filesystem::path record_p
 }
 
 void RunMonitor::watch(experiment::RunSession& session) {
-  session.watch_with(cycle_watch_);
+  session.set_heartbeat(cycle_watch_);
   if (guardian_) session.guard_with(*guardian_);
 }
 

@@ -39,12 +39,12 @@ MatrixCase run_with(Backend backend, std::vector<driver::Injection> injections, 
   std::vector<runtime::FlightSlot> slots(recorder_slots);
   runtime::FlightRing flight(slots);
   runtime::HeartbeatPanel panel;
-  runtime::Heartbeat watch(panel, flight);
+  runtime::Heartbeat heartbeat(panel, flight);
   Recorder recorder;
   analysis::RunMetrics metrics(setup.plant.rig.wheels.r2_m, setup.experiment.end_speed_m_s);
   telemetry::CsvSink csv(folder / "run.csv");
   RunSession session(clock, driver, logic_parts(setup), setup.gate, {&recorder, &metrics, &csv});
-  session.watch_with(watch);
+  session.set_heartbeat(heartbeat);
   const RunOutcome outcome = session.run_fast([] { return rig::Reason::none; });
 
   MatrixCase result{.reason = outcome.reason, .metrics = metrics.metrics()};
