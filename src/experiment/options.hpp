@@ -4,7 +4,7 @@
 
 namespace abs_hil::experiment {
 
-/// Everything below `experiment.` in the configuration.
+/// Options under `experiment.` in the configuration.
 struct ExperimentOptions {
   std::string name{"paper"};
   bool wait_for_start{false};       ///< stay idle until a command gives the start

@@ -23,24 +23,26 @@ runtime::RealtimeMode realtime_mode(const std::string& name) {
   return name == "off" ? runtime::RealtimeMode::off : runtime::RealtimeMode::prefer;
 }
 
-/// A run that waits for its start must be able to get it.
+/// Checks that a run that waits for a start command can receive one.
 void check_start(const RunRequest& request) {
   const config::Settings& s = request.settings;
   const auto refuse = [](const char* why) { throw config::ConfigError(std::string("--wait-for-start: ") + why); };
-  if (!s.commands.enabled) refuse("nobody could give the start; add --set commands.enabled=true and commands.key_file");
-  if (request.outputs.no_lcm) refuse("the start comes over LCM; leave out --no-lcm");
-  if (request.outputs.fast) refuse("virtual time waits for nobody; leave out --fast");
+  if (!s.commands.enabled)
+    refuse("the start command needs remote commands; add --set commands.enabled=true --set commands.key_file=FILE");
+  if (request.outputs.no_lcm) refuse("the start command comes over LCM; leave out --no-lcm");
+  if (request.outputs.fast) refuse("a run in virtual time cannot wait for a command; leave out --fast");
   if (s.experiment.start_speed_rad_s > 0.0) {
-    refuse("wheels that turn from the start would run down meanwhile; leave out experiment.start_speed_rad_s");
+    refuse(
+        "wheels that turn from the beginning would slow down during the wait; leave out experiment.start_speed_rad_s");
   }
 }
 
-/// What only a simulated plant can do, and what may be done to an emulator but never to hardware.
+/// Refuses events that only a simulated plant can carry out, and fault injection into real hardware.
 void refuse_events(const config::Script& script, bool emulated) {
   for (const config::EventScript& event : script.events) {
     for (const config::Change& change : event.changes) {
       throw config::ConfigError(
-          fmt::format("{}: [[event]] {}: only a simulated plant can be told to change; run experiment {} with "
+          fmt::format("{}: [[event]] {}: only a simulated plant can change on command; run experiment {} with "
                       "--backend sim, or leave its events out for the rig",
                       script.at(event.place), change.what, script.name));
     }
@@ -53,13 +55,12 @@ void refuse_events(const config::Script& script, bool emulated) {
   }
 }
 
-/// The same, asked for by the configuration.
+/// Refuses profiles of plant parameters, which only a simulated plant can follow.
 void refuse_profiles(config::Settings& s) {
   for (const config::ChangingPart& part : config::changing_parts()) {
     if (part.profile(s).empty()) continue;
-    throw config::ConfigError(
-        fmt::format("plant.{}_profile: only a simulated plant can be told to change; leave it out or use --backend sim",
-                    part.what));
+    throw config::ConfigError(fmt::format(
+        "plant.{}_profile: only a simulated plant can follow a profile; leave it out or use --backend sim", part.what));
   }
 }
 
@@ -67,17 +68,17 @@ void check_together(const RunRequest& request) {
   const config::Settings& s = request.settings;
   if (s.backend == "rig" && request.outputs.fast && !s.driver.emulated) {
     throw config::ConfigError(
-        "--fast: the rig runs in real time only; leave it out, use --backend sim, or for an emulator in lock-step "
-        "(never hardware) --set driver.emulated=true");
+        "--fast: the rig runs in real time only; leave it out, use --backend sim, or, for an emulator in lock-step "
+        "(never for hardware), --set driver.emulated=true");
   }
   if (request.outputs.fast && request.outputs.histogram_file) {
     throw config::ConfigError(
-        "--histogram: in virtual time (--fast) there are no latencies to measure; leave one of the two out");
+        "--histogram: a run in virtual time (--fast) has no latencies to measure; leave out one of the two");
   }
   if (s.backend == "rig" && s.driver.kind == "usb" && !request.outputs.fast &&
       s.driver.usb.answer_timeout_us * s.control.rate_Hz >= 1e6) {
     throw config::ConfigError("driver.usb.answer_timeout_us = " + std::to_string(s.driver.usb.answer_timeout_us) +
-                              ": a cycle must not wait longer than its period; give less than " +
+                              ": a cycle must not wait longer than its period; give a value below " +
                               std::to_string(std::llround(1e6 / s.control.rate_Hz)) + " or a lower control.rate_Hz");
   }
   if (s.backend == "rig" && s.experiment.start_speed_rad_s > 0.0) {
@@ -87,12 +88,12 @@ void check_together(const RunRequest& request) {
   if (s.experiment.wait_for_start) check_start(request);
   if (s.backend == "rig") refuse_events(*request.script, s.driver.emulated);
   if (s.control.adaptive.theta_min_N >= s.control.adaptive.theta_max_N) {
-    throw config::ConfigError("control.adaptive.theta_min_N: must be less than control.adaptive.theta_max_N");
+    throw config::ConfigError("control.adaptive.theta_min_N: give a value below control.adaptive.theta_max_N");
   }
 }
 
-/// What the board's driver never sends the gate and the controller's anti-windup must know, and its checks of counts
-/// need the wheels' encoders.
+/// Applies the board's limits: the gate and the controller's anti-windup must know the outputs that its driver never
+/// sends, and the gate's checks of counts need the wheels' encoders.
 void apply_board_limits(config::Settings& s) {
   const auto cap = [&s](const auto& board) {
     s.gate.brake_duty_max = std::min(s.gate.brake_duty_max, board.brake_duty_max);
@@ -107,7 +108,7 @@ void apply_board_limits(config::Settings& s) {
   s.driver.can.rate_Hz = s.control.rate_Hz;
 }
 
-/// Everything but what the script asks for beyond its settings.
+/// Fills in all settings, except what the script requests beyond its own settings.
 void fill(config::Settings& s, config::KeyTable& keys, const RunOptions& options, const config::Script* script) {
   s.backend = options.backend;
   s.realtime.mode = realtime_mode(options.realtime);
@@ -134,7 +135,7 @@ void fill(config::Settings& s, config::KeyTable& keys, const RunOptions& options
   if (options.wait_for_start) keys.set_text("experiment.wait_for_start=true", "--wait-for-start");
 }
 
-/// Which experiment it is, options and files together say; its settings stand below theirs.
+/// Finds the experiment script from options and files. The script's settings have lower priority than both.
 std::shared_ptr<const config::Script> script_of(const RunOptions& options) {
   config::Settings settings;
   config::KeyTable keys(settings);
@@ -162,7 +163,7 @@ RunRequest merge(const RunOptions& options) {
   if (!script.files.empty()) config["experiment_files"] = script.files;
   request.config_json = config.dump();
   request.config_toml = fmt::format(
-      "# Effective configuration of a run; the same again: abs_hil --backend {} --plant {} --config THIS_FILE\n{}",
+      "# Effective configuration of a run. To run it again: abs_hil --backend {} --plant {} --config THIS_FILE\n{}",
       s.backend, s.plant_name, keys.to_toml());
   return request;
 }

@@ -245,7 +245,7 @@ class Guardian(RigTest):
         emulator.command('fault 6c:ok')
         self.wait_until_guardian_ended(guardian)
         _, errors = program.communicate(timeout=20)
-        self.assertIn('goes on trying', errors)
+        self.assertIn('still tries to make the outputs safe', errors)
         self.assertIn('the controller could not verify the safe state', errors)
         self.assertIn('written and read back', errors)
         self.assertEqual(emulator.wire(), SAFE)

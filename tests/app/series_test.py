@@ -71,7 +71,7 @@ class Series(ProgramTest):
         self.assertEqual(program.returncode, 130, errors)
         done = [run['folder'] for run in self.index(out) if run['status'] == 'completed']
         self.assertIn(f'interrupted with {len(done)} of 4 runs done, 0 ended early, in {out}', words)
-        self.assertIn(f'the same command with --out {out} goes on', words)
+        self.assertIn(f'to continue, repeat the command with --out {out}', words)
         self.assertTrue(0 < len(done) < 4)
         before = {name: (out / name / 'SHA256SUMS').read_bytes() for name in done}
         result = subprocess.run(command, capture_output=True, text=True, timeout=60)

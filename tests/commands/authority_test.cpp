@@ -31,10 +31,10 @@ TEST_CASE("A key that is no secret, or none at all, is refused with its file and
   CHECK_THAT(refusal(""), Contains("none given") && Contains("--set commands.key_file=commands.key"));
   CHECK_THAT(refusal(scratch / "nowhere"),
              Contains("nowhere' cannot be read: No such file") && Contains("openssl rand"));
-  CHECK_THAT(refusal(scratch.path), Contains("is no file"));
+  CHECK_THAT(refusal(scratch.path), Contains("is not a regular file"));
   const std::string sixteen = "0123456789abcdef";
-  CHECK_THAT(refusal(with(sixteen, S_IRUSR | S_IWUSR | S_IROTH)), Contains("is open to everybody: chmod o= "));
-  CHECK_THAT(refusal(with(sixteen.substr(1) + " \n\n", S_IRUSR | S_IWUSR)), Contains("holds less than 16 characters"));
+  CHECK_THAT(refusal(with(sixteen, S_IRUSR | S_IWUSR | S_IROTH)), Contains("is accessible to all users: chmod o= "));
+  CHECK_THAT(refusal(with(sixteen.substr(1) + " \n\n", S_IRUSR | S_IWUSR)), Contains("holds fewer than 16 characters"));
   CHECK(read_key(with(sixteen + " \r\n", S_IRUSR | S_IWUSR | S_IRGRP)) == sixteen);
 }
 

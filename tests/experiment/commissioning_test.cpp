@@ -164,7 +164,7 @@ TEST_CASE("Each pulse has its guard, from before it until the outputs are 0 agai
   Lab dying;
   dying.guard.dies_at = 50;
   CHECK(dying.run() == CommissioningResult::failed);
-  CHECK_THAT(dying.person.said, Contains("the guardian has died"));
+  CHECK_THAT(dying.person.said, Contains("the guardian process has ended"));
   CHECK(dying.guard.beats == 50);
   CHECK(dying.guard.ended_safe == 1);
   CHECK(dying.card.model.outputs().drive_duty == 0.0);
@@ -249,7 +249,7 @@ TEST_CASE("Wheels that do not turn, or turn each other, are found") {
   }
   SECTION("E-stop pressed during the drive pulse") {
     lab.card.model.press_emergency_stop(true);
-    words = "E-stop still pressed";
+    words = "the E-stop is pressed";
   }
   CHECK(lab.run() == CommissioningResult::failed);
   CHECK_THAT(lab.person.said, Contains(words));
@@ -290,19 +290,19 @@ TEST_CASE("A board that fails in a pulse ends it, and says at what") {
     lab.board.on_read = [&lab]() -> driver::IoResult {
       return {lab.guard.beats < 10 ? driver::IoError::none : driver::IoError::no_answer};
     };
-    words = "FAILED: reading the board: board did not answer in time";
+    words = "FAILED: cannot read the board: board did not answer in time";
   }
   SECTION("writing") {
     lab.board.on_write = [](const rig::Command& command) -> driver::IoResult {
       return {command.motor_duty > 0.0 ? driver::IoError::stalled : driver::IoError::none};
     };
-    words = "FAILED: writing to the board: board refuses the transfer";
+    words = "FAILED: cannot write to the board: board refuses the transfer";
   }
   SECTION("the zeros at its end") {
     lab.board.on_write = [](const rig::Command& command) -> driver::IoResult {
       return {command.motor_duty > 0.0 ? driver::IoError::none : driver::IoError::disconnected};
     };
-    words = "FAILED: ending the pulse: board is gone";
+    words = "FAILED: cannot end the pulse: board is gone";
     pulses_ended_safe = 0;
   }
   CHECK(lab.run() == CommissioningResult::failed);
@@ -321,18 +321,18 @@ TEST_CASE("After the pulses: wheels that do not stop, a brake that drives, one t
       if (lab.guard.begun > 0) ++lab.board.counters.lower_counts;
       return driver::IoResult{};
     };
-    words = "the wheels do not come to rest";
+    words = "the wheels still turn after the run-out limit";
   }
   SECTION("drive and brake exchanged") {
     lab.board.on_write = [&lab](const rig::Command& command) {
       if (command.motor_duty > 0.0 || command.brake_duty > 0.0) ++lab.board.counters.lower_counts;
       return driver::IoResult{};
     };
-    words = "are drive and brake exchanged?";
+    words = "check whether drive and brake are exchanged";
   }
   SECTION("nothing seen of the brake") {
     lab.person.no_to = 5;
-    words = "look at the brake's supply and cable";
+    words = "check the brake's supply and cable";
   }
   CHECK(lab.run() == CommissioningResult::failed);
   CHECK_THAT(lab.person.said, Contains(words));
@@ -345,7 +345,7 @@ TEST_CASE("A safe state that did not reach the board is no success") {
     if (lab.person.asked.size() == 5) lab.board.made_safe = {driver::IoError::disconnected};
   };
   CHECK(lab.run() == CommissioningResult::failed);
-  CHECK_THAT(lab.person.said, Contains("the safe state is not known to have reached the board: board is gone"));
+  CHECK_THAT(lab.person.said, Contains("the safe state may not have reached the board: board is gone"));
 }
 
 TEST_CASE("Whoever stops turning by hand, or stops while the wheels run out, ends it there") {

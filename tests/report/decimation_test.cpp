@@ -15,9 +15,9 @@ namespace {
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<Point> thinned(const std::vector<Point>& rows, std::size_t most) {
-  Decimation envelope(most);
-  for (const Point& row : rows) envelope.add(row.x, row.y);
-  return envelope.points();
+  Decimation decimation(most);
+  for (const Point& row : rows) decimation.add(row.x, row.y);
+  return decimation.points();
 }
 
 std::vector<Point> noise(std::size_t count) {

@@ -62,7 +62,7 @@ TEST_CASE("ASCII is ASCII everywhere") {
 
 TEST_CASE("waiting, silence and the end of a run are told apart") {
   CHECK_THAT(shown(RunView(10.0), 0, {.source = "udpm://here", .channel = "ABS_TELEMETRY"}),
-             Contains("waiting for messages") && Contains("Nothing has come yet on ABS_TELEMETRY at udpm://here."));
+             Contains("waiting for messages") && Contains("No message has arrived yet on ABS_TELEMETRY at udpm://here."));
   RunView view = whole_run();
   const CellGrid grid = draw_screen(view, 8199 * ms, {});
   CHECK_THAT(grid.to_text(), Contains("  no messages for 3.2 s"));

@@ -160,7 +160,7 @@ def garbage():
 def watched_run():
     watcher = Watcher()
     watcher.until('waiting for messages', 10)
-    watcher.until('Nothing has come yet on ABS_TELEMETRY', 5)
+    watcher.until('No message has arrived yet on ABS_TELEMETRY', 5)
     first = run()
     watcher.until(r'accelerate +[\d.]+ s +ω1 +[1-9]', 15)
     watcher.until(r'(9[5-9]\d|10[0-5]\d) messages/s', 8)
@@ -196,7 +196,7 @@ def given_back():
         watcher = Watcher(term='xterm-256color')
         for _ in range(100):
             watcher.read(0.1)
-            if b'Nothing has come' in watcher.bytes:
+            if b'No message has arrived' in watcher.bytes:
                 break
         watcher.process.send_signal(getattr(signal, name))
         watcher.ends(status)
@@ -205,7 +205,7 @@ def given_back():
 
 def odd_terminals():
     watcher = Watcher(locale='C')
-    watcher.until('Nothing has come', 10)
+    watcher.until('No message has arrived', 10)
     running = run('--set', 'experiment.start_speed_rad_s=120')
     watcher.until(r'w1 +\d+\.\d.*\n.*slip +\* slip', 15)
     assert watcher.screen.text().isascii(), watcher.screen.text()
@@ -275,7 +275,7 @@ def without_terminal():
         return subprocess.run([PROGRAM, 'watch', *arguments], capture_output=True, text=True, timeout=60, **options)
 
     nothing = watch('--once', '--timeout', '0.5')
-    assert nothing.returncode == 3 and 'no message within 0.5 s on ABS_TELEMETRY' in nothing.stderr, nothing
+    assert nothing.returncode == 3 and 'no message arrived within 0.5 s on ABS_TELEMETRY' in nothing.stderr, nothing
     running = run()
     time.sleep(1)
     picture = watch('--once', '--ascii')

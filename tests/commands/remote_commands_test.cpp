@@ -1,4 +1,4 @@
-#include "commands/command_desk.hpp"
+#include "commands/remote_commands.hpp"
 
 #include <sys/stat.h>
 
@@ -30,13 +30,13 @@ struct Bench {
   abs_hil::test::TemporaryFolder scratch;
   telemetry::test::CapturingOutlet captured;
   telemetry::MessageStream stream{{}, {}, {}};
-  CommandDesk steering{with_commands(scratch / "key"), stream};
+  RemoteCommands remote{with_commands(scratch / "key"), stream};
   experiment::AdjustmentMailbox mailbox;
 
   Bench() {
     stream.add(captured);
-    steering.drive(mailbox);
-    stream.set_farewell([this] { steering.refuse_pending(); });
+    remote.set_mailbox(mailbox);
+    stream.set_farewell([this] { remote.refuse_pending(); });
     show(0, rig::Reason::none, 0);
   }
   /// The record of cycle `n`.
@@ -45,7 +45,7 @@ struct Bench {
     record.reason = reason;
     record.reason_value = value;
     stream.consume(record, 0.0);
-    steering.consume(record, 0.0);
+    remote.consume(record, 0.0);
   }
   command2_t slip_ref(std::int64_t sequence, double value) { return command(sequence, "slip-ref", value); }
   command2_t command(std::int64_t sequence, const std::string& what, double value) {
@@ -69,8 +69,8 @@ struct Bench {
 
 TEST_CASE("a change that the run's end forestalled is refused, one that took effect is not") {
   Bench bench;
-  REQUIRE_FALSE(bench.steering.judge(bench.slip_ref(1, 0.1)).has_value());
-  REQUIRE_FALSE(bench.steering.judge(bench.slip_ref(2, 0.2)).has_value());
+  REQUIRE_FALSE(bench.remote.judge(bench.slip_ref(1, 0.1)).has_value());
+  REQUIRE_FALSE(bench.remote.judge(bench.slip_ref(2, 0.2)).has_value());
   bench.show(1, rig::Reason::slip_reference_changed, 1.0);  // the first has reached a cycle
   CHECK(bench.answers().size() == 1);
 
@@ -92,7 +92,7 @@ TEST_CASE("a change that the run's end forestalled is refused, one that took eff
 TEST_CASE("after the run's end a command is refused with that reason") {
   Bench bench;
   bench.stream.finish();
-  const auto answer = bench.steering.judge(bench.slip_ref(1, 0.1));
+  const auto answer = bench.remote.judge(bench.slip_ref(1, 0.1));
   REQUIRE(answer.has_value());
   CHECK(answer->reason == rig::Reason::command_not_now);
   CHECK(answer->message == "refused 'slip-ref': the run has ended");
@@ -102,14 +102,14 @@ TEST_CASE("a change that found no room leaves nothing behind, and can be sent ag
   Bench bench;
   std::int64_t sequence = 0;
   std::optional<telemetry::CommandAnswer> answer;
-  while (!answer) answer = bench.steering.judge(bench.slip_ref(++sequence, 0.1));
+  while (!answer) answer = bench.remote.judge(bench.slip_ref(++sequence, 0.1));
   CHECK(answer->message == "refused 'slip-ref': too many changes at once: send it again");
-  CHECK(bench.steering.judge(bench.command(++sequence, "start", 0.0)).has_value());
+  CHECK(bench.remote.judge(bench.command(++sequence, "start", 0.0)).has_value());
 
   experiment::AdjustmentMailbox::Arrived arrived{};
   while (bench.mailbox.take(arrived)) {
   }
-  CHECK_FALSE(bench.steering.judge(bench.command(++sequence, "start", 0.0)).has_value());
+  CHECK_FALSE(bench.remote.judge(bench.command(++sequence, "start", 0.0)).has_value());
   REQUIRE(bench.mailbox.take(arrived));
   CHECK(arrived.kind == experiment::Adjustment::Kind::start);
 }
