@@ -110,8 +110,8 @@ class RigScript(RigTest):
         read = PageReader(report(rig))
         text = page.read_text()
         self.assertEqual(read.cell('metrics', 'speeds and slip'), 'estimates')
-        self.assertIn('Estimated from the encoders', text)
-        self.assertIn('know no true θ', text)
+        self.assertIn('Runs without true values show estimates from the encoders', text)
+        self.assertIn('have no true θ', text)
         # θ is not known, so neither it nor the error against it is drawn; what the encoders tell is.
         self.assertEqual([curve['quantity'] for curve in read.figures['fig9']], ['theta_est'])
         for figure in ('fig5', 'fig6', 'fig7', 'fig8', 'fig10'):

@@ -35,7 +35,7 @@ class Browser(ReportTest):
 
     def test_curves(self):
         expected = {
-            'course': ['omega2'] * 2,
+            'profile': ['omega2'] * 2,
             'fig5': ['omega1'] * 2,
             'fig6': ['omega2'] * 2,
             'fig7': ['slip'] * 2 + ['slip_ref'] + ['slip_error'] * 2,

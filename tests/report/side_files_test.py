@@ -59,10 +59,10 @@ class SideFiles(ReportTest):
 
     def test_broken_histogram_is_said_with_its_line(self):
         run = self.without_summary('a')
-        for text, words in (('something else\n', 'histogram.txt:1: this is no histogram of abs_hil'),
-                            (HISTOGRAM_HEAD + '000001\t1\t2\n', 'histogram.txt:2: no line of a histogram'),
-                            (HISTOGRAM_HEAD + '000001' + '\tx' * PARTS + '\n', 'histogram.txt:2: no line'),
-                            (HISTOGRAM_HEAD + '99999999999' + '\t1' * PARTS + '\n', 'histogram.txt:2: no line')):
+        for text, words in (('something else\n', 'histogram.txt:1: not a histogram of abs_hil'),
+                            (HISTOGRAM_HEAD + '000001\t1\t2\n', 'histogram.txt:2: not a line of a histogram'),
+                            (HISTOGRAM_HEAD + '000001' + '\tx' * PARTS + '\n', 'histogram.txt:2: not a line'),
+                            (HISTOGRAM_HEAD + '99999999999' + '\t1' * PARTS + '\n', 'histogram.txt:2: not a line')):
             (run / 'histogram.txt').write_text(text)
             page, said = self.page(run)
             self.assertIn(words, said)
@@ -84,8 +84,8 @@ class SideFiles(ReportTest):
         run = self.make_run('a')
         events = (run / 'events.csv').read_text()
         for text, words in (('time,what\n', 'events.csv:1: the header must begin with'),
-                            (events + 'soon,phase,brake,"no reason",1\n', r'events.csv:\d+: no event: "soon'),
-                            (events + '1.0,phase\n', r'events.csv:\d+: no event: "1.0,phase"')):
+                            (events + 'soon,phase,brake,"no reason",1\n', r'events.csv:\d+: not an event: "soon'),
+                            (events + '1.0,phase\n', r'events.csv:\d+: not an event: "1.0,phase"')):
             (run / 'events.csv').write_text(text)
             self.assertRegex(self.page(run)[1], words)
         (run / 'events.csv').write_text(events)
