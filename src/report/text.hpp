@@ -22,12 +22,12 @@ namespace abs_hil::report {
 /// A gnuplot string in single quotes, in which gnuplot substitutes neither commands nor variables.
 [[nodiscard]] std::string gnuplot_quote(std::string_view text);
 
-/// A number with a fixed count of decimals and a true minus sign; "–" for what is not a number.
+/// A number with fixed decimals and a true minus sign; "–" for NaN and infinity.
 [[nodiscard]] std::string shown(double value, int decimals);
-/// A number with so many significant digits, a true minus sign; "–" for what is not a number.
+/// A number with `digits` significant digits and a true minus sign; "–" for NaN and infinity.
 [[nodiscard]] std::string shown_significant(double value, int digits);
 
-/// Characters (code points) of valid UTF-8.
+/// Number of characters (code points) in valid UTF-8.
 [[nodiscard]] std::size_t length_of(std::string_view utf8);
 
 }  // namespace abs_hil::report

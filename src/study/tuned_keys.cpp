@@ -1,4 +1,4 @@
-// What the search for gains may set, controller by controller.
+// The keys that the search for gains may set, by controller.
 
 #include <array>
 

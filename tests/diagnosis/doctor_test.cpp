@@ -74,5 +74,5 @@ TEST_CASE("every name of a check selects findings of that check alone") {
 TEST_CASE("findings for people have their fix below, each line indented") {
   const std::vector<Finding> findings{
       {.check = "cpu", .what = "thing", .standing = Standing::warning, .detail = "is off", .fix = "do a\ndo b"}};
-  CHECK(to_text(findings) == "WARN  thing: is off\n      to mend it:\n        do a\n        do b\n");
+  CHECK(to_text(findings) == "WARN  thing: is off\n      fix:\n        do a\n        do b\n");
 }

@@ -150,7 +150,8 @@ TEST_CASE("A profile that cannot be used is refused with the key it stands in") 
        {&DriftProfiles::upper_bearing, "plant.upper_bearing_profile: "},
        {&DriftProfiles::lower_bearing, "plant.lower_bearing_profile: "}}));
   options.drift.*profile = "distance: 1; 0.5 at 2";
-  CHECK_THROWS_WITH(Plant(options), Contains(std::string(key) + "\"distance\" is no axis here; write time or braking"));
+  CHECK_THROWS_WITH(Plant(options),
+                    Contains(std::string(key) + "\"distance\" is not an axis of this profile; write time or braking"));
   options.drift.*profile = "time: 1; 0 at 2";
-  CHECK_THROWS_WITH(Plant(options), Contains(std::string(key) + "\"0 at 2\" gives a factor that is not in (0, 10]"));
+  CHECK_THROWS_WITH(Plant(options), Contains(std::string(key) + "\"0 at 2\" has a factor outside (0, 10]"));
 }

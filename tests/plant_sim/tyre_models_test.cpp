@@ -90,5 +90,5 @@ TEST_CASE("A curve that is nowhere positive and an unknown tyre are refused") {
   CHECK_THROWS_WITH(Plant(options), Contains("plant.mu_w4 = -1") && Contains("nowhere positive"));
   options = {};
   options.tyre = "pacejka";
-  CHECK_THROWS_WITH(Plant(options), Contains("plant.tyre = \"pacejka\": must be magic-formula or inteco-mu"));
+  CHECK_THROWS_WITH(Plant(options), Contains("plant.tyre = \"pacejka\": give magic-formula or inteco-mu"));
 }

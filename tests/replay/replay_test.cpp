@@ -189,7 +189,7 @@ TEST_CASE("any changed bit of a measurement, estimate or command is found and na
   longer.cycles.push_back(longer.cycles.back());
   ++longer.cycles.back().cycle;
   longer.measured_ns.push_back(longer.cycles.back().stamp_ns);
-  CHECK_THAT(check(longer).lines.front(), Contains("comes to its end after"));
+  CHECK_THAT(check(longer).lines.front(), Contains("the replayed run ends after"));
 }
 
 TEST_CASE("another seed, gain or controller in the configuration is found") {
