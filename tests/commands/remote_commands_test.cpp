@@ -25,7 +25,7 @@ config::Settings with_commands(const std::filesystem::path& key_file) {
   return settings;
 }
 
-/// A run whose real-time thread takes changes only when told to; what it says is captured.
+/// A run whose real-time thread takes changes only on request; its answers are captured.
 struct Bench {
   abs_hil::test::TemporaryFolder scratch;
   telemetry::test::CapturingOutlet captured;
@@ -67,7 +67,7 @@ struct Bench {
   }
 };
 
-TEST_CASE("a change that the run's end forestalled is refused, one that took effect is not") {
+TEST_CASE("a change still pending at the run's end is refused, one that took effect is not") {
   Bench bench;
   REQUIRE_FALSE(bench.remote.judge(bench.slip_ref(1, 0.1)).has_value());
   REQUIRE_FALSE(bench.remote.judge(bench.slip_ref(2, 0.2)).has_value());
@@ -85,7 +85,7 @@ TEST_CASE("a change that the run's end forestalled is refused, one that took eff
   CHECK(states.back().accepted == 1);
   CHECK(bench.captured.all<adjustment_t>("ABS_ADJUSTMENT").size() == 1);
 
-  bench.stream.finish();  // said once
+  bench.stream.finish();  // each change gets one answer
   CHECK(bench.answers().size() == 2);
 }
 
@@ -98,7 +98,7 @@ TEST_CASE("after the run's end a command is refused with that reason") {
   CHECK(answer->message == "refused 'slip-ref': the run has ended");
 }
 
-TEST_CASE("a change that found no room leaves nothing behind, and can be sent again") {
+TEST_CASE("a change refused for lack of room has no effect and can be sent again") {
   Bench bench;
   std::int64_t sequence = 0;
   std::optional<telemetry::CommandAnswer> answer;

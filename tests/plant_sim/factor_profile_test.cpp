@@ -23,7 +23,7 @@ std::string error_of(const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("No text is friction 1 throughout") {
+TEST_CASE("An empty text is friction 1 throughout") {
   for (const char* text : {"", "  "}) {
     const FactorProfile profile(text);
     REQUIRE(profile.pieces().size() == 1);
@@ -64,7 +64,7 @@ TEST_CASE("A ramp may begin at 0, right after a jump and right after a ramp") {
   CHECK_FALSE(profile.from_braking());
 }
 
-TEST_CASE("What is no profile is refused with the part that is wrong") {
+TEST_CASE("An invalid profile is refused with the invalid part") {
   const auto [text, error] = GENERATE(table<const char*, const char*>({
       {"1; 0.5 at 2", "\"1; 0.5 at 2\" names no axis; begin with \"time:\", \"distance:\", \"braking time:\""},
       {"way: 1", "\"way\" is not an axis; write time, distance, braking time or braking distance"},

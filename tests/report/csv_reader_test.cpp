@@ -52,7 +52,7 @@ std::string error_of(const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("Rows are read as they were written, whatever their line ends and further columns") {
+TEST_CASE("Rows are read as they were written, with any line ends and further columns") {
   const File file(std::string(header) + ",extra\r\n" + row("0.25") + ",7\r\n" + row("0.5", "hold") + ",8\r\n");
   CsvReader csv(file.path());
   REQUIRE(csv.next());
@@ -81,7 +81,7 @@ TEST_CASE("Rows across the reader's blocks") {
   CHECK(rows == count);
 }
 
-TEST_CASE("A last line without its end is no row, even if it could be one") {
+TEST_CASE("A last line without line end does not count as a row, even if it is complete") {
   for (const std::string& cut : {row("2"), std::string("2,bra"), std::string("2")}) {
     const File file(std::string(header) + "\n" + row("1") + "\n" + cut);
     CsvReader csv(file.path());
@@ -91,7 +91,7 @@ TEST_CASE("A last line without its end is no row, even if it could be one") {
   }
 }
 
-TEST_CASE("What is no run is refused with file and line") {
+TEST_CASE("A file that is not a run is refused with file and line") {
   const std::string h = std::string(header) + "\n";
   CHECK(error_of("") == "FILE:1: the file is empty: the run wrote nothing");
   CHECK(error_of("time_s,pha") ==

@@ -1,4 +1,5 @@
-// The rivals ship with the gains that the search found (docs/comparison.md), the paper's controller with the paper's.
+// The baselines ship with the gains that the search found (docs/comparison.md), the paper's controller with the
+// paper's.
 
 #include <variant>
 
@@ -23,15 +24,15 @@ nlohmann::ordered_json json_of(config::Settings settings) { return config::KeyTa
 
 }  // namespace
 
-TEST_CASE("every rival's shipped gains are those that the search recorded") {
-  int rivals = 0;
+TEST_CASE("every baseline's shipped gains are those that the search recorded") {
+  int baselines = 0;
   for (const std::string_view controller : tunable_controllers()) {
     if (controller == "adaptive") continue;
     INFO(controller);
     CHECK(json_of(with_file_of(controller)) == json_of({}));
-    ++rivals;
+    ++baselines;
   }
-  CHECK(rivals >= 6);
+  CHECK(baselines >= 6);
 }
 
 TEST_CASE("the recorded gains lie in the ranges searched") {
