@@ -12,7 +12,7 @@ namespace {
 
 using plant_sim::FactorProfile;
 
-constexpr std::array<std::pair<const char*, const char*>, 5> profiles{{
+constexpr std::array<std::pair<const char*, const char*>, 5> profile_keys{{
     {"plant.friction_profile", "friction"},
     {"plant.brake_torque_profile", "brake torque"},
     {"plant.motor_torque_profile", "motor torque"},
@@ -27,7 +27,7 @@ std::string label_of(const std::string& what, const FactorProfile::Piece& piece)
 }  // namespace
 
 PlantChangeFinder::PlantChangeFinder(const RunFiles& run) {
-  for (const auto& [key, what] : profiles) {
+  for (const auto& [key, what] : profile_keys) {
     const auto text = run.config.find(key);
     if (text == run.config.end()) continue;
     try {

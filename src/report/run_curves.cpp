@@ -49,9 +49,9 @@ std::map<std::string, Profile> read_curves(const RunFiles& run, const RunSurvey&
       }
     }
   }
-  std::map<std::string, Profile> profiles;
-  for (const Collector& c : collectors) profiles[c.request->name] = {c.decimation.points(), c.relevant};
-  return profiles;
+  std::map<std::string, Profile> curves;
+  for (const Collector& c : collectors) curves[c.request->name] = {c.decimation.points(), c.relevant};
+  return curves;
 }
 
 }  // namespace abs_hil::report

@@ -203,9 +203,9 @@ class FigureMaker {
   [[nodiscard]] std::optional<Range> relevant(const std::vector<std::string>& quantities, Range least) const {
     Range range = least;
     bool any = false;
-    for (const auto& profiles : profiles_) {
+    for (const auto& run_profiles : profiles_) {
       for (const std::string& quantity : quantities) {
-        const Range r = profiles.at(quantity).relevant;
+        const Range r = run_profiles.at(quantity).relevant;
         if (r.first > r.second) continue;
         range = {std::min(range.first, r.first), std::max(range.second, r.second)};
         any = true;
@@ -272,10 +272,11 @@ class FigureMaker {
 
   [[nodiscard]] Figure theta_figure() const {
     const bool truth = std::any_of(surveys_.begin(), surveys_.end(), [](const auto& s) { return s.knows("theta_N"); });
-    Figure figure = begin("fig9", "Figure 9. Estimate of the friction parameter θ",
-                          ? "(a) estimate, and the plant's θ (dotted), (b) θ minus its estimate. The axes cover the "
-                            "range above 3 m/s."
-                          : "Estimate only: these runs have no true θ, so the error is unknown.");
+    Figure figure =
+        begin("fig9", "Figure 9. Estimate of the friction parameter θ",
+              truth ? "(a) estimate, and the plant's θ (dotted), (b) θ minus its estimate. The axes cover the "
+                      "range above 3 m/s."
+                    : "Estimate only: these runs have no true θ, so the error is unknown.");
     Panel theta{.y_label = "{/:Italic θ} / N", .y_range = relevant({"theta_est", "theta"}, {0.0, 1.0})};
     add_all(theta, "theta_est");
     if (std::all_of(surveys_.begin(), surveys_.end(), [](const auto& s) { return !s.knows("theta_est_N"); })) {

@@ -1,4 +1,4 @@
-"""Bad input: status 2 (3 for what is not there), one clear line on stderr, and nothing written."""
+"""Bad input: status 2 (3 for a missing resource), one clear line on stderr, and no files written."""
 import unittest
 
 from program import ProgramTest

@@ -1,4 +1,4 @@
-"""--out: a folder with all of a run's record, and the default one below runs/."""
+"""--out: a folder with all files of a run, and the default one below runs/."""
 import csv
 import hashlib
 import json

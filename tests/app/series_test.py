@@ -1,4 +1,4 @@
-"""Experiment files and series, as users run them."""
+"""Experiment files and series of runs, as users run them."""
 import json
 import os
 import re
@@ -79,7 +79,7 @@ class Series(ProgramTest):
         self.assertEqual({run['status'] for run in self.index(out)}, {'completed'})
         for name, sums in before.items():
             self.assertEqual((out / name / 'SHA256SUMS').read_bytes(), sums)
-        # Another series does not go into the same folder.
+        # Another series of runs does not go into the same folder.
         result = self.run_program(*command[1:], '--set', 'control.slip_ref=0.2')
         self.assertEqual(result.returncode, 2)
         self.assertIn('another series', result.stderr)

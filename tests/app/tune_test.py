@@ -1,4 +1,4 @@
-"""abs_tune as its users run it: gains that abs_hil reads, the same whatever the threads, bad input refused."""
+"""abs_tune as users run it: gains that abs_hil reads, the same with any number of threads, bad input refused."""
 import re
 import subprocess
 import sys
