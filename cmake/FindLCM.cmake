@@ -1,7 +1,7 @@
 # FindLCM: LCM::LCM (library) and the program lcm-gen as LCM_GEN_EXECUTABLE.
 #
-# LCM 1.5 and later bring a CMake configuration of their own, which is taken if it is there. Debian 12's 1.3.1 has none,
-# and its lcm.pc needs glib's, which liblcm-dev does not pull in: so look for the files themselves.
+# LCM 1.5 and later have their own CMake configuration. This module uses it if it is installed. Debian 12's 1.3.1 has
+# none, and its lcm.pc needs glib's, which liblcm-dev does not install. In that case the module looks for the files.
 
 find_package(lcm CONFIG QUIET)
 if(lcm_FOUND)

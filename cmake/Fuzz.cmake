@@ -1,6 +1,6 @@
 # abs_hil_fuzz(NAME SOURCES ... USES ...): the fuzz target NAME, a program with LLVMFuzzerTestOneInput. Preset `asan`
-# (clang) builds it with libFuzzer for scripts/fuzz.sh. Every other build makes a plain program of it that runs the kept
-# corpus, tests/fuzz/corpus/NAME, once through: ctest entry fuzz_corpus_NAME.
+# (clang) builds it with libFuzzer for scripts/fuzz.sh. Every other build makes a plain program, which runs the
+# kept corpus, tests/fuzz/corpus/NAME, once. Its ctest entry is fuzz_corpus_NAME.
 option(ABS_HIL_FUZZ "Build the fuzz targets with libFuzzer (needs clang)" OFF)
 
 function(abs_hil_fuzz name)
@@ -15,6 +15,9 @@ function(abs_hil_fuzz name)
     target_sources(fuzz_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests/fuzz/corpus_runner.cpp)
     add_test(NAME fuzz_corpus_${name}
       COMMAND fuzz_${name} ${PROJECT_SOURCE_DIR}/tests/fuzz/corpus/${name})
+    if(TARGET abs_hil_quick_tests)
+      add_dependencies(abs_hil_quick_tests fuzz_${name})
+    endif()
   endif()
 endfunction()
 

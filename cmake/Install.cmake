@@ -1,5 +1,5 @@
-# What `cmake --install` puts where. Two components: runtime (programs, configuration) and development (headers,
-# libraries, find_package(abs_hil)).
+# What `cmake --install` installs, and where. There are two components: runtime (programs, configuration) and
+# development (headers, libraries, find_package(abs_hil)).
 include(CMakePackageConfigHelpers)
 
 set(abs_hil_cmake_dir ${CMAKE_INSTALL_LIBDIR}/cmake/abs_hil)
@@ -20,7 +20,7 @@ install(FILES completion/abs_hil.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-
 install(FILES README.md CHANGELOG.md CITATION.cff DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
 
-# Manual pages are the programs' own --help, so that they never lag behind.
+# help2man makes the manual pages from the programs' --help, so they are always up to date.
 find_program(HELP2MAN_EXECUTABLE help2man)
 if(HELP2MAN_EXECUTABLE)
   set(manual_pages)
@@ -45,7 +45,7 @@ else()
   message(STATUS "help2man is not installed: no manual pages")
 endif()
 
-# The rooms as libraries, for programs that bring a controller of their own.
+# The rooms as libraries, for programs with their own controller.
 get_property(abs_hil_rooms GLOBAL PROPERTY ABS_HIL_ROOMS)
 install(TARGETS ${abs_hil_rooms} EXPORT abs_hil_targets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/abs_hil COMPONENT development)

@@ -1,7 +1,7 @@
-# ABS_HIL_JAVA: true where jars can be built, that is with a JDK and LCM's own jar. Without them all but lcm-spy's
-# view of our messages is built just the same.
-# abs_hil_jar(NAME OUTPUT FILE SOURCES ... CLASSPATH JARS... [MANIFEST FILE]): compiles the sources into a jar, target
-# NAME_jar.
+# ABS_HIL_JAVA: true if jars can be built, that is with a JDK and LCM's own jar. Without them the build leaves out only
+# lcm-spy's view of our messages.
+# abs_hil_jar(NAME OUTPUT FILE SOURCES ... CLASSPATH JARS... [MANIFEST FILE]): compiles the sources into a jar. Its
+# target is NAME_jar.
 
 find_package(Java QUIET COMPONENTS Development)
 get_filename_component(_lcm_bin ${LCM_GEN_EXECUTABLE} DIRECTORY)
@@ -18,7 +18,7 @@ if(NOT DEFINED ABS_HIL_JAVA)
   elseif(NOT LCM_JAR)
     set(_missing "no lcm.jar")
   else()
-    # The oldest Java that the compiler can still write for: the jars then run on whatever Java is installed.
+    # The oldest Java release that the compiler supports, so that the jars run on any installed Java.
     file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/java_release/Probe.java "class Probe {}\n")
     foreach(release 8 11 17 21)
       execute_process(
@@ -51,7 +51,7 @@ function(abs_hil_jar name)
   add_custom_command(OUTPUT ${JAR_OUTPUT}
     COMMAND ${CMAKE_COMMAND} -E rm -rf ${classes}
     COMMAND ${CMAKE_COMMAND} -E make_directory ${classes} ${output_dir}
-    # -options: that old releases are going out of support is known.
+    # -options: no warning that support of old releases will end.
     COMMAND ${Java_JAVAC_EXECUTABLE} --release ${ABS_HIL_JAVA_RELEASE} -Xlint:all,-options,-serial,-processing -Werror
       -encoding UTF-8 -cp ${classpath} -d ${classes} ${JAR_SOURCES}
     COMMAND ${Java_JAR_EXECUTABLE} ${create} -C ${classes} .

@@ -3,7 +3,7 @@
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_VENDOR "abs_hil")
 set(ABS_HIL_MAINTAINER "The abs_hil authors <abs-hil@no-address.invalid>" CACHE STRING
-  "Name and address of who answers for the Debian packages")
+  "Name and address of the maintainer of the Debian packages")
 set(CPACK_PACKAGE_CONTACT ${ABS_HIL_MAINTAINER})
 set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
 set(CPACK_STRIP_FILES ON)
@@ -35,9 +35,9 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
 set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION
   "controllers and real-time loop of abs-hil as libraries
  Headers, static libraries and CMake configuration of abs-hil, for programs
- that bring a slip controller of their own.")
+ with their own slip controller.")
 
-# Debian wants a compressed changelog and a copyright file in each package's own folder of documents.
+# Debian requires a compressed changelog and a copyright file in each package's documentation folder.
 foreach(package abs-hil libabs-hil-dev)
   configure_file(packaging/changelog.Debian.in ${CMAKE_BINARY_DIR}/packaging/${package}/changelog @ONLY)
 endforeach()

@@ -1,5 +1,5 @@
-# Run at build time (-P): writes OUTPUT with the sources' git revision, only if it changed, so that nothing is rebuilt
-# in vain. Variables: SOURCE_DIR, OUTPUT.
+# Runs at build time (-P). Writes the sources' git revision to OUTPUT, but only if it has changed, to avoid rebuilds.
+# Variables: SOURCE_DIR, OUTPUT.
 execute_process(COMMAND git describe --always --dirty --abbrev=12
   WORKING_DIRECTORY ${SOURCE_DIR} OUTPUT_VARIABLE revision OUTPUT_STRIP_TRAILING_WHITESPACE
   RESULT_VARIABLE status ERROR_QUIET)

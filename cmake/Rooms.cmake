@@ -1,6 +1,6 @@
-# The table of rooms, the only one: name | what it holds | the rooms whose headers it may include. No text may hold a semicolon. The libraries, their
-# include folders, the check of includes (tests/rooms) and the table in docs/architecture.md are made from it. A room
-# knows only rooms above it, so there is no circle.
+# The table of rooms, the only one: name | what it holds | the rooms whose headers it may include (no semicolons). The
+# libraries, their include folders, the check of includes (tests/rooms) and the table in docs/architecture.md are made
+# from it. A room knows only rooms above it, so there is no circle.
 set(ABS_HIL_ROOM_TABLE
   "rig | the vocabulary: measurement, command, parameters, brake map, tyre curve, cycle record, the tables of quantities, reasons and options' rows | "
   "control | the paper's laws, slip controllers, speed observer, brake actuator model, their options | rig"

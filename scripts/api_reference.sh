@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The API reference, build/api/html/index.html, from the headers' docstrings. A warning is an error.
+# Makes the API reference, build/api/html/index.html, from the headers' docstrings. A warning is an error.
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# build.sh [PRESET [ARGUMENT...]]: configures and builds one preset (default: release), with ccache where it is installed;
-# further arguments go to the build (--target NAME).
+# build.sh [PRESET [ARGUMENT...]]: configures and builds one preset (default: release), with ccache if it is installed.
+# Further arguments go to the build (--target NAME). On a terminal the progress stays on one line. Elsewhere the script
+# prints a line at each tenth of the steps. It always prints warnings and errors whole.
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
 
@@ -13,4 +14,25 @@ if command -v ccache >/dev/null; then
 fi
 cmake --preset "$preset" "${launcher[@]}" >"/tmp/abs_hil_configure.$$" || { cat "/tmp/abs_hil_configure.$$"; exit 1; }
 rm -f "/tmp/abs_hil_configure.$$"
-cmake --build --preset "$preset" "$@"
+
+# Reads ninja's output. Prints only those progress lines that complete a tenth of the steps, and all other lines whole.
+print_tenths() {
+  local line tenth=0
+  while IFS= read -r line; do
+    if [[ $line =~ ^build:\ ([0-9]+)\ of\ ([0-9]+)\ steps,\ [0-9.]+\ s ]]; then
+      if [ $((BASH_REMATCH[1] * 10 / BASH_REMATCH[2])) -gt $tenth ]; then
+        tenth=$((BASH_REMATCH[1] * 10 / BASH_REMATCH[2]))
+        echo "${BASH_REMATCH[0]}"
+      fi
+    else
+      printf '%s\n' "$line"
+    fi
+  done
+}
+
+export NINJA_STATUS='build: %f of %t steps, %e s  '
+if [ -t 1 ]; then
+  cmake --build --preset "$preset" "$@"
+else
+  cmake --build --preset "$preset" "$@" 2>&1 | print_tenths
+fi

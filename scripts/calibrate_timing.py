@@ -3,10 +3,11 @@
 
 usage: scripts/calibrate_timing.py [PROGRAM]    default: build/release/bin/abs_hil
 
-Everything but theta as in plant paper-table1: real actuator, 4096-count encoders, adaptive controller at 1 kHz, braking
-from 170 rad/s (1625 rpm, the paper's initial condition) to 0.3 m/s; mean over three encoder phases. The stop time does
-not fall evenly with theta: the brake's lag, which the paper's law ignores, makes the slip swing, and when the swing
-happens to end matters. So this scans, prints the table, and takes the first theta that comes within 5 ms of 1.2 s.
+Except for theta, the plant is paper-table1: real actuator, 4096-count encoders, adaptive controller at 1 kHz, braking
+from 170 rad/s (1625 rpm, the paper's initial condition) to 0.3 m/s. The result is the mean over three encoder phases.
+The stop time does not fall evenly with theta: the brake's lag, which the paper's law ignores, makes the slip oscillate,
+and the phase of the oscillation at the end changes the time. The script therefore scans theta, prints the table, and
+takes the first theta that comes within 5 ms of 1.2 s.
 """
 import json
 import pathlib

@@ -1,19 +1,20 @@
 #!/usr/bin/env bash
-# Lines and branches that the tests reach, room by room, into the tables of docs/quality.md; every line is shown in
-# build/coverage/html/index.html. Builds with clang's source-based coverage and runs the tests that need no virtual machine
-# and are not long ones. Status 1 where fewer of the lines outside apps are reached than coverage_table.py asks for.
+# Writes the lines and branches that the tests reach, room by room, into the tables of docs/quality.md.
+# build/coverage/html/index.html shows every line. The script builds with clang's source-based coverage. It leaves out
+# the tests in a virtual machine and the long ones. Status 1 if the tests reach fewer of the lines outside apps than
+# coverage_table.py requires.
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
 
 scripts/setup.sh packages-coverage.txt >&2
 scripts/build.sh coverage >&2
 build=$PWD/build/coverage
-# Counters live in mapped files (%c), so that a program that is killed has counted too. Some tests give up their rights.
+# Counters are in mapped files (%c), so the counts of a killed program are kept. Some tests drop their privileges.
 export LLVM_PROFILE_FILE=$build/profiles/%m%c.profraw
 rm -rf "$build/profiles" "$build/html"
 mkdir "$build/profiles"
 chmod 777 "$build/profiles"
-# A test that fails (8) fails in release as well, unless it judges optimised code: its lines are counted either way.
+# Status 8: a test failed. It fails in release too, unless it judges optimised code. Its lines count in both cases.
 (umask 0 && ctest --preset coverage -j "$(nproc)" -LE 'vm|docs|on-demand') >&2 || [ $? -eq 8 ]
 
 llvm-profdata-16 merge -sparse -failure-mode=all -o "$build/all.profdata" "$build"/profiles/*.profraw

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """usage: coverage_table.py LINES.lcov PAGE
 
-Writes what llvm-cov exports as Markdown tables into PAGE, between `<!-- begin NAME -->` and `<!-- end NAME -->`: `rooms`,
-and `files`, those with the most lines not reached. Status 1 where less than 95 % of the lines outside apps are reached.
+Writes the export of llvm-cov as Markdown tables into PAGE, between `<!-- begin NAME -->` and `<!-- end NAME -->`. The
+tables are `rooms`, and `files` with the most unreached lines. Status 1 if less than 95 % of the lines outside apps are
+reached.
 """
 import collections
 import pathlib

@@ -1,15 +1,16 @@
 #!/usr/bin/env python3
-"""Fits what controllers are told of the plant inteco-manual: theta, B and C of theta sin(C atan(B slip)).
+"""Fits the controllers' tyre model for the plant inteco-manual: theta, B and C of theta sin(C atan(B slip)).
 
 usage: scripts/fit_inteco_tyre.py [PLANT.toml]    default: config/plants/inteco-manual.toml
 
-The plant's tyre force depends on the slip and, through the lever, on the brake torque. Both are tied in braking at a
-constant slip, so the fit is to the force F(slip) there, at half of the speed that braking starts from (it changes by
-0.2 % between 170 rad/s and standstill). With r1 w1 = (1 - s) r2 w2, hence w1' = k w2', k = (1 - s) r2 / r1:
+The plant's tyre force depends on the slip and, through the lever, on the brake torque. In braking at a constant slip
+the slip determines the brake torque. The fit therefore uses the force F(slip) there, at half the initial speed of
+braking (the force changes by 0.2 % between 170 rad/s and standstill). With r1 w1 = (1 - s) r2 w2, hence w1' = k w2',
+k = (1 - s) r2 / r1:
     F = mu Fn,  Fn L (sin phi - mu cos phi) = Mg + M10 + M1 + d1 w1 = Mg + r1 F - J1 k w2',
     J2 w2' = -(r2 F + d2 w2 + M20)
-which is linear in F. Least squares over slips 0.005, 0.01 ... 0.5: what a slip controller meets; at slip 1 the fit is
-only as good as it turns out. For given B and C the best theta has a closed form; (B, C) are searched by halving steps.
+which is linear in F. The fit is by least squares over slips 0.005, 0.01 ... 0.5, the range of a slip controller; slip 1
+is outside. For given B and C the best theta has a closed form. The script searches (B, C) with halving steps.
 """
 import math
 import pathlib

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # fuzz.sh [SECONDS] [TARGET...]: builds the fuzz targets with clang and libFuzzer (preset asan: with address and
-# undefined-behaviour sanitizers) and runs each for SECONDS (default 60) from its kept corpus. What a target finds is left
-# in build/asan/findings/TARGET; a crash ends the script with status 1. With ABS_HIL_KEEP_CORPUS=1 new inputs that reach
-# new code are merged into the kept corpus.
+# undefined-behaviour sanitizers) and runs each for SECONDS (default 60) from its kept corpus. Failing inputs stay in
+# build/asan/findings/TARGET. A crash ends the script with status 1. With ABS_HIL_KEEP_CORPUS=1 the script merges inputs
+# that reach new code into the kept corpus.
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
 
@@ -28,7 +28,7 @@ run_one() { # TARGET
   fi
 }
 
-# Two at a time where there are two cores.
+# One target for each core at a time.
 export seconds
 export -f run_one
 status=0

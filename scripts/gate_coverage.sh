@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Line and branch coverage of the command gate and its plausibility checks by the test `gate` alone: status 1 below 100 %.
-# Builds just these files, without optimisation; needs gcovr (packages-coverage.txt). Status 77 without it.
+# Measures the line and branch coverage of the command gate and its plausibility checks by the test `gate` alone.
+# Status 1 below 100 %. Builds only these files, without optimisation. Needs gcovr (packages-coverage.txt); status 77
+# without it.
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
 command -v gcovr >/dev/null || { echo "SKIPPED: gcovr is not installed (scripts/setup.sh packages-coverage.txt)"; exit 77; }

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Runs a command in a network namespace of its own with a multicast route over its loopback, so that LCM's messages stay
-# inside. Needs root or unprivileged user namespaces. Status 77 where the kernel does not permit it.
+# Runs a command in a private network namespace with a multicast route over its loopback, so that LCM's messages stay
+# inside. Needs root or unprivileged user namespaces. Status 77 if the kernel does not permit it.
 set -euo pipefail
 enter=(unshare -n)
 [ "$(id -u)" -eq 0 ] || enter=(unshare -rn)

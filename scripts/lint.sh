@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# lint.sh [CHECK...]: the static checks format, shell, cppcheck, tidy (default: all, quick ones first). Each finding is an
-# error. tidy looks at every source of src/ and apps/ that has changed since nothing was found in it; lint.sh tidy FILE...
-# at the units of those only.
+# lint.sh [CHECK...]: runs the static checks format, shell, cppcheck, tidy (default: all, quick ones first). Each
+# warning is an error. tidy checks every source of src/ and apps/ that has changed since its last clean check. lint.sh
+# tidy FILE... checks the units of these files only.
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
 

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """usage: mutate.py [--list] [--jobs N] [--only FILE] [--report FILE]
 
-Mutation run of the command gate and its plausibility checks: changes one thing at a time in their sources (a relation, an
-operator, a constant, a condition, a statement left out), compiles that file alone without optimisation, links it with the
-test `gate` and runs it. A mutant that the tests do not notice has survived. Survivors must be listed, with the reason why
-they change nothing, in EQUIVALENT below; status 1 if one is not, or if a listed one is killed after all.
+Mutation run of the command gate and its plausibility checks. The script changes one place at a time in their sources (a
+relation, an operator, a constant, a condition, a statement left out), compiles only that file without optimisation,
+links it with the test `gate` and runs the test. A mutant that the tests do not notice survives. mutate_equivalent.txt
+must list each survivor with the reason why it changes nothing. Status 1 if a survivor is not listed or a listed mutant
+is killed.
 
-Takes some minutes; run on demand. Results: docs/quality-mutation.md.
+The run takes some minutes. Start it on demand. Results: docs/quality-mutation.md.
 """
 import argparse
 import concurrent.futures
@@ -26,7 +27,7 @@ COMPILE = ['g++', '-std=c++20', '-O0', '-fPIC', '-I', ROOT / 'include', '-I', RO
 RELATIONS = {'<=': ['<', '>'], '>=': ['>', '<'], '<': ['<=', '>='], '>': ['>=', '<='], '==': ['!='], '!=': ['==']}
 ARITHMETIC = {'+': '-', '-': '+', '*': '/', '/': '*'}
 
-# (file, the line's text, what was changed) -> why no test can tell. Kept in EQUIVALENT_FILE.
+# (file, the line's text, the change) -> why no test can detect it. From EQUIVALENT_FILE.
 EQUIVALENT_FILE = ROOT / 'scripts' / 'mutate_equivalent.txt'
 
 
@@ -128,8 +129,8 @@ def require(result):
 
 
 class Bench:
-    """The tests as one program; what they test as a shared object beside it, so that a mutant costs one short
-    compilation, with the headers compiled before, and one short link."""
+    """The tests as one program and the tested code as a shared object. A mutant then costs one short compilation, with
+    precompiled headers, and one short link."""
 
     def __init__(self, folder):
         self.folder = folder

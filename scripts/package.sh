@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the Debian packages abs-hil and libabs-hil-dev in build/release/packages and checks them with lintian.
+# Makes the Debian packages abs-hil and libabs-hil-dev in build/release/packages. lintian checks them.
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
 

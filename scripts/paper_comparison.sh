@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The paper's comparison: adaptive against sliding mode on the plant whose timing is that of the paper's plots, once on
-# the plant as it is and 200 times on varied ones. Options are handed on to abs_hil compare (--threads 1, say).
+# Makes the paper's comparison, adaptive against sliding mode, on the plant with the timing of the paper's plots: once
+# on the nominal plant and 200 times on varied plants. Options go to abs_hil compare (for example --threads 1).
 # usage: scripts/paper_comparison.sh [OPTION...]      (needs build/release, or ABS_BIN=FOLDER of the programs)
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."

@@ -2,7 +2,7 @@
 """Writes the tables of docs/paper.md, between its markers, from fresh runs.
 
 usage: scripts/paper_numbers.py [--check]      (needs build/release, or ABS_BIN=FOLDER of the programs)
-       --check: changes nothing, exit status 1 if the page is not what the program says now
+       --check: changes nothing, exit status 1 if the page differs from the program's present results
 """
 import csv
 import json
@@ -54,7 +54,7 @@ def first_time(rows, holds):
 
 
 def figures_table():
-    """One row for each thing that a figure of the paper shows, for both controllers on both plants."""
+    """One row for each quantity in the paper's figures, for both controllers on both plants."""
     columns = [(plant, controller, *brake_rows(plant, controller)) for plant in PLANTS for controller in PAIR]
     lines = ['| figure | quantity | ' + ' | '.join(f'{plant}: {controller}' for plant, controller, _, _ in columns) + ' |',
              '|---|---|' + '---:|' * len(columns)]

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """usage: performance.py [--output FILE]
 
-Runs the benchmarks of build/release, and the same braking in Octave and SciPy where they are installed, and writes
-docs/performance.md. Each figure is the median of repetitions that are interleaved with those of the others of its program.
+Runs the benchmarks of build/release, and the same braking in Octave and SciPy if they are installed. Writes
+docs/performance.md. Each figure is the median of repetitions. The repetitions of one program's benchmarks are
+interleaved.
 """
 import argparse
 import json
@@ -39,7 +40,7 @@ def bench(program):
 
 
 def whole_process(arguments, environment=None):
-    """Median CPU ms and peak MB of a command and what it starts."""
+    """Median CPU ms and peak MB of a command and its child processes."""
     cpu_ms, peak_mb = [], 0.0
     for _ in range(REPETITIONS):
         pid = os.posix_spawn(arguments[0], arguments, environment or os.environ,
@@ -63,13 +64,13 @@ def report_of_two_runs():
 
 
 def elsewhere():
-    """(name, ms, error) of the same braking in other languages, where they are installed."""
+    """(name, ms, error) of the same braking in other languages, if they are installed."""
     rows = []
     scripts = ROOT / 'bench' / 'baselines'
     if shutil.which('octave'):
         rows += subprocess.run(['octave', '--no-gui', '--quiet', scripts / 'braking.m'], check=True, capture_output=True,
                                text=True).stdout.splitlines()
-    # Debian's own Python first: python3-scipy is found by no other.
+    # Debian's own Python first: only this one finds python3-scipy.
     for python in ('/usr/bin/python3', sys.executable):
         if subprocess.run([python, '-c', 'import scipy'], capture_output=True).returncode == 0:
             rows += subprocess.run([python, scripts / 'braking.py'], check=True, capture_output=True,
@@ -129,15 +130,16 @@ def page():
     counted = instructions()
     text = f'''# Performance
 
-Written by `scripts/performance.py`, which runs the benchmarks of `bench/` anew. CPU time, medians of {REPETITIONS}
-interleaved repetitions; absolute figures on a shared machine drift, so compare only those of one table.
+`scripts/performance.py` runs the benchmarks of `bench/` and writes this page. Figures are CPU time, medians of
+{REPETITIONS} interleaved repetitions. Absolute figures on a shared machine drift, so compare only figures of one table.
 
 {where}.
 
 ## Integrating the plant
 
-One braking from 170 rad/s under a constant duty, 2 s in ticks of 1 ms. The error is the largest difference of the upper
-wheel's speed at any tick from RK4 at 1 µs (Octave's and SciPy's: from their own finest solution).
+The test case is one braking from 170 rad/s under a constant duty, 2 s in ticks of 1 ms. The error is the largest
+difference of the upper wheel's speed at any tick from RK4 at 1 µs (for Octave and SciPy: from their own finest
+solution).
 
 {table(['integrator', 'ms', 'ours is', 'error, rad/s'],
        [[INTEGRATION_NAMES[name], f'{ms:.3g}', f'{shown_ratio(ms / ours)} × as fast' if name != 'plant' else '', f'{error:.1g}']
@@ -155,8 +157,8 @@ wheel's speed at any tick from RK4 at 1 µs (Octave's and SciPy's: from their ow
     ['`compare`, 1,000 runs on varied plants, wall clock', shown_ns(compare['thousand_runs'][1]['real_time'] * 1e6)],
 ])}
 
-The acceleration costs more than the braking: near standstill the slip dynamics are stiff and the integration takes short
-steps.
+The acceleration costs more than the braking: near standstill the slip dynamics are stiff and the integration takes
+short steps.
 
 ## The parts of a cycle
 
@@ -166,14 +168,15 @@ steps.
 
 {table(['what', 'time'], [[f'`{name}`', shown_ns(ns)] for name, (ns, _) in sorted(telemetry.items())])}
 
-`publish_in_process` is LCM's memq. Over UDP a publish makes system calls as well (not measured here); its caller is never
+`publish_in_process` is LCM's memq. Over UDP a publish also makes system calls (not measured here). Its caller is never
 the real-time thread.
 '''
     if counted:
         text += f'''
 ## Instructions of the real-time thread
 
-Counted by callgrind, the same on every run; `ctest -R bench_instructions` fails where a budget is exceeded.
+callgrind counts the instructions; the count is the same on every run. `ctest -R bench_instructions` fails if a count
+exceeds its budget.
 
 {re.sub("^", "    ", counted.strip(), flags=re.MULTILINE)}
 '''

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes docs/figures/report.png: part of abs_report's page of two runs of the paper's experiment, as a browser shows it.
+# Makes docs/figures/report.png with a browser: a part of abs_report's page of two runs of the paper's experiment.
 # usage: scripts/report_screenshot.sh [PICTURE.png]      (needs build/release, or ABS_BIN=FOLDER of the programs)
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
@@ -15,7 +15,7 @@ for controller in adaptive sliding-mode; do
   "$programs/abs_hil" --backend sim --fast --no-lcm --controller "$controller" --out "$data/$controller" >/dev/null
 done
 "$programs/abs_report" "$data/adaptive" "$data/sliding-mode" --output "$data/report.html" >/dev/null
-# Two of the page's figures: slip and torque.
+# Keep two of the page's figures: slip and torque.
 hidden='h1, h2, p, footer, details, .wide, #notes, figure:not(#figure-fig7):not(#figure-fig8)'
 sed -i "s|</head>|<style>$hidden { display: none } body { margin: 0 auto } figure { margin: 0 0 1.4em }</style></head>|" \
   "$data/report.html"

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# The main job: sets up, builds, runs the paper's experiment in real time on the simulated rig and makes a report of it,
-# below runs/; with arguments, whatever they ask of abs_hil. Without a route for LCM's multicast it says what to type and
-# records to a log instead.
+# run.sh [ARGUMENT...]: the main job. Installs the packages and builds the programs. Without arguments it then runs the
+# paper's experiment in real time on the simulated rig and makes a report, in a folder below runs/. Arguments go to
+# abs_hil. Without a route for LCM's multicast the script says which command adds one and records to a log instead.
 set -euo pipefail
 root=$(realpath "$(dirname "$(realpath "$0")")/..")
 
 "$root/scripts/setup.sh"
-# The programs alone, half of what there is to build; the tests can wait.
+# The programs only. They are half of the whole build; a run does not need the tests.
 "$root/scripts/build.sh" release --target abs_hil_programs
 program="$root/build/release/bin/abs_hil"
 
@@ -36,16 +36,16 @@ fi
 [ -n "$folder" ] || exec "$program" "${arguments[@]}"
 "$program" "${arguments[@]}" &
 pid=$!
-# Ctrl-C reaches the program by itself; a second signal would stop it at once. The others are handed on.
+# The terminal sends Ctrl-C to the program too; a second SIGINT would end it at once. Pass on the other signals only.
 trap : INT
 trap 'kill -TERM "$pid"' TERM
 trap 'kill -HUP "$pid"' HUP
 status=0
 wait "$pid" || status=$?
-while kill -0 "$pid" 2>/dev/null; do  # a signal interrupts the waiting, not the run
+while kill -0 "$pid" 2>/dev/null; do  # a signal interrupts `wait`, not the run
   status=0
   wait "$pid" || status=$?
 done
-# A run that a fault ended has something to show as well; one that never began has nothing.
+# A run that a fault ended gets a report too. A run that never began has no rows.
 if [ -s "$folder/run.csv" ]; then "$root/build/release/bin/abs_report" "$folder" --output "$folder/report.html" || true; fi
 exit "$status"

@@ -1,10 +1,12 @@
 #!/usr/bin/env bash
-# setup.sh [LIST]: installs the Debian packages of scripts/LIST (packages.txt, or packages-vm.txt for the tests in a
-# virtual machine) that are not there yet. Harmless when repeated.
+# setup.sh [LIST]: installs the Debian packages of scripts/LIST that are not there yet. LIST is packages.txt by default;
+# packages-vm.txt holds those of the tests in a virtual machine. What apt prints goes to build/setup.log. The script may
+# be repeated without harm.
 set -euo pipefail
 here=$(dirname "$(realpath "$0")")
+list=${1:-packages.txt}
 
-mapfile -t wanted < <(sed 's/#.*//; s/[[:space:]]*$//; /^$/d' "$here/${1:-packages.txt}")
+mapfile -t wanted < <(sed 's/#.*//; s/[[:space:]]*$//; /^$/d' "$here/$list")
 missing=()
 for package in "${wanted[@]}"; do
   [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)" = installed ] || missing+=("$package")
@@ -19,6 +21,18 @@ if [ "$(id -u)" -ne 0 ]; then
   command -v sudo >/dev/null || { echo "setup: run as root, or install: ${missing[*]}" >&2; exit 3; }
   as_root=(sudo)
 fi
-echo "setup: installing ${missing[*]}"
-"${as_root[@]}" apt-get update -qq
-"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}"
+log=$(realpath "$here/..")/build/setup.log
+mkdir -p "$(dirname "$log")"
+echo "setup: installing ${missing[*]} (log: $log)"
+
+install_missing() {
+  "${as_root[@]}" apt-get update -qq &&
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}"
+}
+echo "== $(date '+%Y-%m-%d %H:%M:%S') $list: ${missing[*]}" >>"$log"
+status=0
+install_missing >>"$log" 2>&1 || status=$?
+[ $status -eq 0 ] && exit 0
+tail -n 20 "$log" >&2
+echo "setup: apt-get failed with status $status; the end of its output is above, all of it in $log" >&2
+exit $status

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Python modules that Debian 12 does not package, from PyPI into build/python, a virtual environment of its own: lcm, with
-# LCM's tools of that version, lcm-spy among them, and cantools, which tests read config/can/abs_rig.dbc with. Harmless
-# when repeated.
+# Installs Python modules that Debian 12 does not package from PyPI into the virtual environment build/python: lcm, with
+# its version of LCM's tools (lcm-spy and others), and cantools, with which tests read config/can/abs_rig.dbc. The
+# script may be repeated without harm.
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
 

@@ -1,15 +1,36 @@
 #!/usr/bin/env bash
-# The tests: sets up, builds and runs ctest on one preset (default: release); further arguments go to ctest, without any
-# those labelled on-demand are left out (long ones: ctest -L on-demand runs them). Where CI=true or ABS_HIL_REQUIRE_VM=1
-# the tests in a virtual machine must not be skipped; where CI=true, what the tests of abs-spy, of Python modules and of
-# abs_report need is installed as well.
+# test.sh [quick | PRESET] [ARGUMENT...]: sets up, builds and runs the tests.
+#   test.sh                  all tests of the preset release but those labelled on-demand, which take longest
+#   test.sh PRESET ...       the same for another preset; ARGUMENTs go to ctest and then choose the tests alone
+#   test.sh quick ...        the preset release without the labels of slow_labels below: about a minute after the build
+# With CI=true or ABS_HIL_REQUIRE_VM=1 the tests in a virtual machine must not be skipped. With CI=true the script also
+# installs what the tests of abs-spy, of the Python modules and of abs_report need.
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
 
+slow_labels='^(slow|vm|bench|docs|on-demand)$'
 preset=${1:-release}
 [ $# -gt 0 ] && shift
+if [ "$preset" = quick ]; then
+  echo "test: quick: builds the programs and the unit tests, then runs for about a minute. Left out: real-time runs," \
+    "reports, network, virtual machine, long simulations (scripts/test.sh runs these too)"
+  scripts/setup.sh
+  scripts/build.sh release --target abs_hil_quick_tests
+  ctest --preset release -j "$(nproc)" -LE "$slow_labels" "$@"
+  exit
+fi
+
+if [ $# -gt 0 ]; then
+  echo "test: builds everything of the preset $preset, then runs: ctest $*"
+else
+  echo "test: builds everything of the preset $preset, then runs all tests but those on demand: 10 minutes or more," \
+    "most of it real-time runs and tests in a virtual machine (scripts/test.sh quick: about a minute)"
+fi
+echo "test: a test is skipped and says why if its tools are missing: a virtual machine (packages-vm.txt), abs-spy" \
+  "(packages-spy.txt), a browser and Octave (packages-report.txt), Python modules (setup_python.sh), FUSE," \
+  "network namespaces"
 scripts/setup.sh
-# Where these cannot be installed the tests in a virtual machine are skipped and say why, unless they must not be.
+# Without these packages the tests in a virtual machine are skipped, unless they must not be.
 scripts/setup.sh packages-vm.txt || { [ "${CI:-}" != true ] && [ "${ABS_HIL_REQUIRE_VM:-}" != 1 ]; }
 if [ "${CI:-}" = true ]; then
   scripts/setup.sh packages-spy.txt
@@ -18,6 +39,6 @@ if [ "${CI:-}" = true ]; then
 fi
 scripts/build.sh "$preset"
 [ $# -gt 0 ] || set -- -LE on-demand
-# Some tests run in real time, on whatever machine this is: there a failure counts only if it repeats itself.
+# Some tests run in real time, on whatever machine this is. In CI a failure counts only if the test fails twice.
 if [ "${CI:-}" = true ]; then set -- --repeat until-pass:2 "$@"; fi
 ctest --preset "$preset" -j "$(nproc)" "$@"

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """usage: tidy.py [SOURCE...]
 
-clang-tidy over src/ and apps/, or over the units that hold the given sources. Reads build/clang (scripts/build.sh clang),
-where several sources share a unit: headers cost most of the time. The static analyzer looks at functions of the main file
-alone, so it is run on each source by itself. What had no finding is remembered by the content of everything it includes,
-in ~/.cache/abs_hil/tidy, and not looked at again. Prints each finding; ends with status 1 where there is one.
+Runs clang-tidy over src/ and apps/, or over the units that hold the given sources. Reads build/clang (scripts/build.sh
+clang), where several sources share a unit, because headers cost most of the time. The static analyzer checks functions
+of the main file only, so the script runs it on each source separately. ~/.cache/abs_hil/tidy remembers units without
+warnings by the content of all their includes; the script skips these. It prints each warning and ends with status 1 if
+there is one.
 """
 import concurrent.futures
 import hashlib
@@ -21,7 +22,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 BUILD = ROOT / 'build' / 'clang'
 TIDY = 'clang-tidy-16'
 CACHE = pathlib.Path(os.environ.get('XDG_CACHE_HOME', pathlib.Path.home() / '.cache')) / 'abs_hil' / 'tidy'
-# A unit includes its sources: that is what it is for.
+# A unit includes its sources on purpose.
 MATCHERS = ['--checks=-clang-analyzer-*,-bugprone-suspicious-include',
             f'--header-filter=^{re.escape(str(ROOT))}/(include/abs_hil|src|apps)/']
 
@@ -50,7 +51,7 @@ def everything_included():
 
 
 class Digests(dict):
-    """Of files' contents; what was made by the build names this clone's folder."""
+    """Hash of the files' contents. Generated files name this clone's folder, which is left out."""
 
     def __missing__(self, file):
         self[file] = hashlib.sha256(file.read_bytes().replace(bytes(ROOT), b'.')).hexdigest()
@@ -63,7 +64,7 @@ def portable(text):
 
 def key_of(sources, flags, files, digests, fixed):
     parts = [fixed, *map(portable, sources), *map(portable, flags)]
-    # The revision changes with every commit and can hold no finding.
+    # The revision changes with every commit and cannot cause a warning.
     parts += sorted(f'{portable(file)} {digests[file]}' for file in files if file.name != 'abs_hil_revision.hpp')
     return hashlib.sha256('\n'.join(parts).encode()).hexdigest()
 
@@ -71,7 +72,7 @@ def key_of(sources, flags, files, digests, fixed):
 def findings(arguments):
     done = subprocess.run([TIDY, '--quiet', f'--config-file={ROOT}/.clang-tidy', *arguments], cwd=BUILD, capture_output=True,
                           text=True)
-    if done.returncode and not done.stdout:  # it was killed, or could not begin
+    if done.returncode and not done.stdout:  # it was killed or did not start
         return done.stderr or f'{TIDY} {" ".join(arguments[:2])} ended with status {done.returncode}\n'
     return done.stdout
 

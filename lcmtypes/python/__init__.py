@@ -8,6 +8,8 @@ Every field with its unit and range: lcmtypes/*.lcm. Decoding needs nothing but 
 reading event logs needs LCM's own module (pip install lcm).
 """
 import importlib
+import json
+import pathlib
 import pkgutil
 
 #: name -> class of every message type
@@ -17,8 +19,19 @@ for _module in pkgutil.iter_modules(__path__):
         TYPES[_module.name] = getattr(importlib.import_module(f'{__name__}.{_module.name}'), _module.name)
 globals().update(TYPES)
 
+
+
+def _table(name, key):
+    rows = json.loads(pathlib.Path(__path__[0], name).read_text(encoding='utf-8'))
+    return {row[key]: row for row in rows}
+
+
+#: name -> unit, type, meaning and so on of every quantity of a cycle, in the order of the CSV columns
+QUANTITIES = _table('quantities.json', 'name')
+#: number -> name, kind and text of every reason (field `reason`)
+REASONS = _table('reasons.json', 'number')
 #: names of the values of the field `phase`, as in the CSV
-PHASES = ('idle', 'accelerate', 'coast', 'brake', 'hold', 'stopped', 'fault')
+PHASES = tuple(QUANTITIES['phase']['values'])
 
 _BY_FINGERPRINT = {type_._get_packed_fingerprint(): type_ for type_ in TYPES.values()}
 

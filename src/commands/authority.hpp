@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
+#include "abs_hil/command2_t.hpp"
 #include "abs_hil/rig/reason.hpp"
-#include "telemetry/message_fields.hpp"
 
 namespace abs_hil::commands {
 

@@ -16,6 +16,7 @@
 #include <thread>
 #include <variant>
 
+#include "abs_hil/command2_t.hpp"
 #include "telemetry/lcm_outlet.hpp"
 #include "telemetry/message_stream.hpp"
 #include "telemetry/udpm_receiver.hpp"

@@ -3,8 +3,6 @@
 #include <cstdint>
 #include <string>
 
-#include "telemetry/message_fields.hpp"
-
 namespace abs_hil::commands {
 
 /// A command and its destination.

@@ -7,20 +7,20 @@ namespace abs_hil::config {
 namespace {
 
 constexpr double day_s = 86'400.0;
-constexpr config::Range duration{0.0, day_s};
+constexpr rig::Range duration = rig::from_zero(day_s);
 /// No phase lasts longer, whatever it waits for (experiment::Sequence), its slack of a second included.
-constexpr config::Range phase_limit{0.0, 600.0, true, false};
-constexpr config::Range phase_duration{0.0, 599.0};
-constexpr config::Range span{0.0, day_s, true, false};
-constexpr config::Range wheel_speed{0.0, 2000.0};
-constexpr config::Range car_speed{0.0, 200.0};
-constexpr config::Range way{0.0, 1e5, true, false};
-constexpr config::Range duty{0.0, 1.0};
-constexpr config::Range torque{0.0, 100.0};
-constexpr config::Range slip{0.0, 1.0, true, true};
-constexpr config::Range any_slip{-1.0, 1.0};
-constexpr config::Range factor{0.0, 10.0, true, false};
-constexpr config::Range anything{-1e9, 1e9};
+constexpr rig::Range phase_limit = rig::positive(600.0);
+constexpr rig::Range phase_duration = rig::from_zero(599.0);
+constexpr rig::Range span = rig::positive(day_s);
+constexpr rig::Range wheel_speed = rig::from_zero(2000.0);
+constexpr rig::Range car_speed = rig::from_zero(200.0);
+constexpr rig::Range way = rig::positive(1e5);
+constexpr rig::Range duty = rig::from_zero(1.0);
+constexpr rig::Range torque = rig::from_zero(100.0);
+constexpr rig::Range slip = rig::open_between(0.0, 1.0);
+constexpr rig::Range any_slip = rig::between(-1.0, 1.0);
+constexpr rig::Range factor = rig::positive(10.0);
+constexpr rig::Range anything = rig::between(-1e9, 1e9);
 
 }  // namespace
 
@@ -122,7 +122,7 @@ const Grammar& until_grammar() {
   static Grammar grammar{"until", "What ends a phase", {}};
   static const bool filled = [] {
     using enum Quantity;
-    const auto add = [](std::string_view name, Quantity quantity, config::Range range, std::string_view meaning) {
+    const auto add = [](std::string_view name, Quantity quantity, rig::Range range, std::string_view meaning) {
       grammar.fields.push_back(
           {.name = name, .shape = Shape::number, .meaning = meaning, .quantity = quantity, .range = range});
     };

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "abs_hil/rig/option.hpp"
 #include "config/key_table.hpp"
 
 namespace abs_hil::config {
@@ -52,9 +53,9 @@ struct Field {
   Shape shape;
   std::string_view meaning;
   Quantity quantity{Quantity::none};
-  config::Range range{};                    ///< of numbers, in SI units
-  std::vector<std::string_view> allowed{};  ///< of choices
-  const Grammar* grammar{nullptr};          ///< of tables
+  rig::Range range{};               ///< of numbers, in SI units
+  rig::AllowedNames allowed{};      ///< of choices
+  const Grammar* grammar{nullptr};  ///< of tables
   bool required{false};
 };
 

@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "abs_hil/rig/option_check.hpp"
 #include "config/config_error.hpp"
 #include "rig/nearest_name.hpp"
 
@@ -28,14 +29,13 @@ std::string shown(const Value& value) {
 }
 
 [[noreturn]] void refuse(const Key& key, std::string_view value, std::string_view valid, std::string_view origin) {
-  throw ConfigError(fmt::format("{}: {} = {} is not valid; give {}{}{} ({})", origin, key.name, value, valid,
-                                key.unit.empty() ? "" : " ", key.unit, key.meaning));
+  throw ConfigError(fmt::format("{}: {}", origin, rig::refusal(key.name, value, valid, key)));
 }
 
 template <typename Number>
 void assign_number(const Key& key, Number& target, const Value& value, std::string_view origin) {
   constexpr bool whole = std::is_integral_v<Number>;
-  const std::string valid = fmt::format("a {} in {}", whole ? "whole number" : "number", key.range.text());
+  const std::string valid = rig::valid_number_text(key, whole);
   double number = 0.0;
   if (const auto* integer = std::get_if<std::int64_t>(&value)) {
     number = static_cast<double>(*integer);
@@ -82,12 +82,16 @@ nlohmann::ordered_json value_of(const Key& key) {
 
 }  // namespace
 
-bool Range::contains(double value) const noexcept {
-  return (least_open ? value > least : value >= least) && (most_open ? value < most : value <= most);
+KeyTable::KeyTable(Settings& settings) {
+  rig::for_each_option(settings, {}, [this](const std::string& name, const rig::OptionFacts& facts, auto& value) {
+    keys_.push_back({facts, name, &value});
+  });
 }
 
-std::string Range::text() const {
-  return fmt::format("{}{}, {}{}", least_open ? '(' : '[', least, most, most_open ? ')' : ']');
+std::string section_of(std::string_view controller) {
+  std::string name(controller);
+  std::replace(name.begin(), name.end(), '-', '_');
+  return "control." + name + '.';
 }
 
 Value parse_value(const Key& key, std::string_view text) {
@@ -115,15 +119,11 @@ void KeyTable::set(std::string_view name, const Value& value, std::string_view o
           *target = *flag;
         } else if constexpr (std::is_same_v<Target, std::string>) {
           const auto* text = std::get_if<std::string>(&value);
-          const bool known =
-              text != nullptr &&
-              (key.allowed.empty() || std::find(key.allowed.begin(), key.allowed.end(), *text) != key.allowed.end());
-          if (known && !is_utf8(*text)) {
-            throw ConfigError(fmt::format("{}: {} is not UTF-8 text; give UTF-8 ({})", origin, key.name, key.meaning));
+          if (text == nullptr || !key.allowed.contains(*text)) {
+            refuse(key, shown(value), rig::valid_name_text(key), origin);
           }
-          if (!known) {
-            refuse(key, shown(value),
-                   key.allowed.empty() ? "text" : fmt::format("one of {}", fmt::join(key.allowed, ", ")), origin);
+          if (!is_utf8(*text)) {
+            throw ConfigError(fmt::format("{}: {} is not UTF-8 text; give UTF-8 ({})", origin, key.name, key.meaning));
           }
           *target = *text;
         } else {
@@ -150,7 +150,7 @@ std::string KeyTable::to_toml() const {
   std::vector<std::pair<std::string_view, std::string>> tables;
   for (const Key& key : keys_) {
     const std::size_t dot = key.name.rfind('.');
-    const std::string_view table = key.name.substr(0, dot);
+    const std::string_view table = std::string_view(key.name).substr(0, dot);
     auto at = std::find_if(tables.begin(), tables.end(), [&](const auto& known) { return known.first == table; });
     if (at == tables.end()) at = tables.insert(tables.end(), {table, fmt::format("\n[{}]\n", table)});
     // A number as short as reads back to the same; a text as JSON writes it, which TOML reads alike.

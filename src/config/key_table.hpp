@@ -9,28 +9,15 @@
 #include <variant>
 #include <vector>
 
+#include "abs_hil/rig/option.hpp"
 #include "config/settings.hpp"
 
 namespace abs_hil::config {
 
-/// Interval of admissible numbers, ends included unless open.
-struct Range {
-  double least{0.0};
-  double most{0.0};
-  bool least_open{false};
-  bool most_open{false};
-  [[nodiscard]] bool contains(double value) const noexcept;  ///< false for NaN
-  [[nodiscard]] std::string text() const;                    ///< "(0, 1]", say
-};
-
-/// One configuration value: its dotted name, where it is kept, what it may be.
-struct Key {
-  std::string_view name;
-  std::string_view unit;  ///< empty for pure numbers, flags and names
-  std::string_view meaning;
+/// One configuration value: its row (rig/option.hpp), its dotted name and where it is kept.
+struct Key : rig::OptionFacts {
+  std::string name;
   std::variant<double*, std::int32_t*, std::int64_t*, bool*, std::string*> target;
-  Range range{};                            ///< for numbers
-  std::vector<std::string_view> allowed{};  ///< for names; empty: any text
 };
 
 /// A value from a file or from the command line, before it is known what it should be.
@@ -39,7 +26,10 @@ using Value = std::variant<double, std::int64_t, bool, std::string>;
 /// `text` as a value for that key: as it is where the key wants text, else as a TOML file would hold it.
 [[nodiscard]] Value parse_value(const Key& key, std::string_view text);
 
-/// Every configuration value by its dotted name: the one place that knows names, units and ranges.
+/// What the names of a controller's own keys begin with: "control.sliding_mode.".
+[[nodiscard]] std::string section_of(std::string_view controller);
+
+/// Every configuration value by its dotted name, made from the rows of the options.
 class KeyTable {
  public:
   /// Refers to `settings`, which must outlive the table.

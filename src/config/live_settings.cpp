@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <stdexcept>
 
 #include "abs_hil/control/registry.hpp"
@@ -16,22 +15,13 @@ namespace {
 
 constexpr std::string_view slip_ref_key = "control.slip_ref";
 
-/// Where braking begins: without effect once it has.
-constexpr std::array<std::string_view, 5> start_values{
-    "control.adaptive.zeta0", "control.adaptive_actuator.zeta0", "control.sliding_mode.theta0_N",
-    "control.sliding_mode_smooth.theta0_N", "control.super_twisting.theta0_N"};
-
-std::string section_of(std::string controller) {
-  std::replace(controller.begin(), controller.end(), '-', '_');
-  return "control." + controller + '.';
-}
-
-bool may_change(const std::string& key, const std::string& controller) {
-  if (key == slip_ref_key) return true;
-  if (std::find(start_values.begin(), start_values.end(), key) != start_values.end()) return false;
+bool may_change(const Key& key, const std::string& controller) {
+  if (key.name == slip_ref_key) return true;
+  if (key.start_value) return false;
   // (16) and (17) share these two.
-  if (controller == "nominal" && (key == "control.adaptive.ks0" || key == "control.adaptive.ks1")) return true;
-  return key.starts_with(section_of(controller));
+  if (controller == "nominal" && (key.name == "control.adaptive.ks0" || key.name == "control.adaptive.ks1"))
+    return true;
+  return key.name.starts_with(section_of(controller));
 }
 
 }  // namespace
@@ -43,8 +33,9 @@ std::string LiveSettings::resolve(std::string_view name) const {
   for (const std::string& prefix : {std::string(), std::string("control."), section_of(controller)}) {
     std::string key = prefix + std::string(name);
     const auto is_named = [&key](const Key& known) { return known.name == key; };
-    if (std::none_of(keys.keys().begin(), keys.keys().end(), is_named)) continue;
-    if (may_change(key, controller)) return key;
+    const auto known = std::find_if(keys.keys().begin(), keys.keys().end(), is_named);
+    if (known == keys.keys().end()) continue;
+    if (may_change(*known, controller)) return key;
     throw ConfigError(fmt::format("{} cannot be changed while controller {} runs; what can: control.slip_ref and {}*",
                                   key, controller, section_of(controller)));
   }

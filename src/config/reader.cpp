@@ -132,11 +132,11 @@ std::string TableReader::text(const Entry& entry) const {
 }
 
 std::string TableReader::choice(const Entry& entry) const {
-  const auto& allowed = entry.field->allowed;
+  const rig::AllowedNames& allowed = entry.field->allowed;
   const auto* text = entry.node->as_string();
-  if (text == nullptr || std::find(allowed.begin(), allowed.end(), text->get()) == allowed.end()) {
+  if (text == nullptr || !allowed.contains(text->get())) {
     source_.fail(entry.place, fmt::format("{} = {}: give one of {} ({})", entry.key, shown(*entry.node),
-                                          quoted(allowed), entry.field->meaning));
+                                          quoted(allowed.list()), entry.field->meaning));
   }
   return text->get();
 }

@@ -11,7 +11,7 @@ using Json = nlohmann::ordered_json;
 
 const Json reference{{"type", "string"}, {"pattern", "^\\$[a-z]"}, {"description", "value of a configuration key"}};
 
-Json bounds(const config::Range& range) {
+Json bounds(const rig::Range& range) {
   return {{"type", "number"},
           {range.least_open ? "exclusiveMinimum" : "minimum", range.least},
           {range.most_open ? "exclusiveMaximum" : "maximum", range.most}};
@@ -45,7 +45,7 @@ Json value_of(const Field& field, bool unit_is_named) {
   switch (field.shape) {
     case Shape::text:
     case Shape::condition: return {{"type", "string"}};
-    case Shape::choice: return {{"enum", field.allowed}};
+    case Shape::choice: return {{"enum", field.allowed.list()}};
     case Shape::flag_true: return {{"const", true}};
     case Shape::number: return number(field, unit_is_named);
     case Shape::whole: {
@@ -65,7 +65,7 @@ Json value_of(const Field& field, bool unit_is_named) {
       if (field.shape == Shape::motor) json["anyOf"].push_back({{"const", "off"}});
       return json;
     }
-    case Shape::brake: return {{"anyOf", {{{"enum", field.allowed}}, pointer_to(*field.grammar)}}};
+    case Shape::brake: return {{"anyOf", {{{"enum", field.allowed.list()}}, pointer_to(*field.grammar)}}};
     case Shape::table: return pointer_to(*field.grammar);
     case Shape::tables: return list_of(pointer_to(*field.grammar));
     case Shape::points:

@@ -27,7 +27,7 @@ struct Number {
   double value{0.0};
   std::string key{};  ///< not empty: the value of this configuration key
   std::string_view unit{};
-  config::Range range{};
+  rig::Range range{};
   Place place{};
 };
 

@@ -5,6 +5,7 @@
 
 #include "abs_hil/control/options.hpp"
 #include "abs_hil/plant_sim/options.hpp"
+#include "abs_hil/rig/option.hpp"
 #include "driver/factory.hpp"
 #include "experiment/options.hpp"
 #include "guardian/options.hpp"
@@ -15,35 +16,43 @@ namespace abs_hil::config {
 
 /// Everything below `telemetry.` in the configuration.
 struct TelemetryOptions {
-  std::string channel_prefix{"ABS_"};
-  std::int32_t decimation{1};       ///< one ABS_TELEMETRY message every so many cycles, >= 1
-  double status_period_s{1.0};      ///< from one ABS_STATUS to the next, run time, > 0
-  double experiment_period_s{5.0};  ///< from one ABS_EXPERIMENT to the next, run time, > 0
+  ABS_HIL_OPTIONS(TelemetryOptions);
+  ABS_HIL_OPTION(std::string, channel_prefix, "ABS_", .meaning = "prefix of the LCM channels");
+  ABS_HIL_OPTION(std::int32_t, decimation, 1, .meaning = "cycles for each telemetry message",
+                 .range = rig::between(1, 10'000));
+  ABS_HIL_OPTION(double, status_period_s, 1.0, .unit = "s", .meaning = "from one status message to the next",
+                 .range = rig::between(0.01, 3600));
+  ABS_HIL_OPTION(double, experiment_period_s, 5.0, .unit = "s",
+                 .meaning = "from one message with the configuration to the next", .range = rig::between(0.01, 3600));
 };
 
 /// Everything below `commands.` in the configuration.
 struct CommandOptions {
-  bool enabled{false};     ///< commands other than `stop` are taken over LCM
-  std::string key_file{};  ///< with the secret that senders must know; its contents are no configuration value, which
-                           ///< is published
+  ABS_HIL_OPTIONS(CommandOptions);
+  ABS_HIL_OPTION(bool, enabled, false, .meaning = "take commands other than stop over LCM (docs/telemetry.md)");
+  /// The file's contents are no configuration value: the configuration is published.
+  ABS_HIL_OPTION(std::string, key_file, "", .meaning = "file with the secret that senders of commands must know");
 };
 
 /// One effective configuration: the defaults, then the plant's file, then the configuration file, then the command
 /// line.
 struct Settings {
-  plant_sim::PlantOptions plant{};
-  control::ControlOptions control{};
-  experiment::ExperimentOptions experiment{};
-  driver::DriverOptions driver{};
-  runtime::GateOptions gate{};
-  guardian::GuardianOptions guardian{};
-  runtime::RealtimeOptions realtime{};
-  TelemetryOptions telemetry{};
-  CommandOptions commands{};
+  ABS_HIL_OPTIONS(Settings);
+  ABS_HIL_GROUP(plant_sim::PlantOptions, plant, "plant.", {});
+  ABS_HIL_GROUP(control::ControlOptions, control, "control.", {});
+  ABS_HIL_GROUP(experiment::ExperimentOptions, experiment, "experiment.", {});
+  ABS_HIL_GROUP(driver::DriverOptions, driver, "driver.", {});
+  ABS_HIL_GROUP(guardian::GuardianOptions, guardian, "guardian.", {});
+  ABS_HIL_GROUP(CommandOptions, commands, "commands.", {});
+  ABS_HIL_GROUP(runtime::GateOptions, gate, "gate.", {});
+  ABS_HIL_GROUP(runtime::RealtimeOptions, realtime, "realtime.", {});
+  ABS_HIL_GROUP(TelemetryOptions, telemetry, "telemetry.", {});
+  ABS_HIL_OPTION(std::string, inject, "", .key = "run.inject",
+                 .meaning = "faults to inject, separated by commas (docs/fault-injection.md); never on hardware");
+  ABS_HIL_OPTION(std::int64_t, seed, 1, .key = "run.seed", .meaning = "seed of everything random in the simulator",
+                 .range = rig::from_zero(9e15));
   std::string plant_name{"paper-table1"};
   std::string backend{"sim"};
-  std::int64_t seed{1};
-  std::string inject{};  ///< faults to inject, separated by commas (driver/injection); empty: none
 };
 
 }  // namespace abs_hil::config

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "abs_hil/rig/option_check.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 #include "control/adaptive_gains.hpp"
 
@@ -13,10 +14,8 @@ namespace {
 /// The options with this controller's gains in the place where the parts it shares with AdaptiveController look.
 ControlOptions with_own_gains(const ControlOptions& options) {
   const AdaptiveActuatorOptions& own = options.adaptive_actuator;
-  const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
-  if (!positive(own.lag_gain_per_s) || !positive(own.lag_weight_s2)) {
-    throw std::invalid_argument("adaptive_actuator.lag_gain_per_s and adaptive_actuator.lag_weight_s2 must be > 0");
-  }
+  rig::require_valid(own, &AdaptiveActuatorOptions::lag_gain_per_s, "control.adaptive_actuator.");
+  rig::require_valid(own, &AdaptiveActuatorOptions::lag_weight_s2, "control.adaptive_actuator.");
   ControlOptions result = options;
   result.adaptive = own.law;
   return result;
@@ -33,16 +32,15 @@ double force_slope(const rig::TyreParameters& tyre, double slip) noexcept {
 AdaptiveActuatorController::AdaptiveActuatorController(const ControllerContext& context)
     : wheels_{context.rig.wheels},
       tyre_{context.rig.tyre},
-      gains_{context.options.adaptive_actuator.law},
       lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},
       lag_gain_{context.options.adaptive_actuator.lag_gain_per_s},
       lag_weight_{context.options.adaptive_actuator.lag_weight_s2},
       v_min_m_s_{context.options.v_min_m_s},
       period_s_{1.0 / context.options.rate_Hz},
       dynamics_{{with_own_gains(context.options), context.rig}},
-      theta_{checked(gains_), context.rig.wheels},
-      wheels_observer_{context.options.adaptive_actuator.observer, context.rig, context.options.rate_Hz},
-      error_weights_{error_weights(gains_)} {}
+      gains_{paper_gains(context.options.adaptive_actuator.law)},
+      theta_{context.options.adaptive_actuator.law, context.rig.wheels},
+      wheels_observer_{context.options.adaptive_actuator.observer, context.rig, context.options.rate_Hz} {}
 
 void AdaptiveActuatorController::reset(const SlipInput& input) noexcept {
   integral_.reset(slip_velocity_error_m_s(wheels_, input.speeds, input.slip_ref), input.slip_ref);
@@ -71,28 +69,32 @@ SlipOutput AdaptiveActuatorController::step(const SlipInput& raw) noexcept {
   const double past_phi = rig::normalised_tyre_force(tyre_, 0.5 * (slip_ + input.slip));
   adapt(input, past_phi);
 
-  double torque_Nm = dynamics_.brake_torque_Nm(input, integral_.value_m(), error_m_s, theta_.theta_N(), past_phi);
+  double torque_Nm =
+      dynamics_.feedback_linearising_torque_Nm(input, integral_.value_m(), error_m_s, theta_.theta_N(), past_phi);
   if (lags) torque_Nm = through_lag(input, torque_Nm, error_m_s);
   integral_.note_request(torque_Nm, input.max_brake_torque_Nm);
   return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
 }
 
+/// zeta' = -gamma phi ( k B'P [I; e_v] + lag_weight a eta ), while the command is limited 0.
+double AdaptiveActuatorController::zeta_rate_N_s(double slip_ref, double phi, double BtP_x) const noexcept {
+  return limited_ ? 0.0 : -gains_.gamma * phi * (slip_velocity_gain(wheels_, slip_ref) * BtP_x + tuning_);
+}
+
 void AdaptiveActuatorController::adapt(const SlipInput& input, double past_phi) noexcept {
-  const double weighted_error =
-      error_weights_[0] * integral_.mean_value_m() + error_weights_[1] * integral_.mean_error_m_s();
-  const double k = rig::slip_velocity_gain(wheels_, input.slip_ref);
+  const double BtP_x = paper::Laws<double>::BtP_x(gains_, integral_.mean_value_m(), integral_.mean_error_m_s());
   if (std::isfinite(input.max_brake_torque_Nm)) {
     theta_.update(ForceInterval{.dt_s = input.dt_s,
                                 .tyre_force_N = wheels_observer_.force_N(),
                                 .phi = past_phi,
-                                .weighted_error = limited_ ? 0.0 : k * weighted_error + tuning_});
+                                .zeta_rate_N_s = zeta_rate_N_s(input.slip_ref, past_phi, BtP_x)});
   } else {
     theta_.update(AdaptationInterval{.dt_s = input.dt_s,
                                      .omega1_before_rad_s = omega1_rad_s_,
                                      .omega1_after_rad_s = input.speeds.omega1_rad_s,
                                      .brake_torque_Nm = input.mean_brake_torque_Nm,
                                      .phi = past_phi,
-                                     .weighted_error = k * weighted_error});
+                                     .zeta_rate_N_s = zeta_rate_N_s(input.slip_ref, past_phi, BtP_x)});
   }
   omega1_rad_s_ = input.speeds.omega1_rad_s;
   slip_ = input.slip;
@@ -102,21 +104,21 @@ void AdaptiveActuatorController::adapt(const SlipInput& input, double past_phi) 
 double AdaptiveActuatorController::wanted_rate_m_s3(const SlipInput& input, double error_m_s,
                                                     double zeta_rate) const noexcept {
   const double phi = rig::normalised_tyre_force(tyre_, input.slip);
-  const double k = rig::slip_velocity_gain(wheels_, input.slip_ref);
+  const double k = slip_velocity_gain(wheels_, input.slip_ref);
   const WheelMotion motion =
       wheel_motion(wheels_, input.speeds, input.slip, input.slip_ref,
                    {.tyre_force_N = theta_.theta_N() * phi, .brake_torque_Nm = input.brake_torque_Nm}, v_min_m_s_);
-  return -gains_.ks0 * error_m_s - gains_.ks1 * motion.error_rate_m_s2 + k * phi * zeta_rate +
+  return paper::Laws<double>::nu(gains_, error_m_s, motion.error_rate_m_s2) + k * phi * zeta_rate +
          k * theta_.theta_N() * force_slope(tyre_, input.slip) * motion.slip_rate_per_s + motion.drift_rate_m_s3;
 }
 
 /// What each newton of phi (theta - theta_hat), which the model cannot know, adds to it: the factor a of the header.
 double AdaptiveActuatorController::wanted_rate_per_theta(const SlipInput& input) const noexcept {
   const auto& w = wheels_;
-  const double k = rig::slip_velocity_gain(w, input.slip_ref);
+  const double k = slip_velocity_gain(w, input.slip_ref);
   const double phi = std::max(0.0, rig::normalised_tyre_force(tyre_, input.slip));
   const double v_x = std::max(w.r2_m * input.speeds.omega2_rad_s, v_min_m_s_);
-  const double slip_rate = -rig::slip_velocity_gain(w, input.slip) / v_x;
+  const double slip_rate = -slip_velocity_gain(w, input.slip) / v_x;
   const double upper = w.r1_m / w.J1_kg_m2;
   const double lower = w.r2_m / w.J2_kg_m2;
   const double drift_rate = -upper * upper * w.d1_Nms_rad - (1.0 - input.slip_ref) * lower * lower * w.d2_Nms_rad;
@@ -127,14 +129,13 @@ double AdaptiveActuatorController::wanted_rate_per_theta(const SlipInput& input)
 double AdaptiveActuatorController::through_lag(const SlipInput& input, double wanted_Nm, double error_m_s) noexcept {
   const double arm = wheels_.J1_kg_m2 / wheels_.r1_m;
   const double eta = (input.brake_torque_Nm - wanted_Nm) / arm;
-  const double weighted_error = error_weights_[0] * integral_.value_m() + error_weights_[1] * error_m_s;
-  const double k = rig::slip_velocity_gain(wheels_, input.slip_ref);
+  const double BtP_x = paper::Laws<double>::BtP_x(gains_, integral_.value_m(), error_m_s);
   const double phi = std::max(0.0, rig::normalised_tyre_force(tyre_, input.slip));
 
   tuning_ = lag_weight_ * wanted_rate_per_theta(input) * eta;
-  const double zeta_rate = limited_ ? 0.0 : -gains_.gamma * phi * (k * weighted_error + tuning_);
+  const double zeta_rate = zeta_rate_N_s(input.slip_ref, phi, BtP_x);
   // eta decays by exp(-lag_gain h) over the period; for h -> 0 the quotient is the gain itself.
-  const double eta_rate = std::expm1(-lag_gain_ * period_s_) / period_s_ * eta - weighted_error / lag_weight_;
+  const double eta_rate = std::expm1(-lag_gain_ * period_s_) / period_s_ * eta - BtP_x / lag_weight_;
   const double torque_rate_Nm_s = arm * (wanted_rate_m_s3(input, error_m_s, zeta_rate) + eta_rate);
   const double command_Nm = lag_.command_Nm(input.brake_torque_Nm, period_s_ * torque_rate_Nm_s);
   limited_ = command_Nm < 0.0 || command_Nm > input.max_brake_torque_Nm;

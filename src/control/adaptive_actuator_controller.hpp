@@ -1,7 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
-
 #include "abs_hil/control/slip_error_dynamics.hpp"
 #include "abs_hil/control/wheel_motion.hpp"
 #include "control/slip_error_integral.hpp"
@@ -31,24 +29,24 @@ class AdaptiveActuatorController final : public SlipController {
  private:
   [[nodiscard]] SlipInput observed(const SlipInput& input) const noexcept;
   void adapt(const SlipInput& input, double past_phi) noexcept;
+  [[nodiscard]] double zeta_rate_N_s(double slip_ref, double phi, double BtP_x) const noexcept;
   [[nodiscard]] double through_lag(const SlipInput& input, double wanted_Nm, double error_m_s) noexcept;
   [[nodiscard]] double wanted_rate_m_s3(const SlipInput& input, double error_m_s, double zeta_rate) const noexcept;
   [[nodiscard]] double wanted_rate_per_theta(const SlipInput& input) const noexcept;
 
   rig::WheelParameters wheels_;
   rig::TyreParameters tyre_;
-  AdaptiveOptions gains_;
   BrakeLag lag_;
   double lag_gain_;    ///< 1/s
   double lag_weight_;  ///< s^2
   double v_min_m_s_;
   double period_s_;
   SlipErrorDynamics dynamics_;
+  paper::Gains<double> gains_;
   SlipErrorIntegral integral_;
   ThetaEstimator theta_;
   WheelForceObserver wheels_observer_;
-  Eigen::RowVector2d error_weights_;  ///< B'P of (17)
-  double omega1_rad_s_{0.0};          ///< of the cycle before, as is the slip
+  double omega1_rad_s_{0.0};  ///< of the cycle before, as is the slip
   double slip_{0.0};
   double tuning_{0.0};   ///< lag_weight a eta of the cycle before
   bool limited_{false};  ///< the command of the cycle before was

@@ -9,8 +9,8 @@ AdaptiveController::AdaptiveController(const ControllerContext& context)
     : wheels_{context.rig.wheels},
       tyre_{context.rig.tyre},
       dynamics_{context},
-      theta_{checked(context.options.adaptive), context.rig.wheels},
-      error_weights_{error_weights(context.options.adaptive)} {}
+      gains_{paper_gains(context.options.adaptive)},
+      theta_{context.options.adaptive, context.rig.wheels} {}
 
 void AdaptiveController::reset(const SlipInput& input) noexcept {
   integral_.reset(slip_velocity_error_m_s(wheels_, input.speeds, input.slip_ref), input.slip_ref);
@@ -26,20 +26,21 @@ SlipOutput AdaptiveController::step(const SlipInput& input) noexcept {
   const double past_phi = rig::normalised_tyre_force(tyre_, 0.5 * (slip_ + input.slip));
   adapt(input, past_phi);
 
-  const double torque_Nm = dynamics_.brake_torque_Nm(input, integral_.value_m(), error_m_s, theta_.theta_N(), past_phi);
+  const double torque_Nm =
+      dynamics_.feedback_linearising_torque_Nm(input, integral_.value_m(), error_m_s, theta_.theta_N(), past_phi);
   integral_.note_request(torque_Nm, input.max_brake_torque_Nm);
   return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
 }
 
 void AdaptiveController::adapt(const SlipInput& input, double past_phi) noexcept {
-  const double weighted_error =
-      error_weights_[0] * integral_.mean_value_m() + error_weights_[1] * integral_.mean_error_m_s();
+  const paper::Laws<double> laws = paper::laws(wheels_);
+  const double BtP_x = paper::Laws<double>::BtP_x(gains_, integral_.mean_value_m(), integral_.mean_error_m_s());
   theta_.update({.dt_s = input.dt_s,
                  .omega1_before_rad_s = omega1_rad_s_,
                  .omega1_after_rad_s = input.speeds.omega1_rad_s,
                  .brake_torque_Nm = input.mean_brake_torque_Nm,
                  .phi = past_phi,
-                 .weighted_error = rig::slip_velocity_gain(wheels_, input.slip_ref) * weighted_error});
+                 .zeta_rate_N_s = laws.zeta_dot(gains_, {.lambda_ref = input.slip_ref, .phi = past_phi}, BtP_x)});
   omega1_rad_s_ = input.speeds.omega1_rad_s;
   slip_ = input.slip;
 }

@@ -1,17 +1,15 @@
 #pragma once
 
-#include <Eigen/Core>
-
 #include "abs_hil/control/slip_error_dynamics.hpp"
 #include "control/slip_error_integral.hpp"
 #include "control/theta_estimator.hpp"
 
 namespace abs_hil::control {
 
-/// Adaptive slip controller (17)-(18) of Theorem 3.1: the control law of (16) with theta_hat in the place of theta0,
-///   I' = e_v,   Tb = (J1/r1) ( -ks0 I - ks1 e_v + k(slip_ref) theta_hat phi(slip) + friction drift ),
-/// and theta_hat from ThetaEstimator, which is driven by the brake torque that acts, not by the one asked for. With an
-/// ideal actuator V = ([I; e_v]' P [I; e_v] + (theta - theta_hat)^2/gamma)/2 never grows.
+/// Adaptive slip controller (17)-(18) of Theorem 3.1, `adaptive_T_b` and `adaptive_dot` of paper_laws.hpp in
+/// sampled-data form: the torque from SlipErrorDynamics, I from SlipErrorIntegral, theta_hat from ThetaEstimator, which
+/// is driven by the brake torque that acts, not by the one asked for. With an ideal actuator
+/// V = ([I; e_v]' P [I; e_v] + (theta - theta_hat)^2/gamma)/2 never grows.
 class AdaptiveController final : public SlipController {
  public:
   /// Throws std::invalid_argument for gains, Q or bounds of theta out of range.
@@ -27,10 +25,10 @@ class AdaptiveController final : public SlipController {
   rig::WheelParameters wheels_;
   rig::TyreParameters tyre_;
   SlipErrorDynamics dynamics_;
+  paper::Gains<double> gains_;
   SlipErrorIntegral integral_;
   ThetaEstimator theta_;
-  Eigen::RowVector2d error_weights_;  ///< B'P of (17)
-  double omega1_rad_s_{0.0};          ///< of the cycle before, as is the slip
+  double omega1_rad_s_{0.0};  ///< of the cycle before, as is the slip
   double slip_{0.0};
 };
 

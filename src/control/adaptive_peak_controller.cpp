@@ -4,24 +4,17 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "abs_hil/rig/option_check.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 
 namespace abs_hil::control {
 namespace {
 
 const AdaptivePeakOptions& checked(const AdaptivePeakOptions& o) {
-  if (!(o.ks0 > 0.0 && o.ks1 > 0.0 && o.lag_gain_per_s > 0.0 && o.slip_rate_per_s > 0.0 && o.search_rad_s > 0.0)) {
-    throw std::invalid_argument(
-        "adaptive_peak: ks0, ks1, lag_gain_per_s, slip_rate_per_s and search_rad_s must be > 0");
-  }
-  if (!(0.0 < o.slip_min && o.slip_min < o.slip_max && o.slip_max < 1.0)) {
-    throw std::invalid_argument("adaptive_peak needs 0 < slip_min < slip_max < 1");
-  }
+  rig::require_valid(o, "control.adaptive_peak.");
+  if (!(o.slip_min < o.slip_max)) throw std::invalid_argument("adaptive_peak needs slip_min < slip_max");
   if (!(o.slip_start >= o.slip_min && o.slip_start <= o.slip_max)) {
     throw std::invalid_argument("adaptive_peak.slip_start must lie within [slip_min, slip_max]");
-  }
-  if (!(o.search_part >= 0.0 && o.search_part < 1.0 && o.search_min >= 0.0)) {
-    throw std::invalid_argument("adaptive_peak needs search_part in [0, 1) and search_min >= 0");
   }
   return o;
 }
@@ -88,24 +81,26 @@ double AdaptivePeakController::command_Nm(const SlipInput& input, double slip, c
                                           double error_m_s) const noexcept {
   const rig::WheelSpeeds speeds = observer_.speeds();
   const double v_x = std::max(wheels_.r2_m * speeds.omega2_rad_s, v_min_m_s_);
-  const double arm = wheels_.J1_kg_m2 / wheels_.r1_m;
-  const double k = rig::slip_velocity_gain(wheels_, reference.slip);
+  const paper::Laws<double> laws = paper::laws(wheels_);
+  const paper::Gains<double> gains{.ks0 = options_.ks0, .ks1 = options_.ks1};
+  // The observed force stands for theta phi: theta is the force, phi is 1.
+  const paper::Reading<double> reading{
+      .omega1 = speeds.omega1_rad_s, .omega2 = speeds.omega2_rad_s, .lambda_ref = reference.slip, .phi = 1.0};
   // The observed force is late: the curve tells what the slip has changed of it since.
   const double force_N = observer_.force_N() + peak_.force_N(slip) - peak_.force_N(late_slip_);
   const double reference_m_s2 = reference.rate_per_s * v_x;
 
   // e_v' = -ks0 I - ks1 e_v, as in (16), with a reference that moves and a brake that is off by the observed error.
-  const double wanted_Nm = arm * (-options_.ks0 * integral_.value_m() - options_.ks1 * error_m_s + k * force_N +
-                                  friction_drift_m_s2(wheels_, speeds, reference.slip) + reference_m_s2) -
-                           observer_.brake_error_Nm();
+  const double nu = paper::Laws<double>::nu(gains, integral_.value_m(), error_m_s);
+  const double wanted_Nm = laws.T_b(laws.xi_1(reading, nu, force_N) + reference_m_s2) - observer_.brake_error_Nm();
   if (std::isinf(input.max_brake_torque_Nm)) return wanted_Nm;
 
   const WheelMotion motion = wheel_motion(
       wheels_, speeds, slip, reference.slip,
       {.tyre_force_N = force_N, .brake_torque_Nm = input.brake_torque_Nm + observer_.brake_error_Nm()}, v_min_m_s_);
   const double wanted_rate_Nm_s =
-      arm * (-options_.ks0 * error_m_s - options_.ks1 * (motion.error_rate_m_s2 - reference_m_s2) +
-             k * peak_.force_slope_N(slip) * motion.slip_rate_per_s);
+      laws.T_b(paper::Laws<double>::nu(gains, error_m_s, motion.error_rate_m_s2 - reference_m_s2) +
+               laws.k(reading) * peak_.force_slope_N(slip) * motion.slip_rate_per_s);
   const double catch_up_Nm = std::expm1(-options_.lag_gain_per_s * period_s_) * (input.brake_torque_Nm - wanted_Nm);
   return lag_.command_Nm(input.brake_torque_Nm, period_s_ * wanted_rate_Nm_s + catch_up_Nm);
 }

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "abs_hil/control/slip_error_dynamics.hpp"
+#include "abs_hil/rig/option_check.hpp"
 #include "control/full_torque.hpp"
 
 namespace abs_hil::control {
@@ -14,20 +15,15 @@ namespace {
 constexpr double standing_rad_s = 1.0;
 
 const FivePhaseOptions& checked(const FivePhaseOptions& o) {
-  if (!(o.release_below_m_s2 <= o.hold_below_m_s2 && o.hold_below_m_s2 < 0.0)) {
-    throw std::invalid_argument("five_phase: release_below_m_s2 <= hold_below_m_s2 < 0 must hold");
+  rig::require_valid(o, "control.five_phase.");
+  if (!(o.release_below_m_s2 <= o.hold_below_m_s2)) {
+    throw std::invalid_argument("five_phase.release_below_m_s2 must not be above hold_below_m_s2");
   }
   if (!(o.recover_above_m_s2 > o.release_below_m_s2)) {
     throw std::invalid_argument("five_phase.recover_above_m_s2 must be above release_below_m_s2");
   }
   if (!(o.reapply_below_m_s2 > o.hold_below_m_s2)) {
     throw std::invalid_argument("five_phase.reapply_below_m_s2 must be above hold_below_m_s2");
-  }
-  if (!(o.apply_Nm_s > 0.0 && o.release_Nm_s > 0.0 && o.reapply_Nm_s > 0.0)) {
-    throw std::invalid_argument("five_phase: the torque ramps must be > 0");
-  }
-  if (!(o.hold_limit_s > 0.0 && o.recover_limit_s > 0.0)) {
-    throw std::invalid_argument("five_phase: the time limits must be > 0");
   }
   return o;
 }

@@ -1,8 +1,6 @@
 #include "control/nominal_controller.hpp"
 
-#include <cmath>
-#include <stdexcept>
-
+#include "abs_hil/rig/option_check.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 
 namespace abs_hil::control {
@@ -12,9 +10,7 @@ NominalController::NominalController(const ControllerContext& context)
       tyre_{context.rig.tyre},
       dynamics_{context},
       theta0_N_{context.options.nominal.theta0_N != 0.0 ? context.options.nominal.theta0_N : context.rig.tyre.theta_N} {
-  if (!(theta0_N_ > 0.0 && std::isfinite(theta0_N_))) {
-    throw std::invalid_argument("nominal.theta0_N must be > 0, or 0 for the plant's own");
-  }
+  rig::require_valid(context.options.nominal, "control.nominal.");
 }
 
 void NominalController::reset(const SlipInput& input) noexcept {
@@ -26,7 +22,8 @@ SlipOutput NominalController::step(const SlipInput& input) noexcept {
   integral_.advance(input.dt_s, error_m_s, input.slip_ref, wheels_.r2_m * input.speeds.omega2_rad_s);
 
   const double phi = rig::normalised_tyre_force(tyre_, input.slip);
-  const double torque_Nm = dynamics_.brake_torque_Nm(input, integral_.value_m(), error_m_s, theta0_N_, phi);
+  const double torque_Nm =
+      dynamics_.feedback_linearising_torque_Nm(input, integral_.value_m(), error_m_s, theta0_N_, phi);
   integral_.note_request(torque_Nm, input.max_brake_torque_Nm);
   return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta0_N_};
 }

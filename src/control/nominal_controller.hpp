@@ -5,8 +5,8 @@
 
 namespace abs_hil::control {
 
-/// Slip controller (16) for a known peak tyre force theta0: I' = e_v,
-///   Tb = (J1/r1) ( -ks0 I - ks1 e_v + k(slip_ref) theta0 phi(slip) + friction drift ).
+/// Slip controller (16) for a known peak tyre force theta0: `nominal_T_b` of paper_laws.hpp in sampled-data form, the
+/// torque from SlipErrorDynamics, I from SlipErrorIntegral.
 /// With the right theta0 and an ideal actuator e_v'' + ks1 e_v' + ks0 e_v = 0. theta_est_N is theta0.
 class NominalController final : public SlipController {
  public:

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "abs_hil/control/slip_error_dynamics.hpp"
+#include "abs_hil/rig/option_check.hpp"
 
 namespace abs_hil::control {
 
@@ -13,8 +14,7 @@ double measured_equivalent_torque_Nm(const rig::WheelParameters& wheels, const S
   const double tyre_force_N =
       std::max(0.0, -(w.J2_kg_m2 * input.alpha2_rad_s2 + w.d2_Nms_rad * input.speeds.omega2_rad_s + w.M20_Nm) / w.r2_m);
   return w.J1_kg_m2 / w.r1_m *
-         (rig::slip_velocity_gain(w, input.slip_ref) * tyre_force_N +
-          friction_drift_m_s2(w, input.speeds, input.slip_ref));
+         (slip_velocity_gain(w, input.slip_ref) * tyre_force_N + friction_drift_m_s2(w, input.speeds, input.slip_ref));
 }
 
 PiController::PiController(const ControllerContext& context)
@@ -23,9 +23,7 @@ PiController::PiController(const ControllerContext& context)
       ki_per_s2_{context.options.pi.ki_per_s2},
       feed_forward_{context.options.pi.feed_forward} {
   if (!(context.options.rate_Hz > 0.0)) throw std::invalid_argument("the control rate must be > 0");
-  if (!(context.options.pi.kp_per_s > 0.0)) throw std::invalid_argument("pi.kp_per_s must be > 0");
-  if (!(ki_per_s2_ >= 0.0)) throw std::invalid_argument("pi.ki_per_s2 must be >= 0");
-  if (!(feed_forward_ >= 0.0 && feed_forward_ <= 1.0)) throw std::invalid_argument("pi.feed_forward must be in [0, 1]");
+  rig::require_valid(context.options.pi, "control.pi.");
 }
 
 void PiController::reset(const SlipInput& input) noexcept {

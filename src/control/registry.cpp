@@ -59,6 +59,10 @@ std::string unknown_name_message(std::string_view name) {
 
 }  // namespace
 
+std::string_view controller_name(std::size_t index) noexcept {
+  return index < table().size() ? table()[index].name : std::string_view{};
+}
+
 std::span<const ControllerEntry> controllers() noexcept { return table(); }
 
 void register_controller(const ControllerEntry& entry) {

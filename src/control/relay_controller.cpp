@@ -3,13 +3,14 @@
 #include <stdexcept>
 
 #include "abs_hil/control/slip_error_dynamics.hpp"
+#include "abs_hil/rig/option_check.hpp"
 #include "control/full_torque.hpp"
 
 namespace abs_hil::control {
 
 RelayController::RelayController(const ControllerContext& context)
     : wheels_{context.rig.wheels}, brake_{context.rig.brake}, threshold_{context.options.relay.threshold} {
-  if (!(threshold_ >= 0.0 && threshold_ < 1.0)) throw std::invalid_argument("relay.threshold must be in [0, 1)");
+  rig::require_valid(context.options.relay, "control.relay.");
 }
 
 void RelayController::reset(const SlipInput&) noexcept {}

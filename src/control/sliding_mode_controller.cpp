@@ -1,12 +1,12 @@
 #include "control/sliding_mode_controller.hpp"
 
-#include <stdexcept>
+#include "abs_hil/rig/option_check.hpp"
 
 namespace abs_hil::control {
 
 SlidingModeController::SlidingModeController(const ControllerContext& context)
     : surface_{context, context.options.sliding_mode.adaptation}, gain_m_s2_{context.options.sliding_mode.gain_m_s2} {
-  if (!(gain_m_s2_ > 0.0)) throw std::invalid_argument("sliding_mode.gain_m_s2 must be > 0");
+  rig::require_valid(context.options.sliding_mode, "control.sliding_mode.");
 }
 
 SlipOutput SlidingModeController::step(const SlipInput& input) noexcept {

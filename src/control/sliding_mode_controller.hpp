@@ -5,7 +5,7 @@
 namespace abs_hil::control {
 
 /// Sliding-mode slip control, the kind of controller that the paper compares itself with:
-///   Tb = (J1/r1) ( k(slip_ref) theta_hat phi(slip) + friction drift - K sign(e_v) ),
+///   Tb = (J1/r1) xi_1 of (18), with nu = -K sign(e_v) in the place of -ks0 I - ks1 e_v,
 ///   theta_hat' = -gamma k(slip_ref) phi(slip) sign(e_v), projected.
 /// The law and the gains of the paper's own baseline are not public; this is the textbook one for its error (13), not a
 /// copy. The sign is held for a period, so e_v chatters within about K periods of 0: that is the law, not a flaw here.

@@ -28,7 +28,7 @@ double SlidingSurface::observe(const SlipInput& input) noexcept {
   slip_ = input.slip;
   // theta_hat moves by -phi s, the torque by phi times that.
   if (!winds_up(-switching_)) {
-    theta_.update(input.dt_s, rig::slip_velocity_gain(wheels_, input.slip_ref) * past_phi_, switching_);
+    theta_.update(input.dt_s, slip_velocity_gain(wheels_, input.slip_ref) * past_phi_, switching_);
   }
   return slip_velocity_error_m_s(wheels_, input.speeds, input.slip_ref);
 }

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "control/equivalent_control.hpp"
+#include "abs_hil/control/equivalent_control.hpp"
 #include "control/switching_theta_estimator.hpp"
 
 namespace abs_hil::control {

@@ -1,8 +1,9 @@
 #include "abs_hil/control/slip_error_dynamics.hpp"
 
 #include <cmath>
-#include <stdexcept>
 #include <unsupported/Eigen/MatrixFunctions>
+
+#include "abs_hil/rig/option_check.hpp"
 
 namespace abs_hil::control {
 
@@ -14,19 +15,20 @@ Eigen::Matrix2d error_dynamics_matrix(double ks0, double ks1) {
 
 SlipErrorDynamics::SlipErrorDynamics(const ControllerContext& context) : equivalent_{context} {
   const auto& gains = context.options.adaptive;
-  const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
-  if (!positive(gains.ks0) || !positive(gains.ks1)) throw std::invalid_argument("ks0 and ks1 must be > 0");
+  rig::require_valid(gains, &AdaptiveOptions::ks0, "control.adaptive.");
+  rig::require_valid(gains, &AdaptiveOptions::ks1, "control.adaptive.");
 
   const Eigen::Matrix2d A = error_dynamics_matrix(gains.ks0, gains.ks1);
   const Eigen::Matrix2d half = (A * (0.5 * equivalent_.period_s())).exp();
   const Eigen::Matrix2d whole = half * half;
-  mean_rate_ = (whole - Eigen::Matrix2d::Identity()).row(1) / equivalent_.period_s();
+  const Eigen::RowVector2d mean_rate = (whole - Eigen::Matrix2d::Identity()).row(1) / equivalent_.period_s();
+  sampled_gains_ = {.ks0 = -mean_rate[0], .ks1 = -mean_rate[1]};
   error_at_mid_ = half.row(1);
 }
 
-double SlipErrorDynamics::brake_torque_Nm(const SlipInput& input, double integral_m, double error_m_s, double theta_N,
-                                          double recent_phi) const noexcept {
-  const WantedMotion wanted{.mean_rate_m_s2 = mean_rate_[0] * integral_m + mean_rate_[1] * error_m_s,
+double SlipErrorDynamics::feedback_linearising_torque_Nm(const SlipInput& input, double integral_m, double error_m_s,
+                                                         double theta_N, double recent_phi) const noexcept {
+  const WantedMotion wanted{.mean_rate_m_s2 = paper::Laws<double>::nu(sampled_gains_, integral_m, error_m_s),
                             .error_at_mid_m_s = error_at_mid_[0] * integral_m + error_at_mid_[1] * error_m_s};
   return equivalent_.brake_torque_Nm(input, error_m_s, wanted, theta_N, recent_phi);
 }

@@ -24,14 +24,4 @@ void SlipErrorIntegral::advance(double dt_s, double error_m_s, double slip_ref, 
   value_m_ += increment_m;
 }
 
-void SlipErrorIntegral::note_request(double torque_Nm, double max_torque_Nm) noexcept {
-  if (torque_Nm > max_torque_Nm) {
-    request_ = Request::above;
-  } else if (torque_Nm < 0.0) {
-    request_ = Request::below;
-  } else {
-    request_ = Request::within_range;
-  }
-}
-
 }  // namespace abs_hil::control

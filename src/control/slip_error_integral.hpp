@@ -15,7 +15,15 @@ class SlipErrorIntegral {
   /// @param v_x_m_s  car speed: gives the error that the reference of the past interval would have had
   void advance(double dt_s, double error_m_s, double slip_ref, double v_x_m_s) noexcept;
   /// Takes note of the torque asked for until the next `advance`, against the actuator's range [0, max_torque_Nm].
-  void note_request(double torque_Nm, double max_torque_Nm) noexcept;
+  void note_request(double torque_Nm, double max_torque_Nm) noexcept {
+    if (torque_Nm > max_torque_Nm) {
+      request_ = Request::above;
+    } else if (torque_Nm < 0.0) {
+      request_ = Request::below;
+    } else {
+      request_ = Request::within_range;
+    }
+  }
 
   [[nodiscard]] double value_m() const noexcept { return value_m_; }
   /// Means over the last interval, for the adaptation.

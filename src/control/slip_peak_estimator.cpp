@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "abs_hil/rig/option_check.hpp"
+
 namespace abs_hil::control {
 namespace {
 
@@ -47,20 +49,15 @@ SlipPeakEstimator::SlipPeakEstimator(const SlipPeakOptions& options, double slip
       log_slip_min_{std::log(slip_min)},
       log_slip_max_{std::log(slip_max)},
       sample_variance_N2_{options.force_noise_N2_s * rate_Hz},
-      speed_window_{at_least_one(kept_every_s * rate_Hz)},
-      window_{at_least_one(jump_window_s * rate_Hz / static_cast<double>(speed_window_))},
-      rollback_{at_least_one(rollback_s * rate_Hz / static_cast<double>(speed_window_))} {
-  const auto& o = options;
+      decimation_{at_least_one(kept_every_s * rate_Hz)},
+      window_{at_least_one(jump_window_s * rate_Hz / static_cast<double>(decimation_))},
+      rollback_{at_least_one(rollback_s * rate_Hz / static_cast<double>(decimation_))} {
+  rig::require_valid(options, "control.adaptive_peak.");
   if (!(0.0 < slip_min && slip_min < slip_max && rate_Hz > 0.0)) {
     throw std::invalid_argument("the peak's slip needs bounds 0 < slip_min < slip_max and a control rate > 0");
   }
-  if (!(o.peak_slip0 >= slip_min && o.peak_slip0 <= slip_max)) {
+  if (!(options.peak_slip0 >= slip_min && options.peak_slip0 <= slip_max)) {
     throw std::invalid_argument("adaptive_peak.peak_slip0 must lie within [slip_min, slip_max]");
-  }
-  if (!(o.peak_force0_N > 0.0 && o.force_drift_per_s > 0.0 && o.slip_drift_per_s > 0.0 && o.shape_drift_per_s > 0.0 &&
-        o.force_noise_N2_s > 0.0 && o.jump_level > 0.0)) {
-    throw std::invalid_argument(
-        "adaptive_peak: peak_force0_N, the drifts, force_noise_N2_s and jump_level must be > 0");
   }
   reset();
 }
@@ -95,7 +92,7 @@ void SlipPeakEstimator::update(double dt_s, double slip, double force_N) noexcep
 }
 
 void SlipPeakEstimator::keep(double slip, double force_N) noexcept {
-  if (cycle_++ % speed_window_ != 0) return;
+  if (cycle_++ % decimation_ != 0) return;
   samples_[kept_count_++ % samples_.size()] = {slip, force_N, state_};
 }
 

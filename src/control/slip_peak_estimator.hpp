@@ -58,7 +58,7 @@ class SlipPeakEstimator {
   double log_slip_min_;
   double log_slip_max_;
   double sample_variance_N2_;  ///< of one pair, such that pairs at any rate teach as much per second
-  std::size_t speed_window_;   ///< cycles between kept samples, 1 ms or one cycle
+  std::size_t decimation_;     ///< cycles between kept samples, 1 ms or one cycle
   std::size_t window_;         ///< kept samples in 15 ms and in 30 ms
   std::size_t rollback_;
   State state_{State::Zero()};

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
+
+#include "abs_hil/rig/option_check.hpp"
 
 namespace abs_hil::control {
 
@@ -18,9 +19,7 @@ SmoothSlidingModeController::SmoothSlidingModeController(const ControllerContext
     : surface_{context, context.options.sliding_mode_smooth.adaptation},
       gain_m_s2_{context.options.sliding_mode_smooth.gain_m_s2},
       width_m_s_{context.options.sliding_mode_smooth.boundary_m_s} {
-  if (!(gain_m_s2_ > 0.0 && width_m_s_ > 0.0)) {
-    throw std::invalid_argument("sliding_mode_smooth.gain_m_s2 and .boundary_m_s must be > 0");
-  }
+  rig::require_valid(context.options.sliding_mode_smooth, "control.sliding_mode_smooth.");
 }
 
 SlipOutput SmoothSlidingModeController::step(const SlipInput& input) noexcept {

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
+
+#include "abs_hil/rig/option_check.hpp"
 
 namespace abs_hil::control {
 
@@ -22,7 +23,7 @@ SuperTwistingController::SuperTwistingController(const ControllerContext& contex
     : surface_{context, context.options.super_twisting.adaptation},
       k1_{context.options.super_twisting.k1},
       k2_{context.options.super_twisting.k2} {
-  if (!(k1_ > 0.0 && k2_ > 0.0)) throw std::invalid_argument("super_twisting.k1 and .k2 must be > 0");
+  rig::require_valid(context.options.super_twisting, "control.super_twisting.");
 }
 
 void SuperTwistingController::reset(const SlipInput& input) noexcept {

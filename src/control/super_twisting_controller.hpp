@@ -14,7 +14,7 @@ struct SuperTwistingStep {
 /// Semi-implicit step: sqrt|e| is taken at the period's end, where e+ = e - h k1 sqrt|e+| sign(e+), and the sign is
 /// sat(e/(h^2 k2)), so that z never moves by more than takes e to 0. Continuous in e and z; close to 0 it becomes the
 /// deadbeat pair u = z - 2 e/h, z+ = z - e/h, which ends the chatter at any rate and leaves e = O(h^2) under a
-/// perturbation of bounded slope (docs/theory-rivals.md). Real-time safe.
+/// perturbation of bounded slope (docs/theory-baselines.md). Real-time safe.
 [[nodiscard]] SuperTwistingStep super_twisting_step(double error_m_s, double integral_m_s2, double k1, double k2,
                                                     double period_s) noexcept;
 

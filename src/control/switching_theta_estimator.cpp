@@ -1,8 +1,9 @@
 #include "control/switching_theta_estimator.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
+
+#include "abs_hil/rig/option_check.hpp"
 
 namespace abs_hil::control {
 
@@ -12,7 +13,7 @@ SwitchingThetaEstimator::SwitchingThetaEstimator(const SwitchingAdaptationOption
       theta_min_N_{options.theta_min_N},
       theta_max_N_{options.theta_max_N},
       theta_N_{options.theta0_N} {
-  if (!(gamma_ >= 0.0 && std::isfinite(gamma_))) throw std::invalid_argument("gamma of theta_hat must be >= 0");
+  rig::require_valid(options, "");
   if (!(theta_min_N_ <= theta0_N_ && theta0_N_ <= theta_max_N_)) {
     throw std::invalid_argument("theta0_N must lie within [theta_min_N, theta_max_N]");
   }

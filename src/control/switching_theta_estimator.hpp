@@ -9,7 +9,7 @@ namespace abs_hil::control {
 /// Estimate of the peak tyre force that belongs to a sliding-mode law,
 ///   theta_hat' = -gamma k(slip_ref) phi(slip) s,   s in [-1, 1] standing for sign(e_v),
 /// projected onto [theta_min_N, theta_max_N]. With e_v' = -k phi (theta - theta_hat) - K s + d it makes
-/// V = |e_v| + (theta - theta_hat)^2/(2 gamma) fall at K - |d| or faster until e_v = 0 (docs/theory-rivals.md), for
+/// V = |e_v| + (theta - theta_hat)^2/(2 gamma) fall at K - |d| or faster until e_v = 0 (docs/theory-baselines.md), for
 /// either sign of phi. Real-time safe.
 class SwitchingThetaEstimator {
  public:

@@ -12,28 +12,26 @@ struct AdaptationInterval {
   double omega1_after_rad_s{0.0};   ///< ... and its end; linear in between
   double brake_torque_Nm{0.0};      ///< mean torque that acted
   double phi{0.0};                  ///< mean of phi(slip)
-  double weighted_error{0.0};       ///< mean of k(slip_ref) B'P [I; e_v]
+  double zeta_rate_N_s{0.0};        ///< mean of zeta' (17); counts for phi > 0 only
 };
 
 /// The same, where the tyre force is known by itself.
 struct ForceInterval {
-  double dt_s{0.0};            ///< > 0
-  double tyre_force_N{0.0};    ///< mean of F, see ThetaEstimator
-  double phi{0.0};             ///< mean of phi(slip)
-  double weighted_error{0.0};  ///< as in AdaptationInterval
+  double dt_s{0.0};           ///< > 0
+  double tyre_force_N{0.0};   ///< mean of F, see ThetaEstimator
+  double phi{0.0};            ///< mean of phi(slip)
+  double zeta_rate_N_s{0.0};  ///< as in AdaptationInterval
 };
 
-/// Estimate of the peak tyre force theta by (17)-(18):
-///   omega1_hat' = (r1/J1) theta_hat phi - (d1 omega1 + M10 + Tb)/J1,    zeta' = -gamma phi k B'P [I; e_v],
-///   theta_hat   = zeta + gamma ka1 (J1/r1) (omega1 - omega1_hat).
-/// The sign before ka1 is plus: with the minus printed in (18) the estimation error grows wherever phi > 0
-/// (docs/theory.md, and a test shows both).
+/// Estimate of the peak tyre force theta by (17)-(18): `omega1_hat_dot`, `zeta_dot` and `theta_hat` of paper_laws.hpp
+/// in sampled-data form.
 ///
 /// zeta and omega1_hat act on the controller through theta_hat alone, and (18) differentiated along (17) closes in it:
 ///   theta_hat' = zeta' + gamma ka1 (F - phi theta_hat),   F = (J1 omega1' + d1 omega1 + M10 + Tb)/r1,
-/// where F is the tyre force that the upper wheel's motion tells. So theta_hat itself is the state here. That is the
-/// same estimator, and it makes freezing (hold) and projection (clamp) free of wind-up and of jumps. The equation is
-/// linear, and solved exactly for F, phi and zeta' at their means over the interval: stable for any gain and rate.
+/// where F is the tyre force that the upper wheel's motion tells. So the states here are zeta and theta_hat; omega1_hat
+/// follows from them by (18). That is the same estimator, and it makes freezing (hold) and projection (clamp) free of
+/// wind-up and of jumps: omega1_hat gives way to them. The equation is linear, and solved exactly for F, phi and zeta'
+/// at their means over the interval: stable for any gain and rate.
 ///
 /// Adaptation is frozen for phi <= 0 (rolling free, traction), where V' <= 0 of Theorem 3.1 does not hold.
 /// Real-time safe.
@@ -44,21 +42,26 @@ class ThetaEstimator {
 
   /// omega1_hat = omega1, so theta_hat = zeta0, projected.
   void reset() noexcept;
-  /// Goes on with the other's estimate, within the own bounds.
+  /// Goes on with the other's estimate, within the own bounds, and its zeta.
   void take_over(const ThetaEstimator& before) noexcept;
   void update(const AdaptationInterval& past) noexcept;
   void update(const ForceInterval& past) noexcept;
 
   [[nodiscard]] double theta_N() const noexcept { return theta_N_; }
+  /// zeta of (17): the integral of zeta' from zeta0 while adaptation is not frozen, not projected.
+  [[nodiscard]] double zeta_N() const noexcept { return zeta_N_; }
+  /// omega1_hat of (17) at the end of the last interval, where the upper wheel turned at `omega1_rad_s`: (18) solved
+  /// for it.
+  [[nodiscard]] double omega1_hat_rad_s(double omega1_rad_s) const noexcept;
 
  private:
   rig::WheelParameters wheels_;
-  double gamma_;
   double innovation_gain_;  ///< gamma ka1
   double zeta0_N_;
   double theta_min_N_;
   double theta_max_N_;
   double theta_N_;
+  double zeta_N_;
 };
 
 }  // namespace abs_hil::control

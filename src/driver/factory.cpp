@@ -32,6 +32,10 @@ std::span<const BackendEntry> boards() noexcept {
   return entries;
 }
 
+std::string_view board_name(std::size_t index) noexcept {
+  return index < boards().size() ? boards()[index].name : std::string_view{};
+}
+
 std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options, bool lock_step) {
   if (options.kind == "pci") {
     return std::make_unique<pci::PciDriver>(

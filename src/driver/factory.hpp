@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <span>
 #include <string>
@@ -7,22 +8,28 @@
 
 #include "abs_hil/driver/rig_driver.hpp"
 #include "abs_hil/driver/safe_state_writer.hpp"
+#include "abs_hil/rig/option.hpp"
 #include "driver/can/options.hpp"
 #include "driver/pci/options.hpp"
 #include "driver/usb/options.hpp"
 
 namespace abs_hil::driver {
 
+/// Name number `index` of `boards()`; empty beyond the last.
+[[nodiscard]] std::string_view board_name(std::size_t index) noexcept;
+
 /// Everything below `driver.` in the configuration.
 struct DriverOptions {
-  std::string kind{"pci"};  ///< the board behind `--backend rig`
-  /// The board is an emulator. With `--fast` its time is driven in lock-step; refused where there is no emulator.
-  bool emulated{false};
-  /// Set by a lab that has gone through docs/rig-setup.md on its own rig; until then doctor and log say otherwise.
-  bool verified_on_hardware{false};
-  pci::PciOptions pci{};
-  can::CanOptions can{};
-  usb::UsbOptions usb{};
+  ABS_HIL_OPTIONS(DriverOptions);
+  ABS_HIL_OPTION(std::string, kind, "pci", .meaning = "board behind --backend rig", .allowed = board_name);
+  /// Refused where there is no emulator.
+  ABS_HIL_OPTION(bool, emulated, false, .meaning = "the board is an emulator: --fast may drive its time in lock-step");
+  /// Until then doctor and log say otherwise.
+  ABS_HIL_OPTION(bool, verified_on_hardware, false,
+                 .meaning = "this lab has gone through docs/rig-setup.md on its own rig");
+  ABS_HIL_GROUP(pci::PciOptions, pci, "pci.", {});
+  ABS_HIL_GROUP(can::CanOptions, can, "can.", {});
+  ABS_HIL_GROUP(usb::UsbOptions, usb, "usb.", {});
 };
 
 struct BackendEntry {

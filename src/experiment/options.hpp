@@ -2,27 +2,47 @@
 
 #include <string>
 
+#include "abs_hil/rig/option.hpp"
+
 namespace abs_hil::experiment {
 
 /// Options under `experiment.` in the configuration.
 struct ExperimentOptions {
-  std::string name{"paper"};
-  bool wait_for_start{false};       ///< stay idle until a command gives the start
-  double start_speed_rad_s{0.0};    ///< > 0: start braking at once from this speed of both wheels (simulation only)
-  double end_speed_m_s{0.3};        ///< car speed at which braking counts as done, > 0
-  std::string cut{"threshold"};     ///< what cuts the motor: "threshold" or "peak" of the upper wheel's speed
-  double cut_speed_rad_s{170.0};    ///< upper wheel's speed at which the motor is cut ("threshold"), > 0
-  double peak_wait_s{0.3};          ///< no new maximum for this long is a peak ("peak"), > 0
-  double motor_duty{1.0};           ///< drive PWM while accelerating, in (0, 1]
-  double idle_s{0.05};              ///< still, before the motor starts, >= 0
-  double coast_s{0.01};             ///< motor off, brake not yet on, >= 0
-  double hold_torque_Nm{2.0};       ///< brake torque from the end of slip control to standstill; 0 lets the rig run out
-  double stopped_s{0.1};            ///< recorded after standstill, >= 0
-  double accelerate_limit_s{20.0};  ///< time limits: a phase that lasts longer is a fault, > 0
-  double brake_limit_s{30.0};
-  double hold_limit_s{30.0};
-  double stop_brake_duty{0.0};     ///< brake PWM after a stop request, until standstill, in [0, 1]; 0: released at once
-  double stop_brake_limit_s{5.0};  ///< ... but no longer than this, > 0
+  ABS_HIL_OPTIONS(ExperimentOptions);
+  ABS_HIL_OPTION(std::string, name, "paper", .meaning = "experiment by name or TOML file");
+  ABS_HIL_OPTION(double, start_speed_rad_s, 0.0, .unit = "rad/s",
+                 .meaning = "simulation: brake at once from this speed; 0: accelerate first",
+                 .range = rig::from_zero(1000));
+  ABS_HIL_OPTION(double, end_speed_m_s, 0.3, .unit = "m/s", .meaning = "car speed at which braking counts as done",
+                 .range = rig::between(0.02, 50));
+  ABS_HIL_OPTION(std::string, cut, "threshold", .meaning = "what cuts the motor", .allowed = {"threshold", "peak"});
+  ABS_HIL_OPTION(double, cut_speed_rad_s, 170.0, .unit = "rad/s", .meaning = "upper wheel's speed that cuts the motor",
+                 .range = rig::positive(1000));
+  ABS_HIL_OPTION(double, peak_wait_s, 0.3, .unit = "s", .meaning = "time without a new maximum that counts as a peak",
+                 .range = rig::between(0.05, 10));
+  ABS_HIL_OPTION(double, motor_duty, 1.0, .meaning = "drive PWM while accelerating", .range = rig::positive(1));
+  ABS_HIL_OPTION(double, idle_s, 0.05, .unit = "s", .meaning = "time before the motor starts",
+                 .range = rig::from_zero(60));
+  ABS_HIL_OPTION(double, coast_s, 0.01, .unit = "s", .meaning = "time between motor off and brake on",
+                 .range = rig::from_zero(60));
+  /// 0 lets the rig run out.
+  ABS_HIL_OPTION(double, hold_torque_Nm, 2.0, .unit = "N m",
+                 .meaning = "brake torque from the end of slip control to standstill", .range = rig::from_zero(100));
+  ABS_HIL_OPTION(double, stopped_s, 0.1, .unit = "s", .meaning = "time recorded after standstill",
+                 .range = rig::from_zero(60));
+  /// A phase that lasts longer than its limit is a fault.
+  ABS_HIL_OPTION(double, accelerate_limit_s, 20.0, .unit = "s", .meaning = "time limit of acceleration",
+                 .range = rig::positive(600));
+  ABS_HIL_OPTION(double, brake_limit_s, 30.0, .unit = "s", .meaning = "time limit of braking",
+                 .range = rig::positive(600));
+  ABS_HIL_OPTION(double, hold_limit_s, 30.0, .unit = "s", .meaning = "time limit of holding",
+                 .range = rig::positive(600));
+  ABS_HIL_OPTION(double, stop_brake_duty, 0.0,
+                 .meaning = "brake PWM from a stop request to standstill; 0: released at once",
+                 .range = rig::from_zero(1));
+  ABS_HIL_OPTION(double, stop_brake_limit_s, 5.0, .unit = "s", .meaning = "... but no longer than this",
+                 .range = rig::positive(60));
+  ABS_HIL_OPTION(bool, wait_for_start, false, .meaning = "stay idle until a command gives the start");
 };
 
 }  // namespace abs_hil::experiment

@@ -1,12 +1,20 @@
 #pragma once
 
+#include "abs_hil/rig/option.hpp"
+
 namespace abs_hil::guardian {
 
 /// Everything below `guardian.` in the configuration.
 struct GuardianOptions {
-  bool enabled{true};       ///< false only with an emulated board
-  double timeout_ms{20.0};  ///< without a sign of life of the cycle, > 0
-  double insist_s{10.0};    ///< how long it goes on trying when the safe state cannot be verified, > 0
+  ABS_HIL_OPTIONS(GuardianOptions);
+  ABS_HIL_OPTION(bool, enabled, true,
+                 .meaning = "dead-man process beside a run on a board; off only with driver.emulated");
+  ABS_HIL_OPTION(double, timeout_ms, 20.0, .unit = "ms",
+                 .meaning = "time without a sign of life of the cycle after which the guardian acts",
+                 .range = rig::between(2, 1000));
+  ABS_HIL_OPTION(double, insist_s, 10.0, .unit = "s",
+                 .meaning = "how long the guardian goes on trying to verify the safe state",
+                 .range = rig::between(0.1, 600));
 };
 
 }  // namespace abs_hil::guardian

@@ -24,7 +24,7 @@ std::string value_of(const config::Key& key) {
 std::string valid_of(const config::Key& key) {
   if (std::holds_alternative<bool*>(key.target)) return "true or false";
   if (!std::holds_alternative<std::string*>(key.target)) return key.range.text();
-  return key.allowed.empty() ? "text" : fmt::format("{}", fmt::join(key.allowed, " | "));
+  return key.allowed.empty() ? "text" : fmt::format("{}", fmt::join(key.allowed.list(), " | "));
 }
 
 void list_keys() {

@@ -243,8 +243,15 @@ int dispatch(int argc, char** argv) {
   add_run_options(cli, options);
   cli.require_subcommand(0, 1);
   auto* list = cli.add_subcommand("list", "list controllers, plants, experiments and backends");
-  bool keys = false;
-  list->add_flag("--keys", keys, "list all configuration values with unit and range");
+  bool keys = false, quantities = false, reasons = false, list_json = false;
+  auto* list_keys = list->add_flag("--keys", keys, "list all configuration values with unit and range");
+  auto* list_quantities =
+      list->add_flag("--quantities", quantities, "list the quantities of a CSV row and of ABS_TELEMETRY");
+  list->add_flag("--reasons", reasons, "list the reasons of phase changes, ends of runs and refused commands")
+      ->excludes(list_keys)
+      ->excludes(list_quantities);
+  list_quantities->excludes(list_keys);
+  list->add_flag("--json", list_json, "print quantities or reasons as JSON")->excludes(list_keys);
   DoctorCommand doctor;
   add_doctor(cli, doctor);
   LatencyCommand latency;
@@ -265,6 +272,7 @@ int dispatch(int argc, char** argv) {
   add_send(cli, send);
   try {
     cli.parse(argc, argv);
+    if (list_json && !quantities && !reasons) throw CLI::RequiresError("--json", "--quantities or --reasons");
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return cli.exit(error);  // --help, --version
     const auto asked = cli.get_subcommands();
@@ -272,6 +280,8 @@ int dispatch(int argc, char** argv) {
     fprintf(stderr, "abs_hil: %s (%s --help shows all options)\n", error.what(), command.c_str());
     return program::exit_usage;
   }
+  if (quantities) return program::list_quantities(list_json);
+  if (reasons) return program::list_reasons(list_json);
   if (list->parsed()) return program::list(keys);
   if (doctor.parser->parsed()) return program::doctor(program::merge(doctor.options), doctor.only, doctor.json);
   if (latency.parser->parsed()) return program::latency(program::merge(latency.options), latency.latency);

@@ -20,6 +20,10 @@ int run_series(const RunOptions& options, const RunRequest& base);
 int compare(const CompareOptions& options);
 /// `abs_hil list`: lists controllers, plants, experiments and backends, or all configuration keys.
 int list(bool keys);
+/// `abs_hil list --quantities`: prints the table of rig/quantities.hpp, as text or JSON.
+int list_quantities(bool json);
+/// `abs_hil list --reasons`: prints the table of rig/reason.hpp, as text or JSON.
+int list_reasons(bool json);
 /// `abs_hil validate`: describes an experiment and checks it against the limits of its backend.
 int validate(const RunRequest& request);
 /// `abs_hil validate --schema`: the JSON Schema of experiment files.

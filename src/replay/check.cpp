@@ -3,20 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <map>
 #include <string_view>
 
+#include "abs_hil/message_fields.hpp"
+#include "abs_hil/rig/quantities.hpp"
 #include "telemetry/message_codec.hpp"
 
 namespace abs_hil::replay {
 
 namespace {
-
-constexpr std::array<std::string_view, 8> durations{"wakeup_latency_ns", "read_ns",      "control_ns",
-                                                    "write_ns",          "cycle_ns",     "periods_skipped",
-                                                    "record_ns",         "overrun_cause"};
 
 /// A field as bits for comparison and as text for messages.
 struct FieldValue {
@@ -77,8 +74,8 @@ Difference first_difference(const telemetry_t& recorded, const telemetry_t& comp
   Difference difference;
   // Fields are compared in the message's order: causes come before effects, except for estimates.
   telemetry::visit_fields(recorded, [&](std::string_view name, const auto&) {
-    const bool is_duration = std::find(durations.begin(), durations.end(), name) != durations.end();
-    if (!difference.field.empty() || (is_duration && !with_timing)) return;
+    const bool is_timing = rig::topic_of(name) == rig::Topic::timing;
+    if (!difference.field.empty() || (is_timing && !with_timing)) return;
     if (a.at(name).bits != b.at(name).bits) difference = {std::string(name), a.at(name).text, b.at(name).text};
   });
   return difference;

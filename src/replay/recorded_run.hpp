@@ -6,8 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "abs_hil/adjustment_t.hpp"
+#include "abs_hil/event_t.hpp"
+#include "abs_hil/experiment_t.hpp"
+#include "abs_hil/telemetry_t.hpp"
 #include "config/settings.hpp"
-#include "telemetry/message_fields.hpp"
 #include "telemetry/recording.hpp"
 
 namespace abs_hil::replay {

@@ -205,37 +205,17 @@ bool ended_from_outside(const RecordedRun& run, std::size_t n, WheelFaults fault
   const auto reason = static_cast<rig::Reason>(cycle.reason);
   if (rig::is_stop_request(reason)) return true;  // the stop brake may act first
   if (cycle.phase != telemetry_t::PHASE_STOPPED && cycle.phase != telemetry_t::PHASE_FAULT) return false;
-  switch (reason) {
-    // Sequence, gate or logic find these again from the measurements.
-    case rig::Reason::phase_time_limit:
-    case rig::Reason::run_time_limit:
-    case rig::Reason::run_distance_limit:
-    case rig::Reason::overspeed:
-    case rig::Reason::command_not_finite:
-    case rig::Reason::estimate_not_finite:
-    case rig::Reason::board_interlock_tripped:
-    case rig::Reason::board_supply_tripped:
-    case rig::Reason::board_supply_low:
-    case rig::Reason::board_too_hot:
-    case rig::Reason::board_health_lost: return false;
-    case rig::Reason::encoder_upper_jumped:
-    case rig::Reason::encoder_lower_jumped:
-      // The gate refuses counts that jump within one cycle; the recording then repeats the previous cycle's counts.
+  if (!rig::is_fault(reason)) return false;
+  switch (rig::row_of(reason).found_again) {
+    case rig::FoundAgain::no: return true;
+    case rig::FoundAgain::yes: return false;
+    case rig::FoundAgain::jumped_counts:
+      // The gate refuses such counts; the recording then repeats the previous cycle's counts.
       if (n > 0 && run.measured_ns[n] == run.measured_ns[n - 1]) return true;
       return faults == WheelFaults::as_recorded;
-    case rig::Reason::encoder_upper_stuck:
-    case rig::Reason::encoder_lower_stuck:
-    case rig::Reason::encoder_upper_reversed:
-    case rig::Reason::encoder_lower_reversed:
-    case rig::Reason::encoders_lost:
-    case rig::Reason::encoders_disagree:
-    case rig::Reason::slip_implausible:
-    case rig::Reason::samples_missing:
-    case rig::Reason::speed_rises_with_motor_off:
-    case rig::Reason::motor_no_response:
-    case rig::Reason::brake_no_response: return faults == WheelFaults::as_recorded;
-    default: return rig::is_fault(reason);
+    case rig::FoundAgain::wheel_checks: return faults == WheelFaults::as_recorded;
   }
+  return true;
 }
 
 std::vector<RerunCycle> rerun_open_loop(const RecordedRun& run, const config::Settings& settings, WheelFaults faults) {

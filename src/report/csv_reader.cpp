@@ -12,6 +12,7 @@
 #include <limits>
 #include <utility>
 
+#include "abs_hil/rig/quantities.hpp"
 #include "report/input_error.hpp"
 #include "report/text.hpp"
 
@@ -42,25 +43,13 @@ std::string_view take_field(std::string_view& line, bool& more) {
 }  // namespace
 
 const std::vector<std::string>& contract_columns() {
-  static const std::vector<std::string> columns{"time_s",
-                                                "phase",
-                                                "omega1_rad_s",
-                                                "omega2_rad_s",
-                                                "omega1_est_rad_s",
-                                                "omega2_est_rad_s",
-                                                "slip",
-                                                "slip_est",
-                                                "slip_ref",
-                                                "brake_torque_Nm",
-                                                "brake_torque_ref_Nm",
-                                                "brake_torque_est_Nm",
-                                                "brake_pwm",
-                                                "motor_pwm",
-                                                "motor_enable",
-                                                "theta_N",
-                                                "theta_est_N",
-                                                "distance_m",
-                                                "slip_velocity_error_m_s"};
+  static const std::vector<std::string> columns = [] {
+    std::vector<std::string> names;
+    rig::for_each_quantity([&names](const auto& row) {
+      if (row.in_csv() && row.since == rig::first_version) names.emplace_back(row.name);
+    });
+    return names;
+  }();
   return columns;
 }
 

@@ -6,6 +6,7 @@
 
 #include "abs_hil/driver/rig_driver.hpp"
 #include "abs_hil/rig/cycle_record.hpp"
+#include "abs_hil/rig/option.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/command_gate.hpp"
 #include "runtime/cycle_logic.hpp"
@@ -19,8 +20,12 @@ using RecordRing = SpscRing<rig::CycleRecord>;
 
 /// What counts as late, and when it ends the run.
 struct OverrunOptions {
-  int startup_cycles{10};   ///< the first cycles of a run, which meet cold caches, are not counted or measured, >= 0
-  int max_consecutive{50};  ///< so many late cycles in a row latch a fault; 0: never
+  ABS_HIL_OPTIONS(OverrunOptions);
+  /// They meet cold caches.
+  ABS_HIL_OPTION(std::int32_t, startup_cycles, 10, .meaning = "first cycles of a run, not counted as late or measured",
+                 .range = rig::from_zero(100'000));
+  ABS_HIL_OPTION(std::int32_t, max_consecutive, 50, .key = "max_consecutive_overruns",
+                 .meaning = "late cycles in a row that are a fault; 0: never", .range = rig::from_zero(1'000'000));
 };
 
 /// read -> estimate -> sequence -> control -> gate -> write -> record, once a period on absolute ticks: the same code

@@ -3,22 +3,36 @@
 #include <array>
 #include <cstddef>
 
+#include "abs_hil/rig/option.hpp"
 #include "abs_hil/rig/phase.hpp"
 
 namespace abs_hil::runtime {
 
 /// Limits of what may reach the rig, whatever asks for it. docs/safety.md gives the reason of each default.
 struct GateOptions {
-  double motor_duty_max{1.0};     ///< in (0, 1]
-  double brake_duty_max{1.0};     ///< in (0, 1]; the maker's driver caps the real brake at 0.7
-  double overspeed_rad_s{250.0};  ///< either wheel above this latches a fault, > 0
-  double supply_min_V{0.0};       ///< a board that reports less latches a fault, >= 0; 0: never
-  /// A board that reports more latches a fault, deg C. Ours: the board's own limit is not public.
-  double temperature_max_C{90.0};
-  double motor_rate_per_s{2000.0};  ///< fastest rise of the drive's duty, 1/s, > 0; falling is never limited
-  double brake_rate_per_s{2000.0};  ///< fastest rise of the brake's duty, 1/s, > 0
-  double sample_age_max_s{0.02};    ///< so long without a fresh measurement latches a fault, > 0
-  double free_slip_max{0.15};       ///< share by which the wheels may differ while the brake is long released, > 0
+  ABS_HIL_OPTIONS(GateOptions);
+  ABS_HIL_OPTION(double, motor_duty_max, 1.0, .meaning = "largest drive PWM that may reach the rig",
+                 .range = rig::positive(1));
+  /// The maker's driver caps the real brake at 0.7.
+  ABS_HIL_OPTION(double, brake_duty_max, 1.0, .meaning = "largest brake PWM that may reach the rig",
+                 .range = rig::positive(1));
+  ABS_HIL_OPTION(double, overspeed_rad_s, 250.0, .unit = "rad/s", .meaning = "speed of either wheel that is a fault",
+                 .range = rig::positive(2000));
+  ABS_HIL_OPTION(double, supply_min_V, 0.0, .unit = "V",
+                 .meaning = "a board that reports a lower supply is a fault; 0: never", .range = rig::from_zero(100));
+  /// The default is ours: the board's own limit is not public.
+  ABS_HIL_OPTION(double, temperature_max_C, 90.0, .unit = "deg C", .meaning = "a board that reports more is a fault",
+                 .range = rig::positive(300));
+  /// Falling is never limited.
+  ABS_HIL_OPTION(double, motor_rate_per_s, 2000.0, .unit = "1/s", .meaning = "fastest rise of the drive PWM",
+                 .range = rig::positive(1e6));
+  ABS_HIL_OPTION(double, brake_rate_per_s, 2000.0, .unit = "1/s", .meaning = "fastest rise of the brake PWM",
+                 .range = rig::positive(1e6));
+  ABS_HIL_OPTION(double, sample_age_max_s, 0.02, .unit = "s",
+                 .meaning = "so long without a fresh measurement is a fault", .range = rig::between(0.002, 1));
+  ABS_HIL_OPTION(double, free_slip_max, 0.15,
+                 .meaning = "share by which the wheels may differ, brake long released, before it is a fault",
+                 .range = rig::between(0.02, 1));
 };
 
 /// What a phase's plan lets act.

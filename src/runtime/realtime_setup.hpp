@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
+#include "abs_hil/rig/option.hpp"
 #include "runtime/cyclic_executive.hpp"
 
 namespace abs_hil::runtime {
@@ -12,10 +14,13 @@ enum class RealtimeMode { require, prefer, off };
 
 /// Everything below `realtime.` in the configuration.
 struct RealtimeOptions {
+  ABS_HIL_OPTIONS(RealtimeOptions);
   RealtimeMode mode{RealtimeMode::prefer};
-  int priority{80};  ///< SCHED_FIFO, 1 ... 98: 99 belongs to the kernel's own threads
-  int cpu{-1};       ///< CPU that the cycle is bound to; -1: any
-  OverrunOptions overruns{};
+  /// 99 belongs to the kernel's own threads.
+  ABS_HIL_OPTION(std::int32_t, priority, 80, .meaning = "SCHED_FIFO priority", .range = rig::between(1, 98));
+  ABS_HIL_OPTION(std::int32_t, cpu, -1, .meaning = "CPU that the cycle is bound to; -1: any",
+                 .range = rig::between(-1, 1023));
+  ABS_HIL_GROUP(OverrunOptions, overruns, "", {});
 };
 
 /// One step of the set-up, as it was observed and not as it was asked for.

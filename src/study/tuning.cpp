@@ -8,6 +8,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "abs_hil/control/registry.hpp"
 #include "abs_hil/rig/brake_map.hpp"
 #include "config/key_table.hpp"
 #include "study/parallel.hpp"
@@ -28,15 +29,15 @@ double rounded(double value) {
   return result;
 }
 
-double value_at(const TunedKey& key, double coordinate) {
-  if (!key.logarithmic) return rounded(key.least + coordinate * (key.most - key.least));
-  return rounded(key.least * std::pow(key.most / key.least, coordinate));
+double value_at(const rig::SearchRange& search, double coordinate) {
+  if (!search.logarithmic) return rounded(search.least + coordinate * (search.most - search.least));
+  return rounded(search.least * std::pow(search.most / search.least, coordinate));
 }
 
-double coordinate_of(const TunedKey& key, double value) {
-  const double within = std::clamp(value, key.least, key.most);
-  return key.logarithmic ? std::log(within / key.least) / std::log(key.most / key.least)
-                         : (within - key.least) / (key.most - key.least);
+double coordinate_of(const rig::SearchRange& search, double value) {
+  const double within = std::clamp(value, search.least, search.most);
+  return search.logarithmic ? std::log(within / search.least) / std::log(search.most / search.least)
+                            : (within - search.least) / (search.most - search.least);
 }
 
 double& target_of(config::Settings& settings, std::string_view name) {
@@ -84,15 +85,15 @@ class Judge {
     });
   }
 
-  [[nodiscard]] std::span<const TunedKey> keys() const noexcept { return keys_; }
+  [[nodiscard]] const std::vector<TunedKey>& keys() const noexcept { return keys_; }
   [[nodiscard]] Point start() {
     Point point;
-    for (const TunedKey& key : keys_) point.push_back(coordinate_of(key, target_of(plants_.front(), key.name)));
+    for (const TunedKey& key : keys_) point.push_back(coordinate_of(key.search, target_of(plants_.front(), key.name)));
     return point;
   }
   [[nodiscard]] std::vector<double> values(const Point& point) const {
     std::vector<double> values;
-    for (std::size_t d = 0; d < keys_.size(); ++d) values.push_back(value_at(keys_[d], point[d]));
+    for (std::size_t d = 0; d < keys_.size(); ++d) values.push_back(value_at(keys_[d].search, point[d]));
     return values;
   }
   /// Costs of the candidates, in their order.
@@ -124,7 +125,7 @@ class Judge {
     }
   }
 
-  std::span<const TunedKey> keys_;
+  std::vector<TunedKey> keys_;
   bool follows_slip_;
   std::vector<config::Settings> plants_;
   std::size_t threads_;
@@ -154,6 +155,27 @@ Point trial(const std::vector<Point>& population, std::size_t i, std::size_t bes
 }
 
 }  // namespace
+
+std::vector<TunedKey> tuned_keys(std::string_view controller) {
+  config::Settings settings;
+  const config::KeyTable table(settings);
+  const std::string section = config::section_of(controller);
+  std::vector<TunedKey> tuned;
+  for (const config::Key& key : table.keys()) {
+    if (key.search.given() && key.name.starts_with(section)) tuned.push_back({key.name, key.search});
+  }
+  return tuned;
+}
+
+bool follows_slip_reference(std::string_view controller) noexcept { return controller != "five-phase"; }
+
+std::vector<std::string_view> tunable_controllers() {
+  std::vector<std::string_view> names;
+  for (const control::ControllerEntry& entry : control::controllers()) {
+    if (!tuned_keys(entry.name).empty()) names.push_back(entry.name);
+  }
+  return names;
+}
 
 double run_cost(const RunResult& run, bool follows_slip, double locked_distance_m, double max_torque_Nm) noexcept {
   const analysis::Metrics& m = run.metrics;
@@ -198,8 +220,8 @@ TuningResult tune(std::string_view controller, const TrainingSet& training, cons
 }
 
 std::string to_toml(std::string_view controller, const TuningResult& result, std::string_view comment) {
-  const std::span<const TunedKey> keys = tuned_keys(controller);
-  const std::string_view table = keys.front().name.substr(0, keys.front().name.rfind('.'));
+  const std::vector<TunedKey> keys = tuned_keys(controller);
+  const std::string table = keys.front().name.substr(0, keys.front().name.rfind('.'));
   std::string text = fmt::format("# {}\n", comment);
   text += fmt::format("# Mean cost {:.5f} after {} candidates.\n", result.cost, result.evaluations);
   text += fmt::format("description = \"Gains of {} found by abs_tune\"\n\n[{}]\n", controller, table);

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "abs_hil/rig/range.hpp"
 #include "config/settings.hpp"
 #include "study/simulated_run.hpp"
 #include "study/variation.hpp"
@@ -16,15 +17,13 @@ namespace abs_hil::study {
 
 /// A configuration key that the search may set, and its range.
 struct TunedKey {
-  std::string_view name;  ///< dotted, as for --set
-  double least{0.0};
-  double most{0.0};
-  bool logarithmic{true};  ///< searched on a logarithmic scale, for gains of unknown order of magnitude
+  std::string name;  ///< dotted, as for --set
+  rig::SearchRange search;
 };
 
-/// The keys that the search sets for a controller; empty if it has none. The speed observer is not included, because
-/// all controllers share it.
-[[nodiscard]] std::span<const TunedKey> tuned_keys(std::string_view controller) noexcept;
+/// The gains of a controller that the search sets: the options whose rows give a search range; empty if there are none.
+/// The speed observer is not included, because all controllers share it.
+[[nodiscard]] std::vector<TunedKey> tuned_keys(std::string_view controller);
 /// False for five-phase, which neither measures slip nor has a slip reference.
 [[nodiscard]] bool follows_slip_reference(std::string_view controller) noexcept;
 /// The controllers that have tuned keys.

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <type_traits>
 
-#include "telemetry/message_fields.hpp"
+#include "abs_hil/message_fields.hpp"
 
 namespace abs_hil::telemetry {
 

@@ -4,12 +4,15 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <type_traits>
 #include <utility>
 
+#include "abs_hil/rig/quantities.hpp"
 #include "telemetry/file_error.hpp"
 
 namespace abs_hil::telemetry {
@@ -18,48 +21,53 @@ namespace {
 constexpr std::size_t block_bytes = 65'536;
 constexpr std::string_view csv_kind = "CSV file";
 
-/// Appends to a row that is known to be large enough.
-class RowWriter {
- public:
-  explicit RowWriter(char (&out)[csv_row_max_bytes]) : begin_(out), at_(out), end_(out + csv_row_max_bytes) {}
+constexpr std::size_t header_size = [] {
+  std::size_t size = rig::csv_columns.size() - 1;
+  for (const std::string_view name : rig::csv_columns) size += name.size();
+  return size;
+}();
+constexpr auto header_text = [] {
+  std::array<char, header_size> text{};
+  auto at = text.begin();
+  for (const std::string_view name : rig::csv_columns) {
+    if (at != text.begin()) *at++ = ',';
+    at = std::copy(name.begin(), name.end(), at);
+  }
+  return text;
+}();
 
-  RowWriter& number(double value) {
-    if (std::isnan(value)) return text("NaN");  // to_chars would show the sign of a NaN
-    at_ = std::to_chars(at_, end_, value).ptr;
-    return *this;
-  }
-  RowWriter& text(std::string_view value) {
-    at_ = std::copy(value.begin(), value.end(), at_);
-    return *this;
-  }
-  RowWriter& next(double value) {
-    *at_++ = ',';
-    return number(value);
-  }
-  [[nodiscard]] std::size_t size() const { return static_cast<std::size_t>(at_ - begin_); }
+// The longest double is -1.2345678901234567e-308, the longest whole number has a sign and 19 digits.
+constexpr std::size_t longest_value = 24;
+static_assert(rig::csv_columns.size() * (longest_value + 1) <= csv_row_max_bytes, "the rows need more room");
 
- private:
-  char* begin_;
-  char* at_;
-  char* end_;
-};
+char* put_text(char* at, std::string_view text) noexcept { return std::copy(text.begin(), text.end(), at); }
+template <class Value>
+char* put(char* at, const Value& value) noexcept {
+  if constexpr (std::is_same_v<Value, rig::Phase>) {
+    return put_text(at, rig::name_of(value));
+  } else if constexpr (std::is_floating_point_v<Value>) {
+    if (std::isnan(value)) return put_text(at, "NaN");  // to_chars would show the sign of a NaN
+    return std::to_chars(at, at + longest_value, value).ptr;
+  } else {
+    return std::to_chars(at, at + longest_value, static_cast<std::int64_t>(value)).ptr;
+  }
+}
 
 }  // namespace
 
+constinit const std::string_view csv_header(header_text.data(), header_text.size());
+
 std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, char (&out)[csv_row_max_bytes]) noexcept {
-  const auto& truth = record.truth;
-  const auto& control = record.control;
-  RowWriter row(out);
-  row.number(record.time_s).text(",").text(rig::name_of(record.phase));
-  row.next(truth.speeds.omega1_rad_s).next(truth.speeds.omega2_rad_s);
-  row.next(control.speeds_est.omega1_rad_s).next(control.speeds_est.omega2_rad_s);
-  row.next(truth.slip).next(control.slip_est).next(control.slip_ref);
-  row.next(truth.brake_torque_Nm).next(control.brake_torque_ref_Nm).next(control.brake_torque_est_Nm);
-  row.next(record.command.brake_duty).next(record.command.motor_duty);
-  row.text(record.command.motor_enable ? ",1" : ",0");
-  row.next(truth.theta_N).next(control.theta_est_N).next(distance_m).next(control.slip_velocity_error_m_s);
-  row.text("\n");
-  return row.size();
+  constexpr std::int64_t no_message = 0;
+  const rig::CycleParts<const rig::CycleRecord> parts{record, distance_m, no_message};
+  char* at = out;
+  rig::for_each_quantity([&](const auto& row) {
+    if (!row.in_csv()) return;
+    if (at != out) *at++ = ',';
+    at = put(at, row.at(parts));
+  });
+  *at++ = '\n';
+  return static_cast<std::size_t>(at - out);
 }
 
 CsvSink::CsvSink(std::filesystem::path path, std::int64_t write_period_ns)

@@ -10,14 +10,12 @@
 
 namespace abs_hil::telemetry {
 
-/// The CSV's first line, without the line end. Names and order are a contract; columns may be added at the end.
-inline constexpr std::string_view csv_header =
-    "time_s,phase,omega1_rad_s,omega2_rad_s,omega1_est_rad_s,omega2_est_rad_s,slip,slip_est,slip_ref,brake_torque_Nm,"
-    "brake_torque_ref_Nm,brake_torque_est_Nm,brake_pwm,motor_pwm,motor_enable,theta_N,theta_est_N,distance_m,"
-    "slip_velocity_error_m_s";
+/// The CSV's first line, without the line end, made from rig/quantities.hpp. Names and order are a contract; columns
+/// may be added at the end.
+extern const std::string_view csv_header;
 
-/// Longest row: 17 doubles of at most 24 characters, their separators, the phase and the flag, with room to spare.
-inline constexpr std::size_t csv_row_max_bytes = 640;
+/// No row is longer.
+inline constexpr std::size_t csv_row_max_bytes = 1024;
 
 /// Writes a row with its line end to `out` and returns its length. Doubles are the shortest text that reads back
 /// bit-exactly; NaN is `NaN`. The same on every locale.

@@ -1,8 +1,15 @@
 #include "telemetry/message_codec.hpp"
 
+#include <algorithm>
 #include <bit>
+#include <cstddef>
 #include <limits>
+#include <tuple>
+#include <type_traits>
+#include <utility>
 
+#include "abs_hil/message_fields.hpp"
+#include "abs_hil/rig/quantities.hpp"
 #include "telemetry/checked_decode.hpp"
 
 namespace abs_hil::telemetry {
@@ -17,91 +24,98 @@ static_assert(telemetry_t::PHASE_HOLD == static_cast<int>(rig::Phase::hold));
 static_assert(telemetry_t::PHASE_STOPPED == static_cast<int>(rig::Phase::stopped));
 static_assert(telemetry_t::PHASE_FAULT == static_cast<int>(rig::Phase::fault));
 
+/// A name as a template argument, so that the compiler's message shows it.
+template <std::size_t size>
+struct Name {
+  constexpr explicit Name(std::string_view name) { std::copy(name.begin(), name.end(), text); }
+  char text[size]{};
+};
+
+constexpr std::size_t field_count = std::tuple_size_v<std::remove_const_t<decltype(fields<telemetry_t>)>>;
+
+/// Place of the field of that name in telemetry_t, field_count if it has none.
+constexpr std::size_t field_of(std::string_view name) {
+  return std::apply(
+      [name](const auto&... field) {
+        std::size_t n = 0;
+        static_cast<void>(((field.name == name || (++n, false)) || ...));
+        return n;
+      },
+      fields<telemetry_t>);
+}
+
+template <Name name, bool is_there>
+constexpr bool row_has_field() {
+  static_assert(is_there, "this row of rig/quantities.hpp goes to LCM, but telemetry_t.lcm has no field of its name");
+  return is_there;
+}
+template <Name name, bool is_there>
+constexpr bool field_has_row() {
+  static_assert(is_there, "this field of telemetry_t.lcm has no row for LCM in rig/quantities.hpp");
+  return is_there;
+}
+
+constexpr bool goes_to_lcm(std::string_view name) {
+  bool found = false;
+  rig::for_each_quantity([&](const auto& row) { found = found || (row.in_lcm() && row.name == name); });
+  return found;
+}
+
+template <std::size_t... n>
+constexpr bool every_field_has_row(std::index_sequence<n...>) {
+  constexpr auto& all = fields<telemetry_t>;
+  return (field_has_row<Name<std::get<n>(all).name.size() + 1>(std::get<n>(all).name),
+                        goes_to_lcm(std::get<n>(all).name)>() &&
+          ...);
+}
+static_assert(every_field_has_row(std::make_index_sequence<field_count>{}));
+
+template <std::size_t n, class Message, class Parts, class Use>
+void use_match(Message& message, const Parts& parts, const Use& use) {
+  constexpr auto& row = std::get<n>(rig::quantities);
+  if constexpr (row.in_lcm()) {
+    constexpr std::size_t place = field_of(row.name);
+    if constexpr (row_has_field<Name<row.name.size() + 1>(row.name), (place < field_count)>()) {
+      use(message.*std::get<place>(fields<telemetry_t>).member, row.at(parts));
+    }
+  }
+}
+
+/// Calls `use(field, value)` with each field of the message and the value of the cycle that has its name.
+template <class Message, class Parts, class Use>
+void for_each_match(Message& message, const Parts& parts, const Use& use) {
+  [&]<std::size_t... n>(std::index_sequence<n...>) {
+    (use_match<n>(message, parts, use), ...);
+  }(std::make_index_sequence<rig::quantity_count>{});
+}
+
+template <class Field, class Value>
+void read(const Field& field, Value& value) {
+  value = static_cast<Value>(field);
+}
+void read(const std::int8_t& field, bool& value) { value = field != 0; }
+/// A number that is no phase counts as a fault.
+void read(const std::int8_t& field, rig::Phase& value) {
+  value = field >= 0 && field <= telemetry_t::PHASE_FAULT ? static_cast<rig::Phase>(field) : rig::Phase::fault;
+}
+
 }  // namespace
 
 telemetry_t to_message(const rig::CycleRecord& record, double distance_m, std::int64_t sequence) noexcept {
-  telemetry_t m{};
-  m.stamp_ns = record.stamp_ns;
-  m.sequence = sequence;
-  m.cycle = std::bit_cast<std::int64_t>(record.sequence);
-  m.time_s = record.time_s;
-  m.phase = static_cast<std::int8_t>(record.phase);
-  m.reason = static_cast<std::int16_t>(record.reason);
-  m.reason_value = record.reason_value;
-
-  m.omega1_rad_s = record.truth.speeds.omega1_rad_s;
-  m.omega2_rad_s = record.truth.speeds.omega2_rad_s;
-  m.omega1_est_rad_s = record.control.speeds_est.omega1_rad_s;
-  m.omega2_est_rad_s = record.control.speeds_est.omega2_rad_s;
-  m.slip = record.truth.slip;
-  m.slip_est = record.control.slip_est;
-  m.slip_ref = record.control.slip_ref;
-  m.brake_torque_Nm = record.truth.brake_torque_Nm;
-  m.brake_torque_ref_Nm = record.control.brake_torque_ref_Nm;
-  m.brake_torque_est_Nm = record.control.brake_torque_est_Nm;
-  m.brake_pwm = record.command.brake_duty;
-  m.motor_pwm = record.command.motor_duty;
-  m.motor_enable = static_cast<std::int8_t>(record.command.motor_enable);
-  m.theta_N = record.truth.theta_N;
-  m.theta_est_N = record.control.theta_est_N;
-  m.distance_m = distance_m;
-  m.slip_velocity_error_m_s = record.control.slip_velocity_error_m_s;
-
-  m.upper_counts = record.measurement.upper_counts;
-  m.lower_counts = record.measurement.lower_counts;
-  m.supply_V = record.measurement.supply_V;
-  m.temperature_C = record.measurement.temperature_C;
-  m.trip_flags = record.measurement.trip_flags;
-
-  m.wakeup_latency_ns = record.timing.wakeup_latency_ns;
-  m.read_ns = record.timing.read_ns;
-  m.control_ns = record.timing.control_ns;
-  m.write_ns = record.timing.write_ns;
-  m.cycle_ns = record.timing.cycle_ns;
-  m.periods_skipped = record.timing.periods_skipped;
-  m.record_ns = record.timing.record_ns;
-  m.overrun_cause = static_cast<std::int8_t>(record.timing.overrun_cause);
-  return m;
+  telemetry_t message{};
+  for_each_match(message, rig::CycleParts<const rig::CycleRecord>{record, distance_m, sequence},
+                 [](auto& field, const auto& value) { field = static_cast<std::decay_t<decltype(field)>>(value); });
+  return message;
 }
 
-rig::CycleRecord to_record(const telemetry_t& m) noexcept {
-  rig::CycleRecord r;
-  r.sequence = std::bit_cast<std::uint64_t>(m.cycle);
-  r.stamp_ns = m.stamp_ns;
-  r.time_s = m.time_s;
-  r.phase = m.phase >= 0 && m.phase <= telemetry_t::PHASE_FAULT ? static_cast<rig::Phase>(m.phase) : rig::Phase::fault;
-  r.reason = static_cast<rig::Reason>(m.reason);
-  r.reason_value = m.reason_value;
-
-  r.truth = {.speeds = {m.omega1_rad_s, m.omega2_rad_s},
-             .slip = m.slip,
-             .brake_torque_Nm = m.brake_torque_Nm,
-             .theta_N = m.theta_N};
-  r.control = {.speeds_est = {m.omega1_est_rad_s, m.omega2_est_rad_s},
-               .slip_est = m.slip_est,
-               .slip_ref = m.slip_ref,
-               .slip_velocity_error_m_s = m.slip_velocity_error_m_s,
-               .brake_torque_ref_Nm = m.brake_torque_ref_Nm,
-               .brake_torque_est_Nm = m.brake_torque_est_Nm,
-               .theta_est_N = m.theta_est_N};
-  r.command = {.motor_duty = m.motor_pwm, .brake_duty = m.brake_pwm, .motor_enable = m.motor_enable != 0};
-
-  r.measurement.time_ns = m.stamp_ns;
-  r.measurement.upper_counts = m.upper_counts;
-  r.measurement.lower_counts = m.lower_counts;
-  r.measurement.supply_V = m.supply_V;
-  r.measurement.temperature_C = m.temperature_C;
-  r.measurement.trip_flags = static_cast<std::uint32_t>(m.trip_flags);
-
-  r.timing.wakeup_latency_ns = m.wakeup_latency_ns;
-  r.timing.read_ns = m.read_ns;
-  r.timing.control_ns = m.control_ns;
-  r.timing.write_ns = m.write_ns;
-  r.timing.cycle_ns = m.cycle_ns;
-  r.timing.record_ns = m.record_ns;
-  r.timing.periods_skipped = static_cast<std::uint32_t>(m.periods_skipped);
-  r.timing.overrun_cause = static_cast<rig::OverrunCause>(m.overrun_cause);
-  return r;
+rig::CycleRecord to_record(const telemetry_t& message) noexcept {
+  rig::CycleRecord record;
+  double distance_m = 0.0;
+  std::int64_t sequence = 0;
+  for_each_match(message, rig::CycleParts<rig::CycleRecord>{record, distance_m, sequence},
+                 [](const auto& field, auto& value) { read(field, value); });
+  record.measurement.time_ns = message.stamp_ns;
+  return record;
 }
 
 measurement_t measured_at(const rig::CycleRecord& record) noexcept {

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "abs_hil/adjustment_t.hpp"
 #include "telemetry/file_error.hpp"
 
 namespace abs_hil::telemetry {

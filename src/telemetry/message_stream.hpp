@@ -7,10 +7,11 @@
 #include <utility>
 #include <vector>
 
+#include "abs_hil/command_state_t.hpp"
+#include "abs_hil/experiment_t.hpp"
 #include "rig/record_sink.hpp"
 #include "telemetry/event_detector.hpp"
 #include "telemetry/message_codec.hpp"
-#include "telemetry/message_fields.hpp"
 #include "telemetry/outlet.hpp"
 #include "telemetry/status_snapshot.hpp"
 

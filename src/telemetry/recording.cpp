@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "abs_hil/rig/phase.hpp"
+#include "abs_hil/rig/quantities.hpp"
 #include "telemetry/checked_decode.hpp"
-#include "telemetry/csv_sink.hpp"
 #include "telemetry/csv_text.hpp"
 #include "telemetry/file_error.hpp"
 #include "telemetry/hexadecimal.hpp"
@@ -37,30 +37,33 @@ Fields split_header(std::string_view header) {
   return names;
 }
 
-/// The columns of --csv, in their order.
-const Fields& csv_columns() {
-  static const Fields columns = split_header(csv_header);
+/// Quantities of --csv that a log holds: they go first, in the order of --csv. Other messages have none.
+template <class Message>
+const Fields& first_columns() {
+  static const Fields columns = [] {
+    Fields names;
+    if constexpr (!std::same_as<Message, telemetry_t>) return names;
+    rig::for_each_quantity([&names](const auto& row) {
+      if (row.in_csv() && row.in_lcm()) names.emplace_back(row.name);
+    });
+    return names;
+  }();
   return columns;
 }
 
-/// Columns of --csv, which go first, by name; in other files none.
 template <class Message>
 bool goes_first(std::string_view name) {
-  if constexpr (!std::same_as<Message, telemetry_t>) return false;
-  return std::ranges::find(csv_columns(), name) != csv_columns().end();
-}
-
-/// The columns of --csv stand in another order than telemetry_t's fields.
-constexpr std::string_view first_columns(std::string_view type) {
-  return type == type_name<telemetry_t> ? csv_header : std::string_view{};
+  return std::ranges::find(first_columns<Message>(), name) != first_columns<Message>().end();
 }
 
 template <class Message>
 std::string header_of() {
-  std::string header(first_columns(type_name<Message>));
+  std::string header;
+  const auto put = [&header](std::string_view name) { header.append(header.empty() ? "" : ",").append(name); };
+  for (const std::string& name : first_columns<Message>()) put(name);
   Message message{};
-  visit_fields(message, [&header](std::string_view name, const auto&) {
-    if (!goes_first<Message>(name)) header.append(header.empty() ? "" : ",").append(name);
+  visit_fields(message, [&put](std::string_view name, const auto&) {
+    if (!goes_first<Message>(name)) put(name);
   });
   return header.append(",").append(envelope);
 }
@@ -83,7 +86,7 @@ std::string row_of(const Message& message, const LogEvent& event) {
       texts[name] = one.row();
     });
     texts["phase"] = rig::name_of(static_cast<rig::Phase>(message.phase));
-    for (const std::string& column : csv_columns()) row.text(texts[column]);
+    for (const std::string& column : first_columns<Message>()) row.text(texts[column]);
   }
   visit_fields(message, [&row](std::string_view name, const auto& value) {
     if (!goes_first<Message>(name)) row(name, value);

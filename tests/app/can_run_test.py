@@ -10,10 +10,10 @@ from emulator_process import EMULATOR
 SAFE = (0.0, 0.0)
 # fault that the node has from its first second on, words on stderr
 BROKEN = [
-    ('silent', 'CAN node did not answer too often'),
+    ('silent', 'CAN node missed too many answers'),
     ('stale=20', 'CAN node answers with old sequence numbers'),
     ('wrong-size=6', 'CAN frames have the wrong length'),
-    ('babble=10', "are not the node's (wrong check)"),
+    ('babble=10', "have a wrong check value"),
 ]
 # the first run's limit is below the speed that it accelerates to
 SERIES = '''

@@ -1,5 +1,6 @@
 """The outputs of a run: CSV, summary, event log, text on stdout."""
 import hashlib
+import json
 import math
 import unittest
 
@@ -110,6 +111,23 @@ class Outputs(ProgramTest):
         self.assertEqual(sorted(line.split()[0] for line in lines), sorted(names(config)))
         listed = {line.split()[0]: line.split()[1] for line in lines}
         self.assertEqual(listed['control.sliding_mode_smooth.boundary_m_s'], '2.29')
+
+    def test_quantities_are_listed_with_their_csv_columns(self):
+        rows = json.loads(self.run_program('list', '--quantities', '--json').stdout)
+        columns = sorted((row['csv_column'], row['name']) for row in rows if row['csv_column'])
+        self.assertEqual(','.join(name for _, name in columns), HEADER)
+        self.assertEqual([row['values'] for row in rows if row['name'] == 'phase'], [PHASES + ['fault']])
+        lines = self.run_program('list', '--quantities').stdout.splitlines()
+        self.assertEqual([line.split()[0] for line in lines[1:]], [row['name'] for row in rows])
+
+    def test_reasons_are_listed_with_number_kind_and_text(self):
+        rows = json.loads(self.run_program('list', '--reasons', '--json').stdout)
+        overspeed = next(row for row in rows if row['number'] == 65)
+        self.assertEqual(overspeed, {'number': 65, 'name': 'overspeed', 'kind': 'fault', 'found_again': 'yes',
+                                     'text': 'wheel speed above the limit'})
+        lines = self.run_program('list', '--reasons').stdout.splitlines()
+        self.assertEqual([int(line.split()[0]) for line in lines[1:]], [row['number'] for row in rows])
+        self.assertEqual(self.run_program('list', '--json').returncode, 2)
 
     def test_a_wrong_argument_points_to_the_help_of_its_command(self):
         for command, arguments in (('abs_hil', ['--bogus']), ('abs_hil list', ['list', '--bogus'])):

@@ -75,27 +75,63 @@ TEST_CASE("what is no number, not whole, not finite, not a flag or not a known n
   }
 }
 
-TEST_CASE("ends of ranges belong to them unless open") {
-  const Range half_open{0.0, 1.0, true, false};
-  CHECK_FALSE(half_open.contains(0.0));
-  CHECK(half_open.contains(1.0));
-  CHECK_FALSE(half_open.contains(std::numeric_limits<double>::quiet_NaN()));
-  CHECK(half_open.text() == "(0, 1]");
-}
-
-TEST_CASE("every default lies within its own range, every key has a meaning, no name stands twice") {
+TEST_CASE("every default lies within its own range, every key has a meaning, no two rows give the same key") {
   Fixture f;
   std::set<std::string_view> names;
   for (const Key& key : f.table.keys()) {
     INFO(key.name);
     CHECK(names.insert(key.name).second);
     CHECK_FALSE(key.meaning.empty());
-    if (const auto* number = std::get_if<double*>(&key.target)) CHECK(key.range.contains(**number));
-    if (const auto* whole = std::get_if<std::int32_t*>(&key.target)) CHECK(key.range.contains(**whole));
-    if (const auto* text = std::get_if<std::string*>(&key.target); text != nullptr && !key.allowed.empty()) {
-      CHECK(std::find(key.allowed.begin(), key.allowed.end(), **text) != key.allowed.end());
-    }
+    std::visit(
+        [&key](const auto* target) {
+          using Target = std::decay_t<decltype(*target)>;
+          if constexpr (std::is_same_v<Target, std::string>) {
+            CHECK(key.allowed.contains(*target));
+          } else if constexpr (!std::is_same_v<Target, bool>) {
+            CHECK(key.range.contains(static_cast<double>(*target)));
+          }
+        },
+        key.target);
   }
+}
+
+TEST_CASE("a search looks at numbers alone, and only within their own range") {
+  Fixture f;
+  int searched = 0;
+  for (const Key& key : f.table.keys()) {
+    if (!key.search.given()) continue;
+    INFO(key.name);
+    ++searched;
+    CHECK(std::holds_alternative<double*>(key.target));
+    CHECK(key.range.contains(key.search.least));
+    CHECK(key.range.contains(key.search.most));
+    if (key.search.logarithmic) CHECK(key.search.least > 0.0);
+  }
+  CHECK(searched > 0);
+}
+
+TEST_CASE("groups stand in the order that recorded configurations have") {
+  Fixture f;
+  const nlohmann::ordered_json json = f.table.to_json();
+  std::vector<std::string> tables, controllers;
+  for (const auto& item : json.items()) tables.push_back(item.key());
+  for (const auto& item : json["control"].items()) controllers.push_back(item.key());
+  CHECK(tables == std::vector<std::string>{"plant", "control", "experiment", "driver", "guardian", "commands", "gate",
+                                           "realtime", "telemetry", "run"});
+  CHECK(controllers == std::vector<std::string>{"controller", "rate_Hz", "slip_ref", "v_min_m_s", "adaptive", "nominal",
+                                                "observer", "sliding_mode", "sliding_mode_smooth", "super_twisting",
+                                                "relay", "pi", "five_phase", "adaptive_actuator", "adaptive_peak"});
+}
+
+TEST_CASE("what only has an effect where braking begins is marked as such") {
+  Fixture f;
+  std::set<std::string> marked;
+  for (const Key& key : f.table.keys()) {
+    if (key.start_value) marked.insert(key.name);
+  }
+  CHECK(marked == std::set<std::string>{"control.adaptive.zeta0", "control.adaptive_actuator.zeta0",
+                                        "control.sliding_mode.theta0_N", "control.sliding_mode_smooth.theta0_N",
+                                        "control.super_twisting.theta0_N"});
 }
 
 TEST_CASE("the names that scripts rely on exist") {

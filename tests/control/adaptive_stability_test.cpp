@@ -1,4 +1,4 @@
-// Theorem 3.1 in closed loop: the Lyapunov function, and the sign of (18).
+// Theorem 3.1 in closed loop: the Lyapunov function of the sampled-data controller.
 
 #include <algorithm>
 #include <cmath>
@@ -42,46 +42,6 @@ LyapunovRun lyapunov_run(const bench::Setup& s) {
   return result;
 }
 
-/// The adaptive controller put together from its parts, so that the sign of (18) can be chosen: ka1 < 0 is the
-/// printed one. AdaptiveController itself refuses that.
-class Assembled final : public control::SlipController {
- public:
-  explicit Assembled(const bench::Setup& s)
-      : setup_{s}, dynamics_{{s.options, s.rig}}, theta_{s.options.adaptive, s.rig.wheels} {
-    const auto& o = s.options.adaptive;
-    Eigen::Matrix2d Q;
-    Q << o.q11, o.q12, o.q12, o.q22;
-    weights_ = control::solve_lyapunov(control::error_dynamics_matrix(o.ks0, o.ks1), Q).row(1);
-  }
-  void reset(const control::SlipInput& in) noexcept override {
-    before_ = in;
-    theta_.reset();
-    integral_.reset(error(in), in.slip_ref);
-  }
-  control::SlipOutput step(const control::SlipInput& in) noexcept override {
-    integral_.advance(in.dt_s, error(in), in.slip_ref, setup_.rig.wheels.r2_m * in.speeds.omega2_rad_s);
-    const double phi = rig::normalised_tyre_force(setup_.rig.tyre, (before_.slip + in.slip) / 2);
-    theta_.update({in.dt_s, before_.speeds.omega1_rad_s, in.speeds.omega1_rad_s, in.mean_brake_torque_Nm, phi,
-                   rig::slip_velocity_gain(setup_.rig.wheels, in.slip_ref) *
-                       (weights_[0] * integral_.mean_value_m() + weights_[1] * integral_.mean_error_m_s())});
-    before_ = in;
-    const double torque = dynamics_.brake_torque_Nm(in, integral_.value_m(), error(in), theta_.theta_N(), phi);
-    integral_.note_request(torque, in.max_brake_torque_Nm);
-    return {torque, error(in), theta_.theta_N()};
-  }
-
- private:
-  double error(const control::SlipInput& in) const {
-    return bench::e_v(setup_.rig.wheels, in.speeds.omega1_rad_s, in.speeds.omega2_rad_s, in.slip_ref);
-  }
-  const bench::Setup& setup_;
-  control::SlipErrorDynamics dynamics_;
-  control::SlipErrorIntegral integral_;
-  control::ThetaEstimator theta_;
-  Eigen::RowVector2d weights_;
-  control::SlipInput before_;
-};
-
 }  // namespace
 
 TEST_CASE("V never grows and its derivative is -x'Qx - ka1 phi theta~^2") {
@@ -114,40 +74,5 @@ TEST_CASE("V never grows and its derivative is -x'Qx - ka1 phi theta~^2") {
       const double rate = (run.V[n + 1] - run.V[n - 1]) / 2 * s.options.rate_Hz;
       REQUIRE_THAT(rate, WithinAbs(run.V_rate_expected[n], 0.005 * steepest));
     }
-  }
-}
-
-TEST_CASE("In closed loop the plus sign converges and the printed sign of (18) diverges") {
-  const auto theta_error_N = [](double ka1, double at_s) {
-    bench::Setup s;
-    s.options.adaptive.ka1 = ka1;
-    s.options.adaptive.theta_min_N = -1e6;
-    s.options.adaptive.theta_max_N = 1e6;
-    s.options.adaptive.zeta0 = 0.98 * s.rig.tyre.theta_N;
-    s.max_time_s = at_s;
-    Assembled controller{s};
-    const auto run = bench::brake(s, controller);
-    double worst = 0.0;
-    for (const auto& tick : run.ticks) {
-      const double error = std::abs(s.rig.tyre.theta_N - tick.output.theta_est_N);
-      if (tick.t > 0.7 * at_s) worst = std::max(worst, error);
-    }
-    return worst;
-  };
-  const double at_start = 0.02 * 23.0;
-  CHECK(theta_error_N(1.0, 0.4) < 0.1 * at_start);
-  CHECK(theta_error_N(-1.0, 0.4) > 20.0 * at_start);
-  CHECK(theta_error_N(-1.0, 0.4) > 3.0 * theta_error_N(-1.0, 0.25));
-}
-
-TEST_CASE("What the last test assembles is the adaptive controller") {
-  bench::Setup s;
-  s.ideal_actuator = false;
-  s.encoders = true;
-  Assembled assembled{s};
-  const auto ours = bench::brake(s, assembled), theirs = bench::brake(s, "adaptive");
-  REQUIRE(ours.ticks.size() == theirs.ticks.size());
-  for (std::size_t n = 0; n < ours.ticks.size(); ++n) {
-    REQUIRE_THAT(ours.ticks[n].output.brake_torque_Nm, WithinAbs(theirs.ticks[n].output.brake_torque_Nm, 1e-9));
   }
 }

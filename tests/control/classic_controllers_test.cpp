@@ -4,8 +4,8 @@
 #include <random>
 
 #include "catch.hpp"
+#include "control/baseline_bench.hpp"
 #include "control/pi_controller.hpp"
-#include "control/rival_bench.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;
@@ -45,8 +45,8 @@ TEST_CASE("The torque fed forward keeps e_v as it is on the plant that it was me
   const auto& w = rig.wheels;
   for (int i = 0; i < 100; ++i) {
     const double slip_ref = 0.05 + 0.3 * unit(random), theta = 10 + 60 * unit(random);
-    auto in = rival::input_at(rig, 30 + 140 * unit(random), 2 * unit(random) - 1.5, 0.0, slip_ref);
-    const double force = theta * rival::phi(rig, std::abs(in.slip));
+    auto in = baseline::input_at(rig, 30 + 140 * unit(random), 2 * unit(random) - 1.5, 0.0, slip_ref);
+    const double force = theta * baseline::phi(rig, std::abs(in.slip));
     in.alpha2_rad_s2 = (-w.r2_m * force - w.d2_Nms_rad * in.speeds.omega2_rad_s - w.M20_Nm) / w.J2_kg_m2;
     const double torque = control::measured_equivalent_torque_Nm(w, in);
     const double alpha1 = (w.r1_m * force - w.d1_Nms_rad * in.speeds.omega1_rad_s - w.M10_Nm - torque) / w.J1_kg_m2;
@@ -54,7 +54,7 @@ TEST_CASE("The torque fed forward keeps e_v as it is on the plant that it was me
     // A lower wheel that its friction alone does not account for is not taken for a pulling tyre.
     in.alpha2_rad_s2 = 50.0;
     CHECK_THAT(control::measured_equivalent_torque_Nm(w, in),
-               WithinAbs(w.J1_kg_m2 / w.r1_m * rival::drift(rig, in.speeds, slip_ref), 1e-12));
+               WithinAbs(w.J1_kg_m2 / w.r1_m * baseline::drift(rig, in.speeds, slip_ref), 1e-12));
   }
 }
 
@@ -71,7 +71,7 @@ TEST_CASE("PI is the discrete formula, on slip with gains that follow the car's 
   double sum = 0.0, before = 0.0;
   for (int n = 0; n < 200; ++n) {
     const double omega2 = 160.0 - 20.0 * n * h, error = -0.6 + 0.5 * std::sin(3.0 * n);
-    auto in = rival::input_at(rig, omega2, error, n == 0 ? 0.0 : h);
+    auto in = baseline::input_at(rig, omega2, error, n == 0 ? 0.0 : h);
     in.alpha2_rad_s2 = -80.0;
     if (n == 0) pi->reset(in);
     const double v = w.r2_m * omega2;
@@ -89,13 +89,13 @@ TEST_CASE("PI does not wind up while the actuator is at its limit") {
   options.pi = {.kp_per_s = 20.0, .ki_per_s2 = 200.0, .feed_forward = 0.0};
   const rig::RigParameters rig;
   const auto pi = control::make_controller("pi", {options, rig});
-  auto in = rival::input_at(rig, 150.0, -2.0, 0.0);
+  auto in = baseline::input_at(rig, 150.0, -2.0, 0.0);
   in.max_brake_torque_Nm = 1.5;
   pi->reset(in);
   REQUIRE(pi->step(in).brake_torque_Nm > 1.5);
   in.dt_s = 1e-3;
   for (int n = 0; n < 2000; ++n) (void)pi->step(in);  // 2 s at the limit: an integral would have grown to -4 m
-  in = rival::input_at(rig, 150.0, 0.0, 1e-3);
+  in = baseline::input_at(rig, 150.0, 0.0, 1e-3);
   in.max_brake_torque_Nm = 1.5;
   // What is left is the trapezoid of the two cycles around the limit, not 2 s of error.
   CHECK(std::abs(pi->step(in).brake_torque_Nm) < 0.1);

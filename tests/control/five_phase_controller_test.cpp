@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "catch.hpp"
-#include "control/rival_bench.hpp"
+#include "control/baseline_bench.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "catch.hpp"
-#include "control/rival_bench.hpp"
+#include "control/baseline_bench.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;
@@ -41,14 +41,14 @@ TEST_CASE("For vanishing periods the sliding-mode torque is the law as written")
     auto s = setup(2 + 20 * unit(random), 0.0, 10 + 40 * unit(random), 1e7);
     const auto controller = control::make_controller("sliding-mode", {s.options, s.rig});
     const double error = 4 * unit(random) - 3;
-    const auto in = rival::input_at(s.rig, 40 + 130 * unit(random), error, 0.0);
+    const auto in = baseline::input_at(s.rig, 40 + 130 * unit(random), error, 0.0);
     controller->reset(in);
     const auto out = controller->step(in);
     const double sign = error > 0 ? 1.0 : -1.0;
     const double written =
         s.rig.wheels.J1_kg_m2 / s.rig.wheels.r1_m *
-        (rival::gain(s.rig, 0.15) * s.options.sliding_mode.adaptation.theta0_N * rival::phi(s.rig, in.slip) +
-         rival::drift(s.rig, in.speeds, 0.15) - s.options.sliding_mode.gain_m_s2 * sign);
+        (baseline::gain(s.rig, 0.15) * s.options.sliding_mode.adaptation.theta0_N * baseline::phi(s.rig, in.slip) +
+         baseline::drift(s.rig, in.speeds, 0.15) - s.options.sliding_mode.gain_m_s2 * sign);
     CHECK_THAT(out.brake_torque_Nm, WithinAbs(written, 1e-4));
     CHECK_THAT(out.slip_velocity_error_m_s, WithinAbs(error, 1e-12));
     CHECK(out.theta_est_N == s.options.sliding_mode.adaptation.theta0_N);
@@ -61,7 +61,7 @@ TEST_CASE("Sliding mode reaches e_v = 0 within |e_v(0)|/eta when K exceeds the m
   const double rate_Hz = GENERATE(100.0, 1000.0, 10'000.0);
   const double K = 12.0;
   auto s = setup(K, 0.0, 23.0 - mismatch, rate_Hz);
-  const double bound = rival::gain(s.rig, 0.15) * std::abs(mismatch);
+  const double bound = baseline::gain(s.rig, 0.15) * std::abs(mismatch);
   const double eta = K - bound;
   REQUIRE(eta > 0.0);
   const auto run = bench::brake(s, "sliding-mode");
@@ -104,7 +104,7 @@ TEST_CASE("With adaptation V = |e_v| + theta_tilde^2/(2 gamma) falls by eta or m
     if (std::abs(run.ticks[n].output.slip_velocity_error_m_s) > 10 * K * h) sliding = n + 1;
   }
   REQUIRE(run.ticks[sliding].t < 0.9);
-  const double k_phi = rival::gain(s.rig, 0.15) * rival::phi(s.rig, 0.15);
+  const double k_phi = baseline::gain(s.rig, 0.15) * baseline::phi(s.rig, 0.15);
   const double rate = gamma * k_phi * k_phi / K;
   const auto later = sliding + static_cast<std::size_t>(std::lround(1.0 / (rate * h)));
   const double tilde1 = 23.0 - run.ticks[sliding].output.theta_est_N;
@@ -115,7 +115,7 @@ TEST_CASE("theta_hat stands while the torque asked for is beyond the actuator an
   auto s = setup(10.0, 100.0, 20.0);
   const auto controller = control::make_controller("sliding-mode", {s.options, s.rig});
   const auto after = [&](double error, double max_torque) {
-    auto in = rival::input_at(s.rig, 150.0, error, 0.0);
+    auto in = baseline::input_at(s.rig, 150.0, error, 0.0);
     in.max_brake_torque_Nm = max_torque;
     controller->reset(in);
     double theta = 0.0;
@@ -144,7 +144,7 @@ TEST_CASE("The boundary layer's motion solves e' = -K sat(e/width) exactly") {
       auto& w = s.rig.wheels;
       w.d1_Nms_rad = w.d2_Nms_rad = w.M10_Nm = w.M20_Nm = 0.0;
       const auto controller = control::make_controller("sliding-mode-smooth", {s.options, s.rig});
-      const auto in = rival::input_at(s.rig, 170.0, error0, 0.0);
+      const auto in = baseline::input_at(s.rig, 170.0, error0, 0.0);
       controller->reset(in);
       const double rate = controller->step(in).brake_torque_Nm * w.r1_m / w.J1_kg_m2;
       CAPTURE(width, error0);

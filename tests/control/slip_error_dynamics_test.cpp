@@ -43,9 +43,9 @@ TEST_CASE("The sampled-data law tends to the printed one as the period goes to 0
     for (const double rate_Hz : {1e4, 1e5, 1e6}) {
       options.rate_Hz = rate_Hz;
       const control::SlipErrorDynamics dynamics{{options, rig}};
-      last_gap = std::abs(
-          dynamics.brake_torque_Nm(in, integral, error, theta, std::sin(rig.tyre.C * std::atan(rig.tyre.B * in.slip))) -
-          printed);
+      last_gap = std::abs(dynamics.feedback_linearising_torque_Nm(
+                              in, integral, error, theta, std::sin(rig.tyre.C * std::atan(rig.tyre.B * in.slip))) -
+                          printed);
       CHECK(last_gap < 2000.0 / rate_Hz);
     }
     CHECK(last_gap < 2e-3);
@@ -75,7 +75,7 @@ TEST_CASE("At 100 Hz the wanted rate is the mean over the period, for real and f
       e += h / 6 * (b1 + 2 * b2 + 2 * b3 + b4);
     }
     const control::SlipInput in{.speeds = {140.0, 170.0}, .slip = 0.1, .slip_ref = 0.15};
-    const double torque = dynamics.brake_torque_Nm(in, integral, error, 0.0, 0.5);
+    const double torque = dynamics.feedback_linearising_torque_Nm(in, integral, error, 0.0, 0.5);
     CHECK_THAT(torque, WithinRel(rig.wheels.J1_kg_m2 / rig.wheels.r1_m * (e - error) / 0.01, 1e-9));
   }
 }

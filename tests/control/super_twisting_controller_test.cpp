@@ -5,7 +5,7 @@
 #include <random>
 
 #include "catch.hpp"
-#include "control/rival_bench.hpp"
+#include "control/baseline_bench.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;
@@ -156,7 +156,7 @@ TEST_CASE("The integral of the sign stands while it would drive the torque furth
   bench::Setup s;
   s.options.super_twisting = {.k1 = 5.0, .k2 = 50.0, .adaptation = {.gamma = 0.0, .theta0_N = 20.0}};
   const auto controller = control::make_controller("super-twisting", {s.options, s.rig});
-  auto in = rival::input_at(s.rig, 150.0, -1.0, 0.0);
+  auto in = baseline::input_at(s.rig, 150.0, -1.0, 0.0);
   in.max_brake_torque_Nm = 1.0;
   controller->reset(in);
   const double first = controller->step(in).brake_torque_Nm;

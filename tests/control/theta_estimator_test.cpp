@@ -4,11 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "abs_hil/control/paper_laws.hpp"
 #include "catch.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
+namespace paper = control::paper;
 
 namespace {
 
@@ -33,39 +35,67 @@ control::AdaptationInterval balanced(double dt_s, double theta_N, double phi) {
 
 }  // namespace
 
-TEST_CASE("It is the estimator (17)-(18): zeta and omega1_hat integrated as they stand give the same estimate") {
+TEST_CASE(
+    "It is the estimator (17)-(18): zeta, omega1_hat and theta_hat are those of the equations integrated finely") {
   auto options = unbounded();
   options.zeta0 = 3.0;
   control::ThetaEstimator estimator{options, wheels};
-  const double g = options.gamma * options.ka1 * wheels.J1_kg_m2 / wheels.r1_m;
+  const paper::Gains<double> gains{.gamma = options.gamma, .ka1 = options.ka1};
+  const auto laws = paper::laws(wheels);
   const double h = 2e-3;
-  double omega1 = 160.0, zeta = options.zeta0, omega1_hat = omega1;
+  double omega1 = 160.0;
+  paper::AdaptiveState<double> x{.omega1_hat = omega1, .zeta = options.zeta0};
   for (int n = 0; n < 300; ++n) {
-    const double t = n * h, phi = 0.6 + 0.4 * std::sin(9 * t), torque = 4 + 3 * std::cos(17 * t);
-    const double slope = -60 + 30 * std::sin(5 * t), weighted = 0.3 * std::cos(11 * t);
+    const double t = n * h, torque = 4 + 3 * std::cos(17 * t), slope = -60 + 30 * std::sin(5 * t);
+    const double BtP_x = 0.3 * std::cos(11 * t);
+    paper::Reading<double> y{.omega1 = omega1, .lambda_ref = 0.15, .phi = 0.6 + 0.4 * std::sin(9 * t)};
+    const double zeta_rate = laws.zeta_dot(gains, y, BtP_x);
     estimator.update({.dt_s = h,
                       .omega1_before_rad_s = omega1,
                       .omega1_after_rad_s = omega1 + slope * h,
                       .brake_torque_Nm = torque,
-                      .phi = phi,
-                      .weighted_error = weighted});
+                      .phi = y.phi,
+                      .zeta_rate_N_s = zeta_rate});
     const int fine = 200;
-    for (int i = 0; i < fine; ++i) {  // midpoint rule on the printed equations, plus sign
-      const double s = h / fine;
-      const auto observer_rate = [&](double w1, double w1_hat, double z) {
-        const double theta_hat = z + g * (w1 - w1_hat);
-        return wheels.r1_m / wheels.J1_kg_m2 * theta_hat * phi -
-               (wheels.d1_Nms_rad * w1 + wheels.M10_Nm + torque) / wheels.J1_kg_m2;
-      };
-      const double zeta_rate = -options.gamma * phi * weighted;
-      const double half = omega1_hat + s / 2 * observer_rate(omega1, omega1_hat, zeta);
-      omega1_hat += s * observer_rate(omega1 + slope * s / 2, half, zeta + zeta_rate * s / 2);
-      omega1 += slope * s;
-      zeta += zeta_rate * s;
+    const double step = h / fine;
+    for (int i = 0; i < fine; ++i) {  // midpoint rule on (17)
+      y.omega1 = omega1;
+      const auto half = x.omega1_hat + step / 2 * laws.omega1_hat_dot(y, laws.theta_hat(gains, x, omega1), torque);
+      y.omega1 = omega1 + slope * step / 2;
+      const paper::AdaptiveState<double> mid{.omega1_hat = half, .zeta = x.zeta + zeta_rate * step / 2};
+      x.omega1_hat += step * laws.omega1_hat_dot(y, laws.theta_hat(gains, mid, y.omega1), torque);
+      x.zeta += zeta_rate * step;
+      omega1 += slope * step;
     }
-    const double theta_hat = zeta + g * (omega1 - omega1_hat);
+    const double theta_hat = laws.theta_hat(gains, x, omega1);
     REQUIRE_THAT(estimator.theta_N(), WithinAbs(theta_hat, 2e-3 * (1 + std::abs(theta_hat))));
+    REQUIRE_THAT(estimator.zeta_N(), WithinAbs(x.zeta, 1e-9 * (1 + std::abs(x.zeta))));
+    REQUIRE_THAT(estimator.omega1_hat_rad_s(omega1), WithinAbs(x.omega1_hat, 2e-3));
   }
+}
+
+TEST_CASE("omega1_hat gives way when the estimate is frozen or projected: (18) holds all the time") {
+  control::AdaptiveOptions options;
+  options.zeta0 = 10.0;
+  options.theta_max_N = 20.0;
+  control::ThetaEstimator estimator{options, wheels};
+  CHECK(estimator.zeta_N() == 10.0);
+  CHECK(estimator.omega1_hat_rad_s(100.0) == 100.0);
+  const paper::Gains<double> gains{.gamma = options.gamma, .ka1 = options.ka1};
+  for (const double phi : {0.8, -0.2, 0.8, 1.0}) {
+    for (int n = 0; n < 100; ++n) {
+      auto past = balanced(1e-3, 60.0, phi);
+      past.zeta_rate_N_s = -3.0;
+      estimator.update(past);
+      const paper::AdaptiveState<double> x{.omega1_hat = estimator.omega1_hat_rad_s(100.0), .zeta = estimator.zeta_N()};
+      REQUIRE_THAT(paper::laws(wheels).theta_hat(gains, x, 100.0), WithinAbs(estimator.theta_N(), 1e-9));
+    }
+  }
+  CHECK(estimator.theta_N() == 20.0);
+  CHECK_THAT(estimator.zeta_N(), WithinAbs(10.0 - 3.0 * 0.3, 1e-9));  // it stands while phi <= 0
+  estimator.reset();
+  CHECK(estimator.zeta_N() == 10.0);
+  CHECK(estimator.omega1_hat_rad_s(100.0) == 100.0);
 }
 
 TEST_CASE("The plus sign converges at the rate gamma ka1 phi, the sign printed in (18) diverges at it") {
@@ -112,7 +142,7 @@ TEST_CASE("Adaptation is frozen for phi <= 0, without a jump before or after") {
                         .omega1_after_rad_s = 105.0 + 5.0 * n,
                         .brake_torque_Nm = 2.0,
                         .phi = phi,
-                        .weighted_error = 3.0});
+                        .zeta_rate_N_s = 50.0});
       CHECK(estimator.theta_N() == before);
     }
   }

@@ -4,8 +4,8 @@
 #include <memory>
 #include <span>
 
-#include "abs_hil/driver/plausibility.hpp"
 #include "driver/pci/pci_driver.hpp"
+#include "driver/plausibility.hpp"
 #include "fuzz_input.hpp"
 
 namespace {

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "abs_hil/driver/plausibility.hpp"
+#include "driver/plausibility.hpp"
 #include "driver/usb/usb_driver.hpp"
 #include "fuzz_input.hpp"
 

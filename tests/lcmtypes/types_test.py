@@ -101,5 +101,27 @@ class Decode(unittest.TestCase):
             self.assertEqual(getattr(abs_hil.telemetry_t, f'PHASE_{name.upper()}'), number)
 
 
+class Tables(unittest.TestCase):
+    def test_quantities_are_the_fields_of_telemetry(self):
+        in_lcm = [name for name, row in abs_hil.QUANTITIES.items() if row['lcm']]
+        self.assertEqual(in_lcm, abs_hil.telemetry_t.__slots__)
+
+    def test_csv_columns_are_numbered_in_order(self):
+        columns = [row['csv_column'] for row in abs_hil.QUANTITIES.values() if row['csv_column']]
+        self.assertEqual(columns, list(range(1, len(columns) + 1)))
+        self.assertEqual(abs_hil.QUANTITIES['time_s']['csv_column'], 1)
+
+    def test_units_are_those_in_the_names(self):
+        for name, row in abs_hil.QUANTITIES.items():
+            suffix = next((s for s in sorted(UNIT_IN_NAME, key=len, reverse=True) if name.endswith(s)), None)
+            with self.subTest(name):
+                self.assertIn(UNIT_IN_NAME[suffix] if suffix else '', row['unit'])
+
+    def test_reasons_have_number_kind_and_text(self):
+        self.assertEqual(abs_hil.REASONS[34]['name'], 'stop_command')
+        self.assertEqual(abs_hil.REASONS[65]['kind'], 'fault')
+        self.assertTrue(all(row['text'] for row in abs_hil.REASONS.values()))
+
+
 if __name__ == '__main__':
     unittest.main()

@@ -120,5 +120,5 @@ TEST_CASE("A lever that friction would wedge and an unknown load are refused") {
   options.load = "constant";
   CHECK_NOTHROW(Plant(options));
   options.load = "spring";
-  CHECK_THROWS_WITH(Plant(options), Contains("plant.load = \"spring\": give constant or lever"));
+  CHECK_THROWS_WITH(Plant(options), Contains("plant.load = \"spring\" is not valid; give one of constant, lever"));
 }

@@ -90,5 +90,6 @@ TEST_CASE("A curve that is nowhere positive and an unknown tyre are refused") {
   CHECK_THROWS_WITH(Plant(options), Contains("plant.mu_w4 = -1") && Contains("nowhere positive"));
   options = {};
   options.tyre = "pacejka";
-  CHECK_THROWS_WITH(Plant(options), Contains("plant.tyre = \"pacejka\": give magic-formula or inteco-mu"));
+  CHECK_THROWS_WITH(Plant(options),
+                    Contains("plant.tyre = \"pacejka\" is not valid; give one of magic-formula, inteco-mu"));
 }

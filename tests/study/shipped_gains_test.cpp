@@ -1,5 +1,4 @@
-// The baselines ship with the gains that the search found (docs/comparison.md), the paper's controller with the
-// paper's.
+// The baselines ship with the gains that the search found (docs/comparison.md), the adaptive law with the paper's.
 
 #include <variant>
 
@@ -44,7 +43,7 @@ TEST_CASE("the recorded gains lie in the ranges searched") {
         if (key.name != tuned.name) continue;
         INFO(tuned.name);
         const double value = *std::get<double*>(key.target);
-        CHECK((value >= tuned.least && value <= tuned.most));
+        CHECK((value >= tuned.search.least && value <= tuned.search.most));
       }
     }
   }

@@ -59,6 +59,8 @@ void check_fields(const rig::CycleRecord& r, double distance_m) {
   CHECK(m.write_ns == r.timing.write_ns);
   CHECK(m.cycle_ns == r.timing.cycle_ns);
   CHECK(m.periods_skipped == static_cast<std::int64_t>(r.timing.periods_skipped));
+  CHECK(m.record_ns == r.timing.record_ns);
+  CHECK(m.overrun_cause == static_cast<int>(r.timing.overrun_cause));
 }
 
 TEST_CASE("every field of a record arrives") {

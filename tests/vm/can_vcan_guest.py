@@ -121,7 +121,7 @@ class Faults(Vcan):
         node = self.node()
         program = self.braking(node)
         node.process.kill()
-        errors = self.check_ended(program, 'CAN node did not answer too often')
+        errors = self.check_ended(program, 'CAN node missed too many answers')
         self.assertIn('watchdog should have zeroed them', errors)
 
     def test_node_replaced_by_one_with_stale_sequences(self):
@@ -162,14 +162,14 @@ class Faults(Vcan):
         node = self.node()
         program = self.braking(node)
         self.babbler([0x90, 0x91, 0x92, 0x93])
-        self.check_ended(program, "CAN frames with the node's identifiers are not the node's")
+        self.check_ended(program, "CAN frames with the node's identifiers have a wrong check value")
         self.check_zero_in_time(node)
 
     def test_third_node_forges_commands(self):
         node = self.node()
         program = self.braking(node)
         self.babbler([0x81])
-        self.check_ended(program, 'CAN node has cut its outputs by itself')
+        self.check_ended(program, 'CAN node switched its outputs off by itself')
         self.assertIn('too many commands rejected', self.check_zero_in_time(node))
 
     def test_interface_down_and_unknown_at_start(self):

@@ -24,15 +24,15 @@ UNSAFE_WORDS = 'the safe state may not have reached the board'
 
 # name, command in mid-braking, words on stderr, what is on the wire afterwards, whether the safe state is known
 BROKEN = [
-    ('unplugged', 'unplug', 'USB board unplugged: its outputs hold, press the E-stop', 'held', False),
+    ('unplugged', 'unplug', 'USB board unplugged: its outputs keep their last values, press the E-stop', 'held', False),
     ('STALL of IN', 'fault stall in', 'USB board refused a transfer (STALL)', 'safe', False),
     ('STALL of IN, clearable', 'fault stall in once', 'USB board refused a transfer (STALL)', 'safe', True),
     ('STALL of OUT', 'fault stall out', 'USB board refused a transfer (STALL)', 'held', False),
     ('STALL of OUT, clearable', 'fault stall out once', 'USB board refused a transfer (STALL)', 'safe', True),
     ('short frame', 'fault length 100', 'USB board sent a frame of the wrong length', 'safe', False),
     ('long frame', 'fault length 512', 'USB board sent a frame of the wrong length', 'safe', False),
-    ('no answer', 'fault silent', 'USB board did not answer in time too often', 'safe', False),
-    ('garbage', 'fault garbage', 'USB board sent what is none of its frames', 'safe', False),
+    ('no answer', 'fault silent', 'USB board missed too many answers', 'safe', False),
+    ('garbage', 'fault garbage', 'USB board sent data that is not one of its frames', 'safe', False),
     ('brake not taken', 'break-brake on', 'USB board does not show the duties that were sent', 'brake off by one', False),
 ]
 
@@ -179,7 +179,7 @@ class RealTime(UsbTest):
                 result, s = self.run_at(rate)
                 self.assertIn((result.returncode, s['result']), ((0, 'completed'), (1, 'fault')), result.stderr)
                 if s['result'] == 'fault':
-                    self.assertRegex(s['reason'], 'did not answer in time too often|consecutive overruns')
+                    self.assertRegex(s['reason'], 'missed too many answers|consecutive overruns')
 
 
 if __name__ == '__main__':

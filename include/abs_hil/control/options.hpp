@@ -1,96 +1,147 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
+#include <string_view>
 
+#include "abs_hil/control/baseline_options.hpp"
 #include "abs_hil/control/rival_options.hpp"
+#include "abs_hil/rig/option.hpp"
 
 namespace abs_hil::control {
 
 /// Gains of the slip velocity error's dynamics e_v'' + ks1 e_v' + ks0 e_v = 0 and of the adaptation (17)-(18); Table 1.
 /// Q and ka1 are not given in the paper: Q = I and ka1 = 1 by default.
 struct AdaptiveOptions {
-  double gamma{21.0};  ///< adaptation gain, > 0
-  double ks0{19.0};    ///< integral gain, 1/s^2, > 0
-  double ks1{32.0};    ///< proportional gain, 1/s, > 0
-  double ka1{1.0};     ///< weight of the observer's innovation in the adaptation, > 0
-  double zeta0{0.0};   ///< zeta(0), N: the first estimate of theta
-  double q11{1.0};     ///< Q of PA + A'P = -2Q, symmetric and positive definite
-  double q12{0.0};
-  double q22{1.0};
-  double theta_min_N{0.0};  ///< the estimate is projected onto [theta_min_N, theta_max_N]
-  double theta_max_N{100.0};
+  ABS_HIL_OPTIONS(AdaptiveOptions);
+  ABS_HIL_OPTION(double, gamma, 21.0, .unit = "kg^2/s^2", .meaning = "adaptation gain of (17)",
+                 .range = rig::positive(1e4), .search = rig::search(1, 1000));
+  ABS_HIL_OPTION(double, ks0, 19.0, .unit = "1/s^2", .meaning = "integral gain of (16), (18)",
+                 .range = rig::positive(1e6), .search = rig::search(1, 500));
+  ABS_HIL_OPTION(double, ks1, 32.0, .unit = "1/s", .meaning = "proportional gain of (16), (18)",
+                 .range = rig::positive(1e4), .search = rig::search(4, 200));
+  ABS_HIL_OPTION(double, ka1, 1.0, .unit = "s/kg^2", .meaning = "innovation's weight in (18)",
+                 .range = rig::positive(1e3), .search = rig::search(0.05, 20));
+  /// The first estimate of theta.
+  ABS_HIL_OPTION(double, zeta0, 0.0, .unit = "N", .meaning = "zeta(0) of (17)", .range = rig::between(-500, 500),
+                 .search = rig::search_linearly(0, 40), .start_value = true);
+  /// Q is symmetric and positive definite.
+  ABS_HIL_OPTION(double, q11, 1.0, .unit = "1/s^3", .meaning = "Q of PA + A'P = -2Q", .range = rig::positive(1e6));
+  ABS_HIL_OPTION(double, q12, 0.0, .unit = "1/s^2", .meaning = "Q of PA + A'P = -2Q", .range = rig::between(-1e6, 1e6));
+  ABS_HIL_OPTION(double, q22, 1.0, .unit = "1/s", .meaning = "Q of PA + A'P = -2Q", .range = rig::positive(1e6));
+  /// The estimate is projected onto [theta_min_N, theta_max_N].
+  ABS_HIL_OPTION(double, theta_min_N, 0.0, .unit = "N", .meaning = "least theta the estimate may take",
+                 .range = rig::from_zero(500));
+  ABS_HIL_OPTION(double, theta_max_N, 100.0, .unit = "N", .meaning = "largest theta the estimate may take",
+                 .range = rig::positive(1000));
 };
 
 /// How fast the unknowns of WheelForceObserver may change: intensities of the white noise on their rates.
 struct ForceObserverOptions {
-  double force_rate_N2_s{100.0};  ///< of the tyre force, N^2/s, > 0
-  double brake_rate_Nm2_s{0.3};   ///< of the brake torque that the actuator's model misses, (N m)^2/s, > 0
+  ABS_HIL_OPTIONS(ForceObserverOptions);
+  ABS_HIL_OPTION(double, force_rate_N2_s, 100.0, .unit = "N^2/s",
+                 .meaning = "force observer: how fast the tyre force may change", .range = rig::positive(1e9));
+  ABS_HIL_OPTION(double, brake_rate_Nm2_s, 0.3, .unit = "(N m)^2/s",
+                 .meaning = "force observer: how fast the brake model's error may change", .range = rig::positive(1e6));
 };
 
 /// Adaptive controller that steps back through the brake's lag: a set of gains of its own, and those of the third step.
 struct AdaptiveActuatorOptions {
-  AdaptiveOptions law{.ka1 = 3.5};
-  double lag_gain_per_s{100.0};  ///< decay of the torque error that the lag leaves, > 0
-  double lag_weight_s2{1e-4};    ///< weight of that error in V, > 0
-  ForceObserverOptions observer{};
+  ABS_HIL_OPTIONS(AdaptiveActuatorOptions);
+  ABS_HIL_GROUP(AdaptiveOptions, law, rig::not_searched(""), {.ka1 = 3.5});
+  ABS_HIL_OPTION(double, lag_gain_per_s, 100.0, .unit = "1/s",
+                 .meaning = "decay of the torque error that the brake's lag leaves", .range = rig::positive(1e4));
+  ABS_HIL_OPTION(double, lag_weight_s2, 1e-4, .unit = "s^2", .meaning = "weight of that error in the Lyapunov function",
+                 .range = rig::positive(1e3));
+  ABS_HIL_GROUP(ForceObserverOptions, observer, "", {});
 };
 
 /// SlipPeakEstimator: what is believed of the tyre at first, and how fast it may change.
 struct SlipPeakOptions {
-  double peak_slip0{0.08};        ///< first guess of the peak's slip, within the controller's bounds of the slip
-  double peak_force0_N{20.0};     ///< first guess of the peak's force, N, > 0
-  double force_drift_per_s{0.3};  ///< variance that the logarithm of the peak's force gains per second, > 0
-  double slip_drift_per_s{0.05};  ///< the same of its slip, > 0
-  double shape_drift_per_s{0.1};  ///< the same of the curve's shape, > 0
-  double force_noise_N2_s{0.01};  ///< intensity of the noise of the force, N^2 s, > 0
-  double jump_level{0.15};        ///< unexplained change, as a part of the peak force, that counts as a jump, > 0
-  double jump_hold_s{0.04};       ///< after a jump only the level is learnt for this long, >= 0
+  ABS_HIL_OPTIONS(SlipPeakOptions);
+  /// Within the controller's bounds of the slip.
+  ABS_HIL_OPTION(double, peak_slip0, 0.08, .meaning = "first guess of the peak's slip",
+                 .range = rig::open_between(0, 1));
+  ABS_HIL_OPTION(double, peak_force0_N, 20.0, .unit = "N", .meaning = "first guess of the peak's force",
+                 .range = rig::positive(500));
+  ABS_HIL_OPTION(double, force_drift_per_s, 0.3, .unit = "1/s", .meaning = "variance of ln force gained per second",
+                 .range = rig::positive(100));
+  ABS_HIL_OPTION(double, slip_drift_per_s, 0.05, .unit = "1/s", .meaning = "variance of ln slip gained per second",
+                 .range = rig::positive(100));
+  ABS_HIL_OPTION(double, shape_drift_per_s, 0.1, .unit = "1/s",
+                 .meaning = "variance of the curve's shape gained per second", .range = rig::positive(100));
+  ABS_HIL_OPTION(double, force_noise_N2_s, 0.01, .unit = "N^2 s", .meaning = "intensity of the force estimate's noise",
+                 .range = rig::positive(100));
+  ABS_HIL_OPTION(double, jump_level, 0.15, .meaning = "unexplained part of the peak force that is a friction jump",
+                 .range = rig::positive(10));
+  ABS_HIL_OPTION(double, jump_hold_s, 0.04, .unit = "s",
+                 .meaning = "time after a jump in which only the level is learnt", .range = rig::from_zero(1));
 };
 
 /// Slip controller that seeks the peak of the tyre force.
 struct AdaptivePeakOptions {
-  double ks0{100.0};             ///< integral gain of the slip loop, 1/s^2, > 0
-  double ks1{70.0};              ///< proportional gain of the slip loop, 1/s, > 0
-  double lag_gain_per_s{130.0};  ///< decay of the torque error that the brake's lag leaves, > 0
-  double slip_min{0.01};         ///< the reference stays within [slip_min, slip_max], in (0, 1)
-  double slip_max{0.3};
-  double slip_start{0.02};      ///< reference at the start of braking, in (0, 1)
-  double slip_rate_per_s{1.0};  ///< fastest change of the reference, > 0
-  double search_part{0.1};      ///< amplitude of the search, as a part of the reference, >= 0
-  double search_min{0.005};     ///< its least amplitude, as a slip, >= 0
-  double search_rad_s{60.0};    ///< its frequency, > 0
-  SlipPeakOptions peak{};
-  ForceObserverOptions observer{.force_rate_N2_s = 200.0, .brake_rate_Nm2_s = 3.0};
+  ABS_HIL_OPTIONS(AdaptivePeakOptions);
+  ABS_HIL_OPTION(double, ks0, 100.0, .unit = "1/s^2", .meaning = "integral gain of the slip loop",
+                 .range = rig::positive(1e6));
+  ABS_HIL_OPTION(double, ks1, 70.0, .unit = "1/s", .meaning = "proportional gain of the slip loop",
+                 .range = rig::positive(1e4));
+  ABS_HIL_OPTION(double, lag_gain_per_s, 130.0, .unit = "1/s",
+                 .meaning = "decay of the torque error that the brake's lag leaves", .range = rig::positive(1e4));
+  ABS_HIL_OPTION(double, slip_min, 0.01, .meaning = "least slip reference", .range = rig::open_between(0, 1));
+  ABS_HIL_OPTION(double, slip_max, 0.3, .meaning = "largest slip reference", .range = rig::open_between(0, 1));
+  ABS_HIL_OPTION(double, slip_start, 0.02, .meaning = "slip reference at the start of braking",
+                 .range = rig::open_between(0, 1));
+  ABS_HIL_OPTION(double, slip_rate_per_s, 1.0, .unit = "1/s", .meaning = "fastest change of the slip reference",
+                 .range = rig::positive(100));
+  ABS_HIL_OPTION(double, search_part, 0.1, .meaning = "amplitude of the search as a part of the reference",
+                 .range = rig::from_zero_below(1));
+  ABS_HIL_OPTION(double, search_min, 0.005, .meaning = "least amplitude of the search, as a slip",
+                 .range = rig::between(0, 0.1));
+  ABS_HIL_OPTION(double, search_rad_s, 60.0, .unit = "rad/s", .meaning = "frequency of the search",
+                 .range = rig::positive(1000));
+  ABS_HIL_GROUP(SlipPeakOptions, peak, "", {});
+  ABS_HIL_GROUP(ForceObserverOptions, observer, "", {.force_rate_N2_s = 200.0, .brake_rate_Nm2_s = 3.0});
 };
 
 /// Nominal controller (16). It shares ks0 and ks1 with the adaptive one.
 struct NominalOptions {
-  double theta0_N{0.0};  ///< theta it believes in; 0: the plant's own
+  ABS_HIL_OPTIONS(NominalOptions);
+  ABS_HIL_OPTION(double, theta0_N, 0.0, .unit = "N", .meaning = "theta that (16) believes in; 0: the plant's",
+                 .range = rig::from_zero(500));
 };
 
 /// Third-order tracking observer of the wheel speeds.
 struct ObserverOptions {
-  double bandwidth_rad_s{150.0};   ///< triple pole, > 0
-  double standstill_time_s{0.05};  ///< a wheel whose count has not changed for this long stands still
+  ABS_HIL_OPTIONS(ObserverOptions);
+  ABS_HIL_OPTION(double, bandwidth_rad_s, 150.0, .unit = "rad/s", .meaning = "speed observer's triple pole",
+                 .range = rig::between(5, 2000));
+  ABS_HIL_OPTION(double, standstill_time_s, 0.05, .unit = "s",
+                 .meaning = "time without a count after which a wheel stands", .range = rig::between(0.005, 1));
 };
+
+/// Name number `index` of the table of controllers; empty beyond the last.
+[[nodiscard]] std::string_view controller_name(std::size_t index) noexcept;
 
 /// Everything below `control.` in the configuration.
 struct ControlOptions {
-  std::string controller{"adaptive"};
-  double rate_Hz{1000.0};  ///< control cycles per second, 100 ... 10000
-  double slip_ref{0.15};   ///< in (0, 1)
-  double v_min_m_s{0.3};   ///< below this car speed slip control hands over to the sequence, > 0
-  AdaptiveOptions adaptive{};
-  AdaptiveActuatorOptions adaptive_actuator{};
-  AdaptivePeakOptions adaptive_peak{};
-  NominalOptions nominal{};
-  SlidingModeOptions sliding_mode{};
-  SmoothSlidingModeOptions sliding_mode_smooth{};
-  SuperTwistingOptions super_twisting{};
-  RelayOptions relay{};
-  PiOptions pi{};
-  FivePhaseOptions five_phase{};
-  ObserverOptions observer{};
+  ABS_HIL_OPTIONS(ControlOptions);
+  ABS_HIL_OPTION(std::string, controller, "adaptive", .meaning = "slip controller", .allowed = controller_name);
+  ABS_HIL_OPTION(double, rate_Hz, 1000.0, .unit = "Hz", .meaning = "control cycles per second",
+                 .range = rig::between(100, 10'000));
+  ABS_HIL_OPTION(double, slip_ref, 0.15, .meaning = "wanted slip", .range = rig::open_between(0, 1));
+  ABS_HIL_OPTION(double, v_min_m_s, 0.3, .unit = "m/s", .meaning = "car speed below which slip control ends",
+                 .range = rig::between(0.05, 5));
+  ABS_HIL_GROUP(AdaptiveOptions, adaptive, "adaptive.", {});
+  ABS_HIL_GROUP(NominalOptions, nominal, "nominal.", {});
+  ABS_HIL_GROUP(ObserverOptions, observer, "observer.", {});
+  ABS_HIL_GROUP(SlidingModeOptions, sliding_mode, "sliding_mode.", {});
+  ABS_HIL_GROUP(SmoothSlidingModeOptions, sliding_mode_smooth, "sliding_mode_smooth.", {});
+  ABS_HIL_GROUP(SuperTwistingOptions, super_twisting, "super_twisting.", {});
+  ABS_HIL_GROUP(RelayOptions, relay, "relay.", {});
+  ABS_HIL_GROUP(PiOptions, pi, "pi.", {});
+  ABS_HIL_GROUP(FivePhaseOptions, five_phase, "five_phase.", {});
+  ABS_HIL_GROUP(AdaptiveActuatorOptions, adaptive_actuator, "adaptive_actuator.", {});
+  ABS_HIL_GROUP(AdaptivePeakOptions, adaptive_peak, "adaptive_peak.", {});
 };
 
 }  // namespace abs_hil::control

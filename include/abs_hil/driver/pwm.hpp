@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string_view>
 
 namespace abs_hil::driver {
 
@@ -12,6 +13,10 @@ inline constexpr double board_clock_Hz = 40e6;
 /// Counting width of a PWM.
 enum class PwmMode : std::uint32_t { bits_8 = 0, bits_12 = 1 };
 
+/// The mode that the option pwm_mode names, "8-bit" or "12-bit".
+[[nodiscard]] constexpr PwmMode pwm_mode_named(std::string_view name) noexcept {
+  return name == "8-bit" ? PwmMode::bits_8 : PwmMode::bits_12;
+}
 /// Largest width, which is duty 1.
 [[nodiscard]] constexpr std::uint32_t full_width(PwmMode mode) noexcept {
   return mode == PwmMode::bits_12 ? 4095 : 255;

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "abs_hil/rig/option.hpp"
 #include "abs_hil/rig/parameters.hpp"
 
 namespace abs_hil::plant_sim {
@@ -9,43 +10,74 @@ namespace abs_hil::plant_sim {
 /// Coefficients of the maker's friction curve, mu(s) = w4 s^p / (a + s^p) + w3 s^3 + w2 s^2 + w1 s for a slip s in
 /// [0, 1] (Inteco ABS, User's Manual, section 5).
 struct IntecoMuParameters {
-  double w1{-0.04240011450454};
-  double w2{2.9375e-10};
-  double w3{0.03508217905067};
-  double w4{0.40662691102315};
-  double a{0.00025724985785};  ///< > 0
-  double p{2.09945271667129};  ///< in [1, 10]; below 1 the slope at slip 0 would be infinite
+  ABS_HIL_OPTIONS(IntecoMuParameters);
+  ABS_HIL_OPTION(double, w1, -0.04240011450454, .meaning = "simulation: tyre inteco-mu, coefficient of slip",
+                 .range = rig::between(-10, 10));
+  ABS_HIL_OPTION(double, w2, 2.9375e-10, .meaning = "simulation: tyre inteco-mu, coefficient of slip^2",
+                 .range = rig::between(-10, 10));
+  ABS_HIL_OPTION(double, w3, 0.03508217905067, .meaning = "simulation: tyre inteco-mu, coefficient of slip^3",
+                 .range = rig::between(-10, 10));
+  ABS_HIL_OPTION(double, w4, 0.40662691102315, .meaning = "simulation: tyre inteco-mu, height of the saturating term",
+                 .range = rig::between(-10, 10));
+  ABS_HIL_OPTION(double, a, 0.00025724985785,
+                 .meaning = "simulation: tyre inteco-mu, slip^p at half of the saturating term",
+                 .range = rig::positive(10));
+  /// Below 1 the curve would rise with infinite slope from slip 0.
+  ABS_HIL_OPTION(double, p, 2.09945271667129, .meaning = "simulation: tyre inteco-mu, exponent of the saturating term",
+                 .range = rig::between(1, 10));
 };
 
 /// The lever that carries the upper wheel and presses it onto the lower one (Inteco ABS, User's Manual, section 5).
 struct LeverParameters {
-  double Mg_Nm{19.62};    ///< moment of the lever's weight about its pivot, > 0
-  double L_m{0.370};      ///< distance from the pivot to the point of contact, > 0
-  double phi_deg{65.61};  ///< angle between the normal in the point of contact and the line L, in (0, 90]
+  ABS_HIL_OPTIONS(LeverParameters);
+  ABS_HIL_OPTION(double, Mg_Nm, 19.62, .unit = "N m", .meaning = "simulation: load lever, moment of its weight",
+                 .range = rig::positive(1000));
+  ABS_HIL_OPTION(double, L_m, 0.370, .unit = "m", .meaning = "simulation: load lever, from pivot to contact",
+                 .range = rig::between(0.01, 10));
+  ABS_HIL_OPTION(double, phi_deg, 65.61, .unit = "deg",
+                 .meaning = "simulation: load lever, angle between its line and the contact's normal",
+                 .range = rig::positive(90));
 };
 
 /// Time profiles of factors over the plant's parameters, see FactorProfile; empty: constant 1.
 struct DriftProfiles {
-  std::string brake_torque{};   ///< factor over the torque of the brake's map
-  std::string motor_torque{};   ///< factor over the drive motor's torque
-  std::string upper_bearing{};  ///< factor over M10 and d1
-  std::string lower_bearing{};  ///< factor over M20 and d2
+  ABS_HIL_OPTIONS(DriftProfiles);
+  ABS_HIL_OPTION(std::string, brake_torque, "", .key = "brake_torque_profile",
+                 .meaning = "simulation: factor over the brake's torque, over time (docs/plants.md)");
+  ABS_HIL_OPTION(std::string, motor_torque, "", .key = "motor_torque_profile",
+                 .meaning = "simulation: factor over the motor's torque, over time (docs/plants.md)");
+  ABS_HIL_OPTION(std::string, upper_bearing, "", .key = "upper_bearing_profile",
+                 .meaning = "simulation: factor over M10 and d1, over time (docs/plants.md)");
+  ABS_HIL_OPTION(std::string, lower_bearing, "", .key = "lower_bearing_profile",
+                 .meaning = "simulation: factor over M20 and d2, over time (docs/plants.md)");
 };
 
 /// The simulated rig. `rig` holds its true parameters.
 struct PlantOptions {
-  rig::RigParameters rig{};
-  std::string tyre{"magic-formula"};     ///< friction curve: "magic-formula" (4) or "inteco-mu"
-  std::string load{"constant"};          ///< normal force: "constant" or "lever"
-  double mu_peak{0.4};                   ///< peak of the magic formula's friction curve, used with the lever only, > 0
-  IntecoMuParameters inteco_mu{};        ///< for tyre "inteco-mu"
-  LeverParameters lever{};               ///< for load "lever"
-  std::string friction_profile{};        ///< friction over time or distance, see FactorProfile; empty: none
-  DriftProfiles drift{};                 ///< changes of other parameters during the run
-  bool ideal_actuator{false};            ///< the commanded torque acts at once, without map, lag and saturation
-  bool ideal_sensors{false};             ///< measurements contain the true speeds
-  double slip_regularisation_m_s{0.02};  ///< lower limit of the car speed in the denominator of (5), > 0
-  double max_step_s{500e-6};  ///< largest integration step, > 0; tests/plant_sim/accuracy_test.cpp shows the error
+  ABS_HIL_OPTIONS(PlantOptions);
+  ABS_HIL_GROUP(rig::RigParameters, rig, "", {});
+  /// Without map, lag and saturation.
+  ABS_HIL_OPTION(bool, ideal_actuator, false, .meaning = "simulation: the torque asked for acts at once");
+  ABS_HIL_OPTION(bool, ideal_sensors, false, .meaning = "simulation: controllers get the true speeds");
+  ABS_HIL_OPTION(double, slip_regularisation_m_s, 0.02, .unit = "m/s",
+                 .meaning = "simulation: least car speed that (5) divides by",
+                 .range = ::abs_hil::rig::between(1e-3, 0.1));
+  /// A test shows the error at the default.
+  ABS_HIL_OPTION(double, max_step_s, 500e-6, .unit = "s", .meaning = "simulation: largest integration step",
+                 .range = ::abs_hil::rig::between(1e-6, 2e-3));
+  ABS_HIL_OPTION(std::string, tyre, "magic-formula", .meaning = "simulation: friction curve",
+                 .allowed = {"magic-formula", "inteco-mu"});
+  ABS_HIL_OPTION(std::string, load, "constant", .meaning = "simulation: normal force",
+                 .allowed = {"constant", "lever"});
+  ABS_HIL_OPTION(double, mu_peak, 0.4,
+                 .meaning = "simulation: peak friction coefficient of tyre magic-formula under load lever",
+                 .range = ::abs_hil::rig::positive(5));
+  ABS_HIL_GROUP(IntecoMuParameters, inteco_mu, "mu_", {});
+  ABS_HIL_GROUP(LeverParameters, lever, "lever_", {});
+  /// See FactorProfile; empty: none.
+  ABS_HIL_OPTION(std::string, friction_profile, "",
+                 .meaning = "simulation: friction over time or distance (docs/plants.md)");
+  ABS_HIL_GROUP(DriftProfiles, drift, "", {});
 };
 
 /// Throws std::invalid_argument with the configuration key, its value and its range if an option is out of range.

@@ -2,34 +2,51 @@
 
 #include <cstdint>
 
+#include "abs_hil/rig/option.hpp"
+
 namespace abs_hil::rig {
 
 /// Both wheels: geometry, inertia and bearing friction (paper, Table 1). Index 1 is the upper, braked "car" wheel,
 /// index 2 the lower wheel that stands for the road and the car's mass.
 struct WheelParameters {
-  double r1_m{0.0995};           ///< upper wheel radius, > 0
-  double r2_m{0.0990};           ///< lower wheel radius, > 0
-  double J1_kg_m2{7.54e-3};      ///< upper wheel moment of inertia, > 0
-  double J2_kg_m2{25.60e-3};     ///< lower wheel moment of inertia, > 0
-  double d1_Nms_rad{118.74e-6};  ///< upper wheel viscous friction, >= 0
-  double d2_Nms_rad{214.68e-6};  ///< lower wheel viscous friction, >= 0
-  double M10_Nm{0.0032};         ///< upper wheel Coulomb (bearing) friction, >= 0
-  double M20_Nm{0.0925};         ///< lower wheel Coulomb (bearing) friction, >= 0
+  ABS_HIL_OPTIONS(WheelParameters);
+  ABS_HIL_OPTION(double, r1_m, 0.0995, .unit = "m", .meaning = "upper wheel radius", .range = between(0.01, 1));
+  ABS_HIL_OPTION(double, r2_m, 0.0990, .unit = "m", .meaning = "lower wheel radius", .range = between(0.01, 1));
+  ABS_HIL_OPTION(double, J1_kg_m2, 7.54e-3, .unit = "kg m^2", .meaning = "upper wheel moment of inertia",
+                 .range = between(1e-4, 1));
+  ABS_HIL_OPTION(double, J2_kg_m2, 25.60e-3, .unit = "kg m^2", .meaning = "lower wheel moment of inertia",
+                 .range = between(1e-4, 1));
+  ABS_HIL_OPTION(double, d1_Nms_rad, 118.74e-6, .unit = "N m s/rad", .meaning = "upper wheel viscous friction",
+                 .range = from_zero(0.1));
+  ABS_HIL_OPTION(double, d2_Nms_rad, 214.68e-6, .unit = "N m s/rad", .meaning = "lower wheel viscous friction",
+                 .range = from_zero(0.1));
+  ABS_HIL_OPTION(double, M10_Nm, 0.0032, .unit = "N m", .meaning = "upper wheel Coulomb friction",
+                 .range = from_zero(10));
+  ABS_HIL_OPTION(double, M20_Nm, 0.0925, .unit = "N m", .meaning = "lower wheel Coulomb friction",
+                 .range = from_zero(10));
 };
 
 /// Tyre force Ft = theta * phi(slip) of (10), phi(slip) = sin(C atan(B slip)).
 struct TyreParameters {
-  double theta_N{23.0};  ///< peak tractive force theta = mu * D, > 0
-  double B{28.0};        ///< stiffness factor, > 0
-  double C{1.68};        ///< shape factor, in (0, 2]: above 2 the force would change sign at large slip
+  ABS_HIL_OPTIONS(TyreParameters);
+  ABS_HIL_OPTION(double, theta_N, 23.0, .unit = "N",
+                 .meaning = "peak tyre force, theta = mu D of (10); with load lever only what controllers are told",
+                 .range = positive(500));
+  ABS_HIL_OPTION(double, B, 28.0, .meaning = "tyre stiffness factor of (4)", .range = positive(200));
+  /// Above 2 the force would change sign at large slip.
+  ABS_HIL_OPTION(double, C, 1.68, .meaning = "tyre shape factor of (4)", .range = positive(2));
 };
 
 /// Brake: static map (7) from duty to torque, first-order lag (6).
 struct BrakeParameters {
-  double b1_Nm{15.24};      ///< slope of the map, torque per unit duty, > 0
-  double b2_Nm{-6.21};      ///< offset of the map
-  double u0{0.415};         ///< dead zone: no torque below this duty, in [0, 1)
-  double c31_per_s{20.37};  ///< inverse time constant of the lag, > 0
+  ABS_HIL_OPTIONS(BrakeParameters);
+  ABS_HIL_OPTION(double, b1_Nm, 15.24, .unit = "N m", .meaning = "slope of the brake map (7)", .range = positive(1000));
+  ABS_HIL_OPTION(double, b2_Nm, -6.21, .unit = "N m", .meaning = "offset of the brake map (7)",
+                 .range = between(-1000, 1000));
+  ABS_HIL_OPTION(double, u0, 0.415, .meaning = "brake duty below which there is no torque (7)",
+                 .range = from_zero_below(1));
+  ABS_HIL_OPTION(double, c31_per_s, 20.37, .unit = "1/s", .meaning = "inverse time constant of the brake (6)",
+                 .range = positive(1000));
 };
 
 /// Lower wheel's DC motor: Tm = stall_torque * duty * (1 - omega2 / no_load_speed). Not in the paper, so calibrated:
@@ -39,22 +56,24 @@ struct BrakeParameters {
 /// without slip, J w' = K - M - (K/w0 + d) w with both wheels' J, d, M referred to the lower one, gives 2.1077 N m in
 /// closed form; slip in traction accounts for the rest. tests/plant_sim/actuators_test.cpp checks both.
 struct DriveMotorParameters {
-  double stall_torque_Nm{2.1122};     ///< torque at standstill and full duty, > 0
-  double no_load_speed_rad_s{220.0};  ///< speed at which back-EMF cancels the supply, > 0
+  ABS_HIL_OPTIONS(DriveMotorParameters);
+  ABS_HIL_OPTION(double, stall_torque_Nm, 2.1122, .unit = "N m",
+                 .meaning = "drive motor's torque at standstill and full duty", .range = positive(100));
+  /// There the back-EMF cancels the supply.
+  ABS_HIL_OPTION(double, no_load_speed_rad_s, 220.0, .unit = "rad/s", .meaning = "drive motor's no-load speed",
+                 .range = positive(2000));
 };
 
 /// Everything a controller may know of the rig. SI units throughout.
 struct RigParameters {
-  WheelParameters wheels;
-  TyreParameters tyre;
-  BrakeParameters brake;
-  DriveMotorParameters motor;
-  std::int32_t encoder_counts_per_rev{4096};  ///< counts per revolution after quadrature decoding, >= 4
+  ABS_HIL_OPTIONS(RigParameters);
+  ABS_HIL_GROUP(TyreParameters, tyre, "", {});
+  ABS_HIL_GROUP(WheelParameters, wheels, "", {});
+  ABS_HIL_GROUP(BrakeParameters, brake, "", {});
+  ABS_HIL_GROUP(DriveMotorParameters, motor, "motor_", {});
+  /// After quadrature decoding.
+  ABS_HIL_OPTION(std::int32_t, encoder_counts_per_rev, 4096, .meaning = "encoder counts per revolution",
+                 .range = between(4, 1'000'000));
 };
-
-/// k(slip_ref) of (15): what a unit of tyre force does to the slip velocity error, 1/kg.
-[[nodiscard]] constexpr double slip_velocity_gain(const WheelParameters& w, double slip_ref) noexcept {
-  return w.r1_m * w.r1_m / w.J1_kg_m2 + (1.0 - slip_ref) * w.r2_m * w.r2_m / w.J2_kg_m2;
-}
 
 }  // namespace abs_hil::rig

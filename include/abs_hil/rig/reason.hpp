@@ -1,210 +1,213 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 
 namespace abs_hil::rig {
 
-/// Why a phase changed, a command was refused or a run ended. Plain numbers, so that the real-time thread can hand them
-/// on without a string; `description` turns them into words where there is time. Append only: logs hold the numbers.
-enum class Reason : std::uint16_t {
-  none = 0,
-  // the sequence goes on
-  run_started = 1,
-  start_speed_given = 2,
-  speed_threshold_reached = 3,
-  upper_wheel_peak_detected = 4,
-  phase_duration_over = 5,
-  end_speed_reached = 6,
-  standstill_reached = 7,
-  sequence_complete = 8,
-  slip_control_left_at_low_speed = 9,
-  speed_condition_met = 20,
-  slip_condition_met = 21,
-  distance_reached = 22,
-  all_conditions_met = 23,
-  // the run ends early because somebody asked for it
-  interrupt_signal = 32,
-  terminate_signal = 33,
-  stop_command = 34,
-  hangup_signal = 35,
-  // the run goes on, changed by a command
-  gain_changed = 37,
-  slip_reference_changed = 38,
-  start_command = 39,
-  // why a command is refused; the run goes on
-  commands_not_enabled = 40,
-  command_not_authentic = 41,
-  command_repeated = 42,
-  command_unknown = 43,
-  command_out_of_range = 44,
-  command_malformed = 45,
-  command_not_now = 46,
-  // the run ends early by a fault or limit
-  phase_time_limit = 64,
-  overspeed = 65,
-  command_not_finite = 66,
-  estimate_not_finite = 67,
-  driver_read_failed = 68,
-  driver_write_failed = 69,
-  board_interlock_tripped = 70,
-  consecutive_overruns = 71,
-  board_supply_tripped = 80,
-  board_supply_low = 81,
-  board_too_hot = 82,
-  can_node_silent = 100,
-  can_frames_stale = 101,
-  can_frames_duplicated = 102,
-  can_frames_out_of_order = 103,
-  can_frame_wrong_length = 104,
-  can_frames_forged = 105,
-  can_values_implausible = 106,
-  can_too_many_frames = 107,
-  can_send_queue_full = 108,
-  can_bus_off = 109,
-  can_error_passive = 110,
-  can_interface_down = 111,
-  can_node_latched = 112,
-  can_node_restarted = 113,
-  can_outputs_not_taken = 114,
-  usb_unplugged = 120,
-  usb_stalled = 121,
-  usb_short_frame = 122,
-  usb_no_answer = 123,
-  usb_not_a_frame = 124,
-  usb_outputs_not_taken = 125,
-  usb_transfer_failed = 126,
-  // what the gate's plausibility checks find (docs/safety.md)
-  encoder_upper_stuck = 130,
-  encoder_lower_stuck = 131,
-  encoder_upper_jumped = 132,
-  encoder_lower_jumped = 133,
-  encoder_upper_reversed = 134,
-  encoder_lower_reversed = 135,
-  encoders_lost = 136,
-  encoders_disagree = 137,
-  slip_implausible = 138,
-  samples_missing = 139,
-  speed_rises_with_motor_off = 140,
-  motor_no_response = 141,
-  brake_no_response = 142,
-  board_health_lost = 143,
-  // the guardian, and what it acts upon (docs/dead-man.md)
-  guardian_died = 160,
-  guardian_silent = 161,
-  controller_died = 162,
-  controller_silent = 163,
-  safe_state_unverified = 164,
-  // limits of an experiment's script
-  run_time_limit = 200,
-  run_distance_limit = 201,
+/// What a reason does to a run.
+enum class ReasonKind : std::uint8_t {
+  none,          ///< nothing happened
+  sequence,      ///< the experiment goes on to its next phase or ends as planned
+  stop_request,  ///< somebody asked for the end: a signal or a stop command
+  adjustment,    ///< a command changed a run that goes on
+  refusal,       ///< a command was refused; the run goes on
+  fault,         ///< a fault or limit ended the run; only a new run goes on
 };
 
-/// In words, for events, logs and summaries.
-[[nodiscard]] constexpr std::string_view description(Reason reason) noexcept {
-  switch (reason) {
-    case Reason::none: return "none";
-    case Reason::run_started: return "run started";
-    case Reason::start_speed_given: return "braking starts at once from the given start speed";
-    case Reason::speed_threshold_reached: return "upper wheel reached its speed threshold";
-    case Reason::upper_wheel_peak_detected: return "upper wheel stopped gaining speed";
-    case Reason::phase_duration_over: return "phase lasted its set time";
-    case Reason::end_speed_reached: return "car speed below the experiment's end speed";
-    case Reason::standstill_reached: return "both wheels stand still";
-    case Reason::sequence_complete: return "experiment ran to its end";
-    case Reason::slip_control_left_at_low_speed: return "car speed below the least speed for slip control";
-    case Reason::speed_condition_met: return "speed reached the value that ends the phase";
-    case Reason::slip_condition_met: return "slip reached the value that ends the phase";
-    case Reason::distance_reached: return "car came the distance that ends the phase";
-    case Reason::all_conditions_met: return "all conditions that end the phase hold";
-    case Reason::interrupt_signal: return "interrupted (SIGINT)";
-    case Reason::terminate_signal: return "terminated (SIGTERM)";
-    case Reason::stop_command: return "stopped by a command on ABS_COMMAND";
-    case Reason::hangup_signal: return "terminal closed (SIGHUP)";
-    case Reason::gain_changed: return "gain changed by a command";
-    case Reason::slip_reference_changed: return "slip reference changed by a command";
-    case Reason::start_command: return "started by a command";
-    case Reason::commands_not_enabled: return "commands other than stop are not enabled";
-    case Reason::command_not_authentic: return "command does not prove that its sender may give it";
-    case Reason::command_repeated: return "command was received before";
-    case Reason::command_unknown: return "command is not known";
-    case Reason::command_out_of_range: return "command's value is out of range";
-    case Reason::command_malformed: return "packet is no command";
-    case Reason::command_not_now: return "command cannot be carried out now";
-    case Reason::phase_time_limit: return "phase exceeded its time limit";
-    case Reason::overspeed: return "wheel speed above the limit";
-    case Reason::command_not_finite: return "command was not a finite number";
-    case Reason::estimate_not_finite: return "speed estimate was not a finite number";
-    case Reason::driver_read_failed: return "reading the board failed";
-    case Reason::driver_write_failed: return "writing to the board failed";
-    case Reason::board_interlock_tripped: return "the board's own interlock tripped";
-    case Reason::consecutive_overruns: return "too many consecutive overruns";
-    case Reason::board_supply_tripped: return "the board's own interlock tripped: supply undervoltage";
-    case Reason::board_supply_low: return "the board's supply is below gate.supply_min_V";
-    case Reason::board_too_hot: return "the board is hotter than gate.temperature_max_C";
-    case Reason::can_node_silent: return "CAN node did not answer too often: its watchdog takes the outputs to zero";
-    case Reason::can_frames_stale: return "CAN node answers with old sequence numbers";
-    case Reason::can_frames_duplicated: return "CAN frames come twice: two nodes, or one that repeats itself";
-    case Reason::can_frames_out_of_order: return "CAN frames come out of order or ahead of what was asked";
-    case Reason::can_frame_wrong_length: return "CAN frames have the wrong length";
-    case Reason::can_frames_forged: return "CAN frames with the node's identifiers are not the node's (wrong check)";
-    case Reason::can_values_implausible: return "CAN node sends values that cannot be";
-    case Reason::can_too_many_frames: return "CAN frames come faster than they can be read";
-    case Reason::can_send_queue_full: return "CAN interface takes no more frames: the bus is blocked";
-    case Reason::can_bus_off: return "CAN controller is bus-off";
-    case Reason::can_error_passive: return "CAN controller is error-passive";
-    case Reason::can_interface_down: return "CAN interface is down or gone";
-    case Reason::can_node_latched: return "CAN node has cut its outputs by itself";
-    case Reason::can_node_restarted: return "CAN node was restarted or replaced";
-    case Reason::can_outputs_not_taken: return "CAN node does not apply the duties that were sent";
-    case Reason::usb_unplugged: return "USB board unplugged: its outputs hold, press the E-stop";
-    case Reason::usb_stalled: return "USB board refused a transfer (STALL)";
-    case Reason::usb_short_frame: return "USB board sent a frame of the wrong length";
-    case Reason::usb_no_answer:
-      return "USB board did not answer in time too often: its outputs may hold, press the E-stop";
-    case Reason::usb_not_a_frame: return "USB board sent what is none of its frames";
-    case Reason::usb_outputs_not_taken: return "USB board does not show the duties that were sent";
-    case Reason::usb_transfer_failed: return "USB transfer failed";
-    case Reason::encoder_upper_stuck: return "upper wheel's encoder stands still though the wheel cannot";
-    case Reason::encoder_lower_stuck: return "lower wheel's encoder stands still though the wheel cannot";
-    case Reason::encoder_upper_jumped: return "upper wheel's encoder shows speeds that the wheel cannot have";
-    case Reason::encoder_lower_jumped: return "lower wheel's encoder shows speeds that the wheel cannot have";
-    case Reason::encoder_upper_reversed: return "upper wheel's encoder counts backwards";
-    case Reason::encoder_lower_reversed: return "lower wheel's encoder counts backwards";
-    case Reason::encoders_lost: return "both encoders stand still though the wheels cannot";
-    case Reason::encoders_disagree: return "wheels differ in speed with the brake long released: an encoder drifts";
-    case Reason::slip_implausible:
-      return "slip outside what the tyre can do: the braked wheel is the faster one (encoders swapped?)";
-    case Reason::samples_missing: return "no fresh measurement";
-    case Reason::speed_rises_with_motor_off: return "wheels gain speed with the motor off";
-    case Reason::motor_no_response: return "motor on and the wheels do not gain speed";
-    case Reason::brake_no_response: return "brake on and the wheels do not lose speed";
-    case Reason::board_health_lost: return "the board no longer reports its supply or temperature";
-    case Reason::guardian_died: return "the guardian process died; without it nothing may move";
-    case Reason::guardian_silent: return "the guardian process gave no sign of life; without it nothing may move";
-    case Reason::controller_died: return "the controller process died";
-    case Reason::controller_silent: return "the controller gave no sign of life for guardian.timeout_ms";
-    case Reason::safe_state_unverified: return "the controller could not verify the safe state";
-    case Reason::run_time_limit: return "run exceeded the experiment's time limit";
-    case Reason::run_distance_limit: return "car came further than the experiment's limit";
+/// Whether a replay finds the reason again from the recorded measurements.
+enum class FoundAgain : std::uint8_t {
+  no,             ///< it came from outside: a person, a board, the bus, the operating system
+  yes,            ///< sequence, gate or logic find it; recorded adjustments are put in again
+  wheel_checks,   ///< the gate's checks of the wheels find it, if the recorded commands are those that acted
+  jumped_counts,  ///< as wheel_checks, unless the gate refused the counts: the recording does not hold those
+};
+
+// clang-format off
+/// Every reason: name, number, kind, found again, text. Logs hold the numbers: rows are added, never renumbered.
+#define ABS_HIL_REASONS(ROW)                                                                                          \
+  ROW(none, 0, none, yes, "none")                                                                                     \
+  ROW(run_started, 1, sequence, yes, "run started")                                                                   \
+  ROW(start_speed_given, 2, sequence, yes, "braking starts at once from the given start speed")                       \
+  ROW(speed_threshold_reached, 3, sequence, yes, "upper wheel reached its speed threshold")                           \
+  ROW(upper_wheel_peak_detected, 4, sequence, yes, "upper wheel stopped gaining speed")                               \
+  ROW(phase_duration_over, 5, sequence, yes, "phase lasted its set time")                                             \
+  ROW(end_speed_reached, 6, sequence, yes, "car speed below the experiment's end speed")                              \
+  ROW(standstill_reached, 7, sequence, yes, "both wheels stand still")                                                \
+  ROW(sequence_complete, 8, sequence, yes, "experiment ran to its end")                                               \
+  ROW(slip_control_left_at_low_speed, 9, sequence, yes, "car speed below the least speed for slip control")           \
+  ROW(speed_condition_met, 20, sequence, yes, "speed reached the value that ends the phase")                          \
+  ROW(slip_condition_met, 21, sequence, yes, "slip reached the value that ends the phase")                            \
+  ROW(distance_reached, 22, sequence, yes, "car covered the distance that ends the phase")                            \
+  ROW(all_conditions_met, 23, sequence, yes, "all conditions that end the phase hold")                                \
+  ROW(interrupt_signal, 32, stop_request, no, "interrupted (SIGINT)")                                                 \
+  ROW(terminate_signal, 33, stop_request, no, "terminated (SIGTERM)")                                                 \
+  ROW(stop_command, 34, stop_request, no, "stopped by a command on ABS_COMMAND")                                      \
+  ROW(hangup_signal, 35, stop_request, no, "terminal closed (SIGHUP)")                                                \
+  ROW(gain_changed, 37, adjustment, yes, "gain changed by a command")                                                 \
+  ROW(slip_reference_changed, 38, adjustment, yes, "slip reference changed by a command")                             \
+  ROW(start_command, 39, adjustment, yes, "started by a command")                                                     \
+  ROW(commands_not_enabled, 40, refusal, no, "commands other than stop are not enabled")                              \
+  ROW(command_not_authentic, 41, refusal, no, "command is not authenticated")                                         \
+  ROW(command_repeated, 42, refusal, no, "command was received before")                                               \
+  ROW(command_unknown, 43, refusal, no, "command is not known")                                                       \
+  ROW(command_out_of_range, 44, refusal, no, "command's value is out of range")                                       \
+  ROW(command_malformed, 45, refusal, no, "packet does not hold a command")                                           \
+  ROW(command_not_now, 46, refusal, no, "command cannot be carried out now")                                          \
+  ROW(phase_time_limit, 64, fault, yes, "phase exceeded its time limit")                                              \
+  ROW(overspeed, 65, fault, yes, "wheel speed above the limit")                                                       \
+  ROW(command_not_finite, 66, fault, yes, "command was not a finite number")                                          \
+  ROW(estimate_not_finite, 67, fault, yes, "speed estimate was not a finite number")                                  \
+  ROW(driver_read_failed, 68, fault, no, "reading the board failed")                                                  \
+  ROW(driver_write_failed, 69, fault, no, "writing to the board failed")                                              \
+  ROW(board_interlock_tripped, 70, fault, yes, "the board's own interlock tripped")                                   \
+  ROW(consecutive_overruns, 71, fault, no, "too many consecutive overruns")                                           \
+  ROW(board_supply_tripped, 80, fault, yes, "the board's own interlock tripped: supply undervoltage")                 \
+  ROW(board_supply_low, 81, fault, yes, "the board's supply is below gate.supply_min_V")                              \
+  ROW(board_too_hot, 82, fault, yes, "the board is hotter than gate.temperature_max_C")                               \
+  ROW(can_node_silent, 100, fault, no, "CAN node missed too many answers; its watchdog sets the outputs to zero")     \
+  ROW(can_frames_stale, 101, fault, no, "CAN node answers with old sequence numbers")                                 \
+  ROW(can_frames_duplicated, 102, fault, no, "CAN frames arrive twice: two nodes answer, or one repeats itself")      \
+  ROW(can_frames_out_of_order, 103, fault, no,                                                                        \
+      "CAN frames arrive out of order or answer requests that were not sent")                                         \
+  ROW(can_frame_wrong_length, 104, fault, no, "CAN frames have the wrong length")                                     \
+  ROW(can_frames_forged, 105, fault, no,                                                                              \
+      "CAN frames with the node's identifiers have a wrong check value: another sender")                              \
+  ROW(can_values_implausible, 106, fault, no, "CAN node sends impossible values")                                     \
+  ROW(can_too_many_frames, 107, fault, no, "CAN frames arrive faster than the program can read them")                 \
+  ROW(can_send_queue_full, 108, fault, no, "CAN interface accepts no more frames: the bus is blocked")                \
+  ROW(can_bus_off, 109, fault, no, "CAN controller is bus-off")                                                       \
+  ROW(can_error_passive, 110, fault, no, "CAN controller is error-passive")                                           \
+  ROW(can_interface_down, 111, fault, no, "CAN interface is down or gone")                                            \
+  ROW(can_node_latched, 112, fault, no, "CAN node switched its outputs off by itself")                                \
+  ROW(can_node_restarted, 113, fault, no, "CAN node was restarted or replaced")                                       \
+  ROW(can_outputs_not_taken, 114, fault, no, "CAN node does not apply the duties that were sent")                     \
+  ROW(usb_unplugged, 120, fault, no, "USB board unplugged: its outputs keep their last values, press the E-stop")     \
+  ROW(usb_stalled, 121, fault, no, "USB board refused a transfer (STALL)")                                            \
+  ROW(usb_short_frame, 122, fault, no, "USB board sent a frame of the wrong length")                                  \
+  ROW(usb_no_answer, 123, fault, no,                                                                                  \
+      "USB board missed too many answers: its outputs may keep their last values, press the E-stop")                  \
+  ROW(usb_not_a_frame, 124, fault, no, "USB board sent data that is not one of its frames")                           \
+  ROW(usb_outputs_not_taken, 125, fault, no, "USB board does not show the duties that were sent")                     \
+  ROW(usb_transfer_failed, 126, fault, no, "USB transfer failed")                                                     \
+  ROW(encoder_upper_stuck, 130, fault, wheel_checks,                                                                  \
+      "upper wheel's encoder shows standstill, but the wheel must be turning")                                        \
+  ROW(encoder_lower_stuck, 131, fault, wheel_checks,                                                                  \
+      "lower wheel's encoder shows standstill, but the wheel must be turning")                                        \
+  ROW(encoder_upper_jumped, 132, fault, jumped_counts,                                                                \
+      "upper wheel's encoder shows speeds that the wheel cannot reach")                                               \
+  ROW(encoder_lower_jumped, 133, fault, jumped_counts,                                                                \
+      "lower wheel's encoder shows speeds that the wheel cannot reach")                                               \
+  ROW(encoder_upper_reversed, 134, fault, wheel_checks, "upper wheel's encoder counts backwards")                     \
+  ROW(encoder_lower_reversed, 135, fault, wheel_checks, "lower wheel's encoder counts backwards")                     \
+  ROW(encoders_lost, 136, fault, wheel_checks, "both encoders show standstill, but the wheels must be turning")       \
+  ROW(encoders_disagree, 137, fault, wheel_checks,                                                                    \
+      "wheel speeds differ long after the brake was released: one encoder is wrong")                                  \
+  ROW(slip_implausible, 138, fault, wheel_checks,                                                                     \
+      "slip is outside the range of the tyre: the braked wheel turns faster than the other (encoders swapped?)")      \
+  ROW(samples_missing, 139, fault, wheel_checks, "no fresh measurement")                                              \
+  ROW(speed_rises_with_motor_off, 140, fault, wheel_checks, "the wheels gain speed although the motor is off")        \
+  ROW(motor_no_response, 141, fault, wheel_checks, "the motor is on, but the wheels do not gain speed")               \
+  ROW(brake_no_response, 142, fault, wheel_checks, "the brake is on, but the wheels do not lose speed")               \
+  ROW(board_health_lost, 143, fault, yes, "the board no longer reports its supply or temperature")                    \
+  ROW(guardian_died, 160, fault, no, "the guardian process died; the rig may not move without it")                    \
+  ROW(guardian_silent, 161, fault, no, "the guardian process gave no sign of life; the rig may not move without it")  \
+  ROW(controller_died, 162, fault, no, "the controller process died")                                                 \
+  ROW(controller_silent, 163, fault, no, "the controller gave no sign of life for guardian.timeout_ms")               \
+  ROW(safe_state_unverified, 164, fault, no, "the controller could not verify the safe state")                        \
+  ROW(run_time_limit, 200, fault, yes, "run exceeded the experiment's time limit")                                    \
+  ROW(run_distance_limit, 201, fault, yes, "car went further than the experiment's limit")
+// clang-format on
+
+/// Why a phase changed, a command was refused or a run ended. Plain numbers, so that the real-time thread can hand them
+/// on without a string.
+enum class Reason : std::uint16_t {
+#define ABS_HIL_REASON_NUMBER(name, number, kind, found_again, text) name = number,
+  ABS_HIL_REASONS(ABS_HIL_REASON_NUMBER)
+#undef ABS_HIL_REASON_NUMBER
+};
+
+/// A row of the table.
+struct ReasonRow {
+  std::string_view name;
+  Reason reason;
+  ReasonKind kind;
+  FoundAgain found_again;
+  std::string_view text;  ///< in words, for events, logs and summaries
+};
+
+inline constexpr std::array reasons{
+#define ABS_HIL_REASON_ROW(name, number, kind, found_again, text) \
+  ReasonRow{#name, Reason::name, ReasonKind::kind, FoundAgain::found_again, text},
+    ABS_HIL_REASONS(ABS_HIL_REASON_ROW)
+#undef ABS_HIL_REASON_ROW
+};
+
+#undef ABS_HIL_REASONS
+
+namespace detail {
+
+/// Numbers from here on are faults, those that a later version adds included.
+inline constexpr std::uint16_t first_fault = 64;
+static_assert(std::ranges::all_of(reasons, [](const ReasonRow& row) {
+  return (row.kind == ReasonKind::fault) == (static_cast<std::uint16_t>(row.reason) >= first_fault);
+}));
+static_assert(std::ranges::adjacent_find(reasons,
+                                         [](const ReasonRow& a, const ReasonRow& b) { return a.reason >= b.reason; }) ==
+                  reasons.end(),
+              "the rows stand in the order of their numbers, and no number comes twice");
+
+inline constexpr ReasonRow unknown_event{"unknown", Reason::none, ReasonKind::none, FoundAgain::no, "unknown reason"};
+inline constexpr ReasonRow unknown_fault{"unknown", Reason::none, ReasonKind::fault, FoundAgain::no, "unknown reason"};
+
+inline constexpr std::size_t numbers = static_cast<std::size_t>(reasons.back().reason) + 1;
+/// Place of each number's row in `reasons`, reasons.size() for a number without one.
+inline constexpr auto places = [] {
+  static_assert(reasons.size() < 256);
+  std::array<std::uint8_t, numbers> place{};
+  place.fill(static_cast<std::uint8_t>(reasons.size()));
+  for (std::size_t n = 0; n < reasons.size(); ++n) {
+    place[static_cast<std::size_t>(reasons[n].reason)] = static_cast<std::uint8_t>(n);
   }
-  return "unknown reason";
+  return place;
+}();
+
+}  // namespace detail
+
+/// The reason's row; for a number that this version does not know one that says so. Real-time safe.
+[[nodiscard]] constexpr const ReasonRow& row_of(Reason reason) noexcept {
+  const auto number = static_cast<std::size_t>(reason);
+  if (number < detail::numbers && detail::places[number] < reasons.size()) return reasons[detail::places[number]];
+  return number < detail::first_fault ? detail::unknown_event : detail::unknown_fault;
 }
 
+/// In words, for events, logs and summaries.
+[[nodiscard]] constexpr std::string_view description(Reason reason) noexcept { return row_of(reason).text; }
+
 /// True for reasons that latch: the run is over and only a new one goes on.
-[[nodiscard]] constexpr bool is_fault(Reason reason) noexcept {
-  return static_cast<std::uint16_t>(reason) >= static_cast<std::uint16_t>(Reason::phase_time_limit);
-}
+[[nodiscard]] constexpr bool is_fault(Reason reason) noexcept { return row_of(reason).kind == ReasonKind::fault; }
 
 /// True for changes that a command made to a run that goes on.
 [[nodiscard]] constexpr bool is_adjustment(Reason reason) noexcept {
-  return reason == Reason::gain_changed || reason == Reason::slip_reference_changed || reason == Reason::start_command;
+  return row_of(reason).kind == ReasonKind::adjustment;
 }
 
 /// True for reasons that come from outside: a signal or a stop command.
 [[nodiscard]] constexpr bool is_stop_request(Reason reason) noexcept {
-  return reason == Reason::interrupt_signal || reason == Reason::terminate_signal || reason == Reason::stop_command ||
-         reason == Reason::hangup_signal;
+  return row_of(reason).kind == ReasonKind::stop_request;
+}
+
+[[nodiscard]] constexpr std::string_view name_of(ReasonKind kind) noexcept {
+  constexpr std::array<std::string_view, 6> names{"none", "sequence", "stop request", "adjustment", "refusal", "fault"};
+  return names[static_cast<std::size_t>(kind)];
+}
+
+[[nodiscard]] constexpr std::string_view name_of(FoundAgain found_again) noexcept {
+  constexpr std::array<std::string_view, 4> names{"no", "yes", "wheel checks", "wheel checks, not jumped counts"};
+  return names[static_cast<std::size_t>(found_again)];
 }
 
 }  // namespace abs_hil::rig

@@ -7,12 +7,13 @@
 #include <stdexcept>
 #include <utility>
 
-#include "abs_hil/driver/encoder_sign.hpp"
-#include "abs_hil/driver/plausibility.hpp"
+#include "abs_hil/rig/option_check.hpp"
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/can/bus_load.hpp"
 #include "driver/can/signal_codec.hpp"
+#include "driver/encoder_sign.hpp"
 #include "driver/monotonic_time.hpp"
+#include "driver/plausibility.hpp"
 
 namespace abs_hil::driver::can {
 
@@ -48,6 +49,7 @@ CanDriver::CanDriver(const CanOptions& options, OpenLink open_link, bool lock_st
       lock_step_(lock_step),
       answer_timeout_ns_(answer_timeout_ns(options, lock_step)),
       bucket_(options.loss_cost, options.loss_relief, options.loss_limit) {
+  rig::require_valid(options, "driver.can.");
   check_sign("driver.can.upper_sign", options.upper_sign);
   check_sign("driver.can.lower_sign", options.lower_sign);
 }

@@ -3,25 +3,40 @@
 #include <cstdint>
 #include <string>
 
+#include "abs_hil/rig/option.hpp"
+#include "driver/board_rows.hpp"
+
 namespace abs_hil::driver::can {
 
 /// Everything below `driver.can.` in the configuration.
 struct CanOptions {
-  /// Network interface; "unix:PATH": a socket of type SOCK_SEQPACKET that an emulator listens on in its place.
-  std::string interface {
-    "can0"
-  };
-  std::string fd{"auto"};             ///< CAN FD frames: "auto", "on" or "off"
-  std::int32_t watchdog_ms{20};       ///< the node zeroes its outputs so long after the last valid command, 5 ... 10000
-  std::int32_t answer_timeout_us{0};  ///< longest wait for the answer to a SYNC; 0: 60 % of the period
-  double motor_duty_max{1.0};         ///< in (0, 1]
-  double brake_duty_max{0.7};         ///< in (0, 1]; the vendor's driver caps the brake's supply current at this
-  std::int32_t upper_sign{1};         ///< 1, or -1 if the counter counts down for forward motion
-  std::int32_t lower_sign{1};         ///< as `upper_sign`
-  std::int32_t loss_cost{2};          ///< what a lost or wrong frame adds to the leaky bucket, >= 0
-  std::int32_t loss_relief{1};        ///< what a good answer takes off, >= 0
-  std::int32_t loss_limit{10};        ///< the run ends when the bucket holds so much, >= 1
-  double plausible_speed_rad_s{1000.0};  ///< counters that go faster tell nonsense, rad/s, > 0
+  ABS_HIL_OPTIONS(CanOptions);
+  /// "unix:PATH": a socket of type SOCK_SEQPACKET that an emulator listens on.
+  ABS_HIL_OPTION(std::string, interface, "can0",
+                 .meaning = "CAN interface of the node; unix:PATH: an emulator's socket in its place");
+  ABS_HIL_OPTION(std::string, fd, "auto", .meaning = "CAN FD frames; auto: where interface and node have them",
+                 .allowed = {"auto", "on", "off"});
+  ABS_HIL_OPTION(std::int32_t, watchdog_ms, 20, .unit = "ms",
+                 .meaning = "the node zeroes its outputs so long after the last valid command",
+                 .range = rig::between(5, 10'000));
+  ABS_HIL_OPTION(std::int32_t, answer_timeout_us, 0, .unit = "us",
+                 .meaning = "longest wait for the node's answer, at most 80 % of the period; 0: 60 % of it",
+                 .range = rig::from_zero(8000));
+  ABS_HIL_OPTION(double, motor_duty_max, 1.0, motor_duty_cap);
+  /// The vendor's driver caps the brake's supply current at this.
+  ABS_HIL_OPTION(double, brake_duty_max, 0.7, brake_duty_cap);
+  ABS_HIL_OPTION(std::int32_t, lower_sign, 1, .meaning = "1, or -1 if the counter counts down going forward",
+                 .range = rig::between(-1, 1));
+  ABS_HIL_OPTION(std::int32_t, upper_sign, 1, .meaning = "1, or -1 if the counter counts down going forward",
+                 .range = rig::between(-1, 1));
+  // Of the leaky bucket.
+  ABS_HIL_OPTION(std::int32_t, loss_cost, 2, .meaning = "points that a lost or wrong frame costs",
+                 .range = rig::from_zero(1000));
+  ABS_HIL_OPTION(std::int32_t, loss_relief, 1, .meaning = "points that a good answer takes off",
+                 .range = rig::from_zero(1000));
+  ABS_HIL_OPTION(std::int32_t, loss_limit, 10, .meaning = "points that end the run",
+                 .range = rig::between(1, 1'000'000));
+  ABS_HIL_OPTION(double, plausible_speed_rad_s, 1000.0, plausible_speed);
   // Known from elsewhere in the configuration.
   std::int32_t encoder_counts_per_rev{4096};
   double rate_Hz{1000.0};  ///< cycles per second

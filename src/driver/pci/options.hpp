@@ -3,23 +3,33 @@
 #include <cstdint>
 #include <string>
 
+#include "abs_hil/rig/option.hpp"
+#include "driver/board_rows.hpp"
+
 namespace abs_hil::driver::pci {
 
 /// Everything below `driver.pci.` in the configuration.
 struct PciOptions {
-  std::string root{"/sys/bus/pci/devices"};  ///< folder with one folder for each PCI device
-  std::string bdf{};                         ///< which card, "0000:03:00.0"; empty: the only one
-  std::int32_t bitstream{-1};                ///< version word that the card must show, 0 ... 65535; -1: not compared
-  double motor_duty_max{1.0};                ///< in (0, 1]
-  double brake_duty_max{0.7};                ///< in (0, 1]; the vendor's driver caps the brake's supply current at this
-  std::string pwm_mode{"12-bit"};            ///< "8-bit" or "12-bit"; the vendor's demos use 12-bit
-  std::int32_t pwm_prescaler{60};            ///< 0 ... 65535; 60 in 12-bit mode is 160 Hz, as in the vendor's demos
-  std::int32_t lower_channel{0};             ///< encoder channel of the lower wheel, 0 ... 2
-  std::int32_t upper_channel{1};             ///< encoder channel of the upper wheel, 0 ... 2
-  std::int32_t lower_sign{1};                ///< 1, or -1 if the channel counts down for forward motion
-  std::int32_t upper_sign{1};                ///< as `lower_sign`
-  /// A counter that goes faster than this tells nonsense; far above what the motor reaches. rad/s, > 0.
-  double plausible_speed_rad_s{1000.0};
+  ABS_HIL_OPTIONS(PciOptions);
+  ABS_HIL_OPTION(std::string, root, "/sys/bus/pci/devices", .meaning = "folder with one folder for each PCI device");
+  ABS_HIL_OPTION(std::string, bdf, "", .meaning = "which card, as 0000:03:00.0; empty: the only one");
+  ABS_HIL_OPTION(std::int32_t, bitstream, -1, .meaning = "version word that the card must show; -1: not compared",
+                 .range = rig::between(-1, 65535));
+  ABS_HIL_OPTION(double, motor_duty_max, 1.0, motor_duty_cap);
+  /// The vendor's driver caps the brake's supply current at this.
+  ABS_HIL_OPTION(double, brake_duty_max, 0.7, brake_duty_cap);
+  /// The vendor's demos use 12-bit.
+  ABS_HIL_OPTION(std::string, pwm_mode, "12-bit", pwm_width);
+  /// 60 in 12-bit mode is 160 Hz, as in the vendor's demos.
+  ABS_HIL_OPTION(std::int32_t, pwm_prescaler, 60, .meaning = "PWM frequency is 40 MHz / ((prescaler + 1) 255 or 4095)",
+                 .range = rig::between(0, 65535));
+  ABS_HIL_OPTION(std::int32_t, lower_channel, 0, .meaning = "encoder channel of the lower wheel",
+                 .range = rig::between(0, 2));
+  ABS_HIL_OPTION(std::int32_t, upper_channel, 1, .meaning = "encoder channel of the upper wheel",
+                 .range = rig::between(0, 2));
+  ABS_HIL_OPTION(std::int32_t, lower_sign, 1, encoder_sign);
+  ABS_HIL_OPTION(std::int32_t, upper_sign, 1, encoder_sign);
+  ABS_HIL_OPTION(double, plausible_speed_rad_s, 1000.0, plausible_speed);
   std::int32_t encoder_counts_per_rev{4096};  ///< for that check alone; 1024 lines, quadrature
 };
 

@@ -1,10 +1,10 @@
 #include "driver/pci/pci_driver.hpp"
 
-#include <stdexcept>
 #include <utility>
 
-#include "abs_hil/driver/encoder_sign.hpp"
-#include "abs_hil/driver/plausibility.hpp"
+#include "abs_hil/rig/option_check.hpp"
+#include "driver/encoder_sign.hpp"
+#include "driver/plausibility.hpp"
 
 namespace abs_hil::driver::pci {
 
@@ -50,15 +50,13 @@ class PciDriver::Access {
 
 PciDriver::PciDriver(const PciOptions& options, OpenCard open_card, ReadClock read_clock)
     : options_(options),
-      mode_(options.pwm_mode == "8-bit" ? PwmMode::bits_8 : PwmMode::bits_12),
+      mode_(pwm_mode_named(options.pwm_mode)),
       open_card_(std::move(open_card)),
       read_clock_(read_clock) {
+  rig::require_valid(options, "driver.pci.");
   check_sign("driver.pci.lower_sign", options.lower_sign);
   check_sign("driver.pci.upper_sign", options.upper_sign);
-  if (options.lower_channel == options.upper_channel) {
-    throw std::invalid_argument("driver.pci.lower_channel = driver.pci.upper_channel = " +
-                                std::to_string(options.upper_channel) + ": each wheel has an encoder of its own");
-  }
+  check_channels("driver.pci.", options.lower_channel, options.upper_channel);
 }
 
 PciDriver::~PciDriver() { static_cast<void>(deactivate()); }

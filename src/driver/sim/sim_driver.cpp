@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "abs_hil/driver/plausibility.hpp"
 #include "abs_hil/rig/encoder_scale.hpp"
+#include "driver/plausibility.hpp"
 #include "plant_sim/encoder.hpp"
 
 namespace abs_hil::driver {

@@ -3,35 +3,49 @@
 #include <cstdint>
 #include <string>
 
+#include "abs_hil/rig/option.hpp"
+#include "driver/board_rows.hpp"
+
 namespace abs_hil::driver::usb {
 
 /// Everything below `driver.usb.` in the configuration.
 struct UsbOptions {
-  std::string sysfs_root{"/sys/bus/usb/devices"};  ///< where the kernel tells what is plugged in
-  std::string device_root{"/dev/bus/usb"};         ///< folder with BUS/DEVICE, the nodes that libusb opens
-  std::int32_t vendor_id{-1};                      ///< 0 ... 65535; -1: any. The maker's is not public
-  std::int32_t product_id{-1};                     ///< 0 ... 65535; -1: any. The maker's is not public
-  std::string manufacturer{"InTeCo"};              ///< the device's own word for its maker; empty: not compared
-  std::string serial{};                            ///< which board; empty: the only one
-  std::int32_t version{-1};                        ///< version word that the board must show, 0 ... 65535; -1: any
-  std::int32_t drive_pwm{0};                       ///< PWM channel of the drive, 0 ... 9
-  std::int32_t brake_pwm{1};                       ///< PWM channel of the brake, 0 ... 9
-  std::int32_t enable_line{-1};                    ///< digital line that enables the motor, 0 ... 14; -1: none
-  bool enable_inverted{false};                     ///< the line is low while the motor is enabled
-  std::int32_t lower_channel{0};                   ///< encoder channel of the lower wheel, 0 ... 7
-  std::int32_t upper_channel{1};                   ///< encoder channel of the upper wheel, 0 ... 7
-  std::int32_t lower_sign{1};                      ///< 1, or -1 if the channel counts down for forward motion
-  std::int32_t upper_sign{1};                      ///< as `lower_sign`
-  double motor_duty_max{1.0};                      ///< in (0, 1]
-  double brake_duty_max{0.7};                      ///< in (0, 1]; as on the RT-DAC4/PCI
-  std::string pwm_mode{"12-bit"};                  ///< "8-bit" or "12-bit"
-  std::int32_t pwm_prescaler{60};                  ///< 0 ... 65535; 160 Hz if the board's clock is the PCI board's
-  /// Every frame must show the PWM words that were sent. Whether the board shows them is not known; without it the
-  /// safe state is sent and taken, but not verified.
-  bool verify_outputs{true};
-  std::int32_t answer_timeout_us{500};  ///< longest that a cycle waits for a frame, 50 ... 1000000; below the period
-  /// A counter that goes faster than this tells nonsense; far above what the motor reaches. rad/s, > 0.
-  double plausible_speed_rad_s{1000.0};
+  ABS_HIL_OPTIONS(UsbOptions);
+  ABS_HIL_OPTION(std::string, sysfs_root, "/sys/bus/usb/devices",
+                 .meaning = "where the kernel shows what is plugged in");
+  ABS_HIL_OPTION(std::string, device_root, "/dev/bus/usb", .meaning = "folder with the device nodes BUS/DEVICE");
+  // The maker's numbers are not public.
+  ABS_HIL_OPTION(std::int32_t, vendor_id, -1, .meaning = "the board's; -1: any", .range = rig::between(-1, 65535));
+  ABS_HIL_OPTION(std::int32_t, product_id, -1, .meaning = "the board's; -1: any", .range = rig::between(-1, 65535));
+  ABS_HIL_OPTION(std::string, manufacturer, "InTeCo",
+                 .meaning = "the board's own word for its maker; empty: not compared");
+  ABS_HIL_OPTION(std::string, serial, "", .meaning = "which board; empty: the only one");
+  ABS_HIL_OPTION(std::int32_t, version, -1, .meaning = "version word that the board must show; -1: not compared",
+                 .range = rig::between(-1, 65535));
+  ABS_HIL_OPTION(std::int32_t, drive_pwm, 0, .meaning = "PWM channel of the drive", .range = rig::between(0, 9));
+  ABS_HIL_OPTION(std::int32_t, brake_pwm, 1, .meaning = "PWM channel of the brake", .range = rig::between(0, 9));
+  ABS_HIL_OPTION(std::int32_t, enable_line, -1, .meaning = "digital line that enables the motor; -1: none",
+                 .range = rig::between(-1, 14));
+  ABS_HIL_OPTION(bool, enable_inverted, false, .meaning = "the line is low while the motor is enabled");
+  ABS_HIL_OPTION(std::int32_t, lower_channel, 0, .meaning = "encoder channel of the lower wheel",
+                 .range = rig::between(0, 7));
+  ABS_HIL_OPTION(std::int32_t, upper_channel, 1, .meaning = "encoder channel of the upper wheel",
+                 .range = rig::between(0, 7));
+  ABS_HIL_OPTION(std::int32_t, lower_sign, 1, encoder_sign);
+  ABS_HIL_OPTION(std::int32_t, upper_sign, 1, encoder_sign);
+  ABS_HIL_OPTION(double, motor_duty_max, 1.0, motor_duty_cap);
+  /// As on the RT-DAC4/PCI.
+  ABS_HIL_OPTION(double, brake_duty_max, 0.7, brake_duty_cap);
+  ABS_HIL_OPTION(std::string, pwm_mode, "12-bit", pwm_width);
+  /// 160 Hz if the board's clock is the PCI board's.
+  ABS_HIL_OPTION(std::int32_t, pwm_prescaler, 60, .meaning = "PWM frequency: clock / ((prescaler + 1) 255 or 4095)",
+                 .range = rig::between(0, 65535));
+  /// Whether the board shows them is not known; without it the safe state is sent and taken, but not verified.
+  ABS_HIL_OPTION(bool, verify_outputs, true, .meaning = "every frame must show the PWM words that were sent");
+  ABS_HIL_OPTION(std::int32_t, answer_timeout_us, 500, .unit = "us",
+                 .meaning = "longest that a cycle waits for its frame; below the period",
+                 .range = rig::between(50, 1'000'000));
+  ABS_HIL_OPTION(double, plausible_speed_rad_s, 1000.0, plausible_speed);
   std::int32_t encoder_counts_per_rev{4096};  ///< for that check alone; 1024 lines, quadrature
 };
 

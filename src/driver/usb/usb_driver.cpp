@@ -5,9 +5,10 @@
 #include <tuple>
 #include <utility>
 
-#include "abs_hil/driver/encoder_sign.hpp"
-#include "abs_hil/driver/plausibility.hpp"
+#include "abs_hil/rig/option_check.hpp"
 #include "abs_hil/rig/time_units.hpp"
+#include "driver/encoder_sign.hpp"
+#include "driver/plausibility.hpp"
 
 namespace abs_hil::driver::usb {
 
@@ -40,15 +41,13 @@ IoResult with_reason(IoResult result) noexcept {
 
 UsbDriver::UsbDriver(const UsbOptions& options, OpenBoard open_board, ReadClock read_clock)
     : options_(options),
-      mode_(options.pwm_mode == "8-bit" ? PwmMode::bits_8 : PwmMode::bits_12),
+      mode_(pwm_mode_named(options.pwm_mode)),
       open_board_(std::move(open_board)),
       read_clock_(read_clock) {
+  rig::require_valid(options, "driver.usb.");
   check_sign("driver.usb.lower_sign", options.lower_sign);
   check_sign("driver.usb.upper_sign", options.upper_sign);
-  if (options.lower_channel == options.upper_channel) {
-    throw std::invalid_argument("driver.usb.lower_channel = driver.usb.upper_channel = " +
-                                std::to_string(options.upper_channel) + ": each wheel has an encoder of its own");
-  }
+  check_channels("driver.usb.", options.lower_channel, options.upper_channel);
   if (options.drive_pwm == options.brake_pwm) {
     throw std::invalid_argument("driver.usb.drive_pwm = driver.usb.brake_pwm = " + std::to_string(options.brake_pwm) +
                                 ": drive and brake have a PWM each");

@@ -71,7 +71,7 @@ TEST_CASE("Counts go on across the wrap of the node's counters") {
 
 TEST_CASE("Signs turn the counters round") {
   Active forward;
-  Active backward({.upper_sign = -1, .lower_sign = -1});
+  Active backward({.lower_sign = -1, .upper_sign = -1});
   for (int i = 0; i < 20; ++i) {
     REQUIRE(forward.cycle().ok());
     REQUIRE(backward.cycle().ok());

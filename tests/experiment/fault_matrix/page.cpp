@@ -28,17 +28,18 @@ std::string cell(const MatrixCase& c, double nominal_m) {
 
 constexpr const char* introduction = R"(# Fault matrix
 
-Written by `scripts/fault_matrix.sh` from the runs of the test `fault_matrix`, which fails when this page is out of date: do
-not edit. Every signal, every kind of fault, every phase: the paper's experiment (adaptive, plant `paper-table1`, 1 kHz,
-seed 1, idle, coast and stopped 0.3 s long) on the virtual clock, with one fault that begins 100 ms (hold: 10 ms) into the
-phase and stays. On the simulated rig; then, with faults while accelerating and while braking, with the driver of the PCI
-card on the registers of the emulated card, whose brake is capped at 0.7. [fault-injection.md](fault-injection.md) says
-what each fault does, [safety.md](safety.md) what must come of it and why.
+Do not edit: `scripts/fault_matrix.sh` writes this page from the runs of the test `fault_matrix`, which fails if the
+page is out of date. The tables cover every signal, every kind of fault and every phase. Each run is the paper's
+experiment (adaptive, plant `paper-table1`, 1 kHz, seed 1, idle, coast and stopped 0.3 s long) on the virtual clock.
+One fault begins 100 ms (hold: 10 ms) into the phase and stays. The first part uses the simulated rig. The second part
+uses the driver of the PCI card on the registers of the emulated card, with the brake limited to 0.7 and faults during
+acceleration and braking. [fault-injection.md](fault-injection.md) describes each fault, [safety.md](safety.md) the
+required reaction and its reason.
 
-A number is the reason of the stop (below), with the time from the first reading or command in which the fault made a
-difference to the end of the cycle after which the safe state was on the wire. "goes on": the run went to its end, with the
-stopping distance's change where there is one.
-In all runs the safe state was reached and the CSV held every cycle up to the last; after every fault the flight recorder
+A number is the reason of the stop (below). The time after it counts from the first reading or command that the fault
+changed to the end of the cycle after which the safe state was on the wire. "goes on" means that the run reached its
+end; a percentage gives the change of the stop distance.
+All runs reached the safe state, and the CSV held every cycle up to the last. After every fault the flight recorder
 held the last 2 s and the reason, in memory and in its three files.
 )";
 

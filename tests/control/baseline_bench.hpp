@@ -2,8 +2,8 @@
 
 #include "control/braking_bench.hpp"
 
-/// Helpers of the rivals' tests, written out independently of the control room.
-namespace rival {
+/// Helpers of the tests of the baseline controllers, written out independently of the control room.
+namespace baseline {
 
 using namespace abs_hil;
 
@@ -37,4 +37,4 @@ inline control::SlipInput input_at(const rig::RigParameters& rig, double omega2,
   return in;
 }
 
-}  // namespace rival
+}  // namespace baseline

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "abs_hil/control/controller_context.hpp"
+#include "abs_hil/control/paper_laws.hpp"
 #include "abs_hil/control/slip_controller.hpp"
 
 namespace abs_hil::control {
@@ -11,9 +12,8 @@ struct WantedMotion {
   double error_at_mid_m_s{0.0};  ///< e_v in its middle
 };
 
-/// Equivalent control, the part that all slip laws share: from (14), e_v' = -k theta phi(slip) - friction drift +
-/// (r1/J1) Tb, so the torque that makes e_v move as a law wants is
-///   Tb = (J1/r1) ( wanted e_v' + k(slip_ref) theta phi(slip) + friction drift ).
+/// Equivalent control, the part that all slip laws share: by (14) the torque that makes e_v move as a law wants is
+/// Tb = (J1/r1) xi_1 with the wanted e_v' for nu, `xi_1` and `T_b` of paper_laws.hpp.
 /// The torque is held for a period, so the terms that cancel what the plant does by itself are taken in the middle of
 /// it: phi changes by a quarter within 1 ms when braking starts. The slip there is predicted with the model along the
 /// wanted motion, never by differentiating measurements, so that prediction does not amplify noise.
@@ -32,7 +32,7 @@ class EquivalentControl {
   [[nodiscard]] double period_s() const noexcept { return 2.0 * half_period_s_; }
 
  private:
-  rig::WheelParameters wheels_;
+  paper::Laws<double> laws_;
   rig::TyreParameters tyre_;
   double v_min_m_s_;
   double half_period_s_;

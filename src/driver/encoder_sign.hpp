@@ -18,4 +18,12 @@ inline void check_sign(const char* key, std::int32_t sign) {
   throw std::invalid_argument(std::string(key) + " = " + std::to_string(sign) + ": give 1 or -1");
 }
 
+/// Throws std::invalid_argument, naming the keys, if both wheels have the same encoder channel.
+/// @param board prefix of the keys, "driver.pci."
+inline void check_channels(const std::string& board, std::int32_t lower, std::int32_t upper) {
+  if (lower != upper) return;
+  throw std::invalid_argument(board + "lower_channel = " + board + "upper_channel = " + std::to_string(upper) +
+                              ": each wheel has an encoder of its own");
+}
+
 }  // namespace abs_hil::driver

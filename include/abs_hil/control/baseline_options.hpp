@@ -1,0 +1,94 @@
+#pragma once
+
+#include "abs_hil/rig/option.hpp"
+
+namespace abs_hil::control {
+
+// The defaults are the gains that abs_tune recorded in config/tuned (docs/comparison.md); a test compares them.
+
+/// Adaptation of the equivalent control, theta_hat' = -gamma k phi s, where s is what stands for sign(e_v).
+struct SwitchingAdaptationOptions {
+  ABS_HIL_OPTIONS(SwitchingAdaptationOptions);
+  /// 0: theta_hat stays at theta0_N.
+  ABS_HIL_OPTION(double, gamma, 5.0, .unit = "kg^2 m/s^3", .meaning = "gain of theta_hat' = -gamma k phi sign(e_v)",
+                 .range = rig::from_zero(1e4), .search = rig::search(1, 1000));
+  ABS_HIL_OPTION(double, theta0_N, 18.0, .unit = "N", .meaning = "first estimate of theta",
+                 .range = rig::from_zero(500), .search = rig::search_linearly(0, 40), .start_value = true);
+  ABS_HIL_OPTION(double, theta_min_N, 0.0, .unit = "N", .meaning = "least theta the estimate may take",
+                 .range = rig::from_zero(500));
+  ABS_HIL_OPTION(double, theta_max_N, 100.0, .unit = "N", .meaning = "largest theta the estimate may take",
+                 .range = rig::positive(1000));
+};
+
+struct SlidingModeOptions {
+  ABS_HIL_OPTIONS(SlidingModeOptions);
+  ABS_HIL_OPTION(double, gain_m_s2, 73.8, .unit = "m/s^2", .meaning = "K of -K sign(e_v)", .range = rig::positive(200),
+                 .search = rig::search(0.5, 100));
+  ABS_HIL_GROUP(SwitchingAdaptationOptions, adaptation, "", {.gamma = 1.25, .theta0_N = 0.497});
+};
+
+struct SmoothSlidingModeOptions {
+  ABS_HIL_OPTIONS(SmoothSlidingModeOptions);
+  ABS_HIL_OPTION(double, gain_m_s2, 95.3, .unit = "m/s^2", .meaning = "K of -K sat(e_v/width)",
+                 .range = rig::positive(200), .search = rig::search(0.5, 100));
+  ABS_HIL_OPTION(double, boundary_m_s, 2.29, .unit = "m/s", .meaning = "width of the boundary layer in e_v",
+                 .range = rig::between(1e-3, 10), .search = rig::search(0.01, 5));
+  ABS_HIL_GROUP(SwitchingAdaptationOptions, adaptation, "", {.gamma = 69.1, .theta0_N = 0.837});
+};
+
+struct SuperTwistingOptions {
+  ABS_HIL_OPTIONS(SuperTwistingOptions);
+  ABS_HIL_OPTION(double, k1, 37.8, .unit = "m^0.5/s^1.5", .meaning = "gain of sqrt|e_v|", .range = rig::positive(200),
+                 .search = rig::search(0.5, 100));
+  ABS_HIL_OPTION(double, k2, 3.47, .unit = "m/s^3", .meaning = "gain of the integral of sign(e_v)",
+                 .range = rig::positive(5000), .search = rig::search(1, 2000));
+  ABS_HIL_GROUP(SwitchingAdaptationOptions, adaptation, "", {.gamma = 2.02, .theta0_N = 29.3});
+};
+
+struct RelayOptions {
+  ABS_HIL_OPTIONS(RelayOptions);
+  ABS_HIL_OPTION(double, threshold, 0.0447, .meaning = "slip that releases the brake; 0: control.slip_ref",
+                 .range = rig::from_zero(0.99), .search = rig::search(0.01, 0.6));
+};
+
+struct PiOptions {
+  ABS_HIL_OPTIONS(PiOptions);
+  ABS_HIL_OPTION(double, kp_per_s, 39.3, .unit = "1/s", .meaning = "proportional gain on e_v",
+                 .range = rig::positive(1000), .search = rig::search(2, 300));
+  ABS_HIL_OPTION(double, ki_per_s2, 71.6, .unit = "1/s^2", .meaning = "integral gain on e_v",
+                 .range = rig::from_zero(1e4), .search = rig::search(0.1, 2000));
+  ABS_HIL_OPTION(double, feed_forward, 0.0311, .meaning = "share of the measured tyre force fed forward",
+                 .range = rig::between(0, 1), .search = rig::search_linearly(0, 1));
+};
+
+/// Accelerations are those of the wheel's circumference, r1 omega1'. FivePhaseController names the phases.
+struct FivePhaseOptions {
+  ABS_HIL_OPTIONS(FivePhaseOptions);
+  /// Apply or re-apply -> hold.
+  ABS_HIL_OPTION(double, hold_below_m_s2, -5.15, .unit = "m/s^2",
+                 .meaning = "wheel acceleration below which the torque is held", .range = rig::negative(-500),
+                 .search = rig::search_linearly(-150, -5));
+  /// Hold -> release; at most hold_below_m_s2.
+  ABS_HIL_OPTION(double, release_below_m_s2, -23.3, .unit = "m/s^2", .meaning = "... below which it is released",
+                 .range = rig::negative(-500), .search = rig::search_linearly(-200, -5));
+  /// Release -> recover.
+  ABS_HIL_OPTION(double, recover_above_m_s2, -16.2, .unit = "m/s^2", .meaning = "... above which releasing ends",
+                 .range = rig::between(-500, 500), .search = rig::search_linearly(-50, 50));
+  /// Recover -> re-apply, once the acceleration has been above it.
+  ABS_HIL_OPTION(double, reapply_below_m_s2, 50.9, .unit = "m/s^2",
+                 .meaning = "... below which, after its peak, it is re-applied", .range = rig::between(-500, 500),
+                 .search = rig::search_linearly(-20, 60));
+  ABS_HIL_OPTION(double, hold_limit_s, 0.122, .unit = "s", .meaning = "longest hold before the torque is re-applied",
+                 .range = rig::positive(5), .search = rig::search(0.005, 0.3));
+  /// Release at zero torque -> recover, and recover -> re-apply when nothing happens.
+  ABS_HIL_OPTION(double, recover_limit_s, 0.347, .unit = "s", .meaning = "longest wait for the wheel to come back",
+                 .range = rig::positive(5), .search = rig::search(0.01, 0.5));
+  ABS_HIL_OPTION(double, apply_Nm_s, 118.0, .unit = "N m/s", .meaning = "torque ramp of the first application",
+                 .range = rig::positive(1e4), .search = rig::search(10, 500));
+  ABS_HIL_OPTION(double, release_Nm_s, 479.0, .unit = "N m/s", .meaning = "torque ramp down",
+                 .range = rig::positive(1e4), .search = rig::search(10, 1000));
+  ABS_HIL_OPTION(double, reapply_Nm_s, 22.4, .unit = "N m/s", .meaning = "torque ramp of the re-application",
+                 .range = rig::positive(1e4), .search = rig::search(1, 300));
+};
+
+}  // namespace abs_hil::control

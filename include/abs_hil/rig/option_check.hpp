@@ -1,0 +1,46 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+#include "abs_hil/rig/option.hpp"
+
+namespace abs_hil::rig {
+
+/// What an option takes, for an error: "a number in (0, 1] N m", "one of a, b".
+[[nodiscard]] std::string valid_number_text(const OptionFacts& facts, bool whole);
+[[nodiscard]] std::string valid_name_text(const OptionFacts& facts);
+/// "NAME = VALUE is not valid; give VALID UNIT (MEANING)".
+[[nodiscard]] std::string refusal(std::string_view name, std::string_view value, std::string_view valid,
+                                  const OptionFacts& facts);
+
+/// Throws std::invalid_argument, naming option, value and range, unless the value is one that its row allows.
+void require_valid(std::string_view name, const OptionFacts& facts, double value);
+void require_valid(std::string_view name, const OptionFacts& facts, std::string_view text);
+
+/// Throws std::invalid_argument unless every option, those of groups included, is one that its row allows.
+/// @param prefix of the keys, as in "control.adaptive_peak."
+template <class Options>
+void require_valid(const Options& options, const std::string& prefix) {
+  for_each_option(options, prefix, [](const std::string& name, const OptionFacts& facts, const auto& value) {
+    using Value = std::remove_cvref_t<decltype(value)>;
+    if constexpr (std::is_same_v<Value, std::string>) {
+      require_valid(name, facts, std::string_view(value));
+    } else if constexpr (!std::is_same_v<Value, bool>) {
+      require_valid(name, facts, static_cast<double>(value));
+    }
+  });
+}
+
+/// The same for one of the options of `Options` itself.
+template <class Options>
+void require_valid(const Options& options, double Options::*member, const std::string& prefix) {
+  for_each_row<Options>([&](const auto& row) {
+    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(row)>, OptionRow<Options, double>>) {
+      if (row.member == member) require_valid(prefix + std::string(row.facts.key), row.facts, options.*member);
+    }
+  });
+}
+
+}  // namespace abs_hil::rig

@@ -1,0 +1,71 @@
+#include "abs_hil/rig/option.hpp"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
+
+#include "abs_hil/rig/option_check.hpp"
+
+namespace abs_hil::rig {
+
+namespace {
+
+/// As short as reads back to the same number, with an exponent only for very large and very small ones.
+std::string number_text(double value) {
+  const double size = std::abs(value);
+  const bool plain = value == 0.0 || (size >= 1e-4 && size < 1e16);
+  std::array<char, 32> text{};
+  const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value,
+                                          plain ? std::chars_format::fixed : std::chars_format::scientific);
+  return error == std::errc() ? std::string(text.data(), end) : std::string("?");
+}
+
+}  // namespace
+
+std::string Range::text() const {
+  return (least_open ? '(' : '[') + number_text(least) + ", " + number_text(most) + (most_open ? ')' : ']');
+}
+
+std::vector<std::string_view> AllowedNames::list() const {
+  std::vector<std::string_view> names;
+  for (std::size_t index = 0; !at(index).empty(); ++index) names.push_back(at(index));
+  return names;
+}
+
+bool AllowedNames::contains(std::string_view name) const noexcept {
+  if (empty()) return true;
+  for (std::size_t index = 0; !at(index).empty(); ++index) {
+    if (at(index) == name) return true;
+  }
+  return false;
+}
+
+std::string valid_number_text(const OptionFacts& facts, bool whole) {
+  return std::string(whole ? "a whole number in " : "a number in ") + facts.range.text();
+}
+
+std::string valid_name_text(const OptionFacts& facts) {
+  std::string text;
+  for (const std::string_view name : facts.allowed.list()) text.append(text.empty() ? "one of " : ", ").append(name);
+  return text.empty() ? "text" : text;
+}
+
+std::string refusal(std::string_view name, std::string_view value, std::string_view valid, const OptionFacts& facts) {
+  std::string text(name);
+  text.append(" = ").append(value).append(" is not valid; give ").append(valid);
+  if (!facts.unit.empty()) text.append(" ").append(facts.unit);
+  return text.append(" (").append(facts.meaning).append(")");
+}
+
+void require_valid(std::string_view name, const OptionFacts& facts, double value) {
+  if (facts.range.contains(value)) return;
+  throw std::invalid_argument(refusal(name, number_text(value), valid_number_text(facts, false), facts));
+}
+
+void require_valid(std::string_view name, const OptionFacts& facts, std::string_view text) {
+  if (facts.allowed.contains(text)) return;
+  throw std::invalid_argument(refusal(name, '"' + std::string(text) + '"', valid_name_text(facts), facts));
+}
+
+}  // namespace abs_hil::rig
