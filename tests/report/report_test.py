@@ -1,4 +1,4 @@
-"""abs_report on runs of abs_hil: what the page holds, and what it makes of broken, incomplete and hostile runs."""
+"""abs_report on runs of abs_hil: the page's content, also for broken, incomplete and hostile runs."""
 import json
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""abs_report on what stands beside a run's rows: timing, configuration, events, as they are and broken."""
+"""abs_report on the files beside a run's rows: timing, configuration and events, valid and broken."""
 import os
 import re
 import subprocess
@@ -20,7 +20,7 @@ class SideFiles(ReportTest):
         return folder
 
     def without_summary(self, name, *args):
-        """A run whose summary is lost: what it held is looked for in the files beside it."""
+        """A run without its summary: abs_report takes the content from the other files."""
         folder = self.make_run(name, *args)
         os.remove(folder / 'summary.json')
         return folder
@@ -35,7 +35,7 @@ class SideFiles(ReportTest):
         self.assertEqual(read.cell('timing', 'cycles'), str(summary['cycles']))
         self.assertEqual(read.cell('timing', 'late cycles'), str(summary['overruns']))
         self.assertEqual(read.cell('timing', 'real time obtained'), 'no')
-        # Every cycle after the first few stands in each column of the histogram once, and each column is a curve.
+        # Every cycle after the first few counts once in each column of the histogram, and each column is a curve.
         measured = summary['cycles'] - summary['config']['realtime']['startup_cycles']
         lines = (run / 'histogram.txt').read_text().splitlines()
         overflows = next(line for line in lines if 'Overflows' in line).split(':')[1].split()
@@ -48,7 +48,7 @@ class SideFiles(ReportTest):
 
     def test_histogram_beside_a_run_whose_summary_is_lost(self):
         run = self.without_summary('a')
-        # All of one duration: a single bar, whose sides are the bin's ends.
+        # All cycles have the same duration: a single bar between the edges of one bin.
         (run / 'histogram.txt').write_text(HISTOGRAM_HEAD + '# Histogram\n000005' + '\t000100' * PARTS +
                                            '\n# Histogram Overflows: 00002 00000 00000 00000 00001\n')
         page, said = self.page(run)

@@ -5,7 +5,6 @@
 #include <string_view>
 
 #include "abs_hil/control/baseline_options.hpp"
-#include "abs_hil/control/rival_options.hpp"
 #include "abs_hil/rig/option.hpp"
 
 namespace abs_hil::control {
