@@ -49,12 +49,9 @@ struct Grammar;
 
 /// One key of a table.
 struct Field {
-  std::string_view name;  ///< without the unit's suffix
+  rig::OptionFacts facts;  ///< key without the unit's suffix; range in SI units; names that a choice may be
   Shape shape;
-  std::string_view meaning;
   Quantity quantity{Quantity::none};
-  rig::Range range{};               ///< of numbers, in SI units
-  rig::AllowedNames allowed{};      ///< of choices
   const Grammar* grammar{nullptr};  ///< of tables
   bool required{false};
 };

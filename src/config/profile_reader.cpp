@@ -21,14 +21,14 @@ class ValueReader {
     if (!plain && node.is_number() && !outer_.has_suffix) {
       source_.fail(
           place, fmt::format("{} = {} has no unit; name it in the key {}{} = ... or write \"{} {}\"", what, shown(node),
-                             field.name, suffix_of(field.quantity), shown(node), unit_of(field.quantity)));
+                             field.facts.key, suffix_of(field.quantity), shown(node), field.facts.unit));
     }
     if (!plain && outer_.has_suffix && node.is_string() && !node.as_string()->get().starts_with('$')) {
       source_.fail(place, fmt::format("{} = {}: the key {} names the unit already; write a plain number", what,
                                       shown(node), outer_.key));
     }
     Field inner = field;
-    inner.name = what;
+    inner.facts.key = what;
     return read_number(source_, node, inner, what, outer_.has_suffix);
   }
 
@@ -148,7 +148,7 @@ class ProfileReader {
     }
     if (outer_.field->quantity != Quantity::none && !outer_.has_suffix) {
       source_.fail(entry.place, fmt::format("file = \"{}\": its values have no unit; name it in the key {}{} = ...",
-                                            name, outer_.field->name, suffix_of(outer_.field->quantity)));
+                                            name, outer_.field->facts.key, suffix_of(outer_.field->quantity)));
     }
     const std::optional<std::string> text = read_file(name);
     if (!text) source_.fail(entry.place, fmt::format("file = \"{}\": there is no such file beside the script", name));
@@ -176,12 +176,12 @@ class ProfileReader {
       const auto first = std::from_chars(line.data(), end, time_s);
       const bool comma = first.ec == std::errc() && first.ptr != end && *first.ptr == ',';
       const auto second = comma ? std::from_chars(first.ptr + 1, end, value) : first;
-      if (!comma || second.ec != std::errc() || second.ptr != end || !outer_.field->range.contains(value)) {
+      if (!comma || second.ec != std::errc() || second.ptr != end || !outer_.field->facts.range.contains(value)) {
         source_.fail(place, fmt::format("file \"{}\", line {}: give a time in s and a value in {}", name, row,
-                                        outer_.field->range.text()));
+                                        outer_.field->facts.range.text()));
       }
       Number number{
-          .value = value, .unit = unit_of(outer_.field->quantity), .range = outer_.field->range, .place = place};
+          .value = value, .unit = outer_.field->facts.unit, .range = outer_.field->facts.range, .place = place};
       add_point(time_s, number, place);
     }
     if (profile_.points.empty()) source_.fail(place, fmt::format("file \"{}\" holds no points", name));

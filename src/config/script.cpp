@@ -100,7 +100,7 @@ class Parser {
       source_.fail(entry.place,
                    fmt::format("motor = {}: give \"off\", a duty in {}, or a profile of duties {{ from, to, "
                                "over_s }}, {{ before, after, at_s }}, {{ points }}, {{ file }}",
-                               shown(*entry.node), entry.field->range.text()));
+                               shown(*entry.node), entry.field->facts.range.text()));
     }
     return read_course(source_, entry, read_file_, script_.files);
   }
@@ -121,9 +121,9 @@ class Parser {
                                                reader.entries().size()));
     }
     const Entry& what = reader.entries().front();
-    phase.brake = what.field->name == "duty"     ? BrakeAction::duty
-                  : what.field->name == "torque" ? BrakeAction::torque
-                                                 : BrakeAction::slip_control;
+    phase.brake = what.field->facts.key == "duty"     ? BrakeAction::duty
+                  : what.field->facts.key == "torque" ? BrakeAction::torque
+                                                      : BrakeAction::slip_control;
     phase.brake_course = read_course(source_, what, read_file_, script_.files);
   }
 

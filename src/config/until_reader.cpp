@@ -39,7 +39,7 @@ ConditionScript read_condition(const Source& source, const TableReader& reader, 
   condition.place = reader.place();
   const Entry* what = nullptr;
   for (const Entry& entry : reader.entries()) {
-    if (entry.field->name == "when") continue;
+    if (entry.field->facts.key == "when") continue;
     if (what != nullptr) {
       source.fail(entry.key_place,
                   fmt::format("\"{}\" and \"{}\" in one condition: say any = [{{ ... }}, {{ ... }}] or all = "
@@ -53,7 +53,7 @@ ConditionScript read_condition(const Source& source, const TableReader& reader, 
                 "an end condition is missing; give lasts_s, upper_speed_above_rad_s, car_speed_below_m_s, "
                 "standstill, ... (docs/experiments.md)");
   }
-  if (what->field->name == "all" && depth != Depth::all) {
+  if (what->field->facts.key == "all" && depth != Depth::all) {
     condition.kind = EndKind::all;
     condition.parts = read_list(source, reader, *what, Depth::all);
     for (const ConditionScript& part : condition.parts) {
@@ -62,12 +62,12 @@ ConditionScript read_condition(const Source& source, const TableReader& reader, 
     }
     return condition;
   }
-  if (what->field->name == "any" || what->field->name == "all") {
+  if (what->field->facts.key == "any" || what->field->facts.key == "all") {
     source.fail(what->key_place,
                 fmt::format("\"{}\" has no place within another list; any may hold all, no more", what->key));
   }
   for (const Known& known : conditions) {
-    if (known.name == what->field->name) condition.kind = known.kind;
+    if (known.name == what->field->facts.key) condition.kind = known.kind;
   }
   if (condition.kind == EndKind::standstill) {
     const auto* flag = what->node->as_boolean();
