@@ -43,7 +43,7 @@ void set_values(const toml::table& table, const std::string& prefix, const fs::p
     } else if (const auto* real = node.as_floating_point()) {
       keys.set(name, real->get(), origin);
     } else {
-      throw ConfigError(fmt::format("{}: {} is neither number, flag nor text", origin, name));
+      throw ConfigError(fmt::format("{}: {} is neither a number, a flag nor a text; give one of them", origin, name));
     }
   }
 }
@@ -56,8 +56,8 @@ void load_file(const fs::path& file, KeyTable& keys, std::string_view only_table
   if (!only_table.empty()) {
     for (const auto& [key, node] : table) {
       if (key.str() == only_table && node.is_table()) continue;
-      throw ConfigError(fmt::format("{}:{}: {} has no place here; this file may hold the table [{}] only",
-                                    file.string(), node.source().begin.line, std::string_view(key.str()), only_table));
+      throw ConfigError(fmt::format("{}:{}: {} does not belong in this file; give the table [{}] only", file.string(),
+                                    node.source().begin.line, std::string_view(key.str()), only_table));
     }
   }
   set_values(table, {}, file, keys);

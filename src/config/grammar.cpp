@@ -8,7 +8,7 @@ namespace {
 
 constexpr double day_s = 86'400.0;
 constexpr rig::Range duration = rig::from_zero(day_s);
-/// No phase lasts longer, whatever it waits for (experiment::Sequence), its slack of a second included.
+/// The longest time limit of a phase (experiment::Sequence). It includes the slack of one second.
 constexpr rig::Range phase_limit = rig::positive(600.0);
 constexpr rig::Range phase_duration = rig::from_zero(599.0);
 constexpr rig::Range span = rig::positive(day_s);

@@ -34,7 +34,7 @@ std::string Source::at(Place place) const { return fmt::format("{}:{}:{}", path_
 
 void Source::fail(Place place, std::string_view message) const {
   std::string text = fmt::format("{}: {}", at(place), message);
-  // A key in quotes may hold a line end.
+  // A quoted key may contain a line end, but a message is one line.
   for (char& c : text) {
     if (static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) == 0x7F) c = ' ';
   }
@@ -106,7 +106,7 @@ TableReader::TableReader(const Source& source, const toml::table& table, const G
     }
     entries_.push_back(std::move(entry));
   }
-  // In the order of the file, which toml++ does not keep.
+  // toml++ does not keep the order of the file.
   std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
     return std::pair(a.key_place.line, a.key_place.column) < std::pair(b.key_place.line, b.key_place.column);
   });

@@ -17,7 +17,7 @@ Json bounds(const rig::Range& range) {
           {range.most_open ? "exclusiveMaximum" : "maximum", range.most}};
 }
 
-/// A name for "$defs": letters alone.
+/// A name for "$defs": letters and underscores only.
 std::string definition_of(const Grammar& grammar) {
   std::string name;
   for (const char c : grammar.title) {

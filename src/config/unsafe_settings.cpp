@@ -10,13 +10,13 @@ namespace abs_hil::config {
 
 namespace {
 
-/// The kernel's own files are of real cards, whatever driver.emulated says.
+/// The kernel's own files belong to real cards, whatever driver.emulated says.
 bool is_of_the_kernel(const std::string& folder) {
   std::error_code error;
   return std::filesystem::weakly_canonical(folder, error).string().starts_with("/sys/");
 }
 
-/// A network interface with a device behind it is an adapter; vcan has none, nor has a socket in place of a bus.
+/// A network interface with a device is an adapter to a real bus. Neither vcan nor a socket has a device.
 bool is_an_adapter(const std::string& interface) {
   std::error_code ignored;
   return std::filesystem::exists("/sys/class/net/" + interface + "/device", ignored);
@@ -58,12 +58,12 @@ void refuse_hardware_without_guardian(const Settings& s) {
                                                    : std::string();
     if (real.empty()) return;
     throw ConfigError(fmt::format(
-        "guardian.enabled = false: driver.emulated=true, but {} is of real hardware, which is driven beside a guardian "
-        "only; leave it out, or name the emulator's",
+        "guardian.enabled = false: driver.emulated=true, but {} is real hardware, which needs a guardian; leave it "
+        "out, or name the emulator's",
         real));
   }
   throw ConfigError(
-      "guardian.enabled = false: a real rig is driven beside a guardian only, as its PWMs are assumed to hold when the "
+      "guardian.enabled = false: a real rig needs a guardian, because its PWMs may hold their values when the "
       "program dies; leave it out, or for an emulator (never hardware) --set driver.emulated=true");
 }
 

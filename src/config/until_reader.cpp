@@ -27,7 +27,7 @@ constexpr std::array<Known, 12> conditions{{
     {"standstill", EndKind::standstill},
 }};
 
-/// Lists stand in `until` alone, and all of several may be one of any.
+/// `until` may hold a list any or all. A list any may hold lists all. Deeper lists are refused.
 enum class Depth { until, any, all };
 
 std::vector<ConditionScript> read_list(const Source& source, const TableReader& reader, const Entry& entry,
@@ -42,7 +42,7 @@ ConditionScript read_condition(const Source& source, const TableReader& reader, 
     if (entry.field->facts.key == "when") continue;
     if (what != nullptr) {
       source.fail(entry.key_place,
-                  fmt::format("\"{}\" and \"{}\" in one condition: say any = [{{ ... }}, {{ ... }}] or all = "
+                  fmt::format("\"{}\" and \"{}\" in one condition; give any = [{{ ... }}, {{ ... }}] or all = "
                               "[{{ ... }}, {{ ... }}]",
                               what->key, entry.key));
     }
@@ -57,14 +57,14 @@ ConditionScript read_condition(const Source& source, const TableReader& reader, 
     condition.kind = EndKind::all;
     condition.parts = read_list(source, reader, *what, Depth::all);
     for (const ConditionScript& part : condition.parts) {
-      // Left out, it would make the others stronger or weaker: not to be guessed.
-      if (part.when) source.fail(part.place, "a condition within all has no when; give the list itself one");
+      // Without this condition the others would mean something else. The parser does not guess.
+      if (part.when) source.fail(part.place, "a condition within all takes no when; give the when to the list");
     }
     return condition;
   }
   if (what->field->facts.key == "any" || what->field->facts.key == "all") {
     source.fail(what->key_place,
-                fmt::format("\"{}\" has no place within another list; any may hold all, no more", what->key));
+                fmt::format("\"{}\" must not stand in this list; only any may hold a list, and only all", what->key));
   }
   for (const Known& known : conditions) {
     if (known.name == what->field->facts.key) condition.kind = known.kind;
