@@ -52,7 +52,7 @@ TEST_CASE("A registered controller stands beside ours; a taken or empty name is 
   const control::ControlOptions options;
   const rig::RigParameters parameters;
   CHECK(control::make_controller("own-locked", {options, parameters}) != nullptr);
-  CHECK_THROWS_WITH(control::register_controller(entry), Contains("'own-locked' is there already"));
+  CHECK_THROWS_WITH(control::register_controller(entry), Contains("'own-locked' already exists"));
   CHECK_THROWS_AS(control::register_controller({"", "none", entry.make}), std::invalid_argument);
 }
 

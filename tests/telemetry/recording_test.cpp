@@ -174,7 +174,7 @@ TEST_CASE("CSV that is not of a recording is refused by name") {
   using Catch::Matchers::Contains;
   CHECK_THROWS_WITH(csv_to_log(scratch / "own.csv", scratch / "back.lcmlog"), Contains("encoder counts"));
   log_to_csv(scratch / "run.lcmlog", scratch / "made.csv");
-  CHECK_THROWS_WITH(log_to_csv(scratch / "run.lcmlog", scratch / "made.csv"), Contains("is there already"));
+  CHECK_THROWS_WITH(log_to_csv(scratch / "run.lcmlog", scratch / "made.csv"), Contains("already exists"));
   std::string text = content(scratch / "made.csv");
   const std::size_t row = text.find('\n') + 1;
   put(scratch / "bad.csv", text.substr(0, row) + "abc" + text.substr(row));

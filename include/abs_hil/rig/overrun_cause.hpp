@@ -7,7 +7,7 @@
 
 namespace abs_hil::rig {
 
-/// The part of a late cycle that took longest, and so the one to look at.
+/// The longest part of a late cycle, which is the probable cause.
 enum class OverrunCause : std::uint8_t {
   none = 0,
   wakeup,   ///< the kernel let the thread run late: scheduling, interrupts, C-states, firmware
@@ -28,10 +28,10 @@ inline constexpr std::size_t overrun_cause_count = 6;
 /// Late cycles since the start of a run. A cycle is late if it has not ended when the next one should begin.
 struct OverrunCounts {
   std::uint64_t total{0};
-  std::uint64_t startup{0};                                   ///< within the start-up cycles; not part of `total`
-  std::uint64_t ticks_missed{0};                              ///< whole periods skipped because of those in `total`
-  std::uint64_t longest_run{0};                               ///< most of them in a row
-  std::array<std::uint64_t, overrun_cause_count> by_cause{};  ///< adds up to `total`
+  std::uint64_t startup{0};                                   ///< during the start-up cycles; not included in `total`
+  std::uint64_t ticks_missed{0};                              ///< whole periods that the late cycles of `total` skipped
+  std::uint64_t longest_run{0};                               ///< largest number of consecutive late cycles
+  std::array<std::uint64_t, overrun_cause_count> by_cause{};  ///< the sum is `total`
 
   [[nodiscard]] std::uint64_t of(OverrunCause cause) const noexcept {
     return by_cause[static_cast<std::size_t>(cause)];

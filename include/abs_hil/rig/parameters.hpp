@@ -49,22 +49,23 @@ struct BrakeParameters {
                  .range = positive(1000));
 };
 
-/// Lower wheel's DC motor: Tm = stall_torque * duty * (1 - omega2 / no_load_speed). Not in the paper, so calibrated:
-/// the paper's plots start braking at about 6.2 s from omega1 = 170 rad/s, 0.05 s of which the motor is off. With the
-/// no-load speed set to 220 rad/s (170 rad/s is reached at 0.78 of it), the stall torque is the root of "full duty from
-/// rest brings the upper wheel to 170 rad/s in 6.15 s", bisected on the simulated plant of Table 1. The lumped model
-/// without slip, J w' = K - M - (K/w0 + d) w with both wheels' J, d, M referred to the lower one, gives 2.1077 N m in
-/// closed form; slip in traction accounts for the rest. tests/plant_sim/actuators_test.cpp checks both.
+/// Lower wheel's DC motor: Tm = stall_torque * duty * (1 - omega2 / no_load_speed). The paper does not give it,
+/// so it is calibrated. The paper's plots start braking at about 6.2 s from omega1 = 170 rad/s; the motor is off for
+/// the last 0.05 s. The no-load speed is set to 220 rad/s (170 rad/s is 0.78 of it). The stall torque is bisected on
+/// the simulated plant of Table 1, so that full duty from rest brings the upper wheel to 170 rad/s in 6.15 s. The
+/// lumped model without slip, J w' = K - M - (K/w0 + d) w with J, d, M of both wheels referred to the lower one,
+/// gives 2.1077 N m in closed form. Slip in traction causes the difference. tests/plant_sim/actuators_test.cpp checks
+/// both.
 struct DriveMotorParameters {
   ABS_HIL_OPTIONS(DriveMotorParameters);
   ABS_HIL_OPTION(double, stall_torque_Nm, 2.1122, .unit = "N m",
                  .meaning = "drive motor's torque at standstill and full duty", .range = positive(100));
-  /// There the back-EMF cancels the supply.
+  /// Speed at which the back-EMF cancels the supply.
   ABS_HIL_OPTION(double, no_load_speed_rad_s, 220.0, .unit = "rad/s", .meaning = "drive motor's no-load speed",
                  .range = positive(2000));
 };
 
-/// Everything a controller may know of the rig. SI units throughout.
+/// All parameters of the rig that a controller may use. SI units.
 struct RigParameters {
   ABS_HIL_OPTIONS(RigParameters);
   ABS_HIL_GROUP(TyreParameters, tyre, "", {});
