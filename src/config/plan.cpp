@@ -188,7 +188,7 @@ double value_of(const Script& script, const Number& number, const config::KeyTab
   const config::Key* key = find(keys, number.key);
   const double value = key == nullptr ? std::nan("") : number_of(*key).value_or(std::nan(""));
   if (!number.range.contains(value)) {
-    throw config::ConfigError(fmt::format("{}: this configuration has {} = {}; give a value in {}{}{}",
+    throw config::ConfigError(fmt::format("{}: ${} is {} in this configuration; give a value in {}{}{}",
                                           script.at(number.place), number.key, value, number.range.text(),
                                           number.unit.empty() ? "" : " ", number.unit));
   }

@@ -76,7 +76,7 @@ TEST_CASE("a configuration value out of the range it is used in is refused with 
 
 TEST_CASE("a script whose every phase is left out is refused") {
   const Script script = parsed("[[phase]]\nname = \"a\"\nwhen = \"control.slip_ref > 0.5\"\nuntil = { lasts_s = 1 }\n");
-  CHECK_THROWS_WITH(plan(script, config::Settings{}), Contains("every phase is left out"));
+  CHECK_THROWS_WITH(plan(script, config::Settings{}), Contains("leaves out every phase"));
 }
 
 TEST_CASE("limits of a script only tighten") {
