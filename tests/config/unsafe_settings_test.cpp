@@ -37,7 +37,7 @@ std::string an_adapter() {
 
 }  // namespace
 
-TEST_CASE("Hardware is not driven without a guardian, whatever is said of emulators") {
+TEST_CASE("Hardware needs a guardian, whatever driver.emulated says") {
   Settings settings = without_guardian();
   CHECK_THAT(refusal(settings), Contains("or for an emulator (never hardware) --set driver.emulated=true"));
   settings.driver.emulated = true;
@@ -65,7 +65,7 @@ TEST_CASE("An adapter to a real bus is hardware") {
   CHECK(refusal(settings).empty());
 }
 
-TEST_CASE("Faults are injected into simulations and emulators alone") {
+TEST_CASE("Faults are injected into simulations and emulators only") {
   Settings settings;
   settings.inject = "brake@encoder_upper:stuck";
   CHECK(refusal(settings).empty());

@@ -90,7 +90,7 @@ TEST_CASE("Options that are not usable are refused when the controller is made")
   refused("nominal", [](auto& o) { o.nominal.theta0_N = -5.0; });
 }
 
-TEST_CASE("The locked controller asks for all that there is, and estimates nothing") {
+TEST_CASE("The locked controller gives the largest torque, and estimates nothing") {
   const control::ControlOptions options;
   const rig::RigParameters parameters;
   const auto locked = control::make_controller("locked", {options, parameters});
