@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """usage: message_fields.py OUTPUT TYPE.lcm...
 
-Writes the C++ header abs_hil/message_fields.hpp: the fields of each message type by name, which lcm-gen's C++ does not
-offer. Each .lcm file holds one type; fields are scalars or strings. Anything else is an error.
+Writes the C++ header abs_hil/message_fields.hpp. It gives the fields of each message type by name, which lcm-gen's C++
+does not offer. Each .lcm file must hold one type, whose fields are scalars or strings.
 """
 import pathlib
 import re
@@ -28,7 +28,7 @@ namespace abs_hil::telemetry {{
 template <class M, class Message>
 concept Is = std::same_as<std::remove_const_t<M>, Message>;
 
-/// One field of a message type: its name, and where its value is.
+/// One field of a message type: its name and its member.
 template <class Message, class Value>
 struct Field {{
   std::string_view name;
@@ -75,14 +75,14 @@ def fields_of(path):
     text = re.sub(r'//[^\n]*|/\*.*?\*/', '', path.read_text(encoding='utf-8'), flags=re.DOTALL)
     struct = STRUCT.search(text)
     if struct is None or struct[1] != path.stem:
-        raise ValueError(f'{path}: no "struct {path.stem}"')
+        raise ValueError(f'{path}: there is no "struct {path.stem}"; give one')
     names = []
     for statement in filter(None, map(str.strip, struct[2].split(';'))):
         if CONSTANTS.fullmatch(statement):
             continue
         field = FIELD.fullmatch(statement)
         if field is None:
-            raise ValueError(f'{path}: "{statement}" is neither a constant nor one field of a scalar type or string')
+            raise ValueError(f'{path}: "{statement}" is neither a constant nor a field of a scalar type or string')
         names.append(field[1])
     return names
 

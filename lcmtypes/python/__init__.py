@@ -1,10 +1,10 @@
-"""The messages of abs_hil: what a running experiment publishes over LCM and what its event logs (.lcmlog) hold.
+"""The messages of abs_hil, which a running experiment publishes over LCM and writes to its event logs (.lcmlog).
 
     import abs_hil
-    message = abs_hil.decode(data)                  # whichever of the types it is
+    message = abs_hil.decode(data)                  # any of the types
     message = abs_hil.telemetry_t.decode(data)      # this one, else ValueError
 
-Every field with its unit and range: lcmtypes/*.lcm. Decoding needs nothing but Python; receiving live messages and
+lcmtypes/*.lcm lists every field with its unit and range. Decoding needs only Python. Receiving live messages and
 reading event logs needs LCM's own module (pip install lcm).
 """
 import importlib
@@ -37,15 +37,15 @@ _BY_FINGERPRINT = {type_._get_packed_fingerprint(): type_ for type_ in TYPES.val
 
 
 def decode(data):
-    """The message in `data` (bytes), whichever type it is. ValueError if it is none of abs_hil's or damaged."""
+    """Decodes the message in `data` (bytes) of any type. Raises ValueError if it is damaged or not from abs_hil."""
     type_ = _BY_FINGERPRINT.get(bytes(data[:8]))
     if type_ is None:
         raise ValueError(f'not a message of abs_hil: fingerprint {bytes(data[:8]).hex()}, known are '
                          + ', '.join(f'{name} {t._get_packed_fingerprint().hex()}' for name, t in TYPES.items()))
     try:
         message = type_.decode(data)
-    except Exception as error:  # the generated decoders let struct.error and UnicodeDecodeError through
+    except Exception as error:  # the generated decoders raise struct.error and UnicodeDecodeError
         raise ValueError(f'damaged {type_.__name__} of {len(data)} bytes: {error}') from error
-    if message.encode() != bytes(data):  # they take a last string that is cut short, and bytes behind the end
+    if message.encode() != bytes(data):  # the decoders accept a last string that is cut short, and bytes after the end
         raise ValueError(f'damaged {type_.__name__} of {len(data)} bytes: its length is not that of its fields')
     return message

@@ -44,7 +44,7 @@ void collect(const toml::table& table, const std::string& prefix, const fs::path
     } else if (const auto* real = node.as_floating_point()) {
       values.push_back({name, real->get(), origin});
     } else {
-      throw ConfigError(fmt::format("{}: {} is neither number, flag nor text", origin, name));
+      throw ConfigError(fmt::format("{}: {} is neither a number, a flag nor a text; give one of them", origin, name));
     }
   }
 }
@@ -57,8 +57,8 @@ std::vector<FileValue> read_file(const fs::path& file, std::string_view only_tab
   if (!only_table.empty()) {
     for (const auto& [key, node] : table) {
       if (key.str() == only_table && node.is_table()) continue;
-      throw ConfigError(fmt::format("{}:{}: {} has no place here; this file may hold the table [{}] only",
-                                    file.string(), node.source().begin.line, std::string_view(key.str()), only_table));
+      throw ConfigError(fmt::format("{}:{}: {} does not belong in this file; give the table [{}] only", file.string(),
+                                    node.source().begin.line, std::string_view(key.str()), only_table));
     }
   }
   std::vector<FileValue> values;

@@ -28,7 +28,7 @@ void load_file(const std::filesystem::path& file, KeyTable& table, std::string_v
 /// the program, else the source tree's. Throws ConfigError if there is none.
 [[nodiscard]] std::filesystem::path config_dir();
 
-/// The same, whatever the environment says: what came with the program.
+/// The folder that came with the program: as config_dir(), but without $ABS_HIL_CONFIG_DIR.
 [[nodiscard]] std::filesystem::path own_config_dir();
 
 /// A plant by name or file: `name` alone is config_dir()/plants/name.toml. Throws ConfigError, naming the known ones.

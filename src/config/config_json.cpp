@@ -31,14 +31,15 @@ void set_values(const nlohmann::ordered_json& node, const std::string& name, Key
   } else if (node.is_string()) {
     table.set(name, node.get<std::string>(), origin);
   } else {
-    throw ConfigError(std::string(origin) + ": " + name + " is neither number, flag nor text");
+    throw ConfigError(std::string(origin) + ": " + name + " is neither a number, a flag nor a text; give one of them");
   }
 }
 
 }  // namespace
 
 std::vector<std::string> load_json(const nlohmann::ordered_json& config, KeyTable& table, std::string_view origin) {
-  if (!config.is_object()) throw ConfigError(std::string(origin) + ": not a JSON object");
+  if (!config.is_object())
+    throw ConfigError(std::string(origin) + ": the configuration is not a JSON object; give one");
   std::vector<std::string> unknown;
   set_values(config, {}, table, origin, unknown);
   return unknown;

@@ -27,22 +27,24 @@ constexpr std::array<ChangingPart, 5> parts{{
   throw config::ConfigError(fmt::format("{}: this change of {} {}", script.at(event.place), what, problem));
 }
 
-/// Changes of one part follow one another on one clock.
+/// Refuses changes of one part that overlap, or that count from different times.
 void check_order(const Script& script, const EventScript& before, const EventScript& event, std::string_view what) {
   if (event.from_braking != before.from_braking) {
     refuse(script, event, what,
-           fmt::format("is counted from {}, that in line {} is not; count them from the same",
+           fmt::format("counts from {}, but the change in line {} does not; count both from the same time",
                        event.from_braking ? "braking" : "the start", before.place.line));
   }
   if (event.at_s < before.end_s) {
-    refuse(script, event, what,
-           fmt::format("begins at {} s, before that in line {} has ended (at {} s); put them in order, without overlap",
-                       event.at_s, before.place.line, before.end_s));
+    refuse(
+        script, event, what,
+        fmt::format("begins at {} s, before the change in line {} ends (at {} s); put them in order, without overlap",
+                    event.at_s, before.place.line, before.end_s));
   }
-  // After a ramp a jump at its end is one; after a jump it would make that undone.
+  // A jump may follow a ramp at the ramp's end. At the time of another jump it would undo that one.
   if (event.at_s == before.at_s && event.at_s == event.end_s) {
     refuse(script, event, what,
-           fmt::format("comes at {} s, as that in line {} does; leave one of them out", event.at_s, before.place.line));
+           fmt::format("comes at {} s, as the change in line {} does; leave one of them out", event.at_s,
+                       before.place.line));
   }
 }
 
@@ -60,7 +62,7 @@ std::string profile(const Script& script, std::string_view what) {
       if (before != nullptr) {
         check_order(script, *before, event, what);
       } else {
-        // A jump at 0 is none: it is what holds from the start.
+        // A jump at 0 changes nothing during the run: its factor holds from the start.
         const bool from_the_start = jump && event.at_s == 0.0;
         text =
             fmt::format("{}: {}", event.from_braking ? "braking time" : "time", from_the_start ? change.factor : 1.0);

@@ -9,17 +9,17 @@
 
 namespace abs_hil::config {
 
-/// Something of the simulated plant that events may change while it runs.
+/// A part of the simulated plant that events may change during a run.
 struct ChangingPart {
   std::string_view what;                                ///< key of an event: "friction"
   std::string_view in_words;                            ///< "friction of the road"
-  std::string& (*profile)(config::Settings& settings);  ///< the configuration value that says how it goes
+  std::string& (*profile)(config::Settings& settings);  ///< the configuration value with its profile
 };
 [[nodiscard]] std::span<const ChangingPart> changing_parts() noexcept;
 
-/// How the events let one of the changing parts go, as its configuration value has it
-/// ("braking time: 1; 0.5 at 0.6; 1 from 1 to 3"); empty: they leave it alone. Throws config::ConfigError, naming
-/// line and column, for events that do not go together.
+/// The profile that the script's events give one of the changing parts, in the form of its configuration value
+/// ("braking time: 1; 0.5 at 0.6; 1 from 1 to 3"). Empty: no event changes the part. Throws config::ConfigError with
+/// line and column for events that contradict each other.
 [[nodiscard]] std::string profile(const Script& script, std::string_view what);
 
 }  // namespace abs_hil::config

@@ -57,7 +57,7 @@ std::string in_words(const experiment::EndCondition& end) {
     case EndKind::start_command: return "the start is given";
     case EndKind::slip_above: return fmt::format("the slip reaches {}", value);
     case EndKind::slip_below: return fmt::format("the slip is less than {}", value);
-    case EndKind::distance: return fmt::format("the car has come {} m in it", value);
+    case EndKind::distance: return fmt::format("the car has travelled {} m in it", value);
     case EndKind::all: break;
   }
   std::string text;

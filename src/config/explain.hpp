@@ -8,11 +8,11 @@
 
 namespace abs_hil::config {
 
-/// The script in words, as it runs under these settings: phases, what ends them, limits, events, series. Throws
-/// config::ConfigError where the two do not go together.
+/// Describes in words how the script runs under these settings: phases, their ends, limits, events, series. Throws
+/// config::ConfigError if the script cannot run under these settings.
 [[nodiscard]] std::string explain(const Script& script, const config::Settings& settings);
 
-/// What a script may hold as a JSON Schema (draft 2020-12) for editors, made from the parser's own grammar.
+/// The JSON Schema (draft 2020-12) of scripts, for editors. It is made from the parser's own grammar.
 [[nodiscard]] nlohmann::ordered_json schema();
 
 }  // namespace abs_hil::config

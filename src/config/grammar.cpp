@@ -8,7 +8,7 @@ namespace {
 
 constexpr double day_s = 86'400.0;
 constexpr rig::Range duration = rig::from_zero(day_s);
-/// No phase lasts longer, whatever it waits for (experiment::Sequence), its slack of a second included.
+/// The longest time limit of a phase (experiment::Sequence). It includes the slack of one second.
 constexpr rig::Range phase_limit = rig::positive(600.0);
 constexpr rig::Range phase_duration = rig::from_zero(599.0);
 constexpr rig::Range span = rig::positive(day_s);
@@ -22,12 +22,22 @@ constexpr rig::Range any_slip = rig::between(-1.0, 1.0);
 constexpr rig::Range factor = rig::positive(10.0);
 constexpr rig::Range anything = rig::between(-1e9, 1e9);
 
+Field row(Shape shape, rig::OptionFacts facts, Quantity quantity = Quantity::none, const Grammar* grammar = nullptr) {
+  facts.unit = unit_of(quantity);
+  return {.facts = facts, .shape = shape, .quantity = quantity, .grammar = grammar};
+}
+
+Field required(Field field) {
+  field.required = true;
+  return field;
+}
+
 }  // namespace
 
 const Field* Grammar::find(std::string_view name) const noexcept {
   const auto is_it = [name](const Field& field) {
-    if (!name.starts_with(field.name)) return false;
-    const std::string_view rest = name.substr(field.name.size());
+    if (!name.starts_with(field.facts.key)) return false;
+    const std::string_view rest = name.substr(field.facts.key.size());
     return rest.empty() || rest == suffix_of(field.quantity);
   };
   const auto at = std::find_if(fields.begin(), fields.end(), is_it);
@@ -37,9 +47,9 @@ const Field* Grammar::find(std::string_view name) const noexcept {
 std::vector<std::string> Grammar::spellings() const {
   std::vector<std::string> names;
   for (const Field& field : fields) {
-    names.emplace_back(field.name);
+    names.emplace_back(field.facts.key);
     if (field.quantity != Quantity::none) {
-      names.push_back(std::string(field.name) + std::string(suffix_of(field.quantity)));
+      names.push_back(std::string(field.facts.key) + std::string(suffix_of(field.quantity)));
     }
   }
   return names;
@@ -50,36 +60,28 @@ const Grammar& script_grammar() {
       "the script",
       "An experiment of abs_hil (docs/experiments.md)",
       {
-          {.name = "description", .shape = Shape::text, .meaning = "what the experiment is, in a line"},
-          {.name = "author", .shape = Shape::text, .meaning = "who wrote it"},
-          {.name = "notes", .shape = Shape::text, .meaning = "anything else worth keeping with the results"},
-          {.name = "analysis",
-           .shape = Shape::choice,
-           .meaning = "what is computed from the run beside its metrics",
-           .allowed = {"friction-curve"}},
-          {.name = "settings",
-           .shape = Shape::settings,
-           .meaning = "configuration values of the experiment; --config, options and --set override them"},
-          {.name = "phase",
-           .shape = Shape::tables,
-           .meaning = "the phases, in order",
-           .grammar = &phase_grammar(),
-           .required = true},
-          {.name = "limits",
-           .shape = Shape::table,
-           .meaning = "limits of this experiment; they can only tighten those of the configuration",
-           .grammar = &limits_grammar()},
-          {.name = "event",
-           .shape = Shape::tables,
-           .meaning = "what happens to the simulated plant; the rig refuses it",
-           .grammar = &event_grammar()},
-          {.name = "series",
-           .shape = Shape::table,
-           .meaning = "the experiment is run several times",
-           .grammar = &series_grammar()},
-          {.name = "vary",
-           .shape = Shape::grid,
-           .meaning = "configuration values that the runs of a series differ in: every combination is run"},
+          row(Shape::text, {.key = "description", .meaning = "what the experiment is, in a line"}),
+          row(Shape::text, {.key = "author", .meaning = "who wrote it"}),
+          row(Shape::text, {.key = "notes", .meaning = "anything else worth keeping with the results"}),
+          row(Shape::choice, {.key = "analysis",
+                              .meaning = "what is computed from the run beside its metrics",
+                              .allowed = {"friction-curve"}}),
+          row(Shape::settings,
+              {.key = "settings",
+               .meaning = "configuration values of the experiment; --config, options and --set override them"}),
+          required(row(Shape::tables, {.key = "phase", .meaning = "the phases, in order"}, Quantity::none,
+                       &phase_grammar())),
+          row(Shape::table,
+              {.key = "limits",
+               .meaning = "limits of this experiment; they can only tighten those of the configuration"},
+              Quantity::none, &limits_grammar()),
+          row(Shape::tables, {.key = "event", .meaning = "what happens to the simulated plant; the rig refuses it"},
+              Quantity::none, &event_grammar()),
+          row(Shape::table, {.key = "series", .meaning = "the experiment is run several times"}, Quantity::none,
+              &series_grammar()),
+          row(Shape::grid,
+              {.key = "vary",
+               .meaning = "configuration values that the runs of a series differ in: every combination is run"}),
       }};
   return grammar;
 }
@@ -89,30 +91,27 @@ const Grammar& phase_grammar() {
       "[[phase]]",
       "One phase: what acts, and what ends it",
       {
-          {.name = "name", .shape = Shape::text, .meaning = "its name, in displays and events", .required = true},
-          {.name = "kind",
-           .shape = Shape::choice,
-           .meaning = "the CSV's word for it; without: the name if it is one of these, else by what acts",
-           .allowed = {"idle", "accelerate", "coast", "brake", "hold", "stopped"}},
-          {.name = "when",
-           .shape = Shape::condition,
-           .meaning = "the phase is left out unless this holds for the configuration"},
-          {.name = "motor", .shape = Shape::motor, .meaning = "drive PWM of the lower wheel's motor", .range = duty},
-          {.name = "brake",
-           .shape = Shape::brake,
-           .meaning = "what drives the brake; or a table of duty, torque_Nm or slip_ref",
-           .allowed = {"off", "controller"},
-           .grammar = &brake_grammar()},
-          {.name = "until",
-           .shape = Shape::table,
-           .meaning = "what ends the phase: one condition, or any or all of several",
-           .grammar = &until_grammar(),
-           .required = true},
-          {.name = "at_most",
-           .shape = Shape::number,
-           .meaning = "a phase that lasts longer is a fault; may be left out if the phase ends by its duration",
-           .quantity = Quantity::time,
-           .range = phase_limit},
+          required(row(Shape::text, {.key = "name", .meaning = "its name, in displays and events"})),
+          row(Shape::choice,
+              {.key = "kind",
+               .meaning = "the CSV's word for it; without: the name if it is one of these, else by what acts",
+               .allowed = {"idle", "accelerate", "coast", "brake", "hold", "stopped"}}),
+          row(Shape::condition,
+              {.key = "when", .meaning = "the phase is left out unless this holds for the configuration"}),
+          row(Shape::motor, {.key = "motor", .meaning = "drive PWM of the lower wheel's motor", .range = duty}),
+          row(Shape::brake,
+              {.key = "brake",
+               .meaning = "what drives the brake; or a table of duty, torque_Nm or slip_ref",
+               .allowed = {"off", "controller"}},
+              Quantity::none, &brake_grammar()),
+          required(row(Shape::table,
+                       {.key = "until", .meaning = "what ends the phase: one condition, or any or all of several"},
+                       Quantity::none, &until_grammar())),
+          row(Shape::number,
+              {.key = "at_most",
+               .meaning = "a phase that lasts longer is a fault; may be left out if the phase ends by its duration",
+               .range = phase_limit},
+              Quantity::time),
       }};
   return grammar;
 }
@@ -123,8 +122,7 @@ const Grammar& until_grammar() {
   static const bool filled = [] {
     using enum Quantity;
     const auto add = [](std::string_view name, Quantity quantity, rig::Range range, std::string_view meaning) {
-      grammar.fields.push_back(
-          {.name = name, .shape = Shape::number, .meaning = meaning, .quantity = quantity, .range = range});
+      grammar.fields.push_back(row(Shape::number, {.key = name, .meaning = meaning, .range = range}, quantity));
     };
     add("lasts", time, phase_duration, "the phase has lasted this long");
     add("upper_speed_above", angular_speed, wheel_speed, "the upper wheel is at least this fast");
@@ -137,14 +135,14 @@ const Grammar& until_grammar() {
     add("slip_above", none, any_slip, "the estimated slip is at least this");
     add("slip_below", none, any_slip, "the estimated slip is less than this");
     add("distance", distance, way, "the car has come this far since the phase began");
-    grammar.fields.push_back({.name = "standstill", .shape = Shape::flag_true, .meaning = "both wheels stand"});
-    grammar.fields.push_back({.name = "when",
-                              .shape = Shape::condition,
-                              .meaning = "the condition is left out unless this holds for the configuration"});
+    grammar.fields.push_back(row(Shape::flag_true, {.key = "standstill", .meaning = "both wheels stand"}));
     grammar.fields.push_back(
-        {.name = "any", .shape = Shape::tables, .meaning = "the first of these that holds", .grammar = &grammar});
+        row(Shape::condition,
+            {.key = "when", .meaning = "the condition is left out unless this holds for the configuration"}));
     grammar.fields.push_back(
-        {.name = "all", .shape = Shape::tables, .meaning = "all of these at the same time", .grammar = &grammar});
+        row(Shape::tables, {.key = "any", .meaning = "the first of these that holds"}, Quantity::none, &grammar));
+    grammar.fields.push_back(
+        row(Shape::tables, {.key = "all", .meaning = "all of these at the same time"}, Quantity::none, &grammar));
     return true;
   }();
   static_cast<void>(filled);
@@ -152,26 +150,21 @@ const Grammar& until_grammar() {
 }
 
 const Grammar& brake_grammar() {
-  static const Grammar grammar{"brake",
-                               "What drives the brake: one of these",
-                               {
-                                   {.name = "duty",
-                                    .shape = Shape::profile,
-                                    .meaning = "brake PWM",
-                                    .range = duty,
-                                    .grammar = &profile_grammar()},
-                                   {.name = "torque",
-                                    .shape = Shape::profile,
-                                    .meaning = "brake torque, through the inverse of the brake's map",
-                                    .quantity = Quantity::torque,
-                                    .range = torque,
-                                    .grammar = &profile_grammar()},
-                                   {.name = "slip_ref",
-                                    .shape = Shape::profile,
-                                    .meaning = "the slip controller, with this reference in place of control.slip_ref",
-                                    .range = slip,
-                                    .grammar = &profile_grammar()},
-                               }};
+  static const Grammar grammar{
+      "brake",
+      "What drives the brake: one of these",
+      {
+          row(Shape::profile, {.key = "duty", .meaning = "brake PWM", .range = duty}, Quantity::none,
+              &profile_grammar()),
+          row(Shape::profile,
+              {.key = "torque", .meaning = "brake torque, through the inverse of the brake's map", .range = torque},
+              Quantity::torque, &profile_grammar()),
+          row(Shape::profile,
+              {.key = "slip_ref",
+               .meaning = "the slip controller, with this reference in place of control.slip_ref",
+               .range = slip},
+              Quantity::none, &profile_grammar()),
+      }};
   return grammar;
 }
 
@@ -180,63 +173,41 @@ const Grammar& profile_grammar() {
       "a profile",
       "A value over the time since the phase began: a ramp, a step, points or a file",
       {
-          {.name = "from", .shape = Shape::number, .meaning = "ramp: first value", .range = anything},
-          {.name = "to", .shape = Shape::number, .meaning = "ramp: last value", .range = anything},
-          {.name = "over",
-           .shape = Shape::number,
-           .meaning = "ramp: how long it takes",
-           .quantity = Quantity::time,
-           .range = span},
-          {.name = "before", .shape = Shape::number, .meaning = "step: first value", .range = anything},
-          {.name = "after", .shape = Shape::number, .meaning = "step: second value", .range = anything},
-          {.name = "at",
-           .shape = Shape::number,
-           .meaning = "step: when",
-           .quantity = Quantity::time,
-           .range = duration},
-          {.name = "points",
-           .shape = Shape::points,
-           .meaning = "profile: [[time in s, value], ...], times rising",
-           .range = anything},
-          {.name = "file",
-           .shape = Shape::text,
-           .meaning = "profile: CSV file beside the script, header time_s,value, times rising"},
-          {.name = "between",
-           .shape = Shape::choice,
-           .meaning = "profile: what happens between two points",
-           .allowed = {"line", "hold"}},
+          row(Shape::number, {.key = "from", .meaning = "ramp: first value", .range = anything}),
+          row(Shape::number, {.key = "to", .meaning = "ramp: last value", .range = anything}),
+          row(Shape::number, {.key = "over", .meaning = "ramp: how long it takes", .range = span}, Quantity::time),
+          row(Shape::number, {.key = "before", .meaning = "step: first value", .range = anything}),
+          row(Shape::number, {.key = "after", .meaning = "step: second value", .range = anything}),
+          row(Shape::number, {.key = "at", .meaning = "step: when", .range = duration}, Quantity::time),
+          row(Shape::points,
+              {.key = "points", .meaning = "profile: [[time in s, value], ...], times rising", .range = anything}),
+          row(Shape::text,
+              {.key = "file", .meaning = "profile: CSV file beside the script, header time_s,value, times rising"}),
+          row(Shape::choice,
+              {.key = "between", .meaning = "profile: what happens between two points", .allowed = {"line", "hold"}}),
       }};
   return grammar;
 }
 
 const Grammar& limits_grammar() {
-  static const Grammar grammar{"[limits]",
-                               "Limits of the experiment",
-                               {
-                                   {.name = "wheel_speed",
-                                    .shape = Shape::number,
-                                    .meaning = "a faster wheel is a fault (gate.overspeed_rad_s)",
-                                    .quantity = Quantity::angular_speed,
-                                    .range = {0.0, 2000.0, true, false}},
-                                   {.name = "motor_duty",
-                                    .shape = Shape::number,
-                                    .meaning = "largest drive PWM (gate.motor_duty_max)",
-                                    .range = {0.0, 1.0, true, false}},
-                                   {.name = "brake_duty",
-                                    .shape = Shape::number,
-                                    .meaning = "largest brake PWM (gate.brake_duty_max)",
-                                    .range = {0.0, 1.0, true, false}},
-                                   {.name = "run_time",
-                                    .shape = Shape::number,
-                                    .meaning = "a longer run is a fault",
-                                    .quantity = Quantity::time,
-                                    .range = span},
-                                   {.name = "distance",
-                                    .shape = Shape::number,
-                                    .meaning = "a car that comes further in the run is a fault",
-                                    .quantity = Quantity::distance,
-                                    .range = way},
-                               }};
+  static const Grammar grammar{
+      "[limits]",
+      "Limits of the experiment",
+      {
+          row(Shape::number,
+              {.key = "wheel_speed",
+               .meaning = "a faster wheel is a fault (gate.overspeed_rad_s)",
+               .range = rig::positive(2000.0)},
+              Quantity::angular_speed),
+          row(Shape::number,
+              {.key = "motor_duty", .meaning = "largest drive PWM (gate.motor_duty_max)", .range = rig::positive(1.0)}),
+          row(Shape::number,
+              {.key = "brake_duty", .meaning = "largest brake PWM (gate.brake_duty_max)", .range = rig::positive(1.0)}),
+          row(Shape::number, {.key = "run_time", .meaning = "a longer run is a fault", .range = span}, Quantity::time),
+          row(Shape::number,
+              {.key = "distance", .meaning = "a car that comes further in the run is a fault", .range = way},
+              Quantity::distance),
+      }};
   return grammar;
 }
 
@@ -245,46 +216,36 @@ const Grammar& event_grammar() {
       "[[event]]",
       "One thing that happens to the simulated plant",
       {
-          {.name = "at", .shape = Shape::number, .meaning = "when", .quantity = Quantity::time, .range = duration},
-          {.name = "counted_from",
-           .shape = Shape::choice,
-           .meaning = "what `at` counts from; without: start",
-           .allowed = {"start", "braking"}},
-          {.name = "over",
-           .shape = Shape::number,
-           .meaning = "how long the change takes; without: a jump",
-           .quantity = Quantity::time,
-           .range = span},
-          {.name = "until",
-           .shape = Shape::number,
-           .meaning = "when the change has ended, in place of over",
-           .quantity = Quantity::time,
-           .range = span},
-          {.name = "friction",
-           .shape = Shape::number,
-           .meaning = "friction of the road from then on, over that of the tyre model",
-           .range = factor},
-          {.name = "brake_torque",
-           .shape = Shape::number,
-           .meaning = "torque of the brake from then on, over that of its map: fading",
-           .range = factor},
-          {.name = "motor_torque",
-           .shape = Shape::number,
-           .meaning = "torque of the motor from then on, over that of the plant's parameters",
-           .range = factor},
-          {.name = "upper_bearing",
-           .shape = Shape::number,
-           .meaning =
-               "friction of the upper wheel's bearing (M10, d1) from then on, over that of the plant's parameters",
-           .range = factor},
-          {.name = "lower_bearing",
-           .shape = Shape::number,
-           .meaning =
-               "friction of the lower wheel's bearing (M20, d2) from then on, over that of the plant's parameters",
-           .range = factor},
-          {.name = "inject",
-           .shape = Shape::text,
-           .meaning = "a fault at the I/O seam, as after --inject; it says itself when (docs/fault-injection.md)"},
+          row(Shape::number, {.key = "at", .meaning = "when", .range = duration}, Quantity::time),
+          row(Shape::choice, {.key = "counted_from",
+                              .meaning = "what `at` counts from; without: start",
+                              .allowed = {"start", "braking"}}),
+          row(Shape::number, {.key = "over", .meaning = "how long the change takes; without: a jump", .range = span},
+              Quantity::time),
+          row(Shape::number, {.key = "until", .meaning = "when the change has ended, in place of over", .range = span},
+              Quantity::time),
+          row(Shape::number, {.key = "friction",
+                              .meaning = "friction of the road from then on, over that of the tyre model",
+                              .range = factor}),
+          row(Shape::number, {.key = "brake_torque",
+                              .meaning = "torque of the brake from then on, over that of its map: fading",
+                              .range = factor}),
+          row(Shape::number, {.key = "motor_torque",
+                              .meaning = "torque of the motor from then on, over that of the plant's parameters",
+                              .range = factor}),
+          row(Shape::number,
+              {.key = "upper_bearing",
+               .meaning =
+                   "friction of the upper wheel's bearing (M10, d1) from then on, over that of the plant's parameters",
+               .range = factor}),
+          row(Shape::number,
+              {.key = "lower_bearing",
+               .meaning =
+                   "friction of the lower wheel's bearing (M20, d2) from then on, over that of the plant's parameters",
+               .range = factor}),
+          row(Shape::text,
+              {.key = "inject",
+               .meaning = "a fault at the I/O seam, as after --inject; it says itself when (docs/fault-injection.md)"}),
       }};
   return grammar;
 }
@@ -294,20 +255,15 @@ const Grammar& series_grammar() {
       "[series]",
       "The experiment is run several times",
       {
-          {.name = "repeat",
-           .shape = Shape::whole,
-           .meaning = "runs of each combination, with seeds that count up",
-           .range = {1.0, 100'000.0}},
-          {.name = "seed", .shape = Shape::whole, .meaning = "seed of the first repetition", .range = {0.0, 9e15}},
-          {.name = "seeds",
-           .shape = Shape::wholes,
-           .meaning = "the seeds themselves, in place of repeat and seed",
-           .range = {0.0, 9e15}},
-          {.name = "pause",
-           .shape = Shape::number,
-           .meaning = "between two runs in real time, for the brake to cool",
-           .quantity = Quantity::time,
-           .range = duration},
+          row(Shape::whole, {.key = "repeat",
+                             .meaning = "runs of each combination, with seeds that count up",
+                             .range = {1.0, 100'000.0}}),
+          row(Shape::whole, {.key = "seed", .meaning = "seed of the first repetition", .range = {0.0, 9e15}}),
+          row(Shape::wholes,
+              {.key = "seeds", .meaning = "the seeds themselves, in place of repeat and seed", .range = {0.0, 9e15}}),
+          row(Shape::number,
+              {.key = "pause", .meaning = "between two runs in real time, for the brake to cool", .range = duration},
+              Quantity::time),
       }};
   return grammar;
 }
@@ -317,13 +273,9 @@ const Grammar& steps_grammar() {
       "a range of values",
       "Equally spaced values, both ends included",
       {
-          {.name = "from", .shape = Shape::number, .meaning = "first value", .range = anything, .required = true},
-          {.name = "to", .shape = Shape::number, .meaning = "last value", .range = anything, .required = true},
-          {.name = "steps",
-           .shape = Shape::whole,
-           .meaning = "how many values",
-           .range = {2.0, 10'000.0},
-           .required = true},
+          required(row(Shape::number, {.key = "from", .meaning = "first value", .range = anything})),
+          required(row(Shape::number, {.key = "to", .meaning = "last value", .range = anything})),
+          required(row(Shape::whole, {.key = "steps", .meaning = "how many values", .range = {2.0, 10'000.0}})),
       }};
   return grammar;
 }

@@ -12,21 +12,21 @@
 
 namespace abs_hil::config {
 
-/// What a number measures. In a script a quantity with a unit has it in its key's name (`lasts_s = 2`) or behind the
-/// number (`lasts = "2 s"`); nothing is guessed.
+/// The quantity that a number measures. A script gives its unit in the key's name (`lasts_s = 2`) or after the number
+/// (`lasts = "2 s"`). The parser never guesses a unit.
 enum class Quantity : std::uint8_t { none, time, angular_speed, speed, distance, torque };
 
 /// The SI unit as the configuration keys write it: "rad/s"; empty for pure numbers.
 [[nodiscard]] std::string_view unit_of(Quantity quantity) noexcept;
-/// What a key's name ends with to say that unit: "_rad_s"; empty for pure numbers.
+/// The suffix of a key's name that gives this unit: "_rad_s"; empty for pure numbers.
 [[nodiscard]] std::string_view suffix_of(Quantity quantity) noexcept;
-/// The units that may stand behind a number, "s, ms, min" for a time.
+/// The units that a number may have, as a list: "s, ms, min" for a time.
 [[nodiscard]] std::string units_text(Quantity quantity);
-/// `text` as number and unit, "20 ms", in SI units. Nothing if it is not of that form; for pure numbers the only unit
-/// is "%".
+/// Reads a number with its unit, "20 ms", and converts it to SI units. Returns nothing if the text has another form.
+/// The only unit of pure numbers is "%".
 [[nodiscard]] std::optional<double> parse_quantity(std::string_view text, Quantity quantity) noexcept;
 
-/// What a field's value looks like.
+/// The form of a field's value.
 enum class Shape : std::uint8_t {
   text,       ///< any text
   choice,     ///< one of `allowed`
@@ -35,7 +35,7 @@ enum class Shape : std::uint8_t {
   whole,      ///< a whole number
   wholes,     ///< a list of whole numbers
   condition,  ///< "KEY = VALUE" over the configuration
-  profile,    ///< a number, or a table that says how it goes over the time of the phase
+  profile,    ///< a number, or a table with a profile over the time of the phase
   motor,      ///< "off" or a profile of duties
   brake,      ///< "off", "controller" or a table
   table,      ///< a table of `grammar`
@@ -49,24 +49,21 @@ struct Grammar;
 
 /// One key of a table.
 struct Field {
-  std::string_view name;  ///< without the unit's suffix
+  rig::OptionFacts facts;  ///< key without the unit's suffix; range in SI units; names that a choice may be
   Shape shape;
-  std::string_view meaning;
   Quantity quantity{Quantity::none};
-  rig::Range range{};               ///< of numbers, in SI units
-  rig::AllowedNames allowed{};      ///< of choices
   const Grammar* grammar{nullptr};  ///< of tables
   bool required{false};
 };
 
-/// One kind of table: the single source of what the parser takes, what its errors offer and what the schema says.
+/// One kind of table. The parser, its errors and the schema all use it.
 struct Grammar {
-  std::string_view title;  ///< as errors name it: "[[phase]]"
+  std::string_view title;  ///< its name in errors: "[[phase]]"
   std::string_view meaning;
   std::vector<Field> fields;
 
   [[nodiscard]] const Field* find(std::string_view name) const noexcept;
-  /// Every spelling that is taken: names with and without the unit's suffix.
+  /// All valid spellings: names with and without the unit's suffix.
   [[nodiscard]] std::vector<std::string> spellings() const;
 };
 

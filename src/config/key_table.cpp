@@ -49,7 +49,7 @@ void assign_number(const Key& key, Number& target, const Value& value, std::stri
   target = static_cast<Number>(number);
 }
 
-/// A value as a TOML file would hold it: flag, whole number, number, else text.
+/// Reads a value as TOML would: a flag, a whole number or a number, otherwise text.
 Value parse_value(std::string_view text) {
   if (text == "true" || text == "false") return text == "true";
   const char* end = text.data() + text.size();
@@ -67,7 +67,7 @@ Value parse_value(std::string_view text) {
   return std::string(text);
 }
 
-/// Texts go into JSON (summary, logs), which holds UTF-8 only.
+/// Texts are written to JSON (summary, logs), which is UTF-8.
 bool is_utf8(const std::string& text) {
   try {
     static_cast<void>(nlohmann::json(text).dump());
@@ -147,14 +147,14 @@ void KeyTable::set_text(std::string_view assignment, std::string_view origin) {
 }
 
 std::string KeyTable::to_toml() const {
-  // Tables in the order of their first key, each once, whatever the order of the keys.
+  // Each table is written once. The tables have the order of their first keys.
   std::vector<std::pair<std::string_view, std::string>> tables;
   for (const Key& key : keys_) {
     const std::size_t dot = key.name.rfind('.');
     const std::string_view table = std::string_view(key.name).substr(0, dot);
     auto at = std::find_if(tables.begin(), tables.end(), [&](const auto& known) { return known.first == table; });
     if (at == tables.end()) at = tables.insert(tables.end(), {table, fmt::format("\n[{}]\n", table)});
-    // A number as short as reads back to the same; a text as JSON writes it, which TOML reads alike.
+    // A number gets the shortest form that reads back to the same value. TOML reads a text as JSON writes it.
     const std::string value = std::visit(
         [](const auto* target) {
           if constexpr (std::is_same_v<std::decay_t<decltype(*target)>, std::string>) {

@@ -20,29 +20,29 @@ struct Key : rig::OptionFacts {
   std::variant<double*, std::int32_t*, std::int64_t*, bool*, std::string*> target;
 };
 
-/// A value from a file or from the command line, before it is known what it should be.
+/// A value from a file or from the command line, before its key has checked the type.
 using Value = std::variant<double, std::int64_t, bool, std::string>;
 
-/// `text` as a value for that key: as it is where the key wants text, else as a TOML file would hold it.
+/// Converts `text` to a value for the key. A key of text takes it unchanged; other keys read it as TOML would.
 [[nodiscard]] Value parse_value(const Key& key, std::string_view text);
 
-/// What the names of a controller's own keys begin with: "control.sliding_mode.".
+/// The prefix of a controller's own keys: "control.sliding_mode.".
 [[nodiscard]] std::string section_of(std::string_view controller);
 
-/// Every configuration value by its dotted name, made from the rows of the options.
+/// All configuration values by their dotted names. The table is made from the rows of the options.
 class KeyTable {
  public:
   /// Refers to `settings`, which must outlive the table.
   explicit KeyTable(Settings& settings);
 
   /// Sets a value. `origin` says where it came from ("--set", "FILE:LINE"). Throws ConfigError for an unknown name
-  /// (with the nearest known one), a value of the wrong kind or out of range; then nothing is changed.
+  /// (with the nearest known one), a value of the wrong type or out of range; then nothing changes.
   void set(std::string_view name, const Value& value, std::string_view origin);
   /// The same for `name=value` as text.
   void set_text(std::string_view assignment, std::string_view origin);
 
   [[nodiscard]] const std::vector<Key>& keys() const noexcept { return keys_; }
-  /// True if a file or an option gave the value, and not the default alone.
+  /// True if a file or an option gave the value. False if it is the default.
   [[nodiscard]] bool was_set(std::string_view name) const { return set_.contains(name); }
   /// The effective configuration, nested as in a file.
   [[nodiscard]] nlohmann::ordered_json to_json() const;
@@ -53,7 +53,7 @@ class KeyTable {
   [[nodiscard]] const Key& find(std::string_view name, std::string_view origin) const;
 
   std::vector<Key> keys_;
-  std::set<std::string, std::less<>> set_;  ///< names of the values that were given
+  std::set<std::string, std::less<>> set_;  ///< names of the values that a file or an option gave
 };
 
 }  // namespace abs_hil::config

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// A configuration folder of one's own need not hold experiments.
+/// A configuration folder of the user may lack experiments. Then those of the program serve.
 fs::path experiments_dir() {
   const fs::path named = config::config_dir() / "experiments";
   std::error_code error;

@@ -18,7 +18,7 @@ constexpr std::string_view slip_ref_key = "control.slip_ref";
 bool may_change(const Key& key, const std::string& controller) {
   if (key.name == slip_ref_key) return true;
   if (key.start_value) return false;
-  // (16) and (17) share these two.
+  // The laws (16) and (17) share these two gains.
   if (controller == "nominal" && (key.name == "control.adaptive.ks0" || key.name == "control.adaptive.ks1"))
     return true;
   return key.name.starts_with(section_of(controller));
@@ -36,10 +36,10 @@ std::string LiveSettings::resolve(std::string_view name) const {
     const auto known = std::find_if(keys.keys().begin(), keys.keys().end(), is_named);
     if (known == keys.keys().end()) continue;
     if (may_change(*known, controller)) return key;
-    throw ConfigError(fmt::format("{} cannot be changed while controller {} runs; what can: control.slip_ref and {}*",
-                                  key, controller, section_of(controller)));
+    throw ConfigError(fmt::format("{} cannot be changed while controller {} runs; change control.slip_ref or {}*", key,
+                                  controller, section_of(controller)));
   }
-  throw ConfigError(fmt::format("no key {} (abs_hil list --keys shows all)", name));
+  throw ConfigError(fmt::format("unknown key {} (abs_hil list --keys shows all)", name));
 }
 
 experiment::Adjustment LiveSettings::set(const std::string& key, double value) {
@@ -59,10 +59,11 @@ experiment::Adjustment LiveSettings::set(const std::string& key, double value) {
     } catch (const std::invalid_argument& error) {
       throw ConfigError(fmt::format("{} = {}: {}", key, value, error.what()));
     }
-    // Whether the law can do so at all is asked of two that nobody uses.
+    // Two spare controllers show whether this law can take over at all.
     if (!make(changed)->take_over(*make(settings_))) {
       throw ConfigError(
-          fmt::format("controller {}: its gains cannot be changed while it runs", changed.control.controller));
+          fmt::format("the gains of controller {} cannot be changed while it runs; change control.slip_ref only",
+                      changed.control.controller));
     }
   }
   settings_ = std::move(changed);

@@ -9,17 +9,17 @@
 
 namespace abs_hil::config {
 
-/// The part of a running experiment's configuration that may be changed while it runs: the slip reference and the gains
-/// of its controller, within the ranges of the key table.
+/// The settings that may change during a run: the slip reference and the gains of the controller. The ranges of the key
+/// table apply.
 class LiveSettings {
  public:
   explicit LiveSettings(Settings settings) : settings_(std::move(settings)) {}
 
-  /// The full key for a name that may lack "control." or the controller's part as well. Throws ConfigError for one
-  /// that is not known or cannot be changed during the run.
+  /// Returns the full key of a name. The name may lack "control.", and the controller's part too. Throws ConfigError
+  /// for a key that is unknown or cannot change during the run.
   [[nodiscard]] std::string resolve(std::string_view name) const;
-  /// The change that sets `key`, a full one, to `value`. Throws ConfigError for a value out of range or one that the
-  /// controller cannot work with; then nothing is changed.
+  /// Returns the adjustment that sets the full key `key` to `value`. Throws ConfigError for a value that is out of
+  /// range or that the controller refuses; then nothing changes.
   [[nodiscard]] experiment::Adjustment set(const std::string& key, double value);
 
   [[nodiscard]] const Settings& settings() const noexcept { return settings_; }

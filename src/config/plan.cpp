@@ -64,7 +64,7 @@ Reason reason_of(EndKind kind) {
   return Reason::none;
 }
 
-/// The CSV's word for a phase that does not say it itself.
+/// The kind of a phase in the CSV, derived where the script gives none.
 rig::Phase kind_of(const PhaseScript& phase) {
   if (phase.kind) return *phase.kind;
   for (const rig::Phase kind : {rig::Phase::idle, rig::Phase::accelerate, rig::Phase::coast, rig::Phase::brake,
@@ -89,7 +89,7 @@ class Planner {
     }
     if (plan.phases.empty()) {
       throw config::ConfigError(
-          fmt::format("{}: under this configuration every phase is left out by its \"when\"", script_.path));
+          fmt::format("{}: this configuration leaves out every phase by its \"when\"; change one", script_.path));
     }
     if (script_.limits.run_time) plan.limits.run_time_s = value(*script_.limits.run_time);
     if (script_.limits.distance) plan.limits.distance_m = value(*script_.limits.distance);
@@ -99,7 +99,7 @@ class Planner {
  private:
   [[nodiscard]] double value(const Number& number) const { return value_of(script_, number, keys_); }
 
-  [[nodiscard]] experiment::Profile profile(const CourseScript& script) const {
+  [[nodiscard]] experiment::Profile profile(const ProfileScript& script) const {
     std::vector<experiment::Profile::Point> points;
     points.reserve(script.points.size());
     for (const auto& [time, number] : script.points) points.push_back({value(time), value(number)});
@@ -109,8 +109,8 @@ class Planner {
       throw config::ConfigError(fmt::format("{}: {}", script_.at(script.place), error.what()));
     }
   }
-  /// A constant into `constant`, anything else as a profile.
-  [[nodiscard]] experiment::Profile course_or(const std::optional<CourseScript>& script, double& constant) const {
+  /// Stores a constant in `constant` and returns an empty profile; returns any other profile.
+  [[nodiscard]] experiment::Profile profile_or(const std::optional<ProfileScript>& script, double& constant) const {
     if (!script) return {};
     if (!script->constant()) return profile(*script);
     constant = value(script->points.front().second);
@@ -141,19 +141,20 @@ class Planner {
       if (!script.when || holds(*script.when, keys_)) plan.ends_on.push_back(condition(script));
     }
     if (plan.ends_on.empty()) {
-      throw config::ConfigError(fmt::format("{}: under this configuration phase \"{}\" has no end condition left",
-                                            script_.at(phase.place), phase.name));
+      throw config::ConfigError(
+          fmt::format("{}: this configuration leaves phase \"{}\" without an end condition; give one",
+                      script_.at(phase.place), phase.name));
     }
     plan.time_limit_s = time_limit_s(phase, plan);
     if (phase.brake == BrakeAction::slip_control && !ends_above(settings_.control.v_min_m_s, plan)) {
-      // The laws are steep in 1 / v_x: below this speed no script keeps them on.
+      // The laws are steep in 1 / v_x. Below this speed slip control ends, whatever the script says.
       plan.ends_on.push_back(
           {EndKind::car_speed_below, settings_.control.v_min_m_s, Reason::slip_control_left_at_low_speed});
     }
     return plan;
   }
 
-  /// It ends by itself before the car is slower than that.
+  /// True if the phase ends before the car is slower than `v_min_m_s`.
   [[nodiscard]] static bool ends_above(double v_min_m_s, const experiment::PhasePlan& plan) {
     return std::any_of(plan.ends_on.begin(), plan.ends_on.end(), [=](const experiment::EndCondition& end) {
       return end.kind == EndKind::car_speed_below && end.value >= v_min_m_s;
@@ -187,7 +188,7 @@ double value_of(const Script& script, const Number& number, const config::KeyTab
   const config::Key* key = find(keys, number.key);
   const double value = key == nullptr ? std::nan("") : number_of(*key).value_or(std::nan(""));
   if (!number.range.contains(value)) {
-    throw config::ConfigError(fmt::format("{}: ${} is {} under this configuration; valid here is {}{}{}",
+    throw config::ConfigError(fmt::format("{}: ${} is {} in this configuration; give a value in {}{}{}",
                                           script.at(number.place), number.key, value, number.range.text(),
                                           number.unit.empty() ? "" : " ", number.unit));
   }

@@ -10,32 +10,32 @@
 
 namespace abs_hil::config {
 
-/// A script made ready to run under one configuration.
+/// A script with the values of one configuration, ready to run.
 struct Plan {
   std::vector<experiment::PhasePlan> phases{};
   std::vector<std::string> phase_names{};  ///< of each of `phases`
   experiment::SequenceLimits limits{};
 };
 
-/// Looks up what the script leaves to the configuration. Throws config::ConfigError where the two do not go together:
-/// no phase left, a value out of range.
+/// Looks up the values that the script takes from the configuration. Throws config::ConfigError if no phase remains or
+/// a value is out of its range.
 [[nodiscard]] Plan plan(const Script& script, const config::Settings& settings);
 
-/// The plan of the experiment that the settings name. A script is read once in the life of the process. Throws
+/// The plan of the experiment that the settings name. The process reads each script once. Throws
 /// config::ConfigError. Thread-safe.
 [[nodiscard]] Plan plan(const config::Settings& settings);
 
-/// What the script asks of the plant and the gate, put into the settings: tightened limits, and its events, where the
-/// configuration has no own. Throws config::ConfigError for events that do not go together.
+/// Puts the script's tighter limits and its events into the settings. Events of the configuration take precedence.
+/// Throws config::ConfigError for events that contradict each other.
 void apply(const Script& script, config::Settings& settings);
 
-/// The number as it is under these settings. Throws config::ConfigError if it is out of its range.
+/// The value of the number under these settings. Throws config::ConfigError if it is out of its range.
 [[nodiscard]] double value_of(const Script& script, const Number& number, const config::KeyTable& keys);
-/// Whether it holds under these settings.
+/// True if the condition holds under these settings.
 [[nodiscard]] bool holds(const When& when, const config::KeyTable& keys);
 
-/// Where the script goes beyond what rig, gate or board give under these settings, in words; empty: nowhere. A run
-/// would be held to the limits.
+/// Describes where the script exceeds the limits of rig, gate or board under these settings; empty: nowhere. A run
+/// stays within the limits.
 [[nodiscard]] std::vector<std::string> beyond_limits(const Plan& plan, const config::Settings& settings);
 
 }  // namespace abs_hil::config

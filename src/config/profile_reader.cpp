@@ -9,7 +9,7 @@ namespace abs_hil::config {
 
 namespace {
 
-/// What the profile is of: the unit may stand in the key above it (`torque_Nm = {...}`) or behind every number.
+/// Reads the values of a profile. The key above may give their unit (`torque_Nm = {...}`), or each number does.
 class ValueReader {
  public:
   ValueReader(const Source& source, const Entry& outer) : source_(source), outer_(outer) {}
@@ -21,14 +21,14 @@ class ValueReader {
     if (!plain && node.is_number() && !outer_.has_suffix) {
       source_.fail(
           place, fmt::format("{} = {} has no unit; name it in the key {}{} = ... or write \"{} {}\"", what, shown(node),
-                             field.name, suffix_of(field.quantity), shown(node), unit_of(field.quantity)));
+                             field.facts.key, suffix_of(field.quantity), shown(node), field.facts.unit));
     }
     if (!plain && outer_.has_suffix && node.is_string() && !node.as_string()->get().starts_with('$')) {
       source_.fail(place, fmt::format("{} = {}: the key {} names the unit already; write a plain number", what,
                                       shown(node), outer_.key));
     }
     Field inner = field;
-    inner.name = what;
+    inner.facts.key = what;
     return read_number(source_, node, inner, what, outer_.has_suffix);
   }
 
@@ -51,7 +51,7 @@ class ProfileReader {
     profile_.place = reader_.place();
   }
 
-  CourseScript read(const FileReader& read_file, std::map<std::string, std::string>& files) {
+  ProfileScript read(const FileReader& read_file, std::map<std::string, std::string>& files) {
     only_one_form();
     if (has("from") || has("to") || has("over")) {
       const Number from = value("from");
@@ -70,7 +70,7 @@ class ProfileReader {
     }
     if (const Entry* between = reader_.find("between")) {
       if (!has("points") && !has("file")) {
-        source_.fail(between->key_place, "between belongs to points or a file; leave it out");
+        source_.fail(between->key_place, "between applies to points or a file only; leave it out");
       }
       if (reader_.choice(*between) == "hold") profile_.between = experiment::Between::hold;
     }
@@ -105,7 +105,7 @@ class ProfileReader {
         if (name.empty() || !has(name)) continue;
         if (!first.empty() && std::find(form.begin(), form.end(), first) == form.end()) {
           source_.fail(reader_.find(name)->key_place,
-                       fmt::format("{}: \"{}\" and \"{}\" do not go together; give a ramp, a step, points or a file",
+                       fmt::format("{}: \"{}\" and \"{}\" contradict each other; give a ramp, a step, points or a file",
                                    outer_.key, first, name));
         }
         first = name;
@@ -148,7 +148,7 @@ class ProfileReader {
     }
     if (outer_.field->quantity != Quantity::none && !outer_.has_suffix) {
       source_.fail(entry.place, fmt::format("file = \"{}\": its values have no unit; name it in the key {}{} = ...",
-                                            name, outer_.field->name, suffix_of(outer_.field->quantity)));
+                                            name, outer_.field->facts.key, suffix_of(outer_.field->quantity)));
     }
     const std::optional<std::string> text = read_file(name);
     if (!text) source_.fail(entry.place, fmt::format("file = \"{}\": there is no such file beside the script", name));
@@ -165,7 +165,7 @@ class ProfileReader {
       ++row;
       if (row == 1) {
         if (line != "time_s,value") {
-          source_.fail(place, fmt::format("file \"{}\": the first line is not time_s,value", name));
+          source_.fail(place, fmt::format("file \"{}\": the first line is wrong; give time_s,value", name));
         }
         continue;
       }
@@ -176,28 +176,29 @@ class ProfileReader {
       const auto first = std::from_chars(line.data(), end, time_s);
       const bool comma = first.ec == std::errc() && first.ptr != end && *first.ptr == ',';
       const auto second = comma ? std::from_chars(first.ptr + 1, end, value) : first;
-      if (!comma || second.ec != std::errc() || second.ptr != end || !outer_.field->range.contains(value)) {
+      if (!comma || second.ec != std::errc() || second.ptr != end || !outer_.field->facts.range.contains(value)) {
         source_.fail(place, fmt::format("file \"{}\", line {}: give a time in s and a value in {}", name, row,
-                                        outer_.field->range.text()));
+                                        outer_.field->facts.range.text()));
       }
       Number number{
-          .value = value, .unit = unit_of(outer_.field->quantity), .range = outer_.field->range, .place = place};
+          .value = value, .unit = outer_.field->facts.unit, .range = outer_.field->facts.range, .place = place};
       add_point(time_s, number, place);
     }
-    if (profile_.points.empty()) source_.fail(place, fmt::format("file \"{}\" holds no points", name));
+    if (profile_.points.empty())
+      source_.fail(place, fmt::format("file \"{}\" holds no points; give at least one", name));
   }
 
   const Source& source_;
   const Entry& outer_;
   ValueReader values_;
   TableReader reader_;
-  CourseScript profile_{};
+  ProfileScript profile_{};
 };
 
 }  // namespace
 
-CourseScript read_course(const Source& source, const Entry& entry, const FileReader& read_file,
-                         std::map<std::string, std::string>& files) {
+ProfileScript read_profile_script(const Source& source, const Entry& entry, const FileReader& read_file,
+                                  std::map<std::string, std::string>& files) {
   if (entry.node->is_table()) return ProfileReader(source, entry).read(read_file, files);
   const Number value = read_number(source, *entry.node, *entry.field, entry.key, entry.has_suffix);
   return {.points = {{seconds(0.0, entry.place), value}}, .place = entry.place};

@@ -77,7 +77,7 @@ std::optional<double> parse_quantity(std::string_view text, Quantity quantity) n
   std::string_view unit(at, static_cast<std::size_t>(end - at));
   while (unit.starts_with(' ')) unit.remove_prefix(1);
   for (const Unit& known : units) {
-    // A division for ms, say, would round twice where 20 ms can be had exactly as 20 / 1000.
+    // 20 / 1000 rounds once; 20 * 0.001 rounds twice, because 0.001 is not exact.
     if (known.quantity == quantity && known.name == unit) {
       const double divisor = std::round(1.0 / known.si);
       return known.si < 1.0 && divisor * known.si == 1.0 ? number / divisor : number * known.si;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "abs_hil/rig/option_check.hpp"
 #include "config/config_error.hpp"
 #include "rig/nearest_name.hpp"
 
@@ -18,7 +19,7 @@ constexpr std::size_t longest_shown = 60;
 /// "lasts_s = 2 or lasts = "2 s"" for the key of a quantity.
 std::string with_unit(const Field& field, std::string_view name, double example) {
   return fmt::format("{}{} = {} or {} = \"{} {}\"", name, suffix_of(field.quantity), example, name, example,
-                     unit_of(field.quantity));
+                     field.facts.unit);
 }
 
 std::string quoted(const std::vector<std::string_view>& names) {
@@ -33,7 +34,7 @@ std::string Source::at(Place place) const { return fmt::format("{}:{}:{}", path_
 
 void Source::fail(Place place, std::string_view message) const {
   std::string text = fmt::format("{}: {}", at(place), message);
-  // A key in quotes may hold a line end.
+  // A quoted key may contain a line end, but a message is one line.
   for (char& c : text) {
     if (static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) == 0x7F) c = ' ';
   }
@@ -98,27 +99,28 @@ TableReader::TableReader(const Source& source, const toml::table& table, const G
                   fmt::format("unknown key \"{}\" in {}; the nearest known key is \"{}\"; known: {}", entry.key,
                               grammar.title, rig::nearest_name(entry.key, names), fmt::join(names, ", ")));
     }
-    entry.has_suffix = entry.key.size() > entry.field->name.size();
-    if (const Entry* other = find(entry.field->name)) {
+    entry.has_suffix = entry.key.size() > entry.field->facts.key.size();
+    if (const Entry* other = find(entry.field->facts.key)) {
       source.fail(entry.key_place,
                   fmt::format("{} and {} say the same thing; leave one of them out", other->key, entry.key));
     }
     entries_.push_back(std::move(entry));
   }
-  // In the order of the file, which toml++ does not keep.
+  // toml++ does not keep the order of the file.
   std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
     return std::pair(a.key_place.line, a.key_place.column) < std::pair(b.key_place.line, b.key_place.column);
   });
   for (const Field& field : grammar.fields) {
-    if (field.required && find(field.name) == nullptr) {
-      source.fail(place_, fmt::format("{} has no \"{}\" ({}); give one", grammar.title, field.name, field.meaning));
+    if (field.required && find(field.facts.key) == nullptr) {
+      source.fail(place_,
+                  fmt::format("{} has no \"{}\" ({}); give one", grammar.title, field.facts.key, field.facts.meaning));
     }
   }
 }
 
 const Entry* TableReader::find(std::string_view name) const noexcept {
   const auto at =
-      std::find_if(entries_.begin(), entries_.end(), [name](const Entry& e) { return e.field->name == name; });
+      std::find_if(entries_.begin(), entries_.end(), [name](const Entry& e) { return e.field->facts.key == name; });
   return at == entries_.end() ? nullptr : &*at;
 }
 
@@ -126,17 +128,17 @@ std::string TableReader::text(const Entry& entry) const {
   const auto* text = entry.node->as_string();
   if (text == nullptr) {
     source_.fail(entry.place, fmt::format("{} = {}: give a text in quotes ({})", entry.key, shown(*entry.node),
-                                          entry.field->meaning));
+                                          entry.field->facts.meaning));
   }
   return text->get();
 }
 
 std::string TableReader::choice(const Entry& entry) const {
-  const rig::AllowedNames& allowed = entry.field->allowed;
+  const rig::AllowedNames& allowed = entry.field->facts.allowed;
   const auto* text = entry.node->as_string();
   if (text == nullptr || !allowed.contains(text->get())) {
     source_.fail(entry.place, fmt::format("{} = {}: give one of {} ({})", entry.key, shown(*entry.node),
-                                          quoted(allowed.list()), entry.field->meaning));
+                                          quoted(allowed.list()), entry.field->facts.meaning));
   }
   return text->get();
 }
@@ -147,9 +149,9 @@ Number TableReader::number(const Entry& entry) const {
 
 std::int64_t TableReader::whole(const Entry& entry) const {
   const auto* number = entry.node->as_integer();
-  if (number == nullptr || !entry.field->range.contains(static_cast<double>(number->get()))) {
+  if (number == nullptr || !entry.field->facts.range.contains(static_cast<double>(number->get()))) {
     source_.fail(entry.place, fmt::format("{} = {}: give a whole number in {} ({})", entry.key, shown(*entry.node),
-                                          entry.field->range.text(), entry.field->meaning));
+                                          entry.field->facts.range.text(), entry.field->facts.meaning));
   }
   return number->get();
 }
@@ -159,16 +161,16 @@ std::vector<std::int64_t> TableReader::wholes(const Entry& entry) const {
   if (const auto* list = entry.node->as_array()) {
     for (const toml::node& node : *list) {
       const auto* number = node.as_integer();
-      if (number == nullptr || !entry.field->range.contains(static_cast<double>(number->get()))) {
+      if (number == nullptr || !entry.field->facts.range.contains(static_cast<double>(number->get()))) {
         source_.fail(place_of(node.source()), fmt::format("{} holds {}: give whole numbers in {}", entry.key,
-                                                          shown(node), entry.field->range.text()));
+                                                          shown(node), entry.field->facts.range.text()));
       }
       numbers.push_back(number->get());
     }
   }
   if (numbers.empty()) {
     source_.fail(entry.place, fmt::format("{} = {}: give a list of whole numbers, [1, 2, 3] ({})", entry.key,
-                                          shown(*entry.node), entry.field->meaning));
+                                          shown(*entry.node), entry.field->facts.meaning));
   }
   return numbers;
 }
@@ -205,7 +207,7 @@ const toml::table& TableReader::table(const Entry& entry) const {
   const auto* table = entry.node->as_table();
   if (table == nullptr) {
     source_.fail(entry.place,
-                 fmt::format("{} = {}: give a table ({})", entry.key, shown(*entry.node), entry.field->meaning));
+                 fmt::format("{} = {}: give a table ({})", entry.key, shown(*entry.node), entry.field->facts.meaning));
   }
   return *table;
 }
@@ -221,9 +223,9 @@ std::vector<const toml::table*> TableReader::tables(const Entry& entry) const {
     }
   }
   if (tables.empty()) {
-    source_.fail(entry.place,
-                 fmt::format("{} is {}: give a list of tables ({})", entry.key,
-                             entry.node->is_array() ? "an empty list" : kind_of(*entry.node), entry.field->meaning));
+    source_.fail(entry.place, fmt::format("{} is {}: give a list of tables ({})", entry.key,
+                                          entry.node->is_array() ? "an empty list" : kind_of(*entry.node),
+                                          entry.field->facts.meaning));
   }
   return tables;
 }
@@ -246,11 +248,10 @@ std::optional<When> TableReader::optional_when() const {
 Number read_number(const Source& source, const toml::node& node, const Field& field, std::string_view what,
                    bool unit_is_named) {
   const Place place = place_of(node.source());
-  Number number{.unit = unit_of(field.quantity), .range = field.range, .place = place};
-  const std::string_view base = what.substr(0, field.name.size());
+  Number number{.unit = field.facts.unit, .range = field.facts.range, .place = place};
+  const std::string_view base = what.substr(0, field.facts.key.size());
   const auto refuse = [&] {
-    source.fail(place, fmt::format("{} = {} is not valid; give a number in {}{}{} ({})", what, shown(node),
-                                   field.range.text(), number.unit.empty() ? "" : " ", number.unit, field.meaning));
+    source.fail(place, rig::refusal(what, shown(node), rig::valid_number_text(field.facts, false), field.facts));
   };
   if (const auto* text = node.as_string()) {
     if (text->get().starts_with('$')) {
@@ -272,7 +273,7 @@ Number read_number(const Source& source, const toml::node& node, const Field& fi
     const std::optional<double> value = parse_quantity(text->get(), field.quantity);
     if (!value) {
       source.fail(place, fmt::format("{} = {}: give a number with one of the units {} ({})", what, shown(node),
-                                     units_text(field.quantity), field.meaning));
+                                     units_text(field.quantity), field.facts.meaning));
     }
     number.value = *value;
   } else if (const auto real = node.is_number() ? node.value<double>() : std::nullopt) {
@@ -284,7 +285,7 @@ Number read_number(const Source& source, const toml::node& node, const Field& fi
   } else {
     refuse();
   }
-  if (!field.range.contains(number.value)) refuse();
+  if (!field.facts.range.contains(number.value)) refuse();
   return number;
 }
 

@@ -16,13 +16,13 @@ namespace abs_hil::config {
   return {region.begin.line, region.begin.column};
 }
 
-/// What errors are reported against, and what values are looked up in.
+/// The script's path, for errors, and the table of configuration keys, for look-ups.
 class Source {
  public:
   explicit Source(std::string path) : path_(std::move(path)), keys_(settings_) {}
   [[noreturn]] void fail(Place place, std::string_view message) const;
   [[nodiscard]] std::string at(Place place) const;
-  /// The configuration key of that name; fails with the nearest known one.
+  /// Returns the configuration key of that name. Fails for an unknown name, with the nearest known one.
   [[nodiscard]] const config::Key& key(std::string_view name, Place place) const;
   /// Fails unless the configuration key takes that value.
   void check_value(std::string_view name, const config::Value& value, Place place) const;
@@ -43,7 +43,7 @@ struct Entry {
   Place key_place{};
 };
 
-/// A table read by its grammar. The constructor refuses unknown and missing keys; the rest reads values by their shape.
+/// Reads a table by its grammar. The constructor refuses unknown and missing keys. The other members read values.
 class TableReader {
  public:
   /// @param place where the table stands if TOML does not say
@@ -63,7 +63,7 @@ class TableReader {
   /// The tables of a list; not empty.
   [[nodiscard]] std::vector<const toml::table*> tables(const Entry& entry) const;
 
-  // The same for what may be there or not.
+  // The same for optional keys.
   [[nodiscard]] std::string text_or_empty(std::string_view name) const;
   [[nodiscard]] std::optional<Number> optional_number(std::string_view name) const;
   [[nodiscard]] std::optional<When> optional_when() const;
@@ -74,26 +74,27 @@ class TableReader {
   std::vector<Entry> entries_;
 };
 
-/// A value as messages show it: on one line, not too long.
+/// Formats a value for messages: on one line, shortened if long.
 [[nodiscard]] std::string shown(const toml::node& node);
 /// "a whole number", "a table", ...
 [[nodiscard]] std::string_view kind_of(const toml::node& node);
 
-/// A number of that quantity and range, by the rules for units. @param what the key, for messages
-/// @param unit_is_named the key's name says the unit
+/// Reads a number of the field's quantity and range, by the rules for units.
+/// @param what the key, for messages
+/// @param unit_is_named true if the key's name gives the unit
 [[nodiscard]] Number read_number(const Source& source, const toml::node& node, const Field& field,
                                  std::string_view what, bool unit_is_named);
 
-/// The profile of `entry`. Files it refers to are added to `files`.
-[[nodiscard]] CourseScript read_course(const Source& source, const Entry& entry, const FileReader& read_file,
-                                       std::map<std::string, std::string>& files);
+/// Reads the profile of `entry`. Adds the files that it names to `files`.
+[[nodiscard]] ProfileScript read_profile_script(const Source& source, const Entry& entry, const FileReader& read_file,
+                                                std::map<std::string, std::string>& files);
 
-/// What ends a phase, from its `until` table.
+/// Reads the end conditions of a phase from its `until` table.
 [[nodiscard]] std::vector<ConditionScript> read_until(const Source& source, const toml::table& table, Place place);
 
-/// [series] and [vary].
+/// Reads [series] and [vary].
 [[nodiscard]] SeriesScript read_series(const Source& source, const TableReader& root);
-/// [settings].
+/// Reads [settings].
 [[nodiscard]] std::vector<Setting> read_settings(const Source& source, const TableReader& root);
 
 }  // namespace abs_hil::config

@@ -17,7 +17,7 @@ Json bounds(const rig::Range& range) {
           {range.most_open ? "exclusiveMaximum" : "maximum", range.most}};
 }
 
-/// A name for "$defs": letters alone.
+/// A name for "$defs": letters and underscores only.
 std::string definition_of(const Grammar& grammar) {
   std::string name;
   for (const char c : grammar.title) {
@@ -34,8 +34,8 @@ Json with_unit(const Field& field) {
 
 Json number(const Field& field, bool unit_is_named) {
   const bool plain = field.quantity == Quantity::none;
-  if (unit_is_named) return {{"anyOf", {bounds(field.range), reference}}};
-  if (plain) return {{"anyOf", {bounds(field.range), with_unit(field), reference}}};
+  if (unit_is_named) return {{"anyOf", {bounds(field.facts.range), reference}}};
+  if (plain) return {{"anyOf", {bounds(field.facts.range), with_unit(field), reference}}};
   return {{"anyOf", {with_unit(field), reference}}};
 }
 
@@ -45,16 +45,16 @@ Json value_of(const Field& field, bool unit_is_named) {
   switch (field.shape) {
     case Shape::text:
     case Shape::condition: return {{"type", "string"}};
-    case Shape::choice: return {{"enum", field.allowed.list()}};
+    case Shape::choice: return {{"enum", field.facts.allowed.list()}};
     case Shape::flag_true: return {{"const", true}};
     case Shape::number: return number(field, unit_is_named);
     case Shape::whole: {
-      Json json = bounds(field.range);
+      Json json = bounds(field.facts.range);
       json["type"] = "integer";
       return json;
     }
     case Shape::wholes: {
-      Json json = bounds(field.range);
+      Json json = bounds(field.facts.range);
       json["type"] = "integer";
       return list_of(std::move(json));
     }
@@ -65,7 +65,7 @@ Json value_of(const Field& field, bool unit_is_named) {
       if (field.shape == Shape::motor) json["anyOf"].push_back({{"const", "off"}});
       return json;
     }
-    case Shape::brake: return {{"anyOf", {{{"enum", field.allowed.list()}}, pointer_to(*field.grammar)}}};
+    case Shape::brake: return {{"anyOf", {{{"enum", field.facts.allowed.list()}}, pointer_to(*field.grammar)}}};
     case Shape::table: return pointer_to(*field.grammar);
     case Shape::tables: return list_of(pointer_to(*field.grammar));
     case Shape::points:
@@ -83,12 +83,13 @@ Json table(const Grammar& grammar) {
   for (const Field& field : grammar.fields) {
     const auto add = [&](const std::string& name, bool unit_is_named) {
       Json json = value_of(field, unit_is_named);
-      json["description"] = field.meaning;
+      json["description"] = field.facts.meaning;
       properties[name] = std::move(json);
     };
-    add(std::string(field.name), false);
-    if (field.quantity != Quantity::none) add(std::string(field.name) + std::string(suffix_of(field.quantity)), true);
-    if (field.required) required.push_back(field.name);
+    add(std::string(field.facts.key), false);
+    if (field.quantity != Quantity::none)
+      add(std::string(field.facts.key) + std::string(suffix_of(field.quantity)), true);
+    if (field.required) required.push_back(field.facts.key);
   }
   Json json{{"type", "object"}, {"description", grammar.meaning}, {"properties", std::move(properties)}};
   if (!required.empty()) json["required"] = std::move(required);

@@ -62,16 +62,17 @@ class Parser {
     if (const Entry* motor = reader.find("motor")) phase.motor = read_motor(*motor);
     if (const Entry* brake = reader.find("brake")) read_brake(reader, *brake, phase);
     if (phase.motor && phase.brake != BrakeAction::released) {
-      source_.fail(reader.find("brake")->key_place,
-                   fmt::format("phase \"{}\": motor and brake never act together; leave one of them out", phase.name));
+      source_.fail(
+          reader.find("brake")->key_place,
+          fmt::format("phase \"{}\": motor and brake must not act together; leave one of them out", phase.name));
     }
     const Entry& until = *reader.find("until");
     phase.until = read_until(source_, reader.table(until), until.place);
     phase.at_most = reader.optional_number("at_most");
     const auto lasts = [](const ConditionScript& c) { return c.kind == experiment::EndKind::duration && !c.when; };
     if (!phase.at_most && std::none_of(phase.until.begin(), phase.until.end(), lasts)) {
-      source_.fail(phase.place, fmt::format("phase \"{}\" may last for ever; give at_most_s, after which it is a fault",
-                                            phase.name));
+      source_.fail(phase.place,
+                   fmt::format("phase \"{}\" may never end; give at_most_s, after which it is a fault", phase.name));
     }
     return phase;
   }
@@ -87,22 +88,22 @@ class Parser {
     }
     for (const PhaseScript& other : script_.phases) {
       if (other.name == phase.name) {
-        source_.fail(entry.place, fmt::format("a phase \"{}\" stands in line {} already; give each its own name",
-                                              phase.name, other.place.line));
+        source_.fail(entry.place, fmt::format("the phase in line {} is also named \"{}\"; give each phase its own name",
+                                              other.place.line, phase.name));
       }
     }
   }
 
-  std::optional<CourseScript> read_motor(const Entry& entry) {
+  std::optional<ProfileScript> read_motor(const Entry& entry) {
     if (const auto* text = entry.node->as_string(); text != nullptr && text->get() == "off") return std::nullopt;
     if (const auto* text = entry.node->as_string();
         text != nullptr && !text->get().starts_with('$') && !parse_quantity(text->get(), Quantity::none)) {
       source_.fail(entry.place,
                    fmt::format("motor = {}: give \"off\", a duty in {}, or a profile of duties {{ from, to, "
                                "over_s }}, {{ before, after, at_s }}, {{ points }}, {{ file }}",
-                               shown(*entry.node), entry.field->range.text()));
+                               shown(*entry.node), entry.field->facts.range.text()));
     }
-    return read_course(source_, entry, read_file_, script_.files);
+    return read_profile_script(source_, entry, read_file_, script_.files);
   }
 
   void read_brake(const TableReader& phase_reader, const Entry& entry, PhaseScript& phase) {
@@ -174,14 +175,14 @@ class Parser {
 
   [[nodiscard]] double plain_number(const TableReader& reader, const Entry& entry) const {
     const Number number = reader.number(entry);
-    if (!number.key.empty()) source_.fail(number.place, "an event takes numbers, not $keys");
+    if (!number.key.empty()) source_.fail(number.place, "an event takes no $key; give a number");
     return number.value;
   }
 
   [[nodiscard]] EventScript read_fault(const TableReader& reader, const Entry& entry) const {
     if (reader.entries().size() != 1) {
       source_.fail(entry.key_place,
-                   "inject stands alone in its event: it says itself when, as in \"brake@write:off+0.2s\"");
+                   "an event with inject takes no other key; give the time in inject, as in \"brake@write:off+0.2s\"");
     }
     EventScript event;
     event.inject = reader.text(entry);

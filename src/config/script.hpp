@@ -16,13 +16,13 @@
 
 namespace abs_hil::config {
 
-/// Where in a script something stands, both from 1.
+/// A place in a script. Line and column count from 1.
 struct Place {
   unsigned int line{0};
   unsigned int column{0};
 };
 
-/// A number of a script: written there, or the value of a configuration key, looked up when the run is planned.
+/// A number of a script: a constant, or the value of a configuration key, which is looked up when the run is planned.
 struct Number {
   double value{0.0};
   std::string key{};  ///< not empty: the value of this configuration key
@@ -40,7 +40,7 @@ struct When {
 };
 
 /// A value over the time of a phase; one point at time 0 is a constant.
-struct CourseScript {
+struct ProfileScript {
   std::vector<std::pair<Number, Number>> points{};  ///< time, value
   experiment::Between between{experiment::Between::line};
   Place place{};
@@ -59,7 +59,7 @@ struct PhaseScript {
   std::string name;
   std::optional<rig::Phase> kind{};
   std::optional<When> when{};
-  std::optional<CourseScript> motor{};
+  std::optional<ProfileScript> motor{};
   experiment::BrakeAction brake{experiment::BrakeAction::released};
   std::optional<CourseScript> brake_profile{};  ///< duty, torque or slip reference; none: control.slip_ref
   std::vector<ConditionScript> until{};         ///< any of them
@@ -75,19 +75,19 @@ struct LimitsScript {
   std::optional<Number> distance{};
 };
 
-/// Something of the simulated plant that an event multiplies.
+/// One factor that an event sets for a part of the simulated plant.
 struct Change {
   std::string_view what;  ///< as in changing_parts(): "friction"
   double factor{1.0};
 };
 
-/// Something that happens to the simulated plant.
+/// One event of the simulated plant.
 struct EventScript {
   double at_s{0.0};
   double end_s{0.0};  ///< the same as `at_s` for a jump
   bool from_braking{false};
   std::vector<Change> changes{};
-  std::string inject{};  ///< not empty: a fault, and nothing else here counts
+  std::string inject{};  ///< if not empty: a fault; then the other members do not count
   Place place{};
 };
 
@@ -106,20 +106,20 @@ struct Varied {
 };
 
 struct SeriesScript {
-  bool given{false};  ///< there is a [series] or a [vary]: run folders are those of a series, even of one run
+  bool given{false};  ///< the script has a [series] or [vary]; then even a single run gets the folder of a series
   std::int64_t repeat{1};
   std::optional<std::int64_t> seed{};
-  std::vector<std::int64_t> seeds{};  ///< not empty: in place of repeat and seed
+  std::vector<std::int64_t> seeds{};  ///< if not empty, they replace repeat and seed
   double pause_s{0.0};
   std::vector<Varied> vary{};
 };
 
-/// An experiment as its file has it: checked for itself, not yet against a configuration.
+/// An experiment as read from its file. It is checked by itself, but not yet against a configuration.
 struct Script {
   std::string name;                            ///< "paper", or the path of a file
-  std::string path;                            ///< as errors name it
+  std::string path;                            ///< its name in errors
   std::string text;                            ///< of the file, byte by byte
-  std::map<std::string, std::string> files{};  ///< files it refers to, by the name it has for them
+  std::map<std::string, std::string> files{};  ///< the files that it names, by these names
   std::string description{};
   std::string author{};
   std::string notes{};
@@ -134,12 +134,12 @@ struct Script {
   [[nodiscard]] std::string at(Place place) const;
 };
 
-/// Gives the text of a file that a script refers to, by the name it has for it; nothing if there is no such file.
+/// Returns the text of a file that a script names, or nothing if there is no such file.
 using FileReader = std::function<std::optional<std::string>(const std::string& name)>;
 
-/// Reads a script. Throws config::ConfigError in one line, "FILE:LINE:COLUMN: ...", naming what is wrong, what would
-/// be right and, for a key, the nearest known one.
-/// @param path as errors name it
+/// Reads a script. Throws config::ConfigError with one line, "FILE:LINE:COLUMN: ...". It names the error, what is valid
+/// and, for an unknown key, the nearest known one.
+/// @param path the script's name in errors
 [[nodiscard]] Script parse(std::string text, std::string path, const FileReader& read_file);
 
 /// The script of that file. Throws config::ConfigError.

@@ -9,7 +9,7 @@ namespace abs_hil::config {
 namespace {
 
 constexpr std::size_t most_runs = 100'000;
-/// What a script does not set: who runs it, and on what, is not its business.
+/// Keys that a script must not set: they describe the computer and its user, not the experiment.
 constexpr std::array<std::string_view, 5> not_for_scripts{"driver.", "realtime.", "guardian.", "commands.",
                                                           "experiment.name"};
 
@@ -30,7 +30,8 @@ config::Value value_of(const Source& source, std::string_view key, const toml::n
   if (const auto* flag = node.as_boolean()) return flag->get();
   if (const auto* integer = node.as_integer()) return integer->get();
   if (const auto* real = node.as_floating_point()) return real->get();
-  source.fail(place_of(node.source()), fmt::format("{} = {} is neither number, flag nor text", key, shown(node)));
+  source.fail(place_of(node.source()),
+              fmt::format("{} = {} is neither a number, a flag nor a text; give one of them", key, shown(node)));
 }
 
 void add_settings(const Source& source, const toml::table& table, const std::string& prefix,
@@ -67,7 +68,7 @@ Varied read_steps(const Source& source, const std::string& key, const toml::tabl
   return varied;
 }
 
-/// A table that is a range of values and not the way to a longer key.
+/// True if the table is a range of values. Otherwise it is a part of a longer key.
 bool is_steps(const toml::table& table) { return table.contains("steps") || table.contains("from"); }
 
 void add_varied(const Source& source, const toml::table& table, const std::string& prefix, std::vector<Varied>& vary) {
@@ -81,7 +82,7 @@ void add_varied(const Source& source, const toml::table& table, const std::strin
     }
     static_cast<void>(source.key(key, place_of(name.source())));
     refuse_foreign(source, key, place_of(name.source()));
-    if (key == "run.seed") source.fail(place, "run.seed is varied by [series] repeat or seeds");
+    if (key == "run.seed") source.fail(place, "[vary] takes no run.seed; give repeat or seeds in [series]");
     Varied varied{key, {}, place};
     if (inner != nullptr) {
       varied = read_steps(source, key, *inner, place);
@@ -113,7 +114,7 @@ SeriesScript read_series(const Source& source, const TableReader& root) {
     if (const Entry* seed = reader.find("seed")) series.seed = reader.whole(*seed);
     if (const Entry* seeds = reader.find("seeds")) {
       if (reader.find("repeat") != nullptr || reader.find("seed") != nullptr) {
-        source.fail(seeds->key_place, "seeds stand in place of repeat and seed; leave one or the other out");
+        source.fail(seeds->key_place, "seeds replaces repeat and seed; leave one or the other out");
       }
       series.seeds = reader.wholes(*seeds);
     }
@@ -125,7 +126,7 @@ SeriesScript read_series(const Source& source, const TableReader& root) {
   if (const Entry* entry = root.find("vary")) {
     series.given = true;
     add_varied(source, root.table(*entry), {}, series.vary);
-    // The runs are numbered in the order of the file, which toml++ does not keep.
+    // The runs are numbered in the order of the file. toml++ does not keep it.
     std::sort(series.vary.begin(), series.vary.end(), [](const Varied& a, const Varied& b) {
       return std::pair(a.place.line, a.place.column) < std::pair(b.place.line, b.place.column);
     });
@@ -133,7 +134,7 @@ SeriesScript read_series(const Source& source, const TableReader& root) {
   double runs = series.seeds.empty() ? static_cast<double>(series.repeat) : static_cast<double>(series.seeds.size());
   for (const Varied& varied : series.vary) runs *= static_cast<double>(varied.values.size());
   if (runs > static_cast<double>(most_runs)) {
-    source.fail(root.place(), fmt::format("a series of {:.0f} runs; give one of at most {}", runs, most_runs));
+    source.fail(root.place(), fmt::format("the series has {:.0f} runs; give at most {}", runs, most_runs));
   }
   return series;
 }

@@ -30,12 +30,12 @@ struct TelemetryOptions {
 struct CommandOptions {
   ABS_HIL_OPTIONS(CommandOptions);
   ABS_HIL_OPTION(bool, enabled, false, .meaning = "take commands other than stop over LCM (docs/telemetry.md)");
-  /// The file's contents are no configuration value: the configuration is published.
+  /// Only the file's name is a configuration value, because the configuration is published.
   ABS_HIL_OPTION(std::string, key_file, "", .meaning = "file with the secret that senders of commands must know");
 };
 
-/// One effective configuration: the defaults, then the plant's file, then the configuration file, then the command
-/// line.
+/// One effective configuration. Later sources override earlier ones: the defaults, the plant's file, the configuration
+/// file, the command line.
 struct Settings {
   ABS_HIL_OPTIONS(Settings);
   ABS_HIL_GROUP(plant_sim::PlantOptions, plant, "plant.", {});

@@ -27,7 +27,7 @@ constexpr std::array<Known, 12> conditions{{
     {"standstill", EndKind::standstill},
 }};
 
-/// Lists stand in `until` alone, and all of several may be one of any.
+/// `until` may hold a list any or all. A list any may hold lists all. Deeper lists are refused.
 enum class Depth { until, any, all };
 
 std::vector<ConditionScript> read_list(const Source& source, const TableReader& reader, const Entry& entry,
@@ -39,10 +39,10 @@ ConditionScript read_condition(const Source& source, const TableReader& reader, 
   condition.place = reader.place();
   const Entry* what = nullptr;
   for (const Entry& entry : reader.entries()) {
-    if (entry.field->name == "when") continue;
+    if (entry.field->facts.key == "when") continue;
     if (what != nullptr) {
       source.fail(entry.key_place,
-                  fmt::format("\"{}\" and \"{}\" in one condition: say any = [{{ ... }}, {{ ... }}] or all = "
+                  fmt::format("\"{}\" and \"{}\" in one condition; give any = [{{ ... }}, {{ ... }}] or all = "
                               "[{{ ... }}, {{ ... }}]",
                               what->key, entry.key));
     }
@@ -53,21 +53,21 @@ ConditionScript read_condition(const Source& source, const TableReader& reader, 
                 "an end condition is missing; give lasts_s, upper_speed_above_rad_s, car_speed_below_m_s, "
                 "standstill, ... (docs/experiments.md)");
   }
-  if (what->field->name == "all" && depth != Depth::all) {
+  if (what->field->facts.key == "all" && depth != Depth::all) {
     condition.kind = EndKind::all;
     condition.parts = read_list(source, reader, *what, Depth::all);
     for (const ConditionScript& part : condition.parts) {
-      // Left out, it would make the others stronger or weaker: not to be guessed.
-      if (part.when) source.fail(part.place, "a condition within all has no when; give the list itself one");
+      // Without this condition the others would mean something else. The parser does not guess.
+      if (part.when) source.fail(part.place, "a condition within all takes no when; give the when to the list");
     }
     return condition;
   }
-  if (what->field->name == "any" || what->field->name == "all") {
+  if (what->field->facts.key == "any" || what->field->facts.key == "all") {
     source.fail(what->key_place,
-                fmt::format("\"{}\" has no place within another list; any may hold all, no more", what->key));
+                fmt::format("\"{}\" must not stand in this list; only any may hold a list, and only all", what->key));
   }
   for (const Known& known : conditions) {
-    if (known.name == what->field->name) condition.kind = known.kind;
+    if (known.name == what->field->facts.key) condition.kind = known.kind;
   }
   if (condition.kind == EndKind::standstill) {
     const auto* flag = what->node->as_boolean();

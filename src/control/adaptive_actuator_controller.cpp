@@ -11,7 +11,7 @@
 namespace abs_hil::control {
 namespace {
 
-/// The options with this controller's gains in the place where the parts it shares with AdaptiveController look.
+/// Copies this controller's gains to the options of AdaptiveController, whose parts it shares.
 ControlOptions with_own_gains(const ControlOptions& options) {
   const AdaptiveActuatorOptions& own = options.adaptive_actuator;
   rig::require_valid(own, &AdaptiveActuatorOptions::lag_gain_per_s, "control.adaptive_actuator.");
@@ -76,7 +76,7 @@ SlipOutput AdaptiveActuatorController::step(const SlipInput& raw) noexcept {
   return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
 }
 
-/// zeta' = -gamma phi ( k B'P [I; e_v] + lag_weight a eta ), while the command is limited 0.
+/// zeta' = -gamma phi ( k B'P [I; e_v] + lag_weight a eta ); 0 while the command is limited.
 double AdaptiveActuatorController::zeta_rate_N_s(double slip_ref, double phi, double BtP_x) const noexcept {
   return limited_ ? 0.0 : -gains_.gamma * phi * (slip_velocity_gain(wheels_, slip_ref) * BtP_x + tuning_);
 }
@@ -100,7 +100,7 @@ void AdaptiveActuatorController::adapt(const SlipInput& input, double past_phi) 
   slip_ = input.slip;
 }
 
-/// (r1/J1) alpha' of (17) as the model sees it at theta_hat. `zeta_rate` is the part of theta_hat' that is known now.
+/// (r1/J1) alpha' of (17) by the model at theta_hat. `zeta_rate` is the part of theta_hat' that is known now.
 double AdaptiveActuatorController::wanted_rate_m_s3(const SlipInput& input, double error_m_s,
                                                     double zeta_rate) const noexcept {
   const double phi = rig::normalised_tyre_force(tyre_, input.slip);
@@ -112,7 +112,7 @@ double AdaptiveActuatorController::wanted_rate_m_s3(const SlipInput& input, doub
          k * theta_.theta_N() * force_slope(tyre_, input.slip) * motion.slip_rate_per_s + motion.drift_rate_m_s3;
 }
 
-/// What each newton of phi (theta - theta_hat), which the model cannot know, adds to it: the factor a of the header.
+/// Effect on it of each newton of phi (theta - theta_hat), which the model does not know: the factor a of the header.
 double AdaptiveActuatorController::wanted_rate_per_theta(const SlipInput& input) const noexcept {
   const auto& w = wheels_;
   const double k = slip_velocity_gain(w, input.slip_ref);
@@ -134,7 +134,7 @@ double AdaptiveActuatorController::through_lag(const SlipInput& input, double wa
 
   tuning_ = lag_weight_ * wanted_rate_per_theta(input) * eta;
   const double zeta_rate = zeta_rate_N_s(input.slip_ref, phi, BtP_x);
-  // eta decays by exp(-lag_gain h) over the period; for h -> 0 the quotient is the gain itself.
+  // eta decays by exp(-lag_gain h) over the period; for h -> 0 the quotient becomes the gain.
   const double eta_rate = std::expm1(-lag_gain_ * period_s_) / period_s_ * eta - BtP_x / lag_weight_;
   const double torque_rate_Nm_s = arm * (wanted_rate_m_s3(input, error_m_s, zeta_rate) + eta_rate);
   const double command_Nm = lag_.command_Nm(input.brake_torque_Nm, period_s_ * torque_rate_Nm_s);

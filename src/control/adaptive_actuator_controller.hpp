@@ -9,14 +9,14 @@
 namespace abs_hil::control {
 
 /// The adaptive controller (17)-(18) with the brake's lag (6) as a third step of backstepping (docs/theory-beyond.md):
-/// alpha is the torque that (17) wants, eta = (r1/J1)(Tb - alpha) what the lag still owes, in m/s^2. The static torque
-/// asked of the actuator,
+/// alpha is the torque of (17), and eta = (r1/J1)(Tb - alpha) is the error that the lag leaves, in m/s^2. The static
+/// torque reference,
 ///   b = Tb + (1/c31) ( alpha' - (J1/r1) ( lag_gain eta + B'P [I; e_v] / lag_weight ) ),
 /// with alpha' from the model at theta_hat, and the tuning function zeta' = -gamma phi ( k B'P [I; e_v] + lag_weight a
 /// eta ) give V' = -x'Qx - lag_weight lag_gain eta^2 - ka1 phi theta_err^2 for
 ///   V = ( x'Px + lag_weight eta^2 + theta_err^2 / gamma ) / 2.
-/// While the command is limited only the innovation's part of the adaptation goes on, and the integral stands.
-/// With an ideal actuator (no limit, no lag) it is AdaptiveController with its own gains, bit for bit.
+/// While the command is limited, the integral is held and only the innovation adapts theta_hat. With an ideal actuator
+/// (no limit, no lag) the output equals that of AdaptiveController with the same gains, bit for bit.
 class AdaptiveActuatorController final : public SlipController {
  public:
   /// Throws std::invalid_argument for gains, Q or bounds of theta out of range.
@@ -46,10 +46,10 @@ class AdaptiveActuatorController final : public SlipController {
   SlipErrorIntegral integral_;
   ThetaEstimator theta_;
   WheelForceObserver wheels_observer_;
-  double omega1_rad_s_{0.0};  ///< of the cycle before, as is the slip
+  double omega1_rad_s_{0.0};  ///< of the previous cycle, as is the slip
   double slip_{0.0};
-  double tuning_{0.0};   ///< lag_weight a eta of the cycle before
-  bool limited_{false};  ///< the command of the cycle before was
+  double tuning_{0.0};   ///< lag_weight a eta of the previous cycle
+  bool limited_{false};  ///< true if the previous command was limited
 };
 
 }  // namespace abs_hil::control

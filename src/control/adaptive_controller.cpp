@@ -22,7 +22,7 @@ void AdaptiveController::reset(const SlipInput& input) noexcept {
 SlipOutput AdaptiveController::step(const SlipInput& input) noexcept {
   const double error_m_s = slip_velocity_error_m_s(wheels_, input.speeds, input.slip_ref);
   integral_.advance(input.dt_s, error_m_s, input.slip_ref, wheels_.r2_m * input.speeds.omega2_rad_s);
-  // Half way between the two slips: half the error of the trapezoid where phi bends most.
+  // phi at the mean of the two slips has half the error of the trapezoidal rule where the curvature of phi is largest.
   const double past_phi = rig::normalised_tyre_force(tyre_, 0.5 * (slip_ + input.slip));
   adapt(input, past_phi);
 

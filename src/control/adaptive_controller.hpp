@@ -7,9 +7,9 @@
 namespace abs_hil::control {
 
 /// Adaptive slip controller (17)-(18) of Theorem 3.1, `adaptive_T_b` and `adaptive_dot` of paper_laws.hpp in
-/// sampled-data form: the torque from SlipErrorDynamics, I from SlipErrorIntegral, theta_hat from ThetaEstimator, which
-/// is driven by the brake torque that acts, not by the one asked for. With an ideal actuator
-/// V = ([I; e_v]' P [I; e_v] + (theta - theta_hat)^2/gamma)/2 never grows.
+/// sampled-data form. SlipErrorDynamics gives the torque, SlipErrorIntegral gives I, and ThetaEstimator gives
+/// theta_hat. The estimator uses the brake torque that acts, not the reference. With an ideal actuator V = ([I; e_v]' P
+/// [I; e_v] + (theta - theta_hat)^2/gamma)/2 never grows.
 class AdaptiveController final : public SlipController {
  public:
   /// Throws std::invalid_argument for gains, Q or bounds of theta out of range.
@@ -28,7 +28,7 @@ class AdaptiveController final : public SlipController {
   paper::Gains<double> gains_;
   SlipErrorIntegral integral_;
   ThetaEstimator theta_;
-  double omega1_rad_s_{0.0};  ///< of the cycle before, as is the slip
+  double omega1_rad_s_{0.0};  ///< of the previous cycle, as is the slip
   double slip_{0.0};
 };
 

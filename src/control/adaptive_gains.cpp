@@ -9,13 +9,13 @@
 namespace abs_hil::control {
 
 const AdaptiveOptions& checked(const AdaptiveOptions& options) {
-  // Not the bounds of theta: without a projection, as in the paper's proofs, they lie beyond those of the
-  // configuration.
+  // The bounds of theta are not checked. The paper's proofs have no projection, and tests of them use bounds outside
+  // the ranges of the configuration.
   for (const auto member : {&AdaptiveOptions::gamma, &AdaptiveOptions::ka1, &AdaptiveOptions::zeta0}) {
     rig::require_valid(options, member, "control.adaptive.");
   }
   if (!(options.theta_min_N <= options.theta_max_N)) {
-    throw std::invalid_argument("adaptive.theta_min_N must not exceed adaptive.theta_max_N");
+    throw std::invalid_argument("control.adaptive.theta_min_N must not exceed control.adaptive.theta_max_N");
   }
   return options;
 }

@@ -5,8 +5,8 @@
 
 namespace abs_hil::control {
 
-/// The options themselves, if the adaptation can work with them. Throws std::invalid_argument naming what it cannot
-/// work with: gamma, ka1 or zeta0 out of its range, theta_min_N > theta_max_N. Not real-time safe.
+/// Returns the options unchanged. Throws std::invalid_argument, naming the option, if gamma, ka1 or zeta0 is out of its
+/// range or theta_min_N > theta_max_N. Not real-time safe.
 [[nodiscard]] const AdaptiveOptions& checked(const AdaptiveOptions& options);
 
 /// The gains of (16)-(18), with B'P of P A + A'P = -2 Q. Throws std::invalid_argument as `checked` does, and if Q is

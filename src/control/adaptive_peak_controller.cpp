@@ -12,9 +12,10 @@ namespace {
 
 const AdaptivePeakOptions& checked(const AdaptivePeakOptions& o) {
   rig::require_valid(o, "control.adaptive_peak.");
-  if (!(o.slip_min < o.slip_max)) throw std::invalid_argument("adaptive_peak needs slip_min < slip_max");
+  if (!(o.slip_min < o.slip_max))
+    throw std::invalid_argument("control.adaptive_peak.slip_min must be below control.adaptive_peak.slip_max");
   if (!(o.slip_start >= o.slip_min && o.slip_start <= o.slip_max)) {
-    throw std::invalid_argument("adaptive_peak.slip_start must lie within [slip_min, slip_max]");
+    throw std::invalid_argument("control.adaptive_peak.slip_start must be in [slip_min, slip_max]");
   }
   return o;
 }
@@ -83,10 +84,10 @@ double AdaptivePeakController::command_Nm(const SlipInput& input, double slip, c
   const double v_x = std::max(wheels_.r2_m * speeds.omega2_rad_s, v_min_m_s_);
   const paper::Laws<double> laws = paper::laws(wheels_);
   const paper::Gains<double> gains{.ks0 = options_.ks0, .ks1 = options_.ks1};
-  // The observed force stands for theta phi: theta is the force, phi is 1.
+  // The observed force replaces theta phi: theta is the force, and phi is 1.
   const paper::Reading<double> reading{
       .omega1 = speeds.omega1_rad_s, .omega2 = speeds.omega2_rad_s, .lambda_ref = reference.slip, .phi = 1.0};
-  // The observed force is late: the curve tells what the slip has changed of it since.
+  // The observed force is delayed. The curve gives its change with the slip since then.
   const double force_N = observer_.force_N() + peak_.force_N(slip) - peak_.force_N(late_slip_);
   const double reference_m_s2 = reference.rate_per_s * v_x;
 

@@ -8,11 +8,12 @@
 
 namespace abs_hil::control {
 
-/// Brakes at the slip of the largest tyre force without being told theta, B, C or a slip reference
-/// (docs/theory-beyond.md): WheelForceObserver gives speeds and tyre force from encoders and brake, SlipPeakEstimator
-/// the peak from slip and force, and the slip loop follows it plus a small sinusoidal search. The loop is that of (16)
-/// with the observed force in the place of theta phi, carried through the brake's lag as in
-/// AdaptiveActuatorController. `rig.tyre` is not looked at. theta_est_N is the estimated peak force, slip_ref its own.
+/// Brakes at the slip of the largest tyre force. It needs neither theta, B and C nor a slip reference
+/// (docs/theory-beyond.md). WheelForceObserver estimates speeds and tyre force from encoders and brake.
+/// SlipPeakEstimator estimates the peak from slip and force. The slip loop follows this peak plus a small sinusoidal
+/// search. The loop is (16) with the observed force in place of theta phi. It compensates the brake's lag as
+/// AdaptiveActuatorController does. It does not use `rig.tyre`. theta_est_N is the estimated peak force, and slip_ref
+/// is the controller's own reference.
 class AdaptivePeakController final : public SlipController {
  public:
   /// Throws std::invalid_argument for options out of range.
@@ -22,7 +23,7 @@ class AdaptivePeakController final : public SlipController {
   [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
 
  private:
-  /// The slip asked for now, and how fast it changes.
+  /// The slip reference now, and its rate.
   struct Reference {
     double slip;
     double rate_per_s;
@@ -43,7 +44,7 @@ class AdaptivePeakController final : public SlipController {
   SlipErrorIntegral integral_;
   double centre_{0.0};  ///< of the search
   double time_s_{0.0};  ///< since the start of braking
-  /// Slip behind two equal lags that together delay it as long as the force estimate.
+  /// Slip after two equal lags. Together they delay it as long as the force estimate is delayed.
   double half_late_slip_{0.0};
   double late_slip_{0.0};
 };

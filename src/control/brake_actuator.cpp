@@ -26,7 +26,8 @@ void BrakeActuator::advance(double dt_s) noexcept {
     mean_torque_Nm_ = target_Nm_;
     return;
   }
-  // (6) under a constant duty: the distance to b(u) shrinks by exp(-c31 dt); its integral is what it lost over c31.
+  // (6) at a constant duty: the distance to b(u) shrinks by exp(-c31 dt). The integral of the distance is its loss /
+  // c31.
   const double covered = -std::expm1(-brake_.c31_per_s * dt_s);
   const double change_Nm = (target_Nm_ - torque_Nm_) * covered;
   mean_torque_Nm_ = target_Nm_ - change_Nm / (brake_.c31_per_s * dt_s);

@@ -4,24 +4,24 @@
 
 namespace abs_hil::control {
 
-/// The brake as the controllers see it: duty for a wanted torque through the inverse of (7), and an open-loop estimate
-/// of the torque that acts, through the lag (6), since the rig has no torque sensor. Real-time safe.
+/// The controllers' model of the brake. It computes the duty for a torque by the inverse of (7). It estimates the
+/// torque that acts in open loop, by the lag (6), because the rig has no torque sensor. Real-time safe.
 class BrakeActuator {
  public:
-  /// @param ideal the torque asked for acts at once and without limits (`plant.ideal_actuator`)
+  /// @param ideal the reference torque acts at once and without limits (`plant.ideal_actuator`)
   /// @param max_duty largest duty the gate lets pass, in (0, 1]
   BrakeActuator(const rig::BrakeParameters& brake, bool ideal, double max_duty) noexcept;
 
-  /// The brake has been released for long.
+  /// Starts from a brake that has long been released.
   void reset() noexcept;
-  /// Lets `dt_s` pass under the duty (the torque, if ideal) of the last `command`: exact solution of (6).
+  /// Advances the model by `dt_s` under the duty of the last `command` (the torque, if ideal): exact solution of (6).
   void advance(double dt_s) noexcept;
-  /// Takes note of what is sent now: the duty in [0, 1] counts, or, if ideal, the torque, >= 0.
+  /// Stores the command that is sent now: its duty in [0, 1], or, if ideal, its torque, >= 0.
   void command(double duty, double torque_Nm) noexcept;
 
-  /// Duty in [0, max_duty] for a wanted torque; with an ideal actuator only for the record.
+  /// Duty in [0, max_duty] for a reference torque. With an ideal actuator it is only recorded.
   [[nodiscard]] double duty_for(double torque_Nm) const noexcept;
-  /// Static torque that comes of a wanted one: within [0, max_torque_Nm], and 0 or b(u0) for torques that the dead
+  /// Static torque for a reference torque: within [0, max_torque_Nm], and 0 or b(u0) for torques that the dead
   /// zone makes unreachable.
   [[nodiscard]] double limited(double torque_Nm) const noexcept;
   /// b(max_duty); infinite if ideal.

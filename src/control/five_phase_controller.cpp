@@ -11,19 +11,19 @@
 namespace abs_hil::control {
 namespace {
 
-/// A wheel slower than this stands, as far as a wheel speed sensor can tell.
+/// Below this speed a wheel speed sensor cannot distinguish a turning wheel from a standing one.
 constexpr double standing_rad_s = 1.0;
 
 const FivePhaseOptions& checked(const FivePhaseOptions& o) {
   rig::require_valid(o, "control.five_phase.");
   if (!(o.release_below_m_s2 <= o.hold_below_m_s2)) {
-    throw std::invalid_argument("five_phase.release_below_m_s2 must not be above hold_below_m_s2");
+    throw std::invalid_argument("control.five_phase.release_below_m_s2 must not be above hold_below_m_s2");
   }
   if (!(o.recover_above_m_s2 > o.release_below_m_s2)) {
-    throw std::invalid_argument("five_phase.recover_above_m_s2 must be above release_below_m_s2");
+    throw std::invalid_argument("control.five_phase.recover_above_m_s2 must be above release_below_m_s2");
   }
   if (!(o.reapply_below_m_s2 > o.hold_below_m_s2)) {
-    throw std::invalid_argument("five_phase.reapply_below_m_s2 must be above hold_below_m_s2");
+    throw std::invalid_argument("control.five_phase.reapply_below_m_s2 must be above hold_below_m_s2");
   }
   return o;
 }
@@ -35,7 +35,7 @@ FivePhaseController::FivePhaseController(const ControllerContext& context)
       brake_{context.rig.brake},
       options_{checked(context.options.five_phase)},
       period_s_{1.0 / context.options.rate_Hz} {
-  if (!(context.options.rate_Hz > 0.0)) throw std::invalid_argument("the control rate must be > 0");
+  if (!(context.options.rate_Hz > 0.0)) throw std::invalid_argument("control.rate_Hz must be > 0 Hz");
 }
 
 void FivePhaseController::reset(const SlipInput&) noexcept {
@@ -90,7 +90,7 @@ SlipOutput FivePhaseController::step(const SlipInput& input) noexcept {
     in_phase_s_ = 0.0;
     accelerated_ = acceleration_m_s2 > options_.reapply_below_m_s2;
   }
-  // The torque is held for the period to come: it gets the ramp's value at the end of it.
+  // The torque is held for the next period, so it gets the ramp's value at the period's end.
   const double step_s = input.dt_s > 0.0 ? input.dt_s : period_s_;
   torque_Nm_ = std::clamp(torque_Nm_ + ramp_Nm_s() * step_s, 0.0, full_torque_Nm(brake_, input.max_brake_torque_Nm));
   return {.brake_torque_Nm = torque_Nm_,

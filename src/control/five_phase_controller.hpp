@@ -7,25 +7,25 @@
 
 namespace abs_hil::control {
 
-/// Where the cycle of FivePhaseController stands.
+/// State of the cycle of FivePhaseController.
 enum class BrakePhase : std::uint8_t {
-  apply,    ///< first application: torque up, fast
-  hold,     ///< the wheel decelerates more than a car can: torque kept, wait and see
-  release,  ///< it decelerates yet more: torque down
-  recover,  ///< the wheel is coming back: torque kept until it has
-  reapply,  ///< torque up, slowly, in search of the next instability
+  apply,    ///< first application: the torque rises fast
+  hold,     ///< the wheel decelerates more than a car can: the torque is held
+  release,  ///< it decelerates even more: the torque falls
+  recover,  ///< the wheel accelerates: the torque is held until it has recovered
+  reapply,  ///< the torque rises slowly until the next instability
 };
 
 /// Anti-lock logic on thresholds of the braked wheel's acceleration a = r1 omega1', as in production systems (the cycle
-/// of the Bosch Automotive Handbook; five-phase algorithms after Pasillas-Lepine, 2006), without any slip measurement:
+/// of the Bosch Automotive Handbook; five-phase algorithms after Pasillas-Lepine, 2006). It measures no slip:
 /// apply -> hold (a < hold_below) -> release (a < release_below) -> recover (a > recover_above) -> re-apply (a, once
 /// above reapply_below, < reapply_below) -> hold ... From hold it re-applies when a is back above hold_below, or
-/// nothing has happened for hold_limit_s. A wheel that stands counts as one that decelerates without bound: nothing
-/// else tells a locked wheel from a free one here. Reads alpha1, omega1 and the torque's limit only; the slip velocity
-/// error that it reports is for the record. theta_est_N is NaN.
+/// after hold_limit_s without a transition. A standing wheel counts as one that decelerates without bound, because
+/// nothing else distinguishes a locked wheel from a free one here. The controller reads alpha1, omega1 and the torque's
+/// limit only. It reports the slip velocity error for the record. theta_est_N is NaN.
 class FivePhaseController final : public SlipController {
  public:
-  /// Throws std::invalid_argument for thresholds out of order, or ramps or limits not > 0.
+  /// Throws std::invalid_argument if thresholds are out of order or a ramp or limit is not > 0.
   explicit FivePhaseController(const ControllerContext& context);
 
   void reset(const SlipInput& input) noexcept override;

@@ -5,8 +5,8 @@
 
 namespace abs_hil::control {
 
-/// Full brake torque throughout, whatever the slip: what happens without ABS, the reference for the slip controllers.
-/// It asks for the actuator's largest torque, or for b(1) of (7) where the actuator has no limit. theta_est_N is NaN.
+/// Full brake torque at any slip: braking without ABS, the reference for the slip controllers. The torque is the
+/// actuator's largest, or b(1) of (7) if the actuator has no limit. theta_est_N is NaN.
 class LockedController final : public SlipController {
  public:
   explicit LockedController(const ControllerContext& context) noexcept;

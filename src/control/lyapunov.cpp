@@ -30,7 +30,7 @@ Eigen::Matrix4d kronecker(const Eigen::Matrix2d& left, const Eigen::Matrix2d& ri
 Eigen::Matrix2d solve_lyapunov(const Eigen::Matrix2d& A, const Eigen::Matrix2d& Q) {
   if (!Q.allFinite() || !Q.isApprox(Q.transpose()) || !is_positive_definite(Q)) {
     throw std::invalid_argument(
-        rig::formatted("Q = [%g %g; %g %g] is not valid; it must be symmetric and positive definite: q11 > 0, q22 > 0, "
+        rig::formatted("Q = [%g %g; %g %g] is not valid; give a symmetric and positive definite Q: q11 > 0, q22 > 0, "
                        "q11 q22 > q12^2",
                        Q(0, 0), Q(0, 1), Q(1, 0), Q(1, 1)));
   }
@@ -42,7 +42,9 @@ Eigen::Matrix2d solve_lyapunov(const Eigen::Matrix2d& A, const Eigen::Matrix2d& 
 
   const Eigen::Matrix2d P = Eigen::Map<const Eigen::Matrix2d>(solution.data());
   Eigen::Matrix2d symmetric = 0.5 * (P + P.transpose());
-  if (!is_positive_definite(symmetric)) throw std::invalid_argument("the error dynamics A must be stable");
+  if (!is_positive_definite(symmetric))
+    throw std::invalid_argument(
+        "the error dynamics A is not stable; give an A with eigenvalues in the left half-plane");
   return symmetric;
 }
 

@@ -5,9 +5,9 @@
 
 namespace abs_hil::control {
 
-/// Slip controller (16) for a known peak tyre force theta0: `nominal_T_b` of paper_laws.hpp in sampled-data form, the
-/// torque from SlipErrorDynamics, I from SlipErrorIntegral.
-/// With the right theta0 and an ideal actuator e_v'' + ks1 e_v' + ks0 e_v = 0. theta_est_N is theta0.
+/// Slip controller (16) for a known peak tyre force theta0: `nominal_T_b` of paper_laws.hpp in sampled-data form.
+/// SlipErrorDynamics gives the torque, and SlipErrorIntegral gives I.
+/// With the correct theta0 and an ideal actuator, e_v'' + ks1 e_v' + ks0 e_v = 0. theta_est_N is theta0.
 class NominalController final : public SlipController {
  public:
   /// Throws std::invalid_argument for gains or theta0 out of range.

@@ -22,7 +22,7 @@ PiController::PiController(const ControllerContext& context)
       kp_per_s_{-std::expm1(-context.options.pi.kp_per_s / context.options.rate_Hz) * context.options.rate_Hz},
       ki_per_s2_{context.options.pi.ki_per_s2},
       feed_forward_{context.options.pi.feed_forward} {
-  if (!(context.options.rate_Hz > 0.0)) throw std::invalid_argument("the control rate must be > 0");
+  if (!(context.options.rate_Hz > 0.0)) throw std::invalid_argument("control.rate_Hz must be > 0 Hz");
   rig::require_valid(context.options.pi, "control.pi.");
 }
 

@@ -23,7 +23,7 @@
 namespace abs_hil::control {
 namespace {
 
-/// A new controller is one file pair and one line here (docs/writing-a-controller.md).
+/// A new controller needs a pair of files and one line here (docs/writing-a-controller.md).
 constexpr std::array own_table{
     controller_entry<AdaptiveController>(
         "adaptive", "adaptive slip control, estimates the peak tyre force: (17)-(18) of the paper"),
@@ -66,10 +66,11 @@ std::string_view controller_name(std::size_t index) noexcept {
 std::span<const ControllerEntry> controllers() noexcept { return table(); }
 
 void register_controller(const ControllerEntry& entry) {
-  if (entry.name.empty() || entry.make == nullptr) throw std::invalid_argument("a controller needs a name and a maker");
+  if (entry.name.empty() || entry.make == nullptr)
+    throw std::invalid_argument("a controller entry needs a name and a make function");
   if (std::ranges::find(table(), entry.name, &ControllerEntry::name) != table().end()) {
     throw std::invalid_argument("a controller named '" + std::string(entry.name) +
-                                "' is there already; choose another name");
+                                "' already exists; choose another name");
   }
   table().push_back(entry);
 }

@@ -5,8 +5,8 @@
 
 namespace abs_hil::control {
 
-/// Relay as in the rig maker's demonstration: no brake while the slip is above a threshold, else full torque (that of
-/// LockedController). No state, so no hysteresis. theta_est_N is NaN.
+/// Relay as in the rig maker's demonstration: no torque while the slip is above a threshold, otherwise full torque (as
+/// LockedController). It has no state and so no hysteresis. theta_est_N is NaN.
 class RelayController final : public SlipController {
  public:
   /// Throws std::invalid_argument for a threshold outside [0, 1).

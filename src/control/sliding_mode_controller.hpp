@@ -4,11 +4,12 @@
 
 namespace abs_hil::control {
 
-/// Sliding-mode slip control, the kind of controller that the paper compares itself with:
-///   Tb = (J1/r1) xi_1 of (18), with nu = -K sign(e_v) in the place of -ks0 I - ks1 e_v,
+/// Sliding-mode slip control, the type of the paper's own baseline:
+///   Tb = (J1/r1) xi_1 of (18), with nu = -K sign(e_v) in place of -ks0 I - ks1 e_v,
 ///   theta_hat' = -gamma k(slip_ref) phi(slip) sign(e_v), projected.
-/// The law and the gains of the paper's own baseline are not public; this is the textbook one for its error (13), not a
-/// copy. The sign is held for a period, so e_v chatters within about K periods of 0: that is the law, not a flaw here.
+/// The law and the gains of the paper's baseline are not public. This is the textbook law for the error (13), not a
+/// copy. The sign is held for a period, so e_v chatters around 0 with an amplitude of about K times the period. The
+/// chatter belongs to the law.
 class SlidingModeController final : public SlipController {
  public:
   /// Throws std::invalid_argument for options out of range.

@@ -26,7 +26,7 @@ void SlidingSurface::take_over(const SlidingSurface& before) noexcept {
 double SlidingSurface::observe(const SlipInput& input) noexcept {
   past_phi_ = rig::normalised_tyre_force(tyre_, 0.5 * (slip_ + input.slip));
   slip_ = input.slip;
-  // theta_hat moves by -phi s, the torque by phi times that.
+  // theta_hat changes by -phi s, and the torque by phi times this change.
   if (!winds_up(-switching_)) {
     theta_.update(input.dt_s, slip_velocity_gain(wheels_, input.slip_ref) * past_phi_, switching_);
   }

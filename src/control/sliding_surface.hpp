@@ -5,26 +5,26 @@
 
 namespace abs_hil::control {
 
-/// What the laws that slide on e_v = 0 have in common: the equivalent control with a theta_hat of its own. A law only
-/// says how e_v is to move and what stands for sign(e_v). Real-time safe but for the constructor.
+/// The common part of the laws that slide on e_v = 0: the equivalent control and an estimate theta_hat. A law gives the
+/// reference motion of e_v and its substitute for sign(e_v). Real-time safe except the constructor.
 class SlidingSurface {
  public:
   /// Throws std::invalid_argument for options out of range.
   SlidingSurface(const ControllerContext& context, const SwitchingAdaptationOptions& adaptation);
 
   void reset(const SlipInput& input) noexcept;
-  /// Goes on from where the other stands.
+  /// Takes over the state of the other.
   void take_over(const SlidingSurface& before) noexcept;
-  /// Adapts theta_hat over the past interval. It stands while the torque asked for lay outside what the actuator can
-  /// give and adaptation would drive it further out (anti-windup).
+  /// Adapts theta_hat over the past interval. theta_hat is held if the reference torque was outside the actuator's
+  /// range and adaptation would drive it further out (anti-windup).
   /// @return e_v now
   [[nodiscard]] double observe(const SlipInput& input) noexcept;
-  /// The torque that makes e_v, now `error_m_s`, move as wanted.
+  /// The torque that moves e_v, now `error_m_s`, along the reference motion.
   /// @param switching  s for theta_hat over the coming interval, in [-1, 1]
   [[nodiscard]] SlipOutput drive(const SlipInput& input, double error_m_s, const WantedMotion& wanted,
                                  double switching) noexcept;
 
-  /// True if the last torque lay outside what the actuator can give and a change of this sign would drive it further.
+  /// True if the last torque was outside the actuator's range and a change of this sign would drive it further out.
   [[nodiscard]] bool winds_up(double torque_change) const noexcept { return excess_ * torque_change > 0.0; }
   [[nodiscard]] double period_s() const noexcept { return equivalent_.period_s(); }
 
@@ -33,7 +33,7 @@ class SlidingSurface {
   rig::TyreParameters tyre_;
   EquivalentControl equivalent_;
   SwitchingThetaEstimator theta_;
-  double slip_{0.0};  ///< of the cycle before
+  double slip_{0.0};  ///< of the previous cycle
   double past_phi_{0.0};
   double switching_{0.0};
   double excess_{0.0};  ///< 1: the last torque was above the actuator's range, -1: below, 0: within

@@ -10,13 +10,13 @@ void SlipErrorIntegral::reset(double error_m_s, double slip_ref) noexcept {
 }
 
 void SlipErrorIntegral::advance(double dt_s, double error_m_s, double slip_ref, double v_x_m_s) noexcept {
-  // A reference that changes now changes e_v by a jump that the past interval did not see.
+  // A change of the reference now makes e_v jump. The past interval must not include this jump.
   const double error_before_change = error_m_s + (slip_ref - slip_ref_) * v_x_m_s;
   mean_error_m_s_ = 0.5 * (error_m_s_ + error_before_change);
   error_m_s_ = error_m_s;
   slip_ref_ = slip_ref;
 
-  // The torque holds -ks0 I: a negative error drives it up, a positive one down.
+  // The torque contains -ks0 I: a negative error raises it, a positive error lowers it.
   const bool winds_up =
       (request_ == Request::above && mean_error_m_s_ < 0.0) || (request_ == Request::below && mean_error_m_s_ > 0.0);
   const double increment_m = winds_up ? 0.0 : mean_error_m_s_ * dt_s;

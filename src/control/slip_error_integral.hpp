@@ -4,17 +4,16 @@
 
 namespace abs_hil::control {
 
-/// I of (16)-(17), I' = e_v, by the trapezoid of the measured e_v over the interval that really passed, with
-/// anti-windup: it stands while the torque asked for lay outside what the actuator can give and e_v would drive it
-/// further out. Real-time safe.
+/// I of (16)-(17), I' = e_v, by the trapezoidal rule over the measured interval. Anti-windup: I is held while the
+/// reference torque is outside the actuator's range and e_v would drive it further out. Real-time safe.
 class SlipErrorIntegral {
  public:
   /// I = 0 at the start of braking.
   void reset(double error_m_s, double slip_ref) noexcept;
   /// Integrates up to `input`, whose error is `error_m_s`.
-  /// @param v_x_m_s  car speed: gives the error that the reference of the past interval would have had
+  /// @param v_x_m_s  car speed; it gives the error against the reference of the past interval
   void advance(double dt_s, double error_m_s, double slip_ref, double v_x_m_s) noexcept;
-  /// Takes note of the torque asked for until the next `advance`, against the actuator's range [0, max_torque_Nm].
+  /// Stores the reference torque until the next `advance`, and compares it with the range [0, max_torque_Nm].
   void note_request(double torque_Nm, double max_torque_Nm) noexcept {
     if (torque_Nm > max_torque_Nm) {
       request_ = Request::above;

@@ -9,13 +9,13 @@
 namespace abs_hil::control {
 namespace {
 
-// What is believed at first: standard deviations of the logarithms, the shape and the slip's zero.
+// Initial standard deviations of the logarithms, the shape and the slip's zero.
 constexpr double log_force_spread = 1.0;
 constexpr double log_width_spread = 0.6;
 constexpr double shape0 = 1.0;
 constexpr double shape_spread = 1.0;
 constexpr double zero_spread = 0.01;
-// Bounds of the unknowns; those of the width are the controller's.
+// Bounds of the unknowns. The controller gives the bounds of the width.
 constexpr double log_force_max = 7.0;
 constexpr double shape_min = -0.5;
 constexpr double shape_max = 20.0;
@@ -25,8 +25,8 @@ constexpr double jump_window_s = 0.015;
 constexpr double rollback_s = 0.03;
 constexpr double kept_every_s = 1e-3;
 constexpr double jump_least_N = 3.0;         ///< three standard deviations of the force estimate
-constexpr double jump_force_spread = 0.5;    ///< of the logarithm of the level after one
-constexpr double level_known_spread = 0.12;  ///< before the level is known as well as this there are no jumps
+constexpr double jump_force_spread = 0.5;    ///< of the logarithm of the level after a jump
+constexpr double level_known_spread = 0.12;  ///< jumps are detected only once the level is known to this accuracy
 
 struct CurvePoint {
   double value;
@@ -54,10 +54,10 @@ SlipPeakEstimator::SlipPeakEstimator(const SlipPeakOptions& options, double slip
       rollback_{at_least_one(rollback_s * rate_Hz / static_cast<double>(decimation_))} {
   rig::require_valid(options, "control.adaptive_peak.");
   if (!(0.0 < slip_min && slip_min < slip_max && rate_Hz > 0.0)) {
-    throw std::invalid_argument("the peak's slip needs bounds 0 < slip_min < slip_max and a control rate > 0");
+    throw std::invalid_argument("the slip peak estimator needs 0 < slip_min < slip_max and a control rate > 0 Hz");
   }
   if (!(options.peak_slip0 >= slip_min && options.peak_slip0 <= slip_max)) {
-    throw std::invalid_argument("adaptive_peak.peak_slip0 must lie within [slip_min, slip_max]");
+    throw std::invalid_argument("control.adaptive_peak.peak_slip0 must be in [slip_min, slip_max]");
   }
   reset();
 }
@@ -105,7 +105,7 @@ bool SlipPeakEstimator::jumped(double slip, double force_N) const noexcept {
   if (!level_known || kept_count_ <= window_) return false;
   const Sample& past = kept(window_);
   const double unexplained = force_N - past.force_N - (this->force_N(slip) - this->force_N(past.slip));
-  // The curve is least to be trusted for long moves along it.
+  // The curve is least accurate for long moves along it.
   const double trusted = options_.jump_level + std::abs(slip - past.slip) / width();
   return std::abs(unexplained) > std::max(jump_least_N, peak_force_N() * trusted);
 }

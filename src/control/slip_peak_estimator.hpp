@@ -8,15 +8,15 @@
 
 namespace abs_hil::control {
 
-/// Where the tyre force peaks over the slip, from pairs of slip and force alone: an extended Kalman filter of
+/// Estimates the slip of the largest tyre force from pairs of slip and force only. It is an extended Kalman filter for
 ///   F = Fp (2 + c) x / (1 + c |x| + x^2),   x = (slip + zero) / width,
-/// which rises to Fp at x = 1 and falls beyond, the more slowly the larger c: the least curve that has a peak, not the
-/// plant's own. Unknowns: ln Fp, ln width, c and `zero`, the error of the measured slip at no force (wheel radii).
-/// All drift as random walks, the level Fp fastest, so that what teaches the peak's place is how the force answers the
-/// search, not its level.
+/// which rises to Fp at x = 1 and then falls, more slowly for larger c. This is the simplest curve with a peak, not the
+/// plant's own curve. Unknowns: ln Fp, ln width, c and `zero`, the error of the measured slip at no force (wheel
+/// radii). All unknowns drift as random walks, the level Fp fastest. So the filter learns the peak's slip from the
+/// response of the force to the search, not from the level of the force.
 ///
-/// A change of force over 15 ms that no move along the curve explains is a jump of friction: the level is learnt anew,
-/// and alone for `jump_hold_s`, and what the last 30 ms taught of the curve is taken back.
+/// If the force changes over 15 ms and no move along the curve explains the change, the friction has jumped. Then the
+/// filter learns the level again, for `jump_hold_s` only the level, and discards what it learnt in the last 30 ms.
 /// `reset` and `update` are real-time safe.
 class SlipPeakEstimator {
  public:
@@ -26,7 +26,7 @@ class SlipPeakEstimator {
   SlipPeakEstimator(const SlipPeakOptions& options, double slip_min, double slip_max, double rate_Hz);
 
   void reset() noexcept;
-  /// One measured pair, both of the same moment; `dt_s` > 0 after the one before.
+  /// One measured pair, both of the same time, `dt_s` > 0 after the previous pair.
   void update(double dt_s, double slip, double force_N) noexcept;
 
   [[nodiscard]] double peak_force_N() const noexcept;
@@ -57,7 +57,7 @@ class SlipPeakEstimator {
   SlipPeakOptions options_;
   double log_slip_min_;
   double log_slip_max_;
-  double sample_variance_N2_;  ///< of one pair, such that pairs at any rate teach as much per second
+  double sample_variance_N2_;  ///< of one pair, scaled so that the information per second does not depend on the rate
   std::size_t decimation_;     ///< cycles between kept samples, 1 ms or one cycle
   std::size_t window_;         ///< kept samples in 15 ms and in 30 ms
   std::size_t rollback_;

@@ -35,7 +35,7 @@ SlipOutput SuperTwistingController::step(const SlipInput& input) noexcept {
   const double error_m_s = surface_.observe(input);
   const double period_s = surface_.period_s();
   const SuperTwistingStep next = super_twisting_step(error_m_s, integral_m_s2_, k1_, k2_, period_s);
-  // z makes up for what the model misses, so the root alone is how e_v is expected to move.
+  // z compensates the model error, so only the root moves e_v.
   const WantedMotion wanted{.mean_rate_m_s2 = next.root_rate_m_s2 + next.integral_m_s2,
                             .error_at_mid_m_s = error_m_s + 0.5 * period_s * next.root_rate_m_s2};
   const SlipOutput output = surface_.drive(input, error_m_s, wanted, next.sign);

@@ -8,21 +8,21 @@ namespace abs_hil::control {
 struct SuperTwistingStep {
   double root_rate_m_s2{0.0};  ///< -k1 sqrt|e| sign(e), mean over the period
   double integral_m_s2{0.0};   ///< z for the period
-  double sign{0.0};            ///< what stood for sign(e), in [-1, 1]
+  double sign{0.0};            ///< substitute for sign(e), in [-1, 1]
 };
 
-/// Semi-implicit step: sqrt|e| is taken at the period's end, where e+ = e - h k1 sqrt|e+| sign(e+), and the sign is
-/// sat(e/(h^2 k2)), so that z never moves by more than takes e to 0. Continuous in e and z; close to 0 it becomes the
-/// deadbeat pair u = z - 2 e/h, z+ = z - e/h, which ends the chatter at any rate and leaves e = O(h^2) under a
-/// perturbation of bounded slope (docs/theory-baselines.md). Real-time safe.
+/// Semi-implicit step. sqrt|e| is taken at the period's end, where e+ = e - h k1 sqrt|e+| sign(e+). The sign is
+/// sat(e/(h^2 k2)), so that the change of z never takes e beyond 0. The step is continuous in e and z. Close to 0 it
+/// becomes the deadbeat pair u = z - 2 e/h, z+ = z - e/h. This ends the chatter at any rate and leaves e = O(h^2) under
+/// a perturbation of bounded slope (docs/theory-baselines.md). Real-time safe.
 [[nodiscard]] SuperTwistingStep super_twisting_step(double error_m_s, double integral_m_s2, double k1, double k2,
                                                     double period_s) noexcept;
 
 /// Super-twisting slip control: the equivalent control of SlidingModeController, but with the continuous
 ///   -k1 sqrt|e_v| sign(e_v) + z,  z' = -k2 sign(e_v)
-/// in the place of -K sign(e_v). A mismatch rho of the model with |rho'| <= L is overcome in finite time if k2 > L and
-/// k1 > sqrt(k2 + L). z stands while the torque asked for lies outside what the actuator can give and z would drive it
-/// further out.
+/// in place of -K sign(e_v). The law overcomes a model error rho with |rho'| <= L in finite time if k2 > L and
+/// k1 > sqrt(k2 + L). z is held while the reference torque is outside the actuator's range and z would drive it further
+/// out.
 class SuperTwistingController final : public SlipController {
  public:
   /// Throws std::invalid_argument for options out of range.

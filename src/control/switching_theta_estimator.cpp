@@ -15,7 +15,7 @@ SwitchingThetaEstimator::SwitchingThetaEstimator(const SwitchingAdaptationOption
       theta_N_{options.theta0_N} {
   rig::require_valid(options, "");
   if (!(theta_min_N_ <= theta0_N_ && theta0_N_ <= theta_max_N_)) {
-    throw std::invalid_argument("theta0_N must lie within [theta_min_N, theta_max_N]");
+    throw std::invalid_argument("theta0_N must be in [theta_min_N, theta_max_N]");
   }
 }
 

@@ -6,18 +6,18 @@
 
 namespace abs_hil::control {
 
-/// Estimate of the peak tyre force that belongs to a sliding-mode law,
-///   theta_hat' = -gamma k(slip_ref) phi(slip) s,   s in [-1, 1] standing for sign(e_v),
-/// projected onto [theta_min_N, theta_max_N]. With e_v' = -k phi (theta - theta_hat) - K s + d it makes
-/// V = |e_v| + (theta - theta_hat)^2/(2 gamma) fall at K - |d| or faster until e_v = 0 (docs/theory-baselines.md), for
-/// either sign of phi. Real-time safe.
+/// Estimator of the peak tyre force for a sliding-mode law,
+///   theta_hat' = -gamma k(slip_ref) phi(slip) s,   where s in [-1, 1] is the substitute for sign(e_v),
+/// projected onto [theta_min_N, theta_max_N]. If e_v' = -k phi (theta - theta_hat) - K s + d, then
+/// V = |e_v| + (theta - theta_hat)^2/(2 gamma) falls at K - |d| or faster until e_v = 0, for either sign of phi
+/// (docs/theory-baselines.md). Real-time safe.
 class SwitchingThetaEstimator {
  public:
   /// Throws std::invalid_argument for a gain or bounds out of range.
   explicit SwitchingThetaEstimator(const SwitchingAdaptationOptions& options);
 
   void reset() noexcept { theta_N_ = theta0_N_; }
-  /// Goes on with the other's estimate, within the own bounds.
+  /// Takes over the other's estimate, limited to the own bounds.
   void take_over(const SwitchingThetaEstimator& before) noexcept {
     theta_N_ = std::clamp(before.theta_N_, theta_min_N_, theta_max_N_);
   }

@@ -5,7 +5,7 @@
 
 namespace abs_hil::control {
 
-/// What passed between two control cycles, as the adaptation sees it.
+/// The interval between two control cycles, for the adaptation.
 struct AdaptationInterval {
   double dt_s{0.0};                 ///< > 0
   double omega1_before_rad_s{0.0};  ///< upper wheel at its start ...
@@ -15,7 +15,7 @@ struct AdaptationInterval {
   double zeta_rate_N_s{0.0};        ///< mean of zeta' (17); counts for phi > 0 only
 };
 
-/// The same, where the tyre force is known by itself.
+/// The same interval with a known tyre force.
 struct ForceInterval {
   double dt_s{0.0};           ///< > 0
   double tyre_force_N{0.0};   ///< mean of F, see ThetaEstimator
@@ -28,10 +28,10 @@ struct ForceInterval {
 ///
 /// zeta and omega1_hat act on the controller through theta_hat alone, and (18) differentiated along (17) closes in it:
 ///   theta_hat' = zeta' + gamma ka1 (F - phi theta_hat),   F = (J1 omega1' + d1 omega1 + M10 + Tb)/r1,
-/// where F is the tyre force that the upper wheel's motion tells. So the states here are zeta and theta_hat; omega1_hat
-/// follows from them by (18). That is the same estimator, and it makes freezing (hold) and projection (clamp) free of
-/// wind-up and of jumps: omega1_hat gives way to them. The equation is linear, and solved exactly for F, phi and zeta'
-/// at their means over the interval: stable for any gain and rate.
+/// where F is the tyre force computed from the upper wheel's motion. So the states here are zeta and theta_hat, and
+/// omega1_hat follows from them by (18). This is the same estimator. Freezing (hold) and projection (clamp) act on
+/// theta_hat directly, so they cause no wind-up and no jumps. The equation is linear. It is solved exactly for the
+/// means of F, phi and zeta' over the interval, and so it is stable for any gain and rate.
 ///
 /// Adaptation is frozen for phi <= 0 (rolling free, traction), where V' <= 0 of Theorem 3.1 does not hold.
 /// Real-time safe.
@@ -42,7 +42,7 @@ class ThetaEstimator {
 
   /// omega1_hat = omega1, so theta_hat = zeta0, projected.
   void reset() noexcept;
-  /// Goes on with the other's estimate, within the own bounds, and its zeta.
+  /// Takes over the other's zeta, and its estimate, limited to the own bounds.
   void take_over(const ThetaEstimator& before) noexcept;
   void update(const AdaptationInterval& past) noexcept;
   void update(const ForceInterval& past) noexcept;
@@ -50,8 +50,8 @@ class ThetaEstimator {
   [[nodiscard]] double theta_N() const noexcept { return theta_N_; }
   /// zeta of (17): the integral of zeta' from zeta0 while adaptation is not frozen, not projected.
   [[nodiscard]] double zeta_N() const noexcept { return zeta_N_; }
-  /// omega1_hat of (17) at the end of the last interval, where the upper wheel turned at `omega1_rad_s`: (18) solved
-  /// for it.
+  /// omega1_hat of (17) at the end of the last interval, by (18). `omega1_rad_s` is the upper wheel's speed at that
+  /// time.
   [[nodiscard]] double omega1_hat_rad_s(double omega1_rad_s) const noexcept;
 
  private:

@@ -21,7 +21,7 @@ void TrackingObserver::reset(std::int32_t counts, double omega_rad_s) noexcept {
 }
 
 void TrackingObserver::update(std::int32_t counts, double dt_s) noexcept {
-  if (!(dt_s > 0.0)) return;  // the travel then counts for the next interval
+  if (!(dt_s > 0.0)) return;  // the next interval then includes this travel
   const std::int32_t travel = rig::counts_between(counts_, counts);
   counts_ = counts;
   still_s_ = travel == 0 ? still_s_ + dt_s : 0.0;
@@ -47,14 +47,14 @@ void TrackingObserver::predict_and_correct(double travel_rad, double dt_s) noexc
   const double turned_rad = 0.5 * (omega_rad_s_ + omega_predicted) * dt_s;
   const double residual_rad = travel_rad - (angle_error_rad_ + turned_rad);
 
-  // Estimate less reading: the prediction is off by -residual, of which the angle gain takes its part away.
+  // Estimate minus reading: the prediction error is -residual, and the angle gain reduces it.
   angle_error_rad_ = (angle_gain - 1.0) * residual_rad;
   omega_rad_s_ = omega_predicted + omega_gain * residual_rad;
   alpha_rad_s2_ += alpha_gain * residual_rad;
 }
 
 void TrackingObserver::bound_by_silence() noexcept {
-  // The wheel has stayed within one count for the time T since the last one came. Under constant acceleration, also
+  // The wheel has stayed within one count for the time T since the last change. Under constant acceleration, also
   // through a reversal, its speed then is below 4 counts per T. Without this bound the filter would swing through zero
   // after a wheel locks, and ring after a lone count.
   const double bound_rad_s = 4.0 * rad_per_count_ / still_s_;

@@ -6,22 +6,21 @@
 
 namespace abs_hil::control {
 
-/// Third-order tracking observer of one wheel: angle, speed and acceleration from encoder counts, with a triple pole at
-/// -bandwidth, discretised exactly for the time step given (the alpha-beta-gamma or fading-memory form), so that it
-/// holds for any rate and for a jittering one. Follows a constant deceleration without lag.
+/// Third-order tracking observer of one wheel. It estimates angle, speed and acceleration from encoder counts, with a
+/// triple pole at -bandwidth. It is discretised exactly for each time step (the alpha-beta-gamma or fading-memory
+/// form), so that it is valid for any rate, also with jitter. It follows a constant deceleration without lag.
 ///
-/// A reading stands for the middle of its count; the estimate is kept as a difference to it, so the half count never
-/// shows. A wheel whose count has not changed for `standstill_time_s` stands still: speed and acceleration exactly 0;
-/// the next count ends that. Real-time safe.
+/// A reading means the middle of its count. The estimate is stored as a difference to the reading, so the half count
+/// has no effect. If the count has not changed for `standstill_time_s`, the wheel stands still: speed and acceleration
+/// are exactly 0 until the next count. Real-time safe.
 class TrackingObserver {
  public:
   /// @param counts_per_rev encoder counts per revolution, > 0
   TrackingObserver(const ObserverOptions& options, std::int32_t counts_per_rev) noexcept;
 
-  /// Starts from a reading, with the speed it is known to have (0 if unknown).
+  /// Starts from a reading and a known speed (0 if unknown).
   void reset(std::int32_t counts, double omega_rad_s) noexcept;
-  /// Takes the next reading, `dt_s` > 0 after the one before (otherwise it is ignored), right across the counter's
-  /// wrap-around.
+  /// Takes the next reading, `dt_s` after the previous one. Ignores it unless `dt_s` > 0. The counter may wrap around.
   void update(std::int32_t counts, double dt_s) noexcept;
 
   [[nodiscard]] double omega_rad_s() const noexcept { return omega_rad_s_; }
@@ -36,7 +35,7 @@ class TrackingObserver {
   double standstill_time_s_;
   double rad_per_count_;
   std::int32_t counts_{0};
-  /// Estimated angle less the last reading's: a difference, so that it stays exact however far the wheel has turned.
+  /// Estimated angle minus the last reading. The difference stays exact however far the wheel has turned.
   double angle_error_rad_{0.0};
   double omega_rad_s_{0.0};
   double alpha_rad_s2_{0.0};

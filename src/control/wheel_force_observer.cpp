@@ -47,7 +47,7 @@ Gain steady_gain(const Matrix6& A, const Matrix6& Q, double angle_variance) {
   return gain;
 }
 
-/// Steady lag of the estimate behind a force that rises evenly.
+/// Steady-state lag of the estimate behind a force ramp.
 double ramp_delay(const Matrix6& A, const Gain& gain, double dt) {
   // Error e = truth - estimate after each correction: e+ = (1 - K C)(A e + one step of the ramp in F).
   Eigen::Matrix<double, 2, 6> C = Eigen::Matrix<double, 2, 6>::Zero();
@@ -66,7 +66,7 @@ WheelForceObserver::WheelForceObserver(const ForceObserverOptions& options, cons
                                        double rate_Hz)
     : wheels_{rig.wheels} {
   if (!(options.force_rate_N2_s > 0.0 && options.brake_rate_Nm2_s > 0.0 && rate_Hz > 0.0)) {
-    throw std::invalid_argument("the force observer's noise intensities and the control rate must be > 0");
+    throw std::invalid_argument("the force observer's noise intensities and the control rate (Hz) must be > 0");
   }
   const double dt = 1.0 / rate_Hz;
   const Matrix6 A = transition(wheels_, dt);
@@ -91,7 +91,7 @@ void WheelForceObserver::predict(double dt_s, double brake_torque_Nm) noexcept {
       (w.r1_m * state_[force] - w.d1_Nms_rad * state_[omega1] - w.M10_Nm - brake_torque_Nm - state_[brake_error]) /
       w.J1_kg_m2;
   const double alpha2 = (-w.r2_m * state_[force] - w.d2_Nms_rad * state_[omega2] - w.M20_Nm) / w.J2_kg_m2;
-  // The brake stops a wheel, it does not turn it back.
+  // The brake stops a wheel but cannot turn it backwards.
   const double omega1_after = std::max(0.0, state_[omega1] + alpha1 * dt_s);
   const double omega2_after = std::max(0.0, state_[omega2] + alpha2 * dt_s);
   state_[angle1] += 0.5 * (state_[omega1] + omega1_after) * dt_s;

@@ -6,7 +6,7 @@
 
 namespace abs_hil::rig {
 
-/// Text as printf makes it, of whatever length; `format` must be a literal that suits the values. Not real-time safe.
+/// Formats text of any length as printf does. `format` must be a literal that fits the values. Not real-time safe.
 template <typename... Values>
 [[nodiscard]] std::string formatted(const char* format, Values... values) {
   const int size = std::snprintf(nullptr, 0, format, values...);

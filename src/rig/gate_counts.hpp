@@ -7,14 +7,14 @@
 
 namespace abs_hil::rig {
 
-/// What the command gate did to a command. Append only: summaries hold the names.
+/// Interventions of the command gate. Only append rows, because summaries contain the names.
 enum class GateAction : std::uint8_t {
   passed = 0,
-  motor_clamped,             ///< outside [0, gate.motor_duty_max]
-  brake_clamped,             ///< outside [0, gate.brake_duty_max]
-  motor_blocked_by_brake,    ///< motor and brake never act together unless the plan says so: the brake wins
+  motor_clamped,           ///< outside [0, gate.motor_duty_max]
+  brake_clamped,           ///< outside [0, gate.brake_duty_max]
+  motor_blocked_by_brake,  ///< motor and brake must not act together unless the plan permits it: the brake has priority
   motor_blocked_by_disable,  ///< motor duty without motor_enable
-  refused,                   ///< the safe command went out instead; a fault is latched
+  refused,                   ///< the gate sent the safe command instead and latched a fault
   motor_rate_limited,        ///< rose faster than gate.motor_rate_per_s
   brake_rate_limited,        ///< rose faster than gate.brake_rate_per_s
   motor_blocked_by_phase,    ///< no motor in this phase's plan
@@ -22,7 +22,7 @@ enum class GateAction : std::uint8_t {
 };
 inline constexpr std::size_t gate_action_count = 10;
 
-/// How often each action was taken. One command may meet several.
+/// Number of each intervention. One command may cause several.
 using GateCounts = std::array<std::uint64_t, gate_action_count>;
 
 [[nodiscard]] constexpr std::string_view name_of(GateAction action) noexcept {
@@ -32,7 +32,7 @@ using GateCounts = std::array<std::uint64_t, gate_action_count>;
   return names[static_cast<std::size_t>(action)];
 }
 
-/// Commands that did not pass as they were.
+/// Commands that the gate changed.
 [[nodiscard]] constexpr std::uint64_t interventions(const GateCounts& counts) noexcept {
   std::uint64_t sum = 0;
   for (std::size_t i = 1; i < counts.size(); ++i) sum += counts[i];

@@ -23,7 +23,7 @@ namespace abs_hil::rig {
   return row[b.size()];
 }
 
-/// The element of `names` nearest to `name`; empty if there are none.
+/// The element of `names` that is nearest to `name`; empty if `names` is empty.
 template <typename Names>
 [[nodiscard]] std::string_view nearest_name(std::string_view name, const Names& names) {
   std::string_view best;
@@ -38,9 +38,9 @@ template <typename Names>
   return best;
 }
 
-/// What to offer in place of the unknown dotted key `name`, which may lack its first parts: the keys with a tail (the
-/// whole key, or what follows one of its dots) that is `name`; else up to three of which a tail begins with it; else
-/// those with the nearest tail.
+/// Suggestions for the unknown dotted key `name`, which may lack its first parts. A tail is a whole key or the text
+/// after one of its dots. The result is the keys with `name` as a tail; or else up to three keys with a tail that
+/// begins with `name`; or else the keys with the nearest tail.
 [[nodiscard]] inline std::vector<std::string_view> nearest_keys(std::string_view name,
                                                                 const std::vector<std::string_view>& keys) {
   std::vector<std::string_view> nearest, begun;

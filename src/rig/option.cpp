@@ -11,7 +11,7 @@ namespace abs_hil::rig {
 
 namespace {
 
-/// As short as reads back to the same number, with an exponent only for very large and very small ones.
+/// The shortest text that reads back to the same number. Only very large and very small numbers have an exponent.
 std::string number_text(double value) {
   const double size = std::abs(value);
   const bool plain = value == 0.0 || (size >= 1e-4 && size < 1e16);

@@ -12,9 +12,9 @@ class RecordSink {
   RecordSink& operator=(const RecordSink&) = delete;
   virtual ~RecordSink() = default;
 
-  /// `distance_m` is the car's way since braking started (0 before).
+  /// `distance_m` is the distance of the car since braking started (0 before).
   virtual void consume(const CycleRecord& record, double distance_m) = 0;
-  /// No more records come: write out what is buffered. Throws std::runtime_error, naming the file, when data was lost.
+  /// Ends the records and writes buffered data. Throws std::runtime_error, naming the file, if data is lost.
   virtual void finish() {}
 };
 

@@ -5,7 +5,7 @@
 
 namespace abs_hil::rig {
 
-/// How a run kept time, start-up cycles left out.
+/// Timing of a run without its start-up cycles.
 struct TimingSummary {
   DurationQuantiles wakeup_latency{};  ///< lateness of the wake-up against its tick
   DurationQuantiles read{};

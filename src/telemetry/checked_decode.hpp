@@ -11,7 +11,7 @@
 
 namespace abs_hil::telemetry {
 
-/// Reads LCM's big-endian fields one by one, never beyond the end. Once a field did not fit nothing is read any more.
+/// Reads LCM's big-endian fields one by one, never beyond the end. After a field that does not fit it reads nothing.
 class FieldReader {
  public:
   explicit FieldReader(std::span<const std::uint8_t> packet) : rest_(packet) {}
@@ -54,7 +54,7 @@ class FieldReader {
   bool sound_{true};
 };
 
-/// The fingerprint that a packet begins with, 0 for one too short to have any.
+/// The fingerprint at the start of a packet; 0 if the packet is too short.
 [[nodiscard]] inline std::int64_t fingerprint_of(std::span<const std::uint8_t> packet) {
   std::int64_t fingerprint = 0;
   FieldReader reader(packet);
@@ -62,9 +62,9 @@ class FieldReader {
   return fingerprint;
 }
 
-/// Decodes what anybody may have sent or damaged. Unlike the generated decode(), which trusts lengths (a string of
-/// length 0 or less throws or worse), it checks every one first. Returns what is wrong, empty if `message` is valid;
-/// else its fields are not to be used. Throws nothing but std::bad_alloc.
+/// Decodes a packet from an untrusted source. The generated decode() trusts lengths: a string of length 0 or less
+/// throws or worse. This function checks every length first. Returns the problem, or an empty text if `message` is
+/// valid. Do not use the fields of an invalid message. Throws only std::bad_alloc.
 template <class Message>
 [[nodiscard]] std::string_view decode_checked(std::span<const std::uint8_t> packet, Message& message) {
   if (packet.size() < sizeof(std::int64_t)) return "shorter than a fingerprint";

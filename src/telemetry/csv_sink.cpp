@@ -98,7 +98,7 @@ void CsvSink::finish() {
 }
 
 void CsvSink::append(const char* text, std::size_t size) noexcept {
-  if (size > buffer_.size() - used_bytes_) flush();  // whole rows only: no reader finds half of one at a block's end
+  if (size > buffer_.size() - used_bytes_) flush();  // whole rows only, so that no block ends with a part of a row
   std::memcpy(buffer_.data() + used_bytes_, text, size);
   used_bytes_ += size;
 }
@@ -110,7 +110,7 @@ void CsvSink::flush() noexcept {
     if (n > 0) {
       written_bytes += static_cast<std::size_t>(n);
     } else if (n == 0 || errno != EINTR) {
-      // No retry: a file with a hole in the middle would be worse than one that ends early.
+      // No retry: a file that ends early is better than a file with a gap.
       error_number_ = n == 0 ? EIO : errno;
     }
   }
@@ -121,7 +121,7 @@ void CsvSink::flush() noexcept {
 
 void CsvSink::close() noexcept {
   flush();
-  // Some file systems (NFS, quotas) tell only now that data was lost.
+  // Some file systems (NFS, quotas) report lost data only when the file is closed.
   if (file_ >= 0 && ::close(file_) != 0 && errno != EINTR && !failed()) error_number_ = errno;
   file_ = -1;
 }

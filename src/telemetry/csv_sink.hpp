@@ -14,30 +14,30 @@ namespace abs_hil::telemetry {
 /// may be added at the end.
 extern const std::string_view csv_header;
 
-/// No row is longer.
+/// Upper limit of a row's length.
 inline constexpr std::size_t csv_row_max_bytes = 1024;
 
-/// Writes a row with its line end to `out` and returns its length. Doubles are the shortest text that reads back
-/// bit-exactly; NaN is `NaN`. The same on every locale.
+/// Writes a row with its line end to `out` and returns its length. A double has the shortest text that reads back
+/// bit-exactly; NaN is `NaN`. The text does not depend on the locale.
 std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, char (&out)[csv_row_max_bytes]) noexcept;
 
-/// One row a cycle into a file, written in blocks of at most 64 KiB of whole rows.
+/// Writes one row per cycle to a file, in blocks of whole rows of at most 64 KiB.
 class CsvSink : public rig::RecordSink {
  public:
   /// Creates or empties the file. Throws FileError when it cannot be opened.
-  /// @param write_period_ns  rows older than this, by the records' stamps, are handed to the kernel, so that a program
-  ///                         that is killed loses no more; 0: only when a block is full
+  /// @param write_period_ns  longest time, by the records' stamps, until a row is written, so that a killed program
+  ///                         loses no older rows; 0: rows are written only when a block is full
   explicit CsvSink(std::filesystem::path path, std::int64_t write_period_ns = 0);
-  /// Writes out what is buffered, if finish() was not called; a failure then goes unseen.
+  /// Writes the buffered rows if finish() was not called. A failure is not reported then.
   ~CsvSink() override;
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
-  /// Throws FileError when any write failed since the start, as on a full disk. Closes the file in any case.
+  /// Closes the file. Throws FileError if any write has failed since the start, as on a full disk.
   void finish() override;
 
-  /// True once a write failed: what comes after is not in the file.
+  /// True after a write has failed. Later rows are not in the file.
   [[nodiscard]] bool failed() const noexcept { return error_number_ != 0; }
-  /// Rows that are not in the file, or in part only.
+  /// Rows that are missing or incomplete in the file.
   [[nodiscard]] std::uint64_t rows_lost() const noexcept { return rows_lost_; }
 
  private:
@@ -48,7 +48,7 @@ class CsvSink : public rig::RecordSink {
   std::filesystem::path path_;
   std::vector<char> buffer_;
   std::int64_t write_period_ns_;
-  std::int64_t last_write_ns_{0};  ///< stamp of the record after which rows were last written
+  std::int64_t last_write_ns_{0};  ///< stamp of the record of the last write
   std::size_t used_bytes_{0};
   std::uint64_t rows_buffered_{0};
   std::uint64_t rows_lost_{0};

@@ -58,7 +58,7 @@ class CsvRow {
   bool first_{true};
 };
 
-/// Bytes of hexadecimal digits, none if the text is anything else.
+/// Converts hexadecimal digits to bytes. Returns nothing for any other text.
 [[nodiscard]] inline std::optional<std::vector<std::uint8_t>> bytes_of_hexadecimal(std::string_view text) {
   std::vector<std::uint8_t> bytes(text.size() / 2);
   if (text.size() % 2 != 0) return std::nullopt;
@@ -71,7 +71,7 @@ class CsvRow {
   return bytes;
 }
 
-/// The whole text as a number of that type; false if it is none.
+/// Reads the whole text as a number of this type. False if it is not one.
 template <class Number>
 [[nodiscard]] bool parse_number(std::string_view text, Number& value) {
   if constexpr (std::is_floating_point_v<Number>) {
@@ -83,7 +83,7 @@ template <class Number>
   return error == std::errc{} && end == text.data() + text.size();
 }
 
-/// Reads rows of CSV, quoted fields with line ends in them included.
+/// Reads rows of CSV. Quoted fields may contain line ends.
 class CsvRows {
  public:
   explicit CsvRows(std::FILE* file) : file_(file) {}
@@ -109,7 +109,7 @@ class CsvRows {
       field += static_cast<char>(c);
     }
   }
-  /// Number of the row read last, the header is 1.
+  /// Number of the last row that was read. The header is row 1.
   [[nodiscard]] std::uint64_t row() const noexcept { return row_; }
 
  private:

@@ -37,7 +37,7 @@ void EventCsv::consume(const rig::CycleRecord& record, double /*distance_m*/) {
   if (!event) return;
   append_number(text_, record.time_s);
   text_.append(",").append(event->kind).append(",").append(rig::name_of(record.phase));
-  // Quoted: what a reason says may hold a comma.
+  // Quoted, because the text of a reason may contain a comma.
   text_.append(",\"").append(rig::description(record.reason)).append("\",");
   append_number(text_, record.reason_value);
   text_ += '\n';

@@ -13,8 +13,8 @@ namespace abs_hil::telemetry {
 /// First line of events.csv. Names and order are a contract; columns may be added at the end.
 inline constexpr std::string_view event_csv_header = "time_s,event,phase,reason,value";
 
-/// The events of a run (those of ABS_EVENT) as a CSV file: phase changes, faults, limits. `phase` is the phase entered
-/// or acting, `reason` the words of rig::description, `value` what led to it, in the SI unit of its quantity.
+/// The events of a run as on ABS_EVENT, in a CSV file: phase changes, faults, limits. `phase` is the phase entered or
+/// in force, `reason` the text of rig::description, `value` the value that caused the event, in SI units.
 class EventCsv : public rig::RecordSink {
  public:
   /// Creates or empties the file. Throws FileError when it cannot be opened.

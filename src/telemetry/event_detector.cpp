@@ -6,7 +6,7 @@ std::optional<DetectedEvent> EventDetector::observe(const rig::CycleRecord& reco
   const bool first = !last_;
   // An experiment may have two phases of one kind in a row.
   const bool phase_changed = first || record.phase != last_->phase || record.phase_index != last_->phase_index;
-  // What a command changed is told in the answer to it.
+  // The answer to a command reports its change.
   const bool reason_is_new = record.reason != rig::Reason::none && !rig::is_adjustment(record.reason) &&
                              (first || record.reason != last_->reason);
   const rig::Phase phase_before = first ? record.phase : last_->phase;
@@ -23,7 +23,7 @@ std::optional<DetectedEvent> EventDetector::observe(const rig::CycleRecord& reco
   if (phase_changed && !first) event.message.append(rig::name_of(phase_before)).append(" -> ");
   event.message.append(rig::name_of(record.phase));
   if (record.reason != rig::Reason::none) event.message.append(": ").append(rig::description(record.reason));
-  // A change may have happened, with its reason, in a record that never arrived.
+  // The change and its reason may be in a lost record.
   if (records_lost > 0) event.message.append(" (").append(std::to_string(records_lost)).append(" records lost before)");
   return event;
 }

@@ -17,17 +17,17 @@ inline constexpr std::string_view limit = "limit";
 inline constexpr std::string_view command = "command";
 }  // namespace event_kind
 
-/// An event that a record gave rise to.
+/// An event that a record caused.
 struct DetectedEvent {
   std::string_view kind;
   std::string message;  ///< for people, one line
 };
 
-/// Finds events in the stream of records, so that the real-time thread handles numbers only. One event for each change
-/// of phase and each new reason, however many records repeat it or are missing in between.
+/// Finds events in the stream of records, so that the real-time thread handles numbers only. Each change of phase and
+/// each new reason gives one event, even if records repeat it or are missing.
 class EventDetector {
  public:
-  /// Call with every record, in order. The first always gives an event.
+  /// Takes every record, in order. The first always gives an event.
   [[nodiscard]] std::optional<DetectedEvent> observe(const rig::CycleRecord& record);
 
  private:

@@ -38,7 +38,7 @@ EventLogReader::EventLogReader(std::filesystem::path path)
   std::error_code error;
   if (file_) size_ = std::filesystem::file_size(path_, error);
   if (!file_ || error) {
-    throw RecordingError("'" + path_.string() + "': " + (file_ ? "not a file" : std::strerror(errno)) +
+    throw RecordingError("'" + path_.string() + "': " + (file_ ? "not a regular file" : std::strerror(errno)) +
                          "; give an LCM event log (.lcmlog), as --log writes it");
   }
 }
@@ -53,7 +53,7 @@ std::optional<LogEvent> EventLogReader::next() {
   const std::size_t read = std::fread(header.data(), 1, header.size(), file_.get());
   if (read == 0 && std::feof(file_.get()) != 0) return std::nullopt;
   if (read >= sizeof sync_word && big_endian<std::uint32_t>(header.data()) != sync_word) {
-    fail(events_ == 0 ? "not an LCM event log" : "damaged: no event begins here");
+    fail(events_ == 0 ? "not an LCM event log" : "the file is damaged: no event begins here");
   }
   if (read != header.size()) fail(events_ == 0 ? "not an LCM event log" : "the file is cut off");
   LogEvent event;
@@ -62,10 +62,10 @@ std::optional<LogEvent> EventLogReader::next() {
   const auto channel_bytes = big_endian<std::uint32_t>(&header[20]);
   const auto data_bytes = big_endian<std::uint32_t>(&header[24]);
   if (channel_bytes == 0 || channel_bytes > channel_max_bytes || data_bytes > data_max_bytes) {
-    fail("damaged: lengths that no event has");
+    fail("the file is damaged: these lengths are not valid");
   }
-  if (event.number < events_) fail("damaged: event number " + std::to_string(event.number));
-  // Before anything is made room for: lengths may be anything.
+  if (event.number < events_) fail("the file is damaged: event number " + std::to_string(event.number));
+  // Checked before memory is allocated, because a damaged length may have any value.
   if (size_ - at_ < header_bytes + std::uint64_t{channel_bytes} + data_bytes) fail("the file is cut off");
   event.channel.resize(channel_bytes);
   event.data.resize(data_bytes);

@@ -11,7 +11,8 @@
 
 namespace abs_hil::telemetry {
 
-/// A recording cannot be read: it is none, damaged, or not whole. `what()` names file, place and reason.
+/// A file cannot be read as a recording: it is of another kind, damaged or incomplete. `what()` names file, place and
+/// reason.
 class RecordingError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -32,14 +33,13 @@ struct FileCloser {
 using FilePointer = std::unique_ptr<std::FILE, FileCloser>;
 }  // namespace detail
 
-/// Reads LCM's event logs and trusts nothing in them, where lcm::LogFile searches on silently after damage: sync word,
-/// lengths and event numbers are checked.
+/// Reads LCM's event logs. It checks sync words, lengths and event numbers. lcm::LogFile skips damage silently instead.
 class EventLogReader {
  public:
   /// Throws RecordingError when the file cannot be opened.
   explicit EventLogReader(std::filesystem::path path);
 
-  /// The next event, none at the end. Throws RecordingError where the file is damaged or cut off.
+  /// Returns the next event, or nothing at the end. Throws RecordingError if the file is damaged or cut off.
   [[nodiscard]] std::optional<LogEvent> next();
 
  private:
@@ -52,7 +52,7 @@ class EventLogReader {
   std::int64_t events_{0};
 };
 
-/// Writes events with the numbers and times that they bear.
+/// Writes events with their own numbers and times.
 class EventLogWriter {
  public:
   /// Creates or empties the file. Throws FileError.

@@ -9,7 +9,7 @@ namespace abs_hil::telemetry {
 /// A file could not be opened or written. `what()` names the path, the reason and the fix.
 class FileError : public std::runtime_error {
  public:
-  /// `kind` is what the file was to be, as in "CSV file". `error_number` is an errno.
+  /// `kind` is the kind of file, as in "CSV file". `error_number` is an errno.
   FileError(std::string_view kind, const std::filesystem::path& path, int error_number);
 
   [[nodiscard]] int error_number() const noexcept { return error_number_; }

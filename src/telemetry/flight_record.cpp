@@ -59,7 +59,7 @@ void write_csv(const std::filesystem::path& path, const FlightRecord& record) {
 
 void write_log(const std::filesystem::path& path, const FlightRecord& record, const ExperimentInfo& experiment,
                const std::string& channel_prefix) {
-  // The last record is taken to be of now.
+  // The last record gets the present wall-clock time.
   const double last_s = record.records.empty() ? 0.0 : record.records.back().time_s;
   LogOutlet outlet(path, wall_clock_us() - std::llround(last_s * 1e6));
   MessageStream stream({.channel_prefix = channel_prefix}, experiment, nullptr);

@@ -11,12 +11,12 @@
 
 namespace abs_hil::telemetry {
 
-/// What a flight recorder held when something went wrong, and why it is written.
+/// The contents of a flight recorder at a fault, and the reason.
 struct FlightRecord {
   std::span<const rig::CycleRecord> records;  ///< in order
   rig::Reason reason{rig::Reason::none};
   double reason_value{0.0};
-  std::string account{};  ///< in words, several lines: what happened and what was done
+  std::string account{};  ///< in words, several lines: what happened and what the program did
 };
 
 /// The columns of the recorder's CSV beyond those of a run's.
@@ -25,8 +25,8 @@ inline constexpr std::string_view flight_csv_extra_header =
     "wakeup_latency_us,cycle_us";
 
 /// Writes `PREFIX.csv` (a row a cycle, `distance_m` NaN, with more columns than a run's CSV), `PREFIX.lcmlog` (the
-/// messages of a run, then an ABS_EVENT of kind "fault" with the reason) and `PREFIX.txt` (reason and account). Each is
-/// tried whatever becomes of the others. Returns the files written; the problems are appended to `problems`.
+/// messages of a run, then an ABS_EVENT of kind "fault" with the reason) and `PREFIX.txt` (reason and account). A
+/// failure of one file does not stop the others. Returns the written files. Appends the problems to `problems`.
 std::vector<std::filesystem::path> write_flight_record(const std::filesystem::path& prefix, const FlightRecord& record,
                                                        const ExperimentInfo& experiment,
                                                        const std::string& channel_prefix,

@@ -10,8 +10,7 @@
 namespace abs_hil::telemetry {
 namespace {
 
-/// tcpq connects, blocks and prints two lines at every publish while its server is away: ask it once in so many
-/// seconds.
+/// Seconds between two attempts. Without a server, tcpq connects, blocks and prints two lines at every publish.
 constexpr double tcpq_retry_s = 1.0;
 constexpr int tcpq_start_timeout_ms = 2'000;
 constexpr int tcpq_retry_timeout_ms = 200;
@@ -19,10 +18,10 @@ constexpr int tcpq_retry_timeout_ms = 200;
 std::string checked(std::string url) {
   if (url.empty()) url = default_lcm_url();
   const RouteProbe probe = probe_lcm_route(url);
-  if (!probe.usable) throw LcmError("LCM cannot use '" + url + "': " + probe.problem + ". To mend it:\n" + probe.fix);
+  if (!probe.usable) throw LcmError("LCM cannot use '" + url + "': " + probe.problem + ". To fix it:\n" + probe.fix);
   const LcmUrl parts = parse_lcm_url(url);
   if (parts.provider == "tcpq" && ask_tcpq_server(endpoint_of(parts), tcpq_start_timeout_ms) == TcpqServer::silent) {
-    throw LcmError("the tcpq server of '" + url + "' does not answer: start it anew, or check the URL");
+    throw LcmError("the tcpq server of '" + url + "' does not answer: restart it, or check the URL");
   }
   return url;
 }

@@ -11,19 +11,19 @@
 
 namespace abs_hil::telemetry {
 
-/// LCM cannot be used as asked. `what()` names the URL, the reason and the fix.
+/// LCM cannot use the URL. `what()` names the URL, the reason and the fix.
 class LcmError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Publishes on an LCM network. Publishing may block for milliseconds: never from the real-time thread. A tcpq server
-/// that takes nothing, as one of its subscribers reads nothing or as it stands still, is not waited for: what it would
-/// have been sent is a failure; while there is none, one a second is looked for.
+/// Publishes on an LCM network. Publishing may block for milliseconds: do not call it from the real-time thread. The
+/// outlet never waits for a tcpq server that accepts no data, because it or one of its subscribers has stopped. Each
+/// message that it cannot send counts as a failure. While there is no server, it looks for one once a second.
 class LcmOutlet : public Outlet {
  public:
   /// `url`: empty for default_lcm_url(). Throws LcmError when there is no route, LCM does not start, or a tcpq server
-  /// does not answer; there need not be one yet.
+  /// accepts the connection but does not answer. The server may also start later.
   explicit LcmOutlet(std::string url = {});
 
   void send(const std::string& channel, std::span<const std::uint8_t> message, double time_s) noexcept override;
@@ -32,11 +32,11 @@ class LcmOutlet : public Outlet {
   [[nodiscard]] const std::string& url() const noexcept { return url_; }
   /// "udpm", "tcpq", "memq", ...
   [[nodiscard]] const std::string& provider() const noexcept { return provider_; }
-  /// For subscriptions in the same thread.
+  /// LCM itself, for subscriptions in the same thread.
   [[nodiscard]] lcm::LCM& lcm() noexcept { return lcm_; }
 
  private:
-  /// Whether a message can be given to the server without waiting for it.
+  /// True if the server can take a message without waiting.
   [[nodiscard]] bool tcpq_ready(double time_s) noexcept;
 
   std::string url_;
@@ -44,7 +44,7 @@ class LcmOutlet : public Outlet {
   Endpoint server_;  ///< of tcpq
   lcm::LCM lcm_;
   std::uint64_t failures_{0};
-  double next_try_s_;  ///< run time before which tcpq is not tried again
+  double next_try_s_;  ///< run time of the next attempt with tcpq
 };
 
 }  // namespace abs_hil::telemetry

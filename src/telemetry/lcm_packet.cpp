@@ -17,7 +17,7 @@ std::uint32_t word_at(std::span<const std::uint8_t> bytes, std::size_t at) {
   return word;
 }
 
-/// What follows `channel` and its NUL; null where something else stands there.
+/// The bytes after `channel` and its NUL; null if the datagram has another channel.
 const std::uint8_t* after_channel(std::span<const std::uint8_t> bytes, std::string_view channel) {
   if (bytes.size() <= channel.size() || bytes[channel.size()] != 0) return nullptr;
   const auto same = [](char c, std::uint8_t byte) { return static_cast<std::uint8_t>(c) == byte; };

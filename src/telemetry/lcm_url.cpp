@@ -10,7 +10,7 @@ LcmUrl parse_lcm_url(std::string_view url) {
   const std::size_t separator = url.find("://");
   if (separator == std::string_view::npos || separator == 0) {
     throw std::invalid_argument("LCM URL '" + std::string(url) +
-                                "' is not of the form udpm://239.255.76.67:7667?ttl=0");
+                                "' is not valid; give one of the form udpm://239.255.76.67:7667?ttl=0");
   }
   LcmUrl parts;
   parts.provider = url.substr(0, separator);
@@ -33,7 +33,8 @@ Endpoint endpoint_of(const LcmUrl& url) {
   const char* end = port.data() + port.size();
   const auto [stop, error] = std::from_chars(port.data(), end, endpoint.port);
   if (error != std::errc{} || stop != end || endpoint.port == 0) {
-    throw std::invalid_argument("port '" + std::string(port) + "' in an LCM URL must be a number from 1 to 65535");
+    throw std::invalid_argument("port '" + std::string(port) +
+                                "' of the LCM URL is not valid; give a number from 1 to 65535");
   }
   return endpoint;
 }

@@ -20,7 +20,7 @@ LogOutlet::LogOutlet(std::filesystem::path path, std::optional<std::int64_t> epo
   errno = 0;
   file_ = std::make_unique<lcm::LogFile>(path_.string(), "w");
   if (!file_->good()) throw FileError("event log", path_, errno != 0 ? errno : EIO);
-  // The default buffer is 4 KiB, a write for every dozen cycles; without memory for ours that one stays.
+  // The default buffer is 4 KiB, which means a write every dozen cycles. It remains if there is no memory for ours.
   (void)std::setvbuf(file_->getFilePtr(), nullptr, _IOFBF, log_buffer_bytes);
 }
 
@@ -58,7 +58,7 @@ void LogOutlet::write_out(double time_s) noexcept {
 
 void LogOutlet::finish() {
   if (file_) {
-    // LogFile's destructor flushes too, but tells nobody how that went.
+    // LogFile's destructor flushes too, but does not report errors.
     write_out(last_write_s_);
     file_.reset();
   }

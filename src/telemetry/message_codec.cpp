@@ -33,7 +33,7 @@ struct Name {
 
 constexpr std::size_t field_count = std::tuple_size_v<std::remove_const_t<decltype(fields<telemetry_t>)>>;
 
-/// Place of the field of that name in telemetry_t, field_count if it has none.
+/// Index of the field of that name in telemetry_t; field_count if there is none.
 constexpr std::size_t field_of(std::string_view name) {
   return std::apply(
       [name](const auto&... field) {
@@ -94,7 +94,7 @@ void read(const Field& field, Value& value) {
   value = static_cast<Value>(field);
 }
 void read(const std::int8_t& field, bool& value) { value = field != 0; }
-/// A number that is no phase counts as a fault.
+/// An unknown number counts as the phase fault.
 void read(const std::int8_t& field, rig::Phase& value) {
   value = field >= 0 && field <= telemetry_t::PHASE_FAULT ? static_cast<rig::Phase>(field) : rig::Phase::fault;
 }

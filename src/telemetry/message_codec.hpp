@@ -18,29 +18,29 @@
 
 namespace abs_hil::telemetry {
 
-/// The record as a message. `distance_m`: the car's way since braking started; `sequence`: of the channel.
+/// The record as a message. `distance_m`: distance of the car since braking started; `sequence`: of the channel.
 [[nodiscard]] telemetry_t to_message(const rig::CycleRecord& record, double distance_m, std::int64_t sequence) noexcept;
 
-/// The inverse of to_message, as far as the message goes: the command's torque and true speeds handed to the controller
-/// are not in it, and the counters' time is the stamp (measurement_t says otherwise where it is not).
+/// The inverse of to_message for the fields of the message. The message lacks the command's torque and the true speeds
+/// given to the controller. The time of the counters is the stamp, unless a measurement_t gives another time.
 [[nodiscard]] rig::CycleRecord to_record(const telemetry_t& message) noexcept;
 /// The record's cycle and the time of its counters.
 [[nodiscard]] measurement_t measured_at(const rig::CycleRecord& record) noexcept;
 
-/// A buffer that messages are encoded into; it grows to the largest and allocates no more after that.
+/// A buffer for encoding. It grows to the size of the largest message and allocates nothing after that.
 class EncodeBuffer {
  public:
   explicit EncodeBuffer(std::size_t initial_bytes = 512) : bytes_(initial_bytes) {}
 
-  /// Bytes of `message`, valid until the next call. Throws std::length_error for one beyond LCM's size limit.
+  /// Encodes `message`. The bytes are valid until the next call. Throws std::length_error above LCM's size limit.
   template <class Message>
   [[nodiscard]] std::span<const std::uint8_t> encode(const Message& message) {
     const int size = message.getEncodedSize();
-    if (size < 0) throw std::length_error("LCM message too large");
+    if (size < 0) throw std::length_error("the message is larger than LCM's limit");
     if (static_cast<std::size_t>(size) > bytes_.size()) bytes_.resize(static_cast<std::size_t>(size));
-    // May be shorter than announced: lcm-gen's strings end at their first NUL.
+    // The size may be smaller than announced, because strings of lcm-gen end at their first NUL.
     const int written = message.encode(bytes_.data(), 0, size);
-    if (written < 0) throw std::length_error("LCM message could not be encoded");
+    if (written < 0) throw std::length_error("LCM cannot encode the message");
     return {bytes_.data(), static_cast<std::size_t>(written)};
   }
 
@@ -48,7 +48,7 @@ class EncodeBuffer {
   std::vector<std::uint8_t> bytes_;
 };
 
-/// Result of decoding what came in on ABS_COMMAND: `problem` is empty if `command` is valid, else says why not.
+/// A decoded message of ABS_COMMAND. `problem` is empty if `command` is valid; otherwise it gives the reason.
 struct DecodedCommand {
   command_t command{};
   std::string_view problem{};
@@ -57,7 +57,7 @@ struct DecodedCommand {
 /// decode_checked for command_t.
 [[nodiscard]] DecodedCommand decode_command(std::span<const std::uint8_t> packet);
 
-/// `text` cut to `max_bytes` with control and non-ASCII bytes replaced by '?', fit for logs and terminals.
+/// `text` for logs and terminals: at most `max_bytes`, with '?' for control and non-ASCII bytes.
 [[nodiscard]] std::string printable(std::string_view text, std::size_t max_bytes);
 
 }  // namespace abs_hil::telemetry

@@ -16,11 +16,11 @@ namespace {
 void check(const StreamOptions& options) {
   check_channel_prefix(options.channel_prefix);
   if (options.telemetry_every_cycles == 0) throw std::invalid_argument("telemetry_every_cycles must be at least 1");
-  if (!(options.status_period_s > 0.0)) throw std::invalid_argument("status_period_s must be above 0");
-  if (!(options.experiment_period_s > 0.0)) throw std::invalid_argument("experiment_period_s must be above 0");
+  if (!(options.status_period_s > 0.0)) throw std::invalid_argument("status_period_s must be above 0 s");
+  if (!(options.experiment_period_s > 0.0)) throw std::invalid_argument("experiment_period_s must be above 0 s");
 }
 
-/// The next time on the grid of `period_s` after `now_s`, so that late messages do not shift those to come.
+/// The next time on the grid of `period_s` after `now_s`, so that a late message does not delay later ones.
 double next_on_grid(double now_s, double period_s) { return (std::floor(now_s / period_s + 1e-9) + 1.0) * period_s; }
 
 void put_parts(const StatusSnapshot& snapshot, status_t& m) {
@@ -53,12 +53,12 @@ void put_parts(const StatusSnapshot& snapshot, status_t& m) {
 void check_channel_prefix(std::string_view prefix) {
   constexpr std::size_t prefix_max = 48;  // LCM's limit is 63 characters with the name
   const auto allowed = [](unsigned char c) {
-    // Without regular-expression characters, as a subscription is one.
+    // No characters of regular expressions, because a subscription is a regular expression.
     return c < 0x80 && (std::isalnum(c) != 0 || c == '_' || c == '-' || c == '/');
   };
   if (prefix.size() > prefix_max || !std::all_of(prefix.begin(), prefix.end(), allowed)) {
     throw std::invalid_argument("channel prefix '" + printable(prefix, 80) +
-                                "': at most 48 letters, digits, '_', '-' and '/'");
+                                "' is not valid; give at most 48 letters, digits, '_', '-' and '/'");
   }
 }
 

@@ -17,7 +17,7 @@
 
 namespace abs_hil::telemetry {
 
-/// What is being run, for ABS_EXPERIMENT.
+/// Description of the run, for ABS_EXPERIMENT.
 struct ExperimentInfo {
   std::string experiment;
   std::string controller;
@@ -27,7 +27,7 @@ struct ExperimentInfo {
   std::string version;
 };
 
-/// How often messages go out.
+/// Channel prefix and rates of the messages.
 struct StreamOptions {
   std::string channel_prefix{"ABS_"};       ///< letters, digits, '_', '-' and '/'; at most 48 characters
   std::uint32_t telemetry_every_cycles{1};  ///< decimation of TELEMETRY, >= 1
@@ -35,43 +35,43 @@ struct StreamOptions {
   double experiment_period_s{5.0};          ///< of run time, > 0
 };
 
-/// Throws std::invalid_argument, naming the prefix and what it may hold, for one that is no StreamOptions' prefix.
+/// Throws std::invalid_argument for an invalid prefix of StreamOptions. The text names the prefix and what is valid.
 void check_channel_prefix(std::string_view prefix);
 
-/// Turns records into the messages of the ABS_ channels and gives the same ones to every outlet. Each channel's
-/// sequence is consecutive from 0; all stamps and times are those of the records, so that a run on virtual time gives
-/// the same bytes again. One stream for each run, used from one thread.
+/// Turns records into the messages of the ABS_ channels and gives the same messages to every outlet. Each channel's
+/// sequence counts from 0 without gaps. All stamps and times are those of the records, so that a run on virtual time
+/// always gives the same bytes. Use one stream for each run, from one thread.
 class MessageStream : public rig::RecordSink {
  public:
   /// Throws std::invalid_argument for an option out of range, naming it.
   MessageStream(StreamOptions options, ExperimentInfo experiment, StatusSource status);
 
-  /// `outlet` must outlive the stream. Before the first record.
+  /// Adds an outlet before the first record. `outlet` must outlive the stream.
   void add(Outlet& outlet) { outlets_.push_back(&outlet); }
 
-  /// What has to be said last, after the last record: called once, at the beginning of finish().
+  /// A function that sends the last messages, after the last record. finish() calls it once, at its beginning.
   void set_farewell(std::function<void()> farewell) { farewell_ = std::move(farewell); }
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
-  /// Sends what the farewell has to say and a last ABS_STATUS, and finishes every outlet, then throws the first
-  /// FileError of theirs.
+  /// Calls the farewell, sends a last ABS_STATUS and finishes every outlet. Then it throws the first FileError of an
+  /// outlet.
   void finish() override;
 
-  /// Where no records come, as between two runs: what is sent from now on is of this time.
+  /// Sets the time of the next messages while there are no records, as between two runs.
   void pass_time(std::int64_t stamp_ns, double time_s) noexcept;
 
   /// An event of kind "command": the answer to a message on ABS_COMMAND.
   void answer_command(rig::Reason reason, std::string message, double value);
 
-  /// An event of kind "fault" beside those that the records give rise to: one found outside of the cycle.
+  /// An event of kind "fault" that was found outside the cycle, beside those from the records.
   void report_fault(rig::Reason reason, double value, std::string message);
-  /// A change that took effect in the latest record's cycle, on ABS_ADJUSTMENT.
+  /// Publishes a change that took effect in the latest record's cycle, on ABS_ADJUSTMENT.
   void send_adjustment(std::string name, double value);
-  /// What senders of commands need to know, on ABS_COMMAND_STATE; stamp and sequence are filled in.
+  /// Publishes the state for senders of commands, on ABS_COMMAND_STATE. It fills in stamp and sequence.
   void send_command_state(command_state_t state);
 
   [[nodiscard]] const std::string& command_channel() const noexcept { return command_channel_; }
-  /// Run time of the latest record, or that which pass_time() gave; s.
+  /// Run time of the latest record or of pass_time(), s.
   [[nodiscard]] double time_s() const noexcept { return latest_.time_s; }
   /// Messages that outlets could not pass on.
   [[nodiscard]] std::uint64_t failures() const noexcept;

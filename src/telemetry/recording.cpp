@@ -24,7 +24,7 @@ using Bytes = std::vector<std::uint8_t>;
 using Fields = std::vector<std::string>;
 using Columns = std::map<std::string, std::size_t, std::less<>>;  ///< place of each name
 
-constexpr std::string_view envelope = "log_event,log_time_us,channel,type";
+constexpr std::string_view event_columns = "log_event,log_time_us,channel,type";
 constexpr std::string_view raw_type = "raw";
 
 Fields split_header(std::string_view header) {
@@ -37,7 +37,7 @@ Fields split_header(std::string_view header) {
   return names;
 }
 
-/// Quantities of --csv that a log holds: they go first, in the order of --csv. Other messages have none.
+/// Columns of --csv that the type holds. They come first, in the order of --csv. Only telemetry has them.
 template <class Message>
 const Fields& first_columns() {
   static const Fields columns = [] {
@@ -65,10 +65,10 @@ std::string header_of() {
   visit_fields(message, [&put](std::string_view name, const auto&) {
     if (!goes_first<Message>(name)) put(name);
   });
-  return header.append(",").append(envelope);
+  return header.append(",").append(event_columns);
 }
 
-void put_envelope(CsvRow& row, const LogEvent& event, std::string_view type) {
+void put_event_columns(CsvRow& row, const LogEvent& event, std::string_view type) {
   row("", event.number);
   row("", event.timestamp_us);
   row("", event.channel);
@@ -91,7 +91,7 @@ std::string row_of(const Message& message, const LogEvent& event) {
   visit_fields(message, [&row](std::string_view name, const auto& value) {
     if (!goes_first<Message>(name)) row(name, value);
   });
-  put_envelope(row, event, type_name<Message>);
+  put_event_columns(row, event, type_name<Message>);
   return row.row();
 }
 
@@ -112,7 +112,8 @@ class FieldTexts {
         return;
       }
     }
-    if (!parse_number(*text, value)) problem_ = std::string(name) + ": '" + *text + "' is no such number";
+    if (!parse_number(*text, value))
+      problem_ = std::string(name) + ": '" + *text + "' is not a number of the field's type";
   }
   void operator()(std::string_view name, std::string& value) {
     if (const std::string* text = find(name)) value = *text;
@@ -123,7 +124,7 @@ class FieldTexts {
   const std::string* find(std::string_view name) {
     const auto column = columns_.find(name);
     if (column != columns_.end()) return &fields_[column->second];
-    problem_ = "no column " + std::string(name);
+    problem_ = "the column " + std::string(name) + " is missing";
     return nullptr;
   }
   const Columns& columns_;
@@ -144,14 +145,14 @@ Columns columns_of(const Fields& header) {
   return columns;
 }
 
-/// What an event looks like in CSV: the type and header of its file and its row.
+/// An event in CSV: the type and header of its file, and its row.
 struct EventText {
   std::string type;
   std::string header;
   std::string row;
 };
 
-/// A row is only as good as what comes out of it again.
+/// True if the row gives the event's bytes again.
 template <class Message>
 bool comes_back(const EventText& text, const LogEvent& event) {
   std::FILE* memory = ::fmemopen(const_cast<char*>(text.row.data()), text.row.size(), "r");
@@ -179,8 +180,8 @@ EventText text_of(const LogEvent& event) {
   if (!text.row.empty()) return text;
   CsvRow row;
   row.text(hexadecimal(event.data));
-  put_envelope(row, event, raw_type);
-  return {std::string(raw_type), std::string("data_hex,").append(envelope), row.row()};
+  put_event_columns(row, event, raw_type);
+  return {std::string(raw_type), std::string("data_hex,").append(event_columns), row.row()};
 }
 
 /// RUN.csv -> RUN.PART.csv.
@@ -192,7 +193,7 @@ fs::path beside(const fs::path& csv, const std::string& part) {
   return path;
 }
 
-/// The files of one conversion, opened as they are needed.
+/// The files of one conversion. Each is opened for its first row.
 class CsvFiles {
  public:
   explicit CsvFiles(fs::path main) : main_(std::move(main)) {}
@@ -222,7 +223,7 @@ class CsvFiles {
     fs::path path;
     detail::FilePointer stream;
   };
-  /// Channels may differ in what no file name tells apart, and a channel may carry several types.
+  /// File names of two channels may collide, and a channel may carry several types. So names get a number if needed.
   fs::path unused(const std::string& part, const std::string& type) {
     fs::path path = beside(main_, part);
     const std::string typed = part + '.' + type;
@@ -267,12 +268,12 @@ std::vector<fs::path> csv_parts(const fs::path& csv) {
   throw RecordingError("'" + path.string() + "': row " + std::to_string(row) + ": " + what);
 }
 
-/// Message bytes of one row; fails where the row does not give them.
+/// Returns the message bytes of a row. Fails if the row does not give them.
 Bytes data_of(const fs::path& path, std::uint64_t row, const Columns& columns, const Fields& fields) {
   const std::string& type = fields[columns.at("type")];
   if (type == raw_type && columns.contains("data_hex")) {
     if (auto bytes = bytes_of_hexadecimal(fields[columns.at("data_hex")])) return std::move(*bytes);
-    fail(path, row, "data_hex: not hexadecimal digits");
+    fail(path, row, "data_hex is not a text of hexadecimal digits");
   }
   std::optional<Bytes> data;
   for_each_message_type([&]<class Message>() {
@@ -283,7 +284,7 @@ Bytes data_of(const fs::path& path, std::uint64_t row, const Columns& columns, c
     if (!texts.problem().empty()) fail(path, row, texts.problem());
     data = encoded(message);
   });
-  if (!data) fail(path, row, "type '" + type + "' is not known");
+  if (!data) fail(path, row, "type '" + type + "' is unknown");
   return std::move(*data);
 }
 
@@ -297,8 +298,8 @@ void read_csv(const fs::path& path, std::map<std::int64_t, LogEvent>& events) {
   const bool whole = columns.contains("log_event") && columns.contains("log_time_us") && columns.contains("channel") &&
                      columns.contains("type");
   if (!any || !whole) {
-    throw RecordingError("'" + path.string() + "': no columns " + std::string(envelope) +
-                         ": a run's --csv holds neither encoder counts nor configuration; give its event log (--log), "
+    throw RecordingError("'" + path.string() + "': no columns " + std::string(event_columns) +
+                         "; a run's --csv holds neither encoder counts nor configuration; give its event log (--log), "
                          "or CSV that abs_hil convert made of one");
   }
   Fields fields;
@@ -309,13 +310,13 @@ void read_csv(const fs::path& path, std::map<std::int64_t, LogEvent>& events) {
     LogEvent event;
     if (!parse_number(fields[columns.at("log_event")], event.number) ||
         !parse_number(fields[columns.at("log_time_us")], event.timestamp_us)) {
-      fail(path, rows.row(), "log_event or log_time_us is no whole number");
+      fail(path, rows.row(), "log_event or log_time_us is not a whole number");
     }
     event.channel = fields[columns.at("channel")];
     event.data = data_of(path, rows.row(), columns, fields);
     const std::int64_t number = event.number;
     if (!events.emplace(number, std::move(event)).second) {
-      fail(path, rows.row(), "log_event " + std::to_string(number) + " is there twice");
+      fail(path, rows.row(), "log_event " + std::to_string(number) + " occurs twice");
     }
   }
 }
@@ -332,7 +333,7 @@ std::map<std::int64_t, LogEvent> read_all_csv(const fs::path& csv) {
 ConversionCounts log_to_csv(const fs::path& log, const fs::path& csv) {
   EventLogReader reader(log);
   for (const fs::path& part : csv_parts(csv)) {
-    throw RecordingError("'" + part.string() + "' is there already and would be taken for a part of '" + csv.string() +
+    throw RecordingError("'" + part.string() + "' already exists and would be read as a part of '" + csv.string() +
                          "'; remove it, or choose another name");
   }
   CsvFiles files(csv);

@@ -8,16 +8,15 @@
 
 namespace abs_hil::telemetry {
 
-// An event log as CSV, for spreadsheets and scripts, and back without loss. RUN.csv holds the telemetry, with the
-// columns of --csv first and all other fields after them; every other channel has a file of its own beside it,
-// RUN.CHANNEL.csv, with its type's fields as columns; what is of no type of ours, or does not come out of its text bit
-// for bit, stands in RUN.raw.csv as hexadecimal digits. Each row ends with the event's number and time, its channel and
-// its type.
+// Converts an event log to CSV, for spreadsheets and scripts, and back without loss. RUN.csv holds the telemetry: first
+// the columns of --csv, then all other fields. Every other channel has its own file RUN.CHANNEL.csv beside it, with the
+// fields of its type as columns. RUN.raw.csv holds, as hexadecimal digits, events of unknown types and events that
+// their text would not reproduce bit for bit. Each row ends with the event's number and time, its channel and its type.
 
-/// How many events went where.
+/// Numbers of events.
 struct ConversionCounts {
   std::uint64_t events{0};
-  std::uint64_t raw{0};  ///< of them as hexadecimal digits
+  std::uint64_t raw{0};  ///< events written as hexadecimal digits
 };
 
 /// Event log -> CSV. Throws RecordingError and FileError.
@@ -25,8 +24,8 @@ ConversionCounts log_to_csv(const std::filesystem::path& log, const std::filesys
 /// CSV, as log_to_csv wrote it, -> event log, the same bytes. Throws RecordingError and FileError.
 ConversionCounts csv_to_log(const std::filesystem::path& csv, const std::filesystem::path& log);
 
-/// Calls `take` for every event of a recording, in order: an event log, or CSV as log_to_csv writes it (by its name's
-/// end, .csv). Throws RecordingError, also after some calls.
+/// Calls `take` for every event of a recording, in order. The recording is an event log, or CSV of log_to_csv if its
+/// name ends in .csv. Throws RecordingError, even after some calls.
 void for_each_event(const std::filesystem::path& recording, const std::function<void(const LogEvent&)>& take);
 
 }  // namespace abs_hil::telemetry

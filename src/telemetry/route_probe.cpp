@@ -50,7 +50,7 @@ RouteProbe probe_udpm(const Endpoint& endpoint) {
 RouteProbe probe_tcpq(const Endpoint& endpoint) {
   in_addr address{};
   if (::inet_pton(AF_INET, endpoint.address.c_str(), &address) != 1) {
-    // LCM 1.3 takes inet_aton's failure for success and would connect to a wrong address.
+    // LCM 1.3 ignores a failure of inet_aton and would connect to a wrong address.
     return {false, "tcpq needs a numeric IPv4 address, not '" + endpoint.address + "'", "use tcpq://127.0.0.1:7700"};
   }
   return {true, {}, "needs lcm-tcpq-server at " + endpoint.address + ":" + std::to_string(endpoint.port)};
@@ -65,7 +65,7 @@ RouteProbe probe_lcm_route(std::string_view url) {
     if (parts.provider == "tcpq") return probe_tcpq(endpoint_of(parts));
     if (parts.provider == "memq") return {true, {}, "messages stay within this process"};
     if (parts.provider == "file") return {true, {}, "needs a path that can be written and ?mode=w"};
-    return {true, {}, "provider '" + parts.provider + "' is not known here: LCM decides"};
+    return {true, {}, "provider '" + parts.provider + "' is unknown; only LCM can check it"};
   } catch (const std::invalid_argument& error) {
     return {false, error.what(), "use udpm://239.255.76.67:7667?ttl=0"};
   }

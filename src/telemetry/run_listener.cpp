@@ -16,7 +16,7 @@
 namespace abs_hil::telemetry {
 namespace {
 
-/// LCM's queue holds 30 messages, 30 ms of telemetry, if nobody says otherwise.
+/// LCM's queue holds 30 messages by default, which is 30 ms of telemetry.
 constexpr int queue_messages = 20'000;
 constexpr std::chrono::seconds look_period{1};
 constexpr int look_timeout_ms = 100;
@@ -41,7 +41,7 @@ void RunListener::look_for_server() {
   if (now < next_look_) return;
   next_look_ = now + look_period;
   if (ask_tcpq_server(endpoint_of(parse_lcm_url(network_.url())), look_timeout_ms) != TcpqServer::answers) return;
-  // This connects again. Handling would, too, and then wait for a message without end.
+  // This connects again. lcm_handle would connect too, but then wait for a message without limit.
   for (lcm_subscription_t* subscription : subscriptions_) {
     lcm_unsubscribe(network_.lcm().getUnderlyingLCM(), subscription);
   }

@@ -15,7 +15,7 @@
 
 namespace abs_hil::telemetry {
 
-/// Takes the messages of a run, each checked before it was decoded.
+/// Receives the messages of a run. Each has been checked before decoding.
 class RunObserver {
  public:
   RunObserver() = default;
@@ -27,11 +27,11 @@ class RunObserver {
   virtual void take(const status_t& message) = 0;
   virtual void take(const event_t& message) = 0;
   virtual void take(const experiment_t& message) = 0;
-  /// Something came on one of the channels that is not of its type.
+  /// Receives a message that does not have the type of its channel.
   virtual void take_malformed() = 0;
 };
 
-/// Listens to what somebody else's run publishes. Publishers may come, go and start anew.
+/// Receives the messages that another program's run publishes. Publishers may start, stop and restart.
 class RunListener {
  public:
   /// `url`: empty for default_lcm_url(). Throws LcmError when there is no route or LCM does not start, and
@@ -40,9 +40,9 @@ class RunListener {
   RunListener(const RunListener&) = delete;
   RunListener& operator=(const RunListener&) = delete;
 
-  /// For poll(2); below 0 while a tcpq server is away.
+  /// File descriptor for poll(2); negative while there is no tcpq server.
   [[nodiscard]] int file_descriptor() noexcept { return network_.lcm().getFileno(); }
-  /// Hands on what has come, without waiting. At most `messages_max` of them, so that a flood leaves time for others.
+  /// Passes on the received messages without waiting: at most `messages_max`, so that a flood cannot block the caller.
   void poll(int messages_max = 20'000);
 
   [[nodiscard]] const std::string& url() const noexcept { return network_.url(); }
@@ -53,7 +53,7 @@ class RunListener {
   template <class Message>
   void subscribe(const std::string& channel);
   void subscribe();
-  /// Of tcpq, once a second at most.
+  /// Connects tcpq again, at most once a second.
   void look_for_server();
 
   LcmOutlet network_;

@@ -48,7 +48,7 @@ std::string format_status_line(const rig::CycleRecord& record, const StatusSnaps
       record.control.theta_est_N, static_cast<unsigned long long>(status.overruns),
       static_cast<unsigned long long>(status.telemetry_drops),
       static_cast<unsigned long long>(status.gate_interventions), timing_text(status).data());
-  // A speed of 1e300 fills the buffer; what there is room for will do.
+  // A speed of 1e300 fills the buffer. Then the text is cut.
   if (size < 0) return {};
   return {text.data(), std::min(static_cast<std::size_t>(size), text.size() - 1)};
 }
@@ -89,7 +89,7 @@ void StatusLine::erase() noexcept {
 void StatusLine::put(std::string_view text) noexcept {
   pollfd ready{file_, POLLOUT, 0};
   if (::poll(&ready, 1, 0) <= 0 || (ready.revents & POLLOUT) == 0) return;
-  // Nothing to be done about a failure here: the line is a courtesy.
+  // A failure is ignored, because the line is not essential.
   [[maybe_unused]] const auto written = ::write(file_, text.data(), text.size());
 }
 

@@ -14,11 +14,11 @@ namespace abs_hil::telemetry {
 /// time as p50/p99/p99.9/max. UTF-8, no line end.
 [[nodiscard]] std::string format_status_line(const rig::CycleRecord& record, const StatusSnapshot& status);
 
-/// `text` cut to `columns` of a terminal; combining marks take none.
+/// `text` cut to `columns` of a terminal. Combining marks count as 0 columns.
 [[nodiscard]] std::string_view cut_to_columns(std::string_view text, int columns) noexcept;
 
-/// A line on a terminal, drawn over itself at most ten times a second by the records' stamps; for runs in real time.
-/// Does nothing where the file is not a terminal, and skips a terminal that is held (Ctrl-S) rather than wait for it.
+/// A status line on a terminal, for runs in real time. It is redrawn at most ten times a second by the records' stamps.
+/// It does nothing if the file is not a terminal, and does not wait for a terminal that is held (Ctrl-S).
 class StatusLine : public rig::RecordSink {
  public:
   /// `file` is a file descriptor, 2 for stderr; it stays open.
@@ -28,7 +28,7 @@ class StatusLine : public rig::RecordSink {
   void consume(const rig::CycleRecord& record, double distance_m) override;
   /// Erases the line.
   void finish() override { erase(); }
-  /// Makes room for other text on the same terminal; the next record draws the line again.
+  /// Erases the line for other text on the same terminal. The next record draws it again.
   void erase() noexcept;
 
   [[nodiscard]] bool active() const noexcept { return active_; }

@@ -7,7 +7,7 @@
 
 namespace abs_hil::telemetry {
 
-/// What only the owner of the run knows and ABS_STATUS and the status line show. All counts since the start.
+/// Data from the owner of the run for ABS_STATUS and the status line. All counts are since the start.
 struct StatusSnapshot {
   std::uint64_t cycles{0};
   std::uint64_t overruns{0};            ///< cycles that missed at least one tick

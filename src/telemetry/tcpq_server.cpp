@@ -16,7 +16,7 @@ namespace {
 constexpr std::uint32_t server_greeting = 0x287617fa;
 constexpr std::uint32_t client_greeting = 0x287617fb;
 constexpr std::uint32_t protocol_version = 0x0100;
-/// The kernel grants twice net.core.wmem_max at most, some 400 kB by default; it reports room while a third is free.
+/// The kernel grants at most twice net.core.wmem_max, about 400 kB by default. It reports room while a third is free.
 constexpr int send_buffer_bytes = 1 << 20;
 
 class Socket {
@@ -82,7 +82,7 @@ TcpqServer ask_tcpq_server(const Endpoint& endpoint, int timeout_ms) noexcept {
 }
 
 bool takes_without_waiting(int socket) noexcept {
-  // As often as it is asked: LCM connects anew behind our back.
+  // Set at every call, because LCM may have connected again.
   static_cast<void>(::setsockopt(socket, SOL_SOCKET, SO_SNDBUF, &send_buffer_bytes, sizeof send_buffer_bytes));
   pollfd ready{socket, POLLOUT, 0};
   return ::poll(&ready, 1, 0) > 0;

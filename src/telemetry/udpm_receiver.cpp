@@ -19,7 +19,7 @@ namespace {
 
 constexpr int datagrams_per_look = 256;
 
-/// recv_buf_size of the URL's options, 0 where there is none.
+/// recv_buf_size of the URL's options; 0 if there is none.
 int wanted_buffer_bytes(std::string_view options) {
   constexpr std::string_view name = "recv_buf_size=";
   const std::size_t at = options.find(name);
@@ -34,17 +34,17 @@ bool set(int socket, int level, int option, int value) {
   return ::setsockopt(socket, level, option, &value, sizeof value) == 0;
 }
 
-/// True, or errno says what is wrong.
+/// Returns true, or false with errno set.
 bool join(int socket, const sockaddr_in& group, int buffer_bytes) {
-  // LCM's own sockets at this port, and others of ours, ask for it too.
+  // LCM's own sockets at this port, and our other sockets, set it too.
   if (!set(socket, SOL_SOCKET, SO_REUSEADDR, 1)) return false;
-  // Bound to the group: what is sent to this computer's own address does not get here.
+  // Bound to the group, so that the socket does not receive packets to this computer's own address.
   if (::bind(socket, reinterpret_cast<const sockaddr*>(&group), sizeof group) != 0) return false;
   ip_mreq membership{};
   membership.imr_multiaddr = group.sin_addr;
   membership.imr_interface.s_addr = htonl(INADDR_ANY);
   if (::setsockopt(socket, IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership, sizeof membership) != 0) return false;
-  // As much as the kernel permits (net.core.rmem_max), and a count of what it drops: without them it works as well.
+  // Requests the largest buffer (net.core.rmem_max) and a count of dropped datagrams. The receiver works without both.
   if (buffer_bytes > 0) static_cast<void>(set(socket, SOL_SOCKET, SO_RCVBUF, buffer_bytes));
   static_cast<void>(set(socket, SOL_SOCKET, SO_RXQ_OVFL, 1));
   return true;

@@ -10,17 +10,16 @@
 
 namespace abs_hil::telemetry {
 
-/// Takes the messages of one channel from LCM's UDP multicast, those that fit one datagram and `payload_max`, without
-/// liblcm. A program that moves a machine must not be ended by who sends it packets: liblcm 1.3.1 believes fragments
-/// about the size of their message, which it allocates, up to 256 MB, and about where they belong in it, and writes
-/// there. Here nothing is put together, so that there is nothing to believe, and nothing is allocated after the
-/// construction. Used from one thread.
+/// Receives the messages of one channel from LCM's UDP multicast without liblcm. A message must fit one datagram and
+/// `payload_max`. No packet may end a program that moves a machine, but liblcm 1.3.1 trusts fragments: it allocates the
+/// size that they claim, up to 256 MB, and writes at the offset that they claim. This class assembles no fragments, and
+/// it allocates nothing after construction. Used from one thread.
 class UdpmReceiver {
  public:
   static constexpr std::size_t payload_max = 2048;  ///< bytes
 
-  /// `url`: udpm://…; its recv_buf_size is asked for. Throws LcmError, naming the address, where the group cannot be
-  /// joined.
+  /// `url`: udpm://…; its recv_buf_size is requested from the kernel. Throws LcmError, naming the address, if it
+  /// cannot join the group.
   UdpmReceiver(const std::string& url, std::string channel);
   UdpmReceiver(const UdpmReceiver&) = delete;
   UdpmReceiver& operator=(const UdpmReceiver&) = delete;
@@ -30,14 +29,14 @@ class UdpmReceiver {
   [[nodiscard]] int file_descriptor() const noexcept { return socket_; }
 
   struct Arrival {
-    bool any{false};                          ///< false: nothing of the channel is there now
-    bool too_long{false};                     ///< there was a message, of more than one datagram or `payload_max`
+    bool any{false};                          ///< false: there is no message of the channel now
+    bool too_long{false};                     ///< true: the message is larger than one datagram or `payload_max`
     std::span<const std::uint8_t> payload{};  ///< valid until the next call
   };
-  /// The next message of the channel, without waiting; looks at 256 datagrams at most.
+  /// Returns the next message of the channel without waiting. It reads at most 256 datagrams.
   Arrival next() noexcept;
 
-  /// Datagrams of any channel that the kernel dropped, as they came faster than they were taken.
+  /// Datagrams of any channel that the kernel dropped, because they came faster than they were read.
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
 
  private:

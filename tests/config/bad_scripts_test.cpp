@@ -21,7 +21,7 @@ std::string text_of(const fs::path& path) {
   return text.str();
 }
 
-/// The message without the folder, which is another on every computer; empty if the script is taken.
+/// The message without the folder, which depends on the computer; empty if the script is valid.
 std::string refusal_of(const fs::path& path) try {
   static_cast<void>(config::load(path.string()));
   return {};
@@ -41,7 +41,7 @@ TEST_CASE("every bad script is refused with the exact message") {
   }
   std::sort(scripts.begin(), scripts.end());
   CHECK(scripts.size() >= 40);
-  // For a new script: write down what is said, then read it with care.
+  // For a new script: write the message to the file, then check it with care.
   const bool write_down = std::getenv("ABS_HIL_WRITE_EXPECTED") != nullptr;
   for (const fs::path& path : scripts) {
     fs::path expected = path;

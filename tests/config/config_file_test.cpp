@@ -13,7 +13,7 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-/// A file that goes with the test.
+/// A temporary file. The destructor removes it.
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::string& text)
@@ -58,11 +58,11 @@ TEST_CASE("errors in a file name file and line") {
   CHECK_THAT(load_error("[plant]\n\nthetaN = 3\n"), Contains(".toml:3") && Contains("plant.theta_N"));
   CHECK_THAT(load_error("[plant]\ntheta_N = -3\n"), Contains(".toml:2") && Contains("(0, 500]"));
   CHECK_THAT(load_error("[plant]\nx="), Contains(".toml:2") && Contains("not valid TOML"));
-  CHECK_THAT(load_error("[plant]\ntheta_N = [1, 2]\n"), Contains("neither number"));
+  CHECK_THAT(load_error("[plant]\ntheta_N = [1, 2]\n"), Contains("neither a number"));
   CHECK_THAT(load_error("[plant]\ntheta_N = nan\n"), Contains("theta_N"));
 }
 
-TEST_CASE("a plant file holds nothing but a plant") {
+TEST_CASE("a plant file with another table is refused") {
   CHECK_THAT(load_error("[control]\nslip_ref = 0.1\n", "plant"), Contains(".toml:1") && Contains("[plant]"));
   CHECK(load_error("description = \"p\"\n[plant]\nB = 20\n", "plant").empty());
 }
@@ -79,7 +79,7 @@ TEST_CASE("plants are found by name; an unknown one names the known") {
   CHECK_THROWS_WITH(plant_file("paper-table2"), Contains("nearest known is paper-table1"));
 }
 
-TEST_CASE("every shipped plant loads, sets every plant key and says what it is") {
+TEST_CASE("every shipped plant loads, sets every plant key and has a description") {
   const auto plants = known_plants();
   REQUIRE(plants.size() >= 2);
   for (const PlantEntry& plant : plants) {
@@ -91,7 +91,7 @@ TEST_CASE("every shipped plant loads, sets every plant key and says what it is")
   }
 }
 
-TEST_CASE("plant paper-table1 is what the defaults are") {
+TEST_CASE("plant paper-table1 equals the defaults") {
   Settings defaults;
   Settings loaded;
   KeyTable table(loaded);
@@ -99,7 +99,7 @@ TEST_CASE("plant paper-table1 is what the defaults are") {
   CHECK(table.to_json() == KeyTable(defaults).to_json());
 }
 
-TEST_CASE("the maker's plant carries the manual's numbers, its models, and the fit that controllers are told") {
+TEST_CASE("the maker's plant has the manual's numbers, its models, and the fit for the controllers") {
   Settings settings;
   KeyTable table(settings);
   load_file(plant_file("inteco-manual"), table, "plant");

@@ -28,7 +28,7 @@ std::string error_of(KeyTable& table, const std::string& assignment) {
 
 }  // namespace
 
-TEST_CASE("values reach their place by dotted name") {
+TEST_CASE("values are set by dotted name") {
   Fixture f;
   f.table.set_text("plant.theta_N=30", "--set");
   f.table.set_text("control.adaptive.ka1=2.5", "--set");
@@ -47,7 +47,7 @@ TEST_CASE("an unknown key names the nearest known one") {
   CHECK_THAT(error_of(f.table, "plant.thetaN=3"), Contains("unknown key plant.thetaN") && Contains("plant.theta_N"));
 }
 
-TEST_CASE("the end or the middle of a key's name is answered with the keys that hold it") {
+TEST_CASE("a part of a key's name gives the keys that contain it") {
   Fixture f;
   CHECK_THAT(error_of(f.table, "slip_ref=0.1"), Contains("the nearest known key is control.slip_ref ("));
   CHECK_THAT(error_of(f.table, "ka1=2"),
@@ -64,7 +64,7 @@ TEST_CASE("a bad value names key, value, range and unit, and changes nothing") {
   CHECK(f.settings.plant.rig.tyre.theta_N == 23.0);
 }
 
-TEST_CASE("what is no number, not whole, not finite, not a flag or not a known name is refused") {
+TEST_CASE("values that are not a number, whole, finite, a flag or a known name are refused") {
   Fixture f;
   for (const char* bad :
        {"plant.theta_N=abc", "plant.theta_N=nan", "plant.theta_N=inf", "plant.theta_N=", "plant.theta_N=3x",
@@ -95,7 +95,7 @@ TEST_CASE("every default lies within its own range, every key has a meaning, no 
   }
 }
 
-TEST_CASE("a search looks at numbers alone, and only within their own range") {
+TEST_CASE("only numbers have a search range, and it lies within their own range") {
   Fixture f;
   int searched = 0;
   for (const Key& key : f.table.keys()) {
@@ -110,7 +110,7 @@ TEST_CASE("a search looks at numbers alone, and only within their own range") {
   CHECK(searched > 0);
 }
 
-TEST_CASE("groups stand in the order that recorded configurations have") {
+TEST_CASE("groups have the order of recorded configurations") {
   Fixture f;
   const nlohmann::ordered_json json = f.table.to_json();
   std::vector<std::string> tables, controllers;
@@ -123,7 +123,7 @@ TEST_CASE("groups stand in the order that recorded configurations have") {
                                                 "relay", "pi", "five_phase", "adaptive_actuator", "adaptive_peak"});
 }
 
-TEST_CASE("what only has an effect where braking begins is marked as such") {
+TEST_CASE("options that act only when braking begins are marked as start values") {
   Fixture f;
   std::set<std::string> marked;
   for (const Key& key : f.table.keys()) {
@@ -160,7 +160,7 @@ TEST_CASE("the effective configuration is nested like a file and complete") {
   CHECK(leaves == f.table.keys().size());
 }
 
-TEST_CASE("the effective configuration as TOML names every table once and every value as it is") {
+TEST_CASE("the effective configuration as TOML has every table once and every value unchanged") {
   Fixture f;
   f.table.set("telemetry.channel_prefix", std::string("with \"quotes\" and \\"), "test");
   f.table.set("plant.theta_N", 0.1 + 0.2, "test");

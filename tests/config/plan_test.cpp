@@ -22,7 +22,7 @@ constexpr const char* brake =
 
 }  // namespace
 
-TEST_CASE("the paper's script makes the plan that was written in C++ before it") {
+TEST_CASE("the paper's script gives the plan that C++ code gave before") {
   config::Settings s;
   const Plan whole = plan(*find("paper"), s);
   CHECK(whole.phase_names == std::vector<std::string>{"idle", "accelerate", "coast", "brake", "hold", "stopped"});
@@ -49,7 +49,7 @@ TEST_CASE("slip control always ends at the least speed for it, whatever the scri
   CHECK(made.phases[0].slip_ref_profile.at(1.0) == 0.2);
 }
 
-TEST_CASE("where a phase ends no later by itself, the least speed is not asked for twice") {
+TEST_CASE("a phase that ends above the least speed gets no second condition") {
   config::Settings s;
   s.experiment.end_speed_m_s = s.control.v_min_m_s = 0.3;
   CHECK(plan(*find("paper"), s).phases[3].ends_on.size() == 1);
@@ -57,7 +57,7 @@ TEST_CASE("where a phase ends no later by itself, the least speed is not asked f
   const auto ends = plan(*find("paper"), s).phases[3].ends_on;
   REQUIRE(ends.size() == 2);
   CHECK(ends[1].value == 0.4);
-  // One that asks for more than the speed need not come in time.
+  // A condition with a further part may hold too late, so the least speed is added.
   const Script both = parsed(
       "[[phase]]\nname = \"a\"\nbrake = \"controller\"\nat_most_s = 3\n"
       "until.all = [{ car_speed_below_m_s = 1 }, { distance_m = 5 }]\n");
@@ -76,7 +76,7 @@ TEST_CASE("a configuration value out of the range it is used in is refused with 
 
 TEST_CASE("a script whose every phase is left out is refused") {
   const Script script = parsed("[[phase]]\nname = \"a\"\nwhen = \"control.slip_ref > 0.5\"\nuntil = { lasts_s = 1 }\n");
-  CHECK_THROWS_WITH(plan(script, config::Settings{}), Contains("every phase is left out"));
+  CHECK_THROWS_WITH(plan(script, config::Settings{}), Contains("leaves out every phase"));
 }
 
 TEST_CASE("limits of a script only tighten") {
@@ -90,7 +90,7 @@ TEST_CASE("limits of a script only tighten") {
   CHECK(plan(script, s).limits.run_time_s == 5.0);
 }
 
-TEST_CASE("what goes beyond the rig's limits is named with phase, value and limit") {
+TEST_CASE("values beyond the rig's limits are named with phase, value and limit") {
   config::Settings s;
   s.gate.brake_duty_max = 0.7;
   const Script script = parsed(
@@ -114,7 +114,7 @@ TEST_CASE("friction events make a profile; the configuration's own stays") {
   CHECK(s.plant.friction_profile == "time: 0.7");
 }
 
-TEST_CASE("every part of the plant drifts by its own events, on its own clock") {
+TEST_CASE("every part of the plant has its own events and its own time base") {
   const Script script = parsed(std::string(brake) +
                                "[[event]]\nat_s = 0\nbrake_torque = \"80 %\"\nfriction = 0.9\n"
                                "[[event]]\nat_s = 1\nuntil = \"1.5 min\"\nbrake_torque = 0.5\nlower_bearing = 3\n"

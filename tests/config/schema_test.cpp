@@ -6,7 +6,7 @@
 
 using namespace abs_hil;
 
-TEST_CASE("the schema beside the experiments is the parser's") {
+TEST_CASE("config/experiments/schema.json equals the parser's schema") {
   std::ifstream file(ABS_HIL_EXPERIMENTS "/schema.json");
   std::stringstream text;
   text << file.rdbuf();

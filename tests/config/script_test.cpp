@@ -23,7 +23,7 @@ Script parsed(const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("quantities come in the units of the trade, and in no other") {
+TEST_CASE("quantities take their own units only") {
   CHECK(parse_quantity("20 ms", Quantity::time) == 0.02);
   CHECK(parse_quantity("1.5min", Quantity::time) == 90.0);
   CHECK_THAT(*parse_quantity("1700 rpm", Quantity::angular_speed),
@@ -89,7 +89,7 @@ control.slip_ref = { from = 0.1, to = 0.2, steps = 3 }
   CHECK(std::get<double>(script.series.vary[1].values[1]) == 0.15000000000000002);
 }
 
-TEST_CASE("every shipped experiment says what it is and can be explained") {
+TEST_CASE("every shipped experiment has a description and an explanation") {
   config::Settings settings;
   const auto known = known_experiments();
   CHECK(known.size() >= 6);
@@ -105,7 +105,7 @@ TEST_CASE("an unknown experiment names the nearest and all known ones") {
   CHECK_THROWS_WITH(find("/nowhere/x.toml"), Contains("/nowhere/x.toml"));
 }
 
-TEST_CASE("the explanation holds what acts, what ends it and how often") {
+TEST_CASE("the explanation has actions, ends and numbers of runs") {
   config::Settings settings;
   const std::string words = explain(*find("paper"), settings);
   CHECK_THAT(words, Contains("motor duty 1, brake off") && Contains("until the upper wheel reaches 170 rad/s") &&
@@ -114,7 +114,7 @@ TEST_CASE("the explanation holds what acts, what ends it and how often") {
   CHECK_THAT(explain(*find("series-of-ten"), settings), Contains("Series of 10 runs") && Contains("30 s apart"));
 }
 
-TEST_CASE("the explanation tells steps from slopes") {
+TEST_CASE("the explanation distinguishes steps from ramps") {
   const config::Settings settings;
   CHECK_THAT(explain(*find("brake-step"), settings),
              Contains("brake torque 0.5 N m, from 0.5 s on 1 N m, from 1 s on 2 N m\n"));

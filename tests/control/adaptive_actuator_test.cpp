@@ -1,4 +1,4 @@
-// adaptive-actuator: what it promises against `adaptive`, and the Lyapunov function of its three steps.
+// adaptive-actuator: its advantages over `adaptive`, and the Lyapunov function of its three steps.
 
 #include <algorithm>
 #include <cmath>
@@ -14,7 +14,7 @@ using Catch::Matchers::WithinAbs;
 
 namespace {
 
-/// The rig as it is: lag, limits, dead zone and encoders.
+/// The real rig: lag, limits, dead zone and encoders.
 bench::Setup real_rig(double theta_N = 23.0) {
   bench::Setup s;
   s.ideal_actuator = false;
@@ -97,7 +97,7 @@ TEST_CASE("With an ideal actuator it is the adaptive controller, bit for bit") {
   }
 }
 
-TEST_CASE("A brake of whatever lag is held to the same slip") {
+TEST_CASE("The slip is the same for any lag of the brake") {
   for (const double c31_per_s : {10.0, 40.0, 200.0}) {
     CAPTURE(c31_per_s);
     auto s = real_rig();

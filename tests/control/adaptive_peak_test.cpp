@@ -1,4 +1,4 @@
-// adaptive-peak: how near it comes to the best that a constant slip could do, and that it is told nothing of the tyre.
+// adaptive-peak: its loss against the best constant slip, and its independence of the tyre parameters.
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +16,7 @@ namespace {
 constexpr double slow_m_s = 3.0;
 constexpr double locked_slip = 0.9;
 
-/// Lag, limits, dead zone and encoders; the controller believes in a tyre that has nothing to do with the plant's.
+/// Lag, limits, dead zone and encoders. The controller's tyre parameters are wrong.
 bench::Setup real_rig() {
   bench::Setup s;
   s.ideal_actuator = false;
@@ -91,7 +91,7 @@ TEST_CASE("Table 1 from 170 rad/s: within 4 % of the bound of 15.29 m, whatever 
   }
 }
 
-TEST_CASE("It is told nothing of the tyre: other theta, B and C in its model change not a bit") {
+TEST_CASE("It does not use the tyre parameters: other theta, B and C in its model change no bit") {
   auto s = real_rig();
   const auto first = bench::brake(s, "adaptive-peak");
   for (const auto& tyre : {rig::TyreParameters{23.0, 28.0, 1.68}, rig::TyreParameters{90.0, 3.0, 1.9}}) {
@@ -104,7 +104,7 @@ TEST_CASE("It is told nothing of the tyre: other theta, B and C in its model cha
   }
 }
 
-TEST_CASE("Nor of the slip reference") {
+TEST_CASE("It does not use the slip reference") {
   auto s = real_rig();
   const double distance_m = bench::brake(s, "adaptive-peak").stop_distance_m;
   s.options.slip_ref = 0.4;

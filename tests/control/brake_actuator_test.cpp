@@ -53,7 +53,7 @@ TEST_CASE("The lag's torque and its mean are exact for any step, also a jitterin
   double torque = 0.0;
   for (int i = 0; i < 300; ++i) {
     const double u = duty(random), dt = step_s(random);
-    actuator.command(u, std::numeric_limits<double>::quiet_NaN());  // on the rig the duty alone acts
+    actuator.command(u, std::numeric_limits<double>::quiet_NaN());  // on the rig only the duty acts
     actuator.advance(dt);
     // Independent: Tb' = c31 (b(u) - Tb) by fine RK4, its mean by Simpson's rule over the same steps.
     const double target = map_Nm(u);

@@ -17,12 +17,12 @@
 #include "control/brake_actuator.hpp"
 #include "control/tracking_observer.hpp"
 
-/// A plant and a control loop of the tests' own: plain RK4 of (11), independent of plant_sim.
+/// A plant and a control loop for the tests: plain RK4 of (11), independent of plant_sim.
 namespace bench {
 
 using namespace abs_hil;
 
-/// State of (11) with the brake's lag (6), the wheels' angles and the way.
+/// State of (11) with the brake's lag (6), the wheels' angles and the distance.
 struct PlantState {
   double omega1{170.0}, omega2{170.0}, torque{0.0}, angle1{0.0}, angle2{0.0}, way{0.0};
 };
@@ -116,7 +116,7 @@ inline Result brake(const Setup& s, control::SlipController& controller) {
   control::TrackingObserver lower{s.options.observer, s.rig.encoder_counts_per_rev};
   const std::int32_t per_rev = s.rig.encoder_counts_per_rev;
   if (s.encoders) {
-    // The observers come settled out of the phase before.
+    // The observers have settled in the previous phase.
     const int warm_up = static_cast<int>(0.5 / h);
     const double angle1 = x.angle1 - warm_up * h * x.omega1;
     const double angle2 = x.angle2 - warm_up * h * x.omega2;

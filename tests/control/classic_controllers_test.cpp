@@ -11,7 +11,7 @@ using namespace abs_hil;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 
-TEST_CASE("The relay switches exactly at its threshold, the wanted slip unless it has one of its own") {
+TEST_CASE("The relay switches exactly at its threshold, which is the slip reference by default") {
   control::ControlOptions options;
   const rig::RigParameters rig;
   for (const double own : {0.0, 0.1, 0.7}) {
@@ -38,7 +38,7 @@ TEST_CASE("The relay switches exactly at its threshold, the wanted slip unless i
   CHECK_THROWS_AS(control::make_controller("relay", {options, rig}), std::invalid_argument);
 }
 
-TEST_CASE("The torque fed forward keeps e_v as it is on the plant that it was measured on") {
+TEST_CASE("The feed-forward torque keeps e_v constant on the plant on which it was measured") {
   std::mt19937 random{21};
   std::uniform_real_distribution<double> unit{0.0, 1.0};
   rig::RigParameters rig;
@@ -51,7 +51,7 @@ TEST_CASE("The torque fed forward keeps e_v as it is on the plant that it was me
     const double torque = control::measured_equivalent_torque_Nm(w, in);
     const double alpha1 = (w.r1_m * force - w.d1_Nms_rad * in.speeds.omega1_rad_s - w.M10_Nm - torque) / w.J1_kg_m2;
     CHECK_THAT((1 - slip_ref) * w.r2_m * in.alpha2_rad_s2 - w.r1_m * alpha1, WithinAbs(0.0, 1e-11));
-    // A lower wheel that its friction alone does not account for is not taken for a pulling tyre.
+    // A lower wheel that decelerates less than by friction gives no negative tyre force.
     in.alpha2_rad_s2 = 50.0;
     CHECK_THAT(control::measured_equivalent_torque_Nm(w, in),
                WithinAbs(w.J1_kg_m2 / w.r1_m * baseline::drift(rig, in.speeds, slip_ref), 1e-12));
@@ -97,7 +97,7 @@ TEST_CASE("PI does not wind up while the actuator is at its limit") {
   for (int n = 0; n < 2000; ++n) (void)pi->step(in);  // 2 s at the limit: an integral would have grown to -4 m
   in = baseline::input_at(rig, 150.0, 0.0, 1e-3);
   in.max_brake_torque_Nm = 1.5;
-  // What is left is the trapezoid of the two cycles around the limit, not 2 s of error.
+  // The rest is the trapezoid of the two cycles around the limit, not 2 s of error.
   CHECK(std::abs(pi->step(in).brake_torque_Nm) < 0.1);
 }
 

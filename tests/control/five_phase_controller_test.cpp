@@ -126,7 +126,7 @@ TEST_CASE("The torque follows the ramps of the phases, in N m/s, within what the
   CHECK(torque == 0.0);
 }
 
-TEST_CASE("No phase lasts for ever") {
+TEST_CASE("Every phase ends") {
   const auto options = options_of_test();
   const rig::RigParameters rig;
   control::FivePhaseController c{{options, rig}};
@@ -147,14 +147,14 @@ TEST_CASE("No phase lasts for ever") {
   (void)c.step(in = input_at(rig, -50.0, 1e-3));
   (void)c.step(in);
   REQUIRE(c.phase() == BrakePhase::release);
-  // Released to nothing and the wheel still does not come back: recover_limit_s later it is believed to be free.
+  // The torque is 0 and the wheel does not accelerate: after recover_limit_s it counts as free.
   CHECK(cycles_in(BrakePhase::release, -1.0) <= 102);
   REQUIRE(c.phase() == BrakePhase::recover);
   CHECK(std::abs(cycles_in(BrakePhase::recover, -1.0) - 100) <= 1);
   CHECK(c.phase() == BrakePhase::reapply);
 }
 
-TEST_CASE("Five-phase never looks at the slip or at the car's speed") {
+TEST_CASE("Five-phase does not use the slip or the car's speed") {
   const auto options = options_of_test();
   const rig::RigParameters rig;
   control::FivePhaseController one{{options, rig}}, other{{options, rig}};

@@ -23,7 +23,7 @@ double worst_deviation_m_s(const bench::Setup& s, const bench::Result& run) {
   return worst;
 }
 
-/// (16) computed at the tick and held, without regard to the period.
+/// (16) computed at the tick and held, without the sampled-data form.
 class PrintedLaw final : public control::SlipController {
  public:
   explicit PrintedLaw(const bench::Setup& s) : setup_{s} {}
@@ -114,7 +114,7 @@ TEST_CASE("The exponentials hold for other plants, speeds and references") {
   }
 }
 
-TEST_CASE("After a step of the slip reference e_v goes on as the exponentials have it") {
+TEST_CASE("After a step of the slip reference e_v follows the exponentials") {
   class Stepping final : public control::SlipController {
    public:
     explicit Stepping(const bench::Setup& s) : inner_{{s.options, s.rig}} {}

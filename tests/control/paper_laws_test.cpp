@@ -1,5 +1,5 @@
-// The laws as the paper prints them, in continuous time: their closed forms, the mended sign of (18), and the limit to
-// which the sampled-data controllers tend.
+// The laws as the paper prints them, in continuous time: their closed forms, the corrected sign of (18), and the limit
+// of the sampled-data controllers.
 
 #include "abs_hil/control/paper_laws.hpp"
 
@@ -74,7 +74,7 @@ TEST_CASE("The nominal law leaves e_v'' + ks1 e_v' + ks0 e_v = 0") {
   }
 }
 
-TEST_CASE("e_v' of (14) is what the wheels of (11) do, with any torque") {
+TEST_CASE("e_v' of (14) equals that of the wheels of (11), with any torque") {
   std::mt19937 random{7};
   std::uniform_real_distribution<double> unit{0.0, 1.0};
   for (int i = 0; i < 100; ++i) {

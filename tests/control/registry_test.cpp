@@ -52,7 +52,7 @@ TEST_CASE("A registered controller stands beside ours; a taken or empty name is 
   const control::ControlOptions options;
   const rig::RigParameters parameters;
   CHECK(control::make_controller("own-locked", {options, parameters}) != nullptr);
-  CHECK_THROWS_WITH(control::register_controller(entry), Contains("'own-locked' is there already"));
+  CHECK_THROWS_WITH(control::register_controller(entry), Contains("'own-locked' already exists"));
   CHECK_THROWS_AS(control::register_controller({"", "none", entry.make}), std::invalid_argument);
 }
 
@@ -90,7 +90,7 @@ TEST_CASE("Options that are not usable are refused when the controller is made")
   refused("nominal", [](auto& o) { o.nominal.theta0_N = -5.0; });
 }
 
-TEST_CASE("The locked controller asks for all that there is, and estimates nothing") {
+TEST_CASE("The locked controller gives the largest torque, and estimates nothing") {
   const control::ControlOptions options;
   const rig::RigParameters parameters;
   const auto locked = control::make_controller("locked", {options, parameters});

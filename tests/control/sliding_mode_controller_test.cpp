@@ -80,7 +80,7 @@ TEST_CASE("Sliding mode reaches e_v = 0 within |e_v(0)|/eta when K exceeds the m
 }
 
 TEST_CASE("With adaptation V = |e_v| + theta_tilde^2/(2 gamma) falls by eta or more until the surface is reached") {
-  // K alone would not do: |theta - theta0| k = 21 m/s^2. Outside the surface V' = -K, whatever theta0 (docs).
+  // K alone is not enough: |theta - theta0| k = 21 m/s^2. Outside the surface V' = -K, whatever theta0 (docs).
   const double theta0 = GENERATE(10.0, 36.0);
   const double K = 8.0, gamma = 60.0, h = 1e-4;
   auto s = setup(K, gamma, theta0, 1.0 / h);
@@ -111,7 +111,7 @@ TEST_CASE("With adaptation V = |e_v| + theta_tilde^2/(2 gamma) falls by eta or m
   CHECK_THAT((23.0 - run.ticks[later].output.theta_est_N) / tilde1, WithinAbs(std::exp(-1.0), 0.02));
 }
 
-TEST_CASE("theta_hat stands while the torque asked for is beyond the actuator and adaptation would drive it further") {
+TEST_CASE("theta_hat is held while the torque is outside the actuator's range and adaptation would drive it further") {
   auto s = setup(10.0, 100.0, 20.0);
   const auto controller = control::make_controller("sliding-mode", {s.options, s.rig});
   const auto after = [&](double error, double max_torque) {

@@ -106,7 +106,7 @@ TEST_CASE("A perturbation with slope L is overcome if k2 > L and k1 > sqrt(k2 + 
     }
     return late;
   };
-  // What sampling leaves is of the order of h^2 (k1^2 + k2), 2e-6 here, not of h times the perturbation, 1e-2.
+  // The error of sampling is of the order of h^2 (k1^2 + k2), 2e-6 here, not of h times the perturbation, 1e-2.
   for (const bool worst : {true, false}) {
     CHECK(largest_late(1.02 * std::sqrt(2.1 * L), 1.1 * L, worst) < 1e-5);
     CHECK(largest_late(1.5 * std::sqrt(L), 1.1 * L, worst) < 1e-5);  // Levant's setting
@@ -152,7 +152,7 @@ TEST_CASE("With an ideal actuator super-twisting reaches the surface at every ra
   CHECK(run.ticks.back().output.theta_est_N == 19.0);
 }
 
-TEST_CASE("The integral of the sign stands while it would drive the torque further beyond the actuator") {
+TEST_CASE("The integral of the sign is held while it would drive the torque further out of the actuator's range") {
   bench::Setup s;
   s.options.super_twisting = {.k1 = 5.0, .k2 = 50.0, .adaptation = {.gamma = 0.0, .theta0_N = 20.0}};
   const auto controller = control::make_controller("super-twisting", {s.options, s.rig});

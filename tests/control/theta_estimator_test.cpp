@@ -74,7 +74,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("omega1_hat gives way when the estimate is frozen or projected: (18) holds all the time") {
+TEST_CASE("omega1_hat follows when the estimate is frozen or projected: (18) always holds") {
   control::AdaptiveOptions options;
   options.zeta0 = 10.0;
   options.theta_max_N = 20.0;
@@ -136,7 +136,7 @@ TEST_CASE("Adaptation is frozen for phi <= 0, without a jump before or after") {
   CHECK(before > 20.0);
   for (const double phi : {0.0, -0.3, -1.0}) {
     for (int n = 0; n < 100; ++n) {
-      // A wheel that speeds up by 5 rad/s per cycle, and a large error: nothing of it may get in.
+      // The wheel gains 5 rad/s per cycle and the error is large. The estimate must ignore both.
       estimator.update({.dt_s = 1e-3,
                         .omega1_before_rad_s = 100.0 + 5.0 * n,
                         .omega1_after_rad_s = 105.0 + 5.0 * n,
@@ -173,7 +173,7 @@ TEST_CASE("The estimate is projected, and leaves a bound at once when the deriva
   CHECK(estimator.theta_N() == 5.0);
 }
 
-TEST_CASE("No time and hardly any slip are harmless") {
+TEST_CASE("A zero interval and a tiny slip cause no invalid numbers") {
   control::AdaptiveOptions options;
   options.zeta0 = 10.0;
   control::ThetaEstimator estimator{options, wheels};

@@ -25,7 +25,7 @@ TEST_CASE("A constant acceleration is followed without steady error at any rate"
   for (const double rate_Hz : {100.0, 500.0, 1000.0, 2000.0, 5000.0, 10000.0}) {
     CAPTURE(rate_Hz);
     control::TrackingObserver observer{options, fine_counts_per_rev};
-    observer.reset(0, 0.0);  // knows nothing of the speed
+    observer.reset(0, 0.0);  // the speed is unknown
     const double dt = 1.0 / rate_Hz;
     for (double t = dt; t < 1.0; t += dt) {
       observer.update(encoder_reading(omega0 * t + alpha * t * t / 2, fine_counts_per_rev), dt);
@@ -122,7 +122,7 @@ TEST_CASE("Quantisation noise stays far below that of the difference of counts")
   }
 }
 
-TEST_CASE("The counter's wrap-around does not show") {
+TEST_CASE("The counter's wrap-around has no effect") {
   const auto run = [](std::int64_t offset, double direction) {
     control::TrackingObserver observer{options, 4096};
     observer.reset(encoder_reading(0.0, 4096, offset), direction * 100.0);

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """usage: controllers_page.py ABS_HIL PAGE
 
-The tables of docs/controllers.md against the program: every controller of `abs_hil list` has a row and no other has, and
-every key in them has the default and the unit that `abs_hil list --keys` says.
+Compares the tables of docs/controllers.md with the program. Exactly the controllers of `abs_hil list` must have a row.
+Every key must have the default and the unit of `abs_hil list --keys`.
 """
 import re
 import subprocess
@@ -38,7 +38,7 @@ def problems(page, controllers, keys):
         if name.startswith('control.') and tuple(row[1:3]) != keys.get(name):
             yield f'{name}: the page says {row[1:3]}, abs_hil list --keys {keys.get(name, "nothing")}'
     if not any(name.startswith('control.') for name in named):
-        yield 'no table of gains was found'
+        yield 'the page has no table of gains'
 
 
 def main():

@@ -2,14 +2,14 @@
 """usage: run_commands.py ROOT BUILD [PAGE...] | --self-test
 
 Runs every command that README.md, CONTRIBUTING.md and docs/*.md show, page by page, each page in a scratch folder that
-looks like the top of the tree. A command must end with status 0, within its time. What cannot be run here stands in
-not_run.txt, with the reason; an entry there that matches nothing is an error, as is a command that is neither.
+looks like the top of the tree. A command must end with status 0, within its time. not_run.txt lists commands that
+cannot run here, with the reason. An entry that matches no command is an error.
 
 A block is a run of lines indented by four spaces, or a fence marked sh. In it
   - a line that begins with a program of ours, or with one of PROGRAMS, is a command; `\\` carries it on; where its comment
     says "status N" it must end with that;
-  - `$ command` may end with any status, and the lines below it must stand in what it prints;
-  - a program that serves until it is stopped (SERVERS) runs beside the rest of its block;
+  - `$ command` may end with any status, and its output must contain the lines below it;
+  - a server (SERVERS) runs beside the rest of its block until the end;
   - a line with [ ] or | around choices is a synopsis, not a command.
 """
 import os
@@ -139,7 +139,7 @@ class Scratch:
                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                                   start_new_session=True)
         self.servers.append(server)
-        time.sleep(1.5)  # what it serves (a mount, a socket) says nothing when it is there
+        time.sleep(1.5)  # nothing reports that its mount or socket is ready
         if server.poll() not in (None, 0):
             return f'ended with status {server.returncode}:\n{server.stdout.read().decode()[-1500:]}'
         return None

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 """usage: toml_examples.py ABS_HIL ROOT
 
-Every TOML example of the documentation, taken as its reader would take it:
+Checks every TOML example of the documentation by the kind that its fence names:
 
     ```toml experiment       a whole experiment file: must be valid, within the limits and run to its end in simulation
-    ```toml more-of-it       goes with the experiment above it on the page
-    ```toml configuration    goes after --config
+    ```toml more-of-it       is appended to the experiment above it on the page
+    ```toml configuration    is a file for --config
 
-No other TOML may stand in a page, fenced or indented, unseen by this test.
+Other TOML in a page, fenced or indented, is an error.
 """
 import pathlib
 import re

@@ -33,7 +33,7 @@ std::uint64_t fingerprint() {
 
 }  // namespace
 
-TEST_CASE("the C++ types have the fingerprints that were published") {
+TEST_CASE("the C++ types have the published fingerprints") {
   const auto table = published();
   REQUIRE(table.size() >= 5);
   INFO("a published type must not change: see lcmtypes/README.md");

@@ -1,5 +1,5 @@
-"""The message types as their users meet them: every field documented, Python and Java with the published fingerprints,
-and Python's decode() on whole, damaged and foreign messages.
+"""Tests the message types for users: every field is documented, Python and Java have the published fingerprints, and
+Python's decode() handles whole, damaged and foreign messages.
 
 usage: types_test.py LCMTYPES PYTHON_MODULE_DIR [JAVA TYPES_JAR LCM_JAR FINGERPRINTS_CLASS_DIR]
 """

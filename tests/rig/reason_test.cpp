@@ -14,7 +14,7 @@ using namespace abs_hil::rig;
 
 namespace {
 
-/// Logs hold these numbers: a line here is never changed or removed. A new reason adds a line at the end.
+/// Logs contain these numbers. Never change or remove a line. Append a line for a new reason.
 // clang-format off
 constexpr std::pair<std::string_view, int> published[]{
     {"none", 0},
@@ -137,7 +137,7 @@ TEST_CASE("every known reason has words of its own") {
   CHECK(seen.size() == static_cast<std::size_t>(known));
 }
 
-TEST_CASE("reasons fall into three kinds: going on, asked to stop, fault") {
+TEST_CASE("reasons have three groups: the run goes on, a stop request, a fault") {
   CHECK_FALSE(is_fault(Reason::sequence_complete));
   CHECK_FALSE(is_fault(Reason::interrupt_signal));
   CHECK(is_stop_request(Reason::interrupt_signal));
@@ -147,7 +147,7 @@ TEST_CASE("reasons fall into three kinds: going on, asked to stop, fault") {
   CHECK(is_fault(Reason::consecutive_overruns));
 }
 
-TEST_CASE("what a replay finds again is what measurements show") {
+TEST_CASE("a replay reproduces the reasons that measurements show") {
   CHECK(row_of(Reason::overspeed).found_again == FoundAgain::yes);
   CHECK(row_of(Reason::encoder_upper_stuck).found_again == FoundAgain::wheel_checks);
   CHECK(row_of(Reason::encoder_lower_jumped).found_again == FoundAgain::jumped_counts);
@@ -156,7 +156,7 @@ TEST_CASE("what a replay finds again is what measurements show") {
   CHECK(row_of(static_cast<Reason>(300)).found_again == FoundAgain::no);
 }
 
-TEST_CASE("phases bear the names of the CSV") {
+TEST_CASE("phases have the names of the CSV") {
   const char* names[] = {"idle", "accelerate", "coast", "brake", "hold", "stopped", "fault"};
   for (std::uint8_t i = 0; i < 7; ++i) CHECK(name_of(static_cast<Phase>(i)) == names[i]);
 }

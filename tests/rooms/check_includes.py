@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Fails when a file includes what its room must not know.
+"""Fails if a file includes a header that its room must not use.
 
-The compiler already refuses a header of a room that is not known (cmake/Room.cmake). This check adds what a compiler
-cannot see: the backend `driver/sim`, which stands in the folder of `driver`; libraries that a room does not link; headers
-of clocks, threads and files in the rooms that only compute; a public header that needs a private one.
+The compiler already refuses headers of rooms that a room does not list (cmake/Room.cmake). This check finds what the
+compiler cannot find: includes of the backend `driver/sim`, which is in the folder of `driver`; of libraries that a room
+does not link; of clocks, threads and files in rooms that only compute; of private headers in public ones.
 
 usage: check_includes.py ROOT ROOMS.TSV              checks ROOT/include/abs_hil and ROOT/src
        check_includes.py ROOT ROOMS.TSV --self-test  plants one offence of each kind and checks that each is found
@@ -78,7 +78,7 @@ def offences(root, rooms):
 
 
 def self_test(rooms):
-    """Every offence must be found when it is planted."""
+    """Plants every kind of offence. Returns those that the check does not find."""
     planted = [(f'src/{"driver/sim" if room == "driver_sim" else room}', f'{other}/anything.hpp')
                for room, known in rooms.items() for other in rooms
                if other != room and other not in known and other not in ('driver_sim', 'lcmtypes')]
@@ -102,7 +102,7 @@ def main():
         problems = [f'planted offence not found: {missed}' for missed in self_test(rooms)]
     else:
         problems = offences(root, rooms)
-    print('\n'.join(problems) or f'none of {len(rooms)} rooms knows more than it may')
+    print('\n'.join(problems) or f'none of {len(rooms)} rooms includes a forbidden header')
     return 1 if problems else 0
 
 

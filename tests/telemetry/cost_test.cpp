@@ -1,5 +1,4 @@
-// What a record costs, for whoever asks: test_telemetry "[cost]". Hidden otherwise, as it says nothing about right or
-// wrong.
+// Measures the cost of a record: test_telemetry "[cost]". The test is hidden because it checks nothing.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -18,7 +17,7 @@ namespace {
 constexpr int repetitions = 20;
 constexpr std::uint64_t records = 20'000;
 
-/// Best of some repetitions, ns a record, as others may use the machine.
+/// Shortest time of some repetitions, ns per record, because other programs may run.
 template <class Consume>
 void measure(const char* what, Consume consume) {
   double best_ns = 1e300;

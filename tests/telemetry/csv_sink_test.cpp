@@ -44,7 +44,7 @@ std::string row_of(const rig::CycleRecord& record, double distance_m) {
   return {row, format_csv_row(record, distance_m, row)};
 }
 
-TEST_CASE("the CSV header is the contract's, to the letter") {
+TEST_CASE("the CSV header equals the published one exactly") {
   CHECK(csv_header ==
         "time_s,phase,omega1_rad_s,omega2_rad_s,omega1_est_rad_s,omega2_est_rad_s,slip,slip_est,slip_ref,"
         "brake_torque_Nm,brake_torque_ref_Nm,brake_torque_est_Nm,brake_pwm,motor_pwm,motor_enable,theta_N,theta_est_N,"
@@ -90,7 +90,7 @@ TEST_CASE("every CSV column holds its quantity, bit-exactly") {
   }
 }
 
-TEST_CASE("a record of a backend that knows nothing is written with NaN, whatever the sign of the NaN") {
+TEST_CASE("unknown values are written as NaN, whatever the sign of the NaN") {
   rig::CycleRecord r;
   r.truth.slip = -std::numeric_limits<double>::quiet_NaN();
   CHECK(row_of(r, 0.0) == "0,idle,NaN,NaN,0,0,NaN,0,0,NaN,0,0,0,0,0,NaN,NaN,0,NaN\n");
@@ -163,7 +163,7 @@ TEST_CASE("rows that did not reach the disk are counted") {
   CHECK(sink.rows_lost() == 100);
 }
 
-TEST_CASE("a full disk is told by finish(), not by a crash") {
+TEST_CASE("finish() reports a full disk") {
   CsvSink sink("/dev/full");
   for (std::uint64_t i = 0; i < 1000; ++i) sink.consume(test::sample_record(i), 0.0);
   CHECK(sink.failed());

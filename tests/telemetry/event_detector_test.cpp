@@ -16,7 +16,7 @@ rig::CycleRecord record(std::uint64_t sequence, Phase phase, Reason reason = Rea
   return r;
 }
 
-TEST_CASE("the first record opens the stream of events") {
+TEST_CASE("the first record gives an event") {
   EventDetector detector;
   const auto event = detector.observe(record(0, Phase::accelerate, Reason::run_started));
   REQUIRE(event);
@@ -35,7 +35,7 @@ TEST_CASE("one event for each change of phase, with its reason") {
   CHECK_FALSE(detector.observe(record(3, Phase::brake)));
 }
 
-TEST_CASE("two phases of one kind in a row are two, for whatever reason the first ended") {
+TEST_CASE("two consecutive phases of one kind give two events, whatever ended the first") {
   EventDetector detector;
   (void)detector.observe(record(0, Phase::brake, Reason::run_started));
   rig::CycleRecord next = record(1, Phase::brake, Reason::all_conditions_met);

@@ -37,7 +37,7 @@ TEST_CASE("a whole message of the channel is its payload") {
   CHECK(look_at(empty, "ABS_COMMAND").payload.empty());
 }
 
-TEST_CASE("other channels are told from a longer, a shorter and a cut name") {
+TEST_CASE("longer, shorter and cut names are other channels") {
   for (const char* other : {"ABS_COMMAND_STATE", "ABS_COMMAN", "BS_COMMAND", "abs_command", "X"}) {
     CHECK(look_at(whole + std::string(other) + std::string("\0payload", 8), "ABS_COMMAND").kind == Kind::other);
   }
@@ -53,7 +53,7 @@ TEST_CASE("the first fragment of the channel is known, whatever it says about th
   CHECK(look_at(fragment(0), "ABS_COMMAND").kind == Kind::other);
 }
 
-TEST_CASE("what is cut anywhere, or is no LCM, is of no channel") {
+TEST_CASE("packets that are cut anywhere or are not LCM have no channel") {
   for (const Datagram& datagram : {whole + command, fragment(0) + command}) {
     for (std::size_t size = 0; size < datagram.size(); ++size) {
       CAPTURE(size);

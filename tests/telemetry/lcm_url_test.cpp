@@ -9,7 +9,7 @@
 namespace abs_hil::telemetry {
 namespace {
 
-TEST_CASE("a URL comes apart into provider, network and options") {
+TEST_CASE("a URL is split into provider, network and options") {
   const LcmUrl url = parse_lcm_url("udpm://239.1.2.3:7000?ttl=1&recv_buf_size=100");
   CHECK(url.provider == "udpm");
   CHECK(url.network == "239.1.2.3:7000");
@@ -18,7 +18,7 @@ TEST_CASE("a URL comes apart into provider, network and options") {
   CHECK(endpoint_of(url).port == 7000);
 }
 
-TEST_CASE("what is missing in a URL is LCM's default") {
+TEST_CASE("missing parts of a URL get LCM's defaults") {
   for (const char* text : {"udpm://", "udpm://?ttl=0", "udpm://:7667", "udpm://239.255.76.67"}) {
     INFO(text);
     const Endpoint endpoint = endpoint_of(parse_lcm_url(text));
@@ -30,7 +30,7 @@ TEST_CASE("what is missing in a URL is LCM's default") {
   CHECK(tcpq.port == 7700);
 }
 
-TEST_CASE("a URL that is none is refused by name") {
+TEST_CASE("an invalid URL is refused with its text") {
   for (const char* text : {"", "udpm", "udpm:/", "://x", "239.255.76.67:7667"}) {
     INFO(text);
     CHECK_THROWS_AS(parse_lcm_url(text), std::invalid_argument);

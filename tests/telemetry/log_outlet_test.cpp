@@ -81,7 +81,7 @@ TEST_CASE("without an epoch the times are wall clock with the spacing of the rec
   CHECK(last_us - first_us == static_cast<std::int64_t>(record_count - 1) * 1000);
 }
 
-TEST_CASE("a log on a full disk is told by finish(); what is refused meanwhile is counted") {
+TEST_CASE("finish() reports a full disk; messages that were not written are counted") {
   LogOutlet log("/dev/full", 0);
   test::CapturingOutlet other;
   MessageStream stream({}, {}, {});

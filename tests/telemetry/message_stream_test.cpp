@@ -84,7 +84,7 @@ TEST_CASE("status comes at the start, once a second of run time and at the end")
   CHECK(last.cycle_time_max_us == 8.0);
 }
 
-TEST_CASE("the experiment is told at the start and every five seconds, a gap notwithstanding") {
+TEST_CASE("the experiment is published at the start and every five seconds, also after a gap") {
   test::CapturingOutlet outlet;
   MessageStream stream({}, info(), {});
   stream.add(outlet);

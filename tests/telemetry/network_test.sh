@@ -16,7 +16,7 @@ if [ "${2:-}" != inside ]; then
     exit 77
   fi
 
-  # Without a route: a clear error with the two commands that mend it.
+  # Without a route: a clear error with the two commands that fix it.
   text=$(unshare -n "$helper" publish "$url" 1 0 /dev/null 2>&1)
   status=$?
   case $text in
@@ -25,7 +25,7 @@ if [ "${2:-}" != inside ]; then
   esac
   [ $status = 3 ] || { echo "FAILED: exit status $status without a route"; exit 1; }
 
-  # The very commands that the error names.
+  # The commands that the error names.
   exec unshare -n sh -c 'ip link set lo up multicast on; ip route add 224.0.0.0/4 dev lo; exec "$@"' -- sh "$0" "$helper" inside
 fi
 

@@ -67,7 +67,7 @@ TEST_CASE("the CSV begins with the columns of --csv, and they hold the same text
   int rows = 0;
   while (std::getline(own, own_line)) {
     REQUIRE(std::getline(made, made_line));
-    // A NaN with a sign keeps it here, as it must come out again.
+    // A NaN keeps its sign here, because the conversion back must give it again.
     for (std::size_t at; (at = made_line.find("-NaN")) != std::string::npos;) made_line.erase(at, 1);
     CHECK(made_line.starts_with(own_line + ','));
     ++rows;
@@ -75,12 +75,12 @@ TEST_CASE("the CSV begins with the columns of --csv, and they hold the same text
   CHECK(rows == 1201);
 }
 
-TEST_CASE("what is of no type of ours, or damaged, comes through as it is") {
+TEST_CASE("unknown types and damaged messages are converted without loss") {
   const abs_hil::test::TemporaryFolder scratch;
   {
     EventLogWriter log(scratch / "odd.lcmlog");
     telemetry_t m{};
-    m.motor_enable = 5;  // no truth value, but it is what was sent
+    m.motor_enable = 5;  // not a valid flag, but the sender sent it
     m.phase = 3;
     EncodeBuffer buffer;
     const auto bytes = buffer.encode(m);
@@ -92,7 +92,7 @@ TEST_CASE("what is of no type of ours, or damaged, comes through as it is") {
     const auto odd_phase = buffer.encode(m);
     log.write(
         {.number = 10, .timestamp_us = 8, .channel = "ABS_TELEMETRY", .data = {odd_phase.begin(), odd_phase.end()}});
-    m.theta_N = std::bit_cast<double>(std::uint64_t{0x7FF8'0000'0000'1234});  // a NaN with something in it
+    m.theta_N = std::bit_cast<double>(std::uint64_t{0x7FF8'0000'0000'1234});  // a NaN with a payload
     const auto odd_nan = buffer.encode(m);
     log.write({.number = 11, .timestamp_us = 9, .channel = "rig2/TELEMETRY", .data = {odd_nan.begin(), odd_nan.end()}});
     log.finish();
@@ -168,13 +168,13 @@ TEST_CASE("a damaged log is an error that names the place, wherever it is cut or
   CHECK_THROWS_AS(EventLogReader(scratch / "none.lcmlog"), RecordingError);
 }
 
-TEST_CASE("CSV that is not of a recording is refused by name") {
+TEST_CASE("CSV that is not a recording is refused with its name") {
   const abs_hil::test::TemporaryFolder scratch;
   record(scratch / "run.lcmlog", scratch / "own.csv");
   using Catch::Matchers::Contains;
   CHECK_THROWS_WITH(csv_to_log(scratch / "own.csv", scratch / "back.lcmlog"), Contains("encoder counts"));
   log_to_csv(scratch / "run.lcmlog", scratch / "made.csv");
-  CHECK_THROWS_WITH(log_to_csv(scratch / "run.lcmlog", scratch / "made.csv"), Contains("is there already"));
+  CHECK_THROWS_WITH(log_to_csv(scratch / "run.lcmlog", scratch / "made.csv"), Contains("already exists"));
   std::string text = content(scratch / "made.csv");
   const std::size_t row = text.find('\n') + 1;
   put(scratch / "bad.csv", text.substr(0, row) + "abc" + text.substr(row));

@@ -97,7 +97,7 @@ TEST_CASE("a held terminal is skipped, not waited for") {
   REQUIRE(::tcflow(pty.terminal, TCOON) == 0);
 }
 
-TEST_CASE("what is not a terminal stays untouched") {
+TEST_CASE("a file that is not a terminal stays unchanged") {
   int ends[2];
   REQUIRE(::pipe(ends) == 0);
   {

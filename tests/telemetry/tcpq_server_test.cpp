@@ -50,9 +50,9 @@ class Listening {
   std::uint16_t port_{0};
 };
 
-TEST_CASE("a tcpq server is told from one that stands still, from none, and from another program") {
+TEST_CASE("a tcpq server is distinguished from a stopped one, from none and from another program") {
   const Listening server;
-  CHECK(ask_tcpq_server(server.endpoint(), 20) == TcpqServer::silent);  // connected by the kernel, taken by nobody
+  CHECK(ask_tcpq_server(server.endpoint(), 20) == TcpqServer::silent);  // the kernel connects, but no program accepts
   CHECK(ask_tcpq_server({"127.0.0.1", 1}, 1000) == TcpqServer::absent);
   CHECK(ask_tcpq_server({"nowhere", 7700}, 1000) == TcpqServer::absent);
 
@@ -66,7 +66,7 @@ TEST_CASE("a tcpq server is told from one that stands still, from none, and from
   CHECK(answer(cut, {0x287617fa}) == TcpqServer::absent);
 }
 
-TEST_CASE("a server that stands still is refused as a network, with what to do") {
+TEST_CASE("a stopped server is refused with the fix") {
   const Listening server;
   const std::string url = "tcpq://127.0.0.1:" + std::to_string(server.endpoint().port);
   CHECK_THROWS_WITH(LcmOutlet(url), Catch::Matchers::Contains("does not answer"));

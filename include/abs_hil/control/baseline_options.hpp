@@ -6,10 +6,10 @@ namespace abs_hil::control {
 
 // The defaults are the gains that abs_tune recorded in config/tuned (docs/comparison.md); a test compares them.
 
-/// Adaptation of the equivalent control, theta_hat' = -gamma k phi s, where s is what stands for sign(e_v).
+/// Adaptation of the equivalent control, theta_hat' = -gamma k phi s, where s is the law's substitute for sign(e_v).
 struct SwitchingAdaptationOptions {
   ABS_HIL_OPTIONS(SwitchingAdaptationOptions);
-  /// 0: theta_hat stays at theta0_N.
+  /// 0: theta_hat keeps the value theta0_N.
   ABS_HIL_OPTION(double, gamma, 5.0, .unit = "kg^2 m/s^3", .meaning = "gain of theta_hat' = -gamma k phi sign(e_v)",
                  .range = rig::from_zero(1e4), .search = rig::search(1, 1000));
   ABS_HIL_OPTION(double, theta0_N, 18.0, .unit = "N", .meaning = "first estimate of theta",

@@ -5,8 +5,8 @@
 
 namespace abs_hil::control {
 
-/// What every controller may know when it is made: the options and the rig's nominal parameters. A controller that
-/// adapts to theta does not look at `rig.tyre.theta_N`. Only read while a controller is constructed.
+/// The data for the construction of a controller: the options and the rig's nominal parameters. A controller that
+/// adapts to theta must not use `rig.tyre.theta_N`. The context is only valid during construction.
 struct ControllerContext {
   const ControlOptions& options;
   const rig::RigParameters& rig;

@@ -6,20 +6,20 @@
 
 namespace abs_hil::control {
 
-/// How a law wants e_v to move during the coming period.
+/// The reference motion of e_v during the next period.
 struct WantedMotion {
   double mean_rate_m_s2{0.0};    ///< mean of e_v' over the period
-  double error_at_mid_m_s{0.0};  ///< e_v in its middle
+  double error_at_mid_m_s{0.0};  ///< e_v in the middle of the period
 };
 
-/// Equivalent control, the part that all slip laws share: by (14) the torque that makes e_v move as a law wants is
-/// Tb = (J1/r1) xi_1 with the wanted e_v' for nu, `xi_1` and `T_b` of paper_laws.hpp.
-/// The torque is held for a period, so the terms that cancel what the plant does by itself are taken in the middle of
-/// it: phi changes by a quarter within 1 ms when braking starts. The slip there is predicted with the model along the
-/// wanted motion, never by differentiating measurements, so that prediction does not amplify noise.
+/// Equivalent control, the common part of all slip laws. By (14) the torque for a reference motion of e_v is
+/// Tb = (J1/r1) xi_1, where nu is the reference e_v' (`xi_1` and `T_b` of paper_laws.hpp).
+/// The torque is held for a period, so the terms that cancel the plant's own motion are taken in the middle of the
+/// period: phi changes by a quarter within 1 ms when braking starts. The model predicts the slip there along the
+/// reference motion. No measurement is differentiated, so the prediction does not amplify noise.
 class EquivalentControl {
  public:
-  /// Throws std::invalid_argument for a control rate or v_min_m_s not > 0.
+  /// Throws std::invalid_argument if the control rate or v_min_m_s is not > 0.
   explicit EquivalentControl(const ControllerContext& context);
 
   /// @param error_m_s  e_v of `input`

@@ -10,7 +10,7 @@
 namespace abs_hil::control {
 
 /// Gains of the slip velocity error's dynamics e_v'' + ks1 e_v' + ks0 e_v = 0 and of the adaptation (17)-(18); Table 1.
-/// Q and ka1 are not given in the paper: Q = I and ka1 = 1 by default.
+/// The paper does not give Q and ka1. Their defaults are Q = I and ka1 = 1.
 struct AdaptiveOptions {
   ABS_HIL_OPTIONS(AdaptiveOptions);
   ABS_HIL_OPTION(double, gamma, 21.0, .unit = "kg^2/s^2", .meaning = "adaptation gain of (17)",
@@ -44,7 +44,7 @@ struct ForceObserverOptions {
                  .meaning = "force observer: how fast the brake model's error may change", .range = rig::positive(1e6));
 };
 
-/// Adaptive controller that steps back through the brake's lag: a set of gains of its own, and those of the third step.
+/// Adaptive controller with the brake's lag as a third backstepping step: its own set of gains, and those of this step.
 struct AdaptiveActuatorOptions {
   ABS_HIL_OPTIONS(AdaptiveActuatorOptions);
   ABS_HIL_GROUP(AdaptiveOptions, law, rig::not_searched(""), {.ka1 = 3.5});
@@ -55,7 +55,7 @@ struct AdaptiveActuatorOptions {
   ABS_HIL_GROUP(ForceObserverOptions, observer, "", {});
 };
 
-/// SlipPeakEstimator: what is believed of the tyre at first, and how fast it may change.
+/// SlipPeakEstimator: initial values of the tyre curve, and how fast they may change.
 struct SlipPeakOptions {
   ABS_HIL_OPTIONS(SlipPeakOptions);
   /// Within the controller's bounds of the slip.
@@ -77,7 +77,7 @@ struct SlipPeakOptions {
                  .meaning = "time after a jump in which only the level is learnt", .range = rig::from_zero(1));
 };
 
-/// Slip controller that seeks the peak of the tyre force.
+/// Slip controller that finds the peak of the tyre force.
 struct AdaptivePeakOptions {
   ABS_HIL_OPTIONS(AdaptivePeakOptions);
   ABS_HIL_OPTION(double, ks0, 100.0, .unit = "1/s^2", .meaning = "integral gain of the slip loop",
@@ -121,7 +121,7 @@ struct ObserverOptions {
 /// Name number `index` of the table of controllers; empty beyond the last.
 [[nodiscard]] std::string_view controller_name(std::size_t index) noexcept;
 
-/// Everything below `control.` in the configuration.
+/// The keys `control.` of the configuration.
 struct ControlOptions {
   ABS_HIL_OPTIONS(ControlOptions);
   ABS_HIL_OPTION(std::string, controller, "adaptive", .meaning = "slip controller", .allowed = controller_name);

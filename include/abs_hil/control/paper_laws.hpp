@@ -4,10 +4,10 @@
 
 #include "abs_hil/rig/parameters.hpp"
 
-/// The paper's laws (13)-(18) in its own symbols and in continuous time, one equation a line. A wrong sign or hat of
-/// the paper is mended, and the line says so; docs/theory.md gives the reasons and the units. The controllers compute
-/// with these lines, in sampled-data form (SlipErrorDynamics, ThetaEstimator); tests/control/paper_laws_test.cpp shows
-/// that this form tends to these laws as the period goes to 0.
+/// The paper's laws (13)-(18) in its own symbols and in continuous time, one equation per line. Where the paper has a
+/// wrong sign or hat, the line is correct and says so. docs/theory.md gives the reasons and the units. The controllers
+/// compute with these lines in sampled-data form (SlipErrorDynamics, ThetaEstimator).
+/// tests/control/paper_laws_test.cpp shows that this form converges to these laws as the period goes to 0.
 ///
 /// There is no branch here: freezing, projection and limits belong to the classes that use the laws. Real-time safe.
 namespace abs_hil::control::paper {
@@ -23,11 +23,11 @@ concept Scalar = std::copyable<S> && std::constructible_from<S, double> && requi
   { 1.0 - a } -> std::convertible_to<S>;
 };
 
-/// What the laws read of the rig. Both wheels turn forwards.
+/// Inputs of the laws. Both wheels turn forwards.
 template <Scalar S>
 struct Reading {
   S omega1{0.0}, omega2{0.0};  ///< wheel speeds, rad/s
-  S lambda_ref{0.0};           ///< wanted slip, in (0, 1)
+  S lambda_ref{0.0};           ///< reference slip, in (0, 1)
   S phi{0.0};                  ///< phi(lambda) of (10): rig::normalised_tyre_force
 };
 
@@ -58,15 +58,15 @@ struct Laws {
   constexpr S e_v_dot(const Reading<S>& y, S theta, S T_b) const {
     return -k(y) * theta * y.phi - delta(y) + r1 / J1 * T_b;
   }
-  // (15)  what a unit of tyre force does to e_v, 1/kg
+  // (15)  effect of a unit of tyre force on e_v', 1/kg
   constexpr S k(const Reading<S>& y) const { return r1 * r1 / J1 + (1.0 - y.lambda_ref) * r2 * r2 / J2; }
-  // (14)  what bearing friction does to e_v, with the sign in which (16) and (18) cancel it, m/s^2
+  // (14)  effect of bearing friction on e_v', with the sign in which (16) and (18) cancel it, m/s^2
   constexpr S delta(const Reading<S>& y) const {
     return -r1 / J1 * (d1 * y.omega1 + M10) + (1.0 - y.lambda_ref) * r2 / J2 * (d2 * y.omega2 + M20);
   }
 
-  // What both laws have in common: theta is theta0 in (16), theta_hat in (18)
-  // (16)  nu = -ks0 I - ks1 e_v, the e_v' that the law wants, m/s^2
+  // Common to both laws: theta is theta0 in (16), theta_hat in (18)
+  // (16)  nu = -ks0 I - ks1 e_v, the reference for e_v', m/s^2
   static constexpr S nu(const Gains<S>& g, S I, S e_v) { return -g.ks0 * I - g.ks1 * e_v; }
   // (16)  xi_1 = nu + k theta phi + delta; in (18) the same with theta_hat
   constexpr S xi_1(const Reading<S>& y, S nu, S theta) const { return nu + k(y) * theta * y.phi + delta(y); }

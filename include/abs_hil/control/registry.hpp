@@ -16,8 +16,8 @@ struct ControllerEntry {
   std::unique_ptr<SlipController> (*make)(const ControllerContext&);
 };
 
-/// The entry of a class with the constructor `Controller(const ControllerContext&)`: a line of the table, or, for a
-/// controller that lives outside this library, what its own program goes on with.
+/// Makes the table's entry for a class with the constructor `Controller(const ControllerContext&)`. Programs outside
+/// this library use it for their own controllers.
 template <class Controller>
 [[nodiscard]] constexpr ControllerEntry controller_entry(std::string_view name, std::string_view summary) noexcept {
   return {name, summary, [](const ControllerContext& context) -> std::unique_ptr<SlipController> {
@@ -25,17 +25,17 @@ template <class Controller>
           }};
 }
 
-/// All controllers, in the order in which `abs_hil list` shows them: ours, then those registered. The span is good
-/// until the next one is registered.
+/// All controllers, in the order of `abs_hil list`: those of this library, then the registered ones. The span is valid
+/// until the next registration.
 [[nodiscard]] std::span<const ControllerEntry> controllers() noexcept;
 
-/// Adds a controller that lives outside this library. Throws std::invalid_argument for an empty name or one that is
-/// taken. To be called before anything else of this library is used: not thread-safe.
+/// Adds a controller from outside this library. Throws std::invalid_argument if the name is empty or already exists.
+/// Call it before any other use of this library: it is not thread-safe.
 void register_controller(const ControllerEntry& entry);
 
-/// Makes the controller named `name`. Throws std::invalid_argument, naming the nearest and all known ones, for an
-/// unknown name, and for options that are not usable (Q not positive definite, say). Not real-time safe: called once
-/// before a run.
+/// Makes the controller named `name`. Throws std::invalid_argument for an unknown name, with the nearest and all known
+/// names, and for invalid options (such as a Q that is not positive definite). Not real-time safe: call it before a
+/// run.
 [[nodiscard]] std::unique_ptr<SlipController> make_controller(std::string_view name, const ControllerContext& context);
 
 }  // namespace abs_hil::control

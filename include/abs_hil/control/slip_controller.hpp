@@ -4,33 +4,33 @@
 
 namespace abs_hil::control {
 
-/// What a slip controller sees in one cycle. SI units.
+/// Inputs of a slip controller in one cycle. SI units.
 struct SlipInput {
   double dt_s{0.0};           ///< time since the previous step, > 0; ignored by `reset`
   rig::WheelSpeeds speeds{};  ///< estimated wheel speeds
   double slip{0.0};           ///< estimated slip (5)
-  double slip_ref{0.0};       ///< wanted slip, in (0, 1)
+  double slip_ref{0.0};       ///< reference slip, in (0, 1)
   /// Mean over the past interval of the brake torque estimated to act (the command itself for an ideal actuator), N m.
   double mean_brake_torque_Nm{0.0};
   double brake_torque_Nm{0.0};      ///< brake torque estimated to act now, N m
   double max_brake_torque_Nm{0.0};  ///< largest torque the actuator can give, > 0, may be infinite; the least is 0
   double alpha1_rad_s2{0.0};        ///< estimated acceleration of the upper wheel
   double alpha2_rad_s2{0.0};        ///< estimated acceleration of the lower wheel
-  /// Angles turned over the past interval, by the encoders (by the speeds, where those are ideal), rad; NaN if unknown.
+  /// Angles turned over the past interval, from the encoders (from the speeds with ideal sensors), rad; NaN if unknown.
   double upper_travel_rad{rig::unknown};
   double lower_travel_rad{rig::unknown};
 };
 
-/// What a slip controller wants. The torque is the static one, b(u) of (7), asked of the actuator: behind the lag (6)
-/// it acts later. It may lie outside what the actuator can give: it is limited afterwards.
+/// Outputs of a slip controller. The torque is the static torque b(u) of (7); it acts after the lag (6). It may be
+/// outside the actuator's range: it is limited afterwards.
 struct SlipOutput {
   double brake_torque_Nm{0.0};
   double slip_velocity_error_m_s{0.0};  ///< e_v of (13)
   double theta_est_N{0.0};              ///< estimated peak tyre force, NaN for controllers that estimate none
-  double slip_ref{rig::unknown};        ///< slip that it follows, if it chooses it itself; NaN: that of the input
+  double slip_ref{rig::unknown};        ///< the controller's own slip reference; NaN if it follows that of the input
 };
 
-/// A slip controller: a pure function of its inputs and its own state, which knows nothing of boards, clocks and files.
+/// A slip controller: a pure function of its inputs and its own state. It does not use boards, clocks or files.
 /// `reset` and `step` run in the real-time thread: no allocation, lock, system call, exception or log call.
 class SlipController {
  public:
@@ -39,13 +39,13 @@ class SlipController {
   SlipController& operator=(const SlipController&) = delete;
   virtual ~SlipController() = default;
 
-  /// Start of braking: forget the past and take the state from this measurement.
+  /// Starts braking: discards the past and takes the state from this measurement.
   virtual void reset(const SlipInput& input) noexcept = 0;
-  /// One control period. Called for the first time in the same cycle as `reset`, with the same input and dt_s = 0.
+  /// Computes one control period. The first call is in the same cycle as `reset`, with the same input and dt_s = 0.
   [[nodiscard]] virtual SlipOutput step(const SlipInput& input) noexcept = 0;
-  /// Goes on from where `before` stands, a controller of the same class with other gains: integrals and estimates are
-  /// kept (an estimate within its new bounds), so that gains can be changed while it brakes. False, and nothing
-  /// changed, for another class; the default for laws that cannot do so.
+  /// Takes over the state of `before`, a controller of the same class with other gains, so that gains can change while
+  /// braking. Integrals and estimates are kept, and estimates are limited to their new bounds. Returns false and
+  /// changes nothing for another class. By default a law cannot take over and returns false.
   [[nodiscard]] virtual bool take_over(const SlipController& before) noexcept;
 };
 

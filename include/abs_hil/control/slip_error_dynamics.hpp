@@ -22,7 +22,8 @@ namespace abs_hil::control {
   return paper::laws(w).delta({.omega1 = speeds.omega1_rad_s, .omega2 = speeds.omega2_rad_s, .lambda_ref = slip_ref});
 }
 
-/// k(slip_ref) of (15): what a unit of tyre force does to the slip velocity error, 1/kg. Real-time safe.
+/// k(slip_ref) of (15): the effect of a unit of tyre force on the rate of the slip velocity error, 1/kg. Real-time
+/// safe.
 [[nodiscard]] constexpr double slip_velocity_gain(const rig::WheelParameters& w, double slip_ref) noexcept {
   return paper::laws(w).k({.lambda_ref = slip_ref});
 }
@@ -31,14 +32,14 @@ namespace abs_hil::control {
 [[nodiscard]] Eigen::Matrix2d error_dynamics_matrix(double ks0, double ks1);
 
 /// The feedback-linearising law of (16) and (18), `nominal_T_b` and `adaptive_T_b` of paper_laws.hpp, in sampled-data
-/// form: the torque is held for a whole period h, and the paper's law is in continuous time.
-/// - nu, the wanted e_v', becomes the mean of e_v' over the period along the wanted trajectory: row 2 of
-///   (exp(A h) - 1)/h times [I; e_v]. This row is -[ks0 ks1] for h -> 0. So e_v meets the trajectory at every tick
-///   whatever the rate.
-/// - The other terms, which cancel what the plant does by itself, are EquivalentControl's.
+/// form: the torque is held for a whole period h, but the paper's law is in continuous time.
+/// - nu, the reference e_v', becomes the mean of e_v' over the period along the reference trajectory: row 2 of
+///   (exp(A h) - 1)/h times [I; e_v]. This row is -[ks0 ks1] for h -> 0. So e_v meets the trajectory at every tick for
+///   any rate.
+/// - EquivalentControl computes the other terms, which cancel the plant's own motion.
 class SlipErrorDynamics {
  public:
-  /// Throws std::invalid_argument for ks0, ks1, the control rate or v_min_m_s not > 0.
+  /// Throws std::invalid_argument if ks0, ks1, the control rate or v_min_m_s is not > 0.
   explicit SlipErrorDynamics(const ControllerContext& context);
 
   /// Tb of (16) for theta0, of (17)-(18) for theta_hat.

@@ -5,13 +5,13 @@
 
 namespace abs_hil::control {
 
-/// What acts on the wheels, as a controller believes.
+/// The controller's estimate of the loads on the wheels.
 struct WheelLoads {
   double tyre_force_N{0.0};
   double brake_torque_Nm{0.0};
 };
 
-/// How the wheels and their slip change under given loads, by (1), (2), (5) and (13).
+/// Rates of the wheels and their slip under given loads, by (1), (2), (5) and (13).
 struct WheelMotion {
   double omega1_rate_rad_s2{0.0};
   double omega2_rate_rad_s2{0.0};

@@ -12,7 +12,7 @@
 
 namespace abs_hil::rig {
 
-/// What only a simulator knows, for logs and metrics alone: nothing that controls may read it. NaN on hardware.
+/// True values that only a simulator knows, for logs and metrics. Controllers must not read them. NaN on hardware.
 struct PlantTruth {
   WheelSpeeds speeds{unknown, unknown};
   double slip{unknown};
@@ -20,13 +20,13 @@ struct PlantTruth {
   double theta_N{unknown};          ///< peak tyre force theta of (10)
 };
 
-/// What the estimators and the controller made of a measurement. NaN where the phase does not compute it.
+/// Results of the estimators and the controller for one measurement. NaN if the phase does not compute them.
 struct ControlState {
   WheelSpeeds speeds_est{};
   double slip_est{0.0};
   double slip_ref{0.0};
   double slip_velocity_error_m_s{unknown};  ///< e_v of (13), from the estimates
-  double brake_torque_ref_Nm{0.0};          ///< torque asked for, after limiting
+  double brake_torque_ref_Nm{0.0};          ///< torque reference, after limiting
   double brake_torque_est_Nm{0.0};          ///< torque estimated to act now, through (6)-(7)
   double theta_est_N{unknown};
 };
@@ -38,30 +38,30 @@ struct CycleTiming {
   std::int64_t control_ns{0};
   std::int64_t write_ns{0};
   std::int64_t cycle_ns{0};          ///< wake-up to end of write
-  std::int64_t record_ns{0};         ///< recording of the cycle before: this one's is not over when it is written down
+  std::int64_t record_ns{0};         ///< recording of the previous cycle, because that of this cycle has not ended yet
   std::uint32_t periods_skipped{0};  ///< ticks missed before this one
   OverrunCause overrun_cause{OverrunCause::none};  ///< why they were missed
 };
 
-/// Everything about one cycle: measurement of tick n and the command computed from it. The real-time thread pushes it
-/// whole into the ring; everything else (CSV, LCM, metrics) is derived from it. Trivially copyable.
+/// The complete record of one cycle: the measurement of tick n and the command computed from it. The real-time thread
+/// pushes it into the ring. CSV, LCM and metrics are derived from it. Trivially copyable.
 struct CycleRecord {
   std::uint64_t sequence{0};  ///< counts cycles from 0; a gap is a dropped record
   std::int64_t stamp_ns{0};   ///< monotonic clock at the wake-up
   double time_s{0.0};         ///< since the start of the run
   Phase phase{Phase::idle};
-  std::uint16_t phase_index{0};  ///< counts the phases of the experiment from 0; the last again in an early end
-  Reason reason{Reason::none};   ///< why this phase was entered or the command refused; none if nothing happened
-  double reason_value{0.0};      ///< the value that led to it, in the SI unit of its quantity
+  std::uint16_t phase_index{0};  ///< counts the phases of the experiment from 0; an early end keeps the last number
+  Reason reason{Reason::none};   ///< why the phase began or the command was refused; none if nothing happened
+  double reason_value{0.0};      ///< the value that caused it, in the SI unit of its quantity
   Measurement measurement{};
   ControlState control{};
-  Command command{};  ///< as it passed the gate
+  Command command{};  ///< the command after the gate
   PlantTruth truth{};
   CycleTiming timing{};
 };
 static_assert(std::is_trivially_copyable_v<CycleRecord>);
 
-/// Speeds for metrics: the truth where the backend knows it, else the estimates.
+/// Speeds for metrics: the true speeds if the backend knows them, otherwise the estimates.
 [[nodiscard]] inline WheelSpeeds best_speeds(const CycleRecord& record) noexcept {
   return std::isnan(record.truth.speeds.omega2_rad_s) ? record.control.speeds_est : record.truth.speeds;
 }

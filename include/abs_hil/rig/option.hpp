@@ -11,7 +11,7 @@
 
 #include "abs_hil/rig/range.hpp"
 
-// Options of the configuration. Each one is a single row, which is the member of its room's struct as well:
+// Options of the configuration. Each option is one row, which also declares the member of its room's struct:
 //
 //   struct RelayOptions {
 //     ABS_HIL_OPTIONS(RelayOptions);
@@ -19,13 +19,13 @@
 //     rig::from_zero(0.99));
 //   };
 //
-// The struct stays an aggregate, and reading an option is reading a member. Everything else is made from the rows: the
-// configuration's keys with their lists, files and schemas, checks of ranges, what may change during a run, and what a
-// search for gains may set.
+// The struct stays an aggregate, and code reads an option as a member. The rows give everything else: the
+// configuration's keys with their lists, files and schemas, the checks of ranges, the options that may change during a
+// run, and those that a search for gains may set.
 
 namespace abs_hil::rig {
 
-/// The names that a text may be; none: any text.
+/// The valid values of a text; none: any text is valid.
 class AllowedNames {
  public:
   /// Name number `index`; empty beyond the last.
@@ -36,7 +36,7 @@ class AllowedNames {
     std::size_t index = 0;
     for (const std::string_view name : names) names_[index++] = name;
   }
-  /// For names that another table holds, or that only the running program knows.
+  /// For names from another table, or names that only the running program knows.
   constexpr AllowedNames(NameAt name_at) noexcept : name_at_{name_at} {}
 
   [[nodiscard]] constexpr std::string_view at(std::size_t index) const noexcept {
@@ -45,7 +45,7 @@ class AllowedNames {
   }
   [[nodiscard]] constexpr bool empty() const noexcept { return at(0).empty(); }
   [[nodiscard]] std::vector<std::string_view> list() const;
-  /// True if the name is one of them, or any text will do.
+  /// True if the name is one of them, or if any text is valid.
   [[nodiscard]] bool contains(std::string_view name) const noexcept;
 
  private:
@@ -53,30 +53,30 @@ class AllowedNames {
   NameAt name_at_{nullptr};
 };
 
-/// What is to be known of an option beside its type, its name and its default.
+/// The facts of an option beside its type, its name and its default. Fields of scripts use it too.
 struct OptionFacts {
   std::string_view key{};      ///< its name in the configuration; empty: that of the member
   std::string_view unit{};     ///< empty for pure numbers, flags and texts
-  std::string_view meaning{};  ///< in a line
+  std::string_view meaning{};  ///< one line
   Range range{};               ///< of numbers
   AllowedNames allowed{};      ///< of texts
   SearchRange search{};        ///< where abs_tune looks for a gain; nowhere by default
-  bool start_value{false};     ///< where slip control begins: without effect once it has
+  bool start_value{false};     ///< initial value of slip control: no effect after slip control has begun
 };
 
-/// One row: the member of `Struct` that holds the option, and what is to be known of it.
+/// One row: the member of `Struct` that holds the option, and its facts.
 template <class Struct, class Value>
 struct OptionRow {
   Value Struct::*member;
   OptionFacts facts;
 };
 
-/// One member of `Struct` that holds options of its own.
+/// One member of `Struct` that is itself a struct of options.
 template <class Struct, class Group>
 struct GroupRow {
   Group Struct::*member;
-  std::string_view prefix;  ///< of its options' names: "observer."; empty: they stand beside those of `Struct`
-  bool searched{true};      ///< false: the ranges for a search, which the rows give, do not count here
+  std::string_view prefix;  ///< of its options' names: "observer."; empty: the names have no prefix within `Struct`
+  bool searched{true};      ///< false: the search ranges of the rows do not apply here
 };
 
 template <class Row>
@@ -84,7 +84,7 @@ inline constexpr bool is_group_row = false;
 template <class Struct, class Group>
 inline constexpr bool is_group_row<GroupRow<Struct, Group>> = true;
 
-/// How a group takes part: its prefix, and whether a search may set its options.
+/// Use of a group: its prefix, and whether a search may set its options.
 struct GroupUse {
   std::string_view prefix;
   bool searched{true};
@@ -104,18 +104,18 @@ template <class Struct, class Group>
   return {member, use.prefix, use.searched};
 }
 
-/// Rows are told apart by the line that they stand in, counted from ABS_HIL_OPTIONS.
+/// The line of a row, counted from ABS_HIL_OPTIONS, identifies it.
 template <int line>
 using RowLine = std::integral_constant<int, line>;
 inline constexpr int most_row_lines = 128;
 
 // NOLINTBEGIN(cppcoreguidelines-macro-usage, bugprone-macro-parentheses): they declare members.
-/// Before the rows of a struct, whose own name is `type`.
+/// Stands before the rows of a struct. `type` is the struct's name.
 #define ABS_HIL_OPTIONS(type) \
   using OptionOwner = type;   \
   static constexpr int option_line = __LINE__
 
-/// One option: type, member, default; then what OptionFacts holds, as in `.unit = "s", .range = rig::positive(60)`.
+/// One option: type, member, default, then members of OptionFacts, as in `.unit = "s", .range = rig::positive(60)`.
 /// The types are double, std::int32_t, std::int64_t, bool and std::string.
 #define ABS_HIL_OPTION(type, member, standard, ...)                                                 \
   static constexpr auto option_row(::abs_hil::rig::RowLine<__LINE__ - option_line>) noexcept {      \
@@ -124,8 +124,8 @@ inline constexpr int most_row_lines = 128;
   static_assert(__LINE__ - option_line < ::abs_hil::rig::most_row_lines, "too many lines of rows"); \
   type member = standard
 
-/// A member with options of its own: type, member, prefix of its keys (or `rig::not_searched(prefix)`), and the braces
-/// that it is initialised with.
+/// A member that is a struct of options: type, member, prefix of its keys (or `rig::not_searched(prefix)`), and its
+/// initialiser in braces.
 #define ABS_HIL_GROUP(type, member, use, ...)                                                       \
   static constexpr auto option_row(::abs_hil::rig::RowLine<__LINE__ - option_line>) noexcept {      \
     return ::abs_hil::rig::make_group_row(&OptionOwner::member, use);                               \
@@ -134,7 +134,7 @@ inline constexpr int most_row_lines = 128;
   type member __VA_ARGS__
 // NOLINTEND(cppcoreguidelines-macro-usage, bugprone-macro-parentheses)
 
-/// Calls `visit` with each row of `Options`, in their order.
+/// Calls `visit` with each row of `Options`, in order.
 template <class Options, class Visit>
 constexpr void for_each_row(const Visit& visit) {
   const auto visit_line = [&visit](auto line) {
@@ -145,8 +145,8 @@ constexpr void for_each_row(const Visit& visit) {
   }(std::make_integer_sequence<int, most_row_lines>{});
 }
 
-/// Calls `visit(name, facts, value)` for each option, those of groups included, in their order. Not real-time safe.
-/// @param prefix before every name
+/// Calls `visit(name, facts, value)` for each option, including those of groups, in order. Not real-time safe.
+/// @param prefix is put before every name
 template <class Options, class Visit>
 void for_each_option(Options& options, const std::string& prefix, const Visit& visit, bool searched = true) {
   for_each_row<std::remove_const_t<Options>>([&](const auto& row) {

@@ -8,18 +8,18 @@
 
 namespace abs_hil::rig {
 
-/// What an option takes, for an error: "a number in (0, 1] N m", "one of a, b".
+/// The valid values of an option, for errors: "a number in (0, 1]", "one of a, b".
 [[nodiscard]] std::string valid_number_text(const OptionFacts& facts, bool whole);
 [[nodiscard]] std::string valid_name_text(const OptionFacts& facts);
 /// "NAME = VALUE is not valid; give VALID UNIT (MEANING)".
 [[nodiscard]] std::string refusal(std::string_view name, std::string_view value, std::string_view valid,
                                   const OptionFacts& facts);
 
-/// Throws std::invalid_argument, naming option, value and range, unless the value is one that its row allows.
+/// Throws std::invalid_argument, naming option, value and range, unless the row allows the value.
 void require_valid(std::string_view name, const OptionFacts& facts, double value);
 void require_valid(std::string_view name, const OptionFacts& facts, std::string_view text);
 
-/// Throws std::invalid_argument unless every option, those of groups included, is one that its row allows.
+/// Throws std::invalid_argument unless the rows allow the values of all options, including those of groups.
 /// @param prefix of the keys, as in "control.adaptive_peak."
 template <class Options>
 void require_valid(const Options& options, const std::string& prefix) {
@@ -33,7 +33,7 @@ void require_valid(const Options& options, const std::string& prefix) {
   });
 }
 
-/// The same for one of the options of `Options` itself.
+/// The same for one option of `Options`, not of a group.
 template <class Options>
 void require_valid(const Options& options, double Options::*member, const std::string& prefix) {
   for_each_row<Options>([&](const auto& row) {

@@ -60,7 +60,7 @@ struct DriveMotorParameters {
   ABS_HIL_OPTIONS(DriveMotorParameters);
   ABS_HIL_OPTION(double, stall_torque_Nm, 2.1122, .unit = "N m",
                  .meaning = "drive motor's torque at standstill and full duty", .range = positive(100));
-  /// There the back-EMF cancels the supply.
+  /// Speed at which the back-EMF cancels the supply.
   ABS_HIL_OPTION(double, no_load_speed_rad_s, 220.0, .unit = "rad/s", .meaning = "drive motor's no-load speed",
                  .range = positive(2000));
 };

@@ -12,29 +12,29 @@
 
 namespace abs_hil::rig {
 
-/// A cycle as a file or a message holds it: its record, and what stands beside it. `Record` is CycleRecord or, to read
-/// only, const CycleRecord.
+/// A cycle for a file or a message: its record and the values beside it. `Record` is CycleRecord, or const CycleRecord
+/// for reading only.
 template <class Record>
 struct CycleParts {
   template <class T>
   using Part = std::conditional_t<std::is_const_v<Record>, const T, T>;
   Record& record;
-  Part<double>& distance_m;      ///< the car's way since the start of braking, m
+  Part<double>& distance_m;      ///< distance of the car since the start of braking, m
   Part<std::int64_t>& sequence;  ///< of the message on its channel
 };
 
-/// Where a quantity is written. telemetry_t is published and does not change: what it lacks can be a CSV column only.
+/// The outputs of a quantity. telemetry_t is published and does not change, so a new quantity can be a CSV column only.
 enum class Outlet : std::uint8_t { csv, lcm, both };
 
-/// What a quantity tells of. A timing is of one run alone: no replay finds it again.
+/// The topic of a quantity. A timing belongs to one run: a replay cannot reproduce it.
 enum class Topic : std::uint8_t { sequence, motion, board, timing };
 
 /// A row of the table. `Access` takes CycleParts and returns a reference to the value, to read and to write it.
 template <class Access>
 struct Quantity {
   std::string_view name;   ///< of the CSV column and of the field of telemetry_t, with its unit
-  std::string_view unit;   ///< empty where it has none
-  std::string_view since;  ///< version of the program that wrote it first
+  std::string_view unit;   ///< empty if it has none
+  std::string_view since;  ///< first version of the program that writes it
   Topic topic;
   Outlet outlet;
   Access at;
@@ -48,11 +48,11 @@ template <class Access>
 Quantity(std::string_view, std::string_view, std::string_view, Topic, Outlet, Access, std::string_view)
     -> Quantity<Access>;
 
-/// Columns of this version are in every run's CSV.
+/// Every run's CSV has the columns of this version.
 inline constexpr std::string_view first_version = "0.1";
 
 // clang-format off
-/// Every quantity of a cycle, in the order of the CSV columns and of the fields of telemetry_t. New rows go to the end.
+/// Every quantity of a cycle, in the order of the CSV columns and of the fields of telemetry_t. Append new rows.
 inline constexpr std::tuple quantities{
     Quantity{"stamp_ns", "ns", "0.1", Topic::sequence, Outlet::lcm, [](auto& c) -> auto& { return c.record.stamp_ns; },
              "monotonic clock at the wake-up; virtual time with --fast"},
@@ -175,7 +175,7 @@ constexpr void for_each_quantity(Use&& use) {
 template <class Row>
 using ValueOf = std::remove_cvref_t<decltype(std::declval<const Row&>().at(std::declval<CycleParts<CycleRecord>&>()))>;
 
-/// Topic of the quantity of that name; `sequence` where there is none.
+/// Topic of the quantity of that name; `sequence` if there is none.
 [[nodiscard]] constexpr Topic topic_of(std::string_view name) noexcept {
   Topic topic = Topic::sequence;
   for_each_quantity([&](const auto& row) {

@@ -4,7 +4,7 @@
 
 namespace abs_hil::rig {
 
-/// Interval of admissible numbers, ends included unless open.
+/// Interval of valid numbers. An end belongs to it unless it is open.
 struct Range {
   double least{0.0};
   double most{0.0};
@@ -14,7 +14,7 @@ struct Range {
   [[nodiscard]] constexpr bool contains(double value) const noexcept {
     return (least_open ? value > least : value >= least) && (most_open ? value < most : value <= most);
   }
-  [[nodiscard]] std::string text() const;  ///< "(0, 1]", say
+  [[nodiscard]] std::string text() const;  ///< such as "(0, 1]"
 };
 
 [[nodiscard]] constexpr Range between(double least, double most) noexcept { return {least, most, false, false}; }
@@ -24,11 +24,11 @@ struct Range {
 [[nodiscard]] constexpr Range from_zero_below(double most) noexcept { return {0.0, most, false, true}; }
 [[nodiscard]] constexpr Range negative(double least) noexcept { return {least, 0.0, false, true}; }
 
-/// Where a search for good values looks. Nowhere, unless least < most.
+/// Interval in which a search for good values looks. There is no search unless least < most.
 struct SearchRange {
   double least{0.0};
   double most{0.0};
-  bool logarithmic{true};  ///< by its logarithm: for gains, whose order of magnitude is not known
+  bool logarithmic{true};  ///< search over the logarithm: for gains of unknown order of magnitude
   [[nodiscard]] constexpr bool given() const noexcept { return least < most; }
 };
 

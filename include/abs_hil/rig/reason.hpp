@@ -8,26 +8,27 @@
 
 namespace abs_hil::rig {
 
-/// What a reason does to a run.
+/// Effect of a reason on a run.
 enum class ReasonKind : std::uint8_t {
   none,          ///< nothing happened
-  sequence,      ///< the experiment goes on to its next phase or ends as planned
-  stop_request,  ///< somebody asked for the end: a signal or a stop command
-  adjustment,    ///< a command changed a run that goes on
+  sequence,      ///< the experiment enters its next phase or ends as planned
+  stop_request,  ///< a signal or a stop command ends the run
+  adjustment,    ///< a command changed the run; the run goes on
   refusal,       ///< a command was refused; the run goes on
-  fault,         ///< a fault or limit ended the run; only a new run goes on
+  fault,         ///< a fault or limit ended the run; only a new run can follow
 };
 
-/// Whether a replay finds the reason again from the recorded measurements.
+/// Whether a replay reproduces the reason from the recorded measurements.
 enum class FoundAgain : std::uint8_t {
-  no,             ///< it came from outside: a person, a board, the bus, the operating system
-  yes,            ///< sequence, gate or logic find it; recorded adjustments are put in again
-  wheel_checks,   ///< the gate's checks of the wheels find it, if the recorded commands are those that acted
-  jumped_counts,  ///< as wheel_checks, unless the gate refused the counts: the recording does not hold those
+  no,             ///< it comes from outside: a person, a board, the bus, the operating system
+  yes,            ///< sequence, gate or logic find it; the replay repeats recorded adjustments
+  wheel_checks,   ///< the gate's checks of the wheels find it, if the recorded commands are those that acted on the rig
+  jumped_counts,  ///< as wheel_checks, unless the gate refused the counts: the recording does not contain refused
+                  ///< counts
 };
 
 // clang-format off
-/// Every reason: name, number, kind, found again, text. Logs hold the numbers: rows are added, never renumbered.
+/// Every reason: name, number, kind, found again, text. Logs contain the numbers: add rows, but never renumber them.
 #define ABS_HIL_REASONS(ROW)                                                                                          \
   ROW(none, 0, none, yes, "none")                                                                                     \
   ROW(run_started, 1, sequence, yes, "run started")                                                                   \
@@ -122,8 +123,8 @@ enum class FoundAgain : std::uint8_t {
   ROW(run_distance_limit, 201, fault, yes, "car went further than the experiment's limit")
 // clang-format on
 
-/// Why a phase changed, a command was refused or a run ended. Plain numbers, so that the real-time thread can hand them
-/// on without a string.
+/// Why a phase changed, a command was refused or a run ended. These are plain numbers, so that the real-time thread
+/// needs no strings.
 enum class Reason : std::uint16_t {
 #define ABS_HIL_REASON_NUMBER(name, number, kind, found_again, text) name = number,
   ABS_HIL_REASONS(ABS_HIL_REASON_NUMBER)
@@ -150,7 +151,7 @@ inline constexpr std::array reasons{
 
 namespace detail {
 
-/// Numbers from here on are faults, those that a later version adds included.
+/// All numbers from here on are faults, also those of later versions.
 inline constexpr std::uint16_t first_fault = 64;
 static_assert(std::ranges::all_of(reasons, [](const ReasonRow& row) {
   return (row.kind == ReasonKind::fault) == (static_cast<std::uint16_t>(row.reason) >= first_fault);
@@ -164,7 +165,7 @@ inline constexpr ReasonRow unknown_event{"unknown", Reason::none, ReasonKind::no
 inline constexpr ReasonRow unknown_fault{"unknown", Reason::none, ReasonKind::fault, FoundAgain::no, "unknown reason"};
 
 inline constexpr std::size_t numbers = static_cast<std::size_t>(reasons.back().reason) + 1;
-/// Place of each number's row in `reasons`, reasons.size() for a number without one.
+/// Index of each number's row in `reasons`; reasons.size() for a number without a row.
 inline constexpr auto places = [] {
   static_assert(reasons.size() < 256);
   std::array<std::uint8_t, numbers> place{};
@@ -177,7 +178,7 @@ inline constexpr auto places = [] {
 
 }  // namespace detail
 
-/// The reason's row; for a number that this version does not know one that says so. Real-time safe.
+/// The reason's row. For a number that this version does not know, a row that says so. Real-time safe.
 [[nodiscard]] constexpr const ReasonRow& row_of(Reason reason) noexcept {
   const auto number = static_cast<std::size_t>(reason);
   if (number < detail::numbers && detail::places[number] < reasons.size()) return reasons[detail::places[number]];
@@ -187,10 +188,10 @@ inline constexpr auto places = [] {
 /// In words, for events, logs and summaries.
 [[nodiscard]] constexpr std::string_view description(Reason reason) noexcept { return row_of(reason).text; }
 
-/// True for reasons that latch: the run is over and only a new one goes on.
+/// True for reasons that latch: the run has ended, and only a new run can follow.
 [[nodiscard]] constexpr bool is_fault(Reason reason) noexcept { return row_of(reason).kind == ReasonKind::fault; }
 
-/// True for changes that a command made to a run that goes on.
+/// True for changes by a command after which the run goes on.
 [[nodiscard]] constexpr bool is_adjustment(Reason reason) noexcept {
   return row_of(reason).kind == ReasonKind::adjustment;
 }
