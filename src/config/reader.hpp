@@ -93,6 +93,8 @@ class TableReader {
 
 /// [series] and [vary].
 [[nodiscard]] SeriesScript read_series(const Source& source, const TableReader& root);
+/// False for the keys that say who runs a script, and on what.
+[[nodiscard]] bool script_may_set(std::string_view key) noexcept;
 /// [settings].
 [[nodiscard]] std::vector<Setting> read_settings(const Source& source, const TableReader& root);
 
