@@ -1,4 +1,4 @@
-// What `abs_hil compare` costs: 1,000 perturbed braking runs, 500 of each of two controllers, on all processors.
+// Cost of `abs_hil compare`: 1,000 perturbed braking runs, 500 of each of two controllers, on all processors.
 
 #include <benchmark/benchmark.h>
 

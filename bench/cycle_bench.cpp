@@ -1,4 +1,4 @@
-// What the parts of one cycle cost, each on the inputs that it saw in a braking run: plant tick, speed observer, every
+// Cost of the parts of one cycle, each with its inputs from a braking run: plant tick, speed observer, every
 // controller's step, gate, ring.
 
 #include <benchmark/benchmark.h>
@@ -14,13 +14,13 @@ namespace {
 using namespace abs_hil;
 using experiment::test::braking;
 
-/// The braking phase of a run of the adaptive controller.
+/// The braking phase of a run with the adaptive controller.
 const std::vector<rig::CycleRecord>& braking_records() {
   static const auto records = experiment::test::run(braking("adaptive")).in_phase(rig::Phase::brake);
   return records;
 }
 
-/// Calls `one(record)` for each record in turn, round and round.
+/// Calls `one(record)` for the records in turn, repeatedly.
 template <class One>
 void for_each_record(benchmark::State& state, const One& one) {
   const auto& records = braking_records();

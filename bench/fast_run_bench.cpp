@@ -1,4 +1,4 @@
-// A whole simulated run in virtual time, by the same code as the program: what it costs beyond start-up.
+// Cost of a whole simulated run in virtual time, by the program's own code, without start-up.
 
 #include <benchmark/benchmark.h>
 

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 
-# (what it is, functions, budget in instructions a cycle)
+# (description, functions, budget in instructions per cycle)
 BUDGETS = [
     ('observers, adaptive controller, gate',
      ['abs_hil::control::TrackingObserver::update*', 'abs_hil::control::AdaptiveController::step*',
@@ -19,14 +19,14 @@ BUDGETS = [
     # 1,500 until the sequence took conditions from experiment files and controllers could be adjusted live (some 40).
     ('the same with sequence and actuator: all of "control"', ['counted_control'], 1550),
     ('plausibility of the measurement', ['counted_watch'], 300),
-    ("sign of life, look for the guardian's, flight recorder", ['counted_watchers'], 400),
+    ("heartbeat, check of the guardian's, flight recorder", ['counted_watchers'], 400),
     ('ring push of one record', ['counted_ring_push'], 150),
     ('five histograms', ['counted_statistics'], 200),
 ]
 
 
 def count(program, functions):
-    """Instructions of all calls of the functions, what they call included, and the cycles of the run."""
+    """Instructions of all calls of the functions, including their callees, and the number of cycles of the run."""
     with tempfile.TemporaryDirectory() as folder:
         out = pathlib.Path(folder) / 'callgrind.out'
         toggles = [f'--toggle-collect={function}' for function in functions]

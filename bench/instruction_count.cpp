@@ -1,4 +1,4 @@
-// What callgrind counts the instructions of: one function for each thing that has a budget (instruction_budget.py).
+// Functions whose instructions callgrind counts: one for each budget (instruction_budget.py).
 
 #include <cstdio>
 #include <cstdlib>
@@ -22,16 +22,16 @@ extern "C" {
   logic.commanded(record.command);
 }
 
-/// The gate's look at the measurement.
+/// The gate's check of the measurement.
 [[gnu::noinline]] void counted_watch(runtime::CommandGate& gate, const rig::Measurement& measurement) {
-  gate.watch(measurement, measurement.time_ns);
+  gate.check_measurement(measurement, measurement.time_ns);
 }
 
 [[gnu::noinline]] bool counted_ring_push(runtime::RecordRing& ring, const rig::CycleRecord& record) {
   return ring.push(record);
 }
 
-/// Sign of life, a look for the guardian's, and the flight recorder.
+/// Heartbeat, check of the guardian's heartbeat, and flight recorder.
 [[gnu::noinline]] bool counted_watchers(runtime::Heartbeat& watch, const rig::CycleRecord& record) {
   watch.beat();
   const bool lost = watch.guardian_lost();
@@ -45,7 +45,7 @@ extern "C" {
 
 }  // extern "C"
 
-/// Brakes from 170 rad/s under slip control; prints in how many cycles.
+/// Brakes from 170 rad/s under slip control and prints the number of cycles.
 int main() {
   const experiment::test::Setup setup = experiment::test::braking("adaptive");
   driver::SimDriver driver(setup.plant, {.seed = 1, .start_speed_rad_s = setup.experiment.start_speed_rad_s});

@@ -1,6 +1,6 @@
-// What integrating the plant costs: ours beside a plain RK4 loop and Boost.odeint on the same equations, one braking
-// from 170 rad/s under a constant duty, 2 s in ticks of 1 ms. `error_rad_s`: largest difference of the upper wheel's
-// speed, at any tick, from RK4 at 1 us; a comparison of speeds at unequal errors says little.
+// Cost of integrating the plant, compared with a plain RK4 loop and Boost.odeint on the same equations: one braking
+// from 170 rad/s under a constant duty, 2 s in ticks of 1 ms. `error_rad_s` is the largest difference of the upper
+// wheel's speed, at any tick, from RK4 at 1 us; compare costs only at similar errors.
 
 #include <benchmark/benchmark.h>
 
@@ -26,7 +26,7 @@ constexpr double start_rad_s = 170.0;
 
 using State = std::array<double, 3>;  ///< omega1, omega2 in rad/s, brake torque in N m
 
-/// (1)-(7) with both wheels turning forwards, written out plainly: nothing of ours in it.
+/// (1)-(7) with both wheels turning forwards, written without code of abs_hil.
 struct Equations {
   void operator()(const State& x, State& dx, double /*t*/) const {
     constexpr double r1 = 0.0995, r2 = 0.0990, J1 = 7.54e-3, J2 = 25.60e-3, d1 = 118.74e-6, d2 = 214.68e-6;
@@ -52,7 +52,7 @@ void rk4_step(State& x, double h) {
   for (std::size_t i = 0; i < 3; ++i) x[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
 }
 
-/// omega1 at every tick of a braking that `advance(state)` carries on by a tick.
+/// omega1 at every tick of a braking; `advance(state)` integrates one tick.
 template <class Advance>
 std::vector<double> brake(const Advance& advance) {
   State x{start_rad_s, start_rad_s, 0.0};

@@ -1,7 +1,7 @@
-// What adaptive-peak loses against the best constant slip, found by brute force: the whole chain in virtual time, real
-// actuator, encoders. `peak_slip_search [RANDOM_RUNS [SEED]]` writes Markdown to stdout.
-// "Best constant slip": the shortest way over a grid of references, of adaptive-actuator, which is told the tyre, and
-// of adaptive-peak's own slip loop held at the reference without a search; a run that locks the wheel does not count.
+// Loss of adaptive-peak against the best constant slip, which a brute-force search finds: the whole chain in virtual
+// time with real actuator and encoders. `peak_slip_search [RANDOM_RUNS [SEED]]` writes Markdown to stdout.
+// "Best constant slip" is the shortest stop over a grid of references. The candidates are adaptive-actuator, which
+// knows the tyre, and adaptive-peak's own slip loop with a fixed reference. A run that locks the wheel does not count.
 
 #include <algorithm>
 #include <cmath>
@@ -30,7 +30,7 @@ struct Braking {
   double largest_slip{0.0};  ///< above 3 m/s
 };
 
-/// Brakes the plant with a controller that believes in `believed`.
+/// Brakes the plant with a controller whose nominal parameters are `believed`.
 Braking brake(const Setup& setup, const rig::RigParameters& believed) {
   runtime::VirtualClock clock;
   driver::SimDriver driver(setup.plant, {.seed = setup.seed, .start_speed_rad_s = setup.experiment.start_speed_rad_s});
@@ -122,8 +122,8 @@ void named_cases() {
   }
 }
 
-/// theta 10-60 N, B 10-40, C 1.3-1.9, 60-180 rad/s, wheels and brake 10 % off what the controller believes (radii 1 %),
-/// every second run with a friction jump and back.
+/// Random cases: theta 10-60 N, B 10-40, C 1.3-1.9, 60-180 rad/s; wheels and brake 10 % (radii 1 %) off the
+/// controller's parameters; a friction jump and back in every second run.
 void random_cases(int runs, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   const auto draw = [&](double least, double most) {

@@ -1,5 +1,5 @@
-// What the slow side spends on a cycle: encoding a message, publishing it within the process, a row of CSV, an event in
-// the log.
+// Cost of a cycle on the slow side: encoding a message, publishing it within the process, a row of CSV, an event in the
+// log.
 
 #include <benchmark/benchmark.h>
 
@@ -22,7 +22,7 @@ const std::vector<rig::CycleRecord>& records() {
   return kept;
 }
 
-/// Calls `one(record)` for each record in turn, round and round; counts bytes and cycles.
+/// Calls `one(record)` for the records in turn, repeatedly; counts bytes and cycles.
 template <class One>
 void for_each_record(benchmark::State& state, const One& one) {
   std::size_t next = 0;
@@ -48,7 +48,7 @@ void publish_in_process(benchmark::State& state) {
   const std::string channel = "ABS_TELEMETRY";
   for_each_record(state, [&](const rig::CycleRecord& record) {
     outlet.send(channel, buffer.encode(telemetry::to_message(record, 1.0, 1)), record.time_s);
-    outlet.lcm().handleTimeout(0);  // memq keeps what nobody takes
+    outlet.lcm().handleTimeout(0);  // memq keeps messages until they are handled
   });
 }
 
@@ -76,7 +76,7 @@ void log_event(benchmark::State& state) {
 
 BENCHMARK(encode);
 BENCHMARK(publish_in_process);
-// Files: not more than fits a small disk.
+// Limits the files to a size that fits a small disk.
 BENCHMARK(csv_row)->Iterations(500'000);
 BENCHMARK(log_event)->Iterations(500'000);
 

@@ -1,5 +1,5 @@
-// The dead-man beside a run on a board (docs/dead-man.md): looks at the controller's signs of life, and when they end
-// it brings the outputs into the safe state through its own handle. Started by abs_hil, never by hand.
+// The guardian of a run on a board (docs/dead-man.md). It reads the controller's heartbeat. When the heartbeat stops it
+// brings the outputs into the safe state through its own handle. abs_hil starts it; it is never started by hand.
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -31,8 +31,7 @@ constexpr int exit_verified = 0;
 constexpr int exit_not_verified = 1;
 constexpr int exit_not_started = 3;
 
-/// What ends programs from a terminal, a service manager or a closed pipe is not for the guardian: it ends when the
-/// controller is done.
+/// Signals from a terminal, a service manager or a closed pipe must not end the guardian. It ends after the controller.
 void ignore_signals() {
   for (const int signal :
        {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGTSTP, SIGTTIN, SIGTTOU, SIGUSR1, SIGUSR2, SIGXFSZ}) {
@@ -40,7 +39,7 @@ void ignore_signals() {
   }
 }
 
-/// Best effort: it needs CAP_SYS_RESOURCE. The guardian is small, and the last that should go when memory runs out.
+/// Exempts the guardian from the kernel's out-of-memory killer. This needs CAP_SYS_RESOURCE; failure is ignored.
 void spare_from_oom() {
   const int file = ::open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
   if (file < 0) return;
@@ -63,7 +62,7 @@ std::string inherited_text(int fd) {
 }
 
 runtime::RealtimeOptions realtime_options(const config::Settings& s, const std::string& mode) {
-  // Above the controller: one that runs wild must not keep its guardian from the processor.
+  // One above the controller: a controller in an endless loop must not block its guardian.
   constexpr int highest = 99;
   runtime::RealtimeOptions options{.priority = std::min(s.realtime.priority + 1, highest)};
   options.mode = mode == "off"       ? runtime::RealtimeMode::off
@@ -72,71 +71,72 @@ runtime::RealtimeOptions realtime_options(const config::Settings& s, const std::
   return options;
 }
 
-/// Everything that a guardian on duty needs, made before the controller goes on.
-struct Post {
-  guardian::LaunchConfig brief{};
+/// Everything that the guardian needs, ready before the controller continues.
+struct GuardianSetup {
+  guardian::LaunchConfig launch{};
   config::Settings settings{};
   std::unique_ptr<driver::SafeStateWriter> writer{};
   std::unique_ptr<runtime::RealtimeScope> realtime{};
 };
 
-Post take_post() {
-  Post post{.brief = guardian::parse_launch_config(inherited_text(guardian::inherited_launch_config))};
-  config::KeyTable keys(post.settings);
-  // No more than it needs: whatever else the controller knows, names of its own controllers say, may be unknown here.
-  const auto config = nlohmann::ordered_json::parse(post.brief.config_json);
+GuardianSetup set_up() {
+  GuardianSetup setup{.launch = guardian::parse_launch_config(inherited_text(guardian::inherited_launch_config))};
+  config::KeyTable keys(setup.settings);
+  // Only these tables: others may name things that the guardian does not know, such as a user's own controller.
+  const auto config = nlohmann::ordered_json::parse(setup.launch.config_json);
   for (const char* table : {"driver", "guardian", "realtime", "telemetry"}) {
     const nlohmann::ordered_json part{{table, config.at(table)}};
     static_cast<void>(config::load_json(part, keys, "the controller's configuration"));
   }
-  post.writer = driver::make_safe_state_writer(post.settings.driver);
-  post.writer->prepare();
-  const runtime::RealtimeOptions realtime = realtime_options(post.settings, post.brief.realtime);
-  post.realtime = std::make_unique<runtime::RealtimeScope>(realtime);
-  if (realtime.mode == runtime::RealtimeMode::require && !post.realtime->report().realtime()) {
-    throw driver::Unavailable("real time is required and not to be had\n" + post.realtime->report().shortcomings());
+  setup.writer = driver::make_safe_state_writer(setup.settings.driver);
+  setup.writer->prepare();
+  const runtime::RealtimeOptions realtime = realtime_options(setup.settings, setup.launch.realtime);
+  setup.realtime = std::make_unique<runtime::RealtimeScope>(realtime);
+  if (realtime.mode == runtime::RealtimeMode::require && !setup.realtime->report().realtime()) {
+    throw driver::Unavailable("real time is required, but the guardian cannot get it\n" +
+                              setup.realtime->report().shortcomings());
   }
-  return post;
+  return setup;
 }
 
-void leave_record(const Post& post, const guardian::SharedRegion& region, const guardian::GuardianReport& report,
-                  std::string account) {
-  if (post.brief.record_prefix.empty()) return;
-  const config::Settings& s = post.settings;
+void write_record(const GuardianSetup& setup, const guardian::SharedRegion& region,
+                  const guardian::GuardianReport& report, std::string account) {
+  if (setup.launch.record_prefix.empty()) return;
+  const config::Settings& s = setup.settings;
   const auto records = region.recorder().contents();
   std::vector<std::string> problems;
-  const auto files = telemetry::write_flight_record(post.brief.record_prefix,
+  const auto files = telemetry::write_flight_record(setup.launch.record_prefix,
                                                     {.records = records,
                                                      .reason = report.reason,
                                                      .reason_value = static_cast<double>(report.silence_ns) * 1e-9,
                                                      .account = std::move(account)},
-                                                    {.experiment = post.brief.experiment,
-                                                     .controller = post.brief.controller,
-                                                     .plant = post.brief.plant,
-                                                     .backend = post.brief.backend,
-                                                     .config_json = post.brief.config_json,
-                                                     .version = post.brief.version},
+                                                    {.experiment = setup.launch.experiment,
+                                                     .controller = setup.launch.controller,
+                                                     .plant = setup.launch.plant,
+                                                     .backend = setup.launch.backend,
+                                                     .config_json = setup.launch.config_json,
+                                                     .version = setup.launch.version},
                                                     s.telemetry.channel_prefix, problems);
   for (const auto& file : files) std::fprintf(stderr, "abs_guardian: wrote %s\n", file.c_str());
   for (const auto& problem : problems) std::fprintf(stderr, "abs_guardian: %s\n", problem.c_str());
 }
 
-int stand_guard() {
+int run_guardian() {
   guardian::SharedRegion region = guardian::SharedRegion::attach(guardian::inherited_region);
   const pid_t controller_pid = ::getppid();
   guardian::LinuxProcess controller(guardian::inherited_controller);
-  const Post post = take_post();
+  const GuardianSetup setup = set_up();
   runtime::MonotonicClock clock;
-  guardian::GuardianLoop duty(clock, controller, region, *post.writer, post.settings.guardian);
-  const bool prefers = post.brief.realtime == "prefer" && !post.realtime->report().realtime();
-  tell_controller("ready " + (prefers ? post.realtime->report().shortcomings() : std::string()));
+  guardian::GuardianLoop loop(clock, controller, region, *setup.writer, setup.settings.guardian);
+  const bool prefers = setup.launch.realtime == "prefer" && !setup.realtime->report().realtime();
+  tell_controller("ready " + (prefers ? setup.realtime->report().shortcomings() : std::string()));
 
-  const guardian::GuardianReport report = duty.run();
+  const guardian::GuardianReport report = loop.run();
   if (report.reason == rig::Reason::none) return exit_verified;
-  // From here on nothing is urgent any more.
+  // The outputs are dealt with: the rest need not be real-time safe.
   const std::string account = guardian::to_text(report, controller_pid);
   std::fprintf(stderr, "abs_guardian: %s", account.c_str());
-  leave_record(post, region, report, account);
+  write_record(setup, region, report, account);
   return !report.acted || report.verified ? exit_verified : exit_not_verified;
 }
 
@@ -146,19 +146,20 @@ int main(int argc, char** argv) {
   if (argc == 2 && std::string_view(argv[1]) == "--help") {
     std::puts(
         "Usage: abs_guardian\n\n"
-        "The dead-man beside a run of abs_hil on a board: when the controller dies, stops or hangs, it brings the "
-        "outputs into the safe state.\nabs_hil starts it by itself; there is nothing to be typed "
+        "The guardian of a run of abs_hil on a board. When the controller dies, stops or hangs, the guardian brings "
+        "the outputs into the safe state.\nabs_hil starts it automatically; do not start it by hand "
         "(docs/dead-man.md).");
     return 0;
   }
   if (argc != 1 || ::fcntl(guardian::inherited_launch_config, F_GETFD) < 0) {
-    std::fputs("abs_guardian: the dead-man beside a run; abs_hil starts it by itself (docs/dead-man.md)\n", stderr);
+    std::fputs("abs_guardian: only abs_hil can start this program, which is the guardian of a run (docs/dead-man.md)\n",
+               stderr);
     return 2;
   }
   ignore_signals();
   spare_from_oom();
   try {
-    return stand_guard();
+    return run_guardian();
   } catch (const std::exception& error) {
     tell_controller(std::string("error ") + error.what());
     return exit_not_started;

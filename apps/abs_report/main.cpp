@@ -57,7 +57,7 @@ int export_rows(const Options& o, report::ExportFormat format) {
   const bool binary = format == report::ExportFormat::octave;
   if (o.output.empty()) {
     if (binary && ::isatty(STDOUT_FILENO) != 0) {
-      throw report::InputError("--octave writes a binary file: give --output RUN.mat, or a pipe");
+      throw report::InputError("--octave writes a binary file: give --output RUN.mat or redirect stdout");
     }
     say(report::export_runs(options, std::cout));
     std::cout.flush();
@@ -96,27 +96,28 @@ int write_report(Options& o) {
 
 void add_options(CLI::App& cli, Options& o) {
   cli.add_option("RUN", o.report.runs, "run folders, series folders, or CSV files of runs")->required();
-  cli.add_option("--output", o.output, "the page (default: report.html here) or the exported file (default: stdout)");
-  cli.add_flag("--force", o.force, "replace files that are there already");
+  cli.add_option("--output", o.output,
+                 "file of the page (default: report.html) or of the exported rows (default: stdout)");
+  cli.add_flag("--force", o.force, "replace existing files");
   cli.add_option("--title", o.report.title, "heading of the page");
-  cli.add_option("--label", o.report.labels, "name of a run in legends and tables; as many as runs")->take_all();
-  cli.add_option("--window", o.window, "what the figures show: brake, run, or FROM:TO in seconds of the run")
+  cli.add_option("--label", o.report.labels, "name of each run in legends and tables, one per run")->take_all();
+  cli.add_option("--window", o.window, "time range of the figures: brake, run, or FROM:TO in seconds of the run")
       ->capture_default_str();
-  cli.add_flag("--paper", o.report.paper, "the paper's comparison page, of an adaptive and a sliding-mode run");
-  cli.add_option("--figures", o.figures, "folder for the figures as files of their own");
-  cli.add_option("--format", o.format, "of these files: svg, png or pdf")
+  cli.add_flag("--paper", o.report.paper, "make the paper's comparison page from an adaptive and a sliding-mode run");
+  cli.add_option("--figures", o.figures, "folder for the figures as separate files");
+  cli.add_option("--format", o.format, "format of these files: svg, png or pdf")
       ->transform(
           CLI::CheckedTransformer(std::map<std::string, report::PictureFormat>{{"svg", report::PictureFormat::svg},
                                                                                {"png", report::PictureFormat::png},
                                                                                {"pdf", report::PictureFormat::pdf}}))
       ->needs("--figures");
-  auto* formats = cli.add_option_group("export", "rows instead of a page, to --output or stdout");
+  auto* formats = cli.add_option_group("export", "export rows instead of a page, to --output or stdout");
   const auto add_export = [&](const char* name, report::ExportFormat format, const char* help) {
     formats->add_flag_callback(
         name, [&o, format] { o.export_as = format; }, help);
   };
-  add_export("--csv", report::ExportFormat::csv, "all runs in one CSV, the run's name in front of each row");
-  add_export("--json", report::ExportFormat::json, "runs with summaries, one array a column");
+  add_export("--csv", report::ExportFormat::csv, "all runs in one CSV, with the run's name in the first column");
+  add_export("--json", report::ExportFormat::json, "runs with summaries, one array per column");
   add_export("--octave", report::ExportFormat::octave, "MAT-file for Octave, MATLAB, SciPy");
   formats->require_option(0, 1);
   cli.add_option("--columns", o.columns, "columns to export, separated by commas (default: all)")
@@ -139,10 +140,11 @@ int run(int argc, char** argv) {
     return bad_input;
   }
   if (!o.export_as && !o.columns.empty()) {
-    throw report::InputError("--columns chooses columns to export: give --csv, --json or --octave too");
+    throw report::InputError("--columns selects columns to export: also give --csv, --json or --octave");
   }
   if (o.export_as && (o.report.paper || !o.figures.empty())) {
-    throw report::InputError("--paper and --figures make a page, --csv, --json and --octave export rows: choose one");
+    throw report::InputError(
+        "--paper and --figures make a page; --csv, --json and --octave export rows; give one kind only");
   }
   return o.export_as ? export_rows(o, *o.export_as) : write_report(o);
 }

@@ -61,11 +61,11 @@ void BusSocket::listen_at(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path.empty() || path.size() >= sizeof address.sun_path) {
-    throw std::invalid_argument("--can unix:" + path + ": the path must have 1 to 107 characters");
+    throw std::invalid_argument("--can unix:" + path + ": give a path of 1 to 107 characters");
   }
   std::memcpy(address.sun_path, path.c_str(), path.size());
   listening_ = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  ::unlink(path.c_str());  // what an emulator that was killed left behind
+  ::unlink(path.c_str());  // left behind by a killed emulator
   if (listening_ < 0 || ::bind(listening_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
       ::listen(listening_, 1) != 0) {
     refuse("unix:" + path + ": ");
@@ -82,7 +82,7 @@ bool BusSocket::receive(emulator::BusFrame& frame) {
     ::close(client_);
     client_ = -1;
   }
-  // An interface that is down says so once; the node goes on and hears nothing.
+  // An interface that goes down returns one error. The node then continues and receives nothing.
   if (size != CAN_MTU && size != CANFD_MTU) return false;
   frame = {.id = raw.can_id, .length = std::min<std::uint8_t>(raw.len, CANFD_MAX_DLEN), .fd = size == CANFD_MTU};
   std::memcpy(frame.data.data(), raw.data, frame.length);

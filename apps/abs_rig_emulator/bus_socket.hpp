@@ -6,22 +6,22 @@
 
 namespace abs_hil::program {
 
-/// The emulated node's end of the bus: a raw CAN socket, or for "unix:PATH" an AF_UNIX socket of type SOCK_SEQPACKET
-/// that it listens on, one client at a time.
+/// The emulated node's end of the bus: a raw CAN socket, or for "unix:PATH" a listening AF_UNIX socket of type
+/// SOCK_SEQPACKET with one client at a time.
 class BusSocket {
  public:
-  /// Throws std::runtime_error if it cannot be had.
+  /// Throws std::runtime_error if the socket cannot be opened.
   explicit BusSocket(const std::string& interface);
   BusSocket(const BusSocket&) = delete;
   BusSocket& operator=(const BusSocket&) = delete;
   ~BusSocket();
 
-  /// To wait on.
+  /// Descriptor for poll().
   [[nodiscard]] int descriptor() const noexcept { return client_ >= 0 ? client_ : listening_; }
   [[nodiscard]] bool can_fd() const noexcept { return can_fd_; }
-  /// False once there is none.
+  /// Takes the next frame; false if there is none.
   [[nodiscard]] bool receive(emulator::BusFrame& frame);
-  /// What cannot be sent now is lost, as on a bus that is blocked.
+  /// Sends a frame. If that is not possible at once, the frame is lost, as on a blocked bus.
   void send(const emulator::BusFrame& frame);
 
  private:

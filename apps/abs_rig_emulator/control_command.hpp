@@ -12,17 +12,17 @@ class ControlCommand {
   explicit ControlCommand(std::string_view line);
 
   [[nodiscard]] bool empty() const noexcept { return words_.empty(); }
-  /// Whether it has this name and so many arguments.
+  /// True if it has this name and number of arguments.
   [[nodiscard]] bool is(std::string_view name, std::size_t arguments) const;
   [[nodiscard]] const std::string& name() const { return words_.at(0); }
   /// The nth argument, from 1.
   [[nodiscard]] const std::string& text(std::size_t n) const { return words_.at(n); }
-  /// Throws std::invalid_argument if it is no number.
+  /// The nth argument as a number. Throws std::invalid_argument if it is not one.
   [[nodiscard]] double number(std::size_t n) const;
-  /// Throws std::invalid_argument if it is neither "on" nor "off".
+  /// The nth argument as "on" or "off". Throws std::invalid_argument if it is neither.
   [[nodiscard]] bool on(std::size_t n) const;
 
-  /// Throws std::invalid_argument that names the line and the commands that there are.
+  /// Throws std::invalid_argument with the line and the known commands.
   [[noreturn]] void refuse(const char* known) const;
 
  private:
@@ -30,7 +30,7 @@ class ControlCommand {
   std::vector<std::string> words_{};
 };
 
-/// Obeys what every board with supply and temperature sensors knows; false: the command is none of these.
+/// Obeys the commands of every board with supply and temperature sensors; false for any other command.
 template <typename Board>
 bool obey_surroundings(Board& board, const ControlCommand& command) {
   if (command.is("estop", 1)) {
@@ -47,7 +47,7 @@ bool obey_surroundings(Board& board, const ControlCommand& command) {
   return true;
 }
 
-/// Obeys "turn upper|lower REVOLUTIONS"; false: the command is another.
+/// Obeys "turn upper|lower REVOLUTIONS"; false for any other command.
 template <typename Board>
 bool obey_turn(Board& board, const ControlCommand& command) {
   if (!command.is("turn", 2) || (command.text(1) != "upper" && command.text(1) != "lower")) return false;

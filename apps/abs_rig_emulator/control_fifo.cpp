@@ -20,11 +20,11 @@ void say(const std::string& text) {
 ControlFifo::ControlFifo(const std::string& path) {
   if (path.empty()) return;
   if (::mkfifo(path.c_str(), 0600) != 0 && errno != EEXIST) {
-    throw std::runtime_error(path + ": cannot be made: " + std::strerror(errno));
+    throw std::runtime_error(path + ": cannot create the FIFO: " + std::strerror(errno));
   }
-  // For writing too: else it would be at its end whenever no one writes.
+  // Open it for writing, too: otherwise it reports end of file whenever it has no writer.
   descriptor_ = ::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
-  if (descriptor_ < 0) throw std::runtime_error(path + ": cannot be opened: " + std::strerror(errno));
+  if (descriptor_ < 0) throw std::runtime_error(path + ": cannot open the FIFO: " + std::strerror(errno));
 }
 
 ControlFifo::~ControlFifo() {

@@ -5,21 +5,21 @@
 
 namespace abs_hil::program {
 
-/// A line of output, seen at once by who waits for it.
+/// Prints a line and flushes it.
 void say(const std::string& text);
 
-/// FIFO that commands are taken from while the emulator runs. Without a path there is none.
+/// FIFO from which the emulator takes commands while it runs. An empty path means no FIFO.
 class ControlFifo {
  public:
-  /// Makes the FIFO if it is not there. Throws std::runtime_error.
+  /// Creates the FIFO if it does not exist. Throws std::runtime_error.
   explicit ControlFifo(const std::string& path);
   ControlFifo(const ControlFifo&) = delete;
   ControlFifo& operator=(const ControlFifo&) = delete;
   ~ControlFifo();
 
-  /// To wait on; -1: none.
+  /// Descriptor for poll(); -1: no FIFO.
   [[nodiscard]] int descriptor() const noexcept { return descriptor_; }
-  /// Carries out the whole lines that have come, and says each one's answer or error.
+  /// Obeys all complete lines received, and prints the answer or error of each.
   using Obey = std::function<std::string(const std::string& line)>;
   void take(const Obey& obey);
 

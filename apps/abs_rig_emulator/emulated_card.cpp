@@ -101,16 +101,16 @@ std::string EmulatedCard::widths() const {
 
 const char* EmulatedCard::commands() {
   return "fault OFFSET:KIND[=PARAMETER]   one register: ok stuck wrong= slow= delayed= intermittent= off garbage\n"
-         "unplug | plug                   the card's files vanish, come back\n"
+         "unplug | plug                   the card's files disappear, reappear\n"
          "all-ones on|off                 the card leaves the bus, its files stay\n"
-         "deny on|off                     opening the registers is not permitted\n"
+         "deny on|off                     opening the registers is forbidden\n"
          "estop on|off                    the emergency stop: cuts the drive only\n"
          "supply V | temperature C        what the board measures\n"
          "overspeed                       latches the overspeed interlock until the wheels stop\n"
          "turn upper|lower REVOLUTIONS    a wheel is turned by hand\n"
          "record FILE | record off        register accesses: R or W, offset, value\n"
-         "widths                          both PWM width registers; since when both are 0 and when last written, ns of "
-         "CLOCK_MONOTONIC, in lock-step of the card's time\n"
+         "widths                          both PWM width registers, since when both are 0, time of the last write; ns "
+         "of CLOCK_MONOTONIC, in lock-step of the card's time\n"
          "status                          duties on the wire, speeds, trip flags\n";
 }
 

@@ -14,13 +14,13 @@
 
 namespace abs_hil::program {
 
-/// What the emulator is started with.
+/// Options of the emulator.
 struct EmulatorOptions {
   emulator::CardOptions card{};
   std::uint64_t seed{1};
   bool lock_step{false};
-  std::string truth_file{};    ///< CSV of what no register shows; empty: none
-  std::string traffic_file{};  ///< every register access; empty: none
+  std::string truth_file{};    ///< CSV of true values that no register shows; empty: none
+  std::string traffic_file{};  ///< log of every register access; empty: none
 };
 
 /// The card behind the tree's files: time, registers, faults, logs and the control commands.
@@ -34,15 +34,15 @@ class EmulatedCard final : public FileHandler {
   [[nodiscard]] int write(std::string_view name, std::uint64_t offset, const void* data, std::size_t size) override;
   [[nodiscard]] bool present() const override { return present_; }
 
-  /// Lets the rig go on to the wall clock; in lock-step it waits for the client.
+  /// Advances the rig to the current time; in lock-step only the client advances it.
   void catch_up();
-  /// One control command; returns its answer. Throws std::invalid_argument for what it does not know.
+  /// Obeys one control command and returns its answer. Throws std::invalid_argument for an unknown command.
   std::string obey(std::string_view line);
-  /// The commands `obey` knows, one a line.
+  /// The commands of `obey`, one per line.
   [[nodiscard]] static const char* commands();
-  /// Duties on the wire now, one line.
+  /// Current duties at the power stage and other values, as one line.
   [[nodiscard]] std::string status() const;
-  /// Both PWMs' width registers and their times, one line.
+  /// Both PWMs' width registers and their times, as one line.
   [[nodiscard]] std::string widths() const;
 
  private:

@@ -16,15 +16,15 @@ class EmulatedNode {
   /// Throws std::invalid_argument.
   EmulatedNode(const emulator::CanNodeOptions& options, std::uint64_t seed);
 
-  /// Lets the rig go on to the wall clock; in lock-step it waits for ABS_TIME.
+  /// Advances the rig to the current time; in lock-step only ABS_TIME advances it.
   void catch_up();
-  /// Answers all frames that have come.
+  /// Answers all received frames.
   void serve(BusSocket& bus);
-  /// One control command; returns its answer. Throws std::invalid_argument for what it does not know.
+  /// Obeys one control command and returns its answer. Throws std::invalid_argument for an unknown command.
   std::string obey(std::string_view line);
-  /// The commands `obey` knows, one a line.
+  /// The commands of `obey`, one per line.
   [[nodiscard]] static const char* commands();
-  /// Duties on the wire now, one line.
+  /// Current duties at the power stage and other values, as one line.
   [[nodiscard]] std::string status() const;
 
  private:

@@ -22,12 +22,12 @@ namespace {
 
 constexpr std::int64_t mid_braking_ns = 300'000'000;
 
-/// The first free port for high speed: lines "hs 0000 004 000 ...", where 004 is free.
+/// The first free port for high speed. The lines are "hs 0000 004 000 ..."; 004 means free.
 int free_port(const std::string& controller) {
   std::ifstream status(controller + "/status");
   if (!status) {
     throw std::runtime_error(controller + "/status: " + std::strerror(errno) +
-                             "; the kernel's virtual USB host controller is needed: sudo modprobe vhci_hcd");
+                             "; load the kernel's virtual USB host controller: sudo modprobe vhci_hcd");
   }
   std::string line;
   while (std::getline(status, line)) {
@@ -38,7 +38,7 @@ int free_port(const std::string& controller) {
     constexpr int is_free = 4;
     if (words >> speed >> port >> state && speed == "hs" && state == is_free) return port;
   }
-  throw std::runtime_error(controller + ": all its high-speed ports are taken");
+  throw std::runtime_error(controller + ": all high-speed ports are in use; detach a device (usbip detach)");
 }
 
 }  // namespace
@@ -52,7 +52,8 @@ EmulatedUsb::EmulatedUsb(const UsbEmulatorOptions& options)
       started_ns_(driver::monotonic_ns()),
       truth_(options.truth_file, false) {
   for (const std::string& command : options.when_braking) {
-    if (command == "plug") throw std::invalid_argument("--when-braking plug: nothing is unplugged then");
+    if (command == "plug")
+      throw std::invalid_argument("--when-braking plug: the board is already plugged in; give another");
   }
   plug_in();
 }
@@ -61,7 +62,7 @@ void EmulatedUsb::plug_in() {
   const int port = free_port(options_.controller);
   std::array<int, 2> pair{};
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair.data()) != 0) {
-    throw std::runtime_error(std::string("no socket pair: ") + std::strerror(errno));
+    throw std::runtime_error(std::string("cannot open a socket pair: ") + std::strerror(errno));
   }
   driver::FileDescriptor ours(pair[0]);
   const driver::FileDescriptor kernels(pair[1]);
@@ -71,24 +72,24 @@ void EmulatedUsb::plug_in() {
   attach << fmt::format("{} {} {} {}", port, kernels.get(), any_device_id, high_speed) << std::flush;
   if (!attach) {
     throw std::runtime_error(options_.controller + "/attach: cannot be written: " + std::strerror(errno) +
-                             "; run as root");
+                             "; run abs_rig_emulator as root");
   }
   host_ = std::move(ours);
   device_.reconnect();
-  // The kernel asks who is there; until it has set a configuration nobody can use the board.
+  // The kernel reads the descriptors. No program can use the board before the kernel has set a configuration.
   const std::int64_t started_ns = driver::monotonic_ns();
   constexpr std::int64_t longest_ns = 20'000'000'000;
   while (!device_.configured()) {
     pollfd ready{host_.get(), POLLIN, 0};
     static_cast<void>(::poll(&ready, 1, 100));
     if ((ready.revents != 0 && !serve()) || driver::monotonic_ns() - started_ns > longest_ns) {
-      throw std::runtime_error(options_.controller + ": the kernel does not take the board; see dmesg");
+      throw std::runtime_error(options_.controller + ": the kernel does not accept the board; see dmesg");
     }
   }
 }
 
 void EmulatedUsb::unplug() {
-  host_ = driver::FileDescriptor(-1);  // closing is pulling the cable
+  host_ = driver::FileDescriptor(-1);  // closing it unplugs the cable
 }
 
 void EmulatedUsb::send(const std::vector<std::uint8_t>& replies) {
@@ -107,7 +108,7 @@ bool EmulatedUsb::serve() {
   std::array<std::uint8_t, 4096> buffer{};
   const ssize_t got = ::recv(host_.get(), buffer.data(), buffer.size(), MSG_DONTWAIT);
   if (got < 0 && (errno == EAGAIN || errno == EINTR)) return true;
-  if (got <= 0) return false;  // the controller has let go of it
+  if (got <= 0) return false;  // the controller has released it
   std::vector<std::uint8_t> replies;
   device_.receive(std::span(buffer).first(static_cast<std::size_t>(got)), driver::monotonic_ns(), replies);
   send(replies);
@@ -116,10 +117,10 @@ bool EmulatedUsb::serve() {
 
 void EmulatedUsb::go_on_to(std::int64_t time_ns) {
   truth_.advance(board_, time_ns);
-  watch_brake();
+  run_commands_when_braking();
 }
 
-void EmulatedUsb::watch_brake() {
+void EmulatedUsb::run_commands_when_braking() {
   if (options_.when_braking.empty()) return;
   if (board_.outputs().brake_duty == 0.0) {
     brake_since_ns_ = -1;
@@ -159,7 +160,7 @@ const char* EmulatedUsb::commands() {
   return "fault KIND                      ok | stall in|out [once] | length BYTES | silent | late US [COUNT] | "
          "garbage\n"
          "unplug | plug                   the cable; the outputs hold\n"
-         "break-brake on|off              the brake's PWM does not take what is written\n"
+         "break-brake on|off              the brake's PWM ignores writes\n"
          "estop on|off                    the emergency stop: cuts the drive only\n"
          "turn upper|lower REVOLUTIONS    a wheel is turned by hand\n"
          "status                          duties on the wire, speeds, frames taken\n";

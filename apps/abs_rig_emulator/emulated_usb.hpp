@@ -12,21 +12,21 @@
 
 namespace abs_hil::program {
 
-/// What the emulated USB board is started with.
+/// Options of the emulated USB board.
 struct UsbEmulatorOptions {
   emulator::UsbBoardOptions board{};
   emulator::UsbIdentity identity{};
   std::string controller{"/sys/devices/platform/vhci_hcd.0"};  ///< the kernel's virtual host controller
   std::uint64_t seed{1};
   bool lock_step{false};
-  std::string truth_file{};                 ///< CSV of what no frame shows; empty: none
+  std::string truth_file{};                 ///< CSV of true values that no frame shows; empty: none
   std::vector<std::string> when_braking{};  ///< commands obeyed once the brake has acted for 0.3 s
 };
 
 /// The board, plugged into this computer's virtual USB host controller (vhci_hcd) through a socket pair.
 class EmulatedUsb {
  public:
-  /// Plugs the board in. Throws std::invalid_argument, or std::runtime_error if there is no controller to plug it into.
+  /// Plugs the board in. Throws std::invalid_argument, or std::runtime_error if there is no usable host controller.
   explicit EmulatedUsb(const UsbEmulatorOptions& options);
 
   [[nodiscard]] int descriptor() const { return host_.get(); }
@@ -35,14 +35,14 @@ class EmulatedUsb {
   std::string obey(std::string_view line);
   [[nodiscard]] std::string status() const;
   [[nodiscard]] std::string place() const;
-  /// The commands `obey` knows, one a line.
+  /// The commands of `obey`, one per line.
   [[nodiscard]] static const char* commands();
 
  private:
   void plug_in();
   void unplug();
   void go_on_to(std::int64_t time_ns);
-  void watch_brake();
+  void run_commands_when_braking();
   void send(const std::vector<std::uint8_t>& replies);
 
   UsbEmulatorOptions options_;

@@ -26,7 +26,7 @@ namespace {
 constexpr fuse_ino_t first_folder = 2;
 constexpr fuse_ino_t first_file = 1000;
 constexpr fuse_ino_t files_per_folder = 100;
-/// The kernel keeps nothing: an unplugged card is gone at once.
+/// The kernel must cache nothing, so that an unplugged card disappears at once.
 constexpr double no_caching = 0.0;
 
 FuseTree::State& state_of(fuse_req_t request) { return *static_cast<FuseTree::State*>(fuse_req_userdata(request)); }
@@ -35,7 +35,7 @@ bool is_there(const FuseTree::State& s, std::size_t folder) {
   return folder < s.folders.size() && (folder != 0 || s.handler->present());
 }
 
-/// The file behind an inode; null if it is none or gone.
+/// The file behind an inode; null if there is none, or if the card is gone.
 const ServedFile* file_of(const FuseTree::State& s, fuse_ino_t inode) {
   if (inode < first_file) return nullptr;
   const std::size_t folder = (inode - first_file) / files_per_folder;
@@ -94,7 +94,7 @@ void on_getattr(fuse_req_t request, fuse_ino_t inode, fuse_file_info* /*info*/) 
   }
 }
 
-/// Opening with O_TRUNC or `touch` asks for it: nothing changes.
+/// Called for O_TRUNC and `touch`: changes nothing.
 void on_setattr(fuse_req_t request, fuse_ino_t inode, struct stat* /*wanted*/, int /*which*/, fuse_file_info* info) {
   on_getattr(request, inode, info);
 }
@@ -139,7 +139,7 @@ void on_read(fuse_req_t request, fuse_ino_t inode, size_t size, off_t offset, fu
   const FuseTree::State& s = state_of(request);
   const ServedFile* file = file_of(s, inode);
   if (file == nullptr) {
-    fuse_reply_err(request, ENODEV);  // open, but pulled out meanwhile
+    fuse_reply_err(request, ENODEV);  // the card was unplugged while the file was open
     return;
   }
   const auto at = static_cast<std::size_t>(offset);
@@ -150,7 +150,7 @@ void on_read(fuse_req_t request, fuse_ino_t inode, size_t size, off_t offset, fu
   }
   std::array<char, 8> word{};
   const int result = is_first_folder(inode) ? s.handler->read(file->name, at, word.data(), std::min(size, word.size()))
-                                            : -EIO;  // a folder for show
+                                            : -EIO;  // a folder without a card behind it
   if (result < 0) {
     fuse_reply_err(request, -result);
   } else {
@@ -204,7 +204,7 @@ FuseTree::FuseTree(const std::string& root, std::vector<std::string> folders, st
     delete state_;
     throw std::runtime_error(
         "cannot mount a FUSE tree at " + root +
-        ": it needs /dev/fuse (sudo modprobe fuse), the package fuse3, and an empty folder of yours");
+        ": it needs /dev/fuse (sudo modprobe fuse), the package fuse3, and an empty folder that you own");
   }
 }
 

@@ -11,13 +11,13 @@ namespace abs_hil::program {
 /// One file of the tree below the card's folder.
 struct ServedFile {
   std::string name;
-  std::string content{};   ///< of a read-only text file
-  std::uint64_t bytes{0};  ///< size to show for a file of registers
+  std::string content{};   ///< content of a read-only text file
+  std::uint64_t bytes{0};  ///< size of a file of registers
   bool registers{false};   ///< reads and writes go to the handler, one access each
   int mode{0444};
 };
 
-/// What the tree asks of the emulator. Results are -errno, or the bytes read or written.
+/// Interface of the tree to the emulator. Results are -errno, or the number of bytes read or written.
 class FileHandler {
  public:
   FileHandler() = default;
@@ -27,25 +27,25 @@ class FileHandler {
   [[nodiscard]] virtual int open(std::string_view name) = 0;
   [[nodiscard]] virtual int read(std::string_view name, std::uint64_t offset, void* data, std::size_t size) = 0;
   [[nodiscard]] virtual int write(std::string_view name, std::uint64_t offset, const void* data, std::size_t size) = 0;
-  /// False: the card has been pulled out, its folder is gone.
+  /// False: the card is unplugged and its folder is gone.
   [[nodiscard]] virtual bool present() const = 0;
 };
 
-/// A folder with one folder for each card, mounted through FUSE: files of text like sysfs', and files whose every
-/// access goes to the handler, uncached (direct_io). One thread, the caller's.
+/// A folder with one folder per card, mounted through FUSE. It has text files like those of sysfs, and files whose
+/// every access goes to the handler, uncached (direct_io). It runs in the caller's thread.
 class FuseTree {
  public:
   /// Mounts at `root`, an empty folder. Throws std::runtime_error with the cause.
-  /// @param folders names of the cards' folders; all hold the same files, and the first one is the one behind them
+  /// @param folders names of the cards' folders; all have the same files, but only the first has a card behind it
   FuseTree(const std::string& root, std::vector<std::string> folders, std::vector<ServedFile> files,
            FileHandler& handler);
   FuseTree(const FuseTree&) = delete;
   FuseTree& operator=(const FuseTree&) = delete;
   ~FuseTree();  ///< unmounts
 
-  /// To be waited for.
+  /// Descriptor for poll().
   [[nodiscard]] int descriptor() const;
-  /// Answers one request that is there. False once the tree has been unmounted from outside.
+  /// Answers one waiting request. False once the tree has been unmounted from outside.
   bool serve_one();
 
   struct State;

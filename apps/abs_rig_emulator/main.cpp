@@ -1,6 +1,6 @@
-// The device side of the rig as a process of its own, with the simulated rig behind it: an emulated RT-DAC4/PCI, served
-// as a tree like /sys/bus/pci/devices (docs/rig-setup.md), a CAN I/O node (docs/can.md), or an RT-DAC/USB2 plugged into
-// the kernel's virtual host controller (docs/usb.md).
+// Emulator of the rig's boards with the simulated rig behind them, as a separate process. It emulates an RT-DAC4/PCI
+// with a tree like /sys/bus/pci/devices (docs/rig-setup.md), a CAN I/O node (docs/can.md), or an RT-DAC/USB2 that is
+// plugged into the kernel's virtual host controller (docs/usb.md).
 
 #include <fmt/format.h>
 #include <poll.h>
@@ -32,7 +32,7 @@ namespace {
 using namespace abs_hil;
 
 std::atomic<bool> stop_requested{false};
-static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may touch nothing else");
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may use only lock-free atomics");
 
 struct Arguments {
   program::EmulatorOptions emulator{};
@@ -56,59 +56,69 @@ struct Arguments {
 };
 
 void add_card_options(CLI::App& cli, emulator::CardOptions& card) {
-  cli.add_option("--bitstream", card.bitstream_version, "version word that the card shows")->capture_default_str();
+  cli.add_option("--bitstream", card.bitstream_version, "version word of the card")->capture_default_str();
   cli.add_option("--start-speed", card.start_speed_rad_s, "both wheels' speed at the start, rad/s");
-  cli.add_option("--overspeed-rpm", card.overspeed_rpm, "the FPGA's limit, ours")->capture_default_str();
-  cli.add_option("--supply-min", card.supply_min_V, "the FPGA's limit, V, ours")->capture_default_str();
-  cli.add_option("--temperature-max", card.temperature_max_C, "the FPGA's limit, deg C, ours")->capture_default_str();
-  cli.add_option("--overspeed-bit", card.overspeed_bit, "bit of the trip flags: the sources disagree")
+  cli.add_option("--overspeed-rpm", card.overspeed_rpm, "the FPGA's limit (our choice), rpm")->capture_default_str();
+  cli.add_option("--supply-min", card.supply_min_V, "the FPGA's limit (our choice), V")->capture_default_str();
+  cli.add_option("--temperature-max", card.temperature_max_C, "the FPGA's limit (our choice), deg C")
+      ->capture_default_str();
+  cli.add_option("--overspeed-bit", card.overspeed_bit, "overspeed bit of the trip flags (the sources disagree)")
       ->check(CLI::IsMember({0, 2}))
       ->capture_default_str();
-  cli.add_flag("--trip-clears-width", card.trip_clears_width, "a trip zeroes the PWM width registers too: not known");
+  cli.add_flag("--trip-clears-width", card.trip_clears_width,
+               "a trip also zeroes the PWM width registers (not known of the real card)");
 }
 
 void add_usb_options(CLI::App& cli, program::UsbEmulatorOptions& usb) {
-  cli.add_option("--usb-serial", usb.identity.serial, "what the USB board says it is")->capture_default_str();
-  cli.add_option("--usb-manufacturer", usb.identity.manufacturer, "what it says it is")->capture_default_str();
+  cli.add_option("--usb-serial", usb.identity.serial, "serial number of the USB board")->capture_default_str();
+  cli.add_option("--usb-manufacturer", usb.identity.manufacturer, "manufacturer string of the USB board")
+      ->capture_default_str();
   cli.add_option("--vhci", usb.controller, "folder of the virtual host controller")->capture_default_str();
-  cli.add_flag("!--hide-outputs", usb.board.shows_outputs, "its frames do not show what was sent: not known");
-  cli.add_option("--enable-line", usb.board.enable_line, "its digital line without which the drive does nothing");
-  cli.add_option("--when-braking", usb.when_braking, "its control command, obeyed once the brake has acted for 0.3 s")
+  cli.add_flag("!--hide-outputs", usb.board.shows_outputs,
+               "the USB board's frames do not show the sent words (not known of the real board)");
+  cli.add_option("--enable-line", usb.board.enable_line, "digital line of the USB board that enables the drive");
+  cli.add_option("--when-braking", usb.when_braking,
+                 "control command of the USB board, obeyed once the brake has acted for 0.3 s")
       ->allow_extra_args(false);
 }
 
 void add_options(CLI::App& cli, Arguments& a) {
-  auto* board = cli.add_option_group("board", "what the rig is behind");
-  board->add_option("--pci-root", a.pci_root, "a card: folder to mount its tree at; made if it is not there")
+  auto* board = cli.add_option_group("board", "the board of the rig");
+  board->add_option("--pci-root", a.pci_root, "emulate a card: folder at which to mount its tree; created if missing")
       ->type_name("DIR");
-  CLI::Option* can =
-      board->add_option("--can", a.can_interface, "a CAN I/O node: interface, or unix:PATH to listen at in its place")
-          ->type_name("IFACE");
-  CLI::Option* usb = board->add_flag("--usb", a.use_usb, "a USB board, plugged into this computer's vhci_hcd (root)");
+  CLI::Option* can = board
+                         ->add_option("--can", a.can_interface,
+                                      "emulate a CAN I/O node: interface, or unix:PATH of a socket to listen on")
+                         ->type_name("IFACE");
+  CLI::Option* usb =
+      board->add_flag("--usb", a.use_usb, "emulate a USB board, plugged into this computer's vhci_hcd (needs root)");
   board->require_option(1);
-  cli.add_option("--watchdog-ms", a.watchdog_ms, "of the CAN node, until its activation says otherwise")
+  cli.add_option("--watchdog-ms", a.watchdog_ms, "watchdog of the CAN node, ms, until an activation sets another value")
       ->check(CLI::Range(1, 10'000))
       ->capture_default_str();
-  cli.add_option("--bdf", a.bdfs, "the card's address; repeated: more cards, for show")->capture_default_str();
+  cli.add_option("--bdf", a.bdfs, "the card's address; give it again for more cards, without a rig behind them")
+      ->capture_default_str();
   cli.add_option("--plant", a.plant, "plant by name or TOML file")->capture_default_str();
-  cli.add_option("--set", a.assignments, "any plant value, plant.theta_N=30 say")->allow_extra_args(false);
-  cli.add_option("--seed", a.emulator.seed, "of intermittent faults and garbage")->capture_default_str();
-  cli.add_flag("--lock-step", a.emulator.lock_step, "time goes on only when the client says so (abs_hil --fast)");
-  cli.add_option("--fault", a.faults, "fault of one register from the start, 88:stuck say")->allow_extra_args(false);
+  cli.add_option("--set", a.assignments, "any plant value, for example plant.theta_N=30")->allow_extra_args(false);
+  cli.add_option("--seed", a.emulator.seed, "seed of intermittent faults and garbage")->capture_default_str();
+  cli.add_flag("--lock-step", a.emulator.lock_step, "time advances only when the client says so (abs_hil --fast)");
+  cli.add_option("--fault", a.faults, "fault of one register from the start, for example 88:stuck")
+      ->allow_extra_args(false);
   cli.add_option("--command", a.commands, "any control command, obeyed at the start")->allow_extra_args(false);
-  cli.add_option("--control", a.control_fifo, "FIFO to take commands from while running; made if it is not there");
-  cli.add_option("--truth", a.emulator.truth_file, "CSV of what no register or frame shows, every ms")->excludes(can);
-  cli.add_option("--record", a.emulator.traffic_file, "every register access to the card, one a line")
+  cli.add_option("--control", a.control_fifo, "FIFO from which to take commands while running; created if missing");
+  cli.add_option("--truth", a.emulator.truth_file, "CSV of true values that no register or frame shows, every ms")
+      ->excludes(can);
+  cli.add_option("--record", a.emulator.traffic_file, "log of every register access to the card, one per line")
       ->excludes(can)
       ->excludes(usb);
-  cli.add_option("--vendor", a.vendor, "what the card says it is")->capture_default_str();
-  cli.add_option("--device", a.device, "what the card says it is")->capture_default_str();
+  cli.add_option("--vendor", a.vendor, "vendor id of the card")->capture_default_str();
+  cli.add_option("--device", a.device, "device id of the card")->capture_default_str();
   cli.add_option("--bar-bytes", a.bar_bytes, "size of BAR 2")->capture_default_str();
   cli.add_option("--bar-kind", a.bar_kind, "io or memory")
       ->check(CLI::IsMember({"io", "memory"}))
       ->capture_default_str();
-  cli.add_option("--cpu", a.cpu, "CPU to run on: the client's, for short accesses");
-  cli.add_option("--priority", a.priority, "SCHED_FIFO priority, above the client's; 0: none")
+  cli.add_option("--cpu", a.cpu, "CPU to run on; the client's CPU gives short accesses");
+  cli.add_option("--priority", a.priority, "SCHED_FIFO priority, higher than the client's; 0: none")
       ->check(CLI::Range(0, 98))
       ->capture_default_str();
   add_card_options(cli, a.emulator.card);
@@ -124,14 +134,15 @@ void read_plant(Arguments& a) {
   config::load_file(config::plant_file(a.plant), keys, "plant");
   for (const std::string& assignment : a.assignments) {
     if (!assignment.starts_with("plant.")) {
-      throw config::ConfigError("--set " + assignment + ": the emulator takes plant values alone");
+      throw config::ConfigError("--set " + assignment +
+                                ": the emulator takes only plant values, for example plant.theta_N=30");
     }
     keys.set_text(assignment, "--set");
   }
   a.emulator.card.plant = s.plant;
 }
 
-/// The files of sysfs that a driver looks at.
+/// The files of sysfs that a driver reads.
 std::vector<program::ServedFile> files_of(const Arguments& a) {
   constexpr std::uint64_t bar_start = 0xE000;
   const std::string flags = a.bar_kind == "io" ? "0x0000000000040101" : "0x0000000000040200";
@@ -160,18 +171,18 @@ void pin_to(int cpu) {
   }
 }
 
-/// As quick to answer as a card would be, if permitted: an emulator waits for its turn, a card never does.
+/// Requests real time, if permitted: a card answers at once, but an emulator must wait for the CPU.
 void take_priority(const Arguments& a) {
   if (a.priority == 0 || a.emulator.lock_step) return;
   sched_param wanted{};
   wanted.sched_priority = a.priority;
   if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0 || sched_setscheduler(0, SCHED_FIFO, &wanted) != 0) {
     program::say(std::string("not in real time (") + std::strerror(errno) +
-                 "): slow answers are to be expected; see abs_hil doctor, or --priority 0");
+                 "): expect slow answers; see abs_hil doctor, or give --priority 0");
   }
 }
 
-/// Frames catch up with the clock by themselves; between them the rig goes on every ms, in steps of 100 us.
+/// Each frame advances the rig to the clock. Between frames this advances it every ms, in steps of 100 us.
 constexpr timespec idle{.tv_sec = 0, .tv_nsec = 1'000'000};
 
 template <typename Board>
@@ -180,8 +191,8 @@ void obey_first(const Arguments& a, Board& board) {
   for (const std::string& command : a.commands) static_cast<void>(board.obey(command));
 }
 
-/// Serves the host, at the descriptor that `host` gives, and the control FIFO until a signal or until `serve_host` says
-/// that the host has gone for good.
+/// Serves the host, at the descriptor that `host` returns, and the control FIFO. Ends at a signal, or when `serve_host`
+/// returns that the host has gone for good.
 template <typename Board, typename Host, typename ServeHost>
 int serve_until_stopped(const Arguments& a, Board& board, const std::string& place, Host host, ServeHost serve_host) {
   program::ControlFifo control(a.control_fifo);

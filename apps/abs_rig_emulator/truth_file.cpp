@@ -11,7 +11,7 @@ namespace abs_hil::program {
 void open_for_writing(std::ofstream& stream, const std::string& file) {
   stream.close();
   stream.open(file);
-  if (!stream) throw std::runtime_error(file + ": cannot be written: " + std::strerror(errno));
+  if (!stream) throw std::runtime_error("cannot write \"" + file + "\": " + std::strerror(errno));
 }
 
 TruthFile::TruthFile(const std::string& file, bool with_trip_flags) {

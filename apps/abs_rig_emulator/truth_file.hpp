@@ -9,17 +9,17 @@
 
 namespace abs_hil::program {
 
-/// Opens a file that the emulator writes aside, truth or traffic. Throws std::runtime_error.
+/// Opens an output file of the emulator (truth or traffic). Throws std::runtime_error.
 void open_for_writing(std::ofstream& stream, const std::string& file);
 
-/// CSV of what the board does not show the host, a row every ms of the board's time.
+/// CSV of true values that the board does not show to the host, one row per ms of the board's time.
 class TruthFile {
  public:
-  /// `with_trip_flags`: a last column for boards that have them. Without a file nothing is written. Throws
+  /// `with_trip_flags`: adds a last column, for boards that have them. An empty file name writes nothing. Throws
   /// std::runtime_error.
   TruthFile(const std::string& file, bool with_trip_flags);
 
-  /// Lets the board go on to `time_ns`, with a row wherever one is due on the way.
+  /// Advances the board to `time_ns` and writes every row that is due in between.
   template <typename Board>
   void advance(Board& board, std::int64_t time_ns) {
     while (stream_.is_open() && next_ns_ <= time_ns) {

@@ -17,7 +17,7 @@ namespace {
 
 using namespace abs_hil;
 
-/// The paper brakes from 1625 rpm.
+/// The paper brakes from 1625 rpm, 170 rad/s.
 constexpr double start_speed_rad_s = 170.0;
 
 struct Options {
@@ -51,7 +51,7 @@ void tune(const std::string& controller, const Options& o) {
                   controller, fmt::join(o.plants, ","), o.cases, o.search.generations, o.search.seed);
   const std::string text = study::to_toml(controller, result, comment);
   file.write(text);
-  fmt::print("{}: cost {:.5f}, with the gains so far {:.5f}\n{}\n", controller, result.cost, result.start_cost, text);
+  fmt::print("{}: cost {:.5f}, with the previous gains {:.5f}\n{}\n", controller, result.cost, result.start_cost, text);
 }
 
 int run(int argc, char** argv) {
@@ -67,7 +67,8 @@ int run(int argc, char** argv) {
       ->capture_default_str();
   cli.add_option("--seed", o.search.seed, "seed of the search")->capture_default_str();
   o.search.threads = study::machine_threads();
-  cli.add_option("--threads", o.search.threads, "changes no figure")->check(CLI::Range(1, 1024));
+  cli.add_option("--threads", o.search.threads, "number of threads; does not change the results")
+      ->check(CLI::Range(1, 1024));
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,4 +1,4 @@
-// abs_hil with a controller of one's own: on the simulated rig and on the real one, with every option of abs_hil.
+// abs_hil with its own controller, on the simulated and on the real rig, with every option of abs_hil.
 #include <abs_hil/control/slip_error_dynamics.hpp>
 #include <abs_hil/program/program.hpp>
 
@@ -6,7 +6,7 @@ namespace {
 
 using namespace abs_hil::control;
 
-/// Torque proportional to the slip error, about one that roughly holds the wanted slip.
+/// Torque proportional to the slip error, around a torque that roughly holds the slip reference.
 class Proportional final : public SlipController {
  public:
   explicit Proportional(const ControllerContext& context) : wheels_{context.rig.wheels} {}

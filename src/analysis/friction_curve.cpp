@@ -16,9 +16,9 @@ namespace abs_hil::analysis {
 namespace {
 
 constexpr double half_window_s = 0.03;
-constexpr std::size_t least_samples = 12;  ///< of a window: a cubic with enough to average
-constexpr double slow_m_s = 1.0;           ///< below, slip is mostly the encoders' error
-constexpr double near_peak = 0.85;         ///< part of the largest force above which points shape the peak
+constexpr std::size_t least_samples = 12;  ///< per window: enough samples to average over a cubic
+constexpr double slow_m_s = 1.0;           ///< below this speed slip is mostly encoder error
+constexpr double near_peak = 0.85;         ///< points above this share of the largest force define the peak
 constexpr std::size_t least_peak_points = 20;
 constexpr int grid = 2000;
 
@@ -28,7 +28,7 @@ struct Motion {
   double alpha_rad_s2;
 };
 
-/// Cubic by least squares; `angles` by column.
+/// Least-squares cubic; one column of `angles` per wheel.
 using Angles = Eigen::Matrix<double, Eigen::Dynamic, 2>;
 
 std::array<Motion, 2> fitted(const Eigen::VectorXd& times_s, const Angles& angles_rad) {
@@ -77,7 +77,7 @@ void find_peak(FrictionCurveResult& result) {
       best = i;
     }
   }
-  // A largest value at an end is no peak that was passed.
+  // If the largest value is at an end, the run did not pass a peak.
   if (best == 0 || best == grid) return;
   result.peak_force_N = best_N;
   result.peak_slip = std::exp(std::lerp(least, most, static_cast<double>(best) / grid));

@@ -17,19 +17,18 @@ struct FrictionPoint {
   double force_N{0.0};
 };
 
-/// The tyre's friction curve as a run went along it, and its peak. NaN where the run did not pass a peak.
+/// The tyre's friction curve over the slip range of a run, and its peak. NaN if the run did not pass a peak.
 struct FrictionCurveResult {
   std::vector<FrictionPoint> points{};
   double peak_force_N{rig::unknown};
   double peak_slip{rig::unknown};
 };
 
-/// Traces the friction curve from both encoders' counts and the time of their reading alone, over phase `brake`:
+/// Traces the friction curve over phase `brake` from the counts of both encoders and their reading times alone:
 ///   force = -(J2 omega2' + d2 omega2 + M20) / r2  (2),   slip (5) from both speeds.
-/// Speeds and deceleration come from cubics fitted by least squares to the counts within 30 ms on either side, which
-/// does not lag, as a filter that runs along with the cycle must. Nothing is assumed of the tyre; wheel parameters are
-/// those that the controller knows. The peak is that of a cubic in ln(slip) through the points above 85 % of the
-/// largest force.
+/// Speeds and deceleration come from least-squares cubics through the counts within 30 ms on either side. These have no
+/// lag, unlike a filter in the cycle. The method assumes nothing about the tyre; wheel parameters are the controller's.
+/// The peak is that of a cubic in ln(slip) through the points above 85 % of the largest force.
 class FrictionCurve final : public rig::RecordSink {
  public:
   FrictionCurve(const rig::WheelParameters& wheels, std::int32_t counts_per_rev);
@@ -39,7 +38,7 @@ class FrictionCurve final : public rig::RecordSink {
 
  private:
   struct Sample {
-    double time_s;       ///< of the reading, from the first sample on
+    double time_s;       ///< time of the reading since the first sample
     std::int64_t upper;  ///< counts, unwrapped
     std::int64_t lower;
   };
@@ -54,7 +53,7 @@ class FrictionCurve final : public rig::RecordSink {
 
 /// As CSV: time_s,slip,force_N.
 [[nodiscard]] std::string to_csv(const FrictionCurveResult& result);
-/// For a run's summary: peak_force_N, peak_slip, points.
+/// Fields of a run's summary: peak_force_N, peak_slip, points.
 [[nodiscard]] nlohmann::ordered_json to_json(const FrictionCurveResult& result);
 
 }  // namespace abs_hil::analysis

@@ -6,11 +6,11 @@
 
 namespace abs_hil::analysis {
 
-/// A file of results that is either whole or not there: opened beside its place before the run, so that a bad path is
-/// known before anything moves, and renamed into place once written.
+/// A result file that is either complete or absent. It is created under a temporary name before the run, so that a bad
+/// path is reported before anything moves, and renamed once it is written.
 class ResultFile {
  public:
-  /// @param what "the summary", say, for messages. Throws std::runtime_error, naming path, reason and fix, if the file
+  /// @param what  name for messages, as "the summary". Throws std::runtime_error with path, reason and fix if the file
   /// cannot be created.
   ResultFile(std::filesystem::path path, std::string what);
   ResultFile(const ResultFile&) = delete;

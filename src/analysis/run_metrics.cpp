@@ -9,7 +9,7 @@ constexpr double rms_start_s = 0.3;
 /// Slower than this the slip dynamics stiffen as 1 / v_x and the paper calls the performance "no longer relevant".
 constexpr double slip_band = 0.02;
 constexpr double theta_band = 0.05;
-/// A wheel that keeps less than a twentieth of the car's speed gives no more steering than one that stands.
+/// A wheel below a twentieth of the car's speed can be steered no better than a locked one.
 constexpr double locked_slip = 0.95;
 }  // namespace
 

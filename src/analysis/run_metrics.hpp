@@ -7,40 +7,40 @@
 
 namespace abs_hil::analysis {
 
-/// Car speed above which slip and its estimates are judged: below, a count of an encoder is a large part of them.
+/// Car speed above which slip and its estimates are judged. Below it one encoder count is a large part of them.
 inline constexpr double least_judged_speed_m_s = 3.0;
 
-/// What a braking run was worth. NaN where a run does not get that far or the backend cannot know. Speeds and slip are
-/// the true ones where the backend knows them, else the estimates.
+/// Metrics of a braking run. NaN if the run did not get that far or the backend cannot know the value. Speeds and slip
+/// are true values if the backend knows them, else estimates.
 struct Metrics {
   double brake_start_s{rig::unknown};     ///< first cycle in phase brake
-  double stop_time_s{rig::unknown};       ///< from there to the first tick with v_x below the end speed
-  double stop_distance_m{rig::unknown};   ///< trapezoid of v_x over the ticks between
-  double slip_rms{rig::unknown};          ///< of slip - slip_ref, later than 0.3 s after brake start and v_x > 3 m/s
-  double slip_settling_s{rig::unknown};   ///< after which slip stays within 0.02 of slip_ref while v_x > 3 m/s
-  double theta_final_N{rig::unknown};     ///< last estimate while v_x > 3 m/s
-  double theta_settling_s{rig::unknown};  ///< after which the estimate stays within 5 % of the truth while v_x > 3 m/s
-  double torque_total_variation_Nm{rig::unknown};  ///< of the torque asked for, over phase brake: measures chatter
-  double slip_overshoot{rig::unknown};     ///< most that slip exceeds slip_ref by while v_x > 3 m/s; 0 if it never does
-  double time_locked_s{rig::unknown};      ///< time braked with slip > 0.95 while v_x > 3 m/s
-  double theta_error_final{rig::unknown};  ///< theta_final_N over the true theta then, less 1
-  double theta_error_rms{rig::unknown};    ///< of the estimate over the truth less 1, where slip_rms looks
+  double stop_time_s{rig::unknown};       ///< from brake_start_s to the first tick with v_x below the end speed
+  double stop_distance_m{rig::unknown};   ///< v_x over the ticks of the stop time, by the trapezoidal rule
+  double slip_rms{rig::unknown};          ///< of slip - slip_ref, from 0.3 s after brake start while v_x > 3 m/s
+  double slip_settling_s{rig::unknown};   ///< time after which slip stays within 0.02 of slip_ref while v_x > 3 m/s
+  double theta_final_N{rig::unknown};     ///< last estimate with v_x > 3 m/s
+  double theta_settling_s{rig::unknown};  ///< time after which it stays within 5 % of the truth while v_x > 3 m/s
+  double torque_total_variation_Nm{rig::unknown};  ///< of the torque reference over phase brake: measures chatter
+  double slip_overshoot{rig::unknown};             ///< largest slip - slip_ref while v_x > 3 m/s, >= 0
+  double time_locked_s{rig::unknown};              ///< braking time with slip > 0.95 while v_x > 3 m/s
+  double theta_error_final{rig::unknown};          ///< theta_final_N / true theta at that time - 1
+  double theta_error_rms{rig::unknown};            ///< of estimate / truth - 1, over the samples of slip_rms
 };
 
-/// Computes the metrics from the records as they come, without storing them.
+/// Computes the metrics from a stream of records without storing them.
 class RunMetrics final : public rig::RecordSink {
  public:
-  /// @param r2_m lower wheel's radius
-  /// @param end_speed_m_s v_x at which the car counts as stopped, > 0
+  /// @param r2_m  lower wheel's radius
+  /// @param end_speed_m_s  v_x below which the car counts as stopped, > 0
   RunMetrics(double r2_m, double end_speed_m_s) : r2_m_(r2_m), end_speed_m_s_(end_speed_m_s) {}
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
   [[nodiscard]] Metrics metrics() const;
-  /// True once the stop is known and braking is over: no later record changes a metric.
+  /// True once the stop is known and braking is over: later records change no metric.
   [[nodiscard]] bool complete() const noexcept { return !braking_ && !std::isnan(metrics_.stop_time_s); }
 
  private:
-  /// Since when a quantity has stayed within its band, counted from the start of braking.
+  /// Finds the time since which a quantity has stayed within its band, from the start of braking.
   class Settling {
    public:
     void observe(double since_brake_s, bool inside) noexcept {

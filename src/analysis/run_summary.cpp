@@ -144,9 +144,9 @@ std::string to_text(const RunSummary& s) {
     line("timing", "virtual time (--fast): no latencies to report");
   } else {
     add_timing(s.timing, line);
-    if (!s.realtime) line("real time", "NOT obtained: late cycles are to be expected");
+    if (!s.realtime) line("real time", "NOT obtained: expect late cycles");
   }
-  if (!s.truth_known) line("note", "speeds and slip are estimates: this backend knows no truth");
+  if (!s.truth_known) line("note", "speeds and slip are estimates: this backend has no true values");
   return text;
 }
 

@@ -12,7 +12,7 @@
 
 namespace abs_hil::analysis {
 
-/// Everything a run's summary says.
+/// The contents of a run's summary.
 struct RunSummary {
   std::string result;  ///< "completed", "fault" or "stopped"
   std::string reason;
@@ -26,23 +26,23 @@ struct RunSummary {
   std::uint64_t publish_failures{0};
   std::uint64_t csv_rows_lost{0};
   bool realtime{false};      ///< every required step of the real-time set-up was obtained
-  bool virtual_time{false};  ///< --fast: the timing figures say nothing of this machine
-  bool truth_known{false};   ///< metrics come from the simulator's truth, not from estimates
+  bool virtual_time{false};  ///< --fast: the timing figures do not describe this computer
+  bool truth_known{false};   ///< metrics are computed from the simulator's true values, not from estimates
   rig::TimingSummary timing{};
-  rig::GateCounts gate{};  ///< what the command gate did to the commands
+  rig::GateCounts gate{};  ///< numbers of the command gate's interventions
   nlohmann::ordered_json config{};
-  nlohmann::ordered_json friction_curve{};  ///< what the experiment's analysis found; null without one
+  nlohmann::ordered_json friction_curve{};  ///< result of the experiment's analysis; null without one
 };
 
 /// The summary as JSON, field names as in docs/telemetry.md; NaN becomes null.
 [[nodiscard]] nlohmann::ordered_json to_json(const RunSummary& summary);
-/// The summary for people, a few lines.
+/// The summary as a few lines of text.
 [[nodiscard]] std::string to_text(const RunSummary& summary);
 
-/// A summary file that is either whole or not there (see ResultFile).
+/// A summary file that is either complete or absent (see ResultFile).
 class SummaryFile {
  public:
-  /// Throws std::runtime_error, naming path, reason and fix, if the file cannot be created.
+  /// Throws std::runtime_error with path, reason and fix if the file cannot be created.
   explicit SummaryFile(std::filesystem::path path);
   /// Throws std::runtime_error if the file cannot be written.
   void write(const RunSummary& summary);

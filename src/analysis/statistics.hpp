@@ -5,9 +5,9 @@
 
 namespace abs_hil::analysis {
 
-/// What a sample says about its mean. NaN where the sample is too small: the mean of none, the rest of fewer than two.
+/// Estimate of a mean. NaN if the sample is too small: the mean needs one value, everything else two.
 struct Estimate {
-  std::size_t n{0};  ///< values that are numbers; NaN counts as missing
+  std::size_t n{0};  ///< number of values; NaN counts as missing
   double mean{0.0};
   double standard_deviation{0.0};  ///< of the sample, with n - 1
   double low{0.0};                 ///< 95 % confidence interval of the mean: mean -+ t(0.975, n - 1) s / sqrt(n)
@@ -15,18 +15,18 @@ struct Estimate {
   [[nodiscard]] double half_width() const noexcept { return 0.5 * (high - low); }
 };
 
-/// Quantile of Student's t distribution. @param probability in (0, 1) @param degrees_of_freedom >= 1
+/// Quantile of Student's t distribution. @param probability  in (0, 1) @param degrees_of_freedom  >= 1
 [[nodiscard]] double student_t_quantile(double probability, double degrees_of_freedom);
 
-/// Mean of the values that are numbers.
+/// Mean of the values that are not NaN.
 [[nodiscard]] Estimate estimate_mean(std::span<const double> values);
 
-/// Mean of `values[i] - base[i]` over the pairs in which both are numbers. What varies both alike (common random
-/// numbers) drops out, so that small differences show. Throws std::invalid_argument for unequal lengths.
+/// Mean of `values[i] - base[i]` over the pairs without NaN. Common random numbers cancel, so that small differences
+/// show. Throws std::invalid_argument for unequal lengths.
 [[nodiscard]] Estimate estimate_difference(std::span<const double> values, std::span<const double> base);
 
-/// Geometric mean of `values[i] / base[i]` over the pairs in which both are > 0, its interval by the t distribution on
-/// the logarithms, so that the ratio the other way round has the inverse interval. `standard_deviation` is that of the
+/// Geometric mean of `values[i] / base[i]` over the pairs in which both are > 0. The interval comes from the t
+/// distribution of the logarithms, so the inverse ratio has the inverse interval. `standard_deviation` is that of the
 /// logarithms. Throws std::invalid_argument for unequal lengths.
 [[nodiscard]] Estimate estimate_ratio(std::span<const double> values, std::span<const double> base);
 

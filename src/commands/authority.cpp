@@ -33,23 +33,23 @@ constexpr std::size_t session_bytes = 16;
 }  // namespace
 
 std::string read_key(const std::filesystem::path& file) {
-  const std::string make_one = "; make one: (umask 077; openssl rand -hex 32 > " + file.string() + ")";
+  const std::string make_one = "; create one:  (umask 077; openssl rand -hex 32 > " + file.string() + ")";
   if (file.empty()) {
     throw config::ConfigError(
-        "commands.key_file: none given; commands need a secret: (umask 077; openssl rand -hex 32 "
+        "commands.key_file: not set; remote commands need a secret key: (umask 077; openssl rand -hex 32 "
         "> commands.key), then --set commands.key_file=commands.key");
   }
   struct stat facts {};
   if (::stat(file.c_str(), &facts) != 0) {
     refuse(file, std::string("cannot be read: ") + std::strerror(errno) + make_one);
   }
-  if (!S_ISREG(facts.st_mode)) refuse(file, "is no file" + make_one);
-  if ((facts.st_mode & S_IRWXO) != 0) refuse(file, "is open to everybody: chmod o= " + file.string());
+  if (!S_ISREG(facts.st_mode)) refuse(file, "is not a regular file" + make_one);
+  if ((facts.st_mode & S_IRWXO) != 0) refuse(file, "is accessible to all users: chmod o= " + file.string());
   std::ifstream stream(file, std::ios::binary);
   std::string key{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream) refuse(file, "cannot be read: choose one that you may read");
+  if (!stream) refuse(file, "cannot be read; choose a file that you may read");
   key.erase(key.find_last_not_of(" \t\r\n") + 1);
-  if (key.size() < key_min_characters) refuse(file, "holds less than 16 characters" + make_one);
+  if (key.size() < key_min_characters) refuse(file, "holds fewer than 16 characters" + make_one);
   return key;
 }
 
@@ -70,14 +70,14 @@ std::string mac_of(const command2_t& command, const std::string& key) {
 Authority::Authority(std::string key) : key_(std::move(key)) {
   std::array<unsigned char, session_bytes> random{};
   if (RAND_bytes(random.data(), static_cast<int>(random.size())) != 1) {
-    throw std::runtime_error("no random numbers to be had for the session of commands");
+    throw std::runtime_error("the system provides no random numbers for the command session");
   }
   session_ = telemetry::hexadecimal(random);
 }
 
 rig::Reason Authority::judge(const command2_t& command) {
   const std::string expected = mac_of(command, key_);
-  // In constant time: the time taken must not tell how much of a guess was right.
+  // Compare in constant time: the duration must not reveal how much of a guess was right.
   const bool authentic =
       command.mac.size() == expected.size() && CRYPTO_memcmp(command.mac.data(), expected.data(), expected.size()) == 0;
   if (!authentic) return rig::Reason::command_not_authentic;

@@ -25,7 +25,7 @@ constexpr std::size_t shown_text_max_bytes = 64;
 constexpr int thread_wait_ms = 50;
 constexpr std::chrono::seconds reconnect_after{1};
 constexpr int tcpq_timeout_ms = 200;
-/// LCM queues 30 messages if nobody says otherwise, and a flood would push a stop out.
+/// LCM's default queue holds 30 messages, and a flood would push a stop out of it.
 constexpr int lcm_queue_capacity = 1024;
 constexpr std::string_view too_long = "too long for a command";
 
@@ -33,7 +33,7 @@ constexpr std::string_view too_long = "too long for a command";
 
 CommandListener::CommandListener(LcmOutlet& outlet, MessageStream& stream, std::function<void()> on_stop)
     : outlet_(outlet), stream_(stream), on_stop_(std::move(on_stop)) {
-  // A log file has nothing to say, and its descriptor for waiting is not one to poll.
+  // A log file delivers no messages, and its descriptor cannot be polled.
   if (outlet_.provider() == "file") return;
   if (outlet_.provider() == "udpm") {
     udpm_.emplace(outlet_.url(), stream_.command_channel());
@@ -58,7 +58,7 @@ void CommandListener::subscribe() {
 
 CommandListener::~CommandListener() {
   end_thread();
-  // An LCM object of its own takes its subscription with it; tcpq would look for its server once more.
+  // An own LCM object unsubscribes by itself; with tcpq an explicit call would search for the server again.
   if (!own_lcm_ && subscription_ != nullptr) lcm_unsubscribe(lcm_, subscription_);
 }
 
@@ -80,7 +80,7 @@ void CommandListener::listen() {
 }
 
 void CommandListener::listen_until(const std::stop_token& stop) {
-  // Signals are for the main thread.
+  // Only the main thread handles signals.
   sigset_t all;
   sigfillset(&all);
   pthread_sigmask(SIG_BLOCK, &all, nullptr);
@@ -88,20 +88,21 @@ void CommandListener::listen_until(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     const bool connected = file_descriptor() >= 0;
     if (receive(thread_wait_ms) || connected) continue;
-    // tcpq without its server: looked for not more often than publishing does.
+    // The tcpq server is away: look for it no more often than publishing does.
     for (auto waited = std::chrono::milliseconds(0); waited < reconnect_after && !stop.stop_requested();
          waited += std::chrono::milliseconds(thread_wait_ms)) {
       std::this_thread::sleep_for(std::chrono::milliseconds(thread_wait_ms));
     }
     if (stop.stop_requested() || ask_tcpq_server(server, tcpq_timeout_ms) != TcpqServer::answers) continue;
-    // This connects again. Handling would, too, and then wait for a message without end.
+    // Subscribing connects again. lcm_handle would connect too, but then wait for a message without a time limit.
     lcm_unsubscribe(lcm_, subscription_);
     subscribe();
   }
 }
 
 bool CommandListener::receive(int timeout_ms) {
-  // Not lcm_handle_timeout: its select() does not survive descriptors of -1 (tcpq without server) or above 1023.
+  // lcm_handle_timeout does not work here: its select() cannot handle a descriptor of -1 (tcpq without server) or above
+  // 1023.
   pollfd ready{file_descriptor(), POLLIN, 0};
   if (ready.fd < 0 || ::poll(&ready, 1, timeout_ms) <= 0) return false;
   if (udpm_) {
@@ -115,7 +116,7 @@ bool CommandListener::receive(int timeout_ms) {
     return true;
   }
   if (outlet_.provider() == "tcpq") {
-    // A server that stands still within a message must not keep the run from ending.
+    // A server that stalls in the middle of a message must not keep the run from ending.
     constexpr timeval timeout{.tv_sec = 0, .tv_usec = suseconds_t{tcpq_timeout_ms} * 1000};
     static_cast<void>(::setsockopt(ready.fd, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout));
   }
@@ -150,7 +151,7 @@ void CommandListener::answer_waiting(std::size_t at_most) {
   }
 }
 
-// Only copies: answers are published, and may throw, outside of LCM's C code.
+// Only copies the packet: publishing an answer may throw, and must not throw through LCM's C code.
 void CommandListener::on_packet(const lcm_recv_buf_t* received, const char* /*channel*/, void* self) noexcept {
   Packet& packet = static_cast<CommandListener*>(self)->packet_;
   packet.size = received->data_size;
@@ -181,7 +182,7 @@ void CommandListener::hand_over(Arrival arrival, bool is_stop) {
   if (arrivals_.size() < most_waiting) {
     arrivals_.push_back(std::move(arrival));
   } else if (is_stop) {
-    arrivals_.front() = std::move(arrival);  // a stop is answered whatever else came
+    arrivals_.front() = std::move(arrival);  // the queue is full, but a stop must be answered
     dropped_.fetch_add(1, std::memory_order_relaxed);
   } else {
     dropped_.fetch_add(1, std::memory_order_relaxed);
@@ -212,8 +213,8 @@ void CommandListener::answer(const Arrival& arrival) {
   ++refused_;
   const std::string shown = "refused '" + printable(name, shown_text_max_bytes) + "': ";
   if (command != nullptr) {
-    return say(rig::Reason::commands_not_enabled, shown + "only 'stop' is accepted (commands.enabled)" + from, refused_,
-               false);
+    return say(rig::Reason::commands_not_enabled,
+               shown + "only 'stop' is accepted, as this run has commands.enabled = false" + from, refused_, false);
   }
   say(rig::Reason::command_unknown, shown + "only 'stop' is accepted" + from, refused_, false);
 }
@@ -224,7 +225,7 @@ void CommandListener::say(rig::Reason reason, std::string message, std::uint64_t
     answer_window_start_s_ = now_s;
     answers_in_window_ = 0;
   }
-  // A flood must not get a flood of answers.
+  // A flood of messages must not cause a flood of answers.
   if (!always && answers_in_window_ >= answers_per_second) return;
   if (!always) ++answers_in_window_;
   stream_.answer_command(reason, std::move(message), static_cast<double>(count));

@@ -22,10 +22,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds stop_again{50};
-/// A run's slow side ends within this time after its last cycle.
+/// After its last cycle a run's slow thread ends within this time.
 constexpr std::chrono::seconds last_words{1};
 
-/// Listens to one program's answers.
+/// Collects the answers of one running program.
 class Answers {
  public:
   Answers(lcm_t* lcm, const std::string& prefix, std::string sender) : lcm_(lcm), sender_(std::move(sender)) {
@@ -39,7 +39,7 @@ class Answers {
     lcm_unsubscribe(lcm_, states_);
   }
 
-  /// Takes in what comes until `until`, at the latest until `enough` says so.
+  /// Receives messages until `until`, or until `enough` returns true.
   template <class Enough>
   void wait(Clock::time_point until, Enough enough) {
     while (!enough()) {
@@ -51,7 +51,7 @@ class Answers {
   }
 
   std::optional<event_t> answer{};
-  std::optional<event_t> ending{};  ///< the run's last phase, if it began while we listened
+  std::optional<event_t> ending{};  ///< the event that ended the run, if it arrived while we listened
   std::optional<command_state_t> state{};
 
  private:
@@ -90,13 +90,15 @@ void publish(lcm_t* lcm, const std::string& channel, const Message& message) {
   telemetry::EncodeBuffer buffer;
   const auto bytes = buffer.encode(message);
   if (lcm_publish(lcm, channel.c_str(), bytes.data(), static_cast<unsigned int>(bytes.size())) != 0) {
-    throw telemetry::LcmError("the command could not be published on " + channel);
+    throw telemetry::LcmError("cannot publish the command on " + channel);
   }
 }
 
 Reply reply_of(const std::optional<event_t>& answer) {
   if (!answer) {
-    return {Outcome::no_answer, "no answer: is abs_hil running, on this network and with this channel prefix?"};
+    return {
+        Outcome::no_answer,
+        "no answer; check that abs_hil is running on this network (--lcm-url) and with this telemetry.channel_prefix"};
   }
   const auto reason = static_cast<rig::Reason>(answer->reason);
   const bool accepted = reason == rig::Reason::stop_command || rig::is_adjustment(reason);
@@ -129,7 +131,7 @@ Reply send(const Order& order, const SenderOptions& options) {
   answers.wait(end, [&answers] { return answers.state.has_value(); });
   if (!answers.state) return reply_of(std::nullopt);
   if (answers.state->enabled == 0) {
-    return {Outcome::refused, "the running abs_hil takes no commands but stop: start it with commands.enabled=true"};
+    return {Outcome::refused, "the running abs_hil accepts only stop; start it with --set commands.enabled=true"};
   }
   command2_t command{};
   command.session = answers.state->session;
@@ -139,13 +141,14 @@ Reply send(const Order& order, const SenderOptions& options) {
   command.value = order.value;
   command.sender = sender;
   command.mac = mac_of(command, key);
-  answers.ending.reset();  // of a run before
+  answers.ending.reset();  // it may belong to an earlier run
   publish(lcm, channel, command);
   answers.wait(end, [&] { return answered() || answers.ending; });
-  // What ended the run is published before what the end of the run did to a command.
+  // The program publishes why the run ended before it refuses the pending commands.
   if (!answered() && answers.ending) answers.wait(std::min(end, Clock::now() + last_words), answered);
   if (!answered() && answers.ending) {
-    return {Outcome::refused, "no answer, as the run ended: " + telemetry::printable(answers.ending->message, 200)};
+    return {Outcome::refused,
+            "no answer, because the run ended: " + telemetry::printable(answers.ending->message, 200)};
   }
   return reply_of(answers.answer);
 }

@@ -5,7 +5,7 @@
 
 namespace abs_hil::commands {
 
-/// What is to be sent, and where.
+/// A command and its destination.
 struct Order {
   std::string command{};  ///< "stop", "slip-ref", "gain", "start"
   std::string name{};     ///< for "gain"
@@ -18,15 +18,15 @@ struct SenderOptions {
   double timeout_s{3.0};
 };
 
-/// What came of an order.
+/// The result of sending.
 enum class Outcome : std::uint8_t { accepted, refused, no_answer };
 struct Reply {
   Outcome outcome{Outcome::no_answer};
-  std::string message{};  ///< the program's own words, or what is missing
+  std::string message{};  ///< the program's answer, or why there is none
 };
 
-/// Sends an order to a running abs_hil and waits for its answer. A stop needs no key and is sent again and again until
-/// it is answered. Throws telemetry::LcmError without a network and config::ConfigError for the key.
+/// Sends a command to a running abs_hil and waits for its answer. A stop needs no key and is repeated until it is
+/// answered. Throws telemetry::LcmError without a network and config::ConfigError for the key.
 [[nodiscard]] Reply send(const Order& order, const SenderOptions& options);
 
 }  // namespace abs_hil::commands

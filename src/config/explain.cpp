@@ -68,12 +68,12 @@ std::string in_words(const experiment::EndCondition& end) {
 std::string brake_in_words(const experiment::PhasePlan& phase, const config::Settings& s) {
   switch (phase.brake) {
     case BrakeAction::released: return "off";
-    case BrakeAction::torque: return "torque " + in_words(phase.brake_course, phase.brake_torque_Nm, " N m");
-    case BrakeAction::duty: return "duty " + in_words(phase.brake_course, phase.brake_duty, "");
+    case BrakeAction::torque: return "torque " + in_words(phase.brake_profile, phase.brake_torque_Nm, " N m");
+    case BrakeAction::duty: return "duty " + in_words(phase.brake_profile, phase.brake_duty, "");
     case BrakeAction::slip_control: break;
   }
   return fmt::format("controller {}, slip reference {}", s.control.controller,
-                     in_words(phase.slip_ref_course, s.control.slip_ref, ""));
+                     in_words(phase.slip_ref_profile, s.control.slip_ref, ""));
 }
 
 void add_series(const SeriesScript& series, const config::Settings& s, std::string& text) {
@@ -107,9 +107,9 @@ std::string explain(const Script& script, const config::Settings& settings) {
     for (const experiment::EndCondition& end : phase.ends_on) ends += (ends.empty() ? "" : ", or ") + in_words(end);
     text += fmt::format("{}. {} ({}): motor {}, brake {}\n   until {}; a fault after {} s\n", i + 1,
                         plan.phase_names[i], rig::name_of(phase.phase),
-                        phase.motor_course.empty() && phase.motor_duty == 0.0
+                        phase.motor_profile.empty() && phase.motor_duty == 0.0
                             ? "off"
-                            : "duty " + in_words(phase.motor_course, phase.motor_duty, ""),
+                            : "duty " + in_words(phase.motor_profile, phase.motor_duty, ""),
                         brake_in_words(phase, s), ends, number(phase.time_limit_s));
   }
   text += fmt::format("Limits: wheels {} rad/s, motor duty {}, brake duty {}", number(s.gate.overspeed_rad_s),

@@ -129,13 +129,13 @@ class Planner {
 
   [[nodiscard]] experiment::PhasePlan planned(const PhaseScript& phase) const {
     experiment::PhasePlan plan{.phase = kind_of(phase), .brake = phase.brake};
-    plan.motor_course = course_or(phase.motor, plan.motor_duty);
+    plan.motor_profile = course_or(phase.motor, plan.motor_duty);
     if (phase.brake == BrakeAction::slip_control) {
       // A constant too: it stands in place of control.slip_ref.
-      if (phase.brake_course) plan.slip_ref_course = profile(*phase.brake_course);
+      if (phase.brake_profile) plan.slip_ref_profile = profile(*phase.brake_profile);
     } else {
-      plan.brake_course =
-          course_or(phase.brake_course, phase.brake == BrakeAction::duty ? plan.brake_duty : plan.brake_torque_Nm);
+      plan.brake_profile =
+          course_or(phase.brake_profile, phase.brake == BrakeAction::duty ? plan.brake_duty : plan.brake_torque_Nm);
     }
     for (const ConditionScript& script : phase.until) {
       if (!script.when || holds(*script.when, keys_)) plan.ends_on.push_back(condition(script));
@@ -245,10 +245,10 @@ std::vector<std::string> beyond_limits(const Plan& plan, const config::Settings&
                                        wanted, unit, most, unit));
       }
     };
-    compare(highest(phase.motor_course, phase.motor_duty), s.gate.motor_duty_max, "motor duty", "");
-    compare(highest(phase.brake_course, phase.brake_torque_Nm) * (phase.brake == BrakeAction::torque ? 1.0 : 0.0),
+    compare(highest(phase.motor_profile, phase.motor_duty), s.gate.motor_duty_max, "motor duty", "");
+    compare(highest(phase.brake_profile, phase.brake_torque_Nm) * (phase.brake == BrakeAction::torque ? 1.0 : 0.0),
             most_torque_Nm, "brake torque", " N m");
-    compare(highest(phase.brake_course, phase.brake_duty) * (phase.brake == BrakeAction::duty ? 1.0 : 0.0),
+    compare(highest(phase.brake_profile, phase.brake_duty) * (phase.brake == BrakeAction::duty ? 1.0 : 0.0),
             s.gate.brake_duty_max, "brake duty", "");
     for (const experiment::EndCondition& end : phase.ends_on) {
       if (end.kind == EndKind::upper_speed_above || end.kind == EndKind::lower_speed_above) {

@@ -13,14 +13,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Addresses of the cards below a folder; none if it is not there.
+/// Addresses of the cards below a folder; empty if it does not exist.
 std::vector<std::string> addresses(const fs::path& devices) try {
   return driver::pci::find_cards(devices);
 } catch (const driver::Unavailable&) {
   return {};
 }
 
-/// Opening a resource file touches no register.
+/// Opening a resource file does not access a register.
 bool can_read_and_write(const fs::path& file) {
   const int descriptor = ::open(file.c_str(), O_RDWR | O_CLOEXEC);
   if (descriptor >= 0) ::close(descriptor);
@@ -81,7 +81,7 @@ std::vector<Finding> judge(const std::vector<driver::usb::UsbDevice>& boards) {
     return {{.check = "boards",
              .what = "no RT-DAC/USB2 found",
              .standing = Standing::note,
-             .detail = "looked for by driver.usb.manufacturer, .vendor_id, .product_id and .serial"}};
+             .detail = "searched by driver.usb.manufacturer, .vendor_id, .product_id and .serial"}};
   }
   std::vector<Finding> findings;
   for (const driver::usb::UsbDevice& board : boards) {

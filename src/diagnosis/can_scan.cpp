@@ -15,7 +15,7 @@ using driver::can::InterfaceFacts;
 
 constexpr double megabit = 1e6;
 constexpr double fd_data_rate = 5e6;
-/// Above this the bus has no room for anything else, and no patience with errors.
+/// Above this load the bus has no reserve for other messages or for repeated ones after errors.
 constexpr double most_load = 0.8;
 
 std::string described(const InterfaceFacts& can) {
@@ -26,7 +26,7 @@ std::string described(const InterfaceFacts& can) {
   if (can.transmit_errors + can.receive_errors > 0) {
     text += fmt::format(", error counters {} (sending) and {} (receiving)", can.transmit_errors, can.receive_errors);
   }
-  if (can.kind == "vcan") text += ", virtual: no bus behind it";
+  if (can.kind == "vcan") text += ", virtual: without a real bus";
   return text;
 }
 
@@ -72,11 +72,10 @@ Finding bus_load_finding(double rate_Hz) {
 std::vector<Finding> judge(const std::vector<InterfaceFacts>& interfaces, bool can_sockets, double rate_Hz) {
   std::vector<Finding> findings;
   if (interfaces.empty()) {
-    findings.push_back(
-        {.check = "can",
-         .what = "no CAN interface",
-         .standing = Standing::note,
-         .detail = can_sockets ? "" : "this kernel makes no CAN sockets either (sudo modprobe can_raw)"});
+    findings.push_back({.check = "can",
+                        .what = "no CAN interface",
+                        .standing = Standing::note,
+                        .detail = can_sockets ? "" : "this kernel has no CAN sockets (sudo modprobe can_raw)"});
   }
   for (const InterfaceFacts& can : interfaces) findings.push_back(judge_interface(can, rate_Hz));
   findings.push_back(bus_load_finding(rate_Hz));

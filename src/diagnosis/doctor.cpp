@@ -26,21 +26,22 @@ Findings machine_part(std::string_view check) {
   return part;
 }
 
-/// rtkit hands out SCHED_RR up to priority 20 and limits the CPU time of who takes it: no use here, but many desktops
-/// have it and their users ask.
+/// rtkit grants SCHED_RR up to priority 20 and limits the CPU time of its users. abs_hil cannot use it, but many
+/// desktops have it and their users ask about it.
 Finding rtkit_finding() {
   const bool there = std::filesystem::exists("/usr/libexec/rtkit-daemon");
-  return {.check = "realtime",
-          .what = there ? "rtkit is installed" : "rtkit is not installed",
-          .standing = Standing::note,
-          .detail = "not used: it grants SCHED_RR up to priority 20 and 200 ms of CPU time, not SCHED_FIFO"};
+  return {
+      .check = "realtime",
+      .what = there ? "rtkit is installed" : "rtkit is not installed",
+      .standing = Standing::note,
+      .detail = "abs_hil does not use it: it grants SCHED_RR up to priority 20 and 200 ms of CPU time, not SCHED_FIFO"};
 }
 
 Findings check_realtime(const Examination& e) {
   runtime::RealtimeOptions options = e.realtime;
   options.mode = runtime::RealtimeMode::prefer;
   runtime::RealtimeReport report;
-  // In a thread of its own: what it obtains ends with it.
+  // Uses a thread of its own: what the thread obtains ends with it.
   std::jthread([&] { report = runtime::RealtimeScope(options).report(); }).join();
   Findings findings;
   for (const runtime::RealtimeStep& step : report.steps) {
@@ -61,7 +62,7 @@ Findings check_lcm(const Examination& e) {
   if (!probe.usable) {
     finding.standing = Standing::warning;
     finding.detail = probe.problem;
-    finding.fix = probe.fix + "\nor run without: --no-lcm";
+    finding.fix = probe.fix + "\nor run without LCM: --no-lcm";
   }
   return {std::move(finding)};
 }

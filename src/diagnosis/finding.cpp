@@ -44,7 +44,7 @@ std::string to_text(std::span<const Finding> findings) {
   std::string text;
   for (const Finding& f : findings) {
     text += fmt::format("{}  {}{}{}\n", mark(f.standing), f.what, f.detail.empty() ? "" : ": ", f.detail);
-    if (!f.fix.empty()) text += fmt::format("      to mend it:\n{}\n", indented(f.fix, "        "));
+    if (!f.fix.empty()) text += fmt::format("      fix:\n{}\n", indented(f.fix, "        "));
   }
   return text;
 }

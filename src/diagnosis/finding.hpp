@@ -8,23 +8,23 @@
 
 namespace abs_hil::diagnosis {
 
-/// How a finding stands: a note needs nothing, a warning costs quality, with a failure the backend cannot run.
+/// Severity of a finding. A note needs no action, a warning costs quality, and after a failure the backend cannot run.
 enum class Standing : std::uint8_t { good, note, warning, failure };
 
-/// One thing that was looked at on this computer.
+/// The result of examining one item of this computer.
 struct Finding {
-  std::string check;  ///< the check it belongs to, as in `abs_hil doctor --only CHECK`
-  std::string what;   ///< "SCHED_FIFO priority 80", say
+  std::string check;  ///< name of its check, as in `abs_hil doctor --only CHECK`
+  std::string what;   ///< the item, as "SCHED_FIFO priority 80"
   Standing standing{Standing::good};
-  std::string detail{};  ///< what was observed
-  std::string fix{};     ///< commands or advice that mend it, one a line; empty if nothing is to be done
+  std::string detail{};  ///< the observation
+  std::string fix{};     ///< commands or advice, one per line; empty if no action is needed
 };
 
 [[nodiscard]] std::string_view name_of(Standing standing) noexcept;
-/// One line each, the detail and the fix below.
+/// One line per finding, with detail and fix below it.
 [[nodiscard]] std::string to_text(std::span<const Finding> findings);
 [[nodiscard]] nlohmann::ordered_json to_json(std::span<const Finding> findings);
-/// The worst standing among them; `good` for none.
+/// The worst standing of the findings; `good` if there are none.
 [[nodiscard]] Standing worst(std::span<const Finding> findings) noexcept;
 
 }  // namespace abs_hil::diagnosis

@@ -12,7 +12,7 @@ namespace {
 Grade grade_jitter(double worst_us) noexcept {
   if (worst_us < 20.0) return Grade::very_good;
   if (worst_us <= 50.0) return Grade::good;
-  return worst_us <= 500.0 ? Grade::usable : Grade::unfit;  // not a number is unfit
+  return worst_us <= 500.0 ? Grade::usable : Grade::unfit;  // NaN is unfit
 }
 
 Grade grade_in_time(double share) noexcept {
@@ -68,7 +68,7 @@ std::string to_text(const LatencyRun& run, const MachineFacts& facts) {
     text += fmt::format("  {:<18}{}\n", name, value);
   };
   text += fmt::format("{} cycles at {:.0f} Hz, {}\n", run.cycles, run.rate_Hz,
-                      run.realtime ? "in real time" : "NOT in real time (abs_hil doctor says why)");
+                      run.realtime ? "in real time" : "NOT in real time (abs_hil doctor gives the reason)");
   line("wake-up latency", quantiles_text(t.wakeup_latency));
   line("read", quantiles_text(t.read));
   line("control", quantiles_text(t.control));

@@ -8,7 +8,7 @@
 
 namespace abs_hil::diagnosis {
 
-/// What `abs_hil latency` measured.
+/// The measurements of `abs_hil latency`.
 struct LatencyRun {
   double rate_Hz{0.0};
   double duration_s{0.0};
@@ -17,11 +17,11 @@ struct LatencyRun {
   rig::TimingSummary timing{};
 };
 
-/// How well a computer keeps time.
+/// Grades of a computer's timing.
 enum class Grade : std::uint8_t { very_good, good, usable, unfit };
 [[nodiscard]] std::string_view name_of(Grade grade) noexcept;
 
-/// A grade and what it rests on.
+/// A grade and the figures behind it.
 struct Verdict {
   Grade jitter{Grade::unfit};    ///< worst wake-up: LinuxCNC's < 20 us very nice, 20-50 good, > 500 unacceptable
   double in_time{0.0};           ///< share of the ticks that were met, in [0, 1]: libfranka warns below 0.95
@@ -31,9 +31,9 @@ struct Verdict {
 };
 [[nodiscard]] Verdict judge(const LatencyRun& run) noexcept;
 
-/// Figures, verdict and the machine's facts beside them, for people.
+/// The measurements, the verdict and the computer's facts as text.
 [[nodiscard]] std::string to_text(const LatencyRun& run, const MachineFacts& facts);
-/// The same for programs.
+/// The same as JSON.
 [[nodiscard]] nlohmann::ordered_json to_json(const LatencyRun& run, const MachineFacts& facts);
 
 }  // namespace abs_hil::diagnosis

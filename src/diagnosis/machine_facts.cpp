@@ -12,7 +12,7 @@ namespace {
 namespace fs = std::filesystem;
 const std::string unknown = "unknown";
 
-/// "none voluntary (full)" -> "full": how the kernel marks the choice that is in force.
+/// "none voluntary (full)" -> "full": the kernel marks the active choice by parentheses.
 std::string chosen(const std::string& choices) {
   const auto from = choices.find('(');
   const auto to = choices.find(')', from);
@@ -20,7 +20,7 @@ std::string chosen(const std::string& choices) {
 }
 
 std::string preemption_model(const fs::path& root) {
-  if (first_line(root / "sys/kernel/realtime") == "1") return "PREEMPT_RT";  // only such kernels have the file
+  if (first_line(root / "sys/kernel/realtime") == "1") return "PREEMPT_RT";  // only PREEMPT_RT kernels have this file
   const std::string version = first_line(root / "proc/sys/kernel/version");
   if (version.find("PREEMPT_RT") != std::string::npos) return "PREEMPT_RT";
   if (version.find("PREEMPT_DYNAMIC") != std::string::npos) {
@@ -65,12 +65,12 @@ Finding kernel_finding(const MachineFacts& facts) {
 
 Finding clock_finding(const MachineFacts& facts) {
   Finding f{.check = "clock", .what = "clock source " + facts.clock_source};
-  // Others than these are read by a system call, at a microsecond and more: vdso(7), arch/x86/include/asm/vdso.
+  // All other clock sources need a system call of a microsecond and more: vdso(7), arch/x86/include/asm/vdso.
   for (const std::string_view quick : {"tsc", "kvm-clock", "hyperv_clocksource_tsc_page", "arch_sys_counter"}) {
     if (facts.clock_source == quick) return f;
   }
   f.standing = Standing::warning;
-  f.detail = "reading it takes a system call, five times a cycle";
+  f.detail = "reading it takes a system call, five times per cycle";
   f.fix =
       "cat /sys/devices/system/clocksource/clocksource0/available_clocksource\n"
       "echo tsc | sudo tee /sys/devices/system/clocksource/clocksource0/current_clocksource";
@@ -84,7 +84,7 @@ Finding governor_finding(const MachineFacts& facts) {
     f.detail = "frequencies are not scaled by this kernel";
   } else if (facts.governor != "performance") {
     f.standing = Standing::warning;
-    f.detail = "a clock that changes with the load makes cycles of uneven length";
+    f.detail = "a CPU frequency that changes with the load makes the cycle time vary";
     f.fix = "echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor";
   }
   return f;
@@ -95,7 +95,7 @@ Finding isolation_finding(const MachineFacts& facts) {
   f.detail = "of " + facts.online_cpus;
   if (facts.isolated_cpus == "none") {
     f.detail +=
-        "; a CPU of its own keeps other work away from the cycle: kernel parameters isolcpus=N nohz_full=N "
+        "; an isolated CPU keeps other work away from the cycle: kernel parameters isolcpus=N nohz_full=N "
         "rcu_nocbs=N, then --set realtime.cpu=N";
   }
   return f;
@@ -124,7 +124,7 @@ std::vector<Finding> judge(const MachineFacts& facts) {
     findings.push_back({.check = "cpu",
                         .what = "this is a virtual machine",
                         .standing = Standing::note,
-                        .detail = "its host decides when it runs: worst latencies are the host's, not this system's"});
+                        .detail = "the host decides when it runs, so the worst latencies are those of the host"});
   }
   return findings;
 }

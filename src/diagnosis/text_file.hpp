@@ -6,8 +6,8 @@
 
 namespace abs_hil::diagnosis {
 
-/// First line of a small file such as /sys holds, without trailing blanks; `otherwise` if it cannot be read or is
-/// empty.
+/// First line of a small file, such as those in /sys, without trailing blanks; `otherwise` if it is empty or cannot be
+/// read.
 [[nodiscard]] inline std::string first_line(const std::filesystem::path& file, const std::string& otherwise = {}) {
   std::ifstream stream(file);
   std::string line;

@@ -6,7 +6,7 @@
 
 namespace abs_hil::driver {
 
-/// The clock of an emulated board in lock-step: it stands still until told to go on. No hardware has one.
+/// The clock of an emulated board in lock-step: it advances only when the driver says so. No hardware has such a clock.
 class EmulatedTime {
  public:
   EmulatedTime() = default;
@@ -15,7 +15,7 @@ class EmulatedTime {
   virtual ~EmulatedTime() = default;
 
   virtual IoResult now(std::int64_t& time_ns) noexcept = 0;
-  /// Lets the emulated rig go on to `time_ns`; returns when it is there.
+  /// Advances the emulated rig to `time_ns` and returns when that is done.
   virtual IoResult advance_to(std::int64_t time_ns) noexcept = 0;
 };
 

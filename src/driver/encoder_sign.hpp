@@ -7,9 +7,10 @@
 
 namespace abs_hil::driver {
 
-/// A counter as the driver hands it on, turned round by a sign of -1. Real-time safe.
+/// The counter as a signed number, negated if `sign` is -1. Real-time safe.
 [[nodiscard]] inline std::int32_t with_sign(std::uint32_t raw, std::int32_t sign) noexcept {
-  return std::bit_cast<std::int32_t>(sign < 0 ? 0U - raw : raw);  // unsigned: the most negative count has no negative
+  return std::bit_cast<std::int32_t>(sign < 0 ? 0U - raw
+                                              : raw);  // unsigned arithmetic: the most negative count has no negative
 }
 
 /// Throws std::invalid_argument, naming the key, unless `sign` is 1 or -1.

@@ -55,26 +55,27 @@ std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options, bool lo
         lock_step ? nullptr : monotonic_ns);
   }
   throw Unavailable("backend rig: driver.kind = \"" + options.kind +
-                    "\": this build does not drive that board; use driver.kind=pci, driver.kind=can or --backend sim");
+                    "\": this build has no driver for that board; use driver.kind=pci, can or usb, or --backend sim");
 }
 
 std::string verification_note(const DriverOptions& options) {
   if (options.verified_on_hardware) return {};
   if (options.kind == "can") {
     return "backend rig, driver.kind=can: not verified on hardware. The protocol is this project's own (docs/can.md) "
-           "and "
-           "was tried on an emulated node alone: go through docs/can.md, \"What is not verified\", then set "
-           "driver.verified_on_hardware=true";
+           "and has been tested only with an emulated node. Do the checks of docs/can.md, \"What is not verified\", "
+           "then "
+           "set driver.verified_on_hardware=true";
   }
   if (options.kind == "usb") {
-    return "backend rig, driver.kind=usb: not verified on hardware. Its words come from the maker's documents and were "
-           "tried on an emulator alone, and no watchdog of the board is known: go through docs/usb.md and "
+    return "backend rig, driver.kind=usb: not verified on hardware. The frame format comes from the maker's documents "
+           "and has been tested only with an emulator. The board has no known watchdog. Do the checks of docs/usb.md "
+           "and "
            "docs/rig-setup.md with abs_hil commission, then set driver.verified_on_hardware=true";
   }
   return "backend rig, driver.kind=" + options.kind +
-         ": not verified on hardware. Its registers come from the maker's documents and were tried on an emulator "
-         "alone: "
-         "go through docs/rig-setup.md with abs_hil commission, then set driver.verified_on_hardware=true";
+         ": not verified on hardware. The register map comes from the maker's documents and has been tested only with "
+         "an emulator. Do the checks of docs/rig-setup.md with abs_hil commission, then set "
+         "driver.verified_on_hardware=true";
 }
 
 std::unique_ptr<SafeStateWriter> make_safe_state_writer(const DriverOptions& options) {

@@ -36,22 +36,22 @@ struct BackendEntry {
   std::string_view name;
   std::string_view summary;
 };
-/// What `--backend` takes. The simulated one is made by `SimDriver` itself: only driver/sim knows the plant.
+/// Values of `--backend`. Callers make a SimDriver themselves for the simulated one: only driver/sim knows the plant.
 [[nodiscard]] std::span<const BackendEntry> backends() noexcept;
 
-/// The boards that `driver.kind` knows.
+/// Values of `driver.kind`.
 [[nodiscard]] std::span<const BackendEntry> boards() noexcept;
 
-/// The rig behind the board that `options.kind` names; its `configure` looks for the board. Throws
-/// std::invalid_argument for an option outside its range, Unavailable for a kind that this build does not drive.
-/// @param lock_step  drive an emulator's time (`options.emulated`, `--fast`)
+/// Makes the driver of the board that `options.kind` names; its `configure` looks for the board. Throws
+/// std::invalid_argument for an option outside its range, Unavailable for a kind without a driver in this build.
+/// @param lock_step  the driver advances an emulator's time (`options.emulated`, `--fast`)
 [[nodiscard]] std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options, bool lock_step = false);
 
-/// The writer of the safe state for the board that `options.kind` names. Throws Unavailable for a kind that has none in
-/// this build.
+/// Makes the writer of the safe state for the board that `options.kind` names. Throws Unavailable for a kind without
+/// one in this build.
 [[nodiscard]] std::unique_ptr<SafeStateWriter> make_safe_state_writer(const DriverOptions& options);
 
-/// "not verified on hardware ..." until the configuration says otherwise; empty then.
+/// The warning "not verified on hardware ..."; empty if `verified_on_hardware` is set.
 [[nodiscard]] std::string verification_note(const DriverOptions& options);
 
 }  // namespace abs_hil::driver

@@ -5,8 +5,8 @@
 
 namespace abs_hil::driver {
 
-/// Leaky bucket, as LinuxCNC's hostmot2 has it: single losses are borne, sustained loss trips. Latches until `reset`.
-/// Real-time safe.
+/// Leaky bucket as in LinuxCNC's hostmot2: it tolerates single losses and trips on sustained loss. It stays tripped
+/// until `reset`. Real-time safe.
 class LossBucket {
  public:
   /// @param cost  level that a loss adds, > 0

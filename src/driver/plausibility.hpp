@@ -9,18 +9,18 @@
 
 namespace abs_hil::driver {
 
-/// What no gate lets through: a duty not in [0, 1], a torque < 0, anything not finite.
+/// False if a duty is not in [0, 1], the torque is < 0, or a value is not finite.
 [[nodiscard]] inline bool in_range(const rig::Command& command) noexcept {
   const auto is_duty = [](double value) { return value >= 0.0 && value <= 1.0; };  // false for NaN
   return is_duty(command.motor_duty) && is_duty(command.brake_duty) && std::isfinite(command.brake_torque_Nm) &&
          command.brake_torque_Nm >= 0.0;
 }
 
-/// Whether a counter can have gone from `before` to `after` in `elapsed_ns`, which is >= 0.
-/// @param speed_rad_s faster is implausible
+/// True if a counter can have moved from `before` to `after` in `elapsed_ns`, which is >= 0.
+/// @param speed_rad_s largest plausible speed
 [[nodiscard]] inline bool plausible_travel(std::int32_t before, std::int32_t after, std::int64_t elapsed_ns,
                                            double speed_rad_s, std::int32_t counts_per_rev) noexcept {
-  /// Counts that an encoder may jump beyond what its speed explains: vibration, and the reads' own lateness.
+  /// Counts allowed in addition to what the speed explains, because of vibration and late reads.
   constexpr double slack_counts = 256.0;
   const double most = slack_counts + speed_rad_s * static_cast<double>(elapsed_ns) * rig::s_per_ns /
                                          rig::radians_per_count(counts_per_rev);

@@ -11,7 +11,7 @@ IoResult TakeOverWriter::make_safe() noexcept {
     driver_->activate(monotonic_ns());
     return driver_->deactivate();
   } catch (...) {
-    // Not there yet, or still its owner's: the next try begins anew.
+    // The board is missing, or its owner still has it: the next call makes a new driver.
     driver_.reset();
     return {IoError::disconnected};
   }

@@ -9,9 +9,9 @@
 
 namespace abs_hil::driver {
 
-/// The safe state of a board that has one owner at a time, or a handshake: once its owner is gone, a driver of our own
-/// takes it over, which makes its outputs safe, and lets it go again, which verifies that. Nothing can be opened
-/// beforehand, so that the first try takes as long as the board's `configure` and `activate`.
+/// Writes the safe state of a board that has only one owner at a time, or needs a handshake. After the owner's end it
+/// takes the board over with its own driver: `activate` makes the outputs safe and `deactivate` verifies it. It cannot
+/// open the board beforehand, so the first try takes as long as the board's `configure` and `activate`.
 class TakeOverWriter final : public SafeStateWriter {
  public:
   using MakeDriver = std::function<std::unique_ptr<RigDriver>()>;

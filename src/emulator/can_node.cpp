@@ -15,11 +15,11 @@ namespace abs_hil::emulator {
 namespace {
 
 constexpr double full_duty = 10000.0;
-/// A command may be so many steps ahead of the last one: the ones between were lost.
+/// A command's sequence may be at most this far ahead of the last one: the commands in between were lost.
 constexpr unsigned most_commands_lost = 16;
-/// And its heartbeat so many measurements old.
+/// A command's heartbeat may be at most this many measurements old.
 constexpr unsigned most_heartbeat_age = 8;
-/// Rejected commands cost 2, accepted ones give back 1: at this level the node latches.
+/// A rejected command adds 2 to the level, an accepted one takes off 1. At this level the node latches.
 constexpr int reject_limit = 20;
 constexpr unsigned slow_every = 10;
 
@@ -103,7 +103,7 @@ void CanNode::note_outputs(const std::string& why) {
   nonzero_ = nonzero;
 }
 
-void CanNode::watch() {
+void CanNode::check_interlocks() {
   const double fastest = fastest_rad_s(plant_);
   if (fastest > rad_s_of_rpm(options_.overspeed_rpm)) {
     overspeed_latched_ = true;
@@ -128,7 +128,7 @@ void CanNode::advance_to(std::int64_t time_ns) {
     if (guarded && time_ns_ >= watchdog_ends_ns()) {
       become(State::latched, 1, "watchdog");
     }
-    watch();
+    check_interlocks();
   }
 }
 
@@ -155,7 +155,7 @@ void CanNode::receive(const BusFrame& frame) {
 void CanNode::on_time(const BusFrame& frame) {
   if (!options_.lock_step || !sound(frame, 8)) return;
   constexpr std::uint64_t range = std::uint64_t{1} << 48U;
-  constexpr std::uint64_t most_ns = 10'000'000'000;  // a jump further than this is none of a run's
+  constexpr std::uint64_t most_ns = 10'000'000'000;  // a longer jump does not occur in a run
   const std::uint64_t host_time = bytes_of(frame, 0, 6);
   const std::uint64_t step = (host_time - host_time_) % range;
   host_time_ = host_time;
@@ -167,8 +167,9 @@ void CanNode::on_sync(const BusFrame& frame) {
   sync_sequence_ = frame.data[0];
   ++syncs_;
   const bool fd = frame.fd && options_.can_fd;
-  // The slow frames first: the answer ends with the frame that the host waits for.
-  const bool in_trouble = trip_flags() != 0 || state_ == State::latched;  // told with every answer: one may be lost
+  // Send the slow frames first: the answer must end with the frame for which the host waits.
+  const bool in_trouble =
+      trip_flags() != 0 || state_ == State::latched;  // sent with every answer, because one may be lost
   if (std::exchange(status_due_, false) || in_trouble || syncs_ % slow_every == 0) send_status();
   if (!fd && syncs_ % slow_every == slow_every / 2) send_outputs();
   send_encoders(fd);
@@ -183,7 +184,7 @@ void CanNode::reject(const char* why) {
 
 void CanNode::on_command(const BusFrame& frame) {
   ++writes_;
-  if (!sound(frame, 8)) return reject("length or check wrong");
+  if (!sound(frame, 8)) return reject("wrong length or checksum");
   const double brake = static_cast<double>(bytes_of(frame, 0, 2)) / full_duty;
   const double drive = static_cast<double>(bytes_of(frame, 2, 2)) / full_duty;
   const bool enable = (frame.data[4] & 1) != 0;
@@ -191,7 +192,7 @@ void CanNode::on_command(const BusFrame& frame) {
   const auto ahead = static_cast<std::uint8_t>(frame.data[6] - command_sequence_);
   if (brake > 1.0 || drive > 1.0) return reject("duty out of range");
   if (ahead < 1 || ahead > most_commands_lost) return reject("sequence stale or repeated");
-  if (heartbeat_age > most_heartbeat_age) return reject("heartbeat: computed from an old measurement");
+  if (heartbeat_age > most_heartbeat_age) return reject("heartbeat too old: computed from an old measurement");
   if (state_ != State::active) return;
   command_sequence_ = frame.data[6];
   last_command_ns_ = time_ns_;
@@ -219,7 +220,7 @@ void CanNode::on_control(const BusFrame& frame) {
 void CanNode::activate(const BusFrame& frame) {
   ++writes_;
   const std::uint64_t watchdog_ms = bytes_of(frame, 3, 2);
-  // Only who has just asked knows the nonce: a repeated or recorded activation does nothing.
+  // Only a host that has just asked knows the nonce, so a repeated or recorded activation has no effect.
   if (bytes_of(frame, 1, 2) != nonce_ || watchdog_ms > 10000) return;
   nonce_ = static_cast<std::uint16_t>(nonce_ * 25173U + 13849U);
   if (watchdog_ms != 0) options_.watchdog_ms = static_cast<std::uint16_t>(watchdog_ms);

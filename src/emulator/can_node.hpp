@@ -18,13 +18,13 @@ struct BusFrame {
   std::array<std::uint8_t, 64> data{};
 };
 
-/// What the emulated node is. Limits and supply are ours, as those of the emulated card.
+/// Properties of the emulated node. This project chose limits and supply, as for the emulated card.
 struct CanNodeOptions {
   plant_sim::PlantOptions plant{};
   double start_speed_rad_s{0.0};  ///< both wheels' speed at power-on, >= 0
-  std::uint16_t watchdog_ms{20};  ///< until an activation says otherwise
-  bool lock_step{false};          ///< time goes on with ABS_TIME alone
-  bool can_fd{true};              ///< answers a SYNC in an FD frame with one
+  std::uint16_t watchdog_ms{20};  ///< until an activation sets another value
+  bool lock_step{false};          ///< only ABS_TIME advances the time
+  bool can_fd{true};              ///< answers a SYNC in an FD frame with an FD frame
   double supply_V{24.0};
   double supply_min_V{15.0};
   double temperature_C{30.0};
@@ -32,15 +32,15 @@ struct CanNodeOptions {
   double overspeed_rpm{2200.0};
 };
 
-/// Something worth a line in the node's log.
+/// An event for the node's log.
 struct NodeEvent {
   std::int64_t time_ns{0};  ///< the node's own clock, 0 at power-on
   std::string text{};
 };
 
-/// The CAN I/O node of docs/can.md with the rig behind it: it latches its counters at a SYNC, applies commands, and
-/// takes its outputs to zero by itself when valid commands stop. Written from config/can/abs_rig.dbc alone, without a
-/// line of the driver's.
+/// The CAN I/O node of docs/can.md with the simulated rig behind it. It latches its counters at a SYNC, applies
+/// commands, and zeroes its outputs when valid commands stop. It was written only from config/can/abs_rig.dbc and
+/// shares no code with the driver.
 class CanNode {
  public:
   static constexpr std::int64_t step_ns = 100'000;  ///< the plant and the interlocks run at 10 kHz
@@ -49,20 +49,20 @@ class CanNode {
   /// Throws std::invalid_argument if an option is outside its range.
   explicit CanNode(const CanNodeOptions& options);
 
-  /// Lets rig and watchdog go on to `time_ns` (0 at power-on); never back.
+  /// Advances rig and watchdog to `time_ns` (0 at power-on); an earlier time does nothing.
   void advance_to(std::int64_t time_ns);
-  /// Takes any frame from the bus as of now.
+  /// Takes any frame from the bus at the current time.
   void receive(const BusFrame& frame);
-  /// What it has to send since the last call, in order.
+  /// The frames that it has sent since the last call, in order.
   [[nodiscard]] std::vector<BusFrame> take_answers();
   [[nodiscard]] std::vector<NodeEvent> take_events();
 
-  // What happens to the rig from outside.
+  // Events from outside the rig.
   void press_emergency_stop(bool pressed) noexcept { emergency_stop_ = pressed; }  ///< cuts the drive only
   void set_supply_V(double volts) noexcept { options_.supply_V = volts; }
   void set_temperature_C(double celsius) noexcept { options_.temperature_C = celsius; }
   void trip_overspeed() noexcept { overspeed_latched_ = true; }
-  /// The power stage does not do what it is told: its brake duty is off by this from now on.
+  /// Fault of the power stage: from now on the brake's duty differs by `error` from the command.
   void break_brake_output(double error) noexcept { brake_error_ = error; }
 
   [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }
@@ -70,7 +70,7 @@ class CanNode {
   [[nodiscard]] State state() const noexcept { return state_; }
   [[nodiscard]] std::uint32_t trip_flags() const noexcept;
   [[nodiscard]] const plant_sim::Plant& plant() const noexcept { return plant_; }
-  /// Activations, deactivations and commands that came in, valid or not.
+  /// Number of received activations, deactivations and commands, valid or not.
   [[nodiscard]] std::uint64_t writes() const noexcept { return writes_; }
   [[nodiscard]] std::uint64_t rejected() const noexcept { return rejected_; }
 
@@ -82,7 +82,7 @@ class CanNode {
   void activate(const BusFrame& frame);
   void become(State state, std::uint8_t latch_reason, const std::string& why);
   void reject(const char* why);
-  void watch();
+  void check_interlocks();
   void note_outputs(const std::string& why);
   [[nodiscard]] std::int64_t count(bool upper_wheel) const noexcept;
   [[nodiscard]] std::uint64_t duty_raw(double duty) const noexcept;
@@ -101,13 +101,13 @@ class CanNode {
   double brake_{0.0};
   double drive_{0.0};
   double brake_error_{0.0};
-  bool nonzero_{false};  ///< outputs were not zero when last looked at
+  bool nonzero_{false};  ///< the outputs were not zero at the last check
   bool emergency_stop_{false};
   bool overspeed_latched_{false};
   std::uint16_t nonce_{0x1234};
   std::uint8_t sync_sequence_{0};
   std::uint8_t command_sequence_{0};
-  std::int64_t last_command_ns_{-1};  ///< when one was last accepted; -1: none since the activation
+  std::int64_t last_command_ns_{-1};  ///< time of the last accepted command; -1: none since the activation
   int reject_level_{0};
   std::uint64_t rejected_{0};
   std::uint64_t writes_{0};

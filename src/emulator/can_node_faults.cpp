@@ -13,7 +13,7 @@ namespace {
 struct Kind {
   std::string_view name;
   NodeFaultKind kind;
-  unsigned most;  ///< largest number; 0: takes none
+  unsigned most;  ///< largest number; 0: takes no number
 };
 constexpr std::array<Kind, 14> node_faults{{{"ok", NodeFaultKind::ok, 0},
                                             {"silent", NodeFaultKind::silent, 0},
@@ -32,7 +32,7 @@ constexpr std::array<Kind, 14> node_faults{{{"ok", NodeFaultKind::ok, 0},
 
 bool is_measurement(const BusFrame& frame) { return frame.id >= 0x92 && frame.id <= 0x94; }
 
-/// Place of the sequence in any of the node's frames but ABS_IDENTITY.
+/// Byte of the sequence in the node's frames, except ABS_IDENTITY.
 std::size_t sequence_place(const BusFrame& frame) { return frame.length - 2U; }
 
 void shift_sequence(BusFrame& frame, unsigned by) {
@@ -156,7 +156,7 @@ std::vector<BusFrame> NodeFaults::changed(std::vector<BusFrame> frames) {
 std::vector<BusFrame> NodeFaults::answer(std::vector<BusFrame> frames) {
   using enum NodeFaultKind;
   const bool to_sync = std::any_of(frames.begin(), frames.end(), is_measurement);
-  // Answers to ABS_CONTROL are changed only by what keeps the node from speaking or garbles it.
+  // Only faults that silence the node or corrupt its frames change the answers to ABS_CONTROL.
   const bool always = kind_ == silent || kind_ == wrong_size || kind_ == corrupt;
   return frames.empty() || (!to_sync && !always) ? frames : changed(std::move(frames));
 }

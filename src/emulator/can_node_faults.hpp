@@ -9,36 +9,35 @@
 
 namespace abs_hil::emulator {
 
-/// What can be wrong with a node and what else is on its bus. The names are those of the control command
-/// `fault NAME[=NUMBER]`.
+/// Faults of a node and of its bus. The names are those of the control command `fault NAME[=NUMBER]`.
 enum class NodeFaultKind : std::uint8_t {
-  ok,          ///< nothing: heals the node
+  ok,          ///< no fault: heals the node
   silent,      ///< sends nothing
   deaf,        ///< takes no command, but answers
   drop,        ///< the next NUMBER answers are lost, then ok
   no_status,   ///< STATUS and OUTPUTS are never sent
   stale,       ///< sequences NUMBER behind
   ahead,       ///< sequences NUMBER ahead
-  stuck,       ///< repeats its answer of when the fault began
+  stuck,       ///< repeats the answer that it gave when the fault began
   duplicate,   ///< sends every frame twice
   swapped,     ///< ends its answer with the counters instead of their time
   wrong_size,  ///< frames are NUMBER bytes long
-  corrupt,     ///< wrong checks
-  nonsense,    ///< counters jump about
+  corrupt,     ///< wrong checksums
+  nonsense,    ///< random counters
   babble,      ///< NUMBER frames of other identifiers and as many forged ones of its own before each answer
 };
 
-/// A node with such a fault between it and the bus.
+/// Applies a fault between a node and its bus.
 class NodeFaults {
  public:
   explicit NodeFaults(std::uint64_t seed) : random_(seed) {}
 
-  /// "stale=5". Throws std::invalid_argument, saying what is valid.
+  /// Sets a fault such as "stale=5". Throws std::invalid_argument with the valid faults.
   void set(std::string_view text);
   [[nodiscard]] static const char* known();
-  /// Whether the node hears this frame.
+  /// True if the node receives this frame.
   [[nodiscard]] bool hears(const BusFrame& frame) const noexcept;
-  /// What reaches the bus of one answer.
+  /// The frames of one answer that reach the bus.
   [[nodiscard]] std::vector<BusFrame> answer(std::vector<BusFrame> frames);
 
  private:
@@ -51,7 +50,7 @@ class NodeFaults {
   std::mt19937_64 random_;
 };
 
-/// Puts the right check into a frame's last byte.
+/// Puts the correct checksum into a frame's last byte.
 void seal(BusFrame& frame) noexcept;
 
 }  // namespace abs_hil::emulator

@@ -113,13 +113,13 @@ void CardModel::write32(std::uint32_t offset, std::uint32_t value) noexcept {
     case 0x6C: write_pwm(offset, value); break;
     case 0x80: encoder_index_ = value; break;
     case 0x84:
-      // A counter is held at 0 as long as its bit is set, and counts from there once the bit is cleared.
+      // A counter stays at 0 while its bit is set, and counts from 0 once the bit is cleared.
       for (std::uint32_t channel = 0; channel < encoder_count; ++channel) {
         if (((reset_mask_ | value) >> channel & 1U) != 0) zero_[channel] = raw_count(channel);
       }
       reset_mask_ = value & 7U;
       break;
-    // Digital I/O, velocity period, start resistors, limits: whether the host may write them is not known; here it may.
+    // Digital I/O, velocity period, start resistors, limits: not known whether the host may write them. Here it may.
     case 0x40:
     case 0x44:
     case 0x48:
@@ -157,10 +157,10 @@ Outputs CardModel::outputs() const noexcept {
 
 void CardModel::trip_overspeed() noexcept {
   overspeed_latched_ = true;
-  plausibility_limits();
+  enforce_limits();
 }
 
-void CardModel::plausibility_limits() noexcept {
+void CardModel::enforce_limits() noexcept {
   const double fastest = fastest_rad_s(plant_);
   if (velocity(fastest) > plain_[0x5C / 4]) {
     overspeed_latched_ = true;
@@ -182,7 +182,7 @@ void CardModel::advance_to(std::int64_t time_ns) noexcept {
     const std::int64_t next = step_end_ns(time_ns_, time_ns, step_ns);
     step(plant_, next - time_ns_, outputs());
     time_ns_ = next;
-    plausibility_limits();
+    enforce_limits();
   }
 }
 

@@ -8,12 +8,12 @@
 
 namespace abs_hil::emulator {
 
-/// What every emulator says to the text of a fault that it does not know.
+/// Throws the error of every emulator for an unknown fault.
 [[noreturn]] inline void refuse_fault(std::string_view text, std::string_view valid) {
   throw std::invalid_argument("fault \"" + std::string(text) + "\": give " + std::string(valid));
 }
 
-/// All of `text` as a number; `base` (2 to 36) for integers alone.
+/// Parses all of `text` as a number; `base` (2 to 36) is only for integers.
 template <typename Number, typename... Base>
 [[nodiscard]] std::optional<Number> number_in(std::string_view text, Base... base) {
   Number value{};

@@ -105,7 +105,7 @@ AccessResult FaultyCard::read32(std::uint32_t offset) {
 }
 
 AccessResult FaultyCard::write32(std::uint32_t offset, std::uint32_t value) {
-  if (all_ones_) return {};  // nobody is there to take it
+  if (all_ones_) return {};  // the card is not on the bus: the write is lost
   AccessResult result;
   if (const auto found = faults_.find(offset); found != faults_.end()) {
     const Fault& fault = found->second.fault;

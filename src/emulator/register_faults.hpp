@@ -10,16 +10,16 @@
 
 namespace abs_hil::emulator {
 
-/// What can be wrong with one register. The names are those of `--fault OFFSET:NAME[=PARAMETER]`.
+/// Faults of one register. The names are those of `--fault OFFSET:NAME[=PARAMETER]`.
 enum class FaultKind : std::uint8_t {
-  ok,            ///< nothing: heals the register
-  stuck,         ///< reads what it read when the fault began; writes are lost
+  ok,            ///< no fault: heals the register
+  stuck,         ///< keeps the value that it had when the fault began; writes are lost
   wrong,         ///< reads its value plus the parameter
   slow,          ///< each access takes the parameter in us
-  delayed,       ///< reads what it would have read so many reads ago (parameter)
-  intermittent,  ///< each access fails with the probability given
+  delayed,       ///< reads the value of n reads ago (n: parameter)
+  intermittent,  ///< each access fails with the given probability
   off,           ///< every access fails
-  garbage,       ///< reads anything
+  garbage,       ///< reads random values
 };
 
 struct Fault {
@@ -27,21 +27,21 @@ struct Fault {
   double parameter{0.0};
 };
 
-/// One access as the host gets it.
+/// Result of one access for the host.
 struct AccessResult {
   bool failed{false};
   std::uint32_t value{0};
-  std::int64_t delay_ns{0};  ///< to wait before answering
+  std::int64_t delay_ns{0};  ///< delay of the answer
 };
 
-/// A card with faults in single registers, or none at all on the bus (all ones).
+/// A card with faults in single registers, or a card that is missing on the bus (all ones).
 class FaultyCard {
  public:
   FaultyCard(CardModel& card, std::uint64_t seed) : card_(card), random_(seed) {}
 
   /// Begins or (`ok`) ends a fault of the register at `offset`.
   void set(std::uint32_t offset, const Fault& fault);
-  /// "88:delayed=3", "0x6c:stuck". Throws std::invalid_argument, saying what is valid.
+  /// Sets a fault such as "88:delayed=3" or "0x6c:stuck". Throws std::invalid_argument with the valid faults.
   void set(std::string_view text);
   void answer_all_ones(bool on) noexcept { all_ones_ = on; }
 

@@ -10,7 +10,7 @@ namespace abs_hil::emulator {
 
 void start_wheels(plant_sim::Plant& plant, double speed_rad_s) {
   if (!(speed_rad_s >= 0.0) || !std::isfinite(speed_rad_s)) {
-    throw std::invalid_argument("start speed " + std::to_string(speed_rad_s) + " rad/s: must be finite and >= 0");
+    throw std::invalid_argument("start speed " + std::to_string(speed_rad_s) + " rad/s: give a finite value >= 0");
   }
   plant.reset({.omega1_rad_s = speed_rad_s, .omega2_rad_s = speed_rad_s});
 }

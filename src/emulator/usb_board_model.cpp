@@ -59,7 +59,7 @@ UsbBoardModel::Taken UsbBoardModel::take(std::span<const std::uint8_t> transfer)
 
 UsbBoardModel::Image UsbBoardModel::image() const noexcept {
   std::array<std::uint16_t, words> shown{};
-  // "ABSEMU", the date as two words, and so many of everything; all of it ours.
+  // "ABSEMU", the date as two words, and the channel counts. This project chose all of these values.
   const std::array<std::uint16_t, 9> identity{options_.version, 0x4241, 0x4553, 0x554D, 0x2026,
                                               0x1121,           0x0A08, 0x0004, 0x1004};
   std::copy(identity.begin(), identity.end(), shown.begin());

@@ -9,21 +9,22 @@
 
 namespace abs_hil::emulator {
 
-/// What the emulated RT-DAC/USB2 is and how the rig is wired to it.
+/// Properties of the emulated RT-DAC/USB2 and its wiring to the rig.
 struct UsbBoardOptions {
   plant_sim::PlantOptions plant{};
   double start_speed_rad_s{0.0};  ///< both wheels' speed at power-on, >= 0
-  std::uint16_t version{103};     ///< ours: the real word is not public
+  std::uint16_t version{103};     ///< our choice: the real word is not public
   std::uint32_t drive_pwm{0};     ///< PWM channel wired to the drive, 0 ... 9
   std::uint32_t brake_pwm{1};
   std::uint32_t lower_encoder{0};  ///< encoder channel of the lower wheel, 0 ... 7
   std::uint32_t upper_encoder{1};
-  std::int32_t enable_line{-1};  ///< digital line without which the drive does nothing, 0 ... 14; -1: none
-  bool shows_outputs{true};      ///< frames show PWM and digital words as they were sent; not known of the real board
+  std::int32_t enable_line{-1};  ///< digital line that enables the drive, 0 ... 14; -1: none
+  bool shows_outputs{true};      ///< frames show the PWM and digital words that were sent; not known of the real board
 };
 
-/// The RT-DAC/USB2 with generic logic as a host sees it, frame by frame, and behind it the rig. Written from the frame
-/// facts alone, without the driver's table. There is no watchdog: without a host the PWMs hold.
+/// The RT-DAC/USB2 with generic logic as a host sees it, frame by frame, and the simulated rig behind it. It was
+/// written only from the documented frames and does not use the driver's table. It has no watchdog: without a host the
+/// PWMs hold their duties.
 class UsbBoardModel {
  public:
   static constexpr std::size_t frame_bytes = 504;
@@ -33,20 +34,20 @@ class UsbBoardModel {
   /// Throws std::invalid_argument if an option is outside its range.
   explicit UsbBoardModel(const UsbBoardOptions& options);
 
-  /// What one transfer from the host is.
+  /// Kinds of transfers from the host.
   enum class Taken : std::uint8_t { frame, request, nonsense };
-  /// A frame acts at once. A request is for the caller to answer with `image`. Nonsense, which includes payload with
-  /// bit 15 set, is counted and changes nothing.
+  /// Takes a transfer. A frame acts at once. The caller must answer a request with `image`. An invalid transfer, such
+  /// as payload with bit 15 set, is counted and changes nothing.
   Taken take(std::span<const std::uint8_t> transfer) noexcept;
-  /// A frame to the host, of this moment.
+  /// The current frame to the host.
   [[nodiscard]] Image image() const noexcept;
-  /// Lets the rig go on to `time_ns` (0 at power-on) in steps of at most `step_ns`; never back.
+  /// Advances the rig to `time_ns` (0 at power-on) in steps of at most `step_ns`; an earlier time does nothing.
   void advance_to(std::int64_t time_ns) noexcept;
 
   void press_emergency_stop(bool pressed) noexcept { emergency_stop_ = pressed; }  ///< cuts the drive only
-  /// The brake's width does not take what is written, and shows one more.
+  /// Fault: the brake's width ignores writes and shows a value that is 1 too large.
   void break_brake(bool broken) noexcept { brake_broken_ = broken; }
-  /// Somebody turns a standing wheel by hand.
+  /// Turns a standing wheel by hand.
   void turn_by_hand(bool upper_wheel, double revolutions) noexcept;
 
   [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }
@@ -62,7 +63,7 @@ class UsbBoardModel {
   UsbBoardOptions options_;
   plant_sim::Plant plant_;
   std::int64_t time_ns_{0};
-  std::array<std::uint16_t, words> written_{};  ///< as the last frame left them
+  std::array<std::uint16_t, words> written_{};  ///< words after the last frame
   std::uint64_t frames_taken_{0};
   std::uint64_t nonsense_{0};
   bool emergency_stop_{false};

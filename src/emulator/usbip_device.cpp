@@ -16,7 +16,7 @@ constexpr std::size_t header_bytes = 48;
 constexpr std::uint32_t most_bytes = 1U << 20U;
 
 enum Command : std::uint32_t { cmd_submit = 1, cmd_unlink = 2, ret_submit = 3, ret_unlink = 4 };
-// Linux's numbers of errors, which the protocol carries.
+// Linux error numbers, which the protocol transmits.
 constexpr std::int32_t status_stall = -32;      // EPIPE
 constexpr std::int32_t status_overflow = -75;   // EOVERFLOW
 constexpr std::int32_t status_unlinked = -104;  // ECONNRESET
@@ -36,16 +36,16 @@ void append(Bytes& out, std::uint32_t value) {
 void append_header(Bytes& out, Command command, std::uint32_t sequence) {
   append(out, command);
   append(out, sequence);
-  for (int i = 0; i < 3; ++i) append(out, 0);  // device, direction and endpoint are the host's to remember
+  for (int i = 0; i < 3; ++i) append(out, 0);  // device, direction and endpoint: the host knows them
 }
 
-/// @param data of a read; empty for a write, whose `length` tells what was taken
+/// @param data data of a read; empty for a write, for which `length` tells the number of bytes taken
 void reply(Bytes& out, std::uint32_t sequence, std::int32_t status, std::uint32_t length,
            std::span<const std::uint8_t> data = {}) {
   append_header(out, ret_submit, sequence);
   append(out, static_cast<std::uint32_t>(status));
   append(out, length);
-  for (int i = 0; i < 5; ++i) append(out, 0);  // start frame, packets, errors: isochronous alone; padding
+  for (int i = 0; i < 5; ++i) append(out, 0);  // start frame, packets, errors (only isochronous); padding
   out.insert(out.end(), data.begin(), data.end());
 }
 
@@ -120,7 +120,7 @@ void UsbipDevice::receive(std::span<const std::uint8_t> bytes, std::int64_t now_
                       .length = big_endian(rest, 24)};
     if (command != cmd_submit || transfer.length > most_bytes) {
       throw std::runtime_error("USB/IP: command " + std::to_string(command) + " with " +
-                               std::to_string(transfer.length) + " bytes is none of the protocol");
+                               std::to_string(transfer.length) + " bytes is not part of the protocol");
     }
     const std::size_t whole = header_bytes + (transfer.in ? 0 : transfer.length);
     if (rest.size() < whole) break;

@@ -13,7 +13,7 @@
 
 namespace abs_hil::emulator {
 
-/// How the board introduces itself. Ids are of pid.codes' range for tests: the maker's are not public.
+/// Identity of the board. The ids are from pid.codes' range for tests, because the maker's are not public.
 struct UsbIdentity {
   std::uint16_t vendor_id{0x1209};
   std::uint16_t product_id{0x0001};
@@ -22,25 +22,25 @@ struct UsbIdentity {
   std::string serial{"1"};
 };
 
-/// A USB device as the Linux kernel's virtual host controller (vhci_hcd) speaks to it: commands of the USB/IP protocol
-/// (Documentation/usb/usbip_protocol.rst) come as a stream of bytes, replies go back. High speed, one interface, bulk
-/// endpoints 2 OUT and 4 IN for frames, and 6 OUT and 8 IN, the JTAG of the real board, which must stay untouched.
-/// Descriptors: USB 2.0, chapter 9.
+/// A USB device for the Linux kernel's virtual host controller (vhci_hcd). Commands of the USB/IP protocol
+/// (Documentation/usb/usbip_protocol.rst) come as a stream of bytes, and replies go back. The device has high speed and
+/// one interface. It has bulk endpoints 2 OUT and 4 IN for frames, and 6 OUT and 8 IN, the JTAG of the real board,
+/// which a driver must not use. Descriptors: USB 2.0, chapter 9.
 class UsbipDevice {
  public:
   using GoOnTo = std::function<void(std::int64_t time_ns)>;
-  /// @param lock_step called when the host drives the rig's time; empty: time is the caller's
+  /// @param lock_step called when the host advances the rig's time; empty: the caller advances it
   UsbipDevice(UsbBoardModel& board, const UsbIdentity& identity, std::uint64_t seed, GoOnTo lock_step = {});
 
-  /// Takes what came from the host, whole commands or parts of them; appends what is to be sent to it.
-  /// @param now_ns any clock that never goes back: late answers are measured with it
-  /// Throws std::runtime_error for what is no command of the protocol: the stream is lost.
+  /// Takes bytes from the host, complete commands or parts of them, and appends the replies.
+  /// @param now_ns time on any monotonic clock, for late answers
+  /// Throws std::runtime_error if the bytes are not a command of the protocol: the stream is lost.
   void receive(std::span<const std::uint8_t> bytes, std::int64_t now_ns, std::vector<std::uint8_t>& replies);
-  /// Answers that were late and are due now.
+  /// Appends the delayed answers that are due.
   void answer_late_ones(std::int64_t now_ns, std::vector<std::uint8_t>& replies);
-  /// Forgets the connection's state, as a board does that is plugged in anew. Its outputs stay.
+  /// Resets the state of the connection, like a board that is plugged in again. The outputs do not change.
   void reconnect();
-  /// The host has taken it into use.
+  /// True if the host has configured the device.
   [[nodiscard]] bool configured() const noexcept { return configured_; }
 
   UsbFaults faults{};
@@ -77,8 +77,8 @@ class UsbipDevice {
   GoOnTo lock_step_;
   std::mt19937_64 random_;
   std::vector<std::uint8_t> received_{};
-  std::deque<Waiting> waiting_{};  ///< reads of the host that have no answer yet
-  std::deque<Answer> answers_{};   ///< answers that nobody has read yet
+  std::deque<Waiting> waiting_{};  ///< the host's reads without an answer
+  std::deque<Answer> answers_{};   ///< answers that the host has not read yet
   std::uint64_t jtag_transfers_{0};
   bool configured_{false};
 };

@@ -8,17 +8,17 @@
 
 namespace abs_hil::experiment {
 
-/// A change to a run that goes on.
+/// A change to a running run.
 struct Adjustment {
   enum class Kind : std::uint8_t { start, slip_ref, controller };
   Kind kind{Kind::start};
   double slip_ref{0.0};
-  /// The same law as before with other gains, ready made; it takes over where the old one stands.
+  /// The same control law with other gains, constructed in advance; it takes over the state of the old one.
   std::unique_ptr<control::SlipController> controller{};
 };
 
-/// Hands adjustments from one slow thread to the real-time thread, and controllers that have served their time back, so
-/// that neither waits and only the slow thread allocates and frees.
+/// Hands adjustments from one slow thread to the real-time thread, and replaced controllers back. Neither thread waits
+/// for the other, and only the slow thread allocates and frees memory.
 class AdjustmentMailbox {
  public:
   AdjustmentMailbox() = default;
@@ -26,19 +26,19 @@ class AdjustmentMailbox {
   AdjustmentMailbox& operator=(const AdjustmentMailbox&) = delete;
   ~AdjustmentMailbox();
 
-  /// Slow thread. The number that the change will bear, from 1 on; 0 if too many wait.
+  /// Slow thread. Returns the number of the change, from 1 on; 0 if too many changes wait.
   [[nodiscard]] std::uint32_t put(Adjustment adjustment);
 
-  /// What arrives in the real-time thread.
+  /// A change as the real-time thread receives it.
   struct Arrived {
     Adjustment::Kind kind;
     std::uint32_t number;
     double slip_ref;
-    control::SlipController* controller;  ///< owned by who takes it
+    control::SlipController* controller;  ///< the taker owns it
   };
-  /// Real-time thread. False if nothing waits.
+  /// Real-time thread. Returns false if nothing waits.
   [[nodiscard]] bool take(Arrived& arrived) noexcept { return inbox_.pop(arrived); }
-  /// Real-time thread: gives a controller back.
+  /// Real-time thread. Returns a replaced controller to the slow thread.
   void retire(control::SlipController* controller) noexcept { static_cast<void>(retired_.push(controller)); }
 
  private:
@@ -46,7 +46,7 @@ class AdjustmentMailbox {
 
   static constexpr std::size_t most_waiting = 16;
   runtime::SpscRing<Arrived> inbox_{most_waiting};
-  /// Room for all that may be under way, so that none is lost.
+  /// Room for all controllers that can be under way, so that none is lost.
   runtime::SpscRing<control::SlipController*> retired_{2 * most_waiting};
   std::uint32_t last_number_{0};
 };

@@ -16,18 +16,18 @@ namespace {
 using rig::formatted;
 
 constexpr std::int64_t cycle_ns = 1'000'000;
-/// An eighth of a revolution of 4096 counts: a turn by hand is more, trembling is less.
+/// An eighth of a revolution of 4096 counts: turning by hand gives more, trembling gives less.
 constexpr std::int32_t turned_counts = 512;
-/// What a wheel that nobody touches may move meanwhile.
+/// Largest movement of the other wheel, which nobody touches meanwhile.
 constexpr std::int32_t still_counts = 64;
-/// A wheel that moves less in this time stands.
+/// A wheel counts as standing if it moves less than `still_counts` in this time.
 constexpr std::int64_t standstill_ns = 500'000'000;
 
 void require(bool in_range, const char* what, double value, const char* range) {
-  if (!in_range) throw std::invalid_argument(formatted("%s %g: give a number in %s", what, value, range));
+  if (!in_range) throw std::invalid_argument(formatted("%s = %g: give a number in %s", what, value, range));
 }
 
-/// Leaves the rig safe however a step ends.
+/// Makes the rig safe, however a step ends.
 class SafeAtEnd {
  public:
   explicit SafeAtEnd(driver::RigDriver& driver) : driver_(driver) {}
@@ -71,7 +71,7 @@ CommissioningResult Commissioning::run() {
   }
   const driver::IoResult result = driver_.deactivate();
   if (!result.ok()) {
-    dialog_.tell("the safe state is not known to have reached the board: " + driver::error_text(result));
+    dialog_.tell("the safe state may not have reached the board: " + driver::error_text(result));
     return CommissioningResult::failed;
   }
   return CommissioningResult::passed;
@@ -80,22 +80,23 @@ CommissioningResult Commissioning::run() {
 bool Commissioning::read(rig::Measurement& measurement) {
   const driver::IoResult result = driver_.read(clock_.now_ns(), measurement);
   if (!result.ok()) {
-    dialog_.tell("FAILED: reading the board: " + driver::error_text(result));
+    dialog_.tell("FAILED: cannot read the board: " + driver::error_text(result));
   } else if (measurement.trip_flags != 0) {
-    dialog_.tell(
-        formatted("FAILED: the board's interlocks have tripped, flags 0x%x (0x2: supply)", measurement.trip_flags));
+    dialog_.tell(formatted("FAILED: the board's interlocks have tripped, flags 0x%x (bit 0x2: supply voltage)",
+                           measurement.trip_flags));
   }
   return result.ok() && measurement.trip_flags == 0;
 }
 
 CommissioningResult Commissioning::read_board() {
-  if (!dialog_.ask("Step 1 of 4: open the board and read all it has. Nothing is written, nothing can move. Go on?")) {
+  if (!dialog_.ask("Step 1 of 4: the program opens the board and reads its registers. It writes nothing; nothing can "
+                   "move. Go on?")) {
     return CommissioningResult::declined;
   }
   driver_.configure();
   for (const std::string& line : driver_.notes()) dialog_.tell("  " + line);
   for (const std::string& line : driver_.inspection()) dialog_.tell("  " + line);
-  dialog_.tell("ok: compare version, supply, temperature and limits with what you know of your board");
+  dialog_.tell("ok: compare version, supply, temperature and limits with your board's data sheet");
   return CommissioningResult::passed;
 }
 
@@ -105,22 +106,22 @@ bool Commissioning::judge_turn(Wheel wheel, const Travel& travel) {
   const std::int32_t turned = upper ? travel.upper : travel.lower;
   const std::int32_t other = upper ? travel.lower : travel.upper;
   if (std::abs(turned) < turned_counts && std::abs(other) >= turned_counts) {
-    // The CAN node has no channels to choose from.
+    // The CAN node has fixed channels.
     const std::string fix = board == "can"
                                 ? "exchange the two encoders at the node"
                                 : "swap driver." + board + ".upper_channel and driver." + board + ".lower_channel";
     dialog_.tell("FAILED: the other wheel's counter moved: " + fix);
   } else if (std::abs(turned) < turned_counts) {
-    dialog_.tell(
-        formatted("FAILED: %d counts: too few. Turn further, or look at the encoder's cable and channel", turned));
+    dialog_.tell(formatted(
+        "FAILED: %d counts are too few. Turn the wheel further, or check the encoder's cable and channel", turned));
   } else if (std::abs(other) > still_counts) {
     dialog_.tell(
         formatted("FAILED: the other wheel moved too, by %d counts: lift the upper wheel off the lower one", other));
   } else if (turned < 0) {
-    dialog_.tell(formatted("FAILED: %d counts, backwards: change the sign of driver.%s.%s_sign", turned, board.c_str(),
-                           upper ? "upper" : "lower"));
+    dialog_.tell(formatted("FAILED: %d counts is the wrong direction: change the sign of driver.%s.%s_sign", turned,
+                           board.c_str(), upper ? "upper" : "lower"));
   } else {
-    dialog_.tell(formatted("ok: %d counts forward, %.2f turns at 4096 a turn", turned, turned / 4096.0));
+    dialog_.tell(formatted("ok: %d counts forward, %.2f turns at 4096 counts per turn", turned, turned / 4096.0));
     return true;
   }
   return false;
@@ -128,8 +129,8 @@ bool Commissioning::judge_turn(Wheel wheel, const Travel& travel) {
 
 CommissioningResult Commissioning::turn_by_hand() {
   if (!dialog_.ask(
-          "Step 2 of 4: both PWMs are set to 0 and the counters to 0; then you turn the wheels by hand. Press the "
-          "E-stop, lift the upper wheel off the lower one. Go on?")) {
+          "Step 2 of 4: the program sets both PWMs and the counters to 0; then you turn the wheels by hand. Press the "
+          "E-stop and lift the upper wheel off the lower one. Go on?")) {
     return CommissioningResult::declined;
   }
   driver_.activate(clock_.now_ns());
@@ -139,7 +140,7 @@ CommissioningResult Commissioning::turn_by_hand() {
     if (!read(before)) return CommissioningResult::failed;
     const std::string name = wheel == Wheel::upper ? "UPPER" : "LOWER";
     if (!dialog_.wait_until_done("Turn the " + name +
-                                 " wheel about half a turn in the direction of driving, then Enter")) {
+                                 " wheel about half a turn in the driving direction, then press Enter")) {
       return CommissioningResult::declined;
     }
     if (!read(after)) return CommissioningResult::failed;
@@ -155,13 +156,13 @@ bool Commissioning::drive(const rig::Command& command, std::int64_t end_ns) {
   for (std::int64_t tick_ns = clock_.now_ns(); tick_ns < end_ns && !stop_requested_(); tick_ns += cycle_ns) {
     clock_.sleep_until(tick_ns);
     if (!guard_.beat()) {
-      dialog_.tell("FAILED: the guardian has died: the pulse was cut short");
+      dialog_.tell("FAILED: the guardian process has ended; the pulse was stopped");
       return false;
     }
     if (!read(now)) return false;
     if (clock_.now_ns() >= end_ns) break;
     if (const driver::IoResult result = driver_.write(command); !result.ok()) {
-      dialog_.tell("FAILED: writing to the board: " + driver::error_text(result));
+      dialog_.tell("FAILED: cannot write to the board: " + driver::error_text(result));
       return false;
     }
   }
@@ -173,12 +174,12 @@ bool Commissioning::pulse(const rig::Command& command, double duration_s, Travel
   rig::Measurement now;
   guard_.begin();
   bool good = read(first) && drive(command, clock_.now_ns() + std::llround(duration_s / rig::s_per_ns));
-  // A driver that failed has made its outputs safe, and tells how that went once more.
+  // A driver that failed has already made its outputs safe; it reports the result again.
   const driver::IoResult ended =
       driver_.state() == driver::DriverState::active ? driver_.write(rig::safe_command) : driver_.deactivate();
   guard_.end(ended.ok());
   if (good && !ended.ok()) {
-    dialog_.tell("FAILED: ending the pulse: " + driver::error_text(ended));
+    dialog_.tell("FAILED: cannot end the pulse: " + driver::error_text(ended));
     good = false;
   }
   if (!good || !read(now)) return false;
@@ -195,7 +196,7 @@ bool Commissioning::wait_for_standstill() {
   while (clock_.now_ns() - still_since_ns < standstill_ns) {
     if (stop_requested_()) return false;
     if (clock_.now_ns() > limit_ns) {
-      dialog_.tell("FAILED: the wheels do not come to rest");
+      dialog_.tell("FAILED: the wheels still turn after the run-out limit");
       return false;
     }
     clock_.sleep_until(clock_.now_ns() + cycle_ns);
@@ -211,8 +212,8 @@ bool Commissioning::wait_for_standstill() {
 
 CommissioningResult Commissioning::drive_pulse() {
   if (!dialog_.ask(
-          formatted("Step 3 of 4: the drive gets duty %.2f for %.2f s. Close the cover, stand clear, a hand at the "
-                    "E-stop; release the E-stop and let the upper wheel down. Go on?",
+          formatted("Step 3 of 4: the drive gets duty %.2f for %.2f s. Close the cover, stand clear and keep a hand "
+                    "at the E-stop; release the E-stop and let the upper wheel down. Go on?",
                     options_.drive_duty, options_.drive_pulse_s))) {
     return CommissioningResult::declined;
   }
@@ -223,20 +224,20 @@ CommissioningResult Commissioning::drive_pulse() {
   if (stop_requested_()) return CommissioningResult::interrupted;
   if (travel.lower <= still_counts) {
     dialog_.tell(
-        formatted("FAILED: the lower wheel moved %d counts. 0: E-stop still pressed, rig not switched on, or too "
-                  "small a duty (--drive-duty). Below 0: motor polarity against encoder sign",
+        formatted("FAILED: the lower wheel moved %d counts. At 0: the E-stop is pressed, the rig is off, or the "
+                  "duty is too small (--drive-duty). Below 0: motor polarity and encoder sign do not match",
                   travel.lower));
     return CommissioningResult::failed;
   }
-  dialog_.tell(formatted("ok: lower wheel %d counts forward, upper wheel %d; waiting for standstill", travel.lower,
-                         travel.upper));
+  dialog_.tell(formatted("ok: lower wheel %d counts forward, upper wheel %d; waiting for both wheels to stop",
+                         travel.lower, travel.upper));
   return wait_for_standstill() ? CommissioningResult::passed : CommissioningResult::failed;
 }
 
 CommissioningResult Commissioning::brake_pulse() {
   if (!dialog_.ask(
-          formatted("Step 4 of 4: the brake of the standing upper wheel gets duty %.2f for %.2f s. Keep your hands "
-                    "out of it. Go on?",
+          formatted("Step 4 of 4: the upper wheel stands and its brake gets duty %.2f for %.2f s. Keep your hands "
+                    "away from it. Go on?",
                     options_.brake_duty, options_.brake_pulse_s))) {
     return CommissioningResult::declined;
   }
@@ -245,13 +246,13 @@ CommissioningResult Commissioning::brake_pulse() {
   if (stop_requested_()) return CommissioningResult::interrupted;
   if (std::abs(travel.upper) > still_counts || std::abs(travel.lower) > still_counts) {
     dialog_.tell(
-        formatted("FAILED: a brake moves nothing, but the upper wheel went %d and the lower %d counts: are drive "
-                  "and brake exchanged?",
+        formatted("FAILED: the brake pulse moved the upper wheel %d and the lower wheel %d counts, but a brake cannot "
+                  "move a wheel: check whether drive and brake are exchanged",
                   travel.upper, travel.lower));
     return CommissioningResult::failed;
   }
-  if (!dialog_.ask("Did the brake grip and let go again, as could be seen or heard?")) {
-    dialog_.tell("FAILED: look at the brake's supply and cable, and at the dead zone (plant.u0)");
+  if (!dialog_.ask("Did you see or hear the brake grip and release?")) {
+    dialog_.tell("FAILED: check the brake's supply and cable, and the dead zone (plant.u0)");
     return CommissioningResult::failed;
   }
   return CommissioningResult::passed;

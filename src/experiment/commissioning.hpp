@@ -9,7 +9,7 @@
 
 namespace abs_hil::experiment {
 
-/// The person at the rig.
+/// The dialog with the person at the rig.
 class Dialog {
  public:
   Dialog() = default;
@@ -18,13 +18,13 @@ class Dialog {
   virtual ~Dialog() = default;
 
   virtual void tell(const std::string& text) = 0;
-  /// A yes-or-no question. Anything but a plain yes, the end of input included, is a no.
+  /// Asks a yes-or-no question. Everything but a plain yes counts as no, also the end of input.
   [[nodiscard]] virtual bool ask(const std::string& question) = 0;
-  /// Waits until the person has done what the text says. False at the end of input.
+  /// Waits until the person has done what the text says. Returns false at the end of input.
   [[nodiscard]] virtual bool wait_until_done(const std::string& text) = 0;
 };
 
-/// Who stands by while a pulse acts, should this program die or hang meanwhile.
+/// A guard that makes the outputs safe if this program dies or hangs during a pulse.
 class PulseGuard {
  public:
   PulseGuard() = default;
@@ -32,36 +32,36 @@ class PulseGuard {
   PulseGuard& operator=(const PulseGuard&) = delete;
   virtual ~PulseGuard() = default;
 
-  /// Before anything is driven. Throws driver::Unavailable: then there is no pulse.
+  /// Called before the pulse. Throws driver::Unavailable: then there is no pulse.
   virtual void begin() = 0;
-  /// Once a cycle of the pulse, before anything is written: a sign of life. False once nobody stands by any more.
+  /// Called in each cycle of the pulse before the write: a heartbeat. Returns false once the guard has ended.
   [[nodiscard]] virtual bool beat() noexcept = 0;
-  /// Nothing is driven any more.
+  /// Called after the pulse.
   /// @param safe  the outputs are known to be 0
   virtual void end(bool safe) noexcept = 0;
 };
 
-/// Pulses of the commissioning: small enough that nothing can run away.
+/// Pulses of the commissioning; their limits keep the rig from running away.
 struct CommissioningOptions {
   double drive_duty{0.15};       ///< in (0, 0.3]
   double drive_pulse_s{0.3};     ///< in (0, 1]
-  double brake_duty{0.5};        ///< in (0, 0.7]; above the dead zone of 0.415, or nothing is felt
+  double brake_duty{0.5};        ///< in (0, 0.7]; the brake grips above its dead zone of 0.415
   double brake_pulse_s{0.3};     ///< in (0, 1]
-  double run_out_limit_s{60.0};  ///< longest wait for the wheels to stand again, > 0
+  double run_out_limit_s{60.0};  ///< longest wait for standstill, > 0
 };
 
 enum class CommissioningResult : std::uint8_t { passed, failed, declined, interrupted };
 
-/// First steps with a rig, each asked for: read the board, turn the wheels by hand, a small drive pulse, a small brake
-/// pulse, both beside a guard. The first step that does not turn out as it should ends it; the outputs are safe
-/// whichever way it ends.
+/// The first steps with a rig. Each needs the person's consent: read the board, turn the wheels by hand, a small drive
+/// pulse, a small brake pulse. A guard stands by during both pulses. The first step that fails ends the commissioning.
+/// The outputs are safe however it ends.
 class Commissioning {
  public:
   /// Throws std::invalid_argument if an option is outside its range.
-  /// @param stop_requested asked every cycle; true ends the pulse at once
+  /// @param stop_requested called every cycle; true ends the pulse at once
   Commissioning(driver::RigDriver& driver, runtime::Clock& clock, Dialog& dialog, PulseGuard& guard,
                 const CommissioningOptions& options, std::function<bool()> stop_requested);
-  /// Throws driver::Unavailable if the board is not there or not as it should be.
+  /// Throws driver::Unavailable if the board is absent or not as expected.
   [[nodiscard]] CommissioningResult run();
 
  private:

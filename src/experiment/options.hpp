@@ -6,7 +6,7 @@
 
 namespace abs_hil::experiment {
 
-/// Everything below `experiment.` in the configuration.
+/// Options under `experiment.` in the configuration.
 struct ExperimentOptions {
   ABS_HIL_OPTIONS(ExperimentOptions);
   ABS_HIL_OPTION(std::string, name, "paper", .meaning = "experiment by name or TOML file");

@@ -10,10 +10,10 @@ namespace abs_hil::experiment {
 Profile::Profile(std::vector<Point> points, Between between) : points_(std::move(points)), between_(between) {
   for (std::size_t i = 0; i < points_.size(); ++i) {
     if (!std::isfinite(points_[i].time_s) || !std::isfinite(points_[i].value)) {
-      throw std::invalid_argument("a point of a profile is not finite");
+      throw std::invalid_argument("each point of a profile needs a finite time and value");
     }
     if (i > 0 && points_[i].time_s < points_[i - 1].time_s) {
-      throw std::invalid_argument("the times of a profile must not fall");
+      throw std::invalid_argument("the times of a profile must not decrease");
     }
   }
 }

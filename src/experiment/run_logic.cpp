@@ -12,11 +12,11 @@
 namespace abs_hil::experiment {
 
 namespace {
-/// Below this car speed the estimated slip would be encoder noise over next to nothing; slip control has ended by then.
+/// Below this car speed, encoder noise dominates the estimated slip. Slip control has ended by then.
 constexpr double slip_floor_m_s = 0.1;
-constexpr double bump_fades_s = 0.05;  ///< about the brake's own lag
+constexpr double bump_fades_s = 0.05;  ///< about the brake's time constant
 constexpr double bump_gone_Nm = 1e-6;
-/// How long a run waits for its start.
+/// Longest wait for the start command, s.
 constexpr double start_limit_s = 600.0;
 }  // namespace
 
@@ -65,7 +65,7 @@ void RunLogic::estimate(const rig::Measurement& measurement, double dt_s) noexce
   }
   note_travel(measurement, dt_s);
   if (measurement.ideal_speeds) {
-    // The mean over the past cycle, without the encoders' and the observer's errors: what true speeds can tell.
+    // The mean over the past cycle from true speeds, without the errors of encoders and observer.
     if (started_ && dt_s > 0.0) {
       alpha1_rad_s2_ = (measurement.ideal_speeds->omega1_rad_s - speeds_.omega1_rad_s) / dt_s;
       alpha2_rad_s2_ = (measurement.ideal_speeds->omega2_rad_s - speeds_.omega2_rad_s) / dt_s;
@@ -116,8 +116,8 @@ double RunLogic::slip_control(double dt_s, bool entered, rig::ControlState& stat
   return without_bump(output.brake_torque_Nm, input);
 }
 
-/// Changed gains act at once on how the torque moves, not on where it stands: what they would make it jump by fades out
-/// within some 50 ms, while integral and estimates go on as they are.
+/// Makes a change of gains bumpless. New gains take effect on changes of the torque at once, but the jump that they
+/// would cause fades out within about 50 ms. Integral and estimates continue.
 double RunLogic::without_bump(double torque_Nm, const control::SlipInput& input) noexcept {
   if (replaced_ != nullptr) {
     bump_Nm_ += replaced_->step(input).brake_torque_Nm - torque_Nm;
@@ -133,7 +133,7 @@ void RunLogic::adjust(rig::CycleRecord& record) noexcept {
   AdjustmentMailbox::Arrived arrived{};
   if (!adjustments_.take(arrived)) return;
   switch (arrived.kind) {
-    case Adjustment::Kind::start: start_given_ = true; return;  // the record of the phase that follows says so
+    case Adjustment::Kind::start: start_given_ = true; return;  // the record of the next phase shows it
     case Adjustment::Kind::slip_ref:
       slip_ref_ = arrived.slip_ref;
       record.reason = rig::Reason::slip_reference_changed;
@@ -204,7 +204,7 @@ double RunLogic::wanted_torque_Nm(const PhasePlan& plan, double dt_s, bool enter
     case BrakeAction::torque: return plan.brake_torque_Nm_at(sequence_.phase_time_s());
     case BrakeAction::slip_control: break;
   }
-  if (!plan.slip_ref_course.empty()) state.slip_ref = plan.slip_ref_course.at(sequence_.phase_time_s());
+  if (!plan.slip_ref_profile.empty()) state.slip_ref = plan.slip_ref_profile.at(sequence_.phase_time_s());
   return slip_control(dt_s, entered, state);
 }
 

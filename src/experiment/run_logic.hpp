@@ -17,25 +17,25 @@
 
 namespace abs_hil::experiment {
 
-/// What a run's logic is made of.
+/// The parts of a run's logic.
 struct RunLogicParts {
   const control::ControlOptions& control;
   const rig::RigParameters& rig;  ///< nominal parameters, as the controller knows them
   std::unique_ptr<control::SlipController> controller;
   Sequence sequence;
   bool ideal_actuator{false};
-  double max_brake_duty{1.0};     ///< as the gate limits it
+  double max_brake_duty{1.0};     ///< limit of the command gate
   double start_speed_rad_s{0.0};  ///< both wheels' speed at the first measurement
 };
 
-/// The parts of a run with the controller that `control` names. Throws std::invalid_argument for options that are not
-/// usable. `control` and `rig` must outlive the construction of the logic.
+/// Makes the parts of a run with the controller named in `control`. Throws std::invalid_argument for unusable options.
+/// `control` and `rig` must outlive the construction of the logic.
 [[nodiscard]] RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig::RigParameters& rig,
                                              bool ideal_actuator, const runtime::GateOptions& gate,
                                              const ExperimentOptions& experiment, std::vector<PhasePlan> plans,
                                              const SequenceLimits& limits = {});
 
-/// estimate -> sequence -> control of one run: from counts to the command wanted.
+/// The logic of one run's cycle: estimate, sequence, control; from counts to the wanted command.
 class RunLogic final : public runtime::CycleLogic {
  public:
   explicit RunLogic(RunLogicParts parts);
@@ -44,18 +44,19 @@ class RunLogic final : public runtime::CycleLogic {
   void commanded(const rig::Command& command) noexcept override;
   void end_early(rig::Reason reason, double value) noexcept override { sequence_.end_early(reason, value); }
   [[nodiscard]] bool finished() const noexcept override { return sequence_.finished(); }
-  /// The gate of this run: its options, what the plans permit, what the rig's physics allows.
+  /// The command gate of this run: its options, the permissions of the plans, the limits of the rig's physics.
   [[nodiscard]] runtime::CommandGate make_gate(const runtime::GateOptions& options) const noexcept {
     return runtime::CommandGate(options, sequence_.permissions(),
                                 runtime::plausibility_limits(rig_, ideal_actuator_, options));
   }
-  /// What each phase's plan lets act.
+  /// Which outputs the plan of each phase permits.
   [[nodiscard]] runtime::PhasePermissions permissions() const noexcept { return sequence_.permissions(); }
-  /// Why the run ended; `none` while it has not.
+  /// Why the run ended; `none` while it goes on.
   [[nodiscard]] rig::Reason end_reason() const noexcept { return end_.reason; }
   [[nodiscard]] double end_value() const noexcept { return end_.value; }
-  /// Changes put here take effect one a cycle, in cycles in which no phase begins. The record of the cycle says so: its
-  /// reason is an adjustment's and its value the change's number (for the start, in the cycle after: 0).
+  /// Changes put here take effect one per cycle, in cycles in which no phase begins. The cycle's record has an
+  /// adjustment as its reason and the change's number as its value. A start command shows in the next cycle's record,
+  /// with value 0.
   [[nodiscard]] AdjustmentMailbox& adjustments() noexcept { return adjustments_; }
 
  private:
@@ -84,14 +85,14 @@ class RunLogic final : public runtime::CycleLogic {
   std::int32_t lower_counts_{0};
   double upper_travel_rad_{0.0};  ///< over the past interval
   double lower_travel_rad_{0.0};
-  double distance_m_{0.0};  ///< that the car has come since the run began
+  double distance_m_{0.0};  ///< distance of the car since the run began
   double slip_{0.0};
   double alpha1_rad_s2_{0.0};
   double alpha2_rad_s2_{0.0};
   AdjustmentMailbox adjustments_;
-  /// The controller whose gains were changed in this cycle, until its last torque is known.
+  /// The old controller if the gains changed in this cycle, until its last torque is known.
   control::SlipController* replaced_{nullptr};
-  double bump_Nm_{0.0};  ///< what the torque still owes to the gains before
+  double bump_Nm_{0.0};  ///< remaining offset that keeps the torque continuous
   bool start_given_{false};
   Sequence::Change end_{};
   bool stands_still_{false};

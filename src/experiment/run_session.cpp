@@ -10,17 +10,17 @@ namespace abs_hil::experiment {
 namespace {
 
 constexpr std::int64_t poll_interval_ns = 2'000'000;
-/// After this thread was held up it hands on what has gathered in bursts of this size: LCM's receivers queue 30
+/// When this thread was delayed, it hands on the gathered records in bursts of this size. LCM's receivers queue 30
 /// messages of a channel and drop the rest.
 constexpr std::size_t records_per_burst = 16;
 constexpr std::int64_t burst_interval_ns = 500'000;
-/// Records the ring holds: 0.8 s at 10 kHz, time enough for a slow disk.
+/// Records the ring holds: 0.8 s at 10 kHz, long enough for a slow disk.
 constexpr std::size_t ring_capacity = 8192;
 constexpr int fast_cycles_per_drain = 1000;
 
 std::int64_t period_ns_for(double rate_Hz) noexcept { return std::llround(1e9 / rate_Hz); }
 
-/// Time that the cycle's thread has to get going.
+/// Time for the cycle's thread to start.
 constexpr std::int64_t start_margin_ns = 100'000'000;
 
 std::int64_t next_second_ns(std::int64_t now_ns) noexcept {
@@ -28,7 +28,7 @@ std::int64_t next_second_ns(std::int64_t now_ns) noexcept {
   return (now_ns / second_ns + 1) * second_ns;
 }
 
-/// Leaves the rig in the safe state however the run ends.
+/// Puts the rig in the safe state, however the run ends.
 class ActiveDriver {
  public:
   ActiveDriver(driver::RigDriver& driver, std::int64_t now_ns) : driver_(driver) {
@@ -90,7 +90,7 @@ RunOutcome RunSession::run_realtime(const runtime::RealtimeOptions& options, con
     if (go.get_future().get()) {
       while (executive_.step()) {
       }
-      // Here and not in the slow thread: nothing must delay the safe state.
+      // Called here and not in the slow thread: nothing must delay the safe state.
       safe_state_ = driver_.deactivate();
       driver_.tell_before_making_safe(nullptr);
       if (guard_ != nullptr) guard_->outputs_released(safe_state_.ok());
@@ -106,7 +106,7 @@ RunOutcome RunSession::run_realtime(const runtime::RealtimeOptions& options, con
   try {
     driver_.configure();
     if (guard_ != nullptr) {
-      guard_->stand_guard();
+      guard_->arm();
       driver_.tell_before_making_safe(guard_);
     }
     std::int64_t start_ns = clock_.now_ns();
@@ -114,7 +114,7 @@ RunOutcome RunSession::run_realtime(const runtime::RealtimeOptions& options, con
       start_ns = next_second_ns(start_ns + start_margin_ns) + second_offset_ns_;
       executive_.start_at(start_ns);
     }
-    // A simulated rig's time begins with the first cycle.
+    // The time of a simulated rig begins with the first cycle.
     driver_.activate(start_ns);
   } catch (...) {
     driver_.tell_before_making_safe(nullptr);
@@ -130,13 +130,13 @@ RunOutcome RunSession::run_realtime(const runtime::RealtimeOptions& options, con
       clock_.sleep_until(clock_.now_ns() + (more ? burst_interval_ns : poll_interval_ns));
     }
   } catch (...) {
-    // Without its slow side the run is worthless: end it in order, then report.
+    // Without the slow thread nothing is recorded: end the run in order, then report the error.
     executive_.request_stop(rig::Reason::terminate_signal);
     cycle.join();
     throw;
   }
   cycle.join();
-  static_cast<void>(poll());  // what ended the run wants its answer
+  static_cast<void>(poll());  // answers the command that ended the run
   pump_.finish();
   return outcome();
 }

@@ -16,19 +16,19 @@
 
 namespace abs_hil::experiment {
 
-/// How a run went, as far as the executive can tell; the metrics of braking come from the records.
+/// The outcome of a run as the cyclic executive knows it; the metrics of braking come from the records.
 struct RunOutcome {
   rig::Reason reason{rig::Reason::none};
   double reason_value{0.0};
   driver::IoResult io_error{};    ///< the driver's first error
-  driver::IoResult safe_state{};  ///< did the safe state reach the board at the end?
+  driver::IoResult safe_state{};  ///< result of writing the safe state at the end
   runtime::RealtimeReport realtime{};
-  bool ran{false};  ///< false: real time was required and not to be had; nothing moved
+  bool ran{false};  ///< false: real time was required but unavailable; nothing moved
   [[nodiscard]] bool completed() const noexcept { return reason == rig::Reason::sequence_complete; }
 };
 
-/// One run, from an unconfigured driver to the safe state. Owns what the real-time thread works on and keeps the slow
-/// side, the sinks, in the calling thread.
+/// One run, from an unconfigured driver to the safe state. It owns the data of the real-time thread; the sinks work in
+/// the calling (slow) thread.
 class RunSession {
  public:
   /// @param sinks get every record, in this order, in the thread that calls `run_...`
@@ -36,38 +36,38 @@ class RunSession {
              const runtime::GateOptions& gate_options, std::vector<rig::RecordSink*> sinks,
              const runtime::OverrunOptions& overruns = {});
 
-  /// Asked every few milliseconds of a run in real time, every second of one in virtual time, outside the real-time
-  /// thread: a reason other than `none` ends the run in an orderly way.
+  /// Called outside the real-time thread, every few milliseconds in real time and every second of virtual time. A
+  /// reason other than `none` ends the run in order.
   using Poll = std::function<rig::Reason()>;
 
-  /// Runs in the calling thread as fast as it can: for a virtual clock.
-  /// Both throw driver::Unavailable if the driver cannot start, and what a sink throws when it finishes; the rig is in
-  /// the safe state whichever way they end.
+  /// Runs in the calling thread as fast as possible, with a virtual clock. Both run functions throw driver::Unavailable
+  /// if the driver cannot start, and whatever a sink throws when it finishes; the rig is in the safe state in every
+  /// case.
   RunOutcome run_fast(const Poll& poll);
-  /// Runs the cycle in a thread of its own with the real-time set-up of `options`.
+  /// Runs the cycle in its own thread with the real-time set-up of `options`.
   RunOutcome run_realtime(const runtime::RealtimeOptions& options, const Poll& poll);
 
-  /// Lets a run in real time begin at the next whole second of the clock plus `offset_ns`, >= 0, so that its ticks lie
-  /// where those of `cyclictest --secaligned` do.
+  /// Lets a real-time run begin at the next whole second of the clock plus `offset_ns`, >= 0: its ticks then coincide
+  /// with those of `cyclictest --secaligned`.
   void align_to_second(std::int64_t offset_ns) noexcept { second_offset_ns_ = offset_ns; }
 
-  /// For runs in real time: `guard` stands by from between configuration and activation of the driver until its outputs
-  /// are released. Both must outlive the run.
+  /// For real-time runs: `guard` stands by from before the driver's activation until its outputs are released. Both
+  /// must outlive the run.
   void guard_with(runtime::RunGuard& guard) noexcept { guard_ = &guard; }
-  void watch_with(runtime::Heartbeat& watch) noexcept { executive_.watch_with(watch); }
+  void set_heartbeat(runtime::Heartbeat& heartbeat) noexcept { executive_.set_heartbeat(heartbeat); }
   /// Ends the run in an orderly way at its next cycle. Any thread or signal handler may call it.
   void request_stop(rig::Reason reason) noexcept { executive_.request_stop(reason); }
 
-  /// For one slow thread, while it runs.
+  /// For one slow thread during the run.
   [[nodiscard]] AdjustmentMailbox& adjustments() noexcept { return logic_.adjustments(); }
   [[nodiscard]] const runtime::CyclicExecutive& executive() const noexcept { return executive_; }
   [[nodiscard]] const runtime::CommandGate& gate() const noexcept { return gate_; }
   [[nodiscard]] std::uint64_t record_drops() const noexcept { return ring_.drops(); }
-  /// True once the run's thread has obtained real time.
+  /// True once the run's thread has obtained real-time scheduling.
   [[nodiscard]] bool realtime() const noexcept { return realtime_.realtime(); }
-  /// What it obtained. For the slow thread, from its first poll on.
+  /// What the real-time set-up obtained. The slow thread may read it from its first poll on.
   [[nodiscard]] const runtime::RealtimeReport& realtime_report() const noexcept { return realtime_; }
-  /// How the run went. After it: the cycle's own thread writes what this reads.
+  /// The outcome. Call it after the run: the real-time thread writes the same data.
   [[nodiscard]] RunOutcome outcome() const;
   [[nodiscard]] const rig::CycleRecord& latest() const noexcept { return pump_.latest(); }
 

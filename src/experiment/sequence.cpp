@@ -10,40 +10,43 @@
 namespace abs_hil::experiment {
 
 namespace {
-/// Encoder noise must not count as a new maximum of the wheel's speed.
+/// Encoder noise below this must not count as a new maximum of the wheel's speed.
 constexpr double peak_margin_rad_s = 0.2;
-/// The longest that any phase may last: nothing runs for ever.
+/// Upper limit of every phase's time limit.
 constexpr double longest_phase_s = 600.0;
 
-/// What no phase may ask of the rig, wherever it was written. Throws std::invalid_argument.
+/// Checks limits that hold for every phase, whatever its source. Throws std::invalid_argument.
 void check_safe(const PhasePlan& plan, const std::string& name) {
   const auto refuse = [&name](const std::string& what) { throw std::invalid_argument("phase " + name + what); };
   if (!(plan.time_limit_s > 0.0 && plan.time_limit_s <= longest_phase_s)) {
-    refuse(": time limit " + std::to_string(plan.time_limit_s) + " s: give one in (0, 600] s, no phase lasts for ever");
+    refuse(": time limit " + std::to_string(plan.time_limit_s) + " s: give a limit in (0, 600] s");
   }
   if (!(plan.motor_duty >= 0.0 && plan.motor_duty <= 1.0)) {
-    refuse(": motor duty " + std::to_string(plan.motor_duty) + ": give one in [0, 1]");
+    refuse(": motor duty " + std::to_string(plan.motor_duty) + ": give a duty in [0, 1]");
   }
   if (!(plan.brake_torque_Nm >= 0.0 && std::isfinite(plan.brake_torque_Nm))) {
-    refuse(": brake torque " + std::to_string(plan.brake_torque_Nm) + " N m: give a finite one, >= 0");
+    refuse(": brake torque " + std::to_string(plan.brake_torque_Nm) + " N m: give a finite torque >= 0");
   }
   const auto lies_within = [](const Profile& profile, double least, double most) {
     return std::all_of(profile.points().begin(), profile.points().end(),
                        [=](const Profile::Point& point) { return point.value >= least && point.value <= most; });
   };
   constexpr double unbounded = std::numeric_limits<double>::max();
-  if (!lies_within(plan.motor_course, 0.0, 1.0)) refuse(": motor duties: give them in [0, 1]");
-  if (!(plan.brake_duty >= 0.0 && plan.brake_duty <= 1.0)) refuse(": brake duty: give one in [0, 1]");
-  if (!lies_within(plan.brake_course, 0.0, plan.brake == BrakeAction::duty ? 1.0 : unbounded)) {
-    refuse(": brake duties in [0, 1], brake torques >= 0");
+  if (!lies_within(plan.motor_profile, 0.0, 1.0))
+    refuse(": a motor duty of its profile is outside [0, 1]; give duties in [0, 1]");
+  if (!(plan.brake_duty >= 0.0 && plan.brake_duty <= 1.0))
+    refuse(": brake duty " + std::to_string(plan.brake_duty) + ": give a duty in [0, 1]");
+  if (!lies_within(plan.brake_profile, 0.0, plan.brake == BrakeAction::duty ? 1.0 : unbounded)) {
+    refuse(": a value of the brake profile is out of range; give duties in [0, 1] or torques >= 0");
   }
-  if (!lies_within(plan.slip_ref_course, 0.0, 1.0)) refuse(": slip references: give them in (0, 1)");
+  if (!lies_within(plan.slip_ref_profile, 0.0, 1.0))
+    refuse(": a slip reference of its profile is outside [0, 1]; give references in (0, 1)");
   const bool brakes = plan.brake == BrakeAction::slip_control ||
                       (plan.brake == BrakeAction::torque && plan.brake_torque_Nm > 0.0) ||
-                      (plan.brake == BrakeAction::duty && plan.brake_duty > 0.0) || !plan.brake_course.empty();
-  const bool drives = plan.motor_duty > 0.0 || !plan.motor_course.empty();
+                      (plan.brake == BrakeAction::duty && plan.brake_duty > 0.0) || !plan.brake_profile.empty();
+  const bool drives = plan.motor_duty > 0.0 || !plan.motor_profile.empty();
   if (drives && brakes && !plan.motor_with_brake) {
-    refuse(": motor and brake together: leave one of them out, or say that it is meant (motor_with_brake)");
+    refuse(": motor and brake act together: leave one of them out, or set motor_with_brake = true");
   }
 }
 }  // namespace
@@ -56,10 +59,10 @@ Sequence::Sequence(std::vector<PhasePlan> plans, const SequenceLimits& limits, c
                  .brake_duty = stop_brake.duty,
                  .time_limit_s = stop_brake.limit_s} {
   check_safe(stop_plan_, "after a stop request");
-  if (plans_.empty()) throw std::invalid_argument("a sequence needs at least one phase");
+  if (plans_.empty()) throw std::invalid_argument("a sequence has no phases; give at least one");
   for (const PhasePlan& plan : plans_) {
     const std::string name(rig::name_of(plan.phase));
-    if (plan.ends_on.empty()) throw std::invalid_argument("phase " + name + " has no end condition");
+    if (plan.ends_on.empty()) throw std::invalid_argument("phase " + name + " has no end condition; give at least one");
     check_safe(plan, name);
   }
 }
@@ -68,7 +71,7 @@ runtime::PhasePermissions Sequence::permissions() const noexcept {
   runtime::PhasePermissions permissions{};
   for (const PhasePlan& plan : plans_) {
     runtime::PhasePermission& may = permissions[static_cast<std::size_t>(plan.phase)];
-    may.motor = may.motor || plan.motor_duty > 0.0 || !plan.motor_course.empty();
+    may.motor = may.motor || plan.motor_duty > 0.0 || !plan.motor_profile.empty();
     may.brake = may.brake || plan.brake != BrakeAction::released;
     may.together = may.together || plan.motor_with_brake;
   }
@@ -91,7 +94,7 @@ inline bool Sequence::holds(const EndCondition& condition, const SequenceInput& 
     case EndKind::duration: return input.time_s - entered_at_s_ >= value;
     case EndKind::upper_speed_above: return input.speeds.omega1_rad_s >= value;
     case EndKind::upper_speed_below: return input.speeds.omega1_rad_s < value;
-    // A wheel that has not started to turn has no peak yet.
+    // A wheel that has not begun to turn has no peak yet.
     case EndKind::upper_wheel_peak: return peak_speed_rad_s_ > peak_margin_rad_s && input.time_s - peak_at_s_ >= value;
     case EndKind::lower_speed_above: return input.speeds.omega2_rad_s >= value;
     case EndKind::lower_speed_below: return input.speeds.omega2_rad_s < value;

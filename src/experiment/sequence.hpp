@@ -13,88 +13,88 @@
 
 namespace abs_hil::experiment {
 
-/// What drives the brake during a phase.
+/// What sets the brake during a phase.
 enum class BrakeAction : std::uint8_t { released, torque, duty, slip_control };
 
-/// What ends a phase. Speeds are estimates.
+/// What ends a phase. All speeds are estimates.
 enum class EndKind : std::uint8_t {
   duration,           ///< value: s since the phase began
   upper_speed_above,  ///< value: rad/s of the upper wheel
   upper_wheel_peak,   ///< value: s without a new maximum of the upper wheel's speed
   car_speed_below,    ///< value: m/s
   standstill,         ///< both wheels stand; no value
-  start_command,      ///< somebody gave the start; no value
+  start_command,      ///< a start command arrived; no value
   upper_speed_below,  ///< value: rad/s
   lower_speed_above,  ///< value: rad/s of the lower wheel
   lower_speed_below,  ///< value: rad/s
   car_speed_above,    ///< value: m/s
   slip_above,         ///< value: slip
   slip_below,         ///< value: slip
-  distance,           ///< value: m that the car has come since the phase began
+  distance,           ///< value: m of the car since the phase began
   all,                ///< all of `parts` hold at the same time; no value
 };
 
 struct EndCondition {
   EndKind kind{EndKind::duration};
   double value{0.0};
-  rig::Reason reason{rig::Reason::none};  ///< noted when this condition ends the phase
+  rig::Reason reason{rig::Reason::none};  ///< recorded when this condition ends the phase
   std::vector<EndCondition> parts{};      ///< for EndKind::all
 };
 
-/// One phase: what acts, and what ends it, whichever condition comes first. Outlasting the time limit is a fault.
+/// One phase: its actions, and the conditions of which the first to hold ends it. Exceeding the time limit is a fault.
 struct PhasePlan {
   rig::Phase phase{rig::Phase::idle};
   double motor_duty{0.0};
   BrakeAction brake{BrakeAction::released};
   double brake_torque_Nm{0.0};  ///< for BrakeAction::torque
   double brake_duty{0.0};       ///< for BrakeAction::duty
-  // Not empty: in place of the constants above, over the time of the phase.
-  Profile motor_course{};
-  Profile brake_course{};     ///< of the torque or the duty
-  Profile slip_ref_course{};  ///< in place of control.slip_ref
+  // Profiles over the phase's time; those that are not empty replace the constants above.
+  Profile motor_profile{};
+  Profile brake_profile{};     ///< of the torque or the duty
+  Profile slip_ref_profile{};  ///< replaces control.slip_ref
   std::vector<EndCondition> ends_on{};
   double time_limit_s{0.0};      ///< in (0, 600]
-  bool motor_with_brake{false};  ///< motor and brake may act together in this phase: only where it is asked for
+  bool motor_with_brake{false};  ///< permits motor and brake together in this phase
 
   [[nodiscard]] double motor_duty_at(double time_s) const noexcept {
-    return motor_course.empty() ? motor_duty : motor_course.at(time_s);
+    return motor_profile.empty() ? motor_duty : motor_profile.at(time_s);
   }
   [[nodiscard]] double brake_torque_Nm_at(double time_s) const noexcept {
-    return brake_course.empty() ? brake_torque_Nm : brake_course.at(time_s);
+    return brake_profile.empty() ? brake_torque_Nm : brake_profile.at(time_s);
   }
   [[nodiscard]] double brake_duty_at(double time_s) const noexcept {
-    return brake_course.empty() ? brake_duty : brake_course.at(time_s);
+    return brake_profile.empty() ? brake_duty : brake_profile.at(time_s);
   }
 };
 
-/// Limits of a whole run; passing one is a fault.
+/// Limits of a whole run; exceeding one is a fault.
 struct SequenceLimits {
   double run_time_s{std::numeric_limits<double>::infinity()};
-  double distance_m{std::numeric_limits<double>::infinity()};  ///< that the car comes since the run began
+  double distance_m{std::numeric_limits<double>::infinity()};  ///< distance of the car since the run began
 };
 
-/// The brake after a stop request: motor off, this duty until standstill, then released.
+/// The brake after a stop request: the motor is off, this duty acts until standstill, then the brake is released.
 struct StopBrake {
   double duty{0.0};     ///< in [0, 1]; 0: the run ends at once
-  double limit_s{5.0};  ///< the longest, > 0
+  double limit_s{5.0};  ///< time limit, > 0
 };
 
-/// What the sequence looks at in each cycle.
+/// The sequence's inputs in each cycle.
 struct SequenceInput {
   double time_s{0.0};  ///< since the start of the run, never decreasing
   rig::WheelSpeeds speeds{};
   double car_speed_m_s{0.0};
   bool stands_still{false};
-  bool start_given{false};  ///< by a command
+  bool start_given{false};  ///< a start command has arrived
   double slip{0.0};
-  double distance_m{0.0};  ///< that the car has come since the run began
+  double distance_m{0.0};  ///< distance of the car since the run began
 };
 
-/// Steps through the phases of an experiment. `update` is real-time safe; the plans are made before the run.
+/// Steps through the phases of an experiment. `update` is real-time safe. The plans are made before the run.
 class Sequence {
  public:
-  /// Throws std::invalid_argument for an empty list and for an unsafe phase: without an end or a finite time limit,
-  /// with a duty or torque outside its range, with motor and brake together that does not say `motor_with_brake`.
+  /// Throws std::invalid_argument for an empty list and for an unsafe phase: one without an end or a finite time limit,
+  /// with a duty or torque outside its range, or with motor and brake together but without `motor_with_brake`.
   explicit Sequence(std::vector<PhasePlan> plans, const SequenceLimits& limits = {}, const StopBrake& stop_brake = {});
 
   struct Change {
@@ -102,24 +102,24 @@ class Sequence {
     rig::Reason reason{rig::Reason::none};
     double value{0.0};
   };
-  /// Enters the first phase on the first call, afterwards the next one as soon as an end condition holds.
+  /// Enters the first phase on the first call, and later the next phase as soon as an end condition holds.
   Change update(const SequenceInput& input) noexcept;
-  /// Leaves the plans for the phase `stopped` (stop request) or `fault`, for one last cycle. With a brake for it a stop
-  /// request leads through the phase `hold` first. The first reason stays, but for a fault in that phase.
+  /// Leaves the plans for one last cycle in phase `stopped` (stop request) or `fault`. With a stop brake, a stop
+  /// request first enters the phase `hold`. The first reason stays, unless a fault occurs in `hold`.
   void end_early(rig::Reason reason, double value) noexcept;
 
-  /// What the plans let act in each phase.
+  /// Which outputs the plans permit in each phase.
   [[nodiscard]] runtime::PhasePermissions permissions() const noexcept;
   /// The phase that acts in this cycle.
   [[nodiscard]] const PhasePlan& current() const noexcept {
     if (ended_) return last_;
     return stopping_ ? stop_plan_ : plans_[index_];
   }
-  /// Its place among the plans, from 0; after a stop request that of the one which it interrupted.
+  /// Index of the phase among the plans, from 0; after a stop request, of the phase that it interrupted.
   [[nodiscard]] std::size_t index() const noexcept { return index_; }
-  /// How long it has acted, s.
+  /// Time since the phase began, s.
   [[nodiscard]] double phase_time_s() const noexcept { return now_s_ - entered_at_s_; }
-  /// True in the run's last cycle: the safe command goes out in it.
+  /// True in the run's last cycle, in which the safe command goes out.
   [[nodiscard]] bool finished() const noexcept { return ended_; }
 
  private:
@@ -136,7 +136,7 @@ class Sequence {
   PhasePlan last_{};
   std::size_t index_{0};
   bool started_{false};
-  bool stopping_{false};  ///< the brake for a stop acts
+  bool stopping_{false};  ///< the stop brake acts
   bool ended_{false};
   rig::Reason early_reason_{rig::Reason::none};
   double early_value_{0.0};

@@ -23,7 +23,7 @@ PhasePlan timed(rig::Phase phase, double duration_s) {
 
 std::vector<PhasePlan> plan_timing_load(double duration_s) {
   if (!(duration_s > 0.0 && duration_s <= longest_s)) {
-    throw std::invalid_argument("duration " + std::to_string(duration_s) + " s: must be in (0, 86400] s");
+    throw std::invalid_argument("duration " + std::to_string(duration_s) + " s: give a time in (0, 86400] s");
   }
   std::vector<PhasePlan> plans;
   for (double left_s = duration_s; left_s > 0.0;) {

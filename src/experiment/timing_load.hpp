@@ -6,12 +6,12 @@
 
 namespace abs_hil::experiment {
 
-/// Speed of both wheels to start from: high enough that the wheels never come near standstill, where the simulation
-/// takes so many small steps that reading it would hide the machine's own lateness.
+/// Initial speed of both wheels. It keeps the wheels far from standstill: there the simulation takes so many small
+/// steps that its cost would hide the computer's own latency.
 inline constexpr double timing_load_start_speed_rad_s = 50.0;
 
-/// Phases that keep a cycle as busy as an experiment does, for `abs_hil latency`: accelerating and braking under slip
-/// control by turns, for `duration_s` in all, with the brake released at the end. The simulated rig only: nothing waits
+/// Phases that load a cycle as an experiment does, for `abs_hil latency`. They alternate acceleration and braking under
+/// slip control, last `duration_s` in all, and end with the brake released. For the simulated rig only: no phase waits
 /// for a speed. Throws std::invalid_argument unless 0 < duration_s <= 86400.
 [[nodiscard]] std::vector<PhasePlan> plan_timing_load(double duration_s);
 

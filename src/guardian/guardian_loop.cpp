@@ -8,13 +8,13 @@ namespace abs_hil::guardian {
 
 namespace {
 
-/// A killed process ends within microseconds, unless the kernel is in the midst of an access of its.
+/// A killed process ends within microseconds unless the kernel is still executing one of its accesses.
 constexpr std::int64_t end_wait_ns = 5'000'000;
 constexpr int quick_tries = 100;
 constexpr std::int64_t quick_pause_ns = 1'000'000;
 constexpr std::int64_t slow_pause_ns = 50'000'000;
 
-/// Eight looks in the time of the timeout: an eighth more at worst until it is noticed.
+/// Eight looks per timeout. The guardian therefore notices silence at most an eighth of the timeout late.
 std::int64_t look_period_for(std::int64_t timeout_ns) noexcept {
   constexpr std::int64_t shortest_ns = 250'000;
   constexpr std::int64_t longest_ns = 5'000'000;
@@ -39,21 +39,21 @@ GuardianReport GuardianLoop::run() noexcept {
   std::uint64_t beats = 0;
   for (;;) {
     next_look_ns = std::max(next_look_ns + look_period_ns_, clock_.now_ns());
-    HeartbeatReading sight{};
-    sight.controller_gone = controller_.gone_by(next_look_ns);
+    HeartbeatReading reading{};
+    reading.controller_gone = controller_.gone_by(next_look_ns);
     region_.panel().guardian_beats.store(++beats, std::memory_order_relaxed);
-    // What the controller said last, which is final if it is gone.
-    sight.stage = region_.stage();
-    sight.cycle_beats = region_.panel().cycle_beats.load(std::memory_order_relaxed) +
-                        region_.panel().safe_beats.load(std::memory_order_relaxed);
-    sight.now_ns = clock_.now_ns();
-    const Verdict verdict = watchdog_.look(sight);
+    // Read after `controller_gone`: if the controller has ended, these values are final.
+    reading.stage = region_.stage();
+    reading.cycle_beats = region_.panel().cycle_beats.load(std::memory_order_relaxed) +
+                          region_.panel().safe_beats.load(std::memory_order_relaxed);
+    reading.now_ns = clock_.now_ns();
+    const Verdict verdict = watchdog_.look(reading);
     if (verdict == Verdict::wait) continue;
 
     GuardianReport report{
-        .reason = watchdog_.reason(), .silence_ns = watchdog_.silence_ns(), .noticed_ns = sight.now_ns};
-    if (sight.controller_gone) report.controller_gone_ns = sight.now_ns;
-    if (verdict == Verdict::make_safe) make_safe(report, sight.stage == Stage::handed_over);
+        .reason = watchdog_.reason(), .silence_ns = watchdog_.silence_ns(), .noticed_ns = reading.now_ns};
+    if (reading.controller_gone) report.controller_gone_ns = reading.now_ns;
+    if (verdict == Verdict::make_safe) make_safe(report, reading.stage == Stage::handed_over);
     return report;
   }
 }

@@ -11,7 +11,7 @@
 
 namespace abs_hil::guardian {
 
-/// The controller's process as its guardian sees it.
+/// The process of the controller, as seen from the guardian.
 class ControllerProcess {
  public:
   ControllerProcess() = default;
@@ -19,33 +19,34 @@ class ControllerProcess {
   ControllerProcess& operator=(const ControllerProcess&) = delete;
   virtual ~ControllerProcess() = default;
 
-  /// True once the process has ended with all its threads, so that nothing of it can write any more. Waits for that
-  /// until `time_ns` of the guardian's clock at the latest.
+  /// True once the process and all its threads have ended, so that none of them can write any more. Waits for this
+  /// until `time_ns` (guardian's clock) at the latest.
   [[nodiscard]] virtual bool gone_by(std::int64_t time_ns) noexcept = 0;
-  /// SIGKILL: stopped and hung processes end by it, too.
+  /// Sends SIGKILL, which also ends stopped and hung processes.
   virtual void end() noexcept = 0;
 };
 
 /// What the guardian did.
 struct GuardianReport {
-  rig::Reason reason{rig::Reason::none};  ///< `none`: dismissed after a run that ended in order
-  bool acted{false};                      ///< it wrote the safe state
-  bool verified{false};                   ///< and read it back
-  driver::IoResult last_error{};          ///< of the last try that failed
-  int tries{0};
-  std::int64_t silence_ns{0};          ///< without a sign of life when it decided
-  std::int64_t noticed_ns{0};          ///< monotonic clock
-  std::int64_t controller_gone_ns{0};  ///< 0: not seen to end
-  std::int64_t first_written_ns{0};    ///< after the first try
-  std::int64_t verified_ns{0};
+  rig::Reason reason{rig::Reason::none};  ///< `none`: the run ended in order and the guardian was dismissed
+  bool acted{false};                      ///< the guardian wrote the safe state
+  bool verified{false};                   ///< the guardian read the safe state back
+  driver::IoResult last_error{};          ///< error of the last failed try
+  int tries{0};                           ///< number of attempts to write the safe state
+  std::int64_t silence_ns{0};             ///< time without a heartbeat when the guardian decided to act
+  std::int64_t noticed_ns{0};             ///< when the guardian decided to act, monotonic clock
+  std::int64_t controller_gone_ns{0};     ///< when the controller was seen to have ended; 0: never
+  std::int64_t first_written_ns{0};       ///< when the first try was over
+  std::int64_t verified_ns{0};            ///< when the safe state had been read back
 };
 
-/// The guardian's whole life: look, and if need be make safe, in this order:
-/// 1. end the controller, if it lives and may still write: otherwise one that was stopped between index and data would
-///    finish its write when it goes on, and undo the safe state;
-/// 2. wait until it has ended, all its threads and the accesses they were in: a little at first;
-/// 3. write the safe state and read it back, again and again until it is verified with the controller gone, for
-///    `insist_s` at the longest.
+/// The main loop of the guardian. It reads the controller's heartbeat once per period. When the heartbeat stops it
+/// makes the outputs safe in three steps:
+/// 1. It ends the controller if that may still write. A controller that was stopped between index and data would
+///    otherwise complete its write later and undo the safe state.
+/// 2. It waits up to 5 ms until the controller, its threads and their register accesses have ended.
+/// 3. It writes the safe state and reads it back. It repeats this until the safe state is verified and the controller
+///    has ended, for at most `insist_s`.
 class GuardianLoop {
  public:
   GuardianLoop(runtime::Clock& clock, ControllerProcess& controller, SharedRegion& region,
@@ -66,7 +67,7 @@ class GuardianLoop {
   Watchdog watchdog_;
 };
 
-/// In words, several lines, for log and file. `controller` is the process' id.
+/// The report as several lines of text, for log and file. `controller` is the process id of the controller.
 [[nodiscard]] std::string to_text(const GuardianReport& report, int controller);
 
 }  // namespace abs_hil::guardian

@@ -26,23 +26,23 @@ constexpr int ends_within_ms = 500;
 
 [[noreturn]] void refuse(const std::string& what) {
   throw driver::Unavailable("guardian: " + what +
-                            ". Without a guardian nothing may move: a program that dies would leave the motor driven "
-                            "(docs/dead-man.md)");
+                            ". The run does not start without a guardian: if this program died, nothing would stop the "
+                            "motor (docs/dead-man.md)");
 }
 
 [[noreturn]] void refuse(const std::string& what, int error) { refuse(what + ": " + std::strerror(error)); }
 
-/// A descriptor above those that the child finds, which closes itself.
+/// A descriptor numbered above those that the child inherits. The destructor closes it.
 class HighDescriptor {
  public:
-  /// Takes `fd` over if `ours`, else copies it.
+  /// Takes ownership of `fd` if `ours`, otherwise copies it.
   HighDescriptor(int fd, bool ours) {
     constexpr int above = 10;
-    if (fd < 0) refuse("a descriptor could not be opened", errno);
+    if (fd < 0) refuse("cannot open a file descriptor for it", errno);
     fd_ = ::fcntl(fd, F_DUPFD_CLOEXEC, above);
     const int error = errno;
     if (ours) ::close(fd);
-    if (fd_ < 0) refuse("a descriptor could not be copied", error);
+    if (fd_ < 0) refuse("cannot copy a file descriptor for it", error);
   }
   HighDescriptor(const HighDescriptor&) = delete;
   HighDescriptor& operator=(const HighDescriptor&) = delete;
@@ -54,7 +54,7 @@ class HighDescriptor {
 };
 
 int text_in_memory(const std::string& text) {
-  const int fd = ::memfd_create("abs_hil brief", MFD_CLOEXEC);
+  const int fd = ::memfd_create("abs_hil launch config", MFD_CLOEXEC);
   if (fd < 0) return -1;
   if (::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size())) return fd;
   ::close(fd);
@@ -93,18 +93,18 @@ std::string guardian_program() {
   std::error_code error;
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
   const std::filesystem::path beside = self.parent_path() / "abs_guardian";
-  // A program of somebody's own that runs ours from the library has the installed one.
+  // A program that embeds the library uses the installed guardian.
   const std::filesystem::path installed = std::filesystem::path(ABS_HIL_INSTALLED_BIN_DIR) / "abs_guardian";
   if (!std::filesystem::exists(beside, error) && std::filesystem::exists(installed, error)) return installed.string();
   return beside.string();
 }
 
-GuardianProcess::GuardianProcess(SharedRegion& region, std::string program, std::string brief_json)
-    : region_(region), program_(std::move(program)), brief_(std::move(brief_json)) {}
+GuardianProcess::GuardianProcess(SharedRegion& region, std::string program, std::string launch_config_json)
+    : region_(region), program_(std::move(program)), launch_config_(std::move(launch_config_json)) {}
 
 GuardianProcess::~GuardianProcess() { static_cast<void>(end()); }
 
-void GuardianProcess::stand_guard() {
+void GuardianProcess::arm() {
   start();
   try {
     wait_until_ready();
@@ -117,18 +117,18 @@ void GuardianProcess::stand_guard() {
 
 void GuardianProcess::start() {
   std::array<int, 2> pipe{-1, -1};
-  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) refuse("no pipe", errno);
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) refuse("cannot open a pipe", errno);
   ready_ = pipe[0];
   const HighDescriptor ready(pipe[1], true);
   const HighDescriptor region(region_.descriptor(), false);
   const HighDescriptor controller(open_pidfd(::getpid()), true);
-  const HighDescriptor brief(text_in_memory(brief_), true);
+  const HighDescriptor launch_config(text_in_memory(launch_config_), true);
 
   SpawnSetUp set_up;
   for (const auto& [from, to] : {std::pair(region.get(), inherited_region),
                                  {controller.get(), inherited_controller},
                                  {ready.get(), inherited_ready},
-                                 {brief.get(), inherited_launch_config}}) {
+                                 {launch_config.get(), inherited_launch_config}}) {
     posix_spawn_file_actions_adddup2(&set_up.actions, from, to);
   }
   posix_spawn_file_actions_addclosefrom_np(&set_up.actions, inherited_launch_config + 1);
@@ -138,7 +138,7 @@ void GuardianProcess::start() {
       ::posix_spawn(&pid_, program_.c_str(), &set_up.actions, &set_up.attributes, arguments.data(), environ);
   if (error != 0) {
     pid_ = 0;
-    refuse(program_ + " cannot be started", error);
+    refuse("cannot start " + program_, error);
   }
   pidfd_ = open_pidfd(pid_);
   if (pidfd_ < 0) {
@@ -146,7 +146,7 @@ void GuardianProcess::start() {
     ::kill(pid_, SIGKILL);
     ::waitpid(pid_, nullptr, 0);
     pid_ = 0;
-    refuse("no pidfd", reason);
+    refuse("cannot open a pidfd of its process", reason);
   }
 }
 
@@ -172,7 +172,8 @@ void GuardianProcess::wait_until_ready() {
 
 void GuardianProcess::making_safe() noexcept {
   region_.set_stage(Stage::making_safe);
-  // A failed write makes the outputs safe, and the end of the run once more, with no cycle between: each has its time.
+  // A failed write and the end of the run each make the outputs safe, without a cycle in between. Each beat restarts
+  // the guardian's timeout.
   region_.panel().safe_beats.fetch_add(1, std::memory_order_relaxed);
 }
 
@@ -195,20 +196,21 @@ GuardianProcess::GuardianExit GuardianProcess::end() noexcept {
   if (ready_ >= 0) ::close(std::exchange(ready_, -1));
   if (pid_ == 0) return GuardianExit::none;
   const bool handed_over = region_.stage() == Stage::handed_over;
-  // Outputs that were handed over stay so: a guardian that is held up must find them so, however late.
+  // `handed_over` must stay: a delayed guardian has to read it, however late.
   if (!handed_over) region_.set_stage(Stage::closed);
   const bool ended = ended_within(ends_within_ms);
-  GuardianExit farewell = GuardianExit::insisting;
-  if (!ended && !handed_over) ::kill(pid_, SIGKILL);  // stopped or hung: the outputs are safe without it
+  GuardianExit how = GuardianExit::insisting;
+  if (!ended && !handed_over)
+    ::kill(pid_, SIGKILL);  // the guardian is stopped or hung, and the outputs are already safe
   if (ended || !handed_over) {
     int status = 0;
     while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
     }
-    farewell = WIFEXITED(status) && WEXITSTATUS(status) == 0 ? GuardianExit::ended : GuardianExit::failed;
+    how = WIFEXITED(status) && WEXITSTATUS(status) == 0 ? GuardianExit::ended : GuardianExit::failed;
   }
   ::close(std::exchange(pidfd_, -1));
   pid_ = 0;
-  return farewell;
+  return how;
 }
 
 }  // namespace abs_hil::guardian

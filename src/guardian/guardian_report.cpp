@@ -15,19 +15,19 @@ std::string to_text(const GuardianReport& report, int controller) {
   std::string text(rig::description(report.reason));
   text += formatted(" (reason %d, process %d)", static_cast<int>(report.reason), controller);
   if (report.reason == rig::Reason::controller_silent) {
-    text += formatted(": no cycle for %.1f ms; ended it with SIGKILL before writing",
+    text += formatted(": no cycle for %.1f ms; the guardian ended it with SIGKILL before it wrote the safe state",
                       static_cast<double>(report.silence_ns) * 1e-6);
   }
   text += '\n';
-  if (!report.acted) return text + "its outputs had been released before: nothing to write\n";
+  if (!report.acted) return text + "the controller had already made the outputs safe: the guardian wrote nothing\n";
   if (report.controller_gone_ns != 0) {
-    text += formatted("process seen to have ended %.3f ms after this was noticed\n",
+    text += formatted("the controller's process had ended %.3f ms after the guardian noticed\n",
                       ms_between(report.noticed_ns, report.controller_gone_ns));
   } else if (report.reason != rig::Reason::safe_state_unverified) {
-    text += "PROCESS NOT SEEN TO END: it hangs in the kernel\n";
+    text += "THE CONTROLLER'S PROCESS DID NOT END: it hangs in the kernel\n";
   }
   if (report.verified) {
-    text += formatted("drive 0 and brake 0 written and read back %.3f ms after this was noticed, at try %d\n",
+    text += formatted("drive 0 and brake 0 written and read back %.3f ms after the guardian noticed, at try %d\n",
                       ms_between(report.noticed_ns, report.verified_ns), report.tries);
     return text;
   }

@@ -5,11 +5,11 @@
 
 namespace abs_hil::guardian {
 
-std::string to_json(const LaunchConfig& brief) {
-  return nlohmann::json{{"config_json", brief.config_json}, {"experiment", brief.experiment},
-                        {"controller", brief.controller},   {"plant", brief.plant},
-                        {"backend", brief.backend},         {"version", brief.version},
-                        {"realtime", brief.realtime},       {"record_prefix", brief.record_prefix}}
+std::string to_json(const LaunchConfig& config) {
+  return nlohmann::json{{"config_json", config.config_json}, {"experiment", config.experiment},
+                        {"controller", config.controller},   {"plant", config.plant},
+                        {"backend", config.backend},         {"version", config.version},
+                        {"realtime", config.realtime},       {"record_prefix", config.record_prefix}}
       .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
@@ -24,7 +24,7 @@ LaunchConfig parse_launch_config(const std::string& json) try {
           .realtime = object.at("realtime"),
           .record_prefix = object.at("record_prefix")};
 } catch (const nlohmann::json::exception& error) {
-  throw std::runtime_error(std::string("guardian: not a brief: ") + error.what());
+  throw std::runtime_error(std::string("guardian: not a launch configuration: ") + error.what());
 }
 
 }  // namespace abs_hil::guardian

@@ -14,8 +14,8 @@
 namespace abs_hil::guardian {
 
 int open_pidfd(pid_t process) noexcept {
-  constexpr unsigned int close_on_exec = 0;  // pidfds always are
-  return static_cast<int>(::syscall(SYS_pidfd_open, process, close_on_exec));
+  constexpr unsigned int no_flags = 0;  // a pidfd is always close-on-exec
+  return static_cast<int>(::syscall(SYS_pidfd_open, process, no_flags));
 }
 
 bool LinuxProcess::gone_by(std::int64_t time_ns) noexcept {
@@ -25,7 +25,7 @@ bool LinuxProcess::gone_by(std::int64_t time_ns) noexcept {
     const timespec left{.tv_sec = static_cast<time_t>(left_ns / rig::ns_per_s), .tv_nsec = left_ns % rig::ns_per_s};
     pollfd ended{pidfd_, POLLIN, 0};
     const int ready = ::ppoll(&ended, 1, &left, nullptr);
-    if (ready > 0) return true;  // POLLIN, or a descriptor that is none: nobody to guard
+    if (ready > 0) return true;  // POLLIN: the process has ended. POLLNVAL: there is no process to guard
     if (ready == 0 || errno != EINTR) return false;
   }
 }

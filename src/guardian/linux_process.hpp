@@ -6,10 +6,10 @@
 
 namespace abs_hil::guardian {
 
-/// A process behind a pidfd, which names this very process however soon it ends and its number is used again.
+/// A process identified by a pidfd. A pidfd never refers to another process, even when the process id is reused.
 class LinuxProcess final : public ControllerProcess {
  public:
-  /// @param pidfd  stays the caller's
+  /// @param pidfd  the caller keeps ownership
   explicit LinuxProcess(int pidfd) noexcept : pidfd_(pidfd) {}
 
   [[nodiscard]] bool gone_by(std::int64_t time_ns) noexcept override;
@@ -19,7 +19,7 @@ class LinuxProcess final : public ControllerProcess {
   int pidfd_;
 };
 
-/// A pidfd of a process; -1 and errno if there is none.
+/// Opens a pidfd of a process; -1 and errno on failure.
 [[nodiscard]] int open_pidfd(pid_t process) noexcept;
 
 }  // namespace abs_hil::guardian

@@ -36,7 +36,7 @@ runtime::FlightSlot* SharedRegion::first_slot() const noexcept {
 }
 
 void SharedRegion::map(std::size_t bytes) {
-  // Populated: the cycle's first lap around the recorder must not fault its pages in.
+  // MAP_POPULATE: the cycle's first lap around the recorder must not cause page faults.
   void* const memory = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, fd_, 0);
   if (memory == MAP_FAILED) fail("cannot be mapped");
   bytes_ = bytes;
@@ -46,7 +46,7 @@ void SharedRegion::map(std::size_t bytes) {
 SharedRegion::SharedRegion(std::size_t slots) : fd_(::memfd_create("abs_hil run", MFD_CLOEXEC | MFD_ALLOW_SEALING)) {
   if (fd_ < 0) fail("cannot be made");
   const std::size_t bytes = bytes_for(slots);
-  // Sealed: nobody can cut it short under the feet of the other.
+  // Sealed: neither process can shrink the memory that the other one uses.
   if (::ftruncate(fd_, static_cast<off_t>(bytes)) != 0 ||
       ::fcntl(fd_, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) != 0) {
     const int error = errno;
@@ -72,7 +72,9 @@ SharedRegion::SharedRegion(Inherited inherited) : fd_(inherited.fd), owns_fd_(fa
   if (header_->magic != region_magic || header_->layout != expected_layout() || header_->slots == 0 ||
       bytes != bytes_for(header_->slots)) {
     ::munmap(header_, bytes_);
-    throw std::runtime_error("guardian: the shared memory is that of another build of abs_hil");
+    throw std::runtime_error(
+        "guardian: the shared memory comes from another build of abs_hil; install abs_hil and abs_guardian of one "
+        "build");
   }
   recorder_ = runtime::FlightRing({first_slot(), header_->slots});
 }

@@ -9,24 +9,25 @@
 
 namespace abs_hil::guardian {
 
-/// How far a run has come, as the controller tells its guardian.
+/// State of the run's outputs, as the controller tells its guardian.
 enum class Stage : std::uint32_t {
-  guarded = 0,      ///< outputs may be driven
-  released = 1,     ///< the controller has brought the outputs into the safe state and verified it
-  handed_over = 2,  ///< the controller has given the outputs up without knowing them safe: it writes zeros only
-  closed = 3,       ///< the run is over, its files are written; never after handed_over
-  making_safe = 4,  ///< the controller waits for the board to confirm the safe state, which takes its time
+  guarded = 0,   ///< the controller may drive the outputs
+  released = 1,  ///< the controller has brought the outputs into the safe state and verified it
+  handed_over =
+      2,       ///< the controller could not verify the safe state and leaves it to the guardian: it writes zeros only
+  closed = 3,  ///< the run is over and its files are written; never after handed_over
+  making_safe = 4,  ///< the controller waits for the board to confirm the safe state, which may take seconds
 };
 
-/// Memory of one run, shared by the controller and its guardian: signs of life and the flight recorder. It outlives
-/// either of them as long as the other one lives. Nothing in it is a lock.
+/// Memory of one run that controller and guardian share: heartbeat counters and flight recorder. It lives until both
+/// processes have ended. It contains no lock.
 class SharedRegion {
  public:
-  /// Makes one. Throws std::system_error.
-  /// @param slots  of the flight recorder, >= 1
+  /// Creates the memory. Throws std::system_error.
+  /// @param slots  slots of the flight recorder, >= 1
   explicit SharedRegion(std::size_t slots);
-  /// Takes the one behind an inherited descriptor, which stays the caller's. Throws std::runtime_error if it is none,
-  /// or one of another build.
+  /// Maps the memory behind an inherited descriptor; the caller keeps the descriptor. Throws std::runtime_error if the
+  /// descriptor is not such memory, or if another build created it.
   [[nodiscard]] static SharedRegion attach(int fd) { return SharedRegion(Inherited{fd}); }
   SharedRegion(const SharedRegion&) = delete;
   SharedRegion& operator=(const SharedRegion&) = delete;
@@ -45,7 +46,7 @@ class SharedRegion {
   };
   struct Header {
     std::uint64_t magic{0};
-    std::uint64_t layout{0};  ///< sizes of all that is shared: two builds that differ in one do not fit
+    std::uint64_t layout{0};  ///< sizes of all shared types; builds with different sizes do not fit together
     std::uint64_t slots{0};
     std::atomic<Stage> stage{Stage::guarded};
     runtime::HeartbeatPanel panel{};

@@ -4,30 +4,30 @@
 
 namespace abs_hil::guardian {
 
-void Watchdog::listen(const HeartbeatReading& sight) noexcept {
-  const std::int64_t since_last_look_ns = std::min(sight.now_ns - last_look_ns_, 2 * look_period_ns_);
-  const bool life = sight.cycle_beats != last_beats_;
-  // Before the first cycle nothing can be driven, and there is nothing to be heard.
-  silence_ns_ = life || sight.cycle_beats == 0 ? 0 : silence_ns_ + since_last_look_ns;
-  last_look_ns_ = sight.now_ns;
-  last_beats_ = sight.cycle_beats;
+void Watchdog::measure_silence(const HeartbeatReading& reading) noexcept {
+  const std::int64_t since_last_look_ns = std::min(reading.now_ns - last_look_ns_, 2 * look_period_ns_);
+  const bool beat = reading.cycle_beats != last_beats_;
+  // There is no heartbeat before the first cycle, and no output can be driven before it.
+  silence_ns_ = beat || reading.cycle_beats == 0 ? 0 : silence_ns_ + since_last_look_ns;
+  last_look_ns_ = reading.now_ns;
+  last_beats_ = reading.cycle_beats;
 }
 
-Verdict Watchdog::look(const HeartbeatReading& sight) noexcept {
+Verdict Watchdog::look(const HeartbeatReading& reading) noexcept {
   if (reason_ != rig::Reason::none) return Verdict::make_safe;
-  listen(sight);
-  if (sight.stage == Stage::closed) return Verdict::dismissed;
-  if (sight.stage == Stage::handed_over) {
+  measure_silence(reading);
+  if (reading.stage == Stage::closed) return Verdict::dismissed;
+  if (reading.stage == Stage::handed_over) {
     reason_ = rig::Reason::safe_state_unverified;
     return Verdict::make_safe;
   }
-  if (sight.controller_gone) {
+  if (reading.controller_gone) {
     reason_ = rig::Reason::controller_died;
-    return sight.stage == Stage::released ? Verdict::dismissed : Verdict::make_safe;
+    return reading.stage == Stage::released ? Verdict::dismissed : Verdict::make_safe;
   }
-  const bool silent = sight.stage == Stage::guarded       ? silence_ns_ >= timeout_ns_
-                      : sight.stage == Stage::making_safe ? silence_ns_ >= timeout_ns_ + making_safe_ns_
-                                                          : false;
+  const bool silent = reading.stage == Stage::guarded       ? silence_ns_ >= timeout_ns_
+                      : reading.stage == Stage::making_safe ? silence_ns_ >= timeout_ns_ + making_safe_ns_
+                                                            : false;
   if (silent) {
     reason_ = rig::Reason::controller_silent;
     return Verdict::make_safe;

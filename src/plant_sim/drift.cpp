@@ -5,7 +5,7 @@
 namespace abs_hil::plant_sim {
 namespace {
 
-/// A profile over time alone: the wheel's angle and radius have no part in it.
+/// A profile over time alone: it ignores the wheel's angle and radius.
 FactorProgress over_time(const std::string& profile, const char* key) {
   return {FactorProfile(profile, key, FactorProfile::Axes::time_only), 1.0};
 }

@@ -8,15 +8,15 @@ namespace {
 
 double sign_of(double value) noexcept { return value > 0.0 ? 1.0 : value < 0.0 ? -1.0 : 0.0; }
 
-/// Torque on the standing upper wheel, N m, other than friction.
+/// Torque on the standing upper wheel without friction, N m.
 double pull_on_upper_Nm(const WheelModel& model, double force_N) noexcept { return model.wheels().r1_m * force_N; }
 
-/// Torque on the standing lower wheel, N m, other than friction.
+/// Torque on the standing lower wheel without friction, N m.
 double pull_on_lower_Nm(const WheelModel& model, const HeldTorques& held, double force_N) noexcept {
   return motor_torque_Nm(held, 0.0) - model.wheels().r2_m * force_N;
 }
 
-/// Friction that holds the standing upper wheel, N m: bearing and brake.
+/// Largest friction torque on the standing upper wheel, N m: bearing and brake.
 double hold_of_upper_Nm(const WheelModel& model, const StateVector& x) noexcept {
   return model.wheels().M10_Nm + x[brake_torque];
 }
@@ -29,8 +29,8 @@ double direction(double speed_rad_s, double pull_Nm, double hold_Nm) noexcept {
 }  // namespace
 
 Sliding sliding_from(TorqueBalance balance, const StateVector& x) noexcept {
-  // A standing upper wheel is tried as held: if its friction is not enough to hold it, it is not with the force of the
-  // sliding wheel either, which differs with a load that feels the brake.
+  // Assume first that a standing upper wheel is held. If its friction cannot hold it then, it cannot hold it with the
+  // force of the sliding wheel either, which differs for a load that depends on the brake.
   balance.sliding = {sign_of(x[omega1]), sign_of(x[omega2])};
   if (x[omega1] != 0.0 && x[omega2] != 0.0) return balance.sliding;
   const WheelModel& model = balance.model;

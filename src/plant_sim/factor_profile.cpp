@@ -21,7 +21,7 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
-/// Cuts the text up to `separator` off `rest`, all of it if there is none.
+/// Removes and returns the text before `separator` from `rest`; all of it if there is no separator.
 std::string_view cut(std::string_view& rest, char separator) {
   const std::size_t at = rest.find(separator);
   const std::string_view head = rest.substr(0, at);
@@ -40,14 +40,14 @@ double number(std::string_view word, std::string_view part) {
   const char* end = word.data() + word.size();
   const auto [at, error] = std::from_chars(word.data(), end, value);
   if (error != std::errc() || at != end || !std::isfinite(value)) {
-    refuse(part, "holds \"" + std::string(word) + "\" where a number belongs");
+    refuse(part, "holds \"" + std::string(word) + "\" instead of a number");
   }
   return value;
 }
 
 double factor(std::string_view word, std::string_view part) {
   const double value = number(word, part);
-  if (!(value > 0.0 && value <= highest_factor)) refuse(part, "gives a factor that is not in (0, 10]");
+  if (!(value > 0.0 && value <= highest_factor)) refuse(part, "has a factor outside (0, 10]");
   return value;
 }
 
@@ -69,7 +69,7 @@ Change change(std::string_view part) {
     return ramp;
   }
   refuse(part,
-         "is no change; write \"VALUE at POSITION\" or \"VALUE from POSITION to POSITION\", as in \"0.5 at 0.8\"");
+         "is not a change; write \"VALUE at POSITION\" or \"VALUE from POSITION to POSITION\", as in \"0.5 at 0.8\"");
 }
 
 }  // namespace
@@ -96,8 +96,8 @@ void FactorProfile::read(std::string_view text, Axes axes) {
   const std::vector<std::string_view> axis = words_of(head);
   from_braking_ = axis.size() == 2 && axis.front() == "braking";
   if ((axis.size() != 1 && !from_braking_) || (axis.back() != "time" && (axis.back() != "distance" || time_only))) {
-    refuse(head, time_only ? "is no axis here; write time or braking time"
-                           : "is no axis; write time, distance, braking time or braking distance");
+    refuse(head, time_only ? "is not an axis of this profile; write time or braking time"
+                           : "is not an axis; write time, distance, braking time or braking distance");
   }
   axis_ = axis.back() == "time" ? Axis::time : Axis::distance;
 
@@ -108,9 +108,9 @@ void FactorProfile::read(std::string_view text, Axes axes) {
     const std::string_view part = cut(rest, ';');
     const Change next = change(part);
     Piece& last = pieces_.back();
-    if (next.begin < last.begin) refuse(part, "must not begin before the change before it has ended");
+    if (next.begin < last.begin) refuse(part, "must not begin before the previous change has ended");
     const bool jump = next.begin == next.end;
-    if (jump && next.begin == jumped_at) refuse(part, "must come after the jump before it, and after 0");
+    if (jump && next.begin == jumped_at) refuse(part, "must come after the previous jump and after 0");
     const double before = last.value;
     last.end = next.begin;
     if (last.end == last.begin) pieces_.pop_back();

@@ -5,7 +5,7 @@
 namespace abs_hil::plant_sim {
 namespace {
 
-/// What the sum of a run's intervals may miss an instant by; a piece that ends so soon has ended.
+/// Rounding error of the sum of a run's intervals; a piece with less time left has ended.
 constexpr double time_rounding_s = 1e-11;
 
 }  // namespace
@@ -27,7 +27,7 @@ void FactorProgress::brake_applied(double angle2_rad) noexcept {
 
 void FactorProgress::settle_on_changes(double angle2_rad) noexcept {
   if (!counting_) return;
-  // The last piece ends at infinity. Along the way the comparison is the integration's own.
+  // The last piece ends at infinity. Along the distance this is the same comparison as in the integration.
   while (along_time() ? time_left_s() <= time_rounding_s : angle2_rad >= end_angle2_rad()) ++index_;
 }
 

@@ -7,8 +7,8 @@
 namespace abs_hil::plant_sim {
 namespace {
 
-/// Least part of the lever's arm L sin phi that friction must leave: with less, the normal force would rise more than
-/// tenfold.
+/// Friction must leave at least this share of the lever's arm L sin phi; below it the normal force would increase more
+/// than tenfold.
 constexpr double least_arm = 0.1;
 
 }  // namespace
@@ -23,14 +23,14 @@ LeverLoad::LeverLoad(const PlantOptions& options, double peak_mu, double frictio
   if (peak_mu * friction_at_most <= most_mu) return;
   throw std::invalid_argument("plant.load = \"lever\": a friction coefficient of " +
                               std::to_string(peak_mu * friction_at_most) +
-                              " would wedge the wheel under its lever; at most " + std::to_string(most_mu) +
+                              " would wedge the wheel under its lever; it can be at most " + std::to_string(most_mu) +
                               " with this plant.lever_L_m, plant.lever_phi_deg and plant.r1_m");
 }
 
 LoadModel make_load_model(const PlantOptions& options, double peak_mu, double friction_at_most) {
   if (options.load == "constant") return ConstantLoad(options);
   if (options.load == "lever") return LeverLoad(options, peak_mu, friction_at_most);
-  throw std::invalid_argument("plant.load = \"" + options.load + "\": must be constant or lever");
+  throw std::invalid_argument("plant.load = \"" + options.load + "\": give constant or lever");
 }
 
 }  // namespace abs_hil::plant_sim

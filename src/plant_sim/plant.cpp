@@ -68,7 +68,7 @@ void Plant::advance(double duration_s, const PlantInput& input) noexcept {
     integrate(model_, options_.max_step_s, torques, part_s, profile_, x);
   };
   if (drift_.any()) {
-    // Within a part the factors stand at those of its middle.
+    // Each part uses the factors at its middle.
     for (double left_s = duration_s; left_s > 0.0;) {
       const double part_s = drift_.part_s(left_s, options_.max_step_s);
       const DriftFactors factors = drift_.after(0.5 * part_s);

@@ -9,16 +9,15 @@
 namespace abs_hil::plant_sim {
 namespace {
 
-/// Step over time constant of the slip dynamics. RK4 is stable up to 2.78; tests/plant_sim/accuracy_test.cpp shows what
-/// error this value leaves.
+/// Ratio of step and time constant of the slip dynamics. RK4 is stable up to 2.78; tests/plant_sim/accuracy_test.cpp
+/// shows the error at this value.
 constexpr double slip_time_constant_fraction = 0.3;
-/// A wheel that breaks away and is held again within this time was pulled no harder than its friction, but for
-/// rounding.
+/// If a wheel breaks away and is held again within this time, the torque on it equalled its friction within rounding.
 constexpr double least_slide_s = 1e-6;
-/// Halvings of the bracket of a stop or break-away: to a 10^-12th of the substep.
+/// Bisections of the interval that contains a stop or break-away: down to 10^-12 of the substep.
 constexpr int event_bisections = 40;
 
-/// One Runge-Kutta step of `step_s` from `x`, with the way of sliding held.
+/// One Runge-Kutta step of `step_s` from `x` with a fixed direction of sliding.
 StateVector stepped(const TorqueBalance& balance, const StateVector& x, double step_s) noexcept {
   boost::numeric::odeint::runge_kutta4<StateVector> stepper;
   StateVector end{};
@@ -26,8 +25,8 @@ StateVector stepped(const TorqueBalance& balance, const StateVector& x, double s
   return end;
 }
 
-/// The step that `max_step_s` and the slip dynamics allow. Their time constant, which for the magic formula is
-/// v_x / (theta B C (r1^2/J1 + r2^2/J2)), falls with the car speed; a held wheel has no part in them.
+/// Step limit from `max_step_s` and the slip dynamics. Their time constant decreases with the car speed; for the magic
+/// formula it is v_x / (theta B C (r1^2/J1 + r2^2/J2)). A held wheel has no slip dynamics.
 double step_limit_s(const TorqueBalance& balance, const StateVector& x, double max_step_s) noexcept {
   const rig::WheelParameters& w = balance.model.wheels();
   const Sliding& sliding = balance.sliding;
@@ -38,7 +37,7 @@ double step_limit_s(const TorqueBalance& balance, const StateVector& x, double m
   return std::min(max_step_s, slip_time_constant_fraction / rate_per_s);
 }
 
-/// The shortest step, within 10^-12 of `step_s`, after which `margin` is negative; it is so after `step_s`.
+/// Shortest step, within 10^-12 of `step_s`, after which `margin` is negative. It must be negative after `step_s`.
 double event_step_s(const TorqueBalance& balance, const StateVector& x, double step_s) noexcept {
   double before_s = 0.0;
   double after_s = step_s;
@@ -50,7 +49,7 @@ double event_step_s(const TorqueBalance& balance, const StateVector& x, double s
   return after_s;
 }
 
-/// Goes on from `x` to the first event before `step_s`, or for all of it. Returns the time passed.
+/// Integrates `x` to the first event before `step_s`, or over all of it. Returns the integrated time.
 double substep(TorqueBalance& balance, double step_s, StateVector& x) noexcept {
   const StateVector whole = stepped(balance, x, step_s);
   if (!(margin(balance, whole, step_s) < 0.0)) {
@@ -62,7 +61,7 @@ double substep(TorqueBalance& balance, double step_s, StateVector& x) noexcept {
   const bool upper_stops = balance.sliding.upper * end[omega1] < 0.0;
   const bool lower_stops = balance.sliding.lower * end[omega2] < 0.0;
   if (taken_s < least_slide_s && ((upper_stops && x[omega1] == 0.0) || (lower_stops && x[omega2] == 0.0))) {
-    // Hold it, or rounding could make it break away and stop for ever without time passing.
+    // Hold the wheel: rounding could otherwise make it break away and stop again endlessly without progress in time.
     if (upper_stops) balance.sliding.upper = 0.0;
     if (lower_stops) balance.sliding.lower = 0.0;
     taken_s = std::min(least_slide_s, step_s);
@@ -74,7 +73,7 @@ double substep(TorqueBalance& balance, double step_s, StateVector& x) noexcept {
   return taken_s;
 }
 
-/// Nothing turns: only the brake's lag (6) goes on, by its closed form.
+/// Both wheels stand: only the brake's lag (6) continues, in closed form.
 void stand(const HeldTorques& held, double duration_s, StateVector& x) noexcept {
   const double remainder = std::exp(-held.brake_rate_per_s * duration_s);
   x[brake_torque] = held.brake_target_Nm + remainder * (x[brake_torque] - held.brake_target_Nm);
@@ -93,7 +92,7 @@ void integrate(const WheelModel& model, double max_step_s, const HeldTorques& he
     }
     TorqueBalance balance{model, held, profile.present(x[angle2]), {}};
     balance.sliding = sliding_from(balance, x);
-    // Equal parts of what is left; the last part is what is left, so the interval ends exactly.
+    // Equal parts of the remaining time; the last part is exactly the rest, so the interval ends exactly.
     const double interval_s = std::min(left_s, profile.time_left_s());
     const double parts = std::ceil(interval_s / step_limit_s(balance, x, max_step_s));
     const double taken_s = substep(balance, parts > 1.0 ? interval_s / parts : interval_s, x);

@@ -8,7 +8,7 @@
 
 namespace abs_hil::plant_sim {
 
-/// The plant's state as Boost.odeint integrates it; the indices below name its elements.
+/// The plant's state for Boost.odeint; the indices below name its elements.
 using StateVector = std::array<double, 5>;
 inline constexpr std::size_t omega1 = 0;
 inline constexpr std::size_t omega2 = 1;
@@ -16,19 +16,19 @@ inline constexpr std::size_t brake_torque = 2;
 inline constexpr std::size_t angle1 = 3;
 inline constexpr std::size_t angle2 = 4;
 
-/// Which way each wheel slides in its bearing and brake: +1 forward, -1 backward, 0 held at standstill. It is fixed
-/// within a substep, so that the right-hand side is smooth there.
+/// Direction of sliding of each wheel in its bearing and brake: +1 forward, -1 backward, 0 held at standstill. It is
+/// fixed within a substep, so that the right-hand side is smooth there.
 struct Sliding {
   double upper{0.0};
   double lower{0.0};
 };
 
-/// The inputs of one `advance`, resolved to what the differential equations need.
+/// The inputs of one `advance` in the form that the differential equations use.
 struct HeldTorques {
-  double brake_target_Nm{0.0};     ///< b(u) of (7), which the brake torque tends to
-  double brake_rate_per_s{0.0};    ///< c31 of (6); 0 with the ideal actuator, whose torque is held
+  double brake_target_Nm{0.0};     ///< b(u) of (7), the target of the brake torque
+  double brake_rate_per_s{0.0};    ///< c31 of (6); 0 for the ideal actuator, whose torque is constant
   double motor_stall_Nm{0.0};      ///< motor torque at standstill
-  double motor_back_emf_Nms{0.0};  ///< its fall per rad/s of the lower wheel
+  double motor_back_emf_Nms{0.0};  ///< decrease of the motor torque per rad/s of the lower wheel
 };
 
 [[nodiscard]] inline HeldTorques resolve(const PlantOptions& options, const PlantInput& input) noexcept {
@@ -45,21 +45,21 @@ struct HeldTorques {
   return held;
 }
 
-/// Drive motor's torque on the lower wheel, N m; exactly 0 at duty 0.
+/// Torque of the drive motor on the lower wheel, N m; exactly 0 at duty 0.
 [[nodiscard]] inline double motor_torque_Nm(const HeldTorques& held, double omega2_rad_s) noexcept {
   return held.motor_stall_Nm - held.motor_back_emf_Nms * omega2_rad_s;
 }
 
-/// The right-hand side of (1), (2) and (6) for a given way of sliding and along one piece of the friction profile. The
-/// tyre force is odd in the slip, without the factor s(r2 omega2 - r1 omega1) printed in (1), which would turn it round
-/// in traction (docs/theory.md).
+/// The right-hand side of (1), (2) and (6) for a fixed direction of sliding and one piece of the friction profile. The
+/// tyre force is odd in the slip; the factor s(r2 omega2 - r1 omega1) printed in (1) is left out, because it would
+/// reverse the force in traction (docs/theory.md).
 struct TorqueBalance {
   const WheelModel& model;
   const HeldTorques& held;
   PresentFactor friction;
   Sliding sliding;
 
-  /// @param time_s  since `friction` holds
+  /// @param time_s  time since `friction` holds
   [[nodiscard]] double tyre_force_N(const StateVector& x, double time_s) const noexcept {
     return model.tyre_force_N(
         {x[omega1], x[omega2], x[brake_torque], sliding.upper, friction.after(time_s, x[angle2])});

@@ -19,9 +19,9 @@ IntecoMu::IntecoMu(const PlantOptions& options)
   steepest_shape_ = slope_bound() / peak_mu_;
 }
 
-/// The highest point of the curve on [0, 1], which need not be a smooth maximum: the published curve is highest at 1.
+/// The maximum of the curve on [0, 1]. It may lie at an end: the published curve is highest at 1.
 double IntecoMu::highest() const noexcept {
-  // Samples that lie closer at small slips, where the knee is; then a golden-section search around the best.
+  // Sample more densely at small slips, where the knee is; then run a golden-section search around the best sample.
   constexpr int samples = 200;
   const auto sample = [](int i) { return square(static_cast<double>(i) / samples); };
   int best = 0;
@@ -40,8 +40,8 @@ double IntecoMu::highest() const noexcept {
   return std::max(friction_coefficient(0.5 * (left + right)), friction_coefficient(sample(best)));
 }
 
-/// Bound on |mu'| over [0, 1]. The saturating term is steepest where s^p = a (p - 1) / (p + 1), its turning point; the
-/// polynomial's slope is bounded term by term.
+/// Upper bound on |mu'| over [0, 1]. The saturating term is steepest at its turning point, s^p = a (p - 1) / (p + 1);
+/// the polynomial's slope is bounded term by term.
 double IntecoMu::slope_bound() const noexcept {
   const double power = mu_.a * (mu_.p - 1.0) / (mu_.p + 1.0);
   const double s = std::pow(power, 1.0 / mu_.p);
@@ -52,7 +52,7 @@ double IntecoMu::slope_bound() const noexcept {
 TyreModel make_tyre_model(const PlantOptions& options) {
   if (options.tyre == "magic-formula") return MagicFormula(options);
   if (options.tyre == "inteco-mu") return IntecoMu(options);
-  throw std::invalid_argument("plant.tyre = \"" + options.tyre + "\": must be magic-formula or inteco-mu");
+  throw std::invalid_argument("plant.tyre = \"" + options.tyre + "\": give magic-formula or inteco-mu");
 }
 
 }  // namespace abs_hil::plant_sim

@@ -5,13 +5,13 @@
 
 namespace abs_hil::program {
 
-/// Says in the log what the driver found out about its board, and that nobody has tried it on hardware until the
-/// configuration says that somebody has. Nothing for the simulator.
+/// Logs what the driver reports about its board. Also warns that the driver is not verified on hardware until
+/// driver.verified_on_hardware is true. Does nothing for the simulator.
 class BoardNotes {
  public:
   BoardNotes(const config::Settings& settings, const driver::RigDriver& driver)
       : settings_(settings), driver_(driver) {}
-  /// Does so on the first call, which must come when the driver is configured.
+  /// Logs on the first call, which must come after the driver was configured.
   void log_once();
 
  private:

@@ -22,24 +22,26 @@ runtime::RealtimeMode realtime_mode(const std::string& name) {
   return name == "off" ? runtime::RealtimeMode::off : runtime::RealtimeMode::prefer;
 }
 
-/// A run that waits for its start must be able to get it.
+/// Checks that a run that waits for a start command can receive one.
 void check_start(const RunRequest& request) {
   const config::Settings& s = request.settings;
   const auto refuse = [](const char* why) { throw config::ConfigError(std::string("--wait-for-start: ") + why); };
-  if (!s.commands.enabled) refuse("nobody could give the start; add --set commands.enabled=true and commands.key_file");
-  if (request.outputs.no_lcm) refuse("the start comes over LCM; leave out --no-lcm");
-  if (request.outputs.fast) refuse("virtual time waits for nobody; leave out --fast");
+  if (!s.commands.enabled)
+    refuse("the start command needs remote commands; add --set commands.enabled=true --set commands.key_file=FILE");
+  if (request.outputs.no_lcm) refuse("the start command comes over LCM; leave out --no-lcm");
+  if (request.outputs.fast) refuse("a run in virtual time cannot wait for a command; leave out --fast");
   if (s.experiment.start_speed_rad_s > 0.0) {
-    refuse("wheels that turn from the start would run down meanwhile; leave out experiment.start_speed_rad_s");
+    refuse(
+        "wheels that turn from the beginning would slow down during the wait; leave out experiment.start_speed_rad_s");
   }
 }
 
-/// What only a simulated plant can do, and what may be done to an emulator but never to hardware.
+/// Refuses events that only a simulated plant can carry out, and fault injection into real hardware.
 void refuse_events(const config::Script& script, bool emulated) {
   for (const config::EventScript& event : script.events) {
     for (const config::Change& change : event.changes) {
       throw config::ConfigError(
-          fmt::format("{}: [[event]] {}: only a simulated plant can be told to change; run experiment {} with "
+          fmt::format("{}: [[event]] {}: only a simulated plant can change on command; run experiment {} with "
                       "--backend sim, or leave its events out for the rig",
                       script.at(event.place), change.what, script.name));
     }
@@ -52,13 +54,12 @@ void refuse_events(const config::Script& script, bool emulated) {
   }
 }
 
-/// The same, asked for by the configuration.
+/// Refuses profiles of plant parameters, which only a simulated plant can follow.
 void refuse_profiles(config::Settings& s) {
   for (const config::ChangingPart& part : config::changing_parts()) {
     if (part.profile(s).empty()) continue;
-    throw config::ConfigError(
-        fmt::format("plant.{}_profile: only a simulated plant can be told to change; leave it out or use --backend sim",
-                    part.what));
+    throw config::ConfigError(fmt::format(
+        "plant.{}_profile: only a simulated plant can follow a profile; leave it out or use --backend sim", part.what));
   }
 }
 
@@ -67,11 +68,11 @@ void check_together(const RunRequest& request) {
   const config::Settings& s = request.settings;
   if (request.outputs.fast && request.outputs.histogram_file) {
     throw config::ConfigError(
-        "--histogram: in virtual time (--fast) there are no latencies to measure; leave one of the two out");
+        "--histogram: a run in virtual time (--fast) has no latencies to measure; leave out one of the two");
   }
   if (s.experiment.wait_for_start) check_start(request);
   if (s.control.adaptive.theta_min_N >= s.control.adaptive.theta_max_N) {
-    throw config::ConfigError("control.adaptive.theta_min_N: must be less than control.adaptive.theta_max_N");
+    throw config::ConfigError("control.adaptive.theta_min_N: give a value below control.adaptive.theta_max_N");
   }
 }
 
@@ -161,7 +162,7 @@ RunRequest merge(const RunOptions& options) {
   if (!script.files.empty()) config["experiment_files"] = script.files;
   request.config_json = config.dump();
   request.config_toml = fmt::format(
-      "# Effective configuration of a run; the same again: abs_hil --backend {} --plant {} --config THIS_FILE\n{}",
+      "# Effective configuration of a run. To run it again: abs_hil --backend {} --plant {} --config THIS_FILE\n{}",
       s.backend, s.plant_name, keys.to_toml());
   return request;
 }

@@ -14,20 +14,20 @@
 
 namespace abs_hil::program {
 
-/// Where a run's records go, and whether it runs in virtual time.
+/// The files of a run's records, and whether the run is in virtual time.
 struct OutputOptions {
   bool fast{false};
   std::optional<std::string> csv_file{};
   std::optional<std::string> log_file{};
   std::optional<std::string> summary_file{};
   std::optional<std::string> histogram_file{};
-  std::optional<std::string> recorder_dir{};  ///< --recorder: where the flight record goes after a fault
+  std::optional<std::string> recorder_dir{};  ///< --recorder: folder of the flight record, written after a fault
   std::optional<std::string> lcm_url{};
   bool no_lcm{false};
-  std::optional<std::string> run_folder{};  ///< --out: new or empty
+  std::optional<std::string> run_folder{};  ///< --out: a new or empty folder
   bool no_run_folder{false};                ///< --no-out
 
-  /// True if a run's records go to files that were named one by one.
+  /// True if an option names a file for the run's records.
   [[nodiscard]] bool names_files() const { return csv_file || log_file || summary_file || histogram_file; }
 };
 
@@ -41,44 +41,44 @@ struct RunOptions {
   std::optional<std::string> slip_ref{};
   std::optional<std::string> rate_Hz{};
   std::optional<std::string> seed{};
-  std::vector<std::string> defaults{};  ///< assignments that files and options may override
+  std::vector<std::string> defaults{};  ///< assignments of lowest priority, below files and options
   std::vector<std::string> assignments{};
   bool wait_for_start{false};
-  std::vector<std::string> injections{};  ///< faults to inject, beside those of run.inject
+  std::vector<std::string> injections{};  ///< faults to inject, in addition to those of run.inject
   std::string realtime{"prefer"};
   OutputOptions outputs{};
 };
 
 /// The options of `abs_hil compare` as typed.
 struct CompareOptions {
-  RunOptions run{};  ///< plant, configuration file and assignments are taken from it
+  RunOptions run{};  ///< only plant, configuration file and assignments are used
   std::vector<std::string> controllers{"adaptive", "sliding-mode"};
   std::size_t repeat{100};
   std::uint64_t seed{1};
   std::optional<std::string> vary{};
-  std::size_t threads{0};  ///< 0: as many as the machine runs at once
+  std::size_t threads{0};  ///< 0: one for each processor
   std::optional<std::string> json_file{};
   std::optional<std::string> csv_file{};
   std::optional<std::string> markdown_file{};
   std::optional<std::string> runs_file{};
 };
 
-/// A run as it will be: the effective configuration and where its records go.
+/// A completely specified run: its effective configuration and the files of its records.
 struct RunRequest {
   config::Settings settings{};
-  std::shared_ptr<const config::Script> script{};  ///< what is run
+  std::shared_ptr<const config::Script> script{};  ///< the experiment
   std::string config_json{};                       ///< the effective configuration
   std::string config_toml{};                       ///< the same, as a file for --config
   OutputOptions outputs{};
-  std::vector<std::string> command_line{};  ///< as typed, for the record
-  /// Not empty: a run of a series, which prints nothing but faults and tells now and then which phase it is in.
+  std::vector<std::string> command_line{};  ///< as typed; recorded in environment.json
+  /// Set for one run of a series: the run prints only faults, and calls this now and then with its current phase.
   std::function<void(std::string_view phase)> in_series{};
-  /// Called after such a run if somebody has sent it a stop, in time for it or not.
+  /// Called after a run of a series if somebody sent it a stop, even one that came too late for that run.
   std::function<void()> stop_was_sent{};
 };
 
-/// Merges defaults, plant file, the script's settings, configuration file, named options and assignments, later ones
-/// winning. Throws config::ConfigError.
+/// Merges defaults, plant file, the script's settings, configuration file, named options and assignments; later ones
+/// win. Throws config::ConfigError.
 [[nodiscard]] RunRequest merge(const RunOptions& options);
 
 }  // namespace abs_hil::program

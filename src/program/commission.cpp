@@ -16,7 +16,7 @@ namespace abs_hil::program {
 
 namespace {
 
-/// Questions on stdout, answers from stdin.
+/// Asks questions on stdout and reads answers from stdin.
 class Terminal final : public experiment::Dialog {
  public:
   void tell(const std::string& text) override {
@@ -35,18 +35,18 @@ class Terminal final : public experiment::Dialog {
   }
 };
 
-/// A guardian for each pulse: at other times the outputs are 0 and the program waits for a person, silently.
+/// A guardian for each pulse. Between pulses the outputs are 0 and the program waits for a person, without heartbeats.
 class GuardedPulse final : public experiment::PulseGuard {
  public:
   GuardedPulse(const RunRequest& request, driver::RigDriver& driver) : request_(request), driver_(driver) {}
   ~GuardedPulse() override { driver_.tell_before_making_safe(nullptr); }
 
   void begin() override {
-    if (!wants_guardian(request_)) return;
+    if (!needs_guardian(request_)) return;
     region_.emplace(1);
     watch_.emplace(region_->panel(), region_->recorder());
-    guardian_.emplace(*region_, guardian::guardian_program(), guardian_brief(request_, {}));
-    guardian_->stand_guard();
+    guardian_.emplace(*region_, guardian::guardian_program(), guardian_launch_json(request_, {}));
+    guardian_->arm();
     driver_.tell_before_making_safe(&*guardian_);
   }
   [[nodiscard]] bool beat() noexcept override {
@@ -65,7 +65,7 @@ class GuardedPulse final : public experiment::PulseGuard {
  private:
   const RunRequest& request_;
   driver::RigDriver& driver_;
-  // The guardian goes before what it works on.
+  // The guardian must be destroyed before the region that it uses.
   std::optional<guardian::SharedRegion> region_{};
   std::optional<runtime::Heartbeat> watch_{};
   std::optional<guardian::GuardianProcess> guardian_{};
@@ -80,20 +80,21 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
   Terminal terminal;
   note_signals();
   terminal.tell(
-      "Commissioning, in four steps, each asked for first. docs/rig-setup.md says what must be done before.\n"
+      "Commissioning in four steps; the program asks before each. First do what docs/rig-setup.md requires.\n"
       "The E-stop cuts the drive only, not the brake. A guardian stands by during each pulse (docs/dead-man.md).");
   GuardedPulse guard(request, *driver);
   experiment::Commissioning commissioning(*driver, clock, terminal, guard, options,
                                           [] { return signalled() != rig::Reason::none; });
   switch (commissioning.run()) {
     case experiment::CommissioningResult::passed:
-      terminal.tell(driver_options.emulated
-                        ? "All four steps passed, on an emulator: that says nothing about hardware."
-                        : "All four steps passed. Go on with docs/rig-setup.md, \"What is not verified\", and then set "
-                          "driver.verified_on_hardware=true in your configuration.");
+      terminal.tell(
+          driver_options.emulated
+              ? "All four steps passed on an emulator. This does not verify any hardware."
+              : "All four steps passed. Continue with docs/rig-setup.md, \"What is not verified\", and then set "
+                "driver.verified_on_hardware=true in your configuration.");
       return exit_completed;
     case experiment::CommissioningResult::declined:
-      terminal.tell("Stopped as you wished; the outputs are safe.");
+      terminal.tell("Stopped at your request; the outputs are safe.");
       return exit_ended_early;
     case experiment::CommissioningResult::failed: return exit_ended_early;
     case experiment::CommissioningResult::interrupted:

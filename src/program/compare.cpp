@@ -15,17 +15,17 @@ namespace abs_hil::program {
 
 namespace {
 
-/// The paper brakes from 1625 rpm.
+/// The paper brakes from 1625 rpm, 170 rad/s.
 constexpr double default_start_speed_rad_s = 170.0;
 
-/// Opened before the runs, so that a bad path does not cost them.
+/// Opens a result file. Called before the runs, so that a bad path is reported at once.
 std::unique_ptr<analysis::ResultFile> open(const std::optional<std::string>& path) try {
   return path ? std::make_unique<analysis::ResultFile>(*path, "the comparison") : nullptr;
 } catch (const std::runtime_error& error) {
   throw config::ConfigError(error.what());
 }
 
-/// Prints how far it is, in steps of a hundredth, if somebody is watching.
+/// Prints the progress in steps of one hundredth if stderr is a terminal.
 std::function<void(std::size_t)> progress(std::size_t runs) {
   if (isatty(STDERR_FILENO) == 0) return {};
   const std::size_t step = std::max<std::size_t>(1, runs / 100);

@@ -56,7 +56,7 @@ int list(bool keys) {
   for (const auto& script : config::known_experiments()) print(script->name, script->description);
   fmt::print("backends\n");
   for (const auto& entry : driver::backends()) print(entry.name, entry.summary);
-  fmt::print("boards (driver.kind of backend rig; none of them verified on hardware)\n");
+  fmt::print("boards (driver.kind of backend rig; none is verified on hardware)\n");
   for (const auto& entry : driver::boards()) print(entry.name, entry.summary);
   return exit_completed;
 }

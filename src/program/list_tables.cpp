@@ -14,7 +14,7 @@ namespace abs_hil::program {
 
 namespace {
 
-using Json = nlohmann::ordered_json;  // members in the order in which they are written
+using Json = nlohmann::ordered_json;  // keeps the order of insertion
 
 void print(const Json& rows) { fmt::print("{}\n", rows.dump(1)); }
 
@@ -35,7 +35,7 @@ std::string_view type_name() {
   return std::is_floating_point_v<Value> ? "number" : "integer";
 }
 
-/// One object for every row of the table. `csv_column` counts from 1; null where the quantity is not in the CSV.
+/// One object per row of the table. `csv_column` counts from 1; null if the CSV lacks the quantity.
 Json quantities() {
   Json rows = Json::array();
   int column = 0;

@@ -14,14 +14,13 @@
 namespace abs_hil::program {
 
 void add_replay(CLI::App& cli, ReplayCommand& command) {
-  command.parser = cli.add_subcommand("replay", "a recorded run through its own or another controller, open loop");
-  command.parser
-      ->add_option("recording", command.recording, "event log (--log), or CSV that abs_hil convert made of it")
+  command.parser = cli.add_subcommand("replay", "feed a recorded run to its own or another controller, open loop");
+  command.parser->add_option("recording", command.recording, "event log (--log), or its CSV from abs_hil convert")
       ->type_name("LOG")
       ->required();
-  auto* check = command.parser->add_flag("--check", command.check,
-                                         "run the recorded configuration again: are its commands bit-equal?");
-  command.parser->add_option("--controller", command.changes.controller, "another slip controller")
+  auto* check = command.parser->add_flag(
+      "--check", command.check, "run the recorded configuration again and check that all commands are bit-equal");
+  command.parser->add_option("--controller", command.changes.controller, "use another slip controller")
       ->type_name("NAME")
       ->excludes(check);
   command.parser->add_option("--set", command.changes.assignments, "change a recorded configuration value")
@@ -29,7 +28,7 @@ void add_replay(CLI::App& cli, ReplayCommand& command) {
       ->take_all()
       ->allow_extra_args(false)
       ->excludes(check);
-  command.parser->add_option("--csv", command.csv_file, "write what it would have commanded, with the columns of a run")
+  command.parser->add_option("--csv", command.csv_file, "write the replayed commands, with the columns of a run's CSV")
       ->type_name("FILE")
       ->excludes(check);
 }
@@ -40,9 +39,10 @@ int check_again(const replay::RecordedRun& run) {
   const replay::CheckResult result = replay::check(run);
   for (const std::string& line : result.lines) fmt::print("{}\n", line);
   if (result.equal) return exit_completed;
-  fmt::print(stderr,
-             "abs_hil: the recorded commands do not come out again: another version, another machine, or a "
-             "damaged recording\n");
+  fmt::print(
+      stderr,
+      "abs_hil: the replayed commands differ from the recorded ones: the version or the computer is another, or the "
+      "recording is damaged\n");
   return exit_ended_early;
 }
 
@@ -68,7 +68,7 @@ int replay_run(const ReplayCommand& command) {
 }
 
 void add_convert(CLI::App& cli, ConvertCommand& command) {
-  command.parser = cli.add_subcommand("convert", "an event log (.lcmlog) to CSV or back, without loss");
+  command.parser = cli.add_subcommand("convert", "convert an event log (.lcmlog) to CSV or back, without loss");
   command.parser->add_option("from", command.from, "event log or CSV")->type_name("IN")->required();
   command.parser->add_option("to", command.to, "CSV or event log")->type_name("OUT")->required();
 }
@@ -77,13 +77,13 @@ int convert(const ConvertCommand& command) {
   const bool from_csv = std::filesystem::path(command.from).extension() == ".csv";
   const bool to_csv = std::filesystem::path(command.to).extension() == ".csv";
   if (from_csv == to_csv) {
-    throw config::ConfigError("convert: one of IN and OUT must end in .csv, the other is the event log");
+    throw config::ConfigError("convert: exactly one of IN and OUT must end in .csv; the other is the event log");
   }
   try {
     const telemetry::ConversionCounts counts =
         from_csv ? telemetry::csv_to_log(command.from, command.to) : telemetry::log_to_csv(command.from, command.to);
     fmt::print("{} events", counts.events);
-    if (counts.raw > 0) fmt::print(", {} of them of no type of ours, as hexadecimal digits", counts.raw);
+    if (counts.raw > 0) fmt::print(", {} of them of unknown type, kept as hexadecimal digits", counts.raw);
     fmt::print("\n");
     return exit_completed;
   } catch (const telemetry::RecordingError& error) {

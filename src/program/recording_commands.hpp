@@ -8,7 +8,7 @@
 
 namespace abs_hil::program {
 
-/// `abs_hil replay` as typed.
+/// Options of `abs_hil replay` as typed.
 struct ReplayCommand {
   std::string recording{};
   replay::Changes changes{};
@@ -17,11 +17,11 @@ struct ReplayCommand {
   CLI::App* parser{nullptr};
 };
 void add_replay(CLI::App& cli, ReplayCommand& command);
-/// The exit status: with --check 0 if all commands are bit-equal, 1 if not; 2 for a recording that is none, damaged or
-/// not whole.
+/// Returns the exit status: with --check 0 if all commands are bit-equal and 1 if not; 2 for a file that is no
+/// recording, is damaged, or is incomplete.
 int replay_run(const ReplayCommand& command);
 
-/// `abs_hil convert` as typed.
+/// Options of `abs_hil convert` as typed.
 struct ConvertCommand {
   std::string from{};
   std::string to{};

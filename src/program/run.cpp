@@ -76,10 +76,10 @@ run_folder::RunEnvironment environment(const RunRequest& request, const driver::
           .realtime_shortcomings = request.outputs.fast ? std::string() : outcome.realtime.shortcomings()};
 }
 
-/// What a run in real time says about its timing while it goes on.
-class TimingWatch {
+/// Logs messages about the timing of a run in real time.
+class TimingMessages {
  public:
-  TimingWatch(const RunRequest& request, const experiment::RunSession& session, runtime::OverrunReporter& reporter)
+  TimingMessages(const RunRequest& request, const experiment::RunSession& session, runtime::OverrunReporter& reporter)
       : session_(session),
         reporter_(reporter),
         real_time_wanted_(!request.outputs.fast && request.settings.realtime.mode != runtime::RealtimeMode::off) {}
@@ -89,9 +89,9 @@ class TimingWatch {
       const runtime::RealtimeReport& report = session_.realtime_report();
       const std::string shortcomings = report.shortcomings();
       if (!report.realtime()) {
-        spdlog::warn("NOT IN REAL TIME: late cycles, wrong brake torques are to be expected\n{}", shortcomings);
+        spdlog::warn("NOT IN REAL TIME: expect late cycles and wrong brake torques\n{}", shortcomings);
       } else if (!shortcomings.empty()) {
-        spdlog::info("in real time, but not all that helps was obtained\n{}", shortcomings);
+        spdlog::info("in real time, but some optional settings failed\n{}", shortcomings);
       }
     }
     if (const auto late = reporter_.message(session_.executive().statistics().overruns())) spdlog::warn("{}", *late);
@@ -114,35 +114,37 @@ int status_of(const experiment::RunOutcome& outcome) {
 }
 
 std::string realtime_refusal(const runtime::RealtimeReport& report) {
-  return "--rt require: real time is not to be had on this machine; nothing has moved\n" + report.shortcomings();
+  return "--rt require: real-time scheduling is unavailable on this computer; nothing has moved\n" +
+         report.shortcomings();
 }
 
 namespace {
 
-/// As far as that can be told before it stands guard.
+/// Checks in advance, as far as possible, that a guardian can start.
 void require_guardian(const RunRequest& request) {
-  if (!wants_guardian(request)) return;
+  if (!needs_guardian(request)) return;
   static_cast<void>(driver::make_safe_state_writer(request.settings.driver));
   const std::string program = guardian::guardian_program();
   if (::access(program.c_str(), X_OK) == 0) return;
-  throw driver::Unavailable("guardian: " + program + ": " + std::strerror(errno) +
-                            ": it belongs beside abs_hil, which drives a rig beside its guardian only");
+  throw driver::Unavailable(
+      "guardian: " + program + ": " + std::strerror(errno) +
+      ": abs_hil needs its guardian to drive a rig; install abs_guardian in the folder of abs_hil");
 }
 
-/// What the run cannot do without is asked for before its files are opened: an earlier run's stay whole. Throws
-/// driver::Unavailable. The run itself obtains both anew.
+/// Checks the required resources before the run's files are opened, so that a failure leaves an earlier run's files
+/// unchanged. Throws driver::Unavailable. The run itself obtains the resources again.
 void require_resources(const RunRequest& request, driver::RigDriver& driver) {
   driver.configure();
   require_guardian(request);
   if (request.outputs.fast || request.settings.realtime.mode != runtime::RealtimeMode::require) return;
   runtime::RealtimeReport report;
-  // In a thread of its own, which takes the scheduling class with it when it ends.
+  // Uses a thread of its own: its scheduling class disappears with it.
   std::jthread([&] { report = runtime::RealtimeScope(request.settings.realtime).report(); }).join();
   if (!report.realtime()) throw driver::Unavailable(realtime_refusal(report));
 }
 
-/// The run is over: writes its record, tells how it ended, dismisses the guardian. Returns the exit status.
-/// @param lost  why recorded data was lost; empty: none was
+/// Concludes the run: writes its files, reports how it ended, ends the guardian. Returns the exit status.
+/// @param lost  why recorded data was lost; empty: nothing was lost
 int conclude(const RunRequest& request, const experiment::RunSession& session, const experiment::RunOutcome& outcome,
              driver::RigDriver& driver, RunOutputs& outputs, RunMonitor& run_monitor, const std::string& lost) {
   if (!outcome.safe_state.ok()) {
@@ -160,7 +162,7 @@ int conclude(const RunRequest& request, const experiment::RunSession& session, c
     if (const auto& folder = outputs.folder()) {
       text += fmt::format("  {:<22}{}\n", "run folder", folder->path().string());
     }
-    // A terminal that has gone takes nothing: no reason to end otherwise than the run did.
+    // If the terminal was closed, the exit status must still be the run's.
     static_cast<void>(std::fputs(text.c_str(), stdout));
   }
   for (const std::string& line : driver.tally()) spdlog::info("{}", line);
@@ -182,9 +184,10 @@ int run(const RunRequest& request) {
   const std::unique_ptr<driver::RigDriver> driver = with_faults(make_driver(s, request.outputs.fast), s, clock);
   config::Plan plan = config::plan(*request.script, s);
   std::vector<std::string> phase_names = plan.phase_names;
-  // The logic puts a phase before the first then.
+  // The run's logic then adds a phase before the first.
   if (s.experiment.wait_for_start) phase_names.insert(phase_names.begin(), "waiting for the start");
-  for (const std::string& problem : config::beyond_limits(plan, s)) spdlog::warn("{}; it is held to that", problem);
+  for (const std::string& problem : config::beyond_limits(plan, s))
+    spdlog::warn("{}; the gate limits it to that", problem);
   experiment::RunLogicParts logic = make_logic(s, std::move(plan.phases), plan.limits);
   require_resources(request, *driver);
   RunOutputs outputs(request);
@@ -192,13 +195,13 @@ int run(const RunRequest& request) {
   std::vector<rig::RecordSink*> sinks = outputs.sinks();
   if (!request.outputs.fast) sinks.push_back(&late_cycles);
   experiment::RunSession session(clock, *driver, std::move(logic), s.gate, std::move(sinks), s.realtime.overruns);
-  TimingWatch timing(request, session, late_cycles);
-  outputs.watch(session);
+  TimingMessages timing(request, session, late_cycles);
+  outputs.attach(session);
   const auto& folder = outputs.folder();
   RunMonitor run_monitor(request, flight_record_prefix(request, folder ? folder->path() : std::filesystem::path()));
-  run_monitor.watch(session);
+  run_monitor.attach(session);
   note_signals();
-  // The handler knows one run: of a series in virtual time, several at once, each asks for itself.
+  // The signal handler knows one run. In a series in virtual time, with several runs at once, each run polls instead.
   std::optional<SignalsStop> signals;
   if (!request.in_series || !request.outputs.fast) {
     signals.emplace(session, s.backend == "sim" || run_monitor.has_guardian());
@@ -219,7 +222,7 @@ int run(const RunRequest& request) {
   try {
     outcome = request.outputs.fast ? session.run_fast(poll) : session.run_realtime(s.realtime, poll);
   } catch (const telemetry::FileError& error) {
-    // The run itself went on to its end: report it, and that its record is not whole.
+    // The run itself completed: report it, and that its record is incomplete.
     lost = error.what();
     outcome = session.outcome();
   }

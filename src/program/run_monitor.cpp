@@ -18,7 +18,7 @@ namespace {
 
 constexpr double recorded_s = 2.0;
 
-/// The guardian's timeout in cycles, which is what the cycle gives the guardian in turn.
+/// The guardian's timeout in cycles; the cycle waits as long for heartbeats from the guardian.
 std::uint64_t silent_cycles_max(const config::Settings& s) {
   constexpr double s_per_ms = 1e-3;
   constexpr std::int64_t least = 3;
@@ -37,11 +37,11 @@ std::string name_of(runtime::RealtimeMode mode) {
 
 }  // namespace
 
-bool wants_guardian(const RunRequest& request) {
+bool needs_guardian(const RunRequest& request) {
   return request.settings.backend == "rig" && !request.outputs.fast && request.settings.guardian.enabled;
 }
 
-std::string guardian_brief(const RunRequest& request, const std::filesystem::path& record_prefix) {
+std::string guardian_launch_json(const RunRequest& request, const std::filesystem::path& record_prefix) {
   const config::Settings& s = request.settings;
   return to_json(guardian::LaunchConfig{.config_json = request.config_json,
                                         .experiment = s.experiment.name,
@@ -56,14 +56,14 @@ std::string guardian_brief(const RunRequest& request, const std::filesystem::pat
 RunMonitor::RunMonitor(const RunRequest& request, std::filesystem::path record_prefix)
     : record_prefix_(std::move(record_prefix)),
       region_(runtime::FlightRing::slots_for(recorded_s, request.settings.control.rate_Hz)),
-      cycle_watch_(region_.panel(), region_.recorder(),
-                   wants_guardian(request) ? silent_cycles_max(request.settings) : 0) {
-  if (!wants_guardian(request)) return;
-  guardian_.emplace(region_, guardian::guardian_program(), guardian_brief(request, record_prefix_));
+      heartbeat_(region_.panel(), region_.recorder(),
+                 needs_guardian(request) ? silent_cycles_max(request.settings) : 0) {
+  if (!needs_guardian(request)) return;
+  guardian_.emplace(region_, guardian::guardian_program(), guardian_launch_json(request, record_prefix_));
 }
 
-void RunMonitor::watch(experiment::RunSession& session) {
-  session.watch_with(cycle_watch_);
+void RunMonitor::attach(experiment::RunSession& session) {
+  session.set_heartbeat(heartbeat_);
   if (guardian_) session.guard_with(*guardian_);
 }
 
@@ -73,11 +73,11 @@ rig::Reason RunMonitor::poll() {
     if (guardian_->notes().empty()) {
       spdlog::info("guardian: process {} stands by", guardian_->pid());
     } else {
-      spdlog::warn("guardian: process {} stands by, but not in real time: it may act late\n{}", guardian_->pid(),
-                   guardian_->notes());
+      spdlog::warn("guardian: process {} stands by, but without real-time scheduling: it may act late\n{}",
+                   guardian_->pid(), guardian_->notes());
     }
   }
-  // One that has taken the outputs over ends in order.
+  // A guardian that has already taken over the outputs has not died.
   const guardian::Stage stage = region_.stage();
   const bool on_duty = stage == guardian::Stage::guarded || stage == guardian::Stage::making_safe;
   return on_duty && !guardian_->alive() ? rig::Reason::guardian_died : rig::Reason::none;
@@ -108,10 +108,10 @@ void RunMonitor::end() {
     case guardian::GuardianProcess::GuardianExit::none:
     case guardian::GuardianProcess::GuardianExit::ended: return;
     case guardian::GuardianProcess::GuardianExit::failed:
-      spdlog::error("guardian: process {} did not end in order: see its words above", pid);
+      spdlog::error("guardian: process {} ended with an error: see its messages above", pid);
       return;
     case guardian::GuardianProcess::GuardianExit::insisting:
-      spdlog::error("guardian: process {} goes on trying to make the outputs safe, and tells how that ends", pid);
+      spdlog::error("guardian: process {} still tries to make the outputs safe and will report the result", pid);
   }
 }
 
@@ -124,7 +124,7 @@ std::filesystem::path flight_record_prefix(const RunRequest& request, const std:
     std::error_code error;
     std::filesystem::create_directories(folder, error);
     if (error || ::access(folder.c_str(), W_OK | X_OK) != 0) {
-      throw config::ConfigError(fmt::format("--recorder {}: {}; give a folder that can be made or written to",
+      throw config::ConfigError(fmt::format("--recorder {}: {}; give a folder that can be created or written to",
                                             folder.string(), error ? error.message() : std::strerror(errno)));
     }
   } else if (o.log_file || o.csv_file || o.summary_file) {

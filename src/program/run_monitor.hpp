@@ -11,39 +11,39 @@
 
 namespace abs_hil::program {
 
-/// Whether a run needs a guardian: in real time on a board. In simulation and in virtual time nothing real moves.
-[[nodiscard]] bool wants_guardian(const RunRequest& request);
+/// Whether a run needs a guardian: only in real time on a board. In simulation and in virtual time nothing real moves.
+[[nodiscard]] bool needs_guardian(const RunRequest& request);
 
-/// What the guardian of a run is told, as JSON.
-[[nodiscard]] std::string guardian_brief(const RunRequest& request, const std::filesystem::path& record_prefix);
+/// The launch configuration of the run's guardian, as JSON.
+[[nodiscard]] std::string guardian_launch_json(const RunRequest& request, const std::filesystem::path& record_prefix);
 
-/// Who watches over a run: the flight recorder always, the guardian beside a run in real time on a board.
+/// Monitors a run: it keeps the flight record of every run, and starts the guardian for a run in real time on a board.
 class RunMonitor {
  public:
-  /// @param record_prefix  path and beginning of the names of what is written after a fault; empty: nothing is
+  /// @param record_prefix  path and first part of the names of files that are written after a fault; empty: none
   /// Throws config::ConfigError if no shared memory can be had.
   RunMonitor(const RunRequest& request, std::filesystem::path record_prefix);
 
-  /// Lets the session be watched. It must not run after this object is gone.
-  void watch(experiment::RunSession& session);
+  /// Attaches the monitor to the session, which must not run after this object is destroyed.
+  void attach(experiment::RunSession& session);
   [[nodiscard]] bool has_guardian() const noexcept { return guardian_.has_value(); }
-  /// Called every few milliseconds: the stop that is due because the guardian died, `none` otherwise.
+  /// Called every few milliseconds. Returns the stop reason if the guardian died, else `none`.
   [[nodiscard]] rig::Reason poll();
-  /// After a fault: writes the flight record and says where.
+  /// After a fault: writes the flight record and logs its path.
   void write_record(const RunRequest& request, rig::Reason reason, double value, const std::string& account);
-  /// The run is over and its files are written: dismisses the guardian, and says so if that was not in order.
+  /// Ends the guardian after the run's files are written, and logs an error if it did not end cleanly.
   void end();
 
  private:
   std::filesystem::path record_prefix_;
   guardian::SharedRegion region_;
   std::optional<guardian::GuardianProcess> guardian_;
-  runtime::Heartbeat cycle_watch_;
+  runtime::Heartbeat heartbeat_;
   bool told_notes_{false};
 };
 
-/// Where a run's flight record goes: --recorder, else the run's folder, else beside the files named, else (for a board)
-/// here. Makes the folder of --recorder. Throws config::ConfigError.
+/// The place of a run's flight record: the folder of --recorder, else the run folder, else the folder of a named file,
+/// else (for a board) the working directory. Creates the folder of --recorder. Throws config::ConfigError.
 /// @param run_folder  empty: none
 [[nodiscard]] std::filesystem::path flight_record_prefix(const RunRequest& request,
                                                          const std::filesystem::path& run_folder);

@@ -11,23 +11,23 @@
 namespace abs_hil::program {
 
 namespace {
-/// Event times of runs in virtual time count from here (1 January 2000), so that the log is the same on every run.
+/// Event times of runs in virtual time start here (1 January 2000), so that equal runs give equal logs.
 constexpr std::int64_t virtual_epoch_us = 946'684'800'000'000;
-/// Half of the 100 ms that a killed program may lose of its files: the slow side itself may come late.
+/// Half of the 100 ms of data that a killed program may lose; the other half allows for a late slow thread.
 constexpr std::int64_t write_period_ns = 50'000'000;
 }  // namespace
 
 RunOutputs::RunOutputs(const RunRequest& request)
     : metrics_(request.settings.plant.rig.wheels.r2_m, request.settings.experiment.end_speed_m_s) {
-  // Whether there is a network is asked first: files are not touched in vain.
-  // In virtual time 8,000 messages would burst onto the network at once: only when asked for by name.
+  // Check the network first: a failure then leaves the files unchanged. In virtual time 8,000 messages would flood the
+  // network at once, so publish only if --lcm-url is given.
   if (!request.outputs.no_lcm && (!request.outputs.fast || request.outputs.lcm_url)) {
     const std::string url = request.outputs.lcm_url.value_or(telemetry::default_lcm_url());
-    static_cast<void>(telemetry::parse_lcm_url(url));  // a malformed one is a usage error, not a missing network
+    static_cast<void>(telemetry::parse_lcm_url(url));  // a malformed URL is a usage error, not a missing network
     lcm_.emplace(url);
   }
   try {
-    // The files named one by one first: a bad path leaves no folder behind.
+    // Open named files first: a bad path then leaves no run folder behind.
     open_files(request.outputs);
     open_folder(request);
   } catch (const std::runtime_error& error) {
@@ -56,7 +56,7 @@ void RunOutputs::open_folder(const RunRequest& request) {
   if (o.run_folder) {
     folder_.emplace(*o.run_folder);
   } else {
-    // A run in virtual time can be had again from its command line: it leaves no folder unless asked to.
+    // A run in virtual time can be repeated from its command line: it leaves a run folder only if asked.
     const std::filesystem::path runs = run_folder::default_runs_dir();
     if (o.fast || o.no_run_folder || o.names_files() || runs.empty()) return;
     const std::time_t now = std::time(nullptr);
@@ -65,8 +65,8 @@ void RunOutputs::open_folder(const RunRequest& request) {
     try {
       folder_.emplace(run_folder::unused_folder(runs, local, request.settings.experiment.name));
     } catch (const run_folder::FolderError& error) {
-      // Nobody asked for it: the run is worth more than its record.
-      spdlog::warn("this run leaves no folder: {} (--no-out: none wanted)", error.what());
+      // This folder was not asked for, so its failure must not prevent the run.
+      spdlog::warn("this run leaves no run folder: {} (--no-out silences this)", error.what());
       return;
     }
   }
@@ -98,9 +98,9 @@ void RunOutputs::open_stream(const RunRequest& request) {
   for (telemetry::LogOutlet& log : log_) stream_->add(log);
   if (lcm_) {
     stream_->add(*lcm_);
-    if (!request.outputs.fast) steering_.emplace(s, *stream_);
-    // In the listening thread: the cycle that follows finds the request.
-    commands_.emplace(*lcm_, *stream_, [this] {
+    if (!request.outputs.fast) remote_commands_.emplace(s, *stream_);
+    // This runs in the listening thread: the next cycle sees the request.
+    command_listener_.emplace(*lcm_, *stream_, [this] {
       if (session_ != nullptr) session_->request_stop(rig::Reason::stop_command);
     });
   }
@@ -112,21 +112,22 @@ std::vector<rig::RecordSink*> RunOutputs::sinks() {
   for (telemetry::CsvSink& csv : csv_) sinks.push_back(&csv);
   if (events_) sinks.push_back(&*events_);
   if (stream_) sinks.push_back(&*stream_);
-  if (steering_) sinks.push_back(&*steering_);  // its messages are of the record that the stream has just had
+  // Behind the stream, because its messages refer to the record that the stream has just received.
+  if (remote_commands_) sinks.push_back(&*remote_commands_);
   if (status_line_ && status_line_->active()) sinks.push_back(&*status_line_);
   return sinks;
 }
 
-void RunOutputs::watch(experiment::RunSession& session) {
+void RunOutputs::attach(experiment::RunSession& session) {
   session_ = &session;
-  if (!steering_ || !commands_ || !stream_) return;
-  steering_->drive(session.adjustments());
-  steering_->count(*commands_);
-  commands_->set_judge([this](const command2_t& command) { return steering_->judge(command); });
-  commands_->listen();
+  if (!remote_commands_ || !command_listener_ || !stream_) return;
+  remote_commands_->set_mailbox(session.adjustments());
+  remote_commands_->set_listener(*command_listener_);
+  command_listener_->set_judge([this](const command2_t& command) { return remote_commands_->judge(command); });
+  command_listener_->listen();
   stream_->set_farewell([this] {
-    commands_->finish();
-    steering_->refuse_pending();
+    command_listener_->finish();
+    remote_commands_->refuse_pending();
   });
 }
 
@@ -135,7 +136,7 @@ nlohmann::ordered_json RunOutputs::friction_curve_json() const {
 }
 
 void RunOutputs::poll() {
-  if (commands_) commands_->poll();
+  if (command_listener_) command_listener_->poll();
 }
 
 std::uint64_t RunOutputs::csv_rows_lost() const {

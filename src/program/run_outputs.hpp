@@ -9,8 +9,8 @@
 #include "analysis/friction_curve.hpp"
 #include "analysis/run_metrics.hpp"
 #include "analysis/run_summary.hpp"
-#include "commands/command_desk.hpp"
 #include "commands/command_listener.hpp"
+#include "commands/remote_commands.hpp"
 #include "experiment/run_session.hpp"
 #include "program/command_line.hpp"
 #include "rig/record_sink.hpp"
@@ -26,30 +26,30 @@
 
 namespace abs_hil::program {
 
-/// Everything a run's records go to, opened before anything moves: metrics, CSV, LCM, event log, summary, status line,
-/// a folder with all of them.
+/// All destinations of a run's records, opened before anything moves: metrics, CSV, LCM, event log, summary, status
+/// line, and a run folder with all of them.
 class RunOutputs {
  public:
-  /// Throws telemetry::FileError or std::runtime_error as config::ConfigError for files and folders that cannot be
-  /// written, and telemetry::LcmError without a network.
+  /// Throws config::ConfigError for files and folders that cannot be written, and telemetry::LcmError without a
+  /// network.
   explicit RunOutputs(const RunRequest& request);
 
   [[nodiscard]] std::vector<rig::RecordSink*> sinks();
-  /// Lets ABS_STATUS and the status line look at the run, which must outlive the outputs' use.
-  /// From here on commands are taken as well.
-  void watch(experiment::RunSession& session);
-  /// Takes in commands from LCM.
+  /// Attaches the session, whose state ABS_STATUS and the status line then show; it must outlive the use of the
+  /// outputs. Remote commands are accepted from here on.
+  void attach(experiment::RunSession& session);
+  /// Handles remote commands from LCM.
   void poll();
-  [[nodiscard]] bool stop_requested() const { return commands_ && commands_->stop_requested(); }
+  [[nodiscard]] bool stop_requested() const { return command_listener_ && command_listener_->stop_requested(); }
   [[nodiscard]] analysis::Metrics metrics() const { return metrics_.metrics(); }
   [[nodiscard]] std::uint64_t publish_failures() const { return stream_ ? stream_->failures() : 0; }
   [[nodiscard]] std::uint64_t csv_rows_lost() const;
-  /// Writes summary and histogram where they were asked for, and completes the run folder: each is tried whatever
-  /// became of the others. Returns what could not be written, in words.
+  /// Writes summary and histogram if requested, and completes the run folder. Tries each, even after a failure. Returns
+  /// what could not be written, as text.
   [[nodiscard]] std::vector<std::string> write(const analysis::RunSummary& summary,
                                                const runtime::CycleStatistics& statistics,
                                                const run_folder::RunEnvironment& environment);
-  /// What the script's analysis found; null without one.
+  /// Result of the script's analysis; null without one.
   [[nodiscard]] nlohmann::ordered_json friction_curve_json() const;
   /// The run folder, if there is one.
   [[nodiscard]] const std::optional<run_folder::RunFolder>& folder() const noexcept { return folder_; }
@@ -64,7 +64,7 @@ class RunOutputs {
   analysis::RunMetrics metrics_;
   std::optional<analysis::FrictionCurve> friction_curve_;
   std::optional<run_folder::RunFolder> folder_;
-  // Of each as many as there are places: the run folder and the file named.
+  // Each list holds up to two: one in the run folder and one for the named file.
   std::list<telemetry::CsvSink> csv_;
   std::list<analysis::SummaryFile> summary_;
   std::list<runtime::HistogramFile> histogram_;
@@ -72,8 +72,8 @@ class RunOutputs {
   std::optional<telemetry::EventCsv> events_;
   std::optional<telemetry::LcmOutlet> lcm_;
   std::optional<telemetry::MessageStream> stream_;
-  std::optional<commands::CommandDesk> steering_;
-  std::optional<telemetry::CommandListener> commands_;
+  std::optional<commands::RemoteCommands> remote_commands_;
+  std::optional<telemetry::CommandListener> command_listener_;
   std::optional<telemetry::StatusLine> status_line_;
 };
 

@@ -11,13 +11,14 @@
 
 namespace abs_hil::program {
 
-/// The driver of the backend that the settings name; with `fast` it runs in virtual time. Throws driver::Unavailable.
+/// Makes the driver of the settings' backend; with `fast` it runs in virtual time. Throws driver::Unavailable.
 [[nodiscard]] std::unique_ptr<driver::RigDriver> make_driver(const config::Settings& settings, bool fast);
-/// The same driver with the settings' faults planted before it; unchanged without any. `clock` must outlive it. Throws
-/// std::invalid_argument for faults that cannot be read.
+/// Wraps the driver with the settings' fault injections; returns it unchanged if there are none. `clock` must outlive
+/// it. Throws std::invalid_argument for invalid fault texts.
 [[nodiscard]] std::unique_ptr<driver::RigDriver> with_faults(std::unique_ptr<driver::RigDriver> driver,
                                                              const config::Settings& settings, runtime::Clock& clock);
-/// What a run's logic is made of. Throws std::invalid_argument. `settings` must outlive the construction of the logic.
+/// Makes the parts of a run's logic. Throws std::invalid_argument. `settings` must outlive the construction of the
+/// logic.
 [[nodiscard]] experiment::RunLogicParts make_logic(const config::Settings& settings,
                                                    std::vector<experiment::PhasePlan> plans,
                                                    const experiment::SequenceLimits& limits = {});

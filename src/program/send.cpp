@@ -16,7 +16,7 @@ double number_of(const std::string& text) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size()) {
-    throw config::ConfigError("send: '" + text + "' is no number");
+    throw config::ConfigError("send: '" + text + "' is not a number; give a decimal number");
   }
   return value;
 }

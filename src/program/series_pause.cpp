@@ -18,7 +18,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds look_period{50};
 
-/// Takes in commands while no run does.
+/// Receives commands between two runs.
 class StopListener {
  public:
   explicit StopListener(const RunRequest& run)
@@ -29,12 +29,12 @@ class StopListener {
     commands_.set_judge([](const command2_t& command) {
       const std::string shown = telemetry::printable(command.command, 64);
       return telemetry::CommandAnswer{rig::Reason::command_not_now,
-                                      "refused '" + shown + "': between two runs of a series only stop is taken"};
+                                      "refused '" + shown + "': only stop is accepted between two runs of a series"};
     });
     commands_.listen();
   }
 
-  /// @param time_s  since the pause began
+  /// @param time_s  time since the pause began
   [[nodiscard]] bool stop_heard(Clock::time_point now, double time_s) {
     stream_.pass_time(std::chrono::nanoseconds(now.time_since_epoch()).count(), time_s);
     if (!commands_.stop_requested()) {

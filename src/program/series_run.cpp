@@ -25,14 +25,14 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// How far a series is, on stderr: on a terminal one line that changes, else a line for every tenth of it.
+/// Shows the progress of a series of runs on stderr: one changing line on a terminal, else one line for every tenth.
 class Progress {
  public:
-  /// @param pause_s  between two runs; 0 where there is none
+  /// @param pause_s  pause between two runs; 0: none
   Progress(std::size_t runs, std::size_t done, double pause_s)
       : runs_(runs), done_(done), at_start_(done), pause_s_(pause_s) {}
 
-  /// @param what the run, @param phase where it stands; empty for one that has ended
+  /// @param what  the run @param phase  its current phase; empty: the run has ended
   void show(const std::string& what, std::string_view phase, bool at_once = false) {
     const std::scoped_lock lock(mutex_);
     const auto now = Clock::now();
@@ -75,7 +75,7 @@ class Progress {
   std::size_t done_;
   std::size_t at_start_;
   double pause_s_;
-  int pauses_{0};  ///< that are over
+  int pauses_{0};  ///< number of completed pauses
   bool terminal_{isatty(STDERR_FILENO) == 1};
   Clock::time_point start_{Clock::now()};
   Clock::time_point shown_{};
@@ -105,7 +105,7 @@ RunOptions options_of(const RunOptions& common, const config::SeriesMember& memb
   return options;
 }
 
-/// Where the series goes; none if nobody wants a folder. Throws config::ConfigError.
+/// Opens the folder of the series; null if no folder is wanted. Throws config::ConfigError.
 std::unique_ptr<run_folder::SeriesFolder> open_folder(const RunRequest& base,
                                                       std::vector<run_folder::SeriesEntry> entries) {
   const OutputOptions& o = base.outputs;
@@ -131,13 +131,13 @@ std::unique_ptr<run_folder::SeriesFolder> open_folder(const RunRequest& base,
   return folder;
 }
 
-/// A signal ended the run: it is to be done again.
+/// True if a signal ended the run: then it must be repeated.
 bool is_interrupted(int status) { return status > 128; }
 
-/// The runs of a series that are still to be done.
+/// Carries out the remaining runs of a series.
 class SeriesRun {
  public:
-  /// @param folder  may be null. All must outlive it.
+  /// @param folder  may be null; all arguments must outlive it
   SeriesRun(const RunOptions& common, const RunRequest& base, const std::vector<config::SeriesMember>& members,
             run_folder::SeriesFolder* folder)
       : common_(common),
@@ -151,13 +151,13 @@ class SeriesRun {
       if (folder->done(i) && folder->status(i) != completed) ++ended_early_;
     }
     if (folder != nullptr && folder->resumed()) {
-      spdlog::info("{} of {} runs are there already", members.size() - left_.size(), members.size());
+      spdlog::info("{} of {} runs are already recorded", members.size() - left_.size(), members.size());
     }
   }
 
-  /// Does them; returns the program's exit status.
+  /// Carries out the runs. Returns the program's exit status.
   int run_all() {
-    // In virtual time as many at once as the machine has processors; at the rig one after the other.
+    // In virtual time one run per processor at a time; on the rig one after the other.
     const bool at_once = base_.outputs.fast && base_.settings.backend == "sim";
     study::for_each_index(left_.size(), at_once ? study::machine_threads() : 1, [this](std::size_t k) { run_one(k); });
     progress_.end();
@@ -200,20 +200,20 @@ class SeriesRun {
     }
     if (status != exit_completed) {
       ++ended_early_;
-      // A fault of the rig, or somebody stopped it: nothing moves again before a person has looked.
+      // After a fault of the rig or a stop command a person must look before anything moves again.
       if (base_.settings.backend == "rig") halted_by_ = i + 1;
     }
     if (folder_ != nullptr) folder_->end(i, status == exit_completed ? completed : "fault");
     progress_.count(what);
     if (pause_s_ > 0.0 && k + 1 < left_.size() && halted_by_ == 0 && !stopped_) {
-      progress_.show(what, fmt::format("over; pause of {:.6g} s before the next", pause_s_), true);
+      progress_.show(what, fmt::format("ended; pause of {:.6g} s before the next run", pause_s_), true);
       const rig::Reason reason = pause_between_runs(request, pause_s_);
       if (reason == rig::Reason::none) progress_.paused();
       if (reason == rig::Reason::stop_command) stopped_ = true;
     }
   }
 
-  /// Not all runs were done.
+  /// True if some runs were not done.
   [[nodiscard]] bool cut_short() const {
     return interrupted_ != 0 || ((halted_by_ != 0 || stopped_) && progress_.done() < members_.size());
   }
@@ -232,7 +232,7 @@ class SeriesRun {
     return fmt::format(
         "series {}: {} with {} of {} runs done, {} ended early{}{}", base_.script->name, why, progress_.done(),
         members_.size(), ended_early_.load(), where,
-        folder_ != nullptr ? "; the same command with --out " + folder_->path().string() + " goes on" : "");
+        folder_ != nullptr ? "; to continue, repeat the command with --out " + folder_->path().string() : "");
   }
 
   const RunOptions& common_;
@@ -244,8 +244,8 @@ class SeriesRun {
   Progress progress_;
   std::atomic<std::size_t> ended_early_{0};
   std::atomic<int> interrupted_{0};
-  std::atomic<bool> stopped_{false};       ///< somebody sent a stop, to a run or between two
-  std::atomic<std::size_t> halted_by_{0};  ///< number of the run at a rig that ended early, from 1; 0: none
+  std::atomic<bool> stopped_{false};       ///< a stop command arrived, during a run or between two runs
+  std::atomic<std::size_t> halted_by_{0};  ///< number of the run on the rig that ended early, from 1; 0: none
 };
 
 }  // namespace
@@ -259,7 +259,7 @@ int run_series(const RunOptions& common, const RunRequest& base) {
   }
   const std::vector<config::SeriesMember> members = config::members_of(base.script->series, base.settings.seed);
   std::vector<run_folder::SeriesEntry> entries;
-  // Every run's configuration is checked before the first one moves anything.
+  // Check every run's configuration before the first run moves anything.
   for (const config::SeriesMember& member : members) {
     static_cast<void>(merge(options_of(common, member)));
     entries.push_back({.varied = varied_json(member), .seed = member.seed});

@@ -40,10 +40,11 @@ bool ignored(int signal) noexcept {
 
 void survive_closed_terminals() {
   for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    if (::fcntl(fd, F_GETFD) < 0) static_cast<void>(::open("/dev/null", O_RDWR));  // takes the lowest free one
+    if (::fcntl(fd, F_GETFD) < 0)
+      static_cast<void>(::open("/dev/null", O_RDWR));  // open() returns the lowest free descriptor
   }
   std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);  // a file at its size limit is a full disk: the write says so
+  std::signal(SIGXFSZ, SIG_IGN);  // a file at its size limit is reported by the failed write, like a full disk
 }
 
 void note_signals() {

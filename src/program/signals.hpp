@@ -5,25 +5,25 @@
 
 namespace abs_hil::program {
 
-/// Descriptors 0, 1 and 2 that were closed before the program started lead to /dev/null from now on, so that no file
-/// of a run takes their place and gets words meant for people; SIGPIPE is ignored.
+/// Opens /dev/null on each of the descriptors 0, 1 and 2 that was closed at program start, so that no file of the run
+/// gets that number and receives messages for people. Also ignores SIGPIPE.
 void survive_closed_terminals();
 
-/// From now on SIGINT, SIGTERM and SIGHUP are noted instead of ending the program; SIGHUP stays ignored under nohup.
+/// From now on SIGINT, SIGTERM and SIGHUP are noted and do not end the program. Under nohup SIGHUP stays ignored.
 void note_signals();
-/// The stop that a signal has asked for; `none` if there was none.
+/// The stop reason of a noted signal; `none` if there was none.
 [[nodiscard]] rig::Reason signalled() noexcept;
 
-/// As long as it lives, a signal ends the session's run at its next cycle, straight from the handler: a slow side that
-/// hangs at a disk or network holds nothing up. A second signal ends the program at once, if that is safe.
+/// While this object lives, a signal ends the session's run at its next cycle, directly from the handler: a slow thread
+/// that hangs at a disk or network causes no delay. A second signal ends the program at once, if that is safe.
 class SignalsStop {
  public:
-  /// @param may_leave  outputs are looked after by a guardian, or there are none
+  /// @param may_leave  true if a guardian protects the outputs, or if there are no real outputs
   SignalsStop(experiment::RunSession& session, bool may_leave) noexcept;
   SignalsStop(const SignalsStop&) = delete;
   SignalsStop& operator=(const SignalsStop&) = delete;
   ~SignalsStop();
-  /// The outputs are safe: a second signal may end the program from now on.
+  /// Call when the outputs are safe: a second signal may then end the program.
   void allow_leaving() noexcept;
 };
 

@@ -16,11 +16,13 @@ int validate(const RunRequest& request) {
   const std::vector<std::string> problems = config::beyond_limits(plan, request.settings);
   for (const std::string& problem : problems) fmt::print(stderr, "abs_hil: {}: {}\n", script.path, problem);
   if (!problems.empty()) return exit_usage;
-  // What only shows when a run is made.
+  // Find errors that appear only when a run is made.
   static_cast<void>(experiment::Sequence(plan.phases, plan.limits));
   if (request.settings.backend == "sim") static_cast<void>(plant_sim::Plant(request.settings.plant));
-  fmt::print("Within the limits of backend {}, plant {}.{}\n", request.settings.backend, request.settings.plant_name,
-             script.events.empty() ? "" : " Its events happen in simulation only: --backend rig refuses it.");
+  fmt::print(
+      "The experiment is within the limits of backend {}, plant {}.{}\n", request.settings.backend,
+      request.settings.plant_name,
+      script.events.empty() ? "" : " It has events, which only a simulation can carry out: --backend rig refuses it.");
   return exit_completed;
 }
 

@@ -10,12 +10,14 @@ namespace abs_hil::program {
 
 int watch(const watch::WatchOptions& options) {
   if (!options.url.empty()) {
-    static_cast<void>(telemetry::parse_lcm_url(options.url));  // a usage error, no missing network
+    static_cast<void>(
+        telemetry::parse_lcm_url(options.url));  // a malformed URL is a usage error, not a missing network
   }
   note_signals();
   const watch::WatchEnd end = watch::watch(options, [] { return signalled() != rig::Reason::none; });
   if (end == watch::WatchEnd::nothing_received) {
-    fprintf(stderr, "abs_hil: no message within %g s on %sTELEMETRY\n", options.once_timeout_s, options.prefix.c_str());
+    fprintf(stderr, "abs_hil: no message arrived within %g s on %sTELEMETRY\n", options.once_timeout_s,
+            options.prefix.c_str());
     return exit_unavailable;
   }
   if (end == watch::WatchEnd::quit) return exit_completed;

@@ -15,7 +15,7 @@ namespace abs_hil::replay {
 
 namespace {
 
-/// A field as bits, to compare, and as text, to show.
+/// A field as bits for comparison and as text for messages.
 struct FieldValue {
   std::uint64_t bits{};
   std::string text;
@@ -41,7 +41,7 @@ bool same_bits(const telemetry_t& a, const telemetry_t& b) {
   return std::equal(bytes_a.begin(), bytes_a.end(), bytes_b.begin(), bytes_b.end());
 }
 
-/// Compares a rerun with the recording; one line about it.
+/// Compares a rerun with the recording and adds one line about the result.
 bool compare(const RecordedRun& run, const std::vector<RerunCycle>& rerun, bool with_timing, const std::string& what,
              CheckResult& result) {
   const std::size_t common = std::min(run.cycles.size(), rerun.size());
@@ -53,12 +53,12 @@ bool compare(const RecordedRun& run, const std::vector<RerunCycle>& rerun, bool 
     const Difference difference = first_difference(recorded, computed, with_timing);
     if (difference.field.empty()) continue;
     result.lines.push_back(
-        fmt::format("{}: DIFFERENT from cycle {} (t = {:.6f} s) on: {} was recorded as {}, comes to {}", what, n,
+        fmt::format("{}: DIFFERENT from cycle {} (t = {:.6f} s) on: {} was recorded as {} but replayed as {}", what, n,
                     recorded.time_s, difference.field, difference.recorded, difference.computed));
     return false;
   }
   if (run.cycles.size() != rerun.size()) {
-    result.lines.push_back(fmt::format("{}: DIFFERENT: {} cycles were recorded, the run comes to its end after {}",
+    result.lines.push_back(fmt::format("{}: DIFFERENT: {} cycles were recorded, but the replayed run ends after {}",
                                        what, run.cycles.size(), rerun.size()));
     return false;
   }
@@ -72,7 +72,7 @@ Difference first_difference(const telemetry_t& recorded, const telemetry_t& comp
   const auto a = values_of(recorded);
   const auto b = values_of(computed);
   Difference difference;
-  // In the order of the message, which is that of cause and effect less the estimates.
+  // Fields are compared in the message's order: causes come before effects, except for estimates.
   telemetry::visit_fields(recorded, [&](std::string_view name, const auto&) {
     const bool is_timing = rig::topic_of(name) == rig::Topic::timing;
     if (!difference.field.empty() || (is_timing && !with_timing)) return;
@@ -89,14 +89,14 @@ CheckResult check(const RecordedRun& run) {
   };
   compared(rerun_open_loop(run, settings, WheelFaults::found_again), run.virtual_time,
            "open loop (commands, phases and estimates from the recorded measurements)");
-  const std::string simulation = "simulation (counts and true motion too, from the seed on)";
+  const std::string simulation = "simulation (also counts and true motion, from the seed)";
   if (run.experiment.backend != "sim") {
-    result.lines.push_back(simulation + ": not possible, the backend was " + run.experiment.backend);
+    result.lines.push_back(simulation + ": not possible, because the backend was " + run.experiment.backend);
   } else if (!settings.inject.empty()) {
-    result.lines.push_back(simulation + ": left out, faults were injected (run.inject)");
+    result.lines.push_back(simulation + ": not compared, because faults were injected (run.inject)");
   } else if (!run.virtual_time && settings.experiment.start_speed_rad_s > 0.0) {
     result.lines.push_back(simulation +
-                           ": not possible, how far the wheels had run before the first cycle is not recorded "
+                           ": not possible, because the wheels' motion before the first cycle is not recorded "
                            "(experiment.start_speed_rad_s in real time)");
   } else {
     compared(rerun_simulation(run, settings), run.virtual_time, simulation);

@@ -8,25 +8,25 @@
 
 namespace abs_hil::replay {
 
-/// What `abs_hil replay --check` found.
+/// Result of `abs_hil replay --check`.
 struct CheckResult {
   bool equal{true};
-  std::vector<std::string> lines{};  ///< what was compared and what came of it, for people
+  std::vector<std::string> lines{};  ///< each comparison and its result, as text
 };
 
 /// Runs the recorded configuration again and compares bit by bit:
-/// - open loop, always: from the recorded measurements the same estimates, phases, reasons and commands;
-/// - simulation, where the run was one whose start the recording tells: from the recorded seed and times the same
-///   encoder counts and true motion as well; of a run with --fast every telemetry message byte by byte.
+/// - open loop, always: the recorded measurements must give the same estimates, phases, reasons and commands;
+/// - simulation, if the recording determines the start of the run: the recorded seed and times must also give the same
+///   encoder counts and true motion; for a run with --fast every telemetry message is compared byte by byte.
 [[nodiscard]] CheckResult check(const RecordedRun& run);
 
-/// The first field in which a message differs from another, by its bits; empty if there is none.
+/// The first field in which two messages differ in their bits; empty if there is none.
 struct Difference {
   std::string field;
   std::string recorded;
   std::string computed;
 };
-/// @param with_timing  false: durations, which no rerun can repeat, are not compared
+/// @param with_timing  false: does not compare durations, which no rerun can repeat
 [[nodiscard]] Difference first_difference(const telemetry_t& recorded, const telemetry_t& computed, bool with_timing);
 
 }  // namespace abs_hil::replay

@@ -15,7 +15,7 @@ namespace {
 
 using telemetry::RecordingError;
 
-/// Sorts a recording's events into a run and checks them one by one.
+/// Collects a recording's events into a run and checks each of them.
 class Collector {
  public:
   explicit Collector(std::string name) : name_(std::move(name)) {}
@@ -38,24 +38,25 @@ class Collector {
     } else if (is(status_t{})) {
       static_cast<void>(decoded<status_t>(event));
     } else if (!channel_.empty() && event.channel == channel_) {
-      fail("a message on " + channel_ + " is no telemetry_t");
+      fail("a message on " + channel_ + " is not a telemetry_t");
     }
   }
 
   RecordedRun finish() {
-    if (run_.cycles.empty()) fail("holds no telemetry of abs_hil (no telemetry_t message)");
+    if (run_.cycles.empty()) fail("it holds no telemetry of abs_hil (no telemetry_t message)");
     if (!has_experiment_) {
-      fail("holds no configuration (no experiment_t message): record with --log, or longer than 5 s");
+      fail("it holds no configuration (no experiment_t message); record with --log, or for more than 5 s");
     }
     for (const telemetry_t& cycle : run_.cycles) run_.measured_ns.push_back(cycle.stamp_ns);
     for (const measurement_t& measurement : measurements_) {
       if (measurement.cycle < 0 || static_cast<std::size_t>(measurement.cycle) >= run_.cycles.size()) {
-        fail("a measurement_t of cycle " + std::to_string(measurement.cycle) + ", which is not there");
+        fail("a measurement_t of cycle " + std::to_string(measurement.cycle) + ", but the recording lacks that cycle");
       }
       run_.measured_ns[static_cast<std::size_t>(measurement.cycle)] = measurement.measured_ns;
     }
     for (std::size_t n = 1; n < run_.adjustments.size(); ++n) {
-      if (run_.adjustments[n].cycle < run_.adjustments[n - 1].cycle) fail("adjustments out of order: damaged");
+      if (run_.adjustments[n].cycle < run_.adjustments[n - 1].cycle)
+        fail("the adjustments are out of order; the recording is damaged");
     }
     run_.virtual_time = std::all_of(run_.cycles.begin(), run_.cycles.end(), [](const telemetry_t& cycle) {
       return cycle.wakeup_latency_ns == 0 && cycle.cycle_ns == 0 && cycle.record_ns == 0;
@@ -78,22 +79,24 @@ class Collector {
 
   void take_cycle(telemetry_t cycle, const std::string& channel) {
     if (channel_.empty()) channel_ = channel;
-    if (channel != channel_) fail("telemetry on two channels, " + channel_ + " and " + channel + ": one run at a time");
+    if (channel != channel_)
+      fail("telemetry on two channels, " + channel_ + " and " + channel + "; give a recording of one run");
     const auto expected = static_cast<std::int64_t>(run_.cycles.size());
     if (cycle.cycle != expected) fail(gap(expected, cycle));
     if (cycle.phase < telemetry_t::PHASE_IDLE || cycle.phase > telemetry_t::PHASE_FAULT) {
       fail("cycle " + std::to_string(cycle.cycle) + " is damaged: phase " + std::to_string(cycle.phase));
     }
     if (!run_.cycles.empty() && cycle.stamp_ns < run_.cycles.back().stamp_ns) {
-      fail("cycle " + std::to_string(cycle.cycle) + " is damaged: its stamp lies before that of the cycle before");
+      fail("cycle " + std::to_string(cycle.cycle) +
+           " is damaged: its time stamp is earlier than that of the previous cycle");
     }
     run_.cycles.push_back(cycle);
   }
 
   [[nodiscard]] std::string gap(std::int64_t expected, const telemetry_t& found) const {
     const std::string where =
-        "cycle " + std::to_string(found.cycle) + " where cycle " + std::to_string(expected) + " should be: ";
-    if (expected == 0) return where + "a replay needs the run from its first cycle on";
+        "cycle " + std::to_string(found.cycle) + " follows where cycle " + std::to_string(expected) + " is expected: ";
+    if (expected == 0) return where + "a replay needs the run from its first cycle";
     if (found.cycle == 0) return where + "a second run begins; give a recording of one run";
     if (found.sequence == expected) {
       return where +
@@ -111,12 +114,12 @@ class Collector {
         experiment.backend != first.backend || experiment.plant != first.plant ||
         experiment.experiment != first.experiment) {
       fail("two configurations in one recording (message " + std::to_string(experiment.sequence) +
-           " on the experiment's channel): damaged, or more than one run");
+           " on the experiment's channel); the recording is damaged or holds more than one run");
     }
   }
 
   std::string name_;
-  std::string channel_;  ///< of the telemetry
+  std::string channel_;  ///< telemetry channel
   RecordedRun run_{};
   std::vector<measurement_t> measurements_{};
   bool has_experiment_{false};
@@ -134,9 +137,9 @@ config::Settings settings_of(const RecordedRun& run, const Changes& changes) {
   config::Settings settings;
   config::KeyTable keys(settings);
   const auto config = nlohmann::ordered_json::parse(run.experiment.config_json, nullptr, false);
-  if (config.is_discarded()) throw RecordingError("the recorded configuration is no JSON: the recording is damaged");
+  if (config.is_discarded()) throw RecordingError("the recorded configuration is not JSON; the recording is damaged");
   try {
-    // Keys of another version do not matter as long as --check finds the same commands.
+    // Unknown keys of another version are harmless as long as --check finds the same commands.
     static_cast<void>(config::load_json(config, keys, "recorded configuration"));
   } catch (const config::ConfigError& error) {
     throw RecordingError(error.what());

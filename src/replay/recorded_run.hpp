@@ -15,28 +15,28 @@
 
 namespace abs_hil::replay {
 
-/// A run as its recording tells it: every cycle from the first on.
+/// A recorded run: every cycle from the first.
 struct RecordedRun {
-  experiment_t experiment{};                ///< the first of the recording: names and effective configuration
-  std::vector<telemetry_t> cycles{};        ///< cycle n at place n; not empty
-  std::vector<std::int64_t> measured_ns{};  ///< when the counters of cycle n were read
+  experiment_t experiment{};                ///< first such message of the recording: names and effective configuration
+  std::vector<telemetry_t> cycles{};        ///< index: cycle number; not empty
+  std::vector<std::int64_t> measured_ns{};  ///< time at which the counters of each cycle were read
   std::vector<event_t> events{};
-  std::vector<adjustment_t> adjustments{};  ///< in the order of their cycles
-  bool virtual_time{false};                 ///< a run with --fast: every wake-up exact, no computation took time
+  std::vector<adjustment_t> adjustments{};  ///< ordered by cycle
+  bool virtual_time{false};                 ///< a run with --fast: exact wake-ups, computations take no time
 };
 
-/// Reads a recording (event log or converted CSV). Throws telemetry::RecordingError for one that is damaged or cut off,
-/// holds no run of abs_hil or more than one, or not every cycle of it from the first on.
+/// Reads a recording (event log or converted CSV). Throws telemetry::RecordingError if it is damaged or truncated,
+/// holds no run or several runs, or lacks a cycle.
 [[nodiscard]] RecordedRun read_run(const std::filesystem::path& recording);
 
-/// What a replay changes about the recorded configuration.
+/// Changes that a replay makes to the recorded configuration.
 struct Changes {
   std::optional<std::string> controller{};
   std::vector<std::string> assignments{};  ///< key=value
 };
 
-/// The configuration that the run was made with, changed. Throws config::ConfigError for values that do not fit and
-/// telemetry::RecordingError for a recorded configuration that is none.
+/// The recorded configuration with changes. Throws config::ConfigError for invalid values and telemetry::RecordingError
+/// for a recorded configuration that is invalid.
 [[nodiscard]] config::Settings settings_of(const RecordedRun& run, const Changes& changes = {});
 
 }  // namespace abs_hil::replay

@@ -11,7 +11,7 @@ namespace abs_hil::replay {
 
 namespace {
 
-/// Figures of the torque asked for, over the cycles in which both runs brake.
+/// Statistics of the torque reference over the cycles in which both runs brake.
 struct TorqueFigures {
   double mean_Nm{0.0};
   double max_Nm{0.0};
@@ -60,15 +60,15 @@ std::string report(const RecordedRun& run, const config::Settings& replayed, con
   text += row("controller", run.experiment.controller, replayed.control.controller);
   text += row("cycles", fmt::format("{}", run.cycles.size()), fmt::format("{}", rerun.size()));
   text += fmt::format("{:<34} {:>14}\n", "cycles braking in both", braking);
-  if (braking == 0) return text + "no cycle with slip control in both: nothing to compare\n";
+  if (braking == 0) return text + "the two runs share no cycle with slip control: nothing to compare\n";
   const auto count = static_cast<double>(braking);
-  text += row("brake torque asked for, mean (N m)", before.mean_Nm / count, after.mean_Nm / count);
+  text += row("brake torque reference, mean (N m)", before.mean_Nm / count, after.mean_Nm / count);
   text += row("  largest (N m)", before.max_Nm, after.max_Nm);
   text += row("  total variation (N m)", before.total_variation_Nm, after.total_variation_Nm);
   text += row("theta estimate at the end (N)", before.theta_last_N, after.theta_last_N);
   text += fmt::format("{:<34} {:>14} {:>14.4f}\n", "difference, RMS (N m)", "", std::sqrt(square_sum / count));
   text += fmt::format("{:<34} {:>14} {:>14.4f} at {:.3f} s\n", "  largest (N m)", "", largest, largest_at_s);
-  return text + "open loop: the rig moved as recorded, whatever the replayed controller asked for\n";
+  return text + "open loop: the rig moved as recorded and did not react to the replayed controller\n";
 }
 
 }  // namespace abs_hil::replay

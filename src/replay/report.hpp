@@ -7,7 +7,7 @@
 
 namespace abs_hil::replay {
 
-/// What the replayed controller would have asked for beside what the recorded one did, as a table for people.
+/// A table that compares the commands of the replayed controller with those of the recorded one.
 [[nodiscard]] std::string report(const RecordedRun& run, const config::Settings& replayed,
                                  const std::vector<RerunCycle>& rerun);
 

@@ -20,9 +20,9 @@ namespace abs_hil::replay {
 
 namespace {
 
-constexpr std::size_t ring_capacity = 2;  // emptied after every cycle
+constexpr std::size_t ring_capacity = 2;  // the ring is emptied after every cycle
 
-/// Time that stands still within a cycle and moves to the recorded stamp of the next.
+/// A clock that stands still within a cycle and moves to the recorded time of the next cycle.
 class RecordedClock final : public runtime::Clock {
  public:
   explicit RecordedClock(std::int64_t start_ns) : now_ns_(start_ns) {}
@@ -34,7 +34,7 @@ class RecordedClock final : public runtime::Clock {
   std::int64_t now_ns_;
 };
 
-/// A rig that does again what was recorded, whatever is asked of it.
+/// A rig that repeats the recorded motion and ignores commands.
 class RecordedRig final : public driver::RigDriver {
  public:
   RecordedRig(const RecordedRun& run, const config::Settings& s)
@@ -52,8 +52,8 @@ class RecordedRig final : public driver::RigDriver {
     measurement = record.measurement;
     measurement.time_ns = run_.measured_ns[next_];
     truth_ = record.truth;
-    // The simulator hands its true speeds to the controller then; what an injected fault made of them it took as it
-    // was.
+    // With ideal sensors the simulator hands its true speeds to the controller. Fault injections may have changed them;
+    // then the estimates hold what the controller received.
     if (ideal_sensors_) measurement.ideal_speeds = injected_ ? record.control.speeds_est : truth_.speeds;
     ++next_;
     return {};
@@ -68,7 +68,7 @@ class RecordedRig final : public driver::RigDriver {
   rig::PlantTruth truth_{};
 };
 
-/// A rig whose reading takes as long as it was recorded to: the gate judges no counts that came late.
+/// A rig whose reading takes the recorded time: the gate does not judge counts that came late.
 class TimedReading final : public driver::RigDriver {
  public:
   TimedReading(driver::RigDriver& rig, const RecordedRun& run, RecordedClock& clock)
@@ -95,7 +95,7 @@ class TimedReading final : public driver::RigDriver {
   std::size_t next_{0};
 };
 
-/// The run's logic, except that what acted on the rig is what was recorded.
+/// The run's logic, except that the actuator model gets the recorded commands.
 class RecordedActuation final : public runtime::CycleLogic {
  public:
   RecordedActuation(experiment::RunLogic& logic, const RecordedRun& run) : logic_(logic), run_(run) {}
@@ -128,7 +128,7 @@ class Collected final : public rig::RecordSink {
   std::vector<RerunCycle> cycles;
 };
 
-/// The recorded script; for a recording without one that of the name.
+/// The recorded script, or, for a recording without one, the script with the recorded name.
 config::Plan plan_of(const RecordedRun& run, const config::Settings& s) {
   const auto config = nlohmann::json::parse(run.experiment.config_json, nullptr, false);
   if (!config.is_object() || !config.contains("experiment_script") || !config["experiment_script"].is_string()) {
@@ -151,7 +151,7 @@ experiment::RunLogicParts logic_parts(const RecordedRun& run, const config::Sett
 
 constexpr std::string_view start_name = "start";
 
-/// The cycle that takes a change out of the mailbox; a given start shows in the one after.
+/// The cycle that takes a change out of the mailbox. A start command shows one cycle later.
 std::int64_t put_before(const adjustment_t& adjustment) {
   return adjustment.name == start_name ? adjustment.cycle - 1 : adjustment.cycle;
 }
@@ -164,7 +164,7 @@ void put(const adjustment_t& adjustment, config::LiveSettings& live, experiment:
   try {
     static_cast<void>(mailbox.put(live.set(live.resolve(adjustment.name), adjustment.value)));
   } catch (const config::ConfigError&) {
-    // A gain of the recorded controller, which another one has not.
+    // The replayed controller does not have this gain.
   }
 }
 
@@ -177,7 +177,7 @@ std::vector<RerunCycle> rerun(const RecordedRun& run, const config::Settings& s,
   RecordedClock clock(run.cycles.front().stamp_ns);
   TimedReading rig(backend, run, clock);
   runtime::RecordRing ring(ring_capacity);
-  // Lateness is recorded, not met again: it must not count here.
+  // Delays are part of the recording and not repeated, so they must not count here.
   runtime::CyclicExecutive executive(clock, rig, cycle_logic, gate, ring, std::llround(1e9 / s.control.rate_Hz),
                                      {.startup_cycles = 0, .max_consecutive = 0});
   Collected collected;
@@ -203,14 +203,14 @@ std::vector<RerunCycle> rerun(const RecordedRun& run, const config::Settings& s,
 bool ended_from_outside(const RecordedRun& run, std::size_t n, WheelFaults faults) noexcept {
   const telemetry_t& cycle = run.cycles[n];
   const auto reason = static_cast<rig::Reason>(cycle.reason);
-  if (rig::is_stop_request(reason)) return true;  // the brake for a stop may act first
+  if (rig::is_stop_request(reason)) return true;  // the stop brake may act first
   if (cycle.phase != telemetry_t::PHASE_STOPPED && cycle.phase != telemetry_t::PHASE_FAULT) return false;
   if (!rig::is_fault(reason)) return false;
   switch (rig::row_of(reason).found_again) {
     case rig::FoundAgain::no: return true;
     case rig::FoundAgain::yes: return false;
     case rig::FoundAgain::jumped_counts:
-      // The recording holds the counts of the cycle before in the place of those that were refused.
+      // The gate refuses such counts; the recording then repeats the previous cycle's counts.
       if (n > 0 && run.measured_ns[n] == run.measured_ns[n - 1]) return true;
       return faults == WheelFaults::as_recorded;
     case rig::FoundAgain::wheel_checks: return faults == WheelFaults::as_recorded;
@@ -222,7 +222,7 @@ std::vector<RerunCycle> rerun_open_loop(const RecordedRun& run, const config::Se
   experiment::RunLogic logic(logic_parts(run, settings));
   RecordedActuation actuation(logic, run);
   RecordedRig rig(run, settings);
-  // What another controller would have sent never acted: the wheels cannot be held against it.
+  // Commands of another controller never acted, so the gate must not judge the wheels by them.
   runtime::CommandGate gate = faults == WheelFaults::found_again
                                   ? logic.make_gate(settings.gate)
                                   : runtime::CommandGate(settings.gate, logic.permissions());

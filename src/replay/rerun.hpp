@@ -8,32 +8,32 @@
 
 namespace abs_hil::replay {
 
-/// A cycle computed anew.
+/// A recomputed cycle.
 struct RerunCycle {
   rig::CycleRecord record{};
   double distance_m{0.0};
 };
 
-/// Where the gate's findings about the wheels (reasons 130 to 142) come from in a rerun.
+/// Source of the gate's wheel faults (reasons 130 to 142) in a rerun.
 enum class WheelFaults : std::uint8_t {
-  found_again,  ///< by the run's own gate, from the recorded counts and the commands of the rerun, which must be those
-                ///< that acted: for the configuration of the recording alone
-  as_recorded   ///< they end the rerun in the recorded cycle
+  found_again,  ///< The run's own gate finds them from the recorded counts and the rerun's commands. These must equal
+                ///< the commands that acted, so this requires the recorded configuration.
+  as_recorded   ///< They end the rerun in the recorded cycle.
 };
 
-/// Feeds the recorded measurements, at their recorded times, through estimators, sequence, controller and gate of
-/// `settings`: what they would have commanded, had it changed nothing about how the rig moved. The brake model is
-/// driven by the recorded commands, which are those that acted. Ends where the recording or the new sequence ends. What
-/// came from outside of the cycle (signals, stop, I/O errors, late cycles) ends it in the recorded cycle.
+/// Feeds the recorded measurements at their recorded times through estimators, sequence, controller and gate of
+/// `settings`. The result is what they would have commanded if their commands had not changed the rig's motion. The
+/// brake model gets the recorded commands, which are those that acted. The rerun ends where the recording or the new
+/// sequence ends. Events from outside the cycle (signals, stop, I/O errors, late cycles) end it in the recorded cycle.
 [[nodiscard]] std::vector<RerunCycle> rerun_open_loop(const RecordedRun& run, const config::Settings& settings,
                                                       WheelFaults faults);
 
-/// The same cycle at the recorded times with the simulated rig of `settings`, from the recorded seed on. Faults of the
-/// wheels are found again.
+/// Runs the same cycle at the recorded times with the simulated rig of `settings` and the recorded seed. The gate finds
+/// wheel faults again.
 [[nodiscard]] std::vector<RerunCycle> rerun_simulation(const RecordedRun& run, const config::Settings& settings);
 
-/// True if in cycle `n` the run came, or began to come, to an end for a reason that a rerun cannot find by itself and
-/// takes from the recording.
+/// True if in cycle `n` the run ended, or began to end, for a reason that a rerun cannot find and takes from the
+/// recording.
 [[nodiscard]] bool ended_from_outside(const RecordedRun& run, std::size_t n, WheelFaults faults) noexcept;
 
 }  // namespace abs_hil::replay

@@ -21,7 +21,7 @@ Range made_proper(Range range) {
   if (!std::isfinite(range.first) || !std::isfinite(range.second)) return {0.0, 1.0};
   const double size = std::max(std::abs(range.first), std::abs(range.second));
   if (range.second - range.first > 1e-9 * size && range.second > range.first) return range;
-  const double room = size > 0.0 ? 0.5 * size : 0.5;  // a constant: with room about it
+  const double room = size > 0.0 ? 0.5 * size : 0.5;  // a constant curve gets space above and below
   return {range.first - room, range.second + room};
 }
 
@@ -41,7 +41,7 @@ Axis axis_around(Range range, int wanted) {
     return step * (direction < 0.0 ? std::floor(steps) : std::ceil(steps));
   };
   const double high = rounded(range.second + margin, 1.0);
-  // Zero stays the end of an axis that begins there, and a hair below it is no whole step.
+  // An axis that begins at zero keeps zero as its end; a tiny negative value must not add a whole step.
   if (range.first >= 0.0 && range.first < margin) return {0.0, high, step};
   if (range.first < 0.0 && range.first > -2.0 * margin) return {range.first - 0.5 * margin, high, step};
   return {rounded(range.first - margin, -1.0), high, step};

@@ -21,7 +21,7 @@ namespace abs_hil::report {
 namespace {
 
 constexpr std::size_t block_bytes = 1U << 20U;
-/// No row of a run is near that long: a file with a longer line is something else.
+/// Rows of a run are much shorter. A file with a longer line is not a run's CSV.
 constexpr std::size_t longest_line_bytes = 65'536;
 constexpr std::size_t shown_characters = 40;
 constexpr double no_number = std::numeric_limits<double>::quiet_NaN();
@@ -31,7 +31,7 @@ std::string_view without_return(std::string_view line) {
   return line;
 }
 
-/// Takes the field up to the next comma off the front of `line`.
+/// Removes and returns the field before the next comma of `line`.
 std::string_view take_field(std::string_view& line, bool& more) {
   const std::size_t comma = line.find(',');
   const std::string_view field = line.substr(0, comma);
@@ -81,8 +81,9 @@ std::optional<std::size_t> CsvReader::find(std::string_view column) const noexce
 std::size_t CsvReader::column(std::string_view name) const {
   const auto found = find(name);
   if (!found) {
-    throw InputError(path_, 1,
-                     fmt::format("no column \"{}\"; the file has {}", clean_text(name), fmt::join(columns_, ", ")));
+    throw InputError(
+        path_, 1,
+        fmt::format("no column \"{}\"; the file has the columns {}", clean_text(name), fmt::join(columns_, ", ")));
   }
   return *found;
 }
@@ -98,7 +99,7 @@ void CsvReader::refill() {
   } else if (got == 0) {
     at_end_ = true;
   } else if (errno != EINTR) {
-    throw InputError(path_, line_ + 1, fmt::format("cannot read on: {}", std::strerror(errno)));
+    throw InputError(path_, line_ + 1, fmt::format("cannot read the next line: {}", std::strerror(errno)));
   }
 }
 
@@ -116,7 +117,8 @@ bool CsvReader::next_line(std::string_view& line) {
       return true;
     }
     if (size > longest_line_bytes) {
-      throw InputError(path_, line_ + 1, "the line is longer than any row of a run: this is no run's CSV");
+      throw InputError(path_, line_ + 1,
+                       "the line is longer than any row of a run; give a CSV file that abs_hil wrote");
     }
     if (at_end_) {
       truncated_ = size > 0;
@@ -131,7 +133,7 @@ void CsvReader::read_header() {
   std::string_view line;
   if (!next_line(line)) {
     throw InputError(path_, 1,
-                     truncated_ ? "the file ends within its first line: the run was cut off before it began"
+                     truncated_ ? "the file ends within its first line: the recording stopped before the first row"
                                 : "the file is empty: the run wrote nothing");
   }
   if (line.starts_with("\xEF\xBB\xBF")) line.remove_prefix(3);  // a spreadsheet's byte order mark
@@ -163,8 +165,9 @@ void CsvReader::read_row(std::string_view line) {
   bool more = true;
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     if (!more) {
-      throw InputError(path_, line_,
-                       fmt::format("{} fields instead of {}: the row ends before {}", i, columns_.size(), columns_[i]));
+      throw InputError(
+          path_, line_,
+          fmt::format("the row has {} fields instead of {} and ends before {}", i, columns_.size(), columns_[i]));
     }
     const std::string_view field = take_field(line, more);
     if (i == phase_column_) {
@@ -175,17 +178,17 @@ void CsvReader::read_row(std::string_view line) {
     const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), values_[i]);
     if (error != std::errc{} || end != field.data() + field.size()) {
       throw InputError(path_, line_,
-                       fmt::format("{}: \"{}\" is not a number (NaN where a run does not know)", columns_[i],
+                       fmt::format("{}: \"{}\" is not a number (a run writes NaN for an unknown value)", columns_[i],
                                    clean_text(field, shown_characters)));
     }
   }
   if (more) {
-    throw InputError(path_, line_, fmt::format("more than the header's {} fields", columns_.size()));
+    throw InputError(path_, line_, fmt::format("the row has more than the header's {} fields", columns_.size()));
   }
   const double time_s = values_[time_column_];
   if (!std::isfinite(time_s)) throw InputError(path_, line_, "time_s is not a finite number");
   if (time_s < last_time_s_) {
-    throw InputError(path_, line_, fmt::format("time_s goes back from {} to {}", last_time_s_, time_s));
+    throw InputError(path_, line_, fmt::format("time_s decreases from {} to {}", last_time_s_, time_s));
   }
   last_time_s_ = time_s;
 }

@@ -9,11 +9,11 @@
 
 namespace abs_hil::report {
 
-/// Columns that every run's CSV has (docs/telemetry.md); others may follow, in any order.
+/// Columns that every run's CSV contains (docs/telemetry.md). Others may follow in any order.
 [[nodiscard]] const std::vector<std::string>& contract_columns();
 
-/// Reads a run's CSV row by row with memory that does not grow with the file. Throws InputError, naming file and line,
-/// for what is no run: missing columns, fields that are no numbers, a time that runs backwards.
+/// Reads a run's CSV row by row, with memory that does not grow with the file. Throws InputError with file and line for
+/// a file that is no run: missing columns, fields that are not numbers, decreasing time.
 class CsvReader {
  public:
   /// Opens the file and reads its header.
@@ -24,18 +24,18 @@ class CsvReader {
 
   [[nodiscard]] const std::vector<std::string>& columns() const noexcept { return columns_; }
   [[nodiscard]] std::optional<std::size_t> find(std::string_view column) const noexcept;
-  /// As find, but throws InputError for a column that the file does not have.
+  /// Like find, but throws InputError if the file does not have the column.
   [[nodiscard]] std::size_t column(std::string_view name) const;
 
-  /// Goes to the next row; false at the end. A last line without line end is what a crash leaves behind: it is no row,
-  /// and `truncated` tells of it.
+  /// Reads the next row; false at the end. A last line without line end is the trace of a crash: it does not count as a
+  /// row, and `truncated` becomes true.
   [[nodiscard]] bool next();
 
-  /// Of the row: one number a column, NaN for `phase`.
+  /// Values of the row: one number per column, NaN for `phase`.
   [[nodiscard]] const std::vector<double>& values() const noexcept { return values_; }
   [[nodiscard]] double time_s() const noexcept { return values_[time_column_]; }
   [[nodiscard]] std::string_view phase() const noexcept { return phase_; }
-  /// Line of the row in the file, counted from 1; the header's is 1.
+  /// Line number of the row in the file. The header is line 1.
   [[nodiscard]] std::size_t line() const noexcept { return line_; }
   [[nodiscard]] bool truncated() const noexcept { return truncated_; }
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }

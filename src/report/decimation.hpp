@@ -11,22 +11,22 @@ struct Point {
   double y;
 };
 
-/// Thins a curve while it is read, with memory that does not grow with it: rows are gathered in stretches of equal
-/// length, of which the first, least, greatest and last values remain (the aggregation M4 of Jugel et al., VLDB 2014,
-/// by rows instead of pixels). A line through them covers the same pixels as one through all rows as long as a stretch
-/// is not wider than a pixel: peaks and chatter stay. As long as there are at most `most_stretches` rows, all remain.
+/// Thins a curve while it is read, with memory that does not grow with the curve. Rows are gathered in stretches of
+/// equal length, and the first, smallest, largest and last value of each stretch remain (aggregation M4 of Jugel et
+/// al., VLDB 2014, by rows instead of pixels). If a stretch is not wider than a pixel, the thinned line covers the same
+/// pixels as the full one: peaks and chatter stay visible. Curves of at most `most_stretches` rows keep all rows.
 class Decimation {
  public:
   /// @param most_stretches >= 2, even
   explicit Decimation(std::size_t most_stretches);
 
-  /// Rows in the order of their x. NaN as y breaks the curve.
+  /// Adds a row; x must not decrease. NaN as y breaks the curve.
   void add(double x, double y);
-  /// The curve so far; breaks are points whose y is NaN, none at its ends.
+  /// The curve so far. A point with y = NaN marks a break; there are none at the ends.
   [[nodiscard]] std::vector<Point> points() const;
 
  private:
-  /// Some rows of the curve. `first.y` is NaN if none of them has a value.
+  /// Consecutive rows of the curve. `first.y` is NaN if none of them has a value.
   struct Stretch {
     Point first;
     Point least;

@@ -26,7 +26,8 @@ std::size_t points_of(const Curve& curve) {
 void mark_plot(std::string& svg, const std::string& gnuplot_id, const std::string& opening) {
   const std::size_t begin = svg.find(fmt::format("<g id=\"{}\"", gnuplot_id));
   const std::size_t end = begin == std::string::npos ? begin : svg.find("</title>", begin);
-  if (end == std::string::npos) throw std::runtime_error(fmt::format("gnuplot's picture lacks {}", gnuplot_id));
+  if (end == std::string::npos)
+    throw std::runtime_error(fmt::format("gnuplot's picture has no element {}", gnuplot_id));
   svg.replace(begin, end - begin, opening);
 }
 
@@ -39,7 +40,7 @@ std::string with_common_fonts(std::string svg) {
 
 std::string embeddable_svg(const std::string& picture, const Figure& figure) {
   const std::size_t begin = picture.find("<svg");
-  if (begin == std::string::npos) throw std::runtime_error("gnuplot's picture is no SVG");
+  if (begin == std::string::npos) throw std::runtime_error("gnuplot's picture is not an SVG");
   std::string svg = with_common_fonts(picture.substr(begin));
   for (std::size_t p = 0; p < figure.panels.size(); ++p) {
     const std::vector<Curve>& curves = figure.panels[p].curves;

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::string_view phase_column = "phase";
 
-/// Columns that all runs have, in the order of the first.
+/// Columns that all runs share, in the order of the first run.
 std::vector<std::string> shared_columns(const std::vector<RunFiles>& runs) {
   std::vector<std::string> shared = CsvReader(runs.front().csv).columns();
   for (std::size_t r = 1; r < runs.size(); ++r) {
@@ -51,7 +51,8 @@ std::vector<std::size_t> places_of(const CsvReader& csv, const std::vector<std::
 
 void note_truncation(const CsvReader& csv, std::vector<std::string>& notes) {
   if (csv.truncated()) {
-    notes.push_back(fmt::format("{}: the last row is cut off, as after a crash; it is left out", csv.path().string()));
+    notes.push_back(
+        fmt::format("{}: the last row is incomplete, as after a crash, and is left out", csv.path().string()));
   }
 }
 
@@ -77,9 +78,9 @@ void write_csv(const std::vector<RunFiles>& runs, const std::vector<std::string>
   }
 }
 
-/// A run's rows, column by column.
+/// A run's rows by column.
 struct Columns {
-  std::vector<std::vector<double>> values{};  ///< of `phase`: place in `phases`, from 1
+  std::vector<std::vector<double>> values{};  ///< for `phase`: index into `phases`, from 1
   std::vector<std::string> phases{};          ///< in the order in which they occur
 };
 

@@ -6,7 +6,7 @@
 namespace abs_hil::report {
 
 Style run_style(std::size_t run) {
-  // Okabe, Ito: "Color Universal Design" (2008). The first two are far apart in lightness too.
+  // Okabe, Ito: "Color Universal Design" (2008). The first two colours also differ strongly in lightness.
   static const std::array<Style, 7> styles{{
       {"#0072B2", "solid", 1.5},
       {"#E69F00", "(14,3)", 1.5},

@@ -10,7 +10,7 @@
 
 namespace abs_hil::report {
 
-/// How a curve is drawn. Colours tell curves apart, dashes do too where there is no colour.
+/// How a curve is drawn. Dashes distinguish curves where there are no colours.
 struct Style {
   std::string colour{"#000000"};
   std::string dash{"solid"};  ///< gnuplot's: "solid" or "(10,4)"
@@ -18,74 +18,74 @@ struct Style {
   int point_type{7};  ///< gnuplot's, for markers
 };
 
-/// Okabe and Ito's palette, which the colour-blind can tell apart, yellow left out; every entry with a dash of its own.
+/// Okabe and Ito's palette for colour-blind readers without its yellow. Each entry has its own dash pattern.
 [[nodiscard]] Style run_style(std::size_t run);
 
 enum class Drawn { line, markers, intervals };
 
 struct Curve {
   std::size_t run{0};
-  std::string quantity{};  ///< column that it shows, or what is made of columns
+  std::string quantity{};  ///< the column that it shows, or a name for a computed quantity
   Style style{};
   std::vector<Point> points{};
   Drawn drawn{Drawn::line};
-  /// With Drawn::intervals: low and high of every point.
+  /// For Drawn::intervals: lower and upper bound of every point.
   std::vector<std::pair<double, double>> bounds{};
 };
 
 struct LegendEntry {
-  std::string text{};  ///< plain: shown as it is
+  std::string text{};  ///< plain text
   Style style{};
   Drawn drawn{Drawn::line};
 };
 
 using Range = std::pair<double, double>;
 
-/// A rectangle of a panel, in its coordinates: a phase of a run.
+/// A rectangle in a panel's coordinates that shows a phase of a run.
 struct Bar {
   double x0{0.0};
   double x1{0.0};
   double y0{0.0};
   double y1{0.0};
   std::string colour{};
-  std::string text{};  ///< shown in its middle where there is room
+  std::string text{};  ///< shown in the middle if it fits
 };
 
 struct Panel {
-  std::string y_label{};  ///< in gnuplot's enhanced notation; ours, never from a file
+  std::string y_label{};  ///< in gnuplot's enhanced notation; fixed text, never from a file
   std::optional<Range> y_range{};
   std::vector<Curve> curves{};
   double height_px{180.0};
   bool log_x{false};
   bool log_y{false};
-  std::optional<Range> x_range{};                        ///< unlike the figure's: the panel then has an axis of its own
-  std::string x_label{};                                 ///< with x_range; enhanced notation, ours
+  std::optional<Range> x_range{};                        ///< if set, the panel has its own x axis
+  std::string x_label{};                                 ///< for x_range; enhanced notation, fixed text
   std::vector<std::pair<double, std::string>> y_tics{};  ///< instead of numbers; plain text
   std::vector<std::pair<double, std::string>> x_tics{};  ///< instead of numbers; plain text
   std::vector<Bar> bars{};
   bool grid{true};
 };
 
-/// A stretch of the time axis with a light background.
+/// A shaded part of the time axis.
 struct Shade {
   double from{0.0};
   double to{0.0};
-  std::string label{};  ///< plain
+  std::string label{};  ///< plain text
 };
 
 /// A vertical line at an instant.
 struct Mark {
   double x{0.0};
-  std::string label{};  ///< plain
+  std::string label{};  ///< plain text
   bool fault{false};
 };
 
-/// A picture with one or more panels above each other that share their x axis.
+/// A picture of one or more panels in a column with a common x axis.
 struct Figure {
-  std::string id{};       ///< "fig5": of its file and of its curves, `fig5_1a` is the first one of panel a
-  std::string heading{};  ///< plain: "Figure 5. Upper wheel speed"
-  std::string caption{};  ///< plain
-  std::string x_label{};  ///< enhanced notation, ours
+  std::string id{};       ///< "fig5": names its file and its curves; `fig5_1a` is the first curve of panel a
+  std::string heading{};  ///< plain text: "Figure 5. Upper wheel speed"
+  std::string caption{};  ///< plain text
+  std::string x_label{};  ///< enhanced notation, fixed text
   std::optional<Range> x_range{};
   std::vector<Panel> panels{};
   std::vector<LegendEntry> legend{};
@@ -93,7 +93,7 @@ struct Figure {
   std::vector<Mark> marks{};
 };
 
-/// Background of a phase; white for what is looked at, braking.
+/// Background colour of a phase; white for braking, the phase of interest.
 [[nodiscard]] std::string phase_colour(const std::string& phase);
 
 }  // namespace abs_hil::report

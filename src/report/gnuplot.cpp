@@ -25,9 +25,9 @@ namespace {
 
 constexpr const char* script_name = "figures.gp";
 constexpr const char* words_name = "gnuplot.log";
-constexpr int not_found_status = 127;  ///< what posix_spawnp's child may end with instead of an error (POSIX)
+constexpr int not_found_status = 127;  ///< exit status that POSIX permits instead of an error of posix_spawnp
 
-/// Ends with the program's exit status, -1 for a signal. Throws UnavailableError if there is no such program.
+/// Returns the program's exit status, -1 after a signal. Throws UnavailableError if the program is missing.
 int run_gnuplot(const fs::path& folder) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -35,7 +35,7 @@ int run_gnuplot(const fs::path& folder) {
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, words_name, O_WRONLY | O_CREAT | O_TRUNC, 0600);
   posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
-  // --default-settings: nobody's .gnuplot changes how our figures look.
+  // --default-settings keeps a user's .gnuplot from changing the figures.
   std::array<std::string, 3> words{"gnuplot", "--default-settings", script_name};
   std::array<char*, 4> arguments{words[0].data(), words[1].data(), words[2].data(), nullptr};
   pid_t child = 0;
@@ -49,7 +49,7 @@ int run_gnuplot(const fs::path& folder) {
     status = WIFEXITED(wait_status) ? WEXITSTATUS(wait_status) : -1;
   }
   if (status == not_found_status) {
-    throw UnavailableError("gnuplot, which draws the figures, is missing: apt-get install gnuplot-nox");
+    throw UnavailableError("gnuplot, which draws the figures, is missing; install it: apt-get install gnuplot-nox");
   }
   return status;
 }

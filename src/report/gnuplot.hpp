@@ -13,11 +13,11 @@ enum class PictureFormat { svg, png, pdf };
 
 [[nodiscard]] std::string_view extension_of(PictureFormat format);
 
-/// gnuplot's commands that draw the figures into files named by their ids. Texts from files stand in single quotes
-/// without markup; the data stand in the script itself.
+/// Commands for gnuplot that draw the figures into files named after their ids. Texts from files are in single quotes
+/// without markup. The script contains the data.
 [[nodiscard]] std::string gnuplot_script(const std::vector<Figure>& figures, PictureFormat format);
 
-/// A folder of one's own that goes with the object.
+/// A new temporary folder, deleted with the object.
 class TemporaryFolder {
  public:
   TemporaryFolder();
@@ -30,15 +30,15 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-/// Runs gnuplot as a child process, without a shell, in `folder`; the pictures are there afterwards. Throws
-/// UnavailableError, with the fix, where gnuplot is missing, std::runtime_error with its words where it fails.
+/// Runs gnuplot in `folder` as a child process without a shell; it writes the pictures there. Throws UnavailableError
+/// with the fix if gnuplot is missing, and std::runtime_error with gnuplot's messages if it fails.
 void draw(const std::vector<Figure>& figures, PictureFormat format, const std::filesystem::path& folder);
 
-/// An SVG of gnuplot's with other fonts named beside ours, for machines that do not have it.
+/// Adds fallback fonts to an SVG of gnuplot, for computers without its font.
 [[nodiscard]] std::string with_common_fonts(std::string svg);
 
-/// A picture of gnuplot's made part of a page: a bare `svg` element, curves marked with class, run, quantity and number
-/// of points, names that do not clash with those of other pictures.
+/// Prepares an SVG of gnuplot for a page: a bare `svg` element whose curves are marked with class, run, quantity and
+/// number of points, and whose ids do not clash with those of other pictures.
 [[nodiscard]] std::string embeddable_svg(const std::string& svg, const Figure& figure);
 
 }  // namespace abs_hil::report

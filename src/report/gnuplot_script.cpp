@@ -16,14 +16,14 @@ constexpr double left_px = 78.0;
 constexpr double right_px = 18.0;
 constexpr double bottom_px = 52.0;
 constexpr double gap_px = 16.0;
-constexpr double log_gap_px = 22.0;  ///< powers of ten stand higher
+constexpr double log_gap_px = 22.0;  ///< powers of ten need more height
 constexpr double own_axis_gap_px = 54.0;
-constexpr double legend_row_px = 21.5;  ///< as gnuplot spaces the rows of a legend
+constexpr double legend_row_px = 21.5;  ///< gnuplot's spacing of legend rows
 constexpr double label_row_px = 17.0;
 constexpr double top_px = 8.0;
 constexpr double font_px = 14.0;
 constexpr double small_font_px = 12.0;
-constexpr double legend_character_px = 8.4;  ///< as gnuplot reckons when it lays out a legend
+constexpr double legend_character_px = 8.4;  ///< gnuplot's estimate for the layout of a legend
 constexpr double small_character_px = 5.8;   ///< of the small font
 constexpr double legend_sample_px = 94.0;
 constexpr double inner_px = width_px - left_px - right_px;
@@ -42,7 +42,7 @@ double gap_below(const Panel& panel) {
   return panel.log_y ? log_gap_px : gap_px;
 }
 
-/// Where everything stands, in pixels from the top.
+/// Vertical positions of all parts, in pixels from the top.
 struct Layout {
   explicit Layout(const Figure& figure) {
     std::size_t longest = 1;
@@ -121,7 +121,7 @@ void add_data(Lines& script, std::size_t figure, std::size_t panel, const Panel&
   }
 }
 
-/// Names of phases and marks in the row above the frame, as many as have room; marks come first.
+/// Labels phases and marks in the row above the frame, as many as fit; marks have priority.
 void add_row_of_labels(Lines& script, const Figure& figure, Range x, double above) {
   const double px_a_unit = inner_px / (x.second - x.first);
   std::vector<Range> taken;
@@ -217,7 +217,7 @@ void add_plot(Lines& script, const Figure& figure, std::size_t f, std::size_t p,
     plots += fmt::format("{}$d{}_{}_{} using 1:2{} {} notitle", plots.empty() ? "" : ", \\\n  ", f, p, c,
                          curve.drawn == Drawn::intervals ? ":3:4" : "", with(curve.style, curve.drawn));
   }
-  if (plots.empty()) plots = "NaN notitle";  // an empty frame is better than none
+  if (plots.empty()) plots = "NaN notitle";  // draws an empty frame
   if (p == 0 && !figure.legend.empty()) {
     say(script, "set key noenhanced at screen 0.5,{:.5f} center top horizontal maxcols {} samplen 3.2 height 0 width 1",
         layout.screen_y(2.0), layout.columns);

@@ -7,7 +7,7 @@
 
 namespace abs_hil::report {
 
-/// A run that cannot be read. The message names file, line where there is one, what is wrong, and the fix.
+/// A run that cannot be read. The message gives the file, the line if known, the problem and the fix.
 class InputError : public std::runtime_error {
  public:
   explicit InputError(const std::string& message) : std::runtime_error(message) {}
@@ -15,7 +15,7 @@ class InputError : public std::runtime_error {
       : std::runtime_error(file.string() + ":" + std::to_string(line) + ": " + message) {}
 };
 
-/// Something that a report needs and this machine does not have, gnuplot say. The message names the fix.
+/// A required program that is missing on this computer, for example gnuplot. The message gives the fix.
 class UnavailableError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

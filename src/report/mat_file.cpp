@@ -8,7 +8,8 @@
 
 namespace abs_hil::report::mat {
 
-static_assert(std::endian::native == std::endian::little, "written as the machine has it, declared little-endian");
+static_assert(std::endian::native == std::endian::little,
+              "the file holds the processor's byte order, declared as little-endian");
 
 namespace {
 
@@ -16,7 +17,7 @@ enum Type : std::uint32_t { int8 = 1, uint16 = 4, int32 = 5, uint32 = 6, float64
 enum Class : std::uint32_t { cell = 1, structure = 2, characters = 4, doubles = 6 };
 
 constexpr std::size_t header_text_bytes = 116;
-constexpr std::size_t field_name_bytes = 64;  ///< with the zero at its end
+constexpr std::size_t field_name_bytes = 64;  ///< including the final zero
 
 template <typename Value>
 void append(std::string& bytes, Value value) {
@@ -25,7 +26,7 @@ void append(std::string& bytes, Value value) {
   bytes.append(raw.data(), raw.size());
 }
 
-/// Tag, data, and zeros up to a multiple of eight bytes.
+/// Appends tag, data, and zeros up to a multiple of eight bytes.
 void append_element(std::string& bytes, Type type, std::string_view data) {
   append(bytes, static_cast<std::uint32_t>(type));
   append(bytes, static_cast<std::uint32_t>(data.size()));
@@ -81,7 +82,7 @@ std::string text(std::string_view name, std::string_view value) {
   std::size_t count = 0;
   for (const char c : value) {
     const auto byte = static_cast<unsigned char>(c);
-    if (byte >= 0x80U && byte < 0xC0U) continue;  // the rest of a character of more than one byte
+    if (byte >= 0x80U && byte < 0xC0U) continue;  // a continuation byte of a multi-byte character
     append(data, static_cast<std::uint16_t>(byte < 0x80U ? byte : '?'));
     ++count;
   }
@@ -99,7 +100,7 @@ std::string texts(std::string_view name, const std::vector<std::string>& values)
 std::string structs(std::string_view name, const std::vector<std::string>& names,
                     const std::vector<std::string>& fields) {
   std::string bytes = beginning(structure, 1, names.empty() ? 0 : fields.size() / names.size(), name);
-  // The length of the names is a small data element: type and size share four bytes, the value takes the other four.
+  // The length of the names is a small data element: type and size share four bytes, and the value follows in four.
   append(bytes, static_cast<std::uint32_t>(4U << 16U | static_cast<std::uint32_t>(int32)));
   append(bytes, static_cast<std::int32_t>(field_name_bytes));
   std::string all_names;

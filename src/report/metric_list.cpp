@@ -23,14 +23,14 @@ constexpr std::array<Metric, 12> list{{
     {"slip_settling_s", "slip settled after / s", 3, &Metrics::slip_settling_s},
     {"slip_overshoot", "slip overshoot", 4, &Metrics::slip_overshoot},
     {"time_locked_s", "time locked / s", 3, &Metrics::time_locked_s},
-    {"torque_total_variation_Nm", "variation of torque asked for / (N m)", 1, &Metrics::torque_total_variation_Nm},
+    {"torque_total_variation_Nm", "variation of torque reference / (N m)", 1, &Metrics::torque_total_variation_Nm},
     {"theta_final_N", "estimate of θ at 3 m/s / N", 2, &Metrics::theta_final_N},
     {"theta_error_final", "relative error of θ at 3 m/s", 4, &Metrics::theta_error_final},
     {"theta_error_rms", "relative RMS error of θ", 4, &Metrics::theta_error_rms},
     {"theta_settling_s", "estimate of θ settled after / s", 3, &Metrics::theta_settling_s},
 }};
 
-/// Rounding of sums differs by less; a row that was lost makes more.
+/// Rounding differences stay below this; a missing row exceeds it.
 constexpr double tolerance = 1e-6;
 
 }  // namespace
@@ -55,9 +55,9 @@ std::vector<std::string> contradictions(const RunFiles& run, const RunSurvey& su
     const double computed = survey.metrics.*m.computed;
     if (!std::isfinite(said) || !std::isfinite(computed)) continue;
     if (std::abs(said - computed) <= tolerance * std::max(1.0, std::abs(said))) continue;
-    notes.push_back(
-        fmt::format("{}: the summary says {}, the CSV gives {}: rows are missing or they are not of one run", m.key,
-                    shown_significant(said, 6), shown_significant(computed, 6)));
+    notes.push_back(fmt::format(
+        "{}: the summary says {} but the CSV gives {}; rows are missing, or the files belong to different runs", m.key,
+        shown_significant(said, 6), shown_significant(computed, 6)));
   }
   return notes;
 }

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t most_open_rows = 12;
 
-/// No script, no image from elsewhere: nothing that a run's files could make the page do.
+/// Forbids scripts and external images, so that a run's files cannot inject active content.
 constexpr std::string_view policy = "default-src 'none'; style-src 'unsafe-inline'";
 
 constexpr std::string_view style = R"(
@@ -110,16 +110,16 @@ std::string report_page(const PageContents& contents) {
     if (picture.figure->id.starts_with("series")) continue;
     (picture.figure->id == "timing" ? timing : pictures) += picture_html(picture);
   }
-  body += section(runs.size() == 1 ? "Profile of the run" : "Courses of the runs", pictures);
+  body += section(runs.size() == 1 ? "Profile of the run" : "Profiles of the runs", pictures);
   const std::string differences = differences_table(runs);
   if (runs.size() > 1) {
     body +=
         section("Differences in configuration",
-                differences.empty() ? "<p>None that is known.</p>\n"
+                differences.empty() ? "<p>No differences are known.</p>\n"
                                     : folded("keys whose values differ", differences, runs.size() <= most_open_rows));
   }
   std::string real_time = timing + timing_table(runs);
-  if (real_time.empty()) real_time = "<p>No run was timed: virtual time, or no summary.</p>\n";
+  if (real_time.empty()) real_time = "<p>No timing is known: the runs were in virtual time or have no summary.</p>\n";
   body += section("Real time", real_time);
   body += section("Events", folded("events", events_table(runs, surveys), runs.size() <= most_open_rows));
   body += section("Environment", folded("machines and builds", environment_table(runs), false));

@@ -11,10 +11,10 @@
 
 namespace abs_hil::report {
 
-/// By which a file is known as a page of ours.
+/// Marks a file as a page of abs_report.
 inline constexpr std::string_view page_mark = "<meta name=\"generator\" content=\"abs_report";
 
-/// A figure and its picture, ready to stand in the page.
+/// A figure and its picture for the page.
 struct Picture {
   const Figure* figure;
   std::string svg;
@@ -31,14 +31,14 @@ struct PageContents {
   std::vector<std::string> study_names{};
 };
 
-/// A whole page around a body. @param body HTML
+/// A whole page around a body. @param body  HTML
 [[nodiscard]] std::string page_around(const std::string& title, const std::string& version, const std::string& body);
 [[nodiscard]] std::string picture_html(const Picture& picture);
 [[nodiscard]] std::string section(const std::string& heading, const std::string& html);
 
 /// The general report.
 [[nodiscard]] std::string report_page(const PageContents& contents);
-/// The paper's comparison: run 0 in the adaptive controller's place, run 1 in the sliding mode's.
+/// The paper's comparison page: run 0 is the adaptive controller, run 1 the sliding mode.
 [[nodiscard]] std::string paper_page(const PageContents& contents);
 
 }  // namespace abs_hil::report

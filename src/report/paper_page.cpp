@@ -15,10 +15,10 @@ namespace {
 
 /// The paper's claim: "approximately 6.7 % less time and distance".
 constexpr double claimed_per_cent = -6.7;
-/// From 6.2 to 7.4 s on its plots.
+/// The paper's plots show braking from 6.2 to 7.4 s.
 constexpr double plotted_stop_s = 1.2;
 
-/// Values of a metric: of the adaptive controller, of its baseline.
+/// Values of a metric: of the adaptive controller and of its baseline.
 class Pair {
  public:
   Pair(const PageContents& contents, std::string_view key) : metric_(metric(key)) {
@@ -49,7 +49,7 @@ struct Words {
   std::string ours;
 };
 
-/// What the paper says of each of its figures, in our words, and what these two runs say.
+/// For each of the paper's figures: a paraphrase of its statement, and the result of these two runs.
 std::map<std::string, Words> words(const PageContents& c) {
   const Pair time(c, "stop_time_s");
   const Pair distance(c, "stop_distance_m");
@@ -71,7 +71,7 @@ std::map<std::string, Words> words(const PageContents& c) {
                     rms[1], settled(settling, 0), settled(settling, 1))}},
       {"fig8",
        {"No chattering, which the sliding mode shows.",
-        fmt::format("{}: the torque asked for varies by {} N m and {} N m in all.",
+        fmt::format("{}: the torque references vary by {} N m and {} N m in total.",
                     holds_if(variation.known(), variation.less()), variation[0], variation[1])}},
       {"fig9",
        {"Estimates of both controllers; unreliable at the end of braking.",
@@ -106,13 +106,14 @@ std::string paper_page(const PageContents& contents) {
       html_escape(runs[1].label), html_escape(runs[0].text("plant").empty() ? "unknown" : runs[0].text("plant")),
       html_escape(runs[0].text("backend") == "sim" ? "simulated" : "backend " + runs[0].text("backend")));
   body +=
-      "<p>The counterparts of figures 5 to 10 of C. Acosta-Lúa, S. Di Gennaro and M. E. Sánchez-Morales, “An adaptive "
-      "controller applied to an anti-lock braking system laboratory”, in the paper’s order and colours. What the paper "
-      "says is paraphrased; none of its curves is traced.</p>\n<p>An exact reproduction is not possible: law and gains "
+      "<p>Counterparts of figures 5 to 10 of C. Acosta-Lúa, S. Di Gennaro and M. E. Sánchez-Morales, “An adaptive "
+      "controller applied to an anti-lock braking system laboratory”, in the paper’s order and colours. The paper’s "
+      "statements are paraphrased; none of its curves is traced.</p>\n<p>An exact reproduction is not possible: law "
+      "and gains "
       "of the paper’s sliding-mode controller are not public, Table 1 does not fit the 1.2 s of the plots (θ = 23 N "
       "gives "
-      "about 2.3 s whatever the controller), Q and k<sub>a1</sub> are not given, and one run of each controller says "
-      "nothing of chance. The project’s page docs/paper.md compares series of 200 runs.</p>\n";
+      "about 2.3 s for any controller), Q and k<sub>a1</sub> are not given, and one run of each controller shows no "
+      "statistics. The page docs/paper.md of the project compares series of 200 runs.</p>\n";
   body += section("The claim", claims_table(contents));
   const auto said = words(contents);
   std::string pictures;

@@ -31,9 +31,9 @@ PlantChangeFinder::PlantChangeFinder(const RunFiles& run) {
     const auto text = run.config.find(key);
     if (text == run.config.end()) continue;
     try {
-      courses_.push_back({.what = what, .profile = FactorProfile(text->second, key)});
+      profiles_.push_back({.what = what, .profile = FactorProfile(text->second, key)});
     } catch (const std::invalid_argument&) {
-      // Another version's or a hand's: the run is worth showing without its marks.
+      // The text was written by another version or by hand: show the run without these marks.
     }
   }
 }
@@ -42,7 +42,7 @@ void PlantChangeFinder::see(double time_s, bool braking, double road_speed_m_s) 
   if (std::exchange(started_, true)) rolled_m_ += 0.5 * (time_s - last_time_s_) * (last_speed_m_s_ + road_speed_m_s);
   last_time_s_ = time_s;
   last_speed_m_s_ = road_speed_m_s;
-  for (Profile& profile : courses_) {
+  for (Profile& profile : profiles_) {
     if (!profile.counting && (braking || !profile.profile.from_braking())) {
       profile.counting = true;
       if (profile.profile.from_braking()) {
@@ -65,7 +65,7 @@ void PlantChangeFinder::advance(Profile& profile, double time_s, double rolled_m
 
 std::vector<PlantChange> PlantChangeFinder::changes() const {
   std::vector<PlantChange> all;
-  for (const Profile& profile : courses_) all.insert(all.end(), profile.changes.begin(), profile.changes.end());
+  for (const Profile& profile : profiles_) all.insert(all.end(), profile.changes.begin(), profile.changes.end());
   return all;
 }
 

@@ -11,11 +11,11 @@ namespace abs_hil::report {
 namespace {
 
 constexpr std::size_t most_strips = 12;
-constexpr std::size_t most_bars = 60;  ///< of one run; more are no picture
+constexpr std::size_t most_bars = 60;  ///< per run; more would be unreadable
 constexpr double strip_px = 24.0;
 constexpr std::size_t short_name_characters = 8;
 
-/// One strip for each run: its phases, and marks where something unusual happened.
+/// One strip per run with its phases, and marks at unusual events.
 Panel phase_strips(const std::vector<RunFiles>& runs, const std::vector<RunSurvey>& surveys) {
   const std::size_t strips = std::min(runs.size(), most_strips);
   Panel panel{.y_label = "", .y_range = Range{0.0, static_cast<double>(strips)}};
@@ -50,7 +50,7 @@ Panel phase_strips(const std::vector<RunFiles>& runs, const std::vector<RunSurve
 }  // namespace
 
 Figure profile_figure(const std::vector<RunFiles>& runs, const std::vector<RunSurvey>& surveys,
-                      const std::vector<Courses>& profiles, const std::function<Style(std::size_t)>& style,
+                      const std::vector<Profiles>& profiles, const std::function<Style(std::size_t)>& style,
                       std::vector<LegendEntry> legend) {
   Figure figure;
   figure.id = "profile";
@@ -64,21 +64,21 @@ Figure profile_figure(const std::vector<RunFiles>& runs, const std::vector<RunSu
   Panel speeds{.y_label = "speed / (rad/s)", .height_px = 200.0};
   const Style upper{"#909090", "(3,3)", 1.0};
   for (std::size_t r = 0; r < runs.size(); ++r) {
-    if (!profiles[r].at("course_omega2").points.empty()) {
-      speeds.curves.push_back({r, "omega2", style(r), profiles[r].at("course_omega2").points, Drawn::line, {}});
+    if (!profiles[r].at("profile_omega2").points.empty()) {
+      speeds.curves.push_back({r, "omega2", style(r), profiles[r].at("profile_omega2").points, Drawn::line, {}});
     }
   }
-  if (runs.size() == 1 && !profiles[0].at("course_omega1").points.empty()) {
-    speeds.curves.push_back({0, "omega1", upper, profiles[0].at("course_omega1").points, Drawn::line, {}});
+  if (runs.size() == 1 && !profiles[0].at("profile_omega1").points.empty()) {
+    speeds.curves.push_back({0, "omega1", upper, profiles[0].at("profile_omega1").points, Drawn::line, {}});
     legend = {{"lower wheel ω₂ (the road)", style(0), Drawn::line}, {"upper wheel ω₁ (braked)", upper, Drawn::line}};
   }
   figure.legend = std::move(legend);
   figure.caption = runs.size() == 1 ? "(a) Speeds of both wheels. " : "(a) Speed of the lower wheel, the road. ";
   figure.caption += "(b) Phases of the run";
   if (runs.size() > 1) figure.caption += "s";
-  figure.caption += "; a triangle stands where something other than a change of phase happened.";
+  figure.caption += "; a triangle marks an event other than a change of phase.";
   if (runs.size() > most_strips) {
-    figure.caption += fmt::format(" The first {} of {} runs.", most_strips, runs.size());
+    figure.caption += fmt::format(" Only the first {} of {} runs are shown.", most_strips, runs.size());
   }
   figure.panels = {std::move(speeds), phase_strips(runs, surveys)};
   return figure;

@@ -12,11 +12,11 @@
 
 namespace abs_hil::report {
 
-using Courses = std::map<std::string, Profile>;
+using Profiles = std::map<std::string, Profile>;
 
-/// The runs from start to end: speeds of both wheels, below them each run's phases and events on a strip of its own.
+/// The whole runs: speeds of both wheels, and below them a strip per run with its phases and events.
 [[nodiscard]] Figure profile_figure(const std::vector<RunFiles>& runs, const std::vector<RunSurvey>& surveys,
-                                    const std::vector<Courses>& profiles,
+                                    const std::vector<Profiles>& profiles,
                                     const std::function<Style(std::size_t)>& style, std::vector<LegendEntry> legend);
 
 }  // namespace abs_hil::report

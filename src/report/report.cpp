@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Groups that a palette tells apart.
+/// Number of groups that the palette can distinguish.
 constexpr std::size_t most_group_styles = 7;
 constexpr std::size_t mark_bytes = 4096;
 
@@ -30,21 +30,21 @@ std::string read_file(const fs::path& path, std::size_t most) {
   return text;
 }
 
-/// The adaptive controller's run first, as the page of the paper has it.
+/// Puts the adaptive controller's run first, as the paper's page requires.
 void order_for_paper(std::vector<RunFiles>& runs, std::vector<std::string>& notes) {
   if (runs.size() != 2) {
-    throw InputError(fmt::format("--paper compares two runs, adaptive and sliding-mode; {} {} given", runs.size(),
-                                 runs.size() == 1 ? "was" : "were"));
+    throw InputError(fmt::format("--paper compares two runs, adaptive and sliding-mode; give two runs: {} {} given",
+                                 runs.size(), runs.size() == 1 ? "was" : "were"));
   }
   if (runs[1].text("controller") == "adaptive" && runs[0].text("controller") != "adaptive") std::swap(runs[0], runs[1]);
   for (std::size_t r = 0; r < 2; ++r) {
     const std::string controller = runs[r].text("controller");
     const std::string wanted = r == 0 ? "adaptive" : "sliding-mode";
     if (controller == wanted) continue;
-    notes.push_back(fmt::format("{} stands in the place of {}; its controller is {}", runs[r].name, wanted,
+    notes.push_back(fmt::format("{} is shown as {}, but its controller is {}", runs[r].name, wanted,
                                 controller.empty() ? "not known" : controller));
   }
-  if (runs[0].text("plant") != runs[1].text("plant")) notes.emplace_back("the two runs are not of one plant");
+  if (runs[0].text("plant") != runs[1].text("plant")) notes.emplace_back("the two runs have different plants");
 }
 
 std::string title_of(const ReportOptions& options, const std::vector<RunFiles>& runs,
@@ -58,7 +58,7 @@ std::string title_of(const ReportOptions& options, const std::vector<RunFiles>& 
   return title;
 }
 
-/// Runs of one series by what was varied, if a palette has colours enough.
+/// Gives runs of one series of runs a style for each varied value, if the palette has enough colours.
 void group_styles(const std::vector<SeriesStudy>& studies, std::size_t runs, RunFigureOptions& options) {
   if (studies.size() != 1 || studies[0].groups.size() > most_group_styles) return;
   std::vector<std::size_t> groups(runs, most_group_styles);
@@ -68,7 +68,7 @@ void group_styles(const std::vector<SeriesStudy>& studies, std::size_t runs, Run
   }
   for (const std::size_t group : groups) {
     if (group == most_group_styles) {
-      options.group_labels.clear();  // other runs stand beside the series
+      options.group_labels.clear();  // there are also runs outside the series
       return;
     }
   }
@@ -141,7 +141,7 @@ void check_replaceable(const fs::path& path, bool replace) {
   if (replace || !fs::exists(path, ignored)) return;
   if (read_file(path, mark_bytes).find(page_mark) != std::string::npos) return;
   throw InputError(
-      fmt::format("\"{}\" exists and is no report of abs_report; give another --output, or --force to "
+      fmt::format("\"{}\" exists and is not a report of abs_report; give another --output, or --force to "
                   "replace it",
                   path.string()));
 }

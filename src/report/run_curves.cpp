@@ -17,7 +17,7 @@ struct Collector {
   std::size_t column;
   std::size_t minus;
   bool subtracts;
-  Decimation envelope;
+  Decimation decimation;
   Range relevant{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
 };
 
@@ -43,15 +43,15 @@ std::map<std::string, Profile> read_curves(const RunFiles& run, const RunSurvey&
       double value = csv.values()[c.column];
       if (c.subtracts) value -= csv.values()[c.minus];
       if (c.request->braking_only && !braking) value = unknown;
-      c.envelope.add(time_s - c.request->window.zero_s, value);
+      c.decimation.add(time_s - c.request->window.zero_s, value);
       if (relevant && std::isfinite(value)) {
         c.relevant = {std::min(c.relevant.first, value), std::max(c.relevant.second, value)};
       }
     }
   }
-  std::map<std::string, Profile> profiles;
-  for (const Collector& c : collectors) profiles[c.request->name] = {c.envelope.points(), c.relevant};
-  return profiles;
+  std::map<std::string, Profile> curves;
+  for (const Collector& c : collectors) curves[c.request->name] = {c.decimation.points(), c.relevant};
+  return curves;
 }
 
 }  // namespace abs_hil::report

@@ -11,31 +11,31 @@
 
 namespace abs_hil::report {
 
-/// Part of the time axis that the figures show, and where its zero is.
+/// The part of the time axis that the figures show, and the position of its zero.
 struct Window {
-  double from_s{0.0};  ///< of the run's own time
+  double from_s{0.0};  ///< in the run's own time
   double to_s{0.0};
-  double zero_s{0.0};  ///< run time that is zero on the axis
+  double zero_s{0.0};  ///< run time of the axis' zero
 };
 
-/// A quantity of the rows: a column, or one less another.
+/// A requested quantity: a column, or the difference of two.
 struct Request {
-  std::string name{};    ///< under which the curve is found
-  std::string column{};  ///< of the CSV
-  std::string minus{};   ///< column to be subtracted; empty for none
+  std::string name{};    ///< name of the curve
+  std::string column{};  ///< column of the CSV
+  std::string minus{};   ///< column to subtract; empty: none
   bool braking_only{false};
   Window window{};
 };
 
-/// A request answered.
+/// The curve of a request.
 struct Profile {
   std::vector<Point> points{};
-  /// Least and greatest value while the car brakes faster than 3 m/s, where figures of slip mean something; low > high
-  /// where there is none.
+  /// Smallest and largest value while the car brakes above 3 m/s, where slip is meaningful; low > high if there is
+  /// none.
   Range relevant{1.0, 0.0};
 };
 
-/// Reads the rows once and thins every wanted curve to at most about `most_stretches` stretches (Decimation). Throws
+/// Reads the rows once and thins every requested curve to about `most_stretches` stretches (Decimation). Throws
 /// InputError.
 [[nodiscard]] std::map<std::string, Profile> read_curves(const RunFiles& run, const RunSurvey& survey,
                                                          const std::vector<Request>& requests,

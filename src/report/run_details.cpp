@@ -16,13 +16,13 @@ namespace abs_hil::report {
 
 namespace {
 
-/// Side files are small; a larger one is something else, and reading it whole would take all memory.
+/// Side files are small. A larger file is not one, and must not fill the memory.
 constexpr std::uintmax_t most_bytes = 64U << 20U;
-/// The greatest bin of a histogram that is believed, 10 s: more would take memory for nothing.
+/// Largest accepted bin of a histogram, 10 s; larger ones would waste memory.
 constexpr std::uint64_t most_us = 10'000'000;
 constexpr std::size_t event_fields = 5;
 
-/// The summary has 23.0 where config.toml has 23: here both are 23, so that they compare.
+/// The summary has 23.0 where config.toml has 23: both become 23, so that they compare equal.
 std::string number_text(double value) { return fmt::format("{}", value); }
 
 void flatten(const nlohmann::ordered_json& json, const std::string& prefix, std::map<std::string, std::string>& flat) {
@@ -57,7 +57,7 @@ void flatten(const toml::table& table, const std::string& prefix, std::map<std::
   }
 }
 
-/// Fields of a CSV line; in double quotes they may hold commas, and "" stands for ".
+/// Fields of a CSV line. A field in double quotes may contain commas, and "" stands for ".
 std::vector<std::string> fields_of(const std::string& line) {
   std::vector<std::string> fields(1);
   bool quoted = false;
@@ -96,10 +96,10 @@ std::string read_text(const std::filesystem::path& path) {
 nlohmann::ordered_json read_json(const std::filesystem::path& path) {
   try {
     auto json = nlohmann::ordered_json::parse(read_text(path));
-    if (!json.is_object()) throw InputError(path, 1, "an object is expected");
+    if (!json.is_object()) throw InputError(path, 1, "the file must contain a JSON object");
     return json;
   } catch (const nlohmann::ordered_json::exception& error) {
-    throw InputError(fmt::format("{}: no valid JSON: {}", path.string(), clean_text(error.what())));
+    throw InputError(fmt::format("{}: not valid JSON: {}", path.string(), clean_text(error.what())));
   }
 }
 
@@ -128,7 +128,7 @@ std::vector<RunEvent> read_events(const std::filesystem::path& path) {
   }
   std::vector<RunEvent> events;
   for (std::size_t number = 2; std::getline(lines, line); ++number) {
-    const bool cut_off = lines.eof();  // no line end: what a crash leaves behind
+    const bool cut_off = lines.eof();  // a line without line end is the trace of a crash
     const std::vector<std::string> fields = fields_of(line);
     RunEvent event;
     const bool complete = fields.size() >= event_fields;
@@ -136,7 +136,7 @@ std::vector<RunEvent> read_events(const std::filesystem::path& path) {
     const auto parsed = std::from_chars(begin, begin + fields[0].size(), event.time_s);
     if (!complete || parsed.ec != std::errc{} || parsed.ptr != begin + fields[0].size()) {
       if (cut_off) break;
-      throw InputError(path, number, fmt::format("no event: \"{}\"", clean_text(line, 60)));
+      throw InputError(path, number, fmt::format("not an event: \"{}\"", clean_text(line, 60)));
     }
     event.event = clean_text(fields[1], 40);
     event.phase = clean_text(fields[2], 40);
@@ -153,7 +153,7 @@ TimingHistogram read_histogram(const std::filesystem::path& path) {
   std::string line;
   for (std::size_t number = 1; std::getline(lines, line); ++number) {
     if (number == 1 && !line.starts_with("# abs_hil, us;")) {
-      throw InputError(path, 1, "this is no histogram of abs_hil: it must begin with \"# abs_hil, us;\"");
+      throw InputError(path, 1, "not a histogram of abs_hil: the file must begin with \"# abs_hil, us;\"");
     }
     constexpr std::string_view overflow_title = "# Histogram Overflows:";
     const bool overflow = line.starts_with(overflow_title);
@@ -164,7 +164,7 @@ TimingHistogram read_histogram(const std::filesystem::path& path) {
     std::array<std::uint64_t, TimingHistogram::parts.size()> counts{};
     for (std::uint64_t& count : counts) fields >> count;
     if (!fields || bin_us > most_us) {
-      throw InputError(path, number, fmt::format("no line of a histogram: \"{}\"", clean_text(line, 60)));
+      throw InputError(path, number, fmt::format("not a line of a histogram: \"{}\"", clean_text(line, 60)));
     }
     for (std::size_t part = 0; part < counts.size(); ++part) {
       if (overflow) {

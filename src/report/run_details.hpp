@@ -8,12 +8,13 @@
 
 #include "report/run_files.hpp"
 
-/// The files beside a run's CSV, each read whole: they are small. All throw InputError for a file that cannot be read.
+/// Readers of the files beside a run's CSV. They read whole files, which are small, and throw InputError for a file
+/// that cannot be read.
 namespace abs_hil::report {
 
 [[nodiscard]] std::string read_text(const std::filesystem::path& path);
 [[nodiscard]] nlohmann::ordered_json read_json(const std::filesystem::path& path);
-/// Keys dotted, values as text. @param json an object
+/// Values as text under dotted keys. @param json  an object
 [[nodiscard]] std::map<std::string, std::string> flattened(const nlohmann::ordered_json& json);
 [[nodiscard]] std::map<std::string, std::string> read_toml(const std::filesystem::path& path);
 [[nodiscard]] std::vector<RunEvent> read_events(const std::filesystem::path& path);

@@ -19,11 +19,11 @@ namespace {
 
 constexpr double before_brake_s = 0.2;
 constexpr double after_brake_s = 0.2;
-/// Points of a curve are no use beyond two a pixel; of many curves even fewer are seen.
+/// More than two points per pixel are invisible; with many curves fewer are enough.
 constexpr std::size_t most_stretches = 1400;
 constexpr std::size_t stretches_of_all_runs = 9000;
 constexpr std::size_t least_stretches = 80;
-/// More names than that are no legend.
+/// More entries would make the legend unreadable.
 constexpr std::size_t most_legend_entries = 12;
 constexpr double double_panel_px = 165.0;
 
@@ -47,7 +47,7 @@ Window window_of(const RunSurvey& survey, const WindowChoice& choice, bool braki
   return {survey.from_s, survey.to_s, 0.0};
 }
 
-/// The simulator's truth where the run knows it, else what the controller estimated.
+/// The simulator's truth if the run has it, else the controller's estimate.
 std::string best_of(const RunSurvey& survey, const std::string& truth, const std::string& estimate) {
   return survey.knows(truth) ? truth : estimate;
 }
@@ -58,8 +58,8 @@ std::vector<Request> requests_for(const RunSurvey& survey, const Window& window)
   const std::string slip = best_of(survey, "slip", "slip_est");
   const std::string torque = best_of(survey, "brake_torque_Nm", "brake_torque_est_Nm");
   return {
-      {"course_omega1", best_of(survey, "omega1_rad_s", "omega1_est_rad_s"), "", false, whole},
-      {"course_omega2", best_of(survey, "omega2_rad_s", "omega2_est_rad_s"), "", false, whole},
+      {"profile_omega1", best_of(survey, "omega1_rad_s", "omega1_est_rad_s"), "", false, whole},
+      {"profile_omega2", best_of(survey, "omega2_rad_s", "omega2_est_rad_s"), "", false, whole},
       {"omega1", best_of(survey, "omega1_rad_s", "omega1_est_rad_s"), "", false, window},
       {"omega1_est", "omega1_est_rad_s", "", false, window},
       {"omega2", best_of(survey, "omega2_rad_s", "omega2_est_rad_s"), "", false, window},
@@ -76,7 +76,7 @@ std::vector<Request> requests_for(const RunSurvey& survey, const Window& window)
   };
 }
 
-/// All that the figures are made of.
+/// Makes the figures.
 class FigureMaker {
  public:
   FigureMaker(const std::vector<RunFiles>& runs, const std::vector<RunSurvey>& surveys, const RunFigureOptions& options)
@@ -87,7 +87,7 @@ class FigureMaker {
     for (std::size_t r = 0; r < runs.size(); ++r) {
       const Window window = window_of(surveys[r], options.window, braking);
       windows_.push_back(window);
-      courses_.push_back(
+      profiles_.push_back(
           read_curves(runs[r], surveys[r], requests_for(surveys[r], window), stretches_for(runs.size())));
       x.first = std::min(x.first, window.from_s - window.zero_s);
       x.second = std::max(x.second, window.to_s - window.zero_s);
@@ -99,7 +99,7 @@ class FigureMaker {
   [[nodiscard]] std::vector<Figure> figures() const {
     std::vector<Figure> figures;
     figures.push_back(profile_figure(
-        runs_, surveys_, courses_, [this](std::size_t r) { return style(r); }, legend()));
+        runs_, surveys_, profiles_, [this](std::size_t r) { return style(r); }, legend()));
     figures.push_back(speed_figure("fig5", "Figure 5. Upper wheel speed", "omega1", 1));
     figures.push_back(speed_figure("fig6", "Figure 6. Lower wheel speed", "omega2", 2));
     figures.push_back(slip_figure());
@@ -133,7 +133,7 @@ class FigureMaker {
     return entries;
   }
 
-  /// Phases of the first run as background; faults, and changes of the simulated rig, of all runs as lines.
+  /// Shades the phases of the first run, and marks faults and changes of the simulated rig of all runs by lines.
   void add_phases() {
     for (const PhaseInterval& phase : surveys_.front().phases) {
       if (shades_.size() == most_shades) break;
@@ -154,7 +154,7 @@ class FigureMaker {
     }
   }
 
-  /// Runs of one experiment change alike.
+  /// Adds a mark once: runs of one experiment change alike.
   void mark_once(Mark mark) {
     constexpr double same_s = 1e-6;
     const bool known = std::any_of(marks_.begin(), marks_.end(), [&](const Mark& other) {
@@ -177,20 +177,20 @@ class FigureMaker {
   }
 
   void add_curve(Panel& panel, std::size_t run, const std::string& quantity, const Style& curve_style) const {
-    const auto found = courses_[run].find(quantity);
-    if (found == courses_[run].end() || found->second.points.empty()) return;
+    const auto found = profiles_[run].find(quantity);
+    if (found == profiles_[run].end() || found->second.points.empty()) return;
     panel.curves.push_back({run, quantity, curve_style, found->second.points, Drawn::line, {}});
   }
   void add_all(Panel& panel, const std::string& quantity) const {
     for (std::size_t r = 0; r < runs_.size(); ++r) add_curve(panel, r, quantity, style(r));
   }
 
-  /// A quantity that is mostly the same in all runs, as a thin dotted line; each different one once.
+  /// Draws a quantity that most runs share as a thin dotted line, each different curve once.
   void add_reference(Panel& panel, const std::string& quantity) const {
     std::vector<std::vector<double>> drawn;
     for (std::size_t r = 0; r < runs_.size(); ++r) {
       std::vector<double> values;
-      for (const Point& point : courses_[r].at(quantity).points) {
+      for (const Point& point : profiles_[r].at(quantity).points) {
         if (values.empty() || point.y != values.back()) values.push_back(point.y);
       }
       if (std::find(drawn.begin(), drawn.end(), values) != drawn.end()) continue;
@@ -199,13 +199,13 @@ class FigureMaker {
     }
   }
 
-  /// The y axis shows what happens above 3 m/s; towards standstill slip and its estimates run away.
+  /// Range of y above 3 m/s; towards standstill slip and its estimates diverge.
   [[nodiscard]] std::optional<Range> relevant(const std::vector<std::string>& quantities, Range least) const {
     Range range = least;
     bool any = false;
-    for (const auto& profiles : courses_) {
+    for (const auto& run_profiles : profiles_) {
       for (const std::string& quantity : quantities) {
-        const Range r = profiles.at(quantity).relevant;
+        const Range r = run_profiles.at(quantity).relevant;
         if (r.first > r.second) continue;
         range = {std::min(range.first, r.first), std::max(range.second, r.second)};
         any = true;
@@ -220,7 +220,7 @@ class FigureMaker {
     return std::all_of(surveys_.begin(), surveys_.end(), [&](const RunSurvey& s) { return s.knows(column); });
   }
   [[nodiscard]] std::string estimated_note(const std::string& column) const {
-    return truth_everywhere(column) ? "" : " Estimated from the encoders where a run knows no truth.";
+    return truth_everywhere(column) ? "" : " Runs without true values show estimates from the encoders.";
   }
 
   [[nodiscard]] Figure speed_figure(const std::string& id, const std::string& heading, const std::string& quantity,
@@ -232,7 +232,8 @@ class FigureMaker {
     }
     Panel panel{.y_label = fmt::format("{{/:Italic ω}}_{} / (rad/s)", wheel), .height_px = 240.0};
     if (runs_.size() == 1 && truth_everywhere(fmt::format("omega{}_rad_s", wheel))) {
-      add_curve(panel, 0, quantity + "_est", second_style());  // on top: dashed, so that the other shows through
+      add_curve(panel, 0, quantity + "_est",
+                second_style());  // drawn on top and dashed, so that the other curve stays visible
       figure.legend = {{"wheel", style(0), Drawn::line}, {"estimate", second_style(), Drawn::line}};
     }
     add_all(panel, quantity);
@@ -242,8 +243,8 @@ class FigureMaker {
 
   [[nodiscard]] Figure slip_figure() const {
     Figure figure = begin("fig7", "Figure 7. Wheel slip and tracking error",
-                          "(a) slip and its reference (dotted), (b) slip less reference. The axes cover what happens "
-                          "above 3 m/s; slip runs away towards standstill." +
+                          "(a) slip and its reference (dotted), (b) slip minus reference. The axes cover the range "
+                          "above 3 m/s; slip diverges towards standstill." +
                               estimated_note("slip"));
     Panel slip{.y_label = "slip {/:Italic λ}", .y_range = relevant({"slip", "slip_ref"}, {0.0, 0.2})};
     add_all(slip, "slip");
@@ -257,11 +258,10 @@ class FigureMaker {
   }
 
   [[nodiscard]] Figure torque_figure() const {
-    Figure figure =
-        begin("fig8", "Figure 8. Brake torque",
-              "(a) the torque that the controller asks for, (b) the torque that acts behind the brake's lag." +
-                  estimated_note("brake_torque_Nm"));
-    Panel asked{.y_label = "asked for / (N m)"};
+    Figure figure = begin("fig8", "Figure 8. Brake torque",
+                          "(a) the controller's torque reference, (b) the torque that acts behind the brake's lag." +
+                              estimated_note("brake_torque_Nm"));
+    Panel asked{.y_label = "reference / (N m)"};
     add_all(asked, "torque_ref");
     Panel acting{.y_label = "acting / (N m)"};
     add_all(acting, "torque");
@@ -272,14 +272,15 @@ class FigureMaker {
 
   [[nodiscard]] Figure theta_figure() const {
     const bool truth = std::any_of(surveys_.begin(), surveys_.end(), [](const auto& s) { return s.knows("theta_N"); });
-    Figure figure = begin("fig9", "Figure 9. Estimate of the friction parameter θ",
-                          truth ? "(a) estimate, and the plant's θ (dotted), (b) θ less its estimate. The axes cover "
-                                  "what happens above 3 m/s."
-                                : "Estimate alone: these runs know no true θ, so there is no error to show.");
+    Figure figure =
+        begin("fig9", "Figure 9. Estimate of the friction parameter θ",
+              truth ? "(a) estimate, and the plant's θ (dotted), (b) θ minus its estimate. The axes cover the "
+                      "range above 3 m/s."
+                    : "Estimate only: these runs have no true θ, so the error is unknown.");
     Panel theta{.y_label = "{/:Italic θ} / N", .y_range = relevant({"theta_est", "theta"}, {0.0, 1.0})};
     add_all(theta, "theta_est");
     if (std::all_of(surveys_.begin(), surveys_.end(), [](const auto& s) { return !s.knows("theta_est_N"); })) {
-      figure.caption += " None of these runs' controllers estimates θ.";
+      figure.caption += " No controller of these runs estimates θ.";
     }
     theta.height_px = truth ? double_panel_px : 240.0;
     if (!truth) {
@@ -296,7 +297,7 @@ class FigureMaker {
   }
 
   [[nodiscard]] Figure distance_figure() const {
-    Figure figure = begin("fig10", "Figure 10. Braking distance", "Way of the car since the start of braking.");
+    Figure figure = begin("fig10", "Figure 10. Braking distance", "Distance of the car since the start of braking.");
     Panel panel{.y_label = "distance / m", .height_px = 240.0};
     add_all(panel, "distance");
     figure.panels.push_back(std::move(panel));
@@ -311,7 +312,7 @@ class FigureMaker {
   const std::vector<RunSurvey>& surveys_;
   const RunFigureOptions& options_;
   std::vector<Window> windows_;
-  std::vector<Courses> courses_;
+  std::vector<Profiles> profiles_;
   std::string x_label_;
   Range x_range_;
   std::vector<Shade> shades_;

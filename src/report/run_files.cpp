@@ -29,7 +29,7 @@ bool is_folder(const fs::path& path) {
   return fs::is_directory(path, ignored);
 }
 
-/// The last part of a path, also where it ends in a slash or is ".".
+/// The last part of a path, also if it ends in a slash or is ".".
 std::string base_name(const fs::path& path) {
   std::error_code ignored;
   fs::path whole = fs::absolute(path, ignored).lexically_normal();
@@ -41,7 +41,7 @@ std::string as_text(const nlohmann::ordered_json& value) {
   return value.is_string() ? clean_text(value.get<std::string>()) : std::string();
 }
 
-/// A side file is nice to have: that one is broken must not hide the run, only be said.
+/// Reads an optional side file. A broken one becomes a note, so that the run is still shown.
 template <typename Read>
 void read_if_there(RunFiles& run, const fs::path& path, std::string_view what, const Read& read) {
   if (!is_there(path)) {
@@ -51,23 +51,23 @@ void read_if_there(RunFiles& run, const fs::path& path, std::string_view what, c
   try {
     read();
   } catch (const InputError& error) {
-    run.notes.push_back(fmt::format("left out, {}", clean_text(error.what(), 400)));
+    run.notes.push_back(fmt::format("not used: {}", clean_text(error.what(), 400)));
   }
 }
 
 void read_folder(RunFiles& run) {
   const fs::path& folder = run.folder;
-  read_if_there(run, folder / "summary.json", "figures are computed from the CSV, names and result are not known",
+  read_if_there(run, folder / "summary.json", "metrics are computed from the CSV; names and result are unknown",
                 [&] { run.summary = read_json(folder / "summary.json"); });
   if (run.summary.contains("config") && run.summary["config"].is_object()) {
     run.config = flattened(run.summary["config"]);
   } else {
-    read_if_there(run, folder / "config.toml", "the configuration is not known",
+    read_if_there(run, folder / "config.toml", "the configuration is unknown",
                   [&] { run.config = read_toml(folder / "config.toml"); });
   }
-  read_if_there(run, folder / "environment.json", "kernel, build and board are not known",
+  read_if_there(run, folder / "environment.json", "kernel, build and board are unknown",
                 [&] { run.environment = flattened(read_json(folder / "environment.json")); });
-  read_if_there(run, folder / "events.csv", "events are the changes of phase in the CSV, without reasons",
+  read_if_there(run, folder / "events.csv", "events are the phase changes in the CSV, without reasons",
                 [&] { run.events = read_events(folder / "events.csv"); });
   const bool virtual_time = run.summary.value("virtual_time", nlohmann::ordered_json(false)) == true;
   if (!virtual_time) {
@@ -86,8 +86,8 @@ RunFiles load_run(const fs::path& path) {
   } else {
     run.csv = path;
     run.notes.emplace_back(
-        "a CSV file alone: no configuration, reasons or timing; figures are computed from it with the paper's radius "
-        "and end speed");
+        "only a CSV file: configuration, reasons and timing are unknown; metrics are computed from it with the paper's "
+        "radius and end speed");
   }
   return run;
 }
@@ -96,7 +96,7 @@ std::vector<fs::path> run_folders_of(const fs::path& series) {
   std::vector<fs::path> folders;
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(series, error)) {
-    std::error_code ignored;  // a link that leads nowhere is no run
+    std::error_code ignored;  // a dangling link is not a run
     if (entry.is_directory(ignored) && entry.path().filename().string().starts_with("run-")) {
       folders.push_back(entry.path());
     }
@@ -110,15 +110,15 @@ void load_series(const fs::path& path, FoundRuns& found) {
   Series series{base_name(path), {}};
   for (const fs::path& folder : run_folders_of(path)) {
     if (!is_there(folder / "run.csv") || !is_there(folder / "summary.json")) {
-      found.notes.push_back(fmt::format("{} has not finished: left out", clean_text(folder.string())));
+      found.notes.push_back(fmt::format("{} is not complete and is left out", clean_text(folder.string())));
       continue;
     }
     series.runs.push_back(found.runs.size());
     found.runs.push_back(load_run(folder));
   }
   if (series.runs.empty()) {
-    throw InputError(
-        fmt::format("\"{}\": no finished run in this series (run-0001/ with run.csv and summary.json)", path.string()));
+    throw InputError(fmt::format(
+        "\"{}\": this series folder has no complete run (as run-0001/ with run.csv and summary.json)", path.string()));
   }
   found.series.push_back(std::move(series));
 }
@@ -126,7 +126,7 @@ void load_series(const fs::path& path, FoundRuns& found) {
 void load(const fs::path& path, FoundRuns& found) {
   if (!is_there(path)) {
     throw InputError(
-        fmt::format("\"{}\" does not exist; give a run's folder or CSV file, or a series' folder", path.string()));
+        fmt::format("\"{}\" does not exist; give a run folder, a run's CSV file or a series folder", path.string()));
   }
   if (!is_folder(path) || is_there(path / "run.csv")) {
     found.runs.push_back(load_run(path));
@@ -134,7 +134,7 @@ void load(const fs::path& path, FoundRuns& found) {
     load_series(path, found);
   } else {
     throw InputError(
-        fmt::format("\"{}\" is neither a run's folder (no run.csv in it) nor a series' (no series.json, no run-0001/)",
+        fmt::format("\"{}\" is neither a run folder (no run.csv) nor a series folder (no series.json, no run-0001/)",
                     path.string()));
   }
 }

@@ -13,11 +13,11 @@ namespace abs_hil::report {
 
 namespace {
 
-/// The paper's, for runs without a configuration.
+/// The paper's radius, for runs without a configuration.
 constexpr double paper_r2_m = rig::WheelParameters{}.r2_m;
 constexpr double default_end_speed_m_s = 0.3;
 
-/// Turns rows back into the records that they were written from, as far as metrics need them.
+/// Restores records from rows, as far as the metrics need them.
 class RecordMaker {
  public:
   explicit RecordMaker(const CsvReader& csv) {
@@ -90,8 +90,8 @@ RunSurvey survey(const RunFiles& run) {
   }
   if (survey.rows == 0) {
     throw InputError(run.csv, csv.truncated() ? 2 : 1,
-                     csv.truncated() ? "the only row is cut off: nothing of this run was recorded"
-                                     : "no rows after the header: nothing of this run was recorded");
+                     csv.truncated() ? "the only row is incomplete: the file holds no data of the run"
+                                     : "no rows after the header: the file holds no data of the run");
   }
   for (std::size_t i = 0; i < known.size(); ++i) {
     if (known[i]) survey.known_columns.push_back(csv.columns()[i]);

@@ -16,7 +16,7 @@ namespace abs_hil::report {
 
 namespace {
 
-/// More runs than that stand below each other, not beside each other.
+/// With more runs than this, runs become rows instead of columns.
 constexpr std::size_t most_columns = 5;
 constexpr std::size_t most_events = 200;
 
@@ -32,7 +32,7 @@ std::string arranged(const Table& table, std::size_t runs) {
 
 std::string text_or_dash(const std::string& text) { return text.empty() ? "–" : text; }
 
-/// Change of the second of two runs against the first, in per cent; as a factor where it is a large one.
+/// Change from the first to the second run, in per cent; a large change as a factor.
 std::string change(double first, double second) {
   constexpr double large = 3.0;
   if (!std::isfinite(first) || !std::isfinite(second) || first == 0.0) return "–";
@@ -45,7 +45,7 @@ std::string count_of(const RunFiles& run, const std::string& key) {
   return std::isfinite(count) ? fmt::format("{:.0f}", count) : "–";
 }
 
-/// Changes of phase where the run folder has no events.
+/// Changes of phase, for a run folder without events.
 std::vector<RunEvent> events_of(const RunFiles& run, const RunSurvey& survey) {
   if (!run.events.empty()) return run.events;
   std::vector<RunEvent> events;
@@ -62,8 +62,8 @@ std::vector<RunEvent> events_of(const RunFiles& run, const RunSurvey& survey) {
 std::string metrics_table(const std::vector<RunFiles>& runs, const std::vector<RunSurvey>& surveys) {
   Table table{"metrics", header_of(runs), {}, true};
   const bool pair = runs.size() == 2;
-  std::string shared;  // what many runs have in common is said once
-  if (pair) table.header.emplace_back("second against first");
+  std::string shared;  // values that all of many runs share are shown once
+  if (pair) table.header.emplace_back("second relative to first");
   for (const auto& [key, name] : std::array<std::pair<const char*, const char*>, 6>{{{"result", "result"},
                                                                                      {"reason", "reason"},
                                                                                      {"experiment", "experiment"},
@@ -133,7 +133,7 @@ std::string timing_table(const std::vector<RunFiles>& runs) {
   add("cycles", "cycles");
   add("late cycles", "overruns");
   add("late at start-up", "overruns_startup");
-  add("most late in a row", "overruns_longest_run");
+  add("longest run of late cycles", "overruns_longest_run");
   add("ticks missed", "ticks_missed");
   add("records lost", "telemetry_drops");
   std::vector<std::string> realtime{"real time obtained"};
@@ -199,7 +199,7 @@ std::vector<std::string> all_notes(const std::vector<RunFiles>& runs, const std:
   for (std::size_t r = 0; r < runs.size(); ++r) {
     const auto add = [&](const std::string& note) { notes.push_back(runs[r].name + ": " + note); };
     for (const std::string& note : runs[r].notes) add(note);
-    if (surveys[r].truncated) add("the last row of the CSV is cut off, as after a crash; it is left out");
+    if (surveys[r].truncated) add("the last row of the CSV is incomplete, as after a crash, and is left out");
     for (const std::string& note : contradictions(runs[r], surveys[r])) add(note);
   }
   return notes;

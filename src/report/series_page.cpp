@@ -57,7 +57,7 @@ std::vector<double> values_of(const Metric& m, const SeriesGroup& group, const s
   return values;
 }
 
-/// Places of the groups on the x axis: their values, if these are numbers and tell them apart, else 1, 2, 3, ...
+/// Positions of the groups on the x axis: their values, if these are different numbers, else 1, 2, 3, ...
 std::vector<double> places_of(const SeriesStudy& study) {
   std::vector<double> places;
   places.reserve(study.groups.size());
@@ -77,7 +77,7 @@ SeriesStudy study(const Series& series, const std::vector<RunFiles>& runs) {
   own.reserve(series.runs.size());
   for (const std::size_t r : series.runs) own.push_back(runs[r]);
   for (const std::string& key : differing_keys(own)) {
-    if (key != "run.seed") study.keys.push_back(key);  // the seed makes runs differ; it is not what is studied
+    if (key != "run.seed") study.keys.push_back(key);  // the seed varies too, but is not the studied quantity
   }
   std::map<std::vector<std::string>, std::size_t> known;
   for (const std::size_t r : series.runs) {
@@ -101,7 +101,7 @@ std::string series_table(const SeriesStudy& study, const std::vector<RunFiles>& 
                          const std::vector<RunSurvey>& surveys) {
   std::string varied;
   for (const std::string& key : study.keys) varied += (varied.empty() ? "" : ", ") + key;
-  Table table{"series", {"figure", varied.empty() ? "nothing varied but the seed" : varied}, {}, true};
+  Table table{"series", {"figure", varied.empty() ? "only the seed varies" : varied}, {}, true};
   for (const char* column : {"runs", "mean", "standard deviation", "95 % interval of the mean"}) {
     table.header.emplace_back(column);
   }
@@ -123,10 +123,10 @@ Figure series_figure(const std::string& id, const SeriesStudy& study, const std:
                      const std::vector<RunSurvey>& surveys) {
   Figure figure;
   figure.id = id;
-  figure.heading = "Figures of merit over what was varied";
+  figure.heading = "Figures of merit over the varied keys";
   const std::vector<double> places = places_of(study);
   const bool by_value = study.groups.size() > 1 && study.keys.size() == 1 && study.groups.front().value;
-  // A key of the configuration: letters, digits, dots and underscores, which enhanced text would set low.
+  // Configuration keys contain dots and underscores; enhanced text would set subscripts.
   std::string key = by_value ? study.keys.front() : "group";
   for (std::size_t at = key.find('_'); at != std::string::npos; at = key.find('_', at + 2)) key.insert(at, "\\");
   figure.x_label = key;

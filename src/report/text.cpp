@@ -16,7 +16,7 @@ constexpr std::string_view minus = "\u2212";
 
 bool is_continuation(char c) { return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U; }
 
-/// Bytes of the character that `text` begins with; 0 if they are none (RFC 3629, section 4).
+/// Number of bytes of the first character of `text`; 0 if it is invalid (RFC 3629, section 4).
 std::size_t character_bytes(std::string_view text) {
   const auto first = static_cast<unsigned char>(text[0]);
   std::size_t size = 0;
@@ -41,7 +41,7 @@ std::size_t character_bytes(std::string_view text) {
   return code < least || surrogate || code > 0x10FFFFU ? 0 : size;
 }
 
-/// C0, DEL, C1, and the marks that turn the direction of writing, which can make text look like other text.
+/// C0, DEL, C1, and marks that change the direction of writing, which can disguise text.
 bool is_control(std::string_view character) {
   const auto first = static_cast<unsigned char>(character[0]);
   if (character.size() == 1) return first < 0x20U || first == 0x7FU;
@@ -50,7 +50,7 @@ bool is_control(std::string_view character) {
          (character >= "\u2066" && character <= "\u2069");
 }
 
-/// Bytes that two names begin with alike, as far as whole characters; some of the shorter one are always left.
+/// Number of bytes, in whole characters, of the common beginning of two names; always less than the shorter one.
 std::size_t common_bytes(std::string_view a, std::string_view b) {
   constexpr std::size_t left = 2;
   const std::size_t size = std::min(a.size(), b.size());
@@ -125,7 +125,7 @@ std::string gnuplot_quote(std::string_view text) {
 std::string shown(double value, int decimals) {
   if (!std::isfinite(value)) return "–";
   std::string text = fmt::format("{:.{}f}", value, decimals);
-  if (text.find_first_not_of("-0.") == std::string::npos && text.starts_with('-')) text.erase(0, 1);  // no minus zero
+  if (text.find_first_not_of("-0.") == std::string::npos && text.starts_with('-')) text.erase(0, 1);  // avoids "-0"
   return with_minus(std::move(text));
 }
 

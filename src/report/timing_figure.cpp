@@ -16,7 +16,7 @@ constexpr double panel_px = 105.0;
 constexpr std::size_t most_runs = 7;
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
 
-/// Lower ends, in us, of bins of about equal width on a logarithmic axis that hold whole microseconds: 0, 1, 2, ...
+/// Lower edges, in whole us, of bins of about equal width on a logarithmic axis: 0, 1, 2, ...
 std::vector<std::size_t> bin_edges(std::size_t last_us) {
   std::vector<std::size_t> edges{0, 1};
   for (double exponent = 0.0; edges.back() <= last_us; exponent += 1.0 / bins_a_decade) {
@@ -28,7 +28,7 @@ std::vector<std::size_t> bin_edges(std::size_t last_us) {
 
 double place_of(std::size_t edge_us) { return edge_us == 0 ? 0.5 : static_cast<double>(edge_us); }
 
-/// Share of the cycles by duration, as the outline of its bars; nothing where no cycle is.
+/// Share of the cycles by duration as the outline of a bar chart; no outline over empty bins.
 std::vector<Point> outline(const std::vector<std::uint64_t>& counts, double total, double floor) {
   std::vector<Point> points;
   const std::vector<std::size_t> edges = bin_edges(counts.size());
@@ -98,8 +98,9 @@ std::optional<Figure> timing_figure(const std::vector<RunFiles>& runs) {
   figure.x_label = "duration / µs";
   figure.caption =
       "Share of the cycles by duration: (a) lateness of the wake-up, (b) reading the board, (c) control, (d) writing, "
-      "(e) the whole cycle. Bins are about a tenth of a decade wide and hold whole microseconds, the first one all "
-      "below 1 µs; the axis ends below one cycle.";
+      "(e) the whole cycle. Bins are about a tenth of a decade wide and hold whole microseconds; the first bin holds "
+      "all "
+      "durations below 1 µs. The axis ends below one cycle.";
   if (overflows > 0) {
     figure.caption += fmt::format(" {} durations beyond the histograms' range are not shown.", overflows);
   }

@@ -18,16 +18,16 @@ namespace fs = std::filesystem;
 RunFolder::RunFolder(fs::path path) : path_(std::move(path)) {
   std::error_code error;
   if (fs::exists(path_, error) && !fs::is_directory(path_, error)) {
-    throw FolderError(fmt::format("--out: \"{}\" is a file; name a folder that is new or empty", path_.string()));
+    throw FolderError(fmt::format("--out: \"{}\" is a file; give a new or empty folder", path_.string()));
   }
   fs::create_directories(path_, error);
   if (error) {
-    throw FolderError(fmt::format("--out: cannot create \"{}\": {}; name a folder in a writable place", path_.string(),
-                                  error.message()));
+    throw FolderError(fmt::format("--out: cannot create \"{}\": {}; give a folder in a writable directory",
+                                  path_.string(), error.message()));
   }
   if (!fs::is_empty(path_, error) || error) {
-    throw FolderError(fmt::format(
-        "--out: \"{}\" is not empty; name a folder that is new or empty, nothing is overwritten", path_.string()));
+    throw FolderError(fmt::format("--out: \"{}\" is not empty, and nothing is overwritten; give a new or empty folder",
+                                  path_.string()));
   }
 }
 
@@ -65,7 +65,7 @@ fs::path default_runs_dir() {
 }
 
 fs::path unused_folder(const fs::path& parent, const std::tm& local_time, std::string_view experiment) {
-  // A script's path becomes its name; what a file name should not hold becomes a dash.
+  // A script's path becomes its name; characters unfit for a file name become dashes.
   std::string name = fs::path(experiment).stem().string();
   for (char& c : name) {
     const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';

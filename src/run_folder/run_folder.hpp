@@ -9,13 +9,13 @@
 
 namespace abs_hil::run_folder {
 
-/// A folder that cannot be used for a run's record; the message is one line with path, reason and fix.
+/// An unusable run folder; the message is one line with path, reason and fix.
 class FolderError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Names of what a run folder holds (docs/run-folders.md).
+/// File names in a run folder (docs/run-folders.md).
 namespace file {
 inline constexpr std::string_view csv = "run.csv";
 inline constexpr std::string_view log = "run.lcmlog";
@@ -28,10 +28,10 @@ inline constexpr std::string_view histogram = "histogram.txt";
 inline constexpr std::string_view checksums = "SHA256SUMS";
 }  // namespace file
 
-/// The folder of one run: created by the constructor, sealed with checksums at the end.
+/// The folder of one run. The constructor creates it; seal() completes it with checksums.
 class RunFolder {
  public:
-  /// Creates the folder and those above it. Throws FolderError if it is a file, not empty, or cannot be created.
+  /// Creates the folder and its parents. Throws FolderError if it is a file, not empty, or cannot be created.
   explicit RunFolder(std::filesystem::path path);
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
@@ -39,23 +39,24 @@ class RunFolder {
   /// Throws FolderError if the file cannot be written.
   void write(std::string_view name, std::string_view text) const;
   void write(std::string_view name, const nlohmann::ordered_json& json) const;
-  /// Writes SHA256SUMS over every file in the folder, in the format of sha256sum: the record is whole.
+  /// Writes SHA256SUMS over every file in the folder, in the format of sha256sum. Its presence marks a complete record.
   void seal() const;
 
  private:
   std::filesystem::path path_;
 };
 
-/// SHA-256 of a file, as 64 hexadecimal digits. Throws FolderError if it cannot be read.
+/// SHA-256 of a file: 64 hexadecimal digits. Throws FolderError if the file cannot be read.
 [[nodiscard]] std::string sha256_of_file(const std::filesystem::path& path);
-/// SHA-256 of a text, as 64 hexadecimal digits.
+/// SHA-256 of a text: 64 hexadecimal digits.
 [[nodiscard]] std::string sha256_of(std::string_view text);
 
-/// Where runs go whose folder nobody named: $ABS_HIL_RUNS_DIR, else `runs`; empty if that variable is set and empty.
+/// Parent of run folders that have no name given: $ABS_HIL_RUNS_DIR, else `runs`. Empty if that variable is set but
+/// empty.
 [[nodiscard]] std::filesystem::path default_runs_dir();
 
-/// A folder below `parent` that does not exist yet: `20261121-134512-paper`, with -2, -3, ... where that is taken.
-/// @param local_time broken-down time of the start
+/// A folder below `parent` that does not exist yet: `20261121-134512-paper`, with -2, -3, ... if that is taken.
+/// @param local_time  start of the run, broken down
 [[nodiscard]] std::filesystem::path unused_folder(const std::filesystem::path& parent, const std::tm& local_time,
                                                   std::string_view experiment);
 

@@ -23,7 +23,7 @@ void move_to(const fs::path& from, const fs::path& to) {
   }
 }
 
-/// A text of an object that somebody may have damaged; nothing if there is none.
+/// Text under `key`, if there is one: somebody may have damaged the file.
 std::optional<std::string> text_of(const nlohmann::ordered_json& object, const char* key) {
   if (!object.is_object() || !object.contains(key) || !object[key].is_string()) return std::nullopt;
   return object[key].get<std::string>();
@@ -52,13 +52,14 @@ void SeriesFolder::read_index(const std::string& identity) {
   const bool whole = text_of(json, "identity") == identity && json.contains("runs") && json["runs"].is_array() &&
                      json["runs"].size() == runs_.size() && std::ranges::all_of(json["runs"], has_status);
   if (!whole) {
-    throw FolderError(fmt::format(
-        "--out: \"{}\" holds another series (script, configuration or seeds differ, or its {} is damaged); name "
-        "a folder that is new or empty",
-        path_.string(), series_index));
+    throw FolderError(
+        fmt::format("--out: \"{}\" holds another series of runs (script, configuration or seeds differ, or its {} is "
+                    "damaged); give "
+                    "a new or empty folder",
+                    path_.string(), series_index));
   }
   for (std::size_t i = 0; i < runs_.size(); ++i) {
-    // What counts is the folder: the index may be one run behind when the program was killed.
+    // The run folders decide: a killed program may leave the index one run behind.
     const bool there = fs::is_directory(path_ / name_of(i));
     const std::string status = text_of(json["runs"][i], "status").value_or("");
     if (there) runs_[i].status = status == "planned" ? "completed" : status;

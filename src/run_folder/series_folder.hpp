@@ -14,34 +14,34 @@ namespace abs_hil::run_folder {
 
 inline constexpr std::string_view series_index = "series.json";
 
-/// One run of a series in its index.
+/// One run in the index of a series of runs.
 struct SeriesEntry {
   nlohmann::ordered_json varied = nlohmann::ordered_json::object();  ///< configuration key: value
   std::int64_t seed{0};
   std::string status{"planned"};  ///< then "completed", "fault" or "stopped"
 };
 
-/// The folder of a series: series.json, and run-0001/, run-0002/, ... each a whole run folder. A run writes into
-/// run-0001.part/, which gets its name when it is whole. Opened again with the same series, it goes on where it was
-/// left; what an interrupted run had written is kept beside it as run-0001.interrupted-1/. Thread-safe.
+/// The folder of a series of runs: series.json and one whole run folder for each run: run-0001/, run-0002/, ... A run
+/// writes into run-0001.part/, which is renamed when it is complete. Opened again for the same series, it continues
+/// where it stopped and keeps an interrupted run's files beside it as run-0001.interrupted-1/. Thread-safe.
 class SeriesFolder {
  public:
-  /// @param identity what makes this series this one (a digest): a folder of another is refused
-  /// @param title name of the experiment, for the index
+  /// @param identity  digest of the series' content: a folder of another series is refused
+  /// @param title  name of the experiment, for the index
   /// Throws FolderError for a folder that holds anything but this series.
   SeriesFolder(std::filesystem::path path, std::string identity, std::string title, std::vector<SeriesEntry> runs);
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   [[nodiscard]] bool resumed() const noexcept { return resumed_; }
-  /// True if the run has ended and is kept.
+  /// True if the run has ended and its folder is kept.
   [[nodiscard]] bool done(std::size_t run) const;
-  /// How it ended: "planned" if it has not.
+  /// The run's status; "planned" if it has not ended.
   [[nodiscard]] std::string status(std::size_t run) const;
   /// "run-0001" for run 0.
   [[nodiscard]] static std::string name_of(std::size_t run);
-  /// Where the run has to write; there is nothing there. Throws FolderError.
+  /// Returns a new, empty place for the run's files. Throws FolderError.
   [[nodiscard]] std::filesystem::path begin(std::size_t run);
-  /// The run's folder is whole: it gets its name, and the index its status. Throws FolderError.
+  /// Renames the run's complete folder and records its status in the index. Throws FolderError.
   void end(std::size_t run, const std::string& status);
 
  private:

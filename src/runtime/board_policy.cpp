@@ -32,8 +32,8 @@ bool names_an_adapter(const driver::DriverOptions& d) { return d.kind == "can" &
 void refuse_virtual_time_on_hardware(const BoardUse& use) {
   if (!use.virtual_time || use.driver.emulated) return;
   throw std::invalid_argument(
-      "--fast: the rig runs in real time only; leave it out, use --backend sim, or for an emulator in lock-step "
-      "(never hardware) --set driver.emulated=true");
+      "--fast: the rig runs in real time only; leave it out, use --backend sim, or, for an emulator in lock-step "
+      "(never for hardware), --set driver.emulated=true");
 }
 
 void refuse_start_speed(const BoardUse& use) {
@@ -46,10 +46,10 @@ void refuse_start_speed(const BoardUse& use) {
 void refuse_slow_answers(const BoardUse& use) {
   const driver::usb::UsbOptions& usb = use.driver.usb;
   if (use.driver.kind != "usb" || use.virtual_time || usb.answer_timeout_us * use.rate_Hz < 1e6) return;
-  throw std::invalid_argument(
-      fmt::format("driver.usb.answer_timeout_us = {}: a cycle must not wait longer than its period; give less than {} "
-                  "or a lower control.rate_Hz",
-                  usb.answer_timeout_us, std::llround(1e6 / use.rate_Hz)));
+  throw std::invalid_argument(fmt::format(
+      "driver.usb.answer_timeout_us = {}: a cycle must not wait longer than its period; give a value below {} "
+      "or a lower control.rate_Hz",
+      usb.answer_timeout_us, std::llround(1e6 / use.rate_Hz)));
 }
 
 void refuse_injection_into_hardware(const BoardUse& use) {

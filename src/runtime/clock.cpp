@@ -15,7 +15,7 @@ std::int64_t MonotonicClock::now_ns() noexcept {
 
 void MonotonicClock::sleep_until(std::int64_t time_ns) noexcept {
   const timespec until{static_cast<time_t>(time_ns / rig::ns_per_s), static_cast<long>(time_ns % rig::ns_per_s)};
-  // clock_nanosleep returns its error; a signal handled by this thread must not shorten the period.
+  // clock_nanosleep returns its error. Repeat after EINTR: a signal must not shorten the period.
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
   }
 }

@@ -12,7 +12,7 @@ class Clock {
   Clock& operator=(const Clock&) = delete;
   virtual ~Clock() = default;
   [[nodiscard]] virtual std::int64_t now_ns() noexcept = 0;
-  /// Returns at `time_ns` or later; at once if that has passed.
+  /// Sleeps until `time_ns` or a little later; returns at once if that time has passed.
   virtual void sleep_until(std::int64_t time_ns) noexcept = 0;
 };
 
@@ -23,7 +23,7 @@ class MonotonicClock final : public Clock {
   void sleep_until(std::int64_t time_ns) noexcept override;
 };
 
-/// Time that passes only by sleeping: every wake-up is exact and every computation takes no time.
+/// Virtual time: it advances only in `sleep_until`. Every wake-up is exact and every computation takes no time.
 class VirtualClock final : public Clock {
  public:
   [[nodiscard]] std::int64_t now_ns() noexcept override { return now_ns_; }

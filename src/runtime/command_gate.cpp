@@ -12,9 +12,9 @@ namespace {
 
 using rig::Reason;
 
-/// Rounding must not make a step that the limit just allows look like one it does not.
+/// Tolerance for rounding: a step exactly at the limit must pass.
 constexpr double rounding = 1e-9;
-/// A reading that took longer was held up somewhere between its counters and its stamp.
+/// A longer reading was delayed, and its time stamp may not belong to its counters.
 constexpr std::int64_t prompt_reading_ns = 500'000;
 
 bool brakes(const rig::Command& command) noexcept { return command.brake_duty > 0.0 || command.brake_torque_Nm > 0.0; }
@@ -44,32 +44,33 @@ rig::GateCounts CommandGate::counts() const noexcept {
   return counts;
 }
 
-bool CommandGate::watch(const rig::Measurement& measurement, std::int64_t now_ns, std::int64_t reading_ns) noexcept {
-  watch_board(measurement);
-  if (watching_) watch_wheels(measurement, now_ns, reading_ns <= prompt_reading_ns);
+bool CommandGate::check_measurement(const rig::Measurement& measurement, std::int64_t now_ns,
+                                    std::int64_t reading_ns) noexcept {
+  check_board(measurement);
+  if (checks_wheels_) check_wheels(measurement, now_ns, reading_ns <= prompt_reading_ns);
   return speed_windows_.usable();
 }
 
-void CommandGate::watch_board(const rig::Measurement& measurement) noexcept {
+void CommandGate::check_board(const rig::Measurement& measurement) noexcept {
   if (const std::uint32_t flags = measurement.trip_flags; flags != 0) {
     latch(flags == rig::trip::supply ? Reason::board_supply_tripped : Reason::board_interlock_tripped, flags);
   }
   if (measurement.supply_V < options_.supply_min_V) latch(Reason::board_supply_low, measurement.supply_V);
   if (measurement.temperature_C > options_.temperature_max_C) latch(Reason::board_too_hot, measurement.temperature_C);
-  // A board that could tell and no longer can: 1 for its supply, 2 for its temperature.
+  // The board reported this value before and no longer does. The fault's value is 1 for supply, 2 for temperature.
   if (supply_known_ && std::isnan(measurement.supply_V)) latch(Reason::board_health_lost, 1.0);
   if (temperature_known_ && std::isnan(measurement.temperature_C)) latch(Reason::board_health_lost, 2.0);
   supply_known_ = !std::isnan(measurement.supply_V);
   temperature_known_ = !std::isnan(measurement.temperature_C);
 }
 
-void CommandGate::watch_wheels(const rig::Measurement& measurement, std::int64_t now_ns, bool prompt) noexcept {
-  CheckResult finding = speed_windows_.update(measurement, now_ns, sent_, prompt);
+void CommandGate::check_wheels(const rig::Measurement& measurement, std::int64_t now_ns, bool prompt) noexcept {
+  CheckResult result = speed_windows_.update(measurement, now_ns, sent_, prompt);
   if (speed_windows_.complete()) {
-    finding = encoders_.update(speed_windows_.speed_window());
-    if (finding.sound()) finding = response_.update(speed_windows_.speed_window(), encoders_.brake_torque_Nm());
+    result = encoders_.update(speed_windows_.speed_window());
+    if (result.sound()) result = response_.update(speed_windows_.speed_window(), encoders_.brake_torque_Nm());
   }
-  latch(finding.reason, finding.value);
+  latch(result.reason, result.value);
 }
 
 void CommandGate::require_finite(const rig::Command& wanted, const rig::WheelSpeeds& speeds) noexcept {
@@ -116,7 +117,7 @@ void CommandGate::interlock(rig::Command& command, const PhasePermission& may) n
   }
 }
 
-/// Flattened: what it calls is called in each cycle, and calls cost a tenth of it.
+/// Flattened (all calls inlined): the calls would cost a tenth of its time in each cycle.
 [[gnu::flatten]] GateResult CommandGate::check(const rig::Command& wanted, const GateInput& input) noexcept {
   last_action_ = GateAction::passed;
   require_finite(wanted, input.speeds);
@@ -131,7 +132,7 @@ void CommandGate::interlock(rig::Command& command, const PhasePermission& may) n
     command.brake_torque_Nm = std::max(0.0, wanted.brake_torque_Nm);
     command.brake_duty = limited(wanted.brake_duty, options_.brake_duty_max, GateAction::brake_clamped);
     command.motor_duty = limited(wanted.motor_duty, options_.motor_duty_max, GateAction::motor_clamped);
-    // Before the first command the outputs have been 0 for longer than any rise takes.
+    // The first command is not rate-limited: the outputs have been 0 for longer than any rise takes.
     if (has_sent_) {
       const double elapsed_s = static_cast<double>(input.now_ns - sent_ns_) * rig::s_per_ns;
       command.brake_duty = rising(command.brake_duty, sent_.brake_duty, options_.brake_rate_per_s, elapsed_s,

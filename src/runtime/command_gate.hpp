@@ -21,7 +21,7 @@ namespace abs_hil::runtime {
 using rig::gate_action_count;
 using rig::GateAction;
 
-/// What the gate is told beside the command.
+/// Inputs of the gate besides the command.
 struct GateInput {
   rig::WheelSpeeds speeds{};  ///< estimated from the latest measurement
   rig::Phase phase{rig::Phase::idle};
@@ -29,48 +29,49 @@ struct GateInput {
 };
 
 struct GateResult {
-  rig::Command command{};                 ///< what may be sent
-  GateAction action{GateAction::passed};  ///< the last one taken
-  rig::Reason fault{rig::Reason::none};   ///< the latched fault, once there is one
+  rig::Command command{};                 ///< the command that may be sent
+  GateAction action{GateAction::passed};  ///< the last action taken on it
+  rig::Reason fault{rig::Reason::none};   ///< the latched fault; `none` before the first
   double fault_value{0.0};
 };
 
-/// Stands between controller and driver and trusts neither: finite, range, rate, interlocks, and what is measured must
-/// agree with physics and with what was sent. A fault latches; from then on only the safe command passes, until a new
-/// run makes a new gate. docs/safety.md has every check with its reason. Real-time safe.
+/// Safety gate between controller and driver. It checks each command for finite values, range, rate and interlocks. It
+/// checks that each measurement agrees with physics and with the commands sent. A fault latches: from then on only the
+/// safe command passes; each run has a new gate. docs/safety.md lists every check with its reason. Real-time safe.
 class CommandGate {
  public:
-  /// @param permissions what each phase's plan lets act
-  /// @param limits      what physics allows; without them measurements are not judged
+  /// @param permissions which actuators each phase allows
+  /// @param limits      bounds for the plausibility checks; not `enabled`: the wheels are not checked
   explicit CommandGate(const GateOptions& options, const PhasePermissions& permissions = any_phase(),
                        const PlausibilityLimits& limits = {}) noexcept
       : options_(options),
         permissions_(permissions),
-        watching_(limits.enabled),
+        checks_wheels_(limits.enabled),
         speed_windows_(limits),
         encoders_(limits),
         response_(limits) {}
 
-  /// Takes a cycle's measurement before anything is made of it: latches what the board reports about itself and what
-  /// cannot be true of the wheels.
-  /// @return false if nothing may be made of it: stale, or a counter has leapt. The one before then stands.
-  /// @param reading_ns how long the reading took: one that was held up is not judged
-  bool watch(const rig::Measurement& measurement, std::int64_t now_ns, std::int64_t reading_ns = 0) noexcept;
+  /// Checks a cycle's measurement before anything uses it. Latches faults that the board reports and wheel motion that
+  /// is physically impossible.
+  /// @return false if the measurement must not be used, because it is stale or a counter jumped; use the one before
+  /// @param reading_ns duration of the reading; the wheels of a delayed reading are not checked
+  bool check_measurement(const rig::Measurement& measurement, std::int64_t now_ns,
+                         std::int64_t reading_ns = 0) noexcept;
   [[nodiscard]] GateResult check(const rig::Command& wanted, const GateInput& input) noexcept;
-  /// Latches a fault found elsewhere (driver, executive). The first one stays.
+  /// Latches a fault found elsewhere (driver, executive). The first fault stays.
   void latch(rig::Reason fault, double value) noexcept;
 
   [[nodiscard]] rig::Reason fault() const noexcept { return fault_; }
   [[nodiscard]] double fault_value() const noexcept { return fault_value_; }
-  /// How often each action was taken; any thread may ask.
+  /// How often each action was taken; any thread may call it.
   [[nodiscard]] rig::GateCounts counts() const noexcept;
   [[nodiscard]] std::uint64_t count(GateAction action) const noexcept {
     return counts_[static_cast<std::size_t>(action)].load(std::memory_order_relaxed);
   }
 
  private:
-  void watch_board(const rig::Measurement& measurement) noexcept;
-  void watch_wheels(const rig::Measurement& measurement, std::int64_t now_ns, bool prompt) noexcept;
+  void check_board(const rig::Measurement& measurement) noexcept;
+  void check_wheels(const rig::Measurement& measurement, std::int64_t now_ns, bool prompt) noexcept;
   void require_finite(const rig::Command& wanted, const rig::WheelSpeeds& speeds) noexcept;
   [[nodiscard]] double limited(double duty, double most, GateAction action) noexcept;
   [[nodiscard]] double rising(double duty, double before, double rate_per_s, double elapsed_s,
@@ -80,7 +81,7 @@ class CommandGate {
 
   GateOptions options_;
   PhasePermissions permissions_;
-  bool watching_;
+  bool checks_wheels_;
   SpeedWindows speed_windows_;
   EncoderCheck encoders_;
   ResponseCheck response_;
@@ -92,7 +93,7 @@ class CommandGate {
   GateAction last_action_{GateAction::passed};
   rig::Reason fault_{rig::Reason::none};
   double fault_value_{0.0};
-  std::array<std::atomic<std::uint64_t>, gate_action_count> counts_{};  ///< one thread alone adds
+  std::array<std::atomic<std::uint64_t>, gate_action_count> counts_{};  ///< only the cycle's thread adds
 };
 
 }  // namespace abs_hil::runtime

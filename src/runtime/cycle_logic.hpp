@@ -7,8 +7,8 @@
 
 namespace abs_hil::runtime {
 
-/// The middle of the cycle, "estimate, sequence, control", as the executive sees it. All functions run in the real-time
-/// thread: no allocation, lock, system call, exception or log call.
+/// The middle part of the cycle: estimate, sequence, control. The executive calls it. All functions run in the
+/// real-time thread: no allocation, lock, system call, exception or log call.
 class CycleLogic {
  public:
   CycleLogic() = default;
@@ -19,11 +19,11 @@ class CycleLogic {
   /// One cycle: takes the measurement, fills `record.phase`, `.reason`, `.reason_value` and `.control`, and returns the
   /// command wanted. A pure function of the measurements so far.
   [[nodiscard]] virtual rig::Command step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept = 0;
-  /// What the gate let pass of it, and the rig now does.
+  /// Takes the command that the gate let pass and the rig now executes.
   virtual void commanded(const rig::Command& command) noexcept = 0;
-  /// The run must end: a stop was requested, or a fault was found outside. Takes effect in the next `step`.
+  /// Ends the run, because of a stop request or a fault found outside. Takes effect in the next `step`.
   virtual void end_early(rig::Reason reason, double value) noexcept = 0;
-  /// True once the step just made was the run's last.
+  /// True if the latest step was the run's last.
   [[nodiscard]] virtual bool finished() const noexcept = 0;
 };
 

@@ -10,11 +10,11 @@
 
 namespace abs_hil::runtime {
 
-/// How the executive keeps time: histograms of every part of the cycle, and counts of late cycles by cause. One thread
-/// adds, any thread reads at any time without a lock. The adding functions are real-time safe. 200 kB.
+/// Timing statistics of the executive: histograms of every part of the cycle, and counts of late cycles by cause. One
+/// thread adds; any thread may read at any time without a lock. The adding functions are real-time safe. Size: 200 kB.
 class CycleStatistics {
  public:
-  /// Durations of one cycle, start-up cycles excepted.
+  /// Adds the durations of one cycle. Do not call it for start-up cycles.
   void add(const rig::CycleTiming& timing) noexcept;
   void count_cycle() noexcept;
   /// @param ticks_missed whole periods skipped, >= 1
@@ -39,7 +39,7 @@ class CycleStatistics {
   std::atomic<std::uint64_t> startup_overruns_{0};
   std::atomic<std::uint64_t> ticks_missed_{0};
   std::atomic<std::uint64_t> longest_run_{0};
-  std::uint64_t run_{0};  ///< late cycles in a row; the adding thread's own
+  std::uint64_t run_{0};  ///< late cycles in a row; only the adding thread uses it
   LatencyHistogram wakeup_latency_{};
   LatencyHistogram read_{};
   LatencyHistogram control_{};

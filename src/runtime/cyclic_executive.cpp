@@ -13,7 +13,7 @@ static_assert(std::atomic<rig::Reason>::is_always_lock_free, "request_stop is ca
 
 std::uint64_t count_of(int value) noexcept { return static_cast<std::uint64_t>(std::max(value, 0)); }
 
-/// The part that took longest; of equal ones the first.
+/// The part of the cycle that took longest; the first one if several are equal.
 rig::OverrunCause longest_part(const rig::CycleTiming& timing, std::int64_t record_ns) noexcept {
   using Part = std::pair<std::int64_t, rig::OverrunCause>;
   const std::array<Part, 5> parts{{{timing.wakeup_latency_ns, rig::OverrunCause::wakeup},
@@ -54,10 +54,10 @@ bool CyclicExecutive::step() noexcept {
 }
 
 void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
-  if (watch_ != nullptr) {
-    watch_->beat();
-    if (watch_->guardian_lost()) {
-      gate_.latch(rig::Reason::guardian_silent, static_cast<double>(watch_->silent_cycles()));
+  if (heartbeat_ != nullptr) {
+    heartbeat_->beat();
+    if (heartbeat_->guardian_lost()) {
+      gate_.latch(rig::Reason::guardian_silent, static_cast<double>(heartbeat_->silent_cycles()));
     }
   }
   const std::int64_t woken_ns = clock_.now_ns();
@@ -76,7 +76,7 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   if (!read.ok()) {
     if (io_error_.ok()) io_error_ = read;
     gate_.latch(driver::reason_of(read, rig::Reason::driver_read_failed), static_cast<double>(read.error));
-  } else if (gate_.watch(latest, woken_ns, read_ns - woken_ns) || record.sequence == 0) {
+  } else if (gate_.check_measurement(latest, woken_ns, read_ns - woken_ns) || record.sequence == 0) {
     measurement_ = latest;
   }
   record.measurement = measurement_;
@@ -113,7 +113,7 @@ void CyclicExecutive::keep(const rig::CycleRecord& record) noexcept {
   statistics_->count_cycle();
   if (!starting_up()) statistics_->add(record.timing);
   ring_.push(record);
-  if (watch_ != nullptr) watch_->keep(record);
+  if (heartbeat_ != nullptr) heartbeat_->keep(record);
 }
 
 void CyclicExecutive::schedule_next(const rig::CycleTiming& timing) noexcept {

@@ -18,7 +18,7 @@ namespace abs_hil::runtime {
 
 using RecordRing = SpscRing<rig::CycleRecord>;
 
-/// What counts as late, and when it ends the run.
+/// Which late cycles count, and how many end the run.
 struct OverrunOptions {
   ABS_HIL_OPTIONS(OverrunOptions);
   /// They meet cold caches.
@@ -28,31 +28,30 @@ struct OverrunOptions {
                  .meaning = "late cycles in a row that are a fault; 0: never", .range = rig::from_zero(1'000'000));
 };
 
-/// read -> estimate -> sequence -> control -> gate -> write -> record, once a period on absolute ticks: the same code
-/// in real and in virtual time. A cycle that ends late skips whole periods and keeps the phase; it is never caught up
-/// with. A late cycle is put down to the part that took longest, and too many in a row latch a fault. `step` is
-/// real-time safe apart from the clock's sleep and the driver's I/O; everything is allocated before.
+/// Runs the cycle read -> estimate -> sequence -> control -> gate -> write -> record once per period, on absolute
+/// ticks, in real or virtual time. After a late cycle it skips whole periods and keeps the ticks' phase; it does not
+/// catch up. It blames a late cycle on the part that took longest. Too many late cycles in a row latch a fault. `step`
+/// is real-time safe apart from the clock's sleep and the driver's I/O; the constructor allocates everything.
 class CyclicExecutive {
  public:
-  /// @param driver active, and left active: whoever runs the executive deactivates it
+  /// @param driver active; the executive leaves it active, and its caller must deactivate it
   /// @param period_ns > 0
   CyclicExecutive(Clock& clock, driver::RigDriver& driver, CycleLogic& logic, CommandGate& gate, RecordRing& ring,
                   std::int64_t period_ns, const OverrunOptions& overruns = {});
 
-  /// The first tick, instead of the moment of the first step. Before the first step.
+  /// Sets the time of the first tick; otherwise it is the moment of the first step. Call it before the first step.
   void start_at(std::int64_t first_tick_ns) noexcept { first_tick_ns_ = first_tick_ns; }
-  /// Gives signs of life, keeps records for after a fault, and latches a fault when the guardian is lost. `watch` must
-  /// outlive the executive's use. Before the first step.
-  void watch_with(Heartbeat& watch) noexcept { watch_ = &watch; }
+  /// Makes each cycle beat, feed the flight recorder, and latch a fault when the guardian is lost. `heartbeat` must
+  /// outlive the last step. Call it before the first step.
+  void set_heartbeat(Heartbeat& heartbeat) noexcept { heartbeat_ = &heartbeat; }
   /// Sleeps until the next tick and runs one cycle. False after the run's last cycle.
   bool step() noexcept;
-  /// Ends the run in an orderly way at the next cycle. Any thread or signal handler may call it; the first reason
-  /// stays.
+  /// Ends the run in order at the next cycle. Any thread or signal handler may call it. The first reason stays.
   void request_stop(rig::Reason reason) noexcept;
 
-  /// How it keeps time; other threads may look while it runs.
+  /// Timing statistics; other threads may read them during the run.
   [[nodiscard]] const CycleStatistics& statistics() const noexcept { return *statistics_; }
-  /// The first error of the driver, for the report: later ones follow from it.
+  /// The driver's first error, for the report; later errors follow from it.
   [[nodiscard]] const driver::IoResult& io_error() const noexcept { return io_error_; }
 
  private:
@@ -67,7 +66,7 @@ class CyclicExecutive {
   CycleLogic& logic_;
   CommandGate& gate_;
   RecordRing& ring_;
-  Heartbeat* watch_{nullptr};
+  Heartbeat* heartbeat_{nullptr};
   std::int64_t period_ns_;
   std::uint64_t startup_cycles_;
   std::uint64_t max_consecutive_;

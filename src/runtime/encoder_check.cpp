@@ -11,19 +11,19 @@ namespace {
 using rig::Reason;
 
 // docs/safety.md, "Where the bounds come from", derives these.
-constexpr double stamp_error_s = 150e-6;  ///< of a stamp against the moment of reading
-constexpr double backwards_rad_s = 2.0;   ///< a wheel that has stopped may swing back so fast
-constexpr int outside_max = 3;            ///< speed_windows
-constexpr double rolled_after_s = 3.0;    ///< a locked wheel, released, rolls along again after this
+constexpr double stamp_error_s = 150e-6;  ///< error of a time stamp against the moment of reading
+constexpr double backwards_rad_s = 2.0;   ///< speed at which a stopped wheel may swing back
+constexpr int outside_max = 3;            ///< number of speed windows
+constexpr double rolled_after_s = 3.0;    ///< a locked wheel rolls again within this time after its release
 constexpr double disagreement_s = 0.1;
-constexpr double disagreement_m_s = 0.3;  ///< beside the share
+constexpr double disagreement_m_s = 0.3;  ///< allowed in addition to `free_slip_max`
 constexpr double earnest_brake_Nm = 1.0;
 constexpr double braked_after_s = 0.15;
 constexpr double slip_speed_m_s = 3.0;
 constexpr double ahead_part = 0.05;
 constexpr double ahead_max_s = 0.05;
 
-/// By verdict.
+/// One reason for each SpeedInterval::Verdict.
 using Reasons = std::array<Reason, 4>;
 constexpr Reasons upper_reasons{Reason::none, Reason::encoder_upper_stuck, Reason::encoder_upper_reversed,
                                 Reason::encoder_upper_jumped};
@@ -41,7 +41,7 @@ SpeedInterval::Verdict SpeedInterval::update(double omega_rad_s, double resoluti
   low_rad_s_ = std::max(low_rad_s_ - loss_rad_s2_ * dt_s, -backwards_rad_s);
   high_rad_s_ += gain_rad_s2_ * dt_s;
   if (omega_rad_s + slack_rad_s >= low_rad_s_ && omega_rad_s - slack_rad_s <= high_rad_s_) {
-    // The reading is a mean: at its end the wheel may have left it by what the time allows.
+    // The reading is a mean over dt. At its end the wheel may be faster or slower by what dt allows.
     low_rad_s_ = std::max(low_rad_s_, omega_rad_s - slack_rad_s - loss_rad_s2_ * dt_s);
     high_rad_s_ = std::min(high_rad_s_, omega_rad_s + slack_rad_s + gain_rad_s2_ * dt_s);
     outside_ = 0;
@@ -60,17 +60,17 @@ EncoderCheck::EncoderCheck(const PlausibilityLimits& limits) noexcept
       free_s_(rolled_after_s) {}
 
 CheckResult EncoderCheck::update(const SpeedWindow& speed_window) noexcept {
-  // (6) by the implicit Euler rule: good to the speed_window's share of the lag, 4 %.
+  // (6) by the implicit Euler rule. Its relative error is the speed window's share of the lag, 4 %.
   const double share = limits_.brake.c31_per_s * speed_window.dt_s;
   brake_Nm_ = limits_.ideal_actuator ? speed_window.brake_target_Nm
                                      : (brake_Nm_ + share * speed_window.brake_target_Nm) / (1.0 + share);
   free_s_ = speed_window.brake_target_Nm > 0.0 ? 0.0 : free_s_ + speed_window.dt_s;
   braked_s_ = brake_Nm_ >= earnest_brake_Nm ? braked_s_ + speed_window.dt_s : 0.0;
 
-  CheckResult finding = judge_speeds(speed_window);
-  if (finding.sound()) finding = judge_rolling(speed_window);
-  if (finding.sound()) finding = judge_slip(speed_window);
-  return finding;
+  CheckResult result = judge_speeds(speed_window);
+  if (result.sound()) result = judge_rolling(speed_window);
+  if (result.sound()) result = judge_slip(speed_window);
+  return result;
 }
 
 CheckResult EncoderCheck::judge_speeds(const SpeedWindow& speed_window) noexcept {

@@ -6,9 +6,8 @@
 
 namespace abs_hil::runtime {
 
-/// The speeds that one wheel can have, as an interval: it widens as fast as physics lets the wheel gain and lose speed,
-/// and each sound reading narrows it. A reading outside it cannot be true, a wheel that locks stays inside. Real-time
-/// safe.
+/// Interval of the speeds that one wheel can have. It widens as fast as physics lets the wheel gain and lose speed, and
+/// each sound reading narrows it. A locking wheel stays inside; a reading outside is a fault. Real-time safe.
 class SpeedInterval {
  public:
   enum class Verdict : std::uint8_t { sound, stuck, reversed, jumped };
@@ -16,10 +15,10 @@ class SpeedInterval {
   SpeedInterval(double gain_rad_s2, double loss_rad_s2, double fastest_rad_s) noexcept
       : gain_rad_s2_(gain_rad_s2), loss_rad_s2_(loss_rad_s2), high_rad_s_(fastest_rad_s) {}
 
-  /// Takes a mean speed over `dt_s`; `resolution_rad_s` is its uncertainty by counts. Other than `sound` once three
-  /// readings in a row were outside.
+  /// Takes a mean speed over `dt_s`; `resolution_rad_s` is its uncertainty from counting. The verdict differs from
+  /// `sound` only after three readings in a row outside the interval.
   Verdict update(double omega_rad_s, double resolution_rad_s, double dt_s) noexcept;
-  /// The latest reading was outside.
+  /// True if the latest reading was outside the interval.
   [[nodiscard]] bool doubtful() const noexcept { return outside_ > 0; }
 
  private:
@@ -27,16 +26,16 @@ class SpeedInterval {
   double loss_rad_s2_;
   double low_rad_s_{0.0};
   double high_rad_s_;
-  int outside_{0};  ///< readings in a row
+  int outside_{0};  ///< number of readings in a row outside the interval
 };
 
-/// Encoders that are stuck, jump, count backwards or wrongly, are swapped or lost. Real-time safe.
+/// Finds encoders that are stuck, jump, count backwards or wrongly, are swapped or lost. Real-time safe.
 class EncoderCheck {
  public:
   explicit EncoderCheck(const PlausibilityLimits& limits) noexcept;
 
   CheckResult update(const SpeedWindow& speed_window) noexcept;
-  /// Brake torque that should act, by map and lag, N m.
+  /// Brake torque expected from the map (7) and the lag (6), N m.
   [[nodiscard]] double brake_torque_Nm() const noexcept { return brake_Nm_; }
 
  private:
@@ -48,10 +47,10 @@ class EncoderCheck {
   SpeedInterval upper_;
   SpeedInterval lower_;
   double brake_Nm_{0.0};
-  double free_s_;         ///< since the brake was released
-  double braked_s_{0.0};  ///< since the brake has been acting in earnest
+  double free_s_;         ///< time since the brake was released
+  double braked_s_{0.0};  ///< time with a brake torque of at least 1 N m
   double disagreeing_s_{0.0};
-  double ahead_s_{0.0};  ///< since the braked wheel has been the faster one
+  double ahead_s_{0.0};  ///< time with the braked wheel faster than the lower one
 };
 
 }  // namespace abs_hil::runtime

@@ -11,7 +11,7 @@ namespace {
 
 using Words = std::array<std::uint64_t, FlightSlot::words>;
 
-/// The record in a slot and its version; version 0 if there is none, or none that is whole.
+/// The record in a slot and its version. Version 0: the slot holds no complete record.
 std::pair<std::uint64_t, rig::CycleRecord> whole_record(const FlightSlot& slot) noexcept {
   Words words{};
   const std::uint64_t before = slot.version.load(std::memory_order_acquire);

@@ -8,7 +8,7 @@
 
 namespace abs_hil::runtime {
 
-/// Limits of what may reach the rig, whatever asks for it. docs/safety.md gives the reason of each default.
+/// Limits for every command to the rig, from any source. docs/safety.md gives the reason for each default.
 struct GateOptions {
   ABS_HIL_OPTIONS(GateOptions);
   ABS_HIL_OPTION(double, motor_duty_max, 1.0, .meaning = "largest drive PWM that may reach the rig",
@@ -35,18 +35,18 @@ struct GateOptions {
                  .range = rig::between(0.02, 1));
 };
 
-/// What a phase's plan lets act.
+/// Which actuators a phase allows.
 struct PhasePermission {
   bool motor{false};
   bool brake{false};
   bool together{false};  ///< motor and brake at once
 };
 
-/// One for each rig::Phase.
+/// One entry for each rig::Phase.
 inline constexpr std::size_t phase_count = 7;
 using PhasePermissions = std::array<PhasePermission, phase_count>;
 
-/// Motor or brake in any phase, never both: for what has no plan.
+/// Motor or brake in any phase, but never both: for runs without a sequence of phases.
 [[nodiscard]] constexpr PhasePermissions any_phase() noexcept {
   PhasePermissions all{};
   all.fill({.motor = true, .brake = true});

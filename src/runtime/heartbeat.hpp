@@ -8,25 +8,26 @@
 
 namespace abs_hil::runtime {
 
-/// Signs of life between the cycle and a guardian in another process. Counts, not times: a computer that stood still
-/// as a whole makes nobody look dead. Each word has one writer and a cache line of its own.
+/// Heartbeat counters that the cycle and a guardian in another process share. They are counts, not times: when the
+/// whole computer pauses, neither side mistakes the other for dead. Each counter has one writer and its own cache line.
 struct HeartbeatPanel {
-  alignas(64) std::atomic<std::uint64_t> cycle_beats{0};  ///< the cycle's thread: one at the start of each cycle
-  alignas(64) std::atomic<std::uint64_t> safe_beats{0};   ///< the cycle's thread: one before it makes the outputs safe
-  alignas(64) std::atomic<std::uint64_t> guardian_beats{0};  ///< the guardian: one each time it looks
+  alignas(64) std::atomic<std::uint64_t> cycle_beats{0};     ///< the cycle's thread adds 1 at the start of each cycle
+  alignas(64) std::atomic<std::uint64_t> safe_beats{0};      ///< it adds 1 each time before it makes the outputs safe
+  alignas(64) std::atomic<std::uint64_t> guardian_beats{0};  ///< the guardian adds 1 each time it looks
 };
 
-/// What the cycle does for those who watch over it: its own sign of life, the flight recorder, and a look at whether
-/// the guardian still gives signs of life. Real-time safe.
+/// The cycle's side of the supervision: it beats, fills the flight recorder, and checks that the guardian still beats.
+/// Real-time safe.
 class Heartbeat {
  public:
-  /// @param silent_cycles_max  cycles without a sign of life after which the guardian counts as lost; 0: there is none
+  /// @param silent_cycles_max  the guardian counts as lost after this number of silent cycles; 0: no guardian
   Heartbeat(HeartbeatPanel& panel, FlightRing& recorder, std::uint64_t silent_cycles_max = 0) noexcept
       : panel_(panel), recorder_(recorder), silent_cycles_max_(silent_cycles_max) {}
 
-  /// At the start of a cycle, before anything is read or written: what this cycle writes is already watched over.
+  /// Beats. Call it at the start of a cycle, before any read or write, so that the guardian covers that cycle's
+  /// outputs.
   void beat() noexcept { panel_.cycle_beats.store(++beats_, std::memory_order_relaxed); }
-  /// Once a cycle. True from the cycle on in which the guardian counts as lost.
+  /// Checks the guardian's heartbeat; call it once per cycle. True if the guardian counts as lost.
   [[nodiscard]] bool guardian_lost() noexcept {
     if (silent_cycles_max_ == 0) return false;
     const std::uint64_t seen = panel_.guardian_beats.load(std::memory_order_relaxed);
@@ -46,13 +47,15 @@ class Heartbeat {
   std::uint64_t silent_cycles_{0};
 };
 
-/// Whoever must stand by before outputs may be enabled, and be told when they are safe again.
+/// Supervisor of a run, such as the guardian. It must be armed before the outputs are enabled, and is told when they
+/// are safe again.
 class RunGuard : public driver::MakingSafeListener {
  public:
-  /// The driver is configured and inactive. Throws driver::Unavailable: then the run does not start.
-  virtual void stand_guard() = 0;
-  /// The driver was deactivated; called by the thread that did so. Real-time safe.
-  /// @param safe  the safe state is known to have reached the board
+  /// Arms the supervisor; the driver is configured and inactive. Throws driver::Unavailable: the run must not start
+  /// then.
+  virtual void arm() = 0;
+  /// Tells that the driver was deactivated. The thread that deactivated it makes the call. Real-time safe.
+  /// @param safe  true if the board is known to be in the safe state
   virtual void outputs_released(bool safe) noexcept = 0;
 };
 

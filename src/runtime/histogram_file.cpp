@@ -17,7 +17,7 @@ namespace {
 
 using Columns = std::array<const LatencyHistogram*, 5>;
 
-/// One past the last bin in use, at least one.
+/// Index one past the last bin in use, at least 1.
 std::size_t bins_in_use(const Columns& columns) {
   std::size_t used = 1;
   for (const LatencyHistogram* column : columns) {

@@ -39,7 +39,7 @@ rig::DurationQuantiles LatencyHistogram::summary() const noexcept {
   const std::array<Wanted, 3> wanted{{{0.5, result.p50_us}, {0.99, result.p99_us}, {0.999, result.p99_9_us}}};
   std::size_t next = 0;
   std::uint64_t seen = 0;
-  // Leaves at the last quantile: few of the bins are ever looked at.
+  // Stops at the last quantile: the loop visits only few of the bins.
   for (std::size_t bin = 0; bin < bins && next < wanted.size(); ++bin) {
     seen += in_bin(bin);
     while (next < wanted.size() &&

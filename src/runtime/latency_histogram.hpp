@@ -9,8 +9,8 @@
 
 namespace abs_hil::runtime {
 
-/// Histogram of durations with bins of 1 us and an overflow count; least, greatest and sum are kept exactly. One thread
-/// adds, any thread reads at any time (relaxed atomics: a reader may miss the latest few). `add` is real-time safe.
+/// Histogram of durations with bins of 1 us and an overflow count. Least, greatest and sum are exact. One thread adds;
+/// any thread may read at any time, but may miss the latest few (relaxed atomics). `add` is real-time safe.
 class LatencyHistogram {
  public:
   static constexpr std::size_t bins = 10'000;
@@ -23,11 +23,11 @@ class LatencyHistogram {
   [[nodiscard]] std::uint32_t in_bin(std::size_t us) const noexcept {
     return counts_[us].load(std::memory_order_relaxed);
   }
-  /// Least and greatest duration, 0 while there are none.
+  /// Least and greatest duration; 0 without any.
   [[nodiscard]] std::int64_t min_ns() const noexcept;
   [[nodiscard]] std::int64_t max_ns() const noexcept { return max_ns_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::int64_t sum_ns() const noexcept { return sum_ns_.load(std::memory_order_relaxed); }
-  /// Quantiles as the upper edge of their bin, so that no figure flatters; a quantile in the overflow is the maximum.
+  /// Quantiles, rounded up to the upper edge of their bin. A quantile in the overflow is the maximum.
   [[nodiscard]] rig::DurationQuantiles summary() const noexcept;
 
  private:

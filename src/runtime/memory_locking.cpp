@@ -43,7 +43,7 @@ long faults() {
   return usage.ru_minflt + usage.ru_majflt;
 }
 
-/// Touches the stack below this frame; returns the page faults that this took.
+/// Touches the stack below this frame; returns the number of page faults.
 [[gnu::noinline]] long touch_stack() {
   // Written by touch(). NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init)
   std::array<volatile unsigned char, stack_bytes> pages;
@@ -52,7 +52,7 @@ long faults() {
   return faults() - before;
 }
 
-/// Touches a block of the heap and gives it back; returns the page faults that this took, -1 without memory.
+/// Touches a block of the heap and frees it; returns the number of page faults, -1 if there is no memory.
 long touch_heap() {
   void* const block = std::malloc(heap_bytes);
   if (block == nullptr) return -1;
@@ -66,7 +66,7 @@ long touch_heap() {
 RealtimeStep judged(RealtimeStep step, long faults_when_repeated) {
   step.obtained = faults_when_repeated == 0;
   if (faults_when_repeated < 0) {
-    step.detail = "no memory: the limit for locked memory is too low";
+    step.detail = "cannot allocate memory: the limit for locked memory (RLIMIT_MEMLOCK) is too low";
     step.fix = privilege_fix();
   } else {
     step.detail = std::to_string(faults_when_repeated) + " page faults when touched again";
@@ -98,8 +98,8 @@ RealtimeStep lock_memory() {
 }
 
 RealtimeStep prefault_heap() {
-  // One heap for all threads, none of it given back to the kernel, no block mapped on its own: what has been touched
-  // stays. mallopt(3).
+  // One heap for all threads, no memory returned to the kernel, no block in a mapping of its own. Pages once touched
+  // therefore stay in memory; mallopt(3).
   mallopt(M_ARENA_MAX, 1);
   mallopt(M_TRIM_THRESHOLD, -1);
   mallopt(M_MMAP_MAX, 0);

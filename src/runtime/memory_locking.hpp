@@ -6,7 +6,7 @@ namespace abs_hil::runtime {
 
 /// Locks all memory of this process, present and future.
 [[nodiscard]] RealtimeStep lock_memory();
-/// Lets the heap grow once, keep what it has and be in memory.
+/// Grows the heap once, touches it, and keeps it from shrinking.
 [[nodiscard]] RealtimeStep prefault_heap();
 /// Touches the part of the calling thread's stack that a cycle may use.
 [[nodiscard]] RealtimeStep prefault_stack();

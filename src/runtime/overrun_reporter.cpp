@@ -16,7 +16,7 @@ unsigned long long count_of(const rig::OverrunCounts& counts, rig::OverrunCause 
 }  // namespace
 
 void OverrunReporter::consume(const rig::CycleRecord& record, double /*distance_m*/) {
-  // What a cycle missed is known in the next one; after a dropped record the late cycle's own times are lost.
+  // The next record tells what a cycle missed. If a record was dropped, the late cycle's own times are lost.
   if (record.timing.periods_skipped > 0 && record.sequence == latest_.sequence + 1) {
     late_ = LateCycle{.timing = latest_.timing,
                       .record_ns = record.timing.record_ns,
@@ -37,7 +37,7 @@ std::optional<std::string> OverrunReporter::message(const rig::OverrunCounts& co
   const int size = std::snprintf(
       text.data(), text.size(),
       "%llu late cycles (%llu new; wakeup %llu, read %llu, control %llu, write %llu, record %llu), %llu ticks missed; "
-      "the latest at %.3f s missed %u because of %.*s: expected %.0f us, woke %.0f us late, read %.0f, control %.0f, "
+      "the latest at %.3f s missed %u because of %.*s: period %.0f us, woke %.0f us late, read %.0f, control %.0f, "
       "write %.0f, record %.0f us",
       static_cast<unsigned long long>(counts.total), static_cast<unsigned long long>(counts.total - told_),
       count_of(counts, rig::OverrunCause::wakeup), count_of(counts, rig::OverrunCause::read),
@@ -47,7 +47,7 @@ std::optional<std::string> OverrunReporter::message(const rig::OverrunCounts& co
       rig::in_us(late_->timing.wakeup_latency_ns), rig::in_us(late_->timing.read_ns),
       rig::in_us(late_->timing.control_ns), rig::in_us(late_->timing.write_ns), rig::in_us(late_->record_ns));
   told_ = counts.total;
-  late_.reset();  // the counters run ahead of the records: the next message waits for a late cycle of its own
+  late_.reset();  // the counters run ahead of the records: the next message needs the record of another late cycle
   return size > 0 ? std::optional<std::string>(text.data()) : std::nullopt;
 }
 

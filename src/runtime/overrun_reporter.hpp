@@ -9,21 +9,21 @@
 
 namespace abs_hil::runtime {
 
-/// Puts late cycles into words, outside the real-time thread: at most one message a second, however many there are,
-/// while the counters of CycleStatistics go on unthrottled.
+/// Writes messages about late cycles, outside the real-time thread. It gives at most one message per second, for any
+/// number of late cycles; the counters of CycleStatistics are not limited.
 class OverrunReporter final : public rig::RecordSink {
  public:
-  /// @param period_ns of the cycle, > 0
+  /// @param period_ns period of the cycle, > 0
   explicit OverrunReporter(std::int64_t period_ns) : period_ns_(period_ns) {}
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
-  /// What there is to say now, if anything: total by cause, and the latest late cycle part by part.
-  /// @param counts as of now
+  /// The message due now, if any: totals by cause, and the parts of the latest late cycle.
+  /// @param counts current counts
   [[nodiscard]] std::optional<std::string> message(const rig::OverrunCounts& counts);
 
  private:
   struct LateCycle {
-    rig::CycleTiming timing{};  ///< its own
+    rig::CycleTiming timing{};  ///< of the late cycle itself
     std::int64_t record_ns{0};
     std::uint32_t ticks_missed{0};
     rig::OverrunCause cause{rig::OverrunCause::none};

@@ -5,8 +5,8 @@
 
 namespace abs_hil::runtime {
 
-/// What physics allows this rig, from its nominal parameters with a factor of 2 for all that they do not know
-/// (docs/safety.md derives each). `enabled` false: nothing is checked.
+/// Bounds of what physics allows this rig. They come from its nominal parameters, with a factor of 2 for their
+/// uncertainty (docs/safety.md derives each). `enabled` false: nothing is checked.
 struct PlausibilityLimits {
   bool enabled{false};
   double rad_per_count{0.0};

@@ -32,7 +32,7 @@ std::string fifo_fix(int priority) {
            privilege_fix();
   }
   if (::geteuid() == 0) {
-    // Root is refused by a container without CAP_SYS_NICE, or by a control group without real-time bandwidth.
+    // Root can fail in a container without CAP_SYS_NICE, or in a control group without real-time bandwidth.
     return "in a container: docker run --cap-add SYS_NICE --cap-add IPC_LOCK --ulimit rtprio=98 --ulimit memlock=-1 "
            "...\n"
            "in a control group without real-time bandwidth: sudo sysctl -w kernel.sched_rt_runtime_us=-1\n" +

@@ -4,11 +4,11 @@
 
 namespace abs_hil::runtime {
 
-/// Commands for a shell that give this program SCHED_FIFO and locked memory, for good.
+/// Shell commands that permit this program SCHED_FIFO and locked memory permanently.
 [[nodiscard]] std::string privilege_fix();
-/// The same, with what else may keep the scheduler from granting `priority`.
+/// The same commands, and fixes for other causes that keep the scheduler from granting `priority`.
 [[nodiscard]] std::string fifo_fix(int priority);
-/// Commands that let the group realtime open /dev/cpu_dma_latency.
+/// Shell commands that let the group realtime open /dev/cpu_dma_latency.
 [[nodiscard]] std::string cpu_latency_fix();
 
 }  // namespace abs_hil::runtime

@@ -59,7 +59,7 @@ RealtimeStep bind_to_cpu(int cpu) {
   if (step.obtained) {
     step.detail = "runs on CPU " + std::to_string(sched_getcpu());
   } else {
-    step.detail = set_error == EINVAL ? "there is no such CPU, or this process may not use it"
+    step.detail = set_error == EINVAL ? "this CPU does not exist, or this process may not use it"
                                       : std::strerror(set_error != 0 ? set_error : get_error);
     step.fix = "taskset -cp $$   # shows the CPUs that may be used; then --set realtime.cpu=N, or -1 for any";
   }
@@ -74,7 +74,7 @@ RealtimeStep least_timer_slack() {
   const int got_ns = prctl(PR_GET_TIMERSLACK, 0, 0, 0, 0);
   step.obtained = set == 0 && got_ns >= 0 && got_ns <= static_cast<int>(least_ns);
   step.detail = set == 0 ? "slack is " + std::to_string(got_ns) + " ns" : std::strerror(error);
-  if (!step.obtained) step.fix = "none needed under SCHED_FIFO, which has no slack";
+  if (!step.obtained) step.fix = "no fix needed: timer slack does not apply under SCHED_FIFO";
   return step;
 }
 
@@ -95,7 +95,7 @@ std::string RealtimeReport::shortcomings() const {
     if (std::find(fixes.begin(), fixes.end(), step.fix) == fixes.end()) fixes.push_back(step.fix);
   }
   if (text.empty()) return text;
-  text += "  to mend it:";
+  text += "  to fix it:";
   for (const std::string_view fix : fixes) {
     text += "\n    ";
     for (const char c : fix) text += c == '\n' ? std::string("\n    ") : std::string(1, c);
@@ -115,7 +115,7 @@ RealtimeScope::RealtimeScope(const RealtimeOptions& options) {
   report_.steps.push_back(prefault_heap());
   report_.steps.push_back(prefault_stack());
   if (options.cpu >= 0) report_.steps.push_back(bind_to_cpu(options.cpu));
-  // Before SCHED_FIFO: a real-time thread has no slack to set.
+  // Set the slack before SCHED_FIFO: a real-time thread has none.
   report_.steps.push_back(least_timer_slack());
   report_.steps.push_back(schedule_fifo(options.priority));
   hold_cpu_latency();
@@ -125,8 +125,8 @@ RealtimeScope::~RealtimeScope() {
   if (cpu_latency_file_ >= 0) ::close(cpu_latency_file_);
 }
 
-// The kernel keeps the CPUs in states with an exit latency of at most the value written (us), as long as the file stays
-// open: Documentation/power/pm_qos_interface.rst.
+// As long as this file is open, the kernel keeps the CPUs in idle states whose exit latency is at most the value
+// written (us): Documentation/power/pm_qos_interface.rst.
 void RealtimeScope::hold_cpu_latency() {
   constexpr const char* device = "/dev/cpu_dma_latency";
   RealtimeStep step{.what = std::string(device) + " held at 0", .required = false};
@@ -141,7 +141,7 @@ void RealtimeScope::hold_cpu_latency() {
     step.detail = "the kernel's limit reads 0 us";
   } else {
     step.detail = written ? "the kernel's limit is still " + std::to_string(got_us) + " us" : std::strerror(error);
-    step.fix = error == ENOENT ? "none: this kernel has no CPU latency control (CONFIG_CPU_IDLE)" : cpu_latency_fix();
+    step.fix = error == ENOENT ? "no fix: this kernel has no CPU latency control (CONFIG_CPU_IDLE)" : cpu_latency_fix();
   }
   report_.steps.push_back(std::move(step));
 }

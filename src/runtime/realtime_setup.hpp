@@ -9,7 +9,7 @@
 
 namespace abs_hil::runtime {
 
-/// What `--rt` asks for.
+/// Values of `--rt`.
 enum class RealtimeMode { require, prefer, off };
 
 /// Everything below `realtime.` in the configuration.
@@ -23,14 +23,15 @@ struct RealtimeOptions {
   ABS_HIL_GROUP(OverrunOptions, overruns, "", {});
 };
 
-/// One step of the set-up, as it was observed and not as it was asked for.
+/// One step of the set-up, as observed afterwards (not as requested).
 struct RealtimeStep {
-  std::string what;  ///< "SCHED_FIFO priority 80", say
+  std::string what;  ///< for example "SCHED_FIFO priority 80"
   bool obtained{false};
-  /// Whether real time depends on it. What is merely helpful (C-states, timer slack) is reported, not required.
+  /// True if real time depends on this step. C-states and timer slack are only helpful: they are reported, not
+  /// required.
   bool required{true};
   std::string detail{};  ///< what was observed
-  std::string fix{};     ///< the commands that mend it, one a line; empty if obtained
+  std::string fix{};     ///< the commands that fix it, one per line; empty if obtained
 };
 
 /// Result of setting up this process and the calling thread for real time.
@@ -38,17 +39,17 @@ struct RealtimeReport {
   std::vector<RealtimeStep> steps;
   /// True only if every required step was obtained.
   [[nodiscard]] bool realtime() const noexcept;
-  /// The steps that were not obtained and, once each, their fixes; empty if there are none.
+  /// The steps that were not obtained, then their fixes, each once. Empty if every step was obtained.
   [[nodiscard]] std::string shortcomings() const;
 };
 
-/// Blocks all signals for the calling thread, so that another one runs their handlers.
+/// Blocks all signals for the calling thread, so that another thread runs their handlers.
 void keep_signals_away() noexcept;
 
-/// Real time for the thread that makes it, which is the one that will run the cycle; before its first one. Locks and
-/// prefaults memory (process), binds to a CPU, sets timer slack, SCHED_FIFO (thread) and keeps the CPUs out of deep
-/// C-states for as long as it lives; each step is read back. Never throws because of missing permissions: the report
-/// tells. Scheduling and locked memory stay when it is gone.
+/// Sets up real time for the thread that constructs it. Construct it in the cycle's thread, before the first cycle. It
+/// locks and prefaults the process' memory. It binds the thread to a CPU and sets its timer slack and SCHED_FIFO. It
+/// keeps the CPUs out of deep C-states for its lifetime. Each step is read back. It does not throw if permissions are
+/// missing; see the report. Scheduling and locked memory remain after its destruction.
 class RealtimeScope {
  public:
   explicit RealtimeScope(const RealtimeOptions& options);

@@ -10,19 +10,19 @@
 
 namespace abs_hil::runtime {
 
-/// Takes the records out of the ring, outside the real-time thread, and hands them to the sinks in order; adds the
-/// car's way since braking started (trapezoid of v_x over ticks).
+/// Moves records from the ring to the sinks, in order, outside the real-time thread. It adds the distance that the car
+/// has covered since braking started (trapezoidal rule on v_x).
 class RecordPump {
  public:
-  /// @param r2_m lower wheel's radius
+  /// @param r2_m lower wheel's radius, m
   RecordPump(RecordRing& ring, double r2_m, std::vector<rig::RecordSink*> sinks);
 
-  /// Hands on what is there, at most so many records. Returns their number.
+  /// Moves the records in the ring, at most `at_most`. Returns their number.
   std::size_t drain(std::size_t at_most = std::numeric_limits<std::size_t>::max());
-  /// Drains and finishes every sink, also when one of them throws; the first exception is thrown on.
+  /// Drains the ring and finishes every sink, even if one throws; then rethrows the first exception.
   void finish();
 
-  /// The last record handed on, for a status line.
+  /// The last record moved, for a status line.
   [[nodiscard]] const rig::CycleRecord& latest() const noexcept { return latest_; }
 
  private:

@@ -10,12 +10,14 @@ using rig::Reason;
 
 // docs/safety.md, "Where the bounds come from", derives these.
 constexpr double window_s = 0.1;
-constexpr double rise_max_kg_m_s = 0.25;     ///< of the momentum in a window, by the encoders' and stamps' errors
-constexpr double motor_counts_kg_m_s = 0.3;  ///< a smaller impulse is not looked for
-constexpr double motor_part = 0.25;          ///< of the expected impulse that must come
+constexpr double rise_max_kg_m_s =
+    0.25;  ///< largest rise of the momentum in a window from errors of encoders and time stamps
+constexpr double motor_counts_kg_m_s = 0.3;  ///< a smaller expected impulse of the motor is not checked
+constexpr double motor_part = 0.25;          ///< share of the expected impulse that must be measured
 constexpr double idle_brake_Nm = 0.1;
 constexpr double earnest_brake_Nm = 1.5;
-constexpr double moving_kg_m_s = 5.0;  ///< below this momentum the wheels are about to stop, brake or not
+constexpr double moving_kg_m_s =
+    5.0;  ///< below this momentum the wheels are about to stop, and the brake is not checked
 constexpr double brake_part = 0.3;
 constexpr double friction_margin = 2.0;
 
@@ -36,10 +38,10 @@ CheckResult ResponseCheck::update(const SpeedWindow& s, double brake_Nm) noexcep
   now_.most_duty = std::max(now_.most_duty, s.motor_duty);
   now_.rolls = now_.rolls && w.r1_m * s.omega1_rad_s >= 0.5 * w.r2_m * s.omega2_rad_s;
   if (now_.lasted_s < window_s) return {};
-  const CheckResult finding = before_.lasted_s > 0.0 ? judge(before_, now_) : CheckResult{};
+  const CheckResult result = before_.lasted_s > 0.0 ? judge(before_, now_) : CheckResult{};
   before_ = now_;
   now_ = {};
-  return finding;
+  return result;
 }
 
 CheckResult ResponseCheck::judge(const Window& before, const Window& now) const noexcept {

@@ -10,12 +10,12 @@
 namespace abs_hil::runtime {
 
 namespace {
-/// A little under two cycles at 1 kHz, so that jitter does not make three of them.
-constexpr double stride_s = 1.8e-3;
-/// One held-up answer is no fault, however long it took.
+/// Shortest duration of a speed window: a little less than two cycles at 1 kHz, so that jitter does not make it three.
+constexpr double speed_window_s = 1.8e-3;
+/// Fewer stale cycles in a row are no fault: a single delayed answer must pass, however long it took.
 constexpr int stale_cycles_max = 5;
 constexpr double resolution_counts = 2.0;
-/// No counter goes on by more than twice the overspeed does in the time since the measurement before, and this.
+/// Added to the time since the previous measurement: no counter moves faster than twice the overspeed in this time.
 constexpr double leap_slack_s = 1e-3;
 }  // namespace
 
@@ -76,7 +76,7 @@ CheckResult SpeedWindows::update(const rig::Measurement& measurement, std::int64
   }
 
   const double dt_s = static_cast<double>(measurement.time_ns - begin_ns_) * rig::s_per_ns;
-  if (dt_s < stride_s) return {};
+  if (dt_s < speed_window_s) return {};
   const double rad_s_per_count = limits_.rad_per_count / dt_s;
   speed_window_ = {.dt_s = dt_s,
                    .omega1_rad_s = rig::counts_between(begin_upper_, measurement.upper_counts) * rad_s_per_count,

@@ -9,37 +9,36 @@
 
 namespace abs_hil::runtime {
 
-/// A fault found, or none.
+/// Result of a plausibility check: the fault found, or none.
 struct CheckResult {
   rig::Reason reason{rig::Reason::none};
   double value{0.0};
   [[nodiscard]] bool sound() const noexcept { return reason == rig::Reason::none; }
 };
 
-/// What the wheels did over a stretch of about 2 ms, long enough for the encoders to tell, and what was sent meanwhile.
+/// Mean speeds and commands over about 2 ms, which is long enough for the encoders to resolve a speed.
 struct SpeedWindow {
   double dt_s{0.0};
-  double omega1_rad_s{0.0};  ///< mean over the stretch, from counts alone
+  double omega1_rad_s{0.0};  ///< mean over the window, from counts alone
   double omega2_rad_s{0.0};
-  double resolution_rad_s{0.0};  ///< what two counts are in this time
-  double brake_target_Nm{0.0};   ///< mean of b(u), or of the torque asked for with an ideal actuator
+  double resolution_rad_s{0.0};  ///< speed that corresponds to two counts in this time
+  double brake_target_Nm{0.0};   ///< mean of b(u); with an ideal actuator mean of the commanded torque
   double motor_duty{0.0};        ///< mean
 };
 
-/// Judges whether measurements are fresh and joins them to speed_windows. Real-time safe.
+/// Checks whether measurements are fresh and combines them into speed windows. Real-time safe.
 class SpeedWindows {
  public:
   explicit SpeedWindows(const PlausibilityLimits& limits) noexcept : limits_(limits) {}
 
-  /// Takes a measurement and the command that has acted since the one before.
-  /// @param now_ns  the cycle's wake-up, on the clock of the stamps
-  /// @param prompt  the reading was not held up, so that its stamp holds for its counts: no speed_window ends on
-  /// another
+  /// Takes a measurement and the command that has acted since the previous one.
+  /// @param now_ns  the cycle's wake-up, on the clock of the time stamps
+  /// @param prompt  the reading was not delayed, so its time stamp fits its counts. Only such a reading ends a window.
   CheckResult update(const rig::Measurement& measurement, std::int64_t now_ns, const rig::Command& sent,
                      bool prompt = true) noexcept;
-  /// True if the latest measurement may be used: fresh, and no counter has leapt.
+  /// True if the latest measurement may be used: it is fresh and no counter jumped.
   [[nodiscard]] bool usable() const noexcept { return usable_; }
-  /// True if the latest update completed a speed_window.
+  /// True if the latest update completed a speed window.
   [[nodiscard]] bool complete() const noexcept { return complete_; }
   [[nodiscard]] const SpeedWindow& speed_window() const noexcept { return speed_window_; }
 
@@ -58,10 +57,10 @@ class SpeedWindows {
   std::int64_t stamp_ns_{0};  ///< its stamp
   std::int32_t upper_{0};     ///< its counts
   std::int32_t lower_{0};
-  std::int64_t begin_ns_{0};  ///< of the speed_window
+  std::int64_t begin_ns_{0};  ///< start of the current speed window
   std::int32_t begin_upper_{0};
   std::int32_t begin_lower_{0};
-  double brake_impulse_Nms_{0.0};  ///< of b(u) over the speed_window
+  double brake_impulse_Nms_{0.0};  ///< integral of b(u) over the speed window
   double motor_duty_s_{0.0};
   SpeedWindow speed_window_{};
 };

@@ -9,8 +9,8 @@
 
 namespace abs_hil::runtime {
 
-/// The memory that a ring works on. Tests put a model in its place that plays through every interleaving and every
-/// value a load may return.
+/// Memory operations of a ring. Tests replace them by a model that tries every interleaving and every value that a load
+/// may return.
 struct NativeMemory {
   template <typename T>
   using Atomic = std::atomic<T>;
@@ -18,17 +18,17 @@ struct NativeMemory {
   using Slot = T;
 };
 
-/// Bounded queue from one producer thread to one consumer thread. A full ring drops the new element and counts it: the
-/// producer, the real-time thread, never waits. `push` is real-time safe: no lock, allocation or system call.
+/// Bounded queue from one producer thread to one consumer thread. A full ring drops the new element and counts it, so
+/// that the producer (the real-time thread) never waits. `push` is real-time safe: no lock, allocation or system call.
 template <typename T, typename Memory = NativeMemory>
 class SpscRing {
-  static_assert(std::is_trivially_copyable_v<T>, "elements are copied without running code of theirs");
+  static_assert(std::is_trivially_copyable_v<T>, "the ring copies elements bytewise");
 
  public:
-  /// Room for `capacity` elements, rounded up to a power of two.
+  /// The ring has room for `capacity` elements, rounded up to a power of two.
   explicit SpscRing(std::size_t capacity) : slots_(std::bit_ceil(capacity < 2 ? std::size_t{2} : capacity)) {}
 
-  /// Producer. False, and one more drop counted, if the ring is full.
+  /// Producer. Returns false and counts a drop if the ring is full.
   bool push(const T& element) noexcept {
     const std::uint64_t tail = tail_.load(std::memory_order_relaxed);
     if (tail - known_head_ == slots_.size()) {
@@ -43,7 +43,7 @@ class SpscRing {
     return true;
   }
 
-  /// Consumer. False if the ring is empty.
+  /// Consumer. Returns false if the ring is empty.
   bool pop(T& element) noexcept {
     const std::uint64_t head = head_.load(std::memory_order_relaxed);
     if (head == tail_.load(std::memory_order_acquire)) return false;
@@ -52,7 +52,7 @@ class SpscRing {
     return true;
   }
 
-  /// Elements refused so far; any thread may ask.
+  /// Number of dropped elements; any thread may call it.
   [[nodiscard]] std::uint64_t drops() const noexcept { return drops_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::size_t capacity() const noexcept { return slots_.size(); }
 
@@ -65,7 +65,7 @@ class SpscRing {
 
   static constexpr std::size_t cache_line = 64;
   std::vector<typename Memory::template Slot<T>> slots_;
-  // Producer and consumer write to lines of their own, so that neither slows the other down.
+  // Producer and consumer write to separate cache lines, so that neither slows down the other.
   alignas(cache_line) Counter tail_{0};
   std::uint64_t known_head_{0};  ///< producer's last look at head_
   Counter drops_{0};

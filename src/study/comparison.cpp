@@ -14,12 +14,12 @@ namespace abs_hil::study {
 namespace {
 
 void check(const ComparisonPlan& plan) {
-  if (plan.controllers.empty()) throw std::invalid_argument("--controllers: name at least one");
-  if (plan.repeat < 1) throw std::invalid_argument("--repeat: must be at least 1");
+  if (plan.controllers.empty()) throw std::invalid_argument("--controllers: empty list; give at least one controller");
+  if (plan.repeat < 1) throw std::invalid_argument("--repeat: give a number of at least 1");
   plant_sim::check(plan.settings.plant);
   for (auto name = plan.controllers.begin(); name != plan.controllers.end(); ++name) {
     if (std::find(plan.controllers.begin(), name, *name) != name) {
-      throw std::invalid_argument(fmt::format("--controllers: {} is named twice", *name));
+      throw std::invalid_argument(fmt::format("--controllers: {} is given twice; give each controller once", *name));
     }
     static_cast<void>(control::make_controller(*name, {plan.settings.control, plan.settings.plant.rig}));
   }

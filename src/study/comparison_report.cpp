@@ -1,4 +1,4 @@
-// The comparison as text, Markdown, CSV and JSON.
+// Writes the comparison as text, Markdown, CSV and JSON.
 
 #include <fmt/format.h>
 
@@ -16,7 +16,7 @@ namespace {
 using analysis::Estimate;
 using Cells = std::vector<std::vector<std::string>>;
 
-/// "2.331 ± 0.012", with the number of runs behind it where some have no value.
+/// "2.331 ± 0.012", followed by the number of runs if some have no value.
 std::string shown(const Estimate& e, std::size_t runs, int decimals, bool with_sign) {
   if (e.n == 0) return "-";
   std::string text = with_sign ? fmt::format("{:+.{}f}", e.mean, decimals) : fmt::format("{:.{}f}", e.mean, decimals);
@@ -29,7 +29,7 @@ std::string title_of(const ComparedMetric& metric) {
   return metric.unit.empty() ? std::string(metric.title) : fmt::format("{} / {}", metric.title, metric.unit);
 }
 
-/// Rows of the means: one a metric, a column for each controller.
+/// Rows of means: one row per metric, one column per controller.
 Cells mean_cells(const ComparisonTable& table) {
   Cells cells{{""}};
   for (const ControllerColumn& column : table.columns) cells[0].push_back(column.name);
@@ -62,7 +62,7 @@ Cells difference_cells(const ComparisonTable& table) {
   return cells;
 }
 
-/// Characters, not bytes.
+/// Number of characters, not bytes.
 std::size_t width_of(const std::string& text) {
   return static_cast<std::size_t>(
       std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
@@ -136,7 +136,7 @@ nlohmann::ordered_json json_of(const Estimate& e) {
 std::string to_text(const ComparisonTable& table) {
   std::string text = heading(table) + '\n' + aligned(mean_cells(table));
   if (table.columns.size() > 1) {
-    text += "\nDifferences, run by run on the same plants:\n" + aligned(difference_cells(table));
+    text += "\nDifferences, paired by plant:\n" + aligned(difference_cells(table));
   }
   if (table.paper_ratio) text += '\n' + ratio_line(*table.paper_ratio);
   return text;

@@ -23,7 +23,7 @@ constexpr std::array<ComparedMetric, 10> all_metrics{{
     {"theta_error_final", "theta error at end", "", 4, &Metrics::theta_error_final, true},
 }};
 
-/// A metric of every run, in order; NaN for runs that a fault ended.
+/// A metric of every run, in order; NaN for runs that ended by a fault.
 std::vector<double> values_of(const std::vector<RunResult>& runs, const ComparedMetric& metric) {
   std::vector<double> values;
   values.reserve(runs.size());

@@ -15,8 +15,8 @@ namespace abs_hil::study {
 
 namespace {
 
-/// Emptied after every cycle: RunSession's ring, made for a slow disk, would cost more to clear than the run to
-/// compute.
+/// The ring is emptied after every cycle. RunSession's larger ring is made for a slow disk, and clearing it would cost
+/// more than computing the run.
 constexpr std::size_t ring_capacity = 2;
 
 }  // namespace
@@ -41,7 +41,7 @@ RunResult simulate(const config::Settings& settings, const plant_sim::PlantOptio
     running = executive.step();
     pump.drain();
   }
-  // The last cycle of a whole sequence ends with a reason that is no fault; an early end by a limit or fault is one.
+  // The last cycle of a complete sequence has a reason that is not a fault; an early end has a limit or fault.
   const rig::Reason end = logic.end_reason();
   return {.metrics = metrics.metrics(), .fault = rig::is_fault(end) ? end : rig::Reason::none};
 }

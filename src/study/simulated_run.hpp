@@ -8,18 +8,18 @@
 
 namespace abs_hil::study {
 
-/// What a simulated run came to.
+/// Result of a simulated run.
 struct RunResult {
   analysis::Metrics metrics{};
-  rig::Reason fault{rig::Reason::none};  ///< what ended it early; its figures then hold up to there
+  rig::Reason fault{rig::Reason::none};  ///< reason of an early end; the metrics then cover the run up to it
   [[nodiscard]] bool stopped() const noexcept { return fault == rig::Reason::none; }
 };
 
 /// Runs one experiment in virtual time in the calling thread, through the program's own cycle, until its metrics are
-/// complete: the hold to standstill after braking is left out. A function of its arguments alone, whatever the thread.
-/// @param settings what controller and sequence are made of; `settings.plant` is the rig as the controller knows it
-/// @param plant the rig as it is
-/// @param seed of the simulator: where within a count the encoders start
+/// complete. It leaves out the hold phase after braking. The result depends on the arguments alone, not on the thread.
+/// @param settings  settings of controller and sequence; `settings.plant` is the rig as the controller knows it
+/// @param plant  the true parameters of the rig
+/// @param seed  seed of the simulator: the encoders' initial position within a count
 /// Throws std::invalid_argument for unusable options.
 [[nodiscard]] RunResult simulate(const config::Settings& settings, const plant_sim::PlantOptions& plant,
                                  std::uint64_t seed);

@@ -19,7 +19,7 @@ namespace {
 
 constexpr double fault_cost = 3.0;
 
-/// A place in the search space: each coordinate in [0, 1].
+/// A point of the search space: each coordinate in [0, 1].
 using Point = std::vector<double>;
 
 double rounded(double value) {
@@ -59,7 +59,7 @@ struct Case {
   double locked_distance_m{0.0};
 };
 
-/// Judges candidates: mean cost over the same cases for each.
+/// Evaluates candidates: mean cost over the same cases for each.
 class Judge {
  public:
   Judge(std::string_view controller, const TrainingSet& training, std::size_t threads)
@@ -67,7 +67,9 @@ class Judge {
         follows_slip_(follows_slip_reference(controller)),
         plants_(training.plants),
         threads_(threads) {
-    if (keys_.empty()) throw std::invalid_argument(fmt::format("{} has no gains to search for", controller));
+    if (keys_.empty())
+      throw std::invalid_argument(
+          fmt::format("controller {} has no gains to tune; give another controller", controller));
     if (plants_.empty() || training.cases_per_plant == 0) throw std::invalid_argument("the training set is empty");
     for (std::size_t p = 0; p < plants_.size(); ++p) {
       plants_[p].control.controller = controller;
@@ -94,7 +96,7 @@ class Judge {
     for (std::size_t d = 0; d < keys_.size(); ++d) values.push_back(value_at(keys_[d].search, point[d]));
     return values;
   }
-  /// Costs of candidates, in their order.
+  /// Costs of the candidates, in their order.
   [[nodiscard]] std::vector<double> costs(const std::vector<Point>& points) {
     std::vector<double> single(points.size() * cases_.size());
     for_each_index(single.size(), threads_, [&](std::size_t index) {
@@ -119,7 +121,7 @@ class Judge {
       return run_cost(simulate(candidate, on.options, on.sensor_seed), follows_slip_, on.locked_distance_m,
                       max_torque_Nm);
     } catch (const std::invalid_argument&) {
-      return fault_cost;  // gains that do not go together
+      return fault_cost;  // the constructor refuses this combination of gains
     }
   }
 
@@ -131,7 +133,7 @@ class Judge {
   std::size_t evaluations_{0};
 };
 
-/// Trial for member `i`: towards the best, plus a weighted difference of two others, crossed with the member itself.
+/// Trial for member `i`: moved towards the best, plus a weighted difference of two others, crossed with the member.
 Point trial(const std::vector<Point>& population, std::size_t i, std::size_t best, const SearchOptions& search,
             std::mt19937_64& generator) {
   const auto other = [&] {
@@ -190,7 +192,7 @@ TuningResult tune(std::string_view controller, const TrainingSet& training, cons
   const std::size_t size = search.population > 0 ? search.population : std::clamp<std::size_t>(8 * dimensions, 16, 40);
   std::mt19937_64 generator(search.seed);
 
-  // The gains there are now have no place in the first generation: the search must find the same whatever they are.
+  // The present gains are not part of the first generation: the search must not depend on them.
   TuningResult result{.start_cost = judge.costs({judge.start()}).front()};
   std::vector<Point> population(size, Point(dimensions));
   for (Point& point : population) {

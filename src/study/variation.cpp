@@ -14,9 +14,9 @@ namespace {
 
 constexpr double standard_magnitude = 0.1;
 constexpr double largest_magnitude = 0.5;
-constexpr double largest_C = 2.0;    ///< above it the tyre force would change sign at large slip
-constexpr double largest_u0 = 0.99;  ///< the dead zone leaves some duty to brake with
-/// Sensor seed of a series that does not vary the phase.
+constexpr double largest_C = 2.0;    ///< above this the tyre force would change sign at large slip
+constexpr double largest_u0 = 0.99;  ///< the dead zone must leave some duty for braking
+/// Seed of the sensors if the phase does not vary.
 constexpr std::uint64_t fixed_sensor_seed = 1;
 
 double parse_magnitude(std::string_view entry, std::string_view text) {
@@ -54,7 +54,7 @@ void parse_entry(std::string_view entry, Variation& v) {
     v.radii = magnitude();
   } else {
     throw std::invalid_argument(fmt::format(
-        "--vary: \"{}\" is not known; known: parameters, wheels, brake, tyre, theta, radii, phase, none", entry));
+        "--vary: \"{}\" is unknown; give parameters, wheels, brake, tyre, theta, radii, phase or none", entry));
   }
 }
 
@@ -105,7 +105,7 @@ Perturbation draw(const Variation& v, std::uint64_t seed, std::uint64_t index) {
   std::seed_seq sequence{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32U),
                          static_cast<std::uint32_t>(index), static_cast<std::uint32_t>(index >> 32U)};
   std::mt19937_64 generator(sequence);
-  // Every number is drawn, in this order, whether it is used or not.
+  // Draw all numbers in this order, also the unused ones.
   const auto factor = [&generator](double magnitude) { return 1.0 + magnitude * symmetric(generator); };
   Perturbation p;
   for (double* wheel : {&p.J1, &p.J2, &p.d1, &p.d2, &p.M10, &p.M20}) *wheel = factor(v.wheels);
@@ -129,7 +129,7 @@ plant_sim::PlantOptions perturbed(const plant_sim::PlantOptions& nominal, const 
   w.M20_Nm *= p.M20;
   w.r1_m *= p.r1;
   w.r2_m *= p.r2;
-  // b1 and b2 together: pads that rub better scale the whole map.
+  // Scale b1 and b2 together: better pads scale the whole map.
   rig::BrakeParameters& b = plant.rig.brake;
   b.b1_Nm *= p.brake_gain;
   b.b2_Nm *= p.brake_gain;
@@ -142,7 +142,7 @@ plant_sim::PlantOptions perturbed(const plant_sim::PlantOptions& nominal, const 
   plant_sim::IntecoMuParameters& mu = plant.inteco_mu;
   mu.a /= std::pow(p.B, mu.p);
   if (plant.load == "lever") {
-    // The force is friction times load: theta is no parameter there.
+    // Here the force is friction times load, and theta is not a parameter.
     plant.mu_peak *= p.theta;
     for (double* weight : {&mu.w1, &mu.w2, &mu.w3, &mu.w4}) *weight *= p.theta;
   } else {

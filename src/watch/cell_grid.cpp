@@ -7,7 +7,7 @@ namespace {
 
 constexpr char32_t replacement = U'?';
 
-/// Takes the first character off `text`, which is not empty.
+/// Removes and returns the first character of `text`, which must not be empty.
 char32_t take_character(std::string_view& text) {
   const auto byte = [&text](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char first = byte(0);

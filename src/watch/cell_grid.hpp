@@ -8,33 +8,33 @@
 
 namespace abs_hil::watch {
 
-/// How a cell looks; a terminal without colours shows all but `bold` and `alarm` alike.
+/// Style of a cell. A terminal without colours distinguishes only `bold` and `alarm` from the rest.
 enum class Style : std::uint8_t { normal, dim, bold, alarm, good, first_line, second_line };
 
-/// One character of a terminal.
+/// One character cell of a terminal.
 struct Cell {
   char32_t glyph{U' '};
   char32_t mark{0};  ///< combining mark over the glyph, 0 = none
   Style style{Style::normal};
 };
 
-/// A terminal's worth of characters, filled without a terminal. Writing outside is cut off.
+/// A grid of character cells, independent of any terminal. It ignores writes outside its area.
 class CellGrid {
  public:
-  /// Less than 1 column or row is 0 of them.
+  /// Negative sizes count as 0.
   CellGrid(int columns, int rows);
 
   [[nodiscard]] int columns() const noexcept { return columns_; }
   [[nodiscard]] int rows() const noexcept { return rows_; }
-  /// A blank for a place outside.
+  /// The cell, or a blank for a place outside.
   [[nodiscard]] Cell at(int column, int row) const noexcept;
 
   void put(int column, int row, Cell cell) noexcept;
-  /// Writes UTF-8 and returns the column behind it, wherever it was cut. Combining marks take no column; bytes that are
-  /// no UTF-8, and control characters, become '?'.
+  /// Writes UTF-8 and returns the column after the whole text, even if the text was cut off. Combining marks take no
+  /// column. Invalid UTF-8 and control characters become '?'.
   int write(int column, int row, std::string_view text, Style style = Style::normal);
 
-  /// The characters as UTF-8, one line a row, without blanks at their ends.
+  /// The characters as UTF-8, one line per row, without trailing blanks.
   [[nodiscard]] std::string to_text() const;
 
  private:
@@ -50,7 +50,7 @@ class CellGrid {
   std::vector<Cell> cells_;
 };
 
-/// Columns that UTF-8 text takes in a CellGrid.
+/// Number of columns that UTF-8 text takes in a CellGrid.
 [[nodiscard]] int columns_of(std::string_view text);
 
 }  // namespace abs_hil::watch

@@ -11,11 +11,11 @@ namespace {
 constexpr char32_t braille_blank = 0x2800;
 constexpr int braille_columns = 2;
 constexpr int braille_rows = 4;
-/// Bit of the dot in column x, row y of a braille character.
+/// Bit of the dot at column x, row y of a braille character.
 constexpr std::array<std::array<unsigned, braille_rows>, braille_columns> braille_bits{
     {{0x01, 0x02, 0x04, 0x40}, {0x08, 0x10, 0x20, 0x80}}};
 
-/// The smallest of 1, 2, 5, 10, 20 ... (and tenths) that is no less than `least`, > 0.
+/// The smallest number of the series 1, 2, 5, 10, 20 ... (and its tenths) that is at least `least`, > 0.
 double round_step(double least) {
   const double power = std::pow(10.0, std::floor(std::log10(least)));
   for (const double factor : {1.0, 2.0, 5.0}) {
@@ -52,7 +52,7 @@ void DotCanvas::dot(int x, int y, Style style, char mark) noexcept {
 
 void DotCanvas::line(int x0, int y0, int x1, int y1, Style style, char mark) noexcept {
   if (height_ == 0 || width_ == 0) return;
-  // Beforehand, so that a line to far outside costs nothing.
+  // Clamp first, so that a line to a far point costs nothing.
   y0 = std::clamp(y0, 0, height_ - 1);
   y1 = std::clamp(y1, 0, height_ - 1);
   if (std::max(x0, x1) < 0 || std::min(x0, x1) >= width_) return;

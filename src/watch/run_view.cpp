@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t samples_max = 600'000;  // 60 s at 10 kHz
 constexpr std::size_t text_max_bytes = 200;
-/// Networks may deliver a few messages out of order; a sequence further back is another run's.
+/// Networks may deliver a few messages out of order. A sequence number further back belongs to another run.
 constexpr std::int64_t late_messages_max = 16;
 
 double known(double truth, double estimate) { return std::isnan(truth) ? estimate : truth; }
@@ -26,7 +26,7 @@ bool RunView::admit(std::int64_t sequence, std::int64_t& latest, std::int64_t no
   if (sequence <= latest) {
     const bool late = sequence > latest - late_messages_max && sequence > 0;
     if (late) return false;
-    begin_run();  // sets `latest` back too
+    begin_run();  // also resets `latest`
   }
   return true;
 }
@@ -69,7 +69,7 @@ void RunView::take(const status_t& message, std::int64_t now_ns) {
 
 void RunView::take(const event_t& message, std::int64_t now_ns) {
   if (message.kind == telemetry::event_kind::command && message.sequence <= event_sequence_) {
-    // Given between two runs of a series, where numbers begin anew: the run that has ended stays in view.
+    // The command was answered between two runs of a series, with new sequence numbers: keep the ended run in view.
     last_received_ns_ = now_ns;
   } else {
     if (!admit(message.sequence, event_sequence_, now_ns)) return;

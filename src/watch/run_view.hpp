@@ -12,10 +12,10 @@
 
 namespace abs_hil::watch {
 
-/// What the plots show of one telemetry message; speeds and slip are the truth where it is known, else estimates. NaN:
-/// not known.
+/// The plotted values of one telemetry message. Speeds and slip are true values where known, else estimates. NaN: not
+/// known.
 struct Sample {
-  std::int64_t received_ns{0};  ///< watcher's clock
+  std::int64_t received_ns{0};  ///< receiver's monotonic clock
   double time_s{0.0};           ///< run time
   double omega1_rad_s{0.0};
   double omega2_rad_s{0.0};
@@ -23,11 +23,11 @@ struct Sample {
   double slip_ref{0.0};
   double theta_est_N{0.0};
   double theta_N{0.0};
-  bool after_gap{false};  ///< messages before this one were lost
+  bool after_gap{false};  ///< messages just before this one were lost
 };
 
-/// What a watcher knows of a run from the messages that came: some, none, or suddenly those of another run. `now_ns` is
-/// the watcher's own monotonic clock at the arrival. Texts from the network are made printable.
+/// The state of a run as far as received messages show it. Messages may be missing, and a new run may begin at any
+/// time. `now_ns` is the receiver's monotonic clock at the arrival. Texts from the network are made printable.
 class RunView {
  public:
   /// Keeps the samples of the last `window_s` seconds of run time, > 0.
@@ -37,7 +37,7 @@ class RunView {
   void take(const status_t& message, std::int64_t now_ns);
   void take(const event_t& message, std::int64_t now_ns);
   void take(const experiment_t& message, std::int64_t now_ns);
-  /// Something came that is no message of ours.
+  /// Counts a packet that is no message of a known type.
   void note_malformed() noexcept { ++malformed_; }
 
   [[nodiscard]] double window_s() const noexcept { return window_s_; }
@@ -45,22 +45,22 @@ class RunView {
   [[nodiscard]] const std::optional<telemetry_t>& telemetry() const noexcept { return telemetry_; }
   [[nodiscard]] const std::optional<status_t>& status() const noexcept { return status_; }
   [[nodiscard]] const std::optional<experiment_t>& experiment() const noexcept { return experiment_; }
-  /// The latest first, at most `events_max`.
+  /// The newest first, at most `events_max`.
   [[nodiscard]] const std::deque<event_t>& events() const noexcept { return events_; }
   static constexpr std::size_t events_max = 20;
 
-  /// Since any message came, s; empty if none ever did.
+  /// Time since the last message of any kind, s; empty if none has arrived.
   [[nodiscard]] std::optional<double> silence_s(std::int64_t now_ns) const noexcept;
-  /// Telemetry messages within the last second.
+  /// Number of telemetry messages within the last second.
   [[nodiscard]] std::size_t messages_last_second(std::int64_t now_ns) const noexcept;
-  /// Telemetry messages of this run that were sent and did not arrive.
+  /// Number of telemetry messages of this run that were sent but did not arrive.
   [[nodiscard]] std::int64_t lost() const noexcept { return lost_; }
   [[nodiscard]] std::int64_t malformed() const noexcept { return malformed_; }
-  /// Runs seen, the present one included.
+  /// Number of runs seen, including the present one.
   [[nodiscard]] int runs() const noexcept { return runs_; }
 
  private:
-  /// False for a message that is a late one of this run; begins a new run for one whose sequence has started again.
+  /// Returns false for a late message of this run. Begins a new run if the sequence has restarted.
   bool admit(std::int64_t sequence, std::int64_t& latest, std::int64_t now_ns);
   void begin_run() noexcept;
 
@@ -71,7 +71,7 @@ class RunView {
   std::optional<experiment_t> experiment_;
   std::deque<event_t> events_;
   std::optional<std::int64_t> last_received_ns_;
-  // latest sequence of each channel, -1: none in this run
+  // Latest sequence number of each channel; -1: none in this run.
   std::int64_t telemetry_sequence_{-1};
   std::int64_t status_sequence_{-1};
   std::int64_t event_sequence_{-1};

@@ -16,11 +16,11 @@
 namespace abs_hil::watch {
 namespace {
 
-constexpr double silent_after_s = 1.5;  // longer than the second between two messages of ABS_STATUS
+constexpr double silent_after_s = 1.5;  // ABS_STATUS comes every second
 constexpr int axis_columns = 8;
-constexpr int plot_rows_min = 3;  // title, and two of dots
+constexpr int plot_rows_min = 3;  // the title and two rows of dots
 
-/// Characters beyond ASCII and what stands for them.
+/// Characters beyond ASCII and their ASCII replacements.
 struct Words {
   std::string_view omega1, omega2, theta_est, theta, micro, dot;
 };
@@ -46,7 +46,7 @@ Style style_of(rig::Phase phase) {
   return phase == rig::Phase::brake ? Style::good : Style::bold;
 }
 
-/// A number in few characters, "-" for NaN. Values come from the network: any double there is.
+/// A number in few characters; "-" for NaN. The value comes from the network and may be any double.
 std::string number(double value, int decimals) {
   if (std::isnan(value)) return "-";
   return std::abs(value) < 1e6 ? fmt::format("{:.{}f}", value, decimals) : fmt::format("{:.1e}", value);
@@ -77,7 +77,7 @@ std::string values_text(const RunView& view, const Words& words) {
                      number(s.theta_est_N, 2));
 }
 
-/// Why the run ended in a fault, by the event or, if that was lost, by the reason in the telemetry.
+/// Why the run ended in a fault: from the event or, if that was lost, from the reason in the telemetry.
 std::string fault_text(const RunView& view) {
   for (const event_t& event : view.events()) {
     if (event.kind == "fault") return event.message.empty() ? event.reason_text : event.message;
@@ -117,7 +117,7 @@ class Screen {
                               words_.dot, e->backend));
     }
     const std::string text = liveness(view_, now_ns_);
-    // Over the names, if there is no room for both.
+    // Overwrite the names if there is no room for both.
     const int at = std::max(0, grid_.columns() - columns_of(text));
     grid_.write(at - 2, 0, "  ");
     const Style silent = has_ended(view_) ? Style::dim : Style::alarm;
@@ -125,17 +125,16 @@ class Screen {
   }
 
   void draw_waiting() {
-    grid_.write(0, 2, fmt::format("Nothing has come yet on {} at {}.", options_.channel, options_.source));
+    grid_.write(0, 2, fmt::format("No message has arrived yet on {} at {}.", options_.channel, options_.source));
     grid_.write(0, 3, "Start a run:  abs_hil", Style::dim);
-    grid_.write(0, 4, "Messages stay within one computer unless both sides say otherwise, as in", Style::dim);
-    grid_.write(0, 5, "--lcm-url udpm://239.255.76.67:7667?ttl=1", Style::dim);
+    grid_.write(0, 4, "By default messages stay on one computer. To receive from another one, give both", Style::dim);
+    grid_.write(0, 5, "programs --lcm-url udpm://239.255.76.67:7667?ttl=1", Style::dim);
     draw_malformed(6);
   }
 
   void draw_malformed(int row) {
     if (view_.malformed() == 0) return;
-    grid_.write(0, row, fmt::format("{} packets were no messages of this program's types", view_.malformed()),
-                Style::alarm);
+    grid_.write(0, row, fmt::format("{} packets had no message type of abs_hil", view_.malformed()), Style::alarm);
   }
 
   void draw_state() {
@@ -160,7 +159,7 @@ class Screen {
     }
   }
 
-  /// Timing, counts and events at the bottom; returns the first row that they take.
+  /// Draws timing, counts and events at the bottom. Returns the first row of these.
   int draw_foot() {
     const int events = std::clamp(grid_.rows() - 20, 1, 6);
     const int first = std::max(2, grid_.rows() - 1 - events - 2);
@@ -193,7 +192,7 @@ class Screen {
         s->realtime != 0 ? Style::normal : Style::alarm);
   }
 
-  /// What must be 0 stands out when it is not.
+  /// Draws the error counts; a count above 0 is highlighted.
   void draw_counts(int row) {
     int column = 0;
     const auto count = [&](std::string_view name, std::int64_t value) {
@@ -213,7 +212,7 @@ class Screen {
   void draw_plots(int end_row) {
     constexpr int first_row = 2;
     if (view_.samples().empty()) return;
-    const int rows = end_row - first_row - 1;  // one for the time axis
+    const int rows = end_row - first_row - 1;  // one row is for the time axis
     const int plots = std::clamp(rows / plot_rows_min, 0, 3);
     const int columns = grid_.columns() - axis_columns;
     if (plots == 0 || columns < 4) return;
@@ -237,7 +236,7 @@ class Screen {
 
   struct Plot {
     std::string_view title, first, second;
-    std::span<const PlotLine> lines;  ///< the second one first, so that the first is drawn over it
+    std::span<const PlotLine> lines;  ///< in drawing order: the first quantity comes last, on top
     ValueRange least, most;
   };
 

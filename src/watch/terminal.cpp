@@ -1,6 +1,6 @@
 #include "watch/terminal.hpp"
 
-// The wide characters of ncurses.
+// Selects the wide-character functions of ncurses.
 #define NCURSES_WIDECHAR 1
 #define NCURSES_NOMACROS 1
 #include <curses.h>
@@ -28,7 +28,7 @@ namespace {
 /// Signals that end the program without unwinding.
 constexpr std::array fatal_signals{SIGQUIT, SIGILL, SIGABRT, SIGBUS, SIGFPE, SIGSEGV};
 
-/// What a signal handler needs to give the terminal back: made beforehand, as it may call next to nothing.
+/// What a signal handler needs to restore the terminal. Prepared in advance, as a handler may call very little.
 struct Rescue {
   termios modes{};
   std::array<char, 128> text{};
@@ -47,7 +47,7 @@ void append_capability(const char* name) {
 extern "C" void give_back_and_die(int signal) {
   [[maybe_unused]] const auto written = ::write(STDOUT_FILENO, rescue.text.data(), rescue.size);
   ::tcsetattr(STDIN_FILENO, TCSANOW, &rescue.modes);
-  ::raise(signal);  // its default action, by SA_RESETHAND
+  ::raise(signal);  // SA_RESETHAND has restored the default action
 }
 
 void catch_fatal_signals() {
@@ -84,22 +84,22 @@ attr_t attributes_of(Style style) {
 }  // namespace
 
 bool locale_is_utf8() {
-  // Characters alone: numbers keep their decimal points.
+  // Only the character set: numbers keep their decimal points.
   return std::setlocale(LC_CTYPE, "") != nullptr && std::string_view(::nl_langinfo(CODESET)) == "UTF-8";
 }
 
 bool is_terminal() noexcept { return ::isatty(STDIN_FILENO) == 1 && ::isatty(STDOUT_FILENO) == 1; }
 
 Terminal::Terminal() : unicode_(locale_is_utf8()) {
-  if (!is_terminal()) throw std::runtime_error("stdin and stdout must be a terminal; --plain does without");
+  if (!is_terminal()) throw std::runtime_error("stdin and stdout must be a terminal; use --plain without one");
   ::tcgetattr(STDIN_FILENO, &rescue.modes);
   if (::newterm(nullptr, stdout, stdin) == nullptr) {
     const char* type = std::getenv("TERM");
     throw std::runtime_error(std::string("the terminal's type TERM='") + (type == nullptr ? "" : type) +
-                             "' is not known here; set TERM=vt100, or use --plain");
+                             "' is unknown on this computer; set TERM=vt100, or use --plain");
   }
   rescue.size = 0;
-  // liblcm tells there that it connects, and why it cannot: in the midst of the picture.
+  // liblcm writes connection messages to stderr, which would disturb the screen.
   if (::isatty(STDERR_FILENO) == 1) {
     const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
     stderr_ = ::fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3);
@@ -145,7 +145,7 @@ void Terminal::show(const CellGrid& grid) {
       const short pair = colours_ && colour_of(cell.style) >= 0 ? static_cast<short>(cell.style) : short{0};
       cchar_t character{};
       ::setcchar(&character, text.data(), attributes_of(cell.style), pair, nullptr);
-      ::mvwadd_wch(stdscr, row, column, &character);  // the last cell of the screen says ERR and is drawn nevertheless
+      ::mvwadd_wch(stdscr, row, column, &character);  // returns ERR for the last cell of the screen, but draws it
     }
   }
   ::wrefresh(stdscr);

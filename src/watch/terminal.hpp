@@ -4,12 +4,12 @@
 
 namespace abs_hil::watch {
 
-/// The terminal at stdin and stdout as a screen (ncurses); what libraries write to stderr does not get into it. The
-/// destructor gives it back as it was, and so do the signals that end a program without destructors (SIGQUIT, SIGSEGV,
-/// SIGABRT ...). One at a time.
+/// Uses the terminal at stdin and stdout as a screen (ncurses) and keeps stderr output of libraries out of it. The
+/// destructor restores the terminal. Signals that end a program without destructors (SIGQUIT, SIGSEGV, SIGABRT ...)
+/// restore it too. Only one object may exist at a time.
 class Terminal {
  public:
-  /// Throws std::runtime_error when stdin or stdout is no terminal, or of a type (TERM) that nobody knows.
+  /// Throws std::runtime_error if stdin or stdout is no terminal, or if its type (TERM) is unknown.
   Terminal();
   ~Terminal();
   Terminal(const Terminal&) = delete;
@@ -17,23 +17,23 @@ class Terminal {
 
   [[nodiscard]] int columns() const noexcept;
   [[nodiscard]] int rows() const noexcept;
-  /// True where the locale's characters are UTF-8.
+  /// True if the locale uses UTF-8.
   [[nodiscard]] bool unicode() const noexcept { return unicode_; }
 
   void show(const CellGrid& grid);
-  /// The next key typed, 0 if there is none. Also takes note of a new size.
+  /// Returns the next typed key, 0 if there is none. Also handles a change of the terminal's size.
   [[nodiscard]] int key();
 
  private:
   bool unicode_;
-  int stderr_{-1};  ///< kept for later if it is a terminal too
+  int stderr_{-1};  ///< the saved stderr if it is a terminal too
   bool colours_{false};
 };
 
 /// True if stdin and stdout are terminals.
 [[nodiscard]] bool is_terminal() noexcept;
 
-/// True where the locale that the environment names writes UTF-8. Sets the program's LC_CTYPE to it.
+/// True if the locale named in the environment uses UTF-8. Sets the program's LC_CTYPE to it.
 [[nodiscard]] bool locale_is_utf8();
 
 }  // namespace abs_hil::watch

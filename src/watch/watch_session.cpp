@@ -30,7 +30,7 @@ std::int64_t monotonic_ns() {
   return duration_cast<nanoseconds>(steady_clock::now().time_since_epoch()).count();
 }
 
-/// Messages into a view, stamped on arrival.
+/// Puts received messages with their arrival times into a view.
 class ViewFeed : public telemetry::RunObserver {
  public:
   explicit ViewFeed(double window_s) : view_(window_s) {}
@@ -62,7 +62,7 @@ class Session {
       terminal.show(draw_screen(feed_.view(), monotonic_ns(), screen_));
       const std::int64_t next_ns = monotonic_ns() + draw_period_ns;
       while (monotonic_ns() < next_ns && !stop_()) {
-        if (wait(next_ns, true)) return WatchEnd::quit;  // the terminal has gone
+        if (wait(next_ns, true)) return WatchEnd::quit;  // the terminal was closed
         for (int key = terminal.key(); key != 0; key = terminal.key()) {
           if (key == 'q' || key == 'Q') return WatchEnd::quit;
         }
@@ -89,7 +89,7 @@ class Session {
     screen_.rows = picture_rows;
     const std::int64_t start_ns = monotonic_ns();
     const std::int64_t end_ns = start_ns + static_cast<std::int64_t>(options_.once_timeout_s * 1e9);
-    // A status, and telemetry for a second, so that there is a rate to show.
+    // Complete with a status and one second of telemetry, so that there is a message rate to show.
     const auto complete = [&] {
       const RunView& view = feed_.view();
       return view.status() && !view.samples().empty() &&
@@ -105,18 +105,18 @@ class Session {
   }
 
  private:
-  /// Takes messages until `until_ns`, a key or a signal. True if the terminal's other end has gone.
+  /// Receives messages until `until_ns`, a key or a signal. Returns true if the terminal was closed.
   bool wait(std::int64_t until_ns, bool keys) {
     const std::int64_t left_ms = (until_ns - monotonic_ns() + rig::ns_per_ms - 1) / rig::ns_per_ms;
     std::array<pollfd, 2> ready{pollfd{listener_.file_descriptor(), POLLIN, 0}, pollfd{STDIN_FILENO, POLLIN, 0}};
     const auto timeout_ms = static_cast<int>(std::clamp<std::int64_t>(left_ms, 0, draw_period_ns / rig::ns_per_ms));
-    if (::poll(ready.data(), keys ? 2 : 1, timeout_ms) < 0) return false;  // EINTR: the caller asks why
-    // Also without descriptor, a tcpq server being away: LCM then tries to reach it again.
+    if (::poll(ready.data(), keys ? 2 : 1, timeout_ms) < 0) return false;  // EINTR: the caller checks for signals
+    // Also polls without a descriptor (a tcpq server is away): LCM then tries to reconnect.
     if (ready[0].fd < 0 || ready[0].revents != 0) listener_.poll();
     return keys && (ready[1].revents & (POLLHUP | POLLERR | POLLNVAL)) != 0;
   }
 
-  /// False when nobody reads any more.
+  /// Returns false if nobody reads the output any more.
   static bool print(const std::string& text) {
     return std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
   }

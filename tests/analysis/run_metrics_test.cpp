@@ -14,7 +14,7 @@ constexpr double r2_m = 0.1;
 constexpr double start_m_s = 10.0;
 constexpr double deceleration_m_s2 = 5.0;
 
-/// A car that brakes at a constant 5 m/s^2 from 10 m/s, from 1 s on, with the slip and the estimate given.
+/// A car that brakes at a constant 5 m/s^2 from 10 m/s, starting at 1 s, with the given slip and estimate.
 template <typename Slip, typename Theta>
 Metrics brake(Slip slip, Theta theta_est_N, double end_speed_m_s = 0.5, bool truth = true) {
   RunMetrics metrics(r2_m, end_speed_m_s);
@@ -59,9 +59,9 @@ TEST_CASE("stop time and distance of a constant deceleration") {
   CHECK_THAT(m.stop_distance_m, WithinAbs(10.0 * 1.901 - 2.5 * 1.901 * 1.901, 1e-6));
 }
 
-TEST_CASE("slip RMS looks at t > 0.3 s and v_x > 3 m/s only") {
+TEST_CASE("slip RMS covers only t > 0.3 s and v_x > 3 m/s") {
   const auto slip = [](double since_s) {
-    // One tick wider than what counts, so that rounding of the ticks at either end does not matter.
+    // One tick wider than the counted range, so that rounding of the end ticks does not matter.
     const bool counted = since_s > 0.2995 && start_m_s - deceleration_m_s2 * since_s > 2.9995;
     return counted ? 0.15 + 0.02 : 0.9;
   };
@@ -77,18 +77,18 @@ TEST_CASE("settling is the start of the last stay within the band") {
   CHECK(m.theta_final_N == 20.9);
 }
 
-TEST_CASE("what never settles has no settling time") {
+TEST_CASE("a quantity that never settles has no settling time") {
   const Metrics m = brake([](double) { return 0.5; }, [](double) { return 10.0; });
   CHECK(std::isnan(m.slip_settling_s));
   CHECK(std::isnan(m.theta_settling_s));
 }
 
-TEST_CASE("total variation sums the steps of the torque asked for") {
+TEST_CASE("total variation sums the steps of the torque reference") {
   const Metrics m = brake(on_target, exact);
   CHECK_THAT(m.torque_total_variation_Nm, WithinAbs(3000 * 0.5, 1e-6));
 }
 
-TEST_CASE("overshoot is the most that slip exceeds its reference by, above 3 m/s only") {
+TEST_CASE("overshoot is the largest excess of slip over its reference above 3 m/s") {
   const auto peak = [](double since_s) { return since_s > 0.5 && since_s < 0.6 ? 0.25 : (since_s > 1.45 ? 1.0 : 0.1); };
   CHECK_THAT(brake(peak, exact).slip_overshoot, WithinAbs(0.10, 1e-12));
   CHECK(brake([](double) { return 0.1; }, exact).slip_overshoot == 0.0);
@@ -129,14 +129,14 @@ TEST_CASE("the metrics are complete once the stop is known and phase brake is ov
   CHECK(metrics.complete());
 }
 
-TEST_CASE("without truth the estimates count, and theta has nothing to settle to") {
+TEST_CASE("without true values the metrics use estimates, and theta has no settling time") {
   const Metrics m = brake(on_target, exact, 0.5, false);
   CHECK_THAT(m.stop_time_s, WithinAbs(1.901, 1e-9));
   CHECK_THAT(m.slip_rms, WithinAbs(0.0, 1e-12));
   CHECK(std::isnan(m.theta_settling_s));
 }
 
-TEST_CASE("a run that never brakes has no figures") {
+TEST_CASE("a run that never brakes has no metrics") {
   RunMetrics metrics(r2_m, 0.3);
   metrics.consume({}, 0.0);
   CHECK(std::isnan(metrics.metrics().brake_start_s));

@@ -19,7 +19,7 @@ std::filesystem::path temporary_path() {
 
 }  // namespace
 
-TEST_CASE("the summary has the fields that scripts rely on, and null for what is not known") {
+TEST_CASE("the summary has the fields that scripts need, and null for unknown values") {
   RunSummary summary;
   summary.metrics.stop_time_s = 2.5;
   const auto json = to_json(summary);
@@ -76,7 +76,7 @@ TEST_CASE("every part of the cycle has its quantiles, and late cycles their caus
              Contains("control 3") && Contains("at most 7 in a row") && Contains("3 records dropped"));
 }
 
-TEST_CASE("the text says when real time was not obtained and when there is no truth") {
+TEST_CASE("the text says if real time was not obtained and if there are no true values") {
   RunSummary summary;
   CHECK_THAT(to_text(summary), Contains("NOT obtained") && Contains("estimates"));
   summary.realtime = true;
@@ -86,7 +86,7 @@ TEST_CASE("the text says when real time was not obtained and when there is no tr
   CHECK_THAT(to_text(summary), Contains("virtual time"));
 }
 
-TEST_CASE("a summary file is whole or not there") {
+TEST_CASE("a summary file is either complete or absent") {
   const auto path = temporary_path();
   { SummaryFile abandoned(path); }
   CHECK_FALSE(std::filesystem::exists(path));
@@ -102,7 +102,7 @@ TEST_CASE("a summary file is whole or not there") {
   std::filesystem::remove(path);
 }
 
-TEST_CASE("a place that cannot be written to is known at once") {
+TEST_CASE("an unwritable path is reported before the run") {
   CHECK_THROWS_WITH(SummaryFile("/nonexistent/dir/s.json"),
                     Contains("/nonexistent/dir/s.json") && Contains("existing"));
   CHECK_THROWS_WITH(SummaryFile(std::filesystem::temp_directory_path()), Contains("directory"));

@@ -50,7 +50,7 @@ TEST_CASE("samples too small have no interval, empty ones no mean") {
   CHECK(std::isnan(none.mean));
 }
 
-TEST_CASE("a paired difference sees through what varies both alike") {
+TEST_CASE("a paired difference cancels common variation") {
   const std::array base{1.0, 5.0, 9.0, 13.0};
   const std::array values{1.1, 5.2, 9.1, 13.2};
   const Estimate paired = estimate_difference(values, base);
@@ -68,7 +68,7 @@ TEST_CASE("pairs with one value missing are left out") {
   CHECK_THROWS_AS(estimate_difference(std::array{1.0}, std::array{1.0, 2.0}), std::invalid_argument);
 }
 
-TEST_CASE("a ratio turned round has the inverse interval") {
+TEST_CASE("an inverse ratio has the inverse interval") {
   const std::array base{1.0, 2.0, 4.0};
   const std::array values{0.5, 1.1, 1.8};
   const Estimate ratio = estimate_ratio(values, base);

@@ -1,4 +1,4 @@
-"""Bad input: status 2 (3 for what is not there), one clear line on stderr, and nothing written."""
+"""Bad input: status 2 (3 for a missing resource), one clear line on stderr, and no files written."""
 import unittest
 
 from program import ProgramTest
@@ -26,7 +26,7 @@ class BadInput(ProgramTest):
         self.refused([*usb, '--set', 'driver.usb.drive_pwm=1'], ['driver.usb.drive_pwm = driver.usb.brake_pwm = 1'])
         late = self.run_program('--backend', 'rig', '--no-lcm', '--set', 'driver.kind=usb', '--rate', '2000')
         self.assertEqual(late.returncode, 2, late.stderr)
-        self.assertIn('a cycle must not wait longer than its period; give less than 500', late.stderr)
+        self.assertIn('a cycle must not wait longer than its period; give a value below 500', late.stderr)
 
     def test_configuration_values(self):
         self.refused(['--set', 'plant.thetaN=3'], ['plant.thetaN', 'plant.theta_N'])

@@ -1,4 +1,4 @@
-"""The emulated CAN node as a process of its own, behind a socket in place of a bus, for the tests of driver.kind=can."""
+"""The emulated CAN node in its own process, behind a socket instead of a bus, for the tests of driver.kind=can."""
 import sys
 
 from emulator_process import EMULATOR, EmulatorProcess, EmulatorTest
@@ -30,5 +30,5 @@ class CanTest(EmulatorTest):
         return self.run_program(*self.arguments(node, '--fast', '--set', 'driver.emulated=true', *args))
 
     def real_time(self, node, *args):
-        # A guardian that is patient with this computer's own pauses.
+        # This guardian tolerates this computer's pauses.
         return self.start_program(*self.arguments(node, '--set', 'guardian.timeout_ms=1000', *args))

@@ -80,7 +80,7 @@ class CanRun(CanTest):
         for fault, words in BROKEN:
             with self.subTest(fault):
                 node = self.node('--lock-step', '--command', 'supply 24')
-                # The fault begins with the run's first cycles: the handshake, in which no time passes, is let through.
+                # The fault begins with the run's first cycles, after the handshake, in which no time passes.
                 program = self.real_time(node, '--fast', '--set', 'driver.emulated=true', '--set',
                                          'driver.can.answer_timeout_us=8000', '--set', 'experiment.idle_s=60',
                                          '--set', 'experiment.accelerate_limit_s=600')

@@ -25,7 +25,7 @@ CYCLE_NS = 1_000_000
 
 
 class Wire:
-    """LCM's multicast by hand, so that anything at all can be sent."""
+    """LCM's multicast protocol by hand, so that the test can send any packet."""
 
     def __init__(self):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -36,7 +36,7 @@ class Wire:
         try:
             self.socket.sendto(data, (GROUP, PORT))
         except OSError:
-            pass  # a full buffer: the flood is as fast as it gets
+            pass  # the buffer is full: the flood has its highest speed
 
     def message(self, channel, data):
         self.number += 1
@@ -48,7 +48,7 @@ class Wire:
 
 
 class Ear:
-    """Hears what goes over LCM's multicast from now on."""
+    """Receives all traffic on LCM's multicast from now on."""
 
     def __init__(self):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -58,7 +58,7 @@ class Ear:
         self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, struct.pack('=4sI', socket.inet_aton(GROUP), 0))
 
     def heard(self, channel, silence_s):
-        """The messages on a channel, until nothing at all has come for so long."""
+        """The messages on a channel, until no message has arrived for the given time."""
         self.socket.settimeout(silence_s)
         while True:
             try:
@@ -97,7 +97,7 @@ class Run:
         time.sleep(1.5)
 
     def wait_for_cycles(self):
-        """Until it is under way, however long the program took to start."""
+        """Waits until the run is under way, however long the program takes to start."""
         deadline = time.monotonic() + 20
         while not self.log.exists() or b'ABS_TELEMETRY' not in self.log.read_bytes():
             if time.monotonic() > deadline:
@@ -131,7 +131,7 @@ def live_changes(folder, key):
                                 (('gain', 'nosuch', '1'), 1, 'no key'), (('gain', 'zeta0', '1'), 1, 'cannot be changed')]:
         found, said = send(*words)
         check(found == status and text in said, f'send {" ".join(words)}', found, said)
-    # What was heard on the wire is of no use a second time, forged or changed neither.
+    # A recorded message cannot be used again, neither forged nor changed.
     state = [m for c, m in events_of(run.log) if c == 'ABS_COMMAND_STATE'][-1]
     wire, good = Wire(), command2(key, state.session, state.last_sequence + 1000, 'slip-ref', value=0.2)
     wire.message(b'ABS_COMMAND', good)
@@ -142,13 +142,13 @@ def live_changes(folder, key):
     check(send('start')[0] == 0, 'send start')
     time.sleep(6.4)
     found, said = send('gain', 'ka1', '3')
-    check(found == 0, 'a gain while it drives', said)
+    check(found == 0, 'a gain changes during the run', said)
     check(send('start')[0] == 1, 'a second start is refused')
     check(run.end() == 0, 'the run goes to its end', run.output)
     reasons = [m.reason for m in run.answers if 'wire' in m.message]
     check(reasons == [42, 41, 42, 38] or sorted(reasons) == [38, 41, 42, 42], 'repeated, forged, of another session',
           reasons)
-    check(subprocess.run([PROGRAM, 'replay', run.log, '--check']).returncode == 0, 'the changed run comes out again')
+    check(subprocess.run([PROGRAM, 'replay', run.log, '--check']).returncode == 0, 'replay reproduces the changed run')
     refs = {m.slip_ref for c, m in run.messages if c == 'ABS_TELEMETRY' and m.phase == m.PHASE_BRAKE}
     check(refs == {0.2}, 'the slip reference was followed', refs)
 
@@ -158,14 +158,14 @@ def not_enabled(folder):
     found, said = send('slip-ref', '0.2')
     check(found == 1 and 'commands.enabled' in said, 'commands are off unless enabled', found, said)
     found, said = send('stop')
-    check(found == 0 and 'stop accepted' in said, 'stop needs nothing', found, said)
-    check(run.end() == 1, 'and ends the run')
+    check(found == 0 and 'stop accepted' in said, 'stop needs no key', found, said)
+    check(run.end() == 1, 'stop ends the run')
     found, said = send('--timeout', '0.5', 'stop')
-    check(found == 3 and 'no answer' in said, 'nobody there', found, said)
+    check(found == 3 and 'no answer' in said, 'send reports that no run answers', found, said)
 
 
 def run_ends_meanwhile():
-    """A run, played here, that ends between a command and its answer."""
+    """A simulated run of this test that ends between a command and its answer."""
     ears = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     ears.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     ears.bind((GROUP, PORT))
@@ -191,7 +191,7 @@ def run_ends_meanwhile():
     said = ''.join(sender.communicate(timeout=30))
     check(sender.returncode == 1 and 'the run ended: brake -> stopped: all done' in said, 'send says that the run ended',
           sender.returncode, said)
-    check(time.monotonic() - started < 15, 'and does not wait for an answer that cannot come')
+    check(time.monotonic() - started < 15, 'send does not wait after the end of the run')
 
 
 def stop_latency(folder, tries, flood, judge=statistics.median_low):
@@ -234,19 +234,19 @@ def garbage(folder):
         wire.fragment(20_000, 0, 0, 3, b'ABS_COMMAND\0' + bytes(1000))                               # never completed
         time.sleep(0.002)
     for _ in range(20_000):
-        wire.message(b'ABS_COMMAND', whole[:-2] + b'xx')                                             # as fast as it goes
+        wire.message(b'ABS_COMMAND', whole[:-2] + b'xx')                                             # at the highest speed
     check(run.end() == 0, 'garbage, fragments and a flood end no run', run.output)
     counts = [m for c, m in run.messages if c == 'ABS_COMMAND_STATE'][-1]
     check(counts.malformed > 500 and counts.stops == 0, 'they are counted and ignored',
           counts.malformed, counts.dropped, counts.stops)
     cycles = [m.cycle for c, m in run.messages if c == 'ABS_TELEMETRY']
     check(cycles == list(range(len(cycles))), 'no record was lost', len(cycles))
-    check(len(run.answers) <= 12 * 12, 'a flood gets no flood of answers', len(run.answers))
+    check(len(run.answers) <= 12 * 12, 'a flood gets few answers', len(run.answers))
     print(f'malformed {counts.malformed}, dropped {counts.dropped}')
 
 
 def series(folder, key):
-    """A stop ends the whole series, in a run or between two; the same command goes on with the next run."""
+    """A stop during a run or between two runs ends the whole series; the same command continues with the next run."""
     script, out = pathlib.Path(folder, 'series.toml'), pathlib.Path(folder, 'series')
     script.write_text('[settings]\nexperiment.start_speed_rad_s = 60\n[[phase]]\nname = "brake"\nbrake = "controller"\n'
                       'until = { car_speed_below_m_s = 1 }\nat_most_s = 20\n'
@@ -280,19 +280,19 @@ def series(folder, key):
     check(answer.reason == 46 and 'wire' in answer.message and answer.stamp_ns > 0, 'a change between two runs is refused',
           answer.reason, answer.message)
     found, said = send('stop')
-    check(found == 0 and 'stop accepted' in said, 'a stop between two runs is taken', found, said)
+    check(found == 0 and 'stop accepted' in said, 'a stop between two runs is accepted', found, said)
     words, errors = program.communicate(timeout=20)
     check(program.returncode == 1 and 'ended by a stop command with 1 of 3 runs done, 0 ended early' in words,
           'and ends the series', program.returncode, words, errors)
     program = begin()
-    log = out / 'run-0002.part' / 'run.lcmlog'  # it loses the ending when the run is over
+    log = out / 'run-0002.part' / 'run.lcmlog'  # the folder is renamed when the run is over
     wait_for(lambda: log.exists() and b'ABS_TELEMETRY' in log.read_bytes(), 'the second run is under way')
     found, said = send('stop')
     check(found == 0, 'a stop in the second run', found, said)
     words, errors = program.communicate(timeout=20)
     check(program.returncode == 1 and 'ended by a stop command with 2 of 3 runs done, 1 ended early' in words,
           'ends the run and the series', program.returncode, words, errors)
-    check(statuses() == ['completed', 'fault', 'planned'], 'and is recorded', statuses())
+    check(statuses() == ['completed', 'fault', 'planned'], 'the index records the states', statuses())
 
 
 def main():

@@ -1,4 +1,4 @@
-"""abs_hil compare as its users run it: the same table whatever the threads, files that agree, bad input refused."""
+"""abs_hil compare as users run it: the same table with any number of threads, consistent files, bad input refused."""
 import json
 import unittest
 

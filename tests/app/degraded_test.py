@@ -1,5 +1,5 @@
-"""Disks that fill up, folders that vanish and a program that is killed: the cycle goes on, what is lost is counted and
-said, and what was written stays readable."""
+"""Full disks, vanishing folders and a killed program: the cycle continues, losses are counted and reported, and
+written data stays readable."""
 import os
 import resource
 import shutil
@@ -13,12 +13,12 @@ import unittest
 from program import PROGRAM, ProgramTest
 
 LOG_SYNC = 0xEDA1DA01
-# The simulated rig in real time, a few seconds.
+# The simulated rig in real time, for a few seconds.
 SHORT = ('--no-lcm', '--set', 'experiment.cut_speed_rad_s=25')
 
 
 def last_cycle_of_log(path):
-    """Of the telemetry in an event log whose last event may be cut."""
+    """Telemetry messages of an event log whose last event may be incomplete."""
     data, at, last = path.read_bytes(), 0, -1
     while at + 28 <= len(data):
         sync, _, _, channel_bytes, packet_bytes = struct.unpack_from('>IqqII', data, at)
@@ -34,7 +34,7 @@ def last_cycle_of_log(path):
 
 class Degraded(ProgramTest):
     def test_full_disk(self):
-        limit = 1_000_000  # for every file of the program's, its flight recorder's memory included
+        limit = 1_000_000  # for every file of the program, including its flight recorder's memory
         for option in ('--csv', '--log'):
             with self.subTest(option):
                 path, summary = self.folder / 'record', self.folder / 'summary.json'
@@ -50,7 +50,7 @@ class Degraded(ProgramTest):
                 counted = found['csv_rows_lost'] if option == '--csv' else found['publish_failures']
                 self.assertGreater(counted, 100)
                 if option == '--csv':
-                    # Whole rows up to where the disk was full.
+                    # Complete rows up to the point where the disk was full.
                     self.assertGreaterEqual(path.read_bytes().count(b'\n') - 1 + counted, found['cycles'] - 1)
                 else:
                     self.assertGreater(last_cycle_of_log(path), 100)
@@ -86,10 +86,10 @@ class Degraded(ProgramTest):
                     self.assertEqual(program.returncode, 1, errors)
                     self.assertIn(str(place), errors)
                 else:
-                    self.assertEqual(program.returncode, 0, errors)  # the open file took all that came
+                    self.assertEqual(program.returncode, 0, errors)  # the open file received all rows
 
     def last_time_s(self, csv):
-        """Of the rows that the kernel has."""
+        """Rows that have reached the kernel."""
         return float(csv.read_bytes().rsplit(b'\n', 2)[-2].split(b',')[0])
 
     def test_killed(self):
@@ -113,7 +113,7 @@ class Degraded(ProgramTest):
             program.communicate(timeout=20)
             self.assert_readable(csv, log)
         print('lost when killed (ms):', *(f'{ms:.0f}' for ms in sorted(lost_ms)))
-        # No more than what is between two hand-overs is lost; the usual one, as this computer stands still at times.
+        # At most the data between two hand-overs is lost. The usual bound applies, as this computer pauses at times.
         self.assertLessEqual(statistics.median(handed_over_s), 0.1)
 
     def assert_readable(self, csv, log):
@@ -122,7 +122,7 @@ class Degraded(ProgramTest):
         self.assertTrue(all(len(row) == 19 and None not in row.values() for row in rows))
         steps = [float(b['time_s']) - float(a['time_s']) for a, b in zip(rows, rows[1:])]
         self.assertGreater(min(steps), 0)
-        # Both are handed over by the same thread, one after the other.
+        # The same thread hands over both, one after the other.
         self.assertLess(abs(last_cycle_of_log(log) - (len(rows) - 1)), 200)
 
 

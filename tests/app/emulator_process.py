@@ -1,4 +1,4 @@
-"""A running abs_rig_emulator, whatever its board, told by lines into its control FIFO."""
+"""A running abs_rig_emulator for any board, controlled by lines written into its FIFO."""
 import pathlib
 import re
 import subprocess
@@ -11,13 +11,13 @@ EMULATOR = pathlib.Path(PROGRAM).parent / 'abs_rig_emulator'
 class EmulatorProcess:
     def __init__(self, folder, *args):
         self.control = folder / 'control'
-        self.lines = []  # all that it has said, stripped
+        self.lines = []  # all of its output lines, stripped
         self.process = subprocess.Popen([EMULATOR, '--control', self.control, *map(str, args)], stdout=subprocess.PIPE,
                                         stderr=subprocess.STDOUT, text=True)
         self.line('ready')  # "not in real time" may come before
 
     def line(self, start):
-        """Its next line with this start."""
+        """Its next line that begins with `start`."""
         for line in self.process.stdout:
             self.lines.append(line.strip())
             if line.startswith(start):
@@ -25,7 +25,7 @@ class EmulatorProcess:
         raise AssertionError(f'the emulator ended without "{start}": {self.lines}')
 
     def command(self, text):
-        """Its answer, once the command has been obeyed."""
+        """Its answer, after it has carried out the command."""
         with open(self.control, 'w') as fifo:
             fifo.write(text + '\n')
         return self.line(f'{text}: ')
@@ -36,7 +36,7 @@ class EmulatorProcess:
         return float(found[1]), float(found[2])
 
     def time_s(self):
-        """The board's own time; in lock-step it goes on with the program's cycles alone."""
+        """The board's own time; in lock-step only the program's cycles advance it."""
         return float(self.command('status').split('time ')[1].split()[0])
 
     def end(self):
@@ -57,7 +57,7 @@ class EmulatorProcess:
 
 
 class EmulatorTest(ProgramTest):
-    """Ends the programs and then the emulators that a test started, however it ends."""
+    """Ends the programs and then the emulators that a test started, however the test ends."""
 
     def setUp(self):
         super().setUp()
@@ -74,18 +74,18 @@ class EmulatorTest(ProgramTest):
         super().tearDown()  # removes the folder, in which nothing may be mounted any more
 
     def start_emulator(self, kind, *args):
-        """An EmulatorProcess of this kind with a folder of its own."""
+        """An EmulatorProcess of this kind with its own folder."""
         folder = self.folder / str(len(self._emulators))
         folder.mkdir()
         self._emulators.append(kind(folder, *args))
         return self._emulators[-1]
 
     def run_program(self, *args, **kwargs):
-        """abs_hil in this test's folder: the flight record of a fault goes there."""
+        """Starts abs_hil in this test's folder, which gets the flight record of a fault."""
         return super().run_program(*args, **{'cwd': self.folder, **kwargs})
 
     def start_program(self, *args):
-        """abs_hil in this test's folder."""
+        """Runs abs_hil in this test's folder."""
         self._programs.append(subprocess.Popen([pathlib.Path(PROGRAM).resolve(), *map(str, args)], cwd=self.folder,
                                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
         return self._programs[-1]

@@ -17,7 +17,7 @@ from live import URL, Run, check, compare_timing, drive_for, enter_private_netwo
 
 
 def hostile_packets():
-    """By hand, as (what it is, datagrams)."""
+    """Hand-made packets as (description, datagrams)."""
     wire = Wire()
     kept = []
     wire.raw = kept.append
@@ -63,19 +63,19 @@ def survives(program, folder):
         for datagram in datagrams:
             wire.raw(datagram)
         time.sleep(0.1)
-        check(run.process.poll() is None, f'{what}: it goes on', run.process.poll())
+        check(run.process.poll() is None, f'{what}: the run continues', run.process.poll())
     after = {what: memory_kB(run.process.pid, what) for what in before}
     print(f'memory, kB: before {before}, after {after}')
     # 256 MB were announced; what the program itself takes in these moments is little.
-    check(all(after[what] - before[what] < 8192 for what in before), 'no memory is taken for what is announced')
+    check(all(after[what] - before[what] < 8192 for what in before), 'announced sizes allocate no memory')
     run.end()
     counts = [m for c, m in events_of(log) if c == 'ABS_COMMAND_STATE'][-1]
-    # Of each kind what bears our channel: 1 + 20 + 20 + 1, and the one too long.
+    # Counted of each kind: the packets on our channel, 1 + 20 + 20 + 1, and the one that is too long.
     check(counts.malformed >= 42 and counts.stops == 0, 'they are counted and ignored', counts.malformed, counts.stops)
 
 
 def flood(end, kinds):
-    """As fast as it goes: garbage, other types, fragments, on our channels, until `end` is set."""
+    """Sends garbage, other types and fragments on our channels at the highest speed until `end` is set."""
     wire = Wire()
     telemetry = abs_hil.telemetry_t().encode()
     while not end.is_set():
@@ -106,14 +106,14 @@ class Flood:
 
 
 def same_bits_in_virtual_time(program, folder):
-    """The run as such, in lock-step with its plant: the CSV holds every command."""
+    """The run in lock-step with its plant; its CSV holds every command."""
     files = [pathlib.Path(folder, name) for name in ('left-alone.csv', 'flooded.csv')]
     options = ['--fast', '--lcm-url', URL, '--csv']
     subprocess.run([program, *options, files[0]], check=True, capture_output=True, timeout=60)
     with Flood('command', 'telemetry'):
         subprocess.run([program, *options, files[1]], check=True, capture_output=True, timeout=60)
     alone, flooded = (file.read_bytes() for file in files)
-    check(alone == flooded and alone.count(b'\n') > 5000, 'in virtual time every command is the same to the last bit',
+    check(alone == flooded and alone.count(b'\n') > 5000, 'in virtual time every command is bit-equal',
           len(alone), len(flooded))
 
 
@@ -128,10 +128,10 @@ def goes_on_in_real_time(program, folder, seconds, pairs):
         answers = [m for c, m in events_of(log) if c == 'ABS_EVENT' and m.kind == 'command']
         print(f'malformed {last.malformed}, dropped {last.dropped}, stops {last.stops}, answers {len(answers)}')
         check(last.malformed + last.dropped > 1000 and last.stops == 0, 'the flood is counted', last.malformed, last.dropped)
-        check(len(answers) <= 10 * (seconds + 2), 'a flood gets no flood of answers', len(answers))
+        check(len(answers) <= 10 * (seconds + 2), 'a flood gets few answers', len(answers))
         check((with_[-1]['telemetry_drops'], with_[-1]['publish_failures']) == (0, 0), 'no record is lost')
         replay = subprocess.run([program, 'replay', log, '--check'], capture_output=True, text=True, timeout=60)
-        check(replay.returncode == 0, 'each command is to the last bit what the measurements ask for', replay.stderr)
+        check(replay.returncode == 0, 'each command is bit-equal to that of the replayed measurements', replay.stderr)
     compare_timing('flooded', without, with_)
 
 

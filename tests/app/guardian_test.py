@@ -16,11 +16,11 @@ from rig_emulator import RigTest, skip_unless_possible
 SAFE = (0.0, 0.0)
 PHASES = ('idle', 'accelerate', 'coast', 'brake', 'hold')
 SIGNALS = (signal.SIGKILL, signal.SIGSTOP, signal.SIGSEGV)
-# Every phase lasts long enough to be hit, and the wheel turns too slowly for the last one to be over soon.
+# Every phase lasts long enough to be hit, and the wheel turns slowly, so that the last phase is not over soon.
 EXPERIMENT = ('experiment.idle_s=0.4', 'experiment.cut_speed_rad_s=25', 'experiment.coast_s=0.3',
               'experiment.end_speed_m_s=1.5', 'experiment.hold_torque_Nm=0.3')
 PR_SET_CHILD_SUBREAPER = 36
-# Longer than this computer stands still, so that a guardian acts for the test's reasons only.
+# Longer than this computer's pauses, so that a guardian acts for the test's reasons only.
 PATIENT_MS = 500
 
 
@@ -50,17 +50,17 @@ def wait_until(condition, what, seconds=20):
 class Guardian(RigTest):
     def setUp(self):
         super().setUp()
-        # Orphaned guardians become this process' children, to be waited for.
+        # Orphaned guardians become children of this process, which waits for them.
         ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
         self.record = self.folder / 'record'
 
     def start(self, emulator, timeout_ms, *args):
-        # Late cycles are this computer's affair: no reason to end a run here.
+        # Late cycles depend on this computer: they must not end a run here.
         return self.real_time(emulator, '--recorder', self.record, '--set', 'realtime.max_consecutive_overruns=0', *args,
                               guardian_timeout_ms=timeout_ms)
 
     def wait_for_phase(self, emulator, program, phase):
-        """Sees phases by what acts on the wire."""
+        """Detects phases from the outputs on the wire."""
         try:
             self.see_phase(emulator, program, phase)
         except AssertionError as error:
@@ -73,7 +73,7 @@ class Guardian(RigTest):
             return drive > 0.9, brake > 0.3, emulator.lower_speed()
         if phase == 'idle':
             wait_until(lambda: guardian_of(program.pid), 'no guardian')
-            time.sleep(0.15)  # before its first cycle a controller can drive nothing, and nobody listens for it
+            time.sleep(0.15)  # before its first cycle a controller drives nothing and has no guardian
             return
         wait_until(lambda: status()[0] and status()[2] > 1, 'never accelerated')
         if phase == 'accelerate':
@@ -106,7 +106,7 @@ class Guardian(RigTest):
                     guardian = guardian_of(program.pid)
                     before_ns = time.monotonic_ns()
                     program.send_signal(number)
-                    program.wait(timeout=20)  # a stopped one, too: its guardian ends it
+                    program.wait(timeout=20)  # also a stopped one: its guardian ends it
                     self.wait_until_guardian_ended(guardian)
                     self.assertEqual(emulator.wire(), SAFE)
                     took_ms[number].append(self.ms_until_zero(emulator, before_ns))
@@ -120,14 +120,14 @@ class Guardian(RigTest):
             print(f'{number.name}: both PWMs 0 after (ms)', *(f'{t:.1f}' for t in sorted(times)))
 
     def ms_until_zero(self, emulator, since_ns):
-        """By the card's clock; 0 if nothing was driven."""
+        """Time by the card's clock; 0 if nothing was driven."""
         widths = emulator.widths()
         self.assertEqual((widths.drive, widths.brake), (0, 0))
         self.assertGreater(widths.last_written_ns, since_ns)
         return max(0, widths.zero_since_ns - since_ns) * 1e-6
 
     def check_record(self):
-        """Whole rows at full rate, up to the end; the log is read by LCM's own reader in another test."""
+        """Complete rows at full rate up to the end; another test reads the log with LCM's own reader."""
         text = self.record_text()
         self.assertIn('the controller', text)
         csv_file = next(self.record.glob('*.csv'))
@@ -200,7 +200,7 @@ class Guardian(RigTest):
         for name, content in (('missing', None), ('none', '#!/bin/sh\nexit 0\n'), ('not a program', 'x')):
             with self.subTest(name):
                 if not content and shutil.which('abs_guardian'):
-                    continue  # an installed one takes its place
+                    continue  # an installed guardian replaces it
                 if content:
                     (alone / 'abs_guardian').write_text(content)
                     (alone / 'abs_guardian').chmod(0o755)
@@ -238,14 +238,14 @@ class Guardian(RigTest):
         self.wait_for_phase(emulator, program, 'accelerate')
         guardian = guardian_of(program.pid)
         emulator.command('fault 6c:wrong=1')
-        # The error stays until the controller has given up; then the guardian goes on.
+        # The error stays until the controller has given up; then the guardian continues.
         program.wait(timeout=20)
         self.assertEqual(program.returncode, 1)
         self.assertTrue(pathlib.Path(f'/proc/{guardian}').exists())
         emulator.command('fault 6c:ok')
         self.wait_until_guardian_ended(guardian)
         _, errors = program.communicate(timeout=20)
-        self.assertIn('goes on trying', errors)
+        self.assertIn('still tries to make the outputs safe', errors)
         self.assertIn('the controller could not verify the safe state', errors)
         self.assertIn('written and read back', errors)
         self.assertEqual(emulator.wire(), SAFE)

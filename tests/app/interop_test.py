@@ -25,13 +25,14 @@ CHANNELS = {'ABS_TELEMETRY': 'telemetry_t', 'ABS_STATUS': 'status_t', 'ABS_EVENT
 
 
 def urgent():
-    """lcm-logger and subscribers drop what they cannot take in time: give them priority where that is permitted."""
+    """Gives lcm-logger and subscribers priority where permitted, because they drop what they cannot read in time."""
     permitted = subprocess.run(['chrt', '-f', '10', 'true'], stderr=subprocess.DEVNULL).returncode == 0
     return ['chrt', '-f', '10'] if permitted else []
 
 
 def wait_for_listeners(count):
-    """Until so many sockets in this namespace listen on LCM's port 7667 = 0x1DF3; then LCM must enter its handlers."""
+    """Waits until that many sockets in this namespace listen on LCM's port 7667 = 0x1DF3, and until LCM has
+    entered its handlers."""
     for _ in range(400):
         if pathlib.Path('/proc/net/udp').read_text().count(':1DF3 ') >= count:
             time.sleep(0.3)
@@ -41,7 +42,7 @@ def wait_for_listeners(count):
 
 
 class Subscriber:
-    """All telemetry messages that arrive while it is open, through LCM's Python module."""
+    """Receives all telemetry messages through LCM's Python module while it is open."""
 
     def __init__(self, expected):
         self.packets = []
@@ -67,17 +68,17 @@ class Subscriber:
 
 
 def bits(value):
-    """Of a double; all NaN are one."""
+    """Bits of a double; all NaN are equal."""
     return 'NaN' if math.isnan(value) else struct.pack('>d', value).hex()
 
 
 def compare(name, messages, rows):
-    """Every row of the CSV against the message of its cycle: every column, to the last bit."""
+    """Compares every row of the CSV with the message of its cycle: every column, bit by bit."""
     assert [m.cycle for m in messages] == list(range(len(rows))), f'{name}: {len(messages)} messages, {len(rows)} rows'
     values = 0
     for message, row in zip(messages, rows):
         for column, text in row.items():
-            if not hasattr(message, column):  # a column that the CSV got later than the message type was published
+            if not hasattr(message, column):  # the CSV got this column after the message type was published
                 assert column not in CONTRACT, f'{name}: no field {column}'
                 continue
             seen = getattr(message, column)
@@ -98,10 +99,10 @@ def read_log(path):
     """Telemetry messages of an event log; every other message must be of its channel's type too."""
     telemetry = []
     for event in lcm.EventLog(str(path)):
-        if event.channel == 'LCM_SELF_TEST':  # liblcm's own, which lcm-logger records too
+        if event.channel == 'LCM_SELF_TEST':  # liblcm's own message, which lcm-logger also records
             continue
         message = abs_hil.decode(event.data)
-        # Channels that came later carry what they like, as long as it is one of our types.
+        # Later channels may carry any type, as long as it is one of ours.
         assert type(message).__name__ == CHANNELS.get(event.channel, type(message).__name__), (event.channel, type(message))
         if event.channel == 'ABS_TELEMETRY':
             telemetry.append(message)
@@ -133,7 +134,7 @@ def recorded_live_and_replayed(program, folder):
                    stdout=subprocess.DEVNULL)
     compare('lcm-logplayer', replayed.finish(), rows)
 
-    # The comparison itself must see a single wrong bit.
+    # The comparison itself must detect a single wrong bit.
     wrong = read_log(f'{folder}/own.lcmlog')
     wrong[500].slip_est = math.nextafter(wrong[500].slip_est, 2.0)
     try:

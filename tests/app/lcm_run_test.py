@@ -32,12 +32,13 @@ def messages(path):
 
 
 def sequence_of(packet):
-    """Second field of every message of ours, after the fingerprint and stamp_ns."""
+    """The second field of each of our messages, after the fingerprint and stamp_ns."""
     return struct.unpack_from('>q', packet, 16)[0]
 
 
 def wait_for_listener():
-    """Until somebody in this namespace listens on LCM's port 7667 = 0x1DF3, and then for LCM to enter its handlers."""
+    """Waits until a socket in this namespace listens on LCM's port 7667 = 0x1DF3, and until LCM has entered
+    its handlers."""
     for _ in range(200):
         if ':1DF3 ' in pathlib.Path('/proc/net/udp').read_text():
             time.sleep(0.3)
@@ -47,7 +48,7 @@ def wait_for_listener():
 
 
 def whole_run(program, folder):
-    # lcm-logger drops what it cannot take in time: give it priority over the machine's other work, where permitted.
+    # lcm-logger drops what it cannot read in time: give it priority over other processes, where permitted.
     urgent = ['chrt', '-f', '10'] if subprocess.run(['chrt', '-f', '10', 'true'], stderr=subprocess.DEVNULL).returncode == 0 else []
     logger = subprocess.Popen([*urgent, 'lcm-logger', '-q', f'{folder}/seen.lcmlog'])
     try:

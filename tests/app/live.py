@@ -1,5 +1,5 @@
-"""What the tests of a run on a network share: the network of their own, runs of a set length, subscribers and what the
-kernel did not give them."""
+"""Shared by the tests of a run on a network: a network namespace, runs of a set length, subscribers, and the
+datagrams that the kernel dropped."""
 import json
 import os
 import pathlib
@@ -14,7 +14,7 @@ LCM_PORT = 7667
 
 
 def enter_private_network(script, arguments):
-    """Goes on in a network namespace of its own; status 77 where there is none to be had."""
+    """Continues in a network namespace of its own; status 77 if none is available."""
     if os.environ.get('ABS_HIL_TEST_INSIDE') != '1':
         os.environ['ABS_HIL_TEST_INSIDE'] = '1'
         os.environ['ABS_HIL_RUNS_DIR'] = ''
@@ -28,13 +28,13 @@ def check(holds, what, *shown):
 
 
 def urgent():
-    """Precedence over the machine's other work for what must not miss anything, where permitted."""
+    """Gives a process that must not miss anything priority over other processes, where permitted."""
     wish = ['chrt', '-f', '10']
     return wish if subprocess.run([*wish, 'true'], stderr=subprocess.DEVNULL).returncode == 0 else []
 
 
 def drive_for(folder, seconds):
-    """An experiment that only drives, for so long."""
+    """An experiment that only drives for the given time."""
     path = pathlib.Path(folder, f'drive-{seconds}.toml')
     path.write_text('description = "drive"\n[[phase]]\nname = "accelerate"\nmotor = 0.3\n'
                     f'until = {{ lasts_s = {seconds} }}\n')
@@ -42,7 +42,7 @@ def drive_for(folder, seconds):
 
 
 class Run:
-    """The program, with a summary."""
+    """A running abs_hil that writes a summary."""
 
     def __init__(self, program, folder, *options):
         self.summary_file = pathlib.Path(folder, f'{time.monotonic_ns()}.json')
@@ -51,14 +51,14 @@ class Run:
 
     def end(self, timeout=120):
         self.output, self.errors = self.process.communicate(timeout=timeout)
-        check(self.process.returncode == 0, 'the run goes to its end', self.process.returncode, self.errors[-2000:])
+        check(self.process.returncode == 0, 'the run completes', self.process.returncode, self.errors[-2000:])
         self.summary = json.loads(self.summary_file.read_text())
         return self.summary
 
 
 def port_drops(pid=None):
-    """Datagrams that the kernel dropped at the sockets on LCM's port, of one process or of all: it had no room left
-    in their buffers."""
+    """Datagrams that the kernel dropped at the sockets on LCM's port, of one process or of all, because their
+    buffers were full."""
     inodes = None
     if pid is not None:
         links = []
@@ -77,7 +77,7 @@ def port_drops(pid=None):
 
 
 class Subscriber:
-    """The project's own receiver of runs (`RunListener`, as `abs_hil watch` has it) in a process of its own."""
+    """The project's own receiver of runs (`RunListener`, as in `abs_hil watch`) in its own process."""
 
     def __init__(self, helper, url, precedence=(), silence_s=2):
         self.process = subprocess.Popen([*precedence, helper, 'receive', url, str(silence_s)], stdout=subprocess.PIPE, text=True)
@@ -94,7 +94,7 @@ class Subscriber:
         self.process.send_signal(signal.SIGCONT)
 
     def result(self):
-        """What it saw; comes `silence_s` after the last message."""
+        """Its result, which comes `silence_s` after the last message."""
         text, _ = self.process.communicate(timeout=60)
         return json.loads(text)
 
@@ -109,8 +109,8 @@ def distribution(summaries, name):
 
 
 def compare_timing(title, without, with_):
-    """Both distributions, and whether the cycle's own statistics stayed the same: the medians of cycle and wake-up,
-    which the machine's other work does not move (it moves the tails, which are only shown)."""
+    """Compares both distributions, and checks that the cycle's own statistics stayed the same: the medians of cycle and
+    wake-up, which other processes do not change (they change the tails, which are only shown)."""
     for name in ('cycle_time_us', 'wakeup_latency_us', 'write_us'):
         for kind, summaries in (('without', without), (title, with_)):
             shown = '  '.join('/'.join(f'{value:g}' for value in row) for row in distribution(summaries, name))
@@ -121,7 +121,7 @@ def compare_timing(title, without, with_):
     def median(summaries, name):
         return statistics.median(summary[name]['p50'] for summary in summaries)
 
-    # Publishing in the cycle would cost 8 to 43 us with one to four subscribers, once a cycle: beyond these bounds.
+    # Publishing within the cycle would cost 8 to 43 us per cycle with one to four subscribers, more than these bounds.
     for name, slack_us in (('cycle_time_us', 6), ('wakeup_latency_us', 60)):
         before, after = median(without, name), median(with_, name)
         check(after <= 1.5 * before + slack_us, f'{title}: median of {name}: {before:g} without, {after:g} with')

@@ -1,4 +1,4 @@
-"""What a run leaves behind: CSV, summary, event log, words on stdout."""
+"""The outputs of a run: CSV, summary, event log, text on stdout."""
 import hashlib
 import json
 import math
@@ -36,7 +36,7 @@ class Outputs(ProgramTest):
         braking = [i for i, row in enumerate(rows) if row['phase'] == 'brake']
         first = braking[0]
         self.assertAlmostEqual(s['brake_start_s'], float(rows[first]['time_s']), places=9)
-        # Recomputed here from the rows, by the definitions of docs/telemetry.md.
+        # Recomputed from the rows by the definitions of docs/telemetry.md.
         v = [0.099 * float(row['omega2_rad_s']) for row in rows]
         t = [float(row['time_s']) for row in rows]
         stop = next(i for i in range(first, len(rows)) if v[i] < 0.3)
@@ -106,7 +106,7 @@ class Outputs(ProgramTest):
                 yield from names(value, f'{prefix}{name}.') if isinstance(value, dict) else [prefix + name]
 
         config = self.summary(summary)['config']
-        del config['experiment_script']  # no key: the script's text
+        del config['experiment_script']  # the script's text is not a key
         lines = self.run_program('list', '--keys').stdout.splitlines()
         self.assertEqual(sorted(line.split()[0] for line in lines), sorted(names(config)))
         listed = {line.split()[0]: line.split()[1] for line in lines}

@@ -10,7 +10,7 @@ import unittest
 
 PROGRAM = sys.argv.pop(1) if len(sys.argv) > 1 else 'build/release/bin/abs_hil'
 
-# Runs that name no place for their record leave none.
+# Runs without a named destination write no run folder.
 os.environ['ABS_HIL_RUNS_DIR'] = ''
 
 
@@ -26,7 +26,7 @@ class ProgramTest(unittest.TestCase):
         return subprocess.run([PROGRAM, *map(str, args)], capture_output=True, text=True, timeout=60, **kwargs)
 
     def fast(self, *args):
-        """A run in virtual time that must end well."""
+        """A run in virtual time that must complete."""
         result = self.run_program('--backend', 'sim', '--fast', '--no-lcm', *args)
         self.assertEqual(result.returncode, 0, result.stderr)
         return result

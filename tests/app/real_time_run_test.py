@@ -1,4 +1,4 @@
-"""Runs in real time, without LCM: the outcome is asserted, never the machine's timing."""
+"""Runs in real time without LCM: asserts the outcome, never the computer's timing."""
 import signal
 import subprocess
 import time

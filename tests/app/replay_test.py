@@ -27,7 +27,7 @@ class Replay(ProgramTest):
                 self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
                 self.assertEqual(result.stdout.count('bit-equal'), 1)
                 self.assertIn('faults were injected', result.stdout)
-                # It is the fault that comes out again, in its cycle.
+                # The replay finds the same fault in the same cycle.
                 self.assertEqual(self.run_program('convert', log, self.folder / f'{number}.csv').returncode, 0)
                 self.assertEqual(int(self.rows(self.folder / f'{number}.csv')[-1]['reason']), number)
 
@@ -59,7 +59,7 @@ class Replay(ProgramTest):
     def test_real_time_run(self):
         log = self.folder / 'real.lcmlog'
         self.run_program('--no-lcm', '--log', log, '--rt', 'off', '--set', 'experiment.cut_speed_rad_s=10', '--set',
-                         'experiment.accelerate_limit_s=0.5')  # ends with a fault: that comes out again as well
+                         'experiment.accelerate_limit_s=0.5')  # ends with a fault, which the replay finds again
         result = self.run_program('replay', log, '--check')
         self.assertEqual(result.returncode, 0, result.stderr + result.stdout)
         self.assertEqual(result.stdout.count('bit-equal'), 2)

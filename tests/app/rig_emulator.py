@@ -1,4 +1,4 @@
-"""The emulated rig as a process of its own, for the tests of --backend rig."""
+"""The emulated rig in its own process, for the tests of --backend rig."""
 import os
 import re
 import shutil
@@ -10,7 +10,7 @@ from emulator_process import EMULATOR, EmulatorProcess, EmulatorTest
 
 
 def why_not():
-    """Why FUSE trees cannot be served here; None if they can."""
+    """Why this computer cannot serve FUSE trees; None if it can."""
     if not EMULATOR.exists():
         return f'{EMULATOR} was not built (libfuse3-dev)'
     if not os.access('/dev/fuse', os.W_OK):
@@ -28,10 +28,10 @@ def skip_unless_possible():
 
 
 class Widths(typing.NamedTuple):
-    """Of both PWMs; times in ns of CLOCK_MONOTONIC."""
+    """State of both PWMs; times in ns of CLOCK_MONOTONIC."""
     drive: int
     brake: int
-    zero_since_ns: int | None  # None: not both are 0
+    zero_since_ns: int | None  # None: at least one is not 0
     last_written_ns: int
 
 
@@ -43,7 +43,7 @@ class Emulator(EmulatorProcess):
         super().__init__(folder, '--pci-root', self.root, '--truth', self.truth, *args)
 
     def widths(self):
-        """Both PWM width registers by the card's own account."""
+        """Both PWM width registers as the card reports them."""
         found = re.search(r'drive (\d+), brake (\d+), (?:not both 0|both 0 since (\d+) ns), last written at (\d+) ns',
                           self.command('widths'))
         return Widths(*(number and int(number) for number in found.groups()))
@@ -52,7 +52,7 @@ class Emulator(EmulatorProcess):
         return float(self.command('status').split('lower ')[1].split()[0])
 
     def turn(self, wheel, revolutions):
-        """By hand: over some time, as the driver takes nothing faster for a wheel."""
+        """Turns a wheel as by hand: over some time, because the driver accepts no faster change."""
         start = self.time_s()
         while self.time_s() < start + 0.02:
             pass
@@ -72,6 +72,6 @@ class RigTest(EmulatorTest):
                                 f'driver.pci.root={emulator.root}', *args)
 
     def real_time(self, emulator, *args, guardian_timeout_ms=1000):
-        """Patient with this computer's own pauses: a guardian must not end a run that only waits for its turn."""
+        """A guardian that tolerates this computer's pauses: it must not end a run that only waits for the processor."""
         return self.start_program('--backend', 'rig', '--no-lcm', '--set', f'driver.pci.root={emulator.root}', '--set',
                                   f'guardian.timeout_ms={guardian_timeout_ms}', *args)

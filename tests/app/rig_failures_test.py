@@ -1,4 +1,4 @@
-"""What goes wrong with a card, one row each: reason, exit status, and what is left on the wire."""
+"""Failures of a card, one per row: reason, exit status, and the final state of the wire."""
 import signal
 import subprocess
 import time
@@ -27,7 +27,7 @@ REFUSED = [
     ('no such kind', [], ['driver.kind=isa'], 2, 'driver.kind'),
 ]
 
-# name, command while accelerating, words on stderr; None: the wire is not there any more to be looked at
+# name, command while accelerating, words on stderr; None: the wire can no longer be examined
 BROKEN = [
     ('unplugged', 'unplug', 'board is gone', 'held'),
     ('all ones', 'all-ones on', 'board is gone', 'held'),
@@ -72,7 +72,7 @@ class RigFailures(RigTest):
 
     def wait_until_driving(self, emulator):
         deadline = time.monotonic() + 20
-        # A turning wheel, too: an overspeed latched at standstill would be let go at once.
+        # A turning wheel is needed too: an overspeed latched at standstill would be released at once.
         while emulator.wire()[0] < 0.9 or emulator.lower_speed() < 5:
             self.assertLess(time.monotonic(), deadline, 'the drive was never switched on')
 
@@ -89,7 +89,7 @@ class RigFailures(RigTest):
                 if wire == 'safe':
                     self.assertEqual(emulator.wire(), SAFE)
                 else:
-                    # Nothing can reach the wire: the PWMs hold, and the user is told to act.
+                    # Nothing can reach the wire: the PWMs hold, and a message asks the user to act.
                     self.assertIn('the safe state may not have reached the board', errors)
                     self.assertGreater(emulator.wire()[0], 0.9)
                 emulator.end()
@@ -128,7 +128,7 @@ class RigFailures(RigTest):
 
     def test_commission_by_hand(self):
         emulator = self.emulator()
-        # A guardian patient with this computer's pauses.
+        # This guardian tolerates this computer's pauses.
         arguments = [self.program_path(), 'commission', '--set', f'driver.pci.root={emulator.root}', '--set',
                      'guardian.timeout_ms=1000']
         program = subprocess.Popen(arguments, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,

@@ -8,7 +8,7 @@ class RigRealTime(RigTest):
     def test_paper_experiment(self):
         emulator = self.emulator()
         summary = self.folder / 'summary.json'
-        # 1 kHz leaves the emulator's file system no time to spare where another program runs beside it.
+        # 1 kHz leaves the emulator's file system no spare time if another program runs at the same time.
         program = self.real_time(emulator, '--summary', summary, '--rate', '500')
         _, errors = program.communicate(timeout=40)
         self.assertEqual(program.returncode, 0, errors)

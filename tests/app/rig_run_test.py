@@ -9,7 +9,7 @@ DOCUMENT = pathlib.Path(__file__).parents[2] / 'docs' / 'rig-setup.md'
 
 
 def documented_cycle():
-    """The accesses that docs/rig-setup.md gives for one cycle: (direction, offset, value or a word for it)."""
+    """The accesses of one cycle according to docs/rig-setup.md: (direction, offset, value or its name)."""
     block = re.search(r'```register-traffic\n(.*?)```', DOCUMENT.read_text(), re.S).group(1)
     return [tuple(line.split('#')[0].split()) for line in block.splitlines() if line.strip()]
 
@@ -22,7 +22,7 @@ class RigRun(RigTest):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn('not verified on hardware', result.stderr)
         self.assertIn('11 register accesses a cycle', result.stderr)
-        # The rig's brake is capped at 0.7; the comparison is with the same cap.
+        # The rig's brake is capped at 0.7, so the comparison uses the same cap.
         self.fast('--summary', sim, '--set', 'gate.brake_duty_max=0.7')
         r, s = self.summary(rig), self.summary(sim)
         self.assertEqual(r['config']['gate']['brake_duty_max'], 0.7)

@@ -110,13 +110,13 @@ class RigScript(RigTest):
         read = PageReader(report(rig))
         text = page.read_text()
         self.assertEqual(read.cell('metrics', 'speeds and slip'), 'estimates')
-        self.assertIn('Estimated from the encoders', text)
-        self.assertIn('know no true θ', text)
-        # θ is not known, so neither it nor the error against it is drawn; what the encoders tell is.
+        self.assertIn('Runs without true values show estimates from the encoders', text)
+        self.assertIn('have no true θ', text)
+        # The true θ is unknown, so neither it nor the error is drawn; values from the encoders are.
         self.assertEqual([curve['quantity'] for curve in read.figures['fig9']], ['theta_est'])
         for figure in ('fig5', 'fig6', 'fig7', 'fig8', 'fig10'):
             self.assertGreater(max(curve['drawn'] for curve in read.figures[figure]), 50, figure)
-        # Beside a simulated run: that one has its truth.
+        # A simulated run on the same page shows its truth.
         read = PageReader(report(rig, sim))
         self.assertEqual([read.cell('metrics', 'speeds and slip', run) for run in (1, 2)], ['estimates', 'truth'])
         self.assertEqual({(curve['run'], curve['quantity']) for curve in read.figures['fig9']

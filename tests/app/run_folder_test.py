@@ -1,4 +1,4 @@
-"""--out: a folder with all of a run's record, and the default one below runs/."""
+"""--out: a folder with all files of a run, and the default one below runs/."""
 import csv
 import hashlib
 import json
@@ -77,7 +77,7 @@ class RunFolder(ProgramTest):
         result = self.run_program('--no-lcm', '--rt', 'off', '--set', 'experiment.start_speed_rad_s=20',
                                   env={**os.environ, 'ABS_HIL_RUNS_DIR': str(place / 'runs')})
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertIn('leaves no folder', result.stderr)
+        self.assertIn('leaves no run folder', result.stderr)
 
 
 if __name__ == '__main__':

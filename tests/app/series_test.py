@@ -1,4 +1,4 @@
-"""Experiment files and series, as users run them."""
+"""Experiment files and series of runs, as users run them."""
 import json
 import os
 import re
@@ -71,7 +71,7 @@ class Series(ProgramTest):
         self.assertEqual(program.returncode, 130, errors)
         done = [run['folder'] for run in self.index(out) if run['status'] == 'completed']
         self.assertIn(f'interrupted with {len(done)} of 4 runs done, 0 ended early, in {out}', words)
-        self.assertIn(f'the same command with --out {out} goes on', words)
+        self.assertIn(f'to continue, repeat the command with --out {out}', words)
         self.assertTrue(0 < len(done) < 4)
         before = {name: (out / name / 'SHA256SUMS').read_bytes() for name in done}
         result = subprocess.run(command, capture_output=True, text=True, timeout=60)
@@ -79,7 +79,7 @@ class Series(ProgramTest):
         self.assertEqual({run['status'] for run in self.index(out)}, {'completed'})
         for name, sums in before.items():
             self.assertEqual((out / name / 'SHA256SUMS').read_bytes(), sums)
-        # Another series does not go into the same folder.
+        # Another series of runs does not go into the same folder.
         result = self.run_program(*command[1:], '--set', 'control.slip_ref=0.2')
         self.assertEqual(result.returncode, 2)
         self.assertIn('another series', result.stderr)

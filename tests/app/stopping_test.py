@@ -1,4 +1,4 @@
-"""Signals, terminals that go away and pipes that break, for a run in real time on the simulated rig."""
+"""Signals, closed terminals and broken pipes, for a run in real time on the simulated rig."""
 import os
 import pty
 import signal
@@ -14,7 +14,7 @@ SIGNALS = ((signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129))
 
 class Stopping(ProgramTest):
     def start(self, *args, **streams):
-        """A run that accelerates; returns once its motor is on, as its CSV tells."""
+        """A run that accelerates; returns once the CSV shows that the motor is on."""
         self.csv, self.summary_file = self.folder / 'run.csv', self.folder / 'summary.json'
         self.csv.unlink(missing_ok=True)
         streams = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, **streams}
@@ -34,7 +34,7 @@ class Stopping(ProgramTest):
             self.assertLess(time.monotonic(), deadline, f'no more than {seen} rad/s')
             self.assertIsNone(program.poll(), 'it ended by itself')
             time.sleep(0.02)
-            head, *rows = self.csv.read_text().split('\n')[:-1]  # whole rows
+            head, *rows = self.csv.read_text().split('\n')[:-1]  # complete rows
             seen = float(rows[-1].split(',')[head.split(',').index('omega2_rad_s')])
 
     def end(self, program):
@@ -52,10 +52,10 @@ class Stopping(ProgramTest):
     def test_second_signal_stops_at_once(self):
         for number, status in SIGNALS:
             with self.subTest(number.name):
-                # The first one brakes for a minute: wheels that nothing brakes run on for longer.
+                # The first one brakes for a minute: wheels without a brake turn for longer.
                 program = self.start('--set', 'experiment.stop_brake_duty=0.01', '--set',
                                      'experiment.stop_brake_limit_s=60')
-                self.wait_for_speed(program, 20.0)  # at standstill the brake would have nothing to do
+                self.wait_for_speed(program, 20.0)  # at standstill the brake would not act
                 program.send_signal(signal.SIGINT)
                 deadline = time.monotonic() + 20
                 while b',hold,' not in self.csv.read_bytes()[-3000:]:
@@ -78,7 +78,7 @@ class Stopping(ProgramTest):
 
     def test_closed_streams_and_broken_pipes_harm_nothing(self):
         read, write = os.pipe()
-        os.close(read)  # whoever read it has gone
+        os.close(read)  # the reader has closed its end
         for name, streams in (('broken pipes', {'stdout': write, 'stderr': write}),
                               ('closed', {'preexec_fn': lambda: [os.close(fd) for fd in (0, 1, 2)]})):
             with self.subTest(name):
@@ -94,7 +94,7 @@ class Stopping(ProgramTest):
         ours, theirs = pty.openpty()
         program = self.start(stdin=theirs, stdout=theirs, stderr=theirs, preexec_fn=lambda: take_terminal(theirs))
         os.close(theirs)
-        os.close(ours)  # the kernel hangs it up: SIGHUP, and every write fails
+        os.close(ours)  # the kernel hangs up: SIGHUP, and every write fails
         self.assert_stopped_in_order(program, 129)
 
     def test_terminal_that_goes_away_under_nohup(self):
@@ -109,7 +109,7 @@ class Stopping(ProgramTest):
 
 
 def take_terminal(terminal, ignore=False):
-    """In the child: a session of its own, whose terminal this is."""
+    """Runs in the child: gives it its own session with this terminal."""
     import fcntl
     import termios
     os.setsid()

@@ -14,8 +14,8 @@ from live import URL, Run, Subscriber, check, compare_timing, drive_for, enter_p
 
 
 def receives_all(program, helper, folder, seconds, rate_Hz, tries=1):
-    """The receiver's kernel buffer takes what comes while its process has to wait for the processor. The run has room for
-    some seconds of its own messages at 1 kHz, a tenth of that at 10 kHz: there a busy machine gets further tries."""
+    """The receiver's kernel buffer holds the messages that arrive while its process waits for the processor. It has room
+    for some seconds of messages at 1 kHz and a tenth of that at 10 kHz: there a busy computer gets further tries."""
     url = f'{URL}&recv_buf_size={4 << 20}'
     subscriber = Subscriber(helper, url, urgent())
     run = Run(program, folder, *drive_for(folder, seconds), '--rate', rate_Hz, '--set',
@@ -29,19 +29,19 @@ def receives_all(program, helper, folder, seconds, rate_Hz, tries=1):
     if tries > 1 and (summary['telemetry_drops'] or subscriber.kernel_drops):
         print(f'the processor was taken away for too long ({summary["telemetry_drops"]} records lost): again', flush=True)
         return receives_all(program, helper, folder, seconds, rate_Hz, tries - 1)
-    check((summary['telemetry_drops'], summary['publish_failures']) == (0, 0), 'the run itself lost nothing',
+    check((summary['telemetry_drops'], summary['publish_failures']) == (0, 0), 'the run dropped nothing',
           summary['telemetry_drops'], summary['publish_failures'])
-    check(subscriber.kernel_drops == 0, 'nor did the receiver in its own buffer', subscriber.kernel_drops)
+    check(subscriber.kernel_drops == 0, 'the receiver dropped nothing', subscriber.kernel_drops)
     check((seen['received'], seen['lost'], seen['malformed']) == (summary['cycles'], 0, 0),
           f'each of {summary["cycles"]} messages arrived', seen)
 
 
 def nobody_slows_the_cycle(program, helper, folder, seconds, pairs):
     without, with_ = [], []
-    for _ in range(pairs):  # in turn, as the machine's other work comes and goes
+    for _ in range(pairs):  # alternating, because the computer's load varies
         without.append(Run(program, folder, *drive_for(folder, seconds)).end())
         readers = [Subscriber(helper, URL) for _ in range(4)]
-        # A small buffer, which is full within the run.
+        # A small buffer, which fills up during the run.
         idle = Subscriber(helper, f'{URL}&recv_buf_size=65536')
         try:
             idle.stand_still()
@@ -59,10 +59,10 @@ def nobody_slows_the_cycle(program, helper, folder, seconds, pairs):
         check((with_[-1]['telemetry_drops'], with_[-1]['publish_failures']) == (0, 0), 'the run drops nothing itself')
         for reader, seen in zip(readers, results):
             missing = cycles - seen['received']
-            check(missing == 0 or reader.kernel_drops >= missing, 'what a reader misses its own buffer has dropped',
+            check(missing == 0 or reader.kernel_drops >= missing, 'a reader misses only what its own buffer dropped',
                   cycles, seen, reader.kernel_drops)
         missing = cycles - late['received']
-        check(0 < missing <= idle.kernel_drops, 'who does not read loses in a buffer of its own, where it is counted',
+        check(0 < missing <= idle.kernel_drops, 'a subscriber that does not read loses only messages of its own buffer',
               cycles, late, idle.kernel_drops)
         print(f'{cycles} cycles; readers missed {[cycles - seen["received"] for seen in results]}; who read nothing '
               f'missed {missing}, the kernel dropped {idle.kernel_drops} datagrams of all channels there', flush=True)
@@ -70,14 +70,14 @@ def nobody_slows_the_cycle(program, helper, folder, seconds, pairs):
 
 
 def publishes_faster_than_10_kHz(helper, count=50_000):
-    """As fast as it goes, with somebody who listens."""
+    """At the highest speed, with a subscriber."""
     subscriber = Subscriber(helper, f'{URL}&recv_buf_size={4 << 20}', urgent())
     said = subprocess.run([helper, 'publish', URL, str(count), '0', '/dev/null'], capture_output=True, text=True, timeout=60)
     subscriber.end()
     found = re.search(r'published (\d+) in ([\d.]+) s, failures (\d+)', said.stdout)
-    check(said.returncode == 0 and found, 'flat out', said)
+    check(said.returncode == 0 and found, 'publishing at the highest speed', said)
     rate_Hz = int(found[1]) / float(found[2])
-    check(int(found[3]) == 0 and rate_Hz > 10_000, f'flat out {rate_Hz:.0f} messages/s are published, none refused', said.stdout)
+    check(int(found[3]) == 0 and rate_Hz > 10_000, f'{rate_Hz:.0f} messages/s are published, none refused', said.stdout)
 
 
 def main():

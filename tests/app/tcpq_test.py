@@ -45,7 +45,7 @@ def every_message(program, helper, folder, seconds):
     summary = Run(program, folder, *drive_for(folder, seconds), '--lcm-url', URL).end()
     seen = subscriber.result()
     server.end()
-    check((summary['telemetry_drops'], summary['publish_failures']) == (0, 0), 'nothing is lost on the way to the server',
+    check((summary['telemetry_drops'], summary['publish_failures']) == (0, 0), 'no message is lost before the server',
           summary['telemetry_drops'], summary['publish_failures'])
     check((seen['received'], seen['lost']) == (summary['cycles'], 0), f'each of {summary["cycles"]} messages arrived', seen)
 
@@ -61,12 +61,12 @@ def clients(program, folder):
                           timeout=60)
     check(stop.returncode == 0 and 'stop accepted' in stop.stdout, 'abs_hil send stop', stop)
     run.process.communicate(timeout=60)
-    check(run.process.returncode == 1, 'ends the run', run.process.returncode)
+    check(run.process.returncode == 1, 'send stop ends the run', run.process.returncode)
     server.end()
 
 
 def server_dies(program, helper, folder):
-    """And comes again: the same subscriber goes on, the run has counted what it could not send."""
+    """The server returns: the same subscriber continues, and the run has counted what it could not send."""
     server = Server()
     subscriber = Subscriber(helper, URL, silence_s=6)
     run = Run(program, folder, *drive_for(folder, 8), '--lcm-url', URL)
@@ -79,11 +79,11 @@ def server_dies(program, helper, folder):
     server.end()
     print(f'{summary["cycles"]} cycles, {summary["publish_failures"]} messages not sent, {seen}')
     check(summary['telemetry_drops'] == 0 and 500 < summary['publish_failures'] < summary['cycles'],
-          'a server that dies costs messages, which are counted, and no record', summary['publish_failures'])
-    check(seen['run_failures'] > 0 and seen['lost'] > 500, 'and the subscriber hears of it when it is there again', seen)
+          'a dead server costs messages, which are counted, but no record', summary['publish_failures'])
+    check(seen['run_failures'] > 0 and seen['lost'] > 500, 'the subscriber learns the count after the return', seen)
 
 
-# 2 MB a second, which fills the buffers between: those of a server within two seconds, with a subscriber's within eight.
+# 2 MB/s fill the buffers: those of a server within two seconds, including a subscriber's within eight.
 FAST = ['--rate', 4_000, '--set', 'realtime.max_consecutive_overruns=0', '--lcm-url', URL]
 
 
@@ -91,7 +91,7 @@ def costs_messages_only(what, run):
     summary = run.end(timeout=30)
     print(f'{what}: {summary["cycles"]} cycles, {summary["publish_failures"]} messages not sent')
     check(summary['telemetry_drops'] == 0 and 1000 < summary['publish_failures'] < summary['cycles'],
-          f'{what}: costs messages, which are counted, no record, and keeps no run from ending', summary['telemetry_drops'])
+          f'{what}: costs counted messages but no record, and the run still ends', summary['telemetry_drops'])
 
 
 def server_stands_still(program, folder):
@@ -101,7 +101,7 @@ def server_stands_still(program, folder):
     server.process.send_signal(signal.SIGSTOP)
     costs_messages_only('a server that stands still', run)
     refused = subprocess.run([program, '--no-out', '--lcm-url', URL], capture_output=True, text=True, timeout=30)
-    check(refused.returncode == 3 and 'does not answer' in refused.stderr, 'and no run begins with it', refused)
+    check(refused.returncode == 3 and 'does not answer' in refused.stderr, 'no run begins with this server', refused)
     server.end()
 
 
@@ -153,8 +153,8 @@ def main():
         server_dies(program, helper, folder)
         server_stands_still(program, folder)
         subscriber_reads_nothing(program, helper, folder)
-        # What an idle subscriber leaves unread must fit into the buffers before it: once they are full, after some 10 s,
-        # LCM's server holds up everybody else as well (docs/telemetry.md).
+        # What an idle subscriber leaves unread must fit into the buffers before it. Once they are full, after some 10
+        # s, LCM's server delays everybody else too (docs/telemetry.md).
         nobody_slows_the_cycle(program, helper, folder, min(seconds, 5), pairs)
 
 

@@ -1,4 +1,4 @@
-"""abs_hil latency, doctor and --histogram: what they report and end with, never how well this machine does."""
+"""abs_hil latency, doctor and --histogram: reports and exit statuses, never this computer's timing."""
 import json
 import unittest
 

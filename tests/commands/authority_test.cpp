@@ -12,7 +12,7 @@ namespace abs_hil::commands {
 
 using Catch::Matchers::Contains;
 
-TEST_CASE("A key that is no secret, or none at all, is refused with its file and what mends it") {
+TEST_CASE("A key that is not secret, or missing, is refused with its file and the fix") {
   const abs_hil::test::TemporaryFolder scratch;
   const auto refusal = [](const std::filesystem::path& file) -> std::string {
     try {
@@ -31,14 +31,14 @@ TEST_CASE("A key that is no secret, or none at all, is refused with its file and
   CHECK_THAT(refusal(""), Contains("none given") && Contains("--set commands.key_file=commands.key"));
   CHECK_THAT(refusal(scratch / "nowhere"),
              Contains("nowhere' cannot be read: No such file") && Contains("openssl rand"));
-  CHECK_THAT(refusal(scratch.path), Contains("is no file"));
+  CHECK_THAT(refusal(scratch.path), Contains("is not a regular file"));
   const std::string sixteen = "0123456789abcdef";
-  CHECK_THAT(refusal(with(sixteen, S_IRUSR | S_IWUSR | S_IROTH)), Contains("is open to everybody: chmod o= "));
-  CHECK_THAT(refusal(with(sixteen.substr(1) + " \n\n", S_IRUSR | S_IWUSR)), Contains("holds less than 16 characters"));
+  CHECK_THAT(refusal(with(sixteen, S_IRUSR | S_IWUSR | S_IROTH)), Contains("is accessible to all users: chmod o= "));
+  CHECK_THAT(refusal(with(sixteen.substr(1) + " \n\n", S_IRUSR | S_IWUSR)), Contains("holds fewer than 16 characters"));
   CHECK(read_key(with(sixteen + " \r\n", S_IRUSR | S_IWUSR | S_IRGRP)) == sixteen);
 }
 
-TEST_CASE("A mac says the same for the same message and key, and another for anything else in it") {
+TEST_CASE("A mac is the same for the same message and key, and differs for any change of either") {
   command2_t command{};
   command.command = "slip-ref";
   command.value = 0.15;
@@ -47,7 +47,7 @@ TEST_CASE("A mac says the same for the same message and key, and another for any
   CHECK(mac.size() == 64);
   CHECK(mac.find_first_not_of("0123456789abcdef") == std::string::npos);
   CHECK(mac_of(command, key + "0") != mac);
-  command.mac = mac;  // what it carries already is left out
+  command.mac = mac;  // the mac of a message does not depend on its mac field
   CHECK(mac_of(command, key) == mac);
   command.value = 0.2;
   CHECK(mac_of(command, key) != mac);

@@ -10,7 +10,7 @@
 namespace abs_hil::telemetry {
 namespace {
 
-/// A listener on memq, with its answers captured.
+/// A listener on memq whose answers are captured.
 struct Bench {
   LcmOutlet outlet{"memq://"};
   test::CapturingOutlet captured;
@@ -58,7 +58,7 @@ TEST_CASE("stop is accepted with any token and answered") {
   CHECK(answers[0].stamp_ns == test::sample_record(0).stamp_ns);
 }
 
-TEST_CASE("anything else is refused and told why") {
+TEST_CASE("any other command is refused with a reason") {
   Bench bench;
   for (const char* command : {"start", "STOP", "stop ", "", "set"}) bench.send(command, "t");
   bench.listener.poll();
@@ -71,7 +71,7 @@ TEST_CASE("anything else is refused and told why") {
   CHECK(answers[0].reason == static_cast<int>(rig::Reason::command_unknown));
 }
 
-TEST_CASE("garbage, truncated, foreign and oversized packets are counted and answered, nothing more") {
+TEST_CASE("garbage, truncated, foreign and oversized packets are only counted and answered") {
   Bench bench;
   command_t stop{};
   stop.command = "stop";
@@ -95,7 +95,7 @@ TEST_CASE("garbage, truncated, foreign and oversized packets are counted and ans
   CHECK(bench.listener.stop_requested());
 }
 
-TEST_CASE("a flood gets few answers, but a stop in it is heard and answered") {
+TEST_CASE("a flood gets few answers, but a stop in it is accepted and answered") {
   Bench bench;
   for (int i = 0; i < 25; ++i) bench.send("flood");
   bench.send("stop", "me");
@@ -112,7 +112,7 @@ TEST_CASE("a flood gets few answers, but a stop in it is heard and answered") {
   CHECK(bench.answers().size() == 12);
 }
 
-TEST_CASE("a stop that the thread took in is answered at the end; what comes later is not taken in") {
+TEST_CASE("a stop that the thread received is answered at the end; later packets are not received") {
   Bench bench;
   bench.listener.listen();
   bench.send("stop", "me");
@@ -132,7 +132,7 @@ TEST_CASE("a stop that the thread took in is answered at the end; what comes lat
   CHECK(bench.answers().size() == 1);
 }
 
-TEST_CASE("without a server there is nothing to hear, and polling is harmless") {
+TEST_CASE("without a server nothing is received, and polling is harmless") {
   LcmOutlet outlet("tcpq://127.0.0.1:1");
   MessageStream stream({}, {}, {});
   CommandListener listener(outlet, stream, {});
@@ -140,7 +140,7 @@ TEST_CASE("without a server there is nothing to hear, and polling is harmless") 
   CHECK_FALSE(listener.stop_requested());
 }
 
-TEST_CASE("a log file as LCM network is not listened to") {
+TEST_CASE("a log file as LCM network has no listener") {
   const abs_hil::test::TemporaryFolder scratch;
   LcmOutlet outlet("file://" + (scratch / "x.lcmlog").string() + "?mode=w");
   MessageStream stream({}, {}, {});

@@ -46,7 +46,7 @@ TEST_CASE("slip control always ends at the least speed for it, whatever the scri
   CHECK(last.value == 0.7);
   CHECK(last.reason == rig::Reason::slip_control_left_at_low_speed);
   CHECK(made.phases[0].phase == rig::Phase::brake);
-  CHECK(made.phases[0].slip_ref_course.at(1.0) == 0.2);
+  CHECK(made.phases[0].slip_ref_profile.at(1.0) == 0.2);
 }
 
 TEST_CASE("where a phase ends no later by itself, the least speed is not asked for twice") {

@@ -77,7 +77,7 @@ control.slip_ref = { from = 0.1, to = 0.2, steps = 3 }
   CHECK(first.until[1].kind == experiment::EndKind::all);
   CHECK(first.until[1].parts[1].value.value == 3.0);
   CHECK(first.at_most->value == 60.0);
-  CHECK(script.phases[1].brake_course->points.size() == 3);
+  CHECK(script.phases[1].brake_profile->points.size() == 3);
   CHECK(script.limits.run_time->value == 30.0);
   CHECK(script.events[0].at_s == 1.0);
   CHECK(script.events[0].end_s == 1.2);

@@ -39,7 +39,7 @@ TEST_CASE("cards are found by vendor and device among others, with binding and a
   CHECK(findings[1].fix.find("/sys/bus/pci/devices/0000:04:00.0/enable") != std::string::npos);
 }
 
-TEST_CASE("registers that cannot be opened are told of with the fix") {
+TEST_CASE("registers that cannot be opened are reported with the fix") {
   FakeSystem system;
   put_card(system, "0000:03:00.0", "1");
   std::filesystem::remove(system.root() / (devices + "0000:03:00.0/resource2"));
@@ -53,7 +53,8 @@ TEST_CASE("no card is a note: the simulated rig needs none") {
   CHECK(worst(judge(find_pci_boards(system.root() / devices))) == Standing::note);
 }
 
-TEST_CASE("USB boards: none is a note; one that may not be opened gets its udev rule; all are called unverified") {
+TEST_CASE(
+    "USB boards: a missing board is a note, an inaccessible one gets its udev rule, and all count as unverified") {
   CHECK(worst(judge(std::vector<abs_hil::driver::usb::UsbDevice>{})) == Standing::note);
   FakeSystem system;
   system.put("dev/001/002", "");

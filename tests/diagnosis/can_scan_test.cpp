@@ -25,7 +25,7 @@ TEST_CASE("an interface that is up is good, with state, bit rate and load") {
   CHECK(holds(f.detail, "load at most 50.7 %"));
 }
 
-TEST_CASE("what hinders an interface comes with its fix") {
+TEST_CASE("each problem of an interface is reported with its fix") {
   InterfaceFacts facts = good();
   facts.up = facts.running = false;
   facts.state = "stopped";
@@ -50,7 +50,7 @@ TEST_CASE("what hinders an interface comes with its fix") {
   CHECK(finding_of(facts, 500).standing == Standing::good);
 }
 
-TEST_CASE("a virtual interface is said to be one; none at all is a note") {
+TEST_CASE("a virtual interface is reported as virtual; a missing interface is a note") {
   const InterfaceFacts vcan{.name = "vcan0", .kind = "vcan", .up = true, .running = true, .can_fd = true};
   CHECK(finding_of(vcan).standing == Standing::good);
   CHECK(holds(finding_of(vcan).detail, "virtual"));

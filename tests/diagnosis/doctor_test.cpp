@@ -37,7 +37,7 @@ TEST_CASE("the backend can run if its driver configures; it is not activated") {
   CHECK(turned_out_well(examination, findings));
 }
 
-TEST_CASE("a backend that cannot run is a failure, in its own words") {
+TEST_CASE("a backend that cannot run is a failure with the driver's message") {
   const auto examination = only_backend([] { return std::make_unique<Board>(false); });
   const auto findings = examine(examination);
   CHECK(findings.front().standing == Standing::failure);
@@ -47,7 +47,7 @@ TEST_CASE("a backend that cannot run is a failure, in its own words") {
   CHECK(worst(examine(none)) == Standing::failure);
 }
 
-TEST_CASE("a check that is not the backend's warns; alone it decides, among all it does not") {
+TEST_CASE("a warning decides the result of its own check, but not the result of all checks") {
   Examination examination{.only = "lcm", .lcm_url = "udpm://10.0.0.1:7667"};  // not a multicast address
   const auto findings = examine(examination);
   REQUIRE(findings.size() == 1);
@@ -58,7 +58,7 @@ TEST_CASE("a check that is not the backend's warns; alone it decides, among all 
   CHECK(turned_out_well(examination, findings));
 }
 
-TEST_CASE("every name of a check selects findings of that check alone") {
+TEST_CASE("every name of a check selects the findings of that check only") {
   for (const std::string& name : check_names()) {
     Examination examination = only_backend([] { return std::make_unique<Board>(true); });
     examination.only = name;
@@ -74,5 +74,5 @@ TEST_CASE("every name of a check selects findings of that check alone") {
 TEST_CASE("findings for people have their fix below, each line indented") {
   const std::vector<Finding> findings{
       {.check = "cpu", .what = "thing", .standing = Standing::warning, .detail = "is off", .fix = "do a\ndo b"}};
-  CHECK(to_text(findings) == "WARN  thing: is off\n      to mend it:\n        do a\n        do b\n");
+  CHECK(to_text(findings) == "WARN  thing: is off\n      fix:\n        do a\n        do b\n");
 }

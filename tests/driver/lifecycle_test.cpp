@@ -12,7 +12,7 @@ using abs_hil::rig::Measurement;
 
 namespace {
 
-/// Writes down what reached the board, and fails when told to.
+/// Records what reached the board, and fails on request.
 class ScriptedDriver final : public RigDriver {
  public:
   ~ScriptedDriver() override { static_cast<void>(deactivate()); }
@@ -112,7 +112,7 @@ TEST_CASE("A failed write makes the outputs safe before it returns, and latches"
   CHECK(driver.write({}).ok());
 }
 
-TEST_CASE("Whoever listens is told before the outputs are made safe, by a failed write as by the end") {
+TEST_CASE("The listener is called before the outputs are made safe, after a failed write and at the end") {
   ScriptedDriver driver;
   struct Listener final : MakingSafeListener {
     explicit Listener(std::vector<std::string>& calls) : calls_(calls) {}
@@ -142,7 +142,7 @@ TEST_CASE("A failed read reports its error and leaves the outputs to the caller'
   CHECK(driver.state() == DriverState::active);
 }
 
-TEST_CASE("A board that is not there leaves nothing configured or active") {
+TEST_CASE("A missing board leaves the driver neither configured nor active") {
   ScriptedDriver driver;
   driver.absent = true;
   CHECK_THROWS_AS(driver.configure(), Unavailable);
@@ -165,7 +165,7 @@ TEST_CASE("Configuring an active driver makes it safe first") {
   CHECK(driver.state() == DriverState::inactive);
 }
 
-TEST_CASE("Every I/O error has words of its own") {
+TEST_CASE("Every I/O error has its own text") {
   std::vector<std::string_view> seen;
   for (int i = 0; i <= static_cast<int>(IoError::command_out_of_range); ++i) {
     const std::string_view words = description(static_cast<IoError>(i));

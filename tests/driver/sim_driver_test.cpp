@@ -87,7 +87,7 @@ TEST_CASE("The ideal actuator has no quantisation of the brake; the motor keeps 
   CHECK(driver.truth().brake_torque_Nm == 2.5);
 }
 
-TEST_CASE("A command that no gate lets through is refused, and the rig is made safe for good") {
+TEST_CASE("A command outside its range is refused, and the rig is made safe until a new configure") {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
   const Command bad = GENERATE_COPY(values<Command>({{.motor_duty = -1e-9},
@@ -169,7 +169,7 @@ TEST_CASE("Activation starts the run anew") {
   CHECK(again.upper_counts == first.upper_counts);
 }
 
-TEST_CASE("A start speed that is none is refused") {
+TEST_CASE("An invalid start speed is refused") {
   CHECK_THROWS_AS(SimDriver({}, {.start_speed_rad_s = -1.0}), std::invalid_argument);
   CHECK_THROWS_AS(SimDriver({}, {.start_speed_rad_s = std::nan("")}), std::invalid_argument);
   PlantOptions bad;

@@ -70,7 +70,7 @@ TEST_CASE("The seed sets the phase within a count: the same gives the same count
   CHECK(differing_lower < 1000);
 }
 
-TEST_CASE("The counters wrap at 32 bits and differences go right across") {
+TEST_CASE("The counters wrap at 32 bits, and differences are right across the wrap") {
   // So fine an encoder that the counters wrap within a few turns.
   PlantOptions plant;
   plant.rig.encoder_counts_per_rev = 1 << 30;
@@ -107,7 +107,7 @@ TEST_CASE("Only ideal sensors carry the true speeds") {
   CHECK(measurement.ideal_speeds->omega1_rad_s < 90.0);
 }
 
-TEST_CASE("Nothing a board cannot know is made up") {
+TEST_CASE("Values that a board cannot measure are NaN") {
   const Measurement measurement = coasting({}, {}, 1).back();
   CHECK(std::isnan(measurement.supply_V));
   CHECK(std::isnan(measurement.temperature_C));

@@ -43,7 +43,7 @@ TakeOverWriter writer_of(Board& board) {
 
 }  // namespace
 
-TEST_CASE("a board with one owner is left alone until that is gone, then taken over and let go") {
+TEST_CASE("a board with one owner is taken over only after the owner's end, then released") {
   Board board;
   TakeOverWriter writer = writer_of(board);
   writer.prepare();
@@ -57,7 +57,7 @@ TEST_CASE("a board with one owner is left alone until that is gone, then taken o
   CHECK(board.story == std::vector<std::string>{"open", "take over", "safe"});
 }
 
-TEST_CASE("what the board does not verify is not taken for safe") {
+TEST_CASE("a board that does not verify the safe state does not count as safe") {
   Board board;
   TakeOverWriter writer = writer_of(board);
   writer.prepare();

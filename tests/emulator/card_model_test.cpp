@@ -69,7 +69,7 @@ TEST_CASE("Since when both widths are 0, and when either was last written") {
   CHECK(card.pwm_widths().last_written_ns == 5 * ms);
 }
 
-TEST_CASE("A trip that clears the widths is no write of the host's") {
+TEST_CASE("A trip that clears the widths does not count as a write of the host") {
   CardModel card({.start_speed_rad_s = 50.0, .trip_clears_width = true});
   card.advance_to(1 * ms);
   set_width(card, 0, 1000);
@@ -165,7 +165,7 @@ TEST_CASE("Velocity registers show lines in the velocity period") {
   CHECK(card.read32(0x50) == 400'000);
 }
 
-TEST_CASE("How the host's accesses fall changes nothing but when inputs change") {
+TEST_CASE("The times of the host's accesses affect only when inputs change") {
   CardModel often({.start_speed_rad_s = 100.0});
   CardModel rarely({.start_speed_rad_s = 100.0});
   for (CardModel* card : {&often, &rarely}) set_width(*card, 1, 2400);
@@ -176,7 +176,7 @@ TEST_CASE("How the host's accesses fall changes nothing but when inputs change")
   CHECK(often.time_ns() == rarely.time_ns());
 }
 
-TEST_CASE("Registers nobody knows read 0 and ignore writes; read-only ones keep their value") {
+TEST_CASE("Undocumented registers read 0 and ignore writes; read-only ones keep their value") {
   CardModel card({});
   for (const std::uint32_t offset : {0x0CU, 0x3CU, 0x70U, 0xC0U, 0xFCU}) {
     card.write32(offset, 0x1234);

@@ -39,7 +39,7 @@ TEST_CASE("Each fault does what its name says, and ok heals it") {
   CHECK(card.read32(plain).value == 12);
 }
 
-TEST_CASE("Delayed shows the value of so many reads ago") {
+TEST_CASE("Delayed shows the value of n reads ago") {
   CardModel model({});
   FaultyCard card(model, 1);
   card.set("90:delayed=2");
@@ -51,7 +51,7 @@ TEST_CASE("Delayed shows the value of so many reads ago") {
   CHECK(seen == std::vector<std::uint32_t>{1, 1, 1, 2, 3});
 }
 
-TEST_CASE("Intermittent fails as often as asked; garbage is all over; both repeat with their seed") {
+TEST_CASE("Intermittent fails with its probability, garbage is random; both repeat with their seed") {
   CardModel model({});
   std::set<std::uint32_t> values;
   int failures = 0;
@@ -73,7 +73,7 @@ TEST_CASE("Intermittent fails as often as asked; garbage is all over; both repea
   CHECK(failures < 600);
 }
 
-TEST_CASE("All ones: nobody answers and nobody listens") {
+TEST_CASE("All ones: the card neither answers nor takes writes") {
   CardModel model({});
   FaultyCard card(model, 1);
   card.answer_all_ones(true);

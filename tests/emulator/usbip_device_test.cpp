@@ -1,4 +1,4 @@
-// What the kernel's virtual host controller would send and must get, byte for byte (USB/IP protocol).
+// Requests of the kernel's virtual host controller and the expected replies, byte by byte (USB/IP protocol).
 
 #include "emulator/usbip_device.hpp"
 
@@ -88,7 +88,7 @@ TEST_CASE("Descriptors: a high-speed device of the maker's name, with the endpoi
   CHECK(number(host.send(submit(12, false, 0, 0, {0x00, 9, 1, 0, 0, 0, 0, 0})), 20) == 0);       // configuration 1
 }
 
-TEST_CASE("A request is answered with a frame, whichever of reading and asking comes first") {
+TEST_CASE("A request is answered with a frame, whether the read comes before or after it") {
   Host host;
   CHECK(host.send(submit(1, true, 4, 512)).empty());  // waits
   Bytes replies = host.ask(2);
@@ -113,7 +113,7 @@ TEST_CASE("Commands may come in any pieces") {
   CHECK(replies.size() == 48 + 48 + 504);
 }
 
-TEST_CASE("A read that is taken back is never answered") {
+TEST_CASE("A cancelled read is never answered") {
   Host host;
   CHECK(host.send(submit(1, true, 4, 512)).empty());
   const Bytes gone = host.send(unlink(2, 1));
@@ -170,7 +170,7 @@ TEST_CASE("Faults: STALL until cleared, silence, lateness, length") {
   }
 }
 
-TEST_CASE("The rig's time can be driven only in lock-step") {
+TEST_CASE("The host can advance the rig's time only in lock-step") {
   Host host;
   const Bytes ask_time{0xC0, 0x54, 0, 0, 0, 0, 8, 0};
   CHECK(number(host.send(submit(1, true, 0, 8, ask_time)), 20) == stall);
@@ -186,7 +186,7 @@ TEST_CASE("The rig's time can be driven only in lock-step") {
   CHECK(Bytes(replies.begin() + 48, replies.end()) == time);
 }
 
-TEST_CASE("JTAG endpoints are refused and counted; what is no command ends the connection") {
+TEST_CASE("JTAG endpoints are refused and counted; an invalid command ends the connection") {
   Host host;
   CHECK(number(host.send(submit(1, false, 6, 4, {}, request)), 20) == stall);
   CHECK(number(host.send(submit(2, true, 8, 64)), 20) == stall);

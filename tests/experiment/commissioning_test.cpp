@@ -154,7 +154,7 @@ TEST_CASE("A good rig passes all four steps, each asked for, and is safe after")
   CHECK(largest_width(lab.card) <= 0.5 + 1.0 / 4095.0);  // the brake's pulse is the largest
 }
 
-TEST_CASE("Each pulse has its guard, from before it until the outputs are 0 again") {
+TEST_CASE("Each pulse has its guard from before it until the outputs are 0 again") {
   Lab lab;
   CHECK(lab.run() == CommissioningResult::passed);
   CHECK(lab.guard.begun == 2);
@@ -164,7 +164,7 @@ TEST_CASE("Each pulse has its guard, from before it until the outputs are 0 agai
   Lab dying;
   dying.guard.dies_at = 50;
   CHECK(dying.run() == CommissioningResult::failed);
-  CHECK_THAT(dying.person.said, Contains("the guardian has died"));
+  CHECK_THAT(dying.person.said, Contains("the guardian process has ended"));
   CHECK(dying.guard.beats == 50);
   CHECK(dying.guard.ended_safe == 1);
   CHECK(dying.card.model.outputs().drive_duty == 0.0);
@@ -175,7 +175,7 @@ TEST_CASE("Each pulse has its guard, from before it until the outputs are 0 agai
   CHECK(largest_width(alone.card) == 0.0);
 }
 
-TEST_CASE("A no ends it there: before the second step nothing was written, before the third nothing but zeros") {
+TEST_CASE("The answer no ends the commissioning: nothing is written before step 2, only zeros before step 3") {
   for (int step = 1; step <= 4; ++step) {
     Lab lab;
     lab.person.no_to = step;
@@ -188,7 +188,7 @@ TEST_CASE("A no ends it there: before the second step nothing was written, befor
   }
 }
 
-TEST_CASE("What is wired otherwise is found and named with its key") {
+TEST_CASE("Wrong wiring is found and reported with its key") {
   driver::pci::PciOptions options;
   std::string words;
   SECTION("sign of the upper wheel") {
@@ -210,7 +210,7 @@ TEST_CASE("What is wired otherwise is found and named with its key") {
   CHECK(largest_width(lab.card) == 0.0);  // nothing moved by itself
 }
 
-TEST_CASE("Keys are named that the board has") {
+TEST_CASE("Messages name keys of the connected board") {
   const auto said_of = [](std::string_view kind, std::int32_t upper_counts, std::int32_t lower_counts) {
     OtherBoard board(kind);
     test::ModelCard unused;
@@ -233,7 +233,7 @@ TEST_CASE("Keys are named that the board has") {
   CHECK_THAT(node, !Contains("_channel"));
 }
 
-TEST_CASE("Wheels that do not turn, or turn each other, are found") {
+TEST_CASE("Wheels that do not turn, or that turn each other, are found") {
   Lab lab;
   std::string words;
   SECTION("no turn") {
@@ -249,7 +249,7 @@ TEST_CASE("Wheels that do not turn, or turn each other, are found") {
   }
   SECTION("E-stop pressed during the drive pulse") {
     lab.card.model.press_emergency_stop(true);
-    words = "E-stop still pressed";
+    words = "the E-stop is pressed";
   }
   CHECK(lab.run() == CommissioningResult::failed);
   CHECK_THAT(lab.person.said, Contains(words));
@@ -282,7 +282,7 @@ TEST_CASE("Pulses that could run away are refused") {
                   std::invalid_argument);
 }
 
-TEST_CASE("A board that fails in a pulse ends it, and says at what") {
+TEST_CASE("A board that fails in a pulse ends it with a message about the failed step") {
   OtherLab lab;
   std::string words;
   int pulses_ended_safe = 1;
@@ -290,19 +290,19 @@ TEST_CASE("A board that fails in a pulse ends it, and says at what") {
     lab.board.on_read = [&lab]() -> driver::IoResult {
       return {lab.guard.beats < 10 ? driver::IoError::none : driver::IoError::no_answer};
     };
-    words = "FAILED: reading the board: board did not answer in time";
+    words = "FAILED: cannot read the board: board did not answer in time";
   }
   SECTION("writing") {
     lab.board.on_write = [](const rig::Command& command) -> driver::IoResult {
       return {command.motor_duty > 0.0 ? driver::IoError::stalled : driver::IoError::none};
     };
-    words = "FAILED: writing to the board: board refuses the transfer";
+    words = "FAILED: cannot write to the board: board refuses the transfer";
   }
   SECTION("the zeros at its end") {
     lab.board.on_write = [](const rig::Command& command) -> driver::IoResult {
       return {command.motor_duty > 0.0 ? driver::IoError::none : driver::IoError::disconnected};
     };
-    words = "FAILED: ending the pulse: board is gone";
+    words = "FAILED: cannot end the pulse: board is gone";
     pulses_ended_safe = 0;
   }
   CHECK(lab.run() == CommissioningResult::failed);
@@ -321,34 +321,34 @@ TEST_CASE("After the pulses: wheels that do not stop, a brake that drives, one t
       if (lab.guard.begun > 0) ++lab.board.counters.lower_counts;
       return driver::IoResult{};
     };
-    words = "the wheels do not come to rest";
+    words = "the wheels still turn after the run-out limit";
   }
   SECTION("drive and brake exchanged") {
     lab.board.on_write = [&lab](const rig::Command& command) {
       if (command.motor_duty > 0.0 || command.brake_duty > 0.0) ++lab.board.counters.lower_counts;
       return driver::IoResult{};
     };
-    words = "are drive and brake exchanged?";
+    words = "check whether drive and brake are exchanged";
   }
   SECTION("nothing seen of the brake") {
     lab.person.no_to = 5;
-    words = "look at the brake's supply and cable";
+    words = "check the brake's supply and cable";
   }
   CHECK(lab.run() == CommissioningResult::failed);
   CHECK_THAT(lab.person.said, Contains(words));
   CHECK(lab.board.state() == driver::DriverState::inactive);
 }
 
-TEST_CASE("A safe state that did not reach the board is no success") {
+TEST_CASE("A safe state that did not reach the board is not a success") {
   OtherLab lab;
   lab.person.before_answer = [&lab] {
     if (lab.person.asked.size() == 5) lab.board.made_safe = {driver::IoError::disconnected};
   };
   CHECK(lab.run() == CommissioningResult::failed);
-  CHECK_THAT(lab.person.said, Contains("the safe state is not known to have reached the board: board is gone"));
+  CHECK_THAT(lab.person.said, Contains("the safe state may not have reached the board: board is gone"));
 }
 
-TEST_CASE("Whoever stops turning by hand, or stops while the wheels run out, ends it there") {
+TEST_CASE("A stop while turning by hand or while the wheels run out ends the commissioning") {
   OtherLab leaving;
   leaving.person.gives_up = true;
   CHECK(leaving.run() == CommissioningResult::declined);
@@ -357,7 +357,7 @@ TEST_CASE("Whoever stops turning by hand, or stops while the wheels run out, end
   OtherLab stopping;
   stopping.board.on_read = [&] {
     stopping.stop = stopping.guard.ended_safe == 1 && stopping.clock.now_ns() > 1'000'000'000;
-    if (stopping.guard.begun > 0) ++stopping.board.counters.lower_counts;  // running on
+    if (stopping.guard.begun > 0) ++stopping.board.counters.lower_counts;  // the wheel keeps turning
     return driver::IoResult{};
   };
   CHECK(stopping.run() == CommissioningResult::interrupted);

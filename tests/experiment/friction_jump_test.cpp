@@ -30,7 +30,7 @@ Setup on_makers_plant(Setup setup) {
 
 }  // namespace
 
-TEST_CASE("only friction-jump is about a changing road") {
+TEST_CASE("only friction-jump has a changing road") {
   CHECK(config::profile(*config::find("friction-jump"), "friction") == "braking time: 1; 0.521739 at 0.6; 1 at 1");
   CHECK(config::profile(*config::find("paper"), "friction").empty());
 }
@@ -48,14 +48,14 @@ TEST_CASE("friction-jump takes theta from 23 to 12 and back to 23 N in mid-braki
       if (in_patch) CHECK(record.truth.speeds.omega2_rad_s * 0.0990 > 3.0);
     }
     CHECK(low == 400);
-    // Less grip for 0.4 s costs time and way against the same run without.
+    // 0.4 s of less grip cost time and distance compared with the same run without.
     const Result plain = run(start);
     CHECK(result.metrics.stop_time_s > plain.metrics.stop_time_s + 0.1);
     CHECK(result.metrics.stop_distance_m > plain.metrics.stop_distance_m + 1.0);
   }
 }
 
-TEST_CASE("the adaptive controller's estimate follows friction-jump both ways") {
+TEST_CASE("the adaptive controller's estimate follows both jumps of friction-jump") {
   const Result result = run(friction_jump(ideal_braking("adaptive")));
   for (const auto& record : result.records) {
     const double since_s = record.time_s - result.metrics.brake_start_s;
@@ -74,7 +74,7 @@ TEST_CASE("under slip control at 0.15 the maker's plant stops in 1.245 s within 
   CHECK_THAT(result.metrics.stop_distance_m, WithinRel(10.49, 0.02));
 }
 
-TEST_CASE("what controllers are told of the maker's plant fits it: theta's estimate is within 5 % of the truth") {
+TEST_CASE("the nominal parameters of the maker's plant fit it: theta's estimate is within 5 % of the truth") {
   for (const Setup& start : {ideal_braking("adaptive"), braking("adaptive")}) {
     const Result result = run(on_makers_plant(start));
     REQUIRE(result.outcome.completed());

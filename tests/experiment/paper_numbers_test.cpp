@@ -1,4 +1,5 @@
-// The numbers a correct implementation must show: theory.md's independent prototype (RK4 at 100 us) and closed forms.
+// Numbers that a correct implementation must reproduce: from the independent prototype of theory.md (RK4 at 100 us) and
+// closed forms.
 
 #include <algorithm>
 #include <cmath>

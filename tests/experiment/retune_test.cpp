@@ -1,4 +1,4 @@
-// Gains and slip reference changed while a run brakes: no bump in the torque, nothing forgotten.
+// Gains and slip reference change during braking: the torque has no bump and the controller keeps its state.
 #include <cmath>
 #include <functional>
 
@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::int64_t ms = 1'000'000;
 
-/// A run in virtual time, cycle by cycle, in which something is changed at one cycle.
+/// A run in virtual time, cycle by cycle, with a change at one cycle.
 struct Bench {
   test::Setup setup;
   driver::SimDriver driver{setup.plant, {.seed = 1, .start_speed_rad_s = setup.experiment.start_speed_rad_s}};
@@ -38,7 +38,7 @@ struct Bench {
     for (int i = 0; i < cycles; ++i) record = step();
     return record;
   }
-  /// The same law with gains of its own.
+  /// The same law with its own gains.
   Adjustment retuned(const std::function<void(control::ControlOptions&)>& change) {
     control::ControlOptions options = setup.control;
     change(options);
@@ -60,12 +60,12 @@ void double_gains(control::ControlOptions& o) {
   o.super_twisting.k1 *= 2.0;
 }
 
-TEST_CASE("changed gains: the torque asked for and theta go on without a jump, then the new gains act") {
+TEST_CASE("changed gains: torque reference and theta continue without a jump, then the new gains act") {
   for (const char* controller :
        {"adaptive", "adaptive-actuator", "nominal", "pi", "sliding-mode-smooth", "super-twisting"}) {
     INFO(controller);
     Bench changed(controller), unchanged(controller);
-    // 40 ms into braking e_v is large: there a change of gains would show at once.
+    // 40 ms into braking e_v is large: a change of gains would show at once.
     const double theta_N = changed.run(40).control.theta_est_N;
     unchanged.run(40);
     REQUIRE(changed.logic.adjustments().put(changed.retuned(double_gains)) == 1);
@@ -73,13 +73,13 @@ TEST_CASE("changed gains: the torque asked for and theta go on without a jump, t
     const rig::CycleRecord as_before = unchanged.step();
     CHECK(now.reason == rig::Reason::gain_changed);
     CHECK(now.reason_value == 1.0);
-    // The torque of this cycle is the one that the old gains ask for, and theta goes on from where it was: one interval
-    // at twice the gain moves it twice as far.
+    // The torque of this cycle is that of the old gains, and theta continues from its value: one interval at twice the
+    // gain moves it twice as far.
     CHECK(std::abs(now.control.brake_torque_ref_Nm - as_before.control.brake_torque_ref_Nm) < 1e-9);
     if (!std::isnan(now.control.theta_est_N)) {
       CHECK(std::abs(now.control.theta_est_N - theta_N) <= 2.2 * std::abs(as_before.control.theta_est_N - theta_N));
     }
-    // From there on it moves by no more than some cycles' worth of fading.
+    // Afterwards it changes by no more than a few cycles' share of the fading.
     rig::CycleRecord before = now;
     rig::CycleRecord before_unchanged = as_before;
     double largest_step_Nm = 0.0, largest_unchanged_Nm = 0.0, difference_Nm = 0.0;
@@ -102,7 +102,7 @@ TEST_CASE("changed gains: the torque asked for and theta go on without a jump, t
   }
 }
 
-TEST_CASE("without carrying the difference the same change would jump: the test above can fail") {
+TEST_CASE("without the bumpless transfer the same change jumps: the test above can fail") {
   Bench bench("adaptive");
   bench.run(40);
   const Adjustment fresh = bench.retuned(double_gains);
@@ -116,7 +116,7 @@ TEST_CASE("without carrying the difference the same change would jump: the test 
   CHECK(jump_Nm > 0.5);
 }
 
-TEST_CASE("a change to the same gains changes nothing, bit by bit") {
+TEST_CASE("a change to the same gains has no effect, bit by bit") {
   for (const auto& entry : control::controllers()) {
     Bench changed{std::string(entry.name)}, unchanged{std::string(entry.name)};
     Adjustment same = changed.retuned([](auto&) {});
@@ -133,7 +133,7 @@ TEST_CASE("a change to the same gains changes nothing, bit by bit") {
   }
 }
 
-TEST_CASE("a law that cannot take over says so, and another class is refused") {
+TEST_CASE("a law that cannot take over a state reports that, and a controller of another class is refused") {
   Bench bench("adaptive");
   const Adjustment other = bench.retuned([](auto& o) { o.controller = "pi"; });
   const Adjustment own = bench.retuned([](auto&) {});
@@ -142,7 +142,7 @@ TEST_CASE("a law that cannot take over says so, and another class is refused") {
   CHECK_FALSE(locked.controller->take_over(*locked.controller));
 }
 
-TEST_CASE("a changed slip reference is followed, with theta as it was") {
+TEST_CASE("a changed slip reference is followed, and theta keeps its value") {
   Bench bench("adaptive");
   const double theta_N = bench.run(600).control.theta_est_N;
   REQUIRE(bench.logic.adjustments().put({.kind = Adjustment::Kind::slip_ref, .slip_ref = 0.1}) == 1);
@@ -153,7 +153,7 @@ TEST_CASE("a changed slip reference is followed, with theta as it was") {
   CHECK_THAT(bench.run(600).control.slip_est, Catch::Matchers::WithinAbs(0.1, 0.02));
 }
 
-TEST_CASE("changes take effect one a cycle, in order, and too many are refused") {
+TEST_CASE("changes take effect one per cycle, in order, and excess changes are refused") {
   Bench bench("adaptive");
   bench.run(5);
   std::uint32_t taken = 0;
@@ -164,7 +164,7 @@ TEST_CASE("changes take effect one a cycle, in order, and too many are refused")
   CHECK(bench.logic.adjustments().put({.kind = Adjustment::Kind::slip_ref, .slip_ref = 0.2}) == taken + 1);
 }
 
-TEST_CASE("hundreds of changed controllers are given back to the slow side") {
+TEST_CASE("hundreds of replaced controllers return to the slow thread") {
   Bench bench("adaptive");
   for (std::uint32_t n = 1; n <= 300; ++n) {
     REQUIRE(bench.logic.adjustments().put(bench.retuned(double_gains)) == n);
@@ -172,7 +172,7 @@ TEST_CASE("hundreds of changed controllers are given back to the slow side") {
   }
 }
 
-TEST_CASE("a run that waits stays idle and safe until the start is given") {
+TEST_CASE("a run that waits stays idle and safe until the start command") {
   test::Setup setup;
   setup.experiment.wait_for_start = true;
   driver::SimDriver driver(setup.plant, {.seed = 1});

@@ -24,19 +24,19 @@ TEST_CASE("a measurement repeated with the same time stamp changes no estimate")
   CHECK(record.control.speeds_est.omega2_rad_s == before.omega2_rad_s);
 }
 
-TEST_CASE("the torque estimate follows what was sent, not what was asked for") {
+TEST_CASE("the torque estimate follows the sent command, not the wanted one") {
   RunLogic logic(logic_parts(braking("adaptive")));
   rig::CycleRecord record;
   static_cast<void>(logic.step({.time_ns = 0}, record));
   CHECK(record.control.brake_torque_ref_Nm > 0.0);
-  logic.commanded(rig::safe_command);  // the gate let nothing pass
+  logic.commanded(rig::safe_command);  // the gate blocked the command
   static_cast<void>(logic.step({.time_ns = 1'000'000}, record));
   CHECK(record.control.brake_torque_est_Nm == 0.0);
 }
 
 namespace {
 
-/// Writes down what it sees.
+/// Records its inputs.
 class Probe final : public control::SlipController {
  public:
   explicit Probe(control::SlipInput& seen) : seen_{seen} {}
@@ -52,7 +52,7 @@ class Probe final : public control::SlipController {
 
 }  // namespace
 
-TEST_CASE("controllers see accelerations: the observers', or the mean over the past cycle where speeds are true") {
+TEST_CASE("controllers get the observers' accelerations, or the mean over the past cycle if speeds are true") {
   for (const bool ideal : {false, true}) {
     control::SlipInput seen;
     const auto setup = braking("adaptive");
@@ -65,7 +65,7 @@ TEST_CASE("controllers see accelerations: the observers', or the mean over the p
     rig::CycleRecord record;
     double omega1_before = 0.0, omega2_before = 0.0;
     for (int n = 0; n <= 300; ++n) {
-      // Both wheels slow down steadily, the upper one at 90 rad/s^2, the lower one at 70.
+      // Both wheels decelerate steadily, the upper one at 90 rad/s^2, the lower one at 70.
       const double t = 1e-3 * n;
       const double omega1 = 170.0 - 90.0 * t, omega2 = 170.0 - 70.0 * t;
       const auto counts = [&](double omega, double alpha) {
@@ -97,11 +97,11 @@ TEST_CASE("controllers see accelerations: the observers', or the mean over the p
   }
 }
 
-TEST_CASE("the brake for a stop request acts within the gate's cap, until standstill, and is released at the end") {
+TEST_CASE("the stop brake acts within the gate's cap until standstill and is then released") {
   Setup setup;
   setup.experiment.stop_brake_duty = 0.9;
   setup.gate.brake_duty_max = 0.7;
-  // Asked for after a second of acceleration.
+  // The stop request comes after a second of acceleration.
   const Result result = run(setup, [] { return rig::Reason::terminate_signal; });
   CHECK(result.outcome.reason == rig::Reason::terminate_signal);
   CHECK(result.outcome.safe_state.ok());

@@ -26,7 +26,7 @@ SequenceInput at(double time_s, double omega1_rad_s = 0.0) {
 
 }  // namespace
 
-TEST_CASE("what no phase may ask for is refused by name") {
+TEST_CASE("an unsafe phase is refused by name") {
   const PhasePlan sound{.phase = Phase::hold,
                         .motor_duty = 0.3,
                         .ends_on = {{EndKind::duration, 1.0, Reason::phase_duration_over}},
@@ -79,7 +79,7 @@ TEST_CASE("phases follow one another in the cycle in which a condition holds") {
   CHECK(sequence.current().brake == BrakeAction::released);
 }
 
-TEST_CASE("outlasting a time limit is a fault that says how long it took") {
+TEST_CASE("exceeding a time limit is a fault with the phase's duration as value") {
   Sequence sequence = two_phases({EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached});
   sequence.update(at(0.0));
   CHECK_FALSE(sequence.update(at(5.0, 50.0)).entered);
@@ -91,7 +91,7 @@ TEST_CASE("outlasting a time limit is a fault that says how long it took") {
   CHECK(sequence.finished());
 }
 
-TEST_CASE("a peak is a maximum that nothing has topped for a while, not the stillness before the start") {
+TEST_CASE("a peak is a maximum that was not exceeded for a while; standstill before the start is not a peak") {
   Sequence sequence = two_phases({EndKind::upper_wheel_peak, 0.3, Reason::upper_wheel_peak_detected});
   sequence.update(at(0.0));
   CHECK_FALSE(sequence.update(at(0.5)).entered);
@@ -116,7 +116,7 @@ TEST_CASE("car speed and standstill end phases") {
   CHECK(still.update(standing).reason == Reason::standstill_reached);
 }
 
-TEST_CASE("ending early: a stop request stops, a fault faults, and the first reason stays") {
+TEST_CASE("an early end: a stop request leads to stopped, a fault to fault, and the first reason stays") {
   for (const auto& [reason, phase] :
        {std::pair{Reason::interrupt_signal, Phase::stopped}, std::pair{Reason::overspeed, Phase::fault}}) {
     Sequence sequence = two_phases({EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached});
@@ -132,7 +132,8 @@ TEST_CASE("ending early: a stop request stops, a fault faults, and the first rea
   }
 }
 
-TEST_CASE("a stop request may brake first: motor off, until standstill, for its time, and a fault ends that at once") {
+TEST_CASE(
+    "a stop request may first brake with the motor off until standstill or its limit; a fault ends that at once") {
   const auto stopping = [](StopBrake brake, Reason reason) {
     Sequence sequence({{.phase = Phase::accelerate,
                         .motor_duty = 0.8,
@@ -154,7 +155,7 @@ TEST_CASE("a stop request may brake first: motor off, until standstill, for its 
     CHECK(sequence.current().phase == Phase::hold);
     CHECK(sequence.current().motor_duty_at(0.0) == 0.0);
     CHECK(sequence.current().brake_duty_at(0.0) == 0.6);
-    sequence.end_early(Reason::terminate_signal, 0.0);  // asked again
+    sequence.end_early(Reason::terminate_signal, 0.0);  // a repeated request
     CHECK_FALSE(sequence.update(at(2.9, 50.0)).entered);
     CHECK_FALSE(sequence.finished());
     CHECK(sequence.update(at(3.0, 50.0)).reason == Reason::interrupt_signal);  // its 2 s are over
@@ -178,7 +179,7 @@ TEST_CASE("a stop request may brake first: motor off, until standstill, for its 
   }
   {
     Sequence sequence = stopping({.duty = 0.6}, Reason::interrupt_signal);
-    sequence.update(standing);  // nothing turns
+    sequence.update(standing);  // both wheels stand
     CHECK(sequence.finished());
   }
   for (const auto& [brake, reason] :

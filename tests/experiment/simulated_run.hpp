@@ -24,7 +24,7 @@ class Recorder final : public rig::RecordSink {
   std::vector<double> distances_m;
 };
 
-/// What a simulated run is to be.
+/// Options of a simulated run.
 struct Setup {
   plant_sim::PlantOptions plant{};
   control::ControlOptions control{};
@@ -33,7 +33,7 @@ struct Setup {
   std::uint64_t seed{1};
 };
 
-/// What came of it.
+/// Its result.
 struct Result {
   RunOutcome outcome{};
   analysis::Metrics metrics{};
@@ -50,7 +50,7 @@ struct Result {
   }
 };
 
-/// The phases of the experiment that the setup names.
+/// The phases of the setup's experiment.
 inline std::vector<PhasePlan> phases_of(const Setup& setup) {
   config::Settings settings{.plant = setup.plant, .control = setup.control, .experiment = setup.experiment};
   return config::plan(settings).phases;
@@ -61,7 +61,7 @@ inline RunLogicParts logic_parts(const Setup& setup) {
                           phases_of(setup));
 }
 
-/// Runs it in virtual time, on the same code as the program.
+/// Runs the setup in virtual time with the program's own code.
 inline Result run(
     const Setup& setup, const RunSession::Poll& poll = [] { return rig::Reason::none; }) {
   runtime::VirtualClock clock;
@@ -73,7 +73,7 @@ inline Result run(
   return {outcome, metrics.metrics(), std::move(recorder.records), std::move(recorder.distances_m)};
 }
 
-/// Braking at once from 170 rad/s, as the paper's initial conditions.
+/// Braking from 170 rad/s without a run-up, as in the paper's initial conditions.
 inline Setup braking(const std::string& controller) {
   Setup setup;
   setup.control.controller = controller;

@@ -16,7 +16,7 @@ analysis::FrictionCurveResult swept(const Setup& setup) {
   REQUIRE(result.outcome.completed());
   analysis::FrictionCurve curve(setup.plant.rig.wheels, setup.plant.rig.encoder_counts_per_rev);
   for (rig::CycleRecord record : result.records) {
-    // Nothing but the encoders: what the simulator knows, and what the controller made of it, is taken away.
+    // Keep only the encoders: remove the simulator's truth and the controller's estimates.
     record.truth = {};
     record.control = {};
     curve.consume(record, 0.0);
@@ -42,7 +42,7 @@ TEST_CASE("slip-sweep finds the plant's peak force within 2 % and its slip withi
   }
 }
 
-TEST_CASE("it finds another plant's peak, though the controller believes in the first") {
+TEST_CASE("slip-sweep finds another plant's peak, though the controller has the first plant's parameters") {
   Setup setup = sweep(1);
   setup.plant.rig.tyre.theta_N = 18.0;
   setup.plant.rig.tyre.B = 20.0;
@@ -57,7 +57,7 @@ TEST_CASE("the traced curve lies on the plant's") {
   double square_sum = 0.0;
   int n = 0;
   for (const auto& point : curve.points) {
-    if (point.slip < 0.02) continue;  // where the brake comes on, force and slip change within the window
+    if (point.slip < 0.02) continue;  // while the brake sets in, force and slip change within the window
     const double plant_N = setup.plant.rig.tyre.theta_N * rig::normalised_tyre_force(setup.plant.rig.tyre, point.slip);
     square_sum += (point.force_N - plant_N) * (point.force_N - plant_N);
     ++n;

@@ -28,15 +28,15 @@ void read(const std::string& text) {
   std::ofstream(file(), std::ios::binary) << text;
   try {
     abs_hil::report::CsvReader csv(file());
-    abs_hil::report::Decimation envelope(8);
+    abs_hil::report::Decimation decimation(8);
     double last_s = 0.0;
     for (std::size_t rows = 0; csv.next(); ++rows) {
       expect(csv.values().size() == csv.columns().size());
       expect(rows == 0 || csv.time_s() >= last_s);
       last_s = csv.time_s();
-      envelope.add(csv.time_s(), csv.values().back());
+      decimation.add(csv.time_s(), csv.values().back());
     }
-    expect(envelope.points().size() <= 4 * 8);
+    expect(decimation.points().size() <= 4 * 8);
     abs_hil::report::RunFiles run;
     run.csv = file();
     const auto survey = abs_hil::report::survey(run);

@@ -31,8 +31,8 @@ void use(const config::Script& script) {
     const double time_s = sequence.phase_time_s();
     expect(now.motor_duty_at(time_s) >= 0.0 && now.motor_duty_at(time_s) <= 1.0);
     expect(std::isfinite(now.brake_torque_Nm_at(time_s)) && std::isfinite(now.brake_duty_at(time_s)));
-    if (!now.slip_ref_course.empty())
-      expect(now.slip_ref_course.at(time_s) > 0.0 && now.slip_ref_course.at(time_s) < 1.0);
+    if (!now.slip_ref_profile.empty())
+      expect(now.slip_ref_profile.at(time_s) > 0.0 && now.slip_ref_profile.at(time_s) < 1.0);
   }
 }
 

@@ -9,7 +9,7 @@ using namespace abs_hil::guardian::test;
 
 namespace {
 
-/// A guardian on duty over a controller whose cycles, at 1 kHz, go on until they are told not to.
+/// A guardian beside a controller that runs cycles at 1 kHz until the test stops it.
 struct Post {
   Post() {
     clock.happens = [this](std::int64_t now_ns) {
@@ -37,7 +37,7 @@ constexpr std::int64_t then_ns = 1'100 * ms;
 
 }  // namespace
 
-TEST_CASE("a run that ends in order is let go, and nothing is written") {
+TEST_CASE("the guardian writes nothing after a run that ends in order") {
   Post post;
   post.stage_at_ns = then_ns;
   const GuardianReport report = post.run();
@@ -47,7 +47,7 @@ TEST_CASE("a run that ends in order is let go, and nothing is written") {
   CHECK(post.clock.now_ns() - then_ns <= post.duty.look_period_ns());
 }
 
-TEST_CASE("the guardian gives a sign of life at each of its looks") {
+TEST_CASE("the guardian beats at each of its looks") {
   Post post;
   post.stage_at_ns = then_ns;
   static_cast<void>(post.run());
@@ -77,7 +77,7 @@ TEST_CASE("a silent controller is ended, and seen to have ended, before anything
   CHECK(report.controller_gone_ns <= report.first_written_ns);
 }
 
-TEST_CASE("a controller that the kernel holds on to is not waited for, but the last word is spoken after its end") {
+TEST_CASE("the guardian does not wait for a controller stuck in the kernel, but writes again after its end") {
   Post post;
   post.last_cycle_ns = then_ns;
   post.controller.dying_takes_ns = 40 * ms;
@@ -91,7 +91,7 @@ TEST_CASE("a controller that the kernel holds on to is not waited for, but the l
   CHECK(report.verified_ns >= report.controller_gone_ns);
 }
 
-TEST_CASE("what cannot be verified is tried again until it is") {
+TEST_CASE("the guardian retries the safe state until it is verified") {
   Post post;
   post.controller.dies_at_ns = then_ns;
   post.writer.fails_first = 7;
@@ -102,7 +102,7 @@ TEST_CASE("what cannot be verified is tried again until it is") {
   CHECK(report.verified_ns - then_ns <= 8 * ms);
 }
 
-TEST_CASE("a board that is gone for good is given up after guardian.insist_s, and that is told") {
+TEST_CASE("the guardian gives up on a lost board after guardian.insist_s and reports it") {
   Post post;
   post.controller.dies_at_ns = then_ns;
   post.writer.fails_first = 1'000'000;
@@ -114,7 +114,7 @@ TEST_CASE("a board that is gone for good is given up after guardian.insist_s, an
                                         Catch::Matchers::Contains("0x6c") && Catch::Matchers::Contains("E-stop"));
 }
 
-TEST_CASE("outputs that were given up are made safe while their controller lives on") {
+TEST_CASE("the guardian makes handed-over outputs safe while the controller lives on") {
   Post post;
   post.stage_at_ns = then_ns;
   post.stage = Stage::handed_over;
@@ -143,7 +143,7 @@ TEST_CASE("reports say who, why and how fast") {
                        Catch::Matchers::Contains("SIGKILL") && Catch::Matchers::Contains("at try 1"));
 }
 
-TEST_CASE("a controller that makes its board safe twice, a wait each time, has its time for both") {
+TEST_CASE("a controller that makes its board safe twice has the full time for each") {
   Post post;
   post.last_cycle_ns = then_ns;
   post.clock.happens = [&post](std::int64_t now_ns) {
@@ -159,7 +159,7 @@ TEST_CASE("a controller that makes its board safe twice, a wait each time, has i
   CHECK(post.story.empty());
 }
 
-TEST_CASE("a controller that never comes back from making its board safe is ended after that board's time") {
+TEST_CASE("a controller that hangs while it makes its board safe is ended after that board's time") {
   Post post;
   post.last_cycle_ns = then_ns;
   post.stage_at_ns = then_ns;

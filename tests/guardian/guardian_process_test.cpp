@@ -12,7 +12,7 @@
 namespace abs_hil::guardian {
 namespace {
 
-/// A guardian that says that it is ready and then does nothing, as one that the computer holds up.
+/// A guardian that reports ready and then does nothing, like one that the computer delays.
 std::string held_up_guardian(const std::filesystem::path& folder) {
   const std::string program = folder / "abs_guardian";
   const std::string ready = std::to_string(inherited_ready);
@@ -21,23 +21,23 @@ std::string held_up_guardian(const std::filesystem::path& folder) {
   return program;
 }
 
-TEST_CASE("outputs that were handed over stay so until their guardian has seen it") {
+TEST_CASE("handed-over outputs stay handed over until the guardian has read it") {
   const test::TemporaryFolder folder;
   SharedRegion region(1);
   GuardianProcess guardian(region, held_up_guardian(folder.path), "{}");
-  guardian.stand_guard();
+  guardian.arm();
   const pid_t pid = guardian.pid();
   guardian.outputs_released(false);
   CHECK(guardian.end() == GuardianProcess::GuardianExit::insisting);
   CHECK(region.stage() == Stage::handed_over);
-  REQUIRE(::kill(pid, SIGKILL) == 0);  // it was left alone to go on
+  REQUIRE(::kill(pid, SIGKILL) == 0);  // the guardian still ran
 }
 
 TEST_CASE("a guardian that hangs although the outputs are safe is ended") {
   const test::TemporaryFolder folder;
   SharedRegion region(1);
   GuardianProcess guardian(region, held_up_guardian(folder.path), "{}");
-  guardian.stand_guard();
+  guardian.arm();
   guardian.outputs_released(true);
   CHECK(guardian.end() == GuardianProcess::GuardianExit::failed);
   CHECK(region.stage() == Stage::closed);

@@ -12,7 +12,7 @@ namespace abs_hil::guardian::test {
 inline constexpr std::int64_t us = 1'000;
 inline constexpr std::int64_t ms = 1'000'000;
 
-/// Time that passes by waiting alone, and what happens at its moments.
+/// Virtual time that advances only by waiting, with events at given times.
 class ScriptedClock final : public runtime::Clock {
  public:
   [[nodiscard]] std::int64_t now_ns() noexcept override { return now_; }
@@ -22,7 +22,7 @@ class ScriptedClock final : public runtime::Clock {
       if (happens) happens(now_);
     }
   }
-  /// The computer stands still: nothing happens meanwhile.
+  /// The computer pauses: no event happens meanwhile.
   void jump(std::int64_t duration_ns) { now_ += duration_ns; }
 
   std::function<void(std::int64_t)> happens;
@@ -31,7 +31,7 @@ class ScriptedClock final : public runtime::Clock {
   std::int64_t now_{1'000 * ms};
 };
 
-/// Everything that is done, in order, in words.
+/// Log of all actions in order, as text.
 using Story = std::vector<std::string>;
 
 class ScriptedController final : public ControllerProcess {

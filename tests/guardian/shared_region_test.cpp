@@ -13,7 +13,7 @@
 using namespace abs_hil;
 using namespace abs_hil::guardian;
 
-TEST_CASE("what one process writes, another reads, also after the writer was killed") {
+TEST_CASE("a process reads what another one wrote, also after the writer was killed") {
   SharedRegion region(16);
   const pid_t child = fork();
   REQUIRE(child >= 0);
@@ -39,12 +39,12 @@ TEST_CASE("what one process writes, another reads, also after the writer was kil
   CHECK(records.back().sequence == 19);
 }
 
-TEST_CASE("nobody can cut the region short under the other's feet") {
+TEST_CASE("neither process can shrink the region") {
   const SharedRegion region(4);
   CHECK(::ftruncate(region.descriptor(), 0) != 0);
 }
 
-TEST_CASE("another build's region, or something else altogether, is refused") {
+TEST_CASE("a region of another build, or any other descriptor, is refused") {
   const int other = ::memfd_create("other", MFD_ALLOW_SEALING);
   REQUIRE(::ftruncate(other, 65536) == 0);
   CHECK_THROWS_WITH(SharedRegion::attach(other), Catch::Matchers::Contains("not the shared memory of a run"));
@@ -54,18 +54,18 @@ TEST_CASE("another build's region, or something else altogether, is refused") {
   CHECK_THROWS(SharedRegion::attach(other));
 }
 
-TEST_CASE("a brief reads back, and what is none is refused") {
-  const LaunchConfig brief{.config_json = R"({"a": {"b": "\"x\""}})",
-                           .experiment = "e",
-                           .controller = "c",
-                           .plant = "p",
-                           .backend = "rig",
-                           .version = "1",
-                           .realtime = "prefer",
-                           .record_prefix = "/tmp/a b/recorder"};
-  const LaunchConfig read = parse_launch_config(to_json(brief));
-  CHECK(read.config_json == brief.config_json);
-  CHECK(read.record_prefix == brief.record_prefix);
-  CHECK_THROWS_WITH(parse_launch_config("{}"), Catch::Matchers::Contains("not a brief"));
-  CHECK_THROWS_WITH(parse_launch_config("nonsense"), Catch::Matchers::Contains("not a brief"));
+TEST_CASE("a launch configuration reads back; other text is refused") {
+  const LaunchConfig config{.config_json = R"({"a": {"b": "\"x\""}})",
+                            .experiment = "e",
+                            .controller = "c",
+                            .plant = "p",
+                            .backend = "rig",
+                            .version = "1",
+                            .realtime = "prefer",
+                            .record_prefix = "/tmp/a b/recorder"};
+  const LaunchConfig read = parse_launch_config(to_json(config));
+  CHECK(read.config_json == config.config_json);
+  CHECK(read.record_prefix == config.record_prefix);
+  CHECK_THROWS_WITH(parse_launch_config("{}"), Catch::Matchers::Contains("not a launch configuration"));
+  CHECK_THROWS_WITH(parse_launch_config("nonsense"), Catch::Matchers::Contains("not a launch configuration"));
 }

@@ -1,5 +1,5 @@
-// The guardian's way to a board with one owner at a time, tried on the emulated CAN node and the emulated USB board:
-// the owner drives and says no more, the writer brings drive and brake to 0 and lets go.
+// How the guardian takes over a board that has one owner at a time, on the emulated CAN node and the emulated USB
+// board: the owner drives and falls silent; the writer brings drive and brake to 0 and releases the board.
 
 #include <memory>
 
@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::int64_t ms = 1'000'000;
 
-/// Runs the owner's cycle for a while; it is left in the midst of driving.
+/// Runs the owner's cycle for a while and leaves it driving.
 void drive(driver::RigDriver& owner, const rig::Command& command) {
   owner.configure();
   owner.activate(0);
@@ -48,12 +48,12 @@ TEST_CASE("a CAN node whose owner fell silent is taken over and left safe") {
       CHECK(writer.make_safe().ok());
       CHECK(node.wire().drive_duty == 0.0);
       CHECK(node.wire().brake_duty == 0.0);
-      CHECK(writer.make_safe().ok());  // as often as it is asked
+      CHECK(writer.make_safe().ok());  // may be repeated
     }
   }
 }
 
-TEST_CASE("a CAN node that does not answer is not taken for safe, and is once it does") {
+TEST_CASE("a CAN node counts as safe only once it answers") {
   test::NodeOnSocket node({.start_speed_rad_s = 30.0});
   const auto make = [&] {
     return std::make_unique<driver::can::CanDriver>(driver::can::CanOptions{.answer_timeout_us = 20'000}, node.opener(),

@@ -94,7 +94,7 @@ TEST_CASE("Down to standstill the step shrinks with the speed and the error stay
   CHECK(worst_rad_s < 1e-5);
 }
 
-TEST_CASE("However the time is cut up, the plant ends at the same state") {
+TEST_CASE("The plant reaches the same state for any division of the time") {
   Plant whole{PlantOptions{}};
   Plant pieces{PlantOptions{}};
   whole.reset(rolling_at_170);
@@ -110,7 +110,7 @@ TEST_CASE("However the time is cut up, the plant ends at the same state") {
   CHECK_THAT(pieces.state().brake_torque_Nm, Catch::Matchers::WithinAbs(whole.state().brake_torque_Nm, 1e-10));
 }
 
-TEST_CASE("No time changes nothing") {
+TEST_CASE("A duration of 0 changes nothing") {
   PlantOptions options;
   options.ideal_actuator = true;
   Plant plant(options);

@@ -43,8 +43,8 @@ TEST_CASE("The calibrated motor brings the upper wheel to 170 rad/s when the pap
   const double idle_s = 0.05;
   const PlantOptions options;
   const double time_s = run_up_s(options, 170.0);
-  CHECK_THAT(idle_s + time_s, WithinAbs(6.2, 0.1));   // what the paper's plots tell
-  CHECK_THAT(idle_s + time_s, WithinAbs(6.2, 1e-3));  // what the calibration was for
+  CHECK_THAT(idle_s + time_s, WithinAbs(6.2, 0.1));   // read from the paper's plots
+  CHECK_THAT(idle_s + time_s, WithinAbs(6.2, 1e-3));  // the target of the calibration
   CHECK_THAT(time_s, WithinRel(lumped_run_up_s(options.rig, 170.0), 0.01));
   CHECK_THAT(run_up_s(options, 80.0), WithinRel(lumped_run_up_s(options.rig, 80.0), 0.01));
 }
@@ -58,7 +58,7 @@ TEST_CASE("At duty 0 the motor neither drives nor brakes") {
   CHECK(plant.state().omega2_rad_s < 299.0);  // back-EMF brakes there
 }
 
-TEST_CASE("Traction drags the upper wheel along: the tyre force is positive in braking and negative slip drives") {
+TEST_CASE("Traction drives the upper wheel: the tyre force is positive in braking, and negative slip drives") {
   Plant plant{PlantOptions{}};
   plant.reset({.omega1_rad_s = 50.0, .omega2_rad_s = 100.0});
   CHECK(plant.slip() > 0.0);
@@ -71,7 +71,7 @@ TEST_CASE("Traction drags the upper wheel along: the tyre force is positive in b
   CHECK(plant.state().omega2_rad_s > 50.0);
 }
 
-TEST_CASE("The ideal actuator applies the torque asked for at once, beyond map and lag, and ignores the duty") {
+TEST_CASE("The ideal actuator applies the commanded torque at once, without map and lag, and ignores the duty") {
   PlantOptions options = wheels_apart();
   options.ideal_actuator = true;
   options.rig.wheels.d1_Nms_rad = 0.0;

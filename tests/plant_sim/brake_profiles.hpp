@@ -3,11 +3,11 @@
 #include "abs_hil/plant_sim/plant.hpp"
 #include "catch.hpp"
 
-// What holds of any rig under the brake.
+// Properties of any rig under the brake.
 namespace abs_hil::plant_sim {
 
-/// Under the full brake the upper wheel locks first and stays locked, then the lower one stands: both at exactly 0,
-/// never below, and for good.
+/// Under the full brake the upper wheel locks first and stays locked, then the lower one stops. Both stay at exactly 0
+/// and are never negative.
 inline void check_locks_then_stands(Plant& plant, int most_ms) {
   int locked_at = -1;
   int standing_at = -1;
@@ -30,7 +30,7 @@ inline void check_locks_then_stands(Plant& plant, int most_ms) {
   CHECK(plant.slip() == 0.0);
 }
 
-/// Under any brake the wheels' kinetic energy never rises. `between(low, high)` draws a number.
+/// Under any brake torque the wheels' kinetic energy never increases. `between(low, high)` draws a number.
 template <typename Between>
 void require_energy_never_rises(Plant& plant, double J1_kg_m2, double J2_kg_m2, Between between) {
   const auto energy_J = [&] {

@@ -59,8 +59,8 @@ TEST_CASE("Coast-down of each wheel alone follows its closed form to standstill"
 }
 
 TEST_CASE("The order of convergence survives the stop of a wheel") {
-  // Friction high enough that steps of tens of milliseconds leave an error to measure. The way to standstill contains
-  // the event: a stop located to first or second order would spoil the order of it.
+  // High friction, so that steps of tens of milliseconds leave a measurable error. The interval to standstill contains
+  // the event: a stop located to first or second order would spoil the order of convergence.
   PlantOptions options = wheels_apart();
   options.rig.wheels.d1_Nms_rad = 10.0 * options.rig.wheels.J1_kg_m2;
   options.rig.wheels.M10_Nm = 100.0 * options.rig.wheels.J1_kg_m2;
@@ -99,7 +99,7 @@ TEST_CASE("Under the tyre force alone J1 w1 / r1 + J2 w2 / r2 is conserved and s
   CHECK_THAT(plant.slip(), WithinAbs(0.0, 1e-9));
 }
 
-TEST_CASE("Without any torque the angles grow in proportion to the time passed, whatever the cut") {
+TEST_CASE("Without any torque the angles grow in proportion to time, for any division of the time") {
   Plant plant(frictionless());
   plant.reset({.omega1_rad_s = 99.0, .omega2_rad_s = 99.5});  // equal circumferential speeds
   double passed_s = 0.0;

@@ -16,7 +16,7 @@ namespace {
 constexpr double J1 = 7.54e-3;
 constexpr double J2 = 25.60e-3;
 
-/// Lets `duration_s` pass in ticks of `tick_s`, which need not be a part of it.
+/// Advances the plant by `duration_s` in ticks of `tick_s`, which need not divide it.
 void pass(Plant& plant, double duration_s, double tick_s, const PlantInput& input) {
   double left_s = duration_s;
   for (; left_s > tick_s; left_s -= tick_s) plant.advance(tick_s, input);
@@ -25,7 +25,7 @@ void pass(Plant& plant, double duration_s, double tick_s, const PlantInput& inpu
 
 }  // namespace
 
-TEST_CASE("A brake that fades takes less and less speed from a wheel of its own, however the time is cut") {
+TEST_CASE("A fading brake decelerates a free wheel by its closed form, for any division of the time") {
   // J1 w' = -f(t) T with f = 1 up to 0.1003217 s, then falling to 0.4 over a second.
   PlantOptions options = wheels_apart();
   options.rig.wheels.d1_Nms_rad = options.rig.wheels.M10_Nm = 0.0;
@@ -41,7 +41,7 @@ TEST_CASE("A brake that fades takes less and less speed from a wheel of its own,
   CHECK_THAT(plant.truth().brake_torque_Nm, WithinRel(0.2, 1e-12));
 }
 
-TEST_CASE("Through the lag a fading brake follows its closed form") {
+TEST_CASE("With the lag a fading brake follows its closed form") {
   // Tb' = c (s(t) b - Tb), s = 1 - 0.25 t: Tb = b (s + 0.25/c) + K exp(-c t).
   PlantOptions options = wheels_apart();
   options.drift.brake_torque = "braking time: 1; 0.5 from 0 to 2";
@@ -56,7 +56,7 @@ TEST_CASE("Through the lag a fading brake follows its closed form") {
   REQUIRE(plant.state().omega1_rad_s > 0.0);
 }
 
-TEST_CASE("A bearing that dries takes the speed its growing friction takes") {
+TEST_CASE("A drying bearing decelerates its wheel by the closed form of its growing friction") {
   // J2 w' = -f(t) (d w + M), f = 1 + 2 t: w = (w0 + M/d) exp(-d (t + t^2)/J2) - M/d.
   PlantOptions options = wheels_apart();
   options.drift.lower_bearing = "time: 1; 5 from 0 to 2";
@@ -67,7 +67,7 @@ TEST_CASE("A bearing that dries takes the speed its growing friction takes") {
   const double M = options.rig.wheels.M20_Nm;
   const double expected = (170.0 + M / d) * std::exp(-d * (1.5 + 1.5 * 1.5) / J2) - M / d;
   CHECK_THAT(plant.state().omega2_rad_s, WithinAbs(expected, 1e-8));
-  CHECK(plant.state().omega1_rad_s > 160.0);  // its own bearing is as it was
+  CHECK(plant.state().omega1_rad_s > 160.0);  // the upper bearing does not drift
 }
 
 TEST_CASE("A motor that loses torque drives by its closed form") {
@@ -83,7 +83,7 @@ TEST_CASE("A motor that loses torque drives by its closed form") {
   CHECK_THAT(plant.state().omega2_rad_s, WithinRel(no_load * (1.0 - std::exp(-k / J2 * (1.0 - 0.125))), 1e-8));
 }
 
-TEST_CASE("A constant factor is another plant, to the last bit") {
+TEST_CASE("A constant factor equals a plant with scaled parameters, bit by bit") {
   PlantOptions other = GENERATE(PlantOptions{}, inteco_manual());
   PlantOptions drifting = other;
   other.rig.wheels.M10_Nm *= 2.0;
@@ -107,7 +107,7 @@ TEST_CASE("A constant factor is another plant, to the last bit") {
   CHECK(plant.truth().theta_N == expected.truth().theta_N);
 }
 
-TEST_CASE("A bearing that dries holds the wheel that it let go, and a reset renews it") {
+TEST_CASE("A drying bearing holds a wheel that turned before, and a reset restores the bearing") {
   PlantOptions options;
   options.rig.wheels.d2_Nms_rad = 0.0;
   options.drift.lower_bearing = "time: 1; 10 at 0.5";
@@ -122,8 +122,8 @@ TEST_CASE("A bearing that dries holds the wheel that it let go, and a reset rene
   }
 }
 
-TEST_CASE("Halving the step quarters the error that is left by holding the factors within a part") {
-  // Only with ramps as steep as no lab's: a brake that goes from 1 to 0.2 and back within 20 ms.
+TEST_CASE("Halving the step quarters the error of constant factors within a part") {
+  // Only with steeper ramps than any laboratory's: a brake that goes from 1 to 0.2 and back within 20 ms.
   PlantOptions options;
   options.drift.brake_torque = "braking time: 1; 0.2 from 0.05 to 0.07; 1 from 0.07 to 0.09";
   options.drift.upper_bearing = "time: 1; 10 from 0.01 to 0.05";
@@ -142,7 +142,7 @@ TEST_CASE("Halving the step quarters the error that is left by holding the facto
   CHECK(fine < 1e-5);
 }
 
-TEST_CASE("A profile that cannot be used is refused with the key it stands in") {
+TEST_CASE("An unusable profile is refused with its key") {
   PlantOptions options;
   const auto [profile, key] = GENERATE(table<std::string DriftProfiles::*, const char*>(
       {{&DriftProfiles::brake_torque, "plant.brake_torque_profile: "},
@@ -150,7 +150,8 @@ TEST_CASE("A profile that cannot be used is refused with the key it stands in") 
        {&DriftProfiles::upper_bearing, "plant.upper_bearing_profile: "},
        {&DriftProfiles::lower_bearing, "plant.lower_bearing_profile: "}}));
   options.drift.*profile = "distance: 1; 0.5 at 2";
-  CHECK_THROWS_WITH(Plant(options), Contains(std::string(key) + "\"distance\" is no axis here; write time or braking"));
+  CHECK_THROWS_WITH(Plant(options),
+                    Contains(std::string(key) + "\"distance\" is not an axis of this profile; write time or braking"));
   options.drift.*profile = "time: 1; 0 at 2";
-  CHECK_THROWS_WITH(Plant(options), Contains(std::string(key) + "\"0 at 2\" gives a factor that is not in (0, 10]"));
+  CHECK_THROWS_WITH(Plant(options), Contains(std::string(key) + "\"0 at 2\" has a factor outside (0, 10]"));
 }

@@ -9,7 +9,7 @@ using namespace abs_hil::plant_sim;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 
-TEST_CASE("A locked wheel stands at exactly zero, never below, until both stand for good") {
+TEST_CASE("A locked wheel stays at exactly zero until both wheels stand for good") {
   Plant plant{PlantOptions{}};
   plant.reset(rolling_at_170);
   check_locks_then_stands(plant, 4000);
@@ -17,7 +17,7 @@ TEST_CASE("A locked wheel stands at exactly zero, never below, until both stand 
 
 TEST_CASE("A standing pair takes no substeps") {
   Plant plant{PlantOptions{}};
-  plant.advance(1e9, {.brake_duty = 1.0});  // 2e12 steps otherwise
+  plant.advance(1e9, {.brake_duty = 1.0});  // would take 2e12 steps otherwise
   CHECK_THAT(plant.state().brake_torque_Nm, WithinAbs(9.03, 1e-12));
 }
 
@@ -57,7 +57,7 @@ TEST_CASE("A released wheel breaks away when the falling brake torque lets the t
   CHECK_THAT(plant.slip(), WithinAbs(0.0, 1e-3));
 }
 
-TEST_CASE("A held wheel pulled barely harder than its rising friction comes to stand again at once") {
+TEST_CASE("A held wheel whose pull barely exceeds its rising friction soon stands again") {
   // Locked, slip is 1. The brake torque rises at c31 (9.03 - Tb), so the wheel slides for 2 excess / that rate: from
   // far below the rounding of any step to many microseconds.
   const double pull_Nm = 0.0995 * 23.0 * std::sin(1.68 * std::atan(28.0));
@@ -120,7 +120,7 @@ TEST_CASE("The motor moves the standing lower wheel only beyond its friction") {
   CHECK(plant.state().omega1_rad_s >= 0.0);
 }
 
-TEST_CASE("Started from rest with the brake full on, the upper wheel holds while the lower one turns under it") {
+TEST_CASE("At a start with full brake the upper wheel holds while the lower one turns under it") {
   PlantOptions options;
   options.rig.tyre.theta_N = 10.0;  // r2 theta is well below the motor's torque
   Plant plant(options);
@@ -160,7 +160,7 @@ TEST_CASE("A reversed rig mirrors the forward one exactly") {
   CHECK(forward.state().angle1_rad > 0.0);
 }
 
-TEST_CASE("A wheel pulled through zero stops being braked one way and is dragged the other") {
+TEST_CASE("A wheel pulled through zero speed continues in the other direction without sticking") {
   // The upper wheel turns backward over a lower wheel going forward: it must pass zero without sticking.
   PlantOptions options;
   options.ideal_actuator = true;

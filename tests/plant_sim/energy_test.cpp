@@ -6,7 +6,7 @@
 
 using namespace abs_hil::plant_sim;
 
-TEST_CASE("Without the motor the kinetic energy never rises, whatever the rig, the state and the brake") {
+TEST_CASE("Without the motor the kinetic energy never increases, for any rig, state and brake") {
   std::mt19937_64 generator(20240607);
   const auto between = [&](double low, double high) {
     return low + (high - low) * static_cast<double>(generator() >> 11U) * 0x1p-53;

@@ -23,7 +23,7 @@ std::string error_of(const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("No text is friction 1 throughout") {
+TEST_CASE("An empty text is friction 1 throughout") {
   for (const char* text : {"", "  "}) {
     const FactorProfile profile(text);
     REQUIRE(profile.pieces().size() == 1);
@@ -64,32 +64,32 @@ TEST_CASE("A ramp may begin at 0, right after a jump and right after a ramp") {
   CHECK_FALSE(profile.from_braking());
 }
 
-TEST_CASE("What is no profile is refused with the part that is wrong") {
+TEST_CASE("An invalid profile is refused with the invalid part") {
   const auto [text, error] = GENERATE(table<const char*, const char*>({
       {"1; 0.5 at 2", "\"1; 0.5 at 2\" names no axis; begin with \"time:\", \"distance:\", \"braking time:\""},
-      {"way: 1", "\"way\" is no axis; write time, distance, braking time or braking distance"},
-      {"time distance: 1", "\"time distance\" is no axis"},
-      {"braking: 1", "\"braking\" is no axis"},
-      {": 1", "\"\" is no axis"},
-      {"time:", "\"\" holds \"\" where a number belongs"},
-      {"time: 0.5 at 1", "\"0.5 at 1\" holds \"0.5 at 1\" where a number belongs"},
-      {"time: 1; 0.5", "\"0.5\" is no change; write \"VALUE at POSITION\" or \"VALUE from POSITION to POSITION\""},
-      {"time: 1;; 0.5 at 1", "\"\" is no change"},
-      {"time: 1; 0.5 at", "\"0.5 at\" is no change"},
-      {"time: 1; 0.5 from 1 until 2", "is no change"},
-      {"time: 1; 0.5 at soon", "\"0.5 at soon\" holds \"soon\" where a number belongs"},
-      {"time: 1; 0.5 at 1s", "holds \"1s\" where a number belongs"},
-      {"time: 1; 0.5 at nan", "holds \"nan\" where a number belongs"},
-      {"time: 1; 0.5 at inf", "holds \"inf\" where a number belongs"},
-      {"time: 0", "\"0\" gives a factor that is not in (0, 10]"},
-      {"time: 1; -1 at 1", "\"-1 at 1\" gives a factor that is not in (0, 10]"},
-      {"time: 1; 11 at 1", "\"11 at 1\" gives a factor that is not in (0, 10]"},
+      {"way: 1", "\"way\" is not an axis; write time, distance, braking time or braking distance"},
+      {"time distance: 1", "\"time distance\" is not an axis"},
+      {"braking: 1", "\"braking\" is not an axis"},
+      {": 1", "\"\" is not an axis"},
+      {"time:", "\"\" holds \"\" instead of a number"},
+      {"time: 0.5 at 1", "\"0.5 at 1\" holds \"0.5 at 1\" instead of a number"},
+      {"time: 1; 0.5", "\"0.5\" is not a change; write \"VALUE at POSITION\" or \"VALUE from POSITION to POSITION\""},
+      {"time: 1;; 0.5 at 1", "\"\" is not a change"},
+      {"time: 1; 0.5 at", "\"0.5 at\" is not a change"},
+      {"time: 1; 0.5 from 1 until 2", "is not a change"},
+      {"time: 1; 0.5 at soon", "\"0.5 at soon\" holds \"soon\" instead of a number"},
+      {"time: 1; 0.5 at 1s", "holds \"1s\" instead of a number"},
+      {"time: 1; 0.5 at nan", "holds \"nan\" instead of a number"},
+      {"time: 1; 0.5 at inf", "holds \"inf\" instead of a number"},
+      {"time: 0", "\"0\" has a factor outside (0, 10]"},
+      {"time: 1; -1 at 1", "\"-1 at 1\" has a factor outside (0, 10]"},
+      {"time: 1; 11 at 1", "\"11 at 1\" has a factor outside (0, 10]"},
       {"time: 1; 0.5 from 2 to 2", "\"0.5 from 2 to 2\" must end after it begins"},
-      {"time: 1; 0.5 at 2; 1 at 1", "\"1 at 1\" must not begin before the change before it has ended"},
-      {"time: 1; 0.5 from 1 to 3; 1 at 2", "\"1 at 2\" must not begin before the change before it has ended"},
-      {"time: 1; 0.5 at -1", "\"0.5 at -1\" must not begin before the change before it has ended"},
-      {"time: 1; 0.5 at 2; 1 at 2", "\"1 at 2\" must come after the jump before it, and after 0"},
-      {"time: 1; 0.5 at 0", "\"0.5 at 0\" must come after the jump before it, and after 0"},
+      {"time: 1; 0.5 at 2; 1 at 1", "\"1 at 1\" must not begin before the previous change has ended"},
+      {"time: 1; 0.5 from 1 to 3; 1 at 2", "\"1 at 2\" must not begin before the previous change has ended"},
+      {"time: 1; 0.5 at -1", "\"0.5 at -1\" must not begin before the previous change has ended"},
+      {"time: 1; 0.5 at 2; 1 at 2", "\"1 at 2\" must come after the previous jump and after 0"},
+      {"time: 1; 0.5 at 0", "\"0.5 at 0\" must come after the previous jump and after 0"},
   }));
   CHECK_THAT(error_of(text), Contains(std::string("plant.friction_profile: ")) && Contains(error));
 }

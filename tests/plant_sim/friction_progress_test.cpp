@@ -9,8 +9,8 @@ using namespace abs_hil::plant_sim;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 
-// Most of these lock the upper wheel under a lower one without viscous friction: with slip 1 the deceleration
-// is a1 m + a0 for a friction m, and speed and way have closed forms along any profile.
+// Most of these tests lock the upper wheel over a lower one without viscous friction. With slip 1 the deceleration is
+// a1 m + a0 for a friction m, and speed and distance have closed forms along any profile.
 namespace {
 
 constexpr double locking_Nm = 50.0;
@@ -31,7 +31,7 @@ constexpr PlantInput locking{.brake_torque_Nm = locking_Nm};
 
 }  // namespace
 
-TEST_CASE("A jump in time acts at its instant, between ticks and within one step, however the time is cut") {
+TEST_CASE("A jump in time acts at its instant, between ticks and within one step, for any division of the time") {
   Plant plant(locked_on("time: 1; 0.4 at 0.1003217; 2 at 0.1003219"));
   const double tick_s = GENERATE(1e-3, 0.37e-3, 0.25);
   plant.reset(locked_at_170);
@@ -46,7 +46,7 @@ TEST_CASE("A jump in time acts at its instant, between ticks and within one step
   CHECK(plant.friction() == 2.0);
 }
 
-TEST_CASE("A ramp in time is a straight line, and what the truth tells follows it") {
+TEST_CASE("A ramp in time is a straight line, and the reported truth follows it") {
   Plant plant(locked_on("time: 1; 0.5 from 0.1 to 0.3"));
   plant.reset(locked_at_170);
   plant.advance(0.15, locking);
@@ -59,7 +59,7 @@ TEST_CASE("A ramp in time is a straight line, and what the truth tells follows i
   CHECK_THAT(plant.state().omega2_rad_s, WithinAbs(170.0 - a0 * 0.4 - a1 * (0.1 + 0.2 * 0.75 + 0.1 * 0.5), 1e-10));
 }
 
-TEST_CASE("A patch on the way begins and ends where it lies") {
+TEST_CASE("A patch over the distance begins and ends at its position") {
   // w^2 falls by 2 a for each rad; the patch is from 0.8 to 1.7 m.
   Plant plant(locked_on("distance: 1; 0.3 at 0.8; 1 at 1.7"));
   plant.reset({.angle2_rad = 77.0, .omega2_rad_s = 170.0});
@@ -77,7 +77,7 @@ TEST_CASE("A patch on the way begins and ends where it lies") {
   CHECK(0.0990 * (plant.state().angle2_rad - 77.0) > 2.0);
 }
 
-TEST_CASE("A ramp along the way is a straight line over the way") {
+TEST_CASE("A ramp over the distance is a straight line over the distance") {
   Plant plant(locked_on("distance: 1; 0.2 from 1 to 3"));
   plant.reset(locked_at_170);
   plant.advance(0.12, locking);
@@ -93,7 +93,7 @@ TEST_CASE("A ramp along the way is a straight line over the way") {
   CHECK(plant.friction() == 0.2);
 }
 
-TEST_CASE("A profile of braking counts from the first brake torque, and a reset starts it again") {
+TEST_CASE("A braking profile counts from the first brake torque, and a reset restarts it") {
   const bool in_time = GENERATE(true, false);
   Plant plant(locked_on(in_time ? "braking time: 1; 0.5 at 0.1" : "braking distance: 1; 0.5 at 1.6"));
   for (int run = 0; run < 2; ++run) {
@@ -102,7 +102,7 @@ TEST_CASE("A profile of braking counts from the first brake torque, and a reset 
     CHECK(plant.friction() == 1.0);
     const double start_rad = plant.state().angle2_rad;
     plant.advance(0.05, {.brake_torque_Nm = 0.1});
-    plant.advance(0.03, {});  // counting goes on
+    plant.advance(0.03, {});  // counting continues
     plant.advance(0.015, locking);
     CHECK(plant.friction() == 1.0);
     plant.advance(0.015, locking);
@@ -111,7 +111,7 @@ TEST_CASE("A profile of braking counts from the first brake torque, and a reset 
   }
 }
 
-TEST_CASE("With the real actuator the dead zone is no braking") {
+TEST_CASE("With the real actuator a duty in the dead zone does not count as braking") {
   PlantOptions options;
   options.friction_profile = "braking time: 1; 0.5 at 0.1";
   Plant plant(options);
@@ -122,7 +122,7 @@ TEST_CASE("With the real actuator the dead zone is no braking") {
   CHECK(plant.friction() == 0.5);
 }
 
-TEST_CASE("Pieces that pass while both wheels stand are passed") {
+TEST_CASE("Pieces end by time also while both wheels stand") {
   Plant plant(locked_on("time: 1; 0.5 at 10; 0.7 at 20"));
   plant.advance(15.0, {});
   CHECK(plant.friction() == 0.5);
@@ -131,7 +131,7 @@ TEST_CASE("Pieces that pass while both wheels stand are passed") {
   CHECK(plant.friction() == 0.7);
 }
 
-TEST_CASE("A held wheel breaks away where its road gains grip, and is held again where it loses it") {
+TEST_CASE("A held wheel breaks away where the road gains grip, and is held again where the road loses it") {
   PlantOptions options = locked_on("time: 0.5; 1 at 0.0102; 0.5 at 0.0304");
   options.rig.wheels.M10_Nm = 0.75 * 0.0995 * force_N;
   Plant plant(options);
@@ -146,7 +146,7 @@ TEST_CASE("A held wheel breaks away where its road gains grip, and is held again
   CHECK(plant.state().omega1_rad_s == 0.0);
 }
 
-TEST_CASE("The order of convergence survives jumps and corners of the friction, in time and along the way") {
+TEST_CASE("The order of convergence survives jumps and corners of the friction, in time and over distance") {
   PlantOptions options;
   options.friction_profile = GENERATE("time: 1; 0.6 at 0.0313; 1 at 0.0777", "time: 1; 0.6 from 0.0213 to 0.0471",
                                       "distance: 1; 0.6 at 0.513; 1 at 1.1", "distance: 1; 0.6 from 0.413 to 0.91");
@@ -165,7 +165,7 @@ TEST_CASE("The order of convergence survives jumps and corners of the friction, 
   CHECK(fine < 1e-7);
 }
 
-TEST_CASE("A profile of 1 changes nothing, to the last bit") {
+TEST_CASE("A profile of 1 changes nothing, bit by bit") {
   PlantOptions options;
   Plant plain(options);
   options.friction_profile = "time: 1";

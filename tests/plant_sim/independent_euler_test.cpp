@@ -5,8 +5,8 @@
 #include "catch.hpp"
 #include "rigs.hpp"
 
-// The plant once more, written down from the paper with Table 1's numbers and nothing of the project's: plain Euler
-// steps of 1 us, a wheel that would pass zero clamped there.
+// A second plant, written from the paper with Table 1's numbers and without code of the project: plain Euler steps of 1
+// us; a wheel that would pass zero is clamped there.
 namespace {
 
 struct EulerRig {

@@ -19,7 +19,7 @@ constexpr double d1 = 118.74e-6, d2 = 214.68e-6, M10 = 0.0032, M20 = 0.0925;
 constexpr double tick_s = 1e-3;
 
 /// Braking at a constant slip, from the manual's equations alone. With r1 w1 = (1 - slip) r2 w2 the upper wheel's
-/// torque balance gives the brake torque, the lever then a force that is linear in w2: w2' = -(a + b w2).
+/// torque balance gives the brake torque, and the lever gives a force that is linear in w2: w2' = -(a + b w2).
 struct ConstantSlip {
   double k, mu_arm, slip;
 
@@ -44,8 +44,8 @@ struct Stop {
   double time_s, way_m, slip_error;
 };
 
-/// Brakes the plant from 170 rad/s at a constant slip, by the torque above and a feedback that only has to take out
-/// what holding the torque over a tick leaves, down to `end_w2`.
+/// Brakes the plant from 170 rad/s to `end_w2` at a constant slip: with the torque above and a feedback that only
+/// removes the error of a constant torque within a tick.
 Stop stop_at(double slip, double end_w2) {
   PlantOptions options = inteco_manual();
   options.ideal_actuator = true;
@@ -114,7 +114,7 @@ TEST_CASE("On the maker's plant, too, J1 w1 / r1 + J2 w2 / r2 is conserved under
     plant.advance(1e-3, {});
     REQUIRE_THAT(momentum(plant.state()), WithinRel(start, 1e-11));
   }
-  CHECK(std::abs(plant.slip()) < 5e-4);  // the curve is flat at 0: the slip dies out as 1 / t
+  CHECK(std::abs(plant.slip()) < 5e-4);  // the curve is flat at 0, so the slip decays as 1 / t
 }
 
 TEST_CASE("Without the motor the maker's plant never gains energy") {
@@ -138,7 +138,7 @@ TEST_CASE("Without the motor the maker's plant never gains energy") {
   }
 }
 
-TEST_CASE("The maker's plant locks, stands at exactly 0 and stays there; released before, it breaks away") {
+TEST_CASE("The maker's plant locks and stays at exactly 0; if the brake is released earlier, it breaks away") {
   Plant plant(inteco_manual());
   plant.reset(rolling_at_170);
   check_locks_then_stands(plant, 2000);
@@ -152,7 +152,7 @@ TEST_CASE("The maker's plant locks, stands at exactly 0 and stays there; release
   CHECK(plant.slip() < 0.01);
 }
 
-TEST_CASE("The motor drags the upper wheel up through the maker's contact, and in traction the force turns round") {
+TEST_CASE("The motor drives the upper wheel through the maker's contact, and in traction the force reverses") {
   Plant plant(inteco_manual());
   int ticks = 0;
   while (plant.state().omega1_rad_s < 170.0 && ticks < 10000) {

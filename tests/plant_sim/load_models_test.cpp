@@ -39,7 +39,7 @@ TEST_CASE("The lever's normal force, by hand: it rises with the brake torque and
   CHECK_THAT(more / 33.74139246815038, WithinRel(1.0 + 1.0 / 23.641011, 1e-8));
 }
 
-TEST_CASE("A wheel turning backward lifts the lever with its brake torque, to nothing at worst") {
+TEST_CASE("A wheel turning backward lifts the lever with its brake torque, at most to zero force") {
   // s1 = -1: the numerator is 19.62 - M1 - M10 - d1 |w1|; slip 1 in opposite ways, s = +1.
   const double arm = 0.37 * (std::sin(phi) - 0.3992043980505987 * std::cos(phi));
   CHECK_THAT(force_N(inteco_manual(), turning(-10.0, 100.0, 9.0)),
@@ -47,7 +47,7 @@ TEST_CASE("A wheel turning backward lifts the lever with its brake torque, to no
   CHECK(force_N(inteco_manual(), turning(-10.0, 100.0, 25.0)) == 0.0);
 }
 
-TEST_CASE("A wheel that its brake holds hands on the tyre's torque, not what the brake could hold") {
+TEST_CASE("A wheel that its brake holds transmits the tyre's torque, not the largest brake torque") {
   // Fn (L (sin phi - mu cos phi) - r1 mu) = Mg: 83.0426 N, F = 33.1510 N, whatever the brake torque beyond r1 F.
   const double torque_Nm = GENERATE(3.4, 5.0, 9.03, 50.0);
   CHECK_THAT(force_N(inteco_manual(), turning(0.0, 100.0, torque_Nm)), WithinRel(33.15095163929526, 1e-12));
@@ -78,7 +78,7 @@ TEST_CASE("The truth's theta is the largest braking force of any slip at the pre
   CHECK_THAT(plant.truth().theta_N, WithinRel(largest_N, 1e-6));
 }
 
-TEST_CASE("No load rises more steeply with friction than it says") {
+TEST_CASE("No load rises more steeply with friction than its bound") {
   PlantOptions options = inteco_manual();
   options.load = GENERATE("constant", "lever");
   const LoadModel model = make_load_model(options, 0.4, 1.5);
@@ -101,7 +101,7 @@ TEST_CASE("Tyres and loads combine freely") {
   const double omega2 = 0.0995 * 150.0 / 0.85 / 0.0990;  // slip 0.15
   const PlantState state = turning(150.0, omega2, 4.0);
   PlantOptions options = inteco_manual();
-  options.load = "constant";  // theta_N is the peak then
+  options.load = "constant";  // then theta_N is the peak
   CHECK_THAT(force_N(options, state), WithinRel(34.31 * 0.3948472925401165 / 0.3992043980505987, 1e-12));
   options.tyre = "magic-formula";
   options.load = "lever";

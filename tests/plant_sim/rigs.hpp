@@ -5,7 +5,7 @@
 // Rigs for tests: Table 1 with parts of the physics taken away.
 namespace abs_hil::plant_sim {
 
-/// The wheels do not touch, but for a force that changes no speed by more than 1e-10 rad/s in a second.
+/// The wheels do not touch, except for a force that changes speeds by at most 1e-10 rad/s per second.
 inline PlantOptions wheels_apart() {
   PlantOptions options;
   options.rig.tyre.theta_N = 1e-12;
@@ -30,7 +30,7 @@ inline PlantOptions inteco_manual() {
   return options;
 }
 
-/// Both wheels turning at the same speed, where the paper's braking starts.
+/// Both wheels at the same speed, the start of the paper's braking.
 inline constexpr PlantState rolling_at_170{.omega1_rad_s = 170.0, .omega2_rad_s = 170.0};
 
 }  // namespace abs_hil::plant_sim

@@ -26,7 +26,7 @@ TEST_CASE("The maker's curve has the values that 40-digit arithmetic gives for t
   CHECK(tyre.shape(-slip) == -tyre.shape(slip));
 }
 
-TEST_CASE("The peak is found wherever it lies") {
+TEST_CASE("The peak is found at any position") {
   CHECK_THAT(IntecoMu(inteco_manual()).peak_mu(), WithinAbs(0.3992043980505987, 1e-15));  // a locked wheel
   PlantOptions options = inteco_manual();
   options.inteco_mu.w3 = 0.0;  // the curve falls after its knee
@@ -37,7 +37,7 @@ TEST_CASE("The peak is found wherever it lies") {
   CHECK(falling.shape(1.0) < 0.95);
 }
 
-TEST_CASE("The maker's slip: braking, traction, 1 in opposite ways, mirrored backward, 0 at rest") {
+TEST_CASE("The maker's slip: braking, traction, 1 for opposite directions, mirrored backward, 0 at rest") {
   const IntecoMu tyre(inteco_manual());
   CHECK_THAT(tyre.slip(6.0, 10.0), WithinAbs(0.4, 1e-15));   // (v_x - v_w) / v_x
   CHECK_THAT(tyre.slip(10.0, 6.0), WithinAbs(-0.4, 1e-15));  // s (v_w - v_x) / v_w; (5) would give -0.667
@@ -49,20 +49,20 @@ TEST_CASE("The maker's slip: braking, traction, 1 in opposite ways, mirrored bac
   CHECK(tyre.slip(10.0, 0.0) == -1.0);
   CHECK(tyre.slip(0.0, 0.0) == 0.0);
   CHECK_THAT(tyre.slip(0.004, 0.005), WithinAbs(0.001 / 0.02, 1e-15));  // regularised
-  // The paper's in the same places.
+  // The paper's slip for the same speeds.
   const MagicFormula paper{PlantOptions{}};
   CHECK_THAT(paper.slip(10.0, 6.0), WithinAbs(-4.0 / 6.0, 1e-15));
   CHECK_THAT(paper.slip(0.004, 0.005), WithinAbs(0.001 / 0.02, 1e-15));
 }
 
-TEST_CASE("Where the published polynomial would drive, friction is 0") {
+TEST_CASE("Friction is 0 where the published polynomial would drive") {
   const IntecoMu tyre(inteco_manual());
   CHECK(tyre.shape(3e-5) == 0.0);
   CHECK(tyre.shape(-3e-5) == 0.0);
   CHECK(tyre.shape(1e-4) > 0.0);
 }
 
-TEST_CASE("No tyre rises more steeply than it says, and not much less steeply somewhere") {
+TEST_CASE("No tyre rises more steeply than its bound, and the bound is nearly reached") {
   PlantOptions options = inteco_manual();
   options.tyre = GENERATE("magic-formula", "inteco-mu");
   const TyreModel model = make_tyre_model(options);

@@ -1,4 +1,4 @@
-// Runs recorded by the program's own parts, replayed, checked and damaged.
+// Runs recorded by the program's own parts: replayed, checked, and damaged.
 #include <fstream>
 #include <functional>
 #include <iterator>
@@ -23,15 +23,15 @@ namespace {
 
 using abs_hil::test::TemporaryFolder;
 
-/// What is recorded: key=value, and whether a stop request ends it.
+/// A run to record: key=value assignments, and whether a stop request ends it.
 struct Recipe {
   std::vector<std::string> assignments{};
   std::uint32_t decimation{1};
   rig::Reason stop{rig::Reason::none};
-  std::int64_t measured_late_ns{0};  ///< as a board that reads its counters after the wake-up
+  std::int64_t measured_late_ns{0};  ///< like a board that reads its counters after the wake-up
 };
 
-/// Hands records on with another time of measurement, as from a board.
+/// Passes records on with a later time of measurement, like a board.
 class LateMeasurement final : public rig::RecordSink {
  public:
   LateMeasurement(rig::RecordSink& next, std::int64_t late_ns) : next_(next), late_ns_(late_ns) {}
@@ -78,7 +78,7 @@ std::string content(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-TEST_CASE("a recorded run comes out again bit by bit, whatever the controller and the rate") {
+TEST_CASE("a recorded run is reproduced bit by bit with any controller and rate") {
   const TemporaryFolder scratch;
   for (const char* controller : {"adaptive", "adaptive-actuator", "adaptive-peak", "nominal", "sliding-mode",
                                  "sliding-mode-smooth", "super-twisting", "pi", "relay", "five-phase", "locked"}) {
@@ -92,7 +92,7 @@ TEST_CASE("a recorded run comes out again bit by bit, whatever the controller an
   }
 }
 
-TEST_CASE("ideal sensors, ideal actuator, faults and stop requests come out again") {
+TEST_CASE("runs with ideal sensors, ideal actuator, faults and stop requests are reproduced") {
   const TemporaryFolder scratch;
   const std::vector<Recipe> recipes{
       {{"plant.ideal_sensors=true", "plant.ideal_actuator=true"}},
@@ -112,7 +112,7 @@ TEST_CASE("ideal sensors, ideal actuator, faults and stop requests come out agai
   }
 }
 
-TEST_CASE("every fault that the gate finds in the wheels comes out again") {
+TEST_CASE("every fault that the gate finds in the wheels is reproduced") {
   const TemporaryFolder scratch;
   const std::vector<std::pair<const char*, rig::Reason>> faults{
       {"brake@encoder_upper:stuck+0.1s", rig::Reason::encoder_upper_stuck},
@@ -127,7 +127,7 @@ TEST_CASE("every fault that the gate finds in the wheels comes out again") {
       {"brake@read:stuck+0.1s", rig::Reason::samples_missing},
       {"accelerate@stamp:off+0.1s", rig::Reason::samples_missing},
       {"brake@stamp:intermittent+0.1s", rig::Reason::sequence_complete},  // measurements refused on the way
-      // Readings that were held up are not judged, and what a counter shows then goes on to the estimates.
+      // The gate does not judge delayed readings, and the counter's value then reaches the estimates.
       {"brake@read:slow=0.9ms,brake@encoder_upper:garbage+0.1s", rig::Reason::overspeed},
       {"accelerate@write:stuck+1s", rig::Reason::speed_rises_with_motor_off},
       {"accelerate@motor_pwm:off+0.1s", rig::Reason::motor_no_response},
@@ -139,12 +139,12 @@ TEST_CASE("every fault that the gate finds in the wheels comes out again") {
       record_run(scratch / "run.lcmlog", {{"experiment.start_speed_rad_s=0", std::string("run.inject=") + fault,
                                            std::string("plant.ideal_sensors=") + (ideal_sensors ? "true" : "false")}});
       const RecordedRun run = read_run(scratch / "run.lcmlog");
-      // A failing encoder's ideal speed may leap before its counts tell.
+      // A failing encoder's ideal speed may jump before its counts show it.
       if (!ideal_sensors) CHECK(run.cycles.back().reason == static_cast<int>(reason));
       const CheckResult result = check(run);
       INFO(result.lines.front());
       CHECK(result.equal);
-      // What another controller would have done ends there, too.
+      // The replay of another controller ends there too.
       CHECK(rerun_open_loop(run, settings_of(run, {.controller = "pi"}), WheelFaults::as_recorded).size() ==
             run.cycles.size());
     }
@@ -189,7 +189,7 @@ TEST_CASE("any changed bit of a measurement, estimate or command is found and na
   longer.cycles.push_back(longer.cycles.back());
   ++longer.cycles.back().cycle;
   longer.measured_ns.push_back(longer.cycles.back().stamp_ns);
-  CHECK_THAT(check(longer).lines.front(), Contains("comes to its end after"));
+  CHECK_THAT(check(longer).lines.front(), Contains("the replayed run ends after"));
 }
 
 TEST_CASE("another seed, gain or controller in the configuration is found") {
@@ -207,7 +207,7 @@ TEST_CASE("another seed, gain or controller in the configuration is found") {
   CHECK_FALSE(with("control", "controller", "pi").equal);
   const CheckResult seed = with("run", "seed", 2);
   CHECK_FALSE(seed.equal);
-  CHECK(seed.lines[0].find("bit-equal") != std::string::npos);  // open loop the seed has no say
+  CHECK(seed.lines[0].find("bit-equal") != std::string::npos);  // the seed does not affect the open loop
   CHECK(seed.lines[1].find("DIFFERENT") != std::string::npos);
   CHECK_THROWS_AS(with("control", "slip_ref", 2.0), telemetry::RecordingError);
 }
@@ -224,7 +224,7 @@ TEST_CASE("another controller sees the same run: same measurements and estimates
   for (std::size_t n = 0; n < rerun.size(); ++n) {
     CHECK(rerun[n].record.control.speeds_est.omega1_rad_s == run.cycles[n].omega1_est_rad_s);
     CHECK(static_cast<int>(rerun[n].record.phase) == run.cycles[n].phase);
-    // The torque that acted is the recorded command's, whoever is asked.
+    // The torque that acted is that of the recorded command for every controller.
     CHECK(rerun[n].record.control.brake_torque_est_Nm == run.cycles[n].brake_torque_est_Nm);
     difference =
         std::max(difference, std::abs(rerun[n].record.control.brake_torque_ref_Nm - run.cycles[n].brake_torque_ref_Nm));
@@ -251,7 +251,7 @@ TEST_CASE("recordings that do not hold the whole run are refused with the reason
   CHECK_THROWS_WITH(read_bytes(whole + whole), Contains("damaged: event number"));
 }
 
-TEST_CASE("64 random bytes anywhere are an error or a difference, never a crash and rarely unseen") {
+TEST_CASE("64 random bytes anywhere give an error or a difference, never a crash, and rarely pass unnoticed") {
   const TemporaryFolder scratch;
   record_run(scratch / "run.lcmlog", {{"experiment.start_speed_rad_s=30"}});
   const std::string whole = content(scratch / "run.lcmlog");

@@ -1,4 +1,4 @@
-"""The page in headless Chromium: every figure is there with the right number of curves and points, and is seen."""
+"""The page in headless Chromium: every figure is visible and has the right number of curves and points."""
 import subprocess
 import unittest
 
@@ -8,7 +8,7 @@ from program import ReportTest, need
 need('gnuplot', 'gnuplot-nox')
 need('chromium', 'chromium')
 
-BEFORE_AFTER_S = 0.2  # of braking, in the figures
+BEFORE_AFTER_S = 0.2  # margin around braking in the figures
 RUNS = ('adaptive', 'sliding-mode')
 
 
@@ -35,7 +35,7 @@ class Browser(ReportTest):
 
     def test_curves(self):
         expected = {
-            'course': ['omega2'] * 2,
+            'profile': ['omega2'] * 2,
             'fig5': ['omega1'] * 2,
             'fig6': ['omega2'] * 2,
             'fig7': ['slip'] * 2 + ['slip_ref'] + ['slip_error'] * 2,
@@ -47,7 +47,7 @@ class Browser(ReportTest):
                          {figure: sorted(quantities) for figure, quantities in expected.items()})
 
     def test_points(self):
-        """Up to 2800 rows nothing is thinned: each row is a point, but those where there is no value."""
+        """Up to 2800 rows nothing is thinned: each row with a value is a point."""
         for figure, panel, column in (('fig5', 'a', 'omega1_rad_s'), ('fig6', 'a', 'omega2_rad_s'),
                                       ('fig8', 'a', 'brake_torque_ref_Nm'), ('fig8', 'b', 'brake_torque_Nm'),
                                       ('fig10', 'a', 'distance_m'), ('fig7', 'a', 'slip'), ('fig9', 'a', 'theta_est_N')):
@@ -57,7 +57,7 @@ class Browser(ReportTest):
                 self.assertGreater(len(values), 2000)
                 curve = self.read.curve(figure, panel, run)
                 self.assertEqual((curve['run'], curve['said']), (run, len(values)), (figure, column))
-                if figure not in ('fig7', 'fig9'):  # their axes cut off what runs away towards standstill
+                if figure not in ('fig7', 'fig9'):  # the other axes cut off values that diverge towards standstill
                     self.assertEqual(curve['drawn'], len(values), (figure, column))
 
     def test_curve_stands_where_the_rows_say(self):
@@ -67,7 +67,7 @@ class Browser(ReportTest):
             values = [float(row['omega1_rad_s']) for row in rows]
             high, low = values.index(max(values)), values.index(min(values))
             slope = (pixels[high] - pixels[low]) / (values[high] - values[low])
-            self.assertLess(slope, -0.5)  # upwards, and filling its frame: 240 px for 170 rad/s
+            self.assertLess(slope, -0.5)  # it points upwards and fills its frame: 240 px for 170 rad/s
             for pixel, value in zip(pixels, values):
                 self.assertAlmostEqual(pixel, pixels[low] + slope * (value - values[low]), delta=0.02)
 

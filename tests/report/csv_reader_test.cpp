@@ -52,7 +52,7 @@ std::string error_of(const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("Rows are read as they were written, whatever their line ends and further columns") {
+TEST_CASE("Rows are read as they were written, with any line ends and further columns") {
   const File file(std::string(header) + ",extra\r\n" + row("0.25") + ",7\r\n" + row("0.5", "hold") + ",8\r\n");
   CsvReader csv(file.path());
   REQUIRE(csv.next());
@@ -81,7 +81,7 @@ TEST_CASE("Rows across the reader's blocks") {
   CHECK(rows == count);
 }
 
-TEST_CASE("A last line without its end is no row, even if it could be one") {
+TEST_CASE("A last line without line end does not count as a row, even if it is complete") {
   for (const std::string& cut : {row("2"), std::string("2,bra"), std::string("2")}) {
     const File file(std::string(header) + "\n" + row("1") + "\n" + cut);
     CsvReader csv(file.path());
@@ -91,17 +91,18 @@ TEST_CASE("A last line without its end is no row, even if it could be one") {
   }
 }
 
-TEST_CASE("What is no run is refused with file and line") {
+TEST_CASE("A file that is not a run is refused with file and line") {
   const std::string h = std::string(header) + "\n";
   CHECK(error_of("") == "FILE:1: the file is empty: the run wrote nothing");
-  CHECK(error_of("time_s,pha") == "FILE:1: the file ends within its first line: the run was cut off before it began");
+  CHECK(error_of("time_s,pha") ==
+        "FILE:1: the file ends within its first line: the recording stopped before the first row");
   CHECK(error_of("time_s,phase\n").find("FILE:1: the header lacks omega1_rad_s, ") == 0);
-  CHECK(error_of(h + row("1") + "\n" + row("0.5") + "\n") == "FILE:3: time_s goes back from 1 to 0.5");
+  CHECK(error_of(h + row("1") + "\n" + row("0.5") + "\n") == "FILE:3: time_s decreases from 1 to 0.5");
   CHECK(error_of(h + row("x") + "\n").find("FILE:2: time_s: \"x\" is not a number") == 0);
   CHECK(error_of(h + row("") + "\n").find("FILE:2: time_s: \"\" is not a number") == 0);
   CHECK(error_of(h + row("NaN") + "\n") == "FILE:2: time_s is not a finite number");
-  CHECK(error_of(h + "1,brake,3\n") == "FILE:2: 3 fields instead of 19: the row ends before omega2_rad_s");
-  CHECK(error_of(h + row("1") + ",9\n") == "FILE:2: more than the header's 19 fields");
-  CHECK(error_of(h + "\n") == "FILE:2: time_s: \"\" is not a number (NaN where a run does not know)");
+  CHECK(error_of(h + "1,brake,3\n") == "FILE:2: the row has 3 fields instead of 19 and ends before omega2_rad_s");
+  CHECK(error_of(h + row("1") + ",9\n") == "FILE:2: the row has more than the header's 19 fields");
+  CHECK(error_of(h + "\n") == "FILE:2: time_s: \"\" is not a number (a run writes NaN for an unknown value)");
   CHECK(error_of(std::string(100'000, 'a')).find("FILE:1: the line is longer than any row") == 0);
 }

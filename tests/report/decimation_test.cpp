@@ -15,9 +15,9 @@ namespace {
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<Point> thinned(const std::vector<Point>& rows, std::size_t most) {
-  Decimation envelope(most);
-  for (const Point& row : rows) envelope.add(row.x, row.y);
-  return envelope.points();
+  Decimation decimation(most);
+  for (const Point& row : rows) decimation.add(row.x, row.y);
+  return decimation.points();
 }
 
 std::vector<Point> noise(std::size_t count) {
@@ -37,7 +37,7 @@ TEST_CASE("A short curve stays as it is") {
   for (std::size_t i = 0; i < rows.size(); ++i) CHECK(points[i].y == rows[i].y);
 }
 
-TEST_CASE("A long curve keeps its ends and, in every stretch, its least and greatest value") {
+TEST_CASE("A long curve keeps its ends and the smallest and largest value of every stretch") {
   const auto rows = noise(100'003);
   const auto points = thinned(rows, 512);
   CHECK(points.size() <= 4 * 512);
@@ -63,7 +63,7 @@ TEST_CASE("Every point of a thinned curve is a row") {
   for (const Point& point : thinned(rows, 64)) CHECK(rows[static_cast<std::size_t>(point.x)].y == point.y);
 }
 
-TEST_CASE("What is not a number breaks the curve and stands at none of its ends") {
+TEST_CASE("NaN breaks the curve and is at none of its ends") {
   const auto points =
       thinned({{0, none}, {1, 1}, {2, none}, {3, none}, {4, 2}, {5, std::numeric_limits<double>::infinity()}}, 16);
   REQUIRE(points.size() == 3);

@@ -1,4 +1,4 @@
-"""The exports hold the rows as they are, and the examples that load them in Octave and Python get the summary's figures."""
+"""The exports hold the rows unchanged, and the examples that load them in Octave and Python get the summary's metrics."""
 import csv
 import io
 import json

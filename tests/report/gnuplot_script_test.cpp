@@ -23,7 +23,7 @@ Figure figure_with(const std::string& text) {
   return figure;
 }
 
-/// What stands outside of gnuplot's single quotes.
+/// The parts of a script outside gnuplot's single quotes.
 std::string unquoted(const std::string& script) {
   std::string rest;
   bool quoted = false;
@@ -39,7 +39,7 @@ std::string unquoted(const std::string& script) {
 
 }  // namespace
 
-TEST_CASE("Text from files never stands outside of single quotes") {
+TEST_CASE("Text from files is always within single quotes") {
   const std::string hostile = "'; system('touch pwned') #`id`\"$(id)\" @x";
   const std::string rest = unquoted(gnuplot_script({figure_with(hostile)}, PictureFormat::svg));
   for (const char* part : {"system", "`", "\"", "touch", "$(", "@x"}) {
@@ -48,7 +48,7 @@ TEST_CASE("Text from files never stands outside of single quotes") {
   }
 }
 
-TEST_CASE("A picture is marked with what its curves are, and hostile names stay text") {
+TEST_CASE("A picture's curves are marked, and hostile names stay text") {
   const Figure figure = figure_with("<b onload=\"x\">");
   const std::string drawn =
       "<?xml version=\"1.0\"?>\n<!DOCTYPE svg>\n<svg viewBox=\"0 0 1 1\"><g id=\"gnuplot_canvas\">"

@@ -1,10 +1,10 @@
-"""Reads a report's page as a browser has it: figures with their curves, tables, the page's text."""
+"""Reads a report's page like a browser: figures with their curves, tables, the page's text."""
 import html.parser
 import re
 
 
 class PageReader(html.parser.HTMLParser):
-    """figures[id] = list of curves: id, run, quantity, points as said, points as drawn."""
+    """figures[id] = list of curves: id, run, quantity, stated number of points, drawn points."""
 
     def __init__(self, page):
         super().__init__()

@@ -15,7 +15,7 @@ MUST_NOT_SKIP = os.environ.get('CI') == 'true'
 
 
 def need(program, package):
-    """Ends the test as skipped where a program is missing, as failed where nothing may be skipped."""
+    """Skips the test if a program is missing; fails it where nothing may be skipped."""
     if shutil.which(program):
         return
     print(f'SKIPPED: {program} is missing: scripts/setup.sh packages-report.txt installs {package}')
@@ -31,7 +31,7 @@ class ReportTest(unittest.TestCase):
         self._folder.cleanup()
 
     def make_run(self, name, *args):
-        """A run folder of a run in virtual time."""
+        """Makes the run folder of a run in virtual time."""
         folder = self.folder / name
         result = subprocess.run([ABS_HIL, '--backend', 'sim', '--fast', '--no-lcm', '--out', folder, *args],
                                 capture_output=True, text=True, timeout=60, check=False)
@@ -45,7 +45,7 @@ class ReportTest(unittest.TestCase):
         return result
 
     def page(self, *args):
-        """The page that abs_report makes, and what it says on stderr."""
+        """The page from abs_report, and its stderr."""
         result = self.report(*args, '--output', self.folder / 'page.html', '--force')
         return (self.folder / 'page.html').read_text(), result.stderr.decode()
 

@@ -1,4 +1,4 @@
-"""abs_report on runs of abs_hil: what the page holds, and what it makes of broken, incomplete and hostile runs."""
+"""abs_report on runs of abs_hil: the page's content, also for broken, incomplete and hostile runs."""
 import json
 import os
 import shutil
@@ -7,7 +7,7 @@ import unittest
 from page_reader import PageReader
 from program import ReportTest, need
 
-FIGURES = ['course', 'fig5', 'fig6', 'fig7', 'fig8', 'fig9', 'fig10']
+FIGURES = ['profile', 'fig5', 'fig6', 'fig7', 'fig8', 'fig9', 'fig10']
 TRUTH = ('omega1_rad_s', 'omega2_rad_s', 'slip', 'brake_torque_Nm', 'theta_N')
 need('gnuplot', 'gnuplot-nox')
 
@@ -49,13 +49,13 @@ class Page(ReportTest):
         summary = self.summary(a)
         shutil.copy(a / 'run.csv', self.folder / 'alone.csv')
         page, said = self.page(self.folder / 'alone.csv')
-        self.assertIn('a CSV file alone', said)
+        self.assertIn('only a CSV file', said)
         read = PageReader(page)
         self.assertEqual(list(read.figures), FIGURES)
         for row, key, decimals in (('stop time / s', 'stop_time_s', 3), ('stop distance / m', 'stop_distance_m', 2),
                                    ('slip RMS error', 'slip_rms', 4), ('slip overshoot', 'slip_overshoot', 4),
                                    ('estimate of θ at 3 m/s / N', 'theta_final_N', 2),
-                                   ('variation of torque asked for / (N m)', 'torque_total_variation_Nm', 1)):
+                                   ('variation of torque reference / (N m)', 'torque_total_variation_Nm', 1)):
             self.assertEqual(read.cell('metrics', row), f'{summary[key]:.{decimals}f}')
 
     def test_rig_run_without_truth(self):
@@ -69,8 +69,8 @@ class Page(ReportTest):
         read = PageReader(page)
         self.assertEqual(list(read.figures), FIGURES)
         self.assertEqual(read.cell('metrics', 'speeds and slip'), 'estimates')
-        self.assertIn('Estimated from the encoders', page)
-        self.assertIn('know no true θ', page)
+        self.assertIn('Runs without true values show estimates from the encoders', page)
+        self.assertIn('have no true θ', page)
         self.assertEqual([curve['quantity'] for curve in read.figures['fig9']], ['theta_est'])
         rows = [row for row in self.rows(a) if row['phase'] == 'brake']
         self.assertGreaterEqual(read.curve('fig7', 'a', 1)['said'], len(rows) - 2)
@@ -81,7 +81,7 @@ class Page(ReportTest):
         (a / 'environment.json').write_text('{"kernel": ')
         page, said = self.page(a)
         self.assertIn('no events.csv', said)
-        self.assertIn('environment.json: no valid JSON', said)
+        self.assertIn('environment.json: not valid JSON', said)
         self.assertIn('no events.csv', page)
 
     def test_run_without_braking_shows_all_of_it(self):
@@ -104,13 +104,13 @@ class Page(ReportTest):
         read = PageReader(page)
         self.assertEqual([line for line in read.tables['events'] if line[2] == 'fault'],
                          [['7.000', 'a', 'fault', 'fault', 'wheel speed, above the limit', '251.5']])
-        self.assertEqual([c['drawn'] for c in read.figures['course'] if c['quantity'] == 'events'], [1])
+        self.assertEqual([c['drawn'] for c in read.figures['profile'] if c['quantity'] == 'events'], [1])
         self.assertIn('>fault<', page)
 
     def test_changes_of_the_simulated_rig_stand_on_the_time_axis(self):
         a, b = (self.make_run(name, '--experiment', 'friction-jump') for name in 'ab')
         page, _ = self.page(a)
-        self.assertEqual([c['drawn'] for c in PageReader(page).figures['course'] if c['quantity'] == 'events'], [2])
+        self.assertEqual([c['drawn'] for c in PageReader(page).figures['profile'] if c['quantity'] == 'events'], [2])
         for label in ('>friction × 0.522<', '>friction × 1<'):
             self.assertEqual(page.count(label), len(FIGURES) - 1, label)
             self.assertEqual(self.page(a, b)[0].count(label), len(FIGURES) - 1, 'once for runs that change alike')
@@ -161,7 +161,7 @@ class Series(ReportTest):
         (series / 'series.json').write_text('{}')
         (series / 'run-0007').mkdir()
         page, said = self.page(series)
-        self.assertIn('run-0007 has not finished', said)
+        self.assertIn('run-0007 is not complete', said)
         read = PageReader(page)
         self.assertEqual(list(read.figures), ['series1', *FIGURES])
         lines = [line for line in read.tables['series'][1:] if line[0] == 'stop time / s']
@@ -183,7 +183,7 @@ class Files(ReportTest):
         (self.folder / 'none' / 'x').mkdir(parents=True)
         (self.folder / 'none' / 'x').rmdir()
         (self.folder / 'none' / 'run-0001').symlink_to('nowhere')
-        self.assertIn('is neither a run\'s folder', self.report('none', status=2).stderr.decode())
+        self.assertIn('is neither a run folder', self.report('none', status=2).stderr.decode())
 
     def test_report_stands_here_and_replaces_only_reports(self):
         a = self.make_run('a')
@@ -192,7 +192,7 @@ class Files(ReportTest):
         self.report(a)
         (self.folder / 'thesis.html').write_text('<html>years of work</html>')
         said = self.report(a, '--output', 'thesis.html', status=2).stderr.decode()
-        self.assertIn('is no report of abs_report', said)
+        self.assertIn('is not a report of abs_report', said)
         self.assertEqual((self.folder / 'thesis.html').read_text(), '<html>years of work</html>')
         self.report(a, '--output', 'thesis.html', '--force')
 
@@ -213,16 +213,16 @@ class Files(ReportTest):
         for text, says in (
                 ([], 'broken.csv:1: the file is empty'),
                 (lines[:1], 'broken.csv:1: no rows after the header'),
-                ([lines[0], lines[1][:9]], 'broken.csv:2: the only row is cut off'),
+                ([lines[0], lines[1][:9]], 'broken.csv:2: the only row is incomplete'),
                 ([*lines[:50], 'garbage\n', *lines[50:]], 'broken.csv:51: time_s: "garbage" is not a number'),
-                ([*lines[:50], *lines[20:]], 'broken.csv:51: time_s goes back'),
+                ([*lines[:50], *lines[20:]], 'broken.csv:51: time_s decreases'),
                 (['time_s,phase\n', '0,idle\n'], 'broken.csv:1: the header lacks omega1_rad_s'),
                 (['\x7fELF\x01\x01\x00' * 30_000], 'broken.csv:1: ')):
             broken.write_text(''.join(text))
             self.assertIn(says, self.report(broken, status=2).stderr.decode())
             self.assertFalse((self.folder / 'report.html').exists())
         (self.folder / 'empty').mkdir()
-        for args, says in (((self.folder / 'empty',), 'neither a run\'s folder'), (('nowhere',), 'does not exist'),
+        for args, says in (((self.folder / 'empty',), 'neither a run folder'), (('nowhere',), 'does not exist'),
                            ((), 'RUN'), ((a, '--window', '3:2'), '--window 3:2'), ((a, '--format', 'gif'), '--format'),
                            ((a, '--label', 'x', '--label', 'y'), '2 labels for 1 runs'),
                            ((a, '--columns', 'slip'), '--columns')):
@@ -232,7 +232,7 @@ class Files(ReportTest):
         a = self.make_run('a')
         text = (a / 'run.csv').read_text()
         (a / 'run.csv').write_text(text[:len(text) // 10 * 9])
-        self.assertIn('is cut off, as after a crash', self.page(a)[1])
+        self.assertIn('is incomplete, as after a crash', self.page(a)[1])
 
     def test_without_gnuplot(self):
         a = self.make_run('a')

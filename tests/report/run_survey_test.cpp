@@ -13,7 +13,7 @@
 namespace abs_hil::report {
 namespace {
 
-/// The changes of a rig that rolls at 10 m/s and is braked from 1 s on with 2 m/s^2, a row every 10 ms.
+/// Changes of a rig that rolls at 10 m/s and brakes from 1 s on with 2 m/s^2, with a row every 10 ms.
 std::vector<PlantChange> changes_along(const std::string& key, const std::string& profile, bool truth_known = true) {
   constexpr double r2_m = 0.1;
   const test::TemporaryFolder folder;
@@ -34,7 +34,7 @@ std::vector<PlantChange> changes_along(const std::string& key, const std::string
   return survey(run).plant_changes;
 }
 
-TEST_CASE("Changes over time stand at their instants") {
+TEST_CASE("Changes over time are marked at their instants") {
   const auto changes = changes_along("plant.brake_torque_profile", "time: 1; 0.5 at 0.255; 1 from 1.5 to 2; 0.7 at 9");
   REQUIRE(changes.size() == 3);
   CHECK(changes[0].time_s == 0.255);
@@ -47,7 +47,7 @@ TEST_CASE("Changes over time stand at their instants") {
   CHECK(braking[0].time_s == 1.25);
 }
 
-TEST_CASE("Changes over distance stand at the first row that is so far") {
+TEST_CASE("Changes over distance are marked at the first row that reached the distance") {
   // 10 m/s: 4.995 m after 0.4995 s. From 1 s on s = 10 m + 10 t - t^2: 14 m at t = 5 - sqrt(21) = 0.41742 s.
   const auto changes = changes_along("plant.friction_profile", "distance: 1; 0.5 at 4.995; 1 at 14; 0.7 at 100");
   REQUIRE(changes.size() == 2);
@@ -59,7 +59,7 @@ TEST_CASE("Changes over distance stand at the first row that is so far") {
   CHECK(std::abs(braking[0].time_s - 1.42) < 1e-9);
 }
 
-TEST_CASE("What cannot be known is left out") {
+TEST_CASE("Unknown changes are left out") {
   CHECK(changes_along("plant.friction_profile", "distance: 1; 0.5 at 4", false).empty());
   CHECK(changes_along("plant.friction_profile", "no profile at all").empty());
   CHECK(changes_along("plant.friction_profile", "").empty());

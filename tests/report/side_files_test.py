@@ -1,4 +1,4 @@
-"""abs_report on what stands beside a run's rows: timing, configuration, events, as they are and broken."""
+"""abs_report on the files beside a run's rows: timing, configuration and events, valid and broken."""
 import os
 import re
 import subprocess
@@ -20,7 +20,7 @@ class SideFiles(ReportTest):
         return folder
 
     def without_summary(self, name, *args):
-        """A run whose summary is lost: what it held is looked for in the files beside it."""
+        """A run without its summary: abs_report takes the content from the other files."""
         folder = self.make_run(name, *args)
         os.remove(folder / 'summary.json')
         return folder
@@ -35,7 +35,7 @@ class SideFiles(ReportTest):
         self.assertEqual(read.cell('timing', 'cycles'), str(summary['cycles']))
         self.assertEqual(read.cell('timing', 'late cycles'), str(summary['overruns']))
         self.assertEqual(read.cell('timing', 'real time obtained'), 'no')
-        # Every cycle after the first few stands in each column of the histogram once, and each column is a curve.
+        # Every cycle after the first few counts once in each column of the histogram, and each column is a curve.
         measured = summary['cycles'] - summary['config']['realtime']['startup_cycles']
         lines = (run / 'histogram.txt').read_text().splitlines()
         overflows = next(line for line in lines if 'Overflows' in line).split(':')[1].split()
@@ -48,7 +48,7 @@ class SideFiles(ReportTest):
 
     def test_histogram_beside_a_run_whose_summary_is_lost(self):
         run = self.without_summary('a')
-        # All of one duration: a single bar, whose sides are the bin's ends.
+        # All cycles have the same duration: a single bar between the edges of one bin.
         (run / 'histogram.txt').write_text(HISTOGRAM_HEAD + '# Histogram\n000005' + '\t000100' * PARTS +
                                            '\n# Histogram Overflows: 00002 00000 00000 00000 00001\n')
         page, said = self.page(run)
@@ -59,10 +59,10 @@ class SideFiles(ReportTest):
 
     def test_broken_histogram_is_said_with_its_line(self):
         run = self.without_summary('a')
-        for text, words in (('something else\n', 'histogram.txt:1: this is no histogram of abs_hil'),
-                            (HISTOGRAM_HEAD + '000001\t1\t2\n', 'histogram.txt:2: no line of a histogram'),
-                            (HISTOGRAM_HEAD + '000001' + '\tx' * PARTS + '\n', 'histogram.txt:2: no line'),
-                            (HISTOGRAM_HEAD + '99999999999' + '\t1' * PARTS + '\n', 'histogram.txt:2: no line')):
+        for text, words in (('something else\n', 'histogram.txt:1: not a histogram of abs_hil'),
+                            (HISTOGRAM_HEAD + '000001\t1\t2\n', 'histogram.txt:2: not a line of a histogram'),
+                            (HISTOGRAM_HEAD + '000001' + '\tx' * PARTS + '\n', 'histogram.txt:2: not a line'),
+                            (HISTOGRAM_HEAD + '99999999999' + '\t1' * PARTS + '\n', 'histogram.txt:2: not a line')):
             (run / 'histogram.txt').write_text(text)
             page, said = self.page(run)
             self.assertIn(words, said)
@@ -84,8 +84,8 @@ class SideFiles(ReportTest):
         run = self.make_run('a')
         events = (run / 'events.csv').read_text()
         for text, words in (('time,what\n', 'events.csv:1: the header must begin with'),
-                            (events + 'soon,phase,brake,"no reason",1\n', r'events.csv:\d+: no event: "soon'),
-                            (events + '1.0,phase\n', r'events.csv:\d+: no event: "1.0,phase"')):
+                            (events + 'soon,phase,brake,"no reason",1\n', r'events.csv:\d+: not an event: "soon'),
+                            (events + '1.0,phase\n', r'events.csv:\d+: not an event: "1.0,phase"')):
             (run / 'events.csv').write_text(text)
             self.assertRegex(self.page(run)[1], words)
         (run / 'events.csv').write_text(events)

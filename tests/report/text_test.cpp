@@ -12,7 +12,7 @@ TEST_CASE("Text from files cannot become markup") {
   CHECK(html_escape("<script>\"a\" & 'b'</script>") == "&lt;script&gt;&quot;a&quot; &amp; &#39;b&#39;&lt;/script&gt;");
 }
 
-TEST_CASE("gnuplot's single quotes hold anything") {
+TEST_CASE("gnuplot's single quotes accept any text") {
   CHECK(gnuplot_quote("it's `touch x` \"$(id)\"") == "'it''s `touch x` \"$(id)\"'");
 }
 
@@ -28,7 +28,7 @@ TEST_CASE("Cleaned text is valid UTF-8 without control characters") {
   CHECK(length_of("λ = 0.15") == 8);
 }
 
-TEST_CASE("Names cut short stay apart") {
+TEST_CASE("Shortened names stay different") {
   using Names = std::vector<std::string>;
   CHECK(short_names({"paper", "sliding-mode"}, 8) == Names{"paper", "sliding-…"});
   CHECK(short_names({"2026-05-04-paper", "steep", "2026-05-07-paper"}, 8) == Names{"…4-paper", "steep", "…7-paper"});

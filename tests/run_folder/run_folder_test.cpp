@@ -29,7 +29,7 @@ TEST_CASE("SHA-256 gives the digests of FIPS 180-4's examples") {
         "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
 }
 
-TEST_CASE("a folder is made with those above it, and sealed with the sums of its files") {
+TEST_CASE("a folder is created with its parents, and sealed with the checksums of its files") {
   const TemporaryFolder place;
   const RunFolder folder(place.path / "a" / "b");
   folder.write("z.txt", std::string_view("abc"));
@@ -39,7 +39,7 @@ TEST_CASE("a folder is made with those above it, and sealed with the sums of its
   CHECK(sums == sha256_of("{\n  \"x\": 1\n}\n") + "  a.json\n" + sha256_of("abc") + "  z.txt\n");
 }
 
-TEST_CASE("a folder that is not empty, a file and a place that cannot be written are refused by name") {
+TEST_CASE("a folder that is not empty, a file, and an unwritable path are refused by name") {
   const TemporaryFolder place;
   std::ofstream(place.path / "file") << "x";
   CHECK_THROWS_WITH(RunFolder(place.path),

@@ -23,7 +23,7 @@ void do_run(SeriesFolder& series, std::size_t i, const std::string& status) {
 
 }  // namespace
 
-TEST_CASE("a series goes on where it was left, and keeps what an interrupted run had written") {
+TEST_CASE("a series of runs continues where it stopped, and keeps the files of an interrupted run") {
   const TemporaryFolder place;
   const fs::path path = place.path / "series";
   {

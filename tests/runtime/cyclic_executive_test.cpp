@@ -7,7 +7,7 @@ using namespace abs_hil;
 using namespace abs_hil::runtime;
 using namespace abs_hil::runtime::test;
 
-TEST_CASE("cycles in time are on absolute ticks, whatever they take") {
+TEST_CASE("cycles start on absolute ticks, however long they take within the period") {
   Bench bench;
   for (int i = 0; i < 100; ++i) {
     REQUIRE(bench.cycle({.wakeup_ns = i % 7 * 10 * us, .read_ns = i % 5 * 50 * us, .control_ns = i % 3 * 100 * us}));
@@ -76,7 +76,7 @@ TEST_CASE("a failed read latches a fault in the same cycle") {
   CHECK(bench.executive.io_error().where == 0x54U);
 }
 
-TEST_CASE("a backend's own reason stands in the log instead of the general one") {
+TEST_CASE("a backend's own reason replaces the general one") {
   Bench bench;
   REQUIRE(bench.cycle());
   SECTION("reading") { bench.driver.read_result = {driver::IoError::stalled, 0x84, 0, rig::Reason::usb_stalled}; }
@@ -102,7 +102,7 @@ TEST_CASE("a failed write latches a fault, makes the board safe and ends the run
   Bench bench;
   REQUIRE(bench.cycle());
   bench.driver.write_result = {driver::IoError::read_back_mismatch, 0x6C};
-  REQUIRE(bench.cycle());  // the write is this cycle's last act: the next one is the run's last
+  REQUIRE(bench.cycle());  // the write comes last in this cycle, so the next cycle is the run's last
   CHECK(bench.driver.made_safe == 1);
   CHECK(bench.gate.fault() == rig::Reason::driver_write_failed);
   CHECK_FALSE(bench.cycle());
@@ -127,7 +127,7 @@ TEST_CASE("any rate from 100 Hz to 10 kHz keeps its period to the nanosecond") {
   }
 }
 
-TEST_CASE("virtual time passes by sleeping alone") {
+TEST_CASE("virtual time advances only by sleeping") {
   VirtualClock clock;
   clock.sleep_until(5 * ms);
   CHECK(clock.now_ns() == 5 * ms);

@@ -46,7 +46,7 @@ TEST_CASE("the recorder keeps the latest records in order, however many there we
   }
 }
 
-TEST_CASE("a record that its writer was killed in the midst of is left out, the others are not") {
+TEST_CASE("only the record that a killed writer left half written is missing") {
   std::vector<FlightSlot> slots(4);
   FlightRing ring(slots);
   for (std::uint64_t n = 0; n < 6; ++n) ring.push(numbered(n));
@@ -57,7 +57,7 @@ TEST_CASE("a record that its writer was killed in the midst of is left out, the 
   CHECK(records[2].sequence == 5);
 }
 
-TEST_CASE("a reader in the midst of writing never sees a record put together from two") {
+TEST_CASE("a reader during writing never sees a mixture of two records") {
   std::vector<FlightSlot> slots(3);
   std::atomic<bool> done{false};
   std::atomic<std::size_t> seen{0};
@@ -87,13 +87,13 @@ TEST_CASE("two seconds at the cycle's rate") {
   CHECK(FlightRing::slots_for(0.0, 1000.0) == 1);
 }
 
-TEST_CASE("each cycle gives a sign of life before it writes, and leaves its record") {
+TEST_CASE("each cycle beats before it writes, and leaves its record") {
   Bench bench;
   HeartbeatPanel panel;
   std::vector<FlightSlot> slots(8);
   FlightRing recorder(slots);
-  Heartbeat watch(panel, recorder);
-  bench.executive.watch_with(watch);
+  Heartbeat heartbeat(panel, recorder);
+  bench.executive.set_heartbeat(heartbeat);
   for (std::uint64_t n = 1; n <= 3; ++n) {
     bench.cycle();
     CHECK(panel.cycle_beats.load() == n);
@@ -104,14 +104,14 @@ TEST_CASE("each cycle gives a sign of life before it writes, and leaves its reco
   CHECK(records[2].command.brake_duty == 0.5);
 }
 
-TEST_CASE("a guardian that gives no sign of life for so many cycles is a fault, one that is slow is not") {
+TEST_CASE("a guardian without heartbeat for the limit of cycles is a fault, a slow one is not") {
   constexpr std::uint64_t limit = 5;
   Bench bench;
   HeartbeatPanel panel;
   std::vector<FlightSlot> slots(8);
   FlightRing recorder(slots);
-  Heartbeat watch(panel, recorder, limit);
-  bench.executive.watch_with(watch);
+  Heartbeat heartbeat(panel, recorder, limit);
+  bench.executive.set_heartbeat(heartbeat);
   for (int n = 0; n < 40; ++n) {
     if (n % 4 == 0) panel.guardian_beats.store(panel.guardian_beats.load() + 1);
     REQUIRE(bench.cycle());
@@ -125,12 +125,12 @@ TEST_CASE("a guardian that gives no sign of life for so many cycles is a fault, 
   CHECK(bench.driver.written.back().brake_duty == 0.0);
 }
 
-TEST_CASE("without a guardian nobody is missed") {
+TEST_CASE("a run without a guardian has no guardian fault") {
   Bench bench;
   HeartbeatPanel panel;
   std::vector<FlightSlot> slots(8);
   FlightRing recorder(slots);
-  Heartbeat watch(panel, recorder, 0);
-  bench.executive.watch_with(watch);
+  Heartbeat heartbeat(panel, recorder, 0);
+  bench.executive.set_heartbeat(heartbeat);
   for (int n = 0; n < 100; ++n) REQUIRE(bench.cycle());
 }

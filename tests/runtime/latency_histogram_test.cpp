@@ -47,7 +47,7 @@ TEST_CASE("durations beyond the last bin are counted and bound the quantiles by 
   CHECK(histogram->summary().p99_us == 60'000'000.0);
 }
 
-TEST_CASE("a negative duration counts as none") {
+TEST_CASE("a negative duration counts as 0") {
   const auto histogram = filled({-5});
   CHECK(histogram->in_bin(0) == 1);
   CHECK(histogram->min_ns() == 0);
@@ -114,6 +114,6 @@ TEST_CASE("the histogram file has cyclictest's lines: counts add up, bins are co
   CHECK(overflows == "# Histogram Overflows: 00001 00000 00000 00000 00000");
 }
 
-TEST_CASE("a histogram file in a folder that is not there is refused before the run, naming it") {
+TEST_CASE("a histogram file in a missing folder is refused before the run, with its path") {
   CHECK_THROWS_WITH(HistogramFile("/nowhere/at/all.txt"), Catch::Matchers::Contains("/nowhere/at/all.txt"));
 }

@@ -13,10 +13,10 @@
 
 namespace abs_hil::runtime::test {
 
-/// A stateless model checker for two threads: runs the same code over and over, each time with another schedule and
-/// other results of loads, until all have been played. Loads may return any value that C++'s memory model allows for a
-/// variable with a single writer: nothing older than what the thread has seen or what happened before. Plain slots are
-/// watched for data races by vector clocks (Lamport; FastTrack, Flanagan and Freund 2009).
+/// A stateless model checker for two threads. It repeats the same code with every schedule and every result of loads. A
+/// load may return any value that C++'s memory model allows for a variable with a single writer: none older than what
+/// the thread has seen or what happened before. Vector clocks check plain slots for data races (Lamport; FastTrack,
+/// Flanagan and Freund 2009).
 class Explorer {
  public:
   static constexpr std::size_t threads = 2;
@@ -43,7 +43,7 @@ class Explorer {
   void yield() {
     if (running_ < threads) swapcontext(&contexts_[running_], &scheduler_);
   }
-  /// One of `count` ways to go on.
+  /// Chooses one of `count` alternatives.
   std::size_t choose(std::size_t count);
   [[nodiscard]] std::size_t thread() const { return running_; }
   [[nodiscard]] VectorClock& clock() { return running_ < threads ? clocks_[running_] : all_; }

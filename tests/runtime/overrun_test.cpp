@@ -1,4 +1,4 @@
-// Cycles that are late: whole periods are skipped, the phase stays, the part to blame is named, too many are a fault.
+// Late cycles: whole periods are skipped, the phase stays, the part that took longest is named, too many are a fault.
 
 #include <vector>
 
@@ -60,7 +60,7 @@ TEST_CASE("a late cycle is put down to the part that took longest") {
 }
 
 namespace {
-/// Time passes when the clock is asked for it after the write: as if the ring or the statistics had been slow.
+/// Time advances when the executive reads the clock after the write, as if the ring or the statistics were slow.
 class SlowRecordingClock final : public Clock {
  public:
   [[nodiscard]] std::int64_t now_ns() noexcept override {
@@ -132,7 +132,7 @@ TEST_CASE("with a limit of 0 late cycles never end the run") {
   CHECK(bench.executive.statistics().overruns().longest_run == 1000);
 }
 
-TEST_CASE("late cycles are told of once a second at most, with the latest part by part") {
+TEST_CASE("late cycles give at most one message per second, with the parts of the latest one") {
   Bench bench;
   OverrunReporter reporter(ms);
   int messages = 0;
@@ -149,10 +149,10 @@ TEST_CASE("late cycles are told of once a second at most, with the latest part b
   CHECK(messages == 4);
   CHECK(bench.executive.statistics().overruns().total == 1'250);
   CHECK(last.find("because of read: expected 1000 us, woke 20 us late, read 1300") != std::string::npos);
-  CHECK(std::stoul(last) >= 999);  // the count it begins with is unthrottled: late every 3 ms for 3 s
+  CHECK(std::stoul(last) >= 999);  // the message begins with the full count: a late cycle every 3 ms for 3 s
 }
 
-TEST_CASE("without late cycles there is nothing to tell") {
+TEST_CASE("without late cycles there is no message") {
   Bench bench;
   OverrunReporter reporter(ms);
   for (int i = 0; i < 100; ++i) {

@@ -28,7 +28,7 @@ TEST_CASE("off sets nothing up and does not claim real time") {
   CHECK(report.shortcomings().empty());
 }
 
-TEST_CASE("every step says what was observed, and how to mend what failed") {
+TEST_CASE("every step says what was observed, and how to fix what failed") {
   const RealtimeReport report = report_of({.cpu = 0});
   REQUIRE(report.steps.size() == 7);
   for (const RealtimeStep& step : report.steps) {
@@ -54,7 +54,7 @@ TEST_CASE("what the report says of scheduling is what the kernel says") {
   CHECK(fifo->obtained == (policy == SCHED_FIFO && parameters.sched_priority == 33));
 }
 
-TEST_CASE("a CPU that is not there is a shortcoming, with the way to find those that are") {
+TEST_CASE("a missing CPU is a shortcoming, with the command that lists the CPUs") {
   const RealtimeReport report = report_of({.cpu = 1023});
   CHECK_FALSE(report.realtime());
   CHECK(report.shortcomings().find("bound to CPU 1023") != std::string::npos);
@@ -82,7 +82,7 @@ TEST_CASE("signals are kept away from the cycle's thread and left to the others"
   }
 }
 
-TEST_CASE("what is merely helpful does not decide; fixes are told once") {
+TEST_CASE("steps that are only helpful do not decide; each fix is given once") {
   RealtimeReport report;
   report.steps = {{.what = "needed", .obtained = true},
                   {.what = "helpful", .obtained = false, .required = false, .detail = "absent", .fix = "do this"}};

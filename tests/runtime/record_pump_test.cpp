@@ -49,7 +49,7 @@ TEST_CASE("every sink gets every record, in order") {
   CHECK(pump.latest().sequence == 4);
 }
 
-TEST_CASE("the way under constant deceleration is the closed form's, which the trapezoid meets exactly") {
+TEST_CASE("the distance under constant deceleration equals the closed form; the trapezoidal rule is exact for it") {
   constexpr double r2_m = 0.099, start_rad_s = 170.0, slowing_rad_s2 = 75.0, dt_s = 1e-3;
   RecordRing ring(4096);
   Sink sink;
@@ -68,7 +68,7 @@ TEST_CASE("the way under constant deceleration is the closed form's, which the t
              Catch::Matchers::WithinRel(r2_m * (start_rad_s * t_s - 0.5 * slowing_rad_s2 * t_s * t_s), 1e-9));
 }
 
-TEST_CASE("every sink is finished although one of them fails, and that is told") {
+TEST_CASE("every sink is finished although one fails, and its exception is rethrown") {
   RecordRing ring(8);
   Sink failing, other;
   failing.fails = true;

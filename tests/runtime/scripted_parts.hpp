@@ -23,7 +23,7 @@ struct CycleScript {
   std::int64_t write_ns{0};
 };
 
-/// Time that passes as told: late wake-ups, and whatever the parts of a cycle take.
+/// Scripted time: late wake-ups, and given durations of the parts of a cycle.
 class ScriptedClock final : public Clock {
  public:
   [[nodiscard]] std::int64_t now_ns() noexcept override { return time_ns_; }
@@ -40,7 +40,7 @@ class ScriptedClock final : public Clock {
   std::int64_t time_ns_{1'000 * ms};
 };
 
-/// A driver that answers what it is told to, after the time it is told to take.
+/// A driver with scripted answers and durations.
 class ScriptedDriver final : public driver::RigDriver {
  public:
   explicit ScriptedDriver(ScriptedClock& clock) : clock_(clock) {
@@ -79,7 +79,7 @@ class ScriptedDriver final : public driver::RigDriver {
   ScriptedClock& clock_;
 };
 
-/// Asks for the same command in every cycle; ends as the sequence would: one last cycle with the safe command.
+/// Wants the same command in every cycle. Ends as the sequence does: with one last cycle of the safe command.
 class ScriptedLogic final : public CycleLogic {
  public:
   explicit ScriptedLogic(ScriptedClock& clock) : clock_(clock) {}

@@ -14,7 +14,7 @@ namespace {
 
 using Ring = SpscRing<int, ModelledMemory>;
 
-/// One play: so many pushes of 1, 2, 3, ... against so many pops.
+/// One execution: a number of pushes of 1, 2, 3, ... against a number of pops.
 struct Traffic {
   Traffic(int pushes, int pops) : push_count(pushes), pop_count(pops) {}
   void push_all() {
@@ -28,7 +28,7 @@ struct Traffic {
       if (ring.pop(value)) popped.push_back(value);
     }
   }
-  /// What went in came out, in order, or is still there; the rest was counted.
+  /// Each pushed element came out in order, is still in the ring, or was counted as dropped.
   bool sound() {
     for (int value = 0; ring.pop(value);) popped.push_back(value);
     return popped == accepted && ring.drops() + accepted.size() == static_cast<std::size_t>(push_count);

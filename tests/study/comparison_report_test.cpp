@@ -51,12 +51,12 @@ TEST_CASE("the table holds the statistics of the runs") {
   const ComparisonTable table = Sample().table;
   const ControllerColumn& ours = table.columns[0];
   CHECK(ours.faults == 1);
-  CHECK(ours.means[0].n == 3);  // a fault's figures are left out
+  CHECK(ours.means[0].n == 3);  // runs with a fault are left out
   CHECK_THAT(ours.means[0].mean, WithinAbs(2.2, 1e-12));
   CHECK(ours.differences.empty());
   const ControllerColumn& theirs = table.columns[1];
   CHECK(theirs.locked == 1);
-  CHECK(theirs.differences[0].n == 3);  // a pair without a partner is none
+  CHECK(theirs.differences[0].n == 3);  // incomplete pairs are left out
   CHECK_THAT(theirs.differences[0].mean, WithinAbs((0.5 + 0.5 + 0.8) / 3.0, 1e-12));
   REQUIRE(table.paper_ratio);
   CHECK_THAT(table.paper_ratio->stop_time.mean, WithinAbs(std::cbrt(2.0 / 2.5 * 2.2 / 2.7 * 2.4 / 3.2), 1e-12));
@@ -69,7 +69,7 @@ TEST_CASE("the ratio is there only with both controllers of the paper") {
   CHECK_FALSE(tabulate(plan, {{{run_of(2, 30)}, {run_of(2, 30)}}}).paper_ratio);
 }
 
-TEST_CASE("CSV and JSON give the table's numbers back in full") {
+TEST_CASE("CSV and JSON contain the table's numbers with full precision") {
   const Sample sample;
   const auto json = nlohmann::json::parse(to_json(sample.table, R"({"run":{"seed":1}})"));
   CHECK(json["config"]["run"]["seed"] == 1);
@@ -138,7 +138,7 @@ TEST_CASE("a single run has no interval") {
   CHECK_THAT(text, Contains("2.000\n") && !Contains("±") && !Contains("Differences"));
 }
 
-TEST_CASE("the single runs are listed with what became of them") {
+TEST_CASE("the runs are listed with their results") {
   const Sample sample;
   const std::vector<std::string> lines = split(runs_csv(sample.plan, sample.comparison), '\n');
   REQUIRE(lines.size() == 9);

@@ -23,8 +23,8 @@ TEST_CASE("the report is the same, byte for byte, with any number of threads") {
   CHECK(to_text(tabulate(plan, compare(plan))) != text);
 }
 
-TEST_CASE("every controller meets the same plants") {
-  // The true theta of run k, as the error of a known estimate gives it away, does not depend on who brakes.
+TEST_CASE("every controller gets the same plants") {
+  // The error of a known estimate shows the true theta of run k, which must not depend on the controller.
   ComparisonPlan plan = paper_plan({"nominal", "adaptive"}, 4);
   const Comparison both = compare(plan);
   plan.controllers = {"adaptive"};
@@ -37,7 +37,7 @@ TEST_CASE("every controller meets the same plants") {
   }
 }
 
-TEST_CASE("nothing varied gives the same run each time") {
+TEST_CASE("without variation every run is the same") {
   ComparisonPlan plan = paper_plan({"adaptive"}, 3);
   plan.variation = {};
   const Comparison comparison = compare(plan);
@@ -46,7 +46,7 @@ TEST_CASE("nothing varied gives the same run each time") {
   CHECK(comparison.results[0][0].metrics.stop_distance_m == comparison.results[0][2].metrics.stop_distance_m);
 }
 
-TEST_CASE("what cannot be compared is refused before any run") {
+TEST_CASE("an invalid plan is refused before any run") {
   CHECK_THROWS_WITH(compare(paper_plan({"adaptive", "nope"}, 1)), Contains("nope"));
   CHECK_THROWS_WITH(compare(paper_plan({"adaptive", "adaptive"}, 1)), Contains("adaptive") && Contains("twice"));
   CHECK_THROWS_WITH(compare(paper_plan({}, 1)), Contains("--controllers"));

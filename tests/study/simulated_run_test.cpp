@@ -7,7 +7,7 @@
 using namespace abs_hil;
 using study::simulate;
 
-TEST_CASE("a run in this process gives the figures of a whole run session, bit for bit") {
+TEST_CASE("a simulated run gives the metrics of a whole run session, bit for bit") {
   for (const char* controller : {"adaptive", "nominal", "locked"}) {
     INFO(controller);
     experiment::test::Setup setup = experiment::test::braking(controller);
@@ -25,19 +25,19 @@ TEST_CASE("a run in this process gives the figures of a whole run session, bit f
   }
 }
 
-TEST_CASE("the plant differs from what the controller believes only where it is told to") {
+TEST_CASE("the plant differs from the controller's parameters only where requested") {
   config::Settings settings = study::test::paper_settings();
   settings.control.controller = "nominal";
   plant_sim::PlantOptions grippy = settings.plant;
   grippy.rig.tyre.theta_N *= 1.2;
   const study::RunResult run = simulate(settings, grippy, 1);
-  // The nominal controller goes on believing in Table 1's 23 N; the truth is 27.6 N.
+  // The nominal controller keeps Table 1's 23 N; the truth is 27.6 N.
   CHECK(run.metrics.theta_final_N == 23.0);
   CHECK(run.metrics.theta_error_final == Catch::Detail::Approx(23.0 / 27.6 - 1.0));
   CHECK(run.metrics.stop_time_s < 0.95 * simulate(settings, settings.plant, 1).metrics.stop_time_s);
 }
 
-TEST_CASE("a run that a limit ends says so") {
+TEST_CASE("a run that ends by a limit reports it") {
   config::Settings settings = study::test::paper_settings();
   settings.experiment.brake_limit_s = 0.5;
   const study::RunResult run = simulate(settings, settings.plant, 1);

@@ -40,7 +40,7 @@ TEST_CASE("the search sets the gains of seven controllers, in an order on which 
   CHECK_FALSE(tuned_keys("adaptive").back().search.logarithmic);
 }
 
-TEST_CASE("the cost of a run is the sum that the page states") {
+TEST_CASE("the cost of a run is the sum stated in the docs") {
   RunResult run;
   run.metrics.stop_distance_m = 15.0;
   run.metrics.slip_rms = 0.01;
@@ -54,7 +54,7 @@ TEST_CASE("the cost of a run is the sum that the page states") {
   CHECK(run_cost({}, true, 20.0, 9.0) == 3.0);  // never stopped
 }
 
-TEST_CASE("the search finds better gains than bad ones, the same with any number of threads") {
+TEST_CASE("the search improves on bad gains, with the same result for any number of threads") {
   TrainingSet training = small_training();
   training.plants[0].control.adaptive.ks1 = 4.0;
   training.plants[0].control.adaptive.gamma = 1.0;
@@ -66,13 +66,13 @@ TEST_CASE("the search finds better gains than bad ones, the same with any number
   const TuningResult again = tune("adaptive", training, search);
   CHECK(again.values == found.values);
   CHECK(again.cost == found.cost);
-  training.plants[0].control.adaptive.ks1 = 32.0;  // where it comes from makes no difference
+  training.plants[0].control.adaptive.ks1 = 32.0;  // the starting gains make no difference
   CHECK(tune("adaptive", training, search).values == found.values);
   search.seed = 6;
   CHECK(tune("adaptive", training, search).values != found.values);
 }
 
-TEST_CASE("the cost reported is that of the gains reported, and within their ranges") {
+TEST_CASE("the reported cost is that of the reported gains, which lie within their ranges") {
   const TrainingSet training = small_training();
   const TuningResult found = tune("adaptive", training, {.generations = 2, .population = 8});
   config::Settings tuned = training.plants[0];
@@ -100,7 +100,7 @@ TEST_CASE("the gains found are written as a configuration file that loads") {
   CHECK(settings.control.adaptive.ka1 == 0.1);
 }
 
-TEST_CASE("what has no gains, or nothing to be judged on, is refused") {
+TEST_CASE("a controller without gains and an empty training set are refused") {
   CHECK_THROWS_WITH(tune("locked", small_training(), {}), Contains("locked"));
   CHECK_THROWS_WITH(tune("adaptive", {}, {}), Contains("training set"));
 }

@@ -22,7 +22,7 @@ TEST_CASE("a specification reads back as it was written") {
   CHECK(Variation::parse("parameters=0.1").theta == 0.0);
 }
 
-TEST_CASE("a specification that cannot be meant is refused by name and range") {
+TEST_CASE("an invalid specification is refused by name and range") {
   CHECK_THROWS_WITH(Variation::parse("thetta=0.1"), Contains("thetta") && Contains("parameters"));
   CHECK_THROWS_WITH(Variation::parse("theta=0.6"), Contains("theta=0.6") && Contains("[0, 0.5]"));
   CHECK_THROWS_WITH(Variation::parse("theta=-0.1"), Contains("theta=-0.1"));
@@ -56,7 +56,7 @@ TEST_CASE("factors lie within their range, fill it, and differ from each other")
   CHECK(values.size() == 3000);
 }
 
-TEST_CASE("a perturbation depends on seed and number alone, and no parameter on what else is varied") {
+TEST_CASE("a perturbation depends on seed and number alone, and no parameter depends on what else varies") {
   const Perturbation all = draw(Variation::standard(), 3, 17);
   CHECK(draw(Variation::standard(), 3, 17) == all);
   CHECK_FALSE(draw(Variation::standard(), 3, 18) == all);
@@ -69,7 +69,7 @@ TEST_CASE("a perturbation depends on seed and number alone, and no parameter on 
   CHECK(theta_only.sensor_seed == draw({}, 99, 0).sensor_seed);
 }
 
-TEST_CASE("a perturbation reaches the parameter that it names") {
+TEST_CASE("a perturbation changes the parameter that it names") {
   const plant_sim::PlantOptions nominal;
   Perturbation p;
   p.J2 = 1.1;
@@ -104,7 +104,7 @@ TEST_CASE("with the maker's curve and lever theta scales the friction and B the 
   CHECK(plant.rig.tyre.theta_N == nominal.rig.tyre.theta_N);
 }
 
-TEST_CASE("every plant of the widest series is a valid one") {
+TEST_CASE("every plant of the widest variation is valid") {
   const Variation widest = Variation::parse("parameters=0.5,theta=0.5,radii=0.5,phase");
   for (std::uint64_t k = 0; k < 300; ++k) {
     const plant_sim::PlantOptions plant = perturbed({}, draw(widest, 1, k));

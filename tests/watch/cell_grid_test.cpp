@@ -9,7 +9,7 @@ using abs_hil::watch::CellGrid;
 using abs_hil::watch::columns_of;
 using abs_hil::watch::Style;
 
-TEST_CASE("text of one, two, three and four bytes a character comes out as it went in") {
+TEST_CASE("text with characters of one to four bytes is unchanged") {
   CellGrid grid(12, 2);
   CHECK(grid.write(1, 0, "aω⠿𝄞b", Style::bold) == 6);
   CHECK(grid.at(1, 0).glyph == U'a');
@@ -27,10 +27,10 @@ TEST_CASE("a combining mark stands over its letter and takes no column") {
   CHECK(grid.at(0, 0).mark == 0x302);
   CHECK(grid.to_text() == "θ̂x\n");
   CHECK(columns_of("θ̂x") == 2);
-  CHECK(grid.write(0, 0, "\xCC\x82") == 0);  // over nothing
+  CHECK(grid.write(0, 0, "\xCC\x82") == 0);  // there is no character below it
 }
 
-TEST_CASE("what lies outside is cut off and reads as a blank") {
+TEST_CASE("places outside ignore writes and read as blanks") {
   CellGrid grid(3, 1);
   CHECK(grid.write(1, 0, "abcd") == 5);
   CHECK(grid.write(-1, 0, "xy") == 1);
@@ -41,7 +41,7 @@ TEST_CASE("what lies outside is cut off and reads as a blank") {
   CHECK(CellGrid(-5, 3).to_text() == "\n\n\n");
 }
 
-TEST_CASE("bytes that are no UTF-8, and control characters, become question marks") {
+TEST_CASE("invalid UTF-8 and control characters become question marks") {
   const auto shown = [](std::string_view text) {
     CellGrid grid(10, 1);
     grid.write(0, 0, text);

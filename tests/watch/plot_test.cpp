@@ -51,13 +51,13 @@ TEST_CASE("a ramp over the window runs from one corner to the other") {
   CHECK(drawn(ramp(2, 0.0, 1.0), 4, 4, false) == "   *\n  *\n *\n*\n");  // two messages are joined by a line
 }
 
-TEST_CASE("what is not known and what was lost are gaps") {
+TEST_CASE("unknown and lost values are gaps") {
   std::deque<Sample> partly = ramp(11, 0.5, 0.5);
   for (std::size_t i = 4; i < 8; ++i) partly[i].slip = unknown;
   CHECK(drawn(partly, 11, 1, false) == "****    ***\n");
   std::deque<Sample> lost = ramp(11, 0.5, 0.5);
   lost.erase(lost.begin() + 4, lost.begin() + 8);
-  CHECK(drawn(lost, 11, 1, false) == "***********\n");  // decimated: joined
+  CHECK(drawn(lost, 11, 1, false) == "***********\n");  // decimated messages are joined
   lost[4].after_gap = true;
   CHECK(drawn(lost, 11, 1, false) == "****    ***\n");
 }

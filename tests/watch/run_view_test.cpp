@@ -21,7 +21,7 @@ TEST_CASE("samples of the window are kept, older ones are not") {
   CHECK(view.runs() == 1);
 }
 
-TEST_CASE("truth is shown where it is known, else estimates") {
+TEST_CASE("true values are shown if known, else estimates") {
   RunView view(2.0);
   telemetry_t m = telemetry(0);
   m.omega1_est_rad_s = 1.0;
@@ -39,7 +39,7 @@ TEST_CASE("truth is shown where it is known, else estimates") {
   CHECK(view.samples().back().slip == 0.5);
 }
 
-TEST_CASE("missing messages are counted and marked, decimated ones are neither") {
+TEST_CASE("missing messages are counted and marked, but decimated ones are not") {
   RunView view(10.0);
   feed(view, 100, 200);  // joined late: nothing is lost
   CHECK(view.lost() == 0);
@@ -66,7 +66,7 @@ TEST_CASE("a few messages out of order are not another run") {
   CHECK(view.telemetry()->sequence == 102);
 }
 
-TEST_CASE("a publisher that starts again is another run, whichever message comes first") {
+TEST_CASE("a publisher that restarts is another run, whichever message comes first") {
   RunView view(10.0);
   view.take(experiment(0), 0);
   view.take(event(0, "phase", "run started"), 0);
@@ -94,7 +94,7 @@ TEST_CASE("a publisher that starts again is another run, whichever message comes
   CHECK(view.lost() == 0);
 }
 
-TEST_CASE("an answer between two runs of a series leaves the run that has ended in view") {
+TEST_CASE("an answer between two runs of a series keeps the ended run in view") {
   RunView view(10.0);
   for (std::int64_t i = 0; i < 30; ++i) view.take(event(i, "phase", "x"), 0);
   feed(view, 0, 3000);
@@ -108,7 +108,7 @@ TEST_CASE("an answer between two runs of a series leaves the run that has ended 
   CHECK(view.samples().empty());
 }
 
-TEST_CASE("silence and rate are those of the watcher's clock") {
+TEST_CASE("silence and rate use the receiver's clock") {
   RunView view(10.0);
   CHECK_FALSE(view.silence_s(0));
   CHECK(view.messages_last_second(0) == 0);
@@ -133,7 +133,7 @@ TEST_CASE("events are kept up to a number, the latest first, their texts printab
   CHECK(view.events().front().message.size() < 300);
 }
 
-TEST_CASE("times that are no numbers are not plotted") {
+TEST_CASE("NaN times are not plotted") {
   RunView view(10.0);
   feed(view, 0, 10);
   telemetry_t m = telemetry(10);

@@ -39,7 +39,7 @@ bool has_style(const CellGrid& grid, int row, Style style) {
 
 }  // namespace
 
-TEST_CASE("the screen of a run holds what a watcher asks for") {
+TEST_CASE("the screen of a run shows all its quantities") {
   const std::string text = shown(whole_run(), 4999 * ms);
   CHECK_THAT(text, Contains("paper · adaptive · paper-table1 · sim"));
   CHECK_THAT(text, Contains("1000 messages/s"));
@@ -60,9 +60,10 @@ TEST_CASE("ASCII is ASCII everywhere") {
   CHECK_THAT(shown(view, 4999 * ms, {.unicode = false}), Contains("w1  80.0") && Contains("*****"));
 }
 
-TEST_CASE("waiting, silence and the end of a run are told apart") {
-  CHECK_THAT(shown(RunView(10.0), 0, {.source = "udpm://here", .channel = "ABS_TELEMETRY"}),
-             Contains("waiting for messages") && Contains("Nothing has come yet on ABS_TELEMETRY at udpm://here."));
+TEST_CASE("waiting, silence and the end of a run look different") {
+  CHECK_THAT(
+      shown(RunView(10.0), 0, {.source = "udpm://here", .channel = "ABS_TELEMETRY"}),
+      Contains("waiting for messages") && Contains("No message has arrived yet on ABS_TELEMETRY at udpm://here."));
   RunView view = whole_run();
   const CellGrid grid = draw_screen(view, 8199 * ms, {});
   CHECK_THAT(grid.to_text(), Contains("  no messages for 3.2 s"));
@@ -88,7 +89,7 @@ TEST_CASE("a fault is shown with its reason, from the event or without it") {
   CHECK(has_style(grid, 1, Style::alarm));
 }
 
-TEST_CASE("counts that should be 0 stand out") {
+TEST_CASE("counts that should be 0 are highlighted") {
   RunView view = whole_run();
   status_t s = status(6);
   s.overruns = 3;
@@ -101,7 +102,7 @@ TEST_CASE("counts that should be 0 stand out") {
                                          Contains("malformed 1") && Contains("NOT IN REAL TIME"));
 }
 
-TEST_CASE("every size has room for something, and none is left") {
+TEST_CASE("a screen can be drawn at every size") {
   const RunView view = whole_run();
   for (int columns = -1; columns < 140; columns += 3) {
     for (int rows = -1; rows < 60; rows += 2) {
@@ -114,7 +115,7 @@ TEST_CASE("every size has room for something, and none is left") {
   CHECK_THAT(shown(view, 4999 * ms, {.columns = 80, .rows = 24}), Contains("θ̂, N"));
 }
 
-TEST_CASE("whatever numbers come, a screen comes of them") {
+TEST_CASE("a screen can be drawn for any numbers") {
   constexpr double inf = std::numeric_limits<double>::infinity();
   for (const double value : {unknown, inf, -inf, 1e300, -1e300, 5e-324, 0.0}) {
     RunView view(10.0);

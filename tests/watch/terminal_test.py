@@ -24,7 +24,7 @@ COLUMNS, ROWS = 90, 30
 
 
 class Vt100:
-    """What a VT100 shows after the bytes it was sent; fails for a sequence that it does not know."""
+    """The screen of a VT100 after the bytes sent to it; fails for an unknown sequence."""
 
     SEQUENCE = re.compile(rb'\x1b\[(\??[0-9;]*)([A-Za-z])|\x1b[()][A-Z0-9]|\x1b[=>78M]|[\x0e\x0f\x00]')
 
@@ -44,7 +44,7 @@ class Vt100:
                 at = match.end()
             elif data[at] == 0x1b:
                 assert len(data) - at < 12, f'unknown sequence {data[at:at + 12]!r}'
-                break  # the rest of it is still to come
+                break  # the rest has not arrived yet
             elif data[at] in b'\r\n\b':
                 self.column = {13: 0, 10: self.column, 8: max(self.column - 1, 0)}[data[at]]
                 self.row = min(self.row + (data[at] == 10), ROWS - 1)
@@ -122,7 +122,7 @@ class Watcher:
         raise AssertionError(f'{pattern!r} not within {seconds} s on\n{self.screen.text()}')
 
     def ends(self, status, drawn=True):
-        """Waits for the end; the terminal must be as it was."""
+        """Waits for the end; the terminal must be restored."""
         for _ in range(100):
             if self.process.poll() is not None:
                 break
@@ -131,7 +131,7 @@ class Watcher:
         assert self.process.poll() == status, (self.process.poll(), status, self.process.stderr.read1())
         after = termios.tcgetattr(self.slave)
         assert after == self.before, 'the terminal is not as it was'
-        if drawn and not self.known:  # xterm: left the other screen, cursor shown, last of all
+        if drawn and not self.known:  # xterm: the last sequences leave the other screen and show the cursor
             tail = self.bytes[-80:]
             assert b'\x1b[?1049l' in tail and b'\x1b[?25h' in self.bytes[-120:] + b'', tail
             assert self.bytes.count(b'\x1b[?1049h') == 1, 'one screen entered'
@@ -144,7 +144,7 @@ def run(*arguments):
 
 
 def garbage():
-    """Packets on our channels that are no messages: LCM's small-message header, a channel, and then nothing good."""
+    """Packets on our channels that are not messages: LCM's small-message header, a channel, and then garbage."""
     event = abs_hil.event_t()
     whole = event.encode()
     damaged = [b'', b'x', whole[:8], whole[:-3], whole[:32] + b'\xff\xff\xff\xff' + whole[36:], whole + b'more', os.urandom(300)]
@@ -160,7 +160,7 @@ def garbage():
 def watched_run():
     watcher = Watcher()
     watcher.until('waiting for messages', 10)
-    watcher.until('Nothing has come yet on ABS_TELEMETRY', 5)
+    watcher.until('No message has arrived yet on ABS_TELEMETRY', 5)
     first = run()
     watcher.until(r'accelerate +[\d.]+ s +ω1 +[1-9]', 15)
     watcher.until(r'(9[5-9]\d|10[0-5]\d) messages/s', 8)
@@ -190,13 +190,13 @@ def watched_run():
 
 
 def given_back():
-    # A signal that kills is the shell's business; what has a handler ends as a run does.
+    # The shell reports a signal that kills; with a handler the program ends as a run does.
     for name, status in (('SIGINT', 130), ('SIGTERM', 143), ('SIGHUP', 143), ('SIGQUIT', -signal.SIGQUIT),
                          ('SIGSEGV', -signal.SIGSEGV), ('SIGABRT', -signal.SIGABRT)):
         watcher = Watcher(term='xterm-256color')
         for _ in range(100):
             watcher.read(0.1)
-            if b'Nothing has come' in watcher.bytes:
+            if b'No message has arrived' in watcher.bytes:
                 break
         watcher.process.send_signal(getattr(signal, name))
         watcher.ends(status)
@@ -205,7 +205,7 @@ def given_back():
 
 def odd_terminals():
     watcher = Watcher(locale='C')
-    watcher.until('Nothing has come', 10)
+    watcher.until('No message has arrived', 10)
     running = run('--set', 'experiment.start_speed_rad_s=120')
     watcher.until(r'w1 +\d+\.\d.*\n.*slip +\* slip', 15)
     assert watcher.screen.text().isascii(), watcher.screen.text()
@@ -223,8 +223,8 @@ def odd_terminals():
 
 
 class TcpqServer:
-    """One subscriber's end of LCM's tcpq server: the first who subscribes gets a message and is hung up on, those who come
-    after get nothing."""
+    """One subscriber's end of LCM's tcpq server: the first subscriber gets a message and is disconnected, later ones get
+    nothing."""
 
     def __init__(self):
         self.subscribed = 0
@@ -241,7 +241,7 @@ class TcpqServer:
             connection.recv(8)
             connection.sendall(struct.pack('>II', 0x287617fa, 0x0100))
             if not connection.recv(4096):
-                return  # it only asked whether there is a server
+                return  # the client only checked for a server
             self.subscribed += 1
             if self.subscribed == 1:
                 message = abs_hil.telemetry_t()
@@ -275,7 +275,7 @@ def without_terminal():
         return subprocess.run([PROGRAM, 'watch', *arguments], capture_output=True, text=True, timeout=60, **options)
 
     nothing = watch('--once', '--timeout', '0.5')
-    assert nothing.returncode == 3 and 'no message within 0.5 s on ABS_TELEMETRY' in nothing.stderr, nothing
+    assert nothing.returncode == 3 and 'no message arrived within 0.5 s on ABS_TELEMETRY' in nothing.stderr, nothing
     running = run()
     time.sleep(1)
     picture = watch('--once', '--ascii')
@@ -305,7 +305,7 @@ def main():
     global abs_hil
     import abs_hil
     with tempfile.TemporaryDirectory() as folder:
-        os.chdir(folder)  # where a crash may leave a core
+        os.chdir(folder)  # a crash may leave a core file here
         watched_run()
         given_back()
         odd_terminals()

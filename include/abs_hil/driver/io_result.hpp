@@ -9,18 +9,18 @@
 
 namespace abs_hil::driver {
 
-/// What went wrong at the board, as a number the real-time thread can carry.
+/// Errors of the board, as numbers that the real-time thread can pass on.
 enum class IoError : std::uint8_t {
   none = 0,
-  not_active,            ///< read or write outside activate ... deactivate: nothing was sent
+  not_active,            ///< read or write while the driver is not active: nothing was sent
   no_answer,             ///< the board did not answer in time
   disconnected,          ///< the board is gone (unplugged, interface down, all-ones)
   read_back_mismatch,    ///< a register does not hold what was written
-  implausible_answer,    ///< an answer outside what the board can say
-  command_out_of_range,  ///< a command that no gate lets through: a duty not in [0, 1], a torque < 0, not finite
+  implausible_answer,    ///< an answer outside the range of possible values
+  command_out_of_range,  ///< a command with a duty not in [0, 1], a torque < 0 or a value that is not finite
   stalled,               ///< the board refuses the transfer (USB STALL)
   incomplete_answer,     ///< an answer of the wrong length
-  transfer_failed,       ///< the bus gave up on a transfer
+  transfer_failed,       ///< a transfer failed on the bus
 };
 
 [[nodiscard]] constexpr std::string_view description(IoError error) noexcept {
@@ -39,9 +39,9 @@ enum class IoError : std::uint8_t {
   return "unknown error";
 }
 
-/// Result of one read or write. `where` is the register offset, CAN id or endpoint concerned, `errno_value` the
-/// system's error if it had one. `reason` is the backend's own word for logs; with none the cycle's
-/// `driver_read_failed` or `driver_write_failed` stands.
+/// Result of one read or write. `where` is the register offset, CAN id or endpoint concerned. `errno_value` is the
+/// system's error, 0 if there is none. `reason` is the backend's own reason for logs; if it is `none` the executive
+/// uses `driver_read_failed` or `driver_write_failed`.
 struct [[nodiscard]] IoResult {
   IoError error{IoError::none};
   std::uint32_t where{0};
@@ -55,11 +55,11 @@ struct [[nodiscard]] IoResult {
   return result.reason == rig::Reason::none ? otherwise : result.reason;
 }
 
-/// In words for messages: error, place and the system's own words if it had any. Not real-time safe.
+/// Text for messages: error, place and the system's error text, if any. Not real-time safe.
 [[nodiscard]] std::string error_text(const IoResult& result);
 
-/// The backend or something it needs is not there, cannot be opened or is not what it should be. The message names the
-/// thing and the fix; the program ends with status 3.
+/// The backend, or something that it needs, is missing, cannot be opened or is not the expected one. The message names
+/// the thing and the fix; the program ends with status 3.
 class Unavailable : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

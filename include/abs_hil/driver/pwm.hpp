@@ -7,10 +7,10 @@ namespace abs_hil::driver {
 
 // PWM outputs of the maker's RT-DAC4 and RT-DAC boards.
 
-/// PWM and velocity periods of the RT-DAC4/PCI count this.
+/// Clock of the RT-DAC4/PCI's PWM and velocity periods.
 inline constexpr double board_clock_Hz = 40e6;
 
-/// Counting width of a PWM.
+/// Counter width of a PWM.
 enum class PwmMode : std::uint32_t { bits_8 = 0, bits_12 = 1 };
 
 /// The mode that the option pwm_mode names, "8-bit" or "12-bit".
@@ -28,7 +28,7 @@ enum class PwmMode : std::uint32_t { bits_8 = 0, bits_12 = 1 };
 /// Width register for a duty in [0, 1], rounded, but never above the cap in [0, 1].
 [[nodiscard]] constexpr std::uint32_t pwm_width_for(PwmMode mode, double duty, double duty_max) noexcept {
   const double full = static_cast<double>(full_width(mode));
-  constexpr double rounding_slack = 1e-9;  // a cap that is exactly a width may come out a hair below it
+  constexpr double rounding_slack = 1e-9;  // rounding may put a cap that equals a width just below it
   const auto cap = static_cast<std::uint32_t>(duty_max * full + rounding_slack);
   // lround is not constexpr. NOLINTNEXTLINE(bugprone-incorrect-roundings)
   const auto width = static_cast<std::uint32_t>(duty * full + 0.5);

@@ -12,12 +12,12 @@
 
 namespace abs_hil::driver {
 
-/// Life of a driver: configure -> activate -> (read, write)* -> deactivate; activate again goes on from `inactive`.
-/// `failed` latches: after a failed write the outputs are made safe and only a new `configure` leads out of it. A
-/// failed read leaves the driver active: whether one lost answer matters is for the caller to say.
+/// Life of a driver: configure -> activate -> (read, write)* -> deactivate. From `inactive` it may be activated again.
+/// A failed write makes the outputs safe and leads to `failed`, which only a new `configure` ends. A failed read leaves
+/// the driver active: the caller decides whether a lost answer matters.
 enum class DriverState : std::uint8_t { unconfigured, inactive, active, failed };
 
-/// Told before a driver begins to make its outputs safe, which may take up to `make_safe_bound_ns`. Real-time safe.
+/// The driver calls this before it makes its outputs safe, which may take up to `make_safe_bound_ns`. Real-time safe.
 class MakingSafeListener {
  public:
   MakingSafeListener() = default;
@@ -27,13 +27,13 @@ class MakingSafeListener {
   virtual void making_safe() noexcept = 0;
 };
 
-/// One rig behind one board, real or simulated. The public functions keep the lifecycle for every backend alike:
-/// nothing is written while inactive, and an error in `write` makes the outputs safe before it returns. Backends
-/// implement the private `do_` functions and call `deactivate()` in their own destructors (a base class destructor
-/// comes too late).
+/// One rig behind one board, real or simulated. The public functions implement the same lifecycle for every backend:
+/// they write nothing while inactive, and a failed `write` makes the outputs safe before it returns. Backends implement
+/// the private `do_` functions. They must call `deactivate()` in their own destructors, because the base class
+/// destructor runs too late.
 ///
-/// `read` and `write` are called from the real-time thread: they never throw, allocate, lock or wait beyond the bound
-/// the backend documents. The other functions may do all that and are called before and after the run.
+/// The real-time thread calls `read` and `write`: they never throw, allocate, lock or wait longer than the bound that
+/// the backend documents. The other functions may do so; call them before and after the run.
 class RigDriver {
  public:
   RigDriver() = default;
@@ -41,41 +41,42 @@ class RigDriver {
   RigDriver& operator=(const RigDriver&) = delete;
   virtual ~RigDriver() = default;
 
-  /// Opens and checks the board; writes nothing that could move anything. Throws Unavailable.
+  /// Opens and checks the board. Writes nothing that could move the rig. Throws Unavailable.
   void configure();
-  /// Takes the outputs over in the safe state and starts the counters at 0. Throws Unavailable; then nothing is active.
+  /// Takes over the outputs in the safe state and sets the counters to 0. Throws Unavailable and then stays inactive.
   /// @param now_ns monotonic time, the origin of a simulated rig's time
   void activate(std::int64_t now_ns);
-  /// Latches and reads the board's inputs as of `now_ns`, which never decreases from call to call.
+  /// Latches and reads the board's inputs at `now_ns`, which must not decrease from call to call.
   IoResult read(std::int64_t now_ns, rig::Measurement& measurement) noexcept;
-  /// Sends a command. Refused with `not_active`, nothing sent, unless active.
+  /// Sends a command. While not active it sends nothing and returns `not_active`.
   IoResult write(const rig::Command& command) noexcept;
-  /// Leaves the outputs in the safe state: drive 0, brake 0, motor disabled, verified where the board reads back.
-  /// Harmless when repeated. The result tells whether the safe state is known to have reached the board.
+  /// Brings the outputs into the safe state: drive 0, brake 0, motor disabled. Verifies it if the board can read back.
+  /// May be repeated. The result is `ok` if the safe state is known to have reached the board.
   IoResult deactivate() noexcept;
 
-  /// The phase whose command is written next: for injected faults alone (InjectingDriver), no board needs to know.
+  /// Tells the phase of the command that is written next. Only injected faults use it (InjectingDriver).
   virtual void note_phase(rig::Phase /*phase*/) noexcept {}
 
-  /// The longest that a failed `write`, or `deactivate`, waits for the board to confirm the safe state, ns. 0: it does
-  /// not wait, the board's accesses are all that it takes.
+  /// Longest time that a failed `write`, or `deactivate`, waits for the board to confirm the safe state, ns. 0: it does
+  /// not wait; only the board's accesses take time.
   [[nodiscard]] virtual std::int64_t make_safe_bound_ns() const noexcept { return 0; }
-  /// @param listener  outlives the driver's use, or null for none. Called by the thread that makes safe.
+  /// @param listener  called in the thread that makes the outputs safe; must outlive the driver. Null: none.
   virtual void tell_before_making_safe(MakingSafeListener* listener) noexcept { listener_ = listener; }
 
   [[nodiscard]] DriverState state() const noexcept { return state_; }
   [[nodiscard]] virtual std::string_view name() const noexcept = 0;
-  /// The simulator's truth of the last `read`, for logs alone; NaN from hardware.
+  /// The simulator's true values at the last `read`, for logs only; NaN from hardware.
   [[nodiscard]] virtual rig::PlantTruth truth() const noexcept { return {}; }
-  /// What `configure` found out about the board, a line each, for the log. Empty before it, and from a simulator.
+  /// Facts that `configure` found about the board, one per line, for the log. Empty before `configure` and for a
+  /// simulator.
   [[nodiscard]] virtual std::vector<std::string> notes() const { return {}; }
-  /// What the run's traffic came to, a line each, for the log after a run. Empty from backends that count none.
+  /// Counts of the run's traffic, one per line, for the log after a run. Empty for backends that count nothing.
   [[nodiscard]] virtual std::vector<std::string> tally() const { return {}; }
-  /// What the rig does when the safe state did not reach the board, for people.
+  /// Message for the user: what the outputs do if the safe state did not reach the board.
   [[nodiscard]] virtual std::string_view what_holds_unsafe() const noexcept {
     return "its PWMs may hold their last duties";
   }
-  /// All that the configured board lets itself be asked without anything being written, a line each, for people.
+  /// All values that the configured board shows without any write, one per line, for the user.
   [[nodiscard]] virtual std::vector<std::string> inspection() { return {}; }
 
  private:
@@ -83,7 +84,7 @@ class RigDriver {
   virtual void do_activate(std::int64_t now_ns) = 0;
   virtual IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept = 0;
   virtual IoResult do_write(const rig::Command& command) noexcept = 0;
-  /// Writes the safe state whatever went before, and tries all outputs even when one fails.
+  /// Writes the safe state in any situation. Tries all outputs even if one fails.
   virtual IoResult do_make_safe() noexcept = 0;
 
   IoResult make_safe() noexcept;

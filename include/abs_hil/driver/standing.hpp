@@ -7,9 +7,9 @@ namespace abs_hil::driver {
 
 /// How well a fact about a board is known.
 enum class Standing : std::uint8_t {
-  documented,  ///< read in the maker's own driver sources or manual
-  inferred,    ///< concluded from them, not said there
-  unknown,     ///< sources are silent or disagree: never relied on
+  documented,  ///< stated in the maker's own driver sources or manual
+  inferred,    ///< concluded from these, but not stated there
+  unknown,     ///< these sources are silent or disagree: the driver never relies on it
 };
 [[nodiscard]] constexpr std::string_view name_of(Standing standing) noexcept {
   switch (standing) {

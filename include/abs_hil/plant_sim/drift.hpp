@@ -5,7 +5,7 @@
 
 namespace abs_hil::plant_sim {
 
-/// Factors over what drifts, at one instant.
+/// Factors of the drifting parameters at one instant.
 struct DriftFactors {
   double brake_torque{1.0};
   double motor_torque{1.0};
@@ -13,24 +13,24 @@ struct DriftFactors {
   double lower_bearing{1.0};
 };
 
-/// How far a plant has come along the profiles of its drifting parts. Real-time safe but for the constructor.
+/// A plant's position in the profiles of its drifting parameters. Real-time safe except for the constructor.
 class Drift {
  public:
-  /// Throws std::invalid_argument, naming the configuration key, for a profile that cannot be used.
+  /// Throws std::invalid_argument with the configuration key for an unusable profile.
   explicit Drift(const DriftProfiles& profiles);
 
-  /// False: every factor is 1 throughout, and nothing below need be asked.
+  /// False if every factor is always 1; then the calls below are unnecessary.
   [[nodiscard]] bool any() const noexcept { return any_; }
-  /// Back to the start.
+  /// Returns to the start.
   void start() noexcept;
-  /// The brake acts: the origin of profiles that count from braking, the first time.
+  /// Call when the brake acts. The first call sets the origin of profiles that count from braking.
   void brake_applied() noexcept;
-  /// How much of the `left_s` > 0 to come may be taken with the factors of its middle: to the next instant at which a
-  /// piece of a profile ends, and no more than `max_step_s` while a factor changes.
+  /// Length of the next part that may use the factors at its middle: `left_s` > 0, but only up to the next end of a
+  /// profile's piece, and at most `max_step_s` while a factor changes.
   [[nodiscard]] double part_s(double left_s, double max_step_s) const noexcept;
-  /// Lets time pass, no more than a part.
+  /// Advances the time by at most one part.
   void pass(double duration_s) noexcept;
-  /// The factors after `time_s` from now, within a part.
+  /// The factors `time_s` from now, within a part.
   [[nodiscard]] DriftFactors after(double time_s) const noexcept;
 
  private:

@@ -6,14 +6,14 @@
 
 namespace abs_hil::plant_sim {
 
-/// How a factor over a parameter of the plant goes along an axis: constant pieces and ramps. Written as
+/// A factor over a parameter of the plant as a function of time or distance: constant pieces and ramps. Written as
 ///
 ///     AXIS: VALUE; VALUE at POSITION; VALUE from POSITION to POSITION; ...
 ///
-/// with the values in (0, 10]. The first value holds from the start; "at" jumps to a new one, "from ... to" goes there
-/// in a straight line. AXIS is "time" (s) or "distance" (m rolled by the lower wheel) since the start of the run, or
-/// "braking time" or "braking distance" since the brake was first applied, before which the first value holds.
-/// For instance "braking time: 1; 0.5 at 0.6; 1 from 1 to 1.2". An empty text is a factor of 1 throughout.
+/// with values in (0, 10]. The first value holds from the start; "at" jumps to a new value; "from ... to" is a linear
+/// ramp to it. AXIS is "time" (s) or "distance" (m rolled by the lower wheel) since the start of the run, or "braking
+/// time" or "braking distance" since the brake was first applied, before which the first value holds. Example: "braking
+/// time: 1; 0.5 at 0.6; 1 from 1 to 1.2". An empty text is a constant factor of 1.
 class FactorProfile {
  public:
   enum class Axis { time, distance };
@@ -31,17 +31,17 @@ class FactorProfile {
     [[nodiscard]] double highest() const noexcept { return slope > 0.0 ? at(end) : value; }
   };
 
-  /// Throws std::invalid_argument, naming `key`, the part that is wrong and what is valid.
-  /// @param axes  what the factor may go along
+  /// Throws std::invalid_argument with `key`, the invalid part and the valid form.
+  /// @param axes  the permitted axes
   explicit FactorProfile(std::string_view text = {}, std::string_view key = "plant.friction_profile",
                          Axes axes = Axes::time_or_distance);
 
   [[nodiscard]] Axis axis() const noexcept { return axis_; }
-  /// Positions count from the first application of the brake, not from the start.
+  /// True if positions count from the first application of the brake, false if from the start.
   [[nodiscard]] bool from_braking() const noexcept { return from_braking_; }
-  /// In order, without gaps, at least one; the last has no end.
+  /// The pieces in order and without gaps, at least one; the last one has no end.
   [[nodiscard]] const std::vector<Piece>& pieces() const noexcept { return pieces_; }
-  /// Highest value anywhere.
+  /// Highest value of all pieces.
   [[nodiscard]] double highest() const noexcept;
 
  private:

@@ -7,23 +7,23 @@
 
 namespace abs_hil::plant_sim {
 
-/// A factor from one instant on, until the piece of the profile ends: linear in the time since and in the lower wheel's
+/// A factor from one instant to the end of the profile's piece: linear in the time since then and in the lower wheel's
 /// angle.
 struct PresentFactor {
   double value{1.0};
   double per_s{0.0};
   double per_rad{0.0};
-  double angle2_rad{0.0};                                          ///< where `value` holds
-  double end_angle2_rad{std::numeric_limits<double>::infinity()};  ///< of the piece, along the distance
-  double highest{1.0};                                             ///< anywhere on the piece
+  double angle2_rad{0.0};                                          ///< angle at which `value` holds
+  double end_angle2_rad{std::numeric_limits<double>::infinity()};  ///< end of the piece along the distance
+  double highest{1.0};                                             ///< highest value on the piece
 
   [[nodiscard]] double after(double time_s, double angle2) const noexcept {
     return value + per_s * time_s + per_rad * (angle2 - angle2_rad);
   }
 };
 
-/// How far a plant has come along a profile. Pieces that are passed do not return, should the lower wheel
-/// roll back. Real-time safe but for the constructor.
+/// A plant's position in a profile. Passed pieces do not return, even if the lower wheel rolls back. Real-time safe
+/// except for the constructor.
 class FactorProgress {
  public:
   /// @param r2_m  radius of the lower wheel
@@ -37,23 +37,23 @@ class FactorProgress {
 
   [[nodiscard]] const FactorProfile& profile() const noexcept { return profile_; }
 
-  /// Back to the start, with the lower wheel at that angle.
+  /// Returns to the start, with the lower wheel at that angle.
   void start(double angle2_rad) noexcept;
-  /// The brake acts: the origin of profiles that count from braking, the first time.
+  /// Call when the brake acts. The first call sets the origin of profiles that count from braking.
   void brake_applied(double angle2_rad) noexcept;
-  /// Lets time pass.
+  /// Advances the time.
   void pass(double duration_s) noexcept { time_s_ += duration_s; }
-  /// Goes on to the piece that holds from now on.
+  /// Moves to the piece that holds from now on.
   void settle(double angle2_rad) noexcept {
     if (changes_) settle_on_changes(angle2_rad);
   }
 
-  /// Time until the piece ends; infinite if it ends with the distance or not at all.
+  /// Time until the piece ends; infinite if it has no end or ends by distance.
   [[nodiscard]] double time_left_s() const noexcept {
     if (!changes_ || !counting_ || !along_time()) return std::numeric_limits<double>::infinity();
     return origin_time_s_ + piece().end - time_s_;
   }
-  /// False: the factor is 1 throughout.
+  /// False if the factor is always 1.
   [[nodiscard]] bool changes_anything() const noexcept { return changes_ || constant_ != 1.0; }
   [[nodiscard]] PresentFactor present(double angle2_rad) const noexcept {
     if (changes_) return present_of_changes(angle2_rad);
@@ -69,13 +69,13 @@ class FactorProgress {
 
   FactorProfile profile_;
   double r2_m_;
-  bool changes_;     ///< else it costs next to nothing
-  double constant_;  ///< the factor where it does not change
+  bool changes_;     ///< false: the factor is constant, and updates cost almost nothing
+  double constant_;  ///< the factor if it is constant
   std::size_t index_{0};
   double time_s_{0.0};
   double origin_time_s_{0.0};
   double origin_angle2_rad_{0.0};
-  bool counting_{true};  ///< the origin is passed
+  bool counting_{true};  ///< the origin has been passed
 };
 
 }  // namespace abs_hil::plant_sim

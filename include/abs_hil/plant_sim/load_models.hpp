@@ -6,14 +6,15 @@
 
 #include "abs_hil/plant_sim/options.hpp"
 
-// What presses the wheels on each other. Each load turns a friction coefficient over the tyre's peak ("shape", as the
-// tyre gives it, times the profile's friction) into the tyre force. All but the constructors are real-time safe.
+// Models of the force that presses the wheels together. Each converts the friction coefficient relative to the tyre's
+// peak ("shape": the tyre's value times the profile's friction) into the tyre force. All functions are real-time safe
+// except for the constructors.
 namespace abs_hil::plant_sim {
 
-/// What the frame that carries the upper wheel feels of it.
+/// Torques between the upper wheel and the frame that carries it.
 struct UpperWheelTorques {
-  double sliding{0.0};     ///< way the wheel slides in its bearing and brake: +1, -1, or 0 held by them
-  double dry_Nm{0.0};      ///< bearing and brake torque that acts, or may act, on it: M10 + Tb
+  double sliding{0.0};     ///< direction of sliding in bearing and brake: +1, -1, or 0 if they hold the wheel
+  double dry_Nm{0.0};      ///< bearing and brake torque that acts, or can act at most if they hold it: M10 + Tb
   double viscous_Nm{0.0};  ///< d1 omega1
 };
 
@@ -25,7 +26,7 @@ class ConstantLoad {
   [[nodiscard]] double force_N(double shape, const UpperWheelTorques& /*torques*/) const noexcept {
     return theta_N_ * shape;
   }
-  /// What `force_N` rises by at most with `shape`, as long as that stays within `most_shape`, N.
+  /// Upper bound on the slope of `force_N` over `shape` while the latter stays within `most_shape`, N.
   [[nodiscard]] double steepest_N(double /*most_shape*/, const UpperWheelTorques& /*torques*/) const noexcept {
     return theta_N_;
   }
@@ -34,15 +35,15 @@ class ConstantLoad {
   double theta_N_;
 };
 
-/// The maker's load: the upper wheel sits on a lever, which the torques on the wheel press down in braking,
+/// The maker's load. The upper wheel sits on a lever; the torques on the wheel press it down in braking,
 ///   Fn = (Mg + s1 M1 + s1 M10 + d1 omega1) / (L (sin phi - s mu cos phi)),
-/// and lift in traction. A wheel that its brake holds hands on just the torque of the tyre, r1 F, whatever the brake
-/// could hold: s1 (M1 + M10) = r1 F. Where Fn would fall below 0 the wheel lifts off and carries nothing.
+/// and lift it in traction. A wheel that its brake holds transmits only the tyre's torque r1 F, whatever the brake
+/// could hold: s1 (M1 + M10) = r1 F. Where Fn would be negative, the wheel lifts off and transmits no force.
 class LeverLoad {
  public:
-  /// @param peak_mu            the tyre's highest friction coefficient
+  /// @param peak_mu            highest friction coefficient of the tyre
   /// @param friction_at_most   highest value of the friction profile
-  /// Throws std::invalid_argument if so much friction would wedge the lever.
+  /// Throws std::invalid_argument if this friction would wedge the lever.
   LeverLoad(const PlantOptions& options, double peak_mu, double friction_at_most);
 
   [[nodiscard]] double force_N(double shape, const UpperWheelTorques& torques) const noexcept {
@@ -58,7 +59,7 @@ class LeverLoad {
   [[nodiscard]] double pressing_Nm(const UpperWheelTorques& torques) const noexcept {
     return std::max(0.0, Mg_Nm_ + torques.sliding * torques.dry_Nm + torques.viscous_Nm);
   }
-  /// How much of the lever's arm a unit of friction takes away.
+  /// Reduction of the lever's arm per unit of friction, m.
   [[nodiscard]] double wedging_m(const UpperWheelTorques& torques) const noexcept {
     return torques.sliding == 0.0 ? L_cos_phi_m_ + r1_m_ : L_cos_phi_m_;
   }
@@ -72,7 +73,7 @@ class LeverLoad {
 
 using LoadModel = std::variant<ConstantLoad, LeverLoad>;
 
-/// The one that `options.load` names. Throws std::invalid_argument, naming the known ones, for an unknown name.
+/// Makes the model named `options.load`. Throws std::invalid_argument with the known names for an unknown one.
 [[nodiscard]] LoadModel make_load_model(const PlantOptions& options, double peak_mu, double friction_at_most);
 
 }  // namespace abs_hil::plant_sim

@@ -27,7 +27,7 @@ struct IntecoMuParameters {
                  .range = rig::between(1, 10));
 };
 
-/// The lever that carries the upper wheel and presses it on the lower one (Inteco ABS, User's Manual, section 5).
+/// The lever that carries the upper wheel and presses it onto the lower one (Inteco ABS, User's Manual, section 5).
 struct LeverParameters {
   ABS_HIL_OPTIONS(LeverParameters);
   ABS_HIL_OPTION(double, Mg_Nm, 19.62, .unit = "N m", .meaning = "simulation: load lever, moment of its weight",
@@ -39,7 +39,7 @@ struct LeverParameters {
                  .range = rig::positive(90));
 };
 
-/// Factors over parameters of the plant that go with time, see FactorProfile; empty: 1 throughout.
+/// Time profiles of factors over the plant's parameters, see FactorProfile; empty: constant 1.
 struct DriftProfiles {
   ABS_HIL_OPTIONS(DriftProfiles);
   ABS_HIL_OPTION(std::string, brake_torque, "", .key = "brake_torque_profile",
@@ -80,7 +80,7 @@ struct PlantOptions {
   ABS_HIL_GROUP(DriftProfiles, drift, "", {});
 };
 
-/// Throws std::invalid_argument, naming the configuration key, its value and its range, if an option is outside it.
+/// Throws std::invalid_argument with the configuration key, its value and its range if an option is out of range.
 void check(const PlantOptions& options);
 
 }  // namespace abs_hil::plant_sim

@@ -9,14 +9,14 @@
 
 namespace abs_hil::plant_sim {
 
-/// Held inputs of the plant.
+/// Inputs of the plant, constant during `advance`.
 struct PlantInput {
   double motor_duty{0.0};       ///< in [0, 1]
   double brake_duty{0.0};       ///< in [0, 1]
   double brake_torque_Nm{0.0};  ///< applied directly if `ideal_actuator`, else ignored
 };
 
-/// State of the plant. Angles count up for positive speeds.
+/// State of the plant. Angles increase at positive speeds.
 struct PlantState {
   double angle1_rad{0.0};
   double angle2_rad{0.0};
@@ -25,27 +25,26 @@ struct PlantState {
   double brake_torque_Nm{0.0};
 };
 
-/// The rig's mechanics (1)-(11) with the corrections of docs/theory.md: odd tyre force, set-valued Coulomb friction (a
-/// wheel that stands stays at exactly 0 until the torques on it exceed its friction), brake lag and map, drive motor
-/// with back-EMF; with one of several tyre and load models, a road whose friction may change and parts that may drift
-/// (docs/plants.md).
-/// Deterministic; `advance` allocates nothing and does not throw.
+/// The rig's mechanics (1)-(11) with the corrections of docs/theory.md: odd tyre force; set-valued Coulomb friction (a
+/// standing wheel stays at exactly 0 until the torques on it exceed its friction); brake lag and map; drive motor with
+/// back-EMF. It includes one of several tyre and load models, a road with changing friction, and drifting parameters
+/// (docs/plants.md). Deterministic; `advance` does not allocate or throw.
 class Plant {
  public:
   /// Throws std::invalid_argument if an option is outside its range.
   explicit Plant(const PlantOptions& options);
 
-  /// Back to the start of every profile, too.
+  /// Sets the state and returns every profile to its start.
   void reset(const PlantState& state) noexcept;
-  /// Lets `duration_s` >= 0 pass under `input`.
+  /// Advances the plant by `duration_s` >= 0 under `input`.
   void advance(double duration_s, const PlantInput& input) noexcept;
 
   [[nodiscard]] const PlantState& state() const noexcept { return state_; }
   [[nodiscard]] double slip() const noexcept;
   [[nodiscard]] double tyre_force_N() const noexcept;
-  /// Of the road at the contact, over that of the tyre model: the friction profile's present value.
+  /// Present value of the friction profile: friction of the road relative to the tyre model.
   [[nodiscard]] double friction() const noexcept;
-  /// `theta_N` is the largest braking force that any slip would give now (WheelModel::peak_force_N).
+  /// `theta_N` is the largest braking force that any slip could give now (WheelModel::peak_force_N).
   [[nodiscard]] rig::PlantTruth truth() const noexcept;
   [[nodiscard]] const PlantOptions& options() const noexcept { return options_; }
 

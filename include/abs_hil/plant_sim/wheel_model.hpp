@@ -5,19 +5,19 @@
 
 namespace abs_hil::plant_sim {
 
-/// What the tyre force depends on at one instant.
+/// The variables of the tyre force at one instant.
 struct ContactState {
   double omega1_rad_s{0.0};
   double omega2_rad_s{0.0};
   double brake_torque_Nm{0.0};
-  double upper_sliding{0.0};  ///< way the upper wheel slides in its bearing and brake: +1, -1, or 0 held by them
-  double friction{1.0};       ///< of the road at the contact, over that of the tyre model
+  double upper_sliding{0.0};  ///< the upper wheel's sliding in bearing and brake: +1, -1, or 0 if they hold it
+  double friction{1.0};       ///< friction of the road at the contact relative to the tyre model
 };
 
-/// Two wheels in contact: their parameters, a tyre and a load model. Real-time safe but for the constructor.
+/// Two wheels in contact: their parameters, a tyre model and a load model. Real-time safe except for the constructor.
 class WheelModel {
  public:
-  /// Throws std::invalid_argument for a model that is not known or not possible.
+  /// Throws std::invalid_argument for an unknown or impossible model.
   /// @param friction_at_most  highest value of the friction profile
   WheelModel(const PlantOptions& options, double friction_at_most)
       : wheels_(options.rig.wheels),
@@ -26,7 +26,7 @@ class WheelModel {
                               friction_at_most)) {}
 
   [[nodiscard]] const rig::WheelParameters& wheels() const noexcept { return wheels_; }
-  /// Other wheels, or rather: the same with drifted bearings.
+  /// Replaces the wheel parameters, for drifted bearings.
   void set_wheels(const rig::WheelParameters& wheels) noexcept { wheels_ = wheels; }
 
   /// Slip by the tyre model's definition, positive in braking.
@@ -35,7 +35,7 @@ class WheelModel {
         [&](const auto& tyre) { return tyre.slip(wheels_.r1_m * omega1_rad_s, wheels_.r2_m * omega2_rad_s); }, tyre_);
   }
 
-  /// Tyre force, N: positive when it drives the upper wheel forward and brakes the lower one.
+  /// Tyre force, N; positive if it drives the upper wheel forward and brakes the lower one.
   [[nodiscard]] double tyre_force_N(const ContactState& c) const noexcept {
     const double shape = std::visit(
         [&](const auto& tyre) {
@@ -45,12 +45,12 @@ class WheelModel {
     return force_N(c.friction * shape, c);
   }
 
-  /// The largest braking force that any slip would give now, N: theta of (10). With the lever it rises with the torques
-  /// on the upper wheel, and is told for those that act.
+  /// The largest braking force that any slip could give now, N: theta of (10). With the lever it increases with the
+  /// torques on the upper wheel, and holds for the present torques.
   [[nodiscard]] double peak_force_N(const ContactState& c) const noexcept { return force_N(c.friction, c); }
 
-  /// The steepest that the tyre force can rise with the difference of the circumferential speeds, N s/m, whatever the
-  /// slip is now: it bounds how stiff the slip dynamics are.
+  /// Upper bound on the slope of the tyre force over the difference of the circumferential speeds, N s/m, at any slip.
+  /// It bounds the stiffness of the slip dynamics.
   [[nodiscard]] double damping_bound_Ns_m(const ContactState& c) const noexcept {
     const double steepest_s_m = std::visit(
         [&](const auto& tyre) {

@@ -11,8 +11,8 @@ namespace abs_hil::rig {
   return duty >= brake.u0 ? std::max(0.0, brake.b1_Nm * duty + brake.b2_Nm) : 0.0;
 }
 
-/// Inverse of b(u): the duty in [0, max_duty] whose static torque comes nearest to `torque_Nm`. Torques that the dead
-/// zone makes unreachable, those nearer to 0 than to b(u0), give duty 0. Real-time safe.
+/// Inverse of b(u): the duty in [0, max_duty] whose static torque is nearest to `torque_Nm`. The dead zone makes
+/// torques between 0 and b(u0) unreachable; those nearer to 0 give duty 0. Real-time safe.
 [[nodiscard]] constexpr double brake_duty_for(const BrakeParameters& brake, double torque_Nm,
                                               double max_duty = 1.0) noexcept {
   const double least_Nm = brake_torque_at(brake, brake.u0);

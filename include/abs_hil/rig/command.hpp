@@ -2,13 +2,13 @@
 
 namespace abs_hil::rig {
 
-/// What goes to the rig in one cycle. The default is the safe state. Trivially copyable.
+/// Command to the rig in one cycle. The default is the safe state. Trivially copyable.
 struct Command {
   double motor_duty{0.0};    ///< drive PWM of the lower wheel's motor, in [0, 1]
   double brake_duty{0.0};    ///< brake PWM, in [0, 1]
   bool motor_enable{false};  ///< the drive PWM is forced to 0 while false
-  /// Torque that `brake_duty` was computed from, N m, >= 0. Only the simulator with `plant.ideal_actuator` applies it
-  /// (no map, no lag, no saturation); hardware is driven by the duty alone.
+  /// Torque from which `brake_duty` was computed, N m, >= 0. Only the simulator with `plant.ideal_actuator` applies it
+  /// (no map, no lag, no saturation); hardware uses only the duty.
   double brake_torque_Nm{0.0};
 };
 

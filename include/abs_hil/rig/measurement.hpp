@@ -14,21 +14,22 @@ struct WheelSpeeds {
   double omega2_rad_s{0.0};  ///< lower wheel
 };
 
-/// Bits of `Measurement::trip_flags`, as the RT-DAC4/PCI has them. Two of them are known only as a pair.
+/// Bits of `Measurement::trip_flags`, as in the RT-DAC4/PCI. The order of two of them (temperature, overspeed) is not
+/// known, so they form a pair.
 namespace trip {
 inline constexpr std::uint32_t temperature_or_overspeed = 1U << 0U | 1U << 2U;
 inline constexpr std::uint32_t supply = 1U << 1U;
 }  // namespace trip
 
-/// What a board returns in one cycle: counts, never speeds. Trivially copyable.
+/// Measurement of a board in one cycle: encoder counts, never speeds. Trivially copyable.
 struct Measurement {
   std::int64_t time_ns{0};        ///< monotonic time at which the counters were read
   std::int32_t upper_counts{0};   ///< upper wheel's encoder counter; wraps around at 32 bit
   std::int32_t lower_counts{0};   ///< lower wheel's encoder counter; wraps around at 32 bit
-  double supply_V{unknown};       ///< power supply, NaN where the board cannot tell
-  double temperature_C{unknown};  ///< power stage, NaN where the board cannot tell
+  double supply_V{unknown};       ///< power supply; NaN if the board does not measure it
+  double temperature_C{unknown};  ///< power stage; NaN if the board does not measure it
   std::uint32_t trip_flags{0};    ///< the board's own interlocks, `trip` bits; 0 = none tripped
-  /// Only the simulator with `plant.ideal_sensors` sets this; no hardware ever does. Estimators take it as it is.
+  /// Only the simulator with `plant.ideal_sensors` sets this; hardware never does. Estimators use it unchanged.
   std::optional<WheelSpeeds> ideal_speeds{};
 };
 

@@ -7,13 +7,13 @@
 
 namespace abs_hil::rig {
 
-/// The part of a late cycle that took longest, and so the one to look at.
+/// Cause of a late cycle: the part that took longest.
 enum class OverrunCause : std::uint8_t {
   none = 0,
-  wakeup,   ///< the kernel let the thread run late: scheduling, interrupts, C-states, firmware
-  read,     ///< the board's inputs
+  wakeup,   ///< the thread woke late: scheduling, interrupts, C-states, firmware
+  read,     ///< reading the board's inputs
   control,  ///< estimate, sequence, control, gate
-  write,    ///< the board's outputs
+  write,    ///< writing the board's outputs
   record,   ///< statistics and the ring
 };
 inline constexpr std::size_t overrun_cause_count = 6;
@@ -25,12 +25,12 @@ inline constexpr std::size_t overrun_cause_count = 6;
   return index < names.size() ? names[index] : "unknown";
 }
 
-/// Late cycles since the start of a run. A cycle is late if it has not ended when the next one should begin.
+/// Counts of late cycles since the start of a run. A cycle is late if it has not ended when the next one should begin.
 struct OverrunCounts {
   std::uint64_t total{0};
-  std::uint64_t startup{0};                                   ///< within the start-up cycles; not part of `total`
-  std::uint64_t ticks_missed{0};                              ///< whole periods skipped because of those in `total`
-  std::uint64_t longest_run{0};                               ///< most of them in a row
+  std::uint64_t startup{0};       ///< late start-up cycles; not part of `total`
+  std::uint64_t ticks_missed{0};  ///< whole periods skipped because of the cycles in `total`
+  std::uint64_t longest_run{0};   ///< largest number of late cycles in a row
   std::array<std::uint64_t, overrun_cause_count> by_cause{};  ///< adds up to `total`
 
   [[nodiscard]] std::uint64_t of(OverrunCause cause) const noexcept {

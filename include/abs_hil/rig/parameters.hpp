@@ -49,12 +49,13 @@ struct BrakeParameters {
                  .range = positive(1000));
 };
 
-/// Lower wheel's DC motor: Tm = stall_torque * duty * (1 - omega2 / no_load_speed). Not in the paper, so calibrated:
-/// the paper's plots start braking at about 6.2 s from omega1 = 170 rad/s, 0.05 s of which the motor is off. With the
-/// no-load speed set to 220 rad/s (170 rad/s is reached at 0.78 of it), the stall torque is the root of "full duty from
-/// rest brings the upper wheel to 170 rad/s in 6.15 s", bisected on the simulated plant of Table 1. The lumped model
-/// without slip, J w' = K - M - (K/w0 + d) w with both wheels' J, d, M referred to the lower one, gives 2.1077 N m in
-/// closed form; slip in traction accounts for the rest. tests/plant_sim/actuators_test.cpp checks both.
+/// Lower wheel's DC motor: Tm = stall_torque * duty * (1 - omega2 / no_load_speed). The paper does not give these
+/// values, so they are calibrated. In the paper's plots braking starts at about 6.2 s from omega1 = 170 rad/s, and the
+/// motor is off for the last 0.05 s. The no-load speed is set to 220 rad/s (170 rad/s is 0.78 of it). The stall torque
+/// is then the value for which full duty from rest brings the upper wheel to 170 rad/s in 6.15 s, found by bisection on
+/// the simulated plant of Table 1. The lumped model without slip, J w' = K - M - (K/w0 + d) w with both wheels' J, d, M
+/// referred to the lower one, gives 2.1077 N m in closed form; slip in traction explains the difference.
+/// tests/plant_sim/actuators_test.cpp checks both.
 struct DriveMotorParameters {
   ABS_HIL_OPTIONS(DriveMotorParameters);
   ABS_HIL_OPTION(double, stall_torque_Nm, 2.1122, .unit = "N m",
@@ -64,7 +65,7 @@ struct DriveMotorParameters {
                  .range = positive(2000));
 };
 
-/// Everything a controller may know of the rig. SI units throughout.
+/// All parameters of the rig that a controller may use, in SI units.
 struct RigParameters {
   ABS_HIL_OPTIONS(RigParameters);
   ABS_HIL_GROUP(TyreParameters, tyre, "", {});

@@ -5,7 +5,7 @@
 
 namespace abs_hil::rig {
 
-/// Where an experiment stands. The names are those of the CSV's `phase` column; the numbers those of the LCM types.
+/// Phase of an experiment. The names appear in the CSV's `phase` column, the numbers in the LCM types.
 enum class Phase : std::uint8_t { idle, accelerate, coast, brake, hold, stopped, fault };
 
 [[nodiscard]] constexpr std::string_view name_of(Phase phase) noexcept {

@@ -4,7 +4,7 @@
 
 namespace abs_hil::rig {
 
-/// Times are integers in ns wherever a clock is read, and seconds in double wherever dynamics are computed.
+/// Clock readings are integers in ns; dynamics use seconds in double.
 inline constexpr std::int64_t ns_per_us = 1'000;
 inline constexpr std::int64_t ns_per_ms = 1'000'000;
 inline constexpr std::int64_t ns_per_s = 1'000'000'000;

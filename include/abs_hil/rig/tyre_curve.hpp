@@ -8,21 +8,22 @@
 
 namespace abs_hil::rig {
 
-/// Normalised tyre characteristic phi(slip) = sin(C atan(B slip)) of (10). Odd in slip, so that the force has the right
-/// sign in traction too; the product with s(omega) printed in (1) would turn it round (docs/theory.md). Real-time safe.
+/// Normalised tyre characteristic phi(slip) = sin(C atan(B slip)) of (10). It is odd in slip, so that the force has the
+/// right sign in traction, too. The factor s(omega) printed in (1) would reverse that sign (docs/theory.md). Real-time
+/// safe.
 [[nodiscard]] inline double normalised_tyre_force(const TyreParameters& tyre, double slip) noexcept {
   return std::sin(tyre.C * std::atan(tyre.B * slip));
 }
 
-/// Slip at which phi reaches its peak of 1: tan(pi / 2C) / B. Needs C > 1; for C <= 1 phi has no interior peak and the
-/// result is 1 (a locked wheel).
+/// Slip at which phi reaches its peak of 1: tan(pi / 2C) / B. For C <= 1 phi has no interior peak, and the result is 1
+/// (a locked wheel).
 [[nodiscard]] inline double peak_slip(const TyreParameters& tyre) noexcept {
   return tyre.C > 1.0 ? std::min(1.0, std::tan(std::numbers::pi / (2.0 * tyre.C)) / tyre.B) : 1.0;
 }
 
-/// Wheel slip (5), (v_x - v_w) / v_x, from the wheels' circumferential speeds. The quotient is undefined at v_x = 0:
-/// below `regularisation_m_s` (> 0) the denominator is held at that value, which keeps the slip finite and makes it 0
-/// when both wheels stand still. Real-time safe.
+/// Wheel slip (5), (v_x - v_w) / v_x, from the wheels' circumferential speeds. The quotient is undefined at v_x = 0.
+/// Below `regularisation_m_s` (> 0) the denominator therefore keeps that value: the slip stays finite, and is 0 when
+/// both wheels stand still. Real-time safe.
 [[nodiscard]] inline double wheel_slip(double v_wheel_m_s, double v_x_m_s, double regularisation_m_s) noexcept {
   return (v_x_m_s - v_wheel_m_s) / std::max(std::abs(v_x_m_s), regularisation_m_s);
 }

@@ -31,7 +31,7 @@ void AnswerTracker::note_complete() noexcept {
 Anomaly AnswerTracker::take(const EncodersMessage& encoders) noexcept {
   if (const Anomaly anomaly = place(encoders.sequence); anomaly != Anomaly::none) return anomaly;
   if (has_encoders_) return Anomaly::duplicate;
-  // The latch ends the answer; both belong together all the same.
+  // The latch should have come last. The answer is still valid.
   const Anomaly anomaly = has_latch_ ? Anomaly::out_of_order : Anomaly::none;
   answer_.upper_counts = encoders.upper_counts;
   answer_.lower_counts = encoders.lower_counts;

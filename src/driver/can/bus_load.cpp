@@ -28,7 +28,7 @@ BusLoad bus_load(double rate_Hz, double bit_rate, double data_bit_rate, bool fd)
   };
   const auto of = [&](std::uint32_t identifier) { return seconds(find_message(identifier)->bytes); };
   const double sync_s = of(id::sync);
-  const double slow_s = of(id::status);  // OUTPUTS is as long
+  const double slow_s = of(id::status);  // OUTPUTS has the same length
   const double measured_s = fd ? of(id::measurement) : of(id::encoders) + of(id::latch);
   const int slow_frames = fd ? 1 : 2;
   BusLoad load{.answer_s = sync_s + slow_s + measured_s, .command_s = of(id::command)};

@@ -4,7 +4,7 @@
 
 namespace abs_hil::driver::can {
 
-/// Time on the bus of frames, counted in bits, at worst: every place that bit stuffing can fill is filled.
+/// Worst-case length of a frame on the bus, in bits: bit stuffing adds every possible bit.
 struct FrameBits {
   int nominal{0};  ///< at the bit rate of arbitration
   int data{0};     ///< at the data bit rate of CAN FD; 0 for classic frames
@@ -15,11 +15,11 @@ struct FrameBits {
 [[nodiscard]] FrameBits worst_fd_frame(int bytes) noexcept;
 
 struct BusLoad {
-  double share{0.0};     ///< of the bus's time, worst case; > 1: the bus cannot carry it
+  double share{0.0};     ///< worst-case share of the bus' time; > 1: the bus cannot carry it
   double answer_s{0.0};  ///< from the start of the SYNC to the end of the longest answer
   double command_s{0.0};
 };
-/// What one run puts on the bus. Rates in Hz and bit/s, all > 0.
+/// Bus load of one run. Rates in Hz and bit/s, all > 0.
 [[nodiscard]] BusLoad bus_load(double rate_Hz, double bit_rate, double data_bit_rate, bool fd) noexcept;
 
 }  // namespace abs_hil::driver::can

@@ -1,4 +1,4 @@
-// The life of the driver: options, handshake with the node, commands.
+// Lifecycle of the driver: options, handshake with the node, commands.
 
 #include "driver/can/can_driver.hpp"
 
@@ -21,9 +21,9 @@ namespace {
 
 constexpr std::int64_t handshake_timeout_ns = 100'000'000;
 constexpr int handshake_attempts = 3;
-/// The emulator's answer in lock-step may take as long as its computer likes: time stands still.
+/// In lock-step the emulator may take its time to answer, because the emulated time does not advance meanwhile.
 constexpr std::int64_t lock_step_timeout_ns = 1'000'000'000;
-/// Of the period: the rest is for the controller and the command.
+/// Share of the period to wait for an answer. The controller and the command need the rest.
 constexpr double answer_share = 0.6;
 constexpr double most_answer_share = 0.8;
 
@@ -36,7 +36,7 @@ std::int64_t answer_timeout_ns(const CanOptions& options, bool lock_step) {
     throw std::invalid_argument(
         "driver.can.answer_timeout_us = " + std::to_string(options.answer_timeout_us) + ": give at most " +
         std::to_string(static_cast<std::int64_t>(most_answer_share * period_ns) / rig::ns_per_us) +
-        " us, 80 % of the period, or 0");
+        " us (80 % of the period), or 0 for the default of 60 %");
   }
   return timeout_ns;
 }
@@ -63,7 +63,7 @@ Frame CanDriver::in_format(Frame frame) const noexcept {
 
 bool CanDriver::await(bool (CanDriver::*heard)(const NodeMessage&) noexcept, std::int64_t timeout_ns) noexcept {
   const std::int64_t deadline_ns = monotonic_ns() + timeout_ns;
-  constexpr int most_frames = 1000;  // a babbling bus must not hold the handshake up for ever
+  constexpr int most_frames = 1000;  // a flooded bus must not block the handshake for ever
   Frame frame;
   for (int i = 0; i < most_frames; ++i) {
     const ReceiveOutcome outcome = link_.socket->receive(frame, deadline_ns).outcome;
@@ -106,7 +106,7 @@ void CanDriver::identify() {
     if (await(&CanDriver::hears_identity, handshake_timeout_ns)) return;
   }
   throw Unavailable("backend rig: " + link_.place +
-                    ": no node answers; is it powered, on the same bit rate, the bus terminated? (docs/can.md)");
+                    ": no node answers; check the node's power, its bit rate and the bus termination (docs/can.md)");
 }
 
 void CanDriver::do_configure() {
@@ -116,23 +116,23 @@ void CanDriver::do_configure() {
   identify();
   const std::string node = "backend rig: the node on " + link_.place;
   if (identity_.protocol != protocol_version) {
-    throw Unavailable(node + " speaks protocol " + std::to_string(identity_.protocol) + ", this program " +
-                      std::to_string(protocol_version) + " (docs/can.md)");
+    throw Unavailable(node + " has protocol version " + std::to_string(identity_.protocol) + ", this program needs " +
+                      std::to_string(protocol_version) + ": update the node's firmware (docs/can.md)");
   }
   const bool waits_for_lock_step = (identity_.features & feature::lock_step) != 0;
   if (lock_step_ && !waits_for_lock_step) {
     throw Unavailable(node +
-                      " keeps its own time: it is hardware, or an emulator in real time. Leave --fast out, or start "
-                      "abs_rig_emulator --lock-step");
+                      " keeps its own time: it is hardware, or an emulator in real time. Omit --fast, or start "
+                      "abs_rig_emulator with --lock-step");
   }
   if (!lock_step_ && waits_for_lock_step) {
     throw Unavailable(node +
-                      " is an emulator in lock-step, whose time stands still without --fast and --set "
-                      "driver.emulated=true; or start abs_rig_emulator without --lock-step");
+                      " is an emulator in lock-step: give --fast --set driver.emulated=true to advance its time, or "
+                      "start abs_rig_emulator without --lock-step");
   }
   const bool node_can_fd = (identity_.features & feature::can_fd) != 0;
   if (options_.fd == "on" && !node_can_fd) {
-    throw Unavailable(node + " has no CAN FD (driver.can.fd=on): set driver.can.fd=auto");
+    throw Unavailable(node + " does not support CAN FD (driver.can.fd=on): set driver.can.fd=auto");
   }
   fd_ = options_.fd == "on" || (options_.fd == "auto" && link_.can_fd && node_can_fd);
   if (!link_.facts || link_.facts->bit_rate == 0) return;
@@ -140,8 +140,9 @@ void CanDriver::do_configure() {
   if (load.share > 1.0) {
     throw Unavailable("backend rig: " + link_.place + " at " + std::to_string(link_.facts->bit_rate) +
                       " bit/s cannot carry " + std::to_string(static_cast<int>(options_.rate_Hz)) +
-                      " cycles a second (" + std::to_string(static_cast<int>(std::ceil(100 * load.share))) +
-                      " % at worst): raise the bit rate, use CAN FD or lower --rate");
+                      " cycles a second (worst-case load " +
+                      std::to_string(static_cast<int>(std::ceil(100 * load.share))) +
+                      " %): raise the bit rate, use CAN FD or lower --rate");
   }
 }
 
@@ -160,7 +161,7 @@ IoResult CanDriver::activate_node() noexcept {
 
 void CanDriver::do_activate(std::int64_t now_ns) {
   link_.socket->drain();
-  identify();  // the nonce of the activation before is spent
+  identify();  // each activation needs a new nonce
   bucket_.reset();
   tracker_.reset(sync_);
   commanded_ = {};
@@ -229,7 +230,7 @@ std::int64_t CanDriver::make_safe_bound_ns() const noexcept { return handshake_a
 
 IoResult CanDriver::do_make_safe() noexcept {
   if (!link_.socket) return {IoError::disconnected};
-  link_.socket->drain();  // what the node said before does not count
+  link_.socket->drain();  // earlier frames must not count as the answer
   IoResult result{};
   for (int attempt = 0; attempt < handshake_attempts; ++attempt) {
     send_zero();

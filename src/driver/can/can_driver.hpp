@@ -16,17 +16,17 @@
 
 namespace abs_hil::driver::can {
 
-/// What came and did not come, since `configure`.
+/// Counts of frames and cycles since `configure`.
 struct CanCounters {
   std::uint64_t cycles{0};  ///< SYNCs
-  std::uint64_t lost{0};    ///< without a whole answer in time
-  std::uint64_t stale{0};   ///< frames, as all below
+  std::uint64_t lost{0};    ///< cycles without a complete answer in time
+  std::uint64_t stale{0};   ///< this and all below count frames
   std::uint64_t duplicates{0};
   std::uint64_t out_of_order{0};
   std::uint64_t wrong_length{0};
   std::uint64_t forged{0};
   std::uint64_t implausible{0};
-  std::uint64_t ignored{0};  ///< identifiers that are none of the node's
+  std::uint64_t ignored{0};  ///< frames with identifiers that the node does not have
   std::uint64_t queue_full{0};
   std::uint64_t error_frames{0};
   std::uint64_t error_warnings{0};
@@ -38,15 +38,15 @@ struct CanCounters {
 /// The rig behind a CAN I/O node (docs/can.md). Not verified on hardware.
 ///
 /// One cycle: `read` sends ABS_SYNC and waits for the answer, at most `driver.can.answer_timeout_us`; `write` sends
-/// ABS_COMMAND and does not wait. Single losses are borne (the measurement before is handed out again, with its time
-/// stamp); sustained loss, and every state of the bus in which the node cannot be reached, fails `read` or `write` with
-/// a reason of its own. Without commands the node's watchdog takes the outputs to zero.
+/// ABS_COMMAND and does not wait. The driver tolerates single losses: it returns the previous measurement again, with
+/// its time stamp. Sustained loss, and every state of the bus in which the node cannot be reached, fails `read` or
+/// `write` with its own reason. Without commands the node's watchdog zeroes the outputs.
 class CanDriver final : public RigDriver {
  public:
   using OpenLink = std::function<Link()>;
   /// Throws std::invalid_argument, naming the key, if an option is outside its range.
   /// @param open_link  called by `configure`; throws Unavailable
-  /// @param lock_step  the node is an emulator whose time is driven by this driver's; refused by any other node
+  /// @param lock_step  this driver advances the time of the node, which must be an emulator in lock-step
   CanDriver(const CanOptions& options, OpenLink open_link, bool lock_step);
   ~CanDriver() override;
 
@@ -88,7 +88,7 @@ class CanDriver final : public RigDriver {
   void take_outputs(RawDuties applied, std::uint8_t command_sequence) noexcept;
   void note(Anomaly anomaly) noexcept;
   void count(Anomaly anomaly) noexcept;
-  void watch_drops() noexcept;
+  void check_drops() noexcept;
   [[nodiscard]] IoResult judge(std::int64_t now_ns) noexcept;
   [[nodiscard]] IoResult judge_answer(std::int64_t now_ns) noexcept;
   [[nodiscard]] IoResult tripped() noexcept;
@@ -107,11 +107,11 @@ class CanDriver final : public RigDriver {
   IdentityMessage identity_{};
   CanCounters counters_{};
 
-  // Of the handshake.
+  // State of the handshake.
   bool heard_state_{false};
   bool heard_outputs_{false};
 
-  // Of the cycle.
+  // State of the cycle.
   LossBucket bucket_;
   AnswerTracker tracker_{};
   std::uint8_t sync_{0};
@@ -122,17 +122,17 @@ class CanDriver final : public RigDriver {
   std::uint32_t drops_seen_{0};
   std::uint8_t rejected_seen_{0};
 
-  // What is known of the rig.
+  // Last values from the node.
   bool any_answer_{false};
-  std::array<std::int32_t, 2> raw_counts_{};  ///< upper, lower, as the node has them
-  std::array<std::int32_t, 2> counts_{};      ///< 32 bits, with their signs
+  std::array<std::int32_t, 2> raw_counts_{};  ///< upper, lower; the node's own counters
+  std::array<std::int32_t, 2> counts_{};      ///< upper, lower; 32 bits, after `upper_sign` and `lower_sign`
   std::uint32_t node_time_us_{0};
   std::int64_t latched_ns_{0};
   double supply_V_{rig::unknown};
   double temperature_C_{rig::unknown};
   std::uint32_t trip_flags_{0};
 
-  // What was commanded, by sequence.
+  // Commands sent, by sequence.
   std::uint8_t command_sequence_{0};
   std::array<RawDuties, 256> commanded_{};
   bool outputs_known_{false};

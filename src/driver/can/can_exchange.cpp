@@ -1,4 +1,4 @@
-// One cycle of the driver: SYNC out, answer in, and what it is worth.
+// One cycle of the driver: send the SYNC, receive the answer, check it.
 
 #include <algorithm>
 #include <bit>
@@ -15,14 +15,15 @@ namespace abs_hil::driver::can {
 
 namespace {
 
-/// Frames that one cycle reads at most: an answer has 4.
+/// Most frames that one cycle reads. An answer has 4.
 constexpr int most_frames_in_a_cycle = 64;
-/// Counts that an encoder may jump beyond what its speed explains: vibration, and the bus's own lateness.
+/// Counts allowed in addition to what the speed explains, because of vibration and delays on the bus.
 constexpr double plausible_slack_counts = 256.0;
-/// The node's clock and ours may disagree about one interval by so much: it answers when it likes within the timeout.
+/// Largest difference between the node's clock and ours over one interval. The node may answer at any time within the
+/// timeout.
 constexpr std::int64_t clock_slack_ns = 10'000'000;
 
-/// Counts travelled from one reading of a counter of `bits` bits to the next.
+/// Counts travelled between two readings of a counter that has `bits` bits.
 std::int32_t travelled(std::int32_t before, std::int32_t after, unsigned bits) noexcept {
   const unsigned unused = 32U - bits;
   const std::uint32_t difference = std::bit_cast<std::uint32_t>(after) - std::bit_cast<std::uint32_t>(before);
@@ -78,7 +79,7 @@ void CanDriver::note(Anomaly anomaly) noexcept {
   if (anomaly == Anomaly::none) return;
   count(anomaly);
   worst_ = std::max(worst_, anomaly);
-  // An answer that comes late has been counted as lost already.
+  // A late answer has already been counted as lost.
   if (anomaly != Anomaly::stale) bucket_.lost();
 }
 
@@ -118,7 +119,7 @@ void CanDriver::take_status(const StatusMessage& status) noexcept {
 
 void CanDriver::take_outputs(const OutputsMessage& outputs) noexcept {
   take_outputs(outputs.applied, outputs.command_sequence);
-  // Those before the activation are none of this run's.
+  // Rejections before the activation do not belong to this run.
   if (any_answer_) counters_.rejected_by_node += static_cast<std::uint8_t>(outputs.rejected - rejected_seen_);
   rejected_seen_ = outputs.rejected;
 }
@@ -185,7 +186,7 @@ IoResult CanDriver::collect() noexcept {
   return {};
 }
 
-void CanDriver::watch_drops() noexcept {
+void CanDriver::check_drops() noexcept {
   const std::uint32_t dropped = link_.socket->dropped();
   if (dropped == drops_seen_) return;
   counters_.dropped_by_kernel += dropped - drops_seen_;
@@ -194,7 +195,7 @@ void CanDriver::watch_drops() noexcept {
 }
 
 IoResult CanDriver::tripped() noexcept {
-  // Silence has many causes: the interface knows one of them. Bus-off has come as an error frame.
+  // The node is silent: ask whether the interface is down. Bus-off would have come as an error frame.
   if (worst_ <= Anomaly::queue_full && !link_.running()) {
     return {IoError::disconnected, id::sync, 0, rig::Reason::can_interface_down};
   }
@@ -221,7 +222,7 @@ std::int64_t CanDriver::latch_time_ns(const Answer& answer, std::int64_t now_ns)
   if (lock_step_) return now_ns;
   const std::int64_t received_ns = std::max(received_ns_, sent_ns_);
   if (!any_answer_) return sent_ns_ + (received_ns - sent_ns_) / 2;
-  // The node's clock tells the interval best; SYNC and answer tell between which times of ours it lies.
+  // The node's clock gives the best interval. The times of SYNC and answer bound the result.
   const std::uint32_t interval_us = answer.node_time_us - node_time_us_;
   return std::clamp(latched_ns_ + std::int64_t{interval_us} * rig::ns_per_us, sent_ns_, received_ns);
 }
@@ -240,7 +241,7 @@ IoResult CanDriver::judge_answer(std::int64_t now_ns) noexcept {
   if (any_answer_ && std::abs(node_interval_ns - interval_ns) > clock_slack_ns) {
     return {IoError::implausible_answer, id::latch, 0, rig::Reason::can_node_restarted};
   }
-  // Between activation and first answer no wheel turns further than this.
+  // Bound on the time between activation and first answer.
   constexpr std::int64_t first_interval_ns = 200'000'000;
   if (!advance_counts(answer, any_answer_ ? interval_ns : first_interval_ns)) {
     return {IoError::implausible_answer, id::encoders, 0, rig::Reason::can_values_implausible};
@@ -258,7 +259,7 @@ IoResult CanDriver::judge_answer(std::int64_t now_ns) noexcept {
 }
 
 IoResult CanDriver::judge(std::int64_t now_ns) noexcept {
-  watch_drops();
+  check_drops();
   if (!tracker_.complete()) {
     note(Anomaly::missing);
     return bucket_.tripped() ? tripped() : IoResult{};
@@ -277,7 +278,7 @@ IoResult CanDriver::exchange(std::int64_t now_ns) noexcept {
 
 IoResult CanDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept {
   if (const IoResult result = exchange(now_ns); !result.ok()) {
-    send_zero();  // at once: whoever called may take its time
+    send_zero();  // at once, because the caller may react late
     return result;
   }
   measurement = {};

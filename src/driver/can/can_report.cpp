@@ -1,4 +1,4 @@
-// What the driver can say in words about its bus and its node.
+// Texts about the bus and the node.
 
 #include "driver/can/bus_load.hpp"
 #include "driver/can/can_driver.hpp"
@@ -30,13 +30,13 @@ std::vector<std::string> CanDriver::notes() const {
                               static_cast<double>(facts->data_bit_rate), fd_));
   } else {
     constexpr double megabit = 1e6;
-    notes.push_back("no bit rate of its own; on a real bus " +
+    notes.push_back("the interface has no bit rate; on a real bus: " +
                     load_text(options_.rate_Hz, megabit, fd_ ? 5 * megabit : 0.0, fd_));
   }
   notes.push_back(
-      formatted("the node zeroes its outputs %d ms after the last valid command; the run ends at %d points "
-                "of loss (%d each, %d off for each good answer)",
-                options_.watchdog_ms, options_.loss_limit, options_.loss_cost, options_.loss_relief));
+      formatted("the node zeroes its outputs %d ms after the last valid command; each loss adds %d points, each good "
+                "answer takes off %d, and the run ends at %d points",
+                options_.watchdog_ms, options_.loss_cost, options_.loss_relief, options_.loss_limit));
   return notes;
 }
 
@@ -70,7 +70,7 @@ std::vector<std::string> CanDriver::inspection() {
   link_.socket->drain();
   tracker_.reset(sync_);
   heard_state_ = false;
-  // An inactive node answers a SYNC too, and nothing moves by it.
+  // An inactive node answers a SYNC, too, and the SYNC moves nothing.
   tracker_.expect(++sync_);
   static_cast<void>(link_.socket->send(sync_frame(sync_)));
   sent_ns_ = monotonic_ns();
@@ -86,7 +86,7 @@ std::vector<std::string> CanDriver::inspection() {
                             answer.state == NodeState::inactive ? "inactive"
                             : answer.state == NodeState::active ? "active"
                                                                 : "latched"));
-  lines.push_back(formatted("supply %.2f V, temperature %.1f deg C, trip flags 0x%x (NaN: not told yet)", supply_V_,
+  lines.push_back(formatted("supply %.2f V, temperature %.1f deg C, trip flags 0x%x (NaN: not received yet)", supply_V_,
                             temperature_C_, trip_flags_));
   return lines;
 }

@@ -4,14 +4,14 @@
 
 namespace abs_hil::driver::can {
 
-/// What the kernel says about the controller in an error frame. Several may be true at once.
+/// State of the CAN controller, from an error frame of the kernel. Several members may be true at once.
 struct BusReport {
   bool bus_off{false};
   bool restarted{false};
   bool error_passive{false};
   bool error_warning{false};
   bool receive_overflow{false};  ///< the controller's own queue
-  bool other{false};  ///< bus errors, arbitration, no acknowledgement: counted, they show as losses if lasting
+  bool other{false};  ///< bus errors, arbitration, no acknowledgement: only counted; lasting ones show as losses
 };
 [[nodiscard]] BusReport bus_report(const Frame& error_frame) noexcept;
 

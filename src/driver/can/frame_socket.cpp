@@ -24,24 +24,25 @@ std::int64_t ns_of(const timespec& time) noexcept { return std::int64_t{time.tv_
 bool is_full(int error) noexcept { return error == EAGAIN || error == EWOULDBLOCK || error == ENOBUFS; }
 
 bool is_down(int error) noexcept {
-  // An interface that is gone gives ENODEV or ENXIO; a closed other end of a socket pair EPIPE or ECONNRESET.
+  // A missing interface gives ENODEV or ENXIO. A closed peer of a socket pair gives EPIPE or ECONNRESET.
   return error == ENETDOWN || error == ENODEV || error == ENXIO || error == EPIPE || error == ECONNRESET ||
          error == ENOTCONN || error == ECONNREFUSED;
 }
 
-/// The kernel stamps in the settable clock: how long ago that was is the same in both.
+/// The kernel stamps with the settable clock (CLOCK_REALTIME). The age of a frame is the same on both clocks.
 std::int64_t monotonic_of(const timespec& realtime) noexcept {
   timespec now{};
   clock_gettime(CLOCK_REALTIME, &now);
   const std::int64_t age_ns = std::max<std::int64_t>(0, ns_of(now) - ns_of(realtime));
-  return monotonic_ns() - std::min(age_ns, rig::ns_per_s);  // a clock that was set makes no age of years
+  return monotonic_ns() -
+         std::min(age_ns, rig::ns_per_s);  // at most 1 s: setting the clock must not make a frame years old
 }
 
 void unpack(const canfd_frame& raw, std::size_t size, Frame& frame) noexcept {
   frame = {};
   frame.fd = size == CANFD_MTU;
   frame.error = (raw.can_id & CAN_ERR_FLAG) != 0;
-  // Extended and remote frames keep their flags, so that they are no one's identifier.
+  // Extended and remote frames keep their flags, so that they match no identifier.
   frame.id = frame.error ? raw.can_id & CAN_ERR_MASK : raw.can_id;
   frame.length = std::min<std::uint8_t>(raw.len, frame.fd ? CANFD_MAX_DLEN : CAN_MAX_DLEN);
   std::memcpy(frame.data.data(), raw.data, frame.length);
@@ -52,7 +53,7 @@ void unpack(const canfd_frame& raw, std::size_t size, Frame& frame) noexcept {
 FrameSocket::FrameSocket(int descriptor) noexcept : descriptor_(descriptor) {
   ::fcntl(descriptor_, F_SETFL, ::fcntl(descriptor_, F_GETFL) | O_NONBLOCK);
   const int on = 1;
-  // Niceties: without them a frame counts as received when it is read, and drops show as losses.
+  // These options may fail. Without them a frame counts as received when it is read, and drops show as losses.
   ::setsockopt(descriptor_, SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);
   ::setsockopt(descriptor_, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on);
 }
@@ -87,7 +88,7 @@ ReceiveResult FrameSocket::take(Frame& frame) noexcept {
     if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR) return {};
     return {is_down(errno) ? ReceiveOutcome::down : ReceiveOutcome::failed, errno};
   }
-  if (size == 0) return {ReceiveOutcome::down, EPIPE};  // the other end has closed; CAN sockets never say so
+  if (size == 0) return {ReceiveOutcome::down, EPIPE};  // the peer has closed; a CAN socket never returns 0
   const bool whole = (message.msg_flags & MSG_TRUNC) == 0;
   if (!whole || (size != CAN_MTU && size != CANFD_MTU)) return {ReceiveOutcome::malformed};
   unpack(raw, static_cast<std::size_t>(size), frame);

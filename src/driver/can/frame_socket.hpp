@@ -9,9 +9,9 @@
 namespace abs_hil::driver::can {
 
 enum class SendOutcome : std::uint8_t {
-  sent,  ///< handed to the kernel: whether it reaches the bus the node's answer tells
-  full,  ///< no room in the queue now (EAGAIN, ENOBUFS): not sent
-  down,  ///< the interface is down or gone, or the other end of a socket pair
+  sent,  ///< the kernel has it; only the node's answer shows whether it reached the bus
+  full,  ///< not sent: the queue is full (EAGAIN, ENOBUFS)
+  down,  ///< the interface is down or gone, or the peer of a socket pair is
   failed,
 };
 struct [[nodiscard]] SendResult {
@@ -21,8 +21,8 @@ struct [[nodiscard]] SendResult {
 
 enum class ReceiveOutcome : std::uint8_t {
   frame,
-  nothing,    ///< none until the deadline
-  malformed,  ///< something that is no frame at all (its size); another socket than CAN alone can bring it
+  nothing,    ///< no frame until the deadline
+  malformed,  ///< data with the wrong size for a frame; only a socket other than CAN can deliver it
   down,       ///< as SendOutcome::down
   failed,
 };
@@ -31,26 +31,25 @@ struct [[nodiscard]] ReceiveResult {
   int errno_value{0};
 };
 
-/// Sends and receives frames, as `struct can_frame` or `struct canfd_frame`, on any socket that keeps datagrams apart:
-/// a raw CAN socket, or an AF_UNIX one of type SOCK_SEQPACKET or SOCK_DGRAM in its place, which emulators and tests
-/// use. Never blocks but for `receive` up to its deadline. `send` and `receive` are real-time safe save their system
-/// calls.
+/// Sends and receives frames (`struct can_frame` or `struct canfd_frame`) on a socket that keeps message boundaries: a
+/// raw CAN socket, or for emulators and tests an AF_UNIX socket of type SOCK_SEQPACKET or SOCK_DGRAM. Only `receive`
+/// blocks, up to its deadline. `send` and `receive` are real-time safe apart from their system calls.
 class FrameSocket {
  public:
-  /// Takes over an open socket; sets it non-blocking and asks for receive time stamps and for the count of drops.
+  /// Takes ownership of an open socket. Makes it non-blocking and enables receive time stamps and the drop count.
   explicit FrameSocket(int descriptor) noexcept;
   FrameSocket(const FrameSocket&) = delete;
   FrameSocket& operator=(const FrameSocket&) = delete;
   virtual ~FrameSocket();
 
   SendResult send(const Frame& frame) noexcept;
-  /// @param deadline_ns monotonic clock; in the past: takes what is there and never waits
+  /// @param deadline_ns monotonic clock; if it is in the past the call does not wait
   virtual ReceiveResult receive(Frame& frame, std::int64_t deadline_ns) noexcept;
-  /// Frames that the kernel dropped because this socket's queue was full, since it was opened.
+  /// Number of frames that the kernel has dropped because this socket's queue was full.
   [[nodiscard]] std::uint32_t dropped() const noexcept { return dropped_; }
-  /// Throws away what has been received so far; bounded.
+  /// Discards the frames received so far, up to a fixed number.
   void drain() noexcept;
-  /// Asks for the flags of the interface that `request` names (SIOCGIFFLAGS); false if there is none.
+  /// Gets the flags of the interface that `request` names (SIOCGIFFLAGS); false if it does not exist.
   [[nodiscard]] bool ask_interface(ifreq& request) const noexcept;
 
  private:

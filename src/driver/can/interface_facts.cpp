@@ -24,7 +24,7 @@ constexpr std::uint32_t canfd_mtu = 72;
 
 using Visit = std::function<void(unsigned type, const void* data, std::size_t size)>;
 
-/// Walks through a list of attributes.
+/// Calls a function for each attribute of a list.
 void for_each(const void* data, std::size_t size, const Visit& visit) {
   const auto* at = static_cast<const unsigned char*>(data);
   while (size >= sizeof(rtattr)) {
@@ -109,7 +109,7 @@ InterfaceFacts facts_in(const ifinfomsg& info, const void* attributes, std::size
 class Netlink {
  public:
   Netlink() : descriptor_(::socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_ROUTE)) {
-    if (descriptor_ < 0) refuse("the kernel cannot be asked (rtnetlink)");
+    if (descriptor_ < 0) refuse("cannot open an rtnetlink socket");
   }
   Netlink(const Netlink&) = delete;
   Netlink& operator=(const Netlink&) = delete;
@@ -129,7 +129,7 @@ void ask_for_links(int descriptor) {
   request.head.nlmsg_type = RTM_GETLINK;
   request.head.nlmsg_flags = NLM_F_REQUEST | NLM_F_DUMP;
   request.info.ifi_family = AF_UNSPEC;
-  if (::send(descriptor, &request, sizeof request, 0) < 0) refuse("asking the kernel failed");
+  if (::send(descriptor, &request, sizeof request, 0) < 0) refuse("cannot send a request to the kernel (rtnetlink)");
 }
 
 }  // namespace
@@ -162,7 +162,7 @@ std::vector<InterfaceFacts> can_interfaces() {
   alignas(nlmsghdr) static thread_local std::array<unsigned char, 65536> buffer;
   for (bool done = false; !done;) {
     const ssize_t got = ::recv(netlink.get(), buffer.data(), buffer.size(), 0);
-    if (got < 0) refuse("the kernel's answer cannot be read");
+    if (got < 0) refuse("cannot read the kernel's answer (rtnetlink)");
     done = take_links(std::span(buffer).first(static_cast<std::size_t>(got)), found);
   }
   std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
@@ -185,12 +185,13 @@ std::optional<InterfaceProblem> problem_of(const InterfaceFacts& facts) {
   }
   if (facts.state == "bus-off" || facts.state == "stopped") {
     return InterfaceProblem{facts.state,
-                            "mend the wiring (docs/can.md), then " + set_link + " down && " + set_link + " up"};
+                            "repair the wiring (docs/can.md), then " + set_link + " down && " + set_link + " up"};
   }
   if (facts.state == "error-passive") {
-    return InterfaceProblem{"error-passive",
-                            "nobody acknowledges or the bit rates differ: check node, wiring, the two "
-                            "120 ohm terminations and the bit rate (docs/can.md)"};
+    return InterfaceProblem{
+        "error-passive",
+        "no node acknowledges, or the bit rates differ: check the node, the wiring, the two 120 ohm "
+        "terminations and the bit rate (docs/can.md)"};
   }
   if (!facts.running) return InterfaceProblem{"without carrier", set_link + " down && " + set_link + " up"};
   return std::nullopt;

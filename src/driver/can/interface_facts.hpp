@@ -8,15 +8,15 @@
 
 namespace abs_hil::driver::can {
 
-/// What the kernel tells about one CAN interface (rtnetlink).
+/// Properties of one CAN interface, from the kernel (rtnetlink).
 struct InterfaceFacts {
   std::string name{};
-  std::string kind{};  ///< "can", "vcan", ...; empty: the kernel does not say
+  std::string kind{};  ///< "can", "vcan", ...; empty: not known
   bool up{false};
-  bool running{false};        ///< has its carrier: not bus-off, not stopped
-  bool can_fd{false};         ///< takes CAN FD frames now
-  std::string state{};        ///< of the controller: "error-active", "error-passive", "bus-off", ...; empty: has none
-  std::uint32_t bit_rate{0};  ///< bit/s; 0: has none (vcan) or it is not set
+  bool running{false};        ///< it has a carrier: it is neither bus-off nor stopped
+  bool can_fd{false};         ///< it currently takes CAN FD frames
+  std::string state{};        ///< controller state: "error-active", "error-passive", "bus-off", ...; empty: none
+  std::uint32_t bit_rate{0};  ///< bit/s; 0: none (vcan) or not set
   std::uint32_t data_bit_rate{0};
   std::uint32_t transmit_errors{0};
   std::uint32_t receive_errors{0};
@@ -24,15 +24,15 @@ struct InterfaceFacts {
   std::uint32_t queue_length{0};
 };
 
-/// All interfaces of type CAN, by name. Empty where there is none. Throws Unavailable if the kernel cannot be asked.
+/// All interfaces of type CAN, sorted by name; empty if there is none. Throws Unavailable if rtnetlink fails.
 [[nodiscard]] std::vector<InterfaceFacts> can_interfaces();
-/// Takes one answer of the kernel apart (messages of rtnetlink, RTM_NEWLINK among them) and adds its interfaces of type
-/// CAN. True at the end of all answers, which is also where an error or a message that cannot be true stands.
+/// Parses one answer of the kernel (rtnetlink messages such as RTM_NEWLINK) and adds its interfaces of type CAN.
+/// Returns true after the last answer, and on an error or an invalid message.
 [[nodiscard]] bool take_links(std::span<const unsigned char> answer, std::vector<InterfaceFacts>& found);
-/// One of them; nothing if there is none of this name.
+/// The interface with this name, if any.
 [[nodiscard]] std::optional<InterfaceFacts> find_interface(const std::string& name);
 
-/// What hinders its use, with the command that mends it.
+/// A problem that prevents the use of an interface, and the command that fixes it.
 struct InterfaceProblem {
   std::string what{};
   std::string fix{};

@@ -35,7 +35,7 @@ void set_option(int descriptor, int name, const void* value, socklen_t size, con
   }
 }
 
-/// Only what the node sends: all else is dropped in the kernel, however much there is of it.
+/// Receives only the node's identifiers. The kernel drops all other frames, so that a busy bus costs nothing here.
 std::vector<can_filter> node_filters() {
   std::vector<can_filter> filters;
   for (const Message& message : messages()) {
@@ -47,7 +47,7 @@ std::vector<can_filter> node_filters() {
 int open_raw_socket(const InterfaceFacts& facts, bool fd_frames) {
   const int descriptor = ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
   if (descriptor < 0) {
-    refuse("no CAN socket: " + system_words(errno) + "; sudo modprobe can_raw, if this kernel has it");
+    refuse("cannot open a CAN socket: " + system_words(errno) + "; load the kernel module: sudo modprobe can_raw");
   }
   const std::vector<can_filter> filters = node_filters();
   set_option(descriptor, CAN_RAW_FILTER, filters.data(), static_cast<socklen_t>(filters.size() * sizeof(can_filter)),
@@ -67,7 +67,7 @@ int open_raw_socket(const InterfaceFacts& facts, bool fd_frames) {
   return descriptor;
 }
 
-/// An interface that has just been set up gets its carrier a little later (the kernel's linkwatch: up to 1 s).
+/// Waits for the carrier of an interface that was just set up (the kernel's linkwatch takes up to 1 s).
 std::optional<InterfaceFacts> find_settled_interface(const std::string& name) {
   constexpr int attempts = 40;
   constexpr std::chrono::milliseconds pause{50};
@@ -85,14 +85,14 @@ Link open_interface(const CanOptions& options) {
     std::string known;
     for (const InterfaceFacts& other : can_interfaces()) known += (known.empty() ? "" : ", ") + other.name;
     refuse("no CAN interface " + options.interface + " (driver.can.interface); there " +
-           (known.empty() ? "is none: plug the adapter in, load its kernel module (docs/can.md)" : "are " + known));
+           (known.empty() ? "is none: plug the adapter in and load its kernel module (docs/can.md)" : "are " + known));
   }
   if (const auto problem = problem_of(*facts)) {
     refuse("CAN interface " + facts->name + " is " + problem->what + ": " + problem->fix);
   }
   if (options.fd == "on" && !facts->can_fd) {
-    refuse("CAN interface " + facts->name + " takes no CAN FD frames (driver.can.fd=on): sudo ip link set " +
-           facts->name + " type can bitrate 1000000 dbitrate 5000000 fd on, or driver.can.fd=auto");
+    refuse("CAN interface " + facts->name + " takes no CAN FD frames (driver.can.fd=on): run sudo ip link set " +
+           facts->name + " type can bitrate 1000000 dbitrate 5000000 fd on, or set driver.can.fd=auto");
   }
   return {.socket = std::make_unique<FrameSocket>(open_raw_socket(*facts, facts->can_fd)),
           .place = "CAN interface " + facts->name,
@@ -109,7 +109,7 @@ Link open_unix_socket(const std::string& path) {
   }
   std::memcpy(address.sun_path, path.c_str(), path.size());
   const int descriptor = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
-  if (descriptor < 0) refuse("no AF_UNIX socket: " + system_words(errno));
+  if (descriptor < 0) refuse("cannot open an AF_UNIX socket: " + system_words(errno));
   if (::connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     const int error = errno;
     ::close(descriptor);
@@ -127,7 +127,7 @@ bool Link::running() const noexcept {
   std::memcpy(request.ifr_name, facts->name.c_str(), std::min<std::size_t>(facts->name.size(), IFNAMSIZ - 1));
   if (!socket->ask_interface(request)) return false;
   const auto flags = static_cast<unsigned>(request.ifr_flags);
-  // On its way down an interface loses its carrier first.
+  // An interface that goes down loses its carrier first.
   return (flags & IFF_UP) != 0 && (flags & IFF_RUNNING) != 0;
 }
 

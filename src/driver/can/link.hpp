@@ -13,16 +13,16 @@ namespace abs_hil::driver::can {
 /// A bus ready for use.
 struct Link {
   std::unique_ptr<FrameSocket> socket{};
-  std::string place{};                    ///< for messages
-  bool can_fd{false};                     ///< carries CAN FD frames
-  std::optional<InterfaceFacts> facts{};  ///< of a real interface
+  std::string place{};                    ///< name for messages
+  bool can_fd{false};                     ///< it carries CAN FD frames
+  std::optional<InterfaceFacts> facts{};  ///< only for a real interface
 
-  /// Whether the interface is up and has its carrier, asked when answers fail to come; a system call.
+  /// True if the interface is up and has a carrier. Makes a system call; the driver calls it when answers are missing.
   [[nodiscard]] bool running() const noexcept;
 };
 
-/// Opens the interface that the options name: raw CAN with kernel filters for the node's identifiers and with error
-/// frames; or "unix:PATH", an emulator's socket. Throws Unavailable with the cause and what mends it.
+/// Opens the interface that the options name: a raw CAN socket with error frames and kernel filters for the node's
+/// identifiers, or for "unix:PATH" the socket of an emulator. Throws Unavailable with cause and fix.
 [[nodiscard]] Link open_link(const CanOptions& options);
 
 /// Prefix of `driver.can.interface` for a socket in place of a bus.

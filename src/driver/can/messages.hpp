@@ -8,7 +8,7 @@
 
 namespace abs_hil::driver::can {
 
-// What the host sends, as frames with check.
+// Messages that the host sends, as frames with checksum.
 
 [[nodiscard]] Frame time_frame(std::int64_t host_time_ns) noexcept;
 [[nodiscard]] Frame sync_frame(std::uint8_t sequence) noexcept;
@@ -22,7 +22,7 @@ struct RawDuties {
 struct CommandMessage {
   RawDuties duties{};
   bool drive_enable{false};
-  std::uint8_t heartbeat{0};  ///< sequence of the measurement that it was computed from
+  std::uint8_t heartbeat{0};  ///< sequence of the measurement from which the command was computed
   std::uint8_t sequence{0};
 };
 [[nodiscard]] Frame command_frame(const CommandMessage& command) noexcept;
@@ -30,20 +30,20 @@ struct CommandMessage {
 struct ControlMessage {
   Request request{Request::identify};
   std::uint16_t nonce{0};        ///< of the node's latest ABS_IDENTITY
-  std::uint16_t watchdog_ms{0};  ///< 0: as it is
-  std::uint8_t sequence{0};      ///< the first command has the next one
+  std::uint16_t watchdog_ms{0};  ///< 0: unchanged
+  std::uint8_t sequence{0};      ///< the first command has the next sequence
 };
 [[nodiscard]] Frame control_frame(const ControlMessage& control) noexcept;
 
-// What the node sends. Every field is within its signal's range.
+// Messages that the node sends. Every field is within its signal's range.
 
 struct StatusMessage {
   std::uint32_t trip_flags{0};
   NodeState state{NodeState::inactive};
   LatchReason latch_reason{LatchReason::none};
-  double supply_V{0.0};       ///< NaN: the node does not know
-  double temperature_C{0.0};  ///< NaN: the node does not know
-  std::uint8_t sequence{0};   ///< of the SYNC it came with
+  double supply_V{0.0};       ///< NaN: the node does not know it
+  double temperature_C{0.0};  ///< NaN: the node does not know it
+  std::uint8_t sequence{0};   ///< of the SYNC that it answers
 };
 struct OutputsMessage {
   RawDuties applied{};
@@ -57,12 +57,12 @@ struct EncodersMessage {
   std::uint8_t sequence{0};
 };
 struct LatchMessage {
-  std::uint32_t node_time_us{0};  ///< node's clock when it latched the counters
+  std::uint32_t node_time_us{0};  ///< node's clock at the moment when it latched the counters
   std::int32_t lever_counts{0};   ///< 12 bits, wrapping
   NodeState state{NodeState::inactive};
   std::uint8_t sequence{0};
 };
-/// CAN FD: encoders, latch and outputs in one.
+/// CAN FD: encoders, latch and outputs in one message.
 struct MeasurementMessage {
   std::int32_t upper_counts{0};
   std::int32_t lower_counts{0};
@@ -83,10 +83,10 @@ struct IdentityMessage {
 
 enum class DecodeError : std::uint8_t {
   none = 0,
-  unknown_identifier,  ///< none of the node's messages
-  wrong_length,        ///< not the message's length, or a format (classic, FD) it does not come in
-  wrong_check,         ///< the check does not match: not from a node of this protocol, or damaged on the way
-  out_of_range,        ///< a signal holds what it cannot
+  unknown_identifier,  ///< not a message of the node
+  wrong_length,        ///< wrong length, or wrong format (classic, FD) for this message
+  wrong_check,         ///< wrong checksum: the frame is damaged or from another protocol
+  out_of_range,        ///< the value of a signal is outside its range
 };
 
 using NodeMessage = std::variant<std::monostate, StatusMessage, OutputsMessage, EncodersMessage, LatchMessage,
@@ -96,7 +96,7 @@ struct Decoded {
   DecodeError error{DecodeError::none};
   NodeMessage message{};  ///< monostate on error
 };
-/// Any frame at all, to a node's message or an error. Real-time safe.
+/// Decodes any frame to a message of the node, or to an error. Real-time safe.
 [[nodiscard]] Decoded decode(const Frame& frame) noexcept;
 
 }  // namespace abs_hil::driver::can

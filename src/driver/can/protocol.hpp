@@ -7,14 +7,14 @@
 
 namespace abs_hil::driver::can {
 
-/// The node's protocol, version 1: every message and signal, once. config/can/abs_rig.dbc says the same for other
-/// tools, and a test holds the two together. docs/can.md tells how the frames follow each other.
+/// The node's protocol, version 1: every message and signal. config/can/abs_rig.dbc has the same for other tools, and a
+/// test compares the two. docs/can.md describes the order of the frames.
 inline constexpr std::uint32_t protocol_version = 1;
 
 enum class ByteOrder : std::uint8_t { little_endian, big_endian };
 
-/// One signal: physical value = raw * scale + offset. `start_bit` as in a DBC file: bit n is bit n % 8 of byte n / 8;
-/// of the least significant bit in little-endian order, of the most significant one in big-endian order.
+/// One signal: physical value = raw * scale + offset. `start_bit` is as in a DBC file: bit n is bit n % 8 of byte n
+/// / 8. It is the least significant bit in little-endian order, the most significant bit in big-endian order.
 struct Signal {
   std::string_view name;
   std::uint16_t start_bit;
@@ -22,13 +22,13 @@ struct Signal {
   bool is_signed{false};
   double scale{1.0};
   double offset{0.0};
-  double least{0.0};  ///< least physical value that the decoder lets through
-  double most{0.0};   ///< largest one
+  double least{0.0};  ///< least physical value that the decoder accepts
+  double most{0.0};   ///< largest physical value that the decoder accepts
   std::string_view unit{};
   ByteOrder order{ByteOrder::little_endian};
 };
 
-/// One message with an 11-bit identifier. The last byte of each is its check (`checksum`).
+/// One message with an 11-bit identifier. Its last byte is its checksum (`checksum`).
 struct Message {
   std::uint32_t id;
   std::string_view name;
@@ -38,7 +38,7 @@ struct Message {
   std::span<const Signal> signals;
 };
 
-/// Identifiers: the lower, the earlier on the bus.
+/// Identifiers. A lower one has priority on the bus.
 namespace id {
 inline constexpr std::uint32_t time = 0x07F;
 inline constexpr std::uint32_t sync = 0x080;
@@ -52,22 +52,22 @@ inline constexpr std::uint32_t measurement = 0x094;
 inline constexpr std::uint32_t identity = 0x09A;
 }  // namespace id
 
-/// What ABS_CONTROL asks for.
+/// Requests of ABS_CONTROL.
 enum class Request : std::uint8_t { identify = 1, activate = 2, deactivate = 3 };
-/// How the node stands. Only in `active` do its outputs follow commands; `latched` ends with a new activation alone.
+/// State of the node. Its outputs follow commands only in `active`. Only a new activation ends `latched`.
 enum class NodeState : std::uint8_t { inactive = 0, active = 1, latched = 2 };
 /// Why the node latched.
 enum class LatchReason : std::uint8_t { none = 0, watchdog = 1, commands_rejected = 2 };
 /// Bits of ABS_IDENTITY's features.
 namespace feature {
-inline constexpr std::uint8_t lock_step = 1U << 0U;  ///< an emulator whose time is driven by ABS_TIME
+inline constexpr std::uint8_t lock_step = 1U << 0U;  ///< an emulator whose time ABS_TIME advances
 inline constexpr std::uint8_t can_fd = 1U << 1U;
 }  // namespace feature
 
-/// Raw values that say "not known".
+/// Raw values that mean "not known".
 inline constexpr std::int64_t supply_unknown = 0xFFFF;
 inline constexpr std::int64_t temperature_unknown = -32768;
-/// STATUS and OUTPUTS each come with one answer in so many.
+/// The node sends STATUS and OUTPUTS with every n-th answer.
 inline constexpr unsigned slow_frame_period = 10;
 
 namespace signal {
@@ -129,7 +129,7 @@ inline constexpr Signal identity_watchdog{"WatchdogTimeout", 32, 16, false, 1, 0
 
 /// All messages, by identifier.
 [[nodiscard]] std::span<const Message> messages() noexcept;
-/// Null for an identifier that is none of the protocol's.
+/// Null for an identifier that the protocol does not have.
 [[nodiscard]] const Message* find_message(std::uint32_t identifier) noexcept;
 
 }  // namespace abs_hil::driver::can

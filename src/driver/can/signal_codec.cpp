@@ -9,10 +9,10 @@ namespace {
 
 constexpr unsigned bits_per_byte = 8;
 
-/// Where bit `number` of a signal lies, number 0 being the least significant one.
+/// Position of bit `number` of a signal; number 0 is the least significant bit.
 unsigned place_of(const Signal& signal, unsigned number) noexcept {
   if (signal.order == ByteOrder::little_endian) return signal.start_bit + number;
-  // Big-endian: from the most significant bit downwards within a byte, then on with bit 7 of the next one.
+  // Big-endian: from the most significant bit downwards within a byte, then from bit 7 of the next byte.
   const unsigned from_top = signal.bits - 1U - number;
   const unsigned top = (signal.start_bit / bits_per_byte) * bits_per_byte +
                        (bits_per_byte - 1U - signal.start_bit % bits_per_byte) + from_top;

@@ -9,7 +9,7 @@
 #include "abs_hil/rig/encoder_scale.hpp"
 #include "driver/injection/injection.hpp"
 
-// What an injected fault makes of one signal. All functions but the constructors are real-time safe.
+// The effect of an injected fault on one signal. All functions except the constructors are real-time safe.
 namespace abs_hil::driver {
 
 /// A number in [0, 1) from the generator's upper 32 bits: the same with every standard library.
@@ -17,13 +17,13 @@ namespace abs_hil::driver {
   return static_cast<double>(random() >> 32U) * 0x1p-32;
 }
 
-/// The fault that acts on a signal now.
+/// The fault that currently acts on a signal.
 struct ActiveFault {
   InjectionKind kind{InjectionKind::ok};
   double parameter{0.0};
 };
 
-/// Values waiting until they are old enough; the oldest is lost when it overflows.
+/// Queue of values that are delivered late. If it overflows, the oldest value is lost.
 template <typename Value>
 class DelayLine {
  public:
@@ -36,7 +36,7 @@ class DelayLine {
       first_ = (first_ + 1) % capacity;
     }
   }
-  /// Takes the oldest if it came at `until_ns` or before.
+  /// Takes the oldest value if it was pushed at `until_ns` or before.
   [[nodiscard]] bool pop(std::int64_t until_ns, Value& value) noexcept {
     if (size_ == 0 || waiting_[first_].came_ns > until_ns) return false;
     value = waiting_[first_].value;
@@ -59,15 +59,15 @@ class DelayLine {
 
 [[nodiscard]] inline std::int64_t ns_of(double seconds) noexcept { return std::llround(seconds * 1e9); }
 
-/// One encoder's counter. As with a real incremental encoder, counts that are lost never come back: after the fault the
-/// counter goes on from where it then is.
+/// One encoder's counter. As with a real incremental encoder, lost counts stay lost: after the fault the counter
+/// continues from its current value.
 class EncoderChannel {
  public:
-  /// Begins anew with the counter's first reading.
+  /// Starts anew with the counter's first reading.
   void start(std::int32_t counts) noexcept;
-  /// Counts travelled since the reading before.
+  /// Counts travelled since the previous reading.
   [[nodiscard]] std::int32_t travel(std::int32_t counts) noexcept;
-  /// What is delivered of `travel` under the fault.
+  /// The part of `travel` that is delivered under the fault.
   [[nodiscard]] std::int32_t pass(std::int32_t travel, const ActiveFault& fault, std::int64_t now_ns,
                                   std::mt19937_64& random) noexcept;
 
@@ -76,8 +76,8 @@ class EncoderChannel {
 
   std::int32_t last_{0};
   std::int32_t delivered_{0};
-  double fraction_{0.0};  ///< of a count, of a counter that counts wrongly
-  std::int64_t held_{0};  ///< counts that come late
+  double fraction_{0.0};  ///< fraction of a count left over (kind `wrong`)
+  std::int64_t held_{0};  ///< counts to be delivered later
   std::int64_t renewed_ns_{0};
   DelayLine<std::int64_t> line_{};
 };
@@ -87,16 +87,16 @@ struct NumberFaults {
   double off{0.0};
   double garbage_least{0.0};
   double garbage_most{1.0};
-  bool whole{false};  ///< garbage is a whole number
+  bool whole{false};  ///< garbage values are whole numbers
   double (*wrong)(double value, double parameter) noexcept;
-  bool intermittently_wrong{false};  ///< comes and goes as `wrong`, not as `off`
+  bool intermittently_wrong{false};  ///< an intermittent fault acts as `wrong`, not as `off`
 };
 
-/// A number: a duty, a voltage, a flag, a time.
+/// A signal that is a number: a duty, a voltage, a flag, a time.
 class NumberChannel {
  public:
   explicit NumberChannel(const NumberFaults& faults) : faults_(faults) {}
-  /// Begins anew: nothing has been delivered.
+  /// Starts anew, with nothing delivered.
   void start() noexcept;
   [[nodiscard]] double pass(double value, const ActiveFault& fault, std::int64_t now_ns,
                             std::mt19937_64& random) noexcept;

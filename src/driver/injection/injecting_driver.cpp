@@ -10,7 +10,7 @@ namespace abs_hil::driver {
 
 namespace {
 
-constexpr double longest_run_s = 1e9;  ///< a duration beyond it, infinity included, is no end
+constexpr double longest_run_s = 1e9;  ///< a longer duration, also infinity, means no end
 constexpr double not_known = std::numeric_limits<double>::quiet_NaN();
 
 double scaled_duty(double duty, double factor) noexcept { return std::clamp(duty * factor, 0.0, 1.0); }
@@ -29,7 +29,7 @@ constexpr NumberFaults duty_faults{.wrong = scaled_duty};
 constexpr NumberFaults torque_faults{.garbage_most = 10.0, .wrong = scaled};
 constexpr NumberFaults enable_faults{.garbage_most = 2.0, .whole = true, .wrong = inverted};
 
-/// NaN is the same as NaN here: not known.
+/// NaN equals NaN here: both mean "not known".
 bool differ(double a, double b) noexcept { return a != b && !(std::isnan(a) && std::isnan(b)); }
 
 bool differ(const rig::Measurement& a, const rig::Measurement& b) noexcept {
@@ -95,7 +95,7 @@ void InjectingDriver::note_effect(bool differs) noexcept {
 }
 
 ActiveFault InjectingDriver::fault_of(InjectionSignal signal) const noexcept {
-  // The one that began last acts; `ok` among them ends what was before it.
+  // The fault that began last acts. The kind `ok` ends earlier faults.
   std::int64_t latest_ns = -1;
   ActiveFault fault{};
   for (const Planned& planned : planned_) {
@@ -111,7 +111,7 @@ ActiveFault InjectingDriver::fault_of(InjectionSignal signal) const noexcept {
 
 IoResult InjectingDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept {
   now_ns_ = now_ns;
-  // The backend is read whatever fails after it: an emulator's time goes on with it.
+  // Always read the backend, also under a fault: the read advances an emulator's time.
   if (const IoResult result = inner_->read(now_ns, measurement); !result.ok()) return result;
   if (std::exchange(first_read_, false)) {
     upper_.start(measurement.upper_counts);
@@ -143,7 +143,7 @@ void InjectingDriver::fail_encoders(rig::Measurement& measurement) noexcept {
   measurement.upper_counts = upper_.pass(upper_travel, upper, now_ns_, random_);
   measurement.lower_counts = lower_.pass(lower_travel, lower, now_ns_, random_);
   if (!measurement.ideal_speeds) return;
-  // True speeds belong to sound encoders; one that fails shows what its counts say.
+  // The true speed holds only for a sound encoder. For a faulty one it is scaled by the counts that are delivered.
   const double dt_s = static_cast<double>(measurement.time_ns - before.time_ns) * 1e-9;
   const auto speed = [&](std::int32_t from, std::int32_t to, std::int32_t travelled, double true_rad_s) {
     const double shown = rig::counts_between(from, to);

@@ -15,12 +15,12 @@
 
 namespace abs_hil::driver {
 
-/// Any backend but real hardware, with faults planted between it and the executive. The same faults and seed give the
-/// same run. Making safe (`deactivate`, and after a failed write) always reaches the backend: what remains when no
-/// command can is for the guardian and the E-stop. Real-time safe as the backend is.
+/// Injects faults between the executive and any backend except real hardware. The same faults and seed give the same
+/// run. No fault affects making safe (`deactivate`, and after a failed write): guardian and E-stop are there for the
+/// case that no command reaches the board. As real-time safe as the backend.
 class InjectingDriver final : public RigDriver {
  public:
-  /// Lets time pass in the calling thread, ns: what slow calls take.
+  /// Lets this time pass in the calling thread, ns; used for slow calls.
   using PassTime = std::function<void(std::int64_t duration_ns)>;
   /// @param pass_time may be empty; then slow calls take no time
   InjectingDriver(std::unique_ptr<RigDriver> inner, const std::vector<Injection>& injections, std::uint64_t seed,
@@ -39,13 +39,13 @@ class InjectingDriver final : public RigDriver {
   }
   void note_phase(rig::Phase phase) noexcept override;
   [[nodiscard]] const RigDriver& inner() const noexcept { return *inner_; }
-  /// Time of the first read or write in which a fault made a difference; -1 while none has.
+  /// Time of the first read or write that a fault changed; -1 before that.
   [[nodiscard]] std::int64_t first_effect_ns() const noexcept { return first_effect_ns_; }
 
  private:
   struct Planned {
     Injection injection{};
-    std::int64_t entered_ns{-1};  ///< when its phase was first entered; < 0: not yet
+    std::int64_t entered_ns{-1};  ///< when the run first entered its phase; < 0: not yet
   };
 
   void do_configure() override { inner_->configure(); }
@@ -72,8 +72,8 @@ class InjectingDriver final : public RigDriver {
 
   EncoderChannel upper_{};
   EncoderChannel lower_{};
-  rig::Measurement delivered_{};  ///< last answer handed on
-  rig::Command sent_{};           ///< last command handed on
+  rig::Measurement delivered_{};  ///< last measurement passed on
+  rig::Command sent_{};           ///< last command passed on
   DelayLine<rig::Measurement> answers_{};
   DelayLine<rig::Command> commands_{};
   NumberChannel stamp_;
@@ -82,7 +82,7 @@ class InjectingDriver final : public RigDriver {
   NumberChannel trip_;
   NumberChannel motor_;
   NumberChannel brake_;
-  NumberChannel brake_torque_;  ///< goes with the brake's duty; the ideal actuator's
+  NumberChannel brake_torque_;  ///< for the ideal actuator; has the faults of the brake's duty
   NumberChannel enable_;
 };
 

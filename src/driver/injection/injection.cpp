@@ -21,7 +21,7 @@ constexpr std::array<rig::Phase, 6> phases{rig::Phase::idle,  rig::Phase::accele
                                            rig::Phase::brake, rig::Phase::hold,       rig::Phase::stopped};
 constexpr std::string_view any_phase = "any";
 constexpr double longest_delay_s = 600.0;
-/// The longest that what `delayed` and `slow` hold back: so much is kept in memory at 10 kHz.
+/// Longest delay of `delayed` and `slow`; the memory suffices for it at 10 kHz.
 constexpr double longest_holding_s = 0.5;
 
 template <std::size_t n>
@@ -45,7 +45,7 @@ bool is_number(std::string_view text, double& value) {
   return error == std::errc() && at == text.data() + text.size() && std::isfinite(value);
 }
 
-/// "0.2s", "200ms".
+/// Parses "0.2s" or "200ms".
 bool is_time(std::string_view text, double& seconds) {
   const bool milli = text.ends_with("ms");
   if (!text.ends_with('s') || !is_number(text.substr(0, text.size() - (milli ? 2 : 1)), seconds)) return false;
@@ -53,7 +53,7 @@ bool is_time(std::string_view text, double& seconds) {
   return true;
 }
 
-/// What a kind takes as its parameter on a signal: its range and the value if none is given.
+/// Parameter of a kind on a signal: its range and its default.
 struct Parameter {
   enum class Unit : std::uint8_t { none, number, time } unit{Unit::none};
   double least{0.0};
@@ -65,7 +65,7 @@ Parameter parameter_of(InjectionSignal signal, InjectionKind kind) {
   using enum InjectionSignal;
   switch (kind) {
     case InjectionKind::slow:
-      // A slow call holds up the cycle; anything else is renewed so seldom.
+      // A slow call delays the cycle; a slow signal is only updated at this interval.
       if (signal == read || signal == write) return {Parameter::Unit::time, 1e-6, longest_holding_s, 0.002};
       return {Parameter::Unit::time, 1e-6, longest_holding_s, 0.05};
     case InjectionKind::delayed: return {Parameter::Unit::time, 1e-6, longest_holding_s, 0.05};

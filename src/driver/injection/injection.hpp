@@ -10,10 +10,10 @@
 
 #include "abs_hil/rig/phase.hpp"
 
-// Faults planted at the I/O seam, between the executive and any backend but real hardware (docs/fault-injection.md).
+// Faults injected between the executive and any backend except real hardware (docs/fault-injection.md).
 namespace abs_hil::driver {
 
-/// What a fault sits in: a part of the measurement, a part of the command, or a whole call.
+/// Where a fault acts: on a part of the measurement, a part of the command, or a whole call.
 enum class InjectionSignal : std::uint8_t {
   encoder_upper,
   encoder_lower,
@@ -30,31 +30,31 @@ enum class InjectionSignal : std::uint8_t {
 };
 inline constexpr std::size_t injection_signal_count = 12;
 
-/// What becomes of it. docs/fault-injection.md says what each means for each signal.
+/// What a fault does. docs/fault-injection.md tells the meaning of each kind for each signal.
 enum class InjectionKind : std::uint8_t { ok, off, stuck, garbage, wrong, slow, delayed, intermittent };
 inline constexpr std::size_t injection_kind_count = 8;
 
 /// One fault: when, where, what. Trivially copyable.
 struct Injection {
-  std::optional<rig::Phase> phase{};  ///< counts from the first cycle of this phase; none: from the run's first
+  std::optional<rig::Phase> phase{};  ///< time counts from the first cycle of this phase; none: of the run
   InjectionSignal signal{InjectionSignal::read};
   InjectionKind kind{InjectionKind::ok};
-  double parameter{0.0};  ///< of the kind: factor, offset, seconds or probability; 0 where it takes none
+  double parameter{0.0};  ///< factor, offset, seconds or probability, depending on the kind; 0 if the kind has none
   double delay_s{0.0};    ///< in [0, 600]
   double duration_s{std::numeric_limits<double>::infinity()};  ///< > 0
   friend bool operator==(const Injection&, const Injection&) = default;
 };
 
-/// "brake@encoder_upper:stuck+0.2s", in general
+/// Parses one fault such as "brake@encoder_upper:stuck+0.2s". The syntax is
 ///
 ///     PHASE@SIGNAL:KIND[=PARAMETER][+DELAY][~DURATION]
 ///
 /// with PHASE one of idle accelerate coast brake hold stopped any, times as 0.2s or 200ms. Throws
 /// std::invalid_argument, naming the part, what is allowed in its place and an example.
 [[nodiscard]] Injection parse_injection(std::string_view text);
-/// Several, separated by commas or blanks; none for an empty text.
+/// Parses several faults, separated by commas or blanks. An empty text gives none.
 [[nodiscard]] std::vector<Injection> parse_injections(std::string_view list);
-/// In the form that `parse_injection` takes.
+/// The fault in the syntax of `parse_injection`.
 [[nodiscard]] std::string to_text(const Injection& injection);
 
 [[nodiscard]] std::string_view name_of(InjectionSignal signal) noexcept;

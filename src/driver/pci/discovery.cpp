@@ -47,7 +47,7 @@ std::string joined(const std::vector<std::string>& words) {
   return text;
 }
 
-constexpr const char* how_to_look = "lspci -nn -d 10b5:2497 should show it (docs/rig-setup.md)";
+constexpr const char* how_to_look = "check with lspci -nn -d 10b5:2497 (docs/rig-setup.md)";
 
 std::string choose(const PciOptions& options) {
   const fs::path root(options.root);
@@ -67,7 +67,7 @@ std::string choose(const PciOptions& options) {
   const std::vector<std::string> cards = find_cards(root);
   if (cards.empty()) {
     refuse("no RT-DAC4/PCI card (driver.kind=pci, " + hex(vendor_id) + ":" + hex(device_id) + ") in " + options.root +
-           "; " + how_to_look + ". Without the rig use --backend sim");
+           "; " + how_to_look + ". To run without the rig, use --backend sim");
   }
   if (cards.size() > 1) {
     refuse(std::to_string(cards.size()) + " cards in " + options.root + ": " + joined(cards) +
@@ -80,16 +80,17 @@ void check_bar(const fs::path& folder) {
   const BarInfo bar = read_bar2(folder);
   const std::string place = (folder / "resource").string() + ": BAR 2 ";
   if (bar.bytes == 0) {
-    refuse(place + "is not there; the card must have " + std::to_string(window_bytes) + " bytes of it");
+    refuse(place + "is missing; the card must have one of " + std::to_string(window_bytes) + " bytes");
   }
   if (!bar.io_ports) {
-    refuse(place + "is memory, not I/O ports: another card or another board logic; nothing was written");
+    refuse(place +
+           "is memory, not I/O ports: this is another card, or it has another board logic; nothing was written");
   }
   if (bar.bytes < window_bytes) {
     refuse(place + "has " + std::to_string(bar.bytes) + " bytes; the register map needs " +
-           std::to_string(window_bytes) + ": another card or another board logic; nothing was written");
+           std::to_string(window_bytes) + ": this is another card, or it has another board logic; nothing was written");
   }
-  // sysfs gives the file the BAR's size. Where both are told they must agree; a size of 0 tells nothing.
+  // sysfs gives the file the size of the BAR, or the size 0, which tells nothing. Otherwise both sizes must agree.
   std::error_code error;
   const std::uintmax_t file_bytes = fs::file_size(folder / "resource2", error);
   if (!error && file_bytes != 0 && file_bytes < window_bytes) {
@@ -106,7 +107,7 @@ std::vector<std::string> find_cards(const fs::path& root) {
   fs::directory_iterator entries(root, error);
   if (error) {
     refuse("cannot look for PCI devices in " + root.string() + " (driver.pci.root): " + error.message() +
-           ". Without the rig use --backend sim");
+           ". To run without the rig, use --backend sim");
   }
   for (const fs::directory_iterator end; entries != end && !error; entries.increment(error)) {
     if (is_the_card(entries->path())) cards.push_back(entries->path().filename().string());
@@ -141,12 +142,12 @@ Card open_card(const PciOptions& options, bool lock_step) {
   const bool waits_for_lock_step = fs::exists(folder / emulated_time_file, ignored);
   if (lock_step && !waits_for_lock_step) {
     refuse(folder.string() + " has no file " + emulated_time_file +
-           ": it is hardware, or an emulator in real time. Leave --fast out, or start abs_rig_emulator --lock-step");
+           ": it is hardware, or an emulator in real time. Omit --fast, or start abs_rig_emulator with --lock-step");
   }
   if (!lock_step && waits_for_lock_step) {
     refuse(folder.string() +
-           " is an emulator in lock-step, whose time stands still without --fast and --set driver.emulated=true; or "
-           "start abs_rig_emulator without --lock-step");
+           " is an emulator in lock-step: give --fast --set driver.emulated=true to advance its time, or start "
+           "abs_rig_emulator without --lock-step");
   }
   Card card{.window = std::make_unique<SysfsWindow>(folder / "resource2"), .place = bdf + " in " + options.root};
   if (lock_step) card.time = std::make_unique<EmulatedTimeFile>(folder / emulated_time_file);

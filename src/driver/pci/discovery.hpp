@@ -14,7 +14,7 @@ namespace abs_hil::driver::pci {
 /// A card ready for use.
 struct Card {
   std::unique_ptr<RegisterWindow> window{};
-  std::unique_ptr<EmulatedTime> time{};  ///< only behind an emulator in lock-step
+  std::unique_ptr<EmulatedTime> time{};  ///< only for an emulator in lock-step
   std::string place{};                   ///< for messages: address and folder
 };
 
@@ -30,17 +30,17 @@ struct BarInfo {
 /// Throws Unavailable if the file cannot be read as a table of regions.
 [[nodiscard]] BarInfo read_bar2(const std::filesystem::path& device_folder);
 
-/// Finds the card that the options mean, checks device, kind and size of its BAR, opens and locks it. Nothing is
-/// written. Throws Unavailable with the cause and what mends it.
-/// @param lock_step  the emulator's clock is to be driven: refused where there is none, as on all hardware; without it
-///                   an emulator that waits for lock-step is refused
+/// Finds the card that the options select. Checks its ids and the kind and size of its BAR, then opens and locks it.
+/// Writes nothing. Throws Unavailable with cause and fix.
+/// @param lock_step  advance the emulator's clock; refused without such a clock, as on all hardware. If false, an
+///                   emulator in lock-step is refused
 [[nodiscard]] Card open_card(const PciOptions& options, bool lock_step);
 
-/// The registers of the same card for a guardian: found and checked in the same way, not locked as an owner locks them.
-/// Throws Unavailable; also if another guardian still makes that card safe.
+/// Opens the registers of the same card for a guardian. Finds and checks the card in the same way, but without the
+/// owner's lock. Throws Unavailable, also if another guardian still makes that card safe.
 [[nodiscard]] std::unique_ptr<RegisterWindow> open_beside_owner(const PciOptions& options);
 
-/// Beside the card's files in an emulator in lock-step, and never on hardware.
+/// File in the card's folder that only an emulator in lock-step has.
 inline constexpr const char* emulated_time_file = "emulated_time_ns";
 
 }  // namespace abs_hil::driver::pci

@@ -10,17 +10,18 @@ namespace abs_hil::driver::pci {
 
 namespace {
 
-/// Counters whose reading took longer belong to no one instant: at 170 rad/s it is 28 counts. They are read once more.
+/// If reading both counters takes longer, they belong to different instants (28 counts at 170 rad/s) and are read
+/// again.
 constexpr std::int64_t late_reading_ns = 250'000;
 
 }  // namespace
 
-/// One piece of work on the card: the first error ends it, later accesses are left out.
+/// A sequence of accesses to the card. After the first error all later accesses are skipped.
 class PciDriver::Access {
  public:
   explicit Access(RegisterWindow& window) noexcept : window_(window) {}
 
-  /// The value read; 0 once something has failed.
+  /// The value read; 0 after an error.
   std::uint32_t read(std::uint32_t offset) noexcept {
     std::uint32_t value = 0;
     if (result_.ok()) result_ = window_.read32(offset, value);
@@ -62,7 +63,7 @@ PciDriver::PciDriver(const PciOptions& options, OpenCard open_card, ReadClock re
 PciDriver::~PciDriver() { static_cast<void>(deactivate()); }
 
 void PciDriver::do_configure() {
-  card_ = {};  // gives the lock back, should it be ours
+  card_ = {};  // releases the lock if this driver holds it
   card_ = open_card_();
   Access card(*card_.window);
   version_ = card.read(reg::bitstream_version);
@@ -74,19 +75,19 @@ void PciDriver::do_configure() {
   };
   if (const IoResult& result = card.result(); !result.ok()) refuse(error_text(result));
   if (version_ == all_ones) {
-    refuse("answers all ones: it is not on the bus (no power, not seated, or its I/O decoding is disabled)");
+    refuse("answers all ones: it is not on the bus; check its power, its slot and that its I/O decoding is enabled");
   }
   constexpr std::uint32_t low_16_bits = 0xFFFF;
   if (options_.bitstream >= 0 && (version_ & low_16_bits) != static_cast<std::uint32_t>(options_.bitstream)) {
     refuse("bitstream version " + std::to_string(version_ & low_16_bits) + " is not the configured " +
            std::to_string(options_.bitstream) +
-           " (driver.pci.bitstream): another logic has other registers; load the ABS logic or correct the key");
+           " (driver.pci.bitstream): another logic has other registers. Load the ABS logic or correct the key");
   }
 }
 
 void PciDriver::take_over(Access& card) noexcept {
   for (const Pwm pwm : {Pwm::drive, Pwm::brake}) {
-    write_pwm(card, pwm, 0);  // before mode and prescaler: they must not turn an old width into a pulse
+    write_pwm(card, pwm, 0);  // before mode and prescaler, which could turn an old width into a pulse
     for (const auto& [offset, value] :
          {std::pair(reg::pwm_mode, static_cast<std::uint32_t>(mode_)),
           std::pair(reg::pwm_prescaler, static_cast<std::uint32_t>(options_.pwm_prescaler))}) {
@@ -114,7 +115,7 @@ void PciDriver::do_activate(std::int64_t now_ns) {
     take_over(card);
     result = checked_for_absence(card);
   }
-  // Between reset and reading no wheel turns further than this.
+  // Bound on the time between reset and reading.
   constexpr std::int64_t reset_takes_at_most_ns = 100'000'000;
   if (result.ok() && !plausible(now_ns + reset_takes_at_most_ns, {0, 0})) {
     result = {IoError::implausible_answer, reg::encoder_reset};
@@ -153,7 +154,7 @@ bool PciDriver::plausible(std::int64_t read_ns, const std::array<std::int32_t, 2
 
 IoResult PciDriver::checked_for_absence(const Access& card) noexcept {
   if (!card.saw_all_ones()) return card.result();
-  // All ones may be a count of -1. A card that is gone shows them everywhere.
+  // All ones may be a count of -1. A missing card returns all ones from every register.
   std::uint32_t version = 0;
   const IoResult result = card_.window->read32(reg::bitstream_version, version);
   if (!result.ok()) return result;
@@ -200,8 +201,8 @@ IoResult PciDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) 
 
 bool PciDriver::tripped_to_zero(Access& card, std::uint32_t width_read) noexcept {
   if (width_read != 0) return false;
-  // Whether the width reads 0 while the FPGA holds the outputs off is not known. If so it is the trip that must be
-  // reported, with the next measurement, and not the register.
+  // It is not known whether the width reads 0 while the FPGA holds the outputs off. If it does, the next measurement
+  // must report the trip, and this is no register error.
   read_health(card, reg::trip_flags);
   return card.result().ok() && health_[0] != 0;
 }
@@ -225,7 +226,7 @@ IoResult PciDriver::do_write(const rig::Command& command) noexcept {
 
 IoResult PciDriver::do_make_safe() noexcept {
   if (!card_.window) return {IoError::disconnected};
-  // Each output is tried whatever became of the other, the motor first; the first error is reported.
+  // Writes both outputs, the motor first, even if one fails. Reports the first error.
   IoResult first{};
   for (const Pwm pwm : {Pwm::drive, Pwm::brake}) {
     Access card(*card_.window);

@@ -15,30 +15,30 @@
 
 namespace abs_hil::driver::pci {
 
-/// The registers that take turns, one a cycle: they change slowly, and the FPGA acts on them by itself.
+/// Registers that are read in turn, one per cycle: they change slowly, and the FPGA acts on them by itself.
 inline constexpr std::array health_registers{reg::trip_flags, reg::supply, reg::temperature_high, reg::temperature_low};
 
-/// Register accesses of one cycle, always the same number (docs/rig-setup.md lists them): index and counter of two
-/// encoders, one of the health registers, index, width and read-back of two PWMs. The index is written before every
-/// access to indexed data, though the card keeps it: were it ever not what we think, brake duty would go to the drive.
+/// Number of register accesses of one cycle (docs/rig-setup.md lists them): index and counter of two encoders, one of
+/// the health registers, index, width and read-back of two PWMs. The driver writes the index before every access to
+/// indexed data although the card keeps it: with a wrong index the brake's duty would go to the drive.
 inline constexpr std::size_t accesses_in_read = std::size_t{2} * 2 + 1;
 inline constexpr std::size_t accesses_in_write = std::size_t{2} * 3;
 inline constexpr std::size_t accesses_per_cycle = accesses_in_read + accesses_in_write;
 
 /// The RT-DAC4/PCI with ABS logic. Not verified on hardware.
 ///
-/// `read` and `write` take `accesses_per_cycle` register accesses together, about 1 us each on PCI, and four more
-/// when the counters' reading was held up, and at most four more when an answer looks like that of a card that is gone
-/// or has tripped. The motor enable is this driver's own gate: the ABS logic has no such bit. After a crash the card is
-/// assumed to go on with its last duties: it has no known watchdog.
+/// `read` and `write` together make `accesses_per_cycle` register accesses, about 1 us each on PCI. They make four more
+/// after a delayed reading of the counters, and up to four more if an answer looks like that of a missing or tripped
+/// card. The driver itself gates the motor enable: the ABS logic has no such bit. The card has no known watchdog, so it
+/// is assumed to keep its last duties after a crash.
 class PciDriver final : public RigDriver {
  public:
   using OpenCard = std::function<Card()>;
   using ReadClock = std::int64_t (*)() noexcept;
   /// Throws std::invalid_argument, naming the key, if an option is outside its range.
   /// @param open_card called by `configure`; throws Unavailable
-  /// @param read_clock  the clock that `now_ns` comes from: counters are stamped with the middle of their reading, so
-  ///                    that a late answer does not look like speed. None in virtual time, where reading takes none.
+  /// @param read_clock  the clock of `now_ns`. The time stamp of the counters is the middle of their reading, so that a
+  ///                    delayed answer does not look like speed. Null in virtual time, where reading takes no time.
   PciDriver(const PciOptions& options, OpenCard open_card, ReadClock read_clock = nullptr);
   ~PciDriver() override;
 
@@ -57,7 +57,7 @@ class PciDriver final : public RigDriver {
 
   void take_over(Access& card) noexcept;
   void read_wheels(Access& card) noexcept;
-  /// Reads both counters and stamps them; false if that took too long.
+  /// Reads both counters and sets their time stamp; false if that took too long.
   bool read_wheels_at(Access& card, std::int64_t& read_ns) noexcept;
   void read_health(Access& card, std::uint32_t offset) noexcept;
   void write_pwm(Access& card, Pwm pwm, std::uint32_t width) noexcept;
@@ -74,7 +74,7 @@ class PciDriver final : public RigDriver {
   std::uint32_t channel_counts_{0};
 
   std::int64_t activated_ns_{0};  ///< time of `activate`
-  std::int64_t emulated_ns_{0};   ///< the emulator's time then
+  std::int64_t emulated_ns_{0};   ///< the emulator's time at `activate`
   std::int64_t last_read_ns_{0};
   std::array<std::int32_t, 2> counts_{};  ///< upper, lower; with their signs
   std::array<std::uint32_t, health_registers.size()> health_{};

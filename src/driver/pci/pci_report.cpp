@@ -1,4 +1,4 @@
-// What the driver can say in words about its card.
+// Texts about the card.
 
 #include "driver/pci/pci_driver.hpp"
 #include "rig/formatted_text.hpp"

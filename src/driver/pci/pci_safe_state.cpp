@@ -22,7 +22,7 @@ IoResult check_for_zero(RegisterWindow& window, Pwm pwm) noexcept {
   std::uint32_t index_read = 0;
   std::uint32_t width = 0;
   if (const IoResult result = window.read32(reg::pwm_width, width); !result.ok()) return result;
-  // The index last, too: somebody else's would mean that the width was another PWM's.
+  // Read the index as well: if another process changed it, the width belonged to another PWM.
   if (const IoResult result = window.read32(reg::pwm_index, index_read); !result.ok()) return result;
   if (width == all_ones || index_read == all_ones) return {IoError::disconnected, reg::pwm_width};
   if (index_read != index) return {IoError::read_back_mismatch, reg::pwm_index};

@@ -10,15 +10,15 @@
 
 namespace abs_hil::driver::pci {
 
-/// Both PWMs of the RT-DAC4/PCI to width 0, read back in a second round. Index and data are two accesses: with an owner
-/// alive between them, a width meant for one PWM could go to the other, or the owner's next width undo the safe state.
-/// So this must run only when the owner writes no more, or zeros only.
+/// Sets both PWMs of the RT-DAC4/PCI to width 0, then reads both back. Index and data are two accesses. A live owner
+/// between them could send a width to the wrong PWM, or undo the safe state with its next width. Use this only when the
+/// owner no longer writes, or writes only zeros.
 class PciSafeState final : public SafeStateWriter {
  public:
   using OpenWindow = std::function<std::unique_ptr<RegisterWindow>()>;
-  /// @param open_window  throws Unavailable; called by `prepare`, and again after accesses failed
+  /// @param open_window  throws Unavailable; called by `prepare`, and again after failed accesses
   explicit PciSafeState(OpenWindow open_window) : open_window_(std::move(open_window)) {}
-  /// The card that the options mean, through sysfs.
+  /// For the card that the options select, through sysfs.
   explicit PciSafeState(const PciOptions& options);
 
   [[nodiscard]] std::string_view name() const noexcept override { return "pci"; }

@@ -10,7 +10,7 @@ using enum Standing;
 using enum Use;
 
 constexpr std::string_view abs_only = "in the board's generic logic this is an ADC or DAC: check the bitstream first";
-constexpr std::string_view limit_open = "whether the host may write it, and its power-on value";
+constexpr std::string_view limit_open = "whether the host may write it; its power-on value";
 
 constexpr std::array table{
     Register{reg::bitstream_version, "bitstream version", "", "low 16 bits", documented, checked,
@@ -18,7 +18,7 @@ constexpr std::array table{
     Register{reg::channel_counts, "channel counts", "", "bits 15:12 counters, 11:8 timers", documented, checked},
     Register{reg::supply, "supply", "V", "92000 / raw; 0 = none", documented, in_turn},
     Register{reg::dio_direction_low, "digital I/O direction, low half", "", "a bit each", documented, never,
-             "which lines the ABS logic wires to anything"},
+             "which lines the ABS logic uses"},
     Register{reg::dio_direction_high, "digital I/O direction, high half", "", "a bit each", documented, never,
              "as the low half"},
     Register{reg::dio_value_low, "digital I/O value, low half", "", "a bit each", documented, never, "as direction"},
@@ -30,18 +30,19 @@ constexpr std::array table{
     Register{reg::velocity_upper, "velocity of the upper wheel", "rad/s", "as the lower wheel's", documented, checked,
              "as the lower wheel's"},
     Register{reg::velocity_limit, "overspeed limit", "rad/s", "as the velocities", documented, checked, limit_open},
-    Register{reg::pwm_index, "PWM index", "", "0 drive, 1 brake: what 64, 68 and 6C speak of", documented, every_cycle},
+    Register{reg::pwm_index, "PWM index", "", "0 drive, 1 brake: selects the PWM of 64, 68 and 6C", documented,
+             every_cycle},
     Register{reg::pwm_mode, "PWM mode", "", "0 = 8-bit, 1 = 12-bit; reads back", documented, at_activation},
     Register{reg::pwm_prescaler, "PWM prescaler", "", "f = 40 MHz / ((prescaler + 1) full width); reads back",
              documented, at_activation, "how many bits it has"},
     Register{reg::pwm_width, "PWM width", "", "high time, 0 ... 255 or 4095; reads back", documented, every_cycle,
              "whether it reads 0 while an interlock holds the outputs off"},
-    Register{reg::encoder_index, "encoder index", "", "0 lower wheel, 1 upper wheel, 2 lever: what 88 speaks of",
-             documented, every_cycle},
+    Register{reg::encoder_index, "encoder index", "",
+             "0 lower wheel, 1 upper wheel, 2 lever: selects the encoder of 88", documented, every_cycle},
     Register{reg::encoder_reset, "encoder reset", "", "bits 0-2, a channel each; its counter is 0 while the bit is set",
              documented, at_activation},
     Register{reg::encoder_counter, "encoder counter", "counts", "32-bit signed, of the indexed encoder", documented,
-             every_cycle, "which way is forward: the wiring decides"},
+             every_cycle, "which direction is forward: the wiring decides"},
     Register{reg::start_resistors, "start resistors", "", "bit 0 R1, bit 1 R2", documented, never,
              "whether the host should switch them"},
     Register{reg::r1_low, "R1 low threshold", "", "", documented, never, "its unit"},
@@ -55,7 +56,7 @@ constexpr std::array table{
     Register{reg::temperature_high, "temperature sensor, high time", "", "235 - 400 high / low is deg C", inferred,
              in_turn},
     Register{reg::temperature_low, "temperature sensor, low time", "", "as the high time", inferred, in_turn,
-             "what it shows without a sensor; 0 is taken for none"},
+             "what it shows without a sensor; the driver takes 0 as no sensor"},
 };
 
 }  // namespace

@@ -11,12 +11,12 @@
 
 namespace abs_hil::driver::pci {
 
-// RT-DAC4/PCI with ABS logic, from the maker's driver sources. Nothing here has been tried on hardware.
+// Register map of the RT-DAC4/PCI with ABS logic, from the maker's driver sources. It has not been tested on hardware.
 
 inline constexpr std::uint32_t vendor_id = 0x10B5;       ///< PLX
 inline constexpr std::uint32_t device_id = 0x2497;       ///< PCI 9030 as the maker programs it
 inline constexpr std::uint32_t window_bytes = 256;       ///< BAR 2, I/O ports, 32-bit accesses
-inline constexpr std::uint32_t all_ones = ~0U;           ///< what a bus answers where no card is
+inline constexpr std::uint32_t all_ones = ~0U;           ///< value that a bus returns without a card
 inline constexpr double encoder_lines_per_rev = 1024.0;  ///< the velocity registers count lines, not quadrature edges
 
 /// Offsets in the window, bytes.
@@ -56,10 +56,10 @@ using driver::Standing;
 
 /// What this driver does with a register.
 enum class Use : std::uint8_t {
-  never,         ///< listed for completeness
+  never,         ///< not used; listed for completeness
   checked,       ///< read once, in `configure`
   every_cycle,   ///< read or written in every cycle
-  in_turn,       ///< one of these in every cycle, in turn
+  in_turn,       ///< each cycle reads one of these, in turn
   at_activation  ///< written and verified when the outputs are taken over
 };
 [[nodiscard]] std::string_view name_of(Use use) noexcept;
@@ -67,14 +67,14 @@ enum class Use : std::uint8_t {
 struct Register {
   std::uint32_t offset;
   std::string_view name;
-  std::string_view unit;     ///< of the value after conversion; empty for pure numbers and bits
+  std::string_view unit;     ///< unit of the converted value; empty for numbers and bits
   std::string_view meaning;  ///< bits, conversion
-  Standing standing;         ///< of offset and meaning
+  Standing standing;         ///< how well offset and meaning are known
   Use use;
-  std::string_view open{};  ///< what is not known about it; empty: nothing
+  std::string_view open{};  ///< open questions about it, if any
 };
-/// Every register of the ABS logic, in order of offset. Source of all of them: the maker's driver sources (the sources'
-/// disagreements are in `open`).
+/// Every register of the ABS logic, in order of offset, from the maker's driver sources. `open` has the contradictions
+/// of these sources.
 [[nodiscard]] std::span<const Register> registers() noexcept;
 /// Name of the register at an offset; "unknown register" if there is none.
 [[nodiscard]] std::string_view register_name(std::uint32_t offset) noexcept;
@@ -88,15 +88,15 @@ using driver::pwm_frequency_Hz;
 using driver::pwm_width_for;
 using driver::PwmMode;
 
-/// Registers 38 and A4: V. 0 means that there is no supply; NaN above 100 V, which nothing in this rig has.
+/// Registers 38 and A4: V. 0 means no supply. NaN above 100 V, which this rig cannot have.
 [[nodiscard]] constexpr double supply_V(std::uint32_t raw) noexcept {
   constexpr double most_V = 100.0;
   if (raw == 0) return 0.0;
   const double volts = 92000.0 / static_cast<double>(raw);
   return volts <= most_V ? volts : std::numeric_limits<double>::quiet_NaN();
 }
-/// Registers B4 (high) and B8 (low): deg C; NaN if the sensor does not pulse (low = 0), and below -100 deg C, which no
-/// power stage is. The formula itself cannot exceed 235.
+/// Registers B4 (high) and B8 (low): deg C. NaN without sensor pulses (low = 0) and below -100 deg C, which a power
+/// stage cannot have. The formula cannot exceed 235.
 [[nodiscard]] constexpr double temperature_C(std::uint32_t high, std::uint32_t low) noexcept {
   constexpr double least_C = -100.0;
   if (low == 0) return std::numeric_limits<double>::quiet_NaN();

@@ -8,7 +8,7 @@
 namespace abs_hil::driver::pci {
 
 /// The 32-bit registers of one card, by byte offset from the start of its BAR. Real-time safe: no exception, allocation
-/// or lock; each access takes as long as the bus does.
+/// or lock; each access takes as long as the bus.
 class RegisterWindow {
  public:
   RegisterWindow() = default;
@@ -16,7 +16,7 @@ class RegisterWindow {
   RegisterWindow& operator=(const RegisterWindow&) = delete;
   virtual ~RegisterWindow() = default;
 
-  /// `value` is untouched on error. `IoResult::where` is the offset.
+  /// `value` does not change on error. `IoResult::where` is the offset.
   virtual IoResult read32(std::uint32_t offset, std::uint32_t& value) noexcept = 0;
   virtual IoResult write32(std::uint32_t offset, std::uint32_t value) noexcept = 0;
 };

@@ -34,7 +34,7 @@ int open_for_access(const std::filesystem::path& file) {
   refuse(file, std::string("cannot be opened: ") + std::strerror(error));
 }
 
-/// Name of a process from /proc; empty if it cannot be told.
+/// Name of a process from /proc; empty if unknown.
 std::string process_name(long pid) {
   std::ifstream file("/proc/" + std::to_string(pid) + "/comm");
   std::string name;
@@ -42,7 +42,7 @@ std::string process_name(long pid) {
   return name;
 }
 
-/// Who holds the flock of an open file, from /proc/locks ("7: FLOCK ADVISORY WRITE 4711 00:3a:42 0 EOF").
+/// The process that holds the flock of an open file, from /proc/locks ("7: FLOCK ADVISORY WRITE 4711 00:3a:42 0 EOF").
 std::string lock_holder(int fd) {
   struct stat status {};
   if (::fstat(fd, &status) != 0) return "another process";
@@ -61,10 +61,10 @@ std::string lock_holder(int fd) {
     const std::string name = process_name(pid);
     return "process " + std::to_string(pid) + (name.empty() ? "" : " (" + name + ")");
   }
-  return "another process (lsof on the file tells which)";
+  return "another process (find it with lsof)";
 }
 
-/// Process that stands guard over the card with a lock of fcntl's; 0 if there is none, or it is this one.
+/// Process id of the guardian that holds an fcntl lock on the card; 0 if there is none, or if it is this process.
 pid_t guardian_of(int fd) {
   struct flock lock {};
   lock.l_type = F_WRLCK;
@@ -81,7 +81,7 @@ void become_owner(const std::filesystem::path& file, int fd) {
   if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
     const int error = errno;
     if (error != EWOULDBLOCK) refuse(file, std::string("cannot be locked: ") + std::strerror(error));
-    refuse(file, "the card is in use by " + lock_holder(fd) + "; a card has exactly one owner: end that process first");
+    refuse(file, "the card is in use by " + lock_holder(fd) + "; a card has only one owner: end that process first");
   }
   if (const pid_t guardian = guardian_of(fd); guardian != 0) refuse_while_guarded(file, guardian);
 }
@@ -96,10 +96,10 @@ void become_guardian(const std::filesystem::path& file, int fd) {
   refuse(file, std::string("cannot be locked: ") + std::strerror(error));
 }
 
-/// One whole access; what is not whole failed.
+/// Makes one complete access; a partial access is an error.
 template <typename Access>
 IoResult whole_access(std::uint32_t where, ssize_t size, Access access) noexcept {
-  constexpr int attempts = 3;  // a signal may interrupt; it must not hold the cycle up for ever
+  constexpr int attempts = 3;  // signals may interrupt an access, but must not block the cycle for ever
   for (int attempt = 0; attempt < attempts; ++attempt) {
     const ssize_t done = access();
     if (done == size) return {};
@@ -112,7 +112,7 @@ IoResult whole_access(std::uint32_t where, ssize_t size, Access access) noexcept
 }  // namespace
 
 IoError io_error_for(int errno_value) noexcept {
-  // A card that left the bus gives ENODEV, a dead FUSE server ENOTCONN or ECONNABORTED.
+  // A removed card gives ENODEV, a dead FUSE server ENOTCONN or ECONNABORTED.
   switch (errno_value) {
     case EAGAIN:
     case EBUSY:

@@ -11,17 +11,17 @@ namespace abs_hil::driver::pci {
 
 using driver::FileDescriptor;
 
-/// Who opens a card's registers. A guardian stands beside the owner until that is gone, and keeps new owners away from
-/// then on: it holds a lock of another sort (fcntl), which an owner looks for.
+/// Who opens a card's registers. A guardian opens them beside the owner, and keeps new owners away after the owner's
+/// end: it holds another kind of lock (fcntl), for which a new owner checks.
 enum class WindowUse : std::uint8_t { owner, guardian };
 
-/// The registers behind sysfs' `resource2`: for an I/O BAR the kernel turns a 4-byte pread or pwrite at the register's
-/// offset into one 32-bit port access (Documentation/PCI/sysfs-pci.rst). Exactly one process may own a card, because
-/// index and data are two accesses: the file stays locked (flock) as long as this lives.
+/// The registers behind sysfs' `resource2`. For an I/O BAR the kernel turns a 4-byte pread or pwrite at the register's
+/// offset into one 32-bit port access (Documentation/PCI/sysfs-pci.rst). Only one process may own a card, because index
+/// and data are two accesses. The file stays locked (flock) during this object's lifetime.
 class SysfsWindow final : public RegisterWindow {
  public:
-  /// Opens and locks the file. Throws Unavailable: not there, not permitted (with the udev rule that mends it), or
-  /// owned, or still made safe, by another process (with its id).
+  /// Opens and locks the file. Throws Unavailable if the file is missing, if access is not permitted (with the udev
+  /// rule that fixes it), or if another process owns the card or still makes it safe (with its id).
   explicit SysfsWindow(const std::filesystem::path& resource_file, WindowUse use = WindowUse::owner);
 
   IoResult read32(std::uint32_t offset, std::uint32_t& value) noexcept override;
@@ -31,10 +31,10 @@ class SysfsWindow final : public RegisterWindow {
   FileDescriptor file_;
 };
 
-/// The emulator's clock as a file beside the card's: 8 bytes, the time in ns. Reading tells it, writing advances it.
+/// The emulator's clock: a file of 8 bytes in the card's folder, the time in ns. A write advances the time.
 class EmulatedTimeFile final : public EmulatedTime {
  public:
-  /// Throws Unavailable if the file is not there or cannot be opened.
+  /// Throws Unavailable if the file is missing or cannot be opened.
   explicit EmulatedTimeFile(const std::filesystem::path& file);
 
   IoResult now(std::int64_t& time_ns) noexcept override;
@@ -44,7 +44,7 @@ class EmulatedTimeFile final : public EmulatedTime {
   FileDescriptor file_;
 };
 
-/// What an errno of pread or pwrite says about the card.
+/// The error that an errno of pread or pwrite means.
 [[nodiscard]] IoError io_error_for(int errno_value) noexcept;
 
 }  // namespace abs_hil::driver::pci

@@ -26,7 +26,7 @@ double fraction_of_count(std::mt19937_64& generator) { return static_cast<double
 SimDriver::SimDriver(const plant_sim::PlantOptions& plant, const SimStart& start) : plant_(plant), start_(start) {
   if (!std::isfinite(start.start_speed_rad_s) || start.start_speed_rad_s < 0.0) {
     throw std::invalid_argument("start speed " + std::to_string(start.start_speed_rad_s) +
-                                " rad/s: must be finite and >= 0");
+                                " rad/s: give a finite value >= 0");
   }
 }
 

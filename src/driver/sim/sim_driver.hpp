@@ -8,14 +8,14 @@
 
 namespace abs_hil::driver {
 
-/// How a simulated run begins.
+/// Start of a simulated run.
 struct SimStart {
-  std::uint64_t seed{1};          ///< where within a count the encoders' wheels stand at the start
+  std::uint64_t seed{1};          ///< seed for the wheels' initial angles within one encoder count
   double start_speed_rad_s{0.0};  ///< both wheels' speed at activation, >= 0
 };
 
-/// The simulated rig at the level of the card: encoder counts out, 12-bit duty cycles in. The plant moves on with the
-/// time given to `read`, under the command of the last `write`, so that a late cycle meets a plant that has moved on.
+/// The simulated rig at the level of the card: encoder counts out, 12-bit duty cycles in. `read` advances the plant to
+/// the given time under the command of the last `write`. In a late cycle the plant has therefore moved on, too.
 class SimDriver final : public RigDriver {
  public:
   /// Throws std::invalid_argument if an option or the start speed is outside its range.
@@ -24,7 +24,7 @@ class SimDriver final : public RigDriver {
 
   [[nodiscard]] std::string_view name() const noexcept override { return "sim"; }
   [[nodiscard]] rig::PlantTruth truth() const noexcept override;
-  /// For tests: what acts on the simulated rig now.
+  /// For tests: the command that acts on the simulated rig.
   [[nodiscard]] const plant_sim::PlantInput& outputs() const noexcept { return input_; }
   [[nodiscard]] const plant_sim::Plant& plant() const noexcept { return plant_; }
 
@@ -38,9 +38,9 @@ class SimDriver final : public RigDriver {
   plant_sim::Plant plant_;
   SimStart start_;
   plant_sim::PlantInput input_{};
-  std::int64_t time_ns_{0};       ///< when the plant's state holds
-  double upper_offset_rad_{0.0};  ///< where within a count the upper wheel's encoder started
-  double lower_offset_rad_{0.0};  ///< where within a count the lower wheel's encoder started
+  std::int64_t time_ns_{0};       ///< time of the plant's state
+  double upper_offset_rad_{0.0};  ///< initial angle of the upper wheel within one count
+  double lower_offset_rad_{0.0};  ///< initial angle of the lower wheel within one count
 };
 
 }  // namespace abs_hil::driver

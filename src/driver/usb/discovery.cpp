@@ -86,7 +86,7 @@ UsbDevice choose_board(const UsbOptions& options, bool lock_step, bool emulated)
   const std::vector<UsbDevice> boards = find_boards(options);
   if (boards.empty()) {
     refuse("no RT-DAC/USB2 board (driver.kind=usb, " + wanted_text(options) + ") in " + options.sysfs_root +
-           "; lsusb should show it (docs/usb.md). Without the rig use --backend sim");
+           "; check with lsusb (docs/usb.md). To run without the rig, use --backend sim");
   }
   if (boards.size() > 1) {
     std::string all;
@@ -97,18 +97,18 @@ UsbDevice choose_board(const UsbOptions& options, bool lock_step, bool emulated)
   const UsbDevice& board = boards.front();
   if (emulated && board.product.find(emulator_mark) == std::string::npos) {
     refuse("USB board " + board.text() + " (\"" + board.product +
-           "\") is no emulator, though driver.emulated=true says so: leave that key out");
+           "\") is not an emulator, but driver.emulated=true says so: remove that key");
   }
   const bool waits_for_lock_step = board.product.ends_with(lock_step_mark);
   if (lock_step && !waits_for_lock_step) {
     refuse("USB board " + board.text() +
            " is hardware, or an emulator in real time (its product string does not end with \"" + lock_step_mark +
-           "\"). Leave --fast out, or start abs_rig_emulator --usb --lock-step");
+           "\"). Omit --fast, or start abs_rig_emulator with --usb --lock-step");
   }
   if (!lock_step && waits_for_lock_step) {
     refuse("USB board " + board.text() +
-           " is an emulator in lock-step, whose time stands still without --fast and --set driver.emulated=true; or "
-           "start abs_rig_emulator without --lock-step");
+           " is an emulator in lock-step: give --fast --set driver.emulated=true to advance its time, or start "
+           "abs_rig_emulator without --lock-step");
   }
   return board;
 }

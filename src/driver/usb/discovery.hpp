@@ -9,7 +9,7 @@
 
 namespace abs_hil::driver::usb {
 
-/// A device as the kernel shows it below /sys/bus/usb/devices, readable by everybody.
+/// A device as the kernel shows it below /sys/bus/usb/devices, readable by every user.
 struct UsbDevice {
   std::string address{};  ///< "1-1.4": bus and ports
   std::uint32_t vendor_id{0};
@@ -17,26 +17,28 @@ struct UsbDevice {
   std::string manufacturer{};
   std::string product{};
   std::string serial{};
-  std::filesystem::path node{};  ///< what libusb opens
+  std::filesystem::path node{};  ///< file that libusb opens
   /// "04b4:1003 serial 123 at 1-1.4", for messages.
   [[nodiscard]] std::string text() const;
 };
 
-/// The devices that ids, manufacturer and serial of the options fit, by address; none where there is no USB. With
-/// neither ids nor manufacturer configured nothing fits: any device would.
+/// The devices that match the ids, manufacturer and serial of the options, sorted by address; empty without USB.
+/// Without ids and manufacturer in the options no device matches, because otherwise every device would.
 [[nodiscard]] std::vector<UsbDevice> find_boards(const UsbOptions& options);
 
-/// The one board that the options mean. Throws Unavailable: none, or several, with what mends it.
-/// @param lock_step the emulator's clock is to be driven: refused where there is none, as on all hardware; without it
-///                  an emulator that waits for lock-step is refused
-/// @param emulated  the configuration says that the board is an emulator: anything else is refused
+/// The board that the options select. Throws Unavailable with a fix if there is none, or more than one.
+/// @param lock_step advance the emulator's clock; refused without such a clock, as on all hardware. If false, an
+/// emulator
+///                  in lock-step is refused
+/// @param emulated  the board must be an emulator; any other board is refused
 [[nodiscard]] UsbDevice choose_board(const UsbOptions& options, bool lock_step, bool emulated);
 
-/// What the product string of an emulator holds, and of one in lock-step ends with; no hardware's does.
+/// An emulator's product string contains `emulator_mark`; in lock-step it ends with `lock_step_mark`. No hardware has
+/// these.
 inline constexpr const char* emulator_mark = "emulator";
 inline constexpr const char* lock_step_mark = "emulator in lock-step";
 
-/// The line for /etc/udev/rules.d that gives the group abs_hil the device.
+/// Line for /etc/udev/rules.d that gives the group abs_hil access to the device.
 [[nodiscard]] std::string udev_rule(const UsbDevice& device);
 
 }  // namespace abs_hil::driver::usb

@@ -9,28 +9,28 @@ using enum Use;
 
 constexpr std::array<WordGroup, 21> table{{
     {word::version, 1, "version", "of the logic; the mark 8F0F in frames to the board", documented, checked,
-     "that the mark stands in this word's place, and not before it, is inferred"},
+     "whether the mark replaces this word or precedes it; inferred: replaces it"},
     {word::application, 3, "application", "name of the logic", documented, checked, "its coding"},
     {word::date, 2, "date", "of the logic", documented, checked, "its coding"},
     {word::channel_counts, 3, "channel counts", "of the logic", documented, checked, "which bits count what"},
     {9, 1, "-", "", unknown, never, "all of it"},
     {word::digital_mode, 2, "digital mode", "", documented, kept, "what the modes are"},
     {word::digital_direction, 2, "digital direction", "1 = in; the enable line's bit is 0", documented, sent,
-     "how lines above 14 fit 15 bits a word: not offered"},
+     "how lines above 14 fit into 15 bits per word; the driver does not offer them"},
     {word::digital_out, 2, "digital out", "the enable line's bit", documented, sent},
     {word::digital_in, 2, "digital in", "", documented, never},
     {18, 2, "-", "", unknown, never, "all of it"},
     {word::pwm, pwm_channels* pwm_words, "PWM",
-     "a channel: prescaler bits 14:0; mode << 1 | prescaler bit 15; width, 12 bits. Drive and brake are sent, others "
-     "kept",
+     "per channel: prescaler bits 14:0; mode << 1 | prescaler bit 15; width, 12 bits. Drive and brake are sent, the "
+     "others kept",
      documented, sent, "whether the board shows them as sent; clock (40 MHz on the PCI board); number of channels"},
     {word::encoder_reset, 1, "encoder reset", "always sent as 0: counters are zeroed in software", documented, sent},
     {word::encoder_index_active, 1, "encoder index active", "always sent as 0: the index pulse changes no counter",
      documented, sent},
     {word::encoder_index_invert, 1, "encoder index invert", "", documented, kept},
     {word::encoder_counter, encoder_channels* encoder_words, "encoder counters",
-     "32 bits a channel, low word first, two's complement", documented, received,
-     "which of the words is the low one is inferred; number of channels"},
+     "32 bits per channel, low word first, two's complement", documented, received,
+     "which word is the low one (inferred); number of channels"},
     {69, 1, "-", "", unknown, never, "all of it"},
     {word::timers, 6, "timers", "", documented, kept, "what they count"},
     {76, 124, "-", "", unknown, never, "all of it"},
@@ -84,7 +84,7 @@ Frame frame_from(std::span<const std::uint8_t, frame_bytes> shown) noexcept {
   }
   put_payload(frame, word::encoder_reset, 0);
   put_payload(frame, word::encoder_index_active, 0);
-  // Not payload: the one word with bit 15 set.
+  // The mark is not payload; only it has bit 15 set.
   frame[0] = static_cast<std::uint8_t>(write_mark & 0xFFU);
   frame[1] = static_cast<std::uint8_t>(write_mark >> 8U);
   return frame;

@@ -11,9 +11,9 @@
 
 namespace abs_hil::driver::usb {
 
-/// Frames to and from one board, without waiting: transfers are queued, and their outcome is told by a later call. What
-/// is queued reaches the board in that order, so that an answer shows the board after all that was sent before its
-/// request. Real-time safe as far as the system below it is.
+/// Frames to and from one board without waiting: a call queues a transfer, and a later call returns its result.
+/// Transfers reach the board in the order of queueing. An answer therefore includes the effect of all frames sent
+/// before its request. As real-time safe as the system below it.
 class FrameLink {
  public:
   FrameLink() = default;
@@ -21,25 +21,27 @@ class FrameLink {
   FrameLink& operator=(const FrameLink&) = delete;
   virtual ~FrameLink() = default;
 
-  /// Queues a frame for the board. `no_answer` if the board has not taken the ones before it for too long: not queued.
+  /// Queues a frame for the board. `no_answer`: not queued, because the board has not taken the previous ones for too
+  /// long.
   virtual IoResult send(const Frame& frame) noexcept = 0;
-  /// Queues the request for one frame. One at a time: only while no answer is outstanding.
+  /// Queues the request for one frame. Call it only while no answer is outstanding.
   virtual IoResult request() noexcept = 0;
   [[nodiscard]] virtual bool answer_outstanding() const noexcept = 0;
-  /// Waits for the outstanding answer, `timeout_ns` >= 0 at most. `no_answer`: not there yet, still outstanding. After
-  /// any other result nothing is outstanding. `bytes` views the answer, of any length, until the next request.
+  /// Waits for the outstanding answer, at most `timeout_ns` >= 0. `no_answer`: it has not come yet and stays
+  /// outstanding. After any other result nothing is outstanding. `bytes` views the answer, of any length, until the
+  /// next request.
   virtual IoResult receive(std::int64_t timeout_ns, std::span<const std::uint8_t>& bytes) noexcept = 0;
   /// Waits until the board has taken all that was sent; `no_answer` if it has not within `timeout_ns`.
   virtual IoResult flush(std::int64_t timeout_ns) noexcept = 0;
-  /// Gives up what is queued and outstanding and clears what is stalled, for a fresh start. May take seconds on a board
-  /// that is failing: never called by a cycle that goes well.
+  /// Cancels all transfers and clears stalls, for a fresh start. May take seconds on a failing board; a cycle without
+  /// errors never calls it.
   virtual void recover() noexcept = 0;
 };
 
 /// A board ready for use.
 struct Board {
   std::unique_ptr<FrameLink> link{};
-  std::unique_ptr<EmulatedTime> time{};  ///< only behind an emulator in lock-step; made of the link, ends before it
+  std::unique_ptr<EmulatedTime> time{};  ///< only for an emulator in lock-step; uses the link and must end before it
   std::string place{};                   ///< for messages: ids, serial, bus address
 };
 

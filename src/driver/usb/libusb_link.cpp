@@ -29,7 +29,7 @@ FileDescriptor open_node(const UsbDevice& device) {
   const int error = errno;
   std::string what = device.node.string() + ": " + std::strerror(error);
   if (error == EACCES || error == EPERM) {
-    what += ". Put this line into /etc/udev/rules.d/70-abs-hil.rules, plug the board in again (docs/usb.md):\n" +
+    what += ". Put this line into /etc/udev/rules.d/70-abs-hil.rules and plug the board in again (docs/usb.md):\n" +
             udev_rule(device);
   }
   refuse(device, what);
@@ -57,7 +57,7 @@ IoResult from_error(int error, std::uint8_t endpoint) noexcept {
   }
 }
 
-/// The interface and alternate setting with both bulk endpoints; false if there is none.
+/// Finds the interface and alternate setting with both bulk endpoints; false if there is none.
 bool find_interface(const libusb_config_descriptor& config, int& number, int& setting) {
   for (const libusb_interface& interface : std::span(config.interface, config.bNumInterfaces)) {
     for (const libusb_interface_descriptor& alternate :
@@ -76,7 +76,7 @@ bool find_interface(const libusb_config_descriptor& config, int& number, int& se
   return false;
 }
 
-// Of the emulator alone.
+// Control requests that only the emulator has.
 constexpr std::uint8_t request_emulated_time = 0x54;
 constexpr std::uint8_t vendor_out = LIBUSB_REQUEST_TYPE_VENDOR;
 constexpr std::uint8_t vendor_in = vendor_out | 0x80U;
@@ -85,7 +85,7 @@ constexpr unsigned control_timeout_ms = 10'000;
 }  // namespace
 
 LibusbLink::LibusbLink(const UsbDevice& device) : node_(open_node(device)) {
-  // The device is known already: neither a scan of all buses nor libusb's hot-plug thread is wanted.
+  // The device is already known: libusb must not scan all buses or start its hot-plug thread.
   libusb_set_option(nullptr, LIBUSB_OPTION_NO_DEVICE_DISCOVERY);
   if (const int error = libusb_init(&context_); error != 0) {
     refuse(device, std::string("libusb cannot start: ") + libusb_strerror(static_cast<libusb_error>(error)));
@@ -116,22 +116,24 @@ void LibusbLink::claim(const UsbDevice& device) {
   const bool found = find_interface(*config, interface_, setting);
   libusb_free_config_descriptor(config);
   if (!found) {
-    refuse(device,
-           "has no interface with bulk endpoints 02 (out) and 84 (in): another device, or without its firmware");
+    refuse(
+        device,
+        "has no interface with bulk endpoints 02 (out) and 84 (in): it is another device, or its firmware is missing");
   }
   const int claimed = libusb_claim_interface(handle_, interface_);
   if (claimed == LIBUSB_ERROR_BUSY) {
     interface_ = -1;
-    refuse(device, "is in use by another process; a board has exactly one owner: end that process first");
+    refuse(device, "is in use by another process; a board has only one owner: end that process first");
   }
   check(claimed, "cannot be claimed");
-  if (setting != 0) check(libusb_set_interface_alt_setting(handle_, interface_, setting), "does not take its setting");
+  if (setting != 0)
+    check(libusb_set_interface_alt_setting(handle_, interface_, setting), "does not accept its alternate setting");
 }
 
 LibusbLink::~LibusbLink() {
   cancel_all();
   for (Slot* slot : {&frames_[0], &frames_[1], &frames_[2], &request_, &answer_}) {
-    // What libusb has not given back after all cannot be freed.
+    // Transfers that libusb has still not returned cannot be freed.
     if (slot->done != 0) libusb_free_transfer(slot->transfer);
   }
   libusb_release_interface(handle_, interface_);
@@ -185,7 +187,7 @@ IoResult LibusbLink::send(const Frame& frame) noexcept {
 IoResult LibusbLink::request() noexcept {
   if (const IoResult failure = take_send_failure(); !failure.ok()) return failure;
   if (request_.done == 0 || answer_.done == 0) return {IoError::no_answer, endpoint_out};
-  // Listening first, so that the answer finds somebody.
+  // Submit the receiving transfer first, so that the answer is not lost.
   if (const IoResult result = submit(answer_, answer_.buffer.size()); !result.ok()) return result;
   return submit(request_, frame_request.size());
 }
@@ -237,7 +239,7 @@ void LibusbLink::recover() noexcept {
   cancel_all();
   libusb_clear_halt(handle_, endpoint_out);
   libusb_clear_halt(handle_, endpoint_in);
-  // An answer that was given up may still lie in the board: it must not be taken for the next one.
+  // The board may still hold the cancelled answer. Discard it, so that it does not count as the next one.
   constexpr int most_answers = 4;
   constexpr std::int64_t quiet_ns = 20'000'000;
   for (int i = 0; i < most_answers && answer_.done != 0; ++i) {

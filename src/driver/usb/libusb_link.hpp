@@ -15,14 +15,13 @@ struct libusb_transfer;
 
 namespace abs_hil::driver::usb {
 
-/// Frames over libusb-1.0's asynchronous transfers. All transfers and buffers are made with the link; what libusb
-/// itself does on the cycle's path (docs/usb.md): it takes its own uncontended locks, allocates one small block for
-/// each transfer submitted and gives it back when that is over, and makes an ioctl for each submission, a poll and an
-/// ioctl for each completion.
+/// Frames over libusb-1.0's asynchronous transfers. The constructor allocates all transfers and buffers. On the cycle's
+/// path libusb itself takes its own uncontended locks, allocates and frees one small block per transfer, and makes one
+/// ioctl per submission and one poll and one ioctl per completion (docs/usb.md).
 class LibusbLink final : public FrameLink {
  public:
-  /// Opens the device, claims the interface with the FPGA's two endpoints. Throws Unavailable: not permitted (with the
-  /// udev rule that mends it), in use, or without these endpoints.
+  /// Opens the device and claims the interface with the FPGA's two endpoints. Throws Unavailable if access is not
+  /// permitted (with the udev rule that fixes it), if the device is in use, or if it lacks these endpoints.
   explicit LibusbLink(const UsbDevice& device);
   ~LibusbLink() override;
 
@@ -38,12 +37,12 @@ class LibusbLink final : public FrameLink {
   IoResult advance_emulated_time(std::int64_t time_ns) noexcept;
 
  private:
-  /// A full packet, so that an answer that is too long shows as that and not as an overflow.
+  /// The size of a full packet, so that an answer that is too long is not reported as an overflow.
   static constexpr std::size_t packet_bytes = 512;
   struct Slot {
     libusb_transfer* transfer{nullptr};
     std::array<std::uint8_t, packet_bytes> buffer{};
-    int done{1};  ///< not under way; an int because libusb waits on one
+    int done{1};  ///< 1: no transfer is under way; an int because libusb requires one
     int status{0};
     int length{0};
   };
@@ -52,10 +51,10 @@ class LibusbLink final : public FrameLink {
   static void on_done(libusb_transfer* transfer);
   void claim(const UsbDevice& device);
   IoResult submit(Slot& slot, std::size_t bytes) noexcept;
-  /// Handles events until the slot is done or the time is over.
+  /// Handles events until the slot is done or the time has passed.
   void wait_for(Slot& slot, std::int64_t timeout_ns) noexcept;
   void handle_events(std::int64_t timeout_ns, int* completed) noexcept;
-  /// The first failure of what was sent and has not been told yet.
+  /// The first failed send that no call has returned yet.
   IoResult take_send_failure() noexcept;
   void cancel_all() noexcept;
 
@@ -69,7 +68,7 @@ class LibusbLink final : public FrameLink {
   Slot answer_{};
 };
 
-/// The board that the options mean, ready for use; `choose_board` says which. Throws Unavailable.
+/// Opens the board that the options select (`choose_board`). Throws Unavailable.
 [[nodiscard]] Board open_board(const UsbOptions& options, bool lock_step, bool emulated);
 
 }  // namespace abs_hil::driver::usb

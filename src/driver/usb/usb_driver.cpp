@@ -14,9 +14,9 @@ namespace abs_hil::driver::usb {
 
 namespace {
 
-/// Outside the cycle nothing presses.
+/// Longer timeout for transfers outside the cycle.
 constexpr std::int64_t patient_ns = 500'000'000;
-/// Of FrameLink::recover on a board that is failing: cancelled transfers and cleared halts have a second each there.
+/// Bound of FrameLink::recover on a failing board: cancelled transfers and cleared halts may take a second each.
 constexpr std::int64_t recovery_bound_ns = 8'000'000'000;
 
 rig::Reason reason_for(IoError error) noexcept {
@@ -50,7 +50,7 @@ UsbDriver::UsbDriver(const UsbOptions& options, OpenBoard open_board, ReadClock 
   check_channels("driver.usb.", options.lower_channel, options.upper_channel);
   if (options.drive_pwm == options.brake_pwm) {
     throw std::invalid_argument("driver.usb.drive_pwm = driver.usb.brake_pwm = " + std::to_string(options.brake_pwm) +
-                                ": drive and brake have a PWM each");
+                                ": drive and brake need different PWM channels");
   }
 }
 
@@ -61,7 +61,7 @@ std::int64_t UsbDriver::clock_ns(std::int64_t otherwise) const noexcept {
 }
 
 void UsbDriver::do_configure() {
-  board_ = {};  // gives the board back, should it be ours
+  board_ = {};  // releases the board if this driver has claimed it
   board_ = open_board_();
   const auto refuse = [this](const std::string& what) {
     const std::string text = "backend rig: USB board " + board_.place + ": " + what + "; no output was written";
@@ -75,14 +75,14 @@ void UsbDriver::do_configure() {
   Contents contents;
   if (decode(bytes, options_, contents) != IoError::none) {
     refuse("its first frame has " + std::to_string(bytes.size()) + " bytes, not " + std::to_string(frame_bytes) +
-           ": another logic, or another device");
+           ": it is another device, or it has another logic");
   }
   std::copy(bytes.begin(), bytes.end(), shown_.begin());
   identity_ = contents.identity;
   if (options_.version >= 0 && identity_[word::version] != options_.version) {
     refuse("version word " + std::to_string(identity_[word::version]) + " is not the configured " +
            std::to_string(options_.version) +
-           " (driver.usb.version): another logic has other words; load the right logic or correct the key");
+           " (driver.usb.version): another logic has other frames. Load the right logic or correct the key");
   }
 }
 
@@ -141,7 +141,7 @@ IoResult UsbDriver::send_safe() noexcept {
 }
 
 IoResult UsbDriver::take_over(Contents& contents) noexcept {
-  // Mode and prescaler as they are, widths 0, before they are changed: they must not turn an old width into a pulse.
+  // First set the widths to 0 with the old mode and prescaler: changing these could turn an old width into a pulse.
   for (const std::int32_t channel : {options_.drive_pwm, options_.brake_pwm}) {
     put_payload(frame_, word::pwm + pwm_words * static_cast<std::size_t>(channel) + 2, 0);
   }
@@ -168,8 +168,9 @@ void UsbDriver::do_activate(std::int64_t now_ns) {
         "backend rig: USB board " + board_.place + ": taking over the outputs failed: " + error_text(result);
     if (result.error == IoError::read_back_mismatch) {
       text +=
-          ". Its frames do not show the PWM words that were sent. Whether the real board does is not known: if yours "
-          "does not, set driver.usb.verify_outputs=false; the safe state is then sent but never verified";
+          ". Its frames do not show the PWM words that were sent. It is not known whether the real board shows them. "
+          "If "
+          "yours does not, set driver.usb.verify_outputs=false; the safe state is then sent but never verified";
     }
     throw Unavailable(text);
   }
@@ -223,7 +224,7 @@ IoResult UsbDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) 
   last_.time_ns = read_ns;
   last_.upper_counts = counts[0];
   last_.lower_counts = counts[1];
-  measurement = last_;  // the generic logic knows neither supply nor temperature nor interlocks
+  measurement = last_;  // the generic logic has no values of supply, temperature and interlocks
   return {};
 }
 
@@ -236,12 +237,12 @@ IoResult UsbDriver::do_write(const rig::Command& command) noexcept {
   const IoResult result = board_.link->send(frame_);
   if (result.error != IoError::no_answer) return with_reason(result);
   std::tie(drive_sent_, brake_sent_, digital_sent_) = sent_before;
-  // A cycle counts once. Without a read nobody else would notice a board that takes nothing.
+  // Count a cycle only once. Without a read, only this would find a board that takes no frames.
   return std::exchange(lost_this_cycle_, false) ? IoResult{} : lost_frame();
 }
 
 std::int64_t UsbDriver::make_safe_bound_ns() const noexcept {
-  // Two tries, each of which waits for the board to take the frame and to show it, and the recovery between them.
+  // Two tries with a recovery in between. Each try waits for the board to take the frame and to show it.
   return std::int64_t{2} * 2 * patient_ns + recovery_bound_ns;
 }
 

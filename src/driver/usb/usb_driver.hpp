@@ -18,20 +18,20 @@ namespace abs_hil::driver::usb {
 
 /// The RT-DAC/USB2 with generic logic. Not verified on hardware.
 ///
-/// `read` asks for a frame and waits for it, `answer_timeout_us` at most; `write` queues one and waits for nothing. A
-/// cycle without its frame keeps the measurement of the one before, old stamp and all, and counts as lost. An answer
-/// that comes after its cycle is dropped: of when it is nobody knows. Making safe takes up to three seconds on a board
-/// that fails, and longer where a stall must be cleared. The motor enable is this driver's own gate, and a digital line
-/// where one is configured. There is no known watchdog: the board is assumed to go on with its last duties when the
-/// program dies or the cable goes.
+/// `read` requests a frame and waits for it, at most `answer_timeout_us`; `write` queues a frame and does not wait. A
+/// cycle without its frame counts as lost and keeps the previous measurement with its time stamp. A frame that arrives
+/// after its cycle is dropped, because its time is unknown. Making safe takes up to three seconds on a failing board,
+/// and longer if a stall must be cleared. The driver itself gates the motor enable, and also sets a digital line if one
+/// is configured. The board has no known watchdog: it is assumed to keep its last duties when the program dies or the
+/// cable is unplugged.
 class UsbDriver final : public RigDriver {
  public:
   using OpenBoard = std::function<Board()>;
   using ReadClock = std::int64_t (*)() noexcept;
   /// Throws std::invalid_argument, naming the key, if an option is outside its range.
   /// @param open_board called by `configure`; throws Unavailable
-  /// @param read_clock the clock that `now_ns` comes from: counters are stamped with the middle between request and
-  ///                   answer. None in virtual time, where reading takes none.
+  /// @param read_clock the clock of `now_ns`. The time stamp of the counters is the middle between request and answer.
+  ///                   Null in virtual time, where reading takes no time.
   UsbDriver(const UsbOptions& options, OpenBoard open_board, ReadClock read_clock = nullptr);
   ~UsbDriver() override;
 
@@ -41,9 +41,9 @@ class UsbDriver final : public RigDriver {
   [[nodiscard]] std::vector<std::string> tally() const override;
   [[nodiscard]] std::int64_t make_safe_bound_ns() const noexcept override;
   [[nodiscard]] std::string_view what_holds_unsafe() const noexcept override {
-    return "its PWMs may hold their last duties, as no watchdog of the board is known";
+    return "its PWMs may hold their last duties, because the board has no known watchdog";
   }
-  /// Cycles without their frame since `activate`.
+  /// Number of cycles without their frame since `activate`.
   [[nodiscard]] std::uint64_t frames_lost() const noexcept { return frames_lost_; }
 
  private:
@@ -54,10 +54,10 @@ class UsbDriver final : public RigDriver {
   IoResult do_make_safe() noexcept override;
 
   [[nodiscard]] std::int64_t clock_ns(std::int64_t otherwise) const noexcept;
-  /// A frame of this moment, waited for until `timeout_ns` from now; one that is late is dropped first.
+  /// Requests a current frame and waits for it, at most `timeout_ns`. Drops a late frame first.
   IoResult fresh_frame(std::int64_t timeout_ns, Contents& contents, std::int64_t& read_ns) noexcept;
   IoResult lost_frame() noexcept;
-  /// The failure with its reason, the safe frame on its way without waiting for it.
+  /// Adds the reason to a failure, and sends the safe frame without waiting.
   IoResult failed(const IoResult& result) noexcept;
   [[nodiscard]] IoResult checked(const Contents& contents) const noexcept;
   void take_counts(const Contents& contents, std::array<std::int32_t, 2>& counts) const noexcept;
@@ -72,17 +72,17 @@ class UsbDriver final : public RigDriver {
   Board board_{};
 
   std::array<std::uint16_t, identity_words> identity_{};
-  Frame shown_{};          ///< the frame that the board gave when it was configured
-  Frame frame_{};          ///< to the board, as it was sent last
-  PwmWords drive_sent_{};  ///< what a frame must show
+  Frame shown_{};          ///< the board's frame at `configure`
+  Frame frame_{};          ///< the frame sent last
+  PwmWords drive_sent_{};  ///< PWM words that the board's frames must show
   PwmWords brake_sent_{};
   std::uint16_t digital_sent_{0};
 
   std::int64_t activated_ns_{0};  ///< time of `activate`
-  std::int64_t emulated_ns_{0};   ///< the emulator's time then
-  Contents zero_{};               ///< counters then
+  std::int64_t emulated_ns_{0};   ///< the emulator's time at `activate`
+  Contents zero_{};               ///< the counters at `activate`
   rig::Measurement last_{};
-  LossBucket bucket_{2, 1, 10};  ///< the fifth loss in a row trips it
+  LossBucket bucket_{2, 1, 10};  ///< trips at the fifth loss in a row
   bool lost_this_cycle_{false};
   std::uint64_t frames_lost_{0};
 };

@@ -1,4 +1,4 @@
-// What the driver can say in words about its board.
+// Texts about the board.
 
 #include "driver/usb/usb_driver.hpp"
 #include "rig/formatted_text.hpp"
@@ -22,22 +22,21 @@ std::vector<std::string> UsbDriver::notes() const {
                             identity_[word::channel_counts], identity_[word::channel_counts + 1],
                             identity_[word::channel_counts + 2]));
   const auto prescaler = static_cast<std::uint32_t>(options_.pwm_prescaler);
-  notes.push_back(
-      formatted("PWM %d drive, %d brake, %s, prescaler %u: %.4g Hz if its clock is the PCI board's; drive duty at most "
-                "%.3g, brake "
-                "duty at most %.3g",
-                options_.drive_pwm, options_.brake_pwm, options_.pwm_mode.c_str(), prescaler,
-                pwm_frequency_Hz(mode_, prescaler), options_.motor_duty_max, options_.brake_duty_max));
+  notes.push_back(formatted(
+      "PWM %d drive, %d brake, %s, prescaler %u: %.4g Hz if its clock is that of the PCI board; drive duty at "
+      "most %.3g, brake duty at most %.3g",
+      options_.drive_pwm, options_.brake_pwm, options_.pwm_mode.c_str(), prescaler, pwm_frequency_Hz(mode_, prescaler),
+      options_.motor_duty_max, options_.brake_duty_max));
   notes.push_back(options_.verify_outputs
                       ? "every frame must show the PWM words that were sent"
-                      : "the PWM words in its frames are not looked at (driver.usb.verify_outputs=false): the safe "
-                        "state is sent and taken, but not verified");
+                      : "the driver does not check the PWM words in the frames (driver.usb.verify_outputs=false): the "
+                        "safe state is sent and accepted, but not verified");
   notes.push_back(
-      formatted("a cycle waits %d us for its frame at most; supply, temperature and interlocks are not known",
+      formatted("a cycle waits at most %d us for its frame; supply, temperature and interlocks are not known",
                 options_.answer_timeout_us));
   notes.emplace_back(
-      "no watchdog of the board is known: if this program dies or the cable is pulled the PWMs are assumed to hold: "
-      "press the E-stop");
+      "the board has no known watchdog: if this program dies or the cable is unplugged, the PWMs are assumed to hold "
+      "their duties: press the E-stop");
   return notes;
 }
 

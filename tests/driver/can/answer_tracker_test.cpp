@@ -16,7 +16,7 @@ LatchMessage latch(unsigned sequence) {
 
 }  // namespace
 
-TEST_CASE("An answer is whole with both its frames, and numbers wrap") {
+TEST_CASE("An answer is complete with both its frames, and sequences wrap") {
   AnswerTracker tracker;
   tracker.reset(253);
   for (unsigned cycle = 254; cycle < 600; ++cycle) {
@@ -32,7 +32,7 @@ TEST_CASE("An answer is whole with both its frames, and numbers wrap") {
   }
 }
 
-TEST_CASE("Frames that belong to no answer are told apart") {
+TEST_CASE("The tracker tells apart the kinds of frames that do not belong to the answer") {
   AnswerTracker tracker;
   tracker.reset(9);
   tracker.expect(10);
@@ -60,7 +60,7 @@ TEST_CASE("Frames that belong to no answer are told apart") {
   CHECK(tracker.take(MeasurementMessage{.sequence = 13}) == Anomaly::duplicate);
 }
 
-TEST_CASE("The bucket bears single losses, trips at sustained loss, and latches") {
+TEST_CASE("The bucket tolerates single losses, trips at sustained loss, and latches") {
   abs_hil::driver::LossBucket bucket(2, 1, 10);
   for (int i = 0; i < 100; ++i) {  // one loss in three cycles: what flows in flows out
     bucket.lost();

@@ -29,7 +29,7 @@ int stuffed_length(const std::vector<bool>& bits) {
 
 }  // namespace
 
-TEST_CASE("Worst classic frames: the worst pattern, stuffed bit by bit, is as long as the formula says") {
+TEST_CASE("The worst classic frame, stuffed bit by bit, has the length of the formula") {
   for (int bytes = 0; bytes <= 8; ++bytes) {
     // Start of frame to CRC: 34 + 8 n bits; the worst has 00000 1111 0000 1111 ...
     std::vector<bool> bits(5, false);
@@ -41,7 +41,7 @@ TEST_CASE("Worst classic frames: the worst pattern, stuffed bit by bit, is as lo
     constexpr int behind_crc = 1 + 2 + 7 + 3;  // delimiter, acknowledgement, end, between frames
     CHECK(worst_classic_frame(bytes).nominal == stuffed_length(bits) + behind_crc);
   }
-  CHECK(worst_classic_frame(8).nominal == 135);  // the figure that everybody quotes
+  CHECK(worst_classic_frame(8).nominal == 135);  // the well-known value
 }
 
 TEST_CASE("Load of the documented configurations") {

@@ -22,7 +22,7 @@ struct Active {
     driver.configure();
     driver.activate(0);
   }
-  /// A cycle with a command, as a run makes it.
+  /// One cycle with a command, like that of a run.
   driver::IoResult cycle(const rig::Command& command = {}) {
     const driver::IoResult result = driver.read(now_ns += ms, measurement);
     return result.ok() ? driver.write(command) : result;
@@ -50,8 +50,8 @@ CanDriver::OpenLink as_interface(NodeOnSocket& node, driver::can::InterfaceFacts
 
 }  // namespace
 
-TEST_CASE("Counts go on across the wrap of the node's counters") {
-  constexpr std::int32_t per_rev = 1'000'000;  // 24 bits are over in 0.6 s
+TEST_CASE("Counts continue across the wrap of the node's counters") {
+  constexpr std::int32_t per_rev = 1'000'000;  // the 24 bits wrap in 0.6 s
   emulator::CanNodeOptions options{.start_speed_rad_s = 170.0};
   options.plant.rig.encoder_counts_per_rev = per_rev;
   for (const bool fd : {false, true}) {
@@ -69,7 +69,7 @@ TEST_CASE("Counts go on across the wrap of the node's counters") {
   }
 }
 
-TEST_CASE("Signs turn the counters round") {
+TEST_CASE("A sign of -1 negates the counter") {
   Active forward;
   Active backward({.lower_sign = -1, .upper_sign = -1});
   for (int i = 0; i < 20; ++i) {
@@ -104,7 +104,7 @@ TEST_CASE("The node's watchdog zeroes the outputs when commands stop, and only a
   CHECK(rig.now_ns - commanded_ns == 20 * ms);
   CHECK(result.reason == rig::Reason::can_node_latched);
   CHECK(rig.node.wire().brake_duty == 0.0);
-  // Commands alone do not wake it.
+  // Commands alone do not end the latched state.
   for (int i = 0; i < 5; ++i) {
     CHECK(rig.driver.write({.brake_duty = 0.5}).ok());
     CHECK(rig.driver.read(rig.now_ns += ms, rig.measurement).reason == rig::Reason::can_node_latched);
@@ -116,7 +116,7 @@ TEST_CASE("The node's watchdog zeroes the outputs when commands stop, and only a
   CHECK(rig.node.wire().brake_duty == 0.5);
 }
 
-TEST_CASE("What the node says of itself reaches the measurement") {
+TEST_CASE("The node's supply, temperature and trip flags reach the measurement") {
   Active rig;
   rig.node.with_node([](emulator::CanNode& node, emulator::NodeFaults&) {
     node.set_supply_V(11.0);
@@ -128,7 +128,7 @@ TEST_CASE("What the node says of itself reaches the measurement") {
   CHECK(rig.measurement.trip_flags == rig::trip::supply);
 }
 
-TEST_CASE("Options are checked, each with its key") {
+TEST_CASE("An invalid option is refused with its key") {
   using Catch::Matchers::Contains;
   const auto made = [](const CanOptions& options) {
     CanDriver(
@@ -139,14 +139,14 @@ TEST_CASE("Options are checked, each with its key") {
   CHECK_NOTHROW(made({.answer_timeout_us = 800}));
 }
 
-TEST_CASE("A node that keeps other time than asked for is refused; nothing is written") {
+TEST_CASE("A node in the wrong time mode (lock-step or real time) is refused; nothing is written") {
   NodeOnSocket node({});
   CanDriver real_time({}, node.opener(), false);
   CHECK_THROWS_WITH(real_time.configure(), Catch::Matchers::Contains("emulator in lock-step"));
   CHECK(node.with_node([](emulator::CanNode& n, emulator::NodeFaults&) { return n.writes(); }) == 0);
 }
 
-TEST_CASE("Silence at configure and at activation is told") {
+TEST_CASE("A silent node is reported at configure and at activation") {
   NodeOnSocket node({});
   CanDriver rig({}, node.opener(), true);
   node.fault("silent");
@@ -166,10 +166,10 @@ TEST_CASE("A bus too slow for the rate of the cycle is refused; one that carries
                                           Contains("raise the bit rate, use CAN FD or lower --rate"));
   CanDriver good({}, as_interface(node, {.name = "nowhere0", .bit_rate = 1'000'000}), true);
   good.configure();
-  CHECK_THAT(good.notes().at(1), Contains("bus load") && !Contains("no bit rate of its own"));
+  CHECK_THAT(good.notes().at(1), Contains("bus load") && !Contains("the interface has no bit rate"));
 }
 
-TEST_CASE("A node that falls silent because its interface is gone: the interface is the reason") {
+TEST_CASE("If the interface is gone, the interface is the reason and not the silent node") {
   NodeOnSocket node({.start_speed_rad_s = 60.0});
   CanDriver driver({}, as_interface(node, {.name = "nowhere0", .bit_rate = 1'000'000}), true);
   driver.configure();
@@ -184,14 +184,14 @@ TEST_CASE("A node that falls silent because its interface is gone: the interface
   CHECK(result.reason == rig::Reason::can_interface_down);
 }
 
-TEST_CASE("A socket in place of a bus that is not there is refused with what mends it") {
+TEST_CASE("A missing socket is refused with the fix") {
   const auto opening = [](const std::string& path) { return driver::can::open_link({.interface = "unix:" + path}); };
   CHECK_THROWS_WITH(opening(""), Contains("give a path of 1 to 107 characters"));
   CHECK_THROWS_WITH(opening(std::string(108, 'x')), Contains("give a path of 1 to 107 characters"));
   CHECK_THROWS_WITH(opening("/nowhere/node"), Contains("No such file") && Contains("start abs_rig_emulator --can"));
 }
 
-TEST_CASE("Inspection asks a node that stays inactive; its silence is told") {
+TEST_CASE("Inspection asks a node that stays inactive, and reports its silence") {
   NodeOnSocket node({.start_speed_rad_s = 60.0});
   CanDriver driver({}, node.opener(), true);
   driver.configure();
@@ -203,7 +203,7 @@ TEST_CASE("Inspection asks a node that stays inactive; its silence is told") {
   CHECK_THAT(joined(driver.inspection()), Contains("no answer to a SYNC") && !Contains("counters:"));
 }
 
-TEST_CASE("The tally is one line after a good run, and names what was odd after another") {
+TEST_CASE("The tally is one line after a good run, and lists the anomalies of another") {
   Active good;
   for (int i = 0; i < 20; ++i) REQUIRE(good.cycle().ok());
   CHECK(good.driver.tally().size() == 1);

@@ -1,4 +1,4 @@
-// What goes wrong on the bus: the reason, how soon, and what is left on the wire.
+// Faults on the bus: the reason, the delay, and the outputs afterwards.
 
 #include <linux/can/error.h>
 
@@ -50,7 +50,7 @@ can_frame error_frame(std::uint32_t kind, std::uint8_t controller = 0) {
 
 }  // namespace
 
-TEST_CASE("Each fault of the node has its reason, within the bucket's patience, and the brake is off") {
+TEST_CASE("Each fault of the node ends with its reason once the bucket trips, and the brake is off") {
   struct Case {
     const char* fault;
     Reason reason;
@@ -82,13 +82,13 @@ TEST_CASE("Each fault of the node has its reason, within the bucket's patience, 
   }
 }
 
-TEST_CASE("Answers the wrong way round are told") {
+TEST_CASE("Answers in the wrong order are reported") {
   Active rig;
   rig.node.fault("swapped");
   CHECK(rig.until_failure(20).reason == Reason::can_frames_out_of_order);
 }
 
-TEST_CASE("Single losses are borne: the measurement before is handed out again, with its time") {
+TEST_CASE("Single losses are tolerated: the previous measurement is returned again, with its time") {
   Active rig;
   const rig::Measurement before = rig.measurement;
   rig.node.fault("drop=4");
@@ -103,7 +103,7 @@ TEST_CASE("Single losses are borne: the measurement before is handed out again, 
   CHECK(rig.node.wire().brake_duty == 0.5);
 }
 
-TEST_CASE("Losses of every third answer are borne for ever, of every second one not") {
+TEST_CASE("A loss of every third answer is tolerated for ever, of every second one not") {
   for (const int every : {3, 2}) {
     Active rig;
     driver::IoResult result{};
@@ -135,7 +135,7 @@ TEST_CASE("The controller's states: bus-off and error-passive end the run at onc
   CHECK(result.error == driver::IoError::disconnected);
 }
 
-TEST_CASE("An interface that goes away is told, and so is that the safe state cannot be confirmed") {
+TEST_CASE("A lost interface is reported, and so is the unconfirmed safe state") {
   Active rig;
   rig.node.hang_up();
   const driver::IoResult result = rig.cycle();
@@ -143,7 +143,7 @@ TEST_CASE("An interface that goes away is told, and so is that the safe state ca
   CHECK(rig.driver.deactivate().error == driver::IoError::disconnected);
 }
 
-TEST_CASE("A node that takes no commands latches by its watchdog and is told") {
+TEST_CASE("A node that takes no commands latches by its watchdog, and that is reported") {
   Active rig;
   rig.node.fault("deaf");
   CHECK(rig.until_failure(50).reason == Reason::can_node_latched);
@@ -154,7 +154,7 @@ TEST_CASE("A node that takes no commands latches by its watchdog and is told") {
   for (int i = 0; i < 30; ++i) REQUIRE(same.cycle().ok());
 }
 
-TEST_CASE("A node that starts anew in mid-run is told") {
+TEST_CASE("A restart of the node during the run is reported") {
   Active rig;
   // Another node of the same kind takes over: powered on later, inactive.
   rig.node.with_node([](emulator::CanNode& node, emulator::NodeFaults&) {
@@ -164,7 +164,7 @@ TEST_CASE("A node that starts anew in mid-run is told") {
   CHECK(rig.node.wire().brake_duty == 0.0);
 }
 
-TEST_CASE("Forged, repeated and old commands neither act nor feed the node's watchdog") {
+TEST_CASE("Forged, repeated and old commands have no effect and do not feed the node's watchdog") {
   Active rig;
   emulator::BusFrame forged{.id = 0x81, .length = 8, .data = {0x10, 0x27}};
   emulator::BusFrame old = forged;  // its check is right, its sequence was used before
@@ -192,7 +192,7 @@ TEST_CASE("Forged, repeated and old commands neither act nor feed the node's wat
 
 TEST_CASE("Commands computed from old measurements do not feed the watchdog") {
   Active rig;
-  // The driver hears nothing any more but, told to bear it, goes on commanding: the node's own view must end that.
+  // The driver hears nothing but goes on commanding, because its loss limit is high: the node itself must end that.
   Active patient(false, {.watchdog_ms = 20, .loss_limit = 1'000'000});
   patient.node.fault("silent");
   int cycles = 0;

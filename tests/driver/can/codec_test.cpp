@@ -22,7 +22,7 @@ Frame checked(Frame frame) {
 
 }  // namespace
 
-TEST_CASE("Signals lie where DBC files put them, in both byte orders") {
+TEST_CASE("Signals have the positions of DBC files, in both byte orders") {
   // The examples are worked by hand from the DBC rules.
   Frame frame{.length = 8};
   frame.data = {0x12, 0x34, 0x56, 0x78};
@@ -35,7 +35,7 @@ TEST_CASE("Signals lie where DBC files put them, in both byte orders") {
   CHECK(raw_value(frame, {"", 0, 8, true}) == -128);
 }
 
-TEST_CASE("What is put in comes out, for every signal of the protocol, and touches no other bit") {
+TEST_CASE("Every signal of the protocol reads back what was written and changes no other bit") {
   std::mt19937_64 random(7);
   for (const Message& message : messages()) {
     for (const Signal& signal : message.signals) {
@@ -65,7 +65,7 @@ TEST_CASE("The check is CRC-8 SAE J1850") {
   CHECK(checksum(frame) == 0x4B);
 }
 
-TEST_CASE("Host's frames carry what they say") {
+TEST_CASE("The host's frames have the contents of their messages") {
   const Frame frame = command_frame(
       {.duties = {.brake = 7000, .drive = 10000}, .drive_enable = true, .heartbeat = 17, .sequence = 254});
   CHECK(frame.id == 0x081);
@@ -83,7 +83,7 @@ TEST_CASE("Host's frames carry what they say") {
   CHECK(raw_value(time_frame(123'456'789'012), signal::host_time) == 123'456'789'012);
 }
 
-TEST_CASE("A node's frame is taken whole or not at all") {
+TEST_CASE("A node's frame is decoded completely or not at all") {
   Frame good = node_frame(id::encoders, 8);
   set_raw_value(good, signal::upper_counts, -5);
   set_raw_value(good, signal::lower_counts, 8'388'607);
@@ -126,7 +126,7 @@ TEST_CASE("A node's frame is taken whole or not at all") {
   }
 }
 
-TEST_CASE("Values outside their range do not pass; not known is NaN") {
+TEST_CASE("Values outside their range are refused; unknown values are NaN") {
   Frame status = node_frame(id::status, 8);
   set_raw_value(status, signal::supply, 24'000);
   set_raw_value(status, signal::temperature, -1234);
@@ -148,7 +148,7 @@ TEST_CASE("Values outside their range do not pass; not known is NaN") {
   CHECK(decode(checked(outputs)).error == DecodeError::out_of_range);
 }
 
-TEST_CASE("The FD measurement comes in FD frames alone") {
+TEST_CASE("The FD measurement is only valid in FD frames") {
   Frame frame = checked(node_frame(id::measurement, 24));
   CHECK(decode(frame).error == DecodeError::none);
   frame.fd = false;

@@ -52,7 +52,7 @@ TEST_CASE("Frames go out and come in as the kernel's structures, with a time sta
   CHECK(socket.receive(received, 0).outcome == ReceiveOutcome::nothing);
 }
 
-TEST_CASE("FD frames, extended frames, sizes that are none") {
+TEST_CASE("FD frames, extended frames and invalid sizes") {
   Pair pair;
   FrameSocket socket(pair.ends[0]);
   Frame frame{.id = 0x94, .length = 24, .fd = true};
@@ -80,7 +80,7 @@ TEST_CASE("FD frames, extended frames, sizes that are none") {
   CHECK(socket.receive(received, 0).outcome == ReceiveOutcome::malformed);
 }
 
-TEST_CASE("What is thrown away is all that has come, no frame among it or not") {
+TEST_CASE("drain() discards everything received, also malformed data") {
   Pair pair;
   FrameSocket socket(pair.ends[0]);
   can_frame raw{};
@@ -93,7 +93,7 @@ TEST_CASE("What is thrown away is all that has come, no frame among it or not") 
   CHECK(socket.receive(received, 0).outcome == ReceiveOutcome::nothing);
 }
 
-TEST_CASE("A full queue is told as such, not as success; a closed end as down") {
+TEST_CASE("A full queue is reported as full, a closed peer as down") {
   Pair pair;
   FrameSocket socket(pair.ends[0]);
   Frame frame{.id = 0x81, .length = 8};
@@ -111,7 +111,7 @@ TEST_CASE("A full queue is told as such, not as success; a closed end as down") 
   CHECK(socket.receive(received, 0).outcome == ReceiveOutcome::down);
 }
 
-TEST_CASE("Error frames tell the controller's state") {
+TEST_CASE("Error frames give the controller's state") {
   Pair pair;
   FrameSocket socket(pair.ends[0]);
   const auto report_of = [&](std::uint32_t kind, std::uint8_t controller) {

@@ -1,4 +1,4 @@
-// What the kernel says of its interfaces, in messages put together here by linux/rtnetlink.h and linux/if_link.h.
+// Facts about interfaces from the kernel's messages, which are built here after linux/rtnetlink.h and linux/if_link.h.
 
 #include "driver/can/interface_facts.hpp"
 
@@ -105,7 +105,7 @@ InterfaceFacts only(const Bytes& attributes, unsigned flags = IFF_UP | IFF_RUNNI
 
 }  // namespace
 
-TEST_CASE("A controller's rates, state, errors and queue are told") {
+TEST_CASE("A controller's rates, state, errors and queue are read") {
   const InterfaceFacts facts = only(with_controller(CAN_STATE_ERROR_WARNING));
   CHECK(facts.name == "can0");
   CHECK(facts.kind == "can");
@@ -122,7 +122,7 @@ TEST_CASE("A controller's rates, state, errors and queue are told") {
   CHECK_FALSE(problem_of(facts));
 }
 
-TEST_CASE("Every state of a controller has the name that ip link shows, and hinders or not") {
+TEST_CASE("Every state of a controller has the name that ip link shows, and prevents its use or not") {
   const auto state_of = [](std::uint32_t state) { return only(with_controller(state)); };
   CHECK(state_of(CAN_STATE_ERROR_ACTIVE).state == "error-active");
   CHECK(state_of(CAN_STATE_ERROR_PASSIVE).state == "error-passive");
@@ -144,7 +144,7 @@ TEST_CASE("Flags: an interface that is down, one without carrier") {
   CHECK(no_carrier->fix == "sudo ip link set vcan0 down && sudo ip link set vcan0 up");
 }
 
-TEST_CASE("What a virtual interface says of itself is not a controller's") {
+TEST_CASE("The facts of a virtual interface are not those of a controller") {
   for (const char* kind : {"vcan", "vxcan"}) {
     const InterfaceFacts facts = only(with_controller(CAN_STATE_BUS_OFF, kind));
     CHECK(facts.kind == kind);
@@ -153,13 +153,13 @@ TEST_CASE("What a virtual interface says of itself is not a controller's") {
   }
 }
 
-TEST_CASE("Classic CAN alone: an MTU below CAN FD's") {
+TEST_CASE("Classic CAN only: an MTU below that of CAN FD") {
   Bytes attributes = named("can0");
   put_number(attributes, IFLA_MTU, 16);
   CHECK_FALSE(only(attributes).can_fd);
 }
 
-TEST_CASE("Several interfaces in one answer, those of other types left out, until the kernel has told all") {
+TEST_CASE("Several interfaces in one answer are read to its end, without those of other types") {
   Bytes answer;
   put_link(answer, IFF_UP, named("can1"));
   put_link(answer, IFF_UP, named("eth0"), ARPHRD_ETHER);
@@ -174,7 +174,7 @@ TEST_CASE("Several interfaces in one answer, those of other types left out, unti
   CHECK(found[1].name == "can0");
 }
 
-TEST_CASE("An error and a length that cannot be true end the answer; what came before stands") {
+TEST_CASE("An error or an invalid length ends the answer; earlier interfaces remain") {
   Bytes start;
   put_link(start, IFF_UP, named("can0"));
   Bytes refused = start;
@@ -198,7 +198,7 @@ TEST_CASE("An error and a length that cannot be true end the answer; what came b
   CHECK(taken(stump).first.empty());
 }
 
-TEST_CASE("An attribute whose length cannot be true ends the list; numbers that are cut off count as the bytes there") {
+TEST_CASE("An attribute with an invalid length ends the list; a truncated number is read from the bytes it has") {
   for (const unsigned short length : {std::uint16_t{0}, std::uint16_t{3}, std::uint16_t{60'000}}) {
     Bytes attributes = named("can0");
     const std::size_t lying = attributes.size();

@@ -32,8 +32,8 @@ class NodeOnSocket {
     for (const int end : ends_) ::close(end);
   }
 
-  /// A link to it; each is a socket of its own. The node has answered before the driver listens: no wait, and no
-  /// outcome that a busy computer decides.
+  /// A new link to the node, with its own socket. The node answers before the driver listens, so that there is no wait
+  /// and the result does not depend on the computer's load.
   [[nodiscard]] driver::can::CanDriver::OpenLink opener(bool can_fd = false) {
     return [this, can_fd] { return link(std::make_unique<PromptSocket>(::dup(ends_[0]), *this), can_fd); };
   }
@@ -55,14 +55,14 @@ class NodeOnSocket {
   [[nodiscard]] emulator::Outputs wire() {
     return with_node([](emulator::CanNode& node, emulator::NodeFaults&) { return node.outputs(); });
   }
-  /// Anything at all to the driver, as if from the bus.
+  /// Sends any frame to the driver, as if from the bus.
   void inject(const void* data, std::size_t size) { static_cast<void>(::send(ends_[1], data, size, MSG_NOSIGNAL)); }
   void inject(const can_frame& frame) { inject(&frame, sizeof frame); }
-  /// To the node, as another one on the bus would.
+  /// Sends a frame to the node, like another node on the bus.
   void send_to_node(const emulator::BusFrame& frame) {
     with_node([&](emulator::CanNode& node, emulator::NodeFaults&) { node.receive(frame); });
   }
-  /// The driver finds its end of the pair closed.
+  /// Closes the driver's end of the pair.
   void hang_up() { ::shutdown(ends_[1], SHUT_RDWR); }
 
  private:

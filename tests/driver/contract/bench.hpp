@@ -24,8 +24,7 @@ class Bench {
     double brake_duty{0.0};
   };
   [[nodiscard]] virtual Wire wire() = 0;
-  /// How often anything was written to the board since the bench was made; a simulator, which has no registers, counts
-  /// none and says so.
+  /// Number of writes to the board since the bench was made. A simulator has no registers and counts none.
   [[nodiscard]] virtual std::uint64_t writes() = 0;
   [[nodiscard]] virtual bool has_registers() const { return true; }
   /// Whether the board tells its supply and temperature.
@@ -36,7 +35,7 @@ class Bench {
   [[nodiscard]] virtual int read_back_cycles() const { return 0; }
 };
 
-/// Made by each backend's own file. Returns null, having said why, where it cannot be had.
+/// Each backend's own file defines it. If the bench is not available it prints the cause and returns null.
 [[nodiscard]] std::unique_ptr<Bench> make_bench();
 
 inline constexpr double bench_speed_rad_s = 60.0;

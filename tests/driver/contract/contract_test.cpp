@@ -1,4 +1,4 @@
-// What every backend keeps, whatever is behind it.
+// Behaviour that every backend must have.
 
 #include <limits>
 #include <numbers>
@@ -203,7 +203,7 @@ TEST_CASE("Activation again starts the counters and the measurement anew") {
   CHECK(later.upper_counts > 50);  // the wheels still turn
 }
 
-TEST_CASE("What the board cannot know is NaN, never a made-up number; no backend but the simulator knows the truth") {
+TEST_CASE("Values that the board cannot measure are NaN; only the simulator knows the true values") {
   auto bench = active_bench();
   const rig::Measurement measurement = read_until(bench->driver(), 0, 10 * ms);
   CHECK(measurement.trip_flags == 0);

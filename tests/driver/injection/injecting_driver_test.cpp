@@ -91,7 +91,7 @@ TEST_CASE("a fault begins with its phase and delay, and ends with its duration")
   CHECK(bench.measurement.upper_counts == 600);  // the counts lost are lost for good
 }
 
-TEST_CASE("encoders: what each kind makes of the counts") {
+TEST_CASE("encoders: the effect of each kind on the counts") {
   const auto upper_after = [](std::string_view fault, int cycles) {
     Bench bench(std::string("any@encoder_upper:") + std::string(fault) + "+11ms");
     bench.cycles(10);  // 1000 counts
@@ -128,14 +128,14 @@ TEST_CASE("both encoders: swapped, or failing alike") {
   CHECK(lost.measurement.lower_counts == 120);
 }
 
-TEST_CASE("after a delay that has ended nothing is missing") {
+TEST_CASE("after the end of a delay no counts are missing") {
   Bench bench("any@encoder_upper:delayed=4ms+5ms~10ms,any@encoder_lower:slow=4ms+5ms~10ms");
   bench.cycles(30);
   CHECK(bench.measurement.upper_counts == 3000);
   CHECK(bench.measurement.lower_counts == 3600);
 }
 
-TEST_CASE("supply, temperature, trip flags and stamp fail as numbers do") {
+TEST_CASE("supply, temperature, trip flags and stamp fail like numbers") {
   const auto after = [](std::string_view fault) {
     Bench bench(std::string(fault) + "+3ms");
     bench.cycles(6);
@@ -180,7 +180,7 @@ TEST_CASE("whole answers") {
   CHECK(failed == Approx(300).margin(60));
 }
 
-TEST_CASE("commands: what each kind makes of them") {
+TEST_CASE("commands: the effect of each kind") {
   const rig::Command driving{.motor_duty = 0.8, .motor_enable = true};
   const rig::Command braking{.brake_duty = 0.6, .brake_torque_Nm = 3.0};
   const auto sent = [](std::string_view fault, const rig::Command& command) {
@@ -226,7 +226,7 @@ TEST_CASE("a write that fails makes the rig safe, and so does every end") {
   CHECK(stuck.rig.last.motor_duty == 0.0);
 }
 
-TEST_CASE("the same seed gives the same faults, another one others") {
+TEST_CASE("the same seed gives the same faults, another seed other ones") {
   const auto history = [](std::uint64_t seed) {
     Bench bench("any@encoder_upper:intermittent,any@supply:garbage", seed);
     std::vector<double> values;
@@ -248,7 +248,7 @@ TEST_CASE("the later fault acts, and ok heals") {
   CHECK(bench.measurement.supply_V == 29.0);
 }
 
-TEST_CASE("a delay that comes again begins with what is there then") {
+TEST_CASE("a repeated delay begins with the current value") {
   Bench supply("any@supply:delayed=2ms+2ms~3ms,any@supply:delayed=2ms+10ms");
   supply.cycles(10);
   CHECK(supply.measurement.supply_V == 33.0);  // of the ninth, the last without it
@@ -260,7 +260,7 @@ TEST_CASE("a delay that comes again begins with what is there then") {
   CHECK(command.rig.last.brake_duty == Approx(0.09));
 }
 
-TEST_CASE("a run's faults know nothing of the run before it") {
+TEST_CASE("a run's faults do not depend on the previous run") {
   Bench bench("any@write:delayed=4ms,any@encoder_upper:delayed=4ms,any@supply:delayed=4ms");
   for (int i = 0; i < 3; ++i) bench.cycle(rig::Phase::accelerate, {.motor_duty = 0.8, .motor_enable = true});
   REQUIRE(bench.driver.deactivate().ok());
@@ -273,7 +273,7 @@ TEST_CASE("a run's faults know nothing of the run before it") {
   }
 }
 
-TEST_CASE("a duration beyond all runs is no end") {
+TEST_CASE("a duration longer than any run means no end") {
   Bench bench("any@supply:off~1e30s");
   bench.cycles(3);
   CHECK(bench.measurement.supply_V == 0.0);

@@ -8,7 +8,7 @@ using namespace abs_hil;
 using namespace abs_hil::driver;
 using Catch::Matchers::Contains;
 
-TEST_CASE("an injection is read as it is written") {
+TEST_CASE("an injection's text is parsed") {
   const Injection stuck = parse_injection("brake@encoder_upper:stuck+0.2s");
   CHECK(stuck.phase == rig::Phase::brake);
   CHECK(stuck.signal == InjectionSignal::encoder_upper);
@@ -43,7 +43,7 @@ TEST_CASE("every phase, signal and kind has a name that reads back") {
   }
 }
 
-TEST_CASE("what cannot be read names the part, what is allowed and an example") {
+TEST_CASE("an invalid text is refused with the part, the allowed values and an example") {
   struct Row {
     const char* text;
     const char* part;

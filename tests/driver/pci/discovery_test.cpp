@@ -75,7 +75,7 @@ TEST_CASE("The one card among other devices is found, opened and read") {
   CHECK(file.get() == 4);  // little-endian, at the register's offset
 }
 
-TEST_CASE("Each thing that may be wrong is refused with its own words") {
+TEST_CASE("Each fault is refused with its own message") {
   Tree tree;
   CHECK_THAT(refusal(tree.options), Contains("no RT-DAC4/PCI card") && Contains(tree.root.string()));
   tree.add("0000:04:01.0");
@@ -114,7 +114,7 @@ TEST_CASE("Each thing that may be wrong is refused with its own words") {
   }
   SECTION("no BAR 2") {
     tree.bar("0000:04:01.0", "0x0000000000000000 0x0000000000000000 0x0000000000000000");
-    CHECK_THAT(refusal(tree.options), Contains("BAR 2 is not there"));
+    CHECK_THAT(refusal(tree.options), Contains("BAR 2 is missing"));
   }
   SECTION("no table of regions") {
     tree.bar("0000:04:01.0", "nonsense");
@@ -128,18 +128,18 @@ TEST_CASE("Each thing that may be wrong is refused with its own words") {
   }
 }
 
-TEST_CASE("A card has one owner; a second one is told who holds it, and gets it once it is free") {
+TEST_CASE("A card has one owner; a second one is told the owner, and gets the card once it is free") {
   const Tree tree;
   tree.add("0000:04:01.0");
   {
     const Card first = open_card(tree.options, false);
     CHECK_THAT(refusal(tree.options),
-               Contains("in use by process " + std::to_string(::getpid())) && Contains("exactly one owner"));
+               Contains("in use by process " + std::to_string(::getpid())) && Contains("only one owner"));
   }
   CHECK(refusal(tree.options) == "opened");
 }
 
-TEST_CASE("A guardian stands beside the owner; its own process may, any other that comes is told of it and kept away") {
+TEST_CASE("A guardian runs beside the owner and keeps other processes away from the card") {
   const Tree tree;
   tree.add("0000:04:01.0");
   std::array<int, 2> to_parent{};
@@ -179,7 +179,7 @@ TEST_CASE("A guardian stands beside the owner; its own process may, any other th
   CHECK(value == 0);
 }
 
-TEST_CASE("Lock-step is for an emulator that waits for it, and for nothing else") {
+TEST_CASE("Lock-step works only with an emulator in lock-step") {
   const Tree tree;
   tree.add("0000:04:01.0");
   CHECK_THAT(refusal(tree.options, true), Contains("has no file emulated_time_ns: it is hardware"));
@@ -193,7 +193,7 @@ TEST_CASE("Lock-step is for an emulator that waits for it, and for nothing else"
   CHECK(now_ns == 123'456'789'012);
 }
 
-TEST_CASE("An access that the kernel cuts short means that the card is gone") {
+TEST_CASE("An access that the kernel truncates means that the card is gone") {
   const Tree tree;
   tree.add("0000:04:01.0");
   const Card card = open_card(tree.options, false);

@@ -23,7 +23,7 @@ struct RegisterAccess {
 struct ModelCard {
   explicit ModelCard(const emulator::CardOptions& options = {}) : model(options), faulty(model, 1) {}
 
-  /// The driver's way to it; the model must outlive what it opens.
+  /// Opens the card for the driver; the model must outlive it.
   [[nodiscard]] driver::pci::PciDriver::OpenCard opener();
   /// The accesses since the last call.
   std::vector<RegisterAccess> take_traffic() { return std::exchange(traffic, {}); }

@@ -58,7 +58,7 @@ TEST_CASE("Activation takes the outputs over: width 0 first, mode and prescaler 
   CHECK(card.model.outputs().brake_duty == 0.0);
 }
 
-TEST_CASE("A cycle has eleven accesses, the health registers in turn, and no other ever") {
+TEST_CASE("A cycle has exactly eleven accesses, with the health registers in turn") {
   ModelCard card;
   PciDriver driver({}, card.opener());
   driver.configure();
@@ -150,7 +150,7 @@ TEST_CASE("Counters wrap around at 32 bit, with either sign") {
   }
 }
 
-TEST_CASE("Readings are stamped with the middle of their reading; a late one is read once more") {
+TEST_CASE("A reading has the time stamp of its middle; a delayed one is repeated") {
   static std::int64_t clock_ns;
   static std::int64_t step_ns;
   clock_ns = 0;

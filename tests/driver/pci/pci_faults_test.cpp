@@ -1,4 +1,4 @@
-// The card, or a part of it, fails: what the driver says, and what is left on the wire.
+// Faults of the card or a part of it: the driver's error, and the outputs afterwards.
 
 #include <string>
 
@@ -113,13 +113,13 @@ TEST_CASE("A register that does not answer is an error at its place") {
   CHECK(run.card.model.outputs().drive_duty == 0.0);
 }
 
-TEST_CASE("Nonsense in a counter is no speed") {
+TEST_CASE("A random counter is refused") {
   Running run;
   run.card.faulty.set("88:wrong=100000");
   CHECK(run.read_after(ms).error == IoError::implausible_answer);
 }
 
-TEST_CASE("Taking over fails, and says where, when mode or counter do not obey") {
+TEST_CASE("Taking over fails, with the register, if mode or counter do not take their value") {
   const auto [fault, words] =
       GENERATE(std::pair("64:wrong=1", "0x64"), std::pair("88:wrong=1000000", "0x84"), std::pair("6c:off", "0x6c"));
   ModelCard card;

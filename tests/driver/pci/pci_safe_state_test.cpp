@@ -1,4 +1,4 @@
-// The safe state from a second process: whatever access the owner was killed in, both PWMs are 0 afterwards.
+// The safe state from a second process: both PWMs are 0, no matter in which access the owner was killed.
 
 #include "driver/pci/pci_safe_state.hpp"
 
@@ -91,7 +91,7 @@ TEST_CASE("preparing writes nothing") {
   CHECK(card.traffic.empty());
 }
 
-TEST_CASE("a width that does not become 0 is not taken for safe, and the other PWM is tried all the same") {
+TEST_CASE("a width that does not become 0 does not count as safe, and the other PWM is still written") {
   ModelCard card;
   ModelWindow owner(card);
   for (const std::uint32_t pwm : {0U, 1U}) {
@@ -107,7 +107,7 @@ TEST_CASE("a width that does not become 0 is not taken for safe, and the other P
   CHECK(both_zero(card));  // the fault is in the reading
 }
 
-TEST_CASE("all ones is a card that is gone, not a width") {
+TEST_CASE("all ones means a missing card and is not a width") {
   ModelCard card;
   pci::PciSafeState guardian = safe_state_of(card);
   guardian.prepare();
@@ -115,7 +115,7 @@ TEST_CASE("all ones is a card that is gone, not a width") {
   CHECK(guardian.make_safe().error == IoError::disconnected);
 }
 
-TEST_CASE("a card that comes back is opened anew") {
+TEST_CASE("a card that comes back is opened again") {
   ModelCard card;
   ModelWindow owner(card);
   REQUIRE(owner.write32(0x60, 0).ok());

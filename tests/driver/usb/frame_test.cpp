@@ -50,7 +50,7 @@ TEST_CASE("A frame to the board: the mark, and no other word with bit 15") {
   CHECK(word_at(frame, 51) == 0);
 }
 
-TEST_CASE("The 16th bit of the prescaler travels beside the mode") {
+TEST_CASE("The 16th bit of the prescaler is in the word of the mode") {
   CHECK(pwm_words_for(1, 60, 4095) == PwmWords{60, 2, 4095});
   CHECK(pwm_words_for(1, 0x8001, 0) == PwmWords{1, 3, 0});
   CHECK(pwm_words_for(0, 0xFFFF, 255) == PwmWords{0x7FFF, 1, 255});
@@ -89,7 +89,7 @@ TEST_CASE("A frame from the board, laid out by hand") {
   CHECK(contents.upper_raw == 0xFFFFFFFFU);
 }
 
-TEST_CASE("Any other length is no frame, and leaves the contents alone") {
+TEST_CASE("Any other length is refused and leaves the contents unchanged") {
   const std::size_t length = GENERATE(0U, 1U, 64U, 503U, 505U, 512U);
   std::vector<std::uint8_t> bytes(length, 0xAA);
   Contents contents{.upper_raw = 7};

@@ -69,7 +69,7 @@ IoResult received(LibusbLink& link, std::vector<std::uint8_t>& bytes) {
 
 }  // namespace
 
-TEST_CASE("The interface with both of the FPGA's endpoints is claimed, and everything given back") {
+TEST_CASE("The interface with both of the FPGA's endpoints is claimed, and everything is released") {
   Bench bench;
   {
     const LibusbLink link(bench.device());
@@ -133,7 +133,7 @@ TEST_CASE("A device that cannot be opened is refused with its name and the cause
   SECTION("not to be set") {
     usb.settings[1].alternate = 1;
     usb.setting_error = LIBUSB_ERROR_NOT_FOUND;
-    CHECK_THAT(refusal(), Contains("does not take its setting"));
+    CHECK_THAT(refusal(), Contains("does not accept its alternate setting"));
   }
 }
 
@@ -156,7 +156,7 @@ TEST_CASE("Frames reach the board in their order; one too many is refused, not q
   }
 }
 
-TEST_CASE("A request's answer comes whole, of whatever length") {
+TEST_CASE("A request's answer arrives completely, with any length") {
   Bench bench;
   LibusbLink link(bench.device());
   auto& usb = libusb_stand_in();
@@ -177,7 +177,7 @@ TEST_CASE("A request's answer comes whole, of whatever length") {
   }
 }
 
-TEST_CASE("What became of a frame is told by the next call, once") {
+TEST_CASE("The next call returns the result of a frame, once") {
   struct Case {
     libusb_transfer_status status;
     IoError error;
@@ -226,7 +226,7 @@ TEST_CASE("What became of a frame is told by the next call, once") {
   }
 }
 
-TEST_CASE("A transfer that libusb does not take has its error at once, and its slot stays free") {
+TEST_CASE("A transfer that libusb refuses has its error at once, and its slot stays free") {
   struct Case {
     int error;
     IoError expected;
@@ -246,7 +246,7 @@ TEST_CASE("A transfer that libusb does not take has its error at once, and its s
   }
 }
 
-TEST_CASE("Recovery gives up what is queued, clears both stalls and drops answers that lie in the board") {
+TEST_CASE("Recovery cancels queued transfers, clears both stalls and drops the board's old answers") {
   Bench bench;
   LibusbLink link(bench.device());
   auto& usb = libusb_stand_in();
@@ -268,7 +268,7 @@ TEST_CASE("Recovery gives up what is queued, clears both stalls and drops answer
   CHECK(received(link, bytes).ok());
   CHECK(bytes == std::vector<std::uint8_t>{3});
 
-  // A board that talks on and on is not listened to for ever; one that is gone not at all.
+  // Recovery ends although the board goes on sending, and at once if the board is gone.
   usb.answers.assign(9, {4});
   link.recover();
   CHECK(usb.answers.size() == 5);

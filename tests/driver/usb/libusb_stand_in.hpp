@@ -8,8 +8,8 @@
 
 namespace abs_hil::test {
 
-/// What stands in for libusb in a program linked with libusb_stand_in.cpp, whose functions come before the library's:
-/// one device with a queue for each endpoint. What a call gives back is for the test to say; what was asked is kept.
+/// Replacement for libusb in a program linked with libusb_stand_in.cpp, whose functions replace the library's. It has
+/// one device with a queue per endpoint. The test sets the results of the calls and reads their arguments.
 struct LibusbStandIn {
   /// One alternate setting: the interface's number, its own, its endpoints with their attributes.
   struct Setting {
@@ -18,7 +18,7 @@ struct LibusbStandIn {
     std::vector<libusb_endpoint_descriptor> endpoints{};
   };
 
-  // What the calls give back: 0 or LIBUSB_ERROR_...
+  // Results of the calls: 0 or LIBUSB_ERROR_...
   int init_error{0};
   int wrap_error{0};
   int config_error{0};
@@ -26,14 +26,14 @@ struct LibusbStandIn {
   int setting_error{0};
   int submit_error{0};
   std::vector<Setting> settings{};
-  /// What becomes of transfers to the board; none is finished while false.
+  /// Whether transfers to the board finish.
   bool takes{true};
   libusb_transfer_status out_status{LIBUSB_TRANSFER_COMPLETED};
   libusb_transfer_status in_status{LIBUSB_TRANSFER_COMPLETED};
-  /// Answers that lie in the board, each for one transfer from it.
+  /// Answers waiting in the board, one per transfer.
   std::deque<std::vector<std::uint8_t>> answers{};
   std::int64_t board_time_ns{0};
-  /// What a control transfer gives back instead of its size; 0: its size.
+  /// Result of a control transfer instead of its size; 0: its size.
   int control_result{0};
 
   // What was asked.
@@ -49,7 +49,7 @@ struct LibusbStandIn {
   std::deque<libusb_transfer*> cancelled{};
 };
 
-/// The one that the functions work on; a test begins with a fresh one.
+/// The stand-in that the functions use; each test begins with a new one.
 LibusbStandIn& libusb_stand_in();
 
 }  // namespace abs_hil::test

@@ -17,19 +17,19 @@ namespace abs_hil::test {
 struct ModelBoard {
   explicit ModelBoard(const emulator::UsbBoardOptions& options = {}) : model(options) {}
 
-  /// The driver's way to it; the model must outlive what it opens.
+  /// Opens the board for the driver; the model must outlive it.
   [[nodiscard]] driver::usb::UsbDriver::OpenBoard opener();
 
   emulator::UsbBoardModel model;
   emulator::UsbFaults faults{};
   std::mt19937_64 random{1};
   bool unplugged{false};
-  int late_waits{0};  ///< so many waits pass before an answer is there
-  int slow_sends{0};  ///< so many frames are not taken
+  int late_waits{0};  ///< number of waits before an answer arrives
+  int slow_sends{0};  ///< number of frames that the board does not take
   int recoveries{0};
 };
 
-/// The bus as the board's model: an answer is of the moment of its request.
+/// The bus of the modelled board: an answer shows the board at the moment of its request.
 class ModelLink final : public driver::usb::FrameLink {
  public:
   explicit ModelLink(ModelBoard& board) : board_(board) {}

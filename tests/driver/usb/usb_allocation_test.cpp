@@ -7,8 +7,8 @@
 
 using namespace abs_hil;
 using namespace abs_hil::driver;
+using runtime::test::OffenceCounter;
 using runtime::test::Offences;
-using runtime::test::Watch;
 
 namespace {
 
@@ -54,14 +54,14 @@ Offences offences_of(bool planted) {
   Offences found;
   bool went_well = true;
   {
-    const Watch watch;
+    const OffenceCounter counter;
     rig::Measurement measurement;
     for (std::int64_t cycle = 1; cycle <= 1000; ++cycle) {
       went_well = driver.read(cycle * 1'000'000, measurement).ok() && went_well;
       went_well = driver.write({.brake_duty = 0.5}).ok() && went_well;
     }
     went_well = driver.deactivate().ok() && went_well;
-    found = watch.so_far();
+    found = counter.so_far();
   }
   CHECK(went_well);
   CHECK(driver.frames_lost() > 50);

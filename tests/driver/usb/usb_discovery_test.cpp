@@ -1,4 +1,4 @@
-// Which device is the board, by what the kernel shows of it.
+// Finding the board among the devices that the kernel shows.
 
 #include <string>
 
@@ -45,7 +45,7 @@ TEST_CASE("A board is found by manufacturer, ids and serial; other devices and i
   bus.options.product_id = 0x1004;
   CHECK(find_boards(bus.options).empty());
   bus.options = {.sysfs_root = bus.options.sysfs_root, .manufacturer = "", .serial = "77"};
-  CHECK(find_boards(bus.options).empty());  // a serial alone is anybody's
+  CHECK(find_boards(bus.options).empty());  // a serial number alone does not identify a board
 }
 
 TEST_CASE("None, several, and one of several") {
@@ -59,17 +59,17 @@ TEST_CASE("None, several, and one of several") {
   CHECK(choose_board(bus.options, false, false).address == "1-2");
 }
 
-TEST_CASE("Lock-step is for an emulator that has it, and for nothing else") {
+TEST_CASE("Lock-step works only with an emulator in lock-step") {
   FakeBus bus;
   bus.plug("1-1", "1209", "InTeCo", "1");
   CHECK_THROWS_WITH(choose_board(bus.options, true, false), Contains("is hardware, or an emulator in real time"));
-  CHECK_THROWS_WITH(choose_board(bus.options, false, true), Contains("is no emulator, though driver.emulated=true"));
+  CHECK_THROWS_WITH(choose_board(bus.options, false, true), Contains("is not an emulator, but driver.emulated=true"));
   bus.plug("1-1", "1209", "InTeCo", "1", "RT-DAC/USB2 emulator in lock-step");
   CHECK(choose_board(bus.options, true, true).address == "1-1");
   CHECK_THROWS_WITH(choose_board(bus.options, false, false), Contains("is an emulator in lock-step"));
 }
 
-TEST_CASE("A node that is not there is named") {
+TEST_CASE("A missing device node is named") {
   FakeBus bus;
   bus.plug("1-1", "04b4", "InTeCo", "77");
   CHECK_THROWS_WITH(open_board(bus.options, false, false), Contains("001/012") && Contains("No such file"));

@@ -42,7 +42,7 @@ TEST_CASE("Encoders are taken from the channels configured, with their signs") {
   CHECK(measurement.lower_counts == 20);
 }
 
-TEST_CASE("Counters that wrap around go on, at 16, 31 and 32 bits") {
+TEST_CASE("Counters continue across a wrap at 16, 31 and 32 bits") {
   const double start_counts = GENERATE(65530.0, 2147483640.0, 4294967290.0, -6.0);
   ModelBoard board;
   board.model.turn_by_hand(true, (start_counts + 0.5) * count_rev);
@@ -131,7 +131,7 @@ TEST_CASE("Another version word is refused before any output is written") {
   CHECK(right.state() == DriverState::inactive);
 }
 
-TEST_CASE("What the driver says about its board: not known is said to be not known") {
+TEST_CASE("The driver's notes about the board name what is not known") {
   ModelBoard board;
   UsbDriver driver({}, board.opener());
   CHECK(driver.notes().empty());
@@ -146,7 +146,7 @@ TEST_CASE("What the driver says about its board: not known is said to be not kno
   CHECK(board.model.frames_taken() == 0);
 }
 
-TEST_CASE("Options that do not go together are named") {
+TEST_CASE("Options that contradict each other are named") {
   ModelBoard board;
   CHECK_THROWS_WITH(UsbDriver({.upper_sign = 0}, board.opener()), Contains("driver.usb.upper_sign = 0"));
   CHECK_THROWS_WITH(UsbDriver({.lower_channel = 1}, board.opener()), Contains("driver.usb.lower_channel"));

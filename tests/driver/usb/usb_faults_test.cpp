@@ -1,4 +1,4 @@
-// The board, the cable or a part of either fails: what the driver says, and what is left on the wire.
+// Faults of board and cable: the driver's error, and the outputs afterwards.
 
 #include "catch.hpp"
 #include "driver/usb/usb_driver.hpp"
@@ -38,7 +38,7 @@ struct Running {
 
 }  // namespace
 
-TEST_CASE("A cycle without its frame keeps the measurement of the one before, stamp and all") {
+TEST_CASE("A cycle without its frame keeps the previous measurement with its time stamp") {
   Running run;
   const rig::Measurement before = run.measurement;
   run.board.late_waits = 1;
@@ -48,7 +48,7 @@ TEST_CASE("A cycle without its frame keeps the measurement of the one before, st
   CHECK(run.driver.frames_lost() == 1);
 }
 
-TEST_CASE("A late answer is not taken for the answer of the cycle in which it comes") {
+TEST_CASE("A late answer does not count as the answer of the cycle in which it arrives") {
   Running run;
   run.board.late_waits = 1;
   REQUIRE(run.cycle().ok());  // asked at 2 ms, nothing yet
@@ -76,7 +76,7 @@ TEST_CASE("Four cycles without a frame pass, the fifth is a fault; commands go o
   CHECK(run.driver.deactivate().error == IoError::no_answer);
 }
 
-TEST_CASE("A board that takes no frames any more is found though nobody reads") {
+TEST_CASE("A board that takes no more frames is found even without reads") {
   Running run;
   run.board.slow_sends = 100;
   for (int i = 0; i < 4; ++i) REQUIRE(run.driver.write({.brake_duty = 0.5}).ok());
@@ -85,7 +85,7 @@ TEST_CASE("A board that takes no frames any more is found though nobody reads") 
   CHECK(run.driver.state() == DriverState::failed);
 }
 
-TEST_CASE("A frame that was not taken is no mismatch: the board still shows the one before") {
+TEST_CASE("A frame that the board did not take is no mismatch: the board still shows the previous one") {
   Running run;
   run.board.slow_sends = 1;
   REQUIRE(run.driver.write({.brake_duty = 0.5}).ok());
@@ -124,7 +124,7 @@ TEST_CASE("A STALL is a fault; cleared, it does not keep the safe state from the
   CHECK(run.safe());
 }
 
-TEST_CASE("A STALL of IN that nothing clears: the safe state reaches the board and cannot be verified") {
+TEST_CASE("With a permanent STALL of IN the safe state reaches the board but cannot be verified") {
   Running run;
   run.board.faults.stall_in = emulator::UsbFaults::Stall::on;
   CHECK(run.cycle().reason == Reason::usb_stalled);
@@ -132,7 +132,7 @@ TEST_CASE("A STALL of IN that nothing clears: the safe state reaches the board a
   CHECK(run.safe());
 }
 
-TEST_CASE("A frame of the wrong length, and bytes that are none of its frames") {
+TEST_CASE("A frame of the wrong length, and random bytes") {
   Running run;
   SECTION("short") {
     run.board.faults.length = GENERATE(0U, 4U, 503U);
@@ -185,7 +185,7 @@ TEST_CASE("A board that does not show its outputs: refused with the key, or run 
   CHECK_THAT(trusting.notes()[3], Contains("not verified"));
 }
 
-TEST_CASE("A board whose first frame is none, or does not come, is refused") {
+TEST_CASE("A board whose first frame is invalid or missing is refused") {
   ModelBoard board;
   UsbDriver driver({}, board.opener());
   SECTION("short") {

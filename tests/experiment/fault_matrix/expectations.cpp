@@ -1,4 +1,4 @@
-// What must come of each fault: the classes and bounds of docs/safety.md, "What is found, and how soon".
+// Expected result of each fault: the classes and bounds of docs/safety.md, "What is found, and how soon".
 
 #include "matrix.hpp"
 
@@ -15,15 +15,15 @@ constexpr double at_once_s = 0.002;    ///< board flags, I/O errors, leaping cou
 constexpr double missing_s = 0.025;    ///< no fresh measurement
 constexpr double overruns_s = 0.160;   ///< 50 late cycles of 3 ms
 constexpr double encoder_s = 0.25;     ///< an encoder that does not follow its wheel, from rest too
-constexpr double lost_counts_s = 0.5;  ///< ... that follows it now and then
+constexpr double lost_counts_s = 0.5;  ///< an encoder that follows its wheel intermittently
 constexpr double response_s = 0.5;     ///< an output that does not follow its command
-constexpr double random_s = 5.0;       ///< outputs at random: when they happen to contradict the command
-constexpr double half_motor_s = 20.0;  ///< a motor at half duty does its work; what else is wrong shows in braking
+constexpr double random_s = 5.0;       ///< random outputs: until they contradict the command
+constexpr double half_motor_s = 20.0;  ///< a motor at half duty still works; other effects show in braking
 
 bool before(Phase phase, Phase other) { return static_cast<int>(phase) < static_cast<int>(other); }
 
 Expectation encoder(const driver::Injection& injection, Reason stuck, Reason jumped, Reason reversed) {
-  // A few turns a second in the end: too slow for stuck and reversed to show before the run is over.
+  // A few turns per second at the end: too slow to detect stuck and reversed before the run ends.
   const bool slow_wheels = !before(*injection.phase, Phase::hold);
   switch (injection.kind) {
     case InjectionKind::off:
@@ -37,7 +37,7 @@ Expectation encoder(const driver::Injection& injection, Reason stuck, Reason jum
     case InjectionKind::garbage: return {{jumped}, false, at_once_s};
     case InjectionKind::wrong: return {{reversed, jumped}, slow_wheels, encoder_s};
     case InjectionKind::delayed:
-      // From rest nothing shows but a worse stop; at speed the counter first stands.
+      // From rest the only effect is a longer stop; at speed the counter stands at first.
       return {{stuck, Reason::encoders_lost, Reason::encoder_lower_stuck},
               slow_wheels || before(*injection.phase, Phase::coast),
               encoder_s};
@@ -55,7 +55,7 @@ Expectation both_encoders(const driver::Injection& injection) {
   Expectation expectation =
       encoder(injection, Reason::encoders_lost, Reason::encoder_upper_jumped, Reason::encoder_lower_jumped);
   if (injection.kind == InjectionKind::wrong) {
-    // Swapped wheels that roll on each other show the same speeds: found when they are braked.
+    // Swapped wheels that roll on each other show equal speeds; braking reveals them.
     expectation.reasons.push_back(Reason::slip_implausible);
     expectation.bound_s = before(*injection.phase, Phase::brake) ? 10.0 : encoder_s;
   }
@@ -63,12 +63,12 @@ Expectation both_encoders(const driver::Injection& injection) {
 }
 
 Expectation stamp(InjectionKind kind) {
-  // Good stamps in between are enough to go on with.
+  // Good stamps in between are enough to continue.
   if (kind == InjectionKind::intermittent) return {{Reason::samples_missing}, true, missing_s};
   return {{Reason::samples_missing}, kind == InjectionKind::ok, missing_s};
 }
 
-/// What the board reports about itself; what the simulator does not know cannot be wrong or late.
+/// What the board reports about itself; what the simulator does not report cannot be wrong or late.
 Expectation supply(Backend backend, InjectionKind kind) {
   const bool shows = kind == InjectionKind::garbage || kind == InjectionKind::off ||
                      kind == InjectionKind::intermittent ||
@@ -111,13 +111,13 @@ Expectation read(InjectionKind kind) {
   return {{}, true};
 }
 
-/// Drive PWM and enable: the same to the wheels.
+/// Drive PWM and enable: both have the same effect on the wheels.
 Expectation drive(const driver::Injection& injection) {
   const bool driven = before(*injection.phase, Phase::coast);
   switch (injection.kind) {
     case InjectionKind::off: return {{Reason::motor_no_response}, !driven, response_s};
     case InjectionKind::stuck:
-      // At the duty it had: right while accelerating, and the enable takes it away afterwards.
+      // Stuck at its duty: correct during acceleration, and the enable switches it off afterwards.
       return {{Reason::motor_no_response}, injection.phase != Phase::idle, response_s};
     case InjectionKind::wrong:
       return {{Reason::motor_no_response}, injection.signal == InjectionSignal::motor_pwm || !driven, response_s};
@@ -131,7 +131,7 @@ Expectation brake(const driver::Injection& injection) {
     case InjectionKind::off:
     case InjectionKind::wrong: return {{Reason::brake_no_response}, late, response_s};
     case InjectionKind::stuck:
-      // From braking on it stays on: the rig stops with a locked wheel.
+      // It stays on from the start of braking: the rig stops with a locked wheel.
       return {{Reason::brake_no_response}, !before(*injection.phase, Phase::brake), response_s};
     case InjectionKind::garbage:
       return {{Reason::brake_no_response, Reason::motor_no_response, Reason::encoder_upper_stuck,
@@ -157,7 +157,7 @@ Expectation write(Backend backend, const driver::Injection& injection) {
     case InjectionKind::garbage:
       return {{Reason::motor_no_response, Reason::brake_no_response, Reason::speed_rises_with_motor_off,
                Reason::encoder_upper_stuck, Reason::encoders_disagree},
-              // Capped at 0.7 as on the card, a random brake does about what was asked for.
+              // Capped at 0.7 as on the card, a random brake acts roughly like the commanded one.
               late || (backend == Backend::card && !before(*injection.phase, Phase::coast)),
               random_s};
     default: return {{Reason::brake_no_response}, true, response_s};

@@ -35,7 +35,7 @@ std::vector<std::string> columns_of(std::string_view row) {
   return columns;
 }
 
-/// Header, number of rows and of columns in all of them; `last_row` gets the last one.
+/// Reads the header and the number of rows, and the number of columns in all of them; `last_row` gets the last row.
 std::string fault_of_table(const std::filesystem::path& csv, const std::string& header, std::size_t rows,
                            std::string& last_row) {
   const std::string name = csv.filename().string() + ": ";

@@ -9,13 +9,13 @@
 
 namespace abs_hil::experiment::test {
 
-// What a run leaves behind must hold all of it. Each check returns what is wrong, empty if nothing is.
+// Checks that a run's files are complete. Each check returns the problem as text; empty if there is none.
 
-/// A run's CSV: its header, a whole row for every cycle, the last one of the run's last phase and time.
+/// A run's CSV: the header, a complete row for every cycle, and a last row with the run's last phase and time.
 [[nodiscard]] std::string fault_of_csv(const std::filesystem::path& csv, const std::vector<rig::CycleRecord>& records);
 
 /// The flight recorder: the last cycles of the run without a gap, the last one with its reason; and the three files
-/// that are written from it to PREFIX.
+/// written from it to PREFIX.
 [[nodiscard]] std::string fault_of_recorder(const runtime::FlightRing& recorder, std::size_t slots,
                                             const std::vector<rig::CycleRecord>& records,
                                             const std::filesystem::path& prefix);

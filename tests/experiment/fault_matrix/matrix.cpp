@@ -15,7 +15,7 @@ namespace {
 
 using rig::Phase;
 
-/// The paper's experiment with longer pauses, so that a fault has time to act in each phase.
+/// The paper's experiment with longer pauses, so that a fault can act in each phase.
 Setup matrix_setup(Backend backend) {
   Setup setup;
   setup.control.controller = "adaptive";
@@ -27,7 +27,7 @@ Setup matrix_setup(Backend backend) {
   return setup;
 }
 
-constexpr std::size_t recorder_slots = 2000;  ///< 2 s, as the program's
+constexpr std::size_t recorder_slots = 2000;  ///< 2 s, as in the program
 
 MatrixCase run_with(Backend backend, std::vector<driver::Injection> injections, const std::filesystem::path& folder) {
   const Setup setup = matrix_setup(backend);
@@ -39,12 +39,12 @@ MatrixCase run_with(Backend backend, std::vector<driver::Injection> injections, 
   std::vector<runtime::FlightSlot> slots(recorder_slots);
   runtime::FlightRing flight(slots);
   runtime::HeartbeatPanel panel;
-  runtime::Heartbeat watch(panel, flight);
+  runtime::Heartbeat heartbeat(panel, flight);
   Recorder recorder;
   analysis::RunMetrics metrics(setup.plant.rig.wheels.r2_m, setup.experiment.end_speed_m_s);
   telemetry::CsvSink csv(folder / "run.csv");
   RunSession session(clock, driver, logic_parts(setup), setup.gate, {&recorder, &metrics, &csv});
-  session.watch_with(watch);
+  session.set_heartbeat(heartbeat);
   const RunOutcome outcome = session.run_fast([] { return rig::Reason::none; });
 
   MatrixCase result{.reason = outcome.reason, .metrics = metrics.metrics()};
@@ -77,7 +77,7 @@ std::vector<driver::Injection> all_injections(Backend backend) {
   for (std::size_t signal = 0; signal < driver::injection_signal_count; ++signal) {
     for (std::size_t kind = 0; kind < driver::injection_kind_count; ++kind) {
       for (const Phase phase : phases_of(backend)) {
-        // Holding lasts some 30 ms.
+        // The hold phase lasts some 30 ms.
         const std::string delay = phase == Phase::hold ? "+10ms" : "+100ms";
         all.push_back(
             driver::parse_injection(std::string(rig::name_of(phase)) + '@' +

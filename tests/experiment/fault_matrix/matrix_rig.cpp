@@ -23,7 +23,7 @@ class SimulatedRig final : public MatrixRig {
   const driver::SimDriver* sim_;
 };
 
-/// The registers of the emulated card, which only goes on with the driver's time.
+/// The registers of the emulated card, whose time advances only with the driver's.
 class EmulatedCard final : public MatrixRig {
  public:
   explicit EmulatedCard(const Setup& setup) : card_({.plant = setup.plant}) {}

@@ -9,7 +9,7 @@ namespace abs_hil::experiment::test {
 
 struct Setup;
 
-/// A backend in this process, on the clock of its driver, and what acts on the wheels behind it.
+/// A backend in this process, on the clock of its driver, and the outputs that act on its wheels.
 class MatrixRig {
  public:
   MatrixRig() = default;
@@ -17,9 +17,9 @@ class MatrixRig {
   MatrixRig& operator=(const MatrixRig&) = delete;
   virtual ~MatrixRig() = default;
 
-  /// Its driver, once; the rig must outlive it.
+  /// Returns its driver; call it once. The rig must outlive the driver.
   [[nodiscard]] virtual std::unique_ptr<driver::RigDriver> driver() = 0;
-  /// Neither drive nor brake acts.
+  /// True if neither drive nor brake acts.
   [[nodiscard]] virtual bool at_rest() const = 0;
 };
 

@@ -1,5 +1,5 @@
-// Every signal x every kind of fault x every phase, on the virtual clock, on the simulated rig and on the
-// emulated card.
+// Every signal x every kind of fault x every phase, on the virtual clock, on the simulated rig and on the emulated
+// card.
 
 #include "matrix.hpp"
 
@@ -38,7 +38,7 @@ const Matrix& matrix_of(Backend backend) {
   return both[static_cast<std::size_t>(backend)];
 }
 
-/// How much longer the way to a stop may get in a run that goes on.
+/// Permitted increase of the stopping distance in a run that continues.
 constexpr double longest_degraded = 1.40;
 constexpr double longest_undisturbed = 1.005;
 
@@ -50,7 +50,7 @@ bool touches_braking(const driver::Injection& injection) {
 
 }  // namespace
 
-TEST_CASE("every fault in every phase ends safe, recorded to the last cycle, for the right reason and in time") {
+TEST_CASE("every fault in every phase ends in the safe state in time, with the right reason and a complete record") {
   const Backend backend = GENERATE(Backend::sim, Backend::card);
   for (const MatrixCase& c : matrix_of(backend).cases) {
     const Expectation expectation = expected(backend, c.injection);
@@ -67,7 +67,7 @@ TEST_CASE("every fault in every phase ends safe, recorded to the last cycle, for
   }
 }
 
-TEST_CASE("a run that goes on in spite of a fault keeps within the stated degradation") {
+TEST_CASE("a run that continues despite a fault stays within the stated degradation") {
   const Matrix& matrix = matrix_of(GENERATE(Backend::sim, Backend::card));
   for (const MatrixCase& c : matrix.cases) {
     if (!c.survived()) continue;
@@ -77,7 +77,7 @@ TEST_CASE("a run that goes on in spite of a fault keeps within the stated degrad
   }
 }
 
-TEST_CASE("docs/fault-matrix.md is what the runs give") {
+TEST_CASE("docs/fault-matrix.md equals the result of the runs") {
   const std::string text = page(matrix_of(Backend::sim), matrix_of(Backend::card));
   if (const char* file = std::getenv("ABS_HIL_WRITE_FAULT_MATRIX"); file != nullptr) {
     std::ofstream(file) << text;

@@ -57,7 +57,7 @@ std::string table_head(Backend backend) {
   return names + rule;
 }
 
-/// The tables of one backend, a section for each signal; notes the reasons met.
+/// The tables of one backend, one section per signal; collects the reasons that occurred.
 std::string tables(const Matrix& matrix, Backend backend, std::map<int, std::string>& reasons) {
   std::string text;
   std::string signal;

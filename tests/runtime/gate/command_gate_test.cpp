@@ -41,7 +41,7 @@ TEST_CASE("duties are limited, and that is counted") {
   CHECK(gate.count(GateAction::motor_clamped) == 1);
 }
 
-TEST_CASE("the motor never turns against the brake, nor without its enable") {
+TEST_CASE("the motor is off while the brake acts and while it is not enabled") {
   CommandGate gate(GateOptions{});
   const GateResult both = gate.check({.motor_duty = 1.0, .brake_duty = 0.5, .motor_enable = true}, moderate);
   CHECK(both.action == GateAction::motor_blocked_by_brake);
@@ -53,7 +53,7 @@ TEST_CASE("the motor never turns against the brake, nor without its enable") {
   CHECK(disabled.command.motor_duty == 0.0);
 }
 
-TEST_CASE("what is not finite latches a fault; from then on only the safe command passes") {
+TEST_CASE("a value that is not finite latches a fault; from then on only the safe command passes") {
   for (const double bad : {not_a_number, infinite, -infinite}) {
     CommandGate gate(GateOptions{});
     CHECK(is_safe(gate.check({.brake_duty = bad}, moderate).command));
@@ -98,7 +98,7 @@ TEST_CASE("the first fault stays") {
   CHECK(gate.fault_value() == 2.0);
 }
 
-TEST_CASE("what the limits just allow passes, and is not counted as limited") {
+TEST_CASE("a command exactly at the limits passes and is not counted as limited") {
   CommandGate gate({.motor_duty_max = 0.8, .brake_duty_max = 0.7});
   CHECK(gate.check({.brake_duty = 0.7}, moderate).command.brake_duty == 0.7);
   CHECK(gate.check({.motor_duty = 0.8, .motor_enable = true}, moderate).action == GateAction::motor_rate_limited);
@@ -132,7 +132,7 @@ TEST_CASE("duties rise no faster than their rates by real elapsed time, and fall
   CHECK(motor.action == GateAction::motor_rate_limited);
   CHECK(gate.count(GateAction::motor_rate_limited) == 1);
   CHECK(check({.motor_duty = 0.1, .motor_enable = true}, 19).command.motor_duty == 0.1);
-  // Time that stands still or runs back lets nothing rise.
+  // Nothing rises while time stands still or runs backwards.
   CHECK(check({.motor_duty = 0.2, .motor_enable = true}, 19).command.motor_duty == Approx(0.1));
 }
 
@@ -183,7 +183,7 @@ TEST_CASE("every action is counted, several of one command too") {
   CHECK(rig::name_of(GateAction::brake_blocked_by_phase) == "brake_blocked_by_phase");
 }
 
-TEST_CASE("a motor that is not enabled stays so, and the result says what was done to this command alone") {
+TEST_CASE("a motor that is not enabled stays disabled, and the result tells the actions on this command only") {
   CommandGate gate(GateOptions{});
   CHECK_FALSE(gate.check({.motor_duty = 0.5}, moderate).command.motor_enable);
   const GateResult next = gate.check({.motor_enable = true}, {.now_ns = ms});
@@ -193,7 +193,7 @@ TEST_CASE("a motor that is not enabled stays so, and the result says what was do
   CHECK(next.fault_value == 0.0);
 }
 
-TEST_CASE("what the board reports of itself latches and makes the command safe") {
+TEST_CASE("a fault that the board reports latches and makes the command safe") {
   struct Row {
     rig::Measurement measurement;
     Reason reason;
@@ -213,47 +213,48 @@ TEST_CASE("what the board reports of itself latches and makes the command safe")
       {{.supply_V = 0.0, .temperature_C = 200.0, .trip_flags = 2}, Reason::board_supply_tripped, 2.0},
   }));
   CommandGate gate({.supply_min_V = 12.0, .temperature_max_C = 80.0});
-  std::ignore = gate.watch(row.measurement, 0);
+  std::ignore = gate.check_measurement(row.measurement, 0);
   CHECK(gate.fault() == row.reason);
   CHECK(gate.fault_value() == row.value);
   const GateResult result = gate.check({.brake_duty = 0.5}, {});
   CHECK((result.command.brake_duty == 0.0) == (row.reason != Reason::none));
 }
 
-TEST_CASE("a board that no longer reports its health is a fault, one that never did is none") {
+TEST_CASE("a board that stops reporting its health is a fault, one that never reported it is not") {
   CommandGate supply(GateOptions{});
-  std::ignore = supply.watch({.supply_V = 24.0}, 0);
-  std::ignore = supply.watch({}, ms);
+  std::ignore = supply.check_measurement({.supply_V = 24.0}, 0);
+  std::ignore = supply.check_measurement({}, ms);
   CHECK(supply.fault() == Reason::board_health_lost);
   CHECK(supply.fault_value() == 1.0);
   CommandGate temperature(GateOptions{});
-  std::ignore = temperature.watch({.temperature_C = 30.0}, 0);
-  std::ignore = temperature.watch({.supply_V = 24.0}, ms);
+  std::ignore = temperature.check_measurement({.temperature_C = 30.0}, 0);
+  std::ignore = temperature.check_measurement({.supply_V = 24.0}, ms);
   CHECK(temperature.fault() == Reason::board_health_lost);
   CHECK(temperature.fault_value() == 2.0);
   CommandGate healthy(GateOptions{});
-  for (int i = 0; i < 3; ++i) std::ignore = healthy.watch({.supply_V = 24.0, .temperature_C = 30.0}, i * ms);
+  for (int i = 0; i < 3; ++i)
+    std::ignore = healthy.check_measurement({.supply_V = 24.0, .temperature_C = 30.0}, i * ms);
   CHECK(healthy.fault() == Reason::none);
   CommandGate never(GateOptions{});
-  std::ignore = never.watch({}, 0);
-  std::ignore = never.watch({}, ms);
+  std::ignore = never.check_measurement({}, 0);
+  std::ignore = never.check_measurement({}, ms);
   CHECK(never.fault() == Reason::none);
 }
 
 namespace {
 
-/// Feeds a gate that watches with wheels that turn at given speeds, at 1 kHz.
-struct WatchedWheels {
-  explicit WatchedWheels(const PlausibilityLimits& limits) : gate(GateOptions{}, any_phase(), limits) {}
+/// Feeds a gate that checks the wheels, with wheels that turn at given speeds, at 1 kHz.
+struct CheckedWheels {
+  explicit CheckedWheels(const PlausibilityLimits& limits) : gate(GateOptions{}, any_phase(), limits) {}
   void run(double omega1_rad_s, double omega2_rad_s, int cycles, const rig::Command& command = {}) {
     for (int i = 0; i < cycles; ++i) {
       now_ns += ms;
       angle1 += omega1_rad_s * 1e-3;
       angle2 += omega2_rad_s * 1e-3;
-      std::ignore = gate.watch({.time_ns = now_ns,
-                                .upper_counts = static_cast<std::int32_t>(angle1 * 651.8986),
-                                .lower_counts = static_cast<std::int32_t>(angle2 * 651.8986)},
-                               now_ns);
+      std::ignore = gate.check_measurement({.time_ns = now_ns,
+                                            .upper_counts = static_cast<std::int32_t>(angle1 * 651.8986),
+                                            .lower_counts = static_cast<std::int32_t>(angle2 * 651.8986)},
+                                           now_ns);
       static_cast<void>(gate.check(command, {.phase = Phase::brake, .now_ns = now_ns}));
     }
   }
@@ -267,36 +268,36 @@ PlausibilityLimits paper_limits() { return plausibility_limits({}, false, {}); }
 
 }  // namespace
 
-TEST_CASE("the gate watches the wheels: encoders, response to what it sent, samples") {
-  WatchedWheels sound(paper_limits());
+TEST_CASE("the gate checks the wheels: encoders, response to what it sent, samples") {
+  CheckedWheels sound(paper_limits());
   sound.run(100.0, 100.0, 1000);
   CHECK(sound.gate.fault() == Reason::none);
   sound.run(0.0, 100.0, 10);
   CHECK(sound.gate.fault() == Reason::encoder_upper_stuck);
 
-  WatchedWheels rolling_on(paper_limits());
+  CheckedWheels rolling_on(paper_limits());
   rolling_on.run(100.0, 100.0, 700, {.brake_duty = 0.7});
   CHECK(rolling_on.gate.fault() == Reason::brake_no_response);
 
-  WatchedWheels silent(paper_limits());
+  CheckedWheels silent(paper_limits());
   silent.run(100.0, 100.0, 10);
-  for (int i = 0; i < 30; ++i) std::ignore = silent.gate.watch({.time_ns = 10 * ms}, (10 + i) * ms);
+  for (int i = 0; i < 30; ++i) std::ignore = silent.gate.check_measurement({.time_ns = 10 * ms}, (10 + i) * ms);
   CHECK(silent.gate.fault() == Reason::samples_missing);
-  CHECK_FALSE(silent.gate.watch({.time_ns = 10 * ms}, 40 * ms));
-  CHECK(CommandGate(GateOptions{}, any_phase(), paper_limits()).watch({.time_ns = ms}, ms));
+  CHECK_FALSE(silent.gate.check_measurement({.time_ns = 10 * ms}, 40 * ms));
+  CHECK(CommandGate(GateOptions{}, any_phase(), paper_limits()).check_measurement({.time_ns = ms}, ms));
 
-  // A reading of half a millisecond is judged, a longer one is not.
+  // A reading of half a millisecond is checked, a longer one is not.
   for (const bool judged : {true, false}) {
-    WatchedWheels held_up(paper_limits());
+    CheckedWheels held_up(paper_limits());
     held_up.run(100.0, 100.0, 10);
-    std::ignore =
-        held_up.gate.watch({.time_ns = 11 * ms, .upper_counts = 100'000}, 11 * ms, judged ? 500'000 : 500'001);
+    std::ignore = held_up.gate.check_measurement({.time_ns = 11 * ms, .upper_counts = 100'000}, 11 * ms,
+                                                 judged ? 500'000 : 500'001);
     CHECK((held_up.gate.fault() == Reason::encoder_upper_jumped) == judged);
   }
 
-  WatchedWheels unwatched({});
-  unwatched.run(100.0, 100.0, 10);
-  unwatched.run(0.0, 100.0, 10);
-  for (int i = 0; i < 30; ++i) CHECK(unwatched.gate.watch({.time_ns = 10 * ms}, (20 + i) * ms));
-  CHECK(unwatched.gate.fault() == Reason::none);
+  CheckedWheels unchecked({});
+  unchecked.run(100.0, 100.0, 10);
+  unchecked.run(0.0, 100.0, 10);
+  for (int i = 0; i < 30; ++i) CHECK(unchecked.gate.check_measurement({.time_ns = 10 * ms}, (20 + i) * ms));
+  CHECK(unchecked.gate.fault() == Reason::none);
 }

@@ -1,11 +1,11 @@
-// The cycle allocates nothing and takes no lock, whatever the controller, over a whole experiment.
+// The cycle allocates nothing and takes no lock, with any controller, over a whole experiment.
 
 #include <cstdlib>
 #include <mutex>
 
 #include "catch.hpp"
+#include "cycle_run.hpp"
 #include "interposed.hpp"
-#include "watched_run.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::runtime;
@@ -15,13 +15,13 @@ namespace {
 
 Offences offences_of(const std::string& controller, PlantedLogic::Offence offence = nullptr) {
   VirtualClock clock;
-  WatchedRun run(clock, controller, 1000.0, 0.0, offence);
+  CycleRun run(clock, controller, 1000.0, 0.0, offence);
   Offences found;
   {
-    const Watch watch;
+    const OffenceCounter counter;
     while (run.cycle()) {
     }
-    found = watch.so_far();
+    found = counter.so_far();
   }
   REQUIRE(run.end_reason() == rig::Reason::sequence_complete);
   REQUIRE(run.cycles() > 8'000);

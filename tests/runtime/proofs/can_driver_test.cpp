@@ -1,5 +1,5 @@
 // A cycle of driver.kind=can allocates nothing and takes no lock, with good answers, lost ones and wrong ones. The node
-// works in a thread of its own, which is not watched.
+// runs in a thread of its own, whose allocations and locks do not count.
 
 #include "catch.hpp"
 #include "driver/can/node_on_socket.hpp"
@@ -7,7 +7,7 @@
 
 using namespace abs_hil;
 
-TEST_CASE("read and write of the CAN driver neither allocate nor lock, whatever comes") {
+TEST_CASE("read and write of the CAN driver neither allocate nor lock, for any answer") {
   constexpr std::int64_t ms = 1'000'000;
   for (const char* fault : {"ok", "drop=3", "babble=20", "wrong-size=5", "silent"}) {
     INFO(fault);
@@ -20,12 +20,12 @@ TEST_CASE("read and write of the CAN driver neither allocate nor lock, whatever 
     bool good = true;
     runtime::test::Offences offences;
     {
-      const runtime::test::Watch watch;
+      const runtime::test::OffenceCounter counter;
       for (std::int64_t now_ns = ms; now_ns <= 50 * ms; now_ns += ms) {
         good = driver.read(now_ns, measurement).ok() && good;
         static_cast<void>(driver.write({.brake_duty = 0.5}));
       }
-      offences = watch.so_far();
+      offences = counter.so_far();
     }
     CHECK(offences.allocations == 0);
     CHECK(offences.locks == 0);

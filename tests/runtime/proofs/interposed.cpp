@@ -11,14 +11,14 @@ namespace abs_hil::runtime::test {
 
 namespace {
 
-thread_local bool watching = false;
+thread_local bool counting = false;
 thread_local Offences offences{};
 
 void note_allocation() {
-  if (watching) ++offences.allocations;
+  if (counting) ++offences.allocations;
 }
 void note_lock() {
-  if (watching) ++offences.locks;
+  if (counting) ++offences.locks;
 }
 
 /// The C library's own function of that name.
@@ -29,12 +29,12 @@ Function* next(const char* name) {
 
 }  // namespace
 
-Watch::Watch() {
+OffenceCounter::OffenceCounter() {
   offences = {};
-  watching = true;
+  counting = true;
 }
-Watch::~Watch() { watching = false; }
-Offences Watch::so_far() const { return offences; }
+OffenceCounter::~OffenceCounter() { counting = false; }
+Offences OffenceCounter::so_far() const { return offences; }
 
 }  // namespace abs_hil::runtime::test
 

@@ -4,20 +4,20 @@
 
 namespace abs_hil::runtime::test {
 
-/// What a thread did while it was watched: malloc and its kin (operator new among them), and locks of any kind.
+/// What a thread did while it was counted: calls of malloc and similar functions (also operator new), and locks.
 struct Offences {
   std::uint64_t allocations{0};
   std::uint64_t locks{0};
 };
 
-/// Counts the calling thread's offences as long as it lives. This program's own malloc, pthread_mutex_lock and so on
-/// stand in front of the C library's.
-class Watch {
+/// Counts the calling thread's offences during its lifetime. This program's malloc, pthread_mutex_lock and so on
+/// replace those of the C library and call them.
+class OffenceCounter {
  public:
-  Watch();
-  Watch(const Watch&) = delete;
-  Watch& operator=(const Watch&) = delete;
-  ~Watch();
+  OffenceCounter();
+  OffenceCounter(const OffenceCounter&) = delete;
+  OffenceCounter& operator=(const OffenceCounter&) = delete;
+  ~OffenceCounter();
   [[nodiscard]] Offences so_far() const;
 };
 

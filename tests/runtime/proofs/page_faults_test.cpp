@@ -1,4 +1,4 @@
-// After the real-time set-up the cycle faults no page in, from its first cycle on.
+// After the real-time set-up the cycle causes no page fault, from its first cycle on.
 
 #include <sys/mman.h>
 #include <sys/resource.h>
@@ -6,8 +6,8 @@
 #include <thread>
 
 #include "catch.hpp"
+#include "cycle_run.hpp"
 #include "runtime/realtime_setup.hpp"
-#include "watched_run.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::runtime;
@@ -28,7 +28,7 @@ long faults_of_this_thread() {
 /// 1,000 cycles bring their pages in.
 long faults_of(const std::string& controller, PlantedLogic::Offence offence = nullptr) {
   VirtualClock clock;
-  WatchedRun run(clock, controller, 1000.0, 0.0, offence);
+  CycleRun run(clock, controller, 1000.0, 0.0, offence);
   long faults = -1;
   std::jthread([&] {
     const RealtimeScope realtime({});
@@ -45,7 +45,7 @@ long faults_of(const std::string& controller, PlantedLogic::Offence offence = nu
 
 }  // namespace
 
-TEST_CASE("a whole experiment faults no page in, with every controller") {
+TEST_CASE("a whole experiment causes no page fault, with every controller") {
   for (const std::string& controller : all_controllers()) {
     CAPTURE(controller);
     CHECK(faults_of(controller) == 0);
@@ -62,7 +62,7 @@ TEST_CASE("a planted page fault is found") {
     madvise(const_cast<char*>(planted_page), page_bytes, MADV_DONTNEED);
     *planted_page = 1;
   };
-  static_assert(WatchedRun::offence_cycle < 1'000);
+  static_assert(CycleRun::offence_cycle < 1'000);
   const bool can_lock = mlockall(MCL_CURRENT) == 0;
   munlockall();
   const long faults = faults_of("adaptive", touch_absent_page);

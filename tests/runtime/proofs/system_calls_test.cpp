@@ -16,7 +16,7 @@
 #include <fstream>
 
 #include "catch.hpp"
-#include "watched_run.hpp"
+#include "cycle_run.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::runtime;
@@ -24,7 +24,7 @@ using namespace abs_hil::runtime::test;
 
 namespace {
 
-/// What the trapped process leaves behind, in memory it shares with the test.
+/// Result of the trapped process, in memory that it shares with the test.
 struct Trapped {
   int system_calls{0};
   int first_number{-1};
@@ -37,8 +37,8 @@ void on_trap(int, siginfo_t* info, void*) {
   if (trapped->system_calls++ == 0) trapped->first_number = info->si_syscall;
 }
 
-/// Reads and sleeps as in a real run, but tells the executive of a time that passes by sleeping alone: how many cycles
-/// there are does not depend on the machine's load.
+/// Reads the clock and sleeps as in a real run, but gives the executive a time that advances only by sleeping. The
+/// number of cycles therefore does not depend on the machine's load.
 class SleepingVirtualClock final : public Clock {
  public:
   [[nodiscard]] std::int64_t now_ns() noexcept override {
@@ -96,7 +96,7 @@ Trapped run_trapped(const std::string& controller, PlantedLogic::Offence offence
   REQUIRE(child >= 0);
   if (child == 0) {
     SleepingVirtualClock clock;
-    WatchedRun run(clock, controller, 5000.0, 25.0, offence);
+    CycleRun run(clock, controller, 5000.0, 25.0, offence);
     struct sigaction action {};
     action.sa_sigaction = on_trap;
     action.sa_flags = SA_SIGINFO;

@@ -1,4 +1,4 @@
-#include "commands/command_desk.hpp"
+#include "commands/remote_commands.hpp"
 
 #include <fmt/format.h>
 
@@ -19,24 +19,25 @@ std::string shown(const std::string& text) { return telemetry::printable(text, s
 
 std::string why(rig::Reason reason) {
   switch (reason) {
-    case rig::Reason::command_not_authentic: return "its mac does not fit: another key, or not the sender's own";
-    case rig::Reason::command_repeated: return "not of this session, or its sequence was used before";
+    case rig::Reason::command_not_authentic:
+      return "its mac does not fit: the sender used another key, or somebody changed the message";
+    case rig::Reason::command_repeated: return "it belongs to another session, or its sequence number was used before";
     default: return std::string(rig::description(reason));
   }
 }
 
 }  // namespace
 
-CommandDesk::CommandDesk(const config::Settings& settings, telemetry::MessageStream& stream)
+RemoteCommands::RemoteCommands(const config::Settings& settings, telemetry::MessageStream& stream)
     : stream_(stream), live_(settings), waiting_(settings.experiment.wait_for_start) {
   if (settings.commands.enabled) authority_.emplace(read_key(settings.commands.key_file));
 }
 
-std::optional<telemetry::CommandAnswer> CommandDesk::judge(const command2_t& command) {
+std::optional<telemetry::CommandAnswer> RemoteCommands::judge(const command2_t& command) {
   const std::string refused = "refused '" + shown(command.command) + "': ";
   if (!authority_) {
     return telemetry::CommandAnswer{rig::Reason::commands_not_enabled,
-                                    refused + "only 'stop' is accepted (commands.enabled)"};
+                                    refused + "only 'stop' is accepted, as this run has commands.enabled = false"};
   }
   if (const rig::Reason reason = authority_->judge(command); reason != rig::Reason::none) {
     return telemetry::CommandAnswer{reason, refused + why(reason)};
@@ -49,15 +50,15 @@ std::optional<telemetry::CommandAnswer> CommandDesk::judge(const command2_t& com
   return answer;
 }
 
-telemetry::CommandAnswer CommandDesk::carry_out(const command2_t& command, bool& taken) {
+telemetry::CommandAnswer RemoteCommands::carry_out(const command2_t& command, bool& taken) {
   using rig::Reason;
-  if (mailbox_ == nullptr) return {Reason::command_not_now, "the run has not begun"};
+  if (mailbox_ == nullptr) return {Reason::command_not_now, "the run has not begun yet"};
   if (over_) return {Reason::command_not_now, "the run has ended"};
   experiment::Adjustment adjustment;
   config::LiveSettings changed = live_;
   Pending pending{.key = {}, .value = command.value, .sender = command.sender};
   if (command.command == "start") {
-    if (!waiting_) return {Reason::command_not_now, "the run does not wait for its start (--wait-for-start)"};
+    if (!waiting_) return {Reason::command_not_now, "the run does not wait for a start command (--wait-for-start)"};
     pending.key = start_name;
     pending.value = 0.0;
   } else if (command.command == "slip-ref" || command.command == "gain") {
@@ -68,7 +69,7 @@ telemetry::CommandAnswer CommandDesk::carry_out(const command2_t& command, bool&
       return {Reason::command_out_of_range, error.what()};
     }
   } else {
-    return {Reason::command_unknown, "known are slip-ref, gain, start, stop"};
+    return {Reason::command_unknown, "unknown command; give slip-ref, gain, start or stop"};
   }
   const std::uint32_t number = mailbox_->put(std::move(adjustment));
   if (number == 0) return {Reason::command_not_now, "too many changes at once: send it again"};
@@ -79,7 +80,7 @@ telemetry::CommandAnswer CommandDesk::carry_out(const command2_t& command, bool&
   return {};
 }
 
-void CommandDesk::settle(rig::Reason reason, std::map<std::uint32_t, Pending>::iterator pending) {
+void RemoteCommands::settle(rig::Reason reason, std::map<std::uint32_t, Pending>::iterator pending) {
   const Pending& done = pending->second;
   ++accepted_;
   stream_.send_adjustment(done.key, done.value);
@@ -88,7 +89,7 @@ void CommandDesk::settle(rig::Reason reason, std::map<std::uint32_t, Pending>::i
   pending_.erase(pending);
 }
 
-void CommandDesk::refuse_pending() {
+void RemoteCommands::refuse_pending() {
   over_ = true;
   for (const auto& [number, pending] : pending_) {
     ++refused_at_end_;
@@ -100,11 +101,11 @@ void CommandDesk::refuse_pending() {
                            pending.value);
   }
   pending_.clear();
-  // Those who look at the counts find the last ones, too.
+  // Send the counts once more, so that receivers get the final ones.
   if (mailbox_ != nullptr) send_state();
 }
 
-void CommandDesk::consume(const rig::CycleRecord& record, double /*distance_m*/) {
+void RemoteCommands::consume(const rig::CycleRecord& record, double /*distance_m*/) {
   if (record.reason == rig::Reason::start_command) {
     for (auto it = pending_.begin(); it != pending_.end(); ++it) {
       if (it->second.key != start_name) continue;
@@ -122,7 +123,7 @@ void CommandDesk::consume(const rig::CycleRecord& record, double /*distance_m*/)
   }
 }
 
-void CommandDesk::send_state() {
+void RemoteCommands::send_state() {
   command_state_t state{};
   state.enabled = static_cast<std::int8_t>(enabled());
   state.waiting = static_cast<std::int8_t>(waiting_);

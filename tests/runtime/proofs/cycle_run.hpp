@@ -29,14 +29,14 @@ class PlantedLogic final : public CycleLogic {
   int cycles_left_;
 };
 
-/// A whole experiment's cycle on the simulated rig, step by step, with nothing but the cycle's own thread: what the
-/// real-time thread runs, the gate's plausibility checks, signs of life and flight recorder included.
-class WatchedRun {
+/// The cycle of a whole experiment on the simulated rig, step by step, in one thread. It runs what the real-time thread
+/// runs, including the gate's plausibility checks, the heartbeat and the flight recorder.
+class CycleRun {
  public:
   static constexpr int offence_cycle = 500;
 
-  WatchedRun(Clock& clock, const std::string& controller, double rate_Hz, double start_speed_rad_s,
-             PlantedLogic::Offence offence = nullptr)
+  CycleRun(Clock& clock, const std::string& controller, double rate_Hz, double start_speed_rad_s,
+           PlantedLogic::Offence offence = nullptr)
       : setup_(setup(controller, rate_Hz, start_speed_rad_s)),
         driver_(setup_.plant, {.seed = 1, .start_speed_rad_s = start_speed_rad_s}),
         logic_(experiment::test::logic_parts(setup_)),
@@ -45,21 +45,21 @@ class WatchedRun {
         ring_(1024),  // full after so many cycles: dropping is part of what is proven
         slots_(FlightRing::slots_for(2.0, rate_Hz)),
         recorder_(slots_),
-        watch_(panel_, recorder_, guardian_never_lost),
+        heartbeat_(panel_, recorder_, guardian_never_lost),
         executive_(clock, driver_, planted_, gate_, ring_, static_cast<std::int64_t>(1e9 / rate_Hz)) {
-    executive_.watch_with(watch_);
+    executive_.set_heartbeat(heartbeat_);
     driver_.configure();
     driver_.activate(clock.now_ns());
   }
   /// False after the run's last cycle.
   bool cycle() noexcept { return executive_.step(); }
-  /// Cycles that gave a sign of life, each of them kept by the flight recorder.
+  /// Number of heartbeats. The flight recorder keeps the record of each of these cycles.
   [[nodiscard]] std::uint64_t beats() const { return panel_.cycle_beats.load(); }
   [[nodiscard]] std::uint64_t cycles() const { return executive_.statistics().cycles(); }
   [[nodiscard]] rig::Reason end_reason() const { return logic_.end_reason(); }
 
  private:
-  /// It is looked for in each cycle, and nobody is there.
+  /// Each cycle checks for a guardian that does not exist; the limit is never reached.
   static constexpr std::uint64_t guardian_never_lost = 1'000'000'000;
 
   static experiment::test::Setup setup(const std::string& controller, double rate_Hz, double start_speed_rad_s) {
@@ -79,7 +79,7 @@ class WatchedRun {
   std::vector<FlightSlot> slots_;
   FlightRing recorder_;
   HeartbeatPanel panel_{};
-  Heartbeat watch_;
+  Heartbeat heartbeat_;
   CyclicExecutive executive_;
 };
 

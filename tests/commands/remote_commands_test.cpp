@@ -1,4 +1,4 @@
-#include "commands/command_desk.hpp"
+#include "commands/remote_commands.hpp"
 
 #include <sys/stat.h>
 
@@ -25,18 +25,18 @@ config::Settings with_commands(const std::filesystem::path& key_file) {
   return settings;
 }
 
-/// A run whose real-time thread takes changes only when told to; what it says is captured.
+/// A run whose real-time thread takes changes only on request; its answers are captured.
 struct Bench {
   abs_hil::test::TemporaryFolder scratch;
   telemetry::test::CapturingOutlet captured;
   telemetry::MessageStream stream{{}, {}, {}};
-  CommandDesk steering{with_commands(scratch / "key"), stream};
+  RemoteCommands remote{with_commands(scratch / "key"), stream};
   experiment::AdjustmentMailbox mailbox;
 
   Bench() {
     stream.add(captured);
-    steering.drive(mailbox);
-    stream.set_farewell([this] { steering.refuse_pending(); });
+    remote.set_mailbox(mailbox);
+    stream.set_farewell([this] { remote.refuse_pending(); });
     show(0, rig::Reason::none, 0);
   }
   /// The record of cycle `n`.
@@ -45,7 +45,7 @@ struct Bench {
     record.reason = reason;
     record.reason_value = value;
     stream.consume(record, 0.0);
-    steering.consume(record, 0.0);
+    remote.consume(record, 0.0);
   }
   command2_t slip_ref(std::int64_t sequence, double value) { return command(sequence, "slip-ref", value); }
   command2_t command(std::int64_t sequence, const std::string& what, double value) {
@@ -67,10 +67,10 @@ struct Bench {
   }
 };
 
-TEST_CASE("a change that the run's end forestalled is refused, one that took effect is not") {
+TEST_CASE("a change still pending at the run's end is refused, one that took effect is not") {
   Bench bench;
-  REQUIRE_FALSE(bench.steering.judge(bench.slip_ref(1, 0.1)).has_value());
-  REQUIRE_FALSE(bench.steering.judge(bench.slip_ref(2, 0.2)).has_value());
+  REQUIRE_FALSE(bench.remote.judge(bench.slip_ref(1, 0.1)).has_value());
+  REQUIRE_FALSE(bench.remote.judge(bench.slip_ref(2, 0.2)).has_value());
   bench.show(1, rig::Reason::slip_reference_changed, 1.0);  // the first has reached a cycle
   CHECK(bench.answers().size() == 1);
 
@@ -85,31 +85,31 @@ TEST_CASE("a change that the run's end forestalled is refused, one that took eff
   CHECK(states.back().accepted == 1);
   CHECK(bench.captured.all<adjustment_t>("ABS_ADJUSTMENT").size() == 1);
 
-  bench.stream.finish();  // said once
+  bench.stream.finish();  // each change gets one answer
   CHECK(bench.answers().size() == 2);
 }
 
 TEST_CASE("after the run's end a command is refused with that reason") {
   Bench bench;
   bench.stream.finish();
-  const auto answer = bench.steering.judge(bench.slip_ref(1, 0.1));
+  const auto answer = bench.remote.judge(bench.slip_ref(1, 0.1));
   REQUIRE(answer.has_value());
   CHECK(answer->reason == rig::Reason::command_not_now);
   CHECK(answer->message == "refused 'slip-ref': the run has ended");
 }
 
-TEST_CASE("a change that found no room leaves nothing behind, and can be sent again") {
+TEST_CASE("a change refused for lack of room has no effect and can be sent again") {
   Bench bench;
   std::int64_t sequence = 0;
   std::optional<telemetry::CommandAnswer> answer;
-  while (!answer) answer = bench.steering.judge(bench.slip_ref(++sequence, 0.1));
+  while (!answer) answer = bench.remote.judge(bench.slip_ref(++sequence, 0.1));
   CHECK(answer->message == "refused 'slip-ref': too many changes at once: send it again");
-  CHECK(bench.steering.judge(bench.command(++sequence, "start", 0.0)).has_value());
+  CHECK(bench.remote.judge(bench.command(++sequence, "start", 0.0)).has_value());
 
   experiment::AdjustmentMailbox::Arrived arrived{};
   while (bench.mailbox.take(arrived)) {
   }
-  CHECK_FALSE(bench.steering.judge(bench.command(++sequence, "start", 0.0)).has_value());
+  CHECK_FALSE(bench.remote.judge(bench.command(++sequence, "start", 0.0)).has_value());
   REQUIRE(bench.mailbox.take(arrived));
   CHECK(arrived.kind == experiment::Adjustment::Kind::start);
 }

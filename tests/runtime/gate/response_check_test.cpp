@@ -1,5 +1,6 @@
-#include "catch.hpp"
 #include "runtime/response_check.hpp"
+
+#include "catch.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::runtime;
@@ -18,15 +19,15 @@ PlausibilityLimits paper_limits() {
 }
 
 struct Bench {
-  ResponseCheck watch{paper_limits()};
+  ResponseCheck check{paper_limits()};
   double omega1{0.0}, omega2{0.0};
 
-  /// Strides with both wheels changing speed steadily; what is found first.
+  /// Speed windows with both wheels changing speed steadily; what is found first.
   CheckResult run(int count, double rad_s2, double motor_duty = 0.0, double brake_Nm = 0.0) {
     for (int i = 0; i < count; ++i) {
       omega1 += rad_s2 * dt_s;
       omega2 += rad_s2 * dt_s;
-      const CheckResult found = watch.update(
+      const CheckResult found = check.update(
           {.dt_s = dt_s, .omega1_rad_s = omega1, .omega2_rad_s = omega2, .motor_duty = motor_duty}, brake_Nm);
       if (!found.sound()) return found;
     }
@@ -55,18 +56,18 @@ TEST_CASE("wheels do not gain speed with the motor off") {
 TEST_CASE("each wheel counts with its inertia over its radius") {
   // The upper wheel alone at 33 rad/s^2, the lower one at 9.7: 0.25 kg m/s each.
   Bench upper;
-  CheckResult finding{};
-  for (int i = 0; i < 103 && finding.sound(); ++i) {
-    finding = upper.watch.update({.dt_s = dt_s, .omega1_rad_s = 34.0 * dt_s * i}, 0.0);
+  CheckResult result{};
+  for (int i = 0; i < 103 && result.sound(); ++i) {
+    result = upper.check.update({.dt_s = dt_s, .omega1_rad_s = 34.0 * dt_s * i}, 0.0);
   }
-  CHECK(finding.reason == Reason::speed_rises_with_motor_off);
-  CHECK(finding.value == Approx(34.0 * 0.1 * 7.54e-3 / 0.0995).epsilon(0.03));
+  CHECK(result.reason == Reason::speed_rises_with_motor_off);
+  CHECK(result.value == Approx(34.0 * 0.1 * 7.54e-3 / 0.0995).epsilon(0.03));
   Bench lower;
-  finding = {};
-  for (int i = 0; i < 103 && finding.sound(); ++i) {
-    finding = lower.watch.update({.dt_s = dt_s, .omega2_rad_s = 10.0 * dt_s * i}, 0.0);
+  result = {};
+  for (int i = 0; i < 103 && result.sound(); ++i) {
+    result = lower.check.update({.dt_s = dt_s, .omega2_rad_s = 10.0 * dt_s * i}, 0.0);
   }
-  CHECK(finding.value == Approx(10.0 * 0.1 * 25.6e-3 / 0.099).epsilon(0.03));
+  CHECK(result.value == Approx(10.0 * 0.1 * 25.6e-3 / 0.099).epsilon(0.03));
 }
 
 TEST_CASE("while the motor is on, and in the window in which it ends, speed may rise") {
@@ -84,7 +85,7 @@ TEST_CASE("while the motor is on, and in the window in which it ends, speed may 
   CHECK(still_on.run(103, 30.0).reason == Reason::speed_rises_with_motor_off);
 }
 
-TEST_CASE("nothing is said before two windows have passed") {
+TEST_CASE("the check finds nothing before two windows have passed") {
   Bench bench{.omega1 = 50.0, .omega2 = 50.0};
   CHECK(bench.run(98, 60.0).sound());
   CHECK(bench.run(5, 60.0).reason == Reason::speed_rises_with_motor_off);
@@ -117,7 +118,7 @@ TEST_CASE("both windows count towards what the motor should give") {
   CHECK(only_before.run(53, 0.0).reason == Reason::motor_no_response);
 }
 
-TEST_CASE("a motor that works against the brake is not judged") {
+TEST_CASE("a motor that works against the brake is not checked") {
   CHECK(found(0.0, 0.0, 1.0, 0.105).sound());
   CHECK(found(0.0, 0.0, 1.0, 0.095).reason == Reason::motor_no_response);
   Bench braked_before;
@@ -142,7 +143,7 @@ TEST_CASE("the brake takes at least three tenths of what it should") {
   CHECK(found(15.1, 0.0, 0.0, 3.0).reason == Reason::brake_no_response);
 }
 
-TEST_CASE("the brake is judged only while it acts in earnest through both windows, on a wheel that rolls, motor off") {
+TEST_CASE("the brake is checked only at 1.5 N m or more through both windows, on a rolling wheel, with the motor off") {
   Bench weak_before{.omega1 = 100.0, .omega2 = 100.0};
   CHECK(weak_before.run(1, 0.0, 0.0, 1.0).sound());
   CHECK(weak_before.run(102, 0.0, 0.0, 3.0).sound());

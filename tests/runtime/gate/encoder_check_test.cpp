@@ -1,7 +1,8 @@
+#include "runtime/encoder_check.hpp"
+
 #include <cmath>
 
 #include "catch.hpp"
-#include "runtime/encoder_check.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::runtime;
@@ -25,10 +26,10 @@ SpeedWindow speed_window(double omega1_rad_s, double omega2_rad_s, double brake_
           .brake_target_Nm = brake_Nm};
 }
 
-/// What is found in `count` speed_windows at these speeds.
-CheckResult run(EncoderCheck& watch, int count, double omega1_rad_s, double omega2_rad_s, double brake_Nm = 0.0) {
+/// The first fault in `count` speed windows at these speeds.
+CheckResult run(EncoderCheck& check, int count, double omega1_rad_s, double omega2_rad_s, double brake_Nm = 0.0) {
   for (int i = 0; i < count; ++i) {
-    const CheckResult found = watch.update(speed_window(omega1_rad_s, omega2_rad_s, brake_Nm));
+    const CheckResult found = check.update(speed_window(omega1_rad_s, omega2_rad_s, brake_Nm));
     if (!found.sound()) return found;
   }
   return {};
@@ -50,7 +51,7 @@ TEST_CASE("a wheel's speed stays within what it can gain and lose") {
   CHECK(doubtful_at(107.2));
 }
 
-TEST_CASE("the interval widens while readings are outside, and narrows with each that is not") {
+TEST_CASE("the interval widens while readings are outside and narrows with each reading inside") {
   SpeedInterval interval(100.0, 200.0, 250.0);
   static_cast<void>(interval.update(100.0, 1.0, 0.01));
   static_cast<void>(interval.update(80.0, 1.0, 0.01));  // low 93.5
@@ -107,7 +108,7 @@ TEST_CASE("three readings in a row make a fault, fewer do not") {
   CHECK(interval.update(0.0, 1.0, 0.01) == Verdict::stuck);
 }
 
-TEST_CASE("what the readings are tells stuck, reversed and jumping apart") {
+TEST_CASE("the readings tell a stuck, a reversed and a jumping encoder apart") {
   const auto verdict_of = [](double omega_rad_s) {
     SpeedInterval interval(100.0, 200.0, 250.0);
     static_cast<void>(interval.update(100.0, 1.0, 0.01));
@@ -138,38 +139,38 @@ TEST_CASE("each encoder's fault has its own reason") {
                                         {100.0, 150.0, Reason::encoder_lower_jumped, 150.0},
                                         {0.0, 0.0, Reason::encoders_lost, 0.0},
                                         {-100.0, -100.0, Reason::encoder_upper_reversed, -100.0}}));
-  EncoderCheck watch(limits());
-  CHECK(run(watch, 20, 100.0, 100.0).sound());
-  CHECK(run(watch, 2, row.omega1, row.omega2).sound());
-  const CheckResult found = watch.update(speed_window(row.omega1, row.omega2));
+  EncoderCheck check(limits());
+  CHECK(run(check, 20, 100.0, 100.0).sound());
+  CHECK(run(check, 2, row.omega1, row.omega2).sound());
+  const CheckResult found = check.update(speed_window(row.omega1, row.omega2));
   CHECK(found.reason == row.reason);
   CHECK(found.value == row.value);
 }
 
-TEST_CASE("both are lost only if both stand: one that stands and one in doubt for a moment") {
-  EncoderCheck watch(limits());
-  CHECK(run(watch, 20, 100.0, 100.0).sound());
-  CHECK(run(watch, 2, 100.0, 0.0).sound());
-  CHECK(run(watch, 1, 0.0, 0.0).reason == Reason::encoders_lost);
+TEST_CASE("both encoders are lost only if both stand still") {
+  EncoderCheck check(limits());
+  CHECK(run(check, 20, 100.0, 100.0).sound());
+  CHECK(run(check, 2, 100.0, 0.0).sound());
+  CHECK(run(check, 1, 0.0, 0.0).reason == Reason::encoders_lost);
 }
 
-TEST_CASE("a wheel that its brake locks is no fault, at the rate of the whole brake torque") {
-  EncoderCheck watch(limits());
+TEST_CASE("a wheel that the full brake torque locks is no fault") {
+  EncoderCheck check(limits());
   double omega1 = 170.0;
-  CHECK(run(watch, 20, omega1, 170.0).sound());
+  CHECK(run(check, 20, omega1, 170.0).sound());
   for (int i = 0; i < 200; ++i) {
     omega1 = std::max(0.0, omega1 - (9.03 + 2.2885) / 7.54e-3 * dt_s);
-    CHECK(watch.update(speed_window(omega1, 170.0 - 40.0 * dt_s * i, 9.03)).sound());
+    CHECK(check.update(speed_window(omega1, 170.0 - 40.0 * dt_s * i, 9.03)).sound());
   }
 }
 
 TEST_CASE("the lag between command and brake torque") {
-  EncoderCheck watch(limits());
-  static_cast<void>(watch.update(speed_window(100.0, 100.0, 3.0)));
+  EncoderCheck check(limits());
+  static_cast<void>(check.update(speed_window(100.0, 100.0, 3.0)));
   const double share = 20.37 * dt_s;
-  CHECK(watch.brake_torque_Nm() == Approx(3.0 * share / (1.0 + share)));
-  for (int i = 0; i < 500; ++i) static_cast<void>(watch.update(speed_window(100.0, 100.0, 3.0)));
-  CHECK(watch.brake_torque_Nm() == Approx(3.0));
+  CHECK(check.brake_torque_Nm() == Approx(3.0 * share / (1.0 + share)));
+  for (int i = 0; i < 500; ++i) static_cast<void>(check.update(speed_window(100.0, 100.0, 3.0)));
+  CHECK(check.brake_torque_Nm() == Approx(3.0));
   EncoderCheck ideal(plausibility_limits({}, true, {}));
   static_cast<void>(ideal.update(speed_window(100.0, 100.0, 3.0)));
   CHECK(ideal.brake_torque_Nm() == 3.0);
@@ -177,8 +178,8 @@ TEST_CASE("the lag between command and brake torque") {
 
 TEST_CASE("with the brake long released the wheels roll on each other") {
   const auto found = [](double omega1, double omega2) {
-    EncoderCheck watch(limits());
-    return run(watch, 60, omega1, omega2).reason;
+    EncoderCheck check(limits());
+    return run(check, 60, omega1, omega2).reason;
   };
   // Allowed: 0.3 m/s + 15 % of the faster one + two counts, in m/s: 1.937 at 100 rad/s.
   CHECK(found(81.0, 100.0) == Reason::none);
@@ -189,14 +190,14 @@ TEST_CASE("with the brake long released the wheels roll on each other") {
   CHECK(found(0.0, 5.2) == Reason::none);
   CHECK(found(0.0, 5.5) == Reason::encoder_upper_stuck);
   CHECK(found(6.0, 0.0) == Reason::encoder_lower_stuck);
-  EncoderCheck watch(limits());
-  CHECK(run(watch, 60, 75.0, 100.0).value == Approx(0.0995 * 75.0 - 0.099 * 100.0));
+  EncoderCheck check(limits());
+  CHECK(run(check, 60, 75.0, 100.0).value == Approx(0.0995 * 75.0 - 0.099 * 100.0));
 }
 
 TEST_CASE("a disagreement must last a tenth of a second, and begins anew after agreement") {
-  EncoderCheck watch(limits());
-  CHECK(run(watch, 49, 75.0, 100.0).sound());
-  CHECK(run(watch, 2, 75.0, 100.0).reason == Reason::encoders_disagree);
+  EncoderCheck check(limits());
+  CHECK(run(check, 49, 75.0, 100.0).sound());
+  CHECK(run(check, 2, 75.0, 100.0).reason == Reason::encoders_disagree);
   EncoderCheck again(limits());
   CHECK(run(again, 45, 75.0, 75.0 * 1.25).sound());
   CHECK(run(again, 1, 75.0, 75.0 * 1.22).sound());
@@ -204,19 +205,19 @@ TEST_CASE("a disagreement must last a tenth of a second, and begins anew after a
 }
 
 TEST_CASE("a wheel that was braked has three seconds to roll along again") {
-  EncoderCheck watch(limits());
-  CHECK(run(watch, 1, 75.0, 100.0, 0.5).sound());
-  CHECK(run(watch, 1499, 75.0, 100.0).sound());
-  CHECK(run(watch, 40, 75.0, 100.0).sound());
-  CHECK(run(watch, 20, 75.0, 100.0).reason == Reason::encoders_disagree);
+  EncoderCheck check(limits());
+  CHECK(run(check, 1, 75.0, 100.0, 0.5).sound());
+  CHECK(run(check, 1499, 75.0, 100.0).sound());
+  CHECK(run(check, 40, 75.0, 100.0).sound());
+  CHECK(run(check, 20, 75.0, 100.0).reason == Reason::encoders_disagree);
 }
 
 TEST_CASE("a braked wheel is not the faster one") {
-  // The torque passes 1 N m after about 10 speed_windows (3 N m through the lag), counts after 0.15 s more, and must
-  // then show the impossible for 0.05 s.
-  EncoderCheck watch(limits());
-  CHECK(run(watch, 105, 110.0, 100.0, 3.0).sound());
-  const CheckResult found = run(watch, 10, 110.0, 100.0, 3.0);
+  // The torque exceeds 1 N m after about 10 speed windows (3 N m through the lag). The check begins 0.15 s later and
+  // needs 0.05 s of impossible speeds.
+  EncoderCheck check(limits());
+  CHECK(run(check, 105, 110.0, 100.0, 3.0).sound());
+  const CheckResult found = run(check, 10, 110.0, 100.0, 3.0);
   CHECK(found.reason == Reason::slip_implausible);
   CHECK(found.value == Approx(1.0 - 0.0995 * 110.0 / (0.099 * 100.0)));
   const auto reason = [](double omega1, double omega2, double brake_Nm) {
@@ -231,14 +232,14 @@ TEST_CASE("a braked wheel is not the faster one") {
   CHECK(reason(110.0, 100.0, 1.02) == Reason::slip_implausible);
 }
 
-TEST_CASE("the faster braked wheel must last, and begins anew") {
-  EncoderCheck watch(limits());
-  CHECK(run(watch, 150, 100.0, 100.0, 3.0).sound());
-  CHECK(run(watch, 24, 110.0, 100.0, 3.0).sound());
-  CHECK(run(watch, 1, 104.0, 100.0, 3.0).sound());
-  CHECK(run(watch, 24, 110.0, 100.0, 3.0).sound());
-  CHECK(run(watch, 2, 110.0, 100.0, 3.0).reason == Reason::slip_implausible);
-  // A brake that lets go in between begins anew too.
+TEST_CASE("a faster braked wheel is a fault only after some time without interruption") {
+  EncoderCheck check(limits());
+  CHECK(run(check, 150, 100.0, 100.0, 3.0).sound());
+  CHECK(run(check, 24, 110.0, 100.0, 3.0).sound());
+  CHECK(run(check, 1, 104.0, 100.0, 3.0).sound());
+  CHECK(run(check, 24, 110.0, 100.0, 3.0).sound());
+  CHECK(run(check, 2, 110.0, 100.0, 3.0).reason == Reason::slip_implausible);
+  // A release of the brake in between restarts the time, too.
   EncoderCheck pulsed(limits());
   CHECK(run(pulsed, 80, 110.0, 100.0, 3.0).sound());
   CHECK(run(pulsed, 60, 100.0, 100.0, 0.1).sound());

@@ -14,31 +14,31 @@
 
 namespace abs_hil::commands {
 
-/// Carries out the commands that a run takes over LCM: checks who sends them, what they ask for and whether it can be
-/// done now, hands the change to the real-time thread, and answers when the record of a cycle shows that it holds.
-/// A sink behind the message stream, in its thread.
-class CommandDesk final : public rig::RecordSink {
+/// Carries out the remote commands that a run receives over LCM. It checks the sender, the request, and whether the
+/// request is possible now; it hands the change to the real-time thread; it answers when the record of a cycle shows
+/// the change. It is a sink behind the message stream and works in the stream's thread.
+class RemoteCommands final : public rig::RecordSink {
  public:
-  /// `stream` must outlive it. Throws what read_key throws where commands are enabled.
-  CommandDesk(const config::Settings& settings, telemetry::MessageStream& stream);
+  /// `stream` must outlive it. Throws what read_key throws if commands are enabled.
+  RemoteCommands(const config::Settings& settings, telemetry::MessageStream& stream);
 
-  /// Where changes go; without it every command is refused as one that comes too early.
-  void drive(experiment::AdjustmentMailbox& mailbox) { mailbox_ = &mailbox; }
-  /// Whose counts ABS_COMMAND_STATE tells.
-  void count(const telemetry::CommandListener& listener) { listener_ = &listener; }
+  /// Sets the mailbox that receives changes. Without a mailbox every command is refused as too early.
+  void set_mailbox(experiment::AdjustmentMailbox& mailbox) { mailbox_ = &mailbox; }
+  /// Sets the listener whose counts ABS_COMMAND_STATE publishes.
+  void set_listener(const telemetry::CommandListener& listener) { listener_ = &listener; }
 
-  /// The judge of the command listener.
+  /// Judges a command for the command listener (CommandJudge).
   [[nodiscard]] std::optional<telemetry::CommandAnswer> judge(const command2_t& command);
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
 
-  /// The run is over: refuses what has not taken effect, and all that is put before the judge from now on.
+  /// Ends the service with the run: refuses pending changes and every later command.
   void refuse_pending();
 
   [[nodiscard]] bool enabled() const noexcept { return authority_.has_value(); }
 
  private:
-  /// A change on its way to the real-time thread.
+  /// A change that the real-time thread has not yet confirmed.
   struct Pending {
     std::string key;
     double value{0.0};

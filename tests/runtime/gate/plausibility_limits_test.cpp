@@ -1,7 +1,8 @@
+#include "runtime/plausibility_limits.hpp"
+
 #include <cmath>
 
 #include "catch.hpp"
-#include "runtime/plausibility_limits.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::runtime;

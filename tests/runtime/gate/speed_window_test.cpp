@@ -1,5 +1,6 @@
-#include "catch.hpp"
 #include "runtime/speed_window.hpp"
+
+#include "catch.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::runtime;
@@ -19,7 +20,7 @@ rig::Measurement at(std::int64_t time_ns, std::int32_t upper = 0, std::int32_t l
 
 }  // namespace
 
-TEST_CASE("a speed_window is complete after about two cycles at 1 kHz, and begins where the one before ended") {
+TEST_CASE("a speed window is complete after about two cycles at 1 kHz and begins where the previous one ended") {
   SpeedWindows maker(limits());
   CHECK(maker.update(at(5 * ms, 100, 200), 5 * ms, {}).sound());
   CHECK_FALSE(maker.complete());
@@ -42,7 +43,7 @@ TEST_CASE("a speed_window is complete after about two cycles at 1 kHz, and begin
 TEST_CASE("commands count as long as they act") {
   SpeedWindows maker(limits());
   static_cast<void>(
-      maker.update(at(1 * ms), 1 * ms, {.motor_duty = 1.0, .brake_duty = 1.0}));  // before the speed_window
+      maker.update(at(1 * ms), 1 * ms, {.motor_duty = 1.0, .brake_duty = 1.0}));  // before the speed window
   static_cast<void>(maker.update(at(2 * ms), 2 * ms, {.motor_duty = 0.4, .brake_duty = 0.5}));
   static_cast<void>(maker.update(at(5 * ms), 5 * ms, {.motor_duty = 0.8, .brake_torque_Nm = 9.0}));
   REQUIRE(maker.complete());
@@ -66,7 +67,7 @@ TEST_CASE("no fresh measurement for 20 ms and five cycles is a fault") {
   CHECK(found.value == Approx(0.02));
 }
 
-TEST_CASE("one answer that was held up is no fault, five are") {
+TEST_CASE("one delayed answer is no fault, five are") {
   SpeedWindows maker(limits());
   static_cast<void>(maker.update(at(10 * ms), 10 * ms, {}));
   for (int i = 1; i < 5; ++i) CHECK(maker.update(at(10 * ms), (10 + 100 * i) * ms, {}).sound());
@@ -135,7 +136,7 @@ TEST_CASE("a counter that leaps is found in the same cycle, and its measurement 
   }
 }
 
-TEST_CASE("no speed_window ends on a reading that was held up, nor is it judged") {
+TEST_CASE("a delayed reading neither ends a speed window nor is checked") {
   SpeedWindows maker(limits());
   CHECK(maker.update(at(1 * ms), 1 * ms, {}).sound());
   CHECK(maker.update(at(4 * ms, 20'000), 4 * ms, {.motor_duty = 0.5}, false).sound());
