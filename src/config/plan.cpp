@@ -129,13 +129,13 @@ class Planner {
 
   [[nodiscard]] experiment::PhasePlan planned(const PhaseScript& phase) const {
     experiment::PhasePlan plan{.phase = kind_of(phase), .brake = phase.brake};
-    plan.motor_profile = course_or(phase.motor, plan.motor_duty);
+    plan.motor_profile = profile_or(phase.motor, plan.motor_duty);
     if (phase.brake == BrakeAction::slip_control) {
       // A constant too: it stands in place of control.slip_ref.
       if (phase.brake_profile) plan.slip_ref_profile = profile(*phase.brake_profile);
     } else {
       plan.brake_profile =
-          course_or(phase.brake_profile, phase.brake == BrakeAction::duty ? plan.brake_duty : plan.brake_torque_Nm);
+          profile_or(phase.brake_profile, phase.brake == BrakeAction::duty ? plan.brake_duty : plan.brake_torque_Nm);
     }
     for (const ConditionScript& script : phase.until) {
       if (!script.when || holds(*script.when, keys_)) plan.ends_on.push_back(condition(script));

@@ -94,6 +94,8 @@ class TableReader {
 
 /// Reads [series] and [vary].
 [[nodiscard]] SeriesScript read_series(const Source& source, const TableReader& root);
+/// False for the keys that say who runs a script, and on what.
+[[nodiscard]] bool script_may_set(std::string_view key) noexcept;
 /// Reads [settings].
 [[nodiscard]] std::vector<Setting> read_settings(const Source& source, const TableReader& root);
 

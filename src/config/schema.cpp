@@ -2,6 +2,8 @@
 
 #include "config/explain.hpp"
 #include "config/grammar.hpp"
+#include "config/key_table.hpp"
+#include "config/reader.hpp"
 
 namespace abs_hil::config {
 
@@ -41,6 +43,41 @@ Json number(const Field& field, bool unit_is_named) {
 
 Json list_of(Json items) { return {{"type", "array"}, {"items", std::move(items)}, {"minItems", 1}}; }
 
+Json schema_of(const Key& key) {
+  Json json = std::visit(
+      [&key](const auto* target) -> Json {
+        using Target = std::decay_t<decltype(*target)>;
+        if constexpr (std::is_same_v<Target, bool>) return {{"type", "boolean"}};
+        if constexpr (std::is_same_v<Target, std::string>) {
+          return key.allowed.empty() ? Json{{"type", "string"}} : Json{{"enum", key.allowed.list()}};
+        }
+        Json number = bounds(key.range);
+        if constexpr (std::is_integral_v<Target>) number["type"] = "integer";
+        return number;
+      },
+      key.target);
+  json["description"] = std::string(key.meaning) + (key.unit.empty() ? "" : ", in ") + std::string(key.unit);
+  return json;
+}
+
+/// The configuration keys that a script may set, nested as in a file. Names with dots in quotes are allowed as well.
+Json settings_table() {
+  Settings defaults;
+  Json json{{"type", "object"}};
+  const KeyTable table(defaults);
+  for (const Key& key : table.keys()) {
+    if (!script_may_set(key.name)) continue;
+    Json* place = &json;
+    for (std::size_t begin = 0, end = 0; end != std::string::npos; begin = end + 1) {
+      end = key.name.find('.', begin);
+      place = &(*place)["properties"][key.name.substr(begin, end - begin)];
+      if (end != std::string::npos) (*place)["type"] = "object";
+    }
+    *place = schema_of(key);
+  }
+  return json;
+}
+
 Json value_of(const Field& field, bool unit_is_named) {
   switch (field.shape) {
     case Shape::text:
@@ -71,7 +108,7 @@ Json value_of(const Field& field, bool unit_is_named) {
     case Shape::points:
       return list_of(
           {{"type", "array"}, {"minItems", 2}, {"maxItems", 2}, {"items", {{"type", {"number", "string"}}}}});
-    case Shape::settings:
+    case Shape::settings: return settings_table();
     case Shape::grid: return {{"type", "object"}};
   }
   return {};

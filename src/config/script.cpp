@@ -125,7 +125,7 @@ class Parser {
     phase.brake = what.field->name == "duty"     ? BrakeAction::duty
                   : what.field->name == "torque" ? BrakeAction::torque
                                                  : BrakeAction::slip_control;
-    phase.brake_profile = read_course(source_, what, read_file_, script_.files);
+    phase.brake_profile = read_profile_script(source_, what, read_file_, script_.files);
   }
 
   void read_limits(const toml::table& table, Place place) {

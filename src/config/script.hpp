@@ -61,8 +61,8 @@ struct PhaseScript {
   std::optional<When> when{};
   std::optional<ProfileScript> motor{};
   experiment::BrakeAction brake{experiment::BrakeAction::released};
-  std::optional<CourseScript> brake_profile{};  ///< duty, torque or slip reference; none: control.slip_ref
-  std::vector<ConditionScript> until{};         ///< any of them
+  std::optional<ProfileScript> brake_profile{};  ///< duty, torque or slip reference; none: control.slip_ref
+  std::vector<ConditionScript> until{};          ///< any of them
   std::optional<Number> at_most{};
   Place place{};
 };

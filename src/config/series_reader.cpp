@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "config/reader.hpp"
@@ -14,11 +15,7 @@ constexpr std::array<std::string_view, 5> not_for_scripts{"driver.", "realtime."
                                                           "experiment.name"};
 
 void refuse_foreign(const Source& source, std::string_view key, Place place) {
-  for (const std::string_view start : not_for_scripts) {
-    if (key.starts_with(start)) {
-      source.fail(place, fmt::format("a script must not set {}; use --config or --set", key));
-    }
-  }
+  if (!script_may_set(key)) source.fail(place, fmt::format("a script must not set {}; use --config or --set", key));
 }
 
 std::string dotted(const std::string& prefix, std::string_view name) {
@@ -98,6 +95,10 @@ void add_varied(const Source& source, const toml::table& table, const std::strin
 }
 
 }  // namespace
+
+bool script_may_set(std::string_view key) noexcept {
+  return std::ranges::none_of(not_for_scripts, [key](std::string_view start) { return key.starts_with(start); });
+}
 
 std::vector<Setting> read_settings(const Source& source, const TableReader& root) {
   std::vector<Setting> settings;

@@ -23,3 +23,15 @@ TEST_CASE("the schema knows every key of every table with its unit, and refuses 
   CHECK(phase["required"] == nlohmann::ordered_json{"name", "until"});
   CHECK(schema["$defs"]["until"]["properties"]["any"]["items"]["$ref"] == "#/$defs/until");
 }
+
+TEST_CASE("the schema knows the configuration keys that a script may set, with their ranges") {
+  const auto settings = config::schema()["properties"]["settings"]["properties"];
+  const auto& control = settings["control"]["properties"];
+  CHECK(control["slip_ref"]["exclusiveMinimum"] == 0);
+  CHECK(control["slip_ref"]["exclusiveMaximum"] == 1);
+  CHECK(control["adaptive"]["properties"]["gamma"]["maximum"] == 1e4);
+  CHECK(control["controller"]["enum"][0] == "adaptive");
+  CHECK(settings["plant"]["properties"]["ideal_actuator"]["type"] == "boolean");
+  for (const char* foreign : {"driver", "realtime", "guardian", "commands"}) CHECK_FALSE(settings.contains(foreign));
+  CHECK_FALSE(settings["experiment"]["properties"].contains("name"));
+}

@@ -120,7 +120,8 @@ enum class FoundAgain : std::uint8_t {
   ROW(controller_silent, 163, fault, no, "the controller gave no sign of life for guardian.timeout_ms")               \
   ROW(safe_state_unverified, 164, fault, no, "the controller could not verify the safe state")                        \
   ROW(run_time_limit, 200, fault, yes, "run exceeded the experiment's time limit")                                    \
-  ROW(run_distance_limit, 201, fault, yes, "car went further than the experiment's limit")
+  ROW(run_distance_limit, 201, fault, yes, "car went further than the experiment's limit")                            \
+  /* the end of the rows */
 // clang-format on
 
 /// Why a phase changed, a command was refused or a run ended. These are plain numbers, so that the real-time thread
