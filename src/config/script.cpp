@@ -122,9 +122,9 @@ class Parser {
                                                reader.entries().size()));
     }
     const Entry& what = reader.entries().front();
-    phase.brake = what.field->name == "duty"     ? BrakeAction::duty
-                  : what.field->name == "torque" ? BrakeAction::torque
-                                                 : BrakeAction::slip_control;
+    phase.brake = what.field->facts.key == "duty"     ? BrakeAction::duty
+                  : what.field->facts.key == "torque" ? BrakeAction::torque
+                                                      : BrakeAction::slip_control;
     phase.brake_profile = read_profile_script(source_, what, read_file_, script_.files);
   }
 

@@ -16,15 +16,21 @@ namespace abs_hil::driver {
          command.brake_torque_Nm >= 0.0;
 }
 
+/// Most counts that a counter can move in `elapsed_ns`, which is >= 0, at a speed of at most `speed_rad_s`.
+[[nodiscard]] inline double most_plausible_counts(std::int64_t elapsed_ns, double speed_rad_s,
+                                                  std::int32_t counts_per_rev) noexcept {
+  /// Counts allowed in addition to what the speed explains, because of vibration, late reads and delays on a bus.
+  constexpr double slack_counts = 256.0;
+  return slack_counts +
+         speed_rad_s * static_cast<double>(elapsed_ns) * rig::s_per_ns / rig::radians_per_count(counts_per_rev);
+}
+
 /// True if a counter can have moved from `before` to `after` in `elapsed_ns`, which is >= 0.
 /// @param speed_rad_s largest plausible speed
 [[nodiscard]] inline bool plausible_travel(std::int32_t before, std::int32_t after, std::int64_t elapsed_ns,
                                            double speed_rad_s, std::int32_t counts_per_rev) noexcept {
-  /// Counts allowed in addition to what the speed explains, because of vibration and late reads.
-  constexpr double slack_counts = 256.0;
-  const double most = slack_counts + speed_rad_s * static_cast<double>(elapsed_ns) * rig::s_per_ns /
-                                         rig::radians_per_count(counts_per_rev);
-  return std::abs(static_cast<double>(rig::counts_between(before, after))) <= most;
+  return std::abs(static_cast<double>(rig::counts_between(before, after))) <=
+         most_plausible_counts(elapsed_ns, speed_rad_s, counts_per_rev);
 }
 
 }  // namespace abs_hil::driver

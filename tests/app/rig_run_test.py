@@ -86,7 +86,7 @@ class RigRun(RigTest):
         self.assertIn('driver.emulated=true', result.stderr)
         result = self.lock_step(emulator)
         self.assertEqual(result.returncode, 3)
-        self.assertIn('has no file emulated_time_ns: it is hardware', result.stderr)
+        self.assertIn('keeps its own time: it is hardware', result.stderr)
 
 
 if __name__ == '__main__':

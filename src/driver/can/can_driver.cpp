@@ -12,6 +12,7 @@
 #include "driver/can/bus_load.hpp"
 #include "driver/can/signal_codec.hpp"
 #include "driver/encoder_sign.hpp"
+#include "driver/lock_step.hpp"
 #include "driver/monotonic_time.hpp"
 #include "driver/plausibility.hpp"
 
@@ -120,16 +121,7 @@ void CanDriver::do_configure() {
                       std::to_string(protocol_version) + ": update the node's firmware (docs/can.md)");
   }
   const bool waits_for_lock_step = (identity_.features & feature::lock_step) != 0;
-  if (lock_step_ && !waits_for_lock_step) {
-    throw Unavailable(node +
-                      " keeps its own time: it is hardware, or an emulator in real time. Omit --fast, or start "
-                      "abs_rig_emulator with --lock-step");
-  }
-  if (!lock_step_ && waits_for_lock_step) {
-    throw Unavailable(node +
-                      " is an emulator in lock-step: give --fast --set driver.emulated=true to advance its time, or "
-                      "start abs_rig_emulator without --lock-step");
-  }
+  require_lock_step("the node on " + link_.place, lock_step_, waits_for_lock_step);
   const bool node_can_fd = (identity_.features & feature::can_fd) != 0;
   if (options_.fd == "on" && !node_can_fd) {
     throw Unavailable(node + " does not support CAN FD (driver.can.fd=on): set driver.can.fd=auto");

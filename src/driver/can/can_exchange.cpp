@@ -10,6 +10,7 @@
 #include "driver/can/can_driver.hpp"
 #include "driver/can/error_frame.hpp"
 #include "driver/monotonic_time.hpp"
+#include "driver/plausibility.hpp"
 
 namespace abs_hil::driver::can {
 
@@ -17,8 +18,6 @@ namespace {
 
 /// Most frames that one cycle reads. An answer has 4.
 constexpr int most_frames_in_a_cycle = 64;
-/// Counts allowed in addition to what the speed explains, because of vibration and delays on the bus.
-constexpr double plausible_slack_counts = 256.0;
 /// Largest difference between the node's clock and ours over one interval. The node may answer at any time within the
 /// timeout.
 constexpr std::int64_t clock_slack_ns = 10'000'000;
@@ -205,9 +204,8 @@ IoResult CanDriver::tripped() noexcept {
 bool CanDriver::advance_counts(const Answer& answer, std::int64_t elapsed_ns) noexcept {
   const std::array<std::int32_t, 2> raw{answer.upper_counts, answer.lower_counts};
   const std::array<std::int32_t, 2> signs{options_.upper_sign, options_.lower_sign};
-  const double most = plausible_slack_counts + options_.plausible_speed_rad_s * static_cast<double>(elapsed_ns) *
-                                                   rig::s_per_ns /
-                                                   rig::radians_per_count(options_.encoder_counts_per_rev);
+  const double most =
+      most_plausible_counts(elapsed_ns, options_.plausible_speed_rad_s, options_.encoder_counts_per_rev);
   for (std::size_t wheel = 0; wheel < raw.size(); ++wheel) {
     const std::int32_t moved = travelled(raw_counts_[wheel], raw[wheel], answer.count_bits);
     if (std::abs(static_cast<double>(moved)) > most) return false;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <system_error>
 
+#include "driver/lock_step.hpp"
 #include "driver/pci/register_map.hpp"
 #include "driver/pci/sysfs_window.hpp"
 
@@ -140,15 +141,7 @@ Card open_card(const PciOptions& options, bool lock_step) {
   check_bar(folder);
   std::error_code ignored;
   const bool waits_for_lock_step = fs::exists(folder / emulated_time_file, ignored);
-  if (lock_step && !waits_for_lock_step) {
-    refuse(folder.string() + " has no file " + emulated_time_file +
-           ": it is hardware, or an emulator in real time. Omit --fast, or start abs_rig_emulator with --lock-step");
-  }
-  if (!lock_step && waits_for_lock_step) {
-    refuse(folder.string() +
-           " is an emulator in lock-step: give --fast --set driver.emulated=true to advance its time, or start "
-           "abs_rig_emulator without --lock-step");
-  }
+  require_lock_step("the card in " + folder.string(), lock_step, waits_for_lock_step);
   Card card{.window = std::make_unique<SysfsWindow>(folder / "resource2"), .place = bdf + " in " + options.root};
   if (lock_step) card.time = std::make_unique<EmulatedTimeFile>(folder / emulated_time_file);
   return card;

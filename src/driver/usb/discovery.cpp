@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "abs_hil/driver/io_result.hpp"
+#include "driver/lock_step.hpp"
 
 namespace abs_hil::driver::usb {
 
@@ -100,16 +101,7 @@ UsbDevice choose_board(const UsbOptions& options, bool lock_step, bool emulated)
            "\") is not an emulator, but driver.emulated=true says so: remove that key");
   }
   const bool waits_for_lock_step = board.product.ends_with(lock_step_mark);
-  if (lock_step && !waits_for_lock_step) {
-    refuse("USB board " + board.text() +
-           " is hardware, or an emulator in real time (its product string does not end with \"" + lock_step_mark +
-           "\"). Omit --fast, or start abs_rig_emulator with --usb --lock-step");
-  }
-  if (!lock_step && waits_for_lock_step) {
-    refuse("USB board " + board.text() +
-           " is an emulator in lock-step: give --fast --set driver.emulated=true to advance its time, or start "
-           "abs_rig_emulator without --lock-step");
-  }
+  require_lock_step("USB board " + board.text(), lock_step, waits_for_lock_step, "--usb --lock-step");
   return board;
 }
 

@@ -182,7 +182,7 @@ TEST_CASE("A guardian runs beside the owner and keeps other processes away from 
 TEST_CASE("Lock-step works only with an emulator in lock-step") {
   const Tree tree;
   tree.add("0000:04:01.0");
-  CHECK_THAT(refusal(tree.options, true), Contains("has no file emulated_time_ns: it is hardware"));
+  CHECK_THAT(refusal(tree.options, true), Contains("keeps its own time: it is hardware"));
   tree.put("0000:04:01.0", emulated_time_file, std::string(8, '\0'));
   CHECK_THAT(refusal(tree.options, false), Contains("emulator in lock-step"));
   Card card = open_card(tree.options, true);
