@@ -4,6 +4,7 @@
 
 #include <fstream>
 
+#include "abs_hil/adjustment_t.hpp"
 #include "catch.hpp"
 #include "telemetry/message_capture.hpp"
 #include "telemetry/sample_records.hpp"
