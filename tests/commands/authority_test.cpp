@@ -28,7 +28,7 @@ TEST_CASE("A key that is not secret, or missing, is refused with its file and th
     ::chmod(file.c_str(), mode);
     return file;
   };
-  CHECK_THAT(refusal(""), Contains("none given") && Contains("--set commands.key_file=commands.key"));
+  CHECK_THAT(refusal(""), Contains("not set") && Contains("--set commands.key_file=commands.key"));
   CHECK_THAT(refusal(scratch / "nowhere"),
              Contains("nowhere' cannot be read: No such file") && Contains("openssl rand"));
   CHECK_THAT(refusal(scratch.path), Contains("is not a regular file"));

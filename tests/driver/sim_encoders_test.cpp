@@ -71,9 +71,10 @@ TEST_CASE("The seed sets the phase within a count: the same gives the same count
 }
 
 TEST_CASE("The counters wrap at 32 bits, and differences are right across the wrap") {
-  // So fine an encoder that the counters wrap within a few turns.
+  // The finest encoder, under full drive: the upper wheel needs 2^31 counts, 2,147 turns, which take about 70 s.
+  constexpr int counts_per_rev = 1'000'000;
   PlantOptions plant;
-  plant.rig.encoder_counts_per_rev = 1 << 30;
+  plant.rig.encoder_counts_per_rev = counts_per_rev;
   SimDriver driver(plant, {.start_speed_rad_s = 170.0});
   driver.configure();
   driver.activate(0);
@@ -81,15 +82,16 @@ TEST_CASE("The counters wrap at 32 bits, and differences are right across the wr
   REQUIRE(driver.read(0, before).ok());
   std::int64_t upper_total = 0;
   bool wrapped = false;
-  for (int tick = 1; tick <= 300; ++tick) {
+  for (int tick = 1; tick <= 90'000; ++tick) {
     Measurement now;
+    REQUIRE(driver.write({.motor_duty = 1.0, .motor_enable = true}).ok());
     REQUIRE(driver.read(tick * ms, now).ok());
     wrapped = wrapped || now.upper_counts < before.upper_counts;
     upper_total += abs_hil::rig::counts_between(before.upper_counts, now.upper_counts);
     before = now;
   }
   const double true_counts =
-      driver.plant().state().angle1_rad * static_cast<double>(1 << 30) / (2.0 * std::numbers::pi);
+      driver.plant().state().angle1_rad * static_cast<double>(counts_per_rev) / (2.0 * std::numbers::pi);
   CHECK(wrapped);
   CHECK(std::abs(static_cast<double>(upper_total) - true_counts) < 1.0);
 }

@@ -35,8 +35,7 @@ TEST_CASE("a CAN node whose owner fell silent is taken over and left safe") {
     for (const rig::Command& command : {driving, braking}) {
       test::NodeOnSocket node({.start_speed_rad_s = 30.0});
       const auto make = [&] {
-        return std::make_unique<driver::can::CanDriver>(driver::can::CanOptions{.answer_timeout_us = 200'000},
-                                                        node.opener(can_fd), true);
+        return std::make_unique<driver::can::CanDriver>(driver::can::CanOptions{}, node.opener(can_fd), true);
       };
       const auto owner = make();
       drive(*owner, command);
@@ -56,7 +55,7 @@ TEST_CASE("a CAN node whose owner fell silent is taken over and left safe") {
 TEST_CASE("a CAN node counts as safe only once it answers") {
   test::NodeOnSocket node({.start_speed_rad_s = 30.0});
   const auto make = [&] {
-    return std::make_unique<driver::can::CanDriver>(driver::can::CanOptions{.answer_timeout_us = 20'000}, node.opener(),
+    return std::make_unique<driver::can::CanDriver>(driver::can::CanOptions{.answer_timeout_us = 8'000}, node.opener(),
                                                     true);
   };
   const auto owner = make();

@@ -28,8 +28,8 @@ TEST_CASE("an invalid specification is refused by name and range") {
   CHECK_THROWS_WITH(Variation::parse("theta=-0.1"), Contains("theta=-0.1"));
   CHECK_THROWS_WITH(Variation::parse("theta=nan"), Contains("theta=nan"));
   CHECK_THROWS_WITH(Variation::parse("theta"), Contains("magnitude"));
-  CHECK_THROWS_WITH(Variation::parse("theta=0.1,"), Contains("not known"));
-  CHECK_THROWS_WITH(Variation::parse(""), Contains("not known"));
+  CHECK_THROWS_WITH(Variation::parse("theta=0.1,"), Contains("is unknown"));
+  CHECK_THROWS_WITH(Variation::parse(""), Contains("is unknown"));
   CHECK_THROWS_WITH(Variation::parse("phase=1"), Contains("phase=1"));
 }
 
