@@ -15,7 +15,7 @@ import tempfile
 BUDGETS = [
     ('observers, adaptive controller, gate',
      ['abs_hil::control::TrackingObserver::update*', 'abs_hil::control::AdaptiveController::step*',
-      'abs_hil::runtime::CommandGate::check*'], 1000),
+      'abs_hil::runtime::CommandGate::check(*'], 1000),
     # 1,500 until the sequence took conditions from experiment files and controllers could be adjusted live (some 40).
     ('the same with sequence and actuator: all of "control"', ['counted_control'], 1550),
     ('plausibility of the measurement', ['counted_watch'], 300),
