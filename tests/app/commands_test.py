@@ -128,7 +128,7 @@ def live_changes(folder, key):
                                 (('gain', 'control.adaptive.gamma', '30'), 0, 'gamma = 30'),
                                 (('slip-ref', '1.5'), 1, '(0, 1)'), (('gain', 'gamma', '-1'), 1, '(0, 10000]'),
                                 (('gain', 'control.rate_Hz', '100'), 1, 'cannot be changed'),
-                                (('gain', 'nosuch', '1'), 1, 'no key'), (('gain', 'zeta0', '1'), 1, 'cannot be changed')]:
+                                (('gain', 'nosuch', '1'), 1, 'unknown key'), (('gain', 'zeta0', '1'), 1, 'cannot be changed')]:
         found, said = send(*words)
         check(found == status and text in said, f'send {" ".join(words)}', found, said)
     # A recorded message cannot be used again, neither forged nor changed.
