@@ -8,7 +8,7 @@ namespace abs_hil::guardian {
 struct GuardianOptions {
   ABS_HIL_OPTIONS(GuardianOptions);
   ABS_HIL_OPTION(bool, enabled, true,
-                 .meaning = "dead-man process beside a run on a board; off only with driver.emulated");
+                 .meaning = "guardian: watchdog process beside a run on a board; off only with driver.emulated");
   ABS_HIL_OPTION(double, timeout_ms, 20.0, .unit = "ms",
                  .meaning = "time without a sign of life of the cycle after which the guardian acts",
                  .range = rig::between(2, 1000));

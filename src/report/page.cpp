@@ -110,7 +110,7 @@ std::string report_page(const PageContents& contents) {
     if (picture.figure->id.starts_with("series")) continue;
     (picture.figure->id == "timing" ? timing : pictures) += picture_html(picture);
   }
-  body += section(runs.size() == 1 ? "Profile of the run" : "Profiles of the runs", pictures);
+  body += section(runs.size() == 1 ? "Time history of the run" : "Time histories of the runs", pictures);
   const std::string differences = differences_table(runs);
   if (runs.size() > 1) {
     body +=

@@ -54,7 +54,7 @@ Figure profile_figure(const std::vector<RunFiles>& runs, const std::vector<RunSu
                       std::vector<LegendEntry> legend) {
   Figure figure;
   figure.id = "profile";
-  figure.heading = runs.size() == 1 ? "Profile of the run" : "Profile of the runs";
+  figure.heading = runs.size() == 1 ? "Time history of the run" : "Time histories of the runs";
   figure.x_label = "time since the start of the run, {/:Italic t} / s";
   Range x{surveys.front().from_s, surveys.front().to_s};
   for (const RunSurvey& survey : surveys) {
