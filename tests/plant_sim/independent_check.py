@@ -9,7 +9,7 @@ fourth-order steps. What the program recorded of its actuators is all that goes 
 and distance must come out within 0.1 %.
 
 Runs whose slip dynamics are stable are followed from start to end. With slip control past the peak of the magic formula
-they are not (an error grows by e^34 in a stop from 170 rad/s, whoever integrates), so there the state is taken over from
+they are not (an error grows by e^34 in a stop from 170 rad/s, with any integrator), so there the state is taken over from
 the record every 50 ms.
 """
 import csv

@@ -137,7 +137,7 @@ TEST_CASE("channels whose names make the same file name get files of their own")
   CHECK(content(scratch / "many.lcmlog") == content(scratch / "back.lcmlog"));
 }
 
-TEST_CASE("a damaged log is an error that names the place, wherever it is cut or overwritten") {
+TEST_CASE("a log that is cut or overwritten at any place is an error that names the place") {
   const abs_hil::test::TemporaryFolder scratch;
   record(scratch / "run.lcmlog", scratch / "own.csv");
   const std::string whole = content(scratch / "run.lcmlog").substr(0, 3000);
