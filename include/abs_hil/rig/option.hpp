@@ -15,8 +15,8 @@
 //
 //   struct RelayOptions {
 //     ABS_HIL_OPTIONS(RelayOptions);
-//     ABS_HIL_OPTION(double, threshold, 0.0447, .meaning = "slip that releases the brake", .range =
-//     rig::from_zero(0.99));
+//     ABS_HIL_OPTION(double, threshold, 0.0447, .meaning = "slip that releases the brake",
+//                    .range = rig::from_zero(0.99));
 //   };
 //
 // The struct stays an aggregate, and code reads an option as a member. The rows give everything else: the
