@@ -9,7 +9,6 @@
 #include <cstring>
 #include <exception>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 
@@ -83,11 +82,8 @@ GuardianSetup set_up() {
   GuardianSetup setup{.launch = guardian::parse_launch_config(inherited_text(guardian::inherited_launch_config))};
   config::KeyTable keys(setup.settings);
   // Only these tables: others may name things that the guardian does not know, such as a user's own controller.
-  const auto config = nlohmann::ordered_json::parse(setup.launch.config_json);
-  for (const char* table : {"driver", "guardian", "realtime", "telemetry"}) {
-    const nlohmann::ordered_json part{{table, config.at(table)}};
-    static_cast<void>(config::load_json(part, keys, "the controller's configuration"));
-  }
+  config::load_tables(setup.launch.config_json, {"driver", "guardian", "realtime", "telemetry"}, keys,
+                      "the controller's configuration");
   setup.writer = driver::make_safe_state_writer(setup.settings.driver);
   setup.writer->prepare();
   const runtime::RealtimeOptions realtime = realtime_options(setup.settings, setup.launch.realtime);

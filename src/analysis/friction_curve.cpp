@@ -2,9 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "abs_hil/rig/encoder_scale.hpp"
@@ -28,20 +27,27 @@ struct Motion {
   double alpha_rad_s2;
 };
 
-/// Least-squares cubic; one column of `angles` per wheel.
-using Angles = Eigen::Matrix<double, Eigen::Dynamic, 2>;
+/// Least-squares cubics through points that arrive one by one, one column of `values` for each cubic. The points should
+/// lie within [-1, 1]: that keeps the normal equations well conditioned. Matrices of fixed size compile fast.
+template <int columns>
+class CubicFit {
+ public:
+  void add(double x, const Eigen::Matrix<double, 1, columns>& values) {
+    const Eigen::Vector4d powers{1.0, x, x * x, x * x * x};
+    normal_ += powers * powers.transpose();
+    moments_ += powers * values;
+  }
+  /// Coefficients from the constant upwards.
+  [[nodiscard]] Eigen::Matrix<double, 4, columns> coefficients() const { return normal_.ldlt().solve(moments_); }
 
-std::array<Motion, 2> fitted(const Eigen::VectorXd& times_s, const Angles& angles_rad) {
-  // Times in units of the half window keep the normal equations well conditioned.
-  Eigen::Matrix<double, Eigen::Dynamic, 4> powers(times_s.size(), 4);
-  const Eigen::ArrayXd x = times_s.array() / half_window_s;
-  powers << Eigen::ArrayXd::Ones(x.size()), x, x.square(), x.cube();
-  const Eigen::Matrix4d normal = powers.transpose() * powers;
-  const Eigen::Matrix<double, 4, 2> c = normal.ldlt().solve(powers.transpose() * angles_rad);
-  const auto motion = [&c](Eigen::Index wheel) {
-    return Motion{c(1, wheel) / half_window_s, 2.0 * c(2, wheel) / (half_window_s * half_window_s)};
-  };
-  return {motion(0), motion(1)};
+ private:
+  Eigen::Matrix4d normal_ = Eigen::Matrix4d::Zero();
+  Eigen::Matrix<double, 4, columns> moments_ = Eigen::Matrix<double, 4, columns>::Zero();
+};
+
+/// Wheel `wheel`'s motion in the middle of a window, of the cubics through the angles over the time / half window.
+Motion motion_of(const Eigen::Matrix<double, 4, 2>& cubics, int wheel) {
+  return {cubics(1, wheel) / half_window_s, 2.0 * cubics(2, wheel) / (half_window_s * half_window_s)};
 }
 
 /// The peak of a cubic in ln(slip) through the points near the largest force.
@@ -53,24 +59,19 @@ void find_peak(FrictionCurveResult& result) {
     if (point.slip > 0.0 && point.force_N > near_peak * largest_N) near.push_back(point);
   }
   if (near.size() < least_peak_points) return;
-  const auto n = static_cast<Eigen::Index>(near.size());
-  Eigen::ArrayXd x(n);
-  Eigen::VectorXd force(n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    x[i] = std::log(near[static_cast<std::size_t>(i)].slip);
-    force[i] = near[static_cast<std::size_t>(i)].force_N;
-  }
-  const double middle = x.mean();
-  Eigen::Matrix<double, Eigen::Dynamic, 4> powers(n, 4);
-  const Eigen::ArrayXd from_middle = x - middle;
-  powers << Eigen::ArrayXd::Ones(n), from_middle, from_middle.square(), from_middle.cube();
-  const Eigen::Vector4d c = powers.colPivHouseholderQr().solve(force);
-  const double least = x.minCoeff();
-  const double most = x.maxCoeff();
+  const auto [low, high] = std::ranges::minmax_element(near, {}, &FrictionPoint::slip);
+  const double least = std::log(low->slip);
+  const double most = std::log(high->slip);
+  if (least == most) return;
+  CubicFit<1> fit;
+  const auto scaled = [&](double log_slip) { return (2.0 * log_slip - least - most) / (most - least); };
+  for (const FrictionPoint& point : near)
+    fit.add(scaled(std::log(point.slip)), Eigen::Matrix<double, 1, 1>{point.force_N});
+  const Eigen::Vector4d c = fit.coefficients();
   int best = 0;
   double best_N = -1.0;
   for (int i = 0; i <= grid; ++i) {
-    const double at = std::lerp(least, most, static_cast<double>(i) / grid) - middle;
+    const double at = scaled(std::lerp(least, most, static_cast<double>(i) / grid));
     const double value_N = c[0] + at * (c[1] + at * (c[2] + at * c[3]));
     if (value_N > best_N) {
       best_N = value_N;
@@ -114,16 +115,16 @@ FrictionCurveResult FrictionCurve::result() const {
     while (samples_[first].time_s < middle.time_s - half_window_s) ++first;
     while (end < samples_.size() && samples_[end].time_s <= middle.time_s + half_window_s) ++end;
     if (end - first < least_samples) continue;
-    const auto n = static_cast<Eigen::Index>(end - first);
-    Eigen::VectorXd times_s(n);
-    Angles angles_rad(n, 2);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const Sample& sample = samples_[first + static_cast<std::size_t>(i)];
-      times_s[i] = sample.time_s - middle.time_s;
-      angles_rad(i, 0) = static_cast<double>(sample.upper - middle.upper) * rad_per_count_;
-      angles_rad(i, 1) = static_cast<double>(sample.lower - middle.lower) * rad_per_count_;
+    CubicFit<2> fit;
+    for (std::size_t i = first; i < end; ++i) {
+      const Sample& sample = samples_[i];
+      fit.add((sample.time_s - middle.time_s) / half_window_s,
+              {static_cast<double>(sample.upper - middle.upper) * rad_per_count_,
+               static_cast<double>(sample.lower - middle.lower) * rad_per_count_});
     }
-    const auto [upper, lower] = fitted(times_s, angles_rad);
+    const Eigen::Matrix<double, 4, 2> cubics = fit.coefficients();
+    const Motion upper = motion_of(cubics, 0);
+    const Motion lower = motion_of(cubics, 1);
     const double v_x_m_s = wheels_.r2_m * lower.omega_rad_s;
     if (v_x_m_s < slow_m_s) continue;
     result.points.push_back(

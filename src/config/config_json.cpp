@@ -45,4 +45,13 @@ std::vector<std::string> load_json(const nlohmann::ordered_json& config, KeyTabl
   return unknown;
 }
 
+void load_tables(std::string_view text, std::initializer_list<const char*> tables, KeyTable& keys,
+                 std::string_view origin) try {
+  const auto config = nlohmann::ordered_json::parse(text);
+  std::vector<std::string> unknown;
+  for (const char* table : tables) set_values(config.at(table), table, keys, origin, unknown);
+} catch (const nlohmann::json::exception& error) {
+  throw ConfigError(std::string(origin) + ": " + error.what());
+}
+
 }  // namespace abs_hil::config

@@ -1,6 +1,7 @@
 #include "config/key_table.hpp"
 
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <string>
 

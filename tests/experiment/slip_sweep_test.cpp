@@ -1,4 +1,5 @@
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "abs_hil/rig/tyre_curve.hpp"
 #include "analysis/friction_curve.hpp"

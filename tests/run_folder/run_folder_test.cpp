@@ -1,6 +1,7 @@
 #include "run_folder/run_folder.hpp"
 
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "catch.hpp"

@@ -1,3 +1,7 @@
 # The warnings of all our targets; each is an error.
 add_library(abs_hil_warnings INTERFACE)
 target_compile_options(abs_hil_warnings INTERFACE -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror)
+
+# For code beside the cycle, see cmake/Rooms.cmake.
+add_library(abs_hil_beside_the_cycle INTERFACE)
+target_compile_options(abs_hil_beside_the_cycle INTERFACE $<$<CONFIG:Release>:-O1>)
