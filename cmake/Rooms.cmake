@@ -23,5 +23,5 @@ set(ABS_HIL_ROOM_TABLE
   "study | simulated runs in this process, controllers side by side over varied plants, search for gains | rig control plant_sim driver driver_sim runtime guardian experiment analysis config"
   "commands | remote commands over LCM: authority, listener, sender | rig control plant_sim driver runtime guardian experiment config telemetry lcmtypes"
   "replay | recorded runs through the cycle again: proof of equal commands, other controllers open loop | rig control plant_sim driver driver_sim runtime guardian experiment config telemetry lcmtypes"
-  "program | what `abs_hil` decides between its command line and the other rooms | rig control plant_sim driver driver_sim runtime guardian experiment lcmtypes telemetry watch analysis run_folder diagnosis config study commands replay"
+  "program | what `abs_hil` decides between its command line and the other rooms | cli rig control plant_sim driver driver_sim runtime guardian experiment lcmtypes telemetry watch analysis run_folder diagnosis config study commands replay"
 )
