@@ -2,6 +2,7 @@
 # libraries, their include folders, the check of includes (tests/rooms) and the table in docs/architecture.md are made
 # from it. A room knows only rooms above it, so there is no circle.
 set(ABS_HIL_ROOM_TABLE
+  "cli | options and subcommands of a program as rows, the only source that includes CLI11 | "
   "rig | the vocabulary: measurement, command, parameters, brake map, tyre curve, cycle record, the tables of quantities, reasons and options' rows | "
   "control | the paper's laws, slip controllers, speed observer, brake actuator model, their options | rig"
   "plant_sim | the simulated wheels, tyre, brake, motor, encoders, roads, their options | rig"
@@ -22,9 +23,9 @@ set(ABS_HIL_ROOM_TABLE
   "study | simulated runs in this process, controllers side by side over varied plants, search for gains | rig control plant_sim driver driver_sim runtime guardian experiment analysis config"
   "commands | remote commands over LCM: authority, listener, sender | rig control plant_sim driver runtime guardian experiment config telemetry lcmtypes"
   "replay | recorded runs through the cycle again: proof of equal commands, other controllers open loop | rig control plant_sim driver driver_sim runtime guardian experiment config telemetry lcmtypes"
-  "program | what `abs_hil` decides between its command line and the other rooms | rig control plant_sim driver driver_sim runtime guardian experiment lcmtypes telemetry watch analysis run_folder diagnosis config study commands replay"
+  "program | what `abs_hil` decides between its command line and the other rooms | cli rig control plant_sim driver driver_sim runtime guardian experiment lcmtypes telemetry watch analysis run_folder diagnosis config study commands replay"
 )
 
 # Rooms whose code neither runs in the cycle nor takes a noticeable time beside it. A release compiles them with -O1,
 # which saves about a third of their compile time.
-set(ABS_HIL_ROOMS_BESIDE_THE_CYCLE watch analysis report run_folder diagnosis config study commands replay program)
+set(ABS_HIL_ROOMS_BESIDE_THE_CYCLE cli watch analysis report run_folder diagnosis config study commands replay program)

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
 #include <fstream>
@@ -9,9 +8,11 @@
 #include <optional>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/result_file.hpp"
+#include "cli/command_line.hpp"
 #include "report/export.hpp"
 #include "report/input_error.hpp"
 #include "report/report.hpp"
@@ -24,14 +25,34 @@ enum ExitStatus { done = 0, bad_input = 2, unavailable = 3 };
 
 struct Options {
   report::ReportOptions report{};
+  std::vector<std::string> runs{};
   std::string output{};
   bool force{false};
   std::string window{"brake"};
   std::string figures{};
-  report::PictureFormat format{report::PictureFormat::svg};
-  std::optional<report::ExportFormat> export_as{};
+  int format{static_cast<int>(report::PictureFormat::svg)};  ///< a report::PictureFormat
+  bool csv{false};
+  bool json{false};
+  bool octave{false};
   std::vector<std::string> columns{};
+
+  /// The format in which to export rows; none: a page is wanted.
+  [[nodiscard]] std::optional<report::ExportFormat> export_as() const {
+    if (csv) return report::ExportFormat::csv;
+    if (json) return report::ExportFormat::json;
+    if (octave) return report::ExportFormat::octave;
+    return std::nullopt;
+  }
 };
+
+/// Formats of figures by their names, which are those of their files.
+std::vector<std::pair<std::string, int>> picture_formats() {
+  std::vector<std::pair<std::string, int>> formats;
+  for (const auto format : {report::PictureFormat::pdf, report::PictureFormat::png, report::PictureFormat::svg}) {
+    formats.emplace_back(report::extension_of(format), static_cast<int>(format));
+  }
+  return formats;
+}
 
 void say(const std::vector<std::string>& notes) {
   constexpr std::size_t most = 10;
@@ -87,66 +108,67 @@ int write_report(Options& o) {
   say(made.notes);
   fmt::print("{}\n", path);
   if (!o.figures.empty()) {
-    for (const auto& figure : report::write_figures(made, o.figures, o.format, o.force)) {
+    for (const auto& figure :
+         report::write_figures(made, o.figures, static_cast<report::PictureFormat>(o.format), o.force)) {
       fmt::print("{}\n", figure.string());
     }
   }
   return done;
 }
 
-void add_options(CLI::App& cli, Options& o) {
-  cli.add_option("RUN", o.report.runs, "run folders, series folders, or CSV files of runs")->required();
-  cli.add_option("--output", o.output,
-                 "file of the page (default: report.html) or of the exported rows (default: stdout)");
-  cli.add_flag("--force", o.force, "replace existing files");
-  cli.add_option("--title", o.report.title, "heading of the page");
-  cli.add_option("--label", o.report.labels, "name of each run in legends and tables, one per run")->take_all();
-  cli.add_option("--window", o.window, "time range of the figures: brake, run, or FROM:TO in seconds of the run")
-      ->capture_default_str();
-  cli.add_flag("--paper", o.report.paper, "make the paper's comparison page from an adaptive and a sliding-mode run");
-  cli.add_option("--figures", o.figures, "folder for the figures as separate files");
-  cli.add_option("--format", o.format, "format of these files: svg, png or pdf")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, report::PictureFormat>{{"svg", report::PictureFormat::svg},
-                                                                               {"png", report::PictureFormat::png},
-                                                                               {"pdf", report::PictureFormat::pdf}}))
-      ->needs("--figures");
-  auto* formats = cli.add_option_group("export", "export rows instead of a page, to --output or stdout");
-  const auto add_export = [&](const char* name, report::ExportFormat format, const char* help) {
-    formats->add_flag_callback(
-        name, [&o, format] { o.export_as = format; }, help);
-  };
-  add_export("--csv", report::ExportFormat::csv, "all runs in one CSV, with the run's name in the first column");
-  add_export("--json", report::ExportFormat::json, "runs with summaries, one array per column");
-  add_export("--octave", report::ExportFormat::octave, "MAT-file for Octave, MATLAB, SciPy");
-  formats->require_option(0, 1);
-  cli.add_option("--columns", o.columns, "columns to export, separated by commas (default: all)")
-      ->allow_extra_args(false)
-      ->delimiter(',');
+void add_options(cli::Parser& parser, Options& o) {
+  parser.add(
+      {.names = "RUN", .to = &o.runs, .help = "run folders, series folders, or CSV files of runs", .required = true});
+  parser.add({.names = "--output",
+              .to = &o.output,
+              .help = "file of the page (default: report.html) or of the exported rows (default: stdout)"});
+  parser.add({.names = "--force", .to = &o.force, .help = "replace existing files"});
+  parser.add({.names = "--title", .to = &o.report.title, .help = "heading of the page"});
+  parser.add(
+      {.names = "--label", .to = &o.report.labels, .help = "name of each run in legends and tables, one per run"});
+  parser.add({.names = "--window",
+              .to = &o.window,
+              .help = "time range of the figures: brake, run, or FROM:TO in seconds of the run",
+              .show_default = true});
+  parser.add({.names = "--paper",
+              .to = &o.report.paper,
+              .help = "make the paper's comparison page from an adaptive and a sliding-mode run"});
+  parser.add({.names = "--figures", .to = &o.figures, .help = "folder for the figures as separate files"});
+  parser.add({.names = "--format",
+              .to = &o.format,
+              .help = "format of these files: svg, png or pdf",
+              .type = "ENUM",
+              .words = picture_formats(),
+              .needs = {"--figures"}});
+  cli::Parser formats =
+      parser.add_group("export", "export rows instead of a page, to --output or stdout", {.least = 0, .most = 1});
+  formats.add({.names = "--csv", .to = &o.csv, .help = "all runs in one CSV, with the run's name in the first column"});
+  formats.add({.names = "--json", .to = &o.json, .help = "runs with summaries, one array per column"});
+  formats.add({.names = "--octave", .to = &o.octave, .help = "MAT-file for Octave, MATLAB, SciPy"});
+  parser.add({.names = "--columns",
+              .to = &o.columns,
+              .help = "columns to export, separated by commas (default: all)",
+              .delimiter = ',',
+              .repeated = true});
 }
 
 int run(int argc, char** argv) {
-  CLI::App cli{"Turns runs into a page with figures and tables, or exports their rows"};
-  cli.name("abs_report");
-  cli.set_version_flag("--version", ABS_HIL_VERSION);
+  cli::Parser parser("abs_report", "Turns runs into a page with figures and tables, or exports their rows");
+  parser.set_version(ABS_HIL_VERSION);
   Options o;
   o.report.version = ABS_HIL_VERSION;
-  add_options(cli, o);
-  try {
-    cli.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return cli.exit(error);  // --help, --version
-    fmt::print(stderr, "abs_report: {} (abs_report --help shows all options)\n", error.what());
-    return bad_input;
-  }
-  if (!o.export_as && !o.columns.empty()) {
+  add_options(parser, o);
+  if (const std::optional<int> status = parser.parse(argc, argv)) return *status;
+  o.report.runs.assign(o.runs.begin(), o.runs.end());
+  const std::optional<report::ExportFormat> export_as = o.export_as();
+  if (!export_as && !o.columns.empty()) {
     throw report::InputError("--columns selects columns to export: also give --csv, --json or --octave");
   }
-  if (o.export_as && (o.report.paper || !o.figures.empty())) {
+  if (export_as && (o.report.paper || !o.figures.empty())) {
     throw report::InputError(
         "--paper and --figures make a page; --csv, --json and --octave export rows; give one kind only");
   }
-  return o.export_as ? export_rows(o, *o.export_as) : write_report(o);
+  return export_as ? export_rows(o, *export_as) : write_report(o);
 }
 
 }  // namespace

@@ -8,15 +8,16 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "bus_socket.hpp"
+#include "cli/command_line.hpp"
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
@@ -55,77 +56,135 @@ struct Arguments {
   int priority{81};
 };
 
-void add_card_options(CLI::App& cli, emulator::CardOptions& card) {
-  cli.add_option("--bitstream", card.bitstream_version, "version word of the card")->capture_default_str();
-  cli.add_option("--start-speed", card.start_speed_rad_s, "both wheels' speed at the start, rad/s");
-  cli.add_option("--overspeed-rpm", card.overspeed_rpm, "the FPGA's limit (our choice), rpm")->capture_default_str();
-  cli.add_option("--supply-min", card.supply_min_V, "the FPGA's limit (our choice), V")->capture_default_str();
-  cli.add_option("--temperature-max", card.temperature_max_C, "the FPGA's limit (our choice), deg C")
-      ->capture_default_str();
-  cli.add_option("--overspeed-bit", card.overspeed_bit, "overspeed bit of the trip flags (the sources disagree)")
-      ->check(CLI::IsMember({0, 2}))
-      ->capture_default_str();
-  cli.add_flag("--trip-clears-width", card.trip_clears_width,
-               "a trip also zeroes the PWM width registers (not known of the real card)");
+void add_card_options(cli::Parser& parser, emulator::CardOptions& card) {
+  parser.add({.names = "--bitstream",
+              .to = &card.bitstream_version,
+              .help = "version word of the card",
+              .show_default = true});
+  parser.add(
+      {.names = "--start-speed", .to = &card.start_speed_rad_s, .help = "both wheels' speed at the start, rad/s"});
+  parser.add({.names = "--overspeed-rpm",
+              .to = &card.overspeed_rpm,
+              .help = "the FPGA's limit (our choice), rpm",
+              .show_default = true});
+  parser.add({.names = "--supply-min",
+              .to = &card.supply_min_V,
+              .help = "the FPGA's limit (our choice), V",
+              .show_default = true});
+  parser.add({.names = "--temperature-max",
+              .to = &card.temperature_max_C,
+              .help = "the FPGA's limit (our choice), deg C",
+              .show_default = true});
+  parser.add({.names = "--overspeed-bit",
+              .to = &card.overspeed_bit,
+              .help = "overspeed bit of the trip flags (the sources disagree)",
+              .one_of = {"0", "2"},
+              .show_default = true});
+  parser.add({.names = "--trip-clears-width",
+              .to = &card.trip_clears_width,
+              .help = "a trip also zeroes the PWM width registers (not known of the real card)"});
 }
 
-void add_usb_options(CLI::App& cli, program::UsbEmulatorOptions& usb) {
-  cli.add_option("--usb-serial", usb.identity.serial, "serial number of the USB board")->capture_default_str();
-  cli.add_option("--usb-manufacturer", usb.identity.manufacturer, "manufacturer string of the USB board")
-      ->capture_default_str();
-  cli.add_option("--vhci", usb.controller, "folder of the virtual host controller")->capture_default_str();
-  cli.add_flag("!--hide-outputs", usb.board.shows_outputs,
-               "the USB board's frames do not show the sent words (not known of the real board)");
-  cli.add_option("--enable-line", usb.board.enable_line, "digital line of the USB board that enables the drive");
-  cli.add_option("--when-braking", usb.when_braking,
-                 "control command of the USB board, obeyed once the brake has acted for 0.3 s")
-      ->allow_extra_args(false);
+void add_usb_options(cli::Parser& parser, program::UsbEmulatorOptions& usb) {
+  parser.add({.names = "--usb-serial",
+              .to = &usb.identity.serial,
+              .help = "serial number of the USB board",
+              .show_default = true});
+  parser.add({.names = "--usb-manufacturer",
+              .to = &usb.identity.manufacturer,
+              .help = "manufacturer string of the USB board",
+              .show_default = true});
+  parser.add({.names = "--vhci",
+              .to = &usb.controller,
+              .help = "folder of the virtual host controller",
+              .show_default = true});
+  parser.add({.names = "--hide-outputs",
+              .to = &usb.board.shows_outputs,
+              .help = "the USB board's frames do not show the sent words (not known of the real board)",
+              .sets = false});
+  parser.add({.names = "--enable-line",
+              .to = &usb.board.enable_line,
+              .help = "digital line of the USB board that enables the drive"});
+  parser.add({.names = "--when-braking",
+              .to = &usb.when_braking,
+              .help = "control command of the USB board, obeyed once the brake has acted for 0.3 s",
+              .repeated = true});
 }
 
-void add_options(CLI::App& cli, Arguments& a) {
-  auto* board = cli.add_option_group("board", "the board of the rig");
-  board->add_option("--pci-root", a.pci_root, "emulate a card: folder at which to mount its tree; created if missing")
-      ->type_name("DIR");
-  CLI::Option* can = board
-                         ->add_option("--can", a.can_interface,
-                                      "emulate a CAN I/O node: interface, or unix:PATH of a socket to listen on")
-                         ->type_name("IFACE");
-  CLI::Option* usb =
-      board->add_flag("--usb", a.use_usb, "emulate a USB board, plugged into this computer's vhci_hcd (needs root)");
-  board->require_option(1);
-  cli.add_option("--watchdog-ms", a.watchdog_ms, "watchdog of the CAN node, ms, until an activation sets another value")
-      ->check(CLI::Range(1, 10'000))
-      ->capture_default_str();
-  cli.add_option("--bdf", a.bdfs, "the card's address; give it again for more cards, without a rig behind them")
-      ->capture_default_str();
-  cli.add_option("--plant", a.plant, "plant by name or TOML file")->capture_default_str();
-  cli.add_option("--set", a.assignments, "any plant value, for example plant.theta_N=30")->allow_extra_args(false);
-  cli.add_option("--seed", a.emulator.seed, "seed of intermittent faults and garbage")->capture_default_str();
-  cli.add_flag("--lock-step", a.emulator.lock_step, "time advances only when the client says so (abs_hil --fast)");
-  cli.add_option("--fault", a.faults, "fault of one register from the start, for example 88:stuck")
-      ->allow_extra_args(false);
-  cli.add_option("--command", a.commands, "any control command, obeyed at the start")->allow_extra_args(false);
-  cli.add_option("--control", a.control_fifo, "FIFO from which to take commands while running; created if missing");
-  cli.add_option("--truth", a.emulator.truth_file, "CSV of true values that no register or frame shows, every ms")
-      ->excludes(can);
-  cli.add_option("--record", a.emulator.traffic_file, "log of every register access to the card, one per line")
-      ->excludes(can)
-      ->excludes(usb);
-  cli.add_option("--vendor", a.vendor, "vendor id of the card")->capture_default_str();
-  cli.add_option("--device", a.device, "device id of the card")->capture_default_str();
-  cli.add_option("--bar-bytes", a.bar_bytes, "size of BAR 2")->capture_default_str();
-  cli.add_option("--bar-kind", a.bar_kind, "io or memory")
-      ->check(CLI::IsMember({"io", "memory"}))
-      ->capture_default_str();
-  cli.add_option("--cpu", a.cpu, "CPU to run on; the client's CPU gives short accesses");
-  cli.add_option("--priority", a.priority, "SCHED_FIFO priority, higher than the client's; 0: none")
-      ->check(CLI::Range(0, 98))
-      ->capture_default_str();
-  add_card_options(cli, a.emulator.card);
-  add_usb_options(cli, a.usb);
-  cli.footer(std::string("Control commands (--command, --control) of a card:\n") + program::EmulatedCard::commands() +
-             "of a CAN node:\n" + program::EmulatedNode::commands() + "of a USB board:\n" +
-             program::EmulatedUsb::commands());
+void add_board_options(cli::Parser& parser, Arguments& a) {
+  cli::Parser board = parser.add_group("board", "the board of the rig", {.least = 1, .most = 1});
+  board.add({.names = "--pci-root",
+             .to = &a.pci_root,
+             .help = "emulate a card: folder at which to mount its tree; created if missing",
+             .type = "DIR"});
+  board.add({.names = "--can",
+             .to = &a.can_interface,
+             .help = "emulate a CAN I/O node: interface, or unix:PATH of a socket to listen on",
+             .type = "IFACE"});
+  board.add({.names = "--usb",
+             .to = &a.use_usb,
+             .help = "emulate a USB board, plugged into this computer's vhci_hcd (needs root)"});
+}
+
+void add_options(cli::Parser& parser, Arguments& a) {
+  add_board_options(parser, a);
+  parser.add({.names = "--watchdog-ms",
+              .to = &a.watchdog_ms,
+              .help = "watchdog of the CAN node, ms, until an activation sets another value",
+              .range = {1, 10'000},
+              .show_default = true});
+  parser.add({.names = "--bdf",
+              .to = &a.bdfs,
+              .help = "the card's address; give it again for more cards, without a rig behind them",
+              .show_default = true});
+  parser.add({.names = "--plant", .to = &a.plant, .help = "plant by name or TOML file", .show_default = true});
+  parser.add({.names = "--set",
+              .to = &a.assignments,
+              .help = "any plant value, for example plant.theta_N=30",
+              .repeated = true});
+  parser.add({.names = "--seed",
+              .to = &a.emulator.seed,
+              .help = "seed of intermittent faults and garbage",
+              .show_default = true});
+  parser.add({.names = "--lock-step",
+              .to = &a.emulator.lock_step,
+              .help = "time advances only when the client says so (abs_hil --fast)"});
+  parser.add({.names = "--fault",
+              .to = &a.faults,
+              .help = "fault of one register from the start, for example 88:stuck",
+              .repeated = true});
+  parser.add(
+      {.names = "--command", .to = &a.commands, .help = "any control command, obeyed at the start", .repeated = true});
+  parser.add({.names = "--control",
+              .to = &a.control_fifo,
+              .help = "FIFO from which to take commands while running; created if missing"});
+  parser.add({.names = "--truth",
+              .to = &a.emulator.truth_file,
+              .help = "CSV of true values that no register or frame shows, every ms",
+              .excludes = {"--can"}});
+  parser.add({.names = "--record",
+              .to = &a.emulator.traffic_file,
+              .help = "log of every register access to the card, one per line",
+              .excludes = {"--can", "--usb"}});
+  parser.add({.names = "--vendor", .to = &a.vendor, .help = "vendor id of the card", .show_default = true});
+  parser.add({.names = "--device", .to = &a.device, .help = "device id of the card", .show_default = true});
+  parser.add({.names = "--bar-bytes", .to = &a.bar_bytes, .help = "size of BAR 2", .show_default = true});
+  parser.add({.names = "--bar-kind",
+              .to = &a.bar_kind,
+              .help = "io or memory",
+              .one_of = {"io", "memory"},
+              .show_default = true});
+  parser.add({.names = "--cpu", .to = &a.cpu, .help = "CPU to run on; the client's CPU gives short accesses"});
+  parser.add({.names = "--priority",
+              .to = &a.priority,
+              .help = "SCHED_FIFO priority, higher than the client's; 0: none",
+              .range = {0, 98},
+              .show_default = true});
+  add_card_options(parser, a.emulator.card);
+  add_usb_options(parser, a.usb);
+  parser.set_footer(std::string("Control commands (--command, --control) of a card:\n") +
+                    program::EmulatedCard::commands() + "of a CAN node:\n" + program::EmulatedNode::commands() +
+                    "of a USB board:\n" + program::EmulatedUsb::commands());
 }
 
 void read_plant(Arguments& a) {
@@ -258,15 +317,12 @@ int serve(Arguments& a) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App cli{"The ABS rig behind an emulated board: RT-DAC4/PCI card, CAN I/O node or RT-DAC/USB2"};
+  // Without a name of its own: its help begins with the path that the user typed.
+  cli::Parser parser("", "The ABS rig behind an emulated board: RT-DAC4/PCI card, CAN I/O node or RT-DAC/USB2");
   Arguments arguments;
-  add_options(cli, arguments);
-  try {
-    cli.parse(argc, argv);
-    return serve(arguments);
-  } catch (const CLI::ParseError& error) {
-    return error.get_exit_code() == 0 ? cli.exit(error) : (cli.exit(error), 2);
-  }
+  add_options(parser, arguments);
+  if (const std::optional<int> status = parser.parse(argc, argv)) return *status;
+  return serve(arguments);
 }
 
 }  // namespace

@@ -1,12 +1,13 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <exception>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "analysis/result_file.hpp"
+#include "cli/command_line.hpp"
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
@@ -54,28 +55,38 @@ void tune(const std::string& controller, const Options& o) {
   fmt::print("{}: cost {:.5f}, with the previous gains {:.5f}\n{}\n", controller, result.cost, result.start_cost, text);
 }
 
+void add_options(cli::Parser& parser, Options& o) {
+  parser.add({.names = "--controllers",
+              .to = &o.controllers,
+              .help = "controllers to tune (default: all that have gains)",
+              .delimiter = ','});
+  parser.add(
+      {.names = "--plants", .to = &o.plants, .help = "plants to tune on", .delimiter = ',', .show_default = true});
+  parser.add({.names = "--folder", .to = &o.folder, .help = "existing folder for CONTROLLER.toml", .required = true});
+  parser.add({.names = "--cases",
+              .to = &o.cases,
+              .help = "varied plants for each plant",
+              .range = {1, 1000},
+              .show_default = true});
+  parser.add({.names = "--generations",
+              .to = &o.search.generations,
+              .help = "generations of the search",
+              .range = {1, 10'000},
+              .show_default = true});
+  parser.add({.names = "--seed", .to = &o.search.seed, .help = "seed of the search", .show_default = true});
+  parser.add({.names = "--threads",
+              .to = &o.search.threads,
+              .help = "number of threads; does not change the results",
+              .range = {1, 1024}});
+}
+
 int run(int argc, char** argv) {
-  CLI::App cli{"Searches for a controller's gains in simulation and writes them as a configuration file"};
-  cli.name("abs_tune");
+  cli::Parser parser("abs_tune",
+                     "Searches for a controller's gains in simulation and writes them as a configuration file");
   Options o;
-  cli.add_option("--controllers", o.controllers, "controllers to tune (default: all that have gains)")->delimiter(',');
-  cli.add_option("--plants", o.plants, "plants to tune on")->delimiter(',')->capture_default_str();
-  cli.add_option("--folder", o.folder, "existing folder for CONTROLLER.toml")->required();
-  cli.add_option("--cases", o.cases, "varied plants for each plant")->check(CLI::Range(1, 1000))->capture_default_str();
-  cli.add_option("--generations", o.search.generations, "generations of the search")
-      ->check(CLI::Range(1, 10'000))
-      ->capture_default_str();
-  cli.add_option("--seed", o.search.seed, "seed of the search")->capture_default_str();
   o.search.threads = study::machine_threads();
-  cli.add_option("--threads", o.search.threads, "number of threads; does not change the results")
-      ->check(CLI::Range(1, 1024));
-  try {
-    cli.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return cli.exit(error);  // --help
-    fmt::print(stderr, "abs_tune: {} (abs_tune --help shows all options)\n", error.what());
-    return 2;
-  }
+  add_options(parser, o);
+  if (const std::optional<int> status = parser.parse(argc, argv)) return *status;
   if (o.controllers.empty()) {
     for (const std::string_view name : study::tunable_controllers()) o.controllers.emplace_back(name);
   }

@@ -8,29 +8,38 @@
 #include "config/config_error.hpp"
 #include "program/exit_status.hpp"
 #include "replay/check.hpp"
+#include "replay/recorded_run.hpp"
 #include "replay/report.hpp"
 #include "telemetry/csv_sink.hpp"
 
 namespace abs_hil::program {
 
-void add_replay(CLI::App& cli, ReplayCommand& command) {
-  command.parser = cli.add_subcommand("replay", "feed a recorded run to its own or another controller, open loop");
-  command.parser->add_option("recording", command.recording, "event log (--log), or its CSV from abs_hil convert")
-      ->type_name("LOG")
-      ->required();
-  auto* check = command.parser->add_flag(
-      "--check", command.check, "run the recorded configuration again and check that all commands are bit-equal");
-  command.parser->add_option("--controller", command.changes.controller, "use another slip controller")
-      ->type_name("NAME")
-      ->excludes(check);
-  command.parser->add_option("--set", command.changes.assignments, "change a recorded configuration value")
-      ->type_name("key=value")
-      ->take_all()
-      ->allow_extra_args(false)
-      ->excludes(check);
-  command.parser->add_option("--csv", command.csv_file, "write the replayed commands, with the columns of a run's CSV")
-      ->type_name("FILE")
-      ->excludes(check);
+void add_replay(cli::Parser& parser, ReplayCommand& command) {
+  command.parser = parser.add_subcommand("replay", "feed a recorded run to its own or another controller, open loop");
+  command.parser.add({.names = "recording",
+                      .to = &command.recording,
+                      .help = "event log (--log), or its CSV from abs_hil convert",
+                      .type = "LOG",
+                      .required = true});
+  command.parser.add({.names = "--check",
+                      .to = &command.check,
+                      .help = "run the recorded configuration again and check that all commands are bit-equal"});
+  command.parser.add({.names = "--controller",
+                      .to = &command.controller,
+                      .help = "use another slip controller",
+                      .type = "NAME",
+                      .excludes = {"--check"}});
+  command.parser.add({.names = "--set",
+                      .to = &command.assignments,
+                      .help = "change a recorded configuration value",
+                      .type = "key=value",
+                      .repeated = true,
+                      .excludes = {"--check"}});
+  command.parser.add({.names = "--csv",
+                      .to = &command.csv_file,
+                      .help = "write the replayed commands, with the columns of a run's CSV",
+                      .type = "FILE",
+                      .excludes = {"--check"}});
 }
 
 namespace {
@@ -52,7 +61,7 @@ int replay_run(const ReplayCommand& command) {
   try {
     const replay::RecordedRun run = replay::read_run(command.recording);
     if (command.check) return check_again(run);
-    const config::Settings settings = replay::settings_of(run, command.changes);
+    const config::Settings settings = replay::settings_of(run, {command.controller, command.assignments});
     const std::vector<replay::RerunCycle> rerun =
         replay::rerun_open_loop(run, settings, replay::WheelFaults::as_recorded);
     fmt::print("{}", replay::report(run, settings, rerun));
@@ -67,10 +76,11 @@ int replay_run(const ReplayCommand& command) {
   }
 }
 
-void add_convert(CLI::App& cli, ConvertCommand& command) {
-  command.parser = cli.add_subcommand("convert", "convert an event log (.lcmlog) to CSV or back, without loss");
-  command.parser->add_option("from", command.from, "event log or CSV")->type_name("IN")->required();
-  command.parser->add_option("to", command.to, "CSV or event log")->type_name("OUT")->required();
+void add_convert(cli::Parser& parser, ConvertCommand& command) {
+  command.parser = parser.add_subcommand("convert", "convert an event log (.lcmlog) to CSV or back, without loss");
+  command.parser.add(
+      {.names = "from", .to = &command.from, .help = "event log or CSV", .type = "IN", .required = true});
+  command.parser.add({.names = "to", .to = &command.to, .help = "CSV or event log", .type = "OUT", .required = true});
 }
 
 int convert(const ConvertCommand& command) {

@@ -1,0 +1,104 @@
+#include "cli/command_line.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iostream>
+#include <type_traits>
+
+namespace abs_hil::cli {
+
+namespace {
+
+CLI::Option* bind(CLI::App& app, const Option& row) {
+  const auto bind_to = [&app, &row](auto* to) {
+    if constexpr (std::is_same_v<decltype(to), bool*>) {
+      return app.add_flag((row.sets ? "" : "!") + row.names, *to, row.help);
+    } else {
+      return app.add_option(row.names, *to, row.help);
+    }
+  };
+  return std::visit(bind_to, row.to);
+}
+
+bool is_integer(const Target& target) {
+  return std::visit([](auto* to) { return std::is_integral_v<std::remove_pointer_t<decltype(to)>>; }, target);
+}
+
+void limit_values(CLI::Option& option, const Option& row) {
+  const auto [least, most] = row.range;
+  if (least < most) {
+    option.check(std::holds_alternative<double*>(row.to) ? CLI::Range(least, most)
+                                                         : CLI::Range(static_cast<int>(least), static_cast<int>(most)));
+  }
+  if (!row.one_of.empty() && is_integer(row.to)) {
+    std::vector<int> numbers(row.one_of.size());
+    std::ranges::transform(row.one_of, numbers.begin(), [](const std::string& text) { return std::stoi(text); });
+    option.check(CLI::IsMember(numbers));
+  } else if (!row.one_of.empty()) {
+    option.check(CLI::IsMember(row.one_of));
+  }
+  if (!row.words.empty()) option.transform(CLI::CheckedTransformer(row.words));
+}
+
+}  // namespace
+
+Parser::Parser(std::string name, const std::string& help) : app_(std::make_shared<CLI::App>(help, std::move(name))) {}
+
+void Parser::add(const Option& row) {
+  CLI::Option& option = *bind(*app_, row);
+  limit_values(option, row);
+  if (!row.type.empty()) option.type_name(row.type);
+  if (row.delimiter != '\0') option.delimiter(row.delimiter);
+  if (row.count.most > 0) option.expected(row.count.least, row.count.most);
+  if (row.repeated) option.allow_extra_args(false);
+  if (row.required) option.required();
+  if (row.show_default) option.capture_default_str();
+  if (!row.default_text.empty()) option.default_str(row.default_text);
+  for (const std::string& other : row.needs) option.needs(other);
+  for (const std::string& other : row.excludes) option.excludes(other);
+}
+
+void Parser::set_version(const std::string& version) { app_->set_version_flag("--version", version); }
+
+void Parser::set_footer(const std::string& footer) { app_->footer(footer); }
+
+Parser Parser::add_subcommand(const std::string& name, const std::string& help) {
+  app_->require_subcommand(0, 1);
+  return Parser(app_->get_subcommand_ptr(app_->add_subcommand(name, help)));
+}
+
+Parser Parser::add_group(const std::string& name, const std::string& help, Count count) {
+  CLI::App* group = app_->add_option_group(name, help);
+  group->require_option(static_cast<std::size_t>(count.least), static_cast<std::size_t>(count.most));
+  return Parser(app_->get_subcommand_ptr(group));
+}
+
+std::optional<int> Parser::parse(int argc, const char* const* argv) {
+  const bool named = !app_->get_name().empty();
+  try {
+    app_->parse(argc, argv);
+    return std::nullopt;
+  } catch (const CLI::ParseError& error) {
+    if (named && error.get_exit_code() != 0) return refuse(error.what());
+    return app_->exit(error) == 0 ? 0 : usage_error;
+  }
+}
+
+int Parser::refuse(const std::string& why) const {
+  std::string command = app_->get_name();
+  for (const CLI::App* subcommand : app_->get_subcommands()) command += " " + subcommand->get_name();
+  std::cerr << app_->get_name() << ": " << why << " (" << command << " --help shows all options)\n" << std::flush;
+  return usage_error;
+}
+
+bool Parser::parsed() const { return app_->parsed(); }
+
+std::vector<std::string> Parser::given() const {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app_->get_options()) {
+    if (option->count() > 0) names.push_back(option->get_name());
+  }
+  return names;
+}
+
+}  // namespace abs_hil::cli

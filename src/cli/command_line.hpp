@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace CLI {
+class App;
+}
+
+// Options and subcommands of a program, one row each:
+//
+//   cli::Parser parser("abs_hil", "Drives the rig");
+//   parser.add({.names = "--backend", .to = &o.backend, .help = "sim or rig", .one_of = {"sim", "rig"}});
+//   if (const auto status = parser.parse(argc, argv)) return *status;
+//
+// Only command_line.cpp includes the library behind it, CLI11, which takes long to compile.
+
+namespace abs_hil::cli {
+
+constexpr int usage_error = 2;  ///< exit status of a wrong command line
+
+/// Where the value goes. The pointer must stay valid until the command line is parsed.
+using Target = std::variant<bool*, int*, std::uint16_t*, std::uint32_t*, std::uint64_t*, double*, std::string*,
+                            std::optional<int>*, std::optional<std::string>*, std::vector<std::string>*>;
+
+/// Valid numbers, both ends included. Equal ends: any number is valid.
+struct Range {
+  double least{0.0};
+  double most{0.0};
+};
+
+/// How many may be given. `most` 0: as many as the target holds.
+struct Count {
+  int least{0};
+  int most{0};
+};
+
+/// One option. Its first three fields have no default, and gcc warns if one is missing.
+struct Option {
+  std::string names;  ///< "--rate" or "-r,--rate"; without dashes, an argument known by its place
+  Target to;          ///< a bool makes the option a flag, which takes no value
+  std::string help;
+  bool sets{true};                                   ///< the value that a flag gives its target
+  std::string type{};                                ///< name of the value in the help; empty: that of its type
+  Range range{};                                     ///< of integers unless the target is a double
+  std::vector<std::string> one_of{};                 ///< valid values; empty: any
+  std::vector<std::pair<std::string, int>> words{};  ///< words for numbers; only these words and numbers are valid
+  char delimiter{'\0'};                              ///< splits one argument into several values
+  Count count{};                                     ///< of values
+  bool repeated{false};                              ///< takes one value each time; without it, all that follow
+  bool required{false};                              ///< the command line must have it
+  bool show_default{false};                          ///< the help shows the target's value at this moment
+  std::string default_text{};                        ///< the help shows this as the default
+  std::vector<std::string> needs{};                  ///< names of options that must be given with it
+  std::vector<std::string> excludes{};               ///< names of options that must not
+};
+
+/// What a program, a subcommand or a group of options reads from a command line. A copy is the same parser.
+class Parser {
+ public:
+  /// Is empty: assign another parser before use.
+  Parser() = default;
+  /// Knows --help. Without a name the program is called what the user typed, and its errors are in CLI11's own form.
+  Parser(std::string name, const std::string& help);
+
+  /// Adds an option. Those that it needs or excludes come first. Throws std::exception for an invalid row.
+  void add(const Option& row);
+  /// Adds --version, which prints this text.
+  void set_version(const std::string& version);
+  /// Sets the last lines of the help.
+  void set_footer(const std::string& footer);
+  /// Adds a subcommand; a command line may have one.
+  [[nodiscard]] Parser add_subcommand(const std::string& name, const std::string& help);
+  /// Adds a group of options, of which a command line must have as many as `count` says.
+  [[nodiscard]] Parser add_group(const std::string& name, const std::string& help, Count count);
+
+  /// Reads the command line into the targets. Returns the exit status if the program must end: it has printed help or
+  /// version, or an error on stderr.
+  [[nodiscard]] std::optional<int> parse(int argc, const char* const* argv);
+  /// Prints an error as `parse` does. Returns the exit status.
+  [[nodiscard]] int refuse(const std::string& why) const;
+  /// True if the command line had this subcommand.
+  [[nodiscard]] bool parsed() const;
+  /// Names of the options that were given, without those of groups and subcommands.
+  [[nodiscard]] std::vector<std::string> given() const;
+
+ private:
+  explicit Parser(std::shared_ptr<CLI::App> app) : app_(std::move(app)) {}
+
+  std::shared_ptr<CLI::App> app_{};
+};
+
+}  // namespace abs_hil::cli
