@@ -1,5 +1,7 @@
 #include "control/adaptive_controller.hpp"
 
+#include <array>
+
 #include "abs_hil/rig/tyre_curve.hpp"
 #include "control/adaptive_gains.hpp"
 
@@ -10,6 +12,7 @@ AdaptiveController::AdaptiveController(const ControllerContext& context)
       tyre_{context.rig.tyre},
       dynamics_{context},
       gains_{paper_gains(context.options.adaptive)},
+      weights_{paper_weights(context.options.adaptive)},
       theta_{context.options.adaptive, context.rig.wheels} {}
 
 void AdaptiveController::reset(const SlipInput& input) noexcept {
@@ -29,7 +32,31 @@ SlipOutput AdaptiveController::step(const SlipInput& input) noexcept {
   const double torque_Nm =
       dynamics_.feedback_linearising_torque_Nm(input, integral_.value_m(), error_m_s, theta_.theta_N(), past_phi);
   integral_.note_request(torque_Nm, input.max_brake_torque_Nm);
-  return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
+  return {.brake_torque_Nm = torque_Nm,
+          .slip_velocity_error_m_s = error_m_s,
+          .theta_est_N = theta_.theta_N(),
+          .signals = states(error_m_s, past_phi)};
+}
+
+std::span<const rig::Signal> AdaptiveController::signals() const noexcept {
+  static constexpr std::array<rig::Signal, 5> rows{{
+      {"I_m", "integral of the slip velocity error, I of (17), in m"},
+      {"omega1_hat_rad_s", "upper wheel's speed in the estimator of (17), in rad/s"},
+      {"zeta_N", "zeta of (17), in N"},
+      {"V", "Lyapunov function of Theorem 3.1, with the model's theta"},
+      {"V_dot", "its derivative V' by the theorem, with the model's theta and phi of the past interval"},
+  }};
+  return rows;
+}
+
+/// In the order of `signals`.
+rig::SignalValues AdaptiveController::states(double error_m_s, double phi) const noexcept {
+  using Laws = paper::Laws<double>;
+  const double I = integral_.value_m();
+  const double theta_err_N = tyre_.theta_N - theta_.theta_N();
+  return {I, theta_.omega1_hat_rad_s(omega1_rad_s_), theta_.zeta_N(),
+          Laws::V(gains_, weights_, I, error_m_s, theta_err_N),
+          Laws::V_dot(gains_, weights_, I, error_m_s, phi, theta_err_N)};
 }
 
 void AdaptiveController::adapt(const SlipInput& input, double past_phi) noexcept {

@@ -17,15 +17,20 @@ class AdaptiveController final : public SlipController {
 
   void reset(const SlipInput& input) noexcept override;
   [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
+  /// The states of (17), and V and V' of Theorem 3.1. V needs the true theta: these take the model's, so V falls as the
+  /// theorem says only if the model's theta is right.
+  [[nodiscard]] std::span<const rig::Signal> signals() const noexcept override;
   [[nodiscard]] bool take_over(const SlipController& before) noexcept override;
 
  private:
+  [[nodiscard]] rig::SignalValues states(double error_m_s, double phi) const noexcept;
   void adapt(const SlipInput& input, double past_phi) noexcept;
 
   rig::WheelParameters wheels_;
   rig::TyreParameters tyre_;
   SlipErrorDynamics dynamics_;
   paper::Gains<double> gains_;
+  paper::Weights<double> weights_;
   SlipErrorIntegral integral_;
   ThetaEstimator theta_;
   double omega1_rad_s_{0.0};  ///< of the previous cycle, as is the slip

@@ -20,12 +20,18 @@ const AdaptiveOptions& checked(const AdaptiveOptions& options) {
   return options;
 }
 
-paper::Gains<double> paper_gains(const AdaptiveOptions& options) {
+paper::Weights<double> paper_weights(const AdaptiveOptions& options) {
   const AdaptiveOptions& o = checked(options);
   Eigen::Matrix2d Q;
   Q << o.q11, o.q12, o.q12, o.q22;
-  const Eigen::RowVector2d B_transpose_P = solve_lyapunov(error_dynamics_matrix(o.ks0, o.ks1), Q).row(1);
-  return {.ks0 = o.ks0, .ks1 = o.ks1, .gamma = o.gamma, .ka1 = o.ka1, .p12 = B_transpose_P[0], .p22 = B_transpose_P[1]};
+  const Eigen::Matrix2d P = solve_lyapunov(error_dynamics_matrix(o.ks0, o.ks1), Q);
+  return {.p11 = P(0, 0), .p12 = P(0, 1), .p22 = P(1, 1), .q11 = o.q11, .q12 = o.q12, .q22 = o.q22};
+}
+
+paper::Gains<double> paper_gains(const AdaptiveOptions& options) {
+  const paper::Weights<double> w = paper_weights(options);
+  const AdaptiveOptions& o = options;
+  return {.ks0 = o.ks0, .ks1 = o.ks1, .gamma = o.gamma, .ka1 = o.ka1, .p12 = w.p12, .p22 = w.p22};
 }
 
 }  // namespace abs_hil::control

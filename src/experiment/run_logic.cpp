@@ -29,9 +29,12 @@ RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig
                                  .ends_on = {{EndKind::start_command, 0.0, rig::Reason::start_command}},
                                  .time_limit_s = start_limit_s});
   }
+  auto controller = control::make_controller(control.controller, {control, rig});
+  std::vector<std::string> signals = rig::signal_names(controller->signals());
   return {.control = control,
           .rig = rig,
-          .controller = control::make_controller(control.controller, {control, rig}),
+          .controller = std::move(controller),
+          .signals = std::move(signals),
           .sequence = Sequence(std::move(plans), limits,
                                {.duty = experiment.stop_brake_duty, .limit_s = experiment.stop_brake_limit_s}),
           .ideal_actuator = ideal_actuator,
@@ -112,6 +115,7 @@ double RunLogic::slip_control(double dt_s, bool entered, rig::ControlState& stat
   if (entered) bump_Nm_ = 0.0;
   state.slip_velocity_error_m_s = output.slip_velocity_error_m_s;
   state.theta_est_N = output.theta_est_N;
+  state.signals = output.signals;
   if (!std::isnan(output.slip_ref)) state.slip_ref = output.slip_ref;
   return without_bump(output.brake_torque_Nm, input);
 }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "abs_hil/control/options.hpp"
@@ -22,6 +23,7 @@ struct RunLogicParts {
   const control::ControlOptions& control;
   const rig::RigParameters& rig;  ///< nominal parameters, as the controller knows them
   std::unique_ptr<control::SlipController> controller;
+  std::vector<std::string> signals;  ///< names of the controller's own signals
   Sequence sequence;
   bool ideal_actuator{false};
   double max_brake_duty{1.0};     ///< limit of the command gate

@@ -190,7 +190,7 @@ int run(const RunRequest& request) {
     spdlog::warn("{}; the gate limits it to that", problem);
   experiment::RunLogicParts logic = make_logic(s, std::move(plan.phases), plan.limits);
   require_resources(request, *driver);
-  RunOutputs outputs(request);
+  RunOutputs outputs(request, logic.signals);
   runtime::OverrunReporter late_cycles(std::llround(1e9 / s.control.rate_Hz));
   std::vector<rig::RecordSink*> sinks = outputs.sinks();
   if (!request.outputs.fast) sinks.push_back(&late_cycles);

@@ -17,8 +17,9 @@ constexpr std::int64_t virtual_epoch_us = 946'684'800'000'000;
 constexpr std::int64_t write_period_ns = 50'000'000;
 }  // namespace
 
-RunOutputs::RunOutputs(const RunRequest& request)
-    : metrics_(request.settings.plant.rig.wheels.r2_m, request.settings.experiment.end_speed_m_s) {
+RunOutputs::RunOutputs(const RunRequest& request, std::vector<std::string> signals)
+    : signals_(std::move(signals)),
+      metrics_(request.settings.plant.rig.wheels.r2_m, request.settings.experiment.end_speed_m_s) {
   // Check the network first: a failure then leaves the files unchanged. In virtual time 8,000 messages would flood the
   // network at once, so publish only if --lcm-url is given.
   if (!request.outputs.no_lcm && (!request.outputs.fast || request.outputs.lcm_url)) {
@@ -42,7 +43,7 @@ RunOutputs::RunOutputs(const RunRequest& request)
 }
 
 void RunOutputs::open_files(const OutputOptions& outputs) {
-  if (outputs.csv_file) csv_.emplace_back(*outputs.csv_file, outputs.fast ? 0 : write_period_ns);
+  if (outputs.csv_file) csv_.emplace_back(*outputs.csv_file, outputs.fast ? 0 : write_period_ns, signals_);
   if (outputs.summary_file) summary_.emplace_back(*outputs.summary_file);
   if (outputs.histogram_file) histogram_.emplace_back(*outputs.histogram_file);
   if (outputs.log_file) {
@@ -93,7 +94,8 @@ void RunOutputs::open_stream(const RunRequest& request) {
                                             .plant = s.plant_name,
                                             .backend = s.backend,
                                             .config_json = request.config_json,
-                                            .version = ABS_HIL_VERSION},
+                                            .version = ABS_HIL_VERSION,
+                                            .signals = signals_},
                   [this] { return snapshot(); });
   for (telemetry::LogOutlet& log : log_) stream_->add(log);
   if (lcm_) {

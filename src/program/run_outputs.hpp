@@ -32,7 +32,8 @@ class RunOutputs {
  public:
   /// Throws config::ConfigError for files and folders that cannot be written, and telemetry::LcmError without a
   /// network.
-  explicit RunOutputs(const RunRequest& request);
+  /// @param signals  names of the controller's own signals
+  RunOutputs(const RunRequest& request, std::vector<std::string> signals);
 
   [[nodiscard]] std::vector<rig::RecordSink*> sinks();
   /// Attaches the session, whose state ABS_STATUS and the status line then show; it must outlive the use of the
@@ -60,6 +61,7 @@ class RunOutputs {
   void open_files(const OutputOptions& outputs);
   void open_stream(const RunRequest& request);
 
+  std::vector<std::string> signals_;
   experiment::RunSession* session_{nullptr};
   analysis::RunMetrics metrics_;
   std::optional<analysis::FrictionCurve> friction_curve_;

@@ -26,6 +26,7 @@ constexpr std::size_t least_stretches = 80;
 /// More entries would make the legend unreadable.
 constexpr std::size_t most_legend_entries = 12;
 constexpr double double_panel_px = 165.0;
+constexpr double signal_panel_px = 110.0;
 
 std::size_t stretches_for(std::size_t runs) {
   const std::size_t share = stretches_of_all_runs / std::max<std::size_t>(runs, 1);
@@ -57,7 +58,7 @@ std::vector<Request> requests_for(const RunSurvey& survey, const Window& window)
   const bool slip_in_braking = survey.brakes();
   const std::string slip = best_of(survey, "slip", "slip_est");
   const std::string torque = best_of(survey, "brake_torque_Nm", "brake_torque_est_Nm");
-  return {
+  std::vector<Request> requests{
       {"profile_omega1", best_of(survey, "omega1_rad_s", "omega1_est_rad_s"), "", false, whole},
       {"profile_omega2", best_of(survey, "omega2_rad_s", "omega2_est_rad_s"), "", false, whole},
       {"omega1", best_of(survey, "omega1_rad_s", "omega1_est_rad_s"), "", false, window},
@@ -74,6 +75,15 @@ std::vector<Request> requests_for(const RunSurvey& survey, const Window& window)
       {"theta_error", "theta_N", "theta_est_N", slip_in_braking, window},
       {"distance", "distance_m", "", false, window},
   };
+  for (const std::string& signal : survey.signals) requests.push_back({signal, signal, "", false, window});
+  return requests;
+}
+
+/// A signal's name in gnuplot's enhanced notation, where '_' would lower the next character.
+std::string enhanced(const std::string& signal) {
+  std::string text;
+  for (const char c : signal) text.append(c == '_' ? "\\_" : std::string(1, c));
+  return text;
 }
 
 /// Makes the figures.
@@ -106,6 +116,7 @@ class FigureMaker {
     figures.push_back(torque_figure());
     figures.push_back(theta_figure());
     figures.push_back(distance_figure());
+    if (Figure signals = signal_figure(); !signals.panels.empty()) figures.push_back(std::move(signals));
     return figures;
   }
 
@@ -301,6 +312,24 @@ class FigureMaker {
     Panel panel{.y_label = "distance / m", .height_px = 240.0};
     add_all(panel, "distance");
     figure.panels.push_back(std::move(panel));
+    return figure;
+  }
+
+  /// A panel for each signal that a run's controller reports of its own.
+  [[nodiscard]] Figure signal_figure() const {
+    Figure figure = begin("signals", "The controllers' own signals",
+                          "Each panel shows one signal of the runs whose controller reports it.");
+    std::vector<std::string> names;
+    for (const RunSurvey& survey : surveys_) {
+      for (const std::string& signal : survey.signals) {
+        if (std::find(names.begin(), names.end(), signal) == names.end()) names.push_back(signal);
+      }
+    }
+    for (const std::string& name : names) {
+      Panel panel{.y_label = enhanced(name), .height_px = signal_panel_px};
+      add_all(panel, name);
+      figure.panels.push_back(std::move(panel));
+    }
     return figure;
   }
 

@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "abs_hil/rig/parameters.hpp"
+#include "abs_hil/rig/quantities.hpp"
+#include "abs_hil/rig/signals.hpp"
 #include "report/csv_reader.hpp"
 #include "report/input_error.hpp"
 #include "report/plant_changes.hpp"
@@ -93,8 +95,13 @@ RunSurvey survey(const RunFiles& run) {
                      csv.truncated() ? "the only row is incomplete: the file holds no data of the run"
                                      : "no rows after the header: the file holds no data of the run");
   }
+  bool in_signals = true;
   for (std::size_t i = 0; i < known.size(); ++i) {
-    if (known[i]) survey.known_columns.push_back(csv.columns()[i]);
+    const std::string& column = csv.columns()[i];
+    if (known[i]) survey.known_columns.push_back(column);
+    // Signals directly follow the fixed columns. A flight record has more quantities there, and no signals.
+    if (i >= rig::csv_columns.size()) in_signals = in_signals && rig::is_signal_name(column);
+    if (known[i] && in_signals && i >= rig::csv_columns.size()) survey.signals.push_back(column);
   }
   survey.plant_changes = plant_changes.changes();
   survey.truncated = csv.truncated();

@@ -33,6 +33,7 @@ struct RunSurvey {
   std::vector<PlantChange> plant_changes{};  ///< from the configuration; only those that the run reached
   bool truncated{false};                     ///< the file ends within a row
   std::vector<std::string> known_columns{};  ///< columns with at least one number
+  std::vector<std::string> signals{};        ///< known columns of the controller's own signals
   analysis::Metrics metrics{};               ///< computed from the rows
   double r2_m{0.0};                          ///< lower wheel's radius used for them
 

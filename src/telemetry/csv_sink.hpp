@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -11,7 +13,7 @@
 namespace abs_hil::telemetry {
 
 /// The CSV's first line, without the line end, made from rig/quantities.hpp. Names and order are a contract; columns
-/// may be added at the end.
+/// may be added at the end. The columns of the controller's own signals follow it.
 extern const std::string_view csv_header;
 
 /// Upper limit of a row's length.
@@ -19,7 +21,9 @@ inline constexpr std::size_t csv_row_max_bytes = 1024;
 
 /// Writes a row with its line end to `out` and returns its length. A double has the shortest text that reads back
 /// bit-exactly; NaN is `NaN`. The text does not depend on the locale.
-std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, char (&out)[csv_row_max_bytes]) noexcept;
+/// @param signals  number of the controller's own signals, which follow the fixed columns, <= rig::signal_max
+std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, char (&out)[csv_row_max_bytes],
+                           std::size_t signals = 0) noexcept;
 
 /// Writes one row per cycle to a file, in blocks of whole rows of at most 64 KiB.
 class CsvSink : public rig::RecordSink {
@@ -27,7 +31,9 @@ class CsvSink : public rig::RecordSink {
   /// Creates or empties the file. Throws FileError when it cannot be opened.
   /// @param write_period_ns  longest time, by the records' stamps, until a row is written, so that a killed program
   ///                         loses no older rows; 0: rows are written only when a block is full
-  explicit CsvSink(std::filesystem::path path, std::int64_t write_period_ns = 0);
+  /// @param signals          names of the controller's own signals, the columns after the fixed ones
+  explicit CsvSink(std::filesystem::path path, std::int64_t write_period_ns = 0,
+                   std::span<const std::string> signals = {});
   /// Writes the buffered rows if finish() was not called. A failure is not reported then.
   ~CsvSink() override;
 
@@ -48,6 +54,7 @@ class CsvSink : public rig::RecordSink {
   std::filesystem::path path_;
   std::vector<char> buffer_;
   std::int64_t write_period_ns_;
+  std::size_t signals_;
   std::int64_t last_write_ns_{0};  ///< stamp of the record of the last write
   std::size_t used_bytes_{0};
   std::uint64_t rows_buffered_{0};

@@ -1,6 +1,7 @@
 #include "telemetry/message_codec.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <limits>
@@ -123,6 +124,25 @@ measurement_t measured_at(const rig::CycleRecord& record) noexcept {
   m.cycle = std::bit_cast<std::int64_t>(record.sequence);
   m.measured_ns = record.measurement.time_ns;
   return m;
+}
+
+namespace {
+constexpr std::array signal_fields{&signals_t::value1, &signals_t::value2, &signals_t::value3, &signals_t::value4,
+                                   &signals_t::value5, &signals_t::value6, &signals_t::value7, &signals_t::value8};
+static_assert(signal_fields.size() == rig::signal_max, "signals_t.lcm has a field for every signal");
+}  // namespace
+
+void put_signals(const rig::CycleRecord& record, std::size_t count, signals_t& message) noexcept {
+  message.cycle = std::bit_cast<std::int64_t>(record.sequence);
+  for (std::size_t n = 0; n < rig::signal_max; ++n) {
+    message.*signal_fields[n] = n < count ? record.control.signals[n] : rig::unknown;
+  }
+}
+
+rig::SignalValues signals_of(const signals_t& message) noexcept {
+  rig::SignalValues values{};
+  for (std::size_t n = 0; n < rig::signal_max; ++n) values[n] = message.*signal_fields[n];
+  return values;
 }
 
 DecodedCommand decode_command(std::span<const std::uint8_t> packet) {

@@ -13,6 +13,7 @@
 #include "abs_hil/experiment_t.hpp"
 #include "abs_hil/measurement_t.hpp"
 #include "abs_hil/rig/cycle_record.hpp"
+#include "abs_hil/signals_t.hpp"
 #include "abs_hil/status_t.hpp"
 #include "abs_hil/telemetry_t.hpp"
 
@@ -26,6 +27,11 @@ namespace abs_hil::telemetry {
 [[nodiscard]] rig::CycleRecord to_record(const telemetry_t& message) noexcept;
 /// The record's cycle and the time of its counters.
 [[nodiscard]] measurement_t measured_at(const rig::CycleRecord& record) noexcept;
+
+/// Fills in the cycle and the first `count` values; the others are NaN, and `names` stays.
+void put_signals(const rig::CycleRecord& record, std::size_t count, signals_t& message) noexcept;
+/// The values of the message.
+[[nodiscard]] rig::SignalValues signals_of(const signals_t& message) noexcept;
 
 /// A buffer for encoding. It grows to the size of the largest message and allocates nothing after that.
 class EncodeBuffer {

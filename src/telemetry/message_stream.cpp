@@ -70,6 +70,7 @@ MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, S
   adjustment_.name = options_.channel_prefix + "ADJUSTMENT";
   command_state_.name = options_.channel_prefix + "COMMAND_STATE";
   measurement_.name = options_.channel_prefix + "MEASUREMENT";
+  signals_.name = options_.channel_prefix + "SIGNALS";
   event_.name = options_.channel_prefix + "EVENT";
   experiment_.name = options_.channel_prefix + "EXPERIMENT";
   command_channel_ = options_.channel_prefix + "COMMAND";
@@ -79,6 +80,10 @@ MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, S
   experiment_message_.backend = std::move(experiment.backend);
   experiment_message_.config_json = std::move(experiment.config_json);
   experiment_message_.version = std::move(experiment.version);
+  signal_count_ = experiment.signals.size();
+  for (const std::string& signal : experiment.signals) {
+    signals_message_.names.append(signals_message_.names.empty() ? "" : ",").append(signal);
+  }
 }
 
 void MessageStream::consume(const rig::CycleRecord& record, double distance_m) {
@@ -96,6 +101,10 @@ void MessageStream::consume(const rig::CycleRecord& record, double distance_m) {
     if (record.measurement.time_ns != record.stamp_ns) {
       measurement_t measurement = measured_at(record);
       send(measurement_, measurement);
+    }
+    if (signal_count_ > 0) {
+      put_signals(record, signal_count_, signals_message_);
+      send(signals_, signals_message_);
     }
     next_telemetry_cycle_ = (record.sequence / options_.telemetry_every_cycles + 1) * options_.telemetry_every_cycles;
   }

@@ -9,6 +9,7 @@
 
 #include "abs_hil/command_state_t.hpp"
 #include "abs_hil/experiment_t.hpp"
+#include "abs_hil/signals_t.hpp"
 #include "rig/record_sink.hpp"
 #include "telemetry/event_detector.hpp"
 #include "telemetry/message_codec.hpp"
@@ -25,6 +26,7 @@ struct ExperimentInfo {
   std::string backend;
   std::string config_json;  ///< effective configuration
   std::string version;
+  std::vector<std::string> signals{};  ///< names of the controller's own signals, for ABS_SIGNALS
 };
 
 /// Channel prefix and rates of the messages.
@@ -92,6 +94,7 @@ class MessageStream : public rig::RecordSink {
   std::vector<Outlet*> outlets_;
   Channel telemetry_;
   Channel measurement_;
+  Channel signals_;
   Channel adjustment_;
   Channel command_state_;
   Channel status_channel_;
@@ -99,6 +102,8 @@ class MessageStream : public rig::RecordSink {
   Channel experiment_;
   std::string command_channel_;
   experiment_t experiment_message_{};
+  signals_t signals_message_{};
+  std::size_t signal_count_{0};
   EventDetector detector_;
   EncodeBuffer buffer_;
   rig::CycleRecord latest_{};

@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::size_t samples_max = 600'000;  // 60 s at 10 kHz
 constexpr std::size_t text_max_bytes = 200;
+constexpr std::size_t name_max_bytes = 32;
 /// Networks may deliver a few messages out of order. A sequence number further back belongs to another run.
 constexpr std::int64_t late_messages_max = 16;
 
@@ -38,7 +39,8 @@ void RunView::begin_run() noexcept {
   telemetry_.reset();
   status_.reset();
   experiment_.reset();
-  telemetry_sequence_ = status_sequence_ = event_sequence_ = experiment_sequence_ = -1;
+  signals_.clear();
+  telemetry_sequence_ = status_sequence_ = event_sequence_ = experiment_sequence_ = signals_sequence_ = -1;
   lost_ = 0;
 }
 
@@ -87,6 +89,19 @@ void RunView::take(const experiment_t& message, std::int64_t now_ns) {
   experiment_ = message;
   experiment_t& e = *experiment_;
   for (std::string* text : {&e.experiment, &e.controller, &e.plant, &e.backend, &e.version}) make_printable(*text);
+}
+
+void RunView::take(const signals_t& message, std::int64_t now_ns) {
+  if (!admit(message.sequence, signals_sequence_, now_ns)) return;
+  signals_sequence_ = message.sequence;
+  const rig::SignalValues values = telemetry::signals_of(message);
+  signals_.clear();
+  std::string_view names = message.names;
+  for (std::size_t n = 0; n < values.size() && !names.empty(); ++n) {
+    const std::size_t comma = std::min(names.find(','), names.size());
+    signals_.push_back({telemetry::printable(names.substr(0, comma), name_max_bytes), values[n]});
+    names.remove_prefix(std::min(comma + 1, names.size()));
+  }
 }
 
 std::optional<double> RunView::silence_s(std::int64_t now_ns) const noexcept {

@@ -4,9 +4,11 @@
 #include <deque>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "abs_hil/event_t.hpp"
 #include "abs_hil/experiment_t.hpp"
+#include "abs_hil/signals_t.hpp"
 #include "abs_hil/status_t.hpp"
 #include "abs_hil/telemetry_t.hpp"
 
@@ -26,6 +28,12 @@ struct Sample {
   bool after_gap{false};  ///< messages just before this one were lost
 };
 
+/// A signal of the controller.
+struct NamedValue {
+  std::string name;
+  double value{0.0};  ///< NaN: not known
+};
+
 /// The state of a run as far as received messages show it. Messages may be missing, and a new run may begin at any
 /// time. `now_ns` is the receiver's monotonic clock at the arrival. Texts from the network are made printable.
 class RunView {
@@ -37,6 +45,7 @@ class RunView {
   void take(const status_t& message, std::int64_t now_ns);
   void take(const event_t& message, std::int64_t now_ns);
   void take(const experiment_t& message, std::int64_t now_ns);
+  void take(const signals_t& message, std::int64_t now_ns);
   /// Counts a packet that is no message of a known type.
   void note_malformed() noexcept { ++malformed_; }
 
@@ -45,6 +54,8 @@ class RunView {
   [[nodiscard]] const std::optional<telemetry_t>& telemetry() const noexcept { return telemetry_; }
   [[nodiscard]] const std::optional<status_t>& status() const noexcept { return status_; }
   [[nodiscard]] const std::optional<experiment_t>& experiment() const noexcept { return experiment_; }
+  /// The controller's own signals, the latest values.
+  [[nodiscard]] const std::vector<NamedValue>& signals() const noexcept { return signals_; }
   /// The newest first, at most `events_max`.
   [[nodiscard]] const std::deque<event_t>& events() const noexcept { return events_; }
   static constexpr std::size_t events_max = 20;
@@ -69,6 +80,7 @@ class RunView {
   std::optional<telemetry_t> telemetry_;
   std::optional<status_t> status_;
   std::optional<experiment_t> experiment_;
+  std::vector<NamedValue> signals_;
   std::deque<event_t> events_;
   std::optional<std::int64_t> last_received_ns_;
   // Latest sequence number of each channel; -1: none in this run.
@@ -76,6 +88,7 @@ class RunView {
   std::int64_t status_sequence_{-1};
   std::int64_t event_sequence_{-1};
   std::int64_t experiment_sequence_{-1};
+  std::int64_t signals_sequence_{-1};
   std::int64_t lost_{0};
   std::int64_t malformed_{0};
   int runs_{0};

@@ -163,6 +163,8 @@ class Screen {
   int draw_foot() {
     const int events = std::clamp(grid_.rows() - 20, 1, 6);
     const int first = std::max(2, grid_.rows() - 1 - events - 2);
+    const bool has_signals = !view_.signals().empty() && first > 2;
+    if (has_signals) draw_signals(first - 1);
     draw_timing(first);
     draw_counts(first + 1);
     const auto& all = view_.events();
@@ -173,7 +175,15 @@ class Screen {
       grid_.write(0, first + 2 + i, fmt::format("{:>8} s {:8} {}", number(event.time_s, 3), event.kind, text),
                   event.kind == "fault" ? Style::alarm : Style::normal);
     }
-    return first;
+    return has_signals ? first - 1 : first;
+  }
+
+  /// Draws the controller's own signals, as many as there is room for.
+  void draw_signals(int row) {
+    int column = 0;
+    for (const NamedValue& signal : view_.signals()) {
+      column = grid_.write(column, row, fmt::format("{} {}  ", signal.name, number(signal.value, 4)));
+    }
   }
 
   void draw_timing(int row) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <string_view>
 #include <vector>
 
 #include "catch.hpp"
@@ -74,5 +75,39 @@ TEST_CASE("V never grows and its derivative is -x'Qx - ka1 phi theta~^2") {
       const double rate = (run.V[n + 1] - run.V[n - 1]) / 2 * s.options.rate_Hz;
       REQUIRE_THAT(rate, WithinAbs(run.V_rate_expected[n], 0.005 * steepest));
     }
+  }
+}
+
+TEST_CASE("the adaptive controller reports the states of (17), and V and V' of Theorem 3.1") {
+  // Independent of the controller: I by the trapezoidal rule, V by the closed form of P, V' by differences of V.
+  bench::Setup s;
+  s.plant_step_s = 1e-4;
+  s.options.rate_Hz = 10000.0;
+  s.options.adaptive.zeta0 = 15.0;
+  s.omega1_start = 0.95 * s.omega2_start * s.rig.wheels.r2_m / s.rig.wheels.r1_m;
+  s.max_time_s = 0.5;
+  const control::AdaptiveController controller({s.options, s.rig});
+  std::vector<std::string_view> names;
+  for (const rig::Signal& signal : controller.signals()) names.push_back(signal.name);
+  CHECK(names == std::vector<std::string_view>{"I_m", "omega1_hat_rad_s", "zeta_N", "V", "V_dot"});
+
+  const auto expected = lyapunov_run(s);
+  const auto run = bench::brake(s, "adaptive");
+  const auto& o = s.options.adaptive;
+  const double scale = *std::max_element(expected.V.begin(), expected.V.end());
+  double steepest = 0.0;
+  for (const double rate : expected.V_rate_expected) steepest = std::max(steepest, std::abs(rate));
+  double I = 0.0;
+  for (std::size_t n = 1; n < run.ticks.size(); ++n) {
+    const auto& tick = run.ticks[n];
+    const rig::SignalValues& signals = tick.output.signals;
+    I += (run.ticks[n - 1].output.slip_velocity_error_m_s + tick.output.slip_velocity_error_m_s) / 2 / s.options.rate_Hz;
+    REQUIRE_THAT(signals[0], WithinAbs(I, 1e-9));
+    // (18) holds among the reported states.
+    const double theta_hat_N =
+        signals[2] + o.gamma * o.ka1 * s.rig.wheels.J1_kg_m2 / s.rig.wheels.r1_m * (tick.omega1 - signals[1]);
+    REQUIRE_THAT(theta_hat_N, WithinAbs(tick.output.theta_est_N, 1e-9));
+    REQUIRE_THAT(signals[3], WithinAbs(expected.V[n], 1e-9 * scale));
+    REQUIRE_THAT(signals[4], WithinAbs(expected.V_rate_expected[n], 0.005 * steepest));
   }
 }

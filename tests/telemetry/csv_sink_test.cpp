@@ -51,6 +51,25 @@ TEST_CASE("the CSV header equals the published one exactly") {
         "distance_m,slip_velocity_error_m_s");
 }
 
+TEST_CASE("the controller's own signals follow the fixed columns, bit-exactly") {
+  const abs_hil::test::TemporaryFolder scratch;
+  rig::CycleRecord r = test::sample_record(7);
+  r.control.signals = {1.0 / 3.0, rig::unknown, 5.0};
+  const std::vector<std::string> signals{"I_m", "zeta_N"};
+  {
+    CsvSink sink(scratch / "run.csv", 0, signals);
+    sink.consume(r, 0.0);
+    sink.finish();
+  }
+  const auto lines = lines_of(scratch / "run.csv");
+  REQUIRE(lines.size() == 2);
+  CHECK(lines[0] == std::string(csv_header) + ",I_m,zeta_N");
+  const auto fields = fields_of(lines[1]);
+  REQUIRE(fields.size() == 21);
+  CHECK(bits_of(fields[19]) == std::bit_cast<std::uint64_t>(1.0 / 3.0));
+  CHECK(fields[20] == "NaN");
+}
+
 TEST_CASE("every CSV column holds its quantity, bit-exactly") {
   const abs_hil::test::TemporaryFolder scratch;
   const rig::CycleRecord r = test::sample_record(7);

@@ -1,5 +1,6 @@
 #include "telemetry/message_stream.hpp"
 
+#include <cmath>
 #include <stdexcept>
 
 #include "catch.hpp"
@@ -9,7 +10,7 @@
 namespace abs_hil::telemetry {
 namespace {
 
-ExperimentInfo info() { return {"paper", "adaptive", "paper-table1", "sim", R"({"plant":{"theta_N":23}})", "0.1.0"}; }
+ExperimentInfo info() { return {"paper", "adaptive", "paper-table1", "sim", R"({"plant":{"theta_N":23}})", "0.1.0", {}}; }
 
 template <class Message>
 void check_consecutive(const std::vector<Message>& messages) {
@@ -27,6 +28,42 @@ TEST_CASE("every record becomes a telemetry message with consecutive sequence nu
   CHECK(messages[321].cycle == 321);
   CHECK(messages[321].distance_m == 0.001 * 321.0);
   CHECK(messages[321].omega1_rad_s == test::sample_record(321).truth.speeds.omega1_rad_s);
+}
+
+TEST_CASE("a controller's own signals come with their names, one message with each telemetry message") {
+  test::CapturingOutlet outlet;
+  ExperimentInfo with_signals = info();
+  with_signals.signals = {"I_m", "zeta_N"};
+  StreamOptions options;
+  options.telemetry_every_cycles = 10;
+  MessageStream stream(options, with_signals, {});
+  stream.add(outlet);
+  for (std::uint64_t i = 0; i < 100; ++i) {
+    rig::CycleRecord record = test::sample_record(i);
+    record.control.signals = {static_cast<double>(i), -1.5, 3.0};
+    stream.consume(record, 0.0);
+  }
+  const auto telemetry = outlet.all<telemetry_t>("ABS_TELEMETRY");
+  const auto messages = outlet.all<signals_t>("ABS_SIGNALS");
+  check_consecutive(messages);
+  REQUIRE(messages.size() == telemetry.size());
+  for (std::size_t n = 0; n < messages.size(); ++n) {
+    CHECK(messages[n].stamp_ns == telemetry[n].stamp_ns);
+    CHECK(messages[n].cycle == telemetry[n].cycle);
+    CHECK(messages[n].names == "I_m,zeta_N");
+    CHECK(messages[n].value1 == static_cast<double>(telemetry[n].cycle));
+    CHECK(messages[n].value2 == -1.5);
+    CHECK(std::isnan(messages[n].value3));  // there is no third signal
+    CHECK(std::isnan(messages[n].value8));
+  }
+}
+
+TEST_CASE("a controller without signals sends none") {
+  test::CapturingOutlet outlet;
+  MessageStream stream({}, info(), {});
+  stream.add(outlet);
+  stream.consume(test::sample_record(0), 0.0);
+  CHECK(outlet.all<signals_t>("ABS_SIGNALS").empty());
 }
 
 TEST_CASE("decimation keeps one cycle in N, whatever records are missing") {

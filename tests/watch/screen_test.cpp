@@ -52,6 +52,24 @@ TEST_CASE("the screen of a run shows all its quantities") {
   CHECK_THAT(text, Contains("q quits"));
 }
 
+TEST_CASE("the controller's own signals stand above the timing, for as long as they come") {
+  RunView view = whole_run();
+  CHECK_THAT(shown(view, 4999 * ms), !Contains("zeta_N"));
+  view.take(signals(4999), 4999 * ms);
+  CHECK_THAT(shown(view, 4999 * ms), Contains("I_m 0.1250  zeta_N 15.5000") && Contains("wake-up 11/12/13/14"));
+  view.take(telemetry(0), 5000 * ms);  // another run, whose controller has none
+  CHECK_THAT(shown(view, 5000 * ms), !Contains("zeta_N"));
+}
+
+TEST_CASE("names of signals from the network are made printable") {
+  RunView view(10.0);
+  signals_t hostile = signals(0);
+  hostile.names = "\x1b[2J,,a,b,c,d,e,f,g,h,i";
+  view.take(hostile, 0);
+  REQUIRE(view.signals().size() == 8);
+  CHECK(view.signals()[0].name == "?[2J");
+}
+
 TEST_CASE("ASCII is ASCII everywhere") {
   const RunView view = whole_run();
   for (const char c : shown(view, 9000 * ms, {.columns = 120, .rows = 50, .unicode = false})) {

@@ -37,6 +37,12 @@ struct Gains {
   S ks0{0.0}, ks1{0.0}, gamma{0.0}, ka1{0.0}, p12{0.0}, p22{0.0};
 };
 
+/// P and Q of the Lyapunov equation PA + A'P = -2 Q of Theorem 3.1, both symmetric.
+template <Scalar S>
+struct Weights {
+  S p11{0.0}, p12{0.0}, p22{0.0}, q11{0.0}, q12{0.0}, q22{0.0};
+};
+
 /// State of (17), and its derivative.
 template <Scalar S>
 struct AdaptiveState {
@@ -107,6 +113,16 @@ struct Laws {
     return {.I = e_v(y),
             .omega1_hat = omega1_hat_dot(y, theta_hat(g, x, y.omega1), T_b),
             .zeta = zeta_dot(g, y, BtP_x(g, x.I, e_v(y)))};
+  }
+
+  // Theorem 3.1, with theta_err = theta - theta_hat
+  // V = ([I; e_v]' P [I; e_v] + theta_err^2 / gamma) / 2
+  static constexpr S V(const Gains<S>& g, const Weights<S>& w, S I, S e_v, S theta_err) {
+    return 0.5 * (w.p11 * I * I + 2.0 * w.p12 * I * e_v + w.p22 * e_v * e_v + theta_err * theta_err / g.gamma);
+  }
+  // V' = -[I; e_v]' Q [I; e_v] - ka1 phi theta_err^2, for a constant theta and phi > 0
+  static constexpr S V_dot(const Gains<S>& g, const Weights<S>& w, S I, S e_v, S phi, S theta_err) {
+    return -(w.q11 * I * I + 2.0 * w.q12 * I * e_v + w.q22 * e_v * e_v) - g.ka1 * phi * theta_err * theta_err;
   }
   // NOLINTEND(modernize-use-nodiscard)
 };

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <span>
+
 #include "abs_hil/rig/measurement.hpp"
+#include "abs_hil/rig/signals.hpp"
 
 namespace abs_hil::control {
 
@@ -28,6 +31,8 @@ struct SlipOutput {
   double slip_velocity_error_m_s{0.0};  ///< e_v of (13)
   double theta_est_N{0.0};              ///< estimated peak tyre force, NaN for controllers that estimate none
   double slip_ref{rig::unknown};        ///< the controller's own slip reference; NaN if it follows that of the input
+  /// Values of the controller's own signals, in the order of `SlipController::signals`. The others are ignored.
+  rig::SignalValues signals{rig::no_signals};
 };
 
 /// A slip controller: a pure function of its inputs and its own state. It does not use boards, clocks or files.
@@ -43,6 +48,10 @@ class SlipController {
   virtual void reset(const SlipInput& input) noexcept = 0;
   /// Computes one control period. The first call is in the same cycle as `reset`, with the same input and dt_s = 0.
   [[nodiscard]] virtual SlipOutput step(const SlipInput& input) noexcept = 0;
+  /// The signals that `step` reports besides the fields of SlipOutput, at most `rig::signal_max`. CSV, LCM, `watch` and
+  /// the report show them. They may depend on the options, but do not change after construction. By default there are
+  /// none. Not called in the real-time thread.
+  [[nodiscard]] virtual std::span<const rig::Signal> signals() const noexcept { return {}; }
   /// Takes over the state of `before`, a controller of the same class with other gains, so that gains can change while
   /// braking. Integrals and estimates are kept, and estimates are limited to their new bounds. Returns false and
   /// changes nothing for another class. By default a law cannot take over and returns false.

@@ -9,6 +9,7 @@
 #include "abs_hil/rig/overrun_cause.hpp"
 #include "abs_hil/rig/phase.hpp"
 #include "abs_hil/rig/reason.hpp"
+#include "abs_hil/rig/signals.hpp"
 
 namespace abs_hil::rig {
 
@@ -29,6 +30,7 @@ struct ControlState {
   double brake_torque_ref_Nm{0.0};          ///< torque reference, after limiting
   double brake_torque_est_Nm{0.0};          ///< torque estimated to act now, through (6)-(7)
   double theta_est_N{unknown};
+  SignalValues signals{no_signals};  ///< the controller's own, see control::SlipController::signals
 };
 
 /// Durations within one cycle, ns. `wakeup_latency_ns` is the lateness of the wake-up against its tick.

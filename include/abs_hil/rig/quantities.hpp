@@ -184,6 +184,13 @@ using ValueOf = std::remove_cvref_t<decltype(std::declval<const Row&>().at(std::
   return topic;
 }
 
+/// True if a row has this name.
+[[nodiscard]] constexpr bool is_quantity(std::string_view name) noexcept {
+  bool found = false;
+  for_each_quantity([&](const auto& row) { found = found || row.name == name; });
+  return found;
+}
+
 /// Columns of a run's CSV, in order.
 inline constexpr auto csv_columns = [] {
   constexpr std::size_t count =

@@ -1,5 +1,6 @@
 package abs_hil.spy;
 
+import abs_hil.signals_t;
 import abs_hil.telemetry_t;
 import java.awt.Dimension;
 import java.awt.Window;
@@ -13,11 +14,11 @@ import javax.swing.SwingUtilities;
 import lcm.spy.ChannelData;
 import lcm.spy.SpyPlugin;
 
-/** lcm-spy finds this on its class path and opens it for channels of telemetry_t, on a double click. */
+/** lcm-spy finds this on its class path and opens it for channels of telemetry_t and signals_t, on a double click. */
 public final class ChartsPlugin implements SpyPlugin {
     @Override
     public boolean canHandle(long fingerprint) {
-        return fingerprint == telemetry_t.LCM_FINGERPRINT;
+        return fingerprint == telemetry_t.LCM_FINGERPRINT || fingerprint == signals_t.LCM_FINGERPRINT;
     }
 
     /** lcm-spy asks once without a desktop, for the name alone, and once with the desktop to open in. */
@@ -40,7 +41,8 @@ public final class ChartsPlugin implements SpyPlugin {
             window.validate();
         }
         JInternalFrame frame = new JInternalFrame(channel.name + " charts", true, true, true, true);
-        frame.add(new ChartsPanel(() -> channel.last));
+        boolean signals = channel.fingerprint == signals_t.LCM_FINGERPRINT;
+        frame.add(signals ? new SignalsPanel(() -> channel.last) : new ChartsPanel(() -> channel.last));
         frame.pack();
         desktop.add(frame);
         frame.setVisible(true);

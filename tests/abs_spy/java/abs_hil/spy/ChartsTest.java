@@ -1,5 +1,6 @@
 package abs_hil.spy;
 
+import abs_hil.signals_t;
 import abs_hil.telemetry_t;
 import java.awt.image.BufferedImage;
 import javax.swing.JTable;
@@ -113,9 +114,37 @@ public final class ChartsTest {
         check(Double.isNaN(history.lastValue(0)), "slip at standstill is a gap");
     }
 
-    private static void pluginIsForTelemetryOnly() {
+    private static signals_t signals(long stampNs, String names, double first, double second) {
+        signals_t s = new signals_t();
+        s.stamp_ns = stampNs;
+        s.names = names;
+        s.value1 = first;
+        s.value2 = second;
+        s.value3 = s.value4 = s.value5 = s.value6 = s.value7 = s.value8 = Double.NaN;
+        return s;
+    }
+
+    private static void signalsPanelHasAChartForEachSignal() {
+        Object[] latest = {"something else"};
+        SignalsPanel panel = new SignalsPanel(() -> latest[0]);
+        panel.sample();
+        check(panel.getComponentCount() == 0, "no message yet");
+        latest[0] = signals(7_000_000_000L, "I_m,zeta_N", 0.5, 15);
+        panel.sample();
+        latest[0] = signals(7_250_000_000L, "I_m,zeta_N", 0.75, 16);
+        panel.sample();
+        check(panel.getComponentCount() == 2, "two charts");
+        check(panel.history().lastTime() == 0.25 && panel.history().lastValue(1) == 16, "time since the first message");
+        check(panel.getComponent(1).toString().startsWith("zeta_N"), "the second chart has the second name");
+        latest[0] = signals(3_000_000_000L, "V", 1, Double.NaN);
+        panel.sample();
+        check(panel.getComponentCount() == 1 && panel.history().lastTime() == 0, "another run has other charts");
+    }
+
+    private static void pluginIsForTelemetryAndSignalsOnly() {
         ChartsPlugin plugin = new ChartsPlugin();
         check(plugin.canHandle(telemetry_t.LCM_FINGERPRINT), "telemetry_t");
+        check(plugin.canHandle(signals_t.LCM_FINGERPRINT), "signals_t");
         check(!plugin.canHandle(abs_hil.status_t.LCM_FINGERPRINT), "status_t");
         plugin.getAction(null, null).actionPerformed(null);  // lcm-spy asks for the name without a desktop
     }
@@ -141,7 +170,7 @@ public final class ChartsTest {
         axesAreRound();
         chartDrawsLinesWhereTheValuesAre();
         panelTakesTruthElseEstimates();
-        pluginIsForTelemetryOnly();
+        pluginIsForTelemetryAndSignalsOnly();
         buttonFindsTheTelemetryRow();
         System.out.println("all charts tests pass");
     }
