@@ -42,6 +42,7 @@ class Browser(ReportTest):
             'fig8': ['torque_ref'] * 2 + ['torque'] * 2,
             'fig9': ['theta_est'] * 2 + ['theta'] + ['theta_error'] * 2,
             'fig10': ['distance'] * 2,
+            'signals': ['I_m', 'omega1_hat_rad_s', 'zeta_N', 'V', 'V_dot'],  # of adaptive
         }
         self.assertEqual({figure: sorted(c['quantity'] for c in curves) for figure, curves in self.read.figures.items()},
                          {figure: sorted(quantities) for figure, quantities in expected.items()})

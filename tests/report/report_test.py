@@ -7,7 +7,8 @@ import unittest
 from page_reader import PageReader
 from program import ReportTest, need
 
-FIGURES = ['profile', 'fig5', 'fig6', 'fig7', 'fig8', 'fig9', 'fig10']
+# of runs with the controller adaptive, which reports signals of its own
+FIGURES = ['profile', 'fig5', 'fig6', 'fig7', 'fig8', 'fig9', 'fig10', 'signals']
 TRUTH = ('omega1_rad_s', 'omega2_rad_s', 'slip', 'brake_torque_Nm', 'theta_N')
 need('gnuplot', 'gnuplot-nox')
 
@@ -39,6 +40,26 @@ class Page(ReportTest):
         one, other = self.make_run('a-name-longer-than-the-margin'), self.make_run('b')
         self.assertIn('a-name-l', self.page(one, other)[0].replace('a-name-longer', ''))
         self.assertNotIn('a-name-l', self.page(one)[0].replace('a-name-longer', ''))
+
+    def test_signals_of_the_controllers(self):
+        a = self.make_run('a', '--controller', 'adaptive')
+        b = self.make_run('b', '--controller', 'pi')
+        read = PageReader(self.page(a, b)[0])
+        self.assertEqual([(c['quantity'], c['run']) for c in read.figures['signals']],
+                         [(name, 1) for name in ('I_m', 'omega1_hat_rad_s', 'zeta_N', 'V', 'V_dot')])
+        self.assertEqual(list(PageReader(self.page(b)[0]).figures), FIGURES[:-1], 'pi has no signals')
+        rows = self.rows(a)
+        last = [row for row in rows if row['phase'] == 'brake'][-1]
+        self.assertAlmostEqual(float(last['theta_est_N']), float(last['zeta_N']) + 21 * 7.54e-3 / 0.0995
+                               * (float(last['omega1_est_rad_s']) - float(last['omega1_hat_rad_s'])), 9, '(18)')
+
+    def test_signals_with_hostile_names_are_not_drawn(self):
+        a = self.make_run('a')
+        text = (a / 'run.csv').read_text()
+        (a / 'run.csv').write_text(text.replace(',zeta_N,', ",{/=99 `touch pwned`},", 1))
+        read = PageReader(self.page(a)[0])
+        self.assertEqual([c['quantity'] for c in read.figures['signals']], ['I_m', 'omega1_hat_rad_s'])
+        self.assertFalse((self.folder / 'pwned').exists())
 
     def test_the_same_page_twice(self):
         a = self.make_run('a')
@@ -142,7 +163,7 @@ class Page(ReportTest):
     def test_paper(self):
         a, b = self.make_run('a', '--controller', 'adaptive'), self.make_run('b', '--controller', 'sliding-mode')
         read = PageReader(self.page('--paper', b, a)[0])
-        self.assertEqual(list(read.figures), FIGURES[1:])
+        self.assertEqual(list(read.figures), FIGURES[1:-1])
         ours = 100.0 * (self.summary(a)['stop_time_s'] / self.summary(b)['stop_time_s'] - 1.0)
         self.assertEqual(read.cell('claims', 'stop time, adaptive against sliding mode', 1), '−6.7 %')
         self.assertEqual(read.cell('claims', 'stop time, adaptive against sliding mode', 2),
