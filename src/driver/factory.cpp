@@ -10,7 +10,7 @@
 #include "driver/pci/pci_driver.hpp"
 #include "driver/pci/pci_safe_state.hpp"
 #include "driver/take_over_writer.hpp"
-#include "driver/usb/libusb_link.hpp"
+#include "driver/usb/urb_link.hpp"
 #include "driver/usb/usb_driver.hpp"
 
 namespace abs_hil::driver {

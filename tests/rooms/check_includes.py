@@ -16,7 +16,7 @@ import tempfile
 # A header of a library -> what links it in the CMakeLists.txt of a room
 LIBRARIES = {
     r'lcm/': 'lcmtypes', r'spdlog/': 'spdlog::spdlog', r'boost/': 'Boost::headers', r'nlohmann/': 'nlohmann_json',
-    r'toml\+\+/': 'tomlplusplus', r'CLI/': 'CLI11', r'fmt/': 'fmt::fmt', r'openssl/': 'OpenSSL', r'libusb': 'LIBUSB',
+    r'toml\+\+/': 'tomlplusplus', r'CLI/': 'CLI11', r'fmt/': 'fmt::fmt', r'openssl/': 'OpenSSL',
     r'Eigen/': 'Eigen3',
 }
 # Rooms that compute and never look at a clock, a thread, a file or a terminal

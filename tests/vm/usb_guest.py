@@ -1,5 +1,5 @@
 """usb_guest.py ABS_HIL [unittest arguments]: within the virtual machine. The emulated RT-DAC/USB2 is a USB device of
-this kernel (vhci_hcd), abs_hil drives it through libusb and usbfs.
+this kernel (vhci_hcd), abs_hil drives it through usbfs.
 
 Class LockStep: time goes on with the client's cycles alone, so that runs repeat themselves and failures happen in
 mid-braking. Class RealTime, for vm_run.sh -V: both on the guest's own clock. /out, if there, gets the figures.

@@ -52,6 +52,7 @@ UsbDevice device_in(const fs::path& folder, const fs::path& device_root) {
           .manufacturer = line_in(folder / "manufacturer"),
           .product = line_in(folder / "product"),
           .serial = line_in(folder / "serial"),
+          .configuration = number_in(folder / "bConfigurationValue", 10),
           .node = device_root / node.data()};
 }
 

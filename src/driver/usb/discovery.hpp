@@ -17,7 +17,8 @@ struct UsbDevice {
   std::string manufacturer{};
   std::string product{};
   std::string serial{};
-  std::filesystem::path node{};  ///< file that libusb opens
+  std::uint32_t configuration{0};  ///< the active one; 0: none
+  std::filesystem::path node{};    ///< the device's file, for usbfs
   /// "04b4:1003 serial 123 at 1-1.4", for messages.
   [[nodiscard]] std::string text() const;
 };

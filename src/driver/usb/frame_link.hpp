@@ -28,8 +28,9 @@ class FrameLink {
   virtual IoResult request() noexcept = 0;
   [[nodiscard]] virtual bool answer_outstanding() const noexcept = 0;
   /// Waits for the outstanding answer, at most `timeout_ns` >= 0. `no_answer`: it has not come yet and stays
-  /// outstanding. After any other result nothing is outstanding. `bytes` views the answer, of any length, until the
-  /// next request.
+  /// outstanding. After any other result of its own nothing is outstanding. A failed send that no call has returned
+  /// yet comes first; the answer then stays outstanding. `bytes` views the answer, of any length, until the next
+  /// request.
   virtual IoResult receive(std::int64_t timeout_ns, std::span<const std::uint8_t>& bytes) noexcept = 0;
   /// Waits until the board has taken all that was sent; `no_answer` if it has not within `timeout_ns`.
   virtual IoResult flush(std::int64_t timeout_ns) noexcept = 0;

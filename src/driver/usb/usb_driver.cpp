@@ -16,8 +16,9 @@ namespace {
 
 /// Longer timeout for transfers outside the cycle.
 constexpr std::int64_t patient_ns = 500'000'000;
-/// Bound of FrameLink::recover on a failing board: cancelled transfers and cleared halts may take a second each.
-constexpr std::int64_t recovery_bound_ns = 8'000'000'000;
+/// Bound of FrameLink::recover on a failing board: two seconds for what is cancelled, the kernel's 5 s for the clearing
+/// of each endpoint, and four short waits for old answers.
+constexpr std::int64_t recovery_bound_ns = 12'100'000'000;
 
 rig::Reason reason_for(IoError error) noexcept {
   switch (error) {

@@ -6,7 +6,7 @@
 #include "catch.hpp"
 #include "diagnosis/fake_system.hpp"
 #include "driver/usb/discovery.hpp"
-#include "driver/usb/libusb_link.hpp"
+#include "driver/usb/urb_link.hpp"
 
 using namespace abs_hil::driver;
 using namespace abs_hil::driver::usb;
