@@ -108,6 +108,7 @@ nlohmann::ordered_json to_json(const RunSummary& s) {
                               {"publish_failures", s.publish_failures},
                               {"csv_rows_lost", s.csv_rows_lost},
                               {"gate", to_json(s.gate)},
+                              {"checks_unjudged", number_or_null(s.checks_unjudged)},
                               {"config", s.config}};
   if (!s.friction_curve.is_null()) json["friction_curve"] = s.friction_curve;
   return json;
@@ -140,6 +141,10 @@ std::string to_text(const RunSummary& s) {
                              s.timing.overruns.total, s.telemetry_drops, s.publish_failures));
   if (s.csv_rows_lost > 0) line("CSV rows lost", fmt::format("{}", s.csv_rows_lost));
   if (rig::interventions(s.gate) > 0) line("command gate", interventions_text(s.gate));
+  if (s.checks_unjudged > 0.0) {
+    line("checks of the wheels",
+         fmt::format("a verdict was due and not possible yet for {:.3g} % of the time", 100.0 * s.checks_unjudged));
+  }
   if (s.virtual_time) {
     line("timing", "virtual time (--fast): no latencies to report");
   } else {

@@ -29,7 +29,8 @@ struct RunSummary {
   bool virtual_time{false};  ///< --fast: the timing figures do not describe this computer
   bool truth_known{false};   ///< metrics are computed from the simulator's true values, not from estimates
   rig::TimingSummary timing{};
-  rig::GateCounts gate{};  ///< numbers of the command gate's interventions
+  rig::GateCounts gate{};       ///< numbers of the command gate's interventions
+  double checks_unjudged{0.0};  ///< share of the run's time in which the gate's checks could not judge the wheels
   nlohmann::ordered_json config{};
   nlohmann::ordered_json friction_curve{};  ///< result of the experiment's analysis; null without one
 };

@@ -1,5 +1,6 @@
 #include "experiment/run_logic.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -8,6 +9,7 @@
 #include "abs_hil/rig/encoder_scale.hpp"
 #include "abs_hil/rig/time_units.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
+#include "rig/stamp_error.hpp"
 
 namespace abs_hil::experiment {
 
@@ -18,6 +20,18 @@ constexpr double bump_fades_s = 0.05;  ///< about the brake's time constant
 constexpr double bump_gone_Nm = 1e-6;
 /// Longest wait for the start command, s.
 constexpr double start_limit_s = 600.0;
+
+struct FastestChange {
+  double upper{0.0};
+  double lower{0.0};
+};
+
+/// By the gate's bounds of what the rig can do.
+FastestChange fastest_change_rad_s2(const RunLogicParts& parts) {
+  const runtime::PlausibilityLimits limits = runtime::plausibility_limits(parts.rig, parts.ideal_actuator, {});
+  return {std::max(limits.upper_gain_rad_s2, limits.upper_loss_rad_s2),
+          std::max(limits.lower_gain_rad_s2, limits.lower_loss_rad_s2)};
+}
 }  // namespace
 
 RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig::RigParameters& rig,
@@ -35,8 +49,9 @@ RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig
           .rig = rig,
           .controller = std::move(controller),
           .signals = std::move(signals),
-          .sequence = Sequence(std::move(plans), limits,
-                               {.duty = experiment.stop_brake_duty, .limit_s = experiment.stop_brake_limit_s}),
+          .sequence = Sequence(
+              std::move(plans), limits, {.duty = experiment.stop_brake_duty, .limit_s = experiment.stop_brake_limit_s},
+              {.duty = std::min(gate.fault_brake_duty, gate.brake_duty_max), .limit_s = gate.fault_brake_limit_s}),
           .ideal_actuator = ideal_actuator,
           .max_brake_duty = gate.brake_duty_max,
           .start_speed_rad_s = experiment.start_speed_rad_s};
@@ -52,18 +67,18 @@ RunLogic::RunLogic(RunLogicParts parts)
       start_speed_rad_s_(parts.start_speed_rad_s),
       controller_(std::move(parts.controller)),
       sequence_(std::move(parts.sequence)),
-      upper_(parts.control.observer, parts.rig.encoder_counts_per_rev),
-      lower_(parts.control.observer, parts.rig.encoder_counts_per_rev),
+      upper_(parts.control.observer, parts.rig.encoder_counts_per_rev, fastest_change_rad_s2(parts).upper),
+      lower_(parts.control.observer, parts.rig.encoder_counts_per_rev, fastest_change_rad_s2(parts).lower),
       actuator_(parts.rig.brake, parts.ideal_actuator, parts.max_brake_duty) {}
 
-void RunLogic::estimate(const rig::Measurement& measurement, double dt_s) noexcept {
+void RunLogic::estimate(const rig::Measurement& measurement, double dt_s, double stamp_error_s) noexcept {
   if (!started_) {
     upper_.reset(measurement.upper_counts, start_speed_rad_s_);
     lower_.reset(measurement.lower_counts, start_speed_rad_s_);
     actuator_.reset();
   } else if (dt_s > 0.0) {
-    upper_.update(measurement.upper_counts, dt_s);
-    lower_.update(measurement.lower_counts, dt_s);
+    upper_.update(measurement.upper_counts, dt_s, stamp_error_s);
+    lower_.update(measurement.lower_counts, dt_s, stamp_error_s);
     actuator_.advance(dt_s);
   }
   note_travel(measurement, dt_s);
@@ -156,7 +171,8 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
   if (!started_) start_ns_ = last_ns_ = measurement.time_ns;
   const double dt_s = static_cast<double>(measurement.time_ns - last_ns_) * rig::s_per_ns;
   last_ns_ = measurement.time_ns;
-  estimate(measurement, dt_s);
+  const std::int64_t stamp_error_ns = rig::stamp_error_ns(measurement.time_ns, record.stamp_ns, record.timing.read_ns);
+  estimate(measurement, dt_s, static_cast<double>(stamp_error_ns) * rig::s_per_ns);
   started_ = true;
 
   const Sequence::Change change =

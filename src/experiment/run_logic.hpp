@@ -64,7 +64,7 @@ class RunLogic final : public runtime::CycleLogic {
  private:
   void adjust(rig::CycleRecord& record) noexcept;
   [[nodiscard]] double without_bump(double torque_Nm, const control::SlipInput& input) noexcept;
-  void estimate(const rig::Measurement& measurement, double dt_s) noexcept;
+  void estimate(const rig::Measurement& measurement, double dt_s, double stamp_error_s) noexcept;
   void note_travel(const rig::Measurement& measurement, double dt_s) noexcept;
   [[nodiscard]] double slip_control(double dt_s, bool entered, rig::ControlState& state) noexcept;
   [[nodiscard]] double wanted_torque_Nm(const PhasePlan& plan, double dt_s, bool entered,

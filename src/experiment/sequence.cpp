@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "runtime/fault_brake.hpp"
+
 namespace abs_hil::experiment {
 
 namespace {
@@ -49,21 +51,45 @@ void check_safe(const PhasePlan& plan, const std::string& name) {
     refuse(": motor and brake act together: leave one of them out, or set motor_with_brake = true");
   }
 }
+
+PhasePlan braking(rig::Phase phase, const StopBrake& brake) {
+  return {.phase = phase,
+          .brake = brake.duty > 0.0 ? BrakeAction::duty : BrakeAction::released,
+          .brake_duty = brake.duty,
+          .time_limit_s = brake.limit_s};
+}
+
+/// True if one wrong sample of speed or slip could make the condition hold.
+bool on_estimates(const EndCondition& condition) noexcept {
+  switch (condition.kind) {
+    case EndKind::upper_speed_above:
+    case EndKind::upper_speed_below:
+    case EndKind::lower_speed_above:
+    case EndKind::lower_speed_below:
+    case EndKind::car_speed_above:
+    case EndKind::car_speed_below:
+    case EndKind::slip_above:
+    case EndKind::slip_below: return true;
+    case EndKind::all: return std::any_of(condition.parts.begin(), condition.parts.end(), on_estimates);
+    default: return false;
+  }
+}
 }  // namespace
 
-Sequence::Sequence(std::vector<PhasePlan> plans, const SequenceLimits& limits, const StopBrake& stop_brake)
+Sequence::Sequence(std::vector<PhasePlan> plans, const SequenceLimits& limits, const StopBrake& stop_brake,
+                   const StopBrake& fault_brake)
     : plans_(std::move(plans)),
       limits_(limits),
-      stop_plan_{.phase = rig::Phase::hold,
-                 .brake = stop_brake.duty > 0.0 ? BrakeAction::duty : BrakeAction::released,
-                 .brake_duty = stop_brake.duty,
-                 .time_limit_s = stop_brake.limit_s} {
+      stop_plan_(braking(rig::Phase::hold, stop_brake)),
+      fault_plan_(braking(rig::Phase::fault, fault_brake)) {
   check_safe(stop_plan_, "after a stop request");
+  check_safe(fault_plan_, "after a fault");
   if (plans_.empty()) throw std::invalid_argument("a sequence has no phases; give at least one");
   for (const PhasePlan& plan : plans_) {
     const std::string name(rig::name_of(plan.phase));
     if (plan.ends_on.empty()) throw std::invalid_argument("phase " + name + " has no end condition; give at least one");
     check_safe(plan, name);
+    held_.resize(std::max(held_.size(), plan.ends_on.size()));
   }
 }
 
@@ -75,6 +101,7 @@ runtime::PhasePermissions Sequence::permissions() const noexcept {
     may.brake = may.brake || plan.brake != BrakeAction::released;
     may.together = may.together || plan.motor_with_brake;
   }
+  if (fault_plan_.brake == BrakeAction::duty) permissions[static_cast<std::size_t>(fault_plan_.phase)].brake = true;
   if (stop_plan_.brake == BrakeAction::duty) permissions[static_cast<std::size_t>(stop_plan_.phase)].brake = true;
   return permissions;
 }
@@ -86,6 +113,7 @@ void Sequence::enter(std::size_t index, const SequenceInput& input) noexcept {
   entered_at_m_ = input.distance_m;
   peak_speed_rad_s_ = input.speeds.omega1_rad_s;
   peak_at_s_ = input.time_s;
+  std::fill(held_.begin(), held_.end(), std::uint8_t{0});
 }
 
 inline bool Sequence::holds(const EndCondition& condition, const SequenceInput& input) const noexcept {
@@ -122,8 +150,13 @@ const EndCondition* Sequence::ending(const SequenceInput& input) noexcept {
     peak_speed_rad_s_ = input.speeds.omega1_rad_s;
     peak_at_s_ = input.time_s;
   }
-  for (const EndCondition& condition : plans_[index_].ends_on) {
-    if (holds(condition, input)) return &condition;
+  const std::vector<EndCondition>& conditions = plans_[index_].ends_on;
+  const bool fresh = input.time_s > now_s_;
+  for (std::size_t i = 0; i < conditions.size(); ++i) {
+    const bool held = held_[i] != 0;
+    const bool now = holds(conditions[i], input);
+    if (fresh) held_[i] = now ? 1 : 0;
+    if (now && ((fresh && held) || !on_estimates(conditions[i]))) return &conditions[i];
   }
   return nullptr;
 }
@@ -144,12 +177,30 @@ Sequence::Change Sequence::stop(const SequenceInput& input) noexcept {
   return {true, early_reason_, early_value_};
 }
 
+Sequence::Change Sequence::fail(const SequenceInput& input) noexcept {
+  const bool brakes = fault_plan_.brake == BrakeAction::duty && !barred_ && started_ && !input.stands_still;
+  const bool in_time = !failing_ || input.time_s - entered_at_s_ < fault_plan_.time_limit_s;
+  if (!brakes || !in_time) return end(rig::Phase::fault, early_reason_, early_value_);
+  if (failing_) return {};
+  enter(index_, input);
+  failing_ = true;
+  return {true, early_reason_, early_value_};
+}
+
+Sequence::Change Sequence::fault(rig::Reason reason, double value, const SequenceInput& input) noexcept {
+  end_early(reason, value);
+  return fail(input);
+}
+
 Sequence::Change Sequence::update(const SequenceInput& input) noexcept {
   if (ended_) return {};
+  const Change change = advance(input);
   now_s_ = input.time_s;
-  if (early_reason_ != rig::Reason::none) {
-    return rig::is_stop_request(early_reason_) ? stop(input) : end(rig::Phase::fault, early_reason_, early_value_);
-  }
+  return change;
+}
+
+Sequence::Change Sequence::advance(const SequenceInput& input) noexcept {
+  if (early_reason_ != rig::Reason::none) return rig::is_stop_request(early_reason_) ? stop(input) : fail(input);
   if (!started_) {
     enter(0, input);
     return {true, rig::Reason::run_started, input.speeds.omega2_rad_s};
@@ -159,19 +210,17 @@ Sequence::Change Sequence::update(const SequenceInput& input) noexcept {
     enter(index_ + 1, input);
     return {true, condition->reason, condition->value};
   }
-  if (input.time_s > limits_.run_time_s) return end(rig::Phase::fault, rig::Reason::run_time_limit, input.time_s);
-  if (input.distance_m > limits_.distance_m) {
-    return end(rig::Phase::fault, rig::Reason::run_distance_limit, input.distance_m);
-  }
+  if (input.time_s > limits_.run_time_s) return fault(rig::Reason::run_time_limit, input.time_s, input);
+  if (input.distance_m > limits_.distance_m) return fault(rig::Reason::run_distance_limit, input.distance_m, input);
   const double lasted_s = input.time_s - entered_at_s_;
-  if (lasted_s > plans_[index_].time_limit_s) {
-    return end(rig::Phase::fault, rig::Reason::phase_time_limit, lasted_s);
-  }
+  if (lasted_s > plans_[index_].time_limit_s) return fault(rig::Reason::phase_time_limit, lasted_s, input);
   return {};
 }
 
 void Sequence::end_early(rig::Reason reason, double value) noexcept {
-  if (early_reason_ != rig::Reason::none && !(stopping_ && rig::is_fault(reason))) return;
+  barred_ = barred_ || (rig::is_fault(reason) && !runtime::brake_may_hold_after(reason));
+  const bool fault_while_stopping = stopping_ && rig::is_stop_request(early_reason_) && rig::is_fault(reason);
+  if (early_reason_ != rig::Reason::none && !fault_while_stopping) return;
   early_reason_ = reason;
   early_value_ = value;
 }

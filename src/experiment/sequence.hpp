@@ -41,7 +41,8 @@ struct EndCondition {
   std::vector<EndCondition> parts{};      ///< for EndKind::all
 };
 
-/// One phase: its actions, and the conditions of which the first to hold ends it. Exceeding the time limit is a fault.
+/// One phase: its actions, and the conditions of which the first to hold ends it. A condition on speed or slip must
+/// hold for two fresh samples in a row, because one sample may be wrong. Exceeding the time limit is a fault.
 struct PhasePlan {
   rig::Phase phase{rig::Phase::idle};
   double motor_duty{0.0};
@@ -73,7 +74,8 @@ struct SequenceLimits {
   double distance_m{std::numeric_limits<double>::infinity()};  ///< distance of the car since the run began
 };
 
-/// The brake after a stop request: the motor is off, this duty acts until standstill, then the brake is released.
+/// The brake after a stop request, or after a fault that permits it: the motor is off, this duty acts until standstill,
+/// then the brake is released.
 struct StopBrake {
   double duty{0.0};     ///< in [0, 1]; 0: the run ends at once
   double limit_s{5.0};  ///< time limit, > 0
@@ -95,7 +97,8 @@ class Sequence {
  public:
   /// Throws std::invalid_argument for an empty list and for an unsafe phase: one without an end or a finite time limit,
   /// with a duty or torque outside its range, or with motor and brake together but without `motor_with_brake`.
-  explicit Sequence(std::vector<PhasePlan> plans, const SequenceLimits& limits = {}, const StopBrake& stop_brake = {});
+  explicit Sequence(std::vector<PhasePlan> plans, const SequenceLimits& limits = {}, const StopBrake& stop_brake = {},
+                    const StopBrake& fault_brake = {});
 
   struct Change {
     bool entered{false};  ///< a phase begins in this cycle
@@ -105,7 +108,9 @@ class Sequence {
   /// Enters the first phase on the first call, and later the next phase as soon as an end condition holds.
   Change update(const SequenceInput& input) noexcept;
   /// Leaves the plans for one last cycle in phase `stopped` (stop request) or `fault`. With a stop brake, a stop
-  /// request first enters the phase `hold`. The first reason stays, unless a fault occurs in `hold`.
+  /// request first enters the phase `hold`. With a fault brake, the phase `fault` lasts until standstill or the brake's
+  /// limit, unless a fault bars the brake (runtime::brake_may_hold_after). The first reason stays, unless a fault
+  /// occurs in `hold`.
   void end_early(rig::Reason reason, double value) noexcept;
 
   /// Which outputs the plans permit in each phase.
@@ -113,6 +118,7 @@ class Sequence {
   /// The phase that acts in this cycle.
   [[nodiscard]] const PhasePlan& current() const noexcept {
     if (ended_) return last_;
+    if (failing_) return fault_plan_;
     return stopping_ ? stop_plan_ : plans_[index_];
   }
   /// Index of the phase among the plans, from 0; after a stop request, of the phase that it interrupted.
@@ -128,19 +134,26 @@ class Sequence {
   [[nodiscard]] bool all_hold(const std::vector<EndCondition>& parts, const SequenceInput& input) const noexcept;
   void enter(std::size_t index, const SequenceInput& input) noexcept;
   Change stop(const SequenceInput& input) noexcept;
+  Change fail(const SequenceInput& input) noexcept;
+  Change fault(rig::Reason reason, double value, const SequenceInput& input) noexcept;
+  Change advance(const SequenceInput& input) noexcept;
   Change end(rig::Phase phase, rig::Reason reason, double value) noexcept;
 
   std::vector<PhasePlan> plans_;
   SequenceLimits limits_;
   PhasePlan stop_plan_;
+  PhasePlan fault_plan_;
+  std::vector<std::uint8_t> held_;  ///< for each end condition of the phase: it held for the latest fresh sample
   PhasePlan last_{};
   std::size_t index_{0};
   bool started_{false};
   bool stopping_{false};  ///< the stop brake acts
+  bool failing_{false};   ///< the fault brake acts
+  bool barred_{false};    ///< a fault does not permit the fault brake
   bool ended_{false};
   rig::Reason early_reason_{rig::Reason::none};
   double early_value_{0.0};
-  double now_s_{0.0};
+  double now_s_{-1.0};  ///< time of the latest sample
   double entered_at_s_{0.0};
   double entered_at_m_{0.0};
   double peak_speed_rad_s_{0.0};

@@ -59,6 +59,7 @@ analysis::RunSummary summarise(const RunRequest& request, const experiment::RunS
           .truth_known = s.backend == "sim",
           .timing = request.outputs.fast ? rig::TimingSummary{} : session.executive().statistics().summary(),
           .gate = session.gate().counts(),
+          .checks_unjudged = session.gate().unjudged_share(),
           .config = nlohmann::ordered_json::parse(request.config_json),
           .friction_curve = outputs.friction_curve_json()};
 }
@@ -119,6 +120,16 @@ std::string realtime_refusal(const runtime::RealtimeReport& report) {
 }
 
 namespace {
+
+/// Without a limit of its own, the cycle's longest gap is that at which the guardian would act.
+runtime::OverrunOptions overruns_of(const RunRequest& request) {
+  runtime::OverrunOptions overruns = request.settings.realtime.overruns;
+  if (overruns.cycle_gap_max_s == 0.0 && needs_guardian(request)) {
+    constexpr double s_per_ms = 1e-3;
+    overruns.cycle_gap_max_s = request.settings.guardian.timeout_ms * s_per_ms;
+  }
+  return overruns;
+}
 
 /// Checks in advance, as far as possible, that a guardian can start.
 void require_guardian(const RunRequest& request) {
@@ -194,7 +205,7 @@ int run(const RunRequest& request) {
   runtime::OverrunReporter late_cycles(std::llround(1e9 / s.control.rate_Hz));
   std::vector<rig::RecordSink*> sinks = outputs.sinks();
   if (!request.outputs.fast) sinks.push_back(&late_cycles);
-  experiment::RunSession session(clock, *driver, std::move(logic), s.gate, std::move(sinks), s.realtime.overruns);
+  experiment::RunSession session(clock, *driver, std::move(logic), s.gate, std::move(sinks), overruns_of(request));
   TimingMessages timing(request, session, late_cycles);
   outputs.attach(session);
   const auto& folder = outputs.folder();

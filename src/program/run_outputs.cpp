@@ -155,6 +155,7 @@ telemetry::StatusSnapshot RunOutputs::snapshot() const {
           .overruns = timing.overruns.total,
           .telemetry_drops = session_->record_drops(),
           .gate_interventions = rig::interventions(session_->gate().counts()),
+          .checks_unjudged = session_->gate().unjudged_share(),
           .realtime = session_->realtime(),
           .wakeup_latency = timing.wakeup_latency,
           .cycle_time = timing.cycle_time,

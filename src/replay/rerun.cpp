@@ -20,6 +20,7 @@ namespace abs_hil::replay {
 
 namespace {
 
+constexpr double ignored_gap_s = 1e6;
 constexpr std::size_t ring_capacity = 2;  // the ring is emptied after every cycle
 
 /// A clock that stands still within a cycle and moves to the recorded time of the next cycle.
@@ -68,7 +69,7 @@ class RecordedRig final : public driver::RigDriver {
   rig::PlantTruth truth_{};
 };
 
-/// A rig whose reading takes the recorded time: the gate does not judge counts that came late.
+/// A rig whose reading takes the recorded time: it tells the gate how certain the time stamps are.
 class TimedReading final : public driver::RigDriver {
  public:
   TimedReading(driver::RigDriver& rig, const RecordedRun& run, RecordedClock& clock)
@@ -179,7 +180,7 @@ std::vector<RerunCycle> rerun(const RecordedRun& run, const config::Settings& s,
   runtime::RecordRing ring(ring_capacity);
   // Delays are part of the recording and not repeated, so they must not count here.
   runtime::CyclicExecutive executive(clock, rig, cycle_logic, gate, ring, std::llround(1e9 / s.control.rate_Hz),
-                                     {.startup_cycles = 0, .max_consecutive = 0});
+                                     {.startup_cycles = 0, .max_consecutive = 0, .cycle_gap_max_s = ignored_gap_s});
   Collected collected;
   runtime::RecordPump pump(ring, s.plant.rig.wheels.r2_m, {&collected});
   rig.configure();

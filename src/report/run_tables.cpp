@@ -136,6 +136,10 @@ std::string timing_table(const std::vector<RunFiles>& runs) {
   add("longest run of late cycles", "overruns_longest_run");
   add("ticks missed", "ticks_missed");
   add("records lost", "telemetry_drops");
+  std::vector<std::string> unjudged{"verdict on the wheels overdue, % of the time"};
+  constexpr double percent = 100.0;
+  for (const RunFiles& run : timed) unjudged.push_back(shown(percent * run.number("checks_unjudged"), 1));
+  table.rows.push_back(std::move(unjudged));
   std::vector<std::string> realtime{"real time obtained"};
   for (const RunFiles& run : timed) {
     realtime.emplace_back(run.summary.value("realtime", nlohmann::ordered_json(false)) == true ? "yes" : "no");

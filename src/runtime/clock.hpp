@@ -14,6 +14,9 @@ class Clock {
   [[nodiscard]] virtual std::int64_t now_ns() noexcept = 0;
   /// Sleeps until `time_ns` or a little later; returns at once if that time has passed.
   virtual void sleep_until(std::int64_t time_ns) noexcept = 0;
+  /// For how long the computer has been suspended so far, ns: this time is missing in `now_ns`. It may be a little
+  /// less than the true value, never more, and counts from any origin. 0 if the clock cannot know.
+  [[nodiscard]] virtual std::int64_t suspended_ns() noexcept { return 0; }
 };
 
 /// CLOCK_MONOTONIC with absolute sleeps. Real-time safe.
@@ -21,6 +24,7 @@ class MonotonicClock final : public Clock {
  public:
   [[nodiscard]] std::int64_t now_ns() noexcept override;
   void sleep_until(std::int64_t time_ns) noexcept override;
+  [[nodiscard]] std::int64_t suspended_ns() noexcept override;
 };
 
 /// Virtual time: it advances only in `sleep_until`. Every wake-up is exact and every computation takes no time.

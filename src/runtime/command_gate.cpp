@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "abs_hil/rig/time_units.hpp"
+#include "runtime/fault_brake.hpp"
 #include "runtime/single_writer.hpp"
 
 namespace abs_hil::runtime {
@@ -14,8 +15,6 @@ using rig::Reason;
 
 /// Tolerance for rounding: a step exactly at the limit must pass.
 constexpr double rounding = 1e-9;
-/// A longer reading was delayed, and its time stamp may not belong to its counters.
-constexpr std::int64_t prompt_reading_ns = 500'000;
 
 bool brakes(const rig::Command& command) noexcept { return command.brake_duty > 0.0 || command.brake_torque_Nm > 0.0; }
 
@@ -27,9 +26,16 @@ void stop_motor(rig::Command& command) noexcept {
 }  // namespace
 
 void CommandGate::latch(Reason fault, double value) noexcept {
+  if (fault == Reason::none) return;
+  if (barring_ == Reason::none && !brake_may_hold_after(fault)) barring_ = fault;
   if (fault_ != Reason::none) return;
   fault_ = fault;
   fault_value_ = value;
+}
+
+double CommandGate::unjudged_share() const noexcept {
+  const auto watched_ns = static_cast<double>(watched_ns_.load(std::memory_order_relaxed));
+  return watched_ns > 0.0 ? static_cast<double>(unjudged_ns_.load(std::memory_order_relaxed)) / watched_ns : 0.0;
 }
 
 void CommandGate::note(GateAction action) noexcept {
@@ -47,7 +53,7 @@ rig::GateCounts CommandGate::counts() const noexcept {
 bool CommandGate::check_measurement(const rig::Measurement& measurement, std::int64_t now_ns,
                                     std::int64_t reading_ns) noexcept {
   check_board(measurement);
-  if (checks_wheels_) check_wheels(measurement, now_ns, reading_ns <= prompt_reading_ns);
+  if (checks_wheels_) check_wheels(measurement, now_ns, reading_ns);
   return speed_windows_.usable();
 }
 
@@ -64,13 +70,32 @@ void CommandGate::check_board(const rig::Measurement& measurement) noexcept {
   temperature_known_ = !std::isnan(measurement.temperature_C);
 }
 
-void CommandGate::check_wheels(const rig::Measurement& measurement, std::int64_t now_ns, bool prompt) noexcept {
-  CheckResult result = speed_windows_.update(measurement, now_ns, sent_, prompt);
+void CommandGate::check_wheels(const rig::Measurement& measurement, std::int64_t now_ns,
+                               std::int64_t reading_ns) noexcept {
+  CheckResult result = speed_windows_.update(measurement, now_ns, sent_, reading_ns);
   if (speed_windows_.complete()) {
     result = encoders_.update(speed_windows_.speed_window());
     if (result.sound()) result = response_.update(speed_windows_.speed_window(), encoders_.brake_torque_Nm());
   }
   latch(result.reason, result.value);
+  require_verdict(now_ns);
+}
+
+void CommandGate::require_verdict(std::int64_t now_ns) noexcept {
+  if (watched_from_ns_ < 0) watched_from_ns_ = watched_until_ns_ = now_ns;
+  const std::int64_t since_ns = now_ns - watched_until_ns_;
+  watched_until_ns_ = now_ns;
+  watched_ns_.store(now_ns - watched_from_ns_, std::memory_order_relaxed);
+  if (speed_windows_.complete()) {
+    without_verdict_ns_ = 0;
+    return;
+  }
+  if (speed_windows_.overdue()) add_as_single_writer(unjudged_ns_, since_ns);
+  // Pulses of an output count together: a verdict alone ends the time.
+  if (rig::acts(sent_)) without_verdict_ns_ += since_ns;
+  if (without_verdict_ns_ > judge_within_ns_) {
+    latch(Reason::checks_cannot_judge, static_cast<double>(without_verdict_ns_) * rig::s_per_ns);
+  }
 }
 
 void CommandGate::require_finite(const rig::Command& wanted, const rig::WheelSpeeds& speeds) noexcept {
@@ -97,6 +122,17 @@ double CommandGate::rising(double duty, double before, double rate_per_s, double
   return most;
 }
 
+/// The command that may follow a fault: the motor is off, and the brake holds at most `fault_brake_duty`, if no fault
+/// bars it and the logic wants it.
+rig::Command CommandGate::after_fault(const rig::Command& wanted, std::int64_t now_ns) noexcept {
+  if (fault_ns_ < 0) fault_ns_ = now_ns;
+  const double held_s = static_cast<double>(now_ns - fault_ns_) * rig::s_per_ns;
+  const double duty = std::min(wanted.brake_duty, options_.fault_brake_duty);
+  const bool holds = duty > 0.0 && std::isfinite(wanted.brake_torque_Nm);  // false for NaN
+  if (!holds || barring_ != Reason::none || held_s > options_.fault_brake_limit_s) return {};
+  return {.brake_duty = duty, .brake_torque_Nm = wanted.brake_torque_Nm * (duty / wanted.brake_duty)};
+}
+
 void CommandGate::interlock(rig::Command& command, const PhasePermission& may) noexcept {
   if (command.motor_duty > 0.0 && !command.motor_enable) {
     stop_motor(command);
@@ -121,17 +157,14 @@ void CommandGate::interlock(rig::Command& command, const PhasePermission& may) n
 [[gnu::flatten]] GateResult CommandGate::check(const rig::Command& wanted, const GateInput& input) noexcept {
   last_action_ = GateAction::passed;
   require_finite(wanted, input.speeds);
-  GateResult result;
-  if (fault_ != Reason::none) {
-    note(GateAction::refused);
-    result.fault = fault_;
-    result.fault_value = fault_value_;
-  } else {
-    rig::Command& command = result.command;
-    command = wanted;
-    command.brake_torque_Nm = std::max(0.0, wanted.brake_torque_Nm);
-    command.brake_duty = limited(wanted.brake_duty, options_.brake_duty_max, GateAction::brake_clamped);
-    command.motor_duty = limited(wanted.motor_duty, options_.motor_duty_max, GateAction::motor_clamped);
+  GateResult result{.fault = fault_, .fault_value = fault_value_};
+  const bool faulty = fault_ != Reason::none;
+  rig::Command& command = result.command;
+  command = faulty ? after_fault(wanted, input.now_ns) : wanted;
+  if (!faulty || rig::acts(command)) {
+    command.brake_torque_Nm = std::max(0.0, command.brake_torque_Nm);
+    command.brake_duty = limited(command.brake_duty, options_.brake_duty_max, GateAction::brake_clamped);
+    command.motor_duty = limited(command.motor_duty, options_.motor_duty_max, GateAction::motor_clamped);
     // The first command is not rate-limited: the outputs have been 0 for longer than any rise takes.
     if (has_sent_) {
       const double elapsed_s = static_cast<double>(input.now_ns - sent_ns_) * rig::s_per_ns;
@@ -141,8 +174,9 @@ void CommandGate::interlock(rig::Command& command, const PhasePermission& may) n
                                   GateAction::motor_rate_limited);
     }
     interlock(command, permissions_[static_cast<std::size_t>(input.phase)]);
-    if (last_action_ == GateAction::passed) note(GateAction::passed);
+    if (!faulty && last_action_ == GateAction::passed) note(GateAction::passed);
   }
+  if (faulty) note(GateAction::refused);
   sent_ = result.command;
   sent_ns_ = input.now_ns;
   has_sent_ = true;

@@ -9,6 +9,7 @@
 #include "abs_hil/rig/measurement.hpp"
 #include "abs_hil/rig/phase.hpp"
 #include "abs_hil/rig/reason.hpp"
+#include "abs_hil/rig/time_units.hpp"
 #include "rig/gate_counts.hpp"
 #include "runtime/encoder_check.hpp"
 #include "runtime/gate_options.hpp"
@@ -36,7 +37,8 @@ struct GateResult {
 };
 
 /// Safety gate between controller and driver. It checks each command for finite values, range, rate and interlocks. It
-/// checks that each measurement agrees with physics and with the commands sent. A fault latches: from then on only the
+/// checks that each measurement agrees with physics and with the commands sent; checks that cannot judge for long are a
+/// fault, too. A fault latches: from then on only the
 /// safe command passes; each run has a new gate. docs/safety.md lists every check with its reason. Real-time safe.
 class CommandGate {
  public:
@@ -45,6 +47,7 @@ class CommandGate {
   explicit CommandGate(const GateOptions& options, const PhasePermissions& permissions = any_phase(),
                        const PlausibilityLimits& limits = {}) noexcept
       : options_(options),
+        judge_within_ns_(static_cast<std::int64_t>(options.judge_within_s * static_cast<double>(rig::ns_per_s))),
         permissions_(permissions),
         checks_wheels_(limits.enabled),
         speed_windows_(limits),
@@ -54,7 +57,7 @@ class CommandGate {
   /// Checks a cycle's measurement before anything uses it. Latches faults that the board reports and wheel motion that
   /// is physically impossible.
   /// @return false if the measurement must not be used, because it is stale or a counter jumped; use the one before
-  /// @param reading_ns duration of the reading; the wheels of a delayed reading are not checked
+  /// @param reading_ns duration of the reading, which began at `now_ns`: the counters were latched within it
   bool check_measurement(const rig::Measurement& measurement, std::int64_t now_ns,
                          std::int64_t reading_ns = 0) noexcept;
   [[nodiscard]] GateResult check(const rig::Command& wanted, const GateInput& input) noexcept;
@@ -63,23 +66,32 @@ class CommandGate {
 
   [[nodiscard]] rig::Reason fault() const noexcept { return fault_; }
   [[nodiscard]] double fault_value() const noexcept { return fault_value_; }
+  /// The first fault after which the brake must not hold `fault_brake_duty`, also if another fault latched before it.
+  [[nodiscard]] rig::Reason brake_barred_by() const noexcept { return barring_; }
   /// How often each action was taken; any thread may call it.
   [[nodiscard]] rig::GateCounts counts() const noexcept;
+  /// Share of the run's time in which a verdict of the wheels' checks was due and could not be given; 0 if the gate
+  /// does not check the wheels. Any thread may call it.
+  [[nodiscard]] double unjudged_share() const noexcept;
   [[nodiscard]] std::uint64_t count(GateAction action) const noexcept {
     return counts_[static_cast<std::size_t>(action)].load(std::memory_order_relaxed);
   }
 
  private:
   void check_board(const rig::Measurement& measurement) noexcept;
-  void check_wheels(const rig::Measurement& measurement, std::int64_t now_ns, bool prompt) noexcept;
+  void check_wheels(const rig::Measurement& measurement, std::int64_t now_ns, std::int64_t reading_ns) noexcept;
+  /// Latches a fault when the checks of the wheels have given no verdict for `judge_within_s` while an output was on.
+  void require_verdict(std::int64_t now_ns) noexcept;
   void require_finite(const rig::Command& wanted, const rig::WheelSpeeds& speeds) noexcept;
   [[nodiscard]] double limited(double duty, double most, GateAction action) noexcept;
   [[nodiscard]] double rising(double duty, double before, double rate_per_s, double elapsed_s,
                               GateAction action) noexcept;
+  [[nodiscard]] rig::Command after_fault(const rig::Command& wanted, std::int64_t now_ns) noexcept;
   void interlock(rig::Command& command, const PhasePermission& may) noexcept;
   void note(GateAction action) noexcept;
 
   GateOptions options_;
+  std::int64_t judge_within_ns_;
   PhasePermissions permissions_;
   bool checks_wheels_;
   SpeedWindows speed_windows_;
@@ -88,11 +100,18 @@ class CommandGate {
   rig::Command sent_{};
   bool has_sent_{false};
   std::int64_t sent_ns_{0};
+  std::int64_t watched_from_ns_{-1};  ///< < 0: the wheels have not been checked yet
+  std::int64_t watched_until_ns_{0};
+  std::int64_t without_verdict_ns_{0};        ///< with an output on, since the latest verdict
+  std::atomic<std::int64_t> watched_ns_{0};   ///< only the cycle's thread writes these two
+  std::atomic<std::int64_t> unjudged_ns_{0};  ///< the part of it in which a verdict was overdue
   bool supply_known_{false};
   bool temperature_known_{false};
   GateAction last_action_{GateAction::passed};
   rig::Reason fault_{rig::Reason::none};
   double fault_value_{0.0};
+  rig::Reason barring_{rig::Reason::none};
+  std::int64_t fault_ns_{-1};  ///< the first command after the fault; < 0: none yet
   std::array<std::atomic<std::uint64_t>, gate_action_count> counts_{};  ///< only the cycle's thread adds
 };
 

@@ -13,6 +13,16 @@ static_assert(std::atomic<rig::Reason>::is_always_lock_free, "request_stop is ca
 
 std::uint64_t count_of(int value) noexcept { return static_cast<std::uint64_t>(std::max(value, 0)); }
 
+constexpr double gap_without_guardian_s = 0.1;
+constexpr std::int64_t least_gap_periods = 3;
+/// Far above the resolution of the clocks, far below the shortest suspension.
+constexpr std::int64_t least_suspension_ns = 1'000'000;
+
+std::int64_t longest_gap_ns(double wanted_s, std::int64_t period_ns) noexcept {
+  const double gap_s = wanted_s > 0.0 ? wanted_s : gap_without_guardian_s;
+  return std::max(static_cast<std::int64_t>(gap_s * static_cast<double>(rig::ns_per_s)), least_gap_periods * period_ns);
+}
+
 /// The part of the cycle that took longest; the first one if several are equal.
 rig::OverrunCause longest_part(const rig::CycleTiming& timing, std::int64_t record_ns) noexcept {
   using Part = std::pair<std::int64_t, rig::OverrunCause>;
@@ -36,6 +46,7 @@ CyclicExecutive::CyclicExecutive(Clock& clock, driver::RigDriver& driver, CycleL
       period_ns_(period_ns),
       startup_cycles_(count_of(overruns.startup_cycles)),
       max_consecutive_(count_of(overruns.max_consecutive)),
+      gap_max_ns_(longest_gap_ns(overruns.cycle_gap_max_s, period_ns)),
       statistics_(std::make_unique<CycleStatistics>()) {}
 
 void CyclicExecutive::request_stop(rig::Reason reason) noexcept {
@@ -53,6 +64,18 @@ bool CyclicExecutive::step() noexcept {
   return !logic_.finished();
 }
 
+void CyclicExecutive::watch_time(std::int64_t woken_ns) noexcept {
+  const std::int64_t told_ns = clock_.suspended_ns();
+  const std::int64_t suspended_ns = sequence_ == 0 ? 0 : told_ns - suspended_ns_;
+  suspended_ns_ = sequence_ == 0 ? told_ns : std::max(suspended_ns_, told_ns);
+  const std::int64_t gap_ns = woken_ns - std::exchange(woken_ns_, woken_ns);
+  if (!acting_) return;
+  if (suspended_ns > least_suspension_ns) {
+    gate_.latch(rig::Reason::computer_suspended, static_cast<double>(suspended_ns) * rig::s_per_ns);
+  }
+  if (gap_ns > gap_max_ns_) gate_.latch(rig::Reason::cycle_gap, static_cast<double>(gap_ns) * rig::s_per_ns);
+}
+
 void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   if (heartbeat_ != nullptr) {
     heartbeat_->beat();
@@ -61,6 +84,7 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
     }
   }
   const std::int64_t woken_ns = clock_.now_ns();
+  watch_time(woken_ns);
   if (sequence_ == 0) start_ns_ = woken_ns;
   record.sequence = sequence_++;
   record.stamp_ns = woken_ns;
@@ -73,10 +97,11 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   rig::Measurement latest;
   const driver::IoResult read = driver_.read(woken_ns, latest);
   const std::int64_t read_ns = clock_.now_ns();
+  record.timing.read_ns = read_ns - woken_ns;
   if (!read.ok()) {
     if (io_error_.ok()) io_error_ = read;
     gate_.latch(driver::reason_of(read, rig::Reason::driver_read_failed), static_cast<double>(read.error));
-  } else if (gate_.check_measurement(latest, woken_ns, read_ns - woken_ns) || record.sequence == 0) {
+  } else if (gate_.check_measurement(latest, woken_ns, record.timing.read_ns) || record.sequence == 0) {
     measurement_ = latest;
   }
   record.measurement = measurement_;
@@ -86,10 +111,12 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
     logic_.end_early(stop, 0.0);
   }
   if (gate_.fault() != rig::Reason::none) logic_.end_early(gate_.fault(), gate_.fault_value());
+  if (const rig::Reason barring = gate_.brake_barred_by(); barring != rig::Reason::none) logic_.end_early(barring, 0.0);
   const rig::Command wanted = logic_.step(measurement_, record);
   driver_.note_phase(record.phase);
   const GateResult gated = gate_.check(wanted, {record.control.speeds_est, record.phase, woken_ns});
   record.command = gated.command;
+  acting_ = rig::acts(gated.command);
   if (gated.fault != rig::Reason::none) logic_.end_early(gated.fault, gated.fault_value);
   const std::int64_t control_ns = clock_.now_ns();
 
@@ -103,7 +130,6 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   logic_.commanded(gated.command);
   const std::int64_t written_ns = clock_.now_ns();
 
-  record.timing.read_ns = read_ns - woken_ns;
   record.timing.control_ns = control_ns - read_ns;
   record.timing.write_ns = written_ns - control_ns;
   record.timing.cycle_ns = written_ns - woken_ns;

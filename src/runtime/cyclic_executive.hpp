@@ -26,12 +26,19 @@ struct OverrunOptions {
                  .range = rig::from_zero(100'000));
   ABS_HIL_OPTION(std::int32_t, max_consecutive, 50, .key = "max_consecutive_overruns",
                  .meaning = "late cycles in a row that are a fault; 0: never", .range = rig::from_zero(1'000'000));
+  /// At least three periods count, whatever is set.
+  ABS_HIL_OPTION(double, cycle_gap_max_s, 0.0, .unit = "s",
+                 .meaning =
+                     "longest time from one cycle to the next with an output on, longer is a fault; 0: the "
+                     "guardian's time-out, without a guardian 0.1 s",
+                 .range = rig::from_zero(10));
 };
 
 /// Runs the cycle read -> estimate -> sequence -> control -> gate -> write -> record once per period, on absolute
 /// ticks, in real or virtual time. After a late cycle it skips whole periods and keeps the ticks' phase; it does not
-/// catch up. It blames a late cycle on the part that took longest. Too many late cycles in a row latch a fault. `step`
-/// is real-time safe apart from the clock's sleep and the driver's I/O; the constructor allocates everything.
+/// catch up. It blames a late cycle on the part that took longest. Too many late cycles in a row latch a fault; so
+/// do one long gap between two cycles and a suspended computer while an output is on. `step` is real-time safe apart
+/// from the clock's sleep and the driver's I/O; the constructor allocates everything.
 class CyclicExecutive {
  public:
   /// @param driver active; the executive leaves it active, and its caller must deactivate it
@@ -56,6 +63,7 @@ class CyclicExecutive {
 
  private:
   void run_cycle(rig::CycleRecord& record) noexcept;
+  void watch_time(std::int64_t woken_ns) noexcept;
   void keep(const rig::CycleRecord& record) noexcept;
   void schedule_next(const rig::CycleTiming& timing) noexcept;
   void count_late(const rig::CycleTiming& timing, std::int64_t ticks_missed) noexcept;
@@ -70,6 +78,10 @@ class CyclicExecutive {
   std::int64_t period_ns_;
   std::uint64_t startup_cycles_;
   std::uint64_t max_consecutive_;
+  std::int64_t gap_max_ns_;
+  bool acting_{false};  ///< the latest command has an output on
+  std::int64_t woken_ns_{0};
+  std::int64_t suspended_ns_{0};    ///< most that the clock has told
   std::int64_t first_tick_ns_{-1};  ///< < 0: at once
   std::int64_t tick_ns_{0};
   std::int64_t start_ns_{0};

@@ -11,10 +11,10 @@ namespace {
 using rig::Reason;
 
 // docs/safety.md, "Where the bounds come from", derives these.
-constexpr double stamp_error_s = 150e-6;  ///< error of a time stamp against the moment of reading
-constexpr double backwards_rad_s = 2.0;   ///< speed at which a stopped wheel may swing back
-constexpr int outside_max = 3;            ///< number of speed windows
-constexpr double rolled_after_s = 3.0;    ///< a locked wheel rolls again within this time after its release
+constexpr double least_stamp_error_s = 150e-6;  ///< least uncertainty of a speed window's duration
+constexpr double backwards_rad_s = 2.0;         ///< speed at which a stopped wheel may swing back
+constexpr int outside_max = 3;                  ///< number of speed windows
+constexpr double rolled_after_s = 3.0;          ///< a locked wheel rolls again within this time after its release
 constexpr double disagreement_s = 0.1;
 constexpr double disagreement_m_s = 0.3;  ///< allowed in addition to `free_slip_max`
 constexpr double earnest_brake_Nm = 1.0;
@@ -36,8 +36,10 @@ Reason reason_of(SpeedInterval::Verdict verdict, const Reasons& reasons) noexcep
 
 }  // namespace
 
-SpeedInterval::Verdict SpeedInterval::update(double omega_rad_s, double resolution_rad_s, double dt_s) noexcept {
-  const double slack_rad_s = resolution_rad_s + std::abs(omega_rad_s) * stamp_error_s / dt_s;
+SpeedInterval::Verdict SpeedInterval::update(double omega_rad_s, double resolution_rad_s, double dt_s,
+                                             double stamp_error_s) noexcept {
+  const double error_s = std::max(stamp_error_s, least_stamp_error_s);
+  const double slack_rad_s = resolution_rad_s + std::abs(omega_rad_s) * error_s / (dt_s - error_s);
   low_rad_s_ = std::max(low_rad_s_ - loss_rad_s2_ * dt_s, -backwards_rad_s);
   high_rad_s_ += gain_rad_s2_ * dt_s;
   if (omega_rad_s + slack_rad_s >= low_rad_s_ && omega_rad_s - slack_rad_s <= high_rad_s_) {
@@ -75,22 +77,51 @@ CheckResult EncoderCheck::update(const SpeedWindow& speed_window) noexcept {
 
 CheckResult EncoderCheck::judge_speeds(const SpeedWindow& speed_window) noexcept {
   using Verdict = SpeedInterval::Verdict;
-  const Verdict upper = upper_.update(speed_window.omega1_rad_s, speed_window.resolution_rad_s, speed_window.dt_s);
-  const Verdict lower = lower_.update(speed_window.omega2_rad_s, speed_window.resolution_rad_s, speed_window.dt_s);
+  const double error_s = speed_window.stamp_error_s();
+  const Verdict upper =
+      upper_.update(speed_window.omega1_rad_s, speed_window.resolution_rad_s, speed_window.dt_s, error_s);
+  const Verdict lower =
+      lower_.update(speed_window.omega2_rad_s, speed_window.resolution_rad_s, speed_window.dt_s, error_s);
   const bool both_doubtful = upper_.doubtful() && lower_.doubtful();
   if (both_doubtful && (upper == Verdict::stuck || lower == Verdict::stuck)) return {Reason::encoders_lost, 0.0};
   if (upper != Verdict::sound) return {reason_of(upper, upper_reasons), speed_window.omega1_rad_s};
   return {reason_of(lower, lower_reasons), speed_window.omega2_rad_s};
 }
 
+void Travelled::add(const SpeedWindow& speed_window, const rig::WheelParameters& wheels) noexcept {
+  if (lasted_s == 0.0) *this = {.begin_error_s = speed_window.begin_error_s};
+  end_error_s = speed_window.end_error_s;
+  resolution_rad = speed_window.resolution_rad_s * speed_window.dt_s;
+  lasted_s += speed_window.dt_s;
+  upper_m += wheels.r1_m * speed_window.omega1_rad_s * speed_window.dt_s;
+  lower_m += wheels.r2_m * speed_window.omega2_rad_s * speed_window.dt_s;
+}
+
 CheckResult EncoderCheck::judge_rolling(const SpeedWindow& speed_window) noexcept {
+  if (free_s_ < rolled_after_s) {
+    disagreeing_.lasted_s = 0.0;
+    return {};
+  }
   const double v1_m_s = limits_.wheels.r1_m * speed_window.omega1_rad_s;
   const double v2_m_s = limits_.wheels.r2_m * speed_window.omega2_rad_s;
   const double allowed_m_s = disagreement_m_s + limits_.free_slip_max * std::max(std::abs(v1_m_s), std::abs(v2_m_s)) +
                              limits_.wheels.r2_m * speed_window.resolution_rad_s;
-  const bool disagrees = free_s_ >= rolled_after_s && std::abs(v1_m_s - v2_m_s) > allowed_m_s;
-  disagreeing_s_ = disagrees ? disagreeing_s_ + speed_window.dt_s : 0.0;
-  if (disagreeing_s_ < disagreement_s) return {};
+  const double stamps_m_s = (std::abs(v1_m_s) + std::abs(v2_m_s)) * speed_window.stamp_error_s() / speed_window.dt_s;
+  if (std::abs(v1_m_s - v2_m_s) + stamps_m_s <= allowed_m_s) {
+    disagreeing_.lasted_s = 0.0;
+    return {};
+  }
+  if (disagreeing_.lasted_s == 0.0) allowed_m_ = 0.0;
+  disagreeing_.add(speed_window, limits_.wheels);
+  allowed_m_ += allowed_m_s * speed_window.dt_s;
+  const double apart_m = std::abs(disagreeing_.upper_m - disagreeing_.lower_m);
+  if (apart_m <= allowed_m_) {  // so far there is no sign of a disagreement
+    disagreeing_.lasted_s = 0.0;
+    return {};
+  }
+  const double stamps_m =
+      (std::abs(disagreeing_.upper_m) + std::abs(disagreeing_.lower_m)) * disagreeing_.stamp_share();
+  if (disagreeing_.lasted_s < disagreement_s || apart_m <= allowed_m_ + stamps_m) return {};
   if (speed_window.omega1_rad_s == 0.0) return {Reason::encoder_upper_stuck, speed_window.omega1_rad_s};
   if (speed_window.omega2_rad_s == 0.0) return {Reason::encoder_lower_stuck, speed_window.omega2_rad_s};
   return {Reason::encoders_disagree, v1_m_s - v2_m_s};
@@ -99,9 +130,25 @@ CheckResult EncoderCheck::judge_rolling(const SpeedWindow& speed_window) noexcep
 CheckResult EncoderCheck::judge_slip(const SpeedWindow& speed_window) noexcept {
   const double v1_m_s = limits_.wheels.r1_m * speed_window.omega1_rad_s;
   const double v2_m_s = limits_.wheels.r2_m * speed_window.omega2_rad_s;
-  const bool ahead = braked_s_ >= braked_after_s && v2_m_s > slip_speed_m_s && v1_m_s > (1.0 + ahead_part) * v2_m_s;
-  ahead_s_ = ahead ? ahead_s_ + speed_window.dt_s : 0.0;
-  if (ahead_s_ < ahead_max_s) return {};
+  constexpr double fastest = 1.0 + ahead_part;
+  if (braked_s_ < braked_after_s || v2_m_s <= slip_speed_m_s) {
+    ahead_.lasted_s = 0.0;
+    return {};
+  }
+  const double stamps_m_s = (v1_m_s + fastest * v2_m_s) * speed_window.stamp_error_s() / speed_window.dt_s;
+  if (v1_m_s + stamps_m_s <= fastest * v2_m_s) {
+    ahead_.lasted_s = 0.0;
+    return {};
+  }
+  ahead_.add(speed_window, limits_.wheels);
+  const double ahead_m = ahead_.upper_m - fastest * ahead_.lower_m;
+  if (ahead_m <= 0.0) {  // so far there is no sign that the braked wheel is ahead
+    ahead_.lasted_s = 0.0;
+    return {};
+  }
+  const double stamps_m = (ahead_.upper_m + fastest * ahead_.lower_m) * ahead_.stamp_share();
+  const double counts_m = (limits_.wheels.r1_m + fastest * limits_.wheels.r2_m) * ahead_.resolution_rad;
+  if (ahead_.lasted_s < ahead_max_s || ahead_m <= stamps_m + counts_m) return {};
   return {Reason::slip_implausible, 1.0 - v1_m_s / v2_m_s};
 }
 

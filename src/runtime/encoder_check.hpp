@@ -15,9 +15,9 @@ class SpeedInterval {
   SpeedInterval(double gain_rad_s2, double loss_rad_s2, double fastest_rad_s) noexcept
       : gain_rad_s2_(gain_rad_s2), loss_rad_s2_(loss_rad_s2), high_rad_s_(fastest_rad_s) {}
 
-  /// Takes a mean speed over `dt_s`; `resolution_rad_s` is its uncertainty from counting. The verdict differs from
-  /// `sound` only after three readings in a row outside the interval.
-  Verdict update(double omega_rad_s, double resolution_rad_s, double dt_s) noexcept;
+  /// Takes a mean speed over `dt_s`; `resolution_rad_s` is its uncertainty from counting, `stamp_error_s` < `dt_s` that
+  /// of `dt_s`. The verdict differs from `sound` only after three readings in a row outside the interval.
+  Verdict update(double omega_rad_s, double resolution_rad_s, double dt_s, double stamp_error_s = 0.0) noexcept;
   /// True if the latest reading was outside the interval.
   [[nodiscard]] bool doubtful() const noexcept { return outside_ > 0; }
 
@@ -27,6 +27,20 @@ class SpeedInterval {
   double low_rad_s_{0.0};
   double high_rad_s_;
   int outside_{0};  ///< number of readings in a row outside the interval
+};
+
+/// The ways that both wheels' treads have covered while a condition held, for a comparison over more than one speed
+/// window. The uncertainty then comes from the two ends alone.
+struct Travelled {
+  double lasted_s{0.0};  ///< 0: the condition does not hold, and the next window begins anew
+  double upper_m{0.0};
+  double lower_m{0.0};
+  double begin_error_s{0.0};
+  double end_error_s{0.0};
+  double resolution_rad{0.0};  ///< two counts
+
+  void add(const SpeedWindow& speed_window, const rig::WheelParameters& wheels) noexcept;
+  [[nodiscard]] double stamp_share() const noexcept { return (begin_error_s + end_error_s) / lasted_s; }
 };
 
 /// Finds encoders that are stuck, jump, count backwards or wrongly, are swapped or lost. Real-time safe.
@@ -49,8 +63,9 @@ class EncoderCheck {
   double brake_Nm_{0.0};
   double free_s_;         ///< time since the brake was released
   double braked_s_{0.0};  ///< time with a brake torque of at least 1 N m
-  double disagreeing_s_{0.0};
-  double ahead_s_{0.0};  ///< time with the braked wheel faster than the lower one
+  Travelled disagreeing_{};
+  double allowed_m_{0.0};  ///< by how much the ways may differ while `disagreeing_`
+  Travelled ahead_{};      ///< while the braked wheel is faster than the lower one
 };
 
 }  // namespace abs_hil::runtime

@@ -30,6 +30,15 @@ struct GateOptions {
                  .range = rig::positive(1e6));
   ABS_HIL_OPTION(double, sample_age_max_s, 0.02, .unit = "s",
                  .meaning = "so long without a fresh measurement is a fault", .range = rig::between(0.002, 1));
+  ABS_HIL_OPTION(double, judge_within_s, 0.1, .unit = "s",
+                 .meaning = "so long without a verdict of the wheels' checks, an output on, is a fault",
+                 .range = rig::between(0.02, 1));
+  /// Never above `brake_duty_max`. Faults of brake, board, driver, guardian or time release the brake all the same.
+  ABS_HIL_OPTION(double, fault_brake_duty, 0.0,
+                 .meaning = "brake PWM from a fault to standstill, unless brake or board are at fault; 0: released",
+                 .range = rig::from_zero(1));
+  ABS_HIL_OPTION(double, fault_brake_limit_s, 5.0, .unit = "s", .meaning = "... but no longer than this",
+                 .range = rig::positive(60));
   ABS_HIL_OPTION(double, free_slip_max, 0.15,
                  .meaning = "share by which the wheels may differ, brake long released, before it is a fault",
                  .range = rig::between(0.02, 1));

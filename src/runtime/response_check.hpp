@@ -6,8 +6,8 @@ namespace abs_hil::runtime {
 
 /// Checks that motor and brake have the effect that their commands should have, by the momentum
 /// p = J1 w1 / r1 + J2 w2 / r2 of both wheels. The tyre force cancels in p, on any road:
-/// p' = motor/r2 - (brake + friction)/r1 - friction/r2. It compares the means of p over windows of 0.1 s. Real-time
-/// safe.
+/// p' = motor/r2 - (brake + friction)/r1 - friction/r2. It compares the means of p over windows of 0.1 s, or of up
+/// to 1 s if time stamps or counts make p less certain. Real-time safe.
 class ResponseCheck {
  public:
   explicit ResponseCheck(const PlausibilityLimits& limits) noexcept : limits_(limits) {}
@@ -19,14 +19,19 @@ class ResponseCheck {
   /// Sums over one window.
   struct Window {
     double lasted_s{0.0};
-    double travel_kg_m{0.0};   ///< integral of p
-    double motor_kg_m_s{0.0};  ///< impulse that the motor should give, less twice the friction
-    double brake_kg_m_s{0.0};  ///< impulse that the brake should take
+    double travel_kg_m{0.0};    ///< integral of p
+    double motor_kg_m_s{0.0};   ///< impulse that the motor should give, less twice the friction
+    double brake_kg_m_s{0.0};   ///< impulse that the brake should take
+    double begin_error_s{0.0};  ///< uncertainty of the stamps at its ends
+    double end_error_s{0.0};
+    double counts_rad{0.0};  ///< two counts
     double least_brake_Nm{1e9};
     double most_brake_Nm{0.0};
     double most_duty{0.0};  ///< largest duty of the motor
     bool rolls{true};       ///< the upper wheel's speed is at least half of rolling speed
   };
+  /// Uncertainty of the window's mean momentum, kg m/s.
+  [[nodiscard]] double slack_kg_m_s(const Window& window) const noexcept;
   [[nodiscard]] CheckResult judge(const Window& before, const Window& now) const noexcept;
 
   PlausibilityLimits limits_;

@@ -6,12 +6,16 @@
 #include "abs_hil/rig/brake_map.hpp"
 #include "abs_hil/rig/encoder_scale.hpp"
 #include "abs_hil/rig/time_units.hpp"
+#include "rig/stamp_error.hpp"
 
 namespace abs_hil::runtime {
 
 namespace {
+// docs/safety.md, "Where the bounds come from", derives these.
 /// Shortest duration of a speed window: a little less than two cycles at 1 kHz, so that jitter does not make it three.
 constexpr double speed_window_s = 1.8e-3;
+constexpr double stamp_share_max = 0.25;       ///< a speed that its stamps make less certain is not judged
+constexpr double resolution_max_rad_s = 40.0;  ///< nor is one that its counts resolve less well
 /// Fewer stale cycles in a row are no fault: a single delayed answer must pass, however long it took.
 constexpr int stale_cycles_max = 5;
 constexpr double resolution_counts = 2.0;
@@ -21,6 +25,7 @@ constexpr double leap_slack_s = 1e-3;
 
 void SpeedWindows::begin(const rig::Measurement& measurement) noexcept {
   begin_ns_ = measurement.time_ns;
+  begin_error_s_ = stamp_error_s_;
   begin_upper_ = measurement.upper_counts;
   begin_lower_ = measurement.lower_counts;
   brake_impulse_Nms_ = 0.0;
@@ -38,15 +43,16 @@ bool SpeedWindows::fresh(std::int64_t stamp_ns, std::int64_t now_ns) noexcept {
   return true;
 }
 
-bool SpeedWindows::leaps(std::int32_t before, std::int32_t now, double since_s) const noexcept {
-  const double turned_rad = std::abs(static_cast<double>(rig::counts_between(before, now))) * limits_.rad_per_count;
-  return turned_rad > 2.0 * limits_.overspeed_rad_s * (since_s + leap_slack_s);
+bool SpeedWindows::leaps(std::int32_t before, std::int32_t now, double at_most_s) const noexcept {
+  const double counts = std::abs(static_cast<double>(rig::counts_between(before, now)));
+  return (counts - resolution_counts) * limits_.rad_per_count > 2.0 * limits_.overspeed_rad_s * at_most_s;
 }
 
 CheckResult SpeedWindows::update(const rig::Measurement& measurement, std::int64_t now_ns, const rig::Command& sent,
-                                 bool prompt) noexcept {
+                                 std::int64_t reading_ns) noexcept {
   complete_ = false;
   usable_ = fresh(measurement.time_ns, now_ns);
+  overdue_ = !usable_;
   if (!usable_) {
     const double missing_s = static_cast<double>(now_ns - fresh_ns_) * rig::s_per_ns;
     const bool lost = stale_cycles_ >= stale_cycles_max && missing_s >= limits_.sample_age_max_s;
@@ -55,6 +61,9 @@ CheckResult SpeedWindows::update(const rig::Measurement& measurement, std::int64
   const double since_s = static_cast<double>(measurement.time_ns - stamp_ns_) * rig::s_per_ns;
   const std::int32_t upper_before = std::exchange(upper_, measurement.upper_counts);
   const std::int32_t lower_before = std::exchange(lower_, measurement.lower_counts);
+  const double error_before_s =
+      std::exchange(stamp_error_s_,
+                    static_cast<double>(rig::stamp_error_ns(measurement.time_ns, now_ns, reading_ns)) * rig::s_per_ns);
   stamp_ns_ = measurement.time_ns;
   if (!started_) {
     started_ = true;
@@ -65,9 +74,9 @@ CheckResult SpeedWindows::update(const rig::Measurement& measurement, std::int64
       limits_.ideal_actuator ? sent.brake_torque_Nm : rig::brake_torque_at(limits_.brake, sent.brake_duty);
   brake_impulse_Nms_ += brake_Nm * since_s;
   motor_duty_s_ += sent.motor_duty * since_s;
-  if (!prompt) return {};
-  const bool upper_leaps = leaps(upper_before, upper_, since_s);
-  usable_ = !upper_leaps && !leaps(lower_before, lower_, since_s);
+  const double at_most_s = since_s + error_before_s + stamp_error_s_ + leap_slack_s;
+  const bool upper_leaps = leaps(upper_before, upper_, at_most_s);
+  usable_ = !upper_leaps && !leaps(lower_before, lower_, at_most_s);
   if (!usable_) {
     const std::int32_t leapt =
         upper_leaps ? rig::counts_between(upper_before, upper_) : rig::counts_between(lower_before, lower_);
@@ -82,10 +91,14 @@ CheckResult SpeedWindows::update(const rig::Measurement& measurement, std::int64
                    .omega1_rad_s = rig::counts_between(begin_upper_, measurement.upper_counts) * rad_s_per_count,
                    .omega2_rad_s = rig::counts_between(begin_lower_, measurement.lower_counts) * rad_s_per_count,
                    .resolution_rad_s = resolution_counts * rad_s_per_count,
+                   .begin_error_s = begin_error_s_,
+                   .end_error_s = stamp_error_s_,
                    .brake_target_Nm = brake_impulse_Nms_ / dt_s,
                    .motor_duty = motor_duty_s_ / dt_s};
-  complete_ = true;
-  begin(measurement);
+  complete_ =
+      speed_window_.stamp_error_s() <= stamp_share_max * dt_s && speed_window_.resolution_rad_s <= resolution_max_rad_s;
+  overdue_ = !complete_;
+  if (complete_) begin(measurement);
   return {};
 }
 

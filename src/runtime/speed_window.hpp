@@ -22,42 +22,53 @@ struct SpeedWindow {
   double omega1_rad_s{0.0};  ///< mean over the window, from counts alone
   double omega2_rad_s{0.0};
   double resolution_rad_s{0.0};  ///< speed that corresponds to two counts in this time
+  double begin_error_s{0.0};     ///< uncertainty of the stamp with which the window began
+  double end_error_s{0.0};       ///< uncertainty of the stamp with which it ended
   double brake_target_Nm{0.0};   ///< mean of b(u); with an ideal actuator mean of the commanded torque
   double motor_duty{0.0};        ///< mean
+
+  /// Uncertainty of the window's duration.
+  [[nodiscard]] double stamp_error_s() const noexcept { return begin_error_s + end_error_s; }
 };
 
-/// Checks whether measurements are fresh and combines them into speed windows. Real-time safe.
+/// Checks whether measurements are fresh and combines them into speed windows. A window lasts until its speeds are
+/// certain enough to be judged. Real-time safe.
 class SpeedWindows {
  public:
   explicit SpeedWindows(const PlausibilityLimits& limits) noexcept : limits_(limits) {}
 
   /// Takes a measurement and the command that has acted since the previous one.
-  /// @param now_ns  the cycle's wake-up, on the clock of the time stamps
-  /// @param prompt  the reading was not delayed, so its time stamp fits its counts. Only such a reading ends a window.
+  /// @param now_ns      the cycle's wake-up, on the clock of the time stamps; the reading began then
+  /// @param reading_ns  how long the reading took; the counters were latched within this time
   CheckResult update(const rig::Measurement& measurement, std::int64_t now_ns, const rig::Command& sent,
-                     bool prompt = true) noexcept;
+                     std::int64_t reading_ns = 0) noexcept;
   /// True if the latest measurement may be used: it is fresh and no counter jumped.
   [[nodiscard]] bool usable() const noexcept { return usable_; }
   /// True if the latest update completed a speed window.
   [[nodiscard]] bool complete() const noexcept { return complete_; }
+  /// True if a speed window is due, but the latest measurement did not complete it: it is stale, or its speeds are too
+  /// uncertain. The checks cannot judge the wheels then.
+  [[nodiscard]] bool overdue() const noexcept { return overdue_; }
   [[nodiscard]] const SpeedWindow& speed_window() const noexcept { return speed_window_; }
 
  private:
   [[nodiscard]] bool fresh(std::int64_t stamp_ns, std::int64_t now_ns) noexcept;
   void begin(const rig::Measurement& measurement) noexcept;
-
-  [[nodiscard]] bool leaps(std::int32_t before, std::int32_t now, double since_s) const noexcept;
+  [[nodiscard]] bool leaps(std::int32_t before, std::int32_t now, double at_most_s) const noexcept;
 
   PlausibilityLimits limits_;
   bool started_{false};
   bool usable_{true};
   bool complete_{false};
+  bool overdue_{false};
   int stale_cycles_{0};
   std::int64_t fresh_ns_{0};  ///< the cycle of the latest fresh measurement
   std::int64_t stamp_ns_{0};  ///< its stamp
-  std::int32_t upper_{0};     ///< its counts
+  double stamp_error_s_{0.0};
+  std::int32_t upper_{0};  ///< its counts
   std::int32_t lower_{0};
   std::int64_t begin_ns_{0};  ///< start of the current speed window
+  double begin_error_s_{0.0};
   std::int32_t begin_upper_{0};
   std::int32_t begin_lower_{0};
   double brake_impulse_Nms_{0.0};  ///< integral of b(u) over the speed window

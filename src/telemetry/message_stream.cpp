@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "abs_hil/adjustment_t.hpp"
+#include "abs_hil/checks_t.hpp"
 #include "telemetry/file_error.hpp"
 
 namespace abs_hil::telemetry {
@@ -71,6 +72,7 @@ MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, S
   command_state_.name = options_.channel_prefix + "COMMAND_STATE";
   measurement_.name = options_.channel_prefix + "MEASUREMENT";
   signals_.name = options_.channel_prefix + "SIGNALS";
+  checks_.name = options_.channel_prefix + "CHECKS";
   event_.name = options_.channel_prefix + "EVENT";
   experiment_.name = options_.channel_prefix + "EXPERIMENT";
   command_channel_ = options_.channel_prefix + "COMMAND";
@@ -200,6 +202,11 @@ void MessageStream::send_status() {
   m.cycle_time_max_us = snapshot.cycle_time.max_us;
   put_parts(snapshot, m);
   send(status_channel_, m);
+  if (std::isnan(snapshot.checks_unjudged)) return;
+  checks_t checks{};
+  checks.time_s = latest_.time_s;
+  checks.unjudged_share = snapshot.checks_unjudged;
+  send(checks_, checks);
 }
 
 void MessageStream::send_experiment() { send(experiment_, experiment_message_); }

@@ -98,6 +98,7 @@ class MessageStream : public rig::RecordSink {
   Channel adjustment_;
   Channel command_state_;
   Channel status_channel_;
+  Channel checks_;
   Channel event_;
   Channel experiment_;
   std::string command_channel_;

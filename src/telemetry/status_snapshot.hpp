@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 
+#include "abs_hil/rig/measurement.hpp"
 #include "rig/timing_summary.hpp"
 
 namespace abs_hil::telemetry {
@@ -13,7 +14,9 @@ struct StatusSnapshot {
   std::uint64_t overruns{0};            ///< cycles that missed at least one tick
   std::uint64_t telemetry_drops{0};     ///< records that found the ring full
   std::uint64_t gate_interventions{0};  ///< commands that the gate limited, blocked or refused
-  bool realtime{false};                 ///< real-time scheduling and locked memory are in force
+  double checks_unjudged{
+      rig::unknown};     ///< share of the time in which the gate's checks could not judge; NaN: not known
+  bool realtime{false};  ///< real-time scheduling and locked memory are in force
   rig::DurationQuantiles wakeup_latency{};
   rig::DurationQuantiles cycle_time{};
   rig::DurationQuantiles read{};

@@ -139,6 +139,30 @@ class Guardian(RigTest):
         self.assertLessEqual(len(rows), 2000)
         self.assertGreater(next(self.record.glob('*.lcmlog')).stat().st_size, 300 * len(rows))
 
+    def test_pause_of_the_whole_computer_is_a_fault(self):
+        emulator = self.emulator()
+        program = self.start(emulator, 200, *settings(*EXPERIMENT))
+        self.wait_for_phase(emulator, program, 'brake')
+        both = guardian_of(program.pid), program.pid
+        for pid in both:
+            os.kill(pid, signal.SIGSTOP)
+        time.sleep(0.5)
+        self.assertNotEqual(emulator.wire(), SAFE)  # the card's outputs hold
+        for pid in both:
+            os.kill(pid, signal.SIGCONT)
+        _, words = program.communicate(timeout=30)
+        self.assertEqual(program.returncode, 1, words)
+        self.assertIn('no cycle ran for longer than realtime.cycle_gap_max_s', words)
+        self.assertEqual(emulator.wire(), SAFE)
+        with open(next(self.record.glob('*.csv')), newline='') as file:
+            rows = list(csv.DictReader(file))
+        after = [n for n in range(1, len(rows)) if float(rows[n]['time_s']) - float(rows[n - 1]['time_s']) > 0.4]
+        self.assertEqual(len(after), 1)
+        # At most one command that was computed before the pause, then zero.
+        self.assertLessEqual(len(rows) - after[0], 2)
+        self.assertEqual([float(rows[-1][name]) for name in ('motor_pwm', 'brake_pwm')], [0.0, 0.0])
+        emulator.end()
+
     def test_guardian_ends_first(self):
         died, silent = 'the guardian process died', 'the guardian process gave no sign of life'
         took_ms = []

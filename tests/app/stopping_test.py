@@ -67,6 +67,24 @@ class Stopping(ProgramTest):
                 self.assertEqual(program.wait(timeout=20), status)
                 self.assertLess(time.monotonic() - before, 10)
 
+    def test_a_stalled_program_is_a_fault(self):
+        program = self.start('--set', 'experiment.start_speed_rad_s=0')
+        self.wait_for_speed(program, 60.0)
+        program.send_signal(signal.SIGSTOP)
+        time.sleep(0.6)
+        program.send_signal(signal.SIGCONT)
+        program.communicate(timeout=30)
+        self.assertEqual(program.returncode, 1)
+        summary = self.summary(self.summary_file)
+        self.assertEqual(summary['result'], 'fault')
+        self.assertIn('no cycle ran for longer than realtime.cycle_gap_max_s', summary['reason'])
+        rows = self.rows(self.csv)
+        after = [row for before, row in zip(rows, rows[1:]) if float(row['time_s']) - float(before['time_s']) > 0.3]
+        self.assertEqual(len(after), 1)
+        rest = rows[rows.index(after[0]):]
+        self.assertLessEqual(len(rest), 2)
+        self.assertEqual([float(rest[-1][name]) for name in ('motor_pwm', 'brake_pwm')], [0.0, 0.0])
+
     def test_brake_for_a_stop(self):
         program = self.start('--set', 'experiment.stop_brake_duty=0.6')
         self.wait_for_speed(program, 20.0)

@@ -167,3 +167,51 @@ TEST_CASE("A reading without time passing is left for the next one") {
   plain.update(33, 1e-3);
   CHECK(observer.omega_rad_s() == plain.omega_rad_s());
 }
+
+TEST_CASE("After a gap far above 1/bandwidth the observer restarts from the mean speed over the gap") {
+  control::TrackingObserver observer{options, fine_counts_per_rev};
+  const double alpha = -70.0;
+  const auto angle = [&](double t) { return 170.0 * t + alpha * t * t / 2; };
+  observer.reset(0, 170.0);
+  for (int n = 1; n <= 500; ++n) observer.update(encoder_reading(angle(n * 1e-3), fine_counts_per_rev), 1e-3);
+  REQUIRE_THAT(observer.omega_rad_s(), WithinAbs(135.0, 1e-2));
+  // 0.6 s later the wheel has stopped decelerating at once: it turned at 90 rad/s all the time.
+  observer.update(encoder_reading(angle(0.5) + 54.0, fine_counts_per_rev), 0.6);
+  CHECK_THAT(observer.omega_rad_s(), WithinAbs(90.0, 1e-2));
+  CHECK(observer.alpha_rad_s2() == 0.0);
+  observer.update(encoder_reading(angle(0.5) + 54.09, fine_counts_per_rev), 1e-3);
+  CHECK_THAT(observer.omega_rad_s(), WithinAbs(90.0, 1e-1));
+}
+
+TEST_CASE("A late reading with an uncertain stamp does not throw the estimate") {
+  // The reading that began at 0.501 s took 9 ms, its stamp says the middle, but its counts are those of the end.
+  for (const double alpha_max : {343.0, 3011.0}) {
+    control::TrackingObserver observer{options, 4096, alpha_max};
+    observer.reset(0, 164.0);
+    const auto reading = [](double t) { return encoder_reading(164.0 * t, 4096); };
+    for (int n = 1; n <= 500; ++n) observer.update(reading(n * 1e-3), 1e-3);
+    observer.update(reading(0.510), 5.5e-3, 4.5e-3);
+    CHECK_THAT(observer.omega_rad_s(), WithinAbs(164.0, 0.2));
+    observer.update(reading(0.511), 5.5e-3, 5e-6);
+    CHECK_THAT(observer.omega_rad_s(), WithinAbs(164.0, 0.2));
+    for (int n = 512; n <= 560; ++n) {
+      observer.update(reading(n * 1e-3), 1e-3, 5e-6);
+      CHECK_THAT(observer.omega_rad_s(), WithinAbs(164.0, 0.2));
+    }
+  }
+}
+
+TEST_CASE("The same late reading is believed if its stamp is certain, or if it is the third in a row") {
+  const auto estimate = [](double stamp_error_s, int readings) {
+    control::TrackingObserver observer{options, 4096, 343.0};
+    observer.reset(0, 164.0);
+    std::int32_t counts = 0;
+    for (int n = 1; n <= 500; ++n) observer.update(counts = encoder_reading(0.164 * n, 4096), 1e-3);
+    for (int n = 0; n < readings; ++n) observer.update(counts += 400, 1e-3, stamp_error_s);
+    return observer.omega_rad_s();
+  };
+  CHECK(estimate(5e-6, 1) > 170.0);
+  CHECK_THAT(estimate(1e-3, 1), WithinAbs(164.0, 0.2));
+  CHECK_THAT(estimate(1e-3, 2), WithinAbs(164.0, 0.2));
+  CHECK(estimate(1e-3, 3) > 170.0);
+}

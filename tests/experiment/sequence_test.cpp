@@ -59,14 +59,15 @@ TEST_CASE("an unsafe phase is refused by name") {
   CHECK_NOTHROW(Sequence({meant}));
 }
 
-TEST_CASE("phases follow one another in the cycle in which a condition holds") {
+TEST_CASE("phases follow one another in the cycle in which a condition holds for the second time") {
   Sequence sequence = two_phases({EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached});
   const auto first = sequence.update(at(0.0));
   CHECK(first.entered);
   CHECK(first.reason == Reason::run_started);
   CHECK(sequence.current().motor_duty == 0.8);
   CHECK_FALSE(sequence.update(at(1.0, 99.9)).entered);
-  const auto second = sequence.update(at(1.1, 100.0));
+  CHECK_FALSE(sequence.update(at(1.1, 100.0)).entered);
+  const auto second = sequence.update(at(1.101, 100.0));
   CHECK(second.entered);
   CHECK(second.reason == Reason::speed_threshold_reached);
   CHECK(sequence.current().phase == Phase::brake);
@@ -106,7 +107,8 @@ TEST_CASE("car speed and standstill end phases") {
   Sequence slow = two_phases({EndKind::car_speed_below, 0.3, Reason::end_speed_reached});
   slow.update(at(0.0, 50.0));
   CHECK_FALSE(slow.update(at(0.1, 0.3 / 0.099 + 0.01)).entered);
-  CHECK(slow.update(at(0.2, 0.3 / 0.099 - 0.01)).reason == Reason::end_speed_reached);
+  CHECK_FALSE(slow.update(at(0.2, 0.3 / 0.099 - 0.01)).entered);
+  CHECK(slow.update(at(0.21, 0.3 / 0.099 - 0.01)).reason == Reason::end_speed_reached);
 
   Sequence still = two_phases({EndKind::standstill, 0.0, Reason::standstill_reached});
   still.update(at(0.0));
@@ -173,7 +175,10 @@ TEST_CASE(
     Sequence sequence = stopping({.duty = 0.6}, Reason::hangup_signal);
     sequence.update(at(1.0, 50.0));
     sequence.end_early(Reason::driver_read_failed, 8.0);
-    CHECK(sequence.update(at(1.001, 50.0)).reason == Reason::driver_read_failed);
+    sequence.end_early(Reason::driver_write_failed, 9.0);
+    const Sequence::Change end = sequence.update(at(1.001, 50.0));
+    CHECK(end.reason == Reason::driver_read_failed);
+    CHECK(end.value == 8.0);
     CHECK(sequence.current().phase == Phase::fault);
     CHECK(sequence.current().brake == BrakeAction::released);
   }
@@ -191,6 +196,115 @@ TEST_CASE(
   CHECK_THROWS_WITH(stopping({.duty = 1.2}, Reason::none),
                     Catch::Matchers::Contains("after a stop request: brake duty"));
   CHECK_THROWS_AS(stopping({.duty = 0.6, .limit_s = 0.0}, Reason::none), std::invalid_argument);
+}
+
+TEST_CASE("one sample of speed or slip ends no phase, nor does the same sample twice") {
+  struct Row {
+    EndKind kind;
+    double value;
+    SequenceInput outside, inside;
+  };
+  const SequenceInput slow{.speeds = {50.0, 50.0}, .car_speed_m_s = 5.0, .slip = 0.1};
+  const SequenceInput fast{.speeds = {150.0, 150.0}, .car_speed_m_s = 15.0, .slip = 0.5};
+  for (const Row& row : {Row{EndKind::upper_speed_above, 100.0, slow, fast},
+                         {EndKind::upper_speed_below, 100.0, fast, slow},
+                         {EndKind::lower_speed_above, 100.0, slow, fast},
+                         {EndKind::lower_speed_below, 100.0, fast, slow},
+                         {EndKind::car_speed_above, 10.0, slow, fast},
+                         {EndKind::car_speed_below, 10.0, fast, slow},
+                         {EndKind::slip_above, 0.3, slow, fast},
+                         {EndKind::slip_below, 0.3, fast, slow}}) {
+    for (const bool part_of_all : {false, true}) {
+      const EndCondition alone{row.kind, row.value, Reason::speed_condition_met};
+      const EndCondition all{EndKind::all, 0.0, Reason::all_conditions_met, {{EndKind::duration, 0.0}, alone}};
+      Sequence sequence = two_phases(part_of_all ? all : alone);
+      const auto entered_at = [&](double time_s, SequenceInput input) {
+        input.time_s = time_s;
+        return sequence.update(input).entered;
+      };
+      CHECK(entered_at(0.0, row.outside));
+      CHECK_FALSE(entered_at(0.001, row.inside));
+      CHECK_FALSE(entered_at(0.002, row.outside));
+      CHECK_FALSE(entered_at(0.003, row.inside));
+      CHECK_FALSE(entered_at(0.003, row.inside));  // no fresh measurement came
+      CHECK_FALSE(entered_at(0.004, row.outside));
+      CHECK_FALSE(entered_at(0.005, row.inside));
+      CHECK_FALSE(entered_at(0.005, row.outside));
+      CHECK(entered_at(0.006, row.inside));
+    }
+  }
+}
+
+TEST_CASE("a sample that held in one phase does not count in the next") {
+  const EndCondition fast{EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached};
+  Sequence sequence({{.phase = Phase::accelerate, .motor_duty = 0.8, .ends_on = {fast}, .time_limit_s = 5.0},
+                     {.phase = Phase::coast, .ends_on = {fast}, .time_limit_s = 5.0},
+                     {.phase = Phase::hold, .ends_on = {fast}, .time_limit_s = 5.0}});
+  sequence.update(at(0.0, 150.0));
+  CHECK_FALSE(sequence.update(at(0.001, 150.0)).entered);
+  CHECK(sequence.update(at(0.002, 150.0)).entered);
+  CHECK_FALSE(sequence.update(at(0.003, 150.0)).entered);
+  CHECK(sequence.update(at(0.004, 150.0)).entered);
+}
+
+TEST_CASE("after a fault that permits it the brake holds until standstill or its limit") {
+  const auto failing = [](StopBrake brake, Reason reason) {
+    Sequence sequence({{.phase = Phase::accelerate,
+                        .motor_duty = 0.8,
+                        .ends_on = {{EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached}},
+                        .time_limit_s = 5.0}},
+                      {}, {}, brake);
+    CHECK(sequence.permissions()[static_cast<std::size_t>(Phase::fault)].brake == (brake.duty > 0.0));
+    sequence.update(at(0.0));
+    sequence.end_early(reason, 7.0);
+    return sequence;
+  };
+  {
+    Sequence sequence = failing({.duty = 0.4, .limit_s = 2.0}, Reason::encoder_upper_stuck);
+    const Sequence::Change begun = sequence.update(at(1.0, 50.0));
+    CHECK(begun.reason == Reason::encoder_upper_stuck);
+    CHECK(begun.value == 7.0);
+    CHECK(sequence.current().phase == Phase::fault);
+    CHECK(sequence.current().brake_duty_at(0.0) == 0.4);
+    CHECK(sequence.current().motor_duty_at(0.0) == 0.0);
+    CHECK_FALSE(sequence.finished());
+    sequence.end_early(Reason::encoder_upper_stuck, 7.0);  // told in each cycle
+    sequence.end_early(Reason::interrupt_signal, 0.0);
+    CHECK_FALSE(sequence.update(at(2.9, 50.0)).entered);
+    CHECK(sequence.update(at(3.0, 50.0)).reason == Reason::encoder_upper_stuck);
+    CHECK(sequence.finished());
+    CHECK(sequence.current().brake == BrakeAction::released);
+  }
+  {
+    Sequence sequence = failing({.duty = 0.4, .limit_s = 2.0}, Reason::overspeed);
+    sequence.update(at(1.0, 50.0));
+    SequenceInput standing = at(1.5);
+    standing.stands_still = true;
+    CHECK(sequence.update(standing).reason == Reason::overspeed);
+    CHECK(sequence.finished());
+  }
+  {
+    Sequence sequence = failing({.duty = 0.4, .limit_s = 2.0}, Reason::overspeed);
+    sequence.update(at(1.0, 50.0));
+    sequence.end_early(Reason::driver_write_failed, 3.0);  // a second fault bars the brake
+    CHECK(sequence.update(at(1.001, 50.0)).reason == Reason::overspeed);
+    CHECK(sequence.finished());
+  }
+  for (const auto& [brake, reason] :
+       {std::pair(StopBrake{}, Reason::overspeed), std::pair(StopBrake{.duty = 0.4}, Reason::driver_write_failed),
+        std::pair(StopBrake{.duty = 0.4}, Reason::brake_no_response),
+        std::pair(StopBrake{.duty = 0.4}, Reason::guardian_died)}) {
+    Sequence sequence = failing(brake, reason);
+    CHECK(sequence.update(at(1.0, 50.0)).reason == reason);
+    CHECK(sequence.finished());
+  }
+  // The sequence's own faults are treated alike.
+  Sequence late = failing({.duty = 0.4, .limit_s = 2.0}, Reason::none);
+  CHECK(late.update(at(5.1, 50.0)).reason == Reason::phase_time_limit);
+  CHECK_FALSE(late.finished());
+  CHECK(late.current().phase == Phase::fault);
+  CHECK(late.current().brake_duty_at(0.0) == 0.4);
+  CHECK_THROWS_WITH(failing({.duty = 1.2}, Reason::none), Catch::Matchers::Contains("after a fault: brake duty"));
 }
 
 TEST_CASE("plans that could never end are refused") {

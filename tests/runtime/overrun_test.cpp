@@ -161,3 +161,68 @@ TEST_CASE("without late cycles there is no message") {
     CHECK_FALSE(reporter.message(bench.executive.statistics().overruns()));
   }
 }
+
+namespace {
+
+/// The reason that ends the bench's run after a gap of `gap_ns` between the wake-ups of two cycles.
+rig::Reason reason_after_gap(std::int64_t gap_ns, const rig::Command& wanted, double limit_s = 0.0) {
+  Bench bench({.startup_cycles = 0, .max_consecutive = 0, .cycle_gap_max_s = limit_s});
+  bench.logic.wanted = wanted;
+  bench.cycle();
+  bench.cycle();
+  bench.cycle({.wakeup_ns = gap_ns - ms});
+  return bench.logic.ended_by;
+}
+
+}  // namespace
+
+TEST_CASE("one long gap between two cycles with an output on is a fault, whatever part of the cycle it falls into") {
+  for (const CycleScript& script : {CycleScript{.wakeup_ns = 600 * ms}, CycleScript{.read_ns = 600 * ms},
+                                    CycleScript{.control_ns = 600 * ms}, CycleScript{.write_ns = 600 * ms}}) {
+    Bench bench;
+    bench.cycle();
+    bench.cycle();
+    bool goes_on = bench.cycle(script);
+    int cycles = 1;
+    for (; goes_on && cycles < 10; ++cycles) goes_on = bench.cycle();
+    CHECK(cycles <= 2);
+    CHECK(bench.logic.ended_by == rig::Reason::cycle_gap);
+    CHECK(bench.logic.ended_value > 0.6);
+    CHECK(bench.logic.ended_value < 0.602);
+    CHECK(bench.driver.written.back().brake_duty == 0.0);
+  }
+}
+
+TEST_CASE("a gap counts above its limit and with an output on only") {
+  const rig::Command braking{.brake_duty = 0.5};
+  CHECK(reason_after_gap(100 * ms, braking) == rig::Reason::none);
+  CHECK(reason_after_gap(100 * ms + 1, braking) == rig::Reason::cycle_gap);
+  CHECK(reason_after_gap(101 * ms, {.motor_duty = 0.5, .motor_enable = true}) == rig::Reason::cycle_gap);
+  CHECK(reason_after_gap(101 * ms, {.brake_torque_Nm = 0.5}) == rig::Reason::cycle_gap);
+  CHECK(reason_after_gap(10'000 * ms, {}) == rig::Reason::none);
+  CHECK(reason_after_gap(20 * ms, braking, 0.02) == rig::Reason::none);
+  CHECK(reason_after_gap(20 * ms + 1, braking, 0.02) == rig::Reason::cycle_gap);
+  // Three periods are no gap.
+  CHECK(reason_after_gap(3 * ms, braking, 0.001) == rig::Reason::none);
+  CHECK(reason_after_gap(3 * ms + 1, braking, 0.001) == rig::Reason::cycle_gap);
+}
+
+TEST_CASE("a suspended computer is a fault with an output on, whatever the origin of its time") {
+  for (const bool on : {true, false}) {
+    Bench bench;
+    bench.logic.wanted = on ? rig::Command{.brake_duty = 0.5} : rig::Command{};
+    for (int i = 0; i < 3; ++i) bench.cycle();
+    bench.clock.suspension_ns += ms;  // within the clocks' accuracy
+    bench.cycle();
+    bench.clock.suspension_ns -= 3 * ms;  // a delay between two clocks makes it smaller for one cycle
+    bench.cycle();
+    bench.clock.suspension_ns += 3 * ms;
+    bench.cycle();
+    CHECK(bench.logic.ended_by == rig::Reason::none);
+    bench.clock.suspension_ns += 2'500 * ms;
+    CHECK(bench.cycle() == !on);
+    CHECK(bench.logic.ended_by == (on ? rig::Reason::computer_suspended : rig::Reason::none));
+    if (on) CHECK(bench.logic.ended_value == Approx(2.5));
+    if (on) CHECK(bench.driver.written.back().brake_duty == 0.0);
+  }
+}

@@ -32,9 +32,11 @@ class ScriptedClock final : public Clock {
     time_ns_ = std::max(time_ns_, time_ns) + wakeup_ns;
   }
   void pass(std::int64_t duration_ns) noexcept { time_ns_ += duration_ns; }
+  [[nodiscard]] std::int64_t suspended_ns() noexcept override { return suspension_ns; }
 
   std::int64_t wakeup_ns{0};
-  std::vector<std::int64_t> asked_ns;  ///< every wake-up time asked for
+  std::int64_t suspension_ns{77 * ms};  ///< its origin is arbitrary
+  std::vector<std::int64_t> asked_ns;   ///< every wake-up time asked for
 
  private:
   std::int64_t time_ns_{1'000 * ms};

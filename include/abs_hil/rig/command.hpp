@@ -15,4 +15,9 @@ struct Command {
 /// Drive off, brake off, motor disabled.
 inline constexpr Command safe_command{};
 
+/// True if the command has an output on.
+[[nodiscard]] constexpr bool acts(const Command& command) noexcept {
+  return command.motor_duty > 0.0 || command.brake_duty > 0.0 || command.brake_torque_Nm > 0.0;
+}
+
 }  // namespace abs_hil::rig

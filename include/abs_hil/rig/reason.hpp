@@ -106,7 +106,7 @@ enum class FoundAgain : std::uint8_t {
   ROW(encoder_lower_reversed, 135, fault, wheel_checks, "lower wheel's encoder counts backwards")                     \
   ROW(encoders_lost, 136, fault, wheel_checks, "both encoders show standstill, but the wheels must be turning")       \
   ROW(encoders_disagree, 137, fault, wheel_checks,                                                                    \
-      "wheel speeds differ long after the brake was released: one encoder is wrong")                                  \
+      "wheel speeds differ long after the brake was released: an encoder is wrong, or the tyre has little grip")      \
   ROW(slip_implausible, 138, fault, wheel_checks,                                                                     \
       "slip is outside the range of the tyre: the braked wheel turns faster than the other (encoders swapped?)")      \
   ROW(samples_missing, 139, fault, wheel_checks, "no fresh measurement")                                              \
@@ -121,6 +121,13 @@ enum class FoundAgain : std::uint8_t {
   ROW(safe_state_unverified, 164, fault, no, "the controller could not verify the safe state")                        \
   ROW(run_time_limit, 200, fault, yes, "run exceeded the experiment's time limit")                                    \
   ROW(run_distance_limit, 201, fault, yes, "car went further than the experiment's limit")                            \
+  ROW(checks_cannot_judge, 220, fault, wheel_checks,                                                                  \
+      "the plausibility checks could not judge the wheels for gate.judge_within_s: readings are too slow or stale, "  \
+      "or the encoders have too few counts")                                                                          \
+  ROW(cycle_gap, 221, fault, no,                                                                                      \
+      "no cycle ran for longer than realtime.cycle_gap_max_s while an output was on: the program was stopped, "       \
+      "frozen or kept from the processor")                                                                            \
+  ROW(computer_suspended, 222, fault, no, "the computer was suspended while an output was on")                        \
   /* the end of the rows */
 // clang-format on
 

@@ -3,8 +3,10 @@
 #include <limits>
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include "catch.hpp"
+#include "runtime/fault_brake.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::runtime;
@@ -254,11 +256,12 @@ struct CheckedWheels {
       std::ignore = gate.check_measurement({.time_ns = now_ns,
                                             .upper_counts = static_cast<std::int32_t>(angle1 * 651.8986),
                                             .lower_counts = static_cast<std::int32_t>(angle2 * 651.8986)},
-                                           now_ns);
+                                           now_ns, reading_ns);
       static_cast<void>(gate.check(command, {.phase = Phase::brake, .now_ns = now_ns}));
     }
   }
   CommandGate gate;
+  std::int64_t reading_ns{0};
   std::int64_t now_ns{0};
   double angle1{0.0};
   double angle2{0.0};
@@ -286,18 +289,146 @@ TEST_CASE("the gate checks the wheels: encoders, response to what it sent, sampl
   CHECK_FALSE(silent.gate.check_measurement({.time_ns = 10 * ms}, 40 * ms));
   CHECK(CommandGate(GateOptions{}, any_phase(), paper_limits()).check_measurement({.time_ns = ms}, ms));
 
-  // A reading of half a millisecond is checked, a longer one is not.
-  for (const bool judged : {true, false}) {
-    CheckedWheels held_up(paper_limits());
-    held_up.run(100.0, 100.0, 10);
-    std::ignore = held_up.gate.check_measurement({.time_ns = 11 * ms, .upper_counts = 100'000}, 11 * ms,
-                                                 judged ? 500'000 : 500'001);
-    CHECK((held_up.gate.fault() == Reason::encoder_upper_jumped) == judged);
-  }
+  // A leap is found however slow the reading is.
+  CheckedWheels held_up(paper_limits());
+  held_up.run(100.0, 100.0, 10);
+  std::ignore = held_up.gate.check_measurement({.time_ns = 11 * ms, .upper_counts = 100'000}, 11 * ms, 700'000);
+  CHECK(held_up.gate.fault() == Reason::encoder_upper_jumped);
 
   CheckedWheels unchecked({});
   unchecked.run(100.0, 100.0, 10);
   unchecked.run(0.0, 100.0, 10);
   for (int i = 0; i < 30; ++i) CHECK(unchecked.gate.check_measurement({.time_ns = 10 * ms}, (20 + i) * ms));
   CHECK(unchecked.gate.fault() == Reason::none);
+  CHECK(unchecked.gate.unjudged_share() == 0.0);
+}
+
+TEST_CASE("slow readings are judged: a stuck, a reversed and a swapped encoder are found") {
+  for (const std::int64_t reading_us : {0, 400, 600, 950}) {
+    CAPTURE(reading_us);
+    const auto found = [reading_us](double omega1, double omega2, const rig::Command& command) {
+      CheckedWheels wheels(paper_limits());
+      wheels.reading_ns = reading_us * 1000;
+      wheels.run(100.0, 100.0, 400);
+      CHECK(wheels.gate.fault() == Reason::none);
+      wheels.run(omega1, omega2, 300, command);
+      return wheels.gate.fault();
+    };
+    CHECK(found(100.0, 0.0, {}) == Reason::encoder_lower_stuck);
+    CHECK(found(0.0, 100.0, {}) == Reason::encoder_upper_stuck);
+    CHECK(found(100.0, -100.0, {}) == Reason::encoder_lower_reversed);
+    CHECK(found(100.0, 80.0, {.brake_duty = 0.7}) != Reason::none);
+    CHECK(found(100.0, 100.0, {}) == Reason::none);
+  }
+}
+
+TEST_CASE("checks that cannot judge for too long while an output is on are a fault of their own") {
+  // Readings of 3 ms at 1 kHz: no window of less than 24 ms can be judged.
+  GateOptions options{.judge_within_s = 0.02};
+  const auto blind = [&options](const rig::Command& command, int cycles, std::int64_t reading_ns) {
+    CommandGate gate(options, any_phase(), plausibility_limits({}, false, options));
+    for (int i = 0; i < cycles; ++i) {
+      std::ignore = gate.check_measurement({.time_ns = i * ms}, i * ms, reading_ns);
+      std::ignore = gate.check(command, {.phase = Phase::brake, .now_ns = i * ms});
+    }
+    return std::pair(gate.fault(), gate.fault_value());
+  };
+  const rig::Command braking{.brake_duty = 0.1};
+  CHECK(blind(braking, 100, 2'400'000).first == Reason::none);  // 19.2 ms
+  CHECK(blind(braking, 21, 3 * ms).first == Reason::none);
+  CHECK(blind(braking, 22, 3 * ms).first == Reason::checks_cannot_judge);
+  CHECK(blind(braking, 22, 3 * ms).second == Approx(0.021));
+  CHECK(blind({.motor_duty = 0.1, .motor_enable = true}, 22, 3 * ms).first == Reason::checks_cannot_judge);
+  CHECK(blind({.brake_torque_Nm = 0.1}, 22, 3 * ms).first == Reason::checks_cannot_judge);
+  CHECK(blind({}, 100, 12 * ms).first == Reason::none);  // nothing is on
+}
+
+TEST_CASE("pulses of an output count together until the checks judge again") {
+  CommandGate gate({.judge_within_s = 0.02}, any_phase(), plausibility_limits({}, false, {}));
+  for (int i = 0; i < 42; ++i) {
+    CHECK(gate.fault() == Reason::none);
+    std::ignore = gate.check_measurement({.time_ns = i * ms}, i * ms, 12 * ms);
+    std::ignore = gate.check({.brake_duty = i % 2 == 0 ? 0.1 : 0.0}, {.phase = Phase::brake, .now_ns = i * ms});
+  }
+  std::ignore = gate.check_measurement({.time_ns = 43 * ms}, 43 * ms, 12 * ms);
+  CHECK(gate.fault() == Reason::checks_cannot_judge);
+}
+
+TEST_CASE("the gate tells the share of time in which its checks could not judge") {
+  CheckedWheels wheels(paper_limits());
+  CHECK(wheels.gate.unjudged_share() == 0.0);
+  wheels.run(100.0, 100.0, 1);
+  CHECK(wheels.gate.unjudged_share() == 0.0);
+  wheels.run(100.0, 100.0, 100);
+  CHECK(wheels.gate.unjudged_share() == 0.0);
+  // Of 5 ms, a verdict is due after 2 ms and comes at the end of the fifth: due and missing in 3 of 5 cycles.
+  CheckedWheels slow(paper_limits());
+  slow.reading_ns = 600'000;
+  slow.run(100.0, 100.0, 1001);
+  CHECK(slow.gate.unjudged_share() == Approx(0.6).margin(0.005));
+}
+
+TEST_CASE("after a fault the brake holds at most its duty for the fault, motor off, until its limit") {
+  const GateOptions options{.brake_duty_max = 0.7, .fault_brake_duty = 0.5, .fault_brake_limit_s = 0.01};
+  const rig::Command wanted{.motor_duty = 0.4, .brake_duty = 0.6, .motor_enable = true, .brake_torque_Nm = 3.0};
+  CommandGate gate(options);
+  gate.latch(Reason::encoder_upper_stuck, 0.0);
+  CHECK(gate.brake_barred_by() == Reason::none);
+  const GateResult first = gate.check(wanted, {.phase = Phase::fault, .now_ns = 5 * ms});
+  CHECK(first.command.brake_duty == 0.5);
+  CHECK(first.command.brake_torque_Nm == Approx(2.5));
+  CHECK(first.command.motor_duty == 0.0);
+  CHECK_FALSE(first.command.motor_enable);
+  CHECK(first.action == GateAction::refused);
+  CHECK(first.fault == Reason::encoder_upper_stuck);
+  CHECK(gate.check({.brake_duty = 0.2}, {.now_ns = 15 * ms}).command.brake_duty == 0.2);
+  CHECK(is_safe(gate.check({.brake_duty = 0.2}, {.now_ns = 15 * ms + 1}).command));
+  CHECK(gate.count(GateAction::passed) == 0);
+  CHECK(gate.count(GateAction::refused) == 3);
+}
+
+TEST_CASE("the brake after a fault is never above the largest duty, and only where the phase permits it") {
+  CommandGate capped({.brake_duty_max = 0.3, .fault_brake_duty = 0.5});
+  capped.latch(Reason::overspeed, 0.0);
+  CHECK(capped.check({.brake_duty = 0.5}, moderate).command.brake_duty == 0.3);
+  CommandGate elsewhere({.fault_brake_duty = 0.5}, PhasePermissions{});
+  elsewhere.latch(Reason::overspeed, 0.0);
+  CHECK(is_safe(elsewhere.check({.brake_duty = 0.5}, moderate).command));
+}
+
+TEST_CASE("faults of brake, board, driver, guardian and time bar the brake, also after another fault") {
+  for (const rig::ReasonRow& row : rig::reasons) {
+    CAPTURE(row.name);
+    if (row.kind != rig::ReasonKind::fault) continue;
+    CommandGate gate({.fault_brake_duty = 0.5});
+    gate.latch(row.reason, 0.0);
+    const bool holds = gate.check({.brake_duty = 0.5}, moderate).command.brake_duty == 0.5;
+    CHECK(holds == brake_may_hold_after(row.reason));
+    CHECK((gate.brake_barred_by() == Reason::none) == holds);
+    CommandGate later({.fault_brake_duty = 0.5});
+    later.latch(Reason::overspeed, 0.0);
+    CHECK(later.check({.brake_duty = 0.5}, moderate).command.brake_duty == 0.5);
+    later.latch(row.reason, 0.0);
+    CHECK((later.check({.brake_duty = 0.5}, moderate).command.brake_duty == 0.5) == holds);
+    CHECK(later.fault() == Reason::overspeed);
+  }
+  for (const Reason bars : {Reason::brake_no_response, Reason::driver_write_failed, Reason::driver_read_failed,
+                            Reason::board_too_hot, Reason::guardian_died, Reason::guardian_silent, Reason::cycle_gap,
+                            Reason::computer_suspended, Reason::samples_missing, Reason::checks_cannot_judge}) {
+    CHECK_FALSE(brake_may_hold_after(bars));
+  }
+  CHECK_FALSE(brake_may_hold_after(Reason::none));
+  CHECK_FALSE(brake_may_hold_after(static_cast<Reason>(999)));
+}
+
+TEST_CASE("a brake command that is no number is not held after a fault; without a duty for it nothing is") {
+  for (const rig::Command& bad : {rig::Command{.brake_duty = not_a_number}, rig::Command{.brake_duty = -1.0},
+                                  rig::Command{.brake_duty = 0.5, .brake_torque_Nm = infinite}}) {
+    CommandGate gate({.fault_brake_duty = 0.5});
+    gate.latch(Reason::overspeed, 0.0);
+    CHECK(is_safe(gate.check(bad, moderate).command));
+  }
+  CommandGate gate(GateOptions{});
+  gate.latch(Reason::overspeed, 0.0);
+  CHECK(is_safe(gate.check({.brake_duty = 0.5, .brake_torque_Nm = 2.0}, moderate).command));
 }

@@ -1,5 +1,7 @@
 #include "runtime/response_check.hpp"
 
+#include <utility>
+
 #include "catch.hpp"
 
 using namespace abs_hil;
@@ -180,4 +182,55 @@ TEST_CASE("both windows count towards what the brake should take") {
   Bench too_little{.omega1 = 100.0, .omega2 = 100.0};
   CHECK(too_little.run(51, -26.0, 0.0, 2.0).sound());
   CHECK(too_little.run(52, -26.0, 0.0, 4.0).reason == Reason::brake_no_response);
+}
+
+namespace {
+
+/// Time until something is found, s, with stamps that may be wrong by `stamp_error_s` at each end; 0: nothing.
+std::pair<double, Reason> found_after(double omega_rad_s, double rad_s2, double stamp_error_s, double resolution_rad,
+                                      double motor_duty, double brake_Nm) {
+  ResponseCheck check(paper_limits());
+  for (int i = 1; i <= 1500; ++i) {
+    omega_rad_s += rad_s2 * dt_s;
+    const CheckResult found = check.update({.dt_s = dt_s,
+                                            .omega1_rad_s = omega_rad_s,
+                                            .omega2_rad_s = omega_rad_s,
+                                            .resolution_rad_s = resolution_rad / dt_s,
+                                            .begin_error_s = stamp_error_s,
+                                            .end_error_s = stamp_error_s,
+                                            .motor_duty = motor_duty},
+                                           brake_Nm);
+    if (!found.sound()) return {i * dt_s, found.reason};
+  }
+  return {0.0, Reason::none};
+}
+
+}  // namespace
+
+TEST_CASE("uncertain stamps lengthen the windows until the momentum is certain enough, and no further") {
+  // p is 33.44 kg m/s at 100 rad/s. A window T ends when p 2 e / T <= T: e = 0.6 ms: 0.2003 s; two of them.
+  const auto [late_s, late] = found_after(100.0, 0.0, 600e-6, 0.0, 0.0, 3.0);
+  CHECK(late == Reason::brake_no_response);
+  CHECK(late_s == Approx(0.404));
+  const auto [prompt_s, prompt] = found_after(100.0, 0.0, 0.0, 0.0, 0.0, 3.0);
+  CHECK(prompt == Reason::brake_no_response);
+  CHECK(prompt_s == Approx(0.2).margin(0.005));
+  // No window is longer than 1 s.
+  const auto [longest_s, longest] = found_after(100.0, 0.0, 20e-3, 0.0, 0.0, 6.0);
+  CHECK(longest == Reason::brake_no_response);
+  CHECK(longest_s == Approx(2.0).margin(0.005));
+}
+
+TEST_CASE("what the stamps and counts leave open is no fault") {
+  // Motor off, rising by 9 rad/s^2: 0.25 kg m/s are exceeded in 0.1 s, but not with 0.3 ms at each end: windows of
+  // 0.142 s, 0.283 kg m/s of slack and 0.427 gained.
+  CHECK(found_after(100.0, 9.0, 0.0, 0.0, 0.0, 0.0).second == Reason::speed_rises_with_motor_off);
+  CHECK(found_after(100.0, 9.0, 300e-6, 0.0, 0.0, 0.0).second == Reason::none);
+  CHECK(found_after(100.0, 30.0, 300e-6, 0.0, 0.0, 0.0).second == Reason::speed_rises_with_motor_off);
+  // Two counts of a quarter turn, pi: 1.05 kg m/s in each window of 1 s.
+  CHECK(found_after(100.0, 5.0, 0.0, 3.14159265, 0.0, 0.0).second == Reason::none);
+  CHECK(found_after(10.0, 10.0, 0.0, 3.14159265, 0.0, 0.0).second == Reason::speed_rises_with_motor_off);
+  // The motor's response: 2.1 N m give 2.1 kg m/s in 0.1 s at standstill; friction is small.
+  CHECK(found_after(1.0, 3.0, 0.0, 0.0, 1.0, 0.0).second == Reason::motor_no_response);
+  CHECK(found_after(1.0, 3.0, 0.0, 0.5, 1.0, 0.0).second == Reason::motor_no_response);
 }

@@ -136,25 +136,95 @@ TEST_CASE("a counter that leaps is found in the same cycle, and its measurement 
   }
 }
 
-TEST_CASE("a delayed reading neither ends a speed window nor is checked") {
+TEST_CASE("a window lasts until its stamps are certain enough, and says how certain they are") {
+  // A reading of 0.6 ms with its stamp at the beginning: 1.2 ms at both ends are a quarter of 4.8 ms.
+  SpeedWindows maker(limits());
+  for (int i = 0; i <= 4; ++i) {
+    CHECK(maker.update(at((1 + i) * ms, 100 * i, 50 * i), (1 + i) * ms, {.motor_duty = 0.5}, 600 * us).sound());
+    CHECK_FALSE(maker.complete());
+    CHECK(maker.overdue() == (i >= 2));
+  }
+  CHECK(maker.update(at(6 * ms, 500, 250), 6 * ms, {.motor_duty = 0.5}, 600 * us).sound());
+  REQUIRE(maker.complete());
+  CHECK_FALSE(maker.overdue());
+  CHECK(maker.speed_window().dt_s == Approx(0.005));
+  CHECK(maker.speed_window().omega1_rad_s == Approx(500 * rad_per_count / 0.005));
+  CHECK(maker.speed_window().begin_error_s == Approx(600e-6));
+  CHECK(maker.speed_window().end_error_s == Approx(600e-6));
+  CHECK(maker.speed_window().motor_duty == Approx(0.5));
+}
+
+TEST_CASE("one delayed reading does not end a window; the next prompt one does") {
   SpeedWindows maker(limits());
   CHECK(maker.update(at(1 * ms), 1 * ms, {}).sound());
-  CHECK(maker.update(at(4 * ms, 20'000), 4 * ms, {.motor_duty = 0.5}, false).sound());
+  CHECK(maker.update(at(4 * ms, 100), 4 * ms, {}, 751 * us).sound());  // a quarter of 3 ms is 750 us
   CHECK(maker.usable());
   CHECK_FALSE(maker.complete());
-  CHECK(maker.update(at(5 * ms, 20'100), 5 * ms, {.motor_duty = 0.5}).sound());
+  CHECK(maker.overdue());
+  CHECK(maker.update(at(5 * ms, 200), 5 * ms, {}).sound());
   REQUIRE(maker.complete());
   CHECK(maker.speed_window().dt_s == Approx(0.004));
-  CHECK(maker.speed_window().omega1_rad_s == Approx(20'100 * rad_per_count / 0.004));
-  CHECK(maker.speed_window().motor_duty == Approx(0.5));
+  CHECK(maker.speed_window().omega1_rad_s == Approx(200 * rad_per_count / 0.004));
+  CHECK(maker.speed_window().stamp_error_s() == 0.0);
+  // Exactly a quarter is enough.
+  SpeedWindows just(limits());
+  CHECK(just.update(at(1 * ms), 1 * ms, {}).sound());
+  CHECK(just.update(at(4 * ms, 100), 4 * ms, {}, 750 * us).sound());
+  CHECK(just.complete());
+}
+
+TEST_CASE("a stamp in the middle of a reading is twice as certain as one at its end") {
+  const auto error_s = [](std::int64_t stamp_us) {
+    SpeedWindows maker(limits());
+    static_cast<void>(maker.update(at(0), 0, {}));
+    static_cast<void>(maker.update(at(10 * ms + stamp_us * us), 10 * ms, {}, 400 * us));
+    return maker.speed_window().end_error_s;
+  };
+  CHECK(error_s(0) == Approx(400e-6));
+  CHECK(error_s(200) == Approx(200e-6));
+  CHECK(error_s(100) == Approx(300e-6));
+  CHECK(error_s(400) == Approx(400e-6));
+  // A stamp outside the reading counts as its nearer end.
+  CHECK(error_s(-500) == Approx(400e-6));
+  CHECK(error_s(900) == Approx(400e-6));
+}
+
+TEST_CASE("a counter may move further by what the stamps leave open, no more") {
+  // 500 rad/s over 1 ms, 1 ms more, and 0.3 ms of each of the two stamps: 1.3 rad, 847.5 counts, and two counts.
+  const auto found = [](std::int32_t counts) {
+    SpeedWindows maker(limits());
+    static_cast<void>(maker.update(at(1 * ms), 1 * ms, {}, 300 * us));
+    return maker.update(at(2 * ms, counts), 2 * ms, {}, 300 * us);
+  };
+  CHECK(found(849).sound());
+  CHECK(found(850).reason == Reason::encoder_upper_jumped);
+}
+
+TEST_CASE("an encoder with few counts does not leap, and its windows last until they resolve a speed") {
+  rig::RigParameters rig;
+  rig.encoder_counts_per_rev = 4;
+  SpeedWindows maker(plausibility_limits(rig, false, {}));
+  // Two counts of a quarter turn within 40 rad/s: 78.5 ms.
+  std::int32_t counts = 0;
+  for (int cycle = 0; cycle <= 78; ++cycle) {
+    counts = cycle / 10;
+    CHECK(maker.update(at(cycle * ms, counts, counts), cycle * ms, {}).sound());
+    CHECK_FALSE(maker.complete());
+    CHECK(maker.overdue() == (cycle >= 2));
+  }
+  CHECK(maker.update(at(79 * ms, counts, counts), 79 * ms, {}).sound());
+  CHECK(maker.complete());
+  CHECK(maker.speed_window().resolution_rad_s == Approx(3.14159265 / 0.079));
 }
 
 TEST_CASE("a stale measurement is not used") {
   SpeedWindows maker(limits());
   CHECK(maker.usable());
   static_cast<void>(maker.update(at(10 * ms), 10 * ms, {}));
+  CHECK_FALSE(maker.overdue());
   static_cast<void>(maker.update(at(10 * ms), 11 * ms, {}));
   CHECK_FALSE(maker.usable());
+  CHECK(maker.overdue());
   static_cast<void>(maker.update(at(12 * ms), 12 * ms, {}));
   CHECK(maker.usable());
 }
