@@ -42,6 +42,7 @@ RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig
 RunLogic::RunLogic(RunLogicParts parts)
     : rig_(parts.rig),
       ideal_actuator_(parts.ideal_actuator),
+      duty_steps_(parts.duty_steps),
       wheels_(parts.rig.wheels),
       rad_per_count_(rig::radians_per_count(parts.rig.encoder_counts_per_rev)),
       slip_ref_(parts.control.slip_ref),
@@ -52,6 +53,12 @@ RunLogic::RunLogic(RunLogicParts parts)
       upper_(parts.control.observer, parts.rig.encoder_counts_per_rev),
       lower_(parts.control.observer, parts.rig.encoder_counts_per_rev),
       actuator_(parts.rig.brake, parts.ideal_actuator, parts.max_brake_duty, parts.duty_steps) {}
+
+runtime::GateOptions RunLogic::on_grid(runtime::GateOptions options) const noexcept {
+  options.motor_duty_max = rig::duty_at_most(options.motor_duty_max, duty_steps_);
+  if (!ideal_actuator_) options.brake_duty_max = rig::duty_at_most(options.brake_duty_max, duty_steps_);
+  return options;
+}
 
 void RunLogic::estimate(const rig::Measurement& measurement, double dt_s) noexcept {
   if (!started_) {

@@ -51,14 +51,15 @@ class RunLogic final : public runtime::CycleLogic {
   void commanded(const rig::Command& acted, const rig::Command& own) noexcept;
   void end_early(rig::Reason reason, double value) noexcept override { sequence_.end_early(reason, value); }
   [[nodiscard]] bool finished() const noexcept override { return sequence_.finished(); }
-  /// The command gate of this run: its options, the permissions of the plans, the limits of the rig's physics.
+  /// The command gate of this run: its options, the permissions of the plans, the limits of the rig's physics. Its caps
+  /// are duties that the driver can send, so that no rounding exceeds them.
   [[nodiscard]] runtime::CommandGate make_gate(const runtime::GateOptions& options) const noexcept {
-    return runtime::CommandGate(options, sequence_.permissions(),
+    return runtime::CommandGate(on_grid(options), sequence_.permissions(),
                                 runtime::plausibility_limits(rig_, ideal_actuator_, options), brake_.u0);
   }
   /// The same gate, but it does not judge the motion of the wheels.
   [[nodiscard]] runtime::CommandGate make_gate_without_wheels(const runtime::GateOptions& options) const noexcept {
-    return runtime::CommandGate(options, sequence_.permissions(), {}, brake_.u0);
+    return runtime::CommandGate(on_grid(options), sequence_.permissions(), {}, brake_.u0);
   }
   /// Why the run ended; `none` while it goes on.
   [[nodiscard]] rig::Reason end_reason() const noexcept { return end_.reason; }
@@ -69,6 +70,7 @@ class RunLogic final : public runtime::CycleLogic {
   [[nodiscard]] AdjustmentMailbox& adjustments() noexcept { return adjustments_; }
 
  private:
+  [[nodiscard]] runtime::GateOptions on_grid(runtime::GateOptions options) const noexcept;
   void adjust(rig::CycleRecord& record) noexcept;
   [[nodiscard]] double without_bump(double torque_Nm, const control::SlipInput& input) noexcept;
   void estimate(const rig::Measurement& measurement, double dt_s) noexcept;
@@ -80,6 +82,7 @@ class RunLogic final : public runtime::CycleLogic {
 
   const rig::RigParameters rig_;
   const bool ideal_actuator_;
+  const std::uint32_t duty_steps_;
   const rig::WheelParameters wheels_;
   const double rad_per_count_;
   double slip_ref_;
