@@ -19,7 +19,12 @@ extern "C" {
                                        const rig::Measurement& measurement, rig::CycleRecord& record) {
   const rig::Command wanted = logic.step(measurement, record);
   record.command = gate.check(wanted, {record.control.speeds_est, record.phase, measurement.time_ns}).command;
-  logic.commanded(record.command);
+}
+
+/// What follows the write: gate, actuator model and anti-windup learn what was sent.
+[[gnu::noinline]] void counted_sent(experiment::RunLogic& logic, runtime::CommandGate& gate, const rig::Command& sent) {
+  gate.note_sent(sent);
+  logic.commanded(sent);
 }
 
 /// The gate's check of the measurement.
@@ -62,13 +67,16 @@ int main() {
 
   rig::Measurement measurement;
   rig::CycleRecord record, taken;
+  rig::Command sent;
   int cycles = 0;
   for (bool braking = true; braking; ++cycles) {
     record = {};
     if (!driver.read(cycles * std::int64_t{1'000'000}, measurement).ok()) return EXIT_FAILURE;
     counted_watch(gate, measurement);
     counted_control(logic, gate, measurement, record);
-    if (!driver.write(record.command).ok()) return EXIT_FAILURE;
+    if (!driver.write(record.command, sent).ok()) return EXIT_FAILURE;
+    record.command = sent;
+    counted_sent(logic, gate, sent);
     braking = record.phase == rig::Phase::brake;
     record.timing = {.wakeup_latency_ns = 20'000, .read_ns = 3'000, .control_ns = 1'000, .write_ns = 500};
     counted_statistics(*statistics, record.timing);

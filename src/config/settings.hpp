@@ -55,4 +55,10 @@ struct Settings {
   std::string backend{"sim"};
 };
 
+/// What the outputs of the settings' backend make of a command. Throws driver::Unavailable for an unknown board.
+[[nodiscard]] inline driver::OutputGrid output_grid(const Settings& s) {
+  return s.backend == "rig" ? driver::output_grid(s.driver)
+                            : driver::simulated_output_grid(s.driver, s.plant.ideal_actuator);
+}
+
 }  // namespace abs_hil::config

@@ -7,6 +7,7 @@
 #include "abs_hil/rig/option_check.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 #include "control/adaptive_gains.hpp"
+#include "control/standing_wheel.hpp"
 
 namespace abs_hil::control {
 namespace {
@@ -49,7 +50,6 @@ void AdaptiveActuatorController::reset(const SlipInput& input) noexcept {
   omega1_rad_s_ = input.speeds.omega1_rad_s;
   slip_ = input.slip;
   tuning_ = 0.0;
-  limited_ = false;
 }
 
 SlipInput AdaptiveActuatorController::observed(const SlipInput& input) const noexcept {
@@ -62,17 +62,17 @@ SlipInput AdaptiveActuatorController::observed(const SlipInput& input) const noe
 
 SlipOutput AdaptiveActuatorController::step(const SlipInput& raw) noexcept {
   const bool lags = std::isfinite(raw.max_brake_torque_Nm);
+  limited_ = lags && raw.unsent_torque_Nm != 0.0;
   if (lags) wheels_observer_.update(raw);
   const SlipInput input = lags ? observed(raw) : raw;
   const double error_m_s = slip_velocity_error_m_s(wheels_, input.speeds, input.slip_ref);
-  integral_.advance(input.dt_s, error_m_s, input.slip_ref, wheels_.r2_m * input.speeds.omega2_rad_s);
+  integral_.advance(input, error_m_s, input.slip_ref, wheels_.r2_m * input.speeds.omega2_rad_s);
   const double past_phi = rig::normalised_tyre_force(tyre_, 0.5 * (slip_ + input.slip));
   adapt(input, past_phi);
 
   double torque_Nm =
       dynamics_.feedback_linearising_torque_Nm(input, integral_.value_m(), error_m_s, theta_.theta_N(), past_phi);
   if (lags) torque_Nm = through_lag(input, torque_Nm, error_m_s);
-  integral_.note_request(torque_Nm, input.max_brake_torque_Nm);
   return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
 }
 
@@ -84,10 +84,11 @@ double AdaptiveActuatorController::zeta_rate_N_s(double slip_ref, double phi, do
 void AdaptiveActuatorController::adapt(const SlipInput& input, double past_phi) noexcept {
   const double BtP_x = paper::Laws<double>::BtP_x(gains_, integral_.mean_value_m(), integral_.mean_error_m_s());
   if (std::isfinite(input.max_brake_torque_Nm)) {
-    theta_.update(ForceInterval{.dt_s = input.dt_s,
-                                .tyre_force_N = wheels_observer_.force_N(),
-                                .phi = past_phi,
-                                .zeta_rate_N_s = zeta_rate_N_s(input.slip_ref, past_phi, BtP_x)});
+    if (turns(omega1_rad_s_) && turns(input.speeds.omega1_rad_s))
+      theta_.update(ForceInterval{.dt_s = input.dt_s,
+                                  .tyre_force_N = wheels_observer_.force_N(),
+                                  .phi = past_phi,
+                                  .zeta_rate_N_s = zeta_rate_N_s(input.slip_ref, past_phi, BtP_x)});
   } else {
     theta_.update(AdaptationInterval{.dt_s = input.dt_s,
                                      .omega1_before_rad_s = omega1_rad_s_,
@@ -137,9 +138,7 @@ double AdaptiveActuatorController::through_lag(const SlipInput& input, double wa
   // eta decays by exp(-lag_gain h) over the period; for h -> 0 the quotient becomes the gain.
   const double eta_rate = std::expm1(-lag_gain_ * period_s_) / period_s_ * eta - BtP_x / lag_weight_;
   const double torque_rate_Nm_s = arm * (wanted_rate_m_s3(input, error_m_s, zeta_rate) + eta_rate);
-  const double command_Nm = lag_.command_Nm(input.brake_torque_Nm, period_s_ * torque_rate_Nm_s);
-  limited_ = command_Nm < 0.0 || command_Nm > input.max_brake_torque_Nm;
-  return command_Nm;
+  return lag_.command_Nm(input.brake_torque_Nm, period_s_ * torque_rate_Nm_s);
 }
 
 bool AdaptiveActuatorController::take_over(const SlipController& before) noexcept {
@@ -151,7 +150,6 @@ bool AdaptiveActuatorController::take_over(const SlipController& before) noexcep
   omega1_rad_s_ = other->omega1_rad_s_;
   slip_ = other->slip_;
   tuning_ = other->tuning_;
-  limited_ = other->limited_;
   return true;
 }
 

@@ -49,7 +49,7 @@ class AdaptiveActuatorController final : public SlipController {
   double omega1_rad_s_{0.0};  ///< of the previous cycle, as is the slip
   double slip_{0.0};
   double tuning_{0.0};   ///< lag_weight a eta of the previous cycle
-  bool limited_{false};  ///< true if the previous command was limited
+  bool limited_{false};  ///< true if the previous command was not sent as it was
 };
 
 }  // namespace abs_hil::control

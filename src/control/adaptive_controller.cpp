@@ -24,14 +24,13 @@ void AdaptiveController::reset(const SlipInput& input) noexcept {
 
 SlipOutput AdaptiveController::step(const SlipInput& input) noexcept {
   const double error_m_s = slip_velocity_error_m_s(wheels_, input.speeds, input.slip_ref);
-  integral_.advance(input.dt_s, error_m_s, input.slip_ref, wheels_.r2_m * input.speeds.omega2_rad_s);
+  integral_.advance(input, error_m_s, input.slip_ref, wheels_.r2_m * input.speeds.omega2_rad_s);
   // phi at the mean of the two slips has half the error of the trapezoidal rule where the curvature of phi is largest.
   const double past_phi = rig::normalised_tyre_force(tyre_, 0.5 * (slip_ + input.slip));
   adapt(input, past_phi);
 
   const double torque_Nm =
       dynamics_.feedback_linearising_torque_Nm(input, integral_.value_m(), error_m_s, theta_.theta_N(), past_phi);
-  integral_.note_request(torque_Nm, input.max_brake_torque_Nm);
   return {.brake_torque_Nm = torque_Nm,
           .slip_velocity_error_m_s = error_m_s,
           .theta_est_N = theta_.theta_N(),

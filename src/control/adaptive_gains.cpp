@@ -1,10 +1,12 @@
 #include "control/adaptive_gains.hpp"
 
+#include <cmath>
 #include <stdexcept>
 
 #include "abs_hil/control/slip_error_dynamics.hpp"
 #include "abs_hil/rig/option_check.hpp"
 #include "control/lyapunov.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::control {
 
@@ -24,7 +26,18 @@ paper::Weights<double> paper_weights(const AdaptiveOptions& options) {
   const AdaptiveOptions& o = checked(options);
   Eigen::Matrix2d Q;
   Q << o.q11, o.q12, o.q12, o.q22;
-  const Eigen::Matrix2d P = solve_lyapunov(error_dynamics_matrix(o.ks0, o.ks1), Q);
+  const Eigen::Matrix2d A = error_dynamics_matrix(o.ks0, o.ks1);
+  // Q is judged first, by the solution for gains that are sound.
+  static_cast<void>(solve_lyapunov(error_dynamics_matrix(1.0, 1.0), Q));
+  Eigen::Matrix2d P;
+  try {
+    P = solve_lyapunov(A, Q);
+  } catch (const std::invalid_argument&) {
+    throw std::invalid_argument(rig::formatted(
+        "control.adaptive.ks0 = %g 1/s^2 and control.adaptive.ks1 = %g 1/s are too far apart: PA + A'P = "
+        "-2Q has no solution that a double can hold; bring ks1 nearer to sqrt(ks0) = %g 1/s",
+        o.ks0, o.ks1, std::sqrt(o.ks0)));
+  }
   return {.p11 = P(0, 0), .p12 = P(0, 1), .p22 = P(1, 1), .q11 = o.q11, .q12 = o.q12, .q22 = o.q22};
 }
 

@@ -69,9 +69,8 @@ SlipOutput AdaptivePeakController::step(const SlipInput& input) noexcept {
   const Reference reference = next_reference(input.dt_s);
 
   const double error_m_s = slip_velocity_error_m_s(wheels_, speeds, reference.slip);
-  integral_.advance(input.dt_s, error_m_s, reference.slip, v_x);
+  integral_.advance(input, error_m_s, reference.slip, v_x);
   const double torque_Nm = command_Nm(input, slip, reference, error_m_s);
-  integral_.note_request(torque_Nm, input.max_brake_torque_Nm);
   return {.brake_torque_Nm = torque_Nm,
           .slip_velocity_error_m_s = error_m_s,
           .theta_est_N = peak_.peak_force_N(),

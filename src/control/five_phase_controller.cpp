@@ -7,12 +7,10 @@
 #include "abs_hil/control/slip_error_dynamics.hpp"
 #include "abs_hil/rig/option_check.hpp"
 #include "control/full_torque.hpp"
+#include "control/standing_wheel.hpp"
 
 namespace abs_hil::control {
 namespace {
-
-/// Below this speed a wheel speed sensor cannot distinguish a turning wheel from a standing one.
-constexpr double standing_rad_s = 1.0;
 
 const FivePhaseOptions& checked(const FivePhaseOptions& o) {
   rig::require_valid(o, "control.five_phase.");
@@ -90,6 +88,8 @@ SlipOutput FivePhaseController::step(const SlipInput& input) noexcept {
     in_phase_s_ = 0.0;
     accelerated_ = acceleration_m_s2 > options_.reapply_below_m_s2;
   }
+  // A ramp goes on from what was sent, not from what a limit held back.
+  if (input.unsent_torque_Nm != 0.0) torque_Nm_ = input.sent_brake_torque_Nm;
   // The torque is held for the next period, so it gets the ramp's value at the period's end.
   const double step_s = input.dt_s > 0.0 ? input.dt_s : period_s_;
   torque_Nm_ = std::clamp(torque_Nm_ + ramp_Nm_s() * step_s, 0.0, full_torque_Nm(brake_, input.max_brake_torque_Nm));

@@ -19,12 +19,11 @@ void NominalController::reset(const SlipInput& input) noexcept {
 
 SlipOutput NominalController::step(const SlipInput& input) noexcept {
   const double error_m_s = slip_velocity_error_m_s(wheels_, input.speeds, input.slip_ref);
-  integral_.advance(input.dt_s, error_m_s, input.slip_ref, wheels_.r2_m * input.speeds.omega2_rad_s);
+  integral_.advance(input, error_m_s, input.slip_ref, wheels_.r2_m * input.speeds.omega2_rad_s);
 
   const double phi = rig::normalised_tyre_force(tyre_, input.slip);
   const double torque_Nm =
       dynamics_.feedback_linearising_torque_Nm(input, integral_.value_m(), error_m_s, theta0_N_, phi);
-  integral_.note_request(torque_Nm, input.max_brake_torque_Nm);
   return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta0_N_};
 }
 

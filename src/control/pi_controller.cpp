@@ -32,11 +32,10 @@ void PiController::reset(const SlipInput& input) noexcept {
 
 SlipOutput PiController::step(const SlipInput& input) noexcept {
   const double error_m_s = slip_velocity_error_m_s(wheels_, input.speeds, input.slip_ref);
-  integral_.advance(input.dt_s, error_m_s, input.slip_ref, wheels_.r2_m * input.speeds.omega2_rad_s);
+  integral_.advance(input, error_m_s, input.slip_ref, wheels_.r2_m * input.speeds.omega2_rad_s);
   const double feedback_m_s2 = -kp_per_s_ * error_m_s - ki_per_s2_ * integral_.value_m();
   const double torque_Nm =
       feed_forward_ * measured_equivalent_torque_Nm(wheels_, input) + wheels_.J1_kg_m2 / wheels_.r1_m * feedback_m_s2;
-  integral_.note_request(torque_Nm, input.max_brake_torque_Nm);
   return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = rig::unknown};
 }
 

@@ -26,6 +26,7 @@ void SlidingSurface::take_over(const SlidingSurface& before) noexcept {
 double SlidingSurface::observe(const SlipInput& input) noexcept {
   past_phi_ = rig::normalised_tyre_force(tyre_, 0.5 * (slip_ + input.slip));
   slip_ = input.slip;
+  excess_ = input.unsent_torque_Nm;
   // theta_hat changes by -phi s, and the torque by phi times this change.
   if (!winds_up(-switching_)) {
     theta_.update(input.dt_s, slip_velocity_gain(wheels_, input.slip_ref) * past_phi_, switching_);
@@ -37,7 +38,8 @@ SlipOutput SlidingSurface::drive(const SlipInput& input, double error_m_s, const
                                  double switching) noexcept {
   const double torque_Nm = equivalent_.brake_torque_Nm(input, error_m_s, wanted, theta_.theta_N(), past_phi_);
   switching_ = switching;
-  excess_ = torque_Nm > input.max_brake_torque_Nm ? 1.0 : (torque_Nm < 0.0 ? -1.0 : 0.0);
+  // A torque outside the actuator's range will not be sent, and a limit that held in the past cycle may still hold.
+  if (torque_Nm > input.max_brake_torque_Nm || torque_Nm < 0.0) excess_ = torque_Nm;
   return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
 }
 

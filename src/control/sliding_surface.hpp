@@ -15,8 +15,8 @@ class SlidingSurface {
   void reset(const SlipInput& input) noexcept;
   /// Takes over the state of the other.
   void take_over(const SlidingSurface& before) noexcept;
-  /// Adapts theta_hat over the past interval. theta_hat is held if the reference torque was outside the actuator's
-  /// range and adaptation would drive it further out (anti-windup).
+  /// Adapts theta_hat over the past interval. theta_hat is held if the torque sent was not the reference torque and
+  /// adaptation would drive the two further apart (anti-windup).
   /// @return e_v now
   [[nodiscard]] double observe(const SlipInput& input) noexcept;
   /// The torque that moves e_v, now `error_m_s`, along the reference motion.
@@ -24,7 +24,7 @@ class SlidingSurface {
   [[nodiscard]] SlipOutput drive(const SlipInput& input, double error_m_s, const WantedMotion& wanted,
                                  double switching) noexcept;
 
-  /// True if the last torque was outside the actuator's range and a change of this sign would drive it further out.
+  /// True if the last torque is not sent as it is and a change of this sign would drive it further out.
   [[nodiscard]] bool winds_up(double torque_change) const noexcept { return excess_ * torque_change > 0.0; }
   [[nodiscard]] double period_s() const noexcept { return equivalent_.period_s(); }
 
@@ -36,7 +36,7 @@ class SlidingSurface {
   double slip_{0.0};  ///< of the previous cycle
   double past_phi_{0.0};
   double switching_{0.0};
-  double excess_{0.0};  ///< 1: the last torque was above the actuator's range, -1: below, 0: within
+  double excess_{0.0};  ///< > 0: less is sent than the reference torque, < 0: more is sent, 0: neither
 };
 
 }  // namespace abs_hil::control

@@ -9,7 +9,7 @@ void SlipErrorIntegral::reset(double error_m_s, double slip_ref) noexcept {
   slip_ref_ = slip_ref;
 }
 
-void SlipErrorIntegral::advance(double dt_s, double error_m_s, double slip_ref, double v_x_m_s) noexcept {
+void SlipErrorIntegral::advance(const SlipInput& input, double error_m_s, double slip_ref, double v_x_m_s) noexcept {
   // A change of the reference now makes e_v jump. The past interval must not include this jump.
   const double error_before_change = error_m_s + (slip_ref - slip_ref_) * v_x_m_s;
   mean_error_m_s_ = 0.5 * (error_m_s_ + error_before_change);
@@ -17,9 +17,8 @@ void SlipErrorIntegral::advance(double dt_s, double error_m_s, double slip_ref, 
   slip_ref_ = slip_ref;
 
   // The torque contains -ks0 I: a negative error raises it, a positive error lowers it.
-  const bool winds_up =
-      (request_ == Request::above && mean_error_m_s_ < 0.0) || (request_ == Request::below && mean_error_m_s_ > 0.0);
-  const double increment_m = winds_up ? 0.0 : mean_error_m_s_ * dt_s;
+  const bool winds_up = input.unsent_torque_Nm * mean_error_m_s_ < 0.0;
+  const double increment_m = winds_up ? 0.0 : mean_error_m_s_ * input.dt_s;
   mean_value_m_ = value_m_ + 0.5 * increment_m;
   value_m_ += increment_m;
 }

@@ -51,7 +51,8 @@ SlipPeakEstimator::SlipPeakEstimator(const SlipPeakOptions& options, double slip
       sample_variance_N2_{options.force_noise_N2_s * rate_Hz},
       decimation_{at_least_one(kept_every_s * rate_Hz)},
       window_{at_least_one(jump_window_s * rate_Hz / static_cast<double>(decimation_))},
-      rollback_{at_least_one(rollback_s * rate_Hz / static_cast<double>(decimation_))} {
+      rollback_{at_least_one(rollback_s * rate_Hz / static_cast<double>(decimation_))},
+      samples_(std::max(window_, rollback_) + 1) {
   rig::require_valid(options, "control.adaptive_peak.");
   if (!(0.0 < slip_min && slip_min < slip_max && rate_Hz > 0.0)) {
     throw std::invalid_argument("the slip peak estimator needs 0 < slip_min < slip_max and a control rate > 0 Hz");

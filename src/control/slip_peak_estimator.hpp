@@ -1,8 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cstddef>
+#include <vector>
 
 #include "abs_hil/control/options.hpp"
 
@@ -63,7 +63,7 @@ class SlipPeakEstimator {
   std::size_t rollback_;
   State state_{State::Zero()};
   Eigen::Matrix4d covariance_{Eigen::Matrix4d::Zero()};
-  std::array<Sample, 32> samples_{};
+  std::vector<Sample> samples_;  ///< a ring that reaches back over the longer of the two
   std::size_t kept_count_{0};
   std::size_t cycle_{0};
   double hold_s_{0.0};

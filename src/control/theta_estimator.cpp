@@ -3,7 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "control/standing_wheel.hpp"
+
 namespace abs_hil::control {
+
+namespace {
+constexpr double least_decay = 1e-12;  ///< the quotient of two numbers below it loses its digits
+}  // namespace
 
 ThetaEstimator::ThetaEstimator(const AdaptiveOptions& options, const rig::WheelParameters& wheels) noexcept
     : wheels_{wheels},
@@ -29,7 +35,7 @@ double ThetaEstimator::omega1_hat_rad_s(double omega1_rad_s) const noexcept {
 }
 
 void ThetaEstimator::update(const AdaptationInterval& past) noexcept {
-  if (!(past.dt_s > 0.0)) return;
+  if (!(past.dt_s > 0.0 && turns(past.omega1_before_rad_s) && turns(past.omega1_after_rad_s))) return;
   const auto& w = wheels_;
   const double omega1_rate = (past.omega1_after_rad_s - past.omega1_before_rad_s) / past.dt_s;
   const double omega1_mean = 0.5 * (past.omega1_before_rad_s + past.omega1_after_rad_s);
@@ -43,7 +49,10 @@ void ThetaEstimator::update(const ForceInterval& past) noexcept {
   // theta' = rate_now - decay (theta - theta_now): over dt it covers (1 - exp(-decay dt))/decay of the present rate.
   const double rate_now = past.zeta_rate_N_s + innovation_gain_ * (past.tyre_force_N - past.phi * theta_N_);
   const double decay = innovation_gain_ * past.phi;
-  const double theta_N = theta_N_ - std::expm1(-decay * past.dt_s) / decay * rate_now;
+  // For a decay that vanishes, that is dt.
+  const double covered_s =
+      std::abs(decay * past.dt_s) < least_decay ? past.dt_s : -std::expm1(-decay * past.dt_s) / decay;
+  const double theta_N = theta_N_ + covered_s * rate_now;
   theta_N_ = std::clamp(theta_N, theta_min_N_, theta_max_N_);
   zeta_N_ += past.zeta_rate_N_s * past.dt_s;
 }

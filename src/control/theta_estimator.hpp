@@ -33,7 +33,8 @@ struct ForceInterval {
 /// theta_hat directly, so they cause no wind-up and no jumps. The equation is linear. It is solved exactly for the
 /// means of F, phi and zeta' over the interval, and so it is stable for any gain and rate.
 ///
-/// Adaptation is frozen for phi <= 0 (rolling free, traction), where V' <= 0 of Theorem 3.1 does not hold.
+/// Adaptation is frozen for phi <= 0 (rolling free, traction), where V' <= 0 of Theorem 3.1 does not hold, and while
+/// the upper wheel stands, where its motion does not give F.
 /// Real-time safe.
 class ThetaEstimator {
  public:

@@ -36,6 +36,24 @@ std::string_view board_name(std::size_t index) noexcept {
   return index < boards().size() ? boards()[index].name : std::string_view{};
 }
 
+namespace {
+[[noreturn]] void refuse_kind(const std::string& kind) {
+  throw Unavailable("backend rig: driver.kind = \"" + kind +
+                    "\": this build has no driver for that board; use driver.kind=pci, can or usb, or --backend sim");
+}
+}  // namespace
+
+OutputGrid output_grid(const DriverOptions& options) {
+  if (options.kind == "pci") return pwm_grid(options.pci);
+  if (options.kind == "can") return can::output_grid(options.can);
+  if (options.kind == "usb") return pwm_grid(options.usb);
+  refuse_kind(options.kind);
+}
+
+OutputGrid simulated_output_grid(const DriverOptions& options, bool any_brake_duty) {
+  return {.duty_steps = full_width(pwm_mode_named(options.sim.pwm_mode)), .any_brake_duty = any_brake_duty};
+}
+
 std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options, bool lock_step) {
   if (options.kind == "pci") {
     return std::make_unique<pci::PciDriver>(
@@ -54,8 +72,7 @@ std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options, bool lo
         },
         lock_step ? nullptr : monotonic_ns);
   }
-  throw Unavailable("backend rig: driver.kind = \"" + options.kind +
-                    "\": this build has no driver for that board; use driver.kind=pci, can or usb, or --backend sim");
+  refuse_kind(options.kind);
 }
 
 std::string verification_note(const DriverOptions& options) {

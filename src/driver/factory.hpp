@@ -10,7 +10,9 @@
 #include "abs_hil/driver/safe_state_writer.hpp"
 #include "abs_hil/rig/option.hpp"
 #include "driver/can/options.hpp"
+#include "driver/output_grid.hpp"
 #include "driver/pci/options.hpp"
+#include "driver/sim_options.hpp"
 #include "driver/usb/options.hpp"
 
 namespace abs_hil::driver {
@@ -30,6 +32,7 @@ struct DriverOptions {
   ABS_HIL_GROUP(pci::PciOptions, pci, "pci.", {});
   ABS_HIL_GROUP(can::CanOptions, can, "can.", {});
   ABS_HIL_GROUP(usb::UsbOptions, usb, "usb.", {});
+  ABS_HIL_GROUP(SimOptions, sim, "sim.", {});
 };
 
 struct BackendEntry {
@@ -46,6 +49,11 @@ struct BackendEntry {
 /// std::invalid_argument for an option outside its range, Unavailable for a kind without a driver in this build.
 /// @param lock_step  the driver advances an emulator's time (`options.emulated`, `--fast`)
 [[nodiscard]] std::unique_ptr<RigDriver> make_rig_driver(const DriverOptions& options, bool lock_step = false);
+
+/// What the outputs make of a command: those of the board that `options.kind` names, or of the simulated rig with
+/// `any_brake_duty` for its ideal actuator. Throws Unavailable for a kind without a driver in this build.
+[[nodiscard]] OutputGrid output_grid(const DriverOptions& options);
+[[nodiscard]] OutputGrid simulated_output_grid(const DriverOptions& options, bool any_brake_duty);
 
 /// Makes the writer of the safe state for the board that `options.kind` names. Throws Unavailable for a kind without
 /// one in this build.

@@ -36,10 +36,18 @@ IoResult RigDriver::read(std::int64_t now_ns, rig::Measurement& measurement) noe
   return do_read(now_ns, measurement);
 }
 
-IoResult RigDriver::write(const rig::Command& command) noexcept {
+rig::Command RigDriver::as_sent(const rig::Command& command) const noexcept {
+  rig::Command sent = command;
+  if (!command.motor_enable) sent.motor_duty = 0.0;
+  return sent;
+}
+
+IoResult RigDriver::write(const rig::Command& command, rig::Command& sent) noexcept {
+  sent = rig::safe_command;
   if (state_ != DriverState::active) return {IoError::not_active};
-  const IoResult result = do_write(command);
+  const IoResult result = do_write(command, sent);
   if (!result.ok()) {
+    sent = rig::safe_command;
     state_ = DriverState::failed;
     // The first error is the one to report, even when making safe fails as well.
     static_cast<void>(make_safe());

@@ -60,6 +60,7 @@ RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig
 RunLogic::RunLogic(RunLogicParts parts)
     : rig_(parts.rig),
       ideal_actuator_(parts.ideal_actuator),
+      duty_steps_(parts.duty_steps),
       wheels_(parts.rig.wheels),
       rad_per_count_(rig::radians_per_count(parts.rig.encoder_counts_per_rev)),
       slip_ref_(parts.control.slip_ref),
@@ -69,7 +70,13 @@ RunLogic::RunLogic(RunLogicParts parts)
       sequence_(std::move(parts.sequence)),
       upper_(parts.control.observer, parts.rig.encoder_counts_per_rev, fastest_change_rad_s2(parts).upper),
       lower_(parts.control.observer, parts.rig.encoder_counts_per_rev, fastest_change_rad_s2(parts).lower),
-      actuator_(parts.rig.brake, parts.ideal_actuator, parts.max_brake_duty) {}
+      actuator_(parts.rig.brake, parts.ideal_actuator, parts.max_brake_duty, parts.duty_steps) {}
+
+runtime::GateOptions RunLogic::on_grid(runtime::GateOptions options) const noexcept {
+  options.motor_duty_max = rig::duty_at_most(options.motor_duty_max, duty_steps_);
+  if (!ideal_actuator_) options.brake_duty_max = rig::duty_at_most(options.brake_duty_max, duty_steps_);
+  return options;
+}
 
 void RunLogic::estimate(const rig::Measurement& measurement, double dt_s, double stamp_error_s) noexcept {
   if (!started_) {
@@ -124,15 +131,34 @@ double RunLogic::slip_control(double dt_s, bool entered, rig::ControlState& stat
                            .alpha1_rad_s2 = alpha1_rad_s2_,
                            .alpha2_rad_s2 = alpha2_rad_s2_,
                            .upper_travel_rad = upper_travel_rad_,
-                           .lower_travel_rad = lower_travel_rad_};
+                           .lower_travel_rad = lower_travel_rad_,
+                           .sent_brake_torque_Nm = entered ? 0.0 : sent_Nm_,
+                           .unsent_torque_Nm = entered ? 0.0 : unsent_Nm_};
   if (entered) controller_->reset(input);
   const control::SlipOutput output = controller_->step(input);
+  if (refused(output, entered)) return 0.0;
   if (entered) bump_Nm_ = 0.0;
   state.slip_velocity_error_m_s = output.slip_velocity_error_m_s;
   state.theta_est_N = output.theta_est_N;
   state.signals = output.signals;
   if (!std::isnan(output.slip_ref)) state.slip_ref = output.slip_ref;
-  return without_bump(output.brake_torque_Nm, input);
+  asked_Nm_ = without_bump(output.brake_torque_Nm, input);
+  return asked_Nm_;
+}
+
+/// Checks a controller's whole output before anything uses it. The torque must be finite. The other signals may be NaN
+/// if they were NaN at the start of the phase: the controller does not give them.
+bool RunLogic::refused(const control::SlipOutput& output, bool entered) noexcept {
+  const std::array<double, rig::controller_signals.size()> signals{
+      output.brake_torque_Nm, output.slip_velocity_error_m_s, output.theta_est_N, output.slip_ref};
+  for (std::size_t n = 0; n < signals.size(); ++n) {
+    if (entered) not_given_[n] = n != 0 && std::isnan(signals[n]);
+    if (std::isfinite(signals[n]) || (not_given_[n] && std::isnan(signals[n]))) continue;
+    sequence_.end_early(rig::Reason::controller_not_finite, static_cast<double>(n));
+    refused_ = true;
+    return true;
+  }
+  return false;
 }
 
 /// Makes a change of gains bumpless. New gains take effect on changes of the torque at once, but the jump that they
@@ -198,16 +224,18 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
   state.brake_torque_est_Nm = actuator_.torque_Nm();
 
   const double phase_time_s = sequence_.phase_time_s();
+  asked_Nm_ = rig::unknown;
   double torque_Nm = 0.0;
   double brake_duty = 0.0;
   if (plan.brake == BrakeAction::duty) {
     brake_duty = plan.brake_duty_at(phase_time_s);
     torque_Nm = rig::brake_torque_at(brake_, brake_duty);
   } else {
-    torque_Nm = actuator_.limited(wanted_torque_Nm(plan, dt_s, change.entered, state));
+    torque_Nm = actuator_.next_torque_Nm(wanted_torque_Nm(plan, dt_s, change.entered, state), dt_s);
     brake_duty = actuator_.duty_for(torque_Nm);
   }
   if (replaced_ != nullptr) adjustments_.retire(std::exchange(replaced_, nullptr));
+  if (refused_) return rig::safe_command;
   state.brake_torque_ref_Nm = torque_Nm;
 
   const double motor_duty = plan.motor_duty_at(phase_time_s);
@@ -228,8 +256,10 @@ double RunLogic::wanted_torque_Nm(const PhasePlan& plan, double dt_s, bool enter
   return slip_control(dt_s, entered, state);
 }
 
-void RunLogic::commanded(const rig::Command& command) noexcept {
-  actuator_.command(command.brake_duty, command.brake_torque_Nm);
+void RunLogic::commanded(const rig::Command& acted, const rig::Command& own) noexcept {
+  actuator_.command(acted.brake_duty, acted.brake_torque_Nm);
+  sent_Nm_ = actuator_.static_torque_Nm(own.brake_duty, own.brake_torque_Nm);
+  unsent_Nm_ = std::isnan(asked_Nm_) ? 0.0 : actuator_.unsent_Nm(asked_Nm_, sent_Nm_);
 }
 
 }  // namespace abs_hil::experiment

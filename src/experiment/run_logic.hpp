@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -7,6 +8,7 @@
 
 #include "abs_hil/control/options.hpp"
 #include "abs_hil/control/slip_controller.hpp"
+#include "abs_hil/rig/controller_signal.hpp"
 #include "abs_hil/rig/parameters.hpp"
 #include "control/brake_actuator.hpp"
 #include "control/tracking_observer.hpp"
@@ -28,6 +30,7 @@ struct RunLogicParts {
   bool ideal_actuator{false};
   double max_brake_duty{1.0};     ///< limit of the command gate
   double start_speed_rad_s{0.0};  ///< both wheels' speed at the first measurement
+  std::uint32_t duty_steps{0};    ///< of the driver's PWMs, from duty 0 to duty 1; 0: any duty can be sent
 };
 
 /// Makes the parts of a run with the controller named in `control`. Throws std::invalid_argument for unusable options.
@@ -43,16 +46,23 @@ class RunLogic final : public runtime::CycleLogic {
   explicit RunLogic(RunLogicParts parts);
 
   [[nodiscard]] rig::Command step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept override;
-  void commanded(const rig::Command& command) noexcept override;
+  void commanded(const rig::Command& sent) noexcept override { commanded(sent, sent); }
+  /// The same where the logic's own command did not act: a recorded one did.
+  /// @param acted  the command that acted on the rig; the actuator model follows it
+  /// @param own  what became of the logic's own command; its integrals follow it
+  void commanded(const rig::Command& acted, const rig::Command& own) noexcept;
   void end_early(rig::Reason reason, double value) noexcept override { sequence_.end_early(reason, value); }
   [[nodiscard]] bool finished() const noexcept override { return sequence_.finished(); }
-  /// The command gate of this run: its options, the permissions of the plans, the limits of the rig's physics.
+  /// The command gate of this run: its options, the permissions of the plans, the limits of the rig's physics. Its caps
+  /// are duties that the driver can send, so that no rounding exceeds them.
   [[nodiscard]] runtime::CommandGate make_gate(const runtime::GateOptions& options) const noexcept {
-    return runtime::CommandGate(options, sequence_.permissions(),
-                                runtime::plausibility_limits(rig_, ideal_actuator_, options));
+    return runtime::CommandGate(on_grid(options), sequence_.permissions(),
+                                runtime::plausibility_limits(rig_, ideal_actuator_, options), brake_.u0);
   }
-  /// Which outputs the plan of each phase permits.
-  [[nodiscard]] runtime::PhasePermissions permissions() const noexcept { return sequence_.permissions(); }
+  /// The same gate, but it does not judge the motion of the wheels.
+  [[nodiscard]] runtime::CommandGate make_gate_without_wheels(const runtime::GateOptions& options) const noexcept {
+    return runtime::CommandGate(on_grid(options), sequence_.permissions(), {}, brake_.u0);
+  }
   /// Why the run ended; `none` while it goes on.
   [[nodiscard]] rig::Reason end_reason() const noexcept { return end_.reason; }
   [[nodiscard]] double end_value() const noexcept { return end_.value; }
@@ -62,16 +72,19 @@ class RunLogic final : public runtime::CycleLogic {
   [[nodiscard]] AdjustmentMailbox& adjustments() noexcept { return adjustments_; }
 
  private:
+  [[nodiscard]] runtime::GateOptions on_grid(runtime::GateOptions options) const noexcept;
   void adjust(rig::CycleRecord& record) noexcept;
   [[nodiscard]] double without_bump(double torque_Nm, const control::SlipInput& input) noexcept;
   void estimate(const rig::Measurement& measurement, double dt_s, double stamp_error_s) noexcept;
   void note_travel(const rig::Measurement& measurement, double dt_s) noexcept;
+  [[nodiscard]] bool refused(const control::SlipOutput& output, bool entered) noexcept;
   [[nodiscard]] double slip_control(double dt_s, bool entered, rig::ControlState& state) noexcept;
   [[nodiscard]] double wanted_torque_Nm(const PhasePlan& plan, double dt_s, bool entered,
                                         rig::ControlState& state) noexcept;
 
   const rig::RigParameters rig_;
   const bool ideal_actuator_;
+  const std::uint32_t duty_steps_;
   const rig::WheelParameters wheels_;
   const double rad_per_count_;
   double slip_ref_;
@@ -94,7 +107,12 @@ class RunLogic final : public runtime::CycleLogic {
   AdjustmentMailbox adjustments_;
   /// The old controller if the gains changed in this cycle, until its last torque is known.
   control::SlipController* replaced_{nullptr};
-  double bump_Nm_{0.0};  ///< remaining offset that keeps the torque continuous
+  double asked_Nm_{rig::unknown};  ///< the controller's torque of this cycle; NaN: it was not asked
+  double sent_Nm_{0.0};            ///< static torque sent for it, and what was missing
+  double unsent_Nm_{0.0};
+  std::array<bool, rig::controller_signals.size()> not_given_{};  ///< signals that the controller does not give
+  bool refused_{false};                                           ///< its output was not finite
+  double bump_Nm_{0.0};                                           ///< remaining offset that keeps the torque continuous
   bool start_given_{false};
   Sequence::Change end_{};
   bool stands_still_{false};

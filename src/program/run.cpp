@@ -14,6 +14,7 @@
 #include "analysis/run_metrics.hpp"
 #include "analysis/run_summary.hpp"
 #include "config/plan.hpp"
+#include "control/silent_settings.hpp"
 #include "driver/factory.hpp"
 #include "experiment/run_session.hpp"
 #include "program/board_notes.hpp"
@@ -23,6 +24,7 @@
 #include "program/run_parts.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
+#include "rig/reason_text.hpp"
 #include "runtime/overrun_reporter.hpp"
 #include "telemetry/file_error.hpp"
 
@@ -30,9 +32,13 @@ namespace abs_hil::program {
 
 namespace {
 
-std::string reason_text(const experiment::RunOutcome& outcome) {
-  std::string text(rig::description(outcome.reason));
-  if (rig::is_fault(outcome.reason)) text += fmt::format(" (value {:.6g})", outcome.reason_value);
+std::string reason_text(const experiment::RunOutcome& outcome, const std::string& controller) {
+  std::string text = rig::reason_text(outcome.reason, outcome.reason_value);
+  if (outcome.reason == rig::Reason::controller_not_finite) {
+    text += fmt::format(" (controller {})", controller);
+  } else if (rig::is_fault(outcome.reason)) {
+    text += fmt::format(" (value {:.6g})", outcome.reason_value);
+  }
   if (!outcome.io_error.ok()) {
     text += ": " + driver::error_text(outcome.io_error);
   }
@@ -44,7 +50,7 @@ analysis::RunSummary summarise(const RunRequest& request, const experiment::RunS
   const config::Settings& s = request.settings;
   const std::string result = outcome.completed() ? "completed" : (rig::is_fault(outcome.reason) ? "fault" : "stopped");
   return {.result = result,
-          .reason = reason_text(outcome),
+          .reason = reason_text(outcome, s.control.controller),
           .controller = s.control.controller,
           .plant = s.plant_name,
           .backend = s.backend,
@@ -199,6 +205,7 @@ int run(const RunRequest& request) {
   if (s.experiment.wait_for_start) phase_names.insert(phase_names.begin(), "waiting for the start");
   for (const std::string& problem : config::beyond_limits(plan, s))
     spdlog::warn("{}; the gate limits it to that", problem);
+  for (const std::string& problem : control::silent_settings(s.control, s.plant.rig)) spdlog::warn("{}", problem);
   experiment::RunLogicParts logic = make_logic(s, std::move(plan.phases), plan.limits);
   require_resources(request, *driver);
   RunOutputs outputs(request, logic.signals);

@@ -13,9 +13,10 @@ namespace abs_hil::program {
 
 std::unique_ptr<driver::RigDriver> make_driver(const config::Settings& s, bool fast) {
   if (s.backend == "rig") return driver::make_rig_driver(s.driver, fast);
-  return std::make_unique<driver::SimDriver>(s.plant,
-                                             driver::SimStart{.seed = static_cast<std::uint64_t>(s.seed),
-                                                              .start_speed_rad_s = s.experiment.start_speed_rad_s});
+  return std::make_unique<driver::SimDriver>(
+      s.plant, driver::SimStart{.seed = static_cast<std::uint64_t>(s.seed),
+                                .start_speed_rad_s = s.experiment.start_speed_rad_s,
+                                .pwm_mode = driver::pwm_mode_named(s.driver.sim.pwm_mode)});
 }
 
 std::unique_ptr<driver::RigDriver> with_faults(std::unique_ptr<driver::RigDriver> driver, const config::Settings& s,
@@ -30,8 +31,10 @@ std::unique_ptr<driver::RigDriver> with_faults(std::unique_ptr<driver::RigDriver
 
 experiment::RunLogicParts make_logic(const config::Settings& s, std::vector<experiment::PhasePlan> plans,
                                      const experiment::SequenceLimits& limits) {
-  return experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate, s.experiment,
-                                      std::move(plans), limits);
+  experiment::RunLogicParts parts = experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate,
+                                                                 s.experiment, std::move(plans), limits);
+  parts.duty_steps = config::output_grid(s).duty_steps;
+  return parts;
 }
 
 }  // namespace abs_hil::program

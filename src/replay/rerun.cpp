@@ -35,11 +35,20 @@ class RecordedClock final : public runtime::Clock {
   std::int64_t now_ns_;
 };
 
-/// A rig that repeats the recorded motion and ignores commands.
+bool same_duties(const rig::Command& a, const rig::Command& b) noexcept {
+  return a.motor_duty == b.motor_duty && a.brake_duty == b.brake_duty && a.motor_enable == b.motor_enable;
+}
+
+/// A rig that repeats the recorded motion. Commands do not move it. What its board made of them is repeated, too: the
+/// rounding, and from the recording whether it took them at all.
 class RecordedRig final : public driver::RigDriver {
  public:
   RecordedRig(const RecordedRun& run, const config::Settings& s)
-      : run_(run), ideal_sensors_(s.plant.ideal_sensors), injected_(!s.inject.empty()) {}
+      : run_(run),
+        ideal_sensors_(s.plant.ideal_sensors),
+        injected_(!s.inject.empty()),
+        loses_commands_(s.backend == "rig"),
+        grid_(config::output_grid(s)) {}
   ~RecordedRig() override { static_cast<void>(deactivate()); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "recorded"; }
@@ -59,12 +68,33 @@ class RecordedRig final : public driver::RigDriver {
     ++next_;
     return {};
   }
-  driver::IoResult do_write(const rig::Command& /*command*/) noexcept override { return {}; }
+  driver::IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override {
+    sent = grid_.as_sent(command);
+    if (not_taken(next_ - 1)) {
+      const double torque_Nm = sent.brake_torque_Nm;
+      sent = command_at(next_ - 1);
+      sent.brake_torque_Nm = torque_Nm;
+    }
+    return {};
+  }
+  [[nodiscard]] rig::Command command_at(std::size_t n) const noexcept {
+    return telemetry::to_record(run_.cycles[n]).command;
+  }
+  /// True if the recording shows that the board may have kept its previous command in cycle `n`, or that the write
+  /// failed and left the safe state.
+  [[nodiscard]] bool not_taken(std::size_t n) const noexcept {
+    const rig::Command recorded = command_at(n);
+    if (loses_commands_ && n > 0 && same_duties(recorded, command_at(n - 1))) return true;
+    const bool failed = n + 1 < run_.cycles.size() && ended_from_outside(run_, n + 1, WheelFaults::found_again);
+    return failed && same_duties(recorded, rig::safe_command);
+  }
   driver::IoResult do_make_safe() noexcept override { return {}; }
 
   const RecordedRun& run_;
   bool ideal_sensors_;
   bool injected_;
+  bool loses_commands_;
+  driver::OutputGrid grid_;
   std::size_t next_{0};
   rig::PlantTruth truth_{};
 };
@@ -78,6 +108,9 @@ class TimedReading final : public driver::RigDriver {
 
   [[nodiscard]] std::string_view name() const noexcept override { return rig_.name(); }
   [[nodiscard]] rig::PlantTruth truth() const noexcept override { return rig_.truth(); }
+  [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
+    return rig_.as_sent(command);
+  }
 
  private:
   void do_configure() override { rig_.configure(); }
@@ -87,7 +120,9 @@ class TimedReading final : public driver::RigDriver {
     clock_.set(now_ns + run_.cycles[next_++].read_ns);
     return result;
   }
-  driver::IoResult do_write(const rig::Command& command) noexcept override { return rig_.write(command); }
+  driver::IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override {
+    return rig_.write(command, sent);
+  }
   driver::IoResult do_make_safe() noexcept override { return rig_.deactivate(); }
 
   driver::RigDriver& rig_;
@@ -112,7 +147,7 @@ class RecordedActuation final : public runtime::CycleLogic {
         std::bit_cast<std::uint64_t>(acted.brake_duty) == std::bit_cast<std::uint64_t>(command.brake_duty);
     const bool ended = recorded.phase == telemetry_t::PHASE_STOPPED || recorded.phase == telemetry_t::PHASE_FAULT;
     acted.brake_torque_Nm = same ? command.brake_torque_Nm : (ended ? 0.0 : recorded.brake_torque_ref_Nm);
-    logic_.commanded(acted);
+    logic_.commanded(acted, command);
   }
   void end_early(rig::Reason reason, double value) noexcept override { logic_.end_early(reason, value); }
   [[nodiscard]] bool finished() const noexcept override { return logic_.finished(); }
@@ -146,8 +181,10 @@ config::Plan plan_of(const RecordedRun& run, const config::Settings& s) {
 
 experiment::RunLogicParts logic_parts(const RecordedRun& run, const config::Settings& s) {
   config::Plan plan = plan_of(run, s);
-  return experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate, s.experiment,
-                                      std::move(plan.phases), plan.limits);
+  experiment::RunLogicParts parts = experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate,
+                                                                 s.experiment, std::move(plan.phases), plan.limits);
+  parts.duty_steps = config::output_grid(s).duty_steps;
+  return parts;
 }
 
 constexpr std::string_view start_name = "start";
@@ -224,16 +261,16 @@ std::vector<RerunCycle> rerun_open_loop(const RecordedRun& run, const config::Se
   RecordedActuation actuation(logic, run);
   RecordedRig rig(run, settings);
   // Commands of another controller never acted, so the gate must not judge the wheels by them.
-  runtime::CommandGate gate = faults == WheelFaults::found_again
-                                  ? logic.make_gate(settings.gate)
-                                  : runtime::CommandGate(settings.gate, logic.permissions());
+  runtime::CommandGate gate = faults == WheelFaults::found_again ? logic.make_gate(settings.gate)
+                                                                 : logic.make_gate_without_wheels(settings.gate);
   return rerun(run, settings, rig, actuation, logic.adjustments(), gate, faults);
 }
 
 std::vector<RerunCycle> rerun_simulation(const RecordedRun& run, const config::Settings& settings) {
   experiment::RunLogic logic(logic_parts(run, settings));
   driver::SimDriver rig(settings.plant, {.seed = static_cast<std::uint64_t>(settings.seed),
-                                         .start_speed_rad_s = settings.experiment.start_speed_rad_s});
+                                         .start_speed_rad_s = settings.experiment.start_speed_rad_s,
+                                         .pwm_mode = driver::pwm_mode_named(settings.driver.sim.pwm_mode)});
   runtime::CommandGate gate = logic.make_gate(settings.gate);
   return rerun(run, settings, rig, logic, logic.adjustments(), gate, WheelFaults::found_again);
 }

@@ -16,6 +16,9 @@ using rig::Reason;
 /// Tolerance for rounding: a step exactly at the limit must pass.
 constexpr double rounding = 1e-9;
 
+/// A driver may round a duty down by so much: half a step of 8 bits, the coarsest PWM.
+constexpr double rounded_down_most = 0.5 / 255.0;
+
 bool brakes(const rig::Command& command) noexcept { return command.brake_duty > 0.0 || command.brake_torque_Nm > 0.0; }
 
 void stop_motor(rig::Command& command) noexcept {
@@ -168,9 +171,9 @@ void CommandGate::interlock(rig::Command& command, const PhasePermission& may) n
     // The first command is not rate-limited: the outputs have been 0 for longer than any rise takes.
     if (has_sent_) {
       const double elapsed_s = static_cast<double>(input.now_ns - sent_ns_) * rig::s_per_ns;
-      command.brake_duty = rising(command.brake_duty, sent_.brake_duty, options_.brake_rate_per_s, elapsed_s,
-                                  GateAction::brake_rate_limited);
-      command.motor_duty = rising(command.motor_duty, sent_.motor_duty, options_.motor_rate_per_s, elapsed_s,
+      command.brake_duty = rising(command.brake_duty, std::max(brake_risen_, brake_free_duty_),
+                                  options_.brake_rate_per_s, elapsed_s, GateAction::brake_rate_limited);
+      command.motor_duty = rising(command.motor_duty, motor_risen_, options_.motor_rate_per_s, elapsed_s,
                                   GateAction::motor_rate_limited);
     }
     interlock(command, permissions_[static_cast<std::size_t>(input.phase)]);
@@ -178,10 +181,20 @@ void CommandGate::interlock(rig::Command& command, const PhasePermission& may) n
   }
   if (faulty) note(GateAction::refused);
   sent_ = result.command;
+  brake_risen_ = result.command.brake_duty;
+  motor_risen_ = result.command.motor_duty;
   sent_ns_ = input.now_ns;
   has_sent_ = true;
   result.action = last_action_;
   return result;
+}
+
+/// A rise goes on from the unrounded duty: steps of the PWM must not swallow a slow one. If the driver sent much less,
+/// the rise goes on from that.
+void CommandGate::note_sent(const rig::Command& sent) noexcept {
+  brake_risen_ = std::min(brake_risen_, sent.brake_duty + rounded_down_most);
+  motor_risen_ = std::min(motor_risen_, sent.motor_duty + rounded_down_most);
+  sent_ = sent;
 }
 
 }  // namespace abs_hil::runtime

@@ -44,11 +44,13 @@ class CommandGate {
  public:
   /// @param permissions which actuators each phase allows
   /// @param limits      bounds for the plausibility checks; not `enabled`: the wheels are not checked
+  /// @param brake_free_duty  brake duty that gives no torque, u0 of (7): a rise of torque begins there
   explicit CommandGate(const GateOptions& options, const PhasePermissions& permissions = any_phase(),
-                       const PlausibilityLimits& limits = {}) noexcept
+                       const PlausibilityLimits& limits = {}, double brake_free_duty = 0.0) noexcept
       : options_(options),
         judge_within_ns_(static_cast<std::int64_t>(options.judge_within_s * static_cast<double>(rig::ns_per_s))),
         permissions_(permissions),
+        brake_free_duty_(brake_free_duty),
         checks_wheels_(limits.enabled),
         speed_windows_(limits),
         encoders_(limits),
@@ -61,6 +63,9 @@ class CommandGate {
   bool check_measurement(const rig::Measurement& measurement, std::int64_t now_ns,
                          std::int64_t reading_ns = 0) noexcept;
   [[nodiscard]] GateResult check(const rig::Command& wanted, const GateInput& input) noexcept;
+  /// Tells what the driver made of the command of the last `check`. Until then the gate takes the command itself as
+  /// sent.
+  void note_sent(const rig::Command& sent) noexcept;
   /// Latches a fault found elsewhere (driver, executive). The first fault stays.
   void latch(rig::Reason fault, double value) noexcept;
 
@@ -93,11 +98,14 @@ class CommandGate {
   GateOptions options_;
   std::int64_t judge_within_ns_;
   PhasePermissions permissions_;
+  double brake_free_duty_;
   bool checks_wheels_;
   SpeedWindows speed_windows_;
   EncoderCheck encoders_;
   ResponseCheck response_;
   rig::Command sent_{};
+  double motor_risen_{0.0};  ///< duties from which the next rise counts
+  double brake_risen_{0.0};
   bool has_sent_{false};
   std::int64_t sent_ns_{0};
   std::int64_t watched_from_ns_{-1};  ///< < 0: the wheels have not been checked yet

@@ -19,8 +19,8 @@ class CycleLogic {
   /// One cycle: takes the measurement, fills `record.phase`, `.reason`, `.reason_value` and `.control`, and returns the
   /// command wanted. A pure function of the measurements so far.
   [[nodiscard]] virtual rig::Command step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept = 0;
-  /// Takes the command that the gate let pass and the rig now executes.
-  virtual void commanded(const rig::Command& command) noexcept = 0;
+  /// Takes the command that the rig now executes: as the driver sent it, after gate, limits and the PWM's steps.
+  virtual void commanded(const rig::Command& sent) noexcept = 0;
   /// Ends the run, because of a stop request or a fault found outside. Takes effect in the next `step`. The first
   /// reason stays. The brake may hold after a fault (`gate.fault_brake_duty`); a further fault that bars it ends this.
   virtual void end_early(rig::Reason reason, double value) noexcept = 0;

@@ -115,19 +115,19 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   const rig::Command wanted = logic_.step(measurement_, record);
   driver_.note_phase(record.phase);
   const GateResult gated = gate_.check(wanted, {record.control.speeds_est, record.phase, woken_ns});
-  record.command = gated.command;
   acting_ = rig::acts(gated.command);
   if (gated.fault != rig::Reason::none) logic_.end_early(gated.fault, gated.fault_value);
   const std::int64_t control_ns = clock_.now_ns();
 
-  const driver::IoResult written = driver_.write(gated.command);
+  const driver::IoResult written = driver_.write(gated.command, record.command);
   if (!written.ok()) {
     if (io_error_.ok()) io_error_ = written;
     const rig::Reason reason = driver::reason_of(written, rig::Reason::driver_write_failed);
     gate_.latch(reason, static_cast<double>(written.error));
     logic_.end_early(reason, static_cast<double>(written.error));
   }
-  logic_.commanded(gated.command);
+  gate_.note_sent(record.command);
+  logic_.commanded(record.command);
   const std::int64_t written_ns = clock_.now_ns();
 
   record.timing.control_ns = control_ns - read_ns;

@@ -26,7 +26,8 @@ struct GateOptions {
   /// Falling is never limited.
   ABS_HIL_OPTION(double, motor_rate_per_s, 2000.0, .unit = "1/s", .meaning = "fastest rise of the drive PWM",
                  .range = rig::positive(1e6));
-  ABS_HIL_OPTION(double, brake_rate_per_s, 2000.0, .unit = "1/s", .meaning = "fastest rise of the brake PWM",
+  ABS_HIL_OPTION(double, brake_rate_per_s, 2000.0, .unit = "1/s",
+                 .meaning = "fastest rise of the brake PWM, from u0 if it is lower: of the brake torque by b1",
                  .range = rig::positive(1e6));
   ABS_HIL_OPTION(double, sample_age_max_s, 0.02, .unit = "s",
                  .meaning = "so long without a fresh measurement is a fault", .range = rig::between(0.002, 1));

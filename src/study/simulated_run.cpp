@@ -23,11 +23,15 @@ constexpr std::size_t ring_capacity = 2;
 
 RunResult simulate(const config::Settings& settings, const plant_sim::PlantOptions& plant, std::uint64_t seed) {
   runtime::VirtualClock clock;
-  driver::SimDriver driver(plant, {.seed = seed, .start_speed_rad_s = settings.experiment.start_speed_rad_s});
+  driver::SimDriver driver(plant, {.seed = seed,
+                                   .start_speed_rad_s = settings.experiment.start_speed_rad_s,
+                                   .pwm_mode = driver::pwm_mode_named(settings.driver.sim.pwm_mode)});
   config::Plan plan = config::plan(settings);
-  experiment::RunLogic logic(experiment::make_logic_parts(settings.control, settings.plant.rig,
-                                                          settings.plant.ideal_actuator, settings.gate,
-                                                          settings.experiment, std::move(plan.phases), plan.limits));
+  experiment::RunLogicParts parts =
+      experiment::make_logic_parts(settings.control, settings.plant.rig, settings.plant.ideal_actuator, settings.gate,
+                                   settings.experiment, std::move(plan.phases), plan.limits);
+  parts.duty_steps = driver::simulated_output_grid(settings.driver, plant.ideal_actuator).duty_steps;
+  experiment::RunLogic logic(std::move(parts));
   runtime::CommandGate gate = logic.make_gate(settings.gate);
   runtime::RecordRing ring(ring_capacity);
   runtime::CyclicExecutive executive(clock, driver, logic, gate, ring, std::llround(1e9 / settings.control.rate_Hz));

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <utility>
 
+#include "rig/reason_text.hpp"
 #include "telemetry/file_error.hpp"
 
 namespace abs_hil::telemetry {
@@ -38,7 +39,7 @@ void EventCsv::consume(const rig::CycleRecord& record, double /*distance_m*/) {
   append_number(text_, record.time_s);
   text_.append(",").append(event->kind).append(",").append(rig::name_of(record.phase));
   // Quoted, because the text of a reason may contain a comma.
-  text_.append(",\"").append(rig::description(record.reason)).append("\",");
+  text_.append(",\"").append(rig::reason_text(record.reason, record.reason_value)).append("\",");
   append_number(text_, record.reason_value);
   text_ += '\n';
 }

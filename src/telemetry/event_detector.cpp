@@ -1,5 +1,7 @@
 #include "telemetry/event_detector.hpp"
 
+#include "rig/reason_text.hpp"
+
 namespace abs_hil::telemetry {
 
 std::optional<DetectedEvent> EventDetector::observe(const rig::CycleRecord& record) {
@@ -22,7 +24,9 @@ std::optional<DetectedEvent> EventDetector::observe(const rig::CycleRecord& reco
   }
   if (phase_changed && !first) event.message.append(rig::name_of(phase_before)).append(" -> ");
   event.message.append(rig::name_of(record.phase));
-  if (record.reason != rig::Reason::none) event.message.append(": ").append(rig::description(record.reason));
+  if (record.reason != rig::Reason::none) {
+    event.message.append(": ").append(rig::reason_text(record.reason, record.reason_value));
+  }
   // The change and its reason may be in a lost record.
   if (records_lost > 0) event.message.append(" (").append(std::to_string(records_lost)).append(" records lost before)");
   return event;

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "abs_hil/rig/time_units.hpp"
+#include "rig/reason_text.hpp"
 #include "telemetry/csv_sink.hpp"
 #include "telemetry/file_error.hpp"
 #include "telemetry/log_outlet.hpp"
@@ -89,7 +90,7 @@ std::vector<std::filesystem::path> write_flight_record(const std::filesystem::pa
   attempt(".txt", [&](const auto& path) {
     write_text(path,
                "reason " + std::to_string(static_cast<int>(record.reason)) + ": " +
-                   std::string(rig::description(record.reason)) + '\n' + record.account +
+                   rig::reason_text(record.reason, record.reason_value) + '\n' + record.account +
                    std::to_string(record.records.size()) + " cycles recorded\n",
                "flight record");
   });

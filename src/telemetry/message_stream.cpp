@@ -9,6 +9,7 @@
 
 #include "abs_hil/adjustment_t.hpp"
 #include "abs_hil/checks_t.hpp"
+#include "rig/reason_text.hpp"
 #include "telemetry/file_error.hpp"
 
 namespace abs_hil::telemetry {
@@ -176,7 +177,7 @@ void MessageStream::send_event(std::string_view kind, rig::Reason reason, double
   event.kind = kind;
   event.phase = static_cast<std::int8_t>(latest_.phase);
   event.reason = static_cast<std::int16_t>(reason);
-  event.reason_text = rig::description(reason);
+  event.reason_text = rig::reason_text(reason, value);
   event.value = value;
   event.message = std::move(message);
   send(event_, event);

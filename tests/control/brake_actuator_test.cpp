@@ -100,3 +100,72 @@ TEST_CASE("With an ideal actuator the torque asked for acts at once, without lim
   CHECK(actuator.torque_Nm() == 4.0);
   CHECK(actuator.mean_torque_Nm() == 12.5);  // still that of the past interval
 }
+
+TEST_CASE("Only what limits and refusals held back counts as unsent, not the PWM's steps and the dead zone") {
+  for (const std::uint32_t steps : {0U, 255U, 4095U}) {
+    const control::BrakeActuator actuator{brake, false, 0.7, steps};
+    CAPTURE(steps);
+    const double most = actuator.max_torque_Nm();
+    for (double torque = 0.0; torque <= most; torque += 0.003) {
+      REQUIRE(actuator.unsent_Nm(torque, actuator.limited(torque)) == 0.0);
+    }
+    CHECK_THAT(actuator.unsent_Nm(most + 0.5, most), WithinAbs(0.5, 1e-12));
+    CHECK_THAT(actuator.unsent_Nm(-0.5, 0.0), WithinAbs(-0.5, 1e-12));
+    CHECK_THAT(actuator.unsent_Nm(3.0, 1.0), WithinAbs(2.0, 1e-12));   // rate-limited
+    CHECK_THAT(actuator.unsent_Nm(3.0, 0.0), WithinAbs(3.0, 1e-12));   // refused
+    CHECK_THAT(actuator.unsent_Nm(1.0, 3.0), WithinAbs(-2.0, 1e-12));  // an older command still acts
+  }
+}
+
+TEST_CASE("A torque that is not finite has no duty and no static torque") {
+  for (const bool ideal : {false, true}) {
+    const control::BrakeActuator actuator{brake, ideal, 1.0, 4095};
+    for (const double torque : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+      CHECK(std::isnan(actuator.limited(torque)));
+      CHECK(std::isnan(actuator.duty_for(torque)));
+    }
+  }
+}
+
+TEST_CASE("A lag too long to move within a step leaves the torque where it is") {
+  control::BrakeActuator actuator{{.c31_per_s = 5e-324}, false, 1.0};
+  actuator.command(1.0, 0.0);
+  actuator.advance(1e-3);
+  CHECK(actuator.torque_Nm() == 0.0);
+  CHECK(actuator.mean_torque_Nm() == 0.0);
+}
+
+TEST_CASE("In the gap that the dead zone leaves, the torque is right in the mean and switches no faster than the PWM") {
+  const rig::BrakeParameters wide{.u0 = 0.6};
+  for (const double dt_s : {1e-4, 1e-3, 5e-3, 1e-2}) {
+    for (const double torque : {0.1, 0.7, 1.4, 2.0, 2.8}) {
+      CAPTURE(dt_s, torque);
+      control::BrakeActuator actuator{wide, false, 1.0, 4095};
+      const double least = wide.b1_Nm * 2457.0 / 4095.0 + wide.b2_Nm;  // 2457/4095 = 0.6
+      double sum = 0.0, before = -1.0, since_s = 1.0;
+      const int cycles = static_cast<int>(4.0 / dt_s);
+      for (int n = 0; n < cycles; ++n) {
+        const double sent = actuator.next_torque_Nm(torque, dt_s);
+        REQUIRE((sent == 0.0 || std::abs(sent - least) < 1e-12));
+        CHECK(actuator.unsent_Nm(torque, sent) == 0.0);
+        if (n > 0 && sent != before) {
+          CHECK(since_s >= std::max(dt_s, 1.0 / 160.0) - 1e-9);
+          since_s = 0.0;
+        }
+        since_s += dt_s;
+        before = sent;
+        sum += sent;
+      }
+      CHECK_THAT(sum / cycles, WithinAbs(torque, 0.02));
+    }
+  }
+}
+
+TEST_CASE("Outside the gap nothing is carried from cycle to cycle") {
+  control::BrakeActuator actuator{brake, false, 0.7, 255};
+  for (double torque = -1.0; torque < 6.0; torque += 0.01) {
+    const double least = map_Nm(106.0 / 255.0);
+    if (torque > 0.0 && torque < least) continue;
+    CHECK(actuator.next_torque_Nm(torque, 1e-3) == actuator.limited(torque));
+  }
+}

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -105,6 +106,12 @@ inline std::int32_t counts_at(double angle, std::int32_t per_rev) {
   return static_cast<std::int32_t>(std::floor(angle / (2 * std::numbers::pi) * per_rev));
 }
 
+/// Tells the controller's next step what was sent of `torque_Nm`: that within [0, max_brake_torque_Nm].
+inline void note_sent(control::SlipInput& next, double torque_Nm) {
+  next.sent_brake_torque_Nm = std::clamp(torque_Nm, 0.0, next.max_brake_torque_Nm);
+  next.unsent_torque_Nm = torque_Nm - next.sent_brake_torque_Nm;
+}
+
 /// Brakes with `controller` from the start speeds until v_x < v_min, as the runtime does cycle by cycle.
 inline Result brake(const Setup& s, control::SlipController& controller) {
   const double h = 1.0 / s.options.rate_Hz;
@@ -133,6 +140,7 @@ inline Result brake(const Setup& s, control::SlipController& controller) {
   double v_before = 0.0;
   rig::WheelSpeeds speeds_before{s.omega1_start, s.omega2_start};
   double angle1_before = x.angle1, angle2_before = x.angle2;
+  double unsent_Nm = 0.0;
   const auto travel = [&](double now, double before) {
     if (!s.encoders) return now - before;
     return (counts_at(now, per_rev) - counts_at(before, per_rev)) * 2 * std::numbers::pi / per_rev;
@@ -162,7 +170,9 @@ inline Result brake(const Setup& s, control::SlipController& controller) {
         .alpha1_rad_s2 = s.encoders ? upper.alpha_rad_s2() : (speeds.omega1_rad_s - speeds_before.omega1_rad_s) / h,
         .alpha2_rad_s2 = s.encoders ? lower.alpha_rad_s2() : (speeds.omega2_rad_s - speeds_before.omega2_rad_s) / h,
         .upper_travel_rad = travel(x.angle1, angle1_before),
-        .lower_travel_rad = travel(x.angle2, angle2_before)};
+        .lower_travel_rad = travel(x.angle2, angle2_before),
+        .sent_brake_torque_Nm = actuator.sent_torque_Nm(),
+        .unsent_torque_Nm = unsent_Nm};
     angle1_before = x.angle1;
     angle2_before = x.angle2;
     speeds_before = speeds;
@@ -171,6 +181,7 @@ inline Result brake(const Setup& s, control::SlipController& controller) {
     const double wanted = actuator.limited(output.brake_torque_Nm);
     const double duty = actuator.duty_for(wanted);
     actuator.command(duty, wanted);
+    unsent_Nm = actuator.unsent_Nm(output.brake_torque_Nm, actuator.sent_torque_Nm());
     result.ticks.push_back({t, x.omega1, x.omega2, slip, x.torque, x.way, input, output, wanted});
     if (t > 0.3 && v_x > 3.0) {
       square_sum += std::pow(slip - s.options.slip_ref, 2);

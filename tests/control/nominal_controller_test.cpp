@@ -162,7 +162,7 @@ TEST_CASE("While the torque is limited the integral does not wind up") {
   const rig::RigParameters rig;
   const control::ControlOptions options;
   control::NominalController controller{{options, rig}};
-  const control::SlipInput stuck{
+  control::SlipInput stuck{
       .dt_s = 1e-3, .speeds = {160.0, 162.0}, .slip = 0.005, .slip_ref = 0.15, .max_brake_torque_Nm = 1.0};
   controller.reset(stuck);
   control::SlipInput first = stuck;
@@ -170,11 +170,16 @@ TEST_CASE("While the torque is limited the integral does not wind up") {
   const double at_start = controller.step(first).brake_torque_Nm;
   REQUIRE(at_start > 1.0);
   double last = 0.0;
-  for (int n = 0; n < 1000; ++n) last = controller.step(stuck).brake_torque_Nm;
+  for (int n = 0; n < 1000; ++n) {
+    bench::note_sent(stuck, at_start);
+    last = controller.step(stuck).brake_torque_Nm;
+  }
   CHECK(last == at_start);
 
   control::SlipInput unlimited = stuck;
   unlimited.max_brake_torque_Nm = 100.0;
-  (void)controller.step(unlimited);  // from here on the request is within range, and e_v counts
+  bench::note_sent(
+      unlimited,
+      controller.step(unlimited).brake_torque_Nm);  // from here on the request is within range, and e_v counts
   CHECK(controller.step(unlimited).brake_torque_Nm > at_start);
 }

@@ -120,8 +120,10 @@ TEST_CASE("theta_hat is held while the torque is outside the actuator's range an
     controller->reset(in);
     double theta = 0.0;
     for (int n = 0; n < 50; ++n) {
-      theta = controller->step(in).theta_est_N;
+      const control::SlipOutput output = controller->step(in);
+      theta = output.theta_est_N;
       in.dt_s = 1e-3;
+      bench::note_sent(in, output.brake_torque_Nm);
     }
     return theta;
   };

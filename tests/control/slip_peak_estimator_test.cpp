@@ -1,9 +1,11 @@
 #include "control/slip_peak_estimator.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <random>
 #include <stdexcept>
+#include <vector>
 
 #include "catch.hpp"
 
@@ -92,6 +94,37 @@ TEST_CASE("What it learns hardly depends on the rate") {
     feed(peak, magic(23.0, 28.0, 1.68), 0.0, 1.0, rate_Hz);
     if (first == 0.0) first = peak.peak_slip();
     CHECK_THAT(peak.peak_slip(), WithinRel(first, 0.02));
+  }
+}
+
+TEST_CASE("A jump takes the curve back by 30 ms at every rate") {
+  // The zero of the slip is where the curve is 0, and the width is the peak's distance from it.
+  const auto width = [](const control::SlipPeakEstimator& peak) {
+    double low = -0.05, high = 0.05;
+    for (int i = 0; i < 60; ++i) (peak.force_N(0.5 * (low + high)) < 0.0 ? low : high) = 0.5 * (low + high);
+    return peak.peak_slip() - low;
+  };
+  for (double rate_Hz = 100.0; rate_Hz <= 10'000.0; rate_Hz += rate_Hz < 3000.0 ? 61.0 : 503.0) {
+    CAPTURE(rate_Hz);
+    auto peak = make(rate_Hz);
+    std::vector<double> widths;
+    const Curve before = magic(23.0, 28.0, 1.68), after = magic(10.0, 28.0, 1.68);
+    int n = 0;
+    for (; peak.jumps() == 0 && n < 2.0 * rate_Hz; ++n) {
+      const double t = n / rate_Hz, slip = slip_at(t, 0.06, 0.012);
+      widths.push_back(width(peak));
+      peak.update(1 / rate_Hz, slip, (t < 0.8 ? before : after)(slip));
+    }
+    REQUIRE(peak.jumps() == 1);
+    // It learns on for up to 15 ms after the friction has jumped. The samples lie 1 ms, or a cycle, apart.
+    const double sample_s = std::max(1.0, std::round(1e-3 * rate_Hz)) / rate_Hz;
+    bool found = false;
+    for (std::size_t i = 0; i < widths.size(); ++i) {
+      const double back_s = (static_cast<double>(widths.size()) - static_cast<double>(i)) / rate_Hz;
+      if (std::abs(back_s - 0.03) > 1.01 * sample_s + 1.01 / rate_Hz) continue;
+      found = found || std::abs(widths[i] - width(peak)) < 1e-9;
+    }
+    CHECK(found);
   }
 }
 

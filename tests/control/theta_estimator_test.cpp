@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "abs_hil/control/paper_laws.hpp"
 #include "catch.hpp"
@@ -183,4 +184,29 @@ TEST_CASE("A zero interval and a tiny slip cause no invalid numbers") {
   CHECK_THAT(estimator.theta_N(), WithinAbs(10.0, 1e-9));
   estimator.update(balanced(1e-3, 23.0, std::numeric_limits<double>::denorm_min()));
   CHECK(std::isfinite(estimator.theta_N()));
+}
+
+TEST_CASE("A standing wheel leaves the estimate, whatever the brake holds") {
+  const control::AdaptiveOptions options;
+  control::ThetaEstimator estimator{options, rig::WheelParameters{}};
+  for (int n = 0; n < 200; ++n) estimator.update(balanced(1e-3, 23.0, 0.8));
+  const double before_N = estimator.theta_N();
+  for (const auto& [from, to] : {std::pair{0.0, 0.0}, std::pair{5.0, 0.0}, std::pair{0.0, 5.0}}) {
+    estimator.update({.dt_s = 1e-3,
+                      .omega1_before_rad_s = from,
+                      .omega1_after_rad_s = to,
+                      .brake_torque_Nm = 9.0,
+                      .phi = 0.9,
+                      .zeta_rate_N_s = 50.0});
+    CHECK(estimator.theta_N() == before_N);
+    CHECK(estimator.zeta_N() == 0.0);
+  }
+}
+
+TEST_CASE("An innovation gain that vanishes leaves zeta alone, and no NaN") {
+  control::AdaptiveOptions options;
+  options.gamma = options.ka1 = 1e-200;
+  control::ThetaEstimator estimator{options, rig::WheelParameters{}};
+  estimator.update(control::ForceInterval{.dt_s = 1e-3, .tyre_force_N = 20.0, .phi = 0.9, .zeta_rate_N_s = 50.0});
+  CHECK_THAT(estimator.theta_N(), WithinAbs(0.05, 1e-12));
 }

@@ -25,7 +25,7 @@ class Board final : public driver::RigDriver {
   }
   void do_activate(std::int64_t) override { throw std::logic_error("the doctor must not activate"); }
   driver::IoResult do_read(std::int64_t, rig::Measurement&) noexcept override { return {}; }
-  driver::IoResult do_write(const rig::Command&) noexcept override { return {}; }
+  driver::IoResult do_write(const rig::Command&, rig::Command&) noexcept override { return {}; }
   driver::IoResult do_make_safe() noexcept override { return {}; }
   bool there_;
 };

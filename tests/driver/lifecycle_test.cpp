@@ -5,6 +5,7 @@
 
 #include "abs_hil/driver/rig_driver.hpp"
 #include "catch.hpp"
+#include "driver/factory.hpp"
 
 using namespace abs_hil::driver;
 using abs_hil::rig::Command;
@@ -38,7 +39,8 @@ class ScriptedDriver final : public RigDriver {
     measurement.time_ns = now_ns;
     return {read_error};
   }
-  IoResult do_write(const Command& /*command*/) noexcept override {
+  IoResult do_write(const Command& command, Command& sent) noexcept override {
+    sent = as_sent(command);
     calls.emplace_back("write");
     return {write_error, 0x40U, 5};
   }
@@ -173,4 +175,26 @@ TEST_CASE("Every I/O error has its own text") {
     for (const std::string_view other : seen) CHECK(words != other);
     seen.push_back(words);
   }
+}
+
+TEST_CASE("The grid of the options is the grid of the driver that they make") {
+  for (const BackendEntry& board : boards()) {
+    for (const char* mode : {"8-bit", "12-bit"}) {
+      DriverOptions options{.kind = std::string(board.name)};
+      options.pci.pwm_mode = options.usb.pwm_mode = mode;
+      options.pci.brake_duty_max = options.usb.brake_duty_max = options.can.brake_duty_max = 0.61;
+      const auto driver = make_rig_driver(options);
+      const OutputGrid grid = output_grid(options);
+      CAPTURE(board.name, mode, grid.duty_steps);
+      for (double duty = 0.0; duty <= 1.0; duty += 0.01) {
+        const Command command{.motor_duty = duty, .brake_duty = duty, .motor_enable = true};
+        CHECK(driver->as_sent(command).motor_duty == grid.as_sent(command).motor_duty);
+        CHECK(driver->as_sent(command).brake_duty == grid.as_sent(command).brake_duty);
+        CHECK(driver->as_sent(command).brake_duty <= 0.61);
+      }
+      if (board.name == "can") continue;
+      CHECK(grid.duty_steps == (std::string(mode) == "8-bit" ? 255U : 4095U));
+    }
+  }
+  CHECK_THROWS_AS(output_grid({.kind = "other"}), Unavailable);
 }

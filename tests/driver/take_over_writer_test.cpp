@@ -29,7 +29,7 @@ class OneOwnerDriver final : public RigDriver {
   }
   void do_activate(std::int64_t) override { board_.story.emplace_back("take over"); }
   IoResult do_read(std::int64_t, rig::Measurement&) noexcept override { return {}; }
-  IoResult do_write(const rig::Command&) noexcept override { return {}; }
+  IoResult do_write(const rig::Command&, rig::Command&) noexcept override { return {}; }
   IoResult do_make_safe() noexcept override {
     board_.story.emplace_back("safe");
     return board_.safe_result;

@@ -105,7 +105,10 @@ class OtherBoard final : public driver::RigDriver {
     measurement.time_ns = now_ns;
     return result;
   }
-  driver::IoResult do_write(const rig::Command& command) noexcept override { return on_write(command); }
+  driver::IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override {
+    sent = as_sent(command);
+    return on_write(command);
+  }
   driver::IoResult do_make_safe() noexcept override { return made_safe; }
 
   std::string_view kind_;

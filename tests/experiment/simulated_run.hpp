@@ -31,6 +31,7 @@ struct Setup {
   ExperimentOptions experiment{};
   runtime::GateOptions gate{};
   std::uint64_t seed{1};
+  driver::PwmMode pwm_mode{driver::PwmMode::bits_12};
 };
 
 /// Its result.
@@ -57,18 +58,25 @@ inline std::vector<PhasePlan> phases_of(const Setup& setup) {
 }
 
 inline RunLogicParts logic_parts(const Setup& setup) {
-  return make_logic_parts(setup.control, setup.plant.rig, setup.plant.ideal_actuator, setup.gate, setup.experiment,
-                          phases_of(setup));
+  RunLogicParts parts = make_logic_parts(setup.control, setup.plant.rig, setup.plant.ideal_actuator, setup.gate,
+                                         setup.experiment, phases_of(setup));
+  parts.duty_steps = driver::full_width(setup.pwm_mode);
+  return parts;
 }
 
-/// Runs the setup in virtual time with the program's own code.
+/// Runs the setup in virtual time with the program's own code, and with another controller if one is given.
 inline Result run(
-    const Setup& setup, const RunSession::Poll& poll = [] { return rig::Reason::none; }) {
+    const Setup& setup, const RunSession::Poll& poll = [] { return rig::Reason::none; },
+    std::unique_ptr<control::SlipController> controller = nullptr) {
   runtime::VirtualClock clock;
-  driver::SimDriver driver(setup.plant, {.seed = setup.seed, .start_speed_rad_s = setup.experiment.start_speed_rad_s});
+  driver::SimDriver driver(
+      setup.plant,
+      {.seed = setup.seed, .start_speed_rad_s = setup.experiment.start_speed_rad_s, .pwm_mode = setup.pwm_mode});
   Recorder recorder;
   analysis::RunMetrics metrics(setup.plant.rig.wheels.r2_m, setup.experiment.end_speed_m_s);
-  RunSession session(clock, driver, logic_parts(setup), setup.gate, {&recorder, &metrics});
+  RunLogicParts parts = logic_parts(setup);
+  if (controller) parts.controller = std::move(controller);
+  RunSession session(clock, driver, std::move(parts), setup.gate, {&recorder, &metrics});
   const RunOutcome outcome = session.run_fast(poll);
   return {outcome, metrics.metrics(), std::move(recorder.records), std::move(recorder.distances_m)};
 }

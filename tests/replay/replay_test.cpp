@@ -63,13 +63,14 @@ void record_run(const std::filesystem::path& path, const Recipe& recipe) {
   driver::InjectingDriver driver(
       std::make_unique<driver::SimDriver>(s.plant,
                                           driver::SimStart{.seed = static_cast<std::uint64_t>(s.seed),
-                                                           .start_speed_rad_s = s.experiment.start_speed_rad_s}),
+                                                           .start_speed_rad_s = s.experiment.start_speed_rad_s,
+                                                           .pwm_mode = driver::pwm_mode_named(s.driver.sim.pwm_mode)}),
       driver::parse_injections(s.inject), static_cast<std::uint64_t>(s.seed),
       [&clock](std::int64_t duration_ns) { clock.sleep_until(clock.now_ns() + duration_ns); });
-  experiment::RunSession session(clock, driver,
-                                 experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate,
-                                                              s.experiment, config::plan(s).phases),
-                                 s.gate, {&late});
+  experiment::RunLogicParts parts = experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate,
+                                                                 s.experiment, config::plan(s).phases);
+  parts.duty_steps = config::output_grid(s).duty_steps;
+  experiment::RunSession session(clock, driver, std::move(parts), s.gate, {&late});
   session.run_fast([&recipe] { return recipe.stop; });
 }
 
@@ -97,6 +98,7 @@ TEST_CASE("runs with ideal sensors, ideal actuator, faults and stop requests are
   const std::vector<Recipe> recipes{
       {{"plant.ideal_sensors=true", "plant.ideal_actuator=true"}},
       {{"plant.ideal_actuator=true"}},
+      {{"driver.sim.pwm_mode=8-bit", "plant.u0=0.55", "gate.brake_rate_per_s=1"}},
       {{"experiment.brake_limit_s=0.5"}},                                   // phase_time_limit
       {{"gate.overspeed_rad_s=99"}},                                        // overspeed, found by the gate
       {{"experiment.brake_limit_s=30"}, 1, rig::Reason::interrupt_signal},  // from outside, after 1000 cycles

@@ -109,6 +109,19 @@ TEST_CASE("a failed write latches a fault, makes the board safe and ends the run
   CHECK(bench.logic.ended_by == rig::Reason::driver_write_failed);
 }
 
+TEST_CASE("record and logic get the command as the driver sent it, the safe one if it could not") {
+  Bench bench;
+  bench.driver.sends = rig::Command{.brake_duty = 0.4980392156862745};  // 127 of 255
+  REQUIRE(bench.cycle());
+  CHECK(bench.driver.written.back().brake_duty == 0.5);
+  CHECK(bench.record().command.brake_duty == 0.4980392156862745);
+  CHECK(bench.logic.last.brake_duty == 0.4980392156862745);
+  bench.driver.write_result = {driver::IoError::no_answer, 0x54};
+  REQUIRE(bench.cycle());
+  CHECK(bench.record().command.brake_duty == 0.0);
+  CHECK(bench.logic.last.brake_duty == 0.0);
+}
+
 TEST_CASE("a full ring drops records, counts them and delays nothing") {
   Bench bench({.startup_cycles = 0, .max_consecutive = 0}, 4);
   for (int i = 0; i < 10; ++i) REQUIRE(bench.cycle());

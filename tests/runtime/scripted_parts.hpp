@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "abs_hil/driver/rig_driver.hpp"
@@ -56,6 +57,7 @@ class ScriptedDriver final : public driver::RigDriver {
   driver::IoResult read_result{};
   driver::IoResult write_result{};
   std::uint32_t trip_flags{0};
+  std::optional<rig::Command> sends;  ///< what it makes of every command; empty: the command
   std::vector<rig::Command> written;
   int made_safe{0};
 
@@ -68,7 +70,9 @@ class ScriptedDriver final : public driver::RigDriver {
     measurement.trip_flags = trip_flags;
     return read_result;
   }
-  driver::IoResult do_write(const rig::Command& command) noexcept override {
+  driver::IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override {
+    sent = as_sent(command);
+    if (sends) sent = *sends;
     clock_.pass(script.write_ns);
     written.push_back(command);
     return write_result;

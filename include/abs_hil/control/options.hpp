@@ -14,19 +14,22 @@ namespace abs_hil::control {
 struct AdaptiveOptions {
   ABS_HIL_OPTIONS(AdaptiveOptions);
   ABS_HIL_OPTION(double, gamma, 21.0, .unit = "kg^2/s^2", .meaning = "adaptation gain of (17)",
-                 .range = rig::positive(1e4), .search = rig::search(1, 1000));
+                 .range = rig::between(1e-6, 1e4), .search = rig::search(1, 1000));
   ABS_HIL_OPTION(double, ks0, 19.0, .unit = "1/s^2", .meaning = "integral gain of (16), (18)",
-                 .range = rig::positive(1e6), .search = rig::search(1, 500));
+                 .range = rig::between(1e-6, 1e6), .search = rig::search(1, 500));
   ABS_HIL_OPTION(double, ks1, 32.0, .unit = "1/s", .meaning = "proportional gain of (16), (18)",
-                 .range = rig::positive(1e4), .search = rig::search(4, 200));
+                 .range = rig::between(1e-6, 1e4), .search = rig::search(4, 200));
   ABS_HIL_OPTION(double, ka1, 1.0, .unit = "s/kg^2", .meaning = "innovation's weight in (18)",
-                 .range = rig::positive(1e3), .search = rig::search(0.05, 20));
+                 .range = rig::between(1e-6, 1e3), .search = rig::search(0.05, 20));
   /// The first estimate of theta.
   ABS_HIL_OPTION(double, zeta0, 0.0, .unit = "N", .meaning = "zeta(0) of (17)", .range = rig::between(-500, 500),
                  .search = rig::search_linearly(0, 40), .start_value = true);
+  // The lower ends keep gamma ka1 and the solution of the Lyapunov equation away from what a double cannot hold.
   /// Q is symmetric and positive definite.
   ABS_HIL_OPTION(double, q11, 1.0, .unit = "1/s^3", .meaning = "Q of PA + A'P = -2Q", .range = rig::positive(1e6));
-  ABS_HIL_OPTION(double, q12, 0.0, .unit = "1/s^2", .meaning = "Q of PA + A'P = -2Q", .range = rig::between(-1e6, 1e6));
+  /// The laws use B'P, which does not contain q12 (src/control/adaptive_gains.hpp). The key stays for old files.
+  ABS_HIL_OPTION(double, q12, 0.0, .unit = "1/s^2", .meaning = "Q of PA + A'P = -2Q; has no effect on any law",
+                 .range = rig::between(-1e6, 1e6));
   ABS_HIL_OPTION(double, q22, 1.0, .unit = "1/s", .meaning = "Q of PA + A'P = -2Q", .range = rig::positive(1e6));
   /// The estimate is projected onto [theta_min_N, theta_max_N].
   ABS_HIL_OPTION(double, theta_min_N, 0.0, .unit = "N", .meaning = "least theta the estimate may take",

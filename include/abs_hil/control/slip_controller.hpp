@@ -22,10 +22,19 @@ struct SlipInput {
   /// Angles turned over the past interval, from the encoders (from the speeds with ideal sensors), rad; NaN if unknown.
   double upper_travel_rad{rig::unknown};
   double lower_travel_rad{rig::unknown};
+  /// Static torque b(u) that was really sent in the previous cycle, N m: after the PWM's steps, the command gate and
+  /// the driver. 0 in the first cycle of a phase.
+  double sent_brake_torque_Nm{0.0};
+  /// What was missing in it of the controller's previous output, N m: > 0 if less was sent than it asked for (limits,
+  /// rate limit, refusal), < 0 if more was sent. 0 if only the PWM's steps and the dead zone part the two, and in the
+  /// first cycle of a phase. While it is not 0, an integral that drives the output further out must stand.
+  double unsent_torque_Nm{0.0};
 };
 
 /// Outputs of a slip controller. The torque is the static torque b(u) of (7); it acts after the lag (6). It may be
-/// outside the actuator's range: it is limited afterwards.
+/// outside the actuator's range: it is limited afterwards. It must be finite in every cycle. The other outputs may be
+/// NaN if they were NaN in the first cycle of the phase, which means that the controller does not give them; they are
+/// never infinite. An output that breaks this ends the run with the fault `controller_not_finite` before it acts.
 struct SlipOutput {
   double brake_torque_Nm{0.0};
   double slip_velocity_error_m_s{0.0};  ///< e_v of (13)

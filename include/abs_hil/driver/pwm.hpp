@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <string_view>
 
+#include "abs_hil/rig/duty_grid.hpp"
+
 namespace abs_hil::driver {
 
 // PWM outputs of the maker's RT-DAC4 and RT-DAC boards.
@@ -27,12 +29,7 @@ enum class PwmMode : std::uint32_t { bits_8 = 0, bits_12 = 1 };
 }
 /// Width register for a duty in [0, 1], rounded, but never above the cap in [0, 1].
 [[nodiscard]] constexpr std::uint32_t pwm_width_for(PwmMode mode, double duty, double duty_max) noexcept {
-  const double full = static_cast<double>(full_width(mode));
-  constexpr double rounding_slack = 1e-9;  // rounding may put a cap that equals a width just below it
-  const auto cap = static_cast<std::uint32_t>(duty_max * full + rounding_slack);
-  // lround is not constexpr. NOLINTNEXTLINE(bugprone-incorrect-roundings)
-  const auto width = static_cast<std::uint32_t>(duty * full + 0.5);
-  return width < cap ? width : cap;
+  return rig::width_for(full_width(mode), duty, duty_max);
 }
 
 }  // namespace abs_hil::driver

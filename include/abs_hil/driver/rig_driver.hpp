@@ -49,7 +49,19 @@ class RigDriver {
   /// Latches and reads the board's inputs at `now_ns`, which must not decrease from call to call.
   IoResult read(std::int64_t now_ns, rig::Measurement& measurement) noexcept;
   /// Sends a command. While not active it sends nothing and returns `not_active`.
-  IoResult write(const rig::Command& command) noexcept;
+  /// @param sent  becomes the command as it went out: its duties are those that the outputs now have by the board's
+  ///   resolution and the driver's own caps, the motor's is 0 while the motor is disabled. It is the command of an
+  ///   earlier cycle if the board did not take this one and keeps that one, and the safe command after a failure.
+  IoResult write(const rig::Command& command, rig::Command& sent) noexcept;
+  /// The same for callers that do not ask what was sent.
+  IoResult write(const rig::Command& command) noexcept {
+    rig::Command sent;
+    return write(command, sent);
+  }
+  /// A command as it would go out: rounded to the board's resolution, limited by the driver's own caps, the motor's
+  /// duty 0 while the motor is disabled. The duties of `command` are in [0, 1]. Sends nothing. Real-time safe. By
+  /// default any duty can be sent.
+  [[nodiscard]] virtual rig::Command as_sent(const rig::Command& command) const noexcept;
   /// Brings the outputs into the safe state: drive 0, brake 0, motor disabled. Verifies it if the board can read back.
   /// May be repeated. The result is `ok` if the safe state is known to have reached the board.
   IoResult deactivate() noexcept;
@@ -83,7 +95,8 @@ class RigDriver {
   virtual void do_configure() = 0;
   virtual void do_activate(std::int64_t now_ns) = 0;
   virtual IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept = 0;
-  virtual IoResult do_write(const rig::Command& command) noexcept = 0;
+  /// If it succeeds it sets `sent` as `write` documents it, to `as_sent(command)` if the board took the command.
+  virtual IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept = 0;
   /// Writes the safe state in any situation. Tries all outputs even if one fails.
   virtual IoResult do_make_safe() noexcept = 0;
 

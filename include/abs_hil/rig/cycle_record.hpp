@@ -27,7 +27,7 @@ struct ControlState {
   double slip_est{0.0};
   double slip_ref{0.0};
   double slip_velocity_error_m_s{unknown};  ///< e_v of (13), from the estimates
-  double brake_torque_ref_Nm{0.0};          ///< torque reference, after limiting
+  double brake_torque_ref_Nm{0.0};          ///< torque reference, after limiting and on the PWM's steps
   double brake_torque_est_Nm{0.0};          ///< torque estimated to act now, through (6)-(7)
   double theta_est_N{unknown};
   SignalValues signals{no_signals};  ///< the controller's own, see control::SlipController::signals
@@ -57,7 +57,7 @@ struct CycleRecord {
   double reason_value{0.0};      ///< the value that caused it, in the SI unit of its quantity
   Measurement measurement{};
   ControlState control{};
-  Command command{};  ///< the command after the gate
+  Command command{};  ///< the command as the driver sent it
   PlantTruth truth{};
   CycleTiming timing{};
 };

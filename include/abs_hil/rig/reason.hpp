@@ -121,6 +121,7 @@ enum class FoundAgain : std::uint8_t {
   ROW(safe_state_unverified, 164, fault, no, "the controller could not verify the safe state")                        \
   ROW(run_time_limit, 200, fault, yes, "run exceeded the experiment's time limit")                                    \
   ROW(run_distance_limit, 201, fault, yes, "car went further than the experiment's limit")                            \
+  ROW(controller_not_finite, 210, fault, yes, "the controller's output was not a finite number")                      \
   ROW(checks_cannot_judge, 220, fault, wheel_checks,                                                                  \
       "the plausibility checks could not judge the wheels for gate.judge_within_s: readings are too slow or stale, "  \
       "or the encoders have too few counts")                                                                          \

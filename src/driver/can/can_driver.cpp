@@ -46,6 +46,7 @@ std::int64_t answer_timeout_ns(const CanOptions& options, bool lock_step) {
 
 CanDriver::CanDriver(const CanOptions& options, OpenLink open_link, bool lock_step)
     : options_(options),
+      grid_(output_grid(options)),
       open_link_(std::move(open_link)),
       lock_step_(lock_step),
       answer_timeout_ns_(answer_timeout_ns(options, lock_step)),
@@ -157,6 +158,7 @@ void CanDriver::do_activate(std::int64_t now_ns) {
   bucket_.reset();
   tracker_.reset(sync_);
   commanded_ = {};
+  command_sent_ = {};
   outputs_known_ = any_answer_ = false;
   raw_counts_ = counts_ = {};
   trip_flags_ = 0;
@@ -187,18 +189,19 @@ IoResult CanDriver::sent(const SendResult& result, std::uint32_t identifier) noe
   return {IoError::disconnected, identifier, result.errno_value};
 }
 
-IoResult CanDriver::do_write(const rig::Command& command) noexcept {
+IoResult CanDriver::do_write(const rig::Command& command, rig::Command& went_out) noexcept {
   if (!driver::in_range(command)) return {IoError::command_out_of_range};
-  const double brake = std::min(command.brake_duty, options_.brake_duty_max);
-  const double drive = command.motor_enable ? std::min(command.motor_duty, options_.motor_duty_max) : 0.0;
-  const RawDuties duties{.brake = static_cast<std::uint16_t>(nearest_raw(signal::brake_duty, brake)),
-                         .drive = static_cast<std::uint16_t>(nearest_raw(signal::drive_duty, drive))};
+  const RawDuties duties{.brake = static_cast<std::uint16_t>(grid_.brake_width(command)),
+                         .drive = static_cast<std::uint16_t>(grid_.motor_width(command))};
   commanded_[++command_sequence_] = duties;
   const Frame frame = command_frame({.duties = duties,
                                      .drive_enable = command.motor_enable,
                                      .heartbeat = tracker_.last_sequence(),
                                      .sequence = command_sequence_});
-  const IoResult result = sent(link_.socket->send(in_format(frame)), id::command);
+  const SendResult sending = link_.socket->send(in_format(frame));
+  if (sending.outcome == SendOutcome::sent) command_sent_ = grid_.as_sent(command);
+  went_out = command_sent_;
+  const IoResult result = sent(sending, id::command);
   return result.ok() && bucket_.tripped() ? tripped() : result;
 }
 

@@ -13,8 +13,16 @@
 #include "driver/can/messages.hpp"
 #include "driver/can/options.hpp"
 #include "driver/loss_bucket.hpp"
+#include "driver/output_grid.hpp"
 
 namespace abs_hil::driver::can {
+
+/// What ABS_COMMAND makes of a command.
+[[nodiscard]] inline OutputGrid output_grid(const CanOptions& options) noexcept {
+  return {.duty_steps = signal::duty_steps,
+          .motor_duty_max = options.motor_duty_max,
+          .brake_duty_max = options.brake_duty_max};
+}
 
 /// Counts of frames and cycles since `configure`.
 struct CanCounters {
@@ -51,6 +59,9 @@ class CanDriver final : public RigDriver {
   ~CanDriver() override;
 
   [[nodiscard]] std::string_view name() const noexcept override { return "can"; }
+  [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
+    return grid_.as_sent(command);
+  }
   [[nodiscard]] std::vector<std::string> notes() const override;
   [[nodiscard]] std::vector<std::string> tally() const override;
   [[nodiscard]] std::string_view what_holds_unsafe() const noexcept override {
@@ -64,7 +75,7 @@ class CanDriver final : public RigDriver {
   void do_configure() override;
   void do_activate(std::int64_t now_ns) override;
   IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override;
-  IoResult do_write(const rig::Command& command) noexcept override;
+  IoResult do_write(const rig::Command& command, rig::Command& went_out) noexcept override;
   IoResult do_make_safe() noexcept override;
 
   // The handshake.
@@ -99,6 +110,7 @@ class CanDriver final : public RigDriver {
   [[nodiscard]] Frame in_format(Frame frame) const noexcept;
 
   CanOptions options_;
+  OutputGrid grid_;
   OpenLink open_link_;
   bool lock_step_;
   std::int64_t answer_timeout_ns_;
@@ -135,6 +147,7 @@ class CanDriver final : public RigDriver {
   // Commands sent, by sequence.
   std::uint8_t command_sequence_{0};
   std::array<RawDuties, 256> commanded_{};
+  rig::Command command_sent_{};  ///< the last one that the interface took
   bool outputs_known_{false};
   RawDuties applied_{};
   std::uint8_t applied_sequence_{0};

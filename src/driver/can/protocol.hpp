@@ -73,6 +73,8 @@ inline constexpr unsigned slow_frame_period = 10;
 namespace signal {
 
 inline constexpr double duty_scale = 0.0001;
+inline constexpr std::uint32_t duty_steps = 10'000;  ///< raw value of duty 1
+static_assert(duty_steps * duty_scale == 1.0);
 inline constexpr Signal check_of_8{"Check", 56, 8, false, 1, 0, 0, 255};
 inline constexpr Signal sequence_of_8{"Sequence", 48, 8, false, 1, 0, 0, 255};
 

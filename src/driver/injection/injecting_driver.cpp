@@ -74,7 +74,7 @@ void InjectingDriver::do_activate(std::int64_t now_ns) {
   first_effect_ns_ = -1;
   first_read_ = true;
   delivered_ = {};
-  sent_ = {};
+  passed_ = {};
   for (NumberChannel* channel :
        {&stamp_, &supply_, &temperature_, &trip_, &motor_, &brake_, &brake_torque_, &enable_}) {
     channel->start();
@@ -208,23 +208,25 @@ IoResult InjectingDriver::fail_whole_answer(rig::Measurement& measurement) noexc
   return {};
 }
 
-IoResult InjectingDriver::do_write(const rig::Command& command) noexcept {
-  rig::Command sent = command;
-  if (const IoResult result = fail_whole_command(sent); !result.ok()) {
+IoResult InjectingDriver::do_write(const rig::Command& command, rig::Command& sent) noexcept {
+  rig::Command passed = command;
+  if (const IoResult result = fail_whole_command(passed); !result.ok()) {
     note_effect(true);
     return result;
   }
-  sent.motor_duty = motor_.pass(sent.motor_duty, fault_of(InjectionSignal::motor_pwm), now_ns_, random_);
+  passed.motor_duty = motor_.pass(passed.motor_duty, fault_of(InjectionSignal::motor_pwm), now_ns_, random_);
   const ActiveFault brake = fault_of(InjectionSignal::brake_pwm);
-  sent.brake_duty = brake_.pass(sent.brake_duty, brake, now_ns_, random_);
-  sent.brake_torque_Nm = brake_torque_.pass(sent.brake_torque_Nm, brake, now_ns_, random_);
+  passed.brake_duty = brake_.pass(passed.brake_duty, brake, now_ns_, random_);
+  passed.brake_torque_Nm = brake_torque_.pass(passed.brake_torque_Nm, brake, now_ns_, random_);
   const ActiveFault enable = fault_of(InjectionSignal::enable);
-  sent.motor_enable = enable_.pass(sent.motor_enable ? 1.0 : 0.0, enable, now_ns_, random_) > 0.5;
-  note_effect(sent.motor_duty != command.motor_duty || sent.brake_duty != command.brake_duty ||
-              sent.brake_torque_Nm != command.brake_torque_Nm || sent.motor_enable != command.motor_enable ||
-              fault_of(InjectionSignal::write).kind == InjectionKind::slow);
-  sent_ = sent;
-  return inner_->write(sent);
+  passed.motor_enable = enable_.pass(passed.motor_enable ? 1.0 : 0.0, enable, now_ns_, random_) > 0.5;
+  const bool changed = passed.motor_duty != command.motor_duty || passed.brake_duty != command.brake_duty ||
+                       passed.brake_torque_Nm != command.brake_torque_Nm || passed.motor_enable != command.motor_enable;
+  note_effect(changed || fault_of(InjectionSignal::write).kind == InjectionKind::slow);
+  passed_ = passed;
+  const IoResult result = inner_->write(passed, sent);
+  if (result.ok() && changed) sent = inner_->as_sent(command);
+  return result;
 }
 
 IoResult InjectingDriver::fail_whole_command(rig::Command& command) noexcept {
@@ -233,7 +235,7 @@ IoResult InjectingDriver::fail_whole_command(rig::Command& command) noexcept {
   switch (fault.kind) {
     case InjectionKind::ok: break;
     case InjectionKind::off: return {IoError::no_answer};
-    case InjectionKind::stuck: command = sent_; break;
+    case InjectionKind::stuck: command = passed_; break;
     case InjectionKind::garbage:
       command.motor_duty = uniform(random_);
       command.brake_duty = uniform(random_);
@@ -250,7 +252,7 @@ IoResult InjectingDriver::fail_whole_command(rig::Command& command) noexcept {
       break;
     case InjectionKind::delayed: {
       commands_.push(now_ns_, command);
-      rig::Command late = sent_;
+      rig::Command late = passed_;
       while (commands_.pop(now_ns_ - ns_of(fault.parameter), late)) {
       }
       command = late;

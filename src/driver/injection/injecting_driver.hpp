@@ -17,7 +17,8 @@ namespace abs_hil::driver {
 
 /// Injects faults between the executive and any backend except real hardware. The same faults and seed give the same
 /// run. No fault affects making safe (`deactivate`, and after a failed write): guardian and E-stop are there for the
-/// case that no command reaches the board. As real-time safe as the backend.
+/// case that no command reaches the board. A fault of the outputs lies behind the board's registers, where no driver
+/// sees it: `write` tells the command that would have gone out without it. As real-time safe as the backend.
 class InjectingDriver final : public RigDriver {
  public:
   /// Lets this time pass in the calling thread, ns; used for slow calls.
@@ -28,6 +29,9 @@ class InjectingDriver final : public RigDriver {
   ~InjectingDriver() override;
 
   [[nodiscard]] std::string_view name() const noexcept override { return inner_->name(); }
+  [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
+    return inner_->as_sent(command);
+  }
   [[nodiscard]] rig::PlantTruth truth() const noexcept override { return inner_->truth(); }
   [[nodiscard]] std::vector<std::string> notes() const override;
   [[nodiscard]] std::vector<std::string> tally() const override { return inner_->tally(); }
@@ -51,7 +55,7 @@ class InjectingDriver final : public RigDriver {
   void do_configure() override { inner_->configure(); }
   void do_activate(std::int64_t now_ns) override;
   IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override;
-  IoResult do_write(const rig::Command& command) noexcept override;
+  IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override;
   IoResult do_make_safe() noexcept override { return inner_->deactivate(); }
 
   [[nodiscard]] ActiveFault fault_of(InjectionSignal signal) const noexcept;
@@ -73,7 +77,7 @@ class InjectingDriver final : public RigDriver {
   EncoderChannel upper_{};
   EncoderChannel lower_{};
   rig::Measurement delivered_{};  ///< last measurement passed on
-  rig::Command sent_{};           ///< last command passed on
+  rig::Command passed_{};         ///< last command passed on
   DelayLine<rig::Measurement> answers_{};
   DelayLine<rig::Command> commands_{};
   NumberChannel stamp_;

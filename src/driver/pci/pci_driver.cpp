@@ -52,6 +52,7 @@ class PciDriver::Access {
 PciDriver::PciDriver(const PciOptions& options, OpenCard open_card, ReadClock read_clock)
     : options_(options),
       mode_(pwm_mode_named(options.pwm_mode)),
+      grid_(pwm_grid(options)),
       open_card_(std::move(open_card)),
       read_clock_(read_clock) {
   rig::require_valid(options, "driver.pci.");
@@ -87,7 +88,8 @@ void PciDriver::do_configure() {
 
 void PciDriver::take_over(Access& card) noexcept {
   for (const Pwm pwm : {Pwm::drive, Pwm::brake}) {
-    write_pwm(card, pwm, 0);  // before mode and prescaler, which could turn an old width into a pulse
+    static_cast<void>(
+        write_pwm(card, pwm, 0));  // before mode and prescaler, which could turn an old width into a pulse
     for (const auto& [offset, value] :
          {std::pair(reg::pwm_mode, static_cast<std::uint32_t>(mode_)),
           std::pair(reg::pwm_prescaler, static_cast<std::uint32_t>(options_.pwm_prescaler))}) {
@@ -207,20 +209,22 @@ bool PciDriver::tripped_to_zero(Access& card, std::uint32_t width_read) noexcept
   return card.result().ok() && health_[0] != 0;
 }
 
-void PciDriver::write_pwm(Access& card, Pwm pwm, std::uint32_t width) noexcept {
+std::uint32_t PciDriver::write_pwm(Access& card, Pwm pwm, std::uint32_t width) noexcept {
   card.write(reg::pwm_index, static_cast<std::uint32_t>(pwm));
   card.write(reg::pwm_width, width);
   const std::uint32_t width_read = card.read(reg::pwm_width);
-  if (!card.result().ok() || width_read == width) return;
-  if (!tripped_to_zero(card, width_read)) card.fail(IoError::read_back_mismatch, reg::pwm_width);
+  if (card.result().ok() && width_read != width && !tripped_to_zero(card, width_read)) {
+    card.fail(IoError::read_back_mismatch, reg::pwm_width);
+  }
+  return width_read;
 }
 
-IoResult PciDriver::do_write(const rig::Command& command) noexcept {
+IoResult PciDriver::do_write(const rig::Command& command, rig::Command& sent) noexcept {
   if (!in_range(command)) return {IoError::command_out_of_range};
-  const double motor_duty = command.motor_enable ? command.motor_duty : 0.0;
   Access card(*card_.window);
-  write_pwm(card, Pwm::drive, pwm_width_for(mode_, motor_duty, options_.motor_duty_max));
-  write_pwm(card, Pwm::brake, pwm_width_for(mode_, command.brake_duty, options_.brake_duty_max));
+  sent = command;
+  sent.motor_duty = rig::duty_of(write_pwm(card, Pwm::drive, grid_.motor_width(command)), grid_.duty_steps);
+  sent.brake_duty = rig::duty_of(write_pwm(card, Pwm::brake, grid_.brake_width(command)), grid_.duty_steps);
   return checked_for_absence(card);
 }
 
@@ -230,7 +234,7 @@ IoResult PciDriver::do_make_safe() noexcept {
   IoResult first{};
   for (const Pwm pwm : {Pwm::drive, Pwm::brake}) {
     Access card(*card_.window);
-    write_pwm(card, pwm, 0);
+    static_cast<void>(write_pwm(card, pwm, 0));
     if (const IoResult result = checked_for_absence(card); first.ok()) first = result;
   }
   return first;

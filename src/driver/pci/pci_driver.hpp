@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "abs_hil/driver/rig_driver.hpp"
+#include "driver/output_grid.hpp"
 #include "driver/pci/discovery.hpp"
 #include "driver/pci/options.hpp"
 #include "driver/pci/register_map.hpp"
@@ -43,6 +44,9 @@ class PciDriver final : public RigDriver {
   ~PciDriver() override;
 
   [[nodiscard]] std::string_view name() const noexcept override { return "pci"; }
+  [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
+    return grid_.as_sent(command);
+  }
   [[nodiscard]] std::vector<std::string> notes() const override;
   [[nodiscard]] std::vector<std::string> inspection() override;
 
@@ -52,7 +56,7 @@ class PciDriver final : public RigDriver {
   void do_configure() override;
   void do_activate(std::int64_t now_ns) override;
   IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override;
-  IoResult do_write(const rig::Command& command) noexcept override;
+  IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override;
   IoResult do_make_safe() noexcept override;
 
   void take_over(Access& card) noexcept;
@@ -60,13 +64,15 @@ class PciDriver final : public RigDriver {
   /// Reads both counters and sets their time stamp; false if that took too long.
   bool read_wheels_at(Access& card, std::int64_t& read_ns) noexcept;
   void read_health(Access& card, std::uint32_t offset) noexcept;
-  void write_pwm(Access& card, Pwm pwm, std::uint32_t width) noexcept;
+  /// Returns the width that reads back: `width`, or 0 while the card's interlock holds the output off.
+  std::uint32_t write_pwm(Access& card, Pwm pwm, std::uint32_t width) noexcept;
   [[nodiscard]] bool tripped_to_zero(Access& card, std::uint32_t width_read) noexcept;
   [[nodiscard]] bool plausible(std::int64_t read_ns, const std::array<std::int32_t, 2>& before) const noexcept;
   [[nodiscard]] IoResult checked_for_absence(const Access& card) noexcept;
 
   PciOptions options_;
   PwmMode mode_;
+  OutputGrid grid_;
   OpenCard open_card_;
   Card card_{};
   ReadClock read_clock_;

@@ -13,17 +13,16 @@
 namespace abs_hil::driver {
 namespace {
 
-constexpr double duty_steps = 4095.0;  ///< the card's PWM has 12 bits
-
-double quantised(double duty) noexcept { return std::round(duty * duty_steps) / duty_steps; }
-
 /// A number in [0, 1) from the generator's upper 32 bits: the same with every standard library, and far enough from 1
 /// that no rounding reaches the next count.
 double fraction_of_count(std::mt19937_64& generator) { return static_cast<double>(generator() >> 32U) * 0x1p-32; }
 
 }  // namespace
 
-SimDriver::SimDriver(const plant_sim::PlantOptions& plant, const SimStart& start) : plant_(plant), start_(start) {
+SimDriver::SimDriver(const plant_sim::PlantOptions& plant, const SimStart& start)
+    : plant_(plant),
+      start_(start),
+      grid_{.duty_steps = full_width(start.pwm_mode), .any_brake_duty = plant.ideal_actuator} {
   if (!std::isfinite(start.start_speed_rad_s) || start.start_speed_rad_s < 0.0) {
     throw std::invalid_argument("start speed " + std::to_string(start.start_speed_rad_s) +
                                 " rad/s: give a finite value >= 0");
@@ -63,11 +62,12 @@ IoResult SimDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) 
   return {};
 }
 
-IoResult SimDriver::do_write(const rig::Command& command) noexcept {
+IoResult SimDriver::do_write(const rig::Command& command, rig::Command& sent) noexcept {
   if (!in_range(command)) return {IoError::command_out_of_range};
-  input_.motor_duty = command.motor_enable ? quantised(command.motor_duty) : 0.0;
-  input_.brake_duty = plant_.options().ideal_actuator ? command.brake_duty : quantised(command.brake_duty);
-  input_.brake_torque_Nm = command.brake_torque_Nm;
+  sent = grid_.as_sent(command);
+  input_.motor_duty = sent.motor_duty;
+  input_.brake_duty = sent.brake_duty;
+  input_.brake_torque_Nm = sent.brake_torque_Nm;
   return {};
 }
 

@@ -3,8 +3,10 @@
 #include <cstdint>
 #include <string_view>
 
+#include "abs_hil/driver/pwm.hpp"
 #include "abs_hil/driver/rig_driver.hpp"
 #include "abs_hil/plant_sim/plant.hpp"
+#include "driver/output_grid.hpp"
 
 namespace abs_hil::driver {
 
@@ -12,10 +14,12 @@ namespace abs_hil::driver {
 struct SimStart {
   std::uint64_t seed{1};          ///< seed for the wheels' initial angles within one encoder count
   double start_speed_rad_s{0.0};  ///< both wheels' speed at activation, >= 0
+  PwmMode pwm_mode{PwmMode::bits_12};
 };
 
-/// The simulated rig at the level of the card: encoder counts out, 12-bit duty cycles in. `read` advances the plant to
-/// the given time under the command of the last `write`. In a late cycle the plant has therefore moved on, too.
+/// The simulated rig at the level of the card: encoder counts out, duty cycles of 12 or 8 bits in. `read` advances the
+/// plant to the given time under the command of the last `write`. In a late cycle the plant has therefore moved on,
+/// too.
 class SimDriver final : public RigDriver {
  public:
   /// Throws std::invalid_argument if an option or the start speed is outside its range.
@@ -24,6 +28,9 @@ class SimDriver final : public RigDriver {
 
   [[nodiscard]] std::string_view name() const noexcept override { return "sim"; }
   [[nodiscard]] rig::PlantTruth truth() const noexcept override;
+  [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
+    return grid_.as_sent(command);
+  }
   /// For tests: the command that acts on the simulated rig.
   [[nodiscard]] const plant_sim::PlantInput& outputs() const noexcept { return input_; }
   [[nodiscard]] const plant_sim::Plant& plant() const noexcept { return plant_; }
@@ -32,11 +39,12 @@ class SimDriver final : public RigDriver {
   void do_configure() override;
   void do_activate(std::int64_t now_ns) override;
   IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override;
-  IoResult do_write(const rig::Command& command) noexcept override;
+  IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override;
   IoResult do_make_safe() noexcept override;
 
   plant_sim::Plant plant_;
   SimStart start_;
+  OutputGrid grid_;
   plant_sim::PlantInput input_{};
   std::int64_t time_ns_{0};       ///< time of the plant's state
   double upper_offset_rad_{0.0};  ///< initial angle of the upper wheel within one count

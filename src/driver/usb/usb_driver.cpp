@@ -43,6 +43,7 @@ IoResult with_reason(IoResult result) noexcept {
 UsbDriver::UsbDriver(const UsbOptions& options, OpenBoard open_board, ReadClock read_clock)
     : options_(options),
       mode_(pwm_mode_named(options.pwm_mode)),
+      grid_(pwm_grid(options)),
       open_board_(std::move(open_board)),
       read_clock_(read_clock) {
   rig::require_valid(options, "driver.usb.");
@@ -159,6 +160,7 @@ void UsbDriver::do_activate(std::int64_t now_ns) {
   bucket_.reset();
   frames_lost_ = 0;
   lost_this_cycle_ = false;
+  command_sent_ = {};
   activated_ns_ = now_ns;
   IoResult result{};
   if (board_.time) result = board_.time->now(emulated_ns_);
@@ -193,7 +195,7 @@ IoResult UsbDriver::lost_frame() noexcept {
 
 IoResult UsbDriver::failed(const IoResult& result) noexcept {
   put_command(0, 0, false);
-  static_cast<void>(board_.link->send(frame_));
+  if (board_.link->send(frame_).ok()) command_sent_ = rig::safe_command;
   return with_reason(result);
 }
 
@@ -229,14 +231,16 @@ IoResult UsbDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) 
   return {};
 }
 
-IoResult UsbDriver::do_write(const rig::Command& command) noexcept {
+IoResult UsbDriver::do_write(const rig::Command& command, rig::Command& sent) noexcept {
   if (!in_range(command)) return {IoError::command_out_of_range};
-  const double motor_duty = command.motor_enable ? command.motor_duty : 0.0;
   const auto sent_before = std::tuple(drive_sent_, brake_sent_, digital_sent_);
-  put_command(pwm_width_for(mode_, motor_duty, options_.motor_duty_max),
-              pwm_width_for(mode_, command.brake_duty, options_.brake_duty_max), command.motor_enable);
+  put_command(grid_.motor_width(command), grid_.brake_width(command), command.motor_enable);
   const IoResult result = board_.link->send(frame_);
-  if (result.error != IoError::no_answer) return with_reason(result);
+  if (result.error != IoError::no_answer) {
+    sent = command_sent_ = grid_.as_sent(command);
+    return with_reason(result);
+  }
+  sent = command_sent_;
   std::tie(drive_sent_, brake_sent_, digital_sent_) = sent_before;
   // Count a cycle only once. Without a read, only this would find a board that takes no frames.
   return std::exchange(lost_this_cycle_, false) ? IoResult{} : lost_frame();

@@ -10,6 +10,7 @@
 #include "abs_hil/driver/pwm.hpp"
 #include "abs_hil/driver/rig_driver.hpp"
 #include "driver/loss_bucket.hpp"
+#include "driver/output_grid.hpp"
 #include "driver/usb/frame.hpp"
 #include "driver/usb/frame_link.hpp"
 #include "driver/usb/options.hpp"
@@ -36,6 +37,9 @@ class UsbDriver final : public RigDriver {
   ~UsbDriver() override;
 
   [[nodiscard]] std::string_view name() const noexcept override { return "usb"; }
+  [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
+    return grid_.as_sent(command);
+  }
   [[nodiscard]] std::vector<std::string> notes() const override;
   [[nodiscard]] std::vector<std::string> inspection() override;
   [[nodiscard]] std::vector<std::string> tally() const override;
@@ -50,7 +54,7 @@ class UsbDriver final : public RigDriver {
   void do_configure() override;
   void do_activate(std::int64_t now_ns) override;
   IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override;
-  IoResult do_write(const rig::Command& command) noexcept override;
+  IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override;
   IoResult do_make_safe() noexcept override;
 
   [[nodiscard]] std::int64_t clock_ns(std::int64_t otherwise) const noexcept;
@@ -67,6 +71,7 @@ class UsbDriver final : public RigDriver {
 
   UsbOptions options_;
   PwmMode mode_;
+  OutputGrid grid_;
   OpenBoard open_board_;
   ReadClock read_clock_;
   Board board_{};
@@ -77,6 +82,7 @@ class UsbDriver final : public RigDriver {
   PwmWords drive_sent_{};  ///< PWM words that the board's frames must show
   PwmWords brake_sent_{};
   std::uint16_t digital_sent_{0};
+  rig::Command command_sent_{};  ///< the command of the frame sent last
 
   std::int64_t activated_ns_{0};  ///< time of `activate`
   std::int64_t emulated_ns_{0};   ///< the emulator's time at `activate`

@@ -97,6 +97,35 @@ TEST_CASE("Commands reach the wire as 12-bit duties; the motor only while enable
   CHECK(bench->wire().drive_duty == 0.0);
 }
 
+TEST_CASE("The driver tells the command as its outputs show it, to the last bit of its grid") {
+  auto bench = active_bench();
+  driver::RigDriver& rig = bench->driver();
+  rig::Command sent;
+  for (int n = 0; n <= 200; ++n) {
+    const double duty = n / 200.0 * 0.99999;
+    const rig::Command command{
+        .motor_duty = duty, .brake_duty = 1.0 - duty, .motor_enable = n % 3 != 0, .brake_torque_Nm = 2.5};
+    REQUIRE(rig.write(command, sent).ok());
+    const rig::Command expected = rig.as_sent(command);
+    CHECK(sent.motor_duty == expected.motor_duty);
+    CHECK(sent.brake_duty == expected.brake_duty);
+    CHECK(sent.motor_enable == command.motor_enable);
+    CHECK(sent.brake_torque_Nm == 2.5);
+    CHECK(rig.as_sent(sent).brake_duty == sent.brake_duty);
+    CHECK(rig.as_sent(sent).motor_duty == sent.motor_duty);
+    if (n % 20 == 0) {
+      // The emulator prints 6 digits; half a step is 2e-5 at the finest.
+      CHECK_THAT(sent.motor_duty, WithinAbs(bench->wire().drive_duty, 1e-6));
+      CHECK_THAT(sent.brake_duty, WithinAbs(bench->wire().brake_duty, 1e-6));
+    }
+  }
+  CHECK(rig.write({.brake_duty = 2.0}, sent).error == IoError::command_out_of_range);
+  CHECK(sent.brake_duty == 0.0);
+  sent = brake;
+  CHECK(rig.write(brake, sent).error == IoError::not_active);
+  CHECK(sent.brake_duty == 0.0);
+}
+
 TEST_CASE("Counters start near 0 and count 4096 to a revolution, up for forward") {
   auto bench = active_bench();
   const rig::Measurement first = read_until(bench->driver(), 0, 0);

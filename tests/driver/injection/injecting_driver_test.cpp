@@ -32,7 +32,8 @@ class TurningRig final : public RigDriver {
     m.temperature_C = 30.0;
     return {};
   }
-  IoResult do_write(const rig::Command& command) noexcept override {
+  IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override {
+    sent = as_sent(command);
     last = command;
     return {};
   }
@@ -277,4 +278,21 @@ TEST_CASE("a duration longer than any run means no end") {
   Bench bench("any@supply:off~1e30s");
   bench.cycles(3);
   CHECK(bench.measurement.supply_V == 0.0);
+}
+
+TEST_CASE("A fault of the outputs lies behind the driver: it tells the command that would have gone out") {
+  for (const char* fault : {"any@brake_pwm:off", "any@brake_pwm:wrong=0.5", "any@write:stuck"}) {
+    Bench bench(fault);
+    CAPTURE(fault);
+    rig::Command sent;
+    REQUIRE(bench.cycle());
+    REQUIRE(bench.driver.write({.brake_duty = 0.6, .brake_torque_Nm = 3.0}, sent).ok());
+    CHECK(bench.rig.last.brake_duty < 0.5);
+    CHECK(sent.brake_duty == 0.6);
+    CHECK(sent.brake_torque_Nm == 3.0);
+  }
+  Bench bench("any@write:off");
+  rig::Command sent{.brake_duty = 0.6};
+  CHECK_FALSE(bench.driver.write({.brake_duty = 0.6}, sent).ok());
+  CHECK(sent.brake_duty == 0.0);
 }

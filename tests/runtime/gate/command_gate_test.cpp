@@ -1,6 +1,8 @@
 #include "runtime/command_gate.hpp"
 
+#include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -136,6 +138,56 @@ TEST_CASE("duties rise no faster than their rates by real elapsed time, and fall
   CHECK(check({.motor_duty = 0.1, .motor_enable = true}, 19).command.motor_duty == 0.1);
   // Nothing rises while time stands still or runs backwards.
   CHECK(check({.motor_duty = 0.2, .motor_enable = true}, 19).command.motor_duty == Approx(0.1));
+}
+
+TEST_CASE("the rate limits the brake's torque: the dead zone is crossed at once") {
+  CommandGate gate({.brake_rate_per_s = 50.0}, any_phase(), {}, 0.4);
+  const auto check = [&](double duty, std::int64_t at_ms) {
+    return gate.check({.brake_duty = duty}, {.phase = Phase::brake, .now_ns = at_ms * ms}).command.brake_duty;
+  };
+  CHECK(check(0.0, 0) == 0.0);
+  CHECK(check(0.4, 1) == 0.4);  // no torque yet
+  CHECK(check(1.0, 2) == Approx(0.45));
+  CHECK(check(0.0, 3) == 0.0);
+  CHECK(check(1.0, 4) == Approx(0.45));  // 1 ms of torque beyond u0
+  CHECK(check(1.0, 6) == Approx(0.55));
+  CHECK(gate.count(GateAction::brake_rate_limited) == 3);
+}
+
+TEST_CASE("a rise goes on from what was sent, but a PWM's steps do not swallow a slow one") {
+  CommandGate gate({.motor_rate_per_s = 0.1, .brake_rate_per_s = 0.1});
+  const auto duty_at = [&](std::int64_t at_ms) {
+    return gate.check({.motor_duty = 1.0, .motor_enable = true}, {.phase = Phase::accelerate, .now_ns = at_ms * ms})
+        .command.motor_duty;
+  };
+  static_cast<void>(gate.check({}, {.now_ns = 0}));
+  // 0.1/s is less than half a step of 8 bits in each cycle, which the driver rounds to 0.
+  double duty = 0.0;
+  for (int n = 1; n <= 1000; ++n) {
+    duty = duty_at(n);
+    gate.note_sent({.motor_duty = std::round(duty * 255.0) / 255.0, .motor_enable = true});
+  }
+  CHECK(duty == Approx(0.1));
+  // The board did not take the last commands: the output is still 0.
+  gate.note_sent({});
+  CHECK(duty_at(1001) < 0.003);
+}
+
+TEST_CASE("the checks of the wheels count the brake as it was sent, not as it was wanted") {
+  const rig::RigParameters rig;
+  const GateOptions options;
+  CommandGate gate(options, any_phase(), plausibility_limits(rig, false, options));
+  // The brake is wanted for a second, but the driver sent none, and the wheels keep their speed.
+  double angle_rad = 0.0;
+  for (int n = 0; n < 1000; ++n) {
+    const auto counts = static_cast<std::int32_t>(angle_rad / (2.0 * std::numbers::pi) * 4096.0);
+    CHECK(gate.check_measurement({.time_ns = n * ms, .upper_counts = counts, .lower_counts = counts}, n * ms));
+    static_cast<void>(
+        gate.check({.brake_duty = 0.9}, {.speeds = {100.0, 100.0}, .phase = Phase::brake, .now_ns = n * ms}));
+    gate.note_sent({});
+    angle_rad += 0.1;
+  }
+  CHECK(gate.fault() == rig::Reason::none);
 }
 
 TEST_CASE("motor and brake act only in the phases whose plan has them, together only where it says so") {

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+
+#include "abs_hil/rig/controller_signal.hpp"
+#include "abs_hil/rig/reason.hpp"
+
+namespace abs_hil::rig {
+
+/// A reason in words, with the name of what its value stands for if the value is an index. Not real-time safe.
+[[nodiscard]] inline std::string reason_text(Reason reason, double value) {
+  std::string text(description(reason));
+  if (reason == Reason::controller_not_finite) text.append(": ").append(controller_signal(value));
+  return text;
+}
+
+}  // namespace abs_hil::rig
