@@ -29,7 +29,9 @@ void add_backend_option(CLI::App& cli, program::RunOptions& o) {
 /// Adds options that belong to the configuration, not to a single run.
 void add_configuration_options(CLI::App& cli, program::RunOptions& o) {
   cli.add_option("--config", o.config_file, "TOML file with any configuration values")->type_name("FILE");
-  cli.add_option("--plant", o.plant, "plant by name or TOML file")->type_name("NAME|FILE");
+  cli.add_option("--plant", o.plant, "simulated plant by name or TOML file")->type_name("NAME|FILE");
+  cli.add_option("--model", o.model, "the controllers' model of the rig, by name or TOML file (default: the plant)")
+      ->type_name("NAME|FILE");
   cli.add_option("--controller", o.controller, "slip controller")->type_name("NAME");
   cli.add_option("--set", o.assignments, "set any configuration value (abs_hil list --keys)")
       ->type_name("key=value")
@@ -39,9 +41,10 @@ void add_configuration_options(CLI::App& cli, program::RunOptions& o) {
 
 void add_timing_options(CLI::App& cli, program::RunOptions& o) {
   cli.add_option("--rate", o.rate_Hz, "control cycles per second, 100 to 10000")->type_name("HZ");
-  cli.add_option("--rt", o.realtime, "real-time scheduling: required, preferred or off")
-      ->check(CLI::IsMember({"require", "prefer", "off"}))
-      ->capture_default_str();
+  cli.add_option(
+         "--rt", o.realtime,
+         "real-time scheduling: required, preferred or off (default: require on a real board, otherwise prefer)")
+      ->check(CLI::IsMember({"require", "prefer", "off"}));
   cli.add_option("--histogram", o.outputs.histogram_file, "write latency histograms in cyclictest's format")
       ->type_name("FILE");
 }
@@ -120,6 +123,8 @@ void add_latency(CLI::App& cli, LatencyCommand& command) {
 CLI::App* add_compare(CLI::App& cli, program::CompareOptions& o) {
   auto* compare = cli.add_subcommand("compare", "compare controllers in simulation on the same varied plants");
   compare->add_option("--plant", o.run.plant, "plant by name or TOML file")->type_name("NAME|FILE");
+  compare->add_option("--model", o.run.model, "every controller's model (default: the plant, before it varies)")
+      ->type_name("NAME|FILE");
   compare->add_option("--controllers", o.controllers, "controllers; the first one is the baseline")
       ->type_name("A,B,...")
       ->delimiter(',')

@@ -145,7 +145,7 @@ config::Plan plan_of(const RecordedRun& run, const config::Settings& s) {
 
 experiment::RunLogicParts logic_parts(const RecordedRun& run, const config::Settings& s) {
   config::Plan plan = plan_of(run, s);
-  return experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate, s.experiment,
+  return experiment::make_logic_parts(s.control, s.model, s.plant.ideal_actuator, s.gate, s.experiment,
                                       std::move(plan.phases), plan.limits);
 }
 

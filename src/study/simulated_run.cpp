@@ -25,7 +25,8 @@ RunResult simulate(const config::Settings& settings, const plant_sim::PlantOptio
   runtime::VirtualClock clock;
   driver::SimDriver driver(plant, {.seed = seed, .start_speed_rad_s = settings.experiment.start_speed_rad_s});
   config::Plan plan = config::plan(settings);
-  experiment::RunLogic logic(experiment::make_logic_parts(settings.control, settings.plant.rig,
+  const bool to_stop = config::means_to_stop(plan, settings.experiment.end_speed_m_s);
+  experiment::RunLogic logic(experiment::make_logic_parts(settings.control, settings.model,
                                                           settings.plant.ideal_actuator, settings.gate,
                                                           settings.experiment, std::move(plan.phases), plan.limits));
   runtime::CommandGate gate = logic.make_gate(settings.gate);
@@ -42,7 +43,8 @@ RunResult simulate(const config::Settings& settings, const plant_sim::PlantOptio
     pump.drain();
   }
   // The last cycle of a complete sequence has a reason that is not a fault; an early end has a limit or fault.
-  const rig::Reason end = logic.end_reason();
+  rig::Reason end = logic.end_reason();
+  if (end == rig::Reason::sequence_complete && to_stop && metrics.moves_on()) end = rig::Reason::braking_without_stop;
   return {.metrics = metrics.metrics(), .fault = rig::is_fault(end) ? end : rig::Reason::none};
 }
 

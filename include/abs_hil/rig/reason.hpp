@@ -121,6 +121,8 @@ enum class FoundAgain : std::uint8_t {
   ROW(safe_state_unverified, 164, fault, no, "the controller could not verify the safe state")                        \
   ROW(run_time_limit, 200, fault, yes, "run exceeded the experiment's time limit")                                    \
   ROW(run_distance_limit, 201, fault, yes, "car went further than the experiment's limit")                            \
+  ROW(braking_without_stop, 230, fault, no,                                                                           \
+      "the experiment ran to its end, but the car was still faster than experiment.end_speed_m_s")                    \
   /* the end of the rows */
 // clang-format on
 
