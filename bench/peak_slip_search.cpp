@@ -84,7 +84,7 @@ Best best_constant_slip(const Setup& setup) {
 Setup plant(const std::string& name, const std::string& friction) {
   config::Settings s;
   config::KeyTable table(s);
-  config::load_file(config::plant_file(name), table, "plant");
+  config::load_file(config::plant_file(name), table, config::Tables::of_plant);
   Setup setup = experiment::test::braking("adaptive-peak");
   setup.plant = s.plant;
   setup.plant.friction_profile = friction;

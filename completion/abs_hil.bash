@@ -13,7 +13,7 @@ _abs_hil() {
     --backend) words="sim rig" ;;
     --rt) words="require prefer off" ;;
     --controller | --controllers) words=$(_abs_hil_names controllers) ;;
-    --plant) words=$(_abs_hil_names plants) ;;
+    --plant | --model) words=$(_abs_hil_names plants) ;;
     --experiment) words=$(_abs_hil_names experiments) ;;
     --set) words=$("$program" list --keys 2>/dev/null | awk '{ print $1 "=" }') ;;
     --csv | --log | --summary | --config | --histogram | --out) ;;

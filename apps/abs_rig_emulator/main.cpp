@@ -190,7 +190,7 @@ void add_options(cli::Parser& parser, Arguments& a) {
 void read_plant(Arguments& a) {
   config::Settings s;
   config::KeyTable keys(s);
-  config::load_file(config::plant_file(a.plant), keys, "plant");
+  config::load_file(config::plant_file(a.plant), keys, config::Tables::of_plant);
   for (const std::string& assignment : a.assignments) {
     if (!assignment.starts_with("plant.")) {
       throw config::ConfigError("--set " + assignment +

@@ -24,6 +24,7 @@ constexpr double start_speed_rad_s = 170.0;
 struct Options {
   std::vector<std::string> controllers{};
   std::vector<std::string> plants{"paper-table1", "paper-timing"};
+  std::string model{};
   std::string folder{};
   std::size_t cases{6};
   study::SearchOptions search{};
@@ -35,7 +36,8 @@ study::TrainingSet training_set(const Options& o) {
     config::Settings& s = training.plants.emplace_back();
     config::KeyTable keys(s);
     s.plant_name = plant;
-    config::load_file(config::plant_file(plant), keys, "plant");
+    config::load_file(config::plant_file(plant), keys, config::Tables::of_plant);
+    if (!o.model.empty()) config::set_all(config::read_model(config::plant_file(o.model, "--model")), keys);
     s.experiment.start_speed_rad_s = start_speed_rad_s;
   }
   return training;
@@ -48,8 +50,9 @@ void tune(const std::string& controller, const Options& o) {
     fmt::print(stderr, "{}: generation {} of {}, cost {:.5f}\n", controller, generation, o.search.generations, cost);
   });
   const std::string comment =
-      fmt::format("abs_tune --controllers {} --plants {} --cases {} --generations {} --seed {} (docs/comparison.md)",
-                  controller, fmt::join(o.plants, ","), o.cases, o.search.generations, o.search.seed);
+      fmt::format("abs_tune --controllers {} --plants {}{} --cases {} --generations {} --seed {} (docs/comparison.md)",
+                  controller, fmt::join(o.plants, ","), o.model.empty() ? "" : " --model " + o.model, o.cases,
+                  o.search.generations, o.search.seed);
   const std::string text = study::to_toml(controller, result, comment);
   file.write(text);
   fmt::print("{}: cost {:.5f}, with the previous gains {:.5f}\n{}\n", controller, result.cost, result.start_cost, text);
@@ -62,6 +65,9 @@ void add_options(cli::Parser& parser, Options& o) {
               .delimiter = ','});
   parser.add(
       {.names = "--plants", .to = &o.plants, .help = "plants to tune on", .delimiter = ',', .show_default = true});
+  parser.add({.names = "--model",
+              .to = &o.model,
+              .help = "the controllers' model, by name or TOML file (default: each plant)"});
   parser.add({.names = "--folder", .to = &o.folder, .help = "existing folder for CONTROLLER.toml", .required = true});
   parser.add({.names = "--cases",
               .to = &o.cases,

@@ -2,6 +2,9 @@
 
 #include <cmath>
 #include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "rig/record_sink.hpp"
 
@@ -13,19 +16,31 @@ inline constexpr double least_judged_speed_m_s = 3.0;
 /// Metrics of a braking run. NaN if the run did not get that far or the backend cannot know the value. Speeds and slip
 /// are true values if the backend knows them, else estimates.
 struct Metrics {
-  double brake_start_s{rig::unknown};     ///< first cycle in phase brake
-  double stop_time_s{rig::unknown};       ///< from brake_start_s to the first tick with v_x below the end speed
+  double brake_start_s{rig::unknown};  ///< first cycle in phase brake
+  /// From brake_start_s to the first tick with v_x below the end speed. If the run ends up to 10 ms before that, as one
+  /// whose estimate is a little below the truth: to the time at which its last deceleration leads there.
+  double stop_time_s{rig::unknown};
   double stop_distance_m{rig::unknown};   ///< v_x over the ticks of the stop time, by the trapezoidal rule
   double slip_rms{rig::unknown};          ///< of slip - slip_ref, from 0.3 s after brake start while v_x > 3 m/s
   double slip_settling_s{rig::unknown};   ///< time after which slip stays within 0.02 of slip_ref while v_x > 3 m/s
-  double theta_final_N{rig::unknown};     ///< last estimate with v_x > 3 m/s
+  double theta_final_N{rig::unknown};     ///< estimate at 3 m/s: the last one with v_x > 3 m/s
   double theta_settling_s{rig::unknown};  ///< time after which it stays within 5 % of the truth while v_x > 3 m/s
   double torque_total_variation_Nm{rig::unknown};  ///< of the torque reference over phase brake: measures chatter
   double slip_overshoot{rig::unknown};             ///< largest slip - slip_ref while v_x > 3 m/s, >= 0
   double time_locked_s{rig::unknown};              ///< braking time with slip > 0.95 while v_x > 3 m/s
   double theta_error_final{rig::unknown};          ///< theta_final_N / true theta at that time - 1
   double theta_error_rms{rig::unknown};            ///< of estimate / truth - 1, over the samples of slip_rms
+  double final_speed_m_s{rig::unknown};            ///< v_x of the last record
 };
+
+/// A figure that a run has no value for.
+struct MissingFigure {
+  std::string_view name;  ///< as in the summary: "stop_time_s"
+  std::string why;
+};
+/// The figures that are missing from the metrics, each with its reason.
+/// @param end_speed_m_s  as given to RunMetrics
+[[nodiscard]] std::vector<MissingFigure> missing_figures(const Metrics& metrics, double end_speed_m_s);
 
 /// Computes the metrics from a stream of records without storing them.
 class RunMetrics final : public rig::RecordSink {
@@ -35,8 +50,12 @@ class RunMetrics final : public rig::RecordSink {
   RunMetrics(double r2_m, double end_speed_m_s) : r2_m_(r2_m), end_speed_m_s_(end_speed_m_s) {}
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
-  [[nodiscard]] Metrics metrics() const;
+  [[nodiscard]] Metrics metrics() const noexcept;
   /// True once the stop is known and braking is over: later records change no metric.
+  /// True if the car has braked but not stopped so far.
+  [[nodiscard]] bool moves_on() const noexcept {
+    return !std::isnan(metrics_.brake_start_s) && std::isnan(metrics().stop_time_s);
+  }
   [[nodiscard]] bool complete() const noexcept { return !braking_ && !std::isnan(metrics_.stop_time_s); }
 
  private:
@@ -54,6 +73,8 @@ class RunMetrics final : public rig::RecordSink {
     double since_s_{rig::unknown};
   };
 
+  /// Measures the deceleration over intervals of at least 10 ms.
+  void note_deceleration(double time_s, double v_x_m_s) noexcept;
   void consume_braking(const rig::CycleRecord& record, double since_brake_s, double v_x_m_s);
 
   double r2_m_;
@@ -65,6 +86,11 @@ class RunMetrics final : public rig::RecordSink {
   double theta_square_sum_{0.0};
   std::uint64_t slip_samples_{0};
   bool braking_{false};
+  bool stopped_{false};  ///< the last record is of phase stopped, with an estimate below the end speed
+  double last_distance_m_{0.0};
+  double interval_start_s_{rig::unknown};
+  double interval_start_m_s_{0.0};
+  double deceleration_m_s2_{0.0};
   double last_time_s_{rig::unknown};
   double last_torque_Nm_{rig::unknown};
 };

@@ -111,6 +111,12 @@ nlohmann::ordered_json to_json(const RunSummary& s) {
                               {"checks_unjudged", number_or_null(s.checks_unjudged)},
                               {"config", s.config}};
   if (!s.friction_curve.is_null()) json["friction_curve"] = s.friction_curve;
+  json["model"] = s.model.empty() ? s.plant : s.model;
+  json["model_differences"] = s.model_differences;
+  json["missing"] = nlohmann::ordered_json::object();
+  for (const MissingFigure& figure : missing_figures(m, s.end_speed_m_s)) {
+    json["missing"][std::string(figure.name)] = figure.why;
+  }
   return json;
 }
 
@@ -122,13 +128,17 @@ std::string to_text(const RunSummary& s) {
   };
   line("experiment",
        fmt::format("{}, controller {}, plant {}, backend {}", s.experiment, s.controller, s.plant, s.backend));
+  if (!s.model_note.empty()) line("model", "differs from plant: " + s.model_note);
   line("braking started at", shown(m.brake_start_s, 3, "s"));
   line("stop time", shown(m.stop_time_s, 3, "s"));
   line("stop distance", shown(m.stop_distance_m, 2, "m"));
+  for (const MissingFigure& figure : missing_figures(m, s.end_speed_m_s)) {
+    if (figure.name == "stop_time_s") line("no stop", figure.why);
+  }
   line("slip error",
        fmt::format("{} RMS, settled after {}", shown(m.slip_rms, 4, ""), shown(m.slip_settling_s, 3, "s")));
-  line("theta estimate",
-       fmt::format("{}, settled after {}", shown(m.theta_final_N, 2, "N"), shown(m.theta_settling_s, 3, "s")));
+  line("theta estimate", fmt::format("{} at {:.0f} m/s, settled after {}", shown(m.theta_final_N, 2, "N"),
+                                     least_judged_speed_m_s, shown(m.theta_settling_s, 3, "s")));
   if (!s.friction_curve.is_null()) {
     const auto value = [&s](const char* name) {
       return s.friction_curve[name].is_number() ? s.friction_curve[name].get<double>() : rig::unknown;

@@ -33,6 +33,11 @@ struct RunSummary {
   double checks_unjudged{0.0};  ///< share of the run's time in which the gate's checks could not judge the wheels
   nlohmann::ordered_json config{};
   nlohmann::ordered_json friction_curve{};  ///< result of the experiment's analysis; null without one
+  std::string model{};                      ///< name of the controllers' model; empty: the plant
+  /// Where the model differs from the plant, as {"theta_N": {"model": 23, "plant": 40}}; null: the plant is unknown.
+  nlohmann::ordered_json model_differences{};
+  std::string model_note{};   ///< the same in words; empty: nowhere
+  double end_speed_m_s{0.0};  ///< below this speed the car has stopped
 };
 
 /// The summary as JSON, field names as in docs/telemetry.md; NaN becomes null.

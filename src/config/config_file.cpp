@@ -49,16 +49,18 @@ void collect(const toml::table& table, const std::string& prefix, const fs::path
   }
 }
 
+bool is_of_plant(std::string_view name) { return name.starts_with("plant."); }
+
 }  // namespace
 
-std::vector<FileValue> read_file(const fs::path& file, std::string_view only_table) {
+std::vector<FileValue> read_file(const fs::path& file, Tables tables) {
   toml::table table = parse(file);
   table.erase("description");
-  if (!only_table.empty()) {
+  if (tables == Tables::of_plant) {
     for (const auto& [key, node] : table) {
-      if (key.str() == only_table && node.is_table()) continue;
-      throw ConfigError(fmt::format("{}:{}: {} does not belong in this file; give the table [{}] only", file.string(),
-                                    node.source().begin.line, std::string_view(key.str()), only_table));
+      if ((key.str() == "plant" || key.str() == "model") && node.is_table()) continue;
+      throw ConfigError(fmt::format("{}:{}: {} does not belong in this file; give the tables [plant] and [model] only",
+                                    file.string(), node.source().begin.line, std::string_view(key.str())));
     }
   }
   std::vector<FileValue> values;
@@ -70,8 +72,50 @@ void set_all(const std::vector<FileValue>& values, KeyTable& keys) {
   for (const FileValue& value : values) keys.set(value.name, value.value, value.origin);
 }
 
-void load_file(const fs::path& file, KeyTable& keys, std::string_view only_table) {
-  set_all(read_file(file, only_table), keys);
+void load_file(const fs::path& file, KeyTable& keys, Tables tables) { set_all(read_file(file, tables), keys); }
+
+bool names_plant(const std::vector<FileValue>& values) {
+  return std::any_of(values.begin(), values.end(), [](const FileValue& value) { return is_of_plant(value.name); });
+}
+
+std::vector<FileValue> as_model(const std::vector<FileValue>& values) {
+  Settings defaults;
+  const KeyTable table(defaults);
+  const auto is_given = [&values](std::string_view name) {
+    return std::any_of(values.begin(), values.end(), [name](const FileValue& value) { return value.name == name; });
+  };
+  std::vector<FileValue> model;
+  for (const FileValue& value : values) {
+    if (const Key* key = model_key(table.keys(), value.name)) {
+      if (!is_given(key->name)) model.push_back({key->name, value.value, value.origin});
+      continue;
+    }
+    const bool known = find_key(table.keys(), value.name) != nullptr;
+    // A misspelled name goes on to KeyTable::set, which refuses it and names the nearest key.
+    if (!is_of_plant(value.name) || !known) model.push_back(value);
+    const auto* text = std::get_if<std::string>(&value.value);
+    if (is_of_plant(value.name) && value.name.ends_with("_profile") && text != nullptr && !text->empty()) {
+      throw ConfigError(
+          fmt::format("{}: {}: only a simulated plant can follow a profile; leave it out or use --backend sim",
+                      value.origin, value.name));
+    }
+  }
+  return model;
+}
+
+std::vector<FileValue> read_model(const fs::path& file) {
+  const std::vector<FileValue> given = read_file(file, Tables::of_plant);
+  std::vector<FileValue> model;
+  if (names_plant(given)) {
+    Settings defaults;
+    const KeyTable table(defaults);
+    for (const Key& key : table.keys()) {
+      if (!key.name.starts_with("model.")) continue;
+      model.push_back({key.name, std::visit([](const auto* value) { return Value(*value); }, key.target), file});
+    }
+  }
+  for (FileValue& value : as_model(given)) model.push_back(std::move(value));
+  return model;
 }
 
 namespace {
@@ -103,7 +147,7 @@ fs::path config_dir() {
   return given != nullptr ? first_folder({given}) : own_config_dir();
 }
 
-fs::path plant_file(std::string_view name_or_file) {
+fs::path plant_file(std::string_view name_or_file, std::string_view option) {
   fs::path given(name_or_file);
   if (given.has_parent_path() || given.extension() == ".toml") return given;
   fs::path named = config_dir() / "plants" / fmt::format("{}.toml", name_or_file);
@@ -112,9 +156,8 @@ fs::path plant_file(std::string_view name_or_file) {
   const std::vector<PlantEntry> known = known_plants();
   names.reserve(known.size());
   for (const PlantEntry& plant : known) names.push_back(plant.name);
-  throw ConfigError(
-      fmt::format("--plant: unknown plant \"{}\"; the nearest known is {}; known: {}; or give a TOML file",
-                  name_or_file, rig::nearest_name(name_or_file, names), fmt::join(names, ", ")));
+  throw ConfigError(fmt::format("{}: unknown plant \"{}\"; the nearest known is {}; known: {}; or give a TOML file",
+                                option, name_or_file, rig::nearest_name(name_or_file, names), fmt::join(names, ", ")));
 }
 
 std::vector<PlantEntry> known_plants() {

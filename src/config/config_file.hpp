@@ -16,13 +16,27 @@ struct FileValue {
   std::string origin;  ///< "FILE:LINE"
 };
 
+/// The tables that a file may hold.
+enum class Tables {
+  all,
+  of_plant,  ///< [plant] and [model] only: the file of a plant or a model
+};
+
 /// Reads a TOML file. Throws ConfigError, naming file and line.
-/// @param only_table if not empty, the one table that the file may hold ("plant")
-[[nodiscard]] std::vector<FileValue> read_file(const std::filesystem::path& file, std::string_view only_table = {});
+[[nodiscard]] std::vector<FileValue> read_file(const std::filesystem::path& file, Tables tables = Tables::all);
 /// Sets every value, in order. Throws ConfigError for one that its key does not take.
 void set_all(const std::vector<FileValue>& values, KeyTable& table);
 /// Reads a TOML file and sets every value in it.
-void load_file(const std::filesystem::path& file, KeyTable& table, std::string_view only_table = {});
+void load_file(const std::filesystem::path& file, KeyTable& table, Tables tables = Tables::all);
+
+/// Values of the plant as values of the model, for a rig. The file's own [model] takes precedence over its [plant].
+/// Values that only a simulated plant has are left out. Throws ConfigError for a profile, which no rig can follow.
+[[nodiscard]] std::vector<FileValue> as_model(const std::vector<FileValue>& values);
+/// True if as_model would change one of the values.
+[[nodiscard]] bool names_plant(const std::vector<FileValue>& values);
+/// Reads the file of a model. Its table [plant] is a whole model: values that it does not name have their defaults. A
+/// table [model] alone gives only the values that it names. Throws ConfigError, naming file and line.
+[[nodiscard]] std::vector<FileValue> read_model(const std::filesystem::path& file);
 
 /// The folder of configuration files that belongs to this program: $ABS_HIL_CONFIG_DIR, else the installed one beside
 /// the program, else the source tree's. Throws ConfigError if there is none.
@@ -31,8 +45,9 @@ void load_file(const std::filesystem::path& file, KeyTable& table, std::string_v
 /// The folder that came with the program: as config_dir(), but without $ABS_HIL_CONFIG_DIR.
 [[nodiscard]] std::filesystem::path own_config_dir();
 
-/// A plant by name or file: `name` alone is config_dir()/plants/name.toml. Throws ConfigError, naming the known ones.
-[[nodiscard]] std::filesystem::path plant_file(std::string_view name_or_file);
+/// A plant by name or file: `name` alone is config_dir()/plants/name.toml. Throws ConfigError, naming `option` and the
+/// known plants.
+[[nodiscard]] std::filesystem::path plant_file(std::string_view name_or_file, std::string_view option = "--plant");
 
 struct PlantEntry {
   std::string name;

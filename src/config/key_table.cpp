@@ -82,12 +82,35 @@ nlohmann::ordered_json value_of(const Key& key) {
   return std::visit([](const auto* target) { return nlohmann::ordered_json(*target); }, key.target);
 }
 
+void copy(const Key& from, const Key& to) {
+  std::visit([&from](auto* target) { *target = *std::get<std::remove_cvref_t<decltype(target)>>(from.target); },
+             to.target);
+}
+
+constexpr std::string_view plant_prefix = "plant.";
+constexpr std::string_view model_prefix = "model.";
+
 }  // namespace
 
 KeyTable::KeyTable(Settings& settings) {
   rig::for_each_option(settings, {}, [this](const std::string& name, const rig::OptionFacts& facts, auto& value) {
     keys_.push_back({facts, name, &value});
   });
+  if (settings.model == settings.plant.rig) return;
+  for (const Key& key : keys_) {
+    const Key* model = model_key(keys_, key.name);
+    if (model != nullptr && value_of(*model) != value_of(key)) set_.insert(model->name);
+  }
+}
+
+const Key* find_key(const std::vector<Key>& keys, std::string_view name) {
+  const auto at = std::find_if(keys.begin(), keys.end(), [name](const Key& key) { return key.name == name; });
+  return at == keys.end() ? nullptr : &*at;
+}
+
+const Key* model_key(const std::vector<Key>& keys, std::string_view name) {
+  if (!name.starts_with(plant_prefix)) return nullptr;
+  return find_key(keys, std::string(model_prefix).append(name.substr(plant_prefix.size())));
 }
 
 std::string section_of(std::string_view controller) {
@@ -101,17 +124,48 @@ Value parse_value(const Key& key, std::string_view text) {
 }
 
 const Key& KeyTable::find(std::string_view name, std::string_view origin) const {
+  if (const Key* key = find_key(keys_, name)) return *key;
   std::vector<std::string_view> names;
   for (const Key& key : keys_) {
-    if (key.name == name) return key;
-    names.push_back(key.name);
+    if (has_plant_ || !key.name.starts_with(plant_prefix)) names.push_back(key.name);
   }
   throw ConfigError(fmt::format("{}: unknown key {}; the nearest known key is {} (abs_hil list --keys shows all)",
                                 origin, name, fmt::join(rig::nearest_keys(name, names), " or ")));
 }
 
+void KeyTable::refuse_plant(std::string_view name, std::string_view origin) const {
+  if (has_plant_ || !name.starts_with(plant_prefix)) return;
+  if (const Key* model = model_key(keys_, name)) {
+    throw ConfigError(fmt::format("{}: {}: a rig has no simulated plant; set {}, the value that the controllers use",
+                                  origin, name, model->name));
+  }
+  throw ConfigError(
+      fmt::format("{}: {}: only a simulated plant has this value; leave it out or use --backend sim", origin, name));
+}
+
+void KeyTable::carry_over(const Key& key) {
+  if (const Key* model = model_key(keys_, key.name)) {
+    if (!set_.contains(model->name)) copy(key, *model);
+  } else if (!has_plant_ && key.name.starts_with(model_prefix)) {
+    copy(key, *find_key(keys_, std::string(plant_prefix).append(key.name.substr(model_prefix.size()))));
+  }
+}
+
+void KeyTable::leave_out_plant() {
+  has_plant_ = false;
+  for (const Key& key : keys_) {
+    if (key.name.starts_with(model_prefix)) carry_over(key);
+  }
+}
+
+bool KeyTable::is_effective(const Key& key) const {
+  if (key.name.starts_with(plant_prefix)) return has_plant_;
+  return !has_plant_ || !key.name.starts_with(model_prefix) || set_.contains(key.name);
+}
+
 void KeyTable::set(std::string_view name, const Value& value, std::string_view origin) {
   const Key& key = find(name, origin);
+  refuse_plant(name, origin);
   std::visit(
       [&](auto* target) {
         using Target = std::decay_t<decltype(*target)>;
@@ -134,6 +188,7 @@ void KeyTable::set(std::string_view name, const Value& value, std::string_view o
       },
       key.target);
   set_.emplace(name);
+  carry_over(key);
 }
 
 void KeyTable::set_text(std::string_view assignment, std::string_view origin) {
@@ -151,6 +206,7 @@ std::string KeyTable::to_toml() const {
   // Each table is written once. The tables have the order of their first keys.
   std::vector<std::pair<std::string_view, std::string>> tables;
   for (const Key& key : keys_) {
+    if (!is_effective(key)) continue;
     const std::size_t dot = key.name.rfind('.');
     const std::string_view table = std::string_view(key.name).substr(0, dot);
     auto at = std::find_if(tables.begin(), tables.end(), [&](const auto& known) { return known.first == table; });
@@ -175,6 +231,7 @@ std::string KeyTable::to_toml() const {
 nlohmann::ordered_json KeyTable::to_json() const {
   nlohmann::ordered_json root;
   for (const Key& key : keys_) {
+    if (!is_effective(key)) continue;
     nlohmann::ordered_json* node = &root;
     std::string_view rest = key.name;
     for (std::size_t dot = rest.find('.'); dot != std::string_view::npos; dot = rest.find('.')) {

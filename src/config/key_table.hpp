@@ -26,14 +26,25 @@ using Value = std::variant<double, std::int64_t, bool, std::string>;
 /// Converts `text` to a value for the key. A key of text takes it unchanged; other keys read it as TOML would.
 [[nodiscard]] Value parse_value(const Key& key, std::string_view text);
 
+/// The key with this name; null without one.
+[[nodiscard]] const Key* find_key(const std::vector<Key>& keys, std::string_view name);
+
+/// "model.x" for "plant.x"; null for a value that only the plant has, and for a name that is not of the plant.
+[[nodiscard]] const Key* model_key(const std::vector<Key>& keys, std::string_view name);
+
 /// The prefix of a controller's own keys: "control.sliding_mode.".
 [[nodiscard]] std::string section_of(std::string_view controller);
 
 /// All configuration values by their dotted names. The table is made from the rows of the options.
+/// A value `model.x` that nobody sets follows `plant.x`, in whatever order the values are set.
 class KeyTable {
  public:
-  /// Refers to `settings`, which must outlive the table.
+  /// Refers to `settings`, which must outlive the table. A value of its model that is not the plant's counts as set.
   explicit KeyTable(Settings& settings);
+
+  /// For a real rig, which has a model but no simulated plant: from now on `set` refuses `plant.`, the plant's values
+  /// follow the model's, and the effective configuration contains the whole model instead of the plant.
+  void leave_out_plant();
 
   /// Sets a value. `origin` says where it came from ("--set", "FILE:LINE"). Throws ConfigError for an unknown name
   /// (with the nearest known one), a value of the wrong type or out of range; then nothing changes.
@@ -51,8 +62,14 @@ class KeyTable {
 
  private:
   [[nodiscard]] const Key& find(std::string_view name, std::string_view origin) const;
+  /// True if the value is part of the effective configuration.
+  [[nodiscard]] bool is_effective(const Key& key) const;
+  void refuse_plant(std::string_view name, std::string_view origin) const;
+  /// Carries a new value over to the other of plant and model, if that one follows.
+  void carry_over(const Key& key);
 
   std::vector<Key> keys_;
+  bool has_plant_{true};
   std::set<std::string, std::less<>> set_;  ///< names of the values that a file or an option gave
 };
 

@@ -52,7 +52,7 @@ experiment::Adjustment LiveSettings::set(const std::string& key, double value) {
   } else {
     adjustment.kind = experiment::Adjustment::Kind::controller;
     const auto make = [](const Settings& s) {
-      return control::make_controller(s.control.controller, {s.control, s.plant.rig});
+      return control::make_controller(s.control.controller, {s.control, s.model});
     };
     try {
       adjustment.controller = make(changed);

@@ -21,12 +21,6 @@ using rig::Reason;
 /// Slack on the time limit of phases that end by their duration.
 constexpr double duration_slack_s = 1.0;
 
-const config::Key* find(const config::KeyTable& keys, std::string_view name) {
-  const auto& all = keys.keys();
-  const auto at = std::find_if(all.begin(), all.end(), [name](const config::Key& key) { return key.name == name; });
-  return at == all.end() ? nullptr : &*at;
-}
-
 std::optional<double> number_of(const config::Key& key) {
   return std::visit(
       [](const auto* target) -> std::optional<double> {
@@ -185,7 +179,7 @@ double highest(const experiment::Profile& profile, double constant) {
 
 double value_of(const Script& script, const Number& number, const config::KeyTable& keys) {
   if (number.key.empty()) return number.value;
-  const config::Key* key = find(keys, number.key);
+  const config::Key* key = find_key(keys.keys(), number.key);
   const double value = key == nullptr ? std::nan("") : number_of(*key).value_or(std::nan(""));
   if (!number.range.contains(value)) {
     throw config::ConfigError(fmt::format("{}: ${} is {} in this configuration; give a value in {}{}{}",
@@ -196,7 +190,7 @@ double value_of(const Script& script, const Number& number, const config::KeyTab
 }
 
 bool holds(const When& when, const config::KeyTable& keys) {
-  const config::Key* key = find(keys, when.key);
+  const config::Key* key = find_key(keys.keys(), when.key);
   if (key == nullptr) return false;
   if (const std::optional<double> value = number_of(*key)) {
     const config::Value wanted = config::parse_value(*key, when.value);
@@ -209,6 +203,26 @@ bool holds(const When& when, const config::KeyTable& keys) {
     return when.operation == "<=" ? *value <= other : *value >= other;
   }
   return (text_of(*key) == when.value) == (when.operation == "=");
+}
+
+bool means_to_stop(const Plan& plan, double end_speed_m_s) {
+  const auto& phases = plan.phases;
+  const auto brakes = [](const experiment::PhasePlan& phase) { return phase.phase == rig::Phase::brake; };
+  // The planner adds the least speed of slip control to a phase: it is not the script's own condition.
+  const auto is_foreign = [](const experiment::EndCondition& end) {
+    return end.reason == Reason::slip_control_left_at_low_speed;
+  };
+  const auto is_stop = [&](const experiment::EndCondition& end) {
+    return end.kind == EndKind::standstill ||
+           (end.kind == EndKind::car_speed_below && end.value <= end_speed_m_s && !is_foreign(end));
+  };
+  const auto last = std::find_if(phases.rbegin(), phases.rend(), brakes);
+  if (last == phases.rend()) return false;
+  return std::any_of(std::prev(last.base()), phases.end(), [&](const experiment::PhasePlan& phase) {
+    return std::any_of(phase.ends_on.begin(), phase.ends_on.end(), is_stop) &&
+           std::all_of(phase.ends_on.begin(), phase.ends_on.end(),
+                       [&](const auto& end) { return is_stop(end) || is_foreign(end); });
+  });
 }
 
 Plan plan(const Script& script, const config::Settings& settings) { return Planner(script, settings).make(); }
@@ -237,7 +251,7 @@ void apply(const Script& script, config::Settings& s) {
 std::vector<std::string> beyond_limits(const Plan& plan, const config::Settings& s) {
   std::vector<std::string> problems;
   const double most_torque_Nm =
-      s.plant.ideal_actuator ? 1e9 : rig::brake_torque_at(s.plant.rig.brake, s.gate.brake_duty_max);
+      s.plant.ideal_actuator ? 1e9 : rig::brake_torque_at(s.model.brake, s.gate.brake_duty_max);
   for (std::size_t i = 0; i < plan.phases.size(); ++i) {
     const experiment::PhasePlan& phase = plan.phases[i];
     const auto compare = [&](double wanted, double most, std::string_view what, std::string_view unit) {
@@ -256,7 +270,7 @@ std::vector<std::string> beyond_limits(const Plan& plan, const config::Settings&
         compare(end.value, s.gate.overspeed_rad_s, "speed to wait for", " rad/s");
       }
       if (end.kind == EndKind::car_speed_above) {
-        compare(end.value / s.plant.rig.wheels.r2_m, s.gate.overspeed_rad_s, "speed to wait for", " rad/s");
+        compare(end.value / s.model.wheels.r2_m, s.gate.overspeed_rad_s, "speed to wait for", " rad/s");
       }
     }
   }

@@ -34,6 +34,10 @@ void apply(const Script& script, config::Settings& settings);
 /// True if the condition holds under these settings.
 [[nodiscard]] bool holds(const When& when, const config::KeyTable& keys);
 
+/// True if the plan brakes and then waits for a stop: its last phase of kind brake, or one after it, ends only at
+/// standstill or below a car speed of at most `end_speed_m_s`.
+[[nodiscard]] bool means_to_stop(const Plan& plan, double end_speed_m_s);
+
 /// Describes where the script exceeds the limits of rig, gate or board under these settings; empty: nowhere. A run
 /// stays within the limits.
 [[nodiscard]] std::vector<std::string> beyond_limits(const Plan& plan, const config::Settings& settings);

@@ -34,11 +34,16 @@ struct CommandOptions {
   ABS_HIL_OPTION(std::string, key_file, "", .meaning = "file with the secret that senders of commands must know");
 };
 
-/// One effective configuration. Later sources override earlier ones: the defaults, the plant's file, the configuration
-/// file, the command line.
+/// One effective configuration. Later sources override earlier ones: the defaults, the plant's file, the model's file,
+/// the configuration file, the command line.
 struct Settings {
   ABS_HIL_OPTIONS(Settings);
+  /// The simulated rig, the truth of a run in simulation. On a board, where the truth is unknown, `plant.rig` is the
+  /// model (KeyTable::leave_out_plant).
   ABS_HIL_GROUP(plant_sim::PlantOptions, plant, "plant.", {});
+  /// The rig as controllers, observers, actuator estimate, feed-forward, gate and board limits know it. KeyTable gives
+  /// each value that nobody sets the plant's value.
+  ABS_HIL_GROUP(rig::RigParameters, model, "model.", {});
   ABS_HIL_GROUP(control::ControlOptions, control, "control.", {});
   ABS_HIL_GROUP(experiment::ExperimentOptions, experiment, "experiment.", {});
   ABS_HIL_GROUP(driver::DriverOptions, driver, "driver.", {});
@@ -52,7 +57,10 @@ struct Settings {
   ABS_HIL_OPTION(std::int64_t, seed, 1, .key = "run.seed", .meaning = "seed of everything random in the simulator",
                  .range = rig::from_zero(9e15));
   std::string plant_name{"paper-table1"};
+  std::string model_name{};  ///< of the file that the model came from; empty: it follows the plant
   std::string backend{"sim"};
+
+  [[nodiscard]] bool on_rig() const noexcept { return backend == "rig"; }
 };
 
 /// What the outputs of the settings' backend make of a command. Throws driver::Unavailable for an unknown board.

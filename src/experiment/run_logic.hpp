@@ -23,14 +23,15 @@ namespace abs_hil::experiment {
 /// The parts of a run's logic.
 struct RunLogicParts {
   const control::ControlOptions& control;
-  const rig::RigParameters& rig;  ///< nominal parameters, as the controller knows them
+  const rig::RigParameters& rig;  ///< the model: the parameters as the controller knows them
   std::unique_ptr<control::SlipController> controller;
   std::vector<std::string> signals;  ///< names of the controller's own signals
   Sequence sequence;
   bool ideal_actuator{false};
-  double max_brake_duty{1.0};     ///< limit of the command gate
-  double start_speed_rad_s{0.0};  ///< both wheels' speed at the first measurement
-  std::uint32_t duty_steps{0};    ///< of the driver's PWMs, from duty 0 to duty 1; 0: any duty can be sent
+  double max_brake_duty{1.0};             ///< limit of the command gate
+  double start_speed_rad_s{0.0};          ///< both wheels' speed at the first measurement
+  double recorded_r2_m{rig.wheels.r2_m};  ///< lower wheel's radius behind the recorded speeds: the plant's, if known
+  std::uint32_t duty_steps{0};            ///< of the driver's PWMs, from duty 0 to duty 1; 0: any duty can be sent
 };
 
 /// Makes the parts of a run with the controller named in `control`. Throws std::invalid_argument for unusable options.

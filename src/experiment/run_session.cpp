@@ -54,7 +54,7 @@ RunSession::RunSession(runtime::Clock& clock, driver::RigDriver& driver, RunLogi
       gate_(logic_.make_gate(gate_options)),
       ring_(ring_capacity),
       executive_(clock, driver, logic_, gate_, ring_, period_ns_for(parts.control.rate_Hz), overruns),
-      pump_(ring_, parts.rig.wheels.r2_m, std::move(sinks)) {}
+      pump_(ring_, parts.recorded_r2_m, std::move(sinks)) {}
 
 RunOutcome RunSession::outcome() const {
   return {.reason = logic_.end_reason(),

@@ -1,14 +1,19 @@
 #include "program/command_line.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
+#include <filesystem>
+#include <mutex>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "config/events.hpp"
 #include "config/key_table.hpp"
 #include "config/library.hpp"
+#include "config/model.hpp"
 #include "config/plan.hpp"
 #include "driver/injection/injection.hpp"
 #include "runtime/board_policy.hpp"
@@ -17,9 +22,22 @@ namespace abs_hil::program {
 
 namespace {
 
-runtime::RealtimeMode realtime_mode(const std::string& name) {
-  if (name == "require") return runtime::RealtimeMode::require;
-  return name == "off" ? runtime::RealtimeMode::off : runtime::RealtimeMode::prefer;
+/// The mode of --rt; none: real time is required on a real board, otherwise preferred.
+runtime::RealtimeMode realtime_mode(const std::optional<std::string>& name, const config::Settings& s) {
+  if (!name) {
+    const bool real = s.on_rig() && runtime::is_real_board(s.driver);
+    return real ? runtime::RealtimeMode::require : runtime::RealtimeMode::prefer;
+  }
+  if (*name == "require") return runtime::RealtimeMode::require;
+  return *name == "off" ? runtime::RealtimeMode::off : runtime::RealtimeMode::prefer;
+}
+
+/// Logs a warning once: each run of a series is merged anew.
+void warn_once(const std::string& text) {
+  static std::mutex mutex;
+  static std::set<std::string> logged;
+  const std::scoped_lock lock(mutex);
+  if (logged.insert(text).second) spdlog::warn("{}", text);
 }
 
 /// Checks that a run that waits for a start command can receive one.
@@ -54,15 +72,6 @@ void refuse_events(const config::Script& script, bool emulated) {
   }
 }
 
-/// Refuses profiles of plant parameters, which only a simulated plant can follow.
-void refuse_profiles(config::Settings& s) {
-  for (const config::ChangingPart& part : config::changing_parts()) {
-    if (part.profile(s).empty()) continue;
-    throw config::ConfigError(fmt::format(
-        "plant.{}_profile: only a simulated plant can follow a profile; leave it out or use --backend sim", part.what));
-  }
-}
-
 /// Options that contradict one another.
 void check_together(const RunRequest& request) {
   const config::Settings& s = request.settings;
@@ -87,34 +96,69 @@ void apply_board_policy(config::Settings& s, const config::KeyTable& keys, bool 
   runtime::refuse_caps_above_board({.brake = keys.was_set("gate.brake_duty_max") ? s.gate.brake_duty_max : 0.0,
                                     .motor = keys.was_set("gate.motor_duty_max") ? s.gate.motor_duty_max : 0.0},
                                    s.driver);
-  runtime::apply_board_limits(s.plant.rig, s.control.rate_Hz, s.gate, s.driver);
+  runtime::apply_board_limits(s.model, s.control.rate_Hz, s.gate, s.driver);
 }
 
 /// The configuration files of a run, each read once.
 struct Files {
   std::vector<config::FileValue> plant{};
+  std::vector<config::FileValue> model{};
   std::vector<config::FileValue> config{};
 };
 
+/// A rig has no simulated plant: values of the plant are taken as values of the model, with a warning.
+std::vector<config::FileValue> taken_as_model(const std::vector<config::FileValue>& values, const std::string& where) {
+  if (!config::names_plant(values)) return values;
+  warn_once(where +
+            ": a rig has no simulated plant; its table [plant] is taken as [model]. Write [model]: a later "
+            "version will refuse [plant]");
+  return config::as_model(values);
+}
+
 Files read_files(const RunOptions& options, const std::string& default_plant) {
-  Files files{.plant = config::read_file(config::plant_file(options.plant.value_or(default_plant)), "plant")};
+  const std::filesystem::path plant = config::plant_file(options.plant.value_or(default_plant));
+  Files files{.plant = config::read_file(plant, config::Tables::of_plant)};
+  if (options.model) files.model = config::read_model(config::plant_file(*options.model, "--model"));
   if (options.config_file) files.config = config::read_file(*options.config_file);
+  if (options.backend != "rig") return files;
+  if (options.plant) {
+    warn_once(
+        fmt::format("--plant {0}: a rig has no simulated plant; it is taken as --model {0}. Write --model: a "
+                    "later version will refuse --plant",
+                    *options.plant));
+  }
+  files.plant = config::as_model(files.plant);
+  files.config = taken_as_model(files.config, options.config_file.value_or(""));
   return files;
+}
+
+std::vector<config::FileValue> settings_of(const config::Script& script, bool on_rig) {
+  std::vector<config::FileValue> values;
+  for (const config::Setting& setting : script.settings) {
+    values.push_back({setting.key, setting.value, script.at(setting.place)});
+  }
+  return on_rig ? taken_as_model(values, script.path) : values;
+}
+
+/// The names of plant and model. On a rig the plant's name is the model's.
+void set_names(config::Settings& s, const RunOptions& options) {
+  if (options.plant) s.plant_name = *options.plant;
+  if (options.model) s.model_name = *options.model;
+  if (!s.on_rig()) return;
+  if (!options.model) s.model_name = s.plant_name;
+  s.plant_name = s.model_name;
 }
 
 /// Everything but what the script asks for beyond its settings.
 void fill(config::Settings& s, config::KeyTable& keys, const RunOptions& options, const Files& files,
           const config::Script* script) {
   s.backend = options.backend;
-  s.realtime.mode = realtime_mode(options.realtime);
+  if (s.on_rig()) keys.leave_out_plant();
   for (const std::string& assignment : options.defaults) keys.set_text(assignment, "default");
-  if (options.plant) s.plant_name = *options.plant;
+  set_names(s, options);
   config::set_all(files.plant, keys);
-  if (script != nullptr) {
-    for (const config::Setting& setting : script->settings) {
-      keys.set(setting.key, setting.value, script->at(setting.place));
-    }
-  }
+  config::set_all(files.model, keys);
+  if (script != nullptr) config::set_all(settings_of(*script, s.on_rig()), keys);
   config::set_all(files.config, keys);
 
   const auto set = [&keys](const char* key, const std::optional<std::string>& value, const char* option) {
@@ -128,6 +172,7 @@ void fill(config::Settings& s, config::KeyTable& keys, const RunOptions& options
   for (const std::string& assignment : options.assignments) keys.set_text(assignment, "--set");
   for (const std::string& injection : options.injections) s.inject += (s.inject.empty() ? "" : ",") + injection;
   if (options.wait_for_start) keys.set_text("experiment.wait_for_start=true", "--wait-for-start");
+  s.realtime.mode = realtime_mode(options.realtime, s);
 }
 
 /// The experiment that options and files name. The settings of its script rank below theirs.
@@ -150,20 +195,21 @@ RunRequest merge(const RunOptions& options) {
   config::KeyTable keys(s);
   fill(s, keys, options, files, &script);
   check_together(request);
-  if (s.backend == "rig") {
-    refuse_profiles(s);
-    refuse_events(script, s.driver.emulated);
-  }
+  if (s.on_rig()) refuse_events(script, s.driver.emulated);
   config::apply(script, s);
   static_cast<void>(driver::parse_injections(s.inject));  // in simulation too, a fault is spelled right or refused
-  if (s.backend == "rig") apply_board_policy(s, keys, request.outputs.fast);
+  if (s.on_rig()) apply_board_policy(s, keys, request.outputs.fast);
+  for (const std::string& problem : config::theta_out_of_bounds(s)) warn_once(problem);
+  if (const std::string problem = config::standstill_too_early(s); !problem.empty()) warn_once(problem);
   nlohmann::ordered_json config = keys.to_json();
   config["experiment_script"] = script.text;
   if (!script.files.empty()) config["experiment_files"] = script.files;
   request.config_json = config.dump();
+  const std::string plant = s.on_rig() ? "" : " --plant " + s.plant_name;
+  const std::string model = s.model_name.empty() ? "" : " --model " + s.model_name;
   request.config_toml = fmt::format(
-      "# Effective configuration of a run. To run it again: abs_hil --backend {} --plant {} --config THIS_FILE\n{}",
-      s.backend, s.plant_name, keys.to_toml());
+      "# Effective configuration of a run. To run it again: abs_hil --backend {}{}{} --config THIS_FILE\n{}", s.backend,
+      plant, model, keys.to_toml());
   return request;
 }
 

@@ -36,6 +36,7 @@ struct RunOptions {
   std::string backend{"sim"};
   std::optional<std::string> config_file{};
   std::optional<std::string> plant{};
+  std::optional<std::string> model{};
   std::optional<std::string> controller{};
   std::optional<std::string> experiment{};
   std::optional<std::string> slip_ref{};
@@ -45,13 +46,13 @@ struct RunOptions {
   std::vector<std::string> assignments{};
   bool wait_for_start{false};
   std::vector<std::string> injections{};  ///< faults to inject, in addition to those of run.inject
-  std::string realtime{"prefer"};
+  std::optional<std::string> realtime{};  ///< --rt; none: require on a real board, otherwise prefer
   OutputOptions outputs{};
 };
 
 /// The options of `abs_hil compare` as typed.
 struct CompareOptions {
-  RunOptions run{};  ///< only plant, configuration file and assignments are used
+  RunOptions run{};  ///< only plant, model, configuration file and assignments are used
   std::vector<std::string> controllers{"adaptive", "sliding-mode"};
   std::size_t repeat{100};
   std::uint64_t seed{1};
@@ -77,8 +78,8 @@ struct RunRequest {
   std::function<void()> stop_was_sent{};
 };
 
-/// Merges defaults, plant file, the script's settings, configuration file, named options and assignments; later ones
-/// win. Throws config::ConfigError.
+/// Merges defaults, plant file, model file, the script's settings, configuration file, named options and assignments;
+/// later ones win. Throws config::ConfigError.
 [[nodiscard]] RunRequest merge(const RunOptions& options);
 
 }  // namespace abs_hil::program

@@ -32,7 +32,11 @@ void add_backend_option(cli::Parser& parser, program::RunOptions& o) {
 void add_configuration_options(cli::Parser& parser, program::RunOptions& o) {
   parser.add(
       {.names = "--config", .to = &o.config_file, .help = "TOML file with any configuration values", .type = "FILE"});
-  parser.add({.names = "--plant", .to = &o.plant, .help = "plant by name or TOML file", .type = "NAME|FILE"});
+  parser.add({.names = "--plant", .to = &o.plant, .help = "simulated plant by name or TOML file", .type = "NAME|FILE"});
+  parser.add({.names = "--model",
+              .to = &o.model,
+              .help = "the controllers' model of the rig, by name or TOML file (default: the plant)",
+              .type = "NAME|FILE"});
   parser.add({.names = "--controller", .to = &o.controller, .help = "slip controller", .type = "NAME"});
   parser.add({.names = "--set",
               .to = &o.assignments,
@@ -45,9 +49,9 @@ void add_timing_options(cli::Parser& parser, program::RunOptions& o) {
   parser.add({.names = "--rate", .to = &o.rate_Hz, .help = "control cycles per second, 100 to 10000", .type = "HZ"});
   parser.add({.names = "--rt",
               .to = &o.realtime,
-              .help = "real-time scheduling: required, preferred or off",
-              .one_of = {"require", "prefer", "off"},
-              .show_default = true});
+              .help = "real-time scheduling: required, preferred or off (default: require on a real board, otherwise "
+                      "prefer)",
+              .one_of = {"require", "prefer", "off"}});
   parser.add({.names = "--histogram",
               .to = &o.outputs.histogram_file,
               .help = "write latency histograms in cyclictest's format",
@@ -163,6 +167,10 @@ void add_latency(cli::Parser& parser, LatencyCommand& command) {
 cli::Parser add_compare(cli::Parser& parser, program::CompareOptions& o) {
   cli::Parser compare = parser.add_subcommand("compare", "compare controllers in simulation on the same varied plants");
   compare.add({.names = "--plant", .to = &o.run.plant, .help = "plant by name or TOML file", .type = "NAME|FILE"});
+  compare.add({.names = "--model",
+               .to = &o.run.model,
+               .help = "every controller's model (default: the plant, before it varies)",
+               .type = "NAME|FILE"});
   compare.add({.names = "--controllers",
                .to = &o.controllers,
                .help = "controllers; the first one is the baseline",

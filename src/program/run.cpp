@@ -13,6 +13,7 @@
 
 #include "analysis/run_metrics.hpp"
 #include "analysis/run_summary.hpp"
+#include "config/model.hpp"
 #include "config/plan.hpp"
 #include "control/silent_settings.hpp"
 #include "driver/factory.hpp"
@@ -45,6 +46,16 @@ std::string reason_text(const experiment::RunOutcome& outcome, const std::string
   return text;
 }
 
+/// Where the model differs from the plant; null on a rig, whose plant is unknown.
+nlohmann::ordered_json differences_json(const config::Settings& s) {
+  if (s.on_rig()) return nullptr;
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (const config::ModelDifference& d : config::model_differences(s)) {
+    json[d.name] = {{"model", d.model}, {"plant", d.plant}};
+  }
+  return json;
+}
+
 analysis::RunSummary summarise(const RunRequest& request, const experiment::RunSession& session,
                                const experiment::RunOutcome& outcome, const RunOutputs& outputs) {
   const config::Settings& s = request.settings;
@@ -67,7 +78,11 @@ analysis::RunSummary summarise(const RunRequest& request, const experiment::RunS
           .gate = session.gate().counts(),
           .checks_unjudged = session.gate().unjudged_share(),
           .config = nlohmann::ordered_json::parse(request.config_json),
-          .friction_curve = outputs.friction_curve_json()};
+          .friction_curve = outputs.friction_curve_json(),
+          .model = s.model_name,
+          .model_differences = differences_json(s),
+          .model_note = config::in_words(config::model_differences(s)),
+          .end_speed_m_s = s.experiment.end_speed_m_s};
 }
 
 run_folder::RunEnvironment environment(const RunRequest& request, const driver::RigDriver& driver,
@@ -121,7 +136,9 @@ int status_of(const experiment::RunOutcome& outcome) {
 }
 
 std::string realtime_refusal(const runtime::RealtimeReport& report) {
-  return "--rt require: real-time scheduling is unavailable on this computer; nothing has moved\n" +
+  return "--rt require (the default on a real board): real-time scheduling is unavailable on this computer; nothing "
+         "has "
+         "moved. Mend the following; --rt prefer runs without it\n" +
          report.shortcomings();
 }
 
@@ -205,7 +222,8 @@ int run(const RunRequest& request) {
   if (s.experiment.wait_for_start) phase_names.insert(phase_names.begin(), "waiting for the start");
   for (const std::string& problem : config::beyond_limits(plan, s))
     spdlog::warn("{}; the gate limits it to that", problem);
-  for (const std::string& problem : control::silent_settings(s.control, s.plant.rig)) spdlog::warn("{}", problem);
+  for (const std::string& problem : control::silent_settings(s.control)) spdlog::warn("{}", problem);
+  const bool to_stop = config::means_to_stop(plan, s.experiment.end_speed_m_s);
   experiment::RunLogicParts logic = make_logic(s, std::move(plan.phases), plan.limits);
   require_resources(request, *driver);
   RunOutputs outputs(request, logic.signals);
@@ -246,6 +264,10 @@ int run(const RunRequest& request) {
   }
   if (!outcome.ran) {
     throw driver::Unavailable(realtime_refusal(outcome.realtime));
+  }
+  if (outcome.completed() && to_stop && outputs.moves_on()) {
+    outcome.reason = rig::Reason::braking_without_stop;
+    outcome.reason_value = outputs.metrics().final_speed_m_s;
   }
   if (signals) signals->allow_leaving();
   board_notes.log_once();

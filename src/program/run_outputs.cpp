@@ -35,7 +35,8 @@ RunOutputs::RunOutputs(const RunRequest& request, std::vector<std::string> signa
     throw config::ConfigError(error.what());
   }
   if (request.script->analysis == "friction-curve") {
-    const rig::RigParameters& rig = request.settings.plant.rig;
+    // As on a rig, where only the model is known: the force is found from the encoders.
+    const rig::RigParameters& rig = request.settings.model;
     friction_curve_.emplace(rig.wheels, rig.encoder_counts_per_rev);
   }
   if (!log_.empty() || lcm_) open_stream(request);

@@ -43,6 +43,8 @@ class RunOutputs {
   void poll();
   [[nodiscard]] bool stop_requested() const { return command_listener_ && command_listener_->stop_requested(); }
   [[nodiscard]] analysis::Metrics metrics() const { return metrics_.metrics(); }
+  /// True if the car has braked but not stopped.
+  [[nodiscard]] bool moves_on() const noexcept { return metrics_.moves_on(); }
   [[nodiscard]] std::uint64_t publish_failures() const { return stream_ ? stream_->failures() : 0; }
   [[nodiscard]] std::uint64_t csv_rows_lost() const;
   /// Writes summary and histogram if requested, and completes the run folder. Tries each, even after a failure. Returns

@@ -3,6 +3,7 @@
 #include "abs_hil/plant_sim/plant.hpp"
 #include "config/explain.hpp"
 #include "config/library.hpp"
+#include "config/model.hpp"
 #include "config/plan.hpp"
 #include "program/exit_status.hpp"
 #include "program/subcommands.hpp"
@@ -19,9 +20,11 @@ int validate(const RunRequest& request) {
   // Find errors that appear only when a run is made.
   static_cast<void>(experiment::Sequence(plan.phases, plan.limits));
   if (request.settings.backend == "sim") static_cast<void>(plant_sim::Plant(request.settings.plant));
+  const std::string model = config::in_words(config::model_differences(request.settings));
+  if (!request.settings.on_rig() && !model.empty()) fmt::print("The model differs from the plant: {}.\n", model);
   fmt::print(
-      "The experiment is within the limits of backend {}, plant {}.{}\n", request.settings.backend,
-      request.settings.plant_name,
+      "The experiment is within the limits of backend {}, {} {}.{}\n", request.settings.backend,
+      request.settings.on_rig() ? "model" : "plant", request.settings.plant_name,
       script.events.empty() ? "" : " It has events, which only a simulation can carry out: --backend rig refuses it.");
   return exit_completed;
 }

@@ -146,6 +146,10 @@ config::Settings settings_of(const RecordedRun& run, const Changes& changes) {
   }
   settings.plant_name = run.experiment.plant;
   settings.backend = run.experiment.backend;
+  if (settings.on_rig()) {
+    settings.model_name = settings.plant_name;
+    keys.leave_out_plant();
+  }
   if (changes.controller) keys.set_text("control.controller=" + *changes.controller, "--controller");
   for (const std::string& assignment : changes.assignments) keys.set_text(assignment, "--set");
   return settings;

@@ -181,7 +181,7 @@ config::Plan plan_of(const RecordedRun& run, const config::Settings& s) {
 
 experiment::RunLogicParts logic_parts(const RecordedRun& run, const config::Settings& s) {
   config::Plan plan = plan_of(run, s);
-  experiment::RunLogicParts parts = experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate,
+  experiment::RunLogicParts parts = experiment::make_logic_parts(s.control, s.model, s.plant.ideal_actuator, s.gate,
                                                                  s.experiment, std::move(plan.phases), plan.limits);
   parts.duty_steps = config::output_grid(s).duty_steps;
   return parts;

@@ -70,7 +70,7 @@ RunSurvey survey(const RunFiles& run) {
   CsvReader csv(run.csv);
   const RecordMaker maker(csv);
   RunSurvey survey;
-  survey.r2_m = run.config_number("plant.r2_m", paper_r2_m);
+  survey.r2_m = run.config_number("plant.r2_m", run.config_number("model.r2_m", paper_r2_m));
   analysis::RunMetrics metrics(survey.r2_m, run.config_number("experiment.end_speed_m_s", default_end_speed_m_s));
   PlantChangeFinder plant_changes(run);
   std::vector<bool> known(csv.columns().size(), false);

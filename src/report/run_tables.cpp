@@ -45,6 +45,21 @@ std::string count_of(const RunFiles& run, const std::string& key) {
   return std::isfinite(count) ? fmt::format("{:.0f}", count) : "–";
 }
 
+/// Where the controllers' model differs from the simulated plant, as in the run's summary. The configuration holds only
+/// the values of the model that were set.
+std::string model_note(const RunFiles& run) {
+  constexpr std::string_view prefix = "model.";
+  std::string note;
+  for (const auto& [key, value] : run.config) {
+    if (!key.starts_with(prefix)) continue;
+    const std::string name = key.substr(prefix.size());
+    const auto plant = run.config.find("plant." + name);
+    if (plant == run.config.end() || plant->second == value) continue;
+    note += fmt::format("{}{} {} (plant {})", note.empty() ? "" : ", ", name, value, plant->second);
+  }
+  return note;
+}
+
 /// Changes of phase, for a run folder without events.
 std::vector<RunEvent> events_of(const RunFiles& run, const RunSurvey& survey) {
   if (!run.events.empty()) return run.events;
@@ -81,6 +96,11 @@ std::string metrics_table(const std::vector<RunFiles>& runs, const std::vector<R
     if (pair) row.emplace_back();
     table.rows.push_back(std::move(row));
   }
+  std::vector<std::string> models{"model differs from plant"};
+  for (const RunFiles& run : runs) models.push_back(text_or_dash(model_note(run)));
+  if (pair) models.emplace_back();
+  const bool differ = std::any_of(runs.begin(), runs.end(), [](const auto& run) { return !model_note(run).empty(); });
+  if (differ) table.rows.push_back(std::move(models));
   std::vector<std::string> truth{"speeds and slip"};
   for (const RunSurvey& survey : surveys) truth.emplace_back(survey.knows("omega2_rad_s") ? "truth" : "estimates");
   if (pair) truth.emplace_back();

@@ -114,6 +114,11 @@ DutyCaps caps_of(const driver::DriverOptions& d) {
 
 }  // namespace
 
+bool is_real_board(const driver::DriverOptions& driver) {
+  if (driver.kind == "usb") return !driver.emulated;
+  return names_real_cards(driver) || names_an_adapter(driver);
+}
+
 void refuse_unsafe_use(const BoardUse& use) {
   refuse_virtual_time_on_hardware(use);
   refuse_start_speed(use);

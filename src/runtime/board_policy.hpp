@@ -25,6 +25,10 @@ struct DutyCaps {
   double motor{0.0};
 };
 
+/// False for a board that is known to be an emulator: one whose files or interface are not the kernel's, or of which
+/// driver.emulated says so. Cards of the kernel and adapters of a real bus are real whatever driver.emulated says.
+[[nodiscard]] bool is_real_board(const driver::DriverOptions& driver);
+
 /// Refuses what each key's own range allows and what must not reach a rig: virtual time, wheels that turn from the
 /// start, answers that take longer than a period, injected faults, no guardian. Throws std::invalid_argument, which
 /// names the key and the fix. Before anything has moved.

@@ -21,7 +21,7 @@ void check(const ComparisonPlan& plan) {
     if (std::find(plan.controllers.begin(), name, *name) != name) {
       throw std::invalid_argument(fmt::format("--controllers: {} is given twice; give each controller once", *name));
     }
-    static_cast<void>(control::make_controller(*name, {plan.settings.control, plan.settings.plant.rig}));
+    static_cast<void>(control::make_controller(*name, {plan.settings.control, plan.settings.model}));
   }
 }
 

@@ -104,6 +104,7 @@ std::string heading(const ComparisonTable& t) {
       t.start_speed_rad_s > 0.0 ? fmt::format("braking from {} rad/s", t.start_speed_rad_s) : "from standstill";
   return fmt::format("Plant {}, experiment {}, {} to {} m/s, slip reference {}.\n", t.plant, t.experiment, start,
                      t.end_speed_m_s, t.slip_ref) +
+         (t.model_note.empty() ? "" : fmt::format("The model differs from the plant: {}.\n", t.model_note)) +
          fmt::format("{} run{} of each controller, seed {}, plants varied by {}{}.\n", t.repeat,
                      t.repeat == 1 ? "" : "s", t.seed, t.variation.text(),
                      t.repeat > 1 ? "; mean ± half of the 95 % confidence interval" : "");

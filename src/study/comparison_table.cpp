@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "config/model.hpp"
+
 namespace abs_hil::study {
 
 namespace {
@@ -83,7 +85,8 @@ ComparisonTable tabulate(const ComparisonPlan& plan, const Comparison& compariso
                         .slip_ref = plan.settings.control.slip_ref,
                         .repeat = plan.repeat,
                         .seed = plan.seed,
-                        .variation = plan.variation};
+                        .variation = plan.variation,
+                        .model_note = config::in_words(config::model_differences(plan.settings))};
   const std::vector<RunResult>* first = nullptr;
   for (std::size_t c = 0; c < plan.controllers.size(); ++c) {
     table.columns.push_back(column_of(plan.controllers[c], comparison.results[c], first));

@@ -54,6 +54,7 @@ struct ComparisonTable {
   Variation variation{};
   std::vector<ControllerColumn> columns{};
   std::optional<PaperRatio> paper_ratio{};  ///< only if both controllers are compared
+  std::string model_note{};                 ///< where the model differs from the nominal plant; empty: nowhere
 };
 
 [[nodiscard]] ComparisonTable tabulate(const ComparisonPlan& plan, const Comparison& comparison);

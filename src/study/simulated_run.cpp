@@ -27,8 +27,9 @@ RunResult simulate(const config::Settings& settings, const plant_sim::PlantOptio
                                    .start_speed_rad_s = settings.experiment.start_speed_rad_s,
                                    .pwm_mode = driver::pwm_mode_named(settings.driver.sim.pwm_mode)});
   config::Plan plan = config::plan(settings);
+  const bool to_stop = config::means_to_stop(plan, settings.experiment.end_speed_m_s);
   experiment::RunLogicParts parts =
-      experiment::make_logic_parts(settings.control, settings.plant.rig, settings.plant.ideal_actuator, settings.gate,
+      experiment::make_logic_parts(settings.control, settings.model, settings.plant.ideal_actuator, settings.gate,
                                    settings.experiment, std::move(plan.phases), plan.limits);
   parts.duty_steps = driver::simulated_output_grid(settings.driver, plant.ideal_actuator).duty_steps;
   experiment::RunLogic logic(std::move(parts));
@@ -46,7 +47,8 @@ RunResult simulate(const config::Settings& settings, const plant_sim::PlantOptio
     pump.drain();
   }
   // The last cycle of a complete sequence has a reason that is not a fault; an early end has a limit or fault.
-  const rig::Reason end = logic.end_reason();
+  rig::Reason end = logic.end_reason();
+  if (end == rig::Reason::sequence_complete && to_stop && metrics.moves_on()) end = rig::Reason::braking_without_stop;
   return {.metrics = metrics.metrics(), .fault = rig::is_fault(end) ? end : rig::Reason::none};
 }
 

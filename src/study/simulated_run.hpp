@@ -17,7 +17,7 @@ struct RunResult {
 
 /// Runs one experiment in virtual time in the calling thread, through the program's own cycle, until its metrics are
 /// complete. It leaves out the hold phase after braking. The result depends on the arguments alone, not on the thread.
-/// @param settings  settings of controller and sequence; `settings.plant` is the rig as the controller knows it
+/// @param settings  settings of controller and sequence; `settings.model` is the rig as the controller knows it
 /// @param plant  the true parameters of the rig
 /// @param seed  seed of the simulator: the encoders' initial position within a count
 /// Throws std::invalid_argument for unusable options.

@@ -10,6 +10,23 @@ using Catch::Matchers::WithinAbs;
 
 namespace {
 
+/// A car that brakes at 5 m/s^2 from 10 m/s to `last_m_s`, where the sequence ends.
+Metrics brake_to(double last_m_s, rig::Phase last_phase, double estimate_m_s = 0.29) {
+  RunMetrics metrics(0.1, 0.3);
+  const auto at = [&](double time_s, rig::Phase phase, double estimate) {
+    rig::CycleRecord record;
+    record.time_s = time_s;
+    record.phase = phase;
+    record.truth.speeds = {0.0, (10.0 - 5.0 * time_s) / 0.1};
+    record.control.speeds_est = {0.0, estimate / 0.1};
+    metrics.consume(record, 10.0 * time_s - 2.5 * time_s * time_s);
+  };
+  const double end_s = (10.0 - last_m_s) / 5.0;
+  for (int tick = 0; 1e-3 * tick < end_s - 1e-6; ++tick) at(1e-3 * tick, rig::Phase::brake, 10.0 - 5e-3 * tick);
+  at(end_s, last_phase, estimate_m_s);
+  return metrics.metrics();
+}
+
 constexpr double r2_m = 0.1;
 constexpr double start_m_s = 10.0;
 constexpr double deceleration_m_s2 = 5.0;
@@ -141,4 +158,16 @@ TEST_CASE("a run that never brakes has no metrics") {
   metrics.consume({}, 0.0);
   CHECK(std::isnan(metrics.metrics().brake_start_s));
   CHECK(std::isnan(metrics.metrics().stop_time_s));
+}
+
+TEST_CASE("a sequence that ends a little above the end speed has its stop where its deceleration leads") {
+  for (const double last_m_s : {0.3002, 0.33, 0.345}) {
+    const Metrics m = brake_to(last_m_s, rig::Phase::stopped);
+    CHECK_THAT(m.stop_time_s, WithinAbs(9.7 / 5.0, 1e-6));
+    CHECK_THAT(m.stop_distance_m, WithinAbs((100.0 - 0.09) / 10.0, 1e-6));
+  }
+  CHECK(std::isnan(brake_to(0.36, rig::Phase::stopped).stop_time_s));       // 12 ms ahead
+  CHECK(std::isnan(brake_to(0.33, rig::Phase::stopped, 0.4).stop_time_s));  // not stopped by its own estimate
+  CHECK(std::isnan(brake_to(0.33, rig::Phase::fault).stop_time_s));
+  CHECK(std::isnan(brake_to(0.33, rig::Phase::brake).stop_time_s));
 }

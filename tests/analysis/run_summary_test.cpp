@@ -86,6 +86,39 @@ TEST_CASE("the text says if real time was not obtained and if there are no true 
   CHECK_THAT(to_text(summary), Contains("virtual time"));
 }
 
+TEST_CASE("the text and the JSON give both values where model and plant differ") {
+  RunSummary summary;
+  CHECK_THAT(to_text(summary), !Contains("differs from plant"));
+  summary.plant = "a";
+  CHECK(to_json(summary)["model"] == "a");
+  summary.model = "b";
+  summary.model_note = "theta_N 23 (plant 40)";
+  summary.model_differences["theta_N"] = {{"model", 23}, {"plant", 40}};
+  CHECK_THAT(to_text(summary), Contains("differs from plant: theta_N 23 (plant 40)"));
+  CHECK(to_json(summary)["model"] == "b");
+  CHECK(to_json(summary)["model_differences"]["theta_N"]["plant"] == 40);
+}
+
+TEST_CASE("the summary says why a figure is missing") {
+  RunSummary summary;
+  summary.end_speed_m_s = 0.3;
+  CHECK(to_json(summary)["missing"]["stop_time_s"] == "the run did not brake");
+  summary.metrics.brake_start_s = 1.0;
+  summary.metrics.final_speed_m_s = 0.875;
+  CHECK_THAT(to_json(summary)["missing"]["stop_distance_m"].get<std::string>(), Contains("0.875") && Contains("0.3"));
+  CHECK_THAT(to_text(summary), Contains("still moved at 0.875 m/s"));
+  summary.metrics.stop_time_s = summary.metrics.stop_distance_m = 2.0;
+  CHECK_FALSE(to_json(summary)["missing"].contains("stop_time_s"));
+  CHECK_FALSE(to_json(summary)["missing"].contains("brake_start_s"));
+  CHECK_THAT(to_text(summary), !Contains("still moved"));
+}
+
+TEST_CASE("the text says at which speed the estimate of theta is taken") {
+  RunSummary summary;
+  summary.metrics.theta_final_N = 23.04;
+  CHECK_THAT(to_text(summary), Contains("23.04 N at 3 m/s"));
+}
+
 TEST_CASE("a summary file is either complete or absent") {
   const auto path = temporary_path();
   { SummaryFile abandoned(path); }

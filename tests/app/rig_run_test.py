@@ -30,6 +30,23 @@ class RigRun(RigTest):
             self.assertAlmostEqual(r[key] / s[key], 1.0, delta=0.01, msg=key)
         self.assertEqual(emulator.wire(), (0.0, 0.0))
 
+    def test_a_rig_has_a_model_and_no_plant(self):
+        emulator = self.emulator('--lock-step', '--start-speed', 60)
+        summary, log = self.folder / 'rig.json', self.folder / 'rig.lcmlog'
+        short = ('--set', 'experiment.cut_speed_rad_s=70')
+        result = self.lock_step(emulator, *short, '--model', 'paper-table1', '--set', 'model.theta_N=24', '--summary',
+                                summary, '--log', log)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        found = self.summary(summary)
+        self.assertNotIn('plant', found['config'])
+        self.assertEqual((len(found['config']['model']), found['config']['model']['theta_N']), (18, 24.0))
+        self.assertEqual((found['model'], found['model_differences']), ('paper-table1', None))
+        replayed = self.run_program('replay', log, '--check')
+        self.assertEqual(replayed.returncode, 0, replayed.stderr)
+        refused = self.run_program('replay', log, '--controller', 'pi', '--set', 'plant.theta_N=30')
+        self.assertEqual(refused.returncode, 2, refused.stderr)
+        self.assertIn('model.theta_N', refused.stderr)
+
     def test_lock_step_repeats_to_the_byte(self):
         runs = []
         for name in ('a', 'b'):

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "catch.hpp"
@@ -27,12 +28,12 @@ class TemporaryFile {
   std::filesystem::path path_;
 };
 
-std::string load_error(const std::string& text, std::string_view only_table = {}) {
+std::string load_error(const std::string& text, Tables tables = Tables::all) {
   const TemporaryFile file(text);
   Settings settings;
   KeyTable table(settings);
   try {
-    load_file(file.path(), table, only_table);
+    load_file(file.path(), table, tables);
   } catch (const ConfigError& error) {
     return error.what();
   }
@@ -63,8 +64,8 @@ TEST_CASE("errors in a file name file and line") {
 }
 
 TEST_CASE("a plant file with another table is refused") {
-  CHECK_THAT(load_error("[control]\nslip_ref = 0.1\n", "plant"), Contains(".toml:1") && Contains("[plant]"));
-  CHECK(load_error("description = \"p\"\n[plant]\nB = 20\n", "plant").empty());
+  CHECK_THAT(load_error("[control]\nslip_ref = 0.1\n", Tables::of_plant), Contains(".toml:1") && Contains("[plant]"));
+  CHECK(load_error("description = \"p\"\n[plant]\nB = 20\n", Tables::of_plant).empty());
 }
 
 TEST_CASE("a missing file is named") {
@@ -87,7 +88,7 @@ TEST_CASE("every shipped plant loads, sets every plant key and has a description
     CHECK_FALSE(plant.description.empty());
     Settings settings;
     KeyTable table(settings);
-    CHECK_NOTHROW(load_file(plant_file(plant.name), table, "plant"));
+    CHECK_NOTHROW(load_file(plant_file(plant.name), table, Tables::of_plant));
   }
 }
 
@@ -95,14 +96,14 @@ TEST_CASE("plant paper-table1 equals the defaults") {
   Settings defaults;
   Settings loaded;
   KeyTable table(loaded);
-  load_file(plant_file("paper-table1"), table, "plant");
+  load_file(plant_file("paper-table1"), table, Tables::of_plant);
   CHECK(table.to_json() == KeyTable(defaults).to_json());
 }
 
 TEST_CASE("the maker's plant has the manual's numbers, its models, and the fit for the controllers") {
   Settings settings;
   KeyTable table(settings);
-  load_file(plant_file("inteco-manual"), table, "plant");
+  load_file(plant_file("inteco-manual"), table, Tables::of_plant);
   const auto& p = settings.plant;
   CHECK(p.tyre == "inteco-mu");
   CHECK(p.load == "lever");

@@ -22,7 +22,7 @@ config::Settings configured(const std::string& plant, const std::string& experim
                             double rate_Hz) {
   config::Settings s;
   config::KeyTable keys(s);
-  config::load_file(config::plant_file(plant), keys, "plant");
+  config::load_file(config::plant_file(plant), keys, config::Tables::of_plant);
   s.plant.friction_profile = config::profile(*config::find(experiment), "friction");
   s.experiment.name = experiment;
   s.control.controller = controller;

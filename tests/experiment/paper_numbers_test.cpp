@@ -72,6 +72,25 @@ TEST_CASE("adaptive, ideal actuator and sensors: stop, distance, convergence of 
   CHECK_THAT(first->time_s - braking.front().time_s, WithinAbs(0.22, 0.03));
 }
 
+TEST_CASE("adaptive finds the plant's theta at 3 m/s although its model has another") {
+  Setup setup = braking("adaptive");
+  setup.model = setup.plant.rig;
+  setup.plant.rig.tyre.theta_N = 40.0;
+  const Result result = run(setup);
+  CHECK(result.outcome.completed());
+  CHECK_THAT(result.metrics.theta_final_N, WithinRel(40.0, 0.03));
+}
+
+TEST_CASE("distance and stop are the plant's, whatever radius the model has") {
+  Setup setup = braking("locked");
+  const Result right = run(setup);
+  setup.model = setup.plant.rig;
+  setup.model->wheels.r2_m *= 1.1;
+  const Result wrong = run(setup);
+  CHECK_THAT(wrong.metrics.stop_distance_m, WithinRel(right.metrics.stop_distance_m, 1e-3));
+  CHECK_THAT(wrong.distances_m.back(), WithinRel(right.distances_m.back(), 5e-3));
+}
+
 TEST_CASE("adaptive, theta = 45, ideal: the paper's 1.2 s") {
   Setup setup = ideal_braking("adaptive");
   setup.plant.rig.tyre.theta_N = 45.0;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -24,7 +25,7 @@ class Recorder final : public rig::RecordSink {
   std::vector<double> distances_m;
 };
 
-/// Options of a simulated run.
+/// Options of a simulated run. As in the configuration, the model is the plant unless it is given.
 struct Setup {
   plant_sim::PlantOptions plant{};
   control::ControlOptions control{};
@@ -32,6 +33,9 @@ struct Setup {
   runtime::GateOptions gate{};
   std::uint64_t seed{1};
   driver::PwmMode pwm_mode{driver::PwmMode::bits_12};
+  std::optional<rig::RigParameters> model{};
+
+  [[nodiscard]] const rig::RigParameters& believed() const { return model ? *model : plant.rig; }
 };
 
 /// Its result.
@@ -58,8 +62,9 @@ inline std::vector<PhasePlan> phases_of(const Setup& setup) {
 }
 
 inline RunLogicParts logic_parts(const Setup& setup) {
-  RunLogicParts parts = make_logic_parts(setup.control, setup.plant.rig, setup.plant.ideal_actuator, setup.gate,
+  RunLogicParts parts = make_logic_parts(setup.control, setup.believed(), setup.plant.ideal_actuator, setup.gate,
                                          setup.experiment, phases_of(setup));
+  parts.recorded_r2_m = setup.plant.rig.wheels.r2_m;
   parts.duty_steps = driver::full_width(setup.pwm_mode);
   return parts;
 }

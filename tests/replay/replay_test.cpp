@@ -50,7 +50,7 @@ class LateMeasurement final : public rig::RecordSink {
 void record_run(const std::filesystem::path& path, const Recipe& recipe) {
   config::Settings s;
   config::KeyTable keys(s);
-  config::load_file(config::plant_file(s.plant_name), keys, "plant");
+  config::load_file(config::plant_file(s.plant_name), keys, config::Tables::of_plant);
   keys.set_text("experiment.start_speed_rad_s=100", "test");
   for (const std::string& assignment : recipe.assignments) keys.set_text(assignment, "test");
   telemetry::LogOutlet log(path, 0);

@@ -58,6 +58,33 @@ TEST_CASE("Hardware is not driven without a guardian, even where it is called an
   CHECK(run.refusal().empty());
 }
 
+TEST_CASE("A board is real unless its files, its interface or the configuration say that it is an emulator") {
+  driver::DriverOptions board;
+  board.kind = "pci";
+  board.pci.root = "/sys/bus/pci/devices";
+  CHECK(runtime::is_real_board(board));
+  board.emulated = true;  // the kernel's cards are real whatever the configuration says
+  CHECK(runtime::is_real_board(board));
+  board.emulated = false;
+  board.pci.root = "/tmp/emulated/pci";
+  CHECK_FALSE(runtime::is_real_board(board));
+
+  board.kind = "can";
+  for (const char* bus : {"unix:/tmp/bus", "vcan-that-is-not-there"}) {
+    board.can.interface = bus;
+    CHECK_FALSE(runtime::is_real_board(board));
+  }
+  if (const std::string adapter = an_adapter(); !adapter.empty()) {
+    board.can.interface = adapter;
+    CHECK(runtime::is_real_board(board));
+  }
+
+  board.kind = "usb";
+  CHECK(runtime::is_real_board(board));
+  board.emulated = true;
+  CHECK_FALSE(runtime::is_real_board(board));
+}
+
 TEST_CASE("An adapter to a real bus is hardware") {
   Asked run{.guarded = false};
   run.driver.emulated = true;

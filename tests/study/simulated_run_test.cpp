@@ -37,6 +37,24 @@ TEST_CASE("the plant differs from the controller's parameters only where request
   CHECK(run.metrics.stop_time_s < 0.95 * simulate(settings, settings.plant, 1).metrics.stop_time_s);
 }
 
+TEST_CASE("the controllers use the model, whatever the plant is") {
+  config::Settings settings = study::test::paper_settings();
+  settings.control.controller = "nominal";
+  settings.model.tyre.theta_N = 18.0;
+  const study::RunResult run = simulate(settings, settings.plant, 1);
+  CHECK(run.metrics.theta_final_N == 18.0);
+  CHECK(run.metrics.theta_error_final == Catch::Detail::Approx(18.0 / 23.0 - 1.0));
+}
+
+TEST_CASE("a run that stops braking while the car moves has not stopped") {
+  config::Settings settings = study::test::paper_settings();
+  settings.plant.rig.encoder_counts_per_rev = settings.model.encoder_counts_per_rev = 100;
+  settings.control.observer.standstill_time_s = 0.005;
+  const study::RunResult run = simulate(settings, settings.plant, 1);
+  CHECK_FALSE(run.stopped());
+  CHECK(run.fault == rig::Reason::braking_without_stop);
+}
+
 TEST_CASE("a run that ends by a limit reports it") {
   config::Settings settings = study::test::paper_settings();
   settings.experiment.brake_limit_s = 0.5;

@@ -108,7 +108,7 @@ struct AdaptivePeakOptions {
 /// Nominal controller (16). It shares ks0 and ks1 with the adaptive one.
 struct NominalOptions {
   ABS_HIL_OPTIONS(NominalOptions);
-  ABS_HIL_OPTION(double, theta0_N, 0.0, .unit = "N", .meaning = "theta that (16) believes in; 0: the plant's",
+  ABS_HIL_OPTION(double, theta0_N, 0.0, .unit = "N", .meaning = "theta that (16) believes in; 0: the model's",
                  .range = rig::from_zero(500));
 };
 

@@ -10,6 +10,7 @@ namespace abs_hil::rig {
 /// index 2 the lower wheel that stands for the road and the car's mass.
 struct WheelParameters {
   ABS_HIL_OPTIONS(WheelParameters);
+  bool operator==(const WheelParameters&) const = default;
   ABS_HIL_OPTION(double, r1_m, 0.0995, .unit = "m", .meaning = "upper wheel radius", .range = between(0.01, 1));
   ABS_HIL_OPTION(double, r2_m, 0.0990, .unit = "m", .meaning = "lower wheel radius", .range = between(0.01, 1));
   ABS_HIL_OPTION(double, J1_kg_m2, 7.54e-3, .unit = "kg m^2", .meaning = "upper wheel moment of inertia",
@@ -29,8 +30,9 @@ struct WheelParameters {
 /// Tyre force Ft = theta * phi(slip) of (10), phi(slip) = sin(C atan(B slip)).
 struct TyreParameters {
   ABS_HIL_OPTIONS(TyreParameters);
+  bool operator==(const TyreParameters&) const = default;
   ABS_HIL_OPTION(double, theta_N, 23.0, .unit = "N",
-                 .meaning = "peak tyre force, theta = mu D of (10); with load lever only what controllers are told",
+                 .meaning = "peak tyre force, theta = mu D of (10); a plant with load lever does not use it",
                  .range = positive(500));
   ABS_HIL_OPTION(double, B, 28.0, .meaning = "tyre stiffness factor of (4)", .range = positive(200));
   /// Above 2 the force would change sign at large slip.
@@ -40,6 +42,7 @@ struct TyreParameters {
 /// Brake: static map (7) from duty to torque, first-order lag (6).
 struct BrakeParameters {
   ABS_HIL_OPTIONS(BrakeParameters);
+  bool operator==(const BrakeParameters&) const = default;
   ABS_HIL_OPTION(double, b1_Nm, 15.24, .unit = "N m", .meaning = "slope of the brake map (7)", .range = positive(1000));
   ABS_HIL_OPTION(double, b2_Nm, -6.21, .unit = "N m", .meaning = "offset of the brake map (7)",
                  .range = between(-1000, 1000));
@@ -58,6 +61,7 @@ struct BrakeParameters {
 /// tests/plant_sim/actuators_test.cpp checks both.
 struct DriveMotorParameters {
   ABS_HIL_OPTIONS(DriveMotorParameters);
+  bool operator==(const DriveMotorParameters&) const = default;
   ABS_HIL_OPTION(double, stall_torque_Nm, 2.1122, .unit = "N m",
                  .meaning = "drive motor's torque at standstill and full duty", .range = positive(100));
   /// Speed at which the back-EMF cancels the supply.
@@ -65,9 +69,10 @@ struct DriveMotorParameters {
                  .range = positive(2000));
 };
 
-/// All parameters of the rig that a controller may use, in SI units.
+/// All parameters of the rig that a controller may use, in SI units: of the simulated rig, or of the model of a rig.
 struct RigParameters {
   ABS_HIL_OPTIONS(RigParameters);
+  bool operator==(const RigParameters&) const = default;
   ABS_HIL_GROUP(TyreParameters, tyre, "", {});
   ABS_HIL_GROUP(WheelParameters, wheels, "", {});
   ABS_HIL_GROUP(BrakeParameters, brake, "", {});

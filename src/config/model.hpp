@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "config/settings.hpp"
+
+namespace abs_hil::config {
+
+/// A value of the model that is not the plant's.
+struct ModelDifference {
+  std::string name;  ///< without prefix: "theta_N"
+  double model{0.0};
+  double plant{0.0};
+};
+
+/// Where the model differs from the simulated plant; nowhere on a rig, whose plant is unknown.
+[[nodiscard]] std::vector<ModelDifference> model_differences(const Settings& settings);
+
+/// "theta_N 23 (plant 40), c31_per_s 16 (plant 20.37)"; empty for no difference.
+[[nodiscard]] std::string in_words(const std::vector<ModelDifference>& differences);
+
+/// Says where the true theta, or on a rig the model's, lies outside the bounds of the controller's estimate; empty:
+/// nowhere. The estimate then stays at its bound.
+[[nodiscard]] std::vector<std::string> theta_out_of_bounds(const Settings& settings);
+
+/// Says if a wheel that still turns at the experiment's end speed can seem to stand: it then takes longer from count to
+/// count than control.observer.standstill_time_s. Empty: it cannot.
+[[nodiscard]] std::string standstill_too_early(const Settings& settings);
+
+}  // namespace abs_hil::config
