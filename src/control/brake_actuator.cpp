@@ -22,7 +22,12 @@ BrakeActuator::BrakeActuator(const rig::BrakeParameters& brake, bool ideal, doub
       duty_steps_{ideal ? 0 : duty_steps},
       max_torque_Nm_{ideal ? std::numeric_limits<double>::infinity()
                            : rig::brake_torque_at(brake, rig::duty_at_most(max_duty, duty_steps))},
-      least_torque_Nm_{ideal ? 0.0 : rig::brake_torque_at(brake, rig::duty_at_least(brake.u0, duty_steps))} {}
+      least_{},
+      half_step_Nm_{duty_steps_ == 0 ? 0.0 : 0.5 * brake.b1_Nm / static_cast<double>(duty_steps_)} {
+  if (ideal) return;
+  least_.duty = rig::duty_at_least(brake.u0, duty_steps);
+  least_.torque_Nm = rig::brake_torque_at(brake, least_.duty);
+}
 
 void BrakeActuator::reset() noexcept {
   target_Nm_ = 0.0;
@@ -59,42 +64,40 @@ double BrakeActuator::duty_for(double torque_Nm) const noexcept {
   return rig::brake_duty_for(brake_, torque_Nm, max_duty_, duty_steps_);
 }
 
-double BrakeActuator::limited(double torque_Nm) const noexcept {
-  if (!std::isfinite(torque_Nm)) return std::numeric_limits<double>::quiet_NaN();
-  if (ideal_) return std::max(0.0, torque_Nm);
-  return rig::brake_torque_at(brake_, duty_for(torque_Nm));
+double BrakeActuator::limited(double torque_Nm) const noexcept { return nearest(torque_Nm).torque_Nm; }
+
+BrakeActuator::Target BrakeActuator::nearest(double torque_Nm) const noexcept {
+  const double duty = duty_for(torque_Nm);
+  if (std::isnan(duty)) return {duty, duty};
+  return {ideal_ ? std::max(0.0, torque_Nm) : rig::brake_torque_at(brake_, duty), duty};
 }
 
 bool BrakeActuator::in_gap(double torque_Nm) const noexcept {
-  return torque_Nm > 0.0 && torque_Nm < least_torque_Nm_ && least_torque_Nm_ <= max_torque_Nm_;
+  return torque_Nm > 0.0 && torque_Nm < least_.torque_Nm && least_.torque_Nm <= max_torque_Nm_;
 }
 
-double BrakeActuator::next_torque_Nm(double torque_Nm, double dt_s) noexcept {
+BrakeActuator::Target BrakeActuator::next(double torque_Nm, double dt_s) noexcept {
   if (!in_gap(torque_Nm)) {
     was_in_gap_ = false;
-    return limited(torque_Nm);
+    return nearest(torque_Nm);
   }
-  if (!was_in_gap_) owed_Nms_ = 0.0;
-  const double most_Nms = least_torque_Nm_ * gap_hold_s;
-  if (was_in_gap_) owed_Nms_ = std::clamp(owed_Nms_ + (torque_Nm - end_Nm_) * dt_s, -most_Nms, most_Nms);
+  const double most_Nms = least_.torque_Nm * gap_hold_s;
+  owed_Nms_ = was_in_gap_ ? std::clamp(owed_Nms_ + (torque_Nm - end_.torque_Nm) * dt_s, -most_Nms, most_Nms) : 0.0;
   held_s_ += dt_s;
   constexpr double rounding_s = 1e-9;
   if (!was_in_gap_ || held_s_ + rounding_s >= gap_hold_s) {
     const double owed_then_Nms = owed_Nms_ + torque_Nm * gap_hold_s;
-    end_Nm_ = owed_then_Nms >= 0.5 * most_Nms ? least_torque_Nm_ : 0.0;
+    end_ = owed_then_Nms >= 0.5 * most_Nms ? least_ : Target{};
     held_s_ = 0.0;
   }
   was_in_gap_ = true;
-  return end_Nm_;
+  return end_;
 }
 
-double BrakeActuator::unsent_Nm(double reference_Nm, double sent_Nm) const noexcept {
+double BrakeActuator::unsent_Nm(double reference_Nm, double target_Nm, double sent_Nm) const noexcept {
   constexpr double rounding_Nm = 1e-9;
-  const double half_step_Nm = duty_steps_ == 0 ? 0.0 : 0.5 * brake_.b1_Nm / static_cast<double>(duty_steps_);
   const bool in_reach = reference_Nm >= 0.0 && reference_Nm <= max_torque_Nm_;
-  const auto sent_is = [&](double torque_Nm) { return std::abs(torque_Nm - sent_Nm) <= half_step_Nm + rounding_Nm; };
-  const bool as_wanted =
-      in_gap(reference_Nm) ? sent_is(0.0) || sent_is(least_torque_Nm_) : sent_is(limited(reference_Nm));
+  const bool as_wanted = std::abs(target_Nm - sent_Nm) <= half_step_Nm_ + rounding_Nm;
   return in_reach && as_wanted ? 0.0 : reference_Nm - sent_Nm;
 }
 

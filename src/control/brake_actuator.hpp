@@ -27,13 +27,19 @@ class BrakeActuator {
   [[nodiscard]] double duty_for(double torque_Nm) const noexcept;
   /// Static torque of that duty, or, if ideal, the torque itself, at least 0.
   [[nodiscard]] double limited(double torque_Nm) const noexcept;
-  /// The torque to send for a reference torque, `dt_s` after the last call: `limited`, except in the gap between 0 and
-  /// the least torque that the dead zone leaves. There it switches between the two ends, so that their mean is the
-  /// reference torque: nothing between them can be sent.
-  [[nodiscard]] double next_torque_Nm(double torque_Nm, double dt_s) noexcept;
+  /// A static torque and the duty that gives it.
+  struct Target {
+    double torque_Nm;
+    double duty;
+  };
+  /// What to send for a reference torque, `dt_s` after the last call: `limited` and `duty_for`, except in the gap
+  /// between 0 and the least torque that the dead zone leaves. There it switches between the two ends, so that their
+  /// mean is the reference torque: nothing between them can be sent.
+  [[nodiscard]] Target next(double torque_Nm, double dt_s) noexcept;
   /// What is missing of a finite reference torque in a static torque that was sent for it, N m: > 0 if less was sent
   /// (limits, rate limit, refusal), < 0 if more was sent. 0 if only the PWM's steps and the dead zone part the two.
-  [[nodiscard]] double unsent_Nm(double reference_Nm, double sent_Nm) const noexcept;
+  /// @param target_Nm  the torque of `next` for the reference torque
+  [[nodiscard]] double unsent_Nm(double reference_Nm, double target_Nm, double sent_Nm) const noexcept;
   /// Static torque b(u) of a command; its torque, if ideal.
   [[nodiscard]] double static_torque_Nm(double duty, double torque_Nm) const noexcept;
   /// Static torque of the last `command`.
@@ -45,15 +51,17 @@ class BrakeActuator {
 
  private:
   [[nodiscard]] bool in_gap(double torque_Nm) const noexcept;
+  [[nodiscard]] Target nearest(double torque_Nm) const noexcept;
 
   rig::BrakeParameters brake_;
   bool ideal_;
   double max_duty_;
   std::uint32_t duty_steps_;
   double max_torque_Nm_;
-  double least_torque_Nm_;  ///< above 0 that can be sent; 0 if ideal
+  Target least_;  ///< the least above 0 that can be sent; 0 if ideal
+  double half_step_Nm_;
   // In the gap: the end that is sent, for how long, and what is owed to the reference torque.
-  double end_Nm_{0.0};
+  Target end_{};
   double held_s_{0.0};
   double owed_Nms_{0.0};
   bool was_in_gap_{false};

@@ -231,12 +231,14 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
     brake_duty = plan.brake_duty_at(phase_time_s);
     torque_Nm = rig::brake_torque_at(brake_, brake_duty);
   } else {
-    torque_Nm = actuator_.next_torque_Nm(wanted_torque_Nm(plan, dt_s, change.entered, state), dt_s);
-    brake_duty = actuator_.duty_for(torque_Nm);
+    const control::BrakeActuator::Target target =
+        actuator_.next(wanted_torque_Nm(plan, dt_s, change.entered, state), dt_s);
+    torque_Nm = target.torque_Nm;
+    brake_duty = target.duty;
   }
   if (replaced_ != nullptr) adjustments_.retire(std::exchange(replaced_, nullptr));
   if (refused_) return rig::safe_command;
-  state.brake_torque_ref_Nm = torque_Nm;
+  state.brake_torque_ref_Nm = target_Nm_ = torque_Nm;
 
   const double motor_duty = plan.motor_duty_at(phase_time_s);
   return {.motor_duty = motor_duty,
@@ -259,7 +261,7 @@ double RunLogic::wanted_torque_Nm(const PhasePlan& plan, double dt_s, bool enter
 void RunLogic::commanded(const rig::Command& acted, const rig::Command& own) noexcept {
   actuator_.command(acted.brake_duty, acted.brake_torque_Nm);
   sent_Nm_ = actuator_.static_torque_Nm(own.brake_duty, own.brake_torque_Nm);
-  unsent_Nm_ = std::isnan(asked_Nm_) ? 0.0 : actuator_.unsent_Nm(asked_Nm_, sent_Nm_);
+  unsent_Nm_ = std::isnan(asked_Nm_) ? 0.0 : actuator_.unsent_Nm(asked_Nm_, target_Nm_, sent_Nm_);
 }
 
 }  // namespace abs_hil::experiment

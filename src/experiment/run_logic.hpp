@@ -109,7 +109,8 @@ class RunLogic final : public runtime::CycleLogic {
   /// The old controller if the gains changed in this cycle, until its last torque is known.
   control::SlipController* replaced_{nullptr};
   double asked_Nm_{rig::unknown};  ///< the controller's torque of this cycle; NaN: it was not asked
-  double sent_Nm_{0.0};            ///< static torque sent for it, and what was missing
+  double target_Nm_{0.0};          ///< the static torque to send for it
+  double sent_Nm_{0.0};            ///< the one that was sent, and what was missing in it
   double unsent_Nm_{0.0};
   std::array<bool, rig::controller_signals.size()> not_given_{};  ///< signals that the controller does not give
   bool refused_{false};                                           ///< its output was not finite

@@ -106,14 +106,17 @@ TEST_CASE("Only what limits and refusals held back counts as unsent, not the PWM
     const control::BrakeActuator actuator{brake, false, 0.7, steps};
     CAPTURE(steps);
     const double most = actuator.max_torque_Nm();
+    const auto unsent = [&](double torque, double sent) {
+      return actuator.unsent_Nm(torque, actuator.limited(torque), sent);
+    };
     for (double torque = 0.0; torque <= most; torque += 0.003) {
-      REQUIRE(actuator.unsent_Nm(torque, actuator.limited(torque)) == 0.0);
+      REQUIRE(actuator.unsent_Nm(torque, actuator.limited(torque), actuator.limited(torque)) == 0.0);
     }
-    CHECK_THAT(actuator.unsent_Nm(most + 0.5, most), WithinAbs(0.5, 1e-12));
-    CHECK_THAT(actuator.unsent_Nm(-0.5, 0.0), WithinAbs(-0.5, 1e-12));
-    CHECK_THAT(actuator.unsent_Nm(3.0, 1.0), WithinAbs(2.0, 1e-12));   // rate-limited
-    CHECK_THAT(actuator.unsent_Nm(3.0, 0.0), WithinAbs(3.0, 1e-12));   // refused
-    CHECK_THAT(actuator.unsent_Nm(1.0, 3.0), WithinAbs(-2.0, 1e-12));  // an older command still acts
+    CHECK_THAT(unsent(most + 0.5, most), WithinAbs(0.5, 1e-12));
+    CHECK_THAT(unsent(-0.5, 0.0), WithinAbs(-0.5, 1e-12));
+    CHECK_THAT(unsent(3.0, 1.0), WithinAbs(2.0, 1e-12));   // rate-limited
+    CHECK_THAT(unsent(3.0, 0.0), WithinAbs(3.0, 1e-12));   // refused
+    CHECK_THAT(unsent(1.0, 3.0), WithinAbs(-2.0, 1e-12));  // an older command still acts
   }
 }
 
@@ -145,9 +148,9 @@ TEST_CASE("In the gap that the dead zone leaves, the torque is right in the mean
       double sum = 0.0, before = -1.0, since_s = 1.0;
       const int cycles = static_cast<int>(4.0 / dt_s);
       for (int n = 0; n < cycles; ++n) {
-        const double sent = actuator.next_torque_Nm(torque, dt_s);
+        const double sent = actuator.next(torque, dt_s).torque_Nm;
         REQUIRE((sent == 0.0 || std::abs(sent - least) < 1e-12));
-        CHECK(actuator.unsent_Nm(torque, sent) == 0.0);
+        CHECK(actuator.unsent_Nm(torque, sent, sent) == 0.0);
         if (n > 0 && sent != before) {
           CHECK(since_s >= std::max(dt_s, 1.0 / 160.0) - 1e-9);
           since_s = 0.0;
@@ -166,6 +169,7 @@ TEST_CASE("Outside the gap nothing is carried from cycle to cycle") {
   for (double torque = -1.0; torque < 6.0; torque += 0.01) {
     const double least = map_Nm(106.0 / 255.0);
     if (torque > 0.0 && torque < least) continue;
-    CHECK(actuator.next_torque_Nm(torque, 1e-3) == actuator.limited(torque));
+    CHECK(actuator.next(torque, 1e-3).torque_Nm == actuator.limited(torque));
+    CHECK(actuator.next(torque, 1e-3).duty == actuator.duty_for(torque));
   }
 }

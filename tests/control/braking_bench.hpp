@@ -181,7 +181,7 @@ inline Result brake(const Setup& s, control::SlipController& controller) {
     const double wanted = actuator.limited(output.brake_torque_Nm);
     const double duty = actuator.duty_for(wanted);
     actuator.command(duty, wanted);
-    unsent_Nm = actuator.unsent_Nm(output.brake_torque_Nm, actuator.sent_torque_Nm());
+    unsent_Nm = actuator.unsent_Nm(output.brake_torque_Nm, wanted, actuator.sent_torque_Nm());
     result.ticks.push_back({t, x.omega1, x.omega2, slip, x.torque, x.way, input, output, wanted});
     if (t > 0.3 && v_x > 3.0) {
       square_sum += std::pow(slip - s.options.slip_ref, 2);
