@@ -1,5 +1,6 @@
 // The baselines ship with the gains that the search found (docs/comparison.md), the adaptive law with the paper's.
 
+#include <nlohmann/json.hpp>
 #include <variant>
 
 #include "catch.hpp"
