@@ -30,42 +30,22 @@ void TrackingObserver::reset(std::int32_t counts, double omega_rad_s) noexcept {
   still_s_ = 0.0;
 }
 
-bool TrackingObserver::implausible(double correction_rad_s, double omega_gain, double dt_s,
-                                   double stamp_error_s) const noexcept {
+[[gnu::noinline]] bool TrackingObserver::implausible(double correction_rad_s, double omega_gain, double dt_s,
+                                                     double stamp_error_s) const noexcept {
   const double resolution_rad = resolution_counts * rad_per_count_;
   const bool uncertain = std::abs(omega_rad_s_) * stamp_error_s > resolution_rad;
   const double unexplained_rad_s = std::abs(correction_rad_s) - omega_gain * resolution_rad;
   return uncertain && ignored_ < ignored_max && unexplained_rad_s > alpha_max_rad_s2_ * dt_s;
 }
 
-void TrackingObserver::restart(double travel_rad, double dt_s) noexcept {
+[[gnu::cold]] void TrackingObserver::restart(double travel_rad, double dt_s) noexcept {
   omega_rad_s_ = (travel_rad - angle_error_rad_) / dt_s;
   alpha_rad_s2_ = 0.0;
   angle_error_rad_ = 0.0;
 }
 
-void TrackingObserver::update(std::int32_t counts, double dt_s, double stamp_error_s) noexcept {
-  if (!(dt_s > 0.0)) return;  // the next interval then includes this travel
-  const std::int32_t travel = rig::counts_between(counts_, counts);
-  still_s_ = travel == 0 ? still_s_ + dt_s : 0.0;
-  if (stands_still()) {
-    counts_ = counts;
-    ignored_ = 0;
-    angle_error_rad_ = 0.0;
-    omega_rad_s_ = 0.0;
-    alpha_rad_s2_ = 0.0;
-    return;
-  }
-  if (predict_and_correct(static_cast<double>(travel) * rad_per_count_, dt_s, stamp_error_s)) {
-    counts_ = counts;
-    ignored_ = 0;
-  } else {
-    ++ignored_;
-  }
-  if (travel == 0) bound_by_silence();
-}
-
-bool TrackingObserver::predict_and_correct(double travel_rad, double dt_s, double stamp_error_s) noexcept {
+[[gnu::always_inline]] inline bool TrackingObserver::predict_and_correct(double travel_rad, double dt_s,
+                                                                         double stamp_error_s) noexcept {
   // Fading-memory gains that put all three poles of the discrete filter at p = exp(-bandwidth dt); q = 1 - p.
   const double q = -std::expm1(-bandwidth_rad_s_ * dt_s);
   const double p = 1.0 - q;
@@ -92,6 +72,27 @@ bool TrackingObserver::predict_and_correct(double travel_rad, double dt_s, doubl
   omega_rad_s_ = omega_predicted + omega_gain * residual_rad;
   alpha_rad_s2_ += alpha_gain * residual_rad;
   return true;
+}
+
+void TrackingObserver::update(std::int32_t counts, double dt_s, double stamp_error_s) noexcept {
+  if (!(dt_s > 0.0)) return;  // the next interval then includes this travel
+  const std::int32_t travel = rig::counts_between(counts_, counts);
+  still_s_ = travel == 0 ? still_s_ + dt_s : 0.0;
+  if (stands_still()) {
+    counts_ = counts;
+    ignored_ = 0;
+    angle_error_rad_ = 0.0;
+    omega_rad_s_ = 0.0;
+    alpha_rad_s2_ = 0.0;
+    return;
+  }
+  if (predict_and_correct(static_cast<double>(travel) * rad_per_count_, dt_s, stamp_error_s)) {
+    counts_ = counts;
+    ignored_ = 0;
+  } else {
+    ++ignored_;
+  }
+  if (travel == 0) bound_by_silence();
 }
 
 void TrackingObserver::bound_by_silence() noexcept {

@@ -54,7 +54,6 @@ class SpeedWindows {
  private:
   [[nodiscard]] bool fresh(std::int64_t stamp_ns, std::int64_t now_ns) noexcept;
   void begin(const rig::Measurement& measurement) noexcept;
-  [[nodiscard]] bool leaps(std::int32_t before, std::int32_t now, double at_most_s) const noexcept;
 
   PlausibilityLimits limits_;
   bool started_{false};
