@@ -183,13 +183,20 @@ exceeds its budget.
     return text
 
 
+def build_cost(page):
+    """The section that scripts/build_cost.py writes, from the page as it is."""
+    begin = page.find('## Building the programs')
+    return page[begin:] if begin >= 0 else ''
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[1])
     parser.add_argument('--output', type=pathlib.Path, default=ROOT / 'docs' / 'performance.md')
     arguments = parser.parse_args()
     if not (BIN / 'bench_integration').exists():
         sys.exit('performance.py: no benchmarks; build them with scripts/build.sh release')
-    arguments.output.write_text(page())
+    before = arguments.output.read_text() if arguments.output.exists() else ''
+    arguments.output.write_text(page() + '\n' + build_cost(before))
 
 
 if __name__ == '__main__':
