@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <ctime>
+#include <nlohmann/json.hpp>
 
 #include "config/config_error.hpp"
 #include "telemetry/file_error.hpp"

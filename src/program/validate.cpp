@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "abs_hil/plant_sim/plant.hpp"
 #include "config/explain.hpp"
 #include "config/library.hpp"

@@ -1,5 +1,7 @@
 #include "diagnosis/latency_verdict.hpp"
 
+#include <nlohmann/json.hpp>
+
 #include "catch.hpp"
 
 using namespace abs_hil;

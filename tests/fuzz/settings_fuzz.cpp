@@ -1,5 +1,6 @@
 // Any lines of `key=value`: each is refused with a ConfigError or leaves every number within its range.
 #include <cstdint>
+#include <nlohmann/json.hpp>
 #include <string_view>
 #include <type_traits>
 #include <variant>
