@@ -16,6 +16,7 @@
 #include "experiment/simulated_run.hpp"
 
 using namespace abs_hil;
+using namespace abs_hil::experiment;
 using namespace abs_hil::experiment::test;
 
 namespace {
