@@ -85,10 +85,9 @@ void CommandGate::check_wheels(const rig::Measurement& measurement, std::int64_t
 }
 
 void CommandGate::require_verdict(std::int64_t now_ns) noexcept {
-  if (watched_from_ns_ < 0) watched_from_ns_ = watched_until_ns_ = now_ns;
-  const std::int64_t since_ns = now_ns - watched_until_ns_;
+  const std::int64_t since_ns = watched_until_ns_ < 0 ? 0 : now_ns - watched_until_ns_;
   watched_until_ns_ = now_ns;
-  watched_ns_.store(now_ns - watched_from_ns_, std::memory_order_relaxed);
+  add_as_single_writer(watched_ns_, since_ns);
   if (speed_windows_.complete()) {
     without_verdict_ns_ = 0;
     return;

@@ -108,8 +108,7 @@ class CommandGate {
   double brake_risen_{0.0};
   bool has_sent_{false};
   std::int64_t sent_ns_{0};
-  std::int64_t watched_from_ns_{-1};  ///< < 0: the wheels have not been checked yet
-  std::int64_t watched_until_ns_{0};
+  std::int64_t watched_until_ns_{-1};         ///< < 0: the wheels have not been checked yet
   std::int64_t without_verdict_ns_{0};        ///< with an output on, since the latest verdict
   std::atomic<std::int64_t> watched_ns_{0};   ///< only the cycle's thread writes these two
   std::atomic<std::int64_t> unjudged_ns_{0};  ///< the part of it in which a verdict was overdue

@@ -13,9 +13,9 @@ namespace abs_hil::runtime {
 namespace {
 // docs/safety.md, "Where the bounds come from", derives these.
 /// Shortest duration of a speed window: a little less than two cycles at 1 kHz, so that jitter does not make it three.
-constexpr double speed_window_s = 1.8e-3;
-constexpr double stamp_share_max = 0.25;       ///< a speed that its stamps make less certain is not judged
-constexpr double resolution_max_rad_s = 40.0;  ///< nor is one that its counts resolve less well
+constexpr std::int64_t speed_window_ns = 1'800'000;
+constexpr std::int64_t window_per_stamp_error = 4;  ///< a speed that its stamps make less certain is not judged
+constexpr double resolution_max_rad_s = 40.0;       ///< nor is one that its counts resolve less well
 /// Fewer stale cycles in a row are no fault: a single delayed answer must pass, however long it took.
 constexpr int stale_cycles_max = 5;
 constexpr double resolution_counts = 2.0;
@@ -27,9 +27,15 @@ bool leaps(std::int32_t before, std::int32_t now, double most_counts) noexcept {
 }
 }  // namespace
 
+SpeedWindows::SpeedWindows(const PlausibilityLimits& limits) noexcept
+    : limits_(limits),
+      most_counts_per_s_(limits.enabled ? 2.0 * limits.overspeed_rad_s / limits.rad_per_count : 0.0),
+      resolving_ns_(static_cast<std::int64_t>(resolution_counts * limits.rad_per_count / resolution_max_rad_s *
+                                              static_cast<double>(rig::ns_per_s))) {}
+
 void SpeedWindows::begin(const rig::Measurement& measurement) noexcept {
   begin_ns_ = measurement.time_ns;
-  begin_error_s_ = stamp_error_s_;
+  begin_error_ns_ = stamp_error_ns_;
   begin_upper_ = measurement.upper_counts;
   begin_lower_ = measurement.lower_counts;
   brake_impulse_Nms_ = 0.0;
@@ -60,9 +66,8 @@ CheckResult SpeedWindows::update(const rig::Measurement& measurement, std::int64
   const double since_s = static_cast<double>(measurement.time_ns - stamp_ns_) * rig::s_per_ns;
   const std::int32_t upper_before = std::exchange(upper_, measurement.upper_counts);
   const std::int32_t lower_before = std::exchange(lower_, measurement.lower_counts);
-  const double error_before_s =
-      std::exchange(stamp_error_s_,
-                    static_cast<double>(rig::stamp_error_ns(measurement.time_ns, now_ns, reading_ns)) * rig::s_per_ns);
+  const std::int64_t error_before_ns =
+      std::exchange(stamp_error_ns_, rig::stamp_error_ns(measurement.time_ns, now_ns, reading_ns));
   stamp_ns_ = measurement.time_ns;
   if (!started_) {
     started_ = true;
@@ -73,8 +78,8 @@ CheckResult SpeedWindows::update(const rig::Measurement& measurement, std::int64
       limits_.ideal_actuator ? sent.brake_torque_Nm : rig::brake_torque_at(limits_.brake, sent.brake_duty);
   brake_impulse_Nms_ += brake_Nm * since_s;
   motor_duty_s_ += sent.motor_duty * since_s;
-  const double at_most_s = since_s + error_before_s + stamp_error_s_ + leap_slack_s;
-  const double most_counts = resolution_counts + 2.0 * limits_.overspeed_rad_s * at_most_s / limits_.rad_per_count;
+  const double errors_s = static_cast<double>(error_before_ns + stamp_error_ns_) * rig::s_per_ns;
+  const double most_counts = resolution_counts + most_counts_per_s_ * (since_s + errors_s + leap_slack_s);
   const bool upper_leaps = leaps(upper_before, upper_, most_counts);
   usable_ = !upper_leaps && !leaps(lower_before, lower_, most_counts);
   if (!usable_) {
@@ -84,18 +89,18 @@ CheckResult SpeedWindows::update(const rig::Measurement& measurement, std::int64
             leapt * limits_.rad_per_count};
   }
 
-  const double dt_s = static_cast<double>(measurement.time_ns - begin_ns_) * rig::s_per_ns;
-  if (dt_s < speed_window_s) return {};
-  overdue_ = begin_error_s_ + stamp_error_s_ > stamp_share_max * dt_s ||
-             resolution_counts * limits_.rad_per_count > resolution_max_rad_s * dt_s;
+  const std::int64_t dt_ns = measurement.time_ns - begin_ns_;
+  if (dt_ns < speed_window_ns) return {};
+  overdue_ = dt_ns < resolving_ns_ || dt_ns < window_per_stamp_error * (begin_error_ns_ + stamp_error_ns_);
   if (overdue_) return {};
+  const double dt_s = static_cast<double>(dt_ns) * rig::s_per_ns;
   const double rad_s_per_count = limits_.rad_per_count / dt_s;
   speed_window_ = {.dt_s = dt_s,
                    .omega1_rad_s = rig::counts_between(begin_upper_, measurement.upper_counts) * rad_s_per_count,
                    .omega2_rad_s = rig::counts_between(begin_lower_, measurement.lower_counts) * rad_s_per_count,
                    .resolution_rad_s = resolution_counts * rad_s_per_count,
-                   .begin_error_s = begin_error_s_,
-                   .end_error_s = stamp_error_s_,
+                   .begin_error_s = static_cast<double>(begin_error_ns_) * rig::s_per_ns,
+                   .end_error_s = static_cast<double>(stamp_error_ns_) * rig::s_per_ns,
                    .brake_target_Nm = brake_impulse_Nms_ / dt_s,
                    .motor_duty = motor_duty_s_ / dt_s};
   complete_ = true;

@@ -35,7 +35,7 @@ struct SpeedWindow {
 /// certain enough to be judged. Real-time safe.
 class SpeedWindows {
  public:
-  explicit SpeedWindows(const PlausibilityLimits& limits) noexcept : limits_(limits) {}
+  explicit SpeedWindows(const PlausibilityLimits& limits) noexcept;
 
   /// Takes a measurement and the command that has acted since the previous one.
   /// @param now_ns      the cycle's wake-up, on the clock of the time stamps; the reading began then
@@ -56,6 +56,8 @@ class SpeedWindows {
   void begin(const rig::Measurement& measurement) noexcept;
 
   PlausibilityLimits limits_;
+  double most_counts_per_s_;   ///< of a counter that does not leap
+  std::int64_t resolving_ns_;  ///< shortest window whose counts resolve a speed
   bool started_{false};
   bool usable_{true};
   bool complete_{false};
@@ -63,11 +65,11 @@ class SpeedWindows {
   int stale_cycles_{0};
   std::int64_t fresh_ns_{0};  ///< the cycle of the latest fresh measurement
   std::int64_t stamp_ns_{0};  ///< its stamp
-  double stamp_error_s_{0.0};
+  std::int64_t stamp_error_ns_{0};
   std::int32_t upper_{0};  ///< its counts
   std::int32_t lower_{0};
   std::int64_t begin_ns_{0};  ///< start of the current speed window
-  double begin_error_s_{0.0};
+  std::int64_t begin_error_ns_{0};
   std::int32_t begin_upper_{0};
   std::int32_t begin_lower_{0};
   double brake_impulse_Nms_{0.0};  ///< integral of b(u) over the speed window

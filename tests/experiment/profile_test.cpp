@@ -37,7 +37,10 @@ Reason end_of(const EndCondition& condition, const SequenceInput& input, const S
   Sequence sequence({{.ends_on = {condition}, .time_limit_s = 100.0}, {.ends_on = {condition}, .time_limit_s = 100.0}},
                     limits);
   sequence.update({});
-  return sequence.update(input).reason;
+  SequenceInput before = input;  // speeds and slip count after two samples
+  before.time_s -= 0.001;
+  const Reason first = sequence.update(before).reason;
+  return first != Reason::none ? first : sequence.update(input).reason;
 }
 
 }  // namespace
@@ -67,9 +70,9 @@ TEST_CASE("all of several conditions must hold at the same time") {
   const EndCondition both{.kind = EndKind::all,
                           .reason = Reason::all_conditions_met,
                           .parts = {{EndKind::slip_above, 0.1}, {EndKind::lower_speed_below, 50.0}}};
-  CHECK(end_of(both, {.speeds = {0.0, 40.0}, .slip = 0.2}) == Reason::all_conditions_met);
-  CHECK(end_of(both, {.speeds = {0.0, 60.0}, .slip = 0.2}) == Reason::none);
-  CHECK(end_of(both, {.speeds = {0.0, 40.0}, .slip = 0.0}) == Reason::none);
+  CHECK(end_of(both, {.time_s = 1.0, .speeds = {0.0, 40.0}, .slip = 0.2}) == Reason::all_conditions_met);
+  CHECK(end_of(both, {.time_s = 1.0, .speeds = {0.0, 60.0}, .slip = 0.2}) == Reason::none);
+  CHECK(end_of(both, {.time_s = 1.0, .speeds = {0.0, 40.0}, .slip = 0.0}) == Reason::none);
 }
 
 TEST_CASE("the distance of a phase counts from its beginning") {
