@@ -25,7 +25,7 @@ struct RunLogicParts {
   const control::ControlOptions& control;
   const rig::RigParameters& rig;  ///< the model: the parameters as the controller knows them
   std::unique_ptr<control::SlipController> controller;
-  std::vector<std::string> signals;  ///< names of the controller's own signals
+  std::vector<std::string> signals{};  ///< names of the controller's own signals
   Sequence sequence;
   bool ideal_actuator{false};
   double max_brake_duty{1.0};             ///< limit of the command gate

@@ -38,7 +38,7 @@ std::string text_of(const Case& c) {
   std::string text = "rate " + std::to_string(c.rate_Hz) + " Hz, reads take " + std::to_string(c.read_share) +
                      " of a period, seed " + std::to_string(c.seed) + ", model parameter " +
                      std::to_string(c.wrong_parameter) + " wrong by " + std::to_string(c.model_error) + ", faults";
-  for (const driver::Injection& fault : c.faults) text += " " + driver::to_text(fault);
+  for (const driver::Injection& fault : c.faults) text.append(" ").append(driver::to_text(fault));
   return text;
 }
 
