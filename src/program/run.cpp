@@ -222,9 +222,9 @@ int run(const RunRequest& request) {
   if (s.experiment.wait_for_start) phase_names.insert(phase_names.begin(), "waiting for the start");
   for (const std::string& problem : config::beyond_limits(plan, s))
     spdlog::warn("{}; the gate limits it to that", problem);
-  for (const std::string& problem : control::silent_settings(s.control)) spdlog::warn("{}", problem);
   const bool to_stop = config::means_to_stop(plan, s.experiment.end_speed_m_s);
   experiment::RunLogicParts logic = make_logic(s, std::move(plan.phases), plan.limits);
+  for (const std::string& problem : control::silent_settings(s.control)) spdlog::warn("{}", problem);
   require_resources(request, *driver);
   RunOutputs outputs(request, logic.signals);
   runtime::OverrunReporter late_cycles(std::llround(1e9 / s.control.rate_Hz));

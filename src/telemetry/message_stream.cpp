@@ -50,6 +50,13 @@ void put_parts(const StatusSnapshot& snapshot, status_t& m) {
   m.ticks_missed = static_cast<std::int64_t>(snapshot.late.ticks_missed);
 }
 
+/// Outside of slip control no signal is known, and a message would say nothing.
+bool knows_signals(const rig::CycleRecord& record, std::size_t count) noexcept {
+  const auto& values = record.control.signals;
+  return std::any_of(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(count),
+                     [](double value) { return !std::isnan(value); });
+}
+
 }  // namespace
 
 void check_channel_prefix(std::string_view prefix) {
@@ -105,7 +112,7 @@ void MessageStream::consume(const rig::CycleRecord& record, double distance_m) {
       measurement_t measurement = measured_at(record);
       send(measurement_, measurement);
     }
-    if (signal_count_ > 0) {
+    if (knows_signals(record, signal_count_)) {
       put_signals(record, signal_count_, signals_message_);
       send(signals_, signals_message_);
     }

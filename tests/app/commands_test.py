@@ -126,7 +126,7 @@ def live_changes(folder, key):
     run = Run(folder, '--wait-for-start', '--set', 'commands.enabled=true', *KEY)
     for words, status, text in [(('slip-ref', '0.12'), 0, 'control.slip_ref = 0.12'), (('gain', 'ka1', '2'), 0, 'ka1 = 2'),
                                 (('gain', 'control.adaptive.gamma', '30'), 0, 'gamma = 30'),
-                                (('slip-ref', '1.5'), 1, '(0, 1)'), (('gain', 'gamma', '-1'), 1, '(0, 10000]'),
+                                (('slip-ref', '1.5'), 1, '(0, 1)'), (('gain', 'gamma', '-1'), 1, '[1e-06, 10000]'),
                                 (('gain', 'control.rate_Hz', '100'), 1, 'cannot be changed'),
                                 (('gain', 'nosuch', '1'), 1, 'unknown key'), (('gain', 'zeta0', '1'), 1, 'cannot be changed')]:
         found, said = send(*words)

@@ -16,7 +16,7 @@ class Outputs(ProgramTest):
     def test_csv(self):
         path = self.folder / 'run.csv'
         self.fast('--csv', path)
-        self.assertEqual(path.read_text().splitlines()[0], HEADER)
+        self.assertEqual(path.read_text().splitlines()[0], HEADER + ',I_m,omega1_hat_rad_s,zeta_N,V,V_dot')
         rows = self.rows(path)
         seen = list(dict.fromkeys(row['phase'] for row in rows))
         self.assertEqual(seen, PHASES)

@@ -10,7 +10,9 @@
 namespace abs_hil::telemetry {
 namespace {
 
-ExperimentInfo info() { return {"paper", "adaptive", "paper-table1", "sim", R"({"plant":{"theta_N":23}})", "0.1.0", {}}; }
+ExperimentInfo info() {
+  return {"paper", "adaptive", "paper-table1", "sim", R"({"plant":{"theta_N":23}})", "0.1.0", {}};
+}
 
 template <class Message>
 void check_consecutive(const std::vector<Message>& messages) {
@@ -56,6 +58,22 @@ TEST_CASE("a controller's own signals come with their names, one message with ea
     CHECK(std::isnan(messages[n].value3));  // there is no third signal
     CHECK(std::isnan(messages[n].value8));
   }
+}
+
+TEST_CASE("signals are not sent while none is known") {
+  test::CapturingOutlet outlet;
+  ExperimentInfo with_signals = info();
+  with_signals.signals = {"I_m", "zeta_N"};
+  MessageStream stream({}, with_signals, {});
+  stream.add(outlet);
+  rig::CycleRecord record = test::sample_record(0);
+  record.control.signals = rig::no_signals;
+  stream.consume(record, 0.0);
+  record.sequence = 1;
+  record.control.signals[1] = 3.0;
+  stream.consume(record, 0.0);
+  REQUIRE(outlet.all<signals_t>("ABS_SIGNALS").size() == 1);
+  CHECK(outlet.all<signals_t>("ABS_SIGNALS").front().cycle == 1);
 }
 
 TEST_CASE("a controller without signals sends none") {
