@@ -8,13 +8,13 @@
 
 #include "abs_hil/control/options.hpp"
 #include "abs_hil/control/slip_controller.hpp"
-#include "abs_hil/rig/controller_signal.hpp"
 #include "abs_hil/rig/parameters.hpp"
 #include "control/brake_actuator.hpp"
 #include "control/tracking_observer.hpp"
 #include "experiment/adjustment.hpp"
 #include "experiment/options.hpp"
 #include "experiment/sequence.hpp"
+#include "rig/controller_signal.hpp"
 #include "runtime/command_gate.hpp"
 #include "runtime/cycle_logic.hpp"
 

@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "abs_hil/rig/controller_signal.hpp"
 #include "abs_hil/rig/reason.hpp"
+#include "rig/controller_signal.hpp"
 
 namespace abs_hil::rig {
 

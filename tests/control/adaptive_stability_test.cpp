@@ -101,7 +101,8 @@ TEST_CASE("the adaptive controller reports the states of (17), and V and V' of T
   for (std::size_t n = 1; n < run.ticks.size(); ++n) {
     const auto& tick = run.ticks[n];
     const rig::SignalValues& signals = tick.output.signals;
-    I += (run.ticks[n - 1].output.slip_velocity_error_m_s + tick.output.slip_velocity_error_m_s) / 2 / s.options.rate_Hz;
+    I +=
+        (run.ticks[n - 1].output.slip_velocity_error_m_s + tick.output.slip_velocity_error_m_s) / 2 / s.options.rate_Hz;
     REQUIRE_THAT(signals[0], WithinAbs(I, 1e-9));
     // (18) holds among the reported states.
     const double theta_hat_N =

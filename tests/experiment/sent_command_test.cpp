@@ -6,8 +6,8 @@
 #include <memory>
 
 #include "abs_hil/rig/brake_map.hpp"
-#include "abs_hil/rig/controller_signal.hpp"
 #include "catch.hpp"
+#include "rig/controller_signal.hpp"
 #include "simulated_run.hpp"
 
 using namespace abs_hil;

@@ -24,8 +24,8 @@ TEST_CASE("the names of signals come in order") {
 }
 
 TEST_CASE("a name that would not do as a column is refused, and the message says which") {
-  for (const std::string_view bad : {"", "1st", "with space", "a,b", "h\xc3\xb6he", "a-b",
-                                     "a_name_of_more_than_thirty_two_characters"}) {
+  for (const std::string_view bad :
+       {"", "1st", "with space", "a,b", "h\xc3\xb6he", "a-b", "a_name_of_more_than_thirty_two_characters"}) {
     CHECK_THROWS_WITH(names_of({"V", bad}), Contains("'" + std::string(bad) + "'") && Contains("letters, digits"));
     CHECK_FALSE(rig::is_signal_name(bad));
   }
