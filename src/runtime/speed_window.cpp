@@ -1,5 +1,6 @@
 #include "runtime/speed_window.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -91,7 +92,8 @@ CheckResult SpeedWindows::update(const rig::Measurement& measurement, std::int64
 
   const std::int64_t dt_ns = measurement.time_ns - begin_ns_;
   if (dt_ns < speed_window_ns) return {};
-  overdue_ = dt_ns < resolving_ns_ || dt_ns < window_per_stamp_error * (begin_error_ns_ + stamp_error_ns_);
+  const std::int64_t sure_ns = window_per_stamp_error * (begin_error_ns_ + stamp_error_ns_);
+  overdue_ = dt_ns < std::max(resolving_ns_, sure_ns);
   if (overdue_) return {};
   const double dt_s = static_cast<double>(dt_ns) * rig::s_per_ns;
   const double rad_s_per_count = limits_.rad_per_count / dt_s;
