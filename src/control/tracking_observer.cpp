@@ -24,9 +24,10 @@ TrackingObserver::TrackingObserver(const ObserverOptions& options, std::int32_t 
 void TrackingObserver::reset(std::int32_t counts, double omega_rad_s) noexcept {
   counts_ = counts;
   angle_error_rad_ = 0.0;
-  omega_rad_s_ = omega_rad_s;
+  omega_rad_s_ = taken_omega_rad_s_ = omega_rad_s;
   alpha_rad_s2_ = 0.0;
   ignored_ = 0;
+  ignored_s_ = 0.0;
   still_s_ = 0.0;
 }
 
@@ -53,12 +54,11 @@ void TrackingObserver::reset(std::int32_t counts, double omega_rad_s) noexcept {
   const double omega_gain = 1.5 * q * q * (1.0 + p) / dt_s;
   const double alpha_gain = q * q * q / (dt_s * dt_s);
 
-  const double omega_predicted = omega_rad_s_ + alpha_rad_s2_ * dt_s;
-  const double turned_rad = 0.5 * (omega_rad_s_ + omega_predicted) * dt_s;
+  const double omega_predicted = taken_omega_rad_s_ + alpha_rad_s2_ * dt_s;
+  const double turned_rad = 0.5 * (taken_omega_rad_s_ + omega_predicted) * dt_s;
   const double residual_rad = travel_rad - (angle_error_rad_ + turned_rad);
 
   if (stamp_error_s > 0.0 && implausible(omega_gain * residual_rad, omega_gain, dt_s, stamp_error_s)) {
-    angle_error_rad_ += turned_rad;  // still against the last reading that was taken
     omega_rad_s_ = omega_predicted;
     return false;
   }
@@ -81,18 +81,26 @@ void TrackingObserver::update(std::int32_t counts, double dt_s, double stamp_err
   if (stands_still()) {
     counts_ = counts;
     ignored_ = 0;
+    ignored_s_ = 0.0;
     angle_error_rad_ = 0.0;
-    omega_rad_s_ = 0.0;
+    omega_rad_s_ = taken_omega_rad_s_ = 0.0;
     alpha_rad_s2_ = 0.0;
     return;
   }
-  if (predict_and_correct(static_cast<double>(travel) * rad_per_count_, dt_s, stamp_error_s)) {
-    counts_ = counts;
-    ignored_ = 0;
-  } else {
-    ++ignored_;
-  }
+  // After an ignored reading the next one counts for the whole time since the last that was taken: its travel does too,
+  // and gains for a shorter time would make the filter unstable.
+  const double since_taken_s = ignored_s_ + dt_s;
+  const bool taken = predict_and_correct(static_cast<double>(travel) * rad_per_count_, since_taken_s, stamp_error_s);
   if (travel == 0) bound_by_silence();
+  if (!taken) {
+    ++ignored_;
+    ignored_s_ = since_taken_s;
+    return;
+  }
+  counts_ = counts;
+  ignored_ = 0;
+  ignored_s_ = 0.0;
+  taken_omega_rad_s_ = omega_rad_s_;
 }
 
 void TrackingObserver::bound_by_silence() noexcept {

@@ -51,9 +51,11 @@ class TrackingObserver {
   /// Estimated angle minus the last reading. The difference stays exact however far the wheel has turned.
   double angle_error_rad_{0.0};
   double omega_rad_s_{0.0};
+  double taken_omega_rad_s_{0.0};  ///< speed at the last reading that was taken
   double alpha_rad_s2_{0.0};
-  int ignored_{0};       ///< readings in a row
-  double still_s_{0.0};  ///< since the count last changed
+  int ignored_{0};         ///< readings in a row
+  double ignored_s_{0.0};  ///< since the last reading that was taken
+  double still_s_{0.0};    ///< since the count last changed
 };
 
 }  // namespace abs_hil::control
