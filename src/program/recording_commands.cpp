@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "abs_hil/control/registry.hpp"
 #include "config/config_error.hpp"
 #include "program/exit_status.hpp"
 #include "replay/check.hpp"
@@ -66,7 +67,8 @@ int replay_run(const ReplayCommand& command) {
         replay::rerun_open_loop(run, settings, replay::WheelFaults::as_recorded);
     fmt::print("{}", replay::report(run, settings, rerun));
     if (command.csv_file) {
-      telemetry::CsvSink csv(*command.csv_file);
+      const auto controller = control::make_controller(settings.control.controller, {settings.control, settings.model});
+      telemetry::CsvSink csv(*command.csv_file, 0, rig::signal_names(controller->signals()));
       for (const replay::RerunCycle& cycle : rerun) csv.consume(cycle.record, cycle.distance_m);
       csv.finish();
     }
