@@ -28,21 +28,29 @@ void add_backend_option(cli::Parser& parser, program::RunOptions& o) {
       {.names = "--backend", .to = &o.backend, .help = "sim or rig", .one_of = {"sim", "rig"}, .show_default = true});
 }
 
-/// Adds options that belong to the configuration, not to a single run.
-void add_configuration_options(cli::Parser& parser, program::RunOptions& o) {
+void add_config_file(cli::Parser& parser, program::RunOptions& o) {
   parser.add(
       {.names = "--config", .to = &o.config_file, .help = "TOML file with any configuration values", .type = "FILE"});
+}
+
+void add_assignments(cli::Parser& parser, program::RunOptions& o) {
+  parser.add({.names = "--set",
+              .to = &o.assignments,
+              .help = "set any configuration value (abs_hil list --keys)",
+              .type = "key=value",
+              .repeated = true});
+}
+
+/// Adds options that belong to the configuration, not to a single run.
+void add_configuration_options(cli::Parser& parser, program::RunOptions& o) {
+  add_config_file(parser, o);
   parser.add({.names = "--plant", .to = &o.plant, .help = "simulated plant by name or TOML file", .type = "NAME|FILE"});
   parser.add({.names = "--model",
               .to = &o.model,
               .help = "the controllers' model of the rig, by name or TOML file (default: the plant)",
               .type = "NAME|FILE"});
   parser.add({.names = "--controller", .to = &o.controller, .help = "slip controller", .type = "NAME"});
-  parser.add({.names = "--set",
-              .to = &o.assignments,
-              .help = "set any configuration value (abs_hil list --keys)",
-              .type = "key=value",
-              .repeated = true});
+  add_assignments(parser, o);
 }
 
 void add_timing_options(cli::Parser& parser, program::RunOptions& o) {
@@ -190,15 +198,8 @@ cli::Parser add_compare(cli::Parser& parser, program::CompareOptions& o) {
                .help = "what varies: parameters (wheels, brake, tyre), theta, radii, phase, or none",
                .type = "SPEC",
                .default_text = "parameters=0.1,theta=0.1,phase"});
-  compare.add({.names = "--config",
-               .to = &o.run.config_file,
-               .help = "TOML file with any configuration values",
-               .type = "FILE"});
-  compare.add({.names = "--set",
-               .to = &o.run.assignments,
-               .help = "set any configuration value (abs_hil list --keys)",
-               .type = "key=value",
-               .repeated = true});
+  add_config_file(compare, o.run);
+  add_assignments(compare, o.run);
   compare.add({.names = "--threads",
                .to = &o.threads,
                .help = "number of threads, 0: one for each processor; does not change the results",

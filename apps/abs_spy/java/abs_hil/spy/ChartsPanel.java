@@ -1,16 +1,10 @@
 package abs_hil.spy;
 
 import abs_hil.telemetry_t;
-import java.awt.GridLayout;
 import java.util.function.Supplier;
-import javax.swing.JPanel;
-import javax.swing.Timer;
 
 /** Slip, speeds and theta of a telemetry channel, sampled from the latest message 50 times a second. */
-final class ChartsPanel extends JPanel {
-    private static final double WINDOW_S = 10.0;
-    private static final int PERIOD_MS = 20;
-    private static final int SAMPLES_PER_PAINT = 5;
+final class ChartsPanel extends SampledPanel {
     private static final int SLIP = 0;
     private static final int SLIP_REF = 1;
     private static final int OMEGA1 = 2;
@@ -20,14 +14,10 @@ final class ChartsPanel extends JPanel {
     private static final int QUANTITIES = 6;
 
     private final SampleHistory history = new SampleHistory(QUANTITIES, WINDOW_S, 1024);
-    private final transient Supplier<Object> latest;
-    private final Timer timer = new Timer(PERIOD_MS, event -> tick());
-    private int ticks;
 
     /** {@code latest} gives the channel's last message, null if there is none yet. */
     ChartsPanel(Supplier<Object> latest) {
-        super(new GridLayout(3, 1));
-        this.latest = latest;
+        super(latest);
         add(chart("slip", new int[] {SLIP, SLIP_REF}, new String[] {"slip", "wanted"}, 0.0, 1.0));
         add(chart("speeds, rad/s", new int[] {OMEGA1, OMEGA2}, new String[] {"upper wheel", "lower wheel"}, 0.0, 50.0));
         add(chart("peak tyre force, N", new int[] {THETA_EST, THETA}, new String[] {"\u03b8\u0302", "\u03b8"}, 0.0, 10.0));
@@ -37,17 +27,10 @@ final class ChartsPanel extends JPanel {
         return new StripChart(title, history, quantities, names, leastLow, leastHigh);
     }
 
-    /** Painting takes longer than sampling, so it is done less often. */
-    private void tick() {
-        sample();
-        if (++ticks % SAMPLES_PER_PAINT == 0) {
-            repaint();
-        }
-    }
-
     /** Takes the latest message into the history. Speeds and slip are the truth where it is known, else estimates. */
+    @Override
     void sample() {
-        Object message = latest.get();
+        Object message = latest();
         if (!(message instanceof telemetry_t)) {
             return;
         }
@@ -64,17 +47,5 @@ final class ChartsPanel extends JPanel {
 
     private static double known(double truth, double estimate) {
         return Double.isNaN(truth) ? estimate : truth;
-    }
-
-    @Override
-    public void addNotify() {
-        super.addNotify();
-        timer.start();
-    }
-
-    @Override
-    public void removeNotify() {
-        timer.stop();
-        super.removeNotify();
     }
 }

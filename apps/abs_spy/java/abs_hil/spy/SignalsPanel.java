@@ -1,42 +1,25 @@
 package abs_hil.spy;
 
 import abs_hil.signals_t;
-import java.awt.GridLayout;
 import java.util.function.Supplier;
-import javax.swing.JPanel;
-import javax.swing.Timer;
 
 /** A chart for each of a controller's own signals, sampled from the latest message 50 times a second. */
-final class SignalsPanel extends JPanel {
-    private static final double WINDOW_S = 10.0;
-    private static final int PERIOD_MS = 20;
-    private static final int SAMPLES_PER_PAINT = 5;
+final class SignalsPanel extends SampledPanel {
     private static final int SIGNALS = 8;
 
     private final SampleHistory history = new SampleHistory(SIGNALS, WINDOW_S, 1024);
-    private final transient Supplier<Object> latest;
-    private final Timer timer = new Timer(PERIOD_MS, event -> tick());
     private String names = "";
     private long firstNs;
-    private int ticks;
 
     /** {@code latest} gives the channel's last message, null if there is none yet. */
     SignalsPanel(Supplier<Object> latest) {
-        super(new GridLayout(0, 1));
-        this.latest = latest;
-    }
-
-    /** Painting takes longer than sampling, so it is done less often. */
-    private void tick() {
-        sample();
-        if (++ticks % SAMPLES_PER_PAINT == 0) {
-            repaint();
-        }
+        super(latest);
     }
 
     /** Takes the latest message into the history. Another run may have other signals: then the charts are new. */
+    @Override
     void sample() {
-        Object message = latest.get();
+        Object message = latest();
         if (!(message instanceof signals_t)) {
             return;
         }
@@ -61,17 +44,5 @@ final class SignalsPanel extends JPanel {
 
     SampleHistory history() {
         return history;
-    }
-
-    @Override
-    public void addNotify() {
-        super.addNotify();
-        timer.start();
-    }
-
-    @Override
-    public void removeNotify() {
-        timer.stop();
-        super.removeNotify();
     }
 }
