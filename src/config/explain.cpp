@@ -65,14 +65,15 @@ std::string in_words(const experiment::EndCondition& end) {
   return text;
 }
 
-std::string brake_in_words(const experiment::PhasePlan& phase, const config::Settings& s) {
+/// @param goes_on  the phase before used the controller too, and this one does not restart it
+std::string brake_in_words(const experiment::PhasePlan& phase, const config::Settings& s, bool goes_on) {
   switch (phase.brake) {
     case BrakeAction::released: return "off";
     case BrakeAction::torque: return "torque " + in_words(phase.brake_profile, phase.brake_torque_Nm, " N m");
     case BrakeAction::duty: return "duty " + in_words(phase.brake_profile, phase.brake_duty, "");
     case BrakeAction::slip_control: break;
   }
-  return fmt::format("controller {}, slip reference {}", s.control.controller,
+  return fmt::format("controller {}{}, slip reference {}", s.control.controller, goes_on ? " (goes on)" : "",
                      in_words(phase.slip_ref_profile, s.control.slip_ref, ""));
 }
 
@@ -103,14 +104,15 @@ std::string explain(const Script& script, const config::Settings& settings) {
       fmt::format("{}: {}\n", script.name, script.description.empty() ? "no description" : script.description);
   for (std::size_t i = 0; i < plan.phases.size(); ++i) {
     const experiment::PhasePlan& phase = plan.phases[i];
+    const bool goes_on = i > 0 && plan.phases[i - 1].brake == BrakeAction::slip_control && !phase.restart;
     std::string ends;
     for (const experiment::EndCondition& end : phase.ends_on) ends += (ends.empty() ? "" : ", or ") + in_words(end);
-    text += fmt::format("{}. {} ({}): motor {}, brake {}\n   until {}; a fault after {} s\n", i + 1,
-                        plan.phase_names[i], rig::name_of(phase.phase),
+    text += fmt::format("{}. {} ({}): motor {}, brake {}\n   until {}; a fault after {} s\n", i + 1, phase.name,
+                        rig::name_of(phase.phase),
                         phase.motor_profile.empty() && phase.motor_duty == 0.0
                             ? "off"
                             : "duty " + in_words(phase.motor_profile, phase.motor_duty, ""),
-                        brake_in_words(phase, s), ends, number(phase.time_limit_s));
+                        brake_in_words(phase, s, goes_on), ends, number(phase.time_limit_s));
   }
   text += fmt::format("Limits: wheels {} rad/s, motor duty {}, brake duty {}", number(s.gate.overspeed_rad_s),
                       number(s.gate.motor_duty_max), number(s.gate.brake_duty_max));

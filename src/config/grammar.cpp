@@ -1,6 +1,7 @@
 #include "config/grammar.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace abs_hil::config {
 
@@ -55,6 +56,22 @@ std::vector<std::string> Grammar::spellings() const {
   return names;
 }
 
+std::string table_below_with(const Grammar& start, std::string_view key) {
+  // Breadth first: the nearest table counts. The grammar of `until` contains itself, so no grammar is taken twice.
+  std::vector<std::pair<const Grammar*, std::string>> open{{&start, ""}};
+  for (std::size_t n = 0; n < open.size(); ++n) {
+    const auto [grammar, path] = open[n];
+    for (const Field& field : grammar->fields) {
+      const auto is_it = [&field](const auto& other) { return other.first == field.grammar; };
+      if (field.grammar == nullptr || std::any_of(open.begin(), open.end(), is_it)) continue;
+      std::string below = path + (path.empty() ? "" : ".") + std::string(field.facts.key);
+      if (field.grammar->find(key) != nullptr) return below;
+      open.emplace_back(field.grammar, std::move(below));
+    }
+  }
+  return {};
+}
+
 const Grammar& script_grammar() {
   static const Grammar grammar{
       "the script",
@@ -104,6 +121,9 @@ const Grammar& phase_grammar() {
                .meaning = "what drives the brake; or a table of duty, torque_Nm or slip_ref",
                .allowed = {"off", "controller"}},
               Quantity::none, &brake_grammar()),
+          row(Shape::flag_true,
+              {.key = "restart",
+               .meaning = "the slip controller begins anew; without: it goes on from the phase before"}),
           required(row(Shape::table,
                        {.key = "until", .meaning = "what ends the phase: one condition, or any or all of several"},
                        Quantity::none, &until_grammar())),

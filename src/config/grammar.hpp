@@ -67,6 +67,9 @@ struct Grammar {
   [[nodiscard]] std::vector<std::string> spellings() const;
 };
 
+/// The path from `start` down to the table that knows the key, "until" or "brake.slip_ref"; empty if none does.
+[[nodiscard]] std::string table_below_with(const Grammar& start, std::string_view key);
+
 [[nodiscard]] const Grammar& script_grammar();
 [[nodiscard]] const Grammar& phase_grammar();
 [[nodiscard]] const Grammar& until_grammar();

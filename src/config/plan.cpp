@@ -79,7 +79,6 @@ class Planner {
     for (const PhaseScript& phase : script_.phases) {
       if (phase.when && !holds(*phase.when, keys_)) continue;
       plan.phases.push_back(planned(phase));
-      plan.phase_names.push_back(phase.name);
     }
     if (plan.phases.empty()) {
       throw config::ConfigError(
@@ -122,7 +121,8 @@ class Planner {
   }
 
   [[nodiscard]] experiment::PhasePlan planned(const PhaseScript& phase) const {
-    experiment::PhasePlan plan{.phase = kind_of(phase), .brake = phase.brake};
+    experiment::PhasePlan plan{
+        .phase = kind_of(phase), .name = phase.name, .brake = phase.brake, .restart = phase.restart};
     plan.motor_profile = profile_or(phase.motor, plan.motor_duty);
     if (phase.brake == BrakeAction::slip_control) {
       // A constant too: it stands in place of control.slip_ref.
@@ -256,8 +256,8 @@ std::vector<std::string> beyond_limits(const Plan& plan, const config::Settings&
     const experiment::PhasePlan& phase = plan.phases[i];
     const auto compare = [&](double wanted, double most, std::string_view what, std::string_view unit) {
       if (wanted > most) {
-        problems.push_back(fmt::format("phase \"{}\": {} {:.6g}{} is more than {:.6g}{}", plan.phase_names[i], what,
-                                       wanted, unit, most, unit));
+        problems.push_back(
+            fmt::format("phase \"{}\": {} {:.6g}{} is more than {:.6g}{}", phase.name, what, wanted, unit, most, unit));
       }
     };
     compare(highest(phase.motor_profile, phase.motor_duty), s.gate.motor_duty_max, "motor duty", "");

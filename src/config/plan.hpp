@@ -13,7 +13,6 @@ namespace abs_hil::config {
 /// A script with the values of one configuration, ready to run.
 struct Plan {
   std::vector<experiment::PhasePlan> phases{};
-  std::vector<std::string> phase_names{};  ///< of each of `phases`
   experiment::SequenceLimits limits{};
 };
 

@@ -28,6 +28,22 @@ std::string quoted(const std::vector<std::string_view>& names) {
   return text;
 }
 
+/// Where an unknown key belongs if another table knows it; otherwise the nearest key.
+std::string advice(const Source& source, std::string_view key, const toml::node& node, const Grammar& grammar,
+                   const std::vector<std::string>& names) {
+  const std::string value = node.is_table() || node.is_array() ? "..." : shown(node);
+  if (const std::string below = table_below_with(grammar, key); !below.empty()) {
+    return fmt::format("put it into {}: {} = {{ {} = {} }}", below, below, key, value);
+  }
+  if (const std::string place = table_below_with(script_grammar(), key); !place.empty()) {
+    return fmt::format("it belongs into the table {}", place);
+  }
+  if (source.is_setting(key)) {
+    return "put it into [settings], which takes the keys of abs_hil list --keys";
+  }
+  return fmt::format("the nearest known key is \"{}\"", rig::nearest_name(key, names));
+}
+
 }  // namespace
 
 std::string Source::at(Place place) const { return fmt::format("{}:{}:{}", path_, place.line, place.column); }
@@ -50,6 +66,13 @@ const config::Key& Source::key(std::string_view name, Place place) const {
   fail(place,
        fmt::format("unknown configuration key \"{}\"; the nearest known key is \"{}\" (abs_hil list --keys shows all)",
                    name, fmt::join(rig::nearest_keys(name, names), "\" or \"")));
+}
+
+bool Source::is_setting(std::string_view name) const {
+  const auto is_it = [table = std::string(name) + '.', name](const config::Key& key) {
+    return key.name == name || key.name.starts_with(table);
+  };
+  return std::any_of(keys_.keys().begin(), keys_.keys().end(), is_it);
 }
 
 void Source::check_value(std::string_view name, const config::Value& value, Place place) const {
@@ -96,8 +119,8 @@ TableReader::TableReader(const Source& source, const toml::table& table, const G
     if (entry.field == nullptr) {
       const std::vector<std::string> names = grammar.spellings();
       source.fail(entry.key_place,
-                  fmt::format("unknown key \"{}\" in {}; the nearest known key is \"{}\"; known: {}", entry.key,
-                              grammar.title, rig::nearest_name(entry.key, names), fmt::join(names, ", ")));
+                  fmt::format("unknown key \"{}\" in {}; {}; known: {}", entry.key, grammar.title,
+                              advice(source, entry.key, node, grammar, names), fmt::join(names, ", ")));
     }
     entry.has_suffix = entry.key.size() > entry.field->facts.key.size();
     if (const Entry* other = find(entry.field->facts.key)) {

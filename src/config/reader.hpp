@@ -24,6 +24,8 @@ class Source {
   [[nodiscard]] std::string at(Place place) const;
   /// Returns the configuration key of that name. Fails for an unknown name, with the nearest known one.
   [[nodiscard]] const config::Key& key(std::string_view name, Place place) const;
+  /// True for a configuration key, and for a table of them, as in "control".
+  [[nodiscard]] bool is_setting(std::string_view name) const;
   /// Fails unless the configuration key takes that value.
   void check_value(std::string_view name, const config::Value& value, Place place) const;
 

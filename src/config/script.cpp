@@ -11,6 +11,7 @@
 #include "config/events.hpp"
 #include "config/reader.hpp"
 #include "driver/injection/injection.hpp"
+#include "rig/run_names.hpp"
 
 namespace abs_hil::config {
 
@@ -69,6 +70,7 @@ class Parser {
     const Entry& until = *reader.find("until");
     phase.until = read_until(source_, reader.table(until), until.place);
     phase.at_most = reader.optional_number("at_most");
+    if (const Entry* restart = reader.find("restart")) phase.restart = read_restart(*restart, phase);
     const auto lasts = [](const ConditionScript& c) { return c.kind == experiment::EndKind::duration && !c.when; };
     if (!phase.at_most && std::none_of(phase.until.begin(), phase.until.end(), lasts)) {
       source_.fail(phase.place,
@@ -79,8 +81,8 @@ class Parser {
 
   void check_name(const PhaseScript& phase, const TableReader& reader) const {
     const Entry& entry = *reader.find("name");
-    const bool plain =
-        !phase.name.empty() && phase.name.size() <= 40 && phase.name.find_first_of("\n\r\t\",") == std::string::npos;
+    const bool plain = !phase.name.empty() && phase.name.size() <= rig::phase_name_max &&
+                       phase.name.find_first_of("\n\r\t\",") == std::string::npos;
     if (!plain) {
       source_.fail(entry.place,
                    fmt::format("name = {}: give a name of 1 to 40 characters without quotes, commas and line ends",
@@ -126,6 +128,19 @@ class Parser {
                   : what.field->facts.key == "torque" ? BrakeAction::torque
                                                       : BrakeAction::slip_control;
     phase.brake_profile = read_profile_script(source_, what, read_file_, script_.files);
+  }
+
+  [[nodiscard]] bool read_restart(const Entry& entry, const PhaseScript& phase) const {
+    const auto* flag = entry.node->as_boolean();
+    if (flag == nullptr || !flag->get()) {
+      source_.fail(entry.place, fmt::format("restart = {}: write true", shown(*entry.node)));
+    }
+    if (phase.brake != BrakeAction::slip_control) {
+      source_.fail(entry.key_place, fmt::format("phase \"{}\": restart needs a slip controller; give brake = "
+                                                "\"controller\" or {{ slip_ref }}, or leave restart out",
+                                                phase.name));
+    }
+    return true;
   }
 
   void read_limits(const toml::table& table, Place place) {

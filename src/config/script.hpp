@@ -64,6 +64,7 @@ struct PhaseScript {
   std::optional<ProfileScript> brake_profile{};  ///< duty, torque or slip reference; none: control.slip_ref
   std::vector<ConditionScript> until{};          ///< any of them
   std::optional<Number> at_most{};
+  bool restart{false};  ///< of the slip controller
   Place place{};
 };
 

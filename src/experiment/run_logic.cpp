@@ -40,15 +40,17 @@ RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig
                                const SequenceLimits& limits) {
   if (experiment.wait_for_start) {
     plans.insert(plans.begin(), {.phase = rig::Phase::idle,
+                                 .name = "waiting for the start",
                                  .ends_on = {{EndKind::start_command, 0.0, rig::Reason::start_command}},
                                  .time_limit_s = start_limit_s});
   }
   auto controller = control::make_controller(control.controller, {control, rig});
-  std::vector<std::string> signals = rig::signal_names(controller->signals());
+  rig::RunNames names{.signals = rig::signal_names(controller->signals())};
+  for (const PhasePlan& plan : plans) names.phases.push_back({plan.phase, plan.name});
   return {.control = control,
           .rig = rig,
           .controller = std::move(controller),
-          .signals = std::move(signals),
+          .names = std::move(names),
           .sequence = Sequence(
               std::move(plans), limits, {.duty = experiment.stop_brake_duty, .limit_s = experiment.stop_brake_limit_s},
               {.duty = std::min(gate.fault_brake_duty, gate.brake_duty_max), .limit_s = gate.fault_brake_limit_s}),
@@ -120,8 +122,8 @@ void RunLogic::note_travel(const rig::Measurement& measurement, double dt_s) noe
   lower_counts_ = measurement.lower_counts;
 }
 
-double RunLogic::slip_control(double dt_s, bool entered, rig::ControlState& state) noexcept {
-  control::SlipInput input{.dt_s = entered ? 0.0 : dt_s,
+double RunLogic::slip_control(double dt_s, bool begins, rig::ControlState& state) noexcept {
+  control::SlipInput input{.dt_s = begins ? 0.0 : dt_s,
                            .speeds = speeds_,
                            .slip = slip_,
                            .slip_ref = state.slip_ref,
@@ -132,12 +134,12 @@ double RunLogic::slip_control(double dt_s, bool entered, rig::ControlState& stat
                            .alpha2_rad_s2 = alpha2_rad_s2_,
                            .upper_travel_rad = upper_travel_rad_,
                            .lower_travel_rad = lower_travel_rad_,
-                           .sent_brake_torque_Nm = entered ? 0.0 : sent_Nm_,
-                           .unsent_torque_Nm = entered ? 0.0 : unsent_Nm_};
-  if (entered) controller_->reset(input);
+                           .sent_brake_torque_Nm = begins ? 0.0 : sent_Nm_,
+                           .unsent_torque_Nm = begins ? 0.0 : unsent_Nm_};
+  if (begins) controller_->reset(input);
   const control::SlipOutput output = controller_->step(input);
-  if (refused(output, entered)) return 0.0;
-  if (entered) bump_Nm_ = 0.0;
+  if (refused(output, begins)) return 0.0;
+  if (begins) bump_Nm_ = 0.0;
   state.slip_velocity_error_m_s = output.slip_velocity_error_m_s;
   state.theta_est_N = output.theta_est_N;
   state.signals = output.signals;
@@ -147,12 +149,13 @@ double RunLogic::slip_control(double dt_s, bool entered, rig::ControlState& stat
 }
 
 /// Checks a controller's whole output before anything uses it. The torque must be finite. The other signals may be NaN
-/// if they were NaN at the start of the phase: the controller does not give them.
-bool RunLogic::refused(const control::SlipOutput& output, bool entered) noexcept {
+/// if they were NaN when the controller began: it does not
+/// give them.
+bool RunLogic::refused(const control::SlipOutput& output, bool begins) noexcept {
   const std::array<double, rig::controller_signals.size()> signals{
       output.brake_torque_Nm, output.slip_velocity_error_m_s, output.theta_est_N, output.slip_ref};
   for (std::size_t n = 0; n < signals.size(); ++n) {
-    if (entered) not_given_[n] = n != 0 && std::isnan(signals[n]);
+    if (begins) not_given_[n] = n != 0 && std::isnan(signals[n]);
     if (std::isfinite(signals[n]) || (not_given_[n] && std::isnan(signals[n]))) continue;
     sequence_.end_early(rig::Reason::controller_not_finite, static_cast<double>(n));
     refused_ = true;
@@ -223,6 +226,9 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
   state.slip_ref = slip_ref_;
   state.brake_torque_est_Nm = actuator_.torque_Nm();
 
+  // Over consecutive phases that use it, the controller goes on with its estimates.
+  const bool begins = change.entered && (!in_slip_control_ || plan.restart);
+  in_slip_control_ = plan.brake == BrakeAction::slip_control;
   const double phase_time_s = sequence_.phase_time_s();
   asked_Nm_ = rig::unknown;
   double torque_Nm = 0.0;
@@ -231,8 +237,7 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
     brake_duty = plan.brake_duty_at(phase_time_s);
     torque_Nm = rig::brake_torque_at(brake_, brake_duty);
   } else {
-    const control::BrakeActuator::Target target =
-        actuator_.next(wanted_torque_Nm(plan, dt_s, change.entered, state), dt_s);
+    const control::BrakeActuator::Target target = actuator_.next(wanted_torque_Nm(plan, dt_s, begins, state), dt_s);
     torque_Nm = target.torque_Nm;
     brake_duty = target.duty;
   }
@@ -247,7 +252,7 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
           .brake_torque_Nm = torque_Nm};
 }
 
-double RunLogic::wanted_torque_Nm(const PhasePlan& plan, double dt_s, bool entered, rig::ControlState& state) noexcept {
+double RunLogic::wanted_torque_Nm(const PhasePlan& plan, double dt_s, bool begins, rig::ControlState& state) noexcept {
   switch (plan.brake) {
     case BrakeAction::released:
     case BrakeAction::duty: return 0.0;
@@ -255,7 +260,7 @@ double RunLogic::wanted_torque_Nm(const PhasePlan& plan, double dt_s, bool enter
     case BrakeAction::slip_control: break;
   }
   if (!plan.slip_ref_profile.empty()) state.slip_ref = plan.slip_ref_profile.at(sequence_.phase_time_s());
-  return slip_control(dt_s, entered, state);
+  return slip_control(dt_s, begins, state);
 }
 
 void RunLogic::commanded(const rig::Command& acted, const rig::Command& own) noexcept {

@@ -15,6 +15,7 @@
 #include "experiment/options.hpp"
 #include "experiment/sequence.hpp"
 #include "rig/controller_signal.hpp"
+#include "rig/run_names.hpp"
 #include "runtime/command_gate.hpp"
 #include "runtime/cycle_logic.hpp"
 
@@ -25,7 +26,7 @@ struct RunLogicParts {
   const control::ControlOptions& control;
   const rig::RigParameters& rig;  ///< the model: the parameters as the controller knows them
   std::unique_ptr<control::SlipController> controller;
-  std::vector<std::string> signals{};  ///< names of the controller's own signals
+  rig::RunNames names{};
   Sequence sequence;
   bool ideal_actuator{false};
   double max_brake_duty{1.0};             ///< limit of the command gate
@@ -78,9 +79,9 @@ class RunLogic final : public runtime::CycleLogic {
   [[nodiscard]] double without_bump(double torque_Nm, const control::SlipInput& input) noexcept;
   void estimate(const rig::Measurement& measurement, double dt_s, double stamp_error_s) noexcept;
   void note_travel(const rig::Measurement& measurement, double dt_s) noexcept;
-  [[nodiscard]] bool refused(const control::SlipOutput& output, bool entered) noexcept;
-  [[nodiscard]] double slip_control(double dt_s, bool entered, rig::ControlState& state) noexcept;
-  [[nodiscard]] double wanted_torque_Nm(const PhasePlan& plan, double dt_s, bool entered,
+  [[nodiscard]] bool refused(const control::SlipOutput& output, bool begins) noexcept;
+  [[nodiscard]] double slip_control(double dt_s, bool begins, rig::ControlState& state) noexcept;
+  [[nodiscard]] double wanted_torque_Nm(const PhasePlan& plan, double dt_s, bool begins,
                                         rig::ControlState& state) noexcept;
 
   const rig::RigParameters rig_;
@@ -112,6 +113,7 @@ class RunLogic final : public runtime::CycleLogic {
   double target_Nm_{0.0};          ///< the static torque to send for it
   double sent_Nm_{0.0};            ///< the one that was sent, and what was missing in it
   double unsent_Nm_{0.0};
+  bool in_slip_control_{false};  ///< the phase of the latest cycle used the slip controller
   std::array<bool, rig::controller_signals.size()> not_given_{};  ///< signals that the controller does not give
   bool refused_{false};                                           ///< its output was not finite
   double bump_Nm_{0.0};                                           ///< remaining offset that keeps the torque continuous

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "abs_hil/rig/measurement.hpp"
@@ -45,6 +46,7 @@ struct EndCondition {
 /// hold for two fresh samples in a row, because one sample may be wrong. Exceeding the time limit is a fault.
 struct PhasePlan {
   rig::Phase phase{rig::Phase::idle};
+  std::string name{};  ///< empty: that of `phase`
   double motor_duty{0.0};
   BrakeAction brake{BrakeAction::released};
   double brake_torque_Nm{0.0};  ///< for BrakeAction::torque
@@ -56,6 +58,7 @@ struct PhasePlan {
   std::vector<EndCondition> ends_on{};
   double time_limit_s{0.0};      ///< in (0, 600]
   bool motor_with_brake{false};  ///< permits motor and brake together in this phase
+  bool restart{false};           ///< the slip controller begins anew, although the phase before used it too
 
   [[nodiscard]] double motor_duty_at(double time_s) const noexcept {
     return motor_profile.empty() ? motor_duty : motor_profile.at(time_s);

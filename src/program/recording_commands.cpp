@@ -5,21 +5,33 @@
 #include <filesystem>
 #include <utility>
 
-#include "abs_hil/control/registry.hpp"
 #include "config/config_error.hpp"
 #include "program/exit_status.hpp"
 #include "replay/check.hpp"
 #include "replay/recorded_run.hpp"
 #include "replay/report.hpp"
+#include "replay/rerun.hpp"
+#include "run_folder/run_folder.hpp"
 #include "telemetry/csv_sink.hpp"
 
 namespace abs_hil::program {
+
+namespace {
+
+/// The event log of a run folder; any other path as it is.
+std::string log_in(const std::string& recording) {
+  const std::filesystem::path path(recording);
+  std::error_code error;
+  return std::filesystem::is_directory(path, error) ? (path / run_folder::file::log).string() : recording;
+}
+
+}  // namespace
 
 void add_replay(cli::Parser& parser, ReplayCommand& command) {
   command.parser = parser.add_subcommand("replay", "feed a recorded run to its own or another controller, open loop");
   command.parser.add({.names = "recording",
                       .to = &command.recording,
-                      .help = "event log (--log), or its CSV from abs_hil convert",
+                      .help = "event log (--log), its CSV from abs_hil convert, or a run folder (--out)",
                       .type = "LOG",
                       .required = true});
   command.parser.add({.names = "--check",
@@ -60,15 +72,14 @@ int check_again(const replay::RecordedRun& run) {
 
 int replay_run(const ReplayCommand& command) {
   try {
-    const replay::RecordedRun run = replay::read_run(command.recording);
+    const replay::RecordedRun run = replay::read_run(log_in(command.recording));
     if (command.check) return check_again(run);
     const config::Settings settings = replay::settings_of(run, {command.controller, command.assignments});
     const std::vector<replay::RerunCycle> rerun =
         replay::rerun_open_loop(run, settings, replay::WheelFaults::as_recorded);
     fmt::print("{}", replay::report(run, settings, rerun));
     if (command.csv_file) {
-      const auto controller = control::make_controller(settings.control.controller, {settings.control, settings.model});
-      telemetry::CsvSink csv(*command.csv_file, 0, rig::signal_names(controller->signals()));
+      telemetry::CsvSink csv(*command.csv_file, 0, replay::names_of(run, settings));
       for (const replay::RerunCycle& cycle : rerun) csv.consume(cycle.record, cycle.distance_m);
       csv.finish();
     }
@@ -81,19 +92,20 @@ int replay_run(const ReplayCommand& command) {
 void add_convert(cli::Parser& parser, ConvertCommand& command) {
   command.parser = parser.add_subcommand("convert", "convert an event log (.lcmlog) to CSV or back, without loss");
   command.parser.add(
-      {.names = "from", .to = &command.from, .help = "event log or CSV", .type = "IN", .required = true});
+      {.names = "from", .to = &command.from, .help = "event log, run folder or CSV", .type = "IN", .required = true});
   command.parser.add({.names = "to", .to = &command.to, .help = "CSV or event log", .type = "OUT", .required = true});
 }
 
 int convert(const ConvertCommand& command) {
-  const bool from_csv = std::filesystem::path(command.from).extension() == ".csv";
+  const std::string from = log_in(command.from);
+  const bool from_csv = std::filesystem::path(from).extension() == ".csv";
   const bool to_csv = std::filesystem::path(command.to).extension() == ".csv";
   if (from_csv == to_csv) {
     throw config::ConfigError("convert: exactly one of IN and OUT must end in .csv; the other is the event log");
   }
   try {
     const telemetry::ConversionCounts counts =
-        from_csv ? telemetry::csv_to_log(command.from, command.to) : telemetry::log_to_csv(command.from, command.to);
+        from_csv ? telemetry::csv_to_log(from, command.to) : telemetry::log_to_csv(from, command.to);
     fmt::print("{} events", counts.events);
     if (counts.raw > 0) fmt::print(", {} of them of unknown type, kept as hexadecimal digits", counts.raw);
     fmt::print("\n");

@@ -217,16 +217,13 @@ int run(const RunRequest& request) {
   runtime::Clock& clock = request.outputs.fast ? static_cast<runtime::Clock&>(virtual_clock) : real_clock;
   const std::unique_ptr<driver::RigDriver> driver = with_faults(make_driver(s, request.outputs.fast), s, clock);
   config::Plan plan = config::plan(*request.script, s);
-  std::vector<std::string> phase_names = plan.phase_names;
-  // The run's logic then adds a phase before the first.
-  if (s.experiment.wait_for_start) phase_names.insert(phase_names.begin(), "waiting for the start");
   for (const std::string& problem : config::beyond_limits(plan, s))
     spdlog::warn("{}; the gate limits it to that", problem);
   const bool to_stop = config::means_to_stop(plan, s.experiment.end_speed_m_s);
   experiment::RunLogicParts logic = make_logic(s, std::move(plan.phases), plan.limits);
   for (const std::string& problem : control::silent_settings(s.control)) spdlog::warn("{}", problem);
   require_resources(request, *driver);
-  RunOutputs outputs(request, logic.signals);
+  RunOutputs outputs(request, logic.names);
   runtime::OverrunReporter late_cycles(std::llround(1e9 / s.control.rate_Hz));
   std::vector<rig::RecordSink*> sinks = outputs.sinks();
   if (!request.outputs.fast) sinks.push_back(&late_cycles);
@@ -248,7 +245,7 @@ int run(const RunRequest& request) {
     board_notes.log_once();
     timing.poll();
     outputs.poll();
-    if (request.in_series) request.in_series(phase_names.at(session.latest().phase_index));
+    if (request.in_series) request.in_series(std::string(outputs.names().phase_of(session.latest())));
     if (const rig::Reason guardian = run_monitor.poll(); guardian != rig::Reason::none) return guardian;
     if (const rig::Reason signal = signalled(); signal != rig::Reason::none) return signal;
     return outputs.stop_requested() ? rig::Reason::stop_command : rig::Reason::none;

@@ -18,8 +18,8 @@ constexpr std::int64_t virtual_epoch_us = 946'684'800'000'000;
 constexpr std::int64_t write_period_ns = 50'000'000;
 }  // namespace
 
-RunOutputs::RunOutputs(const RunRequest& request, std::vector<std::string> signals)
-    : signals_(std::move(signals)),
+RunOutputs::RunOutputs(const RunRequest& request, rig::RunNames names)
+    : names_(std::move(names)),
       metrics_(request.settings.plant.rig.wheels.r2_m, request.settings.experiment.end_speed_m_s) {
   // Check the network first: a failure then leaves the files unchanged. In virtual time 8,000 messages would flood the
   // network at once, so publish only if --lcm-url is given.
@@ -45,7 +45,7 @@ RunOutputs::RunOutputs(const RunRequest& request, std::vector<std::string> signa
 }
 
 void RunOutputs::open_files(const OutputOptions& outputs) {
-  if (outputs.csv_file) csv_.emplace_back(*outputs.csv_file, outputs.fast ? 0 : write_period_ns, signals_);
+  if (outputs.csv_file) csv_.emplace_back(*outputs.csv_file, outputs.fast ? 0 : write_period_ns, names_);
   if (outputs.summary_file) summary_.emplace_back(*outputs.summary_file);
   if (outputs.histogram_file) histogram_.emplace_back(*outputs.histogram_file);
   if (outputs.log_file) {
@@ -82,7 +82,7 @@ void RunOutputs::open_folder(const RunRequest& request) {
        .log_file = folder_->of(run_folder::file::log),
        .summary_file = folder_->of(run_folder::file::summary),
        .histogram_file = o.fast ? std::nullopt : std::optional(folder_->of(run_folder::file::histogram).string())});
-  events_.emplace(folder_->of(run_folder::file::events));
+  events_.emplace(folder_->of(run_folder::file::events), names_);
 }
 
 void RunOutputs::open_stream(const RunRequest& request) {
@@ -97,7 +97,7 @@ void RunOutputs::open_stream(const RunRequest& request) {
                                             .backend = s.backend,
                                             .config_json = request.config_json,
                                             .version = ABS_HIL_VERSION,
-                                            .signals = signals_},
+                                            .names = names_},
                   [this] { return snapshot(); });
   for (telemetry::LogOutlet& log : log_) stream_->add(log);
   if (lcm_) {

@@ -32,8 +32,7 @@ class RunOutputs {
  public:
   /// Throws config::ConfigError for files and folders that cannot be written, and telemetry::LcmError without a
   /// network.
-  /// @param signals  names of the controller's own signals
-  RunOutputs(const RunRequest& request, std::vector<std::string> signals);
+  RunOutputs(const RunRequest& request, rig::RunNames names);
 
   [[nodiscard]] std::vector<rig::RecordSink*> sinks();
   /// Attaches the session, whose state ABS_STATUS and the status line then show; it must outlive the use of the
@@ -54,6 +53,7 @@ class RunOutputs {
                                                const run_folder::RunEnvironment& environment);
   /// Result of the script's analysis; null without one.
   [[nodiscard]] nlohmann::ordered_json friction_curve_json() const;
+  [[nodiscard]] const rig::RunNames& names() const noexcept { return names_; }
   /// The run folder, if there is one.
   [[nodiscard]] const std::optional<run_folder::RunFolder>& folder() const noexcept { return folder_; }
 
@@ -63,7 +63,7 @@ class RunOutputs {
   void open_files(const OutputOptions& outputs);
   void open_stream(const RunRequest& request);
 
-  std::vector<std::string> signals_;
+  rig::RunNames names_;
   experiment::RunSession* session_{nullptr};
   analysis::RunMetrics metrics_;
   std::optional<analysis::FrictionCurve> friction_curve_;

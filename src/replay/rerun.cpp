@@ -256,6 +256,10 @@ bool ended_from_outside(const RecordedRun& run, std::size_t n, WheelFaults fault
   return true;
 }
 
+rig::RunNames names_of(const RecordedRun& run, const config::Settings& settings) {
+  return logic_parts(run, settings).names;
+}
+
 std::vector<RerunCycle> rerun_open_loop(const RecordedRun& run, const config::Settings& settings, WheelFaults faults) {
   experiment::RunLogic logic(logic_parts(run, settings));
   RecordedActuation actuation(logic, run);

@@ -5,6 +5,7 @@
 
 #include "abs_hil/rig/cycle_record.hpp"
 #include "replay/recorded_run.hpp"
+#include "rig/run_names.hpp"
 
 namespace abs_hil::replay {
 
@@ -27,6 +28,9 @@ enum class WheelFaults : std::uint8_t {
 /// sequence ends. Events from outside the cycle (signals, stop, I/O errors, late cycles) end it in the recorded cycle.
 [[nodiscard]] std::vector<RerunCycle> rerun_open_loop(const RecordedRun& run, const config::Settings& settings,
                                                       WheelFaults faults);
+
+/// The names behind the numbers of a rerun's records.
+[[nodiscard]] rig::RunNames names_of(const RecordedRun& run, const config::Settings& settings);
 
 /// Runs the same cycle at the recorded times with the simulated rig of `settings` and the recorded seed. The gate finds
 /// wheel faults again.

@@ -38,7 +38,8 @@ constexpr auto header_text = [] {
 
 // The longest double is -1.2345678901234567e-308, the longest whole number has a sign and 19 digits.
 constexpr std::size_t longest_value = 24;
-static_assert((rig::csv_columns.size() + rig::signal_max) * (longest_value + 1) <= csv_row_max_bytes,
+static_assert((rig::csv_columns.size() + rig::signal_max) * (longest_value + 1) + rig::phase_name_max + 1 <=
+                  csv_row_max_bytes,
               "the rows need more room");
 
 char* put_text(char* at, std::string_view text) noexcept { return std::copy(text.begin(), text.end(), at); }
@@ -59,7 +60,7 @@ char* put(char* at, const Value& value) noexcept {
 constinit const std::string_view csv_header(header_text.data(), header_text.size());
 
 std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, char (&out)[csv_row_max_bytes],
-                           std::size_t signals) noexcept {
+                           const rig::RunNames& names) noexcept {
   constexpr std::int64_t no_message = 0;
   const rig::CycleParts<const rig::CycleRecord> parts{record, distance_m, no_message};
   char* at = out;
@@ -68,7 +69,9 @@ std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, ch
     if (at != out) *at++ = ',';
     at = put(at, row.at(parts));
   });
-  for (std::size_t n = 0; n < signals; ++n) {
+  *at++ = ',';
+  at = put_text(at, names.phase_of(record).substr(0, rig::phase_name_max));
+  for (std::size_t n = 0; n < std::min(names.signals.size(), rig::signal_max); ++n) {
     *at++ = ',';
     at = put(at, record.control.signals[n]);
   }
@@ -76,14 +79,16 @@ std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, ch
   return static_cast<std::size_t>(at - out);
 }
 
-CsvSink::CsvSink(std::filesystem::path path, std::int64_t write_period_ns, std::span<const std::string> signals)
-    : path_(std::move(path)), buffer_(block_bytes), write_period_ns_(write_period_ns), signals_(signals.size()) {
+CsvSink::CsvSink(std::filesystem::path path, std::int64_t write_period_ns, rig::RunNames names)
+    : path_(std::move(path)), buffer_(block_bytes), write_period_ns_(write_period_ns), names_(std::move(names)) {
   do {
     file_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   } while (file_ < 0 && errno == EINTR);
   if (file_ < 0) throw FileError(csv_kind, path_, errno);
   append(csv_header.data(), csv_header.size());
-  for (const std::string& signal : signals) {
+  append(",", 1);
+  append(phase_name_column.data(), phase_name_column.size());
+  for (const std::string& signal : names_.signals) {
     append(",", 1);
     append(signal.data(), signal.size());
   }
@@ -94,7 +99,7 @@ CsvSink::~CsvSink() { close(); }
 
 void CsvSink::consume(const rig::CycleRecord& record, double distance_m) {
   char row[csv_row_max_bytes];
-  append(row, format_csv_row(record, distance_m, row, signals_));
+  append(row, format_csv_row(record, distance_m, row, names_));
   ++rows_buffered_;
   if (write_period_ns_ > 0 && record.stamp_ns - last_write_ns_ >= write_period_ns_) {
     flush();

@@ -3,27 +3,29 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <span>
-#include <string>
 #include <string_view>
 #include <vector>
 
 #include "rig/record_sink.hpp"
+#include "rig/run_names.hpp"
 
 namespace abs_hil::telemetry {
 
 /// The CSV's first line, without the line end, made from rig/quantities.hpp. Names and order are a contract; columns
-/// may be added at the end. The columns of the controller's own signals follow it.
+/// may be added at the end. In a file `phase_name` and the columns of the controller's own signals follow it.
 extern const std::string_view csv_header;
 
 /// Upper limit of a row's length.
 inline constexpr std::size_t csv_row_max_bytes = 1024;
 
-/// Writes a row with its line end to `out` and returns its length. A double has the shortest text that reads back
-/// bit-exactly; NaN is `NaN`. The text does not depend on the locale.
-/// @param signals  number of the controller's own signals, which follow the fixed columns, <= rig::signal_max
+/// The column after the fixed ones: the experiment's own name of the phase.
+inline constexpr std::string_view phase_name_column = "phase_name";
+
+/// Writes a row with its line end to `out` and returns its length: the fixed columns, `phase_name` and the controller's
+/// own signals. A double has the shortest text that reads back bit-exactly; NaN is `NaN`. The text does not depend on
+/// the locale.
 std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, char (&out)[csv_row_max_bytes],
-                           std::size_t signals = 0) noexcept;
+                           const rig::RunNames& names = {}) noexcept;
 
 /// Writes one row per cycle to a file, in blocks of whole rows of at most 64 KiB.
 class CsvSink : public rig::RecordSink {
@@ -31,9 +33,7 @@ class CsvSink : public rig::RecordSink {
   /// Creates or empties the file. Throws FileError when it cannot be opened.
   /// @param write_period_ns  longest time, by the records' stamps, until a row is written, so that a killed program
   ///                         loses no older rows; 0: rows are written only when a block is full
-  /// @param signals          names of the controller's own signals, the columns after the fixed ones
-  explicit CsvSink(std::filesystem::path path, std::int64_t write_period_ns = 0,
-                   std::span<const std::string> signals = {});
+  explicit CsvSink(std::filesystem::path path, std::int64_t write_period_ns = 0, rig::RunNames names = {});
   /// Writes the buffered rows if finish() was not called. A failure is not reported then.
   ~CsvSink() override;
 
@@ -54,7 +54,7 @@ class CsvSink : public rig::RecordSink {
   std::filesystem::path path_;
   std::vector<char> buffer_;
   std::int64_t write_period_ns_;
-  std::size_t signals_;
+  rig::RunNames names_;
   std::int64_t last_write_ns_{0};  ///< stamp of the record of the last write
   std::size_t used_bytes_{0};
   std::uint64_t rows_buffered_{0};

@@ -27,7 +27,8 @@ void append_number(std::string& text, double value) {
 
 }  // namespace
 
-EventCsv::EventCsv(std::filesystem::path path) : path_(std::move(path)), text_(event_csv_header) {
+EventCsv::EventCsv(std::filesystem::path path, rig::RunNames names)
+    : path_(std::move(path)), text_(event_csv_header), names_(std::move(names)) {
   text_ += '\n';
   errno = 0;
   if (!std::ofstream(path_)) throw FileError(event_list_kind, path_, errno);
@@ -41,7 +42,7 @@ void EventCsv::consume(const rig::CycleRecord& record, double /*distance_m*/) {
   // Quoted, because the text of a reason may contain a comma.
   text_.append(",\"").append(rig::reason_text(record.reason, record.reason_value)).append("\",");
   append_number(text_, record.reason_value);
-  text_ += '\n';
+  text_.append(",").append(names_.phase_of(record)) += '\n';
 }
 
 void EventCsv::finish() {

@@ -11,19 +11,22 @@ std::optional<DetectedEvent> EventDetector::observe(const rig::CycleRecord& reco
   // The answer to a command reports its change.
   const bool reason_is_new = record.reason != rig::Reason::none && !rig::is_adjustment(record.reason) &&
                              (first || record.reason != last_->reason);
-  const rig::Phase phase_before = first ? record.phase : last_->phase;
   const std::uint64_t records_lost = first ? record.sequence : record.sequence - last_->sequence - 1;
   last_ = Seen{record.sequence, record.phase, record.phase_index, record.reason};
   if (!phase_changed && !reason_is_new) return std::nullopt;
 
   DetectedEvent event;
+  event.phase_changed = phase_changed;
   if (rig::is_fault(record.reason) || (phase_changed && record.phase == rig::Phase::fault)) {
     event.kind = event_kind::fault;
   } else {
     event.kind = phase_changed ? event_kind::phase : event_kind::limit;
   }
-  if (phase_changed && !first) event.message.append(rig::name_of(phase_before)).append(" -> ");
-  event.message.append(rig::name_of(record.phase));
+  if (phase_changed) {
+    if (!first) event.message.append(phase_name_).append(" -> ");
+    phase_name_ = names_.phase_of(record);
+  }
+  event.message.append(phase_name_);
   if (record.reason != rig::Reason::none) {
     event.message.append(": ").append(rig::reason_text(record.reason, record.reason_value));
   }

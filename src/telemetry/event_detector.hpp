@@ -4,8 +4,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "abs_hil/rig/cycle_record.hpp"
+#include "rig/run_names.hpp"
 
 namespace abs_hil::telemetry {
 
@@ -21,12 +23,15 @@ inline constexpr std::string_view command = "command";
 struct DetectedEvent {
   std::string_view kind;
   std::string message;  ///< for people, one line
+  bool phase_changed{false};
 };
 
 /// Finds events in the stream of records, so that the real-time thread handles numbers only. Each change of phase and
 /// each new reason gives one event, even if records repeat it or are missing.
 class EventDetector {
  public:
+  explicit EventDetector(rig::RunNames names = {}) : names_(std::move(names)) {}
+
   /// Takes every record, in order. The first always gives an event.
   [[nodiscard]] std::optional<DetectedEvent> observe(const rig::CycleRecord& record);
 
@@ -37,7 +42,9 @@ class EventDetector {
     std::uint16_t phase_index;
     rig::Reason reason;
   };
+  rig::RunNames names_;
   std::optional<Seen> last_;
+  std::string phase_name_;  ///< of the latest record
 };
 
 }  // namespace abs_hil::telemetry

@@ -72,13 +72,14 @@ void check_channel_prefix(std::string_view prefix) {
 }
 
 MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, StatusSource status)
-    : options_(std::move(options)), status_(std::move(status)) {
+    : options_(std::move(options)), status_(std::move(status)), names_(std::move(experiment.names)), detector_(names_) {
   check(options_);
   telemetry_.name = options_.channel_prefix + "TELEMETRY";
   status_channel_.name = options_.channel_prefix + "STATUS";
   adjustment_.name = options_.channel_prefix + "ADJUSTMENT";
   command_state_.name = options_.channel_prefix + "COMMAND_STATE";
   measurement_.name = options_.channel_prefix + "MEASUREMENT";
+  phase_.name = options_.channel_prefix + "PHASE";
   signals_.name = options_.channel_prefix + "SIGNALS";
   checks_.name = options_.channel_prefix + "CHECKS";
   event_.name = options_.channel_prefix + "EVENT";
@@ -90,8 +91,7 @@ MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, S
   experiment_message_.backend = std::move(experiment.backend);
   experiment_message_.config_json = std::move(experiment.config_json);
   experiment_message_.version = std::move(experiment.version);
-  signal_count_ = experiment.signals.size();
-  for (const std::string& signal : experiment.signals) {
+  for (const std::string& signal : names_.signals) {
     signals_message_.names.append(signals_message_.names.empty() ? "" : ",").append(signal);
   }
 }
@@ -100,10 +100,12 @@ void MessageStream::consume(const rig::CycleRecord& record, double distance_m) {
   latest_ = record;
   if (!started_ || record.time_s >= next_experiment_s_) {
     send_experiment();
+    send_phase();
     next_experiment_s_ = next_on_grid(record.time_s, options_.experiment_period_s);
   }
   if (auto event = detector_.observe(record)) {
     send_event(event->kind, record.reason, record.reason_value, std::move(event->message));
+    if (event->phase_changed && started_) send_phase();
   }
   if (record.sequence >= next_telemetry_cycle_) {
     telemetry_t message = to_message(record, distance_m, 0);
@@ -112,8 +114,8 @@ void MessageStream::consume(const rig::CycleRecord& record, double distance_m) {
       measurement_t measurement = measured_at(record);
       send(measurement_, measurement);
     }
-    if (knows_signals(record, signal_count_)) {
-      put_signals(record, signal_count_, signals_message_);
+    if (knows_signals(record, names_.signals.size())) {
+      put_signals(record, names_.signals.size(), signals_message_);
       send(signals_, signals_message_);
     }
     next_telemetry_cycle_ = (record.sequence / options_.telemetry_every_cycles + 1) * options_.telemetry_every_cycles;
@@ -215,6 +217,15 @@ void MessageStream::send_status() {
   checks.time_s = latest_.time_s;
   checks.unjudged_share = snapshot.checks_unjudged;
   send(checks_, checks);
+}
+
+void MessageStream::send_phase() {
+  phase_t message{};
+  message.time_s = latest_.time_s;
+  message.phase = static_cast<std::int8_t>(latest_.phase);
+  message.phase_index = latest_.phase_index;
+  message.name = names_.phase_of(latest_);
+  send(phase_, message);
 }
 
 void MessageStream::send_experiment() { send(experiment_, experiment_message_); }

@@ -9,8 +9,10 @@
 
 #include "abs_hil/command_state_t.hpp"
 #include "abs_hil/experiment_t.hpp"
+#include "abs_hil/phase_t.hpp"
 #include "abs_hil/signals_t.hpp"
 #include "rig/record_sink.hpp"
+#include "rig/run_names.hpp"
 #include "telemetry/event_detector.hpp"
 #include "telemetry/message_codec.hpp"
 #include "telemetry/outlet.hpp"
@@ -26,7 +28,7 @@ struct ExperimentInfo {
   std::string backend;
   std::string config_json;  ///< effective configuration
   std::string version;
-  std::vector<std::string> signals{};  ///< names of the controller's own signals, for ABS_SIGNALS
+  rig::RunNames names{};  ///< for events, ABS_PHASE and ABS_SIGNALS
 };
 
 /// Channel prefix and rates of the messages.
@@ -88,6 +90,7 @@ class MessageStream : public rig::RecordSink {
   void send_event(std::string_view kind, rig::Reason reason, double value, std::string message);
   void send_status();
   void send_experiment();
+  void send_phase();
 
   StreamOptions options_;
   StatusSource status_;
@@ -95,6 +98,7 @@ class MessageStream : public rig::RecordSink {
   Channel telemetry_;
   Channel measurement_;
   Channel signals_;
+  Channel phase_;
   Channel adjustment_;
   Channel command_state_;
   Channel status_channel_;
@@ -104,7 +108,7 @@ class MessageStream : public rig::RecordSink {
   std::string command_channel_;
   experiment_t experiment_message_{};
   signals_t signals_message_{};
-  std::size_t signal_count_{0};
+  rig::RunNames names_;
   EventDetector detector_;
   EncodeBuffer buffer_;
   rig::CycleRecord latest_{};

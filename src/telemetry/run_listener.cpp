@@ -35,6 +35,7 @@ void RunListener::subscribe() {
   subscribe<event_t>(prefix_ + "EVENT");
   subscribe<experiment_t>(prefix_ + "EXPERIMENT");
   subscribe<signals_t>(prefix_ + "SIGNALS");
+  subscribe<phase_t>(prefix_ + "PHASE");
 }
 
 void RunListener::look_for_server() {

@@ -40,7 +40,9 @@ void RunView::begin_run() noexcept {
   status_.reset();
   experiment_.reset();
   signals_.clear();
-  telemetry_sequence_ = status_sequence_ = event_sequence_ = experiment_sequence_ = signals_sequence_ = -1;
+  phase_.reset();
+  telemetry_sequence_ = status_sequence_ = event_sequence_ = experiment_sequence_ = -1;
+  signals_sequence_ = phase_sequence_ = -1;
   lost_ = 0;
 }
 
@@ -102,6 +104,18 @@ void RunView::take(const signals_t& message, std::int64_t now_ns) {
     signals_.push_back({telemetry::printable(names.substr(0, comma), name_max_bytes), values[n]});
     names.remove_prefix(std::min(comma + 1, names.size()));
   }
+}
+
+void RunView::take(const phase_t& message, std::int64_t now_ns) {
+  if (!admit(message.sequence, phase_sequence_, now_ns)) return;
+  phase_sequence_ = message.sequence;
+  phase_ = message;
+  phase_->name = telemetry::printable(message.name, name_max_bytes);
+}
+
+std::string_view RunView::name_of(rig::Phase kind) const noexcept {
+  const bool named = phase_ && phase_->phase == static_cast<std::int8_t>(kind) && !phase_->name.empty();
+  return named ? std::string_view(phase_->name) : rig::name_of(kind);
 }
 
 std::optional<double> RunView::silence_s(std::int64_t now_ns) const noexcept {

@@ -8,6 +8,8 @@
 
 #include "abs_hil/event_t.hpp"
 #include "abs_hil/experiment_t.hpp"
+#include "abs_hil/phase_t.hpp"
+#include "abs_hil/rig/phase.hpp"
 #include "abs_hil/signals_t.hpp"
 #include "abs_hil/status_t.hpp"
 #include "abs_hil/telemetry_t.hpp"
@@ -46,6 +48,7 @@ class RunView {
   void take(const event_t& message, std::int64_t now_ns);
   void take(const experiment_t& message, std::int64_t now_ns);
   void take(const signals_t& message, std::int64_t now_ns);
+  void take(const phase_t& message, std::int64_t now_ns);
   /// Counts a packet that is no message of a known type.
   void note_malformed() noexcept { ++malformed_; }
 
@@ -56,6 +59,8 @@ class RunView {
   [[nodiscard]] const std::optional<experiment_t>& experiment() const noexcept { return experiment_; }
   /// The controller's own signals, the latest values.
   [[nodiscard]] const std::vector<NamedValue>& signals() const noexcept { return signals_; }
+  /// The experiment's own name of the phase, if it is of that kind; otherwise the kind's.
+  [[nodiscard]] std::string_view name_of(rig::Phase kind) const noexcept;
   /// The newest first, at most `events_max`.
   [[nodiscard]] const std::deque<event_t>& events() const noexcept { return events_; }
   static constexpr std::size_t events_max = 20;
@@ -81,6 +86,7 @@ class RunView {
   std::optional<status_t> status_;
   std::optional<experiment_t> experiment_;
   std::vector<NamedValue> signals_;
+  std::optional<phase_t> phase_;
   std::deque<event_t> events_;
   std::optional<std::int64_t> last_received_ns_;
   // Latest sequence number of each channel; -1: none in this run.
@@ -89,6 +95,7 @@ class RunView {
   std::int64_t event_sequence_{-1};
   std::int64_t experiment_sequence_{-1};
   std::int64_t signals_sequence_{-1};
+  std::int64_t phase_sequence_{-1};
   std::int64_t lost_{0};
   std::int64_t malformed_{0};
   int runs_{0};

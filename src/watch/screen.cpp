@@ -150,7 +150,7 @@ class Screen {
       time_s = status->time_s;
     }
     const rig::Phase phase = phase_of(number_of_phase);
-    int column = grid_.write(0, 1, rig::name_of(phase), style_of(phase));
+    int column = grid_.write(0, 1, view_.name_of(phase), style_of(phase));
     column = grid_.write(std::max(column + 1, 11), 1, fmt::format("{:>7} s  ", number(time_s, 3)), Style::bold);
     if (phase == rig::Phase::fault && telemetry) {
       grid_.write(column, 1, fault_text(view_), Style::alarm);
@@ -298,7 +298,7 @@ std::string one_line(const RunView& view, std::int64_t now_ns, const ScreenOptio
   const auto& telemetry = view.telemetry();
   if (!telemetry) return live;
   const rig::Phase phase = phase_of(telemetry->phase);
-  std::string line = fmt::format("{:10} {:>7} s", rig::name_of(phase), number(telemetry->time_s, 3));
+  std::string line = fmt::format("{:10} {:>7} s", view.name_of(phase), number(telemetry->time_s, 3));
   if (phase == rig::Phase::fault) line += "  " + fault_text(view);
   if (!view.samples().empty()) line += "  " + values_text(view, words_of(options));
   if (const auto& s = view.status()) line += fmt::format("  overruns {}  drops {}", s->overruns, s->telemetry_drops);

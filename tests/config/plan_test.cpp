@@ -20,12 +20,18 @@ constexpr const char* brake =
     "[[phase]]\nname = \"a\"\nbrake = { slip_ref = { from = 0.1, to = 0.3, over_s = 2 } }\n"
     "until = { lasts_s = 2 }\n";
 
+std::vector<std::string> names_of(const Plan& plan) {
+  std::vector<std::string> names;
+  for (const experiment::PhasePlan& phase : plan.phases) names.push_back(phase.name);
+  return names;
+}
+
 }  // namespace
 
 TEST_CASE("the paper's script gives the plan that C++ code gave before") {
   config::Settings s;
   const Plan whole = plan(*find("paper"), s);
-  CHECK(whole.phase_names == std::vector<std::string>{"idle", "accelerate", "coast", "brake", "hold", "stopped"});
+  CHECK(names_of(whole) == std::vector<std::string>{"idle", "accelerate", "coast", "brake", "hold", "stopped"});
   CHECK(whole.phases[1].motor_duty == 1.0);
   REQUIRE(whole.phases[1].ends_on.size() == 1);
   CHECK(whole.phases[1].ends_on[0].value == 170.0);
@@ -34,7 +40,7 @@ TEST_CASE("the paper's script gives the plan that C++ code gave before") {
   s.experiment.cut = "peak";
   CHECK(plan(*find("paper"), s).phases[1].ends_on[0].kind == EndKind::upper_wheel_peak);
   s.experiment.start_speed_rad_s = 100.0;
-  CHECK(plan(*find("paper"), s).phase_names == std::vector<std::string>{"brake", "hold", "stopped"});
+  CHECK(names_of(plan(*find("paper"), s)) == std::vector<std::string>{"brake", "hold", "stopped"});
 }
 
 TEST_CASE("slip control always ends at the least speed for it, whatever the script says") {
@@ -129,4 +135,12 @@ TEST_CASE("every part of the plant has its own events and its own time base") {
   CHECK(s.plant.drift.upper_bearing == "braking time: 1; 2 from 2 to 3");
   CHECK(s.plant.drift.lower_bearing == "time: 1; 3 from 1 to 90");
   CHECK(s.plant.drift.motor_torque == "time: 0.4");
+}
+
+TEST_CASE("a phase may restart the slip controller that the phase before used") {
+  const std::string two =
+      "[[phase]]\nname = \"a\"\nbrake = \"controller\"\nuntil = { lasts_s = 1 }\n"
+      "[[phase]]\nname = \"b\"\nbrake = \"controller\"\nuntil = { lasts_s = 1 }\n";
+  CHECK_FALSE(plan(parsed(two), {}).phases[1].restart);
+  CHECK(plan(parsed(two + "restart = true\n"), {}).phases[1].restart);
 }

@@ -1,5 +1,7 @@
 #include "experiment/run_logic.hpp"
 
+#include <bit>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <utility>
@@ -122,4 +124,34 @@ TEST_CASE("the stop brake acts within the gate's cap until standstill and is the
   CHECK(run(setup, [] { return rig::Reason::terminate_signal; }).in_phase(rig::Phase::hold).size() == 200);
   setup.experiment.stop_brake_duty = 0.0;
   CHECK(run(setup, [] { return rig::Reason::terminate_signal; }).in_phase(rig::Phase::hold).empty());
+}
+
+TEST_CASE("a controller goes on over consecutive phases that use it, unless the second restarts it") {
+  const PhasePlan whole{.phase = rig::Phase::brake,
+                        .brake = BrakeAction::slip_control,
+                        .ends_on = {{EndKind::duration, 1.0, rig::Reason::phase_duration_over}},
+                        .time_limit_s = 2.0};
+  PhasePlan half = whole;
+  half.ends_on.front().value = 0.5;
+  PhasePlan anew = half;
+  anew.restart = true;
+  for (const control::ControllerEntry& entry : control::controllers()) {
+    const std::string_view controller = entry.name;
+    INFO(controller);
+    Setup one = braking(std::string(controller)), two = one, restarted = one;
+    one.plans = {whole};
+    two.plans = {half, half};
+    restarted.plans = {half, anew};
+    const auto expected = run(one).records, split = run(two).records, begun = run(restarted).records;
+    std::size_t differing = 0;
+    for (std::size_t n = 0; n + 1 < expected.size(); ++n) {
+      CHECK(split[n].command.brake_duty == expected[n].command.brake_duty);
+      CHECK(std::bit_cast<std::uint64_t>(split[n].control.theta_est_N) ==
+            std::bit_cast<std::uint64_t>(expected[n].control.theta_est_N));
+      if (begun[n].command.brake_duty != expected[n].command.brake_duty) ++differing;
+    }
+    CHECK(split[600].phase_index == 1);
+    // The laws without a memory begin anew unseen.
+    if (!std::isnan(expected[600].control.theta_est_N)) CHECK(differing > 0);
+  }
 }

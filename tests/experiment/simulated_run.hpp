@@ -34,6 +34,7 @@ struct Setup {
   std::uint64_t seed{1};
   driver::PwmMode pwm_mode{driver::PwmMode::bits_12};
   std::optional<rig::RigParameters> model{};
+  std::vector<PhasePlan> plans{};  ///< in place of the experiment's own; empty: those
 
   [[nodiscard]] const rig::RigParameters& believed() const { return model ? *model : plant.rig; }
 };
@@ -57,6 +58,7 @@ struct Result {
 
 /// The phases of the setup's experiment.
 inline std::vector<PhasePlan> phases_of(const Setup& setup) {
+  if (!setup.plans.empty()) return setup.plans;
   config::Settings settings{.plant = setup.plant, .control = setup.control, .experiment = setup.experiment};
   return config::plan(settings).phases;
 }

@@ -51,23 +51,26 @@ TEST_CASE("the CSV header equals the published one exactly") {
         "distance_m,slip_velocity_error_m_s");
 }
 
-TEST_CASE("the controller's own signals follow the fixed columns, bit-exactly") {
+TEST_CASE("the phase's own name and the controller's own signals follow the fixed columns, bit-exactly") {
   const abs_hil::test::TemporaryFolder scratch;
   rig::CycleRecord r = test::sample_record(7);
   r.control.signals = {1.0 / 3.0, rig::unknown, 5.0};
-  const std::vector<std::string> signals{"I_m", "zeta_N"};
+  r.phase_index = 1;
+  const rig::RunNames names{.phases = {{rig::Phase::idle, "wait"}, {r.phase, "brake-low"}},
+                            .signals = {"I_m", "zeta_N"}};
   {
-    CsvSink sink(scratch / "run.csv", 0, signals);
+    CsvSink sink(scratch / "run.csv", 0, names);
     sink.consume(r, 0.0);
     sink.finish();
   }
   const auto lines = lines_of(scratch / "run.csv");
   REQUIRE(lines.size() == 2);
-  CHECK(lines[0] == std::string(csv_header) + ",I_m,zeta_N");
+  CHECK(lines[0] == std::string(csv_header) + ",phase_name,I_m,zeta_N");
   const auto fields = fields_of(lines[1]);
-  REQUIRE(fields.size() == 21);
-  CHECK(bits_of(fields[19]) == std::bit_cast<std::uint64_t>(1.0 / 3.0));
-  CHECK(fields[20] == "NaN");
+  REQUIRE(fields.size() == 22);
+  CHECK(fields[19] == "brake-low");
+  CHECK(bits_of(fields[20]) == std::bit_cast<std::uint64_t>(1.0 / 3.0));
+  CHECK(fields[21] == "NaN");
 }
 
 TEST_CASE("every CSV column holds its quantity, bit-exactly") {
@@ -81,7 +84,7 @@ TEST_CASE("every CSV column holds its quantity, bit-exactly") {
   }
   const auto lines = lines_of(scratch / "run.csv");
   REQUIRE(lines.size() == 2);
-  CHECK(lines[0] == csv_header);
+  CHECK(lines[0] == std::string(csv_header) + ",phase_name");
   const auto fields = fields_of(lines[1]);
   REQUIRE(fields.size() == fields_of(lines[0]).size());
   CHECK(fields[1] == "brake");
@@ -112,7 +115,7 @@ TEST_CASE("every CSV column holds its quantity, bit-exactly") {
 TEST_CASE("unknown values are written as NaN, whatever the sign of the NaN") {
   rig::CycleRecord r;
   r.truth.slip = -std::numeric_limits<double>::quiet_NaN();
-  CHECK(row_of(r, 0.0) == "0,idle,NaN,NaN,0,0,NaN,0,0,NaN,0,0,0,0,0,NaN,NaN,0,NaN\n");
+  CHECK(row_of(r, 0.0) == "0,idle,NaN,NaN,0,0,NaN,0,0,NaN,0,0,0,0,0,NaN,NaN,0,NaN,idle\n");
 }
 
 TEST_CASE("extreme values fit a row and read back") {
@@ -132,7 +135,7 @@ TEST_CASE("extreme values fit a row and read back") {
   const std::string row = row_of(r, -1.7976931348623157e+308);
   CHECK(row.size() < csv_row_max_bytes);
   const auto fields = fields_of(row.substr(0, row.size() - 1));
-  REQUIRE(fields.size() == 19);
+  REQUIRE(fields.size() == 20);
   CHECK(bits_of(fields[2]) == std::bit_cast<std::uint64_t>(-Limits::max()));
   CHECK(bits_of(fields[3]) == std::bit_cast<std::uint64_t>(Limits::denorm_min()));
   CHECK(bits_of(fields[5]) == std::bit_cast<std::uint64_t>(-0.0));

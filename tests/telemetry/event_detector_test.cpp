@@ -95,4 +95,19 @@ TEST_CASE("a change is found once when the record that made it is missing") {
 }
 
 }  // namespace
+TEST_CASE("events tell phases by the names that the experiment gives them") {
+  EventDetector detector({.phases = {{rig::Phase::brake, "brake-low"}, {rig::Phase::brake, "brake-high"}}});
+  rig::CycleRecord cycle;
+  cycle.phase = rig::Phase::brake;
+  CHECK(detector.observe(cycle)->message == "brake-low");
+  cycle.sequence = 1;
+  cycle.phase_index = 1;
+  CHECK(detector.observe(cycle)->message == "brake-low -> brake-high");
+  // A phase that the experiment does not plan has the name of its kind.
+  cycle.sequence = 2;
+  cycle.phase = rig::Phase::fault;
+  cycle.reason = rig::Reason::overspeed;
+  CHECK_THAT(detector.observe(cycle)->message, Catch::Matchers::StartsWith("brake-high -> fault: "));
+}
+
 }  // namespace abs_hil::telemetry

@@ -35,7 +35,7 @@ TEST_CASE("every record becomes a telemetry message with consecutive sequence nu
 TEST_CASE("a controller's own signals come with their names, one message with each telemetry message") {
   test::CapturingOutlet outlet;
   ExperimentInfo with_signals = info();
-  with_signals.signals = {"I_m", "zeta_N"};
+  with_signals.names.signals = {"I_m", "zeta_N"};
   StreamOptions options;
   options.telemetry_every_cycles = 10;
   MessageStream stream(options, with_signals, {});
@@ -60,10 +60,35 @@ TEST_CASE("a controller's own signals come with their names, one message with ea
   }
 }
 
+TEST_CASE("each phase is told with the experiment's own name, and again for late receivers") {
+  test::CapturingOutlet outlet;
+  ExperimentInfo named = info();
+  named.names.phases = {{rig::Phase::brake, "brake-low"}, {rig::Phase::brake, "brake-high"}};
+  MessageStream stream({.experiment_period_s = 1.0}, named, {});
+  stream.add(outlet);
+  rig::CycleRecord record = test::sample_record(0);
+  record.phase = rig::Phase::brake;
+  for (int n = 0; n < 150; ++n) {
+    record.time_s = 0.01 * n;
+    record.phase_index = n < 50 ? 0 : 1;
+    stream.consume(record, 0.0);
+    ++record.sequence;
+  }
+  const auto phases = outlet.all<phase_t>("ABS_PHASE");
+  REQUIRE(phases.size() == 3);
+  CHECK(phases[0].name == "brake-low");
+  CHECK(phases[1].name == "brake-high");
+  CHECK(phases[1].phase_index == 1);
+  CHECK(phases[1].phase == telemetry_t::PHASE_BRAKE);
+  CHECK(phases[1].time_s == 0.5);
+  CHECK(phases[2].name == "brake-high");
+  CHECK(phases[2].time_s == 1.0);
+}
+
 TEST_CASE("signals are not sent while none is known") {
   test::CapturingOutlet outlet;
   ExperimentInfo with_signals = info();
-  with_signals.signals = {"I_m", "zeta_N"};
+  with_signals.names.signals = {"I_m", "zeta_N"};
   MessageStream stream({}, with_signals, {});
   stream.add(outlet);
   rig::CycleRecord record = test::sample_record(0);
@@ -209,8 +234,8 @@ TEST_CASE("the channel prefix is configurable and checked") {
   CHECK(stream.command_channel() == "LAB2/ABS_COMMAND");
   std::vector<std::string> channels;
   for (const auto& [channel, messages] : outlet.messages) channels.push_back(channel);
-  CHECK(channels ==
-        std::vector<std::string>{"LAB2/ABS_EVENT", "LAB2/ABS_EXPERIMENT", "LAB2/ABS_STATUS", "LAB2/ABS_TELEMETRY"});
+  CHECK(channels == std::vector<std::string>{"LAB2/ABS_EVENT", "LAB2/ABS_EXPERIMENT", "LAB2/ABS_PHASE",
+                                             "LAB2/ABS_STATUS", "LAB2/ABS_TELEMETRY"});
   for (const char* bad : {"ABS.*", "(", "ABS ", "\xc3\xa4"}) {
     options.channel_prefix = bad;
     CHECK_THROWS_AS(MessageStream(options, info(), {}), std::invalid_argument);

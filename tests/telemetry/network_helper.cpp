@@ -113,6 +113,7 @@ class LossCounter : public RunObserver {
   void take(const event_t& /*message*/) override {}
   void take(const experiment_t& /*message*/) override {}
   void take(const signals_t& /*message*/) override {}
+  void take(const phase_t& /*message*/) override {}
   void take_malformed() override { ++malformed; }
 
   std::int64_t received{0};

@@ -58,7 +58,7 @@ TEST_CASE("event log to CSV and back gives the same bytes") {
   CHECK(content(scratch / "run.lcmlog") == content(scratch / "back.lcmlog"));
 }
 
-TEST_CASE("the CSV begins with the columns of --csv, and they hold the same text") {
+TEST_CASE("the CSV begins with the fixed columns of --csv, and they hold the same text") {
   const abs_hil::test::TemporaryFolder scratch;
   record(scratch / "run.lcmlog", scratch / "own.csv");
   log_to_csv(scratch / "run.lcmlog", scratch / "made.csv");
@@ -69,7 +69,8 @@ TEST_CASE("the CSV begins with the columns of --csv, and they hold the same text
     REQUIRE(std::getline(made, made_line));
     // A NaN keeps its sign here, because the conversion back must give it again.
     for (std::size_t at; (at = made_line.find("-NaN")) != std::string::npos;) made_line.erase(at, 1);
-    CHECK(made_line.starts_with(own_line + ','));
+    own_line.erase(own_line.rfind(',') + 1);  // the phase's own name: the log has it in ABS_PHASE
+    CHECK(made_line.starts_with(own_line));
     ++rows;
   }
   CHECK(rows == 1201);

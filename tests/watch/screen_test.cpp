@@ -13,6 +13,7 @@ using namespace abs_hil::watch;
 using namespace abs_hil::watch::test;
 using abs_hil::rig::unknown;
 using Catch::Matchers::Contains;
+using Catch::Matchers::StartsWith;
 
 namespace {
 
@@ -59,6 +60,20 @@ TEST_CASE("the controller's own signals stand above the timing, for as long as t
   CHECK_THAT(shown(view, 4999 * ms), Contains("I_m 0.1250  zeta_N 15.5000") && Contains("wake-up 11/12/13/14"));
   view.take(telemetry(0), 5000 * ms);  // another run, whose controller has none
   CHECK_THAT(shown(view, 5000 * ms), !Contains("zeta_N"));
+}
+
+TEST_CASE("a phase has the name that the experiment gives it") {
+  RunView view = whole_run();
+  phase_t phase{};
+  phase.phase = telemetry_t::PHASE_BRAKE;
+  phase.name = "brake-low";
+  view.take(phase, 4999 * ms);
+  CHECK_THAT(shown(view, 4999 * ms), Contains("brake-low    4.999 s"));
+  CHECK_THAT(one_line(view, 4999 * ms, {}), StartsWith("brake-low    4.999 s"));
+  telemetry_t last = telemetry(5000);
+  last.phase = telemetry_t::PHASE_FAULT;  // the name belongs to another phase
+  view.take(last, 5000 * ms);
+  CHECK_THAT(one_line(view, 5000 * ms, {}), StartsWith("fault "));
 }
 
 TEST_CASE("names of signals from the network are made printable") {

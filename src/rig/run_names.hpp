@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abs_hil/rig/cycle_record.hpp"
+
+namespace abs_hil::rig {
+
+/// Longest name of a phase, bytes. A name has no quotes, commas and line ends.
+inline constexpr std::size_t phase_name_max = 40;
+
+/// A phase of an experiment: its kind, and the name that the experiment gives it.
+struct NamedPhase {
+  Phase kind{Phase::idle};
+  std::string name{};
+};
+
+/// The names behind the numbers in one run's records, for files and messages.
+struct RunNames {
+  std::vector<NamedPhase> phases{};    ///< by CycleRecord::phase_index
+  std::vector<std::string> signals{};  ///< of the controller, by index into ControlState::signals
+
+  /// Name of the record's phase: the experiment's own, or the kind's for a phase that the experiment does not plan, as
+  /// after a fault.
+  [[nodiscard]] std::string_view phase_of(const CycleRecord& record) const noexcept {
+    if (record.phase_index < phases.size()) {
+      const NamedPhase& named = phases[record.phase_index];
+      if (named.kind == record.phase && !named.name.empty()) return named.name;
+    }
+    return name_of(record.phase);
+  }
+};
+
+}  // namespace abs_hil::rig
