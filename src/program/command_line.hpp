@@ -53,7 +53,7 @@ struct RunOptions {
 /// The options of `abs_hil compare` as typed.
 struct CompareOptions {
   RunOptions run{};  ///< only plant, model, configuration file and assignments are used
-  std::vector<std::string> controllers{"adaptive", "sliding-mode"};
+  std::string controllers{"adaptive,sliding-mode"};
   std::size_t repeat{100};
   std::uint64_t seed{1};
   std::optional<std::string> vary{};

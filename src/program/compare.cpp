@@ -25,6 +25,15 @@ std::unique_ptr<analysis::ResultFile> open(const std::optional<std::string>& pat
   throw config::ConfigError(error.what());
 }
 
+/// Refuses a file name that is a number: --repeat was meant.
+void refuse_number(const std::optional<std::string>& file) {
+  if (!file || file->empty() || file->find_first_not_of("0123456789") != std::string::npos) return;
+  throw config::ConfigError(
+      fmt::format("--runs {0}: this names the file for the single runs; for {0} runs of each controller give --repeat "
+                  "{0}, for a file of this name --runs ./{0}",
+                  *file));
+}
+
 /// Prints the progress in steps of one hundredth if stderr is a terminal.
 std::function<void(std::size_t)> progress(std::size_t runs) {
   if (isatty(STDERR_FILENO) == 0) return {};
@@ -38,12 +47,13 @@ std::function<void(std::size_t)> progress(std::size_t runs) {
 }  // namespace
 
 int compare(const CompareOptions& options) {
+  refuse_number(options.runs_file);
   RunOptions run = options.run;
   run.defaults.push_back(fmt::format("experiment.start_speed_rad_s={}", default_start_speed_rad_s));
   const RunRequest request = merge(run);
   const study::ComparisonPlan plan{
       .settings = request.settings,
-      .controllers = options.controllers,
+      .controllers = study::split_contenders(options.controllers),
       .repeat = options.repeat,
       .seed = options.seed,
       .variation = options.vary ? study::Variation::parse(*options.vary) : study::Variation::standard(),

@@ -181,9 +181,9 @@ cli::Parser add_compare(cli::Parser& parser, program::CompareOptions& o) {
                .type = "NAME|FILE"});
   compare.add({.names = "--controllers",
                .to = &o.controllers,
-               .help = "controllers; the first one is the baseline",
+               .help = "controllers, the first one the baseline: NAME, NAME{key=value,...}, a TOML file, each with "
+                       "LABEL= before it if you like; or all",
                .type = "A,B,...",
-               .delimiter = ',',
                .show_default = true});
   compare.add({.names = "--repeat",
                .to = &o.repeat,

@@ -5,42 +5,43 @@
 #include <algorithm>
 #include <atomic>
 #include <stdexcept>
+#include <utility>
 
 #include "abs_hil/control/registry.hpp"
 #include "study/parallel.hpp"
 
 namespace abs_hil::study {
 
-namespace {
-
-void check(const ComparisonPlan& plan) {
+std::vector<Contender> contenders_of(const ComparisonPlan& plan) {
   if (plan.controllers.empty()) throw std::invalid_argument("--controllers: empty list; give at least one controller");
-  if (plan.repeat < 1) throw std::invalid_argument("--repeat: give a number of at least 1");
-  plant_sim::check(plan.settings.plant);
-  for (auto name = plan.controllers.begin(); name != plan.controllers.end(); ++name) {
-    if (std::find(plan.controllers.begin(), name, *name) != name) {
-      throw std::invalid_argument(fmt::format("--controllers: {} is given twice; give each controller once", *name));
+  std::vector<Contender> contenders;
+  for (const std::string& text : plan.controllers) {
+    Contender contender = read_contender(text, plan.settings);
+    const auto has_its_name = [&contender](const Contender& other) { return other.name == contender.name; };
+    if (std::any_of(contenders.begin(), contenders.end(), has_its_name)) {
+      throw std::invalid_argument(fmt::format(
+          "--controllers: {0} is given twice; give each once, or a label, as in other={0}", contender.name));
     }
-    static_cast<void>(control::make_controller(*name, {plan.settings.control, plan.settings.model}));
+    const config::Settings& s = contender.settings;
+    static_cast<void>(control::make_controller(s.control.controller, {s.control, s.model}));
+    contenders.push_back(std::move(contender));
   }
+  return contenders;
 }
 
-}  // namespace
-
 Comparison compare(const ComparisonPlan& plan, const std::function<void(std::size_t)>& done) {
-  check(plan);
-  const std::size_t kinds = plan.controllers.size();
-  std::vector<config::Settings> settings(kinds, plan.settings);
-  for (std::size_t c = 0; c < kinds; ++c) settings[c].control.controller = plan.controllers[c];
-
-  Comparison comparison{.results = {kinds, std::vector<RunResult>(plan.repeat)}};
+  if (plan.repeat < 1) throw std::invalid_argument("--repeat: give a number of at least 1");
+  plant_sim::check(plan.settings.plant);
+  Comparison comparison{.contenders = contenders_of(plan)};
+  const std::size_t kinds = comparison.contenders.size();
+  comparison.results.assign(kinds, std::vector<RunResult>(plan.repeat));
   std::atomic<std::size_t> finished{0};
   for_each_index(kinds * plan.repeat, plan.threads, [&](std::size_t index) {
     const std::size_t c = index % kinds;
     const std::size_t k = index / kinds;
     const Perturbation perturbation = draw(plan.variation, plan.seed, k);
-    comparison.results[c][k] =
-        simulate(settings[c], perturbed(plan.settings.plant, perturbation), perturbation.sensor_seed);
+    comparison.results[c][k] = simulate(comparison.contenders[c].settings, perturbed(plan.settings.plant, perturbation),
+                                        perturbation.sensor_seed);
     if (done) done(finished.fetch_add(1) + 1);
   });
   return comparison;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "config/settings.hpp"
+#include "study/contender.hpp"
 #include "study/simulated_run.hpp"
 #include "study/variation.hpp"
 
@@ -14,18 +15,23 @@ namespace abs_hil::study {
 
 /// Plan of a comparison.
 struct ComparisonPlan {
-  config::Settings settings{};  ///< settings of every run; each run sets `control.controller` to one of `controllers`
-  std::vector<std::string> controllers{};
-  std::size_t repeat{1};  ///< runs of each controller, >= 1
-  std::uint64_t seed{1};  ///< seed of the perturbations
+  config::Settings settings{};             ///< common settings of all runs
+  std::vector<std::string> controllers{};  ///< each as read_contender reads it; the first is the baseline
+  std::size_t repeat{1};                   ///< runs of each controller, >= 1
+  std::uint64_t seed{1};                   ///< seed of the perturbations
   Variation variation{Variation::standard()};
   std::size_t threads{1};
 };
+
+/// The controllers of a plan with their settings. Throws std::invalid_argument and config::ConfigError for an unknown
+/// or repeated one, for none, and for unusable options.
+[[nodiscard]] std::vector<Contender> contenders_of(const ComparisonPlan& plan);
 
 /// The runs of all controllers over the same perturbed plants.
 struct Comparison {
   /// results[c][k]: controller c on perturbation k
   std::vector<std::vector<RunResult>> results{};
+  std::vector<Contender> contenders{};
 };
 
 /// Runs all controllers over the same perturbed plants. Perturbation k depends on (seed, k) alone, so every controller

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "analysis/json_number.hpp"
+#include "config/key_table.hpp"
 #include "study/comparison_table.hpp"
 
 namespace abs_hil::study {
@@ -99,12 +100,27 @@ std::string markdown(const Cells& cells) {
   return text;
 }
 
+/// What the labels stand for.
+std::string labels(const ComparisonTable& t) {
+  std::string text;
+  for (const ControllerColumn& column : t.columns) {
+    if (column.changes.empty() || column.name.find('{') != std::string::npos) continue;
+    text += fmt::format("{} is {} with", column.name, column.controller);
+    for (std::size_t n = 0; n < column.changes.size(); ++n) {
+      text += fmt::format("{} {} = {}", n == 0 ? "" : ",", column.changes[n].first, column.changes[n].second);
+    }
+    text += ".\n";
+  }
+  return text;
+}
+
 std::string heading(const ComparisonTable& t) {
   const std::string start =
       t.start_speed_rad_s > 0.0 ? fmt::format("braking from {} rad/s", t.start_speed_rad_s) : "from standstill";
   return fmt::format("Plant {}, experiment {}, {} to {} m/s, slip reference {}.\n", t.plant, t.experiment, start,
                      t.end_speed_m_s, t.slip_ref) +
          (t.model_note.empty() ? "" : fmt::format("The model differs from the plant: {}.\n", t.model_note)) +
+         labels(t) +
          fmt::format("{} run{} of each controller, seed {}, plants varied by {}{}.\n", t.repeat,
                      t.repeat == 1 ? "" : "s", t.seed, t.variation.text(),
                      t.repeat > 1 ? "; mean ± half of the 95 % confidence interval" : "");
@@ -122,6 +138,35 @@ std::string ratio_line(const PaperRatio& r) {
       "distance ({:.1f} % less).\n",
       shown_ratio(r.stop_time), shown_ratio(r.stop_distance), shown_ratio(r.torque_total_variation), 1.0 - paper_saving,
       100.0 * paper_saving);
+}
+
+/// A field of CSV. A name with settings holds commas.
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + '"';
+}
+
+/// The keys of the plant's values that the plan's variation changes.
+/// @param drawn  the settings behind `keys`; left as they were
+std::vector<const config::Key*> varied_keys(const ComparisonPlan& plan, const config::KeyTable& keys,
+                                            config::Settings& drawn) {
+  std::vector<double> before;
+  const auto is_number = [](const config::Key& key) {
+    return key.name.starts_with("plant.") && std::holds_alternative<double*>(key.target);
+  };
+  for (const config::Key& key : keys.keys()) {
+    if (is_number(key)) before.push_back(*std::get<double*>(key.target));
+  }
+  drawn.plant = perturbed(plan.settings.plant, smallest(plan.variation));
+  std::vector<const config::Key*> varied;
+  auto at = before.begin();
+  for (const config::Key& key : keys.keys()) {
+    if (is_number(key) && *std::get<double*>(key.target) != *at++) varied.push_back(&key);
+  }
+  drawn.plant = plan.settings.plant;
+  return varied;
 }
 
 nlohmann::ordered_json json_of(const Estimate& e) {
@@ -160,8 +205,8 @@ std::string to_csv(const ComparisonTable& table) {
       const double unknown = rig::unknown;
       const Estimate d = column.differences.empty() ? Estimate{.mean = unknown, .low = unknown, .high = unknown}
                                                     : column.differences[m];
-      text += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", column.name, compared_metrics()[m].key, e.n, e.mean,
-                          e.standard_deviation, e.low, e.high, d.mean, d.low, d.high);
+      text += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", csv_field(column.name), compared_metrics()[m].key, e.n,
+                          e.mean, e.standard_deviation, e.low, e.high, d.mean, d.low, d.high);
     }
   }
   return text;
@@ -177,7 +222,11 @@ std::string to_json(const ComparisonTable& t, const std::string& config_json) {
       means[key] = json_of(column.means[m]);
       if (!column.differences.empty()) differences[key] = json_of(column.differences[m]);
     }
+    nlohmann::ordered_json changes = nlohmann::ordered_json::object();
+    for (const auto& [key, value] : column.changes) changes[key] = value;
     controllers.push_back({{"name", column.name},
+                           {"controller", column.controller},
+                           {"settings", changes},
                            {"runs", column.runs},
                            {"faults", column.faults},
                            {"locked", column.locked},
@@ -204,15 +253,24 @@ std::string to_json(const ComparisonTable& t, const std::string& config_json) {
 }
 
 std::string runs_csv(const ComparisonPlan& plan, const Comparison& comparison) {
+  // The drawn plants, by the keys of what may differ between them.
+  config::Settings drawn = plan.settings;
+  const config::KeyTable keys(drawn);
+  const std::vector<const config::Key*> varied = varied_keys(plan, keys, drawn);
   std::string text = "controller,run,result";
   for (const ComparedMetric& metric : compared_metrics()) text += ',' + std::string(metric.key);
-  text += '\n';
-  for (std::size_t c = 0; c < plan.controllers.size(); ++c) {
+  for (const config::Key* key : varied) text += ',' + key->name;
+  text += ",sensor_seed\n";
+  for (std::size_t c = 0; c < comparison.contenders.size(); ++c) {
     for (std::size_t k = 0; k < comparison.results[c].size(); ++k) {
       const RunResult& run = comparison.results[c][k];
-      text += fmt::format("{},{},{}", plan.controllers[c], k, run.stopped() ? "completed" : "fault");
+      text +=
+          fmt::format("{},{},{}", csv_field(comparison.contenders[c].name), k, run.stopped() ? "completed" : "fault");
       for (const ComparedMetric& metric : compared_metrics()) text += fmt::format(",{}", run.metrics.*metric.value);
-      text += '\n';
+      const Perturbation perturbation = draw(plan.variation, plan.seed, k);
+      drawn.plant = perturbed(plan.settings.plant, perturbation);
+      for (const config::Key* key : varied) text += fmt::format(",{}", *std::get<double*>(key->target));
+      text += fmt::format(",{}\n", perturbation.sensor_seed);
     }
   }
   return text;

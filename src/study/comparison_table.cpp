@@ -36,12 +36,14 @@ std::vector<double> values_of(const std::vector<RunResult>& runs, const Compared
   return values;
 }
 
-ControllerColumn column_of(const std::string& name, const std::vector<RunResult>& runs,
+ControllerColumn column_of(const Contender& contender, const std::vector<RunResult>& runs,
                            const std::vector<RunResult>* first) {
   const auto count = [&runs](auto&& holds) {
     return static_cast<std::size_t>(std::count_if(runs.begin(), runs.end(), holds));
   };
-  ControllerColumn column{.name = name,
+  ControllerColumn column{.name = contender.name,
+                          .controller = contender.settings.control.controller,
+                          .changes = contender.changes,
                           .runs = runs.size(),
                           .faults = count([](const RunResult& run) { return !run.stopped(); }),
                           .locked = count([](const RunResult& run) { return run.metrics.time_locked_s > 0.0; })};
@@ -55,11 +57,12 @@ ControllerColumn column_of(const std::string& name, const std::vector<RunResult>
   return column;
 }
 
-std::optional<PaperRatio> paper_ratio(const ComparisonPlan& plan, const Comparison& comparison) {
+std::optional<PaperRatio> paper_ratio(const Comparison& comparison) {
   const auto runs_of = [&](std::string_view name) -> const std::vector<RunResult>* {
-    const auto at = std::find(plan.controllers.begin(), plan.controllers.end(), name);
-    return at == plan.controllers.end() ? nullptr
-                                        : &comparison.results[static_cast<std::size_t>(at - plan.controllers.begin())];
+    for (std::size_t c = 0; c < comparison.contenders.size(); ++c) {
+      if (comparison.contenders[c].name == name) return &comparison.results[c];
+    }
+    return nullptr;
   };
   const auto* ours = runs_of("adaptive");
   const auto* theirs = runs_of("sliding-mode");
@@ -88,11 +91,11 @@ ComparisonTable tabulate(const ComparisonPlan& plan, const Comparison& compariso
                         .variation = plan.variation,
                         .model_note = config::in_words(config::model_differences(plan.settings))};
   const std::vector<RunResult>* first = nullptr;
-  for (std::size_t c = 0; c < plan.controllers.size(); ++c) {
-    table.columns.push_back(column_of(plan.controllers[c], comparison.results[c], first));
+  for (std::size_t c = 0; c < comparison.contenders.size(); ++c) {
+    table.columns.push_back(column_of(comparison.contenders[c], comparison.results[c], first));
     if (first == nullptr) first = &comparison.results[c];
   }
-  table.paper_ratio = paper_ratio(plan, comparison);
+  table.paper_ratio = paper_ratio(comparison);
   return table;
 }
 

@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "analysis/statistics.hpp"
@@ -26,6 +27,8 @@ struct ComparedMetric {
 
 struct ControllerColumn {
   std::string name;
+  std::string controller;
+  std::vector<std::pair<std::string, std::string>> changes{};  ///< configuration values of its own
   std::size_t runs{0};
   std::size_t faults{0};                          ///< runs that ended by a fault or limit
   std::size_t locked{0};                          ///< runs in which the wheel locked (time_locked_s > 0)

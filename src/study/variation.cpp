@@ -118,6 +118,16 @@ Perturbation draw(const Variation& v, std::uint64_t seed, std::uint64_t index) {
   return p;
 }
 
+Perturbation smallest(const Variation& v) noexcept {
+  Perturbation p;
+  for (double* wheel : {&p.J1, &p.J2, &p.d1, &p.d2, &p.M10, &p.M20}) *wheel -= v.wheels;
+  for (double* brake : {&p.brake_gain, &p.u0, &p.c31}) *brake -= v.brake;
+  for (double* tyre : {&p.B, &p.C}) *tyre -= v.tyre;
+  p.theta -= v.theta;
+  for (double* radius : {&p.r1, &p.r2}) *radius -= v.radii;
+  return p;
+}
+
 plant_sim::PlantOptions perturbed(const plant_sim::PlantOptions& nominal, const Perturbation& p) {
   plant_sim::PlantOptions plant = nominal;
   rig::WheelParameters& w = plant.rig.wheels;

@@ -46,6 +46,9 @@ struct Perturbation {
 /// for every controller and in every thread. The value of one parameter does not depend on which others vary.
 [[nodiscard]] Perturbation draw(const Variation& variation, std::uint64_t seed, std::uint64_t index);
 
+/// The perturbation with every factor at its lower end.
+[[nodiscard]] Perturbation smallest(const Variation& variation) noexcept;
+
 /// Applies a perturbation to the nominal plant. Values stay within their valid range (C <= 2, u0 < 1).
 [[nodiscard]] plant_sim::PlantOptions perturbed(const plant_sim::PlantOptions& nominal,
                                                 const Perturbation& perturbation);

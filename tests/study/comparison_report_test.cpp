@@ -34,7 +34,8 @@ RunResult faulty() {
 struct Sample {
   ComparisonPlan plan = study::test::paper_plan({"adaptive", "sliding-mode"}, 4);
   Comparison comparison{{{run_of(2.0, 30), run_of(2.2, 40), run_of(2.4, 50), faulty()},
-                         {run_of(2.5, 600), run_of(2.7, 800, 0.2), run_of(3.2, 1000), run_of(2.6, 700)}}};
+                         {run_of(2.5, 600), run_of(2.7, 800, 0.2), run_of(3.2, 1000), run_of(2.6, 700)}},
+                        contenders_of(plan)};
   ComparisonTable table = tabulate(plan, comparison);
 };
 
@@ -66,7 +67,7 @@ TEST_CASE("the table holds the statistics of the runs") {
 
 TEST_CASE("the ratio is there only with both controllers of the paper") {
   ComparisonPlan plan = study::test::paper_plan({"adaptive", "nominal"}, 1);
-  CHECK_FALSE(tabulate(plan, {{{run_of(2, 30)}, {run_of(2, 30)}}}).paper_ratio);
+  CHECK_FALSE(tabulate(plan, {{{run_of(2, 30)}, {run_of(2, 30)}}, contenders_of(plan)}).paper_ratio);
 }
 
 TEST_CASE("CSV and JSON contain the table's numbers with full precision") {
@@ -134,7 +135,7 @@ TEST_CASE("every row of a Markdown table has its header's number of cells") {
 
 TEST_CASE("a single run has no interval") {
   ComparisonPlan plan = study::test::paper_plan({"adaptive"}, 1);
-  const std::string text = to_text(tabulate(plan, {{{run_of(2.0, 30)}}}));
+  const std::string text = to_text(tabulate(plan, {{{run_of(2.0, 30)}}, contenders_of(plan)}));
   CHECK_THAT(text, Contains("2.000\n") && !Contains("±") && !Contains("Differences"));
 }
 
