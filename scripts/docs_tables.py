@@ -40,7 +40,8 @@ TABLES = {
     'quantities': (json_rows('abs_hil', 'list', '--quantities', '--json'),
                    {'name': '`{name}`', 'unit': '{unit}', 'CSV column': '{csv_column}', 'meaning': '{meaning}'}),
     'reasons': (json_rows('abs_hil', 'list', '--reasons', '--json'),
-                {'number': '{number}', 'kind': '{kind}', 'reason': '{text}'}),
+                {'number': '{number}', 'kind': '{kind}', 'reason': '{text}', 'value': '{quantity}',
+                 'unit': '{unit}', 'bound': '{bound}'}),
     'rooms': (tsv_rows('rooms.tsv'), {'room': '`{room}`', 'holds': '{holds}', 'may know': '{may know}'}),
 }
 MARKED = re.compile(r'^(<!-- table: (\S+) -->\n)(.*?)^(<!-- end -->)$', re.MULTILINE | re.DOTALL)

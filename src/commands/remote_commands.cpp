@@ -37,7 +37,10 @@ std::optional<telemetry::CommandAnswer> RemoteCommands::judge(const command2_t& 
   const std::string refused = "refused '" + shown(command.command) + "': ";
   if (!authority_) {
     return telemetry::CommandAnswer{rig::Reason::commands_not_enabled,
-                                    refused + "only 'stop' is accepted, as this run has commands.enabled = false"};
+                                    refused +
+                                        "only 'stop' is accepted; start the run with --set commands.enabled=true "
+                                        "--set commands.key_file=FILE, and make FILE before by (umask 077; "
+                                        "openssl rand -hex 32 > FILE)"};
   }
   if (const rig::Reason reason = authority_->judge(command); reason != rig::Reason::none) {
     return telemetry::CommandAnswer{reason, refused + why(reason)};

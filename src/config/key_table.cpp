@@ -113,6 +113,14 @@ const Key* model_key(const std::vector<Key>& keys, std::string_view name) {
   return find_key(keys, std::string(model_prefix).append(name.substr(plant_prefix.size())));
 }
 
+std::string number_text(const Settings& settings, std::string_view name) {
+  Settings copy = settings;
+  const KeyTable keys(copy);
+  const Key* key = find_key(keys.keys(), name);
+  if (key == nullptr || std::holds_alternative<std::string*>(key->target)) return {};
+  return std::visit([](const auto* target) { return fmt::format("{}", *target); }, key->target);
+}
+
 std::string section_of(std::string_view controller) {
   std::string name(controller);
   std::replace(name.begin(), name.end(), '-', '_');

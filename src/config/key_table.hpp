@@ -32,6 +32,9 @@ using Value = std::variant<double, std::int64_t, bool, std::string>;
 /// "model.x" for "plant.x"; null for a value that only the plant has, and for a name that is not of the plant.
 [[nodiscard]] const Key* model_key(const std::vector<Key>& keys, std::string_view name);
 
+/// The number that the settings have for this key, as text; empty for any other text. Not real-time safe.
+[[nodiscard]] std::string number_text(const Settings& settings, std::string_view name);
+
 /// The prefix of a controller's own keys: "control.sliding_mode.".
 [[nodiscard]] std::string section_of(std::string_view controller);
 

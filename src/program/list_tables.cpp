@@ -66,7 +66,10 @@ Json reasons() {
                     {"name", row.name},
                     {"kind", rig::name_of(row.kind)},
                     {"found_again", rig::name_of(row.found_again)},
-                    {"text", row.text}});
+                    {"text", row.text},
+                    {"quantity", row.value.quantity},
+                    {"unit", row.value.unit},
+                    {"bound", row.value.bound}});
   }
   return rows;
 }

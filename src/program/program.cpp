@@ -322,6 +322,23 @@ void add_validate(cli::Parser& parser, ValidateCommand& command) {
   add_configuration_options(command.parser, command.options);
 }
 
+/// Options of `abs_hil init-rig` as typed.
+struct InitRigCommand {
+  program::RunOptions options{};
+  std::string name{};
+  cli::Parser parser{};
+};
+
+void add_init_rig(cli::Parser& parser, InitRigCommand& command) {
+  command.parser = parser.add_subcommand("init-rig", "write NAME.toml, the parameters of a rig of your own to fill in");
+  command.parser.add(
+      {.names = "name", .to = &command.name, .help = "name of the rig", .type = "NAME", .required = true});
+  command.parser.add({.names = "--plant",
+                      .to = &command.options.plant,
+                      .help = "plant whose values it begins with, by name or TOML file",
+                      .type = "NAME|FILE"});
+}
+
 int dispatch(int argc, char** argv) {
   cli::Parser parser("abs_hil", "Driver, adaptive slip controller and simulator of the Inteco ABS laboratory rig");
   parser.set_version(ABS_HIL_VERSION);
@@ -339,6 +356,8 @@ int dispatch(int argc, char** argv) {
   add_validate(parser, validate);
   CommissionCommand commission;
   add_commission(parser, commission);
+  InitRigCommand init_rig;
+  add_init_rig(parser, init_rig);
   program::ReplayCommand replay_command;
   program::add_replay(parser, replay_command);
   program::ConvertCommand convert_command;
@@ -369,6 +388,7 @@ int dispatch(int argc, char** argv) {
   }
   if (commission.parser.parsed()) return program::commission(program::merge(commission.options), commission.pulses);
   if (send.parser.parsed()) return program::send(program::merge(send.options), send.send);
+  if (init_rig.parser.parsed()) return program::init_rig(program::merge(init_rig.options), init_rig.name);
   if (replay_command.parser.parsed()) return program::replay_run(replay_command);
   if (convert_command.parser.parsed()) return program::convert(convert_command);
   program::RunRequest request = program::merge(options);

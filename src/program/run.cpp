@@ -13,6 +13,7 @@
 
 #include "analysis/run_metrics.hpp"
 #include "analysis/run_summary.hpp"
+#include "config/key_table.hpp"
 #include "config/model.hpp"
 #include "config/plan.hpp"
 #include "control/silent_settings.hpp"
@@ -33,12 +34,14 @@ namespace abs_hil::program {
 
 namespace {
 
-std::string reason_text(const experiment::RunOutcome& outcome, const std::string& controller) {
+std::string reason_text(const experiment::RunOutcome& outcome, const config::Settings& s) {
   std::string text = rig::reason_text(outcome.reason, outcome.reason_value);
+  if (rig::is_fault(outcome.reason)) {
+    const std::string bound = config::number_text(s, rig::row_of(outcome.reason).value.bound);
+    text = rig::reason_with_value(outcome.reason, outcome.reason_value, bound);
+  }
   if (outcome.reason == rig::Reason::controller_not_finite) {
-    text += fmt::format(" (controller {})", controller);
-  } else if (rig::is_fault(outcome.reason)) {
-    text += fmt::format(" (value {:.6g})", outcome.reason_value);
+    text += fmt::format(" (controller {})", s.control.controller);
   }
   if (!outcome.io_error.ok()) {
     text += ": " + driver::error_text(outcome.io_error);
@@ -61,7 +64,7 @@ analysis::RunSummary summarise(const RunRequest& request, const experiment::RunS
   const config::Settings& s = request.settings;
   const std::string result = outcome.completed() ? "completed" : (rig::is_fault(outcome.reason) ? "fault" : "stopped");
   return {.result = result,
-          .reason = reason_text(outcome, s.control.controller),
+          .reason = reason_text(outcome, s),
           .controller = s.control.controller,
           .plant = s.plant_name,
           .backend = s.backend,

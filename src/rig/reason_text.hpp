@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <charconv>
 #include <string>
 
 #include "abs_hil/rig/reason.hpp"
@@ -12,6 +14,22 @@ namespace abs_hil::rig {
   std::string text(description(reason));
   if (reason == Reason::controller_not_finite) text.append(": ").append(controller_signal(value));
   return text;
+}
+
+/// The same with the value, its unit and its bound behind: "... (speed 203.1 rad/s; bound gate.overspeed_rad_s)".
+/// @param bound_value  the bound's own value as text, if the caller knows it: "200"
+[[nodiscard]] inline std::string reason_with_value(Reason reason, double value, const std::string& bound_value = {}) {
+  std::string text = reason_text(reason, value);
+  const ReasonValue& facts = row_of(reason).value;
+  if (facts.quantity.empty()) return text;
+  std::array<char, 32> digits{};
+  const auto end =
+      std::to_chars(digits.data(), digits.data() + digits.size(), value, std::chars_format::general, 6).ptr;
+  text.append(" (").append(facts.quantity).append(" ").append(digits.data(), end);
+  if (!facts.unit.empty()) text.append(" ").append(facts.unit);
+  if (!facts.bound.empty()) text.append("; bound: ").append(facts.bound);
+  if (!facts.bound.empty() && !bound_value.empty()) text.append(" = ").append(bound_value);
+  return text.append(")");
 }
 
 }  // namespace abs_hil::rig

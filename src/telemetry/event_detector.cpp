@@ -28,7 +28,9 @@ std::optional<DetectedEvent> EventDetector::observe(const rig::CycleRecord& reco
   }
   event.message.append(phase_name_);
   if (record.reason != rig::Reason::none) {
-    event.message.append(": ").append(rig::reason_text(record.reason, record.reason_value));
+    event.message.append(": ").append(rig::is_fault(record.reason)
+                                          ? rig::reason_with_value(record.reason, record.reason_value)
+                                          : rig::reason_text(record.reason, record.reason_value));
   }
   // The change and its reason may be in a lost record.
   if (records_lost > 0) event.message.append(" (").append(std::to_string(records_lost)).append(" records lost before)");

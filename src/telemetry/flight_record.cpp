@@ -90,7 +90,7 @@ std::vector<std::filesystem::path> write_flight_record(const std::filesystem::pa
   attempt(".txt", [&](const auto& path) {
     write_text(path,
                "reason " + std::to_string(static_cast<int>(record.reason)) + ": " +
-                   rig::reason_text(record.reason, record.reason_value) + '\n' + record.account +
+                   rig::reason_with_value(record.reason, record.reason_value) + '\n' + record.account +
                    std::to_string(record.records.size()) + " cycles recorded\n",
                "flight record");
   });

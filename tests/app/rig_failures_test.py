@@ -31,9 +31,9 @@ REFUSED = [
 BROKEN = [
     ('unplugged', 'unplug', 'board is gone', 'held'),
     ('all ones', 'all-ones on', 'board is gone', 'held'),
-    ('overspeed (bit 0)', 'overspeed', "the board's own interlock tripped (value 1)", 'safe'),
+    ('overspeed (bit 0)', 'overspeed', "the board's own interlock tripped (trip flags 1; bound: 0)", 'safe'),
     ('supply', 'supply 5', 'interlock tripped: supply undervoltage', 'safe'),
-    ('temperature (bit 2)', 'temperature 95', "the board's own interlock tripped (value 4)", 'safe'),
+    ('temperature (bit 2)', 'temperature 95', "the board's own interlock tripped (trip flags 4; bound: 0)", 'safe'),
     ('encoder off', 'fault 88:off', 'at 0x88', 'safe'),
     ('encoder nonsense', 'fault 88:garbage', 'answer outside what the board can say', 'safe'),
     ('PWM reads back otherwise', 'fault 6c:wrong=1', 'register does not read back what was written at 0x6c', 'safe'),

@@ -9,6 +9,7 @@
 
 #include "abs_hil/rig/phase.hpp"
 #include "catch.hpp"
+#include "rig/reason_text.hpp"
 
 using namespace abs_hil::rig;
 
@@ -122,6 +123,18 @@ TEST_CASE("a number without a row says so, and is a fault from 64 on") {
     CHECK(is_fault(reason) == (number >= 64));
     CHECK_FALSE(is_stop_request(reason));
     CHECK_FALSE(is_adjustment(reason));
+  }
+}
+
+TEST_CASE("a fault's value comes with quantity, unit and bound") {
+  CHECK(reason_with_value(Reason::overspeed, 203.14) ==
+        "wheel speed above the limit (speed 203.14 rad/s; bound: gate.overspeed_rad_s)");
+  CHECK(reason_with_value(Reason::overspeed, 203.14, "200") ==
+        "wheel speed above the limit (speed 203.14 rad/s; bound: gate.overspeed_rad_s = 200)");
+  CHECK(reason_with_value(Reason::guardian_died, 0.0) == description(Reason::guardian_died));
+  for (const ReasonRow& row : reasons) {
+    INFO(row.name);
+    if (row.value.quantity.empty()) CHECK((row.value.unit.empty() && row.value.bound.empty()));
   }
 }
 

@@ -12,31 +12,34 @@ namespace abs_hil::plant_sim {
 struct IntecoMuParameters {
   ABS_HIL_OPTIONS(IntecoMuParameters);
   ABS_HIL_OPTION(double, w1, -0.04240011450454, .meaning = "simulation: tyre inteco-mu, coefficient of slip",
-                 .range = rig::between(-10, 10));
+                 .range = rig::between(-10, 10), .on_rig = "fit of the curve to slip and force: experiment slip-sweep");
   ABS_HIL_OPTION(double, w2, 2.9375e-10, .meaning = "simulation: tyre inteco-mu, coefficient of slip^2",
-                 .range = rig::between(-10, 10));
+                 .range = rig::between(-10, 10), .on_rig = "as mu_w1");
   ABS_HIL_OPTION(double, w3, 0.03508217905067, .meaning = "simulation: tyre inteco-mu, coefficient of slip^3",
-                 .range = rig::between(-10, 10));
+                 .range = rig::between(-10, 10), .on_rig = "as mu_w1");
   ABS_HIL_OPTION(double, w4, 0.40662691102315, .meaning = "simulation: tyre inteco-mu, height of the saturating term",
-                 .range = rig::between(-10, 10));
+                 .range = rig::between(-10, 10), .on_rig = "as mu_w1");
   ABS_HIL_OPTION(double, a, 0.00025724985785,
                  .meaning = "simulation: tyre inteco-mu, slip^p at half of the saturating term",
-                 .range = rig::positive(10));
+                 .range = rig::positive(10), .on_rig = "as mu_w1");
   /// Below 1 the curve would rise with infinite slope from slip 0.
   ABS_HIL_OPTION(double, p, 2.09945271667129, .meaning = "simulation: tyre inteco-mu, exponent of the saturating term",
-                 .range = rig::between(1, 10));
+                 .range = rig::between(1, 10), .on_rig = "as mu_w1");
 };
 
 /// The lever that carries the upper wheel and presses it onto the lower one (Inteco ABS, User's Manual, section 5).
 struct LeverParameters {
   ABS_HIL_OPTIONS(LeverParameters);
-  ABS_HIL_OPTION(double, Mg_Nm, 19.62, .unit = "N m", .meaning = "simulation: load lever, moment of its weight",
-                 .range = rig::positive(1000));
+  ABS_HIL_OPTION(
+      double, Mg_Nm, 19.62, .unit = "N m", .meaning = "simulation: load lever, moment of its weight",
+      .range = rig::positive(1000),
+      .on_rig = "force of a spring balance that just lifts the upper wheel, times its distance from the pivot");
   ABS_HIL_OPTION(double, L_m, 0.370, .unit = "m", .meaning = "simulation: load lever, from pivot to contact",
-                 .range = rig::between(0.01, 10));
+                 .range = rig::between(0.01, 10), .on_rig = "tape: from the pivot to the point where the wheels touch");
   ABS_HIL_OPTION(double, phi_deg, 65.61, .unit = "deg",
                  .meaning = "simulation: load lever, angle between its line and the contact's normal",
-                 .range = rig::positive(90));
+                 .range = rig::positive(90),
+                 .on_rig = "photograph from the side: angle between line L and the normal at the contact");
 };
 
 /// Time profiles of factors over the plant's parameters, see FactorProfile; empty: constant 1.
@@ -71,7 +74,8 @@ struct PlantOptions {
                  .allowed = {"constant", "lever"});
   ABS_HIL_OPTION(double, mu_peak, 0.4,
                  .meaning = "simulation: peak friction coefficient of tyre magic-formula under load lever",
-                 .range = ::abs_hil::rig::positive(5));
+                 .range = ::abs_hil::rig::positive(5),
+                 .on_rig = "peak force of experiment slip-sweep over the normal force");
   ABS_HIL_GROUP(IntecoMuParameters, inteco_mu, "mu_", {});
   ABS_HIL_GROUP(LeverParameters, lever, "lever_", {});
   /// See FactorProfile; empty: none.

@@ -61,6 +61,7 @@ struct OptionFacts {
   Range range{};               ///< of numbers
   AllowedNames allowed{};      ///< of texts
   SearchRange search{};        ///< where abs_tune looks for a gain; nowhere by default
+  std::string_view on_rig{};   ///< of a rig's parameter: where to read it off the rig; empty for all others
   bool start_value{false};     ///< initial value of slip control: no effect after slip control has begun
 };
 

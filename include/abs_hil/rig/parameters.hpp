@@ -11,20 +11,29 @@ namespace abs_hil::rig {
 struct WheelParameters {
   ABS_HIL_OPTIONS(WheelParameters);
   bool operator==(const WheelParameters&) const = default;
-  ABS_HIL_OPTION(double, r1_m, 0.0995, .unit = "m", .meaning = "upper wheel radius", .range = between(0.01, 1));
-  ABS_HIL_OPTION(double, r2_m, 0.0990, .unit = "m", .meaning = "lower wheel radius", .range = between(0.01, 1));
-  ABS_HIL_OPTION(double, J1_kg_m2, 7.54e-3, .unit = "kg m^2", .meaning = "upper wheel moment of inertia",
-                 .range = between(1e-4, 1));
+  ABS_HIL_OPTION(double, r1_m, 0.0995, .unit = "m", .meaning = "upper wheel radius", .range = between(0.01, 1),
+                 .on_rig = "caliper, or the length that the rim covers in ten turns over 20 pi");
+  ABS_HIL_OPTION(double, r2_m, 0.0990, .unit = "m", .meaning = "lower wheel radius", .range = between(0.01, 1),
+                 .on_rig = "as r1_m; an error of one radius against the other shifts every slip");
+  ABS_HIL_OPTION(
+      double, J1_kg_m2, 7.54e-3, .unit = "kg m^2", .meaning = "upper wheel moment of inertia",
+      .range = between(1e-4, 1),
+      .on_rig = "lifted upper wheel: known brake torque over deceleration; or computed from drawing and mass");
   ABS_HIL_OPTION(double, J2_kg_m2, 25.60e-3, .unit = "kg m^2", .meaning = "lower wheel moment of inertia",
-                 .range = between(1e-4, 1));
+                 .range = between(1e-4, 1), .on_rig = "computed from drawing and mass, or swung as a pendulum");
   ABS_HIL_OPTION(double, d1_Nms_rad, 118.74e-6, .unit = "N m s/rad", .meaning = "upper wheel viscous friction",
-                 .range = from_zero(0.1));
-  ABS_HIL_OPTION(double, d2_Nms_rad, 214.68e-6, .unit = "N m s/rad", .meaning = "lower wheel viscous friction",
-                 .range = from_zero(0.1));
+                 .range = from_zero(0.1),
+                 .on_rig = "run-out of the lifted upper wheel: slope of deceleration over speed, times J1");
+  ABS_HIL_OPTION(
+      double, d2_Nms_rad, 214.68e-6, .unit = "N m s/rad", .meaning = "lower wheel viscous friction",
+      .range = from_zero(0.1),
+      .on_rig = "run-out of the lower wheel, the upper one lifted: slope of deceleration over speed, times J2");
   ABS_HIL_OPTION(double, M10_Nm, 0.0032, .unit = "N m", .meaning = "upper wheel Coulomb friction",
-                 .range = from_zero(10));
-  ABS_HIL_OPTION(double, M20_Nm, 0.0925, .unit = "N m", .meaning = "lower wheel Coulomb friction",
-                 .range = from_zero(10));
+                 .range = from_zero(10),
+                 .on_rig = "run-out of the lifted upper wheel: deceleration just before it stops, times J1");
+  ABS_HIL_OPTION(
+      double, M20_Nm, 0.0925, .unit = "N m", .meaning = "lower wheel Coulomb friction", .range = from_zero(10),
+      .on_rig = "run-out of the lower wheel, the upper one lifted: deceleration just before it stops, times J2");
 };
 
 /// Tyre force Ft = theta * phi(slip) of (10), phi(slip) = sin(C atan(B slip)).
@@ -33,23 +42,30 @@ struct TyreParameters {
   bool operator==(const TyreParameters&) const = default;
   ABS_HIL_OPTION(double, theta_N, 23.0, .unit = "N",
                  .meaning = "peak tyre force, theta = mu D of (10); a plant with load lever does not use it",
-                 .range = positive(500));
-  ABS_HIL_OPTION(double, B, 28.0, .meaning = "tyre stiffness factor of (4)", .range = positive(200));
+                 .range = positive(500),
+                 .on_rig = "largest braking force while the slip rises slowly: experiment slip-sweep");
+  ABS_HIL_OPTION(double, B, 28.0, .meaning = "tyre stiffness factor of (4)", .range = positive(200),
+                 .on_rig = "initial slope of force over slip, divided by theta and C: experiment slip-sweep");
   /// Above 2 the force would change sign at large slip.
-  ABS_HIL_OPTION(double, C, 1.68, .meaning = "tyre shape factor of (4)", .range = positive(2));
+  ABS_HIL_OPTION(double, C, 1.68, .meaning = "tyre shape factor of (4)", .range = positive(2),
+                 .on_rig = "force of a locked wheel over theta is nearly sin(C pi/2): experiment slip-sweep");
 };
 
 /// Brake: static map (7) from duty to torque, first-order lag (6).
 struct BrakeParameters {
   ABS_HIL_OPTIONS(BrakeParameters);
   bool operator==(const BrakeParameters&) const = default;
-  ABS_HIL_OPTION(double, b1_Nm, 15.24, .unit = "N m", .meaning = "slope of the brake map (7)", .range = positive(1000));
+  ABS_HIL_OPTION(double, b1_Nm, 15.24, .unit = "N m", .meaning = "slope of the brake map (7)", .range = positive(1000),
+                 .on_rig = "steady brake torque at several duties, by a spring balance at the rim: slope over duty");
   ABS_HIL_OPTION(double, b2_Nm, -6.21, .unit = "N m", .meaning = "offset of the brake map (7)",
-                 .range = between(-1000, 1000));
+                 .range = between(-1000, 1000), .on_rig = "the same line: its value at duty 0, below zero");
   ABS_HIL_OPTION(double, u0, 0.415, .meaning = "brake duty below which there is no torque (7)",
-                 .range = from_zero_below(1));
-  ABS_HIL_OPTION(double, c31_per_s, 20.37, .unit = "1/s", .meaning = "inverse time constant of the brake (6)",
-                 .range = positive(1000));
+                 .range = from_zero_below(1),
+                 .on_rig = "raise the brake duty slowly until the turning wheel slows down");
+  ABS_HIL_OPTION(
+      double, c31_per_s, 20.37, .unit = "1/s", .meaning = "inverse time constant of the brake (6)",
+      .range = positive(1000),
+      .on_rig = "1 over the time in which the brake torque reaches 63 % after a step: experiment brake-step");
 };
 
 /// Lower wheel's DC motor: Tm = stall_torque * duty * (1 - omega2 / no_load_speed). The paper does not give these
@@ -63,10 +79,12 @@ struct DriveMotorParameters {
   ABS_HIL_OPTIONS(DriveMotorParameters);
   bool operator==(const DriveMotorParameters&) const = default;
   ABS_HIL_OPTION(double, stall_torque_Nm, 2.1122, .unit = "N m",
-                 .meaning = "drive motor's torque at standstill and full duty", .range = positive(100));
+                 .meaning = "drive motor's torque at standstill and full duty", .range = positive(100),
+                 .on_rig = "acceleration from rest at full duty times both inertias, plus friction");
   /// Speed at which the back-EMF cancels the supply.
   ABS_HIL_OPTION(double, no_load_speed_rad_s, 220.0, .unit = "rad/s", .meaning = "drive motor's no-load speed",
-                 .range = positive(2000));
+                 .range = positive(2000),
+                 .on_rig = "final speed at full duty with the upper wheel lifted, corrected for friction");
 };
 
 /// All parameters of the rig that a controller may use, in SI units: of the simulated rig, or of the model of a rig.
@@ -79,7 +97,8 @@ struct RigParameters {
   ABS_HIL_GROUP(DriveMotorParameters, motor, "motor_", {});
   /// After quadrature decoding.
   ABS_HIL_OPTION(std::int32_t, encoder_counts_per_rev, 4096, .meaning = "encoder counts per revolution",
-                 .range = between(4, 1'000'000));
+                 .range = between(4, 1'000'000),
+                 .on_rig = "turn each wheel once by hand: abs_hil commission counts; 4 times the lines of the disc");
 };
 
 }  // namespace abs_hil::rig

@@ -28,21 +28,31 @@ enum class FoundAgain : std::uint8_t {
 };
 
 // clang-format off
-/// Every reason: name, number, kind, found again, text. Logs contain the numbers: add rows, but never renumber them.
+/// Every reason: name, number, kind, found again, text. If the reason has a value, then its quantity, its unit and its
+/// bound follow: a configuration key, or words. Logs contain the numbers: add rows, but never renumber them.
 #define ABS_HIL_REASONS(ROW)                                                                                          \
   ROW(none, 0, none, yes, "none")                                                                                     \
-  ROW(run_started, 1, sequence, yes, "run started")                                                                   \
+  ROW(run_started, 1, sequence, yes, "run started",                                                                   \
+      "speed of the lower wheel", "rad/s", "")                                                                        \
   ROW(start_speed_given, 2, sequence, yes, "braking starts at once from the given start speed")                       \
-  ROW(speed_threshold_reached, 3, sequence, yes, "upper wheel reached its speed threshold")                           \
-  ROW(upper_wheel_peak_detected, 4, sequence, yes, "upper wheel stopped gaining speed")                               \
-  ROW(phase_duration_over, 5, sequence, yes, "phase lasted its set time")                                             \
-  ROW(end_speed_reached, 6, sequence, yes, "car speed below the experiment's end speed")                              \
+  ROW(speed_threshold_reached, 3, sequence, yes, "upper wheel reached its speed threshold",                           \
+      "speed at least", "rad/s", "the phase's until")                                                                 \
+  ROW(upper_wheel_peak_detected, 4, sequence, yes, "upper wheel stopped gaining speed",                               \
+      "time without a new maximum", "s", "the phase's until")                                                         \
+  ROW(phase_duration_over, 5, sequence, yes, "phase lasted its set time",                                             \
+      "time in the phase", "s", "the phase's until")                                                                  \
+  ROW(end_speed_reached, 6, sequence, yes, "car speed below the experiment's end speed",                              \
+      "car speed at most", "m/s", "the phase's until")                                                                \
   ROW(standstill_reached, 7, sequence, yes, "both wheels stand still")                                                \
-  ROW(sequence_complete, 8, sequence, yes, "experiment ran to its end")                                               \
-  ROW(slip_control_left_at_low_speed, 9, sequence, yes, "car speed below the least speed for slip control")           \
+  ROW(sequence_complete, 8, sequence, yes, "experiment ran to its end",                                               \
+      "run time", "s", "")                                                                                            \
+  ROW(slip_control_left_at_low_speed, 9, sequence, yes, "car speed below the least speed for slip control",           \
+      "car speed at most", "m/s", "control.v_min_m_s")                                                                \
   ROW(speed_condition_met, 20, sequence, yes, "speed reached the value that ends the phase")                          \
-  ROW(slip_condition_met, 21, sequence, yes, "slip reached the value that ends the phase")                            \
-  ROW(distance_reached, 22, sequence, yes, "car covered the distance that ends the phase")                            \
+  ROW(slip_condition_met, 21, sequence, yes, "slip reached the value that ends the phase",                            \
+      "slip", "", "the phase's until")                                                                                \
+  ROW(distance_reached, 22, sequence, yes, "car covered the distance that ends the phase",                            \
+      "distance in the phase", "m", "the phase's until")                                                              \
   ROW(all_conditions_met, 23, sequence, yes, "all conditions that end the phase hold")                                \
   ROW(interrupt_signal, 32, stop_request, no, "interrupted (SIGINT)")                                                 \
   ROW(terminate_signal, 33, stop_request, no, "terminated (SIGTERM)")                                                 \
@@ -58,17 +68,24 @@ enum class FoundAgain : std::uint8_t {
   ROW(command_out_of_range, 44, refusal, no, "command's value is out of range")                                       \
   ROW(command_malformed, 45, refusal, no, "packet does not hold a command")                                           \
   ROW(command_not_now, 46, refusal, no, "command cannot be carried out now")                                          \
-  ROW(phase_time_limit, 64, fault, yes, "phase exceeded its time limit")                                              \
-  ROW(overspeed, 65, fault, yes, "wheel speed above the limit")                                                       \
+  ROW(phase_time_limit, 64, fault, yes, "phase exceeded its time limit",                                              \
+      "time in the phase", "s", "the phase's at_most_s")                                                              \
+  ROW(overspeed, 65, fault, yes, "wheel speed above the limit",                                                       \
+      "speed", "rad/s", "gate.overspeed_rad_s")                                                                       \
   ROW(command_not_finite, 66, fault, yes, "command was not a finite number")                                          \
   ROW(estimate_not_finite, 67, fault, yes, "speed estimate was not a finite number")                                  \
   ROW(driver_read_failed, 68, fault, no, "reading the board failed")                                                  \
   ROW(driver_write_failed, 69, fault, no, "writing to the board failed")                                              \
-  ROW(board_interlock_tripped, 70, fault, yes, "the board's own interlock tripped")                                   \
-  ROW(consecutive_overruns, 71, fault, no, "too many consecutive overruns")                                           \
-  ROW(board_supply_tripped, 80, fault, yes, "the board's own interlock tripped: supply undervoltage")                 \
-  ROW(board_supply_low, 81, fault, yes, "the board's supply is below gate.supply_min_V")                              \
-  ROW(board_too_hot, 82, fault, yes, "the board is hotter than gate.temperature_max_C")                               \
+  ROW(board_interlock_tripped, 70, fault, yes, "the board's own interlock tripped",                                   \
+      "trip flags", "", "0")                                                                                          \
+  ROW(consecutive_overruns, 71, fault, no, "too many consecutive overruns",                                           \
+      "late cycles in a row", "", "realtime.max_consecutive_overruns")                                                \
+  ROW(board_supply_tripped, 80, fault, yes, "the board's own interlock tripped: supply undervoltage",                 \
+      "trip flags", "", "0")                                                                                          \
+  ROW(board_supply_low, 81, fault, yes, "the board's supply is below gate.supply_min_V",                              \
+      "supply", "V", "gate.supply_min_V")                                                                             \
+  ROW(board_too_hot, 82, fault, yes, "the board is hotter than gate.temperature_max_C",                               \
+      "temperature", "degrees Celsius", "gate.temperature_max_C")                                                     \
   ROW(can_node_silent, 100, fault, no, "CAN node missed too many answers; its watchdog sets the outputs to zero")     \
   ROW(can_frames_stale, 101, fault, no, "CAN node answers with old sequence numbers")                                 \
   ROW(can_frames_duplicated, 102, fault, no, "CAN frames arrive twice: two nodes answer, or one repeats itself")      \
@@ -95,51 +112,78 @@ enum class FoundAgain : std::uint8_t {
   ROW(usb_outputs_not_taken, 125, fault, no, "USB board does not show the duties that were sent")                     \
   ROW(usb_transfer_failed, 126, fault, no, "USB transfer failed")                                                     \
   ROW(encoder_upper_stuck, 130, fault, wheel_checks,                                                                  \
-      "upper wheel's encoder shows standstill, but the wheel must be turning")                                        \
+      "upper wheel's encoder shows standstill, but the wheel must be turning",                                        \
+      "speed by its counts", "rad/s", "what brake, tyre and the speed before permit")                                 \
   ROW(encoder_lower_stuck, 131, fault, wheel_checks,                                                                  \
-      "lower wheel's encoder shows standstill, but the wheel must be turning")                                        \
+      "lower wheel's encoder shows standstill, but the wheel must be turning",                                        \
+      "speed by its counts", "rad/s", "what motor, tyre and the speed before permit")                                 \
   ROW(encoder_upper_jumped, 132, fault, jumped_counts,                                                                \
-      "upper wheel's encoder shows speeds that the wheel cannot reach")                                               \
+      "upper wheel's encoder shows speeds that the wheel cannot reach",                                               \
+      "angle or speed by its counts", "rad or rad/s", "what brake, tyre and the speed before permit")                 \
   ROW(encoder_lower_jumped, 133, fault, jumped_counts,                                                                \
-      "lower wheel's encoder shows speeds that the wheel cannot reach")                                               \
-  ROW(encoder_upper_reversed, 134, fault, wheel_checks, "upper wheel's encoder counts backwards")                     \
-  ROW(encoder_lower_reversed, 135, fault, wheel_checks, "lower wheel's encoder counts backwards")                     \
+      "lower wheel's encoder shows speeds that the wheel cannot reach",                                               \
+      "angle or speed by its counts", "rad or rad/s", "what motor, tyre and the speed before permit")                 \
+  ROW(encoder_upper_reversed, 134, fault, wheel_checks, "upper wheel's encoder counts backwards",                     \
+      "speed by its counts", "rad/s", "0")                                                                            \
+  ROW(encoder_lower_reversed, 135, fault, wheel_checks, "lower wheel's encoder counts backwards",                     \
+      "speed by its counts", "rad/s", "0")                                                                            \
   ROW(encoders_lost, 136, fault, wheel_checks, "both encoders show standstill, but the wheels must be turning")       \
   ROW(encoders_disagree, 137, fault, wheel_checks,                                                                    \
-      "wheel speeds differ long after the brake was released: an encoder is wrong, or the tyre has little grip")      \
+      "wheel speeds differ long after the brake was released: an encoder is wrong, or the tyre has little grip",      \
+      "speed of the upper rim less that of the lower", "m/s", "that of a freely rolling tyre")                        \
   ROW(slip_implausible, 138, fault, wheel_checks,                                                                     \
-      "slip is outside the range of the tyre: the braked wheel turns faster than the other (encoders swapped?)")      \
-  ROW(samples_missing, 139, fault, wheel_checks, "no fresh measurement")                                              \
-  ROW(speed_rises_with_motor_off, 140, fault, wheel_checks, "the wheels gain speed although the motor is off")        \
-  ROW(motor_no_response, 141, fault, wheel_checks, "the motor is on, but the wheels do not gain speed")               \
-  ROW(brake_no_response, 142, fault, wheel_checks, "the brake is on, but the wheels do not lose speed")               \
+      "slip is outside the range of the tyre: the braked wheel turns faster than the other (encoders swapped?)",      \
+      "slip", "", "0")                                                                                                \
+  ROW(samples_missing, 139, fault, wheel_checks, "no fresh measurement",                                              \
+      "time without a fresh measurement", "s", "gate.sample_age_max_s")                                               \
+  ROW(speed_rises_with_motor_off, 140, fault, wheel_checks, "the wheels gain speed although the motor is off",        \
+      "momentum gained, at the rim", "kg m/s", "0")                                                                   \
+  ROW(motor_no_response, 141, fault, wheel_checks,                                                                    \
+      "the motor is on, but the wheels do not gain speed: check E-stop, drive switch and supply, then the encoders",  \
+      "momentum gained, at the rim", "kg m/s", "a part of the motor's impulse")                                       \
+  ROW(brake_no_response, 142, fault, wheel_checks, "the brake is on, but the wheels do not lose speed",               \
+      "momentum gained, at the rim", "kg m/s", "a part of the brake's impulse, below 0")                              \
   ROW(board_health_lost, 143, fault, yes, "the board no longer reports its supply or temperature")                    \
   ROW(guardian_died, 160, fault, no, "the guardian process died; the rig may not move without it")                    \
-  ROW(guardian_silent, 161, fault, no, "the guardian process gave no sign of life; the rig may not move without it")  \
+  ROW(guardian_silent, 161, fault, no, "the guardian process gave no sign of life; the rig may not move without it",  \
+      "cycles without its sign of life", "", "guardian.timeout_ms")                                                   \
   ROW(controller_died, 162, fault, no, "the controller process died")                                                 \
   ROW(controller_silent, 163, fault, no, "the controller gave no sign of life for guardian.timeout_ms")               \
   ROW(safe_state_unverified, 164, fault, no, "the controller could not verify the safe state")                        \
-  ROW(run_time_limit, 200, fault, yes, "run exceeded the experiment's time limit")                                    \
-  ROW(run_distance_limit, 201, fault, yes, "car went further than the experiment's limit")                            \
+  ROW(run_time_limit, 200, fault, yes, "run exceeded the experiment's time limit",                                    \
+      "run time", "s", "the experiment's run_time_s")                                                                 \
+  ROW(run_distance_limit, 201, fault, yes, "car went further than the experiment's limit",                            \
+      "distance", "m", "the experiment's distance_m")                                                                 \
   ROW(controller_not_finite, 210, fault, yes, "the controller's output was not a finite number")                      \
   ROW(checks_cannot_judge, 220, fault, wheel_checks,                                                                  \
       "the plausibility checks could not judge the wheels for gate.judge_within_s: readings are too slow or stale, "  \
-      "or the encoders have too few counts")                                                                          \
+      "or the encoders have too few counts",                                                                          \
+      "time without a verdict", "s", "gate.judge_within_s")                                                           \
   ROW(cycle_gap, 221, fault, no,                                                                                      \
       "no cycle ran for longer than realtime.cycle_gap_max_s while an output was on: the program was stopped, "       \
-      "frozen or kept from the processor")                                                                            \
-  ROW(computer_suspended, 222, fault, no, "the computer was suspended while an output was on")                        \
+      "frozen or kept from the processor",                                                                            \
+      "time from one cycle to the next", "s", "realtime.cycle_gap_max_s")                                             \
+  ROW(computer_suspended, 222, fault, no, "the computer was suspended while an output was on",                        \
+      "time suspended", "s", "0")                                                                                     \
   ROW(braking_without_stop, 230, fault, no,                                                                           \
-      "the experiment ran to its end, but the car was still faster than experiment.end_speed_m_s")                    \
+      "the experiment ran to its end, but the car was still faster than experiment.end_speed_m_s",                    \
+      "car speed", "m/s", "experiment.end_speed_m_s")                                                                 \
   /* the end of the rows */
 // clang-format on
 
 /// Why a phase changed, a command was refused or a run ended. These are plain numbers, so that the real-time thread
 /// needs no strings.
 enum class Reason : std::uint16_t {
-#define ABS_HIL_REASON_NUMBER(name, number, kind, found_again, text) name = number,
+#define ABS_HIL_REASON_NUMBER(name, number, ...) name = number,
   ABS_HIL_REASONS(ABS_HIL_REASON_NUMBER)
 #undef ABS_HIL_REASON_NUMBER
+};
+
+/// What the value of a reason is.
+struct ReasonValue {
+  std::string_view quantity{};  ///< empty: the reason has no value that tells a person anything
+  std::string_view unit{};
+  std::string_view bound{};  ///< what it is compared with: a configuration key, or words; empty: nothing
 };
 
 /// A row of the table.
@@ -149,11 +193,12 @@ struct ReasonRow {
   ReasonKind kind;
   FoundAgain found_again;
   std::string_view text;  ///< in words, for events, logs and summaries
+  ReasonValue value{};
 };
 
 inline constexpr std::array reasons{
-#define ABS_HIL_REASON_ROW(name, number, kind, found_again, text) \
-  ReasonRow{#name, Reason::name, ReasonKind::kind, FoundAgain::found_again, text},
+#define ABS_HIL_REASON_ROW(name, number, kind, found_again, text, ...) \
+  ReasonRow{#name, Reason::name, ReasonKind::kind, FoundAgain::found_again, text, ReasonValue{__VA_ARGS__}},
     ABS_HIL_REASONS(ABS_HIL_REASON_ROW)
 #undef ABS_HIL_REASON_ROW
 };
