@@ -207,6 +207,7 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
                         .car_speed_m_s = wheels_.r2_m * speeds_.omega2_rad_s,
                         .stands_still = stands_still_,
                         .start_given = start_given_,
+                        .wheels_sound = wheels_sound_,
                         .slip = slip_,
                         .distance_m = distance_m_});
   if (change.entered && sequence_.finished()) end_ = change;

@@ -46,6 +46,7 @@ class RunLogic final : public runtime::CycleLogic {
  public:
   explicit RunLogic(RunLogicParts parts);
 
+  void wheels_judged(bool sound) noexcept override { wheels_sound_ = sound; }
   [[nodiscard]] rig::Command step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept override;
   void commanded(const rig::Command& sent) noexcept override { commanded(sent, sent); }
   /// The same where the logic's own command did not act: a recorded one did.
@@ -118,6 +119,7 @@ class RunLogic final : public runtime::CycleLogic {
   bool start_given_{false};
   Sequence::Change end_{};
   bool stands_still_{false};
+  bool wheels_sound_{true};
   bool started_{false};
   std::int64_t start_ns_{0};
   std::int64_t last_ns_{0};

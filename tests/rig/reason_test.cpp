@@ -99,6 +99,7 @@ constexpr std::pair<std::string_view, int> published[]{
     {"safe_state_unverified", 164},
     {"run_time_limit", 200},
     {"run_distance_limit", 201},
+    {"released_wheel_stands", 223},
     {"braking_without_stop", 230},
 };
 // clang-format on

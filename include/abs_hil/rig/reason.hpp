@@ -129,6 +129,8 @@ enum class FoundAgain : std::uint8_t {
       "no cycle ran for longer than realtime.cycle_gap_max_s while an output was on: the program was stopped, "       \
       "frozen or kept from the processor")                                                                            \
   ROW(computer_suspended, 222, fault, no, "the computer was suspended while an output was on")                        \
+  ROW(released_wheel_stands, 223, fault, wheel_checks,                                                                \
+      "the upper wheel shows standstill although the brake has let go: its encoder is stuck, or the brake holds on")  \
   ROW(braking_without_stop, 230, fault, no,                                                                           \
       "the experiment ran to its end, but the car was still faster than experiment.end_speed_m_s")                    \
   /* the end of the rows */
