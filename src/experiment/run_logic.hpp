@@ -80,6 +80,7 @@ class RunLogic final : public runtime::CycleLogic {
   void estimate(const rig::Measurement& measurement, double dt_s, double stamp_error_s) noexcept;
   void note_travel(const rig::Measurement& measurement, double dt_s) noexcept;
   [[nodiscard]] bool refused(const control::SlipOutput& output, bool entered) noexcept;
+  [[nodiscard]] bool breaks(std::size_t n, double value, bool entered) noexcept;
   [[nodiscard]] double slip_control(double dt_s, bool entered, rig::ControlState& state) noexcept;
   [[nodiscard]] double wanted_torque_Nm(const PhasePlan& plan, double dt_s, bool entered,
                                         rig::ControlState& state) noexcept;
@@ -113,9 +114,10 @@ class RunLogic final : public runtime::CycleLogic {
   double target_Nm_{0.0};          ///< the static torque to send for it
   double sent_Nm_{0.0};            ///< the one that was sent, and what was missing in it
   double unsent_Nm_{0.0};
-  std::array<bool, rig::controller_signals.size()> not_given_{};  ///< signals that the controller does not give
-  bool refused_{false};                                           ///< its output was not finite
-  double bump_Nm_{0.0};                                           ///< remaining offset that keeps the torque continuous
+  std::size_t own_signal_count_;
+  std::array<bool, rig::controller_output_max> not_given_{};  ///< outputs that the controller does not give
+  bool refused_{false};                                       ///< its output was not finite
+  double bump_Nm_{0.0};                                       ///< remaining offset that keeps the torque continuous
   bool start_given_{false};
   Sequence::Change end_{};
   bool stands_still_{false};

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <thread>
 #include <utility>
 
@@ -33,8 +34,9 @@ namespace abs_hil::program {
 
 namespace {
 
-std::string reason_text(const experiment::RunOutcome& outcome, const std::string& controller) {
-  std::string text = rig::reason_text(outcome.reason, outcome.reason_value);
+std::string reason_text(const experiment::RunOutcome& outcome, const std::string& controller,
+                        std::span<const std::string> own_signals) {
+  std::string text = rig::reason_text(outcome.reason, outcome.reason_value, own_signals);
   if (outcome.reason == rig::Reason::controller_not_finite) {
     text += fmt::format(" (controller {})", controller);
   } else if (rig::is_fault(outcome.reason)) {
@@ -61,7 +63,7 @@ analysis::RunSummary summarise(const RunRequest& request, const experiment::RunS
   const config::Settings& s = request.settings;
   const std::string result = outcome.completed() ? "completed" : (rig::is_fault(outcome.reason) ? "fault" : "stopped");
   return {.result = result,
-          .reason = reason_text(outcome, s.control.controller),
+          .reason = reason_text(outcome, s.control.controller, outputs.signals()),
           .controller = s.control.controller,
           .plant = s.plant_name,
           .backend = s.backend,
@@ -234,7 +236,8 @@ int run(const RunRequest& request) {
   TimingMessages timing(request, session, late_cycles);
   outputs.attach(session);
   const auto& folder = outputs.folder();
-  RunMonitor run_monitor(request, flight_record_prefix(request, folder ? folder->path() : std::filesystem::path()));
+  RunMonitor run_monitor(request, flight_record_prefix(request, folder ? folder->path() : std::filesystem::path()),
+                         outputs.signals());
   run_monitor.attach(session);
   note_signals();
   // The signal handler knows one run. In a series in virtual time, with several runs at once, each run polls instead.

@@ -82,7 +82,7 @@ void RunOutputs::open_folder(const RunRequest& request) {
        .log_file = folder_->of(run_folder::file::log),
        .summary_file = folder_->of(run_folder::file::summary),
        .histogram_file = o.fast ? std::nullopt : std::optional(folder_->of(run_folder::file::histogram).string())});
-  events_.emplace(folder_->of(run_folder::file::events));
+  events_.emplace(folder_->of(run_folder::file::events), signals_);
 }
 
 void RunOutputs::open_stream(const RunRequest& request) {

@@ -42,6 +42,7 @@ class RunOutputs {
   /// Handles remote commands from LCM.
   void poll();
   [[nodiscard]] bool stop_requested() const { return command_listener_ && command_listener_->stop_requested(); }
+  [[nodiscard]] const std::vector<std::string>& signals() const noexcept { return signals_; }
   [[nodiscard]] analysis::Metrics metrics() const { return metrics_.metrics(); }
   /// True if the car has braked but not stopped.
   [[nodiscard]] bool moves_on() const noexcept { return metrics_.moves_on(); }

@@ -27,7 +27,8 @@ void append_number(std::string& text, double value) {
 
 }  // namespace
 
-EventCsv::EventCsv(std::filesystem::path path) : path_(std::move(path)), text_(event_csv_header) {
+EventCsv::EventCsv(std::filesystem::path path, std::vector<std::string> own_signals)
+    : path_(std::move(path)), text_(event_csv_header), detector_(std::move(own_signals)) {
   text_ += '\n';
   errno = 0;
   if (!std::ofstream(path_)) throw FileError(event_list_kind, path_, errno);
@@ -39,7 +40,7 @@ void EventCsv::consume(const rig::CycleRecord& record, double /*distance_m*/) {
   append_number(text_, record.time_s);
   text_.append(",").append(event->kind).append(",").append(rig::name_of(record.phase));
   // Quoted, because the text of a reason may contain a comma.
-  text_.append(",\"").append(rig::reason_text(record.reason, record.reason_value)).append("\",");
+  text_.append(",\"").append(event->reason).append("\",");
   append_number(text_, record.reason_value);
   text_ += '\n';
 }

@@ -18,7 +18,8 @@ inline constexpr std::string_view event_csv_header = "time_s,event,phase,reason,
 class EventCsv : public rig::RecordSink {
  public:
   /// Creates or empties the file. Throws FileError when it cannot be opened.
-  explicit EventCsv(std::filesystem::path path);
+  /// @param own_signals  names of the controller's own signals
+  explicit EventCsv(std::filesystem::path path, std::vector<std::string> own_signals = {});
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
   /// Writes the file. Throws FileError when it cannot be written.

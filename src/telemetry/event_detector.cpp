@@ -22,10 +22,11 @@ std::optional<DetectedEvent> EventDetector::observe(const rig::CycleRecord& reco
   } else {
     event.kind = phase_changed ? event_kind::phase : event_kind::limit;
   }
+  event.reason = rig::reason_text(record.reason, record.reason_value, own_signals_);
   if (phase_changed && !first) event.message.append(rig::name_of(phase_before)).append(" -> ");
   event.message.append(rig::name_of(record.phase));
   if (record.reason != rig::Reason::none) {
-    event.message.append(": ").append(rig::reason_text(record.reason, record.reason_value));
+    event.message.append(": ").append(event.reason);
   }
   // The change and its reason may be in a lost record.
   if (records_lost > 0) event.message.append(" (").append(std::to_string(records_lost)).append(" records lost before)");

@@ -91,6 +91,8 @@ MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, S
   experiment_message_.config_json = std::move(experiment.config_json);
   experiment_message_.version = std::move(experiment.version);
   signal_count_ = experiment.signals.size();
+  own_signals_ = experiment.signals;
+  detector_ = EventDetector(own_signals_);
   for (const std::string& signal : experiment.signals) {
     signals_message_.names.append(signals_message_.names.empty() ? "" : ",").append(signal);
   }
@@ -184,7 +186,7 @@ void MessageStream::send_event(std::string_view kind, rig::Reason reason, double
   event.kind = kind;
   event.phase = static_cast<std::int8_t>(latest_.phase);
   event.reason = static_cast<std::int16_t>(reason);
-  event.reason_text = rig::reason_text(reason, value);
+  event.reason_text = rig::reason_text(reason, value, own_signals_);
   event.value = value;
   event.message = std::move(message);
   send(event_, event);

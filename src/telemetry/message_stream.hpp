@@ -105,6 +105,7 @@ class MessageStream : public rig::RecordSink {
   experiment_t experiment_message_{};
   signals_t signals_message_{};
   std::size_t signal_count_{0};
+  std::vector<std::string> own_signals_;
   EventDetector detector_;
   EncodeBuffer buffer_;
   rig::CycleRecord latest_{};
