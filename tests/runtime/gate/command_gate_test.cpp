@@ -245,3 +245,17 @@ TEST_CASE("a motor that is not enabled stays disabled, and the result tells the 
   CHECK(next.fault == Reason::none);
   CHECK(next.fault_value == 0.0);
 }
+
+TEST_CASE("after a duty that the board did not take, the next rise begins at what it took and half a step of 8 bits") {
+  const double half_step = 0.5 / 255.0;
+  CommandGate gate({.motor_rate_per_s = 1.0, .brake_rate_per_s = 1.0});
+  std::ignore = gate.check({.brake_duty = 0.5}, {.phase = Phase::brake, .now_ns = 0});
+  gate.note_sent({.brake_duty = 0.2});
+  CHECK(gate.check({.brake_duty = 0.5}, {.phase = Phase::brake, .now_ns = 10 * ms}).command.brake_duty ==
+        Approx(0.2 + half_step + 0.01).epsilon(1e-9));
+  CommandGate motor({.motor_rate_per_s = 1.0, .brake_rate_per_s = 1.0});
+  std::ignore = motor.check({.motor_duty = 0.5, .motor_enable = true}, {.now_ns = 0});
+  motor.note_sent({.motor_duty = 0.2, .motor_enable = true});
+  CHECK(motor.check({.motor_duty = 0.5, .motor_enable = true}, {.now_ns = 10 * ms}).command.motor_duty ==
+        Approx(0.2 + half_step + 0.01).epsilon(1e-9));
+}

@@ -43,6 +43,15 @@ TEST_CASE("after a fault the brake holds at most its duty for the fault, motor o
   CHECK(gate.count(GateAction::refused) == 3);
 }
 
+TEST_CASE("the brake's time after a fault counts from the first command, also at time 0") {
+  CommandGate gate({.fault_brake_duty = 0.5, .fault_brake_limit_s = 0.01});
+  gate.latch(Reason::overspeed, 0.0);
+  for (const std::int64_t now_ns : {0 * ms, 5 * ms, 10 * ms}) {
+    CHECK(gate.check({.brake_duty = 0.5}, {.phase = Phase::fault, .now_ns = now_ns}).command.brake_duty == 0.5);
+  }
+  CHECK(is_safe(gate.check({.brake_duty = 0.5}, {.phase = Phase::fault, .now_ns = 10 * ms + 1}).command));
+}
+
 TEST_CASE("the brake after a fault is never above the largest duty, and only where the phase permits it") {
   CommandGate capped({.brake_duty_max = 0.3, .fault_brake_duty = 0.5});
   capped.latch(Reason::overspeed, 0.0);

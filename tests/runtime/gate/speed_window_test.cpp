@@ -245,3 +245,11 @@ TEST_CASE("a counter leaps however short the time between two measurements is") 
   CHECK(found(0, -329) == Reason::encoder_lower_jumped);
   CHECK(found(std::numeric_limits<std::int32_t>::min(), 0) == Reason::encoder_upper_jumped);
 }
+
+TEST_CASE("fast counts that are no leap complete a window") {
+  SpeedWindows maker(limits());
+  static_cast<void>(maker.update(at(1 * ms), 1 * ms, {}));
+  CHECK(maker.update(at(3 * ms, 800, -800), 3 * ms, {}).sound());
+  REQUIRE(maker.complete());
+  CHECK(maker.speed_window().omega1_rad_s == Approx(800 * rad_per_count / 0.002));
+}
