@@ -111,7 +111,8 @@ void write_record(const GuardianSetup& setup, const guardian::SharedRegion& regi
                                                      .plant = setup.launch.plant,
                                                      .backend = setup.launch.backend,
                                                      .config_json = setup.launch.config_json,
-                                                     .version = setup.launch.version},
+                                                     .version = setup.launch.version,
+                                                     .names = {.phases = {}, .signals = setup.launch.signals}},
                                                     s.telemetry.channel_prefix, problems);
   for (const auto& file : files) std::fprintf(stderr, "abs_guardian: wrote %s\n", file.c_str());
   for (const auto& problem : problems) std::fprintf(stderr, "abs_guardian: %s\n", problem.c_str());

@@ -51,11 +51,13 @@ class RunMetrics final : public rig::RecordSink {
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
   [[nodiscard]] Metrics metrics() const noexcept;
-  /// True once the stop is known and braking is over: later records change no metric.
-  /// True if the car has braked but not stopped so far.
+  /// True if the car has braked but not stopped so far, or moves again after a stop.
   [[nodiscard]] bool moves_on() const noexcept {
-    return !std::isnan(metrics_.brake_start_s) && std::isnan(metrics().stop_time_s);
+    if (std::isnan(metrics_.brake_start_s)) return false;
+    const bool again = !std::isnan(metrics_.stop_time_s) && metrics_.final_speed_m_s >= end_speed_m_s_;
+    return again || std::isnan(metrics().stop_time_s);
   }
+  /// True once the stop is known and braking is over: later records change no metric.
   [[nodiscard]] bool complete() const noexcept { return !braking_ && !std::isnan(metrics_.stop_time_s); }
 
  private:

@@ -72,7 +72,8 @@ RunLogic::RunLogic(RunLogicParts parts)
       sequence_(std::move(parts.sequence)),
       upper_(parts.control.observer, parts.rig.encoder_counts_per_rev, fastest_change_rad_s2(parts).upper),
       lower_(parts.control.observer, parts.rig.encoder_counts_per_rev, fastest_change_rad_s2(parts).lower),
-      actuator_(parts.rig.brake, parts.ideal_actuator, parts.max_brake_duty, parts.duty_steps) {}
+      actuator_(parts.rig.brake, parts.ideal_actuator, parts.max_brake_duty, parts.duty_steps),
+      own_signal_count_(std::min(controller_->signals().size(), rig::signal_max)) {}
 
 runtime::GateOptions RunLogic::on_grid(runtime::GateOptions options) const noexcept {
   options.motor_duty_max = rig::duty_at_most(options.motor_duty_max, duty_steps_);
@@ -148,18 +149,28 @@ double RunLogic::slip_control(double dt_s, bool begins, rig::ControlState& state
   return asked_Nm_;
 }
 
-/// Checks a controller's whole output before anything uses it. The torque must be finite. The other signals may be NaN
-/// if they were NaN when the controller began: it does not
-/// give them.
+/// True for an output that is no number, unless the controller does not give it. Ends the run then.
+inline bool RunLogic::breaks(std::size_t n, double value, bool begins) noexcept {
+  if (begins) not_given_[n] = n != 0 && std::isnan(value);
+  if (std::isfinite(value) || (not_given_[n] && std::isnan(value))) return false;
+  sequence_.end_early(rig::Reason::controller_not_finite, static_cast<double>(n));
+  refused_ = true;
+  return true;
+}
+
+/// Checks a controller's whole output before anything uses it. The torque must be finite. The others, its own signals
+/// too, may be NaN if they were NaN when the controller began: it does not give them.
 bool RunLogic::refused(const control::SlipOutput& output, bool begins) noexcept {
-  const std::array<double, rig::controller_signals.size()> signals{
+  const std::array<double, rig::controller_signals.size()> outputs{
       output.brake_torque_Nm, output.slip_velocity_error_m_s, output.theta_est_N, output.slip_ref};
-  for (std::size_t n = 0; n < signals.size(); ++n) {
-    if (begins) not_given_[n] = n != 0 && std::isnan(signals[n]);
-    if (std::isfinite(signals[n]) || (not_given_[n] && std::isnan(signals[n]))) continue;
-    sequence_.end_early(rig::Reason::controller_not_finite, static_cast<double>(n));
-    refused_ = true;
-    return true;
+  for (std::size_t n = 0; n < outputs.size(); ++n) {
+    if (breaks(n, outputs[n], begins)) return true;
+  }
+  double sum = 0.0;  // finite only if all are, and all but certainly if they are
+  for (std::size_t n = 0; n < own_signal_count_; ++n) sum += output.signals[n];
+  if (std::isfinite(sum) && !begins) return false;
+  for (std::size_t n = 0; n < own_signal_count_; ++n) {
+    if (breaks(outputs.size() + n, output.signals[n], begins)) return true;
   }
   return false;
 }
@@ -210,6 +221,7 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
                         .car_speed_m_s = wheels_.r2_m * speeds_.omega2_rad_s,
                         .stands_still = stands_still_,
                         .start_given = start_given_,
+                        .wheels_sound = wheels_sound_,
                         .slip = slip_,
                         .distance_m = distance_m_});
   if (change.entered && sequence_.finished()) end_ = change;

@@ -47,6 +47,7 @@ class RunLogic final : public runtime::CycleLogic {
  public:
   explicit RunLogic(RunLogicParts parts);
 
+  void wheels_judged(bool sound) noexcept override { wheels_sound_ = sound; }
   [[nodiscard]] rig::Command step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept override;
   void commanded(const rig::Command& sent) noexcept override { commanded(sent, sent); }
   /// The same where the logic's own command did not act: a recorded one did.
@@ -80,6 +81,7 @@ class RunLogic final : public runtime::CycleLogic {
   void estimate(const rig::Measurement& measurement, double dt_s, double stamp_error_s) noexcept;
   void note_travel(const rig::Measurement& measurement, double dt_s) noexcept;
   [[nodiscard]] bool refused(const control::SlipOutput& output, bool begins) noexcept;
+  [[nodiscard]] bool breaks(std::size_t n, double value, bool begins) noexcept;
   [[nodiscard]] double slip_control(double dt_s, bool begins, rig::ControlState& state) noexcept;
   [[nodiscard]] double wanted_torque_Nm(const PhasePlan& plan, double dt_s, bool begins,
                                         rig::ControlState& state) noexcept;
@@ -114,12 +116,14 @@ class RunLogic final : public runtime::CycleLogic {
   double sent_Nm_{0.0};            ///< the one that was sent, and what was missing in it
   double unsent_Nm_{0.0};
   bool in_slip_control_{false};  ///< the phase of the latest cycle used the slip controller
-  std::array<bool, rig::controller_signals.size()> not_given_{};  ///< signals that the controller does not give
-  bool refused_{false};                                           ///< its output was not finite
-  double bump_Nm_{0.0};                                           ///< remaining offset that keeps the torque continuous
+  std::size_t own_signal_count_;
+  std::array<bool, rig::controller_output_max> not_given_{};  ///< outputs that the controller does not give
+  bool refused_{false};                                       ///< its output was not finite
+  double bump_Nm_{0.0};                                       ///< remaining offset that keeps the torque continuous
   bool start_given_{false};
   Sequence::Change end_{};
   bool stands_still_{false};
+  bool wheels_sound_{true};
   bool started_{false};
   std::int64_t start_ns_{0};
   std::int64_t last_ns_{0};

@@ -206,9 +206,11 @@ Sequence::Change Sequence::advance(const SequenceInput& input) noexcept {
     return {true, rig::Reason::run_started, input.speeds.omega2_rad_s};
   }
   if (const EndCondition* condition = ending(input)) {
-    if (index_ + 1 == plans_.size()) return end(rig::Phase::stopped, rig::Reason::sequence_complete, input.time_s);
-    enter(index_ + 1, input);
-    return {true, condition->reason, condition->value};
+    if (index_ + 1 < plans_.size()) {
+      enter(index_ + 1, input);
+      return {true, condition->reason, condition->value};
+    }
+    if (input.wheels_sound) return end(rig::Phase::stopped, rig::Reason::sequence_complete, input.time_s);
   }
   if (input.time_s > limits_.run_time_s) return fault(rig::Reason::run_time_limit, input.time_s, input);
   if (input.distance_m > limits_.distance_m) return fault(rig::Reason::run_distance_limit, input.distance_m, input);

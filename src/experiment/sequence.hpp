@@ -91,6 +91,7 @@ struct SequenceInput {
   double car_speed_m_s{0.0};
   bool stands_still{false};
   bool start_given{false};  ///< a start command has arrived
+  bool wheels_sound{true};  ///< nothing speaks against the speeds; the last phase ends only then
   double slip{0.0};
   double distance_m{0.0};  ///< distance of the car since the run began
 };

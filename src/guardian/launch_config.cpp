@@ -9,7 +9,8 @@ std::string to_json(const LaunchConfig& config) {
   return nlohmann::json{{"config_json", config.config_json}, {"experiment", config.experiment},
                         {"controller", config.controller},   {"plant", config.plant},
                         {"backend", config.backend},         {"version", config.version},
-                        {"realtime", config.realtime},       {"record_prefix", config.record_prefix}}
+                        {"realtime", config.realtime},       {"record_prefix", config.record_prefix},
+                        {"signals", config.signals}}
       .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
@@ -21,6 +22,7 @@ LaunchConfig parse_launch_config(const std::string& json) try {
           .plant = object.at("plant"),
           .backend = object.at("backend"),
           .version = object.at("version"),
+          .signals = object.at("signals"),
           .realtime = object.at("realtime"),
           .record_prefix = object.at("record_prefix")};
 } catch (const nlohmann::json::exception& error) {

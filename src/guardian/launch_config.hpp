@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace abs_hil::guardian {
 
@@ -12,8 +13,9 @@ struct LaunchConfig {
   std::string plant{};
   std::string backend{};
   std::string version{};
-  std::string realtime{};       ///< "require", "prefer" or "off"
-  std::string record_prefix{};  ///< path prefix of the files that the guardian writes; empty: it writes none
+  std::vector<std::string> signals{};  ///< names of the controller's own signals, for the flight recorder's files
+  std::string realtime{};              ///< "require", "prefer" or "off"
+  std::string record_prefix{};         ///< path prefix of the files that the guardian writes; empty: it writes none
 };
 
 [[nodiscard]] std::string to_json(const LaunchConfig& config);

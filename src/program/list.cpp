@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <vector>
 
 #include "abs_hil/control/registry.hpp"
 #include "config/config_file.hpp"
@@ -16,6 +17,17 @@ namespace abs_hil::program {
 namespace {
 
 void print(std::string_view name, std::string_view summary) { fmt::print("  {:<20}{}\n", name, summary); }
+
+/// The controllers' own signals. They may depend on options, which are the defaults here.
+void list_signals() {
+  const config::Settings settings;
+  fmt::print("signals (of a controller's own, beside the quantities of every run)\n");
+  for (const auto& entry : control::controllers()) {
+    const auto controller = control::make_controller(entry.name, {settings.control, settings.model});
+    const std::vector<std::string> names = rig::signal_names(controller->signals());
+    if (!names.empty()) print(entry.name, fmt::format("{}", fmt::join(names, ", ")));
+  }
+}
 
 std::string value_of(const config::Key& key) {
   return std::visit([](const auto* value) { return fmt::format("{}", *value); }, key.target);
@@ -58,6 +70,7 @@ int list(bool keys) {
   for (const auto& entry : driver::backends()) print(entry.name, entry.summary);
   fmt::print("boards (driver.kind of backend rig; none is verified on hardware)\n");
   for (const auto& entry : driver::boards()) print(entry.name, entry.summary);
+  list_signals();
   return exit_completed;
 }
 

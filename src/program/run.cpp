@@ -8,6 +8,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <thread>
 #include <utility>
 
@@ -34,11 +35,12 @@ namespace abs_hil::program {
 
 namespace {
 
-std::string reason_text(const experiment::RunOutcome& outcome, const config::Settings& s) {
-  std::string text = rig::reason_text(outcome.reason, outcome.reason_value);
+std::string reason_text(const experiment::RunOutcome& outcome, const config::Settings& s,
+                        std::span<const std::string> own_signals) {
+  std::string text = rig::reason_text(outcome.reason, outcome.reason_value, own_signals);
   if (rig::is_fault(outcome.reason)) {
     const std::string bound = config::number_text(s, rig::row_of(outcome.reason).value.bound);
-    text = rig::reason_with_value(outcome.reason, outcome.reason_value, bound);
+    text = rig::reason_with_value(outcome.reason, outcome.reason_value, own_signals, bound);
   }
   if (outcome.reason == rig::Reason::controller_not_finite) {
     text += fmt::format(" (controller {})", s.control.controller);
@@ -64,7 +66,7 @@ analysis::RunSummary summarise(const RunRequest& request, const experiment::RunS
   const config::Settings& s = request.settings;
   const std::string result = outcome.completed() ? "completed" : (rig::is_fault(outcome.reason) ? "fault" : "stopped");
   return {.result = result,
-          .reason = reason_text(outcome, s),
+          .reason = reason_text(outcome, s, outputs.names().signals),
           .controller = s.control.controller,
           .plant = s.plant_name,
           .backend = s.backend,
@@ -234,7 +236,8 @@ int run(const RunRequest& request) {
   TimingMessages timing(request, session, late_cycles);
   outputs.attach(session);
   const auto& folder = outputs.folder();
-  RunMonitor run_monitor(request, flight_record_prefix(request, folder ? folder->path() : std::filesystem::path()));
+  RunMonitor run_monitor(request, flight_record_prefix(request, folder ? folder->path() : std::filesystem::path()),
+                         outputs.names());
   run_monitor.attach(session);
   note_signals();
   // The signal handler knows one run. In a series in virtual time, with several runs at once, each run polls instead.

@@ -41,7 +41,8 @@ bool needs_guardian(const RunRequest& request) {
   return request.settings.backend == "rig" && !request.outputs.fast && request.settings.guardian.enabled;
 }
 
-std::string guardian_launch_json(const RunRequest& request, const std::filesystem::path& record_prefix) {
+std::string guardian_launch_json(const RunRequest& request, const std::filesystem::path& record_prefix,
+                                 const std::vector<std::string>& signals) {
   const config::Settings& s = request.settings;
   return to_json(guardian::LaunchConfig{.config_json = request.config_json,
                                         .experiment = s.experiment.name,
@@ -49,17 +50,20 @@ std::string guardian_launch_json(const RunRequest& request, const std::filesyste
                                         .plant = s.plant_name,
                                         .backend = s.backend,
                                         .version = ABS_HIL_VERSION,
+                                        .signals = signals,
                                         .realtime = name_of(s.realtime.mode),
                                         .record_prefix = record_prefix.string()});
 }
 
-RunMonitor::RunMonitor(const RunRequest& request, std::filesystem::path record_prefix)
-    : record_prefix_(std::move(record_prefix)),
+RunMonitor::RunMonitor(const RunRequest& request, std::filesystem::path record_prefix, rig::RunNames names)
+    : names_(std::move(names)),
+      record_prefix_(std::move(record_prefix)),
       region_(runtime::FlightRing::slots_for(recorded_s, request.settings.control.rate_Hz)),
       heartbeat_(region_.panel(), region_.recorder(),
                  needs_guardian(request) ? silent_cycles_max(request.settings) : 0) {
   if (!needs_guardian(request)) return;
-  guardian_.emplace(region_, guardian::guardian_program(), guardian_launch_json(request, record_prefix_));
+  guardian_.emplace(region_, guardian::guardian_program(),
+                    guardian_launch_json(request, record_prefix_, names_.signals));
 }
 
 void RunMonitor::attach(experiment::RunSession& session) {
@@ -95,7 +99,8 @@ void RunMonitor::write_record(const RunRequest& request, rig::Reason reason, dou
        .plant = s.plant_name,
        .backend = s.backend,
        .config_json = request.config_json,
-       .version = ABS_HIL_VERSION},
+       .version = ABS_HIL_VERSION,
+       .names = names_},
       s.telemetry.channel_prefix, problems);
   if (!files.empty()) spdlog::info("flight record: {}", files.front().string());
   for (const std::string& problem : problems) spdlog::error("flight record: {}", problem);

@@ -15,14 +15,15 @@ namespace abs_hil::program {
 [[nodiscard]] bool needs_guardian(const RunRequest& request);
 
 /// The launch configuration of the run's guardian, as JSON.
-[[nodiscard]] std::string guardian_launch_json(const RunRequest& request, const std::filesystem::path& record_prefix);
+[[nodiscard]] std::string guardian_launch_json(const RunRequest& request, const std::filesystem::path& record_prefix,
+                                               const std::vector<std::string>& signals = {});
 
 /// Monitors a run: it keeps the flight record of every run, and starts the guardian for a run in real time on a board.
 class RunMonitor {
  public:
   /// @param record_prefix  path and first part of the names of files that are written after a fault; empty: none
   /// Throws config::ConfigError if no shared memory can be had.
-  RunMonitor(const RunRequest& request, std::filesystem::path record_prefix);
+  RunMonitor(const RunRequest& request, std::filesystem::path record_prefix, rig::RunNames names = {});
 
   /// Attaches the monitor to the session, which must not run after this object is destroyed.
   void attach(experiment::RunSession& session);
@@ -35,6 +36,7 @@ class RunMonitor {
   void end();
 
  private:
+  rig::RunNames names_;
   std::filesystem::path record_prefix_;
   guardian::SharedRegion region_;
   std::optional<guardian::GuardianProcess> guardian_;

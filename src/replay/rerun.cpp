@@ -136,6 +136,7 @@ class RecordedActuation final : public runtime::CycleLogic {
  public:
   RecordedActuation(experiment::RunLogic& logic, const RecordedRun& run) : logic_(logic), run_(run) {}
 
+  void wheels_judged(bool sound) noexcept override { logic_.wheels_judged(sound); }
   [[nodiscard]] rig::Command step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept override {
     cycle_ = record.sequence;
     return logic_.step(measurement, record);

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <charconv>
+#include <span>
 #include <string>
 
 #include "abs_hil/rig/reason.hpp"
@@ -10,16 +11,20 @@
 namespace abs_hil::rig {
 
 /// A reason in words, with the name of what its value stands for if the value is an index. Not real-time safe.
-[[nodiscard]] inline std::string reason_text(Reason reason, double value) {
+/// @param own_signals  names of the controller's own signals, if known
+[[nodiscard]] inline std::string reason_text(Reason reason, double value,
+                                             std::span<const std::string> own_signals = {}) {
   std::string text(description(reason));
-  if (reason == Reason::controller_not_finite) text.append(": ").append(controller_signal(value));
+  if (reason == Reason::controller_not_finite) text.append(": ").append(controller_signal(value, own_signals));
   return text;
 }
 
-/// The same with the value, its unit and its bound behind: "... (speed 203.1 rad/s; bound gate.overspeed_rad_s)".
+/// The same with the value, its unit and its bound behind: "... (speed 203.1 rad/s; bound: gate.overspeed_rad_s)".
 /// @param bound_value  the bound's own value as text, if the caller knows it: "200"
-[[nodiscard]] inline std::string reason_with_value(Reason reason, double value, const std::string& bound_value = {}) {
-  std::string text = reason_text(reason, value);
+[[nodiscard]] inline std::string reason_with_value(Reason reason, double value,
+                                                   std::span<const std::string> own_signals = {},
+                                                   const std::string& bound_value = {}) {
+  std::string text = reason_text(reason, value, own_signals);
   const ReasonValue& facts = row_of(reason).value;
   if (facts.quantity.empty()) return text;
   std::array<char, 32> digits{};

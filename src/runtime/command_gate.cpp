@@ -53,8 +53,8 @@ rig::GateCounts CommandGate::counts() const noexcept {
   return counts;
 }
 
-bool CommandGate::check_measurement(const rig::Measurement& measurement, std::int64_t now_ns,
-                                    std::int64_t reading_ns) noexcept {
+[[gnu::flatten]] bool CommandGate::check_measurement(const rig::Measurement& measurement, std::int64_t now_ns,
+                                                     std::int64_t reading_ns) noexcept {
   check_board(measurement);
   if (checks_wheels_) check_wheels(measurement, now_ns, reading_ns);
   return speed_windows_.usable();

@@ -62,6 +62,11 @@ class CommandGate {
   /// @param reading_ns duration of the reading, which began at `now_ns`: the counters were latched within it
   bool check_measurement(const rig::Measurement& measurement, std::int64_t now_ns,
                          std::int64_t reading_ns = 0) noexcept;
+  /// False while the checks of the wheels doubt the readings, or a verdict is due. True if the gate does not check
+  /// them.
+  [[nodiscard]] bool wheels_sound() const noexcept {
+    return !checks_wheels_ || (!speed_windows_.overdue() && !encoders_.doubtful());
+  }
   [[nodiscard]] GateResult check(const rig::Command& wanted, const GateInput& input) noexcept;
   /// Tells what the driver made of the command of the last `check`. Until then the gate takes the command itself as
   /// sent.

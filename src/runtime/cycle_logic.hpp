@@ -16,6 +16,9 @@ class CycleLogic {
   CycleLogic& operator=(const CycleLogic&) = delete;
   virtual ~CycleLogic() = default;
 
+  /// Tells, before `step`, whether the checks of the wheels are free of doubt about the measurement. While they doubt
+  /// it, or a verdict is due, a run does not count as complete.
+  virtual void wheels_judged(bool sound) noexcept = 0;
   /// One cycle: takes the measurement, fills `record.phase`, `.reason`, `.reason_value` and `.control`, and returns the
   /// command wanted. A pure function of the measurements so far.
   [[nodiscard]] virtual rig::Command step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept = 0;

@@ -112,6 +112,7 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   }
   if (gate_.fault() != rig::Reason::none) logic_.end_early(gate_.fault(), gate_.fault_value());
   if (const rig::Reason barring = gate_.brake_barred_by(); barring != rig::Reason::none) logic_.end_early(barring, 0.0);
+  logic_.wheels_judged(gate_.wheels_sound());
   const rig::Command wanted = logic_.step(measurement_, record);
   driver_.note_phase(record.phase);
   const GateResult gated = gate_.check(wanted, {record.control.speeds_est, record.phase, woken_ns});

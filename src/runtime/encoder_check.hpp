@@ -49,11 +49,14 @@ class EncoderCheck {
   explicit EncoderCheck(const PlausibilityLimits& limits) noexcept;
 
   CheckResult update(const SpeedWindow& speed_window) noexcept;
+  /// True if one of the latest speeds was outside what its wheel can reach.
+  [[nodiscard]] bool doubtful() const noexcept { return upper_.doubtful() || lower_.doubtful(); }
   /// Brake torque expected from the map (7) and the lag (6), N m.
   [[nodiscard]] double brake_torque_Nm() const noexcept { return brake_Nm_; }
 
  private:
   [[nodiscard]] CheckResult judge_speeds(const SpeedWindow& speed_window) noexcept;
+  [[nodiscard]] CheckResult judge_standing(const SpeedWindow& speed_window) noexcept;
   [[nodiscard]] CheckResult judge_rolling(const SpeedWindow& speed_window) noexcept;
   [[nodiscard]] CheckResult judge_slip(const SpeedWindow& speed_window) noexcept;
 
@@ -61,8 +64,10 @@ class EncoderCheck {
   SpeedInterval upper_;
   SpeedInterval lower_;
   double brake_Nm_{0.0};
-  double free_s_;         ///< time since the brake was released
-  double braked_s_{0.0};  ///< time with a brake torque of at least 1 N m
+  double free_s_;             ///< time since the brake was released
+  double braked_s_{0.0};      ///< time with a brake torque of at least 1 N m
+  double standing_s_{0.0};    ///< time for which the upper wheel has stood still although the tyre must spin it up
+  double standing_rad_{0.0};  ///< its way in this time
   Travelled disagreeing_{};
   double allowed_m_{0.0};  ///< by how much the ways may differ while `disagreeing_`
   Travelled ahead_{};      ///< while the braked wheel is faster than the lower one

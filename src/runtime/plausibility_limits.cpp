@@ -9,6 +9,8 @@ namespace abs_hil::runtime {
 
 PlausibilityLimits plausibility_limits(const rig::RigParameters& rig, bool ideal_actuator, const GateOptions& options) {
   constexpr double margin = 2.0;
+  // The least grip is a quarter of theta, and a tyre that slides gives at least half of its peak force.
+  constexpr double least_sliding_part = 0.125;
   const rig::WheelParameters& w = rig.wheels;
   const double tyre_N = rig.tyre.theta_N;
   const double brake_Nm =
@@ -21,6 +23,7 @@ PlausibilityLimits plausibility_limits(const rig::RigParameters& rig, bool ideal
           .upper_loss_rad_s2 = margin * (w.r1_m * tyre_N + brake_Nm + friction1_Nm) / w.J1_kg_m2,
           .lower_gain_rad_s2 = margin * (w.r2_m * tyre_N + rig.motor.stall_torque_Nm) / w.J2_kg_m2,
           .lower_loss_rad_s2 = margin * (w.r2_m * tyre_N + friction2_Nm) / w.J2_kg_m2,
+          .released_brake_Nm = least_sliding_part * w.r1_m * tyre_N,
           .overspeed_rad_s = options.overspeed_rad_s,
           .sample_age_max_s = options.sample_age_max_s,
           .free_slip_max = options.free_slip_max,

@@ -14,6 +14,7 @@ struct PlausibilityLimits {
   double upper_loss_rad_s2{0.0};  ///< fastest loss: tyre, full brake and friction; infinite with an ideal actuator
   double lower_gain_rad_s2{0.0};  ///< tyre and motor
   double lower_loss_rad_s2{0.0};  ///< tyre and friction
+  double released_brake_Nm{0.0};  ///< brake torque with which a sliding tyre spins up a standing upper wheel
   double overspeed_rad_s{0.0};
   double sample_age_max_s{0.0};
   double free_slip_max{0.0};

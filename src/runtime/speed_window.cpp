@@ -23,14 +23,17 @@ constexpr double resolution_counts = 2.0;
 /// Added to the time since the previous measurement: no counter moves faster than twice the overspeed in this time.
 constexpr double leap_slack_s = 1e-3;
 
-bool leaps(std::int32_t before, std::int32_t now, double most_counts) noexcept {
-  return std::abs(static_cast<double>(rig::counts_between(before, now))) > most_counts;
+/// True for |travel| > most, also for the travel that has no negative counterpart.
+bool beyond(std::int32_t travel, std::int32_t most) noexcept {
+  const auto range = static_cast<std::uint32_t>(most);
+  return static_cast<std::uint32_t>(travel) + range > 2U * range;
 }
 }  // namespace
 
 SpeedWindows::SpeedWindows(const PlausibilityLimits& limits) noexcept
     : limits_(limits),
       most_counts_per_s_(limits.enabled ? 2.0 * limits.overspeed_rad_s / limits.rad_per_count : 0.0),
+      sure_counts_(static_cast<std::int32_t>(resolution_counts + most_counts_per_s_ * leap_slack_s)),
       resolving_ns_(static_cast<std::int64_t>(resolution_counts * limits.rad_per_count / resolution_max_rad_s *
                                               static_cast<double>(rig::ns_per_s))) {}
 
@@ -52,6 +55,15 @@ bool SpeedWindows::fresh(std::int64_t stamp_ns, std::int64_t now_ns) noexcept {
   stale_cycles_ = 0;
   fresh_ns_ = now_ns;
   return true;
+}
+
+[[gnu::cold]] CheckResult SpeedWindows::leaps(std::int32_t upper_travel, std::int32_t lower_travel,
+                                              double since_s) const noexcept {
+  const double most_counts = resolution_counts + most_counts_per_s_ * (since_s + leap_slack_s);
+  const auto leap = [&](std::int32_t travel) { return std::abs(static_cast<double>(travel)) > most_counts; };
+  if (leap(upper_travel)) return {rig::Reason::encoder_upper_jumped, upper_travel * limits_.rad_per_count};
+  if (leap(lower_travel)) return {rig::Reason::encoder_lower_jumped, lower_travel * limits_.rad_per_count};
+  return {};
 }
 
 CheckResult SpeedWindows::update(const rig::Measurement& measurement, std::int64_t now_ns, const rig::Command& sent,
@@ -79,15 +91,13 @@ CheckResult SpeedWindows::update(const rig::Measurement& measurement, std::int64
       limits_.ideal_actuator ? sent.brake_torque_Nm : rig::brake_torque_at(limits_.brake, sent.brake_duty);
   brake_impulse_Nms_ += brake_Nm * since_s;
   motor_duty_s_ += sent.motor_duty * since_s;
-  const double errors_s = static_cast<double>(error_before_ns + stamp_error_ns_) * rig::s_per_ns;
-  const double most_counts = resolution_counts + most_counts_per_s_ * (since_s + errors_s + leap_slack_s);
-  const bool upper_leaps = leaps(upper_before, upper_, most_counts);
-  usable_ = !upper_leaps && !leaps(lower_before, lower_, most_counts);
-  if (!usable_) {
-    const std::int32_t leapt =
-        upper_leaps ? rig::counts_between(upper_before, upper_) : rig::counts_between(lower_before, lower_);
-    return {upper_leaps ? rig::Reason::encoder_upper_jumped : rig::Reason::encoder_lower_jumped,
-            leapt * limits_.rad_per_count};
+  const std::int32_t upper_travel = rig::counts_between(upper_before, upper_);
+  const std::int32_t lower_travel = rig::counts_between(lower_before, lower_);
+  if (beyond(upper_travel, sure_counts_) || beyond(lower_travel, sure_counts_)) {
+    const double errors_s = static_cast<double>(error_before_ns + stamp_error_ns_) * rig::s_per_ns;
+    const CheckResult leap = leaps(upper_travel, lower_travel, since_s + errors_s);
+    usable_ = leap.sound();
+    if (!usable_) return leap;
   }
 
   const std::int64_t dt_ns = measurement.time_ns - begin_ns_;

@@ -53,10 +53,13 @@ class SpeedWindows {
 
  private:
   [[nodiscard]] bool fresh(std::int64_t stamp_ns, std::int64_t now_ns) noexcept;
+  /// The fault if a counter has moved faster than any wheel can, in `since_s` and the slack.
+  [[nodiscard]] CheckResult leaps(std::int32_t upper_travel, std::int32_t lower_travel, double since_s) const noexcept;
   void begin(const rig::Measurement& measurement) noexcept;
 
   PlausibilityLimits limits_;
   double most_counts_per_s_;   ///< of a counter that does not leap
+  std::int32_t sure_counts_;   ///< a travel of so many counts is no leap, however short its time
   std::int64_t resolving_ns_;  ///< shortest window whose counts resolve a speed
   bool started_{false};
   bool usable_{true};

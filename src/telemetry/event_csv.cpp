@@ -40,7 +40,7 @@ void EventCsv::consume(const rig::CycleRecord& record, double /*distance_m*/) {
   append_number(text_, record.time_s);
   text_.append(",").append(event->kind).append(",").append(rig::name_of(record.phase));
   // Quoted, because the text of a reason may contain a comma.
-  text_.append(",\"").append(rig::reason_text(record.reason, record.reason_value)).append("\",");
+  text_.append(",\"").append(event->reason).append("\",");
   append_number(text_, record.reason_value);
   text_.append(",").append(names_.phase_of(record)) += '\n';
 }

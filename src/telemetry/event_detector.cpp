@@ -17,6 +17,7 @@ std::optional<DetectedEvent> EventDetector::observe(const rig::CycleRecord& reco
 
   DetectedEvent event;
   event.phase_changed = phase_changed;
+  event.reason = rig::reason_text(record.reason, record.reason_value, names_.signals);
   if (rig::is_fault(record.reason) || (phase_changed && record.phase == rig::Phase::fault)) {
     event.kind = event_kind::fault;
   } else {
@@ -29,8 +30,8 @@ std::optional<DetectedEvent> EventDetector::observe(const rig::CycleRecord& reco
   event.message.append(phase_name_);
   if (record.reason != rig::Reason::none) {
     event.message.append(": ").append(rig::is_fault(record.reason)
-                                          ? rig::reason_with_value(record.reason, record.reason_value)
-                                          : rig::reason_text(record.reason, record.reason_value));
+                                          ? rig::reason_with_value(record.reason, record.reason_value, names_.signals)
+                                          : event.reason);
   }
   // The change and its reason may be in a lost record.
   if (records_lost > 0) event.message.append(" (").append(std::to_string(records_lost)).append(" records lost before)");

@@ -23,6 +23,7 @@ inline constexpr std::string_view command = "command";
 struct DetectedEvent {
   std::string_view kind;
   std::string message;  ///< for people, one line
+  std::string reason;   ///< the record's reason in words
   bool phase_changed{false};
 };
 

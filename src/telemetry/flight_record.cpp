@@ -36,7 +36,7 @@ std::string extra_columns(const rig::CycleRecord& r) {
   add_number(row, r.reason_value);
   add_number(row, rig::in_us(r.timing.wakeup_latency_ns));
   add_number(row, rig::in_us(r.timing.cycle_ns));
-  return row + '\n';
+  return row;
 }
 
 void write_text(const std::filesystem::path& path, const std::string& text, std::string_view kind) {
@@ -47,13 +47,19 @@ void write_text(const std::filesystem::path& path, const std::string& text, std:
   if (!file) throw FileError(kind, path, errno != 0 ? errno : EIO);
 }
 
-void write_csv(const std::filesystem::path& path, const FlightRecord& record) {
+void write_csv(const std::filesystem::path& path, const FlightRecord& record, const rig::RunNames& names) {
   std::string text(csv_header);
-  text.append(flight_csv_extra_header).append("\n");
+  text.append(",").append(phase_name_column).append(flight_csv_extra_header);
+  for (const std::string& signal : names.signals) text.append(",").append(signal);
+  text += '\n';
+  // The controller's own signals come last here.
+  const rig::RunNames phases{.phases = names.phases};
   char row[csv_row_max_bytes];
   for (const rig::CycleRecord& r : record.records) {
-    text.append(row, format_csv_row(r, rig::unknown, row) - 1);  // without its line end
+    text.append(row, format_csv_row(r, rig::unknown, row, phases) - 1);  // without its line end
     text += extra_columns(r);
+    for (std::size_t n = 0; n < names.signals.size(); ++n) add_number(text, r.control.signals.at(n));
+    text += '\n';
   }
   write_text(path, text, "flight record");
 }
@@ -90,11 +96,11 @@ std::vector<std::filesystem::path> write_flight_record(const std::filesystem::pa
   attempt(".txt", [&](const auto& path) {
     write_text(path,
                "reason " + std::to_string(static_cast<int>(record.reason)) + ": " +
-                   rig::reason_with_value(record.reason, record.reason_value) + '\n' + record.account +
-                   std::to_string(record.records.size()) + " cycles recorded\n",
+                   rig::reason_with_value(record.reason, record.reason_value, experiment.names.signals) + '\n' +
+                   record.account + std::to_string(record.records.size()) + " cycles recorded\n",
                "flight record");
   });
-  attempt(".csv", [&](const auto& path) { write_csv(path, record); });
+  attempt(".csv", [&](const auto& path) { write_csv(path, record, experiment.names); });
   attempt(".lcmlog", [&](const auto& path) { write_log(path, record, experiment, channel_prefix); });
   return written;
 }

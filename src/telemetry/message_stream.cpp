@@ -186,7 +186,7 @@ void MessageStream::send_event(std::string_view kind, rig::Reason reason, double
   event.kind = kind;
   event.phase = static_cast<std::int8_t>(latest_.phase);
   event.reason = static_cast<std::int16_t>(reason);
-  event.reason_text = rig::reason_text(reason, value);
+  event.reason_text = rig::reason_text(reason, value, names_.signals);
   event.value = value;
   event.message = std::move(message);
   send(event_, event);

@@ -171,3 +171,25 @@ TEST_CASE("a sequence that ends a little above the end speed has its stop where 
   CHECK(std::isnan(brake_to(0.33, rig::Phase::fault).stop_time_s));
   CHECK(std::isnan(brake_to(0.33, rig::Phase::brake).stop_time_s));
 }
+
+TEST_CASE("a car that moves again after its stop has not stopped") {
+  RunMetrics metrics(0.1, 0.3);
+  double time_s = 0.0;
+  const auto at = [&](rig::Phase phase, double speed_m_s) {
+    rig::CycleRecord record;
+    record.time_s = time_s += 1e-3;
+    record.phase = phase;
+    record.control.speeds_est = {0.0, speed_m_s / 0.1};
+    metrics.consume(record, 0.0);
+  };
+  at(rig::Phase::accelerate, 5.0);
+  CHECK_FALSE(metrics.moves_on());  // it has not braked
+  at(rig::Phase::brake, 5.0);
+  CHECK(metrics.moves_on());
+  at(rig::Phase::brake, 0.29);
+  CHECK_FALSE(metrics.moves_on());
+  at(rig::Phase::stopped, 4.0);
+  CHECK(metrics.moves_on());
+  at(rig::Phase::stopped, 0.0);
+  CHECK_FALSE(metrics.moves_on());
+}

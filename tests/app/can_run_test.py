@@ -50,6 +50,26 @@ class CanRun(CanTest):
             self.assertEqual(node.wire(), SAFE)
             node.end()
 
+    def test_at_500_kbit_s_the_checks_judge(self):
+        """The emulated bus has no bit rate. Each read takes the time that its frames need on the bus (docs/can.md, "Bus
+        load"): SYNC and up to three answers."""
+        read = f'any@read:slow={(75 + 3 * 135) / 500:.3f}ms'
+        for fault, reason in ((None, None), ('brake@encoder_lower:stuck+0.2s', 'lower wheel'),
+                              ('brake@encoder_upper:stuck+0.2s', 'upper wheel'),
+                              ('brake@encoder_lower:wrong=-1', 'counts backwards')):
+            with self.subTest(fault):
+                node = self.node('--lock-step', '--start-speed', 60)
+                summary = self.folder / 'summary.json'
+                result = self.lock_step(node, '--rate', 500, '--set', 'experiment.cut_speed_rad_s=120', '--inject', read,
+                                        *(('--inject', fault) if fault else ()), '--summary', summary)
+                self.assertEqual(result.returncode, 1 if fault else 0, result.stderr)
+                found = self.summary(summary)
+                self.assertLess(found['checks_unjudged'], 0.9)
+                if fault:
+                    self.assertIn(reason, found['reason'])
+                self.assertEqual(node.wire(), SAFE)
+                node.end()
+
     def test_lock_step_repeats_to_the_byte(self):
         runs = []
         for name in ('a', 'b'):

@@ -131,6 +131,16 @@ class Outputs(ProgramTest):
         self.assertEqual([int(line.split()[0]) for line in lines[1:]], [row['number'] for row in rows])
         self.assertEqual(self.run_program('list', '--json').returncode, 2)
 
+    def test_the_signals_of_each_controller_are_listed(self):
+        section = self.run_program('list').stdout.split('signals (')[1].splitlines()[1:]
+        names = dict(line.split(maxsplit=1) for line in section)
+        for controller in ('adaptive', 'pi'):
+            path = self.folder / f'{controller}.csv'
+            self.fast('--controller', controller, '--csv', path)
+            own = [names[controller]] if controller in names else []
+            self.assertEqual(path.read_text().splitlines()[0].replace(',', ', '), ', '.join([HEADER.replace(',', ', '), *own]))
+        self.assertIn('adaptive', names)
+
     def test_a_wrong_argument_points_to_the_help_of_its_command(self):
         for command, arguments in (('abs_hil', ['--bogus']), ('abs_hil list', ['list', '--bogus'])):
             result = self.run_program(*arguments)

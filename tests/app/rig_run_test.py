@@ -47,6 +47,21 @@ class RigRun(RigTest):
         self.assertEqual(refused.returncode, 2, refused.stderr)
         self.assertIn('model.theta_N', refused.stderr)
 
+    def test_replay_of_runs_whose_commands_the_board_did_not_take(self):
+        log = self.folder / 'rig.lcmlog'
+        for fault, reason in (('accelerate@write:off+0.1s', 'write'), ('brake@write:off+0.1s', 'write'),
+                              ('brake@write:intermittent+0.1s', 'write'), ('brake@write:stuck+0.1s', ''),
+                              ('brake@brake_pwm:off+0.1s', 'brake')):
+            with self.subTest(fault):
+                emulator = self.emulator('--lock-step', '--start-speed', 60)
+                result = self.lock_step(emulator, '--set', 'experiment.cut_speed_rad_s=70', '--inject', fault, '--log', log)
+                self.assertEqual(result.returncode, 1, result.stderr)
+                self.assertIn(reason, result.stderr.splitlines()[-1])
+                emulator.end()
+                replayed = self.run_program('replay', log, '--check')
+                self.assertEqual(replayed.returncode, 0, replayed.stdout + replayed.stderr)
+                self.assertIn('bit-equal', replayed.stdout)
+
     def test_lock_step_repeats_to_the_byte(self):
         runs = []
         for name in ('a', 'b'):

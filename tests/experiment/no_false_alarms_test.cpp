@@ -9,6 +9,7 @@
 #include "config/key_table.hpp"
 #include "config/library.hpp"
 #include "config/plan.hpp"
+#include "injected_run.hpp"
 #include "simulated_run.hpp"
 #include "study/simulated_run.hpp"
 #include "study/variation.hpp"
@@ -82,6 +83,23 @@ TEST_CASE("ideal sensors and actuators, other seeds and other encoders trip no c
     }
     s.plant.rig.encoder_counts_per_rev = 4096;
     for (s.seed = 2; s.seed < 6; ++s.seed) CHECK(end_of(s) == rig::Reason::sequence_complete);
+  }
+}
+
+TEST_CASE("reads that take most of a period trip no check") {
+  for (const std::string& plant : plants) {
+    for (const auto& controller : control::controllers()) {
+      for (const double rate_Hz : {100.0, 250.0, 1000.0, 10'000.0}) {
+        for (const double share : {0.4, 0.55, 0.7, 0.95}) {
+          CAPTURE(plant, controller.name, rate_Hz, share);
+          config::Settings s = configured(plant, "paper", controller.name, rate_Hz);
+          s.experiment.start_speed_rad_s = 170.0;
+          const test::Setup setup{s.plant, s.control, s.experiment, s.gate};
+          CHECK(test::run_injected(setup, {test::slow_reads(share, rate_Hz)}).outcome.reason ==
+                rig::Reason::sequence_complete);
+        }
+      }
+    }
   }
 }
 

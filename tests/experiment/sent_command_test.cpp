@@ -1,9 +1,12 @@
 // What is sent is not what is wanted: steps of the PWM, dead zone, limits; and outputs that are no numbers.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <span>
+#include <string>
 
 #include "abs_hil/rig/brake_map.hpp"
 #include "catch.hpp"
@@ -172,4 +175,53 @@ TEST_CASE("an output of the controller that is no number ends the run before it 
       }
     }
   }
+}
+
+namespace {
+
+/// Reports two signals of its own. One of them takes another value after 0.2 s.
+class Reporting final : public control::SlipController {
+ public:
+  Reporting(double first, double later) : first_{first}, later_{later} {}
+  void reset(const control::SlipInput&) noexcept override { time_s_ = 0.0; }
+  [[nodiscard]] control::SlipOutput step(const control::SlipInput& input) noexcept override {
+    time_s_ += input.dt_s;
+    control::SlipOutput output{.brake_torque_Nm = 1.0};
+    output.signals[0] = 1.0;
+    output.signals[1] = time_s_ > 0.2 ? later_ : first_;
+    output.signals[2] = rig::unknown;  // not one of its signals
+    return output;
+  }
+  [[nodiscard]] std::span<const rig::Signal> signals() const noexcept override {
+    static constexpr std::array<rig::Signal, 2> mine{{{"one_m", "m"}, {"two_m", "m"}}};
+    return mine;
+  }
+
+ private:
+  double first_;
+  double later_;
+  double time_s_{0.0};
+};
+
+}  // namespace
+
+TEST_CASE("a signal of the controller's own that becomes no number ends the run, with its name") {
+  const double infinity = std::numeric_limits<double>::infinity();
+  const auto outcome = [](double first, double later) {
+    return run(
+               braking("adaptive"), [] { return rig::Reason::none; }, std::make_unique<Reporting>(first, later))
+        .outcome;
+  };
+  const std::array<std::string, 2> names{"one_m", "two_m"};
+  for (const double broken : {rig::unknown, infinity, -infinity}) {
+    const RunOutcome ended = outcome(2.0, broken);
+    CHECK(ended.reason == rig::Reason::controller_not_finite);
+    CHECK(rig::controller_signal(ended.reason_value, names) == "two_m");
+    CHECK(rig::controller_signal(ended.reason_value) == "own signal 2");
+  }
+  CHECK(outcome(infinity, infinity).reason == rig::Reason::controller_not_finite);
+  // Unknown from the first cycle on, and known later: no fault.
+  CHECK(outcome(rig::unknown, rig::unknown).reason != rig::Reason::controller_not_finite);
+  CHECK(outcome(rig::unknown, 2.0).reason != rig::Reason::controller_not_finite);
+  CHECK(rig::controller_signal(99.0, names).empty());
 }

@@ -313,3 +313,21 @@ TEST_CASE("plans that could never end are refused") {
   CHECK_THROWS_AS(Sequence({{.phase = Phase::idle, .ends_on = {{EndKind::duration, 1.0, Reason::none}}}}),
                   std::invalid_argument);
 }
+
+TEST_CASE("a run is not complete while the checks of the wheels doubt the speeds") {
+  Sequence sequence = two_phases({EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached});
+  const auto doubted = [](double time_s, double omega1_rad_s = 0.0) {
+    SequenceInput input = at(time_s, omega1_rad_s);
+    input.wheels_sound = false;
+    return input;
+  };
+  static_cast<void>(sequence.update(doubted(0.0)));
+  static_cast<void>(sequence.update(doubted(0.1, 100.0)));
+  CHECK(sequence.update(doubted(0.2, 100.0)).entered);  // other phases end
+  CHECK_FALSE(sequence.update(doubted(1.3)).entered);
+  CHECK_FALSE(sequence.update(doubted(1.5)).entered);
+  Sequence doubted_for_long = sequence;
+  CHECK(sequence.update(at(1.6)).reason == Reason::sequence_complete);
+  CHECK(sequence.finished());
+  CHECK(doubted_for_long.update(doubted(2.3)).reason == Reason::phase_time_limit);
+}

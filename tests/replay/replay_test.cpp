@@ -29,6 +29,38 @@ struct Recipe {
   std::uint32_t decimation{1};
   rig::Reason stop{rig::Reason::none};
   std::int64_t measured_late_ns{0};  ///< like a board that reads its counters after the wake-up
+  int loses_every{0};                ///< a board that ignores every Nth command; 0: a simulated rig
+};
+
+/// Like a board that takes a command now and then not, and goes on with the one before.
+class LosesCommands final : public driver::RigDriver {
+ public:
+  LosesCommands(std::unique_ptr<driver::RigDriver> rig, int every) : rig_(std::move(rig)), every_(every) {}
+  ~LosesCommands() override { static_cast<void>(deactivate()); }
+  [[nodiscard]] std::string_view name() const noexcept override { return rig_->name(); }
+  [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
+    return rig_->as_sent(command);
+  }
+
+ private:
+  void do_configure() override { rig_->configure(); }
+  void do_activate(std::int64_t now_ns) override { rig_->activate(now_ns); }
+  driver::IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override {
+    return rig_->read(now_ns, measurement);
+  }
+  driver::IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override {
+    sent = last_;
+    if (every_ != 0 && ++writes_ % every_ == 0) return {};
+    const driver::IoResult result = rig_->write(command, sent);
+    last_ = sent;
+    return result;
+  }
+  driver::IoResult do_make_safe() noexcept override { return rig_->deactivate(); }
+
+  std::unique_ptr<driver::RigDriver> rig_;
+  int every_;
+  int writes_{0};
+  rig::Command last_{};
 };
 
 /// Passes records on with a later time of measurement, like a board.
@@ -53,6 +85,11 @@ void record_run(const std::filesystem::path& path, const Recipe& recipe) {
   config::load_file(config::plant_file(s.plant_name), keys, config::Tables::of_plant);
   keys.set_text("experiment.start_speed_rad_s=100", "test");
   for (const std::string& assignment : recipe.assignments) keys.set_text(assignment, "test");
+  if (recipe.loses_every != 0) {
+    s.backend = "rig";
+    s.model = s.plant.rig;
+    keys.leave_out_plant();
+  }
   telemetry::LogOutlet log(path, 0);
   telemetry::MessageStream stream(
       {.telemetry_every_cycles = recipe.decimation},
@@ -61,10 +98,12 @@ void record_run(const std::filesystem::path& path, const Recipe& recipe) {
   LateMeasurement late(stream, recipe.measured_late_ns);
   runtime::VirtualClock clock;
   driver::InjectingDriver driver(
-      std::make_unique<driver::SimDriver>(s.plant,
-                                          driver::SimStart{.seed = static_cast<std::uint64_t>(s.seed),
-                                                           .start_speed_rad_s = s.experiment.start_speed_rad_s,
-                                                           .pwm_mode = driver::pwm_mode_named(s.driver.sim.pwm_mode)}),
+      std::make_unique<LosesCommands>(
+          std::make_unique<driver::SimDriver>(
+              s.plant, driver::SimStart{.seed = static_cast<std::uint64_t>(s.seed),
+                                        .start_speed_rad_s = s.experiment.start_speed_rad_s,
+                                        .pwm_mode = driver::pwm_mode_named(s.driver.sim.pwm_mode)}),
+          recipe.loses_every),
       driver::parse_injections(s.inject), static_cast<std::uint64_t>(s.seed),
       [&clock](std::int64_t duration_ns) { clock.sleep_until(clock.now_ns() + duration_ns); });
   experiment::RunLogicParts parts = experiment::make_logic_parts(s.control, s.plant.rig, s.plant.ideal_actuator, s.gate,
@@ -110,6 +149,21 @@ TEST_CASE("runs with ideal sensors, ideal actuator, faults and stop requests are
     record_run(scratch / "run.lcmlog", recipe);
     const CheckResult result = check(read_run(scratch / "run.lcmlog"));
     INFO(result.lines.back());
+    CHECK(result.equal);
+  }
+}
+
+TEST_CASE("runs on a board that did not take every command are reproduced") {
+  const TemporaryFolder scratch;
+  for (const char* controller : {"adaptive", "pi", "sliding-mode"}) {
+    INFO(controller);
+    record_run(scratch / "run.lcmlog",
+               {.assignments = {std::string("control.controller=") + controller, "gate.brake_duty_max=0.7"},
+                .loses_every = 5});
+    const RecordedRun run = read_run(scratch / "run.lcmlog");
+    CHECK(run.cycles.size() > 500);
+    const CheckResult result = check(run);
+    INFO(result.lines.front());
     CHECK(result.equal);
   }
 }

@@ -100,6 +100,7 @@ constexpr std::pair<std::string_view, int> published[]{
     {"safe_state_unverified", 164},
     {"run_time_limit", 200},
     {"run_distance_limit", 201},
+    {"released_wheel_stands", 223},
     {"braking_without_stop", 230},
 };
 // clang-format on
@@ -129,7 +130,7 @@ TEST_CASE("a number without a row says so, and is a fault from 64 on") {
 TEST_CASE("a fault's value comes with quantity, unit and bound") {
   CHECK(reason_with_value(Reason::overspeed, 203.14) ==
         "wheel speed above the limit (speed 203.14 rad/s; bound: gate.overspeed_rad_s)");
-  CHECK(reason_with_value(Reason::overspeed, 203.14, "200") ==
+  CHECK(reason_with_value(Reason::overspeed, 203.14, {}, "200") ==
         "wheel speed above the limit (speed 203.14 rad/s; bound: gate.overspeed_rad_s = 200)");
   CHECK(reason_with_value(Reason::guardian_died, 0.0) == description(Reason::guardian_died));
   for (const ReasonRow& row : reasons) {

@@ -157,3 +157,10 @@ TEST_CASE("the monotonic clock never wakes early and returns at once for the pas
   }
   clock.sleep_until(0);
 }
+
+TEST_CASE("the logic learns in each cycle whether the checks of the wheels are free of doubt") {
+  Bench bench;  // its gate does not check the wheels
+  CHECK_FALSE(bench.logic.wheels_sound);
+  bench.cycle();
+  CHECK(bench.logic.wheels_sound);
+}

@@ -90,6 +90,7 @@ class ScriptedLogic final : public CycleLogic {
  public:
   explicit ScriptedLogic(ScriptedClock& clock) : clock_(clock) {}
 
+  void wheels_judged(bool sound) noexcept override { wheels_sound = sound; }
   [[nodiscard]] rig::Command step(const rig::Measurement&, rig::CycleRecord& record) noexcept override {
     clock_.pass(script.control_ns);
     finished_ = ended_by != rig::Reason::none;
@@ -108,6 +109,7 @@ class ScriptedLogic final : public CycleLogic {
   CycleScript script{};
   rig::Command wanted{.brake_duty = 0.5};
   rig::Command last{};
+  bool wheels_sound{false};
   rig::Reason ended_by{rig::Reason::none};
   double ended_value{0.0};
 

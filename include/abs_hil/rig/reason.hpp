@@ -165,6 +165,9 @@ enum class FoundAgain : std::uint8_t {
       "time from one cycle to the next", "s", "realtime.cycle_gap_max_s")                                             \
   ROW(computer_suspended, 222, fault, no, "the computer was suspended while an output was on",                        \
       "time suspended", "s", "0")                                                                                     \
+  ROW(released_wheel_stands, 223, fault, wheel_checks,                                                                \
+      "the upper wheel shows standstill although the brake has let go: its encoder is stuck, or the brake holds on",  \
+      "time at standstill", "s", "what a tyre with little grip needs to turn it")
   ROW(braking_without_stop, 230, fault, no,                                                                           \
       "the experiment ran to its end, but the car was still faster than experiment.end_speed_m_s",                    \
       "car speed", "m/s", "experiment.end_speed_m_s")                                                                 \

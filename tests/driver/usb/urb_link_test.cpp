@@ -1,5 +1,4 @@
-// Frames as URBs, and each of their errors, with a stand-in for the kernel's usbfs. The kernel's own USB is in the test
-// vm_usb.
+// Frames as URBs, with a stand-in for the kernel's usbfs. The kernel's own USB is in the test vm_usb.
 
 #include "driver/usb/urb_link.hpp"
 
@@ -8,69 +7,19 @@
 
 #include <cerrno>
 
-#include "abs_hil/driver/io_result.hpp"
 #include "catch.hpp"
-#include "diagnosis/fake_system.hpp"
-#include "usbfs_stand_in.hpp"
+#include "urb_bench.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::driver::usb;
-using abs_hil::diagnosis::test::FakeSystem;
+using namespace abs_hil::driver::usb::test_bench;
 using Catch::Matchers::Contains;
 using driver::IoError;
 using driver::IoResult;
 using driver::Unavailable;
-using test::UsbfsStandIn;
-
-namespace {
-
-constexpr std::int64_t ms = 1'000'000;
-
-/// A stand-in whose device has the FPGA's interface, and one of its JTAG before it.
-struct Bench {
-  explicit Bench(std::uint8_t alternate = 0) {
-    put_settings({{.number = 0, .endpoints = {{0x06}, {0x88}}},
-                  {.number = 1, .alternate = alternate, .endpoints = {{endpoint_out}, {endpoint_in}}}});
-    const std::string folder = "usb/1-1.4/";
-    system.put(folder + "idVendor", "04b4").put(folder + "idProduct", "1003").put(folder + "manufacturer", "InTeCo");
-    system.put(folder + "serial", "77").put(folder + "busnum", "1").put(folder + "devnum", "12");
-    system.put(folder + "product", "RT-DAC/USB2 emulator in lock-step").put(folder + "bConfigurationValue", "1");
-  }
-  void put_settings(const std::vector<UsbfsStandIn::Setting>& settings) {
-    usb.descriptors = UsbfsStandIn::descriptors_of(1, settings);
-  }
-  [[nodiscard]] UsbOptions options() const {
-    return {.sysfs_root = (system.root() / "usb").string(), .device_root = (system.root() / "dev").string()};
-  }
-  [[nodiscard]] UsbDevice device() const { return find_boards(options()).at(0); }
-  FakeSystem system{};
-  UsbfsStandIn usb{};
-};
-
-/// A link, and a frame's whole way with it.
-struct OpenBench : Bench {
-  UrbLink link{device(), usb};
-};
-
-Frame frame_of(std::uint8_t value) {
-  Frame frame{};
-  frame.fill(value);
-  return frame;
-}
-
-std::vector<std::uint8_t> bytes_of(std::span<const std::uint8_t> bytes) { return {bytes.begin(), bytes.end()}; }
-
-IoResult received(UrbLink& link, std::vector<std::uint8_t>& bytes, std::int64_t timeout_ns = 0) {
-  std::span<const std::uint8_t> view;
-  const IoResult result = link.receive(timeout_ns, view);
-  bytes = bytes_of(view);
-  return result;
-}
-
-}  // namespace
 
 TEST_CASE("The interface with both of the FPGA's endpoints is claimed, and everything is released") {
-  Bench bench;
+  UrbBench bench;
   {
     const UrbLink link(bench.device(), bench.usb);
     CHECK(bench.usb.claimed == std::vector{1U});
@@ -79,13 +28,13 @@ TEST_CASE("The interface with both of the FPGA's endpoints is claimed, and every
   CHECK(bench.usb.claimed.empty());
   CHECK(bench.usb.open_files == 0);
 
-  Bench other(3);
+  UrbBench other(3);
   const UrbLink link(other.device(), other.usb);
   CHECK(other.usb.chosen_settings == std::vector{3U});
 }
 
 TEST_CASE("A device that cannot be opened is refused with its name and the cause; nothing stays open") {
-  Bench bench(1);
+  UrbBench bench(1);
   auto& usb = bench.usb;
   const auto refusal = [&]() -> std::string {
     try {
@@ -142,7 +91,7 @@ TEST_CASE("A device that cannot be opened is refused with its name and the cause
 }
 
 TEST_CASE("Frames reach the board in their order; one too many is refused, not queued") {
-  OpenBench bench;
+  OpenUrbBench bench;
   UsbfsStandIn& usb = bench.usb;
   UrbLink& link = bench.link;
   usb.takes = false;
@@ -161,7 +110,7 @@ TEST_CASE("Frames reach the board in their order; one too many is refused, not q
 }
 
 TEST_CASE("A request's answer arrives completely, with any length") {
-  OpenBench bench;
+  OpenUrbBench bench;
   UsbfsStandIn& usb = bench.usb;
   UrbLink& link = bench.link;
   std::vector<std::uint8_t> bytes;
@@ -182,7 +131,7 @@ TEST_CASE("A request's answer arrives completely, with any length") {
 }
 
 TEST_CASE("Waiting ends at its time, to the nanosecond, however often it is interrupted; an answer ends it at once") {
-  OpenBench bench;
+  OpenUrbBench bench;
   UsbfsStandIn& usb = bench.usb;
   UrbLink& link = bench.link;
   std::vector<std::uint8_t> bytes;
@@ -211,7 +160,7 @@ TEST_CASE("Waiting ends at its time, to the nanosecond, however often it is inte
 }
 
 TEST_CASE("A cycle makes three submissions, at most two reaps for each, and two waits") {
-  OpenBench bench;
+  OpenUrbBench bench;
   UsbfsStandIn& usb = bench.usb;
   UrbLink& link = bench.link;
   usb.takes = false;
@@ -246,7 +195,7 @@ TEST_CASE("The next call returns the result of a frame, once") {
         Case{-ENOENT, IoError::no_answer, 0}, Case{-ECONNRESET, IoError::no_answer, 0},
         Case{-ETIME, IoError::transfer_failed, ETIME}, Case{-EPROTO, IoError::transfer_failed, EPROTO}}) {
     INFO("status " << c.status);
-    OpenBench bench;
+    OpenUrbBench bench;
     UsbfsStandIn& usb = bench.usb;
     UrbLink& link = bench.link;
     usb.out_status = c.status;
@@ -284,111 +233,8 @@ TEST_CASE("The next call returns the result of a frame, once") {
   }
 }
 
-TEST_CASE("A transfer that the kernel refuses has its error at once, and its slot stays free") {
-  struct Case {
-    int error;
-    IoError expected;
-    int errno_value;
-  };
-  for (const Case& c : {Case{-ENODEV, IoError::disconnected, ENODEV}, Case{-EPIPE, IoError::stalled, EPIPE},
-                        Case{-ETIMEDOUT, IoError::no_answer, 0}, Case{-EBUSY, IoError::no_answer, 0},
-                        Case{-ENOMEM, IoError::transfer_failed, ENOMEM},
-                        // Of a submission, not of a cancelled transfer: the endpoint does not exist.
-                        Case{-ENOENT, IoError::transfer_failed, ENOENT}}) {
-    INFO("error " << c.error);
-    OpenBench bench;
-    bench.usb.submit_error = c.error;
-    for (int i = 0; i < 5; ++i) {
-      const IoResult told = bench.link.send(frame_of(1));
-      CHECK(told.error == c.expected);
-      CHECK(told.errno_value == c.errno_value);
-    }
-    CHECK(bench.link.request().error == c.expected);
-    CHECK_FALSE(bench.link.answer_outstanding());
-    bench.usb.submit_error = 0;
-    CHECK(bench.link.send(frame_of(2)).ok());
-    CHECK(bench.link.request().ok());
-  }
-}
-
-TEST_CASE("A board that is unplugged ends every wait, whether or not the kernel has ended the transfers yet") {
-  OpenBench bench;
-  UsbfsStandIn& usb = bench.usb;
-  UrbLink& link = bench.link;
-  const bool transfers_end = GENERATE(true, false);
-  usb.takes = GENERATE(true, false);
-  usb.waiting = [&](std::int64_t /*timeout_ns*/) {
-    usb.unplug(transfers_end);
-    return 1000;
-  };
-  const std::int64_t started_ns = usb.time_ns;
-  std::vector<std::uint8_t> bytes;
-  CHECK(link.send(frame_of(1)).ok());
-  CHECK(link.request().ok());
-  const IoResult result = received(link, bytes, 1000 * ms);
-  CHECK(result.error == IoError::disconnected);
-  CHECK(result.errno_value == ENODEV);
-  CHECK(link.send(frame_of(2)).error == IoError::disconnected);
-  CHECK(link.flush(1000 * ms).ok());  // each failure is returned once
-  link.recover();
-  CHECK(link.request().error == IoError::disconnected);
-  CHECK_FALSE(link.answer_outstanding());
-  CHECK(usb.time_ns - started_ns == 1000);
-}
-
-TEST_CASE("Recovery cancels queued transfers, clears both stalls and drops the board's old answers") {
-  OpenBench bench;
-  UsbfsStandIn& usb = bench.usb;
-  UrbLink& link = bench.link;
-  usb.takes = false;
-  CHECK(link.send(frame_of(1)).ok());
-  CHECK(link.request().ok());
-  usb.takes = true;
-  usb.answers = {{1}, {2}};
-  // The frame under way is cancelled: only the answers asked for before are still to come.
-  link.recover();
-  CHECK(usb.under_way.empty());
-  CHECK(usb.cleared_halts == std::vector<unsigned>{endpoint_out, endpoint_in});
-  CHECK(usb.answers.empty());
-  CHECK_FALSE(link.answer_outstanding());
-
-  std::vector<std::uint8_t> bytes;
-  CHECK(link.request().ok());
-  usb.answers = {{3}};
-  CHECK(received(link, bytes).ok());
-  CHECK(bytes == std::vector<std::uint8_t>{3});
-
-  // Recovery ends although the board goes on sending, and at once if the board is gone.
-  usb.answers.assign(9, {4});
-  link.recover();
-  CHECK(usb.answers.size() == 5);
-  usb.submit_error = -ENODEV;
-  link.recover();
-  CHECK(usb.answers.size() == 5);
-}
-
-TEST_CASE("Recovery gives up on transfers that the kernel does not cancel") {
-  OpenBench bench;
-  UsbfsStandIn& usb = bench.usb;
-  UrbLink& link = bench.link;
-  usb.takes = false;
-  for (int i = 0; i < 3; ++i) CHECK(link.send(frame_of(1)).ok());
-  CHECK(link.request().ok());
-  usb.discard_error = -EIO;
-  const std::int64_t started_ns = usb.time_ns;
-  link.recover();
-  CHECK(usb.time_ns - started_ns == 2000 * ms);  // a second before the stalls are cleared, one after it
-  CHECK(link.send(frame_of(2)).error == IoError::no_answer);
-  // They may still end.
-  usb.takes = true;
-  usb.answers = {{1}};
-  CHECK(link.flush(0).ok());
-  CHECK_FALSE(link.answer_outstanding());
-  CHECK(link.request().ok());
-}
-
 TEST_CASE("A board opened in lock-step has the emulator's time, and its control requests their errors") {
-  Bench bench;
+  UrbBench bench;
   {
     const Board board = open_board(bench.options(), true, true, bench.usb);
     CHECK(board.place == "04b4:1003 serial 77 at 1-1.4");

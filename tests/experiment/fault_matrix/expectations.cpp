@@ -17,6 +17,7 @@ constexpr double overruns_s = 0.160;   ///< 50 late cycles of 3 ms
 constexpr double encoder_s = 0.25;     ///< an encoder that does not follow its wheel, from rest too
 constexpr double lost_counts_s = 0.5;  ///< an encoder that follows its wheel intermittently
 constexpr double response_s = 0.5;     ///< an output that does not follow its command
+constexpr double held_s = 0.7;         ///< a brake that holds on: until the wheel has locked, and a quarter second
 constexpr double random_s = 5.0;       ///< random outputs: until they contradict the command
 constexpr double half_motor_s = 20.0;  ///< a motor at half duty still works; other effects show in braking
 
@@ -131,11 +132,11 @@ Expectation brake(const driver::Injection& injection) {
     case InjectionKind::off:
     case InjectionKind::wrong: return {{Reason::brake_no_response}, late, response_s};
     case InjectionKind::stuck:
-      // It stays on from the start of braking: the rig stops with a locked wheel.
-      return {{Reason::brake_no_response}, !before(*injection.phase, Phase::brake), response_s};
+      // From the start of braking it stays on: the wheel locks, and stands although the controller releases the brake.
+      return {{Reason::brake_no_response, Reason::released_wheel_stands}, late, held_s};
     case InjectionKind::garbage:
       return {{Reason::brake_no_response, Reason::motor_no_response, Reason::encoder_upper_stuck,
-               Reason::encoders_disagree},
+               Reason::released_wheel_stands, Reason::encoders_disagree},
               !before(*injection.phase, Phase::coast),
               random_s};
     default: return {{Reason::brake_no_response}, true, response_s};
@@ -149,14 +150,15 @@ Expectation write(Backend backend, const driver::Injection& injection) {
     case InjectionKind::intermittent: return {{Reason::driver_write_failed}, false, 0.03};
     case InjectionKind::slow: return {{Reason::consecutive_overruns}, false, overruns_s};
     case InjectionKind::stuck:
-      return {{Reason::motor_no_response, Reason::brake_no_response, Reason::speed_rises_with_motor_off},
-              !before(*injection.phase, Phase::brake),
-              response_s};
+      return {{Reason::motor_no_response, Reason::brake_no_response, Reason::speed_rises_with_motor_off,
+               Reason::released_wheel_stands},
+              late,
+              held_s};
     case InjectionKind::wrong:
       return {{Reason::brake_no_response}, late, before(*injection.phase, Phase::coast) ? half_motor_s : response_s};
     case InjectionKind::garbage:
       return {{Reason::motor_no_response, Reason::brake_no_response, Reason::speed_rises_with_motor_off,
-               Reason::encoder_upper_stuck, Reason::encoders_disagree},
+               Reason::encoder_upper_stuck, Reason::released_wheel_stands, Reason::encoders_disagree},
               // Capped at 0.7 as on the card, a random brake acts roughly like the commanded one.
               late || (backend == Backend::card && !before(*injection.phase, Phase::coast)),
               random_s};

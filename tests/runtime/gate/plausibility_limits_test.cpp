@@ -20,6 +20,7 @@ TEST_CASE("the bounds are twice what the rig's torques do to its inertias") {
   CHECK(l.upper_loss_rad_s2 == Approx(2.0 * (2.2885 + 9.03 + 0.0316976) / 7.54e-3));
   CHECK(l.lower_gain_rad_s2 == Approx(2.0 * (2.277 + 2.1122) / 25.6e-3));
   CHECK(l.lower_loss_rad_s2 == Approx(2.0 * (2.277 + 0.1440232) / 25.6e-3));
+  CHECK(l.released_brake_Nm == Approx(2.2885 / 8.0));
   CHECK(l.rad_per_count == Approx(6.283185307 / 4096.0));
   CHECK(l.overspeed_rad_s == 240.0);
   CHECK(l.sample_age_max_s == 0.03);

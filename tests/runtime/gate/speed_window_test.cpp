@@ -1,5 +1,7 @@
 #include "runtime/speed_window.hpp"
 
+#include <limits>
+
 #include "catch.hpp"
 
 using namespace abs_hil;
@@ -227,4 +229,27 @@ TEST_CASE("a stale measurement is not used") {
   CHECK(maker.overdue());
   static_cast<void>(maker.update(at(12 * ms), 12 * ms, {}));
   CHECK(maker.usable());
+}
+
+TEST_CASE("a counter leaps however short the time between two measurements is") {
+  // 500 rad/s over 1 ms and 1 ns: 0.5 rad, 325.95 counts, and two counts.
+  const auto found = [](std::int32_t upper, std::int32_t lower) {
+    SpeedWindows maker(limits());
+    static_cast<void>(maker.update(at(1 * ms), 1 * ms, {}));
+    return maker.update(at(1 * ms + 1, upper, lower), 1 * ms + 1, {}).reason;
+  };
+  CHECK(found(327, -327) == Reason::none);
+  CHECK(found(329, 0) == Reason::encoder_upper_jumped);
+  CHECK(found(-329, 0) == Reason::encoder_upper_jumped);
+  CHECK(found(0, 329) == Reason::encoder_lower_jumped);
+  CHECK(found(0, -329) == Reason::encoder_lower_jumped);
+  CHECK(found(std::numeric_limits<std::int32_t>::min(), 0) == Reason::encoder_upper_jumped);
+}
+
+TEST_CASE("fast counts that are no leap complete a window") {
+  SpeedWindows maker(limits());
+  static_cast<void>(maker.update(at(1 * ms), 1 * ms, {}));
+  CHECK(maker.update(at(3 * ms, 800, -800), 3 * ms, {}).sound());
+  REQUIRE(maker.complete());
+  CHECK(maker.speed_window().omega1_rad_s == Approx(800 * rad_per_count / 0.002));
 }

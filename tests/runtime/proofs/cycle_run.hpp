@@ -15,6 +15,7 @@ class PlantedLogic final : public CycleLogic {
   PlantedLogic(CycleLogic& inner, Offence offence, int in_cycle)
       : inner_(inner), offence_(offence), cycles_left_(in_cycle) {}
 
+  void wheels_judged(bool sound) noexcept override { inner_.wheels_judged(sound); }
   [[nodiscard]] rig::Command step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept override {
     if (offence_ != nullptr && cycles_left_-- == 0) offence_();
     return inner_.step(measurement, record);

@@ -1,0 +1,49 @@
+#include "program/compare_command.hpp"
+
+#include "program/run_arguments.hpp"
+
+namespace abs_hil::program {
+
+cli::Parser add_compare(cli::Parser& parser, CompareOptions& o) {
+  cli::Parser compare = parser.add_subcommand("compare", "compare controllers in simulation on the same varied plants");
+  compare.add({.names = "--plant", .to = &o.run.plant, .help = "plant by name or TOML file", .type = "NAME|FILE"});
+  compare.add({.names = "--model",
+               .to = &o.run.model,
+               .help = "every controller's model (default: the plant, before it varies)",
+               .type = "NAME|FILE"});
+  compare.add({.names = "--controllers",
+               .to = &o.controllers,
+               .help = "controllers, the first one the baseline: NAME, NAME{key=value,...}, a TOML file, each with "
+                       "LABEL= before it if you like; or all",
+               .type = "A,B,...",
+               .show_default = true});
+  compare.add({.names = "--repeat",
+               .to = &o.repeat,
+               .help = "runs of each controller",
+               .type = "N",
+               .range = {1, 1'000'000},
+               .show_default = true});
+  compare.add(
+      {.names = "--seed", .to = &o.seed, .help = "seed of the varied plants", .type = "N", .show_default = true});
+  compare.add({.names = "--vary",
+               .to = &o.vary,
+               .help = "what varies: parameters (wheels, brake, tyre), theta, radii, phase, or none",
+               .type = "SPEC",
+               .default_text = "parameters=0.1,theta=0.1,phase"});
+  add_config_file(compare, o.run);
+  add_assignments(compare, o.run);
+  compare.add({.names = "--threads",
+               .to = &o.threads,
+               .help = "number of threads, 0: one for each processor; does not change the results",
+               .type = "N",
+               .range = {0, 1024},
+               .show_default = true});
+  compare.add({.names = "--json", .to = &o.json_file, .help = "write the table as JSON", .type = "FILE"});
+  compare.add({.names = "--csv", .to = &o.csv_file, .help = "write the table as CSV", .type = "FILE"});
+  compare.add({.names = "--markdown", .to = &o.markdown_file, .help = "write the table as Markdown", .type = "FILE"});
+  compare.add({.names = "--runs", .to = &o.runs_file, .help = "write each run's results as CSV", .type = "FILE"});
+  compare.set_footer("To compare runs that are already recorded, use abs_report RUN RUN.");
+  return compare;
+}
+
+}  // namespace abs_hil::program

@@ -1,0 +1,23 @@
+#pragma once
+
+#include "cli/command_line.hpp"
+#include "program/command_line.hpp"
+
+namespace abs_hil::program {
+
+// The command line's options of a run, as rows. Subcommands take those that they understand.
+
+/// --backend
+void add_backend_option(cli::Parser& parser, RunOptions& o);
+/// --config
+void add_config_file(cli::Parser& parser, RunOptions& o);
+/// --set
+void add_assignments(cli::Parser& parser, RunOptions& o);
+/// Those that belong to the configuration, not to a single run: --config, --plant, --model, --controller, --set.
+void add_configuration_options(cli::Parser& parser, RunOptions& o);
+/// --rate, --rt, --histogram
+void add_timing_options(cli::Parser& parser, RunOptions& o);
+/// All of a run's.
+void add_run_options(cli::Parser& parser, RunOptions& o);
+
+}  // namespace abs_hil::program

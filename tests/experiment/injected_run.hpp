@@ -1,0 +1,40 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "driver/injection/injecting_driver.hpp"
+#include "driver/injection/injection.hpp"
+#include "simulated_run.hpp"
+
+namespace abs_hil::experiment::test {
+
+/// A simulated run into which faults were injected.
+struct InjectedResult {
+  RunOutcome outcome{};
+  std::vector<rig::CycleRecord> records{};
+  plant_sim::PlantInput outputs{};  ///< those that acted on the rig when the run was over
+};
+
+/// Every read takes this part of the period.
+inline driver::Injection slow_reads(double share, double rate_Hz) {
+  return driver::parse_injection("any@read:slow=" + std::to_string(share / rate_Hz) + "s");
+}
+
+inline InjectedResult run_injected(const Setup& setup, const std::vector<driver::Injection>& faults) {
+  runtime::VirtualClock clock;
+  auto rig = std::make_unique<driver::SimDriver>(
+      setup.plant, driver::SimStart{.seed = setup.seed, .start_speed_rad_s = setup.experiment.start_speed_rad_s});
+  const driver::SimDriver& sim = *rig;
+  driver::InjectingDriver driver(std::move(rig), faults, setup.seed, [&clock](std::int64_t duration_ns) {
+    clock.sleep_until(clock.now_ns() + duration_ns);
+  });
+  Recorder recorder;
+  RunSession session(clock, driver, logic_parts(setup), setup.gate, {&recorder});
+  const RunOutcome outcome = session.run_fast([] { return rig::Reason::none; });
+  return {.outcome = outcome, .records = std::move(recorder.records), .outputs = sim.outputs()};
+}
+
+}  // namespace abs_hil::experiment::test
