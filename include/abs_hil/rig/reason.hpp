@@ -167,7 +167,7 @@ enum class FoundAgain : std::uint8_t {
       "time suspended", "s", "0")                                                                                     \
   ROW(released_wheel_stands, 223, fault, wheel_checks,                                                                \
       "the upper wheel shows standstill although the brake has let go: its encoder is stuck, or the brake holds on",  \
-      "time at standstill", "s", "what a tyre with little grip needs to turn it")
+      "time at standstill", "s", "what a tyre with little grip needs to turn it")                                     \
   ROW(braking_without_stop, 230, fault, no,                                                                           \
       "the experiment ran to its end, but the car was still faster than experiment.end_speed_m_s",                    \
       "car speed", "m/s", "experiment.end_speed_m_s")                                                                 \
