@@ -58,7 +58,8 @@ constexpr double delay_s = 0.1;
 
 struct Outcome {
   rig::Reason reason{rig::Reason::none};
-  double after_s{0.0};  ///< from the fault to the end of the run
+  double after_s{0.0};    ///< from the fault to the end of the run
+  double braking_s{0.0};  ///< from the start of braking to the end of the run; 0: it did not brake
   bool safe{false};
   bool stops{false};  ///< the car stood at the end, and the run says so
 };
@@ -75,10 +76,12 @@ Outcome outcome_of(const driver::Injection& fault, const Conditions& c) {
   if (c.read_share > 0.0) faults.insert(faults.begin(), slow_reads(c.read_share, c.rate_Hz));
   const InjectedResult run = run_injected(setup, faults);
   const auto began = std::ranges::find_if(run.records, [&](const auto& r) { return r.phase == fault.phase; });
+  const auto brake = std::ranges::find(run.records, rig::Phase::brake, &rig::CycleRecord::phase);
   const rig::CycleRecord& last = run.records.back();
   constexpr double stands_rad_s = 3.0;
   return {.reason = run.outcome.reason,
           .after_s = began == run.records.end() ? 0.0 : last.time_s - began->time_s - delay_s,
+          .braking_s = brake == run.records.end() ? 0.0 : last.time_s - brake->time_s,
           .safe = run.outcome.safe_state.ok() && run.outputs.motor_duty == 0.0 && run.outputs.brake_duty == 0.0,
           .stops = std::abs(last.truth.speeds.omega2_rad_s) < stands_rad_s};
 }
@@ -161,10 +164,27 @@ from the fault to the safe state, ms; "–": the run went on to its end. All run
 }
 
 /// What slow reads and long periods add to the bounds of docs/safety.md.
-double allowed_s(const Expectation& expectation, const Conditions& c) {
-  const double reads_s = c.read_share > 0.0 ? 0.3 : 0.0;
-  const double periods_s = 10.0 / c.rate_Hz;
-  return expectation.bound_s + reads_s + periods_s;
+double allowed_s(const Expectation& expectation, const Conditions& c, rig::Reason reason) {
+  constexpr double late_cycles = 50.0;
+  constexpr double slow_reads_s = 0.3;
+  constexpr double response_windows_s = 2.0;  // two windows of at most 1 s
+  const bool by_response = reason == rig::Reason::speed_rises_with_motor_off ||
+                           reason == rig::Reason::motor_no_response || reason == rig::Reason::brake_no_response ||
+                           reason == rig::Reason::released_wheel_stands;
+  // A late cycle takes two periods.
+  return expectation.bound_s + slow_reads_s + 2.0 * late_cycles / c.rate_Hz + (by_response ? response_windows_s : 0.0);
+}
+
+/// Time since a fault began to matter: one of the brake does not before braking.
+double mattered_s(const driver::Injection& fault, const Outcome& o) {
+  const bool of_brake =
+      fault.signal == driver::InjectionSignal::brake_pwm || fault.signal == driver::InjectionSignal::write;
+  return of_brake && fault.phase != rig::Phase::brake ? std::min(o.after_s, o.braking_s) : o.after_s;
+}
+
+/// Delays of some ms are none where a period takes 10 ms.
+bool no_delay(const driver::Injection& fault, const Conditions& c) {
+  return fault.kind == driver::InjectionKind::slow && c.rate_Hz <= 100.0;
 }
 
 }  // namespace
@@ -180,10 +200,10 @@ TEST_CASE("under slow reads and wrong models every run ends safely, in time, and
         CHECK(o.safe);
         if (o.reason == rig::Reason::sequence_complete) {
           CHECK(o.stops);
-          CHECK(expectation.may_survive);
+          CHECK((expectation.may_survive || no_delay(table.faults[row], table.columns[n])));
         } else {
           CHECK(rig::is_fault(o.reason));
-          CHECK(o.after_s <= allowed_s(expectation, table.columns[n]));
+          CHECK(mattered_s(table.faults[row], o) <= allowed_s(expectation, table.columns[n], o.reason));
         }
       }
     }
