@@ -49,8 +49,8 @@ class RigRun(RigTest):
 
     def test_replay_of_runs_whose_commands_the_board_did_not_take(self):
         log = self.folder / 'rig.lcmlog'
-        for fault, reason in (('accelerate@write:off+0.1s', 'write'), ('brake@write:off+0.1s', 'write'),
-                              ('brake@write:intermittent+0.1s', 'write'), ('brake@write:stuck+0.1s', ''),
+        for fault, reason in (('accelerate@write:off+0.1s', 'writing'), ('brake@write:off+0.1s', 'writing'),
+                              ('brake@write:intermittent+0.1s', 'writing'), ('brake@write:stuck+0.1s', ''),
                               ('brake@brake_pwm:off+0.1s', 'brake')):
             with self.subTest(fault):
                 emulator = self.emulator('--lock-step', '--start-speed', 60)

@@ -41,6 +41,9 @@ class LosesCommands final : public driver::RigDriver {
   [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
     return rig_->as_sent(command);
   }
+  [[nodiscard]] rig::PlantTruth truth() const noexcept override {
+    return every_ == 0 ? rig_->truth() : rig::PlantTruth{};  // a board knows none
+  }
 
  private:
   void do_configure() override { rig_->configure(); }

@@ -33,11 +33,13 @@ TEST_CASE("the flight record has the controller's own signals, by their names") 
   records[1].control.signals[0] = 0.25;
   records[1].control.signals[1] = -3.0;
   std::vector<std::string> problems;
+  ExperimentInfo experiment{};
+  experiment.names.signals = {"I_m", "zeta_N"};
   const double own = static_cast<double>(rig::controller_signals.size() + 1);
   const auto written = write_flight_record(
       folder.path / "flight",
       {.records = records, .reason = rig::Reason::controller_not_finite, .reason_value = own, .account = "a test\n"},
-      {.names = {.phases = {}, .signals = {"I_m", "zeta_N"}}}, "ABS_", problems);
+      experiment, "ABS_", problems);
   CHECK(problems.empty());
   CHECK(written.size() == 3);
   CHECK_THAT(content(folder.path / "flight.txt"), Catch::Matchers::Contains("not a finite number: zeta_N\n"));

@@ -234,3 +234,39 @@ TEST_CASE("what the stamps and counts leave open is no fault") {
   CHECK(found_after(1.0, 3.0, 0.0, 0.0, 1.0, 0.0).second == Reason::motor_no_response);
   CHECK(found_after(1.0, 3.0, 0.0, 0.5, 1.0, 0.0).second == Reason::motor_no_response);
 }
+
+TEST_CASE("two counts leave each wheel's momentum open by its inertia over its radius") {
+  // Two counts of 0.02 rad: 0.0669 kg m/s in a window of 0.1 s, twice.
+  const auto reason = [](double omega_rad_s, double rad_s2, double motor_duty, double brake_Nm) {
+    return found_after(omega_rad_s, rad_s2, 0.0, 0.02, motor_duty, brake_Nm).second;
+  };
+  // Rising by (0.25 + 0.1337) / (0.1 inertia) = 11.47 rad/s^2.
+  CHECK(reason(10.0, 11.0, 0.0, 0.0) == Reason::none);
+  CHECK(reason(10.0, 12.0, 0.0, 0.0) == Reason::speed_rises_with_motor_off);
+  // The motor's quarter, 0.4868 kg m/s: (0.4868 - 0.1337) / (0.1 inertia) = 10.56 rad/s^2.
+  CHECK(reason(0.0, 11.0, 1.0, 0.0) == Reason::none);
+  CHECK(reason(0.0, 10.0, 1.0, 0.0) == Reason::motor_no_response);
+  // Three tenths of 3 N m, 0.9045 kg m/s: (0.9045 - 0.1337) / (0.1 inertia) = 23.05 rad/s^2.
+  CHECK(reason(100.0, -24.0, 0.0, 3.0) == Reason::none);
+  CHECK(reason(100.0, -22.0, 0.0, 3.0) == Reason::brake_no_response);
+}
+
+TEST_CASE("the stamp at the very beginning of a window counts, not those within") {
+  // Windows of 52 times 2^-9 s. 2 ms at the beginning of each leave 0.07 kg m/s open.
+  const auto reason = [](double begin_error_s) {
+    ResponseCheck check(paper_limits());
+    constexpr double short_s = 1.0 / 512.0;
+    for (int i = 0; i < 105; ++i) {
+      const double omega_rad_s = 10.0 + 10.8 * short_s * i;
+      const CheckResult found = check.update({.dt_s = short_s,
+                                              .omega1_rad_s = omega_rad_s,
+                                              .omega2_rad_s = omega_rad_s,
+                                              .begin_error_s = i % 52 == 0 ? begin_error_s : 0.0},
+                                             0.0);
+      if (!found.sound()) return found.reason;
+    }
+    return Reason::none;
+  };
+  CHECK(reason(0.0) == Reason::speed_rises_with_motor_off);
+  CHECK(reason(2e-3) == Reason::none);
+}
