@@ -67,7 +67,7 @@ class Service:
 
     def __init__(self, folder, *assignments):
         self.socket = folder / 'guardian.sock'
-        self.log = folder / 'service.log'
+        self.log = folder / f'service-{len(list(folder.glob("service-*.log")))}.log'
         self.process = subprocess.Popen(
             [GUARDIAN, 'serve', '--socket', self.socket, *settings(*assignments)], stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL, stderr=open(self.log, 'a'))  # noqa: SIM115
@@ -81,6 +81,18 @@ class Service:
             self.process.send_signal(number)
         return self.process.wait(timeout=20)
 
+    def children_left(self):
+        """Processes that still write a flight record."""
+        return [process for process in pathlib.Path('/proc').glob('[0-9]*')
+                if os.fsencode(self.socket) in command_line(process)]
+
+
+def command_line(process):
+    try:
+        return (process / 'cmdline').read_bytes().split(b'\0') if (process / 'exe').resolve() == GUARDIAN else []
+    except OSError:
+        return []
+
 
 class ResidentTest(RigTest):
     timeout_ms = 500  # longer than a busy computer's pauses
@@ -92,6 +104,7 @@ class ResidentTest(RigTest):
     def tearDown(self):
         for service in self.services:
             service.end()
+            wait_until(lambda service=service: not service.children_left(), 'a flight record is not finished')
         super().tearDown()
 
     def service(self, emulator, *assignments):
