@@ -32,8 +32,8 @@ void Guard::refuse_weaker(const runtime::Scheduling& guardian, const runtime::Sc
   };
   refuse_run("it has " + in_words(guardian) + ", but the controller has " + in_words(controller) +
              ": a controller in an endless loop would keep it from the processor. Give " + program +
-             " the rights of abs_hil: the limits of docs/real-time.md, or sudo setcap cap_sys_nice,cap_ipc_lock+ep " +
-             program);
+             " the rights of abs_hil (the limits of docs/real-time.md, or sudo setcap cap_sys_nice,cap_ipc_lock+ep " +
+             program + "), or set a lower realtime.priority");
 }
 
 }  // namespace abs_hil::guardian
