@@ -154,9 +154,9 @@ int run_service(const config::Settings& settings) {
   static_cast<void>(guardian::safe_state_writer_of(settings.driver));
   driver::FileDescriptor listener = open_listener(path);
   SleepWatch sleep(say);
-  MachinePause pause;
   const runtime::RealtimeScope realtime(realtime_options(settings, runtime::RealtimeMode::prefer));
   if (!realtime.report().realtime()) say("NOT IN REAL TIME: it may act late\n" + realtime.report().shortcomings());
+  MachinePause pause;  // its thread takes on this one's scheduling
   ServiceManager manager;
   guardian::ServiceParts parts{
       .listener = std::move(listener),
@@ -171,7 +171,10 @@ int run_service(const config::Settings& settings) {
       .alive = ServiceManager::alive};
   parts.interruptions.push_back(told_to_end(signals));
   parts.interruptions.push_back(sleep.interruption());
-  if (pause.works()) parts.interruptions.push_back(pause.interruption());
+  if (pause.works()) {
+    say("compares the real-time clock, to find pauses of this virtual machine");
+    parts.interruptions.push_back(pause.interruption());
+  }
   runtime::MonotonicClock clock;
   guardian::GuardianService service(clock, std::move(parts));
   service.start();

@@ -167,6 +167,7 @@ void GuardianService::serve(Client client) {
   client_ = std::make_unique<Client>(std::move(client));
   const std::string name = command_of(client_->peer.pid);
   writer_.reset();  // lets go of the board
+  tell_lease(true);
   parts_.status("lease: " + name);
   parts_.tell("lease granted to " + name);
   if (!send_message(client_->socket.get(), {.word = LeaseWord::granted})) client_->closed = true;
@@ -177,6 +178,7 @@ void GuardianService::serve(Client client) {
     cover(*message);
   }
   client_.reset();
+  tell_lease(false);
   keep();
   parts_.tell("lease ended: " + name);
   deal_with_interruptions();
@@ -253,6 +255,12 @@ void GuardianService::keep() {
   }
   parts_.status(safe_ ? "no lease, outputs 0" : "no lease, OUTPUTS NOT VERIFIED");
   next_keep_ns_ = clock_.now_ns() + (safe_ ? parts_.keep_ns : retry_ns);
+}
+
+void GuardianService::tell_lease(bool held) {
+  for (const Interruption& i : parts_.interruptions) {
+    if (i.lease_changed) i.lease_changed(held);
+  }
 }
 
 void GuardianService::deal_with_interruptions() {

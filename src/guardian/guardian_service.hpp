@@ -29,6 +29,8 @@ struct Interruption {
   int descriptor{-1};  ///< readable when it happens
   /// Reads the descriptor. Returns why a lease must end; `none`: nothing but a new look at the board is needed.
   std::function<rig::Reason()> take;
+  /// Called when a lease is granted and when it has ended.
+  std::function<void(bool held)> lease_changed{};
   /// Why nobody gets a lease at present; empty: no objection.
   std::function<std::string()> bars_leases{};
   /// Called once nobody has a lease and the board was made safe, or could not be.
@@ -91,6 +93,7 @@ class GuardianService {
   void serve(Client client);
   void cover(const LeaseMessage& message);
   void keep();
+  void tell_lease(bool held);
   void deal_with_interruptions();
   [[nodiscard]] bool former_client_gone();
 
