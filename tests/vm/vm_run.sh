@@ -26,9 +26,9 @@ while getopts M:q:o:s:m:t:VFS option; do
     s) cpus=$OPTARG ;;
     m) memory=$OPTARG ;;
     t) limit_s=$OPTARG ;;
-    V) cpus=1 accelerator='tcg,thread=single'; qemu_arguments+=(-icount 'shift=3,sleep=off') ;;
+    V) cpus=1 accelerator='tcg,thread=single'; qemu_arguments+=(-icount 'shift=3,sleep=off' -rtc 'base=utc,clock=vm') ;;
     S) boot_arguments+=' with_systemd systemd.show_status=false systemd.log_level=warning' ;;
-    F) cpus=1 accelerator='tcg,thread=single'; qemu_arguments+=(-icount 'shift=1,sleep=off') ;;
+    F) cpus=1 accelerator='tcg,thread=single'; qemu_arguments+=(-icount 'shift=1,sleep=off' -rtc 'base=utc,clock=vm') ;;
     *) exit 2 ;;
   esac
 done
