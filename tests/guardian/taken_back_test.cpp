@@ -30,6 +30,7 @@ struct LeasePost {
         }
       }
       if (event && now_ns >= then_ns) std::exchange(event, nullptr)();
+      if (now_ns >= then_ns + 5'000 * ms) region.set_stage(Stage::closed);  // a guardian that sees nothing
     };
   }
   using HeartbeatPanel = runtime::HeartbeatPanel;

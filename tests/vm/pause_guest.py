@@ -18,6 +18,7 @@ from resident_guardian import Service, settings  # noqa: E402
 from rig_emulator import Emulator  # noqa: E402
 
 TRIES = 3
+MOST_SLOW = 10
 RATE_HZ = 200
 CLOCK = pathlib.Path('/sys/class/rtc/rtc0/since_epoch')
 # The machine runs on its host's clock, and so has the host's pauses: these limits are for those of this test alone.
@@ -46,6 +47,10 @@ def wait_for(condition, what, seconds=60):
         time.sleep(0.005)
 
 
+class HostWasSlow(Exception):
+    """The host held the machine up so long that the run ended for that reason, before or beside the pause."""
+
+
 def one_pause(number, phase, emulator, folder, leaps):
     """(ms from the pause to zero; problems)."""
     program = subprocess.Popen(
@@ -56,7 +61,8 @@ def one_pause(number, phase, emulator, folder, leaps):
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
 
     def there():
-        assert program.poll() is None, program.communicate()[1][-1500:]
+        if program.poll() is not None:
+            raise HostWasSlow(program.communicate()[1][-600:])
         return PHASES[phase](emulator.widths())
     wait_for(there, f'never in {phase}')
     known = len(leaps.read_text().split())
@@ -66,6 +72,8 @@ def one_pause(number, phase, emulator, folder, leaps):
     said = program.communicate(timeout=60)[1]
     widths = emulator.widths()
     problems = []
+    if 'could not judge the wheels' in said:
+        raise HostWasSlow(said[-600:])
     if widths.zero_since_ns is None:
         return None, [f'{phase}: the card holds']
     if program.returncode != 1 or 'the virtual machine was paused' not in said:
@@ -87,11 +95,17 @@ def main():
     problems = []
     for phase in PHASES:
         times = []
-        for _ in range(TRIES):
+        slow = []
+        while len(times) < TRIES and len(slow) < MOST_SLOW and not problems:
             number = len(list(OUT.glob('pause-*')))
-            ms, found = one_pause(number, phase, emulator, folder, leaps)
+            try:
+                ms, problems = one_pause(number, phase, emulator, folder, leaps)
+            except HostWasSlow as what:
+                slow.append(str(what))
+                continue
             times += [] if ms is None else [ms]
-            problems += found
+        if len(slow) == MOST_SLOW:
+            problems.append(f'the host is too slow: {slow[-1]}')
         print(f'paused in {phase}: both widths 0 after (ms of the guest): ' +
               ' '.join(f'{ms:.2f}' for ms in sorted(times)), flush=True)
     os.kill(watcher, 9)
