@@ -18,6 +18,7 @@
 #include "control/silent_settings.hpp"
 #include "driver/factory.hpp"
 #include "experiment/run_session.hpp"
+#include "guardian/kept_board.hpp"
 #include "program/board_notes.hpp"
 #include "program/exit_status.hpp"
 #include "program/run_monitor.hpp"
@@ -156,7 +157,7 @@ runtime::OverrunOptions overruns_of(const RunRequest& request) {
 
 /// Checks in advance, as far as possible, that a guardian can start.
 void require_own_guardian(const RunRequest& request) {
-  static_cast<void>(driver::make_safe_state_writer(request.settings.driver));
+  static_cast<void>(guardian::safe_state_writer_of(request.settings.driver));
   const std::string program = guardian::guardian_program();
   if (::access(program.c_str(), X_OK) == 0) return;
   throw driver::Unavailable(

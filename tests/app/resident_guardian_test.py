@@ -141,6 +141,29 @@ class Leases(ResidentTest):
         wait_until(lambda: service.said().rstrip().endswith('written and read back'), 'not made safe')
         self.assertEqual(emulator.wire(), SAFE)
 
+    def test_commissioning_has_one_lease_for_all_its_pulses(self):
+        emulator = self.emulator()
+        service = self.service(emulator)
+        program = subprocess.Popen(
+            [pathlib.Path(PROGRAM).resolve(), 'commission', *settings(
+                f'driver.pci.root={emulator.root}', 'guardian.resident=require',
+                f'guardian.socket={service.socket}', 'guardian.timeout_ms=1000')],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1)
+        self._programs.append(program)
+        said = ''
+        while line := program.stdout.readline():
+            said += line
+            if '[y/N]' in line:
+                self.assertEqual(emulator.wire(), SAFE, f'while it asks: {line}')
+                program.stdin.write('y\n')
+            elif line.startswith('Turn the '):
+                emulator.turn('upper' if 'UPPER' in line else 'lower', 0.5)
+                program.stdin.write('\n')
+        _, errors = program.communicate(timeout=20)
+        self.assertEqual(program.returncode, 0, said + errors)
+        wait_until(lambda: 'lease ended' in service.said(), 'the lease did not end')
+        self.assertEqual([word for word, _ in granted_and_ended(service.said())], ['granted to', 'ended:'])
+
     def test_service_that_ends_takes_the_outputs_back(self):
         for number, words in ((signal.SIGTERM, 'the resident guardian was told to end'),
                               (signal.SIGKILL, 'the guardian process died'),
