@@ -14,6 +14,9 @@ endforeach()
 install(TARGETS ${programs} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
 install(DIRECTORY config/ DESTINATION ${CMAKE_INSTALL_DATADIR}/abs_hil/config COMPONENT runtime PATTERN udev EXCLUDE)
 install(FILES config/udev/70-abs-hil.rules DESTINATION ${ABS_HIL_UDEV_DIR} COMPONENT runtime)
+install(FILES packaging/guardian.toml DESTINATION ${CMAKE_INSTALL_DATADIR}/abs_hil COMPONENT runtime)
+install(FILES packaging/systemd/abs-guardian.service packaging/systemd/abs_guardian.slice
+  DESTINATION ${ABS_HIL_SYSTEMD_DIR} COMPONENT runtime)
 install(FILES packaging/abs_hil.sysusers DESTINATION ${ABS_HIL_SYSUSERS_DIR} RENAME abs_hil.conf COMPONENT runtime)
 install(FILES completion/abs_hil.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME abs_hil
   COMPONENT runtime)

@@ -26,7 +26,8 @@ set(CPACK_DEBIAN_RUNTIME_DESCRIPTION
  Drives the Inteco ABS laboratory rig, or simulates it: starts the wheel,
  accelerates it, cuts the motor and brakes it to a stop under slip control
  in a real-time thread, and publishes every cycle over LCM.")
-set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/packaging/postinst)
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA
+  ${PROJECT_SOURCE_DIR}/packaging/postinst ${PROJECT_SOURCE_DIR}/packaging/prerm ${PROJECT_SOURCE_DIR}/packaging/postrm)
 
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libabs-hil-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)

@@ -106,7 +106,7 @@ RunOutcome RunSession::run_realtime(const runtime::RealtimeOptions& options, con
   try {
     driver_.configure();
     if (guard_ != nullptr) {
-      guard_->arm();
+      guard_->arm(realtime_.scheduling);
       driver_.tell_before_making_safe(guard_);
     }
     std::int64_t start_ns = clock_.now_ns();

@@ -1,6 +1,7 @@
 #include "guardian/guardian_loop.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "abs_hil/rig/time_units.hpp"
 
@@ -13,6 +14,7 @@ constexpr std::int64_t end_wait_ns = 5'000'000;
 constexpr int quick_tries = 100;
 constexpr std::int64_t quick_pause_ns = 1'000'000;
 constexpr std::int64_t slow_pause_ns = 50'000'000;
+constexpr std::int64_t least_suspension_ns = 1'000'000;
 
 /// Eight looks per timeout. The guardian therefore notices silence at most an eighth of the timeout late.
 std::int64_t look_period_for(std::int64_t timeout_ns) noexcept {
@@ -36,6 +38,8 @@ GuardianLoop::GuardianLoop(runtime::Clock& clock, ControllerProcess& controller,
 
 GuardianReport GuardianLoop::run() noexcept {
   std::int64_t next_look_ns = clock_.now_ns();
+  last_look_ns_ = next_look_ns;
+  suspended_ns_ = clock_.suspended_ns();
   std::uint64_t beats = 0;
   for (;;) {
     next_look_ns = std::max(next_look_ns + look_period_ns_, clock_.now_ns());
@@ -47,24 +51,47 @@ GuardianReport GuardianLoop::run() noexcept {
     reading.cycle_beats = region_.panel().cycle_beats.load(std::memory_order_relaxed) +
                           region_.panel().safe_beats.load(std::memory_order_relaxed);
     reading.now_ns = clock_.now_ns();
+    reading.taken_back_for = must_give_back_for(reading);
     const Verdict verdict = watchdog_.look(reading);
     if (verdict == Verdict::wait) continue;
 
     GuardianReport report{
         .reason = watchdog_.reason(), .silence_ns = watchdog_.silence_ns(), .noticed_ns = reading.now_ns};
     if (reading.controller_gone) report.controller_gone_ns = reading.now_ns;
-    if (verdict == Verdict::make_safe) make_safe(report, reading.stage == Stage::handed_over);
+    const bool writes_zeros_only = reading.stage == Stage::handed_over || reading.stage == Stage::released;
+    if (verdict == Verdict::make_safe) make_safe(report, writes_zeros_only);
     return report;
   }
 }
 
-void GuardianLoop::make_safe(GuardianReport& report, bool handed_over) noexcept {
+rig::Reason GuardianLoop::must_give_back_for(const HeartbeatReading& reading) noexcept {
+  const std::int64_t gap_ns = reading.now_ns - std::exchange(last_look_ns_, reading.now_ns);
+  const std::int64_t told_ns = clock_.suspended_ns();
+  const std::int64_t suspended_ns = told_ns - suspended_ns_;
+  suspended_ns_ = std::max(suspended_ns_, told_ns);
+  const bool has_outputs = reading.stage == Stage::guarded || reading.stage == Stage::making_safe;
+  if (taken_back_for_ != rig::Reason::none || !has_outputs) return taken_back_for_;
+  taken_back_for_ = controller_.must_give_back_for();
+  if (taken_back_for_ == rig::Reason::none && suspended_ns > least_suspension_ns) {
+    taken_back_for_ = rig::Reason::computer_suspended;
+  }
+  // The controller's own limit is one timeout, or three of its periods.
+  if (taken_back_for_ == rig::Reason::none && gap_ns > 2 * timeout_ns_) taken_back_for_ = rig::Reason::guardian_paused;
+  if (taken_back_for_ != rig::Reason::none) {
+    region_.panel().taken_back_for.store(taken_back_for_, std::memory_order_relaxed);
+  }
+  return taken_back_for_;
+}
+
+void GuardianLoop::make_safe(GuardianReport& report, bool writes_zeros_only) noexcept {
   report.acted = true;
-  if (watchdog_.must_end_controller()) controller_.end();
-  bool gone = handed_over || controller_.gone_by(clock_.now_ns() + end_wait_ns);
+  report.controller_lives = writes_zeros_only;
+  report.ended_controller = watchdog_.must_end_controller();
+  if (report.ended_controller) controller_.end();
+  bool gone = writes_zeros_only || controller_.gone_by(clock_.now_ns() + end_wait_ns);
   const std::int64_t give_up_ns = clock_.now_ns() + insist_ns_;
   for (;;) {
-    if (gone && !handed_over && report.controller_gone_ns == 0) report.controller_gone_ns = clock_.now_ns();
+    if (gone && !writes_zeros_only && report.controller_gone_ns == 0) report.controller_gone_ns = clock_.now_ns();
     const driver::IoResult result = writer_.make_safe();
     ++report.tries;
     const std::int64_t now_ns = clock_.now_ns();

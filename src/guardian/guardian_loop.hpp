@@ -24,6 +24,8 @@ class ControllerProcess {
   [[nodiscard]] virtual bool gone_by(std::int64_t time_ns) noexcept = 0;
   /// Sends SIGKILL, which also ends stopped and hung processes.
   virtual void end() noexcept = 0;
+  /// Why the controller must give the outputs back, for a cause outside of the run; `none`: it may keep them.
+  [[nodiscard]] virtual rig::Reason must_give_back_for() noexcept { return rig::Reason::none; }
 };
 
 /// What the guardian did.
@@ -31,6 +33,8 @@ struct GuardianReport {
   rig::Reason reason{rig::Reason::none};  ///< `none`: the run ended in order and the guardian was dismissed
   bool acted{false};                      ///< the guardian wrote the safe state
   bool verified{false};                   ///< the guardian read the safe state back
+  bool controller_lives{false};           ///< the controller was left alive: it drives nothing any more
+  bool ended_controller{false};           ///< the guardian ended the controller
   driver::IoResult last_error{};          ///< error of the last failed try
   int tries{0};                           ///< number of attempts to write the safe state
   std::int64_t silence_ns{0};             ///< time without a heartbeat when the guardian decided to act
@@ -47,6 +51,11 @@ struct GuardianReport {
 /// 2. It waits up to 5 ms until the controller, its threads and their register accesses have ended.
 /// 3. It writes the safe state and reads it back. It repeats this until the safe state is verified and the controller
 ///    has ended, for at most `insist_s`.
+///
+/// For a cause outside of the run, and after a pause of its own, it asks the controller to give the outputs back: it
+/// leaves a mark in the shared memory, which every cycle looks at before it writes. The controller then ends its run as
+/// after a fault, and the guardian verifies the safe state. If the controller does not do so within the timeout, the
+/// guardian takes the three steps.
 class GuardianLoop {
  public:
   GuardianLoop(runtime::Clock& clock, ControllerProcess& controller, SharedRegion& region,
@@ -55,7 +64,8 @@ class GuardianLoop {
   [[nodiscard]] std::int64_t look_period_ns() const noexcept { return look_period_ns_; }
 
  private:
-  void make_safe(GuardianReport& report, bool handed_over) noexcept;
+  void make_safe(GuardianReport& report, bool writes_zeros_only) noexcept;
+  [[nodiscard]] rig::Reason must_give_back_for(const HeartbeatReading& reading) noexcept;
 
   runtime::Clock& clock_;
   ControllerProcess& controller_;
@@ -65,6 +75,9 @@ class GuardianLoop {
   std::int64_t insist_ns_;
   std::int64_t look_period_ns_;
   Watchdog watchdog_;
+  rig::Reason taken_back_for_{rig::Reason::none};
+  std::int64_t last_look_ns_{0};
+  std::int64_t suspended_ns_{0};
 };
 
 /// The report as several lines of text, for log and file. `controller` is the process id of the controller.

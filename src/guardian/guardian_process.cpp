@@ -10,27 +10,23 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <utility>
 
-#include "abs_hil/driver/io_result.hpp"
 #include "guardian/linux_process.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::guardian {
 
 namespace {
 
+constexpr const char* ready_format = "ready %d %d:%n";
 constexpr int ready_within_ms = 5000;
 constexpr int ends_within_ms = 500;
 
-[[noreturn]] void refuse(const std::string& what) {
-  throw driver::Unavailable("guardian: " + what +
-                            ". The run does not start without a guardian: if this program died, nothing would stop the "
-                            "motor (docs/dead-man.md)");
-}
-
-[[noreturn]] void refuse(const std::string& what, int error) { refuse(what + ": " + std::strerror(error)); }
+[[noreturn]] void refuse_for(const std::string& what, int error) { refuse_run(what + ": " + std::strerror(error)); }
 
 /// A descriptor numbered above those that the child inherits. The destructor closes it.
 class HighDescriptor {
@@ -38,11 +34,11 @@ class HighDescriptor {
   /// Takes ownership of `fd` if `ours`, otherwise copies it.
   HighDescriptor(int fd, bool ours) {
     constexpr int above = 10;
-    if (fd < 0) refuse("cannot open a file descriptor for it", errno);
+    if (fd < 0) refuse_for("cannot open a file descriptor for it", errno);
     fd_ = ::fcntl(fd, F_DUPFD_CLOEXEC, above);
     const int error = errno;
     if (ours) ::close(fd);
-    if (fd_ < 0) refuse("cannot copy a file descriptor for it", error);
+    if (fd_ < 0) refuse_for("cannot copy a file descriptor for it", error);
   }
   HighDescriptor(const HighDescriptor&) = delete;
   HighDescriptor& operator=(const HighDescriptor&) = delete;
@@ -52,15 +48,6 @@ class HighDescriptor {
  private:
   int fd_{-1};
 };
-
-int text_in_memory(const std::string& text) {
-  const int fd = ::memfd_create("abs_hil launch config", MFD_CLOEXEC);
-  if (fd < 0) return -1;
-  if (::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size())) return fd;
-  ::close(fd);
-  errno = EIO;
-  return -1;
-}
 
 class SpawnSetUp {
  public:
@@ -89,6 +76,10 @@ class SpawnSetUp {
 
 }  // namespace
 
+std::string ready_text(const runtime::Scheduling& guardian, const std::string& notes) {
+  return rig::formatted("ready %d %d:", guardian.fifo_priority, guardian.memory_locked ? 1 : 0) + notes;
+}
+
 std::string guardian_program() {
   std::error_code error;
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
@@ -100,14 +91,16 @@ std::string guardian_program() {
 }
 
 GuardianProcess::GuardianProcess(SharedRegion& region, std::string program, std::string launch_config_json)
-    : region_(region), program_(std::move(program)), launch_config_(std::move(launch_config_json)) {}
+    : program_(std::move(program)), launch_config_(std::move(launch_config_json)) {
+  region_ = &region;
+}
 
 GuardianProcess::~GuardianProcess() { static_cast<void>(end()); }
 
-void GuardianProcess::arm() {
+void GuardianProcess::arm(const runtime::Scheduling& controller) {
   start();
   try {
-    wait_until_ready();
+    refuse_weaker(wait_until_ready(), controller, program_);
   } catch (...) {
     ::kill(pid_, SIGKILL);
     static_cast<void>(end());
@@ -117,10 +110,10 @@ void GuardianProcess::arm() {
 
 void GuardianProcess::start() {
   std::array<int, 2> pipe{-1, -1};
-  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) refuse("cannot open a pipe", errno);
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) refuse_for("cannot open a pipe", errno);
   ready_ = pipe[0];
   const HighDescriptor ready(pipe[1], true);
-  const HighDescriptor region(region_.descriptor(), false);
+  const HighDescriptor region(region_->descriptor(), false);
   const HighDescriptor controller(open_pidfd(::getpid()), true);
   const HighDescriptor launch_config(text_in_memory(launch_config_), true);
 
@@ -138,7 +131,7 @@ void GuardianProcess::start() {
       ::posix_spawn(&pid_, program_.c_str(), &set_up.actions, &set_up.attributes, arguments.data(), environ);
   if (error != 0) {
     pid_ = 0;
-    refuse("cannot start " + program_, error);
+    refuse_for("cannot start " + program_, error);
   }
   pidfd_ = open_pidfd(pid_);
   if (pidfd_ < 0) {
@@ -146,17 +139,17 @@ void GuardianProcess::start() {
     ::kill(pid_, SIGKILL);
     ::waitpid(pid_, nullptr, 0);
     pid_ = 0;
-    refuse("cannot open a pidfd of its process", reason);
+    refuse_for("cannot open a pidfd of its process", reason);
   }
 }
 
-void GuardianProcess::wait_until_ready() {
+runtime::Scheduling GuardianProcess::wait_until_ready() {
   std::string said;
   for (;;) {
     pollfd readable{ready_, POLLIN, 0};
     const int ready = ::poll(&readable, 1, ready_within_ms);
     if (ready < 0 && errno == EINTR) continue;
-    if (ready <= 0) refuse(program_ + " was not ready within " + std::to_string(ready_within_ms / 1000) + " s");
+    if (ready <= 0) refuse_run(program_ + " was not ready within " + std::to_string(ready_within_ms / 1000) + " s");
     std::array<char, 512> part{};
     const ssize_t got = ::read(ready_, part.data(), part.size());
     if (got < 0 && errno == EINTR) continue;
@@ -165,20 +158,17 @@ void GuardianProcess::wait_until_ready() {
   }
   constexpr std::string_view ready_word = "ready ";
   constexpr std::string_view error_word = "error ";
-  if (said.starts_with(error_word)) refuse(said.substr(error_word.size()));
-  if (!said.starts_with(ready_word)) refuse(program_ + " ended before it was ready");
-  notes_ = said.substr(ready_word.size());
-}
-
-void GuardianProcess::making_safe() noexcept {
-  region_.set_stage(Stage::making_safe);
-  // A failed write and the end of the run each make the outputs safe, without a cycle in between. Each beat restarts
-  // the guardian's timeout.
-  region_.panel().safe_beats.fetch_add(1, std::memory_order_relaxed);
-}
-
-void GuardianProcess::outputs_released(bool safe) noexcept {
-  region_.set_stage(safe ? Stage::released : Stage::handed_over);
+  if (said.starts_with(error_word)) refuse_run(said.substr(error_word.size()));
+  if (!said.starts_with(ready_word)) refuse_run(program_ + " ended before it was ready");
+  runtime::Scheduling has;
+  int locked = 0;
+  int notes_at = 0;
+  if (std::sscanf(said.c_str(), ready_format, &has.fifo_priority, &locked, &notes_at) < 2 || notes_at == 0) {
+    refuse_run(program_ + " comes from another build of abs_hil");
+  }
+  has.memory_locked = locked != 0;
+  notes_ = said.substr(static_cast<std::size_t>(notes_at));
+  return has;
 }
 
 bool GuardianProcess::ended_within(int timeout_ms) const noexcept {
@@ -192,21 +182,21 @@ bool GuardianProcess::ended_within(int timeout_ms) const noexcept {
 
 bool GuardianProcess::alive() const noexcept { return pid_ == 0 || !ended_within(0); }
 
-GuardianProcess::GuardianExit GuardianProcess::end() noexcept {
+GuardEnd GuardianProcess::end() noexcept {
   if (ready_ >= 0) ::close(std::exchange(ready_, -1));
-  if (pid_ == 0) return GuardianExit::none;
-  const bool handed_over = region_.stage() == Stage::handed_over;
+  if (pid_ == 0) return GuardEnd::none;
+  const bool handed_over = region_->stage() == Stage::handed_over;
   // `handed_over` must stay: a delayed guardian has to read it, however late.
-  if (!handed_over) region_.set_stage(Stage::closed);
+  if (!handed_over) region_->set_stage(Stage::closed);
   const bool ended = ended_within(ends_within_ms);
-  GuardianExit how = GuardianExit::insisting;
+  GuardEnd how = GuardEnd::insisting;
   if (!ended && !handed_over)
     ::kill(pid_, SIGKILL);  // the guardian is stopped or hung, and the outputs are already safe
   if (ended || !handed_over) {
     int status = 0;
     while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
     }
-    how = WIFEXITED(status) && WEXITSTATUS(status) == 0 ? GuardianExit::ended : GuardianExit::failed;
+    how = WIFEXITED(status) && WEXITSTATUS(status) == 0 ? GuardEnd::ended : GuardEnd::failed;
   }
   ::close(std::exchange(pidfd_, -1));
   pid_ = 0;

@@ -4,26 +4,29 @@
 
 #include <string>
 
+#include "guardian/guard.hpp"
 #include "guardian/shared_region.hpp"
-#include "runtime/heartbeat.hpp"
 
 namespace abs_hil::guardian {
 
 /// The file descriptors that the guardian inherits. Besides these it has only stdin, stdout (both /dev/null) and
 /// stderr.
 enum InheritedDescriptor : int {
-  inherited_region = 3,         ///< SharedRegion
-  inherited_controller = 4,     ///< pidfd of the controller
-  inherited_ready = 5,          ///< pipe to the controller: the guardian writes "ready NOTES" or "error WHAT" once
+  inherited_region = 3,      ///< SharedRegion
+  inherited_controller = 4,  ///< pidfd of the controller
+  inherited_ready = 5,  ///< pipe to the controller: the guardian writes once what `ready_text` makes, or "error WHAT"
   inherited_launch_config = 6,  ///< LaunchConfig as JSON, read from offset 0
 };
+
+/// What a guardian that stands by tells its controller.
+[[nodiscard]] std::string ready_text(const runtime::Scheduling& guardian, const std::string& notes);
 
 /// Path of the guardian's program: abs_guardian in the folder of the running program, otherwise the installed one.
 [[nodiscard]] std::string guardian_program();
 
 /// The guardian's process, as seen from the controller: a child process in its own session, so that Ctrl-C or the end
-/// of the terminal does not reach it. Use it from one thread; any thread may call `making_safe` and `outputs_released`.
-class GuardianProcess final : public runtime::RunGuard {
+/// of the terminal does not reach it.
+class GuardianProcess final : public Guard {
  public:
   /// @param region  must outlive this object
   /// @param launch_config_json  LaunchConfig as JSON (`to_json`)
@@ -32,35 +35,20 @@ class GuardianProcess final : public runtime::RunGuard {
   ~GuardianProcess() override;
 
   /// Starts the guardian and waits until it has its own handle on the outputs, at most 5 s. Throws driver::Unavailable.
-  void arm() override;
-  void making_safe() noexcept override;
-  void outputs_released(bool safe) noexcept override;
-
-  /// False once the guardian has ended, for any cause. True before it was started.
-  [[nodiscard]] bool alive() const noexcept;
-  [[nodiscard]] pid_t pid() const noexcept { return pid_; }
-  /// What the guardian could not obtain (real time), as text; empty if it lacks nothing.
-  [[nodiscard]] const std::string& notes() const noexcept { return notes_; }
-
-  /// How the guardian ended.
-  enum class GuardianExit : std::uint8_t {
-    none,      ///< no guardian was started
-    ended,     ///< it ended normally and the outputs are known to be safe
-    failed,    ///< it died, or it could not verify the safe state
-    insisting  ///< it still runs and tries to verify the safe state
-  };
-  /// Dismisses the guardian after the run, when all files are written. Waits at most half a second for its end.
-  GuardianExit end() noexcept;
+  void arm(const runtime::Scheduling& controller) override;
+  [[nodiscard]] bool alive() const noexcept override;
+  [[nodiscard]] bool armed() const noexcept override { return pid_ != 0; }
+  [[nodiscard]] pid_t pid() const noexcept override { return pid_; }
+  GuardEnd end() noexcept override;
 
  private:
   void start();
-  void wait_until_ready();
+  /// Returns what the guardian has of the real-time set-up.
+  [[nodiscard]] runtime::Scheduling wait_until_ready();
   [[nodiscard]] bool ended_within(int timeout_ms) const noexcept;
 
-  SharedRegion& region_;
   std::string program_;
   std::string launch_config_;
-  std::string notes_{};
   pid_t pid_{0};
   int pidfd_{-1};
   int ready_{-1};

@@ -18,12 +18,15 @@ std::string to_text(const GuardianReport& report, int controller) {
     text += formatted(": no cycle for %.1f ms; the guardian ended it with SIGKILL before it wrote the safe state",
                       static_cast<double>(report.silence_ns) * 1e-6);
   }
+  if (report.reason != rig::Reason::controller_silent && report.ended_controller) {
+    text += ": the controller did not give the outputs back in time; the guardian ended it with SIGKILL";
+  }
   text += '\n';
   if (!report.acted) return text + "the controller had already made the outputs safe: the guardian wrote nothing\n";
   if (report.controller_gone_ns != 0) {
     text += formatted("the controller's process had ended %.3f ms after the guardian noticed\n",
                       ms_between(report.noticed_ns, report.controller_gone_ns));
-  } else if (report.reason != rig::Reason::safe_state_unverified) {
+  } else if (!report.controller_lives) {
     text += "THE CONTROLLER'S PROCESS DID NOT END: it hangs in the kernel\n";
   }
   if (report.verified) {

@@ -1,13 +1,16 @@
 #include "guardian/linux_process.hpp"
 
 #include <poll.h>
+#include <sys/mman.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <csignal>
 #include <ctime>
+#include <fstream>
 
 #include "abs_hil/rig/time_units.hpp"
 
@@ -30,6 +33,40 @@ bool LinuxProcess::gone_by(std::int64_t time_ns) noexcept {
   }
 }
 
-void LinuxProcess::end() noexcept { static_cast<void>(::syscall(SYS_pidfd_send_signal, pidfd_, SIGKILL, nullptr, 0)); }
+void LinuxProcess::end() noexcept { static_cast<void>(send_signal(pidfd_, SIGKILL)); }
+
+bool send_signal(int pidfd, int signal) noexcept {
+  return ::syscall(SYS_pidfd_send_signal, pidfd, signal, nullptr, 0) == 0;
+}
+
+pid_t process_of(int pidfd) {
+  std::ifstream info("/proc/self/fdinfo/" + std::to_string(pidfd));
+  std::string field;
+  while (info >> field) {
+    pid_t pid = 0;
+    if (field == "Pid:" && info >> pid) return std::max(pid, 0);
+  }
+  return 0;
+}
+
+int text_in_memory(const std::string& text) {
+  const int fd = ::memfd_create("abs_hil launch config", MFD_CLOEXEC);
+  if (fd < 0) return -1;
+  if (::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size())) return fd;
+  ::close(fd);
+  errno = EIO;
+  return -1;
+}
+
+std::string text_behind(int fd) {
+  constexpr std::size_t longest = std::size_t{16} << 20U;
+  std::string text;
+  std::array<char, 4096> part{};
+  for (ssize_t got = 0;
+       text.size() < longest && (got = ::pread(fd, part.data(), part.size(), static_cast<off_t>(text.size()))) > 0;) {
+    text.append(part.data(), static_cast<std::size_t>(got));
+  }
+  return text;
+}
 
 }  // namespace abs_hil::guardian

@@ -15,6 +15,16 @@ struct GuardianOptions {
   ABS_HIL_OPTION(double, insist_s, 10.0, .unit = "s",
                  .meaning = "how long the guardian goes on trying to verify the safe state",
                  .range = rig::between(0.1, 600));
+  ABS_HIL_OPTION(std::string, resident, "auto",
+                 .meaning =
+                     "who guards a run on a board. auto: the resident service on a real board if there is one, "
+                     "else a guardian of the run's own; require: the service; off: a guardian of the run's own",
+                 .allowed = {"auto", "require", "off"});
+  ABS_HIL_OPTION(std::string, socket, "/run/abs_hil/guardian.sock",
+                 .meaning = "socket at which the resident service grants leases");
+  ABS_HIL_OPTION(double, keep_ms, 250.0, .unit = "ms",
+                 .meaning = "resident service without a lease: time from one verified safe state to the next",
+                 .range = rig::between(10, 10'000));
 };
 
 }  // namespace abs_hil::guardian

@@ -9,6 +9,7 @@ void Watchdog::measure_silence(const HeartbeatReading& reading) noexcept {
   const bool beat = reading.cycle_beats != last_beats_;
   // There is no heartbeat before the first cycle, and no output can be driven before it.
   silence_ns_ = beat || reading.cycle_beats == 0 ? 0 : silence_ns_ + since_last_look_ns;
+  if (reading.taken_back_for != rig::Reason::none) asked_back_ns_ += since_last_look_ns;
   last_look_ns_ = reading.now_ns;
   last_beats_ = reading.cycle_beats;
 }
@@ -25,11 +26,21 @@ Verdict Watchdog::look(const HeartbeatReading& reading) noexcept {
     reason_ = rig::Reason::controller_died;
     return reading.stage == Stage::released ? Verdict::dismissed : Verdict::make_safe;
   }
+  if (reading.taken_back_for != rig::Reason::none) {
+    // The controller has made the outputs safe. The guardian verifies it with its own handle.
+    const bool given_back = reading.stage == Stage::released;
+    const std::int64_t patience_ns = timeout_ns_ + (reading.stage == Stage::making_safe ? making_safe_ns_ : 0);
+    if (!given_back && asked_back_ns_ < patience_ns) return Verdict::wait;
+    reason_ = reading.taken_back_for;
+    must_end_controller_ = !given_back;
+    return Verdict::make_safe;
+  }
   const bool silent = reading.stage == Stage::guarded       ? silence_ns_ >= timeout_ns_
                       : reading.stage == Stage::making_safe ? silence_ns_ >= timeout_ns_ + making_safe_ns_
                                                             : false;
   if (silent) {
     reason_ = rig::Reason::controller_silent;
+    must_end_controller_ = true;
     return Verdict::make_safe;
   }
   return Verdict::wait;

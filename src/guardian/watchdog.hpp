@@ -9,10 +9,11 @@ namespace abs_hil::guardian {
 
 /// One look of the guardian at the controller.
 struct HeartbeatReading {
-  std::int64_t now_ns{0};        ///< guardian's clock
-  std::uint64_t cycle_beats{0};  ///< heartbeats of the cycle's thread; 0: no cycle has begun yet
-  Stage stage{Stage::guarded};   ///< read after `controller_gone`
-  bool controller_gone{false};   ///< the process and all its threads have ended
+  std::int64_t now_ns{0};                         ///< guardian's clock
+  std::uint64_t cycle_beats{0};                   ///< heartbeats of the cycle's thread; 0: no cycle has begun yet
+  Stage stage{Stage::guarded};                    ///< read after `controller_gone`
+  bool controller_gone{false};                    ///< the process and all its threads have ended
+  rig::Reason taken_back_for{rig::Reason::none};  ///< why the controller was asked to make the outputs safe; none: not
 };
 
 /// What the guardian has to do.
@@ -25,6 +26,8 @@ enum class Verdict : std::uint8_t {
 /// Decides from heartbeat and stage whether the outputs must be made safe. A heartbeat is a change of the cycle count.
 /// Silence is measured in the guardian's own time: each look adds at most two look periods, so a pause of the guardian,
 /// or of the whole computer, does not count as silence of the controller. The first reason stays.
+///
+/// A controller that was asked to give the outputs back has the timeout for it. After that it counts as silent.
 class Watchdog {
  public:
   /// @param timeout_ns  longest silence of the controller, > 0
@@ -41,7 +44,7 @@ class Watchdog {
   /// Time without a heartbeat up to the last look.
   [[nodiscard]] std::int64_t silence_ns() const noexcept { return silence_ns_; }
   /// True if the controller may still write and must be ended first.
-  [[nodiscard]] bool must_end_controller() const noexcept { return reason_ == rig::Reason::controller_silent; }
+  [[nodiscard]] bool must_end_controller() const noexcept { return must_end_controller_; }
 
  private:
   void measure_silence(const HeartbeatReading& reading) noexcept;
@@ -52,6 +55,8 @@ class Watchdog {
   std::int64_t last_look_ns_{0};
   std::uint64_t last_beats_{0};
   std::int64_t silence_ns_{0};
+  std::int64_t asked_back_ns_{0};  ///< time since the controller was asked to give the outputs back
+  bool must_end_controller_{false};
   rig::Reason reason_{rig::Reason::none};
 };
 

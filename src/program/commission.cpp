@@ -38,43 +38,60 @@ class Terminal final : public experiment::Dialog {
 /// A guardian for each pulse. Between pulses the outputs are 0 and the program waits for a person, without heartbeats.
 class GuardedPulse final : public experiment::PulseGuard {
  public:
-  GuardedPulse(const RunRequest& request, driver::RigDriver& driver) : request_(request), driver_(driver) {}
-  ~GuardedPulse() override { driver_.tell_before_making_safe(nullptr); }
+  /// @param lease  null: a guardian of its own for each pulse
+  GuardedPulse(const RunRequest& request, driver::RigDriver& driver, guardian::GuardianLease* lease)
+      : request_(request), driver_(driver), lease_(lease) {}
+  ~GuardedPulse() override {
+    driver_.tell_before_making_safe(nullptr);
+    if (guardian_ != nullptr) static_cast<void>(guardian_->end());  // it uses this object's memory
+  }
 
   void begin() override {
     if (!needs_guardian(request_)) return;
     region_.emplace(1);
     watch_.emplace(region_->panel(), region_->recorder());
-    guardian_.emplace(*region_, guardian::guardian_program(), guardian_launch_json(request_, {}));
-    guardian_->arm();
+    const std::string launch_config = guardian_launch_json(request_, {});
+    if (lease_ != nullptr) {
+      lease_->cover(*region_, launch_config);
+      guardian_ = lease_;
+    } else {
+      own_guardian_.emplace(*region_, guardian::guardian_program(), launch_config);
+      guardian_ = &*own_guardian_;
+    }
+    // The pulses run in this thread.
+    guardian_->arm(runtime::scheduling_of_this_thread());
     driver_.tell_before_making_safe(&*guardian_);
   }
   [[nodiscard]] bool beat() noexcept override {
-    if (!guardian_ || !watch_) return true;
+    if (guardian_ == nullptr || !watch_) return true;
     watch_->beat();
-    return guardian_->alive();
+    return guardian_->alive() && watch_->taken_back_for() == rig::Reason::none;
   }
   void end(bool safe) noexcept override {
-    if (!guardian_) return;
+    if (guardian_ == nullptr) return;
     driver_.tell_before_making_safe(nullptr);
     guardian_->outputs_released(safe);
     static_cast<void>(guardian_->end());
-    guardian_.reset();
+    guardian_ = nullptr;
+    own_guardian_.reset();
   }
 
  private:
   const RunRequest& request_;
   driver::RigDriver& driver_;
+  guardian::GuardianLease* lease_;
   // The guardian must be destroyed before the region that it uses.
   std::optional<guardian::SharedRegion> region_{};
   std::optional<runtime::Heartbeat> watch_{};
-  std::optional<guardian::GuardianProcess> guardian_{};
+  std::optional<guardian::GuardianProcess> own_guardian_{};
+  guardian::Guard* guardian_{nullptr};
 };
 
 }  // namespace
 
 int commission(const RunRequest& request, const experiment::CommissioningOptions& options) {
   const driver::DriverOptions& driver_options = request.settings.driver;
+  const auto lease = ask_for_lease(request);
   const auto driver = driver::make_rig_driver(driver_options);
   runtime::MonotonicClock clock;
   Terminal terminal;
@@ -82,7 +99,7 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
   terminal.tell(
       "Commissioning in four steps; the program asks before each. First do what docs/rig-setup.md requires.\n"
       "The E-stop cuts the drive only, not the brake. A guardian stands by during each pulse (docs/dead-man.md).");
-  GuardedPulse guard(request, *driver);
+  GuardedPulse guard(request, *driver, lease.get());
   experiment::Commissioning commissioning(*driver, clock, terminal, guard, options,
                                           [] { return signalled() != rig::Reason::none; });
   switch (commissioning.run()) {

@@ -20,6 +20,7 @@
 #include "control/silent_settings.hpp"
 #include "driver/factory.hpp"
 #include "experiment/run_session.hpp"
+#include "guardian/kept_board.hpp"
 #include "program/board_notes.hpp"
 #include "program/exit_status.hpp"
 #include "program/run_monitor.hpp"
@@ -160,9 +161,8 @@ runtime::OverrunOptions overruns_of(const RunRequest& request) {
 }
 
 /// Checks in advance, as far as possible, that a guardian can start.
-void require_guardian(const RunRequest& request) {
-  if (!needs_guardian(request)) return;
-  static_cast<void>(driver::make_safe_state_writer(request.settings.driver));
+void require_own_guardian(const RunRequest& request) {
+  static_cast<void>(guardian::safe_state_writer_of(request.settings.driver));
   const std::string program = guardian::guardian_program();
   if (::access(program.c_str(), X_OK) == 0) return;
   throw driver::Unavailable(
@@ -172,9 +172,9 @@ void require_guardian(const RunRequest& request) {
 
 /// Checks the required resources before the run's files are opened, so that a failure leaves an earlier run's files
 /// unchanged. Throws driver::Unavailable. The run itself obtains the resources again.
-void require_resources(const RunRequest& request, driver::RigDriver& driver) {
+void require_resources(const RunRequest& request, driver::RigDriver& driver, bool has_lease) {
   driver.configure();
-  require_guardian(request);
+  if (needs_guardian(request) && !has_lease) require_own_guardian(request);
   if (request.outputs.fast || request.settings.realtime.mode != runtime::RealtimeMode::require) return;
   runtime::RealtimeReport report;
   // Uses a thread of its own: its scheduling class disappears with it.
@@ -220,6 +220,8 @@ int run(const RunRequest& request) {
   runtime::MonotonicClock real_clock;
   runtime::VirtualClock virtual_clock;
   runtime::Clock& clock = request.outputs.fast ? static_cast<runtime::Clock&>(virtual_clock) : real_clock;
+  // Outlives the driver: the service takes the board back when nobody has it open any more.
+  const std::unique_ptr<guardian::GuardianLease> lease = ask_for_lease(request);
   const std::unique_ptr<driver::RigDriver> driver = with_faults(make_driver(s, request.outputs.fast), s, clock);
   config::Plan plan = config::plan(*request.script, s);
   for (const std::string& problem : config::beyond_limits(plan, s))
@@ -227,7 +229,7 @@ int run(const RunRequest& request) {
   const bool to_stop = config::means_to_stop(plan, s.experiment.end_speed_m_s);
   experiment::RunLogicParts logic = make_logic(s, std::move(plan.phases), plan.limits);
   for (const std::string& problem : control::silent_settings(s.control)) spdlog::warn("{}", problem);
-  require_resources(request, *driver);
+  require_resources(request, *driver, lease != nullptr);
   RunOutputs outputs(request, logic.names);
   runtime::OverrunReporter late_cycles(std::llround(1e9 / s.control.rate_Hz));
   std::vector<rig::RecordSink*> sinks = outputs.sinks();
@@ -236,7 +238,8 @@ int run(const RunRequest& request) {
   TimingMessages timing(request, session, late_cycles);
   outputs.attach(session);
   const auto& folder = outputs.folder();
-  RunMonitor run_monitor(request, flight_record_prefix(request, folder ? folder->path() : std::filesystem::path()),
+  RunMonitor run_monitor(request, lease.get(),
+                         flight_record_prefix(request, folder ? folder->path() : std::filesystem::path()),
                          outputs.names());
   run_monitor.attach(session);
   note_signals();

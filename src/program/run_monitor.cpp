@@ -37,10 +37,6 @@ std::string name_of(runtime::RealtimeMode mode) {
 
 }  // namespace
 
-bool needs_guardian(const RunRequest& request) {
-  return request.settings.backend == "rig" && !request.outputs.fast && request.settings.guardian.enabled;
-}
-
 std::string guardian_launch_json(const RunRequest& request, const std::filesystem::path& record_prefix,
                                  const std::vector<std::string>& signals) {
   const config::Settings& s = request.settings;
@@ -55,30 +51,43 @@ std::string guardian_launch_json(const RunRequest& request, const std::filesyste
                                         .record_prefix = record_prefix.string()});
 }
 
-RunMonitor::RunMonitor(const RunRequest& request, std::filesystem::path record_prefix, rig::RunNames names)
+RunMonitor::RunMonitor(const RunRequest& request, guardian::GuardianLease* lease, std::filesystem::path record_prefix,
+                       rig::RunNames names)
     : names_(std::move(names)),
       record_prefix_(std::move(record_prefix)),
       region_(runtime::FlightRing::slots_for(recorded_s, request.settings.control.rate_Hz)),
       heartbeat_(region_.panel(), region_.recorder(),
-                 needs_guardian(request) ? silent_cycles_max(request.settings) : 0) {
+                 needs_guardian(request) ? silent_cycles_max(request.settings) : 0),
+      resident_(lease != nullptr),
+      request_(request) {
   if (!needs_guardian(request)) return;
-  guardian_.emplace(region_, guardian::guardian_program(),
-                    guardian_launch_json(request, record_prefix_, names_.signals));
+  const std::string launch_config = guardian_launch_json(request, record_prefix_, names_.signals);
+  if (lease != nullptr) {
+    lease->cover(region_, launch_config);
+    guardian_ = lease;
+    return;
+  }
+  own_guardian_.emplace(region_, guardian::guardian_program(), launch_config);
+  guardian_ = &*own_guardian_;
+}
+
+RunMonitor::~RunMonitor() {
+  if (guardian_ != nullptr) static_cast<void>(guardian_->end());
 }
 
 void RunMonitor::attach(experiment::RunSession& session) {
   session.set_heartbeat(heartbeat_);
-  if (guardian_) session.guard_with(*guardian_);
+  if (guardian_ != nullptr) session.guard_with(*guardian_);
 }
 
 rig::Reason RunMonitor::poll() {
-  if (!guardian_ || guardian_->pid() == 0) return rig::Reason::none;
+  if (guardian_ == nullptr || !guardian_->armed()) return rig::Reason::none;
   if (!std::exchange(told_notes_, true)) {
+    const std::string who = who_guards(*guardian_, resident_, request_);
     if (guardian_->notes().empty()) {
-      spdlog::info("guardian: process {} stands by", guardian_->pid());
+      spdlog::info("guardian: {}", who);
     } else {
-      spdlog::warn("guardian: process {} stands by, but without real-time scheduling: it may act late\n{}",
-                   guardian_->pid(), guardian_->notes());
+      spdlog::warn("guardian: {}. It has no real-time scheduling and may act late\n{}", who, guardian_->notes());
     }
   }
   // A guardian that has already taken over the outputs has not died.
@@ -107,15 +116,15 @@ void RunMonitor::write_record(const RunRequest& request, rig::Reason reason, dou
 }
 
 void RunMonitor::end() {
-  if (!guardian_) return;
+  if (guardian_ == nullptr) return;
   const pid_t pid = guardian_->pid();
   switch (guardian_->end()) {
-    case guardian::GuardianProcess::GuardianExit::none:
-    case guardian::GuardianProcess::GuardianExit::ended: return;
-    case guardian::GuardianProcess::GuardianExit::failed:
+    case guardian::GuardEnd::none:
+    case guardian::GuardEnd::ended: return;
+    case guardian::GuardEnd::failed:
       spdlog::error("guardian: process {} ended with an error: see its messages above", pid);
       return;
-    case guardian::GuardianProcess::GuardianExit::insisting:
+    case guardian::GuardEnd::insisting:
       spdlog::error("guardian: process {} still tries to make the outputs safe and will report the result", pid);
   }
 }

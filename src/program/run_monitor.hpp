@@ -8,11 +8,9 @@
 #include "guardian/guardian_process.hpp"
 #include "guardian/shared_region.hpp"
 #include "program/command_line.hpp"
+#include "program/guarding.hpp"
 
 namespace abs_hil::program {
-
-/// Whether a run needs a guardian: only in real time on a board. In simulation and in virtual time nothing real moves.
-[[nodiscard]] bool needs_guardian(const RunRequest& request);
 
 /// The launch configuration of the run's guardian, as JSON.
 [[nodiscard]] std::string guardian_launch_json(const RunRequest& request, const std::filesystem::path& record_prefix,
@@ -21,13 +19,20 @@ namespace abs_hil::program {
 /// Monitors a run: it keeps the flight record of every run, and starts the guardian for a run in real time on a board.
 class RunMonitor {
  public:
+  /// @param lease  guards the run if there is one, and must outlive this object; null: a guardian of the run's own does
   /// @param record_prefix  path and first part of the names of files that are written after a fault; empty: none
-  /// Throws config::ConfigError if no shared memory can be had.
-  RunMonitor(const RunRequest& request, std::filesystem::path record_prefix, rig::RunNames names = {});
+  /// `request` must outlive this object. Throws config::ConfigError if no shared memory can be had.
+  RunMonitor(const RunRequest& request, guardian::GuardianLease* lease, std::filesystem::path record_prefix,
+             rig::RunNames names = {});
+
+  RunMonitor(const RunMonitor&) = delete;
+  RunMonitor& operator=(const RunMonitor&) = delete;
+  /// Ends the guardian unless `end` did: it uses this object's memory.
+  ~RunMonitor();
 
   /// Attaches the monitor to the session, which must not run after this object is destroyed.
   void attach(experiment::RunSession& session);
-  [[nodiscard]] bool has_guardian() const noexcept { return guardian_.has_value(); }
+  [[nodiscard]] bool has_guardian() const noexcept { return guardian_ != nullptr; }
   /// Called every few milliseconds. Returns the stop reason if the guardian died, else `none`.
   [[nodiscard]] rig::Reason poll();
   /// After a fault: writes the flight record and logs its path.
@@ -39,8 +44,11 @@ class RunMonitor {
   rig::RunNames names_;
   std::filesystem::path record_prefix_;
   guardian::SharedRegion region_;
-  std::optional<guardian::GuardianProcess> guardian_;
+  std::optional<guardian::GuardianProcess> own_guardian_;
+  guardian::Guard* guardian_{nullptr};
   runtime::Heartbeat heartbeat_;
+  bool resident_;
+  const RunRequest& request_;
   bool told_notes_{false};
 };
 

@@ -76,6 +76,14 @@ void CyclicExecutive::watch_time(std::int64_t woken_ns) noexcept {
   if (gap_ns > gap_max_ns_) gate_.latch(rig::Reason::cycle_gap, static_cast<double>(gap_ns) * rig::s_per_ns);
 }
 
+// The program stood still between the wake-up and the write. What it computed before must not be sent afterwards.
+void CyclicExecutive::latch_stale_command(std::int64_t age_ns) noexcept {
+  if (!acting_) return;
+  const double age_s = static_cast<double>(age_ns) * rig::s_per_ns;
+  gate_.latch(rig::Reason::cycle_gap, age_s);
+  logic_.end_early(rig::Reason::cycle_gap, age_s);
+}
+
 void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   if (heartbeat_ != nullptr) {
     heartbeat_->beat();
@@ -85,6 +93,9 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   }
   const std::int64_t woken_ns = clock_.now_ns();
   watch_time(woken_ns);
+  if (heartbeat_ != nullptr) {
+    if (const rig::Reason why = heartbeat_->taken_back_for(); why != rig::Reason::none) gate_.latch(why, 0.0);
+  }
   if (sequence_ == 0) start_ns_ = woken_ns;
   record.sequence = sequence_++;
   record.stamp_ns = woken_ns;
@@ -119,8 +130,10 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   acting_ = rig::acts(gated.command);
   if (gated.fault != rig::Reason::none) logic_.end_early(gated.fault, gated.fault_value);
   const std::int64_t control_ns = clock_.now_ns();
+  const bool stale = control_ns - woken_ns > gap_max_ns_;
+  if (stale) latch_stale_command(control_ns - woken_ns);
 
-  const driver::IoResult written = driver_.write(gated.command, record.command);
+  const driver::IoResult written = driver_.write(stale ? rig::safe_command : gated.command, record.command);
   if (!written.ok()) {
     if (io_error_.ok()) io_error_ = written;
     const rig::Reason reason = driver::reason_of(written, rig::Reason::driver_write_failed);

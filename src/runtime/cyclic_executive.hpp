@@ -64,6 +64,7 @@ class CyclicExecutive {
  private:
   void run_cycle(rig::CycleRecord& record) noexcept;
   void watch_time(std::int64_t woken_ns) noexcept;
+  void latch_stale_command(std::int64_t age_ns) noexcept;
   void keep(const rig::CycleRecord& record) noexcept;
   void schedule_next(const rig::CycleTiming& timing) noexcept;
   void count_late(const rig::CycleTiming& timing, std::int64_t ticks_missed) noexcept;

@@ -4,7 +4,9 @@
 #include <cstdint>
 
 #include "abs_hil/driver/rig_driver.hpp"
+#include "abs_hil/rig/reason.hpp"
 #include "runtime/flight_ring.hpp"
+#include "runtime/scheduling.hpp"
 
 namespace abs_hil::runtime {
 
@@ -14,7 +16,10 @@ struct HeartbeatPanel {
   alignas(64) std::atomic<std::uint64_t> cycle_beats{0};     ///< the cycle's thread adds 1 at the start of each cycle
   alignas(64) std::atomic<std::uint64_t> safe_beats{0};      ///< it adds 1 each time before it makes the outputs safe
   alignas(64) std::atomic<std::uint64_t> guardian_beats{0};  ///< the guardian adds 1 each time it looks
+  /// The guardian takes the outputs back: the cycle must make them safe. The first reason stays.
+  alignas(64) std::atomic<rig::Reason> taken_back_for{rig::Reason::none};
 };
+static_assert(std::atomic<rig::Reason>::is_always_lock_free);
 
 /// The cycle's side of the supervision: it beats, fills the flight recorder, and checks that the guardian still beats.
 /// Real-time safe.
@@ -35,6 +40,10 @@ class Heartbeat {
     guardian_beats_ = seen;
     return silent_cycles_ >= silent_cycles_max_;
   }
+  /// Why the guardian takes the outputs back; `none` while the cycle may drive them.
+  [[nodiscard]] rig::Reason taken_back_for() const noexcept {
+    return panel_.taken_back_for.load(std::memory_order_relaxed);
+  }
   void keep(const rig::CycleRecord& record) noexcept { recorder_.push(record); }
   [[nodiscard]] std::uint64_t silent_cycles() const noexcept { return silent_cycles_; }
 
@@ -53,7 +62,8 @@ class RunGuard : public driver::MakingSafeListener {
  public:
   /// Arms the supervisor; the driver is configured and inactive. Throws driver::Unavailable: the run must not start
   /// then.
-  virtual void arm() = 0;
+  /// @param controller  what the cycle's thread has; a weaker supervisor is refused, because it would act too late
+  virtual void arm(const Scheduling& controller) = 0;
   /// Tells that the driver was deactivated. The thread that deactivated it makes the call. Real-time safe.
   /// @param safe  true if the board is known to be in the safe state
   virtual void outputs_released(bool safe) noexcept = 0;

@@ -77,6 +77,8 @@ RealtimeStep judged(RealtimeStep step, long faults_when_repeated) {
 
 }  // namespace
 
+bool memory_is_locked() { return locked_kB() > 0; }
+
 RealtimeStep lock_memory() {
   RealtimeStep step{.what = "memory locked (mlockall)"};
   const int result = mlockall(MCL_CURRENT | MCL_FUTURE);

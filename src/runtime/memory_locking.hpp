@@ -4,6 +4,8 @@
 
 namespace abs_hil::runtime {
 
+/// True if the kernel shows locked memory of this process.
+[[nodiscard]] bool memory_is_locked();
 /// Locks all memory of this process, present and future.
 [[nodiscard]] RealtimeStep lock_memory();
 /// Grows the heap once, touches it, and keeps it from shrinking.

@@ -9,10 +9,15 @@ namespace abs_hil::runtime {
 
 namespace {
 
-std::string program_path() {
+/// This program, and the guardian beside it: a guardian with fewer rights than its controller is refused.
+std::string program_paths() {
   std::array<char, 4096> path{};
   const ssize_t size = ::readlink("/proc/self/exe", path.data(), path.size());
-  return size > 0 ? std::string(path.data(), static_cast<std::size_t>(size)) : "$(command -v abs_hil)";
+  if (size <= 0) return "$(command -v abs_hil) $(command -v abs_guardian)";
+  const std::string program(path.data(), static_cast<std::size_t>(size));
+  const std::string guardian = program.substr(0, program.rfind('/') + 1) + "abs_guardian";
+  const bool has_guardian = guardian != program && ::access(guardian.c_str(), F_OK) == 0;
+  return has_guardian ? program + " " + guardian : program;
 }
 
 }  // namespace
@@ -21,8 +26,8 @@ std::string privilege_fix() {
   return "sudo groupadd -f realtime && sudo usermod -aG realtime $USER\n"
          "printf '@realtime - rtprio 98\\n@realtime - memlock unlimited\\n' | sudo tee "
          "/etc/security/limits.d/99-realtime.conf   # then log in again\n"
-         "or, for this program alone: sudo setcap cap_sys_nice,cap_ipc_lock+ep " +
-         program_path();
+         "or, for these programs alone: sudo setcap cap_sys_nice,cap_ipc_lock+ep " +
+         program_paths();
 }
 
 std::string fifo_fix(int priority) {

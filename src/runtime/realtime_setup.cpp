@@ -110,7 +110,10 @@ void keep_signals_away() noexcept {
 }
 
 RealtimeScope::RealtimeScope(const RealtimeOptions& options) {
-  if (options.mode == RealtimeMode::off) return;
+  if (options.mode == RealtimeMode::off) {
+    report_.scheduling = scheduling_of_this_thread();
+    return;
+  }
   report_.steps.push_back(lock_memory());
   report_.steps.push_back(prefault_heap());
   report_.steps.push_back(prefault_stack());
@@ -119,6 +122,7 @@ RealtimeScope::RealtimeScope(const RealtimeOptions& options) {
   report_.steps.push_back(least_timer_slack());
   report_.steps.push_back(schedule_fifo(options.priority));
   hold_cpu_latency();
+  report_.scheduling = scheduling_of_this_thread();
 }
 
 RealtimeScope::~RealtimeScope() {

@@ -6,6 +6,7 @@
 
 #include "abs_hil/rig/option.hpp"
 #include "runtime/cyclic_executive.hpp"
+#include "runtime/scheduling.hpp"
 
 namespace abs_hil::runtime {
 
@@ -37,6 +38,7 @@ struct RealtimeStep {
 /// Result of setting up this process and the calling thread for real time.
 struct RealtimeReport {
   std::vector<RealtimeStep> steps;
+  Scheduling scheduling{};  ///< what the thread has in the end, asked for or not
   /// True only if every required step was obtained.
   [[nodiscard]] bool realtime() const noexcept;
   /// The steps that were not obtained, then their fixes, each once. Empty if every step was obtained.

@@ -239,6 +239,30 @@ class Guardian(RigTest):
         self.assertEqual(result.returncode, 2)
         self.assertIn('guardian.enabled', result.stderr)
 
+    @unittest.skipUnless(os.getuid() == 0 and shutil.which('setpriv'), 'needs root and setpriv')
+    def test_guardian_weaker_than_the_controller_is_refused(self):
+        """As after a setcap of abs_hil alone: the controller has SCHED_FIFO, its guardian has not."""
+        emulator = self.emulator()
+        alone = self.folder / 'weak'
+        alone.mkdir()
+        subprocess.run(['cp', PROGRAM, alone / 'abs_hil'], check=True)
+        real = pathlib.Path(PROGRAM).resolve().parent / 'abs_guardian'
+        for rights, weak in (('-sys_nice,-ipc_lock', 'no SCHED_FIFO'), ('+all', None)):
+            guardian = alone / 'abs_guardian'
+            guardian.write_text(f'#!/bin/sh\nexec prlimit --rtprio=0 --memlock=0 setpriv --bounding-set={rights} {real}\n')
+            guardian.chmod(0o755)
+            result = subprocess.run([alone / 'abs_hil', '--backend', 'rig', '--no-lcm', '--rt', 'prefer', *settings(
+                f'driver.pci.root={emulator.root}', f'guardian.timeout_ms={PATIENT_MS}',
+                'realtime.max_consecutive_overruns=0', 'experiment.cut_speed_rad_s=10')],
+                capture_output=True, text=True, timeout=60, cwd=self.folder)
+            if 'NOT IN REAL TIME' in result.stderr:
+                self.skipTest('this computer gives no real time')
+            self.assertEqual(result.returncode, 3 if weak else 0, result.stderr)
+            if weak:
+                self.assertIn(weak, result.stderr)
+                self.assertIn('setcap', result.stderr)
+                self.assertEqual(emulator.wire(), SAFE)
+
     def test_card_being_made_safe_has_no_other_owner(self):
         emulator = self.emulator()
         program = self.start(emulator, PATIENT_MS, *settings('guardian.insist_s=3'))

@@ -16,7 +16,8 @@ namespace {
 std::string held_up_guardian(const std::filesystem::path& folder) {
   const std::string program = folder / "abs_guardian";
   const std::string ready = std::to_string(inherited_ready);
-  std::ofstream(program) << "#!/bin/sh\nprintf 'ready ' >&" << ready << "\nexec " << ready << ">&-\nexec sleep 20\n";
+  std::ofstream(program) << "#!/bin/sh\nprintf 'ready 0 0:' >&" << ready << "\nexec " << ready
+                         << ">&-\nexec sleep 20\n";
   ::chmod(program.c_str(), S_IRWXU);
   return program;
 }
@@ -25,21 +26,30 @@ TEST_CASE("handed-over outputs stay handed over until the guardian has read it")
   const test::TemporaryFolder folder;
   SharedRegion region(1);
   GuardianProcess guardian(region, held_up_guardian(folder.path), "{}");
-  guardian.arm();
+  guardian.arm({});
   const pid_t pid = guardian.pid();
   guardian.outputs_released(false);
-  CHECK(guardian.end() == GuardianProcess::GuardianExit::insisting);
+  CHECK(guardian.end() == GuardEnd::insisting);
   CHECK(region.stage() == Stage::handed_over);
   REQUIRE(::kill(pid, SIGKILL) == 0);  // the guardian still ran
+}
+
+TEST_CASE("a guardian that is weaker than its controller is refused") {
+  const test::TemporaryFolder folder;
+  SharedRegion region(1);
+  GuardianProcess guardian(region, held_up_guardian(folder.path), "{}");
+  CHECK_THROWS_WITH(guardian.arm({.fifo_priority = 80, .memory_locked = true}),
+                    Catch::Matchers::Contains("no SCHED_FIFO") && Catch::Matchers::Contains("setcap"));
+  CHECK_FALSE(guardian.armed());
 }
 
 TEST_CASE("a guardian that hangs although the outputs are safe is ended") {
   const test::TemporaryFolder folder;
   SharedRegion region(1);
   GuardianProcess guardian(region, held_up_guardian(folder.path), "{}");
-  guardian.arm();
+  guardian.arm({});
   guardian.outputs_released(true);
-  CHECK(guardian.end() == GuardianProcess::GuardianExit::failed);
+  CHECK(guardian.end() == GuardEnd::failed);
   CHECK(region.stage() == Stage::closed);
 }
 

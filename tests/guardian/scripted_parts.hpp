@@ -24,11 +24,15 @@ class ScriptedClock final : public runtime::Clock {
   }
   /// The computer pauses: no event happens meanwhile.
   void jump(std::int64_t duration_ns) { now_ += duration_ns; }
+  /// The computer is suspended: the monotonic clock stands still.
+  void suspend(std::int64_t duration_ns) { suspended_ns_ += duration_ns; }
+  [[nodiscard]] std::int64_t suspended_ns() noexcept override { return suspended_ns_; }
 
   std::function<void(std::int64_t)> happens;
 
  private:
   std::int64_t now_{1'000 * ms};
+  std::int64_t suspended_ns_{0};
 };
 
 /// Log of all actions in order, as text.
@@ -54,6 +58,12 @@ class ScriptedController final : public ControllerProcess {
   }
   [[nodiscard]] bool gone() { return clock_.now_ns() >= dies_at_ns; }
 
+  [[nodiscard]] rig::Reason must_give_back_for() noexcept override {
+    return clock_.now_ns() >= give_back_at_ns ? give_back_for : rig::Reason::none;
+  }
+
+  rig::Reason give_back_for{rig::Reason::computer_will_suspend};
+  std::int64_t give_back_at_ns{INT64_MAX};
   std::int64_t dies_at_ns{INT64_MAX};
   std::int64_t dying_takes_ns{200 * us};
 

@@ -13,6 +13,17 @@ grep -q "completed" run.txt || { echo "the installed program's run did not compl
 for plant in paper-table1 paper-timing inteco-manual; do
   [ -f "usr/share/abs_hil/config/plants/$plant.toml" ] || { echo "$plant.toml is not installed"; exit 1; }
 done
+for file in share/abs_hil/guardian.toml lib/systemd/system/abs-guardian.service lib/systemd/system/abs_guardian.slice \
+  lib/udev/rules.d/70-abs-hil.rules; do
+  [ -f "usr/$file" ] || { echo "$file is not installed"; exit 1; }
+done
+# The unit as systemd reads it; what it starts is the program that was just installed.
+if command -v systemd-analyze >/dev/null; then
+  sed "s|^ExecStart=abs_guardian|ExecStart=$scratch/usr/bin/abs_guardian|; /^Documentation=/d" \
+    usr/lib/systemd/system/abs-guardian.service >abs-guardian.service
+  cp usr/lib/systemd/system/abs_guardian.slice .
+  systemd-analyze verify ./abs-guardian.service || { echo "systemd finds fault with abs-guardian.service"; exit 1; }
+fi
 
 # Outside the source tree, and without a way back to it.
 cp -r "$source/examples/own_controller" example

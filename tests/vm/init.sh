@@ -21,7 +21,7 @@ mount -t devpts pts /guest/dev/pts
 mount -t tmpfs run /guest/run
 version=$(uname -r)
 mkdir -p "/guest/lib/modules/$version"
-mount -o bind "/lib/modules/$version" "/guest/lib/modules/$version"
+cp -r "/lib/modules/$version/." "/guest/lib/modules/$version" # switch_root empties this file system
 if grep -q with_out_folder /proc/cmdline; then
   mkdir -p /guest/out
   mount -t 9p -o trans=virtio,version=9p2000.L,msize=262144 out /guest/out
@@ -30,6 +30,20 @@ ip link set lo up
 
 cp /command /guest/run/command
 stty -F /dev/ttyS1 raw -echo
+if grep -q with_systemd /proc/cmdline; then
+  # systemd as the first process of this computer's files, with none of the services that are enabled here.
+  mkdir -p /guest/run/systemd/system
+  cp /vm-command.service /guest/run/systemd/system/
+  cat >/guest/run/command-and-end <<'END'
+/bin/bash /run/command >/dev/ttyS1 2>&1 </dev/null
+echo "vm-exit $?" >/dev/ttyS0
+printf '\001' | dd of=/dev/port bs=1 seek=244 2>/dev/null
+END
+  : >/guest/etc/fstab
+  echo 0123456789abcdef0123456789abcdef >/guest/etc/machine-id
+  rm -f /guest/.dockerenv
+  exec switch_root /guest /lib/systemd/systemd --unit=vm-command.service
+fi
 setsid chroot /guest /bin/bash /run/command >/dev/ttyS1 2>&1 </dev/null
 status=$?
 sync

@@ -7,6 +7,7 @@
 #   -s N, -m MEM  CPUs (2) and memory (1G)
 #   -t SECONDS    time limit on this computer's clock (120)
 #   -V            virtual time: one CPU whose clock counts instructions (8 ns each), so that timing repeats itself
+#   -S            systemd as the first process, COMMAND as a service of it
 #   -F            the same with 2 ns each: where two programs and a simulated rig share that CPU
 # Status 77: QEMU or the kernel cannot be had here, the reason on stderr (1 where CI=true or ABS_HIL_REQUIRE_VM=1).
 # Status 125: the machine ended without a status; its console is on stderr.
@@ -17,7 +18,7 @@ PATH=$PATH:/usr/sbin:/sbin  # modprobe, depmod
 
 modules='' out='' cpus=2 memory=1G limit_s=120 accelerator='tcg,thread=multi' boot_arguments=''
 qemu_arguments=()
-while getopts M:q:o:s:m:t:VF option; do
+while getopts M:q:o:s:m:t:VFS option; do
   case $option in
     M) modules=$OPTARG ;;
     q) read -ra words <<<"$OPTARG"; qemu_arguments+=("${words[@]}") ;;
@@ -25,8 +26,9 @@ while getopts M:q:o:s:m:t:VF option; do
     s) cpus=$OPTARG ;;
     m) memory=$OPTARG ;;
     t) limit_s=$OPTARG ;;
-    V) cpus=1 accelerator='tcg,thread=single'; qemu_arguments+=(-icount 'shift=3,sleep=off') ;;
-    F) cpus=1 accelerator='tcg,thread=single'; qemu_arguments+=(-icount 'shift=1,sleep=off') ;;
+    V) cpus=1 accelerator='tcg,thread=single'; qemu_arguments+=(-icount 'shift=3,sleep=off' -rtc 'base=utc,clock=vm') ;;
+    S) boot_arguments+=' with_systemd systemd.show_status=false systemd.log_level=warning' ;;
+    F) cpus=1 accelerator='tcg,thread=single'; qemu_arguments+=(-icount 'shift=1,sleep=off' -rtc 'base=utc,clock=vm') ;;
     *) exit 2 ;;
   esac
 done
@@ -41,6 +43,8 @@ cannot() {
   exit 77
 }
 
+[ -e /lib/systemd/systemd ] || [[ $boot_arguments != *with_systemd* ]] ||
+  cannot "systemd is not installed (scripts/setup.sh packages-vm.txt)"
 for program in qemu-system-x86_64 busybox cpio modprobe depmod python3; do
   command -v "$program" >/dev/null || cannot "$program is not installed (scripts/setup.sh packages-vm.txt)"
 done
@@ -52,7 +56,7 @@ trap 'rm -rf "$scratch"' EXIT
 disk=$scratch/disk
 mkdir -p "$disk"/{bin,proc,sys,dev} "$disk/lib/modules/$version"
 cp "$(command -v busybox)" "$disk/bin/busybox"
-for applet in sh mount mkdir cat modprobe ip stty setsid chroot dd printf poweroff sync cp grep uname echo; do
+for applet in sh mount mkdir cat modprobe ip stty setsid chroot dd printf poweroff sync cp grep uname echo rm switch_root; do
   ln -s busybox "$disk/bin/$applet"
 done
 boot_modules='virtio_pci 9pnet_virtio 9p overlay'
@@ -64,10 +68,11 @@ cp "$kernel/lib/modules/$version"/modules.{builtin,builtin.modinfo,order} "$disk
 depmod -b "$disk" "$version"
 printf 'export HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin\ncd %q\n%s\n' "$PWD" "$*" >"$disk/command"
 install -m 755 "$here/init.sh" "$disk/init"
+cp "$here/vm-command.service" "$disk/"
 (cd "$disk" && find . | cpio -o -H newc -R 0:0 --quiet) >"$scratch/initrd"
 if [ -n "$out" ]; then
   qemu_arguments+=(-virtfs "local,path=$out,mount_tag=out,security_model=none")
-  boot_arguments=with_out_folder
+  boot_arguments+=' with_out_folder'
 fi
 
 # no_timer_check: on a busy host the kernel's look at its timer may see no tick, and it would give up.

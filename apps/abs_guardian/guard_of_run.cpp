@@ -1,0 +1,93 @@
+#include "guard_of_run.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <string>
+
+#include "config/config_json.hpp"
+#include "config/key_table.hpp"
+#include "flight_files.hpp"
+#include "guardian/guardian_loop.hpp"
+#include "guardian/guardian_process.hpp"
+#include "guardian/kept_board.hpp"
+#include "guardian/launch_config.hpp"
+#include "guardian/linux_process.hpp"
+#include "process_set_up.hpp"
+
+namespace abs_hil::app {
+
+namespace {
+
+void tell_controller(const std::string& text) {
+  [[maybe_unused]] const auto written = ::write(guardian::inherited_ready, text.data(), text.size());
+  ::close(guardian::inherited_ready);
+}
+
+/// Everything that the guardian needs, ready before the controller continues.
+struct GuardianSetup {
+  guardian::LaunchConfig launch{};
+  config::Settings settings{};
+  std::unique_ptr<driver::SafeStateWriter> writer{};
+  std::unique_ptr<runtime::RealtimeScope> realtime{};
+};
+
+GuardianSetup set_up() {
+  GuardianSetup setup{.launch =
+                          guardian::parse_launch_config(guardian::text_behind(guardian::inherited_launch_config))};
+  config::KeyTable keys(setup.settings);
+  // Only these tables: others may name things that the guardian does not know, such as a user's own controller.
+  config::load_tables(setup.launch.config_json, {"driver", "guardian", "realtime", "telemetry"}, keys,
+                      "the controller's configuration");
+  setup.writer = guardian::safe_state_writer_of(setup.settings.driver);
+  setup.writer->prepare();
+  const runtime::RealtimeOptions realtime = realtime_options(setup.settings, realtime_mode_of(setup.launch.realtime));
+  setup.realtime = std::make_unique<runtime::RealtimeScope>(realtime);
+  if (realtime.mode == runtime::RealtimeMode::require && !setup.realtime->report().realtime()) {
+    throw driver::Unavailable("real time is required, but the guardian cannot get it\n" +
+                              setup.realtime->report().shortcomings());
+  }
+  return setup;
+}
+
+int guard() {
+  guardian::SharedRegion region = guardian::SharedRegion::attach(guardian::inherited_region);
+  const pid_t controller_pid = ::getppid();
+  guardian::LinuxProcess controller(guardian::inherited_controller);
+  const GuardianSetup setup = set_up();
+  const runtime::RealtimeReport& realtime = setup.realtime->report();
+  runtime::MonotonicClock clock;
+  guardian::GuardianLoop loop(clock, controller, region, *setup.writer, setup.settings.guardian);
+  const bool lacks = setup.launch.realtime == "prefer" && !realtime.realtime();
+  tell_controller(guardian::ready_text(realtime.scheduling, lacks ? realtime.shortcomings() : std::string()));
+
+  const guardian::GuardianReport report = loop.run();
+  if (report.reason == rig::Reason::none) return exit_verified;
+  // The outputs are dealt with: the rest need not be real-time safe.
+  const std::string account = guardian::to_text(report, controller_pid);
+  std::fprintf(stderr, "abs_guardian: %s", account.c_str());
+  write_flight_files(setup.launch, setup.settings.telemetry.channel_prefix, region, report, account);
+  return !report.acted || report.verified ? exit_verified : exit_not_verified;
+}
+
+}  // namespace
+
+bool started_by_a_run() { return ::fcntl(guardian::inherited_launch_config, F_GETFD) >= 0; }
+
+int guard_one_run() {
+  // It ends after the controller, whatever a terminal or a service manager sends.
+  ignore_signals({SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGTSTP, SIGTTIN, SIGTTOU, SIGUSR1, SIGUSR2, SIGXFSZ});
+  spare_from_oom();
+  try {
+    return guard();
+  } catch (const std::exception& error) {
+    tell_controller(std::string("error ") + error.what());
+    return exit_not_started;
+  }
+}
+
+}  // namespace abs_hil::app

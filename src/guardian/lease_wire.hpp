@@ -1,0 +1,55 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstdint>
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "driver/file_descriptor.hpp"
+#include "runtime/scheduling.hpp"
+
+namespace abs_hil::guardian {
+
+/// What controller and resident service say to each other, one packet each on a Unix socket (SOCK_SEQPACKET):
+///
+///     controller                                     service
+///     ask     text: the board; its pidfd      ->
+///                                             <-     granted, or refused with the reason in text
+///     cover   shared memory, launch config    ->             the service now guards the outputs
+///                                             <-     ready   with its scheduling, text: what it lacks; or refused
+///     (stage closed, in the shared memory)           the controller is done
+///                                             <-     ended   safe: verified
+///
+/// `cover` to `ended` may be repeated. The lease ends when the controller's process ends or its socket closes.
+enum class LeaseWord : std::uint32_t { ask = 1, granted, refused, cover, ready, ended };
+
+struct LeaseMessage {
+  LeaseWord word{LeaseWord::ask};
+  runtime::Scheduling scheduling{};  ///< of `ready`
+  bool safe{false};                  ///< of `ended`
+  std::string text{};                ///< at most 60,000 characters are sent
+  std::vector<driver::FileDescriptor> files{};
+};
+
+/// Sends a message and copies of `files`. False and errno if it could not be sent whole, at once.
+[[nodiscard]] bool send_message(int socket, const LeaseMessage& message, std::initializer_list<int> files = {});
+/// Receives the next message, if there is one within `timeout_ms`. Nothing after the other side's end, and for a packet
+/// that is no message of this build.
+[[nodiscard]] std::optional<LeaseMessage> receive_message(int socket, int timeout_ms);
+
+/// The process at the other end.
+struct Peer {
+  pid_t pid{0};
+  uid_t uid{0};
+  gid_t gid{0};
+};
+[[nodiscard]] Peer peer_of(int socket) noexcept;
+
+/// A socket bound to `path`, or connected to it. Returns a descriptor, or -1 and errno.
+[[nodiscard]] int listen_at(const std::string& path);
+[[nodiscard]] int connect_to(const std::string& path);
+
+}  // namespace abs_hil::guardian
