@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <string>
 
@@ -31,6 +32,7 @@ struct GuardianReport {
   rig::Reason reason{rig::Reason::none};  ///< `none`: the run ended in order and the guardian was dismissed
   bool acted{false};                      ///< the guardian wrote the safe state
   bool verified{false};                   ///< the guardian read the safe state back
+  bool released{false};                   ///< a person ended the guardian's tries
   driver::IoResult last_error{};          ///< error of the last failed try
   int tries{0};                           ///< number of attempts to write the safe state
   std::int64_t silence_ns{0};             ///< time without a heartbeat when the guardian decided to act
@@ -46,21 +48,26 @@ struct GuardianReport {
 ///    otherwise complete its write later and undo the safe state.
 /// 2. It waits up to 5 ms until the controller, its threads and their register accesses have ended.
 /// 3. It writes the safe state and reads it back. It repeats this until the safe state is verified and the controller
-///    has ended, for at most `insist_s`.
+///    has ended, until a person releases the guardian, or for at most `insist_s` if that is not 0.
 class GuardianLoop {
  public:
+  /// @param released  becomes true when a person releases the guardian from its tries, which counts only while it makes
+  ///                  them; null: nobody can
   GuardianLoop(runtime::Clock& clock, ControllerProcess& controller, SharedRegion& region,
-               driver::SafeStateWriter& writer, const GuardianOptions& options) noexcept;
+               driver::SafeStateWriter& writer, const GuardianOptions& options,
+               std::atomic<bool>* released = nullptr) noexcept;
   [[nodiscard]] GuardianReport run() noexcept;
   [[nodiscard]] std::int64_t look_period_ns() const noexcept { return look_period_ns_; }
 
  private:
   void make_safe(GuardianReport& report, bool handed_over) noexcept;
+  [[nodiscard]] bool must_give_up(GuardianReport& report, std::int64_t since_ns) const noexcept;
 
   runtime::Clock& clock_;
   ControllerProcess& controller_;
   SharedRegion& region_;
   driver::SafeStateWriter& writer_;
+  std::atomic<bool>* released_;
   std::int64_t timeout_ns_;
   std::int64_t insist_ns_;
   std::int64_t look_period_ns_;

@@ -17,6 +17,7 @@
 #include "config/plan.hpp"
 #include "control/silent_settings.hpp"
 #include "driver/factory.hpp"
+#include "experiment/board_record.hpp"
 #include "experiment/run_session.hpp"
 #include "program/board_notes.hpp"
 #include "program/exit_status.hpp"
@@ -26,6 +27,7 @@
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
 #include "rig/reason_text.hpp"
+#include "runtime/board_policy.hpp"
 #include "runtime/overrun_reporter.hpp"
 #include "telemetry/file_error.hpp"
 
@@ -169,6 +171,8 @@ void require_guardian(const RunRequest& request) {
 /// unchanged. Throws driver::Unavailable. The run itself obtains the resources again.
 void require_resources(const RunRequest& request, driver::RigDriver& driver) {
   driver.configure();
+  const config::Settings& s = request.settings;
+  if (s.on_rig() && runtime::is_real_board(s.driver)) experiment::require_record(s.driver, driver.identity());
   require_guardian(request);
   if (request.outputs.fast || request.settings.realtime.mode != runtime::RealtimeMode::require) return;
   runtime::RealtimeReport report;
