@@ -1,6 +1,6 @@
 #include "serial_board.hpp"
 
-#include <array>
+#include <filesystem>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -169,6 +169,7 @@ std::unique_ptr<SafeStateWriter> make_writer(const SerialOptions& options, const
 
 /// For `abs_hil doctor` and `abs_hil safe`.
 std::vector<FoundBoard> find(const SerialOptions& options) {
+  if (!std::filesystem::exists(options.port)) return {};
   return {{.what = "serial board at " + options.port, .files = {options.port}}};
 }
 
