@@ -4,6 +4,7 @@ its own, where a socket with a foreign source address stands for another compute
 usage: foreign_sender_test.py PROGRAM PRIVATE_NETWORK_SCRIPT PYTHON_MODULE_DIR
 """
 import socket
+import struct
 import sys
 import tempfile
 import time
@@ -22,6 +23,8 @@ def sender(foreign):
     if foreign:
         out.setsockopt(socket.SOL_IP, 19, 1)  # IP_TRANSPARENT
         out.bind((FOREIGN, 0))
+        loopback = struct.pack('@4s4si', bytes(4), bytes(4), socket.if_nametoindex('lo'))
+        out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, loopback)
     return out
 
 

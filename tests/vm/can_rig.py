@@ -82,7 +82,8 @@ class CanRigTest(unittest.TestCase):
              '--csv', self.folder / 'run.csv', '--log', self.folder / 'run.lcmlog', '--summary',
              self.folder / 'run.json', '--set', 'driver.kind=can', '--set', f'driver.can.interface={self.host}',
              '--set', f'driver.can.watchdog_ms={WATCHDOG_MS}', '--set', f'driver.records={self.folder}',
-             '--set', 'driver.emulated=true', *map(str, args)],
+             # A guardian that cannot verify would go on until a person releases it.
+             '--set', 'driver.emulated=true', '--set', 'guardian.insist_s=1', *map(str, args)],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.ends.append(lambda: (program.kill() if program.poll() is None else None, program.communicate()))
         return program
