@@ -178,17 +178,17 @@ void for_each_option(Options& options, const std::string& prefix, const Visit& v
               },
               target);
         });
-    return;
+  } else {
+    for_each_row<Mutable>([&](const auto& row) {
+      if constexpr (is_group_row<std::remove_cvref_t<decltype(row)>>) {
+        for_each_option(options.*row.member, std::string(prefix).append(row.prefix), visit, searched && row.searched);
+      } else {
+        OptionFacts facts = row.facts;
+        if (!searched) facts.search = {};
+        visit(std::string(prefix).append(facts.key), facts, options.*row.member);
+      }
+    });
   }
-  for_each_row<std::remove_const_t<Options>>([&](const auto& row) {
-    if constexpr (is_group_row<std::remove_cvref_t<decltype(row)>>) {
-      for_each_option(options.*row.member, std::string(prefix).append(row.prefix), visit, searched && row.searched);
-    } else {
-      OptionFacts facts = row.facts;
-      if (!searched) facts.search = {};
-      visit(std::string(prefix).append(facts.key), facts, options.*row.member);
-    }
-  });
 }
 
 }  // namespace abs_hil::rig
