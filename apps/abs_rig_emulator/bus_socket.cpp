@@ -6,6 +6,7 @@
 #include <net/if.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -19,6 +20,16 @@ namespace abs_hil::program {
 namespace {
 
 [[noreturn]] void refuse(const std::string& what) { throw std::runtime_error("--can " + what + std::strerror(errno)); }
+
+/// Removes the socket that a killed emulator has left behind. Any other file is somebody's.
+void remove_old_socket(const std::string& path) {
+  struct stat status {};
+  if (::lstat(path.c_str(), &status) != 0) return;
+  if (!S_ISSOCK(status.st_mode)) {
+    throw std::invalid_argument("--can unix:" + path + ": this file exists and is no socket; give another path");
+  }
+  ::unlink(path.c_str());
+}
 
 }  // namespace
 
@@ -65,7 +76,7 @@ void BusSocket::listen_at(const std::string& path) {
   }
   std::memcpy(address.sun_path, path.c_str(), path.size());
   listening_ = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  ::unlink(path.c_str());  // left behind by a killed emulator
+  remove_old_socket(path);
   if (listening_ < 0 || ::bind(listening_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
       ::listen(listening_, 1) != 0) {
     refuse("unix:" + path + ": ");

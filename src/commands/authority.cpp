@@ -82,6 +82,7 @@ rig::Reason Authority::judge(const command2_t& command) {
       command.mac.size() == expected.size() && CRYPTO_memcmp(command.mac.data(), expected.data(), expected.size()) == 0;
   if (!authentic) return rig::Reason::command_not_authentic;
   if (command.session != session_ || command.sequence <= last_sequence_) return rig::Reason::command_repeated;
+  if (command.sequence - last_sequence_ > sequence_leap_max) return rig::Reason::command_repeated;
   last_sequence_ = command.sequence;
   return rig::Reason::none;
 }

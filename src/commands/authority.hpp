@@ -10,6 +10,10 @@
 
 namespace abs_hil::commands {
 
+/// A sender takes its sequence number from ABS_COMMAND_STATE, which anybody can forge. A larger leap could use up the
+/// numbers and lock all senders out.
+inline constexpr std::int64_t sequence_leap_max = 1000;
+
 /// Reads the secret that senders and the program share: the file's text without trailing white space. Throws
 /// config::ConfigError for a file that cannot be read, is accessible to all users, or holds fewer than 16 characters.
 [[nodiscard]] std::string read_key(const std::filesystem::path& file);
@@ -19,8 +23,8 @@ namespace abs_hil::commands {
 
 /// Decides who may command this run. A message is authentic if its mac fits its content: somebody who listens to the
 /// network can neither forge nor change one. A message names this run's random session and a sequence number greater
-/// than all before: a recorded message cannot be replayed, in this run or in another. Messages are not encrypted:
-/// anybody can read them.
+/// than all before, but by at most `sequence_leap_max`: a recorded message cannot be replayed, in this run or in
+/// another. Messages are not encrypted: anybody can read them.
 class Authority {
  public:
   /// Starts a new session. Throws std::runtime_error if the system provides no random numbers.

@@ -133,6 +133,12 @@ Reply send(const Order& order, const SenderOptions& options) {
   if (answers.state->enabled == 0) {
     return {Outcome::refused, "the running abs_hil accepts only stop; start it with --set commands.enabled=true"};
   }
+  constexpr std::int64_t plausible_sequence_max = std::int64_t{1} << 53U;
+  if (answers.state->last_sequence < 0 || answers.state->last_sequence > plausible_sequence_max) {
+    return {Outcome::refused, "ABS_COMMAND_STATE gives an impossible sequence number, " +
+                                  std::to_string(answers.state->last_sequence) +
+                                  ": another sender forges it; look for it with abs-spy, or use ttl=0"};
+  }
   command2_t command{};
   command.session = answers.state->session;
   command.sequence = answers.state->last_sequence + 1;

@@ -17,7 +17,7 @@ namespace abs_hil::config {
 /// One configuration value: its row (rig/option.hpp), its dotted name and where it is kept.
 struct Key : rig::OptionFacts {
   std::string name;
-  std::variant<double*, std::int32_t*, std::int64_t*, bool*, std::string*> target;
+  rig::OptionTarget target;
 };
 
 /// A value from a file or from the command line, before its key has checked the type.

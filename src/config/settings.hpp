@@ -11,6 +11,7 @@
 #include "guardian/options.hpp"
 #include "runtime/command_gate.hpp"
 #include "runtime/realtime_setup.hpp"
+#include "runtime/unsafe_options.hpp"
 
 namespace abs_hil::config {
 
@@ -52,6 +53,7 @@ struct Settings {
   ABS_HIL_GROUP(runtime::GateOptions, gate, "gate.", {});
   ABS_HIL_GROUP(runtime::RealtimeOptions, realtime, "realtime.", {});
   ABS_HIL_GROUP(TelemetryOptions, telemetry, "telemetry.", {});
+  ABS_HIL_GROUP(runtime::UnsafeOptions, unsafe, "unsafe.", {});
   ABS_HIL_OPTION(std::string, inject, "", .key = "run.inject",
                  .meaning = "faults to inject, separated by commas (docs/fault-injection.md); never on hardware");
   ABS_HIL_OPTION(std::int64_t, seed, 1, .key = "run.seed", .meaning = "seed of everything random in the simulator",

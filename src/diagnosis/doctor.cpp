@@ -75,21 +75,46 @@ Findings check_can(const Examination& e) {
   }
 }
 
-Findings check_backend(const Examination& e) {
-  Finding finding{.check = "backend", .what = "backend " + e.backend, .detail = "can run"};
+Finding commissioning_finding(const Examination& e, const driver::RigDriver& driver) {
+  Finding finding{.check = "backend", .what = "commissioning of the board", .detail = "its record holds"};
   try {
-    const std::unique_ptr<driver::RigDriver> driver = e.make_driver();
-    driver->configure();
+    e.require_commissioned(driver);
   } catch (const driver::Unavailable& error) {
     finding.standing = Standing::failure;
     finding.detail = error.what();
   }
-  return {std::move(finding)};
+  return finding;
+}
+
+Findings check_backend(const Examination& e) {
+  Finding finding{.check = "backend", .what = "backend " + e.backend, .detail = "can run"};
+  Findings findings;
+  try {
+    const std::unique_ptr<driver::RigDriver> driver = e.make_driver();
+    driver->configure();
+    if (const driver::IoResult written = driver->try_write(); !written.ok()) {
+      finding.standing = Standing::failure;
+      finding.detail = "it can be read, but a write that changes nothing failed: " + driver::error_text(written);
+      if (written.error == driver::IoError::access_refused) {
+        finding.fix = "the kernel is probably locked down: switch Secure Boot off, or boot without lockdown=";
+      }
+    }
+    if (e.require_commissioned) findings.push_back(commissioning_finding(e, *driver));
+  } catch (const driver::Unavailable& error) {
+    finding.standing = Standing::failure;
+    finding.detail = error.what();
+  }
+  findings.insert(findings.begin(), std::move(finding));
+  return findings;
 }
 
 Findings check_boards(const Examination& e) {
-  Findings findings = judge(find_pci_boards(e.pci_devices));
-  for (Finding& finding : judge(driver::usb::find_boards(e.usb))) findings.push_back(std::move(finding));
+  Findings findings;
+  for (const driver::Backend& backend : driver::registered_backends()) {
+    const driver::BoardOptions* options = e.driver.boards.find(backend.name);
+    if (!backend.find || options == nullptr) continue;
+    for (Finding& finding : judge(backend.name, backend.find(*options))) findings.push_back(std::move(finding));
+  }
   return findings;
 }
 

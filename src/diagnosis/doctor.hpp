@@ -7,7 +7,7 @@
 
 #include "abs_hil/driver/rig_driver.hpp"
 #include "diagnosis/finding.hpp"
-#include "driver/usb/options.hpp"
+#include "driver/factory.hpp"
 #include "runtime/realtime_setup.hpp"
 
 namespace abs_hil::diagnosis {
@@ -21,11 +21,12 @@ struct Examination {
   std::string lcm_url{};
   runtime::RealtimeOptions realtime{};
   std::string backend{"sim"};
-  double rate_Hz{1000.0};                           ///< cycles per second, for the bus load
-  std::string pci_devices{"/sys/bus/pci/devices"};  ///< folder of the PCI devices
-  driver::usb::UsbOptions usb{};                    ///< identifies USB devices that are boards
+  double rate_Hz{1000.0};          ///< cycles per second, for the bus load
+  driver::DriverOptions driver{};  ///< where each backend looks for its boards
   /// Makes the driver of the backend. It may throw driver::Unavailable, and so may the driver's `configure`.
   std::function<std::unique_ptr<driver::RigDriver>()> make_driver{};
+  /// Throws driver::Unavailable if the configured board needs a commissioning first. Empty: it needs none.
+  std::function<void(const driver::RigDriver&)> require_commissioned{};
 };
 
 /// Examines this computer. It obtains real-time scheduling in a thread of its own to check that it is available; memory

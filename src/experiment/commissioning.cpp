@@ -55,6 +55,7 @@ Commissioning::Commissioning(driver::RigDriver& driver, runtime::Clock& clock, D
   require(options.brake_duty > 0.0 && options.brake_duty <= 0.7, "brake duty", options.brake_duty, "(0, 0.7]");
   require(options.brake_pulse_s > 0.0 && options.brake_pulse_s <= 1.0, "brake pulse", options.brake_pulse_s,
           "(0, 1] s");
+  require(options.silence_s > 0.0 && options.silence_s <= 1.0, "silence", options.silence_s, "(0, 1] s");
   require(options.run_out_limit_s > 0.0, "run-out limit", options.run_out_limit_s, "(0, inf) s");
 }
 
@@ -236,9 +237,10 @@ CommissioningResult Commissioning::drive_pulse() {
 
 CommissioningResult Commissioning::brake_pulse() {
   if (!dialog_.ask(
-          formatted("Step 4 of 4: the upper wheel stands and its brake gets duty %.2f for %.2f s. Keep your hands "
+          formatted("Step 4 of 4: the upper wheel stands and its brake gets duty %.2f for %.2f s, then once more while "
+                    "the program sends nothing for %.2f s, to see whether the board holds its outputs. Keep your hands "
                     "away from it. Go on?",
-                    options_.brake_duty, options_.brake_pulse_s))) {
+                    options_.brake_duty, options_.brake_pulse_s, options_.silence_s))) {
     return CommissioningResult::declined;
   }
   Travel travel;
@@ -251,11 +253,56 @@ CommissioningResult Commissioning::brake_pulse() {
                   travel.upper, travel.lower));
     return CommissioningResult::failed;
   }
+  if (!measure_outputs()) return CommissioningResult::failed;
+  if (stop_requested_()) return CommissioningResult::interrupted;
+  dialog_.tell("ok: " + output_text());
   if (!dialog_.ask("Did you see or hear the brake grip and release?")) {
     dialog_.tell("FAILED: check the brake's supply and cable, and the dead zone (plant.u0)");
     return CommissioningResult::failed;
   }
   return CommissioningResult::passed;
+}
+
+void Commissioning::watch_silence() {
+  const std::int64_t silent_since_ns = clock_.now_ns();
+  const std::int64_t end_ns = silent_since_ns + std::llround(options_.silence_s / rig::s_per_ns);
+  const auto silent_ms = [&] { return static_cast<double>(clock_.now_ns() - silent_since_ns) / rig::ns_per_ms; };
+  rig::Command applied;
+  while (clock_.now_ns() < end_ns && !stop_requested_() && guard_.beat()) {
+    if (driver_.outputs_now(applied) && applied.brake_duty == 0.0 && applied.motor_duty == 0.0) {
+      output_times_.watchdog_ms = silent_ms();
+      return;
+    }
+    output_times_.watched_ms = silent_ms();
+    clock_.sleep_until(clock_.now_ns() + cycle_ns);
+  }
+}
+
+bool Commissioning::measure_outputs() {
+  rig::Command applied;
+  output_times_ = {.reported = driver_.outputs_now(applied)};
+  if (!output_times_.reported) return true;
+  constexpr std::int64_t set_ns = 20 * cycle_ns;
+  guard_.begin();
+  const bool driven = drive({.brake_duty = options_.brake_duty}, clock_.now_ns() + set_ns);
+  if (driven) watch_silence();
+  const std::int64_t ordered_ns = clock_.now_ns();
+  const driver::IoResult ended = driver_.deactivate();
+  output_times_.release_ms = static_cast<double>(clock_.now_ns() - ordered_ns) / rig::ns_per_ms;
+  guard_.end(ended.ok());
+  if (driven && !ended.ok()) dialog_.tell("FAILED: cannot end the pulse: " + driver::error_text(ended));
+  return driven && ended.ok();
+}
+
+std::string Commissioning::output_text() const {
+  const OutputTimes& times = output_times_;
+  if (!times.reported) return "this board does not report its outputs: its watchdog and its release were not measured";
+  const std::string watchdog =
+      times.watchdog_ms
+          ? formatted("without commands the board ends its outputs by itself after %.1f ms", *times.watchdog_ms)
+          : formatted("without commands the board HOLDS its outputs, for %.0f ms at least: it has no watchdog",
+                      times.watched_ms);
+  return watchdog + formatted("; the safe state was verified %.3f ms after its order", times.release_ms.value_or(0.0));
 }
 
 }  // namespace abs_hil::experiment

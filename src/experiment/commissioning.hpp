@@ -5,6 +5,7 @@
 #include <string>
 
 #include "abs_hil/driver/rig_driver.hpp"
+#include "experiment/board_record.hpp"
 #include "runtime/clock.hpp"
 
 namespace abs_hil::experiment {
@@ -47,6 +48,7 @@ struct CommissioningOptions {
   double drive_pulse_s{0.3};     ///< in (0, 1]
   double brake_duty{0.5};        ///< in (0, 0.7]; the brake grips above its dead zone of 0.415
   double brake_pulse_s{0.3};     ///< in (0, 1]
+  double silence_s{0.3};         ///< in (0, 1]: how long the program then sends nothing, the brake on
   double run_out_limit_s{60.0};  ///< longest wait for standstill, > 0
 };
 
@@ -63,6 +65,8 @@ class Commissioning {
                 const CommissioningOptions& options, std::function<bool()> stop_requested);
   /// Throws driver::Unavailable if the board is absent or not as expected.
   [[nodiscard]] CommissioningResult run();
+  /// What the last step has measured.
+  [[nodiscard]] const OutputTimes& output_times() const noexcept { return output_times_; }
 
  private:
   enum class Wheel : std::uint8_t { upper, lower };
@@ -80,6 +84,10 @@ class Commissioning {
   [[nodiscard]] bool pulse(const rig::Command& command, double duration_s, Travel& travel);
   [[nodiscard]] bool drive(const rig::Command& command, std::int64_t end_ns);
   [[nodiscard]] bool wait_for_standstill();
+  /// Falls silent with the brake on and sees what the board does by itself; then measures how soon it is safe.
+  [[nodiscard]] bool measure_outputs();
+  void watch_silence();
+  [[nodiscard]] std::string output_text() const;
   [[nodiscard]] CommissioningResult unless_stopped(CommissioningResult result) const;
 
   driver::RigDriver& driver_;
@@ -88,6 +96,7 @@ class Commissioning {
   PulseGuard& guard_;
   CommissioningOptions options_;
   std::function<bool()> stop_requested_;
+  OutputTimes output_times_{};
 };
 
 }  // namespace abs_hil::experiment

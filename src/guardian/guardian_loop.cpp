@@ -26,11 +26,13 @@ std::int64_t look_period_for(std::int64_t timeout_ns) noexcept {
 }  // namespace
 
 GuardianLoop::GuardianLoop(runtime::Clock& clock, ControllerProcess& controller, SharedRegion& region,
-                           driver::SafeStateWriter& writer, const GuardianOptions& options) noexcept
+                           driver::SafeStateWriter& writer, const GuardianOptions& options,
+                           std::atomic<bool>* released) noexcept
     : clock_(clock),
       controller_(controller),
       region_(region),
       writer_(writer),
+      released_(released),
       timeout_ns_(static_cast<std::int64_t>(options.timeout_ms * rig::ns_per_ms)),
       insist_ns_(static_cast<std::int64_t>(options.insist_s * rig::ns_per_s)),
       look_period_ns_(look_period_for(timeout_ns_)),
@@ -83,13 +85,19 @@ rig::Reason GuardianLoop::must_give_back_for(const HeartbeatReading& reading) no
   return taken_back_for_;
 }
 
+bool GuardianLoop::must_give_up(GuardianReport& report, std::int64_t since_ns) const noexcept {
+  report.released = released_ != nullptr && released_->load(std::memory_order_relaxed);
+  return report.released || (insist_ns_ > 0 && clock_.now_ns() - since_ns >= insist_ns_);
+}
+
 void GuardianLoop::make_safe(GuardianReport& report, bool writes_zeros_only) noexcept {
   report.acted = true;
+  if (released_ != nullptr) released_->store(false, std::memory_order_relaxed);
   report.controller_lives = writes_zeros_only;
   report.ended_controller = watchdog_.must_end_controller();
   if (report.ended_controller) controller_.end();
   bool gone = writes_zeros_only || controller_.gone_by(clock_.now_ns() + end_wait_ns);
-  const std::int64_t give_up_ns = clock_.now_ns() + insist_ns_;
+  const std::int64_t since_ns = clock_.now_ns();
   for (;;) {
     if (gone && !writes_zeros_only && report.controller_gone_ns == 0) report.controller_gone_ns = clock_.now_ns();
     const driver::IoResult result = writer_.make_safe();
@@ -102,7 +110,7 @@ void GuardianLoop::make_safe(GuardianReport& report, bool writes_zeros_only) noe
       report.verified_ns = now_ns;
       return;
     }
-    if (now_ns >= give_up_ns) return;
+    if (must_give_up(report, since_ns)) return;
     const std::int64_t next_ns = now_ns + (report.tries < quick_tries ? quick_pause_ns : slow_pause_ns);
     if (gone) {
       clock_.sleep_until(next_ns);

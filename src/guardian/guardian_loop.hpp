@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <string>
 
@@ -35,6 +36,7 @@ struct GuardianReport {
   bool verified{false};                   ///< the guardian read the safe state back
   bool controller_lives{false};           ///< the controller was left alive: it drives nothing any more
   bool ended_controller{false};           ///< the guardian ended the controller
+  bool released{false};                   ///< a person ended the guardian's tries
   driver::IoResult last_error{};          ///< error of the last failed try
   int tries{0};                           ///< number of attempts to write the safe state
   std::int64_t silence_ns{0};             ///< time without a heartbeat when the guardian decided to act
@@ -50,7 +52,7 @@ struct GuardianReport {
 ///    otherwise complete its write later and undo the safe state.
 /// 2. It waits up to 5 ms until the controller, its threads and their register accesses have ended.
 /// 3. It writes the safe state and reads it back. It repeats this until the safe state is verified and the controller
-///    has ended, for at most `insist_s`.
+///    has ended, until a person releases the guardian, or for at most `insist_s` if that is not 0.
 ///
 /// For a cause outside of the run, and after a pause of its own, it asks the controller to give the outputs back: it
 /// leaves a mark in the shared memory, which every cycle looks at before it writes. The controller then ends its run as
@@ -58,19 +60,24 @@ struct GuardianReport {
 /// guardian takes the three steps.
 class GuardianLoop {
  public:
+  /// @param released  becomes true when a person releases the guardian from its tries, which counts only while it makes
+  ///                  them; null: nobody can
   GuardianLoop(runtime::Clock& clock, ControllerProcess& controller, SharedRegion& region,
-               driver::SafeStateWriter& writer, const GuardianOptions& options) noexcept;
+               driver::SafeStateWriter& writer, const GuardianOptions& options,
+               std::atomic<bool>* released = nullptr) noexcept;
   [[nodiscard]] GuardianReport run() noexcept;
   [[nodiscard]] std::int64_t look_period_ns() const noexcept { return look_period_ns_; }
 
  private:
   void make_safe(GuardianReport& report, bool writes_zeros_only) noexcept;
   [[nodiscard]] rig::Reason must_give_back_for(const HeartbeatReading& reading) noexcept;
+  [[nodiscard]] bool must_give_up(GuardianReport& report, std::int64_t since_ns) const noexcept;
 
   runtime::Clock& clock_;
   ControllerProcess& controller_;
   SharedRegion& region_;
   driver::SafeStateWriter& writer_;
+  std::atomic<bool>* released_;
   std::int64_t timeout_ns_;
   std::int64_t insist_ns_;
   std::int64_t look_period_ns_;

@@ -34,7 +34,8 @@ std::string to_text(const GuardianReport& report, int controller) {
                       ms_between(report.noticed_ns, report.verified_ns), report.tries);
     return text;
   }
-  text += formatted("SAFE STATE NOT VERIFIED after %d tries: ", report.tries);
+  text += formatted("SAFE STATE NOT VERIFIED after %d tries%s: ", report.tries,
+                    report.released ? ", then released by a person" : "");
   text += driver::error_text(report.last_error);
   text += "\nthe board may hold its last duties: press the E-stop (it cuts the drive only) and switch the rig off\n";
   return text;

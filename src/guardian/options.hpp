@@ -12,9 +12,12 @@ struct GuardianOptions {
   ABS_HIL_OPTION(double, timeout_ms, 20.0, .unit = "ms",
                  .meaning = "time without a sign of life of the cycle after which the guardian acts",
                  .range = rig::between(2, 1000));
-  ABS_HIL_OPTION(double, insist_s, 10.0, .unit = "s",
-                 .meaning = "how long the guardian goes on trying to verify the safe state",
-                 .range = rig::between(0.1, 600));
+  /// Without end on hardware. An emulator that is gone does not come back.
+  ABS_HIL_OPTION(double, insist_s, 0.0, .unit = "s",
+                 .meaning =
+                     "how long the guardian tries to verify the safe state; 0: until it is, or a person releases "
+                     "it; 10 s on an emulator",
+                 .range = rig::from_zero(1e6));
   ABS_HIL_OPTION(std::string, resident, "auto",
                  .meaning =
                      "who guards a run on a board. auto: the resident service on a real board if there is one, "

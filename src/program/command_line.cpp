@@ -91,6 +91,9 @@ void apply_board_policy(config::Settings& s, const config::KeyTable& keys, bool 
                               .guarded = s.guardian.enabled,
                               .virtual_time = virtual_time,
                               .rate_Hz = s.control.rate_Hz,
+                              .guardian_timeout_ms = s.guardian.timeout_ms,
+                              .sample_age_max_s = s.gate.sample_age_max_s,
+                              .unsafe = s.unsafe,
                               .start_speed_rad_s = s.experiment.start_speed_rad_s,
                               .injections = driver::parse_injections(s.inject)});
   runtime::refuse_caps_above_board({.brake = keys.was_set("gate.brake_duty_max") ? s.gate.brake_duty_max : 0.0,

@@ -1,16 +1,20 @@
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <ctime>
 #include <iostream>
 #include <optional>
 #include <string>
 
 #include "driver/factory.hpp"
+#include "experiment/board_record.hpp"
 #include "experiment/commissioning.hpp"
 #include "program/exit_status.hpp"
 #include "program/run_monitor.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
+#include "runtime/board_policy.hpp"
 
 namespace abs_hil::program {
 
@@ -87,6 +91,21 @@ class GuardedPulse final : public experiment::PulseGuard {
   guardian::Guard* guardian_{nullptr};
 };
 
+/// The record without which nothing else drives this board. That of an emulator is kept only where somebody asks for
+/// it.
+void keep_record(const RunRequest& request, const driver::BoardIdentity& board, const experiment::OutputTimes& outputs,
+                 Terminal& terminal) {
+  const driver::DriverOptions& options = request.settings.driver;
+  const bool emulated = !runtime::is_real_board(options);
+  if (emulated && options.records.empty()) return;
+  experiment::BoardRecord record = experiment::describe_board(options, board, emulated);
+  record.outputs = outputs;
+  record.date = fmt::format("{:%Y-%m-%d %H:%M:%S %z}", fmt::localtime(std::time(nullptr)));
+  record.version = ABS_HIL_VERSION;
+  const auto file = experiment::write_record(record, experiment::record_folders(options.records));
+  terminal.tell("commissioning record: " + file.string());
+}
+
 }  // namespace
 
 int commission(const RunRequest& request, const experiment::CommissioningOptions& options) {
@@ -104,6 +123,7 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
                                           [] { return signalled() != rig::Reason::none; });
   switch (commissioning.run()) {
     case experiment::CommissioningResult::passed:
+      keep_record(request, driver->identity(), commissioning.output_times(), terminal);
       terminal.tell(
           driver_options.emulated
               ? "All four steps passed on an emulator. This does not verify any hardware."

@@ -67,9 +67,9 @@ int list(bool keys) {
   fmt::print("experiments\n");
   for (const auto& script : config::known_experiments()) print(script->name, script->description);
   fmt::print("backends\n");
-  for (const auto& entry : driver::backends()) print(entry.name, entry.summary);
+  for (const auto& entry : driver::backend_kinds()) print(entry.name, entry.summary);
   fmt::print("boards (driver.kind of backend rig; none is verified on hardware)\n");
-  for (const auto& entry : driver::boards()) print(entry.name, entry.summary);
+  for (const auto& entry : driver::registered_backends()) print(entry.name, entry.summary);
   list_signals();
   return exit_completed;
 }

@@ -17,6 +17,7 @@
 #include "program/live_commands.hpp"
 #include "program/recording_commands.hpp"
 #include "program/run_arguments.hpp"
+#include "program/safe.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
 #include "telemetry/file_error.hpp"
@@ -53,6 +54,8 @@ int dispatch(int argc, char** argv) {
   program::add_commission(parser, commission);
   program::InitRigCommand init_rig;
   program::add_init_rig(parser, init_rig);
+  program::SafeCommand safe;
+  program::add_safe(parser, safe);
   program::ReplayCommand replay_command;
   program::add_replay(parser, replay_command);
   program::ConvertCommand convert_command;
@@ -82,6 +85,7 @@ int dispatch(int argc, char** argv) {
     return program::watch(watch_options);
   }
   if (commission.parser.parsed()) return program::commission(program::merge(commission.options), commission.pulses);
+  if (safe.parser.parsed()) return program::make_boards_safe(safe);
   if (send.parser.parsed()) return program::send(program::merge(send.options), send.send);
   if (init_rig.parser.parsed()) return program::init_rig(program::merge(init_rig.options), init_rig.name);
   if (replay_command.parser.parsed()) return program::replay_run(replay_command);
@@ -98,13 +102,15 @@ int fail(int status, const std::exception& error) {
 
 }  // namespace
 
-int program::run_program(int argc, char** argv, std::span<const control::ControllerEntry> own) {
+int program::run_program(int argc, char** argv, std::span<const control::ControllerEntry> own,
+                         std::span<const driver::Backend> boards) {
   program::survive_closed_terminals();
   // Messages go to stderr; stdout carries results.
   spdlog::set_default_logger(spdlog::stderr_color_mt("abs_hil"));
   spdlog::set_pattern("%n: %^%l%$: %v");
   try {
     for (const control::ControllerEntry& entry : own) control::register_controller(entry);
+    for (const driver::Backend& board : boards) driver::register_backend(board);
     return dispatch(argc, argv);
   } catch (const config::ConfigError& error) {
     return fail(program::exit_usage, error);

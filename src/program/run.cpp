@@ -19,6 +19,7 @@
 #include "config/plan.hpp"
 #include "control/silent_settings.hpp"
 #include "driver/factory.hpp"
+#include "experiment/board_record.hpp"
 #include "experiment/run_session.hpp"
 #include "guardian/kept_board.hpp"
 #include "program/board_notes.hpp"
@@ -29,6 +30,7 @@
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
 #include "rig/reason_text.hpp"
+#include "runtime/board_policy.hpp"
 #include "runtime/overrun_reporter.hpp"
 #include "telemetry/file_error.hpp"
 
@@ -174,6 +176,8 @@ void require_own_guardian(const RunRequest& request) {
 /// unchanged. Throws driver::Unavailable. The run itself obtains the resources again.
 void require_resources(const RunRequest& request, driver::RigDriver& driver, bool has_lease) {
   driver.configure();
+  const config::Settings& s = request.settings;
+  if (s.on_rig() && runtime::is_real_board(s.driver)) experiment::require_record(s.driver, driver.identity());
   if (needs_guardian(request) && !has_lease) require_own_guardian(request);
   if (request.outputs.fast || request.settings.realtime.mode != runtime::RealtimeMode::require) return;
   runtime::RealtimeReport report;

@@ -125,7 +125,11 @@ void RunMonitor::end() {
       spdlog::error("guardian: process {} ended with an error: see its messages above", pid);
       return;
     case guardian::GuardEnd::insisting:
-      spdlog::error("guardian: process {} still tries to make the outputs safe and will report the result", pid);
+      spdlog::error(
+          "guardian: process {0} still tries to make the outputs safe and will report the result. Press the E-stop. "
+          "Once "
+          "the rig's power is off, kill -USR1 {0} ends its tries",
+          pid);
   }
 }
 

@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <filesystem>
 #include <stdexcept>
 #include <string>
 
@@ -12,22 +10,13 @@ namespace abs_hil::runtime {
 
 namespace {
 
-/// Files of the kernel belong to real cards, even where driver.emulated says otherwise.
-bool is_of_the_kernel(const std::string& folder) {
-  std::error_code error;
-  return std::filesystem::weakly_canonical(folder, error).string().starts_with("/sys/");
+/// What the options lead to. A kind that no backend has counts as hardware.
+driver::BoardReality reality(const driver::DriverOptions& d) {
+  if (driver::is_known(d.kind)) return driver::reality_of(d);
+  return {.reality = driver::Reality::hardware, .option = "driver.kind = " + d.kind, .is = "is no known board"};
 }
 
-/// A network interface with a device behind it is an adapter. vcan has no device, and neither has a socket in place of
-/// a bus.
-bool is_an_adapter(const std::string& interface) {
-  std::error_code ignored;
-  return std::filesystem::exists("/sys/class/net/" + interface + "/device", ignored);
-}
-
-bool names_real_cards(const driver::DriverOptions& d) { return d.kind == "pci" && is_of_the_kernel(d.pci.root); }
-
-bool names_an_adapter(const driver::DriverOptions& d) { return d.kind == "can" && is_an_adapter(d.can.interface); }
+bool is_certainly_real(const driver::BoardReality& board) { return board.reality == driver::Reality::hardware; }
 
 void refuse_virtual_time_on_hardware(const BoardUse& use) {
   if (!use.virtual_time || use.driver.emulated) return;
@@ -42,14 +31,15 @@ void refuse_start_speed(const BoardUse& use) {
       "experiment.start_speed_rad_s: a real wheel does not start at speed; leave it out or use --backend sim");
 }
 
-/// A cycle must not wait for an answer longer than its period.
-void refuse_slow_answers(const BoardUse& use) {
-  const driver::usb::UsbOptions& usb = use.driver.usb;
-  if (use.driver.kind != "usb" || use.virtual_time || usb.answer_timeout_us * use.rate_Hz < 1e6) return;
-  throw std::invalid_argument(fmt::format(
-      "driver.usb.answer_timeout_us = {}: a cycle must not wait longer than its period; give a value below {} "
-      "or a lower control.rate_Hz",
-      usb.answer_timeout_us, std::llround(1e6 / use.rate_Hz)));
+void refuse_unfit_options(const BoardUse& use) {
+  if (!driver::is_known(use.driver.kind)) return;
+  const driver::ChosenBackend board = driver::chosen_backend(use.driver);
+  if (!board.entry.check) return;
+  driver::RunFacts run = use.driver.facts(use.virtual_time);
+  run.rate_Hz = use.rate_Hz;
+  run.hardware = is_real_board(use.driver);
+  run.outputs_on_after_death = use.unsafe.outputs_on_after_death;
+  board.entry.check(board.options, run);
 }
 
 void refuse_injection_into_hardware(const BoardUse& use) {
@@ -62,17 +52,9 @@ void refuse_injection_into_hardware(const BoardUse& use) {
                     "(never hardware) --set driver.emulated=true",
                     fault));
   }
-  if (names_real_cards(d)) {
+  if (const driver::BoardReality board = reality(d); is_certainly_real(board)) {
     throw std::invalid_argument(
-        fmt::format("--inject {}: driver.emulated=true, but driver.pci.root = {} holds the real cards; give the "
-                    "emulator's folder",
-                    fault, d.pci.root));
-  }
-  if (names_an_adapter(d)) {
-    throw std::invalid_argument(fmt::format(
-        "--inject {}: driver.emulated=true, but driver.can.interface = {} is an adapter to a real bus; give "
-        "a vcan interface or an emulator's socket",
-        fault, d.can.interface));
+        fmt::format("--inject {}: driver.emulated=true, but {} {}", fault, board.option, board.is));
   }
 }
 
@@ -80,19 +62,47 @@ void refuse_hardware_without_guardian(const BoardUse& use) {
   if (use.guarded) return;
   const driver::DriverOptions& d = use.driver;
   if (d.emulated) {
-    const std::string real = names_real_cards(d)   ? "driver.pci.root = " + d.pci.root
-                             : names_an_adapter(d) ? "driver.can.interface = " + d.can.interface
-                                                   : std::string();
-    if (real.empty()) return;
+    const driver::BoardReality board = reality(d);
+    if (!is_certainly_real(board)) return;
     throw std::invalid_argument(fmt::format(
         "guardian.enabled = false: driver.emulated=true, but {} is real hardware, and real hardware needs a "
         "guardian; leave guardian.enabled out, or name the emulator's",
-        real));
+        board.option));
   }
   throw std::invalid_argument(
       "guardian.enabled = false: a real rig needs a guardian, because its PWMs may hold when the program dies; leave "
       "it "
       "out, or for an emulator (never hardware) --set driver.emulated=true");
+}
+
+/// Silence of a single late cycle must not end a run.
+void refuse_impatient_guardian(const BoardUse& use) {
+  if (!use.guarded || use.virtual_time) return;
+  const double two_periods_ms = 2.0 * 1e3 / use.rate_Hz;
+  if (use.guardian_timeout_ms >= two_periods_ms) return;
+  throw std::invalid_argument(fmt::format(
+      "guardian.timeout_ms = {}: the guardian would end a healthy run, whose cycles are {} ms apart; give at "
+      "least two periods, {} ms, or a higher control.rate_Hz",
+      use.guardian_timeout_ms, two_periods_ms / 2.0, two_periods_ms));
+}
+
+/// The bounds leave the guardian and the gate 10 ms to act within 50 ms (docs/dead-man.md).
+void refuse_weakened_limits(const BoardUse& use) {
+  if (!is_real_board(use.driver)) return;
+  constexpr double timeout_most_ms = 40.0;
+  constexpr double age_most_s = 0.05;
+  if (use.guardian_timeout_ms > timeout_most_ms && !use.unsafe.outputs_on_after_death) {
+    throw std::invalid_argument(
+        fmt::format("guardian.timeout_ms = {}: motor and brake could stay on for longer than 50 ms after the program's "
+                    "death; give at most {}, or accept the risk with --set unsafe.outputs_on_after_death=true",
+                    use.guardian_timeout_ms, timeout_most_ms));
+  }
+  if (use.sample_age_max_s > age_most_s && !use.unsafe.blind_control) {
+    throw std::invalid_argument(fmt::format(
+        "gate.sample_age_max_s = {}: motor and brake could stay on for so long without a fresh sample; give "
+        "at most {} s, or accept the risk with --set unsafe.blind_control=true",
+        use.sample_age_max_s, age_most_s));
+  }
 }
 
 void refuse_cap_above(std::string_view key, double value, std::string_view board, double board_value) {
@@ -105,26 +115,29 @@ void refuse_cap_above(std::string_view key, double value, std::string_view board
 
 /// The duty caps of the board that is driven. Throws std::invalid_argument for a board without caps: it is not driven.
 DutyCaps caps_of(const driver::DriverOptions& d) {
-  if (d.kind == "pci") return {d.pci.brake_duty_max, d.pci.motor_duty_max};
-  if (d.kind == "can") return {d.can.brake_duty_max, d.can.motor_duty_max};
-  if (d.kind == "usb") return {d.usb.brake_duty_max, d.usb.motor_duty_max};
-  throw std::invalid_argument(
-      fmt::format("driver.kind = {}: this board has no duty caps, so it is not driven", d.kind));
+  if (!driver::is_known(d.kind)) {
+    throw std::invalid_argument(
+        fmt::format("driver.kind = {}: this board has no duty caps, so it is not driven", d.kind));
+  }
+  const driver::OutputGrid outputs = driver::output_grid(d);
+  return {outputs.brake_duty_max, outputs.motor_duty_max};
 }
 
 }  // namespace
 
 bool is_real_board(const driver::DriverOptions& driver) {
-  if (driver.kind == "usb") return !driver.emulated;
-  return names_real_cards(driver) || names_an_adapter(driver);
+  const driver::BoardReality board = reality(driver);
+  return board.reality == driver::Reality::unknown ? !driver.emulated : is_certainly_real(board);
 }
 
 void refuse_unsafe_use(const BoardUse& use) {
   refuse_virtual_time_on_hardware(use);
   refuse_start_speed(use);
-  refuse_slow_answers(use);
+  refuse_unfit_options(use);
   refuse_injection_into_hardware(use);
   refuse_hardware_without_guardian(use);
+  refuse_impatient_guardian(use);
+  refuse_weakened_limits(use);
 }
 
 void refuse_caps_above_board(const DutyCaps& asked_for, const driver::DriverOptions& driver) {
@@ -138,10 +151,8 @@ void apply_board_limits(const rig::RigParameters& rig, double rate_Hz, GateOptio
   const DutyCaps board = caps_of(driver);
   gate.brake_duty_max = std::min(gate.brake_duty_max, board.brake);
   gate.motor_duty_max = std::min(gate.motor_duty_max, board.motor);
-  driver.pci.encoder_counts_per_rev = rig.encoder_counts_per_rev;
-  driver.can.encoder_counts_per_rev = rig.encoder_counts_per_rev;
-  driver.usb.encoder_counts_per_rev = rig.encoder_counts_per_rev;
-  driver.can.rate_Hz = rate_Hz;
+  driver.encoder_counts_per_rev = rig.encoder_counts_per_rev;
+  driver.rate_Hz = rate_Hz;
 }
 
 }  // namespace abs_hil::runtime

@@ -6,15 +6,19 @@
 #include "driver/factory.hpp"
 #include "driver/injection/injection.hpp"
 #include "runtime/gate_options.hpp"
+#include "runtime/unsafe_options.hpp"
 
 namespace abs_hil::runtime {
 
 /// What a run wants of a board: everything that the safety policy judges.
 struct BoardUse {
   const driver::DriverOptions& driver;
-  bool guarded{true};                           ///< guardian.enabled
-  bool virtual_time{false};                     ///< --fast
-  double rate_Hz{0.0};                          ///< control cycles per second, > 0
+  bool guarded{true};        ///< guardian.enabled
+  bool virtual_time{false};  ///< --fast
+  double rate_Hz{0.0};       ///< control cycles per second, > 0
+  double guardian_timeout_ms{20.0};
+  double sample_age_max_s{0.02};                ///< of the gate
+  UnsafeOptions unsafe{};                       ///< risks that a person accepts
   double start_speed_rad_s{0.0};                ///< wheels that turn from the start, a simulator's alone
   std::vector<driver::Injection> injections{};  ///< faults to inject
 };
@@ -30,8 +34,9 @@ struct DutyCaps {
 [[nodiscard]] bool is_real_board(const driver::DriverOptions& driver);
 
 /// Refuses what each key's own range allows and what must not reach a rig: virtual time, wheels that turn from the
-/// start, answers that take longer than a period, injected faults, no guardian. Throws std::invalid_argument, which
-/// names the key and the fix. Before anything has moved.
+/// start, answers that take longer than a period, injected faults, no guardian, a guardian that would end a healthy
+/// run, and on hardware limits so weak that they need a key of `unsafe.`. Throws std::invalid_argument, which names the
+/// key and the fix. Before anything has moved.
 void refuse_unsafe_use(const BoardUse& use);
 
 /// Refuses caps of the gate above those of the board. Throws std::invalid_argument.

@@ -64,7 +64,8 @@ void CommandGate::check_board(const rig::Measurement& measurement) noexcept {
   if (const std::uint32_t flags = measurement.trip_flags; flags != 0) {
     latch(flags == rig::trip::supply ? Reason::board_supply_tripped : Reason::board_interlock_tripped, flags);
   }
-  if (measurement.supply_V < options_.supply_min_V) latch(Reason::board_supply_low, measurement.supply_V);
+  if (measurement.supply_V < options_.supply_min_V || measurement.supply_V <= 0.0)
+    latch(Reason::board_supply_low, measurement.supply_V);
   if (measurement.temperature_C > options_.temperature_max_C) latch(Reason::board_too_hot, measurement.temperature_C);
   // The board reported this value before and no longer does. The fault's value is 1 for supply, 2 for temperature.
   if (supply_known_ && std::isnan(measurement.supply_V)) latch(Reason::board_health_lost, 1.0);

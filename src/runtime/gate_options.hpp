@@ -19,7 +19,8 @@ struct GateOptions {
   ABS_HIL_OPTION(double, overspeed_rad_s, 250.0, .unit = "rad/s", .meaning = "speed of either wheel that is a fault",
                  .range = rig::positive(2000));
   ABS_HIL_OPTION(double, supply_min_V, 0.0, .unit = "V",
-                 .meaning = "a board that reports a lower supply is a fault; 0: never", .range = rig::from_zero(100));
+                 .meaning = "a board that reports a lower supply is a fault; 0 V always is",
+                 .range = rig::from_zero(100));
   /// The default is ours: the board's own limit is not public.
   ABS_HIL_OPTION(double, temperature_max_C, 90.0, .unit = "deg C", .meaning = "a board that reports more is a fault",
                  .range = rig::positive(300));

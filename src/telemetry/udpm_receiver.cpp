@@ -19,15 +19,26 @@ namespace {
 
 constexpr int datagrams_per_look = 256;
 
-/// recv_buf_size of the URL's options; 0 if there is none.
-int wanted_buffer_bytes(std::string_view options) {
-  constexpr std::string_view name = "recv_buf_size=";
+/// A number in the URL's options, "name=" before it; 0 if there is none.
+int number_in(std::string_view options, std::string_view name) {
   const std::size_t at = options.find(name);
-  int bytes = 0;
-  if (at == std::string_view::npos) return bytes;
+  int number = 0;
+  if (at == std::string_view::npos) return number;
   const std::string_view digits = options.substr(at + name.size());
-  std::from_chars(digits.data(), digits.data() + digits.size(), bytes);
-  return bytes;
+  std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  return number;
+}
+
+/// True if this computer has the address: only then a socket can be bound to it. Makes system calls, allocates nothing.
+bool is_own_address(const in_addr& address) noexcept {
+  const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (socket < 0) return false;
+  sockaddr_in own{};
+  own.sin_family = AF_INET;
+  own.sin_addr = address;
+  const bool bound = ::bind(socket, reinterpret_cast<const sockaddr*>(&own), sizeof own) == 0;
+  ::close(socket);
+  return bound;
 }
 
 bool set(int socket, int level, int option, int value) {
@@ -54,6 +65,7 @@ bool join(int socket, const sockaddr_in& group, int buffer_bytes) {
 
 UdpmReceiver::UdpmReceiver(const std::string& url, std::string channel) : channel_(std::move(channel)) {
   const LcmUrl parts = parse_lcm_url(url);
+  own_computer_only_ = number_in(parts.options, "ttl=") == 0;
   const Endpoint endpoint = endpoint_of(parts);
   sockaddr_in group{};
   group.sin_family = AF_INET;
@@ -61,7 +73,7 @@ UdpmReceiver::UdpmReceiver(const std::string& url, std::string channel) : channe
   errno = EINVAL;
   if (::inet_pton(AF_INET, endpoint.address.c_str(), &group.sin_addr) == 1) {
     socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (socket_ >= 0 && join(socket_, group, wanted_buffer_bytes(parts.options))) return;
+    if (socket_ >= 0 && join(socket_, group, number_in(parts.options, "recv_buf_size="))) return;
   }
   const std::string reason = std::generic_category().message(errno);
   if (socket_ >= 0) ::close(socket_);
@@ -71,11 +83,21 @@ UdpmReceiver::UdpmReceiver(const std::string& url, std::string channel) : channe
 
 UdpmReceiver::~UdpmReceiver() { ::close(socket_); }
 
+bool UdpmReceiver::is_from_here(const in_addr& sender) noexcept {
+  if (sender.s_addr == known_own_address_) return true;
+  if (!is_own_address(sender)) return false;
+  known_own_address_ = sender.s_addr;
+  return true;
+}
+
 UdpmReceiver::Arrival UdpmReceiver::next() noexcept {
   for (int i = 0; i < datagrams_per_look; ++i) {
     iovec into{datagram_.data(), datagram_.size()};
     alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(std::uint32_t)) + 64> control{};
     msghdr message{};
+    sockaddr_in from{};
+    message.msg_name = &from;
+    message.msg_namelen = sizeof from;
     message.msg_iov = &into;
     message.msg_iovlen = 1;
     message.msg_control = control.data();
@@ -88,6 +110,7 @@ UdpmReceiver::Arrival UdpmReceiver::next() noexcept {
       std::memcpy(&seen, CMSG_DATA(note), sizeof seen);
       dropped_ += seen - std::exchange(dropped_seen_, seen);
     }
+    if (own_computer_only_ && !is_from_here(from.sin_addr)) continue;
     const LcmPacket packet = look_at(std::span(datagram_).first(static_cast<std::size_t>(size)), channel_);
     if (packet.kind == LcmPacket::Kind::other) continue;
     const bool cut = (message.msg_flags & MSG_TRUNC) != 0;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <netinet/in.h>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -14,6 +16,10 @@ namespace abs_hil::telemetry {
 /// `payload_max`. No packet may end a program that moves a machine, but liblcm 1.3.1 trusts fragments: it allocates the
 /// size that they claim, up to 256 MB, and writes at the offset that they claim. This class assembles no fragments, and
 /// it allocates nothing after construction. Used from one thread.
+///
+/// ttl=0 (LCM's default) means that messages stay within this computer. This holds for what this program sends; the
+/// group reaches it from the whole network. So with ttl=0 it takes only messages whose sender has an address of this
+/// computer. (The kernel drops packets from outside that claim such an address.)
 class UdpmReceiver {
  public:
   static constexpr std::size_t payload_max = 2048;  ///< bytes
@@ -40,7 +46,11 @@ class UdpmReceiver {
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
 
  private:
+  [[nodiscard]] bool is_from_here(const in_addr& sender) noexcept;
+
   int socket_{-1};
+  bool own_computer_only_{true};
+  in_addr_t known_own_address_{0};  ///< of the last sender on this computer; 0: none yet
   std::string channel_;
   std::array<std::uint8_t, lcm_packet_overhead_max + payload_max> datagram_{};
   std::uint64_t dropped_{0};

@@ -33,6 +33,14 @@ gate.overspeed_rad_s = [50, 250]
 
 
 class CanRun(CanTest):
+    def test_emulator_removes_nobody_s_file(self):
+        file = self.folder / 'precious'
+        file.write_text('data')
+        result = subprocess.run([EMULATOR, '--can', f'unix:{file}'], capture_output=True, text=True, timeout=20)
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertIn('this file exists and is no socket', result.stderr)
+        self.assertEqual(file.read_text(), 'data')
+
     def test_lock_step_agrees_with_the_simulator(self):
         rig, sim = self.folder / 'rig.json', self.folder / 'sim.json'
         self.fast('--summary', sim, '--set', 'gate.brake_duty_max=0.7')

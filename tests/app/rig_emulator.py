@@ -4,6 +4,7 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 import typing
 
 from emulator_process import EMULATOR, EmulatorProcess, EmulatorTest
@@ -75,3 +76,9 @@ class RigTest(EmulatorTest):
         """A guardian that tolerates this computer's pauses: it must not end a run that only waits for the processor."""
         return self.start_program('--backend', 'rig', '--no-lcm', '--set', f'driver.pci.root={emulator.root}', '--set',
                                   f'guardian.timeout_ms={guardian_timeout_ms}', *args)
+
+    def wait_until_driving(self, emulator):
+        deadline = time.monotonic() + 20
+        # A turning wheel is needed too: an overspeed latched at standstill would be released at once.
+        while emulator.wire()[0] < 0.9 or emulator.lower_speed() < 5:
+            self.assertLess(time.monotonic(), deadline, 'the drive was never switched on')

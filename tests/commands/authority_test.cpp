@@ -2,6 +2,7 @@
 
 #include <sys/stat.h>
 
+#include <cstdint>
 #include <fstream>
 
 #include "catch.hpp"
@@ -51,6 +52,26 @@ TEST_CASE("A mac is the same for the same message and key, and differs for any c
   CHECK(mac_of(command, key) == mac);
   command.value = 0.2;
   CHECK(mac_of(command, key) != mac);
+}
+
+TEST_CASE("A sequence number that leaps is refused and uses none up: a forged state cannot lock senders out") {
+  const std::string key = "0123456789abcdef";
+  Authority authority(key);
+  const auto judge = [&](std::int64_t sequence) {
+    command2_t command{};
+    command.session = authority.session();
+    command.sequence = sequence;
+    command.command = "slip-ref";
+    command.mac = mac_of(command, key);
+    return authority.judge(command);
+  };
+  CHECK(judge(1) == rig::Reason::none);
+  CHECK(judge(INT64_MAX) == rig::Reason::command_repeated);
+  CHECK(judge(2 + sequence_leap_max) == rig::Reason::command_repeated);
+  CHECK(authority.last_sequence() == 1);
+  CHECK(judge(1 + sequence_leap_max) == rig::Reason::none);
+  CHECK(judge(2 + sequence_leap_max) == rig::Reason::none);
+  CHECK(judge(INT64_MIN) == rig::Reason::command_repeated);
 }
 
 }  // namespace abs_hil::commands

@@ -119,7 +119,7 @@ TEST_CASE("groups have the order of recorded configurations") {
   for (const auto& item : json.items()) tables.push_back(item.key());
   for (const auto& item : json["control"].items()) controllers.push_back(item.key());
   CHECK(tables == std::vector<std::string>{"plant", "control", "experiment", "driver", "guardian", "commands", "gate",
-                                           "realtime", "telemetry", "run"});
+                                           "realtime", "telemetry", "unsafe", "run"});
   CHECK(controllers == std::vector<std::string>{"controller", "rate_Hz", "slip_ref", "v_min_m_s", "adaptive", "nominal",
                                                 "observer", "sliding_mode", "sliding_mode_smooth", "super_twisting",
                                                 "relay", "pi", "five_phase", "adaptive_actuator", "adaptive_peak"});

@@ -5,7 +5,10 @@
 
 #include "abs_hil/driver/rig_driver.hpp"
 #include "catch.hpp"
+#include "driver/can/options.hpp"
 #include "driver/factory.hpp"
+#include "driver/pci/options.hpp"
+#include "driver/usb/options.hpp"
 
 using namespace abs_hil::driver;
 using abs_hil::rig::Command;
@@ -178,11 +181,13 @@ TEST_CASE("Every I/O error has its own text") {
 }
 
 TEST_CASE("The grid of the options is the grid of the driver that they make") {
-  for (const BackendEntry& board : boards()) {
+  for (const Backend& board : registered_backends()) {
     for (const char* mode : {"8-bit", "12-bit"}) {
       DriverOptions options{.kind = std::string(board.name)};
-      options.pci.pwm_mode = options.usb.pwm_mode = mode;
-      options.pci.brake_duty_max = options.usb.brake_duty_max = options.can.brake_duty_max = 0.61;
+      auto& pci = options.of<pci::PciOptions>();
+      auto& usb = options.of<usb::UsbOptions>();
+      pci.pwm_mode = usb.pwm_mode = mode;
+      pci.brake_duty_max = usb.brake_duty_max = options.of<can::CanOptions>().brake_duty_max = 0.61;
       const auto driver = make_rig_driver(options);
       const OutputGrid grid = output_grid(options);
       CAPTURE(board.name, mode, grid.duty_steps);

@@ -95,6 +95,8 @@ class OtherBoard final : public driver::RigDriver {
   std::function<driver::IoResult()> on_read{[] { return driver::IoResult{}; }};
   std::function<driver::IoResult(const rig::Command&)> on_write{[](const rig::Command&) { return driver::IoResult{}; }};
   driver::IoResult made_safe{};
+  std::function<bool(rig::Command&)> on_outputs{[](rig::Command&) { return false; }};
+  [[nodiscard]] bool outputs_now(rig::Command& applied) noexcept override { return on_outputs(applied); }
 
  private:
   void do_configure() override {}
@@ -160,8 +162,8 @@ TEST_CASE("A good rig passes all four steps, each asked for, and is safe after")
 TEST_CASE("Each pulse has its guard from before it until the outputs are 0 again") {
   Lab lab;
   CHECK(lab.run() == CommissioningResult::passed);
-  CHECK(lab.guard.begun == 2);
-  CHECK(lab.guard.ended_safe == 2);
+  CHECK(lab.guard.begun == 3);
+  CHECK(lab.guard.ended_safe == 3);
   CHECK(lab.guard.beats >= 600);  // once a millisecond
 
   Lab dying;
@@ -176,6 +178,40 @@ TEST_CASE("Each pulse has its guard from before it until the outputs are 0 again
   alone.guard.refuses = true;
   CHECK_THROWS_AS(alone.run(), driver::Unavailable);
   CHECK(largest_width(alone.card) == 0.0);
+}
+
+TEST_CASE("The last step measures what the board does by itself, and how soon it is safe") {
+  Lab holds;
+  CHECK(holds.run() == CommissioningResult::passed);
+  CHECK_THAT(holds.person.said, Contains("the board HOLDS its outputs"));
+  CHECK_THAT(holds.person.said, Contains("the safe state was verified"));
+
+  // A board whose outputs are on while somebody commands them, and for 40 ms after.
+  OtherLab lab;
+  bool on = false;
+  std::int64_t commanded_ns = 0;
+  const auto on_write = lab.board.on_write;
+  lab.board.on_write = [&](const rig::Command& command) {
+    on = command.brake_duty > 0.0;
+    commanded_ns = lab.clock.now_ns();
+    return on_write(command);
+  };
+  lab.board.on_outputs = [&](rig::Command& applied) {
+    applied.brake_duty = on && lab.clock.now_ns() - commanded_ns < 40'000'000 ? 0.5 : 0.0;
+    return true;
+  };
+  const test::ModelCard none;
+  Guard guard(none);
+  experiment::Commissioning commissioning(lab.board, lab.clock, lab.person, guard, {}, [] { return false; });
+  CHECK(commissioning.run() == CommissioningResult::passed);
+  REQUIRE(commissioning.output_times().watchdog_ms);
+  CHECK(*commissioning.output_times().watchdog_ms >= 39.0);
+  CHECK(*commissioning.output_times().watchdog_ms <= 41.0);
+  CHECK(commissioning.output_times().release_ms.has_value());
+
+  OtherLab mute;
+  CHECK(mute.run() == CommissioningResult::passed);
+  CHECK_THAT(mute.person.said, Contains("does not report its outputs"));
 }
 
 TEST_CASE("The answer no ends the commissioning: nothing is written before step 2, only zeros before step 3") {

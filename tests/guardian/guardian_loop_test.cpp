@@ -1,5 +1,7 @@
 #include "guardian/guardian_loop.hpp"
 
+#include <atomic>
+
 #include "catch.hpp"
 #include "scripted_parts.hpp"
 
@@ -27,7 +29,8 @@ struct Post {
   ScriptedController controller{clock, story};
   ScriptedWriter writer{story};
   SharedRegion region{8};
-  GuardianLoop duty{clock, controller, region, writer, options};
+  std::atomic<bool> released{false};
+  GuardianLoop duty{clock, controller, region, writer, options, &released};
   std::int64_t last_cycle_ns{INT64_MAX};
   std::int64_t stage_at_ns{INT64_MAX};
   Stage stage{Stage::closed};
@@ -112,6 +115,34 @@ TEST_CASE("the guardian gives up on a lost board after guardian.insist_s and rep
   CHECK(post.clock.now_ns() - then_ns <= 600 * ms);
   CHECK_THAT(to_text(report, 4711), Catch::Matchers::Contains("SAFE STATE NOT VERIFIED") &&
                                         Catch::Matchers::Contains("0x6c") && Catch::Matchers::Contains("E-stop"));
+}
+
+TEST_CASE("without guardian.insist_s the guardian tries until the board comes back or a person releases it") {
+  Post post;
+  post.options.insist_s = 0.0;
+  GuardianLoop duty{post.clock, post.controller, post.region, post.writer, post.options, &post.released};
+  post.controller.dies_at_ns = then_ns;
+  post.released = true;  // before there is anything to release it from
+  SECTION("the board comes back after 30 s") {
+    post.writer.fails_first = 100 + (30'000 - 100) / 50;  // 1 ms apart, later 50 ms
+    const GuardianReport report = duty.run();
+    CHECK(report.verified);
+    CHECK_FALSE(report.released);
+    CHECK(report.verified_ns - then_ns >= 29'000 * ms);
+  }
+  SECTION("a person releases it") {
+    post.writer.fails_first = 1'000'000;
+    const auto cycles = post.clock.happens;
+    post.clock.happens = [&post, cycles](std::int64_t now_ns) {
+      cycles(now_ns);
+      if (now_ns >= then_ns + 3'600'000 * ms) post.released = true;
+    };
+    const GuardianReport report = duty.run();
+    CHECK_FALSE(report.verified);
+    CHECK(report.released);
+    CHECK(post.clock.now_ns() - then_ns >= 3'600'000 * ms);
+    CHECK_THAT(to_text(report, 4711), Catch::Matchers::Contains("released by a person"));
+  }
 }
 
 TEST_CASE("the guardian makes handed-over outputs safe while the controller lives on") {

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # installed_test.sh BUILD_FOLDER SOURCE_FOLDER: installs the build into a scratch prefix, runs the installed program away
-# from the source tree, and builds and runs examples/own_controller against the installation.
+# from the source tree, and builds and runs examples/own_controller and examples/own_backend against the installation.
 set -euo pipefail
 build=$(realpath "$1") source=$(realpath "$2")
 scratch=$(mktemp -d)
@@ -36,6 +36,15 @@ cmake -G Ninja -S example -B example/build -DCMAKE_PREFIX_PATH="$scratch/usr" \
   { cat cmake.log; exit 1; }
 cmake --build example/build >build.log || { cat build.log; exit 1; }
 example/build/my_abs_hil list | grep -q "^  proportional" || { echo "my_abs_hil does not list its controller"; exit 1; }
+# A board of its own needs both programs.
+cp -r "$source/examples/own_backend" board
+cmake -G Ninja -S board -B board/build -DCMAKE_PREFIX_PATH="$scratch/usr" \
+  ${CMAKE_CXX_COMPILER_LAUNCHER:+-DCMAKE_CXX_COMPILER_LAUNCHER="$CMAKE_CXX_COMPILER_LAUNCHER"} >cmake.log ||
+  { cat cmake.log; exit 1; }
+cmake --build board/build >build.log || { cat build.log; exit 1; }
+board/build/my_abs_hil list | grep -q "^  serial" || { echo "my_abs_hil does not list its board"; exit 1; }
+[ -x board/build/abs_guardian ] || { echo "its guardian was not built"; exit 1; }
+
 export ABS_HIL_CONFIG_DIR=$scratch/usr/share/abs_hil/config
 example/build/my_abs_hil --fast --no-lcm --controller proportional --set experiment.start_speed_rad_s=170 \
   --summary own.json >/dev/null

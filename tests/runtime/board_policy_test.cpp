@@ -5,11 +5,18 @@
 #include <string>
 
 #include "catch.hpp"
+#include "driver/can/options.hpp"
+#include "driver/pci/options.hpp"
+#include "driver/usb/options.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::Contains;
 
 namespace {
+
+driver::pci::PciOptions& pci(driver::DriverOptions& driver) { return driver.of<driver::pci::PciOptions>(); }
+driver::can::CanOptions& can(driver::DriverOptions& driver) { return driver.of<driver::can::CanOptions>(); }
+driver::usb::UsbOptions& usb(driver::DriverOptions& driver) { return driver.of<driver::usb::UsbOptions>(); }
 
 /// What a run wants of a board, and the policy's answer: empty if it is allowed.
 struct Asked {
@@ -18,13 +25,20 @@ struct Asked {
   bool virtual_time{false};
   double start_speed_rad_s{0.0};
   std::string inject{};
+  double rate_Hz{1000.0};
+  double guardian_timeout_ms{20.0};
+  double sample_age_max_s{0.02};
+  runtime::UnsafeOptions unsafe{};
 
   [[nodiscard]] std::string refusal() const {
     try {
       runtime::refuse_unsafe_use({.driver = driver,
                                   .guarded = guarded,
                                   .virtual_time = virtual_time,
-                                  .rate_Hz = 1000.0,
+                                  .rate_Hz = rate_Hz,
+                                  .guardian_timeout_ms = guardian_timeout_ms,
+                                  .sample_age_max_s = sample_age_max_s,
+                                  .unsafe = unsafe,
                                   .start_speed_rad_s = start_speed_rad_s,
                                   .injections = driver::parse_injections(inject)});
     } catch (const std::invalid_argument& error) {
@@ -49,33 +63,36 @@ TEST_CASE("Hardware is not driven without a guardian, even where it is called an
   CHECK_THAT(run.refusal(), Contains("--set driver.emulated=true"));
   run.driver.emulated = true;
   run.driver.kind = "pci";
-  run.driver.pci.root = "/sys/bus/pci/devices";
+  pci(run.driver).root = "/sys/bus/pci/devices";
   CHECK_THAT(run.refusal(), Contains("driver.pci.root = /sys/bus/pci/devices is real hardware"));
-  run.driver.pci.root = "/tmp";
+  pci(run.driver).root = "/tmp";
   CHECK(run.refusal().empty());
   run.driver.kind = "can";
-  run.driver.can.interface = "unix:/tmp/bus";
+  can(run.driver).interface = "unix:/tmp/bus";
   CHECK(run.refusal().empty());
 }
 
 TEST_CASE("A board is real unless its files, its interface or the configuration say that it is an emulator") {
   driver::DriverOptions board;
   board.kind = "pci";
-  board.pci.root = "/sys/bus/pci/devices";
+  pci(board).root = "/sys/bus/pci/devices";
   CHECK(runtime::is_real_board(board));
   board.emulated = true;  // the kernel's cards are real whatever the configuration says
   CHECK(runtime::is_real_board(board));
   board.emulated = false;
-  board.pci.root = "/tmp/emulated/pci";
+  pci(board).root = "/tmp/emulated/pci";
   CHECK_FALSE(runtime::is_real_board(board));
 
   board.kind = "can";
-  for (const char* bus : {"unix:/tmp/bus", "vcan-that-is-not-there"}) {
-    board.can.interface = bus;
-    CHECK_FALSE(runtime::is_real_board(board));
-  }
+  can(board).interface = "unix:/tmp/bus";
+  CHECK_FALSE(runtime::is_real_board(board));
+  can(board).interface = "an-interface-that-is-not-there";
+  CHECK(runtime::is_real_board(board));
+  board.emulated = true;
+  CHECK_FALSE(runtime::is_real_board(board));
+  board.emulated = false;
   if (const std::string adapter = an_adapter(); !adapter.empty()) {
-    board.can.interface = adapter;
+    can(board).interface = adapter;
     CHECK(runtime::is_real_board(board));
   }
 
@@ -89,8 +106,8 @@ TEST_CASE("An adapter to a real bus is hardware") {
   Asked run{.guarded = false};
   run.driver.emulated = true;
   run.driver.kind = "can";
-  run.driver.can.interface = an_adapter();
-  if (run.driver.can.interface.empty()) {
+  can(run.driver).interface = an_adapter();
+  if (can(run.driver).interface.empty()) {
     WARN("this computer has no network adapter to try it with");
     return;
   }
@@ -104,15 +121,15 @@ TEST_CASE("Faults are injected into emulators alone") {
   CHECK_THAT(run.refusal(), Contains("--inject") && Contains("never injected into real hardware"));
   run.driver.emulated = true;
   run.driver.kind = "pci";
-  run.driver.pci.root = "/sys/bus/pci/devices";
+  pci(run.driver).root = "/sys/bus/pci/devices";
   CHECK_THAT(run.refusal(), Contains("driver.pci.root = /sys/bus/pci/devices holds the real cards"));
-  run.driver.pci.root = "/tmp";
+  pci(run.driver).root = "/tmp";
   CHECK(run.refusal().empty());
   run.driver.kind = "can";
-  run.driver.can.interface = "unix:/tmp/bus";
+  can(run.driver).interface = "unix:/tmp/bus";
   CHECK(run.refusal().empty());
-  run.driver.can.interface = an_adapter();
-  if (run.driver.can.interface.empty()) {
+  can(run.driver).interface = an_adapter();
+  if (can(run.driver).interface.empty()) {
     WARN("this computer has no network adapter to try it with");
     return;
   }
@@ -128,17 +145,17 @@ TEST_CASE("Hardware runs in real time, from standstill, and waits no longer than
   CHECK_THAT(run.refusal(), Contains("experiment.start_speed_rad_s"));
   run = {};
   run.driver.kind = "usb";
-  run.driver.usb.answer_timeout_us = 1000;
+  usb(run.driver).answer_timeout_us = 1000;
   CHECK_THAT(run.refusal(), Contains("driver.usb.answer_timeout_us = 1000") && Contains("1000"));
-  run.driver.usb.answer_timeout_us = 999;
+  usb(run.driver).answer_timeout_us = 999;
   CHECK(run.refusal().empty());
 }
 
 TEST_CASE("The gate's duty caps never exceed the board's") {
   for (const char* kind : {"pci", "can", "usb"}) {
     driver::DriverOptions driver{.kind = kind};
-    driver.pci.brake_duty_max = driver.can.brake_duty_max = driver.usb.brake_duty_max = 0.7;
-    driver.pci.motor_duty_max = driver.can.motor_duty_max = driver.usb.motor_duty_max = 0.9;
+    pci(driver).brake_duty_max = can(driver).brake_duty_max = usb(driver).brake_duty_max = 0.7;
+    pci(driver).motor_duty_max = can(driver).motor_duty_max = usb(driver).motor_duty_max = 0.9;
     CHECK_NOTHROW(runtime::refuse_caps_above_board({.brake = 0.7, .motor = 0.9}, driver));
     CHECK_THROWS_WITH(runtime::refuse_caps_above_board({.brake = 0.71}, driver),
                       Contains("gate.brake_duty_max = 0.71") && Contains(std::string("driver.") + kind));
@@ -149,12 +166,56 @@ TEST_CASE("The gate's duty caps never exceed the board's") {
     runtime::apply_board_limits(rig, 500.0, gate, driver);
     CHECK(gate.brake_duty_max == 0.7);
     CHECK(gate.motor_duty_max == 0.9);
-    CHECK(driver.usb.encoder_counts_per_rev == 1024);
-    CHECK(driver.can.rate_Hz == 500.0);
+    CHECK(driver.encoder_counts_per_rev == 1024);
+    CHECK(driver.rate_Hz == 500.0);
   }
 }
 
 TEST_CASE("A board without duty caps is not driven") {
   const driver::DriverOptions driver{.kind = "unheard-of"};
   CHECK_THROWS_WITH(runtime::refuse_caps_above_board({}, driver), Contains("driver.kind = unheard-of"));
+}
+
+TEST_CASE("A guardian that would end a healthy run is refused on every board") {
+  Asked run{.rate_Hz = 100.0, .guardian_timeout_ms = 19.9};
+  pci(run.driver).root = "/tmp";
+  CHECK_THAT(run.refusal(), Contains("guardian.timeout_ms = 19.9") && Contains("two periods, 20 ms"));
+  run.guardian_timeout_ms = 20.0;
+  CHECK(run.refusal().empty());
+  run.guardian_timeout_ms = 2.0;
+  run.virtual_time = true;  // has no guardian
+  run.driver.emulated = true;
+  CHECK(run.refusal().empty());
+}
+
+TEST_CASE("Weakened limits on hardware need a key that names the risk; an emulator takes them") {
+  Asked slow{.guardian_timeout_ms = 41.0};
+  CHECK_THAT(slow.refusal(), Contains("guardian.timeout_ms = 41") && Contains("unsafe.outputs_on_after_death=true"));
+  slow.guardian_timeout_ms = 40.0;
+  CHECK(slow.refusal().empty());
+  slow.guardian_timeout_ms = 1000.0;
+  slow.unsafe.outputs_on_after_death = true;
+  CHECK(slow.refusal().empty());
+  slow.unsafe = {.blind_control = true};
+  CHECK_FALSE(slow.refusal().empty());
+  pci(slow.driver).root = "/tmp";
+  CHECK(slow.refusal().empty());
+
+  Asked blind{.sample_age_max_s = 0.051};
+  CHECK_THAT(blind.refusal(), Contains("gate.sample_age_max_s = 0.051") && Contains("unsafe.blind_control=true"));
+  blind.unsafe.blind_control = true;
+  CHECK(blind.refusal().empty());
+
+  Asked node{};
+  node.driver.kind = "can";
+  can(node.driver).interface = "can0";  // not there: taken for hardware
+  can(node.driver).watchdog_ms = 51;
+  CHECK_THAT(node.refusal(), Contains("driver.can.watchdog_ms = 51") && Contains("unsafe.outputs_on_after_death=true"));
+  node.unsafe.outputs_on_after_death = true;
+  CHECK(node.refusal().empty());
+  node = {};
+  node.driver.kind = "can";
+  can(node.driver).interface = "unix:/tmp/bus";
+  can(node.driver).watchdog_ms = 10'000;
+  CHECK(node.refusal().empty());
 }

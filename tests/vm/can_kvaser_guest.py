@@ -2,7 +2,7 @@
 import subprocess
 import unittest
 
-from can_rig import PROGRAM, CanRigTest, shell
+from can_rig import PROGRAM, CanRigTest, put_record, shell
 
 
 class Kvaser(CanRigTest):
@@ -11,6 +11,13 @@ class Kvaser(CanRigTest):
     def setUp(self):
         super().setUp()
         shell('ip link set can0 up && ip link set can1 up')
+        put_record(self.folder, self.host)
+
+    def test_0_without_a_record(self):
+        (self.folder / f'can-{self.host}.json').unlink()
+        node = self.node()
+        self.assertIn('has not been commissioned as it is now', self.finish(self.start(), 3))
+        self.assertEqual(node.wire(), (0.0, 0.0))
 
     def test_1_paper(self):
         self.node()

@@ -3,6 +3,7 @@
 # as root, in this folder, with this computer's files read-only) and ends with its exit status.
 #   -M "MODULES"  kernel modules to have at hand (modprobe them in COMMAND)
 #   -q "ARGS"     further arguments for QEMU, such as devices
+#   -a "ARGS"     further arguments for the kernel
 #   -o DIR        a folder that the command may write to, as /out
 #   -s N, -m MEM  CPUs (2) and memory (1G)
 #   -t SECONDS    time limit on this computer's clock (120)
@@ -18,10 +19,11 @@ PATH=$PATH:/usr/sbin:/sbin  # modprobe, depmod
 
 modules='' out='' cpus=2 memory=1G limit_s=120 accelerator='tcg,thread=multi' boot_arguments=''
 qemu_arguments=()
-while getopts M:q:o:s:m:t:VFS option; do
+while getopts M:q:a:o:s:m:t:VSF option; do
   case $option in
     M) modules=$OPTARG ;;
     q) read -ra words <<<"$OPTARG"; qemu_arguments+=("${words[@]}") ;;
+    a) boot_arguments+=" $OPTARG" ;;
     o) out=$(realpath "$OPTARG") ;;
     s) cpus=$OPTARG ;;
     m) memory=$OPTARG ;;

@@ -21,6 +21,7 @@ enum class IoError : std::uint8_t {
   stalled,               ///< the board refuses the transfer (USB STALL)
   incomplete_answer,     ///< an answer of the wrong length
   transfer_failed,       ///< a transfer failed on the bus
+  access_refused,        ///< the system does not allow the access (kernel lockdown, permissions)
 };
 
 [[nodiscard]] constexpr std::string_view description(IoError error) noexcept {
@@ -35,6 +36,7 @@ enum class IoError : std::uint8_t {
     case IoError::stalled: return "board refuses the transfer (STALL)";
     case IoError::incomplete_answer: return "answer of the wrong length";
     case IoError::transfer_failed: return "transfer failed on the bus";
+    case IoError::access_refused: return "the system refuses the access";
   }
   return "unknown error";
 }

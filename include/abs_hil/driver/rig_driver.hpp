@@ -27,6 +27,12 @@ class MakingSafeListener {
   virtual void making_safe() noexcept = 0;
 };
 
+/// What tells a board from others, for its commissioning record. Texts, as people read them.
+struct BoardIdentity {
+  std::string place{};  ///< serial number, or slot if it has none: "0000:03:00.0"
+  std::string logic{};  ///< version of its logic or firmware: "bitstream 2741"
+};
+
 /// One rig behind one board, real or simulated. The public functions implement the same lifecycle for every backend:
 /// they write nothing while inactive, and a failed `write` makes the outputs safe before it returns. Backends implement
 /// the private `do_` functions. They must call `deactivate()` in their own destructors, because the base class
@@ -88,6 +94,15 @@ class RigDriver {
   [[nodiscard]] virtual std::string_view what_holds_unsafe() const noexcept {
     return "its PWMs may hold their last duties";
   }
+  /// The configured board. A board that differs in one of the two needs a commissioning of its own. Empty texts: the
+  /// board shows nothing.
+  [[nodiscard]] virtual BoardIdentity identity() const { return {}; }
+  /// The duties that the active board reports for its outputs now, whoever has set them. Sends no command. False if the
+  /// board cannot tell. Not real-time safe.
+  [[nodiscard]] virtual bool outputs_now(rig::Command& /*applied*/) noexcept { return false; }
+  /// Writes to the configured board what changes nothing, to find out whether a write can succeed. `ok` for a board
+  /// whose `configure` has shown that.
+  [[nodiscard]] virtual IoResult try_write() noexcept { return {}; }
   /// All values that the configured board shows without any write, one per line, for the user.
   [[nodiscard]] virtual std::vector<std::string> inspection() { return {}; }
 

@@ -2,11 +2,14 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <initializer_list>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "abs_hil/rig/range.hpp"
@@ -146,19 +149,47 @@ constexpr void for_each_row(const Visit& visit) {
   }(std::make_integer_sequence<int, most_row_lines>{});
 }
 
+/// Where an option is kept, for code that does not know the struct of its row.
+using OptionTarget = std::variant<double*, std::int32_t*, std::int64_t*, bool*, std::string*>;
+using OptionVisitor =
+    std::function<void(const std::string& name, const OptionFacts& facts, const OptionTarget& target)>;
+
+/// A struct whose rows only the running program knows. It visits them itself.
+template <class Options>
+concept VisitsOwnOptions = requires(Options& options, const std::string& prefix, const OptionVisitor& visitor) {
+  options.visit_options(prefix, visitor);
+};
+
 /// Calls `visit(name, facts, value)` for each option, including those of groups, in order. Not real-time safe.
 /// @param prefix is put before every name
 template <class Options, class Visit>
 void for_each_option(Options& options, const std::string& prefix, const Visit& visit, bool searched = true) {
-  for_each_row<std::remove_const_t<Options>>([&](const auto& row) {
-    if constexpr (is_group_row<std::remove_cvref_t<decltype(row)>>) {
-      for_each_option(options.*row.member, prefix + std::string(row.prefix), visit, searched && row.searched);
-    } else {
-      OptionFacts facts = row.facts;
-      if (!searched) facts.search = {};
-      visit(prefix + std::string(facts.key), facts, options.*row.member);
-    }
-  });
+  using Mutable = std::remove_const_t<Options>;
+  if constexpr (VisitsOwnOptions<Mutable>) {
+    const_cast<Mutable&>(options).visit_options(
+        prefix, [&visit, searched](const std::string& name, OptionFacts facts, const OptionTarget& target) {
+          if (!searched) facts.search = {};
+          std::visit(
+              [&](auto* value) {
+                if constexpr (std::is_const_v<Options>) {
+                  visit(name, facts, std::as_const(*value));
+                } else {
+                  visit(name, facts, *value);
+                }
+              },
+              target);
+        });
+  } else {
+    for_each_row<Mutable>([&](const auto& row) {
+      if constexpr (is_group_row<std::remove_cvref_t<decltype(row)>>) {
+        for_each_option(options.*row.member, std::string(prefix).append(row.prefix), visit, searched && row.searched);
+      } else {
+        OptionFacts facts = row.facts;
+        if (!searched) facts.search = {};
+        visit(std::string(prefix).append(facts.key), facts, options.*row.member);
+      }
+    });
+  }
 }
 
 }  // namespace abs_hil::rig

@@ -20,8 +20,6 @@ namespace abs_hil::driver::can {
 
 namespace {
 
-constexpr std::int64_t handshake_timeout_ns = 100'000'000;
-constexpr int handshake_attempts = 3;
 /// In lock-step the emulator may take its time to answer, because the emulated time does not advance meanwhile.
 constexpr std::int64_t lock_step_timeout_ns = 1'000'000'000;
 /// Share of the period to wait for an answer. The controller and the command need the rest.
@@ -221,7 +219,30 @@ IoResult CanDriver::deactivate_node() noexcept {
   return {IoError::no_answer, id::control};
 }
 
-std::int64_t CanDriver::make_safe_bound_ns() const noexcept { return handshake_attempts * handshake_timeout_ns; }
+BoardIdentity CanDriver::identity() const {
+  if (!link_.socket) return {};
+  return {.place = options_.interface, .logic = "protocol " + std::to_string(identity_.protocol)};
+}
+
+bool CanDriver::hears_outputs(const NodeMessage& message) noexcept {
+  if (const auto* outputs = std::get_if<OutputsMessage>(&message)) {
+    applied_ = outputs->applied;
+    return true;
+  }
+  const auto* measured = std::get_if<MeasurementMessage>(&message);
+  if (measured != nullptr) applied_ = measured->applied;
+  return measured != nullptr;
+}
+
+bool CanDriver::outputs_now(rig::Command& applied) noexcept {
+  if (!link_.socket) return false;
+  link_.socket->drain();
+  if (!send_sync(monotonic_ns()).ok() || !await(&CanDriver::hears_outputs, handshake_timeout_ns)) return false;
+  applied = {.motor_duty = rig::duty_of(applied_.drive, signal::duty_steps),
+             .brake_duty = rig::duty_of(applied_.brake, signal::duty_steps)};
+  applied.motor_enable = applied.motor_duty > 0.0;
+  return true;
+}
 
 IoResult CanDriver::do_make_safe() noexcept {
   if (!link_.socket) return {IoError::disconnected};

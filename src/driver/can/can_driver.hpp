@@ -24,6 +24,10 @@ namespace abs_hil::driver::can {
           .brake_duty_max = options.brake_duty_max};
 }
 
+inline constexpr std::int64_t handshake_timeout_ns = 100'000'000;
+inline constexpr int handshake_attempts = 3;
+inline constexpr std::int64_t can_make_safe_bound_ns = handshake_attempts * handshake_timeout_ns;
+
 /// Counts of frames and cycles since `configure`.
 struct CanCounters {
   std::uint64_t cycles{0};  ///< SYNCs
@@ -68,7 +72,9 @@ class CanDriver final : public RigDriver {
     return "the node's watchdog should have zeroed them, if the node works";
   }
   [[nodiscard]] std::vector<std::string> inspection() override;
-  [[nodiscard]] std::int64_t make_safe_bound_ns() const noexcept override;
+  [[nodiscard]] std::int64_t make_safe_bound_ns() const noexcept override { return can_make_safe_bound_ns; }
+  [[nodiscard]] BoardIdentity identity() const override;
+  [[nodiscard]] bool outputs_now(rig::Command& applied) noexcept override;
   [[nodiscard]] const CanCounters& counters() const noexcept { return counters_; }
 
  private:
@@ -84,6 +90,7 @@ class CanDriver final : public RigDriver {
   [[nodiscard]] IoResult activate_node() noexcept;
   [[nodiscard]] bool await(bool (CanDriver::*heard)(const NodeMessage&) noexcept, std::int64_t timeout_ns) noexcept;
   [[nodiscard]] bool hears_identity(const NodeMessage& message) noexcept;
+  [[nodiscard]] bool hears_outputs(const NodeMessage& message) noexcept;
   [[nodiscard]] bool hears_safe(const NodeMessage& message) noexcept;
   [[nodiscard]] bool hears_active(const NodeMessage& message) noexcept;
 

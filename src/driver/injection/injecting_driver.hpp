@@ -34,6 +34,9 @@ class InjectingDriver final : public RigDriver {
   }
   [[nodiscard]] rig::PlantTruth truth() const noexcept override { return inner_->truth(); }
   [[nodiscard]] std::vector<std::string> notes() const override;
+  [[nodiscard]] IoResult try_write() noexcept override { return inner_->try_write(); }
+  [[nodiscard]] BoardIdentity identity() const override { return inner_->identity(); }
+  [[nodiscard]] bool outputs_now(rig::Command& applied) noexcept override { return inner_->outputs_now(applied); }
   [[nodiscard]] std::vector<std::string> tally() const override { return inner_->tally(); }
   [[nodiscard]] std::string_view what_holds_unsafe() const noexcept override { return inner_->what_holds_unsafe(); }
   [[nodiscard]] std::vector<std::string> inspection() override { return inner_->inspection(); }

@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "driver/lock_step.hpp"
+#include "driver/pci/card_obstacles.hpp"
 #include "driver/pci/register_map.hpp"
 #include "driver/pci/sysfs_window.hpp"
 
@@ -19,7 +20,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int bar_number = 2;
-constexpr std::uint64_t ioresource_io = 0x100;  ///< include/linux/ioport.h
+// include/linux/ioport.h
+constexpr std::uint64_t ioresource_io = 0x100;
+constexpr std::uint64_t ioresource_disabled = 0x10000000;
+constexpr std::uint64_t ioresource_unset = 0x20000000;
 
 [[noreturn]] void refuse(const std::string& what) { throw Unavailable("backend rig: " + what); }
 
@@ -77,7 +81,15 @@ std::string choose(const PciOptions& options) {
   return cards.front();
 }
 
-void check_bar(const fs::path& folder) {
+void refuse_obstacles(const fs::path& folder, const std::vector<FoundBoard::Obstacle>& obstacles) {
+  if (obstacles.empty()) return;
+  const FoundBoard::Obstacle& first = obstacles.front();
+  refuse("card " + folder.string() + ": " + first.what + "; nothing was written. " + first.fix);
+}
+
+}  // namespace
+
+void check_bar2(const fs::path& folder) {
   const BarInfo bar = read_bar2(folder);
   const std::string place = (folder / "resource").string() + ": BAR 2 ";
   if (bar.bytes == 0) {
@@ -99,8 +111,6 @@ void check_bar(const fs::path& folder) {
            std::to_string(window_bytes) + "; nothing was written");
   }
 }
-
-}  // namespace
 
 std::vector<std::string> find_cards(const fs::path& root) {
   std::error_code error;
@@ -132,25 +142,33 @@ BarInfo read_bar2(const fs::path& device_folder) {
     refuse(file.string() + ": \"" + line + "\" is not a region: start, end and flags in hexadecimal");
   }
   const bool absent = start == 0 && end == 0;
-  return {.bytes = absent || end < start ? 0 : end - start + 1, .io_ports = (flags & ioresource_io) != 0};
+  return {.bytes = absent || end < start ? 0 : end - start + 1,
+          .io_ports = (flags & ioresource_io) != 0,
+          .unset = start == 0 || (flags & ioresource_unset) != 0,
+          .disabled = (flags & ioresource_disabled) != 0};
 }
 
 Card open_card(const PciOptions& options, bool lock_step) {
   const std::string bdf = choose(options);
   const fs::path folder = fs::path(options.root) / bdf;
-  check_bar(folder);
+  check_bar2(folder);
+  refuse_obstacles(folder, card_obstacles(folder));
   std::error_code ignored;
   const bool waits_for_lock_step = fs::exists(folder / emulated_time_file, ignored);
   require_lock_step("the card in " + folder.string(), lock_step, waits_for_lock_step);
-  Card card{.window = std::make_unique<SysfsWindow>(folder / "resource2"), .place = bdf + " in " + options.root};
+  Card card{.window = std::make_unique<SysfsWindow>(folder / "resource2"),
+            .place = bdf + " in " + options.root,
+            .address = bdf};
   if (lock_step) card.time = std::make_unique<EmulatedTimeFile>(folder / emulated_time_file);
   return card;
 }
 
-std::unique_ptr<RegisterWindow> open_beside_owner(const PciOptions& options) {
+std::unique_ptr<RegisterWindow> open_beside_owner(const PciOptions& options, bool beside_guardian) {
   const fs::path folder = fs::path(options.root) / choose(options);
-  check_bar(folder);
-  return std::make_unique<SysfsWindow>(folder / "resource2", WindowUse::guardian);
+  check_bar2(folder);
+  refuse_obstacles(folder, port_obstacles(folder));
+  return std::make_unique<SysfsWindow>(folder / "resource2",
+                                       beside_guardian ? WindowUse::beside_guardian : WindowUse::guardian);
 }
 
 }  // namespace abs_hil::driver::pci

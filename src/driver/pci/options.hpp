@@ -29,6 +29,10 @@ struct PciOptions {
                  .range = rig::between(0, 2));
   ABS_HIL_OPTION(std::int32_t, lower_sign, 1, encoder_sign);
   ABS_HIL_OPTION(std::int32_t, upper_sign, 1, encoder_sign);
+  /// It is not known what they do and whether the host should switch them.
+  ABS_HIL_OPTION(std::int32_t, start_resistors, -1,
+                 .meaning = "start resistors at activation, bit 0 R1, bit 1 R2; -1: left as they are",
+                 .range = rig::between(-1, 3));
   ABS_HIL_OPTION(double, plausible_speed_rad_s, 1000.0, plausible_speed);
   std::int32_t encoder_counts_per_rev{4096};  ///< for that check alone; 1024 lines, quadrature
 };

@@ -13,6 +13,10 @@ namespace {
 /// If reading both counters takes longer, they belong to different instants (28 counts at 170 rad/s) and are read
 /// again.
 constexpr std::int64_t late_reading_ns = 250'000;
+constexpr std::uint32_t encoder_wheels = 2;
+
+constexpr const char* refusal_hint =
+    ". The kernel is probably locked down (Secure Boot): switch Secure Boot off, or boot without lockdown=";
 
 }  // namespace
 
@@ -69,6 +73,7 @@ void PciDriver::do_configure() {
   Access card(*card_.window);
   version_ = card.read(reg::bitstream_version);
   channel_counts_ = card.read(reg::channel_counts);
+  const std::uint32_t supply = card.read(reg::supply);
   const auto refuse = [this](const std::string& what) {
     const std::string text = "backend rig: card " + card_.place + ": " + what + "; nothing was written";
     card_ = {};
@@ -84,6 +89,36 @@ void PciDriver::do_configure() {
            std::to_string(options_.bitstream) +
            " (driver.pci.bitstream): another logic has other registers. Load the ABS logic or correct the key");
   }
+  if (const std::uint32_t counters = counters_of(channel_counts_); counters < encoder_wheels) {
+    refuse("register 04 gives it " + std::to_string(counters) +
+           " encoder counters, and the rig needs 2: it has another logic, or it is another card");
+  }
+  if (supply == 0) refuse("supply 0 V: the rig is switched off; press its ON button, release the E-stop");
+}
+
+IoResult PciDriver::try_write() noexcept {
+  if (!card_.window) return {IoError::disconnected};
+  // With its own value the index selects what it selected before.
+  std::uint32_t index = 0;
+  if (const IoResult result = card_.window->read32(reg::pwm_index, index); !result.ok()) return result;
+  return card_.window->write32(reg::pwm_index, pwm_bits(reg::pwm_index, index));
+}
+
+BoardIdentity PciDriver::identity() const {
+  if (!card_.window) return {};
+  return {.place = card_.address, .logic = "bitstream " + std::to_string(version_ & 0xFFFFU)};
+}
+
+bool PciDriver::outputs_now(rig::Command& applied) noexcept {
+  if (!card_.window) return false;
+  Access card(*card_.window);
+  const auto duty = [&](Pwm pwm) {
+    card.write(reg::pwm_index, static_cast<std::uint32_t>(pwm));
+    return rig::duty_of(pwm_bits(reg::pwm_width, card.read(reg::pwm_width)), grid_.duty_steps);
+  };
+  applied = {.motor_duty = duty(Pwm::drive), .brake_duty = duty(Pwm::brake)};
+  applied.motor_enable = applied.motor_duty > 0.0;
+  return card.result().ok();
 }
 
 void PciDriver::take_over(Access& card) noexcept {
@@ -94,8 +129,11 @@ void PciDriver::take_over(Access& card) noexcept {
          {std::pair(reg::pwm_mode, static_cast<std::uint32_t>(mode_)),
           std::pair(reg::pwm_prescaler, static_cast<std::uint32_t>(options_.pwm_prescaler))}) {
       card.write(offset, value);
-      if (card.read(offset) != value) card.fail(IoError::read_back_mismatch, offset);
+      if (pwm_bits(offset, card.read(offset)) != value) card.fail(IoError::read_back_mismatch, offset);
     }
+  }
+  if (options_.start_resistors >= 0) {
+    card.write(reg::start_resistors, static_cast<std::uint32_t>(options_.start_resistors));
   }
   // The mask holds the counters at 0 as long as its bits are set.
   card.write(reg::encoder_reset, (1U << static_cast<std::uint32_t>(options_.upper_channel)) |
@@ -124,7 +162,8 @@ void PciDriver::do_activate(std::int64_t now_ns) {
   }
   if (!result.ok()) {
     static_cast<void>(do_make_safe());
-    throw Unavailable("backend rig: card " + card_.place + ": taking over the outputs failed: " + error_text(result));
+    throw Unavailable("backend rig: card " + card_.place + ": taking over the outputs failed: " + error_text(result) +
+                      (result.error == IoError::access_refused ? refusal_hint : ""));
   }
 }
 
@@ -212,7 +251,7 @@ bool PciDriver::tripped_to_zero(Access& card, std::uint32_t width_read) noexcept
 std::uint32_t PciDriver::write_pwm(Access& card, Pwm pwm, std::uint32_t width) noexcept {
   card.write(reg::pwm_index, static_cast<std::uint32_t>(pwm));
   card.write(reg::pwm_width, width);
-  const std::uint32_t width_read = card.read(reg::pwm_width);
+  const std::uint32_t width_read = pwm_bits(reg::pwm_width, card.read(reg::pwm_width));
   if (card.result().ok() && width_read != width && !tripped_to_zero(card, width_read)) {
     card.fail(IoError::read_back_mismatch, reg::pwm_width);
   }

@@ -49,6 +49,9 @@ class PciDriver final : public RigDriver {
   }
   [[nodiscard]] std::vector<std::string> notes() const override;
   [[nodiscard]] std::vector<std::string> inspection() override;
+  [[nodiscard]] BoardIdentity identity() const override;
+  [[nodiscard]] bool outputs_now(rig::Command& applied) noexcept override;
+  [[nodiscard]] IoResult try_write() noexcept override;
 
  private:
   class Access;

@@ -25,14 +25,14 @@ IoResult check_for_zero(RegisterWindow& window, Pwm pwm) noexcept {
   // Read the index as well: if another process changed it, the width belonged to another PWM.
   if (const IoResult result = window.read32(reg::pwm_index, index_read); !result.ok()) return result;
   if (width == all_ones || index_read == all_ones) return {IoError::disconnected, reg::pwm_width};
-  if (index_read != index) return {IoError::read_back_mismatch, reg::pwm_index};
-  return width == 0 ? IoResult{} : IoResult{IoError::read_back_mismatch, reg::pwm_width};
+  if (pwm_bits(reg::pwm_index, index_read) != index) return {IoError::read_back_mismatch, reg::pwm_index};
+  return pwm_bits(reg::pwm_width, width) == 0 ? IoResult{} : IoResult{IoError::read_back_mismatch, reg::pwm_width};
 }
 
 }  // namespace
 
-PciSafeState::PciSafeState(const PciOptions& options)
-    : PciSafeState([options] { return open_beside_owner(options); }) {}
+PciSafeState::PciSafeState(const PciOptions& options, bool beside_guardian)
+    : PciSafeState([options, beside_guardian] { return open_beside_owner(options, beside_guardian); }) {}
 
 void PciSafeState::prepare() { window_ = open_window_(); }
 

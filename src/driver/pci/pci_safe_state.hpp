@@ -19,7 +19,8 @@ class PciSafeState final : public SafeStateWriter {
   /// @param open_window  throws Unavailable; called by `prepare`, and again after failed accesses
   explicit PciSafeState(OpenWindow open_window) : open_window_(std::move(open_window)) {}
   /// For the card that the options select, through sysfs.
-  explicit PciSafeState(const PciOptions& options);
+  /// @param beside_guardian  it works although a guardian has the card, which writes zeros as well
+  explicit PciSafeState(const PciOptions& options, bool beside_guardian = false);
 
   [[nodiscard]] std::string_view name() const noexcept override { return "pci"; }
   void prepare() override;

@@ -43,7 +43,7 @@ constexpr std::array table{
              documented, at_activation},
     Register{reg::encoder_counter, "encoder counter", "counts", "32-bit signed, of the indexed encoder", documented,
              every_cycle, "which direction is forward: the wiring decides"},
-    Register{reg::start_resistors, "start resistors", "", "bit 0 R1, bit 1 R2", documented, never,
+    Register{reg::start_resistors, "start resistors", "", "bit 0 R1, bit 1 R2", documented, at_activation,
              "whether the host should switch them"},
     Register{reg::r1_low, "R1 low threshold", "", "", documented, never, "its unit"},
     Register{reg::r1_high, "R1 high threshold", "", "", documented, never, "its unit"},

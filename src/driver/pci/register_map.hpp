@@ -6,8 +6,8 @@
 #include <span>
 #include <string_view>
 
-#include "abs_hil/driver/pwm.hpp"
 #include "abs_hil/driver/standing.hpp"
+#include "driver/pwm.hpp"
 
 namespace abs_hil::driver::pci {
 
@@ -87,6 +87,18 @@ using driver::full_width;
 using driver::pwm_frequency_Hz;
 using driver::pwm_width_for;
 using driver::PwmMode;
+
+/// The bits of a PWM register that count: the sources give these registers 16 bits and say nothing of those above,
+/// which the card may fill with anything.
+[[nodiscard]] constexpr std::uint32_t pwm_bits(std::uint32_t offset, std::uint32_t value) noexcept {
+  constexpr std::uint32_t low_16_bits = 0xFFFF;
+  return offset >= reg::pwm_index && offset <= reg::pwm_width ? value & low_16_bits : value;
+}
+
+/// Number of encoder counters that register 04 gives (bits 15:12).
+[[nodiscard]] constexpr std::uint32_t counters_of(std::uint32_t channel_counts) noexcept {
+  return (channel_counts >> 12U) & 0xFU;
+}
 
 /// Registers 38 and A4: V. 0 means no supply. NaN above 100 V, which this rig cannot have.
 [[nodiscard]] constexpr double supply_V(std::uint32_t raw) noexcept {

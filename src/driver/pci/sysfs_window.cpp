@@ -118,17 +118,16 @@ IoError io_error_for(int errno_value) noexcept {
     case EBUSY:
     case EINTR:
     case ETIMEDOUT: return IoError::no_answer;
+    case EACCES:
+    case EPERM: return IoError::access_refused;
     default: return IoError::disconnected;
   }
 }
 
 SysfsWindow::SysfsWindow(const std::filesystem::path& resource_file, WindowUse use)
     : file_(open_for_access(resource_file)) {
-  if (use == WindowUse::guardian) {
-    become_guardian(resource_file, file_.get());
-  } else {
-    become_owner(resource_file, file_.get());
-  }
+  if (use == WindowUse::guardian) become_guardian(resource_file, file_.get());
+  if (use == WindowUse::owner) become_owner(resource_file, file_.get());
 }
 
 IoResult SysfsWindow::read32(std::uint32_t offset, std::uint32_t& value) noexcept {

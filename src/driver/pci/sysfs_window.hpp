@@ -12,8 +12,8 @@ namespace abs_hil::driver::pci {
 using driver::FileDescriptor;
 
 /// Who opens a card's registers. A guardian opens them beside the owner, and keeps new owners away after the owner's
-/// end: it holds another kind of lock (fcntl), for which a new owner checks.
-enum class WindowUse : std::uint8_t { owner, guardian };
+/// end: it holds another kind of lock (fcntl), for which a new owner checks. `beside_guardian` takes no lock.
+enum class WindowUse : std::uint8_t { owner, guardian, beside_guardian };
 
 /// The registers behind sysfs' `resource2`. For an I/O BAR the kernel turns a 4-byte pread or pwrite at the register's
 /// offset into one 32-bit port access (Documentation/PCI/sysfs-pci.rst). Only one process may own a card, because index

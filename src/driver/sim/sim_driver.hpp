@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <string_view>
 
-#include "abs_hil/driver/pwm.hpp"
 #include "abs_hil/driver/rig_driver.hpp"
 #include "abs_hil/plant_sim/plant.hpp"
 #include "driver/output_grid.hpp"
+#include "driver/pwm.hpp"
 
 namespace abs_hil::driver {
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <stdexcept>
-#include <tuple>
 #include <utility>
 
 #include "abs_hil/rig/option_check.hpp"
@@ -13,12 +12,6 @@
 namespace abs_hil::driver::usb {
 
 namespace {
-
-/// Longer timeout for transfers outside the cycle.
-constexpr std::int64_t patient_ns = 500'000'000;
-/// Bound of FrameLink::recover on a failing board: two seconds for what is cancelled, the kernel's 5 s for the clearing
-/// of each endpoint, and four short waits for old answers.
-constexpr std::int64_t recovery_bound_ns = 12'100'000'000;
 
 rig::Reason reason_for(IoError error) noexcept {
   switch (error) {
@@ -89,31 +82,13 @@ void UsbDriver::do_configure() {
 }
 
 void UsbDriver::put_command(std::uint32_t drive_width, std::uint32_t brake_width, bool enable) noexcept {
-  const auto put = [this](std::int32_t channel, const PwmWords& words) {
-    const std::size_t at = word::pwm + pwm_words * static_cast<std::size_t>(channel);
-    for (std::size_t i = 0; i < words.size(); ++i) put_payload(frame_, at + i, words[i]);
-  };
-  const auto mode = static_cast<std::uint32_t>(mode_);
-  const auto prescaler = static_cast<std::uint32_t>(options_.pwm_prescaler);
-  drive_sent_ = pwm_words_for(mode, prescaler, drive_width);
-  brake_sent_ = pwm_words_for(mode, prescaler, brake_width);
-  put(options_.drive_pwm, drive_sent_);
-  put(options_.brake_pwm, brake_sent_);
-  if (options_.enable_line < 0) return;
-  const std::uint32_t line = 1U << static_cast<std::uint32_t>(options_.enable_line);
-  const std::uint32_t others = word_at(frame_, word::digital_out) & ~line;
-  digital_sent_ = static_cast<std::uint16_t>(others | (enable != options_.enable_inverted ? line : 0U));
-  put_payload(frame_, word::digital_out, digital_sent_);
-  put_payload(frame_, word::digital_direction, word_at(frame_, word::digital_direction) & ~line);
+  sent_ = put_outputs(frame_, options_, drive_width, brake_width, enable);
 }
 
 IoResult UsbDriver::checked(const Contents& contents) const noexcept {
   if (contents.identity != identity_) return {IoError::implausible_answer, endpoint_in};
   if (!options_.verify_outputs) return {};
-  const std::uint32_t line = options_.enable_line < 0 ? 0U : 1U << static_cast<std::uint32_t>(options_.enable_line);
-  const bool as_sent = contents.drive == drive_sent_ && contents.brake == brake_sent_ &&
-                       ((contents.digital_out ^ digital_sent_) & line) == 0;
-  return as_sent ? IoResult{} : IoResult{IoError::read_back_mismatch, endpoint_in};
+  return shows(contents, sent_, options_) ? IoResult{} : IoResult{IoError::read_back_mismatch, endpoint_in};
 }
 
 IoResult UsbDriver::fresh_frame(std::int64_t timeout_ns, Contents& contents, std::int64_t& read_ns) noexcept {
@@ -233,7 +208,7 @@ IoResult UsbDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) 
 
 IoResult UsbDriver::do_write(const rig::Command& command, rig::Command& sent) noexcept {
   if (!in_range(command)) return {IoError::command_out_of_range};
-  const auto sent_before = std::tuple(drive_sent_, brake_sent_, digital_sent_);
+  const OutputWords sent_before = sent_;
   put_command(grid_.motor_width(command), grid_.brake_width(command), command.motor_enable);
   const IoResult result = board_.link->send(frame_);
   if (result.error != IoError::no_answer) {
@@ -241,14 +216,27 @@ IoResult UsbDriver::do_write(const rig::Command& command, rig::Command& sent) no
     return with_reason(result);
   }
   sent = command_sent_;
-  std::tie(drive_sent_, brake_sent_, digital_sent_) = sent_before;
+  sent_ = sent_before;
   // Count a cycle only once. Without a read, only this would find a board that takes no frames.
   return std::exchange(lost_this_cycle_, false) ? IoResult{} : lost_frame();
 }
 
-std::int64_t UsbDriver::make_safe_bound_ns() const noexcept {
-  // Two tries with a recovery in between. Each try waits for the board to take the frame and to show it.
-  return std::int64_t{2} * 2 * patient_ns + recovery_bound_ns;
+BoardIdentity UsbDriver::identity() const {
+  if (!board_.link) return {};
+  return {.place = board_.serial, .logic = "version " + std::to_string(identity_[word::version])};
+}
+
+bool UsbDriver::outputs_now(rig::Command& applied) noexcept {
+  if (!board_.link) return false;
+  Contents contents;
+  std::int64_t ignored = 0;
+  const IoResult read = fresh_frame(patient_ns, contents, ignored);
+  if (!read.ok() && read.error != IoError::read_back_mismatch) return false;
+  const std::uint32_t steps = full_width(mode_);
+  applied = {.motor_duty = rig::duty_of(contents.drive[2], steps),
+             .brake_duty = rig::duty_of(contents.brake[2], steps)};
+  applied.motor_enable = applied.motor_duty > 0.0;
+  return options_.verify_outputs;
 }
 
 IoResult UsbDriver::do_make_safe() noexcept {

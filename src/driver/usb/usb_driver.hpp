@@ -7,15 +7,24 @@
 #include <string_view>
 #include <vector>
 
-#include "abs_hil/driver/pwm.hpp"
 #include "abs_hil/driver/rig_driver.hpp"
 #include "driver/loss_bucket.hpp"
 #include "driver/output_grid.hpp"
+#include "driver/pwm.hpp"
 #include "driver/usb/frame.hpp"
 #include "driver/usb/frame_link.hpp"
 #include "driver/usb/options.hpp"
+#include "driver/usb/outputs.hpp"
 
 namespace abs_hil::driver::usb {
+
+/// Longer timeout for transfers outside the cycle.
+inline constexpr std::int64_t patient_ns = 500'000'000;
+/// Bound of FrameLink::recover on a failing board: two seconds for what is cancelled, the kernel's 5 s for the clearing
+/// of each endpoint, and four short waits for old answers.
+inline constexpr std::int64_t recovery_bound_ns = 12'100'000'000;
+/// Two tries with a recovery in between. Each try waits for the board to take the frame and to show it.
+inline constexpr std::int64_t usb_make_safe_bound_ns = std::int64_t{2} * 2 * patient_ns + recovery_bound_ns;
 
 /// The RT-DAC/USB2 with generic logic. Not verified on hardware.
 ///
@@ -43,7 +52,9 @@ class UsbDriver final : public RigDriver {
   [[nodiscard]] std::vector<std::string> notes() const override;
   [[nodiscard]] std::vector<std::string> inspection() override;
   [[nodiscard]] std::vector<std::string> tally() const override;
-  [[nodiscard]] std::int64_t make_safe_bound_ns() const noexcept override;
+  [[nodiscard]] BoardIdentity identity() const override;
+  [[nodiscard]] bool outputs_now(rig::Command& applied) noexcept override;
+  [[nodiscard]] std::int64_t make_safe_bound_ns() const noexcept override { return usb_make_safe_bound_ns; }
   [[nodiscard]] std::string_view what_holds_unsafe() const noexcept override {
     return "its PWMs may hold their last duties, because the board has no known watchdog";
   }
@@ -77,11 +88,9 @@ class UsbDriver final : public RigDriver {
   Board board_{};
 
   std::array<std::uint16_t, identity_words> identity_{};
-  Frame shown_{};          ///< the board's frame at `configure`
-  Frame frame_{};          ///< the frame sent last
-  PwmWords drive_sent_{};  ///< PWM words that the board's frames must show
-  PwmWords brake_sent_{};
-  std::uint16_t digital_sent_{0};
+  Frame shown_{};                ///< the board's frame at `configure`
+  Frame frame_{};                ///< the frame sent last
+  OutputWords sent_{};           ///< what the board's frames must show
   rig::Command command_sent_{};  ///< the command of the frame sent last
 
   std::int64_t activated_ns_{0};  ///< time of `activate`

@@ -30,6 +30,7 @@ class Tree {
     fs::create_directories(root / bdf);
     put(bdf, "vendor", vendor + "\n");
     put(bdf, "device", device + "\n");
+    put(bdf, "enable", "1\n");
     bar(bdf, "0x000000000000e000 0x000000000000e0ff 0x0000000000040101");
     put(bdf, "resource2", std::string(256, '\0'));
   }
@@ -111,6 +112,31 @@ TEST_CASE("Each fault is refused with its own message") {
   SECTION("small file behind a BAR that claims more") {
     tree.put("0000:04:01.0", "resource2", std::string(64, '\0'));
     CHECK_THAT(refusal(tree.options), Contains("has 64 bytes"));
+  }
+  SECTION("BAR that has no address") {
+    tree.bar("0000:04:01.0", "0x0000000000000000 0x00000000000000ff 0x0000000020040101");
+    CHECK_THAT(refusal(tree.options),
+               Contains("are not assigned: an access would reach other devices") && Contains("nothing was written"));
+    tree.bar("0000:04:01.0", "0x000000000000e000 0x000000000000e0ff 0x0000000020040101");
+    CHECK_THAT(refusal(tree.options), Contains("are not assigned"));
+    CHECK_THROWS_WITH(open_beside_owner(tree.options), Contains("are not assigned"));
+  }
+  SECTION("BAR that the kernel has switched off") {
+    tree.bar("0000:04:01.0", "0x000000000000e000 0x000000000000e0ff 0x0000000010040101");
+    CHECK_THAT(refusal(tree.options), Contains("are disabled: an access would reach other devices"));
+  }
+  SECTION("disabled device") {
+    tree.put("0000:04:01.0", "enable", "0\n");
+    CHECK_THAT(refusal(tree.options), Contains("not enabled; nothing was written. echo 1 | sudo tee "));
+    CHECK_NOTHROW(open_beside_owner(tree.options));  // it may still take the zeros
+    fs::remove(tree.root / "0000:04:01.0" / "enable");
+    CHECK_THAT(refusal(tree.options), Contains("not enabled"));
+  }
+  SECTION("bound driver") {
+    fs::create_symlink("../drivers/uio_pci_generic", tree.root / "0000:04:01.0" / "driver");
+    CHECK_THAT(refusal(tree.options),
+               Contains("owned by the kernel driver uio_pci_generic") && Contains("/driver/unbind"));
+    CHECK_NOTHROW(open_beside_owner(tree.options));  // nothing keeps the zeros from the card
   }
   SECTION("no BAR 2") {
     tree.bar("0000:04:01.0", "0x0000000000000000 0x0000000000000000 0x0000000000000000");
@@ -205,5 +231,29 @@ TEST_CASE("An access that the kernel truncates means that the card is gone") {
   CHECK(value == 7);
   CHECK(io_error_for(ENODEV) == IoError::disconnected);
   CHECK(io_error_for(ENOTCONN) == IoError::disconnected);
+  for (const int refused : {EPERM, EACCES}) CHECK(io_error_for(refused) == IoError::access_refused);
   for (const int passing : {EAGAIN, EBUSY, EINTR, ETIMEDOUT}) CHECK(io_error_for(passing) == IoError::no_answer);
+}
+
+TEST_CASE("A kernel that is locked down is named before anything is written") {
+  const abs_hil::test::TemporaryFolder folder;
+  const fs::path devices = folder.path / "sys/bus/pci/devices";
+  fs::create_directories(devices / "0000:04:01.0");
+  fs::create_directories(folder.path / "sys/kernel/security");
+  const auto put = [&](const std::string& file, const std::string& text) {
+    std::ofstream(devices / "0000:04:01.0" / file) << text;
+  };
+  put("vendor", "0x10b5\n");
+  put("device", "0x2497\n");
+  put("enable", "1\n");
+  put("resource", "0x0 0x0 0x0\n0x0 0x0 0x0\n0xe000 0xe0ff 0x40101\n");
+  put("resource2", std::string(256, '\0'));
+  const PciOptions options{.root = devices.string()};
+  CHECK(refusal(options) == "opened");
+  for (const char* level : {"none [integrity] confidentiality", "none integrity [confidentiality]"}) {
+    std::ofstream(folder.path / "sys/kernel/security/lockdown") << level << '\n';
+    CHECK_THAT(refusal(options), Contains("the kernel is locked down (Secure Boot)"));
+  }
+  std::ofstream(folder.path / "sys/kernel/security/lockdown") << "[none] integrity confidentiality\n";
+  CHECK(refusal(options) == "opened");
 }

@@ -135,3 +135,22 @@ TEST_CASE("a card that comes back is opened again") {
   CHECK(opened == 3);
   CHECK(both_zero(card));
 }
+
+TEST_CASE("Bits above the documented 16 of the PWM registers mean nothing, to the driver and to the safe state") {
+  for (const char* fault : {"60:wrong=65536", "64:wrong=65536", "68:wrong=65536", "6c:wrong=65536"}) {
+    CAPTURE(fault);
+    ModelCard card;
+    card.faulty.set(fault);
+    pci::PciDriver owner({}, card.opener());
+    owner.configure();
+    owner.activate(0);
+    rig::Command sent;
+    CHECK(owner.write(driving, sent).ok());
+    CHECK(sent.motor_duty == Approx(0.9).margin(1.0 / 4095.0));
+    CHECK(owner.deactivate().ok());
+    pci::PciSafeState writer = safe_state_of(card);
+    writer.prepare();
+    CHECK(writer.make_safe().ok());
+    CHECK(both_zero(card));
+  }
+}

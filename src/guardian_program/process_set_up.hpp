@@ -6,7 +6,7 @@
 #include "config/settings.hpp"
 #include "runtime/realtime_setup.hpp"
 
-namespace abs_hil::app {
+namespace abs_hil::guardian_program {
 
 inline constexpr int exit_verified = 0;
 inline constexpr int exit_not_verified = 1;
@@ -22,4 +22,4 @@ void spare_from_oom();
 /// "require", "off", or anything else for "prefer".
 [[nodiscard]] runtime::RealtimeMode realtime_mode_of(const std::string& name);
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::guardian_program

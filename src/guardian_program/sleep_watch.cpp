@@ -1,4 +1,4 @@
-#include "sleep_watch.hpp"
+#include "guardian_program/sleep_watch.hpp"
 
 #include <poll.h>
 #include <sys/eventfd.h>
@@ -15,7 +15,7 @@
 #include <systemd/sd-bus.h>
 #endif
 
-namespace abs_hil::app {
+namespace abs_hil::guardian_program {
 
 namespace {
 
@@ -146,4 +146,4 @@ guardian::Interruption SleepWatch::interruption() {
               }};
 }
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::guardian_program

@@ -7,7 +7,7 @@
 #include "driver/file_descriptor.hpp"
 #include "guardian/guardian_service.hpp"
 
-namespace abs_hil::app {
+namespace abs_hil::guardian_program {
 
 /// Finds pauses of a virtual machine (QEMU's stop and cont, a migration). All other clocks of the machine stand still
 /// meanwhile, so nothing else in it can know. The real-time clock goes on, and this compares it with the others: every
@@ -41,4 +41,4 @@ class MachinePause {
   std::jthread thread_{};
 };
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::guardian_program

@@ -1,8 +1,9 @@
-#include "guard_of_run.hpp"
+#include "guardian_program/guard_of_run.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <exception>
@@ -11,17 +12,22 @@
 
 #include "config/config_json.hpp"
 #include "config/key_table.hpp"
-#include "flight_files.hpp"
 #include "guardian/guardian_loop.hpp"
 #include "guardian/guardian_process.hpp"
 #include "guardian/kept_board.hpp"
 #include "guardian/launch_config.hpp"
 #include "guardian/linux_process.hpp"
-#include "process_set_up.hpp"
+#include "guardian_program/flight_files.hpp"
+#include "guardian_program/process_set_up.hpp"
+#include "runtime/board_policy.hpp"
 
-namespace abs_hil::app {
+namespace abs_hil::guardian_program {
 
 namespace {
+
+/// A person has said with SIGUSR1 that the rig is switched off: nothing is left to make safe.
+std::atomic<bool> released_by_person{false};
+static_assert(std::atomic<bool>::is_always_lock_free);
 
 void tell_controller(const std::string& text) {
   [[maybe_unused]] const auto written = ::write(guardian::inherited_ready, text.data(), text.size());
@@ -43,6 +49,9 @@ GuardianSetup set_up() {
   // Only these tables: others may name things that the guardian does not know, such as a user's own controller.
   config::load_tables(setup.launch.config_json, {"driver", "guardian", "realtime", "telemetry"}, keys,
                       "the controller's configuration");
+  constexpr double emulator_insist_s = 10.0;
+  double& insist_s = setup.settings.guardian.insist_s;
+  if (insist_s == 0.0 && !runtime::is_real_board(setup.settings.driver)) insist_s = emulator_insist_s;
   setup.writer = guardian::safe_state_writer_of(setup.settings.driver);
   setup.writer->prepare();
   const runtime::RealtimeOptions realtime = realtime_options(setup.settings, realtime_mode_of(setup.launch.realtime));
@@ -61,7 +70,7 @@ int guard() {
   const GuardianSetup setup = set_up();
   const runtime::RealtimeReport& realtime = setup.realtime->report();
   runtime::MonotonicClock clock;
-  guardian::GuardianLoop loop(clock, controller, region, *setup.writer, setup.settings.guardian);
+  guardian::GuardianLoop loop(clock, controller, region, *setup.writer, setup.settings.guardian, &released_by_person);
   const bool lacks = setup.launch.realtime == "prefer" && !realtime.realtime();
   tell_controller(guardian::ready_text(realtime.scheduling, lacks ? realtime.shortcomings() : std::string()));
 
@@ -80,7 +89,8 @@ bool started_by_a_run() { return ::fcntl(guardian::inherited_launch_config, F_GE
 
 int guard_one_run() {
   // It ends after the controller, whatever a terminal or a service manager sends.
-  ignore_signals({SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGTSTP, SIGTTIN, SIGTTOU, SIGUSR1, SIGUSR2, SIGXFSZ});
+  ignore_signals({SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGTSTP, SIGTTIN, SIGTTOU, SIGUSR2, SIGXFSZ});
+  std::signal(SIGUSR1, [](int) { released_by_person.store(true, std::memory_order_relaxed); });
   spare_from_oom();
   try {
     return guard();
@@ -90,4 +100,4 @@ int guard_one_run() {
   }
 }
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::guardian_program

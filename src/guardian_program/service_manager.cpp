@@ -1,10 +1,10 @@
-#include "service_manager.hpp"
+#include "guardian_program/service_manager.hpp"
 
 #ifdef ABS_HIL_HAVE_LIBSYSTEMD
 #include <systemd/sd-daemon.h>
 #endif
 
-namespace abs_hil::app {
+namespace abs_hil::guardian_program {
 
 namespace {
 
@@ -26,4 +26,4 @@ void ServiceManager::status(const std::string& text) {
   notify(("STATUS=" + text).c_str());
 }
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::guardian_program

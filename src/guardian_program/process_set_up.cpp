@@ -1,4 +1,4 @@
-#include "process_set_up.hpp"
+#include "guardian_program/process_set_up.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <csignal>
 
-namespace abs_hil::app {
+namespace abs_hil::guardian_program {
 
 void ignore_signals(std::initializer_list<int> signals) {
   for (const int signal : signals) std::signal(signal, SIG_IGN);
@@ -32,4 +32,4 @@ runtime::RealtimeMode realtime_mode_of(const std::string& name) {
                              : runtime::RealtimeMode::prefer;
 }
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::guardian_program

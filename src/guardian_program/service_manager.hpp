@@ -2,7 +2,7 @@
 
 #include <string>
 
-namespace abs_hil::app {
+namespace abs_hil::guardian_program {
 
 /// Messages to systemd; nothing happens without it.
 class ServiceManager {
@@ -16,4 +16,4 @@ class ServiceManager {
   std::string told_{};
 };
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::guardian_program

@@ -1,4 +1,4 @@
-#include "machine_pause.hpp"
+#include "guardian_program/machine_pause.hpp"
 
 #include <fcntl.h>
 #include <sys/eventfd.h>
@@ -13,7 +13,7 @@
 #include "driver/monotonic_time.hpp"
 #include "runtime/realtime_setup.hpp"
 
-namespace abs_hil::app {
+namespace abs_hil::guardian_program {
 
 namespace {
 
@@ -85,4 +85,4 @@ guardian::Interruption MachinePause::interruption() {
           .lease_changed = [this](bool held) { leased_ = held; }};
 }
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::guardian_program

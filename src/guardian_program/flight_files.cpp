@@ -1,11 +1,11 @@
-#include "flight_files.hpp"
+#include "guardian_program/flight_files.hpp"
 
 #include <cstdio>
 #include <utility>
 
 #include "telemetry/flight_record.hpp"
 
-namespace abs_hil::app {
+namespace abs_hil::guardian_program {
 
 void write_flight_files(const guardian::LaunchConfig& launch, const std::string& channel_prefix,
                         const guardian::SharedRegion& region, const guardian::GuardianReport& report,
@@ -30,4 +30,4 @@ void write_flight_files(const guardian::LaunchConfig& launch, const std::string&
   for (const auto& problem : problems) std::fprintf(stderr, "abs_guardian: %s\n", problem.c_str());
 }
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::guardian_program

@@ -8,7 +8,7 @@
 #include "driver/file_descriptor.hpp"
 #include "guardian/guardian_service.hpp"
 
-namespace abs_hil::app {
+namespace abs_hil::guardian_program {
 
 /// Holds logind's sleep inhibitor (mode "delay"): before the computer is suspended, the service takes the outputs back
 /// and makes them safe, and only then the inhibitor is let go. After the suspension the service looks at the board
@@ -34,4 +34,4 @@ class SleepWatch {
   std::jthread thread_{};
 };
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::guardian_program

@@ -1,4 +1,4 @@
-#include "service.hpp"
+#include "guardian_program/service.hpp"
 
 #include <grp.h>
 #include <pwd.h>
@@ -21,16 +21,16 @@
 #include "config/config_file.hpp"
 #include "config/config_json.hpp"
 #include "config/key_table.hpp"
-#include "flight_files.hpp"
 #include "guardian/guardian_service.hpp"
 #include "guardian/kept_board.hpp"
 #include "guardian/launch_config.hpp"
-#include "machine_pause.hpp"
-#include "process_set_up.hpp"
-#include "service_manager.hpp"
-#include "sleep_watch.hpp"
+#include "guardian_program/flight_files.hpp"
+#include "guardian_program/machine_pause.hpp"
+#include "guardian_program/process_set_up.hpp"
+#include "guardian_program/service_manager.hpp"
+#include "guardian_program/sleep_watch.hpp"
 
-namespace abs_hil::app {
+namespace abs_hil::guardian_program {
 
 namespace {
 
@@ -122,6 +122,9 @@ guardian::LeaseTerms read_terms(const std::string& json, const guardian::Peer& c
   config::KeyTable keys(settings);
   config::load_tables(launch.config_json, {"driver", "guardian", "telemetry"}, keys, "the controller's configuration");
   const std::string prefix = settings.telemetry.channel_prefix;
+  // The service goes on by itself after these tries.
+  constexpr double insist_s = 10.0;
+  if (settings.guardian.insist_s == 0.0) settings.guardian.insist_s = insist_s;
   return {.options = settings.guardian,
           .board = guardian::kept_board(settings.driver),
           .write_record = [launch, client, prefix](const guardian::SharedRegion& region,
@@ -216,4 +219,4 @@ int serve(int argc, const char* const* argv) {
   }
 }
 
-}  // namespace abs_hil::app
+}  // namespace abs_hil::guardian_program

@@ -1,0 +1,71 @@
+#include "driver/can/can_safe_state.hpp"
+
+#include <variant>
+
+#include "driver/can/can_driver.hpp"
+#include "driver/monotonic_time.hpp"
+
+namespace abs_hil::driver::can {
+
+namespace {
+
+constexpr std::int64_t answer_ns = 100'000'000;
+/// A flooded bus must not keep the next zeros back.
+constexpr int most_frames = 1000;
+
+}  // namespace
+
+void CanSafeState::prepare() {
+  if (!one_peer_) link_ = open_link_();
+}
+
+std::int64_t CanSafeState::owner_needs_ns() const noexcept { return can_make_safe_bound_ns; }
+
+IoResult CanSafeState::send_zeros() noexcept {
+  const SendResult requested = link_.socket->send(control_frame({.request = Request::deactivate}));
+  // A node that missed the request, or does not obey it, still takes a command of zeros.
+  const SendResult zeros = link_.socket->send(command_frame({}));
+  for (const SendResult& result : {requested, zeros}) {
+    if (result.outcome == SendOutcome::down || result.outcome == SendOutcome::failed) {
+      return {IoError::disconnected, id::control, result.errno_value, rig::Reason::can_interface_down};
+    }
+  }
+  return {};
+}
+
+IoResult CanSafeState::verify() noexcept {
+  const std::int64_t deadline_ns = monotonic_ns() + answer_ns;
+  bool inactive = false;
+  bool zero = false;
+  Frame frame;
+  for (int i = 0; i < most_frames && !(inactive && zero); ++i) {
+    const ReceiveOutcome outcome = link_.socket->receive(frame, deadline_ns).outcome;
+    if (outcome == ReceiveOutcome::malformed) continue;
+    if (outcome != ReceiveOutcome::frame) break;
+    const Decoded decoded = decode(frame);
+    if (const auto* status = std::get_if<StatusMessage>(&decoded.message)) {
+      inactive = status->state == NodeState::inactive;
+    } else if (const auto* outputs = std::get_if<OutputsMessage>(&decoded.message)) {
+      zero = outputs->applied == RawDuties{};
+    }
+  }
+  if (inactive && zero) return {};
+  return {IoError::no_answer, id::control, 0, rig::Reason::can_node_silent};
+}
+
+IoResult CanSafeState::make_safe() noexcept {
+  if (!link_.socket) {
+    try {
+      link_ = open_link_();
+    } catch (...) {
+      return {IoError::disconnected};
+    }
+  }
+  link_.socket->drain();  // earlier frames must not count as the answer
+  IoResult result = send_zeros();
+  if (result.ok()) result = verify();
+  if (result.error == IoError::disconnected || (!result.ok() && one_peer_)) link_ = {};
+  return result;
+}
+
+}  // namespace abs_hil::driver::can

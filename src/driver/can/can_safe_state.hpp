@@ -1,0 +1,37 @@
+#pragma once
+
+#include <functional>
+#include <utility>
+
+#include "abs_hil/driver/safe_state_writer.hpp"
+#include "driver/can/link.hpp"
+#include "driver/can/messages.hpp"
+
+namespace abs_hil::driver::can {
+
+/// Writes the safe state of a CAN node: it sends the request to deactivate, and zeros, without any handshake, and waits
+/// afterwards until the node reports that it is inactive with both outputs 0. A bus takes more than one socket, so this
+/// one is open beside the owner's. An emulator's socket takes one peer only, so it is opened after the owner's end.
+class CanSafeState final : public SafeStateWriter {
+ public:
+  using OpenLink = std::function<Link()>;
+  /// @param open_link  throws Unavailable
+  /// @param one_peer   the link takes one peer only
+  CanSafeState(OpenLink open_link, bool one_peer) : open_link_(std::move(open_link)), one_peer_(one_peer) {}
+
+  [[nodiscard]] std::string_view name() const noexcept override { return "can"; }
+  void prepare() override;
+  [[nodiscard]] std::int64_t owner_needs_ns() const noexcept override;
+  [[nodiscard]] IoResult make_safe() noexcept override;
+
+ private:
+  [[nodiscard]] IoResult send_zeros() noexcept;
+  /// Waits until the node reports the safe state.
+  [[nodiscard]] IoResult verify() noexcept;
+
+  OpenLink open_link_;
+  bool one_peer_;
+  Link link_{};
+};
+
+}  // namespace abs_hil::driver::can

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <functional>
+#include <utility>
+
+#include "abs_hil/driver/safe_state_writer.hpp"
+#include "driver/usb/frame_link.hpp"
+#include "driver/usb/options.hpp"
+#include "driver/usb/outputs.hpp"
+
+namespace abs_hil::driver::usb {
+
+/// Writes the safe state of an RT-DAC/USB2 after its owner's end; only one process can claim the board. It sends zeros
+/// whether or not the board answers, and verifies them afterwards. A frame sets all words of the board: those that are
+/// not of the rig come from a frame that the board has shown. If it shows none, its digital lines become inputs.
+class UsbSafeState final : public SafeStateWriter {
+ public:
+  using OpenBoard = std::function<Board()>;
+  /// @param open_board  throws Unavailable
+  UsbSafeState(UsbOptions options, OpenBoard open_board)
+      : options_(std::move(options)), open_board_(std::move(open_board)) {}
+
+  [[nodiscard]] std::string_view name() const noexcept override { return "usb"; }
+  /// Opens nothing: the owner has claimed the board.
+  void prepare() override {}
+  [[nodiscard]] std::int64_t owner_needs_ns() const noexcept override;
+  [[nodiscard]] IoResult make_safe() noexcept override;
+
+ private:
+  [[nodiscard]] IoResult open() noexcept;
+  void learn_words() noexcept;
+  /// Asks for a frame and takes its words over; false without one.
+  [[nodiscard]] bool show(Frame& words) noexcept;
+  [[nodiscard]] IoResult send_zeros() noexcept;
+  [[nodiscard]] IoResult verify() noexcept;
+
+  UsbOptions options_;
+  OpenBoard open_board_;
+  Board board_{};
+  Frame frame_{};      ///< the frame to send; all words but the outputs'
+  bool shown_{false};  ///< they come from the board
+  OutputWords zeros_{};
+};
+
+}  // namespace abs_hil::driver::usb

@@ -1,0 +1,207 @@
+#include "experiment/board_record.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+#include "abs_hil/rig/option.hpp"
+#include "rig/formatted_text.hpp"
+
+namespace abs_hil::experiment {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int record_format = 1;
+
+std::string text_of(double value) { return fmt::format("{}", value); }
+std::string text_of(std::int32_t value) { return std::to_string(value); }
+std::string text_of(std::int64_t value) { return std::to_string(value); }
+std::string text_of(bool value) { return value ? "true" : "false"; }
+std::string text_of(const std::string& value) { return value; }
+
+/// The values of all options of `driver.KIND.`, as text.
+std::map<std::string, std::string> option_texts(driver::BoardOptions options, const std::string& prefix) {
+  std::map<std::string, std::string> texts;
+  options.visit_options(prefix, [&](const std::string& name, const rig::OptionFacts&, const rig::OptionTarget& target) {
+    texts[name] = std::visit([](const auto* value) { return text_of(*value); }, target);
+  });
+  return texts;
+}
+
+bool is_cap(const std::string& name) { return name.ends_with("_duty_max"); }
+
+std::string file_name(const BoardRecord& record) {
+  std::string name = record.kind + '-' + (record.board.place.empty() ? "board" : record.board.place);
+  for (char& c : name) {
+    const bool plain =
+        (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' || c == '.';
+    if (!plain) c = '_';
+  }
+  return name + ".json";
+}
+
+nlohmann::ordered_json optional_json(const std::optional<double>& value) {
+  return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json(nullptr);
+}
+
+nlohmann::ordered_json to_json(const BoardRecord& r) {
+  return {{"abs_hil_board_record", record_format},
+          {"driver_kind", r.kind},
+          {"place", r.board.place},
+          {"logic", r.board.logic},
+          {"emulated", r.emulated},
+          {"date", r.date},
+          {"version", r.version},
+          {"encoder_counts_per_rev", r.encoder_counts_per_rev},
+          {"options", r.options},
+          {"outputs",
+           {{"reported", r.outputs.reported},
+            {"watchdog_ms", optional_json(r.outputs.watchdog_ms)},
+            {"watched_ms", r.outputs.watched_ms},
+            {"release_ms", optional_json(r.outputs.release_ms)}}}};
+}
+
+/// What `difference` compares. Throws nlohmann::json::exception or std::runtime_error.
+BoardRecord parse_record(std::istream& in) {
+  const nlohmann::json json = nlohmann::json::parse(in);
+  if (json.at("abs_hil_board_record") != record_format) throw std::runtime_error("of another format");
+  return {.kind = json.at("driver_kind"),
+          .board = {.place = json.at("place"), .logic = json.at("logic")},
+          .emulated = json.at("emulated"),
+          .options = json.at("options"),
+          .encoder_counts_per_rev = json.at("encoder_counts_per_rev"),
+          .date = json.at("date"),
+          .version = json.at("version")};
+}
+
+/// Why the record in this file does not hold; empty if it does, nothing if there is no such file.
+std::optional<std::string> difference_of_file(const fs::path& file, const BoardRecord& present) {
+  std::ifstream in(file);
+  if (!in) return std::nullopt;
+  try {
+    const std::string why = difference(parse_record(in), present);
+    return why.empty() ? why : file.string() + ": " + why;
+  } catch (const std::exception& error) {
+    return file.string() + " is no commissioning record: " + error.what();
+  }
+}
+
+std::string described(const driver::BoardIdentity& board) {
+  return (board.place.empty() ? "board" : board.place) + (board.logic.empty() ? "" : ", " + board.logic);
+}
+
+}  // namespace
+
+BoardRecord describe_board(const driver::DriverOptions& options, const driver::BoardIdentity& board, bool emulated) {
+  const driver::ChosenBackend chosen = driver::chosen_backend(options);
+  const std::string prefix = "driver." + options.kind + '.';
+  BoardRecord record{.kind = options.kind,
+                     .board = board,
+                     .emulated = emulated,
+                     .options = option_texts(chosen.options, prefix),
+                     .encoder_counts_per_rev = options.encoder_counts_per_rev};
+  for (const std::string_view free : chosen.entry.free_options) record.options.erase(prefix + std::string(free));
+  return record;
+}
+
+std::string difference(const BoardRecord& record, const BoardRecord& present) {
+  if (record.emulated) return "it is the record of an emulator";
+  if (record.kind != present.kind || record.board.place != present.board.place) {
+    return "it is the record of another board, " + record.kind + ' ' + described(record.board);
+  }
+  if (record.board.logic != present.board.logic) {
+    return "the board had " + record.board.logic + " then and has " + present.board.logic + " now";
+  }
+  if (record.encoder_counts_per_rev != present.encoder_counts_per_rev) {
+    return rig::formatted("model.encoder_counts_per_rev was %d then and is %d now", record.encoder_counts_per_rev,
+                          present.encoder_counts_per_rev);
+  }
+  for (const auto& [name, now] : present.options) {
+    const auto then = record.options.find(name);
+    if (then == record.options.end()) return "it does not have " + name;
+    const bool lower = is_cap(name) && std::strtod(now.c_str(), nullptr) <= std::strtod(then->second.c_str(), nullptr);
+    if (now != then->second && !lower) return name + " was " + then->second + " then and is " + now + " now";
+  }
+  return {};
+}
+
+std::vector<fs::path> record_folders(const std::string& configured) {
+  if (!configured.empty()) return {configured};
+  std::vector<fs::path> folders{"/var/lib/abs_hil/boards"};
+  const char* state = std::getenv("XDG_STATE_HOME");
+  const char* home = std::getenv("HOME");
+  if (state != nullptr && *state == '/') {
+    folders.push_back(fs::path(state) / "abs_hil/boards");
+  } else if (home != nullptr && *home == '/') {
+    folders.push_back(fs::path(home) / ".local/state/abs_hil/boards");
+  }
+  return folders;
+}
+
+fs::path write_record(const BoardRecord& record, const std::vector<fs::path>& folders) {
+  std::string problems;
+  for (const fs::path& folder : folders) {
+    std::error_code error;
+    fs::create_directories(folder, error);
+    const fs::path file = folder / file_name(record);
+    const fs::path unfinished = file.string() + ".new";
+    {
+      std::ofstream out(unfinished);
+      out << to_json(record).dump(2) << '\n';
+      out.close();
+      if (!out) {
+        problems += (problems.empty() ? "" : "; ") + unfinished.string() + ": " + std::strerror(errno);
+        continue;
+      }
+    }
+    fs::rename(unfinished, file, error);
+    if (!error) return file;
+    problems += (problems.empty() ? "" : "; ") + file.string() + ": " + error.message();
+  }
+  throw driver::Unavailable(
+      "the commissioning record cannot be written (" + problems +
+      "); give a folder with --set driver.records=DIR, or make one: sudo install -d -g abs_hil -m "
+      "2775 /var/lib/abs_hil/boards");
+}
+
+std::string commission_command(const driver::DriverOptions& options) {
+  driver::DriverOptions now = options;
+  driver::DriverOptions standard;
+  std::map<std::string, std::string> defaults;
+  rig::for_each_option(standard, "driver.", [&](const std::string& name, const rig::OptionFacts&, const auto& value) {
+    defaults[name] = text_of(value);
+  });
+  std::string command = "abs_hil commission";
+  rig::for_each_option(now, "driver.", [&](const std::string& name, const rig::OptionFacts&, const auto& value) {
+    const std::string text = text_of(value);
+    if (text != defaults[name]) command += " --set " + name + '=' + text;
+  });
+  return command;
+}
+
+void require_record(const driver::DriverOptions& options, const driver::BoardIdentity& board) {
+  const BoardRecord present = describe_board(options, board, false);
+  std::string why;
+  const std::vector<fs::path> folders = record_folders(options.records);
+  for (const fs::path& folder : folders) {
+    const std::optional<std::string> found = difference_of_file(folder / file_name(present), present);
+    if (found && found->empty()) return;
+    if (found && why.empty()) why = *found;
+  }
+  if (why.empty()) {
+    for (const fs::path& folder : folders) why += (why.empty() ? "no record in " : " or ") + folder.string();
+  }
+  throw driver::Unavailable("backend rig: this board (" + options.kind + ' ' + described(board) +
+                            ") has not been commissioned as it is now: " + why +
+                            ". Nothing but commission, safe and doctor uses it. Type: " + commission_command(options));
+}
+
+}  // namespace abs_hil::experiment

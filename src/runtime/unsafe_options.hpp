@@ -1,0 +1,20 @@
+#pragma once
+
+#include "abs_hil/rig/option.hpp"
+
+namespace abs_hil::runtime {
+
+/// Everything below `unsafe.` in the configuration: each key names a risk that a person accepts on hardware.
+struct UnsafeOptions {
+  ABS_HIL_OPTIONS(UnsafeOptions);
+  ABS_HIL_OPTION(bool, outputs_on_after_death, false,
+                 .meaning =
+                     "accept motor and brake on for longer than 50 ms after the program's death: allows "
+                     "guardian.timeout_ms above 40, driver.can.watchdog_ms above 50");
+  ABS_HIL_OPTION(bool, blind_control, false,
+                 .meaning =
+                     "accept outputs on without fresh samples for longer than 50 ms: allows "
+                     "gate.sample_age_max_s above 0.05");
+};
+
+}  // namespace abs_hil::runtime
