@@ -17,7 +17,7 @@ set(ABS_HIL_ROOM_TABLE
   "watch | `abs_hil watch`: the view of a running experiment, its screen, the terminal | rig telemetry lcmtypes"
   "analysis | metrics, summary | rig"
   "report | a finished run's files as figures, pages, exports, gnuplot as a child process | rig plant_sim analysis"
-  "run_folder | run folders: layout, environment, checksums, the index of a series | "
+  "run_folder | run folders: layout, environment, checksums, the index of a series, the reader of a run's CSV | rig"
   "diagnosis | the checks of `abs_hil doctor`, the verdict of `abs_hil latency` | rig driver runtime telemetry"
   "config | configuration keys from the option rows, files, experiment files: grammar, parser, schema, plan | rig control plant_sim driver runtime guardian experiment"
   "study | simulated runs in this process, controllers side by side over varied plants, search for gains | rig control plant_sim driver driver_sim runtime guardian experiment analysis config"

@@ -4,25 +4,27 @@
     message = abs_hil.decode(data)                  # any of the types
     message = abs_hil.telemetry_t.decode(data)      # this one, else ValueError
 
-lcmtypes/*.lcm lists every field with its unit and range. Decoding needs only Python. Receiving live messages and
-reading event logs needs LCM's own module (pip install lcm).
+lcmtypes/*.lcm lists every field with its unit and range.
 """
+from __future__ import annotations
+
 import importlib
 import json
 import pathlib
 import pkgutil
+from typing import Any
+
+_FOLDER = pathlib.Path(__file__).parent
 
 #: name -> class of every message type
-TYPES = {}
-for _module in pkgutil.iter_modules(__path__):
+TYPES: dict[str, Any] = {}
+for _module in pkgutil.iter_modules([str(_FOLDER)]):
     if _module.name.endswith('_t'):
-        TYPES[_module.name] = getattr(importlib.import_module(f'{__name__}.{_module.name}'), _module.name)
-globals().update(TYPES)
+        TYPES[_module.name] = getattr(importlib.import_module(f'.{_module.name}', __package__), _module.name)
 
 
-
-def _table(name, key):
-    rows = json.loads(pathlib.Path(__path__[0], name).read_text(encoding='utf-8'))
+def _table(name: str, key: str) -> dict[Any, dict[str, Any]]:
+    rows = json.loads((_FOLDER / name).read_text(encoding='utf-8'))
     return {row[key]: row for row in rows}
 
 
@@ -31,13 +33,13 @@ QUANTITIES = _table('quantities.json', 'name')
 #: number -> name, kind and text of every reason (field `reason`)
 REASONS = _table('reasons.json', 'number')
 #: names of the values of the field `phase`, as in the CSV
-PHASES = tuple(QUANTITIES['phase']['values'])
+PHASES: tuple[str, ...] = tuple(QUANTITIES['phase']['values'])
 
 _BY_FINGERPRINT = {type_._get_packed_fingerprint(): type_ for type_ in TYPES.values()}
 
 
-def decode(data):
-    """Decodes the message in `data` (bytes) of any type. Raises ValueError if it is damaged or not from abs_hil."""
+def decode(data: bytes) -> Any:
+    """Decodes the message in `data` of any type. Raises ValueError if it is damaged or not from abs_hil."""
     type_ = _BY_FINGERPRINT.get(bytes(data[:8]))
     if type_ is None:
         raise ValueError(f'not a message of abs_hil: fingerprint {bytes(data[:8]).hex()}, known are '
