@@ -106,9 +106,11 @@ class Series:
         varied = [key for key in keys if len({str(config.get(key)) for config in configs}) > 1]
         rows = []
         for run, config in zip(self.runs, configs):
-            figures: dict[str, Any] = {key: value for key, value in run.summary.items()
-                                       if value is None or isinstance(value, (int, float, str))}
-            rows.append({'run': run.name, **{key: config.get(key) for key in varied}, **figures})
+            row: dict[str, Any] = {'run': run.name}
+            row.update((key, config.get(key)) for key in varied)
+            row.update((key, value) for key, value in run.summary.items()
+                       if value is None or isinstance(value, (int, float, str)))
+            rows.append(row)
         return pandas.DataFrame(rows)
 
 

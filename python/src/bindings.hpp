@@ -13,6 +13,7 @@ namespace py = pybind11;
 
 // Each adds its functions and classes to the module abs_hil._core.
 void add_controllers(py::module_& module);
+void add_episodes(py::module_& module);
 void add_files(py::module_& module);
 void add_network(py::module_& module);
 void add_plant(py::module_& module);

@@ -7,12 +7,14 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "abs_hil/driver/io_result.hpp"
 #include "cli/command_line.hpp"
 #include "config/config_error.hpp"
 #include "diagnosis/doctor.hpp"
 #include "program/exit_status.hpp"
+#include "program/python_programs.hpp"
 #include "program/recording_commands.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
@@ -210,7 +212,7 @@ cli::Parser add_compare(cli::Parser& parser, program::CompareOptions& o) {
   compare.add({.names = "--csv", .to = &o.csv_file, .help = "write the table as CSV", .type = "FILE"});
   compare.add({.names = "--markdown", .to = &o.markdown_file, .help = "write the table as Markdown", .type = "FILE"});
   compare.add({.names = "--runs", .to = &o.runs_file, .help = "write each run's results as CSV", .type = "FILE"});
-  compare.set_footer("To compare runs that are already recorded, use abs_report RUN RUN.");
+  compare.set_footer("To compare runs that are already recorded, use abs_hil report RUN RUN.");
   return compare;
 }
 
@@ -347,6 +349,11 @@ int dispatch(int argc, char** argv) {
   const cli::Parser watch = add_watch(parser, watch_options);
   SendCommand send;
   add_send(parser, send);
+  // Only for the help: these words are looked for before the command line is read.
+  std::vector<cli::Parser> python_programs;
+  for (const program::PythonProgram& python : program::python_programs) {
+    python_programs.push_back(parser.add_subcommand(std::string(python.name), std::string(python.help)));
+  }
   if (const std::optional<int> status = parser.parse(argc, argv)) return *status;
   if (list.json && !list.quantities && !list.reasons) {
     return parser.refuse("--json requires --quantities or --reasons");
@@ -369,6 +376,9 @@ int dispatch(int argc, char** argv) {
   }
   if (commission.parser.parsed()) return program::commission(program::merge(commission.options), commission.pulses);
   if (send.parser.parsed()) return program::send(program::merge(send.options), send.send);
+  for (const cli::Parser& python : python_programs) {
+    if (python.parsed()) return parser.refuse("give the name of a program in Python first, its options after it");
+  }
   if (replay_command.parser.parsed()) return program::replay_run(replay_command);
   if (convert_command.parser.parsed()) return program::convert(convert_command);
   program::RunRequest request = program::merge(options);
@@ -384,6 +394,7 @@ int fail(int status, const std::exception& error) {
 }  // namespace
 
 int program::run_program(int argc, char** argv, std::span<const control::ControllerEntry> own) {
+  if (const std::optional<int> status = program::start_python_program(argc, argv)) return *status;
   program::survive_closed_terminals();
   // Messages go to stderr; stdout carries results.
   spdlog::set_default_logger(spdlog::stderr_color_mt("abs_hil"));
