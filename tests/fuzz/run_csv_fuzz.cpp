@@ -7,9 +7,9 @@
 #include <string>
 
 #include "fuzz_input.hpp"
+#include "run_folder/clean_text.hpp"
 #include "run_folder/csv_reader.hpp"
 #include "run_folder/input_error.hpp"
-#include "run_folder/clean_text.hpp"
 
 namespace {
 
@@ -45,7 +45,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string clean = abs_hil::run_folder::clean_text(text);
   expect(abs_hil::run_folder::clean_text(clean) == clean);
   std::string header;
-  for (const std::string& column : abs_hil::run_folder::contract_columns()) header += (header.empty() ? "" : ",") + column;
+  for (const std::string& column : abs_hil::run_folder::contract_columns())
+    header += (header.empty() ? "" : ",") + column;
   read(text);
   read(header + '\n' + text);
   return 0;

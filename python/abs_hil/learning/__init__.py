@@ -5,6 +5,8 @@
 """
 from __future__ import annotations
 
+import contextlib
+
 from .rigs import Rigs, Task
 
 ID = 'abs_hil/SlipControl-v0'
@@ -19,7 +21,5 @@ def register() -> None:
                            vector_entry_point='abs_hil.learning.environment:SlipControlVector')
 
 
-try:
+with contextlib.suppress(ImportError):  # training in NumPy alone needs no gymnasium
     register()
-except ImportError:  # training in numpy alone needs none
-    pass

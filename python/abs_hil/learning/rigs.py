@@ -1,6 +1,7 @@
 """Simulated rigs for a learner: what it observes, what it is paid, which plants it meets. Needs NumPy only."""
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -117,7 +118,5 @@ class Rigs:
         return self._values[:, 8].copy()
 
     def _read(self) -> None:
-        try:
+        with contextlib.suppress(ValueError):  # some rigs have not begun
             self._values = self._episodes.values()
-        except ValueError:  # some rigs have not begun
-            pass
