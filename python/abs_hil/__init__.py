@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from .run import Run, Series, load, load_series
     from .simulation import Study, controllers, experiments, keys, plants, simulate, simulate_many
 
+# Importing the types' modules has put modules under these names.
+globals().update(TYPES)
+
 #: module -> the names that it gives; loaded at first use, so that decoding messages needs only Python
 _LATER = {'hand': ('Controller', 'Plant', 'SlipInput', 'SlipOutput'),
           'network': ('live',),
@@ -34,8 +37,6 @@ __all__ = ['PHASES', 'QUANTITIES', 'REASONS', 'TYPES', 'Controller', 'Plant', 'R
 
 
 def __getattr__(name: str) -> Any:
-    if name in TYPES:
-        return TYPES[name]
     if name not in _MODULE_OF:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
     value = getattr(importlib.import_module(f'.{_MODULE_OF[name]}', __name__), name)
