@@ -37,12 +37,14 @@ mount --rbind /dev "$root/dev"
 inside apt-get update -qq
 
 step "install the package"
-cp "$source"/build/release/packages/abs-hil_*.deb "$root/tmp/"
-inside bash -c 'apt-get install -y -qq --no-install-recommends /tmp/abs-hil_*.deb >/tmp/install.log 2>&1 || { tail -20 /tmp/install.log; exit 1; }'
+cp "$source"/build/release/packages/{abs-hil,python3-abs-hil}_*.deb "$root/tmp/"
+inside bash -c 'apt-get install -y -qq --no-install-recommends /tmp/*abs-hil_*.deb >/tmp/install.log 2>&1 || { tail -20 /tmp/install.log; exit 1; }'
 step "run the installed program"
-inside abs_hil --backend sim --fast --no-lcm | grep -m 1 completed
+inside abs_hil --backend sim --fast --no-lcm --out /tmp/run | grep -m 1 completed
+inside abs_hil report /tmp/run --output /tmp/report.html
+inside rm -r /tmp/run
 inside sh -c 'getent group abs_hil >/dev/null || { echo "the package made no group abs_hil"; exit 1; }'
-inside apt-get purge -y -qq abs-hil >/dev/null
+inside apt-get purge -y -qq python3-abs-hil abs-hil >/dev/null
 
 step "fresh clone"
 rm -rf "$root/srv/abs_hil"

@@ -10,7 +10,7 @@ import subprocess
 import unittest
 
 from page_reader import PageReader
-from program import ABS_REPORT, ReportTest
+from program import ABS_HIL, ABS_REPORT, ReportTest
 
 # of runs with the controller adaptive, which reports signals of its own
 FIGURES = ['profile', 'fig5', 'fig6', 'fig7', 'fig8', 'fig9', 'fig10', 'signals']
@@ -306,6 +306,20 @@ class Files(ReportTest):
             self.assertEqual(float(row['stop_time_s']), summary['stop_time_s'])
             self.assertEqual(float(row['slip_rms']), summary['slip_rms'])
         self.assertIn('exists', self.report(runs[0], '--merits', 'merits.csv', status=2).stderr.decode())
+
+    def test_abs_hil_starts_the_programs_beside_it_or_says_what_to_install(self):
+        a = self.make_run('a')
+        result = subprocess.run([ABS_HIL, 'report', a, '--table'], capture_output=True, text=True, cwd=self.folder, check=True)
+        self.assertIn('stop time / s', result.stdout)
+        self.assertEqual(subprocess.run([ABS_HIL, 'report', 'nowhere'], capture_output=True, check=False).returncode, 2)
+        said = subprocess.run([ABS_HIL, '--help'], capture_output=True, text=True, check=True).stdout
+        for name in ('report', 'tune', 'learn'):
+            self.assertIn(f'\n  {name} ', said)
+        alone = shutil.copy(ABS_HIL, self.folder / 'abs_hil')
+        result = subprocess.run([alone, 'tune', '--help'], capture_output=True, text=True, check=False,
+                                env={'PATH': str(self.folder)})
+        self.assertEqual(result.returncode, 3)
+        self.assertIn('python3-abs-hil', result.stderr)
 
     def test_nothing_half_written(self):
         a = self.make_run('a')
