@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/control/slip_controller.hpp"
@@ -25,7 +26,8 @@ struct Current {
   py::object* controller{nullptr};
   std::exception_ptr error{};
 };
-thread_local Current current;
+/// The runs of this thread, the innermost last: a controller may itself simulate.
+thread_local std::vector<Current> runs;
 
 /// Calls a Python object. An exception is kept, and from then on the torque is NaN: the gate ends the run with the
 /// fault controller_not_finite before it acts.
@@ -68,12 +70,12 @@ class PythonController final : public control::SlipController {
  private:
   template <class Call>
   void call(const Call& function) noexcept {
-    if (current.error) return;
+    if (runs.empty() || runs.back().error) return;
     const py::gil_scoped_acquire gil;
     try {
       function();
     } catch (...) {
-      current.error = std::current_exception();
+      runs.back().error = std::current_exception();
     }
   }
 
@@ -176,12 +178,12 @@ void add_output(py::module_& module) {
 }  // namespace
 
 PythonControllerScope::PythonControllerScope(py::object controller) : controller_(std::move(controller)) {
-  current = {.controller = &controller_};
+  runs.push_back({.controller = &controller_});
 }
-PythonControllerScope::~PythonControllerScope() { current = {}; }
-bool PythonControllerScope::failed() const noexcept { return current.error != nullptr; }
+PythonControllerScope::~PythonControllerScope() { runs.pop_back(); }
+bool PythonControllerScope::failed() const noexcept { return runs.back().error != nullptr; }
 void PythonControllerScope::rethrow() const {
-  if (current.error) std::rethrow_exception(current.error);
+  if (runs.back().error) std::rethrow_exception(runs.back().error);
 }
 
 void add_controllers(py::module_& module) {
@@ -196,12 +198,12 @@ void add_controllers(py::module_& module) {
   control::register_controller(
       {python_controller, "a controller written in Python",
        [](const control::ControllerContext& /*context*/) -> std::unique_ptr<control::SlipController> {
-         if (current.controller == nullptr) {
+         if (runs.empty()) {
            throw std::invalid_argument(
                "controller \"python\": give the controller itself, an object with the methods "
                "reset and step");
          }
-         return std::make_unique<PythonController>(*current.controller);
+         return std::make_unique<PythonController>(*runs.back().controller);
        }});
 }
 

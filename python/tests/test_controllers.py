@@ -114,6 +114,26 @@ def test_an_exception_ends_the_run_and_is_raised(where):
     assert abs_hil.simulate('pi', set=QUICK).summary['result'] == 'completed', 'nothing of it is left'
 
 
+def test_a_controller_may_simulate_too():
+    class Planner:
+        def reset(self, input):
+            self.torque_Nm = 4.0 + abs_hil.simulate(Full(), set={**QUICK, 'plant.theta_N': 30}).summary['time_locked_s']
+
+        def step(self, input):
+            return self.torque_Nm
+
+    class Full:
+        def reset(self, input):
+            pass
+
+        def step(self, input):
+            return input.max_brake_torque_Nm
+
+    run = abs_hil.simulate(Planner(), set=QUICK)
+    assert run.summary['result'] == 'completed'
+    assert run.during('brake')['brake_torque_ref_Nm'].max() > 4.0
+
+
 def test_not_finite_is_a_fault_like_any_laws():
     class NotANumber:
         def reset(self, input):

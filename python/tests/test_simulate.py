@@ -61,7 +61,7 @@ def test_data_frame_has_the_columns():
     ({'experiment': 'papr'}, 'the nearest known is paper'), ({'set': {'control.slip_ref': 2}}, 'control.slip_ref = 2'),
     ({'set': {'control.slipref': 0.1}}, 'control.slip_ref'), ({'seed': -1}, 'run.seed'),
     ({'inject': ['nonsense']}, 'nonsense'), ({'controller': 'python'}, 'reset and step'),
-    ({'controller': object()}, 'reset and step')])
+    ({'controller': object()}, 'reset and step'), ({'experiment': 'series-of-ten'}, 'a series of runs')])
 def test_bad_options_are_value_errors_with_the_programs_text(options, words):
     with pytest.raises(ValueError, match=words):
         abs_hil.simulate(**options)

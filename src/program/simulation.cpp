@@ -18,6 +18,10 @@ Simulation simulate(RunRequest request, std::vector<rig::RecordSink*> sinks, con
   if (s.experiment.wait_for_start) {
     throw config::ConfigError("experiment.wait_for_start: a run in virtual time cannot wait; leave it out");
   }
+  if (request.script->series.given) {
+    throw config::ConfigError("experiment " + request.script->name +
+                              ": a series of runs, and this is one run; give an experiment without [series]");
+  }
   request.outputs.fast = true;
   runtime::VirtualClock clock;
   const std::unique_ptr<driver::RigDriver> driver = with_faults(make_driver(s, true), s, clock);
