@@ -5,8 +5,8 @@ include(CMakePackageConfigHelpers)
 set(abs_hil_cmake_dir ${CMAKE_INSTALL_LIBDIR}/cmake/abs_hil)
 
 # Programs and what they need.
-set(programs abs_hil_executable abs_tune)
-foreach(optional abs_rig_emulator abs_report abs_guardian)
+set(programs abs_hil_executable)
+foreach(optional abs_rig_emulator abs_guardian)
   if(TARGET ${optional})
     list(APPEND programs ${optional})
   endif()
@@ -42,8 +42,24 @@ if(HELP2MAN_EXECUTABLE)
       VERBATIM)
     list(APPEND manual_pages ${page}.gz)
   endforeach()
-  add_custom_target(abs_hil_manual_pages ALL DEPENDS ${manual_pages})
+  set(python_pages)
+  if(ABS_HIL_PYTHON AND NOT SKBUILD)
+    foreach(program abs_report abs_tune abs_learn)
+      set(page ${CMAKE_BINARY_DIR}/man/${program}.1)
+      add_custom_command(OUTPUT ${page}.gz
+        COMMAND ${CMAKE_COMMAND} -E make_directory ${CMAKE_BINARY_DIR}/man
+        COMMAND ${HELP2MAN_EXECUTABLE} --no-info --version-string ${PROJECT_VERSION} --source "abs_hil ${PROJECT_VERSION}"
+          --include ${PROJECT_SOURCE_DIR}/packaging/${program}.h2m --output ${page}
+          ${CMAKE_RUNTIME_OUTPUT_DIRECTORY}/${program}
+        COMMAND gzip -9nf ${page}
+        DEPENDS abs_hil_python ${PROJECT_SOURCE_DIR}/packaging/${program}.h2m
+        VERBATIM)
+      list(APPEND python_pages ${page}.gz)
+    endforeach()
+  endif()
+  add_custom_target(abs_hil_manual_pages ALL DEPENDS ${manual_pages} ${python_pages})
   install(FILES ${manual_pages} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
+  install(FILES ${python_pages} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT python)
 else()
   message(STATUS "help2man is not installed: no manual pages")
 endif()

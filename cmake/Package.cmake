@@ -1,5 +1,5 @@
-# `cpack` makes two Debian packages: abs-hil (programs) and libabs-hil-dev (find_package(abs_hil)). scripts/package.sh
-# builds and checks them.
+# `cpack` makes three Debian packages: abs-hil (programs), libabs-hil-dev (find_package(abs_hil)) and python3-abs-hil (the
+# Python package, abs_report, abs_tune, abs_learn). scripts/package.sh builds and checks them.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_VENDOR "abs_hil")
 set(ABS_HIL_MAINTAINER "The abs_hil authors <abs-hil@no-address.invalid>" CACHE STRING
@@ -8,7 +8,7 @@ set(CPACK_PACKAGE_CONTACT ${ABS_HIL_MAINTAINER})
 set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
 set(CPACK_STRIP_FILES ON)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
-set(CPACK_COMPONENTS_ALL runtime development)
+set(CPACK_COMPONENTS_ALL runtime development python)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_ENABLE_COMPONENT_DEPENDS OFF)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
@@ -19,7 +19,7 @@ set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME abs-hil)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "adduser")
-set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS "liblcm-bin, gnuplot-nox, fuse3")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS "liblcm-bin, python3-abs-hil, fuse3")
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS "libabs-hil-dev, liblcm-java, default-jre")
 set(CPACK_DEBIAN_RUNTIME_DESCRIPTION
   "real-time driver and slip controller of an ABS rig
@@ -38,12 +38,21 @@ set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION
  Headers, static libraries and CMake configuration of abs-hil, for programs
  with their own slip controller.")
 
+set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-abs-hil)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+  "abs-hil (= ${PROJECT_VERSION}), python3 (>= 3.11), python3 (<< 3.12), python3-numpy, python3-pandas, python3-matplotlib, python3-jinja2, python3-scipy, python3-tqdm")
+set(CPACK_DEBIAN_PYTHON_DESCRIPTION
+  "ABS rig in Python: simulation, reports, tuning, learning
+ Simulates runs of the Inteco ABS laboratory rig with the program's own cycle,
+ loads recorded runs, makes reports of them, and tunes or trains controllers.")
+
 # Debian requires a compressed changelog and a copyright file in each package's documentation folder.
-foreach(package abs-hil libabs-hil-dev)
+foreach(package abs-hil libabs-hil-dev python3-abs-hil)
   configure_file(packaging/changelog.Debian.in ${CMAKE_BINARY_DIR}/packaging/${package}/changelog @ONLY)
 endforeach()
 find_program(GZIP_EXECUTABLE gzip)
-foreach(pair "abs-hil:runtime" "libabs-hil-dev:development")
+foreach(pair "abs-hil:runtime" "libabs-hil-dev:development" "python3-abs-hil:python")
   string(REPLACE ":" ";" pair "${pair}")
   list(GET pair 0 package)
   list(GET pair 1 component)

@@ -58,6 +58,9 @@ function(abs_hil_room name)
     target_include_directories(abs_hil_${name} PUBLIC ${folder})
     # Several sources at a time: most of a source's cost are the headers that its neighbours need as well.
     set_target_properties(abs_hil_${name} PROPERTIES UNITY_BUILD ${ABS_HIL_UNITY} UNITY_BUILD_BATCH_SIZE 12)
+    # The Python module is a shared object. Hidden symbols cost the same as without position-independent code.
+    set_target_properties(abs_hil_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden
+      VISIBILITY_INLINES_HIDDEN ON)
     if(name IN_LIST ABS_HIL_ROOMS_BESIDE_THE_CYCLE)
       target_link_libraries(abs_hil_${name} PRIVATE $<BUILD_INTERFACE:abs_hil_beside_the_cycle>)
     endif()

@@ -16,11 +16,10 @@ set(ABS_HIL_ROOM_TABLE
   "telemetry | LCM messages, event log, CSV, flight record, status line | rig lcmtypes"
   "watch | `abs_hil watch`: the view of a running experiment, its screen, the terminal | rig telemetry lcmtypes"
   "analysis | metrics, summary | rig"
-  "report | a finished run's files as figures, pages, exports, gnuplot as a child process | rig plant_sim analysis"
-  "run_folder | run folders: layout, environment, checksums, the index of a series | "
+  "run_folder | run folders: layout, environment, checksums, the index of a series, the reader of a run's CSV | rig"
   "diagnosis | the checks of `abs_hil doctor`, the verdict of `abs_hil latency` | rig driver runtime telemetry"
   "config | configuration keys from the option rows, files, experiment files: grammar, parser, schema, plan | rig control plant_sim driver runtime guardian experiment"
-  "study | simulated runs in this process, controllers side by side over varied plants, search for gains | rig control plant_sim driver driver_sim runtime guardian experiment analysis config"
+  "study | simulated runs in this process, controllers side by side over varied plants | rig control plant_sim driver driver_sim runtime guardian experiment analysis config"
   "commands | remote commands over LCM: authority, listener, sender | rig control plant_sim driver runtime guardian experiment config telemetry lcmtypes"
   "replay | recorded runs through the cycle again: proof of equal commands, other controllers open loop | rig control plant_sim driver driver_sim runtime guardian experiment config telemetry lcmtypes"
   "guardian_program | the program abs_guardian: the guardian of one run, the resident service, systemd and suspension | cli rig control plant_sim driver runtime guardian experiment lcmtypes telemetry config"
@@ -29,4 +28,4 @@ set(ABS_HIL_ROOM_TABLE
 
 # Rooms whose code neither runs in the cycle nor takes a noticeable time beside it. A release compiles them with -O1,
 # which saves about a third of their compile time.
-set(ABS_HIL_ROOMS_BESIDE_THE_CYCLE cli watch analysis report run_folder diagnosis config study commands replay guardian_program program)
+set(ABS_HIL_ROOMS_BESIDE_THE_CYCLE cli watch analysis run_folder diagnosis config study commands replay guardian_program program)

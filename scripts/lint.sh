@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# lint.sh [CHECK...]: runs the static checks format, shell, cppcheck, tidy (default: all, quick ones first). Each
+# lint.sh [CHECK...]: runs the static checks format, shell, python, cppcheck, tidy (default: all, quick ones first). Each
 # warning is an error. tidy checks every source of src/ and apps/ that has changed since its last clean check. lint.sh
 # tidy FILE... checks the units of these files only.
 set -euo pipefail
@@ -11,6 +11,12 @@ check_format() {
 
 check_shell() {
   git ls-files '*.sh' .ci/run | xargs shellcheck
+}
+
+check_python() {
+  scripts/setup_python.sh
+  build/python/bin/ruff check python
+  build/python/bin/python -m mypy
 }
 
 check_cppcheck() {
@@ -31,7 +37,7 @@ if [ "${1:-}" = tidy ]; then
   exit
 fi
 checks=("$@")
-[ $# -gt 0 ] || checks=(format shell cppcheck tidy)
+[ $# -gt 0 ] || checks=(format shell python cppcheck tidy)
 for check in "${checks[@]}"; do
   start=$SECONDS
   "check_$check" || { echo "lint: $check found the above" >&2; exit 1; }

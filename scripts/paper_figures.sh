@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Draws the counterparts of the paper's figures 5 to 10 from two runs on the plant paper-timing: docs/figures/paper-*.svg.
-# usage: scripts/paper_figures.sh [FOLDER]      (needs gnuplot-nox and build/release, or ABS_BIN=FOLDER of the programs)
+# usage: scripts/paper_figures.sh [FOLDER]      (needs build/release, or ABS_BIN=FOLDER of the programs)
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
 folder=${1:-docs/figures}

@@ -153,7 +153,7 @@ solution).
     ['braking alone, nominal controller', shown_ns(fast['braking_run/nominal'][0])],
     ['braking alone, adaptive controller', shown_ns(fast['braking_run/adaptive'][0])],
     ['one run of `compare`, adaptive', shown_ns(compare['one_run/adaptive'][0])],
-    ['a report of two runs, whole process and gnuplot', f'{report_ms:.3g} ms, {report_mb:.0f} MB at most'],
+    ['a report of two runs, whole process', f'{report_ms:.3g} ms, {report_mb:.0f} MB at most'],
     ['`compare`, 1,000 runs on varied plants, wall clock', shown_ns(compare['thousand_runs'][1]['real_time'] * 1e6)],
 ])}
 

@@ -20,5 +20,5 @@ hidden='h1, h2, p, footer, details, .wide, #notes, figure:not(#figure-fig7):not(
 sed -i "s|</head>|<style>$hidden { display: none } body { margin: 0 auto } figure { margin: 0 0 1.4em }</style></head>|" \
   "$data/report.html"
 chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --user-data-dir="$data/profile" \
-  --force-device-scale-factor=1.4 --window-size=900,1105 --screenshot="$picture" "file://$data/report.html" >/dev/null 2>&1
+  --force-device-scale-factor=1.4 --window-size=900,905 --screenshot="$picture" "file://$data/report.html" >/dev/null 2>&1
 echo "$picture"

@@ -1,11 +1,13 @@
 #!/usr/bin/env bash
-# run.sh [ARGUMENT...]: the main job. Installs the packages and builds the programs. Without arguments it then runs the
+# run.sh [ARGUMENT...]: the main job. Installs packages of Debian and plotly of PyPI and builds the programs. Without arguments it then runs the
 # paper's experiment in real time on the simulated rig and makes a report, in a folder below runs/. Arguments go to
 # abs_hil. Without a route for LCM's multicast the script says which command adds one and records to a log instead.
 set -euo pipefail
 root=$(realpath "$(dirname "$(realpath "$0")")/..")
 
 "$root/scripts/setup.sh"
+# The report shows its figures with plotly.js. Without it the run goes on and has no page.
+"$root/scripts/setup_python.sh" python-packages.txt || echo "run: no plotly from PyPI, see above: no report" >&2
 # The programs only. They are half of the whole build; a run does not need the tests.
 "$root/scripts/build.sh" release --target abs_hil_programs
 program="$root/build/release/bin/abs_hil"
@@ -21,6 +23,7 @@ for argument in "${arguments[@]}"; do
   case "$argument" in
     --no-lcm | --lcm-url | --lcm-url=* | --fast | --help | --version) says_lcm=yes ;;
     list | doctor | latency | compare | validate | commission | watch | send | replay | convert) says_lcm=yes ;;
+    report | tune | learn) says_lcm=yes ;;
   esac
 done
 if [ "$says_lcm" = no ] && ! "$program" doctor --only lcm; then

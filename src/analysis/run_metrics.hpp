@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "rig/record_sink.hpp"
@@ -32,6 +34,24 @@ struct Metrics {
   double theta_error_rms{rig::unknown};            ///< of estimate / truth - 1, over the samples of slip_rms
   double final_speed_m_s{rig::unknown};            ///< v_x of the last record
 };
+
+/// The metrics by their names in a run's summary.
+inline constexpr std::array<std::pair<std::string_view, double Metrics::*>, 13> metric_fields{{
+    {"brake_start_s", &Metrics::brake_start_s},
+    {"stop_time_s", &Metrics::stop_time_s},
+    {"stop_distance_m", &Metrics::stop_distance_m},
+    {"slip_rms", &Metrics::slip_rms},
+    {"slip_settling_s", &Metrics::slip_settling_s},
+    {"slip_overshoot", &Metrics::slip_overshoot},
+    {"time_locked_s", &Metrics::time_locked_s},
+    {"torque_total_variation_Nm", &Metrics::torque_total_variation_Nm},
+    {"theta_final_N", &Metrics::theta_final_N},
+    {"theta_settling_s", &Metrics::theta_settling_s},
+    {"theta_error_rms", &Metrics::theta_error_rms},
+    {"theta_error_final", &Metrics::theta_error_final},
+    {"final_speed_m_s", &Metrics::final_speed_m_s},
+}};
+static_assert(sizeof(Metrics) == metric_fields.size() * sizeof(double), "each metric has a name");
 
 /// A figure that a run has no value for.
 struct MissingFigure {

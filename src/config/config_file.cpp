@@ -130,11 +130,19 @@ fs::path first_folder(const std::vector<fs::path>& places) {
                                 places.back().string()));
 }
 
+fs::path& given_own_config_dir() {
+  static fs::path folder;
+  return folder;
+}
+
 }  // namespace
+
+void set_own_config_dir(fs::path folder) { given_own_config_dir() = std::move(folder); }
 
 fs::path own_config_dir() {
   std::error_code error;
   std::vector<fs::path> places;
+  if (const fs::path& given = given_own_config_dir(); !given.empty()) places.push_back(given);
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
   if (!error) places.push_back(program.parent_path().parent_path() / "share" / "abs_hil" / "config");
   places.emplace_back(ABS_HIL_SOURCE_CONFIG_DIR);

@@ -45,6 +45,10 @@ void load_file(const std::filesystem::path& file, KeyTable& table, Tables tables
 /// The folder that came with the program: as config_dir(), but without $ABS_HIL_CONFIG_DIR.
 [[nodiscard]] std::filesystem::path own_config_dir();
 
+/// Names the folder that own_config_dir() returns from now on, for a program without such a folder beside it: Python.
+/// Not thread-safe: call it before any other function of this file.
+void set_own_config_dir(std::filesystem::path folder);
+
 /// A plant by name or file: `name` alone is config_dir()/plants/name.toml. Throws ConfigError, naming `option` and the
 /// known plants.
 [[nodiscard]] std::filesystem::path plant_file(std::string_view name_or_file, std::string_view option = "--plant");

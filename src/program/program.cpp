@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "abs_hil/driver/io_result.hpp"
 #include "cli/command_line.hpp"
@@ -15,6 +16,7 @@
 #include "program/exit_status.hpp"
 #include "program/inspection_commands.hpp"
 #include "program/live_commands.hpp"
+#include "program/python_programs.hpp"
 #include "program/recording_commands.hpp"
 #include "program/run_arguments.hpp"
 #include "program/safe.hpp"
@@ -64,6 +66,11 @@ int dispatch(int argc, char** argv) {
   const cli::Parser watch = program::add_watch(parser, watch_options);
   program::SendCommand send;
   program::add_send(parser, send);
+  // Only for the help: these words are looked for before the command line is read.
+  std::vector<cli::Parser> python_programs;
+  for (const program::PythonProgram& python : program::python_programs) {
+    python_programs.push_back(parser.add_subcommand(std::string(python.name), std::string(python.help)));
+  }
   if (const std::optional<int> status = parser.parse(argc, argv)) return *status;
   if (list.json && !list.quantities && !list.reasons) {
     return parser.refuse("--json requires --quantities or --reasons");
@@ -88,6 +95,9 @@ int dispatch(int argc, char** argv) {
   if (safe.parser.parsed()) return program::make_boards_safe(safe);
   if (send.parser.parsed()) return program::send(program::merge(send.options), send.send);
   if (init_rig.parser.parsed()) return program::init_rig(program::merge(init_rig.options), init_rig.name);
+  for (const cli::Parser& python : python_programs) {
+    if (python.parsed()) return parser.refuse("give the name of a program in Python first, its options after it");
+  }
   if (replay_command.parser.parsed()) return program::replay_run(replay_command);
   if (convert_command.parser.parsed()) return program::convert(convert_command);
   program::RunRequest request = program::merge(options);
@@ -104,6 +114,7 @@ int fail(int status, const std::exception& error) {
 
 int program::run_program(int argc, char** argv, std::span<const control::ControllerEntry> own,
                          std::span<const driver::Backend> boards) {
+  if (const std::optional<int> status = program::start_python_program(argc, argv)) return *status;
   program::survive_closed_terminals();
   // Messages go to stderr; stdout carries results.
   spdlog::set_default_logger(spdlog::stderr_color_mt("abs_hil"));

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <thread>
@@ -14,8 +13,6 @@
 
 #include "analysis/run_metrics.hpp"
 #include "analysis/run_summary.hpp"
-#include "config/key_table.hpp"
-#include "config/model.hpp"
 #include "config/plan.hpp"
 #include "control/silent_settings.hpp"
 #include "driver/factory.hpp"
@@ -27,9 +24,9 @@
 #include "program/run_monitor.hpp"
 #include "program/run_outputs.hpp"
 #include "program/run_parts.hpp"
+#include "program/run_results.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
-#include "rig/reason_text.hpp"
 #include "runtime/board_policy.hpp"
 #include "runtime/overrun_reporter.hpp"
 #include "telemetry/file_error.hpp"
@@ -37,61 +34,6 @@
 namespace abs_hil::program {
 
 namespace {
-
-std::string reason_text(const experiment::RunOutcome& outcome, const config::Settings& s,
-                        std::span<const std::string> own_signals) {
-  std::string text = rig::reason_text(outcome.reason, outcome.reason_value, own_signals);
-  if (rig::is_fault(outcome.reason)) {
-    const std::string bound = config::number_text(s, rig::row_of(outcome.reason).value.bound);
-    text = rig::reason_with_value(outcome.reason, outcome.reason_value, own_signals, bound);
-  }
-  if (outcome.reason == rig::Reason::controller_not_finite) {
-    text += fmt::format(" (controller {})", s.control.controller);
-  }
-  if (!outcome.io_error.ok()) {
-    text += ": " + driver::error_text(outcome.io_error);
-  }
-  return text;
-}
-
-/// Where the model differs from the plant; null on a rig, whose plant is unknown.
-nlohmann::ordered_json differences_json(const config::Settings& s) {
-  if (s.on_rig()) return nullptr;
-  nlohmann::ordered_json json = nlohmann::ordered_json::object();
-  for (const config::ModelDifference& d : config::model_differences(s)) {
-    json[d.name] = {{"model", d.model}, {"plant", d.plant}};
-  }
-  return json;
-}
-
-analysis::RunSummary summarise(const RunRequest& request, const experiment::RunSession& session,
-                               const experiment::RunOutcome& outcome, const RunOutputs& outputs) {
-  const config::Settings& s = request.settings;
-  const std::string result = outcome.completed() ? "completed" : (rig::is_fault(outcome.reason) ? "fault" : "stopped");
-  return {.result = result,
-          .reason = reason_text(outcome, s, outputs.names().signals),
-          .controller = s.control.controller,
-          .plant = s.plant_name,
-          .backend = s.backend,
-          .experiment = s.experiment.name,
-          .metrics = outputs.metrics(),
-          .cycles = session.executive().statistics().cycles(),
-          .telemetry_drops = session.record_drops(),
-          .publish_failures = outputs.publish_failures(),
-          .csv_rows_lost = outputs.csv_rows_lost(),
-          .realtime = outcome.realtime.realtime(),
-          .virtual_time = request.outputs.fast,
-          .truth_known = s.backend == "sim",
-          .timing = request.outputs.fast ? rig::TimingSummary{} : session.executive().statistics().summary(),
-          .gate = session.gate().counts(),
-          .checks_unjudged = session.gate().unjudged_share(),
-          .config = nlohmann::ordered_json::parse(request.config_json),
-          .friction_curve = outputs.friction_curve_json(),
-          .model = s.model_name,
-          .model_differences = differences_json(s),
-          .model_note = config::in_words(config::model_differences(s)),
-          .end_speed_m_s = s.experiment.end_speed_m_s};
-}
 
 run_folder::RunEnvironment environment(const RunRequest& request, const driver::RigDriver& driver,
                                        const experiment::RunOutcome& outcome) {
@@ -194,7 +136,12 @@ int conclude(const RunRequest& request, const experiment::RunSession& session, c
     spdlog::error("the safe state may not have reached the board ({}): {}. Press the E-stop and switch the rig off",
                   driver::error_text(outcome.safe_state), driver.what_holds_unsafe());
   }
-  const analysis::RunSummary summary = summarise(request, session, outcome, outputs);
+  const analysis::RunSummary summary = summarise(request, session, outcome,
+                                                 {.metrics = outputs.metrics(),
+                                                  .friction_curve = outputs.friction_curve_json(),
+                                                  .publish_failures = outputs.publish_failures(),
+                                                  .csv_rows_lost = outputs.csv_rows_lost(),
+                                                  .names = outputs.names()});
   if (rig::is_fault(outcome.reason)) {
     run_monitor.write_record(request, outcome.reason, outcome.reason_value, summary.reason);
   }

@@ -72,7 +72,7 @@ class ScratchCopy:
         """Without optimisation and without tests: the cheapest build that runs."""
         same = [f'-D{name}={self.cache[name]}' for name in SAME if self.cache.get(name)]
         self.run('cmake', '-S', self.tree, '-B', self.build, '-G', self.cache['CMAKE_GENERATOR'], *same,
-                 '-DCMAKE_BUILD_TYPE=Debug', '-DCMAKE_CXX_FLAGS_DEBUG=', '-DABS_HIL_TESTS=OFF', '-DABS_HIL_BENCH=OFF')
+                 '-DCMAKE_BUILD_TYPE=Debug', '-DCMAKE_CXX_FLAGS_DEBUG=', '-DABS_HIL_TESTS=OFF', '-DABS_HIL_BENCH=OFF', '-DABS_HIL_PYTHON=OFF')
 
     def make(self, *targets):
         self.run('cmake', '--build', self.build, '--target', *targets)

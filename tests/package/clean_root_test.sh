@@ -37,16 +37,18 @@ mount --rbind /dev "$root/dev"
 inside apt-get update -qq
 
 step "install the package"
-cp "$source"/build/release/packages/abs-hil_*.deb "$root/tmp/"
-inside bash -c 'apt-get install -y -qq --no-install-recommends /tmp/abs-hil_*.deb >/tmp/install.log 2>&1 || { tail -20 /tmp/install.log; exit 1; }'
+cp "$source"/build/release/packages/{abs-hil,python3-abs-hil}_*.deb "$root/tmp/"
+inside bash -c 'apt-get install -y -qq --no-install-recommends /tmp/*abs-hil_*.deb >/tmp/install.log 2>&1 || { tail -20 /tmp/install.log; exit 1; }'
 step "run the installed program"
-inside abs_hil --backend sim --fast --no-lcm | grep -m 1 completed
+inside abs_hil --backend sim --fast --no-lcm --out /tmp/run | grep -m 1 completed
+inside abs_hil report /tmp/run --output /tmp/report.html
+inside rm -r /tmp/run
 inside sh -c 'getent group abs_hil >/dev/null || { echo "the package made no group abs_hil"; exit 1; }'
 inside sh -c 'test -f /usr/lib/systemd/system/abs-guardian.service && test -f /etc/abs_hil/guardian.toml' ||
   { echo "the package brought no resident guardian"; exit 1; }
 inside sh -c 'timeout 3 abs_guardian serve --config /etc/abs_hil/guardian.toml --socket /tmp/guardian.sock' >"$root/tmp/guardian.log" 2>&1 || true
 grep -q 'grants leases at /tmp/guardian.sock' "$root/tmp/guardian.log" || { cat "$root/tmp/guardian.log"; exit 1; }
-inside apt-get purge -y -qq abs-hil >/dev/null
+inside apt-get purge -y -qq python3-abs-hil abs-hil >/dev/null
 [ ! -e "$root/etc/abs_hil" ] || { echo "purge left /etc/abs_hil"; exit 1; }
 
 step "fresh clone"

@@ -1,25 +1,19 @@
-"""The page in headless Chromium: every figure is visible and has the right number of curves and points."""
-import subprocess
+"""The page in headless Chromium, opened from disk: figures with all their curves, zoom, hover, print, no error."""
+import base64
 import unittest
 
+from chromium import Chromium
 from page_reader import PageReader
 from program import ReportTest, need
 
-need('gnuplot', 'gnuplot-nox')
 need('chromium', 'chromium')
 
 BEFORE_AFTER_S = 0.2  # margin around braking in the figures
 RUNS = ('adaptive', 'sliding-mode')
+OF_BRAKING = ('fig5', 'fig6', 'fig7', 'fig8', 'fig9', 'fig10', 'signals')
 
 
 class Browser(ReportTest):
-    def chromium(self, *args):
-        result = subprocess.run(
-            ['chromium', '--headless', '--no-sandbox', '--disable-gpu', '--hide-scrollbars',
-             f'--user-data-dir={self.folder}/profile', *args, (self.folder / 'report.html').as_uri()],
-            capture_output=True, text=True, timeout=120, cwd=self.folder, check=True)
-        return result.stdout
-
     def setUp(self):
         super().setUp()
         folders = [self.make_run(controller, '--controller', controller) for controller in RUNS]
@@ -31,7 +25,13 @@ class Browser(ReportTest):
             start, end = float(rows[braking[0]]['time_s']), float(rows[braking[-1] + 1]['time_s'])
             self.rows_of.append([row for row in rows
                                  if start - BEFORE_AFTER_S <= float(row['time_s']) <= end + BEFORE_AFTER_S])
-        self.read = PageReader(self.chromium('--dump-dom'))
+        self.read = PageReader((self.folder / 'report.html').read_text())
+        self.browser = Chromium(self.folder, (self.folder / 'report.html').as_uri())
+        self.browser.wait_for(f'document.body && document.body.dataset.drawn == "{len(self.read.plots)}"', 'all figures')
+
+    def tearDown(self):
+        self.browser.close()
+        super().tearDown()
 
     def test_curves(self):
         expected = {
@@ -46,6 +46,10 @@ class Browser(ReportTest):
         }
         self.assertEqual({figure: sorted(c['quantity'] for c in curves) for figure, curves in self.read.figures.items()},
                          {figure: sorted(quantities) for figure, quantities in expected.items()})
+        drawn = {figure: self.browser.value(f'document.querySelectorAll("#plot-{figure} .scatterlayer .js-line").length')
+                 for figure in expected}
+        self.assertEqual(drawn, {figure: len(quantities) for figure, quantities in expected.items()})
+        self.assertEqual(self.browser.said, [])
 
     def test_points(self):
         """Up to 2800 rows nothing is thinned: each row with a value is a point."""
@@ -57,26 +61,71 @@ class Browser(ReportTest):
                 values = [value for value in values if value == value]
                 self.assertGreater(len(values), 2000)
                 curve = self.read.curve(figure, panel, run)
-                self.assertEqual((curve['run'], curve['said']), (run, len(values)), (figure, column))
-                if figure not in ('fig7', 'fig9'):  # the other axes cut off values that diverge towards standstill
-                    self.assertEqual(curve['drawn'], len(values), (figure, column))
+                self.assertEqual((curve['run'], curve['said'], curve['drawn']), (run, len(values), len(values)),
+                                 (figure, column))
+                for (_, y), value in zip(curve['xy'], values):
+                    self.assertAlmostEqual(y, value, delta=1e-6 * max(1.0, abs(value)))
+                held = self.browser.value(f'document.getElementById("plot-{figure}").data.map(t => t.y.length)')
+                self.assertIn(len(values), held)
 
     def test_curve_stands_where_the_rows_say(self):
-        """The drawn curve is an affine image of the rows: pixels over values lie on one straight line."""
+        """The axis' own transformation puts the least and the greatest value of the first curve where its path has them."""
         for run, rows in enumerate(self.rows_of, 1):
-            pixels = [y for _, y in self.read.curve('fig5', 'a', run)['xy']]
             values = [float(row['omega1_rad_s']) for row in rows]
-            high, low = values.index(max(values)), values.index(min(values))
-            slope = (pixels[high] - pixels[low]) / (values[high] - values[low])
-            self.assertLess(slope, -0.5)  # it points upwards and fills its frame: 240 px for 170 rad/s
-            for pixel, value in zip(pixels, values):
-                self.assertAlmostEqual(pixel, pixels[low] + slope * (value - values[low]), delta=0.02)
+            path = self.browser.value(f'document.querySelectorAll("#plot-fig5 .scatterlayer .js-line")[{run - 1}]'
+                                      '.getAttribute("d")')
+            pixels = [float(pair.split(',')[1]) for pair in path.replace('M', '').split('L')]
+            wanted = self.browser.value('((axis) => [axis.l2p(%r), axis.l2p(%r)])'
+                                        '(document.getElementById("plot-fig5")._fullLayout.yaxis)' % (max(values), min(values)))
+            self.assertAlmostEqual(min(pixels), wanted[0], delta=1.0)
+            self.assertAlmostEqual(max(pixels), wanted[1], delta=1.0)
+            self.assertGreater(wanted[1] - wanted[0], 150.0)
 
-    def test_screenshot(self):
-        picture = self.folder / 'picture.png'
-        self.chromium('--window-size=900,1200', f'--screenshot={picture}')
-        self.assertEqual(picture.read_bytes()[:8], b'\x89PNG\r\n\x1a\n')
-        self.assertGreater(picture.stat().st_size, 30_000, 'an empty page')
+    def area(self, figure):
+        """Rectangle of the first panel's plot area in the window, after scrolling there."""
+        self.browser.value(f'document.getElementById("plot-{figure}").scrollIntoView({{block: "center"}})')
+        return self.browser.value(f'''(() => {{ const place = document.querySelector("#plot-{figure} .nsewdrag")
+            .getBoundingClientRect(); return [place.left, place.top, place.width, place.height]; }})()''')
+
+    def ranges(self, figures):
+        return [self.browser.value(f'document.getElementById("plot-{figure}").layout.xaxis.range.map(Number)')
+                for figure in figures]
+
+    def test_a_drag_zooms_all_axes_of_the_same_time_and_a_double_click_shows_all(self):
+        before, profile = self.ranges(OF_BRAKING), self.ranges(['profile'])
+        left, top, width, height = self.area('fig6')
+        self.browser.drag(left + 0.25 * width, left + 0.5 * width, top + 0.5 * height)
+        low, high = before[0]
+        self.browser.wait_for('document.getElementById("plot-signals").layout.xaxis.range[0] > 0.1', 'the zoom')
+        after = self.ranges(OF_BRAKING)
+        for found in after:
+            self.assertAlmostEqual(found[0], low + 0.25 * (high - low), delta=0.02)
+            self.assertAlmostEqual(found[1], low + 0.5 * (high - low), delta=0.02)
+        self.assertEqual(self.ranges(['profile']), profile, 'another axis of time')
+        for click in (1, 2):
+            for kind in ('mousePressed', 'mouseReleased'):
+                self.browser.mouse(kind, left + 0.4 * width, top + 0.5 * height, button='left', clickCount=click)
+        self.browser.wait_for(f'Math.abs(document.getElementById("plot-fig9").layout.xaxis.range[0] - {low}) < 1e-9',
+                              'all of it again')
+        self.assertEqual(self.ranges(OF_BRAKING), before)
+        self.assertEqual(self.browser.said, [])
+
+    def test_hover_shows_values(self):
+        left, top, width, height = self.area('fig6')
+        for step in range(5):
+            self.browser.mouse('mouseMoved', left + (0.4 + 0.002 * step) * width, top + 0.5 * height)
+        text = self.browser.wait_for('document.querySelector("#plot-fig6 .hoverlayer").textContent', 'the values')
+        for name in RUNS:
+            self.assertIn(name, text)
+        self.assertRegex(text, r'\d')
+
+    def test_print_and_picture(self):
+        pdf = base64.b64decode(self.browser.call('Page.printToPDF')['data'])
+        self.assertEqual(pdf[:5], b'%PDF-')
+        self.assertGreater(len(pdf), 50_000)
+        picture = base64.b64decode(self.browser.call('Page.captureScreenshot')['data'])
+        self.assertEqual(picture[:8], b'\x89PNG\r\n\x1a\n')
+        self.assertGreater(len(picture), 30_000, 'an empty page')
 
 
 if __name__ == '__main__':

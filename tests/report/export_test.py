@@ -11,7 +11,9 @@ import subprocess
 import sys
 import unittest
 
-from program import MUST_NOT_SKIP, ReportTest
+import scipy.io
+
+from program import ABS_REPORT, MUST_NOT_SKIP, ReportTest
 
 EXAMPLES = pathlib.Path(__file__).resolve().parents[2] / 'examples' / 'load_run'
 
@@ -52,6 +54,26 @@ class Export(ReportTest):
             theta = [float(row['theta_est_N']) for row in rows]
             self.assertEqual(run['columns']['theta_est_N'], [None if math.isnan(v) else v for v in theta])
             self.assertEqual(run['summary'], self.summary(folder))
+
+    def test_mat_file_in_scipy(self):
+        self.report('--octave', *self.runs, '--output', 'runs.mat')
+        runs = scipy.io.loadmat(self.folder / 'runs.mat', struct_as_record=False, squeeze_me=True)['runs']
+        for run, folder in zip(runs, self.runs):
+            rows = self.rows(folder)
+            self.assertEqual((run.name, run.controller, run.result), (folder.name, folder.name, 'completed'))
+            self.assertEqual(run.slip.tolist(), [float(row['slip']) for row in rows])
+            self.assertEqual([run.phase_names[int(number) - 1] for number in run.phase], [row['phase'] for row in rows])
+
+    def test_parquet(self):
+        result = subprocess.run([ABS_REPORT, '--parquet', *self.runs, '--output', 'runs.parquet'], capture_output=True,
+                                cwd=self.folder, check=False, timeout=60)
+        if result.returncode == 3 and b'pyarrow' in result.stderr and not MUST_NOT_SKIP:
+            self.skipTest('pyarrow is missing: scripts/setup_python.sh installs it')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        again = self.report('--csv', *self.runs).stdout
+        size = (self.folder / 'runs.parquet').stat().st_size
+        self.assertEqual((self.folder / 'runs.parquet').read_bytes()[:4], b'PAR1')
+        self.assertLess(size, len(again))
 
     def test_python_example(self):
         (self.folder / 'runs.json').write_bytes(self.report('--json', *self.runs).stdout)

@@ -5,11 +5,10 @@ import subprocess
 import unittest
 
 from page_reader import PageReader
-from program import ABS_HIL, ReportTest, need
+from program import ABS_HIL, ReportTest
 
 PARTS = 5  # wake-up, read, control, write, whole cycle
 HISTOGRAM_HEAD = '# abs_hil, us; columns: wake-up latency, read, control, write, whole cycle\n'
-need('gnuplot', 'gnuplot-nox')
 
 
 class SideFiles(ReportTest):

@@ -1,0 +1,48 @@
+"""The Inteco ABS laboratory rig in Python: simulate it, load its runs, step its plant and controllers, watch it live.
+
+    import abs_hil
+    run = abs_hil.simulate(controller="adaptive", set={"plant.theta_N": 30})
+    run.data.plot(x="time_s", y=["slip", "slip_ref"])     # a pandas DataFrame with the columns of the program's CSV
+    run.summary["stop_time_s"]
+
+The laws, the plant and the cycle are the program's own C++ (abs_hil._core): nothing is written twice. Wrong input raises
+ValueError with the program's text. The messages of a running experiment (`decode`, `TYPES`) need only Python.
+"""
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from .messages import PHASES, QUANTITIES, REASONS, TYPES, decode
+
+if TYPE_CHECKING:
+    from .hand import Controller, Plant, SlipInput, SlipOutput
+    from .network import live
+    from .run import Run, Series, load, load_series
+    from .simulation import Study, controllers, experiments, keys, plants, simulate, simulate_many
+
+# Importing the types' modules has put modules under these names.
+globals().update(TYPES)
+
+#: module -> the names that it gives; loaded at first use, so that decoding messages needs only Python
+_LATER = {'hand': ('Controller', 'Plant', 'SlipInput', 'SlipOutput'),
+          'network': ('live',),
+          'run': ('Run', 'Series', 'load', 'load_series'),
+          'simulation': ('Study', 'controllers', 'experiments', 'keys', 'plants', 'simulate', 'simulate_many')}
+_MODULE_OF = {name: module for module, names in _LATER.items() for name in names}
+
+__all__ = ['PHASES', 'QUANTITIES', 'REASONS', 'TYPES', 'Controller', 'Plant', 'Run', 'Series', 'SlipInput', 'SlipOutput',
+           'Study', 'controllers', 'decode', 'experiments', 'keys', 'live', 'load', 'load_series', 'plants', 'simulate',
+           'simulate_many']
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE_OF:
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    value = getattr(importlib.import_module(f'.{_MODULE_OF[name]}', __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_MODULE_OF, *TYPES})

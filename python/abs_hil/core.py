@@ -1,0 +1,31 @@
+"""Loads the compiled module abs_hil._core and tells it where the configuration files are."""
+from __future__ import annotations
+
+import pathlib
+import sys
+import sysconfig
+
+try:
+    from . import _core
+except ImportError as error:  # a build without it, or for another Python
+    raise ImportError(f'abs_hil: the compiled module is missing ({error}); build it for this Python '
+                      f'({sys.version.split()[0]}): `pip install .` in the source folder') from error
+
+__all__ = ['_core']
+
+
+def _config_dir() -> pathlib.Path | None:
+    try:
+        from ._build_tree import CONFIG_DIR
+        return pathlib.Path(CONFIG_DIR)
+    except ImportError:
+        pass
+    for prefix in (sysconfig.get_path('data'), sys.prefix, '/usr', '/usr/local'):
+        folder = pathlib.Path(prefix) / 'share' / 'abs_hil' / 'config'
+        if folder.is_dir():
+            return folder
+    return None
+
+
+if (_folder := _config_dir()) is not None:
+    _core.set_config_dir(str(_folder))

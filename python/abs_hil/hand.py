@@ -1,0 +1,66 @@
+"""The plant and the controllers, stepped by hand."""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from .core import _core
+from .options import PathLike, Value, options
+
+SlipInput = _core.SlipInput
+SlipOutput = _core.SlipOutput
+
+
+class Plant(_core.Plant):  # type: ignore[misc]
+    """The simulated rig's mechanics, tyre, brake and motor (docs/plants.md), advanced by hand; deterministic.
+
+    plant: a name or a TOML file. set: configuration values by dotted key, as {"plant.theta_N": 30}.
+
+    reset(omega1_rad_s=0, omega2_rad_s=0, brake_torque_Nm=0, angle1_rad=0, angle2_rad=0): sets the state, and returns
+        every profile to its start. Index 1: the upper, braked wheel; 2: the lower wheel.
+    advance(duration_s, motor_duty=0, brake_duty=0, brake_torque_Nm=0): advances the plant by duration_s in [0, 1e6] s
+        under constant inputs: duties in [0, 1]; brake_torque_Nm counts only with plant.ideal_actuator.
+    state: angle1_rad, angle2_rad, omega1_rad_s, omega2_rad_s, brake_torque_Nm. slip, tyre_force_N, theta_N (the largest
+        force that any slip could give now) and friction are the present values.
+    """
+
+    def __init__(self, plant: PathLike = 'paper-table1', set: Mapping[str, Value] | None = None) -> None:
+        super().__init__(options(plant=plant, set=set))
+
+
+class Controller(_core.Controller):  # type: ignore[misc]
+    """A slip controller of the program, stepped by hand.
+
+    name: as in abs_hil.controllers(). plant: the model that the controller believes in, a name or a TOML file.
+    set: configuration values by dotted key, as {"control.adaptive.gamma": 60}.
+
+    reset(input): starts braking. step(input): one control period; returns an abs_hil.SlipOutput. The first step has the
+    input of reset and dt_s = 0. signals: name -> meaning of the values in SlipOutput.signals.
+    """
+
+    def __init__(self, name: str = 'adaptive', plant: PathLike = 'paper-table1',
+                 set: Mapping[str, Value] | None = None) -> None:
+        super().__init__(options(controller=name, plant=plant, set=set))
+
+    def __repr__(self) -> str:
+        return f'<abs_hil.Controller {self.name}>'
+
+
+def _describe(type_: Any, text: str) -> None:
+    type_.__doc__ = text
+
+
+_describe(SlipInput, """What a slip controller gets in one cycle, SI units (include/abs_hil/control/slip_controller.hpp).
+
+dt_s: time since the previous step, > 0; 0 in the first step. omega1_rad_s, omega2_rad_s: estimated wheel speeds.
+slip, slip_ref: estimated slip and its reference. brake_torque_Nm: torque estimated to act now; mean_brake_torque_Nm: its
+mean over the past interval; max_brake_torque_Nm: the largest that the actuator can give. alpha1_rad_s2, alpha2_rad_s2:
+estimated accelerations. upper_travel_rad, lower_travel_rad: angles over the past interval, NaN if unknown.
+sent_brake_torque_Nm: static torque that was sent in the previous cycle; unsent_torque_Nm: what was missing in it of the
+controller's previous output; while it is not 0, an integral that drives the output further out must stand.
+""")
+_describe(SlipOutput, """What a slip controller returns: brake_torque_Nm, the static torque b(u); NaN or infinity end the run.
+
+slip_velocity_error_m_s, theta_est_N, slip_ref: NaN if the controller does not give them. signals: at most 8 values, in the
+order of the controller's signals.
+""")

@@ -1,0 +1,25 @@
+"""Learning to brake: gymnasium environments over the program's own cycle (docs/learning.md).
+
+    import gymnasium, abs_hil.learning
+    environment = gymnasium.make("abs_hil/SlipControl-v0")
+"""
+from __future__ import annotations
+
+import contextlib
+
+from .rigs import Rigs, Task
+
+ID = 'abs_hil/SlipControl-v0'
+__all__ = ['ID', 'Rigs', 'Task', 'register']
+
+
+def register() -> None:
+    """Makes the environment known to gymnasium. `import abs_hil.learning` does so if gymnasium is installed."""
+    import gymnasium
+    if ID not in gymnasium.registry:
+        gymnasium.register(ID, entry_point='abs_hil.learning.environment:SlipControl',
+                           vector_entry_point='abs_hil.learning.environment:SlipControlVector')
+
+
+with contextlib.suppress(ImportError):  # training in NumPy alone needs no gymnasium
+    register()

@@ -1,0 +1,102 @@
+"""The gymnasium environments."""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from .rigs import HIGH, LOW, TRAINING_SEED, Rigs, Task
+
+#: the longest braking takes about 450 steps of 10 ms
+MOST_STEPS = 1000
+
+
+def _observation_space() -> gymnasium.spaces.Box:
+    return gymnasium.spaces.Box(LOW, HIGH, dtype=np.float32)
+
+
+def _action_space() -> gymnasium.spaces.Box:
+    return gymnasium.spaces.Box(np.float32(0.0), np.float32(1.0), (1,), np.float32)
+
+
+class SlipControl(gymnasium.Env):
+    """Brake one simulated rig to 3 m/s and keep the wheel's slip at its reference.
+
+    Observation, float32 of shape (7,), as the program's controllers get it, from encoder counts:
+        0 slip_est          estimated slip, in [-1, 1]
+        1 slip_ref          wanted slip, in [0, 1]
+        2 v_x_est_m_s       estimated speed of the car, m/s, in [0, 30]
+        3 alpha1_rad_s2     estimated acceleration of the braked wheel, rad/s^2, in [-3000, 3000]
+        4 alpha2_rad_s2     estimated acceleration of the lower wheel, rad/s^2, in [-1000, 1000]
+        5 brake_torque_est  torque estimated to act behind the brake's lag, over the largest, in [0, 1]
+        6 action_before     the action before, in [0, 1]
+    Action, float32 of shape (1,): the wanted brake torque over the largest, in [0, 1], held for `period_s`.
+    Reward of a step: -|true slip - slip_ref| - 0.02 |change of the action|; -10 if a fault ends the run.
+    Terminated: the car is below 3 m/s, or a fault has ended the run. Truncated after 1000 steps.
+
+    Every episode has another plant: see abs_hil.learning.Task (plant, set, vary, randomise, period_s, start_speed_rad_s),
+    whose fields are this environment's arguments. The same seed of `reset` gives the same plants.
+    """
+
+    metadata: dict[str, Any] = {'render_modes': []}
+
+    def __init__(self, plants_seed: int = TRAINING_SEED, render_mode: str | None = None, **task: Any) -> None:
+        self.render_mode = render_mode
+        self.observation_space = _observation_space()
+        self.action_space = _action_space()
+        self._rigs = Rigs(1, Task(**task), seed=plants_seed)
+        self._steps = 0
+
+    def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[np.ndarray, dict[str, Any]]:
+        """options: {"index": n} chooses plant n of the series."""
+        super().reset(seed=seed)
+        index = int(options['index']) if options and 'index' in options else int(self.np_random.integers(2**31))
+        self._steps = 0
+        return self._rigs.reset(0, index), {'index': index}
+
+    def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        observations, rewards, ended = self._rigs.step(np.asarray(action))
+        self._steps += 1
+        return (observations[0], float(rewards[0]), bool(ended[0]), not ended[0] and self._steps >= MOST_STEPS,
+                {'true_slip': float(self._rigs.true_slip[0])})
+
+
+class SlipControlVector(VectorEnv):
+    """Many rigs of SlipControl, stepped in C++ threads. A rig whose episode has ended begins another at the next step."""
+
+    def __init__(self, num_envs: int = 1, plants_seed: int = TRAINING_SEED, render_mode: str | None = None,
+                 threads: int = 0, **task: Any) -> None:
+        self.num_envs = num_envs
+        self.render_mode = render_mode
+        self.single_observation_space, self.single_action_space = _observation_space(), _action_space()
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.metadata = {'autoreset_mode': AutoresetMode.NEXT_STEP, 'render_modes': []}
+        self._rigs = Rigs(num_envs, Task(**task), seed=plants_seed, threads=threads)
+        self._steps = np.zeros(num_envs, dtype=int)
+        self._over = np.zeros(num_envs, dtype=bool)
+
+    def reset(self, *, seed: Any = None, options: Mapping[str, Any] | None = None) -> tuple[np.ndarray, dict[str, Any]]:
+        super().reset(seed=seed)
+        self._over[:] = False
+        self._steps[:] = 0
+        for rig in range(self.num_envs):
+            self._rigs.reset(rig, int(self.np_random.integers(2**31)))
+        return self._rigs.observations(), {}
+
+    def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        again = self._over.copy()
+        observations, rewards, ended = self._rigs.step(np.asarray(actions).reshape(self.num_envs))
+        for rig in np.flatnonzero(again):
+            self._rigs.reset(int(rig), int(self.np_random.integers(2**31)))
+        if again.any():
+            observations = self._rigs.observations()
+        self._steps = np.where(again, 0, self._steps + 1)
+        terminated = ended & ~again
+        truncated = ~terminated & (self._steps >= MOST_STEPS)
+        self._over = terminated | truncated
+        return observations, np.where(again, 0.0, rewards), terminated, truncated, {}

@@ -1,0 +1,53 @@
+"""The messages of abs_hil, which a running experiment publishes over LCM and writes to its event logs (.lcmlog).
+
+    import abs_hil
+    message = abs_hil.decode(data)                  # any of the types
+    message = abs_hil.telemetry_t.decode(data)      # this one, else ValueError
+
+lcmtypes/*.lcm lists every field with its unit and range.
+"""
+from __future__ import annotations
+
+import importlib
+import json
+import pathlib
+import pkgutil
+from typing import Any
+
+_FOLDER = pathlib.Path(__file__).parent
+
+#: name -> class of every message type
+TYPES: dict[str, Any] = {}
+for _module in pkgutil.iter_modules([str(_FOLDER)]):
+    if _module.name.endswith('_t'):
+        TYPES[_module.name] = getattr(importlib.import_module(f'.{_module.name}', __package__), _module.name)
+
+
+def _table(name: str, key: str) -> dict[Any, dict[str, Any]]:
+    rows = json.loads((_FOLDER / name).read_text(encoding='utf-8'))
+    return {row[key]: row for row in rows}
+
+
+#: name -> unit, type, meaning and so on of every quantity of a cycle, in the order of the CSV columns
+QUANTITIES = _table('quantities.json', 'name')
+#: number -> name, kind and text of every reason (field `reason`)
+REASONS = _table('reasons.json', 'number')
+#: names of the values of the field `phase`, as in the CSV
+PHASES: tuple[str, ...] = tuple(QUANTITIES['phase']['values'])
+
+_BY_FINGERPRINT = {type_._get_packed_fingerprint(): type_ for type_ in TYPES.values()}
+
+
+def decode(data: bytes) -> Any:
+    """Decodes the message in `data` of any type. Raises ValueError if it is damaged or not from abs_hil."""
+    type_ = _BY_FINGERPRINT.get(bytes(data[:8]))
+    if type_ is None:
+        raise ValueError(f'not a message of abs_hil: fingerprint {bytes(data[:8]).hex()}, known are '
+                         + ', '.join(f'{name} {t._get_packed_fingerprint().hex()}' for name, t in TYPES.items()))
+    try:
+        message = type_.decode(data)
+    except Exception as error:  # the generated decoders raise struct.error and UnicodeDecodeError
+        raise ValueError(f'damaged {type_.__name__} of {len(data)} bytes: {error}') from error
+    if message.encode() != bytes(data):  # the decoders accept a last string that is cut short, and bytes after the end
+        raise ValueError(f'damaged {type_.__name__} of {len(data)} bytes: its length is not that of its fields')
+    return message

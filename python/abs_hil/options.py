@@ -1,0 +1,38 @@
+"""The arguments that abs_hil.simulate, Plant and Controller share, as the program's options."""
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any, Union
+
+#: a configuration value as Python has it
+Value = Union[bool, int, float, str]
+PathLike = Union[str, 'os.PathLike[str]']
+
+
+def text_of(value: Value) -> str:
+    """The value as --set takes it: numbers in full, true and false."""
+    if isinstance(value, bool):
+        return 'true' if value else 'false'
+    if isinstance(value, (int, str)):
+        return str(value)
+    return repr(float(value))
+
+
+def options(*, controller: Any = None, plant: PathLike | None = None, model: PathLike | None = None,
+            experiment: PathLike | None = None, config: PathLike | None = None, seed: int | None = None,
+            set: Mapping[str, Value] | None = None, inject: Sequence[str] = ()) -> dict[str, Any]:
+    """Options for abs_hil._core; a controller that is not a name is left out."""
+    given: dict[str, Any] = {}
+    for name, value in (('plant', plant), ('model', model), ('experiment', experiment), ('config', config)):
+        if value is not None:
+            given[name] = os.fspath(value)
+    if isinstance(controller, str):
+        given['controller'] = controller
+    if seed is not None:
+        given['seed'] = str(int(seed))
+    if set:
+        given['set'] = [f'{key}={text_of(value)}' for key, value in set.items()]
+    if inject:
+        given['inject'] = [inject] if isinstance(inject, str) else list(inject)
+    return given

@@ -1,0 +1,1 @@
+"""abs_report: pages, figures, tables and exports of runs (docs/reports.md)."""

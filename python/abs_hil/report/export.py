@@ -1,0 +1,110 @@
+"""The rows of runs in other formats: CSV, JSON, MAT-files, Parquet."""
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterator
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from ..run import TEXTS, csv_bytes, phase_names
+from .files import InputError, RunFiles
+from .page import Unavailable
+from .survey import Rows
+
+FORMATS = ('csv', 'json', 'octave', 'parquet')
+_FIELD_CHARACTERS = 63  # of names in Octave and MATLAB
+
+
+class Exporter:
+    """Writes the chosen columns of runs; `notes` says what is missing."""
+
+    def __init__(self, runs: list[RunFiles], columns: list[str]) -> None:
+        self.runs = runs
+        self.notes: list[str] = []
+        self._columns = columns or self._shared_columns()
+
+    def write(self, kind: str, out: BinaryIO) -> None:
+        {'csv': self._csv, 'json': self._json, 'octave': self._octave, 'parquet': self._parquet}[kind](out)
+
+    def _shared_columns(self) -> list[str]:
+        """Columns that all runs share, in the order of the first run."""
+        names = [Rows(run.csv).names for run in self.runs]
+        return [name for name in names[0] if all(name in other for other in names)]
+
+    def _tables(self) -> Iterator[tuple[RunFiles, dict[str, np.ndarray]]]:
+        """Each run with its columns; phases as an array of names."""
+        for run in self.runs:
+            rows = Rows(run.csv)
+            for name in self._columns:
+                if name not in rows.columns:
+                    raise InputError(f'{run.csv}:1: no column "{name}"; the file has the columns {", ".join(rows.names)}')
+            if rows.truncated:
+                self.notes.append(f'{run.csv}: the last row is incomplete, as after a crash, and is left out')
+            yield run, {name: phase_names(rows.columns[name], tuple(rows.phases)) if name in TEXTS else rows.columns[name]
+                        for name in self._columns}
+
+    def _csv(self, out: BinaryIO) -> None:
+        for number, (run, columns) in enumerate(self._tables()):
+            size = len(next(iter(columns.values())))
+            out.write(csv_bytes({'run': np.full(size, run.name, dtype=object), **columns}, header=number == 0))
+
+    def _json(self, out: BinaryIO) -> None:
+        out.write(b'{"runs": [')
+        for number, (run, columns) in enumerate(self._tables()):
+            data = {'name': run.name, 'label': run.label, 'summary': run.summary,
+                    'columns': {name: _without_nan(values) for name, values in columns.items()}}
+            out.write((',\n' if number else '\n').encode() + json.dumps(data, ensure_ascii=False).encode())
+        out.write(b'\n]}\n')
+
+    def _octave(self, out: BinaryIO) -> None:
+        import scipy.io
+        texts = ('name', 'label', 'controller', 'plant', 'result')
+        fields = [*texts, 'phase_names', *(_field_name(name) for name in self._columns)]
+        runs = np.empty((1, len(self.runs)), dtype=[(name, object) for name in fields])
+        for number, (run, columns) in enumerate(self._tables()):
+            record = runs[0, number]
+            for name, text in zip(texts, (run.name, run.label, run.text('controller'), run.text('plant'),
+                                          run.text('result'))):
+                record[name] = _ascii(text)
+            phases = list(dict.fromkeys(text for name in TEXTS if name in columns for text in columns[name].tolist()))
+            names = np.empty((1, len(phases)), dtype=object)
+            names[0, :] = [_ascii(phase) for phase in phases]
+            record['phase_names'] = names
+            for name, values in columns.items():
+                if name in TEXTS:
+                    place = {phase: float(n) for n, phase in enumerate(phases, 1)}
+                    values = np.array([place[phase] for phase in values.tolist()])
+                record[_field_name(name)] = values.astype(np.float64)[:, None]
+        scipy.io.savemat(out, {'runs': runs})
+
+    def _parquet(self, out: BinaryIO) -> None:
+        import pandas
+        frames = []
+        for run, columns in self._tables():
+            frame = pandas.DataFrame(columns)
+            frame.insert(0, 'run', run.name)
+            frames.append(frame)
+        try:
+            pandas.concat(frames, ignore_index=True).to_parquet(out, index=False)
+        except ImportError:
+            raise Unavailable('Parquet files need the Python package pyarrow; install it: pip install pyarrow, or '
+                              'scripts/setup_python.sh in the source folder') from None
+
+
+def _without_nan(values: np.ndarray) -> list[Any]:
+    if values.dtype == object:
+        return values.tolist()
+    return [value if math.isfinite(value) else None for value in values.tolist()]
+
+
+def _ascii(text: str) -> str:
+    return text.encode('ascii', 'replace').decode()
+
+
+def _field_name(name: str) -> str:
+    """A valid name of a field in Octave and MATLAB."""
+    name = re.sub(r'[^A-Za-z0-9_]', '_', name)[:_FIELD_CHARACTERS]
+    return name if re.match(r'[A-Za-z]', name) else ('x' + name)[:_FIELD_CHARACTERS]

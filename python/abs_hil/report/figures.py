@@ -1,0 +1,356 @@
+"""The figures of runs over time: the time histories, the counterparts of the paper's figures 5 to 10, the signals."""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .files import RunFiles
+from .model import (
+    REFERENCE,
+    SECOND,
+    Bar,
+    Curve,
+    Figure,
+    Label,
+    Mark,
+    Panel,
+    Shade,
+    Style,
+    axis_around,
+    phase_colour,
+    run_style,
+)
+from .survey import JUDGED_M_S, Rows, Survey
+from .text import short_names
+from .thin import thinned
+
+BESIDE_BRAKE_S = 0.2
+#: more than two points per pixel are invisible; with many curves fewer are enough
+MOST_STRETCHES = 1400
+STRETCHES_OF_ALL_RUNS = 9000
+LEAST_STRETCHES = 80
+MOST_LEGEND_ENTRIES = 12
+MOST_MARKS = 200
+MOST_STRIPS = 12
+MOST_BARS = 60  # of a run; more would be unreadable
+DOUBLE_PX = 165.0
+PX_A_MARK = 34.0
+TIME = Label('time since the start of the run, <i>t</i> / s', 'time since the start of the run, $t$ / s')
+
+
+def _symbol(letter: str, index: str, unit: str) -> Label:
+    sub = f'<sub>{index}</sub>' if index else ''
+    greek = {'ω': r'\omega', 'λ': r'\lambda', 'θ': r'\theta'}[letter]
+    below = f'_{{{index}}}' if index else ''
+    return Label(f'<i>{letter}</i>{sub}{unit}', f'${greek}{below}${unit}')
+
+
+@dataclass
+class Choice:
+    """Which part of the runs the figures show: braking with a margin, the whole run, or seconds of the run."""
+    kind: str = 'brake'
+    range: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass
+class Options:
+    choice: Choice = field(default_factory=Choice)
+    paper_colours: bool = False
+    groups: list[int] = field(default_factory=list)  # of each run; runs of one group share a style. Empty: none
+    group_labels: list[str] = field(default_factory=list)
+
+
+@dataclass
+class Window:
+    from_s: float  # in the run's own time
+    to_s: float
+    zero_s: float  # run time of the axis' zero
+
+
+@dataclass
+class Profile:
+    """A thinned curve, and its least and greatest value while the car brakes above 3 m/s."""
+    x: np.ndarray
+    y: np.ndarray
+    relevant: tuple[float, float] = (math.inf, -math.inf)
+
+
+def stretches_for(runs: int) -> int:
+    return min(max(STRETCHES_OF_ALL_RUNS // max(runs, 1), LEAST_STRETCHES), MOST_STRETCHES) // 2 * 2
+
+
+def window_of(found: Survey, choice: Choice, braking: bool) -> Window:
+    if choice.kind == 'given':
+        return Window(*choice.range, 0.0)
+    if choice.kind == 'brake' and braking:
+        return Window(found.brake_from_s - BESIDE_BRAKE_S, found.brake_to_s + BESIDE_BRAKE_S, found.brake_from_s)
+    return Window(found.from_s, found.to_s, 0.0)
+
+
+def _requests(found: Survey, window: Window) -> Iterator[tuple[str, str, str, bool, Window]]:
+    """(name, column, column to subtract, only in braking, window) of every curve. Truth where a run has it."""
+    def best(truth: str, estimate: str) -> str:
+        return truth if truth in found.known else estimate
+    whole = Window(found.from_s, found.to_s, 0.0)
+    braking = found.brakes
+    slip = best('slip', 'slip_est')
+    for wheel in '12':
+        speed = best(f'omega{wheel}_rad_s', f'omega{wheel}_est_rad_s')
+        yield f'profile_omega{wheel}', speed, '', False, whole
+        yield f'omega{wheel}', speed, '', False, window
+        yield f'omega{wheel}_est', f'omega{wheel}_est_rad_s', '', False, window
+    yield 'slip', slip, '', braking, window
+    yield 'slip_ref', 'slip_ref', '', braking, window
+    yield 'slip_error', slip, 'slip_ref', braking, window
+    yield 'torque_ref', 'brake_torque_ref_Nm', '', False, window
+    yield 'torque', best('brake_torque_Nm', 'brake_torque_est_Nm'), '', False, window
+    yield 'theta_est', 'theta_est_N', '', False, window
+    yield 'theta', 'theta_N', '', braking, window
+    yield 'theta_error', 'theta_N', 'theta_est_N', braking, window
+    yield 'distance', 'distance_m', '', False, window
+    for signal in found.signals:
+        yield f'signal {signal}', signal, '', False, window
+
+
+def profiles_of(rows: Rows, found: Survey, window: Window, most_stretches: int) -> dict[str, Profile]:
+    """Every curve of a run, thinned."""
+    time, braking = rows.time_s, rows.braking
+    speed = rows.columns['omega2_rad_s' if 'omega2_rad_s' in found.known else 'omega2_est_rad_s']
+    with np.errstate(invalid='ignore'):
+        judged = braking & (found.r2_m * speed > JUDGED_M_S)
+    profiles = {}
+    for name, column, minus, braking_only, part in _requests(found, window):
+        inside = slice(int(np.searchsorted(time, part.from_s)), int(np.searchsorted(time, part.to_s, 'right')))
+        values = rows.columns[column][inside]
+        if minus:
+            values = values - rows.columns[minus][inside]
+        if braking_only:
+            values = np.where(braking[inside], values, np.nan)
+        relevant = values[judged[inside] & np.isfinite(values)]
+        profile = Profile(*thinned(time[inside] - part.zero_s, values, most_stretches))
+        if len(profile.y) and np.isnan(profile.y).all():
+            profile.x, profile.y = profile.x[:0], profile.y[:0]
+        if len(relevant):
+            profile.relevant = float(relevant.min()), float(relevant.max())
+        profiles[name] = profile
+    return profiles
+
+
+class FigureMaker:
+    """Makes the figures from the surveys and curves of all runs."""
+
+    def __init__(self, runs: list[RunFiles], surveys: list[Survey], windows: list[Window],
+                 profiles: list[dict[str, Profile]], options: Options, braking: bool) -> None:
+        self.runs, self.surveys, self.windows, self.profiles, self.options = runs, surveys, windows, profiles, options
+        text = 'time since the start of braking' if braking else 'time'
+        self.x_label = Label(f'{text}, <i>t</i> / s', f'{text}, $t$ / s')
+        self.x_range = (min(w.from_s - w.zero_s for w in windows), max(w.to_s - w.zero_s for w in windows))
+        self.axis = 'braking' if braking else 'run'
+        self.shades = [Shade(p.from_s - windows[0].zero_s, p.to_s - windows[0].zero_s, p.phase)
+                       for p in surveys[0].phases[:MOST_MARKS]]
+        self.marks: list[Mark] = []
+        self._add_marks()
+
+    def figures(self) -> list[Figure]:
+        made = [self._profile(), self._speed('fig5', 'Figure 5. Upper wheel speed', 1),
+                self._speed('fig6', 'Figure 6. Lower wheel speed', 2), self._slip(), self._torque(), self._theta(),
+                self._distance()]
+        signals = self._signals()
+        return [*made, signals] if signals.panels else made
+
+    # ---- what the figures share
+
+    def _style(self, run: int) -> Style:
+        group = self.options.groups[run] if self.options.groups else run
+        style = run_style(group)
+        if self.options.paper_colours:
+            style = Style('#000000' if group == 0 else '#9a9a9a')
+        return Style(style.colour, style.dash, 0.6) if len(self.runs) > MOST_LEGEND_ENTRIES else style
+
+    def _legend(self, run: int) -> tuple[str, str]:
+        """(legend text, group) of a run's curves; no text with too many runs."""
+        if self.options.groups:
+            group = self.options.groups[run]
+            return self.options.group_labels[group], f'group {group}'
+        return (self.runs[run].label if len(self.runs) <= MOST_LEGEND_ENTRIES else ''), f'run {run}'
+
+    def _add_marks(self) -> None:
+        for number in range(min(len(self.runs), MOST_LEGEND_ENTRIES)):
+            found, run, zero = self.surveys[number], self.runs[number], self.windows[number].zero_s
+            self.marks += [Mark(p.from_s - zero, 'fault', True) for p in found.phases if p.phase == 'fault']
+            self.marks += [Mark(event.time_s - zero, event.event, event.event == 'fault') for event in run.events
+                           if event.unusual and event.phase != 'fault']
+            for change in found.changes:  # runs of one experiment change alike
+                mark = Mark(change.time_s - zero, change.label)
+                if not any(m.label == mark.label and abs(m.x - mark.x) < 1e-6 for m in self.marks):
+                    self.marks.append(mark)
+        del self.marks[MOST_MARKS:]
+
+    def _begin(self, id_: str, heading: str, caption: str, panels: list[Panel]) -> Figure:
+        return Figure(id_, heading, self.x_label, panels, caption.strip(), self.x_range, self.axis, self.shades, self.marks)
+
+    def _add(self, panel: Panel, run: int, quantity: str, style: Style, legend: str = '', group: str = '') -> None:
+        profile = self.profiles[run].get(quantity)
+        if profile is not None and len(profile.x):
+            panel.curves.append(Curve(run, quantity.removeprefix('signal '), style, profile.x, profile.y, legend=legend,
+                                      group=group))
+
+    def _add_all(self, panel: Panel, quantity: str) -> None:
+        for run in range(len(self.runs)):
+            legend, group = self._legend(run)
+            self._add(panel, run, quantity, self._style(run), legend, group)
+
+    def _add_reference(self, panel: Panel, quantity: str, legend: str) -> None:
+        """A quantity that most runs share, as a thin dotted line: each different curve once."""
+        drawn: list[np.ndarray] = []
+        for run in range(len(self.runs)):
+            values = self.profiles[run][quantity].y
+            values = values[np.concatenate(([True], values[1:] != values[:-1]))] if len(values) else values
+            if any(np.array_equal(values, other, equal_nan=True) for other in drawn):
+                continue
+            drawn.append(values)
+            self._add(panel, run, quantity, REFERENCE, legend, legend)
+
+    def _relevant(self, quantities: tuple[str, ...], least: tuple[float, float]) -> tuple[float, float] | None:
+        """Range of y above 3 m/s; towards standstill slip and its estimates diverge."""
+        ranges = [profiles[name].relevant for profiles in self.profiles for name in quantities]
+        ranges = [(low, high) for low, high in ranges if low <= high]
+        if not ranges:
+            return None
+        return axis_around(min(least[0], *(low for low, _ in ranges)), max(least[1], *(high for _, high in ranges)),
+                           int(DOUBLE_PX / PX_A_MARK))
+
+    def _estimated(self, column: str) -> str:
+        if all(column in found.known for found in self.surveys):
+            return ''
+        return ' Runs without true values show estimates from the encoders.'
+
+    # ---- the figures
+
+    def _speed(self, id_: str, heading: str, wheel: int) -> Figure:
+        caption = self._estimated(f'omega{wheel}_rad_s')
+        if wheel == 1:
+            caption += ' In this and the following figures the background is grey outside braking'
+            caption += '.' if len(self.runs) == 1 else f' of {self.runs[0].called}.'
+        panel = Panel(_symbol('ω', str(wheel), ' / (rad/s)'), height_px=240.0)
+        if len(self.runs) == 1 and f'omega{wheel}_rad_s' in self.surveys[0].known:
+            self._add(panel, 0, f'omega{wheel}', self._style(0), 'wheel', 'wheel')
+            self._add(panel, 0, f'omega{wheel}_est', SECOND, 'estimate', 'estimate')
+        else:
+            self._add_all(panel, f'omega{wheel}')
+        return self._begin(id_, heading, caption, [panel])
+
+    def _slip(self) -> Figure:
+        slip = Panel(Label('slip <i>λ</i>', r'slip $\lambda$'), height_px=DOUBLE_PX,
+                     y_range=self._relevant(('slip', 'slip_ref'), (0.0, 0.2)))
+        self._add_all(slip, 'slip')
+        self._add_reference(slip, 'slip_ref', 'reference')
+        error = Panel(Label('<i>λ</i> − <i>λ</i><sub>ref</sub>', r'$\lambda - \lambda_\mathrm{ref}$'), height_px=DOUBLE_PX,
+                      y_range=self._relevant(('slip_error',), (-0.05, 0.05)))
+        self._add_all(error, 'slip_error')
+        return self._begin('fig7', 'Figure 7. Wheel slip and tracking error',
+                           '(a) slip and its reference (dotted), (b) slip minus reference. The axes cover the range above '
+                           '3 m/s; slip diverges towards standstill.' + self._estimated('slip'), [slip, error])
+
+    def _torque(self) -> Figure:
+        asked = Panel(Label.plain('reference / (N m)'), height_px=DOUBLE_PX)
+        self._add_all(asked, 'torque_ref')
+        acting = Panel(Label.plain('acting / (N m)'), height_px=DOUBLE_PX)
+        self._add_all(acting, 'torque')
+        return self._begin('fig8', 'Figure 8. Brake torque',
+                           "(a) the controller's torque reference, (b) the torque that acts behind the brake's lag."
+                           + self._estimated('brake_torque_Nm'), [asked, acting])
+
+    def _theta(self) -> Figure:
+        truth = any('theta_N' in found.known for found in self.surveys)
+        caption = ("(a) estimate, and the plant's θ (dotted), (b) θ minus its estimate. The axes cover the range above 3 m/s."
+                   if truth else 'Estimate only: these runs have no true θ, so the error is unknown.')
+        if not any('theta_est_N' in found.known for found in self.surveys):
+            caption += ' No controller of these runs estimates θ.'
+        theta = Panel(_symbol('θ', '', ' / N'), height_px=DOUBLE_PX if truth else 240.0,
+                      y_range=self._relevant(('theta_est', 'theta'), (0.0, 1.0)))
+        self._add_all(theta, 'theta_est')
+        panels = [theta]
+        if truth:
+            self._add_reference(theta, 'theta', 'plant')
+            error = Panel(Label('error of <i>θ</i> / N', r'error of $\theta$ / N'), height_px=DOUBLE_PX,
+                          y_range=self._relevant(('theta_error',), (-1.0, 1.0)))
+            self._add_all(error, 'theta_error')
+            panels.append(error)
+        return self._begin('fig9', 'Figure 9. Estimate of the friction parameter θ', caption, panels)
+
+    def _distance(self) -> Figure:
+        panel = Panel(Label.plain('distance / m'), height_px=240.0)
+        self._add_all(panel, 'distance')
+        return self._begin('fig10', 'Figure 10. Braking distance', 'Distance of the car since the start of braking.', [panel])
+
+    def _signals(self) -> Figure:
+        names = list(dict.fromkeys(name for found in self.surveys for name in found.signals))
+        panels = []
+        for name in names:
+            panel = Panel(Label.plain(name), height_px=110.0)
+            self._add_all(panel, f'signal {name}')
+            panels.append(panel)
+        return self._begin('signals', "The controllers' own signals",
+                           'Each panel shows one signal of the runs whose controller reports it.', panels)
+
+    def _profile(self) -> Figure:
+        one = len(self.runs) == 1
+        speeds = Panel(Label.plain('speed / (rad/s)'), height_px=200.0)
+        if one:
+            self._add(speeds, 0, 'profile_omega2', self._style(0), 'lower wheel ω₂ (the road)', 'lower')
+            self._add(speeds, 0, 'profile_omega1', Style('#909090', (3, 3), 1.0), 'upper wheel ω₁ (braked)', 'upper')
+        else:
+            self._add_all(speeds, 'profile_omega2')
+        for curve in speeds.curves:
+            curve.quantity = curve.quantity.removeprefix('profile_')
+        caption = '(a) Speeds of both wheels. ' if one else '(a) Speed of the lower wheel, the road. '
+        caption += f'(b) Phases of the run{"" if one else "s"}; a triangle marks an event other than a change of phase.'
+        if len(self.runs) > MOST_STRIPS:
+            caption += f' Only the first {MOST_STRIPS} of {len(self.runs)} runs are shown.'
+        return Figure('profile', 'Time history of the run' if one else 'Time histories of the runs', TIME,
+                      [speeds, self._strips()], caption,
+                      (min(found.from_s for found in self.surveys), max(found.to_s for found in self.surveys)), 'run')
+
+    def _strips(self) -> Panel:
+        """One strip a run with its phases, and marks at unusual events."""
+        strips = min(len(self.runs), MOST_STRIPS)
+        panel = Panel(Label.plain(''), y_range=(0.0, float(strips)), height_px=max(30.0, 24.0 * strips), grid=False)
+        names = short_names([run.called if strips > 1 else '' for run in self.runs[:strips]], 8)
+        for number in range(strips):
+            run, found, bottom = self.runs[number], self.surveys[number], float(strips - 1 - number)
+            panel.y_tics.append((bottom + 0.5, '' if strips == 1 else names[number]))
+            panel.bars += [Bar(p.from_s, p.to_s, bottom + 0.12, bottom + 0.88, phase_colour(p.phase), p.phase)
+                           for p in found.phases[:MOST_BARS]]
+            times = [event.time_s for event in run.events if event.unusual]
+            if not run.events:
+                times += [p.from_s for p in found.phases if p.phase == 'fault']
+            times = (times + [change.time_s for change in found.changes])[:MOST_BARS]
+            if times:
+                panel.curves.append(Curve(number, 'events', Style('#D55E00'), np.array(times),
+                                          np.full(len(times), bottom + 0.5), 'markers', 'triangle'))
+        return panel
+
+
+def run_figures(runs: list[RunFiles], options: Options, read: Callable[[RunFiles], Rows],
+                survey: Callable[[RunFiles, Rows], Survey], progress: Callable[[], None]) -> tuple[list[Survey], list[Figure]]:
+    """The surveys and figures of all runs. Each CSV is read once, and again only if some runs do not brake."""
+    surveys, windows, profiles = [], [], []
+    stretches = stretches_for(len(runs))
+    for run in runs:
+        rows = read(run)
+        found = survey(run, rows)
+        surveys.append(found)
+        windows.append(window_of(found, options.choice, found.brakes))
+        profiles.append(profiles_of(rows, found, windows[-1], stretches))
+        progress()
+    braking = options.choice.kind == 'brake' and all(found.brakes for found in surveys)
+    if options.choice.kind == 'brake' and not braking:
+        for number, found in enumerate(surveys):
+            if found.brakes:
+                windows[number] = window_of(found, options.choice, False)
+                profiles[number] = profiles_of(read(runs[number]), found, windows[number], stretches)
+    return surveys, FigureMaker(runs, surveys, windows, profiles, options, braking).figures()

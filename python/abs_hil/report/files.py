@@ -1,0 +1,314 @@
+"""The files of runs, except their rows: what the command line names, and the files beside each CSV."""
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import pathlib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..run import flattened
+from .text import clean, number_text
+
+try:
+    import tomllib
+except ImportError:  # Python before 3.11
+    tomllib = None  # type: ignore[assignment]
+
+NAME_CHARACTERS = 40
+#: side files are small; a larger file is not one, and must not fill the memory
+MOST_BYTES = 64 << 20
+#: largest accepted bin of a histogram, 10 s
+MOST_US = 10_000_000
+PARTS = ('wake-up latency', 'read', 'control', 'write', 'whole cycle')
+
+
+class InputError(ValueError):
+    """Something that abs_report cannot use; the message names it and the fix."""
+
+
+@dataclass
+class Event:
+    """A line of a run folder's events.csv."""
+    time_s: float
+    event: str
+    phase: str
+    reason: str = ''
+    value: str = ''
+
+    @property
+    def unusual(self) -> bool:
+        """True for an event that is neither a change of phase nor the regular end."""
+        return self.event != 'phase' and not (self.event == 'limit' and self.phase == 'stopped')
+
+
+@dataclass
+class Histogram:
+    """Numbers of cycles by the duration of their parts: counts[part][us]."""
+    counts: list[np.ndarray]
+    overflows: list[int]
+
+
+@dataclass
+class RunFiles:
+    """All files of a run but its rows. All but the CSV may be missing; `notes` say what is missing."""
+    csv: pathlib.Path
+    name: str
+    folder: pathlib.Path | None = None
+    label: str = ''    # in legends and table heads
+    called: str = ''   # beside a time or in a sentence: the given label, else the name
+    summary: dict[str, Any] = field(default_factory=dict)
+    config: dict[str, str] = field(default_factory=dict)
+    environment: dict[str, str] = field(default_factory=dict)
+    events: list[Event] = field(default_factory=list)
+    histogram: Histogram | None = None
+    notes: list[str] = field(default_factory=list)
+
+    def number(self, dotted: str) -> float:
+        """A number from the summary; NaN if it has none."""
+        at: Any = self.summary
+        for key in dotted.split('.'):
+            at = at.get(key) if isinstance(at, dict) else None
+        return float(at) if isinstance(at, (int, float)) and not isinstance(at, bool) else math.nan
+
+    def text(self, key: str) -> str:
+        value = self.summary.get(key)
+        return clean(value) if isinstance(value, str) else ''
+
+    def config_number(self, key: str, otherwise: float) -> float:
+        try:
+            return float(self.config[key])
+        except (KeyError, ValueError):
+            return otherwise
+
+
+@dataclass
+class SeriesFiles:
+    name: str
+    runs: list[int]  # indices into FoundRuns.runs
+
+
+@dataclass
+class FoundRuns:
+    runs: list[RunFiles] = field(default_factory=list)
+    series: list[SeriesFiles] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def read_bytes(path: pathlib.Path) -> bytes:
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise InputError(f'{path}: {path.stat().st_size} bytes are too many for this kind of file')
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f'cannot read "{path}": {error.strerror}') from None
+
+
+def read_json(path: pathlib.Path) -> dict[str, Any]:
+    try:
+        data = json.loads(read_bytes(path).decode('utf-8', 'replace'))
+    except (ValueError, RecursionError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f'{path}: not valid JSON: {clean(error)}') from None
+    if not isinstance(data, dict):
+        raise InputError(f'{path}:1: the file must contain a JSON object')
+    return data
+
+
+def texts_of(values: dict[str, Any]) -> dict[str, str]:
+    """Nested values as text under dotted keys."""
+    return {clean(key, 120): number_text(value) if not isinstance(value, (list, type(None))) else clean(json.dumps(value))
+            for key, value in flattened(values).items()}
+
+
+def read_toml(path: pathlib.Path) -> dict[str, str]:
+    if tomllib is None:
+        raise InputError(f'{path}: reading it needs Python 3.11 or later')
+    text = read_bytes(path).decode('utf-8', 'replace')
+    try:
+        return texts_of(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        line = getattr(error, 'lineno', None)
+        if line is None:
+            found = str(error).partition('at line ')[2].split(',')[0]
+            line = int(found) if found.isdigit() else text.count('\n') + 1
+        raise InputError(f'{path}:{line}: {clean(error)}') from None
+
+
+def read_events(path: pathlib.Path) -> list[Event]:
+    text = read_bytes(path).decode('utf-8', 'replace')
+    if not text.startswith('time_s,event,phase,reason,value'):
+        raise InputError(f'{path}:1: the header must begin with "time_s,event,phase,reason,value"')
+    lines = text.split('\n')
+    events = []
+    for number, line in enumerate(lines[1:], 2):
+        last = number == len(lines)  # a line without line end is the trace of a crash
+        if last and not line:
+            break
+        fields: list[str] = next(csv.reader(io.StringIO(line)), [])
+        try:
+            time_s = float(fields[0])
+            events.append(Event(time_s, clean(fields[1], 40), clean(fields[2], 40), clean(fields[3]),
+                                clean(fields[4].rstrip('\r'), 40)))
+        except (IndexError, ValueError):
+            if last:
+                break
+            raise InputError(f'{path}:{number}: not an event: "{clean(line, 60)}"') from None
+    return events
+
+
+def read_histogram(path: pathlib.Path) -> Histogram:
+    bins: dict[int, list[int]] = {}
+    overflows = [0] * len(PARTS)
+    title = '# Histogram Overflows:'
+    for number, line in enumerate(read_bytes(path).decode('utf-8', 'replace').splitlines(), 1):
+        if number == 1 and not line.startswith('# abs_hil, us;'):
+            raise InputError(f'{path}:1: not a histogram of abs_hil: the file must begin with "# abs_hil, us;"')
+        overflow = line.startswith(title)
+        if not line or (line[0] == '#' and not overflow):
+            continue
+        try:
+            fields = [int(text) for text in (line[len(title):] if overflow else line).split()]
+            counts = fields[-len(PARTS):] if overflow else fields[1:1 + len(PARTS)]
+            if len(counts) < len(PARTS) or min(fields) < 0 or (not overflow and fields[0] > MOST_US):
+                raise ValueError
+        except ValueError:
+            raise InputError(f'{path}:{number}: not a line of a histogram: "{clean(line, 60)}"') from None
+        if overflow:
+            overflows = counts
+        else:
+            row = bins.setdefault(fields[0], [0] * len(PARTS))
+            bins[fields[0]] = [a + b for a, b in zip(row, counts)]
+    size = max(bins, default=-1) + 1
+    columns = [np.zeros(size, dtype=np.float64) for _ in PARTS]
+    for us, counts in bins.items():
+        for part, count in enumerate(counts):
+            columns[part][us] = count
+    return Histogram(columns, overflows)
+
+
+def _read_if_there(run: RunFiles, path: pathlib.Path, what: str, read: Callable[[pathlib.Path], None]) -> None:
+    """Reads an optional file. A broken one becomes a note, so that the run is still shown."""
+    if not path.exists():
+        run.notes.append(f'no {clean(path.name)}: {what}')
+        return
+    try:
+        read(path)
+    except InputError as error:
+        run.notes.append(f'not used: {clean(error, 400)}')
+
+
+def _read_folder(run: RunFiles, folder: pathlib.Path) -> None:
+    def summary(path: pathlib.Path) -> None:
+        run.summary = read_json(path)
+
+    def config(path: pathlib.Path) -> None:
+        run.config = read_toml(path)
+
+    def environment(path: pathlib.Path) -> None:
+        run.environment = texts_of(read_json(path))
+
+    def events(path: pathlib.Path) -> None:
+        run.events = read_events(path)
+
+    def histogram(path: pathlib.Path) -> None:
+        run.histogram = read_histogram(path)
+
+    _read_if_there(run, folder / 'summary.json', 'metrics are computed from the CSV; names and result are unknown', summary)
+    if isinstance(run.summary.get('config'), dict):
+        run.config = texts_of(run.summary['config'])
+    else:
+        _read_if_there(run, folder / 'config.toml', 'the configuration is unknown', config)
+    _read_if_there(run, folder / 'environment.json', 'kernel, build and board are unknown', environment)
+    _read_if_there(run, folder / 'events.csv', 'events are the phase changes in the CSV, without reasons', events)
+    if run.summary.get('virtual_time') is not True:
+        _read_if_there(run, folder / 'histogram.txt', "no histograms of the cycle's timing", histogram)
+
+
+def _base_name(path: pathlib.Path) -> str:
+    whole = path.absolute()
+    whole = whole.resolve() if whole.name in ('', '.', '..') else whole
+    return clean(whole.name if path.is_dir() else whole.stem, NAME_CHARACTERS)
+
+
+def _load_run(path: pathlib.Path) -> RunFiles:
+    if path.is_dir():
+        run = RunFiles(path / 'run.csv', _base_name(path), path)
+        _read_folder(run, path)
+        return run
+    return RunFiles(path, _base_name(path), notes=[
+        'only a CSV file: configuration, reasons and timing are unknown; metrics are computed from it with the paper\'s '
+        'radius and end speed'])
+
+
+def _folders_of(series: pathlib.Path) -> list[pathlib.Path]:
+    try:
+        return sorted(path for path in series.iterdir() if path.name.startswith('run-') and path.is_dir())
+    except OSError as error:
+        raise InputError(f'cannot read "{series}": {error.strerror}') from None
+
+
+def _load_series(path: pathlib.Path, found: FoundRuns) -> None:
+    series = SeriesFiles(_base_name(path), [])
+    for folder in _folders_of(path):
+        if not (folder / 'run.csv').exists() or not (folder / 'summary.json').exists():
+            found.notes.append(f'{clean(folder)} is not complete and is left out')
+            continue
+        series.runs.append(len(found.runs))
+        found.runs.append(_load_run(folder))
+    if not series.runs:
+        raise InputError(f'"{path}": this series folder has no complete run (as run-0001/ with run.csv and summary.json)')
+    found.series.append(series)
+
+
+def find_runs(arguments: Iterable[str | pathlib.Path], labels: list[str] | None = None) -> FoundRuns:
+    """The runs that the command line names: CSV files, run folders, series folders. Raises InputError."""
+    found = FoundRuns()
+    for argument in arguments:
+        path = pathlib.Path(argument)
+        if not path.exists():
+            raise InputError(f'"{path}" does not exist; give a run folder, a run\'s CSV file or a series folder')
+        if not path.is_dir() or (path / 'run.csv').exists():
+            found.runs.append(_load_run(path))
+        elif (path / 'series.json').exists() or _folders_of(path):
+            _load_series(path, found)
+        else:
+            raise InputError(f'"{path}" is neither a run folder (no run.csv) nor a series folder (no series.json, no '
+                             'run-0001/)')
+    _name_apart(found.runs)
+    _label(found.runs, labels or [])
+    return found
+
+
+def _name_apart(runs: list[RunFiles]) -> None:
+    used: set[str] = set()
+    for run in runs:
+        name, number = run.name, 2
+        while run.name in used:
+            run.name, number = f'{name} ({number})', number + 1
+        used.add(run.name)
+
+
+def _label(runs: list[RunFiles], labels: list[str]) -> None:
+    if labels and len(labels) != len(runs):
+        raise InputError(f'{len(labels)} labels for {len(runs)} runs; give one --label for each run')
+    for number, run in enumerate(runs):
+        controller = run.text('controller')
+        run.called = run.name
+        run.label = f'{run.name}: {controller}' if controller and controller not in run.name else run.name
+        if labels:
+            run.label = run.called = clean(labels[number], 2 * NAME_CHARACTERS)
+
+
+def differing_keys(runs: list[RunFiles]) -> list[str]:
+    """Configuration keys whose values differ between the runs that have a configuration."""
+    configured = [run.config for run in runs if run.config]
+    keys = sorted({key for config in configured for key in config})
+    return [key for key in keys
+            if len({config.get(key) for config in configured}) > 1]

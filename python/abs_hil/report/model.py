@@ -1,0 +1,144 @@
+"""A figure as data, which the page (plotly) and the picture files (matplotlib) draw alike."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Style:
+    colour: str = '#000000'
+    dash: tuple[float, ...] = ()  # lengths of strokes and gaps in px; empty: solid
+    width: float = 1.4
+
+
+#: Okabe, Ito: "Color Universal Design" (2008), without its yellow. Each entry has its own dash pattern.
+_RUN_STYLES = (Style('#0072B2', (), 1.5), Style('#E69F00', (14, 3), 1.5), Style('#009E73', (7, 3), 1.5),
+               Style('#D55E00', (12, 3, 2, 3), 1.5), Style('#CC79A7', (4, 2), 1.5),
+               Style('#56B4E9', (12, 3, 2, 3, 2, 3), 1.5), Style('#000000', (2, 2), 1.5))
+STYLES = len(_RUN_STYLES)
+REFERENCE = Style('#000000', (2, 3), 1.1)
+SECOND = Style('#D55E00', (7, 4), 1.3)
+_PHASE_COLOURS = {'idle': '#f3f3f3', 'accelerate': '#e6e6e6', 'coast': '#f3f3f3', 'brake': '#ffffff', 'hold': '#e6e6e6',
+                  'stopped': '#f3f3f3', 'fault': '#f7d9cc'}
+
+
+def run_style(run: int) -> Style:
+    return _RUN_STYLES[run % STYLES]
+
+
+def phase_colour(phase: str) -> str:
+    """Background colour of a phase; white for braking, the phase of interest."""
+    return _PHASE_COLOURS.get(phase, '#ececec')
+
+
+@dataclass(frozen=True)
+class Label:
+    """Text of an axis: fixed text with markup, once for each way of drawing."""
+    html: str
+    math: str  # with matplotlib's $...$
+
+    @staticmethod
+    def plain(text: str) -> Label:
+        """Text from a file, without markup."""
+        return Label(text.replace('&', '&amp;').replace('<', '&lt;').replace('>', '&gt;'), text.replace('$', r'\$'))
+
+
+@dataclass
+class Curve:
+    run: int
+    quantity: str  # the column that it shows, or a name for a computed quantity
+    style: Style
+    x: np.ndarray
+    y: np.ndarray
+    drawn: str = 'line'  # line, markers, intervals
+    marker: str = 'circle'
+    legend: str = ''     # text of its legend entry: plain text; only in the first curve with this text
+    group: str = ''      # curves of one group are hidden and shown together
+    bounds: list[tuple[float, float]] = field(default_factory=list)  # of intervals
+
+
+@dataclass
+class Bar:
+    """A rectangle in a panel's coordinates that shows a phase of a run."""
+    x0: float
+    x1: float
+    y0: float
+    y1: float
+    colour: str
+    text: str  # plain text, shown in the middle if it fits
+
+
+@dataclass
+class Panel:
+    y_label: Label
+    curves: list[Curve] = field(default_factory=list)
+    y_range: tuple[float, float] | None = None
+    height_px: float = 180.0
+    log: bool = False  # both axes
+    y_tics: list[tuple[float, str]] = field(default_factory=list)  # instead of numbers; plain text
+    x_tics: list[tuple[float, str]] = field(default_factory=list)
+    bars: list[Bar] = field(default_factory=list)
+    grid: bool = True
+
+
+@dataclass
+class Shade:
+    x0: float
+    x1: float
+    phase: str
+
+
+@dataclass
+class Mark:
+    """A vertical line at an instant."""
+    x: float
+    label: str  # plain text
+    fault: bool = False
+
+
+@dataclass
+class Figure:
+    """A picture of panels in a column with a common x axis. Figures of one `axis` zoom together."""
+    id: str
+    heading: str  # plain text
+    x_label: Label
+    panels: list[Panel]
+    caption: str = ''  # plain text
+    x_range: tuple[float, float] | None = None
+    axis: str = ''
+    shades: list[Shade] = field(default_factory=list)
+    marks: list[Mark] = field(default_factory=list)
+
+    def curves(self) -> list[Curve]:
+        return [curve for panel in self.panels for curve in panel.curves]
+
+
+def _step_for(span: float, wanted: int) -> float:
+    rough = span / wanted
+    power = 10.0 ** math.floor(math.log10(rough))
+    for factor in (1.0, 2.0, 5.0):
+        if factor * power >= 0.999 * rough:
+            return factor * power
+    return 10.0 * power
+
+
+def axis_around(low: float, high: float, wanted: int) -> tuple[float, float]:
+    """The range widened to whole steps of 1, 2 or 5 times a power of ten, so that curves do not touch the frame."""
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return 0.0, 1.0
+    size = max(abs(low), abs(high))
+    if not high - low > 1e-9 * size:
+        room = 0.5 * size if size > 0.0 else 0.5  # a constant curve gets space above and below
+        low, high = low - room, high + room
+    step = _step_for(high - low, wanted)
+    margin = 0.02 * (high - low)
+    top = step * math.ceil((high + margin) / step)
+    # An axis that begins at zero keeps zero as its end; a tiny negative value must not add a whole step.
+    if 0.0 <= low < margin:
+        return 0.0, top
+    if -2.0 * margin < low < 0.0:
+        return low - 0.5 * margin, top
+    return step * math.floor((low - margin) / step), top

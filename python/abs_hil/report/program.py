@@ -1,0 +1,200 @@
+"""The command line of abs_report."""
+from __future__ import annotations
+
+import argparse
+import pathlib
+import re
+import sys
+from typing import Any
+
+from ..core import _core
+from ..files import write_whole
+from .export import FORMATS as EXPORTS
+from .export import Exporter
+from .figures import Choice
+from .files import InputError, find_runs
+from .page import PAGE_MARK, Unavailable
+from .pictures import FORMATS as PICTURES
+from .report import Report, Request, make
+from .tables import merits
+from .text import clean
+
+BAD_INPUT, UNAVAILABLE = 2, 3
+MOST_NOTES = 10
+#: fewer runs are read before anybody could look at a bar
+LEAST_BAR = 5
+_MARK_BYTES = 4096
+
+
+def parser() -> argparse.ArgumentParser:
+    made = argparse.ArgumentParser('abs_report', description='Turns runs into a page with figures and tables, a plain table, '
+                                   'or exports their rows', allow_abbrev=False)
+    made.add_argument('runs', metavar='RUN', nargs='+', help='run folders, series folders, or CSV files of runs')
+    made.add_argument('--version', action='version', version=_core.version)
+    made.add_argument('--output', metavar='FILE', default='',
+                      help='file of the page (default: report.html) or of the exported rows (default: stdout)')
+    made.add_argument('--force', action='store_true', help='replace existing files')
+    made.add_argument('--title', metavar='TEXT', default='', help='heading of the page')
+    made.add_argument('--label', metavar='TEXT', dest='labels', action='append', default=[],
+                      help='name of each run in legends and tables, one per run')
+    made.add_argument('--window', default='brake', metavar='brake|run|FROM:TO',
+                      help='time range of the figures: brake, run, or FROM:TO in seconds of the run [brake]')
+    made.add_argument('--paper', action='store_true',
+                      help="make the paper's comparison page from an adaptive and a sliding-mode run")
+    made.add_argument('--figures', metavar='DIR', default='', help='folder for the figures as separate files')
+    made.add_argument('--format', choices=PICTURES, default=None, help='format of these files [svg]')
+    made.add_argument('--table', action='store_true', help='print the figures of merit as a plain table; makes no page')
+    made.add_argument('--merits', metavar='FILE', default='',
+                      help='write the figures of merit as CSV, one row a run, numbers in full')
+    exports = made.add_argument_group('export', 'export rows instead of a page, to --output or stdout')
+    one = exports.add_mutually_exclusive_group()
+    one.add_argument('--csv', dest='export', action='store_const', const='csv',
+                     help="all runs in one CSV, with the run's name in the first column")
+    one.add_argument('--json', dest='export', action='store_const', const='json',
+                     help='runs with summaries, one array per column')
+    one.add_argument('--octave', dest='export', action='store_const', const='octave',
+                     help='MAT-file for Octave, MATLAB, SciPy')
+    one.add_argument('--parquet', dest='export', action='store_const', const='parquet', help='Parquet file')
+    made.add_argument('--columns', metavar='A,B', action='append', default=[],
+                      help='columns to export, separated by commas (default: all)')
+    return made
+
+
+def _choice(text: str) -> Choice:
+    if text in ('brake', 'run'):
+        return Choice(text)
+    number = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
+    if (found := re.fullmatch(f'({number}):({number})', text)) and float(found[1]) < float(found[2]):
+        return Choice('given', (float(found[1]), float(found[2])))
+    raise InputError(f'--window {text}: give brake, run, or FROM:TO in seconds with FROM < TO')
+
+
+def _say(notes: list[str]) -> None:
+    for note in notes[:MOST_NOTES]:
+        print(f'abs_report: note: {clean(note, 1000)}', file=sys.stderr)
+    if len(notes) > MOST_NOTES:
+        print(f'abs_report: note: and {len(notes) - MOST_NOTES} more', file=sys.stderr)
+
+
+def _check_replaceable(path: pathlib.Path, replace: bool) -> None:
+    if replace or not path.exists():
+        return
+    with open(path, 'rb') as file:
+        if PAGE_MARK.encode() in file.read(_MARK_BYTES):
+            return
+    raise InputError(f'"{path}" exists and is not a report of abs_report; give another --output, or --force to replace it')
+
+
+def _refuse_existing(path: pathlib.Path, option: str, replace: bool) -> None:
+    if not replace and path.exists():
+        raise InputError(f'"{path}" exists; give another {option}, or --force to replace it')
+
+
+def _export(o: argparse.Namespace, columns: list[str]) -> None:
+    exporter = Exporter(find_runs(o.runs, o.labels).runs, columns)
+    if o.output:
+        path = pathlib.Path(o.output)
+        _refuse_existing(path, '--output', o.force)
+
+        def write(name: str) -> None:
+            with open(name, 'wb') as file:
+                exporter.write(o.export, file)
+        write_whole(path, write)
+    else:
+        if o.export in ('octave', 'parquet') and sys.stdout.isatty():
+            raise InputError(f'--{o.export} writes a binary file: give --output FILE or redirect stdout')
+        exporter.write(o.export, sys.stdout.buffer)
+        sys.stdout.buffer.flush()
+    _say(exporter.notes)
+
+
+def _print_table(made: Report) -> None:
+    for part in made.contents.series:
+        _print_rows(part.groups.header, part.groups.rows)
+        print()
+    metrics = made.contents.metrics
+    _print_rows(metrics.header, metrics.rows)
+
+
+def _print_rows(header: list[str], rows: list[list[str]]) -> None:
+    lines = [header, *rows]
+    widths = [max(len(line[column]) for line in lines) for column in range(len(header))]
+    for line in lines:
+        first = line[0].ljust(widths[0])
+        rest = [cell.rjust(width) for cell, width in zip(line[1:], widths[1:])]
+        print('  '.join([first, *rest]).rstrip())
+
+
+def _report(o: argparse.Namespace) -> None:
+    path = pathlib.Path(o.output or 'report.html')
+    request = Request(o.runs, o.labels, o.title, _choice(o.window), o.paper)
+    if not o.table:
+        _check_replaceable(path, o.force)
+    if o.merits:
+        _refuse_existing(pathlib.Path(o.merits), '--merits', o.force)
+    made = make(request, _Bar())
+    if o.merits:
+        frame = merits(made.runs, made.surveys)
+        write_whole(pathlib.Path(o.merits), lambda name: frame.to_csv(name, index=False, na_rep='NaN'))
+    if o.table:
+        _print_table(made)
+    else:
+        html = made.html()
+
+        def write(name: str) -> None:
+            with open(name, 'w', encoding='utf-8') as file:
+                file.write(html)
+        write_whole(path, write)
+    _say(made.notes)
+    if not o.table:
+        print(path)
+    if o.merits:
+        print(o.merits)
+    if o.figures:
+        from . import pictures
+        for figure in pictures.write(made.figures, pathlib.Path(o.figures), o.format or 'svg', o.force):
+            print(figure)
+
+
+class _Bar:
+    """A progress bar on a terminal while many runs are read."""
+
+    def __init__(self) -> None:
+        self._bar: Any = None
+
+    def __call__(self, done: int, total: int) -> None:
+        if total < LEAST_BAR or not sys.stderr.isatty():
+            return
+        if self._bar is None:
+            import tqdm
+            self._bar = tqdm.tqdm(total=total, unit=' runs', file=sys.stderr, leave=False)
+        self._bar.update(done - self._bar.n)
+        if done == total:
+            self._bar.close()
+
+
+def main(arguments: list[str]) -> int:
+    o = parser().parse_args(arguments)
+    columns = [name for names in o.columns for name in names.split(',') if name]
+    try:
+        if columns and not o.export:
+            raise InputError('--columns selects columns to export: also give '
+                             + ', '.join(f'--{name}' for name in EXPORTS[:-1]) + f' or --{EXPORTS[-1]}')
+        if o.format and not o.figures:
+            raise InputError('--format is the format of the figures: also give --figures')
+        if o.export and (o.paper or o.figures or o.table or o.merits):
+            raise InputError('--paper, --figures, --table and --merits show runs; --csv, --json, --octave and --parquet '
+                             'export rows; give one kind only')
+        if o.export:
+            _export(o, columns)
+        else:
+            _report(o)
+    except Unavailable as error:
+        print(f'abs_report: {error}', file=sys.stderr)
+        return UNAVAILABLE
+    except (ValueError, OSError) as error:
+        print(f'abs_report: {clean(error, 4000)}', file=sys.stderr)
+        return BAD_INPUT
+    return 0
+
+

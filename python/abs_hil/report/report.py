@@ -1,0 +1,113 @@
+"""A report of runs: reads them once, makes figures, tables and the page."""
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..core import _core
+from . import paper
+from .figures import Choice, Options, run_figures
+from .files import FoundRuns, RunFiles, find_runs
+from .model import STYLES, Figure
+from .page import Contents, PaperPart, SeriesPart, page
+from .series import SeriesStudy, group_table, series_figure, series_table, study
+from .survey import Rows, Survey, survey
+from .tables import (
+    all_notes,
+    differences_table,
+    environment_table,
+    events_table,
+    metrics_table,
+    timing_table,
+)
+from .text import clean
+from .timing import timing_figure
+
+
+@dataclass
+class Request:
+    runs: Sequence[Any]  # paths of run folders, CSV files, series folders
+    labels: list[str] = field(default_factory=list)
+    title: str = ''
+    choice: Choice = field(default_factory=Choice)
+    paper: bool = False
+
+
+@dataclass
+class Report:
+    runs: list[RunFiles]
+    surveys: list[Survey]
+    studies: list[SeriesStudy]
+    figures: list[Figure]  # all of them, in the order of the page
+    notes: list[str]
+    contents: Contents
+
+    def html(self) -> str:
+        return page(self.contents)
+
+
+def _title(request: Request, found: FoundRuns) -> str:
+    runs = found.runs
+    if request.title:
+        return clean(request.title)
+    if request.paper:
+        return 'The paper’s comparison: figures 5 to 10'
+    if found.series:
+        return f'Series {found.series[0].name}'
+    if len(runs) == 1:
+        return f'Run {runs[0].label}'
+    if len(runs) == 2:
+        return f'Runs {runs[0].label} and {runs[1].label}'
+    return f'{len(runs)} runs, {runs[0].called} to {runs[-1].called}'
+
+
+def _lead(runs: list[RunFiles]) -> str:
+    names = list(dict.fromkeys(name for run in runs if (name := run.text('experiment'))))
+    lead = f'{len(runs)} run{"" if len(runs) == 1 else "s"}'
+    return f'{lead}, experiment{"" if len(names) == 1 else "s"} {", ".join(names)}' if names else lead
+
+
+def _groups(studies: list[SeriesStudy], runs: int, options: Options) -> None:
+    """Gives runs of one series a style for each varied value, if the palette has enough colours."""
+    if len(studies) != 1 or len(studies[0].groups) > STYLES or sum(len(g.runs) for g in studies[0].groups) != runs:
+        return
+    options.groups = [0] * runs
+    for number, group in enumerate(studies[0].groups):
+        options.group_labels.append(group.label)
+        for run in group.runs:
+            options.groups[run] = number
+
+
+def make(request: Request, progress: Callable[[int, int], None] = lambda done, total: None) -> Report:
+    """Reads the runs and makes the report. Raises InputError for what cannot be used."""
+    found = find_runs(request.runs, request.labels)
+    runs = found.runs
+    if request.paper:
+        paper.order_for_paper(runs, found.notes)
+    studies = [study(series, runs) for series in found.series]
+    options = Options(request.choice, request.paper)
+    _groups(studies, len(runs), options)
+    done = 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        progress(done, len(runs))
+
+    surveys, figures = run_figures(runs, options, lambda run: Rows(run.csv), survey, step)
+    series = [SeriesPart(found_study.name, series_figure(number, found_study, runs, surveys),
+                         group_table(found_study, runs, surveys), series_table(found_study, runs, surveys), False)
+              for number, found_study in enumerate(studies, 1)]
+    timing = timing_figure(runs)
+    notes = all_notes(runs, surveys, found.notes)
+    metrics, shared = metrics_table(runs, surveys)
+    events, left_out = events_table(runs, surveys)
+    contents = Contents(_title(request, found), _core.version, paper.lead(runs) if request.paper else _lead(runs), len(runs),
+                        metrics, shared, differences_table(runs), timing_table(runs), events, left_out,
+                        environment_table(runs), notes, figures, timing, series)
+    if request.paper:
+        pairs = paper.pairs_of(runs, surveys)
+        contents.paper = PaperPart(paper.claims(pairs), paper.statements(pairs))
+    every = [part.figure for part in series] + figures + ([timing] if timing is not None else [])
+    return Report(runs, surveys, studies, every, notes, contents)

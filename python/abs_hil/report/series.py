@@ -1,0 +1,145 @@
+"""Series of runs: groups of equal values of what was varied, their means, and the figure over them."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..core import _core
+from .files import RunFiles, SeriesFiles, differing_keys
+from .model import Curve, Figure, Label, Panel, Style
+from .survey import METRICS, Metric, Survey, value_of
+from .tables import Table
+from .text import DASH, clean, shown
+
+MOST_KEYS_IN_LABEL = 3
+LABEL_CHARACTERS = 36
+MOST_TICS = 12
+SHOWN = {'stop_time_s': 'stop time / s', 'stop_distance_m': 'distance / m', 'slip_rms': 'slip RMS error',
+         'torque_total_variation_Nm': 'torque var. / (N m)'}
+
+
+@dataclass
+class Group:
+    """Runs of a series that share the values of the varied keys."""
+    label: str
+    runs: list[int]
+    value: float | None  # of the first varied key, if it is a number
+
+
+@dataclass
+class SeriesStudy:
+    name: str
+    keys: list[str]  # varied keys, except the seed
+    groups: list[Group] = field(default_factory=list)
+
+    @property
+    def by_value(self) -> bool:
+        """True if the groups stand at their values on the x axis, false if at 1, 2, 3, ..."""
+        return len(self.keys) == 1 and len(self.groups) > 1 and all(group.value is not None for group in self.groups)
+
+    @property
+    def places(self) -> list[float]:
+        return [group.value if self.by_value and group.value is not None else float(number)
+                for number, group in enumerate(self.groups, 1)]
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def study(series: SeriesFiles, runs: list[RunFiles]) -> SeriesStudy:
+    found = SeriesStudy(series.name, [key for key in differing_keys([runs[n] for n in series.runs]) if key != 'run.seed'])
+    known: dict[tuple[str, ...], Group] = {}
+    for number in series.runs:
+        values = tuple(runs[number].config.get(key, DASH) for key in found.keys)
+        if values not in known:
+            parts = [f'{key.rpartition(".")[2]} = {value}' for key, value in zip(found.keys, values)][:MOST_KEYS_IN_LABEL]
+            label = ', '.join(parts + (['…'] if len(found.keys) > MOST_KEYS_IN_LABEL else []))
+            known[values] = Group(clean(label, LABEL_CHARACTERS) if label else 'all runs', [],
+                                  _number(values[0]) if values else None)
+        known[values].runs.append(number)
+    found.groups = list(known.values())
+    if all(group.value is not None for group in found.groups):
+        found.groups.sort(key=lambda group: group.value or 0.0)
+    return found
+
+
+def _values(metric: Metric, group: Group, runs: list[RunFiles], surveys: list[Survey]) -> list[float]:
+    return [value_of(metric, runs[number], surveys[number]) for number in group.runs]
+
+
+def group_table(found: SeriesStudy, runs: list[RunFiles], surveys: list[Survey]) -> Table:
+    """One row a group: the means of the figures of merit that the runs have."""
+    columns = []
+    for metric in METRICS:
+        if metric.key == 'brake_start_s':
+            continue
+        cells = []
+        for group in found.groups:
+            n, mean, _, low, high = _core.estimate_mean(_values(metric, group, runs, surveys))
+            half = f' ± {shown(0.5 * (high - low), metric.decimals)}' if n > 1 else ''
+            cells.append(shown(mean, metric.decimals) + half if n else DASH)
+        if any(cell != DASH for cell in cells):
+            columns.append((metric.name, cells))
+    rows = [[group.label, str(len(group.runs)), *(cells[number] for _, cells in columns)]
+            for number, group in enumerate(found.groups)]
+    return Table('groups', ['group', 'runs', *(name for name, _ in columns)], rows)
+
+
+def series_table(found: SeriesStudy, runs: list[RunFiles], surveys: list[Survey]) -> Table:
+    """Mean, standard deviation and 95 % confidence interval of each figure of merit by group."""
+    rows = []
+    for metric in METRICS:
+        if metric.key == 'brake_start_s':
+            continue
+        for group in found.groups:
+            n, mean, deviation, low, high = _core.estimate_mean(_values(metric, group, runs, surveys))
+            if n == 0:
+                continue
+            digits = metric.decimals + 1
+            rows.append([metric.name, group.label, str(n), shown(mean, digits), shown(deviation, digits),
+                         DASH if n < 2 else f'{shown(low, digits)} to {shown(high, digits)}'])
+    return Table('series', ['figure', ', '.join(found.keys) or 'only the seed varies', 'runs', 'mean', 'standard deviation',
+                            '95 % interval of the mean'], rows)
+
+
+def series_figure(number: int, found: SeriesStudy, runs: list[RunFiles], surveys: list[Survey]) -> Figure:
+    places = found.places
+    room = 0.06 * (max(places) - min(places)) if max(places) > min(places) else 0.5
+    x_range = (min(places) - room, max(places) + room)
+    beside = 0.012 * (x_range[1] - x_range[0])
+    panels = []
+    for key, label in SHOWN.items():
+        metric = next(metric for metric in METRICS if metric.key == key)
+        every: list[tuple[float, float]] = []
+        means: list[tuple[float, float, float, float]] = []
+        for place, group in zip(places, found.groups):
+            values = _values(metric, group, runs, surveys)
+            every += [(place + beside, value) for value in values if math.isfinite(value)]
+            n, mean, _, low, high = _core.estimate_mean(values)
+            if n > 1:
+                means.append((place, mean, low, high))
+        if not every:
+            continue
+        panel = Panel(Label.plain(label), height_px=130.0)
+        if means:
+            panel.curves.append(Curve(0, f'mean of {key}', Style('#000000', (), 1.2), np.array([m[0] for m in means]),
+                                      np.array([m[1] for m in means]), 'intervals', legend='mean, 95 % interval',
+                                      group='means', bounds=[(m[2], m[3]) for m in means]))
+        panel.curves.append(Curve(0, key, Style('#0072B2', (), 1.0), np.array([x for x, _ in every]),
+                                  np.array([y for _, y in every]), 'markers', 'open circle', 'runs', 'runs'))
+        if not found.by_value and len(found.groups) <= MOST_TICS:
+            panel.x_tics = [(place, str(n)) for n, place in enumerate(places, 1)]
+        panels.append(panel)
+    caption = ('Circles: runs, drawn a little to the right; dots with bars: mean of the runs with the same values and its 95 % '
+               'confidence interval.')
+    if not found.by_value:
+        groups = [f'{n}: {group.label}' for n, group in enumerate(found.groups[:MOST_TICS], 1)]
+        caption += f' Groups: {"; ".join(groups)}.'
+    return Figure(f'series{number}', 'Figures of merit over the varied keys',
+                  Label.plain(found.keys[0] if found.by_value else 'group'), panels, caption, x_range, f'series{number}')

@@ -1,0 +1,180 @@
+"""What a run's rows say as a whole: phases, braking, figures of merit, changes of the simulated rig."""
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..core import _core
+from ..run import COLUMNS, TEXTS, signals_of
+from .files import InputError, RunFiles
+from .text import significant
+
+#: car speed above which slip and its estimates are judged
+JUDGED_M_S = 3.0
+PAPER_R2_M = 0.099
+DEFAULT_END_SPEED_M_S = 0.3
+#: a run has a handful
+MOST_PHASES = 2000
+_METRIC_COLUMNS = ('time_s', 'omega1_rad_s', 'omega2_rad_s', 'omega1_est_rad_s', 'omega2_est_rad_s', 'slip', 'slip_est',
+                   'slip_ref', 'brake_torque_ref_Nm', 'theta_N', 'theta_est_N', 'distance_m')
+_PROFILES = {'plant.friction_profile': 'friction', 'plant.brake_torque_profile': 'brake torque',
+             'plant.motor_torque_profile': 'motor torque', 'plant.upper_bearing_profile': 'upper bearing',
+             'plant.lower_bearing_profile': 'lower bearing'}
+
+
+@dataclass
+class Metric:
+    """A figure of merit of a braking run (docs/telemetry.md)."""
+    key: str
+    name: str
+    decimals: int
+
+
+METRICS = (
+    Metric('brake_start_s', 'braking starts at / s', 3), Metric('stop_time_s', 'stop time / s', 3),
+    Metric('stop_distance_m', 'stop distance / m', 2), Metric('slip_rms', 'slip RMS error', 4),
+    Metric('slip_settling_s', 'slip settled after / s', 3), Metric('slip_overshoot', 'slip overshoot', 4),
+    Metric('time_locked_s', 'time locked / s', 3),
+    Metric('torque_total_variation_Nm', 'variation of torque reference / (N m)', 1),
+    Metric('theta_final_N', 'estimate of θ at 3 m/s / N', 2), Metric('theta_error_final', 'relative error of θ at 3 m/s', 4),
+    Metric('theta_error_rms', 'relative RMS error of θ', 4), Metric('theta_settling_s', 'estimate of θ settled after / s', 3))
+
+
+@dataclass
+class Phase:
+    phase: str
+    from_s: float
+    to_s: float
+
+
+@dataclass
+class Change:
+    """A change of the simulated rig during the run."""
+    time_s: float
+    label: str
+
+
+class Rows:
+    """A run's rows: arrays by column, and phases as numbers into `phases`."""
+
+    def __init__(self, path: os.PathLike[str] | str) -> None:
+        try:
+            rows, self.phases, self.truncated = _core.read_csv(os.fspath(path))
+        except ValueError as error:
+            raise InputError(str(error)) from None
+        self.columns: dict[str, np.ndarray] = dict(rows)
+        self.names = [name for name, _ in rows]
+        self.phase = self.columns['phase'].astype(np.int32)
+
+    @property
+    def time_s(self) -> np.ndarray:
+        return self.columns['time_s']
+
+    @property
+    def braking(self) -> np.ndarray:
+        number = self.phases.index('brake') if 'brake' in self.phases else -1
+        return self.phase == number
+
+
+@dataclass
+class Survey:
+    rows: int
+    from_s: float
+    to_s: float
+    phases: list[Phase] = field(default_factory=list)
+    brake_from_s: float = math.nan
+    brake_to_s: float = math.nan
+    changes: list[Change] = field(default_factory=list)
+    truncated: bool = False
+    known: set[str] = field(default_factory=set)
+    signals: list[str] = field(default_factory=list)
+    metrics: dict[str, float] = field(default_factory=dict)
+    r2_m: float = PAPER_R2_M
+
+    @property
+    def brakes(self) -> bool:
+        return not math.isnan(self.brake_from_s)
+
+
+def survey(run: RunFiles, rows: Rows) -> Survey:
+    time = rows.time_s
+    found = Survey(len(time), float(time[0]), float(time[-1]), truncated=rows.truncated)
+    found.r2_m = run.config_number('plant.r2_m', run.config_number('model.r2_m', PAPER_R2_M))
+    braking = rows.braking
+    starts = np.flatnonzero(np.diff(rows.phase, prepend=-1))
+    for number, start in enumerate(starts[:MOST_PHASES]):
+        end = starts[number + 1] if number + 1 < len(starts) else len(time) - 1
+        found.phases.append(Phase(rows.phases[rows.phase[start]], float(time[start]), float(time[end])))
+    if len(starts) > MOST_PHASES:
+        found.phases[-1].to_s = float(time[-1])
+    if braking.any():
+        places = np.flatnonzero(braking)
+        found.brake_from_s = float(time[places[0]])
+        found.brake_to_s = float(time[min(places[-1] + 1, len(time) - 1)])
+    found.known = {name for name in rows.names if name in TEXTS or not np.isnan(rows.columns[name]).all()}
+    found.signals = [name for name in signals_of(rows.names) if name in found.known]
+    columns = {name: rows.columns[name] for name in _METRIC_COLUMNS}
+    found.metrics = _core.metrics_of({**columns, 'braking': braking.astype(np.float64)}, found.r2_m,
+                                     run.config_number('experiment.end_speed_m_s', DEFAULT_END_SPEED_M_S))
+    found.changes = _changes(run, rows, found.r2_m)
+    assert set(COLUMNS) & found.known
+    return found
+
+
+def _changes(run: RunFiles, rows: Rows, r2_m: float) -> list[Change]:
+    """When the parameters of the simulated rig changed according to the configuration; only what the run reached.
+
+    Unknown distances reach nothing. A profile that cannot be read, as of another version, is left out.
+    """
+    changes: list[Change] = []
+    time, braking = rows.time_s, rows.braking
+    rolled = None
+    for key, what in _PROFILES.items():
+        if not run.config.get(key):
+            continue
+        try:
+            axis, from_braking, pieces = _core.profile_of(run.config[key], key)
+        except ValueError:
+            continue
+        first = 0
+        if from_braking:
+            if not braking.any():
+                continue
+            first = int(np.argmax(braking))
+        if axis == 'distance' and rolled is None:
+            speed = r2_m * rows.columns['omega2_rad_s']
+            rolled = np.concatenate(([0.0], np.cumsum(0.5 * np.diff(time) * (speed[1:] + speed[:-1]))))
+        along = time if axis == 'time' else rolled
+        assert along is not None
+        origin = along[first] if from_braking else 0.0
+        for begin, value, slope in pieces[1:]:
+            with np.errstate(invalid='ignore'):
+                reached = np.flatnonzero(along[first:] - origin >= begin)
+            if not len(reached):
+                break
+            at = origin + begin if axis == 'time' else time[first + reached[0]]
+            changes.append(Change(float(at), f'{what} × {value:.3g}' if slope == 0.0 else f'{what} drifts'))
+    return changes
+
+
+def value_of(metric: Metric, run: RunFiles, found: Survey) -> float:
+    """The summary's value, else the value computed from the rows."""
+    said = run.number(metric.key)
+    return said if math.isfinite(said) else found.metrics[metric.key]
+
+
+def contradictions(run: RunFiles, found: Survey) -> list[str]:
+    """Notes about figures that differ between summary and rows: then the files belong to different runs."""
+    tolerance = 1e-6  # rounding stays below it; a missing row exceeds it
+    notes = []
+    for metric in METRICS:
+        said, computed = run.number(metric.key), found.metrics[metric.key]
+        if not (math.isfinite(said) and math.isfinite(computed)):
+            continue
+        if abs(said - computed) > tolerance * max(1.0, abs(said)):
+            notes.append(f'{metric.key}: the summary says {significant(said, 6)} but the CSV gives '
+                         f'{significant(computed, 6)}; rows are missing, or the files belong to different runs')
+    return notes

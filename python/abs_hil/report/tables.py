@@ -1,0 +1,158 @@
+"""The tables of a report. Cells are plain text."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from .files import Event, RunFiles, differing_keys
+from .survey import METRICS, Survey, contradictions, value_of
+from .text import DASH, shown, significant
+
+if TYPE_CHECKING:
+    import pandas
+
+#: with more runs than this, runs become rows instead of columns
+MOST_COLUMNS = 5
+MOST_EVENTS = 200
+
+
+@dataclass
+class Table:
+    id: str
+    header: list[str]
+    rows: list[list[str]]
+    numbers: bool = True  # the first column names the row; all others are numbers, aligned to the right
+
+    def arranged(self, runs: int) -> Table:
+        """With many runs, rows and columns change places."""
+        if runs <= MOST_COLUMNS:
+            return self
+        lines = [list(line) for line in zip(*[self.header, *self.rows])]
+        return Table(self.id, lines[0], lines[1:], self.numbers)
+
+    def __bool__(self) -> bool:
+        return bool(self.rows)
+
+
+def _change(first: float, second: float) -> str:
+    """Change from the first to the second run, in per cent; a large change as a factor."""
+    large = 3.0
+    if not (math.isfinite(first) and math.isfinite(second)) or first == 0.0:
+        return DASH
+    if second / first >= large:
+        return f'× {significant(second / first, 3)}'
+    return f'{"+" if second > first else ""}{shown(100.0 * (second / first - 1.0), 1)} %'
+
+
+def _model_note(run: RunFiles) -> str:
+    """Where the controllers' model differs from the simulated plant."""
+    notes = []
+    for key, value in sorted(run.config.items()):
+        name = key.removeprefix('model.')
+        plant = run.config.get(f'plant.{name}')
+        if name != key and plant is not None and plant != value:
+            notes.append(f'{name} {value} (plant {plant})')
+    return ', '.join(notes)
+
+
+def metrics_table(runs: list[RunFiles], surveys: list[Survey]) -> tuple[Table, str]:
+    """The figures of merit, and what all of many runs share as one sentence."""
+    pair = len(runs) == 2
+    table = Table('metrics', ['', *(run.label for run in runs), *(['second relative to first'] if pair else [])], [])
+    shared = []
+
+    def add(name: str, cells: list[str], last: str = '') -> None:
+        table.rows.append([name, *cells, *([last] if pair else [])])
+
+    for key in ('result', 'reason', 'experiment', 'controller', 'plant', 'backend'):
+        cells = [run.text(key) or DASH for run in runs]
+        if all(cell == DASH for cell in cells):
+            continue
+        if len(runs) > MOST_COLUMNS and len(set(cells)) == 1:
+            shared.append(f'{key}: {cells[0]}')
+        else:
+            add(key, cells)
+    models = [_model_note(run) for run in runs]
+    if any(models):
+        add('model differs from plant', [model or DASH for model in models])
+    add('speeds and slip', ['truth' if 'omega2_rad_s' in found.known else 'estimates' for found in surveys])
+    for metric in METRICS:
+        values = [value_of(metric, run, found) for run, found in zip(runs, surveys)]
+        if not any(math.isfinite(value) for value in values):
+            continue
+        comparable = pair and metric.key not in ('brake_start_s', 'theta_error_final')
+        add(metric.name, [shown(value, metric.decimals) for value in values],
+            _change(values[0], values[1]) if comparable else '')
+    add('rows in the CSV', [str(found.rows) for found in surveys])
+    return table.arranged(len(runs)), f'All runs: {"; ".join(shared)}.' if shared else ''
+
+
+def merits(runs: list[RunFiles], surveys: list[Survey]) -> pandas.DataFrame:
+    """The figures of merit with full precision, one row a run."""
+    import pandas
+    rows: list[dict[str, Any]] = []
+    for run, found in zip(runs, surveys):
+        rows.append({'run': run.called, **{key: run.text(key) for key in ('controller', 'plant', 'experiment', 'result')},
+                     **{metric.key: value_of(metric, run, found) for metric in METRICS}})
+    return pandas.DataFrame(rows)
+
+
+def timing_table(runs: list[RunFiles]) -> Table:
+    timed = [run for run in runs if math.isfinite(run.number('cycle_time_us.p50'))]
+    table = Table('timing', ['µs', *(run.label for run in timed)], [])
+    if not timed:
+        return table
+    for key, part in (('wakeup_latency_us', 'wake-up latency'), ('read_us', 'read'), ('control_us', 'control'),
+                      ('write_us', 'write'), ('cycle_time_us', 'whole cycle')):
+        for quantile, name in (('p50', 'median'), ('p99', '99 %'), ('p99_9', '99.9 %'), ('max', 'greatest')):
+            table.rows.append([f'{part}, {name}', *(shown(run.number(f'{key}.{quantile}'), 0) for run in timed)])
+    for name, key in (('cycles', 'cycles'), ('late cycles', 'overruns'), ('late at start-up', 'overruns_startup'),
+                      ('longest run of late cycles', 'overruns_longest_run'), ('ticks missed', 'ticks_missed'),
+                      ('records lost', 'telemetry_drops')):
+        table.rows.append([name, *(shown(run.number(key), 0) for run in timed)])
+    table.rows.append(['verdict on the wheels overdue, % of the time',
+                       *(shown(100.0 * run.number('checks_unjudged'), 1) for run in timed)])
+    table.rows.append(['real time obtained', *('yes' if run.summary.get('realtime') is True else 'no' for run in timed)])
+    return table.arranged(len(timed))
+
+
+def differences_table(runs: list[RunFiles]) -> Table:
+    return Table('differences', ['key', *(run.label for run in runs)],
+                 [[key, *(run.config.get(key, DASH) for run in runs)] for key in differing_keys(runs)],
+                 False).arranged(len(runs))
+
+
+def environment_table(runs: list[RunFiles]) -> Table:
+    keys = sorted({key for run in runs for key in run.environment})
+    return Table('environment', ['', *(run.label for run in runs)],
+                 [[key, *(run.environment.get(key, DASH) for run in runs)] for key in keys], False).arranged(len(runs))
+
+
+def _events_of(run: RunFiles, found: Survey) -> list[Event]:
+    """The events; changes of phase for a run folder without them."""
+    if run.events:
+        return run.events
+    events = [Event(p.from_s, 'fault' if p.phase == 'fault' else 'phase', p.phase) for p in found.phases]
+    if events and events[-1].event == 'fault':
+        events[-1].reason = run.text('reason')
+    return events
+
+
+def events_table(runs: list[RunFiles], surveys: list[Survey]) -> tuple[Table, int]:
+    """The events of all runs, and how many more there are."""
+    rows = [[shown(event.time_s, 3), run.called, event.event, event.phase, event.reason, event.value]
+            for run, found in zip(runs, surveys) for event in _events_of(run, found)]
+    return (Table('events', ['time / s', 'run', 'event', 'phase', 'reason', 'value'], rows[:MOST_EVENTS], False),
+            max(0, len(rows) - MOST_EVENTS))
+
+
+def all_notes(runs: list[RunFiles], surveys: list[Survey], general: list[str]) -> list[str]:
+    """The general notes, then notes about missing or unusual data of each run."""
+    notes = list(general)
+    for run, found in zip(runs, surveys):
+        own = list(run.notes)
+        if found.truncated:
+            own.append('the last row of the CSV is incomplete, as after a crash, and is left out')
+        notes += [f'{run.called}: {note}' for note in own + contradictions(run, found)]
+    return notes

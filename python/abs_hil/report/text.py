@@ -1,0 +1,64 @@
+"""Texts of a report: text from files made fit to show, and numbers as people read them."""
+from __future__ import annotations
+
+import math
+
+from ..core import _core
+
+MINUS = '\u2212'
+DASH = '–'
+
+
+def clean(text: object, most: int = 200) -> str:
+    """Text from a file or a file's name, fit to show: no control characters, at most `most` characters."""
+    try:
+        data = str(text).encode('utf-8', 'surrogateescape')
+    except UnicodeEncodeError:
+        data = str(text).encode('utf-8', 'replace')
+    return _core.clean_text(data, most)
+
+
+def short_names(names: list[str], most: int) -> list[str]:
+    """Names cut to `most` characters; names that would then look alike lose their common beginning instead."""
+    shorts = [clean(name, most) for name in names]
+    alike: dict[str, list[int]] = {}
+    for number, short in enumerate(shorts):
+        alike.setdefault(short, []).append(number)
+    for group in alike.values():
+        if len(group) == 1:
+            continue
+        begin = min(_common(names[group[0]], names[number]) for number in group)
+        for number in group:
+            shorts[number] = '…' + clean(names[number][begin:], most - 1)
+    return shorts
+
+
+def _common(a: str, b: str) -> int:
+    left = 2
+    n = 0
+    while n + left < min(len(a), len(b)) and a[n] == b[n]:
+        n += 1
+    return n
+
+
+def shown(value: float | None, decimals: int) -> str:
+    """A number with fixed decimals and a true minus sign; a dash for NaN and infinity."""
+    if value is None or not math.isfinite(value):
+        return DASH
+    text = f'{value:.{decimals}f}'
+    if text.strip('-0.') == '':
+        text = text.lstrip('-')
+    return text.replace('-', MINUS)
+
+
+def significant(value: float, digits: int) -> str:
+    return f'{value:.{digits}g}'.replace('-', MINUS) if math.isfinite(value) else DASH
+
+
+def number_text(value: object) -> str:
+    """A configuration value: 23.0 of the summary and 23 of config.toml become the same text."""
+    if isinstance(value, bool):
+        return 'true' if value else 'false'
+    if isinstance(value, float):
+        return repr(int(value)) if value.is_integer() and abs(value) < 1e16 else repr(value)
+    return clean(value)

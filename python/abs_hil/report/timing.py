@@ -1,0 +1,76 @@
+"""Histograms of the cycle's timing."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .files import PARTS, RunFiles
+from .model import STYLES, Curve, Figure, Label, Panel, run_style
+
+BINS_A_DECADE = 10.0
+
+
+def _edges(last_us: int) -> np.ndarray:
+    """Lower edges, in whole us, of bins of about equal width on a logarithmic axis: 0, 1, 2, ..."""
+    edges, exponent = [0, 1], 0.0
+    while edges[-1] <= last_us:
+        edge = round(10.0 ** exponent)
+        if edge > edges[-1]:
+            edges.append(edge)
+        exponent += 1.0 / BINS_A_DECADE
+    return np.array(edges)
+
+
+def outline(counts: np.ndarray, total: float, floor: float) -> tuple[np.ndarray, np.ndarray]:
+    """Share of the cycles by duration as the outline of a bar chart; no outline over empty bins."""
+    points: list[tuple[float, float]] = []
+    edges = _edges(len(counts))
+    for first, last in zip(edges, edges[1:]):
+        share = float(counts[first:last].sum()) / total
+        left, right = (0.5 if first == 0 else float(first)), float(last)
+        is_open = bool(points) and not math.isnan(points[-1][1])
+        if share <= 0.0:
+            if is_open:
+                points += [(left, floor), (left, math.nan)]
+            continue
+        if not is_open:
+            points.append((left, floor))
+        points += [(left, share), (right, share)]
+    if points and not math.isnan(points[-1][1]):
+        points.append((points[-1][0], floor))
+    if points and math.isnan(points[-1][1]):
+        points.pop()
+    return np.array([x for x, _ in points]), np.array([y for _, y in points])
+
+
+def timing_figure(runs: list[RunFiles]) -> Figure | None:
+    """None if no run has a histogram."""
+    timed = [number for number, run in enumerate(runs) if run.histogram is not None][:STYLES]
+    if not timed:
+        return None
+    histograms = {number: runs[number].histogram for number in timed}
+    columns = [counts for histogram in histograms.values() if histogram for counts in histogram.counts]
+    greatest = max([1.0, *(float(counts.sum()) for counts in columns)])
+    last_us = max([10, *(len(counts) for counts in columns)])
+    floor = 10.0 ** math.floor(math.log10(0.9 / greatest))
+    panels = []
+    overflows = 0
+    for part, name in enumerate(PARTS):
+        panel = Panel(Label.plain('share'), y_range=(floor, 1.0), height_px=105.0, log=True)
+        for number, histogram in histograms.items():
+            assert histogram is not None
+            overflows += histogram.overflows[part]
+            total = float(histogram.counts[part].sum())
+            if total > 0.0:
+                x, y = outline(histogram.counts[part], total, floor)
+                panel.curves.append(Curve(number, name, run_style(number), x, y, legend=runs[number].label,
+                                          group=f'run {number}'))
+        panels.append(panel)
+    caption = ('Share of the cycles by duration: (a) lateness of the wake-up, (b) reading the board, (c) control, (d) writing, '
+               '(e) the whole cycle. Bins are about a tenth of a decade wide and hold whole microseconds; the first bin holds '
+               'all durations below 1 µs. The axis ends below one cycle.')
+    if overflows > 0:
+        caption += f" {overflows} durations beyond the histograms' range are not shown."
+    return Figure('timing', 'Timing of the control cycle', Label.plain('duration / µs'), panels, caption,
+                  (0.5, 10.0 ** math.ceil(math.log10(last_us))), 'timing')

@@ -1,0 +1,236 @@
+"""A run's rows, summary and signals, from the simulator or from files."""
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .core import _core
+from .messages import PHASES, QUANTITIES
+from .options import PathLike
+
+if TYPE_CHECKING:
+    import pandas
+
+#: columns of every run's CSV, in order
+COLUMNS = tuple(name for name, row in QUANTITIES.items() if row['csv_column'] is not None)
+#: columns that hold texts
+TEXTS = ('phase', 'phase_name')
+
+
+class Run:
+    """One run.
+
+    columns: name -> NumPy array of shape (cycles,), float64; `phase` and `phase_name` are arrays of names, `motor_enable` of 0 and 1.
+             Names, units and meanings are those of the CSV (abs_hil.QUANTITIES); the controller's own signals follow.
+    summary: the content of summary.json, a dictionary; figures that the run has no value for are None. Empty if the run
+             has no summary.
+    signals: names of the controller's own signals.
+    notes:   what is missing or damaged, as sentences.
+    folder:  where the run was read from; None for a simulated one.
+    """
+
+    def __init__(self, columns: Mapping[str, np.ndarray], summary: Mapping[str, Any] | None = None,
+                 signals: tuple[str, ...] = (), *, notes: list[str] | None = None, config_toml: str = '',
+                 folder: pathlib.Path | None = None, name: str = '') -> None:
+        self.columns = dict(columns)
+        self.summary = dict(summary or {})
+        self.signals = tuple(signals)
+        self.notes = list(notes or [])
+        self.config_toml = config_toml
+        self.folder = folder
+        self.name = name
+
+    @property
+    def data(self) -> pandas.DataFrame:
+        """The columns as a pandas DataFrame of shape (cycles, columns). `phase` and `phase_name` are categorical."""
+        import pandas
+        frame: dict[str, Any] = {name: pandas.Categorical(values) if name in TEXTS else values
+                 for name, values in self.columns.items()}
+        return pandas.DataFrame(frame)
+
+    @property
+    def config(self) -> dict[str, Any]:
+        """The effective configuration by dotted key: {"plant.theta_N": 23.0, ...}; empty if unknown."""
+        return flattened(self.summary.get('config') or {})
+
+    def __getitem__(self, column: str) -> np.ndarray:
+        return self.columns[column]
+
+    def __len__(self) -> int:
+        return len(self.columns['time_s'])
+
+    def during(self, phase: str) -> dict[str, np.ndarray]:
+        """The columns in one phase, as in run.during("brake")."""
+        chosen = self.columns['phase'] == phase
+        return {name: values[chosen] for name, values in self.columns.items()}
+
+    def to_csv(self, path: PathLike) -> None:
+        """Writes the rows as the program does, bit for bit."""
+        with open(path, 'wb') as file:
+            file.write(csv_bytes(self.columns))
+
+    def __repr__(self) -> str:
+        controller = self.summary.get('controller', 'unknown controller')
+        result = self.summary.get('result', 'no summary')
+        stop = self.summary.get('stop_time_s')
+        stopped = f', stopped in {stop:.3f} s' if stop is not None else ''
+        return f'<abs_hil.Run {self.name or controller}: {result}, {len(self)} cycles{stopped}>'
+
+
+class Series:
+    """The runs of a series' folder: a sequence of Run, and `index`, the content of series.json."""
+
+    def __init__(self, runs: list[Run], index: Mapping[str, Any], notes: list[str]) -> None:
+        self.runs = runs
+        self.index = dict(index)
+        self.notes = notes
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    def __iter__(self) -> Iterator[Run]:
+        return iter(self.runs)
+
+    def __getitem__(self, number: int) -> Run:
+        return self.runs[number]
+
+    @property
+    def data(self) -> pandas.DataFrame:
+        """One row a run: its name, the figures of the summary and the configuration values that differ."""
+        import pandas
+        configs = [run.config for run in self.runs]
+        keys = sorted({key for config in configs for key in config})
+        varied = [key for key in keys if len({str(config.get(key)) for config in configs}) > 1]
+        rows = []
+        for run, config in zip(self.runs, configs):
+            row: dict[str, Any] = {'run': run.name}
+            row.update((key, config.get(key)) for key in varied)
+            row.update((key, value) for key, value in run.summary.items()
+                       if value is None or isinstance(value, (int, float, str)))
+            rows.append(row)
+        return pandas.DataFrame(rows)
+
+
+def csv_bytes(columns: Mapping[str, np.ndarray], header: bool = True) -> bytes:
+    """The columns as CSV: a number is the shortest text that reads back bit-exactly, an unknown one is NaN."""
+    kept = [values.tolist() if values.dtype == object else np.ascontiguousarray(values, dtype=np.float64)
+            for values in columns.values()]
+    return (','.join(_quoted(name) for name in columns) + '\n').encode() * header + _core.csv_rows(kept)
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\r\n') else text
+
+
+def phase_names(numbers: np.ndarray, names: tuple[str, ...] = PHASES) -> np.ndarray:
+    """Names of phases from their numbers."""
+    return np.array(names, dtype=object)[numbers.astype(np.intp)]
+
+
+def flattened(values: Mapping[str, Any], prefix: str = '') -> dict[str, Any]:
+    """Nested tables by dotted key."""
+    flat: dict[str, Any] = {}
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            flat.update(flattened(value, f'{prefix}{key}.'))
+        else:
+            flat[f'{prefix}{key}'] = value
+    return flat
+
+
+def read_csv(path: PathLike) -> tuple[dict[str, np.ndarray], tuple[str, ...], list[str]]:
+    """(columns, signals, notes) of a run's CSV. ValueError, with file and line, for a file that is no run's."""
+    rows, names, truncated = _core.read_csv(os.fspath(path))
+    columns = {name: phase_names(values, tuple(names)) if name in TEXTS else values for name, values in rows}
+    notes = ['the last row of the CSV is incomplete, as after a crash, and is left out'] if truncated else []
+    return columns, signals_of([name for name, _ in rows]), notes
+
+
+def signals_of(columns: list[str]) -> tuple[str, ...]:
+    """The controller's own signals: they follow the fixed columns and the phase's own name."""
+    signals = []
+    for name in columns[len(COLUMNS) + ('phase_name' in columns):]:
+        if not _core.is_signal_name(name):
+            break
+        signals.append(name)
+    return tuple(signals)
+
+
+def load(path: PathLike) -> Run:
+    """Loads a run folder, a run's CSV file or an event log (.lcmlog), whole or cut off; `Run.notes` says what is missing.
+
+    Raises ValueError for anything else, with the file, the place and the reason.
+    """
+    place = pathlib.Path(path)
+    if place.suffix == '.lcmlog':
+        return _load_log(place)
+    if not place.is_dir():
+        columns, signals, notes = read_csv(place)
+        return Run(columns, {}, signals, notes=notes, folder=place.parent, name=place.stem)
+    if not (place / 'run.csv').exists() and (place / 'run.lcmlog').exists():
+        run = _load_log(place / 'run.lcmlog')
+        run.notes.append('no run.csv: the rows are those of run.lcmlog')
+        run.name = place.resolve().name
+        return run
+    if not (place / 'run.csv').exists():
+        what = 'a series; load it with abs_hil.load_series' if (place / 'series.json').exists() else 'no run folder'
+        raise ValueError(f'"{place}" is {what} (it has no run.csv)')
+    columns, signals, notes = read_csv(place / 'run.csv')
+    summary: dict[str, Any] = {}
+    try:
+        summary = json.loads((place / 'summary.json').read_text(encoding='utf-8'))
+        if not isinstance(summary, dict):
+            raise ValueError('the file must contain a JSON object')
+    except OSError:
+        notes.append('no summary.json: names, figures and configuration are unknown')
+    except ValueError as error:
+        notes.append(f'summary.json is not used: {error}')
+        summary = {}
+    return Run(columns, summary, signals, notes=notes, folder=place, name=place.resolve().name)
+
+
+def load_series(folder: PathLike) -> Series:
+    """Loads the complete runs of a series' folder, in order; `Series.notes` names those that are left out."""
+    place = pathlib.Path(folder)
+    folders = sorted(path for path in place.glob('run-*') if path.is_dir()) if place.is_dir() else []
+    if not folders:
+        raise ValueError(f'"{place}" is no series folder (it has no run-0001/)')
+    runs, notes = [], []
+    for path in folders:
+        if (path / 'run.csv').exists() and (path / 'summary.json').exists():
+            runs.append(load(path))
+        else:
+            notes.append(f'{path} is not complete and is left out')
+    if not runs:
+        raise ValueError(f'"{place}": this series folder has no complete run (as run-0001/ with run.csv and summary.json)')
+    index: dict[str, Any] = {}
+    try:
+        index = json.loads((place / 'series.json').read_text(encoding='utf-8'))
+    except (OSError, ValueError):
+        notes.append('no readable series.json')
+    return Series(runs, index, notes)
+
+
+def _load_log(path: pathlib.Path) -> Run:
+    columns, signals, rows, experiment, unreadable, damage = _core.read_log(str(path))
+    notes = [f'the rest of the log is not used: {damage}'] if damage else []
+    if unreadable:
+        notes.append(f'{unreadable} messages of the log cannot be read and are left out')
+    if rows == 0:
+        raise ValueError(damage or f'"{path}" holds no telemetry of abs_hil')
+    columns['phase'] = phase_names(np.clip(columns['phase'], 0, len(PHASES) - 1))
+    summary: dict[str, Any] = {}
+    if experiment:
+        names = ('experiment', 'controller', 'plant', 'backend')
+        summary = {name: text.decode(errors='replace') for name, text in zip(names, experiment)}
+        try:
+            summary['config'] = json.loads(experiment[-1])
+        except ValueError:
+            notes.append('the configuration in the log is not valid JSON')
+    notes.append('an event log has no figures of merit')
+    return Run(columns, summary, tuple(signals), notes=notes, folder=path.parent, name=path.stem)

@@ -1,0 +1,194 @@
+"""Runs of the simulated rig in virtual time: one with all its rows, or many with their figures of merit."""
+from __future__ import annotations
+
+import itertools
+import json
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .core import _core
+from .options import PathLike, Value, options
+from .run import Run, phase_names
+
+if TYPE_CHECKING:
+    import pandas
+
+#: what `abs_hil compare` varies by default
+STANDARD_VARIATION = 'parameters=0.1,theta=0.1,phase'
+
+
+def simulate(controller: Any = 'adaptive', plant: PathLike = 'paper-table1', experiment: PathLike = 'paper',
+             seed: int = 1, set: Mapping[str, Value] | None = None, *, model: PathLike | None = None,
+             config: PathLike | None = None, inject: Sequence[str] = ()) -> Run:
+    """Runs an experiment on the simulated rig in virtual time, as `abs_hil --fast` with the same options does.
+
+    controller: a name (abs_hil.controllers()), or an object with `reset(input)` and `step(input)` (abs_hil.SlipInput).
+                `step` returns the wanted brake torque in N m, or an abs_hil.SlipOutput. An attribute `signals`, a
+                dictionary name -> meaning of at most 8 signals, adds columns. The object runs through the same cycle as
+                any law, the command gate included. An exception in it ends the run safely and is raised here.
+    plant, model, experiment: names or TOML files. config: a TOML file with any configuration values.
+    seed:       seed of everything random in the simulator, an integer >= 0.
+    set:        configuration values by dotted key, as --set: {"control.slip_ref": 0.1, "plant.theta_N": 30}.
+    inject:     faults as --inject takes them: ["brake@encoder_upper:stuck+0.2s"].
+
+    Returns a Run. Its columns equal those of the program's CSV bit for bit, each of shape (cycles,). A run that a fault
+    ends is no error: Run.summary["result"] is "fault". Raises ValueError, with the program's text, for options that
+    cannot be used.
+    """
+    # None: a default must not outrank a configuration file. The program has the same defaults.
+    given = options(controller=None if controller == 'adaptive' else controller,
+                    plant=None if plant == 'paper-table1' else plant,
+                    experiment=None if experiment == 'paper' else experiment, model=model, config=config,
+                    seed=None if seed == 1 else seed, set=set, inject=inject)
+    law = None if isinstance(controller, str) else controller
+    if law is not None and not (callable(getattr(law, 'reset', None)) and callable(getattr(law, 'step', None))):
+        raise ValueError(f'controller: {type(law).__name__} has no methods reset and step; give a controller\'s name or an '
+                         'object with both')
+    columns, signals, summary, config_toml = _core.simulate(given, law)
+    columns['phase'] = phase_names(columns['phase'])
+    columns['phase_name'] = np.array(columns['phase_name'], dtype=object)
+    return Run(columns, json.loads(summary), tuple(signals), config_toml=config_toml)
+
+
+class Study:
+    """Figures of merit of many runs: `Study[name]` is an array of shape (runs,).
+
+    The figures are those of a run's summary (stop_time_s, slip_rms, ...), NaN where a run has none. `fault` is the reason
+    of an early end, empty if there was none; `error` says why a run could not begin (only with keep_going). The arguments
+    that differ between the runs are columns too, a configuration value under its dotted key.
+    """
+
+    def __init__(self, columns: Mapping[str, np.ndarray]) -> None:
+        self.columns = dict(columns)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.columns[name]
+
+    def __len__(self) -> int:
+        return len(self.columns['fault'])
+
+    @property
+    def data(self) -> pandas.DataFrame:
+        """The columns as a pandas DataFrame, one row a run."""
+        import pandas
+        return pandas.DataFrame(self.columns)
+
+    def __repr__(self) -> str:
+        return f'<abs_hil.Study of {len(self)} runs>'
+
+
+def simulate_many(runs: Iterable[Mapping[str, Any]] | Mapping[str, Sequence[Any]], *, vary: str | None = None,
+                  repeat: int = 1, vary_seed: int = 1, threads: int = 0, progress: bool | Callable[[int, int], None] = False,
+                  keep_going: bool = False) -> Study:
+    """Simulates many runs in C++ threads, without Python's lock, and returns their figures of merit.
+
+    runs:      a list of arguments of `simulate`, as in [{"controller": "pi"}, {"set": {"plant.theta_N": 30}}]; or a grid:
+               {"controller": ["adaptive", "pi"], "plant.theta_N": [20, 23, 26]} means all combinations, in which a key
+               with a dot is a configuration value. A controller must be a name.
+    vary, repeat, vary_seed: each run is repeated on `repeat` varied plants, those of `abs_hil compare --vary --repeat
+               --seed`, in that order: all runs meet the same plants. By default nothing varies.
+    threads:   number of threads, without effect on the results; 0: one for each processor.
+    progress:  True for a progress bar on stderr, or a function that is called with (done, all).
+    keep_going: a run whose options cannot be used gets the reason in the column `error` instead of raising ValueError.
+
+    A run ends as soon as its figures are known; the hold to standstill is left out.
+    """
+    jobs = _grid(runs) if isinstance(runs, Mapping) else [dict(run) for run in runs]
+    if repeat < 1:
+        raise ValueError(f'repeat {repeat}: give a number of at least 1')
+    if not 0 <= threads <= 1024:
+        raise ValueError(f'threads {threads}: give a number in [0, 1024]')
+    given = []
+    for run in jobs:
+        if not isinstance(run.get('controller', ''), str):
+            raise ValueError('simulate_many: a controller written in Python cannot run in C++ threads; use simulate, or '
+                             'give the name of a controller')
+        given.append(options(**run))
+    drawn = vary is not None or repeat > 1
+    pairs = [(number, index if drawn else None) for number in range(len(jobs)) for index in range(repeat)]
+    if vary is None:
+        vary = STANDARD_VARIATION if repeat > 1 else 'none'
+    with _Progress(progress, len(pairs)) as report:
+        found = _core.simulate_many(given, pairs, vary, vary_seed, threads, report)
+    errors = found.pop('error')
+    if not keep_going:
+        for (number, _), error in zip(pairs, errors):
+            if error:
+                raise ValueError(f'run {number}: {error}' if len(jobs) > 1 else error)
+    columns: dict[str, np.ndarray] = {}
+    flat = [{**run, **run.get('set', {})} for run in jobs]
+    for name in sorted({name for run in flat for name in run if name != 'set'}):
+        values = [run.get(name) for run in flat]
+        if len(jobs) == 1 or any(value != values[0] for value in values):
+            columns[name] = np.repeat(np.array(values), repeat)
+    if repeat > 1:
+        columns['repetition'] = np.tile(np.arange(repeat), len(jobs))
+    columns.update(found, fault=np.array(found['fault'], dtype=object))
+    if keep_going:
+        columns['error'] = np.array(errors, dtype=object)
+    return Study(columns)
+
+
+def _grid(axes: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
+    for name, values in axes.items():
+        if isinstance(values, (str, bytes)) or not isinstance(values, Iterable):
+            raise ValueError(f'grid: {name}: give a list of values, not {values!r}')
+    jobs = []
+    for combination in itertools.product(*axes.values()):
+        job: dict[str, Any] = {'set': {}}
+        for name, value in zip(axes, combination):
+            if isinstance(value, np.generic):
+                value = value.item()
+            (job['set'] if '.' in name else job)[name] = value
+        jobs.append(job)
+    return jobs
+
+
+class _Progress:
+    """Calls the user's function, or shows a progress bar."""
+
+    def __init__(self, wanted: bool | Callable[[int, int], None], total: int) -> None:
+        self._wanted = wanted
+        self._total = total
+        self._bar: Any = None
+
+    def __enter__(self) -> Callable[[int], None] | None:
+        if callable(self._wanted):
+            tell = self._wanted
+            return lambda done: tell(done, self._total)
+        if not self._wanted:
+            return None
+        import tqdm
+        self._bar = tqdm.tqdm(total=self._total, unit=' runs', file=sys.stderr, leave=False)
+        return self._show
+
+    def _show(self, done: int) -> None:
+        # Threads report out of order.
+        self._bar.update(max(0, done - self._bar.n))
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+
+def controllers() -> dict[str, str]:
+    """Name -> description of every controller of the program."""
+    return dict(_core.controllers())
+
+
+def plants() -> dict[str, str]:
+    """Name -> description of every plant."""
+    return dict(_core.plants())
+
+
+def experiments() -> dict[str, str]:
+    """Name -> description of every experiment."""
+    return dict(_core.experiments())
+
+
+def keys(**arguments: Any) -> dict[str, dict[str, Any]]:
+    """Every configuration key: dotted name -> its unit, meaning, and the value that these arguments of `simulate` give."""
+    return {row.pop('name'): row for row in _core.keys(options(**arguments))}

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+#include <string>
+#include <vector>
+
+#include "program/command_line.hpp"
+
+namespace abs_hil::python {
+
+namespace py = pybind11;
+
+// Each adds its functions and classes to the module abs_hil._core.
+void add_controllers(py::module_& module);
+void add_episodes(py::module_& module);
+void add_files(py::module_& module);
+void add_network(py::module_& module);
+void add_plant(py::module_& module);
+void add_simulation(py::module_& module);
+void add_tables(py::module_& module);
+
+/// The options of a run from the arguments of abs_hil.simulate: text, or lists of text.
+[[nodiscard]] program::RunOptions run_options(const py::dict& arguments);
+
+/// A NumPy array that takes over the values.
+template <class Value>
+[[nodiscard]] py::object array_of(std::vector<Value> values);
+
+/// The name under which the registry of controllers has those that are written in Python.
+inline constexpr const char* python_controller = "python";
+
+/// While it lives, the registry makes controllers of this thread that call the object. Then `rethrow` raises what it
+/// raised.
+class PythonControllerScope {
+ public:
+  explicit PythonControllerScope(py::object controller);
+  PythonControllerScope(const PythonControllerScope&) = delete;
+  PythonControllerScope& operator=(const PythonControllerScope&) = delete;
+  ~PythonControllerScope();
+  void rethrow() const;
+  [[nodiscard]] bool failed() const noexcept;
+
+ private:
+  py::object controller_;
+};
+
+}  // namespace abs_hil::python

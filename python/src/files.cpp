@@ -1,0 +1,254 @@
+// Files of runs: rows of a CSV, messages of an event log, and figures of merit of rows.
+
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "abs_hil/experiment_t.hpp"
+#include "abs_hil/plant_sim/factor_profile.hpp"
+#include "abs_hil/rig/cycle_record.hpp"
+#include "abs_hil/rig/quantities.hpp"
+#include "abs_hil/rig/signals.hpp"
+#include "abs_hil/signals_t.hpp"
+#include "abs_hil/telemetry_t.hpp"
+#include "analysis/run_metrics.hpp"
+#include "analysis/statistics.hpp"
+#include "array.hpp"
+#include "bindings.hpp"
+#include "column_sink.hpp"
+#include "run_folder/clean_text.hpp"
+#include "run_folder/csv_reader.hpp"
+#include "run_folder/input_error.hpp"
+#include "telemetry/checked_decode.hpp"
+#include "telemetry/csv_text.hpp"
+#include "telemetry/event_log.hpp"
+#include "telemetry/message_codec.hpp"
+
+namespace abs_hil::python {
+
+namespace {
+
+using run_folder::InputError;
+
+/// Number of a phase's name among those that occurred.
+double number_of(std::string_view phase, std::vector<std::string>& names) {
+  const auto place = std::find(names.begin(), names.end(), phase) - names.begin();
+  if (place == static_cast<std::ptrdiff_t>(names.size())) names.emplace_back(phase);
+  return static_cast<double>(place);
+}
+
+/// (columns, names of the phases that `phase` and `phase_name` count, whether the last row is cut off)
+py::tuple read_csv(const std::string& path) {
+  std::vector<std::string> names;
+  std::vector<std::vector<double>> values;
+  std::vector<std::string> phases;
+  bool truncated = false;
+  {
+    const py::gil_scoped_release release;
+    run_folder::CsvReader csv(path);
+    names = csv.columns();
+    const std::size_t phase = *csv.find("phase");
+    const std::optional<std::size_t> own_name = csv.find(run_folder::phase_name_column);
+    values.resize(names.size());
+    while (csv.next()) {
+      for (std::size_t n = 0; n < names.size(); ++n) values[n].push_back(csv.values()[n]);
+      values[phase].back() = number_of(run_folder::clean_text(csv.phase()), phases);
+      if (own_name) values[*own_name].back() = number_of(run_folder::clean_text(csv.phase_name()), phases);
+    }
+    truncated = csv.truncated();
+    if (values.front().empty()) {
+      throw InputError(path, truncated ? 2 : 1,
+                       truncated ? "the only row is incomplete: the file holds no data of the run"
+                                 : "no rows after the header: the file holds no data of the run");
+    }
+  }
+  py::list columns;
+  for (std::size_t n = 0; n < names.size(); ++n)
+    columns.append(py::make_tuple(names[n], array_of(std::move(values[n]))));
+  return py::make_tuple(columns, phases, truncated);
+}
+
+/// Telemetry and signals of an event log.
+class LogColumns {
+ public:
+  void take(const telemetry::LogEvent& event) {
+    const bool telemetry = event.channel.ends_with("TELEMETRY");
+    if (!telemetry && !event.channel.ends_with("SIGNALS") && !event.channel.ends_with("EXPERIMENT")) return;
+    if (telemetry) {
+      telemetry_t message{};
+      if (!decode(event, message)) return;
+      cycles_.push_back(message.cycle);
+      columns_.consume(telemetry::to_record(message), message.distance_m);
+    } else if (event.channel.ends_with("SIGNALS")) {
+      signals_t message{};
+      // The message of a cycle follows its telemetry.
+      if (!decode(event, message) || cycles_.empty() || cycles_.back() != message.cycle) return;
+      if (names_.empty()) names_ = message.names;
+      columns_.put_signals(columns_.rows() - 1, telemetry::signals_of(message));
+    } else if (experiment_.empty()) {
+      experiment_t message{};
+      if (!decode(event, message)) return;
+      experiment_ = {message.experiment, message.controller, message.plant, message.backend, message.config_json};
+    }
+  }
+  py::tuple result(const std::string& damage) {
+    std::vector<std::string> names;
+    for (std::size_t begin = 0; begin < names_.size() && names.size() < rig::signal_max;) {
+      const std::size_t end = std::min(names_.find(',', begin), names_.size());
+      const std::string name = names_.substr(begin, end - begin);
+      if (!rig::is_signal_name(name)) break;
+      names.push_back(name);
+      begin = end + 1;
+    }
+    for (std::string& text : experiment_) {
+      if (&text != &experiment_.back()) text = run_folder::clean_text(text);
+    }
+    const std::size_t rows = columns_.rows();
+    // The configuration is JSON, as bytes: it may be damaged.
+    py::list experiment;
+    for (const std::string& text : experiment_) experiment.append(py::bytes(text));
+    return py::make_tuple(columns_.take({.phases = {}, .signals = names}), names, rows, experiment, unreadable_, damage);
+  }
+
+ private:
+  template <class Message>
+  bool decode(const telemetry::LogEvent& event, Message& message) {
+    const bool whole = telemetry::decode_checked(event.data, message).empty();
+    if (!whole) ++unreadable_;
+    return whole;
+  }
+
+  ColumnSink columns_;
+  std::vector<std::int64_t> cycles_;
+  std::string names_;
+  std::vector<std::string> experiment_;
+  std::size_t unreadable_{0};
+};
+
+/// (columns, signals, rows, [experiment, controller, plant, backend, configuration], number of unreadable messages,
+/// what is wrong with the rest of the file; empty: nothing)
+py::tuple read_log(const std::string& path) {
+  LogColumns columns;
+  std::string damage;
+  {
+    const py::gil_scoped_release release;
+    telemetry::EventLogReader log(path);
+    try {
+      while (const auto event = log.next()) columns.take(*event);
+    } catch (const telemetry::RecordingError& error) {
+      damage = error.what();
+    }
+  }
+  return columns.result(damage);
+}
+
+using Column = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+/// The figures of merit of rows, as a run's summary has them.
+/// @param columns  a column for each name below, of equal length; `braking` is 1 in phase brake
+py::dict metrics_of(const py::dict& columns, double r2_m, double end_speed_m_s) {
+  static constexpr std::array names{
+      "time_s",   "braking",  "omega1_rad_s",        "omega2_rad_s", "omega1_est_rad_s", "omega2_est_rad_s", "slip",
+      "slip_est", "slip_ref", "brake_torque_ref_Nm", "theta_N",      "theta_est_N",      "distance_m"};
+  std::vector<Column> arrays;
+  for (const char* name : names) arrays.push_back(py::cast<Column>(columns[name]));
+  const py::ssize_t rows = arrays.front().size();
+  for (const Column& array : arrays) {
+    if (array.ndim() != 1 || array.size() != rows)
+      throw std::invalid_argument("metrics_of: give columns of equal length");
+  }
+  std::array<const double*, names.size()> at{};
+  std::transform(arrays.begin(), arrays.end(), at.begin(), [](const Column& array) { return array.data(); });
+  analysis::RunMetrics metrics(r2_m, end_speed_m_s);
+  {
+    const py::gil_scoped_release release;
+    rig::CycleRecord r;
+    for (py::ssize_t n = 0; n < rows; ++n) {
+      r.time_s = at[0][n];
+      r.phase = at[1][n] != 0.0 ? rig::Phase::brake : rig::Phase::idle;
+      r.truth.speeds = {at[2][n], at[3][n]};
+      r.control.speeds_est = {at[4][n], at[5][n]};
+      r.truth.slip = at[6][n];
+      r.control.slip_est = at[7][n];
+      r.control.slip_ref = at[8][n];
+      r.control.brake_torque_ref_Nm = at[9][n];
+      r.truth.theta_N = at[10][n];
+      r.control.theta_est_N = at[11][n];
+      metrics.consume(r, at[12][n]);
+    }
+  }
+  const analysis::Metrics found = metrics.metrics();
+  py::dict result;
+  for (const auto& [name, field] : analysis::metric_fields) result[py::str(name.data(), name.size())] = found.*field;
+  return result;
+}
+
+/// Rows of CSV from columns: arrays of numbers, or lists of texts.
+py::bytes csv_rows(const py::list& columns) {
+  std::vector<Column> numbers(columns.size());
+  std::vector<std::vector<std::string>> texts(columns.size());
+  std::size_t rows = 0;
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    if (py::isinstance<py::list>(columns[c])) {
+      texts[c] = py::cast<std::vector<std::string>>(columns[c]);
+      rows = texts[c].size();
+    } else {
+      numbers[c] = py::cast<Column>(columns[c]);
+      rows = static_cast<std::size_t>(numbers[c].size());
+    }
+  }
+  std::string all;
+  for (std::size_t r = 0; r < rows; ++r) {
+    telemetry::CsvRow row;
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      if (texts[c].empty()) {
+        row({}, numbers[c].at(static_cast<py::ssize_t>(r)));
+      } else {
+        row.text(texts[c].at(r));
+      }
+    }
+    all += row.row();
+    all += '\n';
+  }
+  return all;
+}
+
+/// (axis, counted from braking, [(begin, value, slope)])
+py::tuple profile_of(const std::string& text, const std::string& key) {
+  const plant_sim::FactorProfile profile(text, key);
+  py::list pieces;
+  for (const auto& piece : profile.pieces()) pieces.append(py::make_tuple(piece.begin, piece.value, piece.slope));
+  return py::make_tuple(profile.axis() == plant_sim::FactorProfile::Axis::time ? "time" : "distance",
+                        profile.from_braking(), pieces);
+}
+
+}  // namespace
+
+void add_files(py::module_& module) {
+  module.def("read_csv", &read_csv, py::arg("path"));
+  module.def("read_log", &read_log, py::arg("path"));
+  module.def("metrics_of", &metrics_of, py::arg("columns"), py::arg("r2_m"), py::arg("end_speed_m_s"));
+  module.def("csv_rows", &csv_rows, py::arg("columns"));
+  module.def("profile_of", &profile_of, py::arg("text"), py::arg("key"));
+  module.def(
+      "clean_text",
+      [](const py::bytes& text, std::size_t most) {
+        return run_folder::clean_text(static_cast<std::string>(text), most);
+      },
+      py::arg("text"), py::arg("most_characters") = 200);
+  module.def("is_signal_name", [](const std::string& name) { return rig::is_signal_name(name); });
+  module.def(
+      "estimate_mean",
+      [](const std::vector<double>& values) {
+        const analysis::Estimate e = analysis::estimate_mean(values);
+        return py::make_tuple(e.n, e.mean, e.standard_deviation, e.low, e.high);
+      },
+      py::arg("values"));
+}
+
+}  // namespace abs_hil::python

@@ -1,0 +1,191 @@
+// Whole runs in virtual time: one with its records, or many with their figures of merit.
+
+#include "program/simulation.hpp"
+
+#include <pybind11/functional.h>
+#include <pybind11/stl.h>
+
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "analysis/run_summary.hpp"
+#include "array.hpp"
+#include "bindings.hpp"
+#include "column_sink.hpp"
+#include "config/config_error.hpp"
+#include "study/parallel.hpp"
+#include "study/simulated_run.hpp"
+#include "study/variation.hpp"
+
+namespace abs_hil::python {
+
+namespace {
+
+/// Ends a run if Ctrl-C was pressed, or if its controller in Python failed.
+class PythonPoll {
+ public:
+  explicit PythonPoll(const PythonControllerScope* scope) : scope_(scope) {}
+  rig::Reason operator()() {
+    const py::gil_scoped_acquire gil;
+    if (!interrupted_ && PyErr_CheckSignals() != 0) {
+      error_.emplace();
+      interrupted_ = true;
+    }
+    if (interrupted_ || (scope_ != nullptr && scope_->failed())) return rig::Reason::interrupt_signal;
+    return rig::Reason::none;
+  }
+  void rethrow() {
+    if (error_) throw std::move(*error_);
+  }
+
+ private:
+  const PythonControllerScope* scope_;
+  std::optional<py::error_already_set> error_;
+  bool interrupted_{false};
+};
+
+py::tuple simulate(const py::dict& arguments, py::object controller) {
+  program::RunOptions options = run_options(arguments);
+  std::optional<PythonControllerScope> scope;
+  if (!controller.is_none()) {
+    scope.emplace(std::move(controller));
+    options.controller = python_controller;
+  }
+  ColumnSink columns;
+  program::Simulation simulation;
+  std::string config_toml;
+  PythonPoll poll(scope ? &*scope : nullptr);
+  {
+    const py::gil_scoped_release release;
+    program::RunRequest request = program::merge(options);
+    config_toml = request.config_toml;
+    simulation = program::simulate(std::move(request), {&columns}, std::ref(poll));
+  }
+  poll.rethrow();
+  if (scope) scope->rethrow();
+  return py::make_tuple(columns.take(simulation.names), simulation.names.signals, to_json(simulation.summary).dump(),
+                        config_toml);
+}
+
+/// A run of a study: the options, and the perturbation of the plant that `abs_hil compare` draws.
+struct Job {
+  std::size_t options{0};  ///< index of its options
+  std::optional<std::uint64_t> index{};
+};
+
+struct Study {
+  std::vector<program::RunOptions> options{};
+  std::vector<program::RunRequest> requests{};
+  std::vector<Job> jobs{};
+  study::Variation variation{};
+  std::uint64_t seed{1};
+};
+
+study::RunResult run(const Study& study, const Job& job) {
+  const config::Settings& s = study.requests[job.options].settings;
+  if (!job.index) return study::simulate(s, s.plant, static_cast<std::uint64_t>(s.seed));
+  const study::Perturbation drawn = study::draw(study.variation, study.seed, *job.index);
+  return study::simulate(s, study::perturbed(s.plant, drawn), drawn.sensor_seed);
+}
+
+/// Why the options cannot be used; empty if they can.
+template <class Work>
+std::string refusal(const Work& work) {
+  try {
+    work();
+  } catch (const config::ConfigError& error) {
+    return error.what();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return {};
+}
+
+/// @param jobs  pairs (index into `options`, index of the perturbation or None)
+py::dict simulate_many(const std::vector<py::dict>& options,
+                       const std::vector<std::pair<std::size_t, std::optional<std::uint64_t>>>& jobs,
+                       const std::string& vary, std::uint64_t seed, std::size_t threads,
+                       const std::function<void(std::size_t)>& progress) {
+  Study study{.variation = study::Variation::parse(vary), .seed = seed};
+  for (const py::dict& arguments : options) study.options.push_back(run_options(arguments));
+  for (const auto& [at, index] : jobs) study.jobs.push_back({at, index});
+  std::vector<study::RunResult> results(jobs.size());
+  std::vector<std::string> errors(jobs.size());
+  {
+    const py::gil_scoped_release release;
+    if (threads == 0) threads = study::machine_threads();
+    study.requests.resize(study.options.size());
+    std::vector<std::string> unusable(study.options.size());
+    study::for_each_index(study.options.size(), threads, [&](std::size_t i) {
+      unusable[i] = refusal([&] { study.requests[i] = program::merge(study.options[i]); });
+    });
+    std::atomic<std::size_t> finished{0};
+    const std::size_t step = std::max<std::size_t>(1, jobs.size() / 100);
+    study::for_each_index(jobs.size(), threads, [&](std::size_t i) {
+      errors[i] = unusable[study.jobs[i].options];
+      if (errors[i].empty()) errors[i] = refusal([&] { results[i] = run(study, study.jobs[i]); });
+      const std::size_t done = finished.fetch_add(1) + 1;
+      if (done % step != 0 && done != jobs.size()) return;
+      const py::gil_scoped_acquire gil;
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+      if (progress) progress(done);
+    });
+  }
+  py::dict columns;
+  const auto add = [&](const char* name, auto&& value) {
+    std::vector<double> values;
+    values.reserve(results.size());
+    for (const study::RunResult& result : results) values.push_back(value(result));
+    columns[name] = array_of(std::move(values));
+  };
+  using analysis::Metrics;
+  for (const auto& [name, field] : analysis::metric_fields) {
+    add(std::string(name).c_str(), [field = field](const study::RunResult& r) { return r.metrics.*field; });
+  }
+  std::vector<std::string> faults;
+  faults.reserve(results.size());
+  for (const study::RunResult& result : results) {
+    faults.emplace_back(result.stopped() ? std::string_view() : rig::row_of(result.fault).name);
+  }
+  columns["fault"] = faults;
+  columns["error"] = errors;
+  return columns;
+}
+
+std::vector<std::string> texts(const py::handle& values) { return py::cast<std::vector<std::string>>(values); }
+
+}  // namespace
+
+program::RunOptions run_options(const py::dict& arguments) {
+  program::RunOptions options;
+  const std::map<std::string, std::optional<std::string>*> named{
+      {"plant", &options.plant},           {"model", &options.model},        {"controller", &options.controller},
+      {"experiment", &options.experiment}, {"config", &options.config_file}, {"seed", &options.seed}};
+  for (const auto& [key, value] : arguments) {
+    const auto name = py::cast<std::string>(key);
+    if (name == "set") {
+      options.assignments = texts(value);
+    } else if (name == "inject") {
+      options.injections = texts(value);
+    } else if (const auto found = named.find(name); found != named.end()) {
+      *found->second = py::cast<std::string>(value);
+    } else {
+      throw std::invalid_argument("unknown option " + name);
+    }
+  }
+  options.outputs.fast = true;
+  options.outputs.no_lcm = true;
+  return options;
+}
+
+void add_simulation(py::module_& module) {
+  module.def("simulate", &simulate, py::arg("options"), py::arg("controller") = py::none());
+  module.def("simulate_many", &simulate_many, py::arg("options"), py::arg("jobs"), py::arg("vary"), py::arg("seed"),
+             py::arg("threads"), py::arg("progress") = nullptr);
+}
+
+}  // namespace abs_hil::python

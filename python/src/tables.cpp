@@ -1,0 +1,78 @@
+// What there is to choose from: controllers, plants, experiments, configuration keys.
+
+#include <pybind11/stl.h>
+
+#include <string>
+
+#include "abs_hil/control/registry.hpp"
+#include "abs_hil/rig/brake_map.hpp"
+#include "bindings.hpp"
+#include "config/config_file.hpp"
+#include "config/key_table.hpp"
+#include "config/library.hpp"
+
+namespace abs_hil::python {
+
+namespace {
+
+py::dict controllers() {
+  py::dict all;
+  for (const control::ControllerEntry& entry : control::controllers()) {
+    if (entry.name != python_controller)
+      all[py::str(entry.name.data(), entry.name.size())] = std::string(entry.summary);
+  }
+  return all;
+}
+
+py::dict plants() {
+  py::dict all;
+  for (const config::PlantEntry& plant : config::known_plants()) all[py::str(plant.name)] = plant.description;
+  return all;
+}
+
+py::dict experiments() {
+  py::dict all;
+  for (const auto& script : config::known_experiments()) all[py::str(script->name)] = script->description;
+  return all;
+}
+
+py::object value_of(const config::Key& key) {
+  return std::visit([](const auto* target) { return py::cast(*target); }, key.target);
+}
+
+/// One dictionary for each key, with the values that these options give.
+py::list keys(const py::dict& arguments) {
+  program::RunRequest request = program::merge(run_options(arguments));
+  const config::KeyTable table(request.settings);
+  py::list all;
+  for (const config::Key& key : table.keys()) {
+    py::dict row;
+    row["name"] = key.name;
+    row["unit"] = std::string(key.unit);
+    row["meaning"] = std::string(key.meaning);
+    row["value"] = value_of(key);
+    if (key.search.given()) {
+      row["search"] = py::make_tuple(key.search.least, key.search.most, key.search.logarithmic);
+    }
+    all.append(row);
+  }
+  return all;
+}
+
+double max_brake_torque_Nm(const py::dict& arguments) {
+  const config::Settings s = program::merge(run_options(arguments)).settings;
+  return rig::brake_torque_at(s.plant.rig.brake, s.gate.brake_duty_max);
+}
+
+}  // namespace
+
+void add_tables(py::module_& module) {
+  module.def("controllers", &controllers);
+  module.def("plants", &plants);
+  module.def("experiments", &experiments);
+  module.def("keys", &keys, py::arg("options"));
+  module.def("section_of", [](const std::string& controller) { return config::section_of(controller); });
+  module.def("max_brake_torque_Nm", &max_brake_torque_Nm, py::arg("options"));
+}
+
+}  // namespace abs_hil::python

@@ -1,0 +1,194 @@
+"""Controllers in Python run through the program's own cycle; plant and laws can be stepped by hand."""
+import math
+
+import numpy as np
+import pytest
+from conftest import QUICK
+
+import abs_hil
+
+
+class Pi:
+    """The controller `pi` (src/control/pi_controller.cpp), written again in Python."""
+
+    def __init__(self, **options):
+        value = {name.rpartition('.')[2]: row['value'] for name, row in abs_hil.keys(**options).items()
+                 if name.startswith(('control.pi.', 'plant.'))}
+        self.w = value
+        rate = abs_hil.keys(**options)['control.rate_Hz']['value']
+        self.kp = -math.expm1(-value['kp_per_s'] / rate) * rate
+
+    def error(self, i):
+        return (1.0 - i.slip_ref) * self.w['r2_m'] * i.omega2_rad_s - self.w['r1_m'] * i.omega1_rad_s
+
+    def reset(self, i):
+        self.integral = 0.0
+        self.last = self.error(i)
+        self.last_ref = i.slip_ref
+
+    def step(self, i):
+        w = self.w
+        error = self.error(i)
+        v_x = w['r2_m'] * i.omega2_rad_s
+        mean = 0.5 * (self.last + (error + (i.slip_ref - self.last_ref) * v_x))
+        self.last, self.last_ref = error, i.slip_ref
+        self.integral += 0.0 if i.unsent_torque_Nm * mean < 0.0 else mean * i.dt_s
+        feedback = -self.kp * error - w['ki_per_s2'] * self.integral
+        force = max(0.0, -(w['J2_kg_m2'] * i.alpha2_rad_s2 + w['d2_Nms_rad'] * i.omega2_rad_s + w['M20_Nm']) / w['r2_m'])
+        torque = w['feed_forward'] * self.equivalent(i, force) + w['J1_kg_m2'] / w['r1_m'] * feedback
+        return abs_hil.SlipOutput(torque, slip_velocity_error_m_s=error)
+
+    def equivalent(self, i, force):
+        w = self.w
+        gain = w['r1_m'] * w['r1_m'] / w['J1_kg_m2'] + (1.0 - i.slip_ref) * w['r2_m'] * w['r2_m'] / w['J2_kg_m2']
+        drift = (-w['r1_m'] / w['J1_kg_m2'] * (w['d1_Nms_rad'] * i.omega1_rad_s + w['M10_Nm'])
+                 + (1.0 - i.slip_ref) * w['r2_m'] / w['J2_kg_m2'] * (w['d2_Nms_rad'] * i.omega2_rad_s + w['M20_Nm']))
+        return w['J1_kg_m2'] / w['r1_m'] * (gain * force + drift)
+
+
+def same(a, b):
+    assert a.columns.keys() == b.columns.keys()
+    for name, values in a.columns.items():
+        if name in ('phase', 'phase_name'):
+            assert values.tolist() == b[name].tolist()
+        else:
+            assert values.tobytes() == b[name].tobytes(), name
+
+
+class Delegate:
+    """A controller of the program behind Python."""
+
+    def __init__(self, name):
+        self.law = abs_hil.Controller(name)
+        self.signals = self.law.signals
+        self.reset = self.law.reset
+        self.step = self.law.step
+
+
+@pytest.mark.parametrize('name', ['pi', 'adaptive', 'five-phase'])
+def test_a_law_behind_python_is_the_law(name):
+    ours = abs_hil.simulate(Delegate(name), set=QUICK)
+    same(ours, abs_hil.simulate(name, set=QUICK))
+    assert ours.summary['controller'] == 'python'
+
+
+def test_the_same_law_written_in_python_gives_the_same_bits():
+    same(abs_hil.simulate(Pi(set=QUICK), set=QUICK), abs_hil.simulate('pi', set=QUICK))
+
+
+def test_torque_alone_will_do_and_the_gate_stands_behind_it():
+    class Full:
+        def reset(self, input):
+            self.inputs = [input.slip_ref]
+
+        def step(self, input):
+            return 1e9
+
+    run = abs_hil.simulate(Full(), set=QUICK)
+    assert run.summary['result'] == 'completed'
+    assert run['brake_pwm'].max() <= 1.0
+    assert np.nanmax(run['slip']) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize('where', ['reset', 'step', 'late', 'type'])
+def test_an_exception_ends_the_run_and_is_raised(where):
+    class Broken:
+        steps = 0
+
+        def reset(self, input):
+            if where == 'reset':
+                raise RuntimeError('my reset')
+
+        def step(self, input):
+            self.steps += 1
+            if where == 'type':
+                return 'much'
+            if where == 'step' or self.steps > 100:
+                raise RuntimeError('my step')
+            return 2.0
+
+    law = Broken()
+    with pytest.raises((RuntimeError, TypeError), match='' if where == 'type' else 'my'):
+        abs_hil.simulate(law, set=QUICK)
+    assert law.steps <= 101, 'not called again after its exception'
+    assert abs_hil.simulate('pi', set=QUICK).summary['result'] == 'completed', 'nothing of it is left'
+
+
+def test_a_controller_may_simulate_too():
+    class Planner:
+        def reset(self, input):
+            self.torque_Nm = 4.0 + abs_hil.simulate(Full(), set={**QUICK, 'plant.theta_N': 30}).summary['time_locked_s']
+
+        def step(self, input):
+            return self.torque_Nm
+
+    class Full:
+        def reset(self, input):
+            pass
+
+        def step(self, input):
+            return input.max_brake_torque_Nm
+
+    run = abs_hil.simulate(Planner(), set=QUICK)
+    assert run.summary['result'] == 'completed'
+    assert run.during('brake')['brake_torque_ref_Nm'].max() > 4.0
+
+
+def test_not_finite_is_a_fault_like_any_laws():
+    class NotANumber:
+        def reset(self, input):
+            pass
+
+        def step(self, input):
+            return math.nan
+
+    run = abs_hil.simulate(NotANumber(), set=QUICK)
+    assert run.summary['result'] == 'fault' and 'python' in run.summary['reason']
+
+
+def test_signals_become_columns():
+    class Signalling:
+        signals = {'half_slip': 'half of the slip', 'ones': 'ones'}
+
+        def reset(self, input):
+            pass
+
+        def step(self, input):
+            return abs_hil.SlipOutput(3.0, theta_est_N=20.0, signals=[0.5 * input.slip, 1.0])
+
+    run = abs_hil.simulate(Signalling(), set=QUICK)
+    assert run.signals == ('half_slip', 'ones')
+    brake = run.during('brake')
+    assert (brake['ones'] == 1.0).all() and (brake['theta_est_N'] == 20.0).all()
+    np.testing.assert_array_equal(brake['half_slip'], 0.5 * brake['slip_est'])
+    Signalling.signals = {'no name': ''}
+    with pytest.raises(ValueError, match='no name'):
+        abs_hil.simulate(Signalling(), set=QUICK)
+
+
+def test_plant_by_hand_keeps_its_energy_balance():
+    """A wheel without contact loss: the lower wheel's angle is the integral of its speed, and friction only brakes."""
+    plant = abs_hil.Plant('paper-table1')
+    plant.reset(omega1_rad_s=99.5, omega2_rad_s=100.0)
+    speeds, angle = [plant.state.omega2_rad_s], 0.0
+    for _ in range(1000):
+        plant.advance(1e-3)
+        speeds.append(plant.state.omega2_rad_s)
+        angle += 0.5e-3 * (speeds[-1] + speeds[-2])
+    assert plant.state.angle2_rad == pytest.approx(angle, rel=1e-6)
+    assert all(b < a for a, b in zip(speeds, speeds[1:]))
+    for wrong in ({'duration_s': -1.0}, {'duration_s': math.nan}, {'duration_s': 0.1, 'brake_duty': 1.5}):
+        with pytest.raises(ValueError):
+            plant.advance(**wrong)
+    assert abs_hil.Plant(set={'plant.theta_N': 31}).theta_N == 31.0
+
+
+def test_law_by_hand():
+    law = abs_hil.Controller('relay')
+    inputs = {'dt_s': 0.0, 'omega1_rad_s': 168.0, 'omega2_rad_s': 170.0, 'slip_ref': 0.15, 'max_brake_torque_Nm': 8.0}
+    law.reset(abs_hil.SlipInput(slip=0.0067, **inputs))
+    assert law.step(abs_hil.SlipInput(slip=0.0067, **inputs)).brake_torque_Nm == 8.0, 'slip too small: full brake'
+    with pytest.raises(ValueError, match='relay'):
+        abs_hil.Controller('rely')
+    with pytest.raises(ValueError, match='at most 8'):
+        abs_hil.SlipOutput(1.0, signals=[0.0] * 9)

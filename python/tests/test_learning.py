@@ -1,0 +1,120 @@
+"""The learning environments: gymnasium's own checker, the same bits for the same seed, rewards as stated."""
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import abs_hil
+from abs_hil.learning import ID, Rigs, Task
+from abs_hil.learning.training import Policy, judge, returns, train
+
+QUICK = {'start_speed_rad_s': 60.0}
+STANDARD = Task(plant='paper-table1', vary='none', start_speed_rad_s=170.0)
+
+
+def test_gymnasiums_checker():
+    environment = gymnasium.make(ID, **QUICK)
+    check_env(environment.unwrapped, skip_render_check=True)
+
+
+def test_the_same_seed_gives_the_same_episode():
+    def episode(seed):
+        environment = gymnasium.make(ID, **QUICK)
+        observation, _ = environment.reset(seed=seed)
+        rows, over = [observation], False
+        while not over:
+            observation, reward, terminated, truncated, _ = environment.step(np.array([0.5], dtype=np.float32))
+            rows.append(np.append(observation, np.float32(reward)))
+            over = terminated or truncated
+        return np.concatenate(rows)
+    np.testing.assert_array_equal(episode(1), episode(1))
+    assert not np.array_equal(episode(1), episode(2))
+
+
+def test_a_law_in_the_environment_is_the_law_in_the_simulator():
+    """Every tenth cycle of the same run: the environment's slip is that of simulate, bit for bit."""
+    run = abs_hil.simulate('adaptive', set={'experiment.start_speed_rad_s': 170})
+    brake = run.during('brake')
+    rigs = Rigs(1, STANDARD, law='adaptive')
+    rigs.reset(0, 0)
+    seen = []
+    for _ in range(150):
+        rigs.step(np.zeros(1))
+        seen.append(rigs.true_slip[0])
+    np.testing.assert_array_equal(seen, brake['slip'][10:10 + 1500:10])
+
+
+def test_reward_is_as_stated():
+    rigs = Rigs(2, STANDARD)
+    rigs.reset_all()
+    before = np.zeros(2)
+    for actions in (np.array([0.4, 0.9]), np.array([0.6, 0.9]), np.array([0.6, 0.1])):
+        _, rewards, _ = rigs.step(actions)
+        np.testing.assert_allclose(rewards, -np.abs(rigs.true_slip - 0.15) - 0.02 * np.abs(actions - before), rtol=1e-12)
+        before = actions
+    observation = rigs.observations()
+    assert observation.shape == (2, 7) and observation.dtype == np.float32
+    assert observation[:, 1] == pytest.approx([0.15, 0.15])
+
+
+def test_full_brake_locks_and_no_brake_rolls():
+    rigs = Rigs(2, STANDARD)
+    rigs.reset_all()
+    for _ in range(60):
+        rigs.step(np.array([1.0, 0.0]))
+    assert rigs.true_slip[0] == pytest.approx(1.0) and abs(rigs.true_slip[1]) < 0.02
+
+
+def test_threads_and_neighbours_change_nothing():
+    alone = Rigs(1, Task(), threads=1)
+    alone.reset(0, 5)
+    many = Rigs(6, Task(), threads=3)
+    many.reset_all()
+    for step in range(40):
+        action = 0.3 + 0.01 * step
+        one, _, _ = alone.step(np.array([action]))
+        six, _, _ = many.step(np.full(6, action))
+        np.testing.assert_array_equal(one[0], six[5])
+
+
+def test_vector_environment():
+    environment = gymnasium.make_vec(ID, num_envs=3, vectorization_mode='vector_entry_point', **QUICK)
+    observations, _ = environment.reset(seed=3)
+    assert observations.shape == (3, 7)
+    ended = np.zeros(3, dtype=int)
+    for _ in range(400):
+        observations, rewards, terminated, truncated, _ = environment.step(np.full((3, 1), 0.6, dtype=np.float32))
+        assert environment.observation_space.contains(observations)
+        ended += terminated | truncated
+    assert (ended >= 1).all(), 'each rig began again'
+
+
+def test_randomised_plants_differ_and_bad_tasks_are_refused():
+    rigs = Rigs(1, Task(vary='none', randomise={'plant.theta_N': (15.0, 30.0)}))
+    slips = []
+    for index in (1, 2, 1):
+        rigs.reset(0, index)
+        for _ in range(20):
+            rigs.step(np.array([0.6]))
+        slips.append(rigs.true_slip[0])
+    assert slips[0] == slips[2] != slips[1]
+    with pytest.raises(ValueError, match='period_s'):
+        Rigs(1, Task(period_s=1e-6))
+    with pytest.raises(ValueError, match='nearest'):
+        Rigs(1, Task(plant='paper-tabel1')).reset(0, 0)
+    with pytest.raises(ValueError, match='reset'):
+        Rigs(1).step(np.zeros(1))
+    rigs.reset(0, 0)
+    with pytest.raises(ValueError, match='actions'):
+        rigs.step(np.array([np.nan]))
+
+
+def test_training_improves_and_repeats():
+    task = Task(plant='paper-timing', start_speed_rad_s=100.0)
+    policy, curve = train(task, 3, 1, population=12, plants=2)
+    again, _ = train(task, 3, 1, population=12, plants=2, threads=1)
+    np.testing.assert_array_equal(policy.weights, again.weights)
+    assert len(curve.mean) == 3
+    start = returns(Rigs(4, task, seed=9), Policy(np.zeros(Policy.SIZE)), 0).mean()
+    assert returns(Rigs(4, task, seed=9), policy, 0).mean() > start
+    assert judge(task, None, 'adaptive', 3).shape == (3,)

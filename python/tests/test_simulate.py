@@ -1,0 +1,128 @@
+"""simulate and simulate_many give what the program gives, bit for bit."""
+import csv
+import json
+import math
+import struct
+
+import numpy as np
+import pytest
+from conftest import QUICK
+
+import abs_hil
+
+RUNS = [{}, {'controller': 'pi', 'plant': 'paper-timing', 'seed': 7},
+        {'controller': 'sliding-mode', 'experiment': 'friction-jump', 'set': {'plant.theta_N': 30.5}},
+        {'experiment': 'brake-step', 'set': {'plant.ideal_sensors': True}}]
+
+
+def arguments_of(run):
+    words = []
+    for name, value in run.items():
+        if name == 'set':
+            words += [word for key, v in value.items() for word in ('--set', f'{key}={str(v).lower()}')]
+        else:
+            words += [f'--{name}', value]
+    return words
+
+
+def bits(value):
+    return 'NaN' if math.isnan(value) else struct.pack('>d', value)
+
+
+@pytest.mark.parametrize('run', RUNS)
+def test_rows_and_summary_are_the_programs(run, tmp_path, abs_hil_program):
+    abs_hil_program('--fast', '--no-lcm', '--csv', tmp_path / 'a.csv', '--summary', tmp_path / 's.json',
+                    *arguments_of(run))
+    ours = abs_hil.simulate(**run)
+    with open(tmp_path / 'a.csv', newline='') as file:
+        rows = list(csv.DictReader(file))
+    assert list(ours.columns) == list(rows[0])
+    assert len(ours) == len(rows)
+    for name, values in ours.columns.items():
+        if name in ('phase', 'phase_name'):
+            assert values.tolist() == [row[name] for row in rows]
+        else:
+            assert [bits(value) for value in values.tolist()] == [bits(float(row[name])) for row in rows], name
+    assert ours.summary == json.loads((tmp_path / 's.json').read_text())
+    ours.to_csv(tmp_path / 'b.csv')
+    assert (tmp_path / 'b.csv').read_bytes() == (tmp_path / 'a.csv').read_bytes()
+
+
+def test_data_frame_has_the_columns():
+    run = abs_hil.simulate(set=QUICK)
+    assert list(run.data.columns) == list(run.columns)
+    assert run.signals == ('I_m', 'omega1_hat_rad_s', 'zeta_N', 'V', 'V_dot')
+    assert (run.during('brake')['phase'] == 'brake').all()
+    assert run.config['control.controller'] == 'adaptive'
+
+
+@pytest.mark.parametrize('options, words', [
+    ({'plant': 'paper-tabel1'}, 'the nearest known is paper-table1'), ({'controller': 'slidng-mode'}, 'sliding-mode'),
+    ({'experiment': 'papr'}, 'the nearest known is paper'), ({'set': {'control.slip_ref': 2}}, 'control.slip_ref = 2'),
+    ({'set': {'control.slipref': 0.1}}, 'control.slip_ref'), ({'seed': -1}, 'run.seed'),
+    ({'inject': ['nonsense']}, 'nonsense'), ({'controller': 'python'}, 'reset and step'),
+    ({'controller': object()}, 'reset and step'), ({'experiment': 'series-of-ten'}, 'a series of runs')])
+def test_bad_options_are_value_errors_with_the_programs_text(options, words):
+    with pytest.raises(ValueError, match=words):
+        abs_hil.simulate(**options)
+
+
+def test_a_fault_is_a_result():
+    run = abs_hil.simulate(set=QUICK, inject=['brake@encoder_lower:stuck+0.2s'])
+    assert run.summary['result'] == 'fault'
+    assert run['phase'][-1] == 'fault'
+
+
+def test_many_runs_are_those_of_compare(tmp_path, abs_hil_program):
+    abs_hil_program('compare', '--controllers', 'adaptive,pi', '--repeat', 4, '--seed', 3, '--runs', tmp_path / 'r.csv')
+    study = abs_hil.simulate_many({'controller': ['adaptive', 'pi'], 'experiment.start_speed_rad_s': [170.0]},
+                                  vary='parameters=0.1,theta=0.1,phase', repeat=4, vary_seed=3)
+    with open(tmp_path / 'r.csv', newline='') as file:
+        rows = sorted(csv.DictReader(file), key=lambda row: (row['controller'], int(row['run'])))
+    assert study['controller'].tolist() == [row['controller'] for row in rows]
+    compared = [name for name in rows[0] if name in study.columns and name not in ('controller', 'fault')]
+    assert len(compared) >= 9
+    for name in compared:
+        assert [bits(v) for v in study[name].tolist()] == [bits(float(row[name] or 'nan')) for row in rows], name
+
+
+def test_threads_change_nothing_and_progress_ends_with_all():
+    grid = {'control.slip_ref': [0.1, 0.15, 0.2], 'experiment.start_speed_rad_s': [100.0]}
+    told = []
+    one = abs_hil.simulate_many(grid, threads=1)
+    many = abs_hil.simulate_many(grid, threads=3, progress=lambda done, total: told.append((done, total)))
+    assert sorted(told)[-1] == (3, 3)
+    assert one['control.slip_ref'].tolist() == [0.1, 0.15, 0.2]
+    for name, values in one.columns.items():
+        np.testing.assert_array_equal(values, many[name])
+    single = abs_hil.simulate(set={'control.slip_ref': 0.2, 'experiment.start_speed_rad_s': 100.0})
+    assert one['stop_time_s'][2] == single.summary['stop_time_s']
+    assert len(one.data) == len(one) == 3
+
+
+def test_bad_runs_of_a_study():
+    runs = [{'set': {**QUICK, 'control.adaptive.gamma': gamma}} for gamma in (21.0, -1.0)]
+    with pytest.raises(ValueError, match='run 1: .*control.adaptive.gamma'):
+        abs_hil.simulate_many(runs)
+    study = abs_hil.simulate_many(runs, keep_going=True)
+    assert study['error'][0] == '' and 'control.adaptive.gamma' in study['error'][1]
+    assert np.isnan(study['stop_time_s'][1]) and study['stop_time_s'][0] > 0
+    with pytest.raises(ValueError, match='Python'):
+        abs_hil.simulate_many([{'controller': object()}])
+    with pytest.raises(ValueError, match='list of values'):
+        abs_hil.simulate_many({'controller': 'pi'})
+
+
+def test_an_exception_in_the_progress_ends_the_study():
+    def progress(done, total):
+        raise KeyError('stop')
+    with pytest.raises(KeyError):
+        abs_hil.simulate_many({'seed': [1, 2, 3], 'experiment.start_speed_rad_s': [50.0]}, progress=progress)
+
+
+def test_lists():
+    assert 'adaptive' in abs_hil.controllers() and 'python' not in abs_hil.controllers()
+    assert set(abs_hil.plants()) >= {'paper-table1', 'paper-timing', 'inteco-manual'}
+    assert set(abs_hil.experiments()) >= {'paper', 'coast-down', 'brake-step', 'friction-jump'}
+    key = abs_hil.keys(set={'plant.theta_N': 31})['plant.theta_N']
+    assert key['value'] == 31 and key['unit'] == 'N'

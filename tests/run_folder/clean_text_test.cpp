@@ -1,0 +1,16 @@
+#include "run_folder/clean_text.hpp"
+
+#include "catch.hpp"
+
+using namespace abs_hil::run_folder;
+
+TEST_CASE("Cleaned text is valid UTF-8 without control characters") {
+  CHECK(clean_text("Acosta-Lúa θ̂") == "Acosta-Lúa θ̂");
+  CHECK(clean_text("a\nb\x1b[31m\x7f") == "a\uFFFDb\uFFFD[31m\uFFFD");
+  CHECK(clean_text("\xff\xc3") == "\uFFFD\uFFFD");
+  CHECK(clean_text("\xc0\xaf") == "\uFFFD\uFFFD");            // overlong slash
+  CHECK(clean_text("\xed\xa0\x80") == "\uFFFD\uFFFD\uFFFD");  // surrogate
+  CHECK(clean_text("\xe2\x80\xae"
+                   "evil") == "\uFFFDevil");  // right-to-left override
+  CHECK(clean_text("ααααα", 3) == "ααα…");
+}
