@@ -71,7 +71,7 @@ class OwnBackend(unittest.TestCase):
 
     def run_command(self, board, *args):
         return [PROGRAM, '--backend', 'rig', '--no-lcm', '--no-out', '--rate', '100', '--rt', 'prefer',
-                *self.options(board), *args]
+                '--recorder', self.folder, *self.options(board), *args]
 
     def commission(self, board):
         said = ''
