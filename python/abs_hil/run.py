@@ -224,6 +224,8 @@ def _load_log(path: pathlib.Path) -> Run:
     if rows == 0:
         raise ValueError(damage or f'"{path}" holds no telemetry of abs_hil')
     columns['phase'] = phase_names(np.clip(columns['phase'], 0, len(PHASES) - 1))
+    if 'phase_name' in columns:
+        columns['phase_name'] = np.array(columns['phase_name'], dtype=object)
     summary: dict[str, Any] = {}
     if experiment:
         names = ('experiment', 'controller', 'plant', 'backend')

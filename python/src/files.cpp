@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "abs_hil/experiment_t.hpp"
+#include "abs_hil/phase_t.hpp"
 #include "abs_hil/plant_sim/factor_profile.hpp"
 #include "abs_hil/rig/cycle_record.hpp"
 #include "abs_hil/rig/quantities.hpp"
@@ -78,12 +79,15 @@ class LogColumns {
  public:
   void take(const telemetry::LogEvent& event) {
     const bool telemetry = event.channel.ends_with("TELEMETRY");
+    if (event.channel.ends_with("PHASE")) return take_phase(event);
     if (!telemetry && !event.channel.ends_with("SIGNALS") && !event.channel.ends_with("EXPERIMENT")) return;
     if (telemetry) {
       telemetry_t message{};
       if (!decode(event, message)) return;
       cycles_.push_back(message.cycle);
-      columns_.consume(telemetry::to_record(message), message.distance_m);
+      rig::CycleRecord record = telemetry::to_record(message);
+      record.phase_index = phase_index_;
+      columns_.consume(record, message.distance_m);
     } else if (event.channel.ends_with("SIGNALS")) {
       signals_t message{};
       // The message of a cycle follows its telemetry.
@@ -112,10 +116,22 @@ class LogColumns {
     // The configuration is JSON, as bytes: it may be damaged.
     py::list experiment;
     for (const std::string& text : experiment_) experiment.append(py::bytes(text));
-    return py::make_tuple(columns_.take({.phases = {}, .signals = names}), names, rows, experiment, unreadable_, damage);
+    return py::make_tuple(columns_.take({.phases = phases_, .signals = names}), names, rows, experiment, unreadable_,
+                          damage);
   }
 
  private:
+  /// The message of a phase precedes the telemetry of its first cycle.
+  void take_phase(const telemetry::LogEvent& event) {
+    constexpr std::int32_t most_phases = 10'000;
+    phase_t message{};
+    if (!decode(event, message) || message.phase_index < 0 || message.phase_index >= most_phases) return;
+    phase_index_ = static_cast<std::uint16_t>(message.phase_index);
+    if (phases_.size() <= phase_index_) phases_.resize(phase_index_ + std::size_t{1});
+    // A phase that is not planned, as after a fault, keeps the number of the one before.
+    rig::NamedPhase& named = phases_[phase_index_];
+    if (named.name.empty()) named = {static_cast<rig::Phase>(message.phase), run_folder::clean_text(message.name)};
+  }
   template <class Message>
   bool decode(const telemetry::LogEvent& event, Message& message) {
     const bool whole = telemetry::decode_checked(event.data, message).empty();
@@ -125,6 +141,8 @@ class LogColumns {
 
   ColumnSink columns_;
   std::vector<std::int64_t> cycles_;
+  std::vector<rig::NamedPhase> phases_;
+  std::uint16_t phase_index_{0};
   std::string names_;
   std::vector<std::string> experiment_;
   std::size_t unreadable_{0};

@@ -74,7 +74,7 @@ class Leases(ResidentTest):
         service = self.service(emulator)
         result = subprocess.run(self.command(other), capture_output=True, text=True, timeout=20, cwd=self.folder)
         self.assertEqual(result.returncode, 3)
-        self.assertIn(f'it keeps pci card the only one in {emulator.root}', result.stderr)
+        self.assertIn(f'it keeps pci, root {emulator.root}, bdf the only one', result.stderr)
         self.assertIn('guardian.socket', result.stderr)
         second = subprocess.run([GUARDIAN, 'serve', '--socket', service.socket], capture_output=True, text=True)
         self.assertEqual(second.returncode, 3)

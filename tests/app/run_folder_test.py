@@ -31,7 +31,7 @@ class RunFolder(ProgramTest):
             self.assertEqual(hashlib.sha256((out / name).read_bytes()).hexdigest(), digest, name)
         with open(out / 'events.csv', newline='') as file:
             events = list(csv.DictReader(file))
-        self.assertEqual(list(events[0]), ['time_s', 'event', 'phase', 'reason', 'value'])
+        self.assertEqual(list(events[0]), ['time_s', 'event', 'phase', 'reason', 'value', 'phase_name'])
         self.assertEqual([e['phase'] for e in events if e['event'] == 'phase'],
                          ['idle', 'accelerate', 'coast', 'brake', 'hold', 'stopped'])
 

@@ -29,7 +29,7 @@ def blocks_of(page):
             else:
                 fence = words or ['']
                 if fence[0] == 'toml':
-                    if len(words) != 2 or words[1] not in KINDS:
+                    if len(words) < 2 or words[1] not in KINDS:
                         raise ValueError(f'line {number}: write ```toml with one of {", ".join(KINDS)}')
                     blocks.append((number, words[1], []))
         elif fence is None and re.match(r' {4}\[\[?[a-z_.]+\]\]?\s*(#.*)?$', line):

@@ -2,7 +2,7 @@
 """usage: tutorial_test.py ROOT BUILD
 
 Does what docs/tutorial.md says, command by command, in a copy of the tree of ROOT: a newcomer's clone. Files that the
-page shows (```LANGUAGE tutorial=NAME) are written under their names. BUILD is a build of ROOT, for ccache's settings.
+page shows (```LANGUAGE ... tutorial=NAME) are written under their names. BUILD is a build of ROOT, for ccache's settings.
 """
 import pathlib
 import re
@@ -18,7 +18,7 @@ from scratch_copy import ScratchCopy
 
 # Everything else than our programs that the page calls.
 run_commands.PROGRAMS |= {'sed', 'cmp', 'ctest'}
-SHOWN_FILE = re.compile(r'^```\w+ tutorial=(\S+)\n(.*?)^```$', re.MULTILINE | re.DOTALL)
+SHOWN_FILE = re.compile(r'^```[^\n]* ?tutorial=(\S+)\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 TIMEOUT_S = 600
 
 

@@ -162,7 +162,7 @@ def recorded(program, plant, controller, *settings):
                         '--csv', file, *sets], check=True, stdout=subprocess.DEVNULL)
         with open(file, newline='') as text:
             rows = list(csv.DictReader(text))
-    return [{key: value if key == 'phase' else float(value) for key, value in row.items()} for row in rows]
+    return [{key: value if key.startswith('phase') else float(value) for key, value in row.items()} for row in rows]
 
 
 def target_of(rig, row):

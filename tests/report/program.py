@@ -24,7 +24,7 @@ def need(program, package):
 
 class ReportTest(unittest.TestCase):
     def setUp(self):
-        self._folder = tempfile.TemporaryDirectory()
+        self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         self.folder = pathlib.Path(self._folder.name)
 
     def tearDown(self):

@@ -206,7 +206,8 @@ TEST_CASE("events carry stamp, phase, reason in number and words, and value") {
   CHECK(events[1].reason == 65);
   CHECK(events[1].reason_text == "wheel speed above the limit");
   CHECK(events[1].value == 201.5);
-  CHECK(events[1].message == "brake -> fault: wheel speed above the limit");
+  CHECK(events[1].message ==
+        "brake -> fault: wheel speed above the limit (speed 201.5 rad/s; bound: gate.overspeed_rad_s)");
 }
 
 TEST_CASE("all outlets get the same messages, and the same records give the same bytes again") {

@@ -74,7 +74,7 @@ std::string fault_of_log(const std::filesystem::path& log, const rig::CycleRecor
 
 std::string fault_of_csv(const std::filesystem::path& csv, const std::vector<rig::CycleRecord>& records) {
   std::string row;
-  const std::string header(telemetry::csv_header);
+  const std::string header = std::string(telemetry::csv_header).append(",phase_name");
   if (std::string fault = fault_of_table(csv, header, records.size(), row); !fault.empty()) return fault;
   const std::vector<std::string> columns = columns_of(row);
   const rig::CycleRecord& last = records.back();
