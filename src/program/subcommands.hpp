@@ -24,8 +24,8 @@ int list(bool keys);
 int list_quantities(bool json);
 /// `abs_hil list --reasons`: prints the table of rig/reason.hpp, as text or JSON.
 int list_reasons(bool json);
-/// `abs_hil init-rig NAME`: writes NAME.toml, a plant's file to fill in. Throws config::ConfigError for a bad name and a
-/// file that exists.
+/// `abs_hil init-rig NAME`: writes NAME.toml, a plant's file to fill in. Throws config::ConfigError for a bad name and
+/// a file that exists.
 int init_rig(const RunRequest& request, const std::string& name);
 /// `abs_hil validate`: describes an experiment and checks it against the limits of its backend.
 int validate(const RunRequest& request);
