@@ -49,7 +49,8 @@ def simulate(controller: Any = 'adaptive', plant: PathLike = 'paper-table1', exp
                          'object with both')
     columns, signals, summary, config_toml = _core.simulate(given, law)
     columns['phase'] = phase_names(columns['phase'])
-    columns['phase_name'] = np.array(columns['phase_name'], dtype=object)
+    if 'phase_name' in columns:
+        columns['phase_name'] = np.array(columns['phase_name'], dtype=object)
     return Run(columns, json.loads(summary), tuple(signals), config_toml=config_toml)
 
 

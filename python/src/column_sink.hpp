@@ -33,13 +33,14 @@ class ColumnSink final : public rig::RecordSink {
     for (std::size_t n = 0; n < rig::signal_max; ++n) signals_[n].at(row) = values[n];
   }
   [[nodiscard]] std::size_t rows() const noexcept { return columns_.front().size(); }
-  /// Name to array, in the order of the CSV; `phase_name` is a list of texts, and missing if the phases are not known.
+  /// Name to array, in the order of the CSV; `phase_name` is a list of texts, and missing if the experiment has no
+  /// names of its own.
   [[nodiscard]] py::dict take(const rig::RunNames& names) {
     py::dict taken;
     for (std::size_t n = 0; n < columns_.size(); ++n) {
       taken[py::str(rig::csv_columns[n].data(), rig::csv_columns[n].size())] = array_of(std::move(columns_[n]));
     }
-    if (!names.phases.empty()) taken["phase_name"] = phase_names(names);
+    if (names.has_own_phase_names()) taken["phase_name"] = phase_names(names);
     for (std::size_t n = 0; n < names.signals.size(); ++n) {
       taken[py::str(names.signals[n])] = array_of(std::move(signals_[n]));
     }

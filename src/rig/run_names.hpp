@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,6 +23,12 @@ struct RunNames {
   std::vector<NamedPhase> phases{};    ///< by CycleRecord::phase_index
   std::vector<std::string> signals{};  ///< of the controller, by index into ControlState::signals
 
+  /// True if the experiment gives a phase a name that its kind does not have.
+  [[nodiscard]] bool has_own_phase_names() const noexcept {
+    return std::any_of(phases.begin(), phases.end(), [](const NamedPhase& phase) {
+      return !phase.name.empty() && phase.name != name_of(phase.kind);
+    });
+  }
   /// Name of the record's phase: the experiment's own, or the kind's for a phase that the experiment does not plan, as
   /// after a fault.
   [[nodiscard]] std::string_view phase_of(const CycleRecord& record) const noexcept {

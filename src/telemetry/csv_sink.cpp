@@ -69,8 +69,10 @@ std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, ch
     if (at != out) *at++ = ',';
     at = put(at, row.at(parts));
   });
-  *at++ = ',';
-  at = put_text(at, names.phase_of(record).substr(0, rig::phase_name_max));
+  if (names.has_own_phase_names()) {
+    *at++ = ',';
+    at = put_text(at, names.phase_of(record).substr(0, rig::phase_name_max));
+  }
   for (std::size_t n = 0; n < std::min(names.signals.size(), rig::signal_max); ++n) {
     *at++ = ',';
     at = put(at, record.control.signals[n]);
@@ -86,8 +88,10 @@ CsvSink::CsvSink(std::filesystem::path path, std::int64_t write_period_ns, rig::
   } while (file_ < 0 && errno == EINTR);
   if (file_ < 0) throw FileError(csv_kind, path_, errno);
   append(csv_header.data(), csv_header.size());
-  append(",", 1);
-  append(phase_name_column.data(), phase_name_column.size());
+  if (names_.has_own_phase_names()) {
+    append(",", 1);
+    append(phase_name_column.data(), phase_name_column.size());
+  }
   for (const std::string& signal : names_.signals) {
     append(",", 1);
     append(signal.data(), signal.size());

@@ -18,12 +18,13 @@ extern const std::string_view csv_header;
 /// Upper limit of a row's length.
 inline constexpr std::size_t csv_row_max_bytes = 1024;
 
-/// The column after the fixed ones: the experiment's own name of the phase.
+/// The column after the fixed ones, a text: the experiment's own name of the phase. Only a run with such names has it,
+/// so that a reader of numbers alone can read all others.
 inline constexpr std::string_view phase_name_column = "phase_name";
 
-/// Writes a row with its line end to `out` and returns its length: the fixed columns, `phase_name` and the controller's
-/// own signals. A double has the shortest text that reads back bit-exactly; NaN is `NaN`. The text does not depend on
-/// the locale.
+/// Writes a row with its line end to `out` and returns its length: the fixed columns, `phase_name` if the experiment
+/// has names of its own, and the controller's own signals. A double has the shortest text that reads back bit-exactly;
+/// NaN is `NaN`. The text does not depend on the locale.
 std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, char (&out)[csv_row_max_bytes],
                            const rig::RunNames& names = {}) noexcept;
 

@@ -49,7 +49,8 @@ void write_text(const std::filesystem::path& path, const std::string& text, std:
 
 void write_csv(const std::filesystem::path& path, const FlightRecord& record, const rig::RunNames& names) {
   std::string text(csv_header);
-  text.append(",").append(phase_name_column).append(flight_csv_extra_header);
+  if (names.has_own_phase_names()) text.append(",").append(phase_name_column);
+  text.append(flight_csv_extra_header);
   for (const std::string& signal : names.signals) text.append(",").append(signal);
   text += '\n';
   // The controller's own signals come last here.

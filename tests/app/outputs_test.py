@@ -16,7 +16,7 @@ class Outputs(ProgramTest):
     def test_csv(self):
         path = self.folder / 'run.csv'
         self.fast('--csv', path)
-        self.assertEqual(path.read_text().splitlines()[0], HEADER + ',phase_name,I_m,omega1_hat_rad_s,zeta_N,V,V_dot')
+        self.assertEqual(path.read_text().splitlines()[0], HEADER + ',I_m,omega1_hat_rad_s,zeta_N,V,V_dot')
         rows = self.rows(path)
         seen = list(dict.fromkeys(row['phase'] for row in rows))
         self.assertEqual(seen, PHASES)
@@ -139,7 +139,7 @@ class Outputs(ProgramTest):
             path = self.folder / f'{controller}.csv'
             self.fast('--controller', controller, '--csv', path)
             own = [names[controller]] if controller in names else []
-            self.assertEqual(path.read_text().splitlines()[0].replace(',', ', '), ', '.join([HEADER.replace(',', ', '), 'phase_name', *own]))
+            self.assertEqual(path.read_text().splitlines()[0].replace(',', ', '), ', '.join([HEADER.replace(',', ', '), *own]))
         self.assertIn('adaptive', names)
 
     def test_a_wrong_argument_points_to_the_help_of_its_command(self):

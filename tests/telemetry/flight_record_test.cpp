@@ -48,7 +48,7 @@ TEST_CASE("the flight record has the controller's own signals, by their names") 
   std::getline(lines, header);
   std::getline(lines, first);
   std::getline(lines, second);
-  CHECK(header == std::string(csv_header).append(",phase_name").append(flight_csv_extra_header).append(",I_m,zeta_N"));
+  CHECK(header == std::string(csv_header).append(flight_csv_extra_header).append(",I_m,zeta_N"));
   CHECK_THAT(first, Catch::Matchers::EndsWith(",NaN,NaN"));
   CHECK_THAT(second, Catch::Matchers::EndsWith(",0.25,-3"));
 }

@@ -69,8 +69,7 @@ TEST_CASE("the CSV begins with the fixed columns of --csv, and they hold the sam
     REQUIRE(std::getline(made, made_line));
     // A NaN keeps its sign here, because the conversion back must give it again.
     for (std::size_t at; (at = made_line.find("-NaN")) != std::string::npos;) made_line.erase(at, 1);
-    own_line.erase(own_line.rfind(',') + 1);  // the phase's own name: the log has it in ABS_PHASE
-    CHECK(made_line.starts_with(own_line));
+    CHECK(made_line.starts_with(own_line + ','));
     ++rows;
   }
   CHECK(rows == 1201);

@@ -74,7 +74,7 @@ std::string fault_of_log(const std::filesystem::path& log, const rig::CycleRecor
 
 std::string fault_of_csv(const std::filesystem::path& csv, const std::vector<rig::CycleRecord>& records) {
   std::string row;
-  const std::string header = std::string(telemetry::csv_header).append(",phase_name");
+  const std::string header(telemetry::csv_header);
   if (std::string fault = fault_of_table(csv, header, records.size(), row); !fault.empty()) return fault;
   const std::vector<std::string> columns = columns_of(row);
   const rig::CycleRecord& last = records.back();
@@ -109,10 +109,9 @@ std::string fault_of_recorder(const runtime::FlightRing& recorder, std::size_t s
   const std::string reason = std::to_string(static_cast<int>(last.reason));
   if (!content(file(".txt")).starts_with("reason " + reason + ": ")) return "recorder: another reason in words";
   std::string row;
-  const std::string header =
-      std::string(telemetry::csv_header).append(",phase_name").append(telemetry::flight_csv_extra_header);
+  const std::string header = std::string(telemetry::csv_header).append(telemetry::flight_csv_extra_header);
   if (std::string fault = fault_of_table(file(".csv"), header, kept.size(), row); !fault.empty()) return fault;
-  constexpr std::size_t reason_column = 27;
+  constexpr std::size_t reason_column = 26;
   if (columns_of(header)[reason_column] != "reason" || columns_of(row)[reason_column] != reason) {
     return "recorder: another reason in its last row";
   }
