@@ -25,7 +25,8 @@ TEXTS = ('phase', 'phase_name')
 class Run:
     """One run.
 
-    columns: name -> NumPy array of shape (cycles,), float64; `phase` and `phase_name` are arrays of names, `motor_enable` of 0 and 1.
+    columns: name -> NumPy array of shape (cycles,), float64; `phase` and `phase_name` are arrays of names, `motor_enable`
+             of 0 and 1. `phase_name` is there if the experiment gives its phases names of its own.
              Names, units and meanings are those of the CSV (abs_hil.QUANTITIES); the controller's own signals follow.
     summary: the content of summary.json, a dictionary; figures that the run has no value for are None. Empty if the run
              has no summary.
