@@ -14,9 +14,8 @@ check_shell() {
 }
 
 check_python() {
-  scripts/setup_python.sh
-  build/python/bin/ruff check python
-  build/python/bin/python -m mypy
+  # Joined, because `||` at the call switches off -e within.
+  scripts/setup_python.sh && build/python/bin/ruff check python && build/python/bin/python -m mypy
 }
 
 check_cppcheck() {
