@@ -77,3 +77,11 @@ configure_package_config_file(packaging/abs_hilConfig.cmake.in ${CMAKE_BINARY_DI
 write_basic_package_version_file(${CMAKE_BINARY_DIR}/abs_hilConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/abs_hilConfig.cmake ${CMAKE_BINARY_DIR}/abs_hilConfigVersion.cmake cmake/FindLCM.cmake
   DESTINATION ${abs_hil_cmake_dir} COMPONENT development)
+
+# Builds what `cmake --install` needs: the programs with their pages and modules, without tests and benchmarks.
+add_custom_target(abs_hil_installed)
+foreach(target abs_hil_programs abs_hil_manual_pages abs_hil_python abs_hil_types_jar abs_hil_spy_jar)
+  if(TARGET ${target})
+    add_dependencies(abs_hil_installed ${target})
+  endif()
+endforeach()

@@ -34,6 +34,9 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         copy = ScratchCopy(root, build, pathlib.Path(folder))
         tree = copy.tree
+        # The private network reaches no index, so the Python modules come from this tree.
+        (tree / 'build').mkdir()
+        (tree / 'build' / 'python').symlink_to(root / 'build' / 'python')
         for name, text in SHOWN_FILE.findall(page):
             (tree / name).write_text(text, encoding='utf-8')
         scratch = run_commands.Scratch(tree, tree / 'build' / 'release', str(tree))
