@@ -111,7 +111,9 @@ def tables_of_the_program(copy, program, number):
     assert columns[row['csv_column'] - 1] == 'made_up_index', row
     assert 'made_up_index' in copy.run(program, 'list', '--quantities')
     rows = json.loads(copy.run(program, 'list', '--reasons', '--json'))
-    assert {'number': number, 'name': 'made_up', 'kind': 'fault', 'found_again': 'no', 'text': REASON_TEXT} in rows
+    made_up = {'number': number, 'name': 'made_up', 'kind': 'fault', 'found_again': 'no', 'text': REASON_TEXT,
+               'quantity': '', 'unit': '', 'bound': ''}
+    assert made_up in rows
     assert REASON_TEXT in copy.run(program, 'list', '--reasons')
 
 
