@@ -1,4 +1,4 @@
-"""abs_hil safe on the emulated card: whoever drives it, however that process is, both outputs are 0 and verified."""
+"""abs_hil safe on the emulated card sets both outputs to 0 and verifies them, even while another process drives it."""
 import os
 import signal
 import time

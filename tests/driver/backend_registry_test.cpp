@@ -118,7 +118,7 @@ TEST_CASE("A name is given once, and sim is no board") {
   CHECK_THROWS_AS(register_backend(backend(row)), std::invalid_argument);
 }
 
-TEST_CASE("A kind that no backend has is refused wherever it could drive something") {
+TEST_CASE("An unknown kind of board is refused by driver, guardian and policy") {
   const DriverOptions options{.kind = "unheard-of"};
   CHECK_FALSE(is_known("unheard-of"));
   CHECK_THROWS_WITH(make_rig_driver(options), Contains("\"unheard-of\"") && Contains("pci, can, usb"));

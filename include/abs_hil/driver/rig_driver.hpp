@@ -97,8 +97,8 @@ class RigDriver {
   /// The configured board. A board that differs in one of the two needs a commissioning of its own. Empty texts: the
   /// board shows nothing.
   [[nodiscard]] virtual BoardIdentity identity() const { return {}; }
-  /// The duties that the active board reports for its outputs now, whoever has set them. Sends no command. False if the
-  /// board cannot tell. Not real-time safe.
+  /// The duties that the active board reports for its outputs now. Another process may have set them. Sends no command.
+  /// False if the board cannot tell. Not real-time safe.
   [[nodiscard]] virtual bool outputs_now(rig::Command& /*applied*/) noexcept { return false; }
   /// Writes to the configured board what changes nothing, to find out whether a write can succeed. `ok` for a board
   /// whose `configure` has shown that.

@@ -8,23 +8,13 @@
 #include <utility>
 
 #include "catch.hpp"
+#include "gate_inputs.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::runtime;
+using namespace abs_hil::runtime::test_bench;
 using rig::Phase;
 using rig::Reason;
-
-namespace {
-constexpr GateInput moderate{{100.0, 100.0}, Phase::brake, 0};
-constexpr std::int64_t ms = 1'000'000;
-constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinite = std::numeric_limits<double>::infinity();
-
-bool is_safe(const rig::Command& command) {
-  return command.motor_duty == 0.0 && command.brake_duty == 0.0 && !command.motor_enable &&
-         command.brake_torque_Nm == 0.0;
-}
-}  // namespace
 
 TEST_CASE("a sound command passes unchanged") {
   CommandGate gate(GateOptions{});

@@ -6,24 +6,15 @@
 #include <tuple>
 
 #include "catch.hpp"
+#include "gate_inputs.hpp"
 #include "runtime/command_gate.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::runtime;
+using namespace abs_hil::runtime::test_bench;
 using rig::Phase;
 using rig::Reason;
 
-namespace {
-constexpr GateInput moderate{{100.0, 100.0}, Phase::brake, 0};
-constexpr std::int64_t ms = 1'000'000;
-constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinite = std::numeric_limits<double>::infinity();
-
-bool is_safe(const rig::Command& command) {
-  return command.motor_duty == 0.0 && command.brake_duty == 0.0 && !command.motor_enable &&
-         command.brake_torque_Nm == 0.0;
-}
-}  // namespace
 TEST_CASE("after a fault the brake holds at most its duty for the fault, motor off, until its limit") {
   const GateOptions options{.brake_duty_max = 0.7, .fault_brake_duty = 0.5, .fault_brake_limit_s = 0.01};
   const rig::Command wanted{.motor_duty = 0.4, .brake_duty = 0.6, .motor_enable = true, .brake_torque_Nm = 3.0};
