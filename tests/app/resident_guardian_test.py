@@ -150,15 +150,7 @@ class Leases(ResidentTest):
                 f'guardian.socket={service.socket}', 'guardian.timeout_ms=1000')],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1)
         self._programs.append(program)
-        said = ''
-        while line := program.stdout.readline():
-            said += line
-            if '[y/N]' in line:
-                self.assertEqual(emulator.wire(), SAFE, f'while it asks: {line}')
-                program.stdin.write('y\n')
-            elif line.startswith('Turn the '):
-                emulator.turn('upper' if 'UPPER' in line else 'lower', 0.5)
-                program.stdin.write('\n')
+        said = self.go_through_commissioning(program, emulator)
         _, errors = program.communicate(timeout=20)
         self.assertEqual(program.returncode, 0, said + errors)
         wait_until(lambda: 'lease ended' in service.said(), 'the lease did not end')

@@ -65,6 +65,20 @@ class Emulator(EmulatorProcess):
 
 
 class RigTest(EmulatorTest):
+    def go_through_commissioning(self, program, emulator):
+        """Plays the person of `abs_hil commission`: says yes and turns the wheels. Returns what the program said. While it
+        asks, both outputs must be 0."""
+        said = ''
+        while line := program.stdout.readline():
+            said += line
+            if '[y/N]' in line:
+                self.assertEqual(emulator.wire(), (0.0, 0.0), f'while it asks: {line}')
+                program.stdin.write('y\n')
+            elif line.startswith('Turn the '):
+                emulator.turn('upper' if 'UPPER' in line else 'lower', 0.5)
+                program.stdin.write('\n')
+        return said
+
     def emulator(self, *args):
         return self.start_emulator(Emulator, *args)
 

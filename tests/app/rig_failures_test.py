@@ -128,15 +128,7 @@ class RigFailures(RigTest):
                      'guardian.timeout_ms=1000']
         program = subprocess.Popen(arguments, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                    text=True, bufsize=1)
-        said = ''
-        while line := program.stdout.readline():
-            said += line
-            if '[y/N]' in line:
-                self.assertEqual(emulator.wire(), SAFE, f'while it asks: {line}')
-                program.stdin.write('y\n')
-            elif line.startswith('Turn the '):
-                emulator.turn('upper' if 'UPPER' in line else 'lower', 0.5)
-                program.stdin.write('\n')
+        said = self.go_through_commissioning(program, emulator)
         program.communicate(timeout=20)
         self.assertEqual(program.returncode, 0, said)
         self.assertEqual(said.count('[y/N]'), 5)
