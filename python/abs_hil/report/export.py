@@ -1,6 +1,7 @@
 """The rows of runs in other formats: CSV, JSON, MAT-files, Parquet."""
 from __future__ import annotations
 
+import importlib
 import json
 import math
 import re
@@ -90,8 +91,17 @@ class Exporter:
         try:
             pandas.concat(frames, ignore_index=True).to_parquet(out, index=False)
         except ImportError:
-            raise Unavailable('Parquet files need the Python package pyarrow; install it: pip install pyarrow, or '
-                              'scripts/setup_python.sh in the source folder') from None
+            # pandas says only that no engine is usable. pyarrow itself says why, for instance that NumPy is too old.
+            raise Unavailable(f'Parquet files need the Python package pyarrow ({_why_not("pyarrow")}); install it: pip '
+                              'install pyarrow, or scripts/setup_python.sh in the source folder') from None
+
+
+def _why_not(package: str) -> str:
+    try:
+        importlib.import_module(package)
+    except ImportError as error:
+        return str(error)
+    return 'pandas cannot use it'
 
 
 def _without_nan(values: np.ndarray) -> list[Any]:
