@@ -6,6 +6,7 @@ page shows (```LANGUAGE ... tutorial=NAME) are written under their names. BUILD 
 """
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -20,6 +21,8 @@ from scratch_copy import ScratchCopy
 run_commands.PROGRAMS |= {'sed', 'cmp', 'ctest'}
 SHOWN_FILE = re.compile(r'^```[^\n]* ?tutorial=(\S+)\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 TIMEOUT_S = 600
+# Folders outside the clone that the page makes: an earlier run, even one that was killed, may have left them.
+MADE = ('/tmp/abs_hil', '/tmp/my_project', '/tmp/tutorial')
 
 
 def check_summary(output):
@@ -29,6 +32,8 @@ def check_summary(output):
 
 
 def main():
+    for made in MADE:
+        shutil.rmtree(made, ignore_errors=True)
     root, build = map(pathlib.Path, sys.argv[1:3])
     page = (root / 'docs' / 'tutorial.md').read_text(encoding='utf-8')
     with tempfile.TemporaryDirectory() as folder:
