@@ -43,6 +43,14 @@ TEST_CASE("a fault that the board reports latches and makes the command safe") {
   CHECK((result.command.brake_duty == 0.0) == (row.reason != Reason::none));
 }
 
+TEST_CASE("a board without supply is refused even if no least supply is set") {
+  CommandGate gate(GateOptions{.supply_min_V = 0.0});
+  std::ignore = gate.check_measurement({.supply_V = 0.1}, 0);
+  CHECK(gate.fault() == Reason::none);
+  std::ignore = gate.check_measurement({.supply_V = 0.0}, ms);
+  CHECK(gate.fault() == Reason::board_supply_low);
+}
+
 TEST_CASE("a board that stops reporting its health is a fault, one that never reported it is not") {
   CommandGate supply(GateOptions{});
   std::ignore = supply.check_measurement({.supply_V = 24.0}, 0);
