@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::int64_t answer_ns = 100'000'000;
 /// A flooded bus must not keep the next zeros back.
-constexpr int most_frames = 1000;
+constexpr int most_frames_of_an_answer = 1000;
 
 }  // namespace
 
@@ -38,7 +38,7 @@ IoResult CanSafeState::verify() noexcept {
   bool inactive = false;
   bool zero = false;
   Frame frame;
-  for (int i = 0; i < most_frames && !(inactive && zero); ++i) {
+  for (int i = 0; i < most_frames_of_an_answer && !(inactive && zero); ++i) {
     const ReceiveOutcome outcome = link_.socket->receive(frame, deadline_ns).outcome;
     if (outcome == ReceiveOutcome::malformed) continue;
     if (outcome != ReceiveOutcome::frame) break;
