@@ -1,0 +1,426 @@
+"""The fit: prediction errors of the counts over all logs, by a Kalman filter on windows.
+
+Each window of a log starts from states of its own, which the filter ties together: so a fit neither diverges where the
+plant is unstable (past the tyre's peak) nor needs good start values. The plant is linearised around the most likely
+states by simulating each window with each parameter moved a little (C++, `_core.linearise`). Slow random factors over
+road, brake, motor and both bearings are states of the filter: large in the first rounds, when the model is wrong;
+as large as the logs say in the last.
+"""
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import scipy.optimize
+
+from ..core import _core
+from .logs import Log, Motion, motion_of, segments_of
+from .parameters import DELAY, Form, Parameter, base_options
+from .start import brake_torques, first_values
+
+#: an even distribution within one count, counts^2
+COUNT_VARIANCE = 1 / 12
+WINDOW_S = 0.05
+WINDOW_DISTURBED_S = 0.02
+#: a residual above this has other sources than the counts' steps, counts RMS
+LARGEST_QUIET_RMS = 0.30
+DISTURBANCES = ('road', 'brake', 'motor', 'upper bearing', 'lower bearing')
+
+
+@dataclass
+class Disturbances:
+    """Standard deviations (factors; the bearings' in N m) and time constants (s) of the five random factors."""
+    sd: np.ndarray
+    time_constant_s: np.ndarray
+
+    @classmethod
+    def of(cls, factor: float, torque_Nm: float, time_constant_s: float) -> Disturbances:
+        return cls(np.array([factor, factor, factor, torque_Nm, torque_Nm]), np.full(5, time_constant_s))
+
+
+#: rounds of the homotopy: disturbances, number of iterations
+ROUNDS = ((Disturbances.of(0.10, 0.05, 0.2), 2), (Disturbances.of(0.01, 0.005, 0.5), 2),
+          (Disturbances.of(1e-3, 1e-4, 1.0), 1), (Disturbances.of(1e-4, 1e-5, 1.0), 1))
+#: how far a piece's first state may move in one iteration: angles, speeds, brake torque
+NEAR_SD = np.array([0.005, 0.005, 0.5, 0.5, 0.1])
+QUIET = Disturbances.of(0.0, 0.0, 1.0)
+
+
+@dataclass
+class Piece:
+    """A segment of a log, its windows, and the states at their starts (windows, 5)."""
+    log: int
+    first: np.ndarray
+    states: np.ndarray
+    stands: np.ndarray
+    prior_sd: np.ndarray
+    linear: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def rows(self) -> slice:
+        return slice(int(self.first[0]), int(self.first[-1]))
+
+
+@dataclass
+class Problem:
+    """All logs, and the plant's form with what is fixed."""
+    form: Form
+    base: Any
+    logs: Sequence[Log]
+    motions: Sequence[Motion]
+    segments: Sequence[Sequence[tuple[int, int]]]
+    given: dict[str, float]
+    fixed: dict[str, float]
+    counts_per_rev: int
+    drifts: tuple[str, ...] = ()
+    with_delay: bool = False
+
+    @classmethod
+    def of(cls, form: Form, start: Any, logs: Sequence[Log], fixed: Mapping[str, float | None],
+           drifts: Sequence[str] = ()) -> Problem:
+        base = base_options(form, start)
+        values = base.values()
+        counts_per_rev = int(values['encoder_counts_per_rev'])
+        motions = [motion_of(log, counts_per_rev) for log in logs]
+        segments = [segments_of(log, motion) for log, motion in zip(logs, motions)]
+        known = {key: float(values[key] if value is None else value) for key, value in fixed.items() if key in values}
+        given = {key: known.pop(key, float(values[key])) for key in ('J2_kg_m2', 'r2_m')}
+        keys = {p.key for p in form.parameters}
+        return cls(form, base, logs, motions, segments, given, {k: v for k, v in known.items() if k in keys},
+                   counts_per_rev, tuple(drifts))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        delay = (Parameter(DELAY, 's', 'always', '', floor=1e-3),) if self.with_delay else ()
+        return self.form.parameters + delay
+
+    @property
+    def radians_per_count(self) -> float:
+        return 2 * np.pi / self.counts_per_rev
+
+
+@dataclass
+class Fit:
+    """values: of all parameters. normal: (logs, n, n), right: (logs, n), cost: (logs,) of the last linearisation, in
+    the scaled changes x of `scale`: value = nominal + scale x. `free` marks the estimated ones."""
+    problem: Problem
+    values: dict[str, float]
+    pieces: list[Piece]
+    disturbances: Disturbances
+    window_s: float
+    free: np.ndarray
+    scale: np.ndarray = field(default_factory=lambda: np.empty(0))
+    normal: np.ndarray = field(default_factory=lambda: np.empty(0))
+    right: np.ndarray = field(default_factory=lambda: np.empty(0))
+    cost: np.ndarray = field(default_factory=lambda: np.empty(0))
+    readings: float = 0.0
+    rms_counts: float = np.nan
+    factors: dict[str, float] = field(default_factory=dict)
+    iterations: int = 0
+
+    @property
+    def keys(self) -> list[str]:
+        return [p.key for p in self.problem.parameters]
+
+    def information(self) -> np.ndarray:
+        return np.asarray(self.normal.sum(axis=0))
+
+    def covariance(self) -> np.ndarray:
+        """Of the free parameters' scaled changes, shape (free, free); with a very weak prior so that it exists."""
+        N = self.information()[np.ix_(self.free, self.free)]
+        return np.asarray(np.linalg.pinv(N + 1e-4 * np.eye(len(N)), hermitian=True))
+
+
+def pieces_of(problem: Problem, values: Mapping[str, float], window_s: float) -> list[Piece]:
+    """Windows over every segment, with states from the counts and the brake's torque from the model."""
+    pieces = []
+    for number, (log, motion, segments) in enumerate(zip(problem.logs, problem.motions, problem.segments)):
+        torque = brake_torques(log, values['b1_Nm'], values['b2_Nm'], values['u0'], values['c31_per_s'])
+        step = max(4, round(window_s / log.period_s))
+        for begin, end in segments:
+            count = max(1, (end - begin - 1) // step)
+            first = np.append(begin + step * np.arange(count), end - 1)
+            at = first[:-1]
+            stands = motion.stands[at]
+            states = np.column_stack([motion.smooth_rad[at], np.where(stands, 0.0, motion.speed_rad_s[at]), torque[at]])
+            prior = np.array([0.05, 0.05, 20.0, 20.0, 0.0])
+            pieces.append(Piece(number, first.astype(np.int64), states, stands.astype(float), prior))
+    return pieces
+
+
+def _scale(problem: Problem, values: Mapping[str, float]) -> np.ndarray:
+    return np.array([max(abs(values[p.key]), p.floor) for p in problem.parameters])
+
+
+def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Piece],
+              check: Callable[[], None] = lambda: None) -> np.ndarray:
+    """Fills `linear` of each piece; returns the scale of the parameters' changes."""
+    scale = _scale(problem, values)
+    nominal = [*problem.given.items(), *((p.key, values[p.key]) for p in problem.parameters)]
+    moved = []
+    for i, p in enumerate(problem.parameters):
+        size = 1e-5 * scale[i]
+        if p.key == 'u0':
+            size = _duty_step(problem, values['u0'])
+        if p.key == DELAY:
+            size = 1e-5
+        step = size if values[p.key] + size <= p.most else -size
+        moved.append((p, step))
+    parameters = [([(key, value + step if key == p.key else value) for key, value in nominal], step / scale[i], p.acts)
+                  for i, (p, step) in enumerate(moved)]
+    inputs = [log.inputs() for log in problem.logs]
+    for piece in pieces:
+        check()
+        piece.linear = _core.linearise(problem.base, nominal, parameters, inputs[piece.log], piece.first, piece.states)
+        _measure(problem, piece)
+    return scale
+
+
+def _measure(problem: Problem, piece: Piece) -> None:
+    """What the filter needs beside the sensitivities: residuals, weights, gaps between windows."""
+    motion, linear = problem.motions[piece.log], piece.linear
+    angle = motion.angle_rad[piece.rows]
+    residual = np.nan_to_num(angle) - linear['angles']
+    weight = np.where(np.isfinite(angle), motion.weight[piece.rows], 0.0)
+    gap = np.zeros_like(piece.states)
+    gap[:-1] = linear['end'][:-1] - piece.states[1:]
+    linear.update(residual=residual[:, :, None], weight=weight, gap=gap, stands=piece.stands, first=piece.first,
+                  prior_sd=piece.prior_sd, time_s=problem.logs[piece.log].time_s)
+
+
+def _duty_step(problem: Problem, u0: float) -> float:
+    """A change of u0 that reaches other duties of the logs: two steps of the brake's PWM at least."""
+    duties = np.unique(np.concatenate([log.brake_pwm for log in problem.logs]))
+    near = np.sort(np.abs(duties - u0))
+    return float(max(5e-4, min(0.02, near[min(4, len(near) - 1)])))
+
+
+def directions(problem: Problem, scale: np.ndarray) -> np.ndarray:
+    """What each disturbance does, as changes of the parameters: shape (5, parameters)."""
+    keys = [p.key for p in problem.parameters]
+    out = np.zeros((5, len(keys)))
+    for row, names in ((0, problem.form.road), (1, ('b1_Nm', 'b2_Nm')), (2, ('motor_stall_torque_Nm',))):
+        for name in names:
+            i = keys.index(name)
+            out[row, i] = 1.0
+    for row, name in ((3, 'M10_Nm'), (4, 'M20_Nm')):
+        i = keys.index(name)
+        out[row, i] = 1.0 / scale[i]
+    return out
+
+
+def _relative(problem: Problem, values: Mapping[str, float], scale: np.ndarray) -> np.ndarray:
+    """`directions`, where a factor moves a parameter by its own value (b2 may be smaller than its scale)."""
+    out = directions(problem, scale)
+    for i, p in enumerate(problem.parameters):
+        for row in range(3):
+            out[row, i] *= values[p.key] / scale[i]
+    return out
+
+
+def run_filter(fit: Fit, disturbances: Disturbances, variance: float | None = None) -> tuple[float, list[Any]]:
+    """-2 log likelihood but for a constant at the best parameters, and what `_core.filter_pieces` gave."""
+    problem = fit.problem
+    variance = COUNT_VARIANCE * problem.radians_per_count**2 if variance is None else variance
+    way = _relative(problem, fit.values, fit.scale)
+    found = _core.filter_pieces([piece.linear for piece in fit.pieces], way, disturbances.sd,
+                                disturbances.time_constant_s, variance)
+    N = sum(one[0] for one in found)
+    n = sum(one[1][:, 0] for one in found)
+    c = sum(float(one[2][0]) for one in found)
+    log_variance = sum(one[3] for one in found)
+    x = _solved(N, n, fit.free)
+    return c - float(n @ x) + log_variance, list(found)
+
+
+def _solved(N: np.ndarray, n: np.ndarray, free: np.ndarray, pull: float = 1e-4) -> np.ndarray:
+    """Change of the parameters, 0 for those that are not free. A weak pull to 0 decides what nothing else does."""
+    x = np.zeros(len(n))
+    A = N[np.ix_(free, free)] + pull * np.eye(int(free.sum()))
+    d = 1 / np.sqrt(np.diag(A))
+    x[free] = d * np.linalg.solve(A * np.outer(d, d), d * n[free])
+    return x
+
+
+def step(fit: Fit, disturbances: Disturbances, pull: float, check: Callable[[], None] = lambda: None,
+         bound: float = 0.3) -> float:
+    """One iteration: linearise, estimate, move parameters and states. Returns the largest change over its uncertainty."""
+    problem = fit.problem
+    fit.disturbances = disturbances
+    fit.scale = linearise(problem, fit.values, fit.pieces, check)
+    _, found = run_filter(fit, disturbances)
+    N, n = _keep_normals(fit, found)
+    x = _solved(N, n, fit.free, pull)
+    x = np.clip(x, -bound, bound)
+    moved = dict(fit.values)
+    for i, p in enumerate(problem.parameters):
+        if fit.free[i]:
+            moved[p.key] = float(np.clip(fit.values[p.key] + fit.scale[i] * x[i], p.least, p.most))
+            if p.floor == 0.0:  # sizes that cannot vanish
+                moved[p.key] = max(moved[p.key], 0.3 * fit.values[p.key])
+    x = np.array([(moved[p.key] - fit.values[p.key]) / fit.scale[i] for i, p in enumerate(problem.parameters)])
+    _move_states(fit, disturbances, x)
+    fit.values = moved
+    fit.iterations += 1
+    sd = np.sqrt(np.maximum(np.diag(np.linalg.pinv(N[np.ix_(fit.free, fit.free)] + 1e-4 * np.eye(int(fit.free.sum())))),
+                            1e-30))
+    return float(np.max(np.abs(x[fit.free]) / sd, initial=0.0))
+
+
+def _keep_normals(fit: Fit, found: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
+    logs, n = len(fit.problem.logs), len(fit.scale)
+    fit.normal, fit.right, fit.cost = np.zeros((logs, n, n)), np.zeros((logs, n)), np.zeros(logs)
+    fit.readings = 0.0
+    for piece, (N, right, square, log_variance, readings) in zip(fit.pieces, found):
+        fit.normal[piece.log] += N
+        fit.right[piece.log] += right[:, 0]
+        fit.cost[piece.log] += square[0] + log_variance
+        fit.readings += readings
+    return fit.normal.sum(axis=0), fit.right.sum(axis=0)
+
+
+def _move_states(fit: Fit, disturbances: Disturbances, x: np.ndarray) -> None:
+    problem = fit.problem
+    way = _relative(problem, fit.values, fit.scale)
+    variance = COUNT_VARIANCE * problem.radians_per_count**2
+    square = weights = 0.0
+    for piece in fit.pieces:
+        linear = dict(piece.linear)
+        # The states are near already. A wide prior would only lose digits in the backward pass.
+        linear['prior_sd'] = np.minimum(piece.prior_sd, NEAR_SD)
+        linear['residual'] = (linear['residual'][:, :, 0] - linear['by_parameter'] @ x)[:, :, None]
+        linear['gap'] = linear['gap'] + linear['end_by_parameter'] @ x
+        change, _ = _core.smooth(linear, way, disturbances.sd, disturbances.time_constant_s, variance)
+        counts = np.repeat(np.arange(len(piece.first) - 1), np.diff(piece.first))
+        left = linear['residual'][:, :, 0] - np.einsum('rws,rs->rw', linear['by_state'], change[counts, 2:5])
+        left -= change[counts, :2]
+        left -= np.einsum('rwp,dp,rd->rw', linear['by_parameter'], way, change[counts, 5:])
+        square += float(np.sum(linear['weight'] * left**2))
+        weights += float(np.sum(linear['weight']))
+        speeds = change[:, 2:4]
+        piece.states = piece.states + np.column_stack([change[:, :2], np.clip(speeds, -30, 30), change[:, 4:5]])
+        piece.states[:, 2:4] = np.where(piece.stands != 0, 0.0, np.maximum(piece.states[:, 2:4], 0.0))
+        piece.states[:, 4] = np.maximum(piece.states[:, 4], 0.0)
+    fit.rms_counts = float(np.sqrt(square / max(weights, 1e-9))) / problem.radians_per_count
+
+
+def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
+              check: Callable[[], None] = lambda: None) -> list[tuple[float, float, float]]:
+    """Moves u0 to the most likely gap between the duties of the logs, within `width` of its value. A log tells of u0 only
+    in which of these gaps it lies: the cost is flat within one. Needs the linearisation of `step`; that stays valid.
+
+    Returns (begin of the gap, end of the gap, cost) of those tried, in order.
+    """
+    problem = fit.problem
+    if 'u0' in problem.fixed:
+        return []
+    present = fit.values['u0']
+    duties = np.unique(np.concatenate([log.brake_pwm for log in problem.logs]))
+    edges = duties[np.searchsorted(duties, present - width, 'right') - 1 if duties[0] < present - width else 0:]
+    edges = edges[:np.searchsorted(edges, present + width) + 1]
+    gaps = list(zip(edges[:-1], edges[1:]))
+    if not gaps:
+        return []
+    if len(gaps) > most:  # evenly chosen ones; a later call looks closer
+        gaps = [gaps[i] for i in sorted({round(i) for i in np.linspace(0, len(gaps) - 1, most)})]
+    affected = [_has_duties(problem, piece, edges[0], edges[-1]) for piece in fit.pieces]
+    way = _relative(problem, fit.values, fit.scale)
+    variance = COUNT_VARIANCE * problem.radians_per_count**2
+    settings = (way, disturbances.sd, disturbances.time_constant_s, variance)
+    rest = _core.filter_pieces([p.linear for p, hit in zip(fit.pieces, affected) if not hit], *settings)
+    inputs = [log.inputs() for log in problem.logs]
+    tried = []
+    for begin, end in gaps:
+        check()
+        # A duty that equals u0 acts (7): so u0 lies above the gap's begin, up to its end.
+        candidate = max(0.5 * (begin + end), end - 1e-3)
+        nominal = [*problem.given.items(), *((p.key, candidate if p.key == 'u0' else fit.values[p.key])
+                                             for p in problem.parameters)]
+        changed = []
+        for piece, hit in zip(fit.pieces, affected):
+            if hit:
+                other = _core.linearise(problem.base, nominal, [], inputs[piece.log], piece.first, piece.states)
+                moved = Piece(piece.log, piece.first, piece.states, piece.stands, piece.prior_sd, dict(piece.linear))
+                moved.linear.update(angles=other['angles'], end=other['end'])
+                _measure(problem, moved)
+                changed.append(moved.linear)
+        found = [*rest, *_core.filter_pieces(changed, *settings)]
+        N, n = sum(one[0] for one in found), sum(one[1][:, 0] for one in found)
+        cost = sum(float(one[2][0]) + one[3] for one in found)
+        tried.append((float(begin), float(end), cost - float(n @ _solved(N, n, fit.free))))
+    best = min(tried, key=lambda gap: gap[2])
+    fit.values['u0'] = max(0.5 * (best[0] + best[1]), best[1] - 1e-3)
+    return tried
+
+
+def _has_duties(problem: Problem, piece: Piece, least: float, most: float) -> bool:
+    duty = problem.logs[piece.log].brake_pwm[max(piece.rows.start - 1, 0):piece.rows.stop]
+    return bool(np.any((duty >= least) & (duty <= most)))
+
+
+def start_fit(problem: Problem, start: Mapping[str, float], check: Callable[[], None] = lambda: None) -> Fit:
+    """First values and a few rounds with large disturbances: near the truth, whatever the start."""
+    values = first_values(problem.form, problem.base, problem.given, start, problem.logs, problem.motions,
+                          problem.segments, problem.fixed)
+    values.setdefault(DELAY, 0.0)
+    free = np.array([p.key not in problem.fixed and p.key != 'u0' for p in problem.parameters])
+    fit = Fit(problem, values, pieces_of(problem, values, WINDOW_S), ROUNDS[0][0], WINDOW_S, free)
+    disturbances, count = ROUNDS[0]
+    for _ in range(count):
+        step(fit, disturbances, 10.0, check)
+    return fit
+
+
+def finish_fit(fit: Fit, check: Callable[[], None] = lambda: None, most: int = 8) -> Fit:
+    """The rest of the rounds, then without disturbances until nothing moves."""
+    for number, (disturbances, count) in enumerate(ROUNDS[1:]):
+        for _ in range(count):
+            step(fit, disturbances, 1.0, check)
+        search_u0(fit, disturbances, 0.004 / 4**number, 9, check)
+    for _ in range(most):
+        if step(fit, QUIET, 1e-4, check) < 0.05:
+            break
+    return fit
+
+
+def disturbed_fit(fit: Fit, check: Callable[[], None] = lambda: None, say: Callable[[str], None] = lambda _: None) -> Fit:
+    """A fit for a rig whose factors wander: estimates how much, by maximum likelihood, along with the parameters."""
+    problem = fit.problem
+    fit = dataclasses.replace(fit, pieces=pieces_of(problem, fit.values, WINDOW_DISTURBED_S), window_s=WINDOW_DISTURBED_S)
+    present = Disturbances.of(0.02, 0.01, 0.2)
+    for round_number in range(4):
+        for _ in range(2 if round_number == 0 else 1):
+            moved = step(fit, present, 1e-2, check)
+        search_u0(fit, present, 0.003 / 2**round_number, 7, check)
+        if round_number < 3:
+            present = likeliest_disturbances(fit, present, 12 if round_number == 0 else 6)
+            say(f'disturbances: {describe(present)}')
+    for _ in range(3):
+        if moved < 0.05:
+            break
+        moved = step(fit, present, 1e-2, check)
+    return fit
+
+
+def describe(disturbances: Disturbances) -> str:
+    factors = ', '.join(f'{name} {100 * sd:.2g} %' for name, sd in zip(DISTURBANCES[:3], disturbances.sd))
+    bearings = ', '.join(f'{name} {1e3 * sd:.2g} mN m' for name, sd in zip(DISTURBANCES[3:], disturbances.sd[3:]))
+    return f'{factors}, {bearings}; over {disturbances.time_constant_s[0]:.2g} s'
+
+
+def likeliest_disturbances(fit: Fit, guess: Disturbances, evaluations: int) -> Disturbances:
+    """Maximises the likelihood over the five standard deviations and one time constant, at this linearisation."""
+    x0 = np.log(np.append(guess.sd, guess.time_constant_s[0]))
+    # A weak pull keeps a factor that no log excites from running away.
+    centre = np.log(np.array([0.01, 0.01, 0.01, 0.003, 0.003, 0.2]))
+
+    def cost(x: np.ndarray) -> float:
+        value, _ = run_filter(fit, Disturbances(np.exp(x[:5]), np.full(5, np.exp(x[5]))))
+        return value + float(np.sum(((x - centre) / 3.0)**2))
+    bounds = [*zip(np.log([1e-5] * 3 + [1e-6] * 2 + [0.02]), np.log([0.5] * 3 + [0.3] * 2 + [5.0]))]
+    best = scipy.optimize.minimize(cost, np.clip(x0, *np.transpose(bounds)), method='L-BFGS-B', bounds=bounds,
+                                   options={'maxfun': evaluations, 'eps': 0.02, 'ftol': 1e-6})
+    return Disturbances(np.exp(best.x[:5]), np.full(5, np.exp(best.x[5])))

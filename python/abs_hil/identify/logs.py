@@ -1,0 +1,254 @@
+"""Logs for identification: what was measured and what was sent, from run folders, event logs and plain CSV files."""
+from __future__ import annotations
+
+import gzip
+import hashlib
+import io
+import pathlib
+import zlib
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.ndimage
+import scipy.signal
+
+from ..options import PathLike
+from ..run import load
+
+NEEDED = ('time_s', 'upper_counts', 'lower_counts', 'brake_pwm', 'motor_pwm')
+LEAST_ROWS = 200
+#: half the width of the local parabola that gives first speeds, s
+HALF_WIDTH_S = 0.012
+#: a wheel stands while its count stays the same for this long before and after, s
+STANDS_S = 0.015
+#: slower than this a log says little but about friction at rest, which the model leaves out
+LEAST_SPEED_RAD_S = 3.0
+LEAST_SEGMENT_S = 0.2
+
+
+@dataclass
+class Log:
+    """One log. Arrays have shape (rows,), those with two columns (rows, 2): upper wheel, lower wheel.
+
+    counts: unwrapped, from 0 at the first row; NaN where there was no valid reading
+    read_late_s: how much later than time_s each wheel was read (sample_time_s - time_s)
+    """
+    name: str
+    path: pathlib.Path
+    sha256: str
+    time_s: np.ndarray
+    counts: np.ndarray
+    brake_pwm: np.ndarray
+    motor_pwm: np.ndarray
+    wheels_apart: np.ndarray
+    phase: np.ndarray
+    read_late_s: np.ndarray
+    notes: list[str] = field(default_factory=list)
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @property
+    def period_s(self) -> float:
+        return float(np.median(np.diff(self.time_s)))
+
+    def inputs(self) -> dict[str, np.ndarray]:
+        return {'time_s': self.time_s, 'brake_pwm': self.brake_pwm, 'motor_pwm': self.motor_pwm,
+                'wheels_apart': self.wheels_apart}
+
+
+def load_log(path: PathLike) -> Log:
+    """Reads a run folder, an event log (.lcmlog) or a CSV file, gzip or not, with the columns time_s, upper_counts,
+    lower_counts, brake_pwm, motor_pwm and, if they are there, phase and wheels_apart. Row n holds the counts at time_s
+    and the duties (0 to 1, as sent) from then on.
+
+    Raises ValueError for a file that cannot serve, with its name and the reason; what is cut off is left out and noted.
+    """
+    place = pathlib.Path(path)
+    if place.is_dir() or place.suffix == '.lcmlog':
+        columns, notes, content = _from_run(place)
+    else:
+        columns, notes, content = _from_csv(place)
+    try:
+        return _log(place, columns, notes, hashlib.sha256(content).hexdigest())
+    except ValueError as error:
+        raise ValueError(f'"{place}": {error}') from None
+
+
+def _from_run(place: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str], bytes]:
+    run = load(place)
+    content = b''
+    for name in ('run.csv', 'run.lcmlog'):
+        file = place if place.is_file() else place / name
+        if file.exists():
+            content = file.read_bytes()
+            break
+    columns = run.columns
+    if 'upper_counts' not in columns and (place / 'run.lcmlog').exists():
+        columns = load(place / 'run.lcmlog').columns
+    notes = [note for note in run.notes if 'figures of merit' not in note]
+    return columns, notes, content
+
+
+def _from_csv(place: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str], bytes]:
+    import pandas
+    try:
+        content = place.read_bytes()
+    except OSError as error:
+        raise ValueError(f'cannot read "{place}": {error.strerror}') from None
+    notes: list[str] = []
+    text = content
+    if content[:2] == b'\x1f\x8b':
+        text, cut = _unzipped(content)
+        if cut:
+            notes.append(f'"{place}" is cut off; its readable part is used')
+    if not text.endswith(b'\n') and b'\n' in text:
+        last = text.rindex(b'\n') + 1
+        if text[last:].count(b',') != text[:text.index(b'\n')].count(b','):
+            text = text[:last]
+            notes.append(f'the last row of "{place}" is incomplete and is left out')
+    try:
+        wanted = {*NEEDED, 'phase', 'wheels_apart', 'phase_name', 'sample_valid', 'sample_time_s'}
+        frame = pandas.read_csv(io.BytesIO(text), usecols=lambda name: name.strip() in wanted, skipinitialspace=True)
+    except Exception as error:  # pandas raises many kinds
+        raise ValueError(f'"{place}" is no CSV file of a log: {error}') from None
+    frame.columns = [name.strip() for name in frame.columns]
+    return {str(name): frame[name].to_numpy() for name in frame.columns}, notes, content
+
+
+def _unzipped(content: bytes) -> tuple[bytes, bool]:
+    stream = zlib.decompressobj(wbits=31)
+    try:
+        text = stream.decompress(content)
+    except zlib.error:
+        text = b''
+        with gzip.GzipFile(fileobj=io.BytesIO(content)) as file:
+            try:
+                while chunk := file.read1(1 << 16):
+                    text += chunk
+            except (OSError, EOFError, zlib.error):
+                pass
+        return text, True
+    return text, not stream.eof
+
+
+def _log(place: pathlib.Path, columns: dict[str, np.ndarray], notes: list[str], sha256: str) -> Log:
+    missing = [name for name in NEEDED if name not in columns]
+    if missing:
+        raise ValueError(f'the log lacks the columns {", ".join(missing)}; needed are {", ".join(NEEDED)}')
+    numbers = {}
+    for name in NEEDED:
+        try:
+            numbers[name] = np.asarray(columns[name], dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ValueError(f'the column {name} holds texts; give numbers') from None
+    known = np.isfinite(numbers['time_s'])
+    if not known.all():
+        numbers = {name: values[known] for name, values in numbers.items()}
+        columns = {name: np.asarray(values)[known] for name, values in columns.items()}
+        notes.append(f'{int((~known).sum())} rows without a time are left out')
+    time_s = numbers['time_s']
+    if len(time_s) < LEAST_ROWS:
+        raise ValueError(f'the log has {len(time_s)} rows; give at least {LEAST_ROWS}')
+    if not (np.diff(time_s) > 0).all():
+        row = int(np.argmin(np.diff(time_s))) + 1
+        raise ValueError(f'time_s does not rise at row {row}: {time_s[row - 1]:g} s, then {time_s[row]:g} s')
+    duties = {}
+    for name in ('brake_pwm', 'motor_pwm'):
+        duty = np.nan_to_num(numbers[name])
+        if duty.min() < 0 or duty.max() > 1:
+            raise ValueError(f'{name} reaches {duty.max() if duty.max() > 1 else duty.min():g}; give duties from 0 to 1')
+        duties[name] = duty
+    counts = np.stack([numbers['upper_counts'], numbers['lower_counts']], axis=1)
+    if 'sample_valid' in columns:
+        counts[np.asarray(columns['sample_valid'], dtype=float) == 0] = np.nan
+    late = np.zeros((len(time_s), 2))
+    if 'sample_time_s' in columns:
+        late[:] = np.nan_to_num(np.asarray(columns['sample_time_s'], dtype=float) - time_s)[:, None]
+    apart = np.asarray(columns.get('wheels_apart', np.zeros(len(time_s))), dtype=float)
+    counts = np.stack([_unwrapped(counts[:, wheel]) for wheel in range(2)], axis=1)
+    for wheel, name in enumerate(('upper_counts', 'lower_counts')):
+        if np.nanmin(counts[:, wheel]) == np.nanmax(counts[:, wheel]):
+            raise ValueError(f'{name} never changes: the wheel stood, or its encoder is not connected')
+    phase = np.asarray(columns.get('phase_name', columns.get('phase', np.full(len(time_s), ''))), dtype=object)
+    return Log(_name(place), place, sha256, time_s, counts, duties['brake_pwm'], duties['motor_pwm'],
+               (apart != 0).astype(float), phase, late, notes)
+
+
+def _name(place: pathlib.Path) -> str:
+    name = place.resolve().name
+    for suffix in ('.gz', '.csv', '.lcmlog'):
+        name = name.removesuffix(suffix)
+    return name
+
+
+def _unwrapped(counts: np.ndarray) -> np.ndarray:
+    """Counts of a 32-bit register as ever rising or falling ones, from 0."""
+    known = np.isfinite(counts)
+    if known.sum() < LEAST_ROWS:
+        raise ValueError(f'only {int(known.sum())} readings of a wheel are valid; give at least {LEAST_ROWS}')
+    steps = np.diff(counts[known])
+    steps = (steps + 2.0**31) % 2.0**32 - 2.0**31
+    out = np.full(len(counts), np.nan)
+    out[known] = np.concatenate([[0.0], np.cumsum(steps)])
+    return out
+
+
+# ---- what follows from the counts alone
+
+@dataclass
+class Motion:
+    """Angles, speeds and what the counts weigh, by local parabolas. Shapes (rows, 2).
+
+    angle_rad: of the count's middle, at time_s; NaN where there is no reading
+    """
+    angle_rad: np.ndarray
+    smooth_rad: np.ndarray
+    speed_rad_s: np.ndarray
+    weight: np.ndarray
+    stands: np.ndarray
+
+
+def motion_of(log: Log, counts_per_rev: int) -> Motion:
+    per_count = 2 * np.pi / counts_per_rev
+    rows = len(log)
+    half = max(2, round(HALF_WIDTH_S / log.period_s))
+    width = 2 * half + 1
+    grid = np.linspace(log.time_s[0], log.time_s[-1], rows)
+    smooth, speed = np.empty((rows, 2)), np.empty((rows, 2))
+    angle, weight, stands = np.empty((rows, 2)), np.empty((rows, 2)), np.empty((rows, 2), dtype=bool)
+    around = max(1, round(STANDS_S / log.period_s))
+    for wheel in range(2):
+        counts = log.counts[:, wheel]
+        known = np.isfinite(counts)
+        filled = np.interp(log.time_s, log.time_s[known], counts[known] + 0.5) * per_count
+        even = np.interp(grid, log.time_s, filled)
+        smooth[:, wheel] = np.interp(log.time_s, grid, scipy.signal.savgol_filter(even, width, 2))
+        delta = (grid[-1] - grid[0]) / (rows - 1)
+        speed[:, wheel] = np.interp(log.time_s, grid, scipy.signal.savgol_filter(even, width, 2, deriv=1, delta=delta))
+        angle[:, wheel] = np.where(known, filled, np.nan) - log.read_late_s[:, wheel] * speed[:, wheel]
+        weight[:, wheel] = np.where(known, _weights(np.where(known, counts, -1e18)), 0.0)
+        moved = scipy.ndimage.maximum_filter1d(filled, 2 * around + 1) != scipy.ndimage.minimum_filter1d(
+            filled, 2 * around + 1)
+        stands[:, wheel] = ~moved
+    return Motion(angle, smooth, speed, weight, stands)
+
+
+def _weights(counts: np.ndarray) -> np.ndarray:
+    """Rows that share a count weigh as one: a slow wheel repeats what is known already."""
+    starts = np.flatnonzero(np.concatenate([[True], np.diff(counts) != 0]))
+    lengths = np.diff(np.concatenate([starts, [len(counts)]]))
+    return np.repeat(1.0 / lengths, lengths)
+
+
+def segments_of(log: Log, motion: Motion) -> list[tuple[int, int]]:
+    """Rows [begin, end) in which something turns: without rest, gaps in time, or a change from touching to apart."""
+    upper, lower = motion.speed_rad_s[:, 0], motion.speed_rad_s[:, 1]
+    moves = np.where(log.wheels_apart != 0, np.maximum(upper, lower), lower) > LEAST_SPEED_RAD_S
+    steps = np.diff(log.time_s)
+    breaks = np.flatnonzero((np.diff(log.wheels_apart) != 0) | (steps > 5 * log.period_s)) + 1
+    segments = []
+    for begin, end in zip([0, *breaks], [*breaks, len(log)]):
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], moves[begin:end], [False]]).astype(int)))
+        segments += [(begin + a, begin + b) for a, b in zip(edges[::2], edges[1::2])]
+    return [(a, b) for a, b in segments if log.time_s[b - 1] - log.time_s[a] >= LEAST_SEGMENT_S]

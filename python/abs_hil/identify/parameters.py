@@ -1,0 +1,98 @@
+"""What can be identified: one row for each parameter, and the two forms of the plant."""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..core import _core
+from ..options import PathLike, options
+
+#: the inputs' delay behind the row's time, s; a parameter of logs, not of the plant
+DELAY = 'delay_s'
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of the plant: its key without "plant."; `acts` says when it matters (python/src/identification.cpp);
+    `floor` is the least size that a step relates to, for those that may be 0; `cure` is what would tell it."""
+    key: str
+    unit: str
+    acts: str
+    cure: str
+    floor: float = 0.0
+    least: float = 0.0
+    most: float = np.inf
+
+
+_SHARED = (
+    Parameter('r1_m', 'm', 'contact', 'any log with both wheels rolling together'),
+    Parameter('J1_kg_m2', 'kg m^2', 'always', 'lifted'),
+    Parameter('d1_Nms_rad', 'N m s/rad', 'always', 'lifted', floor=2e-5),
+    Parameter('d2_Nms_rad', 'N m s/rad', 'always', 'lifted', floor=2e-5),
+    Parameter('M10_Nm', 'N m', 'always', 'lifted', floor=1e-3),
+    Parameter('M20_Nm', 'N m', 'always', 'lifted', floor=1e-3),
+    Parameter('b1_Nm', 'N m', 'brake', 'duty-ramp'),
+    Parameter('b2_Nm', 'N m', 'brake', 'duty-ramp', floor=0.5, least=-np.inf),
+    Parameter('c31_per_s', '1/s', 'brake', 'pulses'),
+    Parameter('u0', '1', 'brake', 'duty-ramp', most=0.999),
+    Parameter('motor_stall_torque_Nm', 'N m', 'motor', 'pulses'),
+    Parameter('motor_no_load_speed_rad_s', 'rad/s', 'motor', 'lifted'),
+)
+_MAGIC = (
+    Parameter('theta_N', 'N', 'contact', 'slip-sweep or locked-stop'),
+    Parameter('B', '1', 'contact', 'slip-sweep'),
+    Parameter('C', '1', 'contact', 'slip-sweep or locked-stop', most=2.0),
+)
+_LEVER = (
+    Parameter('lever_Mg_Nm', 'N m', 'contact', 'slip-sweep and pulses'),
+    Parameter('mu_w4', '1', 'contact', 'slip-sweep or locked-stop'),
+    Parameter('mu_a', '1', 'contact', 'slip-sweep'),
+    Parameter('mu_p', '1', 'contact', 'slip-sweep', least=1.0, most=10.0),
+)
+#: given by the person: no log tells the scale of all torques and inertias, nor the scale of length
+GIVEN = {'J2_kg_m2': 'kg m^2', 'r2_m': 'm'}
+
+
+@dataclass(frozen=True)
+class Form:
+    """A form of the plant. `road` names the parameters that a factor over the tyre's force multiplies."""
+    name: str
+    meaning: str
+    settings: Mapping[str, str]
+    parameters: tuple[Parameter, ...]
+    road: tuple[str, ...]
+
+
+FORMS = {
+    'magic-formula': Form('magic-formula', 'magic formula, constant load',
+                          {'plant.tyre': 'magic-formula', 'plant.load': 'constant'}, _SHARED + _MAGIC, ('theta_N',)),
+    'inteco-mu': Form('inteco-mu', "the maker's curve, load by the lever",
+                      {'plant.tyre': 'inteco-mu', 'plant.load': 'lever'}, _SHARED + _LEVER, ('mu_w4',)),
+}
+
+#: combinations that are known where their parts are not: name -> unit, parts, what tells them apart
+COMBINATIONS = {
+    'M10_plus_M20_Nm': ('N m', ('M10_Nm', 'M20_Nm'), 'lifted'),
+    'd1_plus_d2_Nms_rad': ('N m s/rad', ('d1_Nms_rad', 'd2_Nms_rad'), 'lifted'),
+    'theta_B_C_N': ('N', ('theta_N', 'B', 'C'), 'slip-sweep'),
+}
+
+
+def base_options(form: Form, start: PathLike) -> Any:
+    """The start plant in this form, without what a log does not know: profiles of friction and drift."""
+    given: dict[str, Any] = {**form.settings, 'plant.friction_profile': '', 'plant.ideal_actuator': False,
+                             'plant.ideal_sensors': False, 'plant.max_step_s': 1e-3}
+    given.update({f'plant.{part}_profile': '' for part in ('brake_torque', 'motor_torque', 'upper_bearing',
+                                                           'lower_bearing')})
+    return _core.PlantOptions(options(plant=start, set=given))
+
+
+def checked_keys(fixed: Mapping[str, float | None]) -> None:
+    """Raises ValueError for a key that is no parameter of any form."""
+    known = {p.key for form in FORMS.values() for p in form.parameters} | set(GIVEN)
+    for key in fixed:
+        if key not in known:
+            raise ValueError(f'--fix {key}: no such parameter; give one of {", ".join(sorted(known))}')

@@ -1,0 +1,281 @@
+"""First values from the equations of motion themselves, linear in most parameters: no start values are needed for them.
+
+With F eliminated from (1) and (2), over an interval of time,
+
+    (J1/r1) dw1 + (J2/r2) dw2 = int [ Tm/r2 - (d1 w1 + M10 s1 + Tb)/r1 - (d2 w2 + M20)/r2 ] dt
+
+which is linear but for u0 and c31; these two are scanned. While the wheels are apart, each has an equation of its own.
+The tyre's parameters then fit the force that the lower wheel felt.
+"""
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.optimize
+import scipy.signal
+
+from ..core import _core
+from .logs import Log, Motion
+from .parameters import Form
+
+INTERVAL_S = 0.04
+COARSE_S = 0.004
+
+
+@dataclass
+class _Pieces:
+    """Intervals of all logs: speeds at their ends, integrals over them."""
+    apart: np.ndarray
+    dw: np.ndarray  # (intervals, 2)
+    angle: np.ndarray  # (intervals, 2)
+    duration: np.ndarray
+    turning: np.ndarray  # share of time that each wheel turns (intervals, 2)
+    motor: np.ndarray  # int u dt
+    motor_speed: np.ndarray  # int u w2 dt
+    parts: list[tuple[int, np.ndarray, np.ndarray]]  # log, first row, last row
+    log: np.ndarray
+
+
+def brake_torques(log: Log, b1: float, b2: float, u0: float, c31: float) -> np.ndarray:
+    """The brake's torque at each row by (6) and (7), from 0, N m."""
+    static = np.where(log.brake_pwm >= u0, np.maximum(0.0, b1 * log.brake_pwm + b2), 0.0)
+    return _lagged(log, static, c31)
+
+
+def _lagged(log: Log, static: np.ndarray, c31: float) -> np.ndarray:
+    keeps = float(np.exp(-c31 * log.period_s))
+    lagged = scipy.signal.lfilter([0.0, 1.0 - keeps], [1.0, -keeps], static)
+    return np.asarray(lagged)
+
+
+def _integral(log: Log, values: np.ndarray) -> np.ndarray:
+    return np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(log.time_s))])
+
+
+def _pieces(logs: Sequence[Log], motions: Sequence[Motion], segments: Sequence[Sequence[tuple[int, int]]]) -> _Pieces:
+    rows: list[list[np.ndarray]] = [[] for _ in range(8)]
+    parts = []
+    for number, (log, motion, pieces) in enumerate(zip(logs, motions, segments)):
+        step = max(2, round(INTERVAL_S / log.period_s))
+        first = np.concatenate([np.arange(a + step, b - 2 * step, step) for a, b in pieces] or [np.empty(0, dtype=int)])
+        first = first.astype(int)
+        last = first + step
+        w = motion.speed_rad_s
+        motor, speed = _integral(log, log.motor_pwm), _integral(log, log.motor_pwm * w[:, 1])
+        turning = np.stack([_integral(log, (~motion.stands[:, i]).astype(float)) for i in range(2)], axis=1)
+        values = (log.wheels_apart[first], w[last] - w[first], motion.smooth_rad[last] - motion.smooth_rad[first],
+                  log.time_s[last] - log.time_s[first], turning[last] - turning[first], motor[last] - motor[first],
+                  speed[last] - speed[first], np.full(len(first), number))
+        for column, value in zip(rows, values):
+            column.append(value)
+        parts.append((number, first, last))
+    joined = [np.concatenate(column) for column in rows]
+    return _Pieces(joined[0] != 0, joined[1], joined[2], joined[3], joined[4], joined[5], joined[6], parts, joined[7])
+
+
+def first_values(form: Form, base: Any, given: Mapping[str, float], start: Mapping[str, float], logs: Sequence[Log],
+                 motions: Sequence[Motion], segments: Sequence[Sequence[tuple[int, int]]],
+                 fixed: Mapping[str, float]) -> dict[str, float]:
+    """First values of the form's parameters. `given`: J2_kg_m2 and r2_m; `start` fills what the logs do not tell."""
+    pieces = _pieces(logs, motions, segments)
+    r2, J2 = given['r2_m'], given['J2_kg_m2']
+    value = {p.key: float(start[p.key]) for p in form.parameters}
+    value.update(fixed)
+    if 'r1_m' not in fixed:
+        rolling = ~pieces.apart & (pieces.motor == 0) & (pieces.turning.min(axis=1) > 0.99 * pieces.duration)
+        rolling &= ~_braked(pieces, logs)
+        if rolling.sum() > 3:
+            value['r1_m'] = r2 * float(np.median(pieces.angle[rolling, 1] / pieces.angle[rolling, 0]))
+    _scan_brake(value, pieces, logs, motions, r2, J2, fixed)
+    _tyre(form, base, value, pieces, logs, motions, r2, J2, fixed)
+    return value
+
+
+def _braked(pieces: _Pieces, logs: Sequence[Log]) -> np.ndarray:
+    acts = []
+    for number, first, last in pieces.parts:
+        log = logs[number]
+        memory = max(1, round(0.3 / log.period_s))
+        recent = _integral(log, (log.brake_pwm > 0).astype(float))
+        acts.append(recent[last] - recent[np.maximum(first - memory, 0)] > 0)
+    return np.concatenate(acts) if acts else np.empty(0, dtype=bool)
+
+
+#: columns of the linear fit
+_LINEAR = ('J1_kg_m2', 'd1_Nms_rad', 'M10_Nm', 'd2_Nms_rad', 'M20_Nm', 'motor_stall_torque_Nm', 'back_emf', 'b1_Nm',
+           'b2_Nm')
+
+
+def _scan_brake(value: dict[str, float], pieces: _Pieces, logs: Sequence[Log], motions: Sequence[Motion], r2: float,
+                J2: float, fixed: Mapping[str, float]) -> None:
+    r1 = value['r1_m']
+    n = len(pieces.duration)
+    zero = np.zeros(n)
+    turning1, turning2 = pieces.turning.T
+    motor = {'motor_stall_torque_Nm': pieces.motor, 'back_emf': -pieces.motor_speed}
+    contact, apart = ~pieces.apart, pieces.apart
+    duties = np.unique(np.concatenate([log.brake_pwm[log.brake_pwm > 0] for log in logs] or [np.empty(0)]))
+
+    # The scan needs no more than every fourth millisecond.
+    thin = [max(1, round(COARSE_S / log.period_s)) for log in logs]
+    coarse = [(log.time_s[::k], log.brake_pwm[::k], (~motion.stands[::k, 0]).astype(float), k)
+              for log, motion, k in zip(logs, motions, thin)]
+
+    def brake_columns(u0: float, c31: float) -> tuple[np.ndarray, np.ndarray]:
+        slopes, offsets = [], []
+        for number, first, last in pieces.parts:
+            time_s, duty, turning, k = coarse[number]
+            active = (duty >= u0) & (duty > 0)
+            keeps = float(np.exp(-c31 * k * logs[number].period_s))
+            for into, static in ((slopes, np.where(active, duty, 0.0)), (offsets, active.astype(float))):
+                acts = scipy.signal.lfilter([0.0, 1.0 - keeps], [1.0, -keeps], static) * turning
+                whole = np.concatenate([[0.0], np.cumsum(0.5 * (acts[:-1] + acts[1:]) * np.diff(time_s))])
+                whole = np.interp(np.concatenate([first, last]), k * np.arange(len(whole)), whole)
+                into.append(whole[len(first):] - whole[:len(first)])
+        return np.concatenate(slopes), np.concatenate(offsets)
+
+    # A wheel that stands transmits what the brake holds, unknown: such intervals tell nothing of the sum.
+    usable = contact & (turning1 > 0.999 * pieces.duration)
+    upper = apart & (turning1 > 0.999 * pieces.duration)
+    lower = apart & (turning2 > 0.999 * pieces.duration)
+
+    def fit(u0: float, c31: float) -> tuple[float, np.ndarray]:
+        slope, offset = brake_columns(u0, c31)
+        friction1 = {'d1_Nms_rad': pieces.angle[:, 0], 'M10_Nm': turning1, 'b1_Nm': slope, 'b2_Nm': offset,
+                     'J1_kg_m2': pieces.dw[:, 0]}
+        friction2 = {'d2_Nms_rad': pieces.angle[:, 1], 'M20_Nm': turning2, **{k: -v for k, v in motor.items()}}
+        blocks, targets = [], []
+        for rows, upper_by, lower_by in ((usable, r2 / r1, 1.0), (upper, 1.0, 0.0), (lower, 0.0, 1.0)):
+            block = np.stack([upper_by * friction1.get(key, zero) + lower_by * friction2.get(key, zero)
+                              for key in _LINEAR], axis=1)
+            blocks.append(block[rows])
+            targets.append(-lower_by * J2 * pieces.dw[rows, 1])
+        A, y = np.concatenate(blocks), np.concatenate(targets)
+        known = {key: value[key] for key in _LINEAR if key in fixed}
+        for key, number in known.items():
+            y = y - A[:, _LINEAR.index(key)] * number
+        free = [i for i, key in enumerate(_LINEAR) if key not in known]
+        A = A[:, free]
+        # What the logs do not tell stays near the start: a weak pull, in the size of each parameter.
+        sizes = np.array([_size(key, value) for key in _LINEAR])[free]
+        guess = np.array([_guess(key, value) for key in _LINEAR])[free]
+        noise = 0.02 * np.median(np.abs(pieces.duration)) * 1.0
+        A_pull, y_pull = np.diag(noise / (5.0 * sizes)), noise / (5.0 * sizes) * guess
+        found, cost = _robust(A, y, A_pull, y_pull)
+        full = np.array([_guess(key, value) for key in _LINEAR])
+        full[free] = found
+        return cost, full
+
+    best: tuple[float, np.ndarray, float, float] | None = None
+    u0s, c31s = [value['u0']], [value['c31_per_s']]
+    if 'c31_per_s' not in fixed and len(duties):
+        c31s = list(np.geomspace(4.0, 100.0, 12))
+    if 'u0' not in fixed and len(duties):
+        u0s = sorted({float(u) for u in np.quantile(duties, np.linspace(0, 1, 24))} | {float(duties[0])})
+    for round_number in range(3):
+        for u0 in u0s:
+            for c31 in c31s:
+                cost, found = fit(u0, c31)
+                if best is None or cost < best[0]:
+                    best = cost, found, u0, c31
+        assert best is not None
+        if len(c31s) > 1:
+            c31s = list(best[3] * np.geomspace(0.8 if round_number == 0 else 0.93, 1.25 if round_number == 0 else 1.07, 5))
+        if len(u0s) > 1:
+            width = (duties[-1] - duties[0]) / 24 / (4 ** round_number)
+            near = duties[(duties > best[2] - width) & (duties < best[2] + width)]
+            u0s = sorted({float(u) for u in np.quantile(near, np.linspace(0, 1, 6))} | {best[2]})
+    assert best is not None
+    found = dict(zip(_LINEAR, best[1]))
+    for key in _LINEAR:
+        if key in value and key not in fixed:
+            value[key] = float(found[key])
+    for key in ('d1_Nms_rad', 'M10_Nm', 'd2_Nms_rad', 'M20_Nm'):
+        if key not in fixed:
+            value[key] = max(value[key], 0.1 * _size(key, value))
+    if 'J1_kg_m2' not in fixed:
+        value['J1_kg_m2'] = max(value['J1_kg_m2'], 1e-4)
+    if 'motor_no_load_speed_rad_s' not in fixed and pieces.motor.max(initial=0.0) > 0 and found['back_emf'] > 0:
+        value['motor_no_load_speed_rad_s'] = float(np.clip(value['motor_stall_torque_Nm'] / found['back_emf'], 20, 2000))
+    if 'u0' not in fixed:
+        value['u0'] = best[2]
+    if 'c31_per_s' not in fixed:
+        value['c31_per_s'] = best[3]
+
+
+def _size(key: str, value: Mapping[str, float]) -> float:
+    floors = {'d1_Nms_rad': 1e-4, 'd2_Nms_rad': 1e-4, 'M10_Nm': 5e-3, 'M20_Nm': 2e-2}
+    return max(abs(_guess(key, value)), floors.get(key, 1e-6))
+
+
+def _guess(key: str, value: Mapping[str, float]) -> float:
+    if key == 'back_emf':
+        return value['motor_stall_torque_Nm'] / value['motor_no_load_speed_rad_s']
+    return value[key]
+
+
+def _robust(A: np.ndarray, y: np.ndarray, A_pull: np.ndarray, y_pull: np.ndarray) -> tuple[np.ndarray, float]:
+    """Least squares that forgives outliers (Huber's weights); the cost is robust too."""
+    weight = np.ones(len(y))
+    found = np.zeros(A.shape[1])
+    scale = 1.0
+    for _ in range(4):
+        root = np.sqrt(weight)[:, None]
+        stacked, target = np.concatenate([A * root, A_pull]), np.concatenate([y * root[:, 0], y_pull])
+        size = np.linalg.norm(stacked, axis=0)
+        size[size == 0] = 1.0
+        found = np.linalg.lstsq(stacked / size, target, rcond=None)[0] / size
+        residual = y - A @ found
+        scale = 1.4826 * float(np.median(np.abs(residual))) + 1e-12
+        weight = np.minimum(1.0, 2.0 * scale / np.maximum(np.abs(residual), 1e-15))
+    limit = 0.02
+    return found, float(np.sum(np.minimum(residual**2, limit * np.abs(residual))))
+
+
+def _tyre(form: Form, base: Any, value: dict[str, float], pieces: _Pieces, logs: Sequence[Log],
+          motions: Sequence[Motion], r2: float, J2: float, fixed: Mapping[str, float]) -> None:
+    """Fits the tyre's parameters to the mean force of each interval, as the lower wheel felt it."""
+    tyre = [p for p in form.parameters if p.acts == 'contact' and p.key != 'r1_m' and p.key not in fixed]
+    contact = ~pieces.apart
+    if not tyre or contact.sum() < 10:
+        return
+    force = (value['motor_stall_torque_Nm'] * (pieces.motor - pieces.motor_speed / value['motor_no_load_speed_rad_s'])
+             - J2 * pieces.dw[:, 1] - value['d2_Nms_rad'] * pieces.angle[:, 1]
+             - value['M20_Nm'] * pieces.turning[:, 1]) / (r2 * pieces.duration)
+    middle1, middle2, torque = [], [], []
+    for number, first, last in pieces.parts:
+        log = logs[number]
+        Tb = brake_torques(log, value['b1_Nm'], value['b2_Nm'], value['u0'], value['c31_per_s'])
+        centre = (first + last) // 2
+        w = np.where(motions[number].stands, 0.0, motions[number].speed_rad_s)
+        middle1.append(w[centre, 0])
+        middle2.append(w[centre, 1])
+        torque.append(Tb[centre])
+    w1, w2, Tb = (np.concatenate(c)[contact] for c in (middle1, middle2, torque))
+    force = force[contact]
+    shared = [(p.key, value[p.key]) for p in form.parameters if p not in tyre] + [('r2_m', r2), ('J2_kg_m2', J2)]
+    lows = np.array([max(p.least, 1e-2 * value[p.key]) for p in tyre])
+    highs = np.array([min(p.most, 1e2 * value[p.key]) for p in tyre])
+
+    def residual(x: np.ndarray) -> np.ndarray:
+        values = np.clip(np.exp(x), lows, highs)
+        try:
+            modelled = _core.tyre_forces_N(base, shared + list(zip([p.key for p in tyre], values.tolist())), w1, w2, Tb)
+        except ValueError:  # this friction would wedge the lever
+            return np.full(len(force), 100.0)
+        return np.asarray(modelled) - force
+
+    best = None
+    for factor in (1.0, 0.6, 1.6):  # the height's start decides the side of the peak that a fit takes
+        x0 = np.log([np.clip(value[p.key] * (factor if p.key in form.road else 1.0), 1.05 * low, 0.9 * high)
+                     for p, low, high in zip(tyre, lows, highs)])
+        fit = scipy.optimize.least_squares(residual, x0, bounds=(np.log(lows), np.log(highs)), loss='soft_l1',
+                                           f_scale=1.0, max_nfev=60)
+        if best is None or fit.cost < best.cost:
+            best = fit
+    assert best is not None
+    for p, number in zip(tyre, np.clip(np.exp(best.x), lows, highs)):
+        value[p.key] = float(number)
