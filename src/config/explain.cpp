@@ -107,8 +107,8 @@ std::string explain(const Script& script, const config::Settings& settings) {
     const bool goes_on = i > 0 && plan.phases[i - 1].brake == BrakeAction::slip_control && !phase.restart;
     std::string ends;
     for (const experiment::EndCondition& end : phase.ends_on) ends += (ends.empty() ? "" : ", or ") + in_words(end);
-    text += fmt::format("{}. {} ({}): motor {}, brake {}\n   until {}; a fault after {} s\n", i + 1, phase.name,
-                        rig::name_of(phase.phase),
+    text += fmt::format("{}. {} ({}): {}motor {}, brake {}\n   until {}; a fault after {} s\n", i + 1, phase.name,
+                        rig::name_of(phase.phase), phase.wheels_apart ? "wheels apart, " : "",
                         phase.motor_profile.empty() && phase.motor_duty == 0.0
                             ? "off"
                             : "duty " + in_words(phase.motor_profile, phase.motor_duty, ""),

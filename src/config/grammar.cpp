@@ -124,6 +124,10 @@ const Grammar& phase_grammar() {
           row(Shape::flag_true,
               {.key = "restart",
                .meaning = "the slip controller begins anew; without: it goes on from the phase before"}),
+          row(Shape::flag_true,
+              {.key = "wheels_apart",
+               .meaning =
+                   "the upper wheel is lifted off the lower one: a simulator parts them, on a rig a person does"}),
           required(row(Shape::table,
                        {.key = "until", .meaning = "what ends the phase: one condition, or any or all of several"},
                        Quantity::none, &until_grammar())),

@@ -121,8 +121,11 @@ class Planner {
   }
 
   [[nodiscard]] experiment::PhasePlan planned(const PhaseScript& phase) const {
-    experiment::PhasePlan plan{
-        .phase = kind_of(phase), .name = phase.name, .brake = phase.brake, .restart = phase.restart};
+    experiment::PhasePlan plan{.phase = kind_of(phase),
+                               .name = phase.name,
+                               .brake = phase.brake,
+                               .restart = phase.restart,
+                               .wheels_apart = phase.wheels_apart};
     plan.motor_profile = profile_or(phase.motor, plan.motor_duty);
     if (phase.brake == BrakeAction::slip_control) {
       // A constant too: it stands in place of control.slip_ref.

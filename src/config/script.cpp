@@ -71,6 +71,7 @@ class Parser {
     phase.until = read_until(source_, reader.table(until), until.place);
     phase.at_most = reader.optional_number("at_most");
     if (const Entry* restart = reader.find("restart")) phase.restart = read_restart(*restart, phase);
+    if (const Entry* apart = reader.find("wheels_apart")) phase.wheels_apart = read_wheels_apart(*apart, phase);
     const auto lasts = [](const ConditionScript& c) { return c.kind == experiment::EndKind::duration && !c.when; };
     if (!phase.at_most && std::none_of(phase.until.begin(), phase.until.end(), lasts)) {
       source_.fail(phase.place,
@@ -130,11 +131,25 @@ class Parser {
     phase.brake_profile = read_profile_script(source_, what, read_file_, script_.files);
   }
 
-  [[nodiscard]] bool read_restart(const Entry& entry, const PhaseScript& phase) const {
+  void require_true(const Entry& entry) const {
     const auto* flag = entry.node->as_boolean();
     if (flag == nullptr || !flag->get()) {
-      source_.fail(entry.place, fmt::format("restart = {}: write true", shown(*entry.node)));
+      source_.fail(entry.place, fmt::format("{} = {}: write true", entry.key, shown(*entry.node)));
     }
+  }
+
+  [[nodiscard]] bool read_wheels_apart(const Entry& entry, const PhaseScript& phase) const {
+    require_true(entry);
+    if (phase.brake == BrakeAction::slip_control) {
+      source_.fail(entry.key_place, fmt::format("phase \"{}\": wheels that are apart have no slip to control; give "
+                                                "brake = {{ duty }} or {{ torque_Nm }}, or leave wheels_apart out",
+                                                phase.name));
+    }
+    return true;
+  }
+
+  [[nodiscard]] bool read_restart(const Entry& entry, const PhaseScript& phase) const {
+    require_true(entry);
     if (phase.brake != BrakeAction::slip_control) {
       source_.fail(entry.key_place, fmt::format("phase \"{}\": restart needs a slip controller; give brake = "
                                                 "\"controller\" or {{ slip_ref }}, or leave restart out",

@@ -65,6 +65,7 @@ struct PhaseScript {
   std::vector<ConditionScript> until{};          ///< any of them
   std::optional<Number> at_most{};
   bool restart{false};  ///< of the slip controller
+  bool wheels_apart{false};
   Place place{};
 };
 

@@ -230,6 +230,7 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
   record.phase_index = static_cast<std::uint16_t>(sequence_.index());
   record.reason = change.reason;
   record.reason_value = change.value;
+  record.wheels_apart = sequence_.wheels_apart();
   if (!change.entered) adjust(record);
 
   rig::ControlState& state = record.control;

@@ -43,6 +43,8 @@ void check_safe(const PhasePlan& plan, const std::string& name) {
   }
   if (!lies_within(plan.slip_ref_profile, 0.0, 1.0))
     refuse(": a slip reference of its profile is outside [0, 1]; give references in (0, 1)");
+  if (plan.wheels_apart && plan.brake == BrakeAction::slip_control)
+    refuse(": wheels that are apart have no slip to control; give the brake a duty or a torque");
   const bool brakes = plan.brake == BrakeAction::slip_control ||
                       (plan.brake == BrakeAction::torque && plan.brake_torque_Nm > 0.0) ||
                       (plan.brake == BrakeAction::duty && plan.brake_duty > 0.0) || !plan.brake_profile.empty();
@@ -109,6 +111,7 @@ runtime::PhasePermissions Sequence::permissions() const noexcept {
 void Sequence::enter(std::size_t index, const SequenceInput& input) noexcept {
   index_ = index;
   started_ = true;
+  wheels_apart_ = plans_[index].wheels_apart;
   entered_at_s_ = input.time_s;
   entered_at_m_ = input.distance_m;
   peak_speed_rad_s_ = input.speeds.omega1_rad_s;

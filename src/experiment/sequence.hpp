@@ -59,6 +59,7 @@ struct PhasePlan {
   double time_limit_s{0.0};      ///< in (0, 600]
   bool motor_with_brake{false};  ///< permits motor and brake together in this phase
   bool restart{false};           ///< the slip controller begins anew, although the phase before used it too
+  bool wheels_apart{false};      ///< the upper wheel is lifted off the lower one
 
   [[nodiscard]] double motor_duty_at(double time_s) const noexcept {
     return motor_profile.empty() ? motor_duty : motor_profile.at(time_s);
@@ -127,6 +128,8 @@ class Sequence {
   }
   /// Index of the phase among the plans, from 0; after a stop request, of the phase that it interrupted.
   [[nodiscard]] std::size_t index() const noexcept { return index_; }
+  /// True if the upper wheel is lifted off the lower one. An early end leaves it where it is.
+  [[nodiscard]] bool wheels_apart() const noexcept { return wheels_apart_; }
   /// Time since the phase began, s.
   [[nodiscard]] double phase_time_s() const noexcept { return now_s_ - entered_at_s_; }
   /// True in the run's last cycle, in which the safe command goes out.
@@ -151,6 +154,7 @@ class Sequence {
   PhasePlan last_{};
   std::size_t index_{0};
   bool started_{false};
+  bool wheels_apart_{false};
   bool stopping_{false};  ///< the stop brake acts
   bool failing_{false};   ///< the fault brake acts
   bool barred_{false};    ///< a fault does not permit the fault brake

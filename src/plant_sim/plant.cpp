@@ -40,6 +40,7 @@ Plant::Plant(const PlantOptions& options)
 
 void Plant::reset(const PlantState& state) noexcept {
   state_ = state;
+  model_.part(false);
   profile_.start(state.angle2_rad);
   if (!drift_.any()) return;
   drift_.start();

@@ -71,6 +71,11 @@ class CommandGate {
   /// Tells what the driver made of the command of the last `check`. Until then the gate takes the command itself as
   /// sent.
   void note_sent(const rig::Command& sent) noexcept;
+  /// Tells that the wheels are apart from now on, or touch again. Checks that compare the wheels rest while they are.
+  void note_wheels_apart(bool apart) noexcept {
+    encoders_.note_wheels_apart(apart);
+    response_.note_wheels_apart(apart);
+  }
   /// Latches a fault found elsewhere (driver, executive). The first fault stays.
   void latch(rig::Reason fault, double value) noexcept;
 

@@ -19,8 +19,8 @@ class CycleLogic {
   /// Tells, before `step`, whether the checks of the wheels are free of doubt about the measurement. While they doubt
   /// it, or a verdict is due, a run does not count as complete.
   virtual void wheels_judged(bool sound) noexcept = 0;
-  /// One cycle: takes the measurement, fills `record.phase`, `.reason`, `.reason_value` and `.control`, and returns the
-  /// command wanted. A pure function of the measurements so far.
+  /// One cycle: takes the measurement, fills `record.phase`, `.reason`, `.reason_value`, `.wheels_apart` and
+  /// `.control`, and returns the command wanted. A pure function of the measurements so far.
   [[nodiscard]] virtual rig::Command step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept = 0;
   /// Takes the command that the rig now executes: as the driver sent it, after gate, limits and the PWM's steps.
   virtual void commanded(const rig::Command& sent) noexcept = 0;

@@ -109,13 +109,17 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   const driver::IoResult read = driver_.read(woken_ns, latest);
   const std::int64_t read_ns = clock_.now_ns();
   record.timing.read_ns = read_ns - woken_ns;
+  bool valid = false;
   if (!read.ok()) {
     if (io_error_.ok()) io_error_ = read;
     gate_.latch(driver::reason_of(read, rig::Reason::driver_read_failed), static_cast<double>(read.error));
-  } else if (gate_.check_measurement(latest, woken_ns, record.timing.read_ns) || record.sequence == 0) {
-    measurement_ = latest;
+  } else {
+    valid = gate_.check_measurement(latest, woken_ns, record.timing.read_ns);
+    if (valid || record.sequence == 0) measurement_ = latest;
   }
   record.measurement = measurement_;
+  record.sample_valid = valid;
+  record.sample_time_s = static_cast<double>(measurement_.time_ns - start_ns_) * rig::s_per_ns;
   record.truth = driver_.truth();
 
   if (const rig::Reason stop = stop_request_.load(std::memory_order_relaxed); stop != rig::Reason::none) {
@@ -126,6 +130,7 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   logic_.wheels_judged(gate_.wheels_sound());
   const rig::Command wanted = logic_.step(measurement_, record);
   driver_.note_phase(record.phase);
+  if (record.wheels_apart != wheels_apart_) note_wheels_apart(record.wheels_apart);
   const GateResult gated = gate_.check(wanted, {record.control.speeds_est, record.phase, woken_ns});
   acting_ = rig::acts(gated.command);
   if (gated.fault != rig::Reason::none) logic_.end_early(gated.fault, gated.fault_value);
@@ -147,6 +152,12 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   record.timing.control_ns = control_ns - read_ns;
   record.timing.write_ns = written_ns - control_ns;
   record.timing.cycle_ns = written_ns - woken_ns;
+}
+
+void CyclicExecutive::note_wheels_apart(bool apart) noexcept {
+  wheels_apart_ = apart;
+  driver_.note_wheels_apart(apart);
+  gate_.note_wheels_apart(apart);
 }
 
 void CyclicExecutive::keep(const rig::CycleRecord& record) noexcept {

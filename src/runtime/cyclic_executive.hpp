@@ -65,6 +65,7 @@ class CyclicExecutive {
   void run_cycle(rig::CycleRecord& record) noexcept;
   void watch_time(std::int64_t woken_ns) noexcept;
   void latch_stale_command(std::int64_t age_ns) noexcept;
+  void note_wheels_apart(bool apart) noexcept;
   void keep(const rig::CycleRecord& record) noexcept;
   void schedule_next(const rig::CycleTiming& timing) noexcept;
   void count_late(const rig::CycleTiming& timing, std::int64_t ticks_missed) noexcept;
@@ -80,7 +81,8 @@ class CyclicExecutive {
   std::uint64_t startup_cycles_;
   std::uint64_t max_consecutive_;
   std::int64_t gap_max_ns_;
-  bool acting_{false};  ///< the latest command has an output on
+  bool acting_{false};        ///< the latest command has an output on
+  bool wheels_apart_{false};  ///< as the logic told in the latest cycle
   std::int64_t woken_ns_{0};
   std::int64_t suspended_ns_{0};    ///< most that the clock has told
   std::int64_t first_tick_ns_{-1};  ///< < 0: at once

@@ -16,7 +16,8 @@ constexpr double backwards_rad_s = 2.0;         ///< speed at which a stopped wh
 constexpr int outside_max = 3;                  ///< number of speed windows
 constexpr double standing_max_s = 0.25;         ///< a released wheel turns within this time, however it was braked
 constexpr double standing_speed_m_s = 1.0;      ///< of the lower wheel's tread, which then spins up the upper wheel
-constexpr double rolled_after_s = 3.0;          ///< a locked wheel rolls again within this time after its release
+/// A locked wheel rolls again within this time after its release, and a lifted one after it was lowered.
+constexpr double rolled_after_s = 3.0;
 constexpr double disagreement_s = 0.1;
 constexpr double disagreement_m_s = 0.3;  ///< allowed in addition to `free_slip_max`
 constexpr double earnest_brake_Nm = 1.0;
@@ -73,10 +74,28 @@ EncoderCheck::EncoderCheck(const PlausibilityLimits& limits) noexcept
   braked_s_ = brake_Nm_ >= earnest_brake_Nm ? braked_s_ + speed_window.dt_s : 0.0;
 
   CheckResult result = judge_speeds(speed_window);
+  if (!compares_) [[unlikely]]
+    return result.sound() ? judge_parted(speed_window) : result;
   if (result.sound()) result = judge_standing(speed_window);
   if (result.sound()) result = judge_rolling(speed_window);
   if (result.sound()) result = judge_slip(speed_window);
   return result;
+}
+
+void EncoderCheck::note_wheels_apart(bool apart) noexcept {
+  compares_ = false;
+  apart_ = apart;
+  together_s_ = standing_s_ = standing_rad_ = 0.0;
+  disagreeing_.lasted_s = ahead_.lasted_s = 0.0;
+}
+
+/// While the wheels are apart each has a speed of its own. Once they are joined, a standing wheel is spun up at once,
+/// but until both roll their speeds differ.
+CheckResult EncoderCheck::judge_parted(const SpeedWindow& speed_window) noexcept {
+  if (apart_) return {};
+  together_s_ += speed_window.dt_s;
+  compares_ = together_s_ >= rolled_after_s;
+  return judge_standing(speed_window);
 }
 
 CheckResult EncoderCheck::judge_speeds(const SpeedWindow& speed_window) noexcept {

@@ -49,6 +49,8 @@ class EncoderCheck {
   explicit EncoderCheck(const PlausibilityLimits& limits) noexcept;
 
   CheckResult update(const SpeedWindow& speed_window) noexcept;
+  /// The comparisons of the wheels rest while the wheels are apart, and afterwards until both roll again.
+  void note_wheels_apart(bool apart) noexcept;
   /// True if one of the latest speeds was outside what its wheel can reach.
   [[nodiscard]] bool doubtful() const noexcept { return upper_.doubtful() || lower_.doubtful(); }
   /// Brake torque expected from the map (7) and the lag (6), N m.
@@ -56,6 +58,7 @@ class EncoderCheck {
 
  private:
   [[nodiscard]] CheckResult judge_speeds(const SpeedWindow& speed_window) noexcept;
+  [[nodiscard]] CheckResult judge_parted(const SpeedWindow& speed_window) noexcept;
   [[nodiscard]] CheckResult judge_standing(const SpeedWindow& speed_window) noexcept;
   [[nodiscard]] CheckResult judge_rolling(const SpeedWindow& speed_window) noexcept;
   [[nodiscard]] CheckResult judge_slip(const SpeedWindow& speed_window) noexcept;
@@ -64,6 +67,9 @@ class EncoderCheck {
   SpeedInterval upper_;
   SpeedInterval lower_;
   double brake_Nm_{0.0};
+  bool compares_{true};  ///< the wheels have touched for long enough to be compared
+  bool apart_{false};
+  double together_s_{0.0};    ///< time since the wheels were joined
   double free_s_;             ///< time since the brake was released
   double braked_s_{0.0};      ///< time with a brake torque of at least 1 N m
   double standing_s_{0.0};    ///< time for which the upper wheel has stood still although the tyre must spin it up

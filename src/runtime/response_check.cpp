@@ -28,7 +28,8 @@ constexpr double friction_margin = 2.0;
 
 CheckResult ResponseCheck::update(const SpeedWindow& s, double brake_Nm) noexcept {
   const rig::WheelParameters& w = limits_.wheels;
-  const double p_kg_m_s = w.J1_kg_m2 * s.omega1_rad_s / w.r1_m + w.J2_kg_m2 * s.omega2_rad_s / w.r2_m;
+  const double p1_kg_m_s = w.J1_kg_m2 * s.omega1_rad_s / w.r1_m;
+  const double p_kg_m_s = p1_kg_m_s + w.J2_kg_m2 * s.omega2_rad_s / w.r2_m;
   const double motor_Nm =
       limits_.motor.stall_torque_Nm * s.motor_duty * (1.0 - s.omega2_rad_s / limits_.motor.no_load_speed_rad_s);
   const double friction_Nm = w.M20_Nm + w.d2_Nms_rad * s.omega2_rad_s;
@@ -43,6 +44,10 @@ CheckResult ResponseCheck::update(const SpeedWindow& s, double brake_Nm) noexcep
   now_.most_brake_Nm = std::max(now_.most_brake_Nm, brake_Nm);
   now_.most_duty = std::max(now_.most_duty, s.motor_duty);
   now_.rolls = now_.rolls && w.r1_m * s.omega1_rad_s >= 0.5 * w.r2_m * s.omega2_rad_s;
+  if (apart_) [[unlikely]] {
+    now_.apart = true;
+    now_.upper_kg_m += p1_kg_m_s * s.dt_s;
+  }
   if (now_.lasted_s < window_s) return {};
   if (now_.lasted_s < longest_window_s && slack_kg_m_s(now_) > slack_N * now_.lasted_s) return {};
   const CheckResult result = before_.lasted_s > 0.0 ? judge(before_, now_) : CheckResult{};
@@ -72,8 +77,11 @@ CheckResult ResponseCheck::judge(const Window& before, const Window& now) const 
       gained_kg_m_s + slack_sum_kg_m_s < motor_part * motor_kg_m_s) {
     return {Reason::motor_no_response, gained_kg_m_s};
   }
-  const bool braking = motor_off && before.rolls && now.rolls && p_kg_m_s > moving_kg_m_s &&
-                       std::min(before.least_brake_Nm, now.least_brake_Nm) >= earnest_brake_Nm;
+  // A brake can take from a wheel alone what this wheel has. One that has more left cannot have stopped meanwhile.
+  const bool must_slow =
+      now.apart ? now.upper_kg_m / now.lasted_s > brake_kg_m_s : before.rolls && now.rolls && p_kg_m_s > moving_kg_m_s;
+  const bool braking =
+      motor_off && must_slow && std::min(before.least_brake_Nm, now.least_brake_Nm) >= earnest_brake_Nm;
   if (braking && gained_kg_m_s - slack_sum_kg_m_s > -brake_part * brake_kg_m_s)
     return {Reason::brake_no_response, gained_kg_m_s};
   return {};

@@ -14,12 +14,15 @@ class ResponseCheck {
 
   /// @param brake_Nm expected brake torque
   CheckResult update(const SpeedWindow& speed_window, double brake_Nm) noexcept;
+  /// A wheel that is apart from the other one stops sooner under the brake: the check of the brake allows for it.
+  void note_wheels_apart(bool apart) noexcept { apart_ = apart; }
 
  private:
   /// Sums over one window.
   struct Window {
     double lasted_s{0.0};
     double travel_kg_m{0.0};    ///< integral of p
+    double upper_kg_m{0.0};     ///< the upper wheel's part of it, while the wheels are apart
     double motor_kg_m_s{0.0};   ///< impulse that the motor should give, less twice the friction
     double brake_kg_m_s{0.0};   ///< impulse that the brake should take
     double begin_error_s{0.0};  ///< uncertainty of the stamps at its ends
@@ -29,12 +32,14 @@ class ResponseCheck {
     double most_brake_Nm{0.0};
     double most_duty{0.0};  ///< largest duty of the motor
     bool rolls{true};       ///< the upper wheel's speed is at least half of rolling speed
+    bool apart{false};      ///< the wheels were apart in some of it
   };
   /// Uncertainty of the window's mean momentum, kg m/s.
   [[nodiscard]] double slack_kg_m_s(const Window& window) const noexcept;
   [[nodiscard]] CheckResult judge(const Window& before, const Window& now) const noexcept;
 
   PlausibilityLimits limits_;
+  bool apart_{false};
   Window before_{};
   Window now_{};
 };

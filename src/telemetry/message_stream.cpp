@@ -80,6 +80,7 @@ MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, S
   command_state_.name = options_.channel_prefix + "COMMAND_STATE";
   measurement_.name = options_.channel_prefix + "MEASUREMENT";
   phase_.name = options_.channel_prefix + "PHASE";
+  sample_.name = options_.channel_prefix + "SAMPLE";
   signals_.name = options_.channel_prefix + "SIGNALS";
   checks_.name = options_.channel_prefix + "CHECKS";
   event_.name = options_.channel_prefix + "EVENT";
@@ -91,6 +92,7 @@ MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, S
   experiment_message_.backend = std::move(experiment.backend);
   experiment_message_.config_json = std::move(experiment.config_json);
   experiment_message_.version = std::move(experiment.version);
+  sample_message_.sample_valid = 1;
   for (const std::string& signal : names_.signals) {
     signals_message_.names.append(signals_message_.names.empty() ? "" : ",").append(signal);
   }
@@ -103,6 +105,7 @@ void MessageStream::consume(const rig::CycleRecord& record, double distance_m) {
     send_phase();
     next_experiment_s_ = next_on_grid(record.time_s, options_.experiment_period_s);
   }
+  send_sample(record);
   if (auto event = detector_.observe(record)) {
     send_event(event->kind, record.reason, record.reason_value, std::move(event->message));
     if (event->phase_changed && started_) send_phase();
@@ -226,6 +229,17 @@ void MessageStream::send_phase() {
   message.phase_index = latest_.phase_index;
   message.name = names_.phase_of(latest_);
   send(phase_, message);
+}
+
+/// Nearly all samples are valid and most runs keep the wheels together: only changes are sent.
+void MessageStream::send_sample(const rig::CycleRecord& record) {
+  const auto valid = static_cast<std::int8_t>(record.sample_valid);
+  const auto apart = static_cast<std::int8_t>(record.wheels_apart);
+  if (valid == sample_message_.sample_valid && apart == sample_message_.wheels_apart) return;
+  sample_message_.cycle = static_cast<std::int64_t>(record.sequence);
+  sample_message_.sample_valid = valid;
+  sample_message_.wheels_apart = apart;
+  send(sample_, sample_message_);
 }
 
 void MessageStream::send_experiment() { send(experiment_, experiment_message_); }

@@ -10,6 +10,7 @@
 #include "abs_hil/command_state_t.hpp"
 #include "abs_hil/experiment_t.hpp"
 #include "abs_hil/phase_t.hpp"
+#include "abs_hil/sample_t.hpp"
 #include "abs_hil/signals_t.hpp"
 #include "rig/record_sink.hpp"
 #include "rig/run_names.hpp"
@@ -91,6 +92,7 @@ class MessageStream : public rig::RecordSink {
   void send_status();
   void send_experiment();
   void send_phase();
+  void send_sample(const rig::CycleRecord& record);
 
   StreamOptions options_;
   StatusSource status_;
@@ -99,6 +101,7 @@ class MessageStream : public rig::RecordSink {
   Channel measurement_;
   Channel signals_;
   Channel phase_;
+  Channel sample_;
   Channel adjustment_;
   Channel command_state_;
   Channel status_channel_;
@@ -108,6 +111,7 @@ class MessageStream : public rig::RecordSink {
   std::string command_channel_;
   experiment_t experiment_message_{};
   signals_t signals_message_{};
+  sample_t sample_message_{};
   rig::RunNames names_;
   EventDetector detector_;
   EncodeBuffer buffer_;

@@ -9,10 +9,10 @@
 namespace abs_hil::telemetry {
 
 // Converts an event log to CSV, for spreadsheets and scripts, and back without loss. RUN.csv holds the telemetry: first
-// the fixed columns of --csv, then all other fields. Every other channel has its own file RUN.CHANNEL.csv beside it,
-// with the fields of its type as columns. RUN.raw.csv holds, as hexadecimal digits, events of unknown types and events
-// that their text would not reproduce bit for bit. Each row ends with the event's number and time, its channel and its
-// type.
+// the fixed columns of --csv that telemetry_t has, then all other fields. Every other channel has its own file
+// RUN.CHANNEL.csv beside it, with the fields of its type as columns. RUN.raw.csv holds, as hexadecimal digits, events
+// of unknown types and events that their text would not reproduce bit for bit. Each row ends with the event's number
+// and time, its channel and its type.
 
 /// Numbers of events.
 struct ConversionCounts {

@@ -8,7 +8,8 @@ from program import ProgramTest
 
 HEADER = ('time_s,phase,omega1_rad_s,omega2_rad_s,omega1_est_rad_s,omega2_est_rad_s,slip,slip_est,slip_ref,'
           'brake_torque_Nm,brake_torque_ref_Nm,brake_torque_est_Nm,brake_pwm,motor_pwm,motor_enable,theta_N,'
-          'theta_est_N,distance_m,slip_velocity_error_m_s')
+          'theta_est_N,distance_m,slip_velocity_error_m_s,upper_counts,lower_counts,sample_valid,sample_time_s,'
+          'wheels_apart')
 PHASES = ['idle', 'accelerate', 'coast', 'brake', 'hold', 'stopped']
 
 

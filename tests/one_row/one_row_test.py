@@ -68,7 +68,7 @@ def quantity_in_files(copy, program):
     copy.run(program, '--fast', '--no-lcm', '--csv', run, '--log', log)
     columns = run.read_text().split('\n', 1)[0].split(',')
     # The phase's name and the controller's own signals follow the table's columns.
-    assert columns[columns.index('slip_velocity_error_m_s') + 1] == 'made_up_index', columns
+    assert columns[columns.index('wheels_apart') + 1] == 'made_up_index', columns
     rows = columns_of(run)
     phases = list(dict.fromkeys(row['phase'] for row in rows))
     assert len(phases) > 3, phases

@@ -125,3 +125,33 @@ TEST_CASE("The brake torque lags behind its map by the closed form of (6), turni
   turning.advance(0.05, {.brake_duty = 0.4});  // in the dead zone
   CHECK_THAT(turning.state().brake_torque_Nm, WithinAbs(expected_Nm * std::exp(-20.37 * 0.05), 1e-9));
 }
+
+TEST_CASE("Wheels that are parted follow their closed forms alone, and roll together once they are joined") {
+  for (const bool lever : {false, true}) {
+    CAPTURE(lever);
+    PlantOptions options{};
+    if (lever) options.load = "lever";
+    const double motor_duty = 0.5;
+    const CoastDown one = upper(options.rig.wheels, 100.0);
+    // The motor's back-EMF adds to the lower wheel's viscous friction, its stall torque drives it.
+    const auto& motor = options.rig.motor;
+    CoastDown two = lower(options.rig.wheels, 40.0);
+    two.a_per_s += motor_duty * motor.stall_torque_Nm / motor.no_load_speed_rad_s / options.rig.wheels.J2_kg_m2;
+    two.c_rad_s2 -= motor_duty * motor.stall_torque_Nm / options.rig.wheels.J2_kg_m2;
+    Plant plant(options);
+    plant.reset({.omega1_rad_s = 100.0, .omega2_rad_s = 40.0});
+    plant.part_wheels(true);
+    plant.advance(2.0, {.motor_duty = motor_duty});
+    CHECK_THAT(plant.state().omega1_rad_s, WithinAbs(one.speed_rad_s(2.0), 1e-8));
+    CHECK_THAT(plant.state().omega2_rad_s, WithinAbs(two.speed_rad_s(2.0), 1e-8));
+    CHECK(plant.tyre_force_N() == 0.0);
+    CHECK(plant.truth().theta_N == 0.0);
+    plant.part_wheels(false);
+    CHECK(plant.truth().theta_N > 0.0);
+    plant.advance(3.0, {});
+    CHECK_THAT(plant.slip(), WithinAbs(0.0, 1e-3));
+    plant.part_wheels(true);
+    plant.reset({.omega1_rad_s = 100.0, .omega2_rad_s = 40.0});
+    CHECK(plant.tyre_force_N() < 0.0);  // a new run begins with the wheels together
+  }
+}

@@ -164,3 +164,33 @@ TEST_CASE("the logic learns in each cycle whether the checks of the wheels are f
   bench.cycle();
   CHECK(bench.logic.wheels_sound);
 }
+
+TEST_CASE("a record tells whether its sample is of this cycle, and when the counters were read") {
+  Bench bench;
+  bench.driver.stamp_lag_ns = 250 * us;
+  for (int n = 0; n < 3; ++n) REQUIRE(bench.cycle());
+  for (int n = 0; n < 3; ++n) {
+    const rig::CycleRecord record = bench.record();
+    CHECK(record.sample_valid);
+    CHECK_THAT(record.sample_time_s, Catch::Matchers::WithinAbs(1e-3 * n - 0.25e-3, 1e-12));
+  }
+  bench.driver.read_result = {driver::IoError::no_answer, 0x54};
+  CHECK_FALSE(bench.cycle());
+  const rig::CycleRecord failed = bench.record();
+  CHECK_FALSE(failed.sample_valid);
+  CHECK_THAT(failed.sample_time_s, Catch::Matchers::WithinAbs(2e-3 - 0.25e-3, 1e-12));  // that of the cycle before
+}
+
+TEST_CASE("the driver learns when the wheels part and join, once each") {
+  Bench bench;
+  REQUIRE(bench.cycle());
+  bench.logic.wheels_apart = true;
+  REQUIRE(bench.cycle());
+  REQUIRE(bench.cycle());
+  bench.logic.wheels_apart = false;
+  REQUIRE(bench.cycle());
+  REQUIRE(bench.cycle());
+  CHECK(bench.driver.apart == std::vector<bool>{true, false});
+  CHECK_FALSE(bench.record().wheels_apart);
+  CHECK(bench.record().wheels_apart);
+}

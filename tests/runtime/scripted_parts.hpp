@@ -52,6 +52,8 @@ class ScriptedDriver final : public driver::RigDriver {
   }
   ~ScriptedDriver() override { static_cast<void>(deactivate()); }
   [[nodiscard]] std::string_view name() const noexcept override { return "scripted"; }
+  void note_wheels_apart(bool now_apart) noexcept override { apart.push_back(now_apart); }
+  std::int64_t stamp_lag_ns{0};  ///< the counters are read so long before the reading begins
 
   CycleScript script{};
   driver::IoResult read_result{};
@@ -59,6 +61,7 @@ class ScriptedDriver final : public driver::RigDriver {
   std::uint32_t trip_flags{0};
   std::optional<rig::Command> sends;  ///< what it makes of every command; empty: the command
   std::vector<rig::Command> written;
+  std::vector<bool> apart;  ///< what it was told about the wheels, in order
   int made_safe{0};
 
  private:
@@ -66,7 +69,7 @@ class ScriptedDriver final : public driver::RigDriver {
   void do_activate(std::int64_t) override {}
   driver::IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override {
     clock_.pass(script.read_ns);
-    measurement.time_ns = now_ns;
+    measurement.time_ns = now_ns - stamp_lag_ns;
     measurement.trip_flags = trip_flags;
     return read_result;
   }
@@ -96,6 +99,7 @@ class ScriptedLogic final : public CycleLogic {
     finished_ = ended_by != rig::Reason::none;
     record.phase = finished_ ? rig::Phase::fault : rig::Phase::brake;
     record.reason = ended_by;
+    record.wheels_apart = wheels_apart;
     return finished_ ? rig::safe_command : wanted;
   }
   void commanded(const rig::Command& command) noexcept override { last = command; }
@@ -110,6 +114,7 @@ class ScriptedLogic final : public CycleLogic {
   rig::Command wanted{.brake_duty = 0.5};
   rig::Command last{};
   bool wheels_sound{false};
+  bool wheels_apart{false};
   rig::Reason ended_by{rig::Reason::none};
   double ended_value{0.0};
 

@@ -48,7 +48,7 @@ TEST_CASE("the CSV header equals the published one exactly") {
   CHECK(csv_header ==
         "time_s,phase,omega1_rad_s,omega2_rad_s,omega1_est_rad_s,omega2_est_rad_s,slip,slip_est,slip_ref,"
         "brake_torque_Nm,brake_torque_ref_Nm,brake_torque_est_Nm,brake_pwm,motor_pwm,motor_enable,theta_N,theta_est_N,"
-        "distance_m,slip_velocity_error_m_s");
+        "distance_m,slip_velocity_error_m_s,upper_counts,lower_counts,sample_valid,sample_time_s,wheels_apart");
 }
 
 TEST_CASE("the phase's own name and the controller's own signals follow the fixed columns, bit-exactly") {
@@ -67,15 +67,17 @@ TEST_CASE("the phase's own name and the controller's own signals follow the fixe
   REQUIRE(lines.size() == 2);
   CHECK(lines[0] == std::string(csv_header) + ",phase_name,I_m,zeta_N");
   const auto fields = fields_of(lines[1]);
-  REQUIRE(fields.size() == 22);
-  CHECK(fields[19] == "brake-low");
-  CHECK(bits_of(fields[20]) == std::bit_cast<std::uint64_t>(1.0 / 3.0));
-  CHECK(fields[21] == "NaN");
+  REQUIRE(fields.size() == 27);
+  CHECK(fields[24] == "brake-low");
+  CHECK(bits_of(fields[25]) == std::bit_cast<std::uint64_t>(1.0 / 3.0));
+  CHECK(fields[26] == "NaN");
 }
 
 TEST_CASE("every CSV column holds its quantity, bit-exactly") {
   const abs_hil::test::TemporaryFolder scratch;
-  const rig::CycleRecord r = test::sample_record(7);
+  rig::CycleRecord r = test::sample_record(7);
+  r.sample_valid = false;
+  r.wheels_apart = true;
   const double distance_m = 1.0 / 7.0;
   {
     CsvSink sink(scratch / "run.csv");
@@ -89,6 +91,10 @@ TEST_CASE("every CSV column holds its quantity, bit-exactly") {
   REQUIRE(fields.size() == fields_of(lines[0]).size());
   CHECK(fields[1] == "brake");
   CHECK(fields[14] == "1");
+  CHECK(fields[19] == "1007");
+  CHECK(fields[20] == "-2007");
+  CHECK(fields[21] == "0");
+  CHECK(fields[23] == "1");
   const std::vector<std::pair<std::size_t, double>> expected{{0, r.time_s},
                                                              {2, r.truth.speeds.omega1_rad_s},
                                                              {3, r.truth.speeds.omega2_rad_s},
@@ -105,7 +111,8 @@ TEST_CASE("every CSV column holds its quantity, bit-exactly") {
                                                              {15, r.truth.theta_N},
                                                              {16, r.control.theta_est_N},
                                                              {17, distance_m},
-                                                             {18, r.control.slip_velocity_error_m_s}};
+                                                             {18, r.control.slip_velocity_error_m_s},
+                                                             {22, r.sample_time_s}};
   for (const auto& [column, value] : expected) {
     INFO("column " << column);
     CHECK(bits_of(fields[column]) == std::bit_cast<std::uint64_t>(value));
@@ -115,7 +122,7 @@ TEST_CASE("every CSV column holds its quantity, bit-exactly") {
 TEST_CASE("unknown values are written as NaN, whatever the sign of the NaN") {
   rig::CycleRecord r;
   r.truth.slip = -std::numeric_limits<double>::quiet_NaN();
-  CHECK(row_of(r, 0.0) == "0,idle,NaN,NaN,0,0,NaN,0,0,NaN,0,0,0,0,0,NaN,NaN,0,NaN\n");
+  CHECK(row_of(r, 0.0) == "0,idle,NaN,NaN,0,0,NaN,0,0,NaN,0,0,0,0,0,NaN,NaN,0,NaN,0,0,1,0,0\n");
 }
 
 TEST_CASE("extreme values fit a row and read back") {
@@ -129,13 +136,13 @@ TEST_CASE("extreme values fit a row and read back") {
   r.control.slip_est = -Limits::infinity();
   for (double* value : {&r.control.slip_ref, &r.truth.brake_torque_Nm, &r.control.brake_torque_ref_Nm,
                         &r.control.brake_torque_est_Nm, &r.command.brake_duty, &r.command.motor_duty, &r.truth.theta_N,
-                        &r.control.theta_est_N, &r.control.slip_velocity_error_m_s}) {
+                        &r.control.theta_est_N, &r.control.slip_velocity_error_m_s, &r.sample_time_s}) {
     *value = -1.2345678901234567e-301;
   }
   const std::string row = row_of(r, -1.7976931348623157e+308);
   CHECK(row.size() < csv_row_max_bytes);
   const auto fields = fields_of(row.substr(0, row.size() - 1));
-  REQUIRE(fields.size() == 19);
+  REQUIRE(fields.size() == 24);
   CHECK(bits_of(fields[2]) == std::bit_cast<std::uint64_t>(-Limits::max()));
   CHECK(bits_of(fields[3]) == std::bit_cast<std::uint64_t>(Limits::denorm_min()));
   CHECK(bits_of(fields[5]) == std::bit_cast<std::uint64_t>(-0.0));

@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <tuple>
+#include <vector>
 
 #include "catch.hpp"
 #include "telemetry/message_capture.hpp"
@@ -255,6 +257,39 @@ TEST_CASE("options out of range are refused") {
   options = {};
   options.experiment_period_s = rig::unknown;
   CHECK_THROWS_WITH(MessageStream(options, info(), {}), Catch::Matchers::Contains("experiment_period_s"));
+}
+
+TEST_CASE("ABS_SAMPLE tells when samples become invalid or the wheels part, and nothing in an ordinary run") {
+  test::CapturingOutlet outlet;
+  MessageStream stream({}, info(), {});
+  stream.add(outlet);
+  rig::CycleRecord record;
+  const auto cycle = [&](bool valid, bool apart) {
+    record.sample_valid = valid;
+    record.wheels_apart = apart;
+    record.stamp_ns = 1'000'000 * static_cast<std::int64_t>(record.sequence);
+    stream.consume(record, 0.0);
+    ++record.sequence;
+  };
+  cycle(true, false);
+  CHECK(outlet.all<sample_t>("ABS_SAMPLE").empty());
+  cycle(false, false);
+  cycle(false, false);
+  cycle(true, false);
+  cycle(true, true);
+  cycle(false, true);
+  const auto messages = outlet.all<sample_t>("ABS_SAMPLE");
+  check_consecutive(messages);
+  REQUIRE(messages.size() == 4);
+  const std::vector<std::tuple<std::int64_t, bool, bool>> expected{
+      {1, false, false}, {3, true, false}, {4, true, true}, {5, false, true}};
+  for (std::size_t n = 0; n < messages.size(); ++n) {
+    CAPTURE(n);
+    CHECK(messages[n].cycle == std::get<0>(expected[n]));
+    CHECK(messages[n].stamp_ns == 1'000'000 * std::get<0>(expected[n]));
+    CHECK((messages[n].sample_valid != 0) == std::get<1>(expected[n]));
+    CHECK((messages[n].wheels_apart != 0) == std::get<2>(expected[n]));
+  }
 }
 
 }  // namespace

@@ -15,6 +15,7 @@ inline rig::CycleRecord sample_record(std::uint64_t sequence) {
   r.time_s = static_cast<double>(sequence) / 1000.0;
   r.phase = rig::Phase::brake;
   r.measurement.time_ns = r.stamp_ns;
+  r.sample_time_s = 0.61 + x;
   r.measurement.upper_counts = 1000 + static_cast<std::int32_t>(sequence);
   r.measurement.lower_counts = -2000 - static_cast<std::int32_t>(sequence);
   r.measurement.supply_V = 24.0 + x;

@@ -74,6 +74,9 @@ class RigDriver {
 
   /// Tells the phase of the command that is written next. Only injected faults use it (InjectingDriver).
   virtual void note_phase(rig::Phase /*phase*/) noexcept {}
+  /// Tells, whenever it changes, that the upper wheel is lifted off the lower one from now on, or lies on it again. A
+  /// simulated rig then parts or joins its wheels; on a rig a person does so. Real-time safe.
+  virtual void note_wheels_apart(bool /*apart*/) noexcept {}
 
   /// Longest time that a failed `write`, or `deactivate`, waits for the board to confirm the safe state, ns. 0: it does
   /// not wait; only the board's accesses take time.

@@ -34,10 +34,13 @@ class Plant {
   /// Throws std::invalid_argument if an option is outside its range.
   explicit Plant(const PlantOptions& options);
 
-  /// Sets the state and returns every profile to its start.
+  /// Sets the state, joins the wheels and returns every profile to its start.
   void reset(const PlantState& state) noexcept;
   /// Advances the plant by `duration_s` >= 0 under `input`.
   void advance(double duration_s, const PlantInput& input) noexcept;
+
+  /// Lifts the upper wheel off the lower one, which takes the tyre force away, or lowers it again.
+  void part_wheels(bool apart) noexcept { model_.part(apart); }
 
   [[nodiscard]] const PlantState& state() const noexcept { return state_; }
   [[nodiscard]] double slip() const noexcept;

@@ -14,7 +14,8 @@ struct ContactState {
   double friction{1.0};       ///< friction of the road at the contact relative to the tyre model
 };
 
-/// Two wheels in contact: their parameters, a tyre model and a load model. Real-time safe except for the constructor.
+/// Two wheels: their parameters, a tyre model and a load model. They are in contact until they are parted. Real-time
+/// safe except for the constructor.
 class WheelModel {
  public:
   /// Throws std::invalid_argument for an unknown or impossible model.
@@ -28,6 +29,9 @@ class WheelModel {
   [[nodiscard]] const rig::WheelParameters& wheels() const noexcept { return wheels_; }
   /// Replaces the wheel parameters, for drifted bearings.
   void set_wheels(const rig::WheelParameters& wheels) noexcept { wheels_ = wheels; }
+
+  /// Parts the wheels, or joins them again. Wheels apart exchange no force.
+  void part(bool apart) noexcept { apart_ = apart; }
 
   /// Slip by the tyre model's definition, positive in braking.
   [[nodiscard]] double slip(double omega1_rad_s, double omega2_rad_s) const noexcept {
@@ -52,6 +56,7 @@ class WheelModel {
   /// Upper bound on the slope of the tyre force over the difference of the circumferential speeds, N s/m, at any slip.
   /// It bounds the stiffness of the slip dynamics.
   [[nodiscard]] double damping_bound_Ns_m(const ContactState& c) const noexcept {
+    if (apart_) return 0.0;
     const double steepest_s_m = std::visit(
         [&](const auto& tyre) {
           return tyre.steepest_s_m(wheels_.r1_m * c.omega1_rad_s, wheels_.r2_m * c.omega2_rad_s);
@@ -67,6 +72,7 @@ class WheelModel {
     return {c.upper_sliding, wheels_.M10_Nm + c.brake_torque_Nm, wheels_.d1_Nms_rad * c.omega1_rad_s};
   }
   [[nodiscard]] double force_N(double shape, const ContactState& c) const noexcept {
+    if (apart_) return 0.0;
     const UpperWheelTorques torques = upper_torques(c);
     return std::visit([&](const auto& load) { return load.force_N(shape, torques); }, load_);
   }
@@ -74,6 +80,7 @@ class WheelModel {
   rig::WheelParameters wheels_;
   TyreModel tyre_;
   LoadModel load_;
+  bool apart_{false};
 };
 
 }  // namespace abs_hil::plant_sim

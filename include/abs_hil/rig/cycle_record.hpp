@@ -54,8 +54,11 @@ struct CycleRecord {
   Phase phase{Phase::idle};
   std::uint16_t phase_index{0};  ///< counts the phases of the experiment from 0; an early end keeps the last number
   Reason reason{Reason::none};   ///< why the phase began or the command was refused; none if nothing happened
+  bool sample_valid{true};       ///< `measurement` is of this cycle; false: it is the latest one that could be used
+  bool wheels_apart{false};      ///< the experiment says that the upper wheel is lifted off the lower one
   double reason_value{0.0};      ///< the value that caused it, in the SI unit of its quantity
   Measurement measurement{};
+  double sample_time_s{0.0};  ///< when its counters were read, since the start of the run
   ControlState control{};
   Command command{};  ///< the command as the driver sent it
   PlantTruth truth{};

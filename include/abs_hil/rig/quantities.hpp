@@ -34,7 +34,7 @@ template <class Access>
 struct Quantity {
   std::string_view name;   ///< of the CSV column and of the field of telemetry_t, with its unit
   std::string_view unit;   ///< empty if it has none
-  std::string_view since;  ///< first version of the program that writes it
+  std::string_view since;  ///< first version of the program that writes it, into the CSV if it is a column
   Topic topic;
   Outlet outlet;
   Access at;
@@ -120,12 +120,12 @@ inline constexpr std::tuple quantities{
              [](auto& c) -> auto& { return c.record.control.slip_velocity_error_m_s; },
              "slip velocity error e_v of (13), from the estimates"},
 
-    Quantity{"upper_counts", "counts", "0.1", Topic::board, Outlet::lcm,
+    Quantity{"upper_counts", "counts", "0.2", Topic::board, Outlet::both,
              [](auto& c) -> auto& { return c.record.measurement.upper_counts; },
-             "encoder counter of the upper wheel; wraps around at 32 bit"},
-    Quantity{"lower_counts", "counts", "0.1", Topic::board, Outlet::lcm,
+             "encoder counter of the upper wheel as read; wraps around at 32 bit"},
+    Quantity{"lower_counts", "counts", "0.2", Topic::board, Outlet::both,
              [](auto& c) -> auto& { return c.record.measurement.lower_counts; },
-             "encoder counter of the lower wheel; wraps around at 32 bit"},
+             "encoder counter of the lower wheel as read; wraps around at 32 bit"},
     Quantity{"supply_V", "V", "0.1", Topic::board, Outlet::lcm,
              [](auto& c) -> auto& { return c.record.measurement.supply_V; },
              "power supply; NaN where the board does not measure it"},
@@ -160,6 +160,16 @@ inline constexpr std::tuple quantities{
     Quantity{"overrun_cause", "", "0.1", Topic::timing, Outlet::lcm,
              [](auto& c) -> auto& { return c.record.timing.overrun_cause; },
              "why ticks were missed: 0 none, 1 wake-up, 2 read, 3 control, 4 write, 5 record"},
+
+    Quantity{"sample_valid", "", "0.2", Topic::board, Outlet::csv,
+             [](auto& c) -> auto& { return c.record.sample_valid; },
+             "1: the counts are of this cycle; 0: they are the latest usable ones"},
+    Quantity{"sample_time_s", "s", "0.2", Topic::board, Outlet::csv,
+             [](auto& c) -> auto& { return c.record.sample_time_s; },
+             "when the counters were read, since the start of the run"},
+    Quantity{"wheels_apart", "", "0.2", Topic::sequence, Outlet::csv,
+             [](auto& c) -> auto& { return c.record.wheels_apart; },
+             "1: the experiment says that the upper wheel is lifted off the lower one"},
 };
 // clang-format on
 

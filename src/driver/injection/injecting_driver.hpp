@@ -45,6 +45,7 @@ class InjectingDriver final : public RigDriver {
     inner_->tell_before_making_safe(listener);
   }
   void note_phase(rig::Phase phase) noexcept override;
+  void note_wheels_apart(bool apart) noexcept override { inner_->note_wheels_apart(apart); }
   [[nodiscard]] const RigDriver& inner() const noexcept { return *inner_; }
   /// Time of the first read or write that a fault changed; -1 before that.
   [[nodiscard]] std::int64_t first_effect_ns() const noexcept { return first_effect_ns_; }

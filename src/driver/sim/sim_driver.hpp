@@ -31,6 +31,7 @@ class SimDriver final : public RigDriver {
   [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
     return grid_.as_sent(command);
   }
+  void note_wheels_apart(bool apart) noexcept override { plant_.part_wheels(apart); }
   /// For tests: the command that acts on the simulated rig.
   [[nodiscard]] const plant_sim::PlantInput& outputs() const noexcept { return input_; }
   [[nodiscard]] const plant_sim::Plant& plant() const noexcept { return plant_; }

@@ -1,6 +1,7 @@
 #include "runtime/encoder_check.hpp"
 
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "catch.hpp"
@@ -366,4 +367,55 @@ TEST_CASE("under uncertain stamps a single window that agrees is no proof") {
     while (more < 20 && braked.update(uncertain(115.0, 100.0, 3.0)).sound()) ++more;
     CHECK(more <= 5);
   }
+}
+
+TEST_CASE("wheels that are apart are not compared, but each is still judged alone") {
+  const auto parted = [] {
+    EncoderCheck check(limits());
+    check.note_wheels_apart(true);
+    return check;
+  };
+  // The upper wheel stands, rolls elsewhere, or is ahead while braked: all this is possible.
+  for (const auto& [omega1, omega2, brake_Nm] :
+       {std::tuple{0.0, 100.0, 0.0}, std::tuple{100.0, 0.0, 0.0}, std::tuple{100.0, 50.0, 2.0}}) {
+    CAPTURE(omega1, omega2, brake_Nm);
+    EncoderCheck together(limits());
+    CHECK_FALSE(run(together, 2000, omega1, omega2, brake_Nm).sound());
+    EncoderCheck check = parted();
+    CHECK(run(check, 2000, omega1, omega2, brake_Nm).sound());
+  }
+  // A wheel that stops at once, counts backwards or leaps is impossible in any case.
+  for (const auto& [omega1, omega2, reason] :
+       {std::tuple{0.0, 100.0, Reason::encoder_upper_stuck}, std::tuple{100.0, 0.0, Reason::encoder_lower_stuck},
+        std::tuple{-100.0, 100.0, Reason::encoder_upper_reversed},
+        std::tuple{100.0, 200.0, Reason::encoder_lower_jumped}, std::tuple{0.0, 0.0, Reason::encoders_lost}}) {
+    CAPTURE(omega1, omega2);
+    EncoderCheck check = parted();
+    CHECK(run(check, 10, 100.0, 100.0).sound());
+    CHECK(run(check, 4, omega1, omega2).reason == reason);
+  }
+}
+
+TEST_CASE("wheels that were joined are compared again when both have had time to roll") {
+  EncoderCheck check(limits());
+  check.note_wheels_apart(true);
+  CHECK(run(check, 3000, 100.0, 50.0).sound());
+  check.note_wheels_apart(false);
+  CHECK(run(check, 1499, 100.0, 50.0).sound());  // 3 s
+  CHECK(run(check, 60, 100.0, 50.0).reason == Reason::encoders_disagree);
+
+  EncoderCheck braked(limits());
+  braked.note_wheels_apart(true);
+  CHECK(run(braked, 10, 100.0, 50.0, 2.0).sound());
+  braked.note_wheels_apart(false);
+  CHECK(run(braked, 1499, 100.0, 50.0, 2.0).sound());
+  CHECK(run(braked, 60, 100.0, 50.0, 2.0).reason == Reason::slip_implausible);
+
+  // The check of a standing wheel needs no such time: a tyre that slides on a turning wheel spins it up at once.
+  EncoderCheck standing(limits());
+  standing.note_wheels_apart(true);
+  CHECK(run(standing, 3000, 0.0, 50.0).sound());
+  standing.note_wheels_apart(false);
+  CHECK(run(standing, 123, 0.0, 50.0).sound());
+  CHECK(run(standing, 3, 0.0, 50.0).reason == Reason::released_wheel_stands);
 }

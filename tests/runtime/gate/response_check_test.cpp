@@ -1,5 +1,6 @@
 #include "runtime/response_check.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "catch.hpp"
@@ -269,4 +270,33 @@ TEST_CASE("the stamp at the very beginning of a window counts, not those within"
   };
   CHECK(reason(0.0) == Reason::speed_rises_with_motor_off);
   CHECK(reason(2e-3) == Reason::none);
+}
+
+TEST_CASE("motor and brake are judged by the momentum of wheels that are apart, too") {
+  const double upper_kg_m = 7.54e-3 / 0.0995;
+  const auto braked = [&](double omega1, double omega2, double rad_s2, double brake_Nm) {
+    ResponseCheck check(paper_limits());
+    check.note_wheels_apart(true);
+    for (int i = 0; i < 103; ++i) {
+      omega1 = std::max(0.0, omega1 + rad_s2 * dt_s);
+      const CheckResult found = check.update({.dt_s = dt_s, .omega1_rad_s = omega1, .omega2_rad_s = omega2}, brake_Nm);
+      if (!found.sound()) return found;
+    }
+    return CheckResult{};
+  };
+  // 2 N m take 2.01 kg m/s from the upper wheel in 0.1 s: 26.5 rad/s. It has to have lost three tenths of it.
+  const double full_rad_s2 = -2.0 / 0.0995 / upper_kg_m;
+  CHECK(braked(100.0, 0.0, 0.31 * full_rad_s2, 2.0).sound());
+  CHECK(braked(100.0, 0.0, 0.29 * full_rad_s2, 2.0).reason == Reason::brake_no_response);
+  CHECK(braked(100.0, 170.0, 0.0, 2.0).reason == Reason::brake_no_response);  // it need not roll on the other one
+  CHECK(braked(20.0, 170.0, full_rad_s2, 2.0).sound());  // it stands soon, and then loses nothing more
+  CHECK(braked(0.0, 170.0, 0.0, 2.0).sound());
+  // The lower wheel is silent although the motor drives it, whatever the upper one does.
+  Bench silent{.omega1 = 100.0};
+  silent.check.note_wheels_apart(true);
+  CheckResult found{};
+  for (int i = 0; i < 103 && found.sound(); ++i) {
+    found = silent.check.update({.dt_s = dt_s, .omega1_rad_s = 100.0, .motor_duty = 1.0}, 0.0);
+  }
+  CHECK(found.reason == Reason::motor_no_response);
 }
