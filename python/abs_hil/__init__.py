@@ -17,6 +17,7 @@ from .messages import PHASES, QUANTITIES, REASONS, TYPES, decode
 
 if TYPE_CHECKING:
     from .hand import Controller, Plant, SlipInput, SlipOutput
+    from .identification import Identified, identify
     from .network import live
     from .run import Run, Series, load, load_series
     from .simulation import Study, controllers, experiments, keys, plants, simulate, simulate_many
@@ -26,13 +27,14 @@ globals().update(TYPES)
 
 #: module -> the names that it gives; loaded at first use, so that decoding messages needs only Python
 _LATER = {'hand': ('Controller', 'Plant', 'SlipInput', 'SlipOutput'),
+          'identification': ('Identified', 'identify'),
           'network': ('live',),
           'run': ('Run', 'Series', 'load', 'load_series'),
           'simulation': ('Study', 'controllers', 'experiments', 'keys', 'plants', 'simulate', 'simulate_many')}
 _MODULE_OF = {name: module for module, names in _LATER.items() for name in names}
 
-__all__ = ['PHASES', 'QUANTITIES', 'REASONS', 'TYPES', 'Controller', 'Plant', 'Run', 'Series', 'SlipInput', 'SlipOutput',
-           'Study', 'controllers', 'decode', 'experiments', 'keys', 'live', 'load', 'load_series', 'plants', 'simulate',
+__all__ = ['PHASES', 'QUANTITIES', 'REASONS', 'TYPES', 'Controller', 'Identified', 'Plant', 'Run', 'Series', 'SlipInput',
+           'SlipOutput', 'Study', 'controllers', 'decode', 'experiments', 'identify', 'keys', 'live', 'load', 'load_series', 'plants', 'simulate',
            'simulate_many']
 
 

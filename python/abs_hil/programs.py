@@ -1,14 +1,18 @@
-"""The programs in Python: abs_report, abs_tune, abs_learn. `abs_hil report ...` starts them too."""
+"""The programs in Python: abs_report, abs_tune, abs_learn, abs_identify. `abs_hil report ...` starts them too."""
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 
 #: name -> module with main(arguments) -> exit status
-PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn': 'abs_hil.learning.program'}
+PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn': 'abs_hil.learning.program',
+            'identify': 'abs_hil.identification.program'}
 
 
 def start(name: str, arguments: list[str]) -> int:
+    # Our matrices are small. More threads of BLAS would only spin, and wear other programs' cores.
+    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
     try:
         module = importlib.import_module(PROGRAMS[name])
     except ImportError as error:
@@ -33,3 +37,7 @@ def tune() -> None:
 
 def learn() -> None:
     sys.exit(start('learn', sys.argv[1:]))
+
+
+def identify() -> None:
+    sys.exit(start('identify', sys.argv[1:]))

@@ -15,6 +15,7 @@ struct PythonProgram {
 inline constexpr std::array python_programs{
     PythonProgram{"report", "make a page with figures and tables of recorded runs, or export their rows"},
     PythonProgram{"tune", "search for a controller's gains in simulation"},
+    PythonProgram{"identify", "estimate the rig's parameters from its own logs, with intervals"},
     PythonProgram{"learn", "train a small controller in simulation, from nothing but trial and error"},
 };
 

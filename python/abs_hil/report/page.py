@@ -81,30 +81,38 @@ def _as_script_data(data: Any) -> str:
     return text.replace('<', '\\u003c').replace('\u2028', '\\u2028').replace('\u2029', '\\u2029')
 
 
-def page(contents: Contents) -> str:
+def render(template: str, figures: list[Figure], folder: pathlib.Path = _FOLDER, **context: Any) -> str:
+    """A page from a template of `folder`, with these figures as data and the policy that only its own scripts run."""
     import jinja2
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
-    template = environment.from_string((_FOLDER / 'page.html.j2').read_text(encoding='utf-8'))
-    shown = [part.figure for part in contents.series]
-    shown += [figure for figure in contents.figures
-              if contents.paper is None or figure.id in contents.paper.statements]
-    if contents.timing_figure is not None and contents.paper is None:
-        shown.append(contents.timing_figure)
-    plots = [plot(figure) for figure in shown]
-    height = {made['id']: made['height'] for made in plots}
-
-    def view(figure: Figure | None) -> dict[str, Any] | None:
-        if figure is None or figure.id not in height:
-            return None
-        return {'id': figure.id, 'heading': figure.heading, 'caption': figure.caption, 'height': height[figure.id]}
-
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined,
+                                     loader=jinja2.FileSystemLoader([folder, _FOLDER]))
     plotly = plotly_js().replace('</script', '<\\/script')
     js = (_FOLDER / 'page.js').read_text(encoding='utf-8')
     # No script but these two runs, and nothing is fetched: a run's files cannot inject active content.
     policy = (f"default-src 'none'; style-src 'unsafe-inline'; img-src data: blob:; "
               f'script-src {_hash(plotly)} {_hash(js)}')
-    series = [{**vars(part), 'figure': view(part.figure)} for part in contents.series]
-    return template.render({**vars(contents), 'series': series, 'figures': [v for f in contents.figures if (v := view(f))],
-                            'timing_figure': view(contents.timing_figure), 'many': contents.runs > MOST_OPEN_ROWS,
-                            'plots': _as_script_data(plots), 'plotly': plotly, 'js': js, 'policy': policy,
-                            'css': (_FOLDER / 'page.css').read_text(encoding='utf-8')}) + '\n'
+    return environment.get_template(template).render(
+        **context, plots=_as_script_data([plot(figure) for figure in figures]), plotly=plotly, js=js, policy=policy,
+        css=(_FOLDER / 'page.css').read_text(encoding='utf-8')) + '\n'
+
+
+def view(figure: Figure) -> dict[str, Any]:
+    """What a template shows of a figure beside its plot."""
+    return {'id': figure.id, 'heading': figure.heading, 'caption': figure.caption, 'height': plot(figure)['height']}
+
+
+def page(contents: Contents) -> str:
+    shown = [part.figure for part in contents.series]
+    shown += [figure for figure in contents.figures
+              if contents.paper is None or figure.id in contents.paper.statements]
+    if contents.timing_figure is not None and contents.paper is None:
+        shown.append(contents.timing_figure)
+    names = {figure.id for figure in shown}
+    seen = [figure for figure in contents.figures if figure.id in names]
+    timing = contents.timing_figure
+    views: dict[str, Any] = {
+        'series': [{**vars(part), 'figure': view(part.figure)} for part in contents.series],
+        'figures': [view(figure) for figure in seen],
+        'timing_figure': view(timing) if timing is not None and timing.id in names else None,
+        'many': contents.runs > MOST_OPEN_ROWS}
+    return render('page.html.j2', shown, **{**vars(contents), **views})

@@ -259,14 +259,16 @@ def _tyre(form: Form, base: Any, value: dict[str, float], pieces: _Pieces, logs:
     shared = [(p.key, value[p.key]) for p in form.parameters if p not in tyre] + [('r2_m', r2), ('J2_kg_m2', J2)]
     lows = np.array([max(p.least, 1e-2 * value[p.key]) for p in tyre])
     highs = np.array([min(p.most, 1e2 * value[p.key]) for p in tyre])
+    x_start = np.log([value[p.key] for p in tyre])
 
     def residual(x: np.ndarray) -> np.ndarray:
         values = np.clip(np.exp(x), lows, highs)
         try:
             modelled = _core.tyre_forces_N(base, shared + list(zip([p.key for p in tyre], values.tolist())), w1, w2, Tb)
         except ValueError:  # this friction would wedge the lever
-            return np.full(len(force), 100.0)
-        return np.asarray(modelled) - force
+            return np.full(len(force) + len(x), 100.0)
+        # What the force does not tell, as the peak's height in gentle braking, stays near the start.
+        return np.concatenate([np.asarray(modelled) - force, 2.0 * (x - x_start)])
 
     best = None
     for factor in (1.0, 0.6, 1.6):  # the height's start decides the side of the peak that a fit takes

@@ -44,6 +44,8 @@ class Disturbances:
 #: rounds of the homotopy: disturbances, number of iterations
 ROUNDS = ((Disturbances.of(0.10, 0.05, 0.2), 2), (Disturbances.of(0.01, 0.005, 0.5), 2),
           (Disturbances.of(1e-3, 1e-4, 1.0), 1), (Disturbances.of(1e-4, 1e-5, 1.0), 1))
+#: largest change of a parameter in one iteration, over its size
+LARGEST_STEP = 0.3
 #: how far a piece's first state may move in one iteration: angles, speeds, brake torque
 NEAR_SD = np.array([0.005, 0.005, 0.5, 0.5, 0.1])
 QUIET = Disturbances.of(0.0, 0.0, 1.0)
@@ -95,7 +97,20 @@ class Problem:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         delay = (Parameter(DELAY, 's', 'always', '', floor=1e-3),) if self.with_delay else ()
-        return self.form.parameters + delay
+        factors = tuple(Parameter(key, '1', 'brake', '') for key in self.factors) if self.drifts else ()
+        return self.form.parameters + factors + delay
+
+    @property
+    def factors(self) -> tuple[str, ...]:
+        """Names of the brake's factors of each log but the first, over that of the first."""
+        return tuple(f'brake_factor_{number}' for number in range(2, len(self.logs) + 1))
+
+    def plant_values(self, values: Mapping[str, float], log: int) -> list[tuple[str, float]]:
+        """The plant of one log, as `_core` takes it."""
+        factor = values[self.factors[log - 1]] if self.drifts and log > 0 else 1.0
+        scaled = [(p.key, values[p.key] * (factor if p.key in ('b1_Nm', 'b2_Nm') else 1.0))
+                  for p in self.form.parameters]
+        return [*self.given.items(), *scaled, (DELAY, values.get(DELAY, 0.0))]
 
     @property
     def radians_per_count(self) -> float:
@@ -104,7 +119,7 @@ class Problem:
 
 @dataclass
 class Fit:
-    """values: of all parameters. normal: (logs, n, n), right: (logs, n), cost: (logs,) of the last linearisation, in
+    """values: of all parameters; first: those that the prior holds to. normal: (logs, n, n), right: (logs, n), cost: (logs,) of the last linearisation, in
     the scaled changes x of `scale`: value = nominal + scale x. `free` marks the estimated ones."""
     problem: Problem
     values: dict[str, float]
@@ -112,13 +127,13 @@ class Fit:
     disturbances: Disturbances
     window_s: float
     free: np.ndarray
+    first: dict[str, float] = field(default_factory=dict)
     scale: np.ndarray = field(default_factory=lambda: np.empty(0))
     normal: np.ndarray = field(default_factory=lambda: np.empty(0))
     right: np.ndarray = field(default_factory=lambda: np.empty(0))
     cost: np.ndarray = field(default_factory=lambda: np.empty(0))
     readings: float = 0.0
     rms_counts: float = np.nan
-    factors: dict[str, float] = field(default_factory=dict)
     iterations: int = 0
 
     @property
@@ -128,10 +143,19 @@ class Fit:
     def information(self) -> np.ndarray:
         return np.asarray(self.normal.sum(axis=0))
 
+    def prior(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of the scaled changes: the precision (n,), and its product with the way to the first values (n,)."""
+        parameters = self.problem.parameters
+        size = np.array([p.prior * max(abs(self.first.get(p.key, self.values[p.key])), p.floor) for p in parameters])
+        precision = (self.scale / size)**2
+        way = np.array([self.first.get(p.key, self.values[p.key]) - self.values[p.key] for p in parameters])
+        return precision, precision * way / self.scale
+
     def covariance(self) -> np.ndarray:
-        """Of the free parameters' scaled changes, shape (free, free); with a very weak prior so that it exists."""
-        N = self.information()[np.ix_(self.free, self.free)]
-        return np.asarray(np.linalg.pinv(N + 1e-4 * np.eye(len(N)), hermitian=True))
+        """Of the free parameters' scaled changes, shape (free, free); with the prior."""
+        N = (self.information() + np.diag(self.prior()[0]))[np.ix_(self.free, self.free)]
+        d = 1 / np.sqrt(np.diag(N))
+        return np.asarray(np.linalg.inv(N * np.outer(d, d)) * np.outer(d, d))
 
 
 def pieces_of(problem: Problem, values: Mapping[str, float], window_s: float) -> list[Piece]:
@@ -159,23 +183,36 @@ def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Pi
               check: Callable[[], None] = lambda: None) -> np.ndarray:
     """Fills `linear` of each piece; returns the scale of the parameters' changes."""
     scale = _scale(problem, values)
-    nominal = [*problem.given.items(), *((p.key, values[p.key]) for p in problem.parameters)]
-    moved = []
+    steps = []
     for i, p in enumerate(problem.parameters):
         size = 1e-5 * scale[i]
         if p.key == 'u0':
             size = _duty_step(problem, values['u0'])
         if p.key == DELAY:
             size = 1e-5
-        step = size if values[p.key] + size <= p.most else -size
-        moved.append((p, step))
-    parameters = [([(key, value + step if key == p.key else value) for key, value in nominal], step / scale[i], p.acts)
-                  for i, (p, step) in enumerate(moved)]
-    inputs = [log.inputs() for log in problem.logs]
-    for piece in pieces:
-        check()
-        piece.linear = _core.linearise(problem.base, nominal, parameters, inputs[piece.log], piece.first, piece.states)
-        _measure(problem, piece)
+        steps.append(size if values[p.key] + size <= p.most else -size)
+    for number, log in enumerate(problem.logs):
+        inputs = log.inputs()
+        # A factor of another log changes nothing in this one.
+        there = [i for i, p in enumerate(problem.parameters)
+                 if p.key not in problem.factors or p.key == f'brake_factor_{number + 1}']
+        nominal = problem.plant_values(values, number)
+        moved = []
+        for i in there:
+            p = problem.parameters[i]
+            other = problem.plant_values({**values, p.key: values[p.key] + steps[i]}, number)
+            moved.append((other, steps[i] / scale[i], p.acts))
+        for piece in pieces:
+            if piece.log != number:
+                continue
+            check()
+            piece.linear = _core.linearise(problem.base, nominal, moved, inputs, piece.first, piece.states)
+            if len(there) < len(steps):
+                for name in ('by_parameter', 'end_by_parameter'):
+                    few = piece.linear[name]
+                    piece.linear[name] = np.zeros((*few.shape[:2], len(steps)))
+                    piece.linear[name][:, :, there] = few
+            _measure(problem, piece)
     return scale
 
 
@@ -232,41 +269,51 @@ def run_filter(fit: Fit, disturbances: Disturbances, variance: float | None = No
     n = sum(one[1][:, 0] for one in found)
     c = sum(float(one[2][0]) for one in found)
     log_variance = sum(one[3] for one in found)
-    x = _solved(N, n, fit.free)
+    x = solved(fit, N, n)
     return c - float(n @ x) + log_variance, list(found)
 
 
-def _solved(N: np.ndarray, n: np.ndarray, free: np.ndarray, pull: float = 1e-4) -> np.ndarray:
-    """Change of the parameters, 0 for those that are not free. A weak pull to 0 decides what nothing else does."""
+def solved(fit: Fit, N: np.ndarray, n: np.ndarray, low: np.ndarray | None = None,
+           high: np.ndarray | None = None) -> np.ndarray:
+    """The likeliest change of the parameters, 0 for those that are not free. The prior decides what the logs do not. A
+    parameter that would leave its range stops at the range's end, and the others follow: they may depend on it."""
     x = np.zeros(len(n))
-    A = N[np.ix_(free, free)] + pull * np.eye(int(free.sum()))
+    precision, towards = fit.prior()
+    A, n = N + np.diag(precision), n + towards
     d = 1 / np.sqrt(np.diag(A))
-    x[free] = d * np.linalg.solve(A * np.outer(d, d), d * n[free])
+    A, n = A * np.outer(d, d), d * n
+    moving = fit.free.copy()
+    for _ in range(len(n)):
+        stopped = fit.free & ~moving
+        rest = n - A[:, stopped] @ (x[stopped] / d[stopped])
+        x[moving] = d[moving] * np.linalg.solve(A[np.ix_(moving, moving)], rest[moving])
+        if low is None or high is None:
+            break
+        beyond = moving & ((x < low) | (x > high))
+        if not beyond.any():
+            break
+        x[beyond] = np.clip(x, low, high)[beyond]
+        moving &= ~beyond
     return x
 
 
-def step(fit: Fit, disturbances: Disturbances, pull: float, check: Callable[[], None] = lambda: None,
-         bound: float = 0.3) -> float:
+def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambda: None) -> float:
     """One iteration: linearise, estimate, move parameters and states. Returns the largest change over its uncertainty."""
     problem = fit.problem
     fit.disturbances = disturbances
     fit.scale = linearise(problem, fit.values, fit.pieces, check)
     _, found = run_filter(fit, disturbances)
     N, n = _keep_normals(fit, found)
-    x = _solved(N, n, fit.free, pull)
-    x = np.clip(x, -bound, bound)
-    moved = dict(fit.values)
-    for i, p in enumerate(problem.parameters):
-        if fit.free[i]:
-            moved[p.key] = float(np.clip(fit.values[p.key] + fit.scale[i] * x[i], p.least, p.most))
-            if p.floor == 0.0:  # sizes that cannot vanish
-                moved[p.key] = max(moved[p.key], 0.3 * fit.values[p.key])
-    x = np.array([(moved[p.key] - fit.values[p.key]) / fit.scale[i] for i, p in enumerate(problem.parameters)])
+    values = np.array([fit.values[p.key] for p in problem.parameters])
+    least = np.array([p.least if p.floor or p.key == DELAY else max(p.least, 0.3 * v)
+                      for p, v in zip(problem.parameters, values)])
+    most = np.array([p.most for p in problem.parameters])
+    x = solved(fit, N, n, np.maximum((least - values) / fit.scale, -LARGEST_STEP),
+               np.minimum((most - values) / fit.scale, LARGEST_STEP))
     _move_states(fit, disturbances, x)
-    fit.values = moved
+    fit.values = {**fit.values, **{p.key: float(v + s * dx) for p, v, s, dx in zip(problem.parameters, values, fit.scale, x)}}
     fit.iterations += 1
-    sd = np.sqrt(np.maximum(np.diag(np.linalg.pinv(N[np.ix_(fit.free, fit.free)] + 1e-4 * np.eye(int(fit.free.sum())))),
-                            1e-30))
+    sd = np.sqrt(np.diag(fit.covariance()))
     return float(np.max(np.abs(x[fit.free]) / sd, initial=0.0))
 
 
@@ -337,12 +384,12 @@ def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
         check()
         # A duty that equals u0 acts (7): so u0 lies above the gap's begin, up to its end.
         candidate = max(0.5 * (begin + end), end - 1e-3)
-        nominal = [*problem.given.items(), *((p.key, candidate if p.key == 'u0' else fit.values[p.key])
-                                             for p in problem.parameters)]
+        values = {**fit.values, 'u0': candidate}
         changed = []
         for piece, hit in zip(fit.pieces, affected):
             if hit:
-                other = _core.linearise(problem.base, nominal, [], inputs[piece.log], piece.first, piece.states)
+                other = _core.linearise(problem.base, problem.plant_values(values, piece.log), [], inputs[piece.log],
+                                        piece.first, piece.states)
                 moved = Piece(piece.log, piece.first, piece.states, piece.stands, piece.prior_sd, dict(piece.linear))
                 moved.linear.update(angles=other['angles'], end=other['end'])
                 _measure(problem, moved)
@@ -350,10 +397,27 @@ def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
         found = [*rest, *_core.filter_pieces(changed, *settings)]
         N, n = sum(one[0] for one in found), sum(one[1][:, 0] for one in found)
         cost = sum(float(one[2][0]) + one[3] for one in found)
-        tried.append((float(begin), float(end), cost - float(n @ _solved(N, n, fit.free))))
+        tried.append((float(begin), float(end), cost - float(n @ solved(fit, N, n))))
     best = min(tried, key=lambda gap: gap[2])
     fit.values['u0'] = max(0.5 * (best[0] + best[1]), best[1] - 1e-3)
     return tried
+
+
+def likely_u0(fit: Fit, disturbances: Disturbances,
+              check: Callable[[], None] = lambda: None) -> list[tuple[float, float, float]]:
+    """The gaps around u0 with their costs, over a range so wide that both its ends are unlikely, if there is one."""
+    gaps: list[tuple[float, float, float]] = []
+    duties = np.unique(np.concatenate([log.brake_pwm for log in fit.problem.logs]))
+    for width in (8e-4, 3e-3, 1.2e-2, 4e-2):
+        gaps = search_u0(fit, disturbances, width, 12, check)
+        if not gaps:
+            break
+        least = min(gap[2] for gap in gaps) + 10.0
+        lower = gaps[0][2] > least or gaps[0][0] <= duties[0]
+        upper = gaps[-1][2] > least or gaps[-1][1] >= duties[-1]
+        if lower and upper:
+            break
+    return gaps
 
 
 def _has_duties(problem: Problem, piece: Piece, least: float, most: float) -> bool:
@@ -366,23 +430,28 @@ def start_fit(problem: Problem, start: Mapping[str, float], check: Callable[[], 
     values = first_values(problem.form, problem.base, problem.given, start, problem.logs, problem.motions,
                           problem.segments, problem.fixed)
     values.setdefault(DELAY, 0.0)
+    values.update({key: 1.0 for key in problem.factors})
     free = np.array([p.key not in problem.fixed and p.key != 'u0' for p in problem.parameters])
-    fit = Fit(problem, values, pieces_of(problem, values, WINDOW_S), ROUNDS[0][0], WINDOW_S, free)
+    fit = Fit(problem, values, pieces_of(problem, values, WINDOW_S), ROUNDS[0][0], WINDOW_S, free, dict(values))
     disturbances, count = ROUNDS[0]
     for _ in range(count):
-        step(fit, disturbances, 10.0, check)
+        step(fit, disturbances, check)
     return fit
 
 
-def finish_fit(fit: Fit, check: Callable[[], None] = lambda: None, most: int = 8) -> Fit:
+def finish_fit(fit: Fit, check: Callable[[], None] = lambda: None, most: int = 12) -> Fit:
     """The rest of the rounds, then without disturbances until nothing moves."""
     for number, (disturbances, count) in enumerate(ROUNDS[1:]):
         for _ in range(count):
-            step(fit, disturbances, 1.0, check)
+            step(fit, disturbances, check)
         search_u0(fit, disturbances, 0.004 / 4**number, 9, check)
+    before = np.inf
     for _ in range(most):
-        if step(fit, QUIET, 1e-4, check) < 0.05:
+        moved = step(fit, QUIET, check)
+        # The residual settles last: past the peak the states need some rounds more than the parameters.
+        if moved < 0.05 or (moved < 1.0 and fit.rms_counts > 0.999 * before > LARGEST_QUIET_RMS):
             break
+        before = fit.rms_counts
     return fit
 
 
@@ -393,15 +462,15 @@ def disturbed_fit(fit: Fit, check: Callable[[], None] = lambda: None, say: Calla
     present = Disturbances.of(0.02, 0.01, 0.2)
     for round_number in range(4):
         for _ in range(2 if round_number == 0 else 1):
-            moved = step(fit, present, 1e-2, check)
+            moved = step(fit, present, check)
         search_u0(fit, present, 0.003 / 2**round_number, 7, check)
         if round_number < 3:
-            present = likeliest_disturbances(fit, present, 12 if round_number == 0 else 6)
+            present = likeliest_disturbances(fit, present, 60 if round_number == 0 else 30)
             say(f'disturbances: {describe(present)}')
     for _ in range(3):
         if moved < 0.05:
             break
-        moved = step(fit, present, 1e-2, check)
+        moved = step(fit, present, check)
     return fit
 
 

@@ -17,7 +17,8 @@ DELAY = 'delay_s'
 @dataclass(frozen=True)
 class Parameter:
     """A number of the plant: its key without "plant."; `acts` says when it matters (python/src/identification.cpp);
-    `floor` is the least size that a step relates to, for those that may be 0; `cure` is what would tell it."""
+    `floor` is the least size that a step relates to, for those that may be 0; `cure` is what would tell it; `prior` is the
+    relative standard deviation of the first value, which decides only what the logs do not."""
     key: str
     unit: str
     acts: str
@@ -25,31 +26,32 @@ class Parameter:
     floor: float = 0.0
     least: float = 0.0
     most: float = np.inf
+    prior: float = 0.7
 
 
 _SHARED = (
-    Parameter('r1_m', 'm', 'contact', 'any log with both wheels rolling together'),
-    Parameter('J1_kg_m2', 'kg m^2', 'always', 'lifted'),
-    Parameter('d1_Nms_rad', 'N m s/rad', 'always', 'lifted', floor=2e-5),
-    Parameter('d2_Nms_rad', 'N m s/rad', 'always', 'lifted', floor=2e-5),
-    Parameter('M10_Nm', 'N m', 'always', 'lifted', floor=1e-3),
-    Parameter('M20_Nm', 'N m', 'always', 'lifted', floor=1e-3),
-    Parameter('b1_Nm', 'N m', 'brake', 'duty-ramp'),
-    Parameter('b2_Nm', 'N m', 'brake', 'duty-ramp', floor=0.5, least=-np.inf),
-    Parameter('c31_per_s', '1/s', 'brake', 'pulses'),
+    Parameter('r1_m', 'm', 'contact', 'any log with both wheels rolling together', most=0.9, prior=0.01),
+    Parameter('J1_kg_m2', 'kg m^2', 'always', 'lifted', most=0.9),
+    Parameter('d1_Nms_rad', 'N m s/rad', 'always', 'lifted', floor=1e-4, most=0.09),
+    Parameter('d2_Nms_rad', 'N m s/rad', 'always', 'lifted', floor=1e-4, most=0.09),
+    Parameter('M10_Nm', 'N m', 'always', 'lifted', floor=5e-3, most=9.0),
+    Parameter('M20_Nm', 'N m', 'always', 'lifted', floor=2e-2, most=9.0),
+    Parameter('b1_Nm', 'N m', 'brake', 'duty-ramp', most=900.0),
+    Parameter('b2_Nm', 'N m', 'brake', 'duty-ramp', floor=0.5, least=-900.0, most=900.0),
+    Parameter('c31_per_s', '1/s', 'brake', 'pulses', most=900.0),
     Parameter('u0', '1', 'brake', 'duty-ramp', most=0.999),
-    Parameter('motor_stall_torque_Nm', 'N m', 'motor', 'pulses'),
-    Parameter('motor_no_load_speed_rad_s', 'rad/s', 'motor', 'lifted'),
+    Parameter('motor_stall_torque_Nm', 'N m', 'motor', 'pulses', most=90.0),
+    Parameter('motor_no_load_speed_rad_s', 'rad/s', 'motor', 'lifted', most=1900.0),
 )
 _MAGIC = (
-    Parameter('theta_N', 'N', 'contact', 'slip-sweep or locked-stop'),
-    Parameter('B', '1', 'contact', 'slip-sweep'),
+    Parameter('theta_N', 'N', 'contact', 'slip-sweep or locked-stop', most=450.0),
+    Parameter('B', '1', 'contact', 'slip-sweep', most=190.0),
     Parameter('C', '1', 'contact', 'slip-sweep or locked-stop', most=2.0),
 )
 _LEVER = (
-    Parameter('lever_Mg_Nm', 'N m', 'contact', 'slip-sweep and pulses'),
-    Parameter('mu_w4', '1', 'contact', 'slip-sweep or locked-stop'),
-    Parameter('mu_a', '1', 'contact', 'slip-sweep'),
+    Parameter('lever_Mg_Nm', 'N m', 'contact', 'slip-sweep and pulses', most=900.0),
+    Parameter('mu_w4', '1', 'contact', 'slip-sweep or locked-stop', most=9.0),
+    Parameter('mu_a', '1', 'contact', 'slip-sweep', most=9.0, prior=2.0),
     Parameter('mu_p', '1', 'contact', 'slip-sweep', least=1.0, most=10.0),
 )
 #: given by the person: no log tells the scale of all torques and inertias, nor the scale of length

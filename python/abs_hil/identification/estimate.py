@@ -1,0 +1,289 @@
+"""abs_hil.identify: a rig's parameters from its logs."""
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..core import _core
+from ..options import PathLike, options
+from . import intervals
+from .fit import (LARGEST_QUIET_RMS, QUIET, Disturbances, Fit, Problem, _keep_normals, describe, disturbed_fit,
+                  finish_fit, likely_u0, linearise, run_filter, solved, start_fit, step)
+from .logs import Log, load_log
+from .parameters import COMBINATIONS, DELAY, FORMS, GIVEN, checked_keys
+
+#: an estimate whose standard deviation is above this share of its value is not called identified
+LARGEST_SD = 0.05
+#: above this share no interval is given at all
+LARGEST_WIDTH = 0.5
+#: a log whose own estimate lies this far from the others' is named: chi-square over its degrees of freedom
+LARGEST_DISAGREEMENT = 6.0
+#: a difference of -2 log likelihood that decides between the forms at first values already
+CLEAR_DIFFERENCE = 500.0
+#: a delay is believed if it is this many standard deviations from 0
+SURE_DELAY = 6.0
+
+
+@dataclass
+class Estimate:
+    """status: identified, bounded, fixed or not-identifiable; low and high hold the truth in 95 % of cases, None where
+    the logs say too little."""
+    value: float
+    low: float | None
+    high: float | None
+    status: str
+    unit: str
+
+
+@dataclass
+class Identified:
+    """What identify() found. parameters: by name with unit; notes: sentences about what the logs do not tell."""
+    form: str
+    start: str
+    parameters: dict[str, Estimate]
+    combinations: dict[str, Estimate]
+    residual_counts_rms: float
+    disturbances: Disturbances | None
+    notes: list[str]
+    logs: list[Log]
+    fit: Fit
+    spread: intervals.Spread
+    disagreement: dict[str, float] = field(default_factory=dict)
+    validation: dict[str, Any] | None = None
+
+    def values(self) -> dict[str, float]:
+        """The plant's keys without "plant." and their values."""
+        return {name: estimate.value for name, estimate in self.parameters.items() if name != DELAY}
+
+
+def _silent(_: str) -> None:
+    pass
+
+
+def identify(logs: Sequence[PathLike | Log], start: PathLike = 'paper-table1', *,
+             fix: Mapping[str, float | None] | None = None, drift: Sequence[str] = (), form: str = 'auto', seed: int = 1,
+             say: Callable[[str], None] = _silent, check: Callable[[], None] = lambda: None) -> Identified:
+    """Estimates the rig's parameters from logs of counts and duties.
+
+    logs:  run folders, event logs or CSV files (see load_log), or Log objects
+    start: plant that gives J2_kg_m2, r2_m, the encoder's counts and what the logs do not tell
+    fix:   parameters to leave alone: at their start value (None) or at the given one
+    drift: factors that may differ from log to log: brake_torque
+    form:  auto, magic-formula or inteco-mu; auto compares how well each predicts logs that it was not fitted to
+    seed:  of the bootstrap
+    say, check: called with progress in words; called often, may raise to stop
+
+    Raises ValueError for logs that cannot serve and for unknown keys.
+    """
+    fix = dict(fix or {})
+    checked_keys(fix)
+    if form != 'auto' and form not in FORMS:
+        raise ValueError(f'form {form}: give auto, {" or ".join(FORMS)}')
+    for name in drift:
+        if name != 'brake_torque':
+            raise ValueError(f'--drift {name}: no such drift; give brake_torque')
+    loaded = [log if isinstance(log, Log) else load_log(log) for log in logs]
+    if not loaded:
+        raise ValueError('give at least one log')
+    notes = [note for log in loaded for note in log.notes]
+    values = {k: v for k, v in _core.PlantOptions(options(plant=start)).values().items() if isinstance(v, float)}
+    values.update({key: number for key, number in fix.items() if number is not None})
+    _refuse_swapped(loaded)
+
+    fits = []
+    for name in FORMS if form == 'auto' else (form,):
+        say(f'{FORMS[name].meaning}: first values')
+        problem = Problem.of(FORMS[name], start, loaded, fix, tuple(drift))
+        if not any(problem.segments):
+            raise ValueError('in no log does a wheel turn for long enough (0.2 s above 3 rad/s)')
+        try:
+            fits.append(start_fit(problem, values, check))
+        except (ValueError, np.linalg.LinAlgError) as error:
+            notes.append(f'{FORMS[name].meaning}: cannot be fitted ({error})')
+    if not fits:
+        raise ValueError('neither form of the plant can be fitted to these logs')
+    fit = fits[0] if len(fits) == 1 else _better_form(fits, check, say, notes)
+    say(f'{fit.problem.form.meaning}: fit')
+    try:
+        fit = finish_fit(fit, check)
+    except (ValueError, np.linalg.LinAlgError) as error:
+        raise ValueError(f'the fit does not converge: these logs are not of a rig that the plant describes ({error})'
+                         ) from None
+    if not np.isfinite(fit.rms_counts):
+        raise ValueError('the fit does not converge: these logs are not of a rig that the plant describes')
+    quiet = fit.rms_counts <= LARGEST_QUIET_RMS
+    if quiet:
+        fit = _with_delay(fit, check, say)
+    else:
+        say(f'residual {fit.rms_counts:.3g} counts RMS: the rig wanders, or the model lacks something')
+        fit = disturbed_fit(fit, check, say)
+    disturbances = QUIET if quiet else fit.disturbances
+    gaps = likely_u0(fit, disturbances, check)
+    say('intervals')
+    spread = intervals.bootstrap(fit, seed, check=check) if quiet else intervals.information(fit)
+    found = _assembled(fit, spread, gaps, str(start), notes, None if quiet else fit.disturbances)
+    _name_disagreement(found)
+    return found
+
+
+def _refuse_swapped(logs: Sequence[Log]) -> None:
+    """The brake slows the upper wheel: while it acts most, the upper wheel turns less for a turn of the lower one than
+    while both roll."""
+    for log in logs:
+        strong = (log.brake_pwm > 0) & (log.brake_pwm >= 0.95 * log.brake_pwm.max())
+        rolling = (log.brake_pwm == 0) & (log.motor_pwm == 0)
+        ratios = []
+        for rows in (strong, rolling):
+            together = (rows & (log.wheels_apart == 0))[:-1]
+            turned = np.nansum(np.abs(np.diff(log.counts, axis=0))[together], axis=0)
+            ratios.append(turned[0] / turned[1] if turned.min() > 200 else np.nan)
+        if ratios[0] > 1.02 * ratios[1]:
+            raise ValueError(f'"{log.path}": upper_counts and lower_counts seem to be swapped: the upper wheel turns '
+                             f'{ratios[0]:.4f} times as far as the lower one while the brake acts, but {ratios[1]:.4f} times '
+                             'while both roll')
+
+
+def _better_form(fits: Sequence[Fit], check: Callable[[], None], say: Callable[[str], None], notes: list[str]) -> Fit:
+    """The form that better predicts each log from all the others, by the likelihood. Large disturbances are enough if
+    they show a clear difference already."""
+    costs = [_cross_validated(fit) for fit in fits]
+    if abs(costs[0] - costs[1]) < CLEAR_DIFFERENCE:
+        costs = []
+        for fit in fits:
+            for _ in range(2):
+                step(fit, Disturbances.of(0.01, 0.005, 0.5), check)
+            costs.append(_cross_validated(fit))
+    for fit, cost in zip(fits, costs):
+        say(f'{fit.problem.form.meaning}: -2 log likelihood of left-out logs {cost:.6g}')
+    best = int(np.argmin(costs))
+    notes.append(f'form: {fits[best].problem.form.meaning}; it predicts left-out logs better (-2 log likelihood lower by '
+                 f'{abs(costs[0] - costs[1]):.3g})')
+    return fits[best]
+
+
+def _cross_validated(fit: Fit) -> float:
+    N, n = fit.normal.sum(axis=0), fit.right.sum(axis=0)
+    if len(fit.normal) == 1:
+        return float(fit.cost.sum() - n @ solved(fit, N, n))
+    total = 0.0
+    for Nl, nl, cl in zip(fit.normal, fit.right, fit.cost):
+        x = solved(fit, N - Nl, n - nl)
+        total += float(cl - 2 * nl @ x + x @ Nl @ x)
+    return total
+
+
+def _with_delay(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit:
+    """Adds the inputs' delay if the logs are sure of one."""
+    problem = fit.problem
+    problem.with_delay = True
+    fit.free = np.append(fit.free, True)
+    fit.values[DELAY] = 0.0
+    fit.scale = linearise(problem, fit.values, fit.pieces, check)
+    N, n = _keep_normals(fit, run_filter(fit, QUIET)[1])
+    x = solved(fit, N, n)
+    sd = float(np.sqrt(fit.covariance()[-1, -1]))
+    if x[-1] > SURE_DELAY * sd and x[-1] * fit.scale[-1] > 2e-5:
+        say(f'inputs act late, by about {1e3 * x[-1] * fit.scale[-1]:.2g} ms')
+        for _ in range(6):
+            if step(fit, QUIET, check) < 0.05:
+                break
+        return fit
+    problem.with_delay = False
+    fit.free = fit.free[:-1]
+    del fit.values[DELAY]
+    fit.values[DELAY] = 0.0
+    fit.scale = linearise(problem, fit.values, fit.pieces, check)
+    _keep_normals(fit, run_filter(fit, QUIET)[1])
+    return fit
+
+
+def _assembled(fit: Fit, spread: intervals.Spread, gaps: list[tuple[float, float, float]], start: str, notes: list[str],
+               disturbances: Disturbances | None) -> Identified:
+    problem = fit.problem
+    parameters: dict[str, Estimate] = {}
+    for key, unit in GIVEN.items():
+        parameters[key] = Estimate(problem.given[key], problem.given[key], problem.given[key], 'fixed', unit)
+    cures: dict[str, list[str]] = {}
+    for i, p in enumerate(problem.parameters):
+        value = fit.values[p.key]
+        if p.key in problem.fixed:
+            parameters[p.key] = Estimate(value, value, value, 'fixed', p.unit)
+            continue
+        if p.key == 'u0':
+            parameters[p.key] = _u0(fit, gaps)
+            if parameters[p.key].status != 'identified':
+                cures.setdefault(p.cure, []).append(p.key)
+            continue
+        sd = float(np.sqrt(max(spread.covariance[i, i], 0.0))) * float(fit.scale[i])
+        relative = sd / max(abs(value), 1e-300)
+        low, high = value - intervals.WIDTH * sd, value + intervals.WIDTH * sd
+        estimate = Estimate(value, max(low, p.least), min(high, p.most), 'identified', p.unit)
+        if value <= p.least or value >= p.most:
+            estimate.status = 'bounded'
+            notes.append(f'{p.key} is at its bound {value:g} {p.unit}')
+        elif not relative <= LARGEST_SD:
+            estimate.status = 'not-identifiable'
+            cures.setdefault(p.cure, []).append(p.key)
+            if relative > LARGEST_WIDTH or sd == 0.0:
+                estimate.low = estimate.high = None
+        parameters[p.key] = estimate
+    combinations: dict[str, Estimate] = {}
+    for name, (unit, parts, cure) in COMBINATIONS.items():
+        if any(part not in parameters for part in parts):
+            continue
+        if all(parameters[part].status in ('identified', 'fixed') for part in parts):
+            continue
+        value, sd = intervals.combination(fit, spread, name)
+        known = sd <= LARGEST_SD * abs(value)
+        combinations[name] = Estimate(value, value - intervals.WIDTH * sd, value + intervals.WIDTH * sd,
+                                      'identified' if known else 'not-identifiable', unit)
+        if known:
+            joined = ' and '.join((', '.join(parts[:-1]), parts[-1]))
+            notes.append(f'{joined} are known only together, as {name} = {value:.5g} {unit}; run: {cure}')
+    for cure, keys in cures.items():
+        if cure:
+            notes.append(f'the logs do not tell {", ".join(keys)}; run: {cure}')
+    if disturbances is not None:
+        notes.append(f'the rig wanders ({describe(disturbances)}); the intervals count with it')
+    return Identified(problem.form.name, start, parameters, combinations, fit.rms_counts, disturbances, notes,
+                      list(problem.logs), fit, spread)
+
+
+def _u0(fit: Fit, gaps: list[tuple[float, float, float]]) -> Estimate:
+    """identified if the logs exclude smaller and larger values, bounded if one of them."""
+    value = fit.values['u0']
+    smaller, larger = intervals.excluded(gaps)
+    if not (smaller or larger):
+        return Estimate(value, None, None, 'not-identifiable', '1')
+    low, high = intervals.u0_interval(gaps, fit.values)
+    certain = smaller and larger and high - low <= LARGEST_SD * value
+    return Estimate(value, low, high if larger else 1.0, 'identified' if certain else 'bounded', '1')
+
+
+def _name_disagreement(found: Identified) -> None:
+    """Compares each log with all of them: the score of one log at the joint estimate."""
+    fit = found.fit
+    free = fit.free
+    inverse = fit.covariance()
+    for log, Nl, nl in zip(found.logs, fit.normal, fit.right):
+        Nl, score = Nl[np.ix_(free, free)], nl[free]
+        covariance = Nl - Nl @ inverse @ Nl
+        d = 1 / np.sqrt(np.maximum(np.diag(Nl), 1e-12))
+        values, vectors = np.linalg.eigh(covariance * np.outer(d, d))
+        kept = values > 1e-4
+        if not kept.any() or len(found.logs) == 1:
+            continue
+        z = (vectors.T @ (d * score))[kept] / np.sqrt(values[kept])
+        found.disagreement[log.name] = float(z @ z / kept.sum())
+    odd = {name: ratio for name, ratio in found.disagreement.items() if ratio > LARGEST_DISAGREEMENT}
+    if odd:
+        worst = max(odd, key=lambda name: odd[name])
+        found.notes.append(f'the logs disagree: {worst} most (chi-square per degree of freedom {odd[worst]:.3g}, expected '
+                           '1); is it of another rig, has something changed between the logs, or does the brake fade '
+                           '(--drift brake_torque)? So no interval is given')
+        for name, estimate in (*found.parameters.items(), *found.combinations.items()):
+            if estimate.status != 'fixed':
+                estimate.status, estimate.low, estimate.high = 'not-identifiable', None, None

@@ -1,0 +1,95 @@
+"""Intervals of 95 %: by quantising the fitted motion anew with other encoder phases (parametric bootstrap) where only the
+counts' steps disturb, by the information of the filter where the rig wanders."""
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core import _core
+from .fit import COUNT_VARIANCE, QUIET, Fit, _relative, solved
+from .parameters import COMBINATIONS
+
+REPLICATES = 80
+_BATCH = 20
+#: of a normal distribution, 95 %
+WIDTH = 1.96
+#: of a chi-square distribution with one degree of freedom, 95 %
+LIKELY = 3.84
+
+
+@dataclass
+class Spread:
+    """Covariance of the free parameters' scaled changes, (n, n) with zeros for those that are not free, and how the
+    bootstrap's mean is off, (n,)."""
+    covariance: np.ndarray
+    bias: np.ndarray
+    replicates: int
+
+
+def bootstrap(fit: Fit, seed: int = 1, replicates: int = REPLICATES,
+              check: Callable[[], None] = lambda: None) -> Spread:
+    """Spread of the estimates over random encoder phases. The estimate is linear in the counts near the solution."""
+    problem = fit.problem
+    per_count = problem.radians_per_count
+    way = _relative(problem, fit.values, fit.scale)
+    variance = COUNT_VARIANCE * per_count**2
+    random = np.random.default_rng(seed)
+    phases = random.uniform(size=(len(problem.logs), 2, replicates))
+    estimates = []
+    for begin in range(0, replicates, _BATCH):
+        check()
+        chosen = phases[:, :, begin:begin + _BATCH]
+        N, n = 0.0, 0.0
+        for piece in fit.pieces:
+            exact = piece.linear['angles'][:, :, None] / per_count
+            phase = chosen[piece.log][None]
+            residual = (np.floor(exact + phase) + 0.5 - phase - exact) * per_count
+            changed = {**piece.linear, 'residual': residual, 'gap': np.zeros_like(piece.linear['gap'])}
+            found = _core.filter_pieces([changed], way, QUIET.sd, QUIET.time_constant_s, variance)[0]
+            N, n = N + found[0], n + found[1]
+        shift = solved(fit, N, np.zeros(len(N)))  # what the prior alone does
+        estimates += [solved(fit, N, n[:, i]) - shift for i in range(n.shape[1])]
+    x = np.array(estimates)
+    return Spread(np.cov(x.T), x.mean(axis=0), replicates)
+
+
+def information(fit: Fit) -> Spread:
+    covariance = np.zeros((len(fit.scale), len(fit.scale)))
+    covariance[np.ix_(fit.free, fit.free)] = fit.covariance()
+    return Spread(covariance, np.zeros(len(fit.scale)), 0)
+
+
+def combination(fit: Fit, spread: Spread, name: str) -> tuple[float, float]:
+    """(value, standard deviation) of a combination of parameters."""
+    _, parts, _ = COMBINATIONS[name]
+    keys = fit.keys
+    values = np.array([fit.values[key] for key in parts])
+    gradient = np.zeros(len(keys))
+    product = name == 'theta_B_C_N'
+    value = float(np.prod(values) if product else np.sum(values))
+    for key, part in zip(parts, values):
+        i = keys.index(key)
+        gradient[i] = fit.scale[i] * (value / part if product else 1.0)
+    return value, float(np.sqrt(max(0.0, gradient @ spread.covariance @ gradient)))
+
+
+def excluded(gaps: list[tuple[float, float, float]]) -> tuple[bool, bool]:
+    """Whether the logs exclude a smaller and a larger u0 than those that are likely."""
+    if len(gaps) < 2:
+        return False, False
+    least = min(gap[2] for gap in gaps) + LIKELY
+    return gaps[0][2] > least, gaps[-1][2] > least
+
+
+def u0_interval(gaps: list[tuple[float, float, float]], values: Mapping[str, float]) -> tuple[float, float]:
+    """From the first to the last gap between duties that is not less likely than the best by 95 %, or that lies beside
+    one that was not tried."""
+    if not gaps:
+        return values['u0'], values['u0']
+    least = min(gap[2] for gap in gaps) + LIKELY
+    kept = [i for i, gap in enumerate(gaps) if gap[2] <= least]
+    low = gaps[kept[0] - 1][1] if kept[0] > 0 else gaps[0][0]
+    high = gaps[kept[-1] + 1][0] if kept[-1] + 1 < len(gaps) else gaps[-1][1]
+    return low, high

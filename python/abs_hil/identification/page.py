@@ -1,0 +1,113 @@
+"""The page of an identification: fits, residuals, intervals, correlations, what to run next."""
+from __future__ import annotations
+
+import pathlib
+
+import numpy as np
+
+from ..core import _core
+from ..report.model import Curve, Figure, Label, Panel, Shade, run_style
+from ..report.page import render, view
+from ..report.tables import Table
+from .advice import Advice
+from .estimate import Identified
+from .results import words as _  # noqa: F401  (the page and the terminal show the same rows)
+
+_FOLDER = pathlib.Path(__file__).parent
+_MOST_POINTS = 4000
+
+
+def _parameters(found: Identified) -> Table:
+    rows = []
+    for name, e in {**found.parameters, **found.combinations}.items():
+        interval = '–' if e.low is None or e.high is None or e.status == 'fixed' else f'{e.low:.6g} to {e.high:.6g}'
+        width = '–'
+        if e.low is not None and e.high is not None and e.status != 'fixed' and e.value:
+            width = f'± {50 * (e.high - e.low) / abs(e.value):.2g} %'
+        rows.append([name, f'{e.value:.6g}', e.unit, interval, width, e.status])
+    return Table('parameters', ['parameter', 'value', 'unit', 'interval of 95 %', 'half width', 'status'], rows)
+
+
+def _log_figures(found: Identified) -> list[Figure]:
+    fit = found.fit
+    figures = []
+    for number, log in enumerate(found.logs):
+        motion = fit.problem.motions[number]
+        speeds = [Curve(0, name, run_style(i), *_thinned(log.time_s, motion.speed_rad_s[:, i]), legend=name, group=name)
+                  for i, name in enumerate(('upper wheel', 'lower wheel'))]
+        duties = [Curve(0, name, run_style(i + 2), *_thinned(log.time_s, values), legend=name, group=name)
+                  for i, (name, values) in enumerate((('brake', log.brake_pwm), ('motor', log.motor_pwm)))]
+        residuals = []
+        for i, name in enumerate(('upper wheel', 'lower wheel')):
+            time, left = [], []
+            for piece in fit.pieces:
+                if piece.log == number:
+                    time.append(log.time_s[piece.rows])
+                    left.append(np.where(piece.linear['weight'][:, i] > 0, piece.linear['residual'][:, i, 0]
+                                         / fit.problem.radians_per_count, np.nan))
+            if time:
+                residuals.append(Curve(0, f'residual, {name}', run_style(i),
+                                       *_thinned(np.concatenate(time), np.concatenate(left)), group=name))
+        figures.append(Figure(
+            f'log-{number + 1}', log.name, Label('time, s', 'time, s'),
+            [Panel(Label('speed, rad/s', 'speed, rad/s'), speeds, height_px=150.0),
+             Panel(Label('duty', 'duty'), duties, height_px=90.0),
+             Panel(Label('residual, counts', 'residual, counts'), residuals, height_px=110.0)],
+            caption=f'{len(log)} rows; residual by phase: {_by_phase(found, number)}.', axis=f'log-{number + 1}',
+            shades=_apart(log.time_s, log.wheels_apart)))
+    return figures
+
+
+def _apart(time_s: np.ndarray, apart: np.ndarray) -> list[Shade]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], apart != 0, [0]]).astype(int)))
+    return [Shade(float(time_s[a]), float(time_s[b - 1]), 'hold') for a, b in zip(edges[::2], edges[1::2])]
+
+
+def _by_phase(found: Identified, number: int) -> str:
+    fit, log = found.fit, found.logs[number]
+    sums: dict[str, list[float]] = {}
+    for piece in fit.pieces:
+        if piece.log != number:
+            continue
+        square = (piece.linear['weight'] * (piece.linear['residual'][:, :, 0] / fit.problem.radians_per_count)**2)
+        for phase in dict.fromkeys(log.phase[piece.rows]):
+            rows = log.phase[piece.rows] == phase
+            entry = sums.setdefault(str(phase) or 'all', [0.0, 0.0])
+            entry[0] += float(square[rows].sum())
+            entry[1] += float(piece.linear['weight'][rows].sum())
+    return ', '.join(f'{phase} {np.sqrt(square / weight):.3f}' for phase, (square, weight) in sums.items() if weight)
+
+
+def _thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    step = max(1, len(x) // _MOST_POINTS)
+    return x[::step], y[::step]
+
+
+def _correlations(found: Identified) -> Table:
+    fit = found.fit
+    chosen = [i for i, one in enumerate(fit.free) if one]
+    covariance = found.spread.covariance[np.ix_(chosen, chosen)]
+    sd = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    correlation = covariance / np.outer(sd, sd)
+    names = [fit.keys[i] for i in chosen]
+    rows = [[name, *(f'{correlation[i, j]:+.2f}' if j < i else '' for j in range(len(names)))]
+            for i, name in enumerate(names)]
+    return Table('correlations', ['', *names], rows)
+
+
+def page(found: Identified, advice: list[Advice]) -> str:
+    figures = _log_figures(found)
+    validation = Table('validation', ['', 'measured', 'predicted', 'error'], [])
+    if found.validation is not None:
+        v = found.validation
+        for name, label in (('stop_distance_m', 'stop distance, m'), ('stop_time_s', 'stop time, s')):
+            error = v[f'{name}_error']
+            validation.rows.append([label, f'{v[name]:.5g}', f'{v[f"predicted_{name}"]:.5g}',
+                                    '–' if error is None else f'{100 * error:+.3f} %'])
+    logs = Table('logs', ['log', 'rows', 's', 'disagreement', 'sha256'],
+                 [[log.name, str(len(log)), f'{log.time_s[-1] - log.time_s[0]:.1f}',
+                   f'{found.disagreement[log.name]:.2f}' if log.name in found.disagreement else '–', log.sha256[:16]]
+                  for log in found.logs])
+    return render('identification.html.j2', figures, _FOLDER, version=_core.version, found=found,
+                  parameters=_parameters(found), correlations=_correlations(found), validation=validation, logs=logs,
+                  advice=[one.sentence() for one in advice], figures=[view(figure) for figure in figures])

@@ -1,0 +1,156 @@
+"""What identification writes: identified.json, model.toml, and a run that it predicts."""
+from __future__ import annotations
+
+import datetime
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..core import _core
+from ..options import PathLike, options
+from ..run import Run, load
+from ..simulation import simulate
+from .estimate import Estimate, Identified
+from .parameters import DELAY, FORMS
+
+#: keys of a run's configuration that say what the run did, not on what it ran
+_DOING = ('control.', 'experiment.', 'observer.', 'gate.')
+#: a run's gate.* belongs to its board where it names board limits
+_LEFT_OUT = ('gate.brake_duty_max', 'gate.motor_duty_max')
+
+
+def as_json(found: Identified) -> dict[str, Any]:
+    """The content of identified.json."""
+    def row(estimate: Estimate) -> dict[str, Any]:
+        return {'value': estimate.value, 'low': estimate.low, 'high': estimate.high, 'status': estimate.status}
+    return {'parameters': {name: row(e) for name, e in {**found.parameters, **found.combinations}.items()},
+            'residual_counts_rms': found.residual_counts_rms,
+            'form': found.form,
+            'start': found.start,
+            'disturbances': None if found.disturbances is None else {
+                'sd': found.disturbances.sd.tolist(), 'time_constant_s': float(found.disturbances.time_constant_s[0])},
+            'logs': [{'name': log.name, 'path': str(log.path), 'sha256': log.sha256, 'rows': len(log),
+                      'duration_s': float(log.time_s[-1] - log.time_s[0]),
+                      'disagreement': found.disagreement.get(log.name)} for log in found.logs],
+            'notes': found.notes,
+            'validation': found.validation,
+            'version': _core.version,
+            'date': datetime.date.today().isoformat()}
+
+
+def as_toml(found: Identified) -> str:
+    """The content of model.toml: a plant's file, which --model and --plant load."""
+    def line(key: str, estimate: Estimate) -> str:
+        interval = '' if estimate.low is None or estimate.status == 'fixed' else f', {estimate.low:.6g} to {estimate.high:.6g}'
+        return f'{key} = {_number(estimate.value)}  # {estimate.unit}: {estimate.status}{interval}'
+
+    form = FORMS[found.form]
+    base = found.fit.problem.base.values()
+    lines = [f'# Identified by abs_identify {_core.version} on {datetime.date.today().isoformat()}: value, then status and '
+             'interval of 95 %.',
+             f'# Residual {found.residual_counts_rms:.4f} counts RMS (0.2887 if nothing but the counts disturbs).']
+    lines += [f'# Log {_comment(log.name)}: sha256 {log.sha256}' for log in found.logs]
+    lines += [f'# {_comment(note)}' for note in found.notes]
+    description = f'identified from {len(found.logs)} logs on {datetime.date.today().isoformat()}: {form.meaning}'
+    lines += ['', f'description = {json.dumps(description)}', '', '[plant]',
+              *(f'{key.removeprefix("plant.")} = "{value}"' for key, value in form.settings.items())]
+    lines += [line(key, e) for key, e in found.parameters.items() if key in base and not key.startswith('brake_factor')]
+    lines.append(f'encoder_counts_per_rev = {base["encoder_counts_per_rev"]}')
+    if found.form == 'inteco-mu':
+        given = ('mu_w1', 'mu_w2', 'mu_w3', 'lever_L_m', 'lever_phi_deg')
+        lines += [f'{key} = {_number(base[key])}  # of the start, {_comment(found.start)}' for key in given]
+        lines += ['', '[model]', "# What controllers believe of the tyre: the magic formula nearest to the maker's curve in braking."]
+        lines += [f'{key} = {_number(value)}' for key, value in equivalent_tyre(found).items()]
+    return '\n'.join(lines) + '\n'
+
+
+def _number(value: float) -> str:
+    text = repr(float(value))
+    return text if any(c in text for c in '.en') else text + '.0'
+
+
+def _comment(text: str) -> str:
+    """Text from a file in a comment: one line without control characters."""
+    return ''.join(c if c.isprintable() else '?' for c in text)
+
+
+def equivalent_tyre(found: Identified) -> dict[str, float]:
+    """theta_N, B and C of the magic formula whose force is nearest to the identified curve's while the brake holds the
+    wheel at each slip."""
+    import scipy.optimize
+    base, values = found.fit.problem.base, list(found.values().items())
+    slip = np.linspace(0.005, 0.6, 120)
+    omega2 = np.full(slip.shape, 100.0)
+    r1, r2 = found.parameters['r1_m'].value, found.parameters['r2_m'].value
+    omega1 = omega2 * r2 / r1 * (1 - slip)
+    torque = np.zeros(slip.shape)
+    for _ in range(8):  # the lever's load grows with the brake's torque
+        force = np.asarray(_core.tyre_forces_N(base, values, omega1, omega2, torque))
+        torque = np.maximum(0.0, r1 * force)
+    fit = scipy.optimize.least_squares(lambda x: x[0] * np.sin(x[2] * np.arctan(x[1] * slip)) - force,
+                                       (float(force.max()), 25.0, 1.5), bounds=((0.1, 1.0, 0.8), (499.0, 199.0, 2.0)))
+    return {'theta_N': float(fit.x[0]), 'B': float(fit.x[1]), 'C': float(fit.x[2])}
+
+
+def plant_settings(found: Identified) -> dict[str, Any]:
+    """--set for the identified plant."""
+    base = found.fit.problem.base.values()
+    settings: dict[str, Any] = dict(FORMS[found.form].settings)
+    settings.update({f'plant.{key}': value for key, value in found.values().items() if key in base})
+    settings['plant.encoder_counts_per_rev'] = base['encoder_counts_per_rev']
+    if found.form == 'inteco-mu':
+        settings.update({f'plant.{key}': base[key] for key in ('mu_w1', 'mu_w2', 'mu_w3', 'lever_L_m', 'lever_phi_deg')})
+    return settings
+
+
+def validate(found: Identified, folder: PathLike) -> dict[str, Any]:
+    """Simulates the run of a folder on the identified plant, with the run's own controller and model, and compares where
+    and when both stop. Raises ValueError for a folder whose configuration is unknown or that did not stop."""
+    run = load(folder)
+    config = run.config
+    if not config or run.summary.get('stop_distance_m') is None:
+        raise ValueError(f'"{folder}": a run that validates needs its summary.json, with a stop')
+    settings = {key: value for key, value in config.items() if key.startswith(_DOING) and key not in _LEFT_OUT}
+    known = _names()
+    for key, value in config.items():  # what the controllers believed, and not the plant that is identified
+        name = key.partition('.')[2]
+        if key.startswith('plant.') and f'model.{name}' in known:
+            settings.setdefault(f'model.{name}', config.get(f'model.{name}', value))
+        if key.startswith('model.'):
+            settings[key] = value
+    settings.update(plant_settings(found))
+    settings = {key: value for key, value in settings.items() if value is not None and key in known}
+    predicted = simulate(controller=str(run.summary.get('controller', 'adaptive')),
+                         experiment=str(run.summary.get('experiment', 'paper')), set=settings)
+    return {'run': str(folder), **_compared(run, predicted)}
+
+
+def _names() -> set[str]:
+    return {row['name'] for row in _core.keys(options())}
+
+
+def _compared(run: Run, predicted: Run) -> dict[str, float | None]:
+    out: dict[str, float | None] = {}
+    for name in ('stop_distance_m', 'stop_time_s'):
+        measured, simulated = run.summary.get(name), predicted.summary.get(name)
+        out[name] = measured
+        out[f'predicted_{name}'] = simulated
+        usable = measured and simulated and math.isfinite(measured) and math.isfinite(simulated)
+        out[f'{name}_error'] = simulated / measured - 1 if usable else None
+    return out
+
+
+def words(found: Identified) -> list[str]:
+    """A plain table for the terminal."""
+    rows: Mapping[str, Estimate] = {**found.parameters, **found.combinations}
+    width = max(len(name) for name in rows)
+    lines = []
+    for name, e in rows.items():
+        if name == DELAY and e.value == 0.0:
+            continue
+        interval = '' if e.low is None or e.high is None or e.status == 'fixed' else f'{e.low:.6g} to {e.high:.6g}'
+        lines.append(f'{name:{width}}  {e.value:<12.6g}  {interval:26}  {e.status}')
+    return lines
