@@ -128,9 +128,14 @@ const Grammar& phase_grammar() {
               {.key = "wheels_apart",
                .meaning =
                    "the upper wheel is lifted off the lower one: a simulator parts them, on a rig a person does"}),
-          required(row(Shape::table,
-                       {.key = "until", .meaning = "what ends the phase: one condition, or any or all of several"},
-                       Quantity::none, &until_grammar())),
+          row(Shape::text,
+              {.key = "ask",
+               .meaning = "what a person is asked to do; the phase ends when the person has answered, motor and brake "
+                          "are off meanwhile"}),
+          row(Shape::table,
+              {.key = "until",
+               .meaning = "what ends the phase: one condition, or any or all of several; required unless it asks"},
+              Quantity::none, &until_grammar()),
           row(Shape::number,
               {.key = "at_most",
                .meaning = "a phase that lasts longer is a fault; may be left out if the phase ends by its duration",

@@ -66,6 +66,7 @@ struct PhaseScript {
   std::optional<Number> at_most{};
   bool restart{false};  ///< of the slip controller
   bool wheels_apart{false};
+  std::string ask{};  ///< empty: nothing
   Place place{};
 };
 

@@ -48,7 +48,7 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
 
 /// Options of `abs_hil send`.
 struct SendOptions {
-  std::vector<std::string> order{};  ///< "stop", "start", "slip-ref X", "gain NAME X"
+  std::vector<std::string> order{};  ///< "stop", "start", "continue", "slip-ref X", "gain NAME X"
   double timeout_s{3.0};
 };
 /// `abs_hil send`: sends a command to a running abs_hil and waits for its answer. Throws config::ConfigError, LcmError.
