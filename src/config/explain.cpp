@@ -100,9 +100,13 @@ void add_series(const SeriesScript& series, const config::Settings& s, std::stri
 std::string explain(const Script& script, const config::Settings& settings) {
   config::Settings s = settings;
   apply(script, s);
-  const Plan plan = config::plan(script, s);
   std::string text =
       fmt::format("{}: {}\n", script.name, script.description.empty() ? "no description" : script.description);
+  if (script.series.of_experiments) {
+    add_series(script.series, s, text);
+    return text;
+  }
+  const Plan plan = config::plan(script, s);
   for (std::size_t i = 0; i < plan.phases.size(); ++i) {
     const experiment::PhasePlan& phase = plan.phases[i];
     const bool goes_on = i > 0 && plan.phases[i - 1].brake == BrakeAction::slip_control && !phase.restart;

@@ -86,8 +86,9 @@ const Grammar& script_grammar() {
           row(Shape::settings,
               {.key = "settings",
                .meaning = "configuration values of the experiment; --config, options and --set override them"}),
-          required(row(Shape::tables, {.key = "phase", .meaning = "the phases, in order"}, Quantity::none,
-                       &phase_grammar())),
+          row(Shape::tables,
+              {.key = "phase", .meaning = "the phases, in order; required unless [series] names experiments"},
+              Quantity::none, &phase_grammar()),
           row(Shape::table,
               {.key = "limits",
                .meaning = "limits of this experiment; they can only tighten those of the configuration"},
@@ -284,6 +285,10 @@ const Grammar& series_grammar() {
       "[series]",
       "The experiment is run several times",
       {
+          row(Shape::texts,
+              {.key = "experiments",
+               .meaning =
+                   "the experiments that are run, one after the other, in place of phases: names or TOML files"}),
           row(Shape::whole, {.key = "repeat",
                              .meaning = "runs of each combination, with seeds that count up",
                              .range = {1.0, 100'000.0}}),

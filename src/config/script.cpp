@@ -40,18 +40,34 @@ class Parser {
     script_.author = root.text_or_empty("author");
     script_.notes = root.text_or_empty("notes");
     if (const Entry* analysis = root.find("analysis")) script_.analysis = root.choice(*analysis);
-    const Entry& phases = *root.find("phase");
-    for (const toml::table* phase : root.tables(phases)) script_.phases.push_back(read_phase(*phase, phases.place));
+    script_.series = read_series(source_, root);
+    read_phases(root);
     if (const Entry* limits = root.find("limits")) read_limits(root.table(*limits), limits->place);
     if (const Entry* events = root.find("event")) {
       for (const toml::table* event : root.tables(*events)) script_.events.push_back(read_event(*event, events->place));
     }
     for (const ChangingPart& part : changing_parts()) static_cast<void>(profile(script_, part.what));
     script_.settings = read_settings(source_, root);
-    script_.series = read_series(source_, root);
   }
 
  private:
+  void read_phases(const TableReader& root) {
+    const Entry* phases = root.find("phase");
+    if (!script_.series.of_experiments) {
+      if (phases == nullptr) source_.fail(root.place(), "the script has no \"phase\" (the phases, in order); give one");
+      for (const toml::table* phase : root.tables(*phases)) script_.phases.push_back(read_phase(*phase, phases->place));
+      return;
+    }
+    // These belong to the experiments that are run.
+    for (const char* key : {"phase", "limits", "event", "analysis", "settings"}) {
+      if (const Entry* entry = root.find(key)) {
+        source_.fail(entry->key_place, fmt::format("[series] names experiments, which have their own {}; leave {} out "
+                                                   "here, or experiments in [series]",
+                                                   key, key));
+      }
+    }
+  }
+
   PhaseScript read_phase(const toml::table& table, Place place) {
     const TableReader reader(source_, table, phase_grammar(), place);
     PhaseScript phase;

@@ -189,6 +189,12 @@ std::shared_ptr<const config::Script> script_of(const RunOptions& options, const
 
 }  // namespace
 
+void refuse_nested(const config::Script& series, const config::Script& experiment) {
+  if (!experiment.series.given) return;
+  throw config::ConfigError(
+      fmt::format("{}: {} is a series, too; name single experiments", series.path, experiment.name));
+}
+
 RunRequest merge(const RunOptions& options) {
   RunRequest request;
   const Files files = read_files(options, request.settings.plant_name);

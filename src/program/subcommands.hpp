@@ -28,7 +28,7 @@ int list_reasons(bool json);
 /// a file that exists.
 int init_rig(const RunRequest& request, const std::string& name);
 /// `abs_hil validate`: describes an experiment and checks it against the limits of its backend.
-int validate(const RunRequest& request);
+int validate(const RunOptions& options);
 /// `abs_hil validate --schema`: the JSON Schema of experiment files.
 int print_schema();
 /// `abs_hil doctor`: runs all checks of this computer or the named one, and prints a fix for each shortcoming.
