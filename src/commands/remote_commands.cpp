@@ -99,19 +99,19 @@ telemetry::CommandAnswer RemoteCommands::carry_out(const command2_t& command, bo
 void RemoteCommands::settle(rig::Reason reason, std::map<std::uint32_t, Pending>::iterator pending) {
   const Pending& done = pending->second;
   ++accepted_;
-  stream_.send_adjustment(done.key, done.value);
+  // The stream tells of every answer itself, also of one at the terminal.
+  if (done.key != continue_name) stream_.send_adjustment(done.key, done.value);
   const std::string what = has_value(done.key) ? fmt::format("{} = {}", done.key, done.value) : done.key;
   stream_.answer_command(reason, fmt::format("accepted: {} (sender '{}')", what, shown(done.sender)), done.value);
   pending_.erase(pending);
 }
 
-bool RemoteCommands::settle_named(rig::Reason reason, std::string_view name) {
+void RemoteCommands::settle_named(rig::Reason reason, std::string_view name) {
   for (auto it = pending_.begin(); it != pending_.end(); ++it) {
     if (it->second.key != name) continue;
     settle(reason, it);
-    return true;
+    return;
   }
-  return false;
 }
 
 void RemoteCommands::refuse_pending() {
@@ -133,10 +133,7 @@ void RemoteCommands::consume(const rig::CycleRecord& record, double /*distance_m
   if (record.reason == rig::Reason::start_command) {
     settle_named(record.reason, start_name);
   } else if (record.reason == rig::Reason::question_answered) {
-    // An answer at the terminal was no command, but a replay needs it, too.
-    if (!settle_named(record.reason, continue_name) && by_person_) {
-      stream_.send_adjustment(std::string(continue_name), 0.0);
-    }
+    settle_named(record.reason, continue_name);
   } else if (rig::is_adjustment(record.reason)) {
     if (const auto it = pending_.find(static_cast<std::uint32_t>(record.reason_value)); it != pending_.end()) {
       settle(record.reason, it);

@@ -48,7 +48,7 @@ class RemoteCommands final : public rig::RecordSink {
   };
   telemetry::CommandAnswer carry_out(const command2_t& command, bool& taken);
   void settle(rig::Reason reason, std::map<std::uint32_t, Pending>::iterator pending);
-  bool settle_named(rig::Reason reason, std::string_view name);
+  void settle_named(rig::Reason reason, std::string_view name);
   void send_state();
 
   telemetry::MessageStream& stream_;

@@ -111,6 +111,7 @@ class TimedReading final : public driver::RigDriver {
   [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
     return rig_.as_sent(command);
   }
+  void note_wheels_apart(bool apart) noexcept override { rig_.note_wheels_apart(apart); }
 
  private:
   void do_configure() override { rig_.configure(); }
