@@ -224,7 +224,7 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
                         .car_speed_m_s = wheels_.r2_m * speeds_.omega2_rad_s,
                         .stands_still = stands_still_,
                         .start_given = start_given_,
-                        .answered = answered_ || answers_itself_,
+                        .answered = answered_,
                         .wheels_sound = wheels_sound_,
                         .slip = slip_,
                         .distance_m = distance_m_});
@@ -236,7 +236,7 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
   record.reason_value = change.value;
   record.wheels_apart = sequence_.wheels_apart();
   if (change.entered) {
-    answered_ = false;  // an answer counts for the phase that asked
+    answered_ = answers_itself_;  // an answer counts for the phase that asked
   } else {
     adjust(record);
   }
