@@ -20,9 +20,11 @@ BUDGETS = [
     # 1,500 until the sequence took conditions from experiment files and controllers could be adjusted live (some 40);
     # 1,550 until the brake map was inverted onto the PWM's steps, the controller's output checked for finiteness, gate
     # and integrals told what was sent (some 200), stamps had an uncertainty and conditions needed two samples (some
-    # 120); 1,960 until the controller's own signals had to be finite (some 30).
-    ('the same with sequence and actuator: all of "control"', ['counted_control', 'counted_sent'], 1990),
+    # 120); 1,960 until the controller's own signals had to be finite (some 30); 1,990 until phases could ask and part
+    # the wheels (some 10).
+    ('the same with sequence and actuator: all of "control"', ['counted_control', 'counted_sent'], 2000),
     # These two together cost 389 until the checks judged the uncertainty of the stamps and told when they could not.
+    # The first was held to 310 until the wheels could be apart (2).
     ('plausibility of the measurement', ['counted_watch'], 315),
     ('gate: check of the command', ['abs_hil::runtime::CommandGate::check(*'], 142),
     ("heartbeat, check of the guardian's, flight recorder", ['counted_watchers'], 400),

@@ -14,6 +14,9 @@ namespace {
 constexpr double state_period_s = 0.5;
 constexpr std::size_t shown_max_bytes = 64;
 constexpr std::string_view start_name = "start";
+constexpr std::string_view continue_name = "continue";
+
+bool has_value(const std::string& key) { return key != start_name && key != continue_name; }
 
 std::string shown(const std::string& text) { return telemetry::printable(text, shown_max_bytes); }
 
@@ -28,8 +31,12 @@ std::string why(rig::Reason reason) {
 
 }  // namespace
 
-RemoteCommands::RemoteCommands(const config::Settings& settings, telemetry::MessageStream& stream)
-    : stream_(stream), live_(settings), waiting_(settings.experiment.wait_for_start) {
+RemoteCommands::RemoteCommands(const config::Settings& settings, telemetry::MessageStream& stream, rig::RunNames names)
+    : stream_(stream),
+      live_(settings),
+      names_(std::move(names)),
+      waiting_(settings.experiment.wait_for_start),
+      by_person_(settings.experiment.answers == "person") {
   if (settings.commands.enabled) authority_.emplace(read_key(settings.commands.key_file));
 }
 
@@ -64,6 +71,11 @@ telemetry::CommandAnswer RemoteCommands::carry_out(const command2_t& command, bo
     if (!waiting_) return {Reason::command_not_now, "the run does not wait for a start command (--wait-for-start)"};
     pending.key = start_name;
     pending.value = 0.0;
+  } else if (command.command == continue_name) {
+    if (!asking_) return {Reason::command_not_now, "the present phase asks nothing"};
+    adjustment.kind = experiment::Adjustment::Kind::answer;
+    pending.key = continue_name;
+    pending.value = 0.0;
   } else if (command.command == "slip-ref" || command.command == "gain") {
     try {
       pending.key = changed.resolve(command.command == "gain" ? shown(command.name) : "control.slip_ref");
@@ -72,11 +84,12 @@ telemetry::CommandAnswer RemoteCommands::carry_out(const command2_t& command, bo
       return {Reason::command_out_of_range, error.what()};
     }
   } else {
-    return {Reason::command_unknown, "unknown command; give slip-ref, gain, start or stop"};
+    return {Reason::command_unknown, "unknown command; give slip-ref, gain, start, continue or stop"};
   }
   const std::uint32_t number = mailbox_->put(std::move(adjustment));
   if (number == 0) return {Reason::command_not_now, "too many changes at once: send it again"};
   if (pending.key == start_name) waiting_ = false;
+  if (pending.key == continue_name) asking_ = false;
   live_ = std::move(changed);
   pending_.emplace(number, std::move(pending));
   taken = true;
@@ -86,18 +99,26 @@ telemetry::CommandAnswer RemoteCommands::carry_out(const command2_t& command, bo
 void RemoteCommands::settle(rig::Reason reason, std::map<std::uint32_t, Pending>::iterator pending) {
   const Pending& done = pending->second;
   ++accepted_;
-  stream_.send_adjustment(done.key, done.value);
-  const std::string what = done.key == start_name ? done.key : fmt::format("{} = {}", done.key, done.value);
+  // The stream tells of every answer itself, also of one at the terminal.
+  if (done.key != continue_name) stream_.send_adjustment(done.key, done.value);
+  const std::string what = has_value(done.key) ? fmt::format("{} = {}", done.key, done.value) : done.key;
   stream_.answer_command(reason, fmt::format("accepted: {} (sender '{}')", what, shown(done.sender)), done.value);
   pending_.erase(pending);
+}
+
+void RemoteCommands::settle_named(rig::Reason reason, std::string_view name) {
+  for (auto it = pending_.begin(); it != pending_.end(); ++it) {
+    if (it->second.key != name) continue;
+    settle(reason, it);
+    return;
+  }
 }
 
 void RemoteCommands::refuse_pending() {
   over_ = true;
   for (const auto& [number, pending] : pending_) {
     ++refused_at_end_;
-    const bool start = pending.key == start_name;
-    const std::string what = start ? "start" : fmt::format("{} = {}", pending.key, pending.value);
+    const std::string what = has_value(pending.key) ? fmt::format("{} = {}", pending.key, pending.value) : pending.key;
     stream_.answer_command(rig::Reason::command_not_now,
                            fmt::format("refused: {}: the run ended before it could take effect (sender '{}')", what,
                                        shown(pending.sender)),
@@ -110,16 +131,15 @@ void RemoteCommands::refuse_pending() {
 
 void RemoteCommands::consume(const rig::CycleRecord& record, double /*distance_m*/) {
   if (record.reason == rig::Reason::start_command) {
-    for (auto it = pending_.begin(); it != pending_.end(); ++it) {
-      if (it->second.key != start_name) continue;
-      settle(record.reason, it);
-      break;
-    }
+    settle_named(record.reason, start_name);
+  } else if (record.reason == rig::Reason::question_answered) {
+    settle_named(record.reason, continue_name);
   } else if (rig::is_adjustment(record.reason)) {
     if (const auto it = pending_.find(static_cast<std::uint32_t>(record.reason_value)); it != pending_.end()) {
       settle(record.reason, it);
     }
   }
+  if (record.reason != rig::Reason::none) asking_ = by_person_ && !names_.question_of(record).empty();
   if (record.time_s >= next_state_s_) {
     send_state();
     next_state_s_ = (std::floor(record.time_s / state_period_s) + 1.0) * state_period_s;

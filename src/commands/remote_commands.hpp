@@ -10,6 +10,7 @@
 #include "config/live_settings.hpp"
 #include "experiment/adjustment.hpp"
 #include "rig/record_sink.hpp"
+#include "rig/run_names.hpp"
 #include "telemetry/message_stream.hpp"
 
 namespace abs_hil::commands {
@@ -20,7 +21,8 @@ namespace abs_hil::commands {
 class RemoteCommands final : public rig::RecordSink {
  public:
   /// `stream` must outlive it. Throws what read_key throws if commands are enabled.
-  RemoteCommands(const config::Settings& settings, telemetry::MessageStream& stream);
+  /// @param names  whose phases ask questions
+  RemoteCommands(const config::Settings& settings, telemetry::MessageStream& stream, rig::RunNames names = {});
 
   /// Sets the mailbox that receives changes. Without a mailbox every command is refused as too early.
   void set_mailbox(experiment::AdjustmentMailbox& mailbox) { mailbox_ = &mailbox; }
@@ -46,6 +48,7 @@ class RemoteCommands final : public rig::RecordSink {
   };
   telemetry::CommandAnswer carry_out(const command2_t& command, bool& taken);
   void settle(rig::Reason reason, std::map<std::uint32_t, Pending>::iterator pending);
+  void settle_named(rig::Reason reason, std::string_view name);
   void send_state();
 
   telemetry::MessageStream& stream_;
@@ -56,7 +59,10 @@ class RemoteCommands final : public rig::RecordSink {
   std::map<std::uint32_t, Pending> pending_{};
   std::uint64_t accepted_{0};
   std::uint64_t refused_at_end_{0};
+  rig::RunNames names_;
   bool waiting_;
+  bool by_person_;      ///< questions are answered by a person, not by the run itself
+  bool asking_{false};  ///< the present phase asks
   bool over_{false};
   double next_state_s_{0.0};
 };

@@ -7,7 +7,7 @@ namespace abs_hil::commands {
 
 /// A command and its destination.
 struct Order {
-  std::string command{};  ///< "stop", "slip-ref", "gain", "start"
+  std::string command{};  ///< "stop", "slip-ref", "gain", "start", "continue"
   std::string name{};     ///< for "gain"
   double value{0.0};
 };

@@ -55,6 +55,7 @@ std::string in_words(const experiment::EndCondition& end) {
           end.reason == rig::Reason::slip_control_left_at_low_speed ? " (least speed for slip control)" : "");
     case EndKind::standstill: return "both wheels stand";
     case EndKind::start_command: return "the start is given";
+    case EndKind::answer: return "the question is answered";
     case EndKind::slip_above: return fmt::format("the slip reaches {}", value);
     case EndKind::slip_below: return fmt::format("the slip is less than {}", value);
     case EndKind::distance: return fmt::format("the car has travelled {} m in it", value);
@@ -99,14 +100,19 @@ void add_series(const SeriesScript& series, const config::Settings& s, std::stri
 std::string explain(const Script& script, const config::Settings& settings) {
   config::Settings s = settings;
   apply(script, s);
-  const Plan plan = config::plan(script, s);
   std::string text =
       fmt::format("{}: {}\n", script.name, script.description.empty() ? "no description" : script.description);
+  if (script.series.of_experiments) {
+    add_series(script.series, s, text);
+    return text;
+  }
+  const Plan plan = config::plan(script, s);
   for (std::size_t i = 0; i < plan.phases.size(); ++i) {
     const experiment::PhasePlan& phase = plan.phases[i];
     const bool goes_on = i > 0 && plan.phases[i - 1].brake == BrakeAction::slip_control && !phase.restart;
     std::string ends;
     for (const experiment::EndCondition& end : phase.ends_on) ends += (ends.empty() ? "" : ", or ") + in_words(end);
+    if (!phase.question.empty()) ends = fmt::format("a person has answered: \"{}\"", phase.question);
     text += fmt::format("{}. {} ({}): {}motor {}, brake {}\n   until {}; a fault after {} s\n", i + 1, phase.name,
                         rig::name_of(phase.phase), phase.wheels_apart ? "wheels apart, " : "",
                         phase.motor_profile.empty() && phase.motor_duty == 0.0

@@ -33,6 +33,7 @@ enum class Shape : std::uint8_t {
   flag_true,  ///< `true` alone
   number,     ///< a number with its quantity, or "$key" for a configuration value
   whole,      ///< a whole number
+  texts,      ///< a list of texts
   wholes,     ///< a list of whole numbers
   condition,  ///< "KEY = VALUE" over the configuration
   profile,    ///< a number, or a table with a profile over the time of the phase

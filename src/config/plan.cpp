@@ -46,6 +46,7 @@ Reason reason_of(EndKind kind) {
     case EndKind::car_speed_below: return Reason::end_speed_reached;
     case EndKind::standstill: return Reason::standstill_reached;
     case EndKind::start_command: return Reason::start_command;
+    case EndKind::answer: return Reason::question_answered;
     case EndKind::upper_speed_below:
     case EndKind::lower_speed_above:
     case EndKind::lower_speed_below:
@@ -114,7 +115,7 @@ class Planner {
     experiment::EndCondition end{.kind = script.kind, .reason = reason_of(script.kind)};
     if (script.kind == EndKind::all) {
       for (const ConditionScript& part : script.parts) end.parts.push_back(condition(part));
-    } else if (script.kind != EndKind::standstill) {
+    } else if (script.kind != EndKind::standstill && script.kind != EndKind::answer) {
       end.value = value(script.value);
     }
     return end;
@@ -125,7 +126,8 @@ class Planner {
                                .name = phase.name,
                                .brake = phase.brake,
                                .restart = phase.restart,
-                               .wheels_apart = phase.wheels_apart};
+                               .wheels_apart = phase.wheels_apart,
+                               .question = phase.ask};
     plan.motor_profile = profile_or(phase.motor, plan.motor_duty);
     if (phase.brake == BrakeAction::slip_control) {
       // A constant too: it stands in place of control.slip_ref.

@@ -179,6 +179,24 @@ std::int64_t TableReader::whole(const Entry& entry) const {
   return number->get();
 }
 
+std::vector<std::string> TableReader::texts(const Entry& entry) const {
+  std::vector<std::string> all;
+  if (const auto* list = entry.node->as_array()) {
+    for (const toml::node& node : *list) {
+      const auto* text = node.as_string();
+      if (text == nullptr || text->get().empty()) {
+        source_.fail(place_of(node.source()), fmt::format("{} holds {}: give texts in quotes", entry.key, shown(node)));
+      }
+      all.push_back(text->get());
+    }
+  }
+  if (all.empty()) {
+    source_.fail(entry.place, fmt::format("{} = {}: give a list of texts ({})", entry.key, shown(*entry.node),
+                                          entry.field->facts.meaning));
+  }
+  return all;
+}
+
 std::vector<std::int64_t> TableReader::wholes(const Entry& entry) const {
   std::vector<std::int64_t> numbers;
   if (const auto* list = entry.node->as_array()) {

@@ -60,6 +60,7 @@ class TableReader {
   [[nodiscard]] Number number(const Entry& entry) const;
   [[nodiscard]] std::int64_t whole(const Entry& entry) const;
   [[nodiscard]] std::vector<std::int64_t> wholes(const Entry& entry) const;
+  [[nodiscard]] std::vector<std::string> texts(const Entry& entry) const;
   [[nodiscard]] When when(const Entry& entry) const;
   [[nodiscard]] const toml::table& table(const Entry& entry) const;
   /// The tables of a list; not empty.

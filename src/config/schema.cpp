@@ -91,6 +91,7 @@ Json value_of(const Field& field, bool unit_is_named) {
       json["type"] = "integer";
       return json;
     }
+    case Shape::texts: return list_of({{"type", "string"}});
     case Shape::wholes: {
       Json json = bounds(field.facts.range);
       json["type"] = "integer";

@@ -40,18 +40,34 @@ class Parser {
     script_.author = root.text_or_empty("author");
     script_.notes = root.text_or_empty("notes");
     if (const Entry* analysis = root.find("analysis")) script_.analysis = root.choice(*analysis);
-    const Entry& phases = *root.find("phase");
-    for (const toml::table* phase : root.tables(phases)) script_.phases.push_back(read_phase(*phase, phases.place));
+    script_.series = read_series(source_, root);
+    read_phases(root);
     if (const Entry* limits = root.find("limits")) read_limits(root.table(*limits), limits->place);
     if (const Entry* events = root.find("event")) {
       for (const toml::table* event : root.tables(*events)) script_.events.push_back(read_event(*event, events->place));
     }
     for (const ChangingPart& part : changing_parts()) static_cast<void>(profile(script_, part.what));
     script_.settings = read_settings(source_, root);
-    script_.series = read_series(source_, root);
   }
 
  private:
+  void read_phases(const TableReader& root) {
+    const Entry* phases = root.find("phase");
+    if (!script_.series.of_experiments) {
+      if (phases == nullptr) source_.fail(root.place(), "the script has no \"phase\" (the phases, in order); give one");
+      for (const toml::table* phase : root.tables(*phases)) script_.phases.push_back(read_phase(*phase, phases->place));
+      return;
+    }
+    // These belong to the experiments that are run.
+    for (const char* key : {"phase", "limits", "event", "analysis", "settings"}) {
+      if (const Entry* entry = root.find(key)) {
+        source_.fail(entry->key_place, fmt::format("[series] names experiments, which have their own {}; leave {} out "
+                                                   "here, or experiments in [series]",
+                                                   key, key));
+      }
+    }
+  }
+
   PhaseScript read_phase(const toml::table& table, Place place) {
     const TableReader reader(source_, table, phase_grammar(), place);
     PhaseScript phase;
@@ -67,9 +83,15 @@ class Parser {
           reader.find("brake")->key_place,
           fmt::format("phase \"{}\": motor and brake must not act together; leave one of them out", phase.name));
     }
-    const Entry& until = *reader.find("until");
-    phase.until = read_until(source_, reader.table(until), until.place);
     phase.at_most = reader.optional_number("at_most");
+    const Entry* until = reader.find("until");
+    if (const Entry* ask = reader.find("ask")) {
+      read_ask(reader, *ask, until, phase);
+    } else if (until == nullptr) {
+      source_.fail(phase.place, fmt::format("phase \"{}\" has no \"until\" (what ends it); give one", phase.name));
+    } else {
+      phase.until = read_until(source_, reader.table(*until), until->place);
+    }
     if (const Entry* restart = reader.find("restart")) phase.restart = read_restart(*restart, phase);
     if (const Entry* apart = reader.find("wheels_apart")) phase.wheels_apart = read_wheels_apart(*apart, phase);
     const auto lasts = [](const ConditionScript& c) { return c.kind == experiment::EndKind::duration && !c.when; };
@@ -78,6 +100,25 @@ class Parser {
                    fmt::format("phase \"{}\" may never end; give at_most_s, after which it is a fault", phase.name));
     }
     return phase;
+  }
+
+  void read_ask(const TableReader& reader, const Entry& entry, const Entry* until, PhaseScript& phase) const {
+    phase.ask = reader.text(entry);
+    constexpr std::size_t longest = 200;
+    const bool plain = !phase.ask.empty() && phase.ask.size() <= longest &&
+                       std::all_of(phase.ask.begin(), phase.ask.end(), [](char c) { return c >= ' ' && c <= '~'; });
+    if (!plain) {
+      source_.fail(entry.place, fmt::format("ask = {}: give a line of 1 to {} printable ASCII characters",
+                                            shown(*entry.node), longest));
+    }
+    const auto refuse = [&](const Entry& other, std::string_view why) {
+      source_.fail(other.key_place,
+                   fmt::format("phase \"{}\" asks a person: {}; leave {} out", phase.name, why, other.key));
+    };
+    if (until != nullptr) refuse(*until, "the answer ends it");
+    if (phase.motor) refuse(*reader.find("motor"), "the motor must be off");
+    if (phase.brake != BrakeAction::released) refuse(*reader.find("brake"), "the brake must be off");
+    phase.until = {{.kind = experiment::EndKind::answer, .place = entry.place}};
   }
 
   void check_name(const PhaseScript& phase, const TableReader& reader) const {

@@ -66,6 +66,7 @@ struct PhaseScript {
   std::optional<Number> at_most{};
   bool restart{false};  ///< of the slip controller
   bool wheels_apart{false};
+  std::string ask{};  ///< empty: nothing
   Place place{};
 };
 
@@ -114,6 +115,7 @@ struct SeriesScript {
   std::vector<std::int64_t> seeds{};  ///< if not empty, they replace repeat and seed
   double pause_s{0.0};
   std::vector<Varied> vary{};
+  bool of_experiments{false};  ///< the first of `vary` is experiment.name, and the script has no phases
 };
 
 /// An experiment as read from its file. It is checked by itself, but not yet against a configuration.

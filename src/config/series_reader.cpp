@@ -111,6 +111,12 @@ SeriesScript read_series(const Source& source, const TableReader& root) {
   if (const Entry* entry = root.find("series")) {
     series.given = true;
     const TableReader reader(source, root.table(*entry), series_grammar(), entry->place);
+    if (const Entry* experiments = reader.find("experiments")) {
+      Varied names{"experiment.name", {}, experiments->place};
+      for (std::string& name : reader.texts(*experiments)) names.values.emplace_back(std::move(name));
+      series.vary.push_back(std::move(names));
+      series.of_experiments = true;
+    }
     if (const Entry* repeat = reader.find("repeat")) series.repeat = reader.whole(*repeat);
     if (const Entry* seed = reader.find("seed")) series.seed = reader.whole(*seed);
     if (const Entry* seeds = reader.find("seeds")) {
@@ -128,7 +134,8 @@ SeriesScript read_series(const Source& source, const TableReader& root) {
     series.given = true;
     add_varied(source, root.table(*entry), {}, series.vary);
     // The runs are numbered in the order of the file. toml++ does not keep it.
-    std::sort(series.vary.begin(), series.vary.end(), [](const Varied& a, const Varied& b) {
+    const std::ptrdiff_t experiments = series.of_experiments ? 1 : 0;  // they come first, wherever they stand
+    std::sort(series.vary.begin() + experiments, series.vary.end(), [](const Varied& a, const Varied& b) {
       return std::pair(a.place.line, a.place.column) < std::pair(b.place.line, b.place.column);
     });
   }

@@ -10,7 +10,7 @@ namespace abs_hil::experiment {
 
 /// A change to a running run.
 struct Adjustment {
-  enum class Kind : std::uint8_t { start, slip_ref, controller };
+  enum class Kind : std::uint8_t { start, slip_ref, controller, answer };
   Kind kind{Kind::start};
   double slip_ref{0.0};
   /// The same control law with other gains, constructed in advance; it takes over the state of the old one.

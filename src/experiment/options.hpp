@@ -42,6 +42,12 @@ struct ExperimentOptions {
                  .range = rig::from_zero(1));
   ABS_HIL_OPTION(double, stop_brake_limit_s, 5.0, .unit = "s", .meaning = "... but no longer than this",
                  .range = rig::positive(60));
+  /// A run writes here what auto came to, so that a replay does the same.
+  ABS_HIL_OPTION(std::string, answers, "auto",
+                 .meaning =
+                     "who answers questions of phases; auto: a person on a rig or at a terminal, else the "
+                     "simulation itself, at once",
+                 .allowed = {"auto", "person", "itself"});
   ABS_HIL_OPTION(bool, wait_for_start, false, .meaning = "stay idle until a command gives the start");
 };
 

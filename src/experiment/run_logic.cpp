@@ -46,7 +46,7 @@ RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig
   }
   auto controller = control::make_controller(control.controller, {control, rig});
   rig::RunNames names{.signals = rig::signal_names(controller->signals())};
-  for (const PhasePlan& plan : plans) names.phases.push_back({plan.phase, plan.name});
+  for (const PhasePlan& plan : plans) names.phases.push_back({plan.phase, plan.name, plan.question});
   return {.control = control,
           .rig = rig,
           .controller = std::move(controller),
@@ -56,7 +56,8 @@ RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig
               {.duty = std::min(gate.fault_brake_duty, gate.brake_duty_max), .limit_s = gate.fault_brake_limit_s}),
           .ideal_actuator = ideal_actuator,
           .max_brake_duty = gate.brake_duty_max,
-          .start_speed_rad_s = experiment.start_speed_rad_s};
+          .start_speed_rad_s = experiment.start_speed_rad_s,
+          .answers_itself = experiment.answers != "person"};
 }
 
 RunLogic::RunLogic(RunLogicParts parts)
@@ -73,7 +74,8 @@ RunLogic::RunLogic(RunLogicParts parts)
       upper_(parts.control.observer, parts.rig.encoder_counts_per_rev, fastest_change_rad_s2(parts).upper),
       lower_(parts.control.observer, parts.rig.encoder_counts_per_rev, fastest_change_rad_s2(parts).lower),
       actuator_(parts.rig.brake, parts.ideal_actuator, parts.max_brake_duty, parts.duty_steps),
-      own_signal_count_(std::min(controller_->signals().size(), rig::signal_max)) {}
+      own_signal_count_(std::min(controller_->signals().size(), rig::signal_max)),
+      answers_itself_(parts.answers_itself) {}
 
 runtime::GateOptions RunLogic::on_grid(runtime::GateOptions options) const noexcept {
   options.motor_duty_max = rig::duty_at_most(options.motor_duty_max, duty_steps_);
@@ -193,6 +195,7 @@ void RunLogic::adjust(rig::CycleRecord& record) noexcept {
   if (!adjustments_.take(arrived)) return;
   switch (arrived.kind) {
     case Adjustment::Kind::start: start_given_ = true; return;  // the record of the next phase shows it
+    case Adjustment::Kind::answer: answered_ = true; return;
     case Adjustment::Kind::slip_ref:
       slip_ref_ = arrived.slip_ref;
       record.reason = rig::Reason::slip_reference_changed;
@@ -221,6 +224,7 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
                         .car_speed_m_s = wheels_.r2_m * speeds_.omega2_rad_s,
                         .stands_still = stands_still_,
                         .start_given = start_given_,
+                        .answered = answered_,
                         .wheels_sound = wheels_sound_,
                         .slip = slip_,
                         .distance_m = distance_m_});
@@ -231,7 +235,11 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
   record.reason = change.reason;
   record.reason_value = change.value;
   record.wheels_apart = sequence_.wheels_apart();
-  if (!change.entered) adjust(record);
+  if (change.entered) {
+    answered_ = answers_itself_;  // an answer counts for the phase that asked
+  } else {
+    adjust(record);
+  }
 
   rig::ControlState& state = record.control;
   state.speeds_est = speeds_;

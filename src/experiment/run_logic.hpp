@@ -32,6 +32,7 @@ struct RunLogicParts {
   double max_brake_duty{1.0};             ///< limit of the command gate
   double start_speed_rad_s{0.0};          ///< both wheels' speed at the first measurement
   double recorded_r2_m{rig.wheels.r2_m};  ///< lower wheel's radius behind the recorded speeds: the plant's, if known
+  bool answers_itself{true};              ///< questions of phases are answered at once, without a person
   std::uint32_t duty_steps{0};            ///< of the driver's PWMs, from duty 0 to duty 1; 0: any duty can be sent
 };
 
@@ -121,6 +122,8 @@ class RunLogic final : public runtime::CycleLogic {
   bool refused_{false};                                       ///< its output was not finite
   double bump_Nm_{0.0};                                       ///< remaining offset that keeps the torque continuous
   bool start_given_{false};
+  bool answers_itself_;
+  bool answered_{false};  ///< the question of the present phase
   Sequence::Change end_{};
   bool stands_still_{false};
   bool wheels_sound_{true};

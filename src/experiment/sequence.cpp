@@ -49,6 +49,10 @@ void check_safe(const PhasePlan& plan, const std::string& name) {
                       (plan.brake == BrakeAction::torque && plan.brake_torque_Nm > 0.0) ||
                       (plan.brake == BrakeAction::duty && plan.brake_duty > 0.0) || !plan.brake_profile.empty();
   const bool drives = plan.motor_duty > 0.0 || !plan.motor_profile.empty();
+  // Somebody may have a hand at the wheels.
+  if (!plan.question.empty() && (drives || plan.brake != BrakeAction::released)) {
+    refuse(": it asks a person, so that motor and brake must be off; give them phases of their own");
+  }
   if (drives && brakes && !plan.motor_with_brake) {
     refuse(": motor and brake act together: leave one of them out, or set motor_with_brake = true");
   }
@@ -133,6 +137,7 @@ inline bool Sequence::holds(const EndCondition& condition, const SequenceInput& 
     case EndKind::car_speed_below: return input.car_speed_m_s < value;
     case EndKind::standstill: return input.stands_still;
     case EndKind::start_command: return input.start_given;
+    case EndKind::answer: return input.answered;
     case EndKind::slip_above: return input.slip >= value;
     case EndKind::slip_below: return input.slip < value;
     case EndKind::distance: return input.distance_m - entered_at_m_ >= value;
@@ -218,7 +223,10 @@ Sequence::Change Sequence::advance(const SequenceInput& input) noexcept {
   if (input.time_s > limits_.run_time_s) return fault(rig::Reason::run_time_limit, input.time_s, input);
   if (input.distance_m > limits_.distance_m) return fault(rig::Reason::run_distance_limit, input.distance_m, input);
   const double lasted_s = input.time_s - entered_at_s_;
-  if (lasted_s > plans_[index_].time_limit_s) return fault(rig::Reason::phase_time_limit, lasted_s, input);
+  if (lasted_s > plans_[index_].time_limit_s) {
+    const bool asks = !plans_[index_].question.empty();
+    return fault(asks ? rig::Reason::question_unanswered : rig::Reason::phase_time_limit, lasted_s, input);
+  }
   return {};
 }
 

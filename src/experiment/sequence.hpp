@@ -25,6 +25,7 @@ enum class EndKind : std::uint8_t {
   car_speed_below,    ///< value: m/s
   standstill,         ///< both wheels stand; no value
   start_command,      ///< a start command arrived; no value
+  answer,             ///< the phase's question was answered; no value
   upper_speed_below,  ///< value: rad/s
   lower_speed_above,  ///< value: rad/s of the lower wheel
   lower_speed_below,  ///< value: rad/s
@@ -60,6 +61,7 @@ struct PhasePlan {
   bool motor_with_brake{false};  ///< permits motor and brake together in this phase
   bool restart{false};           ///< the slip controller begins anew, although the phase before used it too
   bool wheels_apart{false};      ///< the upper wheel is lifted off the lower one
+  std::string question{};        ///< for a person, who does something before the phase ends; empty: none
 
   [[nodiscard]] double motor_duty_at(double time_s) const noexcept {
     return motor_profile.empty() ? motor_duty : motor_profile.at(time_s);
@@ -92,6 +94,7 @@ struct SequenceInput {
   double car_speed_m_s{0.0};
   bool stands_still{false};
   bool start_given{false};  ///< a start command has arrived
+  bool answered{false};     ///< the phase's question is answered
   bool wheels_sound{true};  ///< nothing speaks against the speeds; the last phase ends only then
   double slip{0.0};
   double distance_m{0.0};  ///< distance of the car since the run began

@@ -16,6 +16,7 @@
 #include "config/model.hpp"
 #include "config/plan.hpp"
 #include "driver/injection/injection.hpp"
+#include "program/questions.hpp"
 #include "runtime/board_policy.hpp"
 
 namespace abs_hil::program {
@@ -188,6 +189,12 @@ std::shared_ptr<const config::Script> script_of(const RunOptions& options, const
 
 }  // namespace
 
+void refuse_nested(const config::Script& series, const config::Script& experiment) {
+  if (!experiment.series.given) return;
+  throw config::ConfigError(
+      fmt::format("{}: {} is a series, too; name single experiments", series.path, experiment.name));
+}
+
 RunRequest merge(const RunOptions& options) {
   RunRequest request;
   const Files files = read_files(options, request.settings.plant_name);
@@ -204,6 +211,7 @@ RunRequest merge(const RunOptions& options) {
   if (s.on_rig()) apply_board_policy(s, keys, request.outputs.fast);
   for (const std::string& problem : config::theta_out_of_bounds(s)) warn_once(problem);
   if (const std::string problem = config::standstill_too_early(s); !problem.empty()) warn_once(problem);
+  if (s.experiment.answers == "auto" && asks(script)) s.experiment.answers = who_answers(request);
   nlohmann::ordered_json config = keys.to_json();
   config["experiment_script"] = script.text;
   if (!script.files.empty()) config["experiment_files"] = script.files;

@@ -80,6 +80,8 @@ struct RunRequest {
 
 /// Merges defaults, plant file, model file, the script's settings, configuration file, named options and assignments;
 /// later ones win. Throws config::ConfigError.
+/// Refuses an experiment of a series that is a series itself. Throws config::ConfigError.
+void refuse_nested(const config::Script& series, const config::Script& experiment);
 [[nodiscard]] RunRequest merge(const RunOptions& options);
 
 }  // namespace abs_hil::program

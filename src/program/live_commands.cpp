@@ -50,7 +50,7 @@ void add_send(cli::Parser& parser, SendCommand& command) {
   command.parser = parser.add_subcommand("send", "send a command to a running abs_hil over LCM");
   command.parser.add({.names = "order",
                       .to = &command.send.order,
-                      .help = "stop | start | slip-ref X | gain NAME X",
+                      .help = "stop | start | continue | slip-ref X | gain NAME X",
                       .count = {1, 3},
                       .required = true});
   command.parser.add({.names = "--config",

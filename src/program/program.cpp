@@ -81,7 +81,7 @@ int dispatch(int argc, char** argv) {
   if (doctor.parser.parsed()) return program::doctor(program::merge(doctor.options), doctor.only, doctor.json);
   if (latency.parser.parsed()) return program::latency(program::merge(latency.options), latency.latency);
   if (validate.parser.parsed()) {
-    return validate.schema ? program::print_schema() : program::validate(program::merge(validate.options));
+    return validate.schema ? program::print_schema() : program::validate(validate.options);
   }
   if (compare.parsed()) {
     refuse_run_options(parser, "compare");

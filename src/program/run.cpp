@@ -21,6 +21,7 @@
 #include "guardian/kept_board.hpp"
 #include "program/board_notes.hpp"
 #include "program/exit_status.hpp"
+#include "program/questions.hpp"
 #include "program/run_monitor.hpp"
 #include "program/run_outputs.hpp"
 #include "program/run_parts.hpp"
@@ -168,6 +169,7 @@ int conclude(const RunRequest& request, const experiment::RunSession& session, c
 
 int run(const RunRequest& request) {
   const config::Settings& s = request.settings;
+  check_questions(request);
   runtime::MonotonicClock real_clock;
   runtime::VirtualClock virtual_clock;
   runtime::Clock& clock = request.outputs.fast ? static_cast<runtime::Clock&>(virtual_clock) : real_clock;
@@ -187,6 +189,7 @@ int run(const RunRequest& request) {
   if (!request.outputs.fast) sinks.push_back(&late_cycles);
   experiment::RunSession session(clock, *driver, std::move(logic), s.gate, std::move(sinks), overruns_of(request));
   TimingMessages timing(request, session, late_cycles);
+  Questions questions(request, outputs.names());
   outputs.attach(session);
   const auto& folder = outputs.folder();
   RunMonitor run_monitor(request, lease.get(),
@@ -205,6 +208,7 @@ int run(const RunRequest& request) {
     board_notes.log_once();
     timing.poll();
     outputs.poll();
+    questions.poll(session);
     if (request.in_series) request.in_series(std::string(outputs.names().phase_of(session.latest())));
     if (const rig::Reason guardian = run_monitor.poll(); guardian != rig::Reason::none) return guardian;
     if (const rig::Reason signal = signalled(); signal != rig::Reason::none) return signal;

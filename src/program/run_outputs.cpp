@@ -102,7 +102,7 @@ void RunOutputs::open_stream(const RunRequest& request) {
   for (telemetry::LogOutlet& log : log_) stream_->add(log);
   if (lcm_) {
     stream_->add(*lcm_);
-    if (!request.outputs.fast) remote_commands_.emplace(s, *stream_);
+    if (!request.outputs.fast) remote_commands_.emplace(s, *stream_, names_);
     // This runs in the listening thread: the next cycle sees the request.
     command_listener_.emplace(*lcm_, *stream_, [this] {
       if (session_ != nullptr) session_->request_stop(rig::Reason::stop_command);

@@ -23,12 +23,13 @@ double number_of(const std::string& text) {
 
 commands::Order order_of(const std::vector<std::string>& words) {
   const std::string& command = words.front();
-  if ((command == "stop" || command == "start") && words.size() == 1) return {.command = command};
+  if ((command == "stop" || command == "start" || command == "continue") && words.size() == 1)
+    return {.command = command};
   if (command == "slip-ref" && words.size() == 2) return {.command = command, .value = number_of(words[1])};
   if (command == "gain" && words.size() == 3) {
     return {.command = command, .name = words[1], .value = number_of(words[2])};
   }
-  throw config::ConfigError("send: give one of stop | start | slip-ref X | gain NAME X");
+  throw config::ConfigError("send: give one of stop | start | continue | slip-ref X | gain NAME X");
 }
 
 }  // namespace

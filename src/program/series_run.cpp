@@ -13,6 +13,7 @@
 #include "config/config_error.hpp"
 #include "config/series.hpp"
 #include "program/exit_status.hpp"
+#include "program/questions.hpp"
 #include "program/series_pause.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
@@ -261,7 +262,9 @@ int run_series(const RunOptions& common, const RunRequest& base) {
   std::vector<run_folder::SeriesEntry> entries;
   // Check every run's configuration before the first run moves anything.
   for (const config::SeriesMember& member : members) {
-    static_cast<void>(merge(options_of(common, member)));
+    const RunRequest one = merge(options_of(common, member));
+    if (base.script->series.of_experiments) refuse_nested(*base.script, *one.script);
+    check_questions(one);
     entries.push_back({.varied = varied_json(member), .seed = member.seed});
   }
   const std::unique_ptr<run_folder::SeriesFolder> folder = open_folder(base, std::move(entries));

@@ -28,7 +28,7 @@ int list_reasons(bool json);
 /// a file that exists.
 int init_rig(const RunRequest& request, const std::string& name);
 /// `abs_hil validate`: describes an experiment and checks it against the limits of its backend.
-int validate(const RunRequest& request);
+int validate(const RunOptions& options);
 /// `abs_hil validate --schema`: the JSON Schema of experiment files.
 int print_schema();
 /// `abs_hil doctor`: runs all checks of this computer or the named one, and prints a fix for each shortcoming.
@@ -48,7 +48,7 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
 
 /// Options of `abs_hil send`.
 struct SendOptions {
-  std::vector<std::string> order{};  ///< "stop", "start", "slip-ref X", "gain NAME X"
+  std::vector<std::string> order{};  ///< "stop", "start", "continue", "slip-ref X", "gain NAME X"
   double timeout_s{3.0};
 };
 /// `abs_hil send`: sends a command to a running abs_hil and waits for its answer. Throws config::ConfigError, LcmError.

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "abs_hil/plant_sim/plant.hpp"
@@ -12,9 +13,21 @@
 
 namespace abs_hil::program {
 
-int validate(const RunRequest& request) {
+int validate(const RunOptions& options) {
+  const RunRequest request = merge(options);
   const config::Script& script = *request.script;
   fmt::print("{}", config::explain(script, request.settings));
+  if (script.series.of_experiments) {
+    int status = exit_completed;
+    for (const config::Value& name : script.series.vary.front().values) {
+      fmt::print("\n");
+      RunOptions one = options;
+      one.experiment = std::get<std::string>(name);
+      refuse_nested(script, *config::find(*one.experiment));
+      status = std::max(status, validate(one));
+    }
+    return status;
+  }
   const config::Plan plan = config::plan(script, request.settings);
   const std::vector<std::string> problems = config::beyond_limits(plan, request.settings);
   for (const std::string& problem : problems) fmt::print(stderr, "abs_hil: {}: {}\n", script.path, problem);

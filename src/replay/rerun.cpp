@@ -111,6 +111,7 @@ class TimedReading final : public driver::RigDriver {
   [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
     return rig_.as_sent(command);
   }
+  void note_wheels_apart(bool apart) noexcept override { rig_.note_wheels_apart(apart); }
 
  private:
   void do_configure() override { rig_.configure(); }
@@ -189,15 +190,21 @@ experiment::RunLogicParts logic_parts(const RecordedRun& run, const config::Sett
 }
 
 constexpr std::string_view start_name = "start";
+constexpr std::string_view continue_name = "continue";
 
-/// The cycle that takes a change out of the mailbox. A start command shows one cycle later.
+/// The cycle that takes a change out of the mailbox. A start command and an answer show one cycle later.
 std::int64_t put_before(const adjustment_t& adjustment) {
-  return adjustment.name == start_name ? adjustment.cycle - 1 : adjustment.cycle;
+  const bool shows_later = adjustment.name == start_name || adjustment.name == continue_name;
+  return shows_later ? adjustment.cycle - 1 : adjustment.cycle;
 }
 
 void put(const adjustment_t& adjustment, config::LiveSettings& live, experiment::AdjustmentMailbox& mailbox) {
   if (adjustment.name == start_name) {
     static_cast<void>(mailbox.put({}));
+    return;
+  }
+  if (adjustment.name == continue_name) {
+    static_cast<void>(mailbox.put({.kind = experiment::Adjustment::Kind::answer}));
     return;
   }
   try {

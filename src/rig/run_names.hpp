@@ -16,6 +16,7 @@ inline constexpr std::size_t phase_name_max = 40;
 struct NamedPhase {
   Phase kind{Phase::idle};
   std::string name{};
+  std::string question{};  ///< what it asks a person; empty: nothing
 };
 
 /// The names behind the numbers in one run's records, for files and messages.
@@ -28,6 +29,11 @@ struct RunNames {
     return std::any_of(phases.begin(), phases.end(), [](const NamedPhase& phase) {
       return !phase.name.empty() && phase.name != name_of(phase.kind);
     });
+  }
+  /// What the record's phase asks a person; empty: nothing.
+  [[nodiscard]] std::string_view question_of(const CycleRecord& record) const noexcept {
+    if (record.phase_index >= phases.size() || phases[record.phase_index].kind != record.phase) return {};
+    return phases[record.phase_index].question;
   }
   /// Name of the record's phase: the experiment's own, or the kind's for a phase that the experiment does not plan, as
   /// after a fault.

@@ -106,6 +106,8 @@ void MessageStream::consume(const rig::CycleRecord& record, double distance_m) {
     next_experiment_s_ = next_on_grid(record.time_s, options_.experiment_period_s);
   }
   send_sample(record);
+  // A replay needs the answer, whoever gave it.
+  if (record.reason == rig::Reason::question_answered) send_adjustment("continue", 0.0);
   if (auto event = detector_.observe(record)) {
     send_event(event->kind, record.reason, record.reason_value, std::move(event->message));
     if (event->phase_changed && started_) send_phase();

@@ -115,5 +115,52 @@ TEST_CASE("a change refused for lack of room has no effect and can be sent again
   CHECK(arrived.kind == experiment::Adjustment::Kind::start);
 }
 
+TEST_CASE("continue answers the question of the present phase, and nothing else") {
+  abs_hil::test::TemporaryFolder scratch;
+  telemetry::test::CapturingOutlet captured;
+  telemetry::MessageStream stream{{}, {}, {}};
+  stream.add(captured);
+  config::Settings settings = with_commands(scratch / "key");
+  settings.experiment.answers = "person";
+  rig::CycleRecord record = sample_record(0);
+  RemoteCommands remote(settings, stream, {.phases = {{record.phase, "up", ""}, {record.phase, "lift", "Lift it."}}});
+  experiment::AdjustmentMailbox mailbox;
+  remote.set_mailbox(mailbox);
+  const auto show = [&](std::uint16_t phase_index, rig::Reason reason) {
+    ++record.sequence;
+    record.phase_index = phase_index;
+    record.reason = reason;
+    stream.consume(record, 0.0);
+    remote.consume(record, 0.0);
+  };
+  std::int64_t sequence = 0;
+  const auto judge = [&] {
+    command2_t command{};
+    command.session = captured.all<command_state_t>("ABS_COMMAND_STATE").back().session;
+    command.sequence = ++sequence;
+    command.command = "continue";
+    command.sender = "s";
+    command.mac = mac_of(command, key);
+    return remote.judge(command);
+  };
+  show(0, rig::Reason::run_started);
+  REQUIRE(judge().has_value());
+  CHECK(judge()->message == "refused 'continue': the present phase asks nothing");
+  show(1, rig::Reason::phase_duration_over);
+  CHECK_FALSE(judge().has_value());
+  experiment::AdjustmentMailbox::Arrived arrived{};
+  REQUIRE(mailbox.take(arrived));
+  CHECK(arrived.kind == experiment::Adjustment::Kind::answer);
+  CHECK(judge()->reason == rig::Reason::command_not_now);  // one answer is enough
+  CHECK(captured.all<adjustment_t>("ABS_ADJUSTMENT").empty());
+  show(0, rig::Reason::question_answered);
+  const auto adjustments = captured.all<adjustment_t>("ABS_ADJUSTMENT");
+  REQUIRE(adjustments.size() == 1);
+  CHECK(adjustments[0].name == "continue");
+  CHECK(adjustments[0].cycle == static_cast<std::int64_t>(record.sequence));
+  CHECK(captured.all<event_t>("ABS_EVENT").back().message == "accepted: continue (sender 's')");
+  REQUIRE(judge().has_value());
+}
+
 }  // namespace
 }  // namespace abs_hil::commands

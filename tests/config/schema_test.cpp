@@ -21,7 +21,7 @@ TEST_CASE("the schema knows every key of every table with its unit, and refuses 
   CHECK(phase["properties"].contains("at_most_s"));
   CHECK(phase["properties"].contains("at_most"));
   CHECK(phase["additionalProperties"] == false);
-  CHECK(phase["required"] == nlohmann::ordered_json{"name", "until"});
+  CHECK(phase["required"] == nlohmann::ordered_json::array({"name"}));
   CHECK(schema["$defs"]["until"]["properties"]["any"]["items"]["$ref"] == "#/$defs/until");
 }
 

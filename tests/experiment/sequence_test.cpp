@@ -331,3 +331,39 @@ TEST_CASE("a run is not complete while the checks of the wheels doubt the speeds
   CHECK(sequence.finished());
   CHECK(doubted_for_long.update(doubted(2.3)).reason == Reason::phase_time_limit);
 }
+
+TEST_CASE("a phase that asks ends when the question is answered, and in time") {
+  const PhasePlan asks{.phase = Phase::coast,
+                       .ends_on = {{EndKind::answer, 0.0, Reason::question_answered}},
+                       .time_limit_s = 5.0,
+                       .wheels_apart = true,
+                       .question = "Lift the wheel."};
+  const PhasePlan after{
+      .phase = Phase::hold, .ends_on = {{EndKind::duration, 1.0, Reason::phase_duration_over}}, .time_limit_s = 2.0};
+  Sequence answered({asks, after});
+  CHECK_FALSE(answered.wheels_apart());
+  CHECK(answered.update(at(0.0)).entered);
+  CHECK(answered.wheels_apart());
+  CHECK_FALSE(answered.update(at(4.9)).entered);
+  SequenceInput now = at(5.0);
+  now.answered = true;
+  const Sequence::Change change = answered.update(now);
+  CHECK(change.entered);
+  CHECK(change.reason == Reason::question_answered);
+  CHECK(answered.index() == 1);
+  CHECK_FALSE(answered.wheels_apart());
+
+  Sequence alone({asks, after}, {}, {}, {.duty = 0.5});
+  static_cast<void>(alone.update(at(0.0, 50.0)));
+  const Sequence::Change late = alone.update(at(5.1, 50.0));
+  CHECK(late.reason == Reason::question_unanswered);
+  CHECK(alone.finished());  // the brake does not hold: somebody may have a hand at the wheel
+  CHECK(alone.wheels_apart());
+
+  for (const bool motor : {true, false}) {
+    PhasePlan acts = asks;
+    if (motor) acts.motor_duty = 0.1;
+    if (!motor) acts.brake = BrakeAction::duty;
+    CHECK_THROWS_WITH(Sequence({acts}), Catch::Matchers::Contains("asks a person"));
+  }
+}

@@ -54,6 +54,7 @@ enum class FoundAgain : std::uint8_t {
   ROW(distance_reached, 22, sequence, yes, "car covered the distance that ends the phase",                            \
       "distance in the phase", "m", "the phase's until")                                                              \
   ROW(all_conditions_met, 23, sequence, yes, "all conditions that end the phase hold")                                \
+  ROW(question_answered, 24, adjustment, yes, "the phase's question was answered")                                        \
   ROW(interrupt_signal, 32, stop_request, no, "interrupted (SIGINT)")                                                 \
   ROW(terminate_signal, 33, stop_request, no, "terminated (SIGTERM)")                                                 \
   ROW(stop_command, 34, stop_request, no, "stopped by a command on ABS_COMMAND")                                      \
@@ -168,6 +169,8 @@ enum class FoundAgain : std::uint8_t {
   ROW(released_wheel_stands, 223, fault, wheel_checks,                                                                \
       "the upper wheel shows standstill although the brake has let go: its encoder is stuck, or the brake holds on",  \
       "time at standstill", "s", "what a tyre with little grip needs to turn it")                                     \
+  ROW(question_unanswered, 224, fault, yes, "nobody answered the phase's question in time",                           \
+      "time in the phase", "s", "the phase's at_most_s")                                                              \
   ROW(braking_without_stop, 230, fault, no,                                                                           \
       "the experiment ran to its end, but the car was still faster than experiment.end_speed_m_s",                    \
       "car speed", "m/s", "experiment.end_speed_m_s")                                                                 \
