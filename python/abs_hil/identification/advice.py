@@ -2,11 +2,13 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..core import _core
+from ..options import Value, options
 from ..simulation import simulate
 from .fit import QUIET, WINDOW_DISTURBED_S, WINDOW_S, Fit, Problem, _keep_normals, linearise, pieces_of, run_filter
 from .estimate import Identified
@@ -32,14 +34,22 @@ class Advice:
         return f'{self.experiment}: ' + ', '.join(f'{name} to {100 * factor:.0f} % of its interval' for name, factor in best)
 
 
-def log_of(name: str, settings: dict[str, object]) -> Log:
-    """A log of an experiment on a simulated plant."""
-    run = simulate(experiment=name, set=settings)  # type: ignore[arg-type]
-    columns = run.columns
+def log_of(name: str, settings: Mapping[str, Value], phases: Sequence[float] | None = None) -> Log:
+    """A log of an experiment on a simulated plant. `phases`: where within a count each wheel's encoder begins, from 0 to 1;
+    the duties are those of phases 0."""
+    columns = simulate(experiment=name, set=settings).columns
     counts = np.stack([columns['upper_counts'], columns['lower_counts']], axis=1)
-    return Log(name, pathlib.Path(name), '', columns['time_s'], counts - counts[0], np.nan_to_num(columns['brake_pwm']),
-               np.nan_to_num(columns['motor_pwm']), columns['wheels_apart'], columns['phase'],
-               np.zeros((len(counts), 2)))
+    log = Log(name, pathlib.Path(name), '', columns['time_s'], counts - counts[0], np.nan_to_num(columns['brake_pwm']),
+              np.nan_to_num(columns['motor_pwm']), columns['wheels_apart'], columns.get('phase_name', columns['phase']),
+              np.zeros((len(counts), 2)))
+    if phases is not None:
+        base = _core.PlantOptions(options(set=settings))
+        per_count = 2 * np.pi / base.values()['encoder_counts_per_rev']
+        start = np.array([phases[0] * per_count, phases[1] * per_count, columns['omega1_rad_s'][0],
+                          columns['omega2_rad_s'][0], columns['brake_torque_Nm'][0]])
+        log.counts = np.floor(_core.trajectory(base, [], log.inputs(), start)[:, :2] / per_count)
+        log.counts -= log.counts[0]
+    return log
 
 
 def advise(found: Identified, check: Callable[[], None] = lambda: None) -> list[Advice]:

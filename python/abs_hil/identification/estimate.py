@@ -98,7 +98,7 @@ def identify(logs: Sequence[PathLike | Log], start: PathLike = 'paper-table1', *
         say(f'{FORMS[name].meaning}: first values')
         problem = Problem.of(FORMS[name], start, loaded, fix, tuple(drift))
         if not any(problem.segments):
-            raise ValueError('in no log does a wheel turn for long enough (0.2 s above 3 rad/s)')
+            raise ValueError('in no log does a wheel turn for long enough (0.2 s above 10 rad/s)')
         try:
             fits.append(start_fit(problem, values, check))
         except (ValueError, np.linalg.LinAlgError) as error:

@@ -21,8 +21,9 @@ LEAST_ROWS = 200
 HALF_WIDTH_S = 0.012
 #: a wheel stands while its count stays the same for this long before and after, s
 STANDS_S = 0.015
-#: slower than this a log says little but about friction at rest, which the model leaves out
-LEAST_SPEED_RAD_S = 3.0
+#: slower than this a log says little: of rolling, whose slip is stiff then and costs time, and of a free wheel
+LEAST_ROLLING_RAD_S = 10.0
+LEAST_FREE_RAD_S = 3.0
 LEAST_SEGMENT_S = 0.2
 
 
@@ -244,7 +245,8 @@ def _weights(counts: np.ndarray) -> np.ndarray:
 def segments_of(log: Log, motion: Motion) -> list[tuple[int, int]]:
     """Rows [begin, end) in which something turns: without rest, gaps in time, or a change from touching to apart."""
     upper, lower = motion.speed_rad_s[:, 0], motion.speed_rad_s[:, 1]
-    moves = np.where(log.wheels_apart != 0, np.maximum(upper, lower), lower) > LEAST_SPEED_RAD_S
+    moves = np.where(log.wheels_apart != 0, np.maximum(upper, lower) > LEAST_FREE_RAD_S, lower > LEAST_ROLLING_RAD_S)
+    moves &= ~_being_parted(log)
     steps = np.diff(log.time_s)
     breaks = np.flatnonzero((np.diff(log.wheels_apart) != 0) | (steps > 5 * log.period_s)) + 1
     segments = []
@@ -252,3 +254,18 @@ def segments_of(log: Log, motion: Motion) -> list[tuple[int, int]]:
         edges = np.flatnonzero(np.diff(np.concatenate([[False], moves[begin:end], [False]]).astype(int)))
         segments += [(begin + a, begin + b) for a, b in zip(edges[::2], edges[1::2])]
     return [(a, b) for a, b in segments if log.time_s[b - 1] - log.time_s[a] >= LEAST_SEGMENT_S]
+
+
+def _being_parted(log: Log) -> np.ndarray:
+    """The phase in which a person lifts the upper wheel, or lowers it: when in that phase, the log cannot tell. It is the
+    first one with the wheels apart, without a duty, if another phase with the wheels apart follows."""
+    out = np.zeros(len(log), dtype=bool)
+    apart = np.flatnonzero(np.diff(np.concatenate([[0.0], log.wheels_apart, [0.0]])))
+    for begin, end in zip(apart[::2], apart[1::2]):
+        same = log.phase[begin:end] == log.phase[begin]
+        if same.all():
+            continue
+        length = int(np.argmin(same))
+        if not (log.brake_pwm[begin:begin + length].any() or log.motor_pwm[begin:begin + length].any()):
+            out[begin:begin + length] = True
+    return out

@@ -81,7 +81,7 @@ def _as_script_data(data: Any) -> str:
     return text.replace('<', '\\u003c').replace('\u2028', '\\u2028').replace('\u2029', '\\u2029')
 
 
-def render(template: str, figures: list[Figure], folder: pathlib.Path = _FOLDER, **context: Any) -> str:
+def render(template: str, drawn: list[Figure], folder: pathlib.Path = _FOLDER, **context: Any) -> str:
     """A page from a template of `folder`, with these figures as data and the policy that only its own scripts run."""
     import jinja2
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined,
@@ -92,7 +92,7 @@ def render(template: str, figures: list[Figure], folder: pathlib.Path = _FOLDER,
     policy = (f"default-src 'none'; style-src 'unsafe-inline'; img-src data: blob:; "
               f'script-src {_hash(plotly)} {_hash(js)}')
     return environment.get_template(template).render(
-        **context, plots=_as_script_data([plot(figure) for figure in figures]), plotly=plotly, js=js, policy=policy,
+        **context, plots=_as_script_data([plot(figure) for figure in drawn]), plotly=plotly, js=js, policy=policy,
         css=(_FOLDER / 'page.css').read_text(encoding='utf-8')) + '\n'
 
 

@@ -1,0 +1,155 @@
+#!/usr/bin/env python3
+"""usage: identification_study.py [--plants A,B] [--repetitions N] [--seed N] [--disturbed] [--jobs N] [--csv FILE]
+
+Tries abs_identify on simulated rigs whose parameters it does not know: each within 25 % of the plant's, with other encoder
+phases, from start values up to 25 % off. The logs are those of the series `identification`. Prints, for each parameter, the
+median error, the share of intervals of 95 % that hold the truth, and how well the identified model predicts `paper`.
+--disturbed: friction and brake wander by 1 %, the motor by 0.5 %, bearings by 5 %, over 0.2 s.
+"""
+import argparse
+import csv
+import os
+import pathlib
+import sys
+import tempfile
+import time
+from concurrent.futures import ProcessPoolExecutor
+
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+import numpy as np  # noqa: E402
+
+import abs_hil  # noqa: E402
+from abs_hil.identification import identify  # noqa: E402
+from abs_hil.identification.advice import log_of  # noqa: E402
+from abs_hil.identification.parameters import FORMS  # noqa: E402
+from abs_hil.identification.results import plant_settings  # noqa: E402
+
+EXPERIMENTS = ('lifted', 'duty-ramp', 'locked-stop', 'pulses', 'slip-sweep')
+SPREAD = 0.25
+#: narrower ones: geometry is measured to a few per cent, and the tyre's shape must stay a shape
+SPREADS = {'r1_m': 0.02, 'u0': 0.1, 'C': 0.1, 'mu_p': 0.1}
+WANDER = {'friction': 0.01, 'brake_torque': 0.01, 'motor_torque': 0.005, 'upper_bearing': 0.05, 'lower_bearing': 0.05}
+WANDER_S = 0.2
+
+
+def values_of(plant):
+    return {name.removeprefix('plant.'): row['value'] for name, row in abs_hil.keys(plant=plant).items()
+            if name.startswith('plant.')}
+
+
+def drawn(plant, random):
+    """(form, truth, start values): by the plant's keys."""
+    values = values_of(plant)
+    form = FORMS[values['tyre']]
+    truth, start = {}, {}
+    for p in form.parameters:
+        spread = SPREADS.get(p.key, SPREAD)
+        truth[p.key] = values[p.key] * (1 + spread * random.uniform(-1, 1))
+        start[p.key] = values[p.key] * (1 + SPREAD * random.uniform(-1, 1))
+    # b2 follows from the torque at the dead zone's end, which is small and not negative.
+    truth['b2_Nm'] = random.uniform(0.02, 0.25) - truth['b1_Nm'] * truth['u0']
+    start['C'] = min(start.get('C', 1.0), 1.95)
+    start['mu_p'] = max(start.get('mu_p', 2.0), 1.1)
+    return form, truth, {key: start[key] for key in truth}
+
+
+def wandering(duration_s, random):
+    """Profiles of the factors: straight lines between values every WANDER_S."""
+    settings = {}
+    for name, sd in WANDER.items():
+        values = 1 + sd * random.standard_normal(int(duration_s / WANDER_S) + 2)
+        pieces = [f'{values[0]:.6f}'] + [f'{b:.6f} from {i * WANDER_S:.3f} to {(i + 1) * WANDER_S:.3f}'
+                                         for i, b in enumerate(values[1:])]
+        settings[f'plant.{name}_profile'] = 'time: ' + '; '.join(pieces)
+    return settings
+
+
+def one(plant, seed, disturbed):
+    """A row of results: name -> value."""
+    random = np.random.default_rng([seed, *plant.encode()])
+    form, truth, start = drawn(plant, random)
+    nominal = values_of(plant)
+    settings = {'plant.tyre': nominal['tyre'], 'plant.load': nominal['load'],
+                **{f'plant.{key}': value for key, value in truth.items()}}
+    if nominal['tyre'] == 'inteco-mu':
+        settings.update({f'plant.{key}': nominal[key] for key in nominal if key.startswith(('mu_w', 'lever_'))
+                         and key not in truth})
+    logs = []
+    for name in EXPERIMENTS:
+        wander = wandering(60.0, random) if disturbed else {}
+        logs.append(log_of(name, {**settings, **wander}, random.uniform(size=2)))
+    paper = abs_hil.simulate(experiment='paper', set=settings)
+    with tempfile.TemporaryDirectory() as folder:
+        file = pathlib.Path(folder) / 'start.toml'
+        given = {**start, 'J2_kg_m2': nominal['J2_kg_m2'], 'r2_m': nominal['r2_m']}
+        file.write_text('description = "start"\n[plant]\n' + f'tyre = "{nominal["tyre"]}"\nload = "{nominal["load"]}"\n'
+                        + '\n'.join(f'{key} = {value!r}' for key, value in given.items()) + '\n')
+        begin = time.process_time()
+        found = identify(logs, file, seed=seed)
+        cpu_s = time.process_time() - begin
+    # Predicted as a user would: the same controller and the same beliefs, on the identified plant.
+    beliefs = {f'model.{key}': settings.get(f'plant.{key}', nominal[key]) for key in nominal if f'model.{key}' in MODEL}
+    again = abs_hil.simulate(experiment='paper', set={**plant_settings(found), **beliefs})
+    row = {'plant': plant, 'seed': seed, 'form_right': found.form == form.name, 'cpu_s': cpu_s,
+           'rms_counts': found.residual_counts_rms,
+           'distance_error': again.summary['stop_distance_m'] / paper.summary['stop_distance_m'] - 1}
+    for key, value in truth.items():
+        estimate = found.parameters.get(key)
+        row[f'{key} error'] = estimate.value / value - 1 if estimate else np.nan
+        row[f'{key} holds'] = np.nan if estimate is None or estimate.low is None else float(
+            estimate.low <= value <= estimate.high)
+        row[f'{key} status'] = estimate.status if estimate else 'other form'
+    return row
+
+
+MODEL = {name for name in abs_hil.keys() if name.startswith('model.')}
+
+
+def table(plant, rows):
+    print(f'\n{plant}: {len(rows)} rigs, {sum(row["form_right"] for row in rows)} with the right form; residual '
+          f'{np.median([row["rms_counts"] for row in rows]):.4f} counts RMS; `paper` predicted within '
+          f'{100 * np.median(np.abs([row["distance_error"] for row in rows])):.4f} % (median), '
+          f'{100 * np.max(np.abs([row["distance_error"] for row in rows])):.4f} % (worst); '
+          f'{np.median([row["cpu_s"] for row in rows]):.1f} s of CPU')
+    print('\n| parameter | median error | worst error | intervals that hold | identified |\n|---|---|---|---|---|')
+    for key in [name.removesuffix(' error') for name in rows[0] if name.endswith(' error')]:
+        errors = np.abs([row[f'{key} error'] for row in rows])
+        holds = np.array([row[f'{key} holds'] for row in rows])
+        share = f'{100 * np.nanmean(holds):.0f} % of {int(np.isfinite(holds).sum())}' if np.isfinite(holds).any() else '–'
+        identified = sum(row[f'{key} status'] == 'identified' for row in rows)
+        print(f'| `{key}` | {np.nanmedian(errors):.1e} | {np.nanmax(errors):.1e} | {share} | {identified} |')
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--plants', default='paper-table1,paper-timing,inteco-manual')
+    parser.add_argument('--repetitions', type=int, default=60)
+    parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--disturbed', action='store_true')
+    parser.add_argument('--jobs', type=int, default=os.cpu_count())
+    parser.add_argument('--csv', type=pathlib.Path)
+    o = parser.parse_args()
+    every = []
+    with ProcessPoolExecutor(o.jobs) as pool:
+        for plant in o.plants.split(','):
+            jobs = [pool.submit(one, plant, o.seed + i, o.disturbed) for i in range(o.repetitions)]
+            rows = []
+            for number, job in enumerate(jobs, 1):
+                try:
+                    rows.append(job.result())
+                except ValueError as error:
+                    print(f'{plant}, seed {o.seed + number - 1}: {error}', file=sys.stderr)
+                print(f'{plant}: {number} of {len(jobs)}', file=sys.stderr, flush=True)
+            if rows:
+                table(plant, rows)
+            every += rows
+    if o.csv and every:
+        names = list(dict.fromkeys(name for row in every for name in row))
+        with open(o.csv, 'w', newline='', encoding='utf-8') as file:
+            writer = csv.DictWriter(file, names)
+            writer.writeheader()
+            writer.writerows(every)
+
+
+if __name__ == '__main__':
+    main()
