@@ -98,20 +98,13 @@ TEST_CASE("each further column of the flight record holds its own quantity") {
   write_flight_record(folder.path / "flight", {.records = {&record, 1}}, experiment, "ABS_", problems);
   CHECK(problems.empty());
   auto row = last_row(folder.path / "flight.csv");
-  const std::map<std::string, std::string> expected{{"phase", "brake"},
-                                                    {"phase_name", "brake-low"},
-                                                    {"cycle", "41"},
-                                                    {"stamp_ns", "42"},
-                                                    {"upper_counts", "43"},
-                                                    {"lower_counts", "-44"},
-                                                    {"supply_V", "23.5"},
-                                                    {"temperature_C", "36.25"},
-                                                    {"trip_flags", "5"},
-                                                    {"reason", "70"},
-                                                    {"reason_value", "1.5"},
-                                                    {"wakeup_latency_us", "46"},
-                                                    {"cycle_us", "47.5"},
-                                                    {"I_m", "NaN"}};
+  const std::map<std::string, std::string> expected{{"phase", "brake"},      {"phase_name", "brake-low"},
+                                                    {"cycle", "41"},         {"stamp_ns", "42"},
+                                                    {"upper_counts", "43"},  {"lower_counts", "-44"},
+                                                    {"supply_V", "23.5"},    {"temperature_C", "36.25"},
+                                                    {"trip_flags", "5"},     {"reason", "70"},
+                                                    {"reason_value", "1.5"}, {"wakeup_latency_us", "46"},
+                                                    {"cycle_us", "47.5"},    {"I_m", "NaN"}};
   for (const auto& [name, value] : expected) {
     CAPTURE(name);
     CHECK(row[name] == value);
