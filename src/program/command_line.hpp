@@ -81,5 +81,7 @@ struct RunRequest {
 /// Merges defaults, plant file, model file, the script's settings, configuration file, named options and assignments;
 /// later ones win. Throws config::ConfigError.
 [[nodiscard]] RunRequest merge(const RunOptions& options);
+/// The settings alone, without the texts of the configuration for files, which cost as much again.
+[[nodiscard]] config::Settings merged_settings(const RunOptions& options);
 
 }  // namespace abs_hil::program
