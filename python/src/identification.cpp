@@ -500,7 +500,7 @@ py::tuple smooth(const py::dict& d, const Array& directions, const Array& sd, co
 
 void add_identification(py::module_& module) {
   py::class_<PlantOptions>(module, "PlantOptions")
-      .def(py::init([](const py::dict& arguments) { return program::merge(run_options(arguments)).settings.plant; }))
+      .def(py::init([](const py::dict& arguments) { return program::merged_settings(run_options(arguments)).plant; }))
       .def("with_values", [](const PlantOptions& options, const Values& values) { return with(options, values); })
       .def("values", [](const PlantOptions& options) {
         py::dict all;

@@ -79,14 +79,14 @@ struct Job {
 
 struct Study {
   std::vector<program::RunOptions> options{};
-  std::vector<program::RunRequest> requests{};
+  std::vector<config::Settings> settings{};
   std::vector<Job> jobs{};
   study::Variation variation{};
   std::uint64_t seed{1};
 };
 
 study::RunResult run(const Study& study, const Job& job) {
-  const config::Settings& s = study.requests[job.options].settings;
+  const config::Settings& s = study.settings[job.options];
   if (!job.index) return study::simulate(s, s.plant, static_cast<std::uint64_t>(s.seed));
   const study::Perturbation drawn = study::draw(study.variation, study.seed, *job.index);
   return study::simulate(s, study::perturbed(s.plant, drawn), drawn.sensor_seed);
@@ -118,10 +118,10 @@ py::dict simulate_many(const std::vector<py::dict>& options,
   {
     const py::gil_scoped_release release;
     if (threads == 0) threads = study::machine_threads();
-    study.requests.resize(study.options.size());
+    study.settings.resize(study.options.size());
     std::vector<std::string> unusable(study.options.size());
     study::for_each_index(study.options.size(), threads, [&](std::size_t i) {
-      unusable[i] = refusal([&] { study.requests[i] = program::merge(study.options[i]); });
+      unusable[i] = refusal([&] { study.settings[i] = program::merged_settings(study.options[i]); });
     });
     std::atomic<std::size_t> finished{0};
     const std::size_t step = std::max<std::size_t>(1, jobs.size() / 100);

@@ -256,7 +256,10 @@ CommissioningResult Commissioning::brake_pulse() {
   if (!measure_outputs()) return CommissioningResult::failed;
   if (stop_requested_()) return CommissioningResult::interrupted;
   dialog_.tell("ok: " + output_text());
-  if (!dialog_.ask("Did you see or hear the brake grip and release?")) {
+  if (!dialog_.ask(options_.emulated
+                       ? "Did the emulated brake grip and release? Nobody can see or hear it: look at the column "
+                         "brake_torque_Nm of the emulator's --truth file."
+                       : "Did you see or hear the brake grip and release?")) {
     dialog_.tell("FAILED: check the brake's supply and cable, and the dead zone (plant.u0)");
     return CommissioningResult::failed;
   }

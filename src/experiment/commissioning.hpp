@@ -50,6 +50,7 @@ struct CommissioningOptions {
   double brake_pulse_s{0.3};     ///< in (0, 1]
   double silence_s{0.3};         ///< in (0, 1]: how long the program then sends nothing, the brake on
   double run_out_limit_s{60.0};  ///< longest wait for standstill, > 0
+  bool emulated{false};          ///< the board is an emulator's: its brake can be neither seen nor heard
 };
 
 enum class CommissioningResult : std::uint8_t { passed, failed, declined, interrupted };

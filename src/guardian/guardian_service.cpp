@@ -1,5 +1,6 @@
 #include "guardian/guardian_service.hpp"
 
+#include <fcntl.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -9,6 +10,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <sstream>
 #include <utility>
 
 #include "abs_hil/rig/time_units.hpp"
@@ -88,11 +90,13 @@ GuardianService::Woken GuardianService::wait(std::int64_t until_ns) {
     next_alive_ns_ = now_ns + alive_ns;
   }
   // A descriptor of -1 is left out.
-  std::array<pollfd, 3 + 8> files{};
+  constexpr std::size_t own_files = 4;
+  std::array<pollfd, own_files + 8> files{};
   files[0] = {parts_.listener.get(), POLLIN, 0};
   files[1] = {client_ && !client_->gone ? client_->pidfd.get() : -1, POLLIN, 0};
   files[2] = {client_ && !client_->closed ? client_->socket.get() : -1, POLLIN | POLLRDHUP, 0};
-  std::size_t count = 3;
+  files[3] = {caller_.get(), POLLIN | POLLRDHUP, 0};
+  std::size_t count = own_files;
   for (const Interruption& i : parts_.interruptions) files.at(count++) = {i.descriptor, POLLIN, 0};
 
   const std::int64_t left_ns = std::clamp<std::int64_t>(std::min(until_ns, next_alive_ns_) - now_ns, 0, alive_ns);
@@ -102,16 +106,17 @@ GuardianService::Woken GuardianService::wait(std::int64_t until_ns) {
   if (client_ && files[1].revents != 0) client_->gone = true;
   if (client_ && (files[2].revents & POLLIN) != 0) woken.spoke = true;
   if (client_ && !woken.spoke && (files[2].revents & closed_events) != 0) client_->closed = true;
-  for (std::size_t i = 3; i < count; ++i) {
+  for (std::size_t i = own_files; i < count; ++i) {
     if (files.at(i).revents == 0) continue;
-    const rig::Reason why = parts_.interruptions[i - 3].take();
+    const rig::Reason why = parts_.interruptions[i - own_files].take();
     if (pending_ == rig::Reason::none) pending_ = why;
     if (why == rig::Reason::guardian_told_to_end) ending_ = true;
     interrupted_ = true;
   }
+  if (files[3].revents != 0) hear_caller();
   if ((files[0].revents & POLLIN) != 0) {
     if (client_) {
-      turn_away();
+      receive_caller();
     } else {
       woken.visitor = true;
     }
@@ -119,13 +124,64 @@ GuardianService::Woken GuardianService::wait(std::int64_t until_ns) {
   return woken;
 }
 
-void GuardianService::turn_away() {
-  const driver::FileDescriptor visitor(::accept4(parts_.listener.get(), nullptr, nullptr, SOCK_CLOEXEC));
-  if (visitor.get() < 0) return;
-  static_cast<void>(send_message(visitor.get(), {.word = LeaseWord::refused,
-                                                 .text = command_of(client_->peer.pid) +
-                                                         " has the lease, and there is only one at a time; end that "
-                                                         "run first"}));
+/// Somebody else connects while a client has the lease. The service does not wait for his words: it looks after the
+/// outputs. Only the last one who has not spoken yet is kept.
+void GuardianService::receive_caller() {
+  caller_ = driver::FileDescriptor(::accept4(parts_.listener.get(), nullptr, nullptr, SOCK_CLOEXEC));
+  if (caller_.get() >= 0) hear_caller();
+}
+
+void GuardianService::hear_caller() {
+  pollfd spoke{caller_.get(), POLLIN | POLLRDHUP, 0};
+  if (::poll(&spoke, 1, 0) == 0) return;
+  const driver::FileDescriptor caller = std::move(caller_);
+  caller_ = driver::FileDescriptor(-1);
+  const auto said = receive_message(caller.get(), 0);
+  if (!said) return;
+  if (said->word == LeaseWord::make_safe && client_ && keeps_one_of(said->text)) {
+    if (pending_ == rig::Reason::none) pending_ = rig::Reason::made_safe_on_request;
+    safe_caller_ = driver::FileDescriptor(::fcntl(caller.get(), F_DUPFD_CLOEXEC, 0));
+    return;
+  }
+  if (answer(caller.get(), *said)) return;
+  static_cast<void>(send_message(caller.get(), {.word = LeaseWord::refused,
+                                                .text = command_of(client_->peer.pid) +
+                                                        " has the lease, and there is only one at a time; end that "
+                                                        "run first"}));
+}
+
+bool GuardianService::keeps_one_of(const std::string& boards) const {
+  std::istringstream lines(boards);
+  for (std::string line; std::getline(lines, line);) {
+    if (line == parts_.board) return true;
+  }
+  return false;
+}
+
+bool GuardianService::answer(int socket, const LeaseMessage& asked) {
+  if (asked.word != LeaseWord::state && asked.word != LeaseWord::make_safe) return false;
+  const std::string outputs = board_result_.ok() ? "drive 0 and brake 0 written and read back"
+                                                 : "OUTPUTS NOT SAFE: " + driver::error_text(board_result_);
+  LeaseMessage said{.word = LeaseWord::answer, .safe = safe_, .text = "nobody has its lease; " + outputs};
+  if (asked.word == LeaseWord::make_safe && !keeps_one_of(asked.text)) {
+    said = {.word = LeaseWord::refused};
+  } else if (client_) {
+    said = {.word = LeaseWord::answer, .text = command_of(client_->peer.pid) + " has its lease"};
+  } else if (!safe_ && board_result_.ok()) {
+    said.text = "process " + std::to_string(former_pid_) + ", which had its lease, has not ended yet; " + outputs;
+  }
+  said.text = parts_.board + (said.text.empty() ? "" : ": ") + said.text;
+  static_cast<void>(send_message(socket, said));
+  return true;
+}
+
+void GuardianService::answer_safe_caller(const std::string& holder) {
+  if (pending_ == rig::Reason::made_safe_on_request) pending_ = rig::Reason::none;
+  if (safe_caller_.get() < 0) return;
+  static_cast<void>(send_message(
+      safe_caller_.get(),
+      {.word = LeaseWord::answer, .safe = safe_, .text = parts_.board + ": ended the lease of " + holder}));
+  safe_caller_ = driver::FileDescriptor(-1);
 }
 
 std::string GuardianService::why_no_lease(const LeaseMessage& asked, const Peer& peer) {
@@ -154,6 +210,7 @@ void GuardianService::receive_visitor() {
   auto asked = receive_message(socket.get(), asks_within_ms);
   if (!asked) return;
   keep();  // nobody gets a lease on outputs that are not known to be zero now
+  if (answer(socket.get(), *asked)) return;
   const Peer peer = peer_of(socket.get());
   if (const std::string why = why_no_lease(*asked, peer); !why.empty()) {
     parts_.tell("refused a lease to " + command_of(peer.pid) + ": " + why);
@@ -181,6 +238,7 @@ void GuardianService::serve(Client client) {
   tell_lease(false);
   keep();
   parts_.tell("lease ended: " + name);
+  answer_safe_caller(name);
   deal_with_interruptions();
 }
 

@@ -87,8 +87,13 @@ class GuardianService {
   };
 
   [[nodiscard]] Woken wait(std::int64_t until_ns);
-  void turn_away();
+  void receive_caller();
+  void hear_caller();
   void receive_visitor();
+  /// Answers questions about the state; false for anything else.
+  [[nodiscard]] bool answer(int socket, const LeaseMessage& asked);
+  void answer_safe_caller(const std::string& holder);
+  [[nodiscard]] bool keeps_one_of(const std::string& boards) const;
   [[nodiscard]] std::string why_no_lease(const LeaseMessage& asked, const Peer& peer);
   void serve(Client client);
   void cover(const LeaseMessage& message);
@@ -100,8 +105,10 @@ class GuardianService {
   runtime::Clock& clock_;
   ServiceParts parts_;
   std::unique_ptr<driver::SafeStateWriter> writer_{};
-  std::unique_ptr<Client> client_{};   ///< holds the lease
-  driver::FileDescriptor former_{-1};  ///< pidfd of a client that was ended and is not gone yet
+  std::unique_ptr<Client> client_{};        ///< holds the lease
+  driver::FileDescriptor caller_{-1};       ///< connected while another has the lease, and has not spoken yet
+  driver::FileDescriptor safe_caller_{-1};  ///< waits until the lease has ended
+  driver::FileDescriptor former_{-1};       ///< pidfd of a client that was ended and is not gone yet
   pid_t former_pid_{0};
   driver::IoResult board_result_{};
   bool board_known_{false};

@@ -24,12 +24,19 @@ namespace abs_hil::guardian {
 ///                                             <-     ended   safe: verified
 ///
 /// `cover` to `ended` may be repeated. The lease ends when the controller's process ends or its socket closes.
-enum class LeaseWord : std::uint32_t { ask = 1, granted, refused, cover, ready, ended };
+///
+/// Whoever may connect may also ask for other things, at any time, also while a run has the lease:
+///
+///     state                                   ->
+///     make_safe  text: names of the board, one a line
+///                                             ->             the service ends the lease and makes the outputs safe
+///                                             <-     answer  safe: verified, text: who has, or had, the lease
+enum class LeaseWord : std::uint32_t { ask = 1, granted, refused, cover, ready, ended, state, make_safe, answer };
 
 struct LeaseMessage {
   LeaseWord word{LeaseWord::ask};
   runtime::Scheduling scheduling{};  ///< of `ready`
-  bool safe{false};                  ///< of `ended`
+  bool safe{false};                  ///< of `ended`, `answer`
   std::string text{};                ///< at most 60,000 characters are sent
   std::vector<driver::FileDescriptor> files{};
 };

@@ -187,22 +187,13 @@ std::shared_ptr<const config::Script> script_of(const RunOptions& options, const
   return config::find(settings.experiment.name);
 }
 
-}  // namespace
-
-void refuse_nested(const config::Script& series, const config::Script& experiment) {
-  if (!experiment.series.given) return;
-  throw config::ConfigError(
-      fmt::format("{}: {} is a series, too; name single experiments", series.path, experiment.name));
-}
-
-RunRequest merge(const RunOptions& options) {
-  RunRequest request;
+/// All of `request` but the texts of the configuration.
+void merge_into(RunRequest& request, config::KeyTable& keys, const RunOptions& options) {
   const Files files = read_files(options, request.settings.plant_name);
   request.script = script_of(options, files);
   request.outputs = options.outputs;
   config::Settings& s = request.settings;
   const config::Script& script = *request.script;
-  config::KeyTable keys(s);
   fill(s, keys, options, files, &script);
   check_together(request);
   if (s.on_rig()) refuse_events(script, s.driver.emulated);
@@ -212,6 +203,29 @@ RunRequest merge(const RunOptions& options) {
   for (const std::string& problem : config::theta_out_of_bounds(s)) warn_once(problem);
   if (const std::string problem = config::standstill_too_early(s); !problem.empty()) warn_once(problem);
   if (s.experiment.answers == "auto" && asks(script)) s.experiment.answers = who_answers(request);
+}
+
+}  // namespace
+
+void refuse_nested(const config::Script& series, const config::Script& experiment) {
+  if (!experiment.series.given) return;
+  throw config::ConfigError(
+      fmt::format("{}: {} is a series, too; name single experiments", series.path, experiment.name));
+}
+
+config::Settings merged_settings(const RunOptions& options) {
+  RunRequest request;
+  config::KeyTable keys(request.settings);
+  merge_into(request, keys, options);
+  return std::move(request.settings);
+}
+
+RunRequest merge(const RunOptions& options) {
+  RunRequest request;
+  config::KeyTable keys(request.settings);
+  merge_into(request, keys, options);
+  const config::Settings& s = request.settings;
+  const config::Script& script = *request.script;
   nlohmann::ordered_json config = keys.to_json();
   config["experiment_script"] = script.text;
   if (!script.files.empty()) config["experiment_files"] = script.files;

@@ -83,5 +83,7 @@ struct RunRequest {
 /// Refuses an experiment of a series that is a series itself. Throws config::ConfigError.
 void refuse_nested(const config::Script& series, const config::Script& experiment);
 [[nodiscard]] RunRequest merge(const RunOptions& options);
+/// The settings alone, without the texts of the configuration for files, which cost as much again.
+[[nodiscard]] config::Settings merged_settings(const RunOptions& options);
 
 }  // namespace abs_hil::program

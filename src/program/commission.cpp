@@ -119,7 +119,9 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
       "Commissioning in four steps; the program asks before each. First do what docs/rig-setup.md requires.\n"
       "The E-stop cuts the drive only, not the brake. A guardian stands by during each pulse (docs/dead-man.md).");
   GuardedPulse guard(request, *driver, lease.get());
-  experiment::Commissioning commissioning(*driver, clock, terminal, guard, options,
+  experiment::CommissioningOptions pulses = options;
+  pulses.emulated = !runtime::is_real_board(driver_options);
+  experiment::Commissioning commissioning(*driver, clock, terminal, guard, pulses,
                                           [] { return signalled() != rig::Reason::none; });
   switch (commissioning.run()) {
     case experiment::CommissioningResult::passed:

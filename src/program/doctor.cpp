@@ -6,7 +6,9 @@
 
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
+#include "guardian/service_call.hpp"
 #include "program/exit_status.hpp"
+#include "program/guarding.hpp"
 #include "program/run_parts.hpp"
 #include "program/subcommands.hpp"
 #include "runtime/board_policy.hpp"
@@ -14,15 +16,40 @@
 
 namespace abs_hil::program {
 
+namespace {
+
+/// Who has the outputs, as the resident service says.
+diagnosis::Finding service_finding(const std::string& socket) {
+  diagnosis::Finding finding{
+      .check = "boards", .what = "resident guardian at " + socket, .standing = diagnosis::Standing::note};
+  const auto service = guardian::service_state(socket);
+  if (!service) {
+    finding.detail = "none listens: each run starts its own (docs/dead-man.md)";
+  } else if (service->service == 0) {
+    finding.standing = diagnosis::Standing::warning;
+    finding.detail = "cannot be asked: " + service->text;
+  } else {
+    finding.detail = fmt::format("process {} keeps {}", service->service, service->text);
+  }
+  return finding;
+}
+
+}  // namespace
+
 int doctor(const RunRequest& request, const std::string& only, bool json) {
   const config::Settings& s = request.settings;
+  std::unique_ptr<guardian::GuardianLease> lease;
   diagnosis::Examination examination{.only = only,
                                      .lcm_url = telemetry::default_lcm_url(),
                                      .realtime = s.realtime,
                                      .backend = s.backend,
                                      .rate_Hz = s.control.rate_Hz,
                                      .driver = s.driver,
-                                     .make_driver = [&s] { return make_driver(s, false); }};
+                                     .make_driver = [&] {
+                                       // The resident service lets go of the board for the holder of its lease.
+                                       lease = ask_for_lease(request);
+                                       return make_driver(s, false);
+                                     }};
   if (s.on_rig() && runtime::is_real_board(s.driver)) {
     examination.require_commissioned = [&s](const driver::RigDriver& driver) {
       experiment::require_record(s.driver, driver.identity());
@@ -33,6 +60,7 @@ int doctor(const RunRequest& request, const std::string& only, bool json) {
       !note.empty() && (only.empty() || only == "boards")) {
     findings.push_back({.check = "boards", .what = note, .standing = diagnosis::Standing::note});
   }
+  if (only.empty() || only == "boards") findings.push_back(service_finding(s.guardian.socket));
   const bool well = diagnosis::turned_out_well(examination, findings);
   if (json) {
     const nlohmann::ordered_json report{

@@ -1,6 +1,9 @@
 #include "analysis/run_metrics.hpp"
 
 #include <cmath>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "catch.hpp"
 
@@ -98,6 +101,41 @@ TEST_CASE("a quantity that never settles has no settling time") {
   const Metrics m = brake([](double) { return 0.5; }, [](double) { return 10.0; });
   CHECK(std::isnan(m.slip_settling_s));
   CHECK(std::isnan(m.theta_settling_s));
+}
+
+TEST_CASE("the estimate of theta settles within 5 % of the true theta, not of itself") {
+  // The bands of 20 N, 19 to 21 N; an estimate's own 5 % would end at 19.05 and at 21.05.
+  CHECK_THAT(brake(on_target, [](double) { return 19.02; }).theta_settling_s, WithinAbs(0.0, 1.1e-3));
+  CHECK(std::isnan(brake(on_target, [](double) { return 21.03; }).theta_settling_s));
+}
+
+TEST_CASE("each missing figure says why, and no other") {
+  const auto why = [](const Metrics& m, std::string_view name) -> std::string {
+    for (const MissingFigure& figure : missing_figures(m, 0.3)) {
+      if (figure.name == name) return figure.why;
+    }
+    return {};
+  };
+  const auto names = [](const Metrics& m) {
+    std::vector<std::string_view> all;
+    for (const MissingFigure& figure : missing_figures(m, 0.3)) all.push_back(figure.name);
+    return all;
+  };
+  RunMetrics nothing(r2_m, 0.3);
+  nothing.consume({}, 0.0);
+  for (const MissingFigure& figure : missing_figures(nothing.metrics(), 0.3)) {
+    CHECK(figure.why == "the run did not brake");
+  }
+  CHECK(names(nothing.metrics()).size() == 7);
+  CHECK(names(brake(on_target, exact)).empty());
+  const Metrics moving = brake_to(0.36, rig::Phase::stopped);
+  CHECK_THAT(why(moving, "stop_time_s"), Catch::Matchers::Contains("still moved at 0.36 m/s"));
+  const Metrics unsettled = brake([](double) { return 0.5; }, [](double) { return 10.0; });
+  CHECK(names(unsettled) == std::vector<std::string_view>{"slip_settling_s", "theta_settling_s"});
+  CHECK_THAT(why(unsettled, "slip_settling_s"), Catch::Matchers::Contains("0.02"));
+  CHECK_THAT(why(unsettled, "theta_settling_s"), Catch::Matchers::Contains("5 %"));
+  const Metrics silent = brake(on_target, [](double) { return std::nan(""); });
+  CHECK_THAT(why(silent, "theta_final_N"), Catch::Matchers::Contains("no estimate"));
 }
 
 TEST_CASE("total variation sums the steps of the torque reference") {

@@ -58,6 +58,18 @@ class CanRun(CanTest):
             self.assertEqual(node.wire(), SAFE)
             node.end()
 
+    def test_safe_reaches_a_node_that_is_named(self):
+        """The emulated bus has one host at a time; tests/vm/can_vcan_guest.py has a run beside it."""
+        node = self.node()
+        result = self.run_program('safe', '--set', 'driver.kind=can', '--set', f'driver.can.interface={node.interface}')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn('board of driver.kind=can: drive 0 and brake 0, verified', result.stdout)
+        self.assertEqual(node.wire(), SAFE)
+        nobody = self.run_program('safe', '--insist', '0.1', '--set', 'driver.kind=can', '--set',
+                                  f'driver.can.interface=unix:{self.folder / "nobody"}')
+        self.assertEqual(nobody.returncode, 1, nobody.stdout)
+        self.assertIn('SAFE STATE NOT VERIFIED', nobody.stderr)
+
     def test_at_500_kbit_s_the_checks_judge(self):
         """The emulated bus has no bit rate. Each read takes the time that its frames need on the bus (docs/can.md, "Bus
         load"): SYNC and up to three answers."""

@@ -141,6 +141,114 @@ class Leases(ResidentTest):
         wait_until(lambda: service.said().rstrip().endswith('written and read back'), 'not made safe')
         self.assertEqual(emulator.wire(), SAFE)
 
+    def safe(self, emulator, service, *args):
+        return self.run_program('safe', *settings(f'driver.pci.root={emulator.root}', f'guardian.socket={service.socket}'),
+                                *args)
+
+    def doctor(self, emulator, service, *args):
+        result = self.run_program('doctor', *args, *settings(
+            f'driver.pci.root={emulator.root}', f'guardian.socket={service.socket}', 'driver.emulated=true',
+            'guardian.resident=require'))
+        return result.stdout
+
+    def test_safe_works_through_the_service(self):
+        """It is the service that ends the lease: it could end a run that belongs to somebody else."""
+        emulator = self.emulator()
+        service = self.service(emulator)
+        for driven in (False, True):
+            with self.subTest(driven=driven):
+                if driven:
+                    program = self.start(emulator)
+                    self.wait_until_driven(emulator, program)
+                result = self.safe(emulator, service)
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertEqual(emulator.wire(), SAFE)
+                by = f'verified, by the resident service (process {service.process.pid}, {service.socket})'
+                self.assertIn(f'RT-DAC4/PCI at 0000:03:00.0: drive 0 and brake 0, {by}', result.stdout)
+                self.assertIn(f'ended the lease of process {program.pid} (abs_hil)' if driven else 'nobody has its lease',
+                              result.stdout)
+        _, words = program.communicate(timeout=30)
+        self.assertEqual(program.returncode, 1, words)
+        self.assertIn('somebody had the board made safe (abs_hil safe)', words)
+        wait_until(lambda: 'lease ended' in service.said(), 'the lease did not end')
+        _, words = self.start(emulator).communicate(timeout=30)
+        self.assertEqual(self._programs[-1].returncode, 0, 'the next run gets a lease: ' + words)
+
+    def test_safe_with_a_service_ends_a_stopped_run(self):
+        emulator = self.emulator()
+        service = self.service(emulator)
+        program = self.start(emulator)
+        self.wait_until_driven(emulator, program)
+        program.send_signal(signal.SIGSTOP)
+        result = self.safe(emulator, service)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(emulator.wire(), SAFE)
+        program.communicate(timeout=30)
+        self.assertEqual(program.returncode, -signal.SIGKILL)
+
+    def test_safe_does_not_believe_a_service_that_cannot_verify(self):
+        emulator = self.emulator()
+        service = self.service(emulator)
+        emulator.command('fault 6c:wrong=1')
+        result = self.safe(emulator, service, '--insist', '0.2')
+        self.assertEqual(result.returncode, 1, result.stdout)
+        self.assertIn('SAFE STATE NOT VERIFIED', result.stderr)
+        self.assertIn('register does not read back', result.stderr)
+        emulator.command('fault 6c:ok')
+
+    def test_a_service_of_another_board_is_left_alone(self):
+        """Its run goes on, and the board that was meant is made safe without it."""
+        mine, others = self.emulator(), self.emulator()
+        service = self.service(others)
+        program = self.start(others)
+        self.wait_until_driven(others, program)
+        result = self.safe(mine, service)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertNotIn('resident', result.stdout)
+        _, words = program.communicate(timeout=30)
+        self.assertEqual(program.returncode, 0, words)
+
+    def test_doctor_says_who_has_the_lease(self):
+        emulator = self.emulator()
+        service = self.service(emulator)
+        keeps = f'process {service.process.pid} keeps pci, '
+        for args in (('--only', 'boards'), ('--backend', 'rig', '--only', 'backend')):
+            with self.subTest(args):
+                said = self.doctor(emulator, service, *args)
+                self.assertIn(f'{keeps}' if 'boards' in args else 'can run', said)
+        self.assertIn('nobody has its lease; drive 0 and brake 0 written and read back',
+                      self.doctor(emulator, service, '--only', 'boards'))
+        program = self.start(emulator)
+        self.wait_until_driven(emulator, program)
+        self.assertIn(f'process {program.pid} (abs_hil) has its lease', self.doctor(emulator, service, '--only', 'boards'))
+        self.assertIn(f'process {program.pid} (abs_hil) has the lease',
+                      self.doctor(emulator, service, '--backend', 'rig', '--only', 'backend'))
+        _, words = program.communicate(timeout=30)
+        self.assertEqual(program.returncode, 0, 'questions disturb no run: ' + words)
+        service.end()
+        self.assertIn('none listens', self.doctor(emulator, service, '--only', 'boards'))
+
+    def test_a_run_without_a_lease_is_told_who_keeps_the_card(self):
+        emulator = self.emulator()
+        service = self.service(emulator)
+        result = subprocess.run(self.command(emulator, resident='off'), cwd=self.folder, capture_output=True, text=True,
+                                timeout=30, check=False)
+        self.assertEqual(result.returncode, 3, result.stderr)
+        self.assertIn(f'process {service.process.pid} (abs_guardian), the resident service, keeps the card', result.stderr)
+        self.assertIn('guardian.resident=require', result.stderr)
+
+    def test_a_caller_who_says_nothing_disturbs_nobody(self):
+        emulator = self.emulator()
+        service = self.service(emulator)
+        program = self.start(emulator)
+        self.wait_until_driven(emulator, program)
+        silent = [connect(service.socket) for _ in range(3)]
+        self.assertIn(f'process {program.pid} (abs_hil) has its lease', self.doctor(emulator, service, '--only', 'boards'))
+        _, words = program.communicate(timeout=30)
+        self.assertEqual(program.returncode, 0, words)
+        for one in silent:
+            one.close()
+
     def test_commissioning_has_one_lease_for_all_its_pulses(self):
         emulator = self.emulator()
         service = self.service(emulator)

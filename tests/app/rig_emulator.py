@@ -65,15 +65,15 @@ class Emulator(EmulatorProcess):
 
 
 class RigTest(EmulatorTest):
-    def go_through_commissioning(self, program, emulator):
-        """Plays the person of `abs_hil commission`: says yes and turns the wheels. Returns what the program said. While it
-        asks, both outputs must be 0."""
+    def go_through_commissioning(self, program, emulator, answer=lambda question: 'y'):
+        """Plays the person of `abs_hil commission`: answers the questions and turns the wheels. Returns what the program
+        said. While it asks, both outputs must be 0."""
         said = ''
         while line := program.stdout.readline():
             said += line
             if '[y/N]' in line:
                 self.assertEqual(emulator.wire(), (0.0, 0.0), f'while it asks: {line}')
-                program.stdin.write('y\n')
+                program.stdin.write(answer(line) + '\n')
             elif line.startswith('Turn the '):
                 emulator.turn('upper' if 'UPPER' in line else 'lower', 0.5)
                 program.stdin.write('\n')

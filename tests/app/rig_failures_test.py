@@ -1,4 +1,6 @@
 """Failures of a card, one per row: reason, exit status, and the final state of the wire."""
+import os
+import pty
 import signal
 import subprocess
 import time
@@ -135,6 +137,44 @@ class RigFailures(RigTest):
         self.assertIn('bitstream version', said)
         self.assertIn('All four steps passed', said)
         self.assertEqual(emulator.wire(), SAFE)
+
+    def test_the_emulated_brake_is_judged_by_the_emulators_file(self):
+        """In a terminal, as a person would: the last question asks for what an emulator can show, and takes a no."""
+        for sees_the_brake in (True, False):
+            with self.subTest(sees_the_brake):
+                emulator = self.emulator()
+                person, terminal = pty.openpty()
+                records = emulator.root.parent / 'records'
+                program = subprocess.Popen(
+                    [self.program_path(), 'commission', '--set', f'driver.pci.root={emulator.root}', '--set',
+                     'guardian.timeout_ms=1000', '--set', f'driver.records={records}'], stdin=terminal,
+                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1)
+                os.close(terminal)
+                self._programs.append(program)
+                torques = []
+
+                def answer(question):
+                    if 'emulated brake' not in question:
+                        return 'y'
+                    self.assertIn('brake_torque_Nm', question)
+                    self.assertNotIn('Did you see or hear', question)
+                    deadline = time.monotonic() + 20
+                    while not torques or torques[-1] > 0.1:  # the file is written in blocks
+                        self.assertLess(time.monotonic(), deadline, 'it did not release')
+                        torques[:] = [float(row['brake_torque_Nm']) for row in self.rows(emulator.truth)[:-1]]
+                    return 'y' if sees_the_brake else 'n'
+
+                program.stdin = open(person, 'w', buffering=1)
+                said = self.go_through_commissioning(program, emulator, answer)
+                program.stdin.close()
+                program.stdin = None
+                program.communicate(timeout=20)
+                self.assertGreater(max(torques), 0.5, 'it gripped')
+                self.assertEqual(program.returncode, 0 if sees_the_brake else 1, said)
+                self.assertEqual('FAILED: check the brake' in said, not sees_the_brake)
+                self.assertEqual(records.exists(), sees_the_brake, 'only a brake that grips earns a record')
+                self.assertEqual(emulator.wire(), SAFE)
+                emulator.end()
 
     def test_commissioning_that_dies_in_its_pulse_leaves_nothing_driven(self):
         for number in (signal.SIGKILL, signal.SIGSTOP):

@@ -73,6 +73,8 @@ class Safe(RigTest):
         gone = self.safe(emulator)
         self.assertEqual(gone.returncode, 3)
         self.assertIn('no board found', gone.stderr)
+        self.assertIn('A CAN node cannot be found', gone.stderr)
+        self.assertIn('driver.kind=can', gone.stderr)
         self.assertIn("pull the rig's power plug", gone.stderr)
 
     def test_a_wrong_configuration_elsewhere_does_not_matter(self):

@@ -86,6 +86,8 @@ TEST_CASE("plant and model part, whichever is set first") {
   f.set({"plant.theta_N=50"});
   CHECK(f.settings.model.tyre.theta_N == 23.0);
   CHECK(in_words(model_differences(f.settings)) == "theta_N 23 (plant 50)");
+  f.set({"model.C=1.5"});
+  CHECK_THAT(in_words(model_differences(f.settings)), Contains("theta_N 23 (plant 50), ") && Contains("C 1.5 (plant "));
 }
 
 TEST_CASE(

@@ -6,7 +6,6 @@ page shows (```LANGUAGE ... tutorial=NAME) are written under their names. BUILD 
 """
 import pathlib
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -21,8 +20,6 @@ from scratch_copy import ScratchCopy
 run_commands.PROGRAMS |= {'sed', 'cmp', 'ctest'}
 SHOWN_FILE = re.compile(r'^```[^\n]* ?tutorial=(\S+)\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 TIMEOUT_S = 600
-# Folders outside the clone that the page makes: an earlier run, even one that was killed, may have left them.
-MADE = ('/tmp/abs_hil', '/tmp/my_project', '/tmp/tutorial')
 
 
 def check_summary(output):
@@ -32,11 +29,12 @@ def check_summary(output):
 
 
 def main():
-    for made in MADE:
-        shutil.rmtree(made, ignore_errors=True)
     root, build = map(pathlib.Path, sys.argv[1:3])
-    page = (root / 'docs' / 'tutorial.md').read_text(encoding='utf-8')
     with tempfile.TemporaryDirectory() as folder:
+        # A /tmp of its own: the page's folders there may belong to another test, or to an earlier one.
+        tmp = pathlib.Path(folder) / 'tmp'
+        tmp.mkdir()
+        page = (root / 'docs' / 'tutorial.md').read_text(encoding='utf-8').replace('/tmp/', f'{tmp}/')
         copy = ScratchCopy(root, build, pathlib.Path(folder))
         tree = copy.tree
         # The private network reaches no index, so the Python modules come from this tree.

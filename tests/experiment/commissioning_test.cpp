@@ -106,6 +106,7 @@ TEST_CASE("A good rig passes all four steps, each asked for, and is safe after")
   CHECK(lab.run() == CommissioningResult::passed);
   INFO(lab.person.said);
   CHECK(lab.person.asked.size() == 5);
+  CHECK_THAT(lab.person.asked.back(), Contains("see or hear the brake"));
   CHECK_THAT(lab.person.said, Contains("ok: 2048 counts forward, 0.50 turns"));
   CHECK(lab.card.model.outputs().brake_duty == 0.0);
   CHECK(lab.driver.state() == driver::DriverState::inactive);

@@ -187,6 +187,8 @@ TEST_CASE("every fault that the gate finds in the wheels is reproduced") {
       {"accelerate@stamp:off+0.1s", rig::Reason::samples_missing},
       {"brake@stamp:intermittent+0.1s", rig::Reason::sequence_complete},  // measurements refused on the way
       {"brake@read:slow=0.9ms,brake@encoder_upper:garbage+0.1s", rig::Reason::encoder_upper_jumped},
+      // Slow readings make the speed windows longer: without the recorded durations the fault would be found earlier.
+      {"brake@read:slow=0.9ms,brake@encoder_lower:stuck+0.1s", rig::Reason::encoder_lower_stuck},
       {"accelerate@write:stuck+1s", rig::Reason::speed_rises_with_motor_off},
       {"accelerate@motor_pwm:off+0.1s", rig::Reason::motor_no_response},
       {"brake@brake_pwm:off", rig::Reason::brake_no_response},

@@ -64,6 +64,34 @@ class Page(ReportTest):
         self.assertIn('outside braking of first.', page)
         self.assertEqual({curve['name'] for curve in read.figures['fig5']}, {'first', 'second &lt;b&gt;'})
 
+    def test_own_names_of_phases_stand_in_strips_figures_and_events(self):
+        """Two phases of one kind: only the experiment's own names tell them apart."""
+        experiment = self.folder / 'steps.toml'
+        experiment.write_text('[[phase]]\nname = "brake-low"\nbrake = { slip_ref = 0.05 }\nuntil = { lasts_s = 0.4 }\n'
+                              '[[phase]]\nname = "brake-high"\nbrake = { slip_ref = 0.15 }\nuntil = { lasts_s = 0.5 }\n'
+                              '[[phase]]\nname = "hold"\nuntil = { lasts_s = 0.2 }\n')
+        run = self.make_run('steps', '--experiment', experiment, '--set', 'experiment.start_speed_rad_s=170')
+        second = next(row for row in self.rows(run) if row['phase_name'] == 'brake-high')['time_s']
+        for with_events in (True, False):
+            read = PageReader(self.page(run)[0])
+            self.assertEqual(read.texts('profile')[-3:], ['brake-low', 'brake-high', 'hold'])
+            for figure in ('fig5', 'fig7', 'fig8', 'fig9', 'fig10', 'signals'):
+                self.assertLessEqual({'brake-low', 'brake-high'}, set(read.texts(figure)), figure)
+                self.assertNotIn('hold', read.texts(figure), 'its colour names it')
+                marks = [shape['x0'] for shape in read.plots[figure]['layout']['shapes'] if shape['type'] == 'line']
+                self.assertEqual(marks[:2], [0.0, float(second)], figure)
+            phases = [line[3] for line in read.tables['events'][1:]]
+            self.assertEqual(phases[:2], ['brake-low (brake)', 'brake-high (brake)'])
+            self.assertEqual(phases[2], 'hold')
+            if with_events:
+                os.remove(run / 'events.csv')
+
+    def test_experiments_without_own_names_show_the_kinds(self):
+        read = PageReader(self.page(self.make_run('a'))[0])
+        self.assertIn('brake', read.texts('profile'))
+        self.assertNotIn('brake', read.texts('fig5'))
+        self.assertEqual([line[3] for line in read.tables['events'][1:4]], ['idle', 'accelerate', 'coast'])
+
     def test_signals_of_the_controllers(self):
         a = self.make_run('a', '--controller', 'adaptive')
         b = self.make_run('b', '--controller', 'pi')

@@ -32,6 +32,8 @@ TEST_CASE("a name that would not do as a column is refused, and the message says
   CHECK_THROWS_WITH(names_of({"V", "V"}), Contains("'V' occurs twice"));
   CHECK_THROWS_WITH(names_of({"theta_est_N"}), Contains("name of a quantity of every run"));
   CHECK(rig::is_signal_name("a_name_of_exactly_32_characters_"));
+  CHECK_FALSE(rig::is_signal_name("a_name_of_exactly_33_characters__"));
+  CHECK_FALSE(rig::is_signal_name("theta_est_N"));
 }
 
 TEST_CASE("at most eight signals are taken") {

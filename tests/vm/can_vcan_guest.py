@@ -117,6 +117,17 @@ class Faults(Vcan):
         self.check_ended(program, 'CAN interface is down or gone')
         self.assertEqual(self.check_zero_in_time(node), 'watchdog')
 
+    def test_safe_ends_a_run(self):
+        """It makes the node inactive, which then ignores the run's commands."""
+        node = self.node()
+        program = self.accelerating(node)
+        result = subprocess.run([PROGRAM, 'safe', '--set', 'driver.kind=can', '--set', 'driver.can.interface=vcan0'],
+                                capture_output=True, text=True, timeout=20)
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+        self.assertIn('board of driver.kind=can: drive 0 and brake 0, verified', result.stdout)
+        self.check_ended(program, 'CAN node was restarted or replaced')
+        self.assertEqual(node.wire(), (0.0, 0.0))
+
     def test_node_killed_in_braking(self):
         node = self.node()
         program = self.braking(node)

@@ -182,6 +182,7 @@ enum class FoundAgain : std::uint8_t {
   ROW(machine_paused, 253, fault, no,                                                                                 \
       "the virtual machine was paused: the board's clock ran on while this computer stood still")                     \
   ROW(guardian_told_to_end, 254, fault, no, "the resident guardian was told to end")                                  \
+  ROW(made_safe_on_request, 255, fault, no, "somebody had the board made safe (abs_hil safe)")                        \
   /* the end of the rows */
 // clang-format on
 

@@ -183,6 +183,8 @@ class FigureMaker:
             self.marks += [Mark(p.from_s - zero, 'fault', True) for p in found.phases if p.phase == 'fault']
             self.marks += [Mark(event.time_s - zero, event.event, event.event == 'fault') for event in run.events
                            if event.unusual and event.phase != 'fault']
+            if number == 0:  # as the background
+                self.marks += [Mark(p.from_s - zero, p.name) for p in found.phases if p.name]
             for change in found.changes:  # runs of one experiment change alike
                 mark = Mark(change.time_s - zero, change.label)
                 if not any(m.label == mark.label and abs(m.x - mark.x) < 1e-6 for m in self.marks):
@@ -323,7 +325,7 @@ class FigureMaker:
         for number in range(strips):
             run, found, bottom = self.runs[number], self.surveys[number], float(strips - 1 - number)
             panel.y_tics.append((bottom + 0.5, '' if strips == 1 else names[number]))
-            panel.bars += [Bar(p.from_s, p.to_s, bottom + 0.12, bottom + 0.88, phase_colour(p.phase), p.phase)
+            panel.bars += [Bar(p.from_s, p.to_s, bottom + 0.12, bottom + 0.88, phase_colour(p.phase), p.shown)
                            for p in found.phases[:MOST_BARS]]
             times = [event.time_s for event in run.events if event.unusual]
             if not run.events:

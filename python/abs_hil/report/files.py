@@ -40,6 +40,7 @@ class Event:
     phase: str
     reason: str = ''
     value: str = ''
+    name: str = ''  # the experiment's own name of the phase; empty in files of older versions
 
     @property
     def unusual(self) -> bool:
@@ -155,7 +156,7 @@ def read_events(path: pathlib.Path) -> list[Event]:
         try:
             time_s = float(fields[0])
             events.append(Event(time_s, clean(fields[1], 40), clean(fields[2], 40), clean(fields[3]),
-                                clean(fields[4].rstrip('\r'), 40)))
+                                clean(fields[4].rstrip('\r'), 40), clean(''.join(fields[5:6]).rstrip('\r'), 40)))
         except (IndexError, ValueError):
             if last:
                 break

@@ -48,6 +48,11 @@ class Phase:
     phase: str
     from_s: float
     to_s: float
+    name: str = ''  # the experiment's own name of the phase; empty if it has none but the kind's
+
+    @property
+    def shown(self) -> str:
+        return self.name or self.phase
 
 
 @dataclass
@@ -68,6 +73,8 @@ class Rows:
         self.columns: dict[str, np.ndarray] = dict(rows)
         self.names = [name for name, _ in rows]
         self.phase = self.columns['phase'].astype(np.int32)
+        own = self.columns.get('phase_name')
+        self.own_name = None if own is None else own.astype(np.int32)
 
     @property
     def time_s(self) -> np.ndarray:
@@ -104,10 +111,15 @@ def survey(run: RunFiles, rows: Rows) -> Survey:
     found = Survey(len(time), float(time[0]), float(time[-1]), truncated=rows.truncated)
     found.r2_m = run.config_number('plant.r2_m', run.config_number('model.r2_m', PAPER_R2_M))
     braking = rows.braking
-    starts = np.flatnonzero(np.diff(rows.phase, prepend=-1))
+    new = np.diff(rows.phase, prepend=-1) != 0
+    if rows.own_name is not None:
+        new |= np.diff(rows.own_name, prepend=-1) != 0
+    starts = np.flatnonzero(new)
     for number, start in enumerate(starts[:MOST_PHASES]):
         end = starts[number + 1] if number + 1 < len(starts) else len(time) - 1
-        found.phases.append(Phase(rows.phases[rows.phase[start]], float(time[start]), float(time[end])))
+        kind = rows.phases[rows.phase[start]]
+        name = '' if rows.own_name is None else rows.phases[rows.own_name[start]]
+        found.phases.append(Phase(kind, float(time[start]), float(time[end]), '' if name == kind else name))
     if len(starts) > MOST_PHASES:
         found.phases[-1].to_s = float(time[-1])
     if braking.any():

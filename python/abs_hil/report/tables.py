@@ -133,15 +133,20 @@ def _events_of(run: RunFiles, found: Survey) -> list[Event]:
     """The events; changes of phase for a run folder without them."""
     if run.events:
         return run.events
-    events = [Event(p.from_s, 'fault' if p.phase == 'fault' else 'phase', p.phase) for p in found.phases]
+    events = [Event(p.from_s, 'fault' if p.phase == 'fault' else 'phase', p.phase, name=p.name) for p in found.phases]
     if events and events[-1].event == 'fault':
         events[-1].reason = run.text('reason')
     return events
 
 
+def _phase_text(event: Event) -> str:
+    """The experiment's own name of a phase with its kind, as `brake-low (brake)`; the kind alone if it has no other."""
+    return event.phase if event.name in ('', event.phase) else f'{event.name} ({event.phase})'
+
+
 def events_table(runs: list[RunFiles], surveys: list[Survey]) -> tuple[Table, int]:
     """The events of all runs, and how many more there are."""
-    rows = [[shown(event.time_s, 3), run.called, event.event, event.phase, event.reason, event.value]
+    rows = [[shown(event.time_s, 3), run.called, event.event, _phase_text(event), event.reason, event.value]
             for run, found in zip(runs, surveys) for event in _events_of(run, found)]
     return (Table('events', ['time / s', 'run', 'event', 'phase', 'reason', 'value'], rows[:MOST_EVENTS], False),
             max(0, len(rows) - MOST_EVENTS))

@@ -72,7 +72,22 @@ pid_t guardian_of(int fd) {
   return ::fcntl(fd, F_GETLK, &lock) == 0 && lock.l_type != F_UNLCK ? lock.l_pid : 0;
 }
 
+/// True for `abs_guardian serve`. It holds the card until a run has its lease.
+bool is_resident(pid_t pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/cmdline");
+  std::string program, command;
+  std::getline(file, program, '\0');
+  std::getline(file, command, '\0');
+  return command == "serve";
+}
+
 [[noreturn]] void refuse_while_guarded(const std::filesystem::path& file, pid_t guardian) {
+  if (is_resident(guardian)) {
+    refuse(file,
+           "process " + std::to_string(guardian) + " (" + process_name(guardian) +
+               "), the resident service, keeps the card and lets go of it for a run with its lease; set "
+               "guardian.resident=require, and guardian.socket to its socket; abs_hil doctor says who has the lease");
+  }
   refuse(file, "process " + std::to_string(guardian) + " (" + process_name(guardian) +
                    ") still brings the card into the safe state after an earlier run; wait until it has ended");
 }

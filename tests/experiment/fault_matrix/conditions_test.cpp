@@ -58,11 +58,42 @@ constexpr double delay_s = 0.1;
 
 struct Outcome {
   rig::Reason reason{rig::Reason::none};
-  double after_s{0.0};    ///< from the fault to the end of the run
-  double braking_s{0.0};  ///< from the start of braking to the end of the run; 0: it did not brake
+  double after_s{0.0};     ///< from the fault to the end of the run
+  double mattered_s{0.0};  ///< from the moment at which the fault began to matter to the end of the run
   bool safe{false};
   bool stops{false};  ///< the car stood at the end, and the run says so
 };
+
+/// Longest error of a stamp: it stands at the start of the reading.
+double stamp_error_s(const Conditions& c) { return c.read_share / c.rate_Hz; }
+
+/// When a fault begins to show. One of the brake does not before braking. A brake that holds on is right until the
+/// wheel stands. A counter that is only renewed every T shows more counts than a wheel at twice the overspeed (with 1
+/// ms and the errors of two stamps) once its wheel is fast enough.
+double matters_from_s(const driver::Injection& fault, const Conditions& c, double overspeed_rad_s, rig::Reason reason,
+                      const std::vector<rig::CycleRecord>& records, double fault_s) {
+  using driver::InjectionKind;
+  using driver::InjectionSignal;
+  double from_s = fault_s;
+  const auto not_before = [&](auto&& shows) {
+    const auto first =
+        std::ranges::find_if(records, [&](const rig::CycleRecord& r) { return r.time_s >= fault_s && shows(r); });
+    if (first != records.end()) from_s = std::max(from_s, first->time_s);
+  };
+  const bool of_brake = fault.signal == InjectionSignal::brake_pwm || fault.signal == InjectionSignal::write;
+  const bool of_encoder = fault.signal == InjectionSignal::encoder_upper ||
+                          fault.signal == InjectionSignal::encoder_lower || fault.signal == InjectionSignal::encoders;
+  if (of_brake) not_before([](const auto& r) { return r.phase == rig::Phase::brake; });
+  if (of_brake && reason == rig::Reason::released_wheel_stands) {
+    not_before([](const auto& r) { return r.truth.speeds.omega1_rad_s < 1.0; });
+  }
+  if (of_encoder && fault.kind == InjectionKind::slow) {
+    const double counted_s = 1.0 / c.rate_Hz + 1e-3 + 2.0 * stamp_error_s(c);
+    const double shows_rad_s = 2.0 * overspeed_rad_s * counted_s / fault.parameter;
+    not_before([&](const auto& r) { return r.truth.speeds.omega2_rad_s >= shows_rad_s; });
+  }
+  return from_s;
+}
 
 Outcome outcome_of(const driver::Injection& fault, const Conditions& c) {
   Setup setup;
@@ -76,12 +107,13 @@ Outcome outcome_of(const driver::Injection& fault, const Conditions& c) {
   if (c.read_share > 0.0) faults.insert(faults.begin(), slow_reads(c.read_share, c.rate_Hz));
   const InjectedResult run = run_injected(setup, faults);
   const auto began = std::ranges::find_if(run.records, [&](const auto& r) { return r.phase == fault.phase; });
-  const auto brake = std::ranges::find(run.records, rig::Phase::brake, &rig::CycleRecord::phase);
   const rig::CycleRecord& last = run.records.back();
+  const double fault_s = began == run.records.end() ? last.time_s : began->time_s + delay_s;
   constexpr double stands_rad_s = 3.0;
   return {.reason = run.outcome.reason,
-          .after_s = began == run.records.end() ? 0.0 : last.time_s - began->time_s - delay_s,
-          .braking_s = brake == run.records.end() ? 0.0 : last.time_s - brake->time_s,
+          .after_s = last.time_s - fault_s,
+          .mattered_s = last.time_s -
+                        matters_from_s(fault, c, setup.gate.overspeed_rad_s, run.outcome.reason, run.records, fault_s),
           .safe = run.outcome.safe_state.ok() && run.outputs.motor_duty == 0.0 && run.outputs.brake_duty == 0.0,
           .stops = std::abs(last.truth.speeds.omega2_rad_s) < stands_rad_s};
 }
@@ -140,7 +172,8 @@ faults in phase `brake` begin with braking, at 170 rad/s.
 The tables of rates have a column for the part of a period that each read takes. A fault of the signal `read` takes the
 place of the slow reads. The tables of wrong models have a column for each parameter of the model that is wrong, at
 1 kHz with reads that take no time. A cell has the reason of the stop ([reasons](fault-matrix.md#reasons)) and the time
-from the fault to the safe state, ms; "–": the run went on to its end. All runs reached the safe state.
+from the fault to the safe state, ms; "–": the run went on to its end. All runs reached the safe state. The test checks
+each time against its bound, which follows from stated times ([safety.md](safety.md), "Slower cycles and readings").
 )";
   for (const Table& table : tables()) {
     text += "\n## " + table.title + "\n\n| fault |";
@@ -163,23 +196,40 @@ from the fault to the safe state, ms; "–": the run went on to its end. All run
   return text;
 }
 
-/// What slow reads and long periods add to the bounds of docs/safety.md.
-double allowed_s(const Expectation& expectation, const Conditions& c, rig::Reason reason) {
-  constexpr double late_cycles = 50.0;
-  constexpr double slow_reads_s = 0.3;
-  constexpr double response_windows_s = 2.0;  // two windows of at most 1 s
-  const bool by_response = reason == rig::Reason::speed_rises_with_motor_off ||
-                           reason == rig::Reason::motor_no_response || reason == rig::Reason::brake_no_response ||
-                           reason == rig::Reason::released_wheel_stands;
-  // A late cycle takes two periods.
-  return expectation.bound_s + slow_reads_s + 2.0 * late_cycles / c.rate_Hz + (by_response ? response_windows_s : 0.0);
-}
-
-/// Time since a fault began to matter: one of the brake does not before braking.
-double mattered_s(const driver::Injection& fault, const Outcome& o) {
-  const bool of_brake =
-      fault.signal == driver::InjectionSignal::brake_pwm || fault.signal == driver::InjectionSignal::write;
-  return of_brake && fault.phase != rig::Phase::brake ? std::min(o.after_s, o.braking_s) : o.after_s;
+/// Longest time to the safe state under conditions. Each term is stated in docs/safety.md, "Slower cycles and
+/// readings"; none is measured.
+double allowed_s(const driver::Injection& fault, const Expectation& expectation, const Conditions& c,
+                 rig::Reason reason) {
+  using rig::Reason;
+  const double period_s = 1.0 / c.rate_Hz;
+  const double times_slower = std::max(1.0, 1000.0 * period_s);  // than the 1 kHz of the bounds
+  // Until the errors at both ends are a quarter of the window, in whole periods.
+  const double speed_window_s = period_s * std::ceil(std::max(1.8e-3, 8.0 * stamp_error_s(c)) / period_s);
+  // Until the momentum, at most 57 kg m/s, is certain within 1 kg m/s for each second of the window.
+  const double response_window_s = std::clamp(std::sqrt(57.0 * 2.0 * stamp_error_s(c)), 0.1, 1.0) + speed_window_s;
+  const double further_speed_windows_s = speed_window_s - 2e-3;
+  constexpr double lost_at_random_s = 1.5;  // the motor has reached 65 rad/s, at which nearly every window shows it
+  switch (reason) {
+    case Reason::consecutive_overruns: return std::max(expectation.bound_s, 50.0 * 2.0 * period_s);
+    case Reason::samples_missing: return std::max(expectation.bound_s, 6.0 * period_s);
+    case Reason::speed_rises_with_motor_off:
+    case Reason::motor_no_response:
+    case Reason::brake_no_response: return expectation.bound_s + 3.0 * (response_window_s - 0.1);
+    case Reason::released_wheel_stands: return expectation.bound_s + 2.0 * further_speed_windows_s;
+    case Reason::encoder_upper_stuck:
+    case Reason::encoder_lower_stuck:
+    case Reason::encoder_upper_jumped:
+    case Reason::encoder_lower_jumped:
+    case Reason::encoder_upper_reversed:
+    case Reason::encoder_lower_reversed:
+    case Reason::encoders_lost:
+    case Reason::encoders_disagree:
+    case Reason::slip_implausible: {
+      const bool by_chance = fault.kind == driver::InjectionKind::intermittent;
+      return (by_chance ? lost_at_random_s : expectation.bound_s) + 4.0 * further_speed_windows_s;
+    }
+    default: return expectation.bound_s * times_slower;
+  }
 }
 
 /// Delays of some ms are none where a period takes 10 ms.
@@ -196,14 +246,14 @@ TEST_CASE("under slow reads and wrong models every run ends safely, in time, and
       for (std::size_t n = 0; n < table.columns.size(); ++n) {
         const Outcome& o = table.rows[row][n];
         CAPTURE(table.title, driver::to_text(table.faults[row]), table.columns[n].name, static_cast<int>(o.reason),
-                o.after_s);
+                o.after_s, o.mattered_s);
         CHECK(o.safe);
         if (o.reason == rig::Reason::sequence_complete) {
           CHECK(o.stops);
           CHECK((expectation.may_survive || no_delay(table.faults[row], table.columns[n])));
         } else {
           CHECK(rig::is_fault(o.reason));
-          CHECK(mattered_s(table.faults[row], o) <= allowed_s(expectation, table.columns[n], o.reason));
+          CHECK(o.mattered_s <= allowed_s(table.faults[row], expectation, table.columns[n], o.reason));
         }
       }
     }
