@@ -34,8 +34,8 @@ _LATER = {'hand': ('Controller', 'Plant', 'SlipInput', 'SlipOutput'),
 _MODULE_OF = {name: module for module, names in _LATER.items() for name in names}
 
 __all__ = ['PHASES', 'QUANTITIES', 'REASONS', 'TYPES', 'Controller', 'Identified', 'Plant', 'Run', 'Series', 'SlipInput',
-           'SlipOutput', 'Study', 'controllers', 'decode', 'experiments', 'identify', 'keys', 'live', 'load', 'load_series', 'plants', 'simulate',
-           'simulate_many']
+           'SlipOutput', 'Study', 'controllers', 'decode', 'experiments', 'identify', 'keys', 'live', 'load',
+           'load_series', 'plants', 'simulate', 'simulate_many']
 
 
 def __getattr__(name: str) -> Any:

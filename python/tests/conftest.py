@@ -13,7 +13,7 @@ ABS_HIL = BUILD / 'bin' / 'abs_hil'
 QUICK = {'experiment.start_speed_rad_s': 170}
 
 
-@pytest.fixture
+@pytest.fixture(scope='session')
 def abs_hil_program():
     def run(*arguments, status=0):
         result = subprocess.run([ABS_HIL, *map(str, arguments)], capture_output=True, text=True, timeout=120, check=False)

@@ -10,8 +10,8 @@ import numpy as np
 from ..core import _core
 from ..options import Value, options
 from ..simulation import simulate
-from .fit import QUIET, WINDOW_DISTURBED_S, WINDOW_S, Fit, Problem, _keep_normals, linearise, pieces_of, run_filter
 from .estimate import Identified
+from .fit import QUIET, WINDOW_DISTURBED_S, WINDOW_S, Disturbances, Fit, Problem, _keep_normals, linearise, pieces_of, run_filter
 from .logs import Log, motion_of, segments_of
 from .results import plant_settings
 
@@ -76,10 +76,8 @@ def advise(found: Identified, check: Callable[[], None] = lambda: None) -> list[
     return sorted(all_of_them, key=lambda one: -one.gain)
 
 
-def _information(fit: Fit, log: Log, window_s: float, disturbances: object) -> np.ndarray:
+def _information(fit: Fit, log: Log, window_s: float, disturbances: Disturbances) -> np.ndarray:
     """The information of one more log at the estimate, in the scaled changes of `fit`."""
-    from .fit import Disturbances
-    assert isinstance(disturbances, Disturbances)
     old = fit.problem
     motion = motion_of(log, old.counts_per_rev)
     problem = Problem(old.form, old.base, [log], [motion], [segments_of(log, motion)], old.given, old.fixed,

@@ -1,6 +1,7 @@
 """abs_hil.identify: a rig's parameters from its logs."""
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,21 +11,42 @@ import numpy as np
 from ..core import _core
 from ..options import PathLike, options
 from . import intervals
-from .fit import (LARGEST_QUIET_RMS, QUIET, Disturbances, Fit, Problem, _keep_normals, describe, disturbed_fit,
-                  finish_fit, likely_u0, linearise, run_filter, solved, start_fit, step)
+from .fit import (
+    CONVERGED,
+    LARGEST_QUIET_RMS,
+    QUIET,
+    Disturbances,
+    Fit,
+    Problem,
+    _keep_normals,
+    describe,
+    disturbed_fit,
+    finish_fit,
+    likely_u0,
+    linearise,
+    run_filter,
+    solved,
+    start_fit,
+    step,
+)
 from .logs import Log, load_log
 from .parameters import COMBINATIONS, DELAY, FORMS, GIVEN, checked_keys
 
 #: an estimate whose standard deviation is above this share of its value is not called identified
 LARGEST_SD = 0.05
 #: above this share no interval is given at all
-LARGEST_WIDTH = 0.5
+LARGEST_WIDTH = 0.25
+#: a combination is given too if a part of it is less certain than this
+UNCERTAIN_PART = 0.01
 #: a log whose own estimate lies this far from the others' is named: chi-square over its degrees of freedom
 LARGEST_DISAGREEMENT = 6.0
 #: a difference of -2 log likelihood that decides between the forms at first values already
 CLEAR_DIFFERENCE = 500.0
+#: of a parameter in its relative change: a log with less does not speak of it
+LEAST_INFORMATION = 10.0
 #: a delay is believed if it is this many standard deviations from 0
 SURE_DELAY = 6.0
+LARGEST_DELAY_S = 0.02
 
 
 @dataclass
@@ -114,10 +136,9 @@ def identify(logs: Sequence[PathLike | Log], start: PathLike = 'paper-table1', *
                          ) from None
     if not np.isfinite(fit.rms_counts):
         raise ValueError('the fit does not converge: these logs are not of a rig that the plant describes')
+    fit = _with_delay(fit, check, say)
     quiet = fit.rms_counts <= LARGEST_QUIET_RMS
-    if quiet:
-        fit = _with_delay(fit, check, say)
-    else:
+    if not quiet:
         say(f'residual {fit.rms_counts:.3g} counts RMS: the rig wanders, or the model lacks something')
         fit = disturbed_fit(fit, check, say)
     disturbances = QUIET if quiet else fit.disturbances
@@ -134,7 +155,9 @@ def _refuse_swapped(logs: Sequence[Log]) -> None:
     while both roll."""
     for log in logs:
         strong = (log.brake_pwm > 0) & (log.brake_pwm >= 0.95 * log.brake_pwm.max())
-        rolling = (log.brake_pwm == 0) & (log.motor_pwm == 0)
+        recent = round(0.5 / log.period_s)  # after a locked wheel, rolling takes its time
+        acted = np.convolve(log.brake_pwm > 0, np.ones(recent))[:len(log)] > 0
+        rolling = ~acted & (log.motor_pwm == 0)
         ratios = []
         for rows in (strong, rolling):
             together = (rows & (log.wheels_apart == 0))[:-1]
@@ -176,28 +199,22 @@ def _cross_validated(fit: Fit) -> float:
 
 
 def _with_delay(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit:
-    """Adds the inputs' delay if the logs are sure of one."""
-    problem = fit.problem
-    problem.with_delay = True
-    fit.free = np.append(fit.free, True)
-    fit.values[DELAY] = 0.0
-    fit.scale = linearise(problem, fit.values, fit.pieces, check)
-    N, n = _keep_normals(fit, run_filter(fit, QUIET)[1])
-    x = solved(fit, N, n)
-    sd = float(np.sqrt(fit.covariance()[-1, -1]))
-    if x[-1] > SURE_DELAY * sd and x[-1] * fit.scale[-1] > 2e-5:
-        say(f'inputs act late, by about {1e3 * x[-1] * fit.scale[-1]:.2g} ms')
-        for _ in range(6):
-            if step(fit, QUIET, check) < 0.05:
-                break
+    """Adds the inputs' delay if the logs are sure of one, and if then only the counts' steps disturb."""
+    problem = dataclasses.replace(fit.problem, with_delay=True)
+    late = dataclasses.replace(fit, problem=problem, free=np.append(fit.free, True), values={**fit.values, DELAY: 0.0},
+                               pieces=[dataclasses.replace(piece) for piece in fit.pieces])
+    late.scale = linearise(problem, late.values, late.pieces, check)
+    N, n = _keep_normals(late, run_filter(late, QUIET)[1])
+    x = solved(late, N, n)[-1]
+    if x < SURE_DELAY * float(np.sqrt(late.covariance()[-1, -1])) or not 2e-5 < x * late.scale[-1] < LARGEST_DELAY_S:
         return fit
-    problem.with_delay = False
-    fit.free = fit.free[:-1]
-    del fit.values[DELAY]
-    fit.values[DELAY] = 0.0
-    fit.scale = linearise(problem, fit.values, fit.pieces, check)
-    _keep_normals(fit, run_filter(fit, QUIET)[1])
-    return fit
+    for _ in range(8):
+        if step(late, QUIET, check) < CONVERGED:
+            break
+    if late.rms_counts > LARGEST_QUIET_RMS:
+        return fit
+    say(f'the inputs act {1e3 * late.values[DELAY]:.3g} ms late')
+    return late
 
 
 def _assembled(fit: Fit, spread: intervals.Spread, gaps: list[tuple[float, float, float]], start: str, notes: list[str],
@@ -207,6 +224,7 @@ def _assembled(fit: Fit, spread: intervals.Spread, gaps: list[tuple[float, float
     for key, unit in GIVEN.items():
         parameters[key] = Estimate(problem.given[key], problem.given[key], problem.given[key], 'fixed', unit)
     cures: dict[str, list[str]] = {}
+    relative: dict[str, float] = {}
     for i, p in enumerate(problem.parameters):
         value = fit.values[p.key]
         if p.key in problem.fixed:
@@ -218,31 +236,32 @@ def _assembled(fit: Fit, spread: intervals.Spread, gaps: list[tuple[float, float
                 cures.setdefault(p.cure, []).append(p.key)
             continue
         sd = float(np.sqrt(max(spread.covariance[i, i], 0.0))) * float(fit.scale[i])
-        relative = sd / max(abs(value), 1e-300)
+        relative[p.key] = sd / max(abs(value), 1e-300)
         low, high = value - intervals.WIDTH * sd, value + intervals.WIDTH * sd
         estimate = Estimate(value, max(low, p.least), min(high, p.most), 'identified', p.unit)
         if value <= p.least or value >= p.most:
             estimate.status = 'bounded'
             notes.append(f'{p.key} is at its bound {value:g} {p.unit}')
-        elif not relative <= LARGEST_SD:
+        elif not relative[p.key] <= LARGEST_SD:
             estimate.status = 'not-identifiable'
             cures.setdefault(p.cure, []).append(p.key)
-            if relative > LARGEST_WIDTH or sd == 0.0:
+            if relative[p.key] > LARGEST_WIDTH or sd == 0.0:
                 estimate.low = estimate.high = None
         parameters[p.key] = estimate
     combinations: dict[str, Estimate] = {}
     for name, (unit, parts, cure) in COMBINATIONS.items():
         if any(part not in parameters for part in parts):
             continue
-        if all(parameters[part].status in ('identified', 'fixed') for part in parts):
-            continue
         value, sd = intervals.combination(fit, spread, name)
         known = sd <= LARGEST_SD * abs(value)
+        worst = max(relative.get(part, 0.0) for part in parts)
+        if worst <= UNCERTAIN_PART or 3 * sd > worst * abs(value):
+            continue
         combinations[name] = Estimate(value, value - intervals.WIDTH * sd, value + intervals.WIDTH * sd,
                                       'identified' if known else 'not-identifiable', unit)
         if known:
             joined = ' and '.join((', '.join(parts[:-1]), parts[-1]))
-            notes.append(f'{joined} are known only together, as {name} = {value:.5g} {unit}; run: {cure}')
+            notes.append(f'{joined} are known better together, as {name} = {value:.5g} {unit}; to part them, run: {cure}')
     for cure, keys in cures.items():
         if cure:
             notes.append(f'the logs do not tell {", ".join(keys)}; run: {cure}')
@@ -266,24 +285,25 @@ def _u0(fit: Fit, gaps: list[tuple[float, float, float]]) -> Estimate:
 def _name_disagreement(found: Identified) -> None:
     """Compares each log with all of them: the score of one log at the joint estimate."""
     fit = found.fit
-    free = fit.free
-    inverse = fit.covariance()
+    if len(found.logs) == 1:
+        return
+    inverse = np.zeros((len(fit.scale), len(fit.scale)))
+    inverse[np.ix_(fit.free, fit.free)] = fit.covariance()
     for log, Nl, nl in zip(found.logs, fit.normal, fit.right):
-        Nl, score = Nl[np.ix_(free, free)], nl[free]
-        covariance = Nl - Nl @ inverse @ Nl
-        d = 1 / np.sqrt(np.maximum(np.diag(Nl), 1e-12))
-        values, vectors = np.linalg.eigh(covariance * np.outer(d, d))
-        kept = values > 1e-4
-        if not kept.any() or len(found.logs) == 1:
-            continue
-        z = (vectors.T @ (d * score))[kept] / np.sqrt(values[kept])
-        found.disagreement[log.name] = float(z @ z / kept.sum())
+        told = fit.free & (np.diag(Nl) > LEAST_INFORMATION)
+        d = 1 / np.sqrt(np.diag(Nl)[told])
+        covariance = (Nl - Nl @ inverse @ Nl)[np.ix_(told, told)] * np.outer(d, d)
+        values, vectors = np.linalg.eigh(covariance)
+        kept = values > 1e-3  # what the log has in common with others; the rest is its own, and rounding
+        if kept.any():
+            z = (vectors.T @ (d * nl[told]))[kept] / np.sqrt(values[kept])
+            found.disagreement[log.name] = float(z @ z / kept.sum())
     odd = {name: ratio for name, ratio in found.disagreement.items() if ratio > LARGEST_DISAGREEMENT}
     if odd:
         worst = max(odd, key=lambda name: odd[name])
         found.notes.append(f'the logs disagree: {worst} most (chi-square per degree of freedom {odd[worst]:.3g}, expected '
                            '1); is it of another rig, has something changed between the logs, or does the brake fade '
                            '(--drift brake_torque)? So no interval is given')
-        for name, estimate in (*found.parameters.items(), *found.combinations.items()):
+        for estimate in (*found.parameters.values(), *found.combinations.values()):
             if estimate.status != 'fixed':
                 estimate.status, estimate.low, estimate.high = 'not-identifiable', None, None

@@ -44,6 +44,8 @@ class Disturbances:
 #: rounds of the homotopy: disturbances, number of iterations
 ROUNDS = ((Disturbances.of(0.10, 0.05, 0.2), 2), (Disturbances.of(0.01, 0.005, 0.5), 2),
           (Disturbances.of(1e-3, 1e-4, 1.0), 1), (Disturbances.of(1e-4, 1e-5, 1.0), 1))
+#: an iteration that moves less, in standard deviations, is the last
+CONVERGED = 0.1
 #: largest change of a parameter in one iteration, over its size
 LARGEST_STEP = 0.3
 #: how far a piece's first state may move in one iteration: angles, speeds, brake torque
@@ -119,8 +121,9 @@ class Problem:
 
 @dataclass
 class Fit:
-    """values: of all parameters; first: those that the prior holds to. normal: (logs, n, n), right: (logs, n), cost: (logs,) of the last linearisation, in
-    the scaled changes x of `scale`: value = nominal + scale x. `free` marks the estimated ones."""
+    """values: of all parameters; first: those that the prior holds to. normal: (logs, n, n), right: (logs, n), cost: (logs,)
+    of the last linearisation, in the scaled changes x of `scale`: value = nominal + scale x. `free` marks the estimated
+    ones."""
     problem: Problem
     values: dict[str, float]
     pieces: list[Piece]
@@ -298,23 +301,28 @@ def solved(fit: Fit, N: np.ndarray, n: np.ndarray, low: np.ndarray | None = None
 
 
 def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambda: None) -> float:
-    """One iteration: linearise, estimate, move parameters and states. Returns the largest change over its uncertainty."""
+    """One iteration: linearise, estimate, move parameters and states. Returns how far they moved, in standard deviations:
+    of the direction that the logs know best, not of each parameter alone."""
     problem = fit.problem
     fit.disturbances = disturbances
     fit.scale = linearise(problem, fit.values, fit.pieces, check)
     _, found = run_filter(fit, disturbances)
     N, n = _keep_normals(fit, found)
     values = np.array([fit.values[p.key] for p in problem.parameters])
-    least = np.array([p.least if p.floor or p.key == DELAY else max(p.least, 0.3 * v)
-                      for p, v in zip(problem.parameters, values)])
+    # Sizes that cannot vanish move by factors: where the logs know only a product, its factors move along straight lines.
+    sizes = np.array([not p.floor and p.key != DELAY for p in problem.parameters])
+    least = np.array([p.least for p in problem.parameters])
     most = np.array([p.most for p in problem.parameters])
-    x = solved(fit, N, n, np.maximum((least - values) / fit.scale, -LARGEST_STEP),
-               np.minimum((most - values) / fit.scale, LARGEST_STEP))
+    with np.errstate(divide='ignore', invalid='ignore'):
+        low = np.where(sizes, np.log(np.maximum(least, 1e-12) / values), (least - values) / fit.scale)
+        high = np.where(sizes, np.log(most / values), (most - values) / fit.scale)
+    x = solved(fit, N, n, np.maximum(low, -LARGEST_STEP), np.minimum(high, LARGEST_STEP))
     _move_states(fit, disturbances, x)
-    fit.values = {**fit.values, **{p.key: float(v + s * dx) for p, v, s, dx in zip(problem.parameters, values, fit.scale, x)}}
+    with np.errstate(over='ignore'):
+        moved = np.where(sizes, values * np.exp(x), values + fit.scale * x)
+    fit.values = {**fit.values, **{p.key: float(v) for p, v in zip(problem.parameters, moved)}}
     fit.iterations += 1
-    sd = np.sqrt(np.diag(fit.covariance()))
-    return float(np.max(np.abs(x[fit.free]) / sd, initial=0.0))
+    return float(np.sqrt(x @ (N + np.diag(fit.prior()[0])) @ x))
 
 
 def _keep_normals(fit: Fit, found: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
@@ -366,8 +374,8 @@ def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
         return []
     present = fit.values['u0']
     duties = np.unique(np.concatenate([log.brake_pwm for log in problem.logs]))
-    edges = duties[np.searchsorted(duties, present - width, 'right') - 1 if duties[0] < present - width else 0:]
-    edges = edges[:np.searchsorted(edges, present + width) + 1]
+    first = max(int(np.searchsorted(duties, present - width, 'right')) - 1, 0)
+    edges = duties[first:int(np.searchsorted(duties, present + width)) + 1]
     gaps = list(zip(edges[:-1], edges[1:]))
     if not gaps:
         return []
@@ -378,6 +386,9 @@ def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
     variance = COUNT_VARIANCE * problem.radians_per_count**2
     settings = (way, disturbances.sd, disturbances.time_constant_s, variance)
     rest = _core.filter_pieces([p.linear for p, hit in zip(fit.pieces, affected) if not hit], *settings)
+    # The sensitivities are those of the present u0: other parameters may follow only as far as they are uncertain.
+    within = np.zeros(len(fit.scale))
+    within[fit.free] = 5.0 * np.sqrt(np.diag(fit.covariance()))
     inputs = [log.inputs() for log in problem.logs]
     tried = []
     for begin, end in gaps:
@@ -397,7 +408,8 @@ def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
         found = [*rest, *_core.filter_pieces(changed, *settings)]
         N, n = sum(one[0] for one in found), sum(one[1][:, 0] for one in found)
         cost = sum(float(one[2][0]) + one[3] for one in found)
-        tried.append((float(begin), float(end), cost - float(n @ solved(fit, N, n))))
+        x = solved(fit, N, n, -within, within)
+        tried.append((float(begin), float(end), cost - float(2 * n @ x - x @ N @ x)))
     best = min(tried, key=lambda gap: gap[2])
     fit.values['u0'] = max(0.5 * (best[0] + best[1]), best[1] - 1e-3)
     return tried
@@ -449,7 +461,7 @@ def finish_fit(fit: Fit, check: Callable[[], None] = lambda: None, most: int = 1
     for _ in range(most):
         moved = step(fit, QUIET, check)
         # The residual settles last: past the peak the states need some rounds more than the parameters.
-        if moved < 0.05 or (moved < 1.0 and fit.rms_counts > 0.999 * before > LARGEST_QUIET_RMS):
+        if moved < CONVERGED or (moved < 1.0 and fit.rms_counts > 0.999 * before > LARGEST_QUIET_RMS):
             break
         before = fit.rms_counts
     return fit
@@ -468,7 +480,7 @@ def disturbed_fit(fit: Fit, check: Callable[[], None] = lambda: None, say: Calla
             present = likeliest_disturbances(fit, present, 60 if round_number == 0 else 30)
             say(f'disturbances: {describe(present)}')
     for _ in range(3):
-        if moved < 0.05:
+        if moved < CONVERGED:
             break
         moved = step(fit, present, check)
     return fit

@@ -41,7 +41,8 @@ def bootstrap(fit: Fit, seed: int = 1, replicates: int = REPLICATES,
     for begin in range(0, replicates, _BATCH):
         check()
         chosen = phases[:, :, begin:begin + _BATCH]
-        N, n = 0.0, 0.0
+        size = len(fit.scale)
+        N, n = np.zeros((size, size)), np.zeros((size, chosen.shape[2]))
         for piece in fit.pieces:
             exact = piece.linear['angles'][:, :, None] / per_count
             phase = chosen[piece.log][None]
@@ -49,7 +50,7 @@ def bootstrap(fit: Fit, seed: int = 1, replicates: int = REPLICATES,
             changed = {**piece.linear, 'residual': residual, 'gap': np.zeros_like(piece.linear['gap'])}
             found = _core.filter_pieces([changed], way, QUIET.sd, QUIET.time_constant_s, variance)[0]
             N, n = N + found[0], n + found[1]
-        shift = solved(fit, N, np.zeros(len(N)))  # what the prior alone does
+        shift = solved(fit, N, np.zeros(size))  # what the prior alone does
         estimates += [solved(fit, N, n[:, i]) - shift for i in range(n.shape[1])]
     x = np.array(estimates)
     return Spread(np.cov(x.T), x.mean(axis=0), replicates)

@@ -11,7 +11,6 @@ from ..report.page import render, view
 from ..report.tables import Table
 from .advice import Advice
 from .estimate import Identified
-from .results import words as _  # noqa: F401  (the page and the terminal show the same rows)
 
 _FOLDER = pathlib.Path(__file__).parent
 _MOST_POINTS = 4000

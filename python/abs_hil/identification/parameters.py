@@ -30,8 +30,8 @@ class Parameter:
 
 
 _SHARED = (
-    Parameter('r1_m', 'm', 'contact', 'any log with both wheels rolling together', most=0.9, prior=0.01),
-    Parameter('J1_kg_m2', 'kg m^2', 'always', 'lifted', most=0.9),
+    Parameter('r1_m', 'm', 'contact', 'any log with both wheels rolling together', least=0.011, most=0.9, prior=0.2),
+    Parameter('J1_kg_m2', 'kg m^2', 'always', 'lifted', least=1e-4, most=0.9),
     Parameter('d1_Nms_rad', 'N m s/rad', 'always', 'lifted', floor=1e-4, most=0.09),
     Parameter('d2_Nms_rad', 'N m s/rad', 'always', 'lifted', floor=1e-4, most=0.09),
     Parameter('M10_Nm', 'N m', 'always', 'lifted', floor=5e-3, most=9.0),

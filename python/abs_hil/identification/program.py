@@ -57,8 +57,12 @@ def _write(found: Identified, o: argparse.Namespace, report: str | None) -> None
         files['report.html'] = report
     for name, text in files.items():
         path = o.out / name
-        write_whole(path, lambda to, text=text: pathlib.Path(to).write_text(text, encoding='utf-8'))
+        _write_text(path, text)
         print(path)
+
+
+def _write_text(path: pathlib.Path, text: str) -> None:
+    write_whole(path, lambda to: pathlib.Path(to).write_text(text, encoding='utf-8'))
 
 
 def _identify(o: argparse.Namespace) -> None:

@@ -3,7 +3,6 @@ from __future__ import annotations
 
 import datetime
 import json
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -62,7 +61,8 @@ def as_toml(found: Identified) -> str:
     if found.form == 'inteco-mu':
         given = ('mu_w1', 'mu_w2', 'mu_w3', 'lever_L_m', 'lever_phi_deg')
         lines += [f'{key} = {_number(base[key])}  # of the start, {_comment(found.start)}' for key in given]
-        lines += ['', '[model]', "# What controllers believe of the tyre: the magic formula nearest to the maker's curve in braking."]
+        lines += ['', '[model]',
+                  "# What controllers believe of the tyre: the magic formula nearest to the maker's curve in braking."]
         lines += [f'{key} = {_number(value)}' for key, value in equivalent_tyre(found).items()]
     return '\n'.join(lines) + '\n'
 
@@ -138,8 +138,7 @@ def _compared(run: Run, predicted: Run) -> dict[str, float | None]:
         measured, simulated = run.summary.get(name), predicted.summary.get(name)
         out[name] = measured
         out[f'predicted_{name}'] = simulated
-        usable = measured and simulated and math.isfinite(measured) and math.isfinite(simulated)
-        out[f'{name}_error'] = simulated / measured - 1 if usable else None
+        out[f'{name}_error'] = simulated / measured - 1 if measured and simulated is not None else None
     return out
 
 

@@ -85,20 +85,23 @@ def first_values(form: Form, base: Any, given: Mapping[str, float], start: Mappi
     value = {p.key: float(start[p.key]) for p in form.parameters}
     value.update(fixed)
     if 'r1_m' not in fixed:
-        rolling = ~pieces.apart & (pieces.motor == 0) & (pieces.turning.min(axis=1) > 0.99 * pieces.duration)
-        rolling &= ~_braked(pieces, logs)
-        if rolling.sum() > 3:
-            value['r1_m'] = r2 * float(np.median(pieces.angle[rolling, 1] / pieces.angle[rolling, 0]))
+        rolls = ~pieces.apart & (pieces.motor == 0) & (pieces.turning.min(axis=1) > 0.99 * pieces.duration)
+        for rest_s in (1.0, 0.3):  # after a locked wheel, rolling takes its time
+            rolling = rolls & ~_braked(pieces, logs, rest_s)
+            if rolling.sum() > 3:
+                value['r1_m'] = r2 * float(np.median(pieces.angle[rolling, 1] / pieces.angle[rolling, 0]))
+                break
     _scan_brake(value, pieces, logs, motions, r2, J2, fixed)
     _tyre(form, base, value, pieces, logs, motions, r2, J2, fixed)
     return value
 
 
-def _braked(pieces: _Pieces, logs: Sequence[Log]) -> np.ndarray:
+def _braked(pieces: _Pieces, logs: Sequence[Log], rest_s: float) -> np.ndarray:
+    """Intervals in which the brake acts, or acted less than `rest_s` before."""
     acts = []
     for number, first, last in pieces.parts:
         log = logs[number]
-        memory = max(1, round(0.3 / log.period_s))
+        memory = max(1, round(rest_s / log.period_s))
         recent = _integral(log, (log.brake_pwm > 0).astype(float))
         acts.append(recent[last] - recent[np.maximum(first - memory, 0)] > 0)
     return np.concatenate(acts) if acts else np.empty(0, dtype=bool)
@@ -125,7 +128,8 @@ def _scan_brake(value: dict[str, float], pieces: _Pieces, logs: Sequence[Log], m
               for log, motion, k in zip(logs, motions, thin)]
 
     def brake_columns(u0: float, c31: float) -> tuple[np.ndarray, np.ndarray]:
-        slopes, offsets = [], []
+        slopes: list[np.ndarray] = []
+        offsets: list[np.ndarray] = []
         for number, first, last in pieces.parts:
             time_s, duty, turning, k = coarse[number]
             active = (duty >= u0) & (duty > 0)
@@ -189,17 +193,17 @@ def _scan_brake(value: dict[str, float], pieces: _Pieces, logs: Sequence[Log], m
             near = duties[(duties > best[2] - width) & (duties < best[2] + width)]
             u0s = sorted({float(u) for u in np.quantile(near, np.linspace(0, 1, 6))} | {best[2]})
     assert best is not None
-    found = dict(zip(_LINEAR, best[1]))
+    linear = dict(zip(_LINEAR, best[1]))
     for key in _LINEAR:
         if key in value and key not in fixed:
-            value[key] = float(found[key])
+            value[key] = float(linear[key])
     for key in ('d1_Nms_rad', 'M10_Nm', 'd2_Nms_rad', 'M20_Nm'):
         if key not in fixed:
             value[key] = max(value[key], 0.1 * _size(key, value))
     if 'J1_kg_m2' not in fixed:
         value['J1_kg_m2'] = max(value['J1_kg_m2'], 1e-4)
-    if 'motor_no_load_speed_rad_s' not in fixed and pieces.motor.max(initial=0.0) > 0 and found['back_emf'] > 0:
-        value['motor_no_load_speed_rad_s'] = float(np.clip(value['motor_stall_torque_Nm'] / found['back_emf'], 20, 2000))
+    if 'motor_no_load_speed_rad_s' not in fixed and pieces.motor.max(initial=0.0) > 0 and linear['back_emf'] > 0:
+        value['motor_no_load_speed_rad_s'] = float(np.clip(value['motor_stall_torque_Nm'] / linear['back_emf'], 20, 2000))
     if 'u0' not in fixed:
         value['u0'] = best[2]
     if 'c31_per_s' not in fixed:
