@@ -56,6 +56,7 @@ bool is_of_plant(std::string_view name) { return name.starts_with("plant."); }
 std::vector<FileValue> read_file(const fs::path& file, Tables tables) {
   toml::table table = parse(file);
   table.erase("description");
+  if (tables == Tables::of_plant) table.erase("identified");  // its date, see model_origin
   if (tables == Tables::of_plant) {
     for (const auto& [key, node] : table) {
       if ((key.str() == "plant" || key.str() == "model") && node.is_table()) continue;

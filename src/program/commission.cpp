@@ -1,12 +1,14 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cstdio>
 #include <ctime>
 #include <iostream>
 #include <optional>
 #include <string>
 
+#include "config/model_origin.hpp"
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
 #include "experiment/commissioning.hpp"
@@ -118,6 +120,8 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
   terminal.tell(
       "Commissioning in four steps; the program asks before each. First do what docs/rig-setup.md requires.\n"
       "The E-stop cuts the drive only, not the brake. A guardian stands by during each pulse (docs/dead-man.md).");
+  terminal.tell(
+      config::model_origin(request.settings, std::chrono::floor<std::chrono::days>(std::chrono::system_clock::now())));
   GuardedPulse guard(request, *driver, lease.get());
   experiment::CommissioningOptions pulses = options;
   pulses.emulated = !runtime::is_real_board(driver_options);

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <nlohmann/json.hpp>
 
+#include "config/model_origin.hpp"
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
 #include "guardian/service_call.hpp"
@@ -61,6 +63,11 @@ int doctor(const RunRequest& request, const std::string& only, bool json) {
     findings.push_back({.check = "boards", .what = note, .standing = diagnosis::Standing::note});
   }
   if (only.empty() || only == "boards") findings.push_back(service_finding(s.guardian.socket));
+  if (s.on_rig() && (only.empty() || only == "backend")) {
+    const auto today = std::chrono::floor<std::chrono::days>(std::chrono::system_clock::now());
+    findings.push_back(
+        {.check = "backend", .what = config::model_origin(s, today), .standing = diagnosis::Standing::note});
+  }
   const bool well = diagnosis::turned_out_well(examination, findings);
   if (json) {
     const nlohmann::ordered_json report{

@@ -28,8 +28,7 @@ void add_number(std::string& row, double value) {
 }
 
 std::string extra_columns(const rig::CycleRecord& r) {
-  std::string row = ',' + std::to_string(r.sequence) + ',' + std::to_string(r.stamp_ns) + ',' +
-                    std::to_string(r.measurement.upper_counts) + ',' + std::to_string(r.measurement.lower_counts);
+  std::string row = ',' + std::to_string(r.sequence) + ',' + std::to_string(r.stamp_ns);
   add_number(row, r.measurement.supply_V);
   add_number(row, r.measurement.temperature_C);
   row += ',' + std::to_string(r.measurement.trip_flags) + ',' + std::to_string(static_cast<int>(r.reason));

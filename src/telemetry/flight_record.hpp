@@ -21,8 +21,7 @@ struct FlightRecord {
 
 /// The columns of the recorder's CSV beyond those of a run's.
 inline constexpr std::string_view flight_csv_extra_header =
-    ",cycle,stamp_ns,upper_counts,lower_counts,supply_V,temperature_C,trip_flags,reason,reason_value,"
-    "wakeup_latency_us,cycle_us";
+    ",cycle,stamp_ns,supply_V,temperature_C,trip_flags,reason,reason_value,wakeup_latency_us,cycle_us";
 
 /// Writes `PREFIX.csv` (a row a cycle, `distance_m` NaN, with more columns than a run's CSV, the
 /// controller's own signals last), `PREFIX.lcmlog` (the

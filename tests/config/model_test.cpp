@@ -2,6 +2,7 @@
 
 #include "config/model.hpp"
 
+#include <chrono>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -10,6 +11,7 @@
 #include "config/config_file.hpp"
 #include "config/config_json.hpp"
 #include "config/key_table.hpp"
+#include "config/model_origin.hpp"
 #include "config/plan.hpp"
 #include "temporary_folder.hpp"
 
@@ -243,4 +245,17 @@ TEST_CASE("which experiments mean to stop follows from their own conditions") {
   Settings coast;
   coast.experiment.name = "coast-down";
   CHECK_FALSE(means_to_stop(plan(coast), coast.experiment.end_speed_m_s));
+}
+
+TEST_CASE("a model says when it was identified, and how long ago") {
+  const File file("identified = 2026-11-22\n[plant]\ntheta_N = 25\n");
+  Settings settings;
+  settings.model_name = file.path().string();
+  const std::chrono::sys_days today = std::chrono::year{2026} / 12 / 1;
+  CHECK_THAT(model_origin(settings, today), Contains("identified on 2026-11-22, 9 days ago"));
+  CHECK_NOTHROW(read_model(file.path()));
+  settings.model_name.clear();
+  settings.plant_name = "paper-table1";
+  CHECK(model_origin(settings, today) ==
+        "model paper-table1: not identified from the rig's own logs; abs_hil identify does that");
 }

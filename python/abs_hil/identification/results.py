@@ -54,7 +54,7 @@ def as_toml(found: Identified) -> str:
     lines += [f'# Log {_comment(log.name)}: sha256 {log.sha256}' for log in found.logs]
     lines += [f'# {_comment(note)}' for note in found.notes]
     description = f'identified from {len(found.logs)} logs on {datetime.date.today().isoformat()}: {form.meaning}'
-    lines += ['', f'description = {json.dumps(description)}', '', '[plant]',
+    lines += ['', f'description = {json.dumps(description)}', f'identified = {datetime.date.today().isoformat()}', '', '[plant]',
               *(f'{key.removeprefix("plant.")} = "{value}"' for key, value in form.settings.items())]
     lines += [line(key, e) for key, e in found.parameters.items() if key in base and not key.startswith('brake_factor')]
     lines.append(f'encoder_counts_per_rev = {base["encoder_counts_per_rev"]}')

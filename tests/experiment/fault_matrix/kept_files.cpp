@@ -111,8 +111,9 @@ std::string fault_of_recorder(const runtime::FlightRing& recorder, std::size_t s
   std::string row;
   const std::string header = std::string(telemetry::csv_header).append(telemetry::flight_csv_extra_header);
   if (std::string fault = fault_of_table(file(".csv"), header, kept.size(), row); !fault.empty()) return fault;
-  constexpr std::size_t reason_column = 26;
-  if (columns_of(header)[reason_column] != "reason" || columns_of(row)[reason_column] != reason) {
+  const std::vector<std::string> names = columns_of(header);
+  const auto column = static_cast<std::size_t>(std::find(names.begin(), names.end(), "reason") - names.begin());
+  if (column == names.size() || columns_of(row)[column] != reason) {
     return "recorder: another reason in its last row";
   }
   return fault_of_log(file(".lcmlog"), last, kept.size());
