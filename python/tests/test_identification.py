@@ -92,6 +92,12 @@ def test_gentle_braking_tells_only_the_product(logs, start):
     assert gentle.parameters['u0'].status != 'identified'
 
 
+def test_logs_that_do_not_tell_the_form_keep_the_starts(logs, start):
+    found = abs_hil.identify([logs[0], rows_of(logs[1], int(np.argmax(logs[1].brake_pwm > 0.46)))], start)
+    assert found.form == 'magic-formula'
+    assert any('do not tell the form' in note for note in found.notes)
+
+
 def test_acceleration_alone_promises_nothing_of_brake_and_tyre(logs, start):
     run_up = rows_of(logs[2], int(np.argmax(logs[2].brake_pwm > 0)) - 250)
     found = abs_hil.identify([run_up], start, form='magic-formula')

@@ -75,6 +75,7 @@ class Identified:
     spread: intervals.Spread
     disagreement: dict[str, float] = field(default_factory=dict)
     validation: dict[str, Any] | None = None
+    interrupted: bool = False
 
     def values(self) -> dict[str, float]:
         """The plant's keys without "plant." and their values."""
@@ -98,7 +99,8 @@ def identify(logs: Sequence[PathLike | Log], start: PathLike = 'paper-table1', *
     seed:  of the bootstrap
     say, check: called with progress in words; called often, may raise to stop
 
-    Raises ValueError for logs that cannot serve and for unknown keys.
+    An interruption (Ctrl-C) after the first values returns what there is, without intervals. Raises ValueError for logs
+    that cannot serve and for unknown keys.
     """
     fix = dict(fix or {})
     checked_keys(fix)
@@ -111,7 +113,9 @@ def identify(logs: Sequence[PathLike | Log], start: PathLike = 'paper-table1', *
     if not loaded:
         raise ValueError('give at least one log')
     notes = [note for log in loaded for note in log.notes]
-    values = {k: v for k, v in _core.PlantOptions(options(plant=start)).values().items() if isinstance(v, float)}
+    given = _core.PlantOptions(options(plant=start)).values()
+    start_form = str(given['tyre'])
+    values = {k: v for k, v in given.items() if isinstance(v, float)}
     values.update({key: number for key, number in fix.items() if number is not None})
     _refuse_swapped(loaded)
 
@@ -127,7 +131,19 @@ def identify(logs: Sequence[PathLike | Log], start: PathLike = 'paper-table1', *
             notes.append(f'{FORMS[name].meaning}: cannot be fitted ({error})')
     if not fits:
         raise ValueError('neither form of the plant can be fitted to these logs')
-    fit = fits[0] if len(fits) == 1 else _better_form(fits, check, say, notes)
+    fit = fits[0] if len(fits) == 1 else _better_form(fits, start_form, check, say, notes)
+    try:
+        fit, spread, gaps, disturbances = _finished(fit, seed, say, check)
+    except KeyboardInterrupt:
+        return _interrupted(fit, str(start), notes)
+    found = _assembled(fit, spread, gaps, str(start), notes, disturbances)
+    _name_disagreement(found)
+    return found
+
+
+def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[], None],
+              ) -> tuple[Fit, intervals.Spread, list[tuple[float, float, float]], Disturbances | None]:
+    """The fit, what its intervals are made of, and the disturbances if there are any."""
     say(f'{fit.problem.form.meaning}: fit')
     try:
         fit = finish_fit(fit, check)
@@ -141,12 +157,23 @@ def identify(logs: Sequence[PathLike | Log], start: PathLike = 'paper-table1', *
     if not quiet:
         say(f'residual {fit.rms_counts:.3g} counts RMS: the rig wanders, or the model lacks something')
         fit = disturbed_fit(fit, check, say)
-    disturbances = QUIET if quiet else fit.disturbances
-    gaps = likely_u0(fit, disturbances, check)
+    gaps = likely_u0(fit, QUIET if quiet else fit.disturbances, check)
     say('intervals')
     spread = intervals.bootstrap(fit, seed, check=check) if quiet else intervals.information(fit)
-    found = _assembled(fit, spread, gaps, str(start), notes, None if quiet else fit.disturbances)
-    _name_disagreement(found)
+    return fit, spread, gaps, None if quiet else fit.disturbances
+
+
+def _interrupted(fit: Fit, start: str, notes: list[str]) -> Identified:
+    """What there is, without intervals."""
+    size = len(fit.problem.parameters)
+    found = _assembled(fit, intervals.Spread(np.full((size, size), np.nan), np.zeros(size), 0), [], start,
+                       ['interrupted: the values are provisional, and no interval is given'], None)
+    found.notes[1:] = notes
+    for estimate in found.parameters.values():
+        if estimate.status != 'fixed':
+            estimate.status, estimate.low, estimate.high = 'not-identifiable', None, None
+    found.combinations.clear()
+    found.interrupted = True
     return found
 
 
@@ -169,7 +196,8 @@ def _refuse_swapped(logs: Sequence[Log]) -> None:
                              'while both roll')
 
 
-def _better_form(fits: Sequence[Fit], check: Callable[[], None], say: Callable[[str], None], notes: list[str]) -> Fit:
+def _better_form(fits: Sequence[Fit], start_form: str, check: Callable[[], None], say: Callable[[str], None],
+                 notes: list[str]) -> Fit:
     """The form that better predicts each log from all the others, by the likelihood. Large disturbances are enough if
     they show a clear difference already."""
     costs = [_cross_validated(fit) for fit in fits]
@@ -182,6 +210,10 @@ def _better_form(fits: Sequence[Fit], check: Callable[[], None], say: Callable[[
     for fit, cost in zip(fits, costs):
         say(f'{fit.problem.form.meaning}: -2 log likelihood of left-out logs {cost:.6g}')
     best = int(np.argmin(costs))
+    starts = [i for i, fit in enumerate(fits) if fit.problem.form.name == start_form]
+    if abs(costs[0] - costs[1]) < CLEAR_DIFFERENCE and starts:
+        notes.append('the logs do not tell the form of tyre and load; it is that of the start. Run: slip-sweep or locked-stop')
+        return fits[starts[0]]
     notes.append(f'form: {fits[best].problem.form.meaning}; it predicts left-out logs better (-2 log likelihood lower by '
                  f'{abs(costs[0] - costs[1]):.3g})')
     return fits[best]
@@ -235,7 +267,7 @@ def _assembled(fit: Fit, spread: intervals.Spread, gaps: list[tuple[float, float
             if parameters[p.key].status != 'identified':
                 cures.setdefault(p.cure, []).append(p.key)
             continue
-        sd = float(np.sqrt(max(spread.covariance[i, i], 0.0))) * float(fit.scale[i])
+        sd = float(np.sqrt(np.maximum(spread.covariance[i, i], 0.0))) * float(fit.scale[i])
         relative[p.key] = sd / max(abs(value), 1e-300)
         low, high = value - intervals.WIDTH * sd, value + intervals.WIDTH * sd
         estimate = Estimate(value, max(low, p.least), min(high, p.most), 'identified', p.unit)

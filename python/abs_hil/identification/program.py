@@ -65,7 +65,7 @@ def _write_text(path: pathlib.Path, text: str) -> None:
     write_whole(path, lambda to: pathlib.Path(to).write_text(text, encoding='utf-8'))
 
 
-def _identify(o: argparse.Namespace) -> None:
+def _identify(o: argparse.Namespace) -> int:
     fixed = _fixed(o.fix)
     o.out.mkdir(parents=True, exist_ok=True)
     for name in ('identified.json', 'model.toml', 'report.html'):
@@ -76,12 +76,12 @@ def _identify(o: argparse.Namespace) -> None:
         print(f'abs_identify: {text}', file=sys.stderr, flush=True)
 
     found = identify(o.logs, o.start, fix=fixed, drift=o.drift, form=o.form, seed=o.seed, say=say)
-    if o.validate:
+    if o.validate and not found.interrupted:
         found.validation = validate(found, o.validate)
         say(f'{o.validate}: stop distance {found.validation["stop_distance_m"]:.5g} m, predicted '
             f'{found.validation["predicted_stop_distance_m"]:.5g} m')
     report = None
-    if not o.no_report:
+    if not o.no_report and not found.interrupted:
         from .advice import advise
         from .page import page
         say('what to run next')
@@ -90,12 +90,13 @@ def _identify(o: argparse.Namespace) -> None:
     for note in found.notes:
         say(clean(note, 2000))
     _write(found, o, report)
+    return INTERRUPTED if found.interrupted else 0
 
 
 def main(arguments: list[str]) -> int:
     o = parser().parse_args(arguments)
     try:
-        _identify(o)
+        return _identify(o)
     except Unavailable as error:
         print(f'abs_identify: {error}', file=sys.stderr)
         return 3
@@ -105,4 +106,3 @@ def main(arguments: list[str]) -> int:
     except KeyboardInterrupt:
         print('abs_identify: interrupted; nothing is written', file=sys.stderr)
         return INTERRUPTED
-    return 0
