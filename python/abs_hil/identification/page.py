@@ -11,6 +11,7 @@ from ..report.page import render, view
 from ..report.tables import Table
 from .advice import Advice
 from .estimate import Identified
+from .results import shown
 
 _FOLDER = pathlib.Path(__file__).parent
 _MOST_POINTS = 4000
@@ -19,11 +20,11 @@ _MOST_POINTS = 4000
 def _parameters(found: Identified) -> Table:
     rows = []
     for name, e in {**found.parameters, **found.combinations}.items():
-        interval = '–' if e.low is None or e.high is None or e.status == 'fixed' else f'{e.low:.6g} to {e.high:.6g}'
+        value, interval = shown(e)
         width = '–'
         if e.low is not None and e.high is not None and e.status != 'fixed' and e.value:
             width = f'± {50 * (e.high - e.low) / abs(e.value):.2g} %'
-        rows.append([name, f'{e.value:.6g}', e.unit, interval, width, e.status])
+        rows.append([name, value, e.unit, interval or '–', width, e.status])
     return Table('parameters', ['parameter', 'value', 'unit', 'interval of 95 %', 'half width', 'status'], rows)
 
 

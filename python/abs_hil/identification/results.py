@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import datetime
 import json
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -43,8 +44,8 @@ def as_json(found: Identified) -> dict[str, Any]:
 def as_toml(found: Identified) -> str:
     """The content of model.toml: a plant's file, which --model and --plant load."""
     def line(key: str, estimate: Estimate) -> str:
-        interval = '' if estimate.low is None or estimate.status == 'fixed' else f', {estimate.low:.6g} to {estimate.high:.6g}'
-        return f'{key} = {_number(estimate.value)}  # {estimate.unit}: {estimate.status}{interval}'
+        _, interval = shown(estimate)
+        return f'{key} = {_number(estimate.value)}  # {estimate.unit}: {estimate.status}' + (interval and ', ' + interval)
 
     form = FORMS[found.form]
     base = found.fit.problem.base.values()
@@ -142,6 +143,14 @@ def _compared(run: Run, predicted: Run) -> dict[str, float | None]:
     return out
 
 
+def shown(e: Estimate) -> tuple[str, str]:
+    """(value, interval) with as many digits as the interval has to say; the interval is empty if there is none."""
+    if e.low is None or e.high is None or e.status == 'fixed' or not e.high > e.low:
+        return f'{e.value:.6g}', ''
+    digits = 2 + max(1, math.ceil(math.log10(max(abs(e.value), e.high - e.low) / (e.high - e.low))))
+    return f'{e.value:.{digits}g}', f'{e.low:.{digits}g} to {e.high:.{digits}g}'
+
+
 def words(found: Identified) -> list[str]:
     """A plain table for the terminal."""
     rows: Mapping[str, Estimate] = {**found.parameters, **found.combinations}
@@ -150,6 +159,6 @@ def words(found: Identified) -> list[str]:
     for name, e in rows.items():
         if name == DELAY and e.value == 0.0:
             continue
-        interval = '' if e.low is None or e.high is None or e.status == 'fixed' else f'{e.low:.6g} to {e.high:.6g}'
-        lines.append(f'{name:{width}}  {e.value:<12.6g}  {interval:26}  {e.status}')
+        value, interval = shown(e)
+        lines.append(f'{name:{width}}  {value:14}  {interval:34}  {e.status}')
     return lines
