@@ -5,16 +5,20 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include "abs_hil/experiment_t.hpp"
+#include "abs_hil/measurement_t.hpp"
 #include "abs_hil/phase_t.hpp"
 #include "abs_hil/plant_sim/factor_profile.hpp"
 #include "abs_hil/rig/cycle_record.hpp"
 #include "abs_hil/rig/quantities.hpp"
 #include "abs_hil/rig/signals.hpp"
+#include "abs_hil/rig/time_units.hpp"
+#include "abs_hil/sample_t.hpp"
 #include "abs_hil/signals_t.hpp"
 #include "abs_hil/telemetry_t.hpp"
 #include "analysis/run_metrics.hpp"
@@ -80,6 +84,8 @@ class LogColumns {
   void take(const telemetry::LogEvent& event) {
     const bool telemetry = event.channel.ends_with("TELEMETRY");
     if (event.channel.ends_with("PHASE")) return take_phase(event);
+    if (event.channel.ends_with("SAMPLE")) return take_sample(event);
+    if (event.channel.ends_with("MEASUREMENT")) return take_measurement(event);
     if (!telemetry && !event.channel.ends_with("SIGNALS") && !event.channel.ends_with("EXPERIMENT")) return;
     if (telemetry) {
       telemetry_t message{};
@@ -87,6 +93,10 @@ class LogColumns {
       cycles_.push_back(message.cycle);
       rig::CycleRecord record = telemetry::to_record(message);
       record.phase_index = phase_index_;
+      record.sample_valid = sample_valid_;
+      record.wheels_apart = wheels_apart_;
+      record.sample_time_s = record.time_s;
+      start_ns_ = message.stamp_ns - std::llround(record.time_s * 1e9);
       columns_.consume(record, message.distance_m);
     } else if (event.channel.ends_with("SIGNALS")) {
       signals_t message{};
@@ -132,6 +142,19 @@ class LogColumns {
     rig::NamedPhase& named = phases_[phase_index_];
     if (named.name.empty()) named = {static_cast<rig::Phase>(message.phase), run_folder::clean_text(message.name)};
   }
+  /// It precedes the telemetry of the first cycle for which it holds.
+  void take_sample(const telemetry::LogEvent& event) {
+    sample_t message{};
+    if (!decode(event, message)) return;
+    sample_valid_ = message.sample_valid != 0;
+    wheels_apart_ = message.wheels_apart != 0;
+  }
+  /// It follows the telemetry of its cycle, if the counts have another time than the cycle.
+  void take_measurement(const telemetry::LogEvent& event) {
+    measurement_t message{};
+    if (!decode(event, message) || cycles_.empty() || cycles_.back() != message.cycle) return;
+    columns_.put_sample_time(columns_.rows() - 1, static_cast<double>(message.measured_ns - start_ns_) * rig::s_per_ns);
+  }
   template <class Message>
   bool decode(const telemetry::LogEvent& event, Message& message) {
     const bool whole = telemetry::decode_checked(event.data, message).empty();
@@ -143,6 +166,9 @@ class LogColumns {
   std::vector<std::int64_t> cycles_;
   std::vector<rig::NamedPhase> phases_;
   std::uint16_t phase_index_{0};
+  bool sample_valid_{true};
+  bool wheels_apart_{false};
+  std::int64_t start_ns_{0};  ///< of the run, by the clock of the stamps
   std::string names_;
   std::vector<std::string> experiment_;
   std::size_t unreadable_{0};
