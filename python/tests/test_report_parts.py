@@ -72,7 +72,8 @@ def changes_along(tmp_path, key, profile, truth=True):
     for i in range(301):
         time = i * 0.01
         speed = (10.0 - 2.0 * max(0.0, time - 1.0)) / 0.1 if truth else NAN
-        lines.append(f'{time},{"coast" if i < 100 else "brake"},1,{speed},1,1,0,0,0.1,0,0,0,0,0,0,23,23,0,0,0,0,1,{time},0'.replace('nan', 'NaN'))
+        lines.append(f'{time},{"coast" if i < 100 else "brake"},1,{speed},1,1,0,0,0.1,0,0,0,0,0,0,23,23,0,0,0,0,1,{time},0'
+                     .replace('nan', 'NaN'))
     (tmp_path / 'run.csv').write_text('\n'.join(lines) + '\n')
     run = files.RunFiles(tmp_path / 'run.csv', 'run', config={'plant.r2_m': '0.1', key: profile})
     return survey.survey(run, survey.Rows(run.csv)).changes

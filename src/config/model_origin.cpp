@@ -2,7 +2,6 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
-
 #include <toml++/toml.h>
 
 #include "config/config_error.hpp"
@@ -17,7 +16,8 @@ std::string model_origin(const Settings& settings, std::chrono::sys_days today) 
   try {
     table = toml::parse_file(file);
   } catch (const toml::parse_error& problem) {
-    throw ConfigError(fmt::format("{}:{}: not valid TOML: {}", file, problem.source().begin.line, problem.description()));
+    throw ConfigError(
+        fmt::format("{}:{}: not valid TOML: {}", file, problem.source().begin.line, problem.description()));
   }
   const auto date = table["identified"].value<toml::date>();
   if (!date) {
