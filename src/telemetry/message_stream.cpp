@@ -106,7 +106,7 @@ void MessageStream::consume(const rig::CycleRecord& record, double distance_m) {
     next_experiment_s_ = next_on_grid(record.time_s, options_.experiment_period_s);
   }
   send_sample(record);
-  // A replay needs the answer, whoever gave it.
+  // A replay needs the answer. It may have come from a person or from the simulation.
   if (record.reason == rig::Reason::question_answered) send_adjustment("continue", 0.0);
   if (auto event = detector_.observe(record)) {
     send_event(event->kind, record.reason, record.reason_value, std::move(event->message));
