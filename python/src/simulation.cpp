@@ -17,8 +17,8 @@
 #include "bindings.hpp"
 #include "column_sink.hpp"
 #include "config/config_error.hpp"
+#include "study/batch.hpp"
 #include "study/parallel.hpp"
-#include "study/simulated_run.hpp"
 #include "study/variation.hpp"
 
 namespace abs_hil::python {
@@ -85,11 +85,11 @@ struct Study {
   std::uint64_t seed{1};
 };
 
-study::RunResult run(const Study& study, const Job& job) {
+study::Job job_of(const Study& study, const Job& job) {
   const config::Settings& s = study.settings[job.options];
-  if (!job.index) return study::simulate(s, s.plant, static_cast<std::uint64_t>(s.seed));
+  if (!job.index) return {.settings = &s, .plant = s.plant, .seed = static_cast<std::uint64_t>(s.seed)};
   const study::Perturbation drawn = study::draw(study.variation, study.seed, *job.index);
-  return study::simulate(s, study::perturbed(s.plant, drawn), drawn.sensor_seed);
+  return {.settings = &s, .plant = study::perturbed(s.plant, drawn), .seed = drawn.sensor_seed};
 }
 
 /// Why the options cannot be used; empty if they can.
@@ -125,14 +125,20 @@ py::dict simulate_many(const std::vector<py::dict>& options,
     });
     std::atomic<std::size_t> finished{0};
     const std::size_t step = std::max<std::size_t>(1, jobs.size() / 100);
-    study::for_each_index(jobs.size(), threads, [&](std::size_t i) {
+    std::vector<std::size_t> usable;
+    for (std::size_t i = 0; i < jobs.size(); ++i) {
       errors[i] = unusable[study.jobs[i].options];
-      if (errors[i].empty()) errors[i] = refusal([&] { results[i] = run(study, study.jobs[i]); });
+      if (errors[i].empty()) usable.push_back(i);
+    }
+    const auto source = [&](std::size_t k) { return job_of(study, study.jobs[usable[k]]); };
+    study::run_batch(usable.size(), threads, source, [&](std::size_t k, study::Outcome outcome) {
+      results[usable[k]] = outcome.run;
+      errors[usable[k]] = std::move(outcome.refusal);
       const std::size_t done = finished.fetch_add(1) + 1;
-      if (done % step != 0 && done != jobs.size()) return;
+      if (done % step != 0 && done != usable.size()) return;
       const py::gil_scoped_acquire gil;
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-      if (progress) progress(done);
+      if (progress) progress(jobs.size() - usable.size() + done);
     });
   }
   py::dict columns;

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "abs_hil/control/registry.hpp"
-#include "study/parallel.hpp"
+#include "study/batch.hpp"
 
 namespace abs_hil::study {
 
@@ -36,12 +36,15 @@ Comparison compare(const ComparisonPlan& plan, const std::function<void(std::siz
   const std::size_t kinds = comparison.contenders.size();
   comparison.results.assign(kinds, std::vector<RunResult>(plan.repeat));
   std::atomic<std::size_t> finished{0};
-  for_each_index(kinds * plan.repeat, plan.threads, [&](std::size_t index) {
-    const std::size_t c = index % kinds;
-    const std::size_t k = index / kinds;
-    const Perturbation perturbation = draw(plan.variation, plan.seed, k);
-    comparison.results[c][k] = simulate(comparison.contenders[c].settings, perturbed(plan.settings.plant, perturbation),
-                                        perturbation.sensor_seed);
+  const auto job_of = [&](std::size_t index) -> Job {
+    const Perturbation perturbation = draw(plan.variation, plan.seed, index / kinds);
+    return {.settings = &comparison.contenders[index % kinds].settings,
+            .plant = perturbed(plan.settings.plant, perturbation),
+            .seed = perturbation.sensor_seed};
+  };
+  run_batch(kinds * plan.repeat, plan.threads, job_of, [&](std::size_t index, const Outcome& outcome) {
+    if (!outcome.refusal.empty()) throw std::invalid_argument(outcome.refusal);
+    comparison.results[index % kinds][index / kinds] = outcome.run;
     if (done) done(finished.fetch_add(1) + 1);
   });
   return comparison;

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "abs_hil/plant_sim/options.hpp"
+#include "config/settings.hpp"
+#include "study/simulated_run.hpp"
+
+namespace abs_hil::study {
+
+/// One run of a batch: the arguments of `simulate`.
+struct Job {
+  const config::Settings* settings{nullptr};  ///< must outlive the batch
+  plant_sim::PlantOptions plant{};
+  std::uint64_t seed{1};
+};
+
+/// What became of a job.
+struct Outcome {
+  RunResult run{};
+  std::string refusal{};  ///< why the job's options cannot be used; empty if they can
+};
+
+/// Runs jobs 0 to count - 1 in any order. The result of a job depends on the job alone: not on its neighbours, the
+/// number of threads or the order.
+/// @param job_of  gives job number `index`; called from several threads
+/// @param take  takes the outcome of job number `index`; called from several threads. An exception of either ends the
+///   batch and leaves it.
+void run_batch(std::size_t count, std::size_t threads, const std::function<Job(std::size_t index)>& job_of,
+               const std::function<void(std::size_t index, Outcome outcome)>& take);
+
+}  // namespace abs_hil::study
