@@ -70,7 +70,7 @@ void MachinePause::watch(const std::stop_token& stop) {
       constexpr std::uint64_t one = 1;
       [[maybe_unused]] const auto written = ::write(happened_.get(), &one, sizeof one);
     }
-    std::this_thread::sleep_for(leased_ ? milliseconds(2) : milliseconds(100));
+    std::this_thread::sleep_for(leased_ ? milliseconds(1) : milliseconds(100));
   }
 }
 

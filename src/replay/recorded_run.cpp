@@ -15,6 +15,9 @@ namespace {
 
 using telemetry::RecordingError;
 
+/// Longer than any cycle that goes on; with it, sums of times stay within their type.
+constexpr std::int64_t longest_read_ns = 3'600'000'000'000;
+
 /// Collects a recording's events into a run and checks each of them.
 class Collector {
  public:
@@ -89,6 +92,9 @@ class Collector {
     if (!run_.cycles.empty() && cycle.stamp_ns < run_.cycles.back().stamp_ns) {
       fail("cycle " + std::to_string(cycle.cycle) +
            " is damaged: its time stamp is earlier than that of the previous cycle");
+    }
+    if (cycle.read_ns < 0 || cycle.read_ns > longest_read_ns) {
+      fail("cycle " + std::to_string(cycle.cycle) + " is damaged: its reading took " + std::to_string(cycle.read_ns) + " ns");
     }
     run_.cycles.push_back(cycle);
   }

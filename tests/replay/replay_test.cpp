@@ -2,6 +2,7 @@
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "catch.hpp"
@@ -29,6 +30,7 @@ struct Recipe {
   std::uint32_t decimation{1};
   rig::Reason stop{rig::Reason::none};
   std::int64_t measured_late_ns{0};  ///< like a board that reads its counters after the wake-up
+  std::int64_t read_ns{0};           ///< duration of each reading as written into the log
   int loses_every{0};                ///< a board that ignores every Nth command; 0: a simulated rig
 };
 
@@ -69,10 +71,12 @@ class LosesCommands final : public driver::RigDriver {
 /// Passes records on with a later time of measurement, like a board.
 class LateMeasurement final : public rig::RecordSink {
  public:
-  LateMeasurement(rig::RecordSink& next, std::int64_t late_ns) : next_(next), late_ns_(late_ns) {}
+  LateMeasurement(rig::RecordSink& next, const Recipe& recipe)
+      : next_(next), late_ns_(recipe.measured_late_ns), read_ns_(recipe.read_ns) {}
   void consume(const rig::CycleRecord& record, double distance_m) override {
     rig::CycleRecord late = record;
     late.measurement.time_ns += late_ns_;
+    late.timing.read_ns += read_ns_;
     next_.consume(late, distance_m);
   }
   void finish() override { next_.finish(); }
@@ -80,6 +84,7 @@ class LateMeasurement final : public rig::RecordSink {
  private:
   rig::RecordSink& next_;
   std::int64_t late_ns_;
+  std::int64_t read_ns_;
 };
 
 void record_run(const std::filesystem::path& path, const Recipe& recipe) {
@@ -98,7 +103,7 @@ void record_run(const std::filesystem::path& path, const Recipe& recipe) {
       {.telemetry_every_cycles = recipe.decimation},
       {s.experiment.name, s.control.controller, s.plant_name, s.backend, keys.to_json().dump(), "test"}, {});
   stream.add(log);
-  LateMeasurement late(stream, recipe.measured_late_ns);
+  LateMeasurement late(stream, recipe);
   runtime::VirtualClock clock;
   driver::InjectingDriver driver(
       std::make_unique<LosesCommands>(
@@ -300,6 +305,11 @@ TEST_CASE("recordings that do not hold the whole run are refused with the reason
   using Catch::Matchers::Contains;
   record_run(scratch / "few.lcmlog", {.decimation = 10});
   CHECK_THROWS_WITH(read_run(scratch / "few.lcmlog"), Contains("telemetry.decimation"));
+  for (const std::int64_t read_ns : {std::int64_t{-1}, std::numeric_limits<std::int64_t>::max()}) {
+    record_run(scratch / "read.lcmlog", {.read_ns = read_ns});
+    CHECK_THROWS_WITH(read_run(scratch / "read.lcmlog"),
+                      Contains("cycle 0 is damaged: its reading took " + std::to_string(read_ns) + " ns"));
+  }
   record_run(scratch / "run.lcmlog", {});
   const std::string whole = content(scratch / "run.lcmlog");
   const auto read_bytes = [&](const std::string& bytes) {

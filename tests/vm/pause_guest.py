@@ -1,6 +1,6 @@
-"""Within the virtual machine, on its own clock: abs_hil and the resident guardian on the emulated card, while pause_test.py
-outside stops and continues the whole machine. Only the real-time clock goes on meanwhile. The run ends with status 1,
-and both PWMs are 0 soon after the pause.
+"""Within the virtual machine, in virtual time: abs_hil and the resident guardian on the emulated card, while pause_test.py
+outside stops and continues the whole machine. Only the real-time clock goes on meanwhile. Each run ends with status 1,
+and both PWMs are 0 within BOUND_MS after the pause.
 
 usage: pause_guest.py ABS_HIL OUT
 """
@@ -17,27 +17,24 @@ from program import PROGRAM  # noqa: E402
 from resident_guardian import Service, settings  # noqa: E402
 from rig_emulator import Emulator  # noqa: E402
 
+BOUND_MS = 5
 TRIES = 3
-MOST_SLOW = 10
-RATE_HZ = 200
-CLOCK = pathlib.Path('/sys/class/rtc/rtc0/since_epoch')
-# The machine runs on its host's clock, and so has the host's pauses: these limits are for those of this test alone.
-PATIENT = ('guardian.timeout_ms=1000', 'realtime.cycle_gap_max_s=5', 'realtime.max_consecutive_overruns=0',
-           'gate.sample_age_max_s=1', 'gate.judge_within_s=1')
+RATE_HZ = 500  # as in kills_guest.py
 PHASES = {'accelerate': lambda w: w.drive > 0, 'brake': lambda w: w.brake > 0}
 
 
 def watch_clock(file):
     """In a process of its own, before all others: writes the monotonic time before each leap of the real-time clock."""
     os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(99))
-    before_ns, seconds = time.monotonic_ns(), int(CLOCK.read_text())
+    clock = os.open('/sys/class/rtc/rtc0/since_epoch', os.O_RDONLY)
+    before_ns, seconds = time.monotonic_ns(), int(os.pread(clock, 32, 0))
     with open(file, 'a', buffering=1) as out:
         while True:
-            now = int(CLOCK.read_text())
+            now = int(os.pread(clock, 32, 0))
             if now - seconds > 1:
                 out.write(f'{before_ns}\n')
             before_ns, seconds = time.monotonic_ns(), now
-            time.sleep(0.001)
+            time.sleep(0.0005)
 
 
 def wait_for(condition, what, seconds=60):
@@ -47,22 +44,17 @@ def wait_for(condition, what, seconds=60):
         time.sleep(0.005)
 
 
-class HostWasSlow(Exception):
-    """The host held the machine up so long that the run ended for that reason, before or beside the pause."""
-
-
 def one_pause(number, phase, emulator, folder, leaps):
     """(ms from the pause to zero; problems)."""
     program = subprocess.Popen(
         [PROGRAM, '--backend', 'rig', '--no-lcm', '--no-out', '--rate', str(RATE_HZ), '--recorder', folder,
          *settings(f'driver.pci.root={emulator.root}', 'guardian.resident=require',
-                   f'guardian.socket={folder}/guardian.sock', 'experiment.idle_s=0.05', *PATIENT,
+                   f'guardian.socket={folder}/guardian.sock', 'experiment.idle_s=0.05',
                    f'experiment.cut_speed_rad_s={60 if phase == "accelerate" else 25}')],
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
 
     def there():
-        if program.poll() is not None:
-            raise HostWasSlow(program.communicate()[1][-600:])
+        assert program.poll() is None, f'ended before {phase}: {program.communicate()[1][-600:]}'
         return PHASES[phase](emulator.widths())
     wait_for(there, f'never in {phase}')
     known = len(leaps.read_text().split())
@@ -71,47 +63,40 @@ def one_pause(number, phase, emulator, folder, leaps):
     pause_ns = int(leaps.read_text().split()[known])
     said = program.communicate(timeout=60)[1]
     widths = emulator.widths()
-    problems = []
-    if 'could not judge the wheels' in said:
-        raise HostWasSlow(said[-600:])
     if widths.zero_since_ns is None:
         return None, [f'{phase}: the card holds']
+    ms = (widths.zero_since_ns - pause_ns) * 1e-6
+    problems = []
     if program.returncode != 1 or 'the virtual machine was paused' not in said:
         problems.append(f'{phase}: status {program.returncode}: {said[-600:]}')
-    if widths.zero_since_ns < pause_ns:
-        raise HostWasSlow(f'{phase}: the host stopped the machine only after the phase')
-    return (widths.zero_since_ns - pause_ns) * 1e-6, problems
+    if not 0 < ms <= BOUND_MS:
+        problems.append(f'{phase}: zero {ms:.2f} ms after the pause; 0 to {BOUND_MS} are expected')
+    return ms, problems
 
 
 def main():
     folder = pathlib.Path(tempfile.mkdtemp())
-    emulator = Emulator(folder, *settings('plant.slip_regularisation_m_s=0.1'))
-    service = Service(folder, f'driver.pci.root={emulator.root}')
     leaps = folder / 'leaps'
     leaps.touch()
     watcher = os.fork()
     if watcher == 0:
         watch_clock(leaps)
-    problems = []
+    emulator = Emulator(folder, *settings('plant.slip_regularisation_m_s=0.1'))
+    service = Service(folder, f'driver.pci.root={emulator.root}')
+    problems, number = [], 0
     for phase in PHASES:
         times = []
-        slow = []
-        while len(times) < TRIES and len(slow) < MOST_SLOW and not problems:
-            number = len(list(OUT.glob('pause-*')))
-            try:
-                ms, problems = one_pause(number, phase, emulator, folder, leaps)
-            except HostWasSlow as what:
-                slow.append(str(what))
-                continue
+        for _ in range(TRIES):
+            ms, found = one_pause(number, phase, emulator, folder, leaps)
+            number += 1
+            problems += found
             times += [] if ms is None else [ms]
-        if len(slow) == MOST_SLOW:
-            problems.append(f'the host is too slow: {slow[-1]}')
         print(f'paused in {phase}: both widths 0 after (ms of the guest): ' +
               ' '.join(f'{ms:.2f}' for ms in sorted(times)), flush=True)
     os.kill(watcher, 9)
     service.end()
     emulator.end()
-    print('\n'.join(problems) or 'each pause ended the run')
+    print('\n'.join(problems) or 'each pause ended the run in time')
     if problems:
         print(service.said()[-3000:])
     return 1 if problems else 0

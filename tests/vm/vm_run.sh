@@ -8,8 +8,9 @@
 #   -s N, -m MEM  CPUs (2) and memory (1G)
 #   -t SECONDS    time limit on this computer's clock (120)
 #   -V            virtual time: one CPU whose clock counts instructions (8 ns each), so that timing repeats itself
-#   -S            systemd as the first process, COMMAND as a service of it
 #   -F            the same with 2 ns each: where two programs and a simulated rig share that CPU
+#   -C FILE       with -V or -F: the machine's real-time clock shows the time that libfaketime reads from FILE
+#   -S            systemd as the first process, COMMAND as a service of it
 # Status 77: QEMU or the kernel cannot be had here, the reason on stderr (1 where CI=true or ABS_HIL_REQUIRE_VM=1).
 # Status 125: the machine ended without a status; its console is on stderr.
 set -euo pipefail
@@ -17,9 +18,9 @@ here=$(dirname "$(realpath "$0")")
 PATH=$PATH:/usr/sbin:/sbin  # modprobe, depmod
 
 
-modules='' out='' cpus=2 memory=1G limit_s=120 accelerator='tcg,thread=multi' boot_arguments=''
+modules='' out='' cpus=2 memory=1G limit_s=120 accelerator='tcg,thread=multi' boot_arguments='' qemu=(qemu-system-x86_64)
 qemu_arguments=()
-while getopts M:q:a:o:s:m:t:VSF option; do
+while getopts M:q:a:o:s:m:t:C:VSF option; do
   case $option in
     M) modules=$OPTARG ;;
     q) read -ra words <<<"$OPTARG"; qemu_arguments+=("${words[@]}") ;;
@@ -29,6 +30,10 @@ while getopts M:q:a:o:s:m:t:VSF option; do
     m) memory=$OPTARG ;;
     t) limit_s=$OPTARG ;;
     V) cpus=1 accelerator='tcg,thread=single'; qemu_arguments+=(-icount 'shift=3,sleep=off' -rtc 'base=utc,clock=vm') ;;
+    C) library=$(echo /usr/lib/*/faketime/libfaketimeMT.so.1)
+       qemu=(env "LD_PRELOAD=$library" "FAKETIME_TIMESTAMP_FILE=$OPTARG" FAKETIME_NO_CACHE=1 FAKETIME_DONT_FAKE_MONOTONIC=1
+         "${qemu[@]}")
+       qemu_arguments+=(-rtc 'base=utc,clock=host') ;;
     S) boot_arguments+=' with_systemd systemd.show_status=false systemd.log_level=warning' ;;
     F) cpus=1 accelerator='tcg,thread=single'; qemu_arguments+=(-icount 'shift=1,sleep=off' -rtc 'base=utc,clock=vm') ;;
     *) exit 2 ;;
@@ -50,6 +55,7 @@ cannot() {
 for program in qemu-system-x86_64 busybox cpio modprobe depmod python3; do
   command -v "$program" >/dev/null || cannot "$program is not installed (scripts/setup.sh packages-vm.txt)"
 done
+[ -z "${library:-}" ] || [ -e "$library" ] || cannot "libfaketime is not installed (scripts/setup.sh packages-vm.txt)"
 kernel=$("$here/fetch_kernel.sh") || cannot "no PREEMPT_RT kernel"
 version=$(ls "$kernel/lib/modules")
 
@@ -80,7 +86,7 @@ fi
 # no_timer_check: on a busy host the kernel's look at its timer may see no tick, and it would give up.
 # Not KVM: it does not work for these kernels on every host that has /dev/kvm.
 status=0
-timeout "$limit_s" qemu-system-x86_64 -accel "$accelerator" -cpu max -smp "$cpus" -m "$memory" \
+timeout "$limit_s" "${qemu[@]}" -accel "$accelerator" -cpu max -smp "$cpus" -m "$memory" \
   -kernel "$kernel/vmlinux" -initrd "$scratch/initrd" \
   -append "console=ttyS0 quiet panic=-1 nokaslr mitigations=off no_timer_check $boot_arguments" \
   -display none -monitor none -no-reboot -nic none \
