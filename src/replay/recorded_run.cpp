@@ -94,7 +94,8 @@ class Collector {
            " is damaged: its time stamp is earlier than that of the previous cycle");
     }
     if (cycle.read_ns < 0 || cycle.read_ns > longest_read_ns) {
-      fail("cycle " + std::to_string(cycle.cycle) + " is damaged: its reading took " + std::to_string(cycle.read_ns) + " ns");
+      fail("cycle " + std::to_string(cycle.cycle) + " is damaged: its reading took " + std::to_string(cycle.read_ns) +
+           " ns");
     }
     run_.cycles.push_back(cycle);
   }
