@@ -14,7 +14,8 @@ SMALL = Training(plants=['paper-table1'], cases=1)
 
 
 def test_gains_are_those_whose_rows_give_a_range():
-    assert tunable() == ['adaptive', 'sliding-mode', 'sliding-mode-smooth', 'super-twisting', 'pi', 'relay', 'five-phase']
+    assert tunable() == ['adaptive', 'sliding-mode', 'sliding-mode-smooth', 'sliding-mode-actuator', 'super-twisting', 'pi',
+                         'relay', 'five-phase']
     assert [gain.name.rpartition('.')[2] for gain in gains_of('adaptive')] == ['gamma', 'ks0', 'ks1', 'ka1', 'zeta0']
     gamma, *_, zeta0 = gains_of('adaptive')
     assert (gamma.least, gamma.most, gamma.logarithmic, zeta0.logarithmic) == (1.0, 1000.0, True, False)
@@ -80,7 +81,8 @@ def test_unusable_names():
         Judge('pi', Training(['paper-tabel1']))
 
 
-@pytest.mark.parametrize('controller', ['sliding-mode', 'sliding-mode-smooth', 'super-twisting', 'pi', 'relay', 'five-phase'])
+@pytest.mark.parametrize('controller', ['sliding-mode', 'sliding-mode-smooth', 'sliding-mode-actuator', 'super-twisting', 'pi',
+                         'relay', 'five-phase'])
 def test_shipped_gains_of_the_baselines_are_the_recorded_ones(controller):
     defaults, recorded = abs_hil.keys(), abs_hil.keys(config=TUNED / f'{controller}.toml')
     assert recorded == defaults

@@ -22,12 +22,6 @@ ControlOptions with_own_gains(const ControlOptions& options) {
   return result;
 }
 
-/// d phi / d slip of (10).
-double force_slope(const rig::TyreParameters& tyre, double slip) noexcept {
-  const double stretched = tyre.B * slip;
-  return tyre.B * tyre.C * std::cos(tyre.C * std::atan(stretched)) / (1.0 + stretched * stretched);
-}
-
 }  // namespace
 
 AdaptiveActuatorController::AdaptiveActuatorController(const ControllerContext& context)
@@ -110,7 +104,8 @@ double AdaptiveActuatorController::wanted_rate_m_s3(const SlipInput& input, doub
       wheel_motion(wheels_, input.speeds, input.slip, input.slip_ref,
                    {.tyre_force_N = theta_.theta_N() * phi, .brake_torque_Nm = input.brake_torque_Nm}, v_min_m_s_);
   return paper::Laws<double>::nu(gains_, error_m_s, motion.error_rate_m_s2) + k * phi * zeta_rate +
-         k * theta_.theta_N() * force_slope(tyre_, input.slip) * motion.slip_rate_per_s + motion.drift_rate_m_s3;
+         k * theta_.theta_N() * rig::normalised_tyre_force_slope(tyre_, input.slip) * motion.slip_rate_per_s +
+         motion.drift_rate_m_s3;
 }
 
 /// Effect on it of each newton of phi (theta - theta_hat), which the model does not know: the factor a of the header.
@@ -124,7 +119,7 @@ double AdaptiveActuatorController::wanted_rate_per_theta(const SlipInput& input)
   const double lower = w.r2_m / w.J2_kg_m2;
   const double drift_rate = -upper * upper * w.d1_Nms_rad - (1.0 - input.slip_ref) * lower * lower * w.d2_Nms_rad;
   return gains_.ks1 * k + k * phi * gains_.gamma * gains_.ka1 +
-         k * theta_.theta_N() * force_slope(tyre_, input.slip) * slip_rate + drift_rate;
+         k * theta_.theta_N() * rig::normalised_tyre_force_slope(tyre_, input.slip) * slip_rate + drift_rate;
 }
 
 double AdaptiveActuatorController::through_lag(const SlipInput& input, double wanted_Nm, double error_m_s) noexcept {

@@ -15,6 +15,7 @@
 #include "control/nominal_controller.hpp"
 #include "control/pi_controller.hpp"
 #include "control/relay_controller.hpp"
+#include "control/sliding_mode_actuator_controller.hpp"
 #include "control/sliding_mode_controller.hpp"
 #include "control/smooth_sliding_mode_controller.hpp"
 #include "control/super_twisting_controller.hpp"
@@ -35,6 +36,8 @@ constexpr std::array own_table{
     controller_entry<SlidingModeController>("sliding-mode",
                                             "textbook sliding mode, the paper's own baseline is not public: chatters"),
     controller_entry<SmoothSlidingModeController>("sliding-mode-smooth", "sliding mode with a boundary layer"),
+    controller_entry<SlidingModeActuatorController>("sliding-mode-actuator",
+                                                    "sliding mode that steps back through the brake's lag (6)"),
     controller_entry<SuperTwistingController>("super-twisting", "second-order sliding mode with a continuous torque"),
     controller_entry<PiController>("pi", "speed-scheduled PI with the measured tyre force fed forward"),
     controller_entry<RelayController>("relay",

@@ -15,6 +15,12 @@ double boundary_layer_motion_m_s(double error_m_s, double gain_m_s2, double widt
   return std::copysign(std::min(size, width_m_s) * std::exp(-gain_m_s2 / width_m_s * inside_s), error_m_s);
 }
 
+WantedMotion boundary_layer_reference(double error_m_s, double gain_m_s2, double width_m_s, double period_s) noexcept {
+  const double error_at_end_m_s = boundary_layer_motion_m_s(error_m_s, gain_m_s2, width_m_s, period_s);
+  return {.mean_rate_m_s2 = (error_at_end_m_s - error_m_s) / period_s,
+          .error_at_mid_m_s = boundary_layer_motion_m_s(error_m_s, gain_m_s2, width_m_s, 0.5 * period_s)};
+}
+
 SmoothSlidingModeController::SmoothSlidingModeController(const ControllerContext& context)
     : surface_{context, context.options.sliding_mode_smooth.adaptation},
       gain_m_s2_{context.options.sliding_mode_smooth.gain_m_s2},
@@ -24,11 +30,7 @@ SmoothSlidingModeController::SmoothSlidingModeController(const ControllerContext
 
 SlipOutput SmoothSlidingModeController::step(const SlipInput& input) noexcept {
   const double error_m_s = surface_.observe(input);
-  const double period_s = surface_.period_s();
-  const double error_at_end_m_s = boundary_layer_motion_m_s(error_m_s, gain_m_s2_, width_m_s_, period_s);
-  const WantedMotion wanted{
-      .mean_rate_m_s2 = (error_at_end_m_s - error_m_s) / period_s,
-      .error_at_mid_m_s = boundary_layer_motion_m_s(error_m_s, gain_m_s2_, width_m_s_, 0.5 * period_s)};
+  const WantedMotion wanted = boundary_layer_reference(error_m_s, gain_m_s2_, width_m_s_, surface_.period_s());
   return surface_.drive(input, error_m_s, wanted, -wanted.mean_rate_m_s2 / gain_m_s2_);
 }
 

@@ -9,6 +9,10 @@ namespace abs_hil::control {
 [[nodiscard]] double boundary_layer_motion_m_s(double error_m_s, double gain_m_s2, double width_m_s,
                                                double time_s) noexcept;
 
+/// The motion of e_v over a period, by that solution. Real-time safe.
+[[nodiscard]] WantedMotion boundary_layer_reference(double error_m_s, double gain_m_s2, double width_m_s,
+                                                    double period_s) noexcept;
+
 /// SlidingModeController with a boundary layer: sat(e_v/width) replaces sign(e_v), so that the torque is continuous in
 /// e_v. The law of the paper's own sliding-mode baseline is not public. In sampled form the mean of e_v' over a period
 /// is that of the closed-form solution above. This is stable for any width and rate. For width -> 0 it becomes the

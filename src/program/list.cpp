@@ -16,7 +16,7 @@ namespace abs_hil::program {
 
 namespace {
 
-void print(std::string_view name, std::string_view summary) { fmt::print("  {:<20}{}\n", name, summary); }
+void print(std::string_view name, std::string_view summary) { fmt::print("  {:<21} {}\n", name, summary); }
 
 /// The controllers' own signals. They may depend on options, which are the defaults here.
 void list_signals() {

@@ -122,7 +122,8 @@ TEST_CASE("groups have the order of recorded configurations") {
                                            "realtime", "telemetry", "unsafe", "run"});
   CHECK(controllers == std::vector<std::string>{"controller", "rate_Hz", "slip_ref", "v_min_m_s", "adaptive", "nominal",
                                                 "observer", "sliding_mode", "sliding_mode_smooth", "super_twisting",
-                                                "relay", "pi", "five_phase", "adaptive_actuator", "adaptive_peak"});
+                                                "relay", "pi", "five_phase", "adaptive_actuator", "adaptive_peak",
+                                                "sliding_mode_actuator"});
 }
 
 TEST_CASE("options that act only when braking begins are marked as start values") {
@@ -132,8 +133,8 @@ TEST_CASE("options that act only when braking begins are marked as start values"
     if (key.start_value) marked.insert(key.name);
   }
   CHECK(marked == std::set<std::string>{"control.adaptive.zeta0", "control.adaptive_actuator.zeta0",
-                                        "control.sliding_mode.theta0_N", "control.sliding_mode_smooth.theta0_N",
-                                        "control.super_twisting.theta0_N"});
+                                        "control.sliding_mode.theta0_N", "control.sliding_mode_actuator.theta0_N",
+                                        "control.sliding_mode_smooth.theta0_N", "control.super_twisting.theta0_N"});
 }
 
 TEST_CASE("the names that scripts rely on exist") {

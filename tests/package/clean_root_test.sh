@@ -23,7 +23,7 @@ root=$1
 chmod 755 "$root"  # mktemp's is closed to others than root, and so were everything in it
 mirror=${DEBIAN_MIRROR:-http://deb.debian.org/debian}
 step() { echo "clean root: $*, at $SECONDS s"; }
-inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/srv LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"; }
+inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/srv LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive PIP_CERT=/etc/ssl/certs/ca-certificates.crt "$@"; }
 
 if [ ! -e "$root/etc/debian_version" ]; then
   step "debootstrap"
@@ -31,6 +31,10 @@ if [ ! -e "$root/etc/debian_version" ]; then
   rm -f "$root.log"
 fi
 cp /etc/resolv.conf "$root/etc/resolv.conf"
+# The certificates that this computer trusts: its mirrors of the package registries may have their own.
+cp /etc/ssl/certs/ca-certificates.crt "$root/etc/ssl/certs/ca-certificates.crt"
+# A mount of its own, as the root of a computer is one: programs in there make namespaces.
+mount --bind "$root" "$root"
 mount -t proc proc "$root/proc"
 mount -t sysfs sys "$root/sys"
 mount --rbind /dev "$root/dev"

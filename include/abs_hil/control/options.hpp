@@ -58,6 +58,20 @@ struct AdaptiveActuatorOptions {
   ABS_HIL_GROUP(ForceObserverOptions, observer, "", {});
 };
 
+/// Sliding mode with a boundary layer, stepped back through the brake's lag.
+struct SlidingModeActuatorOptions {
+  ABS_HIL_OPTIONS(SlidingModeActuatorOptions);
+  ABS_HIL_OPTION(double, gain_m_s2, 30.0, .unit = "m/s^2", .meaning = "K of -K sat(e_v/width)",
+                 .range = rig::positive(200), .search = rig::search(0.5, 100));
+  ABS_HIL_OPTION(double, boundary_m_s, 0.5, .unit = "m/s", .meaning = "width of the boundary layer in e_v",
+                 .range = rig::between(1e-3, 10), .search = rig::search(0.01, 5));
+  ABS_HIL_OPTION(double, lag_gain_per_s, 100.0, .unit = "1/s",
+                 .meaning = "decay of the torque error that the brake's lag leaves", .range = rig::positive(1e4),
+                 .search = rig::search(10, 500));
+  ABS_HIL_GROUP(SwitchingAdaptationOptions, adaptation, "", {.gamma = 30.0, .theta0_N = 23.0});
+  ABS_HIL_GROUP(ForceObserverOptions, observer, "", {});
+};
+
 /// SlipPeakEstimator: initial values of the tyre curve, and how fast they may change.
 struct SlipPeakOptions {
   ABS_HIL_OPTIONS(SlipPeakOptions);
@@ -144,6 +158,7 @@ struct ControlOptions {
   ABS_HIL_GROUP(FivePhaseOptions, five_phase, "five_phase.", {});
   ABS_HIL_GROUP(AdaptiveActuatorOptions, adaptive_actuator, "adaptive_actuator.", {});
   ABS_HIL_GROUP(AdaptivePeakOptions, adaptive_peak, "adaptive_peak.", {});
+  ABS_HIL_GROUP(SlidingModeActuatorOptions, sliding_mode_actuator, "sliding_mode_actuator.", {});
 };
 
 }  // namespace abs_hil::control

@@ -15,6 +15,12 @@ namespace abs_hil::rig {
   return std::sin(tyre.C * std::atan(tyre.B * slip));
 }
 
+/// d phi / d slip of (10). Real-time safe.
+[[nodiscard]] inline double normalised_tyre_force_slope(const TyreParameters& tyre, double slip) noexcept {
+  const double stretched = tyre.B * slip;
+  return tyre.B * tyre.C * std::cos(tyre.C * std::atan(stretched)) / (1.0 + stretched * stretched);
+}
+
 /// Slip at which phi reaches its peak of 1: tan(pi / 2C) / B. For C <= 1 phi has no interior peak, and the result is 1
 /// (a locked wheel).
 [[nodiscard]] inline double peak_slip(const TyreParameters& tyre) noexcept {
