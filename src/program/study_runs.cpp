@@ -1,0 +1,96 @@
+#include "program/study_runs.hpp"
+
+#include <fmt/format.h>
+
+#include <string_view>
+#include <utility>
+
+#include "config/config_error.hpp"
+#include "config/key_table.hpp"
+#include "config/series.hpp"
+#include "program/questions.hpp"
+#include "program/subcommands.hpp"
+#include "study/workbench.hpp"
+
+namespace abs_hil::program {
+
+namespace {
+
+std::string text_of(const config::Key& key) {
+  return std::visit([](const auto* value) { return fmt::format("{}", *value); }, key.target);
+}
+
+/// The assignments that make `wanted` of `given`.
+std::vector<std::string> changes(config::Settings given, config::Settings wanted) {
+  const config::KeyTable from(given);
+  const config::KeyTable to(wanted);
+  std::vector<std::string> assignments;
+  std::vector<std::string> after;
+  for (std::size_t i = 0; i < to.keys().size(); ++i) {
+    const config::Key& key = to.keys()[i];
+    if (text_of(key) == text_of(from.keys()[i])) continue;
+    assignments.push_back(key.name + '=' + text_of(key));
+    // Otherwise the model would follow the plant.
+    if (const config::Key* model = config::model_key(to.keys(), key.name)) {
+      after.push_back(model->name + '=' + text_of(*model));
+    }
+  }
+  assignments.insert(assignments.end(), after.begin(), after.end());
+  return assignments;
+}
+
+}  // namespace
+
+RunOptions options_of_case(const study::StudyScript& script, const std::string& plant, const std::string& experiment) {
+  RunOptions options{.plant = plant, .model = script.model, .experiment = experiment};
+  options.defaults.push_back(fmt::format("experiment.start_speed_rad_s={}", study_start_speed_rad_s));
+  for (const config::Setting& setting : script.settings) {
+    options.assignments.push_back(setting.key + '=' + config::text_of(setting.value));
+  }
+  options.outputs.fast = true;
+  options.outputs.no_lcm = true;
+  return options;
+}
+
+study::Study make_study(study::StudyScript script) {
+  std::vector<study::StudyCase> cases;
+  for (const std::string& plant : script.plants) {
+    for (const std::string& experiment : script.experiments) {
+      RunRequest request = merge(options_of_case(script, plant, experiment));
+      if (request.script->series.given) {
+        throw config::ConfigError(fmt::format(
+            "{}: experiment {} is a series of runs; name experiments without [series]", script.path, experiment));
+      }
+      check_questions(request);
+      cases.push_back({.plant = plant, .experiment = experiment, .settings = std::move(request.settings)});
+    }
+  }
+  return {std::move(script), std::move(cases)};
+}
+
+void require_run(const study::Study& study, std::uint64_t number) {
+  if (number < study.runs()) return;
+  throw config::ConfigError(
+      fmt::format("--run {}: there are {} runs; give a number in [0, {}]", number, study.runs(), study.runs() - 1));
+}
+
+int record_run(const study::Study& study, std::uint64_t number, RunOptions options,
+               const std::optional<std::string>& folder, const std::vector<std::string>& command_line) {
+  const study::RunIndex index = study.index_of(number);
+  study::Workbench bench(study);
+  config::Settings wanted = bench.settings_of(index);
+  const study::Workbench::Drawn drawn = bench.drawn(index);
+  wanted.plant = drawn.plant;
+  wanted.sensor_seed = std::to_string(drawn.seed);
+  options.outputs.fast = true;
+  options.outputs.no_lcm = true;
+  options.outputs.run_folder = folder;
+  for (std::string& change : changes(merged_settings(options), wanted)) {
+    options.assignments.push_back(std::move(change));
+  }
+  RunRequest request = merge(options);
+  request.command_line = command_line;
+  return run(request);
+}
+
+}  // namespace abs_hil::program
