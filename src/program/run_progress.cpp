@@ -34,7 +34,7 @@ void RunProgress::show(std::uint64_t done) {
 
 std::string duration_text(double seconds) {
   if (seconds < 1.0) return fmt::format("{:.0f} ms", 1e3 * seconds);
-  if (seconds < 90.0) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 90.0) return fmt::format("{:.{}f} s", seconds, seconds < 10.0 ? 1 : 0);
   if (seconds < 5400.0) return fmt::format("{:.0f} min", seconds / 60.0);
   return fmt::format("{:.1f} h", seconds / 3600.0);
 }

@@ -44,7 +44,8 @@ void add_submit(cli::Parser& study, StudyCommand& command) {
 }  // namespace
 
 void add_study(cli::Parser& parser, StudyCommand& command) {
-  command.parser = parser.add_subcommand("study", "simulate many runs that a file describes; again continues");
+  command.parser = parser.add_subcommand(
+      "study", "simulate the runs that a file describes; repeat the command to go on after an interruption");
   command.parser.add({.names = "file", .to = &command.file, .help = "the study (docs/studies.md)", .type = "FILE"});
   command.parser.add({.names = "--out",
                       .to = &command.folder,

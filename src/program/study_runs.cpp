@@ -74,21 +74,40 @@ void require_run(const study::Study& study, std::uint64_t number) {
       fmt::format("--run {}: there are {} runs; give a number in [0, {}]", number, study.runs(), study.runs() - 1));
 }
 
-int record_run(const study::Study& study, std::uint64_t number, RunOptions options,
-               const std::optional<std::string>& folder, const std::vector<std::string>& command_line) {
+namespace {
+
+/// The options of a run's case, with what makes the run of them.
+RunOptions with_run(RunOptions options, const study::Study& study, std::uint64_t number) {
   const study::RunIndex index = study.index_of(number);
   study::Workbench bench(study);
   config::Settings wanted = bench.settings_of(index);
   const study::Workbench::Drawn drawn = bench.drawn(index);
   wanted.plant = drawn.plant;
   wanted.sensor_seed = std::to_string(drawn.seed);
-  options.outputs.fast = true;
-  options.outputs.no_lcm = true;
-  options.outputs.run_folder = folder;
   for (std::string& change : changes(merged_settings(options), wanted)) {
     options.assignments.push_back(std::move(change));
   }
-  RunRequest request = merge(options);
+  return options;
+}
+
+}  // namespace
+
+RunOptions options_of_run(const study::Study& study, std::uint64_t number) {
+  require_run(study, number);
+  const study::StudyCase& one = study.cases()[study.index_of(number).study_case];
+  RunOptions options = options_of_case(study.script(), one.plant, one.experiment);
+  // Below everything else, as a default is.
+  options.assignments.insert(options.assignments.begin(), options.defaults.begin(), options.defaults.end());
+  options.defaults.clear();
+  return with_run(std::move(options), study, number);
+}
+
+int record_run(const study::Study& study, std::uint64_t number, RunOptions options,
+               const std::optional<std::string>& folder, const std::vector<std::string>& command_line) {
+  options.outputs.fast = true;
+  options.outputs.no_lcm = true;
+  options.outputs.run_folder = folder;
+  RunRequest request = merge(with_run(std::move(options), study, number));
   request.command_line = command_line;
   return run(request);
 }

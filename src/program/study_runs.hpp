@@ -23,6 +23,10 @@ inline constexpr double study_start_speed_rad_s = 170.0;
 /// Throws config::ConfigError unless the study has a run of this number.
 void require_run(const study::Study& study, std::uint64_t number);
 
+/// The options that repeat one run of a study, the hold phase after braking included.
+/// Throws config::ConfigError unless the study has a run of this number.
+[[nodiscard]] RunOptions options_of_run(const study::Study& study, std::uint64_t number);
+
 /// Repeats one run of a study with everything recorded in a run folder, as `abs_hil --fast --out FOLDER` does: from the
 /// beginning to the end of its experiment. Its config.toml repeats it once more. Returns the run's exit status.
 /// @param number  of a run that the study has

@@ -41,6 +41,25 @@ std::string gzip_member(std::string_view content, const std::string& comment) {
   return packed;
 }
 
+std::string gzip_comment(std::string_view bytes) {
+  z_stream stream{};
+  if (inflateInit2(&stream, gzip_window) != Z_OK) throw std::runtime_error("zlib cannot start to read");
+  std::vector<char> comment(bytes.size() + 1);
+  gz_header header{};
+  header.comment = bytes_of(comment.data());
+  header.comm_max = static_cast<uInt>(bytes.size());
+  inflateGetHeader(&stream, &header);
+  std::array<char, 1> nothing{};
+  stream.next_in = bytes_of(bytes.data());
+  stream.avail_in = static_cast<uInt>(bytes.size());
+  stream.next_out = bytes_of(nothing.data());
+  stream.avail_out = static_cast<uInt>(nothing.size());
+  inflate(&stream, Z_BLOCK);  // ends behind the header
+  inflateEnd(&stream);
+  if (header.done != 1 || comment.front() == '\0') throw std::runtime_error("no gzip file with a comment");
+  return comment.data();
+}
+
 GzipMember read_gzip_member(std::string_view bytes) {
   z_stream stream{};
   if (inflateInit2(&stream, gzip_window) != Z_OK) throw std::runtime_error("zlib cannot start to read");

@@ -10,6 +10,10 @@ namespace abs_hil::study {
 /// @param comment  kept in the member's header, where readers of the content do not see it; without NUL
 [[nodiscard]] std::string gzip_member(std::string_view content, const std::string& comment);
 
+/// The comment of the first member. @param bytes  the beginning of a gzip file, at least its first header
+/// Throws std::runtime_error for anything else, and for a header without comment.
+[[nodiscard]] std::string gzip_comment(std::string_view bytes);
+
 struct GzipMember {
   std::string comment{};
   std::string content{};

@@ -6,7 +6,7 @@
 #include <array>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
+#include <iterator>
 #include <stdexcept>
 
 #include "config/config_error.hpp"
@@ -143,15 +143,11 @@ StudyScript parse_study(std::string text, std::string path) {
 StudyScript load_study(const std::string& path) {
   std::error_code error;
   std::ifstream file(path, std::ios::binary);
-  std::stringstream text;
-  if (std::filesystem::is_regular_file(path, error)) text << file.rdbuf();
-  if (!file || text.str().empty()) {
+  if (!std::filesystem::is_regular_file(path, error) || !file) {
     throw config::ConfigError(
-        fmt::format("{}: no such file, or it is empty or cannot be read; give a study, a TOML "
-                    "file (docs/studies.md)",
-                    path));
+        fmt::format("{}: no such file, or it cannot be read; give a study, a TOML file (docs/studies.md)", path));
   }
-  return parse_study(text.str(), path);
+  return parse_study({std::istreambuf_iterator<char>(file), {}}, path);
 }
 
 }  // namespace abs_hil::study

@@ -12,10 +12,10 @@ import sys
 import time
 import unittest
 
-KILLS = int(sys.argv.pop(2)) if len(sys.argv) > 2 and sys.argv[2].isdigit() else 4
-
 import program
 from program import PROGRAM, ProgramTest
+
+KILLS = int(sys.argv.pop(1)) if sys.argv[1:] and sys.argv[1].isdigit() else 4
 
 STUDY = '''
 controllers = ["adaptive", "pi"]
