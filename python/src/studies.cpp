@@ -32,12 +32,13 @@ std::uint64_t run_study(const std::string& file, const std::string& name, const 
   for (const std::uint64_t chunk : chunks) runs += study.runs_in(chunk);
   const std::uint64_t step = std::max<std::uint64_t>(1, runs / 100);
   if (threads == 0) threads = study::machine_threads();
-  const study::Tally tally = study::compute(study, results, chunks, threads, [&](std::uint64_t done) {
-    if (done % step != 0 && done != runs) return;
-    const py::gil_scoped_acquire gil;
-    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-    if (progress) progress(done, runs);
-  });
+  const study::Tally tally =
+      study::compute(study, results, chunks, threads, program::own_metrics, [&](std::uint64_t done) {
+        if (done % step != 0 && done != runs) return;
+        const py::gil_scoped_acquire gil;
+        if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+        if (progress) progress(done, runs);
+      });
   if (of == 1) results.merge({});
   return tally.runs;
 }

@@ -27,7 +27,7 @@ void RunProgress::show(std::uint64_t done) {
   shown_ = now;
   const double spent_s = std::chrono::duration<double>(now - start_).count();
   const double rate_Hz = static_cast<double>(done) / spent_s;
-  fmt::print(stderr, "\r\033[K{} of {} runs, {:.3g} runs/s, {} left", done, runs_, rate_Hz,
+  fmt::print(stderr, "\r\033[K{} of {} runs, {:.0f} runs/s, {} left", done, runs_, rate_Hz,
              duration_text(static_cast<double>(runs_ - done) / rate_Hz));
   std::fflush(stderr);
 }

@@ -116,7 +116,8 @@ int run_study(const StudyCommand& command) {
   {
     RunProgress progress(runs);
     const std::size_t threads = command.threads > 0 ? command.threads : study::machine_threads();
-    tally = study::compute(study, folder, chunks, threads, [&](std::uint64_t done) { progress.show(done); });
+    tally =
+        study::compute(study, folder, chunks, threads, own_metrics, [&](std::uint64_t done) { progress.show(done); });
   }
   const double spent_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const std::string path = folder.path().string();

@@ -20,6 +20,9 @@ inline constexpr double study_start_speed_rad_s = 170.0;
 /// The study with its plants and experiments looked up. Throws config::ConfigError and std::invalid_argument.
 [[nodiscard]] study::Study make_study(study::StudyScript script);
 
+/// The study's own metrics of one run, from its records; the run goes on to the end of its experiment.
+[[nodiscard]] std::vector<double> own_metrics(const study::Study& study, std::uint64_t number);
+
 /// Throws config::ConfigError unless the study has a run of this number.
 void require_run(const study::Study& study, std::uint64_t number);
 

@@ -35,10 +35,11 @@ std::vector<std::string> result_columns(const Study& study) {
   for (const Factor& factor : study.script().factors) columns.push_back(factor.key);
   columns.insert(columns.end(), {"result", "reason"});
   for (const auto& [name, field] : analysis::metric_fields) columns.emplace_back(name);
+  for (const SignalMetric& metric : study.script().metrics) columns.push_back(metric.name);
   return columns;
 }
 
-std::string result_row(const Study& study, std::uint64_t run, const Outcome& outcome) {
+std::string result_row(const Study& study, std::uint64_t run, const Outcome& outcome, const std::vector<double>& own) {
   const RunIndex index = study.index_of(run);
   const StudyCase& one = study.cases()[index.study_case];
   std::string row;
@@ -52,6 +53,9 @@ std::string result_row(const Study& study, std::uint64_t run, const Outcome& out
   fmt::format_to(out, ",{},{}", result_of(outcome), reason);
   for (const auto& [name, field] : analysis::metric_fields) {
     fmt::format_to(out, ",{}", outcome.refusal.empty() ? outcome.run.metrics.*field : rig::unknown);
+  }
+  for (std::size_t i = 0; i < study.script().metrics.size(); ++i) {
+    fmt::format_to(out, ",{}", own.empty() ? rig::unknown : own[i]);
   }
   return row + '\n';
 }

@@ -7,8 +7,11 @@
 #include <utility>
 
 #include "abs_hil/control/registry.hpp"
+#include "abs_hil/rig/quantities.hpp"
 #include "config/config_error.hpp"
 #include "config/library.hpp"
+#include "rig/nearest_name.hpp"
+#include "study/result_rows.hpp"
 
 namespace abs_hil::study {
 
@@ -71,8 +74,35 @@ Study::Study(StudyScript script, std::vector<StudyCase> cases)
     }
     contenders_.push_back(contenders_of(script_.controllers, one.settings));
   }
+  check_metrics();
   runs_ = cases_.size() * level_combinations_ * design_.rows() * script_.repeat * contenders_.front().size();
   shares_settings_ = can_share_settings();
+}
+
+void Study::check_metrics() const {
+  std::vector<std::string> taken = result_columns(*this);
+  taken.resize(taken.size() - script_.metrics.size());
+  std::vector<std::string_view> known(rig::csv_columns.begin(), rig::csv_columns.end());
+  for (const Contender& contender : contenders_.front()) {
+    const config::Settings& s = contender.settings;
+    for (const rig::Signal& signal : control::make_controller(s.control.controller, {s.control, s.model})->signals()) {
+      known.push_back(signal.name);
+    }
+  }
+  for (const SignalMetric& metric : script_.metrics) {
+    const std::string place = fmt::format("{}:{}:{}", script_.path, metric.place.line, metric.place.column);
+    if (std::ranges::find(known, metric.of) == known.end()) {
+      throw config::ConfigError(
+          fmt::format("{}: of = \"{}\": no column of a run's CSV and no signal of the study's "
+                      "controllers; the nearest is \"{}\"",
+                      place, metric.of, rig::nearest_name(metric.of, known)));
+    }
+    if (std::ranges::find(taken, metric.name) != taken.end()) {
+      throw config::ConfigError(
+          fmt::format("{}: the results have a column {} already; give the metric another name", place, metric.name));
+    }
+    taken.push_back(metric.name);
+  }
 }
 
 bool Study::can_share_settings() const {

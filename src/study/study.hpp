@@ -63,6 +63,7 @@ class Study {
   [[nodiscard]] bool shares_settings() const noexcept { return shares_settings_; }
 
  private:
+  void check_metrics() const;
   [[nodiscard]] bool can_share_settings() const;
 
   StudyScript script_;

@@ -16,6 +16,11 @@ Field row(Shape shape, const rig::OptionFacts& facts, const Grammar* grammar = n
   return {.facts = facts, .shape = shape, .quantity = Quantity::none, .grammar = grammar};
 }
 
+Field row(Shape shape, rig::OptionFacts facts, Quantity quantity) {
+  facts.unit = config::unit_of(quantity);
+  return {.facts = facts, .shape = shape, .quantity = quantity};
+}
+
 Field required(Field field) {
   field.required = true;
   return field;
@@ -44,6 +49,8 @@ const Grammar& study_grammar() {
               &design_grammar()),
           row(Shape::table, {.key = "repeat", .meaning = "every point is run on several varied plants"},
               &repeat_grammar()),
+          row(Shape::tables, {.key = "metric", .meaning = "figures made of signals, beside those of every run"},
+              &metric_grammar()),
           row(Shape::grid, {.key = "factors", .meaning = "configuration values in which the runs differ"}),
       }};
   return grammar;
@@ -73,6 +80,29 @@ const Grammar& repeat_grammar() {
               row(Shape::whole, {.key = "runs", .meaning = "how many varied plants", .range = rig::between(1, 1e9)})),
           row(Shape::text, {.key = "vary", .meaning = "what varies, as after compare --vary"}),
           row(Shape::whole, {.key = "seed", .meaning = "seed of the varied plants; without: 1", .range = seeds}),
+      }};
+  return grammar;
+}
+
+const Grammar& metric_grammar() {
+  static const Grammar grammar{
+      "[[metric]]",
+      "One number made of a signal's values in a phase",
+      {
+          required(row(Shape::text, {.key = "name", .meaning = "of its column in the results"})),
+          required(row(Shape::text, {.key = "of", .meaning = "a column of a run's CSV, or a controller's signal"})),
+          required(row(Shape::choice, {.key = "take",
+                                       .meaning = "what is made of the values",
+                                       .allowed = {"max", "min", "mean", "rms", "last"}})),
+          row(Shape::choice, {.key = "phase",
+                              .meaning = "in which kind of phase; without: brake",
+                              .allowed = {"accelerate", "coast", "brake", "hold", "stopped"}}),
+          row(Shape::number,
+              {.key = "after", .meaning = "from this time after its begin on", .range = rig::from_zero(600)},
+              Quantity::time),
+          row(Shape::number,
+              {.key = "above", .meaning = "only while the car is faster than this", .range = rig::from_zero(200)},
+              Quantity::speed),
       }};
   return grammar;
 }

@@ -31,6 +31,14 @@ constexpr std::array<std::pair<std::string_view, DesignKind>, 5> design_names{{
     {"saltelli", DesignKind::saltelli},
 }};
 
+constexpr std::array<std::pair<std::string_view, Reduction>, 5> reductions{{
+    {"max", Reduction::max},
+    {"min", Reduction::min},
+    {"mean", Reduction::mean},
+    {"rms", Reduction::rms},
+    {"last", Reduction::last},
+}};
+
 std::uint64_t whole_or(const TableReader& reader, std::string_view name, std::uint64_t otherwise) {
   const Entry* entry = reader.find(name);
   return entry == nullptr ? otherwise : static_cast<std::uint64_t>(reader.whole(*entry));
@@ -58,6 +66,9 @@ class StudyParser {
     }
     script_.chunk = whole_or(root, "chunk", script_.chunk);
     script_.settings = read_settings(source_, root);
+    if (const Entry* metrics = root.find("metric")) {
+      for (const toml::table* metric : root.tables(*metrics)) read_metric(*metric, metrics->place);
+    }
     if (const Entry* factors = root.find("factors")) script_.factors = read_factors(source_, root.table(*factors));
     read_design(root);
     if (const Entry* repeat = root.find("repeat")) read_repeat(root.table(*repeat), repeat->place);
@@ -74,6 +85,35 @@ class StudyParser {
         source_.fail(entry.place, error.what());
       }
     }
+  }
+
+  void read_metric(const toml::table& table, config::Place place) {
+    const TableReader reader(source_, table, metric_grammar(), place);
+    SignalMetric metric{.name = reader.text(*reader.find("name")),
+                        .of = reader.text(*reader.find("of")),
+                        .place = reader.find("of")->place};
+    if (!rig::is_signal_name(metric.name)) {
+      source_.fail(reader.find("name")->place,
+                   fmt::format("name = \"{}\": give letters, digits and _, a letter first, at most 32", metric.name));
+    }
+    const std::string take = reader.choice(*reader.find("take"));
+    metric.take = std::ranges::find(reductions, take, [](const auto& row) { return row.first; })->second;
+    if (const Entry* phase = reader.find("phase")) {
+      const std::string name = reader.choice(*phase);
+      for (const rig::Phase kind : {rig::Phase::accelerate, rig::Phase::coast, rig::Phase::hold, rig::Phase::stopped}) {
+        if (rig::name_of(kind) == name) metric.phase = kind;
+      }
+    }
+    metric.after_s = number_or_zero(reader, "after");
+    metric.above_m_s = number_or_zero(reader, "above");
+    script_.metrics.push_back(std::move(metric));
+  }
+
+  [[nodiscard]] double number_or_zero(const TableReader& reader, std::string_view name) const {
+    const auto number = reader.optional_number(name);
+    if (!number) return 0.0;
+    if (!number->key.empty()) source_.fail(number->place, fmt::format("{}: give a number, not a $key", name));
+    return number->value;
   }
 
   void read_design(const TableReader& root) {

@@ -8,6 +8,7 @@
 #include "config/script.hpp"
 #include "study/design.hpp"
 #include "study/factor.hpp"
+#include "study/signal_metrics.hpp"
 #include "study/variation.hpp"
 
 namespace abs_hil::study {
@@ -31,7 +32,8 @@ struct StudyScript {
   std::uint64_t repeat_seed{1};
   Variation variation{};
   std::vector<config::Setting> settings{};
-  std::vector<Factor> factors{};  ///< in the order of the file
+  std::vector<SignalMetric> metrics{};  ///< of its own, beside those of every run
+  std::vector<Factor> factors{};        ///< in the order of the file
 };
 
 /// Reads a study. Throws config::ConfigError with one line, "FILE:LINE:COLUMN: ...", which names the error and what is

@@ -103,6 +103,27 @@ class Study(ProgramTest):
         self.assertEqual(sorted(entry.name for entry in (self.folder / 'killed').iterdir()),
                          ['results.csv.gz', 'study.json', 'study.toml'])
 
+    @unittest.skipIf(KILLS < 30, 'takes a minute')
+    def test_memory_does_not_grow_with_the_runs(self):
+        largest_kB = []
+        for points in (10_000, 100_000):
+            self.study.write_text(f'''controllers = ["locked"]
+[settings]
+experiment.start_speed_rad_s = 155
+experiment.end_speed_m_s = 15.0
+[design]
+kind = "sobol"
+points = {points}
+[factors]
+plant.theta_N = {{ from = 15, to = 30 }}
+''')
+            process = subprocess.Popen([PROGRAM, 'study', self.study, '--out', self.folder / str(points)],
+                                       stdout=subprocess.DEVNULL)
+            _, status, used = os.wait4(process.pid, 0)
+            self.assertEqual(status, 0)
+            largest_kB.append(used.ru_maxrss)
+        self.assertLess(largest_kB[1] - largest_kB[0], 4096, largest_kB)  # 100,000 results alone are 12 MB
+
     def test_a_run_repeated_with_everything_recorded_has_the_row_s_figures(self):
         self.study.write_text(STUDY + 'plant.J1_kg_m2 = { mean = 0.0075, sd = 0.0005 }\nmodel.c31_per_s = [18.5]\n')
         self.complete()
@@ -158,6 +179,35 @@ class Study(ProgramTest):
             self.assertTrue(row['reason'])
             self.assertEqual(row['stop_time_s'], 'nan')
 
+    def test_metrics_of_one_s_own_are_those_of_the_recorded_run(self):
+        self.study.write_text('controllers = ["adaptive", "pi"]\n[factors]\nplant.theta_N = [20, 30]\n' + ''.join(
+            f'[[metric]]\nname = "{name}"\nof = "{of}"\ntake = "{take}"\n{rest}\n' for name, of, take, rest in (
+                ('a', 'brake_torque_Nm', 'max', ''), ('b', 'slip', 'rms', 'after_s = 0.3\nabove_m_s = 3'),
+                ('c', 'zeta_N', 'mean', ''), ('d', 'omega2_rad_s', 'last', 'phase = "hold"'),
+                ('e', 'slip', 'min', 'above_m_s = 5'))))
+        self.complete()
+        for number, row in enumerate(self.table()):
+            folder = self.folder / f'run{number}'
+            self.assertEqual(self.run_program('study', self.study, '--run', number, '--out', folder).returncode, 0)
+            rows = self.rows(folder / 'run.csv')
+            radius = 0.099
+            brake = [r for r in rows if r['phase'] == 'brake']
+            fast = [float(r['slip']) for r in brake if radius * float(r['omega2_rad_s']) > 3
+                    and float(r['time_s']) - float(brake[0]['time_s']) >= 0.3]
+            self.assertEqual(float(row['a']), max(float(r['brake_torque_Nm']) for r in brake))
+            self.assertAlmostEqual(float(row['b']), (sum(x * x for x in fast) / len(fast)) ** 0.5, places=12)
+            hold = [float(r['omega2_rad_s']) for r in rows if r['phase'] == 'hold']
+            self.assertEqual(row['d'] == 'nan', not hold)
+            if hold:
+                self.assertEqual(float(row['d']), hold[-1])
+            self.assertEqual(float(row['e']), min(float(r['slip']) for r in brake
+                                                  if radius * float(r['omega2_rad_s']) > 5))
+            if row['controller'] == 'adaptive':
+                zeta = [float(r['zeta_N']) for r in brake]
+                self.assertAlmostEqual(float(row['c']), sum(zeta) / len(zeta), places=10)
+            else:
+                self.assertEqual(row['c'], 'nan')
+
     def test_quiet_without_a_terminal(self):
         self.assertEqual(self.complete().stderr, '')
 
@@ -169,7 +219,9 @@ class Study(ProgramTest):
                             ('controllers = ["pi{zz=1}"]', ['zz']),
                             ('[factors]\nplant.thetaN = [1]', ['study.toml:2:7', 'plant.theta_N']),
                             ('[settings]\nrun.inject = "brake@encoder_upper:stuck"', ['injects no faults']),
-                            ('model = "moon"', ['moon'])):
+                            ('model = "moon"', ['moon']),
+                            ('[[metric]]\nname = "x"\nof = "slipp"\ntake = "max"', ['study.toml:3:6', '"slip"']),
+                            ('[[metric]]\nname = "slip_rms"\nof = "slip"\ntake = "max"', ['another name'])):
             self.study.write_text(text)
             result = self.run_program('study', self.study, '--out', self.folder / 'bad')
             self.assert_refused(result, words)

@@ -51,7 +51,7 @@ def check(program, folder, where, kind, text):
     if kind == 'configuration':
         calls = [('validate', 'paper', '--config', file)]
     elif kind == 'study':
-        calls = [('study', file, '--out', folder / 'study')]
+        calls = [('study', file, '--out', tempfile.mkdtemp(dir=folder))]
     else:
         calls = [('validate', file)]
         if not re.search(r'^\[(series|vary)\]', text, re.MULTILINE):

@@ -8,6 +8,7 @@
 #include "catch.hpp"
 #include "config/config_error.hpp"
 #include "study/compute.hpp"
+#include "study/durable_file.hpp"
 #include "study/gzip.hpp"
 #include "study/paper_plan.hpp"
 #include "study/result_rows.hpp"
@@ -47,7 +48,7 @@ std::string results_of(const StudyFolder& folder) { return bytes_of(folder.path(
 /// Computes a shard and returns its number of chunks.
 std::size_t compute_shard(const Study& study, const StudyFolder& folder, Shard shard, std::size_t threads = 1) {
   const std::vector<std::uint64_t> chunks = missing_chunks(folder, shard);
-  static_cast<void>(compute(study, folder, chunks, threads, {}));
+  static_cast<void>(compute(study, folder, chunks, threads, {}, {}));
   return chunks.size();
 }
 
@@ -142,6 +143,28 @@ TEST_CASE("a folder takes one study of one program") {
   CHECK(StudyFolder(scratch / "a").facts().columns == facts.columns);
   const StudyFolder other(scratch / "c", facts_of(small_study("# other\n"), "small"));
   CHECK_THROWS_AS(folder.merge({other}), config::ConfigError);
+}
+
+TEST_CASE("a durable file is not there before it is whole, and not at all if it is given up") {
+  const abs_hil::test::TemporaryFolder scratch;
+  const fs::path path = scratch / "chunk";
+  {
+    DurableFile given_up(path);
+    given_up.append("half");
+    CHECK_FALSE(fs::exists(path));
+  }
+  CHECK(fs::is_empty(scratch.path));
+  DurableFile first(path);
+  DurableFile second(path);  // of another task
+  first.append("whole");
+  second.append("whole");
+  CHECK_FALSE(fs::exists(path));
+  first.commit();
+  CHECK(bytes_of(path) == "whole");
+  second.commit();
+  CHECK(bytes_of(path) == "whole");
+  CHECK(std::distance(fs::directory_iterator(scratch.path), fs::directory_iterator()) == 1);
+  CHECK_THROWS_WITH(DurableFile((scratch / "none") / "chunk"), Contains("none"));
 }
 
 TEST_CASE("lists of chunks are short") {

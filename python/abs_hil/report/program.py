@@ -29,7 +29,8 @@ _MARK_BYTES = 4096
 def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser('abs_report', description='Turns runs into a page with figures and tables, a plain table, '
                                    'or exports their rows', allow_abbrev=False)
-    made.add_argument('runs', metavar='RUN', nargs='+', help='run folders, series folders, CSV files of runs; or a study\'s folder')
+    made.add_argument('runs', metavar='RUN', nargs='+',
+                      help='run folders, series folders, CSV files of runs; or the folder of a study')
     made.add_argument('--version', action='version', version=_core.version)
     made.add_argument('--output', metavar='FILE', default='',
                       help='file of the page (default: report.html) or of the exported rows (default: stdout)')
