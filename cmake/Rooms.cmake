@@ -19,7 +19,7 @@ set(ABS_HIL_ROOM_TABLE
   "run_folder | run folders: layout, environment, checksums, the index of a series, the reader of a run's CSV | rig"
   "diagnosis | the checks of `abs_hil doctor`, the verdict of `abs_hil latency` | rig driver runtime telemetry"
   "config | configuration keys from the option rows, files, experiment files: grammar, parser, schema, plan | rig control plant_sim driver runtime guardian experiment"
-  "study | simulated runs in this process, controllers side by side over varied plants | rig control plant_sim driver driver_sim runtime guardian experiment analysis config"
+  "study | simulated runs in this process: studies and their designs, chunks and folders, controllers side by side over varied plants | rig control plant_sim driver driver_sim runtime guardian experiment analysis run_folder config"
   "commands | remote commands over LCM: authority, listener, sender | rig control plant_sim driver runtime guardian experiment config telemetry lcmtypes"
   "replay | recorded runs through the cycle again: proof of equal commands, other controllers open loop | rig control plant_sim driver driver_sim runtime guardian experiment config telemetry lcmtypes"
   "guardian_program | the program abs_guardian: the guardian of one run, the resident service, systemd and suspension | cli rig control plant_sim driver runtime guardian experiment lcmtypes telemetry config"

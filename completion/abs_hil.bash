@@ -9,6 +9,11 @@ _abs_hil() {
   for word in "${COMP_WORDS[@]:1:COMP_CWORD-1}"; do
     case $word in -*) ;; *) [ -z "$subcommand" ] && [[ $previous != --* ]] && subcommand=$word ;; esac
   done
+  if [ "$subcommand" = study ]; then
+    for word in merge status submit; do
+      [[ " ${COMP_WORDS[*]:2:COMP_CWORD-2} " == *" $word "* ]] && subcommand="study $word"
+    done
+  fi
   case $previous in
     --backend) words="sim rig" ;;
     --rt) words="require prefer off" ;;
@@ -20,7 +25,8 @@ _abs_hil() {
     *)
       # shellcheck disable=SC2086  # no word at all where there is no subcommand
       words=$("$program" $subcommand --help 2>/dev/null | grep -oE '^ +(--?[a-zA-Z][a-z-]*|[a-z]+)' | tr -d ' ')
-      words+=" $("$program" ${subcommand:+"$subcommand"} --help 2>/dev/null | grep -oE -- '--[a-z-]+' | tr '\n' ' ')"
+      # shellcheck disable=SC2086
+      words+=" $("$program" $subcommand --help 2>/dev/null | grep -oE -- '--[a-z-]+' | tr '\n' ' ')"
       ;;
   esac
   mapfile -t COMPREPLY < <(compgen -W "$words" -- "$current")

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .network import live
     from .run import Run, Series, load, load_series
     from .simulation import Study, controllers, experiments, keys, plants, simulate, simulate_many
+    from .studies import StudyResults, load_study, simulate_run, study
 
 # Importing the types' modules has put modules under these names.
 globals().update(TYPES)
@@ -30,12 +31,13 @@ _LATER = {'hand': ('Controller', 'Plant', 'SlipInput', 'SlipOutput'),
           'identification': ('Identified', 'identify'),
           'network': ('live',),
           'run': ('Run', 'Series', 'load', 'load_series'),
-          'simulation': ('Study', 'controllers', 'experiments', 'keys', 'plants', 'simulate', 'simulate_many')}
+          'studies': ('StudyResults', 'load_study', 'simulate_run', 'study'),
+         'simulation': ('Study', 'controllers', 'experiments', 'keys', 'plants', 'simulate', 'simulate_many')}
 _MODULE_OF = {name: module for module, names in _LATER.items() for name in names}
 
 __all__ = ['PHASES', 'QUANTITIES', 'REASONS', 'TYPES', 'Controller', 'Identified', 'Plant', 'Run', 'Series', 'SlipInput',
-           'SlipOutput', 'Study', 'controllers', 'decode', 'experiments', 'identify', 'keys', 'live', 'load',
-           'load_series', 'plants', 'simulate', 'simulate_many']
+           'SlipOutput', 'Study', 'StudyResults', 'controllers', 'decode', 'experiments', 'identify', 'keys', 'live', 'load',
+           'load_series', 'load_study', 'plants', 'simulate', 'simulate_many', 'simulate_run', 'study']
 
 
 def __getattr__(name: str) -> Any:

@@ -20,6 +20,7 @@ void add_identification_filter(py::module_& module);
 void add_network(py::module_& module);
 void add_plant(py::module_& module);
 void add_simulation(py::module_& module);
+void add_studies(py::module_& module);
 void add_tables(py::module_& module);
 
 /// The options of a run from the arguments of abs_hil.simulate: text, or lists of text.

@@ -53,6 +53,7 @@ PYBIND11_MODULE(_core, module) {
   python::add_plant(module);
   python::add_simulation(module);
   python::add_episodes(module);
+  python::add_studies(module);
   python::add_files(module);
   python::add_identification(module);
   python::add_identification_filter(module);

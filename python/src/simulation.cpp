@@ -87,7 +87,7 @@ struct Study {
 
 study::Job job_of(const Study& study, const Job& job) {
   const config::Settings& s = study.settings[job.options];
-  if (!job.index) return {.settings = &s, .plant = s.plant, .seed = static_cast<std::uint64_t>(s.seed)};
+  if (!job.index) return {.settings = &s, .plant = s.plant, .seed = config::sensor_seed(s)};
   const study::Perturbation drawn = study::draw(study.variation, study.seed, *job.index);
   return {.settings = &s, .plant = study::perturbed(s.plant, drawn), .seed = drawn.sensor_seed};
 }

@@ -1,4 +1,4 @@
-"""The Python that docs/python.md and docs/learning.md show runs, block after block."""
+"""The Python that docs/python.md, docs/studies.md and docs/learning.md show runs, block after block."""
 import pathlib
 import re
 
@@ -7,7 +7,7 @@ import pytest
 DOCS = pathlib.Path(__file__).parents[2] / 'docs'
 
 
-@pytest.mark.parametrize('page, module', [('python.md', 'pandas'), ('learning.md', 'gymnasium')])
+@pytest.mark.parametrize('page, module', [('python.md', 'pandas'), ('studies.md', 'pandas'), ('learning.md', 'gymnasium')])
 def test_examples(page, module, monkeypatch):
     pytest.importorskip(module)
     monkeypatch.setenv('MPLBACKEND', 'agg')

@@ -1,7 +1,9 @@
 #include "analysis/statistics.hpp"
 
+#include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
 #include <vector>
@@ -44,6 +46,17 @@ Estimate estimate_mean(std::span<const double> values) {
   result.low = result.mean - half;
   result.high = result.mean + half;
   return result;
+}
+
+double quantile(std::span<const double> values, double probability) {
+  std::vector<double> sorted;
+  std::ranges::copy_if(values, std::back_inserter(sorted), [](double value) { return !std::isnan(value); });
+  if (sorted.empty()) return missing;
+  std::ranges::sort(sorted);
+  const double place = probability * static_cast<double>(sorted.size() - 1);
+  const auto below = static_cast<std::size_t>(place);
+  const std::size_t above = std::min(below + 1, sorted.size() - 1);
+  return std::lerp(sorted[below], sorted[above], place - static_cast<double>(below));
 }
 
 Estimate estimate_difference(std::span<const double> values, std::span<const double> base) {

@@ -21,6 +21,10 @@ struct Estimate {
 /// Mean of the values that are not NaN.
 [[nodiscard]] Estimate estimate_mean(std::span<const double> values);
 
+/// Quantile of the values that are not NaN, linear between two of them (NumPy's default); NaN without any.
+/// @param probability  in [0, 1]
+[[nodiscard]] double quantile(std::span<const double> values, double probability);
+
 /// Mean of `values[i] - base[i]` over the pairs without NaN. Common random numbers cancel, so that small differences
 /// show. Throws std::invalid_argument for unequal lengths.
 [[nodiscard]] Estimate estimate_difference(std::span<const double> values, std::span<const double> base);

@@ -58,12 +58,18 @@ struct Settings {
                  .meaning = "faults to inject, separated by commas (docs/fault-injection.md); never on hardware");
   ABS_HIL_OPTION(std::int64_t, seed, 1, .key = "run.seed", .meaning = "seed of everything random in the simulator",
                  .range = rig::from_zero(9e15));
+  /// A text, since the seeds that studies draw have all 64 bits.
+  ABS_HIL_OPTION(std::string, sensor_seed, "", .key = "run.sensor_seed",
+                 .meaning = "seed of the encoders' first positions, a whole number below 2^64; empty: run.seed");
   std::string plant_name{"paper-table1"};
   std::string model_name{};  ///< of the file that the model came from; empty: it follows the plant
   std::string backend{"sim"};
 
   [[nodiscard]] bool on_rig() const noexcept { return backend == "rig"; }
 };
+
+/// The seed of the encoders' first positions. Throws ConfigError for a text that is no such number.
+[[nodiscard]] std::uint64_t sensor_seed(const Settings& s);
 
 /// What the outputs of the settings' backend make of a command. Throws driver::Unavailable for an unknown board.
 [[nodiscard]] inline driver::OutputGrid output_grid(const Settings& s) {

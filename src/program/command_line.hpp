@@ -62,6 +62,8 @@ struct CompareOptions {
   std::optional<std::string> csv_file{};
   std::optional<std::string> markdown_file{};
   std::optional<std::string> runs_file{};
+  std::optional<int> recorded_run{};        ///< --run: repeat this run of each controller in place of the comparison
+  std::optional<std::string> run_folder{};  ///< --out: its folder
 };
 
 /// A completely specified run: its effective configuration and the files of its records.

@@ -42,6 +42,17 @@ cli::Parser add_compare(cli::Parser& parser, CompareOptions& o) {
   compare.add({.names = "--csv", .to = &o.csv_file, .help = "write the table as CSV", .type = "FILE"});
   compare.add({.names = "--markdown", .to = &o.markdown_file, .help = "write the table as Markdown", .type = "FILE"});
   compare.add({.names = "--runs", .to = &o.runs_file, .help = "write each run's results as CSV", .type = "FILE"});
+  compare.add({.names = "--run",
+               .to = &o.recorded_run,
+               .help = "repeat run K of each controller (see --runs) with everything recorded, and compare nothing",
+               .type = "K",
+               .range = {0, 999'999},
+               .excludes = {"--json", "--csv", "--markdown", "--runs"}});
+  compare.add({.names = "--out",
+               .to = &o.run_folder,
+               .help = "run folder of --run; with several controllers one below it for each",
+               .type = "DIR",
+               .needs = {"--run"}});
   compare.set_footer("To compare runs that are already recorded, use abs_report RUN RUN.");
   return compare;
 }

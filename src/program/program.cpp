@@ -21,6 +21,7 @@
 #include "program/run_arguments.hpp"
 #include "program/safe.hpp"
 #include "program/signals.hpp"
+#include "program/study_command.hpp"
 #include "program/subcommands.hpp"
 #include "telemetry/file_error.hpp"
 #include "telemetry/lcm_outlet.hpp"
@@ -50,6 +51,8 @@ int dispatch(int argc, char** argv) {
   program::add_latency(parser, latency);
   program::CompareOptions compare_options;
   const cli::Parser compare = program::add_compare(parser, compare_options);
+  program::StudyCommand study;
+  program::add_study(parser, study);
   program::ValidateCommand validate;
   program::add_validate(parser, validate);
   program::CommissionCommand commission;
@@ -85,7 +88,11 @@ int dispatch(int argc, char** argv) {
   }
   if (compare.parsed()) {
     refuse_run_options(parser, "compare");
-    return program::compare(compare_options);
+    return program::compare(compare_options, {argv, argv + argc});
+  }
+  if (study.parser.parsed()) {
+    refuse_run_options(parser, "study");
+    return program::study(study, {argv, argv + argc});
   }
   if (watch.parsed()) {
     refuse_run_options(parser, "watch");

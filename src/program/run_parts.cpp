@@ -14,7 +14,7 @@ namespace abs_hil::program {
 std::unique_ptr<driver::RigDriver> make_driver(const config::Settings& s, bool fast) {
   if (s.backend == "rig") return driver::make_rig_driver(s.driver, fast);
   return std::make_unique<driver::SimDriver>(
-      s.plant, driver::SimStart{.seed = static_cast<std::uint64_t>(s.seed),
+      s.plant, driver::SimStart{.seed = config::sensor_seed(s),
                                 .start_speed_rad_s = s.experiment.start_speed_rad_s,
                                 .pwm_mode = driver::pwm_mode_named(s.driver.sim.pwm_mode)});
 }

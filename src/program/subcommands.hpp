@@ -16,8 +16,9 @@ int run(const RunRequest& request);
 /// Runs the series of runs that `base.script` describes; each run is merged anew from the options as typed. Returns the
 /// exit status. Throws as `run`.
 int run_series(const RunOptions& options, const RunRequest& base);
-/// `abs_hil compare`: compares controllers in simulation. Throws config::ConfigError and std::invalid_argument.
-int compare(const CompareOptions& options);
+/// `abs_hil compare`: compares controllers in simulation, or records one run of the comparison. Throws
+/// config::ConfigError and std::invalid_argument.
+int compare(const CompareOptions& options, const std::vector<std::string>& command_line);
 /// `abs_hil list`: lists controllers, plants, experiments and backends, or all configuration keys.
 int list(bool keys);
 /// `abs_hil list --quantities`: prints the table of rig/quantities.hpp, as text or JSON.

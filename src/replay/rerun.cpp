@@ -280,7 +280,7 @@ std::vector<RerunCycle> rerun_open_loop(const RecordedRun& run, const config::Se
 
 std::vector<RerunCycle> rerun_simulation(const RecordedRun& run, const config::Settings& settings) {
   experiment::RunLogic logic(logic_parts(run, settings));
-  driver::SimDriver rig(settings.plant, {.seed = static_cast<std::uint64_t>(settings.seed),
+  driver::SimDriver rig(settings.plant, {.seed = config::sensor_seed(settings),
                                          .start_speed_rad_s = settings.experiment.start_speed_rad_s,
                                          .pwm_mode = driver::pwm_mode_named(settings.driver.sim.pwm_mode)});
   runtime::CommandGate gate = logic.make_gate(settings.gate);

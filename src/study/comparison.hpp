@@ -9,6 +9,7 @@
 #include "config/settings.hpp"
 #include "study/contender.hpp"
 #include "study/simulated_run.hpp"
+#include "study/study.hpp"
 #include "study/variation.hpp"
 
 namespace abs_hil::study {
@@ -22,6 +23,10 @@ struct ComparisonPlan {
   Variation variation{Variation::standard()};
   std::size_t threads{1};
 };
+
+/// The plan as a study of one case: run k * controllers + c is controller c on perturbation k. Throws
+/// std::invalid_argument and config::ConfigError as `contenders_of`, and for zero runs and unusable options.
+[[nodiscard]] Study study_of(const ComparisonPlan& plan);
 
 /// The controllers of a plan with their settings. Throws std::invalid_argument and config::ConfigError for an unknown
 /// or repeated one, for none, and for unusable options.

@@ -9,6 +9,7 @@
 #include "analysis/json_number.hpp"
 #include "config/key_table.hpp"
 #include "study/comparison_table.hpp"
+#include "study/result_rows.hpp"
 
 namespace abs_hil::study {
 
@@ -46,6 +47,24 @@ Cells mean_cells(const ComparisonTable& table) {
   for (const ControllerColumn& column : table.columns) {
     cells[cells.size() - 2].push_back(fmt::format("{}", column.faults));
     cells.back().push_back(fmt::format("{}", column.locked));
+  }
+  return cells;
+}
+
+/// "2.331 [2.301, 2.377]".
+std::string shown(const Spread& spread, int decimals) {
+  if (std::isnan(spread.median)) return "-";
+  return fmt::format("{:.{}f} [{:.{}f}, {:.{}f}]", spread.median, decimals, spread.p10, decimals, spread.p90, decimals);
+}
+
+/// Rows of medians with the 10th and the 90th percentile.
+Cells median_cells(const ComparisonTable& table) {
+  Cells cells{{"median [10 %, 90 %]"}};
+  for (const ControllerColumn& column : table.columns) cells[0].push_back(column.name);
+  for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
+    const ComparedMetric& metric = compared_metrics()[m];
+    std::vector<std::string>& row = cells.emplace_back(1, title_of(metric));
+    for (const ControllerColumn& column : table.columns) row.push_back(shown(column.spreads[m], metric.decimals));
   }
   return cells;
 }
@@ -134,18 +153,11 @@ std::string shown_ratio(const Estimate& ratio) {
 
 std::string ratio_line(const PaperRatio& r) {
   return fmt::format(
-      "adaptive / sliding-mode: stop time {}, stop distance {}, torque variation {}; the paper: {:.3f} for time and "
+      "adaptive / sliding-mode: stop time {}, stop distance {}, slip RMS error {}, torque variation {}; the paper: "
+      "{:.3f} for time and "
       "distance ({:.1f} % less).\n",
-      shown_ratio(r.stop_time), shown_ratio(r.stop_distance), shown_ratio(r.torque_total_variation), 1.0 - paper_saving,
-      100.0 * paper_saving);
-}
-
-/// A field of CSV. A name with settings holds commas.
-std::string csv_field(const std::string& text) {
-  if (text.find_first_of(",\"") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + '"';
+      shown_ratio(r.stop_time), shown_ratio(r.stop_distance), shown_ratio(r.slip_rms),
+      shown_ratio(r.torque_total_variation), 1.0 - paper_saving, 100.0 * paper_saving);
 }
 
 /// The keys of the plant's values that the plan's variation changes.
@@ -181,6 +193,7 @@ nlohmann::ordered_json json_of(const Estimate& e) {
 
 std::string to_text(const ComparisonTable& table) {
   std::string text = heading(table) + '\n' + aligned(mean_cells(table));
+  if (table.repeat > 1) text += '\n' + aligned(median_cells(table));
   if (table.columns.size() > 1) {
     text += "\nDifferences, paired by plant:\n" + aligned(difference_cells(table));
   }
@@ -190,6 +203,7 @@ std::string to_text(const ComparisonTable& table) {
 
 std::string to_markdown(const ComparisonTable& table) {
   std::string text = heading(table) + '\n' + markdown(mean_cells(table));
+  if (table.repeat > 1) text += '\n' + markdown(median_cells(table));
   if (table.columns.size() > 1) text += '\n' + markdown(difference_cells(table));
   if (table.paper_ratio) text += '\n' + ratio_line(*table.paper_ratio);
   return text;
@@ -198,15 +212,17 @@ std::string to_markdown(const ComparisonTable& table) {
 std::string to_csv(const ComparisonTable& table) {
   std::string text =
       "controller,metric,n,mean,standard_deviation,ci95_low,ci95_high,difference,difference_ci95_low,"
-      "difference_ci95_high\n";
+      "difference_ci95_high,p10,median,p90\n";
   for (const ControllerColumn& column : table.columns) {
     for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
       const Estimate& e = column.means[m];
       const double unknown = rig::unknown;
       const Estimate d = column.differences.empty() ? Estimate{.mean = unknown, .low = unknown, .high = unknown}
                                                     : column.differences[m];
-      text += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", csv_field(column.name), compared_metrics()[m].key, e.n,
-                          e.mean, e.standard_deviation, e.low, e.high, d.mean, d.low, d.high);
+      const Spread& s = column.spreads[m];
+      text +=
+          fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(column.name), compared_metrics()[m].key,
+                      e.n, e.mean, e.standard_deviation, e.low, e.high, d.mean, d.low, d.high, s.p10, s.median, s.p90);
     }
   }
   return text;
@@ -220,6 +236,9 @@ std::string to_json(const ComparisonTable& t, const std::string& config_json) {
     for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
       const std::string key(compared_metrics()[m].key);
       means[key] = json_of(column.means[m]);
+      means[key]["p10"] = analysis::number_or_null(column.spreads[m].p10);
+      means[key]["median"] = analysis::number_or_null(column.spreads[m].median);
+      means[key]["p90"] = analysis::number_or_null(column.spreads[m].p90);
       if (!column.differences.empty()) differences[key] = json_of(column.differences[m]);
     }
     nlohmann::ordered_json changes = nlohmann::ordered_json::object();
@@ -245,6 +264,7 @@ std::string to_json(const ComparisonTable& t, const std::string& config_json) {
   if (t.paper_ratio) {
     root["adaptive_over_sliding_mode"] = {{"stop_time", json_of(t.paper_ratio->stop_time)},
                                           {"stop_distance", json_of(t.paper_ratio->stop_distance)},
+                                          {"slip_rms", json_of(t.paper_ratio->slip_rms)},
                                           {"torque_total_variation", json_of(t.paper_ratio->torque_total_variation)},
                                           {"paper", 1.0 - paper_saving}};
   }

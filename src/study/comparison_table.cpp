@@ -50,6 +50,9 @@ ControllerColumn column_of(const Contender& contender, const std::vector<RunResu
   for (const ComparedMetric& metric : all_metrics) {
     const std::vector<double> values = values_of(runs, metric);
     column.means.push_back(analysis::estimate_mean(values));
+    column.spreads.push_back({.p10 = analysis::quantile(values, 0.1),
+                              .median = analysis::quantile(values, 0.5),
+                              .p90 = analysis::quantile(values, 0.9)});
     if (first != nullptr) {
       column.differences.push_back(analysis::estimate_difference(values, values_of(*first, metric)));
     }
@@ -73,6 +76,7 @@ std::optional<PaperRatio> paper_ratio(const Comparison& comparison) {
   };
   return PaperRatio{.stop_time = ratio(&Metrics::stop_time_s),
                     .stop_distance = ratio(&Metrics::stop_distance_m),
+                    .slip_rms = ratio(&Metrics::slip_rms),
                     .torque_total_variation = ratio(&Metrics::torque_total_variation_Nm)};
 }
 

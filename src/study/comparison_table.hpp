@@ -25,6 +25,13 @@ struct ComparedMetric {
 /// The metrics of `compare`, in order.
 [[nodiscard]] std::span<const ComparedMetric> compared_metrics() noexcept;
 
+/// Quantiles over the runs without a fault that have the metric; NaN without any.
+struct Spread {
+  double p10{0.0};
+  double median{0.0};
+  double p90{0.0};
+};
+
 struct ControllerColumn {
   std::string name;
   std::string controller;
@@ -33,6 +40,7 @@ struct ControllerColumn {
   std::size_t faults{0};                          ///< runs that ended by a fault or limit
   std::size_t locked{0};                          ///< runs in which the wheel locked (time_locked_s > 0)
   std::vector<analysis::Estimate> means{};        ///< one per metric, over the runs without a fault
+  std::vector<Spread> spreads{};                  ///< likewise
   std::vector<analysis::Estimate> differences{};  ///< paired, relative to the first controller; empty for the first
 };
 
@@ -40,6 +48,7 @@ struct ControllerColumn {
 struct PaperRatio {
   analysis::Estimate stop_time{};
   analysis::Estimate stop_distance{};
+  analysis::Estimate slip_rms{};
   analysis::Estimate torque_total_variation{};
 };
 /// The paper: "approximately 6.7 % less time and distance" than its sliding-mode baseline.

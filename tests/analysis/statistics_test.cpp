@@ -14,6 +14,16 @@ namespace {
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 }
 
+TEST_CASE("quantiles of a sample are NumPy's, and NaN counts as missing") {
+  const std::vector<double> values{3, 1, std::numeric_limits<double>::quiet_NaN(), 4, 1, 5, 9, 2, 6};
+  CHECK_THAT(quantile(values, 0.1), WithinAbs(1.0, 1e-12));
+  CHECK_THAT(quantile(values, 0.5), WithinAbs(3.5, 1e-12));
+  CHECK_THAT(quantile(values, 0.9), WithinAbs(6.9, 1e-12));
+  CHECK(quantile(values, 0.0) == 1.0);
+  CHECK(quantile(values, 1.0) == 9.0);
+  CHECK(std::isnan(quantile({}, 0.5)));
+}
+
 TEST_CASE("quantiles of Student's t are those of the printed tables") {
   // 97.5 % column of any table of the t distribution; 1.9600 is the normal limit.
   CHECK_THAT(student_t_quantile(0.975, 1), WithinAbs(12.7062, 5e-5));

@@ -6,6 +6,7 @@ Checks every TOML example of the documentation by the kind that its fence names:
     ```toml experiment       a whole experiment file: must be valid, within the limits and run to its end in simulation
     ```toml more-of-it       is appended to the experiment above it on the page
     ```toml configuration    is a file for --config
+    ```toml study            is a study, for abs_hil study
 
 Other TOML in a page, fenced or indented, is an error.
 """
@@ -15,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 
-KINDS = ('experiment', 'more-of-it', 'configuration')
+KINDS = ('experiment', 'more-of-it', 'configuration', 'study')
 
 
 def blocks_of(page):
@@ -49,6 +50,8 @@ def check(program, folder, where, kind, text):
     file.write_text(text)
     if kind == 'configuration':
         calls = [('validate', 'paper', '--config', file)]
+    elif kind == 'study':
+        calls = [('study', file, '--out', tempfile.mkdtemp(dir=folder))]
     else:
         calls = [('validate', file)]
         if not re.search(r'^\[(series|vary)\]', text, re.MULTILINE):

@@ -99,6 +99,9 @@ TEST_CASE("CSV and JSON contain the table's numbers with full precision") {
       CHECK(estimate["mean"] == column.means[m].mean);
       CHECK(std::stod(cells[5]) == column.means[m].low);
       CHECK(estimate["ci95_low"] == column.means[m].low);
+      CHECK(std::stod(cells[10]) == column.spreads[m].p10);
+      CHECK(estimate["median"] == column.spreads[m].median);
+      CHECK(std::stod(cells[12]) == column.spreads[m].p90);
     }
   }
   CHECK(rows == 2 * compared_metrics().size());
@@ -112,6 +115,7 @@ TEST_CASE("text and Markdown show the same figures, to their decimals") {
     CHECK_THAT(text, Contains("2.200 ± 0.497 (3 runs)"));
     CHECK_THAT(text, Contains("40.0 ± 24.8 (3 runs)"));
     CHECK_THAT(text, Contains("+0.600 ± 0.430 (3 runs)"));
+    CHECK_THAT(text, Contains("2.200 [2.040, 2.360]"));  // linear between 2.0, 2.2 and 2.4
     CHECK_THAT(text, Contains("the paper: 0.933"));
     CHECK_THAT(text, Contains("4 runs of each controller, seed 3, plants varied by parameters=0.1,theta=0.1,phase"));
   }
@@ -130,13 +134,13 @@ TEST_CASE("every row of a Markdown table has its header's number of cells") {
     CHECK(here == bars);
     ++rows;
   }
-  CHECK(rows == 14 + 12);
+  CHECK(rows == 14 + 12 + 12);
 }
 
 TEST_CASE("a single run has no interval") {
   ComparisonPlan plan = study::test::paper_plan({"adaptive"}, 1);
   const std::string text = to_text(tabulate(plan, {{{run_of(2.0, 30)}}, contenders_of(plan)}));
-  CHECK_THAT(text, Contains("2.000\n") && !Contains("±") && !Contains("Differences"));
+  CHECK_THAT(text, Contains("2.000\n") && !Contains("±") && !Contains("Differences") && !Contains("median"));
 }
 
 TEST_CASE("the runs are listed with their results") {

@@ -29,7 +29,8 @@ _MARK_BYTES = 4096
 def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser('abs_report', description='Turns runs into a page with figures and tables, a plain table, '
                                    'or exports their rows', allow_abbrev=False)
-    made.add_argument('runs', metavar='RUN', nargs='+', help='run folders, series folders, or CSV files of runs')
+    made.add_argument('runs', metavar='RUN', nargs='+',
+                      help='run folders, series folders, CSV files of runs; or the folder of a study')
     made.add_argument('--version', action='version', version=_core.version)
     made.add_argument('--output', metavar='FILE', default='',
                       help='file of the page (default: report.html) or of the exported rows (default: stdout)')
@@ -39,6 +40,8 @@ def parser() -> argparse.ArgumentParser:
                       help='name of each run in legends and tables, one per run')
     made.add_argument('--window', default='brake', metavar='brake|run|FROM:TO',
                       help='time range of the figures: brake, run, or FROM:TO in seconds of the run [brake]')
+    made.add_argument('--metric', metavar='A,B', dest='metrics', action='append', default=[],
+                      help='of a study: the metrics whose curves and maps the page shows')
     made.add_argument('--paper', action='store_true',
                       help="make the paper's comparison page from an adaptive and a sliding-mode run")
     made.add_argument('--figures', metavar='DIR', default='', help='folder for the figures as separate files')
@@ -156,6 +159,24 @@ def _report(o: argparse.Namespace) -> None:
             print(figure)
 
 
+def _report_study(o: argparse.Namespace) -> None:
+    from ..studies import program
+    results = program.results_of(o)
+    if o.table:
+        table = program.quantile_table(results)
+        _print_rows(table.header, table.rows)
+        return
+    path = pathlib.Path(o.output or ('study.parquet' if o.export else 'report.html'))
+    if o.export:
+        _refuse_existing(path, '--output', o.force)
+        write_whole(path, results.to_parquet)
+    else:
+        _check_replaceable(path, o.force)
+        html = program.page_of(o, results)
+        write_whole(path, lambda name: pathlib.Path(name).write_text(html, encoding='utf-8'))
+    print(path)
+
+
 class _Bar:
     """A progress bar on a terminal while many runs are read."""
 
@@ -175,6 +196,7 @@ class _Bar:
 
 def main(arguments: list[str]) -> int:
     o = parser().parse_args(arguments)
+    of_study = any((pathlib.Path(run) / 'study.json').exists() or run.endswith('results.csv.gz') for run in o.runs)
     columns = [name for names in o.columns for name in names.split(',') if name]
     try:
         if columns and not o.export:
@@ -185,7 +207,11 @@ def main(arguments: list[str]) -> int:
         if o.export and (o.paper or o.figures or o.table or o.merits):
             raise InputError('--paper, --figures, --table and --merits show runs; --csv, --json, --octave and --parquet '
                              'export rows; give one kind only')
-        if o.export:
+        if o.metrics and not of_study:
+            raise InputError('--metric: only the page of a study has curves and maps of metrics')
+        if of_study:
+            _report_study(o)
+        elif o.export:
             _export(o, columns)
         else:
             _report(o)

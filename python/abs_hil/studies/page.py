@@ -1,0 +1,82 @@
+"""The page of a study: quantiles, curves, maps, Sobol indices."""
+from __future__ import annotations
+
+import base64
+import pathlib
+from typing import Any
+
+from ..core import _core
+from ..report.tables import Table
+from ..report.text import DASH, significant
+from .figures import TITLES, curve_names, curves, groups_of, maps
+from .results import StudyResults
+
+_FOLDER = pathlib.Path(__file__).parent
+_REPORT = _FOLDER.parent / 'report'
+#: whose curves and maps the page shows, if no metric is asked for
+SHOWN = ('stop_distance_m', 'slip_rms', 'torque_total_variation_Nm')
+
+
+def quantile_table(results: StudyResults) -> Table:
+    """Median and, in brackets, 10th and 90th percentile of each metric; a column for each group."""
+    by = curve_names(results)
+    every, complete = dict(groups_of(results.data, by)), dict(groups_of(results.complete_runs, by))
+    empty = results.data.iloc[:0]
+    rows = []
+    for metric in results.metrics:
+        row = [TITLES.get(metric, metric)]
+        for name in every:
+            values = complete.get(name, empty)[metric].dropna()
+            if len(values) == 0:
+                row.append(DASH)
+                continue
+            low, median, high = values.quantile([0.1, 0.5, 0.9])
+            row.append(f'{significant(median, 4)} [{significant(low, 4)}, {significant(high, 4)}]')
+        rows.append(row)
+    for title, result in (('runs ended by a fault', 'fault'), ('runs that could not begin', 'refused')):
+        rows.append([title, *(str(int((part['result'] == result).sum())) for part in every.values())])
+    rows.append(['runs', *(str(len(part)) for part in every.values())])
+    return Table('quantiles', ['median [10 %, 90 %]', *(name or results.facts['study'] for name in every)], rows)
+
+
+def sobol_table(results: StudyResults, metrics: list[str]) -> tuple[Table, list[str]]:
+    """First-order and total index of each factor, for each metric and controller; and what could not be computed."""
+    rows, notes = [], []
+    by = [name for name in ('plant', 'experiment', 'controller', *results.definition.levels)
+          if results.data[name].nunique() > 1]
+    for metric in metrics:
+        for name, part in groups_of(results.data, by):
+            where = {key: part[key].iloc[0] for key in by}
+            try:
+                found = results.sobol_indices(metric, where)
+            except ValueError as error:
+                notes.append(f'{", ".join(filter(None, (TITLES.get(metric, metric), name)))}: {error}')
+                continue
+            for factor, row in found.iterrows():
+                rows.append([TITLES.get(metric, metric), name or DASH, str(factor),
+                             f'{row["S1"]:.3f} ± {row["S1_conf"]:.3f}', f'{row["ST"]:.3f} ± {row["ST_conf"]:.3f}'])
+    return Table('sobol', ['metric', 'of', 'factor', 'first order', 'total'], rows, False), notes
+
+
+def reasons_table(results: StudyResults) -> Table:
+    counts = results.data['reason'].value_counts()
+    return Table('reasons', ['reason', 'runs'], [[str(reason), str(count)] for reason, count in counts.items() if reason])
+
+
+def page(results: StudyResults, metrics: list[str], title: str = '') -> str:
+    """The page as HTML that needs no network. metrics: whose curves and maps it shows."""
+    sobol, notes = Table('sobol', [], []), list[str]()
+    if results.definition.design == 'saltelli':
+        sobol, notes = sobol_table(results, metrics)
+    drawings = [drawing for metric in metrics for drawing in (curves(results, metric), maps(results, metric)) if drawing]
+    views: list[dict[str, Any]] = [
+        {'id': drawing.id, 'heading': drawing.heading, 'caption': drawing.caption,
+         'source': 'data:image/svg+xml;base64,' + base64.b64encode(drawing.svg).decode()} for drawing in drawings]
+    import jinja2
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined,
+                                     loader=jinja2.FileSystemLoader([_FOLDER, _REPORT]))
+    return environment.get_template('study.html.j2').render(
+        version=_core.version, title=title or f'Study {results.facts["study"]}', facts=results.facts,
+        description=results.definition.description, quantiles=quantile_table(results), sobol=sobol,
+        reasons=reasons_table(results), drawings=views, notes=notes,
+        css=(_REPORT / 'page.css').read_text(encoding='utf-8')) + '\n'

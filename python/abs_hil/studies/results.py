@@ -1,0 +1,187 @@
+"""The results of a study: a row for each run, quantiles, maps, and Sobol's sensitivity indices."""
+from __future__ import annotations
+
+import gzip
+import io
+import json
+import os
+import pathlib
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..core import _core
+from .definition import Definition
+
+if TYPE_CHECKING:
+    import pandas
+
+RESULTS = 'results.csv.gz'
+#: a header with the study's text and configurations is longer than any buffer of a reader
+_HEADER_BYTES = 1 << 24
+#: columns before the factors, and between factors and metrics
+BEFORE, BETWEEN = ('run', 'plant', 'experiment', 'controller', 'point', 'repetition'), ('result', 'reason')
+
+
+class StudyResults:
+    """Results of a study, read from its folder or from results.csv.gz alone.
+
+    facts:   dictionary: study (its name), text, identity (SHA-256 of all that the results depend on), program, runs, ...
+    factors: names of the factors' columns. metrics: names of the metrics' columns, those of a run's summary.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        place = pathlib.Path(path)
+        self.path = place / RESULTS if place.is_dir() else place
+        if not self.path.is_file():
+            hint = ('; the study is not complete: run it again, or see `abs_hil study status`'
+                    if (place / 'study.json').exists() else '; give the folder of a study, or its results.csv.gz')
+            raise ValueError(f'{self.path}: no results{hint}')
+        with open(self.path, 'rb') as file:
+            head = file.read(_HEADER_BYTES)
+        try:
+            self.facts: dict[str, Any] = json.loads(_core.facts_of_results(head))
+            columns = self.facts['columns']
+        except (RuntimeError, ValueError, KeyError) as error:
+            raise ValueError(f'{self.path}: not the results of a study: {error}') from None
+        self.factors: list[str] = columns[len(BEFORE):columns.index(BETWEEN[0])]
+        self.metrics: list[str] = columns[columns.index(BETWEEN[-1]) + 1:]
+        self.definition = Definition(self.facts['text'])
+        self._bytes: bytes | None = None
+        self._data: pandas.DataFrame | None = None
+
+    def keep(self) -> None:
+        """Reads the file into memory, so that it may go."""
+        self._bytes = self.path.read_bytes()
+
+    def __len__(self) -> int:
+        return int(self.facts['runs'])
+
+    def __repr__(self) -> str:
+        return f'<abs_hil.StudyResults {self.facts["study"]}: {len(self)} runs>'
+
+    def _open(self) -> Any:
+        return gzip.open(io.BytesIO(self._bytes) if self._bytes is not None else self.path, 'rb')
+
+    def chunks(self, columns: Sequence[str] | None = None, rows: int = 100_000) -> Any:
+        """The rows as an iterator of DataFrames of at most `rows` rows: for studies that do not fit into the memory."""
+        import pandas
+        texts = {name: 'category' for name in ('plant', 'experiment', 'controller', 'result')}
+        with self._open() as file:
+            yield from pandas.read_csv(file, usecols=None if columns is None else list(columns), chunksize=rows,
+                                       dtype={**texts, 'reason': 'string'}, keep_default_na=False, na_values={
+                                           name: ['nan'] for name in [*self.factors, *self.metrics]})
+
+    @property
+    def data(self) -> pandas.DataFrame:
+        """All rows as a pandas DataFrame, one a run, in order. Metrics of a run that has none are NaN."""
+        if self._data is None:
+            import pandas
+            frame = pandas.concat(list(self.chunks()), ignore_index=True)
+            for name in ('plant', 'experiment', 'controller', 'result'):
+                frame[name] = frame[name].astype('category')
+            self._data = frame
+        return self._data
+
+    @property
+    def complete_runs(self) -> pandas.DataFrame:
+        """The rows of runs that no fault ended and that could begin."""
+        return self.data[self.data['result'] == 'completed']
+
+    @property
+    def groups(self) -> list[str]:
+        """Columns of what has few values and more than one: plant, experiment, controller, factors with levels."""
+        named = [name for name in ('plant', 'experiment', 'controller') if self.data[name].nunique() > 1]
+        return named + [name for name in self.definition.levels if name in self.factors and self.data[name].nunique() > 1]
+
+    def quantiles(self, by: str | Sequence[str] | None = None, metrics: Sequence[str] | None = None,
+                  q: Sequence[float] = (0.1, 0.5, 0.9)) -> pandas.DataFrame:
+        """Quantiles of metrics over the completed runs of each group: index (group, metric), columns `runs` (those that
+        have the metric) and the quantiles. by: columns; default: `groups`."""
+        import pandas
+        by = self.groups if by is None else [by] if isinstance(by, str) else list(by)
+        wanted = [name for name in self.metrics if metrics is None or name in metrics]
+        parts = self.complete_runs.groupby(by if len(by) > 1 else by[0], observed=True) if by else [((), self.complete_runs)]
+        rows, index = [], []
+        for group, part in parts:
+            group = group if isinstance(group, tuple) else (group,)
+            for metric in wanted:
+                values = part[metric].dropna()
+                rows.append([len(values), *(values.quantile(list(q)) if len(values) else [np.nan] * len(q))])
+                index.append((*group, metric))
+        return pandas.DataFrame(rows, columns=['runs', *q],
+                                index=pandas.MultiIndex.from_tuples(index, names=[*by, 'metric']))
+
+    def map(self, x: str, y: str, metric: str, bins: int = 12, where: dict[str, Any] | None = None) -> pandas.DataFrame:
+        """Medians of a metric over two columns: rows y, columns x. A column of more than `bins` values is cut into `bins`
+        equal parts, each under its middle. where: values of other columns, as {"controller": "adaptive"}."""
+        rows = self.complete_runs
+        for name, value in (where or {}).items():
+            rows = rows[rows[name] == value]
+        return rows.groupby([_binned(rows[y], bins), _binned(rows[x], bins)])[metric].median().unstack()
+
+    def sobol_indices(self, metric: str, where: dict[str, Any] | None = None, seed: int = 1) -> pandas.DataFrame:
+        """Sobol's sensitivity indices of a metric by SALib: columns S1 (first order), ST (total) and the half widths of
+        their 95 % intervals; index: factors with ranges. For the design `saltelli` alone. Raises ValueError for another
+        design, for runs that lack the metric, and if `where` leaves several groups."""
+        import pandas
+        definition = self.definition
+        if definition.design != 'saltelli':
+            raise ValueError(f'design {definition.design}: Sobol indices need the design saltelli')
+        try:
+            from SALib.analyze import sobol
+        except ImportError:
+            raise ValueError('Sobol indices need SALib: pip install "SALib<1.5", or scripts/setup_python.sh in the source '
+                             'folder') from None
+        rows = self.data
+        for name, value in (where or {}).items():
+            rows = rows[rows[name] == value]
+        ranges = [name for name in self.factors if name in definition.ranges]
+        others = [name for name in ('plant', 'experiment', 'controller', *definition.levels) if rows[name].nunique() > 1]
+        if others:
+            raise ValueError(f'where: give values of {", ".join(others)}')
+        values = rows.groupby('point', sort=True)[metric].mean().to_numpy()  # over the repetitions
+        if not np.isfinite(values).all():
+            raise ValueError(f'{metric}: {np.count_nonzero(~np.isfinite(values))} of {len(values)} points have none; Sobol '
+                             'indices need all')
+        problem = {'num_vars': len(ranges), 'names': ranges, 'bounds': [[0.0, 1.0]] * len(ranges)}
+        found = sobol.analyze(problem, values, calc_second_order=False, seed=seed)
+        return pandas.DataFrame({name: found[name] for name in ('S1', 'S1_conf', 'ST', 'ST_conf')}, index=ranges)
+
+    def to_parquet(self, path: str | os.PathLike[str]) -> None:
+        """Writes all rows to a Parquet file, with the facts under the key `abs_hil.study` of its metadata. Needs pyarrow."""
+        try:
+            import pyarrow
+            from pyarrow import parquet
+        except ImportError:
+            raise ValueError('Parquet needs pyarrow: pip install "pyarrow<24", or scripts/setup_python.sh in the source '
+                             'folder') from None
+        writer = None
+        try:
+            for frame in self.chunks():
+                for name in ('plant', 'experiment', 'controller', 'result'):
+                    frame[name] = frame[name].astype(str)
+                table = pyarrow.Table.from_pandas(frame, preserve_index=False)
+                if writer is None:
+                    kept = {**(table.schema.metadata or {}), b'abs_hil.study': json.dumps(self.facts).encode()}
+                    writer = parquet.ParquetWriter(path, table.schema.with_metadata(kept), compression='zstd')
+                writer.write_table(table.cast(writer.schema))
+        finally:
+            if writer is not None:
+                writer.close()
+
+
+def _binned(values: pandas.Series, bins: int) -> pandas.Series:
+    """The values, or the middles of the parts that they lie in if there are many."""
+    if not np.issubdtype(values.dtype, np.number) or values.nunique() <= bins:
+        return values
+    edges = np.linspace(values.min(), values.max(), bins + 1)
+    part = np.clip(np.searchsorted(edges, values, side='right') - 1, 0, bins - 1)
+    import pandas
+    return pandas.Series((0.5 * (edges[:-1] + edges[1:]))[part], index=values.index, name=values.name)
+
+
+def load_study(path: str | os.PathLike[str]) -> StudyResults:
+    """The results of a study: its folder, or results.csv.gz. Raises ValueError for anything else."""
+    return StudyResults(path)

@@ -1,0 +1,180 @@
+"""Studies from Python: the program's bytes, single runs of them, quantiles, maps, Sobol indices, the page, Parquet."""
+import gzip
+import json
+
+import numpy as np
+import pandas
+import pytest
+
+import abs_hil
+from abs_hil.report import program as report
+from abs_hil.studies.running import toml_of
+
+#: short runs: braking ends at 5 m/s
+SMALL = {'controllers': ['adaptive', 'pi'], 'chunk': 16,
+         'settings': {'experiment.end_speed_m_s': 5.0},
+         'design': {'kind': 'saltelli', 'points': 8, 'seed': 0},
+         'factors': {'plant.theta_N': {'from': 15, 'to': 30}, 'plant.B': {'from': 20, 'to': 30},
+                     'plant.C': {'mean': 1.6, 'sd': 0.05, 'most': 2.0}}}
+
+
+@pytest.fixture(scope='module')
+def small():
+    return abs_hil.study(SMALL)
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp('study') / 'out'
+    abs_hil.study(SMALL, out=path)
+    return path
+
+
+def test_the_results_are_the_programs(abs_hil_program, tmp_path, folder, small):
+    file = tmp_path / 'study.toml'
+    file.write_text(toml_of(SMALL))
+    abs_hil_program('study', file, '--out', tmp_path / 'out')
+    theirs = (tmp_path / 'out' / 'results.csv.gz').read_bytes()
+    assert theirs == (folder / 'results.csv.gz').read_bytes()
+    with gzip.open(tmp_path / 'out' / 'results.csv.gz', 'rt') as text:
+        rows = pandas.read_csv(text)
+    assert len(small) == len(rows) == len(small.data) == 8 * 5 * 2
+    for name in small.metrics:
+        np.testing.assert_array_equal(small.data[name], rows[name])
+
+
+def test_rows_are_named(small):
+    assert small.factors == ['plant.theta_N', 'plant.B', 'plant.C']
+    assert small.metrics[:3] == ['brake_start_s', 'stop_time_s', 'stop_distance_m']
+    assert list(small.data['controller'][:3]) == ['adaptive', 'pi', 'adaptive']
+    assert (small.data['result'] == 'completed').all()
+    assert 'StudyResults study: 80 runs' in repr(small)
+    assert sum(len(part) for part in small.chunks(rows=7)) == 80
+
+
+def test_saltellis_rows_are_salibs(small):
+    sobol = pytest.importorskip('SALib.sample.sobol')
+    problem = {'num_vars': 2, 'names': ['a', 'b'], 'bounds': [[15, 30], [20, 30]]}
+    both = {**SMALL, 'controllers': ['adaptive'],
+            'factors': {name: SMALL['factors'][name] for name in ('plant.theta_N', 'plant.B')}}
+    data = abs_hil.study(both).data
+    expected = sobol.sample(problem, 8, calc_second_order=False, scramble=False)
+    np.testing.assert_allclose(data[['plant.theta_N', 'plant.B']], expected, atol=1e-12)
+
+
+def test_sobol_indices_of_a_sum_are_the_shares_of_its_variance():
+    pytest.importorskip('SALib')
+    study = abs_hil.study({**SMALL, 'controllers': ['locked'], 'design': {'kind': 'saltelli', 'points': 128},
+                           'settings': {'experiment.end_speed_m_s': 15.0, 'experiment.start_speed_rad_s': 155}})
+    data = study.data
+    unit = [(data['plant.theta_N'] - 15) / 15, (data['plant.B'] - 20) / 10]
+    data['slip_rms'] = 3 * unit[0] + 2 * unit[1]
+    found = study.sobol_indices('slip_rms')
+    np.testing.assert_allclose(found['S1'], [9 / 13, 4 / 13, 0], atol=0.05)
+    np.testing.assert_allclose(found['ST'], [9 / 13, 4 / 13, 0], atol=0.05)
+    data.loc[5, 'slip_rms'] = np.nan
+    with pytest.raises(ValueError, match='1 of 640 points have none'):
+        study.sobol_indices('slip_rms')
+
+
+def test_sobol_indices_need_their_design_and_one_group(small):
+    pytest.importorskip('SALib')
+    with pytest.raises(ValueError, match='give values of controller'):
+        small.sobol_indices('stop_distance_m')
+    assert small.sobol_indices('stop_distance_m', {'controller': 'pi'}).loc['plant.theta_N', 'ST'] > 0.5
+    with pytest.raises(ValueError, match='need the design saltelli'):
+        abs_hil.study({}).sobol_indices('slip_rms')
+
+
+def test_quantiles_are_those_of_numpy(small):
+    table = small.quantiles(metrics=['stop_distance_m'])
+    pi = small.data[small.data['controller'] == 'pi']['stop_distance_m']
+    assert table.loc[('pi', 'stop_distance_m'), 'runs'] == 40
+    np.testing.assert_allclose(table.loc[('pi', 'stop_distance_m'), [0.1, 0.5, 0.9]].astype(float),
+                               np.quantile(pi, [0.1, 0.5, 0.9]))
+
+
+def test_a_map_has_the_median_of_each_cell(small):
+    table = small.map('plant.theta_N', 'plant.B', 'stop_distance_m', bins=2, where={'controller': 'adaptive'})
+    rows = small.data[small.data['controller'] == 'adaptive']
+    theta, stiffness = rows['plant.theta_N'], rows['plant.B']
+    cell = rows[(theta < (theta.min() + theta.max()) / 2) & (stiffness >= (stiffness.min() + stiffness.max()) / 2)]
+    assert table.iloc[1, 0] == cell['stop_distance_m'].median()
+
+
+def test_a_run_of_a_study_with_all_its_rows(small):
+    varied = {**SMALL, 'repeat': {'runs': 3}, 'settings': {}, 'chunk': 200}
+    results = abs_hil.study(varied)
+    for number in (0, 101):
+        run, row = abs_hil.simulate_run(varied, number), results.data.loc[number]
+        assert run.summary['stop_distance_m'] == row['stop_distance_m']
+        assert run.config['plant.theta_N'] != run.config['model.theta_N']
+        assert run.summary['controller'] == row['controller']
+    for bad in (-1, 240):
+        with pytest.raises(ValueError, match=f'run {bad}'):
+            abs_hil.simulate_run(varied, bad)
+
+
+def test_an_interrupted_study_goes_on(tmp_path):
+    def stop(done, total):
+        if done > 40:
+            raise KeyboardInterrupt
+    many = {**SMALL, 'chunk': 4}
+    with pytest.raises(KeyboardInterrupt):
+        abs_hil.study(many, out=tmp_path / 'a', threads=1, progress=stop)
+    done = len(list((tmp_path / 'a' / 'parts').glob('0*.csv.gz')))
+    assert 5 < done < 20
+    with pytest.raises(ValueError, match='not complete'):
+        abs_hil.load_study(tmp_path / 'a')
+    seen = []
+    abs_hil.study(many, out=tmp_path / 'a', progress=lambda done, total: seen.append(total))
+    assert set(seen) == {80 - 4 * done}
+    abs_hil.study(many, out=tmp_path / 'b')
+    assert (tmp_path / 'a' / 'results.csv.gz').read_bytes() == (tmp_path / 'b' / 'results.csv.gz').read_bytes()
+
+
+@pytest.mark.parametrize('study, words', [
+    ({'plant': 'x'}, 'unknown key "plant"'), ({'factors': {'plant.theta': [1]}}, r'plant.theta_N'),
+    ({'factors': {'plant.theta_N': {'from': 1}}}, 'has no to'), ({'chunk': object()}, 'a study takes numbers'),
+    ({3: 1}, 'texts as keys'), ('none.toml', 'no such file')])
+def test_bad_studies_are_value_errors(study, words):
+    with pytest.raises(ValueError, match=words):
+        abs_hil.study(study)
+
+
+def test_toml_of_every_kind_of_value():
+    tomllib = pytest.importorskip('tomllib')
+    values = {'a': [1, 2.5, True, 'x "y"'], 'b': {'c.d': np.float64(0.1), 'e f': np.arange(2)}}
+    assert tomllib.loads(toml_of(values)) == {'a': [1, 2.5, True, 'x "y"'], 'b': {'c': {'d': 0.1}, 'e f': [0, 1]}}
+
+
+def test_parquet_has_the_rows_and_the_study(tmp_path, folder):
+    parquet = pytest.importorskip('pyarrow.parquet')
+    assert report.main([str(folder), '--parquet', '--output', str(tmp_path / 's.parquet')]) == 0
+    table = parquet.read_table(tmp_path / 's.parquet')
+    facts = json.loads(table.schema.metadata[b'abs_hil.study'])
+    assert facts == json.loads((folder / 'study.json').read_text())
+    frame = table.to_pandas()
+    np.testing.assert_array_equal(frame['slip_rms'], abs_hil.load_study(folder).data['slip_rms'])
+
+
+def test_the_page_and_the_table_of_a_study(tmp_path, folder, capsys):
+    page = tmp_path / 'report.html'
+    assert report.main([str(folder), '--output', str(page)]) == 0
+    html = page.read_text()
+    for words in ('Study study', 'figure-maps-slip_rms', 'figure-curves-stop_distance_m', 'median [10 %, 90 %]', 'Sobol indices'):
+        assert words in html
+    assert html.count('data:image/svg+xml') == 6
+    assert report.main([str(folder), '--metric', 'stop_time_s', '--output', str(page)]) == 0
+    assert page.read_text().count('data:image/svg+xml') == 2
+    capsys.readouterr()
+    assert report.main([str(folder), '--table']) == 0
+    printed = capsys.readouterr().out
+    assert 'adaptive' in printed and 'runs ended by a fault' in printed
+
+
+@pytest.mark.parametrize('arguments, words', [
+    (['--metric', 'nope'], '--metric nope'), (['--paper'], '--paper'), (['--csv'], '--csv'), (['--label', 'x'], '--label')])
+def test_options_that_are_not_for_studies(folder, tmp_path, capsys, arguments, words):
+    assert report.main([str(folder), '--output', str(tmp_path / 'r.html'), *arguments]) == 2
+    assert words in capsys.readouterr().err

@@ -1,0 +1,21 @@
+#include "config/settings.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+
+#include "config/config_error.hpp"
+
+namespace abs_hil::config {
+
+std::uint64_t sensor_seed(const Settings& s) {
+  if (s.sensor_seed.empty()) return static_cast<std::uint64_t>(s.seed);
+  std::uint64_t seed = 0;
+  const char* end = s.sensor_seed.data() + s.sensor_seed.size();
+  const auto [at, problem] = std::from_chars(s.sensor_seed.data(), end, seed);
+  if (problem == std::errc() && at == end) return seed;
+  throw ConfigError(fmt::format("run.sensor_seed = \"{}\" is not valid; give a whole number in [0, 2^64), or nothing",
+                                s.sensor_seed));
+}
+
+}  // namespace abs_hil::config

@@ -1,0 +1,198 @@
+#include "program/study_command.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <charconv>
+#include <chrono>
+#include <filesystem>
+
+#include "config/config_error.hpp"
+#include "program/exit_status.hpp"
+#include "program/run_progress.hpp"
+#include "program/study_runs.hpp"
+#include "run_folder/run_folder.hpp"
+#include "study/compute.hpp"
+#include "study/parallel.hpp"
+
+namespace abs_hil::program {
+
+namespace {
+
+void add_submit(cli::Parser& study, StudyCommand& command) {
+  command.submit = study.add_subcommand("submit", "compute a study on a Slurm cluster: an array job, then a merge");
+  command.submit.add(
+      {.names = "file", .to = &command.submitted, .help = "the study", .type = "FILE", .required = true});
+  command.submit.add({.names = "--array",
+                      .to = &command.array,
+                      .help = "tasks of the array job",
+                      .type = "N",
+                      .range = {1, 1'000'000},
+                      .required = true});
+  command.submit.add({.names = "--out",
+                      .to = &command.submitted_folder,
+                      .help = "folder of the study, on a file system that all nodes share",
+                      .type = "DIR"});
+  command.submit.add(
+      {.names = "--write-only", .to = &command.write_only, .help = "write the scripts, and do not call sbatch"});
+  command.submit.add({.names = "options",
+                      .to = &command.sbatch,
+                      .help = "options of sbatch for both jobs, after --",
+                      .type = "OPTION"});
+}
+
+}  // namespace
+
+void add_study(cli::Parser& parser, StudyCommand& command) {
+  command.parser = parser.add_subcommand(
+      "study", "simulate the runs that a file describes; repeat the command to go on after an interruption");
+  command.parser.add({.names = "file", .to = &command.file, .help = "the study (docs/studies.md)", .type = "FILE"});
+  command.parser.add({.names = "--out",
+                      .to = &command.folder,
+                      .help = "folder of the results (default: one of the study's name below runs/); with --run that "
+                              "of the run",
+                      .type = "DIR"});
+  command.parser.add({.names = "--threads",
+                      .to = &command.threads,
+                      .help = "number of threads, 0: one for each processor; does not change the results",
+                      .type = "N",
+                      .range = {0, 1024},
+                      .show_default = true});
+  command.parser.add({.names = "--shard",
+                      .to = &command.shard,
+                      .help = "compute the I-th of N parts only; `merge` puts the parts together",
+                      .type = "I/N"});
+  command.parser.add({.names = "--run",
+                      .to = &command.run,
+                      .help = "repeat one run with everything recorded in a run folder",
+                      .type = "K",
+                      .range = {0, 2'000'000'000},
+                      .excludes = {"--shard"}});
+  command.merge = command.parser.add_subcommand("merge", "put the parts of a study together");
+  command.merge.add({.names = "folder",
+                     .to = &command.merged,
+                     .help = "folders with parts; the results go into the first",
+                     .type = "DIR",
+                     .required = true});
+  command.status = command.parser.add_subcommand("status", "how much of a study is done");
+  command.status.add(
+      {.names = "folder", .to = &command.looked_at, .help = "folder of a study", .type = "DIR", .required = true});
+  add_submit(command.parser, command);
+}
+
+std::string study_folder(const std::string& file, const std::optional<std::string>& given) {
+  if (given) return *given;
+  const std::filesystem::path runs = run_folder::default_runs_dir();
+  if (runs.empty()) throw config::ConfigError("ABS_HIL_RUNS_DIR is empty; give the folder of the results with --out");
+  return (runs / std::filesystem::path(file).stem()).string();
+}
+
+namespace {
+
+std::string name_of(const std::string& file) { return std::filesystem::path(file).stem().string(); }
+
+study::Shard read_shard(const std::string& text) {
+  study::Shard shard;
+  const char* end = text.data() + text.size();
+  const auto [slash, problem] = std::from_chars(text.data(), end, shard.number);
+  if (problem == std::errc() && slash != end && *slash == '/') {
+    const auto [at, error] = std::from_chars(slash + 1, end, shard.of);
+    if (error == std::errc() && at == end && shard.number >= 1 && shard.number <= shard.of) return shard;
+  }
+  throw config::ConfigError(
+      fmt::format("--shard {}: give I/N with 1 <= I <= N, as in --shard 3/8 for the third of eight parts", text));
+}
+
+int run_study(const StudyCommand& command) {
+  const study::Shard shard = command.shard ? read_shard(*command.shard) : study::Shard{};
+  const study::Study study = make_study(study::load_study(command.file));
+  const study::StudyFolder folder(study_folder(command.file, command.folder),
+                                  study::facts_of(study, name_of(command.file)));
+  const std::vector<std::uint64_t> chunks = study::missing_chunks(folder, shard);
+  std::uint64_t runs = 0;
+  for (const std::uint64_t chunk : chunks) runs += study.runs_in(chunk);
+  const auto start = std::chrono::steady_clock::now();
+  study::Tally tally;
+  {
+    RunProgress progress(runs);
+    const std::size_t threads = command.threads > 0 ? command.threads : study::machine_threads();
+    tally =
+        study::compute(study, folder, chunks, threads, own_metrics, [&](std::uint64_t done) { progress.show(done); });
+  }
+  const double spent_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const std::string path = folder.path().string();
+  fmt::print("study {}: {} runs in {}, {:.0f} runs/s; {} ended by a fault, {} refused\n", name_of(command.file),
+             tally.runs, duration_text(spent_s), spent_s > 0.0 ? static_cast<double>(tally.runs) / spent_s : 0.0,
+             tally.faults, tally.refused);
+  if (tally.refused > 0) {
+    spdlog::warn("{} runs could not begin; the column `reason` of the results says why", tally.refused);
+  }
+  if (shard.of == 1) {
+    folder.merge({});
+    fmt::print("results: {}/{}\n", path, study::file::results);
+  } else {
+    fmt::print("part {} of {} is done, in {}; when all are: abs_hil study merge {}\n", shard.number, shard.of, path,
+               path);
+  }
+  return exit_completed;
+}
+
+int merge_study(const std::vector<std::string>& folders) {
+  const study::StudyFolder first(folders.front());
+  const std::vector<study::StudyFolder> others(folders.begin() + 1, folders.end());
+  first.merge(others);
+  fmt::print("results: {}/{}, {} runs\n", first.path().string(), study::file::results, first.facts().runs);
+  return exit_completed;
+}
+
+int show_status(const std::string& path) {
+  const study::StudyFolder folder(path);
+  const study::StudyFacts& facts = folder.facts();
+  const std::uint64_t chunks = facts.chunks();
+  if (folder.complete()) {
+    fmt::print("study {}: complete, {} runs in {}/{}\n", facts.name, facts.runs, path, study::file::results);
+  } else {
+    const std::vector<std::uint64_t> missing = study::missing_chunks(folder, {});
+    std::uint64_t left = 0;
+    for (const std::uint64_t chunk : missing) left += facts.runs_in(chunk);
+    const std::uint64_t done = facts.runs - left;
+    fmt::print("study {}: {} of {} runs ({:.1f} %), {} of {} chunks, in {}\n", facts.name, done, facts.runs,
+               100.0 * static_cast<double>(done) / static_cast<double>(facts.runs), chunks - missing.size(), chunks,
+               path);
+    if (missing.empty()) {
+      fmt::print("all chunks are there; put them together: abs_hil study merge {}\n", path);
+    } else {
+      fmt::print("missing chunks: {}\n", study::list_of(missing));
+    }
+  }
+  fmt::print("{}", slurm_jobs(path));
+  return exit_completed;
+}
+
+int record(const StudyCommand& command, const std::vector<std::string>& command_line) {
+  const study::Study study = make_study(study::load_study(command.file));
+  const auto number = static_cast<std::uint64_t>(*command.run);
+  require_run(study, number);
+  const study::StudyCase& one = study.cases()[study.index_of(number).study_case];
+  return record_run(study, number, options_of_case(study.script(), one.plant, one.experiment), command.folder,
+                    command_line);
+}
+
+}  // namespace
+
+int study(const StudyCommand& command, const std::vector<std::string>& command_line) {
+  const bool below = command.merge.parsed() || command.status.parsed() || command.submit.parsed();
+  if (below && !command.parser.given().empty()) {
+    throw config::ConfigError(fmt::format("{}: give options of a subcommand of `abs_hil study` after its name",
+                                          command.parser.given().front()));
+  }
+  if (command.merge.parsed()) return merge_study(command.merged);
+  if (command.status.parsed()) return show_status(command.looked_at);
+  if (command.submit.parsed()) return submit_study(command);
+  if (command.file.empty()) {
+    throw config::ConfigError("study: give a study, a TOML file (docs/studies.md), or merge, status or submit");
+  }
+  return command.run ? record(command, command_line) : run_study(command);
+}
+
+}  // namespace abs_hil::program

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/command_line.hpp"
+
+namespace abs_hil::program {
+
+/// `abs_hil study` and its subcommands as typed.
+struct StudyCommand {
+  std::string file{};
+  std::optional<std::string> folder{};  ///< --out
+  std::optional<std::string> shard{};   ///< "I/N"
+  std::size_t threads{0};               ///< 0: one for each processor
+  std::optional<int> run{};             ///< --run
+  cli::Parser parser{};
+
+  std::vector<std::string> merged{};  ///< folders of `merge`; the results go into the first
+  cli::Parser merge{};
+
+  std::string looked_at{};  ///< folder of `status`
+  cli::Parser status{};
+
+  std::string submitted{};  ///< file of `submit`
+  std::optional<std::string> submitted_folder{};
+  int array{0};
+  bool write_only{false};
+  std::vector<std::string> sbatch{};
+  cli::Parser submit{};
+};
+void add_study(cli::Parser& parser, StudyCommand& command);
+
+/// Runs the subcommand. Returns the exit status. Throws config::ConfigError, std::invalid_argument, driver::Unavailable
+/// and, for files that cannot be written, std::runtime_error.
+int study(const StudyCommand& command, const std::vector<std::string>& command_line);
+
+/// `abs_hil study submit`: writes the scripts of an array job and of the job that merges, and hands them to Slurm.
+int submit_study(const StudyCommand& command);
+/// What Slurm says about the jobs of a study's folder: a line each; empty without jobs and without Slurm.
+[[nodiscard]] std::string slurm_jobs(const std::string& folder);
+
+/// The folder of a study: the one given, or one of its name below the folder of runs. Throws config::ConfigError.
+[[nodiscard]] std::string study_folder(const std::string& file, const std::optional<std::string>& given);
+
+}  // namespace abs_hil::program

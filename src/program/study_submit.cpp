@@ -1,0 +1,165 @@
+#include <fmt/format.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <stdexcept>
+
+#include "abs_hil/driver/io_result.hpp"
+#include "config/config_error.hpp"
+#include "program/exit_status.hpp"
+#include "program/study_command.hpp"
+#include "program/study_runs.hpp"
+#include "study/compute.hpp"
+#include "study/durable_file.hpp"
+
+namespace abs_hil::program {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::string_view jobs_file = "jobs.txt";
+
+/// As a word of a shell.
+std::string quoted(const std::string& text) {
+  std::string word = "'";
+  for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return word + '\'';
+}
+
+struct Printed {
+  std::string text{};
+  int status{0};
+};
+
+/// What a command prints on stdout.
+Printed output_of(const std::string& command) {
+  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(::popen(command.c_str(), "re"), [](FILE*) { return 0; });
+  if (!pipe) throw std::runtime_error("cannot start a shell for: " + command);
+  Printed printed;
+  std::array<char, 4096> block{};
+  while (const std::size_t read = std::fread(block.data(), 1, block.size(), pipe.get())) {
+    printed.text.append(block.data(), read);
+  }
+  const int status = ::pclose(pipe.get());
+  printed.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return printed;
+}
+
+void check_options(const std::vector<std::string>& options) {
+  for (const std::string& option : options) {
+    if (!option.starts_with('-') || option.find_first_of("\r\n") != std::string::npos) {
+      throw config::ConfigError(
+          fmt::format("{}: give options of sbatch, each in one word, as in -- --partition=short --time=30", option));
+    }
+    if (option.starts_with("--array") || option.starts_with("-a") || option.starts_with("--dependency") ||
+        option.starts_with("-d")) {
+      throw config::ConfigError(fmt::format("{}: array and dependency of the jobs come from --array N", option));
+    }
+  }
+}
+
+std::string script(const std::string& name, const std::string& log, const std::vector<std::string>& own,
+                   const std::vector<std::string>& given, const std::string& command) {
+  std::string text = fmt::format("#!/bin/sh\n#SBATCH --job-name={}\n#SBATCH --output={}\n", name, log);
+  for (const auto* options : {&own, &given}) {
+    for (const std::string& option : *options) text += fmt::format("#SBATCH {}\n", option);
+  }
+  return text + "exec " + command + '\n';
+}
+
+std::string submitted(const std::string& options, const fs::path& file) {
+  const Printed printed = output_of(fmt::format("sbatch --parsable {}{}", options, quoted(file.string())));
+  constexpr int not_found = 127;
+  if (printed.status == not_found) {
+    throw driver::Unavailable(
+        fmt::format("sbatch is not here; submit on a computer of the cluster. The scripts are in "
+                    "{}",
+                    file.parent_path().string()));
+  }
+  // "ID" or "ID;CLUSTER"
+  const std::string id = printed.text.substr(0, printed.text.find_first_of(";\n"));
+  if (printed.status != 0 || id.empty()) {
+    throw driver::Unavailable(
+        fmt::format("sbatch refused {} (its words are above); give its options after --", file.string()));
+  }
+  return id;
+}
+
+/// A name that Slurm and a shell take as it is.
+std::string plain(std::string name) {
+  std::ranges::replace_if(
+      name, [](unsigned char c) { return std::isalnum(c) == 0 && c != '-' && c != '_'; }, '_');
+  return name;
+}
+
+}  // namespace
+
+int submit_study(const StudyCommand& command) {
+  check_options(command.sbatch);
+  const fs::path file = fs::absolute(command.submitted);
+  const fs::path path = fs::absolute(study_folder(command.submitted, command.submitted_folder));
+  if (path.string().find_first_of("\r\n%\\\"") != std::string::npos) {
+    throw config::ConfigError(
+        fmt::format("--out {}: Slurm takes %, \\, quotes and line ends in paths for something "
+                    "else; give a folder without them",
+                    path.string()));
+  }
+  // Everything that is wrong with the study shows here, not in a log on a node.
+  const study::Study study = make_study(study::load_study(command.submitted));
+  const study::StudyFolder folder(path, study::facts_of(study, file.stem().string()));
+  const std::vector<std::uint64_t> missing = study::missing_chunks(folder, {});
+  if (missing.empty()) {
+    folder.merge({});
+    fmt::print("study {}: complete, nothing to submit; results: {}/{}\n", file.stem().string(), path.string(),
+               study::file::results);
+    return exit_completed;
+  }
+  const int tasks =
+      static_cast<int>(std::min<std::uint64_t>(missing.size(), static_cast<std::uint64_t>(command.array)));
+  const std::string program = quoted(fs::read_symlink("/proc/self/exe").string());
+  const fs::path slurm = path / "slurm";
+  fs::create_directories(slurm);
+  const std::string name = plain(file.stem().string());
+  const fs::path array = slurm / "array.sh";
+  const fs::path merge = slurm / "merge.sh";
+  study::write_durably(array,
+                       script(name, fmt::format("\"{}/%A_%a.log\"", slurm.string()),
+                              {fmt::format("--array=1-{}", tasks), "--requeue", "--open-mode=append"}, command.sbatch,
+                              fmt::format("{} study {} --out {} --shard \"$SLURM_ARRAY_TASK_ID/{}\" --threads "
+                                          "\"${{SLURM_CPUS_PER_TASK:-1}}\"",
+                                          program, quoted(file.string()), quoted(path.string()), tasks)));
+  study::write_durably(merge, script(name + "-merge", fmt::format("\"{}/%j-merge.log\"", slurm.string()), {"--requeue"},
+                                     command.sbatch, fmt::format("{} study merge {}", program, quoted(path.string()))));
+  if (command.write_only) {
+    fmt::print("{}\n{}\n", array.string(), merge.string());
+    return exit_completed;
+  }
+  const std::string id = submitted("", array);
+  // After any end: chunks that are missing then are named, and computed by the next `submit`.
+  const std::string merge_id = submitted(fmt::format("--dependency=afterany:{} ", id), merge);
+  std::ofstream(slurm / jobs_file, std::ios::app) << id << '\n' << merge_id << '\n';
+  fmt::print("study {}: {} chunks in {} tasks of job {}, then merge in job {}; see abs_hil study status {}\n",
+             file.stem().string(), missing.size(), tasks, id, merge_id, path.string());
+  return exit_completed;
+}
+
+std::string slurm_jobs(const std::string& folder) {
+  std::ifstream file(fs::path(folder) / "slurm" / jobs_file);
+  std::string ids;
+  for (std::string id; std::getline(file, id);) {
+    const bool number = !id.empty() && id.find_first_not_of("0123456789") == std::string::npos;
+    if (number) ids += (ids.empty() ? "" : ",") + id;
+  }
+  if (ids.empty()) return {};
+  const Printed printed =
+      output_of("squeue --noheader --array --format='job %i: %T %R' --jobs=" + ids + " 2>/dev/null");
+  return printed.status == 0 ? printed.text : std::string();
+}
+
+}  // namespace abs_hil::program

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "study/study.hpp"
+#include "study/study_folder.hpp"
+
+namespace abs_hil::study {
+
+/// One of several shares of a study's chunks: every `of`-th one.
+struct Shard {
+  std::uint64_t number{1};  ///< from 1
+  std::uint64_t of{1};
+  [[nodiscard]] bool has(std::uint64_t chunk) const noexcept { return chunk % of == number - 1; }
+};
+
+/// The chunks of a shard that have no file yet, in order.
+[[nodiscard]] std::vector<std::uint64_t> missing_chunks(const StudyFolder& folder, const Shard& shard);
+
+/// What became of runs.
+struct Tally {
+  std::uint64_t runs{0};
+  std::uint64_t faults{0};   ///< ended early
+  std::uint64_t refused{0};  ///< could not begin, for their combination of values
+};
+
+/// Computes the study's own metrics of a run: `SignalMetrics` over its records. Called from several threads.
+using OwnMetrics = std::function<std::vector<double>(const Study& study, std::uint64_t run)>;
+
+/// Runs these chunks and writes each as soon as it is finished. The bytes do not depend on the threads. Memory does not
+/// grow with the number of chunks.
+/// @param own  called for the runs of a study that has metrics of its own
+/// @param done  called after each run, from several threads, with the number of finished runs
+/// Throws std::runtime_error if a file cannot be written.
+Tally compute(const Study& study, const StudyFolder& folder, const std::vector<std::uint64_t>& chunks,
+              std::size_t threads, const OwnMetrics& own, const std::function<void(std::uint64_t)>& done);
+
+}  // namespace abs_hil::study

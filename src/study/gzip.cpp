@@ -1,0 +1,89 @@
+#include "study/gzip.hpp"
+
+#include <zlib.h>
+
+#include <array>
+#include <stdexcept>
+#include <vector>
+
+namespace abs_hil::study {
+
+namespace {
+
+constexpr int gzip_window = MAX_WBITS + 16;  // zlib's way to ask for gzip's header
+constexpr int memory_level = 8;              // zlib's default
+constexpr int system_unknown = 255;
+constexpr std::size_t longest_comment = 1U << 24U;
+
+Bytef* bytes_of(const char* text) { return reinterpret_cast<Bytef*>(const_cast<char*>(text)); }
+
+}  // namespace
+
+std::string gzip_member(std::string_view content, const std::string& comment) {
+  z_stream stream{};
+  if (deflateInit2(&stream, Z_BEST_SPEED, Z_DEFLATED, gzip_window, memory_level, Z_DEFAULT_STRATEGY) != Z_OK) {
+    throw std::runtime_error("zlib cannot start to compress");
+  }
+  std::string text = comment;  // zlib takes a pointer that may write
+  gz_header header{};
+  header.os = system_unknown;
+  header.comment = bytes_of(text.data());
+  deflateSetHeader(&stream, &header);
+  std::string packed(deflateBound(&stream, content.size()) + comment.size(), '\0');
+  stream.next_in = bytes_of(content.data());
+  stream.avail_in = static_cast<uInt>(content.size());
+  stream.next_out = bytes_of(packed.data());
+  stream.avail_out = static_cast<uInt>(packed.size());
+  const int status = deflate(&stream, Z_FINISH);
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  if (status != Z_STREAM_END) throw std::runtime_error("zlib cannot compress the results");
+  return packed;
+}
+
+std::string gzip_comment(std::string_view bytes) {
+  z_stream stream{};
+  if (inflateInit2(&stream, gzip_window) != Z_OK) throw std::runtime_error("zlib cannot start to read");
+  std::vector<char> comment(bytes.size() + 1);
+  gz_header header{};
+  header.comment = bytes_of(comment.data());
+  header.comm_max = static_cast<uInt>(bytes.size());
+  inflateGetHeader(&stream, &header);
+  std::array<char, 1> nothing{};
+  stream.next_in = bytes_of(bytes.data());
+  stream.avail_in = static_cast<uInt>(bytes.size());
+  stream.next_out = bytes_of(nothing.data());
+  stream.avail_out = static_cast<uInt>(nothing.size());
+  inflate(&stream, Z_BLOCK);  // ends behind the header
+  inflateEnd(&stream);
+  if (header.done != 1 || comment.front() == '\0') throw std::runtime_error("no gzip file with a comment");
+  return comment.data();
+}
+
+GzipMember read_gzip_member(std::string_view bytes) {
+  z_stream stream{};
+  if (inflateInit2(&stream, gzip_window) != Z_OK) throw std::runtime_error("zlib cannot start to read");
+  std::vector<char> comment(std::min(longest_comment, bytes.size() + 1));
+  gz_header header{};
+  header.comment = bytes_of(comment.data());
+  header.comm_max = static_cast<uInt>(comment.size() - 1);
+  inflateGetHeader(&stream, &header);
+  GzipMember member;
+  std::array<char, 65'536> block{};
+  stream.next_in = bytes_of(bytes.data());
+  stream.avail_in = static_cast<uInt>(bytes.size());
+  int status = Z_OK;
+  while (status == Z_OK) {
+    stream.next_out = bytes_of(block.data());
+    stream.avail_out = static_cast<uInt>(block.size());
+    status = inflate(&stream, Z_NO_FLUSH);
+    member.content.append(block.data(), block.size() - stream.avail_out);
+  }
+  const bool whole = status == Z_STREAM_END && stream.avail_in == 0;
+  inflateEnd(&stream);
+  if (!whole) throw std::runtime_error("damaged or cut off");
+  member.comment = comment.data();
+  return member;
+}
+
+}  // namespace abs_hil::study

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace abs_hil::study {
+
+/// One member of a gzip file. Members after each other are a gzip file, too, which every reader takes for one. The same
+/// arguments give the same bytes with the same version of zlib: there is no time in it.
+/// @param comment  kept in the member's header, where readers of the content do not see it; without NUL
+[[nodiscard]] std::string gzip_member(std::string_view content, const std::string& comment);
+
+/// The comment of the first member. @param bytes  the beginning of a gzip file, at least its first header
+/// Throws std::runtime_error for anything else, and for a header without comment.
+[[nodiscard]] std::string gzip_comment(std::string_view bytes);
+
+struct GzipMember {
+  std::string comment{};
+  std::string content{};
+};
+/// Reads a file's content that is one whole member. Throws std::runtime_error, without a path, for anything else and
+/// for a wrong checksum.
+[[nodiscard]] GzipMember read_gzip_member(std::string_view bytes);
+
+}  // namespace abs_hil::study

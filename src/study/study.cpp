@@ -1,0 +1,150 @@
+#include "study/study.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "abs_hil/control/registry.hpp"
+#include "abs_hil/rig/quantities.hpp"
+#include "config/config_error.hpp"
+#include "config/library.hpp"
+#include "rig/nearest_name.hpp"
+#include "study/result_rows.hpp"
+
+namespace abs_hil::study {
+
+namespace {
+
+/// Results are numbered and counted in doubles, too.
+constexpr double most_runs = 1e12;
+
+std::vector<std::string> names_of_ranges(const StudyScript& script) {
+  std::vector<std::string> names;
+  for (const Factor& factor : script.factors) {
+    if (factor.has_range()) names.push_back(factor.key);
+  }
+  return names;
+}
+
+std::vector<Contender> contenders_of(const std::vector<std::string>& texts, const config::Settings& settings) {
+  if (texts.empty()) throw std::invalid_argument("--controllers: empty list; give at least one controller");
+  std::vector<Contender> contenders;
+  for (const std::string& text : texts) {
+    Contender contender = read_contender(text, settings);
+    if (std::ranges::any_of(contenders, [&](const Contender& other) { return other.name == contender.name; })) {
+      throw std::invalid_argument(fmt::format(
+          "--controllers: {0} is given twice; give each once, or a label, as in other={0}", contender.name));
+    }
+    const config::Settings& s = contender.settings;
+    static_cast<void>(control::make_controller(s.control.controller, {s.control, s.model}));
+    contenders.push_back(std::move(contender));
+  }
+  return contenders;
+}
+
+}  // namespace
+
+Study::Study(StudyScript script, std::vector<StudyCase> cases)
+    : script_(std::move(script)),
+      cases_(std::move(cases)),
+      design_(script_.design, script_.points, script_.design_seed, names_of_ranges(script_)) {
+  double runs = static_cast<double>(cases_.size()) * static_cast<double>(script_.repeat) *
+                static_cast<double>(script_.controllers.size()) * static_cast<double>(design_.rows());
+  for (const Factor& factor : script_.factors) {
+    range_of_factor_.push_back(static_cast<std::size_t>(std::ranges::count_if(
+        script_.factors.begin(), script_.factors.begin() + static_cast<std::ptrdiff_t>(range_of_factor_.size()),
+        &Factor::has_range)));
+    if (const auto* levels = std::get_if<Levels>(&factor.values)) {
+      level_combinations_ *= levels->values.size();
+      runs *= static_cast<double>(levels->values.size());
+    }
+    if (runs > most_runs) {
+      throw config::ConfigError(
+          fmt::format("{}: the study has {:.3g} runs; give at most {:.0g}", script_.path, runs, most_runs));
+    }
+  }
+  for (const StudyCase& one : cases_) {
+    plant_sim::check(one.settings.plant);
+    static_cast<void>(config::sensor_seed(one.settings));
+    if (!one.settings.inject.empty()) {
+      throw config::ConfigError(fmt::format("experiment {}: run.inject = {}: a study injects no faults; leave them out",
+                                            one.experiment, one.settings.inject));
+    }
+    contenders_.push_back(contenders_of(script_.controllers, one.settings));
+  }
+  check_metrics();
+  runs_ = cases_.size() * level_combinations_ * design_.rows() * script_.repeat * contenders_.front().size();
+  shares_settings_ = can_share_settings();
+}
+
+void Study::check_metrics() const {
+  std::vector<std::string> taken = result_columns(*this);
+  taken.resize(taken.size() - script_.metrics.size());
+  std::vector<std::string_view> known(rig::csv_columns.begin(), rig::csv_columns.end());
+  for (const Contender& contender : contenders_.front()) {
+    const config::Settings& s = contender.settings;
+    for (const rig::Signal& signal : control::make_controller(s.control.controller, {s.control, s.model})->signals()) {
+      known.push_back(signal.name);
+    }
+  }
+  for (const SignalMetric& metric : script_.metrics) {
+    const std::string place = fmt::format("{}:{}:{}", script_.path, metric.place.line, metric.place.column);
+    if (std::ranges::find(known, metric.of) == known.end()) {
+      throw config::ConfigError(
+          fmt::format("{}: of = \"{}\": no column of a run's CSV and no signal of the study's "
+                      "controllers; the nearest is \"{}\"",
+                      place, metric.of, rig::nearest_name(metric.of, known)));
+    }
+    if (std::ranges::find(taken, metric.name) != taken.end()) {
+      throw config::ConfigError(
+          fmt::format("{}: the results have a column {} already; give the metric another name", place, metric.name));
+    }
+    taken.push_back(metric.name);
+  }
+}
+
+bool Study::can_share_settings() const {
+  if (script_.factors.empty()) return true;
+  if (script_.model_follows_factors) return false;
+  config::Settings settings;
+  const config::KeyTable keys(settings);
+  const bool numbers_of_plant = std::ranges::all_of(script_.factors, [&keys](const Factor& factor) {
+    return factor.key.starts_with("plant.") &&
+           std::holds_alternative<double*>(config::find_key(keys.keys(), factor.key)->target);
+  });
+  // An experiment may look up values of the plant in the settings.
+  return numbers_of_plant && std::ranges::none_of(cases_, [](const StudyCase& one) {
+           return config::find(one.settings.experiment.name)->text.find("plant.") != std::string::npos;
+         });
+}
+
+std::uint64_t Study::runs_in(std::uint64_t chunk) const noexcept {
+  const std::uint64_t first = chunk * script_.chunk;
+  return std::min(script_.chunk, runs_ - first);
+}
+
+RunIndex Study::index_of(std::uint64_t run) const noexcept {
+  RunIndex index;
+  const auto take = [&run](std::uint64_t count) { return std::exchange(run, run / count) % count; };
+  index.contender = take(contenders_.front().size());
+  index.repetition = take(script_.repeat);
+  index.point = take(design_.rows());
+  index.levels = take(level_combinations_);
+  index.study_case = run;
+  return index;
+}
+
+config::Value Study::value_of(const RunIndex& index, std::size_t factor) const {
+  const Factor& wanted = script_.factors[factor];
+  if (wanted.has_range()) return quantile(wanted, design_.at(index.point, range_of_factor_[factor]));
+  std::uint64_t rest = index.levels;
+  for (std::size_t later = script_.factors.size() - 1; later > factor; --later) {
+    if (const auto* levels = std::get_if<Levels>(&script_.factors[later].values)) rest /= levels->values.size();
+  }
+  const auto& values = std::get<Levels>(wanted.values).values;
+  return values[rest % values.size()];
+}
+
+}  // namespace abs_hil::study

@@ -1,0 +1,204 @@
+#include "study/study_folder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+#include "config/config_error.hpp"
+#include "study/durable_file.hpp"
+#include "study/gzip.hpp"
+
+namespace abs_hil::study {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::string_view part_ending = ".csv.gz";
+
+std::string content_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::stringstream text;
+  text << file.rdbuf();
+  if (!file) throw std::runtime_error(fmt::format("cannot read \"{}\"", path.string()));
+  return text.str();
+}
+
+nlohmann::ordered_json to_json(const StudyFacts& facts) {
+  return {{"study", facts.name},      {"identity", facts.identity},
+          {"program", facts.program}, {"runs", facts.runs},
+          {"chunk", facts.chunk},     {"columns", facts.columns},
+          {"text", facts.text},       {"configurations", nlohmann::ordered_json::parse(facts.configurations)}};
+}
+
+StudyFacts read_facts(const fs::path& folder) {
+  const fs::path path = folder / file::index;
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) {
+    throw config::ConfigError(
+        fmt::format("{}: holds no study ({} is missing); give the folder of a study", folder.string(), file::index));
+  }
+  try {
+    const auto json = nlohmann::ordered_json::parse(content_of(path));
+    StudyFacts facts{.identity = json.at("identity"),
+                     .program = json.at("program"),
+                     .name = json.at("study"),
+                     .text = json.at("text"),
+                     .runs = json.at("runs"),
+                     .chunk = json.at("chunk"),
+                     .columns = json.at("columns"),
+                     .configurations = json.at("configurations").dump()};
+    if (facts.runs == 0 || facts.chunk == 0) throw std::runtime_error("no runs");
+    return facts;
+  } catch (const std::exception& problem) {
+    throw config::ConfigError(
+        fmt::format("{}: not the index of a study: {}; begin in another folder", path.string(), problem.what()));
+  }
+}
+
+}  // namespace
+
+StudyFolder::StudyFolder(fs::path path) : path_(std::move(path)), facts_(read_facts(path_)) {}
+
+StudyFolder::StudyFolder(fs::path path, StudyFacts facts) : path_(std::move(path)), facts_(std::move(facts)) {
+  std::error_code error;
+  fs::create_directories(path_, error);
+  if (error) {
+    throw config::ConfigError(fmt::format("{}: cannot create this folder: {}; give a folder that can be written",
+                                          path_.string(), error.message()));
+  }
+  if (fs::is_regular_file(path_ / file::index, error)) {
+    const StudyFacts there = read_facts(path_);
+    if (there.identity != facts_.identity) {
+      const char* what = there.program != facts_.program ? "another program"
+                         : there.text != facts_.text     ? "another study"
+                                                         : "other plants, experiments or controllers of the same names";
+      throw config::ConfigError(fmt::format("{}: holds results of {} ({}, {}); this is {}, {}: give another folder",
+                                            path_.string(), what, there.name, there.program, facts_.name,
+                                            facts_.program));
+    }
+  } else if (!fs::is_empty(path_, error) && !fs::is_directory(path_ / file::parts, error)) {
+    throw config::ConfigError(
+        fmt::format("{}: holds other files; give a new or empty folder, or that of this study", path_.string()));
+  }
+  fs::create_directories(path_ / file::parts, error);
+  if (!fs::exists(path_ / file::text, error)) write_durably(path_ / file::text, facts_.text);
+  if (!fs::exists(path_ / file::index, error)) write_durably(path_ / file::index, to_json(facts_).dump(1) + '\n');
+}
+
+bool StudyFolder::complete() const {
+  std::error_code error;
+  return fs::is_regular_file(path_ / file::results, error);
+}
+
+fs::path StudyFolder::part(std::uint64_t number) const {
+  return path_ / file::parts / fmt::format("{:08}{}", number, part_ending);
+}
+
+std::string StudyFolder::comment_of(std::uint64_t number) const {
+  return fmt::format("abs_hil study {} chunk {}", facts_.identity, number);
+}
+
+std::vector<bool> StudyFolder::finished() const {
+  std::vector<bool> finished(facts_.chunks());
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(path_ / file::parts, error)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.ends_with(part_ending)) continue;
+    std::uint64_t number = 0;
+    const auto [at, problem] = std::from_chars(name.data(), name.data() + name.size() - part_ending.size(), number);
+    const bool whole = problem == std::errc() && std::string_view(at) == part_ending;
+    if (whole && number < finished.size()) finished[number] = true;
+  }
+  return finished;
+}
+
+void StudyFolder::write_chunk(std::uint64_t number, std::string_view rows) const try {
+  write_durably(part(number), gzip_member(rows, comment_of(number)));
+} catch (const std::runtime_error&) {
+  // Another process may have merged the chunks meanwhile; then this one, written again, is in the results already.
+  if (!complete()) throw;
+}
+
+std::string StudyFolder::checked_chunk(std::uint64_t number, const fs::path& file) const {
+  std::string bytes = content_of(file);
+  const auto refuse = [&file](const std::string& why) {
+    throw std::runtime_error(fmt::format("{}: {}; remove this file and run the study again", file.string(), why));
+  };
+  GzipMember member;
+  try {
+    member = read_gzip_member(bytes);
+  } catch (const std::runtime_error& error) {
+    refuse(error.what());
+  }
+  if (member.comment != comment_of(number)) refuse("belongs to another study, another program or another chunk");
+  const std::uint64_t first = number * facts_.chunk;
+  std::uint64_t rows = 0;
+  for (std::size_t at = 0; at < member.content.size(); ++rows) {
+    if (!std::string_view(member.content).substr(at).starts_with(fmt::format("{},", first + rows))) {
+      refuse(fmt::format("row {} is not that of run {}", rows + 1, first + rows));
+    }
+    at = std::min(member.content.find('\n', at), member.content.size() - 1) + 1;
+  }
+  if (rows != facts_.runs_in(number)) refuse(fmt::format("{} rows in place of {}", rows, facts_.runs_in(number)));
+  return bytes;
+}
+
+void StudyFolder::merge(const std::vector<StudyFolder>& others) const {
+  std::error_code error;
+  if (!complete()) {
+    std::vector<const StudyFolder*> folders{this};
+    for (const StudyFolder& other : others) folders.push_back(&other);
+    std::vector<std::vector<bool>> finished;
+    for (const StudyFolder* folder : folders) {
+      if (folder->facts_.identity != facts_.identity) {
+        throw config::ConfigError(fmt::format("{}: holds another study than {}, or another program's results",
+                                              folder->path_.string(), path_.string()));
+      }
+      finished.push_back(folder->finished());
+    }
+    std::vector<std::uint64_t> missing;
+    std::vector<std::size_t> source(facts_.chunks());
+    for (std::uint64_t number = 0; number < facts_.chunks(); ++number) {
+      while (source[number] < folders.size() && !finished[source[number]][number]) ++source[number];
+      if (source[number] == folders.size()) missing.push_back(number);
+    }
+    if (!missing.empty()) {
+      throw std::runtime_error(
+          fmt::format("{}: {} of {} chunks are missing: {}; run the study again with --out {}, it "
+                      "computes these alone",
+                      path_.string(), missing.size(), facts_.chunks(), list_of(missing), path_.string()));
+    }
+    DurableFile results(path_ / file::results);
+    std::string header = fmt::format("{}\n", fmt::join(facts_.columns, ","));
+    // A file of its own then says what it is. ASCII, since readers take a comment for Latin-1.
+    results.append(gzip_member(header, to_json(facts_).dump(-1, ' ', true)));
+    for (std::uint64_t number = 0; number < facts_.chunks(); ++number) {
+      results.append(checked_chunk(number, folders[source[number]]->part(number)));
+    }
+    results.commit();
+  }
+  fs::remove_all(path_ / file::parts, error);
+}
+
+std::string list_of(const std::vector<std::uint64_t>& numbers) {
+  constexpr std::size_t most_shown = 6;
+  std::vector<std::string> shown;
+  std::size_t at = 0;
+  for (; at < numbers.size() && shown.size() < most_shown;) {
+    std::size_t last = at;
+    while (last + 1 < numbers.size() && numbers[last + 1] == numbers[last] + 1) ++last;
+    shown.push_back(last == at ? fmt::format("{}", numbers[at]) : fmt::format("{} to {}", numbers[at], numbers[last]));
+    at = last + 1;
+  }
+  return fmt::format("{}{}", fmt::join(shown, ", "),
+                     at < numbers.size() ? fmt::format(" and {} more", numbers.size() - at) : std::string());
+}
+
+}  // namespace abs_hil::study

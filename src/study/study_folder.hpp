@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "study/study.hpp"
+
+namespace abs_hil::study {
+
+/// File names in a study's folder (docs/studies.md).
+namespace file {
+inline constexpr std::string_view index = "study.json";
+inline constexpr std::string_view text = "study.toml";
+inline constexpr std::string_view parts = "parts";
+inline constexpr std::string_view results = "results.csv.gz";
+}  // namespace file
+
+/// What study.json says: all that results of different processes must have in common.
+struct StudyFacts {
+  std::string identity{};  ///< SHA-256 of everything that the results depend on, this program included
+  std::string program{};   ///< version and revision
+  std::string name{};
+  std::string text{};  ///< of the study's file
+  std::uint64_t runs{0};
+  std::uint64_t chunk{0};
+  std::vector<std::string> columns{};
+  std::string configurations{};  ///< effective configuration of each case, as JSON
+
+  [[nodiscard]] std::uint64_t chunks() const noexcept { return (runs + chunk - 1) / chunk; }
+  [[nodiscard]] std::uint64_t runs_in(std::uint64_t number) const noexcept;
+};
+
+/// @param name  of the study, for people
+[[nodiscard]] StudyFacts facts_of(const Study& study, const std::string& name);
+
+/// The folder of a study: study.json, study.toml, a file in parts/ for every finished chunk of runs, and at the end
+/// results.csv.gz in their place. Every file appears whole or not at all, so any number of processes on any computers
+/// may work in it at the same time, end at any moment and begin again.
+/// All members throw std::runtime_error with path and reason for a folder that cannot be read or written.
+class StudyFolder {
+ public:
+  /// Opens the folder for a study, or creates it. Throws config::ConfigError for the folder of another study or
+  /// program, and for one that holds other files.
+  StudyFolder(std::filesystem::path path, StudyFacts facts);
+  /// Opens a folder that exists. Throws config::ConfigError if it holds no study.
+  explicit StudyFolder(std::filesystem::path path);
+
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+  [[nodiscard]] const StudyFacts& facts() const noexcept { return facts_; }
+  /// True if results.csv.gz is there.
+  [[nodiscard]] bool complete() const;
+  /// By chunk: true if its file is there.
+  [[nodiscard]] std::vector<bool> finished() const;
+  /// Writes the file of a chunk. @param rows  its rows of CSV, in order
+  void write_chunk(std::uint64_t number, std::string_view rows) const;
+  /// Puts the chunks together that lie in this and the other folders, and then removes the parts of this one. Each
+  /// chunk is checked first. Memory does not grow with the runs. Throws std::runtime_error if chunks are missing,
+  /// damaged or of another study, and config::ConfigError if a folder is; then nothing changes.
+  void merge(const std::vector<StudyFolder>& others) const;
+
+ private:
+  [[nodiscard]] std::filesystem::path part(std::uint64_t number) const;
+  [[nodiscard]] std::string comment_of(std::uint64_t number) const;
+  [[nodiscard]] std::string checked_chunk(std::uint64_t number, const std::filesystem::path& file) const;
+
+  std::filesystem::path path_;
+  StudyFacts facts_;
+};
+
+/// "3, 17 to 20 and 812 more": numbers of chunks for messages.
+[[nodiscard]] std::string list_of(const std::vector<std::uint64_t>& numbers);
+
+}  // namespace abs_hil::study
