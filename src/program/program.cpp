@@ -12,6 +12,7 @@
 #include "abs_hil/driver/io_result.hpp"
 #include "cli/command_line.hpp"
 #include "config/config_error.hpp"
+#include "interchange/foreign_controller.hpp"
 #include "program/compare_command.hpp"
 #include "program/exit_status.hpp"
 #include "program/inspection_commands.hpp"
@@ -121,6 +122,7 @@ int program::run_program(int argc, char** argv, std::span<const control::Control
   spdlog::set_pattern("%n: %^%l%$: %v");
   try {
     for (const control::ControllerEntry& entry : own) control::register_controller(entry);
+    interchange::register_foreign_controllers();
     for (const driver::Backend& board : boards) driver::register_backend(board);
     return dispatch(argc, argv);
   } catch (const config::ConfigError& error) {
