@@ -4,6 +4,7 @@ import struct
 import unittest
 
 from foreign import broken, example  # first: it reads the arguments
+
 from program import ProgramTest
 
 BRAKE = ['--set', 'experiment.start_speed_rad_s=170']
