@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "interchange/fmu_code.hpp"
 #include "interchange/library_code.hpp"
 #include "runtime/clock.hpp"
 
@@ -67,7 +68,8 @@ StepTimes warm_up(ForeignCode& code, double period_s, std::int64_t steps) {
 
 std::unique_ptr<ForeignCode> load_here(const ForeignSetup& setup) {
   if (setup.file.extension() == ".so") return load_library(setup);
-  throw std::invalid_argument(setup.file.string() + ": give a shared library (.so)");
+  if (setup.file.extension() == ".fmu") return load_fmu(setup);
+  throw std::invalid_argument(setup.file.string() + ": give a shared library (.so) or an FMU (.fmu)");
 }
 
 }  // namespace abs_hil::interchange

@@ -15,6 +15,7 @@ namespace abs_hil::interchange {
 /// What foreign code is told when it is made.
 struct ForeignSetup {
   std::filesystem::path file{};
+  std::filesystem::path folder{};   ///< of an extracted FMU
   std::filesystem::path mapping{};  ///< TOML file with an FMU's names; empty: none
   double period_s{0.0};
   std::vector<std::pair<std::string, double>> parameters{};  ///< keys of `control.` and `model.`

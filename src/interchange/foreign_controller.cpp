@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "abs_hil/control/registry.hpp"
+#include "interchange/fmu_facts.hpp"
 #include "interchange/hosted_code.hpp"
 #include "interchange/library_code.hpp"
 #include "runtime/clock.hpp"
@@ -37,9 +38,16 @@ ForeignSetup setup_of(const std::string& file, const control::ControllerContext&
   return setup;
 }
 
-/// Everything that can be checked without running the file's code.
-void check(const ForeignSetup& setup) {
-  if (setup.file.extension() == ".so") check_library(setup.file);
+/// Everything that can be checked without running the file's code. Unpacks an FMU.
+std::unique_ptr<ExtractedFmu> check(ForeignSetup& setup) {
+  if (setup.file.extension() == ".so") {
+    check_library(setup.file);
+    return nullptr;
+  }
+  auto fmu = std::make_unique<ExtractedFmu>(setup.file);
+  setup.folder = fmu->folder();
+  static_cast<void>(facts_of(setup.file, setup.folder, setup.mapping));
+  return fmu;
 }
 
 abs_hil_input foreign_input(const control::SlipInput& in, double time_s) noexcept {
@@ -63,8 +71,10 @@ abs_hil_input foreign_input(const control::SlipInput& in, double time_s) noexcep
 }  // namespace
 
 ForeignController::ForeignController(const std::string& file, const control::ControllerContext& context, Home home)
-    : file_(file), setup_(setup_of(file, context)), step_times_(std::make_unique<runtime::LatencyHistogram>()) {
-  check(setup_);
+    : file_(file),
+      setup_(setup_of(file, context)),
+      fmu_(check(setup_)),
+      step_times_(std::make_unique<runtime::LatencyHistogram>()) {
   code_ = home == Home::own_process ? std::make_unique<HostedCode>(setup_) : load_here(setup_);
   for (const std::string& name : code_->signals()) signals_.push_back({name, "signal of the controller's own"});
   try {
@@ -98,8 +108,10 @@ control::SlipOutput ForeignController::step(const control::SlipInput& input) noe
 ForeignTrial ForeignController::try_out() {
   ForeignTrial trial;
   HostedCode apart(setup_);
-  trial.offences = apart.probe(setup_.period_s, trial_steps);
+  static_cast<void>(apart.warm_up_there(setup_.period_s, trial_steps));
   if (!apart.failure().empty()) throw std::invalid_argument(fmt::format("{}: in a trial {}", file_, apart.failure()));
+  trial.offences = apart.probe(setup_.period_s, trial_steps);
+  trial.died_without_system = !apart.failure().empty();
   auto* hosted = dynamic_cast<HostedCode*>(code_.get());
   trial.times = hosted != nullptr ? hosted->warm_up_there(setup_.period_s, trial_steps)
                                   : warm_up(*code_, setup_.period_s, trial_steps);
@@ -120,6 +132,7 @@ void register_foreign_controllers() {
     return std::make_unique<ForeignController>(file, context, chosen_home.load());
   };
   control::register_controller_files({".so", make});
+  control::register_controller_files({".fmu", make});
 }
 
 void set_home(Home home) noexcept { chosen_home.store(home); }

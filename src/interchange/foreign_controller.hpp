@@ -6,6 +6,7 @@
 
 #include "abs_hil/control/controller_context.hpp"
 #include "abs_hil/control/slip_controller.hpp"
+#include "interchange/extracted_fmu.hpp"
 #include "interchange/foreign_code.hpp"
 #include "interchange/host_protocol.hpp"
 #include "runtime/latency_histogram.hpp"
@@ -22,6 +23,7 @@ enum class Home {
 struct ForeignTrial {
   StepTimes times{};
   Offences offences{};
+  bool died_without_system{false};  ///< the code did not bear it that its system calls failed: it needs them
 };
 
 /// Code from a file as a slip controller.
@@ -46,6 +48,7 @@ class ForeignController final : public control::SlipController {
  private:
   std::string file_;
   ForeignSetup setup_;
+  std::unique_ptr<ExtractedFmu> fmu_;  ///< outlives the code
   std::unique_ptr<ForeignCode> code_;
   std::vector<rig::Signal> signals_;
   std::unique_ptr<runtime::LatencyHistogram> step_times_;

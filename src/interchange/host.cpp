@@ -47,6 +47,7 @@ Offences probe(ForeignCode& code, const HostRequest& request, const std::functio
 
 ForeignSetup setup_of(const nlohmann::json& json) {
   return {.file = json.at("file").get<std::string>(),
+          .folder = json.at("folder").get<std::string>(),
           .mapping = json.at("mapping").get<std::string>(),
           .period_s = json.at("period_s").get<double>(),
           .parameters = json.at("parameters").get<std::vector<std::pair<std::string, double>>>()};

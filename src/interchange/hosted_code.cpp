@@ -93,6 +93,7 @@ HostedCode::HostedCode(const ForeignSetup& setup) {
     ::close(std::exchange(ends[1], -1));
     const std::string text = nlohmann::json{
         {"file", std::filesystem::absolute(setup.file).string()},
+        {"folder", setup.folder.string()},
         {"mapping", setup.mapping.empty() ? std::string() : std::filesystem::absolute(setup.mapping).string()},
         {"period_s", setup.period_s},
         {"parameters",

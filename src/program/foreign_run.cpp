@@ -34,6 +34,12 @@ void ForeignRun::look_at(const experiment::RunLogicParts& logic) {
     spdlog::warn("controller {}: {} system calls in {} trial steps, the first one number {}: the kernel can delay them",
                  controller_->file(), found.system_calls, trial_->times.steps, found.first_system_call);
   }
+  if (trial_->died_without_system) {
+    spdlog::warn(
+        "controller {}: it died in a trial in which its system calls failed: it needs them, and the kernel can "
+        "delay them",
+        controller_->file());
+  }
   spdlog::info("controller {}: steps took {:.1f} us at most in a trial of {}", controller_->file(),
                us(trial_->times.worst_ns), trial_->times.steps);
 }
@@ -57,7 +63,8 @@ nlohmann::ordered_json ForeignRun::summary() const {
                        {"p99", us(trial_->times.p99_ns)},
                        {"max", us(trial_->times.worst_ns)}}},
                      {"allocations", trial_->offences.allocations},
-                     {"system_calls", trial_->offences.system_calls}};
+                     {"system_calls", trial_->offences.system_calls},
+                     {"died_without_system_calls", trial_->died_without_system}};
   }
   if (const std::string why = failure(); !why.empty()) json["failure"] = why;
   return json;

@@ -87,6 +87,7 @@ class FmuTest(ProgramTest):
         for fmi in (2, 3):
             plant, law = self.pair(fmi)
             _, whole, speeds = stop(plant, law, ideal_sensors=False, end_speed_m_s=10)
+            steps = len(speeds) - 1
             for instance in (plant, law):
                 get, put, size, free = (('getFMUstate', 'setFMUstate', 'serializeFMUstate', 'freeFMUstate') if fmi == 2 else
                                         ('getFMUState', 'setFMUState', 'serializeFMUState', 'freeFMUState'))
@@ -96,7 +97,7 @@ class FmuTest(ProgramTest):
                 outputs = [v.name for v in instance.description.modelVariables if v.causality == 'output']
                 before = [instance.get(name) for name in outputs]
 
-                def go_on(instance=instance, outputs=outputs, n=len(speeds) - 1):
+                def go_on(instance=instance, outputs=outputs, n=steps):
                     for k in range(20):
                         instance.step((n + k) * 1e-3, 1e-3)
                     return [instance.get(name) for name in outputs]

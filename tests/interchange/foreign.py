@@ -11,8 +11,9 @@ del sys.argv[2:4]
 sys.path.insert(0, str(SOURCE / 'tests' / 'app'))
 
 # What BROKEN names in broken_controllers.c
-BROKEN = ('SOUND VERSION SIZE NO_INTERFACE NO_STEP REFUSES DIES_IN_CREATE DIES_IN_STEP NOT_FINITE '
-               'HANGS ALLOCATES CALLS_SYSTEM BAD_SIGNAL MANY_SIGNALS EXITS MAGIC DIES_LATE').split()
+BROKEN = ['SOUND', 'VERSION', 'SIZE', 'NO_INTERFACE', 'NO_STEP', 'REFUSES', 'DIES_IN_CREATE', 'DIES_IN_STEP',
+          'NOT_FINITE', 'HANGS', 'ALLOCATES', 'CALLS_SYSTEM', 'BAD_SIGNAL', 'MANY_SIGNALS', 'EXITS', 'MAGIC',
+          'DIES_LATE']
 
 
 def compiled(folder, source, name, *options):
