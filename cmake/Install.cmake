@@ -12,6 +12,8 @@ foreach(optional abs_rig_emulator abs_guardian)
   endif()
 endforeach()
 install(TARGETS ${programs} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
+# Nobody calls it by hand.
+install(TARGETS abs_controller_host RUNTIME DESTINATION ${CMAKE_INSTALL_LIBDIR}/abs_hil COMPONENT runtime)
 install(DIRECTORY config/ DESTINATION ${CMAKE_INSTALL_DATADIR}/abs_hil/config COMPONENT runtime PATTERN udev EXCLUDE)
 install(FILES config/udev/70-abs-hil.rules DESTINATION ${ABS_HIL_UDEV_DIR} COMPONENT runtime)
 install(FILES packaging/guardian.toml DESTINATION ${CMAKE_INSTALL_DATADIR}/abs_hil COMPONENT runtime)
@@ -44,7 +46,7 @@ if(HELP2MAN_EXECUTABLE)
   endforeach()
   set(python_pages)
   if(ABS_HIL_PYTHON AND NOT SKBUILD)
-    foreach(program abs_report abs_tune abs_learn abs_identify)
+    foreach(program abs_report abs_tune abs_learn abs_identify abs_convert)
       set(page ${CMAKE_BINARY_DIR}/man/${program}.1)
       add_custom_command(OUTPUT ${page}.gz
         COMMAND ${CMAKE_COMMAND} -E make_directory ${CMAKE_BINARY_DIR}/man

@@ -22,10 +22,11 @@ set(ABS_HIL_ROOM_TABLE
   "study | simulated runs in this process: studies and their designs, chunks and folders, controllers side by side over varied plants | rig control plant_sim driver driver_sim runtime guardian experiment analysis run_folder config"
   "commands | remote commands over LCM: authority, listener, sender | rig control plant_sim driver runtime guardian experiment config telemetry lcmtypes"
   "replay | recorded runs through the cycle again: proof of equal commands, other controllers open loop | rig control plant_sim driver driver_sim runtime guardian experiment config telemetry lcmtypes"
+  "interchange | what other tools bring or take: controllers from shared libraries and FMUs, the process that runs them, plant and laws as FMUs | rig control plant_sim driver driver_sim runtime experiment"
   "guardian_program | the program abs_guardian: the guardian of one run, the resident service, systemd and suspension | cli rig control plant_sim driver runtime guardian experiment lcmtypes telemetry config"
-  "program | what `abs_hil` decides between its command line and the other rooms | cli rig control plant_sim driver driver_sim runtime guardian experiment lcmtypes telemetry watch analysis run_folder diagnosis config study commands replay guardian_program"
+  "program | what `abs_hil` decides between its command line and the other rooms | cli rig control plant_sim driver driver_sim runtime guardian experiment lcmtypes telemetry watch analysis run_folder diagnosis config study commands replay interchange guardian_program"
 )
 
 # Rooms whose code neither runs in the cycle nor takes a noticeable time beside it. A release compiles them with -O1,
 # which saves about a third of their compile time.
-set(ABS_HIL_ROOMS_BESIDE_THE_CYCLE cli watch analysis run_folder diagnosis config study commands replay guardian_program program)
+set(ABS_HIL_ROOMS_BESIDE_THE_CYCLE cli watch analysis run_folder diagnosis config study commands replay interchange guardian_program program)

@@ -1,4 +1,4 @@
-"""The programs in Python: abs_report, abs_tune, abs_learn, abs_identify. `abs_hil report ...` starts them too."""
+"""The programs in Python: abs_report, abs_tune, abs_learn, abs_identify, abs_convert. `abs_hil report ...` starts them too."""
 from __future__ import annotations
 
 import importlib
@@ -7,7 +7,7 @@ import sys
 
 #: name -> module with main(arguments) -> exit status
 PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn': 'abs_hil.learning.program',
-            'identify': 'abs_hil.identification.program'}
+            'identify': 'abs_hil.identification.program', 'convert': 'abs_hil.interchange.program'}
 
 
 def start(name: str, arguments: list[str]) -> int:
@@ -41,3 +41,7 @@ def learn() -> None:
 
 def identify() -> None:
     sys.exit(start('identify', sys.argv[1:]))
+
+
+def convert() -> None:
+    sys.exit(start('convert', sys.argv[1:]))

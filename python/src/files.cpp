@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "abs_hil/event_t.hpp"
 #include "abs_hil/experiment_t.hpp"
 #include "abs_hil/measurement_t.hpp"
 #include "abs_hil/phase_t.hpp"
@@ -191,6 +192,42 @@ py::tuple read_log(const std::string& path) {
   return columns.result(damage);
 }
 
+/// What an event log says besides the rows of read_log: numbers of its telemetry messages, and events.
+py::dict read_log_facts(const std::string& path) {
+  std::vector<std::int64_t> cycles;
+  std::vector<std::int64_t> sequences;
+  std::int64_t start_us = 0;
+  std::vector<std::pair<double, event_t>> events;
+  {
+    const py::gil_scoped_release release;
+    telemetry::EventLogReader log(path);
+    try {
+      while (const auto event = log.next()) {
+        telemetry_t message{};
+        event_t reported{};
+        if (event->channel.ends_with("TELEMETRY") && telemetry::decode_checked(event->data, message).empty()) {
+          if (cycles.empty()) start_us = event->timestamp_us - std::llround(message.time_s * 1e6);
+          cycles.push_back(message.cycle);
+          sequences.push_back(message.sequence);
+        } else if (event->channel.ends_with("EVENT") && telemetry::decode_checked(event->data, reported).empty()) {
+          events.emplace_back(reported.time_s, reported);
+        }
+      }
+    } catch (const telemetry::RecordingError&) {  // read_log says so
+    }
+  }
+  py::list told;
+  for (const auto& [time_s, event] : events) {
+    told.append(py::make_tuple(time_s, py::bytes(event.kind), event.reason, py::bytes(event.message)));
+  }
+  py::dict facts;
+  facts["start_us"] = start_us;
+  facts["cycles"] = py::array_t<std::int64_t>(static_cast<py::ssize_t>(cycles.size()), cycles.data());
+  facts["sequences"] = py::array_t<std::int64_t>(static_cast<py::ssize_t>(sequences.size()), sequences.data());
+  facts["events"] = told;
+  return facts;
+}
+
 using Column = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 /// The figures of merit of rows, as a run's summary has them.
@@ -276,6 +313,7 @@ py::tuple profile_of(const std::string& text, const std::string& key) {
 void add_files(py::module_& module) {
   module.def("read_csv", &read_csv, py::arg("path"));
   module.def("read_log", &read_log, py::arg("path"));
+  module.def("read_log_facts", &read_log_facts, py::arg("path"));
   module.def("metrics_of", &metrics_of, py::arg("columns"), py::arg("r2_m"), py::arg("end_speed_m_s"));
   module.def("csv_rows", &csv_rows, py::arg("columns"));
   module.def("profile_of", &profile_of, py::arg("text"), py::arg("key"));

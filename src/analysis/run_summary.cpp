@@ -111,6 +111,7 @@ nlohmann::ordered_json to_json(const RunSummary& s) {
                               {"checks_unjudged", number_or_null(s.checks_unjudged)},
                               {"config", s.config}};
   if (!s.friction_curve.is_null()) json["friction_curve"] = s.friction_curve;
+  if (!s.foreign_controller.is_null()) json["foreign_controller"] = s.foreign_controller;
   json["model"] = s.model.empty() ? s.plant : s.model;
   json["model_differences"] = s.model_differences;
   json["missing"] = nlohmann::ordered_json::object();
@@ -160,6 +161,12 @@ std::string to_text(const RunSummary& s) {
   } else {
     add_timing(s.timing, line);
     if (!s.realtime) line("real time", "NOT obtained: expect late cycles");
+  }
+  if (!s.foreign_controller.is_null() && !s.virtual_time) {
+    const nlohmann::ordered_json& steps = s.foreign_controller["step_us"];
+    line("controller's steps",
+         fmt::format("p50 {:.0f}, p99 {:.0f}, p99.9 {:.0f}, max {:.0f} us", steps["p50"].get<double>(),
+                     steps["p99"].get<double>(), steps["p99_9"].get<double>(), steps["max"].get<double>()));
   }
   if (!s.truth_known) line("note", "speeds and slip are estimates: this backend has no true values");
   return text;

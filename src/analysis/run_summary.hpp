@@ -36,8 +36,9 @@ struct RunSummary {
   std::string model{};                      ///< name of the controllers' model; empty: the plant
   /// Where the model differs from the plant, as {"theta_N": {"model": 23, "plant": 40}}; null: the plant is unknown.
   nlohmann::ordered_json model_differences{};
-  std::string model_note{};   ///< the same in words; empty: nowhere
-  double end_speed_m_s{0.0};  ///< below this speed the car has stopped
+  std::string model_note{};                     ///< the same in words; empty: nowhere
+  nlohmann::ordered_json foreign_controller{};  ///< facts of a controller from a file; null: it is not from a file
+  double end_speed_m_s{0.0};                    ///< below this speed the car has stopped
 };
 
 /// The summary as JSON, field names as in docs/telemetry.md; NaN becomes null.

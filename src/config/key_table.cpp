@@ -183,7 +183,7 @@ void KeyTable::set(std::string_view name, const Value& value, std::string_view o
           *target = *flag;
         } else if constexpr (std::is_same_v<Target, std::string>) {
           const auto* text = std::get_if<std::string>(&value);
-          if (text == nullptr || !key.allowed.contains(*text)) {
+          if (text == nullptr || !key.allows(*text)) {
             refuse(key, value_text(value), rig::valid_name_text(key), origin);
           }
           if (!is_utf8(*text)) {

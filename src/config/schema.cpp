@@ -44,13 +44,24 @@ Json number(const Field& field, bool unit_is_named) {
 
 Json list_of(Json items) { return {{"type", "array"}, {"items", std::move(items)}, {"minItems", 1}}; }
 
+/// A text that names a file with one of the endings.
+Json files_of(const rig::FileEndings& files) {
+  std::string pattern;
+  for (const std::string_view ending : files.endings) {
+    if (!ending.empty()) pattern.append(pattern.empty() ? "" : "|").append(".\\").append(ending).append("$");
+  }
+  return {{"type", "string"}, {"pattern", pattern}};
+}
+
 Json schema_of(const Key& key) {
   Json json = std::visit(
       [&key](const auto* target) -> Json {
         using Target = std::decay_t<decltype(*target)>;
         if constexpr (std::is_same_v<Target, bool>) return {{"type", "boolean"}};
         if constexpr (std::is_same_v<Target, std::string>) {
-          return key.allowed.empty() ? Json{{"type", "string"}} : Json{{"enum", key.allowed.list()}};
+          if (key.allowed.empty()) return {{"type", "string"}};
+          Json names{{"enum", key.allowed.list()}};
+          return key.files.endings.front().empty() ? names : Json{{"anyOf", {names, files_of(key.files)}}};
         }
         Json number = bounds(key.range);
         if constexpr (std::is_integral_v<Target>) number["type"] = "integer";

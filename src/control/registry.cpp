@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "control/adaptive_actuator_controller.hpp"
@@ -51,6 +52,11 @@ std::vector<ControllerEntry>& table() noexcept {
   return entries;
 }
 
+std::vector<ControllerFiles>& file_table() noexcept {
+  static std::vector<ControllerFiles> entries;
+  return entries;
+}
+
 std::string unknown_name_message(std::string_view name) {
   const auto nearest = std::ranges::min_element(
       table(), {}, [name](const ControllerEntry& entry) { return rig::edit_distance(name, entry.name); });
@@ -78,7 +84,33 @@ void register_controller(const ControllerEntry& entry) {
   table().push_back(entry);
 }
 
+void register_controller_files(const ControllerFiles& files) {
+  if (files.make == nullptr || !is_controller_file(std::string("x").append(files.ending))) {
+    throw std::invalid_argument("controllers cannot come from files *" + std::string(files.ending));
+  }
+  if (std::ranges::find(file_table(), files.ending, &ControllerFiles::ending) == file_table().end()) {
+    file_table().push_back(files);
+  }
+}
+
+bool is_controller_file(std::string_view name) noexcept {
+  bool fits = false;
+  rig::for_each_row<ControlOptions>([&](const auto& row) {
+    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(row)>, rig::OptionRow<ControlOptions, std::string>>) {
+      if (row.member == &ControlOptions::controller) fits = row.facts.files.fit(name);
+    }
+  });
+  return fits;
+}
+
 std::unique_ptr<SlipController> make_controller(std::string_view name, const ControllerContext& context) {
+  if (is_controller_file(name)) {
+    for (const ControllerFiles& files : file_table()) {
+      if (name.ends_with(files.ending)) return files.make(std::string(name), context);
+    }
+    throw std::invalid_argument("controller " + std::string(name) +
+                                ": this program takes no controllers from files; abs_hil does");
+  }
   const auto entry = std::ranges::find(table(), name, &ControllerEntry::name);
   if (entry == table().end()) throw std::invalid_argument(unknown_name_message(name));
   return entry->make(context);

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "abs_hil/control/registry.hpp"
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "config/events.hpp"
@@ -88,15 +89,17 @@ void check_together(const RunRequest& request) {
 
 /// The policy of the board, after all settings are known.
 void apply_board_policy(config::Settings& s, const config::KeyTable& keys, bool virtual_time) {
-  runtime::refuse_unsafe_use({.driver = s.driver,
-                              .guarded = s.guardian.enabled,
-                              .virtual_time = virtual_time,
-                              .rate_Hz = s.control.rate_Hz,
-                              .guardian_timeout_ms = s.guardian.timeout_ms,
-                              .sample_age_max_s = s.gate.sample_age_max_s,
-                              .unsafe = s.unsafe,
-                              .start_speed_rad_s = s.experiment.start_speed_rad_s,
-                              .injections = driver::parse_injections(s.inject)});
+  runtime::refuse_unsafe_use(
+      {.driver = s.driver,
+       .guarded = s.guardian.enabled,
+       .virtual_time = virtual_time,
+       .rate_Hz = s.control.rate_Hz,
+       .guardian_timeout_ms = s.guardian.timeout_ms,
+       .sample_age_max_s = s.gate.sample_age_max_s,
+       .unsafe = s.unsafe,
+       .start_speed_rad_s = s.experiment.start_speed_rad_s,
+       .injections = driver::parse_injections(s.inject),
+       .controller_file = control::is_controller_file(s.control.controller) ? s.control.controller : ""});
   runtime::refuse_caps_above_board({.brake = keys.was_set("gate.brake_duty_max") ? s.gate.brake_duty_max : 0.0,
                                     .motor = keys.was_set("gate.motor_duty_max") ? s.gate.motor_duty_max : 0.0},
                                    s.driver);

@@ -36,7 +36,12 @@ std::string value_of(const config::Key& key) {
 std::string valid_of(const config::Key& key) {
   if (std::holds_alternative<bool*>(key.target)) return "true or false";
   if (!std::holds_alternative<std::string*>(key.target)) return key.range.text();
-  return key.allowed.empty() ? "text" : fmt::format("{}", fmt::join(key.allowed.list(), " | "));
+  if (key.allowed.empty()) return "text";
+  std::string text = fmt::format("{}", fmt::join(key.allowed.list(), " | "));
+  for (const std::string_view ending : key.files.endings) {
+    if (!ending.empty()) text.append(" | FILE").append(ending);
+  }
+  return text;
 }
 
 void list_keys() {

@@ -12,8 +12,10 @@
 #include "abs_hil/driver/io_result.hpp"
 #include "cli/command_line.hpp"
 #include "config/config_error.hpp"
+#include "interchange/foreign_controller.hpp"
 #include "program/compare_command.hpp"
 #include "program/exit_status.hpp"
+#include "program/export_fmu.hpp"
 #include "program/inspection_commands.hpp"
 #include "program/live_commands.hpp"
 #include "program/python_programs.hpp"
@@ -65,6 +67,8 @@ int dispatch(int argc, char** argv) {
   program::add_replay(parser, replay_command);
   program::ConvertCommand convert_command;
   program::add_convert(parser, convert_command);
+  program::ExportFmuCommand export_command;
+  program::add_export_fmu(parser, export_command);
   watch::WatchOptions watch_options;
   const cli::Parser watch = program::add_watch(parser, watch_options);
   program::SendCommand send;
@@ -107,6 +111,7 @@ int dispatch(int argc, char** argv) {
   }
   if (replay_command.parser.parsed()) return program::replay_run(replay_command);
   if (convert_command.parser.parsed()) return program::convert(convert_command);
+  if (export_command.parser.parsed()) return program::export_fmu(export_command);
   program::RunRequest request = program::merge(options);
   request.command_line.assign(argv, argv + argc);
   return request.script->series.given ? program::run_series(options, request) : program::run(request);
@@ -128,6 +133,7 @@ int program::run_program(int argc, char** argv, std::span<const control::Control
   spdlog::set_pattern("%n: %^%l%$: %v");
   try {
     for (const control::ControllerEntry& entry : own) control::register_controller(entry);
+    interchange::register_foreign_controllers();
     for (const driver::Backend& board : boards) driver::register_backend(board);
     return dispatch(argc, argv);
   } catch (const config::ConfigError& error) {

@@ -90,10 +90,16 @@ int replay_run(const ReplayCommand& command) {
 }
 
 void add_convert(cli::Parser& parser, ConvertCommand& command) {
-  command.parser = parser.add_subcommand("convert", "convert an event log (.lcmlog) to CSV or back, without loss");
+  command.parser = parser.add_subcommand(
+      "convert",
+      "convert an event log (.lcmlog) to CSV or back, without loss; a run to .mcap or .parquet (abs_convert --help)");
   command.parser.add(
       {.names = "from", .to = &command.from, .help = "event log, run folder or CSV", .type = "IN", .required = true});
-  command.parser.add({.names = "to", .to = &command.to, .help = "CSV or event log", .type = "OUT", .required = true});
+  command.parser.add({.names = "to",
+                      .to = &command.to,
+                      .help = "CSV or event log; FILE.mcap or FILE.parquet",
+                      .type = "OUT",
+                      .required = true});
 }
 
 int convert(const ConvertCommand& command) {

@@ -21,6 +21,7 @@
 #include "guardian/kept_board.hpp"
 #include "program/board_notes.hpp"
 #include "program/exit_status.hpp"
+#include "program/foreign_run.hpp"
 #include "program/questions.hpp"
 #include "program/run_monitor.hpp"
 #include "program/run_outputs.hpp"
@@ -132,7 +133,8 @@ void require_resources(const RunRequest& request, driver::RigDriver& driver, boo
 /// Concludes the run: writes its files, reports how it ended, ends the guardian. Returns the exit status.
 /// @param lost  why recorded data was lost; empty: nothing was lost
 int conclude(const RunRequest& request, const experiment::RunSession& session, const experiment::RunOutcome& outcome,
-             driver::RigDriver& driver, RunOutputs& outputs, RunMonitor& run_monitor, const std::string& lost) {
+             driver::RigDriver& driver, RunOutputs& outputs, RunMonitor& run_monitor, const std::string& lost,
+             const ForeignRun& foreign) {
   if (!outcome.safe_state.ok()) {
     spdlog::error("the safe state may not have reached the board ({}): {}. Press the E-stop and switch the rig off",
                   driver::error_text(outcome.safe_state), driver.what_holds_unsafe());
@@ -142,7 +144,8 @@ int conclude(const RunRequest& request, const experiment::RunSession& session, c
                                                   .friction_curve = outputs.friction_curve_json(),
                                                   .publish_failures = outputs.publish_failures(),
                                                   .csv_rows_lost = outputs.csv_rows_lost(),
-                                                  .names = outputs.names()});
+                                                  .names = outputs.names(),
+                                                  .foreign_controller = foreign.summary()});
   if (rig::is_fault(outcome.reason)) {
     run_monitor.write_record(request, outcome.reason, outcome.reason_value, summary.reason);
   }
@@ -180,9 +183,11 @@ int run(const RunRequest& request) {
   for (const std::string& problem : config::beyond_limits(plan, s))
     spdlog::warn("{}; the gate limits it to that", problem);
   const bool to_stop = config::means_to_stop(plan, s.experiment.end_speed_m_s);
+  ForeignRun foreign(request);
   experiment::RunLogicParts logic = make_logic(s, std::move(plan.phases), plan.limits);
   for (const std::string& problem : control::silent_settings(s.control)) spdlog::warn("{}", problem);
   require_resources(request, *driver, lease != nullptr);
+  foreign.look_at(logic);
   RunOutputs outputs(request, logic.names);
   runtime::OverrunReporter late_cycles(std::llround(1e9 / s.control.rate_Hz));
   std::vector<rig::RecordSink*> sinks = outputs.sinks();
@@ -233,7 +238,7 @@ int run(const RunRequest& request) {
   if (signals) signals->allow_leaving();
   board_notes.log_once();
   if (request.stop_was_sent && outputs.stop_requested()) request.stop_was_sent();
-  return conclude(request, session, outcome, *driver, outputs, run_monitor, lost);
+  return conclude(request, session, outcome, *driver, outputs, run_monitor, lost, foreign);
 }
 
 }  // namespace abs_hil::program

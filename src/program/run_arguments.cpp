@@ -27,7 +27,10 @@ void add_configuration_options(cli::Parser& parser, RunOptions& o) {
               .to = &o.model,
               .help = "the controllers' model of the rig, by name or TOML file (default: the plant)",
               .type = "NAME|FILE"});
-  parser.add({.names = "--controller", .to = &o.controller, .help = "slip controller", .type = "NAME"});
+  parser.add({.names = "--controller",
+              .to = &o.controller,
+              .help = "slip controller, by name or FILE.so or FILE.fmu",
+              .type = "NAME|FILE"});
   add_assignments(parser, o);
 }
 

@@ -14,7 +14,7 @@ namespace abs_hil::program {
 namespace {
 
 std::string reason_text(const experiment::RunOutcome& outcome, const config::Settings& s,
-                        std::span<const std::string> own_signals) {
+                        std::span<const std::string> own_signals, const nlohmann::ordered_json& foreign) {
   std::string text = rig::reason_text(outcome.reason, outcome.reason_value, own_signals);
   if (rig::is_fault(outcome.reason)) {
     const std::string bound = config::number_text(s, rig::row_of(outcome.reason).value.bound);
@@ -22,6 +22,7 @@ std::string reason_text(const experiment::RunOutcome& outcome, const config::Set
   }
   if (outcome.reason == rig::Reason::controller_not_finite) {
     text += fmt::format(" (controller {})", s.control.controller);
+    if (foreign.contains("failure")) text += ": " + foreign["failure"].get<std::string>();
   }
   if (!outcome.io_error.ok()) {
     text += ": " + driver::error_text(outcome.io_error);
@@ -46,7 +47,7 @@ analysis::RunSummary summarise(const RunRequest& request, const experiment::RunS
   const config::Settings& s = request.settings;
   const std::string result = outcome.completed() ? "completed" : (rig::is_fault(outcome.reason) ? "fault" : "stopped");
   return {.result = result,
-          .reason = reason_text(outcome, s, results.names.signals),
+          .reason = reason_text(outcome, s, results.names.signals, results.foreign_controller),
           .controller = s.control.controller,
           .plant = s.plant_name,
           .backend = s.backend,
@@ -67,6 +68,7 @@ analysis::RunSummary summarise(const RunRequest& request, const experiment::RunS
           .model = s.model_name,
           .model_differences = differences_json(s),
           .model_note = config::in_words(config::model_differences(s)),
+          .foreign_controller = results.foreign_controller,
           .end_speed_m_s = s.experiment.end_speed_m_s};
 }
 

@@ -18,6 +18,7 @@ struct RunResults {
   std::uint64_t publish_failures{0};
   std::uint64_t csv_rows_lost{0};
   rig::RunNames names{};
+  nlohmann::ordered_json foreign_controller{};  ///< null for a controller of the registry
 };
 
 /// The summary of a run that has ended.

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "abs_hil/rig/option_check.hpp"
 
@@ -48,6 +49,10 @@ std::string valid_number_text(const OptionFacts& facts, bool whole) {
 std::string valid_name_text(const OptionFacts& facts) {
   std::string text;
   for (const std::string_view name : facts.allowed.list()) text.append(text.empty() ? "one of " : ", ").append(name);
+  bool first = true;
+  for (const std::string_view ending : facts.files.endings) {
+    if (!ending.empty()) text.append(std::exchange(first, false) ? ", or a file *" : " or *").append(ending);
+  }
   return text.empty() ? "text" : text;
 }
 
@@ -64,7 +69,7 @@ void require_valid(std::string_view name, const OptionFacts& facts, double value
 }
 
 void require_valid(std::string_view name, const OptionFacts& facts, std::string_view text) {
-  if (facts.allowed.contains(text)) return;
+  if (facts.allows(text)) return;
   throw std::invalid_argument(refusal(name, '"' + std::string(text) + '"', valid_name_text(facts), facts));
 }
 

@@ -105,6 +105,15 @@ void refuse_weakened_limits(const BoardUse& use) {
   }
 }
 
+/// A crash of foreign code ends the program. The guardian makes the outputs safe, but a person must want that.
+void refuse_foreign_code(const BoardUse& use) {
+  if (use.controller_file.empty() || use.unsafe.foreign_controller || !is_real_board(use.driver)) return;
+  throw std::invalid_argument(
+      fmt::format("--controller {}: code from a file would run in the control cycle of a real board; try it with "
+                  "--backend sim first, then accept the risk with --set unsafe.foreign_controller=true",
+                  use.controller_file));
+}
+
 void refuse_cap_above(std::string_view key, double value, std::string_view board, double board_value) {
   if (value <= board_value) return;
   throw std::invalid_argument(
@@ -138,6 +147,7 @@ void refuse_unsafe_use(const BoardUse& use) {
   refuse_hardware_without_guardian(use);
   refuse_impatient_guardian(use);
   refuse_weakened_limits(use);
+  refuse_foreign_code(use);
 }
 
 void refuse_caps_above_board(const DutyCaps& asked_for, const driver::DriverOptions& driver) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "abs_hil/rig/parameters.hpp"
@@ -21,6 +22,7 @@ struct BoardUse {
   UnsafeOptions unsafe{};                       ///< risks that a person accepts
   double start_speed_rad_s{0.0};                ///< wheels that turn from the start, a simulator's alone
   std::vector<driver::Injection> injections{};  ///< faults to inject
+  std::string controller_file{};                ///< the controller comes from this file; empty: it does not
 };
 
 /// Largest duties, in [0, 1].

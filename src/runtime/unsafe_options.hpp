@@ -15,6 +15,10 @@ struct UnsafeOptions {
                  .meaning =
                      "accept outputs on without fresh samples for longer than 50 ms: allows "
                      "gate.sample_age_max_s above 0.05");
+  ABS_HIL_OPTION(bool, foreign_controller, false,
+                 .meaning =
+                     "accept that code from a file, which no test of this project has seen, runs in the control cycle: "
+                     "allows --controller FILE on a board");
 };
 
 }  // namespace abs_hil::runtime

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <map>
 #include <optional>
@@ -10,6 +11,7 @@
 
 #include "abs_hil/rig/phase.hpp"
 #include "abs_hil/rig/quantities.hpp"
+#include "abs_hil/rig/time_units.hpp"
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/csv_text.hpp"
 #include "telemetry/file_error.hpp"
@@ -37,19 +39,24 @@ Fields split_header(std::string_view header) {
   return names;
 }
 
-/// Columns of --csv that the type holds. They come first, in the order of --csv. Only telemetry has them.
+/// Columns of --csv. In a file of telemetry they come first, in the order of --csv. Other types do not have them.
 template <class Message>
 const Fields& first_columns() {
   static const Fields columns = [] {
     Fields names;
-    if constexpr (!std::same_as<Message, telemetry_t>) return names;
-    rig::for_each_quantity([&names](const auto& row) {
-      if (row.in_csv() && row.in_lcm()) names.emplace_back(row.name);
-    });
+    if constexpr (std::same_as<Message, telemetry_t>) names.assign(rig::csv_columns.begin(), rig::csv_columns.end());
     return names;
   }();
   return columns;
 }
+
+/// Columns of --csv that telemetry does not hold: the values come from messages of other channels. They are in the CSV
+/// for its readers only; csv_to_log takes the messages from their own files.
+struct CellsFromElsewhere {
+  bool sample_valid{true};
+  bool wheels_apart{false};
+  double sample_time_s{0.0};
+};
 
 template <class Message>
 bool goes_first(std::string_view name) {
@@ -75,11 +82,30 @@ void put_event_columns(CsvRow& row, const LogEvent& event, std::string_view type
   row.text(type);
 }
 
+/// The texts of `elsewhere` by their columns' names.
+std::map<std::string_view, std::string> texts_of(const CellsFromElsewhere& elsewhere) {
+  rig::CycleRecord record;
+  record.sample_valid = elsewhere.sample_valid;
+  record.wheels_apart = elsewhere.wheels_apart;
+  record.sample_time_s = elsewhere.sample_time_s;
+  const double distance_m = 0.0;
+  const std::int64_t sequence = 0;
+  const rig::CycleParts<const rig::CycleRecord> parts{record, distance_m, sequence};
+  std::map<std::string_view, std::string> texts;
+  rig::for_each_quantity([&](const auto& quantity) {
+    if (quantity.in_lcm()) return;
+    CsvRow one;
+    if constexpr (std::is_arithmetic_v<std::remove_cvref_t<decltype(quantity.at(parts))>>) one({}, quantity.at(parts));
+    texts[quantity.name] = one.row();
+  });
+  return texts;
+}
+
 template <class Message>
-std::string row_of(const Message& message, const LogEvent& event) {
+std::string row_of(const Message& message, const LogEvent& event, const CellsFromElsewhere& elsewhere) {
   CsvRow row;
   if constexpr (std::same_as<Message, telemetry_t>) {
-    std::map<std::string_view, std::string> texts;
+    std::map<std::string_view, std::string> texts = texts_of(elsewhere);
     visit_fields(message, [&texts](std::string_view name, const auto& value) {
       CsvRow one;
       one(name, value);
@@ -167,14 +193,14 @@ bool comes_back(const EventText& text, const LogEvent& event) {
   return texts.problem().empty() && encoded(message) == event.data;
 }
 
-EventText text_of(const LogEvent& event) {
+EventText text_of(const LogEvent& event, const CellsFromElsewhere& elsewhere = {}) {
   EventText text;
   const std::int64_t fingerprint = fingerprint_of(event.data);
   for_each_message_type([&]<class Message>() {
     if (!text.row.empty() || fingerprint != static_cast<std::int64_t>(Message::getHash())) return;
     Message message{};
     if (!decode_checked(event.data, message).empty()) return;
-    EventText made{std::string(type_name<Message>), header_of<Message>(), row_of(message, event)};
+    EventText made{std::string(type_name<Message>), header_of<Message>(), row_of(message, event, elsewhere)};
     if (comes_back<Message>(made, event)) text = std::move(made);
   });
   if (!text.row.empty()) return text;
@@ -198,9 +224,12 @@ class CsvFiles {
  public:
   explicit CsvFiles(fs::path main) : main_(std::move(main)) {}
 
+  /// The first channel of telemetry goes into the main file.
+  void note_telemetry(const std::string& channel) {
+    if (channel_.empty()) channel_ = channel;
+  }
   void write(const LogEvent& event, const EventText& text) {
-    const bool is_main = text.type == type_name<telemetry_t> && (channel_.empty() || channel_ == event.channel);
-    if (is_main) channel_ = event.channel;
+    const bool is_main = text.type == type_name<telemetry_t> && channel_ == event.channel;
     const std::string key = is_main ? std::string() : text.type == raw_type ? text.type : event.channel + text.type;
     auto file = files_.find(key);
     if (file == files_.end()) {
@@ -247,6 +276,78 @@ class CsvFiles {
   std::string channel_;  ///< of the telemetry in the main file
   std::map<std::string, File> files_;
   std::set<fs::path> paths_;  ///< beside the main file
+};
+
+template <class Message>
+std::optional<Message> decoded(const LogEvent& event) {
+  Message message{};
+  if (fingerprint_of(event.data) != static_cast<std::int64_t>(Message::getHash())) return std::nullopt;
+  if (!decode_checked(event.data, message).empty()) return std::nullopt;
+  return message;
+}
+
+/// Puts the events of a log into CSV files. A row of telemetry waits for the next one of its run, because a message
+/// that belongs to it may follow it.
+class LogToCsv {
+ public:
+  explicit LogToCsv(fs::path csv) : files_(std::move(csv)) {}
+
+  void take(LogEvent event) {
+    Run& run = runs_[prefix_of(event.channel)];
+    if (const auto message = decoded<telemetry_t>(event)) {
+      finish(run);
+      files_.note_telemetry(event.channel);
+      run.cells.sample_time_s = message->time_s;
+      run.message = *message;
+      run.waiting = std::move(event);
+      return;
+    }
+    if (const auto message = decoded<sample_t>(event)) {
+      // It holds from the next telemetry on.
+      finish(run);
+      run.cells.sample_valid = message->sample_valid != 0;
+      run.cells.wheels_apart = message->wheels_apart != 0;
+    } else if (const auto time = decoded<measurement_t>(event)) {
+      if (run.waiting && time->cycle == run.message.cycle) {
+        const std::int64_t start_ns = run.message.stamp_ns - std::llround(run.message.time_s * 1e9);
+        run.cells.sample_time_s = static_cast<double>(time->measured_ns - start_ns) * rig::s_per_ns;
+      }
+    }
+    write(event, text_of(event));
+  }
+  ConversionCounts finish() {
+    for (auto& [prefix, run] : runs_) finish(run);
+    files_.finish();
+    return counts_;
+  }
+
+ private:
+  struct Run {
+    std::optional<LogEvent> waiting{};  ///< telemetry
+    telemetry_t message{};              ///< the same
+    CellsFromElsewhere cells{};
+  };
+  /// What the channels of a run have in common: telemetry.channel_prefix.
+  static std::string prefix_of(const std::string& channel) {
+    for (const std::string_view name : {"TELEMETRY", "SAMPLE", "MEASUREMENT"}) {
+      if (channel.ends_with(name)) return channel.substr(0, channel.size() - name.size());
+    }
+    return channel;
+  }
+  void finish(Run& run) {
+    if (!run.waiting) return;
+    write(*run.waiting, text_of(*run.waiting, run.cells));
+    run.waiting.reset();
+  }
+  void write(const LogEvent& event, const EventText& text) {
+    files_.write(event, text);
+    ++counts_.events;
+    if (text.type == raw_type) ++counts_.raw;
+  }
+
+  CsvFiles files_;
+  std::map<std::string, Run> runs_;
+  ConversionCounts counts_;
 };
 
 /// RUN.csv and all RUN.*.csv beside it.
@@ -336,18 +437,12 @@ ConversionCounts log_to_csv(const fs::path& log, const fs::path& csv) {
     throw RecordingError("'" + part.string() + "' already exists and would be read as a part of '" + csv.string() +
                          "'; remove it, or choose another name");
   }
-  CsvFiles files(csv);
-  ConversionCounts counts;
+  LogToCsv conversion(csv);
   for (;;) {
-    const auto event = reader.next();
-    if (!event) break;
-    const EventText text = text_of(*event);
-    files.write(*event, text);
-    ++counts.events;
-    if (text.type == raw_type) ++counts.raw;
+    auto event = reader.next();
+    if (!event) return conversion.finish();
+    conversion.take(std::move(*event));
   }
-  files.finish();
-  return counts;
 }
 
 ConversionCounts csv_to_log(const fs::path& csv, const fs::path& log) {

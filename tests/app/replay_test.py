@@ -90,6 +90,23 @@ class Replay(ProgramTest):
         self.assertEqual(self.run_program('convert', log, back).returncode, 2)
         self.assertIn('.csv', self.run_program('convert', log, back).stderr)
 
+    def test_converted_rows_are_those_of_the_csv(self):
+        # Samples that a board could not give: their cells come from messages of other channels.
+        for number, inject in enumerate(([], ['--inject', 'brake@read:intermittent=0.2+0.2s~0.01s'],
+                                         ['--inject', 'brake@stamp:delayed=2ms+0.2s~0.05s'])):
+            log, own, made = (self.folder / f'{number}.{name}' for name in ('lcmlog', 'csv', 'made.csv'))
+            result = self.run_program('--fast', '--no-lcm', '--log', log, '--csv', own, '--set',
+                                      'experiment.start_speed_rad_s=170', *inject)
+            self.assertIn(result.returncode, (0, 1), result.stderr)
+            made = self.folder / f'made{number}.csv'
+            self.assertEqual(self.run_program('convert', log, made).returncode, 0)
+            ours, its = self.rows(own), self.rows(made)
+            columns = own.read_text().split('\n', 1)[0].split(',')[:24]
+            self.assertEqual(columns[-1], 'wheels_apart')
+            self.assertEqual(made.read_text().split('\n', 1)[0].split(',')[:24], columns)
+            for column in columns:
+                self.assertEqual([row[column] for row in its], [row[column] for row in ours], column)
+
 
 if __name__ == '__main__':
     unittest.main()

@@ -138,10 +138,18 @@ struct ObserverOptions {
 /// Name number `index` of the table of controllers; empty beyond the last.
 [[nodiscard]] std::string_view controller_name(std::size_t index) noexcept;
 
+/// Controllers that come from a file (docs/interchange.md).
+struct ForeignOptions {
+  ABS_HIL_OPTIONS(ForeignOptions);
+  ABS_HIL_OPTION(std::string, mapping, "",
+                 .meaning = "TOML file with the names that an FMU's variables have, and its parameters");
+};
+
 /// The keys `control.` of the configuration.
 struct ControlOptions {
   ABS_HIL_OPTIONS(ControlOptions);
-  ABS_HIL_OPTION(std::string, controller, "adaptive", .meaning = "slip controller", .allowed = controller_name);
+  ABS_HIL_OPTION(std::string, controller, "adaptive", .meaning = "slip controller", .allowed = controller_name,
+                 .files = {".so", ".fmu"});
   ABS_HIL_OPTION(double, rate_Hz, 1000.0, .unit = "Hz", .meaning = "control cycles per second",
                  .range = rig::between(100, 10'000));
   ABS_HIL_OPTION(double, slip_ref, 0.15, .meaning = "wanted slip", .range = rig::open_between(0, 1));
@@ -159,6 +167,7 @@ struct ControlOptions {
   ABS_HIL_GROUP(AdaptiveActuatorOptions, adaptive_actuator, "adaptive_actuator.", {});
   ABS_HIL_GROUP(AdaptivePeakOptions, adaptive_peak, "adaptive_peak.", {});
   ABS_HIL_GROUP(SlidingModeActuatorOptions, sliding_mode_actuator, "sliding_mode_actuator.", {});
+  ABS_HIL_GROUP(ForeignOptions, foreign, "foreign.", {});
 };
 
 }  // namespace abs_hil::control

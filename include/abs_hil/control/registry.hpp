@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "abs_hil/control/controller_context.hpp"
@@ -32,6 +33,20 @@ template <class Controller>
 /// Adds a controller from outside this library. Throws std::invalid_argument if the name is empty or already exists.
 /// Call it before any other use of this library: it is not thread-safe.
 void register_controller(const ControllerEntry& entry);
+
+/// Controllers that come from files: the registry makes them for a name that ends in `ending`.
+struct ControllerFiles {
+  std::string_view ending;  ///< with its dot
+  /// Throws std::invalid_argument, which names the file, if it holds no usable controller.
+  std::unique_ptr<SlipController> (*make)(const std::string& file, const ControllerContext& context);
+};
+
+/// Lets controllers come from files. The ending must be one of those in the row of `control.controller`. Throws and is
+/// called as `register_controller`.
+void register_controller_files(const ControllerFiles& files);
+
+/// True for the name of a file that may hold a controller.
+[[nodiscard]] bool is_controller_file(std::string_view name) noexcept;
 
 /// Makes the controller named `name`. Throws std::invalid_argument for an unknown name, with the nearest and all known
 /// names, and for invalid options (such as a Q that is not positive definite). Not real-time safe: call it before a

@@ -56,6 +56,17 @@ class AllowedNames {
   NameAt name_at_{nullptr};
 };
 
+/// Endings of file names, each with its dot. A text that ends in one of them names a file.
+struct FileEndings {
+  std::array<std::string_view, 2> endings{};
+  [[nodiscard]] constexpr bool fit(std::string_view text) const noexcept {
+    for (const std::string_view ending : endings) {
+      if (!ending.empty() && text.size() > ending.size() && text.ends_with(ending)) return true;
+    }
+    return false;
+  }
+};
+
 /// The facts of an option beside its type, its name and its default. Fields of scripts use it too.
 struct OptionFacts {
   std::string_view key{};      ///< its name in the configuration; empty: that of the member
@@ -63,9 +74,13 @@ struct OptionFacts {
   std::string_view meaning{};  ///< one line
   Range range{};               ///< of numbers
   AllowedNames allowed{};      ///< of texts
+  FileEndings files{};         ///< of texts: beside the allowed names, a file whose name ends so
   SearchRange search{};        ///< where abs_tune looks for a gain; nowhere by default
   std::string_view on_rig{};   ///< of a rig's parameter: where to read it off the rig; empty for all others
   bool start_value{false};     ///< initial value of slip control: no effect after slip control has begun
+
+  /// True for an allowed name, for a file with one of the endings, and for any text if none is prescribed.
+  [[nodiscard]] bool allows(std::string_view text) const noexcept { return allowed.contains(text) || files.fit(text); }
 };
 
 /// One row: the member of `Struct` that holds the option, and its facts.

@@ -1,0 +1,2 @@
+"""Files for other tools: MCAP (PlotJuggler, Foxglove) and Parquet, from recorded and from running experiments."""
+from __future__ import annotations

@@ -1,0 +1,84 @@
+"""abs_convert: runs as files for other tools. `abs_hil convert` starts it for OUT.mcap and OUT.parquet."""
+from __future__ import annotations
+
+import argparse
+import pathlib
+import signal
+import sys
+from typing import Any
+
+from ..files import write_whole
+
+TARGETS = ('.mcap', '.parquet')
+
+
+def parser() -> argparse.ArgumentParser:
+    p = argparse.ArgumentParser(
+        prog='abs_convert', description='Converts a recorded run, or records a running one, for PlotJuggler, Foxglove and '
+        'others (docs/interchange.md). Between event logs and CSV: abs_hil convert.')
+    p.add_argument('input', nargs='?', metavar='IN', help='run folder, event log (.lcmlog) or CSV')
+    p.add_argument('output', metavar='OUT', help='file to write: .mcap or .parquet')
+    p.add_argument('--live', metavar='URL', help='record a running experiment from this LCM network; "" is the default one')
+    p.add_argument('--prefix', default='ABS_', help='its telemetry.channel_prefix (default: %(default)s)')
+    p.add_argument('--idle', type=float, metavar='S', help='with --live: end S seconds after the last message')
+    p.add_argument('--seconds', type=float, metavar='S', help='with --live: end after S seconds')
+    return p
+
+
+def main(arguments: list[str]) -> int:
+    p = parser()
+    given = p.parse_args(arguments)
+    output = pathlib.Path(given.output)
+    try:
+        if output.suffix not in TARGETS:
+            raise ValueError(f'OUT = {given.output}: give a name that ends in .mcap or .parquet')
+        if (given.input is None) == (given.live is None):
+            raise ValueError('give either IN or --live URL')
+        if given.live is None and (given.idle is not None or given.seconds is not None):
+            raise ValueError('--idle and --seconds belong to --live')
+        if given.live is not None and output.suffix != '.mcap':
+            raise ValueError('--live writes .mcap only; convert that run\'s folder or log to .parquet afterwards')
+        print(_record(given, output) if given.live is not None else _convert(given.input, output))
+        return 0
+    except ImportError as error:
+        print(f'abs_convert: {error}: install it: pip install {error.name or "mcap"}, or scripts/setup_python.sh in the source '
+              'folder', file=sys.stderr)
+        return 3
+    except (ValueError, OSError) as error:
+        print(f'abs_convert: {error}', file=sys.stderr)
+        return 3 if isinstance(error, OSError) else 2
+
+
+def _convert(path: str, output: pathlib.Path) -> str:
+    from . import recorded, source
+    read = source.read(path)
+    write = recorded.to_mcap if output.suffix == '.mcap' else recorded.to_parquet
+    write_whole(output, lambda name: write(read, name))
+    losses = '; '.join(read.losses)
+    return f'{len(read.run)} rows, {len(read.events)} events; lost: {losses or "nothing"}'
+
+
+def _record(given: Any, output: pathlib.Path) -> str:
+    from . import running
+    from .mcap_file import McapFile
+    # A request to end must not cut the file short.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    result = ''
+
+    def record(name: str) -> None:
+        nonlocal result
+        with open(name, 'wb') as file:
+            recorder = running.Recorder(McapFile(file, library='abs_hil'))
+            try:
+                for channel, message in running.received(given.live, given.prefix, given.idle, given.seconds):
+                    recorder.take(channel, message)
+            except KeyboardInterrupt:
+                pass
+            recorder.finish()
+            if recorder.rows == 0:
+                raise ValueError(f'no telemetry of abs_hil came on {given.live or "the default network"}; `abs_hil doctor --only '
+                                 'lcm` says whether this computer can receive it')
+        result = (f'{recorder.rows} rows; lost: {recorder.lost} messages on the way, {recorder.damaged} damaged')
+
+    write_whole(output, record)
+    return result

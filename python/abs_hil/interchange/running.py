@@ -1,0 +1,131 @@
+"""Records a running experiment into MCAP."""
+from __future__ import annotations
+
+import math
+import re
+import time
+from collections.abc import Iterator
+from typing import Any
+
+from ..core import _core
+from ..messages import QUANTITIES, decode
+from ..run import COLUMNS
+from . import messages
+from .mcap_file import McapFile
+from .recorded import CYCLE_TOPIC, CYCLE_TYPE, EVENT_TOPIC, SIGNALS_TOPIC, SIGNALS_TYPE
+from .source import LEVELS, comment
+
+STATUS_TOPIC, STATUS_TYPE = '/abs_hil/status', 'abs_hil/msg/Status'
+
+
+def received(url: str, prefix: str, idle_s: float | None, seconds: float | None) -> Iterator[tuple[str, Any]]:
+    """(channel without prefix, message or None if damaged) as they come. Ends after `idle_s` without a message once one
+    has come, after `seconds`, or by an interrupt."""
+    subscription = _core.Subscription(url, re.escape(prefix) + '.*')
+    begin = time.monotonic()
+    heard = None
+    slice_s = 0.2
+    while seconds is None or time.monotonic() < begin + seconds:
+        packet = subscription.next(slice_s)
+        now = time.monotonic()
+        if packet is None:
+            if idle_s is not None and heard is not None and now > heard + idle_s:
+                return
+            continue
+        heard = now
+        try:
+            yield packet[0][len(prefix):], decode(packet[1])
+        except ValueError:
+            yield packet[0][len(prefix):], None
+
+
+class Recorder:
+    """Puts messages into a file. A row waits for the next one, because messages that belong to it may follow it."""
+
+    def __init__(self, mcap: McapFile) -> None:
+        self._mcap = mcap
+        self._mcap.add_struct(CYCLE_TOPIC, CYCLE_TYPE, [(name, comment(name)) for name in COLUMNS])
+        self._waiting: dict[str, float] = {}
+        self._waiting_ns = 0
+        self._stamp_ns = 0  # of the waiting row, by the run's clock
+        self._cycle = -1
+        self._facts = {'sample_valid': 1.0, 'wheels_apart': 0.0}
+        self._offset_ns: int | None = None  # from the run's clock to Unix time
+        self._signals: list[str] = []
+        self._sequence: dict[str, int] = {}
+        self.experiment: Any = None
+        self.rows = 0
+        self.lost = 0
+        self.damaged = 0
+
+    def take(self, channel: str, message: Any) -> None:
+        if message is None:
+            self.damaged += 1
+            return
+        kind = type(message).__name__
+        if hasattr(message, 'sequence') and kind != 'command_state_t':
+            before = self._sequence.get(channel)
+            if before is not None and message.sequence > before + 1:
+                self.lost += message.sequence - before - 1
+            self._sequence[channel] = message.sequence
+        handler = getattr(self, f'_{kind}', None)
+        if handler is not None:
+            handler(message)
+
+    def finish(self) -> None:
+        self._put_row()
+        if self.experiment is not None:
+            self._mcap.attach('config.json', 'application/json', self.experiment.config_json.encode(), self._waiting_ns)
+        names = ('experiment', 'controller', 'plant', 'backend', 'version')
+        facts = {name: str(getattr(self.experiment, name)) for name in names} if self.experiment is not None else {}
+        self._mcap.describe('abs_hil', {'source': 'live', 'rows': str(self.rows), 'lost_messages': str(self.lost),
+                                        'damaged_messages': str(self.damaged), **facts})
+        self._mcap.finish()
+
+    def _time_ns(self, stamp_ns: int) -> int:
+        """Unix time: that of the first message's arrival, then the run's own clock."""
+        if self._offset_ns is None:
+            self._offset_ns = time.time_ns() - stamp_ns
+        return stamp_ns + self._offset_ns
+
+    def _put_row(self) -> None:
+        if self._waiting:
+            self._mcap.write(CYCLE_TOPIC, self._waiting_ns, messages.row(list(self._waiting.values())))
+            self.rows += 1
+            self._waiting = {}
+
+    def _telemetry_t(self, message: Any) -> None:
+        self._put_row()
+        self._cycle, self._stamp_ns, self._waiting_ns = message.cycle, message.stamp_ns, self._time_ns(message.stamp_ns)
+        self._waiting = {name: float(getattr(message, name)) if hasattr(message, name) else self._facts.get(name, math.nan)
+                         for name in COLUMNS}
+        self._waiting['sample_time_s'] = message.time_s
+
+    def _measurement_t(self, message: Any) -> None:
+        if self._waiting and message.cycle == self._cycle:
+            start_ns = self._stamp_ns - round(self._waiting['time_s'] * 1e9)
+            self._waiting['sample_time_s'] = (message.measured_ns - start_ns) * 1e-9
+
+    def _sample_t(self, message: Any) -> None:
+        self._facts = {'sample_valid': float(message.sample_valid), 'wheels_apart': float(message.wheels_apart)}
+
+    def _signals_t(self, message: Any) -> None:
+        if not self._signals:
+            self._signals = [name for name in message.names.split(',') if _core.is_signal_name(name)]
+            self._mcap.add_struct(SIGNALS_TOPIC, SIGNALS_TYPE, [(name, comment(name)) for name in self._signals])
+        self._mcap.write(SIGNALS_TOPIC, self._time_ns(message.stamp_ns),
+                         messages.row([getattr(message, f'value{n}') for n in range(1, len(self._signals) + 1)]))
+
+    def _status_t(self, message: Any) -> None:
+        values = {name: float(getattr(message, name)) for name in message.__slots__}
+        if not self._mcap.has(STATUS_TOPIC):
+            self._mcap.add_struct(STATUS_TOPIC, STATUS_TYPE,
+                                  [(name, comment(name) if name in QUANTITIES else '') for name in values])
+        self._mcap.write(STATUS_TOPIC, self._time_ns(message.stamp_ns), messages.row(list(values.values())))
+
+    def _event_t(self, message: Any) -> None:
+        text = message.message or message.reason_text
+        self._mcap.log(EVENT_TOPIC, self._time_ns(message.stamp_ns), LEVELS.get(message.kind, 20), message.kind, text)
+
+    def _experiment_t(self, message: Any) -> None:
+        self.experiment = message

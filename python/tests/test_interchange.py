@@ -1,0 +1,246 @@
+"""Converted runs, read back with decoders that are not ours: equal to the CSV bit for bit."""
+import io
+import json
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from conftest import ABS_HIL
+
+import abs_hil
+from abs_hil.interchange import program, recorded, source
+from abs_hil.interchange.messages import field_names
+from abs_hil.run import COLUMNS
+
+pytest.importorskip('mcap')
+FIELDS = field_names(COLUMNS)
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory):
+    """A run folder with event log, of a controller with signals."""
+    path = tmp_path_factory.mktemp('run') / 'run'
+    subprocess.run([ABS_HIL, '--fast', '--no-lcm', '--set', 'experiment.start_speed_rad_s=170', '--out', path], check=True,
+                   stdout=subprocess.DEVNULL)
+    return path
+
+
+def converted(origin, tmp_path, name='run.mcap'):
+    assert program.main([str(origin), str(tmp_path / name)]) == 0
+    return tmp_path / name
+
+
+def decoded_by_mcap_ros2(path):
+    """topic -> [(time, message)]"""
+    reader = pytest.importorskip('mcap.reader')
+    ros2 = pytest.importorskip('mcap_ros2.decoder')
+    topics = {}
+    with open(path, 'rb') as file:
+        for decoded in reader.make_reader(file, decoder_factories=[ros2.DecoderFactory()]).iter_decoded_messages():
+            topics.setdefault(decoded.channel.topic, []).append((decoded.message.log_time, decoded.decoded_message))
+    return topics
+
+
+def decoded_by_rosbags(path):
+    """topic -> messages, through another implementation of CDR"""
+    typesys = pytest.importorskip('rosbags.typesys')
+    reader = pytest.importorskip('mcap.reader')
+    store = typesys.get_typestore(typesys.Stores.EMPTY)
+    topics = {}
+    with open(path, 'rb') as file:
+        for schema, channel, message in reader.make_reader(file).iter_messages():
+            if schema.name not in store.types and schema.name.startswith('abs_hil/'):
+                store.register(typesys.get_types_from_msg(schema.data.decode(), schema.name))
+            if schema.name.startswith('abs_hil/'):
+                topics.setdefault(channel.topic, []).append(store.deserialize_cdr(message.data, schema.name))
+    return topics
+
+
+def bits(values):
+    return np.asarray(values, dtype=np.float64).view(np.uint64)
+
+
+def csv_columns(path):
+    return {name: values for name, values in abs_hil.load(path).columns.items() if values.dtype != object}
+
+
+@pytest.mark.parametrize('origin', ['.', 'run.csv', 'run.lcmlog'])
+@pytest.mark.parametrize('decode', [decoded_by_mcap_ros2, decoded_by_rosbags])
+def test_every_value_is_that_of_the_csv(folder, tmp_path, origin, decode):
+    topics = decode(converted(folder / origin, tmp_path))
+    expected = csv_columns(folder / 'run.csv')
+    cycles = [entry[1] if isinstance(entry, tuple) else entry for entry in topics['/abs_hil/cycle']]
+    assert len(cycles) == len(expected['time_s'])
+    for name in COLUMNS:
+        if name != 'phase':
+            assert np.array_equal(bits([getattr(cycle, FIELDS[name]) for cycle in cycles]), bits(expected[name])), name
+    phases = abs_hil.load(folder / 'run.csv').columns['phase']
+    assert [abs_hil.PHASES[int(cycle.phase)] for cycle in cycles] == phases.tolist()
+    signals = [entry[1] if isinstance(entry, tuple) else entry for entry in topics['/abs_hil/signals']]
+    own = abs_hil.load(folder / 'run.csv').signals
+    known = ~np.isnan(np.column_stack([expected[name] for name in own])).all(axis=1)
+    assert len(own) > 0 and known.any()
+    for name, field in field_names(own).items():
+        assert np.array_equal(bits([getattr(row, field) for row in signals]), bits(expected[name][known])), name
+
+
+def test_names_of_fields():
+    assert field_names(['theta_N', 'Theta_n', 'a__b_', 'I_m']) == {'theta_N': 'theta_n', 'Theta_n': 'theta_n_2', 'a__b_': 'a_b',
+                                                                  'I_m': 'i_m'}
+
+
+def test_times_and_events(folder, tmp_path):
+    topics = decoded_by_mcap_ros2(converted(folder, tmp_path))
+    times = [time_ns for time_ns, _ in topics['/abs_hil/cycle']]
+    assert np.array_equal(np.diff(times), np.full(len(times) - 1, 1_000_000))
+    assert abs(times[-1] / 1e9 - time.time()) < 3600
+    texts = [message.msg for _, message in topics['/abs_hil/event']]
+    assert len(texts) == len((folder / 'events.csv').read_text().splitlines()) - 1
+    assert any('experiment ran to its end' in text for text in texts)
+    log = decoded_by_mcap_ros2(converted(folder / 'run.lcmlog', tmp_path, 'log.mcap'))
+    assert len(log['/abs_hil/event']) == len(texts)
+
+
+def test_file_has_index_compression_attachments_and_metadata(folder, tmp_path):
+    reader = pytest.importorskip('mcap.reader')
+    with open(converted(folder, tmp_path), 'rb') as file:
+        mcap = reader.make_reader(file)
+        summary = mcap.get_summary()
+        assert summary.statistics.message_count > 1000
+        assert summary.chunk_indexes and {chunk.compression for chunk in summary.chunk_indexes} == {'zstd'}
+        assert {channel.message_encoding for channel in summary.channels.values()} == {'cdr'}
+        assert {schema.encoding for schema in summary.schemas.values()} == {'ros2msg'}
+        attached = {attachment.name: attachment.data for attachment in mcap.iter_attachments()}
+        metadata = {record.name: record.metadata for record in mcap.iter_metadata()}
+    for name in ('config.toml', 'summary.json', 'events.csv'):
+        assert attached[name] == (folder / name).read_bytes()
+    assert metadata['abs_hil']['losses'] == 'none'
+    assert metadata['abs_hil']['controller'] == 'adaptive'
+
+
+def test_parquet(folder, tmp_path):
+    parquet = pytest.importorskip('pyarrow.parquet')
+    table = parquet.read_table(converted(folder, tmp_path, 'run.parquet'))
+    for name, values in csv_columns(folder / 'run.csv').items():
+        assert np.array_equal(bits(table[name].to_numpy()), bits(values)), name
+    assert table['phase'].to_pylist() == abs_hil.load(folder / 'run.csv').columns['phase'].tolist()
+    assert json.loads(table.schema.metadata[b'abs_hil.summary.json']) == abs_hil.load(folder).summary
+
+
+def test_lost_messages_are_counted(folder, tmp_path, capsys):
+    """Without 7 messages in its middle a log has a gap, and the conversion says so."""
+    from abs_hil.messages import decode
+    data = (folder / 'run.lcmlog').read_bytes()
+    kept, place, dropped = io.BytesIO(), 0, 0
+    while place < len(data):
+        channel_size, data_size = (int.from_bytes(data[place + at:place + at + 4], 'big') for at in (20, 24))
+        end = place + 28 + channel_size + data_size
+        channel = data[place + 28:place + 28 + channel_size]
+        lost = channel.endswith(b'TELEMETRY') and 500 <= decode(data[place + 28 + channel_size:end]).sequence < 507
+        dropped += lost
+        if not lost:
+            kept.write(data[place:end])
+        place = end
+    assert dropped == 7
+    (tmp_path / 'gap.lcmlog').write_bytes(kept.getvalue())
+    converted(tmp_path / 'gap.lcmlog', tmp_path)
+    assert '7 messages of telemetry are missing' in capsys.readouterr().out
+    rows = (folder / 'run.csv').read_text().splitlines()
+    (tmp_path / 'gap.csv').write_text('\n'.join(rows[:900] + rows[905:]) + '\n')
+    converted(tmp_path / 'gap.csv', tmp_path)
+    assert 'gaps in time for 5 rows' in capsys.readouterr().out
+    (tmp_path / 'cut.lcmlog').write_bytes(kept.getvalue()[:-1000])
+    converted(tmp_path / 'cut.lcmlog', tmp_path)
+    assert 'lost: nothing' not in capsys.readouterr().out
+
+
+def test_killed_conversion_leaves_no_file(folder, tmp_path):
+    """Killed at several places, the conversion leaves the old file or none."""
+    out = tmp_path / 'run.mcap'
+    script = ('import os, signal, sys, abs_hil.interchange.mcap_file as m\n'
+              'from abs_hil.interchange import program\n'
+              'calls = 0\n'
+              'write = m.McapFile.{method}\n'
+              'def die(*args, **kwargs):\n'
+              '    global calls\n'
+              '    calls += 1\n'
+              '    if calls > {after}: os.kill(os.getpid(), signal.SIGKILL)\n'
+              '    return write(*args, **kwargs)\n'
+              'm.McapFile.{method} = die\n'
+              'program.main(sys.argv[1:])\n')
+    for method, after in (('write', 0), ('write', 1500), ('describe', 0), ('finish', 0)):
+        for before in (None, b'the old one'):
+            out.unlink(missing_ok=True)
+            if before is not None:
+                out.write_bytes(before)
+            code = script.format(method=method, after=after)
+            status = subprocess.run([sys.executable, '-c', code, folder, out], env=dict(os.environ)).returncode
+            assert status == -signal.SIGKILL
+            assert (out.read_bytes() if out.exists() else None) == before
+            assert not [path for path in tmp_path.iterdir() if path.suffix == '.mcap' and path != out]
+
+
+@pytest.mark.parametrize('arguments, words', [
+    (['nowhere', 'out.mcap'], 'nowhere'), (['{run}', 'out.txt'], '.mcap or .parquet'), (['out.mcap'], 'either IN or --live'),
+    (['--live', 'udpm://239.255.76.67:7667?ttl=0', 'out.parquet'], '--live writes .mcap only'),
+    (['--seconds', '3', '{run}', 'out.mcap'], 'belong to --live'), (['{run}', 'nowhere/out.mcap'], 'nowhere/out.mcap'),
+    (['--live', 'nonsense', 'out.mcap'], 'nonsense')])
+def test_bad_input(folder, tmp_path, monkeypatch, capsys, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    assert program.main([argument.replace('{run}', str(folder)) for argument in arguments]) == 2
+    said = capsys.readouterr().err
+    assert words in said and len(said.strip().splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+
+
+LIVE = '''
+import subprocess, sys, threading
+from abs_hil.interchange import program, running
+receive = running.received
+def received(*arguments):
+    # A run of 2 s, which begins when its receiver is there.
+    threading.Timer(0.5, subprocess.run, [[sys.argv[1], '--rt', 'off', '--no-out', '--csv', sys.argv[2], '--set',
+                                           'experiment.start_speed_rad_s=150']]).start()
+    return receive(*arguments)
+running.received = received
+sys.exit(program.main(['--live', '', '--idle', '1', '--seconds', '60', sys.argv[3]]))
+'''
+
+
+def test_live(tmp_path):
+    """What a running experiment publishes, recorded and read back: equal to its CSV from the first message received on."""
+    probe = subprocess.run(['unshare', '-n', 'true'], capture_output=True, check=False)
+    if probe.returncode != 0 or not shutil.which('ip'):
+        pytest.skip('no network namespaces here')
+    script = pathlib.Path(__file__).parents[2] / 'scripts' / 'in_private_network.sh'
+    result = subprocess.run([script, sys.executable, '-c', LIVE, ABS_HIL, tmp_path / 'run.csv', tmp_path / 'run.mcap'],
+                            check=False, capture_output=True, text=True, timeout=120,
+                            env={**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)})
+    assert result.returncode == 0, result.stderr
+    topics = decoded_by_mcap_ros2(tmp_path / 'run.mcap')
+    expected = csv_columns(tmp_path / 'run.csv')
+    row_at = {time_s: row for row, time_s in enumerate(expected['time_s'].tolist())}
+    cycles = [message for _, message in topics['/abs_hil/cycle']]
+    assert len(cycles) > 0.5 * len(row_at)
+    rows = [row_at[cycle.time_s] for cycle in cycles]
+    for name in COLUMNS:
+        if name != 'phase':
+            assert np.array_equal(bits([getattr(cycle, FIELDS[name]) for cycle in cycles]), bits(expected[name][rows])), name
+    assert topics['/abs_hil/status'] and topics['/abs_hil/event'] and topics['/abs_hil/signals']
+    lost = int(result.stdout.rsplit('lost: ', 1)[1].split()[0])
+    assert lost >= np.sum(np.diff(rows) - 1)
+
+
+def test_source_of_an_old_csv_is_refused(folder, tmp_path):
+    rows = [row.split(',') for row in (folder / 'run.csv').read_text().splitlines()]
+    place = rows[0].index('upper_counts')
+    (tmp_path / 'old.csv').write_text('\n'.join(','.join(row[:place]) for row in rows[:50]) + '\n')
+    with pytest.raises(ValueError, match='upper_counts'):
+        source.read(str(tmp_path / 'old.csv'))
+    assert recorded.CYCLE_TOPIC == '/abs_hil/cycle' and pathlib.Path(folder).exists()

@@ -1,0 +1,161 @@
+#include "interchange/extracted_fmu.hpp"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <zip.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <memory>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "interchange/refused_file.hpp"
+
+namespace abs_hil::interchange {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t bytes_max = std::uint64_t{256} << 20U;
+constexpr zip_int64_t entries_max = 10'000;
+
+/// The folders of libraries for this computer: FMI 2 and FMI 3.
+#if defined(__aarch64__)
+constexpr std::array platform_folders{"binaries/aarch64-linux/", "binaries/aarch64-linux/"};
+#else
+constexpr std::array platform_folders{"binaries/linux64/", "binaries/x86_64-linux/"};
+#endif
+
+bool leads_out(std::string_view name) {
+  if (name.empty() || name.front() == '/' || name.find('\\') != std::string_view::npos) return true;
+  if (name.size() > 1 && name[1] == ':') return true;
+  for (const fs::path& part : fs::path(name)) {
+    if (part == "..") return true;
+  }
+  return false;
+}
+
+bool is_wanted(std::string_view name) {
+  if (name.ends_with('/')) return false;
+  return name == "modelDescription.xml" || name.starts_with("resources/") || name.starts_with(platform_folders[0]) ||
+         name.starts_with(platform_folders[1]);
+}
+
+struct Closer {
+  void operator()(zip_t* archive) const noexcept { zip_discard(archive); }
+  void operator()(zip_file_t* file) const noexcept { zip_fclose(file); }
+};
+
+struct Entry {
+  zip_uint64_t index{0};
+  std::string name{};
+  std::uint64_t size{0};
+};
+
+/// Checks all entries; returns those that are needed.
+std::vector<Entry> entries_of(const fs::path& file, zip_t* archive) {
+  const zip_int64_t count = zip_get_num_entries(archive, 0);
+  if (count > entries_max) refuse(file, fmt::format("{} files; an FMU here has at most {}", count, entries_max));
+  std::vector<Entry> wanted;
+  std::set<std::string> names;
+  std::set<std::string> libraries;
+  std::uint64_t bytes = 0;
+  for (zip_int64_t n = 0; n < count; ++n) {
+    const auto index = static_cast<zip_uint64_t>(n);
+    zip_stat_t facts;
+    zip_stat_init(&facts);
+    const bool known = zip_stat_index(archive, index, ZIP_FL_ENC_GUESS, &facts) == 0;
+    if (!known || (facts.valid & ZIP_STAT_NAME) == 0 || (facts.valid & ZIP_STAT_SIZE) == 0) {
+      refuse(file, fmt::format("damaged: entry {} cannot be read", n));
+    }
+    const std::string name = facts.name;
+    if (leads_out(name))
+      refuse(file, fmt::format("its entry \"{}\" leads out of the archive; it is not extracted", name));
+    if (!names.insert(name).second) refuse(file, fmt::format("it has two entries \"{}\"", name));
+    zip_uint8_t system = 0;
+    zip_uint32_t attributes = 0;
+    zip_file_get_external_attributes(archive, index, 0, &system, &attributes);
+    constexpr unsigned mode_shift = 16;
+    if (system == ZIP_OPSYS_UNIX && S_ISLNK(attributes >> mode_shift)) {
+      refuse(file, fmt::format("its entry \"{}\" is a symbolic link; it is not extracted", name));
+    }
+    if (facts.size > bytes_max || (bytes += facts.size) > bytes_max) {
+      refuse(file, fmt::format("its files have more than {} bytes; it is not extracted", bytes_max));
+    }
+    if (name.starts_with("binaries/") && !name.ends_with('/'))
+      libraries.insert(fs::path(name).parent_path().filename().string());
+    if (is_wanted(name)) wanted.push_back({index, name, facts.size});
+  }
+  if (!names.contains("modelDescription.xml")) refuse(file, "not an FMU: it has no modelDescription.xml");
+  for (const char* folder : platform_folders) {
+    if (libraries.contains(fs::path(folder).parent_path().filename().string())) return wanted;
+  }
+  std::string others;
+  for (const std::string& platform : libraries) others.append(others.empty() ? "" : ", ").append(platform);
+  refuse(file, others.empty()
+                   ? "it has no binaries; compile it with its sources in the tool that made it"
+                   : fmt::format("it has libraries for {} only, not for this computer ({}); export it for Linux",
+                                 others, fs::path(platform_folders[0]).parent_path().filename().string()));
+}
+
+void extract(const fs::path& file, zip_t* archive, const Entry& entry, const fs::path& to) {
+  fs::create_directories(to.parent_path());
+  const std::unique_ptr<zip_file_t, Closer> in(zip_fopen_index(archive, entry.index, 0));
+  if (!in) refuse(file, fmt::format("damaged: \"{}\": {}", entry.name, zip_strerror(archive)));
+  std::vector<char> data(entry.size);
+  std::uint64_t got = 0;
+  while (got < entry.size) {
+    const zip_int64_t more = zip_fread(in.get(), data.data() + got, entry.size - got);
+    if (more <= 0) break;
+    got += static_cast<std::uint64_t>(more);
+  }
+  char beyond = 0;
+  // Reading on to the end checks the sum.
+  if (got != entry.size || zip_fread(in.get(), &beyond, 1) != 0) {
+    refuse(file, fmt::format("damaged: \"{}\" cannot be unpacked", entry.name));
+  }
+  std::ofstream out(to, std::ios::binary);
+  out.write(data.data(), static_cast<std::streamsize>(data.size()));
+  out.close();
+  if (!out) throw std::runtime_error(fmt::format("{}: {}", to.string(), std::strerror(errno)));
+}
+
+}  // namespace
+
+ExtractedFmu::ExtractedFmu(const fs::path& file) {
+  int code = 0;
+  const std::unique_ptr<zip_t, Closer> archive(zip_open(file.c_str(), ZIP_RDONLY | ZIP_CHECKCONS, &code));
+  if (!archive) {
+    zip_error_t reason;
+    zip_error_init_with_code(&reason, code);
+    const std::string text = zip_error_strerror(&reason);
+    zip_error_fini(&reason);
+    refuse(file, "not an FMU: it cannot be read as a zip archive: " + text);
+  }
+  const std::vector<Entry> entries = entries_of(file, archive.get());
+  std::string name = (fs::temp_directory_path() / "abs_hil_fmu.XXXXXX").string();
+  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error(fmt::format("{}: {}", name, std::strerror(errno)));
+  folder_ = name;
+  try {
+    for (const Entry& entry : entries) extract(file, archive.get(), entry, folder_ / entry.name);
+  } catch (...) {
+    std::error_code error;
+    fs::remove_all(folder_, error);
+    throw;
+  }
+}
+
+ExtractedFmu::~ExtractedFmu() {
+  std::error_code error;
+  fs::remove_all(folder_, error);
+}
+
+}  // namespace abs_hil::interchange

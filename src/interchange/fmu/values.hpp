@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstdint>
+#include <exception>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+
+#include "interchange/fmu/component.hpp"
+
+namespace abs_hil::interchange::fmu {
+
+/// Calls `action`; what it throws goes to the instance's log, and `failed` is returned.
+template <class Status, class Action>
+Status guarded(Component* component, Status ok, Status failed, const Action& action) noexcept {
+  if (component == nullptr) return failed;
+  try {
+    action();
+    return ok;
+  } catch (const std::exception& error) {
+    component->log(true, error.what());
+    return failed;
+  }
+}
+
+/// The variable's value of that type, or an exception that names both.
+template <class Value>
+Value& value_of(const Variable& variable) {
+  if (auto* const* value = std::get_if<Value*>(&variable.value)) return **value;
+  throw std::invalid_argument(variable.name + " has another type");
+}
+
+template <class Value, class Reference, class Out>
+void get_values(const Component& component, const Reference* references, std::size_t count, Out* values) {
+  for (std::size_t n = 0; n < count; ++n) {
+    const Value& value = value_of<Value>(component.variable(static_cast<std::uint32_t>(references[n])));
+    if constexpr (std::is_same_v<Value, std::string>) {
+      values[n] = value.c_str();
+    } else {
+      values[n] = static_cast<Out>(value);
+    }
+  }
+}
+
+/// A value that the variable's row refuses is not taken.
+template <class Value, class Reference, class In>
+void set_values(const Component& component, const Reference* references, std::size_t count, const In* values) {
+  for (std::size_t n = 0; n < count; ++n) {
+    const Variable& variable = component.to_set(static_cast<std::uint32_t>(references[n]));
+    Value& value = value_of<Value>(variable);
+    const Value before = value;
+    if constexpr (std::is_same_v<Value, bool>) {
+      value = static_cast<bool>(values[n]);
+    } else {
+      value = values[n];
+    }
+    try {
+      check(variable);
+    } catch (...) {
+      value = before;
+      throw;
+    }
+  }
+}
+
+/// A path from an URI of FMI 2 such as file:///tmp/a%20b/resources or file:///C:/a.
+[[nodiscard]] inline std::string path_of(const std::string& uri) {
+  std::string rest = uri;
+  for (const char* prefix : {"file://localhost", "file://", "file:"}) {
+    if (rest.starts_with(prefix)) {
+      rest.erase(0, std::string(prefix).size());
+      break;
+    }
+  }
+  std::string path;
+  for (std::size_t n = 0; n < rest.size(); ++n) {
+    if (rest[n] == '%' && n + 2 < rest.size()) {
+      path += static_cast<char>(std::stoi(rest.substr(n + 1, 2), nullptr, 16));
+      n += 2;
+    } else {
+      path += rest[n];
+    }
+  }
+  if (path.size() > 2 && path[0] == '/' && path[2] == ':') path.erase(0, 1);  // a drive of Windows
+  while (path.size() > 1 && (path.back() == '/' || path.back() == '\\')) path.pop_back();
+  return path;
+}
+
+}  // namespace abs_hil::interchange::fmu

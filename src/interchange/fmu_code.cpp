@@ -1,0 +1,231 @@
+#include "interchange/fmu_code.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdarg>
+#include <cstdlib>
+#include <cstring>
+#include <limits>
+
+#include "interchange/fmi/fmi2FunctionTypes.h"
+#include "interchange/fmi/fmi3FunctionTypes.h"
+#include "interchange/fmu_facts.hpp"
+#include "interchange/loaded_library.hpp"
+#include "interchange/refused_file.hpp"
+
+namespace abs_hil::interchange {
+
+namespace {
+
+double& field_of(void* record, std::size_t offset) {
+  return *reinterpret_cast<double*>(static_cast<char*>(record) + offset);
+}
+double field_of(const void* record, std::size_t offset) {
+  double value = 0.0;
+  std::memcpy(&value, static_cast<const char*>(record) + offset, sizeof value);
+  return value;
+}
+
+void say(const char* instance, const char* message) {
+  static_cast<void>(std::fprintf(stderr, "%s: %s\n", instance, message));
+}
+
+// NOLINTNEXTLINE(cert-dcl50-cpp): the standard's type
+void log2(fmi2ComponentEnvironment /*environment*/, fmi2String instance, fmi2Status status, fmi2String /*category*/,
+          fmi2String format, ...) {
+  if (status < fmi2Error) return;
+  std::array<char, 1024> text{};
+  va_list arguments;
+  va_start(arguments, format);
+  static_cast<void>(std::vsnprintf(text.data(), text.size(), format, arguments));
+  va_end(arguments);
+  say(instance, text.data());
+}
+void log3(fmi3InstanceEnvironment /*environment*/, fmi3Status status, fmi3String /*category*/, fmi3String message) {
+  if (status >= fmi3Error) say("controller", message);
+}
+
+/// The functions of one version that a controller needs. They return true if they worked.
+class Instance2 {
+ public:
+  Instance2(const LoadedLibrary& library, const FmuFacts& facts, const std::string& resources) {
+    library.find("fmi2Instantiate", instantiate_);
+    library.find("fmi2FreeInstance", free_);
+    library.find("fmi2SetupExperiment", set_up_);
+    library.find("fmi2EnterInitializationMode", enter_);
+    library.find("fmi2ExitInitializationMode", exit_);
+    library.find("fmi2Reset", reset_);
+    library.find("fmi2SetReal", set_);
+    library.find("fmi2GetReal", get_);
+    library.find("fmi2SetBoolean", set_flag_);
+    library.find("fmi2SetInteger", set_integer_);
+    library.find("fmi2DoStep", step_);
+    const std::string uri = "file://" + resources;
+    instance_ = instantiate_("controller", fmi2CoSimulation, facts.token.c_str(), uri.c_str(), &callbacks_, fmi2False,
+                             fmi2False);
+  }
+  Instance2(const Instance2&) = delete;
+  Instance2& operator=(const Instance2&) = delete;
+  ~Instance2() {
+    if (instance_ != nullptr) free_(instance_);
+  }
+  [[nodiscard]] bool made() const { return instance_ != nullptr; }
+  [[nodiscard]] bool set(std::uint32_t r, double value) const { return set_(instance_, &r, 1, &value) <= fmi2Warning; }
+  [[nodiscard]] bool get(std::uint32_t r, double& value) const { return get_(instance_, &r, 1, &value) <= fmi2Warning; }
+  [[nodiscard]] bool set_flag(std::uint32_t r, bool flag) const {
+    const fmi2Boolean value = flag ? fmi2True : fmi2False;
+    return set_flag_(instance_, &r, 1, &value) <= fmi2Warning;
+  }
+  [[nodiscard]] bool set_integer(std::uint32_t r, int value) const {
+    return set_integer_(instance_, &r, 1, &value) <= fmi2Warning;
+  }
+  [[nodiscard]] bool enter() const {
+    return set_up_(instance_, fmi2False, 0.0, 0.0, fmi2False, 0.0) <= fmi2Warning && enter_(instance_) <= fmi2Warning;
+  }
+  [[nodiscard]] bool exit() const { return exit_(instance_) <= fmi2Warning; }
+  [[nodiscard]] bool reset() const { return reset_(instance_) <= fmi2Warning; }
+  [[nodiscard]] bool step(double time_s, double step_s) const {
+    return step_(instance_, time_s, step_s, fmi2True) <= fmi2Warning;
+  }
+
+ private:
+  fmi2CallbackFunctions callbacks_{log2, std::calloc, std::free, nullptr, nullptr};
+  fmi2InstantiateTYPE* instantiate_{nullptr};
+  fmi2FreeInstanceTYPE* free_{nullptr};
+  fmi2SetupExperimentTYPE* set_up_{nullptr};
+  fmi2EnterInitializationModeTYPE* enter_{nullptr};
+  fmi2ExitInitializationModeTYPE* exit_{nullptr};
+  fmi2ResetTYPE* reset_{nullptr};
+  fmi2SetRealTYPE* set_{nullptr};
+  fmi2GetRealTYPE* get_{nullptr};
+  fmi2SetBooleanTYPE* set_flag_{nullptr};
+  fmi2SetIntegerTYPE* set_integer_{nullptr};
+  fmi2DoStepTYPE* step_{nullptr};
+  fmi2Component instance_{nullptr};
+};
+
+class Instance3 {
+ public:
+  Instance3(const LoadedLibrary& library, const FmuFacts& facts, const std::string& resources) {
+    library.find("fmi3InstantiateCoSimulation", instantiate_);
+    library.find("fmi3FreeInstance", free_);
+    library.find("fmi3EnterInitializationMode", enter_);
+    library.find("fmi3ExitInitializationMode", exit_);
+    library.find("fmi3Reset", reset_);
+    library.find("fmi3SetFloat64", set_);
+    library.find("fmi3GetFloat64", get_);
+    library.find("fmi3SetBoolean", set_flag_);
+    library.find("fmi3SetInt32", set_integer_);
+    library.find("fmi3DoStep", step_);
+    const std::string path = resources + "/";
+    instance_ = instantiate_("controller", facts.token.c_str(), path.c_str(), fmi3False, fmi3False, fmi3False,
+                             fmi3False, nullptr, 0, nullptr, log3, nullptr);
+  }
+  Instance3(const Instance3&) = delete;
+  Instance3& operator=(const Instance3&) = delete;
+  ~Instance3() {
+    if (instance_ != nullptr) free_(instance_);
+  }
+  [[nodiscard]] bool made() const { return instance_ != nullptr; }
+  [[nodiscard]] bool set(std::uint32_t r, double value) const {
+    return set_(instance_, &r, 1, &value, 1) <= fmi3Warning;
+  }
+  [[nodiscard]] bool get(std::uint32_t r, double& value) const {
+    return get_(instance_, &r, 1, &value, 1) <= fmi3Warning;
+  }
+  [[nodiscard]] bool set_flag(std::uint32_t r, bool value) const {
+    return set_flag_(instance_, &r, 1, &value, 1) <= fmi3Warning;
+  }
+  [[nodiscard]] bool set_integer(std::uint32_t r, int value) const {
+    return set_integer_(instance_, &r, 1, &value, 1) <= fmi3Warning;
+  }
+  [[nodiscard]] bool enter() const { return enter_(instance_, fmi3False, 0.0, 0.0, fmi3False, 0.0) <= fmi3Warning; }
+  [[nodiscard]] bool exit() const { return exit_(instance_) <= fmi3Warning; }
+  [[nodiscard]] bool reset() const { return reset_(instance_) <= fmi3Warning; }
+  [[nodiscard]] bool step(double time_s, double step_s) const {
+    fmi3Boolean event = fmi3False;
+    fmi3Boolean terminate = fmi3False;
+    fmi3Boolean early = fmi3False;
+    fmi3Float64 last_s = 0.0;
+    return step_(instance_, time_s, step_s, fmi3True, &event, &terminate, &early, &last_s) <= fmi3Warning && !terminate;
+  }
+
+ private:
+  fmi3InstantiateCoSimulationTYPE* instantiate_{nullptr};
+  fmi3FreeInstanceTYPE* free_{nullptr};
+  fmi3EnterInitializationModeTYPE* enter_{nullptr};
+  fmi3ExitInitializationModeTYPE* exit_{nullptr};
+  fmi3ResetTYPE* reset_{nullptr};
+  fmi3SetFloat64TYPE* set_{nullptr};
+  fmi3GetFloat64TYPE* get_{nullptr};
+  fmi3SetBooleanTYPE* set_flag_{nullptr};
+  fmi3SetInt32TYPE* set_integer_{nullptr};
+  fmi3DoStepTYPE* step_{nullptr};
+  fmi3Instance instance_{nullptr};
+};
+
+/// The controller in an FMU. A step sets the inputs of this cycle, lets the FMU compute one period, and takes its
+/// outputs.
+template <class Instance>
+class FmuCode final : public ForeignCode {
+ public:
+  FmuCode(const ForeignSetup& setup, FmuFacts facts)
+      : facts_(std::move(facts)),
+        library_(facts_.library),
+        instance_(library_, facts_, (setup.folder / "resources").string()),
+        period_s_(setup.period_s) {
+    if (!instance_.made()) refuse(setup.file, "it cannot be instantiated; the line above says why, if the FMU did");
+    if (!begin()) refuse(setup.file, "its initialisation failed; the line above says why, if the FMU did");
+  }
+
+  void reset(const abs_hil_input& /*input*/) noexcept override {
+    if (!fresh_) restart();
+  }
+  void step(const abs_hil_input& input, abs_hil_output& output) noexcept override {
+    fresh_ = false;
+    bool sound = sound_;
+    for (const FmuLink& in : facts_.inputs) sound = sound && instance_.set(in.reference, field_of(&input, in.offset));
+    sound = sound && instance_.step(static_cast<double>(steps_) * period_s_, period_s_);
+    ++steps_;
+    for (const FmuLink& out : facts_.outputs) {
+      sound = sound && instance_.get(out.reference, field_of(&output, out.offset));
+    }
+    sound_ = sound;
+    if (!sound) output.brake_torque_Nm = std::numeric_limits<double>::quiet_NaN();
+  }
+  void be_fresh() noexcept override { restart(); }
+  [[nodiscard]] std::string failure() const override {
+    return sound_ ? std::string() : fmt::format("the FMU reported an error in step {}", steps_);
+  }
+
+ private:
+  bool begin() {
+    bool sound = true;
+    for (const FmuLink& p : facts_.parameters) sound = sound && instance_.set(p.reference, p.value);
+    for (const FmuLink& p : facts_.flags) sound = sound && instance_.set_flag(p.reference, p.value != 0.0);
+    for (const FmuLink& p : facts_.integers)
+      sound = sound && instance_.set_integer(p.reference, static_cast<int>(p.value));
+    steps_ = 0;
+    fresh_ = sound_ = sound && instance_.enter() && instance_.exit();
+    return sound_;
+  }
+  void restart() noexcept { sound_ = instance_.reset() && begin(); }
+
+  FmuFacts facts_;
+  LoadedLibrary library_;
+  Instance instance_;
+  double period_s_;
+  std::int64_t steps_{0};
+  bool fresh_{false};
+  bool sound_{true};
+};
+
+}  // namespace
+
+std::unique_ptr<ForeignCode> load_fmu(const ForeignSetup& setup) {
+  FmuFacts facts = facts_of(setup.file, setup.folder, setup.mapping);
+  if (facts.fmi == 3) return std::make_unique<FmuCode<Instance3>>(setup, std::move(facts));
+  return std::make_unique<FmuCode<Instance2>>(setup, std::move(facts));
+}
+
+}  // namespace abs_hil::interchange

@@ -1,0 +1,245 @@
+#include "interchange/fmu_facts.hpp"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <cstddef>
+#include <map>
+#include <pugixml.hpp>
+#include <set>
+#include <sstream>
+#include <string_view>
+
+#include "interchange/elf_library.hpp"
+#include "interchange/refused_file.hpp"
+
+namespace abs_hil::interchange {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// NOLINTBEGIN(cppcoreguidelines-macro-usage)
+#define ABS_HIL_IN(name) \
+  Quantity { #name, offsetof(abs_hil_input, name) }
+#define ABS_HIL_OUT(name) \
+  Quantity { #name, offsetof(abs_hil_output, name) }
+// NOLINTEND(cppcoreguidelines-macro-usage)
+
+constexpr std::array our_inputs{ABS_HIL_IN(time_s),
+                                ABS_HIL_IN(dt_s),
+                                ABS_HIL_IN(omega1_rad_s),
+                                ABS_HIL_IN(omega2_rad_s),
+                                ABS_HIL_IN(slip),
+                                ABS_HIL_IN(slip_ref),
+                                ABS_HIL_IN(mean_brake_torque_Nm),
+                                ABS_HIL_IN(brake_torque_Nm),
+                                ABS_HIL_IN(max_brake_torque_Nm),
+                                ABS_HIL_IN(alpha1_rad_s2),
+                                ABS_HIL_IN(alpha2_rad_s2),
+                                ABS_HIL_IN(upper_travel_rad),
+                                ABS_HIL_IN(lower_travel_rad),
+                                ABS_HIL_IN(sent_brake_torque_Nm),
+                                ABS_HIL_IN(unsent_torque_Nm)};
+constexpr std::array our_outputs{ABS_HIL_OUT(brake_torque_Nm), ABS_HIL_OUT(slip_velocity_error_m_s),
+                                 ABS_HIL_OUT(theta_est_N), ABS_HIL_OUT(slip_ref)};
+
+#undef ABS_HIL_IN
+#undef ABS_HIL_OUT
+
+constexpr std::array functions2{"fmi2Instantiate",
+                                "fmi2FreeInstance",
+                                "fmi2SetupExperiment",
+                                "fmi2EnterInitializationMode",
+                                "fmi2ExitInitializationMode",
+                                "fmi2Reset",
+                                "fmi2SetReal",
+                                "fmi2GetReal",
+                                "fmi2SetBoolean",
+                                "fmi2SetInteger",
+                                "fmi2DoStep"};
+constexpr std::array functions3{"fmi3InstantiateCoSimulation",
+                                "fmi3FreeInstance",
+                                "fmi3EnterInitializationMode",
+                                "fmi3ExitInitializationMode",
+                                "fmi3Reset",
+                                "fmi3SetFloat64",
+                                "fmi3GetFloat64",
+                                "fmi3SetBoolean",
+                                "fmi3SetInt32",
+                                "fmi3DoStep"};
+
+struct TheirVariable {
+  std::uint32_t reference{0};
+  std::string type{};
+  std::string causality{};
+};
+using TheirVariables = std::map<std::string, TheirVariable, std::less<>>;
+
+bool is_real(const TheirVariable& variable) { return variable.type == "Real" || variable.type == "Float64"; }
+
+TheirVariables variables_of(pugi::xml_node root, int fmi) {
+  TheirVariables found;
+  for (const pugi::xml_node node : root.child("ModelVariables").children()) {
+    TheirVariable variable{.reference = node.attribute("valueReference").as_uint(),
+                           .type = node.name(),
+                           .causality = node.attribute("causality").as_string("local")};
+    if (fmi == 2) {
+      for (const char* type : {"Real", "Integer", "Boolean", "String", "Enumeration"}) {
+        if (node.child(type)) variable.type = type;
+      }
+    }
+    found.emplace(node.attribute("name").as_string(), std::move(variable));
+  }
+  return found;
+}
+
+const TheirVariable& their(const fs::path& file, const TheirVariables& variables, const std::string& name,
+                           const std::string& causality) {
+  const auto at = variables.find(name);
+  if (at == variables.end())
+    refuse(file, fmt::format("it has no variable \"{}\", which control.foreign.mapping names", name));
+  if (at->second.causality != causality) {
+    refuse(file,
+           fmt::format("its variable \"{}\" has causality {}; give an {}", name, at->second.causality, causality));
+  }
+  return at->second;
+}
+
+template <std::size_t count>
+void link(const fs::path& file, const TheirVariables& variables, const toml::table* names, const char* causality,
+          const std::array<Quantity, count>& ours, std::vector<FmuLink>& links) {
+  const auto add = [&](const std::string& name, const Quantity& quantity) {
+    const TheirVariable& variable = their(file, variables, name, causality);
+    if (!is_real(variable)) {
+      refuse(file, fmt::format("its variable \"{}\" has type {}; {} needs a real number", name, variable.type,
+                               quantity.name));
+    }
+    links.push_back({.reference = variable.reference, .offset = quantity.offset});
+  };
+  std::set<std::string> named;
+  if (names != nullptr) {
+    for (const auto& [key, node] : *names) {
+      const std::string name(key.str());
+      const auto text = node.template value<std::string>();
+      const auto quantity =
+          std::find_if(ours.begin(), ours.end(), [&](const Quantity& q) { return text && *text == q.name; });
+      if (quantity == ours.end()) {
+        std::string known;
+        for (const Quantity& q : ours) known.append(known.empty() ? "" : ", ").append(q.name);
+        refuse(file, fmt::format("control.foreign.mapping: {}s.\"{}\": give one of {}", causality, name, known));
+      }
+      add(name, *quantity);
+      named.insert(quantity->name);
+    }
+  }
+  for (const Quantity& quantity : ours) {
+    if (named.contains(quantity.name)) continue;
+    const auto at = variables.find(quantity.name);
+    if (at != variables.end() && at->second.causality == causality) add(quantity.name, quantity);
+  }
+}
+
+void set_parameters(const fs::path& file, const TheirVariables& variables, const toml::table& values, FmuFacts& facts) {
+  for (const auto& [key, node] : values) {
+    const std::string name(key.str());
+    const TheirVariable& variable = their(file, variables, name, "parameter");
+    const auto number = node.value<double>();
+    const auto flag = node.value<bool>();
+    FmuLink link{.reference = variable.reference};
+    if (is_real(variable) && number) {
+      link.value = *number;
+      facts.parameters.push_back(link);
+    } else if (variable.type == "Boolean" && node.is_boolean()) {
+      link.value = *flag ? 1.0 : 0.0;
+      facts.flags.push_back(link);
+    } else if ((variable.type == "Integer" || variable.type == "Int32") && node.is_integer()) {
+      link.value = *number;
+      facts.integers.push_back(link);
+    } else {
+      refuse(file,
+             fmt::format("control.foreign.mapping: parameters.\"{}\": its type is {}; give a number or true or false",
+                         name, variable.type));
+    }
+  }
+}
+
+toml::table read_mapping(const fs::path& mapping) {
+  if (mapping.empty()) return {};
+  try {
+    toml::table table = toml::parse_file(mapping.string());
+    for (const auto& [key, node] : table) {
+      const bool known = key == "inputs" || key == "outputs" || key == "parameters";
+      if (!known || !node.is_table())
+        refuse(mapping, fmt::format("{}: give the tables inputs, outputs, parameters", key.str()));
+    }
+    return table;
+  } catch (const toml::parse_error& error) {
+    std::ostringstream place;
+    place << error.source().begin.line;
+    refuse(mapping, fmt::format("line {}: {}", place.str(), error.description()));
+  }
+}
+
+}  // namespace
+
+FmuFacts facts_of(const fs::path& file, const fs::path& folder, const fs::path& mapping) {
+  pugi::xml_document document;
+  const pugi::xml_parse_result parsed = document.load_file((folder / "modelDescription.xml").c_str());
+  if (!parsed) refuse(file, fmt::format("damaged modelDescription.xml: {}", parsed.description()));
+  const pugi::xml_node root = document.child("fmiModelDescription");
+  const std::string version = root.attribute("fmiVersion").as_string();
+  FmuFacts facts{.fmi = version.starts_with("3.") ? 3 : 2};
+  if (!version.starts_with("2.") && !version.starts_with("3.")) {
+    refuse(file, fmt::format("its FMI version is \"{}\"; export it for FMI 2.0 or 3.0", version));
+  }
+  const pugi::xml_node simulation = root.child("CoSimulation");
+  if (!simulation)
+    refuse(file, "it is not for co-simulation (model exchange only, perhaps); export it for co-simulation");
+  if (simulation.attribute("needsExecutionTool").as_bool()) {
+    refuse(file, "it needs the tool that made it; export it as a self-contained FMU");
+  }
+  facts.token = root.attribute(facts.fmi == 3 ? "instantiationToken" : "guid").as_string();
+  const std::string identifier = simulation.attribute("modelIdentifier").as_string();
+  facts.library = folder / "binaries" / (facts.fmi == 3 ? "x86_64-linux" : "linux64") / (identifier + ".so");
+  if (identifier.empty() || identifier.find('/') != std::string::npos || !fs::is_regular_file(facts.library)) {
+    refuse(file, fmt::format("it has no {}, the library that its description names",
+                             fs::relative(facts.library, folder).string()));
+  }
+  const TheirVariables variables = variables_of(root, facts.fmi);
+  const toml::table names = read_mapping(mapping);
+  link(file, variables, names["inputs"].as_table(), "input", our_inputs, facts.inputs);
+  link(file, variables, names["outputs"].as_table(), "output", our_outputs, facts.outputs);
+  if (const toml::table* values = names["parameters"].as_table()) set_parameters(file, variables, *values, facts);
+  const bool torque = std::any_of(facts.outputs.begin(), facts.outputs.end(), [](const FmuLink& out) {
+    return out.offset == offsetof(abs_hil_output, brake_torque_Nm);
+  });
+  if (!torque) {
+    refuse(file,
+           "it has no output brake_torque_Nm; name the one that is, in the table [outputs] of control.foreign.mapping");
+  }
+  if (facts.inputs.empty()) {
+    refuse(file, "none of its inputs has a name of ours (docs/interchange.md); name them in control.foreign.mapping");
+  }
+  const auto check_functions = [&](const auto& functions) {
+    try {
+      const ElfLibrary library(facts.library);
+      for (const char* function : functions) {
+        if (!library.has_function(function))
+          refuse(file, fmt::format("its library does not define the function {}", function));
+      }
+    } catch (const std::invalid_argument& error) {
+      const std::string text = error.what();
+      if (text.starts_with(file.string())) throw;
+      refuse(file, "its library " + text);
+    }
+  };
+  if (facts.fmi == 3) {
+    check_functions(functions3);
+  } else {
+    check_functions(functions2);
+  }
+  return facts;
+}
+
+}  // namespace abs_hil::interchange

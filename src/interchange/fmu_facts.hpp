@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "abs_hil/interchange/controller.h"
+
+namespace abs_hil::interchange {
+
+/// A quantity of ours that a variable of an FMU may carry.
+struct Quantity {
+  const char* name;
+  std::size_t offset;  ///< in abs_hil_input or abs_hil_output
+};
+
+/// A variable of an FMU that carries one of our quantities, or a parameter with its value.
+struct FmuLink {
+  std::uint32_t reference{0};
+  std::size_t offset{0};
+  double value{0.0};  ///< of a parameter
+};
+
+/// What a controller's FMU is, and how its variables belong to ours.
+struct FmuFacts {
+  int fmi{2};
+  std::string token{};  ///< guid, or instantiation token
+  std::filesystem::path library{};
+  std::vector<FmuLink> inputs{};
+  std::vector<FmuLink> outputs{};
+  std::vector<FmuLink> parameters{};  ///< real ones
+  std::vector<FmuLink> flags{};       ///< Boolean ones
+  std::vector<FmuLink> integers{};
+};
+
+/// Reads the description in an extracted FMU, and the mapping if there is one, and checks the library's functions.
+/// Throws std::invalid_argument, which names `file`, the FMU as typed.
+[[nodiscard]] FmuFacts facts_of(const std::filesystem::path& file, const std::filesystem::path& folder,
+                                const std::filesystem::path& mapping);
+
+}  // namespace abs_hil::interchange

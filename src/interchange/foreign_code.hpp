@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "abs_hil/interchange/controller.h"
+
+namespace abs_hil::interchange {
+
+/// What foreign code is told when it is made.
+struct ForeignSetup {
+  std::filesystem::path file{};
+  std::filesystem::path folder{};   ///< of an extracted FMU
+  std::filesystem::path mapping{};  ///< TOML file with an FMU's names; empty: none
+  double period_s{0.0};
+  std::vector<std::pair<std::string, double>> parameters{};  ///< keys of `control.` and `model.`
+};
+
+/// A controller that this project did not compile: the C interface of abs_hil/interchange/controller.h, whatever stands
+/// behind it. Its code may do anything, so `step` is as safe for real time as that code is.
+class ForeignCode {
+ public:
+  ForeignCode() = default;
+  ForeignCode(const ForeignCode&) = delete;
+  ForeignCode& operator=(const ForeignCode&) = delete;
+  virtual ~ForeignCode() = default;
+
+  virtual void reset(const abs_hil_input& input) noexcept = 0;
+  /// @param output  holds NaN in every field; after a failure the torque is NaN
+  virtual void step(const abs_hil_input& input, abs_hil_output& output) noexcept = 0;
+  /// Names of its own signals, at most ABS_HIL_CONTROLLER_SIGNALS.
+  [[nodiscard]] const std::vector<std::string>& signals() const noexcept { return signals_; }
+  /// Why it gives no outputs any more; empty while it does. Not real-time safe.
+  [[nodiscard]] virtual std::string failure() const { return {}; }
+  /// After `reset` and `step` were called to warm it up: makes the next `reset` cheap. Not real-time safe.
+  virtual void be_fresh() noexcept {}
+
+ protected:
+  std::vector<std::string> signals_{};
+};
+
+/// Durations of steps, ns.
+struct StepTimes {
+  std::int64_t steps{0};
+  std::int64_t median_ns{0};
+  std::int64_t p99_ns{0};
+  std::int64_t worst_ns{0};
+};
+
+/// The inputs of a braking from 170 rad/s, step by step, to try code without a rig. Wraps round.
+[[nodiscard]] abs_hil_input trial_input(std::int64_t step, double period_s) noexcept;
+/// Output whose fields are all NaN.
+[[nodiscard]] abs_hil_output no_output() noexcept;
+/// Runs the code over trial inputs, so that its memory is present and its caches are warm. Stops at a failure.
+[[nodiscard]] StepTimes warm_up(ForeignCode& code, double period_s, std::int64_t steps);
+
+/// Loads a file into this process. Throws std::invalid_argument, which names the file, before anything of a file that
+/// cannot fit runs.
+[[nodiscard]] std::unique_ptr<ForeignCode> load_here(const ForeignSetup& setup);
+
+}  // namespace abs_hil::interchange

@@ -1,0 +1,140 @@
+#include "interchange/foreign_controller.hpp"
+
+#include <fmt/format.h>
+
+#include <atomic>
+#include <stdexcept>
+#include <type_traits>
+
+#include "abs_hil/control/registry.hpp"
+#include "interchange/fmu_facts.hpp"
+#include "interchange/hosted_code.hpp"
+#include "interchange/library_code.hpp"
+#include "runtime/clock.hpp"
+
+namespace abs_hil::interchange {
+
+namespace {
+
+std::atomic<Home> chosen_home{Home::own_process};
+
+/// Trial steps of a warm-up: 2 s at 1 kHz.
+constexpr std::uint32_t trial_steps = 2000;
+
+template <class Options>
+void add_numbers(const Options& options, const std::string& prefix,
+                 std::vector<std::pair<std::string, double>>& parameters) {
+  rig::for_each_option(options, prefix, [&](const std::string& name, const rig::OptionFacts&, const auto& value) {
+    using Value = std::remove_cvref_t<decltype(value)>;
+    if constexpr (!std::is_same_v<Value, std::string>) parameters.emplace_back(name, static_cast<double>(value));
+  });
+}
+
+ForeignSetup setup_of(const std::string& file, const control::ControllerContext& context) {
+  ForeignSetup setup{
+      .file = file, .mapping = context.options.foreign.mapping, .period_s = 1.0 / context.options.rate_Hz};
+  add_numbers(context.options, "control.", setup.parameters);
+  add_numbers(context.rig, "model.", setup.parameters);
+  return setup;
+}
+
+/// Everything that can be checked without running the file's code. Unpacks an FMU.
+std::unique_ptr<ExtractedFmu> check(ForeignSetup& setup) {
+  if (setup.file.extension() == ".so") {
+    check_library(setup.file);
+    return nullptr;
+  }
+  auto fmu = std::make_unique<ExtractedFmu>(setup.file);
+  setup.folder = fmu->folder();
+  static_cast<void>(facts_of(setup.file, setup.folder, setup.mapping));
+  return fmu;
+}
+
+abs_hil_input foreign_input(const control::SlipInput& in, double time_s) noexcept {
+  return {.time_s = time_s,
+          .dt_s = in.dt_s,
+          .omega1_rad_s = in.speeds.omega1_rad_s,
+          .omega2_rad_s = in.speeds.omega2_rad_s,
+          .slip = in.slip,
+          .slip_ref = in.slip_ref,
+          .mean_brake_torque_Nm = in.mean_brake_torque_Nm,
+          .brake_torque_Nm = in.brake_torque_Nm,
+          .max_brake_torque_Nm = in.max_brake_torque_Nm,
+          .alpha1_rad_s2 = in.alpha1_rad_s2,
+          .alpha2_rad_s2 = in.alpha2_rad_s2,
+          .upper_travel_rad = in.upper_travel_rad,
+          .lower_travel_rad = in.lower_travel_rad,
+          .sent_brake_torque_Nm = in.sent_brake_torque_Nm,
+          .unsent_torque_Nm = in.unsent_torque_Nm};
+}
+
+}  // namespace
+
+ForeignController::ForeignController(const std::string& file, const control::ControllerContext& context, Home home)
+    : file_(file),
+      setup_(setup_of(file, context)),
+      fmu_(check(setup_)),
+      step_times_(std::make_unique<runtime::LatencyHistogram>()) {
+  code_ = home == Home::own_process ? std::make_unique<HostedCode>(setup_) : load_here(setup_);
+  for (const std::string& name : code_->signals()) signals_.push_back({name, "signal of the controller's own"});
+  try {
+    static_cast<void>(rig::signal_names(signals_));
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(file + ": " + error.what());
+  }
+}
+
+void ForeignController::reset(const control::SlipInput& input) noexcept {
+  time_s_ = 0.0;
+  code_->reset(foreign_input(input, 0.0));
+}
+
+control::SlipOutput ForeignController::step(const control::SlipInput& input) noexcept {
+  time_s_ += input.dt_s;
+  abs_hil_output output = no_output();
+  runtime::MonotonicClock clock;
+  const std::int64_t before_ns = clock.now_ns();
+  code_->step(foreign_input(input, time_s_), output);
+  step_times_->add(clock.now_ns() - before_ns);
+  control::SlipOutput taken{.brake_torque_Nm = output.brake_torque_Nm,
+                            .slip_velocity_error_m_s = output.slip_velocity_error_m_s,
+                            .theta_est_N = output.theta_est_N,
+                            .slip_ref = output.slip_ref};
+  static_assert(rig::signal_max == ABS_HIL_CONTROLLER_SIGNALS);
+  for (std::size_t n = 0; n < signals_.size(); ++n) taken.signals[n] = output.signals[n];
+  return taken;
+}
+
+ForeignTrial ForeignController::try_out() {
+  ForeignTrial trial;
+  HostedCode apart(setup_);
+  static_cast<void>(apart.warm_up_there(setup_.period_s, trial_steps));
+  if (!apart.failure().empty()) throw std::invalid_argument(fmt::format("{}: in a trial {}", file_, apart.failure()));
+  trial.offences = apart.probe(setup_.period_s, trial_steps);
+  trial.died_without_system = !apart.failure().empty();
+  auto* hosted = dynamic_cast<HostedCode*>(code_.get());
+  trial.times = hosted != nullptr ? hosted->warm_up_there(setup_.period_s, trial_steps)
+                                  : warm_up(*code_, setup_.period_s, trial_steps);
+  if (!failure().empty()) throw std::invalid_argument(fmt::format("{}: in a trial {}", file_, failure()));
+  // A single late step may be the computer's fault, one of a hundred is the code's own.
+  if (static_cast<double>(trial.times.p99_ns) * 1e-9 > setup_.period_s) {
+    throw std::invalid_argument(fmt::format(
+        "{}: one step of a hundred takes {:.0f} us or more, longer than the control period of {:.0f} us; lower "
+        "control.rate_Hz, or make the code faster",
+        file_, static_cast<double>(trial.times.p99_ns) * 1e-3, setup_.period_s * 1e6));
+  }
+  return trial;
+}
+
+void register_foreign_controllers() {
+  const auto make = [](const std::string& file,
+                       const control::ControllerContext& context) -> std::unique_ptr<control::SlipController> {
+    return std::make_unique<ForeignController>(file, context, chosen_home.load());
+  };
+  control::register_controller_files({".so", make});
+  control::register_controller_files({".fmu", make});
+}
+
+void set_home(Home home) noexcept { chosen_home.store(home); }
+
+}  // namespace abs_hil::interchange

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "abs_hil/control/controller_context.hpp"
+#include "abs_hil/control/slip_controller.hpp"
+#include "interchange/extracted_fmu.hpp"
+#include "interchange/foreign_code.hpp"
+#include "interchange/host_protocol.hpp"
+#include "runtime/latency_histogram.hpp"
+
+namespace abs_hil::interchange {
+
+/// Where the code of controllers from files runs.
+enum class Home {
+  own_process,   ///< abs_controller_host: a crash ends the run with a fault, and nothing is lost
+  this_process,  ///< at once, as a board needs it: a crash ends the program, and the guardian makes the outputs safe
+};
+
+/// Trials of foreign code before a run in real time.
+struct ForeignTrial {
+  StepTimes times{};
+  Offences offences{};
+  bool died_without_system{false};  ///< the code did not bear it that its system calls failed: it needs them
+};
+
+/// Code from a file as a slip controller.
+class ForeignController final : public control::SlipController {
+ public:
+  /// Throws std::invalid_argument, which names the file, if it holds no usable controller.
+  ForeignController(const std::string& file, const control::ControllerContext& context, Home home);
+
+  void reset(const control::SlipInput& input) noexcept override;
+  [[nodiscard]] control::SlipOutput step(const control::SlipInput& input) noexcept override;
+  [[nodiscard]] std::span<const rig::Signal> signals() const noexcept override { return signals_; }
+
+  [[nodiscard]] const std::string& file() const noexcept { return file_; }
+  /// Runs the code over trial inputs, in a process of its own first. Call it before anything moves. Throws
+  /// std::invalid_argument if the code dies in it, or if its steps take longer than the control period.
+  [[nodiscard]] ForeignTrial try_out();
+  /// Durations of its steps in the run so far.
+  [[nodiscard]] const runtime::LatencyHistogram& step_times() const noexcept { return *step_times_; }
+  /// Why it gives no outputs any more; empty while it does. Not real-time safe.
+  [[nodiscard]] std::string failure() const { return code_->failure(); }
+
+ private:
+  std::string file_;
+  ForeignSetup setup_;
+  std::unique_ptr<ExtractedFmu> fmu_;  ///< outlives the code
+  std::unique_ptr<ForeignCode> code_;
+  std::vector<rig::Signal> signals_;
+  std::unique_ptr<runtime::LatencyHistogram> step_times_;
+  double time_s_{0.0};
+};
+
+/// Lets the registry make controllers from files (docs/interchange.md). Their code runs in a process of its own until
+/// `set_home` says otherwise.
+void register_foreign_controllers();
+void set_home(Home home) noexcept;
+
+}  // namespace abs_hil::interchange

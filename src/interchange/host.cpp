@@ -1,0 +1,96 @@
+#include "interchange/host.hpp"
+
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <exception>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "interchange/host_protocol.hpp"
+#include "interchange/system_call_trap.hpp"
+#include "runtime/clock.hpp"
+
+namespace abs_hil::interchange {
+
+namespace {
+
+bool send_packet(const void* data, std::size_t size) {
+  return ::send(host_socket, data, size, MSG_NOSIGNAL) == static_cast<ssize_t>(size);
+}
+
+bool send_json(const nlohmann::json& json) {
+  const std::string text = json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return send_packet(text.data(), text.size());
+}
+
+/// Trial steps of code that is warm, with an eye on what it asks of the system. Its system calls are not done.
+Offences probe(ForeignCode& code, const HostRequest& request, const std::function<std::uint64_t()>& allocations) {
+  constexpr std::int64_t warming = 200;
+  static_cast<void>(warm_up(code, request.period_s, warming));
+  code.reset(trial_input(0, request.period_s));
+  Offences found;
+  if (!trap_system_calls(host_socket)) return found;
+  const std::uint64_t before = allocations();
+  for (std::int64_t step = 0; step < request.count; ++step) {
+    abs_hil_output output = no_output();
+    code.step(trial_input(step, request.period_s), output);
+  }
+  found.allocations = allocations() - before;
+  found.system_calls = trapped_system_calls().count;
+  found.first_system_call = trapped_system_calls().first;
+  return found;
+}
+
+ForeignSetup setup_of(const nlohmann::json& json) {
+  return {.file = json.at("file").get<std::string>(),
+          .folder = json.at("folder").get<std::string>(),
+          .mapping = json.at("mapping").get<std::string>(),
+          .period_s = json.at("period_s").get<double>(),
+          .parameters = json.at("parameters").get<std::vector<std::pair<std::string, double>>>()};
+}
+
+}  // namespace
+
+int run_host(const std::function<std::uint64_t()>& allocations) {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  ::dup2(STDERR_FILENO, STDOUT_FILENO);  // what foreign code prints must not mix with the program's results
+  std::string packet(host_packet_max, '\0');
+  const ssize_t size = ::recv(host_socket, packet.data(), packet.size(), 0);
+  if (size <= 0) return 2;
+  packet.resize(static_cast<std::size_t>(size));
+  std::unique_ptr<ForeignCode> code;
+  try {
+    code = load_here(setup_of(nlohmann::json::parse(packet)));
+  } catch (const std::exception& error) {
+    static_cast<void>(send_json({{"error", error.what()}}));
+    return 2;
+  }
+  if (!send_json({{"signals", code->signals()}})) return 2;
+  runtime::MonotonicClock clock;
+  HostRequest request;
+  while (::recv(host_socket, &request, sizeof request, 0) == static_cast<ssize_t>(sizeof request)) {
+    HostAnswer answer{.output = no_output()};
+    switch (request.action) {
+      case HostAction::reset: code->reset(request.input); break;
+      case HostAction::step: {
+        const std::int64_t before_ns = clock.now_ns();
+        code->step(request.input, answer.output);
+        answer.step_ns = clock.now_ns() - before_ns;
+        break;
+      }
+      case HostAction::warm_up: answer.times = warm_up(*code, request.period_s, request.count); break;
+      case HostAction::probe:
+        answer.offences = probe(*code, request, allocations);
+        static_cast<void>(send_packet(&answer, sizeof answer));
+        ::_exit(0);  // no system call but this one is done any more
+    }
+    if (!send_packet(&answer, sizeof answer)) break;
+  }
+  return 0;
+}
+
+}  // namespace abs_hil::interchange

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+
+#include "interchange/foreign_code.hpp"
+
+namespace abs_hil::interchange {
+
+/// File descriptor of the host's socket (SOCK_SEQPACKET). The first packet is the setup as JSON, and its answer is
+/// JSON:
+/// {"signals": [...]} or {"error": "..."}. Then each packet is a HostRequest, and its answer a HostAnswer.
+inline constexpr int host_socket = 3;
+inline constexpr std::size_t host_packet_max = 65'536;
+
+enum class HostAction : std::uint32_t {
+  reset,
+  step,
+  warm_up,  ///< `count` trial steps
+  probe,    ///< `count` trial steps under watch; only `end` may follow
+};
+
+struct HostRequest {
+  HostAction action{HostAction::step};
+  std::uint32_t count{0};
+  double period_s{0.0};
+  abs_hil_input input{};
+};
+
+/// What real-time code must not do, found in trial steps.
+struct Offences {
+  std::uint64_t allocations{0};
+  std::uint64_t system_calls{0};
+  std::int32_t first_system_call{-1};
+};
+
+struct HostAnswer {
+  abs_hil_output output{};
+  std::int64_t step_ns{0};
+  StepTimes times{};
+  Offences offences{};
+};
+
+}  // namespace abs_hil::interchange

@@ -1,0 +1,168 @@
+"""Exported FMUs in FMPy: valid, equal to abs_hil --fast, the same in both versions of FMI. usage: see foreign.py"""
+import pathlib
+import platform
+import subprocess
+import sys
+import unittest
+import zipfile
+
+from foreign import SOURCE  # first: it reads the arguments
+
+from program import PROGRAM, ProgramTest
+
+try:
+    import fmpy
+    import fmpy.validation
+    from fmpy.fmi1 import FMICallException
+    from fmu_loop import Instance, stop
+except ImportError as error:
+    print(f'SKIPPED: {error}: scripts/setup_python.sh')
+    sys.exit(77)
+
+START = ['--set', 'experiment.start_speed_rad_s=170']
+IDEAL = ['--set', 'plant.ideal_sensors=true', '--set', 'plant.ideal_actuator=true']
+
+
+class FmuTest(ProgramTest):
+    def export(self, name, *options, fmi=2):
+        path = self.folder / f'{name}{fmi}.fmu'
+        result = self.run_program('export-fmu', '--fmi', fmi, '--out', path, *options)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return str(path)
+
+    def pair(self, fmi, *options, controller='adaptive'):
+        plant = Instance(self.export('plant', *START, *options, fmi=fmi))
+        law = Instance(self.export('law', '--controller', controller, *START, *options, fmi=fmi))
+        self.addCleanup(plant.close)
+        self.addCleanup(law.close)
+        return plant, law
+
+    def fast_stop(self, *options):
+        summary = self.folder / 'summary.json'
+        self.fast(*START, '--summary', summary, *options)
+        return self.summary(summary)
+
+    def test_fmpy_validates_them(self):
+        for fmi in (2, 3):
+            for name, options in (('plant', ()), ('law', ('--controller', 'adaptive')), ('road', ('--plant', 'inteco-manual'))):
+                with self.subTest(name=name, fmi=fmi):
+                    path = self.export(name, *options, fmi=fmi)
+                    self.assertEqual(fmpy.validation.validate_fmu(path), [])
+                    names = zipfile.ZipFile(path).namelist()
+                    self.assertIn('binaries/linux64/abs_hil_fmu.so' if fmi == 2 else 'binaries/x86_64-linux/abs_hil_fmu.so', names)
+                    result = fmpy.simulate_fmu(path, stop_time=0.1, output_interval=1e-3)
+                    self.assertEqual(len(result), 101)
+
+    def test_parameters_come_from_the_rows(self):
+        for fmi in (2, 3):
+            description = fmpy.read_model_description(self.export('plant', '--set', 'plant.theta_N=30', fmi=fmi))
+            variables = {v.name: v for v in description.modelVariables}
+            theta = variables['plant.theta_N']
+            self.assertEqual((float(theta.start), theta.unit, float(theta.max)), (30.0, 'N', 500.0))
+            self.assertTrue(theta.description)
+            self.assertEqual(variables['upper_counts'].causality, 'output')
+            self.assertEqual(variables['brake_duty'].causality, 'input')
+            keys = self.run_program('list', '--keys').stdout
+            for name in variables:
+                if name.startswith('plant.'):
+                    self.assertIn(name + ' ', keys)
+
+    def test_closed_loop_stops_as_the_program_does(self):
+        for options, controller, bound in (((), 'adaptive', 0.005), (IDEAL, 'adaptive', 0.001), ((), 'pi', 0.005),
+                                           ((), 'sliding-mode-smooth', 0.005)):
+            expected = self.fast_stop('--controller', controller, *options)
+            runs = []
+            for fmi in (2, 3):
+                with self.subTest(options=options, controller=controller, fmi=fmi):
+                    pair = self.pair(fmi, *options, controller=controller)
+                    time_s, distance_m, speeds = stop(*pair, ideal_sensors=bool(options))
+                    print(f'{controller} {"ideal" if options else "real"} FMI {fmi}: {distance_m:.5f} m, abs_hil --fast '
+                          f'{expected["stop_distance_m"]:.5f} m')
+                    self.assertAlmostEqual(distance_m / expected['stop_distance_m'], 1.0, delta=bound)
+                    self.assertAlmostEqual(time_s / expected['stop_time_s'], 1.0, delta=bound)
+                    runs.append(speeds)
+            self.assertEqual(*runs)
+
+    def test_state_is_kept_set_and_serialised(self):
+        for fmi in (2, 3):
+            plant, law = self.pair(fmi)
+            _, whole, speeds = stop(plant, law, ideal_sensors=False, end_speed_m_s=10)
+            steps = len(speeds) - 1
+            for instance in (plant, law):
+                get, put, size, free = (('getFMUstate', 'setFMUstate', 'serializeFMUstate', 'freeFMUstate') if fmi == 2 else
+                                        ('getFMUState', 'setFMUState', 'serializeFMUState', 'freeFMUState'))
+                state = getattr(instance.fmu, get)()
+                data = getattr(instance.fmu, size)(state)
+                back = getattr(instance.fmu, size.replace('serialize', 'deSerialize' if fmi == 2 else 'deserialize'))(data)
+                outputs = [v.name for v in instance.description.modelVariables if v.causality == 'output']
+                before = [instance.get(name) for name in outputs]
+
+                def go_on(instance=instance, outputs=outputs, n=steps):
+                    for k in range(20):
+                        instance.step((n + k) * 1e-3, 1e-3)
+                    return [instance.get(name) for name in outputs]
+
+                after = go_on()
+                self.assertNotEqual(before, after)
+                for kept in (state, back):
+                    getattr(instance.fmu, put)(kept)
+                    self.assertEqual([instance.get(name) for name in outputs], before)
+                    self.assertEqual(go_on(), after)
+
+    def test_several_instances(self):
+        path = self.export('plant', *START)
+        instances = [Instance(path, f'rig {n}', plant__theta_N=15.0 + n) for n in range(3)]
+        for n in range(50):
+            for instance in instances:
+                instance.set('brake_duty', 0.6)
+                instance.step(n * 1e-3, 1e-3)
+        speeds = [instance.get('omega2_rad_s') for instance in instances]
+        self.assertEqual(len(set(speeds)), 3)
+        for instance in instances:
+            instance.close()
+
+    def test_errors_go_to_the_log(self):
+        for fmi in (2, 3):
+            plant, law = self.pair(fmi)
+            for action in (lambda plant=plant: plant.set('brake_duty', 1.5),
+                           lambda plant=plant: plant.set('brake_duty', float('nan')),
+                           lambda plant=plant: plant.set('plant.theta_N', 20.0), lambda plant=plant: plant.set('slip', 0.1),
+                           lambda plant=plant: plant.step(5.0, 1e-3), lambda plant=plant: plant.step(0.0, -1.0),
+                           lambda law=law: law.step(0.0, 5e-3)):
+                with self.assertRaises(FMICallException):
+                    action()
+            plant.step(0.0, 1e-3)  # and it goes on
+
+    def test_other_versions_description_is_refused(self):
+        path = self.export('plant')
+        edited = self.folder / 'edited.fmu'
+        with zipfile.ZipFile(path) as old, zipfile.ZipFile(edited, 'w') as new:
+            for name in old.namelist():
+                data = old.read(name)
+                new.writestr(name, data.replace(b'abs_hil-plant-', b'abs_hil-plant-0') if name.endswith('.xml') else data)
+        with self.assertRaisesRegex(Exception, 'instantiate'):
+            Instance(str(edited))
+
+    def test_bad_input(self):
+        for arguments, word in ((('--fmi', 4, '--out', self.folder / 'a.fmu'), '--fmi 4'),
+                                (('--out', self.folder / 'nowhere' / 'a.fmu'), 'nowhere'),
+                                (('--set', 'plant.theta_N=-1', '--out', self.folder / 'a.fmu'), 'plant.theta_N'),
+                                (('--controller', 'nope', '--out', self.folder / 'a.fmu'), 'nope')):
+            result = self.run_program('export-fmu', *arguments)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            self.assertIn(str(word), result.stderr)
+            self.assertEqual(len(result.stderr.strip().splitlines()), 1)
+        self.assertEqual(list(self.folder.iterdir()), [])
+
+    def test_binary_brings_everything(self):
+        if platform.system() != 'Linux':
+            self.skipTest('ldd')
+        library = pathlib.Path(PROGRAM).resolve().parent.parent / 'fmu/linux64/abs_hil_fmu.so'
+        needed = subprocess.run(['ldd', library], capture_output=True, text=True, check=True).stdout
+        for line in needed.splitlines():
+            self.assertRegex(line, r'linux-vdso|libm\.so|libc\.so|ld-linux')
+        self.assertTrue(SOURCE.exists())
+
+
+if __name__ == '__main__':
+    unittest.main()
