@@ -27,7 +27,7 @@ else
     "most of it real-time runs and tests in a virtual machine (scripts/test.sh quick: about a minute)"
 fi
 echo "test: a test is skipped and says why if its tools are missing: a virtual machine (packages-vm.txt), abs-spy" \
-  "(packages-spy.txt), a browser and Octave (packages-report.txt), Python modules (setup_python.sh), FUSE," \
+  "(packages-spy.txt), a browser and Octave (packages-report.txt), Windows (packages-windows.txt), Python modules (setup_python.sh), FUSE," \
   "network namespaces"
 scripts/setup.sh
 # Without these packages the tests in a virtual machine are skipped, unless they must not be.
@@ -35,6 +35,7 @@ scripts/setup.sh packages-vm.txt || { [ "${CI:-}" != true ] && [ "${ABS_HIL_REQU
 if [ "${CI:-}" = true ]; then
   scripts/setup.sh packages-spy.txt
   scripts/setup.sh packages-report.txt
+  scripts/setup.sh packages-windows.txt
   scripts/setup_python.sh
 fi
 scripts/build.sh "$preset"

@@ -17,8 +17,8 @@ namespace abs_hil::interchange {
 
 namespace {
 
-double& field_of(void* record, std::size_t offset) {
-  return *reinterpret_cast<double*>(static_cast<char*>(record) + offset);
+void put_field(void* record, std::size_t offset, double value) {
+  std::memcpy(static_cast<char*>(record) + offset, &value, sizeof value);
 }
 double field_of(const void* record, std::size_t offset) {
   double value = 0.0;
@@ -188,7 +188,9 @@ class FmuCode final : public ForeignCode {
     sound = sound && instance_.step(static_cast<double>(steps_) * period_s_, period_s_);
     ++steps_;
     for (const FmuLink& out : facts_.outputs) {
-      sound = sound && instance_.get(out.reference, field_of(&output, out.offset));
+      double value = std::numeric_limits<double>::quiet_NaN();
+      sound = sound && instance_.get(out.reference, value);
+      put_field(&output, out.offset, value);
     }
     sound_ = sound;
     if (!sound) output.brake_torque_Nm = std::numeric_limits<double>::quiet_NaN();

@@ -17,7 +17,8 @@ fmi2Status done(fmi2Component component, const Action& action) noexcept {
 }
 
 fmi2Status not_there(fmi2Component component, const char* what) noexcept {
-  return done(component, [&] { throw std::invalid_argument(std::string(what) + ": this FMU cannot do that"); });
+  if (component != nullptr) of(component)->log(true, std::string(what) + ": this FMU cannot do that");
+  return fmi2Error;
 }
 
 }  // namespace
