@@ -113,9 +113,10 @@ double CommandGate::limited(double duty, double most, GateAction action) noexcep
 
 double CommandGate::rising(double duty, double before, double rate_per_s, double elapsed_s,
                            GateAction action) noexcept {
-  const double risen = rising_duty(duty, before, rate_per_s, elapsed_s);
-  if (risen != duty) note(action);
-  return risen;
+  const double most = before + rate_per_s * elapsed_s;
+  if (duty <= most + rise_rounding) return duty;
+  note(action);
+  return most;
 }
 
 /// The command that may follow a fault: the motor is off, and the brake holds at most `fault_brake_duty`, if no fault

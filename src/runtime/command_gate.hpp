@@ -25,13 +25,8 @@ using rig::GateAction;
 /// A driver may round a duty down by so much: half a step of 8 bits, the coarsest PWM.
 inline constexpr double rounded_down_most = 0.5 / 255.0;
 
-/// The most that a duty may rise to, `elapsed_s` after it was `before`.
-template <class S>
-[[nodiscard]] inline S rising_duty(const S& duty, const S& before, const S& rate_per_s, const S& elapsed_s) noexcept {
-  constexpr double rounding = 1e-9;  // a step exactly at the limit must pass
-  const S most = before + rate_per_s * elapsed_s;
-  return rig::select(duty <= most + rounding, duty, most);
-}
+/// Tolerance for rounding: a step exactly at the limit must pass.
+inline constexpr double rise_rounding = 1e-9;
 
 /// Inputs of the gate besides the command.
 struct GateInput {

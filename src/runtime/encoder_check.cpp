@@ -90,9 +90,13 @@ CheckResult EncoderCheck::judge_speeds(const SpeedWindow& speed_window) noexcept
 }
 
 CheckResult EncoderCheck::judge_standing(const SpeedWindow& speed_window) noexcept {
+  if (watch_.not_standing(speed_window)) {
+    standing_s_ = standing_rad_ = 0.0;
+    return {};
+  }
   standing_s_ += speed_window.dt_s;
   standing_rad_ += speed_window.omega1_rad_s * speed_window.dt_s;
-  if (watch_.quiet_standing(speed_window, standing_rad_)) {
+  if (watch_.moved(speed_window, standing_rad_)) {
     standing_s_ = standing_rad_ = 0.0;
     return {};
   }

@@ -4,7 +4,8 @@ namespace abs_hil::runtime {
 
 CheckResult ResponseCheck::update(const SpeedWindow& speed_window, double brake_Nm) noexcept {
   using rig::Reason;
-  const auto verdict = watch_.update(speed_window, brake_Nm);
+  if (!watch_.take(speed_window, brake_Nm)) return {};
+  const auto verdict = watch_.conclude(true);
   if (!verdict.due) return {};
   if (verdict.rises) return {Reason::speed_rises_with_motor_off, verdict.gained_kg_m_s};
   if (verdict.motor_silent) return {Reason::motor_no_response, verdict.gained_kg_m_s};

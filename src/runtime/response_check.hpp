@@ -37,14 +37,19 @@ class MomentumWatch {
     [[nodiscard]] Condition quiet() const noexcept { return !(due && (rises || motor_silent || brake_silent)); }
   };
 
-  /// @param brake_Nm expected brake torque
-  [[nodiscard]] auto update(const BasicSpeedWindow<S>& speed_window, const S& brake_Nm) noexcept {
+  /// Adds to the window. True where it ends. @param brake_Nm expected brake torque
+  [[nodiscard]] auto take(const BasicSpeedWindow<S>& speed_window, const S& brake_Nm) noexcept {
     add(speed_window, brake_Nm);
-    const auto ends = now_.lasted_s >= window_s &&
-                      !(now_.lasted_s < longest_window_s && slack_kg_m_s(now_) > slack_N * now_.lasted_s);
-    Verdict<decltype(now_.lasted_s > 0.0)> verdict{};
-    if (!rig::any(ends)) return verdict;
-    verdict = judge(before_, now_);
+    const auto lasts = now_.lasted_s >= window_s;
+    if (!rig::any(lasts)) return lasts;
+    now_.end_error_s = speed_window.end_error_s;
+    now_.counts_rad = speed_window.resolution_rad_s * speed_window.dt_s;
+    return lasts && !(now_.lasted_s < longest_window_s && slack_kg_m_s(now_) > slack_N * now_.lasted_s);
+  }
+  /// Compares the windows that end with those before them.
+  template <class Condition>
+  [[nodiscard]] auto conclude(const Condition& ends) noexcept {
+    auto verdict = judge(before_, now_);
     verdict.due = ends && before_.lasted_s > 0.0;
     before_ = chosen(ends, now_, before_);
     now_ = chosen(ends, Window{}, now_);
@@ -116,9 +121,9 @@ void MomentumWatch<S>::add(const BasicSpeedWindow<S>& s, const S& brake_Nm) noex
   const S p_kg_m_s = p1_kg_m_s + J2_per_r2_kg_m_ * s.omega2_rad_s;
   const S motor_Nm = stall_torque_Nm_ * s.motor_duty * (1.0 - s.omega2_rad_s / no_load_speed_rad_s_);
   const S friction_Nm = M20_Nm_ + d2_Nms_rad_ * s.omega2_rad_s;
-  now_.begin_error_s = rig::select(now_.lasted_s == 0.0, s.begin_error_s, now_.begin_error_s);
-  now_.end_error_s = s.end_error_s;
-  now_.counts_rad = s.resolution_rad_s * s.dt_s;
+  const auto begins = now_.lasted_s == 0.0;
+  if (rig::any(begins)) [[unlikely]]
+    now_.begin_error_s = rig::select(begins, s.begin_error_s, now_.begin_error_s);
   now_.lasted_s += s.dt_s;
   now_.travel_kg_m += p_kg_m_s * s.dt_s;
   now_.motor_kg_m_s += (motor_Nm - friction_margin * friction_Nm) / r2_m_ * s.dt_s;

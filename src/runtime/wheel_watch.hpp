@@ -31,6 +31,7 @@ class SpeedBounds {
     low_rad_s_ = rig::larger(S(low_rad_s_ - loss_rad_s2_ * dt_s), S(-backwards_rad_s));
     high_rad_s_ += gain_rad_s2_ * dt_s;
     const auto inside = omega_rad_s + slack_rad_s >= low_rad_s_ && omega_rad_s - slack_rad_s <= high_rad_s_;
+    if (!rig::any(inside)) return inside;
     // The reading is a mean over dt. At its end the wheel may be faster or slower by what dt allows.
     low_rad_s_ =
         rig::select(inside, rig::larger(low_rad_s_, S(omega_rad_s - slack_rad_s - loss_rad_s2_ * dt_s)), low_rad_s_);
@@ -69,9 +70,11 @@ class WheelWatch {
     constexpr double earnest_brake_Nm = 1.0;
     // (6) by the implicit Euler rule. Its relative error is the speed window's share of the lag, 4 %.
     const S share = c31_per_s_ * window.dt_s;
-    const auto lags = c31_per_s_ < std::numeric_limits<double>::infinity();
-    brake_Nm_ =
-        rig::select(lags, S((brake_Nm_ + share * window.brake_target_Nm) / (1.0 + share)), window.brake_target_Nm);
+    const S lagging_Nm = (brake_Nm_ + share * window.brake_target_Nm) / (1.0 + share);
+    const auto ideal = !(c31_per_s_ < std::numeric_limits<double>::infinity());
+    brake_Nm_ = lagging_Nm;
+    if (rig::any(ideal)) [[unlikely]]
+      brake_Nm_ = rig::select(ideal, window.brake_target_Nm, lagging_Nm);
     free_s_ = rig::select(window.brake_target_Nm > 0.0, S(0.0), S(free_s_ + window.dt_s));
     braked_s_ = rig::select(brake_Nm_ >= earnest_brake_Nm, S(braked_s_ + window.dt_s), S(0.0));
   }
@@ -79,7 +82,10 @@ class WheelWatch {
   /// lock, so its interval reaches down to standstill. Once the brake has let go, a tyre that slides on a turning wheel
   /// must spin it up: an encoder without counts is then stuck. @param standing_rad  its way since it stands
   [[nodiscard]] auto quiet_standing(const BasicSpeedWindow<S>& window, const S& standing_rad) const noexcept {
-    return not_standing(window) || rig::magnitude(standing_rad) > window.resolution_rad_s * window.dt_s;
+    return not_standing(window) || moved(window, standing_rad);
+  }
+  [[nodiscard]] auto moved(const BasicSpeedWindow<S>& window, const S& standing_rad) const noexcept {
+    return rig::magnitude(standing_rad) > window.resolution_rad_s * window.dt_s;
   }
   [[nodiscard]] auto not_standing(const BasicSpeedWindow<S>& window) const noexcept {
     constexpr double standing_speed_m_s = 1.0;  // of the lower wheel's tread, which then spins up the upper wheel
@@ -94,10 +100,12 @@ class WheelWatch {
            r2_m_ * window.resolution_rad_s;
   }
   [[nodiscard]] auto quiet_rolling(const BasicSpeedWindow<S>& window) const noexcept {
+    const auto braked = free_s_ < rolled_after_s;
+    if (!rig::any(!braked)) return braked;
     const S v1_m_s = r1_m_ * window.omega1_rad_s;
     const S v2_m_s = r2_m_ * window.omega2_rad_s;
     const S stamps_m_s = (rig::magnitude(v1_m_s) + rig::magnitude(v2_m_s)) * window.stamp_error_s() / window.dt_s;
-    return free_s_ < rolled_after_s || rig::magnitude(S(v1_m_s - v2_m_s)) + stamps_m_s <= allowed_m_s(window);
+    return braked || rig::magnitude(S(v1_m_s - v2_m_s)) + stamps_m_s <= allowed_m_s(window);
   }
   [[nodiscard]] auto quiet_slip(const BasicSpeedWindow<S>& window) const noexcept {
     constexpr double braked_after_s = 0.15;

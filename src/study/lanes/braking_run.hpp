@@ -102,15 +102,17 @@ struct LaneGate {
     };
     const auto upper_in_reach = upper.take(window.omega1_rad_s, slack(window.omega1_rad_s), window.dt_s);
     const auto lower_in_reach = lower.take(window.omega2_rad_s, slack(window.omega2_rad_s), window.dt_s);
-    return upper_in_reach && lower_in_reach && watch.quiet_standing(window, S(window.omega1_rad_s * window.dt_s)) &&
-           watch.quiet_rolling(window) && watch.quiet_slip(window) && momentum.update(window, watch.brake_Nm()).quiet();
+    const auto ends = momentum.take(window, watch.brake_Nm());
+    const auto quiet_wheels = upper_in_reach && lower_in_reach &&
+                              watch.quiet_standing(window, S(window.omega1_rad_s * window.dt_s)) &&
+                              watch.quiet_rolling(window) && watch.quiet_slip(window);
+    return rig::any(ends) ? quiet_wheels && momentum.conclude(ends).quiet() : quiet_wheels;
   }
   [[nodiscard]] S passed_duty(const S& duty, const S& dt_s) noexcept {
     const S within = rig::clamped(duty, S(0.0), brake_duty_max);
+    const S most = rig::larger(brake_risen, brake_free_duty) + brake_rate_per_s * dt_s;
     // The first command is not rate-limited.
-    return rig::select(dt_s > 0.0,
-                       runtime::rising_duty(within, rig::larger(brake_risen, brake_free_duty), brake_rate_per_s, dt_s),
-                       within);
+    return rig::select(dt_s > 0.0 && !(within <= most + runtime::rise_rounding), most, within);
   }
 };
 
