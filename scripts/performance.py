@@ -191,7 +191,7 @@ def lanes():
     """The section on runs in lanes of packs."""
     found = bench('bench_lanes')
     rows = []
-    for name in found:
+    for name in sorted(found, key=lambda name: name.split('/')[0], reverse=True):
         plant, controller, which = name.split('/')
         if which != 'none':
             continue
@@ -202,9 +202,9 @@ def lanes():
         rows.append([f'`{controller}`', f'`{plant}`', f'{alone:,.0f}', *shown, f'{100 * rates["portable"][1]["in_lanes"]:.1f} %'])
     return f'''{LANES}
 
-Braking runs a second on one core, by CPU time: from 170 rad/s to 0.3 m/s at 1 kHz, with the real actuator and encoders, on
-plants varied as `abs_hil compare` does, setting up included. In parentheses: against the scalar path of the same run. The last column
-is the share of the runs that stayed in lanes; the others were computed again by the scalar path.
+Braking runs a second on one core, by CPU time, medians of {REPETITIONS}: from 170 rad/s to 0.3 m/s at 1 kHz, with the
+real actuator and encoders, on plants varied as `abs_hil compare` does, set-up included. In parentheses: against the scalar
+path. The last column is the share of the runs that stayed in lanes; the scalar path computed the others again.
 
 {machine()}
 
