@@ -2,6 +2,10 @@
 add_library(abs_hil_warnings INTERFACE)
 target_compile_options(abs_hil_warnings INTERFACE -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror)
 
+# No fused multiply-add that a source does not ask for: it would change the last bit, and so lanes of packs
+# (rig/scalar.hpp) and single runs would part.
+add_compile_options(-ffp-contract=off)
+
 # For code beside the cycle, see cmake/Rooms.cmake.
 add_library(abs_hil_beside_the_cycle INTERFACE)
 target_compile_options(abs_hil_beside_the_cycle INTERFACE $<$<CONFIG:Release>:-O1>)

@@ -8,12 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/braking_figures.hpp"
 #include "rig/record_sink.hpp"
 
 namespace abs_hil::analysis {
-
-/// Car speed above which slip and its estimates are judged. Below it one encoder count is a large part of them.
-inline constexpr double least_judged_speed_m_s = 3.0;
 
 /// Metrics of a braking run. NaN if the run did not get that far or the backend cannot know the value. Speeds and slip
 /// are true values if the backend knows them, else estimates.
@@ -62,59 +60,33 @@ struct MissingFigure {
 /// @param end_speed_m_s  as given to RunMetrics
 [[nodiscard]] std::vector<MissingFigure> missing_figures(const Metrics& metrics, double end_speed_m_s);
 
+/// The metrics as far as the figures know them.
+[[nodiscard]] Metrics metrics_of(const BrakingFigures<double>& figures) noexcept;
+
 /// Computes the metrics from a stream of records without storing them.
 class RunMetrics final : public rig::RecordSink {
  public:
   /// @param r2_m  lower wheel's radius
   /// @param end_speed_m_s  v_x below which the car counts as stopped, > 0
-  RunMetrics(double r2_m, double end_speed_m_s) : r2_m_(r2_m), end_speed_m_s_(end_speed_m_s) {}
+  RunMetrics(double r2_m, double end_speed_m_s) : r2_m_(r2_m), figures_(end_speed_m_s) {}
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
   [[nodiscard]] Metrics metrics() const noexcept;
   /// True if the car has braked but not stopped so far, or moves again after a stop.
   [[nodiscard]] bool moves_on() const noexcept {
-    if (std::isnan(metrics_.brake_start_s)) return false;
-    const bool again = !std::isnan(metrics_.stop_time_s) && metrics_.final_speed_m_s >= end_speed_m_s_;
+    if (!begun_) return false;
+    const bool again = figures_.stop_known() && figures_.final_speed_m_s >= figures_.end_speed_m_s();
     return again || std::isnan(metrics().stop_time_s);
   }
   /// True once the stop is known and braking is over: later records change no metric.
-  [[nodiscard]] bool complete() const noexcept { return !braking_ && !std::isnan(metrics_.stop_time_s); }
+  [[nodiscard]] bool complete() const noexcept { return !braking_ && figures_.stop_known(); }
 
  private:
-  /// Finds the time since which a quantity has stayed within its band, from the start of braking.
-  class Settling {
-   public:
-    void observe(double since_brake_s, bool inside) noexcept {
-      if (inside && !settled_) since_s_ = since_brake_s;
-      settled_ = inside;
-    }
-    [[nodiscard]] double since_s() const noexcept { return settled_ ? since_s_ : rig::unknown; }
-
-   private:
-    bool settled_{false};
-    double since_s_{rig::unknown};
-  };
-
-  /// Measures the deceleration over intervals of at least 10 ms.
-  void note_deceleration(double time_s, double v_x_m_s) noexcept;
-  void consume_braking(const rig::CycleRecord& record, double since_brake_s, double v_x_m_s);
-
   double r2_m_;
-  double end_speed_m_s_;
-  Metrics metrics_{};
-  Settling slip_settling_{};
-  Settling theta_settling_{};
-  double slip_square_sum_{0.0};
-  double theta_square_sum_{0.0};
-  std::uint64_t slip_samples_{0};
+  BrakingFigures<double> figures_;
+  bool begun_{false};
   bool braking_{false};
   bool stopped_{false};  ///< the last record is of phase stopped, with an estimate below the end speed
-  double last_distance_m_{0.0};
-  double interval_start_s_{rig::unknown};
-  double interval_start_m_s_{0.0};
-  double deceleration_m_s2_{0.0};
-  double last_time_s_{rig::unknown};
-  double last_torque_Nm_{rig::unknown};
 };
 
 }  // namespace abs_hil::analysis

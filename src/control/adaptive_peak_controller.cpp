@@ -95,8 +95,8 @@ double AdaptivePeakController::command_Nm(const SlipInput& input, double slip, c
   const double wanted_Nm = laws.T_b(laws.xi_1(reading, nu, force_N) + reference_m_s2) - observer_.brake_error_Nm();
   if (std::isinf(input.max_brake_torque_Nm)) return wanted_Nm;
 
-  const WheelMotion motion = wheel_motion(
-      wheels_, speeds, slip, reference.slip,
+  const WheelMotion<double> motion = wheel_motion(
+      laws, speeds, slip, reference.slip,
       {.tyre_force_N = force_N, .brake_torque_Nm = input.brake_torque_Nm + observer_.brake_error_Nm()}, v_min_m_s_);
   const double wanted_rate_Nm_s =
       laws.T_b(paper::Laws<double>::nu(gains, error_m_s, motion.error_rate_m_s2 - reference_m_s2) +

@@ -1,10 +1,10 @@
 #pragma once
 
 #include "abs_hil/control/slip_error_dynamics.hpp"
-#include "abs_hil/control/wheel_motion.hpp"
 #include "control/slip_error_integral.hpp"
 #include "control/slip_peak_estimator.hpp"
 #include "control/wheel_force_observer.hpp"
+#include "control/wheel_motion.hpp"
 
 namespace abs_hil::control {
 

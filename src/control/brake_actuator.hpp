@@ -1,73 +1,152 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
+#include <type_traits>
 
-#include "abs_hil/rig/parameters.hpp"
+#include "abs_hil/rig/brake_map.hpp"
+#include "abs_hil/rig/scalar.hpp"
 
 namespace abs_hil::control {
 
 /// The controllers' model of the brake. It computes the duty for a torque by the inverse of (7). It estimates the
 /// torque that acts in open loop, by the lag (6), because the rig has no torque sensor. Real-time safe.
-class BrakeActuator {
+template <class S>
+class BasicBrakeActuator {
  public:
+  BasicBrakeActuator() = default;
   /// @param ideal the reference torque acts at once and without limits (`plant.ideal_actuator`)
   /// @param max_duty largest duty the gate lets pass, in (0, 1]
   /// @param duty_steps steps of the PWM from duty 0 to duty 1; 0: any duty can be sent
-  BrakeActuator(const rig::BrakeParameters& brake, bool ideal, double max_duty, std::uint32_t duty_steps = 0) noexcept;
+  BasicBrakeActuator(const rig::BrakeParameters& brake, bool ideal, double max_duty,
+                     std::uint32_t duty_steps = 0) noexcept
+    requires std::is_same_v<S, double>;
 
   /// Starts from a brake that has long been released.
-  void reset() noexcept;
+  void reset() noexcept {
+    target_Nm_ = torque_Nm_ = mean_torque_Nm_ = S(0.0);
+    was_in_gap_ = S(0.0);
+  }
   /// Advances the model by `dt_s` under the duty of the last `command` (the torque, if ideal): exact solution of (6).
-  void advance(double dt_s) noexcept;
+  void advance(const S& dt_s) noexcept;
+  /// Prepares `advance` for this time; otherwise `advance` does it when the time changes.
+  void prepare(const S& dt_s) noexcept;
   /// Stores the command that was sent now: its duty in [0, 1], or, if ideal, its torque, >= 0.
-  void command(double duty, double torque_Nm) noexcept;
+  void command(const S& duty, const S& torque_Nm) noexcept {
+    target_Nm_ = static_torque_Nm(duty, torque_Nm);
+    torque_Nm_ = rig::select(ideal_ > 0.0, target_Nm_, torque_Nm_);
+  }
 
   /// The PWM's duty in [0, max_duty] whose torque is nearest to a reference torque. With an ideal actuator it is only
   /// recorded. NaN for a torque that is not finite.
-  [[nodiscard]] double duty_for(double torque_Nm) const noexcept;
+  [[nodiscard]] S duty_for(const S& torque_Nm) const noexcept {
+    return rig::brake_duty_for(brake_, torque_Nm, duties_);
+  }
   /// Static torque of that duty, or, if ideal, the torque itself, at least 0.
-  [[nodiscard]] double limited(double torque_Nm) const noexcept;
+  [[nodiscard]] S limited(const S& torque_Nm) const noexcept { return nearest(torque_Nm).torque_Nm; }
   /// A static torque and the duty that gives it.
   struct Target {
-    double torque_Nm;
-    double duty;
+    S torque_Nm{0.0};
+    S duty{0.0};
   };
   /// What to send for a reference torque, `dt_s` after the last call: `limited` and `duty_for`, except in the gap
   /// between 0 and the least torque that the dead zone leaves. There it switches between the two ends, so that their
   /// mean is the reference torque: nothing between them can be sent.
-  [[nodiscard]] Target next(double torque_Nm, double dt_s) noexcept;
+  [[nodiscard]] Target next(const S& torque_Nm, const S& dt_s) noexcept;
   /// What is missing of a finite reference torque in a static torque that was sent for it, N m: > 0 if less was sent
   /// (limits, rate limit, refusal), < 0 if more was sent. 0 if only the PWM's steps and the dead zone part the two.
   /// @param target_Nm  the torque of `next` for the reference torque
-  [[nodiscard]] double unsent_Nm(double reference_Nm, double target_Nm, double sent_Nm) const noexcept;
+  [[nodiscard]] S unsent_Nm(const S& reference_Nm, const S& target_Nm, const S& sent_Nm) const noexcept;
   /// Static torque b(u) of a command; its torque, if ideal.
-  [[nodiscard]] double static_torque_Nm(double duty, double torque_Nm) const noexcept;
+  [[nodiscard]] S static_torque_Nm(const S& duty, const S& torque_Nm) const noexcept {
+    return rig::select(ideal_ > 0.0, rig::larger(S(0.0), torque_Nm), rig::brake_torque_at(brake_, duty));
+  }
   /// Static torque of the last `command`.
-  [[nodiscard]] double sent_torque_Nm() const noexcept { return target_Nm_; }
+  [[nodiscard]] S sent_torque_Nm() const noexcept { return target_Nm_; }
   /// Largest torque that can be sent; infinite if ideal.
-  [[nodiscard]] double max_torque_Nm() const noexcept { return max_torque_Nm_; }
-  [[nodiscard]] double torque_Nm() const noexcept { return torque_Nm_; }            ///< estimated, now
-  [[nodiscard]] double mean_torque_Nm() const noexcept { return mean_torque_Nm_; }  ///< over the last `advance`
+  [[nodiscard]] S max_torque_Nm() const noexcept { return max_torque_Nm_; }
+  [[nodiscard]] S torque_Nm() const noexcept { return torque_Nm_; }            ///< estimated, now
+  [[nodiscard]] S mean_torque_Nm() const noexcept { return mean_torque_Nm_; }  ///< over the last `advance`
 
  private:
-  [[nodiscard]] bool in_gap(double torque_Nm) const noexcept;
-  [[nodiscard]] Target nearest(double torque_Nm) const noexcept;
+  [[nodiscard]] Target nearest(const S& torque_Nm) const noexcept {
+    const S duty = duty_for(torque_Nm);
+    const S torque = rig::select(ideal_ > 0.0, rig::larger(S(0.0), torque_Nm), rig::brake_torque_at(brake_, duty));
+    return {rig::select(rig::is_nan(duty), duty, torque), duty};
+  }
 
-  rig::BrakeParameters brake_;
-  bool ideal_;
-  double max_duty_;
-  std::uint32_t duty_steps_;
-  double max_torque_Nm_;
-  Target least_;  ///< the least above 0 that can be sent; 0 if ideal
-  double half_step_Nm_;
+  rig::BasicBrake<S> brake_{};
+  S ideal_{0.0};  ///< 1 if ideal, else 0; so are the other conditions below
+  rig::BrakeDuties<S> duties_{};
+  S max_torque_Nm_{0.0};
+  Target least_{};  ///< the least above 0 that can be sent; 0 if ideal
+  S half_step_Nm_{0.0};
+  S prepared_s_{0.0};  ///< the time that `advance` is prepared for
+  S covered_{0.0};     ///< the share of the distance to b(u) that it covers
   // In the gap: the end that is sent, for how long, and what is owed to the reference torque.
   Target end_{};
-  double held_s_{0.0};
-  double owed_Nms_{0.0};
-  bool was_in_gap_{false};
-  double target_Nm_{0.0};
-  double torque_Nm_{0.0};
-  double mean_torque_Nm_{0.0};
+  S held_s_{0.0};
+  S owed_Nms_{0.0};
+  S was_in_gap_{0.0};
+  S target_Nm_{0.0};
+  S torque_Nm_{0.0};
+  S mean_torque_Nm_{0.0};
 };
+using BrakeActuator = BasicBrakeActuator<double>;
+
+template <class S>
+void BasicBrakeActuator<S>::prepare(const S& dt_s) noexcept {
+  prepared_s_ = dt_s;
+  // (6) at a constant duty: the distance to b(u) shrinks by exp(-c31 dt).
+  covered_ = -rig::exponential_less_one(S(-brake_.c31_per_s * dt_s));
+}
+
+template <class S>
+void BasicBrakeActuator<S>::advance(const S& dt_s) noexcept {
+  if constexpr (std::is_same_v<S, double>) {
+    if (!(dt_s > 0.0)) return;
+    if (dt_s != prepared_s_) prepare(dt_s);
+  }
+  const S change_Nm = (target_Nm_ - torque_Nm_) * covered_;
+  // The integral of the distance is its loss / c31.
+  const S mean_Nm = target_Nm_ - change_Nm / (brake_.c31_per_s * dt_s);
+  const auto moves = covered_ > 0.0;  // not by a lag so long that the share vanishes
+  mean_torque_Nm_ = rig::select(ideal_ > 0.0, target_Nm_, rig::select(moves, mean_Nm, torque_Nm_));
+  torque_Nm_ = rig::select(ideal_ > 0.0, torque_Nm_, S(torque_Nm_ + change_Nm));
+}
+
+template <class S>
+auto BasicBrakeActuator<S>::next(const S& torque_Nm, const S& dt_s) noexcept -> Target {
+  // Time between two decisions in the gap: a period of the boards' PWMs at their default of 160 Hz, and far below the
+  // time constant of the brake.
+  constexpr double gap_hold_s = 1.0 / 160.0;
+  constexpr double rounding_s = 1e-9;
+  const auto in_gap = torque_Nm > 0.0 && torque_Nm < least_.torque_Nm && least_.torque_Nm <= max_torque_Nm_;
+  Target target = nearest(torque_Nm);
+  if (rig::any(in_gap)) {
+    const auto stays = in_gap && was_in_gap_ > 0.0;
+    const S most_Nms = least_.torque_Nm * gap_hold_s;
+    const S owed_Nms = rig::clamped(S(owed_Nms_ + (torque_Nm - end_.torque_Nm) * dt_s), S(-most_Nms), most_Nms);
+    owed_Nms_ = rig::select(in_gap, rig::select(stays, owed_Nms, S(0.0)), owed_Nms_);
+    held_s_ = rig::select(in_gap, S(held_s_ + dt_s), held_s_);
+    const auto decides = in_gap && (!stays || held_s_ + rounding_s >= gap_hold_s);
+    const auto brakes = owed_Nms_ + torque_Nm * gap_hold_s >= 0.5 * most_Nms;
+    end_.torque_Nm = rig::select(decides, rig::select(brakes, least_.torque_Nm, S(0.0)), end_.torque_Nm);
+    end_.duty = rig::select(decides, rig::select(brakes, least_.duty, S(0.0)), end_.duty);
+    held_s_ = rig::select(decides, S(0.0), held_s_);
+    target.torque_Nm = rig::select(in_gap, end_.torque_Nm, target.torque_Nm);
+    target.duty = rig::select(in_gap, end_.duty, target.duty);
+  }
+  was_in_gap_ = rig::select(in_gap, S(1.0), S(0.0));
+  return target;
+}
+
+template <class S>
+S BasicBrakeActuator<S>::unsent_Nm(const S& reference_Nm, const S& target_Nm, const S& sent_Nm) const noexcept {
+  constexpr double rounding_Nm = 1e-9;
+  const auto in_reach = reference_Nm >= 0.0 && reference_Nm <= max_torque_Nm_;
+  const auto as_wanted = rig::magnitude(S(target_Nm - sent_Nm)) <= half_step_Nm_ + rounding_Nm;
+  return rig::select(in_reach && as_wanted, S(0.0), S(reference_Nm - sent_Nm));
+}
 
 }  // namespace abs_hil::control

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "abs_hil/control/slip_error_dynamics.hpp"
+#include "control/law_controller.hpp"
 #include "control/slip_error_integral.hpp"
 
 namespace abs_hil::control {
@@ -8,21 +9,40 @@ namespace abs_hil::control {
 /// Slip controller (16) for a known peak tyre force theta0: `nominal_T_b` of paper_laws.hpp in sampled-data form.
 /// SlipErrorDynamics gives the torque, and SlipErrorIntegral gives I.
 /// With the correct theta0 and an ideal actuator, e_v'' + ks1 e_v' + ks0 e_v = 0. theta_est_N is theta0.
-class NominalController final : public SlipController {
+template <class S>
+class NominalLaw {
  public:
-  /// Throws std::invalid_argument for gains or theta0 out of range.
-  explicit NominalController(const ControllerContext& context);
+  static constexpr bool estimates_theta = true;
 
-  void reset(const SlipInput& input) noexcept override;
-  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
-  [[nodiscard]] bool take_over(const SlipController& before) noexcept override;
+  NominalLaw() = default;
+  /// Throws std::invalid_argument for options out of range.
+  explicit NominalLaw(const ControllerContext& context)
+    requires std::is_same_v<S, double>;
+
+  void reset(const BasicSlipInput<S>& input) noexcept {
+    integral_.reset(slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref), input.slip_ref);
+  }
+  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept {
+    const S error_m_s = slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref);
+    integral_.advance(input, error_m_s, input.slip_ref, laws_.r2 * input.speeds.omega2_rad_s);
+
+    const S phi = rig::normalised_tyre_force(tyre_, input.slip);
+    const S torque_Nm = dynamics_.feedback_linearising_torque_Nm(input, integral_.value_m(), error_m_s, theta0_N_, phi);
+    return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta0_N_};
+  }
+  void take_over(const NominalLaw& before) noexcept { integral_ = before.integral_; }
 
  private:
-  rig::WheelParameters wheels_;
-  rig::TyreParameters tyre_;
-  SlipErrorDynamics dynamics_;
-  SlipErrorIntegral integral_;
-  double theta0_N_;
+  paper::Laws<S> laws_{};
+  rig::TyreShape<S> tyre_{};
+  BasicSlipErrorDynamics<S> dynamics_{};
+  S theta0_N_{0.0};
+  BasicSlipErrorIntegral<S> integral_{};
+};
+
+class NominalController final : public LawController<NominalLaw> {
+ public:
+  using LawController::LawController;
 };
 
 }  // namespace abs_hil::control

@@ -68,6 +68,8 @@ std::string unknown_name_message(std::string_view name) {
 
 }  // namespace
 
+bool SlipController::take_over(const SlipController& /*before*/) noexcept { return false; }
+
 std::string_view controller_name(std::size_t index) noexcept {
   return index < table().size() ? table()[index].name : std::string_view{};
 }

@@ -59,8 +59,8 @@ double SlidingModeActuatorController::reference_rate_m_s3(const SlipInput& input
                                                           double switching) const noexcept {
   const double phi = rig::normalised_tyre_force(tyre_, input.slip);
   const double k = slip_velocity_gain(wheels_, input.slip_ref);
-  const WheelMotion motion =
-      wheel_motion(wheels_, input.speeds, input.slip, input.slip_ref,
+  const WheelMotion<double> motion =
+      wheel_motion(paper::laws(wheels_), input.speeds, input.slip, input.slip_ref,
                    {.tyre_force_N = theta_N * phi, .brake_torque_Nm = input.brake_torque_Nm}, v_min_m_s_);
   const bool inside = std::abs(error_m_s) < options_.boundary_m_s;
   const double wanted_rate = inside ? -options_.gain_m_s2 / options_.boundary_m_s * motion.error_rate_m_s2 : 0.0;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "abs_hil/control/wheel_motion.hpp"
+#include "control/wheel_motion.hpp"
 #include "control/sliding_surface.hpp"
 #include "control/wheel_force_observer.hpp"
 

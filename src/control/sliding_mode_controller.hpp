@@ -1,5 +1,6 @@
 #pragma once
 
+#include "control/law_controller.hpp"
 #include "control/sliding_surface.hpp"
 
 namespace abs_hil::control {
@@ -10,18 +11,35 @@ namespace abs_hil::control {
 /// The law and the gains of the paper's baseline are not public. This is the textbook law for the error (13), not a
 /// copy. The sign is held for a period, so e_v chatters around 0 with an amplitude of about K times the period. The
 /// chatter belongs to the law.
-class SlidingModeController final : public SlipController {
+template <class S>
+class SlidingModeLaw {
  public:
-  /// Throws std::invalid_argument for options out of range.
-  explicit SlidingModeController(const ControllerContext& context);
+  static constexpr bool estimates_theta = true;
 
-  void reset(const SlipInput& input) noexcept override { surface_.reset(input); }
-  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
-  [[nodiscard]] bool take_over(const SlipController& before) noexcept override;
+  SlidingModeLaw() = default;
+  /// Throws std::invalid_argument for options out of range.
+  explicit SlidingModeLaw(const ControllerContext& context)
+    requires std::is_same_v<S, double>;
+
+  void reset(const BasicSlipInput<S>& input) noexcept { surface_.reset(input); }
+  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept {
+    const S error_m_s = surface_.observe(input);
+    const S sign = rig::select(error_m_s > 0.0, S(1.0), rig::select(error_m_s < 0.0, S(-1.0), S(0.0)));
+    const S rate_m_s2 = -gain_m_s2_ * sign;
+    const BasicWantedMotion<S> wanted{.mean_rate_m_s2 = rate_m_s2,
+                                      .error_at_mid_m_s = error_m_s + 0.5 * surface_.period_s() * rate_m_s2};
+    return surface_.drive(input, error_m_s, wanted, sign);
+  }
+  void take_over(const SlidingModeLaw& before) noexcept { surface_.take_over(before.surface_); }
 
  private:
-  SlidingSurface surface_;
-  double gain_m_s2_;
+  BasicSlidingSurface<S> surface_{};
+  S gain_m_s2_{0.0};
+};
+
+class SlidingModeController final : public LawController<SlidingModeLaw> {
+ public:
+  using LawController::LawController;
 };
 
 }  // namespace abs_hil::control

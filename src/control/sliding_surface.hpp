@@ -1,42 +1,80 @@
 #pragma once
 
 #include "abs_hil/control/equivalent_control.hpp"
+#include "abs_hil/control/slip_error_dynamics.hpp"
 #include "control/switching_theta_estimator.hpp"
 
 namespace abs_hil::control {
 
 /// The common part of the laws that slide on e_v = 0: the equivalent control and an estimate theta_hat. A law gives the
 /// reference motion of e_v and its substitute for sign(e_v). Real-time safe except the constructor.
-class SlidingSurface {
+template <class S>
+class BasicSlidingSurface {
  public:
+  BasicSlidingSurface() = default;
   /// Throws std::invalid_argument for options out of range.
-  SlidingSurface(const ControllerContext& context, const SwitchingAdaptationOptions& adaptation);
+  BasicSlidingSurface(const ControllerContext& context, const SwitchingAdaptationOptions& adaptation)
+    requires std::is_same_v<S, double>
+      : laws_{paper::laws(context.rig.wheels)}, tyre_{context.rig.tyre}, equivalent_{context}, theta_{adaptation} {}
 
-  void reset(const SlipInput& input) noexcept;
+  void reset(const BasicSlipInput<S>& input) noexcept {
+    theta_.reset();
+    slip_ = input.slip;
+    switching_ = S(0.0);
+    excess_ = S(0.0);
+  }
   /// Takes over the state of the other.
-  void take_over(const SlidingSurface& before) noexcept;
+  void take_over(const BasicSlidingSurface& before) noexcept {
+    theta_.take_over(before.theta_);
+    slip_ = before.slip_;
+    past_phi_ = before.past_phi_;
+    switching_ = before.switching_;
+    excess_ = before.excess_;
+  }
   /// Adapts theta_hat over the past interval. theta_hat is held if the torque sent was not the reference torque and
   /// adaptation would drive the two further apart (anti-windup).
   /// @return e_v now
-  [[nodiscard]] double observe(const SlipInput& input) noexcept;
+  [[nodiscard]] S observe(const BasicSlipInput<S>& input) noexcept;
   /// The torque that moves e_v, now `error_m_s`, along the reference motion.
   /// @param switching  s for theta_hat over the coming interval, in [-1, 1]
-  [[nodiscard]] SlipOutput drive(const SlipInput& input, double error_m_s, const WantedMotion& wanted,
-                                 double switching) noexcept;
+  [[nodiscard]] BasicSlipOutput<S> drive(const BasicSlipInput<S>& input, const S& error_m_s,
+                                         const BasicWantedMotion<S>& wanted, const S& switching) noexcept;
 
   /// True if the last torque is not sent as it is and a change of this sign would drive it further out.
-  [[nodiscard]] bool winds_up(double torque_change) const noexcept { return excess_ * torque_change > 0.0; }
-  [[nodiscard]] double period_s() const noexcept { return equivalent_.period_s(); }
+  [[nodiscard]] auto winds_up(const S& torque_change) const noexcept { return excess_ * torque_change > 0.0; }
+  [[nodiscard]] S period_s() const noexcept { return equivalent_.period_s(); }
 
  private:
-  rig::WheelParameters wheels_;
-  rig::TyreParameters tyre_;
-  EquivalentControl equivalent_;
-  SwitchingThetaEstimator theta_;
-  double slip_{0.0};  ///< of the previous cycle
-  double past_phi_{0.0};
-  double switching_{0.0};
-  double excess_{0.0};  ///< > 0: less is sent than the reference torque, < 0: more is sent, 0: neither
+  paper::Laws<S> laws_{};
+  rig::TyreShape<S> tyre_{};
+  BasicEquivalentControl<S> equivalent_{};
+  BasicSwitchingThetaEstimator<S> theta_{};
+  S slip_{0.0};  ///< of the previous cycle
+  S past_phi_{0.0};
+  S switching_{0.0};
+  S excess_{0.0};  ///< > 0: less is sent than the reference torque, < 0: more is sent, 0: neither
 };
+
+template <class S>
+S BasicSlidingSurface<S>::observe(const BasicSlipInput<S>& input) noexcept {
+  past_phi_ = rig::normalised_tyre_force(tyre_, S(0.5 * (slip_ + input.slip)));
+  slip_ = input.slip;
+  excess_ = input.unsent_torque_Nm;
+  // theta_hat changes by -phi s, and the torque by phi times this change.
+  const S gain_phi = laws_.k({.lambda_ref = input.slip_ref}) * past_phi_;
+  theta_.update(!winds_up(S(-switching_)), input.dt_s, gain_phi, switching_);
+  return slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref);
+}
+
+template <class S>
+BasicSlipOutput<S> BasicSlidingSurface<S>::drive(const BasicSlipInput<S>& input, const S& error_m_s,
+                                                 const BasicWantedMotion<S>& wanted, const S& switching) noexcept {
+  const S torque_Nm = equivalent_.brake_torque_Nm(input, error_m_s, wanted, theta_.theta_N(), past_phi_);
+  switching_ = switching;
+  // A torque outside the actuator's range will not be sent, and a limit that held in the past cycle may still hold.
+  const auto outside = torque_Nm > input.max_brake_torque_Nm || torque_Nm < 0.0;
+  excess_ = rig::select(outside, torque_Nm, excess_);
+  return {.brake_torque_Nm = torque_Nm, .slip_velocity_error_m_s = error_m_s, .theta_est_N = theta_.theta_N()};
+}
 
 }  // namespace abs_hil::control

@@ -1,6 +1,5 @@
 #include "abs_hil/control/slip_error_dynamics.hpp"
 
-#include <cmath>
 #include <unsupported/Eigen/MatrixFunctions>
 
 #include "abs_hil/rig/option_check.hpp"
@@ -13,7 +12,10 @@ Eigen::Matrix2d error_dynamics_matrix(double ks0, double ks1) {
   return A;
 }
 
-SlipErrorDynamics::SlipErrorDynamics(const ControllerContext& context) : equivalent_{context} {
+template <class S>
+BasicSlipErrorDynamics<S>::BasicSlipErrorDynamics(const ControllerContext& context)
+  requires std::is_same_v<S, double>
+    : equivalent_{context} {
   const auto& gains = context.options.adaptive;
   rig::require_valid(gains, &AdaptiveOptions::ks0, "control.adaptive.");
   rig::require_valid(gains, &AdaptiveOptions::ks1, "control.adaptive.");
@@ -23,14 +25,9 @@ SlipErrorDynamics::SlipErrorDynamics(const ControllerContext& context) : equival
   const Eigen::Matrix2d whole = half * half;
   const Eigen::RowVector2d mean_rate = (whole - Eigen::Matrix2d::Identity()).row(1) / equivalent_.period_s();
   sampled_gains_ = {.ks0 = -mean_rate[0], .ks1 = -mean_rate[1]};
-  error_at_mid_ = half.row(1);
+  error_at_mid_ = {.per_s = half(1, 0), .share = half(1, 1)};
 }
 
-double SlipErrorDynamics::feedback_linearising_torque_Nm(const SlipInput& input, double integral_m, double error_m_s,
-                                                         double theta_N, double recent_phi) const noexcept {
-  const WantedMotion wanted{.mean_rate_m_s2 = paper::Laws<double>::nu(sampled_gains_, integral_m, error_m_s),
-                            .error_at_mid_m_s = error_at_mid_[0] * integral_m + error_at_mid_[1] * error_m_s};
-  return equivalent_.brake_torque_Nm(input, error_m_s, wanted, theta_N, recent_phi);
-}
+template class BasicSlipErrorDynamics<double>;
 
 }  // namespace abs_hil::control

@@ -27,7 +27,7 @@ class SmoothSlidingModeController final : public SlipController {
   [[nodiscard]] bool take_over(const SlipController& before) noexcept override;
 
  private:
-  SlidingSurface surface_;
+  BasicSlidingSurface<double> surface_;
   double gain_m_s2_;
   double width_m_s_;
 };

@@ -7,6 +7,9 @@ inline constexpr double standing_rad_s = 1.0;
 
 /// On a wheel that does not turn, brake and friction hold each other, and the motion says nothing about the tyre force.
 /// Real-time safe.
-[[nodiscard]] constexpr bool turns(double omega_rad_s) noexcept { return omega_rad_s >= standing_rad_s; }
+template <class S>
+[[nodiscard]] constexpr auto turns(const S& omega_rad_s) noexcept {
+  return omega_rad_s >= standing_rad_s;
+}
 
 }  // namespace abs_hil::control

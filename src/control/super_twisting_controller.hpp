@@ -33,7 +33,7 @@ class SuperTwistingController final : public SlipController {
   [[nodiscard]] bool take_over(const SlipController& before) noexcept override;
 
  private:
-  SlidingSurface surface_;
+  BasicSlidingSurface<double> surface_;
   double k1_;
   double k2_;
   double integral_m_s2_{0.0};

@@ -1,13 +1,14 @@
 #include "control/switching_theta_estimator.hpp"
 
-#include <algorithm>
 #include <stdexcept>
 
 #include "abs_hil/rig/option_check.hpp"
 
 namespace abs_hil::control {
 
-SwitchingThetaEstimator::SwitchingThetaEstimator(const SwitchingAdaptationOptions& options)
+template <class S>
+BasicSwitchingThetaEstimator<S>::BasicSwitchingThetaEstimator(const SwitchingAdaptationOptions& options)
+  requires std::is_same_v<S, double>
     : gamma_{options.gamma},
       theta0_N_{options.theta0_N},
       theta_min_N_{options.theta_min_N},
@@ -19,8 +20,6 @@ SwitchingThetaEstimator::SwitchingThetaEstimator(const SwitchingAdaptationOption
   }
 }
 
-void SwitchingThetaEstimator::update(double dt_s, double gain_phi, double switching) noexcept {
-  theta_N_ = std::clamp(theta_N_ - gamma_ * gain_phi * switching * dt_s, theta_min_N_, theta_max_N_);
-}
+template class BasicSwitchingThetaEstimator<double>;
 
 }  // namespace abs_hil::control

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "abs_hil/control/options.hpp"
+#include "control/speed_tracker.hpp"
 
 namespace abs_hil::control {
 
@@ -32,30 +33,20 @@ class TrackingObserver {
   void update(std::int32_t counts, double dt_s, double stamp_error_s = 0.0) noexcept;
 
   [[nodiscard]] double omega_rad_s() const noexcept { return omega_rad_s_; }
-  [[nodiscard]] double alpha_rad_s2() const noexcept { return alpha_rad_s2_; }
-  [[nodiscard]] bool stands_still() const noexcept { return still_s_ >= standstill_time_s_; }
+  [[nodiscard]] double alpha_rad_s2() const noexcept { return tracker_.alpha_rad_s2(); }
+  [[nodiscard]] bool stands_still() const noexcept { return tracker_.stands_still(); }
+  /// The filter alone.
+  [[nodiscard]] const SpeedTracker<double>& tracker() const noexcept { return tracker_; }
 
  private:
-  /// False if the reading is ignored.
-  bool predict_and_correct(double travel_rad, double dt_s, double stamp_error_s) noexcept;
-  [[nodiscard]] bool implausible(double correction_rad_s, double omega_gain, double dt_s,
-                                 double stamp_error_s) const noexcept;
-  void restart(double travel_rad, double dt_s) noexcept;
-  void bound_by_silence() noexcept;
+  [[nodiscard]] bool implausible(double travel, double stamp_error_s) const noexcept;
 
-  double bandwidth_rad_s_;
-  double standstill_time_s_;
-  double rad_per_count_;
+  SpeedTracker<double> tracker_;
   double alpha_max_rad_s2_;
   std::int32_t counts_{0};
-  /// Estimated angle minus the last reading. The difference stays exact however far the wheel has turned.
-  double angle_error_rad_{0.0};
-  double omega_rad_s_{0.0};
-  double taken_omega_rad_s_{0.0};  ///< speed at the last reading that was taken
-  double alpha_rad_s2_{0.0};
-  int ignored_{0};         ///< readings in a row
-  double ignored_s_{0.0};  ///< since the last reading that was taken
-  double still_s_{0.0};    ///< since the count last changed
+  double omega_rad_s_{0.0};  ///< the tracker's speed, or its prediction while readings are ignored
+  int ignored_{0};           ///< readings in a row
+  double ignored_s_{0.0};    ///< since the last reading that was taken
 };
 
 }  // namespace abs_hil::control

@@ -1,8 +1,6 @@
 #include "control/wheel_force_observer.hpp"
 
 #include <Eigen/LU>
-#include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 #include "abs_hil/rig/encoder_scale.hpp"
@@ -62,61 +60,28 @@ double ramp_delay(const Matrix6& A, const Gain& gain, double dt) {
 
 }  // namespace
 
-WheelForceObserver::WheelForceObserver(const ForceObserverOptions& options, const rig::RigParameters& rig,
-                                       double rate_Hz)
-    : wheels_{rig.wheels} {
+template <class S>
+BasicWheelForceObserver<S>::BasicWheelForceObserver(const ForceObserverOptions& options, const rig::RigParameters& rig,
+                                                    double rate_Hz)
+  requires std::is_same_v<S, double>
+    : laws_{paper::laws(rig.wheels)} {
   if (!(options.force_rate_N2_s > 0.0 && options.brake_rate_Nm2_s > 0.0 && rate_Hz > 0.0)) {
     throw std::invalid_argument("the force observer's noise intensities and the control rate (Hz) must be > 0");
   }
   const double dt = 1.0 / rate_Hz;
-  const Matrix6 A = transition(wheels_, dt);
+  const Matrix6 A = transition(rig.wheels, dt);
   Matrix6 Q = Matrix6::Zero();
   Q(4, 4) = options.force_rate_N2_s * dt;
   Q(5, 5) = options.brake_rate_Nm2_s * dt;
   const double count_rad = rig::radians_per_count(rig.encoder_counts_per_rev);
-  gain_ = steady_gain(A, Q, count_rad * count_rad / 12.0);
-  force_delay_s_ = ramp_delay(A, gain_, dt);
-}
-
-void WheelForceObserver::reset(const rig::WheelSpeeds& speeds) noexcept {
-  state_.setZero();
-  state_[omega1] = speeds.omega1_rad_s;
-  state_[omega2] = speeds.omega2_rad_s;
-  last_speeds_ = speeds;
-}
-
-void WheelForceObserver::predict(double dt_s, double brake_torque_Nm) noexcept {
-  const auto& w = wheels_;
-  const double alpha1 =
-      (w.r1_m * state_[force] - w.d1_Nms_rad * state_[omega1] - w.M10_Nm - brake_torque_Nm - state_[brake_error]) /
-      w.J1_kg_m2;
-  const double alpha2 = (-w.r2_m * state_[force] - w.d2_Nms_rad * state_[omega2] - w.M20_Nm) / w.J2_kg_m2;
-  // The brake stops a wheel but cannot turn it backwards.
-  const double omega1_after = std::max(0.0, state_[omega1] + alpha1 * dt_s);
-  const double omega2_after = std::max(0.0, state_[omega2] + alpha2 * dt_s);
-  state_[angle1] += 0.5 * (state_[omega1] + omega1_after) * dt_s;
-  state_[angle2] += 0.5 * (state_[omega2] + omega2_after) * dt_s;
-  state_[omega1] = omega1_after;
-  state_[omega2] = omega2_after;
-}
-
-void WheelForceObserver::update(const SlipInput& input) noexcept {
-  if (!(input.dt_s > 0.0)) return;
-  double upper_rad = input.upper_travel_rad;
-  double lower_rad = input.lower_travel_rad;
-  if (std::isnan(upper_rad) || std::isnan(lower_rad)) {
-    upper_rad = 0.5 * (last_speeds_.omega1_rad_s + input.speeds.omega1_rad_s) * input.dt_s;
-    lower_rad = 0.5 * (last_speeds_.omega2_rad_s + input.speeds.omega2_rad_s) * input.dt_s;
+  const Gain gain = steady_gain(A, Q, count_rad * count_rad / 12.0);
+  for (std::size_t i = 0; i < state_.size(); ++i) {
+    upper_gain_[i] = gain(static_cast<Eigen::Index>(i), 0);
+    lower_gain_[i] = gain(static_cast<Eigen::Index>(i), 1);
   }
-  last_speeds_ = input.speeds;
-
-  predict(input.dt_s, input.mean_brake_torque_Nm);
-  const Eigen::Vector2d residual{upper_rad - state_[angle1], lower_rad - state_[angle2]};
-  state_ += gain_ * residual;
-  state_[angle1] -= upper_rad;
-  state_[angle2] -= lower_rad;
-  state_[omega1] = std::max(0.0, state_[omega1]);
-  state_[omega2] = std::max(0.0, state_[omega2]);
+  force_delay_s_ = ramp_delay(A, gain, dt);
 }
+
+template class BasicWheelForceObserver<double>;
 
 }  // namespace abs_hil::control

@@ -1,10 +1,14 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <type_traits>
 
 #include "abs_hil/control/options.hpp"
+#include "abs_hil/control/paper_laws.hpp"
 #include "abs_hil/control/slip_controller.hpp"
 #include "abs_hil/rig/parameters.hpp"
+#include "abs_hil/rig/scalar.hpp"
 
 namespace abs_hil::control {
 
@@ -15,40 +19,92 @@ namespace abs_hil::control {
 /// and D is the error of the brake model, which acts on the upper wheel only. Tb is fed forward, so the speeds do not
 /// lag when the brake torque changes. Gains are computed once, for the nominal rate. `reset` and `update` are real-time
 /// safe.
-class WheelForceObserver {
+template <class S>
+class BasicWheelForceObserver {
  public:
+  BasicWheelForceObserver() = default;
   /// @param rate_Hz  control cycles per second, > 0, for the gains; the prediction uses the measured interval
   /// Throws std::invalid_argument for options not > 0.
-  WheelForceObserver(const ForceObserverOptions& options, const rig::RigParameters& rig, double rate_Hz);
+  BasicWheelForceObserver(const ForceObserverOptions& options, const rig::RigParameters& rig, double rate_Hz)
+    requires std::is_same_v<S, double>;
 
   /// Starts from these speeds with zero force.
-  void reset(const rig::WheelSpeeds& speeds) noexcept;
+  void reset(const rig::BasicWheelSpeeds<S>& speeds) noexcept;
   /// Takes over the other's estimates.
-  void take_over(const WheelForceObserver& before) noexcept {
+  void take_over(const BasicWheelForceObserver& before) noexcept {
     state_ = before.state_;
     last_speeds_ = before.last_speeds_;
   }
   /// Updates by one interval. If the travel is unknown, `input.speeds` give it.
-  void update(const SlipInput& input) noexcept;
+  void update(const BasicSlipInput<S>& input) noexcept;
 
-  [[nodiscard]] rig::WheelSpeeds speeds() const noexcept { return {state_[omega1], state_[omega2]}; }
-  [[nodiscard]] double force_N() const noexcept { return state_[force]; }
+  [[nodiscard]] rig::BasicWheelSpeeds<S> speeds() const noexcept { return {state_[omega1], state_[omega2]}; }
+  [[nodiscard]] S force_N() const noexcept { return state_[force]; }
   /// Error of the actuator's model: acting minus modelled brake torque, N m.
-  [[nodiscard]] double brake_error_Nm() const noexcept { return state_[brake_error]; }
+  [[nodiscard]] S brake_error_Nm() const noexcept { return state_[brake_error]; }
   /// Time by which `force_N` follows a ramp of the force, s.
-  [[nodiscard]] double force_delay_s() const noexcept { return force_delay_s_; }
+  [[nodiscard]] S force_delay_s() const noexcept { return force_delay_s_; }
 
  private:
-  using State = Eigen::Matrix<double, 6, 1>;
-  enum Index : Eigen::Index { angle1, omega1, angle2, omega2, force, brake_error };
+  using State = std::array<S, 6>;
+  enum Index : std::size_t { angle1, omega1, angle2, omega2, force, brake_error };
 
-  void predict(double dt_s, double brake_torque_Nm) noexcept;
+  void predict(const S& dt_s, const S& brake_torque_Nm) noexcept;
 
-  rig::WheelParameters wheels_;
-  Eigen::Matrix<double, 6, 2> gain_;
-  double force_delay_s_;
-  State state_{State::Zero()};  ///< angles: estimate minus reading
-  rig::WheelSpeeds last_speeds_{};
+  paper::Laws<S> laws_{};
+  State upper_gain_{};  ///< on the residual of the upper wheel's angle
+  State lower_gain_{};
+  S force_delay_s_{0.0};
+  State state_{};  ///< angles: estimate minus reading
+  rig::BasicWheelSpeeds<S> last_speeds_{};
 };
+using WheelForceObserver = BasicWheelForceObserver<double>;
+
+template <class S>
+void BasicWheelForceObserver<S>::reset(const rig::BasicWheelSpeeds<S>& speeds) noexcept {
+  state_ = State{};
+  state_[omega1] = speeds.omega1_rad_s;
+  state_[omega2] = speeds.omega2_rad_s;
+  last_speeds_ = speeds;
+}
+
+template <class S>
+void BasicWheelForceObserver<S>::predict(const S& dt_s, const S& brake_torque_Nm) noexcept {
+  const auto& w = laws_;
+  const S alpha1 =
+      (w.r1 * state_[force] - w.d1 * state_[omega1] - w.M10 - brake_torque_Nm - state_[brake_error]) / w.J1;
+  const S alpha2 = (-w.r2 * state_[force] - w.d2 * state_[omega2] - w.M20) / w.J2;
+  // The brake stops a wheel but cannot turn it backwards.
+  const S omega1_after = rig::larger(S(0.0), S(state_[omega1] + alpha1 * dt_s));
+  const S omega2_after = rig::larger(S(0.0), S(state_[omega2] + alpha2 * dt_s));
+  state_[angle1] += 0.5 * (state_[omega1] + omega1_after) * dt_s;
+  state_[angle2] += 0.5 * (state_[omega2] + omega2_after) * dt_s;
+  state_[omega1] = omega1_after;
+  state_[omega2] = omega2_after;
+}
+
+template <class S>
+void BasicWheelForceObserver<S>::update(const BasicSlipInput<S>& input) noexcept {
+  const auto later = input.dt_s > 0.0;
+  if (!rig::any(later)) return;
+  const auto unknown = rig::is_nan(input.upper_travel_rad) || rig::is_nan(input.lower_travel_rad);
+  const auto& last = last_speeds_;
+  const S upper_rad = rig::select(unknown, S(0.5 * (last.omega1_rad_s + input.speeds.omega1_rad_s) * input.dt_s),
+                                  input.upper_travel_rad);
+  const S lower_rad = rig::select(unknown, S(0.5 * (last.omega2_rad_s + input.speeds.omega2_rad_s) * input.dt_s),
+                                  input.lower_travel_rad);
+  last_speeds_ = input.speeds;
+
+  predict(input.dt_s, input.mean_brake_torque_Nm);
+  const S upper_residual = upper_rad - state_[angle1];
+  const S lower_residual = lower_rad - state_[angle2];
+  for (std::size_t i = 0; i < state_.size(); ++i) {
+    state_[i] += upper_gain_[i] * upper_residual + lower_gain_[i] * lower_residual;
+  }
+  state_[angle1] -= upper_rad;
+  state_[angle2] -= lower_rad;
+  state_[omega1] = rig::larger(S(0.0), state_[omega1]);
+  state_[omega2] = rig::larger(S(0.0), state_[omega2]);
+}
 
 }  // namespace abs_hil::control

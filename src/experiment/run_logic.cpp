@@ -14,8 +14,6 @@
 namespace abs_hil::experiment {
 
 namespace {
-/// Below this car speed, encoder noise dominates the estimated slip. Slip control has ended by then.
-constexpr double slip_floor_m_s = 0.1;
 constexpr double bump_fades_s = 0.05;  ///< about the brake's time constant
 constexpr double bump_gone_Nm = 1e-6;
 /// Longest wait for the start command, s.

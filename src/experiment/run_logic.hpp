@@ -21,6 +21,9 @@
 
 namespace abs_hil::experiment {
 
+/// Below this car speed, encoder noise dominates the estimated slip. Slip control has ended by then.
+inline constexpr double slip_floor_m_s = 0.1;
+
 /// The parts of a run's logic.
 struct RunLogicParts {
   const control::ControlOptions& control;

@@ -1,40 +1,27 @@
 #include "plant_sim/stepping.hpp"
 
 #include <algorithm>
-#include <boost/numeric/odeint/stepper/runge_kutta4.hpp>
 #include <cmath>
 
 #include "plant_sim/dry_friction.hpp"
+#include "plant_sim/runge_kutta.hpp"
 
 namespace abs_hil::plant_sim {
 namespace {
 
-/// Ratio of step and time constant of the slip dynamics. RK4 is stable up to 2.78; tests/plant_sim/accuracy_test.cpp
-/// shows the error at this value.
-constexpr double slip_time_constant_fraction = 0.3;
 /// If a wheel breaks away and is held again within this time, the torque on it equalled its friction within rounding.
 constexpr double least_slide_s = 1e-6;
 /// Bisections of the interval that contains a stop or break-away: down to 10^-12 of the substep.
 constexpr int event_bisections = 40;
 
-/// One Runge-Kutta step of `step_s` from `x` with a fixed direction of sliding.
-StateVector stepped(const TorqueBalance& balance, const StateVector& x, double step_s) noexcept {
-  boost::numeric::odeint::runge_kutta4<StateVector> stepper;
-  StateVector end{};
-  stepper.do_step(balance, x, 0.0, end, step_s);
-  return end;
-}
-
-/// Step limit from `max_step_s` and the slip dynamics. Their time constant decreases with the car speed; for the magic
-/// formula it is v_x / (theta B C (r1^2/J1 + r2^2/J2)). A held wheel has no slip dynamics.
-double step_limit_s(const TorqueBalance& balance, const StateVector& x, double max_step_s) noexcept {
-  const rig::WheelParameters& w = balance.model.wheels();
+/// Bound on the rate of the slip dynamics, which increases as the car slows down. A held wheel has none.
+double fastest_rate_per_s(const TorqueBalance& balance, const StateVector& x) noexcept {
+  const BasicWheels<double> w(balance.model.wheels());
   const Sliding& sliding = balance.sliding;
-  const double mobility_per_kg = (sliding.upper != 0.0 ? w.r1_m * w.r1_m / w.J1_kg_m2 : 0.0) +
-                                 (sliding.lower != 0.0 ? w.r2_m * w.r2_m / w.J2_kg_m2 : 0.0);
+  const double mobility_per_kg = (sliding.upper != 0.0 ? w.r1_m * w.r1_m * w.per_J1 : 0.0) +
+                                 (sliding.lower != 0.0 ? w.r2_m * w.r2_m * w.per_J2 : 0.0);
   const ContactState steepest{x[omega1], x[omega2], x[brake_torque], sliding.upper, balance.friction.highest};
-  const double rate_per_s = balance.model.damping_bound_Ns_m(steepest) * mobility_per_kg;
-  return std::min(max_step_s, slip_time_constant_fraction / rate_per_s);
+  return balance.model.damping_bound_Ns_m(steepest) * mobility_per_kg;
 }
 
 /// Shortest step, within 10^-12 of `step_s`, after which `margin` is negative. It must be negative after `step_s`.
@@ -43,21 +30,22 @@ double event_step_s(const TorqueBalance& balance, const StateVector& x, double s
   double after_s = step_s;
   for (int i = 0; i < event_bisections; ++i) {
     const double middle_s = 0.5 * (before_s + after_s);
-    const StateVector middle = stepped(balance, x, middle_s);
+    const StateVector middle = runge_kutta_step(balance, x, middle_s);
     (margin(balance, middle, middle_s) < 0.0 ? after_s : before_s) = middle_s;
   }
   return after_s;
 }
 
-/// Integrates `x` to the first event before `step_s`, or over all of it. Returns the integrated time.
-double substep(TorqueBalance& balance, double step_s, StateVector& x) noexcept {
-  const StateVector whole = stepped(balance, x, step_s);
-  if (!(margin(balance, whole, step_s) < 0.0)) {
-    x = whole;
-    return step_s;
-  }
+/// Both wheels stand: only the brake's lag (6) continues, in closed form.
+void stand(const HeldTorques& held, double duration_s, StateVector& x) noexcept {
+  const double remainder = std::exp(-held.brake_rate_per_s * duration_s);
+  x[brake_torque] = held.brake_target_Nm + remainder * (x[brake_torque] - held.brake_target_Nm);
+}
+
+/// Integrates `x` to the event within `step_s`. Returns the integrated time.
+double step_to_event(TorqueBalance& balance, double step_s, StateVector& x) noexcept {
   double taken_s = event_step_s(balance, x, step_s);
-  StateVector end = stepped(balance, x, taken_s);
+  StateVector end = runge_kutta_step(balance, x, taken_s);
   const bool upper_stops = balance.sliding.upper * end[omega1] < 0.0;
   const bool lower_stops = balance.sliding.lower * end[omega2] < 0.0;
   if (taken_s < least_slide_s && ((upper_stops && x[omega1] == 0.0) || (lower_stops && x[omega2] == 0.0))) {
@@ -65,7 +53,7 @@ double substep(TorqueBalance& balance, double step_s, StateVector& x) noexcept {
     if (upper_stops) balance.sliding.upper = 0.0;
     if (lower_stops) balance.sliding.lower = 0.0;
     taken_s = std::min(least_slide_s, step_s);
-    end = stepped(balance, x, taken_s);
+    end = runge_kutta_step(balance, x, taken_s);
   }
   if (upper_stops) end[omega1] = 0.0;
   if (lower_stops) end[omega2] = 0.0;
@@ -73,10 +61,48 @@ double substep(TorqueBalance& balance, double step_s, StateVector& x) noexcept {
   return taken_s;
 }
 
-/// Both wheels stand: only the brake's lag (6) continues, in closed form.
-void stand(const HeldTorques& held, double duration_s, StateVector& x) noexcept {
-  const double remainder = std::exp(-held.brake_rate_per_s * duration_s);
-  x[brake_torque] = held.brake_target_Nm + remainder * (x[brake_torque] - held.brake_target_Nm);
+/// Makes up to `steps` steps of `step_s`. It stops before a step in which `breaks(end of the step)`, and after one with
+/// which a wheel comes to stand. Returns the number of steps made.
+template <class Balance, class Breaks>
+double go_on(const Balance& balance, double steps, double step_s, StateVector& x, const Breaks& breaks) noexcept {
+  for (double made = 0.0; made < steps; made += 1.0) {
+    const StateVector end = runge_kutta_step(balance, x, step_s);
+    if (breaks(end)) return made;
+    const bool turned = x[omega1] != 0.0 && x[omega2] != 0.0;
+    x = end;
+    if (turned && (x[omega1] == 0.0 || x[omega2] == 0.0)) return made + 1.0;
+  }
+  return steps;
+}
+
+/// Integrates `x` while both wheels turn forwards on a steady road. Returns the integrated time: `duration_s`, unless a
+/// wheel would stop before.
+double roll(const WheelModel& model, double max_step_s, const HeldTorques& held, double duration_s, double friction,
+            StateVector& x) noexcept {
+  return model.visit([&](const auto& tyre, const auto& load) {
+    const BasicWheels<double> wheels(model.wheels());
+    const RollingBalance<double, std::decay_t<decltype(tyre)>, std::decay_t<decltype(load)>, HeldTorques> balance{
+        tyre, load, wheels, held, friction};
+    const double steps = steps_for(duration_s, max_step_s, balance.fastest_rate_per_s(x));
+    const double step_s = duration_s / steps;
+    const double made = go_on(balance, steps, step_s, x,
+                              [](const StateVector& end) { return !(end[omega1] >= 0.0 && end[omega2] >= 0.0); });
+    return made == steps ? duration_s : made * step_s;
+  });
+}
+
+/// Integrates `x` in equal steps to the next event within `duration_s`, or over all of it. Returns the integrated time.
+/// @param several  false: makes one step only, because the road changes
+double slide(const WheelModel& model, double max_step_s, const HeldTorques& held, double duration_s, bool several,
+             const PresentFactor& friction, StateVector& x) noexcept {
+  TorqueBalance balance{model, held, friction, {}};
+  balance.sliding = sliding_from(balance, x);
+  const double steps = steps_for(duration_s, max_step_s, fastest_rate_per_s(balance, x));
+  const double step_s = duration_s / steps;
+  const double made = go_on(balance, several ? steps : 1.0, step_s, x,
+                            [&](const StateVector& end) { return margin(balance, end, step_s) < 0.0; });
+  if (made == steps) return duration_s;
+  return made > 0.0 ? made * step_s : step_to_event(balance, step_s, x);
 }
 
 }  // namespace
@@ -90,12 +116,11 @@ void integrate(const WheelModel& model, double max_step_s, const HeldTorques& he
       profile.pass(left_s);
       break;
     }
-    TorqueBalance balance{model, held, profile.present(x[angle2]), {}};
-    balance.sliding = sliding_from(balance, x);
-    // Equal parts of the remaining time; the last part is exactly the rest, so the interval ends exactly.
+    const PresentFactor friction = profile.present(x[angle2]);
     const double interval_s = std::min(left_s, profile.time_left_s());
-    const double parts = std::ceil(interval_s / step_limit_s(balance, x, max_step_s));
-    const double taken_s = substep(balance, parts > 1.0 ? interval_s / parts : interval_s, x);
+    const bool rolls = x[omega1] > 0.0 && x[omega2] > 0.0 && profile.steady() && !model.apart();
+    double taken_s = rolls ? roll(model, max_step_s, held, interval_s, friction.value, x) : 0.0;
+    if (taken_s == 0.0) taken_s = slide(model, max_step_s, held, interval_s, profile.steady(), friction, x);
     left_s -= taken_s;
     profile.pass(taken_s);
     profile.settle(x[angle2]);

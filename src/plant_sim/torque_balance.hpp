@@ -8,8 +8,10 @@
 
 namespace abs_hil::plant_sim {
 
-/// The plant's state for Boost.odeint; the indices below name its elements.
-using StateVector = std::array<double, 5>;
+/// The plant's state; the indices below name its elements. `S` is a `double`, or a pack of them (rig/scalar.hpp).
+template <class S>
+using BasicState = std::array<S, 5>;
+using StateVector = BasicState<double>;
 inline constexpr std::size_t omega1 = 0;
 inline constexpr std::size_t omega2 = 1;
 inline constexpr std::size_t brake_torque = 2;
@@ -23,13 +25,48 @@ struct Sliding {
   double lower{0.0};
 };
 
-/// The inputs of one `advance` in the form that the differential equations use.
-struct HeldTorques {
-  double brake_target_Nm{0.0};     ///< b(u) of (7), the target of the brake torque
-  double brake_rate_per_s{0.0};    ///< c31 of (6); 0 for the ideal actuator, whose torque is constant
-  double motor_stall_Nm{0.0};      ///< motor torque at standstill
-  double motor_back_emf_Nms{0.0};  ///< decrease of the motor torque per rad/s of the lower wheel
+/// Both wheels, in the form that the differential equations use.
+template <class S>
+struct BasicWheels {
+  S r1_m{0.0}, r2_m{0.0};
+  S per_J1{0.0}, per_J2{0.0};  ///< reciprocal moments of inertia
+  S d1_Nms_rad{0.0}, d2_Nms_rad{0.0};
+  S M10_Nm{0.0}, M20_Nm{0.0};
+
+  BasicWheels() = default;
+  explicit BasicWheels(const rig::WheelParameters& w) noexcept
+      : r1_m(w.r1_m),
+        r2_m(w.r2_m),
+        per_J1(1.0 / w.J1_kg_m2),
+        per_J2(1.0 / w.J2_kg_m2),
+        d1_Nms_rad(w.d1_Nms_rad),
+        d2_Nms_rad(w.d2_Nms_rad),
+        M10_Nm(w.M10_Nm),
+        M20_Nm(w.M20_Nm) {}
+
+  /// omega1' of (1).
+  template <class Direction>
+  [[nodiscard]] S upper_rate_rad_s2(const S& force_N, const S& brake_Nm, const S& omega1_rad_s,
+                                    Direction sliding) const noexcept {
+    return (r1_m * force_N - d1_Nms_rad * omega1_rad_s - sliding * (M10_Nm + brake_Nm)) * per_J1;
+  }
+  /// omega2' of (2).
+  template <class Direction>
+  [[nodiscard]] S lower_rate_rad_s2(const S& force_N, const S& motor_Nm, const S& omega2_rad_s,
+                                    Direction sliding) const noexcept {
+    return (motor_Nm - r2_m * force_N - d2_Nms_rad * omega2_rad_s - sliding * M20_Nm) * per_J2;
+  }
 };
+
+/// The inputs of one `advance` in the form that the differential equations use.
+template <class S>
+struct BasicHeldTorques {
+  S brake_target_Nm{0.0};     ///< b(u) of (7), the target of the brake torque
+  S brake_rate_per_s{0.0};    ///< c31 of (6); 0 for the ideal actuator, whose torque is constant
+  S motor_stall_Nm{0.0};      ///< motor torque at standstill
+  S motor_back_emf_Nms{0.0};  ///< decrease of the motor torque per rad/s of the lower wheel
+};
+using HeldTorques = BasicHeldTorques<double>;
 
 [[nodiscard]] inline HeldTorques resolve(const PlantOptions& options, const PlantInput& input) noexcept {
   const rig::RigParameters& rig = options.rig;
@@ -45,9 +82,35 @@ struct HeldTorques {
   return held;
 }
 
+/// The same without the motor.
+template <class S>
+struct BrakeAlone {
+  S brake_target_Nm{0.0};
+  S brake_rate_per_s{0.0};
+};
+template <class S>
+[[nodiscard]] inline S motor_torque_Nm(const BrakeAlone<S>& /*held*/, const S& /*omega2_rad_s*/) noexcept {
+  return S(0.0);
+}
+
 /// Torque of the drive motor on the lower wheel, N m; exactly 0 at duty 0.
-[[nodiscard]] inline double motor_torque_Nm(const HeldTorques& held, double omega2_rad_s) noexcept {
+template <class S>
+[[nodiscard]] inline S motor_torque_Nm(const BasicHeldTorques<S>& held, const S& omega2_rad_s) noexcept {
   return held.motor_stall_Nm - held.motor_back_emf_Nms * omega2_rad_s;
+}
+
+/// The right-hand side of (1), (2) and (6) for a tyre force.
+template <class S, class Held, class Upper, class Lower>
+[[nodiscard, gnu::always_inline]] inline BasicState<S> rates_of(const BasicWheels<S>& wheels, const Held& held,
+                                                                const S& force_N, Upper upper, Lower lower,
+                                                                const BasicState<S>& x) noexcept {
+  BasicState<S> rates;
+  rates[omega1] = wheels.upper_rate_rad_s2(force_N, x[brake_torque], x[omega1], upper);
+  rates[omega2] = wheels.lower_rate_rad_s2(force_N, motor_torque_Nm(held, x[omega2]), x[omega2], lower);
+  rates[brake_torque] = held.brake_rate_per_s * (held.brake_target_Nm - x[brake_torque]);
+  rates[angle1] = x[omega1];
+  rates[angle2] = x[omega2];
+  return rates;
 }
 
 /// The right-hand side of (1), (2) and (6) for a fixed direction of sliding and one piece of the friction profile. The
@@ -65,21 +128,38 @@ struct TorqueBalance {
         {x[omega1], x[omega2], x[brake_torque], sliding.upper, friction.after(time_s, x[angle2])});
   }
 
-  void operator()(const StateVector& x, StateVector& dxdt, double time_s) const noexcept {
-    const rig::WheelParameters& wheels = model.wheels();
-    const double force_N = tyre_force_N(x, time_s);
-    const double dry1_Nm = wheels.M10_Nm + x[brake_torque];
-    dxdt[omega1] =
-        sliding.upper == 0.0
-            ? 0.0
-            : (wheels.r1_m * force_N - wheels.d1_Nms_rad * x[omega1] - sliding.upper * dry1_Nm) / wheels.J1_kg_m2;
-    dxdt[omega2] = sliding.lower == 0.0 ? 0.0
-                                        : (motor_torque_Nm(held, x[omega2]) - wheels.r2_m * force_N -
-                                           wheels.d2_Nms_rad * x[omega2] - sliding.lower * wheels.M20_Nm) /
-                                              wheels.J2_kg_m2;
-    dxdt[brake_torque] = held.brake_rate_per_s * (held.brake_target_Nm - x[brake_torque]);
-    dxdt[angle1] = x[omega1];
-    dxdt[angle2] = x[omega2];
+  [[nodiscard]] StateVector operator()(const StateVector& x, double time_s) const noexcept {
+    const BasicWheels<double> wheels(model.wheels());
+    StateVector rates = rates_of(wheels, held, tyre_force_N(x, time_s), sliding.upper, sliding.lower, x);
+    if (sliding.upper == 0.0) rates[omega1] = 0.0;
+    if (sliding.lower == 0.0) rates[omega2] = 0.0;
+    return rates;
+  }
+};
+
+/// The same while both wheels turn forwards and the road's friction does not change: without a branch, for concrete
+/// models.
+template <class S, class Tyre, class Load, class Held>
+struct RollingBalance {
+  const Tyre& tyre;
+  const Load& load;
+  const BasicWheels<S>& wheels;
+  const Held& held;
+  const S& friction;
+
+  [[nodiscard]] UpperWheelTorques<S, Forwards> upper_torques(const BasicState<S>& x) const noexcept {
+    return {{}, wheels.M10_Nm + x[brake_torque], wheels.d1_Nms_rad * x[omega1]};
+  }
+  [[nodiscard, gnu::always_inline]] BasicState<S> operator()(const BasicState<S>& x,
+                                                             const S& /*time_s*/) const noexcept {
+    const S shape = tyre.shape_at(wheels.r1_m * x[omega1], wheels.r2_m * x[omega2]);
+    return rates_of(wheels, held, load.force_N(friction * shape, upper_torques(x)), Forwards{}, Forwards{}, x);
+  }
+  /// Bound on the rate of the slip dynamics. For the magic formula it is theta B C (r1^2/J1 + r2^2/J2) / v_x.
+  [[nodiscard]] S fastest_rate_per_s(const BasicState<S>& x) const noexcept {
+    const S mobility_per_kg = wheels.r1_m * wheels.r1_m * wheels.per_J1 + wheels.r2_m * wheels.r2_m * wheels.per_J2;
+    return load.steepest_N(friction, upper_torques(x)) * friction *
+           tyre.steepest_s_m(wheels.r1_m * x[omega1], wheels.r2_m * x[omega2]) * mobility_per_kg;
   }
 };
 

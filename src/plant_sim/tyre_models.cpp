@@ -9,18 +9,30 @@ constexpr double square(double x) noexcept { return x * x; }
 
 }  // namespace
 
-IntecoMu::IntecoMu(const PlantOptions& options)
-    : mu_(options.inteco_mu), regularisation_m_s_(options.slip_regularisation_m_s), peak_mu_(highest()) {
+template <class S>
+BasicIntecoMu<S>::BasicIntecoMu(const PlantOptions& options)
+  requires std::is_same_v<S, double>
+    : w1_(options.inteco_mu.w1),
+      w2_(options.inteco_mu.w2),
+      w3_(options.inteco_mu.w3),
+      w4_(options.inteco_mu.w4),
+      a_(options.inteco_mu.a),
+      p_(options.inteco_mu.p),
+      regularisation_m_s_(options.slip_regularisation_m_s),
+      peak_mu_(highest()) {
   if (!(peak_mu_ > 0.0)) {
     throw std::invalid_argument(
-        "plant.mu_w4 = " + std::to_string(mu_.w4) +
+        "plant.mu_w4 = " + std::to_string(w4_) +
         ": the friction curve of plant.mu_w1 ... mu_p is nowhere positive; raise plant.mu_w4 (published: 0.40663)");
   }
   steepest_shape_ = slope_bound() / peak_mu_;
 }
 
 /// The maximum of the curve on [0, 1]. It may lie at an end: the published curve is highest at 1.
-double IntecoMu::highest() const noexcept {
+template <class S>
+double BasicIntecoMu<S>::highest() const noexcept
+  requires std::is_same_v<S, double>
+{
   // Sample more densely at small slips, where the knee is; then run a golden-section search around the best sample.
   constexpr int samples = 200;
   const auto sample = [](int i) { return square(static_cast<double>(i) / samples); };
@@ -42,12 +54,17 @@ double IntecoMu::highest() const noexcept {
 
 /// Upper bound on |mu'| over [0, 1]. The saturating term is steepest at its turning point, s^p = a (p - 1) / (p + 1);
 /// the polynomial's slope is bounded term by term.
-double IntecoMu::slope_bound() const noexcept {
-  const double power = mu_.a * (mu_.p - 1.0) / (mu_.p + 1.0);
-  const double s = std::pow(power, 1.0 / mu_.p);
-  const double saturating = std::abs(mu_.w4) * mu_.a * mu_.p * std::pow(s, mu_.p - 1.0) / square(mu_.a + power);
-  return saturating + std::abs(mu_.w1) + 2.0 * std::abs(mu_.w2) + 3.0 * std::abs(mu_.w3);
+template <class S>
+double BasicIntecoMu<S>::slope_bound() const noexcept
+  requires std::is_same_v<S, double>
+{
+  const double power = a_ * (p_ - 1.0) / (p_ + 1.0);
+  const double s = std::pow(power, 1.0 / p_);
+  const double saturating = std::abs(w4_) * a_ * p_ * std::pow(s, p_ - 1.0) / square(a_ + power);
+  return saturating + std::abs(w1_) + 2.0 * std::abs(w2_) + 3.0 * std::abs(w3_);
 }
+
+template class BasicIntecoMu<double>;
 
 TyreModel make_tyre_model(const PlantOptions& options) {
   if (options.tyre == "magic-formula") return MagicFormula(options);

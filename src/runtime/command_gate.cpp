@@ -13,12 +13,6 @@ namespace {
 
 using rig::Reason;
 
-/// Tolerance for rounding: a step exactly at the limit must pass.
-constexpr double rounding = 1e-9;
-
-/// A driver may round a duty down by so much: half a step of 8 bits, the coarsest PWM.
-constexpr double rounded_down_most = 0.5 / 255.0;
-
 bool brakes(const rig::Command& command) noexcept { return command.brake_duty > 0.0 || command.brake_torque_Nm > 0.0; }
 
 void stop_motor(rig::Command& command) noexcept {
@@ -120,7 +114,7 @@ double CommandGate::limited(double duty, double most, GateAction action) noexcep
 double CommandGate::rising(double duty, double before, double rate_per_s, double elapsed_s,
                            GateAction action) noexcept {
   const double most = before + rate_per_s * elapsed_s;
-  if (duty <= most + rounding) return duty;
+  if (duty <= most + rise_rounding) return duty;
   note(action);
   return most;
 }

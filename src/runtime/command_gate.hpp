@@ -22,6 +22,12 @@ namespace abs_hil::runtime {
 using rig::gate_action_count;
 using rig::GateAction;
 
+/// A driver may round a duty down by so much: half a step of 8 bits, the coarsest PWM.
+inline constexpr double rounded_down_most = 0.5 / 255.0;
+
+/// Tolerance for rounding: a step exactly at the limit must pass.
+inline constexpr double rise_rounding = 1e-9;
+
 /// Inputs of the gate besides the command.
 struct GateInput {
   rig::WheelSpeeds speeds{};  ///< estimated from the latest measurement

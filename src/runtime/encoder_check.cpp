@@ -11,19 +11,9 @@ namespace {
 using rig::Reason;
 
 // docs/safety.md, "Where the bounds come from", derives these.
-constexpr double least_stamp_error_s = 150e-6;  ///< least uncertainty of a speed window's duration
-constexpr double backwards_rad_s = 2.0;         ///< speed at which a stopped wheel may swing back
-constexpr int outside_max = 3;                  ///< number of speed windows
-constexpr double standing_max_s = 0.25;         ///< a released wheel turns within this time, however it was braked
-constexpr double standing_speed_m_s = 1.0;      ///< of the lower wheel's tread, which then spins up the upper wheel
-/// A locked wheel rolls again within this time after its release, and a lifted one after it was lowered.
-constexpr double rolled_after_s = 3.0;
+constexpr int outside_max = 3;           ///< number of speed windows
+constexpr double standing_max_s = 0.25;  ///< a released wheel turns within this time, however it was braked
 constexpr double disagreement_s = 0.1;
-constexpr double disagreement_m_s = 0.3;  ///< allowed in addition to `free_slip_max`
-constexpr double earnest_brake_Nm = 1.0;
-constexpr double braked_after_s = 0.15;
-constexpr double slip_speed_m_s = 3.0;
-constexpr double ahead_part = 0.05;
 constexpr double ahead_max_s = 0.05;
 
 /// One reason for each SpeedInterval::Verdict.
@@ -41,14 +31,8 @@ Reason reason_of(SpeedInterval::Verdict verdict, const Reasons& reasons) noexcep
 
 SpeedInterval::Verdict SpeedInterval::update(double omega_rad_s, double resolution_rad_s, double dt_s,
                                              double stamp_error_s) noexcept {
-  const double error_s = std::max(stamp_error_s, least_stamp_error_s);
-  const double slack_rad_s = resolution_rad_s + std::abs(omega_rad_s) * error_s / (dt_s - error_s);
-  low_rad_s_ = std::max(low_rad_s_ - loss_rad_s2_ * dt_s, -backwards_rad_s);
-  high_rad_s_ += gain_rad_s2_ * dt_s;
-  if (omega_rad_s + slack_rad_s >= low_rad_s_ && omega_rad_s - slack_rad_s <= high_rad_s_) {
-    // The reading is a mean over dt. At its end the wheel may be faster or slower by what dt allows.
-    low_rad_s_ = std::max(low_rad_s_, omega_rad_s - slack_rad_s - loss_rad_s2_ * dt_s);
-    high_rad_s_ = std::min(high_rad_s_, omega_rad_s + slack_rad_s + gain_rad_s2_ * dt_s);
+  const double slack_rad_s = SpeedBounds<double>::slack_rad_s(omega_rad_s, resolution_rad_s, dt_s, stamp_error_s);
+  if (bounds_.take(omega_rad_s, slack_rad_s, dt_s)) {
     outside_ = 0;
     return Verdict::sound;
   }
@@ -62,17 +46,11 @@ EncoderCheck::EncoderCheck(const PlausibilityLimits& limits) noexcept
     : limits_(limits),
       upper_(limits.upper_gain_rad_s2, limits.upper_loss_rad_s2, limits.overspeed_rad_s),
       lower_(limits.lower_gain_rad_s2, limits.lower_loss_rad_s2, limits.overspeed_rad_s),
-      free_s_(rolled_after_s) {}
+      watch_(limits) {}
 
 /// Flattened (all calls inlined): the calls would cost a tenth of its time.
 [[gnu::flatten]] CheckResult EncoderCheck::update(const SpeedWindow& speed_window) noexcept {
-  // (6) by the implicit Euler rule. Its relative error is the speed window's share of the lag, 4 %.
-  const double share = limits_.brake.c31_per_s * speed_window.dt_s;
-  brake_Nm_ = limits_.ideal_actuator ? speed_window.brake_target_Nm
-                                     : (brake_Nm_ + share * speed_window.brake_target_Nm) / (1.0 + share);
-  free_s_ = speed_window.brake_target_Nm > 0.0 ? 0.0 : free_s_ + speed_window.dt_s;
-  braked_s_ = brake_Nm_ >= earnest_brake_Nm ? braked_s_ + speed_window.dt_s : 0.0;
-
+  watch_.expect_brake(speed_window);
   CheckResult result = judge_speeds(speed_window);
   if (!compares_) [[unlikely]]
     return result.sound() ? judge_parted(speed_window) : result;
@@ -94,7 +72,7 @@ void EncoderCheck::note_wheels_apart(bool apart) noexcept {
 CheckResult EncoderCheck::judge_parted(const SpeedWindow& speed_window) noexcept {
   if (apart_) return {};
   together_s_ += speed_window.dt_s;
-  compares_ = together_s_ >= rolled_after_s;
+  compares_ = together_s_ >= watch_.rolled_after_s;
   return judge_standing(speed_window);
 }
 
@@ -112,16 +90,13 @@ CheckResult EncoderCheck::judge_speeds(const SpeedWindow& speed_window) noexcept
 }
 
 CheckResult EncoderCheck::judge_standing(const SpeedWindow& speed_window) noexcept {
-  // In a long speed window a braked wheel may lock, so its interval reaches down to standstill. Once the brake has let
-  // go, a tyre that slides on a turning wheel must spin it up: an encoder without counts is then stuck.
-  const double v2_m_s = limits_.wheels.r2_m * speed_window.omega2_rad_s;
-  if (brake_Nm_ > limits_.released_brake_Nm || v2_m_s < standing_speed_m_s) {
+  if (watch_.not_standing(speed_window)) {
     standing_s_ = standing_rad_ = 0.0;
     return {};
   }
   standing_s_ += speed_window.dt_s;
   standing_rad_ += speed_window.omega1_rad_s * speed_window.dt_s;
-  if (std::abs(standing_rad_) > speed_window.resolution_rad_s * speed_window.dt_s) {
+  if (watch_.moved(speed_window, standing_rad_)) {
     standing_s_ = standing_rad_ = 0.0;
     return {};
   }
@@ -139,22 +114,15 @@ void Travelled::add(const SpeedWindow& speed_window, const rig::WheelParameters&
 }
 
 CheckResult EncoderCheck::judge_rolling(const SpeedWindow& speed_window) noexcept {
-  if (free_s_ < rolled_after_s) {
+  if (watch_.quiet_rolling(speed_window)) {
     disagreeing_.lasted_s = 0.0;
     return {};
   }
   const double v1_m_s = limits_.wheels.r1_m * speed_window.omega1_rad_s;
   const double v2_m_s = limits_.wheels.r2_m * speed_window.omega2_rad_s;
-  const double allowed_m_s = disagreement_m_s + limits_.free_slip_max * std::max(std::abs(v1_m_s), std::abs(v2_m_s)) +
-                             limits_.wheels.r2_m * speed_window.resolution_rad_s;
-  const double stamps_m_s = (std::abs(v1_m_s) + std::abs(v2_m_s)) * speed_window.stamp_error_s() / speed_window.dt_s;
-  if (std::abs(v1_m_s - v2_m_s) + stamps_m_s <= allowed_m_s) {
-    disagreeing_.lasted_s = 0.0;
-    return {};
-  }
   if (disagreeing_.lasted_s == 0.0) allowed_m_ = 0.0;
   disagreeing_.add(speed_window, limits_.wheels);
-  allowed_m_ += allowed_m_s * speed_window.dt_s;
+  allowed_m_ += watch_.allowed_m_s(speed_window) * speed_window.dt_s;
   const double apart_m = std::abs(disagreeing_.upper_m - disagreeing_.lower_m);
   if (apart_m <= allowed_m_) {  // so far there is no sign of a disagreement
     disagreeing_.lasted_s = 0.0;
@@ -169,18 +137,13 @@ CheckResult EncoderCheck::judge_rolling(const SpeedWindow& speed_window) noexcep
 }
 
 CheckResult EncoderCheck::judge_slip(const SpeedWindow& speed_window) noexcept {
+  if (watch_.quiet_slip(speed_window)) {
+    ahead_.lasted_s = 0.0;
+    return {};
+  }
+  constexpr double fastest = WheelWatch<double>::fastest;
   const double v1_m_s = limits_.wheels.r1_m * speed_window.omega1_rad_s;
   const double v2_m_s = limits_.wheels.r2_m * speed_window.omega2_rad_s;
-  constexpr double fastest = 1.0 + ahead_part;
-  if (braked_s_ < braked_after_s || v2_m_s <= slip_speed_m_s) {
-    ahead_.lasted_s = 0.0;
-    return {};
-  }
-  const double stamps_m_s = (v1_m_s + fastest * v2_m_s) * speed_window.stamp_error_s() / speed_window.dt_s;
-  if (v1_m_s + stamps_m_s <= fastest * v2_m_s) {
-    ahead_.lasted_s = 0.0;
-    return {};
-  }
   ahead_.add(speed_window, limits_.wheels);
   const double ahead_m = ahead_.upper_m - fastest * ahead_.lower_m;
   if (ahead_m <= 0.0) {  // so far there is no sign that the braked wheel is ahead

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "runtime/speed_window.hpp"
+#include "runtime/wheel_watch.hpp"
 
 namespace abs_hil::runtime {
 
@@ -13,7 +14,7 @@ class SpeedInterval {
   enum class Verdict : std::uint8_t { sound, stuck, reversed, jumped };
 
   SpeedInterval(double gain_rad_s2, double loss_rad_s2, double fastest_rad_s) noexcept
-      : gain_rad_s2_(gain_rad_s2), loss_rad_s2_(loss_rad_s2), high_rad_s_(fastest_rad_s) {}
+      : bounds_(gain_rad_s2, loss_rad_s2, fastest_rad_s) {}
 
   /// Takes a mean speed over `dt_s`; `resolution_rad_s` is its uncertainty from counting, `stamp_error_s` < `dt_s` that
   /// of `dt_s`. The verdict differs from `sound` only after three readings in a row outside the interval.
@@ -22,10 +23,7 @@ class SpeedInterval {
   [[nodiscard]] bool doubtful() const noexcept { return outside_ > 0; }
 
  private:
-  double gain_rad_s2_;
-  double loss_rad_s2_;
-  double low_rad_s_{0.0};
-  double high_rad_s_;
+  SpeedBounds<double> bounds_;
   int outside_{0};  ///< number of readings in a row outside the interval
 };
 
@@ -54,7 +52,7 @@ class EncoderCheck {
   /// True if one of the latest speeds was outside what its wheel can reach.
   [[nodiscard]] bool doubtful() const noexcept { return upper_.doubtful() || lower_.doubtful(); }
   /// Brake torque expected from the map (7) and the lag (6), N m.
-  [[nodiscard]] double brake_torque_Nm() const noexcept { return brake_Nm_; }
+  [[nodiscard]] double brake_torque_Nm() const noexcept { return watch_.brake_Nm(); }
 
  private:
   [[nodiscard]] CheckResult judge_speeds(const SpeedWindow& speed_window) noexcept;
@@ -66,12 +64,10 @@ class EncoderCheck {
   PlausibilityLimits limits_;
   SpeedInterval upper_;
   SpeedInterval lower_;
-  double brake_Nm_{0.0};
+  WheelWatch<double> watch_;
   bool compares_{true};  ///< the wheels have touched for long enough to be compared
   bool apart_{false};
   double together_s_{0.0};    ///< time since the wheels were joined
-  double free_s_;             ///< time since the brake was released
-  double braked_s_{0.0};      ///< time with a brake torque of at least 1 N m
   double standing_s_{0.0};    ///< time for which the upper wheel has stood still although the tyre must spin it up
   double standing_rad_{0.0};  ///< its way in this time
   Travelled disagreeing_{};

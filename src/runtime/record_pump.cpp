@@ -8,23 +8,11 @@ namespace abs_hil::runtime {
 RecordPump::RecordPump(RecordRing& ring, double r2_m, std::vector<rig::RecordSink*> sinks)
     : ring_(ring), r2_m_(r2_m), sinks_(std::move(sinks)) {}
 
-void RecordPump::add_distance(const rig::CycleRecord& record) noexcept {
-  if (braking_) {
-    const double before_m_s = r2_m_ * rig::best_speeds(latest_).omega2_rad_s;
-    const double now_m_s = r2_m_ * rig::best_speeds(record).omega2_rad_s;
-    distance_m_ += 0.5 * (before_m_s + now_m_s) * (record.time_s - latest_.time_s);
-  } else {
-    braking_ = record.phase == rig::Phase::brake;
-  }
-}
-
 std::size_t RecordPump::drain(std::size_t at_most) {
   std::size_t count = 0;
-  rig::CycleRecord record;
-  while (count < at_most && ring_.pop(record)) {
-    add_distance(record);
-    latest_ = record;
-    for (rig::RecordSink* sink : sinks_) sink->consume(record, distance_m_);
+  while (count < at_most && ring_.pop(latest_)) {
+    distance_.note(latest_.time_s, r2_m_ * rig::best_speeds(latest_).omega2_rad_s, latest_.phase == rig::Phase::brake);
+    for (rig::RecordSink* sink : sinks_) sink->consume(latest_, distance_.distance_m());
     ++count;
   }
   return count;

@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "rig/braking_distance.hpp"
 #include "rig/record_sink.hpp"
 #include "runtime/cyclic_executive.hpp"
 
@@ -26,14 +27,11 @@ class RecordPump {
   [[nodiscard]] const rig::CycleRecord& latest() const noexcept { return latest_; }
 
  private:
-  void add_distance(const rig::CycleRecord& record) noexcept;
-
   RecordRing& ring_;
   double r2_m_;
   std::vector<rig::RecordSink*> sinks_;
   rig::CycleRecord latest_{};
-  bool braking_{false};
-  double distance_m_{0.0};
+  rig::BrakingDistance<double> distance_{};
 };
 
 }  // namespace abs_hil::runtime

@@ -13,13 +13,10 @@ namespace abs_hil::runtime {
 
 namespace {
 // docs/safety.md, "Where the bounds come from", derives these.
-/// Shortest duration of a speed window: a little less than two cycles at 1 kHz, so that jitter does not make it three.
-constexpr std::int64_t speed_window_ns = 1'800'000;
 constexpr std::int64_t window_per_stamp_error = 4;  ///< a speed that its stamps make less certain is not judged
 constexpr double resolution_max_rad_s = 40.0;       ///< nor is one that its counts resolve less well
 /// Fewer stale cycles in a row are no fault: a single delayed answer must pass, however long it took.
 constexpr int stale_cycles_max = 5;
-constexpr double resolution_counts = 2.0;
 /// Added to the time since the previous measurement: no counter moves faster than twice the overspeed in this time.
 constexpr double leap_slack_s = 1e-3;
 
@@ -101,20 +98,16 @@ CheckResult SpeedWindows::update(const rig::Measurement& measurement, std::int64
   }
 
   const std::int64_t dt_ns = measurement.time_ns - begin_ns_;
-  if (dt_ns < speed_window_ns) return {};
+  if (dt_ns < least_speed_window_ns) return {};
   const std::int64_t sure_ns = window_per_stamp_error * (begin_error_ns_ + stamp_error_ns_);
   overdue_ = dt_ns < std::max(resolving_ns_, sure_ns);
   if (overdue_) return {};
   const double dt_s = static_cast<double>(dt_ns) * rig::s_per_ns;
-  const double rad_s_per_count = limits_.rad_per_count / dt_s;
-  speed_window_ = {.dt_s = dt_s,
-                   .omega1_rad_s = rig::counts_between(begin_upper_, measurement.upper_counts) * rad_s_per_count,
-                   .omega2_rad_s = rig::counts_between(begin_lower_, measurement.lower_counts) * rad_s_per_count,
-                   .resolution_rad_s = resolution_counts * rad_s_per_count,
-                   .begin_error_s = static_cast<double>(begin_error_ns_) * rig::s_per_ns,
-                   .end_error_s = static_cast<double>(stamp_error_ns_) * rig::s_per_ns,
-                   .brake_target_Nm = brake_impulse_Nms_ / dt_s,
-                   .motor_duty = motor_duty_s_ / dt_s};
+  speed_window_ = speed_window_over<double>(
+      dt_s, limits_.rad_per_count, rig::counts_between(begin_upper_, measurement.upper_counts),
+      rig::counts_between(begin_lower_, measurement.lower_counts), brake_impulse_Nms_, motor_duty_s_);
+  speed_window_.begin_error_s = static_cast<double>(begin_error_ns_) * rig::s_per_ns;
+  speed_window_.end_error_s = static_cast<double>(stamp_error_ns_) * rig::s_per_ns;
   complete_ = true;
   begin(measurement);
   return {};

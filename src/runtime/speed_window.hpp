@@ -16,20 +16,42 @@ struct CheckResult {
   [[nodiscard]] bool sound() const noexcept { return reason == rig::Reason::none; }
 };
 
-/// Mean speeds and commands over about 2 ms, which is long enough for the encoders to resolve a speed.
-struct SpeedWindow {
-  double dt_s{0.0};
-  double omega1_rad_s{0.0};  ///< mean over the window, from counts alone
-  double omega2_rad_s{0.0};
-  double resolution_rad_s{0.0};  ///< speed that corresponds to two counts in this time
-  double begin_error_s{0.0};     ///< uncertainty of the stamp with which the window began
-  double end_error_s{0.0};       ///< uncertainty of the stamp with which it ended
-  double brake_target_Nm{0.0};   ///< mean of b(u); with an ideal actuator mean of the commanded torque
-  double motor_duty{0.0};        ///< mean
+/// Mean speeds and commands over about 2 ms, which is long enough for the encoders to resolve a speed. `S` is a
+/// `double`, or a pack of them (rig/scalar.hpp).
+template <class S>
+struct BasicSpeedWindow {
+  S dt_s{0.0};
+  S omega1_rad_s{0.0};  ///< mean over the window, from counts alone
+  S omega2_rad_s{0.0};
+  S resolution_rad_s{0.0};  ///< speed that corresponds to two counts in this time
+  S begin_error_s{0.0};     ///< uncertainty of the stamp with which the window began
+  S end_error_s{0.0};       ///< uncertainty of the stamp with which it ended
+  S brake_target_Nm{0.0};   ///< mean of b(u); with an ideal actuator mean of the commanded torque
+  S motor_duty{0.0};        ///< mean
 
   /// Uncertainty of the window's duration.
-  [[nodiscard]] double stamp_error_s() const noexcept { return begin_error_s + end_error_s; }
+  [[nodiscard]] S stamp_error_s() const noexcept { return begin_error_s + end_error_s; }
 };
+using SpeedWindow = BasicSpeedWindow<double>;
+
+/// Duration of the shortest speed window: a little less than two cycles at 1 kHz, so that jitter does not make it
+/// three. docs/safety.md, "Where the bounds come from", derives it and the resolution.
+inline constexpr std::int64_t least_speed_window_ns = 1'800'000;
+inline constexpr double resolution_counts = 2.0;
+
+/// The window in which the counters moved by these counts.
+template <class S>
+[[nodiscard]] inline BasicSpeedWindow<S> speed_window_over(const S& dt_s, const S& rad_per_count, const S& upper_counts,
+                                                           const S& lower_counts, const S& brake_impulse_Nms,
+                                                           const S& motor_duty_s) noexcept {
+  const S rad_s_per_count = rad_per_count / dt_s;
+  return {.dt_s = dt_s,
+          .omega1_rad_s = upper_counts * rad_s_per_count,
+          .omega2_rad_s = lower_counts * rad_s_per_count,
+          .resolution_rad_s = resolution_counts * rad_s_per_count,
+          .brake_target_Nm = brake_impulse_Nms / dt_s,
+          .motor_duty = motor_duty_s / dt_s};
+}
 
 /// Checks whether measurements are fresh and combines them into speed windows. A window lasts until its speeds are
 /// certain enough to be judged. Real-time safe.
@@ -50,6 +72,10 @@ class SpeedWindows {
   /// uncertain. The checks cannot judge the wheels then.
   [[nodiscard]] bool overdue() const noexcept { return overdue_; }
   [[nodiscard]] const SpeedWindow& speed_window() const noexcept { return speed_window_; }
+  /// A travel of so many counts is no leap, however short its time.
+  [[nodiscard]] std::int32_t sure_counts() const noexcept { return sure_counts_; }
+  /// Shortest window whose counts resolve a speed.
+  [[nodiscard]] std::int64_t resolving_ns() const noexcept { return resolving_ns_; }
 
  private:
   [[nodiscard]] bool fresh(std::int64_t stamp_ns, std::int64_t now_ns) noexcept;
@@ -58,9 +84,9 @@ class SpeedWindows {
   void begin(const rig::Measurement& measurement) noexcept;
 
   PlausibilityLimits limits_;
-  double most_counts_per_s_;   ///< of a counter that does not leap
-  std::int32_t sure_counts_;   ///< a travel of so many counts is no leap, however short its time
-  std::int64_t resolving_ns_;  ///< shortest window whose counts resolve a speed
+  double most_counts_per_s_;  ///< of a counter that does not leap
+  std::int32_t sure_counts_;
+  std::int64_t resolving_ns_;
   bool started_{false};
   bool usable_{true};
   bool complete_{false};

@@ -1,14 +1,23 @@
 #include "study/batch.hpp"
 
+#include <algorithm>
+#include <atomic>
+#include <map>
+#include <memory>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "config/config_error.hpp"
+#include "study/lanes/lane_jobs.hpp"
 #include "study/parallel.hpp"
 
 namespace abs_hil::study {
 
 namespace {
+
+/// Runs that are computed together: enough to keep lanes full, few enough for the processor's cache.
+constexpr std::size_t most_together = 768;
 
 Outcome outcome_of(const Job& job) {
   try {
@@ -20,11 +29,67 @@ Outcome outcome_of(const Job& job) {
   }
 }
 
+/// The jobs of one part of a batch.
+class Part {
+ public:
+  using Take = std::function<void(std::size_t, Outcome)>;
+
+  Part(lanes::InstructionSet set, const Take& take) : set_(set), take_(take) {}
+
+  void start(std::size_t index, Job job) {
+    if (set_ != lanes::InstructionSet::none) {
+      auto& settings = settings_[job.settings];
+      if (!settings) settings = std::make_unique<lanes::LaneSettings>(*job.settings);
+      std::vector<double> words;
+      if (const lanes::Kind* kind = settings->begin(job, words)) {
+        groups_[{kind, settings->window_cycles()}].push_back({index, std::move(job), std::move(words)});
+        return;
+      }
+    }
+    ++counts_.scalar;
+    take_(index, outcome_of(job));
+  }
+  void finish() {
+    for (auto& [key, group] : groups_) {
+      lanes::go_on(*key.first, set_, group, key.second);
+      for (const lanes::Started& started : group) {
+        Outcome outcome;
+        const bool complete = lanes::result_of(*key.first, started.words.data(), outcome.run);
+        ++(complete ? counts_.lanes : counts_.disturbed);
+        take_(started.index, complete ? outcome : outcome_of(started.job));
+      }
+    }
+  }
+  [[nodiscard]] const BatchCounts& counts() const noexcept { return counts_; }
+
+ private:
+  lanes::InstructionSet set_;
+  const Take& take_;
+  std::map<const config::Settings*, std::unique_ptr<lanes::LaneSettings>> settings_;
+  std::map<std::pair<const lanes::Kind*, std::uint32_t>, std::vector<lanes::Started>> groups_;
+  BatchCounts counts_{};
+};
+
 }  // namespace
 
-void run_batch(std::size_t count, std::size_t threads, const std::function<Job(std::size_t)>& job_of,
-               const std::function<void(std::size_t, Outcome)>& take) {
-  for_each_index(count, threads, [&](std::size_t index) { take(index, outcome_of(job_of(index))); });
+BatchCounts run_batch(std::size_t count, std::size_t threads, const std::function<Job(std::size_t)>& job_of,
+                      const std::function<void(std::size_t, Outcome)>& take) {
+  const lanes::InstructionSet set = lanes::instruction_set();
+  const std::size_t share = (count + std::max<std::size_t>(threads, 1) - 1) / std::max<std::size_t>(threads, 1);
+  const std::size_t together = std::clamp<std::size_t>(share, 1, most_together);
+  std::atomic<std::size_t> in_lanes{0};
+  std::atomic<std::size_t> disturbed{0};
+  std::atomic<std::size_t> scalar{0};
+  for_each_index((count + together - 1) / together, threads, [&](std::size_t part_index) {
+    Part part(set, take);
+    const std::size_t end = std::min(count, (part_index + 1) * together);
+    for (std::size_t index = part_index * together; index < end; ++index) part.start(index, job_of(index));
+    part.finish();
+    in_lanes += part.counts().lanes;
+    disturbed += part.counts().disturbed;
+    scalar += part.counts().scalar;
+  });
+  return {.lanes = in_lanes, .disturbed = disturbed, .scalar = scalar};
 }
 
 }  // namespace abs_hil::study

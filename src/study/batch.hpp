@@ -24,12 +24,22 @@ struct Outcome {
   std::string refusal{};  ///< why the job's options cannot be used; empty if they can
 };
 
+/// How the runs of a batch were computed.
+struct BatchCounts {
+  std::size_t lanes{0};      ///< side by side, in the lanes of packs
+  std::size_t disturbed{0};  ///< begun in lanes, then by `simulate`, because something happened that lanes do not know
+  std::size_t scalar{0};     ///< by `simulate` alone
+};
+
 /// Runs jobs 0 to count - 1 in any order. The result of a job depends on the job alone: not on its neighbours, the
 /// number of threads or the order.
 /// @param job_of  gives job number `index`; called from several threads
 /// @param take  takes the outcome of job number `index`; called from several threads. An exception of either ends the
 ///   batch and leaves it.
-void run_batch(std::size_t count, std::size_t threads, const std::function<Job(std::size_t index)>& job_of,
-               const std::function<void(std::size_t index, Outcome outcome)>& take);
+/// Runs that brake from a start speed on a steady road are computed side by side in the lanes of vectors, with the bits
+/// of `simulate`: ABS_HIL_LANES=none, portable, avx2 or avx512 chooses the vectors, otherwise the computer does. Throws
+/// std::invalid_argument for a choice that the computer has not.
+BatchCounts run_batch(std::size_t count, std::size_t threads, const std::function<Job(std::size_t index)>& job_of,
+                      const std::function<void(std::size_t index, Outcome outcome)>& take);
 
 }  // namespace abs_hil::study

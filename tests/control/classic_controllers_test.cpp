@@ -48,12 +48,12 @@ TEST_CASE("The feed-forward torque keeps e_v constant on the plant on which it w
     auto in = baseline::input_at(rig, 30 + 140 * unit(random), 2 * unit(random) - 1.5, 0.0, slip_ref);
     const double force = theta * baseline::phi(rig, std::abs(in.slip));
     in.alpha2_rad_s2 = (-w.r2_m * force - w.d2_Nms_rad * in.speeds.omega2_rad_s - w.M20_Nm) / w.J2_kg_m2;
-    const double torque = control::measured_equivalent_torque_Nm(w, in);
+    const double torque = control::measured_equivalent_torque_Nm(control::paper::laws(w), in);
     const double alpha1 = (w.r1_m * force - w.d1_Nms_rad * in.speeds.omega1_rad_s - w.M10_Nm - torque) / w.J1_kg_m2;
     CHECK_THAT((1 - slip_ref) * w.r2_m * in.alpha2_rad_s2 - w.r1_m * alpha1, WithinAbs(0.0, 1e-11));
     // A lower wheel that decelerates less than by friction gives no negative tyre force.
     in.alpha2_rad_s2 = 50.0;
-    CHECK_THAT(control::measured_equivalent_torque_Nm(w, in),
+    CHECK_THAT(control::measured_equivalent_torque_Nm(control::paper::laws(w), in),
                WithinAbs(w.J1_kg_m2 / w.r1_m * baseline::drift(rig, in.speeds, slip_ref), 1e-12));
   }
 }
@@ -78,8 +78,8 @@ TEST_CASE("PI is the discrete formula, on slip with gains that follow the car's 
     const double slip_error = in.slip - 0.15;
     if (n > 0) sum += 0.5 * h * (before + v * slip_error);
     before = v * slip_error;
-    const double wanted =
-        0.6 * control::measured_equivalent_torque_Nm(w, in) - w.J1_kg_m2 / w.r1_m * (kp * v * slip_error + 40.0 * sum);
+    const double wanted = 0.6 * control::measured_equivalent_torque_Nm(control::paper::laws(w), in) -
+                          w.J1_kg_m2 / w.r1_m * (kp * v * slip_error + 40.0 * sum);
     CHECK_THAT(pi->step(in).brake_torque_Nm, WithinRel(wanted, 1e-9) || WithinAbs(wanted, 1e-9));
   }
 }

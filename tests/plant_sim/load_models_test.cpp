@@ -82,8 +82,9 @@ TEST_CASE("No load rises more steeply with friction than its bound") {
   PlantOptions options = inteco_manual();
   options.load = GENERATE("constant", "lever");
   const LoadModel model = make_load_model(options, 0.4, 1.5);
-  const UpperWheelTorques torques = GENERATE(UpperWheelTorques{1.0, 9.0, 0.02}, UpperWheelTorques{0.0, 9.0, 0.0},
-                                             UpperWheelTorques{-1.0, 9.0, -0.02}, UpperWheelTorques{1.0, 0.0, 0.0});
+  using Torques = UpperWheelTorques<double, double>;
+  const Torques torques =
+      GENERATE(Torques{1.0, 9.0, 0.02}, Torques{0.0, 9.0, 0.0}, Torques{-1.0, 9.0, -0.02}, Torques{1.0, 0.0, 0.0});
   std::visit(
       [&](const auto& load) {
         double steepest_N = 0.0;

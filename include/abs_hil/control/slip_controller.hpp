@@ -1,48 +1,54 @@
 #pragma once
 
 #include <span>
+#include <type_traits>
 
 #include "abs_hil/rig/measurement.hpp"
 #include "abs_hil/rig/signals.hpp"
 
 namespace abs_hil::control {
 
-/// Inputs of a slip controller in one cycle. SI units.
-struct SlipInput {
-  double dt_s{0.0};           ///< time since the previous step, > 0; ignored by `reset`
-  rig::WheelSpeeds speeds{};  ///< estimated wheel speeds
-  double slip{0.0};           ///< estimated slip (5)
-  double slip_ref{0.0};       ///< reference slip, in (0, 1)
+/// Inputs of a slip controller in one cycle. SI units. `S` is a `double` in a run of its own, and a pack of them where
+/// many simulated runs are computed side by side (rig/scalar.hpp).
+template <class S>
+struct BasicSlipInput {
+  S dt_s{0.0};                        ///< time since the previous step, > 0; ignored by `reset`
+  rig::BasicWheelSpeeds<S> speeds{};  ///< estimated wheel speeds
+  S slip{0.0};                        ///< estimated slip (5)
+  S slip_ref{0.0};                    ///< reference slip, in (0, 1)
   /// Mean over the past interval of the brake torque estimated to act (the command itself for an ideal actuator), N m.
-  double mean_brake_torque_Nm{0.0};
-  double brake_torque_Nm{0.0};      ///< brake torque estimated to act now, N m
-  double max_brake_torque_Nm{0.0};  ///< largest torque the actuator can give, > 0, may be infinite; the least is 0
-  double alpha1_rad_s2{0.0};        ///< estimated acceleration of the upper wheel
-  double alpha2_rad_s2{0.0};        ///< estimated acceleration of the lower wheel
+  S mean_brake_torque_Nm{0.0};
+  S brake_torque_Nm{0.0};      ///< brake torque estimated to act now, N m
+  S max_brake_torque_Nm{0.0};  ///< largest torque the actuator can give, > 0, may be infinite; the least is 0
+  S alpha1_rad_s2{0.0};        ///< estimated acceleration of the upper wheel
+  S alpha2_rad_s2{0.0};        ///< estimated acceleration of the lower wheel
   /// Angles turned over the past interval, from the encoders (from the speeds with ideal sensors), rad; NaN if unknown.
-  double upper_travel_rad{rig::unknown};
-  double lower_travel_rad{rig::unknown};
+  S upper_travel_rad{rig::unknown};
+  S lower_travel_rad{rig::unknown};
   /// Static torque b(u) that was really sent in the previous cycle, N m: after the PWM's steps, the command gate and
   /// the driver. 0 in the first cycle of a phase.
-  double sent_brake_torque_Nm{0.0};
+  S sent_brake_torque_Nm{0.0};
   /// What was missing in it of the controller's previous output, N m: > 0 if less was sent than it asked for (limits,
   /// rate limit, refusal), < 0 if more was sent. 0 if only the PWM's steps and the dead zone part the two, and in the
   /// first cycle of a phase. While it is not 0, an integral that drives the output further out must stand.
-  double unsent_torque_Nm{0.0};
+  S unsent_torque_Nm{0.0};
 };
+using SlipInput = BasicSlipInput<double>;
 
 /// Outputs of a slip controller. The torque is the static torque b(u) of (7); it acts after the lag (6). It may be
 /// outside the actuator's range: it is limited afterwards. It must be finite in every cycle. The other outputs may be
 /// NaN if they were NaN in the first cycle of the phase, which means that the controller does not give them; they are
 /// never infinite. An output that breaks this ends the run with the fault `controller_not_finite` before it acts.
-struct SlipOutput {
-  double brake_torque_Nm{0.0};
-  double slip_velocity_error_m_s{0.0};  ///< e_v of (13)
-  double theta_est_N{0.0};              ///< estimated peak tyre force, NaN for controllers that estimate none
-  double slip_ref{rig::unknown};        ///< the controller's own slip reference; NaN if it follows that of the input
+template <class S>
+struct BasicSlipOutput {
+  S brake_torque_Nm{0.0};
+  S slip_velocity_error_m_s{0.0};  ///< e_v of (13)
+  S theta_est_N{0.0};              ///< estimated peak tyre force, NaN for controllers that estimate none
+  S slip_ref{rig::unknown};        ///< the controller's own slip reference; NaN if it follows that of the input
   /// Values of the controller's own signals, in the order of `SlipController::signals`. The others are ignored.
   rig::SignalValues signals{rig::no_signals};
 };
+using SlipOutput = BasicSlipOutput<double>;
 
 /// A slip controller: a pure function of its inputs and its own state. It does not use boards, clocks or files.
 /// `reset` and `step` run in the real-time thread: no allocation, lock, system call, exception or log call.
@@ -66,7 +72,5 @@ class SlipController {
   /// changes nothing for another class. By default a law cannot take over and returns false.
   [[nodiscard]] virtual bool take_over(const SlipController& before) noexcept;
 };
-
-inline bool SlipController::take_over(const SlipController& /*before*/) noexcept { return false; }
 
 }  // namespace abs_hil::control

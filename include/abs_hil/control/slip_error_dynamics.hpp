@@ -15,6 +15,12 @@ namespace abs_hil::control {
   return paper::laws(w).e_v({.omega1 = speeds.omega1_rad_s, .omega2 = speeds.omega2_rad_s, .lambda_ref = slip_ref});
 }
 
+template <class S>
+[[nodiscard]] constexpr S slip_velocity_error_m_s(const paper::Laws<S>& laws, const rig::BasicWheelSpeeds<S>& speeds,
+                                                  const S& slip_ref) noexcept {
+  return laws.e_v({.omega1 = speeds.omega1_rad_s, .omega2 = speeds.omega2_rad_s, .lambda_ref = slip_ref});
+}
+
 /// The part of e_v' in (14) that bearing friction causes, with the sign in which (16) cancels it, m/s^2:
 /// -(r1/J1)(d1 omega1 + M10) + (1 - slip_ref)(r2/J2)(d2 omega2 + M20). Both wheels turn forwards. Real-time safe.
 [[nodiscard]] constexpr double friction_drift_m_s2(const rig::WheelParameters& w, const rig::WheelSpeeds& speeds,
@@ -37,10 +43,13 @@ namespace abs_hil::control {
 ///   (exp(A h) - 1)/h times [I; e_v]. This row is -[ks0 ks1] for h -> 0. So e_v meets the trajectory at every tick for
 ///   any rate.
 /// - EquivalentControl computes the other terms, which cancel the plant's own motion.
-class SlipErrorDynamics {
+template <class S>
+class BasicSlipErrorDynamics {
  public:
+  BasicSlipErrorDynamics() = default;
   /// Throws std::invalid_argument if ks0, ks1, the control rate or v_min_m_s is not > 0.
-  explicit SlipErrorDynamics(const ControllerContext& context);
+  explicit BasicSlipErrorDynamics(const ControllerContext& context)
+    requires std::is_same_v<S, double>;
 
   /// Tb of (16) for theta0, of (17)-(18) for theta_hat.
   /// @param integral_m  I, integral of e_v
@@ -48,13 +57,26 @@ class SlipErrorDynamics {
   /// @param theta_N  theta0 or theta_hat
   /// @param recent_phi  phi(slip), now or half a cycle ago: v_x is predicted with it, and changes little
   /// @return brake torque to hold for one period, N m; may lie outside what the actuator can give. Real-time safe.
-  [[nodiscard]] double feedback_linearising_torque_Nm(const SlipInput& input, double integral_m, double error_m_s,
-                                                      double theta_N, double recent_phi) const noexcept;
+  [[nodiscard]] S feedback_linearising_torque_Nm(const BasicSlipInput<S>& input, const S& integral_m,
+                                                 const S& error_m_s, const S& theta_N,
+                                                 const S& recent_phi) const noexcept {
+    const BasicWantedMotion<S> wanted{
+        .mean_rate_m_s2 = paper::Laws<S>::nu(sampled_gains_, integral_m, error_m_s),
+        .error_at_mid_m_s = error_at_mid_.per_s * integral_m + error_at_mid_.share * error_m_s};
+    return equivalent_.brake_torque_Nm(input, error_m_s, wanted, theta_N, recent_phi);
+  }
 
  private:
-  EquivalentControl equivalent_;
-  paper::Gains<double> sampled_gains_;  ///< ks0, ks1 such that nu is the mean: -row 2 of (exp(A h) - 1)/h
-  Eigen::RowVector2d error_at_mid_;     ///< row 2 of exp(A h/2): e_v in the middle of the period
+  /// Row 2 of exp(A h/2): it gives e_v in the middle of the period from I and e_v.
+  struct ErrorAtMid {
+    S per_s{0.0};
+    S share{0.0};
+  };
+
+  BasicEquivalentControl<S> equivalent_{};
+  paper::Gains<S> sampled_gains_{};  ///< ks0, ks1 such that nu is the mean: -row 2 of (exp(A h) - 1)/h
+  ErrorAtMid error_at_mid_{};
 };
+using SlipErrorDynamics = BasicSlipErrorDynamics<double>;
 
 }  // namespace abs_hil::control

@@ -53,6 +53,8 @@ class FactorProgress {
     if (!changes_ || !counting_ || !along_time()) return std::numeric_limits<double>::infinity();
     return origin_time_s_ + piece().end - time_s_;
   }
+  /// True if the factor never changes.
+  [[nodiscard]] bool steady() const noexcept { return !changes_; }
   /// False if the factor is always 1.
   [[nodiscard]] bool changes_anything() const noexcept { return changes_ || constant_ != 1.0; }
   [[nodiscard]] PresentFactor present(double angle2_rad) const noexcept {

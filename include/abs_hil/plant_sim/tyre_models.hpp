@@ -12,69 +12,93 @@
 // safe except for the constructors.
 namespace abs_hil::plant_sim {
 
-/// The paper's curve (4): sin(C atan(B slip)), slip (5).
-class MagicFormula {
+/// The paper's curve (4): sin(C atan(B slip)), slip (5). `S` is a `double`, or a pack of them (rig/scalar.hpp).
+template <class S>
+class BasicMagicFormula {
  public:
-  explicit MagicFormula(const PlantOptions& options) noexcept
-      : tyre_(options.rig.tyre), regularisation_m_s_(options.slip_regularisation_m_s), peak_mu_(options.mu_peak) {}
+  BasicMagicFormula() = default;
+  explicit BasicMagicFormula(const PlantOptions& options) noexcept
+      : B_(options.rig.tyre.B),
+        C_(options.rig.tyre.C),
+        regularisation_m_s_(options.slip_regularisation_m_s),
+        peak_mu_(options.mu_peak) {}
 
-  [[nodiscard]] double slip(double v_wheel_m_s, double v_x_m_s) const noexcept {
+  [[nodiscard]] S slip(const S& v_wheel_m_s, const S& v_x_m_s) const noexcept {
     return rig::wheel_slip(v_wheel_m_s, v_x_m_s, regularisation_m_s_);
   }
-  [[nodiscard]] double shape(double slip) const noexcept { return rig::normalised_tyre_force(tyre_, slip); }
+  [[nodiscard]] S shape(const S& slip) const noexcept { return rig::sine(S(C_ * rig::arctangent(S(B_ * slip)))); }
+  /// `shape` of the slip at these speeds, with one division for slip and arctangent.
+  [[nodiscard, gnu::always_inline]] S shape_at(const S& v_wheel_m_s, const S& v_x_m_s) const noexcept {
+    const S stretched_m_s = B_ * (v_x_m_s - v_wheel_m_s);
+    const S divisor_m_s = rig::larger(rig::magnitude(v_x_m_s), regularisation_m_s_);
+    const S size =
+        rig::sine_of_positive(S(C_ * rig::arctangent_of_positive(rig::magnitude(stretched_m_s), divisor_m_s)));
+    return rig::with_sign(size, stretched_m_s);
+  }
   /// Friction coefficient at the peak of the curve.
-  [[nodiscard]] double peak_mu() const noexcept { return peak_mu_; }
+  [[nodiscard]] S peak_mu() const noexcept { return peak_mu_; }
   /// Upper bound on the slope of `shape` over v_x - v_wheel at these speeds, s/m: its slope B C at slip 0 over the
   /// speed.
-  [[nodiscard]] double steepest_s_m(double /*v_wheel_m_s*/, double v_x_m_s) const noexcept {
-    return tyre_.B * tyre_.C / std::max(std::abs(v_x_m_s), regularisation_m_s_);
+  [[nodiscard]] S steepest_s_m(const S& /*v_wheel_m_s*/, const S& v_x_m_s) const noexcept {
+    return B_ * C_ / rig::larger(rig::magnitude(v_x_m_s), regularisation_m_s_);
   }
 
  private:
-  rig::TyreParameters tyre_;
-  double regularisation_m_s_;
-  double peak_mu_;
+  S B_{0.0};
+  S C_{0.0};
+  S regularisation_m_s_{0.0};
+  S peak_mu_{0.0};
 };
+using MagicFormula = BasicMagicFormula<double>;
 
 /// The maker's curve (IntecoMuParameters) and slip: (v_x - v_w) / v_x in braking, (v_w - v_x) / v_w in traction, 1 if
 /// the wheels turn in opposite directions. With sign s it is (v_x - v_w) over the larger speed, limited to [-1, 1]. It
 /// is regularised near standstill like (5).
-class IntecoMu {
+template <class S>
+class BasicIntecoMu {
  public:
+  BasicIntecoMu() = default;
   /// Throws std::invalid_argument if the curve is nowhere positive.
-  explicit IntecoMu(const PlantOptions& options);
+  explicit BasicIntecoMu(const PlantOptions& options)
+    requires std::is_same_v<S, double>;
 
-  [[nodiscard]] double slip(double v_wheel_m_s, double v_x_m_s) const noexcept {
-    return std::clamp((v_x_m_s - v_wheel_m_s) / larger_speed_m_s(v_wheel_m_s, v_x_m_s), -1.0, 1.0);
+  [[nodiscard]] S slip(const S& v_wheel_m_s, const S& v_x_m_s) const noexcept {
+    return rig::clamped(S((v_x_m_s - v_wheel_m_s) / larger_speed_m_s(v_wheel_m_s, v_x_m_s)), S(-1.0), S(1.0));
   }
   /// The published polynomial is negative (by 2e-6) for slips below 7e-5, where friction would drive; it is clipped to
   /// 0.
-  [[nodiscard]] double shape(double slip) const noexcept {
-    const double s = std::abs(slip);
-    return std::copysign(std::max(0.0, friction_coefficient(s)) / peak_mu_, slip);
+  [[nodiscard]] S shape(const S& slip) const noexcept {
+    const S s = rig::magnitude(slip);
+    return rig::with_sign(S(rig::larger(S(0.0), friction_coefficient(s)) / peak_mu_), slip);
   }
-  [[nodiscard]] double peak_mu() const noexcept { return peak_mu_; }
-  [[nodiscard]] double steepest_s_m(double v_wheel_m_s, double v_x_m_s) const noexcept {
+  [[nodiscard, gnu::always_inline]] S shape_at(const S& v_wheel_m_s, const S& v_x_m_s) const noexcept {
+    return shape(slip(v_wheel_m_s, v_x_m_s));
+  }
+  [[nodiscard]] S peak_mu() const noexcept { return peak_mu_; }
+  [[nodiscard]] S steepest_s_m(const S& v_wheel_m_s, const S& v_x_m_s) const noexcept {
     return steepest_shape_ / larger_speed_m_s(v_wheel_m_s, v_x_m_s);
   }
 
  private:
-  [[nodiscard]] double larger_speed_m_s(double v_wheel_m_s, double v_x_m_s) const noexcept {
-    return std::max({std::abs(v_x_m_s), std::abs(v_wheel_m_s), regularisation_m_s_});
+  [[nodiscard]] S larger_speed_m_s(const S& v_wheel_m_s, const S& v_x_m_s) const noexcept {
+    return rig::larger(rig::larger(rig::magnitude(v_x_m_s), rig::magnitude(v_wheel_m_s)), regularisation_m_s_);
   }
   /// mu(s) as published, for s in [0, 1].
-  [[nodiscard]] double friction_coefficient(double s) const noexcept {
-    const double power = std::pow(s, mu_.p);
-    return mu_.w4 * power / (mu_.a + power) + s * (mu_.w1 + s * (mu_.w2 + s * mu_.w3));
+  [[nodiscard]] S friction_coefficient(const S& s) const noexcept {
+    const S power = rig::power(s, p_);
+    return w4_ * power / (a_ + power) + s * (w1_ + s * (w2_ + s * w3_));
   }
-  [[nodiscard]] double highest() const noexcept;
-  [[nodiscard]] double slope_bound() const noexcept;
+  [[nodiscard]] double highest() const noexcept
+    requires std::is_same_v<S, double>;
+  [[nodiscard]] double slope_bound() const noexcept
+    requires std::is_same_v<S, double>;
 
-  IntecoMuParameters mu_;
-  double regularisation_m_s_;
-  double peak_mu_{0.0};
-  double steepest_shape_{0.0};  ///< upper bound on the slope of `shape` over the slip
+  S w1_{0.0}, w2_{0.0}, w3_{0.0}, w4_{0.0}, a_{0.0}, p_{0.0};  ///< IntecoMuParameters
+  S regularisation_m_s_{0.0};
+  S peak_mu_{0.0};
+  S steepest_shape_{0.0};  ///< upper bound on the slope of `shape` over the slip
 };
+using IntecoMu = BasicIntecoMu<double>;
 
 using TyreModel = std::variant<MagicFormula, IntecoMu>;
 

@@ -42,9 +42,7 @@ class WheelModel {
   /// Tyre force, N; positive if it drives the upper wheel forward and brakes the lower one.
   [[nodiscard]] double tyre_force_N(const ContactState& c) const noexcept {
     const double shape = std::visit(
-        [&](const auto& tyre) {
-          return tyre.shape(tyre.slip(wheels_.r1_m * c.omega1_rad_s, wheels_.r2_m * c.omega2_rad_s));
-        },
+        [&](const auto& tyre) { return tyre.shape_at(wheels_.r1_m * c.omega1_rad_s, wheels_.r2_m * c.omega2_rad_s); },
         tyre_);
     return force_N(c.friction * shape, c);
   }
@@ -62,18 +60,27 @@ class WheelModel {
           return tyre.steepest_s_m(wheels_.r1_m * c.omega1_rad_s, wheels_.r2_m * c.omega2_rad_s);
         },
         tyre_);
-    const UpperWheelTorques torques = upper_torques(c);
+    const Torques torques = upper_torques(c);
     return std::visit([&](const auto& load) { return load.steepest_N(c.friction, torques); }, load_) * c.friction *
            steepest_s_m;
   }
 
+  /// Calls `visitor` with the tyre model and the load model as their own types.
+  template <class Visitor>
+  auto visit(Visitor&& visitor) const {
+    return std::visit(visitor, tyre_, load_);
+  }
+  [[nodiscard]] bool apart() const noexcept { return apart_; }
+
  private:
-  [[nodiscard]] UpperWheelTorques upper_torques(const ContactState& c) const noexcept {
+  using Torques = UpperWheelTorques<double, double>;
+
+  [[nodiscard]] Torques upper_torques(const ContactState& c) const noexcept {
     return {c.upper_sliding, wheels_.M10_Nm + c.brake_torque_Nm, wheels_.d1_Nms_rad * c.omega1_rad_s};
   }
   [[nodiscard]] double force_N(double shape, const ContactState& c) const noexcept {
     if (apart_) return 0.0;
-    const UpperWheelTorques torques = upper_torques(c);
+    const Torques torques = upper_torques(c);
     return std::visit([&](const auto& load) { return load.force_N(shape, torques); }, load_);
   }
 

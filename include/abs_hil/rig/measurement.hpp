@@ -8,11 +8,13 @@ namespace abs_hil::rig {
 
 inline constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
-/// Angular speeds of both wheels, rad/s.
-struct WheelSpeeds {
-  double omega1_rad_s{0.0};  ///< upper wheel
-  double omega2_rad_s{0.0};  ///< lower wheel
+/// Angular speeds of both wheels, rad/s. `S` is a `double`, or a pack of them (rig/scalar.hpp).
+template <class S>
+struct BasicWheelSpeeds {
+  S omega1_rad_s{0.0};  ///< upper wheel
+  S omega2_rad_s{0.0};  ///< lower wheel
 };
+using WheelSpeeds = BasicWheelSpeeds<double>;
 
 /// Bits of `Measurement::trip_flags`, as in the RT-DAC4/PCI. The order of two of them (temperature, overspeed) is not
 /// known, so they form a pair.

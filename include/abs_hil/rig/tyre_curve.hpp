@@ -5,14 +5,25 @@
 #include <numbers>
 
 #include "abs_hil/rig/parameters.hpp"
+#include "abs_hil/rig/scalar.hpp"
 
 namespace abs_hil::rig {
 
+/// The tyre's curve without its height.
+template <class S>
+struct TyreShape {
+  S B{0.0}, C{0.0};
+
+  TyreShape() = default;
+  explicit TyreShape(const TyreParameters& tyre) noexcept : B(tyre.B), C(tyre.C) {}
+};
+
 /// Normalised tyre characteristic phi(slip) = sin(C atan(B slip)) of (10). It is odd in slip, so that the force has the
-/// right sign in traction, too. The factor s(omega) printed in (1) would reverse that sign (docs/theory.md). Real-time
-/// safe.
-[[nodiscard]] inline double normalised_tyre_force(const TyreParameters& tyre, double slip) noexcept {
-  return std::sin(tyre.C * std::atan(tyre.B * slip));
+/// right sign in traction, too. The factor s(omega) printed in (1) would reverse that sign (docs/theory.md). C <= 2.
+/// Real-time safe.
+template <class Tyre, class S>
+[[nodiscard]] inline S normalised_tyre_force(const Tyre& tyre, const S& slip) noexcept {
+  return sine(S(tyre.C * arctangent(S(tyre.B * slip))));
 }
 
 /// d phi / d slip of (10). Real-time safe.
@@ -30,8 +41,10 @@ namespace abs_hil::rig {
 /// Wheel slip (5), (v_x - v_w) / v_x, from the wheels' circumferential speeds. The quotient is undefined at v_x = 0.
 /// Below `regularisation_m_s` (> 0) the denominator therefore keeps that value: the slip stays finite, and is 0 when
 /// both wheels stand still. Real-time safe.
-[[nodiscard]] inline double wheel_slip(double v_wheel_m_s, double v_x_m_s, double regularisation_m_s) noexcept {
-  return (v_x_m_s - v_wheel_m_s) / std::max(std::abs(v_x_m_s), regularisation_m_s);
+template <class S>
+[[nodiscard]] inline S wheel_slip(const S& v_wheel_m_s, const S& v_x_m_s,
+                                  const std::type_identity_t<S>& regularisation_m_s) noexcept {
+  return (v_x_m_s - v_wheel_m_s) / larger(magnitude(v_x_m_s), regularisation_m_s);
 }
 
 }  // namespace abs_hil::rig

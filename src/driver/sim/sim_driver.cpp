@@ -19,6 +19,12 @@ double fraction_of_count(std::mt19937_64& generator) { return static_cast<double
 
 }  // namespace
 
+CountOffsets count_offsets(std::uint64_t seed, double rad_per_count) {
+  std::mt19937_64 generator(seed);
+  const double upper_rad = fraction_of_count(generator) * rad_per_count;
+  return {upper_rad, fraction_of_count(generator) * rad_per_count};
+}
+
 SimDriver::SimDriver(const plant_sim::PlantOptions& plant, const SimStart& start)
     : plant_(plant),
       start_(start),
@@ -36,10 +42,7 @@ rig::PlantTruth SimDriver::truth() const noexcept { return plant_.truth(); }
 void SimDriver::do_configure() {}  // the plant's options were checked when it was made
 
 void SimDriver::do_activate(std::int64_t now_ns) {
-  std::mt19937_64 generator(start_.seed);
-  const double count_rad = rig::radians_per_count(plant_.options().rig.encoder_counts_per_rev);
-  upper_offset_rad_ = fraction_of_count(generator) * count_rad;
-  lower_offset_rad_ = fraction_of_count(generator) * count_rad;
+  offsets_ = count_offsets(start_.seed, rig::radians_per_count(plant_.options().rig.encoder_counts_per_rev));
   plant_.reset({.omega1_rad_s = start_.start_speed_rad_s, .omega2_rad_s = start_.start_speed_rad_s});
   input_ = {};
   time_ns_ = now_ns;
@@ -54,8 +57,8 @@ IoResult SimDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) 
   const std::int32_t counts_per_rev = plant_.options().rig.encoder_counts_per_rev;
   measurement = {};
   measurement.time_ns = time_ns_;
-  measurement.upper_counts = plant_sim::encoder_counts(state.angle1_rad + upper_offset_rad_, counts_per_rev);
-  measurement.lower_counts = plant_sim::encoder_counts(state.angle2_rad + lower_offset_rad_, counts_per_rev);
+  measurement.upper_counts = plant_sim::encoder_counts(state.angle1_rad + offsets_.upper_rad, counts_per_rev);
+  measurement.lower_counts = plant_sim::encoder_counts(state.angle2_rad + offsets_.lower_rad, counts_per_rev);
   if (plant_.options().ideal_sensors) {
     measurement.ideal_speeds = rig::WheelSpeeds{state.omega1_rad_s, state.omega2_rad_s};
   }

@@ -17,6 +17,14 @@ struct SimStart {
   PwmMode pwm_mode{PwmMode::bits_12};
 };
 
+/// The wheels' initial angles within one count.
+struct CountOffsets {
+  double upper_rad{0.0};
+  double lower_rad{0.0};
+};
+/// @param seed  as SimStart has it
+[[nodiscard]] CountOffsets count_offsets(std::uint64_t seed, double rad_per_count);
+
 /// The simulated rig at the level of the card: encoder counts out, duty cycles of 12 or 8 bits in. `read` advances the
 /// plant to the given time under the command of the last `write`. In a late cycle the plant has therefore moved on,
 /// too.
@@ -47,9 +55,8 @@ class SimDriver final : public RigDriver {
   SimStart start_;
   OutputGrid grid_;
   plant_sim::PlantInput input_{};
-  std::int64_t time_ns_{0};       ///< time of the plant's state
-  double upper_offset_rad_{0.0};  ///< initial angle of the upper wheel within one count
-  double lower_offset_rad_{0.0};  ///< initial angle of the lower wheel within one count
+  std::int64_t time_ns_{0};  ///< time of the plant's state
+  CountOffsets offsets_{};
 };
 
 }  // namespace abs_hil::driver

@@ -1,0 +1,32 @@
+#pragma once
+
+#include "abs_hil/control/controller_context.hpp"
+#include "abs_hil/control/slip_controller.hpp"
+
+namespace abs_hil::control {
+
+/// The slip controller of a law that is written over its scalar: `Law<double>` runs in the cycle, a `Law` of packs in
+/// many simulated runs side by side. A law has `reset`, `step` and `take_over` as SlipController has them, and nothing
+/// but scalars of type S as members.
+template <template <class> class Law>
+class LawController : public SlipController {
+ public:
+  /// Throws what the law's constructor throws.
+  explicit LawController(const ControllerContext& context) : law_{context} {}
+
+  void reset(const SlipInput& input) noexcept override { law_.reset(input); }
+  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override { return law_.step(input); }
+  [[nodiscard]] bool take_over(const SlipController& before) noexcept override {
+    const auto* other = dynamic_cast<const LawController*>(&before);
+    if (other == nullptr) return false;
+    law_.take_over(other->law_);
+    return true;
+  }
+
+  [[nodiscard]] const Law<double>& law() const noexcept { return law_; }
+
+ protected:
+  Law<double> law_;
+};
+
+}  // namespace abs_hil::control

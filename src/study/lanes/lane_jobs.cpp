@@ -1,0 +1,315 @@
+#include "study/lanes/lane_jobs.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <variant>
+
+#include "abs_hil/control/registry.hpp"
+#include "abs_hil/rig/encoder_scale.hpp"
+#include "config/plan.hpp"
+#include "driver/factory.hpp"
+#include "driver/sim/sim_driver.hpp"
+#include "plant_sim/stepping.hpp"
+#include "plant_sim/torque_balance.hpp"
+#include "runtime/plausibility_limits.hpp"
+#include "study/lanes/braking_run.hpp"
+#include "study/lanes/lane_kinds.hpp"
+
+namespace abs_hil::study::lanes {
+
+/// The parts of a run that do not depend on its plant.
+struct LaneSettings::Parts {
+  const config::Settings& settings;
+  std::unique_ptr<control::SlipController> controller{};
+  LaneGate<double> gate{};
+  LaneSequence<double> sequence{};
+  control::SpeedTracker<double> tracker{};
+  control::BrakeActuator actuator{};
+  std::int64_t period_ns{0};
+  double period_s{0.0};
+  double duty_steps{0.0};
+  std::uint32_t window_cycles{1};
+};
+
+struct Kind {
+  std::size_t words;
+  /// Writes the words of the run and begins it. False if the kind does not fit.
+  bool (*begin)(const LaneSettings::Parts& parts, const Job& job, const plant_sim::TyreModel& tyres,
+                std::vector<double>& words);
+  bool (*result)(const double* words, RunResult& result);
+  LaneKernel (*portable)();
+  LaneKernel (*avx2)();
+  LaneKernel (*avx512)();
+};
+
+namespace {
+
+using experiment::BrakeAction;
+using experiment::EndKind;
+
+template <class Model>
+std::optional<Model> model_of(const auto& models) {
+  const auto* model = std::get_if<Model>(&models);
+  return model == nullptr ? std::nullopt : std::optional<Model>(*model);
+}
+
+template <class Run>
+Run run_of(const double* words) {
+  Run run;
+  std::memcpy(static_cast<void*>(&run), words, sizeof(Run));
+  return run;
+}
+
+template <template <class> class Law, template <class> class Tyre, template <class> class Load>
+struct KindOf {
+  using Run = BrakingRun<double, Law, Tyre, Load>;
+
+  static bool begin(const LaneSettings::Parts& parts, const Job& job, const plant_sim::TyreModel& tyres,
+                    std::vector<double>& words) {
+    const auto* controller = dynamic_cast<const control::LawController<Law>*>(parts.controller.get());
+    if (controller == nullptr) return false;
+    const auto tyre = model_of<Tyre<double>>(tyres);
+    if (!tyre) return false;
+    constexpr double friction = 1.0;
+    const auto load = model_of<Load<double>>(plant_sim::make_load_model(job.plant, tyre->peak_mu(), friction));
+    if (!load) return false;
+    const rig::RigParameters& model = parts.settings.model;
+    Run run;
+    run.rig.tyre = *tyre;
+    run.rig.load = *load;
+    run.rig.wheels = plant_sim::BasicWheels<double>(job.plant.rig.wheels);
+    run.rig.friction = friction;
+    run.rig.max_step_s = job.plant.max_step_s;
+    run.rig.brake = rig::BasicBrake<double>(job.plant.rig.brake);
+    run.rig.rad_per_count = rig::radians_per_count(job.plant.rig.encoder_counts_per_rev);
+    const driver::CountOffsets offsets = driver::count_offsets(job.seed, run.rig.rad_per_count);
+    run.rig.upper_offset_rad = offsets.upper_rad;
+    run.rig.lower_offset_rad = offsets.lower_rad;
+    run.rig.duty_steps = parts.duty_steps;
+    run.gate = parts.gate;
+    run.sequence = parts.sequence;
+    run.law = controller->law();
+    run.upper = run.lower = parts.tracker;
+    run.actuator = parts.actuator;
+    run.figures = analysis::BrakingFigures<double>(parts.settings.experiment.end_speed_m_s);
+    run.r1_m = model.wheels.r1_m;
+    run.r2_m = model.wheels.r2_m;
+    run.slip_ref = parts.settings.control.slip_ref;
+    run.period_s = parts.period_s;
+    run.period_ns = static_cast<double>(parts.period_ns);
+    run.begin(parts.settings.experiment.start_speed_rad_s);
+    if (run.disturbed != 0.0) return false;
+    words.resize(sizeof(Run) / sizeof(double));
+    std::memcpy(words.data(), static_cast<const void*>(&run), sizeof(Run));
+    return true;
+  }
+  static bool result(const double* words, RunResult& result) {
+    const Run run = run_of<Run>(words);
+    if (run.disturbed != 0.0) return false;
+    result = {.metrics = analysis::metrics_of(run.figures)};
+    return true;
+  }
+
+  using Types = LaneKind<Law, Tyre, Load>;
+  static constexpr Kind kind {
+    sizeof(Run) / sizeof(double), begin, result, [] { return lane_kernel<rig::Portable, Types>(); },
+#if defined(__x86_64__)
+        [] { return lane_kernel<rig::Avx2, Types>(); }, [] { return lane_kernel<rig::Avx512, Types>(); }
+#else
+        nullptr, nullptr
+#endif
+  };
+};
+
+#define ABS_HIL_LANE_KIND(law, tyre, load) &KindOf<law, tyre, load>::kind,
+constexpr const Kind* kinds[] = {ABS_HIL_LANE_KINDS(ABS_HIL_LANE_KIND)};
+#undef ABS_HIL_LANE_KIND
+
+/// The phases that lanes know: slip control until the car is slow, then at most a constant torque until standstill.
+bool plan_sequence(const config::Plan& plan, const config::Settings& settings, LaneSequence<double>& sequence) {
+  if (plan.phases.size() < 2 || plan.limits.distance_m < std::numeric_limits<double>::infinity()) return false;
+  const experiment::PhasePlan& brake = plan.phases[0];
+  const experiment::PhasePlan& hold = plan.phases[1];
+  const auto drives = [](const experiment::PhasePlan& phase) {
+    return phase.motor_duty > 0.0 || !phase.motor_profile.empty() || phase.wheels_apart || !phase.question.empty();
+  };
+  if (drives(brake) || drives(hold)) return false;
+  if (brake.phase != rig::Phase::brake || brake.brake != BrakeAction::slip_control || !brake.slip_ref_profile.empty())
+    return false;
+  if (hold.phase == rig::Phase::brake || !hold.brake_profile.empty() ||
+      (hold.brake != BrakeAction::torque && hold.brake != BrakeAction::released))
+    return false;
+  for (const experiment::EndCondition& end : brake.ends_on) {
+    if (end.kind != EndKind::car_speed_below) return false;
+    sequence.slow_m_s = std::max(sequence.slow_m_s, end.value);
+  }
+  for (const experiment::EndCondition& end : hold.ends_on) {
+    if (end.kind != EndKind::standstill) return false;
+  }
+  sequence.brake_limit_s = brake.time_limit_s;
+  sequence.hold_limit_s = hold.time_limit_s;
+  sequence.run_limit_s = plan.limits.run_time_s;
+  sequence.hold_torque_Nm = hold.brake == BrakeAction::torque ? hold.brake_torque_Nm : 0.0;
+  // The first cycle must not be slow: two slow ones in a row end slip control.
+  return settings.model.wheels.r2_m * settings.experiment.start_speed_rad_s > sequence.slow_m_s;
+}
+
+/// The checks of the gate; false if they would not judge often enough.
+bool plan_gate(LaneSettings::Parts& parts) {
+  const config::Settings& s = parts.settings;
+  const runtime::PlausibilityLimits limits = runtime::plausibility_limits(s.model, false, s.gate);
+  const runtime::SpeedWindows windows(limits);
+  const std::int64_t least_ns = std::max(runtime::least_speed_window_ns, windows.resolving_ns());
+  const std::int64_t cycles = (least_ns + parts.period_ns - 1) / parts.period_ns;
+  constexpr std::int64_t most_cycles = 64;
+  if (cycles > most_cycles || static_cast<double>(cycles * parts.period_ns) * rig::s_per_ns > s.gate.judge_within_s)
+    return false;
+  parts.window_cycles = static_cast<std::uint32_t>(cycles);
+  parts.gate.watch = runtime::WheelWatch<double>(limits);
+  parts.gate.momentum = runtime::MomentumWatch<double>(limits);
+  parts.gate.upper = {limits.upper_gain_rad_s2, limits.upper_loss_rad_s2, limits.overspeed_rad_s};
+  parts.gate.lower = {limits.lower_gain_rad_s2, limits.lower_loss_rad_s2, limits.overspeed_rad_s};
+  parts.gate.brake = rig::BasicBrake<double>(s.model.brake);
+  parts.gate.rad_per_count = limits.rad_per_count;
+  parts.gate.sure_counts = windows.sure_counts();
+  parts.gate.window_s = static_cast<double>(cycles * parts.period_ns) * rig::s_per_ns;
+  parts.gate.overspeed_rad_s = limits.overspeed_rad_s;
+  parts.gate.brake_duty_max = rig::duty_at_most(s.gate.brake_duty_max, static_cast<std::uint32_t>(parts.duty_steps));
+  parts.gate.brake_rate_per_s = s.gate.brake_rate_per_s;
+  parts.gate.brake_free_duty = s.model.brake.u0;
+  return true;
+}
+
+bool ideal(const plant_sim::PlantOptions& plant) { return plant.ideal_actuator || plant.ideal_sensors; }
+
+bool disturbed_road(const plant_sim::PlantOptions& plant) {
+  const plant_sim::DriftProfiles& drift = plant.drift;
+  return !plant.friction_profile.empty() || !drift.brake_torque.empty() || !drift.motor_torque.empty() ||
+         !drift.upper_bearing.empty() || !drift.lower_bearing.empty();
+}
+
+}  // namespace
+
+InstructionSet instruction_set() {
+  InstructionSet widest = InstructionSet::portable;
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx2") != 0) widest = InstructionSet::avx2;
+  if (__builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0)
+    widest = InstructionSet::avx512;
+#endif
+  const char* wanted = std::getenv("ABS_HIL_LANES");  // NOLINT(concurrency-mt-unsafe)
+  if (wanted == nullptr || *wanted == '\0') return widest;
+  constexpr const char* names[] = {"none", "portable", "avx2", "avx512"};
+  for (std::size_t i = 0; i < std::size(names); ++i) {
+    if (std::string(wanted) != names[i]) continue;
+    if (i > static_cast<std::size_t>(widest)) {
+      throw std::invalid_argument(std::string("ABS_HIL_LANES=") + wanted + ": this computer has no " + wanted +
+                                  "; leave ABS_HIL_LANES out");
+    }
+    return static_cast<InstructionSet>(i);
+  }
+  throw std::invalid_argument(std::string("ABS_HIL_LANES=") + wanted + ": give avx512, avx2, portable or none");
+}
+
+LaneSettings::LaneSettings(const config::Settings& settings) {
+  const double start_speed_rad_s = settings.experiment.start_speed_rad_s;
+  if (ideal(settings.plant) || settings.experiment.wait_for_start || !(start_speed_rad_s > 0.0)) return;
+  auto parts = std::make_unique<Parts>(Parts{.settings = settings});
+  try {
+    parts->controller = control::make_controller(settings.control.controller, {settings.control, settings.model});
+    if (!plan_sequence(config::plan(settings), settings, parts->sequence)) return;
+  } catch (const std::exception&) {
+    return;  // `simulate` says what is wrong
+  }
+  parts->period_ns = std::llround(1e9 / settings.control.rate_Hz);
+  parts->period_s = static_cast<double>(parts->period_ns) * rig::s_per_ns;
+  parts->duty_steps = driver::simulated_output_grid(settings.driver, false).duty_steps;
+  if (!plan_gate(*parts)) return;
+  parts->tracker = {settings.control.observer, settings.model.encoder_counts_per_rev};
+  parts->tracker.prepare(parts->period_s);
+  if (parts->tracker.must_restart()) return;
+  parts->actuator = {settings.model.brake, false, settings.gate.brake_duty_max,
+                     static_cast<std::uint32_t>(parts->duty_steps)};
+  parts->actuator.prepare(parts->period_s);
+  parts_ = std::move(parts);
+}
+
+LaneSettings::~LaneSettings() = default;
+
+std::uint32_t LaneSettings::window_cycles() const noexcept { return parts_ ? parts_->window_cycles : 0; }
+
+const Kind* LaneSettings::begin(const Job& job, std::vector<double>& words) const {
+  if (!parts_ || ideal(job.plant) || disturbed_road(job.plant)) return nullptr;
+  try {
+    plant_sim::check(job.plant);
+    const plant_sim::TyreModel tyres = plant_sim::make_tyre_model(job.plant);
+    for (const Kind* kind : kinds) {
+      if (kind->begin(*parts_, job, tyres, words)) return kind;
+    }
+  } catch (const std::exception&) {
+    // `simulate` says what is wrong.
+  }
+  return nullptr;
+}
+
+namespace {
+
+/// The plants of runs in which a wheel stands or stops, made when the first does.
+class StandingPlants {
+ public:
+  explicit StandingPlants(std::span<const Started> runs) : runs_(runs), plants_(runs.size()) {}
+
+  static void assist(void* self, std::uint32_t run, double duration_s, double duty, double* state) {
+    static_cast<StandingPlants*>(self)->integrate(run, duration_s, duty, state);
+  }
+
+ private:
+  struct Plant {
+    plant_sim::WheelModel model;
+    plant_sim::FactorProgress road;
+  };
+
+  void integrate(std::uint32_t run, double duration_s, double duty, double* state) {
+    const plant_sim::PlantOptions& options = runs_[run].job.plant;
+    if (!plants_[run]) {
+      const plant_sim::FactorProfile even(options.friction_profile);
+      plants_[run] = std::make_unique<Plant>(Plant{{options, even.highest()}, {even, options.rig.wheels.r2_m}});
+    }
+    plant_sim::StateVector x{};
+    std::copy_n(state, x.size(), x.begin());
+    const plant_sim::HeldTorques held = plant_sim::resolve(options, {.brake_duty = duty});
+    plant_sim::integrate(plants_[run]->model, options.max_step_s, held, duration_s, plants_[run]->road, x);
+    std::copy(x.begin(), x.end(), state);
+  }
+
+  std::span<const Started> runs_;
+  std::vector<std::unique_ptr<Plant>> plants_;
+};
+
+}  // namespace
+
+void go_on(const Kind& kind, InstructionSet set, std::span<Started> runs, std::uint32_t window_cycles) {
+  std::vector<double*> words;
+  for (Started& run : runs) words.push_back(run.words.data());
+  std::vector<std::uint32_t> next(runs.size());
+  StandingPlants standing(runs);
+  const auto choose = set == InstructionSet::avx512 ? kind.avx512
+                      : set == InstructionSet::avx2 ? kind.avx2
+                                                    : kind.portable;
+  choose()({.runs = words.data(),
+            .next = next.data(),
+            .count = static_cast<std::uint32_t>(runs.size()),
+            .window_cycles = window_cycles,
+            .assist = &StandingPlants::assist,
+            .context = &standing});
+}
+
+bool result_of(const Kind& kind, const double* words, RunResult& result) { return kind.result(words, result); }
+
+}  // namespace abs_hil::study::lanes

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace abs_hil::rig {
+struct Portable;
+struct Avx2;
+struct Avx512;
+}  // namespace abs_hil::rig
+
+/// The compiled loops over packs: one for each instruction set and each combination of law, tyre and load.
+namespace abs_hil::study::lanes {
+
+/// Runs in memory: each has the words of a BrakingRun<double> that has begun.
+struct LaneWork {
+  double* const* runs{nullptr};
+  std::uint32_t* next{nullptr};  ///< room for `count` links
+  std::uint32_t count{0};
+  std::uint32_t window_cycles{1};  ///< cycles of the gate's speed windows
+  /// Integrates the plant of a run over a cycle in which a wheel stands or stops, which lanes cannot.
+  /// @param state  of the plant, as plant_sim::StateVector
+  void (*assist)(void* context, std::uint32_t run, double duration_s, double duty, double* state){nullptr};
+  void* context{nullptr};
+};
+
+/// Goes on with every run until it is complete or disturbed.
+using LaneKernel = void (*)(const LaneWork& work);
+
+/// Combination of law, tyre and load as types, see lane_kinds.hpp.
+template <template <class> class Law, template <class> class Tyre, template <class> class Load>
+struct LaneKind;
+
+/// Defined in the sources that are compiled for `Isa` alone. Null if this program was not built for it.
+template <class Isa, class Kind>
+LaneKernel lane_kernel() noexcept;
+
+}  // namespace abs_hil::study::lanes

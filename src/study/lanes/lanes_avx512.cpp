@@ -1,0 +1,3 @@
+#define ABS_HIL_LANE_ISA Avx512
+#define ABS_HIL_LANE_VECTORS 2
+#include "study/lanes/lane_instances.hpp"

@@ -1,0 +1,204 @@
+#include <bit>
+#include <cstdlib>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "abs_hil/control/registry.hpp"
+#include "catch.hpp"
+#include "config/config_file.hpp"
+#include "config/key_table.hpp"
+#include "config/library.hpp"
+#include "study/batch.hpp"
+#include "study/lanes/lane_jobs.hpp"
+#include "study/variation.hpp"
+
+using namespace abs_hil;
+using namespace abs_hil::study;
+
+namespace {
+
+/// Chooses the lanes of `run_batch` as a user does.
+class Lanes {
+ public:
+  explicit Lanes(const char* set) { setenv("ABS_HIL_LANES", set, 1); }
+  ~Lanes() { unsetenv("ABS_HIL_LANES"); }
+  Lanes(const Lanes&) = delete;
+  Lanes& operator=(const Lanes&) = delete;
+};
+
+/// The instruction sets that this computer has.
+std::vector<const char*> sets() {
+  std::vector<const char*> all{"portable"};
+  for (const char* set : {"avx2", "avx512"}) {
+    const Lanes lanes(set);
+    try {
+      static_cast<void>(lanes::instruction_set());
+      all.push_back(set);
+    } catch (const std::invalid_argument&) {
+    }
+  }
+  return all;
+}
+
+bool same_bits(const RunResult& a, const RunResult& b) {
+  for (const auto& [name, field] : analysis::metric_fields) {
+    const double x = a.metrics.*field;
+    const double y = b.metrics.*field;
+    if (std::bit_cast<std::uint64_t>(x) != std::bit_cast<std::uint64_t>(y) && !(std::isnan(x) && std::isnan(y)))
+      return false;
+  }
+  return a.fault == b.fault;
+}
+
+struct Case {
+  config::Settings settings;
+  Job job;
+};
+
+config::Settings settings_of(const std::string& plant) {
+  config::Settings settings;
+  config::KeyTable keys(settings);
+  config::load_file(config::plant_file(plant), keys, config::Tables::of_plant);
+  return settings;
+}
+
+/// Random settings of everything that `compare` and studies vary, and of much that they do not.
+Case drawn_case(std::mt19937_64& generator, const std::vector<config::Settings>& plants) {
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  const auto chance = [&](double p) { return uniform(generator) < p; };
+  const auto scaled = [&](double& value, double most) {
+    value *= std::exp(std::log(most) * (2.0 * uniform(generator) - 1.0));
+  };
+  Case c{plants[generator() % plants.size()], {}};
+  config::Settings& s = c.settings;
+  const auto controllers = control::controllers();
+  s.control.controller = controllers[generator() % controllers.size()].name;
+  if (chance(0.4)) s.control.controller = "adaptive";
+  s.experiment.start_speed_rad_s = 20.0 + 200.0 * uniform(generator);
+  if (chance(0.3)) s.experiment.end_speed_m_s = 0.05 + 5.0 * uniform(generator);
+  if (chance(0.3)) s.control.slip_ref = 0.02 + 0.3 * uniform(generator);
+  if (chance(0.3)) scaled(s.control.adaptive.gamma, 10.0);
+  if (chance(0.2)) scaled(s.control.adaptive.ks1, 4.0);
+  if (chance(0.2)) scaled(s.control.adaptive.ka1, 10.0);
+  if (chance(0.2)) scaled(s.control.sliding_mode.gain_m_s2, 2.0);
+  if (chance(0.2)) scaled(s.control.observer.bandwidth_rad_s, 4.0);
+  if (chance(0.15)) s.control.rate_Hz = 200.0 + 2800.0 * uniform(generator);
+  if (chance(0.15)) s.model.encoder_counts_per_rev = 512 << (generator() % 6);
+  if (chance(0.15)) s.driver.sim.pwm_mode = "8-bit";
+  if (chance(0.1)) s.gate.brake_duty_max = 0.5 + 0.5 * uniform(generator);
+  if (chance(0.1)) s.gate.brake_rate_per_s = 1.0 + 100.0 * uniform(generator);
+  if (chance(0.05)) s.experiment.brake_limit_s = 0.2 + 2.0 * uniform(generator);
+  if (chance(0.1)) s.gate.overspeed_rad_s = 150.0;
+  if (chance(0.1)) s.experiment.hold_torque_Nm = 5.0 * uniform(generator);
+  s.plant.rig.encoder_counts_per_rev = s.model.encoder_counts_per_rev;
+
+  const Variation wide{.wheels = 0.3, .brake = 0.2, .tyre = 0.2, .theta = 0.3, .radii = 0.02, .phase = true};
+  c.job.plant = perturbed(s.plant, draw(chance(0.5) ? wide : Variation::standard(), generator(), 0));
+  c.job.seed = generator();
+  if (chance(0.1))
+    c.job.plant.friction_profile =
+        chance(0.5) ? "braking time: 1; 0.6 at 0.3" : "distance: 1; 0.7 at 2; 0.9 from 3 to 5";
+  if (chance(0.05)) c.job.plant.drift.brake_torque = "time: 1; 0.9 from 0.2 to 0.5";
+  if (chance(0.05)) c.job.plant.ideal_sensors = s.plant.ideal_sensors = true;
+  if (chance(0.05)) c.job.plant.ideal_actuator = s.plant.ideal_actuator = true;
+  if (chance(0.1)) c.job.plant.max_step_s = 50e-6 + 900e-6 * uniform(generator);
+  return c;
+}
+
+std::vector<Outcome> batch(const std::vector<Case>& cases, std::size_t threads, BatchCounts& counts,
+                           bool reversed = false) {
+  std::vector<Outcome> outcomes(cases.size());
+  const auto place = [&](std::size_t i) { return reversed ? cases.size() - 1 - i : i; };
+  counts = run_batch(
+      cases.size(), threads,
+      [&](std::size_t i) {
+        Job job = cases[place(i)].job;
+        job.settings = &cases[place(i)].settings;
+        return job;
+      },
+      [&](std::size_t i, Outcome outcome) { outcomes[place(i)] = std::move(outcome); });
+  return outcomes;
+}
+
+}  // namespace
+
+TEST_CASE("every run of a batch has the bits of simulate, whatever runs beside it") {
+  const std::vector<config::Settings> plants{settings_of("paper-table1"), settings_of("paper-timing"),
+                                             settings_of("inteco-manual")};
+  std::mt19937_64 generator(20261122);
+  std::vector<Case> cases;
+  for (int i = 0; i < 3000; ++i) cases.push_back(drawn_case(generator, plants));
+
+  BatchCounts none;
+  const std::vector<Outcome> alone = [&] {
+    const Lanes lanes("none");
+    return batch(cases, 2, none);
+  }();
+  CHECK(none.scalar == cases.size());
+  std::size_t stopped = 0;
+  std::size_t faults = 0;
+  for (const Outcome& outcome : alone) {
+    CHECK(outcome.refusal.empty());
+    (outcome.run.stopped() ? stopped : faults) += 1;
+  }
+  // Both kinds of end are tried.
+  CHECK(stopped > cases.size() / 2);
+  CHECK(faults > 20);
+
+  for (const char* set : sets()) {
+    const Lanes lanes(set);
+    BatchCounts counts;
+    const std::vector<Outcome> outcomes = batch(cases, 2, counts, std::string(set) != "portable");
+    INFO(set << ": " << counts.lanes << " in lanes, " << counts.disturbed << " disturbed, " << counts.scalar
+             << " scalar");
+    CHECK(counts.lanes + counts.disturbed + counts.scalar == cases.size());
+    CHECK(counts.lanes > 500);
+    CHECK(counts.disturbed > 10);
+    for (std::size_t i = 0; i < cases.size(); ++i) {
+      INFO(i << " " << cases[i].settings.control.controller);
+      REQUIRE(outcomes[i].refusal == alone[i].refusal);
+      REQUIRE(same_bits(outcomes[i].run, alone[i].run));
+    }
+  }
+}
+
+TEST_CASE("what becomes of a run does not depend on threads, order and number of runs") {
+  const config::Settings plant = settings_of("paper-table1");
+  std::vector<Case> cases(300, Case{plant, {}});
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    cases[i].settings.experiment.start_speed_rad_s = 60.0;
+    const Perturbation perturbation = draw(Variation::standard(), 9, i);
+    cases[i].job = {.plant = perturbed(plant.plant, perturbation), .seed = perturbation.sensor_seed};
+  }
+  BatchCounts counts;
+  const std::vector<Outcome> one = batch(cases, 1, counts);
+  CHECK(counts.lanes + counts.disturbed == cases.size());
+  const std::vector<Outcome> two = batch(cases, 2, counts, true);
+  const std::vector<Case> few(cases.begin(), cases.begin() + 3);
+  const std::vector<Outcome> three = batch(few, 1, counts);
+  for (std::size_t i = 0; i < cases.size(); ++i) CHECK(same_bits(one[i].run, two[i].run));
+  for (std::size_t i = 0; i < few.size(); ++i) CHECK(same_bits(one[i].run, three[i].run));
+}
+
+TEST_CASE("jobs that cannot run are refused one by one") {
+  config::Settings plant = settings_of("paper-table1");
+  std::vector<Case> cases(3, Case{plant, {}});
+  for (Case& c : cases) {
+    c.settings.experiment.start_speed_rad_s = 60.0;
+    c.job.plant = plant.plant;
+  }
+  cases[1].job.plant.rig.wheels.J1_kg_m2 = -1.0;
+  BatchCounts counts;
+  const std::vector<Outcome> outcomes = batch(cases, 1, counts);
+  CHECK(outcomes[0].refusal.empty());
+  CHECK_THAT(outcomes[1].refusal, Catch::Matchers::Contains("J1"));
+  CHECK(outcomes[2].refusal.empty());
+  CHECK(same_bits(outcomes[0].run, outcomes[2].run));
+}
+
+TEST_CASE("an unknown choice of lanes is refused by name") {
+  const Lanes lanes("sse9");
+  CHECK_THROWS_WITH(lanes::instruction_set(),
+                    Catch::Matchers::Contains("ABS_HIL_LANES=sse9") && Catch::Matchers::Contains("portable"));
+}
