@@ -32,7 +32,7 @@ class SlidingModeActuatorController final : public SlipController {
   rig::TyreParameters tyre_;
   SlidingModeActuatorOptions options_;
   BrakeLag lag_;
-  SlidingSurface surface_;
+  BasicSlidingSurface<double> surface_;
   WheelForceObserver wheels_observer_;
   double v_min_m_s_;
 };
