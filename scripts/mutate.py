@@ -137,7 +137,7 @@ class Bench:
         (folder / 'headers.hpp').write_text('#include <algorithm>\n#include <array>\n#include <atomic>\n#include <cmath>\n'
                                             '#include <utility>\n#include "runtime/command_gate.hpp"\n'
                                             '#include "abs_hil/rig/brake_map.hpp"\n'
-                                            '#include "abs_hil/rig/encoder_scale.hpp"\n')
+                                            '#include "rig/encoder_scale.hpp"\n')
         require(run_quietly(*COMPILE, '-w', '-x', 'c++-header', folder / 'headers.hpp', '-o',
                             folder / 'headers.hpp.gch'))
         self.objects = {name: folder / f'{name}.o' for name in SOURCES}

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "abs_hil/rig/encoder_scale.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 #include "analysis/json_number.hpp"
+#include "rig/encoder_scale.hpp"
 
 namespace abs_hil::analysis {
 

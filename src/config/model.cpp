@@ -4,8 +4,8 @@
 
 #include <variant>
 
-#include "abs_hil/rig/encoder_scale.hpp"
 #include "config/key_table.hpp"
+#include "rig/encoder_scale.hpp"
 
 namespace abs_hil::config {
 

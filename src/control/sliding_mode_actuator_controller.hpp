@@ -1,8 +1,8 @@
 #pragma once
 
-#include "control/wheel_motion.hpp"
 #include "control/sliding_surface.hpp"
 #include "control/wheel_force_observer.hpp"
+#include "control/wheel_motion.hpp"
 
 namespace abs_hil::control {
 

@@ -4,8 +4,8 @@
 #include <type_traits>
 
 #include "abs_hil/control/options.hpp"
-#include "abs_hil/rig/encoder_scale.hpp"
 #include "abs_hil/rig/scalar.hpp"
+#include "rig/encoder_scale.hpp"
 
 namespace abs_hil::control {
 

@@ -3,7 +3,7 @@
 #include <Eigen/LU>
 #include <stdexcept>
 
-#include "abs_hil/rig/encoder_scale.hpp"
+#include "rig/encoder_scale.hpp"
 
 namespace abs_hil::control {
 namespace {
@@ -75,7 +75,7 @@ BasicWheelForceObserver<S>::BasicWheelForceObserver(const ForceObserverOptions& 
   Q(5, 5) = options.brake_rate_Nm2_s * dt;
   const double count_rad = rig::radians_per_count(rig.encoder_counts_per_rev);
   const Gain gain = steady_gain(A, Q, count_rad * count_rad / 12.0);
-  for (std::size_t i = 0; i < state_.size(); ++i) {
+  for (std::size_t i = 0; i != state_.size(); ++i) {
     upper_gain_[i] = gain(static_cast<Eigen::Index>(i), 0);
     lower_gain_[i] = gain(static_cast<Eigen::Index>(i), 1);
   }

@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "abs_hil/rig/command.hpp"
-#include "abs_hil/rig/encoder_scale.hpp"
 #include "abs_hil/rig/time_units.hpp"
+#include "rig/encoder_scale.hpp"
 
 namespace abs_hil::driver {
 

@@ -5,8 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "abs_hil/rig/encoder_scale.hpp"
 #include "abs_hil/rig/time_units.hpp"
+#include "rig/encoder_scale.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::experiment {

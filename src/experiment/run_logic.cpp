@@ -6,9 +6,9 @@
 
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/rig/brake_map.hpp"
-#include "abs_hil/rig/encoder_scale.hpp"
 #include "abs_hil/rig/time_units.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
+#include "rig/encoder_scale.hpp"
 #include "rig/stamp_error.hpp"
 
 namespace abs_hil::experiment {

@@ -3,7 +3,7 @@
 #include <bit>
 #include <cmath>
 
-#include "abs_hil/rig/encoder_scale.hpp"
+#include "rig/encoder_scale.hpp"
 
 namespace abs_hil::plant_sim {
 

@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "abs_hil/rig/brake_map.hpp"
-#include "abs_hil/rig/encoder_scale.hpp"
+#include "rig/encoder_scale.hpp"
 
 namespace abs_hil::runtime {
 

@@ -4,9 +4,9 @@
 #include <numbers>
 #include <vector>
 
-#include "abs_hil/rig/encoder_scale.hpp"
 #include "catch.hpp"
 #include "driver/sim/sim_driver.hpp"
+#include "rig/encoder_scale.hpp"
 
 using namespace abs_hil::driver;
 using abs_hil::plant_sim::PlantOptions;

@@ -6,9 +6,9 @@
 #include <memory>
 #include <utility>
 
-#include "abs_hil/rig/encoder_scale.hpp"
 #include "catch.hpp"
 #include "control/tracking_observer.hpp"
+#include "rig/encoder_scale.hpp"
 #include "simulated_run.hpp"
 
 using namespace abs_hil;

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <limits>
 
-#include "abs_hil/rig/encoder_scale.hpp"
 #include "catch.hpp"
+#include "rig/encoder_scale.hpp"
 
 using abs_hil::plant_sim::encoder_counts;
 using abs_hil::rig::counts_between;

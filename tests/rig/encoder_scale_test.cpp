@@ -1,4 +1,4 @@
-#include "abs_hil/rig/encoder_scale.hpp"
+#include "rig/encoder_scale.hpp"
 
 #include <cstdint>
 #include <limits>

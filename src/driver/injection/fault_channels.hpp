@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "abs_hil/rig/encoder_scale.hpp"
 #include "driver/injection/injection.hpp"
+#include "rig/encoder_scale.hpp"
 
 // The effect of an injected fault on one signal. All functions except the constructors are real-time safe.
 namespace abs_hil::driver {

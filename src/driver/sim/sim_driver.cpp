@@ -6,9 +6,9 @@
 #include <stdexcept>
 #include <string>
 
-#include "abs_hil/rig/encoder_scale.hpp"
 #include "driver/plausibility.hpp"
 #include "plant_sim/encoder.hpp"
+#include "rig/encoder_scale.hpp"
 
 namespace abs_hil::driver {
 namespace {

@@ -48,7 +48,7 @@ ControllerModel::ControllerModel() {
   add(Causality::output, "theta_est_N", {.unit = "N", .meaning = "estimated peak tyre force; 0 if the law has none"},
       &theta_est_N_);
   add(Causality::output, "brake_torque_est_Nm", {.unit = "N m", .meaning = "brake torque estimated to act"},
-      &brake_torque_est_Nm_);
+      &estimated_torque_Nm_);
 }
 
 void ControllerModel::start(double time_s) {
@@ -63,7 +63,7 @@ void ControllerModel::start(double time_s) {
   parts.duty_steps = grid_.any_brake_duty ? 0 : grid_.duty_steps;
   logic_ = std::make_unique<experiment::RunLogic>(std::move(parts));
   start_s_ = time_s_ = time_s;
-  brake_torque_ref_Nm_ = brake_duty_ = brake_torque_est_Nm_ = slip_est_ = theta_est_N_ = 0.0;
+  brake_torque_ref_Nm_ = brake_duty_ = estimated_torque_Nm_ = slip_est_ = theta_est_N_ = 0.0;
   omega1_est_rad_s_ = omega2_est_rad_s_ = experiment.start_speed_rad_s;
 }
 
@@ -93,7 +93,7 @@ void ControllerModel::step(double duration_s) {
   omega2_est_rad_s_ = record.control.speeds_est.omega2_rad_s;
   slip_est_ = record.control.slip_est;
   theta_est_N_ = std::isnan(record.control.theta_est_N) ? 0.0 : record.control.theta_est_N;
-  brake_torque_est_Nm_ = record.control.brake_torque_est_Nm;
+  estimated_torque_Nm_ = record.control.brake_torque_est_Nm;
 }
 
 }  // namespace abs_hil::interchange::fmu

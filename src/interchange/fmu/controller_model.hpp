@@ -49,7 +49,7 @@ class ControllerModel final : public Model {
   double omega2_est_rad_s_{0.0};
   double slip_est_{0.0};
   double theta_est_N_{0.0};
-  double brake_torque_est_Nm_{0.0};
+  double estimated_torque_Nm_{0.0};
 };
 
 }  // namespace abs_hil::interchange::fmu

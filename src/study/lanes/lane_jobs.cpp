@@ -11,12 +11,12 @@
 #include <variant>
 
 #include "abs_hil/control/registry.hpp"
-#include "abs_hil/rig/encoder_scale.hpp"
 #include "config/plan.hpp"
 #include "driver/factory.hpp"
 #include "driver/sim/sim_driver.hpp"
 #include "plant_sim/stepping.hpp"
 #include "plant_sim/torque_balance.hpp"
+#include "rig/encoder_scale.hpp"
 #include "runtime/plausibility_limits.hpp"
 #include "study/lanes/braking_run.hpp"
 #include "study/lanes/lane_kinds.hpp"

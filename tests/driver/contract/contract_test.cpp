@@ -3,9 +3,9 @@
 #include <limits>
 #include <numbers>
 
-#include "abs_hil/rig/encoder_scale.hpp"
 #include "bench.hpp"
 #include "catch.hpp"
+#include "rig/encoder_scale.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;

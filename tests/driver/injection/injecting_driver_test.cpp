@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "abs_hil/rig/encoder_scale.hpp"
 #include "catch.hpp"
+#include "rig/encoder_scale.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::driver;
