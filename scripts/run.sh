@@ -19,11 +19,10 @@ if [ $# -eq 0 ]; then
   arguments=(--backend sim --out "$folder")
 fi
 says_lcm=no
+case "${arguments[0]}" in -*) ;; *) says_lcm=yes ;; esac  # a subcommand
 for argument in "${arguments[@]}"; do
   case "$argument" in
     --no-lcm | --lcm-url | --lcm-url=* | --fast | --help | --version) says_lcm=yes ;;
-    list | doctor | latency | compare | validate | commission | watch | send | replay | convert) says_lcm=yes ;;
-    report | tune | learn) says_lcm=yes ;;
   esac
 done
 if [ "$says_lcm" = no ] && ! "$program" doctor --only lcm; then

@@ -3,11 +3,10 @@
 #include <type_traits>
 
 #include "abs_hil/rig/scalar.hpp"
+#include "runtime/asked_lanes.hpp"
 #include "runtime/speed_window.hpp"
 
 namespace abs_hil::runtime {
-
-// GCOVR_EXCL_BR: branches of a pack alone; for one run the condition is known there.
 
 /// Checks that motor and brake have the effect that their commands should have, by the momentum
 /// p = J1 w1 / r1 + J2 w2 / r2 of both wheels. The tyre force cancels in p, on any road:
@@ -23,6 +22,7 @@ class MomentumWatch {
         J2_per_r2_kg_m_(limits.wheels.J2_kg_m2 / limits.wheels.r2_m),
         r1_m_(limits.wheels.r1_m),
         r2_m_(limits.wheels.r2_m),
+        half_rolling_(0.5 * limits.wheels.r2_m / limits.wheels.r1_m),
         d2_Nms_rad_(limits.wheels.d2_Nms_rad),
         M20_Nm_(limits.wheels.M20_Nm),
         stall_torque_Nm_(limits.motor.stall_torque_Nm),
@@ -46,15 +46,14 @@ class MomentumWatch {
     if (!rig::any(lasts)) return lasts;
     now_.end_error_s = speed_window.end_error_s;
     now_.counts_rad = speed_window.resolution_rad_s * speed_window.dt_s;
-    // GCOVR_EXCL_BR_START
-    return lasts && !(now_.lasted_s < longest_window_s && slack_kg_m_s(now_) > slack_N * now_.lasted_s);
-    // GCOVR_EXCL_BR_STOP
+    const auto uncertain = now_.lasted_s < longest_window_s && slack_kg_m_s(now_) > slack_N * now_.lasted_s;
+    return where_asked(lasts, !uncertain);
   }
-  /// Compares the windows that end with those before them.
+  /// Compares the windows that end with those before them. @param ends  what `take` said, true in any lane
   template <class Condition>
   [[nodiscard]] auto conclude(const Condition& ends) noexcept {
     auto verdict = judge(before_, now_);
-    verdict.due = ends && before_.lasted_s > 0.0;  // GCOVR_EXCL_BR_LINE
+    verdict.due = where_asked(ends, before_.lasted_s > 0.0);
     before_ = chosen(ends, now_, before_);
     now_ = chosen(ends, Window{}, now_);
     return verdict;
@@ -73,8 +72,8 @@ class MomentumWatch {
     S lasted_s{0.0};
     S travel_kg_m{0.0};    ///< integral of p
     S upper_kg_m{0.0};     ///< the upper wheel's part of it, while the wheels are apart
-    S motor_kg_m_s{0.0};   ///< impulse that the motor should give, less twice the friction
-    S brake_kg_m_s{0.0};   ///< impulse that the brake should take
+    S motor_Nms{0.0};      ///< integral of the torque that the motor should give, less twice the friction
+    S brake_Nms{0.0};      ///< integral of the brake torque expected
     S begin_error_s{0.0};  ///< uncertainty of the stamps at its ends
     S end_error_s{0.0};
     S counts_rad{0.0};  ///< two counts
@@ -84,15 +83,15 @@ class MomentumWatch {
     S rolls{1.0};      ///< 1: the upper wheel's speed is at least half of rolling speed
     S apart{0.0};      ///< 1: the wheels were apart in some of it
   };
-  /// `a` where the condition holds, else `b`.
+  /// `a` where the window ends, else `b`.
   template <class Condition>
-  [[nodiscard]] static Window chosen(const Condition& condition, const Window& a, const Window& b) noexcept {
+  [[nodiscard]] static Window chosen(const Condition& ends, const Window& a, const Window& b) noexcept {
     Window window;
     for (S Window::*sum :
-         {&Window::lasted_s, &Window::travel_kg_m, &Window::upper_kg_m, &Window::motor_kg_m_s, &Window::brake_kg_m_s,
+         {&Window::lasted_s, &Window::travel_kg_m, &Window::upper_kg_m, &Window::motor_Nms, &Window::brake_Nms,
           &Window::begin_error_s, &Window::end_error_s, &Window::counts_rad, &Window::least_brake_Nm,
           &Window::most_brake_Nm, &Window::most_duty, &Window::rolls, &Window::apart}) {
-      window.*sum = rig::select(condition, a.*sum, b.*sum);  // GCOVR_EXCL_BR_LINE
+      window.*sum = where_asked(ends, a.*sum, b.*sum);
     }
     return window;
   }
@@ -109,6 +108,7 @@ class MomentumWatch {
   S J2_per_r2_kg_m_{0.0};
   S r1_m_{0.0};
   S r2_m_{0.0};
+  S half_rolling_{0.0};  ///< half of the ratio of the upper wheel's speed to the lower one's while both roll
   S d2_Nms_rad_{0.0};
   S M20_Nm_{0.0};
   S stall_torque_Nm_{0.0};
@@ -127,21 +127,19 @@ void MomentumWatch<S>::add(const BasicSpeedWindow<S>& s, const S& brake_Nm) noex
   const S friction_Nm = M20_Nm_ + d2_Nms_rad_ * s.omega2_rad_s;
   const auto begins = now_.lasted_s == 0.0;
   if (rig::any(begins)) [[unlikely]]
-    now_.begin_error_s = rig::select(begins, s.begin_error_s, now_.begin_error_s);  // GCOVR_EXCL_BR_LINE
+    now_.begin_error_s = where_asked(begins, s.begin_error_s, now_.begin_error_s);
   now_.lasted_s += s.dt_s;
   now_.travel_kg_m += p_kg_m_s * s.dt_s;
-  now_.motor_kg_m_s += (motor_Nm - friction_margin * friction_Nm) / r2_m_ * s.dt_s;
-  now_.brake_kg_m_s += brake_Nm / r1_m_ * s.dt_s;
+  now_.motor_Nms += (motor_Nm - friction_margin * friction_Nm) * s.dt_s;
+  now_.brake_Nms += brake_Nm * s.dt_s;
   now_.least_brake_Nm = rig::smaller(now_.least_brake_Nm, brake_Nm);
   now_.most_brake_Nm = rig::larger(now_.most_brake_Nm, brake_Nm);
   now_.most_duty = rig::larger(now_.most_duty, s.motor_duty);
-  now_.rolls = rig::select(r1_m_ * s.omega1_rad_s >= 0.5 * (r2_m_ * s.omega2_rad_s), now_.rolls, S(0.0));
+  now_.rolls = rig::select(s.omega1_rad_s >= half_rolling_ * s.omega2_rad_s, now_.rolls, S(0.0));
   const auto apart = apart_ > 0.0;
   if (rig::any(apart)) [[unlikely]] {
-    now_.apart = rig::select(apart, S(1.0), now_.apart);  // GCOVR_EXCL_BR_LINE
-    // GCOVR_EXCL_BR_START
-    now_.upper_kg_m = rig::select(apart, S(now_.upper_kg_m + p1_kg_m_s * s.dt_s), now_.upper_kg_m);
-    // GCOVR_EXCL_BR_STOP
+    now_.apart = where_asked(apart, S(1.0), now_.apart);
+    now_.upper_kg_m = where_asked(apart, S(now_.upper_kg_m + p1_kg_m_s * s.dt_s), now_.upper_kg_m);
   }
 }
 
@@ -158,8 +156,8 @@ auto MomentumWatch<S>::judge(const Window& before, const Window& now) const noex
   const S p_kg_m_s = now.travel_kg_m / now.lasted_s;
   const S gained_kg_m_s = p_kg_m_s - before.travel_kg_m / before.lasted_s;
   const S slack_sum_kg_m_s = slack_kg_m_s(before) + slack_kg_m_s(now);
-  const S motor_kg_m_s = 0.5 * (before.motor_kg_m_s + now.motor_kg_m_s);
-  const S brake_kg_m_s = 0.5 * (before.brake_kg_m_s + now.brake_kg_m_s);
+  const S motor_kg_m_s = 0.5 * (before.motor_Nms + now.motor_Nms) / r2_m_;
+  const S brake_kg_m_s = 0.5 * (before.brake_Nms + now.brake_Nms) / r1_m_;
   const auto motor_off = before.most_duty == 0.0 && now.most_duty == 0.0;
   const auto brake_idle = rig::larger(before.most_brake_Nm, now.most_brake_Nm) < idle_brake_Nm;
   // A brake can take from a wheel alone what this wheel has. One that has more left cannot have stopped meanwhile.

@@ -1,15 +1,13 @@
 #pragma once
 
-#include <limits>
 #include <type_traits>
 
 #include "abs_hil/rig/scalar.hpp"
+#include "runtime/asked_lanes.hpp"
 #include "runtime/plausibility_limits.hpp"
 #include "runtime/speed_window.hpp"
 
 namespace abs_hil::runtime {
-
-// GCOVR_EXCL_BR: branches of a pack alone; for one run the condition is known there.
 
 /// The speeds that one wheel can have. The interval widens as fast as physics lets the wheel gain and lose speed, and
 /// each reading inside narrows it. `S` is a `double`, or a pack of them (rig/scalar.hpp). Real-time safe.
@@ -35,14 +33,10 @@ class SpeedBounds {
     const auto inside = omega_rad_s + slack_rad_s >= low_rad_s_ && omega_rad_s - slack_rad_s <= high_rad_s_;
     if (!rig::any(inside)) return inside;
     // The reading is a mean over dt. At its end the wheel may be faster or slower by what dt allows.
-    low_rad_s_ =
-        // GCOVR_EXCL_BR_START
-        rig::select(inside, rig::larger(low_rad_s_, S(omega_rad_s - slack_rad_s - loss_rad_s2_ * dt_s)), low_rad_s_);
-    // GCOVR_EXCL_BR_STOP
-    high_rad_s_ =
-        // GCOVR_EXCL_BR_START
-        rig::select(inside, rig::smaller(high_rad_s_, S(omega_rad_s + slack_rad_s + gain_rad_s2_ * dt_s)), high_rad_s_);
-    // GCOVR_EXCL_BR_STOP
+    const S low_rad_s = rig::larger(low_rad_s_, S(omega_rad_s - slack_rad_s - loss_rad_s2_ * dt_s));
+    const S high_rad_s = rig::smaller(high_rad_s_, S(omega_rad_s + slack_rad_s + gain_rad_s2_ * dt_s));
+    low_rad_s_ = where_asked(inside, low_rad_s, low_rad_s_);
+    high_rad_s_ = where_asked(inside, high_rad_s, high_rad_s_);
     return inside;
   }
 
@@ -60,7 +54,7 @@ class WheelWatch {
   WheelWatch() = default;
   explicit WheelWatch(const PlausibilityLimits& limits) noexcept
     requires std::is_same_v<S, double>
-      : c31_per_s_(limits.ideal_actuator ? std::numeric_limits<double>::infinity() : limits.brake.c31_per_s),
+      : c31_per_s_(limits.ideal_actuator ? at_once_per_s : limits.brake.c31_per_s),
         r1_m_(limits.wheels.r1_m),
         r2_m_(limits.wheels.r2_m),
         released_brake_Nm_(limits.released_brake_Nm),
@@ -76,11 +70,7 @@ class WheelWatch {
     constexpr double earnest_brake_Nm = 1.0;
     // (6) by the implicit Euler rule. Its relative error is the speed window's share of the lag, 4 %.
     const S share = c31_per_s_ * window.dt_s;
-    const S lagging_Nm = (brake_Nm_ + share * window.brake_target_Nm) / (1.0 + share);
-    const auto ideal = !(c31_per_s_ < std::numeric_limits<double>::infinity());
-    brake_Nm_ = lagging_Nm;
-    if (rig::any(ideal)) [[unlikely]]
-      brake_Nm_ = rig::select(ideal, window.brake_target_Nm, lagging_Nm);  // GCOVR_EXCL_BR_LINE
+    brake_Nm_ = (brake_Nm_ + share * window.brake_target_Nm) / (1.0 + share);
     free_s_ = rig::select(window.brake_target_Nm > 0.0, S(0.0), S(free_s_ + window.dt_s));
     braked_s_ = rig::select(brake_Nm_ >= earnest_brake_Nm, S(braked_s_ + window.dt_s), S(0.0));
   }
@@ -111,7 +101,8 @@ class WheelWatch {
     const S v1_m_s = r1_m_ * window.omega1_rad_s;
     const S v2_m_s = r2_m_ * window.omega2_rad_s;
     const S stamps_m_s = (rig::magnitude(v1_m_s) + rig::magnitude(v2_m_s)) * window.stamp_error_s() / window.dt_s;
-    return braked || rig::magnitude(S(v1_m_s - v2_m_s)) + stamps_m_s <= allowed_m_s(window);  // GCOVR_EXCL_BR_LINE
+    const auto agree = rig::magnitude(S(v1_m_s - v2_m_s)) + stamps_m_s <= allowed_m_s(window);
+    return !where_asked(!braked, !agree);
   }
   [[nodiscard]] auto quiet_slip(const BasicSpeedWindow<S>& window) const noexcept {
     constexpr double braked_after_s = 0.15;
@@ -126,7 +117,10 @@ class WheelWatch {
   [[nodiscard]] S brake_Nm() const noexcept { return brake_Nm_; }
 
  private:
-  S c31_per_s_{0.0};  ///< infinite for an ideal actuator
+  /// Lag of an ideal actuator: after any window the rest of the torque before is below a bit of the new one.
+  static constexpr double at_once_per_s = 1e24;
+
+  S c31_per_s_{0.0};
   S r1_m_{0.0};
   S r2_m_{0.0};
   S released_brake_Nm_{0.0};

@@ -5,8 +5,8 @@
 
 namespace example {
 
-/// The example of docs/writing-a-controller.md. Proportional to the slip error, about the torque that is known to hold
-/// the wanted slip roughly:
+/// The example of docs/writing-a-controller.md. A torque that roughly holds the wanted slip, and a
+/// part in proportion to the slip error:
 ///   Tb = base + gain (slip_ref - slip)
 struct ProportionalOptions {
   double base_Nm{2.0};   ///< torque at the wanted slip, >= 0

@@ -1,16 +1,20 @@
-"""Controllers from FMUs: one of ours, one that FMPy exports (a container), and FMUs that do not fit. usage: see foreign.py"""
+"""Controllers from FMUs: one of ours, those of two other exporters, and FMUs that do not fit. usage: see foreign.py"""
 import io
 import os
+import pathlib
 import stat
 import sys
+import sysconfig
 import unittest
+import unittest.mock
 import zipfile
 
-from foreign import broken  # first: it reads the arguments
+from foreign import SOURCE, broken, compiled  # first: it reads the arguments
 from rig_emulator import RigTest, why_not
 
 try:
     from fmpy.fmucontainer import Component, Configuration, DefaultExperiment, Variable, create_fmu_container
+    from pythonfmu.builder import FmuBuilder
 except ImportError as error:
     print(f'SKIPPED: {error}: scripts/setup_python.sh')
     sys.exit(77)
@@ -61,11 +65,31 @@ class ForeignFmu(RigTest):
 
     def test_an_fmu_of_another_exporter(self):
         names = self.mapping('[inputs]\nw1 = "omega1_rad_s"\nw2 = "omega2_rad_s"\n[outputs]\nTb = "brake_torque_Nm"\n')
-        own, its = self.stop('--controller', 'adaptive'), self.stop('--controller', self.container(), *names)
+        path, unpacked = self.container(), self.folder / 'unpacked'
+        unpacked.mkdir()
+        with unittest.mock.patch.dict(os.environ, TMPDIR=str(unpacked)):
+            own, its = self.stop('--controller', 'adaptive'), self.stop('--controller', path, *names)
         print(f'container: {its["stop_distance_m"]} m, adaptive {own["stop_distance_m"]} m')
         self.assertAlmostEqual(its['stop_distance_m'] / own['stop_distance_m'], 1.0, delta=0.001)
-        self.assertEqual(len([path for path in os.listdir('/tmp') if path.startswith('abs_hil_fmu.')
-                              and os.stat(f'/tmp/{path}').st_ctime > os.stat(self.folder / 'map.toml').st_ctime]), 0)
+        self.assertEqual(os.listdir(unpacked), [])
+
+    def test_a_law_in_python(self):
+        """PythonFMU's library, and no line of ours: the law stops where the same law in C stops."""
+        FmuBuilder.build_FMU(SOURCE / 'tests/interchange/proportional_law.py', dest=self.folder)
+        made = self.folder / 'ProportionalLaw.fmu'
+        names = self.mapping('[inputs]\nlam = "slip"\n[outputs]\nTb = "brake_torque_Nm"\n[parameters]\nwanted = 0.3\n')
+        self.refused(made, 'needs the tool that made it', options=names)
+
+        def with_its_tool(entry, data):
+            return [(entry, data.replace(b'needsExecutionTool="true"', b'needsExecutionTool="false"'))]
+        # Its library takes Python's functions from the program around it.
+        python = pathlib.Path(sysconfig.get_config_var('LIBDIR'), sysconfig.get_config_var('INSTSONAME'))
+        with unittest.mock.patch.dict(os.environ, LD_PRELOAD=str(python)):
+            its = self.stop('--controller', self.edited(with_its_tool, source=made), *names)
+        same = compiled(self.folder, SOURCE / 'tests/interchange/proportional_law.c', 'proportional')
+        own = self.stop('--controller', same)
+        print(f'Python: {its["stop_distance_m"]} m, C: {own["stop_distance_m"]} m')
+        self.assertEqual(its['stop_distance_m'], own['stop_distance_m'])
 
     @unittest.skipIf(why_not(), why_not())
     def test_on_the_emulated_card_in_real_time(self):
