@@ -2,8 +2,8 @@
 """usage: mutate.py [--list] [--jobs N] [--only FILE] [--report FILE]
 
 Mutation run of the command gate and its plausibility checks. The script changes one place at a time in their sources (a
-relation, an operator, a constant, a condition, a statement left out), compiles only that file without optimisation,
-links it with the test `gate` and runs the test. A mutant that the tests do not notice survives. mutate_equivalent.txt
+relation, an operator, a constant, a condition, a statement left out), compiles only that file or, for a header, the
+source that uses it, without optimisation, links it with the test `gate` and runs the test. A mutant that the tests do not notice survives. mutate_equivalent.txt
 must list each survivor with the reason why it changes nothing. Status 1 if a survivor is not listed or a listed mutant
 is killed.
 
@@ -21,6 +21,9 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 SOURCES = ['command_gate', 'speed_window', 'encoder_check', 'response_check', 'plausibility_limits']
+# File -> the source that is compiled for its mutants.
+FILES = {f'{name}.cpp': name for name in SOURCES} | {'speed_window.hpp': 'speed_window', 'wheel_watch.hpp': 'encoder_check',
+                                                     'response_check.hpp': 'response_check'}
 TESTS = sorted((ROOT / 'tests/runtime/gate').glob('*_test.cpp'))
 COMPILE = ['g++', '-std=c++20', '-O0', '-fPIC', '-I', ROOT / 'include', '-I', ROOT / 'src', '-I', ROOT / 'tests']
 
@@ -40,7 +43,7 @@ def code_of(text):
 
 def mutants_of(name):
     """Yields (line number, what, mutated text)."""
-    text = (ROOT / 'src/runtime' / f'{name}.cpp').read_text()
+    text = (ROOT / 'src/runtime' / name).read_text()
     code = code_of(text)
     begin = code.index('namespace abs_hil::runtime {')
 
@@ -93,10 +96,11 @@ def mutants_of(name):
         start, end = match.span()
         if start >= begin:
             yield at(start, end, {'true': 'false', 'false': 'true'}[match.group()], f'{match.group()} turned round')
-    for match in re.finditer(r'std::(min|max)\(', code):
+    other = {'min': 'max', 'max': 'min', 'smaller': 'larger', 'larger': 'smaller'}
+    for match in re.finditer(r'(?:std|rig)::(min|max|smaller|larger)\(', code):
         start, end = match.span(1)
         if start >= begin:
-            new = {'min': 'max', 'max': 'min'}[match.group(1)]
+            new = other[match.group(1)]
             yield at(start, end, new, f'{match.group(1)} -> {new}')
     # A condition that is always or never true.
     for match in re.finditer(r'\bif \(', code):
@@ -134,10 +138,11 @@ class Bench:
 
     def __init__(self, folder):
         self.folder = folder
-        (folder / 'headers.hpp').write_text('#include <algorithm>\n#include <array>\n#include <atomic>\n#include <cmath>\n'
-                                            '#include <utility>\n#include "runtime/command_gate.hpp"\n'
-                                            '#include "abs_hil/rig/brake_map.hpp"\n'
-                                            '#include "rig/encoder_scale.hpp"\n')
+        # None of FILES may be among these: a mutated header has to be read anew.
+        headers = ('<algorithm>', '<array>', '<atomic>', '<cmath>', '<utility>', '"abs_hil/rig/brake_map.hpp"',
+                   '"abs_hil/rig/command.hpp"', '"abs_hil/rig/measurement.hpp"', '"abs_hil/rig/scalar.hpp"',
+                   '"rig/encoder_scale.hpp"', '"runtime/plausibility_limits.hpp"')
+        (folder / 'headers.hpp').write_text(''.join(f'#include {header}\n' for header in headers))
         require(run_quietly(*COMPILE, '-w', '-x', 'c++-header', folder / 'headers.hpp', '-o',
                             folder / 'headers.hpp.gch'))
         self.objects = {name: folder / f'{name}.o' for name in SOURCES}
@@ -155,11 +160,13 @@ class Bench:
         if self.run(self.place) != 0:
             sys.exit('the tests fail without any mutation')
 
-    def compile(self, source, target):
-        return run_quietly(*COMPILE, '-w', '-include', self.folder / 'headers.hpp', '-c', source, '-o', target)
+    def compile(self, source, target, *includes):
+        return run_quietly(*COMPILE[:4], *(f'-I{folder}' for folder in includes), *COMPILE[4:], '-w', '-include',
+                           self.folder / 'headers.hpp', '-c', source, '-o', target)
 
     def link(self, objects, place):
-        return run_quietly('g++', '-shared', '-o', place / 'libgate.so', *objects)
+        # The library calls its own functions of the headers, not those that the tests have compiled too.
+        return run_quietly('g++', '-shared', '-Wl,-Bsymbolic', '-o', place / 'libgate.so', *objects)
 
     def run(self, place):
         try:
@@ -171,10 +178,13 @@ class Bench:
         place = self.folder / str(number)
         place.mkdir()
         try:
-            (place / 'mutant.cpp').write_text(mutated)
-            if self.compile(place / 'mutant.cpp', place / 'mutant.o').returncode:
+            (place / 'runtime').mkdir()
+            (place / 'runtime' / name).write_text(mutated)
+            changed = place / 'runtime' / name
+            source = changed if changed.suffix == '.cpp' else ROOT / 'src/runtime' / f'{FILES[name]}.cpp'
+            if self.compile(source, place / 'mutant.o', place).returncode:
                 return 'not compilable'
-            others = [path for other, path in self.objects.items() if other != name]
+            others = [path for other, path in self.objects.items() if other != FILES[name]]
             if self.link([place / 'mutant.o', *others], place).returncode:
                 return 'not compilable'
             return 'killed' if self.run(place) else 'survived'
@@ -196,14 +206,14 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--list', action='store_true', help='show the mutants and end')
     parser.add_argument('--jobs', type=int, default=max(1, (os.cpu_count() or 2) - 1))
-    parser.add_argument('--only', choices=SOURCES)
+    parser.add_argument('--only', choices=FILES)
     parser.add_argument('--report', type=pathlib.Path, help='write the counts as a Markdown table')
     arguments = parser.parse_args()
-    names = [arguments.only] if arguments.only else SOURCES
+    names = [arguments.only] if arguments.only else list(FILES)
     mutants = [(name, *mutant) for name in names for mutant in mutants_of(name)]
     if arguments.list:
         for name, line, what, _ in mutants:
-            print(f'{name}.cpp:{line}: {what}')
+            print(f'{name}:{line}: {what}')
         print(len(mutants))
         return 0
     known = equivalents()
@@ -217,14 +227,14 @@ def main():
             results = [(m, pool.submit(bench.verdict, i, m[0], m[3])) for i, m in enumerate(mutants)]
             for (name, line, what, _), future in results:
                 result = future.result()
-                text = (ROOT / 'src/runtime' / f'{name}.cpp').read_text().splitlines()[line - 1].strip()
+                text = (ROOT / 'src/runtime' / name).read_text().splitlines()[line - 1].strip()
                 key = (name, text, what)
                 if result == 'survived' and key in known:
                     used.add(key)
                     result = 'equivalent'
                 elif result == 'survived':
                     bad += 1
-                    print(f'SURVIVED {name}.cpp:{line}: {what}: {text}', flush=True)
+                    print(f'SURVIVED {name}:{line}: {what}: {text}', flush=True)
                 counts[name][result] += 1
     for key in known:
         if key[0] in names and key not in used:
@@ -234,7 +244,7 @@ def main():
     for name in names:
         c = counts[name]
         total = c['killed'] + c['equivalent'] + c['survived']
-        table += f'| `{name}.cpp` | {total} | {c["killed"]} | {c["equivalent"]} | {c["survived"]} |\n'
+        table += f'| `{name}` | {total} | {c["killed"]} | {c["equivalent"]} | {c["survived"]} |\n'
     print(table, end='')
     if arguments.report:
         arguments.report.write_text(table)

@@ -295,6 +295,21 @@ def series(folder, key):
     check(statuses() == ['completed', 'fault', 'planned'], 'the index records the states', statuses())
 
 
+def question(folder):
+    """A phase that asks a person: whoever holds the key may answer over the network."""
+    script = pathlib.Path(folder, 'question.toml')
+    script.write_text('[[phase]]\nname = "lift"\nask = "Lift the upper wheel"\nat_most_s = 30\n'
+                      '[[phase]]\nname = "rest"\nuntil = { lasts_s = 0.5 }\n')
+    run = Run(folder, '--rt', 'off', '--experiment', script, '--set', 'experiment.answers=person', '--set',
+              'commands.enabled=true', *KEY)
+    run.wait_for_cycles()
+    found, said = send('continue')
+    check(found == 0 and 'accepted: continue' in said, 'send continue answers the question', found, said)
+    found, said = send('continue')
+    check(found == 1 and 'the present phase asks nothing' in said, 'a second answer is refused', found, said)
+    check(run.end() == 0, 'the run goes on to its end', run.output)
+
+
 def main():
     global abs_hil, PROGRAM, KEY
     PROGRAM, private_network, module = map(os.path.abspath, sys.argv[1:4])
@@ -317,6 +332,7 @@ def main():
         live_changes(folder, key)
         not_enabled(folder)
         run_ends_meanwhile()
+        question(folder)
         stop_latency(folder, 5, False)
         stop_latency(folder, 3, True)
         series(folder, key)
