@@ -2,6 +2,10 @@
 
 namespace abs_hil::runtime {
 
+ResponseCheck::ResponseCheck(const PlausibilityLimits& limits) noexcept : watch_(limits) {}
+
+void ResponseCheck::note_wheels_apart(bool apart) noexcept { watch_.note_wheels_apart(apart); }
+
 CheckResult ResponseCheck::update(const SpeedWindow& speed_window, double brake_Nm) noexcept {
   using rig::Reason;
   if (!watch_.take(speed_window, brake_Nm)) return {};

@@ -142,19 +142,35 @@ TEST_CASE("wheels that were joined are compared again when both have had time to
   CHECK(run(check, 3000, 100.0, 50.0).sound());
   check.note_wheels_apart(false);
   CHECK(run(check, 1499, 100.0, 50.0).sound());  // 3 s
-  CHECK(run(check, 60, 100.0, 50.0).reason == Reason::encoders_disagree);
+  CHECK(run(check, 45, 100.0, 50.0).sound());    // a disagreement must last 0.1 s
+  CHECK(run(check, 10, 100.0, 50.0).reason == Reason::encoders_disagree);
 
   EncoderCheck braked(limits());
   braked.note_wheels_apart(true);
   CHECK(run(braked, 10, 100.0, 50.0, 2.0).sound());
   braked.note_wheels_apart(false);
   CHECK(run(braked, 1499, 100.0, 50.0, 2.0).sound());
-  CHECK(run(braked, 60, 100.0, 50.0, 2.0).reason == Reason::slip_implausible);
+  CHECK(run(braked, 20, 100.0, 50.0, 2.0).sound());  // 0.05 s
+  CHECK(run(braked, 10, 100.0, 50.0, 2.0).reason == Reason::slip_implausible);
+
+  // What spoke for a disagreement before they parted does not count.
+  EncoderCheck again(limits());
+  CHECK(run(again, 45, 75.0, 100.0).sound());
+  again.note_wheels_apart(true);
+  CHECK(run(again, 10, 75.0, 100.0).sound());
+  again.note_wheels_apart(false);
+  CHECK(run(again, 1000, 75.0, 100.0).sound());
+  again.note_wheels_apart(true);  // once more, before they were compared: the three seconds begin anew
+  again.note_wheels_apart(false);
+  CHECK(run(again, 1499 + 45, 75.0, 100.0).sound());
 
   // The check of a standing wheel needs no such time: a tyre that slides on a turning wheel spins it up at once.
   EncoderCheck standing(limits());
   standing.note_wheels_apart(true);
   CHECK(run(standing, 3000, 0.0, 50.0).sound());
+  standing.note_wheels_apart(false);
+  CHECK(run(standing, 100, 0.0, 50.0).sound());
+  standing.note_wheels_apart(true);  // the time for which the wheel stood ends
   standing.note_wheels_apart(false);
   CHECK(run(standing, 123, 0.0, 50.0).sound());
   CHECK(run(standing, 3, 0.0, 50.0).reason == Reason::released_wheel_stands);

@@ -291,6 +291,15 @@ TEST_CASE("motor and brake are judged by the momentum of wheels that are apart, 
   CHECK(braked(60.0, 170.0, 0.0, 2.0).reason == Reason::brake_no_response);  // it need not roll on the other one
   CHECK(braked(20.0, 170.0, full_rad_s2, 2.0).sound());  // it stands soon, and then loses nothing more
   CHECK(braked(0.0, 170.0, 0.0, 2.0).sound());
+  CHECK(braked(25.0, 170.0, 0.0, 2.0).sound());  // it may have stood in between
+  CHECK(braked(28.0, 170.0, 0.0, 2.0).reason == Reason::brake_no_response);
+  // Once they are joined, the upper wheel must roll along to be judged.
+  Bench joined{.omega1 = 40.0};
+  joined.check.note_wheels_apart(true);
+  joined.check.note_wheels_apart(false);
+  for (int i = 0; i < 103; ++i) {
+    CHECK(joined.check.update({.dt_s = dt_s, .omega1_rad_s = 40.0, .omega2_rad_s = 170.0}, 2.0).sound());
+  }
   // The lower wheel is silent although the motor drives it, whatever the upper one does.
   Bench silent{.omega1 = 100.0};
   silent.check.note_wheels_apart(true);
