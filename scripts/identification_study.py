@@ -1,10 +1,13 @@
 #!/usr/bin/env python3
 """usage: identification_study.py [--plants A,B] [--repetitions N] [--seed N] [--disturbed] [--jobs N] [--csv FILE]
+                                [--check]
 
 Tries abs_identify on simulated rigs whose parameters it does not know: each within 25 % of the plant's, with other encoder
 phases, from start values up to 25 % off. The logs are those of the series `identification`. Prints, for each parameter, the
 median error, the share of intervals of 95 % that hold the truth, and how well the identified model predicts `paper`.
 --disturbed: friction and brake wander by 1 %, the motor by 0.5 %, bearings by 5 %, over 0.2 s.
+--check: status 1 unless all fits converge, errors stay within docs/identification.md's bounds for undisturbed rigs, and
+the intervals of all parameters together hold the truth as often as intervals of 95 % do.
 """
 import argparse
 import csv
@@ -17,6 +20,7 @@ from concurrent.futures import ProcessPoolExecutor
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 import numpy as np  # noqa: E402
+import scipy.stats  # noqa: E402
 
 import abs_hil  # noqa: E402
 from abs_hil.identification import identify  # noqa: E402
@@ -119,6 +123,31 @@ def table(plant, rows):
         print(f'| `{key}` | {np.nanmedian(errors):.1e} | {np.nanmax(errors):.1e} | {share} | {identified} |')
 
 
+#: largest median error of an undisturbed rig's parameter, relative
+LARGEST_ERROR = {'M10_Nm': 3e-3, 'lever_Mg_Nm': 3e-3, 'mu_w4': 3e-3, 'mu_a': 3e-3}
+LARGEST_ERROR_ELSE = 5e-4
+
+
+def problems(rows, wanted):
+    """What of the promises for undisturbed rigs does not hold, in words."""
+    found = [] if len(rows) == wanted else [f'{wanted - len(rows)} of {wanted} fits failed']
+    if wrong := sum(not row['form_right'] for row in rows):
+        found.append(f'{wrong} rigs with the wrong form of the plant')
+    keys = sorted({name.removesuffix(' error') for row in rows for name in row if name.endswith(' error')} - {'u0'})
+    for key in keys:
+        error = np.nanmedian(np.abs([row.get(f'{key} error', np.nan) for row in rows]))
+        if not error <= LARGEST_ERROR.get(key, LARGEST_ERROR_ELSE):
+            found.append(f'{key}: median error {error:.1e}')
+    holds = np.array([row[name] for row in rows for name in row if name.endswith(' holds')])
+    holds = holds[np.isfinite(holds)]
+    # A thousandth of the samples of a right 95 % would fall outside of these, were all intervals independent.
+    low, high = scipy.stats.binom.ppf([0.0005, 0.9995], len(holds), 0.95) / max(1, len(holds))
+    print(f'\n{len(holds)} intervals, {100 * np.mean(holds):.1f} % hold; {100 * low:.1f} to {100 * high:.1f} % expected')
+    if not low <= np.mean(holds) <= high:
+        found.append(f'{100 * np.mean(holds):.1f} % of the intervals hold')
+    return found
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--plants', default='paper-table1,paper-timing,inteco-manual')
@@ -127,6 +156,7 @@ def main():
     parser.add_argument('--disturbed', action='store_true')
     parser.add_argument('--jobs', type=int, default=os.cpu_count())
     parser.add_argument('--csv', type=pathlib.Path)
+    parser.add_argument('--check', action='store_true')
     o = parser.parse_args()
     every = []
     with ProcessPoolExecutor(o.jobs) as pool:
@@ -148,6 +178,9 @@ def main():
             writer = csv.DictWriter(file, names)
             writer.writeheader()
             writer.writerows(every)
+    if o.check:
+        found = problems(every, o.repetitions * len(o.plants.split(',')))
+        sys.exit('; '.join(found) if found else 0)
 
 
 if __name__ == '__main__':
