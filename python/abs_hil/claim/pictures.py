@@ -1,0 +1,47 @@
+"""The map as a picture: ratios over K and gamma, the region of admissible baselines, and the contour of the paper's 0.933."""
+from __future__ import annotations
+
+import pathlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from .map import PAPER_RATIO, Map
+
+TITLES = {'stop_time_s': 'stop time', 'stop_distance_m': 'stop distance',
+          'torque_total_variation_Nm': 'torque variation', 'slip_rms': 'slip RMS error'}
+
+
+def draw(maps: Sequence[Map], path: pathlib.Path) -> None:
+    """One row a map, one column a figure of merit. Writes SVG or PNG by the name of `path`."""
+    import matplotlib
+    matplotlib.use('Agg')
+    from matplotlib import pyplot
+    from matplotlib.colors import TwoSlopeNorm
+    pyplot.rcParams['svg.hashsalt'] = 'abs_hil'
+    figure, rows = pyplot.subplots(len(maps), len(TITLES), figsize=(3.2 * len(TITLES), 2.7 * len(maps)), squeeze=False,
+                                   sharex=True, sharey=True, layout='constrained')
+    for row, one in zip(rows, maps):
+        for axis, (name, title) in zip(row, TITLES.items()):
+            ratio = one.ratio[name]
+            image = axis.pcolormesh(one.gain_m_s2, one.gamma, np.clip(ratio, 0.5, 1.5).T, cmap='RdBu_r', shading='nearest',
+                                    norm=TwoSlopeNorm(1.0, 0.5, 1.5), rasterized=True)
+            axis.contourf(one.gain_m_s2, one.gamma, one.admissible.T.astype(float), levels=[-0.5, 0.5],
+                          hatches=['////'], alpha=0.0)
+            if np.nanmin(ratio) < PAPER_RATIO < np.nanmax(ratio) and name in ('stop_time_s', 'stop_distance_m'):
+                axis.contour(one.gain_m_s2, one.gamma, np.nan_to_num(ratio, nan=9.0).T, levels=[PAPER_RATIO],
+                             colors='black', linewidths=1.2)
+            for found, mark in ((one.best(), '*'), (one.median(), 'o')):
+                if found is not None:
+                    axis.plot(one.gain_m_s2[found[0]], one.gamma[found[1]], mark, color='black', markersize=8,
+                              markerfacecolor='white')
+            axis.set_xscale('log')
+            axis.set_yscale('log')
+            if one is maps[0]:
+                axis.set_title(f'{title}: adaptive / sliding-mode', fontsize=9)
+            if one is maps[-1]:
+                axis.set_xlabel('K / (m/s²)')
+        row[0].set_ylabel(f'{one.plant}, {one.actuator}\nγ / (kg² m/s³)', fontsize=9)
+    figure.colorbar(image, ax=rows, shrink=0.6, label='below 1: adaptive has less')
+    figure.savefig(path, metadata={'Date': None} if path.suffix == '.svg' else None, dpi=110)
+    pyplot.close(figure)
