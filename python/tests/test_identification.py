@@ -105,6 +105,9 @@ def test_acceleration_alone_promises_nothing_of_brake_and_tyre(logs, start):
         estimate = found.parameters[name]
         assert estimate.status != 'identified', name
         assert estimate.low is None or estimate.low <= truth_of(name) <= estimate.high, name
+    if found.residual_counts_rms > 1.0:  # it then ends far from the truth
+        assert any('the model does not follow the logs' in note for note in found.notes)
+        assert all(e.low is None for e in found.parameters.values() if e.status != 'fixed')
 
 
 def test_logs_of_two_rigs_are_named(logs, start):

@@ -81,8 +81,7 @@ def test_unusable_names():
         Judge('pi', Training(['paper-tabel1']))
 
 
-@pytest.mark.parametrize('controller', ['sliding-mode', 'sliding-mode-smooth', 'sliding-mode-actuator', 'super-twisting', 'pi',
-                         'relay', 'five-phase'])
+@pytest.mark.parametrize('controller', ['sliding-mode', 'sliding-mode-smooth', 'super-twisting', 'pi', 'relay', 'five-phase'])
 def test_shipped_gains_of_the_baselines_are_the_recorded_ones(controller):
     defaults, recorded = abs_hil.keys(), abs_hil.keys(config=TUNED / f'{controller}.toml')
     assert recorded == defaults

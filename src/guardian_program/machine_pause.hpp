@@ -11,8 +11,8 @@ namespace abs_hil::guardian_program {
 
 /// Finds pauses of a virtual machine (QEMU's stop and cont, a migration). All other clocks of the machine stand still
 /// meanwhile, so nothing else in it can know. The real-time clock goes on, and this compares it with the others: every
-/// 2 ms while there is a lease. It cannot use the clock's interrupts, because a pause can swallow them. Pauses below
-/// about a second stay unseen.
+/// millisecond while there is a lease. It cannot use the clock's interrupts, because a pause can swallow them. Pauses
+/// below about a second stay unseen.
 class MachinePause {
  public:
   /// Does nothing on a computer that is not a virtual machine or has no real-time clock. Its thread has the scheduling

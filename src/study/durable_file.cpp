@@ -22,16 +22,17 @@ std::string host_name() {
 }
 
 /// No other process on any computer writes under this name.
-std::string part_of(const std::filesystem::path& path) {
+std::string part_of(const std::filesystem::path& path, const std::filesystem::path& folder) {
   static std::atomic<unsigned> number{0};
   const std::string name =
       fmt::format(".{}.{}.{}.{}.part", path.filename().string(), host_name(), ::getpid(), number.fetch_add(1));
-  return (path.parent_path() / name).string();
+  return ((folder.empty() ? path.parent_path() : folder) / name).string();
 }
 
 }  // namespace
 
-DurableFile::DurableFile(std::filesystem::path path) : path_(std::move(path)), part_(part_of(path_)) {
+DurableFile::DurableFile(std::filesystem::path path, const std::filesystem::path& folder)
+    : path_(std::move(path)), part_(part_of(path_, folder)) {
   file_ = ::open(part_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (file_ < 0) fail();
 }
@@ -66,8 +67,8 @@ void DurableFile::commit() {
   ::close(opened);
 }
 
-void write_durably(const std::filesystem::path& path, std::string_view bytes) {
-  DurableFile file(path);
+void write_durably(const std::filesystem::path& path, std::string_view bytes, const std::filesystem::path& folder) {
+  DurableFile file(path, folder);
   file.append(bytes);
   file.commit();
 }

@@ -88,8 +88,9 @@ StudyFolder::StudyFolder(fs::path path, StudyFacts facts) : path_(std::move(path
         fmt::format("{}: holds other files; give a new or empty folder, or that of this study", path_.string()));
   }
   fs::create_directories(path_ / file::parts, error);
-  if (!fs::exists(path_ / file::text, error)) write_durably(path_ / file::text, facts_.text);
-  if (!fs::exists(path_ / file::index, error)) write_durably(path_ / file::index, to_json(facts_).dump(1) + '\n');
+  if (!fs::exists(path_ / file::text, error)) write_durably(path_ / file::text, facts_.text, path_ / file::parts);
+  if (!fs::exists(path_ / file::index, error))
+    write_durably(path_ / file::index, to_json(facts_).dump(1) + '\n', path_ / file::parts);
 }
 
 bool StudyFolder::complete() const {
@@ -175,7 +176,8 @@ void StudyFolder::merge(const std::vector<StudyFolder>& others) const {
                       "computes these alone",
                       path_.string(), missing.size(), facts_.chunks(), list_of(missing), path_.string()));
     }
-    DurableFile results(path_ / file::results);
+    fs::create_directories(path_ / file::parts);
+    DurableFile results(path_ / file::results, path_ / file::parts);  // removed below, with what a killed process left
     std::string header = fmt::format("{}\n", fmt::join(facts_.columns, ","));
     // A file of its own then says what it is. ASCII, since readers take a comment for Latin-1.
     results.append(gzip_member(header, to_json(facts_).dump(-1, ' ', true)));

@@ -35,7 +35,9 @@ class Replay(ProgramTest):
         whole = self.record('--set', 'experiment.start_speed_rad_s=60').read_bytes()
         damaged = self.folder / 'damaged.lcmlog'
         generator = random.Random(1)
-        for place in (len(whole) // 3, len(whole) // 2, len(whole) * 4 // 5):
+        for start in (len(whole) // 3, len(whole) // 2, len(whole) * 4 // 5):
+            # In a message that the check compares: 24 bytes into the next cycle's telemetry.
+            place = whole.index(b'ABS_TELEMETRY', start) + len('ABS_TELEMETRY') + 24
             damaged.write_bytes(whole[:place] + generator.randbytes(64) + whole[place + 64:])
             result = self.run_program('replay', damaged, '--check')
             self.assertIn(result.returncode, (1, 2))

@@ -47,6 +47,8 @@ LEAST_INFORMATION = 10.0
 #: a delay is believed if it is this many standard deviations from 0
 SURE_DELAY = 6.0
 LARGEST_DELAY_S = 0.02
+#: the disturbances take up what the model lacks, so a fit that follows the logs has 0.3 counts RMS also on a rig that wanders
+LARGEST_RMS = 1.0
 
 
 @dataclass
@@ -138,6 +140,10 @@ def identify(logs: Sequence[PathLike | Log], start: PathLike = 'paper-table1', *
         return _interrupted(fit, str(start), notes)
     found = _assembled(fit, spread, gaps, str(start), notes, disturbances)
     _name_disagreement(found)
+    if fit.rms_counts > LARGEST_RMS:
+        found.notes.insert(0, f'the model does not follow the logs: residual {fit.rms_counts:.3g} counts RMS, at most '
+                           f'{LARGEST_RMS:g} is expected even of a rig that wanders. No interval is given')
+        _without_intervals(found)
     return found
 
 
@@ -169,12 +175,17 @@ def _interrupted(fit: Fit, start: str, notes: list[str]) -> Identified:
     found = _assembled(fit, intervals.Spread(np.full((size, size), np.nan), np.zeros(size), 0), [], start,
                        ['interrupted: the values are provisional, and no interval is given'], None)
     found.notes[1:] = notes
+    _without_intervals(found)
+    found.interrupted = True
+    return found
+
+
+def _without_intervals(found: Identified) -> None:
+    """The values are the last ones of the fit; nothing is promised of them."""
     for estimate in found.parameters.values():
         if estimate.status != 'fixed':
             estimate.status, estimate.low, estimate.high = 'not-identifiable', None, None
     found.combinations.clear()
-    found.interrupted = True
-    return found
 
 
 def _refuse_swapped(logs: Sequence[Log]) -> None:
