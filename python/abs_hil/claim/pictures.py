@@ -1,28 +1,32 @@
-"""The map as a picture: ratios over K and gamma, the region of admissible baselines, and the contour of the paper's 0.933."""
+"""The pictures of docs/paper.md: the map of the claim, and the counterparts of the paper's figures."""
 from __future__ import annotations
 
 import pathlib
+import subprocess
+import tempfile
 from collections.abc import Sequence
 
 import numpy as np
 
-from .map import PAPER_RATIO, Map
+from .laws import Entry
+from .map import FIGURES, PAPER_RATIO, Map
 
-TITLES = {'stop_time_s': 'stop time', 'stop_distance_m': 'stop distance',
-          'torque_total_variation_Nm': 'torque variation', 'slip_rms': 'slip RMS error'}
+#: the paper's figures, by the names of our files
+DRAWN = ('5-upper-wheel', '6-lower-wheel', '7-slip', '8-torque', '9-theta', '10-distance')
 
 
 def draw(maps: Sequence[Map], path: pathlib.Path) -> None:
-    """One row a map, one column a figure of merit. Writes SVG or PNG by the name of `path`."""
+    """The map: ratios over K and gamma, hatched where the baseline does not count, with the contour of the paper's 0.933. One
+    row a map, one column a figure of merit. Writes SVG or PNG by the name of `path`."""
     import matplotlib
     matplotlib.use('Agg')
     from matplotlib import pyplot
     from matplotlib.colors import TwoSlopeNorm
     pyplot.rcParams['svg.hashsalt'] = 'abs_hil'
-    figure, rows = pyplot.subplots(len(maps), len(TITLES), figsize=(3.2 * len(TITLES), 2.7 * len(maps)), squeeze=False,
+    figure, rows = pyplot.subplots(len(maps), len(FIGURES), figsize=(3.2 * len(FIGURES), 2.7 * len(maps)), squeeze=False,
                                    sharex=True, sharey=True, layout='constrained')
     for row, one in zip(rows, maps):
-        for axis, (name, title) in zip(row, TITLES.items()):
+        for axis, (name, title) in zip(row, FIGURES.items()):
             ratio = one.ratio[name]
             image = axis.pcolormesh(one.gain_m_s2, one.gamma, np.clip(ratio, 0.5, 1.5).T, cmap='RdBu_r', shading='nearest',
                                     norm=TwoSlopeNorm(1.0, 0.5, 1.5), rasterized=True)
@@ -45,3 +49,18 @@ def draw(maps: Sequence[Map], path: pathlib.Path) -> None:
     figure.colorbar(image, ax=rows, shrink=0.6, label='below 1: adaptive has less')
     figure.savefig(path, metadata={'Date': None} if path.suffix == '.svg' else None, dpi=110)
     pyplot.close(figure)
+
+
+def draw_figures(program: pathlib.Path, laws: Sequence[Entry], plant: str, folder: pathlib.Path) -> None:
+    """The counterparts of the paper's figures 5 to 10: whole experiments of the adaptive law and a baseline, by abs_report."""
+    with tempfile.TemporaryDirectory() as scratch:
+        data = pathlib.Path(scratch)
+        for number, law in enumerate(laws):
+            sets = [word for key, value in law.settings('real').items() if key.startswith('control.')
+                    for word in ('--set', f'{key}={value!r}')]
+            subprocess.run([program, '--backend', 'sim', '--fast', '--no-lcm', '--plant', plant, '--controller', law.controller,
+                            *sets, '--out', data / str(number)], check=True, capture_output=True)
+        subprocess.run([program.with_name('abs_report'), '--paper', data / '0', data / '1', '--output', data / 'page.html',
+                        '--figures', data], check=True, capture_output=True)
+        for name in DRAWN:
+            (folder / f'paper-{name}.svg').write_bytes((data / f'fig{name.partition("-")[0]}.svg').read_bytes())
