@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,6 +18,9 @@ MISSED = 1.0
 PENALTY = 10.0
 #: the share that the search demands: the few training plants do not say exactly what share the others will have
 MARGIN = 0.05
+
+#: generations and varied plants of each kind. Without lag and encoders the cost hardly depends on the plant.
+EFFORT = {'real': (24, 12), 'ideal': (12, 6)}
 
 
 @dataclass
@@ -60,12 +63,16 @@ class TrackingJudge:
         return np.asarray(error + MISSED * (missed > 1e-9) + PENALTY * missed)
 
 
-def find_gains(controller: str, actuator: str, folder: pathlib.Path, generations: int = 24, cases: int = 12, seed: int = 1,
-               threads: int = 0, progress: Callable[[str, int, float], None] = lambda name, generation, cost: None) -> Found:
-    """Searches on all plants, where nothing counts on `inteco-manual` alone, and writes folder/ACTUATOR/CONTROLLER.toml."""
+def find_gains(controller: str, actuator: str, folder: pathlib.Path, generations: int | None = None,
+               cases: int | None = None, seed: int = 1, threads: int = 0) -> Found:
+    """Searches on all plants, where nothing counts on `inteco-manual` alone, and writes folder/ACTUATOR/CONTROLLER.toml.
+
+    generations, cases (varied plants of each kind): by default those of EFFORT.
+    """
+    generations, cases = generations or EFFORT[actuator][0], cases or EFFORT[actuator][1]
     for plants in (PLANTS, PLANTS[:1]):
         judge = TrackingJudge(controller, actuator, plants, cases, threads)
-        found = search(judge, generations, seed, lambda n, cost: progress(f'{actuator} {controller}', n, cost))
+        found = search(judge, generations, seed)
         if found.cost < MISSED:
             break
     law = LAWS[controller]
