@@ -13,9 +13,10 @@ import numpy as np
 from .criteria import ACTUATORS, PLANTS
 from .experiments import beyond_table, expected_table, figures_table, theory_phrases
 from .guard import differences, replaced
-from .laws import LAWS, Entry, PAPER_GAINS
+from .laws import LAWS, PAPER_GAINS, Entry
 from .map import FIGURES, Map, axes, draw_maps, read_maps, write_maps
-from .page import Page
+from .page import Page, first_order
+from .pictures import draw, draw_figures
 from .search import find_gains
 from .swing import phrases
 
@@ -53,15 +54,14 @@ class Comparison:
         path = self.out / MAPS
         path.parent.mkdir(parents=True, exist_ok=True)
         write_maps(maps, path)
-        return maps
+        return read_maps(path)  # as --check reads them: rounded
 
     def pages(self, maps: list[Map]) -> Iterator[tuple[str, str]]:
         """The pages as they should be: path below the root, and text."""
         page = Page(self.out / GAINS, maps, self.runs, self.threads)
-        best = {plant: page.baseline(plant, 'real', 'best') for plant in PLANTS}
-        figures = figures_table(Entry(PAPER_GAINS, 'adaptive'),
-                                {plant: None if found is None else found.entry for plant, found in best.items()})
-        yield PAGE, replaced(self._text(PAGE), [*page.sections(), ('figures', figures)], phrases(self.program))
+        figures = figures_table(Entry(PAPER_GAINS, 'adaptive'), {plant: baseline_of(maps, plant) for plant in PLANTS})
+        yield PAGE, replaced(self._text(PAGE), [*page.sections(), ('figures', figures)],
+                             [*page.phrases(), *phrases(self.program)])
         yield THEORY, replaced(self._text(THEORY), [('expected', expected_table())], theory_phrases())
         yield BEYOND, replaced(self._text(BEYOND), [('measured', beyond_table())])
 
@@ -74,6 +74,9 @@ class Comparison:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding='utf-8')
             say(f'wrote {path}')
+        shown = baseline_of(maps, PLANTS[0])
+        if shown is not None:
+            draw_figures(self.program, [Entry(PAPER_GAINS, 'adaptive'), shown], PLANTS[0], (self.out / PICTURE).parent)
 
     def check(self) -> list[str]:
         """What of the pages and of the map's file differs from fresh runs."""
@@ -82,6 +85,13 @@ class Comparison:
         for name, text in self.pages(maps):
             found += [f'{name}:\n{line}' for line in differences(self._text(name), text, TOLERANCE)]
         return found
+
+
+def baseline_of(maps: list[Map], plant: str) -> Entry | None:
+    """The best baseline of the map behind the real actuator."""
+    one = next(one for one in maps if (one.plant, one.actuator) == (plant, 'real'))
+    cell = one.best()
+    return None if cell is None else first_order(one, cell, 'best')
 
 
 def check_cells(maps: list[Map], cases: int, threads: int) -> list[str]:
@@ -103,7 +113,8 @@ def check_cells(maps: list[Map], cases: int, threads: int) -> list[str]:
 
 
 def main() -> int:
-    made = argparse.ArgumentParser('paper_comparison.sh', allow_abbrev=False, description='Repeats the comparison of docs/paper.md')
+    made = argparse.ArgumentParser('paper_comparison.sh', allow_abbrev=False,
+                                   description='Repeats the comparison of docs/paper.md')
     made.add_argument('--quick', action='store_true', help='small search, map and series, below runs/paper-quick')
     made.add_argument('--check', action='store_true', help='change nothing; status 1 if the pages differ from fresh runs')
     made.add_argument('--only-pages', action='store_true', help='keep the gains and the map, write the pages again')
@@ -127,7 +138,6 @@ def main() -> int:
         say('gains found')
         maps = comparison.draw()
         say('map computed')
-    from .pictures import draw
     draw(maps, out / PICTURE)
     comparison.write(maps)
     return 0

@@ -12,7 +12,6 @@ import numpy as np
 
 from ..core import _core
 from ..options import options
-from ..simulation import Study
 
 #: first estimate of theta of every law, N: theta of Table 1
 THETA0_N = 23.0

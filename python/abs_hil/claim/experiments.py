@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from ..run import Run
 from ..simulation import simulate
 from ..tune import START_SPEED_RAD_S
 from .criteria import ACTUATORS, PLANTS
-from .laws import Entry
+from .laws import Entry, Settings
 from .page import table
 
 JUDGED_ABOVE_M_S = 3.0
@@ -74,7 +75,7 @@ def figures_table(adaptive: Entry, baselines: Mapping[str, Entry | None]) -> str
                  [[figure, quantity, *(value(run) for _, run in columns)] for figure, quantity, value in QUANTITIES])
 
 
-def _braking(controller: str, plant: str = 'paper-table1', **values: float | bool) -> Braking:
+def _braking(controller: str, plant: str = 'paper-table1', values: Settings = MappingProxyType({})) -> Braking:
     # The experiment from the paper's speed, without the run-up.
     return Braking(simulate(controller, plant, set={'experiment.start_speed_rad_s': START_SPEED_RAD_S, **values}))
 
@@ -95,7 +96,7 @@ def beyond_table() -> str:
 
 def theory_phrases() -> Iterator[str]:
     """docs/theory.md: sentences with numbers of runs."""
-    run = _braking('nominal', **ACTUATORS['ideal'])
+    run = _braking('nominal', values=ACTUATORS['ideal'])
     at = {speed: float(np.interp(-speed, -run.speed_m_s, run['slip'])) for speed in (12.0, 2.3)}
     yield (f'`nominal` with ideal actuator and sensors passes {at[12.0]:.4f} at 12 m/s and {at[2.3]:.4f} at 2.3 m/s')
 
@@ -107,15 +108,15 @@ def expected_table() -> str:
     def both(run: Braking) -> str:
         return f'{run.summary["stop_time_s"]:.3f} s, {run.summary["stop_distance_m"]:.2f} m'
 
-    adaptive = _braking('adaptive', **ideal)
+    adaptive = _braking('adaptive', values=ideal)
     within = adaptive.first(np.abs(adaptive['theta_est_N'] / adaptive['theta_N'] - 1.0) <= 0.02)
     real = _braking('adaptive')
-    locked = _braking('locked', **ideal)
+    locked = _braking('locked')
     return table(['case', 'expected', 'abs_hil'], [
-        ['nominal, ideal actuator, true speeds', '2.277 s, 19.36 m', both(_braking('nominal', **ideal))],
+        ['nominal, ideal actuator, true speeds', '2.277 s, 19.36 m', both(_braking('nominal', values=ideal))],
         ['adaptive, ideal actuator, true speeds', '2.283 s, 19.32 m, θ̂ within 2 % at 0.223 s', f'{both(adaptive)}, {within} s'],
         ['adaptive, real actuator, encoders', '2.325 s, 19.72 m, slip RMS 0.008',
          f'{both(real)}, {real.summary["slip_rms"]:.4f}'],
-        ['adaptive, ideal, θ = 45 N', '1.208 s, 10.08 m', both(_braking('adaptive', **ideal, **{'plant.theta_N': 45.0}))],
+        ['adaptive, ideal, θ = 45 N', '1.208 s, 10.08 m', both(_braking('adaptive', values={**ideal, 'plant.theta_N': 45.0}))],
         ['locked wheel', '3.19 s, 26.9 m',
          f'{locked.summary["stop_time_s"]:.2f} s, {locked.summary["stop_distance_m"]:.1f} m']])

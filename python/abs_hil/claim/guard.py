@@ -16,9 +16,10 @@ def replaced(page: str, sections: Iterable[tuple[str, str]], phrases: Iterable[s
     """
     for name, text in sections:
         pattern = re.compile(f'(<!-- begin {name} -->\n).*?(<!-- end {name} -->)', re.S)
-        page, count = pattern.subn(lambda found, text=text: found[1] + '\n' + text.strip() + '\n\n' + found[2], page)
-        if count != 1:
-            raise ValueError(f'expected the markers of {name} once, found them {count} times')
+        parts = list(pattern.finditer(page))
+        if len(parts) != 1:
+            raise ValueError(f'expected the markers of {name} once, found them {len(parts)} times')
+        page = f'{page[:parts[0].start()]}{parts[0][1]}\n{text.strip()}\n\n{parts[0][2]}{page[parts[0].end():]}'
     for phrase in phrases:
         found = list(_pattern_of(phrase).finditer(page))
         if len(found) != 1:

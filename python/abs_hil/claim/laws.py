@@ -2,15 +2,15 @@
 from __future__ import annotations
 
 import pathlib
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
+from ..core import _core
+from ..options import options
 from ..simulation import STANDARD_VARIATION, simulate_many
-from ..tune import START_SPEED_RAD_S
+from ..tune import START_SPEED_RAD_S, gains_of
 from .criteria import ACTUATORS, THETA0_N, Verdict, judge, slip_velocity_gain
 
 Settings = Mapping[str, 'float | bool']
@@ -67,18 +67,9 @@ def gains_file(folder: pathlib.Path, actuator: str, controller: str) -> pathlib.
 
 
 def shipped(folder: pathlib.Path, actuator: str, controller: str) -> Entry:
-    """A law with the gains of its file. Raises OSError without a file."""
-    table: Any = tomllib.loads(gains_file(folder, actuator, controller).read_text(encoding='utf-8'))
-    gains: dict[str, float | bool] = {}
-
-    def walk(part: Mapping[str, Any], prefix: str) -> None:
-        for name, value in part.items():
-            if isinstance(value, Mapping):
-                walk(value, f'{prefix}{name}.')
-            elif not isinstance(value, str):
-                gains[f'{prefix}{name}'] = value
-
-    walk(table, '')
+    """A law with the gains of its file. Raises ValueError without a usable file."""
+    values = {row['name']: row['value'] for row in _core.keys(options(config=gains_file(folder, actuator, controller)))}
+    gains = {gain.name: values[gain.name] for gain in gains_of(controller)}
     return Entry('adaptive, searched' if controller == 'adaptive' else controller, controller, gains)
 
 

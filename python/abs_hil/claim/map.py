@@ -75,7 +75,7 @@ def ratio_of(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
 Progress = Callable[[int, int], None]
 
 
-def _runs(plants: Sequence[str], actuator: str, controller: str, factors: Mapping[str, Sequence[float]], cases: int,
+def _runs(plants: Sequence[str], actuator: str, controller: str, factors: Mapping[str, np.ndarray], cases: int,
           threads: int, progress: bool | Progress) -> dict[str, np.ndarray]:
     """Figures of shape (plants, each factor's values, 1 + cases): the nominal plant, then varied ones."""
     law: dict[str, Any] = {'plants': list(plants), 'controllers': [controller],
@@ -94,13 +94,13 @@ def _runs(plants: Sequence[str], actuator: str, controller: str, factors: Mappin
     return {name: np.concatenate([part[name] for part in parts], axis=-1) for name in parts[0]}
 
 
-def draw_maps(actuator: str, gain: Sequence[float] | np.ndarray, gamma: Sequence[float] | np.ndarray, cases: int = 50,
-              threads: int = 0, progress: bool | Progress = False, plants: Sequence[str] = PLANTS) -> list[Map]:
+def draw_maps(actuator: str, gain: np.ndarray, gamma: np.ndarray, cases: int = 50, threads: int = 0,
+              progress: bool | Progress = False, plants: Sequence[str] = PLANTS) -> list[Map]:
     """One map for each plant: the sliding-mode law at all pairs of gains, and the adaptive law in the paper's gains, on the
     same `cases` varied plants."""
     theirs = _runs(plants, actuator, 'sliding-mode', dict(zip(MAP_KEYS, (gain, gamma))), cases, threads, progress)
     ours = _runs(plants, actuator, 'adaptive', {}, cases, threads, False)
-    K = np.reshape(np.asarray(gain, dtype=float), (-1, 1, 1))
+    K = np.reshape(gain, (-1, 1, 1))
     maps = []
     for index, plant in enumerate(plants):
         found = {name: values[index] for name, values in theirs.items()}
@@ -108,7 +108,7 @@ def draw_maps(actuator: str, gain: Sequence[float] | np.ndarray, gamma: Sequence
         with np.errstate(invalid='ignore'):
             error = found['slip_rms'][..., 1:].mean(axis=-1)
         ratios = {name: ratio_of(ours[name][index, 1:], found[name][..., 1:]) for name in FIGURES}
-        maps.append(Map(plant, actuator, np.asarray(gain, dtype=float), np.asarray(gamma, dtype=float), ratios, error,
+        maps.append(Map(plant, actuator, gain, gamma, ratios, error,
                         verdict.share(), verdict.admissible()))
     return maps
 

@@ -120,6 +120,17 @@ class Page:
                                          *self._ratios(self.found[plant, actuator, name], theirs)])
         return table(['plant', 'actuator', 'adaptive', 'baseline', *FIGURES.values()], rows)
 
+    def phrases(self) -> Iterator[str]:
+        """Sentences of the page with fresh numbers."""
+        for name in ('best', 'median'):
+            theirs = self.baseline(PLANTS[0], 'real', name)
+            if theirs is None:
+                continue
+            ours = self.found[PLANTS[0], 'real', self.names[0]]
+            time, distance = (100.0 - 100.0 * ratio_interval(ours.varied(figure), theirs.varied(figure)).mean
+                              for figure in ('stop_time_s', 'stop_distance_m'))
+            yield f'{time:.1f} % less time and {distance:.1f} % less distance than the {name} baseline'
+
     def map_table(self) -> str:
         """How the ratios lie over the gains that count."""
         rows = []

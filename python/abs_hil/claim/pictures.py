@@ -14,6 +14,9 @@ from .map import FIGURES, PAPER_RATIO, Map
 #: the paper's figures, by the names of our files
 DRAWN = ('5-upper-wheel', '6-lower-wheel', '7-slip', '8-torque', '9-theta', '10-distance')
 
+#: figures that the paper's ratio is about
+CONTOURED = ('stop_time_s', 'stop_distance_m')
+
 
 def draw(maps: Sequence[Map], path: pathlib.Path) -> None:
     """The map: ratios over K and gamma, hatched where the baseline does not count, with the contour of the paper's 0.933. One
@@ -21,18 +24,20 @@ def draw(maps: Sequence[Map], path: pathlib.Path) -> None:
     import matplotlib
     matplotlib.use('Agg')
     from matplotlib import pyplot
-    from matplotlib.colors import TwoSlopeNorm
+    from matplotlib.colors import LogNorm, TwoSlopeNorm
     pyplot.rcParams['svg.hashsalt'] = 'abs_hil'
+    near, far = TwoSlopeNorm(1.0, 0.7, 1.3), LogNorm(0.05, 20.0)
+    norms = {name: near if name in CONTOURED else far for name in FIGURES}
     figure, rows = pyplot.subplots(len(maps), len(FIGURES), figsize=(3.2 * len(FIGURES), 2.7 * len(maps)), squeeze=False,
                                    sharex=True, sharey=True, layout='constrained')
     for row, one in zip(rows, maps):
         for axis, (name, title) in zip(row, FIGURES.items()):
-            ratio = one.ratio[name]
-            image = axis.pcolormesh(one.gain_m_s2, one.gamma, np.clip(ratio, 0.5, 1.5).T, cmap='RdBu_r', shading='nearest',
-                                    norm=TwoSlopeNorm(1.0, 0.5, 1.5), rasterized=True)
+            ratio, norm = one.ratio[name], norms[name]
+            axis.pcolormesh(one.gain_m_s2, one.gamma, np.clip(ratio, norm.vmin, norm.vmax).T, cmap='RdBu_r',
+                            shading='nearest', norm=norm, rasterized=True)
             axis.contourf(one.gain_m_s2, one.gamma, one.admissible.T.astype(float), levels=[-0.5, 0.5],
                           hatches=['////'], alpha=0.0)
-            if np.nanmin(ratio) < PAPER_RATIO < np.nanmax(ratio) and name in ('stop_time_s', 'stop_distance_m'):
+            if np.nanmin(ratio) < PAPER_RATIO < np.nanmax(ratio) and name in CONTOURED:
                 axis.contour(one.gain_m_s2, one.gamma, np.nan_to_num(ratio, nan=9.0).T, levels=[PAPER_RATIO],
                              colors='black', linewidths=1.2)
             for found, mark in ((one.best(), '*'), (one.median(), 'o')):
@@ -46,7 +51,9 @@ def draw(maps: Sequence[Map], path: pathlib.Path) -> None:
             if one is maps[-1]:
                 axis.set_xlabel('K / (m/s²)')
         row[0].set_ylabel(f'{one.plant}, {one.actuator}\nγ / (kg² m/s³)', fontsize=9)
-    figure.colorbar(image, ax=rows, shrink=0.6, label='below 1: adaptive has less')
+    for columns, label in ((rows[:, :2], 'time, distance'), (rows[:, 2:], 'variation, slip')):
+        figure.colorbar(columns[0, 0].collections[0], ax=columns, shrink=0.6, location='bottom',
+                        label=f'{label}: adaptive has less below 1')
     figure.savefig(path, metadata={'Date': None} if path.suffix == '.svg' else None, dpi=110)
     pyplot.close(figure)
 

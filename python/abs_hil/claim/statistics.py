@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+#: two errors with a ratio above it are not worth comparing
+LARGE = 100
+
 
 @dataclass(frozen=True)
 class Interval:
@@ -14,6 +17,8 @@ class Interval:
     high: float
 
     def text(self, digits: int = 3) -> str:
+        if self.mean > LARGE:
+            return f'above {LARGE}'
         return f'{self.mean:.{digits}f} [{self.low:.{digits}f}, {self.high:.{digits}f}]'
 
 
