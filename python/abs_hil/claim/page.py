@@ -113,6 +113,8 @@ class Page:
         for plant in PLANTS:
             for actuator in ACTUATORS:
                 for name in self.names[:2]:
+                    if name != self.names[0] and not self.found[plant, actuator, name].counts:
+                        continue
                     for other in BASELINES:
                         theirs = self.baseline(plant, actuator, other)
                         if theirs is not None:
