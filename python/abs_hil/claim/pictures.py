@@ -25,7 +25,7 @@ def draw(maps: Sequence[Map], path: pathlib.Path) -> None:
     matplotlib.use('Agg')
     from matplotlib import pyplot
     from matplotlib.colors import LogNorm, TwoSlopeNorm
-    pyplot.rcParams['svg.hashsalt'] = 'abs_hil'
+    pyplot.rcParams.update({'svg.hashsalt': 'abs_hil', 'svg.fonttype': 'none'})
     near, far = TwoSlopeNorm(1.0, 0.7, 1.3), LogNorm(0.05, 20.0)
     norms = {name: near if name in CONTOURED else far for name in FIGURES}
     figure, rows = pyplot.subplots(len(maps), len(FIGURES), figsize=(3.2 * len(FIGURES), 2.7 * len(maps)), squeeze=False,
@@ -46,6 +46,7 @@ def draw(maps: Sequence[Map], path: pathlib.Path) -> None:
                               markerfacecolor='white')
             axis.set_xscale('log')
             axis.set_yscale('log')
+            axis.minorticks_off()
             if one is maps[0]:
                 axis.set_title(f'{title}: adaptive / sliding-mode', fontsize=9)
             if one is maps[-1]:
