@@ -1,6 +1,7 @@
 """The generated parts of a page: to write them, and to check what the page prints against fresh runs."""
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Iterable
 
@@ -41,7 +42,8 @@ def differences(before: str, after: str, tolerance: float) -> list[str]:
     `tolerance` of its size and one in its last digit."""
     old, new = before.splitlines(), after.splitlines()
     if len(old) != len(new):
-        return [f'{len(old)} lines, now {len(new)}']
+        changed = [line for line in difflib.unified_diff(old, new, lineterm='', n=0) if line[:3] not in ('---', '+++')]
+        return ['\n'.join([f'{len(old)} lines, now {len(new)}', *changed[:20]])]
     return [f'- {one}\n+ {two}' for one, two in zip(old, new) if not _same(one, two, tolerance)]
 
 
