@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Makes the paper's comparison, adaptive against sliding mode, on the plant with the timing of the paper's plots: once
-# on the nominal plant and 200 times on varied plants. Options go to abs_hil compare (for example --threads 1).
-# usage: scripts/paper_comparison.sh [OPTION...]      (needs build/release, or ABS_BIN=FOLDER of the programs)
+# Puts the paper's claim to the test (docs/paper.md): searches the gains of all laws, computes the map of the claim, and
+# writes page and map: config/paper, docs/paper.md, docs/figures/paper-map.*, and the numbers of docs/theory*.md.
+# usage: scripts/paper_comparison.sh [--quick] [--check] [--only-pages] [--out DIR] [--threads N]
+#        --quick: small search, map and series into runs/paper-quick; --check: changes nothing, status 1 if the pages differ
+#        from fresh runs       (needs build/release, or ABS_BIN=FOLDER of the programs)
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
-program=${ABS_BIN:-build/release/bin}/abs_hil
-[ -x "$program" ] || { echo "$0: $program is missing: run scripts/build.sh first" >&2; exit 3; }
-
-"$program" compare --plant paper-timing --controllers adaptive,sliding-mode --repeat 1 --vary none "$@"
-echo
-"$program" compare --plant paper-timing --controllers adaptive,sliding-mode --repeat 200 --seed 1 "$@"
+programs=${ABS_BIN:-$PWD/build/release/bin}
+[ -x "$programs/abs_hil" ] || { echo "$0: $programs/abs_hil is missing: run scripts/build.sh first" >&2; exit 3; }
+export ABS_BIN=$programs OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=1
+PYTHONPATH=$programs/../share/abs_hil/python exec /usr/bin/python3 -m abs_hil.claim "$@"

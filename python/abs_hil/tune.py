@@ -7,7 +7,7 @@ import pathlib
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -147,7 +147,17 @@ class Judge:
         return cost.reshape(count, -1).mean(axis=1)
 
 
-def search(judge: Judge, generations: int, seed: int,
+class Candidates(Protocol):
+    """What a search needs: the gains, the values at a point of the unit cube, and what candidates cost."""
+    gains: list[Gain]
+    evaluations: int
+
+    def values(self, point: np.ndarray) -> list[float]: ...
+
+    def costs(self, candidates: list[list[float] | None]) -> np.ndarray: ...
+
+
+def search(judge: Candidates, generations: int, seed: int,
            progress: Callable[[int, float], None] = lambda generation, cost: None) -> Found:
     """Differential evolution by SciPy: rand-to-best/1/bin, F 0.7, CR 0.9, 8 candidates a gain (16 to 40).
 

@@ -81,7 +81,7 @@ def test_unusable_names():
         Judge('pi', Training(['paper-tabel1']))
 
 
-@pytest.mark.parametrize('controller', ['sliding-mode', 'sliding-mode-smooth', 'super-twisting', 'pi', 'relay', 'five-phase'])
+@pytest.mark.parametrize('controller', ['pi', 'relay', 'five-phase'])
 def test_shipped_gains_of_the_baselines_are_the_recorded_ones(controller):
     defaults, recorded = abs_hil.keys(), abs_hil.keys(config=TUNED / f'{controller}.toml')
     assert recorded == defaults
@@ -92,7 +92,3 @@ def test_shipped_gains_of_the_baselines_are_the_recorded_ones(controller):
 def test_the_papers_controller_ships_with_table_1():
     shipped = abs_hil.keys()
     assert [shipped[f'control.adaptive.{name}']['value'] for name in ('gamma', 'ks0', 'ks1', 'zeta0')] == [21, 19, 32, 0]
-    recorded = abs_hil.keys(config=TUNED / 'adaptive.toml')
-    assert recorded != shipped
-    for gain in gains_of('adaptive'):
-        assert gain.least <= recorded[gain.name]['value'] <= gain.most

@@ -64,6 +64,8 @@ class BrakingFigures {
   S theta_error_final{rig::unknown};
   S torque_total_variation_Nm{rig::unknown};
   S slip_overshoot{rig::unknown};
+  S slip_reached_s{rig::unknown};
+  S theta_error_max_N{rig::unknown};
   S time_locked_s{rig::unknown};
   S final_speed_m_s{rig::unknown};
   S slip_square_sum{0.0};
@@ -123,7 +125,9 @@ void BrakingFigures<S>::note_braking(const BrakingSample<S>& sample, const Condi
   time_locked_s = rig::select(judged && rig::is_nan(time_locked_s), S(0.0), time_locked_s);
   const auto locked = judged && sample.slip > locked_slip && !rig::is_nan(last_time_s);
   time_locked_s = rig::select(locked, S(time_locked_s + (sample.time_s - last_time_s)), time_locked_s);
-  slip_settling.observe(judged, since_brake_s, rig::magnitude(slip_error) <= slip_band);
+  const auto near = rig::magnitude(slip_error) <= slip_band;
+  slip_reached_s = rig::select(judged && near && rig::is_nan(slip_reached_s), since_brake_s, slip_reached_s);
+  slip_settling.observe(judged, since_brake_s, near);
   theta_final_N = rig::select(judged, sample.theta_est_N, theta_final_N);
   const S theta_relative = sample.theta_est_N / sample.theta_N - 1.0;
   theta_error_final = rig::select(judged, theta_relative, theta_error_final);
@@ -132,6 +136,8 @@ void BrakingFigures<S>::note_braking(const BrakingSample<S>& sample, const Condi
   theta_square_sum = rig::select(counted, S(theta_square_sum + theta_relative * theta_relative), theta_square_sum);
   samples = rig::select(counted, S(samples + 1.0), samples);
   const S theta_error_N = rig::magnitude(S(sample.theta_est_N - sample.theta_N));
+  const auto worse = counted && (rig::is_nan(theta_error_max_N) || theta_error_max_N < theta_error_N);
+  theta_error_max_N = rig::select(worse, theta_error_N, theta_error_max_N);
   theta_settling.observe(judged, since_brake_s, theta_error_N <= theta_band * sample.theta_N);
 }
 

@@ -32,6 +32,7 @@ Metrics metrics_of(const BrakingFigures<double>& f) noexcept {
   Metrics result{.brake_start_s = f.brake_start_s,
                  .stop_time_s = f.stop_time_s,
                  .stop_distance_m = f.stop_distance_m,
+                 .slip_reached_s = f.slip_reached_s,
                  .slip_settling_s = f.slip_settling.since_s(),
                  .theta_final_N = f.theta_final_N,
                  .theta_settling_s = f.theta_settling.since_s(),
@@ -39,6 +40,7 @@ Metrics metrics_of(const BrakingFigures<double>& f) noexcept {
                  .slip_overshoot = f.slip_overshoot,
                  .time_locked_s = f.time_locked_s,
                  .theta_error_final = f.theta_error_final,
+                 .theta_error_max_N = f.theta_error_max_N,
                  .final_speed_m_s = f.final_speed_m_s};
   if (f.samples > 0.0) {
     result.slip_rms = std::sqrt(f.slip_square_sum / f.samples);
@@ -75,6 +77,8 @@ std::vector<MissingFigure> missing_figures(const Metrics& m, double end_speed_m_
   note("stop_distance_m", m.stop_distance_m, moving);
   note("slip_rms", m.slip_rms,
        fmt::format("no braking {} later than {} s after its start", above, BrakingFigures<double>::rms_start_s));
+  note("slip_reached_s", m.slip_reached_s,
+       fmt::format("the slip never came within {} of the wanted one {}", BrakingFigures<double>::slip_band, above));
   note("slip_settling_s", m.slip_settling_s,
        fmt::format("the slip left its band, {}, {}", BrakingFigures<double>::slip_band, above));
   note("theta_final_N", m.theta_final_N, fmt::format("no estimate {}", above));

@@ -22,6 +22,7 @@ struct Metrics {
   double stop_time_s{rig::unknown};
   double stop_distance_m{rig::unknown};   ///< v_x over the ticks of the stop time, by the trapezoidal rule
   double slip_rms{rig::unknown};          ///< of slip - slip_ref, from 0.3 s after brake start while v_x > 3 m/s
+  double slip_reached_s{rig::unknown};    ///< time at which slip first is within 0.02 of slip_ref while v_x > 3 m/s
   double slip_settling_s{rig::unknown};   ///< time after which slip stays within 0.02 of slip_ref while v_x > 3 m/s
   double theta_final_N{rig::unknown};     ///< estimate at 3 m/s: the last one with v_x > 3 m/s
   double theta_settling_s{rig::unknown};  ///< time after which it stays within 5 % of the truth while v_x > 3 m/s
@@ -30,15 +31,17 @@ struct Metrics {
   double time_locked_s{rig::unknown};              ///< braking time with slip > 0.95 while v_x > 3 m/s
   double theta_error_final{rig::unknown};          ///< theta_final_N / true theta at that time - 1
   double theta_error_rms{rig::unknown};            ///< of estimate / truth - 1, over the samples of slip_rms
+  double theta_error_max_N{rig::unknown};          ///< largest |estimate - truth| over the samples of slip_rms
   double final_speed_m_s{rig::unknown};            ///< v_x of the last record
 };
 
 /// The metrics by their names in a run's summary.
-inline constexpr std::array<std::pair<std::string_view, double Metrics::*>, 13> metric_fields{{
+inline constexpr std::array<std::pair<std::string_view, double Metrics::*>, 15> metric_fields{{
     {"brake_start_s", &Metrics::brake_start_s},
     {"stop_time_s", &Metrics::stop_time_s},
     {"stop_distance_m", &Metrics::stop_distance_m},
     {"slip_rms", &Metrics::slip_rms},
+    {"slip_reached_s", &Metrics::slip_reached_s},
     {"slip_settling_s", &Metrics::slip_settling_s},
     {"slip_overshoot", &Metrics::slip_overshoot},
     {"time_locked_s", &Metrics::time_locked_s},
@@ -47,6 +50,7 @@ inline constexpr std::array<std::pair<std::string_view, double Metrics::*>, 13> 
     {"theta_settling_s", &Metrics::theta_settling_s},
     {"theta_error_rms", &Metrics::theta_error_rms},
     {"theta_error_final", &Metrics::theta_error_final},
+    {"theta_error_max_N", &Metrics::theta_error_max_N},
     {"final_speed_m_s", &Metrics::final_speed_m_s},
 }};
 static_assert(sizeof(Metrics) == metric_fields.size() * sizeof(double), "each metric has a name");

@@ -97,6 +97,25 @@ TEST_CASE("settling is the start of the last stay within the band") {
   CHECK(m.theta_final_N == 20.9);
 }
 
+TEST_CASE("the wanted slip is reached where the slip first comes within the band above 3 m/s") {
+  // It reaches, leaves, comes back; the other one comes near from above, the third below 3 m/s (1.4 s) only.
+  const auto twice = [](double since_s) { return since_s < 0.2 || (since_s > 0.4 && since_s < 0.5) ? 0.3 : 0.135; };
+  CHECK_THAT(brake(twice, exact).slip_reached_s, WithinAbs(0.2, 1.1e-3));
+  CHECK_THAT(brake([](double since_s) { return since_s < 0.1 ? 0.171 : 0.169; }, exact).slip_reached_s,
+             WithinAbs(0.1, 1.1e-3));
+  CHECK(std::isnan(brake([](double since_s) { return since_s < 1.4005 ? 0.129 : 0.15; }, exact).slip_reached_s));
+}
+
+TEST_CASE("the largest error of theta counts from 0.3 s on and above 3 m/s, with either sign") {
+  const auto theta = [](double since_s) {
+    if (since_s < 0.2995 || since_s > 1.4005) return 90.0;
+    return since_s < 0.7 ? 26.0 : 13.5;
+  };
+  CHECK_THAT(brake(on_target, theta).theta_error_max_N, WithinAbs(6.5, 1e-12));
+  CHECK(std::isnan(brake(on_target, [](double) { return std::nan(""); }).theta_error_max_N));
+  CHECK(std::isnan(brake(on_target, theta, 0.5, false).theta_error_max_N));
+}
+
 TEST_CASE("a quantity that never settles has no settling time") {
   const Metrics m = brake([](double) { return 0.5; }, [](double) { return 10.0; });
   CHECK(std::isnan(m.slip_settling_s));
@@ -126,12 +145,13 @@ TEST_CASE("each missing figure says why, and no other") {
   for (const MissingFigure& figure : missing_figures(nothing.metrics(), 0.3)) {
     CHECK(figure.why == "the run did not brake");
   }
-  CHECK(names(nothing.metrics()).size() == 7);
+  CHECK(names(nothing.metrics()).size() == 8);
   CHECK(names(brake(on_target, exact)).empty());
   const Metrics moving = brake_to(0.36, rig::Phase::stopped);
   CHECK_THAT(why(moving, "stop_time_s"), Catch::Matchers::Contains("still moved at 0.36 m/s"));
   const Metrics unsettled = brake([](double) { return 0.5; }, [](double) { return 10.0; });
-  CHECK(names(unsettled) == std::vector<std::string_view>{"slip_settling_s", "theta_settling_s"});
+  CHECK(names(unsettled) == std::vector<std::string_view>{"slip_reached_s", "slip_settling_s", "theta_settling_s"});
+  CHECK_THAT(why(unsettled, "slip_reached_s"), Catch::Matchers::Contains("never came within 0.02"));
   CHECK_THAT(why(unsettled, "slip_settling_s"), Catch::Matchers::Contains("0.02"));
   CHECK_THAT(why(unsettled, "theta_settling_s"), Catch::Matchers::Contains("5 %"));
   const Metrics silent = brake(on_target, [](double) { return std::nan(""); });

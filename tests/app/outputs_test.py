@@ -113,7 +113,7 @@ class Outputs(ProgramTest):
         keys = [line.split()[0] for line in lines]
         self.assertEqual(sorted(key for key in keys if not key.startswith('model.')), sorted(names(config)))
         listed = {line.split()[0]: line.split()[1] for line in lines}
-        self.assertEqual(listed['control.sliding_mode_smooth.boundary_m_s'], '2.29')
+        self.assertEqual(listed['control.sliding_mode_smooth.boundary_m_s'], '2.93')
 
     def test_quantities_are_listed_with_their_csv_columns(self):
         rows = json.loads(self.run_program('list', '--quantities', '--json').stdout)

@@ -4,7 +4,8 @@
 
 namespace abs_hil::control {
 
-// The defaults are the gains that abs_tune recorded in config/tuned (docs/comparison.md); a test compares them.
+// The defaults are the gains of config/paper/real (sliding modes, docs/paper.md) and config/tuned (docs/comparison.md);
+// tests compare them.
 
 /// Adaptation of the equivalent control, theta_hat' = -gamma k phi s, where s is the law's substitute for sign(e_v).
 struct SwitchingAdaptationOptions {
@@ -12,7 +13,7 @@ struct SwitchingAdaptationOptions {
   /// 0: theta_hat keeps the value theta0_N.
   ABS_HIL_OPTION(double, gamma, 5.0, .unit = "kg^2 m/s^3", .meaning = "gain of theta_hat' = -gamma k phi sign(e_v)",
                  .range = rig::from_zero(1e4), .search = rig::search(1, 1000));
-  ABS_HIL_OPTION(double, theta0_N, 18.0, .unit = "N", .meaning = "first estimate of theta",
+  ABS_HIL_OPTION(double, theta0_N, 23.0, .unit = "N", .meaning = "first estimate of theta",
                  .range = rig::from_zero(500), .search = rig::search_linearly(0, 40), .start_value = true);
   ABS_HIL_OPTION(double, theta_min_N, 0.0, .unit = "N", .meaning = "least theta the estimate may take",
                  .range = rig::from_zero(500));
@@ -22,27 +23,27 @@ struct SwitchingAdaptationOptions {
 
 struct SlidingModeOptions {
   ABS_HIL_OPTIONS(SlidingModeOptions);
-  ABS_HIL_OPTION(double, gain_m_s2, 73.8, .unit = "m/s^2", .meaning = "K of -K sign(e_v)", .range = rig::positive(200),
+  ABS_HIL_OPTION(double, gain_m_s2, 25.2, .unit = "m/s^2", .meaning = "K of -K sign(e_v)", .range = rig::positive(200),
                  .search = rig::search(0.5, 100));
-  ABS_HIL_GROUP(SwitchingAdaptationOptions, adaptation, "", {.gamma = 1.25, .theta0_N = 0.497});
+  ABS_HIL_GROUP(SwitchingAdaptationOptions, adaptation, "", {.gamma = 55.5});
 };
 
 struct SmoothSlidingModeOptions {
   ABS_HIL_OPTIONS(SmoothSlidingModeOptions);
-  ABS_HIL_OPTION(double, gain_m_s2, 95.3, .unit = "m/s^2", .meaning = "K of -K sat(e_v/width)",
+  ABS_HIL_OPTION(double, gain_m_s2, 84.7, .unit = "m/s^2", .meaning = "K of -K sat(e_v/width)",
                  .range = rig::positive(200), .search = rig::search(0.5, 100));
-  ABS_HIL_OPTION(double, boundary_m_s, 2.29, .unit = "m/s", .meaning = "width of the boundary layer in e_v",
+  ABS_HIL_OPTION(double, boundary_m_s, 2.93, .unit = "m/s", .meaning = "width of the boundary layer in e_v",
                  .range = rig::between(1e-3, 10), .search = rig::search(0.01, 5));
-  ABS_HIL_GROUP(SwitchingAdaptationOptions, adaptation, "", {.gamma = 69.1, .theta0_N = 0.837});
+  ABS_HIL_GROUP(SwitchingAdaptationOptions, adaptation, "", {.gamma = 156.0});
 };
 
 struct SuperTwistingOptions {
   ABS_HIL_OPTIONS(SuperTwistingOptions);
-  ABS_HIL_OPTION(double, k1, 37.8, .unit = "m^0.5/s^1.5", .meaning = "gain of sqrt|e_v|", .range = rig::positive(200),
+  ABS_HIL_OPTION(double, k1, 30.3, .unit = "m^0.5/s^1.5", .meaning = "gain of sqrt|e_v|", .range = rig::positive(200),
                  .search = rig::search(0.5, 100));
-  ABS_HIL_OPTION(double, k2, 3.47, .unit = "m/s^3", .meaning = "gain of the integral of sign(e_v)",
+  ABS_HIL_OPTION(double, k2, 1.69, .unit = "m/s^3", .meaning = "gain of the integral of sign(e_v)",
                  .range = rig::positive(5000), .search = rig::search(1, 2000));
-  ABS_HIL_GROUP(SwitchingAdaptationOptions, adaptation, "", {.gamma = 2.02, .theta0_N = 29.3});
+  ABS_HIL_GROUP(SwitchingAdaptationOptions, adaptation, "", {.gamma = 23.2});
 };
 
 struct RelayOptions {

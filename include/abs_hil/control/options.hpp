@@ -61,14 +61,14 @@ struct AdaptiveActuatorOptions {
 /// Sliding mode with a boundary layer, stepped back through the brake's lag.
 struct SlidingModeActuatorOptions {
   ABS_HIL_OPTIONS(SlidingModeActuatorOptions);
-  ABS_HIL_OPTION(double, gain_m_s2, 30.0, .unit = "m/s^2", .meaning = "K of -K sat(e_v/width)",
+  ABS_HIL_OPTION(double, gain_m_s2, 50.0, .unit = "m/s^2", .meaning = "K of -K sat(e_v/width)",
                  .range = rig::positive(200), .search = rig::search(0.5, 100));
-  ABS_HIL_OPTION(double, boundary_m_s, 0.5, .unit = "m/s", .meaning = "width of the boundary layer in e_v",
+  ABS_HIL_OPTION(double, boundary_m_s, 0.592, .unit = "m/s", .meaning = "width of the boundary layer in e_v",
                  .range = rig::between(1e-3, 10), .search = rig::search(0.01, 5));
-  ABS_HIL_OPTION(double, lag_gain_per_s, 100.0, .unit = "1/s",
+  ABS_HIL_OPTION(double, lag_gain_per_s, 72.6, .unit = "1/s",
                  .meaning = "decay of the torque error that the brake's lag leaves", .range = rig::positive(1e4),
                  .search = rig::search(10, 500));
-  ABS_HIL_GROUP(SwitchingAdaptationOptions, adaptation, "", {.gamma = 30.0, .theta0_N = 23.0});
+  ABS_HIL_GROUP(SwitchingAdaptationOptions, adaptation, "", {.gamma = 261.0});
   ABS_HIL_GROUP(ForceObserverOptions, observer, "", {});
 };
 

@@ -36,11 +36,12 @@ class Metric:
 METRICS = (
     Metric('brake_start_s', 'braking starts at / s', 3), Metric('stop_time_s', 'stop time / s', 3),
     Metric('stop_distance_m', 'stop distance / m', 2), Metric('slip_rms', 'slip RMS error', 4),
-    Metric('slip_settling_s', 'slip settled after / s', 3), Metric('slip_overshoot', 'slip overshoot', 4),
-    Metric('time_locked_s', 'time locked / s', 3),
+    Metric('slip_reached_s', 'slip reached after / s', 3), Metric('slip_settling_s', 'slip settled after / s', 3),
+    Metric('slip_overshoot', 'slip overshoot', 4), Metric('time_locked_s', 'time locked / s', 3),
     Metric('torque_total_variation_Nm', 'variation of torque reference / (N m)', 1),
     Metric('theta_final_N', 'estimate of θ at 3 m/s / N', 2), Metric('theta_error_final', 'relative error of θ at 3 m/s', 4),
-    Metric('theta_error_rms', 'relative RMS error of θ', 4), Metric('theta_settling_s', 'estimate of θ settled after / s', 3))
+    Metric('theta_error_rms', 'relative RMS error of θ', 4), Metric('theta_error_max_N', 'largest error of θ / N', 2),
+    Metric('theta_settling_s', 'estimate of θ settled after / s', 3))
 
 
 @dataclass
