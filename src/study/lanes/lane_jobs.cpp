@@ -194,6 +194,14 @@ bool disturbed_road(const plant_sim::PlantOptions& plant) {
          !drift.upper_bearing.empty() || !drift.lower_bearing.empty();
 }
 
+/// Flaws of brake and encoders, which lanes do not know.
+bool flawed(const plant_sim::PlantOptions& plant) {
+  return plant.rig.brake.brake_rate_limit_Nm_s > 0.0 || plant.brake_flaws != plant_sim::BrakeFlaws{} ||
+         plant.rig.upper_encoder.eccentricity_rad > 0.0 || plant.rig.lower_encoder.eccentricity_rad > 0.0 ||
+         plant.upper_encoder_flaws != plant_sim::EncoderFlaws{} ||
+         plant.lower_encoder_flaws != plant_sim::EncoderFlaws{};
+}
+
 }  // namespace
 
 InstructionSet instruction_set() {
@@ -245,7 +253,7 @@ LaneSettings::~LaneSettings() = default;
 std::uint32_t LaneSettings::window_cycles() const noexcept { return parts_ ? parts_->window_cycles : 0; }
 
 const Kind* LaneSettings::begin(const Job& job, std::vector<double>& words) const {
-  if (!parts_ || ideal(job.plant) || disturbed_road(job.plant)) return nullptr;
+  if (!parts_ || ideal(job.plant) || disturbed_road(job.plant) || flawed(job.plant)) return nullptr;
   try {
     plant_sim::check(job.plant);
     const plant_sim::TyreModel tyres = plant_sim::make_tyre_model(job.plant);
