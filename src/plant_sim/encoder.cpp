@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "abs_hil/rig/scalar.hpp"
 #include "rig/encoder_scale.hpp"
 
 namespace abs_hil::plant_sim {
@@ -37,7 +38,8 @@ Encoder::Encoder(std::int32_t counts_per_rev, const rig::EccentricityParameters&
 std::int64_t Encoder::position(double angle_rad, double offset_rad) const noexcept {
   double read_rad = angle_rad + offset_rad;
   if (eccentricity_.eccentricity_rad > 0.0)
-    read_rad += eccentricity_.eccentricity_rad * std::sin(angle_rad + eccentricity_.phase_rad);
+    read_rad += eccentricity_.eccentricity_rad *
+                rig::sine(std::remainder(angle_rad + eccentricity_.phase_rad, 2.0 * std::numbers::pi));
   const double counts = read_rad / rad_per_count_;
   const double whole = std::floor(counts);
   auto edge = static_cast<std::int64_t>(whole);

@@ -194,11 +194,14 @@ bool disturbed_road(const plant_sim::PlantOptions& plant) {
          !drift.upper_bearing.empty() || !drift.lower_bearing.empty();
 }
 
+bool eccentric(const rig::RigParameters& rig) {
+  return rig.upper_encoder.eccentricity_rad > 0.0 || rig.lower_encoder.eccentricity_rad > 0.0;
+}
+
 /// Flaws of brake and encoders, which lanes do not know.
 bool flawed(const plant_sim::PlantOptions& plant) {
   return plant.rig.brake.brake_rate_limit_Nm_s > 0.0 || plant.brake_flaws != plant_sim::BrakeFlaws{} ||
-         plant.rig.upper_encoder.eccentricity_rad > 0.0 || plant.rig.lower_encoder.eccentricity_rad > 0.0 ||
-         plant.upper_encoder_flaws != plant_sim::EncoderFlaws{} ||
+         eccentric(plant.rig) || plant.upper_encoder_flaws != plant_sim::EncoderFlaws{} ||
          plant.lower_encoder_flaws != plant_sim::EncoderFlaws{};
 }
 
@@ -227,7 +230,9 @@ InstructionSet instruction_set() {
 
 LaneSettings::LaneSettings(const config::Settings& settings) {
   const double start_speed_rad_s = settings.experiment.start_speed_rad_s;
-  if (ideal(settings.plant) || settings.experiment.wait_for_start || !(start_speed_rad_s > 0.0)) return;
+  if (ideal(settings.plant) || settings.experiment.wait_for_start || !(start_speed_rad_s > 0.0) ||
+      eccentric(settings.model))
+    return;
   auto parts = std::make_unique<Parts>(Parts{.settings = settings});
   try {
     parts->controller = control::make_controller(settings.control.controller, {settings.control, settings.model});
