@@ -104,6 +104,8 @@ SLOPES, POINTS = _collocation()
 SCALE = np.array([0.1, 100.0, 5.0, 10.0])
 _SCALE = ca.DM(SCALE)
 SOLVER = {'print_time': False, 'ipopt': {'print_level': 0, 'sb': 'yes', 'max_iter': 400, 'tol': 1e-7, 'mu_init': 1e-4}}
+#: slips of the first guess as parts of the best constant slip: the next is tried where the solver fails from one
+GUESS_SHARES = (0.8, 0.5, 1.0, 0.25)
 #: step of the integration that gives the first guess
 GUESS_STEP_S = 2.5e-4
 
@@ -171,6 +173,17 @@ def solve(rig: Rig, start: np.ndarray, start_s: float, road: Sequence[Piece], en
     the one that this takes. `road` is known: each piece ends at its position, the last one where
     the car is slow. Raises NoOptimum.
     """
+    problems = []
+    for share in GUESS_SHARES:
+        try:
+            return _solve(rig, start, start_s, road, end_speed_m_s, share)
+        except NoOptimum as problem:
+            problems.append(problem)
+    raise problems[0]
+
+
+def _solve(rig: Rig, start: np.ndarray, start_s: float, road: Sequence[Piece], end_speed_m_s: float,
+           guess_share: float) -> Trajectory:
     rates = rig.rates_function()
     symbols: list[ca.SX] = []
     guesses: list[float] = []
@@ -197,7 +210,7 @@ def solve(rig: Rig, start: np.ndarray, start_s: float, road: Sequence[Piece], en
     for number, piece in enumerate(road):
         last = number == len(road) - 1
         slip, deceleration = _cruise(rig, piece.value)
-        first_guess = _FirstGuess(rig, rates, 0.8 * slip)
+        first_guess = _FirstGuess(rig, rates, guess_share * slip)
         expected_s = first_guess.duration_s(guess_x, guess_s, piece, last, end_speed_m_s, deceleration)
         if piece.along == 'time' and not last:
             duration = ca.SX(piece.end) - time
