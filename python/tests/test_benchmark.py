@@ -4,6 +4,9 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import pathlib
+import shutil
+import subprocess
 import sys
 
 import pytest
@@ -114,3 +117,16 @@ def test_program(tmp_path, capsys):
                   ['--draw', '-1'], ['--json', str(tmp_path / 'none' / 'x.json')]):
         assert main(['--quick', *wrong]) == 2
         assert capsys.readouterr().err.startswith('abs_hil benchmark: ')
+
+
+@pytest.mark.skipif(shutil.which('cc') is None, reason='needs a C compiler')
+def test_a_controller_from_a_shared_library(tmp_path):
+    root = pathlib.Path(__file__).parents[2]
+    library = tmp_path / 'pi_in_c.so'
+    subprocess.run(['cc', '-shared', '-fPIC', '-O2', f'-I{root}/include', f'{root}/examples/c_controller/pi_controller.c',
+                    '-o', str(library)], check=True)
+    of_library, of_program = (run(Entry(name, {}), few(), bounds.stored(), seeds=(1,)) for name in (str(library), 'pi'))
+    for from_file, built_in in zip(of_library.rows, of_program.rows):
+        assert from_file['stop_distance_m'] == pytest.approx(built_in['stop_distance_m'], rel=1e-2)
+    with pytest.raises(ValueError, match='none.so'):
+        run(Entry(str(tmp_path / 'none.so'), {}), few(), bounds.stored(), seeds=(1,))
