@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "plant_sim/brake_path.hpp"
 #include "plant_sim/dry_friction.hpp"
@@ -45,7 +46,23 @@ Plant::Plant(const PlantOptions& options)
 }
 
 Plant::~Plant() = default;
-Plant::Plant(Plant&&) noexcept = default;
+Plant::Plant(Plant&& other) noexcept = default;
+Plant::Plant(const Plant& other)
+    : options_(other.options_),
+      profile_(other.profile_),
+      drift_(other.drift_),
+      model_(other.model_),
+      state_(other.state_),
+      brake_path_(other.brake_path_ ? std::make_unique<BrakePath>(*other.brake_path_) : nullptr) {}
+Plant& Plant::operator=(Plant other) noexcept {
+  options_ = std::move(other.options_);
+  profile_ = std::move(other.profile_);
+  drift_ = std::move(other.drift_);
+  model_ = other.model_;
+  state_ = other.state_;
+  brake_path_ = std::move(other.brake_path_);
+  return *this;
+}
 
 void Plant::reset(const PlantState& state) noexcept {
   state_ = state;

@@ -168,6 +168,24 @@ TEST_CASE("A brake fades by the energy that it has taken from its wheel") {
   CHECK_THAT(plant.state().brake_torque_Nm, WithinRel(T0, 1e-2));  // cold again
 }
 
+TEST_CASE("A copy of a plant has a brake of its own, with what is under way in it") {
+  PlantOptions options = endless_wheel();
+  options.brake_flaws.dead_time_s = 0.05;
+  Plant plant(options);
+  plant.reset(rolling_at_170);
+  plant.advance(0.03, {.brake_duty = 0.8});
+  Plant copy = plant;
+  plant.advance(0.1, {.brake_duty = 0.8});
+  copy.advance(0.02, {});  // releases it 0.05 s later
+  copy.advance(0.08, {});
+  CHECK_THAT(plant.state().brake_torque_Nm,
+             WithinRel(static_Nm(options, 0.8) * (1.0 - std::exp(-options.rig.brake.c31_per_s * 0.08)), 1e-9));
+  CHECK(copy.state().brake_torque_Nm > 0.1);
+  CHECK(copy.state().brake_torque_Nm < 0.8 * plant.state().brake_torque_Nm);
+  copy = plant;
+  CHECK(copy.state().brake_torque_Nm == plant.state().brake_torque_Nm);
+}
+
 TEST_CASE("An ideal actuator has no flaws") {
   PlantOptions options = endless_wheel();
   options.ideal_actuator = true;

@@ -38,7 +38,9 @@ class Plant {
   /// Throws std::invalid_argument if an option is outside its range.
   explicit Plant(const PlantOptions& options);
   ~Plant();
-  Plant(Plant&&) noexcept;
+  Plant(const Plant& other);
+  Plant(Plant&& other) noexcept;
+  Plant& operator=(Plant other) noexcept;
 
   /// Sets the state, joins the wheels and returns every profile to its start.
   void reset(const PlantState& state) noexcept;
