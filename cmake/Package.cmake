@@ -1,5 +1,5 @@
 # `cpack` makes three Debian packages: abs-hil (programs), libabs-hil-dev (find_package(abs_hil)) and python3-abs-hil (the
-# Python package, abs_report, abs_tune, abs_learn, abs_identify). scripts/package.sh builds and checks them.
+# Python package, abs_report, abs_tune, abs_learn, abs_identify, abs_benchmark). scripts/package.sh builds and checks them.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_VENDOR "abs_hil")
 set(ABS_HIL_MAINTAINER "The abs_hil authors <abs-hil@no-address.invalid>" CACHE STRING

@@ -1,4 +1,5 @@
-"""The programs in Python: abs_report, abs_tune, abs_learn, abs_identify, abs_convert. `abs_hil report ...` starts them too."""
+"""The programs in Python: abs_report, abs_tune, abs_learn, abs_identify, abs_benchmark,
+abs_convert. `abs_hil report ...` starts them too."""
 from __future__ import annotations
 
 import importlib
@@ -7,7 +8,8 @@ import sys
 
 #: name -> module with main(arguments) -> exit status
 PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn': 'abs_hil.learning.program',
-            'identify': 'abs_hil.identification.program', 'convert': 'abs_hil.interchange.program'}
+            'identify': 'abs_hil.identification.program', 'benchmark': 'abs_hil.benchmark.program',
+            'convert': 'abs_hil.interchange.program'}
 
 
 def start(name: str, arguments: list[str]) -> int:
@@ -41,6 +43,10 @@ def learn() -> None:
 
 def identify() -> None:
     sys.exit(start('identify', sys.argv[1:]))
+
+
+def benchmark() -> None:
+    sys.exit(start('benchmark', sys.argv[1:]))
 
 
 def convert() -> None:

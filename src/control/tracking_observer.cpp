@@ -9,12 +9,13 @@ constexpr int ignored_max = 2;  ///< then the readings are right and the estimat
 constexpr double resolution_counts = 2.0;
 }  // namespace
 
-TrackingObserver::TrackingObserver(const ObserverOptions& options, std::int32_t counts_per_rev,
-                                   double alpha_max_rad_s2) noexcept
-    : tracker_{options, counts_per_rev}, alpha_max_rad_s2_{alpha_max_rad_s2} {}
+TrackingObserver::TrackingObserver(const ObserverOptions& options, std::int32_t counts_per_rev, double alpha_max_rad_s2,
+                                   const rig::EccentricityParameters& eccentricity) noexcept
+    : tracker_{options, counts_per_rev}, disc_{eccentricity, counts_per_rev}, alpha_max_rad_s2_{alpha_max_rad_s2} {}
 
 void TrackingObserver::reset(std::int32_t counts, double omega_rad_s) noexcept {
   counts_ = counts;
+  disc_.reset(counts);
   tracker_.reset(omega_rad_s);
   omega_rad_s_ = omega_rad_s;
   ignored_ = 0;
@@ -31,7 +32,8 @@ void TrackingObserver::reset(std::int32_t counts, double omega_rad_s) noexcept {
 
 void TrackingObserver::update(std::int32_t counts, double dt_s, double stamp_error_s) noexcept {
   if (!(dt_s > 0.0)) return;  // the next interval then includes this travel
-  const double travel = rig::counts_between(counts_, counts);
+  const EncoderDisc::Reading reading = disc_.look(rig::counts_between(counts_, counts));
+  const double travel = reading.own_travel;
   tracker_.note(travel, dt_s);
   if (tracker_.stands_still()) {
     tracker_.stop_where(true);
@@ -55,6 +57,7 @@ void TrackingObserver::update(std::int32_t counts, double dt_s, double stamp_err
     tracker_.bound_by_silence(travel);
   }
   counts_ = counts;
+  disc_.take(reading);
   omega_rad_s_ = tracker_.omega_rad_s();
   ignored_ = 0;
   ignored_s_ = 0.0;

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "abs_hil/control/options.hpp"
+#include "control/encoder_disc.hpp"
 #include "control/speed_tracker.hpp"
 
 namespace abs_hil::control {
@@ -23,14 +24,19 @@ class TrackingObserver {
  public:
   /// @param counts_per_rev  encoder counts per revolution, > 0
   /// @param alpha_max_rad_s2  fastest change of speed that the wheel can have
+  /// @param eccentricity  of the encoder's disc; its readings are corrected by it
   TrackingObserver(const ObserverOptions& options, std::int32_t counts_per_rev,
-                   double alpha_max_rad_s2 = std::numeric_limits<double>::infinity()) noexcept;
+                   double alpha_max_rad_s2 = std::numeric_limits<double>::infinity(),
+                   const rig::EccentricityParameters& eccentricity = {}) noexcept;
 
   /// Starts from a reading and a known speed (0 if unknown).
   void reset(std::int32_t counts, double omega_rad_s) noexcept;
   /// Takes the next reading, `dt_s` after the previous one. Ignores it unless `dt_s` > 0. The counter may wrap around.
   /// @param stamp_error_s  by how much the reading's time stamp may be wrong
   void update(std::int32_t counts, double dt_s, double stamp_error_s = 0.0) noexcept;
+
+  /// Replaces what is known of the disc's eccentricity, without a step of the speed.
+  void know(const rig::EccentricityParameters& eccentricity) noexcept { disc_.know(eccentricity); }
 
   [[nodiscard]] double omega_rad_s() const noexcept { return omega_rad_s_; }
   [[nodiscard]] double alpha_rad_s2() const noexcept { return tracker_.alpha_rad_s2(); }
@@ -42,6 +48,7 @@ class TrackingObserver {
   [[nodiscard]] bool implausible(double travel, double stamp_error_s) const noexcept;
 
   SpeedTracker<double> tracker_;
+  EncoderDisc disc_;  ///< at the last reading that was taken
   double alpha_max_rad_s2_;
   std::int32_t counts_{0};
   double omega_rad_s_{0.0};  ///< the tracker's speed, or its prediction while readings are ignored

@@ -59,7 +59,11 @@ bool sound(const BusFrame& frame, unsigned length) {
 
 }  // namespace
 
-CanNode::CanNode(const CanNodeOptions& options) : options_(options), plant_(options.plant) {
+CanNode::CanNode(const CanNodeOptions& options)
+    : options_(options),
+      plant_(options.plant),
+      upper_(plant_sim::upper_encoder(options.plant)),
+      lower_(plant_sim::lower_encoder(options.plant)) {
   if (options.watchdog_ms < 1 || options.watchdog_ms > 10000) {
     throw std::invalid_argument("watchdog " + std::to_string(options.watchdog_ms) + " ms: give 1 to 10000");
   }
@@ -134,8 +138,7 @@ void CanNode::advance_to(std::int64_t time_ns) {
 
 std::int64_t CanNode::count(bool upper_wheel) const noexcept {
   const plant_sim::PlantState& s = plant_.state();
-  const double rad_per_count = 2.0 * std::numbers::pi / options_.plant.rig.encoder_counts_per_rev;
-  return static_cast<std::int64_t>(std::floor((upper_wheel ? s.angle1_rad : s.angle2_rad) / rad_per_count));
+  return upper_wheel ? upper_.position(s.angle1_rad) : lower_.position(s.angle2_rad);
 }
 
 std::uint64_t CanNode::duty_raw(double duty) const noexcept {

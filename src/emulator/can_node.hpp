@@ -7,6 +7,7 @@
 
 #include "abs_hil/plant_sim/plant.hpp"
 #include "emulator/card_model.hpp"
+#include "plant_sim/encoder.hpp"
 
 namespace abs_hil::emulator {
 
@@ -95,6 +96,8 @@ class CanNode {
 
   CanNodeOptions options_;
   plant_sim::Plant plant_;
+  plant_sim::Encoder upper_;
+  plant_sim::Encoder lower_;
   std::int64_t time_ns_{0};
   State state_{State::inactive};
   std::uint8_t latch_reason_{0};

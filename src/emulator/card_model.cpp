@@ -7,7 +7,6 @@
 #include <stdexcept>
 
 #include "emulator/rig_behind.hpp"
-#include "plant_sim/encoder.hpp"
 
 namespace abs_hil::emulator {
 
@@ -27,7 +26,11 @@ std::uint32_t supply_raw(double volts) noexcept { return volts > 0.0 ? rounded(s
 
 }  // namespace
 
-CardModel::CardModel(const CardOptions& options) : options_(options), plant_(options.plant) {
+CardModel::CardModel(const CardOptions& options)
+    : options_(options),
+      plant_(options.plant),
+      upper_(plant_sim::upper_encoder(options.plant)),
+      lower_(plant_sim::lower_encoder(options.plant)) {
   if (options.overspeed_bit != 0 && options.overspeed_bit != 2) {
     throw std::invalid_argument("overspeed bit " + std::to_string(options.overspeed_bit) + ": give 0 or 2");
   }
@@ -45,11 +48,10 @@ std::uint32_t CardModel::velocity(double omega_rad_s) const noexcept {
 
 std::uint32_t CardModel::raw_count(std::uint32_t channel) const noexcept {
   const plant_sim::PlantState& s = plant_.state();
-  const std::int32_t per_rev = options_.plant.rig.encoder_counts_per_rev;
   switch (channel) {
-    case 0: return std::bit_cast<std::uint32_t>(plant_sim::encoder_counts(s.angle2_rad, per_rev));  // lower wheel
-    case 1: return std::bit_cast<std::uint32_t>(plant_sim::encoder_counts(s.angle1_rad, per_rev));  // upper wheel
-    default: return 0;                                                                              // lever: at rest
+    case 0: return std::bit_cast<std::uint32_t>(lower_.counts(s.angle2_rad));  // lower wheel
+    case 1: return std::bit_cast<std::uint32_t>(upper_.counts(s.angle1_rad));  // upper wheel
+    default: return 0;                                                         // lever: at rest
   }
 }
 

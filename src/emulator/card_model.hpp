@@ -5,6 +5,7 @@
 
 #include "abs_hil/plant_sim/plant.hpp"
 #include "emulator/card_options.hpp"
+#include "plant_sim/encoder.hpp"
 
 namespace abs_hil::emulator {
 
@@ -73,6 +74,8 @@ class CardModel {
 
   CardOptions options_;
   plant_sim::Plant plant_;
+  plant_sim::Encoder upper_;
+  plant_sim::Encoder lower_;
   std::int64_t time_ns_{0};
   std::uint32_t pwm_index_{0};
   std::array<PwmChannel, pwm_count> pwm_{};

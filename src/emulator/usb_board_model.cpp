@@ -6,7 +6,6 @@
 #include <string>
 
 #include "emulator/rig_behind.hpp"
-#include "plant_sim/encoder.hpp"
 
 namespace abs_hil::emulator {
 
@@ -26,7 +25,11 @@ void check_channels(const char* what, std::uint32_t a, std::uint32_t b, std::uin
 
 }  // namespace
 
-UsbBoardModel::UsbBoardModel(const UsbBoardOptions& options) : options_(options), plant_(options.plant) {
+UsbBoardModel::UsbBoardModel(const UsbBoardOptions& options)
+    : options_(options),
+      plant_(options.plant),
+      upper_(plant_sim::upper_encoder(options.plant)),
+      lower_(plant_sim::lower_encoder(options.plant)) {
   check_channels("PWM", options.drive_pwm, options.brake_pwm, 10);
   check_channels("encoder", options.lower_encoder, options.upper_encoder, 8);
   if (options.enable_line > 14) {
@@ -67,14 +70,13 @@ UsbBoardModel::Image UsbBoardModel::image() const noexcept {
     for (std::size_t word = 10; word < words; ++word) shown[word] = written_[word];
   }
   const plant_sim::PlantState& s = plant_.state();
-  const std::int32_t per_rev = options_.plant.rig.encoder_counts_per_rev;
-  const auto show_counter = [&](std::uint32_t channel, double angle_rad) {
-    const auto count = std::bit_cast<std::uint32_t>(plant_sim::encoder_counts(angle_rad, per_rev));
+  const auto show_counter = [&](std::uint32_t channel, std::int32_t counts) {
+    const auto count = std::bit_cast<std::uint32_t>(counts);
     shown[53 + 2 * channel] = static_cast<std::uint16_t>(count & 0xFFFFU);
     shown[54 + 2 * channel] = static_cast<std::uint16_t>(count >> 16U);
   };
-  show_counter(options_.upper_encoder, s.angle1_rad);
-  show_counter(options_.lower_encoder, s.angle2_rad);
+  show_counter(options_.upper_encoder, upper_.counts(s.angle1_rad));
+  show_counter(options_.lower_encoder, lower_.counts(s.angle2_rad));
   Image image{};
   for (std::size_t word = 0; word < words; ++word) {
     image[2 * word] = static_cast<std::uint8_t>(shown[word] % 256U);

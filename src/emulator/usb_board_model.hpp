@@ -6,6 +6,7 @@
 
 #include "abs_hil/plant_sim/plant.hpp"
 #include "emulator/card_model.hpp"
+#include "plant_sim/encoder.hpp"
 
 namespace abs_hil::emulator {
 
@@ -62,6 +63,8 @@ class UsbBoardModel {
 
   UsbBoardOptions options_;
   plant_sim::Plant plant_;
+  plant_sim::Encoder upper_;
+  plant_sim::Encoder lower_;
   std::int64_t time_ns_{0};
   std::array<std::uint16_t, words> written_{};  ///< words after the last frame
   std::uint64_t frames_taken_{0};

@@ -19,6 +19,9 @@ constexpr double bump_gone_Nm = 1e-6;
 /// Longest wait for the start command, s.
 constexpr double start_limit_s = 600.0;
 
+/// The slip that the motor or the start leaves fades within this time; no cubic follows that.
+constexpr double coasting_settles_s = 0.05;
+
 struct FastestChange {
   double upper{0.0};
   double lower{0.0};
@@ -69,8 +72,15 @@ RunLogic::RunLogic(RunLogicParts parts)
       start_speed_rad_s_(parts.start_speed_rad_s),
       controller_(std::move(parts.controller)),
       sequence_(std::move(parts.sequence)),
-      upper_(parts.control.observer, parts.rig.encoder_counts_per_rev, fastest_change_rad_s2(parts).upper),
-      lower_(parts.control.observer, parts.rig.encoder_counts_per_rev, fastest_change_rad_s2(parts).lower),
+      upper_(parts.control.observer, parts.rig.encoder_counts_per_rev, fastest_change_rad_s2(parts).upper,
+             parts.rig.upper_encoder),
+      lower_(parts.control.observer, parts.rig.encoder_counts_per_rev, fastest_change_rad_s2(parts).lower,
+             parts.rig.lower_encoder),
+      upper_disc_(parts.rig.upper_encoder, parts.rig.encoder_counts_per_rev),
+      lower_disc_(parts.rig.lower_encoder, parts.rig.encoder_counts_per_rev),
+      learns_eccentricity_(parts.control.observer.learn_eccentricity_s > 0.0),
+      upper_fit_(parts.control.observer.learn_eccentricity_s, parts.rig.encoder_counts_per_rev),
+      lower_fit_(parts.control.observer.learn_eccentricity_s, parts.rig.encoder_counts_per_rev),
       actuator_(parts.rig.brake, parts.ideal_actuator, parts.max_brake_duty, parts.duty_steps),
       own_signal_count_(std::min(controller_->signals().size(), rig::signal_max)),
       answers_itself_(parts.answers_itself) {}
@@ -115,12 +125,38 @@ void RunLogic::note_travel(const rig::Measurement& measurement, double dt_s) noe
     upper_travel_rad_ = 0.5 * (speeds_.omega1_rad_s + now.omega1_rad_s) * dt_s;
     lower_travel_rad_ = 0.5 * (speeds_.omega2_rad_s + now.omega2_rad_s) * dt_s;
   } else if (started_) {
-    upper_travel_rad_ = rig::counts_between(upper_counts_, measurement.upper_counts) * rad_per_count_;
-    lower_travel_rad_ = rig::counts_between(lower_counts_, measurement.lower_counts) * rad_per_count_;
+    const auto upper = upper_disc_.look(rig::counts_between(upper_counts_, measurement.upper_counts));
+    const auto lower = lower_disc_.look(rig::counts_between(lower_counts_, measurement.lower_counts));
+    upper_disc_.take(upper);
+    lower_disc_.take(lower);
+    upper_travel_rad_ = upper.own_travel * rad_per_count_;
+    lower_travel_rad_ = lower.own_travel * rad_per_count_;
+  } else {
+    upper_disc_.reset(measurement.upper_counts);
+    lower_disc_.reset(measurement.lower_counts);
   }
   distance_m_ += wheels_.r2_m * lower_travel_rad_;
   upper_counts_ = measurement.upper_counts;
   lower_counts_ = measurement.lower_counts;
+}
+
+/// While the wheels coast, each reading goes into the fit of its disc. What a block of them gives holds from then on.
+void RunLogic::learn_eccentricity(const rig::Measurement& measurement, const PhasePlan& plan) noexcept {
+  const bool coasts = plan.brake == BrakeAction::released && sequence_.phase_time_s() >= coasting_settles_s &&
+                      !(plan.motor_duty_at(sequence_.phase_time_s()) > 0.0);
+  if (!coasts || !wheels_sound_) {
+    upper_fit_.restart();
+    lower_fit_.restart();
+    return;
+  }
+  if (const auto found = upper_fit_.take(measurement.time_ns, measurement.upper_counts)) {
+    upper_.know(*found);
+    upper_disc_.know(*found);
+  }
+  if (const auto found = lower_fit_.take(measurement.time_ns, measurement.lower_counts)) {
+    lower_.know(*found);
+    lower_disc_.know(*found);
+  }
 }
 
 double RunLogic::slip_control(double dt_s, bool begins, rig::ControlState& state) noexcept {
@@ -228,6 +264,7 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
                         .distance_m = distance_m_});
   if (change.entered && sequence_.finished()) end_ = change;
   const PhasePlan& plan = sequence_.current();
+  if (learns_eccentricity_ && dt_s > 0.0) learn_eccentricity(measurement, plan);
   record.phase = plan.phase;
   record.phase_index = static_cast<std::uint16_t>(sequence_.index());
   record.reason = change.reason;

@@ -10,6 +10,7 @@
 #include "abs_hil/control/slip_controller.hpp"
 #include "abs_hil/rig/parameters.hpp"
 #include "control/brake_actuator.hpp"
+#include "control/encoder_disc.hpp"
 #include "control/tracking_observer.hpp"
 #include "experiment/adjustment.hpp"
 #include "experiment/options.hpp"
@@ -84,6 +85,7 @@ class RunLogic final : public runtime::CycleLogic {
   [[nodiscard]] double without_bump(double torque_Nm, const control::SlipInput& input) noexcept;
   void estimate(const rig::Measurement& measurement, double dt_s, double stamp_error_s) noexcept;
   void note_travel(const rig::Measurement& measurement, double dt_s) noexcept;
+  void learn_eccentricity(const rig::Measurement& measurement, const PhasePlan& plan) noexcept;
   [[nodiscard]] bool refused(const control::SlipOutput& output, bool begins) noexcept;
   [[nodiscard]] bool breaks(std::size_t n, double value, bool begins) noexcept;
   [[nodiscard]] double slip_control(double dt_s, bool begins, rig::ControlState& state) noexcept;
@@ -102,6 +104,11 @@ class RunLogic final : public runtime::CycleLogic {
   Sequence sequence_;
   control::TrackingObserver upper_;
   control::TrackingObserver lower_;
+  control::EncoderDisc upper_disc_;  ///< at the latest reading
+  control::EncoderDisc lower_disc_;
+  const bool learns_eccentricity_;
+  control::EccentricityFit upper_fit_;
+  control::EccentricityFit lower_fit_;
   control::BrakeActuator actuator_;
   rig::WheelSpeeds speeds_{};
   std::int32_t upper_counts_{0};

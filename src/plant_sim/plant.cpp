@@ -1,5 +1,10 @@
 #include "abs_hil/plant_sim/plant.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "plant_sim/brake_path.hpp"
 #include "plant_sim/dry_friction.hpp"
 #include "plant_sim/stepping.hpp"
 
@@ -35,11 +40,33 @@ Plant::Plant(const PlantOptions& options)
       profile_(FactorProfile(options.friction_profile), options.rig.wheels.r2_m),
       drift_(options.drift),
       model_(options, profile_.profile().highest()) {
+  auto path = std::make_unique<BrakePath>(options_.brake_flaws, options_.ideal_actuator);
+  if (path->any()) brake_path_ = std::move(path);
   let_bearings_drift(drift_.after(0.0));
+}
+
+Plant::~Plant() = default;
+Plant::Plant(Plant&& other) noexcept = default;
+Plant::Plant(const Plant& other)
+    : options_(other.options_),
+      profile_(other.profile_),
+      drift_(other.drift_),
+      model_(other.model_),
+      state_(other.state_),
+      brake_path_(other.brake_path_ ? std::make_unique<BrakePath>(*other.brake_path_) : nullptr) {}
+Plant& Plant::operator=(Plant other) noexcept {
+  options_ = std::move(other.options_);
+  profile_ = std::move(other.profile_);
+  drift_ = std::move(other.drift_);
+  model_ = other.model_;
+  state_ = other.state_;
+  brake_path_ = std::move(other.brake_path_);
+  return *this;
 }
 
 void Plant::reset(const PlantState& state) noexcept {
   state_ = state;
+  if (brake_path_) brake_path_->start();
   model_.part(false);
   profile_.start(state.angle2_rad);
   if (!drift_.any()) return;
@@ -63,26 +90,44 @@ void Plant::advance(double duration_s, const PlantInput& input) noexcept {
     profile_.brake_applied(state_.angle2_rad);
     drift_.brake_applied();
   }
+  if (brake_path_) brake_path_->command(input.brake_duty);
   StateVector x = vector_of(state_);
   const auto go_on = [&](const HeldTorques& torques, double part_s) {
     if (options_.ideal_actuator) x[brake_torque] = torques.brake_target_Nm;
     integrate(model_, options_.max_step_s, torques, part_s, profile_, x);
   };
-  if (drift_.any()) {
-    // Each part uses the factors at its middle.
-    for (double left_s = duration_s; left_s > 0.0;) {
-      const double part_s = drift_.part_s(left_s, options_.max_step_s);
-      const DriftFactors factors = drift_.after(0.5 * part_s);
-      let_bearings_drift(factors);
-      go_on(drifted(held, factors), part_s);
-      left_s -= part_s;
-      drift_.pass(part_s);
-    }
-    let_bearings_drift(drift_.after(0.0));
+  if (drift_.any() || brake_path_) {
+    advance_in_parts(held, duration_s, x, go_on);
   } else {
     go_on(held, duration_s);
   }
   state_ = {x[angle1], x[angle2], x[omega1], x[omega2], x[brake_torque]};
+}
+
+/// Each part uses the drifting factors at its middle.
+template <class Torques, class State, class GoOn>
+void Plant::advance_in_parts(const Torques& held, double duration_s, const State& x, const GoOn& go_on) noexcept {
+  const auto brake_power_W = [&x] { return x[brake_torque] * std::abs(x[omega1]); };
+  for (double left_s = duration_s; left_s > 0.0;) {
+    double part_s = drift_.any() ? drift_.part_s(left_s, options_.max_step_s) : left_s;
+    HeldTorques now = held;
+    if (brake_path_) {
+      part_s = brake_path_->part_s(part_s, options_.max_step_s);
+      now.brake_target_Nm = rig::brake_torque_at(options_.rig.brake, brake_path_->duty());
+    }
+    if (drift_.any()) {
+      const DriftFactors factors = drift_.after(0.5 * part_s);
+      let_bearings_drift(factors);
+      now = drifted(now, factors);
+    }
+    const double power_W = brake_power_W();
+    if (brake_path_) now.brake_target_Nm = brake_path_->transmitted_Nm(now.brake_target_Nm, part_s, power_W);
+    go_on(now, part_s);
+    left_s -= part_s;
+    if (brake_path_) brake_path_->pass(part_s, 0.5 * part_s * (power_W + brake_power_W()));
+    if (drift_.any()) drift_.pass(part_s);
+  }
+  if (drift_.any()) let_bearings_drift(drift_.after(0.0));
 }
 
 double Plant::slip() const noexcept { return model_.slip(state_.omega1_rad_s, state_.omega2_rad_s); }

@@ -36,9 +36,18 @@ double event_step_s(const TorqueBalance& balance, const StateVector& x, double s
   return after_s;
 }
 
-/// Both wheels stand: only the brake's lag (6) continues, in closed form.
+/// Both wheels stand: only the brake's lag (6) continues, in closed form. Its rate stays at the limit until the
+/// distance to the target has shrunk to what the lag alone covers at that rate.
 void stand(const HeldTorques& held, double duration_s, StateVector& x) noexcept {
-  const double remainder = std::exp(-held.brake_rate_per_s * duration_s);
+  double lag_s = duration_s;
+  const double distance_Nm = held.brake_target_Nm - x[brake_torque];
+  if (std::abs(distance_Nm) * held.brake_rate_per_s > held.brake_limit_Nm_s) {
+    const double free_Nm = held.brake_limit_Nm_s / held.brake_rate_per_s;
+    const double ramp_s = std::min(duration_s, (std::abs(distance_Nm) - free_Nm) / held.brake_limit_Nm_s);
+    x[brake_torque] += std::copysign(held.brake_limit_Nm_s * ramp_s, distance_Nm);
+    lag_s -= ramp_s;
+  }
+  const double remainder = std::exp(-held.brake_rate_per_s * lag_s);
   x[brake_torque] = held.brake_target_Nm + remainder * (x[brake_torque] - held.brake_target_Nm);
 }
 

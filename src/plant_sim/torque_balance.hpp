@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 
 #include "abs_hil/plant_sim/plant.hpp"
 #include "abs_hil/rig/brake_map.hpp"
@@ -61,9 +62,10 @@ struct BasicWheels {
 /// The inputs of one `advance` in the form that the differential equations use.
 template <class S>
 struct BasicHeldTorques {
-  S brake_target_Nm{0.0};     ///< b(u) of (7), the target of the brake torque
-  S brake_rate_per_s{0.0};    ///< c31 of (6); 0 for the ideal actuator, whose torque is constant
-  S motor_stall_Nm{0.0};      ///< motor torque at standstill
+  S brake_target_Nm{0.0};   ///< b(u) of (7), the target of the brake torque
+  S brake_rate_per_s{0.0};  ///< c31 of (6); 0 for the ideal actuator, whose torque is constant
+  S brake_limit_Nm_s{std::numeric_limits<double>::infinity()};  ///< of the torque's rate
+  S motor_stall_Nm{0.0};                                        ///< motor torque at standstill
   S motor_back_emf_Nms{0.0};  ///< decrease of the motor torque per rad/s of the lower wheel
 };
 using HeldTorques = BasicHeldTorques<double>;
@@ -76,6 +78,7 @@ using HeldTorques = BasicHeldTorques<double>;
   } else {
     held.brake_target_Nm = rig::brake_torque_at(rig.brake, input.brake_duty);
     held.brake_rate_per_s = rig.brake.c31_per_s;
+    if (rig.brake.brake_rate_limit_Nm_s > 0.0) held.brake_limit_Nm_s = rig.brake.brake_rate_limit_Nm_s;
   }
   held.motor_stall_Nm = rig.motor.stall_torque_Nm * input.motor_duty;
   held.motor_back_emf_Nms = held.motor_stall_Nm / rig.motor.no_load_speed_rad_s;
@@ -99,6 +102,18 @@ template <class S>
   return held.motor_stall_Nm - held.motor_back_emf_Nms * omega2_rad_s;
 }
 
+/// Rate of the brake torque by (6), N m/s.
+template <class S>
+[[nodiscard]] inline S brake_rate_Nm_s(const BrakeAlone<S>& held, const S& torque_Nm) noexcept {
+  return held.brake_rate_per_s * (held.brake_target_Nm - torque_Nm);
+}
+/// The same, within the limit of the rate.
+template <class S>
+[[nodiscard]] inline S brake_rate_Nm_s(const BasicHeldTorques<S>& held, const S& torque_Nm) noexcept {
+  return rig::clamped(S(held.brake_rate_per_s * (held.brake_target_Nm - torque_Nm)), S(-held.brake_limit_Nm_s),
+                      held.brake_limit_Nm_s);
+}
+
 /// The right-hand side of (1), (2) and (6) for a tyre force.
 template <class S, class Held, class Upper, class Lower>
 [[nodiscard, gnu::always_inline]] inline BasicState<S> rates_of(const BasicWheels<S>& wheels, const Held& held,
@@ -107,7 +122,7 @@ template <class S, class Held, class Upper, class Lower>
   BasicState<S> rates;
   rates[omega1] = wheels.upper_rate_rad_s2(force_N, x[brake_torque], x[omega1], upper);
   rates[omega2] = wheels.lower_rate_rad_s2(force_N, motor_torque_Nm(held, x[omega2]), x[omega2], lower);
-  rates[brake_torque] = held.brake_rate_per_s * (held.brake_target_Nm - x[brake_torque]);
+  rates[brake_torque] = brake_rate_Nm_s(held, x[brake_torque]);
   rates[angle1] = x[omega1];
   rates[angle2] = x[omega2];
   return rates;

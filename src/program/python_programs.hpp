@@ -16,6 +16,7 @@ inline constexpr std::array python_programs{
     PythonProgram{"report", "make a page with figures and tables of recorded runs, or export their rows"},
     PythonProgram{"tune", "search for a controller's gains in simulation"},
     PythonProgram{"identify", "estimate the rig's parameters from its own logs, with intervals"},
+    PythonProgram{"benchmark", "score controllers against the shortest braking, over a fixed set of cases"},
     PythonProgram{"learn", "train a small controller in simulation, from nothing but trial and error"},
 };
 

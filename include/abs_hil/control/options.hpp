@@ -133,6 +133,10 @@ struct ObserverOptions {
                  .range = rig::between(5, 2000));
   ABS_HIL_OPTION(double, standstill_time_s, 0.05, .unit = "s",
                  .meaning = "time without a count after which a wheel stands", .range = rig::between(0.005, 1));
+  ABS_HIL_OPTION(
+      double, learn_eccentricity_s, 0.0, .unit = "s",
+      .meaning = "least time of coasting in which the encoders' eccentricity is fitted; 0: the model's holds",
+      .range = rig::from_zero(10));
 };
 
 /// Name number `index` of the table of controllers; empty beyond the last.

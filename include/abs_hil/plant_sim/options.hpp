@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "abs_hil/rig/option.hpp"
@@ -55,6 +56,33 @@ struct DriftProfiles {
                  .meaning = "simulation: factor over M20 and d2, over time (docs/plants.md)");
 };
 
+/// What a real brake does beside its map and lag (docs/plants.md). Without effect on an ideal actuator.
+struct BrakeFlaws {
+  ABS_HIL_OPTIONS(BrakeFlaws);
+  bool operator==(const BrakeFlaws&) const = default;
+  ABS_HIL_OPTION(double, dead_time_s, 0.0, .unit = "s",
+                 .meaning = "simulation: time after which the brake follows a change of its duty",
+                 .range = rig::from_zero(0.2));
+  ABS_HIL_OPTION(double, hysteresis, 0.0,
+                 .meaning = "simulation: share of the torque by which a cable's friction keeps it from b(u)",
+                 .range = rig::from_zero(0.5));
+  ABS_HIL_OPTION(double, fading_per_J, 0.0, .unit = "1/J",
+                 .meaning = "simulation: share of the brake torque lost per joule that the brake has taken",
+                 .range = rig::from_zero(0.1));
+};
+
+/// What a real encoder does beside its steps and its eccentricity (docs/plants.md).
+struct EncoderFlaws {
+  ABS_HIL_OPTIONS(EncoderFlaws);
+  bool operator==(const EncoderFlaws&) const = default;
+  ABS_HIL_OPTION(double, slot_error_counts, 0.0,
+                 .meaning = "simulation: counts by which every second edge of the encoder's disc comes late",
+                 .range = rig::from_zero(0.9));
+  ABS_HIL_OPTION(std::int32_t, lost_counts, 0,
+                 .meaning = "simulation: counts that one place of the encoder's disc loses in each revolution",
+                 .range = rig::between(0, 1000));
+};
+
 /// The simulated rig. `rig` holds its true parameters.
 struct PlantOptions {
   ABS_HIL_OPTIONS(PlantOptions);
@@ -82,6 +110,9 @@ struct PlantOptions {
   ABS_HIL_OPTION(std::string, friction_profile, "",
                  .meaning = "simulation: friction over time or distance (docs/plants.md)");
   ABS_HIL_GROUP(DriftProfiles, drift, "", {});
+  ABS_HIL_GROUP(BrakeFlaws, brake_flaws, "brake_", {});
+  ABS_HIL_GROUP(EncoderFlaws, upper_encoder_flaws, "upper_encoder_", {});
+  ABS_HIL_GROUP(EncoderFlaws, lower_encoder_flaws, "lower_encoder_", {});
 };
 
 /// Throws std::invalid_argument with the configuration key, its value and its range if an option is out of range.

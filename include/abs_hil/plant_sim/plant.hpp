@@ -1,5 +1,7 @@
 #pragma once
 
+#include <memory>
+
 #include "abs_hil/plant_sim/drift.hpp"
 #include "abs_hil/plant_sim/factor_progress.hpp"
 #include "abs_hil/plant_sim/options.hpp"
@@ -8,6 +10,8 @@
 #include "abs_hil/rig/measurement.hpp"
 
 namespace abs_hil::plant_sim {
+
+class BrakePath;
 
 /// Inputs of the plant, constant during `advance`.
 struct PlantInput {
@@ -27,12 +31,16 @@ struct PlantState {
 
 /// The rig's mechanics (1)-(11) with the corrections of docs/theory.md: odd tyre force; set-valued Coulomb friction (a
 /// standing wheel stays at exactly 0 until the torques on it exceed its friction); brake lag and map; drive motor with
-/// back-EMF. It includes one of several tyre and load models, a road with changing friction, and drifting parameters
-/// (docs/plants.md). Deterministic; `advance` does not allocate or throw.
+/// back-EMF. It includes one of several tyre and load models, a road with changing friction, drifting parameters, and
+/// the flaws of a real brake (docs/plants.md). Deterministic; `advance` does not allocate or throw.
 class Plant {
  public:
   /// Throws std::invalid_argument if an option is outside its range.
   explicit Plant(const PlantOptions& options);
+  ~Plant();
+  Plant(const Plant& other);
+  Plant(Plant&& other) noexcept;
+  Plant& operator=(Plant other) noexcept;
 
   /// Sets the state, joins the wheels and returns every profile to its start.
   void reset(const PlantState& state) noexcept;
@@ -54,12 +62,15 @@ class Plant {
  private:
   [[nodiscard]] ContactState contact() const noexcept;
   void let_bearings_drift(const DriftFactors& factors) noexcept;
+  template <class Torques, class State, class GoOn>
+  void advance_in_parts(const Torques& held, double duration_s, const State& x, const GoOn& go_on) noexcept;
 
   PlantOptions options_;
   FactorProgress profile_;
   Drift drift_;
   WheelModel model_;
   PlantState state_{};
+  std::unique_ptr<BrakePath> brake_path_;  ///< null: the brake has none of the flaws
 };
 
 }  // namespace abs_hil::plant_sim

@@ -51,7 +51,7 @@ struct TyreParameters {
                  .on_rig = "force of a locked wheel over theta is nearly sin(C pi/2): experiment slip-sweep");
 };
 
-/// Brake: static map (7) from duty to torque, first-order lag (6).
+/// Brake: static map (7) from duty to torque, first-order lag (6), and the fastest change of the torque.
 struct BrakeParameters {
   ABS_HIL_OPTIONS(BrakeParameters);
   bool operator==(const BrakeParameters&) const = default;
@@ -66,6 +66,21 @@ struct BrakeParameters {
       double, c31_per_s, 20.37, .unit = "1/s", .meaning = "inverse time constant of the brake (6)",
       .range = positive(1000),
       .on_rig = "1 over the time in which the brake torque reaches 63 % after a step: experiment brake-step");
+  ABS_HIL_OPTION(double, brake_rate_limit_Nm_s, 0.0, .unit = "N m/s",
+                 .meaning = "fastest change of the brake torque; 0: none but the lag", .range = from_zero(1e6),
+                 .on_rig = "slope of the brake torque after the largest step of duty: experiment brake-step");
+};
+
+/// Eccentricity of an encoder's disc: it reads angle + eccentricity sin(angle + phase).
+struct EccentricityParameters {
+  ABS_HIL_OPTIONS(EccentricityParameters);
+  bool operator==(const EccentricityParameters&) const = default;
+  ABS_HIL_OPTION(double, eccentricity_rad, 0.0, .unit = "rad",
+                 .meaning = "encoder's largest error of the angle by its eccentricity", .range = from_zero(0.1),
+                 .on_rig = "fitted while the wheels coast: control.observer.learn_eccentricity_s");
+  ABS_HIL_OPTION(double, phase_rad, 0.0, .unit = "rad",
+                 .meaning = "angle of the encoder's disc from its zero of that error, at count 0",
+                 .range = between(-6.2831853071795862, 6.2831853071795862), .on_rig = "as its eccentricity_rad");
 };
 
 /// Lower wheel's DC motor: Tm = stall_torque * duty * (1 - omega2 / no_load_speed). The paper does not give these
@@ -99,6 +114,8 @@ struct RigParameters {
   ABS_HIL_OPTION(std::int32_t, encoder_counts_per_rev, 4096, .meaning = "encoder counts per revolution",
                  .range = between(4, 1'000'000),
                  .on_rig = "turn each wheel once by hand: abs_hil commission counts; 4 times the lines of the disc");
+  ABS_HIL_GROUP(EccentricityParameters, upper_encoder, "upper_encoder_", {});
+  ABS_HIL_GROUP(EccentricityParameters, lower_encoder, "lower_encoder_", {});
 };
 
 }  // namespace abs_hil::rig

@@ -7,7 +7,6 @@
 #include <string>
 
 #include "driver/plausibility.hpp"
-#include "plant_sim/encoder.hpp"
 #include "rig/encoder_scale.hpp"
 
 namespace abs_hil::driver {
@@ -27,6 +26,8 @@ CountOffsets count_offsets(std::uint64_t seed, double rad_per_count) {
 
 SimDriver::SimDriver(const plant_sim::PlantOptions& plant, const SimStart& start)
     : plant_(plant),
+      upper_(plant_sim::upper_encoder(plant)),
+      lower_(plant_sim::lower_encoder(plant)),
       start_(start),
       grid_{.duty_steps = full_width(start.pwm_mode), .any_brake_duty = plant.ideal_actuator} {
   if (!std::isfinite(start.start_speed_rad_s) || start.start_speed_rad_s < 0.0) {
@@ -54,11 +55,10 @@ IoResult SimDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) 
     time_ns_ = now_ns;
   }
   const plant_sim::PlantState& state = plant_.state();
-  const std::int32_t counts_per_rev = plant_.options().rig.encoder_counts_per_rev;
   measurement = {};
   measurement.time_ns = time_ns_;
-  measurement.upper_counts = plant_sim::encoder_counts(state.angle1_rad + offsets_.upper_rad, counts_per_rev);
-  measurement.lower_counts = plant_sim::encoder_counts(state.angle2_rad + offsets_.lower_rad, counts_per_rev);
+  measurement.upper_counts = upper_.counts(state.angle1_rad, offsets_.upper_rad);
+  measurement.lower_counts = lower_.counts(state.angle2_rad, offsets_.lower_rad);
   if (plant_.options().ideal_sensors) {
     measurement.ideal_speeds = rig::WheelSpeeds{state.omega1_rad_s, state.omega2_rad_s};
   }

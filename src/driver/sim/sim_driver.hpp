@@ -7,6 +7,7 @@
 #include "abs_hil/plant_sim/plant.hpp"
 #include "driver/output_grid.hpp"
 #include "driver/pwm.hpp"
+#include "plant_sim/encoder.hpp"
 
 namespace abs_hil::driver {
 
@@ -52,6 +53,8 @@ class SimDriver final : public RigDriver {
   IoResult do_make_safe() noexcept override;
 
   plant_sim::Plant plant_;
+  plant_sim::Encoder upper_;
+  plant_sim::Encoder lower_;
   SimStart start_;
   OutputGrid grid_;
   plant_sim::PlantInput input_{};

@@ -194,6 +194,17 @@ bool disturbed_road(const plant_sim::PlantOptions& plant) {
          !drift.upper_bearing.empty() || !drift.lower_bearing.empty();
 }
 
+bool eccentric(const rig::RigParameters& rig) {
+  return rig.upper_encoder.eccentricity_rad > 0.0 || rig.lower_encoder.eccentricity_rad > 0.0;
+}
+
+/// Flaws of brake and encoders, which lanes do not know.
+bool flawed(const plant_sim::PlantOptions& plant) {
+  return plant.rig.brake.brake_rate_limit_Nm_s > 0.0 || plant.brake_flaws != plant_sim::BrakeFlaws{} ||
+         eccentric(plant.rig) || plant.upper_encoder_flaws != plant_sim::EncoderFlaws{} ||
+         plant.lower_encoder_flaws != plant_sim::EncoderFlaws{};
+}
+
 }  // namespace
 
 InstructionSet instruction_set() {
@@ -219,7 +230,9 @@ InstructionSet instruction_set() {
 
 LaneSettings::LaneSettings(const config::Settings& settings) {
   const double start_speed_rad_s = settings.experiment.start_speed_rad_s;
-  if (ideal(settings.plant) || settings.experiment.wait_for_start || !(start_speed_rad_s > 0.0)) return;
+  if (ideal(settings.plant) || settings.experiment.wait_for_start || !(start_speed_rad_s > 0.0) ||
+      eccentric(settings.model))
+    return;
   auto parts = std::make_unique<Parts>(Parts{.settings = settings});
   try {
     parts->controller = control::make_controller(settings.control.controller, {settings.control, settings.model});
@@ -245,7 +258,7 @@ LaneSettings::~LaneSettings() = default;
 std::uint32_t LaneSettings::window_cycles() const noexcept { return parts_ ? parts_->window_cycles : 0; }
 
 const Kind* LaneSettings::begin(const Job& job, std::vector<double>& words) const {
-  if (!parts_ || ideal(job.plant) || disturbed_road(job.plant)) return nullptr;
+  if (!parts_ || ideal(job.plant) || disturbed_road(job.plant) || flawed(job.plant)) return nullptr;
   try {
     plant_sim::check(job.plant);
     const plant_sim::TyreModel tyres = plant_sim::make_tyre_model(job.plant);

@@ -102,6 +102,11 @@ Case drawn_case(std::mt19937_64& generator, const std::vector<config::Settings>&
   if (chance(0.05)) c.job.plant.drift.brake_torque = "time: 1; 0.9 from 0.2 to 0.5";
   if (chance(0.05)) c.job.plant.ideal_sensors = s.plant.ideal_sensors = true;
   if (chance(0.05)) c.job.plant.ideal_actuator = s.plant.ideal_actuator = true;
+  if (chance(0.05)) c.job.plant.rig.brake.brake_rate_limit_Nm_s = 50.0 + 200.0 * uniform(generator);
+  if (chance(0.05)) c.job.plant.brake_flaws = {.dead_time_s = 0.003, .hysteresis = 0.1, .fading_per_J = 3e-4};
+  if (chance(0.05)) c.job.plant.rig.upper_encoder = {.eccentricity_rad = 0.01, .phase_rad = 1.0};
+  if (chance(0.05)) s.model.lower_encoder = {.eccentricity_rad = 0.005, .phase_rad = -1.0};
+  if (chance(0.05)) c.job.plant.lower_encoder_flaws = {.slot_error_counts = 0.3, .lost_counts = 2};
   if (chance(0.1)) c.job.plant.max_step_s = 50e-6 + 900e-6 * uniform(generator);
   return c;
 }

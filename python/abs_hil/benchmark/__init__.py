@@ -1,0 +1,7 @@
+"""The benchmark: a fixed set of brakings, scored against their causal optima (docs/benchmark.md)."""
+from __future__ import annotations
+
+from .cases import VERSION, Case, drawn, whole_set
+from .score import Entry, Result, Score, run
+
+__all__ = ['Case', 'Entry', 'Result', 'Score', 'VERSION', 'drawn', 'run', 'whole_set']

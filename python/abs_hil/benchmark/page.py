@@ -1,0 +1,54 @@
+"""The result of the benchmark as text, Markdown and JSON."""
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from .cases import VERSION
+from .score import Result, Score
+
+_HEADINGS = ('runs', 'failed', 'locked', 'excess mean %', '90 % %', 'worst %', 'variation median N m', 'worst N m',
+             'slip overshoot', 'ε')
+
+
+def _number(value: float, decimals: int) -> str:
+    return '–' if math.isnan(value) else f'{value:.{decimals}f}'
+
+
+def _cells(score: Score) -> list[str]:
+    return [str(score.runs), str(score.failed), str(score.locked), *(_number(100.0 * value, 1) for value in
+                                                                     (score.excess_mean, score.excess_p90, score.excess_worst)),
+            _number(score.variation_median_Nm, 0), _number(score.variation_worst_Nm, 0), _number(score.slip_overshoot, 2),
+            _number(score.adhesion, 3)]
+
+
+def table(results: Sequence[Result], group: str = 'all') -> str:
+    """A Markdown table with a row for each controller: the best mean excess first, those with failed runs last."""
+    scores = [(result.entry.name, next(score for score in result.scores if score.group == group)) for result in results]
+    scores.sort(key=lambda pair: (pair[1].failed > 0, math.inf if math.isnan(pair[1].excess_mean) else pair[1].excess_mean))
+    lines = ['| controller | ' + ' | '.join(_HEADINGS) + ' |', '|---' + '|---:' * len(_HEADINGS) + '|']
+    lines += [f'| `{name}` | ' + ' | '.join(_cells(score)) + ' |' for name, score in scores]
+    return '\n'.join(lines) + '\n'
+
+
+def text(results: Sequence[Result], whole: bool) -> str:
+    """A page in Markdown: all cases, then each group, then each controller's worst case."""
+    title = f'abs_hil benchmark, version {VERSION}' + ('' if whole else ' (a part of the set: no score of the benchmark)')
+    parts = [f'# {title}\n', table(results)]
+    for score in results[0].scores[:-1]:
+        parts += [f'## {score.group}\n', table(results, score.group)]
+    parts += ['## Worst cases\n', '\n'.join(f'- `{result.entry.name}`: {result.total.worst_case}' for result in results) + '\n']
+    return '\n'.join(parts)
+
+
+def as_json(results: Sequence[Result], whole: bool, program: str) -> str:
+    def known(value: Any) -> Any:
+        return None if isinstance(value, float) and math.isnan(value) else value
+
+    document = {'benchmark': 'abs_hil', 'version': VERSION, 'whole': whole, 'program': program, 'controllers': [
+        {'name': result.entry.name, 'settings': dict(result.entry.settings),
+         'scores': [{key: known(value) for key, value in score.as_row().items()} for score in result.scores],
+         'runs': [{key: known(value) for key, value in row.items()} for row in result.rows]} for result in results]}
+    return json.dumps(document, indent=1, ensure_ascii=False) + '\n'

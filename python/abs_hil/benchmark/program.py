@@ -1,0 +1,85 @@
+"""abs_hil benchmark: how near to the shortest braking a controller comes, over a fixed set of cases (docs/benchmark.md)."""
+from __future__ import annotations
+
+import argparse
+import pathlib
+import sys
+from collections.abc import Sequence
+
+from ..core import _core
+from ..files import write_whole
+from ..options import Value
+from ..simulation import controllers
+from . import bounds, cases
+from .page import as_json, table, text
+from .score import Entry, run
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog='abs_hil benchmark', allow_abbrev=False, description=__doc__.split(' (docs')[0] + '.')
+    parser.add_argument('--controller', metavar='C', action='append', default=[],
+                        help='a name, FILE.so, FILE.fmu, or MODULE:CLASS of a controller in Python; may be repeated '
+                             '(all controllers of the program)')
+    parser.add_argument('--set', metavar='KEY=VALUE', action='append', default=[],
+                        help='a value under control. for every controller; may be repeated')
+    parser.add_argument('--quick', action='store_true', help='12 cases with one seed: a check, no score')
+    parser.add_argument('--draw', metavar='SEED', type=int, help='only cases that this seed draws; needs casadi')
+    parser.add_argument('--count', metavar='N', type=int, default=cases.DRAWN, help=f'how many of them ({cases.DRAWN})')
+    parser.add_argument('--threads', metavar='N', type=int, default=0, help='0: one for each processor')
+    parser.add_argument('--json', metavar='FILE', type=pathlib.Path, help='all scores and runs')
+    parser.add_argument('--page', metavar='FILE', type=pathlib.Path, help='the page in Markdown, with the groups of cases')
+    return parser
+
+
+def _settings(texts: Sequence[str]) -> dict[str, Value]:
+    values: dict[str, Value] = {}
+    for given in texts:
+        key, equals, value = given.partition('=')
+        if not equals or not key.startswith('control.'):
+            raise ValueError(f'--set "{given}": give control.KEY=VALUE; plants and experiment are the benchmark\'s own')
+        values[key] = value
+    return values
+
+
+def _chosen(given: argparse.Namespace) -> tuple[list[cases.Case], dict[str, dict[str, float]]]:
+    if given.draw is None:
+        return (cases.quick_cases() if given.quick else cases.whole_set()), bounds.stored()
+    if given.draw < 0 or not 1 <= given.count <= 10_000:
+        raise ValueError(f'--draw {given.draw} --count {given.count}: give a seed of at least 0 and 1 to 10000 cases')
+    drawn = cases.drawn(given.draw, given.count)
+    known = bounds.stored()
+    for case in bounds.missing(drawn, known):
+        known[bounds.identity(case)] = bounds.compute(case)
+    return drawn, known
+
+
+def _write(target: pathlib.Path, content: str) -> None:
+    write_whole(target, lambda name: pathlib.Path(name).write_text(content, encoding='utf-8'))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    given = _parser().parse_args(arguments)
+    try:
+        settings = _settings(given.set)
+        for target in (given.json, given.page):
+            if target is not None:
+                write_whole(target, lambda name: None, probe=True)
+        entries = [Entry(name, settings) for name in given.controller or controllers()]
+        chosen, known = _chosen(given)
+        whole = not given.quick and given.draw is None
+        results = []
+        for entry in entries:
+            results.append(run(entry, chosen, known, (1,) if given.quick else (1, 2), given.threads))
+            print(table(results[-1:]).splitlines()[-1], file=sys.stderr)
+    except (ValueError, RuntimeError) as error:
+        print(f'abs_hil benchmark: {error}', file=sys.stderr)
+        return 2
+    print(table(results), end='')
+    for target, content in ((given.json, as_json(results, whole, _core.version)), (given.page, text(results, whole))):
+        if target is not None:
+            _write(target, content)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

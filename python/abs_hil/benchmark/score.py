@@ -1,0 +1,166 @@
+"""Runs the cases of the benchmark and scores a controller (docs/benchmark.md)."""
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..hand import Plant
+from ..options import Value
+from ..simulation import keys, simulate, simulate_many
+from .adhesion import least_time_s
+from .bounds import identity
+from .cases import COAST_S, END_SPEED_M_S, Case
+from .from_file import summaries_of
+
+EXPERIMENT = 'coast-and-brake'
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A controller that takes part: a name of the program, a shared library, an FMU, or MODULE:CLASS in Python."""
+    name: str
+    settings: Mapping[str, Value]
+
+    @property
+    def from_file(self) -> bool:
+        return self.name.endswith(('.so', '.fmu'))
+
+    @property
+    def in_python(self) -> bool:
+        return ':' in self.name and not self.from_file
+
+    def made(self) -> Any:
+        """A new object of the class. Raises ValueError."""
+        module, _, name = self.name.partition(':')
+        try:
+            return getattr(importlib.import_module(module), name)()
+        except (ImportError, AttributeError, TypeError) as error:
+            raise ValueError(f'controller "{self.name}": {error}; give MODULE:CLASS, a class that is made without '
+                             'arguments, on PYTHONPATH') from None
+
+
+def coasting_speed_rad_s(case: Case) -> float:
+    """The speed of both wheels from which they coast down to the case's speed at the start of braking."""
+    plant = Plant(case.plant, case.plant_values())
+    speed = case.start_speed_rad_s
+    for _ in range(8):
+        plant.reset(omega1_rad_s=speed, omega2_rad_s=speed)
+        plant.advance(COAST_S)
+        speed += case.start_speed_rad_s - plant.state.omega2_rad_s
+    return speed
+
+
+def _runs(entry: Entry, cases: Sequence[Case], seeds: Sequence[int]) -> list[dict[str, Any]]:
+    nominal: dict[str, dict[str, Value]] = {}
+    runs = []
+    for case in cases:
+        if case.plant not in nominal:
+            nominal[case.plant] = {name: row['value'] for name, row in keys(plant=case.plant).items()}
+        values: dict[str, Value] = {
+            **case.values(nominal[case.plant]), 'experiment.start_speed_rad_s': coasting_speed_rad_s(case),
+                  'experiment.coast_s': COAST_S, 'experiment.end_speed_m_s': END_SPEED_M_S, **entry.settings}
+        runs += [{'controller': entry.name, 'plant': case.plant, 'experiment': EXPERIMENT, 'seed': seed, 'set': values}
+                 for seed in seeds]
+    return runs
+
+
+FIGURES = ('stop_distance_m', 'stop_time_s', 'torque_total_variation_Nm', 'slip_overshoot', 'time_locked_s')
+
+
+def _figures(entry: Entry, runs: list[dict[str, Any]], threads: int) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Each figure, shape (runs,), and the reason of each run's early end."""
+    if not (entry.in_python or entry.from_file):
+        study = simulate_many(runs, threads=threads)
+        return {name: study[name] for name in FIGURES}, [str(fault) for fault in study['fault']]
+    if entry.from_file:
+        summaries = summaries_of(runs, threads)
+    else:
+        summaries = [simulate(**{**run, 'controller': entry.made()}).summary for run in runs]
+    columns: dict[str, list[float]] = {name: [] for name in FIGURES}
+    faults = []
+    for summary in summaries:
+        for name in FIGURES:
+            value = summary.get(name)
+            columns[name].append(math.nan if value is None else float(value))
+        faults.append(str(summary['reason']) if summary['result'] == 'fault' else '')
+    return {name: np.array(values) for name, values in columns.items()}, faults
+
+
+@dataclass(frozen=True)
+class Score:
+    """Of one group of cases, or of all.
+
+    excess: braking distance over the causal optimum, less 1. slip_overshoot: the largest slip beyond the one that the
+    controller itself wanted, above 3 m/s. adhesion: mean utilisation on even roads. failed: runs that a fault ended or that
+    never stopped; no other figure has them.
+    """
+    group: str
+    runs: int
+    failed: int
+    locked: int
+    excess_mean: float
+    excess_p90: float
+    excess_worst: float
+    worst_case: str
+    variation_median_Nm: float
+    variation_worst_Nm: float
+    slip_overshoot: float
+    adhesion: float
+
+    def as_row(self) -> dict[str, Any]:
+        return dict(self.__dict__)
+
+
+@dataclass(frozen=True)
+class Result:
+    entry: Entry
+    scores: list[Score]
+    rows: list[dict[str, Any]]
+
+    @property
+    def total(self) -> Score:
+        return self.scores[-1]
+
+
+def _score(group: str, rows: Sequence[Mapping[str, Any]]) -> Score:
+    excess = np.array([row['excess'] for row in rows])
+    sound = np.isfinite(excess)
+    worst = int(np.argmax(np.where(np.isnan(excess), np.inf, excess)))
+    variation = np.array([row['torque_total_variation_Nm'] for row in rows])[sound]
+
+    adhesion = np.array([row['adhesion'] for row in rows])
+    adhesion = adhesion[np.isfinite(adhesion)]
+
+    def of(values: np.ndarray, function: Any) -> float:
+        return float(function(values)) if len(values) else math.nan
+
+    return Score(group, len(rows), int((~sound).sum()), sum(row['time_locked_s'] > 0 for row in rows),
+                 of(excess[sound], np.mean), of(excess[sound], lambda e: np.percentile(e, 90)), of(excess[sound], np.max),
+                 str(rows[worst]['case']), of(variation, np.median), of(variation, np.max),
+                 of(np.array([row['slip_overshoot'] for row in rows])[sound], np.max), of(adhesion, np.mean))
+
+
+def run(entry: Entry, cases: Sequence[Case], bounds: Mapping[str, Mapping[str, float]], seeds: Sequence[int] = (1, 2),
+        threads: int = 0) -> Result:
+    """Scores a controller. Raises ValueError if it cannot run, or a case has no bound."""
+    for case in cases:
+        if identity(case) not in bounds:
+            raise ValueError(f'case {case.key} has no bound; scripts/benchmark_bounds.py computes it')
+    found, faults = _figures(entry, _runs(entry, cases, seeds), threads)
+    rows = []
+    for number, (case, seed) in enumerate((case, seed) for case in cases for seed in seeds):
+        bound = bounds[identity(case)]
+        row: dict[str, Any] = {'case': case.key, 'group': case.group, 'seed': seed, 'fault': faults[number],
+                               'bound_m': bound['distance_m'], **{name: float(found[name][number]) for name in FIGURES}}
+        # A fault's distance is no braking distance of the controller.
+        row['excess'] = math.nan if row['fault'] else row['stop_distance_m'] / bound['distance_m'] - 1.0
+        row['adhesion'] = math.nan if row['fault'] else least_time_s(case) / row['stop_time_s']
+        rows.append(row)
+    groups = list(dict.fromkeys(case.group for case in cases))
+    scores = [_score(group, [row for row in rows if row['group'] == group]) for group in groups]
+    return Result(entry, [*scores, _score('all', rows)], rows)

@@ -1,0 +1,110 @@
+"""The rig's equations (1), (2), (6), (7) as CasADi expressions, with the values of a plant of ours."""
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..simulation import keys
+
+#: indices of the state: slip, speed of the lower wheel, brake torque, distance. With the slip in the place of the upper
+#: wheel's speed the solver sees the fast motion at its own scale.
+SLIP, OMEGA2, TORQUE, DISTANCE = range(4)
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Both wheels in contact while they turn forwards, and the brake without dead time, hysteresis and fading."""
+    values: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, **arguments: Any) -> Rig:
+        """The plant that these arguments of abs_hil.simulate give."""
+        prefix = 'plant.'
+        return cls({name[len(prefix):]: row['value'] for name, row in keys(**arguments).items() if name.startswith(prefix)})
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.values[name])
+
+    @property
+    def max_torque_Nm(self) -> float:
+        """The largest static torque of the brake, b(1)."""
+        return max(0.0, self['b1_Nm'] + self['b2_Nm'])
+
+    @property
+    def rate_limit_Nm_s(self) -> float:
+        """The fastest change of the brake torque; infinite without a limit."""
+        return self['brake_rate_limit_Nm_s'] or math.inf
+
+    def state(self, omega1_rad_s: float, omega2_rad_s: float, torque_Nm: float = 0.0, distance_m: float = 0.0) -> np.ndarray:
+        slip = 1.0 - self['r1_m'] * omega1_rad_s / (self['r2_m'] * omega2_rad_s)
+        return np.array([slip, omega2_rad_s, torque_Nm, distance_m])
+
+    def omega1_rad_s(self, x: Any) -> Any:
+        return (1.0 - x[SLIP]) * x[OMEGA2] * self['r2_m'] / self['r1_m']
+
+    def _curve(self, slip: Any) -> Any:
+        """The friction curve of the tyre model, without its scale; odd in the slip."""
+        if self.values['tyre'] == 'magic-formula':
+            return ca.sin(self['C'] * ca.atan(self['B'] * slip))
+        # In traction this curve's slip is that over the wheel's speed.
+        pulled = ca.fmin(slip, 0.0)
+        slip = ca.fmax(slip, 0.0) + pulled / (1.0 - pulled)
+        # Powers need a base above 0; the curve is below 1e-11 at this floor.
+        size = ca.sqrt(slip * slip + 1e-14)
+        power = size ** self['mu_p']
+        curve = (self['mu_w4'] * power / (self['mu_a'] + power)
+                 + size * (self['mu_w1'] + size * (self['mu_w2'] + size * self['mu_w3'])))
+        return slip / size * curve
+
+    @functools.cached_property
+    def _highest(self) -> float:
+        """Maximum of the friction curve over [0, 1]; it may lie at the end."""
+        return float(self._curve(ca.DM(np.linspace(0.0, 1.0, 2001) ** 2)).full().max())
+
+    def force_N(self, x: Any, friction: Any) -> Any:
+        """Tyre force while both wheels turn forwards."""
+        magic = self.values['tyre'] == 'magic-formula'
+        shape = self._curve(x[SLIP]) / (1.0 if magic else self._highest)
+        if self.values['load'] == 'constant':
+            return self['theta_N'] * friction * shape
+        mu = (self['mu_peak'] if magic else self._highest) * friction * shape
+        phi = math.radians(self['lever_phi_deg'])
+        pressed_Nm = self['lever_Mg_Nm'] + x[TORQUE] + self['M10_Nm'] + self['d1_Nms_rad'] * self.omega1_rad_s(x)
+        return mu * pressed_Nm / (self['lever_L_m'] * (math.sin(phi) - mu * math.cos(phi)))
+
+    @property
+    def limited(self) -> bool:
+        return self.rate_limit_Nm_s < math.inf
+
+    def torque_rate_Nm_s(self, x: Any, command_Nm: Any) -> Any:
+        """The brake's answer to a commanded torque: the lag, limited to the brake's rate."""
+        rate = self['c31_per_s'] * (command_Nm - x[TORQUE])
+        return ca.fmin(ca.fmax(rate, -self.rate_limit_Nm_s), self.rate_limit_Nm_s) if self.limited else rate
+
+    def wheel_rates(self, x: Any, force_N: Any) -> tuple[Any, Any]:
+        """omega1' and omega2' under a tyre force, rad/s^2."""
+        upper = (self['r1_m'] * force_N - self['d1_Nms_rad'] * self.omega1_rad_s(x) - self['M10_Nm'] - x[TORQUE])
+        lower = -self['r2_m'] * force_N - self['d2_Nms_rad'] * x[OMEGA2] - self['M20_Nm']
+        return upper / self['J1_kg_m2'], lower / self['J2_kg_m2']
+
+    def rates(self, x: Any, torque_rate_Nm_s: Any, friction: Any) -> Any:
+        """Time derivative of the state."""
+        upper, lower = self.wheel_rates(x, self.force_N(x, friction))
+        slip_rate = ((1.0 - x[SLIP]) * lower - self['r1_m'] / self['r2_m'] * upper) / x[OMEGA2]
+        return ca.vertcat(slip_rate, lower, torque_rate_Nm_s, self['r2_m'] * x[OMEGA2])
+
+    def rates_function(self) -> ca.Function:
+        """`rates` of (state, torque rate, friction)."""
+        x, w, f = ca.SX.sym('x', 4), ca.SX.sym('w'), ca.SX.sym('f')
+        return ca.Function('rates', [x, w, f], [self.rates(x, w, f)])
+
+    def force_function(self) -> ca.Function:
+        """`force_N` of (state, friction)."""
+        x, f = ca.SX.sym('x', 4), ca.SX.sym('f')
+        return ca.Function('force', [x, f], [self.force_N(x, f)])

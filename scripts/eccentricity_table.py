@@ -1,0 +1,86 @@
+#!/usr/bin/env python3
+"""usage: eccentricity_table.py --check|--write
+
+What eccentric encoders cost each controller: the mean braking distance over the three plants, relative to the same run with
+sound encoders, with a model that does not know the eccentricity, knows it, or learns it while coasting. The table stands
+in docs/plants.md between the lines
+
+    <!-- eccentricity -->
+    <!-- end -->
+
+--write puts it there, --check fails where the page says something else. Needs the package abs_hil of a build
+(PYTHONPATH=build/release/share/abs_hil/python).
+"""
+import pathlib
+import re
+import sys
+
+import numpy as np
+
+import abs_hil
+
+PAGE = pathlib.Path(__file__).resolve().parent.parent / 'docs' / 'plants.md'
+MARKED = re.compile(r'^(<!-- eccentricity -->\n)(.*?)^(<!-- end -->)$', re.MULTILINE | re.DOTALL)
+PLANTS = ('paper-table1', 'paper-timing', 'inteco-manual')
+#: several, because the distance depends on where the discs stand
+PHASES_RAD = ((1.0, -2.0), (-2.5, 0.5))
+
+
+def settings(e_rad, phases_rad, knows):
+    values = {}
+    for wheel, phase_rad in zip(('upper', 'lower'), phases_rad):
+        values |= {f'plant.{wheel}_encoder_eccentricity_rad': e_rad, f'plant.{wheel}_encoder_phase_rad': phase_rad}
+        if knows != 'model':
+            values[f'model.{wheel}_encoder_eccentricity_rad'] = 0.0
+    if knows == 'learns':
+        values['control.observer.learn_eccentricity_s'] = 0.4
+    return values
+
+
+def distances_m(controller, e_rad, knows):
+    """Shape (plants, phases); NaN for a run that a fault ended."""
+    runs = [{'controller': controller, 'plant': plant, 'experiment': 'coast-and-brake', 'set': settings(e_rad, phases, knows)}
+            for plant in PLANTS for phases in PHASES_RAD]
+    study = abs_hil.simulate_many(runs)
+    found = np.where(study['fault'] == '', study['stop_distance_m'], np.nan)
+    return found.reshape(len(PLANTS), len(PHASES_RAD))
+
+
+def cell(excess):
+    faults = int(np.isnan(excess).sum())
+    if faults:
+        return f'{faults} of {excess.size} runs fail'
+    return f'{100 * excess.mean():+.1f} ({100 * excess.max():+.1f})'
+
+
+def table():
+    columns = [(3e-3, 'unknown'), (1e-2, 'unknown'), (1e-2, 'model'), (1e-2, 'learns')]
+    words = {'unknown': 'unknown', 'model': 'in the model', 'learns': 'learnt'}
+    heads = [f'{1e3 * e:g} mrad, {words[knows]}' for e, knows in columns]
+    lines = ['| braking distance, % more: mean (worst) | ' + ' | '.join(heads) + ' |', '|---' + '|---:' * len(heads) + '|']
+    for controller in abs_hil.controllers():
+        sound = distances_m(controller, 0.0, 'model')
+        cells = [cell(distances_m(controller, e, knows) / sound - 1.0) for e, knows in columns]
+        lines.append(f'| `{controller}` | ' + ' | '.join(cells) + ' |')
+    return '\n'.join(lines) + '\n'
+
+
+def main():
+    if sys.argv[1:] not in (['--check'], ['--write']):
+        print(__doc__, file=sys.stderr)
+        return 2
+    page = PAGE.read_text(encoding='utf-8')
+    if not MARKED.search(page):
+        print(f'{PAGE}: the line <!-- eccentricity --> is missing', file=sys.stderr)
+        return 1
+    current = MARKED.sub(lambda match: match[1] + table() + match[3], page)
+    if sys.argv[1] == '--write':
+        PAGE.write_text(current, encoding='utf-8')
+    elif current != page:
+        print('docs/plants.md: the table of eccentricity is stale; scripts/eccentricity_table.py --write mends it')
+        return 1
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "abs_hil/rig/parameters.hpp"
+
+namespace abs_hil::control {
+
+/// A wheel's encoder disc as the model knows it: what its eccentricity adds to a reading. Real-time safe.
+class EncoderDisc {
+ public:
+  /// @param counts_per_rev  encoder counts per revolution, > 0
+  EncoderDisc(const rig::EccentricityParameters& eccentricity, std::int32_t counts_per_rev) noexcept
+      : eccentricity_{eccentricity}, counts_per_rev_{counts_per_rev} {}
+
+  [[nodiscard]] bool eccentric() const noexcept { return eccentricity_.eccentricity_rad > 0.0; }
+  /// Starts from a reading.
+  void reset(std::int32_t counts) noexcept;
+  /// A later reading: its place within the turn, the error there, and the counts by which the wheel itself has turned.
+  struct Reading {
+    std::int32_t place{0};
+    double error_counts{0.0};
+    double own_travel{0.0};
+  };
+  /// The reading `travel` counts after the one that was taken last.
+  [[nodiscard]] Reading look(std::int32_t travel) const noexcept;
+  void take(const Reading& reading) noexcept {
+    place_ = reading.place;
+    error_counts_ = reading.error_counts;
+  }
+  /// Replaces what is known of the eccentricity. It counts from the next reading on.
+  void know(const rig::EccentricityParameters& eccentricity) noexcept;
+  [[nodiscard]] const rig::EccentricityParameters& known() const noexcept { return eccentricity_; }
+
+ private:
+  [[nodiscard]] double error_counts(std::int32_t place) const noexcept;
+
+  rig::EccentricityParameters eccentricity_;
+  std::int32_t counts_per_rev_;
+  std::int32_t place_{0};  ///< of the latest reading within its turn, counts
+  double error_counts_{0.0};
+};
+
+/// Fits a disc's eccentricity to the readings of a wheel that coasts: angle over time is a cubic, and the reading
+/// differs from it by A cos + B sin of itself. Least squares over blocks of a fixed time, each with its own result; the
+/// cubic follows bearing friction over a second to far below a count. Real-time safe: a fixed number of operations.
+class EccentricityFit {
+ public:
+  /// @param block_s  length of a block, > 0
+  EccentricityFit(double block_s, std::int32_t counts_per_rev) noexcept;
+
+  /// Forgets the present block.
+  void restart() noexcept { samples_ = 0; }
+  /// Takes a reading. Returns the block's result where it completes one in which the wheel turned often enough.
+  [[nodiscard]] std::optional<rig::EccentricityParameters> take(std::int64_t time_ns, std::int32_t counts) noexcept;
+
+ private:
+  static constexpr std::size_t unknowns = 6;
+
+  void begin(std::int64_t time_ns, std::int32_t counts) noexcept;
+  [[nodiscard]] std::optional<rig::EccentricityParameters> solved() noexcept;
+
+  double block_s_;
+  std::int32_t counts_per_rev_;
+  std::int64_t start_ns_{0};
+  std::int32_t start_counts_{0};
+  std::int32_t latest_counts_{0};
+  std::int64_t travel_{0};  ///< since the block's start
+  std::int64_t samples_{0};
+  std::array<std::array<double, unknowns + 1>, unknowns> normal_{};  ///< equations, with their right-hand side
+};
+
+}  // namespace abs_hil::control

@@ -1,0 +1,70 @@
+#include "plant_sim/brake_path.hpp"
+
+#include <algorithm>
+
+#include "abs_hil/rig/scalar.hpp"
+
+namespace abs_hil::plant_sim {
+namespace {
+
+/// Changes of the duty on their way at most: those of the longest dead time at 10 kHz. Beyond them the newest replaces
+/// the one before.
+constexpr std::size_t changes_most = 2048;
+/// Rounding error of the sum of a run's intervals; a change that is due within it is due.
+constexpr double due_rounding_s = 1e-11;
+
+}  // namespace
+
+BrakePath::BrakePath(const BrakeFlaws& flaws, bool ideal_actuator)
+    : dead_time_s_(flaws.dead_time_s),
+      hysteresis_(ideal_actuator ? 0.0 : flaws.hysteresis),
+      fading_per_J_(ideal_actuator ? 0.0 : flaws.fading_per_J),
+      changes_(!ideal_actuator && flaws.dead_time_s > 0.0 ? changes_most : 0) {}
+
+void BrakePath::start() noexcept {
+  first_ = count_ = 0;
+  time_s_ = newest_ = duty_ = held_Nm_ = energy_J_ = 0.0;
+}
+
+void BrakePath::command(double duty) noexcept {
+  if (!delays()) {
+    duty_ = duty;
+    return;
+  }
+  settle();
+  if (duty == newest_) return;
+  newest_ = duty;
+  if (count_ == changes_.size()) --count_;
+  changes_[(first_ + count_) % changes_.size()] = {time_s_ + dead_time_s_, duty};
+  ++count_;
+}
+
+double BrakePath::part_s(double left_s, double max_step_s) const noexcept {
+  double part_s = left_s;
+  if (count_ > 0) part_s = std::min(part_s, next().due_s - time_s_);
+  if (fades()) part_s = std::min(part_s, max_step_s);
+  return part_s;
+}
+
+double BrakePath::transmitted_Nm(double static_Nm, double part_s, double power_W) noexcept {
+  // Fading acts as it is in the part's middle.
+  const double taken_J = energy_J_ + 0.5 * part_s * power_W;
+  const double target_Nm = static_Nm * (1.0 + rig::exponential_less_one(-fading_per_J_ * taken_J));
+  held_Nm_ = std::clamp(held_Nm_, (1.0 - hysteresis_) * target_Nm, (1.0 + hysteresis_) * target_Nm);
+  return held_Nm_;
+}
+
+void BrakePath::pass(double part_s, double energy_J) noexcept {
+  time_s_ += part_s;
+  energy_J_ += energy_J;
+  settle();
+}
+
+void BrakePath::settle() noexcept {
+  for (; count_ > 0 && next().due_s <= time_s_ + due_rounding_s; --count_) {
+    duty_ = next().duty;
+    first_ = (first_ + 1) % changes_.size();
+  }
+}
+
+}  // namespace abs_hil::plant_sim

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "abs_hil/plant_sim/options.hpp"
+
+namespace abs_hil::plant_sim {
+
+/// What a real brake does to its command before the lag (6): dead time, fading by the energy it has taken, and the
+/// hysteresis of a cable. Real-time safe except for the constructor.
+class BrakePath {
+ public:
+  BrakePath(const BrakeFlaws& flaws, bool ideal_actuator);
+
+  /// False if the duty acts at once and gives b(u); then the calls below are unnecessary.
+  [[nodiscard]] bool any() const noexcept { return delays() || fades() || hysteresis_ > 0.0; }
+  /// Returns to a cold brake that has long been released.
+  void start() noexcept;
+  /// Stores the duty that is sent from now on.
+  void command(double duty) noexcept;
+  /// The duty that acts now.
+  [[nodiscard]] double duty() const noexcept { return duty_; }
+  /// Length of the next part under one duty: `left_s` > 0, but only up to the next change, and at most `max_step_s`
+  /// while the brake fades.
+  [[nodiscard]] double part_s(double left_s, double max_step_s) const noexcept;
+  /// The torque that the lag approaches within a part: b(u) of the duty, less what fading and hysteresis take.
+  /// @param static_Nm  b(u) of the duty
+  /// @param power_W  of the brake at the part's start
+  [[nodiscard]] double transmitted_Nm(double static_Nm, double part_s, double power_W) noexcept;
+  /// Advances the time by one part.
+  /// @param energy_J  that the brake has taken in it, >= 0
+  void pass(double part_s, double energy_J) noexcept;
+
+ private:
+  struct Change {
+    double due_s;
+    double duty;
+  };
+
+  [[nodiscard]] bool delays() const noexcept { return !changes_.empty(); }
+  [[nodiscard]] bool fades() const noexcept { return fading_per_J_ > 0.0; }
+  [[nodiscard]] const Change& next() const noexcept { return changes_[first_]; }
+  void settle() noexcept;
+
+  double dead_time_s_;
+  double hysteresis_;
+  double fading_per_J_;
+  std::vector<Change> changes_;  ///< a ring of the changes on their way; empty: without dead time
+  std::size_t first_{0};
+  std::size_t count_{0};
+  double time_s_{0.0};
+  double newest_{0.0};  ///< duty of the last command
+  double duty_{0.0};
+  double held_Nm_{0.0};  ///< behind the hysteresis
+  double energy_J_{0.0};
+};
+
+}  // namespace abs_hil::plant_sim

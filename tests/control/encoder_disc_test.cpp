@@ -1,0 +1,112 @@
+#include "control/encoder_disc.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <optional>
+
+#include "catch.hpp"
+#include "control/tracking_observer.hpp"
+
+using namespace abs_hil;
+using Catch::Matchers::WithinAbs;
+
+namespace {
+
+constexpr std::int32_t counts_per_rev = 4096;
+constexpr double rad_per_count = 2.0 * std::numbers::pi / counts_per_rev;
+
+/// What an eccentric disc reads; written apart from the simulator's encoder.
+std::int32_t reading(double angle_rad, const rig::EccentricityParameters& disc) {
+  const double read_rad = angle_rad + disc.eccentricity_rad * std::sin(angle_rad + disc.phase_rad);
+  return static_cast<std::int32_t>(static_cast<std::int64_t>(std::floor(read_rad / rad_per_count)));
+}
+
+/// A wheel that coasts: bearing friction with a part that grows with the speed.
+double coasting_rad(double time_s) {
+  return 0.3 + 165.0 * time_s - 0.5 * 9.0 * time_s * time_s + 0.02 * std::pow(time_s, 3);
+}
+
+/// Largest error of the observer's speed at a constant 120 rad/s, after it has settled.
+double largest_error_rad_s(const rig::EccentricityParameters& disc, const rig::EccentricityParameters& known) {
+  control::TrackingObserver observer(control::ObserverOptions{}, counts_per_rev,
+                                     std::numeric_limits<double>::infinity(), known);
+  observer.reset(reading(0.2, disc), 120.0);
+  double largest = 0.0;
+  for (int tick = 1; tick < 1000; ++tick) {
+    observer.update(reading(0.2 + 120.0 * 1e-3 * tick, disc), 1e-3);
+    if (tick > 200) largest = std::max(largest, std::abs(observer.omega_rad_s() - 120.0));
+  }
+  return largest;
+}
+
+}  // namespace
+
+TEST_CASE("The fit finds the eccentricity of a coasting wheel within a tenth of a count") {
+  const double e = GENERATE(0.0, 3e-3, 1e-2, 3e-2);
+  const double phase = GENERATE(-2.5, 0.4, 3.0);
+  const std::int32_t start = GENERATE(0, -3'000'000);
+  control::EccentricityFit fit(0.4, counts_per_rev);
+  std::optional<rig::EccentricityParameters> found;
+  int results = 0;
+  for (int tick = 0; tick <= 900; ++tick) {
+    const std::int32_t counts = start + reading(coasting_rad(tick * 1e-3), {e, phase});
+    if (const auto result = fit.take(tick * std::int64_t{1'000'000}, counts)) {
+      found = result;
+      ++results;
+    }
+  }
+  CHECK(results == 2);
+  REQUIRE(found);
+  const double turned = (start % counts_per_rev) * rad_per_count;
+  CHECK_THAT(found->eccentricity_rad * std::cos(found->phase_rad),
+             WithinAbs(e * std::cos(phase - turned), 0.1 * rad_per_count));
+  CHECK_THAT(found->eccentricity_rad * std::sin(found->phase_rad),
+             WithinAbs(e * std::sin(phase - turned), 0.1 * rad_per_count));
+}
+
+TEST_CASE("A wheel that hardly turns teaches nothing") {
+  control::EccentricityFit fit(0.4, counts_per_rev);
+  for (int tick = 0; tick <= 2000; ++tick) {
+    CHECK_FALSE(fit.take(tick * std::int64_t{1'000'000}, reading(15.0 * tick * 1e-3, {0.01, 1.0})));
+  }
+}
+
+TEST_CASE("Eccentricity swings the observed speed by e w, and the correction takes the swing away") {
+  const rig::EccentricityParameters disc{0.01, 0.7};
+  const double wrong = largest_error_rad_s(disc, {});
+  const double right = largest_error_rad_s(disc, disc);
+  // e w = 1.2 rad/s at 120 rad/s, through the observer with its triple pole at 150 rad/s, whose
+  // transfer function from speed to estimate is (3 a^2 s + a^3) / (s + a)^3 at s = 120i.
+  const std::complex<double> s(0.0, 120.0);
+  const double a = 150.0;
+  const double gain = std::abs((3.0 * a * a * s + a * a * a) / std::pow(s + a, 3));
+  CHECK_THAT(wrong, WithinAbs(1.2 * gain, 0.15));
+  CHECK(right < 0.1 * wrong);  // what the counts alone leave
+}
+
+TEST_CASE("What is learnt takes effect without a step of the speed") {
+  const rig::EccentricityParameters disc{0.02, 0.7};
+  control::TrackingObserver observer(control::ObserverOptions{}, counts_per_rev);
+  observer.reset(reading(0.0, disc), 120.0);
+  for (int tick = 1; tick < 500; ++tick) observer.update(reading(0.12 * tick, disc), 1e-3);
+  const double before = observer.omega_rad_s();
+  observer.know(disc);
+  CHECK(observer.omega_rad_s() == before);
+  for (int tick = 500; tick < 700; ++tick) observer.update(reading(0.12 * tick, disc), 1e-3);
+  CHECK_THAT(observer.omega_rad_s(), WithinAbs(120.0, 0.2));
+}
+
+TEST_CASE("A disc without eccentricity passes the counts on") {
+  control::EncoderDisc disc({}, counts_per_rev);
+  disc.reset(-17);
+  for (const std::int32_t travel : {0, 5, -5, 4096, -100'000, 2'000'000'000}) {
+    const auto read = disc.look(travel);
+    CHECK(read.own_travel == travel);
+    CHECK((read.place >= 0 && read.place < counts_per_rev));
+    disc.take(read);
+  }
+}
