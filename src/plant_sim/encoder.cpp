@@ -20,6 +20,12 @@ std::int64_t whole_turns(std::int64_t edges, std::int64_t counts_per_rev) noexce
   return edges / counts_per_rev - (edges % counts_per_rev < 0 ? 1 : 0);
 }
 
+/// The eccentricity that both encoders have, in the phase of this one, added to its own.
+rig::EccentricityParameters beside(double both_rad, rig::EccentricityParameters own) noexcept {
+  own.eccentricity_rad += both_rad;
+  return own;
+}
+
 }  // namespace
 
 std::int32_t encoder_counts(double angle_rad, std::int32_t counts_per_rev) noexcept {
@@ -64,10 +70,12 @@ std::int32_t Encoder::counts(double angle_rad, double offset_rad) const noexcept
 }
 
 Encoder upper_encoder(const PlantOptions& plant) noexcept {
-  return {plant.rig.encoder_counts_per_rev, plant.rig.upper_encoder, plant.upper_encoder_flaws};
+  return {plant.rig.encoder_counts_per_rev, beside(plant.encoder_eccentricity_rad, plant.rig.upper_encoder),
+          plant.upper_encoder_flaws};
 }
 Encoder lower_encoder(const PlantOptions& plant) noexcept {
-  return {plant.rig.encoder_counts_per_rev, plant.rig.lower_encoder, plant.lower_encoder_flaws};
+  return {plant.rig.encoder_counts_per_rev, beside(plant.encoder_eccentricity_rad, plant.rig.lower_encoder),
+          plant.lower_encoder_flaws};
 }
 
 }  // namespace abs_hil::plant_sim

@@ -84,6 +84,19 @@ TEST_CASE("Eccentricity makes the speed swing by eccentricity times speed, once 
   CHECK_THAT(largest, WithinAbs(e * omega, 0.07));
 }
 
+TEST_CASE("Both encoders may have an eccentricity beside their own, each in its phase") {
+  PlantOptions plant;
+  plant.encoder_eccentricity_rad = 0.02;
+  plant.rig.upper_encoder = {.eccentricity_rad = 0.01, .phase_rad = 0.5};
+  plant.rig.lower_encoder.phase_rad = 2.0;
+  const Encoder upper(4096, {.eccentricity_rad = 0.03, .phase_rad = 0.5}, {});
+  const Encoder lower(4096, {.eccentricity_rad = 0.02, .phase_rad = 2.0}, {});
+  for (double angle = 0.0; angle < 7.0; angle += 0.1) {
+    CHECK(upper_encoder(plant).counts(angle) == upper.counts(angle));
+    CHECK(lower_encoder(plant).counts(angle) == lower.counts(angle));
+  }
+}
+
 TEST_CASE("Unequal slots move every second edge and lose no count") {
   const Encoder encoder(8, {}, {.slot_error_counts = 0.3});
   const double count = radians_per_count(8);

@@ -111,6 +111,10 @@ struct PlantOptions {
                  .meaning = "simulation: friction over time or distance (docs/plants.md)");
   ABS_HIL_GROUP(DriftProfiles, drift, "", {});
   ABS_HIL_GROUP(BrakeFlaws, brake_flaws, "brake_", {});
+  ABS_HIL_OPTION(
+      double, encoder_eccentricity_rad, 0.0, .unit = "rad",
+      .meaning = "simulation: eccentricity of both encoders that the model does not know, beside each one's own",
+      .range = rig::from_zero(0.1));
   ABS_HIL_GROUP(EncoderFlaws, upper_encoder_flaws, "upper_encoder_", {});
   ABS_HIL_GROUP(EncoderFlaws, lower_encoder_flaws, "lower_encoder_", {});
 };
