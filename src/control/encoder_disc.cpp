@@ -80,10 +80,11 @@ auto EccentricityFit::take(std::int64_t time_ns, std::int32_t counts) noexcept
   const double t = 2.0 * passed_s / block_s_ - 1.0;  // in [-1, 1], where the powers are far from each other
   const double read_rad =
       middle_rad(within_turn(static_cast<std::int64_t>(start_counts_) + travel_, counts_per_rev_), rad_per_count);
-  const std::array<double, unknowns + 1> row{
+  constexpr std::size_t columns = unknowns + 1;
+  const std::array<double, columns> row{
       1.0, t, t * t, t * t * t, cosine_of(read_rad), sine_of(read_rad), static_cast<double>(travel_) * rad_per_count};
   for (std::size_t i = 0; i < unknowns; ++i) {
-    for (std::size_t j = i; j <= unknowns; ++j) normal_[i][j] += row[i] * row[j];
+    for (std::size_t j = i; j < columns; ++j) normal_[i][j] += row[i] * row[j];
   }
   ++samples_;
   if (passed_s < block_s_) return std::nullopt;
