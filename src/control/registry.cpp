@@ -10,6 +10,7 @@
 
 #include "control/adaptive_actuator_controller.hpp"
 #include "control/adaptive_controller.hpp"
+#include "control/adaptive_optimal_controller.hpp"
 #include "control/adaptive_peak_controller.hpp"
 #include "control/five_phase_controller.hpp"
 #include "control/locked_controller.hpp"
@@ -33,6 +34,8 @@ constexpr std::array own_table{
                                                  "adaptive slip control that steps back through the brake's lag (6)"),
     controller_entry<AdaptivePeakController>("adaptive-peak",
                                              "seeks the slip of peak friction by itself, told nothing of the tyre"),
+    controller_entry<AdaptiveOptimalController>(
+        "adaptive-optimal", "brakes at the unknown peak of friction, and moves the brake as little as that allows"),
     controller_entry<NominalController>("nominal", "slip control with a known peak tyre force: (16) of the paper"),
     controller_entry<SlidingModeController>("sliding-mode",
                                             "textbook sliding mode, the paper's own baseline is not public: chatters"),

@@ -123,7 +123,7 @@ TEST_CASE("groups have the order of recorded configurations") {
   CHECK(controllers == std::vector<std::string>{"controller", "rate_Hz", "slip_ref", "v_min_m_s", "adaptive", "nominal",
                                                 "observer", "sliding_mode", "sliding_mode_smooth", "super_twisting",
                                                 "relay", "pi", "five_phase", "adaptive_actuator", "adaptive_peak",
-                                                "sliding_mode_actuator", "foreign"});
+                                                "adaptive_optimal", "sliding_mode_actuator", "foreign"});
 }
 
 TEST_CASE("options that act only when braking begins are marked as start values") {

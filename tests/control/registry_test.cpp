@@ -89,6 +89,11 @@ TEST_CASE("Options that are not usable are refused when the controller is made")
   refused("adaptive-peak", [](auto& o) { o.adaptive_peak.peak.peak_slip0 = 0.5; });
   refused("adaptive-peak", [](auto& o) { o.adaptive_peak.peak.force_noise_N2_s = 0.0; });
   refused("adaptive-peak", [=](auto& o) { o.adaptive_peak.observer.brake_rate_Nm2_s = nan; });
+  refused("adaptive-optimal", [](auto& o) { o.adaptive_optimal.slip_gain_per_s = 0.0; });
+  refused("adaptive-optimal", [](auto& o) { o.adaptive_optimal.slip_min = 0.4; });
+  refused("adaptive-optimal", [](auto& o) { o.adaptive_optimal.slip_start = 0.5; });
+  refused("adaptive-optimal", [=](auto& o) { o.adaptive_optimal.play_Nm = nan; });
+  refused("adaptive-optimal", [](auto& o) { o.adaptive_optimal.bank.force_noise_N2_s = 0.0; });
   refused("nominal", [](auto& o) { o.nominal.theta0_N = -5.0; });
 }
 

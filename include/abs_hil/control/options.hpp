@@ -119,6 +119,98 @@ struct AdaptivePeakOptions {
   ABS_HIL_GROUP(ForceObserverOptions, observer, "", {.force_rate_N2_s = 200.0, .brake_rate_Nm2_s = 3.0});
 };
 
+/// FrictionBank: what is known of the tyre before braking, and how well its inputs are trusted.
+struct FrictionBankOptions {
+  ABS_HIL_OPTIONS(FrictionBankOptions);
+  ABS_HIL_OPTION(double, force_bandwidth_rad_s, 136.0, .unit = "rad/s",
+                 .meaning = "bandwidth of the force that the curve is learnt from", .range = rig::between(10, 2000),
+                 .search = rig::search(80, 300));
+  ABS_HIL_OPTION(double, force_noise_N2_s, 0.002, .unit = "N^2 s", .meaning = "intensity of that force's noise",
+                 .range = rig::positive(100), .search = rig::search(1e-4, 0.1));
+  ABS_HIL_OPTION(double, force_error, 0.01, .meaning = "part of the force that the curve need not explain",
+                 .range = rig::positive(1), .search = rig::search(1e-3, 0.1));
+  ABS_HIL_OPTION(double, timing_error_s, 0.0018, .unit = "s", .meaning = "delay between slip and force left unknown",
+                 .range = rig::from_zero(0.1));
+  ABS_HIL_OPTION(double, slip_noise_m_s, 0.003, .unit = "m/s", .meaning = "error of the difference of both speeds",
+                 .range = rig::from_zero(1));
+  ABS_HIL_OPTION(double, start_s, 0.017, .unit = "s", .meaning = "time at the start in which nothing is learnt",
+                 .range = rig::from_zero(1));
+  ABS_HIL_OPTION(double, slip0, 0.078, .meaning = "median of the peak's slip before braking",
+                 .range = rig::open_between(0, 1), .search = rig::search(0.03, 0.2));
+  ABS_HIL_OPTION(double, slip_spread, 0.9, .meaning = "standard deviation of the logarithm of the peak's slip",
+                 .range = rig::between(0.05, 5));
+  ABS_HIL_OPTION(double, level0_N, 12.5, .unit = "N", .meaning = "first guess of the peak's force",
+                 .range = rig::positive(500));
+  ABS_HIL_OPTION(double, level_spread_N, 22.5, .unit = "N", .meaning = "standard deviation of this guess",
+                 .range = rig::positive(500));
+  ABS_HIL_OPTION(double, zero_spread, 0.009, .meaning = "standard deviation of the slip read at no force",
+                 .range = rig::between(1e-6, 0.1));
+  ABS_HIL_OPTION(double, level_drift_per_s, 0.005, .unit = "1/s",
+                 .meaning = "variance gained per second by the logarithm of the peak's force",
+                 .range = rig::from_zero(100));
+  ABS_HIL_OPTION(double, zero_drift_per_s, 1e-4, .unit = "1/s",
+                 .meaning = "variance gained per second by the slip read at no force", .range = rig::from_zero(1));
+  ABS_HIL_OPTION(double, share_per_s, 0.013, .unit = "1/s",
+                 .meaning = "part of the weights that returns to the curves known before braking, per second",
+                 .range = rig::between(1e-9, 100));
+  ABS_HIL_OPTION(double, jump_level, 0.11, .meaning = "unexplained part of the peak's force that is a friction jump",
+                 .range = rig::positive(10), .search = rig::search(0.05, 0.5));
+  ABS_HIL_OPTION(double, jump_least_N, 2.5, .unit = "N", .meaning = "least unexplained force that is a friction jump",
+                 .range = rig::positive(500));
+  ABS_HIL_OPTION(double, jump_confirm_s, 0.0028, .unit = "s", .meaning = "time that it must last",
+                 .range = rig::from_zero(1));
+  ABS_HIL_OPTION(double, jump_hold_s, 0.04, .unit = "s",
+                 .meaning = "time after a jump in which only the level is learnt", .range = rig::positive(1));
+  ABS_HIL_OPTION(double, jump_time_constant_s, 0.0023, .unit = "s",
+                 .meaning = "time constant with which the level is learnt then", .range = rig::positive(1));
+  ABS_HIL_OPTION(double, jump_spread, 0.1, .meaning = "relative standard deviation of the level after that",
+                 .range = rig::from_zero(10));
+  ABS_HIL_OPTION(double, jump_after_s, 0.1, .unit = "s",
+                 .meaning = "time at the start in which no friction jump is looked for", .range = rig::from_zero(10));
+};
+
+/// Slip controller that finds the peak of the tyre force, and spares the brake.
+struct AdaptiveOptimalOptions {
+  ABS_HIL_OPTIONS(AdaptiveOptimalOptions);
+  ABS_HIL_OPTION(double, slip_gain_per_s, 67.0, .unit = "1/s", .meaning = "decay of a large slip velocity error",
+                 .range = rig::positive(1e4), .search = rig::search(10, 200));
+  ABS_HIL_OPTION(double, slip_gain_near_per_s, 9.3, .unit = "1/s", .meaning = "decay of a small one",
+                 .range = rig::positive(1e4), .search = rig::search(2, 100));
+  ABS_HIL_OPTION(double, slip_near_m_s, 0.07, .unit = "m/s", .meaning = "error at which the gain is half way between",
+                 .range = rig::positive(10), .search = rig::search(0.01, 1));
+  ABS_HIL_OPTION(double, torque_gain_per_s, 160.0, .unit = "1/s", .meaning = "decay of a large torque error",
+                 .range = rig::positive(1e4), .search = rig::search(20, 400));
+  ABS_HIL_OPTION(double, torque_gain_near_per_s, 30.0, .unit = "1/s", .meaning = "decay of a small one",
+                 .range = rig::positive(1e4), .search = rig::search(5, 200));
+  ABS_HIL_OPTION(double, torque_near_Nm, 0.54, .unit = "N m", .meaning = "error at which the gain is half way between",
+                 .range = rig::positive(100), .search = rig::search(0.03, 3));
+  ABS_HIL_OPTION(double, play_Nm, 0.137, .unit = "N m", .meaning = "change of the torque below which the brake rests",
+                 .range = rig::from_zero(10), .search = rig::search(0.01, 0.5));
+  ABS_HIL_OPTION(double, authority, 0.48, .meaning = "part of the fastest approach from too little slip that is used",
+                 .range = rig::between(0.01, 1));
+  ABS_HIL_OPTION(double, authority_past_peak, 1.0, .meaning = "the same where the force falls as the slip grows",
+                 .range = rig::between(0.01, 1));
+  ABS_HIL_OPTION(double, bold_slip, 0.95, .meaning = "slip that an unknown peak may cost at the start",
+                 .range = rig::positive(100), .search = rig::search(0.02, 5));
+  ABS_HIL_OPTION(double, model_error_per_s, 35.0, .unit = "1/s",
+                 .meaning = "how fast the error of the holding torque is learnt", .range = rig::positive(1e4),
+                 .search = rig::search(5, 200));
+  ABS_HIL_OPTION(double, peak_factor, 1.08, .meaning = "slip reference over the estimated slip of the peak",
+                 .range = rig::between(0.5, 2));
+  ABS_HIL_OPTION(double, slip_min, 0.015, .meaning = "least slip reference", .range = rig::open_between(0, 1));
+  ABS_HIL_OPTION(double, slip_max, 0.35, .meaning = "largest slip reference", .range = rig::open_between(0, 1));
+  ABS_HIL_OPTION(double, slip_start, 0.039, .meaning = "slip reference at the start of braking",
+                 .range = rig::open_between(0, 1));
+  ABS_HIL_OPTION(double, slip_rate_per_s, 8.1, .unit = "1/s",
+                 .meaning = "fastest change of the logarithm of the slip reference", .range = rig::positive(1000));
+  ABS_HIL_OPTION(double, search_part, 0.08, .meaning = "amplitude of the search as a part of the reference",
+                 .range = rig::from_zero_below(1));
+  ABS_HIL_OPTION(double, search_rad_s, 28.0, .unit = "rad/s", .meaning = "frequency of the search",
+                 .range = rig::positive(1000));
+  ABS_HIL_GROUP(FrictionBankOptions, bank, "", {});
+  ABS_HIL_GROUP(ForceObserverOptions, observer, "", {.force_rate_N2_s = 360.0, .brake_rate_Nm2_s = 0.046});
+};
+
 /// Nominal controller (16). It shares ks0 and ks1 with the adaptive one.
 struct NominalOptions {
   ABS_HIL_OPTIONS(NominalOptions);
@@ -170,6 +262,7 @@ struct ControlOptions {
   ABS_HIL_GROUP(FivePhaseOptions, five_phase, "five_phase.", {});
   ABS_HIL_GROUP(AdaptiveActuatorOptions, adaptive_actuator, "adaptive_actuator.", {});
   ABS_HIL_GROUP(AdaptivePeakOptions, adaptive_peak, "adaptive_peak.", {});
+  ABS_HIL_GROUP(AdaptiveOptimalOptions, adaptive_optimal, "adaptive_optimal.", {});
   ABS_HIL_GROUP(SlidingModeActuatorOptions, sliding_mode_actuator, "sliding_mode_actuator.", {});
   ABS_HIL_GROUP(ForeignOptions, foreign, "foreign.", {});
 };

@@ -1,0 +1,189 @@
+#include "control/adaptive_optimal_controller.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+
+#include "abs_hil/rig/option_check.hpp"
+#include "abs_hil/rig/scalar.hpp"
+#include "abs_hil/rig/tyre_curve.hpp"
+#include "control/full_torque.hpp"
+
+namespace abs_hil::control {
+namespace {
+
+constexpr double least_hold_Nm = 0.05;  ///< the limits below need a torque that can still fall
+constexpr double least_room_Nm = 0.2;   ///< the same for a torque near the brake's largest
+constexpr double usual_hold_Nm = 1.0;   ///< before a force is seen
+// The force at the peak is taken as known up to the first relative spread, as unknown from the second on.
+constexpr double known_spread = 0.15;
+constexpr double unknown_spread = 0.4;
+
+const AdaptiveOptimalOptions& checked(const AdaptiveOptimalOptions& o) {
+  rig::require_valid(o, "control.adaptive_optimal.");
+  if (!(o.slip_min < o.slip_max)) {
+    throw std::invalid_argument("control.adaptive_optimal.slip_min must be below control.adaptive_optimal.slip_max");
+  }
+  if (!(o.slip_start >= o.slip_min && o.slip_start <= o.slip_max)) {
+    throw std::invalid_argument("control.adaptive_optimal.slip_start must be in [slip_min, slip_max]");
+  }
+  return o;
+}
+
+ProximateTorque loop(const AdaptiveOptimalOptions& o, const rig::RigParameters& rig) noexcept {
+  const double limit = rig.brake.brake_rate_limit_Nm_s;
+  return {.mass_kg_m = rig.wheels.J1_kg_m2 / rig.wheels.r1_m,
+          .gain_per_s = o.slip_gain_per_s,
+          .near_per_s = o.slip_gain_near_per_s,
+          .near_m_s = o.slip_near_m_s,
+          .swing_per_s = rig.brake.c31_per_s,
+          .rate_limit_Nm_s = limit > 0.0 ? limit : std::numeric_limits<double>::infinity()};
+}
+
+}  // namespace
+
+AdaptiveOptimalController::AdaptiveOptimalController(const ControllerContext& context)
+    : options_{checked(context.options.adaptive_optimal)},
+      rig_{context.rig},
+      laws_{paper::laws(context.rig.wheels)},
+      lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},
+      period_s_{1.0 / context.options.rate_Hz},
+      v_min_m_s_{context.options.v_min_m_s},
+      loop_{loop(options_, context.rig)},
+      observer_{options_.observer, context.rig, context.options.rate_Hz},
+      force_{context.rig.wheels, options_.bank.force_bandwidth_rad_s},
+      bank_{options_.bank, context.options.rate_Hz, observer_.force_delay_s()} {}
+
+void AdaptiveOptimalController::reset(const SlipInput& input) noexcept {
+  observer_.reset(input.speeds);
+  force_.reset(input.speeds.omega2_rad_s);
+  bank_.reset();
+  reference_ = options_.slip_start;
+  model_error_Nm_ = sent_Nm_ = search_rad_ = travel_Nm_ = last_sent_Nm_ = 0.0;
+  last_omega2_rad_s_ = input.speeds.omega2_rad_s;
+}
+
+void AdaptiveOptimalController::learn(const SlipInput& input, double slip) noexcept {
+  if (!(input.dt_s > 0.0)) return;
+  const double omega2 = input.speeds.omega2_rad_s;
+  const double travel =
+      std::isnan(input.lower_travel_rad) ? 0.5 * (last_omega2_rad_s_ + omega2) * input.dt_s : input.lower_travel_rad;
+  last_omega2_rad_s_ = omega2;
+  const double omega2_est = observer_.speeds().omega2_rad_s;
+  force_.update(input.dt_s, travel, omega2_est);
+  bank_.learn({.dt_s = input.dt_s,
+               .slip = slip,
+               .car_speed_m_s = rig_.wheels.r2_m * omega2_est,
+               .force_N = force_.force_N(),
+               .covered = force_.covered(),
+               .quick_force_N = observer_.force_N()});
+  // The balance of both wheels, against that of the curve at the same slip.
+  const paper::Reading<double> same{.omega1 = 0.0, .omega2 = 0.0, .lambda_ref = 0.0, .phi = 1.0};
+  const double missing_Nm =
+      laws_.T_b(laws_.k(same) * (observer_.force_N() - bank_.late_force_N())) - observer_.brake_error_Nm();
+  const double covered = -rig::exponential_less_one(-options_.model_error_per_s * input.dt_s);
+  model_error_Nm_ += covered * (missing_Nm - model_error_Nm_);
+}
+
+double AdaptiveOptimalController::next_reference(double dt_s) noexcept {
+  const double target = std::clamp(options_.peak_factor * bank_.peak_slip(), options_.slip_min, options_.slip_max);
+  const double most = rig::exponential(options_.slip_rate_per_s * dt_s);
+  reference_ = std::clamp(target, reference_ / most, reference_ * most);
+  search_rad_ += options_.search_rad_s * dt_s;
+  if (search_rad_ > std::numbers::pi) search_rad_ = std::remainder(search_rad_, 2.0 * std::numbers::pi);
+  const double search = options_.search_part * rig::sine(search_rad_);
+  return reference_ * (1.0 + search) - bank_.slip_zero();
+}
+
+double AdaptiveOptimalController::holding_torque_Nm(const rig::WheelSpeeds& speeds, double slip,
+                                                    double force_N) const noexcept {
+  const paper::Reading<double> reading{
+      .omega1 = speeds.omega1_rad_s, .omega2 = speeds.omega2_rad_s, .lambda_ref = slip, .phi = 1.0};
+  return std::max(least_hold_Nm, laws_.T_b(laws_.xi_1(reading, 0.0, force_N)) + model_error_Nm_);
+}
+
+AdaptiveOptimalController::Holding AdaptiveOptimalController::holding(double slip, double reference,
+                                                                      double error_m_s) const noexcept {
+  const rig::WheelSpeeds speeds = observer_.speeds();
+  const FrictionBank::Force wanted = bank_.at(reference);
+  const double here_N = bank_.force_N();
+  const double wanted_Nm = holding_torque_Nm(speeds, reference, wanted.N);
+  if (error_m_s > 0.0) {
+    // Past the peak the force falls as the slip grows: the torque has to fall below what holds the slip there.
+    return {wanted_Nm, here_N < wanted.N ? holding_torque_Nm(speeds, slip, here_N) : wanted_Nm};
+  }
+  // Before the peak is known: dare an excess that costs no more than `bold_slip` if the peak is here, and dare at least
+  // that if nothing is known.
+  const double here_Nm = holding_torque_Nm(speeds, slip, std::max(0.0, here_N));
+  const double v_x = std::max(rig_.wheels.r2_m * speeds.omega2_rad_s, v_min_m_s_);
+  const double bold_Nm = std::sqrt(2.0 * options_.bold_slip * v_x * loop_.mass_kg_m * loop_.swing_per_s *
+                                   std::max(here_Nm, usual_hold_Nm));
+  const double spread = wanted.N > 0.0 ? wanted.spread_N / wanted.N : unknown_spread;
+  const double unknown = std::clamp((spread - known_spread) / (unknown_spread - known_spread), 0.0, 1.0);
+  const double dared_Nm = std::clamp(wanted_Nm, here_Nm + unknown * bold_Nm, here_Nm + bold_Nm);
+  return {dared_Nm, dared_Nm};
+}
+
+double AdaptiveOptimalController::wanted_torque_Nm(const Holding& hold, double error_m_s,
+                                                   double most_Nm) const noexcept {
+  const double size = std::abs(error_m_s);
+  if (error_m_s < 0.0) return hold.wanted_Nm + loop_.excess_Nm(size, hold.wanted_Nm, options_.authority);
+  const auto below = [&](double torque_Nm, double authority) {
+    return torque_Nm - loop_.excess_Nm(size, std::max(least_room_Nm, most_Nm - torque_Nm), authority);
+  };
+  return std::min(below(hold.wanted_Nm, options_.authority), below(hold.here_Nm, options_.authority_past_peak));
+}
+
+double AdaptiveOptimalController::through_lag_Nm(double torque_Nm, double wanted_Nm) const noexcept {
+  const double error_Nm = wanted_Nm - torque_Nm;
+  const double size = std::abs(error_Nm);
+  const double near = options_.torque_gain_near_per_s;
+  const double gain = near + (options_.torque_gain_per_s - near) * size / (size + options_.torque_near_Nm);
+  return lag_.command_Nm(torque_Nm, -rig::exponential_less_one(-gain * period_s_) * error_Nm);
+}
+
+double AdaptiveOptimalController::with_play_Nm(double torque_Nm, double most_Nm) noexcept {
+  if (torque_Nm <= 0.0 || torque_Nm >= most_Nm) return sent_Nm_ = std::clamp(torque_Nm, 0.0, most_Nm);
+  return sent_Nm_ = std::clamp(sent_Nm_, std::max(0.0, torque_Nm - options_.play_Nm),
+                               std::min(most_Nm, torque_Nm + options_.play_Nm));
+}
+
+SlipOutput AdaptiveOptimalController::step(const SlipInput& input) noexcept {
+  observer_.update(input);
+  const rig::WheelSpeeds speeds = observer_.speeds();
+  const double slip =
+      rig::wheel_slip(rig_.wheels.r1_m * speeds.omega1_rad_s, rig_.wheels.r2_m * speeds.omega2_rad_s, v_min_m_s_);
+  learn(input, slip);
+  const double reference = next_reference(input.dt_s);
+  const double error_m_s = slip_velocity_error_m_s(rig_.wheels, speeds, reference);
+  const double most_Nm = full_torque_Nm(rig_.brake, input.max_brake_torque_Nm);
+  const double wanted_Nm = wanted_torque_Nm(holding(slip, reference, error_m_s), error_m_s, most_Nm);
+  const bool ideal = std::isinf(input.max_brake_torque_Nm);
+  const double command_Nm = ideal ? wanted_Nm : through_lag_Nm(input.brake_torque_Nm, wanted_Nm);
+  travel_Nm_ += std::abs(input.sent_brake_torque_Nm - last_sent_Nm_);
+  last_sent_Nm_ = input.sent_brake_torque_Nm;
+  SlipOutput output{.brake_torque_Nm = with_play_Nm(command_Nm, most_Nm),
+                    .slip_velocity_error_m_s = error_m_s,
+                    .theta_est_N = bank_.peak_force_N(),
+                    .slip_ref = reference};
+  output.signals[0] = travel_Nm_;
+  output.signals[1] = bank_.peak_slip();
+  output.signals[2] = bank_.slip_zero();
+  output.signals[3] = bank_.jumps();
+  return output;
+}
+
+std::span<const rig::Signal> AdaptiveOptimalController::signals() const noexcept {
+  static constexpr std::array<rig::Signal, 4> rows{{
+      {"sent_variation_Nm", "sum of all changes of the static torque sent since braking began, in N m"},
+      {"peak_slip", "estimated slip of the largest tyre force"},
+      {"slip_zero", "estimated error of the slip: the true one less the one that is read"},
+      {"friction_jumps", "jumps of friction seen since braking began"},
+  }};
+  return rows;
+}
+
+}  // namespace abs_hil::control

@@ -1,0 +1,59 @@
+#pragma once
+
+#include "abs_hil/control/slip_error_dynamics.hpp"
+#include "control/friction_bank.hpp"
+#include "control/proximate_torque.hpp"
+#include "control/wheel_force_observer.hpp"
+#include "control/wheel_motion.hpp"
+
+namespace abs_hil::control {
+
+/// Brakes at the slip of the largest tyre force, and moves the brake as little as that allows. It needs neither theta,
+/// B and C nor a slip reference (docs/theory-beyond.md). FrictionBank learns the curve from the lower wheel's force.
+/// The torque that holds a slip follows from the curve and from the error that the balance of both wheels shows. The
+/// loop is proximate time-optimal through the brake's lag and rate limit. Changes below `play_Nm` are not sent. It does
+/// not use `rig.tyre`. theta_est_N is the estimated peak force, and slip_ref is the controller's own reference.
+class AdaptiveOptimalController final : public SlipController {
+ public:
+  /// Throws std::invalid_argument for options out of range.
+  explicit AdaptiveOptimalController(const ControllerContext& context);
+
+  void reset(const SlipInput& input) noexcept override;
+  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
+  [[nodiscard]] std::span<const rig::Signal> signals() const noexcept override;
+
+ private:
+  /// The torques that hold the slip: as it is wanted, and as it is.
+  struct Holding {
+    double wanted_Nm;
+    double here_Nm;
+  };
+
+  void learn(const SlipInput& input, double slip) noexcept;
+  [[nodiscard]] double next_reference(double dt_s) noexcept;
+  [[nodiscard]] double holding_torque_Nm(const rig::WheelSpeeds& speeds, double slip, double force_N) const noexcept;
+  [[nodiscard]] Holding holding(double slip, double reference, double error_m_s) const noexcept;
+  [[nodiscard]] double wanted_torque_Nm(const Holding& hold, double error_m_s, double most_Nm) const noexcept;
+  [[nodiscard]] double through_lag_Nm(double torque_Nm, double wanted_Nm) const noexcept;
+  [[nodiscard]] double with_play_Nm(double torque_Nm, double most_Nm) noexcept;
+
+  AdaptiveOptimalOptions options_;
+  rig::RigParameters rig_;
+  paper::Laws<double> laws_;
+  BrakeLag lag_;
+  double period_s_;
+  double v_min_m_s_;
+  ProximateTorque loop_;
+  WheelForceObserver observer_;
+  LowerWheelForce force_;
+  FrictionBank bank_;
+  double reference_{0.0};       ///< slip of the peak, without search and zero
+  double model_error_Nm_{0.0};  ///< of the holding torque: what is missing in it
+  double sent_Nm_{0.0};
+  double travel_Nm_{0.0};  ///< of the torque sent: the sum of its changes
+  double last_sent_Nm_{0.0};
+  double search_rad_{0.0};  ///< angle of the search, in [-pi, pi]
+  double last_omega2_rad_s_{0.0};
+};
+
+}  // namespace abs_hil::control

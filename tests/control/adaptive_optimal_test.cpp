@@ -1,0 +1,153 @@
+// adaptive-optimal: its distance, what it costs the brake, and what it does not depend on.
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "catch.hpp"
+#include "control/braking_bench.hpp"
+
+using namespace abs_hil;
+
+namespace {
+
+constexpr double slow_m_s = 3.0;
+
+/// Lag, limits, dead zone and encoders. The controller's tyre parameters are wrong.
+bench::Setup real_rig() {
+  bench::Setup s;
+  s.ideal_actuator = false;
+  s.encoders = true;
+  s.plant_step_s = 1e-4;
+  s.plant = s.rig;
+  s.rig.tyre = {.theta_N = 3.0, .B = 5.0, .C = 1.1};
+  return s;
+}
+
+struct Braking {
+  double distance_m{0.0};
+  double variation_Nm{0.0};  ///< of the static torque that is sent
+  double largest_slip{0.0};  ///< above 3 m/s
+};
+
+Braking brake(const bench::Setup& s) {
+  const auto run = bench::brake(s, "adaptive-optimal");
+  REQUIRE(std::isfinite(run.stop_time_s));
+  Braking result{.distance_m = run.stop_distance_m};
+  double last = 0.0;
+  for (const auto& tick : run.ticks) {
+    result.variation_Nm += std::abs(tick.applied_Nm - last);
+    last = tick.applied_Nm;
+    if (s.plant->wheels.r2_m * tick.omega2 > slow_m_s) result.largest_slip = std::max(result.largest_slip, tick.slip);
+  }
+  return result;
+}
+
+struct Draw {
+  std::mt19937_64 random;
+  double operator()(double least, double most) {
+    return least + (most - least) * static_cast<double>(random() >> 11U) * 0x1p-53;
+  }
+};
+
+/// Within 10 % of what the controller believes, radii within 1 %.
+void perturb(rig::RigParameters& rig, Draw& draw) {
+  auto& w = rig.wheels;
+  auto& b = rig.brake;
+  for (double* parameter : {&w.J1_kg_m2, &w.J2_kg_m2, &w.d1_Nms_rad, &w.d2_Nms_rad, &w.M10_Nm, &w.M20_Nm, &b.b1_Nm,
+                            &b.b2_Nm, &b.u0, &b.c31_per_s}) {
+    *parameter *= draw(0.9, 1.1);
+  }
+  w.r1_m *= draw(0.99, 1.01);
+  w.r2_m *= draw(0.99, 1.01);
+}
+
+}  // namespace
+
+TEST_CASE("Table 1 from 170 rad/s: within 4 % of the causal optimum of 15.62 m, and the brake moves by 100 N m") {
+  Draw draw{std::mt19937_64{5}};
+  for (int i = 0; i < 10; ++i) {
+    auto s = real_rig();
+    s.angle1_start = draw(0.0, 0.1);
+    s.angle2_start = draw(0.0, 0.1);
+    CAPTURE(s.angle1_start, s.angle2_start);
+    const Braking run = brake(s);
+    CHECK(run.distance_m <= 1.04 * 15.622);
+    CHECK(run.distance_m > 15.29);  // no controller beats phi = 1 throughout
+    CHECK(run.variation_Nm < 100.0);
+    CHECK(run.largest_slip < 0.15);
+  }
+}
+
+TEST_CASE("adaptive-optimal uses neither tyre parameters nor the slip reference: no bit changes") {
+  auto s = real_rig();
+  const auto first = bench::brake(s, "adaptive-optimal");
+  const auto check = [&] {
+    const auto other = bench::brake(s, "adaptive-optimal");
+    REQUIRE(other.ticks.size() == first.ticks.size());
+    for (std::size_t n = 0; n < first.ticks.size(); ++n) {
+      REQUIRE(other.ticks[n].output.brake_torque_Nm == first.ticks[n].output.brake_torque_Nm);
+    }
+  };
+  for (const auto& tyre : {rig::TyreParameters{23.0, 28.0, 1.68}, rig::TyreParameters{90.0, 3.0, 1.9}}) {
+    s.rig.tyre = tyre;
+    check();
+  }
+  s.options.slip_ref = 0.4;
+  check();
+}
+
+TEST_CASE("Where friction falls to a half and returns, slip is back at the peak within 0.15 s") {
+  auto s = real_rig();
+  s.theta_at = [](double t) { return t < 0.6 || t >= 1.0 ? 23.0 : 12.0; };
+  const auto run = bench::brake(s, "adaptive-optimal");
+  for (const auto& tick : run.ticks) {
+    CAPTURE(tick.t);
+    REQUIRE(tick.slip < 0.25);
+    const bool settled = (tick.t > 0.75 && tick.t < 1.0) || (tick.t > 1.15 && tick.t < 1.6);
+    if (settled) {
+      REQUIRE(tick.slip > 0.02);
+      REQUIRE(tick.slip < 0.11);
+    }
+  }
+  CHECK(brake(s).variation_Nm < 165.0);
+}
+
+TEST_CASE("Random tyres, rigs off by 10 % and jumps: no lock in 200 runs, and the brake is spared") {
+  Draw draw{std::mt19937_64{17}};
+  std::vector<double> variation_Nm;
+  for (int i = 0; i < 200; ++i) {
+    CAPTURE(i);
+    auto s = real_rig();
+    s.plant->tyre = {.theta_N = draw(10.0, 60.0), .B = draw(10.0, 40.0), .C = draw(1.3, 1.9)};
+    perturb(*s.plant, draw);
+    s.omega1_start = s.omega2_start = draw(60.0, 180.0);
+    s.angle1_start = draw(0.0, 0.1);
+    const double jump_N = draw(10.0, 60.0), first_s = draw(0.1, 1.2), then_s = first_s + draw(0.1, 1.0);
+    const double theta_N = s.plant->tyre.theta_N;
+    if (i % 2 == 1) s.theta_at = [=](double t) { return t < first_s || t >= then_s ? theta_N : jump_N; };
+    const Braking run = brake(s);
+    REQUIRE(run.largest_slip < 0.9);
+    variation_Nm.push_back(run.variation_Nm);
+  }
+  std::sort(variation_Nm.begin(), variation_Nm.end());
+  CHECK(variation_Nm[variation_Nm.size() / 2] < 80.0);
+}
+
+TEST_CASE("adaptive-optimal brakes at other rates, and with an ideal actuator and true speeds") {
+  for (const double rate_Hz : {500.0, 2000.0, 5000.0}) {
+    CAPTURE(rate_Hz);
+    auto s = real_rig();
+    s.options.rate_Hz = rate_Hz;
+    const Braking run = brake(s);
+    CHECK(run.distance_m <= 1.06 * 15.622);
+    CHECK(run.largest_slip < 0.2);
+  }
+  auto s = real_rig();
+  s.ideal_actuator = true;
+  s.encoders = false;
+  const Braking run = brake(s);
+  CHECK(run.distance_m <= 1.04 * 15.29);
+}

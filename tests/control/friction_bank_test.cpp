@@ -1,0 +1,222 @@
+// The force from the lower wheel, the bank that learns the tyre's curve from it, and the loop's time-optimal limit.
+
+#include "control/friction_bank.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <stdexcept>
+
+#include "abs_hil/rig/tyre_curve.hpp"
+#include "catch.hpp"
+#include "control/proximate_torque.hpp"
+
+using namespace abs_hil;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+
+namespace {
+
+constexpr double period_s = 1e-3;
+constexpr double delay_s = 8e-3;
+
+double force_at(double t) { return t < 0.05 ? 400.0 * t : 20.0 + 5.0 * std::sin(40.0 * (t - 0.05)); }
+
+/// Angle that the lower wheel turns in each period under `force_at`: the equation of motion in steps of a microsecond.
+class LowerWheel {
+ public:
+  double omega_rad_s{170.0};
+  double next_rad() {
+    double angle = 0.0;
+    for (int i = 0; i < 1000; ++i) {
+      const double alpha =
+          (-w_.r2_m * force_at(time_s_ + 0.5e-6) - w_.d2_Nms_rad * omega_rad_s - w_.M20_Nm) / w_.J2_kg_m2;
+      angle += omega_rad_s * 1e-6 + 0.5 * alpha * 1e-12;
+      omega_rad_s += alpha * 1e-6;
+      time_s_ += 1e-6;
+    }
+    return angle;
+  }
+
+ private:
+  rig::WheelParameters w_{};
+  double time_s_{0.0};
+};
+
+/// A tyre on a road, seen by the bank with the delays that it has in the controller.
+class Rolling {
+ public:
+  explicit Rolling(const rig::TyreParameters& tyre, double zero = 0.0) : tyre_{tyre}, zero_{zero} {}
+
+  control::FrictionBank bank{{}, 1.0 / period_s, delay_s};
+  double road{1.0};
+  double noise_N{0.0};
+
+  void slip(double reading) {
+    const double force = road * tyre_.theta_N * rig::normalised_tyre_force(tyre_, reading + zero_);
+    const double q = -std::expm1(-control::FrictionBankOptions{}.force_bandwidth_rad_s * period_s);
+    quick_ += -std::expm1(-period_s / delay_s) * (force - quick_);
+    bank.learn({.dt_s = period_s,
+                .slip = reading,
+                .car_speed_m_s = 10.0,
+                .force_N = delayed_(q, force) + noise_N * normal_(random_),
+                .covered = q,
+                .quick_force_N = quick_});
+  }
+  /// Slip up to `most` in 60 ms, then about it.
+  void brake(double most, double lasts_s) {
+    for (double t = 0.0; t < lasts_s; t += period_s, time_s_ += period_s) {
+      const double rise = std::min(1.0, time_s_ / 0.06);
+      slip(most * rise * (1.0 + 0.1 * std::sin(30.0 * time_s_)) - zero_);
+    }
+  }
+
+ private:
+  rig::TyreParameters tyre_;
+  double zero_;
+  control::LowerWheelForce::Delay delayed_{};
+  double quick_{0.0};
+  double time_s_{0.0};
+  std::mt19937_64 random_{3};
+  std::normal_distribution<double> normal_{0.0, 1.0};
+};
+
+/// Part of the largest force that the bank's peak slip gives.
+double used(const Rolling& rolling, const rig::TyreParameters& tyre, double zero) {
+  const double reading = rolling.bank.peak_slip() - rolling.bank.slip_zero();
+  return rig::normalised_tyre_force(tyre, reading + zero);
+}
+
+}  // namespace
+
+TEST_CASE("The lower wheel's angle alone gives the tyre force, late by three known lags") {
+  const rig::WheelParameters wheels;
+  LowerWheel wheel;
+  control::LowerWheelForce force{wheels, 150.0};
+  control::LowerWheelForce::Delay late, too_late;
+  force.reset(wheel.omega_rad_s);
+  double largest_error = 0.0, largest_shifted = 0.0, before = 0.0;
+  for (int n = 1; n <= 400; ++n) {
+    const double travel = wheel.next_rad();
+    force.update(period_s, travel, wheel.omega_rad_s);
+    const double now = force_at(n * period_s);
+    largest_error = std::max(largest_error, std::abs(force.force_N() - late(force.covered(), now)));
+    largest_shifted = std::max(largest_shifted, std::abs(force.force_N() - too_late(force.covered(), before)));
+    before = now;
+  }
+  CHECK(largest_error < 0.02);
+  CHECK(largest_shifted > 0.2);  // one cycle more would be seen
+}
+
+TEST_CASE("The bank finds the peak of curves that are not in it, through a slip that is read wrong") {
+  for (const auto& tyre : {rig::TyreParameters{23.0, 28.0, 1.68}, rig::TyreParameters{47.0, 28.0, 1.68},
+                           rig::TyreParameters{14.0, 18.0, 1.55}, rig::TyreParameters{34.0, 19.5, 1.27},
+                           rig::TyreParameters{30.0, 38.0, 1.85}}) {
+    for (const double zero : {0.0, 0.012, -0.012}) {
+      CAPTURE(tyre.theta_N, tyre.B, tyre.C, zero);
+      Rolling rolling{tyre, zero};
+      rolling.noise_N = 0.2;
+      rolling.brake(1.2 * rig::peak_slip(tyre), 0.6);
+      // Zero and width of the curve are hard to tell apart where it starts steeply.
+      CHECK(used(rolling, tyre, zero) > (zero == 0.0 ? 0.975 : 0.88));
+      CHECK_THAT(rolling.bank.peak_force_N(), WithinRel(tyre.theta_N, zero == 0.0 ? 0.06 : 0.1));
+      CHECK(rolling.bank.jumps() == 0);
+    }
+  }
+}
+
+TEST_CASE("A jump of friction moves the level within 40 ms and leaves the shape") {
+  const rig::TyreParameters tyre{23.0, 28.0, 1.68};
+  for (const double level : {0.5, 1.8}) {
+    CAPTURE(level);
+    Rolling rolling{tyre};
+    rolling.brake(0.05, 0.4);
+    const double peak_slip = rolling.bank.peak_slip();
+    rolling.road = level;
+    rolling.brake(0.05, 0.04);
+    CHECK(rolling.bank.jumps() >= 1);
+    CHECK_THAT(rolling.bank.peak_force_N(), WithinRel(level * tyre.theta_N, 0.1));
+    CHECK_THAT(rolling.bank.peak_slip(), WithinRel(peak_slip, 0.05));
+  }
+}
+
+TEST_CASE("No data make the bank lose its numbers, and it recovers") {
+  const rig::TyreParameters tyre{23.0, 28.0, 1.68};
+  Rolling rolling{tyre};
+  std::mt19937_64 random{9};
+  std::uniform_real_distribution<double> draw{-1.0, 1.0};
+  for (int n = 0; n < 2000; ++n) {
+    rolling.bank.learn({.dt_s = period_s,
+                        .slip = draw(random),
+                        .car_speed_m_s = 10.0 * (1.0 + draw(random)),
+                        .force_N = 1e3 * draw(random),
+                        .covered = 0.14,
+                        .quick_force_N = 1e3 * draw(random)});
+    REQUIRE(std::isfinite(rolling.bank.peak_slip()));
+    REQUIRE(rolling.bank.peak_force_N() > 0.0);
+    REQUIRE(rolling.bank.peak_force_N() <= 500.0);
+    REQUIRE(std::isfinite(rolling.bank.at(0.05).N));
+    REQUIRE(rolling.bank.at(0.05).spread_N >= 0.0);
+  }
+  rolling.bank.reset();
+  rolling.brake(0.055, 0.6);
+  CHECK(used(rolling, tyre, 0.0) > 0.97);
+}
+
+TEST_CASE("A jump that is seen while the slip is negative leaves the level in its bounds") {
+  const rig::TyreParameters tyre{23.0, 28.0, 1.68};
+  Rolling rolling{tyre};
+  rolling.brake(0.05, 0.4);
+  // The force is one that no negative slip explains, for long.
+  for (int n = 0; n < 5000; ++n) {
+    rolling.bank.learn({.dt_s = period_s,
+                        .slip = -0.01,
+                        .car_speed_m_s = 10.0,
+                        .force_N = 20.0,
+                        .covered = 0.14,
+                        .quick_force_N = 20.0});
+    REQUIRE(std::abs(rolling.bank.late_force_N()) <= 500.0);
+    REQUIRE(rolling.bank.peak_force_N() > 0.0);
+  }
+}
+
+TEST_CASE("Options of the bank out of range are refused") {
+  const auto made = [](control::FrictionBankOptions o, double rate_Hz = 1e3, double late_s = delay_s) {
+    return control::FrictionBank{o, rate_Hz, late_s};
+  };
+  CHECK_THROWS_AS(made({.force_noise_N2_s = 0.0}), std::invalid_argument);
+  CHECK_THROWS_AS(made({.slip0 = 1.0}), std::invalid_argument);
+  CHECK_THROWS_AS(made({.share_per_s = 0.0}), std::invalid_argument);
+  CHECK_THROWS_AS(made({}, 0.0), std::invalid_argument);
+  CHECK_THROWS_AS(made({}, 1e3, 0.0), std::invalid_argument);
+}
+
+TEST_CASE("The excess torque is the largest from which a brake of limited rate still ends at the wanted slip") {
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  control::ProximateTorque loop{.mass_kg_m = 0.0758,
+                                .gain_per_s = 1e6,
+                                .near_per_s = 1e6,
+                                .near_m_s = 0.1,
+                                .swing_per_s = 20.37,
+                                .rate_limit_Nm_s = 100.0};
+  // With a rate limit: while the excess z falls to 0 at 100 N m/s, e_v moves by the whole error.
+  for (const double error : {0.01, 0.1, 1.0}) {
+    const double z = loop.excess_Nm(error, 1e3, 1.0);
+    CHECK_THAT(z * z / (2.0 * 100.0 * 0.0758), WithinRel(error, 1e-12));
+  }
+  // With the lag alone: the torque falls faster at first than the rate at its end, so the error is not used up.
+  loop.rate_limit_Nm_s = infinite;
+  const double hold = 3.0, error = 0.2;
+  const double z = loop.excess_Nm(error, hold, 1.0);
+  double moved = 0.0;
+  for (double torque = hold + z; torque > hold; torque -= 1e-6 * 20.37 * torque)
+    moved += 1e-6 * (torque - hold) / 0.0758;
+  CHECK(moved < error);
+  CHECK(moved > 0.5 * error);
+  // Near the target it is linear.
+  loop.gain_per_s = 60.0;
+  loop.near_per_s = 10.0;
+  CHECK_THAT(loop.excess_Nm(1e-6, hold, 1.0), WithinRel(10.0 * 0.0758 * 1e-6, 1e-4));
+  CHECK(loop.excess_Nm(0.0, hold, 1.0) == 0.0);
+}
