@@ -41,7 +41,7 @@ class Training:
         self.calls += 1
         text = STUDY.read_text()
         if controller != 'adaptive-optimal':
-            text = text.replace('"adaptive-optimal"', f'"{controller}"').split('[[metric]]')[0]
+            text = text.replace('"adaptive-optimal"', f'"{controller}"')
         settings = ''.join(f'{PREFIX}{key} = {value:.6g}\n' for key, value in keys.items())
         path = self.folder / 'study.toml'
         path.write_text(text.replace('[settings]\n', '[settings]\n' + settings, 1))
@@ -63,7 +63,7 @@ class Training:
                 continue  # not even the reference can brake there
             loss.append(FAILED if math.isnan(ratio) else 100.0 * (ratio - 1.0))
             if not math.isnan(ratio):
-                variation.append(float(row['variation_Nm']))
+                variation.append(float(row['torque_total_variation_Nm']))
         loss.sort(reverse=True)
         worst = loss[:max(1, len(loss) // 20)]
         variation_Nm = sum(variation) / len(variation)

@@ -62,7 +62,7 @@ void AdaptiveOptimalController::reset(const SlipInput& input) noexcept {
   force_.reset(input.speeds.omega2_rad_s);
   bank_.reset();
   reference_ = options_.slip_start;
-  model_error_Nm_ = sent_Nm_ = search_rad_ = travel_Nm_ = last_sent_Nm_ = 0.0;
+  model_error_Nm_ = sent_Nm_ = search_rad_ = 0.0;
   last_omega2_rad_s_ = input.speeds.omega2_rad_s;
 }
 
@@ -163,22 +163,18 @@ SlipOutput AdaptiveOptimalController::step(const SlipInput& input) noexcept {
   const double wanted_Nm = wanted_torque_Nm(holding(slip, reference, error_m_s), error_m_s, most_Nm);
   const bool ideal = std::isinf(input.max_brake_torque_Nm);
   const double command_Nm = ideal ? wanted_Nm : through_lag_Nm(input.brake_torque_Nm, wanted_Nm);
-  travel_Nm_ += std::abs(input.sent_brake_torque_Nm - last_sent_Nm_);
-  last_sent_Nm_ = input.sent_brake_torque_Nm;
   SlipOutput output{.brake_torque_Nm = with_play_Nm(command_Nm, most_Nm),
                     .slip_velocity_error_m_s = error_m_s,
                     .theta_est_N = bank_.peak_force_N(),
                     .slip_ref = reference};
-  output.signals[0] = travel_Nm_;
-  output.signals[1] = bank_.peak_slip();
-  output.signals[2] = bank_.slip_zero();
-  output.signals[3] = bank_.jumps();
+  output.signals[0] = bank_.peak_slip();
+  output.signals[1] = bank_.slip_zero();
+  output.signals[2] = bank_.jumps();
   return output;
 }
 
 std::span<const rig::Signal> AdaptiveOptimalController::signals() const noexcept {
-  static constexpr std::array<rig::Signal, 4> rows{{
-      {"sent_variation_Nm", "sum of all changes of the static torque sent since braking began, in N m"},
+  static constexpr std::array<rig::Signal, 3> rows{{
       {"peak_slip", "estimated slip of the largest tyre force"},
       {"slip_zero", "estimated error of the slip: the true one less the one that is read"},
       {"friction_jumps", "jumps of friction seen since braking began"},

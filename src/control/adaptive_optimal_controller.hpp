@@ -50,8 +50,6 @@ class AdaptiveOptimalController final : public SlipController {
   double reference_{0.0};       ///< slip of the peak, without search and zero
   double model_error_Nm_{0.0};  ///< of the holding torque: what is missing in it
   double sent_Nm_{0.0};
-  double travel_Nm_{0.0};  ///< of the torque sent: the sum of its changes
-  double last_sent_Nm_{0.0};
   double search_rad_{0.0};  ///< angle of the search, in [-pi, pi]
   double last_omega2_rad_s_{0.0};
 };
