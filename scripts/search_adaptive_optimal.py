@@ -23,7 +23,7 @@ KEYS = ('slip_gain_per_s', 'slip_gain_near_per_s', 'slip_near_m_s', 'torque_gain
         'torque_near_Nm', 'play_Nm', 'authority', 'bold_slip', 'model_error_per_s', 'peak_factor', 'slip_rate_per_s',
         'search_part', 'search_rad_s', 'force_bandwidth_rad_s', 'force_noise_N2_s', 'force_error', 'timing_error_s',
         'start_s', 'slip0', 'slip_spread', 'level0_N', 'level_spread_N', 'zero_spread', 'level_drift_per_s',
-        'zero_drift_per_s', 'share_per_s', 'jump_level', 'jump_confirm_s', 'jump_hold_s', 'jump_time_constant_s',
+        'zero_drift_per_s', 'share_per_s', 'jump_share', 'jump_confirm_s', 'jump_hold_s', 'jump_time_constant_s',
         'force_rate_N2_s', 'brake_rate_Nm2_s')
 #: keys with little room around them
 SMALL_STEPS = {'peak_factor': 0.04, 'slip0': 0.1}

@@ -189,7 +189,7 @@ void FrictionBank::watch_for_jumps(const Data& data) noexcept {
     }
   }
   const bool watches = time_s_ > options_.jump_after_s && data.car_speed_m_s > learning_m_s;
-  const bool unexplained = std::abs(residual) > std::max(options_.jump_least_N, options_.jump_level * peak_force_N_);
+  const bool unexplained = std::abs(residual) > std::max(options_.jump_least_N, options_.jump_share * peak_force_N_);
   unexplained_s_ = watches && unexplained ? unexplained_s_ + data.dt_s : 0.0;
   if (unexplained_s_ >= options_.jump_confirm_s) {
     hold_s_ = options_.jump_hold_s;

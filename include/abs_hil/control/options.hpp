@@ -153,7 +153,7 @@ struct FrictionBankOptions {
   ABS_HIL_OPTION(double, share_per_s, 0.013, .unit = "1/s",
                  .meaning = "part of the weights that returns to the curves known before braking, per second",
                  .range = rig::between(1e-9, 100));
-  ABS_HIL_OPTION(double, jump_level, 0.11, .meaning = "unexplained part of the peak's force that is a friction jump",
+  ABS_HIL_OPTION(double, jump_share, 0.11, .meaning = "unexplained part of the peak's force that is a friction jump",
                  .range = rig::positive(10), .search = rig::search(0.05, 0.5));
   ABS_HIL_OPTION(double, jump_least_N, 2.5, .unit = "N", .meaning = "least unexplained force that is a friction jump",
                  .range = rig::positive(500));

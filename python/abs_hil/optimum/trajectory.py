@@ -4,6 +4,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -21,6 +22,7 @@ REST_INTERVALS = (6, 50)
 #: weight of the squared changes of the commanded torque, m/(N m)^2. On the singular arc the distance alone leaves the
 #: command undetermined within rounding. It lengthens the braking by less than 1e-5 of the distance.
 SMOOTHNESS = 2e-6
+Number = TypeVar('Number', float, ca.SX)
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class Piece:
     end: float = math.inf
     along: str = 'time'
 
-    def friction(self, time_s: float | ca.MX, distance_m: float | ca.MX) -> float | ca.MX:
+    def friction(self, time_s: Number, distance_m: Number) -> Number | float:
         if self.slope == 0.0:
             return self.value
         return self.value + self.slope * ((time_s if self.along == 'time' else distance_m) - self.begin)
@@ -103,7 +105,8 @@ SLOPES, POINTS = _collocation()
 #: sizes of the state's elements, for the solver
 SCALE = np.array([0.1, 100.0, 5.0, 10.0])
 _SCALE = ca.DM(SCALE)
-SOLVER = {'print_time': False, 'ipopt': {'print_level': 0, 'sb': 'yes', 'max_iter': 400, 'tol': 1e-7, 'mu_init': 1e-4}}
+SOLVER: dict[str, Any] = {'print_time': False,
+                          'ipopt': {'print_level': 0, 'sb': 'yes', 'max_iter': 400, 'tol': 1e-7, 'mu_init': 1e-4}}
 #: slips of the first guess as parts of the best constant slip: the next is tried where the solver fails from one
 GUESS_SHARES = (0.8, 0.5, 1.0, 0.25)
 #: step of the integration that gives the first guess
