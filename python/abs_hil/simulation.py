@@ -22,7 +22,8 @@ STANDARD_VARIATION = 'parameters=0.1,theta=0.1,phase'
 
 def simulate(controller: Any = 'adaptive', plant: PathLike = 'paper-table1', experiment: PathLike = 'paper',
              seed: int = 1, set: Mapping[str, Value] | None = None, *, model: PathLike | None = None,
-             config: PathLike | None = None, inject: Sequence[str] = ()) -> Run:
+             config: PathLike | None = None, inject: Sequence[str] = (), repetition: int | None = None,
+             vary: str = STANDARD_VARIATION, vary_seed: int = 1) -> Run:
     """Runs an experiment on the simulated rig in virtual time, as `abs_hil --fast` with the same options does.
 
     controller: a name (abs_hil.controllers()), or an object with `reset(input)` and `step(input)` (abs_hil.SlipInput).
@@ -33,6 +34,8 @@ def simulate(controller: Any = 'adaptive', plant: PathLike = 'paper-table1', exp
     seed:       seed of everything random in the simulator, an integer >= 0.
     set:        configuration values by dotted key, as --set: {"control.slip_ref": 0.1, "plant.theta_N": 30}.
     inject:     faults as --inject takes them: ["brake@encoder_upper:stuck+0.2s"].
+    repetition: number of a varied plant, from 0: the run that `simulate_many` with `vary` and `vary_seed` makes of it,
+                but whole and with everything recorded. None: the plant itself.
 
     Returns a Run. Its columns equal those of the program's CSV bit for bit, each of shape (cycles,). A run that a fault
     ends is no error: Run.summary["result"] is "fault". Raises ValueError, with the program's text, for options that
@@ -47,7 +50,10 @@ def simulate(controller: Any = 'adaptive', plant: PathLike = 'paper-table1', exp
     if law is not None and not (callable(getattr(law, 'reset', None)) and callable(getattr(law, 'step', None))):
         raise ValueError(f'controller: {type(law).__name__} has no methods reset and step; give a controller\'s name or an '
                          'object with both')
-    columns, signals, summary, config_toml = _core.simulate(given, law)
+    if repetition is not None and repetition < 0:
+        raise ValueError(f'repetition {repetition}: give the number of a varied plant, from 0')
+    varied = None if repetition is None else (vary, vary_seed, repetition)
+    columns, signals, summary, config_toml = _core.simulate(given, law, varied)
     columns['phase'] = phase_names(columns['phase'])
     if 'phase_name' in columns:
         columns['phase_name'] = np.array(columns['phase_name'], dtype=object)

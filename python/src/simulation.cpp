@@ -10,6 +10,7 @@
 #include <map>
 #include <optional>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 #include "analysis/run_summary.hpp"
@@ -17,6 +18,7 @@
 #include "bindings.hpp"
 #include "column_sink.hpp"
 #include "config/config_error.hpp"
+#include "program/study_runs.hpp"
 #include "study/batch.hpp"
 #include "study/parallel.hpp"
 #include "study/variation.hpp"
@@ -48,8 +50,14 @@ class PythonPoll {
   bool interrupted_{false};
 };
 
-py::tuple simulate(const py::dict& arguments, py::object controller) {
+/// @param varied  what varies, the seed of the plants and the number of one: a run on that plant
+py::tuple simulate(const py::dict& arguments, py::object controller,
+                   const std::optional<std::tuple<std::string, std::uint64_t, std::uint64_t>>& varied) {
   program::RunOptions options = run_options(arguments);
+  if (varied) {
+    const auto& [vary, seed, index] = *varied;
+    options = program::on_varied_plant(std::move(options), study::Variation::parse(vary), seed, index);
+  }
   std::optional<PythonControllerScope> scope;
   if (!controller.is_none()) {
     scope.emplace(std::move(controller));
@@ -189,7 +197,8 @@ program::RunOptions run_options(const py::dict& arguments) {
 }
 
 void add_simulation(py::module_& module) {
-  module.def("simulate", &simulate, py::arg("options"), py::arg("controller") = py::none());
+  module.def("simulate", &simulate, py::arg("options"), py::arg("controller") = py::none(),
+             py::arg("varied") = py::none());
   module.def("simulate_many", &simulate_many, py::arg("options"), py::arg("jobs"), py::arg("vary"), py::arg("seed"),
              py::arg("threads"), py::arg("progress") = nullptr);
 }

@@ -86,6 +86,23 @@ def test_many_runs_are_those_of_compare(tmp_path, abs_hil_program):
         assert [bits(v) for v in study[name].tolist()] == [bits(float(row[name] or 'nan')) for row in rows], name
 
 
+def test_a_run_of_compare_again(tmp_path, abs_hil_program):
+    """One varied plant: the rows that `compare --run` records, and the figures that simulate_many has for it."""
+    abs_hil_program('compare', '--plant', 'paper-timing', '--controllers', 'adaptive', '--run', 22, '--out', tmp_path / 'r')
+    start = {'experiment.start_speed_rad_s': 170.0}
+    ours = abs_hil.simulate(plant='paper-timing', set=start, repetition=22)
+    ours.to_csv(tmp_path / 'ours.csv')
+    assert (tmp_path / 'ours.csv').read_bytes() == (tmp_path / 'r' / 'run.csv').read_bytes()
+    study = abs_hil.simulate_many([{'plant': 'paper-timing', 'set': start}], repeat=23)
+    assert study['stop_distance_m'][22] == ours.summary['stop_distance_m']
+    other = abs_hil.simulate(plant='paper-timing', set=start, repetition=21)
+    assert other.summary['stop_distance_m'] != ours.summary['stop_distance_m']
+    with pytest.raises(ValueError, match='repetition -1: give'):
+        abs_hil.simulate(repetition=-1)
+    with pytest.raises(ValueError, match='nothing'):
+        abs_hil.simulate(repetition=1, vary='nothing')
+
+
 def test_threads_change_nothing_and_progress_ends_with_all():
     grid = {'control.slip_ref': [0.1, 0.15, 0.2], 'experiment.start_speed_rad_s': [100.0]}
     told = []

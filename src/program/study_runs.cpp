@@ -42,6 +42,12 @@ std::vector<std::string> changes(config::Settings given, config::Settings wanted
   return assignments;
 }
 
+RunOptions with_changes(RunOptions options, const config::Settings& wanted) {
+  for (std::string& change : changes(merged_settings(options), wanted))
+    options.assignments.push_back(std::move(change));
+  return options;
+}
+
 }  // namespace
 
 RunOptions options_of_case(const study::StudyScript& script, const std::string& plant, const std::string& experiment) {
@@ -102,13 +108,19 @@ RunOptions with_run(RunOptions options, const study::Study& study, std::uint64_t
   const study::Workbench::Drawn drawn = bench.drawn(index);
   wanted.plant = drawn.plant;
   wanted.sensor_seed = std::to_string(drawn.seed);
-  for (std::string& change : changes(merged_settings(options), wanted)) {
-    options.assignments.push_back(std::move(change));
-  }
-  return options;
+  return with_changes(std::move(options), wanted);
 }
 
 }  // namespace
+
+RunOptions on_varied_plant(RunOptions options, const study::Variation& variation, std::uint64_t seed,
+                           std::uint64_t index) {
+  config::Settings wanted = merged_settings(options);
+  const study::Perturbation drawn = study::draw(variation, seed, index);
+  wanted.plant = study::perturbed(wanted.plant, drawn);
+  wanted.sensor_seed = std::to_string(drawn.sensor_seed);
+  return with_changes(std::move(options), wanted);
+}
 
 RunOptions options_of_run(const study::Study& study, std::uint64_t number) {
   require_run(study, number);

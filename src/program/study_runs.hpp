@@ -7,6 +7,7 @@
 
 #include "program/command_line.hpp"
 #include "study/study.hpp"
+#include "study/variation.hpp"
 
 namespace abs_hil::program {
 
@@ -29,6 +30,12 @@ void require_run(const study::Study& study, std::uint64_t number);
 /// The options that repeat one run of a study, the hold phase after braking included.
 /// Throws config::ConfigError unless the study has a run of this number.
 [[nodiscard]] RunOptions options_of_run(const study::Study& study, std::uint64_t number);
+
+/// The options that make the run on one varied plant of `abs_hil compare` of these options. The model stays.
+/// @param index  of the plant, from 0
+/// Throws what `merge` throws.
+[[nodiscard]] RunOptions on_varied_plant(RunOptions options, const study::Variation& variation, std::uint64_t seed,
+                                         std::uint64_t index);
 
 /// Repeats one run of a study with everything recorded in a run folder, as `abs_hil --fast --out FOLDER` does: from the
 /// beginning to the end of its experiment. Its config.toml repeats it once more. Returns the run's exit status.
