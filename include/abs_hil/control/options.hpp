@@ -123,12 +123,11 @@ struct AdaptivePeakOptions {
 struct FrictionBankOptions {
   ABS_HIL_OPTIONS(FrictionBankOptions);
   ABS_HIL_OPTION(double, force_bandwidth_rad_s, 136.0, .unit = "rad/s",
-                 .meaning = "bandwidth of the force that the curve is learnt from", .range = rig::between(10, 2000),
-                 .search = rig::search(80, 300));
+                 .meaning = "bandwidth of the force that the curve is learnt from", .range = rig::between(10, 2000));
   ABS_HIL_OPTION(double, force_noise_N2_s, 0.002, .unit = "N^2 s", .meaning = "intensity of that force's noise",
-                 .range = rig::positive(100), .search = rig::search(1e-4, 0.1));
+                 .range = rig::positive(100));
   ABS_HIL_OPTION(double, force_error, 0.01, .meaning = "part of the force that the curve need not explain",
-                 .range = rig::positive(1), .search = rig::search(1e-3, 0.1));
+                 .range = rig::positive(1));
   ABS_HIL_OPTION(double, timing_error_s, 0.0018, .unit = "s", .meaning = "delay between slip and force left unknown",
                  .range = rig::from_zero(0.1));
   ABS_HIL_OPTION(double, slip_noise_m_s, 0.003, .unit = "m/s", .meaning = "error of the difference of both speeds",
@@ -136,7 +135,7 @@ struct FrictionBankOptions {
   ABS_HIL_OPTION(double, start_s, 0.017, .unit = "s", .meaning = "time at the start in which nothing is learnt",
                  .range = rig::from_zero(1));
   ABS_HIL_OPTION(double, slip0, 0.078, .meaning = "median of the peak's slip before braking",
-                 .range = rig::open_between(0, 1), .search = rig::search(0.03, 0.2));
+                 .range = rig::open_between(0, 1));
   ABS_HIL_OPTION(double, slip_spread, 0.9, .meaning = "standard deviation of the logarithm of the peak's slip",
                  .range = rig::between(0.05, 5));
   ABS_HIL_OPTION(double, level0_N, 12.5, .unit = "N", .meaning = "first guess of the peak's force",
@@ -154,7 +153,7 @@ struct FrictionBankOptions {
                  .meaning = "part of the weights that returns to the curves known before braking, per second",
                  .range = rig::between(1e-9, 100));
   ABS_HIL_OPTION(double, jump_share, 0.11, .meaning = "unexplained part of the peak's force that is a friction jump",
-                 .range = rig::positive(10), .search = rig::search(0.05, 0.5));
+                 .range = rig::positive(10));
   ABS_HIL_OPTION(double, jump_least_N, 2.5, .unit = "N", .meaning = "least unexplained force that is a friction jump",
                  .range = rig::positive(500));
   ABS_HIL_OPTION(double, jump_confirm_s, 0.0028, .unit = "s", .meaning = "time that it must last",
@@ -173,28 +172,27 @@ struct FrictionBankOptions {
 struct AdaptiveOptimalOptions {
   ABS_HIL_OPTIONS(AdaptiveOptimalOptions);
   ABS_HIL_OPTION(double, slip_gain_per_s, 67.0, .unit = "1/s", .meaning = "decay of a large slip velocity error",
-                 .range = rig::positive(1e4), .search = rig::search(10, 200));
+                 .range = rig::positive(1e4));
   ABS_HIL_OPTION(double, slip_gain_near_per_s, 9.3, .unit = "1/s", .meaning = "decay of a small one",
-                 .range = rig::positive(1e4), .search = rig::search(2, 100));
+                 .range = rig::positive(1e4));
   ABS_HIL_OPTION(double, slip_near_m_s, 0.07, .unit = "m/s", .meaning = "error at which the gain is half way between",
-                 .range = rig::positive(10), .search = rig::search(0.01, 1));
+                 .range = rig::positive(10));
   ABS_HIL_OPTION(double, torque_gain_per_s, 160.0, .unit = "1/s", .meaning = "decay of a large torque error",
-                 .range = rig::positive(1e4), .search = rig::search(20, 400));
+                 .range = rig::positive(1e4));
   ABS_HIL_OPTION(double, torque_gain_near_per_s, 30.0, .unit = "1/s", .meaning = "decay of a small one",
-                 .range = rig::positive(1e4), .search = rig::search(5, 200));
+                 .range = rig::positive(1e4));
   ABS_HIL_OPTION(double, torque_near_Nm, 0.54, .unit = "N m", .meaning = "error at which the gain is half way between",
-                 .range = rig::positive(100), .search = rig::search(0.03, 3));
+                 .range = rig::positive(100));
   ABS_HIL_OPTION(double, play_Nm, 0.137, .unit = "N m", .meaning = "change of the torque below which the brake rests",
-                 .range = rig::from_zero(10), .search = rig::search(0.01, 0.5));
+                 .range = rig::from_zero(10));
   ABS_HIL_OPTION(double, authority, 0.48, .meaning = "part of the fastest approach from too little slip that is used",
                  .range = rig::between(0.01, 1));
   ABS_HIL_OPTION(double, authority_past_peak, 1.0, .meaning = "the same where the force falls as the slip grows",
                  .range = rig::between(0.01, 1));
   ABS_HIL_OPTION(double, bold_slip, 0.95, .meaning = "slip that an unknown peak may cost at the start",
-                 .range = rig::positive(100), .search = rig::search(0.02, 5));
+                 .range = rig::positive(100));
   ABS_HIL_OPTION(double, model_error_per_s, 35.0, .unit = "1/s",
-                 .meaning = "how fast the error of the holding torque is learnt", .range = rig::positive(1e4),
-                 .search = rig::search(5, 200));
+                 .meaning = "how fast the error of the holding torque is learnt", .range = rig::positive(1e4));
   ABS_HIL_OPTION(double, peak_factor, 1.08, .meaning = "slip reference over the estimated slip of the peak",
                  .range = rig::between(0.5, 2));
   ABS_HIL_OPTION(double, slip_min, 0.015, .meaning = "least slip reference", .range = rig::open_between(0, 1));
