@@ -7,33 +7,14 @@
 #include <string>
 
 #include "catch.hpp"
-#include "control/braking_bench.hpp"
+#include "control/peak_bench.hpp"
 
 using namespace abs_hil;
+using namespace bench;
 
 namespace {
 
-constexpr double slow_m_s = 3.0;
 constexpr double locked_slip = 0.9;
-
-/// Lag, limits, dead zone and encoders. The controller's tyre parameters are wrong.
-bench::Setup real_rig() {
-  bench::Setup s;
-  s.ideal_actuator = false;
-  s.encoders = true;
-  s.plant_step_s = 1e-4;
-  s.plant = s.rig;
-  s.rig.tyre = {.theta_N = 3.0, .B = 5.0, .C = 1.1};
-  return s;
-}
-
-double largest_slip(const bench::Result& run, double r2_m) {
-  double most = 0.0;
-  for (const auto& tick : run.ticks) {
-    if (r2_m * tick.omega2 > slow_m_s) most = std::max(most, tick.slip);
-  }
-  return most;
-}
 
 /// The shortest way that any constant slip reference gives: adaptive-actuator, told the whole truth, and this
 /// controller's own slip loop without its search.
@@ -54,25 +35,6 @@ double best_constant_slip_m(const bench::Setup& s) {
     }
   }
   return best;
-}
-
-struct Draw {
-  std::mt19937_64 random;
-  double operator()(double least, double most) {
-    return least + (most - least) * static_cast<double>(random() >> 11U) * 0x1p-53;
-  }
-};
-
-/// Within 10 % of what the controller believes, radii within 1 %.
-void perturb(rig::RigParameters& rig, Draw& draw) {
-  auto& w = rig.wheels;
-  auto& b = rig.brake;
-  for (double* parameter : {&w.J1_kg_m2, &w.J2_kg_m2, &w.d1_Nms_rad, &w.d2_Nms_rad, &w.M10_Nm, &w.M20_Nm, &b.b1_Nm,
-                            &b.b2_Nm, &b.u0, &b.c31_per_s}) {
-    *parameter *= draw(0.9, 1.1);
-  }
-  w.r1_m *= draw(0.99, 1.01);
-  w.r2_m *= draw(0.99, 1.01);
 }
 
 }  // namespace
