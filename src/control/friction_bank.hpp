@@ -11,7 +11,7 @@ namespace abs_hil::control {
 
 /// Tyre force from the lower wheel alone, J2 omega2' = -r2 F - d2 omega2 - M20: neither the brake nor its model enters.
 /// A fading-memory filter with a triple pole follows the angle by which the force alone turns the wheel back. Its
-/// response to F is known exactly, so whoever compares F with a curve can delay the curve in the same way (`Delay`).
+/// response to F is known exactly. To compare F with a curve, pass the curve through the same delay (`Delay`).
 /// Real-time safe.
 class LowerWheelForce {
  public:

@@ -296,7 +296,7 @@ def series(folder, key):
 
 
 def question(folder):
-    """A phase that asks a person: whoever holds the key may answer over the network."""
+    """A phase asks a person. A sender with the key may answer over the network."""
     script = pathlib.Path(folder, 'question.toml')
     script.write_text('[[phase]]\nname = "lift"\nask = "Lift the upper wheel"\nat_most_s = 30\n'
                       '[[phase]]\nname = "rest"\nuntil = { lasts_s = 0.5 }\n')
