@@ -30,6 +30,8 @@ echo "test: a test is skipped and says why if its tools are missing: a virtual m
   "(packages-spy.txt), a browser and Octave (packages-report.txt), Windows (packages-windows.txt), Python modules (setup_python.sh), FUSE," \
   "network namespaces"
 scripts/setup.sh
+# The report's page needs plotly. The first of the README's commands installs it too, but nobody has to run that before.
+scripts/setup_python.sh python-packages.txt || echo "test: no plotly from PyPI, see above: tests of the report will fail" >&2
 # Without these packages the tests in a virtual machine are skipped, unless they must not be.
 scripts/setup.sh packages-vm.txt || { [ "${CI:-}" != true ] && [ "${ABS_HIL_REQUIRE_VM:-}" != 1 ]; }
 if [ "${CI:-}" = true ]; then
