@@ -52,6 +52,25 @@ def test_rows_are_named(small):
     assert sum(len(part) for part in small.chunks(rows=7)) == 80
 
 
+def test_columns_are_those_of_all_rows(folder):
+    results = abs_hil.load_study(folder)
+    some = results.columns(['plant.theta_N', 'controller', 'stop_distance_m'])
+    assert list(some) == ['plant.theta_N', 'controller', 'stop_distance_m']
+    table, map_ = results.quantiles(), results.map('plant.theta_N', 'plant.B', 'stop_distance_m', bins=2)
+    pandas.testing.assert_frame_equal(some, results.data[list(some)])
+    # The same from all rows as from the columns alone.
+    pandas.testing.assert_frame_equal(table, results.quantiles())
+    pandas.testing.assert_frame_equal(map_, results.map('plant.theta_N', 'plant.B', 'stop_distance_m', bins=2))
+
+
+def test_results_without_a_folder_go_with_their_object():
+    results = abs_hil.study({'settings': SMALL['settings']})
+    place = results.path
+    assert place.exists() and len(results.data) == 1
+    del results
+    assert not place.exists()
+
+
 def test_saltellis_rows_are_salibs(small):
     sobol = pytest.importorskip('SALib.sample.sobol')
     problem = {'num_vars': 2, 'names': ['a', 'b'], 'bounds': [[15, 30], [20, 30]]}

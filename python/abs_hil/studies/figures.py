@@ -35,8 +35,12 @@ class Drawing:
 
 def numeric_factors(results: StudyResults) -> list[str]:
     """Factors that have more than one value and are numbers."""
-    return [name for name in results.factors
-            if np.issubdtype(results.data[name].dtype, np.number) and results.data[name].nunique() > 1]
+    columns = results.columns(results.factors)
+    return [name for name in results.factors if np.issubdtype(columns[name].dtype, np.number) and columns[name].nunique() > 1]
+
+
+def _points(results: StudyResults) -> int:
+    return int(results.columns(['point'])['point'].nunique())
 
 
 def _bins(wanted: float) -> int:
@@ -73,11 +77,12 @@ def _picture(width: float, height: float) -> Any:
 def curves(results: StudyResults, metric: str) -> Drawing | None:
     """Medians over each factor, and between which values 80 % of the runs lie; None without factors."""
     factors = numeric_factors(results)[:MOST_FACTORS]
-    frame = results.complete_runs
+    by = curve_names(results)
+    frame = results.completed([*by, *factors, metric])
     if not factors or not frame[metric].notna().any():
         return None
-    groups = groups_of(frame, curve_names(results))[:MOST_CURVES]
-    bins = _bins(results.data['point'].nunique() / POINTS_IN_BIN)
+    groups = groups_of(frame, by)[:MOST_CURVES]
+    bins = _bins(_points(results) / POINTS_IN_BIN)
     columns = min(3, len(factors))
     rows = -(-len(factors) // columns)
     picture = _picture(3.4 * columns, 2.6 * rows + 0.4)
@@ -105,11 +110,12 @@ def curves(results: StudyResults, metric: str) -> Drawing | None:
 def maps(results: StudyResults, metric: str) -> Drawing | None:
     """Medians over pairs of factors, a row of maps for each controller; None with fewer than two factors."""
     pairs = list(itertools.combinations(numeric_factors(results), 2))[:MOST_PAIRS]
-    frame = results.complete_runs
+    by = curve_names(results)
+    frame = results.completed([*dict.fromkeys([*by, *itertools.chain(*pairs)]), metric])
     if not pairs or not frame[metric].notna().any():
         return None
-    groups = groups_of(frame, curve_names(results))[:MOST_CURVES]
-    bins = _bins(np.sqrt(results.data['point'].nunique() / 2))
+    groups = groups_of(frame, by)[:MOST_CURVES]
+    bins = _bins(np.sqrt(_points(results) / 2))
     picture = _picture(3.6 * len(pairs) + 0.4, 2.8 * len(groups))
     every = picture.subplots(len(groups), len(pairs), squeeze=False)
     low, high = frame[metric].quantile([0.02, 0.98])

@@ -19,14 +19,15 @@ SHOWN = ('stop_distance_m', 'slip_rms', 'torque_total_variation_Nm')
 
 def quantile_table(results: StudyResults) -> Table:
     """Median and, in brackets, 10th and 90th percentile of each metric; a column for each group."""
+    results.columns(results.facts['columns'])  # all of them in one reading of the file
     by = curve_names(results)
-    every, complete = dict(groups_of(results.data, by)), dict(groups_of(results.complete_runs, by))
-    empty = results.data.iloc[:0]
+    every = dict(groups_of(results.columns([*by, 'result']), by))
     rows = []
     for metric in results.metrics:
         row = [TITLES.get(metric, metric)]
+        complete = dict(groups_of(results.completed([*by, metric]), by))
         for name in every:
-            values = complete.get(name, empty)[metric].dropna()
+            values = complete[name][metric].dropna() if name in complete else []
             if len(values) == 0:
                 row.append(DASH)
                 continue
@@ -42,10 +43,10 @@ def quantile_table(results: StudyResults) -> Table:
 def sobol_table(results: StudyResults, metrics: list[str]) -> tuple[Table, list[str]]:
     """First-order and total index of each factor, for each metric and controller; and what could not be computed."""
     rows, notes = [], []
-    by = [name for name in ('plant', 'experiment', 'controller', *results.definition.levels)
-          if results.data[name].nunique() > 1]
+    names = ['plant', 'experiment', 'controller', *results.definition.levels]
+    by = [name for name, different in results.columns(names).nunique().items() if different > 1]
     for metric in metrics:
-        for name, part in groups_of(results.data, by):
+        for name, part in groups_of(results.columns(by), by):
             where = {key: part[key].iloc[0] for key in by}
             try:
                 found = results.sobol_indices(metric, where)
@@ -59,7 +60,7 @@ def sobol_table(results: StudyResults, metrics: list[str]) -> tuple[Table, list[
 
 
 def reasons_table(results: StudyResults) -> Table:
-    counts = results.data['reason'].value_counts()
+    counts = results.columns(['reason'])['reason'].value_counts()
     return Table('reasons', ['reason', 'runs'], [[str(reason), str(count)] for reason, count in counts.items() if reason])
 
 

@@ -2,11 +2,10 @@
 from __future__ import annotations
 
 import gzip
-import io
 import json
 import os
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +21,8 @@ RESULTS = 'results.csv.gz'
 _HEADER_BYTES = 1 << 24
 #: columns before the factors, and between factors and metrics
 BEFORE, BETWEEN = ('run', 'plant', 'experiment', 'controller', 'point', 'repetition'), ('result', 'reason')
+#: columns of texts that few values fill
+_FEW = ('plant', 'experiment', 'controller', 'result')
 
 
 class StudyResults:
@@ -29,6 +30,8 @@ class StudyResults:
 
     facts:   dictionary: study (its name), text, identity (SHA-256 of all that the results depend on), program, runs, ...
     factors: names of the factors' columns. metrics: names of the metrics' columns, those of a run's summary.
+
+    A column is read from the file when it is first wanted, and kept: 8 bytes a row.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -48,12 +51,8 @@ class StudyResults:
         self.factors: list[str] = columns[len(BEFORE):columns.index(BETWEEN[0])]
         self.metrics: list[str] = columns[columns.index(BETWEEN[-1]) + 1:]
         self.definition = Definition(self.facts['text'])
-        self._bytes: bytes | None = None
+        self._columns: dict[str, pandas.Series] = {}
         self._data: pandas.DataFrame | None = None
-
-    def keep(self) -> None:
-        """Reads the file into memory, so that it may go."""
-        self._bytes = self.path.read_bytes()
 
     def __len__(self) -> int:
         return int(self.facts['runs'])
@@ -61,39 +60,54 @@ class StudyResults:
     def __repr__(self) -> str:
         return f'<abs_hil.StudyResults {self.facts["study"]}: {len(self)} runs>'
 
-    def _open(self) -> Any:
-        return gzip.open(io.BytesIO(self._bytes) if self._bytes is not None else self.path, 'rb')
-
-    def chunks(self, columns: Sequence[str] | None = None, rows: int = 100_000) -> Any:
+    def chunks(self, columns: Sequence[str] | None = None, rows: int = 100_000) -> Iterator[pandas.DataFrame]:
         """The rows as an iterator of DataFrames of at most `rows` rows: for studies that do not fit into the memory."""
         import pandas
-        texts = {name: 'category' for name in ('plant', 'experiment', 'controller', 'result')}
-        with self._open() as file:
+        with gzip.open(self.path, 'rb') as file:
             yield from pandas.read_csv(file, usecols=None if columns is None else list(columns), chunksize=rows,
-                                       dtype={**texts, 'reason': 'string'}, keep_default_na=False, na_values={
-                                           name: ['nan'] for name in [*self.factors, *self.metrics]})
+                                       dtype={**{name: 'category' for name in _FEW}, 'reason': 'string'},
+                                       keep_default_na=False,
+                                       na_values={name: ['nan'] for name in [*self.factors, *self.metrics]})
+
+    def columns(self, names: Sequence[str]) -> pandas.DataFrame:
+        """Some columns of all rows, one a run, in order. Metrics of a run that has none are NaN."""
+        import pandas
+        if self._data is not None:
+            return self._data[list(names)]
+        if missing := [name for name in dict.fromkeys(names) if name not in self._columns]:
+            pieces: dict[str, list[pandas.Series]] = {name: [] for name in missing}
+            for frame in self.chunks(missing):
+                for name in missing:
+                    pieces[name].append(frame[name].copy())  # a view would keep the whole piece
+            for name in missing:
+                whole = pandas.concat(pieces.pop(name), ignore_index=True)
+                self._columns[name] = whole.astype('category') if name in _FEW else whole
+        return pandas.DataFrame({name: self._columns[name] for name in names}, copy=False)
 
     @property
     def data(self) -> pandas.DataFrame:
-        """All rows as a pandas DataFrame, one a run, in order. Metrics of a run that has none are NaN."""
+        """All columns of all rows as a pandas DataFrame, the same one each time."""
         if self._data is None:
-            import pandas
-            frame = pandas.concat(list(self.chunks()), ignore_index=True)
-            for name in ('plant', 'experiment', 'controller', 'result'):
-                frame[name] = frame[name].astype('category')
-            self._data = frame
+            self._data = self.columns([*BEFORE, *self.factors, *BETWEEN, *self.metrics])
+            self._columns.clear()
         return self._data
+
+    def completed(self, names: Sequence[str]) -> pandas.DataFrame:
+        """Some columns of the runs that no fault ended and that could begin."""
+        rows = self.columns(names)
+        complete = self.columns(['result'])['result'] == 'completed'
+        return rows if complete.all() else rows[complete]
 
     @property
     def complete_runs(self) -> pandas.DataFrame:
-        """The rows of runs that no fault ended and that could begin."""
-        return self.data[self.data['result'] == 'completed']
+        """All columns of the runs that no fault ended and that could begin."""
+        return self.completed(list(self.data.columns))
 
     @property
     def groups(self) -> list[str]:
         """Columns of what has few values and more than one: plant, experiment, controller, factors with levels."""
-        named = [name for name in ('plant', 'experiment', 'controller') if self.data[name].nunique() > 1]
-        return named + [name for name in self.definition.levels if name in self.factors and self.data[name].nunique() > 1]
+        names = ['plant', 'experiment', 'controller', *(name for name in self.definition.levels if name in self.factors)]
+        return [name for name, different in self.columns(names).nunique().items() if different > 1]
 
     def quantiles(self, by: str | Sequence[str] | None = None, metrics: Sequence[str] | None = None,
                   q: Sequence[float] = (0.1, 0.5, 0.9)) -> pandas.DataFrame:
@@ -102,21 +116,24 @@ class StudyResults:
         import pandas
         by = self.groups if by is None else [by] if isinstance(by, str) else list(by)
         wanted = [name for name in self.metrics if metrics is None or name in metrics]
-        parts = self.complete_runs.groupby(by if len(by) > 1 else by[0], observed=True) if by else [((), self.complete_runs)]
-        rows, index = [], []
-        for group, part in parts:
-            group = group if isinstance(group, tuple) else (group,)
-            for metric in wanted:
-                values = part[metric].dropna()
-                rows.append([len(values), *(values.quantile(list(q)) if len(values) else [np.nan] * len(q))])
-                index.append((*group, metric))
-        return pandas.DataFrame(rows, columns=['runs', *q],
-                                index=pandas.MultiIndex.from_tuples(index, names=[*by, 'metric']))
+        self.columns([*by, *wanted])  # in one reading
+        found: dict[tuple[Any, ...], dict[str, list[float]]] = {}
+        for metric in wanted:
+            frame = self.completed([*by, metric])
+            parts = frame.groupby(by if len(by) > 1 else by[0], observed=True)[metric] if by else [((), frame[metric])]
+            for group, part in parts:
+                values = part.dropna()
+                numbers = values.quantile(list(q)) if len(values) else [np.nan] * len(q)
+                found.setdefault(group if isinstance(group, tuple) else (group,), {})[metric] = [len(values), *numbers]
+        return pandas.DataFrame(
+            [row for of_group in found.values() for row in of_group.values()], columns=['runs', *q],
+            index=pandas.MultiIndex.from_tuples([(*group, metric) for group, of_group in found.items() for metric in of_group],
+                                                names=[*by, 'metric']))
 
     def map(self, x: str, y: str, metric: str, bins: int = 12, where: dict[str, Any] | None = None) -> pandas.DataFrame:
         """Medians of a metric over two columns: rows y, columns x. A column of more than `bins` values is cut into `bins`
         equal parts, each under its middle. where: values of other columns, as {"controller": "adaptive"}."""
-        rows = self.complete_runs
+        rows = self.completed([x, y, metric, *(where or {})])
         for name, value in (where or {}).items():
             rows = rows[rows[name] == value]
         return rows.groupby([_binned(rows[y], bins), _binned(rows[x], bins)])[metric].median().unstack()
@@ -134,7 +151,7 @@ class StudyResults:
         except ImportError:
             raise ValueError('Sobol indices need SALib: pip install "SALib<1.5", or scripts/setup_python.sh in the source '
                              'folder') from None
-        rows = self.data
+        rows = self.columns(['point', 'plant', 'experiment', 'controller', *definition.levels, *(where or {}), metric])
         for name, value in (where or {}).items():
             rows = rows[rows[name] == value]
         ranges = [name for name in self.factors if name in definition.ranges]
@@ -160,7 +177,7 @@ class StudyResults:
         writer = None
         try:
             for frame in self.chunks():
-                for name in ('plant', 'experiment', 'controller', 'result'):
+                for name in _FEW:
                     frame[name] = frame[name].astype(str)
                 table = pyarrow.Table.from_pandas(frame, preserve_index=False)
                 if writer is None:

@@ -5,8 +5,9 @@ import json
 import os
 import pathlib
 import tempfile
+import weakref
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any, Union
 
 import numpy as np
@@ -26,7 +27,7 @@ def study(study: StudyLike, out: str | os.PathLike[str] | None = None, *, thread
     study:    a TOML file, or what it would hold: {"controllers": ["adaptive", "pi"], "factors": {"plant.theta_N":
               {"from": 15, "to": 30}}, "design": {"kind": "sobol", "points": 256}}.
     out:      folder of the results, as --out: the next call with the same study and folder goes on where this one was
-              interrupted. Without: a folder that is gone afterwards, and the results are kept in memory.
+              interrupted. Without: a temporary folder, which is removed with the results' object.
     threads:  number of threads, without effect on the results; 0: one for each processor.
     progress: True for a progress bar on stderr, or a function that is called with (done, all).
 
@@ -35,14 +36,13 @@ def study(study: StudyLike, out: str | os.PathLike[str] | None = None, *, thread
     """
     if not 0 <= threads <= 1024:
         raise ValueError(f'threads {threads}: give a number in [0, 1024]')
-    with _file_of(study) as (file, name), tempfile.TemporaryDirectory() as scratch:
-        folder = os.fspath(out) if out is not None else os.path.join(scratch, 'study')
-        with _Bar(progress) as report:
+    with ExitStack() as scratch:
+        folder = os.fspath(out) if out is not None else os.path.join(scratch.enter_context(tempfile.TemporaryDirectory()), 'study')
+        with _file_of(study) as (file, name), _Bar(progress) as report:
             _core.run_study(str(file), name, folder, 1, 1, threads, report)
         results = load_study(folder)
-        if out is None:
-            results.keep()
-        return results
+        weakref.finalize(results, scratch.pop_all().close)
+    return results
 
 
 def simulate_run(study: StudyLike, run: int) -> Run:
