@@ -1,6 +1,8 @@
 """Studies from Python: the program's bytes, single runs of them, quantiles, maps, Sobol indices, the page, Parquet."""
 import gzip
 import json
+import struct
+import zlib
 
 import numpy as np
 import pandas
@@ -61,6 +63,20 @@ def test_columns_are_those_of_all_rows(folder):
     # The same from all rows as from the columns alone.
     pandas.testing.assert_frame_equal(table, results.quantiles())
     pandas.testing.assert_frame_equal(map_, results.map('plant.theta_N', 'plant.B', 'stop_distance_m', bins=2))
+
+
+def test_rows_that_are_lost_or_doubled_are_refused(folder, tmp_path):
+    whole = (folder / 'results.csv.gz').read_bytes()
+    lines = gzip.decompress(whole).splitlines(keepends=True)
+    header = whole[:whole.index(b'\0', 10) + 1]  # with the study in its comment
+    for rows, words in ((lines[:-1], '79 rows instead of the 80'), ([*lines, lines[-1]], 'more than the 80 rows')):
+        file = tmp_path / 'results.csv.gz'
+        packed = zlib.compressobj(9, zlib.DEFLATED, -15)
+        text = b''.join(rows)
+        file.write_bytes(header + packed.compress(text) + packed.flush()
+                         + struct.pack('<II', zlib.crc32(text), len(text)))
+        with pytest.raises(ValueError, match=words):
+            abs_hil.load_study(tmp_path).quantiles()
 
 
 def test_results_without_a_folder_go_with_their_object():

@@ -51,7 +51,7 @@ class StudyResults:
         self.factors: list[str] = columns[len(BEFORE):columns.index(BETWEEN[0])]
         self.metrics: list[str] = columns[columns.index(BETWEEN[-1]) + 1:]
         self.definition = Definition(self.facts['text'])
-        self._columns: dict[str, pandas.Series] = {}
+        self._columns: dict[str, Any] = {}  # arrays of numpy or pandas; a Series would keep an index of 8 bytes a row
         self._data: pandas.DataFrame | None = None
 
     def __len__(self) -> int:
@@ -75,14 +75,35 @@ class StudyResults:
         if self._data is not None:
             return self._data[list(names)]
         if missing := [name for name in dict.fromkeys(names) if name not in self._columns]:
-            pieces: dict[str, list[pandas.Series]] = {name: [] for name in missing}
-            for frame in self.chunks(missing):
-                for name in missing:
-                    pieces[name].append(frame[name].copy())  # a view would keep the whole piece
-            for name in missing:
-                whole = pandas.concat(pieces.pop(name), ignore_index=True)
-                self._columns[name] = whole.astype('category') if name in _FEW else whole
+            self._columns.update(self._read(missing))
         return pandas.DataFrame({name: self._columns[name] for name in names}, copy=False)
+
+    def _read(self, names: list[str]) -> dict[str, Any]:
+        """Columns of all rows. Numbers are copied to their place piece by piece, so that nothing is in memory twice."""
+        import pandas
+        numbers: dict[str, np.ndarray] = {}
+        texts: dict[str, list[pandas.Series]] = {}
+        row = 0
+        for frame in self.chunks(names, rows=20_000):  # the parser takes some 1,000 bytes a row
+            if row + len(frame) > len(self):
+                raise ValueError(f'{self.path}: more than the {len(self)} rows of its runs')
+            for name, piece in frame.items():
+                if not pandas.api.types.is_numeric_dtype(piece.dtype):
+                    texts.setdefault(name, []).append(piece.copy())
+                    continue
+                whole = numbers.get(name, np.empty(len(self) if row == 0 else 0, piece.dtype))
+                if piece.dtype != whole.dtype:  # whole numbers first, others later
+                    whole = whole.astype(np.result_type(piece.dtype, whole.dtype))
+                whole[row:row + len(frame)] = piece
+                numbers[name] = whole
+            row += len(frame)
+        if row != len(self):
+            raise ValueError(f'{self.path}: {row} rows instead of the {len(self)} of its runs')
+        found: dict[str, Any] = dict(numbers)
+        for name, pieces in texts.items():
+            text = pandas.concat(pieces, ignore_index=True)
+            found[name] = (text.astype('category') if name in _FEW else text).array
+        return found
 
     @property
     def data(self) -> pandas.DataFrame:
