@@ -162,6 +162,28 @@ def test_sensitivities_are_those_of_the_simulated_log(logs):
         np.testing.assert_allclose(found, expected[:-1], rtol=2e-3, atol=2e-6)
 
 
+@pytest.mark.parametrize('form', FORMS.values(), ids=list(FORMS))
+def test_lanes_and_single_simulations_give_the_same(logs, form, monkeypatch):
+    """The logs contain wheels that stand, wheels apart and braking past the peak."""
+    problem = Problem.of(form, 'paper-table1', [logs[0], logs[2]], {})
+    values = {p.key: problem.base.values()[p.key] for p in form.parameters} | {'delay_s': 3e-4}
+    pieces = pieces_of(problem, values, 0.05)
+    found = []
+    for lanes in ('none', 'portable', ''):  # '': the widest of this computer
+        monkeypatch.setenv('ABS_HIL_LANES', lanes)
+        linearise(problem, values, pieces)
+        found.append([dict(piece.linear) for piece in pieces])
+    for single, *others in zip(*found):
+        turns = (single['stands'] == 0)[:, None]
+        for other in others:
+            np.testing.assert_array_equal(other['angles'], single['angles'])
+            np.testing.assert_array_equal(other['end'], single['end'])
+            np.testing.assert_allclose(other['by_parameter'], single['by_parameter'], rtol=1e-12, atol=1e-12)
+            by_speed = [one['end_by_state'][:, :, :2] * turns for one in (other, single)]
+            np.testing.assert_allclose(*by_speed, rtol=1e-12, atol=1e-12)
+    assert any(piece.stands.any() for piece in pieces)
+
+
 def test_the_filter_is_generalised_least_squares(logs):
     """Against dense algebra: all readings of a piece at once, their covariance from the states and the disturbances."""
     problem, values, pieces, scale = small_problem(logs)

@@ -229,6 +229,7 @@ def _measure(problem: Problem, piece: Piece) -> None:
     gap[:-1] = linear['end'][:-1] - piece.states[1:]
     linear.update(residual=residual[:, :, None], weight=weight, gap=gap, stands=piece.stands, first=piece.first,
                   prior_sd=piece.prior_sd, time_s=problem.logs[piece.log].time_s)
+    linear.update(_core.condense(linear))
 
 
 def _duty_step(problem: Problem, u0: float) -> float:
@@ -346,15 +347,9 @@ def _move_states(fit: Fit, disturbances: Disturbances, x: np.ndarray) -> None:
         linear = dict(piece.linear)
         # The states are near already. A wide prior would only lose digits in the backward pass.
         linear['prior_sd'] = np.minimum(piece.prior_sd, NEAR_SD)
-        linear['residual'] = (linear['residual'][:, :, 0] - linear['by_parameter'] @ x)[:, :, None]
-        linear['gap'] = linear['gap'] + linear['end_by_parameter'] @ x
-        change, _ = _core.smooth(linear, way, disturbances.sd, disturbances.time_constant_s, variance)
-        counts = np.repeat(np.arange(len(piece.first) - 1), np.diff(piece.first))
-        left = linear['residual'][:, :, 0] - np.einsum('rws,rs->rw', linear['by_state'], change[counts, 2:5])
-        left -= change[counts, :2]
-        left -= np.einsum('rwp,dp,rd->rw', linear['by_parameter'], way, change[counts, 5:])
-        square += float(np.sum(linear['weight'] * left**2))
-        weights += float(np.sum(linear['weight']))
+        change, left = _core.smooth(linear, x, way, disturbances.sd, disturbances.time_constant_s, variance)
+        square += left
+        weights += float(linear['readings'][:, 1].sum())
         speeds = change[:, 2:4]
         piece.states = piece.states + np.column_stack([change[:, :2], np.clip(speeds, -30, 30), change[:, 4:5]])
         piece.states[:, 2:4] = np.where(piece.stands != 0, 0.0, np.maximum(piece.states[:, 2:4], 0.0))

@@ -48,6 +48,7 @@ def bootstrap(fit: Fit, seed: int = 1, replicates: int = REPLICATES,
             phase = chosen[piece.log][None]
             residual = (np.floor(exact + phase) + 0.5 - phase - exact) * per_count
             changed = {**piece.linear, 'residual': residual, 'gap': np.zeros_like(piece.linear['gap'])}
+            changed.update(_core.condense(changed))
             found = _core.filter_pieces([changed], way, QUIET.sd, QUIET.time_constant_s, variance)[0]
             N, n = N + found[0], n + found[1]
         shift = solved(fit, N, np.zeros(size))  # what the prior alone does
