@@ -2,6 +2,7 @@
 // identification_sensitivities.cpp.
 
 #include "identification_plant.hpp"
+#include "plant_sim/encoder.hpp"
 
 namespace abs_hil::python {
 
@@ -43,6 +44,16 @@ Array tyre_forces_N(const PlantOptions& base, const Values& values, const Array&
   return forces;
 }
 
+/// What the encoders' counters hold at these angles of both wheels, shape (rows, 2).
+py::array_t<std::int32_t> encoder_counts(const PlantOptions& base, const Array& angles_rad) {
+  if (angles_rad.ndim() != 2 || angles_rad.shape(1) != angles) throw std::invalid_argument("give angles of two wheels");
+  const plant_sim::Encoder encoders[] = {plant_sim::upper_encoder(base), plant_sim::lower_encoder(base)};
+  py::array_t<std::int32_t> counts({angles_rad.shape(0), angles});
+  for (std::ptrdiff_t i = 0; i < counts.size(); ++i)
+    counts.mutable_data()[i] = encoders[i % angles].counts(angles_rad.data()[i], 0.0);
+  return counts;
+}
+
 }  // namespace
 
 void add_identification(py::module_& module) {
@@ -60,6 +71,7 @@ void add_identification(py::module_& module) {
   module.def("linearise", &linearise, py::arg("base"), py::arg("nominal"), py::arg("parameters"), py::arg("log"),
              py::arg("first"), py::arg("starts"));
   module.def("trajectory", &trajectory, py::arg("base"), py::arg("nominal"), py::arg("log"), py::arg("start"));
+  module.def("encoder_counts", &encoder_counts, py::arg("base"), py::arg("angles_rad"));
   module.def("tyre_forces_N", &tyre_forces_N, py::arg("base"), py::arg("values"), py::arg("omega1_rad_s"),
              py::arg("omega2_rad_s"), py::arg("brake_torque_Nm"));
 }

@@ -152,7 +152,9 @@ class LanesOf : public Lanes {
     const PlantOptions& options = delayed.plant.options();
     const plant_sim::TyreModel tyres = plant_sim::make_tyre_model(options);
     const auto* tyre = std::get_if<Tyre<double>>(&tyres);
-    if (tyre == nullptr || options.ideal_actuator) return std::nullopt;
+    if (tyre == nullptr || options.ideal_actuator || !options.friction_profile.empty() ||
+        plant_sim::Drift(options.drift).any() || options.brake_flaws != plant_sim::BrakeFlaws{})
+      return std::nullopt;
     const plant_sim::LoadModel loads = plant_sim::make_load_model(options, tyre->peak_mu(), 1.0);
     const auto* load = std::get_if<Load<double>>(&loads);
     if (load == nullptr) return std::nullopt;

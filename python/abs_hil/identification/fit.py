@@ -17,8 +17,9 @@ import numpy as np
 import scipy.optimize
 
 from ..core import _core
+from ..options import options
 from .logs import Log, Motion, motion_of, segments_of
-from .parameters import DELAY, Form, Parameter, base_options
+from .parameters import DELAY, RATE_LIMIT, WHEELS, Form, Parameter, base_options, disc_of
 from .start import brake_torques, first_values
 
 #: an even distribution within one count, counts^2
@@ -44,6 +45,8 @@ class Disturbances:
 #: rounds of the homotopy: disturbances, number of iterations
 ROUNDS = ((Disturbances.of(0.10, 0.05, 0.2), 2), (Disturbances.of(0.01, 0.005, 0.5), 2),
           (Disturbances.of(1e-3, 1e-4, 1.0), 1), (Disturbances.of(1e-4, 1e-5, 1.0), 1))
+#: an eccentricity below this sways no first value, rad
+SMALL_DISC_RAD = 3e-4
 #: an iteration that moves less, in standard deviations, is the last
 CONVERGED = 0.1
 #: largest change of a parameter in one iteration, over its size
@@ -62,6 +65,7 @@ class Piece:
     stands: np.ndarray
     prior_sd: np.ndarray
     linear: dict[str, Any] = field(default_factory=dict)
+    columns: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
 
     @property
     def rows(self) -> slice:
@@ -70,7 +74,7 @@ class Piece:
 
 @dataclass
 class Problem:
-    """All logs, and the plant's form with what is fixed."""
+    """All logs, and the plant's form with what is fixed. `discs` names the wheels whose encoders may be eccentric."""
     form: Form
     base: Any
     logs: Sequence[Log]
@@ -81,26 +85,36 @@ class Problem:
     counts_per_rev: int
     drifts: tuple[str, ...] = ()
     with_delay: bool = False
+    with_rate_limit: bool = False
+    discs: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, form: Form, start: Any, logs: Sequence[Log], fixed: Mapping[str, float | None],
-           drifts: Sequence[str] = ()) -> Problem:
+           drifts: Sequence[str] = (), discs: Sequence[str] = ()) -> Problem:
         base = base_options(form, start)
-        values = base.values()
+        values = _core.PlantOptions(options(plant=start)).values()
         counts_per_rev = int(values['encoder_counts_per_rev'])
         motions = [motion_of(log, counts_per_rev) for log in logs]
         segments = [segments_of(log, motion) for log, motion in zip(logs, motions)]
         known = {key: float(values[key] if value is None else value) for key, value in fixed.items() if key in values}
         given = {key: known.pop(key, float(values[key])) for key in ('J2_kg_m2', 'r2_m')}
-        keys = {p.key for p in form.parameters}
+        keys = {p.key for p in form.parameters} | {RATE_LIMIT.key}
         return cls(form, base, logs, motions, segments, given, {k: v for k, v in known.items() if k in keys},
-                   counts_per_rev, tuple(drifts))
+                   counts_per_rev, tuple(drifts), discs=tuple(discs))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         delay = (Parameter(DELAY, 's', 'always', '', floor=1e-3),) if self.with_delay else ()
         factors = tuple(Parameter(key, '1', 'brake', '') for key in self.factors) if self.drifts else ()
-        return self.form.parameters + factors + delay
+        limit = (RATE_LIMIT,) if self.with_rate_limit else ()
+        discs = tuple(p for log in range(len(self.logs)) for wheel in self.discs for p in disc_of(wheel, log))
+        return self.form.parameters + limit + factors + discs + delay
+
+    def columns(self, log: int) -> np.ndarray:
+        """Places of the parameters that act in one log."""
+        others = {p.key for other in range(len(self.logs)) if other != log for wheel in self.discs
+                  for p in disc_of(wheel, other)} | ({*self.factors} - {f'brake_factor_{log + 1}'})
+        return np.array([i for i, p in enumerate(self.parameters) if p.key not in others])
 
     @property
     def factors(self) -> tuple[str, ...]:
@@ -112,7 +126,12 @@ class Problem:
         factor = values[self.factors[log - 1]] if self.drifts and log > 0 else 1.0
         scaled = [(p.key, values[p.key] * (factor if p.key in ('b1_Nm', 'b2_Nm') else 1.0))
                   for p in self.form.parameters]
-        return [*self.given.items(), *scaled, (DELAY, values.get(DELAY, 0.0))]
+        return [*self.given.items(), *scaled, (RATE_LIMIT.key, values.get(RATE_LIMIT.key, 0.0)),
+                (DELAY, values.get(DELAY, 0.0))]
+
+    def disc_angles_rad(self, log: int, angles_rad: np.ndarray) -> np.ndarray:
+        """Angles of the discs from their counters' zeros, shape (rows, 2)."""
+        return angles_rad + (self.logs[log].first_counts % self.counts_per_rev) * self.radians_per_count
 
     @property
     def radians_per_count(self) -> float:
@@ -165,7 +184,7 @@ def pieces_of(problem: Problem, values: Mapping[str, float], window_s: float) ->
     """Windows over every segment, with states from the counts and the brake's torque from the model."""
     pieces = []
     for number, (log, motion, segments) in enumerate(zip(problem.logs, problem.motions, problem.segments)):
-        torque = brake_torques(log, values['b1_Nm'], values['b2_Nm'], values['u0'], values['c31_per_s'])
+        torque = brake_torques(log, values)
         step = max(4, round(window_s / log.period_s))
         for begin, end in segments:
             count = max(1, (end - begin - 1) // step)
@@ -196,12 +215,11 @@ def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Pi
         steps.append(size if values[p.key] + size <= p.most else -size)
     for number, log in enumerate(problem.logs):
         inputs = log.inputs()
-        # A factor of another log changes nothing in this one.
-        there = [i for i, p in enumerate(problem.parameters)
-                 if p.key not in problem.factors or p.key == f'brake_factor_{number + 1}']
+        there = problem.columns(number)
+        simulated = np.array([problem.parameters[i].acts != 'reading' for i in there])
         nominal = problem.plant_values(values, number)
         moved = []
-        for i in there:
+        for i in there[simulated]:
             p = problem.parameters[i]
             other = problem.plant_values({**values, p.key: values[p.key] + steps[i]}, number)
             moved.append((other, steps[i] / scale[i], p.acts))
@@ -210,26 +228,53 @@ def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Pi
                 continue
             check()
             piece.linear = _core.linearise(problem.base, nominal, moved, inputs, piece.first, piece.states)
-            if len(there) < len(steps):
+            piece.columns = there
+            if not simulated.all():
                 for name in ('by_parameter', 'end_by_parameter'):
                     few = piece.linear[name]
-                    piece.linear[name] = np.zeros((*few.shape[:2], len(steps)))
-                    piece.linear[name][:, :, there] = few
-            _measure(problem, piece)
+                    piece.linear[name] = np.zeros((*few.shape[:2], len(there)))
+                    piece.linear[name][:, :, simulated] = few
+                _read_by_discs(problem, scale, piece)
+            _measure(problem, values, piece)
     return scale
 
 
-def _measure(problem: Problem, piece: Piece) -> None:
+def _read_by_discs(problem: Problem, scale: np.ndarray, piece: Piece) -> None:
+    """Derivatives of the readings by what eccentric discs add. That these change the other derivatives, too, by a
+    hundredth at most, is left out: it changes neither where the residuals vanish nor, visibly, an interval."""
+    keys = [p.key for p in problem.parameters]
+    place = problem.disc_angles_rad(piece.log, piece.linear['angles'])
+    for wheel in problem.discs:
+        number = WHEELS.index(wheel)
+        for p, wave in zip(disc_of(wheel, piece.log), (np.sin(place[:, number]), np.cos(place[:, number]))):
+            i = keys.index(p.key)
+            column = int(np.flatnonzero(piece.columns == i)[0])
+            piece.linear['by_parameter'][:, number, column] = scale[i] * wave
+
+
+def _measure(problem: Problem, values: Mapping[str, float], piece: Piece) -> None:
     """What the filter needs beside the sensitivities: residuals, weights, gaps between windows."""
     motion, linear = problem.motions[piece.log], piece.linear
     angle = motion.angle_rad[piece.rows]
-    residual = np.nan_to_num(angle) - linear['angles']
+    read = linear['angles'].copy()
+    read += disc_waves_rad(problem, values, piece.log, read)
+    residual = np.nan_to_num(angle) - read
     weight = np.where(np.isfinite(angle), motion.weight[piece.rows], 0.0)
     gap = np.zeros_like(piece.states)
     gap[:-1] = linear['end'][:-1] - piece.states[1:]
-    linear.update(residual=residual[:, :, None], weight=weight, gap=gap, stands=piece.stands, first=piece.first,
+    linear.update(read=read, residual=residual[:, :, None], weight=weight, gap=gap, stands=piece.stands, first=piece.first,
                   prior_sd=piece.prior_sd, time_s=problem.logs[piece.log].time_s)
     linear.update(_core.condense(linear))
+
+
+def disc_waves_rad(problem: Problem, values: Mapping[str, float], log: int, angles_rad: np.ndarray) -> np.ndarray:
+    """What the discs add to the readings at these angles, shape (rows, 2)."""
+    waves = np.zeros(angles_rad.shape)
+    place = problem.disc_angles_rad(log, angles_rad)
+    for wheel in problem.discs:
+        number, (sine, cosine) = WHEELS.index(wheel), disc_of(wheel, log)
+        waves[:, number] = values[sine.key] * np.sin(place[:, number]) + values[cosine.key] * np.cos(place[:, number])
+    return waves
 
 
 def _duty_step(problem: Problem, u0: float) -> float:
@@ -267,14 +312,28 @@ def run_filter(fit: Fit, disturbances: Disturbances, variance: float | None = No
     problem = fit.problem
     variance = COUNT_VARIANCE * problem.radians_per_count**2 if variance is None else variance
     way = _relative(problem, fit.values, fit.scale)
-    found = _core.filter_pieces([piece.linear for piece in fit.pieces], way, disturbances.sd,
-                                disturbances.time_constant_s, variance)
+    found = filtered(problem, fit.pieces, way, disturbances, variance)
     N = sum(one[0] for one in found)
     n = sum(one[1][:, 0] for one in found)
     c = sum(float(one[2][0]) for one in found)
     log_variance = sum(one[3] for one in found)
     x = solved(fit, N, n)
-    return c - float(n @ x) + log_variance, list(found)
+    return c - float(n @ x) + log_variance, found
+
+
+def filtered(problem: Problem, pieces: Sequence[Piece], way: np.ndarray, disturbances: Disturbances,
+             variance: float) -> list[Any]:
+    """What `_core.filter_pieces` gives of each piece, with a row and a column for every parameter."""
+    out = []
+    size = len(problem.parameters)
+    for piece in pieces:
+        at = piece.columns
+        N, n, square, log_variance, readings = _core.filter_pieces(
+            [piece.linear], np.ascontiguousarray(way[:, at]), disturbances.sd, disturbances.time_constant_s, variance)[0]
+        whole, right = np.zeros((size, size)), np.zeros((size, n.shape[1]))
+        whole[np.ix_(at, at)], right[at] = N, n
+        out.append((whole, right, square, log_variance, readings))
+    return out
 
 
 def solved(fit: Fit, N: np.ndarray, n: np.ndarray, low: np.ndarray | None = None,
@@ -347,7 +406,8 @@ def _move_states(fit: Fit, disturbances: Disturbances, x: np.ndarray) -> None:
         linear = dict(piece.linear)
         # The states are near already. A wide prior would only lose digits in the backward pass.
         linear['prior_sd'] = np.minimum(piece.prior_sd, NEAR_SD)
-        change, left = _core.smooth(linear, x, way, disturbances.sd, disturbances.time_constant_s, variance)
+        change, left = _core.smooth(linear, x[piece.columns], np.ascontiguousarray(way[:, piece.columns]), disturbances.sd,
+                                    disturbances.time_constant_s, variance)
         square += left
         weights += float(linear['readings'][:, 1].sum())
         speeds = change[:, 2:4]
@@ -355,6 +415,31 @@ def _move_states(fit: Fit, disturbances: Disturbances, x: np.ndarray) -> None:
         piece.states[:, 2:4] = np.where(piece.stands != 0, 0.0, np.maximum(piece.states[:, 2:4], 0.0))
         piece.states[:, 4] = np.maximum(piece.states[:, 4], 0.0)
     fit.rms_counts = float(np.sqrt(square / max(weights, 1e-9))) / problem.radians_per_count
+
+
+def other_costs(fit: Fit, disturbances: Disturbances, affected: Sequence[bool],
+                ) -> Callable[[Mapping[str, float]], tuple[np.ndarray, np.ndarray, float]]:
+    """A function of other values of the parameters: normal equations, and -2 log likelihood without their change. It
+    simulates the affected pieces anew and keeps the sensitivities."""
+    problem = fit.problem
+    settings = (_relative(problem, fit.values, fit.scale), disturbances, COUNT_VARIANCE * problem.radians_per_count**2)
+    rest = filtered(problem, [piece for piece, hit in zip(fit.pieces, affected) if not hit], *settings)
+    inputs = [log.inputs() for log in problem.logs]
+
+    def costs(values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray, float]:
+        changed = []
+        for piece, hit in zip(fit.pieces, affected):
+            if hit:
+                other = _core.linearise(problem.base, problem.plant_values(values, piece.log), [], inputs[piece.log],
+                                        piece.first, piece.states)
+                moved = dataclasses.replace(piece, linear=dict(piece.linear))
+                moved.linear.update(angles=other['angles'], end=other['end'])
+                _measure(problem, values, moved)
+                changed.append(moved)
+        found = [*rest, *filtered(problem, changed, *settings)]
+        return (np.asarray(sum(one[0] for one in found)), np.asarray(sum(one[1][:, 0] for one in found)),
+                sum(float(one[2][0]) + one[3] for one in found))
+    return costs
 
 
 def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
@@ -377,32 +462,15 @@ def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
     if len(gaps) > most:  # evenly chosen ones; a later call looks closer
         gaps = [gaps[i] for i in sorted({round(i) for i in np.linspace(0, len(gaps) - 1, most)})]
     affected = [_has_duties(problem, piece, edges[0], edges[-1]) for piece in fit.pieces]
-    way = _relative(problem, fit.values, fit.scale)
-    variance = COUNT_VARIANCE * problem.radians_per_count**2
-    settings = (way, disturbances.sd, disturbances.time_constant_s, variance)
-    rest = _core.filter_pieces([p.linear for p, hit in zip(fit.pieces, affected) if not hit], *settings)
     # The sensitivities are those of the present u0: other parameters may follow only as far as they are uncertain.
     within = np.zeros(len(fit.scale))
     within[fit.free] = 5.0 * np.sqrt(np.diag(fit.covariance()))
-    inputs = [log.inputs() for log in problem.logs]
+    others = other_costs(fit, disturbances, affected)
     tried = []
     for begin, end in gaps:
         check()
         # A duty that equals u0 acts (7): so u0 lies above the gap's begin, up to its end.
-        candidate = max(0.5 * (begin + end), end - 1e-3)
-        values = {**fit.values, 'u0': candidate}
-        changed = []
-        for piece, hit in zip(fit.pieces, affected):
-            if hit:
-                other = _core.linearise(problem.base, problem.plant_values(values, piece.log), [], inputs[piece.log],
-                                        piece.first, piece.states)
-                moved = Piece(piece.log, piece.first, piece.states, piece.stands, piece.prior_sd, dict(piece.linear))
-                moved.linear.update(angles=other['angles'], end=other['end'])
-                _measure(problem, moved)
-                changed.append(moved.linear)
-        found = [*rest, *_core.filter_pieces(changed, *settings)]
-        N, n = sum(one[0] for one in found), sum(one[1][:, 0] for one in found)
-        cost = sum(float(one[2][0]) + one[3] for one in found)
+        N, n, cost = others({**fit.values, 'u0': max(0.5 * (begin + end), end - 1e-3)})
         x = solved(fit, N, n, -within, within)
         tried.append((float(begin), float(end), cost - float(2 * n @ x - x @ N @ x)))
     best = min(tried, key=lambda gap: gap[2])
@@ -432,12 +500,37 @@ def _has_duties(problem: Problem, piece: Piece, least: float, most: float) -> bo
     return bool(np.any((duty >= least) & (duty <= most)))
 
 
-def start_fit(problem: Problem, start: Mapping[str, float], check: Callable[[], None] = lambda: None) -> Fit:
-    """First values and a few rounds with large disturbances: near the truth, whatever the start."""
+def start_fit(problem: Problem, start: Mapping[str, float], check: Callable[[], None] = lambda: None,
+              other_form: Fit | None = None) -> Fit:
+    """First values and a few rounds with large disturbances: near the truth, whatever the start. What `other_form` found of
+    the same logs is not sought again."""
+    if other_form is not None:
+        problem = dataclasses.replace(problem, motions=other_form.problem.motions,
+                                      with_rate_limit=other_form.problem.with_rate_limit)
+        discs = {p.key: other_form.first[p.key] for p in problem.parameters if p.acts == 'reading'}
+        return _started(problem, start, check, discs, other_form.first)
+    fit = _started(problem, start, check)
+    discs = {p.key: fit.values[p.key] for p in problem.parameters if p.acts == 'reading'}
+    if all(abs(value) < SMALL_DISC_RAD for value in discs.values()):
+        return fit
+    # Speeds that an eccentric disc does not sway give better first values.
+    motions = []
+    for number, (log, motion) in enumerate(zip(problem.logs, problem.motions)):
+        read = log.counts * problem.radians_per_count
+        turned = motion_of(dataclasses.replace(log, counts=log.counts - disc_waves_rad(problem, discs, number, read)
+                                               / problem.radians_per_count), problem.counts_per_rev)
+        motions.append(dataclasses.replace(motion, smooth_rad=turned.smooth_rad, speed_rad_s=turned.speed_rad_s))
+    return _started(dataclasses.replace(problem, motions=motions), start, check, discs)
+
+
+def _started(problem: Problem, start: Mapping[str, float], check: Callable[[], None],
+             discs: Mapping[str, float] | None = None, other_form: Mapping[str, float] | None = None) -> Fit:
     values = first_values(problem.form, problem.base, problem.given, start, problem.logs, problem.motions,
-                          problem.segments, problem.fixed)
+                          problem.segments, problem.fixed, other_form)
     values.setdefault(DELAY, 0.0)
+    values.setdefault(RATE_LIMIT.key, problem.fixed.get(RATE_LIMIT.key, 0.0))
     values.update({key: 1.0 for key in problem.factors})
+    values.update({p.key: 0.0 for p in problem.parameters if p.acts == 'reading'} | dict(discs or {}))
     free = np.array([p.key not in problem.fixed and p.key != 'u0' for p in problem.parameters])
     fit = Fit(problem, values, pieces_of(problem, values, WINDOW_S), ROUNDS[0][0], WINDOW_S, free, dict(values))
     disturbances, count = ROUNDS[0]
@@ -452,6 +545,25 @@ def finish_fit(fit: Fit, check: Callable[[], None] = lambda: None, most: int = 1
         for _ in range(count):
             step(fit, disturbances, check)
         search_u0(fit, disturbances, 0.004 / 4**number, 9, check)
+    _to_rest(fit, check, most)
+    for _ in range(2):
+        if not fit.rms_counts > LARGEST_QUIET_RMS:
+            break
+        # u0 may have stopped one step of the duties beside.
+        moved = dataclasses.replace(fit, pieces=[dataclasses.replace(piece) for piece in fit.pieces])
+        step(moved, ROUNDS[-1][0], check)
+        search_u0(moved, ROUNDS[-1][0], 0.001, 9, check)
+        if moved.values['u0'] == fit.values['u0']:
+            break
+        _to_rest(moved, check, most)
+        if not moved.rms_counts < fit.rms_counts:
+            break
+        fit = moved
+    return fit
+
+
+def _to_rest(fit: Fit, check: Callable[[], None], most: int) -> None:
+    """Steps without disturbances until nothing moves."""
     before = np.inf
     for _ in range(most):
         moved = step(fit, QUIET, check)
@@ -459,7 +571,6 @@ def finish_fit(fit: Fit, check: Callable[[], None] = lambda: None, most: int = 1
         if moved < CONVERGED or (moved < 1.0 and fit.rms_counts > 0.999 * before > LARGEST_QUIET_RMS):
             break
         before = fit.rms_counts
-    return fit
 
 
 def disturbed_fit(fit: Fit, check: Callable[[], None] = lambda: None, say: Callable[[str], None] = lambda _: None) -> Fit:

@@ -2,13 +2,14 @@
 counts' steps disturb, by the information of the filter where the rig wanders."""
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..core import _core
-from .fit import COUNT_VARIANCE, QUIET, Fit, _relative, solved
+from .fit import COUNT_VARIANCE, QUIET, Fit, _relative, filtered, solved
 from .parameters import COMBINATIONS
 
 REPLICATES = 80
@@ -44,12 +45,12 @@ def bootstrap(fit: Fit, seed: int = 1, replicates: int = REPLICATES,
         size = len(fit.scale)
         N, n = np.zeros((size, size)), np.zeros((size, chosen.shape[2]))
         for piece in fit.pieces:
-            exact = piece.linear['angles'][:, :, None] / per_count
+            exact = piece.linear['read'][:, :, None] / per_count
             phase = chosen[piece.log][None]
             residual = (np.floor(exact + phase) + 0.5 - phase - exact) * per_count
             changed = {**piece.linear, 'residual': residual, 'gap': np.zeros_like(piece.linear['gap'])}
             changed.update(_core.condense(changed))
-            found = _core.filter_pieces([changed], way, QUIET.sd, QUIET.time_constant_s, variance)[0]
+            found = filtered(problem, [dataclasses.replace(piece, linear=changed)], way, QUIET, variance)[0]
             N, n = N + found[0], n + found[1]
         shift = solved(fit, N, np.zeros(size))  # what the prior alone does
         estimates += [solved(fit, N, n[:, i]) - shift for i in range(n.shape[1])]

@@ -14,7 +14,7 @@ from ..options import PathLike, options
 from ..run import Run, load
 from ..simulation import simulate
 from .estimate import Estimate, Identified
-from .parameters import DELAY, FORMS
+from .parameters import DELAY, FORMS, WHEELS
 
 #: keys of a run's configuration that say what the run did, not on what it ran
 _DOING = ('control.', 'experiment.', 'observer.', 'gate.')
@@ -62,10 +62,22 @@ def as_toml(found: Identified) -> str:
     if found.form == 'inteco-mu':
         given = ('mu_w1', 'mu_w2', 'mu_w3', 'lever_L_m', 'lever_phi_deg')
         lines += [f'{key} = {_number(base[key])}  # of the start, {_comment(found.start)}' for key in given]
-        lines += ['', '[model]',
-                  "# What controllers believe of the tyre: the magic formula nearest to the maker's curve in braking."]
+    believed = _believed(found)
+    return '\n'.join([*lines, *(['', '[model]', *believed] if believed else [])]) + '\n'
+
+
+def _believed(found: Identified) -> list[str]:
+    """Lines of the table [model]: where controllers believe something else than the plant."""
+    lines = []
+    if found.form == 'inteco-mu':
+        lines.append("# What controllers believe of the tyre: the magic formula nearest to the maker's curve in braking.")
         lines += [f'{key} = {_number(value)}' for key, value in equivalent_tyre(found).items()]
-    return '\n'.join(lines) + '\n'
+    for wheel in WHEELS:
+        phase = found.parameters.get(f'{wheel}_encoder_phase_rad')
+        if phase is not None and phase.status != 'identified':
+            lines.append("# Counters begin anew at another place of the disc: without its phase the eccentricity is no help.")
+            lines.append(f'{wheel}_encoder_eccentricity_rad = 0.0')
+    return lines
 
 
 def _number(value: float) -> str:
