@@ -16,6 +16,7 @@ from abs_hil.identification.fit import COUNT_VARIANCE, QUIET, Disturbances, Prob
 from abs_hil.identification.logs import load_log, motion_of, segments_of
 from abs_hil.identification.parameters import FORMS
 from abs_hil.identification.program import main
+from abs_hil.identification.results import as_toml
 
 MAGIC = FORMS['magic-formula']
 TRUTH = {'plant.theta_N': 26.0, 'plant.B': 24.0, 'plant.J1_kg_m2': 8.2e-3, 'plant.M10_Nm': 0.004, 'plant.c31_per_s': 17.0,
@@ -354,6 +355,16 @@ def test_the_model_closes_the_loop(written):
     as_plant = abs_hil.simulate(plant=model)
     assert as_plant.summary['stop_distance_m'] == pytest.approx(abs_hil.simulate(set=TRUTH).summary['stop_distance_m'],
                                                                 rel=1e-3)
+
+
+@pytest.mark.parametrize('controller', ['adaptive', 'adaptive-actuator', 'adaptive-optimal'])
+def test_laws_stop_as_with_the_true_model(found, tmp_path, controller):
+    """Identified from start values that are 10 % to 25 % off."""
+    model = tmp_path / 'model.toml'
+    model.write_text(as_toml(found))
+    stops = [abs_hil.simulate(controller=controller, set=TRUTH, **given).summary['stop_distance_m']
+             for given in ({}, {'model': model})]
+    assert stops[1] == pytest.approx(stops[0], rel=3e-3)
 
 
 def test_first_values_need_no_good_start(logs, start):

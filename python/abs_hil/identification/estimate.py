@@ -136,7 +136,7 @@ def identify(logs: Sequence[PathLike | Log], start: PathLike = 'paper-table1', *
         except (ValueError, np.linalg.LinAlgError) as error:
             notes.append(f'{FORMS[name].meaning}: cannot be fitted ({error})')
     if not fits:
-        raise ValueError('neither form of the plant can be fitted to these logs')
+        raise ValueError(f'no form of the plant can be fitted to these logs: {"; ".join(notes[-2:])}')
     fit = fits[0] if len(fits) == 1 else _better_form(fits, start_form, check, say, notes)
     try:
         finished = _finished(fit, seed, say, check)
@@ -215,7 +215,8 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
 def _interrupted(fit: Fit, start: str, notes: list[str]) -> Identified:
     """What there is, without intervals."""
     size = len(fit.problem.parameters)
-    found = _assembled(Finished(fit, intervals.Spread(np.full((size, size), np.nan), np.zeros(size), 0), [], None, {}), start,
+    nothing = np.full((size, size), np.nan)
+    found = _assembled(Finished(fit, intervals.Spread(nothing, np.zeros(size), 0, nothing), [], None, {}), start,
                        ['interrupted: the values are provisional, and no interval is given'])
     found.notes[1:] = notes
     _without_intervals(found)

@@ -23,10 +23,12 @@ LIKELY = 3.84
 @dataclass
 class Spread:
     """Covariance of the free parameters' scaled changes, (n, n) with zeros for those that are not free, and how the
-    bootstrap's mean is off, (n,)."""
+    bootstrap's mean is off, (n,). `of_logs`: the part of the covariance that the logs' own errors make, for combinations
+    that hardly depend on the first values."""
     covariance: np.ndarray
     bias: np.ndarray
     replicates: int
+    of_logs: np.ndarray
 
 
 def bootstrap(fit: Fit, seed: int = 1, replicates: int = REPLICATES,
@@ -55,13 +57,21 @@ def bootstrap(fit: Fit, seed: int = 1, replicates: int = REPLICATES,
         shift = solved(fit, N, np.zeros(size))  # what the prior alone does
         estimates += [solved(fit, N, n[:, i]) - shift for i in range(n.shape[1])]
     x = np.array(estimates)
-    return Spread(np.cov(x.T), x.mean(axis=0), replicates)
+    scatter = np.cov(x.T)
+    return Spread(scatter + _by_prior(fit), x.mean(axis=0), replicates, scatter)
+
+
+def _by_prior(fit: Fit) -> np.ndarray:
+    """What the first values' errors add to the covariance: all of it where the logs tell nothing."""
+    known = np.zeros((len(fit.scale), len(fit.scale)))
+    known[np.ix_(fit.free, fit.free)] = fit.covariance()
+    return known @ np.diag(fit.prior()[0]) @ known
 
 
 def information(fit: Fit) -> Spread:
     covariance = np.zeros((len(fit.scale), len(fit.scale)))
     covariance[np.ix_(fit.free, fit.free)] = fit.covariance()
-    return Spread(covariance, np.zeros(len(fit.scale)), 0)
+    return Spread(covariance, np.zeros(len(fit.scale)), 0, covariance)
 
 
 def combination(fit: Fit, spread: Spread, name: str) -> tuple[float, float]:
@@ -75,7 +85,7 @@ def combination(fit: Fit, spread: Spread, name: str) -> tuple[float, float]:
     for key, part in zip(parts, values):
         i = keys.index(key)
         gradient[i] = fit.scale[i] * (value / part if product else 1.0)
-    return value, float(np.sqrt(max(0.0, gradient @ spread.covariance @ gradient)))
+    return value, float(np.sqrt(max(0.0, gradient @ spread.of_logs @ gradient)))
 
 
 def excluded(gaps: list[tuple[float, float, float]]) -> tuple[bool, bool]:

@@ -8,7 +8,7 @@ import sys
 
 from ..core import _core
 from ..files import write_whole
-from ..report.page import Unavailable
+from ..report.page import Unavailable, plotly_js
 from ..report.text import clean
 from .estimate import Identified, identify
 from .parameters import FORMS
@@ -67,6 +67,8 @@ def _write_text(path: pathlib.Path, text: str) -> None:
 
 def _identify(o: argparse.Namespace) -> int:
     fixed = _fixed(o.fix)
+    if not o.no_report:
+        plotly_js()  # what the page needs, before the work rather than behind it
     o.out.mkdir(parents=True, exist_ok=True)
     for name in ('identified.json', 'model.toml', 'report.html'):
         if (o.out / name).exists() and not o.force:
@@ -98,7 +100,7 @@ def main(arguments: list[str]) -> int:
     try:
         return _identify(o)
     except Unavailable as error:
-        print(f'abs_identify: {error}', file=sys.stderr)
+        print(f'abs_identify: {error}; --no-report leaves the page out', file=sys.stderr)
         return 3
     except (ValueError, OSError) as error:
         print(f'abs_identify: {clean(error, 4000)}', file=sys.stderr)

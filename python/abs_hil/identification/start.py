@@ -104,6 +104,9 @@ def first_values(form: Form, base: Any, given: Mapping[str, float], start: Mappi
                 value['r1_m'] = r2 * float(np.median(pieces.angle[rolling, 1] / pieces.angle[rolling, 0]))
                 break
     _scan_brake(value, pieces, logs, motions, r2, J2, fixed)
+    for p in form.parameters:
+        if p.key not in fixed:
+            value[p.key] = float(np.clip(value[p.key], p.least, p.most))
     _tyre(form, base, value, pieces, logs, motions, r2, J2, fixed)
     return value
 
