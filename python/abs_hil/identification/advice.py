@@ -11,8 +11,9 @@ from ..core import _core
 from ..options import Value, options
 from ..simulation import simulate
 from .estimate import Identified
-from .fit import QUIET, WINDOW_DISTURBED_S, WINDOW_S, Disturbances, Fit, Problem, _keep_normals, linearise, pieces_of, run_filter
+from .linear import _keep_normals, linearise, run_filter
 from .logs import Log, motion_of, segments_of
+from .problem import QUIET, WINDOW_DISTURBED_S, WINDOW_S, Disturbances, Fit, Problem, pieces_of
 from .results import plant_settings
 
 EXPERIMENTS = ('lifted', 'duty-ramp', 'pulses', 'slip-sweep', 'locked-stop', 'coast-down')

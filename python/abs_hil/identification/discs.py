@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.stats
 
-from .fit import CONVERGED, Disturbances, Fit, step
+from .fit import CONVERGED
 from .intervals import WIDTH, Spread
+from .linear import step
 from .parameters import disc_of
+from .problem import Disturbances, Fit
 
 #: A disc is believed, and one phase for all logs refused, if chance does it less often than this.
 CHANCE = 1e-6
@@ -59,9 +61,8 @@ def settle(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lam
         return fit, largest
     left = dataclasses.replace(problem, discs=tuple(wheel for wheel in problem.discs if wheel not in largest))
     kept = {p.key for p in left.parameters}
-    fit = dataclasses.replace(fit, problem=left, free=fit.free[[key in kept for key in fit.keys]],
-                              values={key: value for key, value in fit.values.items() if '_disc_' not in key or key in kept},
-                              pieces=[dataclasses.replace(piece) for piece in fit.pieces])
+    fit = fit.copy(problem=left, free=fit.free[[key in kept for key in fit.keys]],
+                   values={key: value for key, value in fit.values.items() if '_disc_' not in key or key in kept})
     for _ in range(4):
         if step(fit, disturbances, check) < CONVERGED:
             break

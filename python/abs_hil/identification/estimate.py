@@ -11,27 +11,11 @@ import numpy as np
 from ..core import _core
 from ..options import PathLike, options
 from . import discs, intervals, rate_limit
-from .fit import (
-    CONVERGED,
-    LARGEST_QUIET_RMS,
-    QUIET,
-    ROUNDS,
-    Disturbances,
-    Fit,
-    Problem,
-    _keep_normals,
-    describe,
-    disturbed_fit,
-    finish_fit,
-    likely_u0,
-    linearise,
-    run_filter,
-    solved,
-    start_fit,
-    step,
-)
+from .fit import CONVERGED, ROUNDS, describe, disturbed_fit, finish_fit, likely_u0, start_fit
+from .linear import _keep_normals, linearise, run_filter, solved, step
 from .logs import Log, load_log
 from .parameters import COMBINATIONS, DELAY, FORMS, GIVEN, RATE_LIMIT, WHEELS, checked_keys, disc_of
+from .problem import LARGEST_QUIET_RMS, QUIET, Disturbances, Fit, Problem
 
 #: an estimate whose standard deviation is above this share of its value is not called identified
 LARGEST_SD = 0.05
@@ -41,8 +25,9 @@ LARGEST_WIDTH = 0.25
 UNCERTAIN_PART = 0.01
 #: a log whose own estimate lies this far from the others' is named: chi-square over its degrees of freedom
 LARGEST_DISAGREEMENT = 6.0
-#: a difference of -2 log likelihood that decides between the forms at first values already
+#: a difference of -2 log likelihood that decides between the forms, and one that does so at first values already
 CLEAR_DIFFERENCE = 500.0
+CLEAR_AT_FIRST = 5000.0
 #: of a parameter in its relative change: a log with less does not speak of it
 LEAST_INFORMATION = 10.0
 #: a delay is believed if it is this many standard deviations from 0
@@ -193,7 +178,7 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
         if limited is not fit:
             fit = finish_fit(limited, check)
     else:
-        near = dataclasses.replace(fit, pieces=[dataclasses.replace(piece) for piece in fit.pieces])
+        near = fit.copy()
         step(near, ROUNDS[-1][0], check)
         limited = rate_limit.started(near, check)
         if limited is not near:
@@ -253,15 +238,19 @@ def _refuse_swapped(logs: Sequence[Log]) -> None:
 
 def _better_form(fits: Sequence[Fit], start_form: str, check: Callable[[], None], say: Callable[[str], None],
                  notes: list[str]) -> Fit:
-    """The form that better predicts each log from all the others, by the likelihood. Large disturbances are enough if
-    they show a clear difference already."""
+    """The form that better predicts each log from all the others, by the likelihood. Large disturbances and first values
+    are enough if they show a clear difference already."""
     costs = [_cross_validated(fit) for fit in fits]
-    if abs(costs[0] - costs[1]) < CLEAR_DIFFERENCE:
-        costs = []
-        for fit in fits:
+    if abs(costs[0] - costs[1]) < CLEAR_AT_FIRST:
+        for number, fit in enumerate(fits):
             for _ in range(2):
-                step(fit, Disturbances.of(0.01, 0.005, 0.5), check)
-            costs.append(_cross_validated(fit))
+                step(fit, ROUNDS[1][0], check)
+            costs[number] = _cross_validated(fit)
+        follow = [_follows(fit, check) for fit in fits] if abs(costs[0] - costs[1]) > CLEAR_DIFFERENCE else []
+        if sum(follow) == 1:
+            best = follow.index(True)
+            notes.append(f'form: {fits[best].problem.form.meaning}; it alone follows the logs to the steps of the counts')
+            return fits[best]
     for fit, cost in zip(fits, costs):
         say(f'{fit.problem.form.meaning}: -2 log likelihood of left-out logs {cost:.6g}')
     best = int(np.argmin(costs))
@@ -272,6 +261,14 @@ def _better_form(fits: Sequence[Fit], start_form: str, check: Callable[[], None]
     notes.append(f'form: {fits[best].problem.form.meaning}; it predicts left-out logs better (-2 log likelihood lower by '
                  f'{abs(costs[0] - costs[1]):.3g})')
     return fits[best]
+
+
+def _follows(fit: Fit, check: Callable[[], None]) -> bool:
+    """Whether nothing but the steps of the counts is left between the logs and this form."""
+    try:
+        return finish_fit(fit.copy(), check).rms_counts <= LARGEST_QUIET_RMS
+    except (ValueError, np.linalg.LinAlgError):
+        return False
 
 
 def _cross_validated(fit: Fit) -> float:
@@ -293,8 +290,7 @@ def _cross_validated(fit: Fit) -> float:
 def _with_delay(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit:
     """Adds the inputs' delay if the logs are sure of one, and if then only the counts' steps disturb."""
     problem = dataclasses.replace(fit.problem, with_delay=True)
-    late = dataclasses.replace(fit, problem=problem, free=np.append(fit.free, True), values={**fit.values, DELAY: 0.0},
-                               pieces=[dataclasses.replace(piece) for piece in fit.pieces])
+    late = fit.copy(problem=problem, free=np.append(fit.free, True), values={**fit.values, DELAY: 0.0})
     late.scale = linearise(problem, late.values, late.pieces, check)
     N, n = _keep_normals(late, run_filter(late, QUIET)[1])
     x = solved(late, N, n)[-1]

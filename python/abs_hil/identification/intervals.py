@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import _core
-from .fit import COUNT_VARIANCE, QUIET, Fit, _relative, filtered, solved
+from .linear import _relative, filtered, solved
 from .parameters import COMBINATIONS
+from .problem import COUNT_VARIANCE, QUIET, Fit
 
 REPLICATES = 80
 _BATCH = 20

@@ -67,12 +67,12 @@ def _write_text(path: pathlib.Path, text: str) -> None:
 
 def _identify(o: argparse.Namespace) -> int:
     fixed = _fixed(o.fix)
-    if not o.no_report:
-        plotly_js()  # what the page needs, before the work rather than behind it
     o.out.mkdir(parents=True, exist_ok=True)
     for name in ('identified.json', 'model.toml', 'report.html'):
         if (o.out / name).exists() and not o.force:
             raise ValueError(f'"{o.out / name}" exists; give another --out, or --force to replace it')
+    if not o.no_report:
+        plotly_js()  # what the page needs, before the work rather than behind it
 
     def say(text: str) -> None:
         print(f'abs_identify: {text}', file=sys.stderr, flush=True)

@@ -6,9 +6,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from .fit import CONVERGED, Disturbances, Fit, other_costs, solved, step
+from .fit import CONVERGED, other_costs
+from .linear import solved, step
 from .logs import Log
 from .parameters import RATE_LIMIT
+from .problem import Disturbances, Fit
 from .start import brake_torques, static_torques
 
 #: a limit is believed if it lowers -2 log likelihood by this
@@ -59,9 +61,8 @@ def sought(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lam
     limited = dataclasses.replace(problem, with_rate_limit=True)
     at = [p.key for p in limited.parameters].index(RATE_LIMIT.key)
     value = SHARES[best] * fastest
-    return dataclasses.replace(fit, problem=limited, values={**fit.values, RATE_LIMIT.key: value},
-                               first={**fit.first, RATE_LIMIT.key: value}, free=np.insert(fit.free, at, True),
-                               pieces=[dataclasses.replace(piece) for piece in fit.pieces])
+    return fit.copy(problem=limited, values={**fit.values, RATE_LIMIT.key: value},
+                    first={**fit.first, RATE_LIMIT.key: value}, free=np.insert(fit.free, at, True))
 
 
 def started(fit: Fit, check: Callable[[], None] = lambda: None) -> Fit:
@@ -83,9 +84,8 @@ def settle(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lam
     sd = float(np.sqrt(fit.covariance()[np.count_nonzero(fit.free[:at]), np.count_nonzero(fit.free[:at])]) * fit.scale[at])
     if sd < LEAST_SURE * value and value < fastest_Nm_s(fit, fit.problem.logs):
         return fit
-    fit = dataclasses.replace(fit, problem=dataclasses.replace(fit.problem, with_rate_limit=False),
-                              values={**fit.values, RATE_LIMIT.key: 0.0}, free=np.delete(fit.free, at),
-                              pieces=[dataclasses.replace(piece) for piece in fit.pieces])
+    fit = fit.copy(problem=dataclasses.replace(fit.problem, with_rate_limit=False),
+                   values={**fit.values, RATE_LIMIT.key: 0.0}, free=np.delete(fit.free, at))
     for _ in range(4):
         if step(fit, disturbances, check) < CONVERGED:
             break
