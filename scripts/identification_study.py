@@ -4,7 +4,8 @@
 
 Tries abs_identify on simulated rigs whose parameters it does not know: each within 25 % of the plant's, with other encoder
 phases, from start values up to 25 % off. The logs are those of the series `identification`. Prints, for each parameter, the
-median error, the share of intervals of 95 % that hold the truth, and how well the identified model predicts `paper`.
+median error, the share of intervals of 95 % that hold the truth, how well the identified model predicts `paper`, and how
+far controllers that believe it stop from where they stop with the true model.
 --disturbed: friction and brake wander by 1 %, the motor by 0.5 %, bearings by 5 %, over 0.2 s.
 --check: status 1 unless all fits converge, errors stay within docs/identification.md's bounds for undisturbed rigs, and
 the intervals of all parameters together hold the truth as often as intervals of 95 % do.
@@ -26,9 +27,11 @@ import abs_hil  # noqa: E402
 from abs_hil.identification import identify  # noqa: E402
 from abs_hil.identification.advice import log_of  # noqa: E402
 from abs_hil.identification.parameters import FORMS  # noqa: E402
-from abs_hil.identification.results import plant_settings  # noqa: E402
+from abs_hil.identification.results import as_toml, equivalent_tyre, plant_settings  # noqa: E402
 
 EXPERIMENTS = ('lifted', 'duty-ramp', 'locked-stop', 'pulses', 'slip-sweep')
+#: laws that use the model
+CONTROLLERS = ('adaptive', 'adaptive-actuator', 'adaptive-optimal')
 SPREAD = 0.25
 #: narrower ones: geometry is measured to a few per cent, the tyre's shape must stay a shape, and the rig must reach 170 rad/s
 SPREADS = {'r1_m': 0.02, 'u0': 0.1, 'motor_no_load_speed_rad_s': 0.1, 'C': 0.1, 'mu_p': 0.1}
@@ -88,12 +91,16 @@ def one(plant, seed, disturbed):
         begin = time.process_time()
         found = identify(logs, file, seed=seed)
         cpu_s = time.process_time() - begin
+        model = pathlib.Path(folder) / 'model.toml'
+        model.write_text(as_toml(found))
+        stops = {name: stopped_apart(name, settings, form, found, model) for name in CONTROLLERS}
     # Predicted as a user would: the same controller and the same beliefs, on the identified plant.
     beliefs = {f'model.{key}': settings[f'plant.{key}'] for key in nominal if f'model.{key}' in MODEL}
     again = abs_hil.simulate(experiment='paper', set={**settings, **plant_settings(found), **beliefs})
     row = {'plant': plant, 'seed': seed, 'form_right': found.form == form.name, 'cpu_s': cpu_s,
            'rms_counts': found.residual_counts_rms,
-           'distance_error': again.summary['stop_distance_m'] / paper.summary['stop_distance_m'] - 1}
+           'distance_error': again.summary['stop_distance_m'] / paper.summary['stop_distance_m'] - 1,
+           **{f'{name} stop': apart for name, apart in stops.items()}}
     for key, value in truth.items():
         estimate = found.parameters.get(key)
         row[f'{key} error'] = estimate.value / value - 1 if estimate else np.nan
@@ -105,6 +112,17 @@ def one(plant, seed, disturbed):
     return row
 
 
+def stopped_apart(controller, settings, form, found, model):
+    """How much farther the true rig stops with the identified model than with the true one, relative."""
+    true = dict(settings)
+    if form.name == 'inteco-mu':
+        truth = {key: settings[f'plant.{key}'] for key in found.values()}
+        true.update({f'model.{key}': value for key, value in equivalent_tyre(found.fit.problem.base, truth).items()})
+    distances = [abs_hil.simulate(controller=controller, **how).summary['stop_distance_m']
+                 for how in ({'set': settings, 'model': model}, {'set': true})]
+    return distances[0] / distances[1] - 1
+
+
 MODEL = {name for name in abs_hil.keys() if name.startswith('model.')}
 
 
@@ -113,7 +131,10 @@ def table(plant, rows):
           f'{np.median([row["rms_counts"] for row in rows]):.4f} counts RMS; `paper` predicted within '
           f'{100 * np.median(np.abs([row["distance_error"] for row in rows])):.4f} % (median), '
           f'{100 * np.max(np.abs([row["distance_error"] for row in rows])):.4f} % (worst); '
-          f'{np.median([row["cpu_s"] for row in rows]):.1f} s of CPU')
+          f'{np.median([row["cpu_s"] for row in rows]):.1f} s of CPU. Stops with the identified model instead of the true one, '
+          'median and worst: ' + ', '.join(
+              f'`{name}` {100 * np.median(apart):.4f} %, {100 * np.max(apart):.4f} %' for name in CONTROLLERS
+              if len(apart := np.abs([row[f'{name} stop'] for row in rows]))))
     print('\n| parameter | median error | worst error | intervals that hold | identified |\n|---|---|---|---|---|')
     for key in [name.removesuffix(' error') for name in rows[0] if name.endswith(' error')]:
         errors = np.abs([row[f'{key} error'] for row in rows])

@@ -2,7 +2,7 @@
 
     python -m abs_hil.eccentricity RUN --out model.toml
 
-A command of its own until `abs_hil identify` fits these four values beside the others.
+`abs_hil identify` fits them beside the rig's other parameters, from any logs. This needs one run alone.
 """
 from __future__ import annotations
 

@@ -1,10 +1,16 @@
 // The prediction-error filter of identification (python/abs_hil/identification): it weighs a log's counts with the
-// sensitivities of identification.cpp.
+// sensitivities of identification_sensitivities.cpp.
+//
+// Within a window nothing but the counts' steps disturbs, so all of its readings together are one measurement of the
+// state at its start and of the parameters: their sums of squares and products say everything. `condense` makes these
+// sums once for each linearisation; the filter then takes one step for each window, whatever the disturbances.
 
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -29,51 +35,132 @@ constexpr int disturbances = 5;
 constexpr int size = states + disturbances;
 using State = Eigen::Matrix<double, size, 1>;
 using Covariance = Eigen::Matrix<double, size, size>;
-using Row = Eigen::Matrix<double, 1, size>;
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using ConstMap = Eigen::Map<const Rows>;
+using Matrix = Eigen::MatrixXd;
 
-/// A linearised piece of a log (`linearise`), with what was measured.
+/// What the readings of each window say: sums over them of weight times products. A reading's row consists of its
+/// derivatives by the window's state, those by the parameters, and its residuals.
+struct Sums {
+  explicit Sums(const py::dict& d)
+      : gram(d["gram"].cast<Array>()),
+        cross(d["cross"].cast<Array>()),
+        square(d["square"].cast<Array>()),
+        log_weight(d["log_weight"].cast<Array>()),
+        readings(d["readings"].cast<Array>()) {
+    windows = gram.shape(0);
+    columns = cross.shape(2);
+  }
+  Array gram;        // (windows, states + parameters, states + parameters)
+  Array cross;       // (windows, states + parameters, columns): with the residuals
+  Array square;      // (windows, columns, columns): of the residuals
+  Array log_weight;  // (windows): sum of the logarithms
+  Array readings;    // (windows, 2): how many, and the sum of their weights
+  std::ptrdiff_t windows{}, columns{};
+};
+
+/// The sums of each window. Shapes as `linearise` gives them; `residual` (rows, 2, columns), `weight` (rows, 2).
+py::dict condense(const py::dict& d) {
+  const auto by_state = d["by_state"].cast<Array>();
+  const auto by_parameter = d["by_parameter"].cast<Array>();
+  const auto residual = d["residual"].cast<Array>();
+  const auto weight = d["weight"].cast<Array>();
+  const auto first = d["first"].cast<Indices>();
+  const std::ptrdiff_t windows = first.size() - 1;
+  const std::ptrdiff_t p = by_parameter.shape(2);
+  const std::ptrdiff_t c = residual.shape(2);
+  const std::ptrdiff_t m = states + p;
+  if (windows < 1 || by_state.shape(0) != by_parameter.shape(0) || residual.shape(0) != by_parameter.shape(0) ||
+      weight.shape(0) != by_parameter.shape(0) || first.data()[windows] - first.data()[0] != by_parameter.shape(0)) {
+    throw std::invalid_argument("the arrays of a piece do not fit together");
+  }
+  Array gram({windows, m, m});
+  Array cross({windows, m, c});
+  Array square({windows, c, c});
+  Array log_weight(windows);
+  Array readings({windows, std::ptrdiff_t{2}});
+  double* const gram_at = gram.mutable_data();
+  double* const cross_at = cross.mutable_data();
+  double* const square_at = square.mutable_data();
+  double* const log_weight_at = log_weight.mutable_data();
+  double* const readings_at = readings.mutable_data();
+  {
+    const py::gil_scoped_release release;
+    Matrix rows;
+    Matrix products(m + c, m + c);
+    for (std::ptrdiff_t w = 0; w < windows; ++w) {
+      const std::ptrdiff_t begin = angles * (first.data()[w] - first.data()[0]);
+      const std::ptrdiff_t end = angles * (first.data()[w + 1] - first.data()[0]);
+      rows.resize(m + c, end - begin);
+      std::ptrdiff_t kept = 0;
+      double logarithms = 0.0;
+      double weights = 0.0;
+      for (std::ptrdiff_t at = begin; at < end; ++at) {
+        const double one = weight.data()[at];
+        if (!(one > 0.0)) continue;
+        auto row = rows.col(kept++);
+        row(at % angles) = 1.0;
+        row(1 - at % angles) = 0.0;
+        for (std::ptrdiff_t i = 0; i < moving; ++i) row(angles + i) = by_state.data()[at * moving + i];
+        for (std::ptrdiff_t i = 0; i < p; ++i) row(states + i) = by_parameter.data()[at * p + i];
+        for (std::ptrdiff_t i = 0; i < c; ++i) row(m + i) = residual.data()[at * c + i];
+        row *= std::sqrt(one);
+        logarithms += std::log(one);
+        weights += one;
+      }
+      products.noalias() = rows.leftCols(kept) * rows.leftCols(kept).transpose();
+      Eigen::Map<Rows>(gram_at + w * m * m, m, m) = products.topLeftCorner(m, m);
+      Eigen::Map<Rows>(cross_at + w * m * c, m, c) = products.topRightCorner(m, c);
+      Eigen::Map<Rows>(square_at + w * c * c, c, c) = products.bottomRightCorner(c, c);
+      log_weight_at[w] = logarithms;
+      readings_at[angles * w] = static_cast<double>(kept);
+      readings_at[angles * w + 1] = weights;
+    }
+  }
+  py::dict result;
+  result["gram"] = gram;
+  result["cross"] = cross;
+  result["square"] = square;
+  result["log_weight"] = log_weight;
+  result["readings"] = readings;
+  return result;
+}
+
+/// A linearised piece of a log (`linearise`, `condense`).
 struct Piece {
   explicit Piece(const py::dict& d)
-      : by_state(d["by_state"].cast<Array>()),
-        by_parameter(d["by_parameter"].cast<Array>()),
+      : sums(d),
         end_by_state(d["end_by_state"].cast<Array>()),
         end_by_parameter(d["end_by_parameter"].cast<Array>()),
         gap(d["gap"].cast<Array>()),
-        residual(d["residual"].cast<Array>()),
-        weight(d["weight"].cast<Array>()),
         stands(d["stands"].cast<Array>()),
+        time_s(d["time_s"].cast<Array>()),
         first(d["first"].cast<Indices>()),
         prior_sd(d["prior_sd"].cast<Array>()) {
     windows = first.size() - 1;
-    parameters = by_parameter.shape(2);
-    rows = by_parameter.shape(0);
-    columns = residual.shape(2);
-    if (residual.shape(0) != rows || weight.shape(0) != rows || gap.shape(0) != windows || stands.shape(0) != windows ||
-        prior_sd.size() != states || first.data()[windows] - first.data()[0] != rows) {
+    parameters = end_by_parameter.shape(2);
+    if (sums.windows != windows || sums.gram.shape(1) != states + parameters || gap.shape(0) != windows ||
+        stands.shape(0) != windows || prior_sd.size() != states || first.data()[windows] >= time_s.size()) {
       throw std::invalid_argument("the arrays of a piece do not fit together");
     }
   }
-  Array by_state, by_parameter, end_by_state, end_by_parameter, gap, residual, weight, stands;
+  Sums sums;
+  Array end_by_state, end_by_parameter, gap, stands, time_s;
   Indices first;
   Array prior_sd;
-  std::ptrdiff_t windows{}, parameters{}, rows{}, columns{};
+  std::ptrdiff_t windows{}, parameters{};
 };
 
 /// Slow random factors of the rig: each is a first-order Gauss-Markov process that acts as a combination of parameters.
 struct Disturbed {
-  ConstMap directions;  // (disturbances, parameters)
-  const double* sd;     // stationary
+  Disturbed(const Array& ways, const Array& sds, const Array& times) : sd(sds.data()), time_constant_s(times.data()) {
+    if (ways.ndim() != 2 || ways.shape(0) != disturbances || sds.size() != disturbances || times.size() != disturbances)
+      throw std::invalid_argument("give five disturbances");
+    into = ConstMap(ways.data(), disturbances, ways.shape(1)).transpose();
+  }
+  Matrix into;       // (parameters, disturbances)
+  const double* sd;  // stationary
   const double* time_constant_s;
-};
-
-/// One scalar reading, as the filter saw it.
-struct Reading {
-  Row sensitivity;
-  State gain;
-  double innovation;
-  double variance;
 };
 
 struct Filtered {
@@ -84,31 +171,54 @@ struct Filtered {
   double readings{0.0};
 };
 
-struct Kept {
-  std::vector<Reading> readings;
-  std::vector<std::ptrdiff_t> last_reading;  // of each window: index after it
-  std::vector<State> predicted;
-  std::vector<Covariance> covariance;
-  std::vector<Covariance> transition;
+/// What the backward pass needs of a window: the predicted state and its covariance, the updated covariance, what the
+/// readings add to the adjoint, and the way to the next window.
+struct Passed {
+  State predicted;
+  Covariance covariance;
+  Covariance updated;
+  Covariance information;
+  State score;
+  Covariance transition;
 };
 
+/// Lower factor of a covariance that may be singular: a standing wheel and a disturbance of size 0 have none.
+Covariance factor_of(const Covariance& P) {
+  constexpr double nothing = 1e-13;
+  Covariance L = Covariance::Zero();
+  for (int j = 0; j < size; ++j) {
+    const double rest = P(j, j) - L.row(j).head(j).squaredNorm();
+    if (!(rest > nothing * P(j, j))) continue;
+    L(j, j) = std::sqrt(rest);
+    for (int i = j + 1; i < size; ++i) L(i, j) = (P(i, j) - L.row(i).head(j).dot(L.row(j).head(j))) / L(j, j);
+  }
+  return L;
+}
+
 /// The Kalman filter over one piece. The estimate of the state is affine in the change of the parameters, and so is
-/// each innovation: the normal equations of the parameters follow from one pass. `kept` is for `smooth`, with no
-/// parameters' columns used.
-Filtered filter(const Piece& piece, const double* time_s, const Disturbed& disturbed, double variance, Kept* kept) {
+/// each innovation: the normal equations of the parameters follow from one pass.
+/// @param change  of the parameters, for `passed`; both may be null
+Filtered filter(const Piece& piece, const Disturbed& disturbed, double variance, const Eigen::VectorXd* change,
+                std::vector<Passed>* passed) {
   const std::ptrdiff_t p = piece.parameters;
-  const std::ptrdiff_t c = piece.columns;
+  const std::ptrdiff_t c = piece.sums.columns;
+  const std::ptrdiff_t m = states + p;
   Filtered out;
   out.normal = Rows::Zero(p, p);
   out.right = Rows::Zero(p, c);
   out.square = Eigen::VectorXd::Zero(c);
   Covariance P = Covariance::Zero();
-  Rows X = Rows::Zero(size, c + p);  // state: the first c columns for each residual, then by parameter
+  Matrix X = Matrix::Zero(size, c + p);  // state: the first c columns for each residual, then by parameter
   for (int i = 0; i < states; ++i) P(i, i) = piece.prior_sd.data()[i] * piece.prior_sd.data()[i];
   for (int i = 0; i < disturbances; ++i) P(states + i, states + i) = disturbed.sd[i] * disturbed.sd[i];
-  Rows b(1, c + p);
-  const std::ptrdiff_t origin = piece.first.data()[0];
-  const Eigen::MatrixXd into = disturbed.directions.transpose();  // (parameters, disturbances)
+  Matrix by_size(m, size);  // products of all with the state's derivatives
+  Matrix W(size, c + p);    // of the state's derivatives with residuals and (negative) parameters
+  Matrix Z(size, c + p);    // the same at the predicted state
+  Matrix V(size, c + p);
+  Matrix Q = Matrix::Zero(c + p, c + p);
+  Covariance F = Covariance::Zero();
+  Covariance noise = Covariance::Zero();
+  double factors_for_s = -1.0;
   for (std::ptrdiff_t w = 0; w < piece.windows; ++w) {
     const double* stands = piece.stands.data() + w * angles;
     for (int i = 0; i < 2; ++i) {
@@ -117,130 +227,138 @@ Filtered filter(const Piece& piece, const double* time_s, const Disturbed& distu
       P.col(angles + i).setZero();
       X.row(angles + i).setZero();
     }
-    if (kept != nullptr) {
-      kept->predicted.push_back(X.col(0));
-      kept->covariance.push_back(P);
+    const ConstMap gram(piece.sums.gram.data() + w * m * m, m, m);
+    const ConstMap cross(piece.sums.cross.data() + w * m * c, m, c);
+    const ConstMap square(piece.sums.square.data() + w * c * c, c, c);
+    by_size.leftCols(states) = gram.leftCols(states);
+    by_size.rightCols(disturbances).noalias() = gram.rightCols(p) * disturbed.into;
+    Covariance A;
+    A.topRows(states) = by_size.topRows(states);
+    A.bottomRows(disturbances).noalias() = disturbed.into.transpose() * by_size.bottomRows(p);
+    W.topLeftCorner(states, c) = cross.topRows(states);
+    W.bottomLeftCorner(disturbances, c).noalias() = disturbed.into.transpose() * cross.bottomRows(p);
+    W.rightCols(p) = -by_size.bottomRows(p).transpose();
+    A /= variance;
+    W /= variance;
+    Z.noalias() = W - A * X;
+    Q.topLeftCorner(c, c) = square / variance;
+    Q.topRightCorner(c, p) = -cross.bottomRows(p).transpose() / variance;
+    Q.bottomLeftCorner(p, c) = Q.topRightCorner(c, p).transpose();
+    Q.bottomRightCorner(p, p) = gram.bottomRightCorner(p, p) / variance;
+    // The readings' covariance is variance / weight and that of the state: the latter leaves V' V less.
+    const Covariance L = factor_of(P);
+    const Eigen::LLT<Covariance> inner(Covariance::Identity() + L.transpose() * A * L);
+    V.noalias() = L.transpose() * Z;
+    inner.matrixL().solveInPlace(V);
+    Q.noalias() -= X.transpose() * W;
+    Q.noalias() -= Z.transpose() * X;
+    Q.noalias() -= V.transpose() * V;
+    out.normal += Q.bottomRightCorner(p, p);
+    out.right -= Q.topRightCorner(c, p).transpose();
+    out.square += Q.topLeftCorner(c, c).diagonal();
+    out.log_variance += piece.sums.readings.data()[angles * w] * std::log(variance) - piece.sums.log_weight.data()[w] +
+                        2.0 * inner.matrixLLT().diagonal().array().log().sum();
+    out.readings += piece.sums.readings.data()[angles * w + 1];
+    Covariance root = L.transpose();
+    inner.matrixL().solveInPlace(root);
+    const Covariance updated = root.transpose() * root;
+    if (passed != nullptr) {
+      const State predicted = X.col(0) + X.rightCols(p) * *change;
+      const State score = Z.col(0) + Z.rightCols(p) * *change;
+      passed->push_back({predicted, P, updated, A, score, {}});
     }
-    for (std::ptrdiff_t row = piece.first.data()[w] - origin; row < piece.first.data()[w + 1] - origin; ++row) {
-      for (std::ptrdiff_t wheel = 0; wheel < angles; ++wheel) {
-        const std::ptrdiff_t at = row * angles + wheel;
-        const double weight = piece.weight.data()[at];
-        if (!(weight > 0.0)) continue;
-        const ConstMap D(piece.by_parameter.data() + at * p, 1, p);
-        Row H = Row::Zero();
-        H(wheel) = 1.0;
-        for (int i = 0; i < moving; ++i) H(angles + i) = piece.by_state.data()[at * moving + i];
-        H.tail<disturbances>() = D * into;
-        const State PH = P * H.transpose();
-        const double S = H.dot(PH.transpose()) + variance / weight;
-        const State K = PH / S;
-        b.noalias() = -H * X;
-        for (std::ptrdiff_t i = 0; i < c; ++i) b(i) += piece.residual.data()[at * c + i];
-        b.rightCols(p) -= D;
-        X.noalias() += K * b;
-        P.noalias() -= K * PH.transpose();
-        out.normal.noalias() += b.rightCols(p).transpose() * b.rightCols(p) / S;
-        out.right.noalias() -= b.rightCols(p).transpose() * b.leftCols(c) / S;
-        out.square += b.leftCols(c).cwiseAbs2().transpose() / S;
-        out.log_variance += std::log(S);
-        out.readings += weight;
-        if (kept != nullptr) kept->readings.push_back({H, K, b(0), S});
-      }
-    }
-    P = 0.5 * (P + P.transpose()).eval();
-    const double duration_s = time_s[piece.first.data()[w + 1]] - time_s[piece.first.data()[w]];
-    Covariance F = Covariance::Zero();
+    X.noalias() += root.transpose() * V;
+
+    const double duration_s =
+        piece.time_s.data()[piece.first.data()[w + 1]] - piece.time_s.data()[piece.first.data()[w]];
+    F.topLeftCorner<states, states>().setZero();
     F(0, 0) = F(1, 1) = 1.0;
-    for (int i = 0; i < states; ++i) {
-      for (int j = 0; j < moving; ++j) F(i, angles + j) = piece.end_by_state.data()[(w * states + i) * moving + j];
-    }
+    F.block<states, moving>(0, angles) = ConstMap(piece.end_by_state.data() + w * states * moving, states, moving);
     const ConstMap G(piece.end_by_parameter.data() + w * states * p, states, p);
-    F.topRightCorner<states, disturbances>() = G * into;
-    Covariance Q = Covariance::Zero();
-    for (int i = 0; i < disturbances; ++i) {
-      const double keeps = std::exp(-duration_s / disturbed.time_constant_s[i]);
-      F(states + i, states + i) = keeps;
-      Q(states + i, states + i) = (1.0 - keeps * keeps) * disturbed.sd[i] * disturbed.sd[i];
+    F.topRightCorner<states, disturbances>() = G * disturbed.into;
+    if (duration_s != factors_for_s) {
+      factors_for_s = duration_s;
+      for (int i = 0; i < disturbances; ++i) {
+        const double keeps = std::exp(-duration_s / disturbed.time_constant_s[i]);
+        F(states + i, states + i) = keeps;
+        noise(states + i, states + i) = (1.0 - keeps * keeps) * disturbed.sd[i] * disturbed.sd[i];
+      }
     }
     X = F * X;
     for (int i = 0; i < states; ++i) X(i, 0) += piece.gap.data()[w * states + i];
     X.topRightCorner(states, p) += G;
-    P = F * P * F.transpose() + Q;
-    if (kept != nullptr) {
-      kept->transition.push_back(F);
-      kept->last_reading.push_back(static_cast<std::ptrdiff_t>(kept->readings.size()));
-    }
+    P = F * updated * F.transpose() + noise;
+    P = 0.5 * (P + P.transpose()).eval();
+    if (passed != nullptr) passed->back().transition = F;
   }
   return out;
 }
 
 py::tuple filter_pieces(const py::list& pieces, const Array& directions, const Array& sd, const Array& time_constant_s,
                         double variance) {
-  if (directions.shape(0) != disturbances || sd.size() != disturbances || time_constant_s.size() != disturbances) {
-    throw std::invalid_argument("give five disturbances");
-  }
+  const Disturbed disturbed(directions, sd, time_constant_s);
   py::list all;
   for (const py::handle item : pieces) {
-    const auto d = item.cast<py::dict>();
-    const Piece piece(d);
-    const auto time_s = d["time_s"].cast<Array>();
-    const Disturbed disturbed{ConstMap(directions.data(), disturbances, directions.shape(1)), sd.data(),
-                              time_constant_s.data()};
+    const Piece piece(item.cast<py::dict>());
     Filtered one;
     {
       const py::gil_scoped_release release;
-      one = filter(piece, time_s.data(), disturbed, variance, nullptr);
+      one = filter(piece, disturbed, variance, nullptr, nullptr);
     }
     all.append(py::make_tuple(one.normal, one.right, one.square, one.log_variance, one.readings));
   }
   return py::tuple(all);
 }
 
-/// The most likely changes of state at the windows' starts, shape (windows, 10): the five of the plant and the
-/// disturbances. The residual's only column and the gaps must contain the change of the parameters already. The
-/// backward pass (modified Bryson-Frazier) inverts no covariance: a standing wheel's is singular. Also the innovations
-/// over their standard deviations, in order of the readings.
-py::tuple smooth(const py::dict& d, const Array& directions, const Array& sd, const Array& time_constant_s,
-                 double variance) {
+/// The most likely changes of state at the windows' starts for a change of the parameters, shape (windows, 10): the
+/// five of the plant and the disturbances; and the weighted sum of squares of what they leave of the residuals. The
+/// backward pass (modified Bryson-Frazier) inverts no covariance: a standing wheel's is singular.
+py::tuple smooth(const py::dict& d, const Array& by_parameters, const Array& directions, const Array& sd,
+                 const Array& time_constant_s, double variance) {
   const Piece piece(d);
-  const auto time_s = d["time_s"].cast<Array>();
-  const Disturbed disturbed{ConstMap(directions.data(), disturbances, directions.shape(1)), sd.data(),
-                            time_constant_s.data()};
-  Array states_at({piece.windows, static_cast<std::ptrdiff_t>(size)});
-  std::vector<double> innovations;
-  double* const to = states_at.mutable_data();
+  const std::ptrdiff_t p = piece.parameters;
+  const Disturbed disturbed(directions, sd, time_constant_s);
+  if (by_parameters.size() != p || piece.sums.columns != 1)
+    throw std::invalid_argument("give one change of each parameter");
+  Array changes({piece.windows, static_cast<std::ptrdiff_t>(size)});
+  double* const to = changes.mutable_data();
+  double left = 0.0;
   {
     const py::gil_scoped_release release;
-    Kept kept;
-    filter(piece, time_s.data(), disturbed, variance, &kept);
-    for (const Reading& r : kept.readings) innovations.push_back(r.innovation / std::sqrt(r.variance));
-    State adjoint = State::Zero();
+    const Eigen::VectorXd change = Eigen::Map<const Eigen::VectorXd>(by_parameters.data(), p);
+    std::vector<Passed> passed;
+    passed.reserve(static_cast<std::size_t>(piece.windows));
+    filter(piece, disturbed, variance, &change, &passed);
+    State adjoint = State::Zero();  // behind the window
+    Eigen::VectorXd all(states + p);
     for (std::ptrdiff_t w = piece.windows - 1; w >= 0; --w) {
-      const auto at = static_cast<std::size_t>(w);
-      adjoint = (kept.transition[at].transpose() * adjoint).eval();
-      const std::ptrdiff_t begin = w == 0 ? 0 : kept.last_reading[at - 1];
-      for (std::ptrdiff_t i = kept.last_reading[at] - 1; i >= begin; --i) {
-        const Reading& r = kept.readings[static_cast<std::size_t>(i)];
-        adjoint += r.sensitivity.transpose() * (r.innovation / r.variance - r.gain.dot(adjoint));
-      }
-      const State best = kept.predicted[at] + kept.covariance[at] * adjoint;
+      const Passed& at = passed[static_cast<std::size_t>(w)];
+      adjoint = (at.transition.transpose() * adjoint).eval() + at.score;
+      const State best = at.predicted + at.updated * adjoint;
       std::copy_n(best.data(), size, to + w * size);
+      adjoint = (Covariance::Identity() + at.information * at.covariance).partialPivLu().solve(adjoint).eval();
       for (int i = 0; i < 2; ++i) {
         if (piece.stands.data()[w * angles + i] != 0.0) adjoint(angles + i) = 0.0;
       }
+      all.head(states) = best.head(states);
+      all.tail(p) = change + disturbed.into * best.tail(disturbances);
+      const std::ptrdiff_t m = states + p;
+      const ConstMap gram(piece.sums.gram.data() + w * m * m, m, m);
+      const Eigen::Map<const Eigen::VectorXd> cross(piece.sums.cross.data() + w * m, m);
+      left += piece.sums.square.data()[w] + all.dot(gram * all - 2.0 * cross);
     }
   }
-  py::array_t<double> values(static_cast<py::ssize_t>(innovations.size()), innovations.data());
-  return py::make_tuple(states_at, values);
+  return py::make_tuple(changes, left);
 }
 
 }  // namespace
 
 void add_identification_filter(py::module_& module) {
+  module.def("condense", &condense, py::arg("piece"));
   module.def("filter_pieces", &filter_pieces, py::arg("pieces"), py::arg("directions"), py::arg("sd"),
              py::arg("time_constant_s"), py::arg("variance"));
-  module.def("smooth", &smooth, py::arg("piece"), py::arg("directions"), py::arg("sd"), py::arg("time_constant_s"),
-             py::arg("variance"));
+  module.def("smooth", &smooth, py::arg("piece"), py::arg("change"), py::arg("directions"), py::arg("sd"),
+             py::arg("time_constant_s"), py::arg("variance"));
 }
 
 }  // namespace abs_hil::python

@@ -11,8 +11,9 @@ from ..core import _core
 from ..options import Value, options
 from ..simulation import simulate
 from .estimate import Identified
-from .fit import QUIET, WINDOW_DISTURBED_S, WINDOW_S, Disturbances, Fit, Problem, _keep_normals, linearise, pieces_of, run_filter
+from .linear import _keep_normals, linearise, run_filter
 from .logs import Log, motion_of, segments_of
+from .problem import QUIET, WINDOW_DISTURBED_S, WINDOW_S, Disturbances, Fit, Problem, pieces_of
 from .results import plant_settings
 
 EXPERIMENTS = ('lifted', 'duty-ramp', 'pulses', 'slip-sweep', 'locked-stop', 'coast-down')
@@ -41,14 +42,14 @@ def log_of(name: str, settings: Mapping[str, Value], phases: Sequence[float] | N
     counts = np.stack([columns['upper_counts'], columns['lower_counts']], axis=1)
     log = Log(name, pathlib.Path(name), '', columns['time_s'], counts - counts[0], np.nan_to_num(columns['brake_pwm']),
               np.nan_to_num(columns['motor_pwm']), columns['wheels_apart'], columns.get('phase_name', columns['phase']),
-              np.zeros((len(counts), 2)))
+              np.zeros((len(counts), 2)), first_counts=counts[0].astype(float))
     if phases is not None:
         base = _core.PlantOptions(options(set=settings))
-        per_count = 2 * np.pi / base.values()['encoder_counts_per_rev']
+        per_count = 2 * np.pi / int(base.values()['encoder_counts_per_rev'])
         start = np.array([phases[0] * per_count, phases[1] * per_count, columns['omega1_rad_s'][0],
                           columns['omega2_rad_s'][0], columns['brake_torque_Nm'][0]])
-        log.counts = np.floor(_core.trajectory(base, [], log.inputs(), start)[:, :2] / per_count)
-        log.counts -= log.counts[0]
+        counts = _core.encoder_counts(base, _core.trajectory(base, [], log.inputs(), start)[:, :2]).astype(float)
+        log.counts, log.first_counts = counts - counts[0], counts[0]
     return log
 
 
@@ -81,7 +82,7 @@ def _information(fit: Fit, log: Log, window_s: float, disturbances: Disturbances
     old = fit.problem
     motion = motion_of(log, old.counts_per_rev)
     problem = Problem(old.form, old.base, [log], [motion], [segments_of(log, motion)], old.given, old.fixed,
-                      old.counts_per_rev, (), old.with_delay)
+                      old.counts_per_rev, (), old.with_delay, old.with_rate_limit, ())
     values = {key: value for key, value in fit.values.items() if not key.startswith('brake_factor')}
     other = Fit(problem, values, pieces_of(problem, values, window_s), disturbances, window_s,
                 np.array([p.key not in old.fixed and p.key != 'u0' for p in problem.parameters]))

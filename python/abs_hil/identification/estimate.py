@@ -10,27 +10,12 @@ import numpy as np
 
 from ..core import _core
 from ..options import PathLike, options
-from . import intervals
-from .fit import (
-    CONVERGED,
-    LARGEST_QUIET_RMS,
-    QUIET,
-    Disturbances,
-    Fit,
-    Problem,
-    _keep_normals,
-    describe,
-    disturbed_fit,
-    finish_fit,
-    likely_u0,
-    linearise,
-    run_filter,
-    solved,
-    start_fit,
-    step,
-)
+from . import discs, intervals, rate_limit
+from .fit import CONVERGED, ROUNDS, describe, disturbed_fit, finish_fit, likely_u0, start_fit
+from .linear import _keep_normals, linearise, run_filter, solved, step
 from .logs import Log, load_log
-from .parameters import COMBINATIONS, DELAY, FORMS, GIVEN, checked_keys
+from .parameters import COMBINATIONS, DELAY, FORMS, GIVEN, RATE_LIMIT, WHEELS, checked_keys, disc_of
+from .problem import LARGEST_QUIET_RMS, QUIET, Disturbances, Fit, Problem
 
 #: an estimate whose standard deviation is above this share of its value is not called identified
 LARGEST_SD = 0.05
@@ -40,8 +25,9 @@ LARGEST_WIDTH = 0.25
 UNCERTAIN_PART = 0.01
 #: a log whose own estimate lies this far from the others' is named: chi-square over its degrees of freedom
 LARGEST_DISAGREEMENT = 6.0
-#: a difference of -2 log likelihood that decides between the forms at first values already
+#: a difference of -2 log likelihood that decides between the forms, and one that does so at first values already
 CLEAR_DIFFERENCE = 500.0
+CLEAR_AT_FIRST = 5000.0
 #: of a parameter in its relative change: a log with less does not speak of it
 LEAST_INFORMATION = 10.0
 #: a delay is believed if it is this many standard deviations from 0
@@ -49,6 +35,8 @@ SURE_DELAY = 6.0
 LARGEST_DELAY_S = 0.02
 #: the disturbances take up what the model lacks, so a fit that follows the logs has 0.3 counts RMS also on a rig that wanders
 LARGEST_RMS = 1.0
+#: friction, brake and motor of no rig wander this far; what else the model or the logs lack does
+LARGEST_WANDER = 0.1
 
 
 @dataclass
@@ -111,7 +99,7 @@ def identify(logs: Sequence[PathLike | Log], start: PathLike = 'paper-table1', *
     for name in drift:
         if name != 'brake_torque':
             raise ValueError(f'--drift {name}: no such drift; give brake_torque')
-    loaded = [log if isinstance(log, Log) else load_log(log) for log in logs]
+    loaded = _with_names([log if isinstance(log, Log) else load_log(log) for log in logs])
     if not loaded:
         raise ValueError('give at least one log')
     notes = [note for log in loaded for note in log.notes]
@@ -121,35 +109,61 @@ def identify(logs: Sequence[PathLike | Log], start: PathLike = 'paper-table1', *
     values.update({key: number for key, number in fix.items() if number is not None})
     _refuse_swapped(loaded)
 
-    fits = []
+    fits: list[Fit] = []
     for name in FORMS if form == 'auto' else (form,):
         say(f'{FORMS[name].meaning}: first values')
-        problem = Problem.of(FORMS[name], start, loaded, fix, tuple(drift))
+        problem = Problem.of(FORMS[name], start, loaded, fix, drift, WHEELS)
         if not any(problem.segments):
             raise ValueError('in no log does a wheel turn for long enough (0.2 s above 10 rad/s)')
         try:
-            fits.append(start_fit(problem, values, check))
+            begun = start_fit(problem, values, check, fits[0] if fits else None)
+            fits.append(begun if fits else rate_limit.started(begun, check))
         except (ValueError, np.linalg.LinAlgError) as error:
             notes.append(f'{FORMS[name].meaning}: cannot be fitted ({error})')
     if not fits:
-        raise ValueError('neither form of the plant can be fitted to these logs')
+        raise ValueError(f'no form of the plant can be fitted to these logs: {"; ".join(notes[-2:])}')
     fit = fits[0] if len(fits) == 1 else _better_form(fits, start_form, check, say, notes)
     try:
-        fit, spread, gaps, disturbances = _finished(fit, seed, say, check)
+        finished = _finished(fit, seed, say, check)
     except KeyboardInterrupt:
         return _interrupted(fit, str(start), notes)
-    found = _assembled(fit, spread, gaps, str(start), notes, disturbances)
+    found = _assembled(finished, str(start), notes)
     _name_disagreement(found)
-    if fit.rms_counts > LARGEST_RMS:
-        found.notes.insert(0, f'the model does not follow the logs: residual {fit.rms_counts:.3g} counts RMS, at most '
+    if found.residual_counts_rms > LARGEST_RMS:
+        found.notes.insert(0, f'the model does not follow the logs: residual {found.residual_counts_rms:.3g} counts RMS, at most '
                            f'{LARGEST_RMS:g} is expected even of a rig that wanders. No interval is given')
+        _without_intervals(found)
+    elif found.disturbances is not None and found.disturbances.sd[:3].max() > LARGEST_WANDER:
+        odd = max(found.disagreement, key=lambda name: found.disagreement[name], default='')
+        found.notes.insert(0, f'the logs disagree{f", {odd} most" if odd else ""}: only a rig that wanders by '
+                           f'{100 * found.disturbances.sd[:3].max():.2g} % would explain them with one set of parameters. Are '
+                           'they of one rig, and of one state of its brake and tyre? No interval is given')
         _without_intervals(found)
     return found
 
 
-def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[], None],
-              ) -> tuple[Fit, intervals.Spread, list[tuple[float, float, float]], Disturbances | None]:
-    """The fit, what its intervals are made of, and the disturbances if there are any."""
+def _with_names(logs: list[Log]) -> list[Log]:
+    """Each log with a name of its own."""
+    seen: dict[str, int] = {}
+    out = []
+    for log in logs:
+        seen[log.name] = seen.get(log.name, 0) + 1
+        out.append(log if seen[log.name] == 1 else dataclasses.replace(log, name=f'{log.name} ({seen[log.name]})'))
+    return out
+
+
+@dataclass
+class Finished:
+    """The last fit, what its intervals are made of, the disturbances if there are any, and the largest eccentricity of
+    the discs that no log shows."""
+    fit: Fit
+    spread: intervals.Spread
+    gaps: list[tuple[float, float, float]]
+    disturbances: Disturbances | None
+    round_discs: dict[str, float]
+
+
+def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
     say(f'{fit.problem.form.meaning}: fit')
     try:
         fit = finish_fit(fit, check)
@@ -159,21 +173,36 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
     if not np.isfinite(fit.rms_counts):
         raise ValueError('the fit does not converge: these logs are not of a rig that the plant describes')
     fit = _with_delay(fit, check, say)
+    if fit.rms_counts <= LARGEST_QUIET_RMS:
+        limited = rate_limit.sought(fit, QUIET, check)
+        if limited is not fit:
+            fit = finish_fit(limited, check)
+    else:
+        near = fit.copy()
+        step(near, ROUNDS[-1][0], check)
+        limited = rate_limit.started(near, check)
+        if limited is not near:
+            fit = finish_fit(limited, check)
     quiet = fit.rms_counts <= LARGEST_QUIET_RMS
     if not quiet:
         say(f'residual {fit.rms_counts:.3g} counts RMS: the rig wanders, or the model lacks something')
         fit = disturbed_fit(fit, check, say)
+        limited = rate_limit.started(fit, check)
+        fit = fit if limited is fit else disturbed_fit(limited, check, say)
+    fit = rate_limit.settle(fit, QUIET if quiet else fit.disturbances, check)
+    fit, round_discs = discs.settle(fit, QUIET if quiet else fit.disturbances, check)
     gaps = likely_u0(fit, QUIET if quiet else fit.disturbances, check)
     say('intervals')
     spread = intervals.bootstrap(fit, seed, check=check) if quiet else intervals.information(fit)
-    return fit, spread, gaps, None if quiet else fit.disturbances
+    return Finished(fit, spread, gaps, None if quiet else fit.disturbances, round_discs)
 
 
 def _interrupted(fit: Fit, start: str, notes: list[str]) -> Identified:
     """What there is, without intervals."""
     size = len(fit.problem.parameters)
-    found = _assembled(fit, intervals.Spread(np.full((size, size), np.nan), np.zeros(size), 0), [], start,
-                       ['interrupted: the values are provisional, and no interval is given'], None)
+    nothing = np.full((size, size), np.nan)
+    found = _assembled(Finished(fit, intervals.Spread(nothing, np.zeros(size), 0, nothing), [], None, {}), start,
+                       ['interrupted: the values are provisional, and no interval is given'])
     found.notes[1:] = notes
     _without_intervals(found)
     found.interrupted = True
@@ -209,15 +238,19 @@ def _refuse_swapped(logs: Sequence[Log]) -> None:
 
 def _better_form(fits: Sequence[Fit], start_form: str, check: Callable[[], None], say: Callable[[str], None],
                  notes: list[str]) -> Fit:
-    """The form that better predicts each log from all the others, by the likelihood. Large disturbances are enough if
-    they show a clear difference already."""
+    """The form that better predicts each log from all the others, by the likelihood. Large disturbances and first values
+    are enough if they show a clear difference already."""
     costs = [_cross_validated(fit) for fit in fits]
-    if abs(costs[0] - costs[1]) < CLEAR_DIFFERENCE:
-        costs = []
-        for fit in fits:
+    if abs(costs[0] - costs[1]) < CLEAR_AT_FIRST:
+        for number, fit in enumerate(fits):
             for _ in range(2):
-                step(fit, Disturbances.of(0.01, 0.005, 0.5), check)
-            costs.append(_cross_validated(fit))
+                step(fit, ROUNDS[1][0], check)
+            costs[number] = _cross_validated(fit)
+        follow = [_follows(fit, check) for fit in fits] if abs(costs[0] - costs[1]) > CLEAR_DIFFERENCE else []
+        if sum(follow) == 1:
+            best = follow.index(True)
+            notes.append(f'form: {fits[best].problem.form.meaning}; it alone follows the logs to the steps of the counts')
+            return fits[best]
     for fit, cost in zip(fits, costs):
         say(f'{fit.problem.form.meaning}: -2 log likelihood of left-out logs {cost:.6g}')
     best = int(np.argmin(costs))
@@ -230,13 +263,26 @@ def _better_form(fits: Sequence[Fit], start_form: str, check: Callable[[], None]
     return fits[best]
 
 
+def _follows(fit: Fit, check: Callable[[], None]) -> bool:
+    """Whether nothing but the steps of the counts is left between the logs and this form."""
+    try:
+        return finish_fit(fit.copy(), check).rms_counts <= LARGEST_QUIET_RMS
+    except (ValueError, np.linalg.LinAlgError):
+        return False
+
+
 def _cross_validated(fit: Fit) -> float:
     N, n = fit.normal.sum(axis=0), fit.right.sum(axis=0)
     if len(fit.normal) == 1:
         return float(fit.cost.sum() - n @ solved(fit, N, n))
     total = 0.0
-    for Nl, nl, cl in zip(fit.normal, fit.right, fit.cost):
+    keys = fit.keys
+    for log, (Nl, nl, cl) in enumerate(zip(fit.normal, fit.right, fit.cost)):
         x = solved(fit, N - Nl, n - nl)
+        # Where its counters began, only the log itself can tell.
+        own = [keys.index(p.key) for wheel in fit.problem.discs for p in disc_of(wheel, log)]
+        x[own] = 0.0
+        x[own] = np.linalg.solve(Nl[np.ix_(own, own)] + 1e-9 * np.eye(len(own)), nl[own] - Nl[own] @ x)
         total += float(cl - 2 * nl @ x + x @ Nl @ x)
     return total
 
@@ -244,8 +290,7 @@ def _cross_validated(fit: Fit) -> float:
 def _with_delay(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit:
     """Adds the inputs' delay if the logs are sure of one, and if then only the counts' steps disturb."""
     problem = dataclasses.replace(fit.problem, with_delay=True)
-    late = dataclasses.replace(fit, problem=problem, free=np.append(fit.free, True), values={**fit.values, DELAY: 0.0},
-                               pieces=[dataclasses.replace(piece) for piece in fit.pieces])
+    late = fit.copy(problem=problem, free=np.append(fit.free, True), values={**fit.values, DELAY: 0.0})
     late.scale = linearise(problem, late.values, late.pieces, check)
     N, n = _keep_normals(late, run_filter(late, QUIET)[1])
     x = solved(late, N, n)[-1]
@@ -260,8 +305,8 @@ def _with_delay(fit: Fit, check: Callable[[], None], say: Callable[[str], None])
     return late
 
 
-def _assembled(fit: Fit, spread: intervals.Spread, gaps: list[tuple[float, float, float]], start: str, notes: list[str],
-               disturbances: Disturbances | None) -> Identified:
+def _assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
+    fit, spread, disturbances = finished.fit, finished.spread, finished.disturbances
     problem = fit.problem
     parameters: dict[str, Estimate] = {}
     for key, unit in GIVEN.items():
@@ -270,11 +315,13 @@ def _assembled(fit: Fit, spread: intervals.Spread, gaps: list[tuple[float, float
     relative: dict[str, float] = {}
     for i, p in enumerate(problem.parameters):
         value = fit.values[p.key]
+        if p.acts == 'reading':
+            continue
         if p.key in problem.fixed:
             parameters[p.key] = Estimate(value, value, value, 'fixed', p.unit)
             continue
         if p.key == 'u0':
-            parameters[p.key] = _u0(fit, gaps)
+            parameters[p.key] = _u0(fit, finished.gaps)
             if parameters[p.key].status != 'identified':
                 cures.setdefault(p.cure, []).append(p.key)
             continue
@@ -291,6 +338,9 @@ def _assembled(fit: Fit, spread: intervals.Spread, gaps: list[tuple[float, float
             if relative[p.key] > LARGEST_WIDTH or sd == 0.0:
                 estimate.low = estimate.high = None
         parameters[p.key] = estimate
+    if RATE_LIMIT.key not in parameters:
+        parameters[RATE_LIMIT.key] = _no_rate_limit(fit, notes, cures)
+    parameters.update(_discs(finished, notes))
     combinations: dict[str, Estimate] = {}
     for name, (unit, parts, cure) in COMBINATIONS.items():
         if any(part not in parameters for part in parts):
@@ -312,6 +362,45 @@ def _assembled(fit: Fit, spread: intervals.Spread, gaps: list[tuple[float, float
         notes.append(f'the rig wanders ({describe(disturbances)}); the intervals count with it')
     return Identified(problem.form.name, start, parameters, combinations, fit.rms_counts, disturbances, notes,
                       list(problem.logs), fit, spread)
+
+
+def _no_rate_limit(fit: Fit, notes: list[str], cures: dict[str, list[str]]) -> Estimate:
+    """The logs show none: 0, the lag alone. A larger one than the logs' fastest change cannot be seen."""
+    problem = fit.problem
+    if RATE_LIMIT.key in problem.fixed:
+        value = problem.fixed[RATE_LIMIT.key]
+        return Estimate(value, value, value, 'fixed', RATE_LIMIT.unit)
+    if not any(log.brake_pwm.any() for log in problem.logs):
+        cures.setdefault(RATE_LIMIT.cure, []).append(RATE_LIMIT.key)
+        return Estimate(0.0, None, None, 'not-identifiable', RATE_LIMIT.unit)
+    notes.append(f'the logs show no limit of the brake\'s rate; one above {rate_limit.fastest_Nm_s(fit, problem.logs):.3g} N m/s '
+                 'would not show')
+    return Estimate(0.0, 0.0, RATE_LIMIT.most, 'bounded', RATE_LIMIT.unit)
+
+
+def _discs(finished: Finished, notes: list[str]) -> dict[str, Estimate]:
+    """The encoders' eccentricity: 0, at most what no log would show, or what the logs say together."""
+    out = {}
+    for wheel in WHEELS:
+        name = f'{wheel}_encoder_eccentricity_rad'
+        if wheel not in finished.fit.problem.discs:
+            out[name] = Estimate(0.0, 0.0, finished.round_discs.get(wheel), 'bounded', 'rad')
+            continue
+        disc = discs.disc(finished.fit, finished.spread, wheel)
+        e, reach = disc.eccentricity_rad, intervals.WIDTH * disc.sd_rad
+        known = disc.sd_rad <= LARGEST_SD * e
+        out[name] = Estimate(e, max(0.0, e - reach), e + reach, 'identified' if known else 'not-identifiable', 'rad')
+        turned = intervals.WIDTH * disc.phase_sd_rad
+        phase = f'{wheel}_encoder_phase_rad'
+        if disc.phase_rad is None:
+            out[phase] = Estimate(0.0, None, None, 'not-identifiable', 'rad')
+            notes.append(f'the {wheel} encoder is eccentric, but its counter began at another place of the disc in each log: so '
+                         'no phase is known, and [model] leaves the eccentricity out; control.observer.learn_eccentricity_s '
+                         'learns it before a braking')
+        else:
+            out[phase] = Estimate(disc.phase_rad, disc.phase_rad - turned, disc.phase_rad + turned,
+                                  'identified' if known else 'not-identifiable', 'rad')
+    return out
 
 
 def _u0(fit: Fit, gaps: list[tuple[float, float, float]]) -> Estimate:

@@ -10,356 +10,62 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import scipy.optimize
 
 from ..core import _core
-from .logs import Log, Motion, motion_of, segments_of
-from .parameters import DELAY, Form, Parameter, base_options
-from .start import brake_torques, first_values
-
-#: an even distribution within one count, counts^2
-COUNT_VARIANCE = 1 / 12
-WINDOW_S = 0.05
-WINDOW_DISTURBED_S = 0.02
-#: a residual above this has other sources than the counts' steps, counts RMS
-LARGEST_QUIET_RMS = 0.30
-DISTURBANCES = ('road', 'brake', 'motor', 'upper bearing', 'lower bearing')
-
-
-@dataclass
-class Disturbances:
-    """Standard deviations (factors; the bearings' in N m) and time constants (s) of the five random factors."""
-    sd: np.ndarray
-    time_constant_s: np.ndarray
-
-    @classmethod
-    def of(cls, factor: float, torque_Nm: float, time_constant_s: float) -> Disturbances:
-        return cls(np.array([factor, factor, factor, torque_Nm, torque_Nm]), np.full(5, time_constant_s))
-
+from .linear import _measure, _relative, disc_waves_rad, filtered, run_filter, solved, step
+from .linear import linearise as linearise
+from .logs import motion_of
+from .parameters import DELAY, RATE_LIMIT
+from .problem import (
+    COUNT_VARIANCE,
+    DISTURBANCES,
+    LARGEST_QUIET_RMS,
+    QUIET,
+    WINDOW_DISTURBED_S,
+    WINDOW_S,
+    Disturbances,
+    Fit,
+    Piece,
+    Problem,
+    pieces_of,
+)
+from .start import first_values
 
 #: rounds of the homotopy: disturbances, number of iterations
 ROUNDS = ((Disturbances.of(0.10, 0.05, 0.2), 2), (Disturbances.of(0.01, 0.005, 0.5), 2),
           (Disturbances.of(1e-3, 1e-4, 1.0), 1), (Disturbances.of(1e-4, 1e-5, 1.0), 1))
+#: an eccentricity below this sways no first value, rad
+SMALL_DISC_RAD = 3e-4
 #: an iteration that moves less, in standard deviations, is the last
 CONVERGED = 0.1
-#: largest change of a parameter in one iteration, over its size
-LARGEST_STEP = 0.3
-#: how far a piece's first state may move in one iteration: angles, speeds, brake torque
-NEAR_SD = np.array([0.005, 0.005, 0.5, 0.5, 0.1])
-QUIET = Disturbances.of(0.0, 0.0, 1.0)
 
 
-@dataclass
-class Piece:
-    """A segment of a log, its windows, and the states at their starts (windows, 5)."""
-    log: int
-    first: np.ndarray
-    states: np.ndarray
-    stands: np.ndarray
-    prior_sd: np.ndarray
-    linear: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def rows(self) -> slice:
-        return slice(int(self.first[0]), int(self.first[-1]))
-
-
-@dataclass
-class Problem:
-    """All logs, and the plant's form with what is fixed."""
-    form: Form
-    base: Any
-    logs: Sequence[Log]
-    motions: Sequence[Motion]
-    segments: Sequence[Sequence[tuple[int, int]]]
-    given: dict[str, float]
-    fixed: dict[str, float]
-    counts_per_rev: int
-    drifts: tuple[str, ...] = ()
-    with_delay: bool = False
-
-    @classmethod
-    def of(cls, form: Form, start: Any, logs: Sequence[Log], fixed: Mapping[str, float | None],
-           drifts: Sequence[str] = ()) -> Problem:
-        base = base_options(form, start)
-        values = base.values()
-        counts_per_rev = int(values['encoder_counts_per_rev'])
-        motions = [motion_of(log, counts_per_rev) for log in logs]
-        segments = [segments_of(log, motion) for log, motion in zip(logs, motions)]
-        known = {key: float(values[key] if value is None else value) for key, value in fixed.items() if key in values}
-        given = {key: known.pop(key, float(values[key])) for key in ('J2_kg_m2', 'r2_m')}
-        keys = {p.key for p in form.parameters}
-        return cls(form, base, logs, motions, segments, given, {k: v for k, v in known.items() if k in keys},
-                   counts_per_rev, tuple(drifts))
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        delay = (Parameter(DELAY, 's', 'always', '', floor=1e-3),) if self.with_delay else ()
-        factors = tuple(Parameter(key, '1', 'brake', '') for key in self.factors) if self.drifts else ()
-        return self.form.parameters + factors + delay
-
-    @property
-    def factors(self) -> tuple[str, ...]:
-        """Names of the brake's factors of each log but the first, over that of the first."""
-        return tuple(f'brake_factor_{number}' for number in range(2, len(self.logs) + 1))
-
-    def plant_values(self, values: Mapping[str, float], log: int) -> list[tuple[str, float]]:
-        """The plant of one log, as `_core` takes it."""
-        factor = values[self.factors[log - 1]] if self.drifts and log > 0 else 1.0
-        scaled = [(p.key, values[p.key] * (factor if p.key in ('b1_Nm', 'b2_Nm') else 1.0))
-                  for p in self.form.parameters]
-        return [*self.given.items(), *scaled, (DELAY, values.get(DELAY, 0.0))]
-
-    @property
-    def radians_per_count(self) -> float:
-        return 2 * np.pi / self.counts_per_rev
-
-
-@dataclass
-class Fit:
-    """values: of all parameters; first: those that the prior holds to. normal: (logs, n, n), right: (logs, n), cost: (logs,)
-    of the last linearisation, in the scaled changes x of `scale`: value = nominal + scale x. `free` marks the estimated
-    ones."""
-    problem: Problem
-    values: dict[str, float]
-    pieces: list[Piece]
-    disturbances: Disturbances
-    window_s: float
-    free: np.ndarray
-    first: dict[str, float] = field(default_factory=dict)
-    scale: np.ndarray = field(default_factory=lambda: np.empty(0))
-    normal: np.ndarray = field(default_factory=lambda: np.empty(0))
-    right: np.ndarray = field(default_factory=lambda: np.empty(0))
-    cost: np.ndarray = field(default_factory=lambda: np.empty(0))
-    readings: float = 0.0
-    rms_counts: float = np.nan
-    iterations: int = 0
-
-    @property
-    def keys(self) -> list[str]:
-        return [p.key for p in self.problem.parameters]
-
-    def information(self) -> np.ndarray:
-        return np.asarray(self.normal.sum(axis=0))
-
-    def prior(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of the scaled changes: the precision (n,), and its product with the way to the first values (n,)."""
-        parameters = self.problem.parameters
-        size = np.array([p.prior * max(abs(self.first.get(p.key, self.values[p.key])), p.floor) for p in parameters])
-        precision = (self.scale / size)**2
-        way = np.array([self.first.get(p.key, self.values[p.key]) - self.values[p.key] for p in parameters])
-        return precision, precision * way / self.scale
-
-    def covariance(self) -> np.ndarray:
-        """Of the free parameters' scaled changes, shape (free, free); with the prior."""
-        N = (self.information() + np.diag(self.prior()[0]))[np.ix_(self.free, self.free)]
-        d = 1 / np.sqrt(np.diag(N))
-        return np.asarray(np.linalg.inv(N * np.outer(d, d)) * np.outer(d, d))
-
-
-def pieces_of(problem: Problem, values: Mapping[str, float], window_s: float) -> list[Piece]:
-    """Windows over every segment, with states from the counts and the brake's torque from the model."""
-    pieces = []
-    for number, (log, motion, segments) in enumerate(zip(problem.logs, problem.motions, problem.segments)):
-        torque = brake_torques(log, values['b1_Nm'], values['b2_Nm'], values['u0'], values['c31_per_s'])
-        step = max(4, round(window_s / log.period_s))
-        for begin, end in segments:
-            count = max(1, (end - begin - 1) // step)
-            first = np.append(begin + step * np.arange(count), end - 1)
-            at = first[:-1]
-            stands = motion.stands[at]
-            states = np.column_stack([motion.smooth_rad[at], np.where(stands, 0.0, motion.speed_rad_s[at]), torque[at]])
-            prior = np.array([0.05, 0.05, 20.0, 20.0, 0.0])
-            pieces.append(Piece(number, first.astype(np.int64), states, stands.astype(float), prior))
-    return pieces
-
-
-def _scale(problem: Problem, values: Mapping[str, float]) -> np.ndarray:
-    return np.array([max(abs(values[p.key]), p.floor) for p in problem.parameters])
-
-
-def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Piece],
-              check: Callable[[], None] = lambda: None) -> np.ndarray:
-    """Fills `linear` of each piece; returns the scale of the parameters' changes."""
-    scale = _scale(problem, values)
-    steps = []
-    for i, p in enumerate(problem.parameters):
-        size = 1e-5 * scale[i]
-        if p.key == 'u0':
-            size = _duty_step(problem, values['u0'])
-        if p.key == DELAY:
-            size = 1e-5
-        steps.append(size if values[p.key] + size <= p.most else -size)
-    for number, log in enumerate(problem.logs):
-        inputs = log.inputs()
-        # A factor of another log changes nothing in this one.
-        there = [i for i, p in enumerate(problem.parameters)
-                 if p.key not in problem.factors or p.key == f'brake_factor_{number + 1}']
-        nominal = problem.plant_values(values, number)
-        moved = []
-        for i in there:
-            p = problem.parameters[i]
-            other = problem.plant_values({**values, p.key: values[p.key] + steps[i]}, number)
-            moved.append((other, steps[i] / scale[i], p.acts))
-        for piece in pieces:
-            if piece.log != number:
-                continue
-            check()
-            piece.linear = _core.linearise(problem.base, nominal, moved, inputs, piece.first, piece.states)
-            if len(there) < len(steps):
-                for name in ('by_parameter', 'end_by_parameter'):
-                    few = piece.linear[name]
-                    piece.linear[name] = np.zeros((*few.shape[:2], len(steps)))
-                    piece.linear[name][:, :, there] = few
-            _measure(problem, piece)
-    return scale
-
-
-def _measure(problem: Problem, piece: Piece) -> None:
-    """What the filter needs beside the sensitivities: residuals, weights, gaps between windows."""
-    motion, linear = problem.motions[piece.log], piece.linear
-    angle = motion.angle_rad[piece.rows]
-    residual = np.nan_to_num(angle) - linear['angles']
-    weight = np.where(np.isfinite(angle), motion.weight[piece.rows], 0.0)
-    gap = np.zeros_like(piece.states)
-    gap[:-1] = linear['end'][:-1] - piece.states[1:]
-    linear.update(residual=residual[:, :, None], weight=weight, gap=gap, stands=piece.stands, first=piece.first,
-                  prior_sd=piece.prior_sd, time_s=problem.logs[piece.log].time_s)
-
-
-def _duty_step(problem: Problem, u0: float) -> float:
-    """A change of u0 that reaches other duties of the logs: two steps of the brake's PWM at least."""
-    duties = np.unique(np.concatenate([log.brake_pwm for log in problem.logs]))
-    near = np.sort(np.abs(duties - u0))
-    return float(max(5e-4, min(0.02, near[min(4, len(near) - 1)])))
-
-
-def directions(problem: Problem, scale: np.ndarray) -> np.ndarray:
-    """What each disturbance does, as changes of the parameters: shape (5, parameters)."""
-    keys = [p.key for p in problem.parameters]
-    out = np.zeros((5, len(keys)))
-    for row, names in ((0, problem.form.road), (1, ('b1_Nm', 'b2_Nm')), (2, ('motor_stall_torque_Nm',))):
-        for name in names:
-            i = keys.index(name)
-            out[row, i] = 1.0
-    for row, name in ((3, 'M10_Nm'), (4, 'M20_Nm')):
-        i = keys.index(name)
-        out[row, i] = 1.0 / scale[i]
-    return out
-
-
-def _relative(problem: Problem, values: Mapping[str, float], scale: np.ndarray) -> np.ndarray:
-    """`directions`, where a factor moves a parameter by its own value (b2 may be smaller than its scale)."""
-    out = directions(problem, scale)
-    for i, p in enumerate(problem.parameters):
-        for row in range(3):
-            out[row, i] *= values[p.key] / scale[i]
-    return out
-
-
-def run_filter(fit: Fit, disturbances: Disturbances, variance: float | None = None) -> tuple[float, list[Any]]:
-    """-2 log likelihood but for a constant at the best parameters, and what `_core.filter_pieces` gave."""
+def other_costs(fit: Fit, disturbances: Disturbances, affected: Sequence[bool],
+                ) -> Callable[[Mapping[str, float]], tuple[np.ndarray, np.ndarray, float]]:
+    """A function of other values of the parameters: normal equations, and -2 log likelihood without their change. It
+    simulates the affected pieces anew and keeps the sensitivities."""
     problem = fit.problem
-    variance = COUNT_VARIANCE * problem.radians_per_count**2 if variance is None else variance
-    way = _relative(problem, fit.values, fit.scale)
-    found = _core.filter_pieces([piece.linear for piece in fit.pieces], way, disturbances.sd,
-                                disturbances.time_constant_s, variance)
-    N = sum(one[0] for one in found)
-    n = sum(one[1][:, 0] for one in found)
-    c = sum(float(one[2][0]) for one in found)
-    log_variance = sum(one[3] for one in found)
-    x = solved(fit, N, n)
-    return c - float(n @ x) + log_variance, list(found)
+    settings = (_relative(problem, fit.values, fit.scale), disturbances, COUNT_VARIANCE * problem.radians_per_count**2)
+    rest = filtered(problem, [piece for piece, hit in zip(fit.pieces, affected) if not hit], *settings)
+    inputs = [log.inputs() for log in problem.logs]
 
-
-def solved(fit: Fit, N: np.ndarray, n: np.ndarray, low: np.ndarray | None = None,
-           high: np.ndarray | None = None) -> np.ndarray:
-    """The likeliest change of the parameters, 0 for those that are not free. The prior decides what the logs do not. A
-    parameter that would leave its range stops at the range's end, and the others follow: they may depend on it."""
-    x = np.zeros(len(n))
-    precision, towards = fit.prior()
-    A, n = N + np.diag(precision), n + towards
-    d = 1 / np.sqrt(np.diag(A))
-    A, n = A * np.outer(d, d), d * n
-    moving = fit.free.copy()
-    for _ in range(len(n)):
-        stopped = fit.free & ~moving
-        rest = n - A[:, stopped] @ (x[stopped] / d[stopped])
-        x[moving] = d[moving] * np.linalg.solve(A[np.ix_(moving, moving)], rest[moving])
-        if low is None or high is None:
-            break
-        beyond = moving & ((x < low) | (x > high))
-        if not beyond.any():
-            break
-        x[beyond] = np.clip(x, low, high)[beyond]
-        moving &= ~beyond
-    return x
-
-
-def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambda: None) -> float:
-    """One iteration: linearise, estimate, move parameters and states. Returns how far they moved, in standard deviations:
-    of the direction that the logs know best, not of each parameter alone."""
-    problem = fit.problem
-    fit.disturbances = disturbances
-    fit.scale = linearise(problem, fit.values, fit.pieces, check)
-    _, found = run_filter(fit, disturbances)
-    N, n = _keep_normals(fit, found)
-    values = np.array([fit.values[p.key] for p in problem.parameters])
-    # Sizes that cannot vanish move by factors: where the logs know only a product, its factors move along straight lines.
-    sizes = np.array([not p.floor and p.key != DELAY for p in problem.parameters])
-    least = np.array([p.least for p in problem.parameters])
-    most = np.array([p.most for p in problem.parameters])
-    with np.errstate(divide='ignore', invalid='ignore'):
-        low = np.where(sizes, np.log(np.maximum(least, 1e-12) / values), (least - values) / fit.scale)
-        high = np.where(sizes, np.log(most / values), (most - values) / fit.scale)
-    x = solved(fit, N, n, np.maximum(low, -LARGEST_STEP), np.minimum(high, LARGEST_STEP))
-    _move_states(fit, disturbances, x)
-    with np.errstate(over='ignore'):
-        moved = np.where(sizes, values * np.exp(x), values + fit.scale * x)
-    fit.values = {**fit.values, **{p.key: float(v) for p, v in zip(problem.parameters, moved)}}
-    fit.iterations += 1
-    return float(np.sqrt(x @ (N + np.diag(fit.prior()[0])) @ x))
-
-
-def _keep_normals(fit: Fit, found: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
-    logs, n = len(fit.problem.logs), len(fit.scale)
-    fit.normal, fit.right, fit.cost = np.zeros((logs, n, n)), np.zeros((logs, n)), np.zeros(logs)
-    fit.readings = 0.0
-    for piece, (N, right, square, log_variance, readings) in zip(fit.pieces, found):
-        fit.normal[piece.log] += N
-        fit.right[piece.log] += right[:, 0]
-        fit.cost[piece.log] += square[0] + log_variance
-        fit.readings += readings
-    return fit.normal.sum(axis=0), fit.right.sum(axis=0)
-
-
-def _move_states(fit: Fit, disturbances: Disturbances, x: np.ndarray) -> None:
-    problem = fit.problem
-    way = _relative(problem, fit.values, fit.scale)
-    variance = COUNT_VARIANCE * problem.radians_per_count**2
-    square = weights = 0.0
-    for piece in fit.pieces:
-        linear = dict(piece.linear)
-        # The states are near already. A wide prior would only lose digits in the backward pass.
-        linear['prior_sd'] = np.minimum(piece.prior_sd, NEAR_SD)
-        linear['residual'] = (linear['residual'][:, :, 0] - linear['by_parameter'] @ x)[:, :, None]
-        linear['gap'] = linear['gap'] + linear['end_by_parameter'] @ x
-        change, _ = _core.smooth(linear, way, disturbances.sd, disturbances.time_constant_s, variance)
-        counts = np.repeat(np.arange(len(piece.first) - 1), np.diff(piece.first))
-        left = linear['residual'][:, :, 0] - np.einsum('rws,rs->rw', linear['by_state'], change[counts, 2:5])
-        left -= change[counts, :2]
-        left -= np.einsum('rwp,dp,rd->rw', linear['by_parameter'], way, change[counts, 5:])
-        square += float(np.sum(linear['weight'] * left**2))
-        weights += float(np.sum(linear['weight']))
-        speeds = change[:, 2:4]
-        piece.states = piece.states + np.column_stack([change[:, :2], np.clip(speeds, -30, 30), change[:, 4:5]])
-        piece.states[:, 2:4] = np.where(piece.stands != 0, 0.0, np.maximum(piece.states[:, 2:4], 0.0))
-        piece.states[:, 4] = np.maximum(piece.states[:, 4], 0.0)
-    fit.rms_counts = float(np.sqrt(square / max(weights, 1e-9))) / problem.radians_per_count
+    def costs(values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray, float]:
+        changed = []
+        for piece, hit in zip(fit.pieces, affected):
+            if hit:
+                other = _core.linearise(problem.base, problem.plant_values(values, piece.log), [], inputs[piece.log],
+                                        piece.first, piece.states)
+                moved = dataclasses.replace(piece, linear=dict(piece.linear))
+                moved.linear.update(angles=other['angles'], end=other['end'])
+                _measure(problem, values, moved)
+                changed.append(moved)
+        found = [*rest, *filtered(problem, changed, *settings)]
+        return (np.asarray(sum(one[0] for one in found)), np.asarray(sum(one[1][:, 0] for one in found)),
+                sum(float(one[2][0]) + one[3] for one in found))
+    return costs
 
 
 def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
@@ -382,32 +88,15 @@ def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
     if len(gaps) > most:  # evenly chosen ones; a later call looks closer
         gaps = [gaps[i] for i in sorted({round(i) for i in np.linspace(0, len(gaps) - 1, most)})]
     affected = [_has_duties(problem, piece, edges[0], edges[-1]) for piece in fit.pieces]
-    way = _relative(problem, fit.values, fit.scale)
-    variance = COUNT_VARIANCE * problem.radians_per_count**2
-    settings = (way, disturbances.sd, disturbances.time_constant_s, variance)
-    rest = _core.filter_pieces([p.linear for p, hit in zip(fit.pieces, affected) if not hit], *settings)
     # The sensitivities are those of the present u0: other parameters may follow only as far as they are uncertain.
     within = np.zeros(len(fit.scale))
     within[fit.free] = 5.0 * np.sqrt(np.diag(fit.covariance()))
-    inputs = [log.inputs() for log in problem.logs]
+    others = other_costs(fit, disturbances, affected)
     tried = []
     for begin, end in gaps:
         check()
         # A duty that equals u0 acts (7): so u0 lies above the gap's begin, up to its end.
-        candidate = max(0.5 * (begin + end), end - 1e-3)
-        values = {**fit.values, 'u0': candidate}
-        changed = []
-        for piece, hit in zip(fit.pieces, affected):
-            if hit:
-                other = _core.linearise(problem.base, problem.plant_values(values, piece.log), [], inputs[piece.log],
-                                        piece.first, piece.states)
-                moved = Piece(piece.log, piece.first, piece.states, piece.stands, piece.prior_sd, dict(piece.linear))
-                moved.linear.update(angles=other['angles'], end=other['end'])
-                _measure(problem, moved)
-                changed.append(moved.linear)
-        found = [*rest, *_core.filter_pieces(changed, *settings)]
-        N, n = sum(one[0] for one in found), sum(one[1][:, 0] for one in found)
-        cost = sum(float(one[2][0]) + one[3] for one in found)
+        N, n, cost = others({**fit.values, 'u0': max(0.5 * (begin + end), end - 1e-3)})
         x = solved(fit, N, n, -within, within)
         tried.append((float(begin), float(end), cost - float(2 * n @ x - x @ N @ x)))
     best = min(tried, key=lambda gap: gap[2])
@@ -437,12 +126,37 @@ def _has_duties(problem: Problem, piece: Piece, least: float, most: float) -> bo
     return bool(np.any((duty >= least) & (duty <= most)))
 
 
-def start_fit(problem: Problem, start: Mapping[str, float], check: Callable[[], None] = lambda: None) -> Fit:
-    """First values and a few rounds with large disturbances: near the truth, whatever the start."""
+def start_fit(problem: Problem, start: Mapping[str, float], check: Callable[[], None] = lambda: None,
+              other_form: Fit | None = None) -> Fit:
+    """First values and a few rounds with large disturbances: near the truth, whatever the start. What `other_form` found of
+    the same logs is not sought again."""
+    if other_form is not None:
+        problem = dataclasses.replace(problem, motions=other_form.problem.motions,
+                                      with_rate_limit=other_form.problem.with_rate_limit)
+        discs = {p.key: other_form.first[p.key] for p in problem.parameters if p.acts == 'reading'}
+        return _started(problem, start, check, discs, other_form.first)
+    fit = _started(problem, start, check)
+    discs = {p.key: fit.values[p.key] for p in problem.parameters if p.acts == 'reading'}
+    if all(abs(value) < SMALL_DISC_RAD for value in discs.values()):
+        return fit
+    # Speeds that an eccentric disc does not sway give better first values.
+    motions = []
+    for number, (log, motion) in enumerate(zip(problem.logs, problem.motions)):
+        read = log.counts * problem.radians_per_count
+        turned = motion_of(dataclasses.replace(log, counts=log.counts - disc_waves_rad(problem, discs, number, read)
+                                               / problem.radians_per_count), problem.counts_per_rev)
+        motions.append(dataclasses.replace(motion, smooth_rad=turned.smooth_rad, speed_rad_s=turned.speed_rad_s))
+    return _started(dataclasses.replace(problem, motions=motions), start, check, discs)
+
+
+def _started(problem: Problem, start: Mapping[str, float], check: Callable[[], None],
+             discs: Mapping[str, float] | None = None, other_form: Mapping[str, float] | None = None) -> Fit:
     values = first_values(problem.form, problem.base, problem.given, start, problem.logs, problem.motions,
-                          problem.segments, problem.fixed)
+                          problem.segments, problem.fixed, other_form)
     values.setdefault(DELAY, 0.0)
+    values.setdefault(RATE_LIMIT.key, problem.fixed.get(RATE_LIMIT.key, 0.0))
     values.update({key: 1.0 for key in problem.factors})
+    values.update({p.key: 0.0 for p in problem.parameters if p.acts == 'reading'} | dict(discs or {}))
     free = np.array([p.key not in problem.fixed and p.key != 'u0' for p in problem.parameters])
     fit = Fit(problem, values, pieces_of(problem, values, WINDOW_S), ROUNDS[0][0], WINDOW_S, free, dict(values))
     disturbances, count = ROUNDS[0]
@@ -457,6 +171,25 @@ def finish_fit(fit: Fit, check: Callable[[], None] = lambda: None, most: int = 1
         for _ in range(count):
             step(fit, disturbances, check)
         search_u0(fit, disturbances, 0.004 / 4**number, 9, check)
+    _to_rest(fit, check, most)
+    for _ in range(2):
+        if not fit.rms_counts > LARGEST_QUIET_RMS:
+            break
+        # u0 may have stopped one step of the duties beside.
+        moved = fit.copy()
+        step(moved, ROUNDS[-1][0], check)
+        search_u0(moved, ROUNDS[-1][0], 0.001, 9, check)
+        if moved.values['u0'] == fit.values['u0']:
+            break
+        _to_rest(moved, check, most)
+        if not moved.rms_counts < fit.rms_counts:
+            break
+        fit = moved
+    return fit
+
+
+def _to_rest(fit: Fit, check: Callable[[], None], most: int) -> None:
+    """Steps without disturbances until nothing moves."""
     before = np.inf
     for _ in range(most):
         moved = step(fit, QUIET, check)
@@ -464,7 +197,6 @@ def finish_fit(fit: Fit, check: Callable[[], None] = lambda: None, most: int = 1
         if moved < CONVERGED or (moved < 1.0 and fit.rms_counts > 0.999 * before > LARGEST_QUIET_RMS):
             break
         before = fit.rms_counts
-    return fit
 
 
 def disturbed_fit(fit: Fit, check: Callable[[], None] = lambda: None, say: Callable[[str], None] = lambda _: None) -> Fit:
@@ -475,6 +207,8 @@ def disturbed_fit(fit: Fit, check: Callable[[], None] = lambda: None, say: Calla
     for round_number in range(4):
         for _ in range(2 if round_number == 0 else 1):
             moved = step(fit, present, check)
+        if round_number == 0 and search_u0(fit, present, 0.03, 13, check):
+            step(fit, present, check)  # u0 may have begun far off
         search_u0(fit, present, 0.003 / 2**round_number, 7, check)
         if round_number < 3:
             present = likeliest_disturbances(fit, present, 60 if round_number == 0 else 30)

@@ -2,14 +2,16 @@
 counts' steps disturb, by the information of the filter where the rig wanders."""
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..core import _core
-from .fit import COUNT_VARIANCE, QUIET, Fit, _relative, solved
+from .linear import _relative, filtered, solved
 from .parameters import COMBINATIONS
+from .problem import COUNT_VARIANCE, QUIET, Fit
 
 REPLICATES = 80
 _BATCH = 20
@@ -22,10 +24,12 @@ LIKELY = 3.84
 @dataclass
 class Spread:
     """Covariance of the free parameters' scaled changes, (n, n) with zeros for those that are not free, and how the
-    bootstrap's mean is off, (n,)."""
+    bootstrap's mean is off, (n,). `of_logs`: the part of the covariance that the logs' own errors make, for combinations
+    that hardly depend on the first values."""
     covariance: np.ndarray
     bias: np.ndarray
     replicates: int
+    of_logs: np.ndarray
 
 
 def bootstrap(fit: Fit, seed: int = 1, replicates: int = REPLICATES,
@@ -44,22 +48,31 @@ def bootstrap(fit: Fit, seed: int = 1, replicates: int = REPLICATES,
         size = len(fit.scale)
         N, n = np.zeros((size, size)), np.zeros((size, chosen.shape[2]))
         for piece in fit.pieces:
-            exact = piece.linear['angles'][:, :, None] / per_count
+            exact = piece.linear['read'][:, :, None] / per_count
             phase = chosen[piece.log][None]
             residual = (np.floor(exact + phase) + 0.5 - phase - exact) * per_count
             changed = {**piece.linear, 'residual': residual, 'gap': np.zeros_like(piece.linear['gap'])}
-            found = _core.filter_pieces([changed], way, QUIET.sd, QUIET.time_constant_s, variance)[0]
+            changed.update(_core.condense(changed))
+            found = filtered(problem, [dataclasses.replace(piece, linear=changed)], way, QUIET, variance)[0]
             N, n = N + found[0], n + found[1]
         shift = solved(fit, N, np.zeros(size))  # what the prior alone does
         estimates += [solved(fit, N, n[:, i]) - shift for i in range(n.shape[1])]
     x = np.array(estimates)
-    return Spread(np.cov(x.T), x.mean(axis=0), replicates)
+    scatter = np.cov(x.T)
+    return Spread(scatter + _by_prior(fit), x.mean(axis=0), replicates, scatter)
+
+
+def _by_prior(fit: Fit) -> np.ndarray:
+    """What the first values' errors add to the covariance: all of it where the logs tell nothing."""
+    known = np.zeros((len(fit.scale), len(fit.scale)))
+    known[np.ix_(fit.free, fit.free)] = fit.covariance()
+    return known @ np.diag(fit.prior()[0]) @ known
 
 
 def information(fit: Fit) -> Spread:
     covariance = np.zeros((len(fit.scale), len(fit.scale)))
     covariance[np.ix_(fit.free, fit.free)] = fit.covariance()
-    return Spread(covariance, np.zeros(len(fit.scale)), 0)
+    return Spread(covariance, np.zeros(len(fit.scale)), 0, covariance)
 
 
 def combination(fit: Fit, spread: Spread, name: str) -> tuple[float, float]:
@@ -73,7 +86,7 @@ def combination(fit: Fit, spread: Spread, name: str) -> tuple[float, float]:
     for key, part in zip(parts, values):
         i = keys.index(key)
         gradient[i] = fit.scale[i] * (value / part if product else 1.0)
-    return value, float(np.sqrt(max(0.0, gradient @ spread.covariance @ gradient)))
+    return value, float(np.sqrt(max(0.0, gradient @ spread.of_logs @ gradient)))
 
 
 def excluded(gaps: list[tuple[float, float, float]]) -> tuple[bool, bool]:

@@ -33,6 +33,7 @@ class Log:
 
     counts: unwrapped, from 0 at the first row; NaN where there was no valid reading
     read_late_s: how much later than time_s each wheel was read (sample_time_s - time_s)
+    first_counts: shape (2,), what the counters held where counts is 0
     """
     name: str
     path: pathlib.Path
@@ -45,6 +46,7 @@ class Log:
     phase: np.ndarray
     read_late_s: np.ndarray
     notes: list[str] = field(default_factory=list)
+    first_counts: np.ndarray = field(default_factory=lambda: np.zeros(2))
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -167,13 +169,14 @@ def _log(place: pathlib.Path, columns: dict[str, np.ndarray], notes: list[str], 
     if 'sample_time_s' in columns:
         late[:] = np.nan_to_num(np.asarray(columns['sample_time_s'], dtype=float) - time_s)[:, None]
     apart = np.asarray(columns.get('wheels_apart', np.zeros(len(time_s))), dtype=float)
+    first_counts = np.array([counts[np.isfinite(counts[:, wheel]), wheel][:1].sum() for wheel in range(2)])
     counts = np.stack([_unwrapped(counts[:, wheel]) for wheel in range(2)], axis=1)
     for wheel, name in enumerate(('upper_counts', 'lower_counts')):
         if np.nanmin(counts[:, wheel]) == np.nanmax(counts[:, wheel]):
             raise ValueError(f'{name} never changes: the wheel stood, or its encoder is not connected')
     phase = np.asarray(columns.get('phase_name', columns.get('phase', np.full(len(time_s), ''))), dtype=object)
     return Log(_name(place), place, sha256, time_s, counts, duties['brake_pwm'], duties['motor_pwm'],
-               (apart != 0).astype(float), phase, late, notes)
+               (apart != 0).astype(float), phase, late, notes, first_counts)
 
 
 def _name(place: pathlib.Path) -> str:

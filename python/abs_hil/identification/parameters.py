@@ -54,6 +54,19 @@ _LEVER = (
     Parameter('mu_a', '1', 'contact', 'slip-sweep', most=9.0, prior=2.0),
     Parameter('mu_p', '1', 'contact', 'slip-sweep', least=1.0, most=10.0),
 )
+#: the fastest change of the brake's torque; fitted where the logs show one
+RATE_LIMIT = Parameter('brake_rate_limit_Nm_s', 'N m/s', 'brake', 'locked-stop or pulses', least=0.5, most=9e5)
+WHEELS = ('upper', 'lower')
+
+
+def disc_of(wheel: str, log: int) -> tuple[Parameter, Parameter]:
+    """What an eccentric disc adds to the readings of one log: sine and cosine of its angle, from the counter's zero. Each
+    log has its own, because counters may begin anew."""
+    sine, cosine = (Parameter(f'{wheel}_disc_{part}_{log + 1}_rad', 'rad', 'reading', 'lifted', floor=0.02, least=-0.1,
+                              most=0.1, prior=1.0) for part in ('sine', 'cosine'))
+    return sine, cosine
+
+
 #: given by the person: no log tells the scale of all torques and inertias, nor the scale of length
 GIVEN = {'J2_kg_m2': 'kg m^2', 'r2_m': 'm'}
 
@@ -87,6 +100,12 @@ def base_options(form: Form, start: PathLike) -> Any:
     """The start plant in this form, without what a log does not know: profiles of friction and drift."""
     given: dict[str, Any] = {**form.settings, 'plant.friction_profile': '', 'plant.ideal_actuator': False,
                              'plant.ideal_sensors': False, 'plant.max_step_s': 1e-3}
+    # Flaws of brake and encoders that are estimated, or that no form of the plant has.
+    given.update({f'plant.{key}': 0.0 for key in (
+        'brake_rate_limit_Nm_s', 'brake_dead_time_s', 'brake_hysteresis', 'brake_fading_per_J', 'encoder_eccentricity_rad')})
+    for wheel in WHEELS:
+        given.update({f'plant.{wheel}_encoder_{flaw}': 0 for flaw in ('eccentricity_rad', 'phase_rad', 'slot_error_counts',
+                                                                      'lost_counts')})
     given.update({f'plant.{part}_profile': '' for part in ('brake_torque', 'motor_torque', 'upper_bearing',
                                                            'lower_bearing')})
     return _core.PlantOptions(options(plant=start, set=given))
@@ -94,7 +113,7 @@ def base_options(form: Form, start: PathLike) -> Any:
 
 def checked_keys(fixed: Mapping[str, float | None]) -> None:
     """Raises ValueError for a key that is no parameter of any form."""
-    known = {p.key for form in FORMS.values() for p in form.parameters} | set(GIVEN)
+    known = {p.key for form in FORMS.values() for p in form.parameters} | {*GIVEN, RATE_LIMIT.key}
     for key in fixed:
         if key not in known:
             raise ValueError(f'--fix {key}: no such parameter; give one of {", ".join(sorted(known))}')

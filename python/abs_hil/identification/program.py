@@ -8,7 +8,7 @@ import sys
 
 from ..core import _core
 from ..files import write_whole
-from ..report.page import Unavailable
+from ..report.page import Unavailable, plotly_js
 from ..report.text import clean
 from .estimate import Identified, identify
 from .parameters import FORMS
@@ -71,6 +71,8 @@ def _identify(o: argparse.Namespace) -> int:
     for name in ('identified.json', 'model.toml', 'report.html'):
         if (o.out / name).exists() and not o.force:
             raise ValueError(f'"{o.out / name}" exists; give another --out, or --force to replace it')
+    if not o.no_report:
+        plotly_js()  # what the page needs, before the work rather than behind it
 
     def say(text: str) -> None:
         print(f'abs_identify: {text}', file=sys.stderr, flush=True)
@@ -98,7 +100,7 @@ def main(arguments: list[str]) -> int:
     try:
         return _identify(o)
     except Unavailable as error:
-        print(f'abs_identify: {error}', file=sys.stderr)
+        print(f'abs_identify: {error}; --no-report leaves the page out', file=sys.stderr)
         return 3
     except (ValueError, OSError) as error:
         print(f'abs_identify: {clean(error, 4000)}', file=sys.stderr)

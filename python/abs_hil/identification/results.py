@@ -14,7 +14,7 @@ from ..options import PathLike, options
 from ..run import Run, load
 from ..simulation import simulate
 from .estimate import Estimate, Identified
-from .parameters import DELAY, FORMS
+from .parameters import DELAY, FORMS, WHEELS
 
 #: keys of a run's configuration that say what the run did, not on what it ran
 _DOING = ('control.', 'experiment.', 'observer.', 'gate.')
@@ -62,10 +62,23 @@ def as_toml(found: Identified) -> str:
     if found.form == 'inteco-mu':
         given = ('mu_w1', 'mu_w2', 'mu_w3', 'lever_L_m', 'lever_phi_deg')
         lines += [f'{key} = {_number(base[key])}  # of the start, {_comment(found.start)}' for key in given]
-        lines += ['', '[model]',
-                  "# What controllers believe of the tyre: the magic formula nearest to the maker's curve in braking."]
-        lines += [f'{key} = {_number(value)}' for key, value in equivalent_tyre(found).items()]
-    return '\n'.join(lines) + '\n'
+    believed = _believed(found)
+    return '\n'.join([*lines, *(['', '[model]', *believed] if believed else [])]) + '\n'
+
+
+def _believed(found: Identified) -> list[str]:
+    """Lines of the table [model]: where controllers believe something else than the plant."""
+    lines = []
+    if found.form == 'inteco-mu':
+        lines.append("# What controllers believe of the tyre: the magic formula nearest to the maker's curve in braking.")
+        tyre = equivalent_tyre(found.fit.problem.base, found.values())
+        lines += [f'{key} = {_number(value)}' for key, value in tyre.items()]
+    for wheel in WHEELS:
+        phase = found.parameters.get(f'{wheel}_encoder_phase_rad')
+        if phase is not None and phase.status != 'identified':
+            lines.append("# Counters begin anew at another place of the disc: without its phase the eccentricity is no help.")
+            lines.append(f'{wheel}_encoder_eccentricity_rad = 0.0')
+    return lines
 
 
 def _number(value: float) -> str:
@@ -78,18 +91,17 @@ def _comment(text: str) -> str:
     return ''.join(c if c.isprintable() else '?' for c in text)
 
 
-def equivalent_tyre(found: Identified) -> dict[str, float]:
-    """theta_N, B and C of the magic formula whose force is nearest to the identified curve's while the brake holds the
-    wheel at each slip."""
+def equivalent_tyre(base: Any, values: Mapping[str, float]) -> dict[str, float]:
+    """theta_N, B and C of the magic formula whose force is nearest to that of the plant `base` with these values while the
+    brake holds the wheel at each slip."""
     import scipy.optimize
-    base, values = found.fit.problem.base, list(found.values().items())
     slip = np.linspace(0.005, 0.6, 120)
     omega2 = np.full(slip.shape, 100.0)
-    r1, r2 = found.parameters['r1_m'].value, found.parameters['r2_m'].value
-    omega1 = omega2 * r2 / r1 * (1 - slip)
+    r1 = values['r1_m']
+    omega1 = omega2 * values['r2_m'] / r1 * (1 - slip)
     torque = np.zeros(slip.shape)
     for _ in range(8):  # the lever's load grows with the brake's torque
-        force = np.asarray(_core.tyre_forces_N(base, values, omega1, omega2, torque))
+        force = np.asarray(_core.tyre_forces_N(base, list(values.items()), omega1, omega2, torque))
         torque = np.maximum(0.0, r1 * force)
     fit = scipy.optimize.least_squares(lambda x: x[0] * np.sin(x[2] * np.arctan(x[1] * slip)) - force,
                                        (float(force.max()), 25.0, 1.5), bounds=((0.1, 1.0, 0.8), (499.0, 199.0, 2.0)))

@@ -19,7 +19,7 @@ import scipy.signal
 
 from ..core import _core
 from .logs import Log, Motion
-from .parameters import Form
+from .parameters import RATE_LIMIT, Form
 
 INTERVAL_S = 0.04
 COARSE_S = 0.004
@@ -39,16 +39,23 @@ class _Pieces:
     log: np.ndarray
 
 
-def brake_torques(log: Log, b1: float, b2: float, u0: float, c31: float) -> np.ndarray:
+def brake_torques(log: Log, values: Mapping[str, float]) -> np.ndarray:
     """The brake's torque at each row by (6) and (7), from 0, N m."""
-    static = np.where(log.brake_pwm >= u0, np.maximum(0.0, b1 * log.brake_pwm + b2), 0.0)
-    return _lagged(log, static, c31)
+    static = static_torques(log, values)
+    keeps = float(np.exp(-values['c31_per_s'] * log.period_s))
+    limit = values.get(RATE_LIMIT.key, 0.0) * log.period_s
+    if limit == 0.0:
+        return np.asarray(scipy.signal.lfilter([0.0, 1.0 - keeps], [1.0, -keeps], static))
+    torque = np.zeros(len(static))
+    for i in range(len(static) - 1):
+        torque[i + 1] = torque[i] + min(max((1.0 - keeps) * (static[i] - torque[i]), -limit), limit)
+    return torque
 
 
-def _lagged(log: Log, static: np.ndarray, c31: float) -> np.ndarray:
-    keeps = float(np.exp(-c31 * log.period_s))
-    lagged = scipy.signal.lfilter([0.0, 1.0 - keeps], [1.0, -keeps], static)
-    return np.asarray(lagged)
+def static_torques(log: Log, values: Mapping[str, float]) -> np.ndarray:
+    """(7) at each row, N m."""
+    return np.where(log.brake_pwm >= values['u0'],
+                    np.maximum(0.0, values['b1_Nm'] * log.brake_pwm + values['b2_Nm']), 0.0)
 
 
 def _integral(log: Log, values: np.ndarray) -> np.ndarray:
@@ -78,12 +85,17 @@ def _pieces(logs: Sequence[Log], motions: Sequence[Motion], segments: Sequence[S
 
 def first_values(form: Form, base: Any, given: Mapping[str, float], start: Mapping[str, float], logs: Sequence[Log],
                  motions: Sequence[Motion], segments: Sequence[Sequence[tuple[int, int]]],
-                 fixed: Mapping[str, float]) -> dict[str, float]:
-    """First values of the form's parameters. `given`: J2_kg_m2 and r2_m; `start` fills what the logs do not tell."""
+                 fixed: Mapping[str, float], other_form: Mapping[str, float] | None = None) -> dict[str, float]:
+    """First values of the form's parameters. `given`: J2_kg_m2 and r2_m; `start` fills what the logs do not tell;
+    `other_form`: first values of another form, from the same logs: all but the tyre's hold here, too."""
     pieces = _pieces(logs, motions, segments)
     r2, J2 = given['r2_m'], given['J2_kg_m2']
     value = {p.key: float(start[p.key]) for p in form.parameters}
     value.update(fixed)
+    if other_form is not None:
+        value.update({key: number for key, number in other_form.items() if key in value or key == RATE_LIMIT.key})
+        _tyre(form, base, value, pieces, logs, motions, r2, J2, fixed)
+        return value
     if 'r1_m' not in fixed:
         rolls = ~pieces.apart & (pieces.motor == 0) & (pieces.turning.min(axis=1) > 0.99 * pieces.duration)
         for rest_s in (1.0, 0.3):  # after a locked wheel, rolling takes its time
@@ -92,6 +104,9 @@ def first_values(form: Form, base: Any, given: Mapping[str, float], start: Mappi
                 value['r1_m'] = r2 * float(np.median(pieces.angle[rolling, 1] / pieces.angle[rolling, 0]))
                 break
     _scan_brake(value, pieces, logs, motions, r2, J2, fixed)
+    for p in form.parameters:
+        if p.key not in fixed:
+            value[p.key] = float(np.clip(value[p.key], p.least, p.most))
     _tyre(form, base, value, pieces, logs, motions, r2, J2, fixed)
     return value
 
@@ -252,7 +267,7 @@ def _tyre(form: Form, base: Any, value: dict[str, float], pieces: _Pieces, logs:
     middle1, middle2, torque = [], [], []
     for number, first, last in pieces.parts:
         log = logs[number]
-        Tb = brake_torques(log, value['b1_Nm'], value['b2_Nm'], value['u0'], value['c31_per_s'])
+        Tb = brake_torques(log, value)
         centre = (first + last) // 2
         w = np.where(motions[number].stands, 0.0, motions[number].speed_rad_s)
         middle1.append(w[centre, 0])

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""usage: symbols_test.py LIBABS_HIL_STUDY
+"""usage: symbols_test.py LIBRARY
 
 The objects of the lanes that are compiled for an instruction set define no function without the set's name in it: the
 linker keeps one of several equal functions, and the rest of the program must run without the set.
@@ -24,8 +24,8 @@ def main():
     found = list(functions(sys.argv[1]))
     strangers, own = [], 0
     for member, kind, symbol in found:
-        for source, name in (('lanes_avx2', 'Avx2'), ('lanes_avx512', 'Avx512')):
-            if not member.startswith(source + '.'):
+        for source, name in (('_avx2', 'Avx2'), ('_avx512', 'Avx512')):
+            if not member.split('.')[0].endswith(source):
                 continue
             if name in symbol:
                 own += 1

@@ -1,0 +1,236 @@
+"""The linearised plant over the logs, and one step of the fit: sensitivities, the filter's normal equations, new states."""
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..core import _core
+from .parameters import DELAY, WHEELS, disc_of
+from .problem import COUNT_VARIANCE, Disturbances, Fit, Piece, Problem
+
+#: largest change of a parameter in one iteration, over its size
+LARGEST_STEP = 0.3
+#: how far a piece's first state may move in one iteration: angles, speeds, brake torque
+NEAR_SD = np.array([0.005, 0.005, 0.5, 0.5, 0.1])
+
+
+def _scale(problem: Problem, values: Mapping[str, float]) -> np.ndarray:
+    return np.array([max(abs(values[p.key]), p.floor) for p in problem.parameters])
+
+
+def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Piece],
+              check: Callable[[], None] = lambda: None) -> np.ndarray:
+    """Fills `linear` of each piece; returns the scale of the parameters' changes."""
+    scale = _scale(problem, values)
+    steps = []
+    for i, p in enumerate(problem.parameters):
+        size = 1e-5 * scale[i]
+        if p.key == 'u0':
+            size = _duty_step(problem, values['u0'])
+        if p.key == DELAY:
+            size = 1e-5
+        steps.append(size if values[p.key] + size <= p.most else -size)
+    for number, log in enumerate(problem.logs):
+        inputs = log.inputs()
+        there = problem.columns(number)
+        simulated = np.array([problem.parameters[i].acts != 'reading' for i in there])
+        nominal = problem.plant_values(values, number)
+        moved = []
+        for i in there[simulated]:
+            p = problem.parameters[i]
+            other = problem.plant_values({**values, p.key: values[p.key] + steps[i]}, number)
+            moved.append((other, steps[i] / scale[i], p.acts))
+        for piece in pieces:
+            if piece.log != number:
+                continue
+            check()
+            piece.linear = _core.linearise(problem.base, nominal, moved, inputs, piece.first, piece.states)
+            piece.columns = there
+            if not simulated.all():
+                for name in ('by_parameter', 'end_by_parameter'):
+                    few = piece.linear[name]
+                    piece.linear[name] = np.zeros((*few.shape[:2], len(there)))
+                    piece.linear[name][:, :, simulated] = few
+                _read_by_discs(problem, scale, piece)
+            _measure(problem, values, piece)
+    return scale
+
+
+def _read_by_discs(problem: Problem, scale: np.ndarray, piece: Piece) -> None:
+    """Derivatives of the readings by what eccentric discs add. That these change the other derivatives, too, by a
+    hundredth at most, is left out: it changes neither where the residuals vanish nor, visibly, an interval."""
+    keys = [p.key for p in problem.parameters]
+    place = problem.disc_angles_rad(piece.log, piece.linear['angles'])
+    for wheel in problem.discs:
+        number = WHEELS.index(wheel)
+        for p, wave in zip(disc_of(wheel, piece.log), (np.sin(place[:, number]), np.cos(place[:, number]))):
+            i = keys.index(p.key)
+            column = int(np.flatnonzero(piece.columns == i)[0])
+            piece.linear['by_parameter'][:, number, column] = scale[i] * wave
+
+
+def _measure(problem: Problem, values: Mapping[str, float], piece: Piece) -> None:
+    """What the filter needs beside the sensitivities: residuals, weights, gaps between windows."""
+    motion, linear = problem.motions[piece.log], piece.linear
+    angle = motion.angle_rad[piece.rows]
+    read = linear['angles'].copy()
+    read += disc_waves_rad(problem, values, piece.log, read)
+    residual = np.nan_to_num(angle) - read
+    weight = np.where(np.isfinite(angle), motion.weight[piece.rows], 0.0)
+    gap = np.zeros_like(piece.states)
+    gap[:-1] = linear['end'][:-1] - piece.states[1:]
+    linear.update(read=read, residual=residual[:, :, None], weight=weight, gap=gap, stands=piece.stands, first=piece.first,
+                  prior_sd=piece.prior_sd, time_s=problem.logs[piece.log].time_s)
+    linear.update(_core.condense(linear))
+
+
+def disc_waves_rad(problem: Problem, values: Mapping[str, float], log: int, angles_rad: np.ndarray) -> np.ndarray:
+    """What the discs add to the readings at these angles, shape (rows, 2)."""
+    waves = np.zeros(angles_rad.shape)
+    place = problem.disc_angles_rad(log, angles_rad)
+    for wheel in problem.discs:
+        number, (sine, cosine) = WHEELS.index(wheel), disc_of(wheel, log)
+        waves[:, number] = values[sine.key] * np.sin(place[:, number]) + values[cosine.key] * np.cos(place[:, number])
+    return waves
+
+
+def _duty_step(problem: Problem, u0: float) -> float:
+    """A change of u0 that reaches other duties of the logs: two steps of the brake's PWM at least."""
+    duties = np.unique(np.concatenate([log.brake_pwm for log in problem.logs]))
+    near = np.sort(np.abs(duties - u0))
+    return float(max(5e-4, min(0.02, near[min(4, len(near) - 1)])))
+
+
+def directions(problem: Problem, scale: np.ndarray) -> np.ndarray:
+    """What each disturbance does, as changes of the parameters: shape (5, parameters)."""
+    keys = [p.key for p in problem.parameters]
+    out = np.zeros((5, len(keys)))
+    for row, names in ((0, problem.form.road), (1, ('b1_Nm', 'b2_Nm')), (2, ('motor_stall_torque_Nm',))):
+        for name in names:
+            i = keys.index(name)
+            out[row, i] = 1.0
+    for row, name in ((3, 'M10_Nm'), (4, 'M20_Nm')):
+        i = keys.index(name)
+        out[row, i] = 1.0 / scale[i]
+    return out
+
+
+def _relative(problem: Problem, values: Mapping[str, float], scale: np.ndarray) -> np.ndarray:
+    """`directions`, where a factor moves a parameter by its own value (b2 may be smaller than its scale)."""
+    out = directions(problem, scale)
+    for i, p in enumerate(problem.parameters):
+        for row in range(3):
+            out[row, i] *= values[p.key] / scale[i]
+    return out
+
+
+def run_filter(fit: Fit, disturbances: Disturbances, variance: float | None = None) -> tuple[float, list[Any]]:
+    """-2 log likelihood but for a constant at the best parameters, and what `_core.filter_pieces` gave."""
+    problem = fit.problem
+    variance = COUNT_VARIANCE * problem.radians_per_count**2 if variance is None else variance
+    way = _relative(problem, fit.values, fit.scale)
+    found = filtered(problem, fit.pieces, way, disturbances, variance)
+    N = sum(one[0] for one in found)
+    n = sum(one[1][:, 0] for one in found)
+    c = sum(float(one[2][0]) for one in found)
+    log_variance = sum(one[3] for one in found)
+    x = solved(fit, N, n)
+    return c - float(n @ x) + log_variance, found
+
+
+def filtered(problem: Problem, pieces: Sequence[Piece], way: np.ndarray, disturbances: Disturbances,
+             variance: float) -> list[Any]:
+    """What `_core.filter_pieces` gives of each piece, with a row and a column for every parameter."""
+    out = []
+    size = len(problem.parameters)
+    for piece in pieces:
+        at = piece.columns
+        N, n, square, log_variance, readings = _core.filter_pieces(
+            [piece.linear], np.ascontiguousarray(way[:, at]), disturbances.sd, disturbances.time_constant_s, variance)[0]
+        whole, right = np.zeros((size, size)), np.zeros((size, n.shape[1]))
+        whole[np.ix_(at, at)], right[at] = N, n
+        out.append((whole, right, square, log_variance, readings))
+    return out
+
+
+def solved(fit: Fit, N: np.ndarray, n: np.ndarray, low: np.ndarray | None = None,
+           high: np.ndarray | None = None) -> np.ndarray:
+    """The likeliest change of the parameters, 0 for those that are not free. The prior decides what the logs do not. A
+    parameter that would leave its range stops at the range's end, and the others follow: they may depend on it."""
+    x = np.zeros(len(n))
+    precision, towards = fit.prior()
+    A, n = N + np.diag(precision), n + towards
+    d = 1 / np.sqrt(np.diag(A))
+    A, n = A * np.outer(d, d), d * n
+    moving = fit.free.copy()
+    for _ in range(len(n)):
+        stopped = fit.free & ~moving
+        rest = n - A[:, stopped] @ (x[stopped] / d[stopped])
+        x[moving] = d[moving] * np.linalg.solve(A[np.ix_(moving, moving)], rest[moving])
+        if low is None or high is None:
+            break
+        beyond = moving & ((x < low) | (x > high))
+        if not beyond.any():
+            break
+        x[beyond] = np.clip(x, low, high)[beyond]
+        moving &= ~beyond
+    return x
+
+
+def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambda: None) -> float:
+    """One iteration: linearise, estimate, move parameters and states. Returns how far they moved, in standard deviations:
+    of the direction that the logs know best, not of each parameter alone."""
+    problem = fit.problem
+    fit.disturbances = disturbances
+    fit.scale = linearise(problem, fit.values, fit.pieces, check)
+    _, found = run_filter(fit, disturbances)
+    N, n = _keep_normals(fit, found)
+    values = np.array([fit.values[p.key] for p in problem.parameters])
+    # Sizes that cannot vanish move by factors: where the logs know only a product, its factors move along straight lines.
+    sizes = np.array([not p.floor and p.key != DELAY for p in problem.parameters])
+    least = np.array([p.least for p in problem.parameters])
+    most = np.array([p.most for p in problem.parameters])
+    with np.errstate(divide='ignore', invalid='ignore'):
+        low = np.where(sizes, np.log(np.maximum(least, 1e-12) / values), (least - values) / fit.scale)
+        high = np.where(sizes, np.log(most / values), (most - values) / fit.scale)
+    x = solved(fit, N, n, np.maximum(low, -LARGEST_STEP), np.minimum(high, LARGEST_STEP))
+    _move_states(fit, disturbances, x)
+    with np.errstate(over='ignore'):
+        moved = np.where(sizes, values * np.exp(x), values + fit.scale * x)
+    fit.values = {**fit.values, **{p.key: float(v) for p, v in zip(problem.parameters, moved)}}
+    fit.iterations += 1
+    return float(np.sqrt(x @ (N + np.diag(fit.prior()[0])) @ x))
+
+
+def _keep_normals(fit: Fit, found: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
+    logs, n = len(fit.problem.logs), len(fit.scale)
+    fit.normal, fit.right, fit.cost = np.zeros((logs, n, n)), np.zeros((logs, n)), np.zeros(logs)
+    fit.readings = 0.0
+    for piece, (N, right, square, log_variance, readings) in zip(fit.pieces, found):
+        fit.normal[piece.log] += N
+        fit.right[piece.log] += right[:, 0]
+        fit.cost[piece.log] += square[0] + log_variance
+        fit.readings += readings
+    return fit.normal.sum(axis=0), fit.right.sum(axis=0)
+
+
+def _move_states(fit: Fit, disturbances: Disturbances, x: np.ndarray) -> None:
+    problem = fit.problem
+    way = _relative(problem, fit.values, fit.scale)
+    variance = COUNT_VARIANCE * problem.radians_per_count**2
+    square = weights = 0.0
+    for piece in fit.pieces:
+        linear = dict(piece.linear)
+        # The states are near already. A wide prior would only lose digits in the backward pass.
+        linear['prior_sd'] = np.minimum(piece.prior_sd, NEAR_SD)
+        change, left = _core.smooth(linear, x[piece.columns], np.ascontiguousarray(way[:, piece.columns]), disturbances.sd,
+                                    disturbances.time_constant_s, variance)
+        square += left
+        weights += float(linear['readings'][:, 1].sum())
+        speeds = change[:, 2:4]
+        piece.states = piece.states + np.column_stack([change[:, :2], np.clip(speeds, -30, 30), change[:, 4:5]])
+        piece.states[:, 2:4] = np.where(piece.stands != 0, 0.0, np.maximum(piece.states[:, 2:4], 0.0))
+        piece.states[:, 4] = np.maximum(piece.states[:, 4], 0.0)
+    fit.rms_counts = float(np.sqrt(square / max(weights, 1e-9))) / problem.radians_per_count

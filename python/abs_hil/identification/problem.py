@@ -1,0 +1,182 @@
+"""What a fit works on: the logs in windows, the plant's form, the present values and their normal equations."""
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..core import _core
+from ..options import options
+from .logs import Log, Motion, motion_of, segments_of
+from .parameters import DELAY, RATE_LIMIT, Form, Parameter, base_options, disc_of
+from .start import brake_torques
+
+#: an even distribution within one count, counts^2
+COUNT_VARIANCE = 1 / 12
+WINDOW_S = 0.05
+WINDOW_DISTURBED_S = 0.02
+#: a residual above this has other sources than the counts' steps, counts RMS
+LARGEST_QUIET_RMS = 0.30
+DISTURBANCES = ('road', 'brake', 'motor', 'upper bearing', 'lower bearing')
+
+
+@dataclass
+class Disturbances:
+    """Standard deviations (factors; the bearings' in N m) and time constants (s) of the five random factors."""
+    sd: np.ndarray
+    time_constant_s: np.ndarray
+
+    @classmethod
+    def of(cls, factor: float, torque_Nm: float, time_constant_s: float) -> Disturbances:
+        return cls(np.array([factor, factor, factor, torque_Nm, torque_Nm]), np.full(5, time_constant_s))
+
+
+QUIET = Disturbances.of(0.0, 0.0, 1.0)
+
+
+@dataclass
+class Piece:
+    """A segment of a log, its windows, and the states at their starts (windows, 5)."""
+    log: int
+    first: np.ndarray
+    states: np.ndarray
+    stands: np.ndarray
+    prior_sd: np.ndarray
+    linear: dict[str, Any] = field(default_factory=dict)
+    columns: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
+
+    @property
+    def rows(self) -> slice:
+        return slice(int(self.first[0]), int(self.first[-1]))
+
+
+@dataclass
+class Problem:
+    """All logs, and the plant's form with what is fixed. `discs` names the wheels whose encoders may be eccentric."""
+    form: Form
+    base: Any
+    logs: Sequence[Log]
+    motions: Sequence[Motion]
+    segments: Sequence[Sequence[tuple[int, int]]]
+    given: dict[str, float]
+    fixed: dict[str, float]
+    counts_per_rev: int
+    drifts: tuple[str, ...] = ()
+    with_delay: bool = False
+    with_rate_limit: bool = False
+    discs: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, form: Form, start: Any, logs: Sequence[Log], fixed: Mapping[str, float | None],
+           drifts: Sequence[str] = (), discs: Sequence[str] = ()) -> Problem:
+        base = base_options(form, start)
+        values = _core.PlantOptions(options(plant=start)).values()
+        counts_per_rev = int(values['encoder_counts_per_rev'])
+        motions = [motion_of(log, counts_per_rev) for log in logs]
+        segments = [segments_of(log, motion) for log, motion in zip(logs, motions)]
+        known = {key: float(values[key] if value is None else value) for key, value in fixed.items() if key in values}
+        given = {key: known.pop(key, float(values[key])) for key in ('J2_kg_m2', 'r2_m')}
+        keys = {p.key for p in form.parameters} | {RATE_LIMIT.key}
+        return cls(form, base, logs, motions, segments, given, {k: v for k, v in known.items() if k in keys},
+                   counts_per_rev, tuple(drifts), discs=tuple(discs))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        delay = (Parameter(DELAY, 's', 'always', '', floor=1e-3),) if self.with_delay else ()
+        factors = tuple(Parameter(key, '1', 'brake', '') for key in self.factors) if self.drifts else ()
+        limit = (RATE_LIMIT,) if self.with_rate_limit else ()
+        discs = tuple(p for log in range(len(self.logs)) for wheel in self.discs for p in disc_of(wheel, log))
+        return self.form.parameters + limit + factors + discs + delay
+
+    def columns(self, log: int) -> np.ndarray:
+        """Places of the parameters that act in one log."""
+        others = {p.key for other in range(len(self.logs)) if other != log for wheel in self.discs
+                  for p in disc_of(wheel, other)} | ({*self.factors} - {f'brake_factor_{log + 1}'})
+        return np.array([i for i, p in enumerate(self.parameters) if p.key not in others])
+
+    @property
+    def factors(self) -> tuple[str, ...]:
+        """Names of the brake's factors of each log but the first, over that of the first."""
+        return tuple(f'brake_factor_{number}' for number in range(2, len(self.logs) + 1))
+
+    def plant_values(self, values: Mapping[str, float], log: int) -> list[tuple[str, float]]:
+        """The plant of one log, as `_core` takes it."""
+        factor = values[self.factors[log - 1]] if self.drifts and log > 0 else 1.0
+        scaled = [(p.key, values[p.key] * (factor if p.key in ('b1_Nm', 'b2_Nm') else 1.0))
+                  for p in self.form.parameters]
+        return [*self.given.items(), *scaled, (RATE_LIMIT.key, values.get(RATE_LIMIT.key, 0.0)),
+                (DELAY, values.get(DELAY, 0.0))]
+
+    def disc_angles_rad(self, log: int, angles_rad: np.ndarray) -> np.ndarray:
+        """Angles of the discs from their counters' zeros, shape (rows, 2)."""
+        return angles_rad + (self.logs[log].first_counts % self.counts_per_rev) * self.radians_per_count
+
+    @property
+    def radians_per_count(self) -> float:
+        return 2 * np.pi / self.counts_per_rev
+
+
+@dataclass
+class Fit:
+    """values: of all parameters; first: those that the prior holds to. normal: (logs, n, n), right: (logs, n), cost: (logs,)
+    of the last linearisation, in the scaled changes x of `scale`: value = nominal + scale x. `free` marks the estimated
+    ones."""
+    problem: Problem
+    values: dict[str, float]
+    pieces: list[Piece]
+    disturbances: Disturbances
+    window_s: float
+    free: np.ndarray
+    first: dict[str, float] = field(default_factory=dict)
+    scale: np.ndarray = field(default_factory=lambda: np.empty(0))
+    normal: np.ndarray = field(default_factory=lambda: np.empty(0))
+    right: np.ndarray = field(default_factory=lambda: np.empty(0))
+    cost: np.ndarray = field(default_factory=lambda: np.empty(0))
+    readings: float = 0.0
+    rms_counts: float = np.nan
+    iterations: int = 0
+
+    def copy(self, **changes: Any) -> Fit:
+        """A fit that can go on without this one."""
+        return dataclasses.replace(self, **{'pieces': [dataclasses.replace(piece) for piece in self.pieces], **changes})
+
+    @property
+    def keys(self) -> list[str]:
+        return [p.key for p in self.problem.parameters]
+
+    def information(self) -> np.ndarray:
+        return np.asarray(self.normal.sum(axis=0))
+
+    def prior(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of the scaled changes: the precision (n,), and its product with the way to the first values (n,)."""
+        parameters = self.problem.parameters
+        size = np.array([p.prior * max(abs(self.first.get(p.key, self.values[p.key])), p.floor) for p in parameters])
+        precision = (self.scale / size)**2
+        way = np.array([self.first.get(p.key, self.values[p.key]) - self.values[p.key] for p in parameters])
+        return precision, precision * way / self.scale
+
+    def covariance(self) -> np.ndarray:
+        """Of the free parameters' scaled changes, shape (free, free); with the prior."""
+        N = (self.information() + np.diag(self.prior()[0]))[np.ix_(self.free, self.free)]
+        d = 1 / np.sqrt(np.diag(N))
+        return np.asarray(np.linalg.inv(N * np.outer(d, d)) * np.outer(d, d))
+
+
+def pieces_of(problem: Problem, values: Mapping[str, float], window_s: float) -> list[Piece]:
+    """Windows over every segment, with states from the counts and the brake's torque from the model."""
+    pieces = []
+    for number, (log, motion, segments) in enumerate(zip(problem.logs, problem.motions, problem.segments)):
+        torque = brake_torques(log, values)
+        step = max(4, round(window_s / log.period_s))
+        for begin, end in segments:
+            count = max(1, (end - begin - 1) // step)
+            first = np.append(begin + step * np.arange(count), end - 1)
+            at = first[:-1]
+            stands = motion.stands[at]
+            states = np.column_stack([motion.smooth_rad[at], np.where(stands, 0.0, motion.speed_rad_s[at]), torque[at]])
+            prior = np.array([0.05, 0.05, 20.0, 20.0, 0.0])
+            pieces.append(Piece(number, first.astype(np.int64), states, stands.astype(float), prior))
+    return pieces

@@ -1,0 +1,92 @@
+"""The brake's rate limit: whether the logs show one, and where the fit of it begins."""
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from .fit import CONVERGED, other_costs
+from .linear import solved, step
+from .logs import Log
+from .parameters import RATE_LIMIT
+from .problem import Disturbances, Fit
+from .start import brake_torques, static_torques
+
+#: a limit is believed if it lowers -2 log likelihood by this
+CLEAR_GAIN = 50.0
+#: its standard deviation over its value, at most
+LEAST_SURE = 0.05
+#: candidates, over the fastest rate that the lag alone would give; the first ones tell whether others are worth a look
+FIRST_SHARES = (0.98, 0.9, 0.6)
+SHARES = (*np.geomspace(0.06, 0.9, 15), 0.95, 0.98)
+WORTH_A_LOOK = 3.0
+
+
+def _brakes(logs: Sequence[Log]) -> bool:
+    return any(log.brake_pwm.any() for log in logs)
+
+
+def fastest_Nm_s(fit: Fit, logs: Sequence[Log]) -> float:
+    """The largest rate of the brake's torque in the logs if the lag alone held it back."""
+    values = {key: value for key, value in fit.values.items() if key != RATE_LIMIT.key}
+    return max(float(np.max(np.abs(values['c31_per_s'] * (static_torques(log, values) - brake_torques(log, values)))))
+               for log in logs)
+
+
+def sought(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambda: None) -> Fit:
+    """The fit with a limit of the brake's rate if one explains the logs clearly better. Needs the linearisation of `step`."""
+    problem = fit.problem
+    if problem.with_rate_limit or RATE_LIMIT.key in problem.fixed or not _brakes(problem.logs):
+        return fit
+    fastest = fastest_Nm_s(fit, problem.logs)
+    affected = [bool(np.any(problem.logs[piece.log].brake_pwm[piece.rows] > 0)) for piece in fit.pieces]
+    within = np.zeros(len(fit.scale))
+    within[fit.free] = 5.0 * np.sqrt(np.diag(fit.covariance()))
+    others = other_costs(fit, disturbances, affected)
+
+    def cost_of(limit_Nm_s: float) -> float:
+        check()
+        N, n, cost = others({**fit.values, RATE_LIMIT.key: limit_Nm_s})
+        x = solved(fit, N, n, -within, within)
+        return cost - float(2 * n @ x - x @ N @ x)
+
+    without = cost_of(0.0)
+    if min(cost_of(share * fastest) for share in FIRST_SHARES) > without - WORTH_A_LOOK:
+        return fit
+    costs = [cost_of(share * fastest) for share in SHARES]
+    best = int(np.argmin(costs))
+    if not costs[best] < without - CLEAR_GAIN:
+        return fit
+    limited = dataclasses.replace(problem, with_rate_limit=True)
+    at = [p.key for p in limited.parameters].index(RATE_LIMIT.key)
+    value = SHARES[best] * fastest
+    return fit.copy(problem=limited, values={**fit.values, RATE_LIMIT.key: value},
+                    first={**fit.first, RATE_LIMIT.key: value}, free=np.insert(fit.free, at, True))
+
+
+def started(fit: Fit, check: Callable[[], None] = lambda: None) -> Fit:
+    """As `sought`, with a few rounds around the limit."""
+    found = sought(fit, fit.disturbances, check)
+    if found is not fit:
+        for _ in range(3):
+            if step(found, found.disturbances, check) < CONVERGED:
+                break
+    return found
+
+
+def settle(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambda: None) -> Fit:
+    """The fit without a limit that its logs do not tell after all."""
+    if not fit.problem.with_rate_limit:
+        return fit
+    at = fit.keys.index(RATE_LIMIT.key)
+    value = fit.values[RATE_LIMIT.key]
+    sd = float(np.sqrt(fit.covariance()[np.count_nonzero(fit.free[:at]), np.count_nonzero(fit.free[:at])]) * fit.scale[at])
+    if sd < LEAST_SURE * value and value < fastest_Nm_s(fit, fit.problem.logs):
+        return fit
+    fit = fit.copy(problem=dataclasses.replace(fit.problem, with_rate_limit=False),
+                   values={**fit.values, RATE_LIMIT.key: 0.0}, free=np.delete(fit.free, at))
+    for _ in range(4):
+        if step(fit, disturbances, check) < CONVERGED:
+            break
+    return fit

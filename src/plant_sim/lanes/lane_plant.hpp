@@ -1,0 +1,103 @@
+#pragma once
+
+#include "abs_hil/plant_sim/load_models.hpp"
+#include "abs_hil/plant_sim/tyre_models.hpp"
+#include "plant_sim/lanes/window_work.hpp"
+#include "plant_sim/runge_kutta.hpp"
+
+/// Calls `each(tyre, load)` for every combination that has lanes.
+#define ABS_HIL_WINDOW_KINDS(each)                                 \
+  each(plant_sim::BasicMagicFormula, plant_sim::BasicConstantLoad) \
+      each(plant_sim::BasicIntecoMu, plant_sim::BasicLeverLoad)
+
+namespace abs_hil::plant_sim::lanes {
+
+/// A plant without profiles and flaws, over a scalar. It has nothing but scalars as members, so that plant and lane
+/// have the same words (rig/pack.hpp).
+template <class S, class Tyre, class Load>
+struct LanePlant {
+  Tyre tyre{};
+  Load load{};
+  BasicWheels<S> wheels{};
+  rig::BasicBrake<S> brake{};
+  S brake_limit_Nm_s{std::numeric_limits<double>::infinity()};
+  S motor_stall_Nm{0.0};
+  S motor_no_load_rad_s{1.0};
+  S max_step_s{0.0};
+  S delay_s{0.0};
+  S upper_turns{1.0};  ///< 0: the upper wheel stands; for wheels apart
+  BasicState<S> x{};
+};
+
+/// The right-hand side of (1), (2) and (6) for wheels apart that turn forwards, the upper one unless it stands.
+template <class S>
+struct ApartBalance {
+  const BasicWheels<S>& wheels;
+  const BasicHeldTorques<S>& held;
+  const S& upper_turns;
+
+  [[nodiscard, gnu::always_inline]] BasicState<S> operator()(const BasicState<S>& x,
+                                                             const S& /*time_s*/) const noexcept {
+    BasicState<S> rates = rates_of(wheels, held, S(0.0), Forwards{}, Forwards{}, x);
+    rates[omega1] = rates[omega1] * upper_turns;
+    return rates;
+  }
+};
+
+template <class S, class Tyre, class Load>
+class WindowPass {
+ public:
+  using Plant = LanePlant<S, Tyre, Load>;
+
+  explicit WindowPass(const Plant& plant) noexcept : plant_(plant) {}
+
+  /// Over one interval. True where a wheel stands or stops.
+  [[gnu::always_inline]] auto advance(const Interval& interval, bool apart, bool late) noexcept {
+    const S whole_s(interval.duration_s);
+    if (!late) return advance_part(whole_s, interval.motor_duty, interval.brake_duty, apart);
+    const S late_s = rig::smaller(plant_.delay_s, whole_s);
+    const auto before = advance_part(late_s, interval.earlier_motor_duty, interval.earlier_brake_duty, apart);
+    return before || advance_part(S(whole_s - late_s), interval.motor_duty, interval.brake_duty, apart);
+  }
+  [[nodiscard]] const BasicState<S>& x() const noexcept { return plant_.x; }
+
+ private:
+  [[gnu::noinline, gnu::flatten]] auto advance_part(const S& duration_s, double motor_duty, double brake_duty,
+                                                    bool apart) noexcept {
+    BasicHeldTorques<S> held;
+    held.brake_target_Nm = rig::brake_torque_at(plant_.brake, S(brake_duty));
+    held.brake_rate_per_s = plant_.brake.c31_per_s;
+    held.brake_limit_Nm_s = plant_.brake_limit_Nm_s;
+    held.motor_stall_Nm = plant_.motor_stall_Nm * S(motor_duty);
+    held.motor_back_emf_Nms = held.motor_stall_Nm / plant_.motor_no_load_rad_s;
+    if (apart) {
+      const ApartBalance<S> balance{plant_.wheels, held, plant_.upper_turns};
+      return go_on(balance, steps_for(duration_s, plant_.max_step_s, S(0.0)), duration_s);
+    }
+    const S friction(1.0);
+    const RollingBalance<S, Tyre, Load, BasicHeldTorques<S>> balance{plant_.tyre, plant_.load, plant_.wheels, held,
+                                                                     friction};
+    return go_on(balance, steps_for(duration_s, plant_.max_step_s, balance.fastest_rate_per_s(plant_.x)), duration_s);
+  }
+  template <class Balance>
+  [[gnu::always_inline]] auto go_on(const Balance& balance, const S& steps, const S& duration_s) noexcept {
+    BasicState<S>& x = plant_.x;
+    const S step_s = duration_s / steps;
+    auto stopped = !turns(x);
+    for (double made = 0.0;; made += 1.0) {
+      const auto goes_on = S(made) < steps;
+      if (!rig::any(goes_on)) break;
+      const BasicState<S> end = runge_kutta_step(balance, x, step_s);
+      for (std::size_t i = 0; i < x.size(); ++i) x[i] = rig::select(goes_on, end[i], x[i]);
+      stopped = stopped || !turns(x);
+    }
+    return stopped;
+  }
+  [[nodiscard, gnu::always_inline]] auto turns(const BasicState<S>& x) const noexcept {
+    return (x[omega1] > 0.0 || plant_.upper_turns == S(0.0)) && x[omega2] > 0.0;
+  }
+
+  Plant plant_;
+};
+
+}  // namespace abs_hil::plant_sim::lanes
