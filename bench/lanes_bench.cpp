@@ -35,14 +35,29 @@ struct Workload {
   std::size_t threads{1};
 };
 
-void runs(benchmark::State& state, const std::string& set, const Workload& work) {
-  setenv("ABS_HIL_LANES", set.c_str(), 1);
+config::Settings settings_of(const Workload& work) {
   config::Settings settings;
   config::KeyTable keys(settings);
   config::load_file(config::plant_file(work.plant), keys, config::Tables::of_plant);
   settings.experiment.start_speed_rad_s = 170.0;
   settings.control.controller = work.controller;
   if (work.on_patches) settings.plant.friction_profile = patches;
+  return settings;
+}
+
+/// False if lanes do not know such runs.
+bool has_lanes(const Workload& work) {
+  setenv("ABS_HIL_LANES", "portable", 1);
+  const config::Settings settings = settings_of(work);
+  const BatchCounts counts = run_batch(
+      1, 1, [&](std::size_t) { return Job{.settings = &settings, .plant = settings.plant}; },
+      [](std::size_t, const Outcome&) {});
+  return counts.scalar == 0;
+}
+
+void runs(benchmark::State& state, const std::string& set, const Workload& work) {
+  setenv("ABS_HIL_LANES", set.c_str(), 1);
+  const config::Settings settings = settings_of(work);
   const std::size_t count = work.threads * (set == "none" ? runs_alone : runs_in_lanes);
   std::vector<Job> jobs;
   for (std::size_t i = 0; i < count; ++i) {
@@ -87,8 +102,9 @@ bool has(const char* set) {
 }
 
 void add(const std::string& name, const Workload& work) {
+  const bool lanes = has_lanes(work);
   for (const char* set : {"none", "portable", "avx2", "avx512"}) {
-    if (!has(set)) continue;
+    if (!has(set) || (!lanes && std::string(set) != "none")) continue;
     benchmark::RegisterBenchmark((name + "/" + set).c_str(), runs, set, work)
         ->Unit(benchmark::kMillisecond)
         ->MeasureProcessCPUTime();

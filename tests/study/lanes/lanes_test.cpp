@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "abs_hil/control/registry.hpp"
+#include "abs_hil/control/slip_error_dynamics.hpp"
 #include "catch.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
@@ -50,6 +51,24 @@ bool same_bits(const RunResult& a, const RunResult& b) {
   }
   return a.fault == b.fault;
 }
+
+/// A user's controller, written for `double` alone, as docs/writing-a-controller.md shows it.
+class OwnController final : public control::SlipController {
+ public:
+  explicit OwnController(const control::ControllerContext& context) : wheels_{context.rig.wheels} {}
+  void reset(const control::SlipInput& /*input*/) noexcept override {}
+  [[nodiscard]] control::SlipOutput step(const control::SlipInput& input) noexcept override {
+    return {.brake_torque_Nm = 2.0 + 10.0 * (input.slip_ref - input.slip),
+            .slip_velocity_error_m_s = control::slip_velocity_error_m_s(wheels_, input.speeds, input.slip_ref),
+            .theta_est_N = rig::unknown};
+  }
+
+ private:
+  rig::WheelParameters wheels_;
+};
+constexpr const char* own_name = "own-controller";
+const bool registered =
+    (control::register_controller(control::controller_entry<OwnController>(own_name, "of a user")), true);
 
 struct Case {
   config::Settings settings;
@@ -199,10 +218,11 @@ TEST_CASE("every run of a batch has the bits of simulate, whatever runs beside i
   }
 }
 
-TEST_CASE("every law but the two that learn the tyre's curve has lanes, on every plant, road and drift") {
+TEST_CASE("every law but a user's and the two that learn the tyre's curve has lanes, on every plant, road and drift") {
+  REQUIRE(registered);
   std::mt19937_64 generator(23);
   for (const control::ControllerEntry& entry : control::controllers()) {
-    const bool scalar = entry.name == "adaptive-peak" || entry.name == "adaptive-optimal";
+    const bool scalar = entry.name == "adaptive-peak" || entry.name == "adaptive-optimal" || entry.name == own_name;
     for (const char* plant : {"paper-table1", "inteco-manual"}) {
       Case c{settings_of(plant), {}};
       c.settings.control.controller = entry.name;
