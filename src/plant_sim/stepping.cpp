@@ -106,7 +106,9 @@ template <class Tyre, class Load>
   return made == steps ? r.duration_s : made * step_s;
 }
 
-#if defined(__x86_64__)
+// Not on Windows, whose stack GCC does not align for such functions.
+#if defined(__x86_64__) && !defined(_WIN32)
+#define ABS_HIL_ROLL_BY_AVX
 /// The same instructions in AVX's encoding, which needs fewer moves between registers. Nothing is contracted, so the
 /// bits are the same.
 template <class Tyre, class Load>
@@ -124,7 +126,7 @@ double roll(const WheelModel& model, double max_step_s, const HeldTorques& held,
   const Rolling rolling{
       BasicWheels<double>(model.wheels()), held, max_step_s, duration_s, friction.value, friction.end_angle2_rad};
   return model.visit([&](const auto& tyre, const auto& load) {
-#if defined(__x86_64__)
+#ifdef ABS_HIL_ROLL_BY_AVX
     if (has_avx) return roll_by_avx(tyre, load, rolling, x);
 #endif
     return roll_on(tyre, load, rolling, x);
