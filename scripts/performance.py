@@ -3,7 +3,8 @@
 
 Runs the benchmarks of build/release, and the same braking in Octave and SciPy if they are installed. Writes
 docs/performance.md. Each figure is the median of repetitions. The repetitions of one program's benchmarks are
-interleaved. --lanes renews the section on many runs alone.
+interleaved. --lanes renews the section on many runs alone. `scripts/setup_python.sh python-packages-bench.txt` installs
+numba for it, which it compares with if it is there.
 """
 import argparse
 import json
@@ -23,10 +24,10 @@ BIN = ROOT / 'build' / 'release' / 'bin'
 REPETITIONS = 9
 
 
-def bench(program):
+def bench(program, repetitions=REPETITIONS):
     """{name: (median CPU ns, counters)} of a benchmark program."""
     with tempfile.NamedTemporaryFile(suffix='.json') as out:
-        subprocess.run([BIN / program, f'--benchmark_repetitions={REPETITIONS}', '--benchmark_enable_random_interleaving=true',
+        subprocess.run([BIN / program, f'--benchmark_repetitions={repetitions}', '--benchmark_enable_random_interleaving=true',
                         '--benchmark_min_time=0.02', f'--benchmark_out={out.name}', '--benchmark_out_format=json'],
                        check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         runs = json.load(open(out.name))['benchmarks']
@@ -34,7 +35,7 @@ def bench(program):
     found = {}
     for run in runs:
         if run['run_type'] == 'aggregate' and run['aggregate_name'] == 'median':
-            name = re.sub(r'/iterations:\d+|/real_time|_median$', '', run['name'])
+            name = re.sub(r'/iterations:\d+|/real_time|/process_time|_median$', '', run['name'])
             found[name] = (run['cpu_time'] * unit[run['time_unit']], run)
     return found
 
@@ -63,6 +64,17 @@ def report_of_two_runs():
         return whole_process([str(BIN / 'abs_report'), *runs, '--output', f'{scratch}/report', '--force'])
 
 
+def python_with(*modules):
+    """A Python that has these modules, else None."""
+    # Debian's own Python before that of the PATH: only this one finds python3-scipy.
+    for python in (ROOT / 'build' / 'python' / 'bin' / 'python', '/usr/bin/python3', sys.executable):
+        found = pathlib.Path(python).exists() and subprocess.run([python, '-c', f'import {", ".join(modules)}'],
+                                                                 capture_output=True).returncode == 0
+        if found:
+            return python
+    return None
+
+
 def elsewhere():
     """(name, ms, error) of the same braking in other languages, if they are installed."""
     rows = []
@@ -70,12 +82,9 @@ def elsewhere():
     if shutil.which('octave'):
         rows += subprocess.run(['octave', '--no-gui', '--quiet', scripts / 'braking.m'], check=True, capture_output=True,
                                text=True).stdout.splitlines()
-    # Debian's own Python first: only this one finds python3-scipy.
-    for python in ('/usr/bin/python3', sys.executable):
-        if subprocess.run([python, '-c', 'import scipy'], capture_output=True).returncode == 0:
-            rows += subprocess.run([python, scripts / 'braking.py'], check=True, capture_output=True,
-                                   text=True).stdout.splitlines()
-            break
+    if python := python_with('scipy'):
+        rows += subprocess.run([python, scripts / 'braking.py'], check=True, capture_output=True,
+                               text=True).stdout.splitlines()
     return [(name, float(ms), float(error)) for name, ms, error in (row.split() for row in rows)]
 
 
@@ -185,30 +194,87 @@ exceeds its budget.
 
 LANES = '## Many runs side by side'
 SETS = ('none', 'portable', 'avx2', 'avx512')
+LANES_REPETITIONS = 3
+
+
+def lane_row(found, name):
+    """The cells of a workload: its rates by the scalar path and in lanes, and the share of runs in lanes."""
+    rates = {s: found[f'{name}/{s}'][1] for s in SETS if f'{name}/{s}' in found}
+    alone = rates['none']['runs_per_s']
+    share = rates.get('portable', {'in_lanes': 0})['in_lanes']
+    shown = [f'{rate["runs_per_s"]:,.0f} ({rate["runs_per_s"] / alone:.1f} ×)' if (rate := rates.get(s)) else '–'
+             for s in SETS[1:]]
+    plant, controller = name.split('/')
+    return [f'`{controller}`', re.sub(r'^(\S+)', r'`\1`', plant), f'{alone:,.0f}', *shown, f'{100 * share:.1f} %']
+
+
+BARE = {'avx512': 'by hand, AVX-512, 4 vectors in flight', 'avx2': 'by hand, AVX2, 4 vectors in flight',
+        'numpy': 'NumPy, RK4 over 2,000 runs at once', 'numba': 'numba, RK4 run by run',
+        'scipy': "SciPy, solve_ivp RK45, 1e-6 / 1e-8"}
+
+
+def bare_rows(found):
+    """Rows of the plant without anything around it, from the fastest."""
+    rates = {name.split('/')[-1]: run['runs_per_s'] for name, (_, run) in found.items() if name.startswith('bare/')}
+    if python := python_with('numba', 'scipy') or python_with('scipy'):
+        lines = subprocess.run([python, ROOT / 'bench' / 'baselines' / 'braking_many.py'], check=True, capture_output=True,
+                               text=True, env={**os.environ, 'OPENBLAS_NUM_THREADS': '1'}).stdout.splitlines()
+        rates |= {line.split()[0]: float(line.split()[1]) for line in lines}
+    return [[BARE[name], f'{rates[name]:,.3g}' if rates[name] < 100 else f'{rates[name]:,.0f}']
+            for name in sorted(rates, key=rates.get, reverse=True)]
+
+
+def memory_rows():
+    """Memory of studies of many short runs."""
+    rows = []
+    with tempfile.TemporaryDirectory() as scratch:
+        for runs in (10_000, 100_000, 1_000_000):
+            study = pathlib.Path(scratch, f'{runs}.toml')
+            study.write_text(f'''[settings]
+experiment.start_speed_rad_s = 155
+experiment.end_speed_m_s = 15.0
+[design]
+kind = "random"
+points = {runs}
+[factors]
+plant.theta_N = {{ from = 15, to = 30 }}
+''')
+            command = ['abs_hil', 'study', str(study), '--out', f'{scratch}/{runs}', '--threads', '1']
+            silent = [(os.POSIX_SPAWN_OPEN, stream, '/dev/null', os.O_WRONLY, 0) for stream in (1, 2)]
+            pid = os.posix_spawn(BIN / 'abs_hil', command, os.environ, file_actions=silent)
+            _, status, usage = os.wait4(pid, 0)
+            if status:
+                sys.exit(f'the study of {runs} runs ended with status {status}')
+            rows.append([f'{runs:,}', f'{usage.ru_maxrss / 1024:.0f} MB'])
+    return rows
 
 
 def lanes():
     """The section on runs in lanes of packs."""
-    found = bench('bench_lanes')
-    rows = []
-    for name in sorted(found, key=lambda name: name.split('/')[0], reverse=True):
-        plant, controller, which = name.split('/')
-        if which != 'none':
-            continue
-        rates = {s: found[f'{plant}/{controller}/{s}'] for s in SETS if f'{plant}/{controller}/{s}' in found}
-        alone = rates['none'][1]['runs_per_s']
-        shown = [f'{rate[1]["runs_per_s"]:,.0f} ({rate[1]["runs_per_s"] / alone:.1f} ×)' if (rate := rates.get(s)) else '–'
-                 for s in SETS[1:]]
-        rows.append([f'`{controller}`', f'`{plant}`', f'{alone:,.0f}', *shown, f'{100 * rates["portable"][1]["in_lanes"]:.1f} %'])
+    found = bench('bench_lanes', LANES_REPETITIONS)
+    names = [name.removesuffix('/none') for name in found if name.endswith('/none')]
+    names.sort(key=lambda name: (' on ' in name, not name.startswith('paper'), name))
     return f'''{LANES}
 
-Braking runs a second on one core, by CPU time, medians of {REPETITIONS}: from 170 rad/s to 0.3 m/s at 1 kHz, with the
-real actuator and encoders, on plants varied as `abs_hil compare` does, set-up included. In parentheses: against the scalar
-path. The last column is the share of the runs that stayed in lanes; the scalar path computed the others again.
+Braking runs a second of CPU time, medians of {LANES_REPETITIONS} interleaved repetitions: from 170 rad/s to 0.3 m/s at
+1 kHz, with the real actuator and encoders, on plants varied as `abs_hil compare` does, set-up included. In parentheses:
+against the scalar path. The last column is the share of the runs that stayed in lanes; the scalar path computed the others
+again. On patches, the friction is halved in every second stretch of 2 m.
 
 {machine()}
 
-{table(['controller', 'plant', 'scalar', 'portable (2 lanes)', 'AVX2', 'AVX-512', 'in lanes'], rows)}
+{table(['controller', 'plant', 'scalar', 'portable (2 lanes)', 'AVX2', 'AVX-512', 'in lanes'],
+       [lane_row(found, name) for name in names])}
+
+The limit is the bare plant: (1)-(7) with both wheels turning, without controller, encoders, checks, figures and standstill,
+2 s from 170 rad/s under a constant duty in 4,000 steps of RK4. A run of the table above takes more steps than that, and does
+all the rest. One core, in the same minutes:
+
+{table(['the bare plant', 'runs a second'], bare_rows(found))}
+
+What a study needs does not grow with its runs:
+
+{table(['short runs of a study', 'memory at most'], memory_rows())}
 '''
 
 
@@ -223,7 +289,7 @@ def main():
     parser.add_argument('--output', type=pathlib.Path, default=ROOT / 'docs' / 'performance.md')
     parser.add_argument('--lanes', action='store_true', help='renew the section on many runs alone')
     arguments = parser.parse_args()
-    if not (BIN / 'bench_integration').exists():
+    if not (BIN / ('bench_lanes' if arguments.lanes else 'bench_integration')).exists():
         sys.exit('performance.py: no benchmarks; build them with scripts/build.sh release')
     before = arguments.output.read_text() if arguments.output.exists() else ''
     if arguments.lanes:

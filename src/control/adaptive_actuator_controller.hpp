@@ -33,14 +33,7 @@ class AdaptiveActuatorLaw {
   void take_over(const AdaptiveActuatorLaw& before) noexcept;
 
  private:
-  /// d phi / d slip of (10).
-  [[nodiscard]] S force_slope(const S& slip) const noexcept {
-    const S stretched = tyre_.B * slip;
-    return tyre_.B * tyre_.C * rig::cosine(S(tyre_.C * rig::arctangent(stretched))) / (1.0 + stretched * stretched);
-  }
   [[nodiscard]] S gain(const S& slip) const noexcept { return laws_.k({.lambda_ref = slip}); }
-  template <class Condition>
-  [[nodiscard]] BasicSlipInput<S> observed(const BasicSlipInput<S>& input, const Condition& lags) const noexcept;
   template <class Condition>
   void adapt(const BasicSlipInput<S>& input, const S& past_phi, const Condition& lags) noexcept;
   [[nodiscard]] S zeta_rate_N_s(const S& slip_ref, const S& phi, const S& BtP_x) const noexcept;
@@ -78,24 +71,11 @@ void AdaptiveActuatorLaw<S>::reset(const BasicSlipInput<S>& input) noexcept {
 }
 
 template <class S>
-template <class Condition>
-BasicSlipInput<S> AdaptiveActuatorLaw<S>::observed(const BasicSlipInput<S>& input,
-                                                   const Condition& lags) const noexcept {
-  BasicSlipInput<S> result = input;
-  const rig::BasicWheelSpeeds<S> speeds = wheels_observer_.speeds();
-  const S slip = rig::wheel_slip(S(laws_.r1 * speeds.omega1_rad_s), S(laws_.r2 * speeds.omega2_rad_s), v_min_m_s_);
-  result.speeds.omega1_rad_s = rig::select(lags, speeds.omega1_rad_s, input.speeds.omega1_rad_s);
-  result.speeds.omega2_rad_s = rig::select(lags, speeds.omega2_rad_s, input.speeds.omega2_rad_s);
-  result.slip = rig::select(lags, slip, input.slip);
-  return result;
-}
-
-template <class S>
 BasicSlipOutput<S> AdaptiveActuatorLaw<S>::step(const BasicSlipInput<S>& raw) noexcept {
   const auto lags = rig::is_finite(raw.max_brake_torque_Nm);
   limited_ = rig::select(lags && raw.unsent_torque_Nm != 0.0, S(1.0), S(0.0));
   if (rig::any(lags)) wheels_observer_.update(raw);
-  const BasicSlipInput<S> input = observed(raw, lags);
+  const BasicSlipInput<S> input = with_speeds(raw, lags, wheels_observer_.speeds(), laws_, v_min_m_s_);
   const S error_m_s = slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref);
   integral_.advance(input, error_m_s, input.slip_ref, laws_.r2 * input.speeds.omega2_rad_s);
   const S past_phi = rig::normalised_tyre_force(tyre_, S(0.5 * (slip_ + input.slip)));
@@ -145,7 +125,8 @@ S AdaptiveActuatorLaw<S>::wanted_rate_m_s3(const BasicSlipInput<S>& input, const
       wheel_motion(laws_, input.speeds, input.slip, input.slip_ref,
                    {.tyre_force_N = theta_.theta_N() * phi, .brake_torque_Nm = input.brake_torque_Nm}, v_min_m_s_);
   return paper::Laws<S>::nu(gains_, error_m_s, motion.error_rate_m_s2) + k * phi * zeta_rate +
-         k * theta_.theta_N() * force_slope(input.slip) * motion.slip_rate_per_s + motion.drift_rate_m_s3;
+         k * theta_.theta_N() * rig::normalised_tyre_force_slope(tyre_, input.slip) * motion.slip_rate_per_s +
+         motion.drift_rate_m_s3;
 }
 
 /// Effect on it of each newton of phi (theta - theta_hat), which the model does not know: the factor a of the header.
@@ -160,7 +141,7 @@ S AdaptiveActuatorLaw<S>::wanted_rate_per_theta(const BasicSlipInput<S>& input) 
   const S lower = w.r2 / w.J2;
   const S drift_rate = -upper * upper * w.d1 - (1.0 - input.slip_ref) * lower * lower * w.d2;
   return gains_.ks1 * k + k * phi * gains_.gamma * gains_.ka1 +
-         k * theta_.theta_N() * force_slope(input.slip) * slip_rate + drift_rate;
+         k * theta_.theta_N() * rig::normalised_tyre_force_slope(tyre_, input.slip) * slip_rate + drift_rate;
 }
 
 template <class S>

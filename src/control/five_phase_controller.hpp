@@ -1,13 +1,16 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
-#include "abs_hil/control/controller_context.hpp"
-#include "abs_hil/control/slip_controller.hpp"
+#include "abs_hil/control/slip_error_dynamics.hpp"
+#include "control/full_torque.hpp"
+#include "control/law_controller.hpp"
+#include "control/standing_wheel.hpp"
 
 namespace abs_hil::control {
 
-/// State of the cycle of FivePhaseController.
+/// State of the cycle of FivePhaseLaw.
 enum class BrakePhase : std::uint8_t {
   apply,    ///< first application: the torque rises fast
   hold,     ///< the wheel decelerates more than a car can: the torque is held
@@ -23,30 +26,112 @@ enum class BrakePhase : std::uint8_t {
 /// after hold_limit_s without a transition. A standing wheel counts as one that decelerates without bound, because
 /// nothing else distinguishes a locked wheel from a free one here. The controller reads alpha1, omega1 and the torque's
 /// limit only. It reports the slip velocity error for the record. theta_est_N is NaN.
-class FivePhaseController final : public SlipController {
+template <class S>
+class FivePhaseLaw {
  public:
+  static constexpr bool estimates_theta = false;
+
+  FivePhaseLaw() = default;
   /// Throws std::invalid_argument if thresholds are out of order or a ramp or limit is not > 0.
-  explicit FivePhaseController(const ControllerContext& context);
+  explicit FivePhaseLaw(const ControllerContext& context)
+    requires std::is_same_v<S, double>;
 
-  void reset(const SlipInput& input) noexcept override;
-  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
-  [[nodiscard]] bool take_over(const SlipController& before) noexcept override;
+  void reset(const BasicSlipInput<S>& /*input*/) noexcept {
+    phase_ = number(BrakePhase::apply);
+    in_phase_s_ = at_zero_s_ = accelerated_ = torque_Nm_ = S(0.0);
+  }
+  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept;
+  void take_over(const FivePhaseLaw& before) noexcept {
+    phase_ = before.phase_;
+    in_phase_s_ = before.in_phase_s_;
+    at_zero_s_ = before.at_zero_s_;
+    accelerated_ = before.accelerated_;
+    torque_Nm_ = before.torque_Nm_;
+  }
 
-  [[nodiscard]] BrakePhase phase() const noexcept { return phase_; }
+  [[nodiscard]] S phase() const noexcept { return phase_; }
 
  private:
-  [[nodiscard]] BrakePhase next_phase(double acceleration_m_s2) const noexcept;
-  [[nodiscard]] double ramp_Nm_s() const noexcept;
+  static S number(BrakePhase phase) noexcept { return S(static_cast<double>(phase)); }
+  [[nodiscard]] auto in(BrakePhase phase) const noexcept { return phase_ == number(phase); }
+  /// @param a_m_s2  acceleration of the wheel
+  [[nodiscard]] S next_phase(const S& a_m_s2) const noexcept;
+  [[nodiscard]] S ramp_Nm_s() const noexcept;
 
-  rig::WheelParameters wheels_;
-  rig::BrakeParameters brake_;
-  FivePhaseOptions options_;
-  double period_s_;
-  BrakePhase phase_{BrakePhase::apply};
-  double in_phase_s_{0.0};
-  double at_zero_s_{0.0};    ///< since the torque reached 0 in `release`
-  bool accelerated_{false};  ///< in `recover`: the acceleration has been above reapply_below
-  double torque_Nm_{0.0};
+  paper::Laws<S> laws_{};
+  rig::BasicBrake<S> brake_{};
+  // FivePhaseOptions.
+  S hold_below_m_s2_{0.0};
+  S release_below_m_s2_{0.0};
+  S recover_above_m_s2_{0.0};
+  S reapply_below_m_s2_{0.0};
+  S hold_limit_s_{0.0};
+  S recover_limit_s_{0.0};
+  S apply_Nm_s_{0.0};
+  S release_Nm_s_{0.0};
+  S reapply_Nm_s_{0.0};
+  S period_s_{0.0};
+  S phase_{0.0};  ///< the number of a BrakePhase
+  S in_phase_s_{0.0};
+  S at_zero_s_{0.0};    ///< since the torque reached 0 in `release`
+  S accelerated_{0.0};  ///< 1 in `recover` once the acceleration has been above reapply_below, else 0
+  S torque_Nm_{0.0};
+};
+
+template <class S>
+S FivePhaseLaw<S>::next_phase(const S& a_m_s2) const noexcept {
+  using enum BrakePhase;
+  const auto unstable = a_m_s2 < hold_below_m_s2_;
+  const auto held_long = in_phase_s_ >= hold_limit_s_;
+  const auto recovered = (accelerated_ > 0.0 && a_m_s2 < reapply_below_m_s2_) || in_phase_s_ >= recover_limit_s_;
+  const auto turned = a_m_s2 > recover_above_m_s2_ || at_zero_s_ >= recover_limit_s_;
+
+  const S from_apply = rig::select(unstable, number(hold), phase_);
+  const S from_hold = rig::select(a_m_s2 < release_below_m_s2_, number(release),
+                                  rig::select(!unstable || held_long, number(reapply), phase_));
+  const S from_release = rig::select(turned, number(recover), phase_);
+  const S from_recover = rig::select(unstable, number(hold), rig::select(recovered, number(reapply), phase_));
+  return rig::select(in(hold), from_hold,
+                     rig::select(in(release), from_release, rig::select(in(recover), from_recover, from_apply)));
+}
+
+template <class S>
+S FivePhaseLaw<S>::ramp_Nm_s() const noexcept {
+  using enum BrakePhase;
+  return rig::select(in(apply), apply_Nm_s_,
+                     rig::select(in(release), S(-release_Nm_s_), rig::select(in(reapply), reapply_Nm_s_, S(0.0))));
+}
+
+template <class S>
+BasicSlipOutput<S> FivePhaseLaw<S>::step(const BasicSlipInput<S>& input) noexcept {
+  const S unbounded_m_s2 = S(-std::numeric_limits<double>::infinity());
+  const S acceleration_m_s2 =
+      rig::select(turns(input.speeds.omega1_rad_s), S(laws_.r1 * input.alpha1_rad_s2), unbounded_m_s2);
+  const auto accelerates = acceleration_m_s2 > reapply_below_m_s2_;
+  in_phase_s_ += input.dt_s;
+  at_zero_s_ = rig::select(torque_Nm_ > 0.0, S(0.0), S(at_zero_s_ + input.dt_s));
+  accelerated_ = rig::select(accelerates, S(1.0), accelerated_);
+
+  const S next = next_phase(acceleration_m_s2);
+  const auto changes = next != phase_;
+  phase_ = next;
+  in_phase_s_ = rig::select(changes, S(0.0), in_phase_s_);
+  accelerated_ = rig::select(changes, rig::select(accelerates, S(1.0), S(0.0)), accelerated_);
+  // A ramp goes on from what was sent, not from what a limit held back.
+  torque_Nm_ = rig::select(input.unsent_torque_Nm != 0.0, input.sent_brake_torque_Nm, torque_Nm_);
+  // The torque is held for the next period, so it gets the ramp's value at the period's end.
+  const S step_s = rig::select(input.dt_s > 0.0, input.dt_s, period_s_);
+  torque_Nm_ =
+      rig::clamped(S(torque_Nm_ + ramp_Nm_s() * step_s), S(0.0), full_torque_Nm(brake_, input.max_brake_torque_Nm));
+  return {.brake_torque_Nm = torque_Nm_,
+          .slip_velocity_error_m_s = slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref),
+          .theta_est_N = rig::unknown};
+}
+
+class FivePhaseController final : public LawController<FivePhaseLaw> {
+ public:
+  using LawController::LawController;
+  [[nodiscard]] BrakePhase phase() const noexcept { return static_cast<BrakePhase>(law_.phase()); }
 };
 
 }  // namespace abs_hil::control

@@ -1,40 +1,103 @@
 #pragma once
 
+#include "control/law_controller.hpp"
 #include "control/sliding_surface.hpp"
+#include "control/smooth_sliding_mode_controller.hpp"
 #include "control/wheel_force_observer.hpp"
 #include "control/wheel_motion.hpp"
 
 namespace abs_hil::control {
 
-/// SmoothSlidingModeController stepped back through the brake's lag (6), as AdaptiveActuatorController does with (17):
-/// alpha is the torque of the sliding-mode law, and eta = (r1/J1)(Tb - alpha) is the error that the lag leaves, in
-/// m/s^2. The static torque reference is
+/// SmoothSlidingModeLaw stepped back through the brake's lag (6), as AdaptiveActuatorLaw does with (17): alpha is the
+/// torque of the sliding-mode law, and eta = (r1/J1)(Tb - alpha) is the error that the lag leaves, in m/s^2. The static
+/// torque reference is
 ///   b = Tb + (1/c31) ( alpha' - (J1/r1) lag_gain eta ),
 /// with alpha' from the model at theta_hat, so eta' = -lag_gain eta and e_v' = -K sat(e_v/width) + eta - k phi
 /// theta_err. The speeds are those of a force observer, which the brake torque is fed to. With an ideal actuator (no
-/// limit, no lag) the output equals that of SmoothSlidingModeController with the same gains, bit for bit
+/// limit, no lag) the output equals that of SmoothSlidingModeLaw with the same gains, bit for bit
 /// (docs/theory-baselines.md).
-class SlidingModeActuatorController final : public SlipController {
+template <class S>
+class SlidingModeActuatorLaw {
  public:
-  /// Throws std::invalid_argument for options out of range.
-  explicit SlidingModeActuatorController(const ControllerContext& context);
+  static constexpr bool estimates_theta = true;
 
-  void reset(const SlipInput& input) noexcept override;
-  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
-  [[nodiscard]] bool take_over(const SlipController& before) noexcept override;
+  SlidingModeActuatorLaw() = default;
+  /// Throws std::invalid_argument for options out of range.
+  explicit SlidingModeActuatorLaw(const ControllerContext& context)
+    requires std::is_same_v<S, double>;
+
+  void reset(const BasicSlipInput<S>& input) noexcept {
+    surface_.reset(input);
+    wheels_observer_.reset(input.speeds);
+  }
+  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& raw) noexcept;
+  void take_over(const SlidingModeActuatorLaw& before) noexcept {
+    surface_.take_over(before.surface_);
+    wheels_observer_.take_over(before.wheels_observer_);
+  }
 
  private:
-  [[nodiscard]] SlipInput observed(const SlipInput& input) const noexcept;
-  [[nodiscard]] double reference_rate_m_s3(const SlipInput& input, double error_m_s, double theta_N,
-                                           double switching) const noexcept;
+  [[nodiscard]] S through_lag(const BasicSlipInput<S>& input, const BasicSlipOutput<S>& wanted,
+                              const S& switching) const noexcept;
+  [[nodiscard]] S reference_rate_m_s3(const BasicSlipInput<S>& input, const S& error_m_s, const S& theta_N,
+                                      const S& switching) const noexcept;
 
-  rig::WheelParameters wheels_;
-  rig::TyreParameters tyre_;
-  SlidingModeActuatorOptions options_;
-  BrakeLag lag_;
-  BasicSlidingSurface<double> surface_;
-  WheelForceObserver wheels_observer_;
-  double v_min_m_s_;
+  paper::Laws<S> laws_{};
+  rig::TyreShape<S> tyre_{};
+  BasicBrakeLag<S> lag_{};
+  BasicSlidingSurface<S> surface_{};
+  BasicWheelForceObserver<S> wheels_observer_{};
+  S gain_m_s2_{0.0};
+  S width_m_s_{0.0};
+  S lag_decay_per_s_{0.0};  ///< mean rate of eta / eta over the period: -lag_gain for h -> 0
+  S gamma_{0.0};
+  S v_min_m_s_{0.0};
+};
+
+template <class S>
+BasicSlipOutput<S> SlidingModeActuatorLaw<S>::step(const BasicSlipInput<S>& raw) noexcept {
+  const auto lags = rig::is_finite(raw.max_brake_torque_Nm);
+  if (rig::any(lags)) wheels_observer_.update(raw);
+  const BasicSlipInput<S> input = with_speeds(raw, lags, wheels_observer_.speeds(), laws_, v_min_m_s_);
+  const S error_m_s = surface_.observe(input);
+  const BasicWantedMotion<S> wanted = boundary_layer_reference(error_m_s, gain_m_s2_, width_m_s_, surface_.period_s());
+  const S switching = -wanted.mean_rate_m_s2 / gain_m_s2_;
+  BasicSlipOutput<S> output = surface_.drive(input, error_m_s, wanted, switching);
+  if (rig::any(lags))
+    output.brake_torque_Nm = rig::select(lags, through_lag(input, output, switching), output.brake_torque_Nm);
+  return output;
+}
+
+template <class S>
+S SlidingModeActuatorLaw<S>::through_lag(const BasicSlipInput<S>& input, const BasicSlipOutput<S>& wanted,
+                                         const S& switching) const noexcept {
+  const S arm = laws_.J1 / laws_.r1;
+  const S eta = (input.brake_torque_Nm - wanted.brake_torque_Nm) / arm;
+  const S rate = reference_rate_m_s3(input, wanted.slip_velocity_error_m_s, wanted.theta_est_N, switching) +
+                 lag_decay_per_s_ * eta;
+  return lag_.command_Nm(input.brake_torque_Nm, S(surface_.period_s() * arm * rate));
+}
+
+/// (r1/J1) alpha' by the model at theta_hat.
+template <class S>
+S SlidingModeActuatorLaw<S>::reference_rate_m_s3(const BasicSlipInput<S>& input, const S& error_m_s, const S& theta_N,
+                                                 const S& switching) const noexcept {
+  const S phi = rig::normalised_tyre_force(tyre_, input.slip);
+  const S k = laws_.k({.lambda_ref = input.slip_ref});
+  const WheelMotion<S> motion =
+      wheel_motion(laws_, input.speeds, input.slip, input.slip_ref,
+                   {.tyre_force_N = theta_N * phi, .brake_torque_Nm = input.brake_torque_Nm}, v_min_m_s_);
+  const auto inside = rig::magnitude(error_m_s) < width_m_s_;
+  const S wanted_rate = rig::select(inside, S(-gain_m_s2_ / width_m_s_ * motion.error_rate_m_s2), S(0.0));
+  const S theta_rate_N_s = -gamma_ * k * phi * switching;
+  return wanted_rate + k * phi * theta_rate_N_s +
+         k * theta_N * rig::normalised_tyre_force_slope(tyre_, input.slip) * motion.slip_rate_per_s +
+         motion.drift_rate_m_s3;
+}
+
+class SlidingModeActuatorController final : public LawController<SlidingModeActuatorLaw> {
+ public:
+  using LawController::LawController;
 };
 
 }  // namespace abs_hil::control

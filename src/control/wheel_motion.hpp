@@ -3,8 +3,9 @@
 #include <type_traits>
 
 #include "abs_hil/control/paper_laws.hpp"
-#include "abs_hil/rig/measurement.hpp"
+#include "abs_hil/control/slip_controller.hpp"
 #include "abs_hil/rig/scalar.hpp"
+#include "abs_hil/rig/tyre_curve.hpp"
 
 namespace abs_hil::control {
 
@@ -44,6 +45,19 @@ template <class S>
   motion.drift_rate_m_s3 = -w.r1 / w.J1 * w.d1 * motion.omega1_rate_rad_s2 +
                            (1.0 - slip_ref) * w.r2 / w.J2 * w.d2 * motion.omega2_rate_rad_s2;
   return motion;
+}
+
+/// The input with other speeds, and their slip, `where` the condition holds. Real-time safe.
+template <class S, class Condition>
+[[nodiscard]] BasicSlipInput<S> with_speeds(const BasicSlipInput<S>& input, const Condition& where,
+                                            const rig::BasicWheelSpeeds<S>& speeds, const paper::Laws<S>& w,
+                                            const S& v_min_m_s) noexcept {
+  BasicSlipInput<S> result = input;
+  const S slip = rig::wheel_slip(S(w.r1 * speeds.omega1_rad_s), S(w.r2 * speeds.omega2_rad_s), v_min_m_s);
+  result.speeds.omega1_rad_s = rig::select(where, speeds.omega1_rad_s, input.speeds.omega1_rad_s);
+  result.speeds.omega2_rad_s = rig::select(where, speeds.omega2_rad_s, input.speeds.omega2_rad_s);
+  result.slip = rig::select(where, slip, input.slip);
+  return result;
 }
 
 /// The brake's lag (6) for a torque that is held over a period.

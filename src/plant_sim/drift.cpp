@@ -47,6 +47,11 @@ void Drift::pass(double duration_s) noexcept {
   }
 }
 
+double Drift::steady_s() const noexcept {
+  return std::min(
+      {brake_torque_.steady_s(), motor_torque_.steady_s(), upper_bearing_.steady_s(), lower_bearing_.steady_s()});
+}
+
 DriftFactors Drift::after(double time_s) const noexcept {
   const auto factor = [time_s](const FactorProgress& profile) { return profile.present(0.0).after(time_s, 0.0); };
   return {factor(brake_torque_), factor(motor_torque_), factor(upper_bearing_), factor(lower_bearing_)};

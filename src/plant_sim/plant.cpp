@@ -16,16 +16,6 @@ const PlantOptions& checked(const PlantOptions& options) {
   return options;
 }
 
-StateVector vector_of(const PlantState& state) noexcept {
-  StateVector x{};
-  x[omega1] = state.omega1_rad_s;
-  x[omega2] = state.omega2_rad_s;
-  x[brake_torque] = state.brake_torque_Nm;
-  x[angle1] = state.angle1_rad;
-  x[angle2] = state.angle2_rad;
-  return x;
-}
-
 HeldTorques drifted(HeldTorques held, const DriftFactors& factors) noexcept {
   held.brake_target_Nm *= factors.brake_torque;
   held.motor_stall_Nm *= factors.motor_torque;
@@ -74,6 +64,23 @@ void Plant::reset(const PlantState& state) noexcept {
   let_bearings_drift(drift_.after(0.0));
 }
 
+PlantConditions Plant::conditions() const noexcept {
+  const bool drifts = drift_.any();
+  return {.friction = friction(),
+          .brake_torque = drifts ? drift_.after(0.0).brake_torque : 1.0,
+          .wheels = model_.wheels(),
+          .steady_s = std::min(profile_.steady_s(), drift_.steady_s()),
+          .steady_to_angle2_rad = profile_.steady_to_angle2_rad()};
+}
+
+void Plant::take_over(const PlantState& state, double cycle_s, std::int64_t cycles) noexcept {
+  state_ = state;
+  for (std::int64_t i = 0; i < cycles; ++i) {
+    profile_.pass(cycle_s);
+    if (drift_.any()) drift_.pass(cycle_s);
+  }
+}
+
 void Plant::let_bearings_drift(const DriftFactors& factors) noexcept {
   rig::WheelParameters wheels = options_.rig.wheels;
   wheels.M10_Nm *= factors.upper_bearing;
@@ -101,7 +108,7 @@ void Plant::advance(double duration_s, const PlantInput& input) noexcept {
   } else {
     go_on(held, duration_s);
   }
-  state_ = {x[angle1], x[angle2], x[omega1], x[omega2], x[brake_torque]};
+  state_ = state_of(x);
 }
 
 /// Each part uses the drifting factors at its middle.

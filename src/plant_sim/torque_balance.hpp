@@ -19,6 +19,19 @@ inline constexpr std::size_t brake_torque = 2;
 inline constexpr std::size_t angle1 = 3;
 inline constexpr std::size_t angle2 = 4;
 
+[[nodiscard]] inline StateVector vector_of(const PlantState& state) noexcept {
+  StateVector x{};
+  x[omega1] = state.omega1_rad_s;
+  x[omega2] = state.omega2_rad_s;
+  x[brake_torque] = state.brake_torque_Nm;
+  x[angle1] = state.angle1_rad;
+  x[angle2] = state.angle2_rad;
+  return x;
+}
+[[nodiscard]] inline PlantState state_of(const StateVector& x) noexcept {
+  return {x[angle1], x[angle2], x[omega1], x[omega2], x[brake_torque]};
+}
+
 /// Direction of sliding of each wheel in its bearing and brake: +1 forward, -1 backward, 0 held at standstill. It is
 /// fixed within a substep, so that the right-hand side is smooth there.
 struct Sliding {

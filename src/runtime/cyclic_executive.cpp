@@ -37,7 +37,7 @@ rig::OverrunCause longest_part(const rig::CycleTiming& timing, std::int64_t reco
 }  // namespace
 
 CyclicExecutive::CyclicExecutive(Clock& clock, driver::RigDriver& driver, CycleLogic& logic, CommandGate& gate,
-                                 RecordRing& ring, std::int64_t period_ns, const OverrunOptions& overruns)
+                                 RecordRing& ring, std::int64_t period_ns, const OverrunOptions& overruns, bool timed)
     : clock_(clock),
       driver_(driver),
       logic_(logic),
@@ -47,7 +47,7 @@ CyclicExecutive::CyclicExecutive(Clock& clock, driver::RigDriver& driver, CycleL
       startup_cycles_(count_of(overruns.startup_cycles)),
       max_consecutive_(count_of(overruns.max_consecutive)),
       gap_max_ns_(longest_gap_ns(overruns.cycle_gap_max_s, period_ns)),
-      statistics_(std::make_unique<CycleStatistics>()) {}
+      statistics_(timed ? std::make_unique<CycleStatistics>() : nullptr) {}
 
 void CyclicExecutive::request_stop(rig::Reason reason) noexcept {
   rig::Reason none = rig::Reason::none;
@@ -161,8 +161,10 @@ void CyclicExecutive::note_wheels_apart(bool apart) noexcept {
 }
 
 void CyclicExecutive::keep(const rig::CycleRecord& record) noexcept {
-  statistics_->count_cycle();
-  if (!starting_up()) statistics_->add(record.timing);
+  if (statistics_ != nullptr) {
+    statistics_->count_cycle();
+    if (!starting_up()) statistics_->add(record.timing);
+  }
   ring_.push(record);
   if (heartbeat_ != nullptr) heartbeat_->keep(record);
 }
@@ -174,7 +176,7 @@ void CyclicExecutive::schedule_next(const rig::CycleTiming& timing) noexcept {
   overrun_cause_ = rig::OverrunCause::none;
   tick_ns_ += period_ns_;
   if (now_ns < tick_ns_) {
-    statistics_->count_cycle_in_time();
+    if (statistics_ != nullptr) statistics_->count_cycle_in_time();
     return;
   }
   const std::int64_t missed = (now_ns - tick_ns_) / period_ns_ + 1;
@@ -185,6 +187,7 @@ void CyclicExecutive::schedule_next(const rig::CycleTiming& timing) noexcept {
 void CyclicExecutive::count_late(const rig::CycleTiming& timing, std::int64_t ticks_missed) noexcept {
   periods_skipped_ = static_cast<std::uint32_t>(ticks_missed);
   overrun_cause_ = longest_part(timing, record_ns_);
+  if (statistics_ == nullptr) return;
   if (starting_up()) {
     statistics_->count_startup_overrun();
     return;

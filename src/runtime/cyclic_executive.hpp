@@ -43,8 +43,9 @@ class CyclicExecutive {
  public:
   /// @param driver active; the executive leaves it active, and its caller must deactivate it
   /// @param period_ns > 0
+  /// @param timed  false: keeps no statistics; for a virtual clock, on which every duration is 0 and no cycle is late
   CyclicExecutive(Clock& clock, driver::RigDriver& driver, CycleLogic& logic, CommandGate& gate, RecordRing& ring,
-                  std::int64_t period_ns, const OverrunOptions& overruns = {});
+                  std::int64_t period_ns, const OverrunOptions& overruns = {}, bool timed = true);
 
   /// Sets the time of the first tick; otherwise it is the moment of the first step. Call it before the first step.
   void start_at(std::int64_t first_tick_ns) noexcept { first_tick_ns_ = first_tick_ns; }
@@ -56,7 +57,7 @@ class CyclicExecutive {
   /// Ends the run in order at the next cycle. Any thread or signal handler may call it. The first reason stays.
   void request_stop(rig::Reason reason) noexcept;
 
-  /// Timing statistics; other threads may read them during the run.
+  /// Timing statistics; other threads may read them during the run. Only of an executive that keeps them.
   [[nodiscard]] const CycleStatistics& statistics() const noexcept { return *statistics_; }
   /// The driver's first error, for the report; later errors follow from it.
   [[nodiscard]] const driver::IoResult& io_error() const noexcept { return io_error_; }
@@ -95,7 +96,7 @@ class CyclicExecutive {
   std::atomic<rig::Reason> stop_request_{rig::Reason::none};
   rig::Measurement measurement_{};
   driver::IoResult io_error_{};
-  std::unique_ptr<CycleStatistics> statistics_;  ///< too large for a stack
+  std::unique_ptr<CycleStatistics> statistics_;  ///< too large for a stack; null: not timed
 };
 
 }  // namespace abs_hil::runtime

@@ -19,9 +19,16 @@ namespace {
 /// Runs that are computed together: enough to keep lanes full, few enough for the processor's cache.
 constexpr std::size_t most_together = 768;
 
-Outcome outcome_of(const Job& job) {
+/// What the runs with the same settings share, each made when the first run needs it.
+struct SharedBySettings {
+  std::unique_ptr<lanes::LaneSettings> lanes{};
+  std::unique_ptr<PreparedSettings> prepared{};
+};
+
+Outcome outcome_of(const Job& job, SharedBySettings& shared) {
   try {
-    return {.run = simulate(*job.settings, job.plant, job.seed)};
+    if (!shared.prepared) shared.prepared = std::make_unique<PreparedSettings>(*job.settings);
+    return {.run = simulate(*shared.prepared, job.plant, job.seed)};
   } catch (const config::ConfigError& error) {
     return {.refusal = error.what()};
   } catch (const std::invalid_argument& error) {
@@ -38,16 +45,17 @@ class Part {
 
   void start(std::size_t index, Job job) {
     if (set_ != lanes::InstructionSet::none) {
-      auto& settings = settings_[job.settings];
+      auto& settings = shared_[job.settings].lanes;
       if (!settings) settings = std::make_unique<lanes::LaneSettings>(*job.settings);
-      std::vector<double> words;
-      if (const lanes::Kind* kind = settings->begin(job, words)) {
-        groups_[{kind, settings->window_cycles()}].push_back({index, std::move(job), std::move(words)});
+      lanes::Started run{.index = index, .job = std::move(job)};
+      if (const lanes::Kind* kind = settings->begin(run)) {
+        groups_[{kind, settings->window_cycles()}].push_back(std::move(run));
         return;
       }
+      job = std::move(run.job);
     }
     ++counts_.scalar;
-    take_(index, outcome_of(job));
+    take_(index, outcome_of(job, shared_[job.settings]));
   }
   void finish() {
     for (auto& [key, group] : groups_) {
@@ -56,7 +64,7 @@ class Part {
         Outcome outcome;
         const bool complete = lanes::result_of(*key.first, started.words.data(), outcome.run);
         ++(complete ? counts_.lanes : counts_.disturbed);
-        take_(started.index, complete ? outcome : outcome_of(started.job));
+        take_(started.index, complete ? outcome : outcome_of(started.job, shared_[started.job.settings]));
       }
     }
   }
@@ -65,7 +73,7 @@ class Part {
  private:
   lanes::InstructionSet set_;
   const Take& take_;
-  std::map<const config::Settings*, std::unique_ptr<lanes::LaneSettings>> settings_;
+  std::map<const config::Settings*, SharedBySettings> shared_;
   std::map<std::pair<const lanes::Kind*, std::uint32_t>, std::vector<lanes::Started>> groups_;
   BatchCounts counts_{};
 };

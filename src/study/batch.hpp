@@ -36,8 +36,8 @@ struct BatchCounts {
 /// @param job_of  gives job number `index`; called from several threads
 /// @param take  takes the outcome of job number `index`; called from several threads. An exception of either ends the
 ///   batch and leaves it.
-/// Runs that brake from a start speed on a steady road are computed side by side in the lanes of vectors, with the bits
-/// of `simulate`: ABS_HIL_LANES=none, portable, avx2 or avx512 chooses the vectors, otherwise the computer does. Throws
+/// Runs that brake from a start speed are computed side by side in the lanes of vectors, with the bits of `simulate`:
+/// ABS_HIL_LANES=none, portable, avx2 or avx512 chooses the vectors, otherwise the computer does. Throws
 /// std::invalid_argument for a choice that the computer has not.
 BatchCounts run_batch(std::size_t count, std::size_t threads, const std::function<Job(std::size_t index)>& job_of,
                       const std::function<void(std::size_t index, Outcome outcome)>& take);

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <utility>
 
-#include "config/plan.hpp"
 #include "driver/sim/sim_driver.hpp"
 #include "experiment/run_logic.hpp"
 #include "runtime/clock.hpp"
@@ -21,21 +20,24 @@ constexpr std::size_t ring_capacity = 2;
 
 }  // namespace
 
-RunResult simulate(const config::Settings& settings, const plant_sim::PlantOptions& plant, std::uint64_t seed) {
+PreparedSettings::PreparedSettings(const config::Settings& s)
+    : settings(s), plan(config::plan(s)), to_stop(config::means_to_stop(plan, s.experiment.end_speed_m_s)) {}
+
+RunResult simulate(const PreparedSettings& prepared, const plant_sim::PlantOptions& plant, std::uint64_t seed) {
+  const config::Settings& settings = prepared.settings;
   runtime::VirtualClock clock;
   driver::SimDriver driver(plant, {.seed = seed,
                                    .start_speed_rad_s = settings.experiment.start_speed_rad_s,
                                    .pwm_mode = driver::pwm_mode_named(settings.driver.sim.pwm_mode)});
-  config::Plan plan = config::plan(settings);
-  const bool to_stop = config::means_to_stop(plan, settings.experiment.end_speed_m_s);
   experiment::RunLogicParts parts =
       experiment::make_logic_parts(settings.control, settings.model, settings.plant.ideal_actuator, settings.gate,
-                                   settings.experiment, std::move(plan.phases), plan.limits);
+                                   settings.experiment, prepared.plan.phases, prepared.plan.limits);
   parts.duty_steps = driver::simulated_output_grid(settings.driver, plant.ideal_actuator).duty_steps;
   experiment::RunLogic logic(std::move(parts));
   runtime::CommandGate gate = logic.make_gate(settings.gate);
   runtime::RecordRing ring(ring_capacity);
-  runtime::CyclicExecutive executive(clock, driver, logic, gate, ring, std::llround(1e9 / settings.control.rate_Hz));
+  runtime::CyclicExecutive executive(clock, driver, logic, gate, ring, std::llround(1e9 / settings.control.rate_Hz), {},
+                                     false);
   analysis::RunMetrics metrics(plant.rig.wheels.r2_m, settings.experiment.end_speed_m_s);
   runtime::RecordPump pump(ring, plant.rig.wheels.r2_m, {&metrics});
 
@@ -48,7 +50,8 @@ RunResult simulate(const config::Settings& settings, const plant_sim::PlantOptio
   }
   // The last cycle of a complete sequence has a reason that is not a fault; an early end has a limit or fault.
   rig::Reason end = logic.end_reason();
-  if (end == rig::Reason::sequence_complete && to_stop && metrics.moves_on()) end = rig::Reason::braking_without_stop;
+  if (end == rig::Reason::sequence_complete && prepared.to_stop && metrics.moves_on())
+    end = rig::Reason::braking_without_stop;
   return {.metrics = metrics.metrics(), .fault = rig::is_fault(end) ? end : rig::Reason::none};
 }
 

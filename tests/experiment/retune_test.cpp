@@ -138,8 +138,8 @@ TEST_CASE("a law that cannot take over a state reports that, and a controller of
   const Adjustment other = bench.retuned([](auto& o) { o.controller = "pi"; });
   const Adjustment own = bench.retuned([](auto&) {});
   CHECK_FALSE(other.controller->take_over(*own.controller));
-  const Adjustment locked = bench.retuned([](auto& o) { o.controller = "locked"; });
-  CHECK_FALSE(locked.controller->take_over(*locked.controller));
+  const Adjustment seeking = bench.retuned([](auto& o) { o.controller = "adaptive-peak"; });
+  CHECK_FALSE(seeking.controller->take_over(*seeking.controller));
 }
 
 TEST_CASE("a changed slip reference is followed, and theta keeps its value") {

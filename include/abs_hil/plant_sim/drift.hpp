@@ -30,6 +30,8 @@ class Drift {
   [[nodiscard]] double part_s(double left_s, double max_step_s) const noexcept;
   /// Advances the time by at most one part.
   void pass(double duration_s) noexcept;
+  /// How long all factors stay as they are, as FactorProgress::steady_s.
+  [[nodiscard]] double steady_s() const noexcept;
   /// The factors `time_s` from now, within a part.
   [[nodiscard]] DriftFactors after(double time_s) const noexcept;
 

@@ -20,6 +20,8 @@ struct PresentFactor {
   [[nodiscard]] double after(double time_s, double angle2) const noexcept {
     return value + per_s * time_s + per_rad * (angle2 - angle2_rad);
   }
+  /// True if the factor does not change on this piece.
+  [[nodiscard]] bool holds() const noexcept { return per_s == 0.0 && per_rad == 0.0; }
 };
 
 /// A plant's position in a profile. Passed pieces do not return, even if the lower wheel rolls back. Real-time safe
@@ -52,6 +54,15 @@ class FactorProgress {
   [[nodiscard]] double time_left_s() const noexcept {
     if (!changes_ || !counting_ || !along_time()) return std::numeric_limits<double>::infinity();
     return origin_time_s_ + piece().end - time_s_;
+  }
+  /// How long the factor stays as it is; 0 while it changes, and until the brake is applied if it counts from there.
+  [[nodiscard]] double steady_s() const noexcept {
+    if (!changes_) return std::numeric_limits<double>::infinity();
+    return counting_ && piece().slope == 0.0 ? time_left_s() : 0.0;
+  }
+  /// The lower wheel's angle up to which it stays so.
+  [[nodiscard]] double steady_to_angle2_rad() const noexcept {
+    return !changes_ || along_time() ? std::numeric_limits<double>::infinity() : end_angle2_rad();
   }
   /// True if the factor never changes.
   [[nodiscard]] bool steady() const noexcept { return !changes_; }

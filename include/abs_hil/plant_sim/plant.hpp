@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
 #include "abs_hil/plant_sim/drift.hpp"
@@ -29,6 +30,15 @@ struct PlantState {
   double brake_torque_Nm{0.0};
 };
 
+/// What road and drift make of the rig now, and for how long.
+struct PlantConditions {
+  double friction{1.0};              ///< value of the friction profile
+  double brake_torque{1.0};          ///< drift of the brake torque
+  rig::WheelParameters wheels{};     ///< with the drift of their bearings
+  double steady_s{0.0};              ///< how long all of it stays so; 0 while it changes, or until the brake is applied
+  double steady_to_angle2_rad{0.0};  ///< the lower wheel's angle up to which it stays so
+};
+
 /// The rig's mechanics (1)-(11) with the corrections of docs/theory.md: odd tyre force; set-valued Coulomb friction (a
 /// standing wheel stays at exactly 0 until the torques on it exceed its friction); brake lag and map; drive motor with
 /// back-EMF. It includes one of several tyre and load models, a road with changing friction, drifting parameters, and
@@ -46,6 +56,11 @@ class Plant {
   void reset(const PlantState& state) noexcept;
   /// Advances the plant by `duration_s` >= 0 under `input`.
   void advance(double duration_s, const PlantInput& input) noexcept;
+
+  [[nodiscard]] PlantConditions conditions() const noexcept;
+  /// Takes over a state that somebody else computed: `cycles` times `cycle_s` in which the conditions stayed as they
+  /// were.
+  void take_over(const PlantState& state, double cycle_s, std::int64_t cycles) noexcept;
 
   /// Lifts the upper wheel off the lower one, which takes the tyre force away, or lowers it again.
   void part_wheels(bool apart) noexcept { model_.part(apart); }

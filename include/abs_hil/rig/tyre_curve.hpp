@@ -27,9 +27,10 @@ template <class Tyre, class S>
 }
 
 /// d phi / d slip of (10). Real-time safe.
-[[nodiscard]] inline double normalised_tyre_force_slope(const TyreParameters& tyre, double slip) noexcept {
-  const double stretched = tyre.B * slip;
-  return tyre.B * tyre.C * std::cos(tyre.C * std::atan(stretched)) / (1.0 + stretched * stretched);
+template <class Tyre, class S>
+[[nodiscard]] inline S normalised_tyre_force_slope(const Tyre& tyre, const S& slip) noexcept {
+  const S stretched = tyre.B * slip;
+  return tyre.B * tyre.C * cosine(S(tyre.C * arctangent(stretched))) / (1.0 + stretched * stretched);
 }
 
 /// Slip at which phi reaches its peak of 1: tan(pi / 2C) / B. For C <= 1 phi has no interior peak, and the result is 1

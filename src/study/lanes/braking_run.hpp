@@ -20,13 +20,22 @@
 /// A run has nothing but scalars as members, so that run and lane have the same words (rig/pack.hpp).
 namespace abs_hil::study::lanes {
 
+/// What road and drift make of the rig, as long as it stays as it is: plant_sim::PlantConditions.
+template <class S>
+struct LaneConditions {
+  plant_sim::BasicWheels<S> wheels{};
+  S friction{1.0};
+  S brake_torque{1.0};
+  S steady_to_ns{std::numeric_limits<double>::infinity()};
+  S steady_to_angle2_rad{std::numeric_limits<double>::infinity()};
+};
+
 /// The rig: plant, encoders, and what the board makes of a duty.
 template <class S, class Tyre, class Load>
 struct LaneRig {
   Tyre tyre{};
   Load load{};
-  plant_sim::BasicWheels<S> wheels{};
-  S friction{1.0};
+  LaneConditions<S> now{};
   S max_step_s{0.0};
   rig::BasicBrake<S> brake{};
   plant_sim::BasicState<S> x{};
@@ -36,22 +45,23 @@ struct LaneRig {
   S lower_offset_rad{0.0};
   S duty_steps{0.0};
 
-  /// Advances by `duration_s` under a duty of the brake. True where a wheel stands or stops: the state is wrong there.
-  [[gnu::noinline, gnu::flatten]] auto advance(const S& duration_s, const S& duty) noexcept {
+  /// Advances by `duration_s`, to `time_ns`, under a duty of the brake. True where a wheel stands or stops, or road or
+  /// drift change: the state is wrong there.
+  [[gnu::noinline, gnu::flatten]] auto advance(const S& duration_s, const S& time_ns, const S& duty) noexcept {
     using namespace plant_sim;
-    const BrakeAlone<S> held{rig::brake_torque_at(brake, duty), brake.c31_per_s};
-    const RollingBalance<S, Tyre, Load, BrakeAlone<S>> balance{tyre, load, wheels, held, friction};
+    const BrakeAlone<S> held{rig::brake_torque_at(brake, duty) * now.brake_torque, brake.c31_per_s};
+    const RollingBalance<S, Tyre, Load, BrakeAlone<S>> balance{tyre, load, now.wheels, held, now.friction};
     steps = steps_for(duration_s, max_step_s, balance.fastest_rate_per_s(x));
     const S step_s = duration_s / steps;
-    auto stopped = !(x[omega1] > 0.0 && x[omega2] > 0.0);
+    auto wrong = !(x[omega1] > 0.0 && x[omega2] > 0.0) || time_ns > now.steady_to_ns;
     for (double made = 0.0;; made += 1.0) {
       const auto goes_on = S(made) < steps;
       if (!rig::any(goes_on)) break;
       const BasicState<S> end = runge_kutta_step(balance, x, step_s);
       for (std::size_t i = 0; i < x.size(); ++i) x[i] = rig::select(goes_on, end[i], x[i]);
-      stopped = stopped || !(x[omega1] > 0.0 && x[omega2] > 0.0);
+      wrong = wrong || !(x[omega1] > 0.0 && x[omega2] > 0.0);
     }
-    return stopped;
+    return wrong || x[angle2] > now.steady_to_angle2_rad;
   }
   [[nodiscard]] S counts(const S& angle_rad) const noexcept { return rig::round_down(S(angle_rad / rad_per_count)); }
   [[nodiscard]] S upper_counts() const noexcept { return counts(x[plant_sim::angle1] + upper_offset_rad); }
@@ -59,12 +69,12 @@ struct LaneRig {
   [[nodiscard]] S sent_duty(const S& duty) const noexcept {
     return rig::whole_part(S(duty * duty_steps + 0.5)) / duty_steps;
   }
-  [[nodiscard]] S v_x_m_s() const noexcept { return wheels.r2_m * x[plant_sim::omega2]; }
-  [[nodiscard]] S slip() const noexcept { return tyre.slip(S(wheels.r1_m * x[plant_sim::omega1]), v_x_m_s()); }
+  [[nodiscard]] S v_x_m_s() const noexcept { return now.wheels.r2_m * x[plant_sim::omega2]; }
+  [[nodiscard]] S slip() const noexcept { return tyre.slip(S(now.wheels.r1_m * x[plant_sim::omega1]), v_x_m_s()); }
   [[nodiscard]] S peak_force_N() const noexcept {
     const plant_sim::UpperWheelTorques<S, plant_sim::Forwards> torques{
-        {}, wheels.M10_Nm + x[plant_sim::brake_torque], wheels.d1_Nms_rad * x[plant_sim::omega1]};
-    return load.force_N(friction, torques);
+        {}, now.wheels.M10_Nm + x[plant_sim::brake_torque], now.wheels.d1_Nms_rad * x[plant_sim::omega1]};
+    return load.force_N(now.friction, torques);
   }
 };
 
@@ -184,13 +194,13 @@ struct BrakingRun {
   }
   /// Every later cycle.
   /// @param window_ends  the gate's speed window ends with it
-  /// @param assist  called as assist(where, before) if a wheel stands or stops: it has to set the plant's state there,
-  ///   from the state before the cycle
+  /// @param assist  called as assist(where, before) if a wheel stands or stops, or road or drift change: it has to set
+  ///   the plant's state and conditions there, from the state before the cycle
   template <class Assist>
   void cycle(bool window_ends, const Assist& assist) noexcept {
     time_ns += period_ns;
     const plant_sim::BasicState<S> before = rig.x;
-    if (const Condition stands = rig.advance(period_s, duty); rig::any(stands)) assist(stands, before);
+    if (const Condition wrong = rig.advance(period_s, time_ns, duty); rig::any(wrong)) assist(wrong, before);
     // With a lever the peak force depends on whether the brake holds the wheel.
     if constexpr (Load<S>::knows_sliding) disturb(!(rig.x[plant_sim::omega1] > 0.0));
     observe(window_ends);

@@ -78,18 +78,21 @@ class LaneEngine {
     }
     return true;
   }
-  /// Replaces the plant's state in these lanes.
+  /// Replaces the plant's state and conditions in these lanes.
   void assist(std::uint32_t lanes, const plant_sim::BasicState<S>& before) noexcept {
     for (std::uint32_t left = lanes; left != 0; left &= left - 1) {
       const auto lane = static_cast<std::uint32_t>(std::countr_zero(left));
+      AssistedCycle cycle{.run = runs_[lane]};
+      rig::take_lane<S>(packed_.time_ns, lane, &cycle.time_ns);
+      rig::take_lane<S>(packed_.period_s, lane, &cycle.duration_s);
+      rig::take_lane<S>(packed_.duty, lane, &cycle.duty);
       double state[5];
-      double duration_s = 0.0;
-      double duty = 0.0;
+      double conditions[sizeof(packed_.rig.now) / sizeof(S)];
       rig::take_lane<S>(before, lane, state);
-      rig::take_lane<S>(packed_.period_s, lane, &duration_s);
-      rig::take_lane<S>(packed_.duty, lane, &duty);
-      work_.assist(work_.context, runs_[lane], duration_s, duty, state);
+      rig::take_lane<S>(packed_.rig.now, lane, conditions);
+      work_.assist(work_.context, cycle, state, conditions);
       rig::put_lane<S>(packed_.rig.x, lane, state);
+      rig::put_lane<S>(packed_.rig.now, lane, conditions);
     }
   }
   void store(std::uint32_t lanes) noexcept {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
-#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -14,33 +13,25 @@
 #include "config/plan.hpp"
 #include "driver/factory.hpp"
 #include "driver/sim/sim_driver.hpp"
-#include "plant_sim/stepping.hpp"
 #include "plant_sim/torque_balance.hpp"
 #include "rig/encoder_scale.hpp"
-#include "runtime/plausibility_limits.hpp"
 #include "study/lanes/braking_run.hpp"
 #include "study/lanes/lane_kinds.hpp"
+#include "study/lanes/lane_parts.hpp"
 
 namespace abs_hil::study::lanes {
 
-/// The parts of a run that do not depend on its plant.
-struct LaneSettings::Parts {
-  const config::Settings& settings;
-  std::unique_ptr<control::SlipController> controller{};
-  LaneGate<double> gate{};
-  LaneSequence<double> sequence{};
-  control::SpeedTracker<double> tracker{};
-  control::BrakeActuator actuator{};
-  std::int64_t period_ns{0};
-  double period_s{0.0};
-  double duty_steps{0.0};
-  std::uint32_t window_cycles{1};
+/// A run's plant as it begins.
+struct StartingPlant {
+  plant_sim::TyreModel tyre;
+  double friction_at_most;
+  LaneConditions<double> conditions;
 };
 
 struct Kind {
   std::size_t words;
   /// Writes the words of the run and begins it. False if the kind does not fit.
-  bool (*begin)(const LaneSettings::Parts& parts, const Job& job, const plant_sim::TyreModel& tyres,
+  bool (*begin)(const LaneSettings::Parts& parts, const Job& job, const StartingPlant& plant,
                 std::vector<double>& words);
   bool (*result)(const double* words, RunResult& result);
   LaneKernel (*portable)();
@@ -49,9 +40,6 @@ struct Kind {
 };
 
 namespace {
-
-using experiment::BrakeAction;
-using experiment::EndKind;
 
 template <class Model>
 std::optional<Model> model_of(const auto& models) {
@@ -70,21 +58,20 @@ template <template <class> class Law, template <class> class Tyre, template <cla
 struct KindOf {
   using Run = BrakingRun<double, Law, Tyre, Load>;
 
-  static bool begin(const LaneSettings::Parts& parts, const Job& job, const plant_sim::TyreModel& tyres,
+  static bool begin(const LaneSettings::Parts& parts, const Job& job, const StartingPlant& plant,
                     std::vector<double>& words) {
     const auto* controller = dynamic_cast<const control::LawController<Law>*>(parts.controller.get());
     if (controller == nullptr) return false;
-    const auto tyre = model_of<Tyre<double>>(tyres);
+    const auto tyre = model_of<Tyre<double>>(plant.tyre);
     if (!tyre) return false;
-    constexpr double friction = 1.0;
-    const auto load = model_of<Load<double>>(plant_sim::make_load_model(job.plant, tyre->peak_mu(), friction));
+    const auto load =
+        model_of<Load<double>>(plant_sim::make_load_model(job.plant, tyre->peak_mu(), plant.friction_at_most));
     if (!load) return false;
     const rig::RigParameters& model = parts.settings.model;
     Run run;
     run.rig.tyre = *tyre;
     run.rig.load = *load;
-    run.rig.wheels = plant_sim::BasicWheels<double>(job.plant.rig.wheels);
-    run.rig.friction = friction;
+    run.rig.now = plant.conditions;
     run.rig.max_step_s = job.plant.max_step_s;
     run.rig.brake = rig::BasicBrake<double>(job.plant.rig.brake);
     run.rig.rad_per_count = rig::radians_per_count(job.plant.rig.encoder_counts_per_rev);
@@ -131,67 +118,30 @@ struct KindOf {
 constexpr const Kind* kinds[] = {ABS_HIL_LANE_KINDS(ABS_HIL_LANE_KIND)};
 #undef ABS_HIL_LANE_KIND
 
-/// The phases that lanes know: slip control until the car is slow, then at most a constant torque until standstill.
-bool plan_sequence(const config::Plan& plan, const config::Settings& settings, LaneSequence<double>& sequence) {
-  if (plan.phases.size() < 2 || plan.limits.distance_m < std::numeric_limits<double>::infinity()) return false;
-  const experiment::PhasePlan& brake = plan.phases[0];
-  const experiment::PhasePlan& hold = plan.phases[1];
-  const auto drives = [](const experiment::PhasePlan& phase) {
-    return phase.motor_duty > 0.0 || !phase.motor_profile.empty() || phase.wheels_apart || !phase.question.empty();
-  };
-  if (drives(brake) || drives(hold)) return false;
-  if (brake.phase != rig::Phase::brake || brake.brake != BrakeAction::slip_control || !brake.slip_ref_profile.empty())
-    return false;
-  if (hold.phase == rig::Phase::brake || !hold.brake_profile.empty() ||
-      (hold.brake != BrakeAction::torque && hold.brake != BrakeAction::released))
-    return false;
-  for (const experiment::EndCondition& end : brake.ends_on) {
-    if (end.kind != EndKind::car_speed_below) return false;
-    sequence.slow_m_s = std::max(sequence.slow_m_s, end.value);
-  }
-  for (const experiment::EndCondition& end : hold.ends_on) {
-    if (end.kind != EndKind::standstill) return false;
-  }
-  sequence.brake_limit_s = brake.time_limit_s;
-  sequence.hold_limit_s = hold.time_limit_s;
-  sequence.run_limit_s = plan.limits.run_time_s;
-  sequence.hold_torque_Nm = hold.brake == BrakeAction::torque ? hold.brake_torque_Nm : 0.0;
-  // The first cycle must not be slow: two slow ones in a row end slip control.
-  return settings.model.wheels.r2_m * settings.experiment.start_speed_rad_s > sequence.slow_m_s;
-}
-
-/// The checks of the gate; false if they would not judge often enough.
-bool plan_gate(LaneSettings::Parts& parts) {
-  const config::Settings& s = parts.settings;
-  const runtime::PlausibilityLimits limits = runtime::plausibility_limits(s.model, false, s.gate);
-  const runtime::SpeedWindows windows(limits);
-  const std::int64_t least_ns = std::max(runtime::least_speed_window_ns, windows.resolving_ns());
-  const std::int64_t cycles = (least_ns + parts.period_ns - 1) / parts.period_ns;
-  constexpr std::int64_t most_cycles = 64;
-  if (cycles > most_cycles || static_cast<double>(cycles * parts.period_ns) * rig::s_per_ns > s.gate.judge_within_s)
-    return false;
-  parts.window_cycles = static_cast<std::uint32_t>(cycles);
-  parts.gate.watch = runtime::WheelWatch<double>(limits);
-  parts.gate.momentum = runtime::MomentumWatch<double>(limits);
-  parts.gate.upper = {limits.upper_gain_rad_s2, limits.upper_loss_rad_s2, limits.overspeed_rad_s};
-  parts.gate.lower = {limits.lower_gain_rad_s2, limits.lower_loss_rad_s2, limits.overspeed_rad_s};
-  parts.gate.brake = rig::BasicBrake<double>(s.model.brake);
-  parts.gate.rad_per_count = limits.rad_per_count;
-  parts.gate.sure_counts = windows.sure_counts();
-  parts.gate.window_s = static_cast<double>(cycles * parts.period_ns) * rig::s_per_ns;
-  parts.gate.overspeed_rad_s = limits.overspeed_rad_s;
-  parts.gate.brake_duty_max = rig::duty_at_most(s.gate.brake_duty_max, static_cast<std::uint32_t>(parts.duty_steps));
-  parts.gate.brake_rate_per_s = s.gate.brake_rate_per_s;
-  parts.gate.brake_free_duty = s.model.brake.u0;
-  return true;
-}
-
 bool ideal(const plant_sim::PlantOptions& plant) { return plant.ideal_actuator || plant.ideal_sensors; }
 
-bool disturbed_road(const plant_sim::PlantOptions& plant) {
+bool changes(const plant_sim::PlantOptions& plant) {
   const plant_sim::DriftProfiles& drift = plant.drift;
   return !plant.friction_profile.empty() || !drift.brake_torque.empty() || !drift.motor_torque.empty() ||
          !drift.upper_bearing.empty() || !drift.lower_bearing.empty();
+}
+
+/// @param time_ns  of the conditions
+LaneConditions<double> lane_conditions(const plant_sim::PlantConditions& now, double time_ns) {
+  // Far above all rounding: the cycle in which something changes is assisted, and sometimes the one before.
+  constexpr double early_ns = 1000.0;
+  constexpr double early_rad = 1e-6;
+  return {.wheels = plant_sim::BasicWheels<double>(now.wheels),
+          .friction = now.friction,
+          .brake_torque = now.brake_torque,
+          .steady_to_ns = time_ns + now.steady_s * 1e9 - early_ns,
+          .steady_to_angle2_rad = now.steady_to_angle2_rad - early_rad};
+}
+
+std::unique_ptr<plant_sim::Plant> started_plant(const plant_sim::PlantOptions& options) {
+  auto plant = std::make_unique<plant_sim::Plant>(options);
+  plant->reset({});
+  return plant;
 }
 
 bool eccentric(const rig::RigParameters& rig) {
@@ -258,13 +208,20 @@ LaneSettings::~LaneSettings() = default;
 
 std::uint32_t LaneSettings::window_cycles() const noexcept { return parts_ ? parts_->window_cycles : 0; }
 
-const Kind* LaneSettings::begin(const Job& job, std::vector<double>& words) const {
-  if (!parts_ || ideal(job.plant) || disturbed_road(job.plant) || flawed(job.plant)) return nullptr;
+const Kind* LaneSettings::begin(Started& run) const {
+  const plant_sim::PlantOptions& plant = run.job.plant;
+  if (!parts_ || ideal(plant) || flawed(plant)) return nullptr;
   try {
-    plant_sim::check(job.plant);
-    const plant_sim::TyreModel tyres = plant_sim::make_tyre_model(job.plant);
+    plant_sim::check(plant);
+    StartingPlant starting{
+        plant_sim::make_tyre_model(plant), 1.0, {.wheels = plant_sim::BasicWheels<double>(plant.rig.wheels)}};
+    if (changes(plant)) {
+      run.plant = started_plant(plant);
+      starting.friction_at_most = plant_sim::FactorProfile(plant.friction_profile).highest();
+      starting.conditions = lane_conditions(run.plant->conditions(), 0.0);
+    }
     for (const Kind* kind : kinds) {
-      if (kind->begin(*parts_, job, tyres, words)) return kind;
+      if (kind->begin(*parts_, run.job, starting, run.words)) return kind;
     }
   } catch (const std::exception&) {
     // `simulate` says what is wrong.
@@ -274,37 +231,21 @@ const Kind* LaneSettings::begin(const Job& job, std::vector<double>& words) cons
 
 namespace {
 
-/// The plants of runs in which a wheel stands or stops, made when the first does.
-class StandingPlants {
- public:
-  explicit StandingPlants(std::span<const Started> runs) : runs_(runs), plants_(runs.size()) {}
-
-  static void assist(void* self, std::uint32_t run, double duration_s, double duty, double* state) {
-    static_cast<StandingPlants*>(self)->integrate(run, duration_s, duty, state);
-  }
-
- private:
-  struct Plant {
-    plant_sim::WheelModel model;
-    plant_sim::FactorProgress road;
-  };
-
-  void integrate(std::uint32_t run, double duration_s, double duty, double* state) {
-    const plant_sim::PlantOptions& options = runs_[run].job.plant;
-    if (!plants_[run]) {
-      const plant_sim::FactorProfile even(options.friction_profile);
-      plants_[run] = std::make_unique<Plant>(Plant{{options, even.highest()}, {even, options.rig.wheels.r2_m}});
-    }
-    plant_sim::StateVector x{};
-    std::copy_n(state, x.size(), x.begin());
-    const plant_sim::HeldTorques held = plant_sim::resolve(options, {.brake_duty = duty});
-    plant_sim::integrate(plants_[run]->model, options.max_step_s, held, duration_s, plants_[run]->road, x);
-    std::copy(x.begin(), x.end(), state);
-  }
-
-  std::span<const Started> runs_;
-  std::vector<std::unique_ptr<Plant>> plants_;
-};
+/// Integrates the plant over a cycle that lanes cannot compute.
+void assist(void* runs, const AssistedCycle& cycle, double* state, double* conditions) {
+  Started& run = static_cast<Started*>(runs)[cycle.run];
+  if (!run.plant) run.plant = started_plant(run.job.plant);
+  const auto cycles = std::llround(cycle.time_ns * rig::s_per_ns / cycle.duration_s);
+  plant_sim::StateVector x{};
+  std::copy_n(state, x.size(), x.begin());
+  run.plant->take_over(plant_sim::state_of(x), cycle.duration_s, cycles - 1 - run.plant_cycles);
+  run.plant->advance(cycle.duration_s, {.brake_duty = cycle.duty});
+  run.plant_cycles = cycles;
+  x = plant_sim::vector_of(run.plant->state());
+  std::copy(x.begin(), x.end(), state);
+  const LaneConditions<double> now = lane_conditions(run.plant->conditions(), cycle.time_ns);
+  std::memcpy(conditions, &now, sizeof(now));
+}
 
 }  // namespace
 
@@ -312,7 +253,6 @@ void go_on(const Kind& kind, InstructionSet set, std::span<Started> runs, std::u
   std::vector<double*> words;
   for (Started& run : runs) words.push_back(run.words.data());
   std::vector<std::uint32_t> next(runs.size());
-  StandingPlants standing(runs);
   const auto choose = set == InstructionSet::avx512 ? kind.avx512
                       : set == InstructionSet::avx2 ? kind.avx2
                                                     : kind.portable;
@@ -320,8 +260,8 @@ void go_on(const Kind& kind, InstructionSet set, std::span<Started> runs, std::u
             .next = next.data(),
             .count = static_cast<std::uint32_t>(runs.size()),
             .window_cycles = window_cycles,
-            .assist = &StandingPlants::assist,
-            .context = &standing});
+            .assist = &assist,
+            .context = runs.data()});
 }
 
 bool result_of(const Kind& kind, const double* words, RunResult& result) { return kind.result(words, result); }

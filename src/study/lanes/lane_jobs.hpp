@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "abs_hil/plant_sim/plant.hpp"
 #include "study/batch.hpp"
 #include "study/lanes/lane_kernels.hpp"
 
@@ -22,6 +23,16 @@ enum class InstructionSet : std::uint8_t { none, portable, avx2, avx512 };
 /// A combination of law, tyre and load with lanes.
 struct Kind;
 
+/// A run under way.
+struct Started {
+  std::size_t index;
+  Job job;
+  std::vector<double> words{};
+  /// For the cycles that lanes cannot compute. Null: not needed so far.
+  std::unique_ptr<plant_sim::Plant> plant{};
+  std::int64_t plant_cycles{0};  ///< that `plant` has passed
+};
+
 /// What all jobs with the same settings have in common, prepared once.
 class LaneSettings {
  public:
@@ -31,9 +42,9 @@ class LaneSettings {
   LaneSettings(const LaneSettings&) = delete;
   LaneSettings& operator=(const LaneSettings&) = delete;
 
-  /// Writes the words of a run that has begun. Null if the run is not for lanes: its controller, plant, road or
-  /// experiment, or options that `simulate` refuses.
-  [[nodiscard]] const Kind* begin(const Job& job, std::vector<double>& words) const;
+  /// Begins a run. Null if it is not for lanes: its controller, plant or experiment, or options that `simulate`
+  /// refuses.
+  [[nodiscard]] const Kind* begin(Started& run) const;
   /// Cycles of the gate's speed windows.
   [[nodiscard]] std::uint32_t window_cycles() const noexcept;
 
@@ -41,13 +52,6 @@ class LaneSettings {
 
  private:
   std::unique_ptr<Parts> parts_;  ///< null: not for lanes
-};
-
-/// A run under way.
-struct Started {
-  std::size_t index;
-  Job job;
-  std::vector<double> words;
 };
 
 /// Goes on with runs of one kind until each is complete or disturbed.

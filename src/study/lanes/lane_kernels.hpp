@@ -12,15 +12,24 @@ struct Avx512;
 /// The compiled loops over packs: one for each instruction set and each combination of law, tyre and load.
 namespace abs_hil::study::lanes {
 
+/// A cycle in which a wheel stands or stops, or road or drift change: what lanes cannot compute.
+struct AssistedCycle {
+  std::uint32_t run{0};
+  double time_ns{0.0};  ///< at its end, since the run began
+  double duration_s{0.0};
+  double duty{0.0};  ///< of the brake
+};
+
 /// Runs in memory: each has the words of a BrakingRun<double> that has begun.
 struct LaneWork {
   double* const* runs{nullptr};
   std::uint32_t* next{nullptr};  ///< room for `count` links
   std::uint32_t count{0};
   std::uint32_t window_cycles{1};  ///< cycles of the gate's speed windows
-  /// Integrates the plant of a run over a cycle in which a wheel stands or stops, which lanes cannot.
+  /// Integrates the plant of a run over such a cycle.
   /// @param state  of the plant, as plant_sim::StateVector
-  void (*assist)(void* context, std::uint32_t run, double duration_s, double duty, double* state){nullptr};
+  /// @param conditions  as LaneConditions<double>
+  void (*assist)(void* context, const AssistedCycle& cycle, double* state, double* conditions){nullptr};
   void* context{nullptr};
 };
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "abs_hil/control/registry.hpp"
+#include "abs_hil/control/slip_error_dynamics.hpp"
 #include "catch.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
@@ -51,6 +52,24 @@ bool same_bits(const RunResult& a, const RunResult& b) {
   return a.fault == b.fault;
 }
 
+/// A user's controller, written for `double` alone, as docs/writing-a-controller.md shows it.
+class OwnController final : public control::SlipController {
+ public:
+  explicit OwnController(const control::ControllerContext& context) : wheels_{context.rig.wheels} {}
+  void reset(const control::SlipInput& /*input*/) noexcept override {}
+  [[nodiscard]] control::SlipOutput step(const control::SlipInput& input) noexcept override {
+    return {.brake_torque_Nm = 2.0 + 10.0 * (input.slip_ref - input.slip),
+            .slip_velocity_error_m_s = control::slip_velocity_error_m_s(wheels_, input.speeds, input.slip_ref),
+            .theta_est_N = rig::unknown};
+  }
+
+ private:
+  rig::WheelParameters wheels_;
+};
+constexpr const char* own_name = "own-controller";
+const bool registered =
+    (control::register_controller(control::controller_entry<OwnController>(own_name, "of a user")), true);
+
 struct Case {
   config::Settings settings;
   Job job;
@@ -61,6 +80,40 @@ config::Settings settings_of(const std::string& plant) {
   config::KeyTable keys(settings);
   config::load_file(config::plant_file(plant), keys, config::Tables::of_plant);
   return settings;
+}
+
+/// A random profile: `axis`, a first value, and up to four jumps and ramps over 0 to `length`.
+std::string drawn_profile(std::mt19937_64& generator, const std::string& axis, double length) {
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  const auto value = [&] { return std::to_string(0.4 + 0.6 * uniform(generator)); };
+  std::string text = axis + ": " + value();
+  double at = 0.0;
+  for (auto changes = generator() % 5; changes > 0; --changes) {
+    at += 0.3 * length * uniform(generator) + 0.01;
+    const std::string begin = std::to_string(at);
+    if (uniform(generator) < 0.7) {
+      text += "; " + value() + " at " + begin;
+    } else {
+      at += 0.2 * length * uniform(generator) + 0.01;
+      text += "; " + value() + " from " + begin + " to " + std::to_string(at);
+    }
+  }
+  return text;
+}
+
+/// Roads and drifts of all kinds.
+void draw_conditions(std::mt19937_64& generator, plant_sim::PlantOptions& plant) {
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  const auto chance = [&](double p) { return uniform(generator) < p; };
+  if (chance(0.8)) {
+    const bool time = chance(0.5);
+    plant.friction_profile = drawn_profile(
+        generator, std::string(chance(0.5) ? "braking " : "") + (time ? "time" : "distance"), time ? 2.0 : 15.0);
+  }
+  for (std::string* drift :
+       {&plant.drift.brake_torque, &plant.drift.motor_torque, &plant.drift.upper_bearing, &plant.drift.lower_bearing}) {
+    if (chance(0.2)) *drift = drawn_profile(generator, chance(0.5) ? "braking time" : "time", 2.0);
+  }
 }
 
 /// Random settings of everything that `compare` and studies vary, and of much that they do not.
@@ -96,10 +149,7 @@ Case drawn_case(std::mt19937_64& generator, const std::vector<config::Settings>&
   const Variation wide{.wheels = 0.3, .brake = 0.2, .tyre = 0.2, .theta = 0.3, .radii = 0.02, .phase = true};
   c.job.plant = perturbed(s.plant, draw(chance(0.5) ? wide : Variation::standard(), generator(), 0));
   c.job.seed = generator();
-  if (chance(0.1))
-    c.job.plant.friction_profile =
-        chance(0.5) ? "braking time: 1; 0.6 at 0.3" : "distance: 1; 0.7 at 2; 0.9 from 3 to 5";
-  if (chance(0.05)) c.job.plant.drift.brake_torque = "time: 1; 0.9 from 0.2 to 0.5";
+  if (chance(0.3)) draw_conditions(generator, c.job.plant);
   if (chance(0.05)) c.job.plant.ideal_sensors = s.plant.ideal_sensors = true;
   if (chance(0.05)) c.job.plant.ideal_actuator = s.plant.ideal_actuator = true;
   if (chance(0.05)) c.job.plant.rig.brake.brake_rate_limit_Nm_s = 50.0 + 200.0 * uniform(generator);
@@ -164,6 +214,39 @@ TEST_CASE("every run of a batch has the bits of simulate, whatever runs beside i
       INFO(i << " " << cases[i].settings.control.controller);
       REQUIRE(outcomes[i].refusal == alone[i].refusal);
       REQUIRE(same_bits(outcomes[i].run, alone[i].run));
+    }
+  }
+}
+
+TEST_CASE("every law but a user's and the two that learn the tyre's curve has lanes, on every plant, road and drift") {
+  REQUIRE(registered);
+  std::mt19937_64 generator(23);
+  for (const control::ControllerEntry& entry : control::controllers()) {
+    const bool scalar = entry.name == "adaptive-peak" || entry.name == "adaptive-optimal" || entry.name == own_name;
+    for (const char* plant : {"paper-table1", "inteco-manual"}) {
+      Case c{settings_of(plant), {}};
+      c.settings.control.controller = entry.name;
+      c.settings.experiment.start_speed_rad_s = 150.0;
+      std::vector<Case> cases(20, c);
+      for (Case& one : cases) {
+        one.job.plant = one.settings.plant;
+        draw_conditions(generator, one.job.plant);
+        one.job.seed = generator();
+      }
+      BatchCounts none;
+      const std::vector<Outcome> alone = [&] {
+        const Lanes lanes("none");
+        return batch(cases, 2, none);
+      }();
+      BatchCounts counts;
+      const std::vector<Outcome> outcomes = batch(cases, 2, counts);
+      INFO(entry.name << " on " << plant << ": " << counts.lanes << " in lanes, " << counts.disturbed << " disturbed");
+      CHECK(counts.scalar == (scalar ? cases.size() : 0));
+      for (std::size_t i = 0; i < cases.size(); ++i) {
+        INFO(cases[i].job.plant.friction_profile);
+        REQUIRE(outcomes[i].refusal == alone[i].refusal);
+        REQUIRE(same_bits(outcomes[i].run, alone[i].run));
+      }
     }
   }
 }
