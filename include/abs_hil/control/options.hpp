@@ -72,6 +72,32 @@ struct SlidingModeActuatorOptions {
   ABS_HIL_GROUP(ForceObserverOptions, observer, "", {});
 };
 
+/// Slip controller that raises the slip while the tyre force still grows with it.
+struct BrakingStiffnessOptions {
+  ABS_HIL_OPTIONS(BrakingStiffnessOptions);
+  ABS_HIL_OPTION(double, memory_s, 0.06, .unit = "s", .meaning = "memory of the slope of force over slip",
+                 .range = rig::between(0.002, 10));
+  ABS_HIL_OPTION(double, slip_noise, 0.002, .meaning = "spread of the slip that tells nothing of the slope",
+                 .range = rig::between(1e-6, 0.1));
+  ABS_HIL_OPTION(double, target, 0.05, .meaning = "relative growth of force per relative growth of slip to stay at",
+                 .range = rig::between(-1, 1));
+  ABS_HIL_OPTION(double, rate_per_s, 8.0, .unit = "1/s", .meaning = "gain of the wanted slip's logarithm on it",
+                 .range = rig::positive(1000));
+  ABS_HIL_OPTION(double, slip_min, 0.01, .meaning = "least slip reference", .range = rig::open_between(0, 1));
+  ABS_HIL_OPTION(double, slip_max, 0.35, .meaning = "largest slip reference", .range = rig::open_between(0, 1));
+  ABS_HIL_OPTION(double, slip_start, 0.03, .meaning = "slip reference at the start of braking",
+                 .range = rig::open_between(0, 1));
+  ABS_HIL_OPTION(double, search_part, 0.1, .meaning = "amplitude of the search as a part of the reference",
+                 .range = rig::from_zero_below(1));
+  ABS_HIL_OPTION(double, search_rad_s, 40.0, .unit = "rad/s", .meaning = "frequency of the search",
+                 .range = rig::positive(1000));
+  ABS_HIL_OPTION(double, slip_gain_per_s, 30.0, .unit = "1/s", .meaning = "decay of the slip velocity error",
+                 .range = rig::positive(1e4));
+  ABS_HIL_OPTION(double, lag_gain_per_s, 60.0, .unit = "1/s",
+                 .meaning = "decay of the torque error that the brake's lag leaves", .range = rig::positive(1e4));
+  ABS_HIL_GROUP(ForceObserverOptions, observer, "", {.force_rate_N2_s = 360.0});
+};
+
 /// SlipPeakEstimator: initial values of the tyre curve, and how fast they may change.
 struct SlipPeakOptions {
   ABS_HIL_OPTIONS(SlipPeakOptions);
@@ -195,6 +221,10 @@ struct AdaptiveOptimalOptions {
                  .meaning = "how fast the error of the holding torque is learnt", .range = rig::positive(1e4));
   ABS_HIL_OPTION(double, peak_factor, 1.08, .meaning = "slip reference over the estimated slip of the peak",
                  .range = rig::between(0.5, 2));
+  ABS_HIL_OPTION(
+      double, runaway, 0.4,
+      .meaning = "runaway of the slip past the peak, per time constant of the brake, that undoes this factor",
+      .range = rig::positive(1e6));
   ABS_HIL_OPTION(double, slip_min, 0.015, .meaning = "least slip reference", .range = rig::open_between(0, 1));
   ABS_HIL_OPTION(double, slip_max, 0.35, .meaning = "largest slip reference", .range = rig::open_between(0, 1));
   ABS_HIL_OPTION(double, slip_start, 0.039, .meaning = "slip reference at the start of braking",
@@ -261,6 +291,8 @@ struct ControlOptions {
   ABS_HIL_GROUP(AdaptiveActuatorOptions, adaptive_actuator, "adaptive_actuator.", {});
   ABS_HIL_GROUP(AdaptivePeakOptions, adaptive_peak, "adaptive_peak.", {});
   ABS_HIL_GROUP(AdaptiveOptimalOptions, adaptive_optimal, "adaptive_optimal.", {});
+  ABS_HIL_GROUP(MixedSlipDecelerationOptions, mixed_slip_deceleration, "mixed_slip_deceleration.", {});
+  ABS_HIL_GROUP(BrakingStiffnessOptions, braking_stiffness, "braking_stiffness.", {});
   ABS_HIL_GROUP(SlidingModeActuatorOptions, sliding_mode_actuator, "sliding_mode_actuator.", {});
   ABS_HIL_GROUP(ForeignOptions, foreign, "foreign.", {});
 };
