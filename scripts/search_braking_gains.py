@@ -4,12 +4,12 @@
 Searches the keys of the laws that look for good slip by themselves, on config/training/braking.toml. The score is the mean
 over the runs of the distance over that of adaptive-peak, in per cent above 100, plus a tenth of the mean of the worst
 twentieth, plus one per cent for 100 N m of torque variation; a locked wheel or a fault costs 100. The search goes from the
-present defaults: it moves one key after the other up and down by a step and keeps what lessens the score by 0.01, until no
+present defaults: it moves one key after the other up and down by a step and keeps what lessens the score by 0.03, until no
 move does; then the same with a smaller step. All is deterministic, so the result does not depend on the computer.
 
 The result goes into config/training/gains.json with its score, and the program's defaults into options.hpp and
 baseline_options.hpp: build anew afterwards. --check compares the build's defaults with gains.json, computes the score again,
-and says whether a move of the smaller step would still lessen it by 0.01.
+and says whether a move of the smaller step would still lessen it by 0.03.
 """
 import argparse
 import csv
@@ -44,7 +44,7 @@ LAWS = {
 #: parts of a key's value by which it moves; keys with little room around them move less
 STEPS = (0.3, 0.1)
 LITTLE_ROOM = {'peak_factor': 0.1, 'slip0': 0.4}
-LEAST_GAIN = 0.01
+LEAST_GAIN = 0.03
 FAILED = 100.0
 VARIATION_PER_CENT_NM = 100.0
 

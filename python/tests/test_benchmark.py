@@ -60,6 +60,15 @@ def test_every_case_has_a_bound_that_the_plant_confirms():
     assert known[bounds.identity(few()[0])]['distance_m'] == pytest.approx(15.622, rel=1e-3)
 
 
+def test_the_shipped_gains_are_those_of_the_search():
+    """scripts/search_braking_gains.py --check also computes their scores again."""
+    stored = json.loads((pathlib.Path(__file__).parents[2] / 'config/training/gains.json').read_text(encoding='utf-8'))
+    defaults = abs_hil.keys()
+    for law, found in stored.items():
+        prefix = f'control.{law.replace("-", "_")}.'
+        assert found['gains'] == {key: defaults[prefix + key]['value'] for key in found['gains']}, law
+
+
 def test_a_longer_draw_begins_with_the_same_cases():
     assert cases.drawn(7, 5) == cases.drawn(7, 20)[:5]
     assert cases.drawn(7, 5) != cases.drawn(8, 5)

@@ -65,13 +65,13 @@ struct PiOptions {
 /// A sum of slip and wheel deceleration that a PI controller holds.
 struct MixedSlipDecelerationOptions {
   ABS_HIL_OPTIONS(MixedSlipDecelerationOptions);
-  ABS_HIL_OPTION(double, weight, 0.03, .meaning = "weight of the wheel's deceleration in g beside the slip",
+  ABS_HIL_OPTION(double, weight, 0.0137, .meaning = "weight of the wheel's deceleration in g beside the slip",
                  .range = rig::from_zero(10));
-  ABS_HIL_OPTION(double, target, 0.1, .meaning = "wanted sum of slip and weighted deceleration",
+  ABS_HIL_OPTION(double, target, 0.13, .meaning = "wanted sum of slip and weighted deceleration",
                  .range = rig::positive(10));
-  ABS_HIL_OPTION(double, kp_Nm, 60.0, .unit = "N m", .meaning = "proportional gain on that sum",
+  ABS_HIL_OPTION(double, kp_Nm, 78.0, .unit = "N m", .meaning = "proportional gain on that sum",
                  .range = rig::positive(1e4));
-  ABS_HIL_OPTION(double, ki_Nm_s, 400.0, .unit = "N m/s", .meaning = "integral gain on that sum",
+  ABS_HIL_OPTION(double, ki_Nm_s, 237.0, .unit = "N m/s", .meaning = "integral gain on that sum",
                  .range = rig::from_zero(1e6));
 };
 

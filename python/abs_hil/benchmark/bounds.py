@@ -39,7 +39,8 @@ def compute(case: Case) -> dict[str, float]:
 def found(cases: Iterable[Case], kept: pathlib.Path | None = None) -> dict[str, dict[str, float]]:
     """The bounds of all cases that have one: stored ones, those in the file `kept`, and others computed (needs casadi).
 
-    What is computed goes into `kept` at once, so that an interrupted computation goes on where it was. Raises ValueError for
+    A case for which the solver finds none has an empty one. What is computed goes into `kept` at once, so that an interrupted
+    computation goes on where it was. Raises ValueError for
     a file that holds something else.
     """
     known = stored()
@@ -59,11 +60,15 @@ def found(cases: Iterable[Case], kept: pathlib.Path | None = None) -> dict[str, 
         try:
             known[identity(case)] = own[identity(case)] = compute(case)
         except NoOptimum:
-            continue
+            known[identity(case)] = own[identity(case)] = {}
         if kept is not None:
-            text = json.dumps({'version': VERSION, 'bounds': own}, indent=1) + '\n'
-            write_whole(kept, lambda name, text=text: pathlib.Path(name).write_text(text, encoding='utf-8'))
+            _keep(kept, own)
     return known
+
+
+def _keep(target: pathlib.Path, own: dict[str, dict[str, float]]) -> None:
+    text = json.dumps({'version': VERSION, 'bounds': own}, indent=1) + '\n'
+    write_whole(target, lambda name: pathlib.Path(name).write_text(text, encoding='utf-8'))
 
 
 def missing(cases: Iterable[Case], known: dict[str, dict[str, float]]) -> list[Case]:

@@ -53,7 +53,7 @@ def _chosen(given: argparse.Namespace) -> tuple[list[cases.Case], dict[str, dict
         raise ValueError(f'--draw {given.draw} --count {given.count}: give a seed of at least 0 and 1 to 10000 cases')
     drawn = cases.drawn(given.draw, given.count)
     found = bounds.found(drawn, given.bounds)
-    without = [case for case in drawn if bounds.identity(case) not in found]
+    without = [case for case in drawn if not found[bounds.identity(case)]]
     for case in without:
         print(f'abs_hil benchmark: {case.key} is left out: no bound was found, the wheel locks there whatever the brake does '
               'or the solver failed', file=sys.stderr)
