@@ -154,7 +154,7 @@ def into_headers(law, keys):
             body = found[0]
             for key, value in keys.items():
                 number = repr(value)
-                body = re.sub(rf'(ABS_HIL_OPTION\(double, {key}, )[^,]+,', rf'\g<1>{number},', body)
+                body = re.sub(rf'(ABS_HIL_OPTION\(\s*double, {key}, )[^,]+,', rf'\g<1>{number},', body)
                 body = re.sub(rf'(\.{key} = )[^,}}]+', rf'\g<1>{number}', body)
             text = text.replace(found[0], body)
         path.write_text(text, encoding='utf-8')

@@ -279,7 +279,7 @@ void FrictionBank::summarise() noexcept {
   peak_slip_ = sum_of(slip) / sum_of(curvature);
   curvature_ = per * sum_of(curvature);
   slip_zero_ = per * sum_of(zero);
-  peak_force_N_ = per * sum_of(theta);
+  peak_force_N_ = std::clamp(per * sum_of(theta), theta_min_N, theta_max_N);  // a mean, but for rounding
   force_N_ = per * sum_of(force);
 }
 
