@@ -136,14 +136,13 @@ def test_drawn_cases_keep_their_bounds(tmp_path, capsys, monkeypatch):
 def test_the_page_as_html(tmp_path):
     pytest.importorskip('jinja2')
     target = tmp_path / 'page.html'
-    assert main(['--quick', '--controller', 'pi', '--controller', 'relay', '--set', 'control.pi.kp_per_s=30', '--page',
-                 str(target)]) == 0
+    assert main(['--quick', '--set', 'control.pi.kp_per_s=30', '--page', str(target)]) == 0
     page = target.read_text(encoding='utf-8')
     assert page.startswith('<!DOCTYPE html>') and 'id="group-mismatch"' in page and 'control.pi.kp_per_s = 30' in page
     plots = json.loads(page.partition('id="plots">')[2].partition('</script>')[0])
     assert [plot['id'] for plot in plots] == ['standing', 'shares']
     for plot in plots:
-        assert {trace.get('name') for trace in plot['data']} == {'pi', 'relay'}
+        assert {trace.get('name') for trace in plot['data']} == set(abs_hil.controllers())
 
 
 def test_program(tmp_path, capsys):

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..core import _core
-from ..report.model import Curve, Figure, Label, Panel, run_style
+from ..report.model import STYLES, Curve, Figure, Label, Panel, run_style
 from ..report.page import render, view
 from ..report.tables import Table
 from .page import HEADINGS, cells, ranked, title
 from .score import Result
 
 _FOLDER = pathlib.Path(__file__).parent
-_MARKERS = ('circle', 'square', 'diamond', 'cross', 'x', 'triangle-up', 'star')
+_MARKERS = ('circle', 'triangle', 'open circle')
 #: excess beyond this is drawn at the edge
 _MOST_EXCESS = 0.5
 
@@ -25,7 +25,7 @@ def _standing(results: Sequence[Result]) -> Figure:
         if not np.isnan(score.excess_mean):
             curves.append(Curve(0, name, run_style(number), np.array([max(score.variation_median_Nm, 1.0)]),
                                 np.array([max(100.0 * score.excess_mean, 0.1)]), drawn='markers',
-                                marker=_MARKERS[number // 7 % len(_MARKERS)], legend=name, group=name))
+                                marker=_MARKERS[number // STYLES % len(_MARKERS)], legend=name, group=name))
     label = Label.plain('torque variation in the median, N m')
     return Figure('standing', 'Distance and what it costs the brake', label,
                   [Panel(Label.plain('mean excess, %'), curves, height_px=360.0, log=True)],
