@@ -15,6 +15,7 @@ import abs_hil
 from abs_hil.benchmark import Entry, bounds, cases, run
 from abs_hil.benchmark.program import main
 from abs_hil.benchmark.score import coasting_speed_rad_s
+from abs_hil.report.page import Unavailable, plotly_js
 
 #: of everything that version 1 consists of
 SET_1 = '681f2ea0f89a944a'
@@ -135,6 +136,10 @@ def test_drawn_cases_keep_their_bounds(tmp_path, capsys, monkeypatch):
 
 def test_the_page_as_html(tmp_path):
     pytest.importorskip('jinja2')
+    try:
+        plotly_js()
+    except Unavailable as error:
+        pytest.skip(str(error))
     target = tmp_path / 'page.html'
     assert main(['--quick', '--set', 'control.pi.kp_per_s=30', '--page', str(target)]) == 0
     page = target.read_text(encoding='utf-8')
