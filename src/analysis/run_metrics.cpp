@@ -38,6 +38,7 @@ Metrics metrics_of(const BrakingFigures<double>& f) noexcept {
                  .theta_settling_s = f.theta_settling.since_s(),
                  .torque_total_variation_Nm = f.torque_total_variation_Nm,
                  .slip_overshoot = f.slip_overshoot,
+                 .slip_largest = f.slip_largest,
                  .time_locked_s = f.time_locked_s,
                  .theta_error_final = f.theta_error_final,
                  .theta_error_max_N = f.theta_error_max_N,

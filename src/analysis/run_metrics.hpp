@@ -28,6 +28,7 @@ struct Metrics {
   double theta_settling_s{rig::unknown};  ///< time after which it stays within 5 % of the truth while v_x > 3 m/s
   double torque_total_variation_Nm{rig::unknown};  ///< of the torque reference over phase brake: measures chatter
   double slip_overshoot{rig::unknown};             ///< largest slip - slip_ref while v_x > 3 m/s, >= 0
+  double slip_largest{rig::unknown};               ///< largest slip while v_x > 3 m/s
   double time_locked_s{rig::unknown};              ///< braking time with slip > 0.95 while v_x > 3 m/s
   double theta_error_final{rig::unknown};          ///< theta_final_N / true theta at that time - 1
   double theta_error_rms{rig::unknown};            ///< of estimate / truth - 1, over the samples of slip_rms
@@ -36,7 +37,7 @@ struct Metrics {
 };
 
 /// The metrics by their names in a run's summary.
-inline constexpr std::array<std::pair<std::string_view, double Metrics::*>, 15> metric_fields{{
+inline constexpr std::array<std::pair<std::string_view, double Metrics::*>, 16> metric_fields{{
     {"brake_start_s", &Metrics::brake_start_s},
     {"stop_time_s", &Metrics::stop_time_s},
     {"stop_distance_m", &Metrics::stop_distance_m},
@@ -44,6 +45,7 @@ inline constexpr std::array<std::pair<std::string_view, double Metrics::*>, 15> 
     {"slip_reached_s", &Metrics::slip_reached_s},
     {"slip_settling_s", &Metrics::slip_settling_s},
     {"slip_overshoot", &Metrics::slip_overshoot},
+    {"slip_largest", &Metrics::slip_largest},
     {"time_locked_s", &Metrics::time_locked_s},
     {"torque_total_variation_Nm", &Metrics::torque_total_variation_Nm},
     {"theta_final_N", &Metrics::theta_final_N},

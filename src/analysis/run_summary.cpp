@@ -88,6 +88,7 @@ nlohmann::ordered_json to_json(const RunSummary& s) {
                               {"theta_settling_s", number_or_null(m.theta_settling_s)},
                               {"torque_total_variation_Nm", number_or_null(m.torque_total_variation_Nm)},
                               {"slip_overshoot", number_or_null(m.slip_overshoot)},
+                              {"slip_largest", number_or_null(m.slip_largest)},
                               {"time_locked_s", number_or_null(m.time_locked_s)},
                               {"theta_error_final", number_or_null(m.theta_error_final)},
                               {"theta_error_rms", number_or_null(m.theta_error_rms)},

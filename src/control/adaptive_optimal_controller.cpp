@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
 
 #include "abs_hil/rig/option_check.hpp"
 #include "abs_hil/rig/scalar.hpp"
@@ -21,6 +22,8 @@ constexpr double usual_hold_Nm = 1.0;   ///< before a force is seen
 // The force at the peak is taken as known up to the first relative spread, as unknown from the second on.
 constexpr double known_spread = 0.15;
 constexpr double unknown_spread = 0.4;
+// The curve is learnt about this often, however short the cycles are: more readings of the same counts say no more.
+constexpr double learning_rate_Hz = 1000.0;
 
 const AdaptiveOptimalOptions& checked(const AdaptiveOptimalOptions& o) {
   rig::require_valid(o, "control.adaptive_optimal.");
@@ -55,7 +58,8 @@ AdaptiveOptimalController::AdaptiveOptimalController(const ControllerContext& co
       loop_{loop(options_, context.rig)},
       observer_{options_.observer, context.rig, context.options.rate_Hz},
       force_{context.rig.wheels, options_.bank.force_bandwidth_rad_s},
-      bank_{options_.bank, context.options.rate_Hz, observer_.force_delay_s()} {}
+      learns_every_{std::max(1, static_cast<int>(std::lround(context.options.rate_Hz / learning_rate_Hz)))},
+      bank_{options_.bank, context.options.rate_Hz / learns_every_, observer_.force_delay_s()} {}
 
 void AdaptiveOptimalController::reset(const SlipInput& input) noexcept {
   observer_.reset(input.speeds);
@@ -64,17 +68,21 @@ void AdaptiveOptimalController::reset(const SlipInput& input) noexcept {
   reference_ = options_.slip_start;
   model_error_Nm_ = sent_Nm_ = search_rad_ = 0.0;
   last_omega2_rad_s_ = input.speeds.omega2_rad_s;
+  unlearnt_ = {};
 }
 
 void AdaptiveOptimalController::learn(const SlipInput& input, double slip) noexcept {
   if (!(input.dt_s > 0.0)) return;
   const double omega2 = input.speeds.omega2_rad_s;
-  const double travel =
+  unlearnt_.travel_rad +=
       std::isnan(input.lower_travel_rad) ? 0.5 * (last_omega2_rad_s_ + omega2) * input.dt_s : input.lower_travel_rad;
+  unlearnt_.time_s += input.dt_s;
   last_omega2_rad_s_ = omega2;
+  if (++unlearnt_.cycles < learns_every_) return;
+  const Unlearnt step = std::exchange(unlearnt_, {});
   const double omega2_est = observer_.speeds().omega2_rad_s;
-  force_.update(input.dt_s, travel, omega2_est);
-  bank_.learn({.dt_s = input.dt_s,
+  force_.update(step.time_s, step.travel_rad, omega2_est);
+  bank_.learn({.dt_s = step.time_s,
                .slip = slip,
                .car_speed_m_s = rig_.wheels.r2_m * omega2_est,
                .force_N = force_.force_N(),
@@ -84,12 +92,25 @@ void AdaptiveOptimalController::learn(const SlipInput& input, double slip) noexc
   const paper::Reading<double> same{.omega1 = 0.0, .omega2 = 0.0, .lambda_ref = 0.0, .phi = 1.0};
   const double missing_Nm =
       laws_.T_b(laws_.k(same) * (observer_.force_N() - bank_.late_force_N())) - observer_.brake_error_Nm();
-  const double covered = -rig::exponential_less_one(-options_.model_error_per_s * input.dt_s);
+  const double covered = -rig::exponential_less_one(-options_.model_error_per_s * step.time_s);
   model_error_Nm_ += covered * (missing_Nm - model_error_Nm_);
 }
 
+/// A tenth past the peak the tyre force falls by theta * curvature * 0.1 peak over the slip, and the slip runs away at
+/// r1^2/J1 of that over v_x. If it runs away within the time that the brake takes to act, the reference must not be
+/// past the peak, whatever is expected of it.
+double AdaptiveOptimalController::peak_factor() const noexcept {
+  constexpr double past_the_peak = 0.1;
+  constexpr double least = 0.85;
+  const double v_x = std::max(rig_.wheels.r2_m * observer_.speeds().omega2_rad_s, v_min_m_s_);
+  const double falls_N = past_the_peak * bank_.peak_slip() * bank_.curvature() * bank_.peak_force_N();
+  const double runs_away_per_s = rig_.wheels.r1_m / loop_.mass_kg_m * falls_N / v_x;
+  const double runaway = runs_away_per_s / rig_.brake.c31_per_s;
+  return std::max(least, 1.0 + (options_.peak_factor - 1.0) * (1.0 - runaway / options_.runaway));
+}
+
 double AdaptiveOptimalController::next_reference(double dt_s) noexcept {
-  const double target = std::clamp(options_.peak_factor * bank_.peak_slip(), options_.slip_min, options_.slip_max);
+  const double target = std::clamp(peak_factor() * bank_.peak_slip(), options_.slip_min, options_.slip_max);
   const double most = rig::exponential(options_.slip_rate_per_s * dt_s);
   reference_ = std::clamp(target, reference_ / most, reference_ * most);
   search_rad_ += options_.search_rad_s * dt_s;

@@ -29,7 +29,15 @@ class AdaptiveOptimalController final : public SlipController {
     double here_Nm;
   };
 
+  /// Cycles since the bank last learnt.
+  struct Unlearnt {
+    int cycles{0};
+    double time_s{0.0};
+    double travel_rad{0.0};  ///< of the lower wheel
+  };
+
   void learn(const SlipInput& input, double slip) noexcept;
+  [[nodiscard]] double peak_factor() const noexcept;
   [[nodiscard]] double next_reference(double dt_s) noexcept;
   [[nodiscard]] double holding_torque_Nm(const rig::WheelSpeeds& speeds, double slip, double force_N) const noexcept;
   [[nodiscard]] Holding holding(double slip, double reference, double error_m_s) const noexcept;
@@ -46,12 +54,14 @@ class AdaptiveOptimalController final : public SlipController {
   ProximateTorque loop_;
   WheelForceObserver observer_;
   LowerWheelForce force_;
+  int learns_every_;  ///< cycles
   FrictionBank bank_;
   double reference_{0.0};       ///< slip of the peak, without search and zero
   double model_error_Nm_{0.0};  ///< of the holding torque: what is missing in it
   double sent_Nm_{0.0};
   double search_rad_{0.0};  ///< angle of the search, in [-pi, pi]
   double last_omega2_rad_s_{0.0};
+  Unlearnt unlearnt_;
 };
 
 }  // namespace abs_hil::control

@@ -5,7 +5,6 @@
 
 #include "abs_hil/rig/scalar.hpp"
 #include "abs_hil/rig/time_units.hpp"
-#include "rig/encoder_scale.hpp"
 
 namespace abs_hil::control {
 namespace {
@@ -32,30 +31,22 @@ constexpr double least_turns = 3.0;
 
 }  // namespace
 
-void EncoderDisc::reset(std::int32_t counts) noexcept {
-  place_ = within_turn(counts, counts_per_rev_);
-  error_counts_ = eccentric() ? error_counts(place_) : 0.0;
-}
-
-auto EncoderDisc::look(std::int32_t travel) const noexcept -> Reading {
-  const std::int64_t reached = static_cast<std::int64_t>(place_) + travel;
-  const bool same_turn = reached >= 0 && reached < counts_per_rev_;
-  const std::int32_t place = same_turn ? static_cast<std::int32_t>(reached) : within_turn(reached, counts_per_rev_);
-  if (!eccentric()) return {place, 0.0, static_cast<double>(travel)};
-  const double error = error_counts(place);
-  return {place, error, travel - (error - error_counts_)};
+double EncoderDisc::corrected(std::int32_t travel) noexcept {
+  const double before = error_counts_;
+  error_counts_ = error_counts();
+  return travel - (error_counts_ - before);
 }
 
 void EncoderDisc::know(const rig::EccentricityParameters& eccentricity) noexcept {
   eccentricity_ = eccentricity;
-  error_counts_ = eccentric() ? error_counts(place_) : 0.0;
+  error_counts_ = eccentric() ? error_counts() : 0.0;
 }
 
 /// The reading r is psi + e sin(psi), psi the disc's angle. Two steps of psi = r - e sin(psi) leave e^3.
-double EncoderDisc::error_counts(std::int32_t place) const noexcept {
+double EncoderDisc::error_counts() const noexcept {
   const double rad_per_count = rig::radians_per_count(counts_per_rev_);
   const double e = eccentricity_.eccentricity_rad;
-  const double read_rad = middle_rad(place, rad_per_count) + eccentricity_.phase_rad;
+  const double read_rad = middle_rad(within_turn(turned_, counts_per_rev_), rad_per_count) + eccentricity_.phase_rad;
   const double first_rad = e * sine_of(read_rad);
   return e * sine_of(read_rad - e * sine_of(read_rad - first_rad)) / rad_per_count;
 }

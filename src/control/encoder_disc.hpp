@@ -5,42 +5,45 @@
 #include <optional>
 
 #include "abs_hil/rig/parameters.hpp"
+#include "rig/encoder_scale.hpp"
 
 namespace abs_hil::control {
 
-/// A wheel's encoder disc as the model knows it: what its eccentricity adds to a reading. Real-time safe.
+/// A wheel's encoder disc as the model knows it. It turns readings into the counts by which the wheel itself has
+/// turned: those of the reading without what the disc's eccentricity adds to them. Real-time safe.
 class EncoderDisc {
  public:
   /// @param counts_per_rev  encoder counts per revolution, > 0
   EncoderDisc(const rig::EccentricityParameters& eccentricity, std::int32_t counts_per_rev) noexcept
       : eccentricity_{eccentricity}, counts_per_rev_{counts_per_rev} {}
 
-  [[nodiscard]] bool eccentric() const noexcept { return eccentricity_.eccentricity_rad > 0.0; }
   /// Starts from a reading.
-  void reset(std::int32_t counts) noexcept;
-  /// A later reading: its place within the turn, the error there, and the counts by which the wheel itself has turned.
-  struct Reading {
-    std::int32_t place{0};
-    double error_counts{0.0};
-    double own_travel{0.0};
-  };
-  /// The reading `travel` counts after the one that was taken last.
-  [[nodiscard]] Reading look(std::int32_t travel) const noexcept;
-  void take(const Reading& reading) noexcept {
-    place_ = reading.place;
-    error_counts_ = reading.error_counts;
+  void reset(std::int32_t counts) noexcept {
+    counts_ = counts;
+    turned_ = counts;
+    know(eccentricity_);
+  }
+  /// Takes the next reading. Returns the counts by which the wheel has turned since the last one. The counter may wrap
+  /// around.
+  double take(std::int32_t counts) noexcept {
+    const std::int32_t travel = rig::counts_between(counts_, counts);
+    counts_ = counts;
+    turned_ += travel;
+    return eccentric() ? corrected(travel) : static_cast<double>(travel);
   }
   /// Replaces what is known of the eccentricity. It counts from the next reading on.
   void know(const rig::EccentricityParameters& eccentricity) noexcept;
-  [[nodiscard]] const rig::EccentricityParameters& known() const noexcept { return eccentricity_; }
 
  private:
-  [[nodiscard]] double error_counts(std::int32_t place) const noexcept;
+  [[nodiscard]] bool eccentric() const noexcept { return eccentricity_.eccentricity_rad > 0.0; }
+  [[nodiscard]] double corrected(std::int32_t travel) noexcept;
+  [[nodiscard]] double error_counts() const noexcept;
 
   rig::EccentricityParameters eccentricity_;
   std::int32_t counts_per_rev_;
-  std::int32_t place_{0};  ///< of the latest reading within its turn, counts
-  double error_counts_{0.0};
+  std::int32_t counts_{0};    ///< the latest reading
+  std::int64_t turned_{0};    ///< the same without wrapping around
+  double error_counts_{0.0};  ///< of the latest reading
 };
 
 /// Fits a disc's eccentricity to the readings of a wheel that coasts: angle over time is a cubic, and the reading

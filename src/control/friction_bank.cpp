@@ -1,9 +1,11 @@
 #include "control/friction_bank.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+#include <type_traits>
 
 #include "abs_hil/rig/option_check.hpp"
 #include "abs_hil/rig/scalar.hpp"
@@ -35,7 +37,61 @@ constexpr double largest_rise = 1.15;
 // exp(-30) is as good as 0, and keeps the weights away from numbers that a double cannot hold.
 constexpr double log_likelihood_min = -30.0;
 
-constexpr double square(double x) noexcept { return x * x; }
+template <class S>
+[[gnu::always_inline]] inline S square(const S& x) noexcept {
+  return x * x;
+}
+
+template <class Row>
+[[gnu::always_inline]] inline Row within(const Row& x, const std::type_identity_t<Row>& least,
+                                         const std::type_identity_t<Row>& most) noexcept {
+  return rig::smaller(rig::larger(x, least), most);
+}
+
+template <class Row>
+[[gnu::always_inline]] inline Row horner(const auto& c, const Row& x) noexcept {
+  Row sum = c.back();
+  for (std::size_t i = c.size() - 1; i-- > 0;) sum = sum * x + c[i];
+  return sum;
+}
+
+/// e^x for x in [-30, 0], within 2 % of it, and within 1e-5 above -5: a likelihood need not be exact.
+template <class Row>
+[[gnu::always_inline]] inline Row likelihood(const Row& x) noexcept {
+  const Row t = x * (1.0 / 64.0);
+  Row e = 1.0 + t * (1.0 + t * (0.5 + t * (1.0 / 6.0 + t * (1.0 / 24.0))));
+  for (int i = 0; i < 6; ++i) e = e * e;
+  return e;
+}
+
+template <class Row>
+[[gnu::always_inline]] inline double sum_of(const Row& row) noexcept {
+  auto sum = row.v[0];
+  for (std::size_t i = 1; i < std::size(row.v); ++i) sum += row.v[i];
+  return sum[0] + sum[1];
+}
+
+template <class Row>
+void set_lane(Row& row, std::size_t lane, double value) noexcept {
+  row.v[lane / rig::Portable::lanes][lane % rig::Portable::lanes] = value;
+}
+
+/// Coefficients of the polynomial that meets `f` at the Chebyshev nodes of (0, 1).
+template <std::size_t N>
+std::array<double, N> fitted(auto f) {
+  Eigen::Matrix<double, N, N> powers;
+  Eigen::Matrix<double, N, 1> values;
+  for (std::size_t row = 0; row < N; ++row) {
+    const double u = 0.5 - 0.5 * std::cos(std::numbers::pi * (static_cast<double>(row) + 0.5) / N);
+    const auto at = static_cast<Eigen::Index>(row);
+    for (std::size_t n = 0; n < N; ++n) powers(at, static_cast<Eigen::Index>(n)) = std::pow(u, n);
+    values(at) = f(u);
+  }
+  const Eigen::Matrix<double, N, 1> solved = powers.fullPivLu().solve(values);
+  std::array<double, N> c{};
+  for (std::size_t n = 0; n < N; ++n) c[n] = solved(static_cast<Eigen::Index>(n));
+  return c;
+}
 
 }  // namespace
 
@@ -66,56 +122,58 @@ FrictionBank::FrictionBank(const FrictionBankOptions& options, double rate_Hz, d
   if (!(rate_Hz > 0.0 && quick_delay_s > 0.0)) {
     throw std::invalid_argument("the friction bank needs a control rate and a delay of the quick force > 0");
   }
-  std::array<double, shapes> curvatures{};  // -phi'' at the peak, slip in units of the peak's
+  double sum = 0.0;
   for (std::size_t k = 0; k < shapes; ++k) {
     const double c = least_shape + (largest_shape - least_shape) * static_cast<double>(k) / (shapes - 1);
     const double at_peak = std::tan(std::numbers::pi / (2.0 * c));
-    curvatures[k] = square(c * at_peak / (1.0 + square(at_peak)));
-    for (std::size_t i = 0; i < table_[k].size(); ++i) {
-      const double u = std::min(static_cast<double>(i) / table_steps, 1.0 - 1e-6);
-      table_[k][i] = std::sin(c * std::atan(at_peak * u / (1.0 - u)));
+    const double curvature = square(c * at_peak / (1.0 + square(at_peak)));  // slip in units of the peak's
+    Shape& shape = shapes_[k];
+    shape.value = fitted<terms>([c](double u) { return std::sin(c * std::atan(u / (1.0 - u))) / u; });
+    for (std::size_t i = 0; i < terms; ++i) shape.slope[i] = static_cast<double>(i + 1) * shape.value[i];
+    for (std::size_t j = 0; j < peaks; ++j) {
+      const double peak =
+          least_peak_slip * std::pow(largest_peak_slip / least_peak_slip, static_cast<double>(j) / (peaks - 1));
+      const double away = std::log(peak / options.slip0) / options.slip_spread;
+      const double prior = std::exp(-0.5 * square(away));
+      sum += prior;
+      Members& m = bank_[k * rows_a_shape + j / Row::lanes];
+      const std::size_t lane = j % Row::lanes;
+      set_lane(m.peak, lane, peak);
+      set_lane(m.knee, lane, peak / at_peak);
+      set_lane(m.bent, lane, curvature / square(peak));
+      set_lane(m.prior, lane, prior);
     }
   }
-  double sum = 0.0;
-  for (std::size_t j = 0; j < peaks; ++j) {
-    peak_slips_[j] =
-        least_peak_slip * std::pow(largest_peak_slip / least_peak_slip, static_cast<double>(j) / (peaks - 1));
-    const double away = std::log(peak_slips_[j] / options.slip0) / options.slip_spread;
-    for (std::size_t k = 0; k < shapes; ++k) {
-      sum += prior_[j * shapes + k] = std::exp(-0.5 * square(away));
-      bent_[j * shapes + k] = curvatures[k] / square(peak_slips_[j]);
-    }
-  }
-  for (double& p : prior_) p /= sum;
+  for (Members& m : bank_) m.prior = m.prior / Row(sum);
   reset();
 }
 
 void FrictionBank::reset() noexcept {
-  for (std::size_t i = 0; i < members; ++i) {
-    bank_[i] = {.theta_N = options_.level0_N,
-                .zero = 0.0,
-                .theta_variance = square(options_.level_spread_N),
-                .covariance = 0.0,
-                .zero_variance = square(options_.zero_spread),
-                .weight = prior_[i],
-                .phi = {}};
+  for (Members& m : bank_) {
+    m.theta_N = options_.level0_N;
+    m.zero = m.covariance = m.now = 0.0;
+    m.theta_variance = square(options_.level_spread_N);
+    m.zero_variance = square(options_.zero_spread);
+    m.weight = m.prior;
+    m.phi = {};
   }
   late_slip_ = {};
   time_s_ = hold_s_ = unexplained_s_ = late_force_N_ = 0.0;
   jumps_ = 0;
-  summarise({});
+  summarise();
 }
 
-FrictionBank::Point FrictionBank::curve(std::size_t index, double slip) const noexcept {
-  const double peak = peak_slips_[index / shapes];
-  const auto& table = table_[index % shapes];
-  const double size = std::abs(slip);
-  const double share = 1.0 / (peak + size);
-  const double place = size * share * table_steps;
-  const auto i = std::min(static_cast<std::size_t>(place), table_steps);
-  const double step = table[i + 1] - table[i];
-  const double value = table[i] + (place - static_cast<double>(i)) * step;
-  return {std::copysign(value, slip), step * table_steps * peak * share * share};
+auto FrictionBank::value(const Shape& shape, const Row& knee, const Row& slip) noexcept -> Row {
+  const Row size = rig::magnitude(slip);
+  const Row u = size / (knee + size);
+  return rig::with_sign(u * horner(shape.value, u), slip);
+}
+
+/// Over the slip.
+auto FrictionBank::slope(const Shape& shape, const Row& knee, const Row& slip) noexcept -> Row {
+  const Row size = rig::magnitude(slip);
+  const Row share = 1.0 / (knee + size);
+  return horner(shape.slope, size * share) * knee * share * share;
 }
 
 void FrictionBank::learn(const Data& data) noexcept {
@@ -126,51 +184,57 @@ void FrictionBank::learn(const Data& data) noexcept {
   const double slip_rate_per_s = (data.slip - late_slip) * options_.force_bandwidth_rad_s / 3.0;
   watch_for_jumps(data);
   const bool learns = !jumping();
-  const bool compares = learns && data.car_speed_m_s > learning_m_s;
   const double starting = time_s_ < options_.start_s ? 1e6 : 1.0;
-  const double noise_N2 =
-      starting * rate_Hz_ * (options_.force_noise_N2_s + error_lasts_s * square(options_.force_error * data.force_N));
   const double timing = options_.timing_error_s * slip_rate_per_s;
   const double speed = options_.slip_noise_m_s / std::max(data.car_speed_m_s, slip_speed_min_m_s);
-  const double slip_error2 = error_lasts_s * rate_Hz_ * (square(timing) + square(speed));
-  const double back = options_.share_per_s * data.dt_s;
-  std::array<double, members> now{};
-  for (std::size_t i = 0; i < members; ++i) {
-    Member& m = bank_[i];
-    const Point here = curve(i, data.slip + m.zero);
-    const double phi = m.phi(data.covered, here.value);
-    now[i] = here.value;
-    m.theta_variance += options_.level_drift_per_s * data.dt_s * square(m.theta_N);
-    m.zero_variance += options_.zero_drift_per_s * data.dt_s;
-    if (!learns) continue;
-    // The gradient of the force that the member expects, by theta and by the zero.
-    const double slope = curve(i, late_slip + m.zero).slope;
-    const double by_zero = m.theta_N * slope;
-    const double noise = noise_N2 + square(by_zero) * slip_error2;
-    const double reach_theta = m.theta_variance * phi + m.covariance * by_zero;
-    const double reach_zero = m.covariance * phi + m.zero_variance * by_zero;
-    const double variance = std::max(noise, reach_theta * phi + reach_zero * by_zero + noise);
-    const double residual = data.force_N - m.theta_N * phi;
-    const double per = 1.0 / variance;
-    if (compares) {
-      m.weight = (m.weight + back * prior_[i]) *
-                 rig::exponential(std::max(-0.5 * square(residual) * per, log_likelihood_min)) *
-                 std::sqrt(noise_N2 * per);
-    }
-    m.theta_N = std::clamp(m.theta_N + reach_theta * per * residual, theta_min_N, theta_max_N);
-    const double zero = std::clamp(m.zero + reach_zero * per * residual, -zero_max, zero_max);
-    // What is on its way through the filter was computed with the old zero.
-    m.phi.shift(slope * (zero - m.zero));
-    now[i] += here.slope * (zero - m.zero);
-    m.zero = zero;
-    // Rounding must not make the covariance indefinite.
-    m.theta_variance = std::max(theta_variance_min_N2, m.theta_variance - reach_theta * per * reach_theta);
-    m.zero_variance = std::max(zero_variance_min, m.zero_variance - reach_zero * per * reach_zero);
-    const double most = std::sqrt(m.theta_variance * m.zero_variance);
-    m.covariance = std::clamp(m.covariance - reach_theta * per * reach_zero, -most, most);
-  }
-  summarise(now);
+  const Look look{.slip = data.slip,
+                  .late_slip = late_slip,
+                  .covered = data.covered,
+                  .force_N = data.force_N,
+                  .noise_N2 = starting * rate_Hz_ *
+                              (options_.force_noise_N2_s + error_lasts_s * square(options_.force_error * data.force_N)),
+                  .slip_error2 = error_lasts_s * rate_Hz_ * (square(timing) + square(speed)),
+                  .theta_growth = options_.level_drift_per_s * data.dt_s,
+                  .zero_growth = options_.zero_drift_per_s * data.dt_s,
+                  .back = options_.share_per_s * data.dt_s,
+                  .learns = learns,
+                  .compares = learns && data.car_speed_m_s > learning_m_s};
+  for (std::size_t i = 0; i < rows; ++i) learn(shapes_[i / rows_a_shape], look, bank_[i]);
+  summarise();
   late_force_N_ += -rig::exponential_less_one(-data.dt_s / quick_delay_s_) * (force_N_ - late_force_N_);
+}
+
+void FrictionBank::learn(const Shape& shape, const Look& look, Members& m) noexcept {
+  m.now = value(shape, m.knee, look.slip + m.zero);
+  const Row phi = m.phi(look.covered, m.now);
+  m.theta_variance = m.theta_variance + look.theta_growth * square(m.theta_N);
+  m.zero_variance = m.zero_variance + look.zero_growth;
+  if (!look.learns) return;
+  // The gradient of the force that the member expects, by theta and by the zero.
+  const Row by_slip = slope(shape, m.knee, look.late_slip + m.zero);
+  const Row by_zero = m.theta_N * by_slip;
+  const Row noise = look.noise_N2 + square(by_zero) * look.slip_error2;
+  const Row reach_theta = m.theta_variance * phi + m.covariance * by_zero;
+  const Row reach_zero = m.covariance * phi + m.zero_variance * by_zero;
+  const Row per = 1.0 / rig::larger(noise, reach_theta * phi + reach_zero * by_zero + noise);
+  const Row residual = look.force_N - m.theta_N * phi;
+  const Row gain_theta = reach_theta * per, gain_zero = reach_zero * per;
+  if (look.compares) {
+    const Row log_likelihood = rig::larger(Row(log_likelihood_min), square(residual) * (-0.5 * per));
+    m.weight = (m.weight + look.back * m.prior) * likelihood(log_likelihood) * rig::square_root(look.noise_N2 * per);
+  }
+  m.theta_N = within(m.theta_N + gain_theta * residual, theta_min_N, theta_max_N);
+  const Row zero = within(m.zero + gain_zero * residual, -zero_max, zero_max);
+  // What is on its way through the filter was computed with the old zero.
+  const Row shift = by_slip * (zero - m.zero);
+  m.phi.shift(shift);
+  m.now = m.now + shift;
+  m.zero = zero;
+  // Rounding must not make the covariance indefinite.
+  m.theta_variance = rig::larger(Row(theta_variance_min_N2), m.theta_variance - gain_theta * reach_theta);
+  m.zero_variance = rig::larger(Row(zero_variance_min), m.zero_variance - gain_zero * reach_zero);
+  const Row most = rig::square_root(m.theta_variance * m.zero_variance);
+  m.covariance = within(m.covariance - gain_theta * reach_zero, -most, most);
 }
 
 void FrictionBank::watch_for_jumps(const Data& data) noexcept {
@@ -181,11 +245,11 @@ void FrictionBank::watch_for_jumps(const Data& data) noexcept {
     if (late_force_N_ > seen_N) {
       const double covered = -rig::exponential_less_one(-data.dt_s / options_.jump_time_constant_s);
       const double factor = std::clamp(1.0 + covered * residual / late_force_N_, largest_fall, largest_rise);
-      for (Member& m : bank_) m.theta_N = std::clamp(m.theta_N * factor, theta_min_N, theta_max_N);
+      for (Members& m : bank_) m.theta_N = within(m.theta_N * factor, theta_min_N, theta_max_N);
       late_force_N_ *= factor;
     }
     if (!jumping()) {
-      for (Member& m : bank_) m.theta_variance += square(options_.jump_spread * m.theta_N);
+      for (Members& m : bank_) m.theta_variance = m.theta_variance + square(options_.jump_spread * m.theta_N);
     }
   }
   const bool watches = time_s_ > options_.jump_after_s && data.car_speed_m_s > learning_m_s;
@@ -198,37 +262,38 @@ void FrictionBank::watch_for_jumps(const Data& data) noexcept {
   }
 }
 
-void FrictionBank::summarise(const std::array<double, members>& now) noexcept {
-  double sum = 0.0;
-  for (const Member& m : bank_) sum += m.weight;
-  const double per = 1.0 / sum;
-  double slip = 0.0, curvature = 0.0, zero = 0.0, theta = 0.0, force = 0.0;
-  for (std::size_t i = 0; i < members; ++i) {
-    Member& m = bank_[i];
-    m.weight *= per;
-    const double bent = m.weight * bent_[i];
-    slip += bent * peak_slips_[i / shapes];
-    curvature += bent;
-    zero += m.weight * m.zero;
-    theta += m.weight * m.theta_N;
-    force += m.weight * m.theta_N * now[i];
+void FrictionBank::summarise() noexcept {
+  Row weight(0.0), slip(0.0), curvature(0.0), zero(0.0), theta(0.0), force(0.0);
+  for (const Members& m : bank_) {
+    const Row bent = m.weight * m.bent;
+    const Row height = m.weight * m.theta_N;
+    weight = weight + m.weight;
+    slip = slip + bent * m.peak;
+    curvature = curvature + bent;
+    zero = zero + m.weight * m.zero;
+    theta = theta + height;
+    force = force + height * m.now;
   }
-  peak_slip_ = slip / curvature;
-  slip_zero_ = zero;
-  peak_force_N_ = theta;
-  force_N_ = force;
+  const double per = 1.0 / sum_of(weight);
+  for (Members& m : bank_) m.weight = m.weight * per;
+  peak_slip_ = sum_of(slip) / sum_of(curvature);
+  curvature_ = per * sum_of(curvature);
+  slip_zero_ = per * sum_of(zero);
+  peak_force_N_ = std::clamp(per * sum_of(theta), theta_min_N, theta_max_N);  // a mean, but for rounding
+  force_N_ = per * sum_of(force);
 }
 
 FrictionBank::Force FrictionBank::at(double slip) const noexcept {
-  double mean = 0.0, square_sum = 0.0;
-  for (std::size_t i = 0; i < members; ++i) {
-    const Member& m = bank_[i];
-    const double phi = curve(i, slip + m.zero).value;
-    const double N = m.theta_N * phi;
-    mean += m.weight * N;
-    square_sum += m.weight * (N * N + m.theta_variance * phi * phi);
+  Row mean(0.0), squares(0.0);
+  for (std::size_t i = 0; i < rows; ++i) {
+    const Members& m = bank_[i];
+    const Row phi = value(shapes_[i / rows_a_shape], m.knee, slip + m.zero);
+    const Row N = m.theta_N * phi;
+    mean = mean + m.weight * N;
+    squares = squares + m.weight * (square(N) + m.theta_variance * square(phi));
   }
-  return {mean, std::sqrt(std::max(0.0, square_sum - mean * mean))};
+  const double mean_N = sum_of(mean);
+  return {mean_N, std::sqrt(std::max(0.0, sum_of(squares) - square(mean_N)))};
 }
 
 }  // namespace abs_hil::control

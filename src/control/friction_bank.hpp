@@ -6,12 +6,35 @@
 #include "abs_hil/control/options.hpp"
 #include "abs_hil/rig/parameters.hpp"
 #include "control/speed_tracker.hpp"
+#include "rig/pack.hpp"
 
 namespace abs_hil::control {
 
+/// Delays a signal as LowerWheelForce delays the force: `q` = `covered()`.
+template <class S>
+struct ForceDelay {
+  std::array<S, 3> lag{S(0.0), S(0.0), S(0.0)};
+  S last{0.0}, before{0.0};
+
+  S operator()(double q, const S& now) noexcept {
+    // A force sampled now and in the two cycles before: the mean acceleration of the two intervals that the filter's
+    // newest second difference spans.
+    S x = 0.25 * (now + 2.0 * last + before);
+    before = last;
+    last = now;
+    for (S& y : lag) x = y = y + q * (x - y);
+    return x;
+  }
+  void shift(const S& by) noexcept {
+    for (S& y : lag) y = y + by;
+    last = last + by;
+    before = before + by;
+  }
+};
+
 /// Tyre force from the lower wheel alone, J2 omega2' = -r2 F - d2 omega2 - M20: neither the brake nor its model enters.
 /// A fading-memory filter with a triple pole follows the angle by which the force alone turns the wheel back. Its
-/// response to F is known exactly. To compare F with a curve, pass the curve through the same delay (`Delay`).
+/// response to F is known exactly. To compare F with a curve, pass the curve through the same delay (`ForceDelay`).
 /// Real-time safe.
 class LowerWheelForce {
  public:
@@ -25,27 +48,6 @@ class LowerWheelForce {
   [[nodiscard]] double force_N() const noexcept { return force_N_; }
   /// What a filter of one pole covers of its distance in the last interval.
   [[nodiscard]] double covered() const noexcept { return covered_; }
-
-  /// Delays a signal as the filter delays the force: `q` = `covered()`.
-  struct Delay {
-    std::array<double, 3> lag{};
-    double last{0.0}, before{0.0};
-    double operator()(double q, double now) noexcept {
-      // A force sampled now and in the two cycles before: the mean acceleration of the two intervals that the filter's
-      // newest second difference spans.
-      double x = 0.25 * (now + 2.0 * last + before);
-      before = last;
-      last = now;
-      for (double& y : lag) x = y += q * (x - y);
-      return x;
-    }
-    void shift(double by) noexcept {
-      for (double& y : lag) y += by;
-      last += by;
-      before += by;
-    }
-    [[nodiscard]] double value() const noexcept { return lag[2]; }
-  };
 
  private:
   rig::WheelParameters wheels_;
@@ -96,6 +98,8 @@ class FrictionBank {
   [[nodiscard]] double peak_slip() const noexcept { return peak_slip_; }
   /// Reading of the slip at no force is minus this.
   [[nodiscard]] double slip_zero() const noexcept { return slip_zero_; }
+  /// Expected -phi'' at the peak.
+  [[nodiscard]] double curvature() const noexcept { return curvature_; }
   [[nodiscard]] double peak_force_N() const noexcept { return peak_force_N_; }
   /// Force of the curve at the readings of late, as late as the quick force.
   [[nodiscard]] double late_force_N() const noexcept { return late_force_N_; }
@@ -103,37 +107,58 @@ class FrictionBank {
   [[nodiscard]] int jumps() const noexcept { return jumps_; }
 
  private:
-  static constexpr std::size_t table_steps = 128;
-  struct Member {
-    double theta_N, zero;
-    double theta_variance, covariance, zero_variance;
-    double weight;
-    LowerWheelForce::Delay phi;
+  /// Members of one shape side by side, as the vectors of any machine compute them.
+  using Row = rig::Pack<rig::Portable, 4>;
+  static constexpr std::size_t rows = members / Row::lanes;
+  static constexpr std::size_t rows_a_shape = peaks / Row::lanes;
+  static constexpr std::size_t terms = 10;
+
+  /// A shape phi of (4) over u = s/(1 + s), s = |slip| over its knee: phi = u P(u), and the slope of phi over u.
+  struct Shape {
+    std::array<double, terms> value{};
+    std::array<double, terms> slope{};
   };
-  struct Point {
-    double value, slope;
+  struct Members {
+    Row knee;  ///< slips 1/B
+    Row peak;  ///< slips
+    Row bent;  ///< -phi'' at the peak
+    Row prior;
+    Row theta_N, zero;
+    Row theta_variance, covariance, zero_variance;
+    Row weight;
+    ForceDelay<Row> phi;
+    Row now;  ///< the curve at the last reading
+  };
+  /// What all members compare their curves with in a cycle.
+  struct Look {
+    double slip, late_slip, covered;
+    double force_N;
+    double noise_N2;      ///< variance of the force
+    double slip_error2;   ///< variance of the slip
+    double theta_growth;  ///< of the variance of ln theta
+    double zero_growth;   ///< of the variance of the zero
+    double back;          ///< share of the weights that returns to the prior
+    bool learns, compares;
   };
 
-  [[nodiscard]] Point curve(std::size_t index, double slip) const noexcept;
+  [[nodiscard]] static Row value(const Shape& shape, const Row& knee, const Row& slip) noexcept;
+  [[nodiscard]] static Row slope(const Shape& shape, const Row& knee, const Row& slip) noexcept;
+  static void learn(const Shape& shape, const Look& look, Members& m) noexcept;
   void watch_for_jumps(const Data& data) noexcept;
-  /// Takes the means, with each member's `now` as its curve at the last reading.
-  void summarise(const std::array<double, members>& now) noexcept;
+  void summarise() noexcept;
 
   FrictionBankOptions options_;
   double rate_Hz_;
   double quick_delay_s_;
-  std::array<double, peaks> peak_slips_{};
-  std::array<double, members> bent_{};  ///< -phi'' at the peak
-  /// phi over u = x/(1 + x), x = slip over the peak's slip.
-  std::array<std::array<double, table_steps + 2>, shapes> table_{};
-  std::array<double, members> prior_{};
-  std::array<Member, members> bank_{};
-  LowerWheelForce::Delay late_slip_;
+  std::array<Shape, shapes> shapes_{};
+  std::array<Members, rows> bank_{};
+  ForceDelay<double> late_slip_;
   double time_s_{0.0};
   double hold_s_{0.0};
   double unexplained_s_{0.0};
   double force_N_{0.0};
   double late_force_N_{0.0};
+  double curvature_{0.0};
   double peak_slip_{0.0}, slip_zero_{0.0}, peak_force_N_{0.0};
   int jumps_{0};
 };

@@ -12,8 +12,10 @@
 #include "control/adaptive_controller.hpp"
 #include "control/adaptive_optimal_controller.hpp"
 #include "control/adaptive_peak_controller.hpp"
+#include "control/braking_stiffness_controller.hpp"
 #include "control/five_phase_controller.hpp"
 #include "control/locked_controller.hpp"
+#include "control/mixed_slip_deceleration_controller.hpp"
 #include "control/nominal_controller.hpp"
 #include "control/pi_controller.hpp"
 #include "control/relay_controller.hpp"
@@ -44,6 +46,10 @@ constexpr std::array own_table{
                                                     "sliding mode that steps back through the brake's lag (6)"),
     controller_entry<SuperTwistingController>("super-twisting", "second-order sliding mode with a continuous torque"),
     controller_entry<PiController>("pi", "speed-scheduled PI with the measured tyre force fed forward"),
+    controller_entry<MixedSlipDecelerationController>("mixed-slip-deceleration",
+                                                      "PI on a sum of slip and wheel deceleration, estimates nothing"),
+    controller_entry<BrakingStiffnessController>("braking-stiffness",
+                                                 "raises the slip while the measured tyre force still grows with it"),
     controller_entry<RelayController>("relay",
                                       "brake on below a slip threshold, off above: the rig maker's demonstration"),
     controller_entry<FivePhaseController>("five-phase", "production-style wheel deceleration thresholds, no slip"),

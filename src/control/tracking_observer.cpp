@@ -14,8 +14,8 @@ TrackingObserver::TrackingObserver(const ObserverOptions& options, std::int32_t 
     : tracker_{options, counts_per_rev}, disc_{eccentricity, counts_per_rev}, alpha_max_rad_s2_{alpha_max_rad_s2} {}
 
 void TrackingObserver::reset(std::int32_t counts, double omega_rad_s) noexcept {
-  counts_ = counts;
   disc_.reset(counts);
+  travel_ = ignored_travel_ = 0.0;
   tracker_.reset(omega_rad_s);
   omega_rad_s_ = omega_rad_s;
   ignored_ = 0;
@@ -32,8 +32,8 @@ void TrackingObserver::reset(std::int32_t counts, double omega_rad_s) noexcept {
 
 void TrackingObserver::update(std::int32_t counts, double dt_s, double stamp_error_s) noexcept {
   if (!(dt_s > 0.0)) return;  // the next interval then includes this travel
-  const EncoderDisc::Reading reading = disc_.look(rig::counts_between(counts_, counts));
-  const double travel = reading.own_travel;
+  travel_ = disc_.take(counts);
+  const double travel = travel_ + ignored_travel_;
   tracker_.note(travel, dt_s);
   if (tracker_.stands_still()) {
     tracker_.stop_where(true);
@@ -47,6 +47,7 @@ void TrackingObserver::update(std::int32_t counts, double dt_s, double stamp_err
       tracker_.bound_by_silence(travel, omega_rad_s_);
       ++ignored_;
       ignored_s_ = since_taken_s;
+      ignored_travel_ = travel;
       return;
     }
     if (tracker_.must_restart()) [[unlikely]] {
@@ -56,11 +57,9 @@ void TrackingObserver::update(std::int32_t counts, double dt_s, double stamp_err
     }
     tracker_.bound_by_silence(travel);
   }
-  counts_ = counts;
-  disc_.take(reading);
   omega_rad_s_ = tracker_.omega_rad_s();
   ignored_ = 0;
-  ignored_s_ = 0.0;
+  ignored_s_ = ignored_travel_ = 0.0;
 }
 
 }  // namespace abs_hil::control

@@ -38,6 +38,8 @@ class TrackingObserver {
   /// Replaces what is known of the disc's eccentricity, without a step of the speed.
   void know(const rig::EccentricityParameters& eccentricity) noexcept { disc_.know(eccentricity); }
 
+  /// Angle that the wheel has turned between the latest two readings, taken or ignored.
+  [[nodiscard]] double travel_rad() const noexcept { return travel_ * tracker_.rad_per_count(); }
   [[nodiscard]] double omega_rad_s() const noexcept { return omega_rad_s_; }
   [[nodiscard]] double alpha_rad_s2() const noexcept { return tracker_.alpha_rad_s2(); }
   [[nodiscard]] bool stands_still() const noexcept { return tracker_.stands_still(); }
@@ -48,12 +50,13 @@ class TrackingObserver {
   [[nodiscard]] bool implausible(double travel, double stamp_error_s) const noexcept;
 
   SpeedTracker<double> tracker_;
-  EncoderDisc disc_;  ///< at the last reading that was taken
+  EncoderDisc disc_;
   double alpha_max_rad_s2_;
-  std::int32_t counts_{0};
-  double omega_rad_s_{0.0};  ///< the tracker's speed, or its prediction while readings are ignored
-  int ignored_{0};           ///< readings in a row
-  double ignored_s_{0.0};    ///< since the last reading that was taken
+  double travel_{0.0};          ///< counts between the latest two readings
+  double omega_rad_s_{0.0};     ///< the tracker's speed, or its prediction while readings are ignored
+  int ignored_{0};              ///< readings in a row
+  double ignored_s_{0.0};       ///< since the last reading that was taken
+  double ignored_travel_{0.0};  ///< counts
 };
 
 }  // namespace abs_hil::control

@@ -8,7 +8,6 @@
 #include "abs_hil/rig/brake_map.hpp"
 #include "abs_hil/rig/time_units.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
-#include "rig/encoder_scale.hpp"
 #include "rig/stamp_error.hpp"
 
 namespace abs_hil::experiment {
@@ -66,7 +65,6 @@ RunLogic::RunLogic(RunLogicParts parts)
       ideal_actuator_(parts.ideal_actuator),
       duty_steps_(parts.duty_steps),
       wheels_(parts.rig.wheels),
-      rad_per_count_(rig::radians_per_count(parts.rig.encoder_counts_per_rev)),
       slip_ref_(parts.control.slip_ref),
       brake_(parts.rig.brake),
       start_speed_rad_s_(parts.start_speed_rad_s),
@@ -76,8 +74,6 @@ RunLogic::RunLogic(RunLogicParts parts)
              parts.rig.upper_encoder),
       lower_(parts.control.observer, parts.rig.encoder_counts_per_rev, fastest_change_rad_s2(parts).lower,
              parts.rig.lower_encoder),
-      upper_disc_(parts.rig.upper_encoder, parts.rig.encoder_counts_per_rev),
-      lower_disc_(parts.rig.lower_encoder, parts.rig.encoder_counts_per_rev),
       learns_eccentricity_(parts.control.observer.learn_eccentricity_s > 0.0),
       upper_fit_(parts.control.observer.learn_eccentricity_s, parts.rig.encoder_counts_per_rev),
       lower_fit_(parts.control.observer.learn_eccentricity_s, parts.rig.encoder_counts_per_rev),
@@ -124,20 +120,12 @@ void RunLogic::note_travel(const rig::Measurement& measurement, double dt_s) noe
     const rig::WheelSpeeds& now = *measurement.ideal_speeds;
     upper_travel_rad_ = 0.5 * (speeds_.omega1_rad_s + now.omega1_rad_s) * dt_s;
     lower_travel_rad_ = 0.5 * (speeds_.omega2_rad_s + now.omega2_rad_s) * dt_s;
-  } else if (started_) {
-    const auto upper = upper_disc_.look(rig::counts_between(upper_counts_, measurement.upper_counts));
-    const auto lower = lower_disc_.look(rig::counts_between(lower_counts_, measurement.lower_counts));
-    upper_disc_.take(upper);
-    lower_disc_.take(lower);
-    upper_travel_rad_ = upper.own_travel * rad_per_count_;
-    lower_travel_rad_ = lower.own_travel * rad_per_count_;
   } else {
-    upper_disc_.reset(measurement.upper_counts);
-    lower_disc_.reset(measurement.lower_counts);
+    const bool moved = started_ && dt_s > 0.0;  // otherwise the next reading has the travel
+    upper_travel_rad_ = moved ? upper_.travel_rad() : 0.0;
+    lower_travel_rad_ = moved ? lower_.travel_rad() : 0.0;
   }
   distance_m_ += wheels_.r2_m * lower_travel_rad_;
-  upper_counts_ = measurement.upper_counts;
-  lower_counts_ = measurement.lower_counts;
 }
 
 /// While the wheels coast, each reading goes into the fit of its disc. What a block of them gives holds from then on.
@@ -149,14 +137,8 @@ void RunLogic::learn_eccentricity(const rig::Measurement& measurement, const Pha
     lower_fit_.restart();
     return;
   }
-  if (const auto found = upper_fit_.take(measurement.time_ns, measurement.upper_counts)) {
-    upper_.know(*found);
-    upper_disc_.know(*found);
-  }
-  if (const auto found = lower_fit_.take(measurement.time_ns, measurement.lower_counts)) {
-    lower_.know(*found);
-    lower_disc_.know(*found);
-  }
+  if (const auto found = upper_fit_.take(measurement.time_ns, measurement.upper_counts)) upper_.know(*found);
+  if (const auto found = lower_fit_.take(measurement.time_ns, measurement.lower_counts)) lower_.know(*found);
 }
 
 double RunLogic::slip_control(double dt_s, bool begins, rig::ControlState& state) noexcept {

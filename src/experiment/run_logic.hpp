@@ -96,7 +96,6 @@ class RunLogic final : public runtime::CycleLogic {
   const bool ideal_actuator_;
   const std::uint32_t duty_steps_;
   const rig::WheelParameters wheels_;
-  const double rad_per_count_;
   double slip_ref_;
   const rig::BrakeParameters brake_;
   const double start_speed_rad_s_;
@@ -104,15 +103,11 @@ class RunLogic final : public runtime::CycleLogic {
   Sequence sequence_;
   control::TrackingObserver upper_;
   control::TrackingObserver lower_;
-  control::EncoderDisc upper_disc_;  ///< at the latest reading
-  control::EncoderDisc lower_disc_;
   const bool learns_eccentricity_;
   control::EccentricityFit upper_fit_;
   control::EccentricityFit lower_fit_;
   control::BrakeActuator actuator_;
   rig::WheelSpeeds speeds_{};
-  std::int32_t upper_counts_{0};
-  std::int32_t lower_counts_{0};
   double upper_travel_rad_{0.0};  ///< over the past interval
   double lower_travel_rad_{0.0};
   double distance_m_{0.0};  ///< distance of the car since the run began

@@ -6,7 +6,7 @@
 
 #include "abs_hil/rig/scalar.hpp"
 
-#if defined(__AVX2__)
+#if defined(__SSE2__)
 #include <immintrin.h>
 #endif
 
@@ -34,12 +34,19 @@ struct Portable {
     return static_cast<std::uint32_t>(a[0] & 1) | static_cast<std::uint32_t>(a[1] & 2);
   }
   static Vector blend(Mask m, Vector a, Vector b) noexcept { return (Vector)((m & (Bits)a) | (~m & (Bits)b)); }
+#if defined(__SSE2__)
+  // The instructions give their second operand where neither is larger.
+  static Vector larger(Vector a, Vector b) noexcept { return _mm_max_pd(b, a); }
+  static Vector smaller(Vector a, Vector b) noexcept { return _mm_min_pd(b, a); }
+  static Vector root(Vector a) noexcept { return _mm_sqrt_pd(a); }
+#else
   static Vector larger(Vector a, Vector b) noexcept { return blend(less(a, b), b, a); }
   static Vector smaller(Vector a, Vector b) noexcept { return blend(less(b, a), b, a); }
+  static Vector root(Vector a) noexcept { return Vector{__builtin_sqrt(a[0]), __builtin_sqrt(a[1])}; }
+#endif
   /// By the 52 bits of the fraction; for numbers >= 0.
   static Bits shifted_right(Bits a) noexcept { return a >> 52; }
   static Vector floor(Vector a) noexcept { return Vector{__builtin_floor(a[0]), __builtin_floor(a[1])}; }
-  static Vector root(Vector a) noexcept { return Vector{__builtin_sqrt(a[0]), __builtin_sqrt(a[1])}; }
 };
 
 #if defined(__AVX2__)

@@ -167,6 +167,8 @@ TEST_CASE("overshoot is the largest excess of slip over its reference above 3 m/
   const auto peak = [](double since_s) { return since_s > 0.5 && since_s < 0.6 ? 0.25 : (since_s > 1.45 ? 1.0 : 0.1); };
   CHECK_THAT(brake(peak, exact).slip_overshoot, WithinAbs(0.10, 1e-12));
   CHECK(brake([](double) { return 0.1; }, exact).slip_overshoot == 0.0);
+  CHECK(brake(peak, exact).slip_largest == 0.25);
+  CHECK(brake([](double) { return -0.1; }, exact).slip_largest == -0.1);
 }
 
 TEST_CASE("time locked counts the cycles with slip above 0.95 and v_x above 3 m/s") {

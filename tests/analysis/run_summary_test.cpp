@@ -38,6 +38,7 @@ TEST_CASE("the summary has the fields that scripts need, and null for unknown va
                             "theta_settling_s",
                             "torque_total_variation_Nm",
                             "slip_overshoot",
+                            "slip_largest",
                             "time_locked_s",
                             "theta_error_final",
                             "theta_error_rms",

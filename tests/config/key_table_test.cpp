@@ -120,10 +120,26 @@ TEST_CASE("groups have the order of recorded configurations") {
   for (const auto& item : json["control"].items()) controllers.push_back(item.key());
   CHECK(tables == std::vector<std::string>{"plant", "control", "experiment", "driver", "guardian", "commands", "gate",
                                            "realtime", "telemetry", "unsafe", "run"});
-  CHECK(controllers == std::vector<std::string>{"controller", "rate_Hz", "slip_ref", "v_min_m_s", "adaptive", "nominal",
-                                                "observer", "sliding_mode", "sliding_mode_smooth", "super_twisting",
-                                                "relay", "pi", "five_phase", "adaptive_actuator", "adaptive_peak",
-                                                "adaptive_optimal", "sliding_mode_actuator", "foreign"});
+  CHECK(controllers == std::vector<std::string>{"controller",
+                                                "rate_Hz",
+                                                "slip_ref",
+                                                "v_min_m_s",
+                                                "adaptive",
+                                                "nominal",
+                                                "observer",
+                                                "sliding_mode",
+                                                "sliding_mode_smooth",
+                                                "super_twisting",
+                                                "relay",
+                                                "pi",
+                                                "five_phase",
+                                                "adaptive_actuator",
+                                                "adaptive_peak",
+                                                "adaptive_optimal",
+                                                "mixed_slip_deceleration",
+                                                "braking_stiffness",
+                                                "sliding_mode_actuator",
+                                                "foreign"});
 }
 
 TEST_CASE("options that act only when braking begins are marked as start values") {

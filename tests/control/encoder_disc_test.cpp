@@ -100,13 +100,42 @@ TEST_CASE("What is learnt takes effect without a step of the speed") {
   CHECK_THAT(observer.omega_rad_s(), WithinAbs(120.0, 0.2));
 }
 
-TEST_CASE("A disc without eccentricity passes the counts on") {
+TEST_CASE("A disc without eccentricity passes the counts on, also where the counter wraps around") {
   control::EncoderDisc disc({}, counts_per_rev);
-  disc.reset(-17);
-  for (const std::int32_t travel : {0, 5, -5, 4096, -100'000, 2'000'000'000}) {
-    const auto read = disc.look(travel);
-    CHECK(read.own_travel == travel);
-    CHECK((read.place >= 0 && read.place < counts_per_rev));
-    disc.take(read);
+  std::int32_t counts = -17;
+  disc.reset(counts);
+  for (const std::int32_t travel : {0, 5, -5, 4096, -100'000, 2'000'000'000, 2'000'000'000}) {
+    counts = static_cast<std::int32_t>(static_cast<std::uint32_t>(counts) + static_cast<std::uint32_t>(travel));
+    CHECK(disc.take(counts) == travel);
   }
+}
+
+TEST_CASE("Whole turns of an eccentric disc are whole turns of the wheel, also where the counter wraps around") {
+  // 4096 divides 2^32, and 1000 does not.
+  const std::int32_t per_rev = GENERATE(4096, 1000);
+  control::EncoderDisc disc({0.02, 0.7}, per_rev);
+  std::int32_t counts = 123;
+  disc.reset(counts);
+  for (int turn = 0; turn < 3000; ++turn) {
+    for (const std::int32_t part : {per_rev * 300, per_rev * 400}) {
+      counts = static_cast<std::int32_t>(static_cast<std::uint32_t>(counts) + static_cast<std::uint32_t>(part));
+      REQUIRE(disc.take(counts) == part);
+    }
+  }
+}
+
+TEST_CASE("What an observer ignores of an eccentric disc counts in its travel, and in the next reading") {
+  const rig::EccentricityParameters disc{0.01, 0.7};
+  control::TrackingObserver observer(control::ObserverOptions{}, counts_per_rev, 343.0, disc);
+  observer.reset(reading(0.0, disc), 120.0);
+  double turned_rad = 0.0;
+  double angle_rad = 0.0;
+  for (int tick = 1; tick < 800; ++tick) {
+    const bool late = tick % 100 == 0;  // its counts are those of 3 ms later, and its stamp may be as wrong
+    angle_rad = 0.12 * tick;
+    observer.update(reading(late ? angle_rad + 0.36 : angle_rad, disc), 1e-3, late ? 3e-3 : 0.0);
+    turned_rad += observer.travel_rad();
+    if (tick > 200) CHECK_THAT(observer.omega_rad_s(), WithinAbs(120.0, 0.2));
+  }
+  CHECK_THAT(turned_rad, WithinAbs(angle_rad, 2.0 * rad_per_count));
 }

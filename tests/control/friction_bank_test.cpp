@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <random>
 #include <stdexcept>
 
@@ -75,7 +76,7 @@ class Rolling {
  private:
   rig::TyreParameters tyre_;
   double zero_;
-  control::LowerWheelForce::Delay delayed_{};
+  control::ForceDelay<double> delayed_{};
   double quick_{0.0};
   double time_s_{0.0};
   std::mt19937_64 random_{3};
@@ -90,11 +91,31 @@ double used(const Rolling& rolling, const rig::TyreParameters& tyre, double zero
 
 }  // namespace
 
+TEST_CASE("Before braking the bank's curve is the mean of the magic formulas that it consists of") {
+  const control::FrictionBankOptions o;
+  const control::FrictionBank bank{o, 1000.0, delay_s};
+  for (const double slip : {-0.3, -0.01, 0.0, 0.003, 0.02, 0.05, 0.1, 0.25, 0.6, 1.0}) {
+    double sum = 0.0, weights = 0.0;
+    for (int j = 0; j < 8; ++j) {
+      const double peak = 0.02 * std::pow(16.0, j / 7.0);
+      const double away = std::log(peak / o.slip0) / o.slip_spread;
+      for (const double C : {1.15, 1.525, 1.9}) {
+        const double weight = std::exp(-0.5 * away * away);
+        const double B = std::tan(std::numbers::pi / (2.0 * C)) / peak;
+        weights += weight;
+        sum += weight * std::sin(C * std::atan(B * slip));
+      }
+    }
+    CAPTURE(slip);
+    CHECK_THAT(bank.at(slip).N, WithinAbs(o.level0_N * sum / weights, 3e-4 * o.level0_N));
+  }
+}
+
 TEST_CASE("The lower wheel's angle alone gives the tyre force, late by three known lags") {
   const rig::WheelParameters wheels;
   LowerWheel wheel;
   control::LowerWheelForce force{wheels, 150.0};
-  control::LowerWheelForce::Delay late, too_late;
+  control::ForceDelay<double> late, too_late;
   force.reset(wheel.omega_rad_s);
   double largest_error = 0.0, largest_shifted = 0.0, before = 0.0;
   for (int n = 1; n <= 400; ++n) {

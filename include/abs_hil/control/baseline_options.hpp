@@ -62,6 +62,19 @@ struct PiOptions {
                  .range = rig::between(0, 1), .search = rig::search_linearly(0, 1));
 };
 
+/// A sum of slip and wheel deceleration that a PI controller holds.
+struct MixedSlipDecelerationOptions {
+  ABS_HIL_OPTIONS(MixedSlipDecelerationOptions);
+  ABS_HIL_OPTION(double, weight, 0.0137, .meaning = "weight of the wheel's deceleration in g beside the slip",
+                 .range = rig::from_zero(10));
+  ABS_HIL_OPTION(double, target, 0.13, .meaning = "wanted sum of slip and weighted deceleration",
+                 .range = rig::positive(10));
+  ABS_HIL_OPTION(double, kp_Nm, 78.0, .unit = "N m", .meaning = "proportional gain on that sum",
+                 .range = rig::positive(1e4));
+  ABS_HIL_OPTION(double, ki_Nm_s, 237.0, .unit = "N m/s", .meaning = "integral gain on that sum",
+                 .range = rig::from_zero(1e6));
+};
+
 /// Accelerations are those of the wheel's circumference, r1 omega1'. FivePhaseController names the phases.
 struct FivePhaseOptions {
   ABS_HIL_OPTIONS(FivePhaseOptions);

@@ -72,6 +72,32 @@ struct SlidingModeActuatorOptions {
   ABS_HIL_GROUP(ForceObserverOptions, observer, "", {});
 };
 
+/// Slip controller that raises the slip while the tyre force still grows with it.
+struct BrakingStiffnessOptions {
+  ABS_HIL_OPTIONS(BrakingStiffnessOptions);
+  ABS_HIL_OPTION(double, memory_s, 0.021, .unit = "s", .meaning = "memory of the slope of force over slip",
+                 .range = rig::between(0.002, 10));
+  ABS_HIL_OPTION(double, slip_noise, 0.0026, .meaning = "spread of the slip that tells nothing of the slope",
+                 .range = rig::between(1e-6, 0.1));
+  ABS_HIL_OPTION(double, target, 0.0296, .meaning = "relative growth of force per relative growth of slip to stay at",
+                 .range = rig::between(-1, 1));
+  ABS_HIL_OPTION(double, rate_per_s, 3.64, .unit = "1/s", .meaning = "gain of the wanted slip's logarithm on it",
+                 .range = rig::positive(1000));
+  ABS_HIL_OPTION(double, slip_min, 0.01, .meaning = "least slip reference", .range = rig::open_between(0, 1));
+  ABS_HIL_OPTION(double, slip_max, 0.35, .meaning = "largest slip reference", .range = rig::open_between(0, 1));
+  ABS_HIL_OPTION(double, slip_start, 0.0659, .meaning = "slip reference at the start of braking",
+                 .range = rig::open_between(0, 1));
+  ABS_HIL_OPTION(double, search_part, 0.169, .meaning = "amplitude of the search as a part of the reference",
+                 .range = rig::from_zero_below(1));
+  ABS_HIL_OPTION(double, search_rad_s, 30.8, .unit = "rad/s", .meaning = "frequency of the search",
+                 .range = rig::positive(1000));
+  ABS_HIL_OPTION(double, slip_gain_per_s, 144.0, .unit = "1/s", .meaning = "decay of the slip velocity error",
+                 .range = rig::positive(1e4));
+  ABS_HIL_OPTION(double, lag_gain_per_s, 46.2, .unit = "1/s",
+                 .meaning = "decay of the torque error that the brake's lag leaves", .range = rig::positive(1e4));
+  ABS_HIL_GROUP(ForceObserverOptions, observer, "", {.force_rate_N2_s = 20.1, .brake_rate_Nm2_s = 0.507});
+};
+
 /// SlipPeakEstimator: initial values of the tyre curve, and how fast they may change.
 struct SlipPeakOptions {
   ABS_HIL_OPTIONS(SlipPeakOptions);
@@ -147,7 +173,7 @@ struct FrictionBankOptions {
   ABS_HIL_OPTION(double, level_drift_per_s, 0.005, .unit = "1/s",
                  .meaning = "variance gained per second by the logarithm of the peak's force",
                  .range = rig::from_zero(100));
-  ABS_HIL_OPTION(double, zero_drift_per_s, 1e-4, .unit = "1/s",
+  ABS_HIL_OPTION(double, zero_drift_per_s, 0.0001, .unit = "1/s",
                  .meaning = "variance gained per second by the slip read at no force", .range = rig::from_zero(1));
   ABS_HIL_OPTION(double, share_per_s, 0.013, .unit = "1/s",
                  .meaning = "part of the weights that returns to the curves known before braking, per second",
@@ -162,7 +188,7 @@ struct FrictionBankOptions {
                  .meaning = "time after a jump in which only the level is learnt", .range = rig::positive(1));
   ABS_HIL_OPTION(double, jump_time_constant_s, 0.0023, .unit = "s",
                  .meaning = "time constant with which the level is learnt then", .range = rig::positive(1));
-  ABS_HIL_OPTION(double, jump_spread, 0.1, .meaning = "relative standard deviation of the level after that",
+  ABS_HIL_OPTION(double, jump_spread, 0.13, .meaning = "relative standard deviation of the level after that",
                  .range = rig::from_zero(10));
   ABS_HIL_OPTION(double, jump_after_s, 0.1, .unit = "s",
                  .meaning = "time at the start in which no friction jump is looked for", .range = rig::from_zero(10));
@@ -183,7 +209,7 @@ struct AdaptiveOptimalOptions {
                  .range = rig::positive(1e4));
   ABS_HIL_OPTION(double, torque_near_Nm, 0.54, .unit = "N m", .meaning = "error at which the gain is half way between",
                  .range = rig::positive(100));
-  ABS_HIL_OPTION(double, play_Nm, 0.137, .unit = "N m", .meaning = "change of the torque below which the brake rests",
+  ABS_HIL_OPTION(double, play_Nm, 0.178, .unit = "N m", .meaning = "change of the torque below which the brake rests",
                  .range = rig::from_zero(10));
   ABS_HIL_OPTION(double, authority, 0.48, .meaning = "part of the fastest approach from too little slip that is used",
                  .range = rig::between(0.01, 1));
@@ -193,13 +219,17 @@ struct AdaptiveOptimalOptions {
                  .range = rig::positive(100));
   ABS_HIL_OPTION(double, model_error_per_s, 35.0, .unit = "1/s",
                  .meaning = "how fast the error of the holding torque is learnt", .range = rig::positive(1e4));
-  ABS_HIL_OPTION(double, peak_factor, 1.08, .meaning = "slip reference over the estimated slip of the peak",
+  ABS_HIL_OPTION(double, peak_factor, 1.11, .meaning = "slip reference over the estimated slip of the peak",
                  .range = rig::between(0.5, 2));
+  ABS_HIL_OPTION(
+      double, runaway, 0.4,
+      .meaning = "runaway of the slip past the peak, per time constant of the brake, that undoes this factor",
+      .range = rig::positive(1e6));
   ABS_HIL_OPTION(double, slip_min, 0.015, .meaning = "least slip reference", .range = rig::open_between(0, 1));
   ABS_HIL_OPTION(double, slip_max, 0.35, .meaning = "largest slip reference", .range = rig::open_between(0, 1));
-  ABS_HIL_OPTION(double, slip_start, 0.039, .meaning = "slip reference at the start of braking",
+  ABS_HIL_OPTION(double, slip_start, 0.0507, .meaning = "slip reference at the start of braking",
                  .range = rig::open_between(0, 1));
-  ABS_HIL_OPTION(double, slip_rate_per_s, 8.1, .unit = "1/s",
+  ABS_HIL_OPTION(double, slip_rate_per_s, 10.5, .unit = "1/s",
                  .meaning = "fastest change of the logarithm of the slip reference", .range = rig::positive(1000));
   ABS_HIL_OPTION(double, search_part, 0.08, .meaning = "amplitude of the search as a part of the reference",
                  .range = rig::from_zero_below(1));
@@ -261,6 +291,8 @@ struct ControlOptions {
   ABS_HIL_GROUP(AdaptiveActuatorOptions, adaptive_actuator, "adaptive_actuator.", {});
   ABS_HIL_GROUP(AdaptivePeakOptions, adaptive_peak, "adaptive_peak.", {});
   ABS_HIL_GROUP(AdaptiveOptimalOptions, adaptive_optimal, "adaptive_optimal.", {});
+  ABS_HIL_GROUP(MixedSlipDecelerationOptions, mixed_slip_deceleration, "mixed_slip_deceleration.", {});
+  ABS_HIL_GROUP(BrakingStiffnessOptions, braking_stiffness, "braking_stiffness.", {});
   ABS_HIL_GROUP(SlidingModeActuatorOptions, sliding_mode_actuator, "sliding_mode_actuator.", {});
   ABS_HIL_GROUP(ForeignOptions, foreign, "foreign.", {});
 };

@@ -6,7 +6,8 @@ import json
 import pathlib
 from collections.abc import Iterable
 
-from .cases import END_SPEED_M_S, Case
+from ..files import write_whole
+from .cases import END_SPEED_M_S, VERSION, Case
 
 #: what the bound leaves out, which can only shorten the distance
 _IGNORED = ('brake_dead_time_s', 'brake_hysteresis', 'encoder_')
@@ -33,6 +34,41 @@ def compute(case: Case) -> dict[str, float]:
     on_plant = drive(braking, case.plant, values)
     return {'distance_m': round(braking.distance_m, 5), 'time_s': round(braking.stop_time_s, 5),
             'torque_variation_Nm': round(braking.variation_Nm, 2), 'distance_on_plant_m': round(on_plant.distance_m, 5)}
+
+
+def found(cases: Iterable[Case], kept: pathlib.Path | None = None) -> dict[str, dict[str, float]]:
+    """The bounds of all cases that have one: stored ones, those in the file `kept`, and others computed (needs casadi).
+
+    A case for which the solver finds none has an empty one. What is computed goes into `kept` at once, so that an interrupted
+    computation goes on where it was. Raises ValueError for
+    a file that holds something else.
+    """
+    known = stored()
+    own: dict[str, dict[str, float]] = {}
+    if kept is not None and kept.exists():
+        try:
+            own = dict(json.loads(kept.read_text(encoding='utf-8'))['bounds'])
+        except (KeyError, TypeError, ValueError):
+            raise ValueError(f'{kept}: no file of bounds; give one that --bounds has written, or a new name') from None
+    known |= own
+    for case in missing(cases, known):
+        try:
+            from ..optimum import NoOptimum
+        except ImportError:
+            raise ValueError('the bounds of drawn cases are computed with casadi; pip install casadi, or give --bounds FILE '
+                             'with all of them') from None
+        try:
+            known[identity(case)] = own[identity(case)] = compute(case)
+        except NoOptimum:
+            known[identity(case)] = own[identity(case)] = {}
+        if kept is not None:
+            _keep(kept, own)
+    return known
+
+
+def _keep(target: pathlib.Path, own: dict[str, dict[str, float]]) -> None:
+    text = json.dumps({'version': VERSION, 'bounds': own}, indent=1) + '\n'
+    write_whole(target, lambda name: pathlib.Path(name).write_text(text, encoding='utf-8'))
 
 
 def missing(cases: Iterable[Case], known: dict[str, dict[str, float]]) -> list[Case]:

@@ -90,10 +90,16 @@ LEAST_AT_DROP_M_S = 3.0
 _PLANT_ONLY = ('brake_dead_time_s', 'brake_hysteresis')
 
 
+#: roads of the mismatches, but no patches with a limited rate: there the computed optimum is 3 % off the plant, so that it is
+#: no bound to score against
+_MISMATCH_ROADS = ('even', 'jump', 'patches')
+
+
 def _mismatches() -> list[Case]:
     return [Case('mismatch', name, plant, road, changes=changes,
                  unknown=() if known else tuple(key for key in changes if key not in _PLANT_ONLY), settings=settings)
-            for plant in PLANTS for road in ('even', 'jump') for name, (changes, known, settings) in MISMATCHES.items()]
+            for plant in PLANTS for road in _MISMATCH_ROADS for name, (changes, known, settings) in MISMATCHES.items()
+            if not (road == 'patches' and name.startswith('rate'))]
 
 
 def _left_m_s(changes: Mapping[str, Value], speed_rad_s: float, road: str) -> float:
@@ -103,6 +109,11 @@ def _left_m_s(changes: Mapping[str, Value], speed_rad_s: float, road: str) -> fl
     v = r2 * speed_rad_s
     left = {'even': 0.0, 'jump': v - 0.6 * slowing, 'patch': math.sqrt(max(v * v - 2.0 * 4.0 * slowing, 0.0))}
     return max(left[road], 0.0)
+
+
+#: The gate judges the encoders by the largest tyre force that the model believes in, which here is the largest that may be
+#: drawn. `nominal`, the only law that uses the model's theta, keeps that of paper-table1.
+_ANY_TYRE: dict[str, Value] = {'model.theta_N': 60.0, 'control.nominal.theta0_N': 23.0}
 
 
 def drawn(seed: int, count: int) -> list[Case]:
@@ -121,7 +132,8 @@ def drawn(seed: int, count: int) -> list[Case]:
         road = generator.choice(('even', 'jump', 'patch'))
         if 0.0 < _left_m_s(changes, speed, road) < LEAST_AT_DROP_M_S:
             road = 'even'
-        cases.append(Case('drawn', f'{number}', 'paper-table1', road, speed, changes, tuple(changes)))
+        unknown = tuple(name for name in changes if name != 'theta_N')
+        cases.append(Case('drawn', f'{number}', 'paper-table1', road, speed, changes, unknown, _ANY_TYRE))
     return cases
 
 

@@ -9,8 +9,8 @@ from typing import Any
 from .cases import VERSION
 from .score import Result, Score
 
-_HEADINGS = ('runs', 'failed', 'locked', 'excess mean %', '90 % %', 'worst %', 'variation median N m', 'worst N m',
-             'slip overshoot', 'ε')
+HEADINGS = ('runs', 'failed', 'locked', 'excess mean %', '90 % %', 'worst %', 'variation median N m', 'worst N m',
+             'slip overshoot', 'peak slip', 'ε')
 
 
 def _number(value: float, decimals: int) -> str:
@@ -21,22 +21,35 @@ def _cells(score: Score) -> list[str]:
     return [str(score.runs), str(score.failed), str(score.locked), *(_number(100.0 * value, 1) for value in
                                                                      (score.excess_mean, score.excess_p90, score.excess_worst)),
             _number(score.variation_median_Nm, 0), _number(score.variation_worst_Nm, 0), _number(score.slip_overshoot, 2),
-            _number(score.adhesion, 3)]
+            _number(score.slip_largest, 2), _number(score.adhesion, 3)]
+
+
+def ranked(results: Sequence[Result], group: str = 'all') -> list[tuple[str, Score]]:
+    """The controllers' scores: the best mean excess first, those with failed runs last."""
+    scores = [(result.entry.name, next(score for score in result.scores if score.group == group)) for result in results]
+    scores.sort(key=lambda pair: (pair[1].failed > 0, math.inf if math.isnan(pair[1].excess_mean) else pair[1].excess_mean))
+    return scores
+
+
+def cells(results: Sequence[Result], group: str = 'all') -> list[list[str]]:
+    """The rows of a table: a controller's name and its figures."""
+    return [[name, *_cells(score)] for name, score in ranked(results, group)]
 
 
 def table(results: Sequence[Result], group: str = 'all') -> str:
-    """A Markdown table with a row for each controller: the best mean excess first, those with failed runs last."""
-    scores = [(result.entry.name, next(score for score in result.scores if score.group == group)) for result in results]
-    scores.sort(key=lambda pair: (pair[1].failed > 0, math.inf if math.isnan(pair[1].excess_mean) else pair[1].excess_mean))
-    lines = ['| controller | ' + ' | '.join(_HEADINGS) + ' |', '|---' + '|---:' * len(_HEADINGS) + '|']
-    lines += [f'| `{name}` | ' + ' | '.join(_cells(score)) + ' |' for name, score in scores]
+    """A Markdown table with a row for each controller."""
+    lines = ['| controller | ' + ' | '.join(HEADINGS) + ' |', '|---' + '|---:' * len(HEADINGS) + '|']
+    lines += [f'| `{name}` | ' + ' | '.join(figures) + ' |' for name, *figures in cells(results, group)]
     return '\n'.join(lines) + '\n'
+
+
+def title(whole: bool) -> str:
+    return f'abs_hil benchmark, version {VERSION}' + ('' if whole else ' (a part of the set: no score of the benchmark)')
 
 
 def text(results: Sequence[Result], whole: bool) -> str:
     """A page in Markdown: all cases, then each group, then each controller's worst case."""
-    title = f'abs_hil benchmark, version {VERSION}' + ('' if whole else ' (a part of the set: no score of the benchmark)')
-    parts = [f'# {title}\n', table(results)]
+    parts = [f'# {title(whole)}\n', table(results)]
     for score in results[0].scores[:-1]:
         parts += [f'## {score.group}\n', table(results, score.group)]
     parts += ['## Worst cases\n', '\n'.join(f'- `{result.entry.name}`: {result.total.worst_case}' for result in results) + '\n']

@@ -9,8 +9,10 @@ from collections.abc import Sequence
 from ..core import _core
 from ..files import write_whole
 from ..options import Value
+from ..report.page import Unavailable, plotly_js
 from ..simulation import controllers
 from . import bounds, cases
+from .html import html
 from .page import as_json, table, text
 from .score import Entry, run
 
@@ -25,9 +27,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--quick', action='store_true', help='12 cases with one seed: a check, no score')
     parser.add_argument('--draw', metavar='SEED', type=int, help='only cases that this seed draws; needs casadi')
     parser.add_argument('--count', metavar='N', type=int, default=cases.DRAWN, help=f'how many of them ({cases.DRAWN})')
+    parser.add_argument('--bounds', metavar='FILE', type=pathlib.Path,
+                        help='keeps the bounds of drawn cases, so that they need not be computed again')
     parser.add_argument('--threads', metavar='N', type=int, default=0, help='0: one for each processor')
     parser.add_argument('--json', metavar='FILE', type=pathlib.Path, help='all scores and runs')
-    parser.add_argument('--page', metavar='FILE', type=pathlib.Path, help='the page in Markdown, with the groups of cases')
+    parser.add_argument('--page', metavar='FILE', type=pathlib.Path,
+                        help='the page with the groups of cases: HTML with figures for FILE.html, otherwise Markdown')
     return parser
 
 
@@ -47,10 +52,12 @@ def _chosen(given: argparse.Namespace) -> tuple[list[cases.Case], dict[str, dict
     if given.draw < 0 or not 1 <= given.count <= 10_000:
         raise ValueError(f'--draw {given.draw} --count {given.count}: give a seed of at least 0 and 1 to 10000 cases')
     drawn = cases.drawn(given.draw, given.count)
-    known = bounds.stored()
-    for case in bounds.missing(drawn, known):
-        known[bounds.identity(case)] = bounds.compute(case)
-    return drawn, known
+    found = bounds.found(drawn, given.bounds)
+    without = [case for case in drawn if not found[bounds.identity(case)]]
+    for case in without:
+        print(f'abs_hil benchmark: {case.key} is left out: no bound was found, the wheel locks there whatever the brake does '
+              'or the solver failed', file=sys.stderr)
+    return [case for case in drawn if case not in without], found
 
 
 def _write(target: pathlib.Path, content: str) -> None:
@@ -64,6 +71,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for target in (given.json, given.page):
             if target is not None:
                 write_whole(target, lambda name: None, probe=True)
+        if given.page is not None and given.page.suffix == '.html':
+            plotly_js()
         entries = [Entry(name, settings) for name in given.controller or controllers()]
         chosen, known = _chosen(given)
         whole = not given.quick and given.draw is None
@@ -71,12 +80,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for entry in entries:
             results.append(run(entry, chosen, known, (1,) if given.quick else (1, 2), given.threads))
             print(table(results[-1:]).splitlines()[-1], file=sys.stderr)
-    except (ValueError, RuntimeError) as error:
+    except (ValueError, RuntimeError, OSError) as error:
         print(f'abs_hil benchmark: {error}', file=sys.stderr)
         return 2
     print(table(results), end='')
-    for target, content in ((given.json, as_json(results, whole, _core.version)), (given.page, text(results, whole))):
-        if target is not None:
+    try:
+        page = None if given.page is None else html(results, whole) if given.page.suffix == '.html' else text(results, whole)
+    except Unavailable as error:
+        print(f'abs_hil benchmark: {error}', file=sys.stderr)
+        return 2
+    for target, content in ((given.json, as_json(results, whole, _core.version)), (given.page, page)):
+        if target is not None and content is not None:
             _write(target, content)
     return 0
 

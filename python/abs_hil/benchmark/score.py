@@ -69,7 +69,7 @@ def _runs(entry: Entry, cases: Sequence[Case], seeds: Sequence[int]) -> list[dic
     return runs
 
 
-FIGURES = ('stop_distance_m', 'stop_time_s', 'torque_total_variation_Nm', 'slip_overshoot', 'time_locked_s')
+FIGURES = ('stop_distance_m', 'stop_time_s', 'torque_total_variation_Nm', 'slip_overshoot', 'slip_largest', 'time_locked_s')
 
 
 def _figures(entry: Entry, runs: list[dict[str, Any]], threads: int) -> tuple[dict[str, np.ndarray], list[str]]:
@@ -96,8 +96,8 @@ class Score:
     """Of one group of cases, or of all.
 
     excess: braking distance over the causal optimum, less 1. slip_overshoot: the largest slip beyond the one that the
-    controller itself wanted, above 3 m/s. adhesion: mean utilisation on even roads. failed: runs that a fault ended or that
-    never stopped; no other figure has them.
+    controller itself wanted, slip_largest: the largest slip, both above 3 m/s. adhesion: mean utilisation on even roads.
+    failed: runs that a fault ended or that never stopped; no other figure has them.
     """
     group: str
     runs: int
@@ -110,6 +110,7 @@ class Score:
     variation_median_Nm: float
     variation_worst_Nm: float
     slip_overshoot: float
+    slip_largest: float
     adhesion: float
 
     def as_row(self) -> dict[str, Any]:
@@ -142,7 +143,8 @@ def _score(group: str, rows: Sequence[Mapping[str, Any]]) -> Score:
     return Score(group, len(rows), int((~sound).sum()), sum(row['time_locked_s'] > 0 for row in rows),
                  of(excess[sound], np.mean), of(excess[sound], lambda e: np.percentile(e, 90)), of(excess[sound], np.max),
                  str(rows[worst]['case']), of(variation, np.median), of(variation, np.max),
-                 of(np.array([row['slip_overshoot'] for row in rows])[sound], np.max), of(adhesion, np.mean))
+                 of(np.array([row['slip_overshoot'] for row in rows])[sound], np.max),
+                 of(np.array([row['slip_largest'] for row in rows])[sound], np.max), of(adhesion, np.mean))
 
 
 def run(entry: Entry, cases: Sequence[Case], bounds: Mapping[str, Mapping[str, float]], seeds: Sequence[int] = (1, 2),

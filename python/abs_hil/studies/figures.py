@@ -20,6 +20,7 @@ POINTS_IN_BIN = 8
 MOST_FACTORS, MOST_PAIRS, MOST_CURVES = 6, 3, 7
 TITLES = {'stop_time_s': 'stop time, s', 'stop_distance_m': 'stop distance, m', 'slip_rms': 'slip RMS error',
           'slip_reached_s': 'slip reached, s', 'slip_settling_s': 'slip settling, s', 'slip_overshoot': 'slip overshoot',
+          'slip_largest': 'largest slip',
           'time_locked_s': 'time locked, s', 'torque_total_variation_Nm': 'torque variation, N m',
           'theta_error_rms': 'theta RMS error', 'theta_error_max_N': 'largest theta error, N',
           'theta_settling_s': 'theta settling, s', 'theta_error_final': 'theta error at end'}

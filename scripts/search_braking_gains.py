@@ -1,0 +1,208 @@
+#!/usr/bin/env python3
+"""usage: search_braking_gains.py BUILD [--law LAW] [--check] [--threads N]
+
+Searches the keys of the laws that look for good slip by themselves, on config/training/braking.toml. The score is the mean
+over the runs of the distance over that of adaptive-peak, in per cent above 100, plus a tenth of the mean of the worst
+twentieth, plus one per cent for 100 N m of torque variation; a locked wheel or a fault costs 100. The search goes from the
+present defaults: it moves one key after the other up and down by a step and keeps what lessens the score by 0.03, until no
+move does; then the same with a smaller step. All is deterministic, so the result does not depend on the computer.
+
+The result goes into config/training/gains.json with its score, and the program's defaults into options.hpp and
+baseline_options.hpp: build anew afterwards. --check compares the build's defaults with gains.json, computes the score again,
+and says whether a move of the smaller step would still lessen it by 0.03.
+"""
+import argparse
+import csv
+import gzip
+import json
+import math
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+STUDY = ROOT / 'config' / 'training' / 'braking.toml'
+GAINS = ROOT / 'config' / 'training' / 'gains.json'
+HEADERS = [ROOT / 'include' / 'abs_hil' / 'control' / name for name in ('options.hpp', 'baseline_options.hpp')]
+REFERENCE = 'adaptive-peak'
+#: keys that are searched, all of them by factors
+LAWS = {
+    'adaptive-optimal': (
+        'slip_gain_per_s', 'slip_gain_near_per_s', 'slip_near_m_s', 'torque_gain_per_s', 'torque_gain_near_per_s',
+        'torque_near_Nm', 'play_Nm', 'authority', 'authority_past_peak', 'bold_slip', 'model_error_per_s', 'peak_factor',
+        'runaway', 'slip_start', 'slip_rate_per_s', 'search_part', 'search_rad_s', 'force_bandwidth_rad_s',
+        'force_noise_N2_s', 'force_error', 'timing_error_s', 'slip_noise_m_s', 'start_s', 'slip0', 'slip_spread', 'level0_N',
+        'level_spread_N', 'zero_spread', 'level_drift_per_s', 'zero_drift_per_s', 'share_per_s', 'jump_share',
+        'jump_least_N', 'jump_confirm_s', 'jump_hold_s', 'jump_time_constant_s', 'jump_spread', 'jump_after_s',
+        'force_rate_N2_s', 'brake_rate_Nm2_s'),
+    'mixed-slip-deceleration': ('weight', 'target', 'kp_Nm', 'ki_Nm_s'),
+    'braking-stiffness': ('memory_s', 'slip_noise', 'target', 'rate_per_s', 'slip_start', 'search_part', 'search_rad_s',
+                          'slip_gain_per_s', 'lag_gain_per_s', 'force_rate_N2_s', 'brake_rate_Nm2_s'),
+}
+#: parts of a key's value by which it moves; keys with little room around them move less
+STEPS = (0.3, 0.1)
+LITTLE_ROOM = {'peak_factor': 0.1, 'slip0': 0.4}
+LEAST_GAIN = 0.03
+FAILED = 100.0
+VARIATION_PER_CENT_NM = 100.0
+
+
+class Training:
+    def __init__(self, program, law, threads, folder):
+        self.program, self.law, self.threads, self.folder = program, law, threads, pathlib.Path(folder)
+        self.prefix = f'control.{law.replace("-", "_")}.'
+        self.calls = 0
+        self.scores = {}
+        self.reference = [row['stop_distance_m'] for row in self.rows({}, REFERENCE)]
+
+    def rows(self, keys, controller):
+        self.calls += 1
+        settings = ''.join(f'{self.prefix}{key} = {value:.6g}\n' for key, value in keys.items())
+        text = STUDY.read_text(encoding='utf-8').replace('"adaptive-optimal"', f'"{controller}"')
+        path = self.folder / 'study.toml'
+        path.write_text(text.replace('[settings]\n', '[settings]\n' + settings, 1), encoding='utf-8')
+        out = self.folder / f'out-{self.calls}'
+        subprocess.run([self.program, 'study', path, '--out', out, '--threads', str(self.threads)], check=True,
+                       stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, cwd=ROOT)
+        with gzip.open(out / 'results.csv.gz', 'rt') as file:
+            rows = list(csv.DictReader(line for line in file if not line.startswith('#')))
+        for row in rows:
+            row['stop_distance_m'] = float(row['stop_distance_m']) if row['result'] == 'completed' else math.nan
+        return rows
+
+    def score(self, keys):
+        """The score, and a text that says what it consists of; the worst score for keys that are out of range."""
+        name = json.dumps(keys, sort_keys=True)
+        if name not in self.scores:
+            try:
+                self.scores[name] = self._scored(self.rows(keys, self.law))
+            except subprocess.CalledProcessError as error:
+                if self.prefix not in error.stderr.decode():
+                    raise SystemExit(error.stderr.decode()) from None
+                self.scores[name] = (math.inf, 'a value is out of its range')
+        return self.scores[name]
+
+    def _scored(self, rows):
+        loss, variation = [], []
+        for row, reference in zip(rows, self.reference, strict=True):
+            ratio = row['stop_distance_m'] / reference
+            if math.isnan(reference):
+                continue  # not even the reference can brake there
+            failed = math.isnan(ratio) or float(row['time_locked_s']) > 0.0
+            loss.append(FAILED if failed else 100.0 * (ratio - 1.0))
+            if not math.isnan(ratio):
+                variation.append(float(row['torque_total_variation_Nm']))
+        loss.sort(reverse=True)
+        worst = loss[:max(1, len(loss) // 20)]
+        variation_Nm = sum(variation) / len(variation) if variation else math.inf
+        mean, mean_worst = sum(loss) / len(loss), sum(worst) / len(worst)
+        return (mean + 0.1 * mean_worst + variation_Nm / VARIATION_PER_CENT_NM,
+                f'mean {mean:+.2f} %, worst twentieth {mean_worst:+.1f} %, {variation_Nm:.0f} N m')
+
+
+def defaults(program, law):
+    """The keys' values of an unchanged build."""
+    prefix = f'control.{law.replace("-", "_")}.'
+    listed = subprocess.run([program, 'list', '--keys'], check=True, capture_output=True, text=True).stdout
+    values = {}
+    for line in listed.splitlines():
+        words = line.split()
+        if words and words[0].startswith(prefix) and words[0][len(prefix):] in LAWS[law]:
+            values[words[0][len(prefix):]] = float(words[1].lstrip('='))
+    if set(values) != set(LAWS[law]):
+        raise SystemExit(f'no such keys: {set(LAWS[law]) - set(values)}')
+    return {key: values[key] for key in LAWS[law]}
+
+
+def moved(keys, key, part):
+    return {**keys, key: float(f'{keys[key] * (1.0 + part * LITTLE_ROOM.get(key, 1.0)):.3g}')}
+
+
+def search(training, keys, say):
+    """The keys from which no move of a step lessens the score."""
+    least, text = training.score(keys)
+    say(f'defaults: {least:.3f} ({text})')
+    for step in STEPS:
+        unmoved = 0
+        while unmoved < len(LAWS[training.law]):
+            for key in LAWS[training.law]:
+                unmoved += 1
+                for part in (step, -step / (1.0 + step)):
+                    other = moved(keys, key, part)
+                    score, text = training.score(other)
+                    if score < least - LEAST_GAIN:
+                        keys, least, unmoved = other, score, 0
+                        say(f'{key} {keys[key]:g}: {least:.3f} ({text})')
+                        break
+                if unmoved == len(LAWS[training.law]):
+                    break
+    return keys, least
+
+
+def into_headers(law, keys):
+    """Writes the keys as the defaults of the law's options."""
+    struct = ''.join(word.capitalize() for word in law.split('-')) + 'Options'
+    places = {'adaptive-optimal': (struct, 'FrictionBankOptions')}.get(law, (struct,))
+    for path in HEADERS:
+        text = path.read_text(encoding='utf-8')
+        for name in places:
+            found = re.search(rf'^struct {name} {{.*?^}};', text, re.MULTILINE | re.DOTALL)
+            if not found:
+                continue
+            body = found[0]
+            for key, value in keys.items():
+                number = repr(value)
+                body = re.sub(rf'(ABS_HIL_OPTION\(\s*double, {key}, )[^,]+,', rf'\g<1>{number},', body)
+                body = re.sub(rf'(\.{key} = )[^,}}]+', rf'\g<1>{number}', body)
+            text = text.replace(found[0], body)
+        path.write_text(text, encoding='utf-8')
+
+
+def check(training, keys, stored):
+    """What is wrong with the shipped gains of a law, in words."""
+    if keys != stored['gains']:
+        changed = [key for key in keys if keys[key] != stored['gains'].get(key)]
+        return [f'{training.law}: the defaults of {", ".join(changed)} are not those of {GAINS.name}']
+    score, _ = training.score(keys)
+    wrong = []
+    if abs(score - stored['score']) > 1e-6:
+        wrong.append(f'{training.law}: the score is {score:.6f}, {GAINS.name} says {stored["score"]:.6f}')
+    for key in LAWS[training.law]:
+        for part in (STEPS[-1], -STEPS[-1] / (1.0 + STEPS[-1])):
+            other = moved(keys, key, part)
+            if training.score(other)[0] < score - LEAST_GAIN:
+                wrong.append(f'{training.law}: {key} = {other[key]:g} instead of {keys[key]:g} scores better: '
+                             f'{training.score(other)[0]:.3f} instead of {score:.3f}; search again')
+    return wrong
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('build', type=pathlib.Path)
+    parser.add_argument('--law', choices=tuple(LAWS), action='append')
+    parser.add_argument('--check', action='store_true')
+    parser.add_argument('--threads', type=int, default=1)
+    options = parser.parse_args()
+    program = (options.build / 'bin' / 'abs_hil').resolve()
+    stored = json.loads(GAINS.read_text(encoding='utf-8')) if GAINS.exists() else {}
+    wrong = []
+    for law in options.law or LAWS:
+        with tempfile.TemporaryDirectory() as folder:
+            training = Training(program, law, options.threads, folder)
+            keys = defaults(program, law)
+            if options.check:
+                wrong += check(training, keys, stored[law])
+                continue
+            keys, score = search(training, keys, lambda text, law=law: print(f'{law}: {text}', flush=True))
+            stored[law] = {'score': round(score, 9), 'gains': keys}
+            GAINS.write_text(json.dumps(stored, indent=1) + '\n', encoding='utf-8')
+            into_headers(law, keys)
+    for text in wrong:
+        print(text, file=sys.stderr)
+    return 1 if wrong else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
