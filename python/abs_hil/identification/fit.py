@@ -80,6 +80,9 @@ def search_u0(fit: Fit, disturbances: Disturbances, width: float, most: int,
         return []
     present = fit.values['u0']
     duties = np.unique(np.concatenate([log.brake_pwm for log in problem.logs]))
+    # Below the duty at which its line crosses zero the brake gives nothing, wherever u0 lies: a search there sees no slope.
+    if present < (crossing := -fit.values['b2_Nm'] / fit.values['b1_Nm']) < duties[-1]:
+        present = crossing
     first = max(int(np.searchsorted(duties, present - width, 'right')) - 1, 0)
     edges = duties[first:int(np.searchsorted(duties, present + width)) + 1]
     gaps = list(zip(edges[:-1], edges[1:]))
