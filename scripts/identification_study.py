@@ -113,14 +113,15 @@ def one(plant, seed, disturbed):
 
 
 def stopped_apart(controller, settings, form, found, model):
-    """How much farther the true rig stops with the identified model than with the true one, relative."""
+    """How much farther the true rig stops with the identified model than with the true one, relative; NaN where a run ends
+    before it stops."""
     true = dict(settings)
     if form.name == 'inteco-mu':
         truth = {key: settings[f'plant.{key}'] for key in found.values()}
         true.update({f'model.{key}': value for key, value in equivalent_tyre(found.fit.problem.base, truth).items()})
     distances = [abs_hil.simulate(controller=controller, **how).summary['stop_distance_m']
                  for how in ({'set': settings, 'model': model}, {'set': true})]
-    return distances[0] / distances[1] - 1
+    return distances[0] / distances[1] - 1 if None not in distances else np.nan
 
 
 MODEL = {name for name in abs_hil.keys() if name.startswith('model.')}
@@ -133,8 +134,8 @@ def table(plant, rows):
           f'{100 * np.max(np.abs([row["distance_error"] for row in rows])):.4f} % (worst); '
           f'{np.median([row["cpu_s"] for row in rows]):.1f} s of CPU. Stops with the identified model instead of the true one, '
           'median and worst: ' + ', '.join(
-              f'`{name}` {100 * np.median(apart):.4f} %, {100 * np.max(apart):.4f} %' for name in CONTROLLERS
-              if len(apart := np.abs([row[f'{name} stop'] for row in rows]))))
+              f'`{name}` {100 * np.nanmedian(apart):.4f} %, {100 * np.nanmax(apart):.4f} %' for name in CONTROLLERS
+              if np.isfinite(apart := np.abs([row[f'{name} stop'] for row in rows])).any()))
     print('\n| parameter | median error | worst error | intervals that hold | identified |\n|---|---|---|---|---|')
     for key in [name.removesuffix(' error') for name in rows[0] if name.endswith(' error')]:
         errors = np.abs([row[f'{key} error'] for row in rows])

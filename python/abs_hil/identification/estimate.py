@@ -110,14 +110,16 @@ def identify(logs: Sequence[PathLike | Log], start: PathLike = 'paper-table1', *
     _refuse_swapped(loaded)
 
     fits: list[Fit] = []
+    begun: list[Fit] = []
     for name in FORMS if form == 'auto' else (form,):
         say(f'{FORMS[name].meaning}: first values')
         problem = Problem.of(FORMS[name], start, loaded, fix, drift, WHEELS)
         if not any(problem.segments):
             raise ValueError('in no log does a wheel turn for long enough (0.2 s above 10 rad/s)')
         try:
-            begun = start_fit(problem, values, check, fits[0] if fits else None)
-            fits.append(begun if fits else rate_limit.started(begun, check))
+            begun.append(start_fit(problem, values, check, begun[0] if begun else None))
+            # Each form for itself: one that cannot follow the logs may take a limit for a remedy.
+            fits.append(rate_limit.started(begun[-1], check))
         except (ValueError, np.linalg.LinAlgError) as error:
             notes.append(f'{FORMS[name].meaning}: cannot be fitted ({error})')
     if not fits:

@@ -134,8 +134,7 @@ def start_fit(problem: Problem, start: Mapping[str, float], check: Callable[[], 
     """First values and a few rounds with large disturbances: near the truth, whatever the start. What `other_form` found of
     the same logs is not sought again."""
     if other_form is not None:
-        problem = dataclasses.replace(problem, motions=other_form.problem.motions,
-                                      with_rate_limit=other_form.problem.with_rate_limit)
+        problem = dataclasses.replace(problem, motions=other_form.problem.motions)
         discs = {p.key: other_form.first[p.key] for p in problem.parameters if p.acts == 'reading'}
         return _started(problem, start, check, discs, other_form.first)
     fit = _started(problem, start, check)

@@ -93,7 +93,7 @@ def first_values(form: Form, base: Any, given: Mapping[str, float], start: Mappi
     value = {p.key: float(start[p.key]) for p in form.parameters}
     value.update(fixed)
     if other_form is not None:
-        value.update({key: number for key, number in other_form.items() if key in value or key == RATE_LIMIT.key})
+        value.update({key: number for key, number in other_form.items() if key in value})
         _tyre(form, base, value, pieces, logs, motions, r2, J2, fixed)
         return value
     if 'r1_m' not in fixed:
