@@ -9,7 +9,7 @@ move does; then the same with a smaller step. All is deterministic, so the resul
 
 The result goes into config/training/gains.json with its score, and the program's defaults into options.hpp and
 baseline_options.hpp: build anew afterwards. --check compares the build's defaults with gains.json, computes the score again,
-and says whether a move of the smaller step would still lessen it by 0.03.
+and says whether a move of the smaller step would lessen it by 0.1. Smaller gains do not hold on other draws of the training set.
 """
 import argparse
 import csv
@@ -45,6 +45,8 @@ LAWS = {
 STEPS = (0.3, 0.1)
 LITTLE_ROOM = {'peak_factor': 0.1, 'slip0': 0.4}
 LEAST_GAIN = 0.03
+#: scatter of the score over draws of the training set: what lessened it by 0.08 was worse on 200 other cases
+SCATTER = 0.1
 FAILED = 100.0
 VARIATION_PER_CENT_NM = 100.0
 
@@ -172,7 +174,7 @@ def check(training, keys, stored):
     for key in LAWS[training.law]:
         for part in (STEPS[-1], -STEPS[-1] / (1.0 + STEPS[-1])):
             other = moved(keys, key, part)
-            if training.score(other)[0] < score - LEAST_GAIN:
+            if training.score(other)[0] < score - SCATTER:
                 wrong.append(f'{training.law}: {key} = {other[key]:g} instead of {keys[key]:g} scores better: '
                              f'{training.score(other)[0]:.3f} instead of {score:.3f}; search again')
     return wrong
