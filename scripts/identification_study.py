@@ -4,8 +4,8 @@
 
 Tries abs_identify on simulated rigs whose parameters it does not know: each within 25 % of the plant's, with other encoder
 phases, from start values up to 25 % off. The logs are those of the series `identification`. Prints, for each parameter, the
-median error, the share of intervals of 95 % that hold the truth, how well the identified model predicts `paper`, and how
-far controllers that believe it stop from where they stop with the true model.
+median error, the share of intervals of 95 % that hold the truth, how well the identified model predicts `paper`, how far the
+tyre's curve is off, and how far controllers that believe the model stop from where they stop with the true one.
 --disturbed: friction and brake wander by 1 %, the motor by 0.5 %, bearings by 5 %, over 0.2 s.
 --check: status 1 unless all fits converge, errors stay within docs/identification.md's bounds for undisturbed rigs, and
 the intervals of all parameters together hold the truth as often as intervals of 95 % do.
@@ -27,7 +27,7 @@ import abs_hil  # noqa: E402
 from abs_hil.identification import identify  # noqa: E402
 from abs_hil.identification.advice import log_of  # noqa: E402
 from abs_hil.identification.parameters import FORMS  # noqa: E402
-from abs_hil.identification.results import as_toml, equivalent_tyre, plant_settings  # noqa: E402
+from abs_hil.identification.results import as_toml, braking_force_N, equivalent_tyre, plant_settings  # noqa: E402
 
 EXPERIMENTS = ('lifted', 'duty-ramp', 'locked-stop', 'pulses', 'slip-sweep')
 #: laws that use the model
@@ -100,6 +100,7 @@ def one(plant, seed, disturbed):
     row = {'plant': plant, 'seed': seed, 'form_right': found.form == form.name, 'cpu_s': cpu_s,
            'rms_counts': found.residual_counts_rms,
            'distance_error': again.summary['stop_distance_m'] / paper.summary['stop_distance_m'] - 1,
+           'force apart': force_apart(settings, form, found),
            **{f'{name} stop': apart for name, apart in stops.items()}}
     for key, value in truth.items():
         estimate = found.parameters.get(key)
@@ -110,6 +111,16 @@ def one(plant, seed, disturbed):
             estimate.high - estimate.low) / 2 / abs(value)
         row[f'{key} status'] = estimate.status if estimate else 'other form'
     return row
+
+
+def force_apart(settings, form, found):
+    """The largest difference of the tyre's force while braking, over its largest force; NaN for the wrong form."""
+    if found.form != form.name:
+        return np.nan
+    base = found.fit.problem.base
+    truth = {key: settings[f'plant.{key}'] for key in found.values() if f'plant.{key}' in settings}
+    true = braking_force_N(base, truth)
+    return np.abs(braking_force_N(base, found.values()) - true).max() / true.max()
 
 
 def stopped_apart(controller, settings, form, found, model):
@@ -132,8 +143,10 @@ def table(plant, rows):
           f'{np.median([row["rms_counts"] for row in rows]):.4f} counts RMS; `paper` predicted within '
           f'{100 * np.median(np.abs([row["distance_error"] for row in rows])):.4f} % (median), '
           f'{100 * np.max(np.abs([row["distance_error"] for row in rows])):.4f} % (worst); '
-          f'{np.median([row["cpu_s"] for row in rows]):.1f} s of CPU. Stops with the identified model instead of the true one, '
-          'median and worst: ' + ', '.join(
+          f'{np.median([row["cpu_s"] for row in rows]):.1f} s of CPU. The tyre\'s force in braking differs by at most '
+          f'{100 * np.nanmedian([row["force apart"] for row in rows]):.4f} % of its largest (median), '
+          f'{100 * np.nanmax([row["force apart"] for row in rows]):.4f} % (worst). Stops with the identified model '
+          'instead of the true one, median and worst: ' + ', '.join(
               f'`{name}` {100 * np.nanmedian(apart):.4f} %, {100 * np.nanmax(apart):.4f} %' for name in CONTROLLERS
               if np.isfinite(apart := np.abs([row[f'{name} stop'] for row in rows])).any()))
     print('\n| parameter | median error | worst error | intervals that hold | identified |\n|---|---|---|---|---|')

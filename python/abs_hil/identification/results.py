@@ -91,19 +91,26 @@ def _comment(text: str) -> str:
     return ''.join(c if c.isprintable() else '?' for c in text)
 
 
-def equivalent_tyre(base: Any, values: Mapping[str, float]) -> dict[str, float]:
-    """theta_N, B and C of the magic formula whose force is nearest to that of the plant `base` with these values while the
-    brake holds the wheel at each slip."""
-    import scipy.optimize
-    slip = np.linspace(0.005, 0.6, 120)
-    omega2 = np.full(slip.shape, 100.0)
+#: where the curves of two tyres are compared
+SLIP = np.linspace(0.005, 0.6, 120)
+
+
+def braking_force_N(base: Any, values: Mapping[str, float]) -> np.ndarray:
+    """The tyre's force of the plant `base` with these values while the brake holds the wheel at each SLIP."""
+    omega2 = np.full(SLIP.shape, 100.0)
     r1 = values['r1_m']
-    omega1 = omega2 * values['r2_m'] / r1 * (1 - slip)
-    torque = np.zeros(slip.shape)
+    omega1 = omega2 * values['r2_m'] / r1 * (1 - SLIP)
+    force = np.zeros(SLIP.shape)
     for _ in range(8):  # the lever's load grows with the brake's torque
-        force = np.asarray(_core.tyre_forces_N(base, list(values.items()), omega1, omega2, torque))
-        torque = np.maximum(0.0, r1 * force)
-    fit = scipy.optimize.least_squares(lambda x: x[0] * np.sin(x[2] * np.arctan(x[1] * slip)) - force,
+        force = np.asarray(_core.tyre_forces_N(base, list(values.items()), omega1, omega2, np.maximum(0.0, r1 * force)))
+    return force
+
+
+def equivalent_tyre(base: Any, values: Mapping[str, float]) -> dict[str, float]:
+    """theta_N, B and C of the magic formula whose force is nearest to that of the plant `base` with these values."""
+    import scipy.optimize
+    force = braking_force_N(base, values)
+    fit = scipy.optimize.least_squares(lambda x: x[0] * np.sin(x[2] * np.arctan(x[1] * SLIP)) - force,
                                        (float(force.max()), 25.0, 1.5), bounds=((0.1, 1.0, 0.8), (499.0, 199.0, 2.0)))
     return {'theta_N': float(fit.x[0]), 'B': float(fit.x[1]), 'C': float(fit.x[2])}
 
