@@ -21,6 +21,8 @@ START_SPEED_RAD_S = 170.0
 #: seed of the plants' perturbations; no evaluation uses it (`abs_hil compare` starts from 1)
 PLANTS_SEED = 20_150_401
 FAULT_COST = 3.0
+#: three times what a locked wheel needs; a stop that takes longer is as bad as none
+BRAKE_LIMIT_S = 10.0
 #: neither measures slip nor has a slip reference
 WITHOUT_REFERENCE = ('five-phase',)
 
@@ -66,7 +68,8 @@ class Training:
 
     def arguments(self, plant: str, controller: str, values: dict[str, float | bool]) -> dict[str, Any]:
         return {'controller': controller, 'plant': plant, 'model': self.model,
-                'set': {'experiment.start_speed_rad_s': START_SPEED_RAD_S, **values}}
+                'set': {'experiment.start_speed_rad_s': START_SPEED_RAD_S, 'experiment.brake_limit_s': BRAKE_LIMIT_S,
+                        **values}}
 
 
 @dataclass
@@ -87,7 +90,7 @@ def cost_of(study: Study, follows_slip: bool, locked_m: np.ndarray, obedient_m: 
         max(D, D_ref) / D_locked + 2 slip RMS error + 0.2 slip overshoot + 0.5/s time locked
         + 1e-4 (torque variation / largest torque)
 
-    and FAULT_COST for a run that ends by a fault or never stops. Stopping shorter than the wanted slip allows earns
+    and FAULT_COST for a run that ends by a fault or does not stop within BRAKE_LIMIT_S. Stopping shorter than the wanted slip allows earns
     nothing: a law that stays near the peak of friction disobeys. A controller without a slip reference has D and no slip
     terms.
     """
