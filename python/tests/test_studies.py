@@ -60,6 +60,7 @@ def test_columns_are_those_of_all_rows(folder):
     assert list(some) == ['plant.theta_N', 'controller', 'stop_distance_m']
     table, map_ = results.quantiles(), results.map('plant.theta_N', 'plant.B', 'stop_distance_m', bins=2)
     pandas.testing.assert_frame_equal(some, results.data[list(some)])
+    assert list(results.columns(['run', 'controller', 'run'])) == ['run', 'controller']
     # The same from all rows as from the columns alone.
     pandas.testing.assert_frame_equal(table, results.quantiles())
     pandas.testing.assert_frame_equal(map_, results.map('plant.theta_N', 'plant.B', 'stop_distance_m', bins=2))

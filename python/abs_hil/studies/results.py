@@ -70,11 +70,12 @@ class StudyResults:
                                        na_values={name: ['nan'] for name in [*self.factors, *self.metrics]})
 
     def columns(self, names: Sequence[str]) -> pandas.DataFrame:
-        """Some columns of all rows, one a run, in order. Metrics of a run that has none are NaN."""
+        """Some columns of all rows, each once, one row a run, in order. Metrics of a run that has none are NaN."""
         import pandas
+        names = list(dict.fromkeys(names))
         if self._data is not None:
-            return self._data[list(names)]
-        if missing := [name for name in dict.fromkeys(names) if name not in self._columns]:
+            return self._data[names]
+        if missing := [name for name in names if name not in self._columns]:
             self._columns.update(self._read(missing))
         return pandas.DataFrame({name: self._columns[name] for name in names}, copy=False)
 
