@@ -90,9 +90,9 @@ def cost_of(study: Study, follows_slip: bool, locked_m: np.ndarray, obedient_m: 
         max(D, D_ref) / D_locked + 2 slip RMS error + 0.2 slip overshoot + 0.5/s time locked
         + 1e-4 (torque variation / largest torque)
 
-    and FAULT_COST for a run that ends by a fault or does not stop within BRAKE_LIMIT_S. Stopping shorter than the wanted slip allows earns
-    nothing: a law that stays near the peak of friction disobeys. A controller without a slip reference has D and no slip
-    terms.
+    and FAULT_COST for a run that ends by a fault or does not stop within BRAKE_LIMIT_S. Stopping shorter than the wanted
+    slip allows earns nothing: a law that stays near the peak of friction disobeys. A controller without a slip reference
+    has D and no slip terms.
     """
     distance = study['stop_distance_m']
     cost = 0.5 * study['time_locked_s'] + 1e-4 * study['torque_total_variation_Nm'] / max_torque_Nm
