@@ -11,7 +11,7 @@ from ..core import _core
 from ..options import Value, options
 from ..simulation import simulate
 from .estimate import Identified
-from .linear import _keep_normals, linearise, run_filter
+from .linear import keep_normals, linearise, run_filter
 from .logs import Log, motion_of, segments_of
 from .problem import QUIET, WINDOW_DISTURBED_S, WINDOW_S, Disturbances, Fit, Problem, pieces_of
 from .results import plant_settings
@@ -87,7 +87,7 @@ def _information(fit: Fit, log: Log, window_s: float, disturbances: Disturbances
     other = Fit(problem, values, pieces_of(problem, values, window_s), disturbances, window_s,
                 np.array([p.key not in old.fixed and p.key != 'u0' for p in problem.parameters]))
     other.scale = linearise(problem, values, other.pieces)
-    N, _ = _keep_normals(other, run_filter(other, disturbances)[1])
+    N, _ = keep_normals(other, run_filter(other, disturbances)[1])
     chosen = [fit.keys.index(key) for key in other.keys]
     out = np.zeros((len(fit.keys), len(fit.keys)))
     ratio = fit.scale[chosen] / other.scale

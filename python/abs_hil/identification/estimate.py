@@ -11,10 +11,12 @@ import numpy as np
 from ..core import _core
 from ..options import PathLike, options
 from . import discs, intervals, rate_limit
-from .fit import CONVERGED, ROUNDS, describe, disturbed_fit, finish_fit, likely_u0, start_fit
-from .linear import _keep_normals, linearise, run_filter, solved, step
+from .delay import with_delay
+from .fit import ROUNDS, describe, disturbed_fit, finish_fit, likely_u0, start_fit
+from .forms import better_form
+from .linear import step
 from .logs import Log, load_log
-from .parameters import COMBINATIONS, DELAY, FORMS, GIVEN, RATE_LIMIT, WHEELS, checked_keys, disc_of
+from .parameters import COMBINATIONS, DELAY, FORMS, GIVEN, RATE_LIMIT, WHEELS, checked_keys
 from .problem import LARGEST_QUIET_RMS, QUIET, Disturbances, Fit, Problem
 
 #: an estimate whose standard deviation is above this share of its value is not called identified
@@ -25,14 +27,8 @@ LARGEST_WIDTH = 0.25
 UNCERTAIN_PART = 0.01
 #: a log whose own estimate lies this far from the others' is named: chi-square over its degrees of freedom
 LARGEST_DISAGREEMENT = 6.0
-#: a difference of -2 log likelihood that decides between the forms, and one that does so at first values already
-CLEAR_DIFFERENCE = 500.0
-CLEAR_AT_FIRST = 5000.0
 #: of a parameter in its relative change: a log with less does not speak of it
 LEAST_INFORMATION = 10.0
-#: a delay is believed if it is this many standard deviations from 0
-SURE_DELAY = 6.0
-LARGEST_DELAY_S = 0.02
 #: the disturbances take up what the model lacks, so a fit that follows the logs has 0.3 counts RMS also on a rig that wanders
 LARGEST_RMS = 1.0
 #: friction, brake and motor of no rig wander this far; what else the model or the logs lack does
@@ -124,7 +120,7 @@ def identify(logs: Sequence[PathLike | Log], start: PathLike = 'paper-table1', *
             notes.append(f'{FORMS[name].meaning}: cannot be fitted ({error})')
     if not fits:
         raise ValueError(f'no form of the plant can be fitted to these logs: {"; ".join(notes[-2:])}')
-    fit = fits[0] if len(fits) == 1 else _better_form(fits, start_form, check, say, notes)
+    fit = fits[0] if len(fits) == 1 else better_form(fits, start_form, check, say, notes)
     try:
         finished = _finished(fit, seed, say, check)
     except KeyboardInterrupt:
@@ -174,7 +170,7 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
                          ) from None
     if not np.isfinite(fit.rms_counts):
         raise ValueError('the fit does not converge: these logs are not of a rig that the plant describes')
-    fit = _with_delay(fit, check, say)
+    fit = with_delay(fit, check, say)
     if fit.rms_counts <= LARGEST_QUIET_RMS:
         limited = rate_limit.sought(fit, QUIET, check)
         if limited is not fit:
@@ -236,75 +232,6 @@ def _refuse_swapped(logs: Sequence[Log]) -> None:
             raise ValueError(f'"{log.path}": upper_counts and lower_counts seem to be swapped: the upper wheel turns '
                              f'{ratios[0]:.4f} times as far as the lower one while the brake acts, but {ratios[1]:.4f} times '
                              'while both roll')
-
-
-def _better_form(fits: Sequence[Fit], start_form: str, check: Callable[[], None], say: Callable[[str], None],
-                 notes: list[str]) -> Fit:
-    """The form that better predicts each log from all the others, by the likelihood. Large disturbances and first values
-    are enough if they show a clear difference already."""
-    costs = [_cross_validated(fit) for fit in fits]
-    if abs(costs[0] - costs[1]) < CLEAR_AT_FIRST:
-        for number, fit in enumerate(fits):
-            for _ in range(2):
-                step(fit, ROUNDS[1][0], check)
-            costs[number] = _cross_validated(fit)
-        follow = [_follows(fit, check) for fit in fits] if abs(costs[0] - costs[1]) > CLEAR_DIFFERENCE else []
-        if sum(follow) == 1:
-            best = follow.index(True)
-            notes.append(f'form: {fits[best].problem.form.meaning}; it alone follows the logs to the steps of the counts')
-            return fits[best]
-    for fit, cost in zip(fits, costs):
-        say(f'{fit.problem.form.meaning}: -2 log likelihood of left-out logs {cost:.6g}')
-    best = int(np.argmin(costs))
-    starts = [i for i, fit in enumerate(fits) if fit.problem.form.name == start_form]
-    if abs(costs[0] - costs[1]) < CLEAR_DIFFERENCE and starts:
-        notes.append('the logs do not tell the form of tyre and load; it is that of the start. Run: slip-sweep or locked-stop')
-        return fits[starts[0]]
-    notes.append(f'form: {fits[best].problem.form.meaning}; it predicts left-out logs better (-2 log likelihood lower by '
-                 f'{abs(costs[0] - costs[1]):.3g})')
-    return fits[best]
-
-
-def _follows(fit: Fit, check: Callable[[], None]) -> bool:
-    """Whether nothing but the steps of the counts is left between the logs and this form."""
-    try:
-        return finish_fit(fit.copy(), check).rms_counts <= LARGEST_QUIET_RMS
-    except (ValueError, np.linalg.LinAlgError):
-        return False
-
-
-def _cross_validated(fit: Fit) -> float:
-    N, n = fit.normal.sum(axis=0), fit.right.sum(axis=0)
-    if len(fit.normal) == 1:
-        return float(fit.cost.sum() - n @ solved(fit, N, n))
-    total = 0.0
-    keys = fit.keys
-    for log, (Nl, nl, cl) in enumerate(zip(fit.normal, fit.right, fit.cost)):
-        x = solved(fit, N - Nl, n - nl)
-        # Where its counters began, only the log itself can tell.
-        own = [keys.index(p.key) for wheel in fit.problem.discs for p in disc_of(wheel, log)]
-        x[own] = 0.0
-        x[own] = np.linalg.solve(Nl[np.ix_(own, own)] + 1e-9 * np.eye(len(own)), nl[own] - Nl[own] @ x)
-        total += float(cl - 2 * nl @ x + x @ Nl @ x)
-    return total
-
-
-def _with_delay(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit:
-    """Adds the inputs' delay if the logs are sure of one, and if then only the counts' steps disturb."""
-    problem = dataclasses.replace(fit.problem, with_delay=True)
-    late = fit.copy(problem=problem, free=np.append(fit.free, True), values={**fit.values, DELAY: 0.0})
-    late.scale = linearise(problem, late.values, late.pieces, check)
-    N, n = _keep_normals(late, run_filter(late, QUIET)[1])
-    x = solved(late, N, n)[-1]
-    if x < SURE_DELAY * float(np.sqrt(late.covariance()[-1, -1])) or not 2e-5 < x * late.scale[-1] < LARGEST_DELAY_S:
-        return fit
-    for _ in range(8):
-        if step(late, QUIET, check) < CONVERGED:
-            break
-    if late.rms_counts > LARGEST_QUIET_RMS:
-        return fit
-    say(f'the inputs act {1e3 * late.values[DELAY]:.3g} ms late')
-    return late
 
 
 def _assembled(finished: Finished, start: str, notes: list[str]) -> Identified:

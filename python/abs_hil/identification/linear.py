@@ -186,7 +186,7 @@ def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambd
     fit.disturbances = disturbances
     fit.scale = linearise(problem, fit.values, fit.pieces, check)
     _, found = run_filter(fit, disturbances)
-    N, n = _keep_normals(fit, found)
+    N, n = keep_normals(fit, found)
     values = np.array([fit.values[p.key] for p in problem.parameters])
     # Sizes that cannot vanish move by factors: where the logs know only a product, its factors move along straight lines.
     sizes = np.array([not p.floor and p.key != DELAY for p in problem.parameters])
@@ -204,7 +204,7 @@ def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambd
     return float(np.sqrt(x @ (N + np.diag(fit.prior()[0])) @ x))
 
 
-def _keep_normals(fit: Fit, found: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
+def keep_normals(fit: Fit, found: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
     logs, n = len(fit.problem.logs), len(fit.scale)
     fit.normal, fit.right, fit.cost = np.zeros((logs, n, n)), np.zeros((logs, n)), np.zeros(logs)
     fit.readings = 0.0
