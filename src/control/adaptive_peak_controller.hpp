@@ -1,6 +1,9 @@
 #pragma once
 
+#include <numbers>
+
 #include "abs_hil/control/slip_error_dynamics.hpp"
+#include "control/law_controller.hpp"
 #include "control/slip_error_integral.hpp"
 #include "control/slip_peak_estimator.hpp"
 #include "control/wheel_force_observer.hpp"
@@ -12,41 +15,138 @@ namespace abs_hil::control {
 /// (docs/theory-beyond.md). WheelForceObserver estimates speeds and tyre force from encoders and brake.
 /// SlipPeakEstimator estimates the peak from slip and force. The slip loop follows this peak plus a small sinusoidal
 /// search. The loop is (16) with the observed force in place of theta phi. It compensates the brake's lag as
-/// AdaptiveActuatorController does. It does not use `rig.tyre`. theta_est_N is the estimated peak force, and slip_ref
-/// is the controller's own reference.
-class AdaptivePeakController final : public SlipController {
+/// AdaptiveActuatorLaw does. It does not use `rig.tyre`. theta_est_N is the estimated peak force, and slip_ref is the
+/// controller's own reference.
+template <class S>
+class AdaptivePeakLaw {
  public:
-  /// Throws std::invalid_argument for options out of range.
-  explicit AdaptivePeakController(const ControllerContext& context);
+  static constexpr bool estimates_theta = true;
 
-  void reset(const SlipInput& input) noexcept override;
-  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
+  AdaptivePeakLaw() = default;
+  /// Throws std::invalid_argument for options out of range.
+  explicit AdaptivePeakLaw(const ControllerContext& context)
+    requires std::is_same_v<S, double>;
+
+  void reset(const BasicSlipInput<S>& input) noexcept;
+  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept;
 
  private:
   /// The slip reference now, and its rate.
   struct Reference {
-    double slip;
-    double rate_per_s;
+    S slip;
+    S rate_per_s;
   };
 
-  void learn(double dt_s, double slip) noexcept;
-  [[nodiscard]] Reference next_reference(double dt_s) noexcept;
-  [[nodiscard]] double command_Nm(const SlipInput& input, double slip, const Reference& reference,
-                                  double error_m_s) const noexcept;
+  void learn(const S& dt_s, const S& slip) noexcept;
+  [[nodiscard]] Reference next_reference(const S& dt_s) noexcept;
+  [[nodiscard]] S command_Nm(const BasicSlipInput<S>& input, const S& slip, const Reference& reference,
+                             const S& error_m_s) const noexcept;
 
-  AdaptivePeakOptions options_;
-  rig::WheelParameters wheels_;
-  BrakeLag lag_;
-  double v_min_m_s_;
-  double period_s_;
-  WheelForceObserver observer_;
-  SlipPeakEstimator peak_;
-  SlipErrorIntegral integral_;
-  double centre_{0.0};  ///< of the search
-  double time_s_{0.0};  ///< since the start of braking
+  paper::Laws<S> laws_{};
+  paper::Gains<S> gains_{};
+  BasicBrakeLag<S> lag_{};
+  S v_min_m_s_{0.0};
+  S period_s_{0.0};
+  S lag_decay_{0.0};  ///< part of the torque error that decays in a period, negative
+  S slip_min_{0.0};
+  S slip_max_{0.0};
+  S slip_start_{0.0};
+  S slip_rate_per_s_{0.0};
+  S search_part_{0.0};
+  S search_min_{0.0};
+  S search_rad_s_{0.0};
+  BasicWheelForceObserver<S> observer_{};
+  BasicSlipPeakEstimator<S> peak_{};
+  BasicSlipErrorIntegral<S> integral_{};
+  S centre_{0.0};            ///< of the search
+  S search_angle_rad_{0.0};  ///< within [-pi, pi]
   /// Slip after two equal lags. Together they delay it as long as the force estimate is delayed.
-  double half_late_slip_{0.0};
-  double late_slip_{0.0};
+  S half_late_slip_{0.0};
+  S late_slip_{0.0};
+};
+
+template <class S>
+void AdaptivePeakLaw<S>::reset(const BasicSlipInput<S>& input) noexcept {
+  observer_.reset(input.speeds);
+  peak_.reset();
+  centre_ = slip_start_;
+  integral_.reset(slip_velocity_error_m_s(laws_, input.speeds, centre_), centre_);
+  search_angle_rad_ = S(0.0);
+  half_late_slip_ = late_slip_ = S(0.0);
+}
+
+template <class S>
+void AdaptivePeakLaw<S>::learn(const S& dt_s, const S& slip) noexcept {
+  if (!rig::any(dt_s > 0.0)) return;
+  const S covered = -rig::exponential_less_one(S(-2.0 * dt_s / observer_.force_delay_s()));
+  half_late_slip_ += covered * (slip - half_late_slip_);
+  late_slip_ += covered * (half_late_slip_ - late_slip_);
+  peak_.update(dt_s, late_slip_, observer_.force_N());
+}
+
+template <class S>
+typename AdaptivePeakLaw<S>::Reference AdaptivePeakLaw<S>::next_reference(const S& dt_s) noexcept {
+  constexpr double turn_rad = 2.0 * std::numbers::pi;
+  const S target = rig::clamped(peak_.peak_slip(), slip_min_, slip_max_);
+  const S most = slip_rate_per_s_ * dt_s;
+  const S step = rig::clamped(S(target - centre_), S(-most), most);
+  centre_ += step;
+  const S angle = search_angle_rad_ + search_rad_s_ * dt_s;
+  search_angle_rad_ = angle - turn_rad * rig::round_down(S(angle / turn_rad + 0.5));
+  const S swing = rig::larger(S(search_part_ * centre_), search_min_);
+  return {.slip = centre_ + swing * rig::sine(search_angle_rad_),
+          .rate_per_s =
+              rig::select(dt_s > 0.0, S(step / dt_s), S(0.0)) + swing * search_rad_s_ * rig::cosine(search_angle_rad_)};
+}
+
+template <class S>
+BasicSlipOutput<S> AdaptivePeakLaw<S>::step(const BasicSlipInput<S>& input) noexcept {
+  observer_.update(input);
+  const rig::BasicWheelSpeeds<S> speeds = observer_.speeds();
+  const S v_x = laws_.r2 * speeds.omega2_rad_s;
+  const S slip = rig::wheel_slip(S(laws_.r1 * speeds.omega1_rad_s), v_x, v_min_m_s_);
+  learn(input.dt_s, slip);
+  const Reference reference = next_reference(input.dt_s);
+
+  const S error_m_s = slip_velocity_error_m_s(laws_, speeds, reference.slip);
+  integral_.advance(input, error_m_s, reference.slip, v_x);
+  return {.brake_torque_Nm = command_Nm(input, slip, reference, error_m_s),
+          .slip_velocity_error_m_s = error_m_s,
+          .theta_est_N = peak_.peak_force_N(),
+          .slip_ref = reference.slip};
+}
+
+template <class S>
+S AdaptivePeakLaw<S>::command_Nm(const BasicSlipInput<S>& input, const S& slip, const Reference& reference,
+                                 const S& error_m_s) const noexcept {
+  const rig::BasicWheelSpeeds<S> speeds = observer_.speeds();
+  const S v_x = rig::larger(S(laws_.r2 * speeds.omega2_rad_s), v_min_m_s_);
+  // The observed force replaces theta phi: theta is the force, and phi is 1.
+  const paper::Reading<S> reading{
+      .omega1 = speeds.omega1_rad_s, .omega2 = speeds.omega2_rad_s, .lambda_ref = reference.slip, .phi = S(1.0)};
+  // The observed force is delayed. The curve gives its change with the slip since then.
+  const S force_N = observer_.force_N() + peak_.force_N(slip) - peak_.force_N(late_slip_);
+  const S reference_m_s2 = reference.rate_per_s * v_x;
+
+  // e_v' = -ks0 I - ks1 e_v, as in (16), with a reference that moves and a brake that is off by the observed error.
+  const S nu = paper::Laws<S>::nu(gains_, integral_.value_m(), error_m_s);
+  const S wanted_Nm = laws_.T_b(laws_.xi_1(reading, nu, force_N) + reference_m_s2) - observer_.brake_error_Nm();
+  const auto lags = rig::is_finite(input.max_brake_torque_Nm);
+  if (!rig::any(lags)) return wanted_Nm;
+
+  const WheelMotion<S> motion = wheel_motion(
+      laws_, speeds, slip, reference.slip,
+      {.tyre_force_N = force_N, .brake_torque_Nm = input.brake_torque_Nm + observer_.brake_error_Nm()}, v_min_m_s_);
+  const S wanted_rate_Nm_s = laws_.T_b(paper::Laws<S>::nu(gains_, error_m_s, motion.error_rate_m_s2 - reference_m_s2) +
+                                       laws_.k(reading) * peak_.force_slope_N(slip) * motion.slip_rate_per_s);
+  const S catch_up_Nm = lag_decay_ * (input.brake_torque_Nm - wanted_Nm);
+  return rig::select(lags, lag_.command_Nm(input.brake_torque_Nm, S(period_s_ * wanted_rate_Nm_s + catch_up_Nm)),
+                     wanted_Nm);
+}
+
+class AdaptivePeakController final : public LawController<AdaptivePeakLaw> {
+ public:
+  using LawController::LawController;
 };
 
 }  // namespace abs_hil::control

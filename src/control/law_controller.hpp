@@ -6,8 +6,8 @@
 namespace abs_hil::control {
 
 /// The slip controller of a law that is written over its scalar: `Law<double>` runs in the cycle, a `Law` of packs in
-/// many simulated runs side by side. A law has `reset`, `step` and `take_over` as SlipController has them, and nothing
-/// but scalars of type S as members.
+/// many simulated runs side by side. A law has `reset` and `step` as SlipController has them, `take_over` if it
+/// can, and nothing but scalars of type S as members.
 template <template <class> class Law>
 class LawController : public SlipController {
  public:
@@ -17,10 +17,14 @@ class LawController : public SlipController {
   void reset(const SlipInput& input) noexcept override { law_.reset(input); }
   [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override { return law_.step(input); }
   [[nodiscard]] bool take_over(const SlipController& before) noexcept override {
-    const auto* other = dynamic_cast<const LawController*>(&before);
-    if (other == nullptr) return false;
-    law_.take_over(other->law_);
-    return true;
+    if constexpr (requires(const Law<double>& other) { law_.take_over(other); }) {
+      const auto* other = dynamic_cast<const LawController*>(&before);
+      if (other == nullptr) return false;
+      law_.take_over(other->law_);
+      return true;
+    } else {
+      return SlipController::take_over(before);
+    }
   }
 
   [[nodiscard]] const Law<double>& law() const noexcept { return law_; }

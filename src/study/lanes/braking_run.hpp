@@ -271,7 +271,7 @@ void BrakingRun<S, Law, Tyre, Load>::decide(const S& dt_s, bool begins) noexcept
   analysis::BrakingSample<S> sample{.time_s = time_s,
                                     .v_x_m_s = rig.v_x_m_s(),
                                     .slip = rig.slip(),
-                                    .slip_ref = slip_ref,
+                                    .slip_ref = rig::select(rig::is_nan(output.slip_ref), slip_ref, output.slip_ref),
                                     .theta_est_N = output.theta_est_N,
                                     .theta_N = rig.peak_force_N()};
   send(rig::select(braking, output.brake_torque_Nm, sequence.hold_torque_Nm), dt_s, braking, sample);

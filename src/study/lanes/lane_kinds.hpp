@@ -4,6 +4,7 @@
 #include "abs_hil/plant_sim/tyre_models.hpp"
 #include "control/adaptive_actuator_controller.hpp"
 #include "control/adaptive_controller.hpp"
+#include "control/adaptive_peak_controller.hpp"
 #include "control/five_phase_controller.hpp"
 #include "control/locked_controller.hpp"
 #include "control/nominal_controller.hpp"
@@ -27,7 +28,8 @@
   ABS_HIL_LANE_PLANTS(each, control::FivePhaseLaw)           \
   ABS_HIL_LANE_PLANTS(each, control::LockedLaw)              \
   ABS_HIL_LANE_PLANTS(each, control::SlidingModeActuatorLaw) \
-  ABS_HIL_LANE_PLANTS(each, control::AdaptiveActuatorLaw)
+  ABS_HIL_LANE_PLANTS(each, control::AdaptiveActuatorLaw)    \
+  ABS_HIL_LANE_PLANTS(each, control::AdaptivePeakLaw)
 #define ABS_HIL_LANE_PLANTS(each, law)                                  \
   each(law, plant_sim::BasicMagicFormula, plant_sim::BasicConstantLoad) \
       each(law, plant_sim::BasicIntecoMu, plant_sim::BasicLeverLoad)

@@ -218,11 +218,12 @@ TEST_CASE("every run of a batch has the bits of simulate, whatever runs beside i
   }
 }
 
-TEST_CASE("every law but a user's and the two that learn the tyre's curve has lanes, on every plant, road and drift") {
+TEST_CASE("every law but a user's and three others has lanes, on every plant, road and drift") {
   REQUIRE(registered);
   std::mt19937_64 generator(23);
   for (const control::ControllerEntry& entry : control::controllers()) {
-    const bool scalar = entry.name == "adaptive-peak" || entry.name == "adaptive-optimal" || entry.name == own_name;
+    const bool scalar = entry.name == "adaptive-optimal" || entry.name == "braking-stiffness" ||
+                        entry.name == "mixed-slip-deceleration" || entry.name == own_name;
     for (const char* plant : {"paper-table1", "inteco-manual"}) {
       Case c{settings_of(plant), {}};
       c.settings.control.controller = entry.name;
@@ -247,6 +248,55 @@ TEST_CASE("every law but a user's and the two that learn the tyre's curve has la
         REQUIRE(outcomes[i].refusal == alone[i].refusal);
         REQUIRE(same_bits(outcomes[i].run, alone[i].run));
       }
+    }
+  }
+}
+
+TEST_CASE("adaptive-peak has the bits of simulate with any gains, rates and jumps of friction") {
+  // Its samples lie in rings, in which each lane has a place of its own.
+  const std::vector<config::Settings> plants{settings_of("paper-table1"), settings_of("inteco-manual")};
+  std::mt19937_64 generator(20261123);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  const auto scaled = [&](double& value, double most) {
+    value *= std::exp(std::log(most) * (2.0 * uniform(generator) - 1.0));
+  };
+  std::vector<Case> cases;
+  for (int i = 0; i < 2000; ++i) {
+    Case c{plants[generator() % plants.size()], {}};
+    c.settings.control.controller = "adaptive-peak";
+    auto& o = c.settings.control.adaptive_peak;
+    for (double* value :
+         {&o.ks0, &o.ks1, &o.lag_gain_per_s, &o.slip_rate_per_s, &o.search_rad_s, &o.peak.peak_force0_N,
+          &o.peak.force_drift_per_s, &o.peak.slip_drift_per_s, &o.peak.shape_drift_per_s, &o.peak.force_noise_N2_s,
+          &o.peak.jump_level, &o.peak.jump_hold_s, &o.observer.force_rate_N2_s})
+      scaled(*value, 3.0);
+    o.search_part *= 2.0 * uniform(generator);
+    o.peak.peak_slip0 = o.slip_min + (o.slip_max - o.slip_min) * uniform(generator);
+    // Few rates, so that there are packs in which the runs have jumps at different times.
+    constexpr double rates_Hz[]{500.0, 1000.0, 1490.0, 2000.0};
+    c.settings.control.rate_Hz = rates_Hz[generator() % std::size(rates_Hz)];
+    c.settings.experiment.start_speed_rad_s = 60.0 + 140.0 * uniform(generator);
+    c.job.plant = perturbed(c.settings.plant, draw(Variation::standard(), generator(), 0));
+    c.job.seed = generator();
+    draw_conditions(generator, c.job.plant);
+    cases.push_back(std::move(c));
+  }
+  BatchCounts none;
+  const std::vector<Outcome> alone = [&] {
+    const Lanes lanes("none");
+    return batch(cases, 2, none);
+  }();
+  for (const char* set : sets()) {
+    const Lanes lanes(set);
+    BatchCounts counts;
+    const std::vector<Outcome> outcomes = batch(cases, 2, counts);
+    INFO(set << ": " << counts.lanes << " in lanes, " << counts.disturbed << " disturbed, " << counts.scalar
+             << " scalar");
+    CHECK(counts.lanes > cases.size() / 2);
+    for (std::size_t i = 0; i < cases.size(); ++i) {
+      INFO(i << ", seed " << cases[i].job.seed);
+      REQUIRE(outcomes[i].refusal == alone[i].refusal);
+      REQUIRE(same_bits(outcomes[i].run, alone[i].run));
     }
   }
 }
