@@ -26,7 +26,7 @@ BasicSlipPeakEstimator<S>::BasicSlipPeakEstimator(const SlipPeakOptions& options
       force_drift_per_s_{options.force_drift_per_s},
       slip_drift_per_s_{options.slip_drift_per_s},
       shape_drift_per_s_{options.shape_drift_per_s},
-      jump_level_{options.jump_level},
+      jump_part_{options.jump_level},
       jump_hold_s_{options.jump_hold_s},
       log_slip_min_{rig::logarithm(slip_min)},
       log_slip_max_{rig::logarithm(slip_max)},

@@ -93,7 +93,7 @@ class BasicSlipPeakEstimator {
   S force_drift_per_s_{0.0};
   S slip_drift_per_s_{0.0};
   S shape_drift_per_s_{0.0};
-  S jump_level_{0.0};
+  S jump_part_{0.0};
   S jump_hold_s_{0.0};
   S log_slip_min_{0.0};
   S log_slip_max_{0.0};
@@ -186,7 +186,7 @@ auto BasicSlipPeakEstimator<S>::jumped(const S& slip, const S& force_N) const no
   const S past_force_N = rig::element(kept_force_N_, past);
   const S unexplained = force_N - past_force_N - (this->force_N(slip) - this->force_N(past_slip));
   // The curve is least accurate for long moves along it.
-  const S trusted = jump_level_ + rig::magnitude(S(slip - past_slip)) / width_;
+  const S trusted = jump_part_ + rig::magnitude(S(slip - past_slip)) / width_;
   return level_known && kept_count_ > window_ &&
          rig::magnitude(unexplained) > rig::larger(S(jump_least_N), S(peak_force_N_ * trusted));
 }
