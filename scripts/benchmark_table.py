@@ -6,14 +6,12 @@ and the bounds of the nominal cases in docs/optimum.md, between <!-- bounds --> 
 --check fails where a page says something else. Needs the package abs_hil of a build
 (PYTHONPATH=build/release/share/abs_hil/python).
 """
-import pathlib
-import re
 import sys
+
+from marked_tables import keep
 
 import abs_hil
 from abs_hil.benchmark import Entry, bounds, cases, page, run
-
-DOCS = pathlib.Path(__file__).resolve().parent.parent / 'docs'
 
 
 def standing():
@@ -40,18 +38,7 @@ def main():
     if sys.argv[1:] not in (['--check'], ['--write']):
         print(__doc__, file=sys.stderr)
         return 2
-    stale = 0
-    for name, mark, make in (('optimum.md', 'bounds', nominal_bounds), ('benchmark.md', 'benchmark', standing)):
-        marked = re.compile(rf'^(<!-- {mark} -->\n)(.*?)^(<!-- end -->)$', re.MULTILINE | re.DOTALL)
-        text = (DOCS / name).read_text(encoding='utf-8')
-        made = make()
-        current = marked.sub(lambda match, made=made: match[1] + made + match[3], text)
-        if sys.argv[1] == '--write':
-            (DOCS / name).write_text(current, encoding='utf-8')
-        elif current != text:
-            print(f'docs/{name}: the table is stale; scripts/benchmark_table.py --write mends it')
-            stale = 1
-    return stale
+    return keep(sys.argv[1], [('optimum.md', 'bounds', nominal_bounds), ('benchmark.md', 'benchmark', standing)])
 
 
 if __name__ == '__main__':

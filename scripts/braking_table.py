@@ -6,15 +6,14 @@ Keeps two tables of adaptive-optimal in docs/theory-beyond.md, next to adaptive-
 <!-- braking mismatch --> and <!-- end -->. Cases and bounds are those of the benchmark. --write puts them there, --check
 fails where the page says something else. Needs the package abs_hil of a build (PYTHONPATH=build/release/share/abs_hil/python).
 """
-import pathlib
-import re
 import sys
 
 import numpy as np
 
+from marked_tables import keep
+
 from abs_hil.benchmark import Entry, bounds, cases, run
 
-PAGE = pathlib.Path(__file__).resolve().parent.parent / 'docs' / 'theory-beyond.md'
 ROADS = ('even', 'jump', 'patches')
 SEEDS = (1, 2, 3, 4, 5)
 FAST = {'control.rate_Hz': 5000.0}
@@ -68,20 +67,7 @@ def main():
     if sys.argv[1:] not in (['--check'], ['--write']):
         print(__doc__, file=sys.stderr)
         return 2
-    text = current = PAGE.read_text(encoding='utf-8')
-    for mark, make in (('braking', cells), ('braking mismatch', mismatches)):
-        marked = re.compile(rf'^(<!-- {mark} -->\n)(.*?)^(<!-- end -->)$', re.MULTILINE | re.DOTALL)
-        if not marked.search(current):
-            print(f'{PAGE}: the line <!-- {mark} --> is missing', file=sys.stderr)
-            return 1
-        made = make()
-        current = marked.sub(lambda match, made=made: match[1] + made + match[3], current)
-    if sys.argv[1] == '--write':
-        PAGE.write_text(current, encoding='utf-8')
-    elif current != text:
-        print('docs/theory-beyond.md: the tables of braking are stale; scripts/braking_table.py --write mends them')
-        return 1
-    return 0
+    return keep(sys.argv[1], [('theory-beyond.md', 'braking', cells), ('theory-beyond.md', 'braking mismatch', mismatches)])
 
 
 if __name__ == '__main__':

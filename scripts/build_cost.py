@@ -13,9 +13,8 @@ import subprocess
 import sys
 import tempfile
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-PAGE = ROOT / 'docs' / 'performance.md'
-BEGIN, END = '<!-- build cost -->\n', '<!-- build cost end -->\n'
+from marked_tables import ROOT, write
+
 
 
 def children_s():
@@ -62,9 +61,7 @@ def main():
     if not arguments.write:
         print(text, end='')
         return
-    page = PAGE.read_text()
-    head, _, rest = page.partition(BEGIN)
-    PAGE.write_text(head + BEGIN + text + rest[rest.index(END):])
+    write('performance.md', 'build cost', text)
 
 
 if __name__ == '__main__':

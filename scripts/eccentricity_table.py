@@ -11,16 +11,13 @@ in docs/plants.md between the lines
 --write puts it there, --check fails where the page says something else. Needs the package abs_hil of a build
 (PYTHONPATH=build/release/share/abs_hil/python).
 """
-import pathlib
-import re
 import sys
 
 import numpy as np
+from marked_tables import keep
 
 import abs_hil
 
-PAGE = pathlib.Path(__file__).resolve().parent.parent / 'docs' / 'plants.md'
-MARKED = re.compile(r'^(<!-- eccentricity -->\n)(.*?)^(<!-- end -->)$', re.MULTILINE | re.DOTALL)
 PLANTS = ('paper-table1', 'paper-timing', 'inteco-manual')
 #: several, because the distance depends on where the discs stand
 PHASES_RAD = ((1.0, -2.0), (-2.5, 0.5))
@@ -69,17 +66,7 @@ def main():
     if sys.argv[1:] not in (['--check'], ['--write']):
         print(__doc__, file=sys.stderr)
         return 2
-    page = PAGE.read_text(encoding='utf-8')
-    if not MARKED.search(page):
-        print(f'{PAGE}: the line <!-- eccentricity --> is missing', file=sys.stderr)
-        return 1
-    current = MARKED.sub(lambda match: match[1] + table() + match[3], page)
-    if sys.argv[1] == '--write':
-        PAGE.write_text(current, encoding='utf-8')
-    elif current != page:
-        print('docs/plants.md: the table of eccentricity is stale; scripts/eccentricity_table.py --write mends it')
-        return 1
-    return 0
+    return keep(sys.argv[1], [('plants.md', 'eccentricity', table)])
 
 
 if __name__ == '__main__':

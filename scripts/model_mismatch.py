@@ -12,19 +12,17 @@ build/release.
 """
 import json
 import pathlib
-import re
 import subprocess
 import sys
 import tempfile
 import tomllib
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-PAGE = ROOT / 'docs' / 'controllers.md'
+from marked_tables import ROOT, keep
+
 PLANT = 'paper-table1'
 WRONG_BY = 0.2
 # heading -> the values of the model that are wrong together
 PARTS = {'J1': ('J1_kg_m2',), 'J2': ('J2_kg_m2',), 'c31': ('c31_per_s',), 'b(u)': ('b1_Nm', 'b2_Nm')}
-MARKED = re.compile(r'^(<!-- model mismatch -->\n)(.*?)^(<!-- end -->)$', re.MULTILINE | re.DOTALL)
 
 
 def controllers(program):
@@ -70,17 +68,7 @@ def main():
         print(__doc__, file=sys.stderr)
         return 2
     program = pathlib.Path(build[0] if build else ROOT / 'build' / 'release').resolve() / 'bin' / 'abs_hil'
-    page = PAGE.read_text(encoding='utf-8')
-    if not MARKED.search(page):
-        print(f'{PAGE}: the line <!-- model mismatch --> is missing', file=sys.stderr)
-        return 1
-    current = MARKED.sub(lambda match: match[1] + table(program) + match[3], page)
-    if mode == '--write':
-        PAGE.write_text(current, encoding='utf-8')
-    elif current != page:
-        print(f'{PAGE.relative_to(ROOT)}: the table of wrong models is stale; scripts/model_mismatch.py --write mends it')
-        return 1
-    return 0
+    return keep(mode, [('controllers.md', 'model mismatch', lambda: table(program))])
 
 
 if __name__ == '__main__':

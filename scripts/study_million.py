@@ -16,9 +16,8 @@ import sys
 import tempfile
 import time
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-PAGE = ROOT / 'docs' / 'cluster.md'
-BEGIN, END = '<!-- million -->\n', '<!-- end of million -->'
+from marked_tables import ROOT, write
+
 TASKS, NODES = 7, 2
 INSIDE = 'ABS_HIL_MILLION_INSIDE'
 
@@ -94,9 +93,7 @@ def main():
         text = table(o, pathlib.Path(folder))
     print(text, end='')
     if o.write:
-        page = PAGE.read_text()
-        head, _, rest = page.partition(BEGIN)
-        PAGE.write_text(head + BEGIN + text + rest[rest.index(END):])
+        write('cluster.md', 'million', text)
     return 0
 
 

@@ -13,9 +13,8 @@ import sys
 import tempfile
 import time
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-PAGE = ROOT / 'docs' / 'cluster.md'
-BEGIN, END = '<!-- plan -->\n', '<!-- end -->'
+from marked_tables import write
+
 STUDY = '''controllers = ["adaptive"]
 chunk = {chunk}
 [design]
@@ -89,9 +88,7 @@ def main():
     if '--write' not in sys.argv:
         print(text)
         return 0
-    page = PAGE.read_text()
-    head, _, rest = page.partition(BEGIN)
-    PAGE.write_text(head + BEGIN + text + rest[rest.index(END):])
+    write('cluster.md', 'plan', text)
     return 0
 
 
