@@ -2,11 +2,7 @@
 
 #include <cstddef>
 
-namespace abs_hil::rig {
-struct Portable;
-struct Avx2;
-struct Avx512;
-}  // namespace abs_hil::rig
+#include "rig/instruction_sets.hpp"
 
 /// Plants of other parameters or states that pass the same inputs side by side: what differences of simulations are
 /// made of. Compiled for each instruction set, as the lanes of a study are.

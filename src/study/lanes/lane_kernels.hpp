@@ -3,11 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace abs_hil::rig {
-struct Portable;
-struct Avx2;
-struct Avx512;
-}  // namespace abs_hil::rig
+#include "rig/instruction_sets.hpp"
 
 /// The compiled loops over packs: one for each instruction set and each combination of law, tyre and load.
 namespace abs_hil::study::lanes {
