@@ -2,12 +2,17 @@
 
 #define FUSE_USE_VERSION 31
 #include <fuse_lowlevel.h>
+#include <spawn.h>
+#include <sys/mount.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <stdexcept>
 
 namespace abs_hil::program {
@@ -188,7 +193,27 @@ fuse_lowlevel_ops operations() {
   return ops;
 }
 
+/// Takes away what an emulator that was killed leaves at `root`: a mount that answers nothing but ENOTCONN.
+void detach_dead_mount(const std::string& root) {
+  struct stat folder {};
+  if (stat(root.c_str(), &folder) == 0 || errno != ENOTCONN) return;
+  if (umount2(root.c_str(), MNT_DETACH) == 0) return;
+  // Without root's rights only fuse3's helper may unmount.
+  std::array<char*, 4> words{const_cast<char*>("fusermount3"), const_cast<char*>("-uz"),
+                             const_cast<char*>(root.c_str()), nullptr};
+  pid_t helper{};
+  int status{-1};
+  if (posix_spawnp(&helper, words[0], nullptr, nullptr, words.data(), environ) == 0) waitpid(helper, &status, 0);
+  if (status != 0)
+    throw std::runtime_error("a killed emulator left a dead mount at " + root + ": run fusermount3 -uz " + root);
+}
+
 }  // namespace
+
+void prepare_mount_folder(const std::string& root) {
+  detach_dead_mount(root);
+  std::filesystem::create_directories(root);
+}
 
 FuseTree::FuseTree(const std::string& root, std::vector<std::string> folders, std::vector<ServedFile> files,
                    FileHandler& handler)

@@ -31,6 +31,10 @@ class FileHandler {
   [[nodiscard]] virtual bool present() const = 0;
 };
 
+/// Makes the folder `root` for a FuseTree if it is missing, and takes away the dead mount that a killed emulator left
+/// there. Throws std::runtime_error with the cause.
+void prepare_mount_folder(const std::string& root);
+
 /// A folder with one folder per card, mounted through FUSE. It has text files like those of sysfs, and files whose
 /// every access goes to the handler, uncached (direct_io). It runs in the caller's thread.
 class FuseTree {

@@ -11,7 +11,6 @@
 #include <atomic>
 #include <cerrno>
 #include <csignal>
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -305,11 +304,11 @@ int serve(Arguments& a) {
   read_plant(a);
   if (a.use_usb) return serve_usb(a);
   if (!a.can_interface.empty()) return serve_node(a);
+  program::prepare_mount_folder(a.pci_root);  // first: the other files are often beside it, in the same new folder
   program::EmulatedCard card(a.emulator);
   obey_first(a, card);
   pin_to(a.cpu);
   take_priority(a);
-  std::filesystem::create_directories(a.pci_root);
   program::FuseTree tree(a.pci_root, a.bdfs, files_of(a), card);
   return serve_until_stopped(
       a, card, "card " + a.bdfs.front() + " in " + a.pci_root, [&tree] { return tree.descriptor(); },

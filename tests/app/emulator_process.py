@@ -73,10 +73,11 @@ class EmulatorTest(ProgramTest):
             emulator.end()
         super().tearDown()  # removes the folder, in which nothing may be mounted any more
 
-    def start_emulator(self, kind, *args):
-        """An EmulatorProcess of this kind with its own folder."""
-        folder = self.folder / str(len(self._emulators))
-        folder.mkdir()
+    def start_emulator(self, kind, *args, folder=None):
+        """An EmulatorProcess of this kind, in a folder of its own unless one is given."""
+        if folder is None:
+            folder = self.folder / str(len(self._emulators))
+            folder.mkdir()
         self._emulators.append(kind(folder, *args))
         return self._emulators[-1]
 

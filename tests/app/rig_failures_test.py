@@ -6,7 +6,7 @@ import subprocess
 import time
 import unittest
 
-from rig_emulator import RigTest, skip_unless_possible
+from rig_emulator import Emulator, RigTest, skip_unless_possible
 
 SAFE = (0.0, 0.0)
 
@@ -99,6 +99,16 @@ class RigFailures(RigTest):
         _, errors = program.communicate(timeout=20)
         self.assertEqual(program.returncode, 1, errors)
         self.assertIn('board is gone', errors)
+
+    def test_emulator_starts_again_where_one_was_killed(self):
+        emulator = self.emulator()
+        emulator.kill_and_leave_mount()
+        with self.assertRaises(OSError):
+            emulator.root.stat()
+        again = self.start_emulator(Emulator, folder=emulator.root.parent)
+        self.assertTrue(any(again.root.iterdir()))
+        self.assertEqual(again.end(), 0)
+        self.assertFalse(any(again.root.iterdir()))
 
     def test_client_ended_by_signals(self):
         for number, status in ((signal.SIGTERM, 143), (signal.SIGINT, 130), (signal.SIGHUP, 129)):

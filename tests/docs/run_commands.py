@@ -116,9 +116,12 @@ class Scratch:
                 (pathlib.Path(self.folder) / entry.name).symlink_to(entry)
         self.environment = dict(os.environ, PATH=f'{build}/bin:' + os.environ['PATH'])
         self.servers = []
+        # What pages put into /tmp goes here: there it may belong to somebody else, or be left from a killed test.
+        self.tmp = tempfile.TemporaryDirectory()
 
     def run(self, command, printed):
         """What is wrong, or None."""
+        command = re.sub(r'(?<![\w.])/tmp/', f'{self.tmp.name}/', command)
         if os.path.basename(first_word(command)) in SERVERS:
             return self.serve(command)
         try:
@@ -154,6 +157,7 @@ class Scratch:
 
     def close(self):
         self.end_servers()
+        self.tmp.cleanup()
         if self.temporary:
             self.temporary.cleanup()
 
@@ -197,6 +201,8 @@ def self_test():
     assert scratch.run('echo one  # status 3', None) is not None
     assert scratch.run('echo one', ['two']) is not None
     assert scratch.run('echo one; false', ['one']) is None
+    assert scratch.run('echo kept > /tmp/of_the_page', None) is None
+    assert pathlib.Path(scratch.tmp.name, 'of_the_page').read_text() == 'kept\n'
     scratch.close()
 
 
