@@ -98,7 +98,7 @@ def test_gentle_braking_tells_only_the_product(logs, start):
 
 
 def test_logs_that_do_not_tell_the_form_keep_the_starts(logs, start):
-    found = abs_hil.identify([logs[0], rows_of(logs[1], int(np.argmax(logs[1].brake_pwm > 0.46)))], start)
+    found = abs_hil.identify(logs[:1], start)  # rolling, and a free wheel
     assert found.form == 'magic-formula'
     assert any('do not tell the form' in note for note in found.notes)
 
@@ -303,6 +303,12 @@ def test_what_is_no_log_is_refused(logs, tmp_path, change, words):
     file.write_text(change(csv_of(logs[2])))
     with pytest.raises(ValueError, match=words):
         load_log(file)
+
+
+def test_wheels_apart_that_the_log_does_not_mark_are_refused(logs, start):
+    unmarked = dataclasses.replace(logs[0], wheels_apart=np.zeros(len(logs[0])))
+    with pytest.raises(ValueError, match='wheels seem to be apart.* column wheels_apart'):
+        abs_hil.identify([unmarked, *logs[1:]], start)
 
 
 def test_swapped_counters_are_refused(logs, start):

@@ -27,6 +27,8 @@ LARGEST_WIDTH = 0.25
 UNCERTAIN_PART = 0.01
 #: a log whose own estimate lies this far from the others' is named: chi-square over its degrees of freedom
 LARGEST_DISAGREEMENT = 6.0
+#: the wheels' radii differ by less than this factor: further from 1, the wheels did not roll on each other
+LARGEST_RATIO = 1.5
 #: of a parameter in its relative change: a log with less does not speak of it
 LEAST_INFORMATION = 10.0
 #: the disturbances take up what the model lacks, so a fit that follows the logs has 0.3 counts RMS also on a rig that wanders
@@ -163,36 +165,45 @@ class Finished:
 
 def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
     say(f'{fit.problem.form.meaning}: fit')
-    try:
-        fit = finish_fit(fit, check)
-    except (ValueError, np.linalg.LinAlgError) as error:
-        raise ValueError(f'the fit does not converge: these logs are not of a rig that the plant describes ({error})'
-                         ) from None
+    # Without disturbances a fit to the logs of a rig that wanders may go anywhere: the other one begins where this one does.
+    undisturbed = _undisturbed(fit.copy(), check, say)
+    quiet = undisturbed is not None and undisturbed.rms_counts <= LARGEST_QUIET_RMS
+    if undisturbed is not None and quiet:
+        fit = undisturbed
+    else:
+        left = f'residual {undisturbed.rms_counts:.3g} counts RMS' if undisturbed is not None else 'no fit without disturbances'
+        say(f'{left}: the rig wanders, or the model lacks something')
+        try:
+            fit = disturbed_fit(fit, check, say)
+            limited = rate_limit.started(fit, check)
+            fit = fit if limited is fit else disturbed_fit(limited, check, say)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            raise ValueError(f'the fit does not converge: these logs are not of a rig that the plant describes ({error})'
+                             ) from None
     if not np.isfinite(fit.rms_counts):
         raise ValueError('the fit does not converge: these logs are not of a rig that the plant describes')
-    fit = with_delay(fit, check, say)
-    if fit.rms_counts <= LARGEST_QUIET_RMS:
-        limited = rate_limit.sought(fit, QUIET, check)
-        if limited is not fit:
-            fit = finish_fit(limited, check)
-    else:
-        near = fit.copy()
-        step(near, ROUNDS[-1][0], check)
-        limited = rate_limit.started(near, check)
-        if limited is not near:
-            fit = finish_fit(limited, check)
-    quiet = fit.rms_counts <= LARGEST_QUIET_RMS
-    if not quiet:
-        say(f'residual {fit.rms_counts:.3g} counts RMS: the rig wanders, or the model lacks something')
-        fit = disturbed_fit(fit, check, say)
-        limited = rate_limit.started(fit, check)
-        fit = fit if limited is fit else disturbed_fit(limited, check, say)
     fit = rate_limit.settle(fit, QUIET if quiet else fit.disturbances, check)
     fit, round_discs = discs.settle(fit, QUIET if quiet else fit.disturbances, check)
     gaps = likely_u0(fit, QUIET if quiet else fit.disturbances, check)
     say('intervals')
     spread = intervals.bootstrap(fit, seed, check=check) if quiet else intervals.information(fit)
     return Finished(fit, spread, gaps, None if quiet else fit.disturbances, round_discs)
+
+
+def _undisturbed(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit | None:
+    """The fit as if nothing disturbed the rig but the counts' steps; None if it ends nowhere."""
+    try:
+        fit = with_delay(finish_fit(fit, check), check, say)
+        if fit.rms_counts <= LARGEST_QUIET_RMS:
+            limited = rate_limit.sought(fit, QUIET, check)
+        else:
+            near = fit.copy()
+            step(near, ROUNDS[-1][0], check)
+            limited = rate_limit.started(near, check)
+            limited = fit if limited is near else limited
+        return fit if limited is fit else finish_fit(limited, check)
+    except (ValueError, np.linalg.LinAlgError):
+        return None
 
 
 def _interrupted(fit: Fit, start: str, notes: list[str]) -> Identified:
@@ -229,9 +240,11 @@ def _refuse_swapped(logs: Sequence[Log]) -> None:
             turned = np.nansum(np.abs(np.diff(log.counts, axis=0))[together], axis=0)
             ratios.append(turned[0] / turned[1] if turned.min() > 200 else np.nan)
         if ratios[0] > 1.02 * ratios[1]:
-            raise ValueError(f'"{log.path}": upper_counts and lower_counts seem to be swapped: the upper wheel turns '
-                             f'{ratios[0]:.4f} times as far as the lower one while the brake acts, but {ratios[1]:.4f} times '
-                             'while both roll')
+            cause = 'upper_counts and lower_counts seem to be swapped'
+            if not 1 / LARGEST_RATIO < ratios[1] < LARGEST_RATIO:
+                cause = 'the wheels seem to be apart at times; give a column wheels_apart that is 1 then and 0 otherwise'
+            raise ValueError(f'"{log.path}": {cause}: the upper wheel turns {ratios[0]:.4f} times as far as the lower one '
+                             f'while the brake acts, but {ratios[1]:.4f} times while neither brake nor motor acts')
 
 
 def _assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
@@ -250,7 +263,7 @@ def _assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
             parameters[p.key] = Estimate(value, value, value, 'fixed', p.unit)
             continue
         if p.key == 'u0':
-            parameters[p.key] = _u0(fit, finished.gaps)
+            parameters[p.key] = _u0(fit, finished.gaps if _known(parameters.get('b1_Nm')) else [])
             if parameters[p.key].status != 'identified':
                 cures.setdefault(p.cure, []).append(p.key)
             continue
@@ -332,8 +345,13 @@ def _discs(finished: Finished, notes: list[str]) -> dict[str, Estimate]:
     return out
 
 
+def _known(estimate: Estimate | None) -> bool:
+    return estimate is not None and estimate.status in ('identified', 'fixed')
+
+
 def _u0(fit: Fit, gaps: list[tuple[float, float, float]]) -> Estimate:
-    """identified if the logs exclude smaller and larger values, bounded if one of them."""
+    """identified if the logs exclude smaller and larger values, bounded if one of them. Without the brake's line, which tells
+    what a duty above u0 does, nothing is excluded."""
     value = fit.values['u0']
     smaller, larger = intervals.excluded(gaps)
     if not (smaller or larger):

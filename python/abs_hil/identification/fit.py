@@ -215,7 +215,7 @@ def disturbed_fit(fit: Fit, check: Callable[[], None] = lambda: None, say: Calla
         if round_number < 3:
             present = likeliest_disturbances(fit, present, 60 if round_number == 0 else 30)
             say(f'disturbances: {describe(present)}')
-    for _ in range(3):
+    for _ in range(6):
         if moved < CONVERGED:
             break
         moved = step(fit, present, check)

@@ -8,10 +8,14 @@ import numpy as np
 
 from ..core import _core
 from .parameters import DELAY, WHEELS, disc_of
-from .problem import COUNT_VARIANCE, Disturbances, Fit, Piece, Problem
+from .problem import COUNT_VARIANCE, Disturbances, Fit, Move, Piece, Problem
 
 #: largest change of a parameter in one iteration, over its size
 LARGEST_STEP = 0.3
+#: a step after which -2 log likelihood is larger by more than this is halved, at most so often. It is that of a linearised
+#: plant, and not exact to less
+LARGEST_RISE = 10.0
+MOST_HALVINGS = 6
 #: how far a piece's first state may move in one iteration: angles, speeds, brake torque
 NEAR_SD = np.array([0.005, 0.005, 0.5, 0.5, 0.1])
 
@@ -183,10 +187,11 @@ def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambd
     """One iteration: linearise, estimate, move parameters and states. Returns how far they moved, in standard deviations:
     of the direction that the logs know best, not of each parameter alone."""
     problem = fit.problem
+    _linearise_where_better(fit, check)
     fit.disturbances = disturbances
-    fit.scale = linearise(problem, fit.values, fit.pieces, check)
     _, found = run_filter(fit, disturbances)
     N, n = keep_normals(fit, found)
+    before = [piece.states for piece in fit.pieces]
     values = np.array([fit.values[p.key] for p in problem.parameters])
     # Sizes that cannot vanish move by factors: where the logs know only a product, its factors move along straight lines.
     sizes = np.array([not p.floor and p.key != DELAY for p in problem.parameters])
@@ -198,10 +203,33 @@ def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambd
     x = solved(fit, N, n, np.maximum(low, -LARGEST_STEP), np.minimum(high, LARGEST_STEP))
     _move_states(fit, disturbances, x)
     with np.errstate(over='ignore'):
-        moved = np.where(sizes, values * np.exp(x), values + fit.scale * x)
+        moved = np.clip(np.where(sizes, values * np.exp(x), values + fit.scale * x), least, most)
+    old = fit.values
     fit.values = {**fit.values, **{p.key: float(v) for p, v in zip(problem.parameters, moved)}}
+    fit.moved = Move(old, fit.values, before, fit.pieces, float(fit.cost.sum()))
     fit.iterations += 1
     return float(np.sqrt(x @ (N + np.diag(fit.prior()[0])) @ x))
+
+
+def _linearise_where_better(fit: Fit, check: Callable[[], None]) -> None:
+    """Linearises at the present values. Where the last step led to worse ones, or to a plant that cannot be, halves it."""
+    last = fit.moved
+    judged = last is not None and last.after is fit.values and last.pieces is fit.pieces
+    for halving in range(MOST_HALVINGS + 1):
+        try:
+            fit.scale = linearise(fit.problem, fit.values, fit.pieces, check)
+            cost = sum(float(one[2][0]) + one[3] for one in filtered(
+                fit.problem, fit.pieces, _relative(fit.problem, fit.values, fit.scale), fit.disturbances,
+                COUNT_VARIANCE * fit.problem.radians_per_count**2)) if judged else 0.0
+        except ValueError:
+            if last is None or not judged or halving == MOST_HALVINGS:
+                raise
+            cost = np.inf
+        if last is None or not judged or cost <= last.cost + LARGEST_RISE:
+            return
+        fit.values = {key: 0.5 * (last.before[key] + value) for key, value in fit.values.items()}
+        for piece, states in zip(fit.pieces, last.states):
+            piece.states = 0.5 * (piece.states + states)
 
 
 def keep_normals(fit: Fit, found: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:

@@ -120,6 +120,16 @@ class Problem:
 
 
 @dataclass
+class Move:
+    """The last step of a fit: values before and after, states before, and -2 log likelihood before."""
+    before: dict[str, float]
+    after: dict[str, float]
+    states: list[np.ndarray]
+    pieces: list[Piece]
+    cost: float
+
+
+@dataclass
 class Fit:
     """values: of all parameters; first: those that the prior holds to. normal: (logs, n, n), right: (logs, n), cost: (logs,)
     of the last linearisation, in the scaled changes x of `scale`: value = nominal + scale x. `free` marks the estimated
@@ -138,6 +148,7 @@ class Fit:
     readings: float = 0.0
     rms_counts: float = np.nan
     iterations: int = 0
+    moved: Move | None = None
 
     def copy(self, **changes: Any) -> Fit:
         """A fit that can go on without this one."""

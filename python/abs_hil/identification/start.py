@@ -23,6 +23,8 @@ from .parameters import RATE_LIMIT, Form
 
 INTERVAL_S = 0.04
 COARSE_S = 0.004
+#: of the brake's line, as a share of the start's: a brake with less did not act
+LEAST_SLOPE = 0.05
 
 
 @dataclass
@@ -209,8 +211,10 @@ def _scan_brake(value: dict[str, float], pieces: _Pieces, logs: Sequence[Log], m
             u0s = sorted({float(u) for u in np.quantile(near, np.linspace(0, 1, 6))} | {best[2]})
     assert best is not None
     linear = dict(zip(_LINEAR, best[1]))
+    # Duties inside the dead zone alone brake nothing: then the brake keeps the start's values.
+    brakes = linear['b1_Nm'] > LEAST_SLOPE * value['b1_Nm']
     for key in _LINEAR:
-        if key in value and key not in fixed:
+        if key in value and key not in fixed and (brakes or key not in ('b1_Nm', 'b2_Nm')):
             value[key] = float(linear[key])
     for key in ('d1_Nms_rad', 'M10_Nm', 'd2_Nms_rad', 'M20_Nm'):
         if key not in fixed:
@@ -219,9 +223,9 @@ def _scan_brake(value: dict[str, float], pieces: _Pieces, logs: Sequence[Log], m
         value['J1_kg_m2'] = max(value['J1_kg_m2'], 1e-4)
     if 'motor_no_load_speed_rad_s' not in fixed and pieces.motor.max(initial=0.0) > 0 and linear['back_emf'] > 0:
         value['motor_no_load_speed_rad_s'] = float(np.clip(value['motor_stall_torque_Nm'] / linear['back_emf'], 20, 2000))
-    if 'u0' not in fixed:
+    if 'u0' not in fixed and brakes:
         value['u0'] = best[2]
-    if 'c31_per_s' not in fixed:
+    if 'c31_per_s' not in fixed and brakes:
         value['c31_per_s'] = best[3]
 
 
