@@ -13,8 +13,10 @@ from abs_hil.core import _core
 from abs_hil.identification import intervals
 from abs_hil.identification.advice import advise, log_of
 from abs_hil.identification.fit import COUNT_VARIANCE, QUIET, Disturbances, Problem, _relative, linearise, pieces_of, start_fit
+from abs_hil.identification.linear import linearise_where_better, step
 from abs_hil.identification.logs import load_log, motion_of, segments_of
 from abs_hil.identification.parameters import FORMS
+from abs_hil.identification.problem import Move
 from abs_hil.identification.program import main
 from abs_hil.identification.results import as_toml
 
@@ -113,6 +115,14 @@ def test_acceleration_alone_promises_nothing_of_brake_and_tyre(logs, start):
     if found.residual_counts_rms > 1.0:  # it then ends far from the truth
         assert any('the model does not follow the logs' in note for note in found.notes)
         assert all(e.low is None for e in found.parameters.values() if e.status != 'fixed')
+
+
+def test_a_brake_that_stays_in_its_dead_zone_promises_nothing_of_itself(logs, start):
+    dead = rows_of(logs[1], int(np.argmax(logs[1].brake_pwm > 0.4)))
+    found = abs_hil.identify([dead], start, form='magic-formula')
+    for name in ('b1_Nm', 'b2_Nm', 'c31_per_s', 'u0'):
+        assert found.parameters[name].status == 'not-identifiable', name
+        assert found.parameters[name].low is None, name
 
 
 def test_logs_of_two_rigs_are_named(logs, start):
@@ -379,3 +389,17 @@ def test_first_values_need_no_good_start(logs, start):
     for name in ('J1_kg_m2', 'theta_N', 'b1_Nm', 'c31_per_s', 'motor_stall_torque_Nm'):
         assert fit.values[name] == pytest.approx(truth_of(name), rel=0.05), name
     assert QUIET.sd.max() == 0.0
+
+
+def test_a_step_that_makes_it_worse_is_halved(logs, start):
+    problem = Problem.of(MAGIC, start, [logs[2]], {})
+    fit = start_fit(problem, {key: value for key, value in problem.base.values().items() if isinstance(value, float)})
+    step(fit, fit.disturbances)
+    good, states = fit.values, [piece.states for piece in fit.pieces]
+    linearise_where_better(fit, lambda: None)
+    cost = float(fit.cost.sum())
+    # Eight times the friction is a plant that no log here comes from: three halvings or more lead back.
+    fit.values = {**good, 'theta_N': 8 * good['theta_N']}
+    fit.moved = Move(good, fit.values, states, fit.pieces, cost)
+    linearise_where_better(fit, lambda: None)
+    assert good['theta_N'] < fit.values['theta_N'] <= 1.9 * good['theta_N']

@@ -10,7 +10,7 @@ import numpy as np
 from ..core import _core
 from ..options import Value, options
 from ..simulation import simulate
-from .estimate import Identified
+from .found import Identified
 from .linear import keep_normals, linearise, run_filter
 from .logs import Log, motion_of, segments_of
 from .problem import QUIET, WINDOW_DISTURBED_S, WINDOW_S, Disturbances, Fit, Problem, pieces_of

@@ -3,8 +3,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -12,62 +10,20 @@ from ..core import _core
 from ..options import PathLike, options
 from . import discs, intervals, rate_limit
 from .delay import with_delay
-from .fit import ROUNDS, describe, disturbed_fit, finish_fit, likely_u0, start_fit
+from .fit import ROUNDS, disturbed_fit, finish_fit, likely_u0, start_fit
 from .forms import better_form
+from .found import Finished, Identified, assembled, interrupted, name_disagreement, without_intervals
 from .linear import step
 from .logs import Log, load_log
-from .parameters import COMBINATIONS, DELAY, FORMS, GIVEN, RATE_LIMIT, WHEELS, checked_keys
-from .problem import LARGEST_QUIET_RMS, QUIET, Disturbances, Fit, Problem
+from .parameters import FORMS, WHEELS, checked_keys
+from .problem import LARGEST_QUIET_RMS, QUIET, Fit, Problem
 
-#: an estimate whose standard deviation is above this share of its value is not called identified
-LARGEST_SD = 0.05
-#: above this share no interval is given at all
-LARGEST_WIDTH = 0.25
-#: a combination is given too if a part of it is less certain than this
-UNCERTAIN_PART = 0.01
-#: a log whose own estimate lies this far from the others' is named: chi-square over its degrees of freedom
-LARGEST_DISAGREEMENT = 6.0
 #: the wheels' radii differ by less than this factor: further from 1, the wheels did not roll on each other
 LARGEST_RATIO = 1.5
-#: of a parameter in its relative change: a log with less does not speak of it
-LEAST_INFORMATION = 10.0
 #: the disturbances take up what the model lacks, so a fit that follows the logs has 0.3 counts RMS also on a rig that wanders
 LARGEST_RMS = 1.0
 #: friction, brake and motor of no rig wander this far; what else the model or the logs lack does
 LARGEST_WANDER = 0.1
-
-
-@dataclass
-class Estimate:
-    """status: identified, bounded, fixed or not-identifiable; low and high hold the truth in 95 % of cases, None where
-    the logs say too little."""
-    value: float
-    low: float | None
-    high: float | None
-    status: str
-    unit: str
-
-
-@dataclass
-class Identified:
-    """What identify() found. parameters: by name with unit; notes: sentences about what the logs do not tell."""
-    form: str
-    start: str
-    parameters: dict[str, Estimate]
-    combinations: dict[str, Estimate]
-    residual_counts_rms: float
-    disturbances: Disturbances | None
-    notes: list[str]
-    logs: list[Log]
-    fit: Fit
-    spread: intervals.Spread
-    disagreement: dict[str, float] = field(default_factory=dict)
-    validation: dict[str, Any] | None = None
-    interrupted: bool = False
-
-    def values(self) -> dict[str, float]:
-        """The plant's keys without "plant." and their values."""
-        return {name: estimate.value for name, estimate in self.parameters.items() if name != DELAY}
 
 
 def _silent(_: str) -> None:
@@ -126,19 +82,19 @@ def identify(logs: Sequence[PathLike | Log], start: PathLike = 'paper-table1', *
     try:
         finished = _finished(fit, seed, say, check)
     except KeyboardInterrupt:
-        return _interrupted(fit, str(start), notes)
-    found = _assembled(finished, str(start), notes)
-    _name_disagreement(found)
+        return interrupted(fit, str(start), notes)
+    found = assembled(finished, str(start), notes)
+    name_disagreement(found)
     if found.residual_counts_rms > LARGEST_RMS:
         found.notes.insert(0, f'the model does not follow the logs: residual {found.residual_counts_rms:.3g} counts RMS, at most '
                            f'{LARGEST_RMS:g} is expected even of a rig that wanders. No interval is given')
-        _without_intervals(found)
+        without_intervals(found)
     elif found.disturbances is not None and found.disturbances.sd[:3].max() > LARGEST_WANDER:
         odd = max(found.disagreement, key=lambda name: found.disagreement[name], default='')
         found.notes.insert(0, f'the logs disagree{f", {odd} most" if odd else ""}: only a rig that wanders by '
                            f'{100 * found.disturbances.sd[:3].max():.2g} % would explain them with one set of parameters. Are '
                            'they of one rig, and of one state of its brake and tyre? No interval is given')
-        _without_intervals(found)
+        without_intervals(found)
     return found
 
 
@@ -150,17 +106,6 @@ def _with_names(logs: list[Log]) -> list[Log]:
         seen[log.name] = seen.get(log.name, 0) + 1
         out.append(log if seen[log.name] == 1 else dataclasses.replace(log, name=f'{log.name} ({seen[log.name]})'))
     return out
-
-
-@dataclass
-class Finished:
-    """The last fit, what its intervals are made of, the disturbances if there are any, and the largest eccentricity of
-    the discs that no log shows."""
-    fit: Fit
-    spread: intervals.Spread
-    gaps: list[tuple[float, float, float]]
-    disturbances: Disturbances | None
-    round_discs: dict[str, float]
 
 
 def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
@@ -206,26 +151,6 @@ def _undisturbed(fit: Fit, check: Callable[[], None], say: Callable[[str], None]
         return None
 
 
-def _interrupted(fit: Fit, start: str, notes: list[str]) -> Identified:
-    """What there is, without intervals."""
-    size = len(fit.problem.parameters)
-    nothing = np.full((size, size), np.nan)
-    found = _assembled(Finished(fit, intervals.Spread(nothing, np.zeros(size), 0, nothing), [], None, {}), start,
-                       ['interrupted: the values are provisional, and no interval is given'])
-    found.notes[1:] = notes
-    _without_intervals(found)
-    found.interrupted = True
-    return found
-
-
-def _without_intervals(found: Identified) -> None:
-    """The values are the last ones of the fit; nothing is promised of them."""
-    for estimate in found.parameters.values():
-        if estimate.status != 'fixed':
-            estimate.status, estimate.low, estimate.high = 'not-identifiable', None, None
-    found.combinations.clear()
-
-
 def _refuse_swapped(logs: Sequence[Log]) -> None:
     """The brake slows the upper wheel: while it acts most, the upper wheel turns less for a turn of the lower one than
     while both roll."""
@@ -245,144 +170,3 @@ def _refuse_swapped(logs: Sequence[Log]) -> None:
                 cause = 'the wheels seem to be apart at times; give a column wheels_apart that is 1 then and 0 otherwise'
             raise ValueError(f'"{log.path}": {cause}: the upper wheel turns {ratios[0]:.4f} times as far as the lower one '
                              f'while the brake acts, but {ratios[1]:.4f} times while neither brake nor motor acts')
-
-
-def _assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
-    fit, spread, disturbances = finished.fit, finished.spread, finished.disturbances
-    problem = fit.problem
-    parameters: dict[str, Estimate] = {}
-    for key, unit in GIVEN.items():
-        parameters[key] = Estimate(problem.given[key], problem.given[key], problem.given[key], 'fixed', unit)
-    cures: dict[str, list[str]] = {}
-    relative: dict[str, float] = {}
-    for i, p in enumerate(problem.parameters):
-        value = fit.values[p.key]
-        if p.acts == 'reading':
-            continue
-        if p.key in problem.fixed:
-            parameters[p.key] = Estimate(value, value, value, 'fixed', p.unit)
-            continue
-        if p.key == 'u0':
-            parameters[p.key] = _u0(fit, finished.gaps if _known(parameters.get('b1_Nm')) else [])
-            if parameters[p.key].status != 'identified':
-                cures.setdefault(p.cure, []).append(p.key)
-            continue
-        sd = float(np.sqrt(np.maximum(spread.covariance[i, i], 0.0))) * float(fit.scale[i])
-        relative[p.key] = sd / max(abs(value), 1e-300)
-        low, high = value - intervals.WIDTH * sd, value + intervals.WIDTH * sd
-        estimate = Estimate(value, max(low, p.least), min(high, p.most), 'identified', p.unit)
-        if value <= p.least or value >= p.most:
-            estimate.status = 'bounded'
-            notes.append(f'{p.key} is at its bound {value:g} {p.unit}')
-        elif not relative[p.key] <= LARGEST_SD:
-            estimate.status = 'not-identifiable'
-            cures.setdefault(p.cure, []).append(p.key)
-            if relative[p.key] > LARGEST_WIDTH or sd == 0.0:
-                estimate.low = estimate.high = None
-        parameters[p.key] = estimate
-    if RATE_LIMIT.key not in parameters:
-        parameters[RATE_LIMIT.key] = _no_rate_limit(fit, notes, cures)
-    parameters.update(_discs(finished, notes))
-    combinations: dict[str, Estimate] = {}
-    for name, (unit, parts, cure) in COMBINATIONS.items():
-        if any(part not in parameters for part in parts):
-            continue
-        value, sd = intervals.combination(fit, spread, name)
-        known = sd <= LARGEST_SD * abs(value)
-        worst = max(relative.get(part, 0.0) for part in parts)
-        if worst <= UNCERTAIN_PART or 3 * sd > worst * abs(value):
-            continue
-        combinations[name] = Estimate(value, value - intervals.WIDTH * sd, value + intervals.WIDTH * sd,
-                                      'identified' if known else 'not-identifiable', unit)
-        if known:
-            joined = ' and '.join((', '.join(parts[:-1]), parts[-1]))
-            notes.append(f'{joined} are known better together, as {name} = {value:.5g} {unit}; to part them, run: {cure}')
-    for cure, keys in cures.items():
-        if cure:
-            notes.append(f'the logs do not tell {", ".join(keys)}; run: {cure}')
-    if disturbances is not None:
-        notes.append(f'the rig wanders ({describe(disturbances)}); the intervals count with it')
-    return Identified(problem.form.name, start, parameters, combinations, fit.rms_counts, disturbances, notes,
-                      list(problem.logs), fit, spread)
-
-
-def _no_rate_limit(fit: Fit, notes: list[str], cures: dict[str, list[str]]) -> Estimate:
-    """The logs show none: 0, the lag alone. A larger one than the logs' fastest change cannot be seen."""
-    problem = fit.problem
-    if RATE_LIMIT.key in problem.fixed:
-        value = problem.fixed[RATE_LIMIT.key]
-        return Estimate(value, value, value, 'fixed', RATE_LIMIT.unit)
-    if not any(log.brake_pwm.any() for log in problem.logs):
-        cures.setdefault(RATE_LIMIT.cure, []).append(RATE_LIMIT.key)
-        return Estimate(0.0, None, None, 'not-identifiable', RATE_LIMIT.unit)
-    notes.append(f'the logs show no limit of the brake\'s rate; one above {rate_limit.fastest_Nm_s(fit, problem.logs):.3g} N m/s '
-                 'would not show')
-    return Estimate(0.0, 0.0, RATE_LIMIT.most, 'bounded', RATE_LIMIT.unit)
-
-
-def _discs(finished: Finished, notes: list[str]) -> dict[str, Estimate]:
-    """The encoders' eccentricity: 0, at most what no log would show, or what the logs say together."""
-    out = {}
-    for wheel in WHEELS:
-        name = f'{wheel}_encoder_eccentricity_rad'
-        if wheel not in finished.fit.problem.discs:
-            out[name] = Estimate(0.0, 0.0, finished.round_discs.get(wheel), 'bounded', 'rad')
-            continue
-        disc = discs.disc(finished.fit, finished.spread, wheel)
-        e, reach = disc.eccentricity_rad, intervals.WIDTH * disc.sd_rad
-        known = disc.sd_rad <= LARGEST_SD * e
-        out[name] = Estimate(e, max(0.0, e - reach), e + reach, 'identified' if known else 'not-identifiable', 'rad')
-        turned = intervals.WIDTH * disc.phase_sd_rad
-        phase = f'{wheel}_encoder_phase_rad'
-        if disc.phase_rad is None:
-            out[phase] = Estimate(0.0, None, None, 'not-identifiable', 'rad')
-            notes.append(f'the {wheel} encoder is eccentric, but its counter began at another place of the disc in each log: so '
-                         'no phase is known, and [model] leaves the eccentricity out; control.observer.learn_eccentricity_s '
-                         'learns it before a braking')
-        else:
-            out[phase] = Estimate(disc.phase_rad, disc.phase_rad - turned, disc.phase_rad + turned,
-                                  'identified' if known else 'not-identifiable', 'rad')
-    return out
-
-
-def _known(estimate: Estimate | None) -> bool:
-    return estimate is not None and estimate.status in ('identified', 'fixed')
-
-
-def _u0(fit: Fit, gaps: list[tuple[float, float, float]]) -> Estimate:
-    """identified if the logs exclude smaller and larger values, bounded if one of them. Without the brake's line, which tells
-    what a duty above u0 does, nothing is excluded."""
-    value = fit.values['u0']
-    smaller, larger = intervals.excluded(gaps)
-    if not (smaller or larger):
-        return Estimate(value, None, None, 'not-identifiable', '1')
-    low, high = intervals.u0_interval(gaps, fit.values)
-    certain = smaller and larger and high - low <= LARGEST_SD * value
-    return Estimate(value, low, high if larger else 1.0, 'identified' if certain else 'bounded', '1')
-
-
-def _name_disagreement(found: Identified) -> None:
-    """Compares each log with all of them: the score of one log at the joint estimate."""
-    fit = found.fit
-    if len(found.logs) == 1:
-        return
-    inverse = np.zeros((len(fit.scale), len(fit.scale)))
-    inverse[np.ix_(fit.free, fit.free)] = fit.covariance()
-    for log, Nl, nl in zip(found.logs, fit.normal, fit.right):
-        told = fit.free & (np.diag(Nl) > LEAST_INFORMATION)
-        d = 1 / np.sqrt(np.diag(Nl)[told])
-        covariance = (Nl - Nl @ inverse @ Nl)[np.ix_(told, told)] * np.outer(d, d)
-        values, vectors = np.linalg.eigh(covariance)
-        kept = values > 1e-3  # what the log has in common with others; the rest is its own, and rounding
-        if kept.any():
-            z = (vectors.T @ (d * nl[told]))[kept] / np.sqrt(values[kept])
-            found.disagreement[log.name] = float(z @ z / kept.sum())
-    odd = {name: ratio for name, ratio in found.disagreement.items() if ratio > LARGEST_DISAGREEMENT}
-    if odd:
-        worst = max(odd, key=lambda name: odd[name])
-        found.notes.append(f'the logs disagree: {worst} most (chi-square per degree of freedom {odd[worst]:.3g}, expected '
-                           '1); is it of another rig, has something changed between the logs, or does the brake fade '
-                           '(--drift brake_torque)? So no interval is given')
-        for estimate in (*found.parameters.values(), *found.combinations.values()):
-            if estimate.status != 'fixed':
-                estimate.status, estimate.low, estimate.high = 'not-identifiable', None, None

@@ -187,7 +187,7 @@ def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambd
     """One iteration: linearise, estimate, move parameters and states. Returns how far they moved, in standard deviations:
     of the direction that the logs know best, not of each parameter alone."""
     problem = fit.problem
-    _linearise_where_better(fit, check)
+    linearise_where_better(fit, check)
     fit.disturbances = disturbances
     _, found = run_filter(fit, disturbances)
     N, n = keep_normals(fit, found)
@@ -211,7 +211,7 @@ def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambd
     return float(np.sqrt(x @ (N + np.diag(fit.prior()[0])) @ x))
 
 
-def _linearise_where_better(fit: Fit, check: Callable[[], None]) -> None:
+def linearise_where_better(fit: Fit, check: Callable[[], None]) -> None:
     """Linearises at the present values. Where the last step led to worse ones, or to a plant that cannot be, halves it."""
     last = fit.moved
     judged = last is not None and last.after is fit.values and last.pieces is fit.pieces

@@ -10,7 +10,7 @@ from ..report.model import Curve, Figure, Label, Panel, Shade, run_style
 from ..report.page import render, view
 from ..report.tables import Table
 from .advice import Advice
-from .estimate import Identified
+from .found import Identified
 from .results import shown
 
 _FOLDER = pathlib.Path(__file__).parent

@@ -10,7 +10,8 @@ from ..core import _core
 from ..files import write_whole
 from ..report.page import Unavailable, plotly_js
 from ..report.text import clean
-from .estimate import Identified, identify
+from .estimate import identify
+from .found import Identified
 from .parameters import FORMS
 from .results import as_json, as_toml, validate, words
 

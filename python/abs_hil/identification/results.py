@@ -13,7 +13,7 @@ from ..core import _core
 from ..options import PathLike, options
 from ..run import Run, load
 from ..simulation import simulate
-from .estimate import Estimate, Identified
+from .found import Estimate, Identified
 from .parameters import DELAY, FORMS, WHEELS
 
 #: keys of a run's configuration that say what the run did, not on what it ran
