@@ -39,6 +39,8 @@ ROUNDS = ((Disturbances.of(0.10, 0.05, 0.2), 2), (Disturbances.of(0.01, 0.005, 0
           (Disturbances.of(1e-3, 1e-4, 1.0), 1), (Disturbances.of(1e-4, 1e-5, 1.0), 1))
 #: an eccentricity below this sways no first value, rad
 SMALL_DISC_RAD = 3e-4
+#: a residual without disturbances that hardly falls from above this, in counts, will not fall to the counts' steps
+HOPELESS_RMS = 10.0
 #: an iteration that moves less, in standard deviations, is the last
 CONVERGED = 0.1
 
@@ -191,12 +193,15 @@ def finish_fit(fit: Fit, check: Callable[[], None] = lambda: None, most: int = 1
 
 
 def _to_rest(fit: Fit, check: Callable[[], None], most: int) -> None:
-    """Steps without disturbances until nothing moves."""
-    before = np.inf
+    """Steps without disturbances until nothing moves, or until it shows that the logs are of a rig that wanders."""
+    before, stalls = np.inf, 0
     for _ in range(most):
         moved = step(fit, QUIET, check)
         # The residual settles last: past the peak the states need some rounds more than the parameters.
         if moved < CONVERGED or (moved < 1.0 and fit.rms_counts > 0.999 * before > LARGEST_QUIET_RMS):
+            break
+        stalls = stalls + 1 if fit.rms_counts > 0.99 * before > HOPELESS_RMS else 0
+        if stalls == 2:
             break
         before = fit.rms_counts
 
