@@ -26,4 +26,4 @@ shared=("${programs[@]:1}" -instr-profile "$build/all.profdata" -compilation-dir
   -ignore-filename-regex '/(build|tests|usr)/')
 llvm-cov-16 export -format=lcov "${shared[@]}" >"$build/lines.lcov"
 llvm-cov-16 show -format=html -show-branches=count -output-dir "$build/html" "${shared[@]}"
-python3 scripts/coverage_table.py "$build/lines.lcov" docs/quality.md
+python3 scripts/coverage_table.py "$build/lines.lcov"

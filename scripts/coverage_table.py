@@ -1,16 +1,15 @@
 #!/usr/bin/env python3
-"""usage: coverage_table.py LINES.lcov PAGE
+"""usage: coverage_table.py LINES.lcov
 
-Writes the export of llvm-cov as Markdown tables into PAGE, between `<!-- begin NAME -->` and `<!-- end NAME -->`. The
-tables are `rooms`, and `files` with the most unreached lines. Status 1 if less than 95 % of the lines outside apps are
-reached.
+Writes the export of llvm-cov as tables into docs/quality.md: by room, and the files with the most unreached lines.
+Status 1 if less than 95 % of the lines outside apps are reached.
 """
 import collections
 import pathlib
-import re
 import sys
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+from marked_tables import ROOT, write
+
 LEAST_LINES_PERCENT = 95.0
 FILES_SHOWN = 15
 
@@ -27,7 +26,7 @@ def percent(reached, of):
 
 def table(head, rows):
     lines = ['| ' + ' | '.join(head) + ' |', '|' + '---|' * len(head)]
-    return '\n'.join(lines + ['| ' + ' | '.join(str(cell) for cell in row) + ' |' for row in rows])
+    return '\n'.join(lines + ['| ' + ' | '.join(str(cell) for cell in row) + ' |' for row in rows]) + '\n'
 
 
 def counts_of_files(export):
@@ -46,17 +45,9 @@ def counts_of_files(export):
     return counts
 
 
-def put(text, name, content):
-    marked = re.compile(rf'(<!-- begin {name} -->\n).*?(<!-- end {name} -->)', re.DOTALL)
-    if not marked.search(text):
-        sys.exit(f'coverage_table.py: the page has no <!-- begin {name} --> with its <!-- end {name} -->')
-    return marked.sub(lambda found: f'{found[1]}{content}\n{found[2]}', text)
-
-
 def main():
-    if len(sys.argv) != 3:
+    if len(sys.argv) != 2:
         sys.exit(__doc__)
-    page = pathlib.Path(sys.argv[2])
     rooms = collections.defaultdict(lambda: [0, 0, 0, 0])
     files = []
     for name, counts in counts_of_files(pathlib.Path(sys.argv[1]).read_text()).items():
@@ -65,13 +56,13 @@ def main():
     apps = rooms.pop('apps')
     outside = [sum(column) for column in zip(*rooms.values())]
     rows = [*sorted(rooms.items()), ('**all outside apps**', outside), ('apps', apps)]
-    text = put(page.read_text(), 'rooms', table(
+    write('quality.md', 'coverage_table.py rooms', table(
         ['room', 'lines', 'reached', 'branches', 'reached'],
         [[room, c[1], percent(c[0], c[1]), c[3], percent(c[2], c[3])] for room, c in rows]))
     weakest = sorted((file for file in files if file[0]), key=lambda file: (-file[0], file[1]))[:FILES_SHOWN]
-    page.write_text(put(text, 'files', table(
+    write('quality.md', 'coverage_table.py files', table(
         ['file', 'lines', 'not reached', 'reached'],
-        [[f'`{name}`', c[1], missed, percent(c[0], c[1])] for missed, name, c in weakest])))
+        [[f'`{name}`', c[1], missed, percent(c[0], c[1])] for missed, name, c in weakest]))
     reached = 100.0 * outside[0] / outside[1]
     print(f'coverage: {reached:.1f} % of the lines outside apps')
     if reached < LEAST_LINES_PERCENT:
