@@ -44,6 +44,7 @@ template <class S>
 struct BasicWheels {
   S r1_m{0.0}, r2_m{0.0};
   S per_J1{0.0}, per_J2{0.0};  ///< reciprocal moments of inertia
+  S r1_per_J1{0.0}, r2_per_J2{0.0};
   S d1_Nms_rad{0.0}, d2_Nms_rad{0.0};
   S M10_Nm{0.0}, M20_Nm{0.0};
 
@@ -53,22 +54,25 @@ struct BasicWheels {
         r2_m(w.r2_m),
         per_J1(1.0 / w.J1_kg_m2),
         per_J2(1.0 / w.J2_kg_m2),
+        r1_per_J1(r1_m * per_J1),
+        r2_per_J2(r2_m * per_J2),
         d1_Nms_rad(w.d1_Nms_rad),
         d2_Nms_rad(w.d2_Nms_rad),
         M10_Nm(w.M10_Nm),
         M20_Nm(w.M20_Nm) {}
 
+  // Each rate needs the force last, because the force takes longest.
   /// omega1' of (1).
   template <class Direction>
   [[nodiscard]] S upper_rate_rad_s2(const S& force_N, const S& brake_Nm, const S& omega1_rad_s,
                                     Direction sliding) const noexcept {
-    return (r1_m * force_N - d1_Nms_rad * omega1_rad_s - sliding * (M10_Nm + brake_Nm)) * per_J1;
+    return r1_per_J1 * force_N - (d1_Nms_rad * omega1_rad_s + sliding * (M10_Nm + brake_Nm)) * per_J1;
   }
   /// omega2' of (2).
   template <class Direction>
   [[nodiscard]] S lower_rate_rad_s2(const S& force_N, const S& motor_Nm, const S& omega2_rad_s,
                                     Direction sliding) const noexcept {
-    return (motor_Nm - r2_m * force_N - d2_Nms_rad * omega2_rad_s - sliding * M20_Nm) * per_J2;
+    return (motor_Nm - d2_Nms_rad * omega2_rad_s - sliding * M20_Nm) * per_J2 - r2_per_J2 * force_N;
   }
 };
 
@@ -181,11 +185,11 @@ struct RollingBalance {
   [[nodiscard, gnu::always_inline]] BasicState<S> operator()(const BasicState<S>& x,
                                                              const S& /*time_s*/) const noexcept {
     const S shape = tyre.shape_at(wheels.r1_m * x[omega1], wheels.r2_m * x[omega2]);
-    return rates_of(wheels, held, load.force_N(friction * shape, upper_torques(x)), Forwards{}, Forwards{}, x);
+    return rates_of(wheels, held, load.force_N(friction, shape, upper_torques(x)), Forwards{}, Forwards{}, x);
   }
   /// Bound on the rate of the slip dynamics. For the magic formula it is theta B C (r1^2/J1 + r2^2/J2) / v_x.
   [[nodiscard]] S fastest_rate_per_s(const BasicState<S>& x) const noexcept {
-    const S mobility_per_kg = wheels.r1_m * wheels.r1_m * wheels.per_J1 + wheels.r2_m * wheels.r2_m * wheels.per_J2;
+    const S mobility_per_kg = wheels.r1_m * wheels.r1_per_J1 + wheels.r2_m * wheels.r2_per_J2;
     return load.steepest_N(friction, upper_torques(x)) * friction *
            tyre.steepest_s_m(wheels.r1_m * x[omega1], wheels.r2_m * x[omega2]) * mobility_per_kg;
   }
