@@ -21,7 +21,16 @@ struct Forwards {
   friend constexpr bool operator==(Forwards, double direction) noexcept { return direction == 1.0; }
 };
 
-/// Torques between the upper wheel and the frame that carries it. `Direction` is `double` or `Forwards`.
+/// A wheel that stands and that its brake holds: the direction of sliding 0.
+struct Held {
+  template <class S>
+  friend constexpr S operator*(Held, const S& /*x*/) noexcept {
+    return S(0.0);
+  }
+  friend constexpr bool operator==(Held, double direction) noexcept { return direction == 0.0; }
+};
+
+/// Torques between the upper wheel and the frame that carries it. `Direction` is `double`, `Forwards` or `Held`.
 template <class S, class Direction>
 struct UpperWheelTorques {
   Direction sliding{};  ///< direction of sliding in bearing and brake: +1, -1, or 0 if they hold the wheel

@@ -130,15 +130,15 @@ struct BrakingRun {
   }
   /// Every later cycle.
   /// @param window_ends  the gate's speed window ends with it
-  /// @param assist  called as assist(where, before) if a wheel stands or stops, or road or drift change: it has to set
+  /// @param assist  called as assist(where, before) if a wheel stops or starts, or road or drift change: it has to set
   ///   the plant's state and conditions there, from the state before the cycle
   template <class Assist>
   void cycle(bool window_ends, const Assist& assist) noexcept {
     time_ns += period_ns;
     const plant_sim::BasicState<S> before = rig.x;
     if (const Condition wrong = rig.advance(period_s, time_ns, duty, sent_Nm); rig::any(wrong)) assist(wrong, before);
-    // With a lever the peak force depends on whether the brake holds the wheel.
-    if constexpr (Load<S>::knows_sliding) disturb(!(rig.x[plant_sim::omega1] > 0.0));
+    // With a lever the peak force depends on the direction in which the wheel turns.
+    if constexpr (Load<S>::knows_sliding) disturb(!(rig.x[plant_sim::omega1] >= 0.0));
     observe(window_ends);
     decide(period_s, false);
   }

@@ -8,7 +8,7 @@
 /// The compiled loops over packs: one for each instruction set and each combination of law, tyre and load.
 namespace abs_hil::study::lanes {
 
-/// A cycle in which a wheel stands or stops, or road or drift change: what lanes cannot compute.
+/// A cycle in which a wheel stops or starts, or road or drift change: what lanes cannot compute.
 struct AssistedCycle {
   std::uint32_t run{0};
   double time_ns{0.0};  ///< at its end, since the run began

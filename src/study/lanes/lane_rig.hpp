@@ -36,7 +36,7 @@ struct LaneRig {
   S duty_steps{0.0};
 
   /// Advances by `duration_s`, to `time_ns`, under a duty of the brake, or an ideal brake's torque. True where a wheel
-  /// stands or stops, or road or drift change: the state is wrong there.
+  /// stops or starts, or road or drift change: the state is wrong there.
   [[gnu::noinline, gnu::flatten]] auto advance(const S& duration_s, const S& time_ns, const S& duty,
                                                const S& torque_Nm) noexcept {
     using namespace plant_sim;
@@ -44,18 +44,16 @@ struct LaneRig {
     const S static_Nm = rig::select(ideal, torque_Nm, rig::brake_torque_at(brake, duty));
     const BrakeAlone<S> held{static_Nm * now.brake_torque, rig::select(ideal, S(0.0), brake.c31_per_s)};
     x[brake_torque] = rig::select(ideal, held.brake_target_Nm, x[brake_torque]);
-    const RollingBalance<S, Tyre, Load, BrakeAlone<S>> balance{tyre, load, now.wheels, held, now.friction};
-    steps = steps_for(duration_s, max_step_s, balance.fastest_rate_per_s(x));
-    const S step_s = duration_s / steps;
-    auto wrong = !(x[omega1] > 0.0 && x[omega2] > 0.0) || time_ns > now.steady_to_ns;
-    for (double made = 0.0;; made += 1.0) {
-      const auto goes_on = S(made) < steps;
-      if (!rig::any(goes_on)) break;
-      const BasicState<S> end = runge_kutta_step(balance, x, step_s);
-      for (std::size_t i = 0; i < x.size(); ++i) x[i] = rig::select(goes_on, end[i], x[i]);
-      wrong = wrong || !(x[omega1] > 0.0 && x[omega2] > 0.0);
+    const auto rolls = x[omega1] > 0.0 && x[omega2] > 0.0;
+    const auto stands = x[omega1] == 0.0 && x[omega2] > 0.0;
+    auto well = rolls;
+    if (rig::any(rolls)) {
+      const RollingBalance<S, Tyre, Load, BrakeAlone<S>> balance{tyre, load, now.wheels, held, now.friction};
+      well = go_on(balance, duration_s, rolls,
+                   [](const BasicState<S>& end) { return end[omega1] > 0.0 && end[omega2] > 0.0; });
     }
-    return wrong || x[angle2] > now.steady_to_angle2_rad;
+    if (rig::any(stands)) well = well || stand(held, duration_s, stands);
+    return !well || time_ns > now.steady_to_ns || x[angle2] > now.steady_to_angle2_rad;
   }
   [[nodiscard]] S counts(const S& angle_rad) const noexcept { return rig::round_down(S(angle_rad / rad_per_count)); }
   [[nodiscard]] S upper_counts() const noexcept { return counts(x[plant_sim::angle1] + upper_offset_rad); }
@@ -66,9 +64,50 @@ struct LaneRig {
   [[nodiscard]] S v_x_m_s() const noexcept { return now.wheels.r2_m * x[plant_sim::omega2]; }
   [[nodiscard]] S slip() const noexcept { return tyre.slip(S(now.wheels.r1_m * x[plant_sim::omega1]), v_x_m_s()); }
   [[nodiscard]] S peak_force_N() const noexcept {
-    const plant_sim::UpperWheelTorques<S, plant_sim::Forwards> torques{
-        {}, now.wheels.M10_Nm + x[plant_sim::brake_torque], now.wheels.d1_Nms_rad * x[plant_sim::omega1]};
-    return load.force_N(now.friction, S(1.0), torques);
+    using namespace plant_sim;
+    const BrakeAlone<S> any{};
+    const RollingBalance<S, Tyre, Load, BrakeAlone<S>> turning{tyre, load, now.wheels, any, now.friction};
+    const S turning_N = load.force_N(now.friction, S(1.0), turning.upper_torques(x));
+    if constexpr (Load::knows_sliding) {
+      const auto stands = x[omega1] == 0.0;
+      if (!rig::any(stands)) return turning_N;
+      const HeldBalance held{tyre, load, now.wheels, any, now.friction};
+      const S held_N = load.force_N(now.friction, S(1.0), held.upper_torques(x));
+      return rig::select(stands && held.holds_upper(x), held_N, turning_N);
+    } else {
+      return turning_N;
+    }
+  }
+
+ private:
+  using HeldBalance = plant_sim::RollingBalance<S, Tyre, Load, plant_sim::BrakeAlone<S>, plant_sim::Held>;
+
+  /// Makes all steps of a cycle in these lanes. True where `well(end)` after each of them.
+  template <class Balance, class Condition, class Well>
+  [[gnu::always_inline]] Condition go_on(const Balance& balance, const S& duration_s, const Condition& where,
+                                         const Well& well) noexcept {
+    using namespace plant_sim;
+    const S needed = steps_for(duration_s, max_step_s, balance.fastest_rate_per_s(x));
+    const S step_s = duration_s / needed;
+    steps = rig::select(where, needed, steps);
+    Condition all_well = where;
+    for (double made = 0.0;; made += 1.0) {
+      const auto goes_on = where && S(made) < needed;
+      if (!rig::any(goes_on)) break;
+      const BasicState<S> end = runge_kutta_step(balance, x, step_s);
+      for (std::size_t i = 0; i < x.size(); ++i) x[i] = rig::select(goes_on, end[i], x[i]);
+      all_well = all_well && well(x);
+    }
+    return all_well;
+  }
+  /// A cycle in which the brake holds the upper wheel. True where it does so throughout.
+  template <class Condition>
+  [[gnu::noinline, gnu::flatten]] Condition stand(const plant_sim::BrakeAlone<S>& held, const S& duration_s,
+                                                  const Condition& stands) noexcept {
+    const HeldBalance balance{tyre, load, now.wheels, held, now.friction};
+    return go_on(balance, duration_s, stands && balance.holds_upper(x), [&](const plant_sim::BasicState<S>& end) {
+      return balance.holds_upper(end) && end[plant_sim::omega2] > 0.0;
+    });
   }
 };
 
