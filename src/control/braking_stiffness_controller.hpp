@@ -1,9 +1,12 @@
 #pragma once
 
-#include <array>
+#include <numbers>
 
-#include "abs_hil/control/controller_context.hpp"
 #include "abs_hil/control/paper_laws.hpp"
+#include "abs_hil/rig/brake_map.hpp"
+#include "abs_hil/rig/tyre_curve.hpp"
+#include "control/full_torque.hpp"
+#include "control/law_controller.hpp"
 #include "control/wheel_force_observer.hpp"
 #include "control/wheel_motion.hpp"
 
@@ -11,49 +14,138 @@ namespace abs_hil::control {
 
 /// Slope of the tyre force over the slip by least squares with fading memory: the extended braking stiffness. Where the
 /// slip has hardly moved, the slope is that of a force proportional to the slip. Real-time safe.
-class BrakingStiffness {
+template <class S>
+class BasicBrakingStiffness {
  public:
+  BasicBrakingStiffness() = default;
   /// @param memory_s  time constant of forgetting, > 0
   /// @param slip_noise  standard deviation of the slip that tells nothing
-  BrakingStiffness(double memory_s, double slip_noise) noexcept : memory_s_{memory_s}, slip_noise_{slip_noise} {}
+  BasicBrakingStiffness(const S& memory_s, const S& slip_noise) noexcept
+      : memory_s_{memory_s}, slip_noise_{slip_noise} {}
 
-  void reset() noexcept;
-  void learn(double dt_s, double slip, double force_N) noexcept;
+  void reset() noexcept { slip_ = force_N_ = variance_ = covariance_N_ = S(0.0); }
+  void learn(const S& dt_s, const S& slip, const S& force_N) noexcept;
   /// d ln F / d ln slip at the mean of late, in [-1, 1]: 1 far below the peak, 0 at it, negative past it.
-  [[nodiscard]] double elasticity() const noexcept;
+  [[nodiscard]] S elasticity() const noexcept;
 
  private:
-  double memory_s_;
-  double slip_noise_;
-  double slip_{0.0}, force_N_{0.0};  ///< means
-  double variance_{0.0}, covariance_N_{0.0};
+  S memory_s_{1.0};
+  S slip_noise_{0.0};
+  S slip_{0.0}, force_N_{0.0};  ///< means
+  S variance_{0.0}, covariance_N_{0.0};
 };
+using BrakingStiffness = BasicBrakingStiffness<double>;
+
+template <class S>
+void BasicBrakingStiffness<S>::learn(const S& dt_s, const S& slip, const S& force_N) noexcept {
+  const S share = -rig::exponential_less_one(S(-dt_s / memory_s_));
+  const S slip_off = slip - slip_, force_off_N = force_N - force_N_;
+  slip_ += share * slip_off;
+  force_N_ += share * force_off_N;
+  variance_ = (1.0 - share) * (variance_ + share * slip_off * slip_off);
+  covariance_N_ = (1.0 - share) * (covariance_N_ + share * slip_off * force_off_N);
+}
+
+template <class S>
+S BasicBrakingStiffness<S>::elasticity() const noexcept {
+  constexpr double least_force_N = 1.0;
+  constexpr double least_slip = 1e-3;
+  const S slip = rig::larger(S(least_slip), slip_), force_N = rig::larger(S(least_force_N), force_N_);
+  const S unknown = slip_noise_ * slip_noise_;
+  const S slope_N = (covariance_N_ + unknown * force_N / slip) / (variance_ + unknown);
+  return rig::clamped(S(slope_N * slip / force_N), S(-1.0), S(1.0));
+}
 
 /// Seeks the peak of the tyre force by the extended braking stiffness (Umeno, 2002; Hoang et al., 2014): the logarithm
 /// of the wanted slip moves in proportion to the elasticity of the force less a small wanted one, with a small sine on
 /// it. The loop feeds the observed force forward and steps back through the brake's lag. It knows nothing of the tyre.
 /// theta_est_N is NaN, slip_ref its own reference.
-class BrakingStiffnessController final : public SlipController {
+template <class S>
+class BrakingStiffnessLaw {
  public:
-  /// Throws std::invalid_argument for options out of range.
-  explicit BrakingStiffnessController(const ControllerContext& context);
+  static constexpr bool estimates_theta = false;
 
-  void reset(const SlipInput& input) noexcept override;
-  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
-  [[nodiscard]] std::span<const rig::Signal> signals() const noexcept override;
+  BrakingStiffnessLaw() = default;
+  /// Throws std::invalid_argument for options out of range.
+  explicit BrakingStiffnessLaw(const ControllerContext& context)
+    requires std::is_same_v<S, double>;
+
+  void reset(const BasicSlipInput<S>& input) noexcept;
+  [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept;
+  [[nodiscard]] S elasticity() const noexcept { return stiffness_.elasticity(); }
 
  private:
-  BrakingStiffnessOptions options_;
-  rig::RigParameters rig_;
-  paper::Laws<double> laws_;
-  BrakeLag lag_;
-  double period_s_;
-  double v_min_m_s_;
-  WheelForceObserver observer_;
-  BrakingStiffness stiffness_;
-  double late_slip_{0.0};  ///< as late as the observed force
-  double reference_{0.0};  ///< without the sine
-  double search_rad_{0.0};
+  void move_reference(const S& dt_s, const S& slip) noexcept;
+
+  paper::Laws<S> laws_{};
+  rig::BasicBrake<S> brake_{};
+  BasicBrakeLag<S> lag_{};
+  S torque_decay_{0.0};  ///< part of the torque error that decays in a period, negative
+  S v_min_m_s_{0.0};
+  S target_{0.0};
+  S rate_per_s_{0.0};
+  S slip_min_{0.0};
+  S slip_max_{0.0};
+  S slip_start_{0.0};
+  S search_part_{0.0};
+  S search_rad_s_{0.0};
+  S slip_gain_per_s_{0.0};
+  BasicWheelForceObserver<S> observer_{};
+  BasicBrakingStiffness<S> stiffness_{};
+  S late_slip_{0.0};  ///< as late as the observed force
+  S reference_{0.0};  ///< without the sine
+  S search_rad_{0.0};
+};
+
+template <class S>
+void BrakingStiffnessLaw<S>::reset(const BasicSlipInput<S>& input) noexcept {
+  observer_.reset(input.speeds);
+  stiffness_.reset();
+  late_slip_ = search_rad_ = S(0.0);
+  reference_ = slip_start_;
+}
+
+template <class S>
+void BrakingStiffnessLaw<S>::move_reference(const S& dt_s, const S& slip) noexcept {
+  if (!rig::any(dt_s > 0.0)) return;
+  constexpr double turn_rad = 2.0 * std::numbers::pi;
+  late_slip_ += -rig::exponential_less_one(S(-dt_s / observer_.force_delay_s())) * (slip - late_slip_);
+  stiffness_.learn(dt_s, late_slip_, observer_.force_N());
+  const S rise = rate_per_s_ * (stiffness_.elasticity() - target_) * dt_s;
+  reference_ = rig::clamped(S(reference_ * rig::exponential(rise)), slip_min_, slip_max_);
+  const S search_rad = search_rad_ + search_rad_s_ * dt_s;
+  search_rad_ = rig::select(search_rad > std::numbers::pi,
+                            S(search_rad - turn_rad * rig::round_down(S(search_rad / turn_rad + 0.5))), search_rad);
+}
+
+template <class S>
+BasicSlipOutput<S> BrakingStiffnessLaw<S>::step(const BasicSlipInput<S>& input) noexcept {
+  observer_.update(input);
+  const rig::BasicWheelSpeeds<S> speeds = observer_.speeds();
+  move_reference(input.dt_s,
+                 rig::wheel_slip(S(laws_.r1 * speeds.omega1_rad_s), S(laws_.r2 * speeds.omega2_rad_s), v_min_m_s_));
+  const S reference = reference_ * (1.0 + search_part_ * rig::sine(search_rad_));
+  const paper::Reading<S> now{
+      .omega1 = speeds.omega1_rad_s, .omega2 = speeds.omega2_rad_s, .lambda_ref = reference, .phi = S(1.0)};
+  const S error_m_s = laws_.e_v(now);
+  const S force_N = rig::larger(S(0.0), observer_.force_N());
+  const S wanted_Nm = rig::clamped(
+      S(laws_.T_b(laws_.xi_1(now, S(-slip_gain_per_s_ * error_m_s), force_N)) - observer_.brake_error_Nm()), S(0.0),
+      full_torque_Nm(brake_, input.max_brake_torque_Nm));
+  const S step_Nm = torque_decay_ * (input.brake_torque_Nm - wanted_Nm);
+  const auto lags = rig::is_finite(input.max_brake_torque_Nm);
+  return {.brake_torque_Nm = rig::select(lags, lag_.command_Nm(input.brake_torque_Nm, step_Nm), wanted_Nm),
+          .slip_velocity_error_m_s = error_m_s,
+          .theta_est_N = rig::unknown,
+          .slip_ref = reference};
+}
+
+class BrakingStiffnessController final : public LawController<BrakingStiffnessLaw> {
+ public:
+  using LawController::LawController;
+
+  [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
+  [[nodiscard]] std::span<const rig::Signal> signals() const noexcept override;
 };
 
 }  // namespace abs_hil::control

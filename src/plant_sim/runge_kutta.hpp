@@ -30,15 +30,16 @@ template <class S, class Balance>
   const BasicState<S> k3 = balance(moved(x, half_s, k2), half_s);
   const BasicState<S> k4 = balance(moved(x, step_s, k3), step_s);
   BasicState<S> mean;
-  for (std::size_t i = 0; i < mean.size(); ++i) mean[i] = (k1[i] + k4[i]) + 2.0 * (k2[i] + k3[i]);
+  for (std::size_t i = 0; i < mean.size(); ++i) mean[i] = (k1[i] + 2.0 * (k2[i] + k3[i])) + k4[i];
   return moved(x, S(step_s * (1.0 / 6.0)), mean);
 }
 
 /// Number of equal steps for `duration_s` > 0: none longer than `max_step_s` and than the slip dynamics allow.
 template <class S>
 [[nodiscard]] inline S steps_for(const S& duration_s, const S& max_step_s, const S& fastest_rate_per_s) noexcept {
-  const S limit_s = rig::smaller(max_step_s, S(slip_time_constant_fraction / fastest_rate_per_s));
-  return rig::larger(S(1.0), rig::round_up(S(duration_s / limit_s)));
+  const S steps =
+      rig::larger(S(duration_s / max_step_s), S(duration_s * fastest_rate_per_s * (1.0 / slip_time_constant_fraction)));
+  return rig::larger(S(1.0), rig::round_up(steps));
 }
 
 }  // namespace abs_hil::plant_sim

@@ -18,8 +18,8 @@ constexpr int event_bisections = 40;
 double fastest_rate_per_s(const TorqueBalance& balance, const StateVector& x) noexcept {
   const BasicWheels<double> w(balance.model.wheels());
   const Sliding& sliding = balance.sliding;
-  const double mobility_per_kg = (sliding.upper != 0.0 ? w.r1_m * w.r1_m * w.per_J1 : 0.0) +
-                                 (sliding.lower != 0.0 ? w.r2_m * w.r2_m * w.per_J2 : 0.0);
+  const double mobility_per_kg =
+      (sliding.upper != 0.0 ? w.r1_m * w.r1_per_J1 : 0.0) + (sliding.lower != 0.0 ? w.r2_m * w.r2_per_J2 : 0.0);
   const ContactState steepest{x[omega1], x[omega2], x[brake_torque], sliding.upper, balance.friction.highest};
   return balance.model.damping_bound_Ns_m(steepest) * mobility_per_kg;
 }
@@ -162,7 +162,7 @@ void integrate(const WheelModel& model, double max_step_s, const HeldTorques& he
     const double interval_s = std::min(left_s, profile.time_left_s());
     const bool rolls = x[omega1] > 0.0 && x[omega2] > 0.0 && friction.holds() && !model.apart();
     double taken_s = rolls ? roll(model, max_step_s, held, interval_s, friction, x) : 0.0;
-    if (taken_s == 0.0) taken_s = slide(model, max_step_s, held, interval_s, profile.steady(), friction, x);
+    if (taken_s == 0.0) taken_s = slide(model, max_step_s, held, interval_s, friction.holds(), friction, x);
     left_s -= taken_s;
     profile.pass(taken_s);
     profile.settle(x[angle2]);

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <limits>
+#include <type_traits>
 
 #include "abs_hil/plant_sim/plant.hpp"
 #include "abs_hil/rig/brake_map.hpp"
@@ -44,6 +45,7 @@ template <class S>
 struct BasicWheels {
   S r1_m{0.0}, r2_m{0.0};
   S per_J1{0.0}, per_J2{0.0};  ///< reciprocal moments of inertia
+  S r1_per_J1{0.0}, r2_per_J2{0.0};
   S d1_Nms_rad{0.0}, d2_Nms_rad{0.0};
   S M10_Nm{0.0}, M20_Nm{0.0};
 
@@ -53,22 +55,25 @@ struct BasicWheels {
         r2_m(w.r2_m),
         per_J1(1.0 / w.J1_kg_m2),
         per_J2(1.0 / w.J2_kg_m2),
+        r1_per_J1(r1_m * per_J1),
+        r2_per_J2(r2_m * per_J2),
         d1_Nms_rad(w.d1_Nms_rad),
         d2_Nms_rad(w.d2_Nms_rad),
         M10_Nm(w.M10_Nm),
         M20_Nm(w.M20_Nm) {}
 
+  // Each rate needs the force last, because the force takes longest.
   /// omega1' of (1).
   template <class Direction>
   [[nodiscard]] S upper_rate_rad_s2(const S& force_N, const S& brake_Nm, const S& omega1_rad_s,
                                     Direction sliding) const noexcept {
-    return (r1_m * force_N - d1_Nms_rad * omega1_rad_s - sliding * (M10_Nm + brake_Nm)) * per_J1;
+    return r1_per_J1 * force_N - (d1_Nms_rad * omega1_rad_s + sliding * (M10_Nm + brake_Nm)) * per_J1;
   }
   /// omega2' of (2).
   template <class Direction>
   [[nodiscard]] S lower_rate_rad_s2(const S& force_N, const S& motor_Nm, const S& omega2_rad_s,
                                     Direction sliding) const noexcept {
-    return (motor_Nm - r2_m * force_N - d2_Nms_rad * omega2_rad_s - sliding * M20_Nm) * per_J2;
+    return (motor_Nm - d2_Nms_rad * omega2_rad_s - sliding * M20_Nm) * per_J2 - r2_per_J2 * force_N;
   }
 };
 
@@ -165,30 +170,45 @@ struct TorqueBalance {
   }
 };
 
-/// The same while both wheels turn forwards and the road's friction does not change: without a branch, for concrete
-/// models.
-template <class S, class Tyre, class Load, class Held>
+/// The same while the lower wheel turns forwards, and the upper one turns forwards or is held (`Upper`), on a road
+/// whose friction does not change: without a branch, for concrete models.
+template <class S, class Tyre, class Load, class Torques, class Upper = Forwards>
 struct RollingBalance {
   const Tyre& tyre;
   const Load& load;
   const BasicWheels<S>& wheels;
-  const Held& held;
+  const Torques& held;
   const S& friction;
 
-  [[nodiscard]] UpperWheelTorques<S, Forwards> upper_torques(const BasicState<S>& x) const noexcept {
+  [[nodiscard]] UpperWheelTorques<S, Upper> upper_torques(const BasicState<S>& x) const noexcept {
     return {{}, wheels.M10_Nm + x[brake_torque], wheels.d1_Nms_rad * x[omega1]};
   }
   [[nodiscard, gnu::always_inline]] BasicState<S> operator()(const BasicState<S>& x,
                                                              const S& /*time_s*/) const noexcept {
+    BasicState<S> rates = rates_of(wheels, held, force_N(x), Upper{}, Forwards{}, x);
+    if constexpr (upper_held) rates[omega1] = S(0.0);
+    return rates;
+  }
+  [[nodiscard, gnu::always_inline]] S force_N(const BasicState<S>& x) const noexcept {
     const S shape = tyre.shape_at(wheels.r1_m * x[omega1], wheels.r2_m * x[omega2]);
-    return rates_of(wheels, held, load.force_N(friction * shape, upper_torques(x)), Forwards{}, Forwards{}, x);
+    return load.force_N(friction, shape, upper_torques(x));
   }
   /// Bound on the rate of the slip dynamics. For the magic formula it is theta B C (r1^2/J1 + r2^2/J2) / v_x.
   [[nodiscard]] S fastest_rate_per_s(const BasicState<S>& x) const noexcept {
-    const S mobility_per_kg = wheels.r1_m * wheels.r1_m * wheels.per_J1 + wheels.r2_m * wheels.r2_m * wheels.per_J2;
+    const S lower_per_kg = wheels.r2_m * wheels.r2_per_J2;
+    const S mobility_per_kg = upper_held ? lower_per_kg : S(wheels.r1_m * wheels.r1_per_J1 + lower_per_kg);
     return load.steepest_N(friction, upper_torques(x)) * friction *
            tyre.steepest_s_m(wheels.r1_m * x[omega1], wheels.r2_m * x[omega2]) * mobility_per_kg;
   }
+  /// True where friction and brake hold an upper wheel that stands.
+  [[nodiscard]] auto holds_upper(const BasicState<S>& x) const noexcept
+    requires std::is_same_v<Upper, Held>
+  {
+    return rig::magnitude(S(wheels.r1_m * force_N(x))) <= wheels.M10_Nm + x[brake_torque];
+  }
+
+ private:
+  static constexpr bool upper_held = std::is_same_v<Upper, Held>;
 };
 
 }  // namespace abs_hil::plant_sim

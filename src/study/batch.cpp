@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -49,7 +50,7 @@ class Part {
       if (!settings) settings = std::make_unique<lanes::LaneSettings>(*job.settings);
       lanes::Started run{.index = index, .job = std::move(job)};
       if (const lanes::Kind* kind = settings->begin(run)) {
-        groups_[{kind, settings->window_cycles()}].push_back(std::move(run));
+        groups_[{kind, settings->window_cycles(), run.job.plant.ideal_actuator}].push_back(std::move(run));
         return;
       }
       job = std::move(run.job);
@@ -59,10 +60,11 @@ class Part {
   }
   void finish() {
     for (auto& [key, group] : groups_) {
-      lanes::go_on(*key.first, set_, group, key.second);
+      const auto& [kind, window_cycles, ideal_actuator] = key;
+      lanes::go_on(*kind, set_, group, window_cycles);
       for (const lanes::Started& started : group) {
         Outcome outcome;
-        const bool complete = lanes::result_of(*key.first, started.words.data(), outcome.run);
+        const bool complete = lanes::result_of(*kind, started.words.data(), outcome.run);
         ++(complete ? counts_.lanes : counts_.disturbed);
         take_(started.index, complete ? outcome : outcome_of(started.job, shared_[started.job.settings]));
       }
@@ -74,7 +76,9 @@ class Part {
   lanes::InstructionSet set_;
   const Take& take_;
   std::map<const config::Settings*, SharedBySettings> shared_;
-  std::map<std::pair<const lanes::Kind*, std::uint32_t>, std::vector<lanes::Started>> groups_;
+  /// Kind, cycles of the gate's speed windows, and whether the brake is ideal: a law may compute one or the other.
+  using Alike = std::tuple<const lanes::Kind*, std::uint32_t, bool>;
+  std::map<Alike, std::vector<lanes::Started>> groups_;
   BatchCounts counts_{};
 };
 

@@ -89,7 +89,7 @@ TEST_CASE("No load rises more steeply with friction than its bound") {
       [&](const auto& load) {
         double steepest_N = 0.0;
         for (int i = -1500; i < 1500; ++i) {
-          const double rise_N = load.force_N(1e-3 * (i + 1), torques) - load.force_N(1e-3 * i, torques);
+          const double rise_N = load.force_N(0.5, 2e-3 * (i + 1), torques) - load.force_N(0.5, 2e-3 * i, torques);
           steepest_N = std::max(steepest_N, rise_N / 1e-3);
         }
         CHECK(steepest_N <= load.steepest_N(1.5, torques) * (1.0 + 1e-9));

@@ -89,7 +89,10 @@ TEST_CASE("the arctangent of a ratio is that of the quotient") {
   for (int i = 0; i < 100'000; ++i) {
     const double p = 50.0 * uniform(generator);
     const double q = 1e-3 + std::fabs(uniform(generator));
-    CHECK(units_off(rig::arctangent_of_ratio(p, q), std::atan(static_cast<long double>(p) / q)) < 2.0);
+    const long double angle = std::atan(static_cast<long double>(p) / q);
+    CHECK(units_off(rig::arctangent_of_ratio(p, q), angle) < 2.0);
+    const double factor = 1.0 + std::fabs(uniform(generator));
+    CHECK(units_off(rig::arctangent_of_positive(std::fabs(p), q, factor), factor * std::fabs(angle)) < 4.0);
   }
 }
 

@@ -8,7 +8,7 @@
 #include "abs_hil/rig/scalar.hpp"
 
 // Models of the force that presses the wheels together. Each converts the friction coefficient relative to the tyre's
-// peak ("shape": the tyre's value times the profile's friction) into the tyre force. All functions are real-time safe
+// peak ("shape": the tyre's value) and the profile's friction into the tyre force. All functions are real-time safe
 // except for the constructors.
 namespace abs_hil::plant_sim {
 
@@ -21,7 +21,16 @@ struct Forwards {
   friend constexpr bool operator==(Forwards, double direction) noexcept { return direction == 1.0; }
 };
 
-/// Torques between the upper wheel and the frame that carries it. `Direction` is `double` or `Forwards`.
+/// A wheel that stands and that its brake holds: the direction of sliding 0.
+struct Held {
+  template <class S>
+  friend constexpr S operator*(Held, const S& /*x*/) noexcept {
+    return S(0.0);
+  }
+  friend constexpr bool operator==(Held, double direction) noexcept { return direction == 0.0; }
+};
+
+/// Torques between the upper wheel and the frame that carries it. `Direction` is `double`, `Forwards` or `Held`.
 template <class S, class Direction>
 struct UpperWheelTorques {
   Direction sliding{};  ///< direction of sliding in bearing and brake: +1, -1, or 0 if they hold the wheel
@@ -39,10 +48,11 @@ class BasicConstantLoad {
   explicit BasicConstantLoad(const PlantOptions& options) noexcept : theta_N_(options.rig.tyre.theta_N) {}
 
   template <class Direction>
-  [[nodiscard]] S force_N(const S& shape, const UpperWheelTorques<S, Direction>& /*torques*/) const noexcept {
-    return theta_N_ * shape;
+  [[nodiscard]] S force_N(const S& friction, const S& shape,
+                          const UpperWheelTorques<S, Direction>& /*torques*/) const noexcept {
+    return theta_N_ * friction * shape;
   }
-  /// Upper bound on the slope of `force_N` over `shape` while the latter stays within `most_shape`, N.
+  /// Upper bound on the slope of `force_N` over friction times `shape` while this stays within `most_shape`, N.
   template <class Direction>
   [[nodiscard]] S steepest_N(const S& /*most_shape*/,
                              const UpperWheelTorques<S, Direction>& /*torques*/) const noexcept {
@@ -71,8 +81,9 @@ class BasicLeverLoad {
     requires std::is_same_v<S, double>;
 
   template <class Direction>
-  [[nodiscard]] S force_N(const S& shape, const UpperWheelTorques<S, Direction>& torques) const noexcept {
-    const S mu = peak_mu_ * shape;
+  [[nodiscard]] S force_N(const S& friction, const S& shape,
+                          const UpperWheelTorques<S, Direction>& torques) const noexcept {
+    const S mu = peak_mu_ * friction * shape;
     return mu * pressing_Nm(torques) / (L_sin_phi_m_ - mu * wedging_m(torques));
   }
   template <class Direction>

@@ -26,14 +26,11 @@ class BasicMagicFormula {
   [[nodiscard]] S slip(const S& v_wheel_m_s, const S& v_x_m_s) const noexcept {
     return rig::wheel_slip(v_wheel_m_s, v_x_m_s, regularisation_m_s_);
   }
-  [[nodiscard]] S shape(const S& slip) const noexcept { return rig::sine(S(C_ * rig::arctangent(S(B_ * slip)))); }
+  [[nodiscard]] S shape(const S& slip) const noexcept { return rig::magic_formula(C_, S(B_ * slip), S(1.0)); }
   /// `shape` of the slip at these speeds, with one division for slip and arctangent.
   [[nodiscard, gnu::always_inline]] S shape_at(const S& v_wheel_m_s, const S& v_x_m_s) const noexcept {
-    const S stretched_m_s = B_ * (v_x_m_s - v_wheel_m_s);
-    const S divisor_m_s = rig::larger(rig::magnitude(v_x_m_s), regularisation_m_s_);
-    const S size =
-        rig::sine_of_positive(S(C_ * rig::arctangent_of_positive(rig::magnitude(stretched_m_s), divisor_m_s)));
-    return rig::with_sign(size, stretched_m_s);
+    return rig::magic_formula(C_, S(B_ * (v_x_m_s - v_wheel_m_s)),
+                              rig::larger(rig::magnitude(v_x_m_s), regularisation_m_s_));
   }
   /// Friction coefficient at the peak of the curve.
   [[nodiscard]] S peak_mu() const noexcept { return peak_mu_; }

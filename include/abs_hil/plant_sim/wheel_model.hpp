@@ -44,12 +44,12 @@ class WheelModel {
     const double shape = std::visit(
         [&](const auto& tyre) { return tyre.shape_at(wheels_.r1_m * c.omega1_rad_s, wheels_.r2_m * c.omega2_rad_s); },
         tyre_);
-    return force_N(c.friction * shape, c);
+    return force_N(shape, c);
   }
 
   /// The largest braking force that any slip could give now, N: theta of (10). With the lever it increases with the
   /// torques on the upper wheel, and holds for the present torques.
-  [[nodiscard]] double peak_force_N(const ContactState& c) const noexcept { return force_N(c.friction, c); }
+  [[nodiscard]] double peak_force_N(const ContactState& c) const noexcept { return force_N(1.0, c); }
 
   /// Upper bound on the slope of the tyre force over the difference of the circumferential speeds, N s/m, at any slip.
   /// It bounds the stiffness of the slip dynamics.
@@ -81,7 +81,7 @@ class WheelModel {
   [[nodiscard]] double force_N(double shape, const ContactState& c) const noexcept {
     if (apart_) return 0.0;
     const Torques torques = upper_torques(c);
-    return std::visit([&](const auto& load) { return load.force_N(shape, torques); }, load_);
+    return std::visit([&](const auto& load) { return load.force_N(c.friction, shape, torques); }, load_);
   }
 
   rig::WheelParameters wheels_;

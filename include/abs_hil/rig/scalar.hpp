@@ -243,18 +243,48 @@ template <class S>
   return detail::sine_up_to_half_pi(S((0.5 * detail::pi - magnitude(x)) + 0.5 * detail::pi_low));
 }
 
+namespace detail {
+
+/// A ratio as an angle and the tangent of the rest.
+template <class S>
+struct TurnedRatio {
+  S angle;
+  S t;  ///< |t| <= tan(pi/8)
+};
+/// p / q turned by 0, -pi/4 or -pi/2, for p >= 0 and q > 0, with one division: atan(p / q) = angle + atan t.
+template <class S>
+[[nodiscard, gnu::always_inline]] inline TurnedRatio<S> turned_ratio(const S& p, const S& q) noexcept {
+  constexpr double tan_pi_8 = 0.41421356237309503;
+  constexpr double tan_3_pi_8 = 2.414213562373095;
+  const auto middle = p > q * tan_pi_8;
+  const auto steep = p > q * tan_3_pi_8;
+  if constexpr (Lanes<S>) {
+    return {select(steep, S(0.5 * pi), select(middle, S(0.25 * pi), S(0.0))),
+            select(steep, S(-q), select(middle, S(p - q), p)) / select(steep, p, select(middle, S(p + q), q))};
+  } else {
+    // The processor predicts the branch, so the division does not wait for the comparisons.
+    if (steep) return {0.5 * pi, -q / p};
+    if (middle) return {0.25 * pi, (p - q) / (p + q)};
+    return {0.0, p / q};
+  }
+}
+
+}  // namespace detail
+
 /// atan(p / q) for p >= 0 and q > 0 with one division, within 2 units of the last place.
 template <class S>
 [[nodiscard, gnu::always_inline]] inline S arctangent_of_positive(const S& p, const S& q) noexcept {
-  constexpr double tan_pi_8 = 0.41421356237309503;
-  constexpr double tan_3_pi_8 = 2.414213562373095;
-  // Rotates p/q by -pi/4 or -pi/2, so that |t| <= tan(pi/8).
-  const auto middle = p > q * tan_pi_8;
-  const auto steep = p > q * tan_3_pi_8;
-  const S t = select(steep, S(-q), select(middle, S(p - q), p)) / select(steep, p, select(middle, S(p + q), q));
-  const S turned = select(steep, S(0.5 * detail::pi), select(middle, S(0.25 * detail::pi), S(0.0)));
+  const auto [angle, t] = detail::turned_ratio(p, q);
   const S square = t * t;
-  return turned + (t + t * square * detail::polynomial(detail::arctangent, square));
+  return angle + (t + t * square * detail::polynomial(detail::arctangent, square));
+}
+/// `factor` times that, within 4 units of the last place. The polynomial takes longest, so it is added last.
+template <class S>
+[[nodiscard, gnu::always_inline]] inline S arctangent_of_positive(const S& p, const S& q, const S& factor) noexcept {
+  const auto [angle, t] = detail::turned_ratio(p, q);
+  const S square = t * t;
+  const S scaled = factor * t;
+  return (factor * angle + scaled) + scaled * square * detail::polynomial(detail::arctangent, square);
 }
 /// The same for p of either sign.
 template <class S>

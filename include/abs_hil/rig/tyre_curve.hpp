@@ -18,12 +18,18 @@ struct TyreShape {
   explicit TyreShape(const TyreParameters& tyre) noexcept : B(tyre.B), C(tyre.C) {}
 };
 
+/// sin(C atan(p / q)) for q > 0 with one division, C <= 2. Real-time safe.
+template <class S>
+[[nodiscard, gnu::always_inline]] inline S magic_formula(const S& C, const S& p, const S& q) noexcept {
+  return with_sign(sine_of_positive(arctangent_of_positive(magnitude(p), q, C)), p);
+}
+
 /// Normalised tyre characteristic phi(slip) = sin(C atan(B slip)) of (10). It is odd in slip, so that the force has the
 /// right sign in traction, too. The factor s(omega) printed in (1) would reverse that sign (docs/theory.md). C <= 2.
 /// Real-time safe.
 template <class Tyre, class S>
 [[nodiscard]] inline S normalised_tyre_force(const Tyre& tyre, const S& slip) noexcept {
-  return sine(S(tyre.C * arctangent(S(tyre.B * slip))));
+  return magic_formula(S(tyre.C), S(tyre.B * slip), S(1.0));
 }
 
 /// d phi / d slip of (10). Real-time safe.

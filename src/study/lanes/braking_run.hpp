@@ -6,11 +6,10 @@
 #include "abs_hil/rig/tyre_curve.hpp"
 #include "analysis/braking_figures.hpp"
 #include "control/brake_actuator.hpp"
-#include "control/speed_tracker.hpp"
 #include "experiment/run_logic.hpp"
-#include "plant_sim/runge_kutta.hpp"
 #include "rig/braking_distance.hpp"
 #include "runtime/command_gate.hpp"
+#include "study/lanes/lane_rig.hpp"
 
 /// One braking run in virtual time, from its first cycle to the stop, over a scalar: a `double`, or a pack in which
 /// every lane is a run. It consists of the same plant, observers, law, checks and figures as `study::simulate`, and
@@ -19,64 +18,6 @@
 ///
 /// A run has nothing but scalars as members, so that run and lane have the same words (rig/pack.hpp).
 namespace abs_hil::study::lanes {
-
-/// What road and drift make of the rig, as long as it stays as it is: plant_sim::PlantConditions.
-template <class S>
-struct LaneConditions {
-  plant_sim::BasicWheels<S> wheels{};
-  S friction{1.0};
-  S brake_torque{1.0};
-  S steady_to_ns{std::numeric_limits<double>::infinity()};
-  S steady_to_angle2_rad{std::numeric_limits<double>::infinity()};
-};
-
-/// The rig: plant, encoders, and what the board makes of a duty.
-template <class S, class Tyre, class Load>
-struct LaneRig {
-  Tyre tyre{};
-  Load load{};
-  LaneConditions<S> now{};
-  S max_step_s{0.0};
-  rig::BasicBrake<S> brake{};
-  plant_sim::BasicState<S> x{};
-  S steps{0.0};  ///< of the latest cycle
-  S rad_per_count{0.0};
-  S upper_offset_rad{0.0};
-  S lower_offset_rad{0.0};
-  S duty_steps{0.0};
-
-  /// Advances by `duration_s`, to `time_ns`, under a duty of the brake. True where a wheel stands or stops, or road or
-  /// drift change: the state is wrong there.
-  [[gnu::noinline, gnu::flatten]] auto advance(const S& duration_s, const S& time_ns, const S& duty) noexcept {
-    using namespace plant_sim;
-    const BrakeAlone<S> held{rig::brake_torque_at(brake, duty) * now.brake_torque, brake.c31_per_s};
-    const RollingBalance<S, Tyre, Load, BrakeAlone<S>> balance{tyre, load, now.wheels, held, now.friction};
-    steps = steps_for(duration_s, max_step_s, balance.fastest_rate_per_s(x));
-    const S step_s = duration_s / steps;
-    auto wrong = !(x[omega1] > 0.0 && x[omega2] > 0.0) || time_ns > now.steady_to_ns;
-    for (double made = 0.0;; made += 1.0) {
-      const auto goes_on = S(made) < steps;
-      if (!rig::any(goes_on)) break;
-      const BasicState<S> end = runge_kutta_step(balance, x, step_s);
-      for (std::size_t i = 0; i < x.size(); ++i) x[i] = rig::select(goes_on, end[i], x[i]);
-      wrong = wrong || !(x[omega1] > 0.0 && x[omega2] > 0.0);
-    }
-    return wrong || x[angle2] > now.steady_to_angle2_rad;
-  }
-  [[nodiscard]] S counts(const S& angle_rad) const noexcept { return rig::round_down(S(angle_rad / rad_per_count)); }
-  [[nodiscard]] S upper_counts() const noexcept { return counts(x[plant_sim::angle1] + upper_offset_rad); }
-  [[nodiscard]] S lower_counts() const noexcept { return counts(x[plant_sim::angle2] + lower_offset_rad); }
-  [[nodiscard]] S sent_duty(const S& duty) const noexcept {
-    return rig::whole_part(S(duty * duty_steps + 0.5)) / duty_steps;
-  }
-  [[nodiscard]] S v_x_m_s() const noexcept { return now.wheels.r2_m * x[plant_sim::omega2]; }
-  [[nodiscard]] S slip() const noexcept { return tyre.slip(S(now.wheels.r1_m * x[plant_sim::omega1]), v_x_m_s()); }
-  [[nodiscard]] S peak_force_N() const noexcept {
-    const plant_sim::UpperWheelTorques<S, plant_sim::Forwards> torques{
-        {}, now.wheels.M10_Nm + x[plant_sim::brake_torque], now.wheels.d1_Nms_rad * x[plant_sim::omega1]};
-    return load.force_N(now.friction, torques);
-  }
-};
 
 /// What of the command gate acts in an undisturbed run: its limits, and whether its checks of the wheels are quiet.
 template <class S>
@@ -161,8 +102,9 @@ struct BrakingRun {
   LaneGate<S> gate{};
   LaneSequence<S> sequence{};
   Law<S> law{};
-  control::SpeedTracker<S> upper{};
-  control::SpeedTracker<S> lower{};
+  LaneWheel<S> upper{};
+  LaneWheel<S> lower{};
+  S ideal_sensors{0.0};  ///< 1: the controller reads the true speeds
   control::BasicBrakeActuator<S> actuator{};
   analysis::BrakingFigures<S> figures{};
   rig::BrakingDistance<S> distance{};
@@ -172,10 +114,6 @@ struct BrakingRun {
   S period_s{0.0};
   S period_ns{0.0};
   S time_ns{0.0};
-  S upper_counts{0.0};
-  S lower_counts{0.0};
-  S upper_travel{0.0};  ///< counts over the past cycle
-  S lower_travel{0.0};
   S duty{0.0};  ///< sent to the board
   S sent_Nm{0.0};
   S unsent_Nm{0.0};
@@ -185,24 +123,22 @@ struct BrakingRun {
   /// The first cycle: both wheels turn at this speed, and the controller begins.
   void begin(const S& start_speed_rad_s) noexcept {
     rig.x[plant_sim::omega1] = rig.x[plant_sim::omega2] = start_speed_rad_s;
-    upper_counts = gate.begin_upper = rig.upper_counts();
-    lower_counts = gate.begin_lower = rig.lower_counts();
-    upper.reset(start_speed_rad_s);
-    lower.reset(start_speed_rad_s);
+    upper.begin(gate.begin_upper = rig.upper_counts(), start_speed_rad_s);
+    lower.begin(gate.begin_lower = rig.lower_counts(), start_speed_rad_s);
     actuator.reset();
     decide(S(0.0), true);
   }
   /// Every later cycle.
   /// @param window_ends  the gate's speed window ends with it
-  /// @param assist  called as assist(where, before) if a wheel stands or stops, or road or drift change: it has to set
+  /// @param assist  called as assist(where, before) if a wheel stops or starts, or road or drift change: it has to set
   ///   the plant's state and conditions there, from the state before the cycle
   template <class Assist>
   void cycle(bool window_ends, const Assist& assist) noexcept {
     time_ns += period_ns;
     const plant_sim::BasicState<S> before = rig.x;
-    if (const Condition wrong = rig.advance(period_s, time_ns, duty); rig::any(wrong)) assist(wrong, before);
-    // With a lever the peak force depends on whether the brake holds the wheel.
-    if constexpr (Load<S>::knows_sliding) disturb(!(rig.x[plant_sim::omega1] > 0.0));
+    if (const Condition wrong = rig.advance(period_s, time_ns, duty, sent_Nm); rig::any(wrong)) assist(wrong, before);
+    // With a lever the peak force depends on the direction in which the wheel turns.
+    if constexpr (Load<S>::knows_sliding) disturb(!(rig.x[plant_sim::omega1] >= 0.0));
     observe(window_ends);
     decide(period_s, false);
   }
@@ -212,19 +148,13 @@ struct BrakingRun {
 
   /// Reads the encoders, and asks the gate whether all is quiet.
   [[gnu::noinline, gnu::flatten]] void observe(bool window_ends) noexcept {
-    constexpr double near_wrap = 2e9;
-    const S upper_now = rig.upper_counts();
-    const S lower_now = rig.lower_counts();
-    upper_travel = upper_now - upper_counts;
-    lower_travel = lower_now - lower_counts;
-    upper_counts = upper_now;
-    lower_counts = lower_now;
-    gate.brake_impulse_Nms += rig::brake_torque_at(gate.brake, duty) * period_s;
-    disturb(rig::magnitude(upper_travel) > gate.sure_counts || rig::magnitude(lower_travel) > gate.sure_counts ||
-            rig::magnitude(upper_now) > near_wrap || rig::magnitude(lower_now) > near_wrap);
-    if (window_ends) disturb(!gate.quiet(upper_now, lower_now));
-    upper.take(upper_travel);
-    lower.take(lower_travel);
+    const Condition ideal = ideal_sensors > 0.0;
+    upper.take(rig.upper_counts(), ideal, rig.x[plant_sim::omega1], period_s);
+    lower.take(rig.lower_counts(), ideal, rig.x[plant_sim::omega2], period_s);
+    gate.brake_impulse_Nms +=
+        rig::select(rig.ideal_brake > 0.0, sent_Nm, rig::brake_torque_at(gate.brake, duty)) * period_s;
+    disturb(upper.leaps(gate.sure_counts) || lower.leaps(gate.sure_counts));
+    if (window_ends) disturb(!gate.quiet(upper.counts, lower.counts));
     actuator.advance(period_s);
   }
   /// Phase, law and gate, from the estimates to the duty, and the figures of the cycle.
@@ -243,10 +173,11 @@ struct BrakingRun {
 template <class S, template <class> class Law, template <class> class Tyre, template <class> class Load>
 void BrakingRun<S, Law, Tyre, Load>::decide(const S& dt_s, bool begins) noexcept {
   const S time_s = time_ns * rig::s_per_ns;
-  const S omega1_rad_s = upper.omega_rad_s();
-  const S omega2_rad_s = lower.omega_rad_s();
+  const Condition ideal = ideal_sensors > 0.0;
+  const S omega1_rad_s = upper.omega_rad_s;
+  const S omega2_rad_s = lower.omega_rad_s;
   const S slip = rig::wheel_slip(S(r1_m * omega1_rad_s), S(r2_m * omega2_rad_s), S(experiment::slip_floor_m_s));
-  disturb(sequence.update(time_s, S(r2_m * omega2_rad_s), upper.stands_still() && lower.stands_still()));
+  disturb(sequence.update(time_s, S(r2_m * omega2_rad_s), upper.stands_still(ideal) && lower.stands_still(ideal)));
   const Condition braking = sequence.holds == 0.0;
   const control::BasicSlipInput<S> input{.dt_s = dt_s,
                                          .speeds = {omega1_rad_s, omega2_rad_s},
@@ -255,10 +186,10 @@ void BrakingRun<S, Law, Tyre, Load>::decide(const S& dt_s, bool begins) noexcept
                                          .mean_brake_torque_Nm = actuator.mean_torque_Nm(),
                                          .brake_torque_Nm = actuator.torque_Nm(),
                                          .max_brake_torque_Nm = actuator.max_torque_Nm(),
-                                         .alpha1_rad_s2 = upper.alpha_rad_s2(),
-                                         .alpha2_rad_s2 = lower.alpha_rad_s2(),
-                                         .upper_travel_rad = upper_travel * gate.rad_per_count,
-                                         .lower_travel_rad = lower_travel * gate.rad_per_count,
+                                         .alpha1_rad_s2 = upper.alpha_rad_s2,
+                                         .alpha2_rad_s2 = lower.alpha_rad_s2,
+                                         .upper_travel_rad = upper.travel_rad,
+                                         .lower_travel_rad = lower.travel_rad,
                                          .sent_brake_torque_Nm = sent_Nm,
                                          .unsent_torque_Nm = unsent_Nm};
   const control::BasicSlipOutput<S> output = ask(law, input, begins);

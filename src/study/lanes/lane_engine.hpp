@@ -86,6 +86,7 @@ class LaneEngine {
       rig::take_lane<S>(packed_.time_ns, lane, &cycle.time_ns);
       rig::take_lane<S>(packed_.period_s, lane, &cycle.duration_s);
       rig::take_lane<S>(packed_.duty, lane, &cycle.duty);
+      rig::take_lane<S>(packed_.sent_Nm, lane, &cycle.brake_torque_Nm);
       double state[5];
       double conditions[sizeof(packed_.rig.now) / sizeof(S)];
       rig::take_lane<S>(before, lane, state);

@@ -74,6 +74,8 @@ struct KindOf {
     run.rig.now = plant.conditions;
     run.rig.max_step_s = job.plant.max_step_s;
     run.rig.brake = rig::BasicBrake<double>(job.plant.rig.brake);
+    run.rig.ideal_brake = job.plant.ideal_actuator ? 1.0 : 0.0;
+    run.ideal_sensors = job.plant.ideal_sensors ? 1.0 : 0.0;
     run.rig.rad_per_count = rig::radians_per_count(job.plant.rig.encoder_counts_per_rev);
     const driver::CountOffsets offsets = driver::count_offsets(job.seed, run.rig.rad_per_count);
     run.rig.upper_offset_rad = offsets.upper_rad;
@@ -82,7 +84,7 @@ struct KindOf {
     run.gate = parts.gate;
     run.sequence = parts.sequence;
     run.law = controller->law();
-    run.upper = run.lower = parts.tracker;
+    run.upper.tracker = run.lower.tracker = parts.tracker;
     run.actuator = parts.actuator;
     run.figures = analysis::BrakingFigures<double>(parts.settings.experiment.end_speed_m_s);
     run.r1_m = model.wheels.r1_m;
@@ -117,8 +119,6 @@ struct KindOf {
 #define ABS_HIL_LANE_KIND(law, tyre, load) &KindOf<law, tyre, load>::kind,
 constexpr const Kind* kinds[] = {ABS_HIL_LANE_KINDS(ABS_HIL_LANE_KIND)};
 #undef ABS_HIL_LANE_KIND
-
-bool ideal(const plant_sim::PlantOptions& plant) { return plant.ideal_actuator || plant.ideal_sensors; }
 
 bool changes(const plant_sim::PlantOptions& plant) {
   const plant_sim::DriftProfiles& drift = plant.drift;
@@ -181,9 +181,7 @@ InstructionSet instruction_set() {
 
 LaneSettings::LaneSettings(const config::Settings& settings) {
   const double start_speed_rad_s = settings.experiment.start_speed_rad_s;
-  if (ideal(settings.plant) || settings.experiment.wait_for_start || !(start_speed_rad_s > 0.0) ||
-      eccentric(settings.model))
-    return;
+  if (settings.experiment.wait_for_start || !(start_speed_rad_s > 0.0) || eccentric(settings.model)) return;
   auto parts = std::make_unique<Parts>(Parts{.settings = settings});
   try {
     parts->controller = control::make_controller(settings.control.controller, {settings.control, settings.model});
@@ -193,12 +191,12 @@ LaneSettings::LaneSettings(const config::Settings& settings) {
   }
   parts->period_ns = std::llround(1e9 / settings.control.rate_Hz);
   parts->period_s = static_cast<double>(parts->period_ns) * rig::s_per_ns;
-  parts->duty_steps = driver::simulated_output_grid(settings.driver, false).duty_steps;
+  parts->duty_steps = driver::simulated_output_grid(settings.driver, settings.plant.ideal_actuator).duty_steps;
   if (!plan_gate(*parts)) return;
   parts->tracker = {settings.control.observer, settings.model.encoder_counts_per_rev};
   parts->tracker.prepare(parts->period_s);
   if (parts->tracker.must_restart()) return;
-  parts->actuator = {settings.model.brake, false, settings.gate.brake_duty_max,
+  parts->actuator = {settings.model.brake, settings.plant.ideal_actuator, settings.gate.brake_duty_max,
                      static_cast<std::uint32_t>(parts->duty_steps)};
   parts->actuator.prepare(parts->period_s);
   parts_ = std::move(parts);
@@ -210,7 +208,9 @@ std::uint32_t LaneSettings::window_cycles() const noexcept { return parts_ ? par
 
 const Kind* LaneSettings::begin(Started& run) const {
   const plant_sim::PlantOptions& plant = run.job.plant;
-  if (!parts_ || ideal(plant) || flawed(plant)) return nullptr;
+  if (!parts_ || flawed(plant)) return nullptr;
+  // The controller would take an ideal brake for a real one, or the other way round.
+  if (plant.ideal_actuator != parts_->settings.plant.ideal_actuator) return nullptr;
   try {
     plant_sim::check(plant);
     StartingPlant starting{
@@ -239,7 +239,7 @@ void assist(void* runs, const AssistedCycle& cycle, double* state, double* condi
   plant_sim::StateVector x{};
   std::copy_n(state, x.size(), x.begin());
   run.plant->take_over(plant_sim::state_of(x), cycle.duration_s, cycles - 1 - run.plant_cycles);
-  run.plant->advance(cycle.duration_s, {.brake_duty = cycle.duty});
+  run.plant->advance(cycle.duration_s, {.brake_duty = cycle.duty, .brake_torque_Nm = cycle.brake_torque_Nm});
   run.plant_cycles = cycles;
   x = plant_sim::vector_of(run.plant->state());
   std::copy(x.begin(), x.end(), state);

@@ -8,12 +8,13 @@
 /// The compiled loops over packs: one for each instruction set and each combination of law, tyre and load.
 namespace abs_hil::study::lanes {
 
-/// A cycle in which a wheel stands or stops, or road or drift change: what lanes cannot compute.
+/// A cycle in which a wheel stops or starts, or road or drift change: what lanes cannot compute.
 struct AssistedCycle {
   std::uint32_t run{0};
   double time_ns{0.0};  ///< at its end, since the run began
   double duration_s{0.0};
-  double duty{0.0};  ///< of the brake
+  double duty{0.0};             ///< of the brake
+  double brake_torque_Nm{0.0};  ///< for an ideal brake
 };
 
 /// Runs in memory: each has the words of a BrakingRun<double> that has begun.

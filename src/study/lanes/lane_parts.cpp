@@ -40,7 +40,7 @@ bool plan_sequence(const config::Plan& plan, const config::Settings& settings, L
 
 bool plan_gate(LaneSettings::Parts& parts) {
   const config::Settings& s = parts.settings;
-  const runtime::PlausibilityLimits limits = runtime::plausibility_limits(s.model, false, s.gate);
+  const runtime::PlausibilityLimits limits = runtime::plausibility_limits(s.model, s.plant.ideal_actuator, s.gate);
   const runtime::SpeedWindows windows(limits);
   const std::int64_t least_ns = std::max(runtime::least_speed_window_ns, windows.resolving_ns());
   const std::int64_t cycles = (least_ns + parts.period_ns - 1) / parts.period_ns;

@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "abs_hil/rig/tyre_curve.hpp"
 #include "catch.hpp"
 
 using namespace abs_hil;
@@ -82,6 +83,7 @@ TEST_CASE("each lane of a pack computes as a double does, bit for bit") {
       check_same(lane(rig::exponential(a), n), rig::exponential(x));
       check_same(lane(rig::exponential_less_one(a), n), rig::exponential_less_one(x));
       check_same(lane(rig::arctangent(a), n), rig::arctangent(x));
+      check_same(lane(rig::magic_formula(b, a, Pack(0.3)), n), rig::magic_formula(y, x, 0.3));
       if (std::fabs(x) <= 3.14) check_same(lane(rig::sine(a), n), rig::sine(x));
       if (std::fabs(x) <= 3.14) check_same(lane(rig::cosine(a), n), rig::cosine(x));
     }

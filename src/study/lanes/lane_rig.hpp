@@ -1,0 +1,151 @@
+#pragma once
+
+#include <limits>
+
+#include "abs_hil/rig/brake_map.hpp"
+#include "control/speed_tracker.hpp"
+#include "plant_sim/runge_kutta.hpp"
+
+/// The simulated rig of a run in lanes, and what its controller sees of it.
+namespace abs_hil::study::lanes {
+
+/// What road and drift make of the rig, as long as it stays as it is: plant_sim::PlantConditions.
+template <class S>
+struct LaneConditions {
+  plant_sim::BasicWheels<S> wheels{};
+  S friction{1.0};
+  S brake_torque{1.0};
+  S steady_to_ns{std::numeric_limits<double>::infinity()};
+  S steady_to_angle2_rad{std::numeric_limits<double>::infinity()};
+};
+
+/// The rig: plant, encoders, and what the board makes of a duty.
+template <class S, class Tyre, class Load>
+struct LaneRig {
+  Tyre tyre{};
+  Load load{};
+  LaneConditions<S> now{};
+  S max_step_s{0.0};
+  rig::BasicBrake<S> brake{};
+  S ideal_brake{0.0};  ///< 1: the brake gives the torque that is sent at once
+  plant_sim::BasicState<S> x{};
+  S steps{0.0};  ///< of the latest cycle
+  S rad_per_count{0.0};
+  S upper_offset_rad{0.0};
+  S lower_offset_rad{0.0};
+  S duty_steps{0.0};
+
+  /// Advances by `duration_s`, to `time_ns`, under a duty of the brake, or an ideal brake's torque. True where a wheel
+  /// stops or starts, or road or drift change: the state is wrong there.
+  [[gnu::noinline, gnu::flatten]] auto advance(const S& duration_s, const S& time_ns, const S& duty,
+                                               const S& torque_Nm) noexcept {
+    using namespace plant_sim;
+    const auto ideal = ideal_brake > 0.0;
+    const S static_Nm = rig::select(ideal, torque_Nm, rig::brake_torque_at(brake, duty));
+    const BrakeAlone<S> held{static_Nm * now.brake_torque, rig::select(ideal, S(0.0), brake.c31_per_s)};
+    x[brake_torque] = rig::select(ideal, held.brake_target_Nm, x[brake_torque]);
+    const auto rolls = x[omega1] > 0.0 && x[omega2] > 0.0;
+    const auto stands = x[omega1] == 0.0 && x[omega2] > 0.0;
+    auto well = rolls;
+    if (rig::any(rolls)) {
+      const RollingBalance<S, Tyre, Load, BrakeAlone<S>> balance{tyre, load, now.wheels, held, now.friction};
+      well = go_on(balance, duration_s, rolls,
+                   [](const BasicState<S>& end) { return end[omega1] > 0.0 && end[omega2] > 0.0; });
+    }
+    if (rig::any(stands)) well = well || stand(held, duration_s, stands);
+    return !well || time_ns > now.steady_to_ns || x[angle2] > now.steady_to_angle2_rad;
+  }
+  [[nodiscard]] S counts(const S& angle_rad) const noexcept { return rig::round_down(S(angle_rad / rad_per_count)); }
+  [[nodiscard]] S upper_counts() const noexcept { return counts(x[plant_sim::angle1] + upper_offset_rad); }
+  [[nodiscard]] S lower_counts() const noexcept { return counts(x[plant_sim::angle2] + lower_offset_rad); }
+  [[nodiscard]] S sent_duty(const S& duty) const noexcept {
+    return rig::whole_part(S(duty * duty_steps + 0.5)) / duty_steps;
+  }
+  [[nodiscard]] S v_x_m_s() const noexcept { return now.wheels.r2_m * x[plant_sim::omega2]; }
+  [[nodiscard]] S slip() const noexcept { return tyre.slip(S(now.wheels.r1_m * x[plant_sim::omega1]), v_x_m_s()); }
+  [[nodiscard]] S peak_force_N() const noexcept {
+    using namespace plant_sim;
+    const BrakeAlone<S> any{};
+    const RollingBalance<S, Tyre, Load, BrakeAlone<S>> turning{tyre, load, now.wheels, any, now.friction};
+    const S turning_N = load.force_N(now.friction, S(1.0), turning.upper_torques(x));
+    if constexpr (Load::knows_sliding) {
+      const auto stands = x[omega1] == 0.0;
+      if (!rig::any(stands)) return turning_N;
+      const HeldBalance held{tyre, load, now.wheels, any, now.friction};
+      const S held_N = load.force_N(now.friction, S(1.0), held.upper_torques(x));
+      return rig::select(stands && held.holds_upper(x), held_N, turning_N);
+    } else {
+      return turning_N;
+    }
+  }
+
+ private:
+  using HeldBalance = plant_sim::RollingBalance<S, Tyre, Load, plant_sim::BrakeAlone<S>, plant_sim::Held>;
+
+  /// Makes all steps of a cycle in these lanes. True where `well(end)` after each of them.
+  template <class Balance, class Condition, class Well>
+  [[gnu::always_inline]] Condition go_on(const Balance& balance, const S& duration_s, const Condition& where,
+                                         const Well& well) noexcept {
+    using namespace plant_sim;
+    const S needed = steps_for(duration_s, max_step_s, balance.fastest_rate_per_s(x));
+    const S step_s = duration_s / needed;
+    steps = rig::select(where, needed, steps);
+    Condition all_well = where;
+    for (double made = 0.0;; made += 1.0) {
+      const auto goes_on = where && S(made) < needed;
+      if (!rig::any(goes_on)) break;
+      const BasicState<S> end = runge_kutta_step(balance, x, step_s);
+      for (std::size_t i = 0; i < x.size(); ++i) x[i] = rig::select(goes_on, end[i], x[i]);
+      all_well = all_well && well(x);
+    }
+    return all_well;
+  }
+  /// A cycle in which the brake holds the upper wheel. True where it does so throughout.
+  template <class Condition>
+  [[gnu::noinline, gnu::flatten]] Condition stand(const plant_sim::BrakeAlone<S>& held, const S& duration_s,
+                                                  const Condition& stands) noexcept {
+    const HeldBalance balance{tyre, load, now.wheels, held, now.friction};
+    return go_on(balance, duration_s, stands && balance.holds_upper(x), [&](const plant_sim::BasicState<S>& end) {
+      return balance.holds_upper(end) && end[plant_sim::omega2] > 0.0;
+    });
+  }
+};
+
+/// What is known of one wheel.
+template <class S>
+struct LaneWheel {
+  control::SpeedTracker<S> tracker{};
+  S counts{0.0};
+  S travel{0.0};  ///< counts over the past cycle
+  S omega_rad_s{0.0};
+  S alpha_rad_s2{0.0};
+  S travel_rad{0.0};
+
+  void begin(const S& counts_now, const S& start_speed_rad_s) noexcept {
+    counts = counts_now;
+    tracker.reset(start_speed_rad_s);
+    omega_rad_s = start_speed_rad_s;
+  }
+  /// Takes a reading, and the true speed where sensors are ideal.
+  template <class Condition>
+  void take(const S& counts_now, const Condition& ideal, const S& true_rad_s, const S& dt_s) noexcept {
+    travel = counts_now - counts;
+    counts = counts_now;
+    tracker.take(travel);
+    const S before_rad_s = omega_rad_s;
+    omega_rad_s = rig::select(ideal, true_rad_s, tracker.omega_rad_s());
+    alpha_rad_s2 = rig::select(ideal, S((true_rad_s - before_rad_s) / dt_s), tracker.alpha_rad_s2());
+    travel_rad = rig::select(ideal, S(0.5 * (before_rad_s + true_rad_s) * dt_s), S(travel * tracker.rad_per_count()));
+  }
+  template <class Condition>
+  [[nodiscard]] Condition stands_still(const Condition& ideal) const noexcept {
+    return (ideal && omega_rad_s == 0.0) || (!ideal && tracker.stands_still());
+  }
+  /// The counter moved further than any wheel can, or nears its end.
+  [[nodiscard]] auto leaps(const S& sure_counts) const noexcept {
+    constexpr double near_wrap = 2e9;
+    return rig::magnitude(travel) > sure_counts || rig::magnitude(counts) > near_wrap;
+  }
+};
+
+}  // namespace abs_hil::study::lanes
