@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """usage: benchmark_bounds.py [--check N]
 
-Computes the causal optimum of every case of the benchmark that has none yet and stores it in
+Computes the causal optimum of every case of the benchmark, and of the cases beside its set, that has none yet and stores it in
 python/abs_hil/benchmark/bounds-1.json; it goes on where it was interrupted. --check computes the first N again and
 compares. Needs the package abs_hil of a build (PYTHONPATH=build/release/share/abs_hil/python) and casadi.
 """
@@ -21,7 +21,7 @@ def store(known):
 
 
 def main():
-    every = cases.whole_set()
+    every = [*cases.whole_set(), *cases.beside_the_set()]
     if sys.argv[1:2] == ['--check'] and len(sys.argv) == 3:
         known = bounds.stored()
         for case in bounds.missing(every, {})[:int(sys.argv[2])]:

@@ -111,8 +111,8 @@ double AdaptiveOptimalController::peak_factor() const noexcept {
 
 double AdaptiveOptimalController::next_reference(double dt_s) noexcept {
   const double target = std::clamp(peak_factor() * bank_.peak_slip(), options_.slip_min, options_.slip_max);
-  const double most = rig::exponential(options_.slip_rate_per_s * dt_s);
-  reference_ = std::clamp(target, reference_ / most, reference_ * most);
+  // A peak that turns out to be near must not be passed: only a rise takes time.
+  reference_ = std::min(target, reference_ * rig::exponential(options_.slip_rate_per_s * dt_s));
   search_rad_ += options_.search_rad_s * dt_s;
   if (search_rad_ > std::numbers::pi) search_rad_ = std::remainder(search_rad_, 2.0 * std::numbers::pi);
   const double search = options_.search_part * rig::sine(search_rad_);

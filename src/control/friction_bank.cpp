@@ -16,7 +16,7 @@ namespace {
 // The bank: slips of the peak in a geometric row, shape factors in an even one. The plants have 0.03 to 0.25 and 1.27
 // to 1.9.
 constexpr double least_peak_slip = 0.02;
-constexpr double largest_peak_slip = 0.32;
+constexpr double largest_peak_slip = 0.25;
 constexpr double least_shape = 1.15;
 constexpr double largest_shape = 1.9;
 // Bounds of the unknowns.

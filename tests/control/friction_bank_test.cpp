@@ -97,7 +97,7 @@ TEST_CASE("Before braking the bank's curve is the mean of the magic formulas tha
   for (const double slip : {-0.3, -0.01, 0.0, 0.003, 0.02, 0.05, 0.1, 0.25, 0.6, 1.0}) {
     double sum = 0.0, weights = 0.0;
     for (int j = 0; j < 8; ++j) {
-      const double peak = 0.02 * std::pow(16.0, j / 7.0);
+      const double peak = 0.02 * std::pow(12.5, j / 7.0);
       const double away = std::log(peak / o.slip0) / o.slip_spread;
       for (const double C : {1.15, 1.525, 1.9}) {
         const double weight = std::exp(-0.5 * away * away);

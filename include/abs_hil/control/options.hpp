@@ -148,25 +148,25 @@ struct AdaptivePeakOptions {
 /// FrictionBank: what is known of the tyre before braking, and how well its inputs are trusted.
 struct FrictionBankOptions {
   ABS_HIL_OPTIONS(FrictionBankOptions);
-  ABS_HIL_OPTION(double, force_bandwidth_rad_s, 136.0, .unit = "rad/s",
+  ABS_HIL_OPTION(double, force_bandwidth_rad_s, 165.0, .unit = "rad/s",
                  .meaning = "bandwidth of the force that the curve is learnt from", .range = rig::between(10, 2000));
-  ABS_HIL_OPTION(double, force_noise_N2_s, 0.002, .unit = "N^2 s", .meaning = "intensity of that force's noise",
+  ABS_HIL_OPTION(double, force_noise_N2_s, 0.00532, .unit = "N^2 s", .meaning = "intensity of that force's noise",
                  .range = rig::positive(100));
   ABS_HIL_OPTION(double, force_error, 0.01, .meaning = "part of the force that the curve need not explain",
                  .range = rig::positive(1));
-  ABS_HIL_OPTION(double, timing_error_s, 0.0018, .unit = "s", .meaning = "delay between slip and force left unknown",
+  ABS_HIL_OPTION(double, timing_error_s, 0.00144, .unit = "s", .meaning = "delay between slip and force left unknown",
                  .range = rig::from_zero(0.1));
-  ABS_HIL_OPTION(double, slip_noise_m_s, 0.003, .unit = "m/s", .meaning = "error of the difference of both speeds",
+  ABS_HIL_OPTION(double, slip_noise_m_s, 0.0039, .unit = "m/s", .meaning = "error of the difference of both speeds",
                  .range = rig::from_zero(1));
-  ABS_HIL_OPTION(double, start_s, 0.017, .unit = "s", .meaning = "time at the start in which nothing is learnt",
+  ABS_HIL_OPTION(double, start_s, 0.0132, .unit = "s", .meaning = "time at the start in which nothing is learnt",
                  .range = rig::from_zero(1));
   ABS_HIL_OPTION(double, slip0, 0.078, .meaning = "median of the peak's slip before braking",
                  .range = rig::open_between(0, 1));
-  ABS_HIL_OPTION(double, slip_spread, 0.9, .meaning = "standard deviation of the logarithm of the peak's slip",
+  ABS_HIL_OPTION(double, slip_spread, 1.29, .meaning = "standard deviation of the logarithm of the peak's slip",
                  .range = rig::between(0.05, 5));
   ABS_HIL_OPTION(double, level0_N, 12.5, .unit = "N", .meaning = "first guess of the peak's force",
                  .range = rig::positive(500));
-  ABS_HIL_OPTION(double, level_spread_N, 22.5, .unit = "N", .meaning = "standard deviation of this guess",
+  ABS_HIL_OPTION(double, level_spread_N, 24.8, .unit = "N", .meaning = "standard deviation of this guess",
                  .range = rig::positive(500));
   ABS_HIL_OPTION(double, zero_spread, 0.009, .meaning = "standard deviation of the slip read at no force",
                  .range = rig::between(1e-6, 0.1));
@@ -175,16 +175,16 @@ struct FrictionBankOptions {
                  .range = rig::from_zero(100));
   ABS_HIL_OPTION(double, zero_drift_per_s, 0.0001, .unit = "1/s",
                  .meaning = "variance gained per second by the slip read at no force", .range = rig::from_zero(1));
-  ABS_HIL_OPTION(double, share_per_s, 0.013, .unit = "1/s",
+  ABS_HIL_OPTION(double, share_per_s, 0.0118, .unit = "1/s",
                  .meaning = "part of the weights that returns to the curves known before braking, per second",
                  .range = rig::between(1e-9, 100));
   ABS_HIL_OPTION(double, jump_share, 0.11, .meaning = "unexplained part of the peak's force that is a friction jump",
                  .range = rig::positive(10));
-  ABS_HIL_OPTION(double, jump_least_N, 2.5, .unit = "N", .meaning = "least unexplained force that is a friction jump",
+  ABS_HIL_OPTION(double, jump_least_N, 2.27, .unit = "N", .meaning = "least unexplained force that is a friction jump",
                  .range = rig::positive(500));
   ABS_HIL_OPTION(double, jump_confirm_s, 0.0028, .unit = "s", .meaning = "time that it must last",
                  .range = rig::from_zero(1));
-  ABS_HIL_OPTION(double, jump_hold_s, 0.04, .unit = "s",
+  ABS_HIL_OPTION(double, jump_hold_s, 0.0308, .unit = "s",
                  .meaning = "time after a jump in which only the level is learnt", .range = rig::positive(1));
   ABS_HIL_OPTION(double, jump_time_constant_s, 0.0023, .unit = "s",
                  .meaning = "time constant with which the level is learnt then", .range = rig::positive(1));
@@ -199,11 +199,11 @@ struct AdaptiveOptimalOptions {
   ABS_HIL_OPTIONS(AdaptiveOptimalOptions);
   ABS_HIL_OPTION(double, slip_gain_per_s, 67.0, .unit = "1/s", .meaning = "decay of a large slip velocity error",
                  .range = rig::positive(1e4));
-  ABS_HIL_OPTION(double, slip_gain_near_per_s, 9.3, .unit = "1/s", .meaning = "decay of a small one",
+  ABS_HIL_OPTION(double, slip_gain_near_per_s, 12.1, .unit = "1/s", .meaning = "decay of a small one",
                  .range = rig::positive(1e4));
   ABS_HIL_OPTION(double, slip_near_m_s, 0.07, .unit = "m/s", .meaning = "error at which the gain is half way between",
                  .range = rig::positive(10));
-  ABS_HIL_OPTION(double, torque_gain_per_s, 160.0, .unit = "1/s", .meaning = "decay of a large torque error",
+  ABS_HIL_OPTION(double, torque_gain_per_s, 176.0, .unit = "1/s", .meaning = "decay of a large torque error",
                  .range = rig::positive(1e4));
   ABS_HIL_OPTION(double, torque_gain_near_per_s, 30.0, .unit = "1/s", .meaning = "decay of a small one",
                  .range = rig::positive(1e4));
@@ -219,18 +219,18 @@ struct AdaptiveOptimalOptions {
                  .range = rig::positive(100));
   ABS_HIL_OPTION(double, model_error_per_s, 35.0, .unit = "1/s",
                  .meaning = "how fast the error of the holding torque is learnt", .range = rig::positive(1e4));
-  ABS_HIL_OPTION(double, peak_factor, 1.11, .meaning = "slip reference over the estimated slip of the peak",
+  ABS_HIL_OPTION(double, peak_factor, 1.14, .meaning = "slip reference over the estimated slip of the peak",
                  .range = rig::between(0.5, 2));
   ABS_HIL_OPTION(
-      double, runaway, 0.4,
+      double, runaway, 0.44,
       .meaning = "runaway of the slip past the peak, per time constant of the brake, that undoes this factor",
       .range = rig::positive(1e6));
   ABS_HIL_OPTION(double, slip_min, 0.015, .meaning = "least slip reference", .range = rig::open_between(0, 1));
   ABS_HIL_OPTION(double, slip_max, 0.35, .meaning = "largest slip reference", .range = rig::open_between(0, 1));
   ABS_HIL_OPTION(double, slip_start, 0.0507, .meaning = "slip reference at the start of braking",
                  .range = rig::open_between(0, 1));
-  ABS_HIL_OPTION(double, slip_rate_per_s, 10.5, .unit = "1/s",
-                 .meaning = "fastest change of the logarithm of the slip reference", .range = rig::positive(1000));
+  ABS_HIL_OPTION(double, slip_rate_per_s, 13.7, .unit = "1/s",
+                 .meaning = "fastest rise of the logarithm of the slip reference", .range = rig::positive(1000));
   ABS_HIL_OPTION(double, search_part, 0.08, .meaning = "amplitude of the search as a part of the reference",
                  .range = rig::from_zero_below(1));
   ABS_HIL_OPTION(double, search_rad_s, 28.0, .unit = "rad/s", .meaning = "frequency of the search",
