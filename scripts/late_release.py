@@ -15,7 +15,6 @@ import sys
 os.environ.setdefault('OMP_NUM_THREADS', '1')
 
 import numpy as np  # noqa: E402
-
 from marked_tables import keep  # noqa: E402
 
 from abs_hil.benchmark import cases  # noqa: E402

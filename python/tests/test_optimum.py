@@ -79,6 +79,13 @@ def test_rate_limit_holds_and_costs():
         limited.distance_m, rel=1e-4)
 
 
+def test_rate_limit_past_the_peak_is_followed_on_the_plant():
+    # Where friction falls, the limited brake holds a slip past the peak: in open loop the wheel drifts into a lock.
+    values = {'plant.brake_rate_limit_Nm_s': 100.0, 'plant.friction_profile': 'braking distance: 1; 0.5 at 2; 1 at 3'}
+    limited = optimum('paper-timing', values, start_speed_rad_s=120.0)
+    assert drive(limited, 'paper-timing', values).distance_m == pytest.approx(limited.distance_m, rel=1e-3)
+
+
 def test_program(capsys):
     assert main(['--plant', 'paper-timing', '--start-speed', '80', '--json']) == 0
     found = json.loads(capsys.readouterr().out)
