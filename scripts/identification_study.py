@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""usage: identification_study.py [--plants A,B] [--repetitions N] [--seed N] [--disturbed] [--jobs N] [--csv FILE]
-                                [--check]
+"""usage: identification_study.py [--plants A,B] [--repetitions N] [--seed N] [--disturbed] [--more A,B] [--jobs N]
+                                [--csv FILE] [--check]
 
 Tries abs_identify on simulated rigs whose parameters it does not know: each within 25 % of the plant's, with other encoder
 phases, from start values up to 25 % off. The logs are those of the series `identification`. Prints, for each parameter, the
 median error, the share of intervals of 95 % that hold the truth, how well the identified model predicts `paper`, how far the
 tyre's curve is off, and how far controllers that believe the model stop from where they stop with the true one.
 --disturbed: friction and brake wander by 1 %, the motor by 0.5 %, bearings by 5 %, over 0.2 s.
+--more: experiments of which there is one log more each.
 --check: status 1 unless all fits converge, errors stay within docs/identification.md's bounds for undisturbed rigs, and
 the intervals of all parameters together hold the truth as often as intervals of 95 % do.
 """
@@ -71,7 +72,7 @@ def wandering(duration_s, random):
     return settings
 
 
-def one(plant, seed, disturbed):
+def one(plant, seed, disturbed, more):
     """A row of results: name -> value."""
     random = np.random.default_rng([seed, *plant.encode()])
     form, truth, start = drawn(plant, random)
@@ -79,7 +80,7 @@ def one(plant, seed, disturbed):
     settings = {**{f'plant.{key}': value for key, value in nominal.items()},
                 **{f'plant.{key}': value for key, value in truth.items()}}
     logs = []
-    for name in EXPERIMENTS:
+    for name in (*EXPERIMENTS, *more):
         wander = wandering(60.0, random) if disturbed else {}
         logs.append(log_of(name, {**settings, **wander}, random.uniform(size=2)))
     paper = abs_hil.simulate(experiment='paper', set=settings)
@@ -189,6 +190,7 @@ def main():
     parser.add_argument('--repetitions', type=int, default=60)
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--disturbed', action='store_true')
+    parser.add_argument('--more', type=lambda names: names.split(','), default=[])
     parser.add_argument('--jobs', type=int, default=os.cpu_count())
     parser.add_argument('--csv', type=pathlib.Path)
     parser.add_argument('--check', action='store_true')
@@ -196,7 +198,7 @@ def main():
     every = []
     with ProcessPoolExecutor(o.jobs) as pool:
         for plant in o.plants.split(','):
-            jobs = [pool.submit(one, plant, o.seed + i, o.disturbed) for i in range(o.repetitions)]
+            jobs = [pool.submit(one, plant, o.seed + i, o.disturbed, o.more) for i in range(o.repetitions)]
             rows = []
             for number, job in enumerate(jobs, 1):
                 try:

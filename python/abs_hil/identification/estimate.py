@@ -22,6 +22,8 @@ from .problem import LARGEST_QUIET_RMS, QUIET, Fit, Problem
 LARGEST_RATIO = 1.5
 #: the disturbances take up what the model lacks, so a fit that follows the logs has 0.3 counts RMS also on a rig that wanders
 LARGEST_RMS = 1.0
+#: a fit whose last step went farther than this, in standard deviations, has not arrived
+LARGEST_LAST_STEP = 5.0
 #: friction, brake and motor of no rig wander this far; what else the model or the logs lack does
 LARGEST_WANDER = 0.1
 
@@ -88,6 +90,10 @@ def identify(logs: Sequence[PathLike | Log], start: PathLike = 'paper-table1', *
     if found.residual_counts_rms > LARGEST_RMS:
         found.notes.insert(0, f'the model does not follow the logs: residual {found.residual_counts_rms:.3g} counts RMS, at most '
                            f'{LARGEST_RMS:g} is expected even of a rig that wanders. No interval is given')
+        without_intervals(found)
+    elif found.disturbances is not None and found.fit.last_step > LARGEST_LAST_STEP:
+        found.notes.insert(0, 'the fit does not settle: the logs tell too little, or the model does not follow them. No interval is '
+                           'given')
         without_intervals(found)
     elif found.disturbances is not None and found.disturbances.sd[:3].max() > LARGEST_WANDER:
         odd = max(found.disagreement, key=lambda name: found.disagreement[name], default='')

@@ -208,7 +208,8 @@ def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambd
     fit.values = {**fit.values, **{p.key: float(v) for p, v in zip(problem.parameters, moved)}}
     fit.moved = Move(old, fit.values, before, fit.pieces, float(fit.cost.sum()))
     fit.iterations += 1
-    return float(np.sqrt(x @ (N + np.diag(fit.prior()[0])) @ x))
+    fit.last_step = float(np.sqrt(x @ (N + np.diag(fit.prior()[0])) @ x))
+    return fit.last_step
 
 
 def linearise_where_better(fit: Fit, check: Callable[[], None]) -> None:

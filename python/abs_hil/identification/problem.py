@@ -133,7 +133,7 @@ class Move:
 class Fit:
     """values: of all parameters; first: those that the prior holds to. normal: (logs, n, n), right: (logs, n), cost: (logs,)
     of the last linearisation, in the scaled changes x of `scale`: value = nominal + scale x. `free` marks the estimated
-    ones."""
+    ones. last_step: how far it went, in standard deviations of the direction that the logs know best."""
     problem: Problem
     values: dict[str, float]
     pieces: list[Piece]
@@ -149,6 +149,7 @@ class Fit:
     rms_counts: float = np.nan
     iterations: int = 0
     moved: Move | None = None
+    last_step: float = 0.0
 
     def copy(self, **changes: Any) -> Fit:
         """A fit that can go on without this one."""
