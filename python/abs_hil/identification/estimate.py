@@ -92,8 +92,8 @@ def identify(logs: Sequence[PathLike | Log], start: PathLike = 'paper-table1', *
                            f'{LARGEST_RMS:g} is expected even of a rig that wanders. No interval is given')
         without_intervals(found)
     elif found.disturbances is not None and found.fit.last_step > LARGEST_LAST_STEP:
-        found.notes.insert(0, 'the fit does not settle: the logs tell too little, or the model does not follow them. No interval is '
-                           'given')
+        found.notes.insert(0, 'the fit does not settle: the logs tell too little, or the model does not follow them. No interval '
+                           'is given')
         without_intervals(found)
     elif found.disturbances is not None and found.disturbances.sd[:3].max() > LARGEST_WANDER:
         odd = max(found.disagreement, key=lambda name: found.disagreement[name], default='')
