@@ -187,9 +187,10 @@ def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambd
     """One iteration: linearise, estimate, move parameters and states. Returns how far they moved, in standard deviations:
     of the direction that the logs know best, not of each parameter alone."""
     problem = fit.problem
-    linearise_where_better(fit, check)
+    found = linearise_where_better(fit, check)
+    if found is None or disturbances is not fit.disturbances:
+        _, found = run_filter(fit, disturbances)
     fit.disturbances = disturbances
-    _, found = run_filter(fit, disturbances)
     N, n = keep_normals(fit, found)
     before = [piece.states for piece in fit.pieces]
     values = np.array([fit.values[p.key] for p in problem.parameters])
@@ -212,25 +213,29 @@ def step(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lambd
     return fit.last_step
 
 
-def linearise_where_better(fit: Fit, check: Callable[[], None]) -> None:
-    """Linearises at the present values. Where the last step led to worse ones, or to a plant that cannot be, halves it."""
+def linearise_where_better(fit: Fit, check: Callable[[], None]) -> list[Any] | None:
+    """Linearises at the present values. Where the last step led to worse ones, or to a plant that cannot be, halves it.
+    Returns what the filter gave with the last step's disturbances; None if there was no step to judge."""
     last = fit.moved
-    judged = last is not None and last.after is fit.values and last.pieces is fit.pieces
+    if last is None or last.after is not fit.values or last.pieces is not fit.pieces:
+        fit.scale = linearise(fit.problem, fit.values, fit.pieces, check)
+        return None
+    found: list[Any] = []
     for halving in range(MOST_HALVINGS + 1):
         try:
             fit.scale = linearise(fit.problem, fit.values, fit.pieces, check)
-            cost = sum(float(one[2][0]) + one[3] for one in filtered(
-                fit.problem, fit.pieces, _relative(fit.problem, fit.values, fit.scale), fit.disturbances,
-                COUNT_VARIANCE * fit.problem.radians_per_count**2)) if judged else 0.0
+            _, found = run_filter(fit, fit.disturbances)
+            cost = sum(float(one[2][0]) + one[3] for one in found)
         except ValueError:
-            if last is None or not judged or halving == MOST_HALVINGS:
+            if halving == MOST_HALVINGS:
                 raise
             cost = np.inf
-        if last is None or not judged or cost <= last.cost + LARGEST_RISE:
-            return
+        if cost <= last.cost + LARGEST_RISE or halving == MOST_HALVINGS:
+            break
         fit.values = {key: 0.5 * (last.before[key] + value) for key, value in fit.values.items()}
         for piece, states in zip(fit.pieces, last.states):
             piece.states = 0.5 * (piece.states + states)
+    return found
 
 
 def keep_normals(fit: Fit, found: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
