@@ -1,8 +1,7 @@
 #pragma once
 
-#include <numbers>
-
 #include "abs_hil/control/slip_error_dynamics.hpp"
+#include "control/half_turn.hpp"
 #include "control/law_controller.hpp"
 #include "control/slip_error_integral.hpp"
 #include "control/slip_peak_estimator.hpp"
@@ -86,13 +85,11 @@ void AdaptivePeakLaw<S>::learn(const S& dt_s, const S& slip) noexcept {
 
 template <class S>
 typename AdaptivePeakLaw<S>::Reference AdaptivePeakLaw<S>::next_reference(const S& dt_s) noexcept {
-  constexpr double turn_rad = 2.0 * std::numbers::pi;
   const S target = rig::clamped(peak_.peak_slip(), slip_min_, slip_max_);
   const S most = slip_rate_per_s_ * dt_s;
   const S step = rig::clamped(S(target - centre_), S(-most), most);
   centre_ += step;
-  const S angle = search_angle_rad_ + search_rad_s_ * dt_s;
-  search_angle_rad_ = angle - turn_rad * rig::round_down(S(angle / turn_rad + 0.5));
+  search_angle_rad_ = within_half_turn_rad(S(search_angle_rad_ + search_rad_s_ * dt_s));
   const S swing = rig::larger(S(search_part_ * centre_), search_min_);
   return {.slip = centre_ + swing * rig::sine(search_angle_rad_),
           .rate_per_s =

@@ -1,11 +1,10 @@
 #pragma once
 
-#include <numbers>
-
 #include "abs_hil/control/paper_laws.hpp"
 #include "abs_hil/rig/brake_map.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 #include "control/full_torque.hpp"
+#include "control/half_turn.hpp"
 #include "control/law_controller.hpp"
 #include "control/wheel_force_observer.hpp"
 #include "control/wheel_motion.hpp"
@@ -108,14 +107,11 @@ void BrakingStiffnessLaw<S>::reset(const BasicSlipInput<S>& input) noexcept {
 template <class S>
 void BrakingStiffnessLaw<S>::move_reference(const S& dt_s, const S& slip) noexcept {
   if (!rig::any(dt_s > 0.0)) return;
-  constexpr double turn_rad = 2.0 * std::numbers::pi;
   late_slip_ += -rig::exponential_less_one(S(-dt_s / observer_.force_delay_s())) * (slip - late_slip_);
   stiffness_.learn(dt_s, late_slip_, observer_.force_N());
   const S rise = rate_per_s_ * (stiffness_.elasticity() - target_) * dt_s;
   reference_ = rig::clamped(S(reference_ * rig::exponential(rise)), slip_min_, slip_max_);
-  const S search_rad = search_rad_ + search_rad_s_ * dt_s;
-  search_rad_ = rig::select(search_rad > std::numbers::pi,
-                            S(search_rad - turn_rad * rig::round_down(S(search_rad / turn_rad + 0.5))), search_rad);
+  search_rad_ = within_half_turn_rad(S(search_rad_ + search_rad_s_ * dt_s));
 }
 
 template <class S>
