@@ -36,11 +36,19 @@ const AdaptiveOptimalOptions& checked(const AdaptiveOptimalOptions& o) {
   return o;
 }
 
+/// The noise of the force and of the first speeds comes from the steps of the counts.
+FrictionBankOptions counted(FrictionBankOptions bank, const rig::RigParameters& rig) noexcept {
+  constexpr double usual_counts_per_rev = 4096.0;
+  const double coarser = usual_counts_per_rev / rig.encoder_counts_per_rev;
+  bank.force_noise_N2_s *= coarser * coarser;
+  bank.zero_error_m_s *= coarser;
+  return bank;
+}
+
 ProximateTorque loop(const AdaptiveOptimalOptions& o, const rig::RigParameters& rig) noexcept {
   const double limit = rig.brake.brake_rate_limit_Nm_s;
   return {.mass_kg_m = rig.wheels.J1_kg_m2 / rig.wheels.r1_m,
           .gain_per_s = o.slip_gain_per_s,
-          .near_per_s = o.slip_gain_near_per_s,
           .near_m_s = o.slip_near_m_s,
           .swing_per_s = rig.brake.c31_per_s,
           .rate_limit_Nm_s = limit > 0.0 ? limit : std::numeric_limits<double>::infinity()};
@@ -59,35 +67,50 @@ AdaptiveOptimalController::AdaptiveOptimalController(const ControllerContext& co
       observer_{options_.observer, context.rig, context.options.rate_Hz},
       force_{context.rig.wheels, options_.bank.force_bandwidth_rad_s},
       learns_every_{std::max(1, static_cast<int>(std::lround(context.options.rate_Hz / learning_rate_Hz)))},
-      bank_{options_.bank, context.options.rate_Hz / learns_every_, observer_.force_delay_s()} {}
+      bank_{counted(options_.bank, context.rig), context.options.rate_Hz / learns_every_, observer_.force_delay_s()} {}
 
 void AdaptiveOptimalController::reset(const SlipInput& input) noexcept {
   observer_.reset(input.speeds);
   force_.reset(input.speeds.omega2_rad_s);
-  bank_.reset();
+  const double turning_Nm = rig_.wheels.J1_kg_m2 * input.alpha1_rad_s2 +
+                            rig_.wheels.d1_Nms_rad * input.speeds.omega1_rad_s + rig_.wheels.M10_Nm;
+  bank_.reset({.slip = slip_of(input.speeds),
+               .car_speed_m_s = std::max(rig_.wheels.r2_m * input.speeds.omega2_rad_s, v_min_m_s_),
+               .force_N = (turning_Nm + input.brake_torque_Nm) / rig_.wheels.r1_m});
+  speeds_.reset(input.speeds);
   reference_ = options_.slip_start;
   model_error_Nm_ = sent_Nm_ = search_rad_ = 0.0;
-  last_omega2_rad_s_ = input.speeds.omega2_rad_s;
+  last_speeds_ = input.speeds;
   unlearnt_ = {};
+}
+
+double AdaptiveOptimalController::slip_of(const rig::WheelSpeeds& speeds) const noexcept {
+  return rig::wheel_slip(rig_.wheels.r1_m * speeds.omega1_rad_s, rig_.wheels.r2_m * speeds.omega2_rad_s, v_min_m_s_);
 }
 
 void AdaptiveOptimalController::learn(const SlipInput& input, double slip) noexcept {
   if (!(input.dt_s > 0.0)) return;
-  const double omega2 = input.speeds.omega2_rad_s;
-  unlearnt_.travel_rad +=
-      std::isnan(input.lower_travel_rad) ? 0.5 * (last_omega2_rad_s_ + omega2) * input.dt_s : input.lower_travel_rad;
+  const auto travel_rad = [&](double known_rad, double last_rad_s, double rad_s) {
+    return std::isnan(known_rad) ? 0.5 * (last_rad_s + rad_s) * input.dt_s : known_rad;
+  };
+  const rig::WheelSpeeds last = std::exchange(last_speeds_, input.speeds);
+  unlearnt_.upper_rad += travel_rad(input.upper_travel_rad, last.omega1_rad_s, input.speeds.omega1_rad_s);
+  unlearnt_.lower_rad += travel_rad(input.lower_travel_rad, last.omega2_rad_s, input.speeds.omega2_rad_s);
   unlearnt_.time_s += input.dt_s;
-  last_omega2_rad_s_ = omega2;
   if (++unlearnt_.cycles < learns_every_) return;
   const Unlearnt step = std::exchange(unlearnt_, {});
   const double omega2_est = observer_.speeds().omega2_rad_s;
-  force_.update(step.time_s, step.travel_rad, omega2_est);
+  const double v_x = std::max(rig_.wheels.r2_m * omega2_est, v_min_m_s_);
+  force_.update(step.time_s, step.lower_rad, omega2_est);
+  speeds_.update(force_.covered(), step.time_s, step.upper_rad, step.lower_rad);
   bank_.learn({.dt_s = step.time_s,
                .slip = slip,
+               .late_slip = slip_of(speeds_.speeds()),
                .car_speed_m_s = rig_.wheels.r2_m * omega2_est,
                .force_N = force_.force_N(),
                .covered = force_.covered(),
-               .quick_force_N = observer_.force_N()});
+               .quick_force_N = observer_.force_N(),
+               .runaway_per_N = rig_.wheels.r1_m / (loop_.mass_kg_m * v_x * rig_.brake.c31_per_s)});
   // The balance of both wheels, against that of the curve at the same slip.
   const paper::Reading<double> same{.omega1 = 0.0, .omega2 = 0.0, .lambda_ref = 0.0, .phi = 1.0};
   const double missing_Nm =
@@ -96,17 +119,11 @@ void AdaptiveOptimalController::learn(const SlipInput& input, double slip) noexc
   model_error_Nm_ += covered * (missing_Nm - model_error_Nm_);
 }
 
-/// A tenth past the peak the tyre force falls by theta * curvature * 0.1 peak over the slip, and the slip runs away at
-/// r1^2/J1 of that over v_x. If it runs away within the time that the brake takes to act, the reference must not be
-/// past the peak, whatever is expected of it.
+/// If the slip runs away within the time that the brake takes to act, the reference must not be past the peak, whatever
+/// is expected of it.
 double AdaptiveOptimalController::peak_factor() const noexcept {
-  constexpr double past_the_peak = 0.1;
-  constexpr double least = 0.85;
-  const double v_x = std::max(rig_.wheels.r2_m * observer_.speeds().omega2_rad_s, v_min_m_s_);
-  const double falls_N = past_the_peak * bank_.peak_slip() * bank_.curvature() * bank_.peak_force_N();
-  const double runs_away_per_s = rig_.wheels.r1_m / loop_.mass_kg_m * falls_N / v_x;
-  const double runaway = runs_away_per_s / rig_.brake.c31_per_s;
-  return std::max(least, 1.0 + (options_.peak_factor - 1.0) * (1.0 - runaway / options_.runaway));
+  constexpr double least = 0.75;
+  return std::max(least, 1.0 + (options_.peak_factor - 1.0) * (1.0 - bank_.runaway() / options_.runaway));
 }
 
 double AdaptiveOptimalController::next_reference(double dt_s) noexcept {
@@ -148,6 +165,13 @@ AdaptiveOptimalController::Holding AdaptiveOptimalController::holding(double sli
   return {dared_Nm, dared_Nm};
 }
 
+/// The brake catches a slip that runs away only if it answers faster, also while the error is small.
+double AdaptiveOptimalController::near_gain_per_s() const noexcept {
+  const double runaway_per_s = bank_.runaway() * rig_.brake.c31_per_s;
+  return std::min(std::max(options_.slip_gain_per_s, options_.slip_gain_near_per_s),
+                  options_.slip_gain_near_per_s + options_.slip_gain_runaway * runaway_per_s);
+}
+
 double AdaptiveOptimalController::wanted_torque_Nm(const Holding& hold, double error_m_s,
                                                    double most_Nm) const noexcept {
   const double size = std::abs(error_m_s);
@@ -175,9 +199,9 @@ double AdaptiveOptimalController::with_play_Nm(double torque_Nm, double most_Nm)
 SlipOutput AdaptiveOptimalController::step(const SlipInput& input) noexcept {
   observer_.update(input);
   const rig::WheelSpeeds speeds = observer_.speeds();
-  const double slip =
-      rig::wheel_slip(rig_.wheels.r1_m * speeds.omega1_rad_s, rig_.wheels.r2_m * speeds.omega2_rad_s, v_min_m_s_);
+  const double slip = slip_of(speeds);
   learn(input, slip);
+  loop_.near_per_s = near_gain_per_s();
   const double reference = next_reference(input.dt_s);
   const double error_m_s = slip_velocity_error_m_s(rig_.wheels, speeds, reference);
   const double most_Nm = full_torque_Nm(rig_.brake, input.max_brake_torque_Nm);

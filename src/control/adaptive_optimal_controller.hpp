@@ -33,11 +33,13 @@ class AdaptiveOptimalController final : public SlipController {
   struct Unlearnt {
     int cycles{0};
     double time_s{0.0};
-    double travel_rad{0.0};  ///< of the lower wheel
+    double upper_rad{0.0}, lower_rad{0.0};  ///< travel of both wheels
   };
 
+  [[nodiscard]] double slip_of(const rig::WheelSpeeds& speeds) const noexcept;
   void learn(const SlipInput& input, double slip) noexcept;
   [[nodiscard]] double peak_factor() const noexcept;
+  [[nodiscard]] double near_gain_per_s() const noexcept;
   [[nodiscard]] double next_reference(double dt_s) noexcept;
   [[nodiscard]] double holding_torque_Nm(const rig::WheelSpeeds& speeds, double slip, double force_N) const noexcept;
   [[nodiscard]] Holding holding(double slip, double reference, double error_m_s) const noexcept;
@@ -54,13 +56,14 @@ class AdaptiveOptimalController final : public SlipController {
   ProximateTorque loop_;
   WheelForceObserver observer_;
   LowerWheelForce force_;
+  DelayedSpeeds speeds_;
   int learns_every_;  ///< cycles
   FrictionBank bank_;
   double reference_{0.0};       ///< slip of the peak, without search and zero
   double model_error_Nm_{0.0};  ///< of the holding torque: what is missing in it
   double sent_Nm_{0.0};
   double search_rad_{0.0};  ///< angle of the search, in [-pi, pi]
-  double last_omega2_rad_s_{0.0};
+  rig::WheelSpeeds last_speeds_{};
   Unlearnt unlearnt_;
 };
 

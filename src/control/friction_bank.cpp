@@ -20,7 +20,7 @@ constexpr double largest_peak_slip = 0.25;
 constexpr double least_shape = 1.15;
 constexpr double largest_shape = 1.9;
 // Bounds of the unknowns.
-constexpr double theta_min_N = 6.0;
+constexpr double theta_min_N = 2.0;
 constexpr double theta_max_N = 500.0;
 constexpr double zero_max = 0.025;
 constexpr double theta_variance_min_N2 = 1e-9;
@@ -30,6 +30,7 @@ constexpr double error_lasts_s = 0.005;
 // Slower, the slip is made of few counts.
 constexpr double learning_m_s = 1.0;
 constexpr double slip_speed_min_m_s = 0.3;
+constexpr double past_the_peak = 0.1;
 // The level is seen in forces above this.
 constexpr double seen_N = 3.0;
 constexpr double largest_fall = 0.9;  ///< of the level in a cycle
@@ -95,27 +96,6 @@ std::array<double, N> fitted(auto f) {
 
 }  // namespace
 
-LowerWheelForce::LowerWheelForce(const rig::WheelParameters& wheels, double bandwidth_rad_s) noexcept
-    : wheels_{wheels}, bandwidth_rad_s_{bandwidth_rad_s}, tracker_{{.bandwidth_rad_s = bandwidth_rad_s}, 1} {}
-
-void LowerWheelForce::reset(double omega2_rad_s) noexcept {
-  free_rad_s_ = omega2_rad_s;
-  tracker_.reset(0.0);
-  covered_ = force_N_ = 0.0;
-}
-
-void LowerWheelForce::update(double dt_s, double travel_rad, double omega2_rad_s) noexcept {
-  const double friction_rad_s2 = -(wheels_.d2_Nms_rad * omega2_rad_s + wheels_.M20_Nm) / wheels_.J2_kg_m2;
-  const double free_rad = (free_rad_s_ + 0.5 * friction_rad_s2 * dt_s) * dt_s;
-  free_rad_s_ += friction_rad_s2 * dt_s;
-  if (dt_s != tracker_.dt_s()) {
-    tracker_.prepare(dt_s);
-    covered_ = -rig::exponential_less_one(-bandwidth_rad_s_ * dt_s);
-  }
-  tracker_.correct((travel_rad - free_rad) / tracker_.rad_per_count());
-  force_N_ = -wheels_.J2_kg_m2 * tracker_.alpha_rad_s2() / wheels_.r2_m;
-}
-
 FrictionBank::FrictionBank(const FrictionBankOptions& options, double rate_Hz, double quick_delay_s)
     : options_{options}, rate_Hz_{rate_Hz}, quick_delay_s_{quick_delay_s} {
   rig::require_valid(options, "control.adaptive_optimal.");
@@ -145,22 +125,26 @@ FrictionBank::FrictionBank(const FrictionBankOptions& options, double rate_Hz, d
     }
   }
   for (Members& m : bank_) m.prior = m.prior / Row(sum);
-  reset();
+  reset({.car_speed_m_s = 1.0});
 }
 
-void FrictionBank::reset() noexcept {
+void FrictionBank::reset(const Start& start) noexcept {
+  const double zero = std::clamp(-start.slip, -zero_max, zero_max);
+  const double spread =
+      options_.zero_error_m_s / start.car_speed_m_s + options_.zero_error_per_N * std::abs(start.force_N);
   for (Members& m : bank_) {
     m.theta_N = options_.level0_N;
-    m.zero = m.covariance = m.now = 0.0;
+    m.zero = zero;
+    m.covariance = m.now = 0.0;
     m.theta_variance = square(options_.level_spread_N);
-    m.zero_variance = square(options_.zero_spread);
+    m.zero_variance = square(spread);
     m.weight = m.prior;
     m.phi = {};
   }
-  late_slip_ = {};
+  late_slip_.settle(start.slip);
   time_s_ = hold_s_ = unexplained_s_ = late_force_N_ = 0.0;
   jumps_ = 0;
-  summarise();
+  summarise(0.0);
 }
 
 auto FrictionBank::value(const Shape& shape, const Row& knee, const Row& slip) noexcept -> Row {
@@ -179,17 +163,18 @@ auto FrictionBank::slope(const Shape& shape, const Row& knee, const Row& slip) n
 void FrictionBank::learn(const Data& data) noexcept {
   if (!(data.dt_s > 0.0)) return;
   time_s_ += data.dt_s;
-  const double late_slip = late_slip_(data.covered, data.slip);
+  const double late_reading = late_slip_(data.covered, data.slip);
   // The filter of the slip is as late as three lags, so this is its mean rate of late.
-  const double slip_rate_per_s = (data.slip - late_slip) * options_.force_bandwidth_rad_s / 3.0;
+  const double slip_rate_per_s = (data.slip - data.late_slip) * options_.force_bandwidth_rad_s / 3.0;
   watch_for_jumps(data);
   const bool learns = !jumping();
   const double starting = time_s_ < options_.start_s ? 1e6 : 1.0;
   const double timing = options_.timing_error_s * slip_rate_per_s;
   const double speed = options_.slip_noise_m_s / std::max(data.car_speed_m_s, slip_speed_min_m_s);
   const Look look{.slip = data.slip,
-                  .late_slip = late_slip,
+                  .late_slip = data.late_slip,
                   .covered = data.covered,
+                  .slip_error = late_reading - data.late_slip,
                   .force_N = data.force_N,
                   .noise_N2 = starting * rate_Hz_ *
                               (options_.force_noise_N2_s + error_lasts_s * square(options_.force_error * data.force_N)),
@@ -200,18 +185,19 @@ void FrictionBank::learn(const Data& data) noexcept {
                   .learns = learns,
                   .compares = learns && data.car_speed_m_s > learning_m_s};
   for (std::size_t i = 0; i < rows; ++i) learn(shapes_[i / rows_a_shape], look, bank_[i]);
-  summarise();
+  summarise(data.runaway_per_N);
   late_force_N_ += -rig::exponential_less_one(-data.dt_s / quick_delay_s_) * (force_N_ - late_force_N_);
 }
 
 void FrictionBank::learn(const Shape& shape, const Look& look, Members& m) noexcept {
   m.now = value(shape, m.knee, look.slip + m.zero);
-  const Row phi = m.phi(look.covered, m.now);
+  const Row delayed = m.phi(look.covered, m.now);
   m.theta_variance = m.theta_variance + look.theta_growth * square(m.theta_N);
   m.zero_variance = m.zero_variance + look.zero_growth;
   if (!look.learns) return;
   // The gradient of the force that the member expects, by theta and by the zero.
   const Row by_slip = slope(shape, m.knee, look.late_slip + m.zero);
+  const Row phi = delayed - by_slip * look.slip_error;
   const Row by_zero = m.theta_N * by_slip;
   const Row noise = look.noise_N2 + square(by_zero) * look.slip_error2;
   const Row reach_theta = m.theta_variance * phi + m.covariance * by_zero;
@@ -262,22 +248,26 @@ void FrictionBank::watch_for_jumps(const Data& data) noexcept {
   }
 }
 
-void FrictionBank::summarise() noexcept {
-  Row weight(0.0), slip(0.0), curvature(0.0), zero(0.0), theta(0.0), force(0.0);
+void FrictionBank::summarise(double runaway_per_N) noexcept {
+  Row weight(0.0), slip(0.0), cost(0.0), runaway(0.0), zero(0.0), theta(0.0), force(0.0);
   for (const Members& m : bank_) {
-    const Row bent = m.weight * m.bent;
     const Row height = m.weight * m.theta_N;
+    // The slope of the force a tenth past the peak, times what a newton means for the slip.
+    const Row runs_away = (past_the_peak * runaway_per_N) * m.theta_N * m.bent * m.peak;
+    const Row passed = rig::select(m.peak < Row(peak_slip_), options_.past_peak_cost * runs_away, Row(0.0));
+    const Row costs = m.weight * m.bent * (1.0 + passed);
     weight = weight + m.weight;
-    slip = slip + bent * m.peak;
-    curvature = curvature + bent;
+    slip = slip + costs * m.peak;
+    cost = cost + costs;
+    runaway = runaway + m.weight * runs_away;
     zero = zero + m.weight * m.zero;
     theta = theta + height;
     force = force + height * m.now;
   }
   const double per = 1.0 / sum_of(weight);
   for (Members& m : bank_) m.weight = m.weight * per;
-  peak_slip_ = sum_of(slip) / sum_of(curvature);
-  curvature_ = per * sum_of(curvature);
+  peak_slip_ = sum_of(slip) / sum_of(cost);
+  runaway_ = per * sum_of(runaway);
   slip_zero_ = per * sum_of(zero);
   peak_force_N_ = std::clamp(per * sum_of(theta), theta_min_N, theta_max_N);  // a mean, but for rounding
   force_N_ = per * sum_of(force);

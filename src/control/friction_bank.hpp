@@ -4,59 +4,10 @@
 #include <cstddef>
 
 #include "abs_hil/control/options.hpp"
-#include "abs_hil/rig/parameters.hpp"
-#include "control/speed_tracker.hpp"
+#include "control/lower_wheel_force.hpp"
 #include "rig/pack.hpp"
 
 namespace abs_hil::control {
-
-/// Delays a signal as LowerWheelForce delays the force: `q` = `covered()`.
-template <class S>
-struct ForceDelay {
-  std::array<S, 3> lag{S(0.0), S(0.0), S(0.0)};
-  S last{0.0}, before{0.0};
-
-  S operator()(double q, const S& now) noexcept {
-    // A force sampled now and in the two cycles before: the mean acceleration of the two intervals that the filter's
-    // newest second difference spans.
-    S x = 0.25 * (now + 2.0 * last + before);
-    before = last;
-    last = now;
-    for (S& y : lag) x = y = y + q * (x - y);
-    return x;
-  }
-  void shift(const S& by) noexcept {
-    for (S& y : lag) y = y + by;
-    last = last + by;
-    before = before + by;
-  }
-};
-
-/// Tyre force from the lower wheel alone, J2 omega2' = -r2 F - d2 omega2 - M20: neither the brake nor its model enters.
-/// A fading-memory filter with a triple pole follows the angle by which the force alone turns the wheel back. Its
-/// response to F is known exactly. To compare F with a curve, pass the curve through the same delay (`ForceDelay`).
-/// Real-time safe.
-class LowerWheelForce {
- public:
-  /// @param bandwidth_rad_s  of the triple pole, > 0
-  LowerWheelForce(const rig::WheelParameters& wheels, double bandwidth_rad_s) noexcept;
-
-  void reset(double omega2_rad_s) noexcept;
-  /// @param travel_rad  that the lower wheel turned in `dt_s` > 0
-  /// @param omega2_rad_s  for the viscous friction only
-  void update(double dt_s, double travel_rad, double omega2_rad_s) noexcept;
-  [[nodiscard]] double force_N() const noexcept { return force_N_; }
-  /// What a filter of one pole covers of its distance in the last interval.
-  [[nodiscard]] double covered() const noexcept { return covered_; }
-
- private:
-  rig::WheelParameters wheels_;
-  double bandwidth_rad_s_;
-  SpeedTracker<double> tracker_;
-  double free_rad_s_{0.0};  ///< speed without tyre force
-  double covered_{0.0};
-  double force_N_{0.0};
-};
 
 /// Learns the tyre's curve F(slip) from slip and force. A bank of shapes of (4), with different peak slips and shape
 /// factors, explains the data side by side. Each member is a Kalman filter of two unknowns, its height theta and the
@@ -77,12 +28,21 @@ class FrictionBank {
   struct Data {
     double dt_s{0.0};  ///< > 0
     double slip{0.0};
+    double late_slip{0.0};  ///< as late as `force_N`
     double car_speed_m_s{0.0};
     double force_N{0.0};        ///< of LowerWheelForce
     double covered{0.0};        ///< of LowerWheelForce
     double quick_force_N{0.0};  ///< less exact and less delayed
+    /// By how fast the slip runs away where the force falls by a newton, over the rate at which the brake acts.
+    double runaway_per_N{0.0};
   };
-  void reset() noexcept;
+  /// Readings as braking begins: without force, they are the slip at no force.
+  struct Start {
+    double slip{0.0};
+    double car_speed_m_s{0.0};  ///< > 0
+    double force_N{0.0};        ///< of the tyre
+  };
+  void reset(const Start& start) noexcept;
   void learn(const Data& data) noexcept;
 
   struct Force {
@@ -93,13 +53,14 @@ class FrictionBank {
   [[nodiscard]] Force at(double slip) const noexcept;
   /// Expected force at the last reading.
   [[nodiscard]] double force_N() const noexcept { return force_N_; }
-  /// Reading of the slip at which the expected loss of force is least (the members taken as parabolas at their peaks),
-  /// without the reading at no force.
+  /// Reading of the slip at which the expected loss is least, without the reading at no force. The members are taken as
+  /// parabolas at their peaks, and a peak that is passed costs more by `past_peak_cost` times its runaway.
   [[nodiscard]] double peak_slip() const noexcept { return peak_slip_; }
   /// Reading of the slip at no force is minus this.
   [[nodiscard]] double slip_zero() const noexcept { return slip_zero_; }
-  /// Expected -phi'' at the peak.
-  [[nodiscard]] double curvature() const noexcept { return curvature_; }
+  /// Expected runaway of the slip a tenth past the peak, over the rate at which the brake acts: from 1 on, the brake is
+  /// too slow to catch it.
+  [[nodiscard]] double runaway() const noexcept { return runaway_; }
   [[nodiscard]] double peak_force_N() const noexcept { return peak_force_N_; }
   /// Force of the curve at the readings of late, as late as the quick force.
   [[nodiscard]] double late_force_N() const noexcept { return late_force_N_; }
@@ -132,6 +93,7 @@ class FrictionBank {
   /// What all members compare their curves with in a cycle.
   struct Look {
     double slip, late_slip, covered;
+    double slip_error;  ///< of the readings on their way through the filter
     double force_N;
     double noise_N2;      ///< variance of the force
     double slip_error2;   ///< variance of the slip
@@ -145,7 +107,7 @@ class FrictionBank {
   [[nodiscard]] static Row slope(const Shape& shape, const Row& knee, const Row& slip) noexcept;
   static void learn(const Shape& shape, const Look& look, Members& m) noexcept;
   void watch_for_jumps(const Data& data) noexcept;
-  void summarise() noexcept;
+  void summarise(double runaway_per_N) noexcept;
 
   FrictionBankOptions options_;
   double rate_Hz_;
@@ -158,7 +120,7 @@ class FrictionBank {
   double unexplained_s_{0.0};
   double force_N_{0.0};
   double late_force_N_{0.0};
-  double curvature_{0.0};
+  double runaway_{0.0};
   double peak_slip_{0.0}, slip_zero_{0.0}, peak_force_N_{0.0};
   int jumps_{0};
 };

@@ -123,10 +123,9 @@ TEST_CASE("adaptive-optimal brakes at other rates, and with an ideal actuator an
 }
 
 TEST_CASE("Where the slip runs away past the peak faster than the brake acts, the reference stays below the peak") {
-  // The same steep tyre at two speeds: past the peak its slip runs away in inverse proportion to the speed.
+  // The same tyre at two speeds: past the peak its slip runs away in inverse proportion to the speed.
   const auto reference_over_peak = [](double speed_rad_s, double runaway) {
     auto s = real_rig();
-    s.plant->tyre = {.theta_N = 40.0, .B = 35.0, .C = 1.85};
     s.omega1_start = s.omega2_start = speed_rad_s;
     s.options.adaptive_optimal.runaway = runaway;
     s.options.adaptive_optimal.search_part = 0.0;
@@ -141,6 +140,6 @@ TEST_CASE("Where the slip runs away past the peak faster than the brake acts, th
   const double factor = control::ControlOptions{}.adaptive_optimal.peak_factor;
   CHECK(std::abs(reference_over_peak(180.0, 1e6) - factor) < 0.02);
   CHECK(std::abs(reference_over_peak(60.0, 1e6) - factor) < 0.02);
-  CHECK(reference_over_peak(60.0, 0.4) < 1.0);
+  CHECK(reference_over_peak(180.0, 0.4) < factor - 0.01);
   CHECK(reference_over_peak(60.0, 0.4) < reference_over_peak(180.0, 0.4));
 }
