@@ -2,22 +2,28 @@
 """usage: search_braking_gains.py BUILD [--law LAW] [--check] [--threads N]
 
 Searches the keys of the laws that look for good slip by themselves, on config/training/braking.toml. The score is the mean
-over the runs of the distance over that of adaptive-peak, in per cent above 100, plus a tenth of the mean of the worst
-twentieth, plus one per cent for 100 N m of torque variation; a locked wheel or a fault costs 100. The search goes from the
-present defaults: it moves one key after the other up and down by a step and keeps what lessens the score by 0.03, until no
-move does; then the same with a smaller step. All is deterministic, so the result does not depend on the computer.
+over the runs of the distance over that of the causal optimum (config/training/bounds.json, by training_bounds.py), in per cent
+above 100, plus a fifth of the mean of the worst twentieth, plus one per cent for 60 N m of torque variation. A locked wheel or
+a fault counts 100, and no run more; a run of adaptive-optimal counts 10 at most: some steep tyres cannot be braked well from
+slow starts for certain (docs/theory-beyond.md), and would outweigh all others.
+
+The search goes from the present defaults: it moves one key after the other up and down by a step and keeps what lessens the
+score by a fiftieth, until no move does; then the same with a smaller step. Smaller gains do not hold on other draws of the
+training set. All is deterministic, so the result does not depend on the computer.
 
 The result goes into config/training/gains.json with its score, and the program's defaults into options.hpp and
 baseline_options.hpp: build anew afterwards. --check compares the build's defaults with gains.json, computes the score again,
-and says whether a move of the smaller step would lessen it by 0.1. Smaller gains do not hold on other draws of the training set.
+and says whether a move of the smaller step would lessen it by a fiftieth.
 """
 import argparse
 import csv
 import gzip
+import hashlib
 import json
 import math
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -26,17 +32,18 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 STUDY = ROOT / 'config' / 'training' / 'braking.toml'
 GAINS = ROOT / 'config' / 'training' / 'gains.json'
 HEADERS = [ROOT / 'include' / 'abs_hil' / 'control' / name for name in ('options.hpp', 'baseline_options.hpp')]
-REFERENCE = 'adaptive-peak'
+BOUNDS = ROOT / 'config' / 'training' / 'bounds.json'
+PROFILE = 'plant.friction_profile'
 #: keys that are searched, all of them by factors
 LAWS = {
     'adaptive-optimal': (
-        'slip_gain_per_s', 'slip_gain_near_per_s', 'slip_near_m_s', 'torque_gain_per_s', 'torque_gain_near_per_s',
-        'torque_near_Nm', 'play_Nm', 'authority', 'authority_past_peak', 'bold_slip', 'model_error_per_s', 'peak_factor',
-        'runaway', 'slip_start', 'slip_rate_per_s', 'search_part', 'search_rad_s', 'force_bandwidth_rad_s',
-        'force_noise_N2_s', 'force_error', 'timing_error_s', 'slip_noise_m_s', 'start_s', 'slip0', 'slip_spread', 'level0_N',
-        'level_spread_N', 'zero_spread', 'level_drift_per_s', 'zero_drift_per_s', 'share_per_s', 'jump_share',
-        'jump_least_N', 'jump_confirm_s', 'jump_hold_s', 'jump_time_constant_s', 'jump_spread', 'jump_after_s',
-        'force_rate_N2_s', 'brake_rate_Nm2_s'),
+        'slip_gain_per_s', 'slip_gain_near_per_s', 'slip_gain_runaway', 'slip_near_m_s', 'torque_gain_per_s',
+        'torque_gain_near_per_s', 'torque_near_Nm', 'play_Nm', 'authority', 'authority_past_peak', 'bold_slip',
+        'model_error_per_s', 'peak_factor', 'runaway', 'slip_start', 'slip_rate_per_s', 'search_part', 'search_rad_s',
+        'force_bandwidth_rad_s', 'force_noise_N2_s', 'force_error', 'timing_error_s', 'slip_noise_m_s', 'start_s', 'slip0',
+        'slip_spread', 'level0_N', 'level_spread_N', 'zero_error_m_s', 'zero_error_per_N', 'past_peak_cost',
+        'level_drift_per_s', 'zero_drift_per_s', 'share_per_s', 'jump_share', 'jump_least_N', 'jump_confirm_s', 'jump_hold_s',
+        'jump_time_constant_s', 'jump_spread', 'jump_after_s', 'force_rate_N2_s', 'brake_rate_Nm2_s'),
     'mixed-slip-deceleration': ('weight', 'target', 'kp_Nm', 'ki_Nm_s'),
     'braking-stiffness': ('memory_s', 'slip_noise', 'target', 'rate_per_s', 'slip_start', 'search_part', 'search_rad_s',
                           'slip_gain_per_s', 'lag_gain_per_s', 'force_rate_N2_s', 'brake_rate_Nm2_s'),
@@ -44,42 +51,58 @@ LAWS = {
 #: parts of a key's value by which it moves; keys with little room around them move less
 STEPS = (0.3, 0.1)
 LITTLE_ROOM = {'peak_factor': 0.1, 'slip0': 0.4}
-LEAST_GAIN = 0.03
-#: scatter of the score over draws of the training set: what lessened it by 0.08 was worse on 200 other cases
-SCATTER = 0.1
+#: scatter of the score over draws of the training set: what lessened it by less was worse on 200 other cases
+LEAST_PART = 0.02
 FAILED = 100.0
-VARIATION_PER_CENT_NM = 100.0
+WORST_COUNTS = 0.2
+#: what a run that stops costs at most
+MOST = {'adaptive-optimal': 10.0}
+VARIATION_PER_CENT_NM = 60.0
+
+
+def study_rows(program, folder, controller, settings, threads=1):
+    """The rows of the training study with another controller and other settings, as texts by their columns."""
+    lines = ''.join(f'{key} = {value:.6g}\n' for key, value in settings.items())
+    text = STUDY.read_text(encoding='utf-8').replace('"adaptive-optimal"', f'"{controller}"')
+    path = folder / 'study.toml'
+    path.write_text(text.replace('[settings]\n', '[settings]\n' + lines, 1), encoding='utf-8')
+    out = folder / 'out'
+    subprocess.run([program, 'study', path, '--out', out, '--threads', str(threads)], check=True,
+                   stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, cwd=ROOT)
+    with gzip.open(out / 'results.csv.gz', 'rt') as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith('#')))
+    shutil.rmtree(out)
+    return rows
+
+
+def bound_key(row):
+    """Of everything that the bound of a run depends on."""
+    parts = [row['plant'], row['experiment'],
+             *(row[name] for name in sorted(row) if name.startswith(('plant.', 'experiment.')))]
+    return hashlib.sha256('|'.join(parts).encode()).hexdigest()[:12]
+
+
+def stored_bounds():
+    return json.loads(BOUNDS.read_text(encoding='utf-8'))
 
 
 class Training:
     def __init__(self, program, law, threads, folder):
         self.program, self.law, self.threads, self.folder = program, law, threads, pathlib.Path(folder)
         self.prefix = f'control.{law.replace("-", "_")}.'
-        self.calls = 0
+        self.bounds = stored_bounds()
         self.scores = {}
-        self.reference = [row['stop_distance_m'] for row in self.rows({}, REFERENCE)]
 
-    def rows(self, keys, controller):
-        self.calls += 1
-        settings = ''.join(f'{self.prefix}{key} = {value:.6g}\n' for key, value in keys.items())
-        text = STUDY.read_text(encoding='utf-8').replace('"adaptive-optimal"', f'"{controller}"')
-        path = self.folder / 'study.toml'
-        path.write_text(text.replace('[settings]\n', '[settings]\n' + settings, 1), encoding='utf-8')
-        out = self.folder / f'out-{self.calls}'
-        subprocess.run([self.program, 'study', path, '--out', out, '--threads', str(self.threads)], check=True,
-                       stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, cwd=ROOT)
-        with gzip.open(out / 'results.csv.gz', 'rt') as file:
-            rows = list(csv.DictReader(line for line in file if not line.startswith('#')))
-        for row in rows:
-            row['stop_distance_m'] = float(row['stop_distance_m']) if row['result'] == 'completed' else math.nan
-        return rows
+    def rows(self, keys):
+        return study_rows(self.program, self.folder, self.law, {self.prefix + key: value for key, value in keys.items()},
+                          self.threads)
 
     def score(self, keys):
         """The score, and a text that says what it consists of; the worst score for keys that are out of range."""
         name = json.dumps(keys, sort_keys=True)
         if name not in self.scores:
             try:
-                self.scores[name] = self._scored(self.rows(keys, self.law))
+                self.scores[name] = self._scored(self.rows(keys))
             except subprocess.CalledProcessError as error:
                 if self.prefix not in error.stderr.decode():
                     raise SystemExit(error.stderr.decode()) from None
@@ -88,19 +111,20 @@ class Training:
 
     def _scored(self, rows):
         loss, variation = [], []
-        for row, reference in zip(rows, self.reference, strict=True):
-            ratio = row['stop_distance_m'] / reference
-            if math.isnan(reference):
-                continue  # not even the reference can brake there
+        for row in rows:
+            bound_m = self.bounds[bound_key(row)]
+            if bound_m is None:
+                continue  # the solver found none
+            ratio = float(row['stop_distance_m']) / bound_m if row['result'] == 'completed' else math.nan
             failed = math.isnan(ratio) or float(row['time_locked_s']) > 0.0
-            loss.append(FAILED if failed else 100.0 * (ratio - 1.0))
+            loss.append(FAILED if failed else min(MOST.get(self.law, FAILED), 100.0 * (ratio - 1.0)))
             if not math.isnan(ratio):
                 variation.append(float(row['torque_total_variation_Nm']))
         loss.sort(reverse=True)
         worst = loss[:max(1, len(loss) // 20)]
         variation_Nm = sum(variation) / len(variation) if variation else math.inf
         mean, mean_worst = sum(loss) / len(loss), sum(worst) / len(worst)
-        return (mean + 0.1 * mean_worst + variation_Nm / VARIATION_PER_CENT_NM,
+        return (mean + WORST_COUNTS * mean_worst + variation_Nm / VARIATION_PER_CENT_NM,
                 f'mean {mean:+.2f} %, worst twentieth {mean_worst:+.1f} %, {variation_Nm:.0f} N m')
 
 
@@ -122,8 +146,8 @@ def moved(keys, key, part):
     return {**keys, key: float(f'{keys[key] * (1.0 + part * LITTLE_ROOM.get(key, 1.0)):.3g}')}
 
 
-def search(training, keys, say):
-    """The keys from which no move of a step lessens the score."""
+def search(training, keys, say, keep):
+    """The keys from which no move of a step lessens the score. Calls keep(keys, score) for each better ones on the way."""
     least, text = training.score(keys)
     say(f'defaults: {least:.3f} ({text})')
     for step in STEPS:
@@ -134,8 +158,9 @@ def search(training, keys, say):
                 for part in (step, -step / (1.0 + step)):
                     other = moved(keys, key, part)
                     score, text = training.score(other)
-                    if score < least - LEAST_GAIN:
+                    if score < (1.0 - LEAST_PART) * least:
                         keys, least, unmoved = other, score, 0
+                        keep(keys, least)
                         say(f'{key} {keys[key]:g}: {least:.3f} ({text})')
                         break
                 if unmoved == len(LAWS[training.law]):
@@ -174,7 +199,7 @@ def check(training, keys, stored):
     for key in LAWS[training.law]:
         for part in (STEPS[-1], -STEPS[-1] / (1.0 + STEPS[-1])):
             other = moved(keys, key, part)
-            if training.score(other)[0] < score - SCATTER:
+            if training.score(other)[0] < (1.0 - LEAST_PART) * score:
                 wrong.append(f'{training.law}: {key} = {other[key]:g} instead of {keys[key]:g} scores better: '
                              f'{training.score(other)[0]:.3f} instead of {score:.3f}; search again')
     return wrong
@@ -197,9 +222,12 @@ def main():
             if options.check:
                 wrong += check(training, keys, stored[law])
                 continue
-            keys, score = search(training, keys, lambda text, law=law: print(f'{law}: {text}', flush=True))
-            stored[law] = {'score': round(score, 9), 'gains': keys}
-            GAINS.write_text(json.dumps(stored, indent=1) + '\n', encoding='utf-8')
+
+            def keep(found, score, law=law):
+                stored[law] = {'score': round(score, 9), 'gains': found}
+                GAINS.write_text(json.dumps(stored, indent=1) + '\n', encoding='utf-8')
+            keys, score = search(training, keys, lambda text, law=law: print(f'{law}: {text}', flush=True), keep)
+            keep(keys, score)
             into_headers(law, keys)
     for text in wrong:
         print(text, file=sys.stderr)
