@@ -21,7 +21,6 @@ from abs_hil.optimum import NoOptimum, optimum  # noqa: E402
 
 #: the bound leaves it out, which can only shorten the distance
 IGNORED = 'plant.brake_dead_time_s'
-END_SPEED_M_S = 0.3
 SAVE_EVERY = 10
 
 
@@ -34,8 +33,7 @@ def bound_m(row):
     plant.reset(omega1_rad_s=speed_rad_s, omega2_rad_s=speed_rad_s)
     plant.advance(float(row['brake_start_s']))
     try:
-        return round(optimum(row['plant'], values, start_speed_rad_s=plant.state.omega2_rad_s,
-                             end_speed_m_s=END_SPEED_M_S).distance_m, 4)
+        return round(optimum(row['plant'], values, start_speed_rad_s=plant.state.omega2_rad_s).distance_m, 4)
     except NoOptimum:
         return None
 

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <stdexcept>
 #include <utility>
 
@@ -12,6 +11,7 @@
 #include "abs_hil/rig/scalar.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
 #include "control/full_torque.hpp"
+#include "control/half_turn.hpp"
 
 namespace abs_hil::control {
 namespace {
@@ -130,8 +130,7 @@ double AdaptiveOptimalController::next_reference(double dt_s) noexcept {
   const double target = std::clamp(peak_factor() * bank_.peak_slip(), options_.slip_min, options_.slip_max);
   // A peak that turns out to be near must not be passed: only a rise takes time.
   reference_ = std::min(target, reference_ * rig::exponential(options_.slip_rate_per_s * dt_s));
-  search_rad_ += options_.search_rad_s * dt_s;
-  if (search_rad_ > std::numbers::pi) search_rad_ = std::remainder(search_rad_, 2.0 * std::numbers::pi);
+  search_rad_ = within_half_turn_rad(search_rad_ + options_.search_rad_s * dt_s);
   const double search = options_.search_part * rig::sine(search_rad_);
   return reference_ * (1.0 + search) - bank_.slip_zero();
 }

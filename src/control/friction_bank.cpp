@@ -30,6 +30,7 @@ constexpr double error_lasts_s = 0.005;
 // Slower, the slip is made of few counts.
 constexpr double learning_m_s = 1.0;
 constexpr double slip_speed_min_m_s = 0.3;
+// A slip counts as past a peak by this part of it.
 constexpr double past_the_peak = 0.1;
 // The level is seen in forces above this.
 constexpr double seen_N = 3.0;
@@ -174,7 +175,7 @@ void FrictionBank::learn(const Data& data) noexcept {
   const Look look{.slip = data.slip,
                   .late_slip = data.late_slip,
                   .covered = data.covered,
-                  .slip_error = late_reading - data.late_slip,
+                  .slip_offset = late_reading - data.late_slip,
                   .force_N = data.force_N,
                   .noise_N2 = starting * rate_Hz_ *
                               (options_.force_noise_N2_s + error_lasts_s * square(options_.force_error * data.force_N)),
@@ -197,7 +198,7 @@ void FrictionBank::learn(const Shape& shape, const Look& look, Members& m) noexc
   if (!look.learns) return;
   // The gradient of the force that the member expects, by theta and by the zero.
   const Row by_slip = slope(shape, m.knee, look.late_slip + m.zero);
-  const Row phi = delayed - by_slip * look.slip_error;
+  const Row phi = delayed - by_slip * look.slip_offset;
   const Row by_zero = m.theta_N * by_slip;
   const Row noise = look.noise_N2 + square(by_zero) * look.slip_error2;
   const Row reach_theta = m.theta_variance * phi + m.covariance * by_zero;

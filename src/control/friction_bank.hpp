@@ -93,7 +93,7 @@ class FrictionBank {
   /// What all members compare their curves with in a cycle.
   struct Look {
     double slip, late_slip, covered;
-    double slip_error;  ///< of the readings on their way through the filter
+    double slip_offset;  ///< of the delayed readings from `late_slip`
     double force_N;
     double noise_N2;      ///< variance of the force
     double slip_error2;   ///< variance of the slip
