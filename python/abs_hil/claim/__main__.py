@@ -39,7 +39,8 @@ class Comparison:
     def __init__(self, root: pathlib.Path, out: pathlib.Path, program: pathlib.Path, quick: bool, threads: int) -> None:
         self.root, self.out, self.program, self.threads = root, out, program, threads
         self.size, self.cases, self.runs = (6, 10, 40) if quick else (24, 50, 400)
-        self.generations, self.training = (2, 4) if quick else (None, None)
+        self.generations: int | None = 2 if quick else None
+        self.training: int | None = 4 if quick else None
 
     def search(self) -> None:
         for actuator in ACTUATORS:

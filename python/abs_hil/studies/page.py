@@ -27,8 +27,8 @@ def quantile_table(results: StudyResults) -> Table:
         row = [TITLES.get(metric, metric)]
         complete = dict(groups_of(results.completed([*by, metric]), by))
         for name in every:
-            values = complete[name][metric].dropna() if name in complete else []
-            if len(values) == 0:
+            values = complete[name][metric].dropna() if name in complete else None
+            if values is None or values.empty:
                 row.append(DASH)
                 continue
             low, median, high = values.quantile([0.1, 0.5, 0.9])
