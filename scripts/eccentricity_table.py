@@ -20,7 +20,7 @@ import abs_hil
 
 PLANTS = ('paper-table1', 'paper-timing', 'inteco-manual')
 #: several, because the distance depends on where the discs stand
-PHASES_RAD = ((1.0, -2.0), (-2.5, 0.5))
+PHASES_RAD = ((1.0, -2.0), (-2.5, 0.5), (2.5, 2.0), (-0.5, -1.0), (0.3, 3.0), (-1.5, 1.5))
 
 
 def settings(e_rad, phases_rad, knows):

@@ -36,6 +36,8 @@ constexpr double past_the_peak = 0.1;
 constexpr double seen_N = 3.0;
 constexpr double largest_fall = 0.9;  ///< of the level in a cycle
 constexpr double largest_rise = 1.15;
+// Friction that changes slowly shows in the mean of the unexplained force over about this time.
+constexpr double unexplained_lasts_s = 0.02;
 // exp(-30) is as good as 0, and keeps the weights away from numbers that a double cannot hold.
 constexpr double log_likelihood_min = -30.0;
 
@@ -143,7 +145,7 @@ void FrictionBank::reset(const Start& start) noexcept {
     m.phi = {};
   }
   late_slip_.settle(start.slip);
-  time_s_ = hold_s_ = unexplained_s_ = late_force_N_ = 0.0;
+  time_s_ = hold_s_ = unexplained_s_ = unexplained_N_ = late_force_N_ = 0.0;
   jumps_ = 0;
   summarise(0.0);
 }
@@ -180,7 +182,8 @@ void FrictionBank::learn(const Data& data) noexcept {
                   .noise_N2 = starting * rate_Hz_ *
                               (options_.force_noise_N2_s + error_lasts_s * square(options_.force_error * data.force_N)),
                   .slip_error2 = error_lasts_s * rate_Hz_ * (square(timing) + square(speed)),
-                  .theta_growth = options_.level_drift_per_s * data.dt_s,
+                  .theta_growth = data.dt_s * (options_.level_drift_per_s + options_.level_drift_unexplained_per_s *
+                                                                                square(unexplained_N_ / peak_force_N_)),
                   .zero_growth = options_.zero_drift_per_s * data.dt_s,
                   .back = options_.share_per_s * data.dt_s,
                   .learns = learns,
@@ -242,6 +245,8 @@ void FrictionBank::watch_for_jumps(const Data& data) noexcept {
   const bool watches = time_s_ > options_.jump_after_s && data.car_speed_m_s > learning_m_s;
   const bool unexplained = std::abs(residual) > std::max(options_.jump_least_N, options_.jump_share * peak_force_N_);
   unexplained_s_ = watches && unexplained ? unexplained_s_ + data.dt_s : 0.0;
+  const double newest = data.dt_s / (unexplained_lasts_s + data.dt_s);
+  unexplained_N_ = watches ? unexplained_N_ + newest * (residual - unexplained_N_) : 0.0;
   if (unexplained_s_ >= options_.jump_confirm_s) {
     hold_s_ = options_.jump_hold_s;
     unexplained_s_ = 0.0;

@@ -118,6 +118,7 @@ class FrictionBank {
   double time_s_{0.0};
   double hold_s_{0.0};
   double unexplained_s_{0.0};
+  double unexplained_N_{0.0};  ///< of the force of late
   double force_N_{0.0};
   double late_force_N_{0.0};
   double runaway_{0.0};

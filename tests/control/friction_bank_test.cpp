@@ -49,12 +49,13 @@ class LowerWheel {
 /// A tyre on a road, seen by the bank with the delays that it has in the controller.
 class Rolling {
  public:
-  explicit Rolling(const rig::TyreParameters& tyre, double zero = 0.0) : tyre_{tyre}, zero_{zero} {
+  explicit Rolling(const rig::TyreParameters& tyre, double zero = 0.0, const control::FrictionBankOptions& options = {})
+      : bank{options, 1.0 / period_s, delay_s}, tyre_{tyre}, zero_{zero} {
     bank.reset({.slip = -zero, .car_speed_m_s = 10.0, .force_N = 0.0});
     late_.settle(-zero);
   }
 
-  control::FrictionBank bank{{}, 1.0 / period_s, delay_s};
+  control::FrictionBank bank;
   double road{1.0};
   double noise_N{0.0};
   double quick_slip_error{0.0};  ///< of the reading that is not delayed, while the slip rises
@@ -252,6 +253,23 @@ TEST_CASE("A jump of friction moves the level within 40 ms and leaves the shape"
     CHECK_THAT(rolling.bank.peak_force_N(), WithinRel(level * tyre.theta_N, 0.1));
     CHECK_THAT(rolling.bank.peak_slip(), WithinRel(peak_slip, 0.05));
   }
+}
+
+TEST_CASE("Where the force stays unexplained for long, the level follows it sooner") {
+  const rig::TyreParameters tyre{23.0, 28.0, 1.68};
+  // Too little for a jump, from 0.4 s on.
+  const auto level_after = [&](double per_s, double lasts_s) {
+    Rolling rolling{tyre, 0.0, {.level_drift_unexplained_per_s = per_s}};
+    rolling.brake(0.05, 0.4);
+    for (double t = 0.0; t < lasts_s; t += period_s) {
+      rolling.road = 1.0 - t;
+      rolling.brake(0.05, period_s);
+    }
+    CHECK(rolling.bank.jumps() == 0);
+    return rolling.bank.peak_force_N() / tyre.theta_N;
+  };
+  CHECK_THAT(level_after(15.0, 0.4), WithinAbs(0.6, 0.06));
+  CHECK(std::abs(level_after(0.0, 0.4) - 0.6) > 0.2);
 }
 
 TEST_CASE("No data make the bank lose its numbers, and it recovers") {

@@ -181,6 +181,9 @@ struct FrictionBankOptions {
   ABS_HIL_OPTION(double, level_drift_per_s, 0.005, .unit = "1/s",
                  .meaning = "variance gained per second by the logarithm of the peak's force",
                  .range = rig::from_zero(100));
+  ABS_HIL_OPTION(double, level_drift_unexplained_per_s, 15.0, .unit = "1/s",
+                 .meaning = "what the square of the unexplained part of the peak's force adds to that",
+                 .range = rig::from_zero(1e4));
   ABS_HIL_OPTION(double, zero_drift_per_s, 0.0001, .unit = "1/s",
                  .meaning = "variance gained per second by the slip read at no force", .range = rig::from_zero(1));
   ABS_HIL_OPTION(double, share_per_s, 0.0118, .unit = "1/s",
@@ -188,7 +191,7 @@ struct FrictionBankOptions {
                  .range = rig::between(1e-9, 100));
   ABS_HIL_OPTION(double, jump_share, 0.143, .meaning = "unexplained part of the peak's force that is a friction jump",
                  .range = rig::positive(10));
-  ABS_HIL_OPTION(double, jump_least_N, 1.5, .unit = "N", .meaning = "least unexplained force that is a friction jump",
+  ABS_HIL_OPTION(double, jump_least_N, 2.2, .unit = "N", .meaning = "least unexplained force that is a friction jump",
                  .range = rig::positive(500));
   ABS_HIL_OPTION(double, jump_confirm_s, 0.0028, .unit = "s", .meaning = "time that it must last",
                  .range = rig::from_zero(1));
