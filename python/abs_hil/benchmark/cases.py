@@ -125,7 +125,7 @@ def _left_m_s(changes: Mapping[str, Value], speed_rad_s: float, road: str) -> fl
 
 #: The gate judges the encoders by the largest tyre force that the model believes in, which here is the largest that may be
 #: drawn. `nominal`, the only law that uses the model's theta, keeps that of paper-table1.
-_ANY_TYRE: dict[str, Value] = {'model.theta_N': 60.0, 'control.nominal.theta0_N': 23.0}
+ANY_TYRE: dict[str, Value] = {'model.theta_N': 60.0, 'control.nominal.theta0_N': 23.0}
 
 
 def drawn(seed: int, count: int) -> list[Case]:
@@ -145,7 +145,7 @@ def drawn(seed: int, count: int) -> list[Case]:
         if 0.0 < _left_m_s(changes, speed, road) < LEAST_AT_DROP_M_S:
             road = 'even'
         unknown = tuple(name for name in changes if name != 'theta_N')
-        cases.append(Case('drawn', f'{number}', 'paper-table1', road, speed, changes, unknown, _ANY_TYRE))
+        cases.append(Case('drawn', f'{number}', 'paper-table1', road, speed, changes, unknown, ANY_TYRE))
     return cases
 
 
