@@ -24,10 +24,11 @@ BUDGETS = [
     # the wheels (some 10).
     ('the same with sequence and actuator: all of "control"', ['counted_control', 'counted_sent'], 2000),
     # These two together cost 389 until the checks judged the uncertainty of the stamps and told when they could not.
-    # They may grow by 15 % over that, to 447.
-    ('plausibility of the measurement', ['counted_watch'], 306),
+    # They may grow by 15 % over that, to 447, and by 9 for the overspeed that the counts alone show.
+    ('plausibility of the measurement', ['counted_watch'], 315),
     ('gate: check of the command', ['abs_hil::runtime::CommandGate::check(*'], 141),
-    ("heartbeat, check of the guardian's, flight recorder", ['counted_watchers'], 400),
+    # 400 until they stood behind an interface, so that the cycle need not know of guardians (two virtual calls, some 15).
+    ("heartbeat, check of the guardian's, flight recorder", ['counted_watchers'], 410),
     ('ring push of one record', ['counted_ring_push'], 150),
     ('five histograms', ['counted_statistics'], 200),
     # A bank of 24 curves; nearly the same number of operations in each cycle.

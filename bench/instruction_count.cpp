@@ -7,8 +7,8 @@
 
 #include "driver/sim/sim_driver.hpp"
 #include "experiment/simulated_run.hpp"
+#include "guardian/heartbeat.hpp"
 #include "runtime/cyclic_executive.hpp"
-#include "runtime/heartbeat.hpp"
 
 using namespace abs_hil;
 
@@ -37,11 +37,10 @@ extern "C" {
 }
 
 /// Heartbeat, check of the guardian's heartbeat, and flight recorder.
-[[gnu::noinline]] bool counted_watchers(runtime::Heartbeat& watch, const rig::CycleRecord& record) {
-  watch.beat();
-  const bool lost = watch.guardian_lost();
+[[gnu::noipa]] bool counted_watchers(runtime::CycleWatch& watch, const rig::CycleRecord& record) {
+  const runtime::GuardianSign guardian = watch.beat();
   watch.keep(record);
-  return lost;
+  return guardian.reason != rig::Reason::none;
 }
 
 [[gnu::noinline]] void counted_statistics(runtime::CycleStatistics& statistics, const rig::CycleTiming& timing) {
@@ -61,8 +60,9 @@ int main(int argc, char** argv) {
   runtime::RecordRing ring(64);
   std::vector<runtime::FlightSlot> slots(2000);
   runtime::FlightRing recorder(slots);
-  runtime::HeartbeatPanel panel;
-  runtime::Heartbeat watch(panel, recorder, 1'000'000);
+  guardian::RunPage page;
+  const guardian::GuardPage guard_page;
+  guardian::Heartbeat watch(page, guard_page, recorder, 1'000'000);
   const auto statistics = std::make_unique<runtime::CycleStatistics>();
 
   rig::Measurement measurement;

@@ -40,6 +40,7 @@ Braking brake(const Setup& setup, const rig::RigParameters& believed) {
       clock, driver,
       {.control = setup.control,
        .rig = believed,
+       .identity = plant_sim::identity_of(setup.plant),
        .controller = control::make_controller(setup.control.controller, {setup.control, believed}),
        .sequence = experiment::Sequence(experiment::test::phases_of(setup)),
        .max_brake_duty = setup.gate.brake_duty_max,

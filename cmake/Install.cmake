@@ -5,13 +5,13 @@ include(CMakePackageConfigHelpers)
 set(abs_hil_cmake_dir ${CMAKE_INSTALL_LIBDIR}/cmake/abs_hil)
 
 # Programs and what they need.
-set(programs abs_hil_executable)
+set(programs abs_hil_command)
 foreach(optional abs_rig_emulator abs_guardian)
   if(TARGET ${optional})
     list(APPEND programs ${optional})
   endif()
 endforeach()
-install(TARGETS ${programs} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
+install(TARGETS ${programs} abs_hil_executable RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
 # Nobody calls it by hand.
 install(TARGETS abs_controller_host RUNTIME DESTINATION ${CMAKE_INSTALL_LIBDIR}/abs_hil COMPONENT runtime)
 install(DIRECTORY config/ DESTINATION ${CMAKE_INSTALL_DATADIR}/abs_hil/config COMPONENT runtime PATTERN udev EXCLUDE)
@@ -40,7 +40,7 @@ if(HELP2MAN_EXECUTABLE)
       COMMAND ${HELP2MAN_EXECUTABLE} --no-info --version-string ${PROJECT_VERSION} --source "abs_hil ${PROJECT_VERSION}"
         --include ${PROJECT_SOURCE_DIR}/packaging/${output_name}.h2m --output ${page} $<TARGET_FILE:${program}>
       COMMAND gzip -9nf ${page}
-      DEPENDS ${program} ${PROJECT_SOURCE_DIR}/packaging/${output_name}.h2m
+      DEPENDS ${program} abs_hil_executable ${PROJECT_SOURCE_DIR}/packaging/${output_name}.h2m
       VERBATIM)
     list(APPEND manual_pages ${page}.gz)
   endforeach()

@@ -42,6 +42,8 @@ TABLES = {
     'reasons': (json_rows('abs_hil', 'list', '--reasons', '--json'),
                 {'number': '{number}', 'kind': '{kind}', 'reason': '{text}', 'value': '{quantity}',
                  'unit': '{unit}', 'bound': '{bound}'}),
+    'keys': (json_rows('abs_hil', 'list', '--keys', '--json'),
+             {'key': '`{name}`', 'default': '{value}', 'valid': '{valid}', 'unit': '{unit}', 'on a real board': '{safety}'}),
     'rooms': (tsv_rows('rooms.tsv'), {'room': '`{room}`', 'holds': '{holds}', 'may know': '{may know}'}),
 }
 MARKED = re.compile(r'^(<!-- table: (\S+) -->\n)(.*?)^(<!-- end -->)$', re.MULTILINE | re.DOTALL)

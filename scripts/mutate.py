@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """usage: mutate.py [--list] [--jobs N] [--only FILE] [--report FILE]
 
-Mutation run of the command gate and its plausibility checks. The script changes one place at a time in their sources (a
+Mutation run of the command gate, its plausibility checks and limits, and of the rule for values that weaken them. The script changes one place at a time in their sources (a
 relation, an operator, a constant, a condition, a statement left out), compiles only that file or, for a header, the
 source that uses it, without optimisation, links it with the test `gate` and runs the test. A mutant that the tests do not notice survives. mutate_equivalent.txt
 must list each survivor with the reason why it changes nothing. Status 1 if a survivor is not listed or a listed mutant
@@ -20,12 +20,15 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-SOURCES = ['command_gate', 'speed_window', 'encoder_check', 'response_check', 'plausibility_limits']
+SOURCES = ['command_gate', 'speed_window', 'encoder_check', 'response_check', 'plausibility_limits', 'weak_values',
+           'safety_class']
 # File -> the sources that are compiled for its mutants. Of the header of the gate and of constructors in headers the
 # tests have their own copies: they cannot be tried like this.
 FILES = {f'{name}.cpp': [name] for name in SOURCES} | {
     'speed_window.hpp': ['speed_window', 'encoder_check', 'response_check'], 'wheel_watch.hpp': ['encoder_check'],
     'response_check.hpp': ['response_check']}
+# Folders of files that do not stand in src/runtime.
+FOLDERS = {'safety_class.cpp': 'rig'}
 TESTS = sorted((ROOT / 'tests/runtime/gate').glob('*_test.cpp'))
 COMPILE = ['g++', '-std=c++20', '-O0', '-fPIC', '-I', ROOT / 'include', '-I', ROOT / 'src', '-I', ROOT / 'tests']
 
@@ -34,6 +37,10 @@ ARITHMETIC = {'+': '-', '-': '+', '*': '/', '/': '*'}
 
 # (file, the line's text, the change) -> why no test can detect it. From EQUIVALENT_FILE.
 EQUIVALENT_FILE = ROOT / 'scripts' / 'mutate_equivalent.txt'
+
+
+def path_of(name):
+    return ROOT / 'src' / FOLDERS.get(name, 'runtime') / name
 
 
 def code_of(text):
@@ -45,9 +52,9 @@ def code_of(text):
 
 def mutants_of(name):
     """Yields (line number, what, mutated text)."""
-    text = (ROOT / 'src/runtime' / name).read_text()
+    text = path_of(name).read_text()
     code = code_of(text)
-    begin = code.index('namespace abs_hil::runtime {')
+    begin = code.index('namespace abs_hil::')
 
     def at(start, end, new, what):
         line = text.count('\n', 0, start) + 1
@@ -151,7 +158,7 @@ class Bench:
                             folder / 'headers.hpp.gch'))
         self.objects = {name: folder / f'{name}.o' for name in SOURCES}
         for name, target in self.objects.items():
-            require(self.compile(ROOT / 'src/runtime' / f'{name}.cpp', target))
+            require(self.compile(path_of(f'{name}.cpp'), target))
         self.place = folder / 'base'
         self.place.mkdir()
         require(self.link(self.objects.values(), self.place))
@@ -188,7 +195,7 @@ class Bench:
             for source in FILES[name]:
                 objects[source] = place / f'{source}.o'
                 changed = place / 'runtime' / f'{source}.cpp'
-                path = changed if changed.exists() else ROOT / 'src/runtime' / f'{source}.cpp'
+                path = changed if changed.exists() else path_of(f'{source}.cpp')
                 if self.compile(path, objects[source], place).returncode:
                     return 'not compilable'
             # Of functions in headers the linker takes the first: the mutated ones.
@@ -234,7 +241,7 @@ def main():
             results = [(m, pool.submit(bench.verdict, i, m[0], m[3])) for i, m in enumerate(mutants)]
             for (name, line, what, _), future in results:
                 result = future.result()
-                text = (ROOT / 'src/runtime' / name).read_text().splitlines()[line - 1].strip()
+                text = path_of(name).read_text().splitlines()[line - 1].strip()
                 key = (name, text, what)
                 if result == 'survived' and key in known:
                     used.add(key)

@@ -4,6 +4,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 #include "control_command.hpp"
 #include "driver/pci/discovery.hpp"
@@ -39,6 +40,13 @@ void EmulatedCard::catch_up() {
 
 void EmulatedCard::record(char direction, std::uint64_t offset, std::uint32_t value) {
   if (traffic_.is_open()) traffic_ << fmt::format("{} {:02X} {:08x}\n", direction, offset, value);
+}
+
+void EmulatedCard::note_change() {
+  const emulator::PwmWidths& w = model_.pwm_widths();
+  const std::pair now{w.drive, w.brake};
+  if (std::exchange(last_widths_, now) == now) return;
+  changes_ << fmt::format("{} {} {}\n", started_ns_ + w.last_written_ns, w.drive, w.brake);
 }
 
 int EmulatedCard::open(std::string_view /*name*/) { return permission_denied_ ? -EACCES : 0; }
@@ -77,6 +85,7 @@ int EmulatedCard::write(std::string_view name, std::uint64_t offset, const void*
   if (result.delay_ns > 0) wait_for(result.delay_ns);
   if (result.failed) return -EIO;
   record('W', offset, value);
+  if (changes_.is_open()) note_change();
   return sizeof value;
 }
 
@@ -109,6 +118,7 @@ const char* EmulatedCard::commands() {
          "overspeed                       latches the overspeed interlock until the wheels stop\n"
          "turn upper|lower REVOLUTIONS    a wheel is turned by hand\n"
          "record FILE | record off        register accesses: R or W, offset, value\n"
+         "changes FILE | changes off      each change of a PWM's width: when, ns of CLOCK_MONOTONIC, drive, brake\n"
          "widths                          both PWM width registers, since when both are 0, time of the last write; ns "
          "of CLOCK_MONOTONIC, in lock-step of the card's time\n"
          "status                          duties on the wire, speeds, trip flags\n";
@@ -131,6 +141,12 @@ std::string EmulatedCard::obey(std::string_view line) {
       traffic_.close();
     } else {
       record_to(command.text(1));
+    }
+  } else if (command.is("changes", 1)) {
+    if (command.text(1) == "off") {
+      changes_.close();
+    } else {
+      open_for_writing(changes_, command.text(1));
     }
   } else if (command.is("widths", 0)) {
     return widths();

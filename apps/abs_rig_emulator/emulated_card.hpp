@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "emulator/card_model.hpp"
 #include "emulator/register_faults.hpp"
@@ -47,6 +48,7 @@ class EmulatedCard final : public FileHandler {
 
  private:
   void record(char direction, std::uint64_t offset, std::uint32_t value);
+  void note_change();
   void record_to(const std::string& file);
 
   emulator::CardModel model_;
@@ -57,6 +59,8 @@ class EmulatedCard final : public FileHandler {
   std::int64_t started_ns_{0};
   TruthFile truth_;
   std::ofstream traffic_{};
+  std::ofstream changes_{};
+  std::pair<std::uint32_t, std::uint32_t> last_widths_{};
 };
 
 }  // namespace abs_hil::program

@@ -91,6 +91,11 @@ class SerialDriver final : public RigDriver {
     State state;
     const LineError error = line_.ask_state(state, options_.answer_timeout_ms);
     if (error != LineError::none) return result_of(error);
+    // `set` has seen these widths in the board's answer. Zeros are its own watchdog; another value is not from here.
+    const auto foreign = [](std::uint32_t shown, std::uint32_t sent) { return shown != sent && shown != 0; };
+    if (foreign(state.drive_width, drive_sent_) || foreign(state.brake_width, brake_sent_)) {
+      return {IoError::foreign_writer, 0, 0, rig::Reason::foreign_writer};
+    }
     measurement = {};
     measurement.time_ns = now_ns;
     measurement.upper_counts = state.upper_counts - start_.upper_counts;
@@ -111,6 +116,8 @@ class SerialDriver final : public RigDriver {
     State state;
     const LineError error = line_.set_widths(drive, brake, state, timeout_ms);
     if (error != LineError::none) return result_of(error);
+    drive_sent_ = drive;
+    brake_sent_ = brake;
     return state.drive_width == drive && state.brake_width == brake ? IoResult{}
                                                                     : IoResult{IoError::read_back_mismatch};
   }
@@ -123,6 +130,8 @@ class SerialDriver final : public RigDriver {
   std::string firmware_{};
   std::string serial_{};
   State start_{};
+  std::uint32_t drive_sent_{0};
+  std::uint32_t brake_sent_{0};
 };
 
 /// The guardian's way to the board: its own descriptor, nothing of the driver's. It sends zeros before it looks for an

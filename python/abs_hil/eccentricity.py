@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .files import write_whole
+from .files import write_text
 from .run import Run, load
 
 #: a cubic follows a coasting wheel over this time to far below a count
@@ -97,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if given.out is None:
             print(text, end='')
         else:
-            write_whole(given.out, lambda name: pathlib.Path(name).write_text(text, encoding='utf-8'))
+            write_text(given.out, text)
     except (OSError, KeyError, ValueError) as error:
         print(f'abs_hil.eccentricity: {error}', file=sys.stderr)
         return 2

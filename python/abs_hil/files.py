@@ -6,31 +6,31 @@ import pathlib
 import tempfile
 from collections.abc import Callable
 
+from .core import _core
 
-def write_whole(path: pathlib.Path, write: Callable[[str], object], *, probe: bool = False) -> None:
-    """Writes `path` by way of a file beside it, whose name `write` gets. A probe only tries whether that is possible.
+
+def write_whole(path: str | os.PathLike[str], write: Callable[[str], object], *, probe: bool = False) -> None:
+    """Writes `path` as the program writes its results (files/result_file.hpp): by way of a file beside it, whose name `write`
+    gets. A link, a device or a pipe is never replaced. A probe only tries whether that is possible.
 
     Raises ValueError, naming the path and the fix, if it cannot be written.
     """
+    def into(part: bytes) -> bytes:
+        if part:
+            write(os.fsdecode(part))
+            return b''
+        with tempfile.TemporaryDirectory() as folder:  # for a stream, which gets the bytes when all are there
+            whole = pathlib.Path(folder, 'whole')
+            whole.touch()
+            write(str(whole))
+            return whole.read_bytes()
     try:
-        handle, name = tempfile.mkstemp(prefix=f'.{path.name}.', dir=path.parent)
-        os.close(handle)
-        try:
-            write(name)
-            os.chmod(name, 0o666 & ~_umask())
-            if probe:
-                os.unlink(name)
-            else:
-                os.replace(name, path)
-        except BaseException:
-            os.unlink(name)
-            raise
+        _core.write_result(os.fsencode(path), into, probe)
     except OSError as error:
-        raise ValueError(f'cannot write "{path}": {error.strerror}; give a path in an existing, writable '
-                         'directory') from None
+        raise ValueError(f'cannot write "{path}": {error.strerror}; give a path in an existing, writable directory'
+                         if error.strerror else str(error)) from None
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """write_whole for a text."""
+    write_whole(path, lambda name: pathlib.Path(name).write_text(text, encoding='utf-8'))

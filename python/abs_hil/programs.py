@@ -2,7 +2,10 @@
 abs_convert. `abs_hil report ...` starts them too."""
 from __future__ import annotations
 
+import contextlib
+import errno
 import importlib
+import io
 import os
 import sys
 
@@ -12,7 +15,36 @@ PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn':
             'convert': 'abs_hil.interchange.program'}
 
 
+class _Stdout(io.FileIO):
+    """Standard output that remembers why it could not be written."""
+    problem: OSError | None = None
+
+    def write(self, data: object) -> int:
+        try:
+            return super().write(data)  # type: ignore[arg-type, return-value]
+        except OSError as error:
+            self.problem = error
+            raise
+
+
 def start(name: str, arguments: list[str]) -> int:
+    """Starts a program. A full disk behind stdout is status 1, whatever the program made of it."""
+    raw = _Stdout(1, 'wb', closefd=False)
+    sys.stdout = io.TextIOWrapper(io.BufferedWriter(raw), encoding=sys.stdout.encoding, errors=sys.stdout.errors,
+                                  line_buffering=bool(sys.stdout.line_buffering))
+    status = _start(name, arguments)
+    with contextlib.suppress(OSError):
+        sys.stdout.flush()
+    if raw.problem is None:
+        return status
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # Python tries once more at its end
+    if raw.problem.errno == errno.EPIPE:
+        return status
+    print(f'abs_{name}: cannot write to standard output: {raw.problem.strerror}', file=sys.stderr)
+    return 1
+
+
+def _start(name: str, arguments: list[str]) -> int:
     # Our matrices are small. More threads of BLAS would only spin, and wear other programs' cores.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
     try:
@@ -23,6 +55,8 @@ def start(name: str, arguments: list[str]) -> int:
         return 3
     try:
         return int(module.main(arguments))
+    except SystemExit as end:  # of argparse
+        return end.code if isinstance(end.code, int) else 0
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:

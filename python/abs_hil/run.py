@@ -1,7 +1,6 @@
 """A run's rows, summary and signals, from the simulator or from files."""
 from __future__ import annotations
 
-import json
 import os
 import pathlib
 from collections.abc import Iterator, Mapping
@@ -10,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .core import _core
+from .files import write_whole
 from .messages import PHASES, QUANTITIES
+from .nesting import parse_json
 from .options import PathLike
 
 if TYPE_CHECKING:
@@ -72,8 +73,8 @@ class Run:
 
     def to_csv(self, path: PathLike) -> None:
         """Writes the rows as the program does, bit for bit."""
-        with open(path, 'wb') as file:
-            file.write(csv_bytes(self.columns))
+        rows = csv_bytes(self.columns)
+        write_whole(path, lambda name: pathlib.Path(name).write_bytes(rows))
 
     def __repr__(self) -> str:
         controller = self.summary.get('controller', 'unknown controller')
@@ -165,7 +166,8 @@ def signals_of(columns: list[str]) -> tuple[str, ...]:
 def load(path: PathLike) -> Run:
     """Loads a run folder, a run's CSV file or an event log (.lcmlog), whole or cut off; `Run.notes` says what is missing.
 
-    Raises ValueError for anything else, with the file, the place and the reason.
+    Raises ValueError for anything else, with the file, the place and the reason; so it does for a run folder whose files
+    are no longer those of its SHA256SUMS.
     """
     place = pathlib.Path(path)
     if place.suffix == '.lcmlog':
@@ -173,6 +175,7 @@ def load(path: PathLike) -> Run:
     if not place.is_dir():
         columns, signals, notes = read_csv(place)
         return Run(columns, {}, signals, notes=notes, folder=place.parent, name=place.stem)
+    _core.check_seal(os.fsencode(place))
     if not (place / 'run.csv').exists() and (place / 'run.lcmlog').exists():
         run = _load_log(place / 'run.lcmlog')
         run.notes.append('no run.csv: the rows are those of run.lcmlog')
@@ -184,7 +187,7 @@ def load(path: PathLike) -> Run:
     columns, signals, notes = read_csv(place / 'run.csv')
     summary: dict[str, Any] = {}
     try:
-        summary = json.loads((place / 'summary.json').read_text(encoding='utf-8'))
+        summary = parse_json((place / 'summary.json').read_text(encoding='utf-8'))
         if not isinstance(summary, dict):
             raise ValueError('the file must contain a JSON object')
     except OSError:
@@ -211,7 +214,7 @@ def load_series(folder: PathLike) -> Series:
         raise ValueError(f'"{place}": this series folder has no complete run (as run-0001/ with run.csv and summary.json)')
     index: dict[str, Any] = {}
     try:
-        index = json.loads((place / 'series.json').read_text(encoding='utf-8'))
+        index = parse_json((place / 'series.json').read_text(encoding='utf-8'))
     except (OSError, ValueError):
         notes.append('no readable series.json')
     return Series(runs, index, notes)
@@ -232,7 +235,7 @@ def _load_log(path: pathlib.Path) -> Run:
         names = ('experiment', 'controller', 'plant', 'backend')
         summary = {name: text.decode(errors='replace') for name, text in zip(names, experiment)}
         try:
-            summary['config'] = json.loads(experiment[-1])
+            summary['config'] = parse_json(experiment[-1])
         except ValueError:
             notes.append('the configuration in the log is not valid JSON')
     notes.append('an event log has no figures of merit')

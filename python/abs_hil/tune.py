@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from .core import _core
-from .files import write_whole
+from .files import write_text, write_whole
 from .options import options
 from .simulation import STANDARD_VARIATION, Study, controllers, simulate_many
 
@@ -252,7 +252,7 @@ def _tune(controller: str, o: argparse.Namespace) -> None:
     comment = (f'abs_tune --controllers {controller} --plants {",".join(plants)}{model} --cases {o.cases} --generations '
                f'{o.generations} --seed {o.seed} (docs/comparison.md)')
     text = to_toml(judge, found, comment)
-    write_whole(path, lambda name: pathlib.Path(name).write_text(text, encoding='utf-8'))
+    write_text(path, text)
     print(f'{controller}: cost {found.cost:.5f}, with the previous gains {found.start_cost:.5f}\n{text}')
 
 

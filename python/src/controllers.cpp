@@ -74,6 +74,11 @@ class PythonController final : public control::SlipController {
     const py::gil_scoped_acquire gil;
     try {
       function();
+    } catch (py::error_already_set& error) {
+      // Passed on, it would end the calling program, and with the status of its choice.
+      runs.back().error = error.matches(PyExc_SystemExit)
+                              ? std::make_exception_ptr(std::runtime_error("the controller asked Python to exit"))
+                              : std::current_exception();
     } catch (...) {
       runs.back().error = std::current_exception();
     }

@@ -124,9 +124,9 @@ class Episode {
 
   experiment::RunLogicParts parts(const plant_sim::PlantOptions& plant, bool law) {
     config::Plan plan = config::plan(settings_);
-    experiment::RunLogicParts parts =
-        experiment::make_logic_parts(settings_.control, settings_.model, settings_.plant.ideal_actuator, settings_.gate,
-                                     settings_.experiment, std::move(plan.phases), plan.limits);
+    experiment::RunLogicParts parts = experiment::make_logic_parts(
+        settings_.control, settings_.model, plant_sim::identity_of(plant), settings_.plant.ideal_actuator,
+        settings_.gate, settings_.experiment, std::move(plan.phases), plan.limits);
     parts.duty_steps = driver::simulated_output_grid(settings_.driver, plant.ideal_actuator).duty_steps;
     auto observed = std::make_unique<Observed>(law ? std::move(parts.controller) : nullptr,
                                                rig::brake_torque_at(settings_.model.brake, 1.0));

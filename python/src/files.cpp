@@ -27,9 +27,11 @@
 #include "array.hpp"
 #include "bindings.hpp"
 #include "column_sink.hpp"
+#include "files/result_file.hpp"
 #include "run_folder/clean_text.hpp"
 #include "run_folder/csv_reader.hpp"
 #include "run_folder/input_error.hpp"
+#include "run_folder/run_folder.hpp"
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/csv_text.hpp"
 #include "telemetry/event_log.hpp"
@@ -185,6 +187,7 @@ py::tuple read_log(const std::string& path) {
     telemetry::EventLogReader log(path);
     try {
       while (const auto event = log.next()) columns.take(*event);
+      damage = log.cut();
     } catch (const telemetry::RecordingError& error) {
       damage = error.what();
     }
@@ -226,6 +229,14 @@ py::dict read_log_facts(const std::string& path) {
   facts["sequences"] = py::array_t<std::int64_t>(static_cast<py::ssize_t>(sequences.size()), sequences.data());
   facts["events"] = told;
   return facts;
+}
+
+/// Writes a result as the program does. `write` gets the name of the file to fill, or an empty one for a stream, and
+/// returns bytes to append.
+void write_result(const std::string& path, const py::function& write, bool probe) {
+  files::ResultFile file(path, "file");
+  const std::string bytes = py::cast<py::bytes>(write(py::bytes(file.part().string())));
+  if (!probe) file.write(bytes);
 }
 
 using Column = py::array_t<double, py::array::c_style | py::array::forcecast>;
@@ -312,6 +323,9 @@ py::tuple profile_of(const std::string& text, const std::string& key) {
 
 void add_files(py::module_& module) {
   module.def("read_csv", &read_csv, py::arg("path"));
+  module.def(
+      "check_seal", [](const std::string& folder) { run_folder::check_seal(folder); }, py::arg("folder"));
+  module.def("write_result", &write_result, py::arg("path"), py::arg("write"), py::arg("probe"));
   module.def("read_log", &read_log, py::arg("path"));
   module.def("read_log_facts", &read_log_facts, py::arg("path"));
   module.def("metrics_of", &metrics_of, py::arg("columns"), py::arg("r2_m"), py::arg("end_speed_m_s"));

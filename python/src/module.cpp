@@ -10,9 +10,10 @@
 #include "bindings.hpp"
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
+#include "files/result_file.hpp"
 #include "run_folder/input_error.hpp"
+#include "run_folder/run_folder.hpp"
 #include "telemetry/event_log.hpp"
-#include "telemetry/file_error.hpp"
 #include "telemetry/lcm_outlet.hpp"
 
 namespace {
@@ -29,7 +30,9 @@ void translate(std::exception_ptr error) {
     PyErr_SetString(PyExc_ValueError, e.what());
   } catch (const run_folder::InputError& e) {
     PyErr_SetString(PyExc_ValueError, e.what());
-  } catch (const telemetry::FileError& e) {
+  } catch (const run_folder::FolderError& e) {
+    PyErr_SetString(PyExc_ValueError, e.what());
+  } catch (const files::FileError& e) {
     PyErr_SetString(PyExc_OSError, e.what());
   } catch (const telemetry::LcmError& e) {
     PyErr_SetString(PyExc_OSError, e.what());

@@ -1,5 +1,6 @@
 """Controllers in Python run through the program's own cycle; plant and laws can be stepped by hand."""
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -90,7 +91,7 @@ def test_torque_alone_will_do_and_the_gate_stands_behind_it():
     assert np.nanmax(run['slip']) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize('where', ['reset', 'step', 'late', 'type'])
+@pytest.mark.parametrize('where', ['reset', 'step', 'late', 'type', 'exit'])
 def test_an_exception_ends_the_run_and_is_raised(where):
     class Broken:
         steps = 0
@@ -103,12 +104,14 @@ def test_an_exception_ends_the_run_and_is_raised(where):
             self.steps += 1
             if where == 'type':
                 return 'much'
+            if where == 'exit':
+                sys.exit(0)
             if where == 'step' or self.steps > 100:
                 raise RuntimeError('my step')
             return 2.0
 
     law = Broken()
-    with pytest.raises((RuntimeError, TypeError), match='' if where == 'type' else 'my'):
+    with pytest.raises((RuntimeError, TypeError), match={'type': '', 'exit': 'asked Python to exit'}.get(where, 'my')):
         abs_hil.simulate(law, set=QUICK)
     assert law.steps <= 101, 'not called again after its exception'
     assert abs_hil.simulate('pi', set=QUICK).summary['result'] == 'completed', 'nothing of it is left'

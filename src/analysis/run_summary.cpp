@@ -175,8 +175,4 @@ std::string to_text(const RunSummary& s) {
   return text;
 }
 
-SummaryFile::SummaryFile(std::filesystem::path path) : file_(std::move(path), "the summary") {}
-
-void SummaryFile::write(const RunSummary& summary) { file_.write(to_json(summary).dump(2) + '\n'); }
-
 }  // namespace abs_hil::analysis

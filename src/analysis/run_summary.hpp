@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "analysis/result_file.hpp"
 #include "analysis/run_metrics.hpp"
 #include "rig/gate_counts.hpp"
 #include "rig/timing_summary.hpp"
@@ -45,17 +44,5 @@ struct RunSummary {
 [[nodiscard]] nlohmann::ordered_json to_json(const RunSummary& summary);
 /// The summary as a few lines of text.
 [[nodiscard]] std::string to_text(const RunSummary& summary);
-
-/// A summary file that is either complete or absent (see ResultFile).
-class SummaryFile {
- public:
-  /// Throws std::runtime_error with path, reason and fix if the file cannot be created.
-  explicit SummaryFile(std::filesystem::path path);
-  /// Throws std::runtime_error if the file cannot be written.
-  void write(const RunSummary& summary);
-
- private:
-  ResultFile file_;
-};
 
 }  // namespace abs_hil::analysis

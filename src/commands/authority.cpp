@@ -53,11 +53,15 @@ std::string read_key(const std::filesystem::path& file) {
   return key;
 }
 
-std::string mac_of(const command2_t& command, const std::string& key) {
-  command2_t bare = command;
-  bare.mac.clear();
+namespace {
+
+constexpr std::string_view tag_begin = " [mac ";
+constexpr std::string_view tag_end = "]";
+
+template <class Message>
+std::string hmac_of(const Message& message, const std::string& key) {
   telemetry::EncodeBuffer buffer;
-  const auto bytes = buffer.encode(bare);
+  const auto bytes = buffer.encode(message);
   std::array<unsigned char, EVP_MAX_MD_SIZE> mac{};
   unsigned int size = 0;
   if (HMAC(EVP_sha256(), key.data(), static_cast<int>(key.size()), bytes.data(), bytes.size(), mac.data(), &size) ==
@@ -65,6 +69,33 @@ std::string mac_of(const command2_t& command, const std::string& key) {
     throw std::runtime_error("OpenSSL cannot make an HMAC-SHA-256");
   }
   return telemetry::hexadecimal(std::span(mac).first(size));
+}
+
+/// In constant time: the duration must not reveal how much of a guess was right.
+bool same(std::string_view given, std::string_view expected) {
+  return given.size() == expected.size() && CRYPTO_memcmp(given.data(), expected.data(), expected.size()) == 0;
+}
+
+}  // namespace
+
+std::string mac_of(const command2_t& command, const std::string& key) {
+  command2_t bare = command;
+  bare.mac.clear();
+  return hmac_of(bare, key);
+}
+
+void sign_answers(telemetry::MessageStream& stream, const std::string& key) {
+  stream.set_answer_tag(
+      [key](const event_t& answer) { return std::string(tag_begin).append(hmac_of(answer, key)).append(tag_end); });
+}
+
+bool take_tag(event_t& answer, const std::string& key) {
+  const std::size_t at = answer.message.rfind(tag_begin);
+  if (at == std::string::npos || !answer.message.ends_with(tag_end)) return false;
+  const std::size_t begin = at + tag_begin.size();
+  const std::string mac = answer.message.substr(begin, answer.message.size() - begin - tag_end.size());
+  answer.message.resize(at);
+  return same(mac, hmac_of(answer, key));
 }
 
 Authority::Authority(std::string key) : key_(std::move(key)) {
@@ -76,11 +107,7 @@ Authority::Authority(std::string key) : key_(std::move(key)) {
 }
 
 rig::Reason Authority::judge(const command2_t& command) {
-  const std::string expected = mac_of(command, key_);
-  // Compare in constant time: the duration must not reveal how much of a guess was right.
-  const bool authentic =
-      command.mac.size() == expected.size() && CRYPTO_memcmp(command.mac.data(), expected.data(), expected.size()) == 0;
-  if (!authentic) return rig::Reason::command_not_authentic;
+  if (!same(command.mac, mac_of(command, key_))) return rig::Reason::command_not_authentic;
   if (command.session != session_ || command.sequence <= last_sequence_) return rig::Reason::command_repeated;
   if (command.sequence - last_sequence_ > sequence_leap_max) return rig::Reason::command_repeated;
   last_sequence_ = command.sequence;

@@ -6,7 +6,9 @@
 #include <string>
 
 #include "abs_hil/command2_t.hpp"
+#include "abs_hil/event_t.hpp"
 #include "abs_hil/rig/reason.hpp"
+#include "telemetry/message_stream.hpp"
 
 namespace abs_hil::commands {
 
@@ -20,6 +22,13 @@ inline constexpr std::int64_t sequence_leap_max = 1000;
 
 /// HMAC-SHA-256, with `key`, of the message encoded with an empty mac: 64 hexadecimal digits.
 [[nodiscard]] std::string mac_of(const command2_t& command, const std::string& key);
+
+/// Ends the message of every answer that the stream sends with a tag: the HMAC-SHA-256, with `key`, of the event
+/// encoded without it. Nobody without the key can make or change such an answer.
+void sign_answers(telemetry::MessageStream& stream, const std::string& key);
+
+/// Takes the tag off the answer's message. True if it is that of this answer and this key.
+[[nodiscard]] bool take_tag(event_t& answer, const std::string& key);
 
 /// Decides who may command this run. A message is authentic if its mac fits its content: somebody who listens to the
 /// network can neither forge nor change one. A message names this run's random session and a sequence number greater

@@ -37,7 +37,10 @@ RemoteCommands::RemoteCommands(const config::Settings& settings, telemetry::Mess
       names_(std::move(names)),
       waiting_(settings.experiment.wait_for_start),
       by_person_(settings.experiment.answers == "person") {
-  if (settings.commands.enabled) authority_.emplace(read_key(settings.commands.key_file));
+  if (!settings.commands.enabled) return;
+  const std::string key = read_key(settings.commands.key_file);
+  authority_.emplace(key);
+  sign_answers(stream_, key);
 }
 
 std::optional<telemetry::CommandAnswer> RemoteCommands::judge(const command2_t& command) {

@@ -28,7 +28,8 @@ constexpr std::chrono::seconds last_words{1};
 /// Collects the answers of one running program.
 class Answers {
  public:
-  Answers(lcm_t* lcm, const std::string& prefix, std::string sender) : lcm_(lcm), sender_(std::move(sender)) {
+  Answers(lcm_t* lcm, const std::string& prefix, std::string sender, std::string key)
+      : lcm_(lcm), sender_(std::move(sender)), key_(std::move(key)) {
     events_ = lcm_subscribe(lcm_, (prefix + "EVENT").c_str(), &on_event, this);
     states_ = lcm_subscribe(lcm_, (prefix + "COMMAND_STATE").c_str(), &on_state, this);
   }
@@ -50,8 +51,11 @@ class Answers {
     }
   }
 
+  [[nodiscard]] bool has_key() const noexcept { return !key_.empty(); }
+
   std::optional<event_t> answer{};
-  std::optional<event_t> ending{};  ///< the event that ended the run, if it arrived while we listened
+  std::optional<event_t> without_tag{};  ///< an answer without the key's tag
+  std::optional<event_t> ending{};       ///< the event that ended the run, if it arrived while we listened
   std::optional<command_state_t> state{};
 
  private:
@@ -65,7 +69,9 @@ class Answers {
     const bool last_phase = event.phase == telemetry_t::PHASE_STOPPED || event.phase == telemetry_t::PHASE_FAULT;
     if (last_phase && event.kind != "command") answers.ending = event;
     if (event.kind != "command") return;
-    if (event.message.find('\'' + answers.sender_ + '\'') != std::string::npos) answers.answer = std::move(event);
+    if (event.message.find('\'' + answers.sender_ + '\'') == std::string::npos) return;
+    const bool counts = answers.key_.empty() || take_tag(event, answers.key_);
+    (counts ? answers.answer : answers.without_tag) = std::move(event);
   }
   static void on_state(const lcm_recv_buf_t* received, const char* /*channel*/, void* self) {
     command_state_t state{};
@@ -76,6 +82,7 @@ class Answers {
 
   lcm_t* lcm_;
   std::string sender_;
+  std::string key_;  ///< empty: every answer counts
   lcm_subscription_t* events_;
   lcm_subscription_t* states_;
 };
@@ -94,7 +101,14 @@ void publish(lcm_t* lcm, const std::string& channel, const Message& message) {
   }
 }
 
-Reply reply_of(const std::optional<event_t>& answer) {
+Reply reply_of(const Answers& answers) {
+  const std::optional<event_t>& answer = answers.answer;
+  if (!answer && answers.without_tag) {
+    return {Outcome::no_answer,
+            "no authentic answer; one without this key's tag came, from a run with another key or "
+            "none, or from a forger: " +
+                telemetry::printable(answers.without_tag->message, 300)};
+  }
   if (!answer) {
     return {
         Outcome::no_answer,
@@ -102,19 +116,19 @@ Reply reply_of(const std::optional<event_t>& answer) {
   }
   const auto reason = static_cast<rig::Reason>(answer->reason);
   const bool accepted = reason == rig::Reason::stop_command || rig::is_adjustment(reason);
-  return {accepted ? Outcome::accepted : Outcome::refused, answer->message};
+  return {accepted ? Outcome::accepted : Outcome::refused, answer->message, answers.has_key()};
 }
 
 }  // namespace
 
 Reply send(const Order& order, const SenderOptions& options) {
   const bool is_stop = order.command == "stop";
-  const std::string key = is_stop ? std::string() : read_key(options.key_file);
+  const std::string key = is_stop && options.key_file.empty() ? std::string() : read_key(options.key_file);
   telemetry::LcmOutlet outlet(options.url);
   lcm_t* const lcm = outlet.lcm().getUnderlyingLCM();
   const std::string sender = unique_sender();
   const std::string channel = options.channel_prefix + "COMMAND";
-  Answers answers(lcm, options.channel_prefix, sender);
+  Answers answers(lcm, options.channel_prefix, sender, key);
   const auto end =
       Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.timeout_s));
   const auto answered = [&answers] { return answers.answer.has_value(); };
@@ -126,10 +140,10 @@ Reply send(const Order& order, const SenderOptions& options) {
       publish(lcm, channel, stop);
       answers.wait(std::min(end, Clock::now() + stop_again), answered);
     }
-    return reply_of(answers.answer);
+    return reply_of(answers);
   }
   answers.wait(end, [&answers] { return answers.state.has_value(); });
-  if (!answers.state) return reply_of(std::nullopt);
+  if (!answers.state) return reply_of(answers);
   if (answers.state->enabled == 0) {
     return {Outcome::refused, "the running abs_hil accepts only stop; start it with --set commands.enabled=true"};
   }
@@ -156,7 +170,7 @@ Reply send(const Order& order, const SenderOptions& options) {
     return {Outcome::refused,
             "no answer, because the run ended: " + telemetry::printable(answers.ending->message, 200)};
   }
-  return reply_of(answers.answer);
+  return reply_of(answers);
 }
 
 }  // namespace abs_hil::commands

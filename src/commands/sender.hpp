@@ -14,7 +14,7 @@ struct Order {
 struct SenderOptions {
   std::string url{};
   std::string channel_prefix{"ABS_"};
-  std::string key_file{};  ///< not needed for "stop"
+  std::string key_file{};  ///< not needed for "stop"; with it only an answer with the key's tag counts
   double timeout_s{3.0};
 };
 
@@ -23,6 +23,7 @@ enum class Outcome : std::uint8_t { accepted, refused, no_answer };
 struct Reply {
   Outcome outcome{Outcome::no_answer};
   std::string message{};  ///< the program's answer, or why there is none
+  bool authentic{false};  ///< the answer has the key's tag: it is that of a run that holds the key
 };
 
 /// Sends a command to a running abs_hil and waits for its answer. A stop needs no key and is repeated until it is

@@ -4,10 +4,14 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
+#include <fstream>
 
 #include "config/config_error.hpp"
 #include "rig/nearest_name.hpp"
+#include "rig/parse_toml.hpp"
 
 namespace abs_hil::config {
 
@@ -21,7 +25,9 @@ toml::table parse(const fs::path& file) {
     throw ConfigError(fmt::format("{}: no such file; give the path of a TOML file", file.string()));
   }
   try {
-    return toml::parse_file(file.string());
+    std::ifstream in(file, std::ios::binary);
+    if (!in) throw ConfigError(fmt::format("{}: cannot be read: {}", file.string(), std::strerror(errno)));
+    return rig::parse_toml(in, file.string());
   } catch (const toml::parse_error& problem) {
     throw ConfigError(
         fmt::format("{}:{}: not valid TOML: {}", file.string(), problem.source().begin.line, problem.description()));

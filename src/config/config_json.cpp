@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "config/config_error.hpp"
+#include "rig/parse_json.hpp"
 
 namespace abs_hil::config {
 
@@ -47,11 +48,20 @@ std::vector<std::string> load_json(const nlohmann::ordered_json& config, KeyTabl
 
 void load_tables(std::string_view text, std::initializer_list<const char*> tables, KeyTable& keys,
                  std::string_view origin) try {
-  const auto config = nlohmann::ordered_json::parse(text);
+  const auto config = rig::parse_json<nlohmann::ordered_json>(text);
   std::vector<std::string> unknown;
   for (const char* table : tables) set_values(config.at(table), table, keys, origin, unknown);
 } catch (const nlohmann::json::exception& error) {
   throw ConfigError(std::string(origin) + ": " + error.what());
+}
+
+bool is_utf8(const std::string& text) {
+  try {
+    static_cast<void>(nlohmann::json(text).dump());
+    return true;
+  } catch (const nlohmann::json::type_error&) {
+    return false;
+  }
 }
 
 }  // namespace abs_hil::config

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -11,6 +12,7 @@
 
 #include "abs_hil/rig/option_check.hpp"
 #include "config/config_error.hpp"
+#include "config/config_json.hpp"
 #include "rig/nearest_name.hpp"
 
 namespace abs_hil::config {
@@ -68,16 +70,6 @@ Value parse_value(std::string_view text) {
   return std::string(text);
 }
 
-/// Texts are written to JSON (summary, logs), which is UTF-8.
-bool is_utf8(const std::string& text) {
-  try {
-    static_cast<void>(nlohmann::json(text).dump());
-    return true;
-  } catch (const nlohmann::json::type_error&) {
-    return false;
-  }
-}
-
 nlohmann::ordered_json value_of(const Key& key) {
   return std::visit([](const auto* target) { return nlohmann::ordered_json(*target); }, key.target);
 }
@@ -89,6 +81,7 @@ void copy(const Key& from, const Key& to) {
 
 constexpr std::string_view plant_prefix = "plant.";
 constexpr std::string_view model_prefix = "model.";
+constexpr std::string_view identity_prefix = "rig.";
 
 }  // namespace
 
@@ -111,6 +104,35 @@ const Key* find_key(const std::vector<Key>& keys, std::string_view name) {
 const Key* model_key(const std::vector<Key>& keys, std::string_view name) {
   if (!name.starts_with(plant_prefix)) return nullptr;
   return find_key(keys, std::string(model_prefix).append(name.substr(plant_prefix.size())));
+}
+
+std::string value_text(const Key& key) {
+  return std::visit([](const auto* target) { return fmt::format("{}", *target); }, key.target);
+}
+
+rig::SafetyClass safety_of(const Key& key) {
+  using Kind = rig::SafetyClass::Kind;
+  if (key.safety.kind != Kind::unclassed) return key.safety;
+  if (key.name.starts_with(identity_prefix)) return rig::commissioned;
+  constexpr std::array<std::string_view, 3> judged{"run.inject", "control.controller", "model.encoder_counts_per_rev"};
+  if (std::ranges::find(judged, key.name) != judged.end()) return rig::judged_elsewhere;
+  const auto begins = [&key](std::string_view table) { return key.name.starts_with(table); };
+  const bool of_the_run = begins(plant_prefix) || begins(model_prefix) || begins("control.") || begins("telemetry.") ||
+                          begins("commands.") || begins("run.");
+  return of_the_run ? rig::no_effect_on_safety : key.safety;
+}
+
+std::vector<runtime::WeakValue> weak_values(const KeyTable& keys) {
+  std::vector<runtime::WeakValue> weak;
+  for (const Key& key : keys.keys()) {
+    if (!std::visit([&key](const auto* target) { return rig::weakens(key, *target); }, key.target)) continue;
+    weak.push_back({.key = key.name,
+                    .value = value_text(key),
+                    .class_text = key.safety.in_words(key.unit),
+                    .consent = std::string(key.safety.consent),
+                    .meaning = std::string(key.meaning)});
+  }
+  return weak;
 }
 
 std::string number_text(const Settings& settings, std::string_view name) {
@@ -168,6 +190,7 @@ void KeyTable::leave_out_plant() {
 
 bool KeyTable::is_effective(const Key& key) const {
   if (key.name.starts_with(plant_prefix)) return has_plant_;
+  if (key.name.starts_with(identity_prefix)) return !has_plant_;
   return !has_plant_ || !key.name.starts_with(model_prefix) || set_.contains(key.name);
 }
 

@@ -11,6 +11,7 @@
 
 #include "abs_hil/rig/option.hpp"
 #include "config/settings.hpp"
+#include "runtime/board_policy.hpp"
 
 namespace abs_hil::config {
 
@@ -31,6 +32,13 @@ using Value = std::variant<double, std::int64_t, bool, std::string>;
 
 /// "model.x" for "plant.x"; null for a value that only the plant has, and for a name that is not of the plant.
 [[nodiscard]] const Key* model_key(const std::vector<Key>& keys, std::string_view name);
+
+/// The value as plain text.
+[[nodiscard]] std::string value_text(const Key& key);
+
+/// How the key bears on the safety of a run on a board: as its row says, otherwise as its table. Unclassed in
+/// `driver.`, `gate.`, `guardian.`, `realtime.` and `experiment.`, whose rows must say it.
+[[nodiscard]] rig::SafetyClass safety_of(const Key& key);
 
 /// The number that the settings have for this key, as text; empty for any other text. Not real-time safe.
 [[nodiscard]] std::string number_text(const Settings& settings, std::string_view name);
@@ -75,5 +83,8 @@ class KeyTable {
   bool has_plant_{true};
   std::set<std::string, std::less<>> set_;  ///< names of the values that a file or an option gave
 };
+
+/// The values that weaken the protection of a real board, for runtime::refuse_unsafe_use.
+[[nodiscard]] std::vector<runtime::WeakValue> weak_values(const KeyTable& keys);
 
 }  // namespace abs_hil::config

@@ -4,8 +4,11 @@
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
+#include <fstream>
+
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
+#include "rig/parse_toml.hpp"
 
 namespace abs_hil::config {
 
@@ -14,7 +17,9 @@ std::string model_origin(const Settings& settings, std::chrono::sys_days today) 
   const std::string file = plant_file(name, "--model").string();
   toml::table table;
   try {
-    table = toml::parse_file(file);
+    std::ifstream in(file, std::ios::binary);
+    if (!in) throw ConfigError(fmt::format("{}: cannot be read; give a file with read permission", file));
+    table = rig::parse_toml(in, file);
   } catch (const toml::parse_error& problem) {
     throw ConfigError(
         fmt::format("{}:{}: not valid TOML: {}", file, problem.source().begin.line, problem.description()));

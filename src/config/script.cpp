@@ -11,6 +11,7 @@
 #include "config/events.hpp"
 #include "config/reader.hpp"
 #include "driver/injection/injection.hpp"
+#include "rig/parse_toml.hpp"
 #include "rig/run_names.hpp"
 
 namespace abs_hil::config {
@@ -291,7 +292,7 @@ Script parse(std::string text, std::string path, const FileReader& read_file) {
   Script script{.name = path, .path = path, .text = std::move(text)};
   const Source source(std::move(path));
   try {
-    const toml::table table = toml::parse(script.text, script.path);
+    const toml::table table = rig::parse_toml(script.text, script.path);
     Parser(source, read_file, script).read(table);
   } catch (const toml::parse_error& problem) {
     source.fail(place_of(problem.source()), fmt::format("not valid TOML: {}", problem.description()));

@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::size_t most_runs = 100'000;
 /// Keys that a script must not set: they describe the computer and its user, not the experiment.
-constexpr std::array<std::string_view, 5> not_for_scripts{"driver.", "realtime.", "guardian.", "commands.",
-                                                          "experiment.name"};
+constexpr std::array<std::string_view, 7> not_for_scripts{"driver.", "realtime.", "guardian.",      "commands.",
+                                                          "rig.",    "unsafe.",   "experiment.name"};
 
 void refuse_foreign(const Source& source, std::string_view key, Place place) {
   if (!script_may_set(key)) source.fail(place, fmt::format("a script must not set {}; use --config or --set", key));

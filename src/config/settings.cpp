@@ -8,6 +8,10 @@
 
 namespace abs_hil::config {
 
+rig::RigParameters identity(const Settings& s) {
+  return s.on_rig() ? s.rig.parameters : plant_sim::identity_of(s.plant);
+}
+
 std::uint64_t sensor_seed(const Settings& s) {
   if (s.sensor_seed.empty()) return static_cast<std::uint64_t>(s.seed);
   std::uint64_t seed = 0;

@@ -8,8 +8,8 @@
 #include "abs_hil/rig/option.hpp"
 #include "driver/factory.hpp"
 #include "experiment/options.hpp"
-#include "guardian/options.hpp"
 #include "runtime/command_gate.hpp"
+#include "runtime/guardian_options.hpp"
 #include "runtime/realtime_setup.hpp"
 #include "runtime/unsafe_options.hpp"
 
@@ -42,13 +42,15 @@ struct Settings {
   /// The simulated rig, the truth of a run in simulation. On a board, where the truth is unknown, `plant.rig` is the
   /// model (KeyTable::leave_out_plant).
   ABS_HIL_GROUP(plant_sim::PlantOptions, plant, "plant.", {});
-  /// The rig as controllers, observers, actuator estimate, feed-forward, gate and board limits know it. KeyTable gives
-  /// each value that nobody sets the plant's value.
+  /// The rig as controllers, observers, actuator estimate and feed-forward know it. KeyTable gives each value that
+  /// nobody sets the plant's value.
   ABS_HIL_GROUP(rig::RigParameters, model, "model.", {});
+  /// What the rig behind a board is: see `identity`.
+  ABS_HIL_GROUP(experiment::RigIdentity, rig, "rig.", {});
   ABS_HIL_GROUP(control::ControlOptions, control, "control.", {});
   ABS_HIL_GROUP(experiment::ExperimentOptions, experiment, "experiment.", {});
   ABS_HIL_GROUP(driver::DriverOptions, driver, "driver.", {});
-  ABS_HIL_GROUP(guardian::GuardianOptions, guardian, "guardian.", {});
+  ABS_HIL_GROUP(runtime::GuardianOptions, guardian, "guardian.", {});
   ABS_HIL_GROUP(CommandOptions, commands, "commands.", {});
   ABS_HIL_GROUP(runtime::GateOptions, gate, "gate.", {});
   ABS_HIL_GROUP(runtime::RealtimeOptions, realtime, "realtime.", {});
@@ -67,6 +69,9 @@ struct Settings {
 
   [[nodiscard]] bool on_rig() const noexcept { return backend == "rig"; }
 };
+
+/// What the limits of gate and checks know of the rig, never the model: on a board `rig.`, in simulation the plant.
+[[nodiscard]] rig::RigParameters identity(const Settings& s);
 
 /// The seed of the encoders' first positions. Throws ConfigError for a text that is no such number.
 [[nodiscard]] std::uint64_t sensor_seed(const Settings& s);

@@ -45,14 +45,18 @@ class AllBoardOptions {
 /// Everything below `driver.` in the configuration.
 struct DriverOptions {
   ABS_HIL_OPTIONS(DriverOptions);
-  ABS_HIL_OPTION(std::string, kind, "pci", .meaning = "board behind --backend rig", .allowed = board_name);
+  ABS_HIL_OPTION(std::string, kind, "pci", .meaning = "board behind --backend rig", .allowed = board_name,
+                 .safety = rig::commissioned);
   /// Refused where there is no emulator.
-  ABS_HIL_OPTION(bool, emulated, false, .meaning = "the board is an emulator: --fast may drive its time in lock-step");
+  ABS_HIL_OPTION(bool, emulated, false, .meaning = "the board is an emulator: --fast may drive its time in lock-step",
+                 .safety = rig::judged_elsewhere);
   /// Until then doctor and log say otherwise.
   ABS_HIL_OPTION(bool, verified_on_hardware, false,
-                 .meaning = "this lab has gone through docs/rig-setup.md on its own rig");
+                 .meaning = "this lab has gone through docs/rig-setup.md on its own rig",
+                 .safety = rig::no_effect_on_safety);
   ABS_HIL_OPTION(std::string, records, "",
-                 .meaning = "folder of the commissioning records; empty: /var/lib/abs_hil/boards, or the user's own");
+                 .meaning = "folder of the commissioning records; empty: /var/lib/abs_hil/boards, or the user's own",
+                 .safety = rig::judged_elsewhere);
   ABS_HIL_GROUP(AllBoardOptions, boards, "", {});
   ABS_HIL_GROUP(SimOptions, sim, "sim.", {});
   // Known from elsewhere in the configuration.

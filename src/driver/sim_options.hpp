@@ -11,7 +11,8 @@ namespace abs_hil::driver {
 struct SimOptions {
   ABS_HIL_OPTIONS(SimOptions);
   /// As the RT-DAC4/PCI in the vendor's demos.
-  ABS_HIL_OPTION(std::string, pwm_mode, "12-bit", pwm_width);
+  ABS_HIL_OPTION(std::string, pwm_mode, "12-bit", .meaning = pwm_width.meaning, .allowed = pwm_width.allowed,
+                 .safety = rig::no_effect_on_safety);
 };
 
 }  // namespace abs_hil::driver

@@ -23,6 +23,7 @@ class TakeOverWriter final : public SafeStateWriter {
   [[nodiscard]] std::int64_t owner_needs_ns() const noexcept override {
     return driver_ ? driver_->make_safe_bound_ns() : 0;
   }
+  void let_go() noexcept override { driver_.reset(); }
   [[nodiscard]] IoResult make_safe() noexcept override;
 
  private:

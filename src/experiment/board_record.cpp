@@ -12,6 +12,7 @@
 
 #include "abs_hil/rig/option.hpp"
 #include "rig/formatted_text.hpp"
+#include "rig/parse_json.hpp"
 
 namespace abs_hil::experiment {
 
@@ -33,6 +34,15 @@ std::map<std::string, std::string> option_texts(driver::BoardOptions options, co
   options.visit_options(prefix, [&](const std::string& name, const rig::OptionFacts&, const rig::OptionTarget& target) {
     texts[name] = std::visit([](const auto* value) { return text_of(*value); }, target);
   });
+  return texts;
+}
+
+/// The rig's parameters, as text. The name of their source tells nothing: its file may have changed.
+std::map<std::string, std::string> identity_texts(const RigIdentity& identity) {
+  std::map<std::string, std::string> texts;
+  rig::for_each_option(
+      identity.parameters, "rig.",
+      [&](const std::string& name, const rig::OptionFacts&, const auto& value) { texts[name] = text_of(value); });
   return texts;
 }
 
@@ -61,7 +71,9 @@ nlohmann::ordered_json to_json(const BoardRecord& r) {
           {"date", r.date},
           {"version", r.version},
           {"encoder_counts_per_rev", r.encoder_counts_per_rev},
+          {"counts_of_one_turn", {{"upper", r.one_turn.upper}, {"lower", r.one_turn.lower}}},
           {"options", r.options},
+          {"identity", r.identity},
           {"outputs",
            {{"reported", r.outputs.reported},
             {"watchdog_ms", optional_json(r.outputs.watchdog_ms)},
@@ -71,23 +83,34 @@ nlohmann::ordered_json to_json(const BoardRecord& r) {
 
 /// What `difference` compares. Throws nlohmann::json::exception or std::runtime_error.
 BoardRecord parse_record(std::istream& in) {
-  const nlohmann::json json = nlohmann::json::parse(in);
+  const nlohmann::json json = rig::parse_json(in);
   if (json.at("abs_hil_board_record") != record_format) throw std::runtime_error("of another format");
   return {.kind = json.at("driver_kind"),
           .board = {.place = json.at("place"), .logic = json.at("logic")},
           .emulated = json.at("emulated"),
           .options = json.at("options"),
           .encoder_counts_per_rev = json.at("encoder_counts_per_rev"),
+          .identity = json.value("identity", std::map<std::string, std::string>{}),
+          // A record without them is older than the check of the encoders' scale.
+          .one_turn = {.upper = json.at("counts_of_one_turn").at("upper"),
+                       .lower = json.at("counts_of_one_turn").at("lower")},
           .date = json.at("date"),
           .version = json.at("version")};
 }
 
 /// Why the record in this file does not hold; empty if it does, nothing if there is no such file.
-std::optional<std::string> difference_of_file(const fs::path& file, const BoardRecord& present) {
+/// @param note  what a person should know of a record that holds
+std::optional<std::string> difference_of_file(const fs::path& file, const BoardRecord& present, std::string& note) {
   std::ifstream in(file);
   if (!in) return std::nullopt;
   try {
-    const std::string why = difference(parse_record(in), present);
+    const BoardRecord record = parse_record(in);
+    const std::string why = difference(record, present);
+    if (why.empty() && record.identity.empty()) {
+      note = file.string() +
+             ": this commissioning record is older than the rig's identity, so the limits are those of the default "
+             "identity, paper-table1; commission again with --set rig.identity=FILE of your rig (docs/safety.md)";
+    }
     return why.empty() ? why : file.string() + ": " + why;
   } catch (const std::exception& error) {
     return file.string() + " is no commissioning record: " + error.what();
@@ -100,14 +123,16 @@ std::string described(const driver::BoardIdentity& board) {
 
 }  // namespace
 
-BoardRecord describe_board(const driver::DriverOptions& options, const driver::BoardIdentity& board, bool emulated) {
+BoardRecord describe_board(const driver::DriverOptions& options, const RigIdentity& identity,
+                           const driver::BoardIdentity& board, bool emulated) {
   const driver::ChosenBackend chosen = driver::chosen_backend(options);
   const std::string prefix = "driver." + options.kind + '.';
   BoardRecord record{.kind = options.kind,
                      .board = board,
                      .emulated = emulated,
                      .options = option_texts(chosen.options, prefix),
-                     .encoder_counts_per_rev = options.encoder_counts_per_rev};
+                     .encoder_counts_per_rev = options.encoder_counts_per_rev,
+                     .identity = identity_texts(identity)};
   for (const std::string_view free : chosen.entry.free_options) record.options.erase(prefix + std::string(free));
   return record;
 }
@@ -121,7 +146,7 @@ std::string difference(const BoardRecord& record, const BoardRecord& present) {
     return "the board had " + record.board.logic + " then and has " + present.board.logic + " now";
   }
   if (record.encoder_counts_per_rev != present.encoder_counts_per_rev) {
-    return rig::formatted("model.encoder_counts_per_rev was %d then and is %d now", record.encoder_counts_per_rev,
+    return rig::formatted("rig.encoder_counts_per_rev was %d then and is %d now", record.encoder_counts_per_rev,
                           present.encoder_counts_per_rev);
   }
   for (const auto& [name, now] : present.options) {
@@ -129,6 +154,15 @@ std::string difference(const BoardRecord& record, const BoardRecord& present) {
     if (then == record.options.end()) return "it does not have " + name;
     const bool lower = is_cap(name) && std::strtod(now.c_str(), nullptr) <= std::strtod(then->second.c_str(), nullptr);
     if (now != then->second && !lower) return name + " was " + then->second + " then and is " + now + " now";
+  }
+  const auto& identity = record.identity.empty() ? identity_texts({}) : record.identity;
+  for (const auto& [name, now] : present.identity) {
+    const auto then = identity.find(name);
+    const std::string before = then == identity.end() ? "not known" : then->second;
+    if (now != before) {
+      return "the rig's identity, from which the limits come, has changed: " + name + " was " + before +
+             " then and is " + now + " now (rig.identity names the rig's file)";
+    }
   }
   return {};
 }
@@ -172,7 +206,7 @@ fs::path write_record(const BoardRecord& record, const std::vector<fs::path>& fo
       "2775 /var/lib/abs_hil/boards");
 }
 
-std::string commission_command(const driver::DriverOptions& options) {
+std::string commission_command(const driver::DriverOptions& options, const RigIdentity& identity) {
   driver::DriverOptions now = options;
   driver::DriverOptions standard;
   std::map<std::string, std::string> defaults;
@@ -184,24 +218,28 @@ std::string commission_command(const driver::DriverOptions& options) {
     const std::string text = text_of(value);
     if (text != defaults[name]) command += " --set " + name + '=' + text;
   });
+  if (identity.source != RigIdentity{}.source) command += " --set rig.identity=" + identity.source;
   return command;
 }
 
-void require_record(const driver::DriverOptions& options, const driver::BoardIdentity& board) {
-  const BoardRecord present = describe_board(options, board, false);
+std::string require_record(const driver::DriverOptions& options, const RigIdentity& identity,
+                           const driver::BoardIdentity& board) {
+  const BoardRecord present = describe_board(options, identity, board, false);
   std::string why;
+  std::string note;
   const std::vector<fs::path> folders = record_folders(options.records);
   for (const fs::path& folder : folders) {
-    const std::optional<std::string> found = difference_of_file(folder / file_name(present), present);
-    if (found && found->empty()) return;
+    const std::optional<std::string> found = difference_of_file(folder / file_name(present), present, note);
+    if (found && found->empty()) return note;
     if (found && why.empty()) why = *found;
   }
   if (why.empty()) {
     for (const fs::path& folder : folders) why += (why.empty() ? "no record in " : " or ") + folder.string();
   }
-  throw driver::Unavailable("backend rig: this board (" + options.kind + ' ' + described(board) +
-                            ") has not been commissioned as it is now: " + why +
-                            ". Nothing but commission, safe and doctor uses it. Type: " + commission_command(options));
+  throw driver::Unavailable(
+      "backend rig: this board (" + options.kind + ' ' + described(board) +
+      ") has not been commissioned as it is now: " + why +
+      ". Nothing but commission, safe and doctor uses it. Type: " + commission_command(options, identity));
 }
 
 }  // namespace abs_hil::experiment

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "driver/factory.hpp"
+#include "experiment/options.hpp"
 
 namespace abs_hil::experiment {
 
@@ -18,6 +19,12 @@ struct OutputTimes {
   std::optional<double> release_ms{};   ///< from the order of the safe state until it was verified
 };
 
+/// Counts of one turn by hand of each wheel. 0: not measured.
+struct TurnCounts {
+  std::int32_t upper{0};
+  std::int32_t lower{0};
+};
+
 /// The record of a board that has gone through `abs_hil commission`. Without a matching record nothing drives hardware.
 struct BoardRecord {
   std::string kind{};  ///< driver.kind
@@ -25,14 +32,17 @@ struct BoardRecord {
   bool emulated{false};                          ///< the record of an emulator, which no hardware matches
   std::map<std::string, std::string> options{};  ///< "driver.pci.lower_sign" -> "1": those that a commissioning tests
   int encoder_counts_per_rev{0};
+  /// "rig.theta_N" -> "23": the rig's identity. Empty in records from before there was one: it is the default then.
+  std::map<std::string, std::string> identity{};
   OutputTimes outputs{};
+  TurnCounts one_turn{};
   std::string date{};
   std::string version{};  ///< of the program
 };
 
 /// The record that the present options and board would get, without measurements, date and version.
-[[nodiscard]] BoardRecord describe_board(const driver::DriverOptions& options, const driver::BoardIdentity& board,
-                                         bool emulated);
+[[nodiscard]] BoardRecord describe_board(const driver::DriverOptions& options, const RigIdentity& identity,
+                                         const driver::BoardIdentity& board, bool emulated);
 
 /// Why a record does not hold for the present board and options, as text; empty if it holds. A record holds for lower
 /// duty caps.
@@ -47,9 +57,11 @@ struct BoardRecord {
 std::filesystem::path write_record(const BoardRecord& record, const std::vector<std::filesystem::path>& folders);
 
 /// Throws driver::Unavailable, with the command to type, unless there is a record that holds for this board.
-void require_record(const driver::DriverOptions& options, const driver::BoardIdentity& board);
+/// @return what a person should know of the record that holds; empty: nothing
+std::string require_record(const driver::DriverOptions& options, const RigIdentity& identity,
+                           const driver::BoardIdentity& board);
 
-/// `abs_hil commission` with the options of `driver.` that differ from their defaults.
-[[nodiscard]] std::string commission_command(const driver::DriverOptions& options);
+/// `abs_hil commission` with the options of `driver.` that differ from their defaults, and the identity's source.
+[[nodiscard]] std::string commission_command(const driver::DriverOptions& options, const RigIdentity& identity);
 
 }  // namespace abs_hil::experiment

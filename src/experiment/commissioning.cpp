@@ -16,8 +16,13 @@ namespace {
 using rig::formatted;
 
 constexpr std::int64_t cycle_ns = 1'000'000;
-/// An eighth of a revolution of 4096 counts: turning by hand gives more, trembling gives less.
-constexpr std::int32_t turned_counts = 512;
+/// Turning by hand gives more than this part of a turn, trembling gives less.
+constexpr double least_turn = 0.125;
+/// A person sets a mark on the rim to a pointer within a few degrees: 3 % are 11. An encoder of another number of
+/// lines, or one that is read by half its edges, is further off. Without this check distances, speeds and torques of a
+/// run would be wrong by that factor, and nothing in a run can tell: both wheels look slower or faster, as on another
+/// rig.
+constexpr double turn_tolerance = 0.03;
 /// Largest movement of the other wheel, which nobody touches meanwhile.
 constexpr std::int32_t still_counts = 64;
 /// A wheel counts as standing if it moves less than `still_counts` in this time.
@@ -56,6 +61,7 @@ Commissioning::Commissioning(driver::RigDriver& driver, runtime::Clock& clock, D
   require(options.brake_pulse_s > 0.0 && options.brake_pulse_s <= 1.0, "brake pulse", options.brake_pulse_s,
           "(0, 1] s");
   require(options.silence_s > 0.0 && options.silence_s <= 1.0, "silence", options.silence_s, "(0, 1] s");
+  require(options.encoder_counts_per_rev > 0, "encoder counts per turn", options.encoder_counts_per_rev, "(0, inf)");
   require(options.run_out_limit_s > 0.0, "run-out limit", options.run_out_limit_s, "(0, inf) s");
 }
 
@@ -106,6 +112,8 @@ bool Commissioning::judge_turn(Wheel wheel, const Travel& travel) {
   const std::string board(driver_.name());
   const std::int32_t turned = upper ? travel.upper : travel.lower;
   const std::int32_t other = upper ? travel.lower : travel.upper;
+  const double turned_counts = least_turn * options_.encoder_counts_per_rev;
+  const double turns = static_cast<double>(turned) / options_.encoder_counts_per_rev;
   if (std::abs(turned) < turned_counts && std::abs(other) >= turned_counts) {
     // The CAN node has fixed channels.
     const std::string fix = board == "can"
@@ -121,8 +129,16 @@ bool Commissioning::judge_turn(Wheel wheel, const Travel& travel) {
   } else if (turned < 0) {
     dialog_.tell(formatted("FAILED: %d counts is the wrong direction: change the sign of driver.%s.%s_sign", turned,
                            board.c_str(), upper ? "upper" : "lower"));
+  } else if (std::abs(turns - 1.0) > turn_tolerance) {
+    dialog_.tell(
+        formatted("FAILED: %d counts are %.3f turns at %d counts a turn (model.encoder_counts_per_rev). If it was "
+                  "not one turn to within 3 %%, turn it again with a mark on its rim; if it was, correct that key: "
+                  "with a wrong one all speeds and distances are wrong",
+                  turned, turns, options_.encoder_counts_per_rev));
   } else {
-    dialog_.tell(formatted("ok: %d counts forward, %.2f turns at 4096 counts per turn", turned, turned / 4096.0));
+    dialog_.tell(formatted("ok: %d counts forward, %.3f turns at %d counts a turn", turned, turns,
+                           options_.encoder_counts_per_rev));
+    (upper ? one_turn_.upper : one_turn_.lower) = turned;
     return true;
   }
   return false;
@@ -134,14 +150,23 @@ CommissioningResult Commissioning::turn_by_hand() {
           "E-stop and lift the upper wheel off the lower one. Go on?")) {
     return CommissioningResult::declined;
   }
-  driver_.activate(clock_.now_ns());
+  // The guard looks at an idle board all the time. It must not while the driver sets the board up.
+  guard_.begin();
+  try {
+    driver_.activate(clock_.now_ns());
+  } catch (...) {
+    guard_.end(false);
+    throw;
+  }
+  guard_.end(true);
   for (const Wheel wheel : {Wheel::upper, Wheel::lower}) {
     rig::Measurement before;
     rig::Measurement after;
     if (!read(before)) return CommissioningResult::failed;
     const std::string name = wheel == Wheel::upper ? "UPPER" : "LOWER";
     if (!dialog_.wait_until_done("Turn the " + name +
-                                 " wheel about half a turn in the driving direction, then press Enter")) {
+                                 " wheel exactly one turn in the driving direction: mark its rim and "
+                                 "bring the mark back to where it was, then press Enter")) {
       return CommissioningResult::declined;
     }
     if (!read(after)) return CommissioningResult::failed;

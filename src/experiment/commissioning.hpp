@@ -44,13 +44,14 @@ class PulseGuard {
 
 /// Pulses of the commissioning; their limits keep the rig from running away.
 struct CommissioningOptions {
-  double drive_duty{0.15};       ///< in (0, 0.3]
-  double drive_pulse_s{0.3};     ///< in (0, 1]
-  double brake_duty{0.5};        ///< in (0, 0.7]; the brake grips above its dead zone of 0.415
-  double brake_pulse_s{0.3};     ///< in (0, 1]
-  double silence_s{0.3};         ///< in (0, 1]: how long the program then sends nothing, the brake on
-  double run_out_limit_s{60.0};  ///< longest wait for standstill, > 0
-  bool emulated{false};          ///< the board is an emulator's: its brake can be neither seen nor heard
+  double drive_duty{0.15};                    ///< in (0, 0.3]
+  double drive_pulse_s{0.3};                  ///< in (0, 1]
+  double brake_duty{0.5};                     ///< in (0, 0.7]; the brake grips above its dead zone of 0.415
+  double brake_pulse_s{0.3};                  ///< in (0, 1]
+  double silence_s{0.3};                      ///< in (0, 1]: how long the program then sends nothing, the brake on
+  double run_out_limit_s{60.0};               ///< longest wait for standstill, > 0
+  std::int32_t encoder_counts_per_rev{4096};  ///< model.encoder_counts_per_rev, > 0: what one turn must give
+  bool emulated{false};                       ///< the board is an emulator's: its brake can be neither seen nor heard
 };
 
 enum class CommissioningResult : std::uint8_t { passed, failed, declined, interrupted };
@@ -68,6 +69,8 @@ class Commissioning {
   [[nodiscard]] CommissioningResult run();
   /// What the last step has measured.
   [[nodiscard]] const OutputTimes& output_times() const noexcept { return output_times_; }
+  /// What turning by hand has given.
+  [[nodiscard]] const TurnCounts& one_turn() const noexcept { return one_turn_; }
 
  private:
   enum class Wheel : std::uint8_t { upper, lower };
@@ -98,6 +101,7 @@ class Commissioning {
   CommissioningOptions options_;
   std::function<bool()> stop_requested_;
   OutputTimes output_times_{};
+  TurnCounts one_turn_{};
 };
 
 }  // namespace abs_hil::experiment

@@ -28,16 +28,16 @@ struct FastestChange {
 
 /// By the gate's bounds of what the rig can do.
 FastestChange fastest_change_rad_s2(const RunLogicParts& parts) {
-  const runtime::PlausibilityLimits limits = runtime::plausibility_limits(parts.rig, parts.ideal_actuator, {});
+  const runtime::PlausibilityLimits limits = runtime::plausibility_limits(parts.identity, parts.ideal_actuator, {});
   return {std::max(limits.upper_gain_rad_s2, limits.upper_loss_rad_s2),
           std::max(limits.lower_gain_rad_s2, limits.lower_loss_rad_s2)};
 }
 }  // namespace
 
 RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig::RigParameters& rig,
-                               bool ideal_actuator, const runtime::GateOptions& gate,
-                               const ExperimentOptions& experiment, std::vector<PhasePlan> plans,
-                               const SequenceLimits& limits) {
+                               const rig::RigParameters& identity, bool ideal_actuator,
+                               const runtime::GateOptions& gate, const ExperimentOptions& experiment,
+                               std::vector<PhasePlan> plans, const SequenceLimits& limits) {
   if (experiment.wait_for_start) {
     plans.insert(plans.begin(), {.phase = rig::Phase::idle,
                                  .name = "waiting for the start",
@@ -49,6 +49,7 @@ RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig
   for (const PhasePlan& plan : plans) names.phases.push_back({plan.phase, plan.name, plan.question});
   return {.control = control,
           .rig = rig,
+          .identity = identity,
           .controller = std::move(controller),
           .names = std::move(names),
           .sequence = Sequence(
@@ -61,7 +62,7 @@ RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig
 }
 
 RunLogic::RunLogic(RunLogicParts parts)
-    : rig_(parts.rig),
+    : identity_(parts.identity),
       ideal_actuator_(parts.ideal_actuator),
       duty_steps_(parts.duty_steps),
       wheels_(parts.rig.wheels),

@@ -29,6 +29,7 @@ inline constexpr double slip_floor_m_s = 0.1;
 struct RunLogicParts {
   const control::ControlOptions& control;
   const rig::RigParameters& rig;  ///< the model: the parameters as the controller knows them
+  rig::RigParameters identity;    ///< what the limits of gate and observers know of the rig
   std::unique_ptr<control::SlipController> controller;
   rig::RunNames names{};
   Sequence sequence;
@@ -42,10 +43,12 @@ struct RunLogicParts {
 
 /// Makes the parts of a run with the controller named in `control`. Throws std::invalid_argument for unusable options.
 /// `control` and `rig` must outlive the construction of the logic.
+/// @param rig  the model, as the controller knows the rig
+/// @param identity  the rig as it is: of the simulated plant, or of a board's record. The limits come from it
 [[nodiscard]] RunLogicParts make_logic_parts(const control::ControlOptions& control, const rig::RigParameters& rig,
-                                             bool ideal_actuator, const runtime::GateOptions& gate,
-                                             const ExperimentOptions& experiment, std::vector<PhasePlan> plans,
-                                             const SequenceLimits& limits = {});
+                                             const rig::RigParameters& identity, bool ideal_actuator,
+                                             const runtime::GateOptions& gate, const ExperimentOptions& experiment,
+                                             std::vector<PhasePlan> plans, const SequenceLimits& limits = {});
 
 /// The logic of one run's cycle: estimate, sequence, control; from counts to the wanted command.
 class RunLogic final : public runtime::CycleLogic {
@@ -65,11 +68,11 @@ class RunLogic final : public runtime::CycleLogic {
   /// are duties that the driver can send, so that no rounding exceeds them.
   [[nodiscard]] runtime::CommandGate make_gate(const runtime::GateOptions& options) const noexcept {
     return runtime::CommandGate(on_grid(options), sequence_.permissions(),
-                                runtime::plausibility_limits(rig_, ideal_actuator_, options), brake_.u0);
+                                runtime::plausibility_limits(identity_, ideal_actuator_, options), identity_.brake.u0);
   }
   /// The same gate, but it does not judge the motion of the wheels.
   [[nodiscard]] runtime::CommandGate make_gate_without_wheels(const runtime::GateOptions& options) const noexcept {
-    return runtime::CommandGate(on_grid(options), sequence_.permissions(), {}, brake_.u0);
+    return runtime::CommandGate(on_grid(options), sequence_.permissions(), {}, identity_.brake.u0);
   }
   /// Why the run ended; `none` while it goes on.
   [[nodiscard]] rig::Reason end_reason() const noexcept { return end_.reason; }
@@ -92,7 +95,7 @@ class RunLogic final : public runtime::CycleLogic {
   [[nodiscard]] double wanted_torque_Nm(const PhasePlan& plan, double dt_s, bool begins,
                                         rig::ControlState& state) noexcept;
 
-  const rig::RigParameters rig_;
+  const rig::RigParameters identity_;
   const bool ideal_actuator_;
   const std::uint32_t duty_steps_;
   const rig::WheelParameters wheels_;

@@ -1,5 +1,6 @@
 #include "experiment/run_session.hpp"
 
+#include <chrono>
 #include <cmath>
 #include <future>
 #include <thread>
@@ -65,16 +66,39 @@ RunOutcome RunSession::outcome() const {
           .ran = ran_};
 }
 
-RunOutcome RunSession::run_fast(const Poll& poll) {
+bool RunSession::make_safe_now() noexcept { return driver_.deactivate().ok(); }
+
+bool RunSession::have_made_safe() noexcept {
+  constexpr int tries = 100;
+  executive_.request_stop(rig::Reason::terminate_signal);
+  for (int i = 0; i < tries && !made_safe_.load(std::memory_order_acquire); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return made_safe_.load(std::memory_order_acquire) && safe_state_.ok();
+}
+
+bool RunSession::step() noexcept {
+  if (!slow_cycles_) return executive_.step();
+  slow_cycles_->cycle_begins();
+  const bool more = executive_.step();
+  slow_cycles_->cycle_ended();
+  return more;
+}
+
+RunOutcome RunSession::run_fast(const Poll& poll, bool own_thread) {
   const ActiveDriver active(driver_, clock_.now_ns());
+  const runtime::CycleInThisThread cycle(*this, own_thread);
+  if (watch_slow_cycles_) slow_cycles_.emplace(executive_.period_ns());
   ran_ = true;
   bool running = true;
   while (running) {
-    for (int i = 0; i < fast_cycles_per_drain && running; ++i) running = executive_.step();
+    for (int i = 0; i < fast_cycles_per_drain && running; ++i) running = step();
     pump_.drain();
     if (const rig::Reason stop = poll(); stop != rig::Reason::none) executive_.request_stop(stop);
   }
+  slow_cycles_.reset();
   safe_state_ = driver_.deactivate();
+  made_safe_.store(true, std::memory_order_release);
   pump_.finish();
   return outcome();
 }
@@ -88,10 +112,12 @@ RunOutcome RunSession::run_realtime(const runtime::RealtimeOptions& options, con
     const runtime::RealtimeScope realtime(options);
     set_up.set_value(realtime.report());
     if (go.get_future().get()) {
-      while (executive_.step()) {
+      const runtime::CycleInThisThread here(*this, true);
+      while (step()) {
       }
       // Called here and not in the slow thread: nothing must delay the safe state.
       safe_state_ = driver_.deactivate();
+      made_safe_.store(true, std::memory_order_release);
       driver_.tell_before_making_safe(nullptr);
       if (guard_ != nullptr) guard_->outputs_released(safe_state_.ok());
     }
@@ -122,6 +148,7 @@ RunOutcome RunSession::run_realtime(const runtime::RealtimeOptions& options, con
     throw;
   }
   ran_ = true;
+  if (watch_slow_cycles_) slow_cycles_.emplace(0);
   go.set_value(true);
   try {
     while (running.load(std::memory_order_acquire)) {
@@ -136,6 +163,7 @@ RunOutcome RunSession::run_realtime(const runtime::RealtimeOptions& options, con
     throw;
   }
   cycle.join();
+  slow_cycles_.reset();
   static_cast<void>(poll());  // answers the command that ended the run
   pump_.finish();
   return outcome();

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "abs_hil/driver/rig_driver.hpp"
@@ -11,6 +12,7 @@
 #include "runtime/clock.hpp"
 #include "runtime/command_gate.hpp"
 #include "runtime/cyclic_executive.hpp"
+#include "runtime/early_end.hpp"
 #include "runtime/realtime_setup.hpp"
 #include "runtime/record_pump.hpp"
 
@@ -28,8 +30,9 @@ struct RunOutcome {
 };
 
 /// One run, from an unconfigured driver to the safe state. It owns the data of the real-time thread; the sinks work in
-/// the calling (slow) thread.
-class RunSession {
+/// the calling (slow) thread. If code in this program ends it during the run, the outputs are made safe first
+/// (runtime::EarlyEndWatch).
+class RunSession final : private runtime::Outputs {
  public:
   /// @param sinks get every record, in this order, in the thread that calls `run_...`
   RunSession(runtime::Clock& clock, driver::RigDriver& driver, RunLogicParts parts,
@@ -43,9 +46,14 @@ class RunSession {
   /// Runs in the calling thread as fast as possible, with a virtual clock. Both run functions throw driver::Unavailable
   /// if the driver cannot start, and whatever a sink throws when it finishes; the rig is in the safe state in every
   /// case.
-  RunOutcome run_fast(const Poll& poll);
+  /// @param own_thread  true: the calling thread ends afterwards (runtime::CycleInThisThread)
+  RunOutcome run_fast(const Poll& poll, bool own_thread = false);
   /// Runs the cycle in its own thread with the real-time set-up of `options`.
   RunOutcome run_realtime(const runtime::RealtimeOptions& options, const Poll& poll);
+
+  /// Ends the program if a controller in this process does not return or, in virtual time, is much too slow. Not for
+  /// boards: their guardian ends such a run.
+  void watch_for_slow_cycles() noexcept { watch_slow_cycles_ = true; }
 
   /// Lets a real-time run begin at the next whole second of the clock plus `offset_ns`, >= 0: its ticks then coincide
   /// with those of `cyclictest --secaligned`.
@@ -54,7 +62,7 @@ class RunSession {
   /// For real-time runs: `guard` stands by from before the driver's activation until its outputs are released. Both
   /// must outlive the run.
   void guard_with(runtime::RunGuard& guard) noexcept { guard_ = &guard; }
-  void set_heartbeat(runtime::Heartbeat& heartbeat) noexcept { executive_.set_heartbeat(heartbeat); }
+  void set_watch(runtime::CycleWatch& watch) noexcept { executive_.set_watch(watch); }
   /// Ends the run in an orderly way at its next cycle. Any thread or signal handler may call it.
   void request_stop(rig::Reason reason) noexcept { executive_.request_stop(reason); }
 
@@ -72,6 +80,10 @@ class RunSession {
   [[nodiscard]] const rig::CycleRecord& latest() const noexcept { return pump_.latest(); }
 
  private:
+  bool make_safe_now() noexcept override;
+  bool have_made_safe() noexcept override;
+  [[nodiscard]] bool step() noexcept;
+
   runtime::Clock& clock_;
   driver::RigDriver& driver_;
   RunLogic logic_;
@@ -82,6 +94,9 @@ class RunSession {
   runtime::RecordPump pump_;
   runtime::RealtimeReport realtime_{};
   runtime::RunGuard* guard_{nullptr};
+  bool watch_slow_cycles_{false};
+  std::optional<runtime::SlowCycleWatch> slow_cycles_{};
+  std::atomic<bool> made_safe_{false};  ///< `safe_state_` is that of the run's end
   driver::IoResult safe_state_{};
   bool ran_{false};
 };

@@ -12,15 +12,29 @@ void refuse_run(const std::string& what) {
 }
 
 void Guard::making_safe() noexcept {
-  if (region_ == nullptr) return;
-  region_->set_stage(Stage::making_safe);
+  pages().run().stage.store(Stage::making_safe, std::memory_order_release);
   // A failed write and the end of the run each make the outputs safe, without a cycle in between. Each beat restarts
   // the guardian's timeout.
-  region_->panel().safe_beats.fetch_add(1, std::memory_order_relaxed);
+  pages().run().safe_beats.fetch_add(1, std::memory_order_relaxed);
 }
 
 void Guard::outputs_released(bool safe) noexcept {
-  if (region_ != nullptr) region_->set_stage(safe ? Stage::released : Stage::handed_over);
+  pages().run().stage.store(safe ? Stage::released : Stage::handed_over, std::memory_order_release);
+}
+
+void Guard::reset_page() noexcept {
+  RunPage& page = pages().run();
+  page.cycle_beats.store(0, std::memory_order_relaxed);
+  page.safe_beats.store(0, std::memory_order_relaxed);
+  page.stage.store(Stage::guarded, std::memory_order_release);
+}
+
+bool Guard::close_page(Stage stage) noexcept {
+  std::atomic<Stage>& now = pages().run().stage;
+  // `handed_over` must stay: a delayed guardian has to read it, however late.
+  const bool handed_over = now.load(std::memory_order_acquire) == Stage::handed_over;
+  if (!handed_over) now.store(stage, std::memory_order_release);
+  return handed_over;
 }
 
 void Guard::refuse_weaker(const runtime::Scheduling& guardian, const runtime::Scheduling& controller,

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "guardian/shared_region.hpp"
-#include "runtime/heartbeat.hpp"
+#include "runtime/cycle_watch.hpp"
 
 namespace abs_hil::guardian {
 
@@ -27,7 +27,10 @@ class Guard : public runtime::RunGuard {
   [[nodiscard]] virtual bool armed() const noexcept = 0;
   [[nodiscard]] virtual pid_t pid() const noexcept = 0;
   /// Dismisses the guard after the run, when all files are written. Waits at most half a second.
-  virtual GuardEnd end() noexcept = 0;
+  /// @param stage  `closed`: the driver is gone; `resting`: it stays active and sends zeros
+  virtual GuardEnd end(Stage stage = Stage::closed) noexcept = 0;
+  /// The pages that the run shares with its guard.
+  [[nodiscard]] virtual Pages& pages() noexcept = 0;
   /// What the guardian could not obtain (real time), as text; empty if it lacks nothing.
   [[nodiscard]] const std::string& notes() const noexcept { return notes_; }
 
@@ -38,8 +41,11 @@ class Guard : public runtime::RunGuard {
   /// Throws driver::Unavailable if the guardian would be scheduled after the controller, or swapped out before it.
   static void refuse_weaker(const runtime::Scheduling& guardian, const runtime::Scheduling& controller,
                             const std::string& program);
+  /// Before a guard takes up its watch: no beats yet, and the outputs may be driven once it has.
+  void reset_page() noexcept;
+  /// Says that the run is done, unless the outputs were handed over. Returns true if they were.
+  bool close_page(Stage stage) noexcept;
 
-  SharedRegion* region_{nullptr};
   std::string notes_{};
 };
 

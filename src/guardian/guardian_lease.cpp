@@ -18,6 +18,7 @@ namespace {
 constexpr int answers_within_ms = 20'000;
 constexpr int covers_within_ms = 5'000;
 constexpr int dismissed_within_ms = 500;
+constexpr int looks_every_ms = 1;
 
 }  // namespace
 
@@ -39,20 +40,27 @@ std::unique_ptr<GuardianLease> GuardianLease::ask(const std::string& path, const
       "the resident service (process " + std::to_string(lease->service_.pid) + ", " + path + ") ";
   if (!answer) refuse_run(service + "gave no answer");
   if (answer->word != LeaseWord::granted) refuse_run(service + "refused a lease: " + answer->text);
+  if (answer->files.size() != 2) refuse_run(service + "comes from another build of abs_hil");
+  lease->pages_.emplace(Pages::as_run({answer->files[0].get(), answer->files[1].get()}));
   return lease;
 }
 
+GuardianLease::GuardianLease(driver::FileDescriptor socket)
+    : socket_(std::move(socket)), service_(peer_of(socket_.get())), guard_process_(open_pidfd(service_.pid)) {}
+
 GuardianLease::~GuardianLease() { static_cast<void>(end()); }
 
-void GuardianLease::cover(SharedRegion& region, std::string launch_config_json) {
-  region_ = &region;
+void GuardianLease::cover(const SharedRecorder& recorder, std::string launch_config_json) {
+  recorder_ = &recorder;
   launch_config_ = std::move(launch_config_json);
 }
 
 void GuardianLease::arm(const runtime::Scheduling& controller) {
   const driver::FileDescriptor launch_config(text_in_memory(launch_config_));
-  if (region_ == nullptr || launch_config.get() < 0) refuse_run("cannot hand the run over to the resident service");
-  if (!send_message(socket_.get(), {.word = LeaseWord::cover}, {region_->descriptor(), launch_config.get()})) {
+  if (recorder_ == nullptr || launch_config.get() < 0) refuse_run("cannot hand the run over to the resident service");
+  ends_before_ = pages_->guard().ends.load(std::memory_order_acquire);
+  reset_page();
+  if (!send_message(socket_.get(), {.word = LeaseWord::cover}, {recorder_->descriptor(), launch_config.get()})) {
     refuse_run(std::string("the resident service ended the lease: ") + std::strerror(errno));
   }
   const auto answer = receive_message(socket_.get(), covers_within_ms);
@@ -64,21 +72,22 @@ void GuardianLease::arm(const runtime::Scheduling& controller) {
 }
 
 bool GuardianLease::alive() const noexcept {
+  if (guard_process_.get() >= 0) return !has_ended(guard_process_.get());
   pollfd closed{socket_.get(), POLLRDHUP, 0};
   return ::poll(&closed, 1, 0) <= 0;
 }
 
-GuardEnd GuardianLease::end() noexcept {
+GuardEnd GuardianLease::end(Stage stage) noexcept {
   if (!std::exchange(armed_, false)) return GuardEnd::none;
-  const bool handed_over = region_->stage() == Stage::handed_over;
-  if (!handed_over) region_->set_stage(Stage::closed);
-  try {
-    const auto answer = receive_message(socket_.get(), dismissed_within_ms);
-    if (answer && answer->word == LeaseWord::ended) return answer->safe ? GuardEnd::ended : GuardEnd::insisting;
-  } catch (...) {
-    return GuardEnd::failed;
+  const bool handed_over = close_page(stage);
+  const GuardPage& guard = pages_->guard();
+  for (int waited_ms = 0; waited_ms < dismissed_within_ms && alive(); waited_ms += looks_every_ms) {
+    if (guard.ends.load(std::memory_order_acquire) != ends_before_) {
+      return guard.ended_safe.load(std::memory_order_relaxed) ? GuardEnd::ended : GuardEnd::insisting;
+    }
+    ::poll(nullptr, 0, looks_every_ms);
   }
-  return handed_over ? GuardEnd::insisting : GuardEnd::failed;
+  return handed_over && alive() ? GuardEnd::insisting : GuardEnd::failed;
 }
 
 }  // namespace abs_hil::guardian

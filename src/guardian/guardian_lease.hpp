@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "driver/file_descriptor.hpp"
@@ -19,22 +20,26 @@ class GuardianLease final : public Guard {
   [[nodiscard]] static std::unique_ptr<GuardianLease> ask(const std::string& socket, const std::string& board);
   ~GuardianLease() override;
 
-  /// What the service is to guard from the next `arm` on. `region` must outlive this object, or the next `cover`.
-  void cover(SharedRegion& region, std::string launch_config_json);
+  /// What the service is to guard from the next `arm` on. `recorder` must outlive this object, or the next `cover`.
+  void cover(const SharedRecorder& recorder, std::string launch_config_json);
 
   void arm(const runtime::Scheduling& controller) override;
   [[nodiscard]] bool alive() const noexcept override;
   [[nodiscard]] bool armed() const noexcept override { return armed_; }
   [[nodiscard]] pid_t pid() const noexcept override { return service_.pid; }
-  GuardEnd end() noexcept override;
+  GuardEnd end(Stage stage = Stage::closed) noexcept override;
+  [[nodiscard]] Pages& pages() noexcept override { return *pages_; }
 
  private:
-  explicit GuardianLease(driver::FileDescriptor socket)
-      : socket_(std::move(socket)), service_(peer_of(socket_.get())) {}
+  explicit GuardianLease(driver::FileDescriptor socket);
 
   driver::FileDescriptor socket_;
   Peer service_;
+  driver::FileDescriptor guard_process_{-1};  ///< -1: not visible from here, as in a container
+  std::optional<Pages> pages_{};
+  const SharedRecorder* recorder_{nullptr};
   std::string launch_config_{};
+  std::uint32_t ends_before_{0};  ///< of the guard's page
   bool armed_{false};
 };
 

@@ -90,10 +90,8 @@ std::string guardian_program() {
   return beside.string();
 }
 
-GuardianProcess::GuardianProcess(SharedRegion& region, std::string program, std::string launch_config_json)
-    : program_(std::move(program)), launch_config_(std::move(launch_config_json)) {
-  region_ = &region;
-}
+GuardianProcess::GuardianProcess(const SharedRecorder& recorder, std::string program, std::string launch_config_json)
+    : recorder_(recorder), program_(std::move(program)), launch_config_(std::move(launch_config_json)) {}
 
 GuardianProcess::~GuardianProcess() { static_cast<void>(end()); }
 
@@ -113,18 +111,23 @@ void GuardianProcess::start() {
   if (::pipe2(pipe.data(), O_CLOEXEC) != 0) refuse_for("cannot open a pipe", errno);
   ready_ = pipe[0];
   const HighDescriptor ready(pipe[1], true);
-  const HighDescriptor region(region_->descriptor(), false);
+  reset_page();
+  const HighDescriptor recorder(recorder_.descriptor(), false);
+  const HighDescriptor run_page(pages_.descriptors().run, false);
+  const HighDescriptor guard_page(pages_.descriptors().guard, false);
   const HighDescriptor controller(open_pidfd(::getpid()), true);
   const HighDescriptor launch_config(text_in_memory(launch_config_), true);
 
   SpawnSetUp set_up;
-  for (const auto& [from, to] : {std::pair(region.get(), inherited_region),
+  for (const auto& [from, to] : {std::pair(recorder.get(), inherited_recorder),
                                  {controller.get(), inherited_controller},
                                  {ready.get(), inherited_ready},
-                                 {launch_config.get(), inherited_launch_config}}) {
+                                 {launch_config.get(), inherited_launch_config},
+                                 {run_page.get(), inherited_run_page},
+                                 {guard_page.get(), inherited_guard_page}}) {
     posix_spawn_file_actions_adddup2(&set_up.actions, from, to);
   }
-  posix_spawn_file_actions_addclosefrom_np(&set_up.actions, inherited_launch_config + 1);
+  posix_spawn_file_actions_addclosefrom_np(&set_up.actions, inherited_guard_page + 1);
   std::string name = program_;
   std::array<char*, 2> arguments{name.data(), nullptr};
   const int error =
@@ -171,24 +174,13 @@ runtime::Scheduling GuardianProcess::wait_until_ready() {
   return has;
 }
 
-bool GuardianProcess::ended_within(int timeout_ms) const noexcept {
-  pollfd ended{pidfd_, POLLIN, 0};
-  int ready = 0;
-  do {
-    ready = ::poll(&ended, 1, timeout_ms);
-  } while (ready < 0 && errno == EINTR);
-  return ready > 0;
-}
+bool GuardianProcess::alive() const noexcept { return pid_ == 0 || !has_ended(pidfd_); }
 
-bool GuardianProcess::alive() const noexcept { return pid_ == 0 || !ended_within(0); }
-
-GuardEnd GuardianProcess::end() noexcept {
+GuardEnd GuardianProcess::end(Stage stage) noexcept {
   if (ready_ >= 0) ::close(std::exchange(ready_, -1));
   if (pid_ == 0) return GuardEnd::none;
-  const bool handed_over = region_->stage() == Stage::handed_over;
-  // `handed_over` must stay: a delayed guardian has to read it, however late.
-  if (!handed_over) region_->set_stage(Stage::closed);
-  const bool ended = ended_within(ends_within_ms);
+  const bool handed_over = close_page(stage);
+  const bool ended = has_ended(pidfd_, ends_within_ms);
   GuardEnd how = GuardEnd::insisting;
   if (!ended && !handed_over)
     ::kill(pid_, SIGKILL);  // the guardian is stopped or hung, and the outputs are already safe

@@ -12,10 +12,12 @@ namespace abs_hil::guardian {
 /// The file descriptors that the guardian inherits. Besides these it has only stdin, stdout (both /dev/null) and
 /// stderr.
 enum InheritedDescriptor : int {
-  inherited_region = 3,      ///< SharedRegion
+  inherited_recorder = 3,    ///< SharedRecorder
   inherited_controller = 4,  ///< pidfd of the controller
   inherited_ready = 5,  ///< pipe to the controller: the guardian writes once what `ready_text` makes, or "error WHAT"
   inherited_launch_config = 6,  ///< LaunchConfig as JSON, read from offset 0
+  inherited_run_page = 7,       ///< both of Pages
+  inherited_guard_page = 8,
 };
 
 /// What a guardian that stands by tells its controller.
@@ -28,9 +30,9 @@ enum InheritedDescriptor : int {
 /// of the terminal does not reach it.
 class GuardianProcess final : public Guard {
  public:
-  /// @param region  must outlive this object
+  /// @param recorder  must outlive this object
   /// @param launch_config_json  LaunchConfig as JSON (`to_json`)
-  GuardianProcess(SharedRegion& region, std::string program, std::string launch_config_json);
+  GuardianProcess(const SharedRecorder& recorder, std::string program, std::string launch_config_json);
   /// Calls end() unless the caller did.
   ~GuardianProcess() override;
 
@@ -39,14 +41,16 @@ class GuardianProcess final : public Guard {
   [[nodiscard]] bool alive() const noexcept override;
   [[nodiscard]] bool armed() const noexcept override { return pid_ != 0; }
   [[nodiscard]] pid_t pid() const noexcept override { return pid_; }
-  GuardEnd end() noexcept override;
+  GuardEnd end(Stage stage = Stage::closed) noexcept override;
+  [[nodiscard]] Pages& pages() noexcept override { return pages_; }
 
  private:
   void start();
   /// Returns what the guardian has of the real-time set-up.
   [[nodiscard]] runtime::Scheduling wait_until_ready();
-  [[nodiscard]] bool ended_within(int timeout_ms) const noexcept;
 
+  const SharedRecorder& recorder_;
+  Pages pages_{};
   std::string program_;
   std::string launch_config_;
   pid_t pid_{0};

@@ -1,4 +1,5 @@
-#include "guardian/guardian_loop.hpp"
+#include "guardian/guardian_report.hpp"
+
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::guardian {

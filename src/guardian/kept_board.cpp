@@ -37,8 +37,12 @@ std::string kept_board(const driver::DriverOptions& options) {
   return text;
 }
 
-std::unique_ptr<driver::SafeStateWriter> safe_state_writer_of(const driver::DriverOptions& options) {
-  return driver::make_safe_state_writer(options);
+std::unique_ptr<driver::SafeStateWriter> safe_state_writer_of(const driver::DriverOptions& options,
+                                                              bool beside_guardian) {
+  const driver::ChosenBackend chosen = driver::chosen_backend(options);
+  driver::RunFacts facts = options.facts();
+  facts.beside_guardian = beside_guardian;
+  return chosen.entry.make_safe_state_writer(chosen.options, facts);
 }
 
 }  // namespace abs_hil::guardian

@@ -11,7 +11,9 @@ namespace abs_hil::guardian {
 /// text.
 [[nodiscard]] std::string kept_board(const driver::DriverOptions& options);
 
-/// The writer of that board's safe state. Throws driver::Unavailable for a kind without one.
-[[nodiscard]] std::unique_ptr<driver::SafeStateWriter> safe_state_writer_of(const driver::DriverOptions& options);
+/// The writer of that board's safe state. @param beside_guardian  it works although a guardian keeps the board. Throws
+/// driver::Unavailable for a kind without one.
+[[nodiscard]] std::unique_ptr<driver::SafeStateWriter> safe_state_writer_of(const driver::DriverOptions& options,
+                                                                            bool beside_guardian = false);
 
 }  // namespace abs_hil::guardian

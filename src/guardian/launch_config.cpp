@@ -3,6 +3,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "rig/parse_json.hpp"
+
 namespace abs_hil::guardian {
 
 std::string to_json(const LaunchConfig& config) {
@@ -15,7 +17,7 @@ std::string to_json(const LaunchConfig& config) {
 }
 
 LaunchConfig parse_launch_config(const std::string& json) try {
-  const nlohmann::json object = nlohmann::json::parse(json);
+  const nlohmann::json object = rig::parse_json(json);
   return {.config_json = object.at("config_json"),
           .experiment = object.at("experiment"),
           .controller = object.at("controller"),

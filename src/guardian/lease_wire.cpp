@@ -1,5 +1,6 @@
 #include "guardian/lease_wire.hpp"
 
+#include <fcntl.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -14,7 +15,7 @@ namespace abs_hil::guardian {
 
 namespace {
 
-constexpr std::uint32_t lease_magic = 0x6C656131;  // a later protocol has another number
+constexpr std::uint32_t lease_magic = 0x6C656132;  // a later protocol has another number
 constexpr std::size_t longest_text = 60'000;
 constexpr std::size_t most_files = 4;
 
@@ -127,8 +128,10 @@ int listen_at(const std::string& path) {
   if (!address_of(path, address)) return -1;
   const int fd = new_socket();
   if (fd < 0) return -1;
-  constexpr int waiting = 8;
-  if (::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 || ::listen(fd, waiting) != 0) {
+  constexpr int waiting = 64;
+  const bool listens = ::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 &&
+                       ::listen(fd, waiting) == 0 && ::fcntl(fd, F_SETFL, O_NONBLOCK) == 0;
+  if (!listens) {
     return closed_with_errno(fd);
   }
   return fd;

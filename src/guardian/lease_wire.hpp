@@ -17,26 +17,26 @@ namespace abs_hil::guardian {
 ///
 ///     controller                                     service
 ///     ask     text: the board; its pidfd      ->
-///                                             <-     granted, or refused with the reason in text
-///     cover   shared memory, launch config    ->             the service now guards the outputs
+///                                             <-     granted with both pages, or refused with the reason in text
+///     cover   flight recorder, launch config  ->             the guard now watches the run
 ///                                             <-     ready   with its scheduling, text: what it lacks; or refused
-///     (stage closed, in the shared memory)           the controller is done
-///                                             <-     ended   safe: verified
+///     (stage closed, in the run's page)                      the controller is done
+///     (ends, in the guard's page)                            the guard has read the board back
 ///
-/// `cover` to `ended` may be repeated. The lease ends when the controller's process ends or its socket closes.
+/// `cover` to `ends` may be repeated. The lease ends when the controller's process ends or its socket closes.
 ///
-/// Whoever may connect may also ask for other things, at any time, also while a run has the lease:
+/// Every process that may connect may also ask for other things, at any time, also while a run has the lease:
 ///
 ///     state                                   ->
 ///     make_safe  text: names of the board, one a line
 ///                                             ->             the service ends the lease and makes the outputs safe
 ///                                             <-     answer  safe: verified, text: who has, or had, the lease
-enum class LeaseWord : std::uint32_t { ask = 1, granted, refused, cover, ready, ended, state, make_safe, answer };
+enum class LeaseWord : std::uint32_t { ask = 1, granted, refused, cover, ready, state, make_safe, answer };
 
 struct LeaseMessage {
   LeaseWord word{LeaseWord::ask};
   runtime::Scheduling scheduling{};  ///< of `ready`
-  bool safe{false};                  ///< of `ended`, `answer`
+  bool safe{false};                  ///< of `answer`
   std::string text{};                ///< at most 60,000 characters are sent
   std::vector<driver::FileDescriptor> files{};
 };

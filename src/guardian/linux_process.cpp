@@ -21,22 +21,47 @@ int open_pidfd(pid_t process) noexcept {
   return static_cast<int>(::syscall(SYS_pidfd_open, process, no_flags));
 }
 
-bool LinuxProcess::gone_by(std::int64_t time_ns) noexcept {
-  runtime::MonotonicClock clock;
-  for (;;) {
-    const std::int64_t left_ns = std::max<std::int64_t>(0, time_ns - clock.now_ns());
-    const timespec left{.tv_sec = static_cast<time_t>(left_ns / rig::ns_per_s), .tv_nsec = left_ns % rig::ns_per_s};
-    pollfd ended{pidfd_, POLLIN, 0};
-    const int ready = ::ppoll(&ended, 1, &left, nullptr);
-    if (ready > 0) return true;  // POLLIN: the process has ended. POLLNVAL: there is no process to guard
-    if (ready == 0 || errno != EINTR) return false;
-  }
+int LinuxProcesses::open(pid_t pid) noexcept {
+  const int pidfd = open_pidfd(pid);
+  if (pidfd < 0 || send_signal(pidfd, 0)) return pidfd;
+  ::close(pidfd);
+  return -1;
 }
 
-void LinuxProcess::end() noexcept { static_cast<void>(send_signal(pidfd_, SIGKILL)); }
+void LinuxProcesses::close(int handle) noexcept { ::close(handle); }
+
+bool LinuxProcesses::gone(int handle) noexcept { return has_ended(handle); }
+
+void LinuxProcesses::end(int handle) noexcept { static_cast<void>(send_signal(handle, SIGKILL)); }
+
+bool has_ended(int pidfd, int timeout_ms) noexcept {
+  pollfd ended{pidfd, POLLIN, 0};
+  int ready = 0;
+  do {
+    ready = ::poll(&ended, 1, timeout_ms);  // POLLNVAL: there is no process
+  } while (ready < 0 && errno == EINTR);
+  return ready > 0;
+}
+
+void wait_for_guard(const BoardGuard& guard, int orders) noexcept {
+  runtime::MonotonicClock clock;
+  const std::int64_t left_ns = std::max<std::int64_t>(0, guard.next_ns() - clock.now_ns());
+  const timespec left{.tv_sec = static_cast<time_t>(left_ns / rig::ns_per_s), .tv_nsec = left_ns % rig::ns_per_s};
+  std::array<pollfd, 2> files{pollfd{orders, POLLIN, 0}, pollfd{guard.holder(), POLLIN, 0}};
+  static_cast<void>(::ppoll(files.data(), files.size(), &left, nullptr));
+}
 
 bool send_signal(int pidfd, int signal) noexcept {
   return ::syscall(SYS_pidfd_send_signal, pidfd, signal, nullptr, 0) == 0;
+}
+
+std::string name_of_process(pid_t pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/comm");
+  std::string name;
+  std::getline(file, name);
+  // A process chooses its name: it must not write lines of ours.
+  std::erase_if(name, [](unsigned char c) { return c < 0x20 || c >= 0x7F; });
+  return "process " + std::to_string(pid) + (name.empty() ? "" : " (" + name + ")");
 }
 
 pid_t process_of(int pidfd) {
@@ -59,7 +84,7 @@ int text_in_memory(const std::string& text) {
 }
 
 std::string text_behind(int fd) {
-  constexpr std::size_t longest = std::size_t{16} << 20U;
+  constexpr std::size_t longest = std::size_t{1} << 20U;
   std::string text;
   std::array<char, 4096> part{};
   for (ssize_t got = 0;

@@ -4,21 +4,17 @@
 
 #include <string>
 
-#include "guardian/guardian_loop.hpp"
+#include "guardian/board_guard.hpp"
 
 namespace abs_hil::guardian {
 
-/// A process identified by a pidfd. A pidfd never refers to another process, even when the process id is reused.
-class LinuxProcess final : public ControllerProcess {
+/// Processes identified by pidfds. A pidfd never refers to another process, even when the process id is reused.
+class LinuxProcesses final : public Processes {
  public:
-  /// @param pidfd  the caller keeps ownership
-  explicit LinuxProcess(int pidfd) noexcept : pidfd_(pidfd) {}
-
-  [[nodiscard]] bool gone_by(std::int64_t time_ns) noexcept override;
-  void end() noexcept override;
-
- private:
-  int pidfd_;
+  [[nodiscard]] int open(pid_t pid) noexcept override;
+  void close(int handle) noexcept override;
+  [[nodiscard]] bool gone(int handle) noexcept override;
+  void end(int handle) noexcept override;
 };
 
 /// Opens a pidfd of a process; -1 and errno on failure.
@@ -27,10 +23,26 @@ class LinuxProcess final : public ControllerProcess {
 [[nodiscard]] pid_t process_of(int pidfd);
 /// Sends a signal through a pidfd; signal 0 only asks whether this process may. False and errno on failure.
 [[nodiscard]] bool send_signal(int pidfd, int signal) noexcept;
+/// True once the process behind the pidfd has ended, `timeout_ms` later at the latest.
+[[nodiscard]] bool has_ended(int pidfd, int timeout_ms = 0) noexcept;
+/// "process 17 (abs_hil)"
+[[nodiscard]] std::string name_of_process(pid_t pid);
+
+/// Sleeps until the guard wants to look, or there is an order, or the holder has ended. `orders` may be -1.
+void wait_for_guard(const BoardGuard& guard, int orders) noexcept;
+/// Runs the guard until it is over. `between` is called after each look.
+template <class Between>
+void run_guard(BoardGuard& guard, int orders, Between between) {
+  while (!guard.over()) {
+    guard.look();
+    between();
+    if (!guard.over()) wait_for_guard(guard, orders);
+  }
+}
 
 /// A file in memory that holds the text; -1 and errno on failure.
 [[nodiscard]] int text_in_memory(const std::string& text);
-/// The text of such a file, from its start, at most 16 MB.
+/// The text of such a file, from its start, at most 1 MB.
 [[nodiscard]] std::string text_behind(int fd);
 
 }  // namespace abs_hil::guardian

@@ -7,81 +7,118 @@
 
 #include <cerrno>
 #include <new>
-#include <span>
 #include <stdexcept>
+#include <string>
 #include <system_error>
+
+#ifndef F_SEAL_FUTURE_WRITE
+#define F_SEAL_FUTURE_WRITE 0x0010  // Linux 5.1
+#endif
 
 namespace abs_hil::guardian {
 
 namespace {
 
-constexpr std::uint64_t region_magic = 0x6E61'6964'7261'7567;  // "guardian"
+constexpr std::uint64_t recorder_magic = 0x6E61'6964'7261'7567;  // "guardian"
+constexpr std::uint64_t layout = std::uint64_t{sizeof(RunPage)} << 48U | std::uint64_t{sizeof(GuardPage)} << 32U |
+                                 std::uint64_t{sizeof(runtime::FlightSlot)};
 
 [[noreturn]] void fail(const char* what) {
   throw std::system_error(errno, std::generic_category(), std::string("guardian: shared memory: ") + what);
 }
 
+/// Size of sealed memory behind a descriptor; 0 for anything else.
+std::size_t sealed_bytes(int fd) noexcept {
+  struct stat status {};
+  const int seals = ::fcntl(fd, F_GET_SEALS);
+  if (seals < 0 || (seals & F_SEAL_SHRINK) == 0 || ::fstat(fd, &status) != 0 || status.st_size <= 0) return 0;
+  return static_cast<std::size_t>(status.st_size);
+}
+
 }  // namespace
 
-std::size_t SharedRegion::bytes_for(std::size_t slots) noexcept {
+SharedMemory::SharedMemory(std::size_t bytes)
+    : fd_(::memfd_create("abs_hil run", MFD_CLOEXEC | MFD_ALLOW_SEALING)), bytes_(bytes) {
+  if (fd_.get() < 0) fail("cannot be made");
+  if (::ftruncate(fd_.get(), static_cast<off_t>(bytes)) != 0 ||
+      ::fcntl(fd_.get(), F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW) != 0) {
+    fail("cannot be sized");
+  }
+  map(fd_.get(), Access::write);
+}
+
+SharedMemory::SharedMemory(int fd, std::size_t bytes, Access access) : bytes_(bytes) {
+  if (sealed_bytes(fd) != bytes) {
+    throw std::runtime_error(
+        "guardian: the descriptor given is not the shared memory of a run of this build; install abs_hil and "
+        "abs_guardian of one build");
+  }
+  map(fd, access);
+}
+
+void SharedMemory::map(int fd, Access access) {
+  const int protection = access == Access::write ? PROT_READ | PROT_WRITE : PROT_READ;
+  // MAP_POPULATE: the cycle's first lap around the recorder must not cause page faults.
+  void* const memory = ::mmap(nullptr, bytes_, protection, MAP_SHARED | MAP_POPULATE, fd, 0);
+  if (memory == MAP_FAILED) fail("cannot be mapped");
+  data_ = memory;
+}
+
+bool SharedMemory::refuse_further_writers() const noexcept {
+  return ::fcntl(fd_.get(), F_ADD_SEALS, F_SEAL_FUTURE_WRITE | F_SEAL_SEAL) == 0;
+}
+
+SharedMemory::~SharedMemory() {
+  if (data_ != nullptr) ::munmap(data_, bytes_);
+}
+
+Pages::Pages() : run_(sizeof(RunPage)), guard_(sizeof(GuardPage)) {
+  new (run_.data()) RunPage;
+  new (guard_.data()) GuardPage;
+}
+
+Pages Pages::as_guard(const Descriptors& pages) {
+  using Access = SharedMemory::Access;
+  return {SharedMemory(pages.run, sizeof(RunPage), Access::read),
+          SharedMemory(pages.guard, sizeof(GuardPage), Access::write)};
+}
+
+Pages Pages::as_run(const Descriptors& pages) {
+  using Access = SharedMemory::Access;
+  return {SharedMemory(pages.run, sizeof(RunPage), Access::write),
+          SharedMemory(pages.guard, sizeof(GuardPage), Access::read)};
+}
+
+std::size_t SharedRecorder::bytes_for(std::size_t slots) noexcept {
   return sizeof(Header) + slots * sizeof(runtime::FlightSlot);
 }
 
-std::uint64_t SharedRegion::expected_layout() noexcept {
-  return std::uint64_t{sizeof(Header)} << 32U | sizeof(runtime::FlightSlot);
+SharedRecorder::SharedRecorder(SharedMemory memory, std::size_t slots) : memory_(std::move(memory)) {
+  auto* const first = reinterpret_cast<runtime::FlightSlot*>(static_cast<Header*>(memory_.data()) + 1);
+  ring_ = runtime::FlightRing({first, slots});
 }
 
-runtime::FlightSlot* SharedRegion::first_slot() const noexcept {
-  return reinterpret_cast<runtime::FlightSlot*>(header_ + 1);
+SharedRecorder::SharedRecorder(std::size_t slots) : SharedRecorder(SharedMemory(bytes_for(slots)), slots) {
+  auto* const header = new (memory_.data()) Header{.magic = recorder_magic, .layout = layout, .slots = slots};
+  auto* const first = reinterpret_cast<runtime::FlightSlot*>(header + 1);
+  for (std::size_t i = 0; i < slots; ++i) new (first + i) runtime::FlightSlot;
 }
 
-void SharedRegion::map(std::size_t bytes) {
-  // MAP_POPULATE: the cycle's first lap around the recorder must not cause page faults.
-  void* const memory = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, fd_, 0);
-  if (memory == MAP_FAILED) fail("cannot be mapped");
-  bytes_ = bytes;
-  header_ = static_cast<Header*>(memory);
-}
-
-SharedRegion::SharedRegion(std::size_t slots) : fd_(::memfd_create("abs_hil run", MFD_CLOEXEC | MFD_ALLOW_SEALING)) {
-  if (fd_ < 0) fail("cannot be made");
-  const std::size_t bytes = bytes_for(slots);
-  // Sealed: neither process can shrink the memory that the other one uses.
-  if (::ftruncate(fd_, static_cast<off_t>(bytes)) != 0 ||
-      ::fcntl(fd_, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) != 0) {
-    const int error = errno;
-    ::close(fd_);
-    errno = error;
-    fail("cannot be sized");
+SharedRecorder SharedRecorder::attach(int fd) {
+  const std::size_t bytes = sealed_bytes(fd);
+  if (bytes < bytes_for(1) || bytes > most_bytes) {
+    throw std::runtime_error("guardian: the descriptor given is not the flight recorder of a run");
   }
-  map(bytes);
-  new (header_) Header{.magic = region_magic, .layout = expected_layout(), .slots = slots};
-  for (std::size_t i = 0; i < slots; ++i) new (first_slot() + i) runtime::FlightSlot;
-  recorder_ = runtime::FlightRing({first_slot(), slots});
-}
-
-SharedRegion::SharedRegion(Inherited inherited) : fd_(inherited.fd), owns_fd_(false) {
-  struct stat status {};
-  if (::fstat(fd_, &status) != 0) fail("no such descriptor");
-  const auto bytes = static_cast<std::size_t>(status.st_size);
-  const int seals = ::fcntl(fd_, F_GET_SEALS);
-  if (bytes < sizeof(Header) || seals < 0 || (seals & F_SEAL_SHRINK) == 0) {
-    throw std::runtime_error("guardian: the descriptor given is not the shared memory of a run");
-  }
-  map(bytes);
-  if (header_->magic != region_magic || header_->layout != expected_layout() || header_->slots == 0 ||
-      bytes != bytes_for(header_->slots)) {
-    ::munmap(header_, bytes_);
+  SharedMemory memory(fd, bytes, SharedMemory::Access::read);
+  // Read once: the other process may still write it.
+  const Header header = *static_cast<const Header*>(memory.data());
+  if (header.magic != recorder_magic || header.layout != layout || header.slots > most_bytes ||
+      bytes != bytes_for(header.slots)) {
     throw std::runtime_error(
-        "guardian: the shared memory comes from another build of abs_hil; install abs_hil and abs_guardian of one "
+        "guardian: the flight recorder comes from another build of abs_hil; install abs_hil and abs_guardian of one "
         "build");
   }
-  recorder_ = runtime::FlightRing({first_slot(), header_->slots});
-}
-
-SharedRegion::~SharedRegion() {
-  if (header_ != nullptr) ::munmap(header_, bytes_);
-  if (owns_fd_ && fd_ >= 0) ::close(fd_);
+  return {std::move(memory), header.slots};
 }
 
 }  // namespace abs_hil::guardian

@@ -1,69 +1,107 @@
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
-#include "runtime/flight_ring.hpp"
-#include "runtime/heartbeat.hpp"
+#include "driver/file_descriptor.hpp"
+#include "guardian/heartbeat.hpp"
 
 namespace abs_hil::guardian {
 
-/// State of the run's outputs, as the controller tells its guardian.
-enum class Stage : std::uint32_t {
-  guarded = 0,   ///< the controller may drive the outputs
-  released = 1,  ///< the controller has brought the outputs into the safe state and verified it
-  handed_over =
-      2,       ///< the controller could not verify the safe state and leaves it to the guardian: it writes zeros only
-  closed = 3,  ///< the run is over and its files are written; never after handed_over
-  making_safe = 4,  ///< the controller waits for the board to confirm the safe state, which may take seconds
-};
-
-/// Memory of one run that controller and guardian share: heartbeat counters and flight recorder. It lives until both
-/// processes have ended. It contains no lock.
-class SharedRegion {
+/// Memory that two processes share through a descriptor. It is sealed: neither can shrink it under the other.
+class SharedMemory {
  public:
-  /// Creates the memory. Throws std::system_error.
-  /// @param slots  slots of the flight recorder, >= 1
-  explicit SharedRegion(std::size_t slots);
-  /// Maps the memory behind an inherited descriptor; the caller keeps the descriptor. Throws std::runtime_error if the
-  /// descriptor is not such memory, or if another build created it.
-  [[nodiscard]] static SharedRegion attach(int fd) { return SharedRegion(Inherited{fd}); }
-  SharedRegion(const SharedRegion&) = delete;
-  SharedRegion& operator=(const SharedRegion&) = delete;
-  ~SharedRegion();
+  enum class Access : std::uint8_t { read, write };
 
-  [[nodiscard]] int descriptor() const noexcept { return fd_; }
-  [[nodiscard]] runtime::HeartbeatPanel& panel() noexcept { return header_->panel; }
-  [[nodiscard]] runtime::FlightRing& recorder() noexcept { return recorder_; }
-  [[nodiscard]] const runtime::FlightRing& recorder() const noexcept { return recorder_; }
-  [[nodiscard]] Stage stage() const noexcept { return header_->stage.load(std::memory_order_acquire); }
-  void set_stage(Stage stage) noexcept { header_->stage.store(stage, std::memory_order_release); }
+  SharedMemory() = default;
+  /// New memory of zeros. Throws std::system_error.
+  explicit SharedMemory(std::size_t bytes);
+  /// Maps what stands behind a descriptor, which the caller keeps. Throws std::runtime_error unless it is sealed memory
+  /// of exactly `bytes` bytes: whoever sent it cannot make this process map more.
+  SharedMemory(int fd, std::size_t bytes, Access access);
+  SharedMemory(SharedMemory&& other) noexcept { swap(other); }
+  SharedMemory& operator=(SharedMemory&& other) noexcept {
+    SharedMemory moved(std::move(other));
+    swap(moved);
+    return *this;
+  }
+  SharedMemory(const SharedMemory&) = delete;
+  SharedMemory& operator=(const SharedMemory&) = delete;
+  ~SharedMemory();
+
+  /// From now on nobody can map it for writing; mappings that exist stay writable. False if the kernel cannot do it.
+  [[nodiscard]] bool refuse_further_writers() const noexcept;
+  [[nodiscard]] int descriptor() const noexcept { return fd_.get(); }
+  [[nodiscard]] void* data() const noexcept { return data_; }
 
  private:
-  struct Inherited {
-    int fd;
+  void map(int fd, Access access);
+  void swap(SharedMemory& other) noexcept {
+    std::swap(fd_, other.fd_);
+    std::swap(data_, other.data_);
+    std::swap(bytes_, other.bytes_);
+  }
+
+  driver::FileDescriptor fd_{-1};  ///< of memory that this object made
+  void* data_{nullptr};
+  std::size_t bytes_{0};
+};
+
+/// The pages of one run and its guard. Each side writes one of them.
+class Pages {
+ public:
+  /// Makes both. Throws std::system_error.
+  Pages();
+  struct Descriptors {
+    int run{-1};
+    int guard{-1};
   };
+  /// Maps the pages of another process as the guard (it writes the guard's page) or as the run. Throws
+  /// std::runtime_error.
+  [[nodiscard]] static Pages as_guard(const Descriptors& pages);
+  [[nodiscard]] static Pages as_run(const Descriptors& pages);
+
+  [[nodiscard]] RunPage& run() const noexcept { return *static_cast<RunPage*>(run_.data()); }
+  [[nodiscard]] GuardPage& guard() const noexcept { return *static_cast<GuardPage*>(guard_.data()); }
+  /// Of pages that this object made.
+  [[nodiscard]] Descriptors descriptors() const noexcept { return {run_.descriptor(), guard_.descriptor()}; }
+  [[nodiscard]] bool refuse_further_writers() const noexcept { return guard_.refuse_further_writers(); }
+
+ private:
+  Pages(SharedMemory run, SharedMemory guard) : run_(std::move(run)), guard_(std::move(guard)) {}
+
+  SharedMemory run_;
+  SharedMemory guard_;
+};
+
+/// The flight recorder's memory. The run writes it; its guardian reads it after a fault.
+class SharedRecorder {
+ public:
+  /// The longest recorder that a guardian maps, bytes.
+  static constexpr std::size_t most_bytes = std::size_t{64} << 20U;
+
+  /// Throws std::system_error. @param slots  >= 1
+  explicit SharedRecorder(std::size_t slots);
+  /// Maps the recorder of another process for reading; the caller keeps the descriptor. Throws std::runtime_error if
+  /// there is none behind it, or one of another build.
+  [[nodiscard]] static SharedRecorder attach(int fd);
+
+  [[nodiscard]] int descriptor() const noexcept { return memory_.descriptor(); }
+  [[nodiscard]] runtime::FlightRing& ring() noexcept { return ring_; }
+  [[nodiscard]] const runtime::FlightRing& ring() const noexcept { return ring_; }
+
+ private:
   struct Header {
     std::uint64_t magic{0};
     std::uint64_t layout{0};  ///< sizes of all shared types; builds with different sizes do not fit together
     std::uint64_t slots{0};
-    std::atomic<Stage> stage{Stage::guarded};
-    runtime::HeartbeatPanel panel{};
   };
-  static_assert(std::atomic<Stage>::is_always_lock_free);
-
-  explicit SharedRegion(Inherited inherited);
-  void map(std::size_t bytes);
+  SharedRecorder(SharedMemory memory, std::size_t slots);
   [[nodiscard]] static std::size_t bytes_for(std::size_t slots) noexcept;
-  [[nodiscard]] static std::uint64_t expected_layout() noexcept;
-  [[nodiscard]] runtime::FlightSlot* first_slot() const noexcept;
 
-  int fd_{-1};
-  bool owns_fd_{true};
-  std::size_t bytes_{0};
-  Header* header_{nullptr};
-  runtime::FlightRing recorder_{{}};
+  SharedMemory memory_;
+  runtime::FlightRing ring_{{}};
 };
 
 }  // namespace abs_hil::guardian

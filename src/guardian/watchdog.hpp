@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "abs_hil/rig/reason.hpp"
-#include "guardian/shared_region.hpp"
+#include "guardian/heartbeat.hpp"
 
 namespace abs_hil::guardian {
 
@@ -37,6 +37,9 @@ class Watchdog {
   Watchdog(std::int64_t timeout_ns, std::int64_t look_period_ns, std::int64_t making_safe_ns = 0) noexcept
       : timeout_ns_(timeout_ns), look_period_ns_(look_period_ns), making_safe_ns_(making_safe_ns) {}
 
+  /// A run that waits for a whole second begins its first cycle within this time, ns.
+  static constexpr std::int64_t first_beat_ns = 10'000'000'000;
+
   [[nodiscard]] Verdict look(const HeartbeatReading& reading) noexcept;
   /// Why the safe state is needed; `none` as long as it is not. Also set if the controller died after it had released
   /// its outputs and before its files were written.
@@ -48,11 +51,13 @@ class Watchdog {
 
  private:
   void measure_silence(const HeartbeatReading& reading) noexcept;
+  /// Longest silence at this stage.
+  [[nodiscard]] std::int64_t patience_ns(const HeartbeatReading& reading) const noexcept;
 
   std::int64_t timeout_ns_;
   std::int64_t look_period_ns_;
   std::int64_t making_safe_ns_;
-  std::int64_t last_look_ns_{0};
+  std::int64_t last_look_ns_{-1};  ///< < 0: not looked yet
   std::uint64_t last_beats_{0};
   std::int64_t silence_ns_{0};
   std::int64_t asked_back_ns_{0};  ///< time since the controller was asked to give the outputs back

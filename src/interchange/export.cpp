@@ -1,7 +1,6 @@
 #include "interchange/export.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 #include <zip.h>
 
 #include <array>
@@ -13,6 +12,8 @@
 #include <sstream>
 #include <stdexcept>
 #include <type_traits>
+
+#include "files/result_file.hpp"
 
 namespace abs_hil::interchange {
 
@@ -188,16 +189,12 @@ std::string start_values(const fmu::Model& model) {
 /// A zip archive that is discarded unless `close` succeeds.
 class Archive {
  public:
-  explicit Archive(const fs::path& path) : path_(path) {
-    int error = 0;
-    archive_.reset(zip_open(path.c_str(), ZIP_CREATE | ZIP_TRUNCATE, &error));
+  Archive() {
+    zip_source_keep(content_.get());  // the archive frees it too
+    archive_.reset(zip_open_from_source(content_.get(), ZIP_TRUNCATE, nullptr));
     if (archive_) return;
-    zip_error_t reason;
-    zip_error_init_with_code(&reason, error);
-    const std::string text = zip_error_strerror(&reason);
-    zip_error_fini(&reason);
-    throw std::runtime_error(
-        fmt::format("cannot write \"{}\": {}; give a path in an existing, writable directory", path.string(), text));
+    zip_source_free(content_.get());
+    fail("no memory");
   }
   /// @param text  must live until `close`
   void add(const std::string& name, const std::string& text) {
@@ -206,22 +203,32 @@ class Archive {
   void add_file(const std::string& name, const fs::path& file) {
     add(name, zip_source_file(archive_.get(), file.c_str(), 0, -1));
   }
-  void close() {
+  /// The bytes of the archive, once.
+  [[nodiscard]] std::string close() {
     zip_t* archive = archive_.release();
-    if (zip_close(archive) == 0) return;
-    const std::string text = zip_strerror(archive);
-    zip_discard(archive);
-    throw std::runtime_error(
-        fmt::format("cannot write \"{}\": {}; give a path in an existing, writable directory", path_.string(), text));
+    if (zip_close(archive) != 0) {
+      const std::string text = zip_strerror(archive);
+      zip_discard(archive);
+      fail(text);
+    }
+    zip_stat_t facts;
+    if (zip_source_stat(content_.get(), &facts) != 0 || zip_source_open(content_.get()) != 0) fail("cannot be read");
+    std::string bytes(facts.size, '\0');
+    const zip_int64_t read = zip_source_read(content_.get(), bytes.data(), bytes.size());
+    zip_source_close(content_.get());
+    if (read != static_cast<zip_int64_t>(bytes.size())) fail("cannot be read");
+    return bytes;
   }
 
  private:
+  [[noreturn]] static void fail(const std::string& why) { throw std::runtime_error("the FMU's archive: " + why); }
   void add(const std::string& name, zip_source_t* source) {
     if (source != nullptr && zip_file_add(archive_.get(), name.c_str(), source, ZIP_FL_ENC_UTF_8) >= 0) return;
     if (source != nullptr) zip_source_free(source);
     throw std::runtime_error(fmt::format("{}: {}", name, zip_strerror(archive_.get())));
   }
-  fs::path path_;
+  std::unique_ptr<zip_source_t, decltype(&zip_source_free)> content_{zip_source_buffer_create(nullptr, 0, 0, nullptr),
+                                                                     zip_source_free};
   std::unique_ptr<zip_t, decltype(&zip_discard)> archive_{nullptr, zip_discard};
 };
 
@@ -270,32 +277,24 @@ std::string model_description(const FmuExport& what, const fmu::Model& model) {
 std::string write_fmu(const FmuExport& what, const fmu::Model& model, const fs::path& path) {
   const std::string description = model_description(what, model);
   const std::string start = start_values(model);
-  fs::path unfinished = path;
-  unfinished += fmt::format(".{}.part", ::getpid());
+  files::ResultFile file(path, "FMU");
   std::string names;
-  try {
-    Archive archive(unfinished);
-    archive.add("modelDescription.xml", description);
-    archive.add("resources/start.txt", start);
-    for (const Platform& platform : platforms) {
-      const fs::path binary = what.binaries / platform.source;
-      if (!fs::exists(binary)) continue;
-      archive.add_file(what.fmi == 3 ? platform.fmi3 : platform.fmi2, binary);
-      names += (names.empty() ? "" : ", ") + binary.parent_path().filename().string();
-    }
-    if (names.empty()) {
-      throw std::runtime_error(
-          fmt::format("\"{}\" holds no binary for FMUs; build the target abs_hil_fmu, or install "
-                      "abs_hil again",
-                      what.binaries.string()));
-    }
-    archive.close();
-    fs::rename(unfinished, path);
-  } catch (...) {
-    std::error_code error;
-    fs::remove(unfinished, error);
-    throw;
+  Archive archive;
+  archive.add("modelDescription.xml", description);
+  archive.add("resources/start.txt", start);
+  for (const Platform& platform : platforms) {
+    const fs::path binary = what.binaries / platform.source;
+    if (!fs::exists(binary)) continue;
+    archive.add_file(what.fmi == 3 ? platform.fmi3 : platform.fmi2, binary);
+    names += (names.empty() ? "" : ", ") + binary.parent_path().filename().string();
   }
+  if (names.empty()) {
+    throw std::runtime_error(
+        fmt::format("\"{}\" holds no binary for FMUs; build the target abs_hil_fmu, or install "
+                    "abs_hil again",
+                    what.binaries.string()));
+  }
+  file.write(archive.close());
   return names;
 }
 

@@ -4,12 +4,14 @@
 #include <sys/stat.h>
 #include <zip.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <iterator>
 #include <memory>
 #include <set>
 #include <string>
@@ -25,7 +27,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint64_t bytes_max = std::uint64_t{256} << 20U;
-constexpr zip_int64_t entries_max = 10'000;
+constexpr std::uint64_t description_bytes_max = std::uint64_t{16} << 20U;
+constexpr unsigned entries_max = 2'000;
+
+constexpr const char* description_name = "modelDescription.xml";
 
 /// The folders of libraries for this computer: FMI 2 and FMI 3.
 #if defined(__aarch64__)
@@ -45,7 +50,7 @@ bool leads_out(std::string_view name) {
 
 bool is_wanted(std::string_view name) {
   if (name.ends_with('/')) return false;
-  return name == "modelDescription.xml" || name.starts_with("resources/") || name.starts_with(platform_folders[0]) ||
+  return name == description_name || name.starts_with("resources/") || name.starts_with(platform_folders[0]) ||
          name.starts_with(platform_folders[1]);
 }
 
@@ -63,7 +68,6 @@ struct Entry {
 /// Checks all entries; returns those that are needed.
 std::vector<Entry> entries_of(const fs::path& file, zip_t* archive) {
   const zip_int64_t count = zip_get_num_entries(archive, 0);
-  if (count > entries_max) refuse(file, fmt::format("{} files; an FMU here has at most {}", count, entries_max));
   std::vector<Entry> wanted;
   std::set<std::string> names;
   std::set<std::string> libraries;
@@ -90,11 +94,14 @@ std::vector<Entry> entries_of(const fs::path& file, zip_t* archive) {
     if (facts.size > bytes_max || (bytes += facts.size) > bytes_max) {
       refuse(file, fmt::format("its files have more than {} bytes; it is not extracted", bytes_max));
     }
+    if (name == description_name && facts.size > description_bytes_max) {
+      refuse(file, fmt::format("its {} has {} bytes; at most {} are read", name, facts.size, description_bytes_max));
+    }
     if (name.starts_with("binaries/") && !name.ends_with('/'))
       libraries.insert(fs::path(name).parent_path().filename().string());
     if (is_wanted(name)) wanted.push_back({index, name, facts.size});
   }
-  if (!names.contains("modelDescription.xml")) refuse(file, "not an FMU: it has no modelDescription.xml");
+  if (!names.contains(description_name)) refuse(file, "not an FMU: it has no modelDescription.xml");
   for (const char* folder : platform_folders) {
     if (libraries.contains(fs::path(folder).parent_path().filename().string())) return wanted;
   }
@@ -110,27 +117,84 @@ void extract(const fs::path& file, zip_t* archive, const Entry& entry, const fs:
   fs::create_directories(to.parent_path());
   const std::unique_ptr<zip_file_t, Closer> in(zip_fopen_index(archive, entry.index, 0));
   if (!in) refuse(file, fmt::format("damaged: \"{}\": {}", entry.name, zip_strerror(archive)));
-  std::vector<char> data(entry.size);
-  std::uint64_t got = 0;
-  while (got < entry.size) {
-    const zip_int64_t more = zip_fread(in.get(), data.data() + got, entry.size - got);
-    if (more <= 0) break;
-    got += static_cast<std::uint64_t>(more);
-  }
-  char beyond = 0;
-  // Reading on to the end checks the sum.
-  if (got != entry.size || zip_fread(in.get(), &beyond, 1) != 0) {
-    refuse(file, fmt::format("damaged: \"{}\" cannot be unpacked", entry.name));
-  }
   std::ofstream out(to, std::ios::binary);
-  out.write(data.data(), static_cast<std::streamsize>(data.size()));
+  std::array<char, 65'536> part;
+  std::uint64_t got = 0;
+  zip_int64_t more = 0;
+  // Reading on to the end checks the sum. An entry may be longer than it says.
+  while (got <= entry.size && (more = zip_fread(in.get(), part.data(), part.size())) > 0) {
+    got += static_cast<std::uint64_t>(more);
+    out.write(part.data(), more);
+  }
+  if (more < 0 || got != entry.size) refuse(file, fmt::format("damaged: \"{}\" cannot be unpacked", entry.name));
   out.close();
   if (!out) throw std::runtime_error(fmt::format("{}: {}", to.string(), std::strerror(errno)));
+}
+
+/// Where the tag ends that begins `text`: a '>' in quotes does not end it.
+std::size_t end_of_tag(std::string_view text) {
+  char quote = '\0';
+  for (std::size_t i = 1; i < text.size(); ++i) {
+    if (quote != '\0') {
+      if (text[i] == quote) quote = '\0';
+    } else if (text[i] == '"' || text[i] == '\'') {
+      quote = text[i];
+    } else if (text[i] == '>') {
+      return i;
+    }
+  }
+  return text.size();
+}
+
+/// Counts elements, attributes and levels in the text without making anything of them: a parser needs a hundred bytes
+/// for the four of "<a/>".
+void check_description(const fs::path& file, const fs::path& description) {
+  constexpr int elements_max = 200'000;
+  constexpr int attributes_max = 1'000'000;
+  constexpr int levels_max = 64;
+  std::ifstream in(description, std::ios::binary);
+  const std::string text(std::istreambuf_iterator<char>(in), {});
+  const auto check = [&](std::int64_t count, int most, const char* what) {
+    if (count > most) refuse(file, fmt::format("its {} has more than {} {}", description_name, most, what));
+  };
+  check(std::ranges::count(text, '='), attributes_max, "attributes");
+  int elements = 0;
+  int level = 0;
+  for (std::size_t at = text.find('<'); at < text.size(); at = text.find('<', at + 1)) {
+    const std::string_view rest = std::string_view(text).substr(at);
+    if (rest.starts_with("<!--") || rest.starts_with("<![CDATA[") || rest.starts_with("<?")) {
+      at = text.find(rest[1] == '?' ? "?>" : rest[2] == '-' ? "-->" : "]]>", at);
+    } else if (rest.starts_with("</")) {
+      --level;
+    } else if (!rest.starts_with("<!")) {
+      const std::size_t end = end_of_tag(rest);
+      check(++elements, elements_max, "elements");
+      if (rest[end - 1] != '/') check(++level, levels_max, "levels of elements");
+      at += end;
+    }
+    if (at >= text.size()) return;
+  }
+}
+
+/// The number of entries as the archive's last record gives it, before the archive is read. libzip makes all entries.
+void check_count(const fs::path& file) {
+  constexpr std::streamoff tail = 65'535 + 22;
+  constexpr std::size_t count_at = 10;
+  std::ifstream in(file, std::ios::binary | std::ios::ate);
+  in.seekg(-std::min<std::streamoff>(in.tellg(), tail), std::ios::end);
+  const std::string text(std::istreambuf_iterator<char>(in), {});
+  for (std::size_t at = text.find("PK\5\6"); at < text.size(); at = text.find("PK\5\6", at + 1)) {
+    if (at + count_at + 1 >= text.size()) return;
+    const auto byte = [&](std::size_t n) { return static_cast<unsigned>(static_cast<unsigned char>(text[at + n])); };
+    const unsigned count = byte(count_at) | byte(count_at + 1) << 8U;
+    if (count > entries_max) refuse(file, fmt::format("{} files; an FMU here has at most {}", count, entries_max));
+  }
 }
 
 }  // namespace
 
 ExtractedFmu::ExtractedFmu(const fs::path& file) {
+  check_count(file);
   int code = 0;
   const std::unique_ptr<zip_t, Closer> archive(zip_open(file.c_str(), ZIP_RDONLY | ZIP_CHECKCONS, &code));
   if (!archive) {
@@ -145,7 +209,13 @@ ExtractedFmu::ExtractedFmu(const fs::path& file) {
   if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error(fmt::format("{}: {}", name, std::strerror(errno)));
   folder_ = name;
   try {
-    for (const Entry& entry : entries) extract(file, archive.get(), entry, folder_ / entry.name);
+    // The description first: what it shows to be hostile is refused before the rest is unpacked.
+    const auto description = std::ranges::find(entries, description_name, &Entry::name);
+    extract(file, archive.get(), *description, folder_ / description_name);
+    check_description(file, folder_ / description_name);
+    for (const Entry& entry : entries) {
+      if (entry.name != description_name) extract(file, archive.get(), entry, folder_ / entry.name);
+    }
   } catch (...) {
     std::error_code error;
     fs::remove_all(folder_, error);

@@ -4,6 +4,7 @@
 #include <toml++/toml.h>
 
 #include <cstddef>
+#include <fstream>
 #include <map>
 #include <pugixml.hpp>
 #include <set>
@@ -12,6 +13,7 @@
 
 #include "interchange/elf_library.hpp"
 #include "interchange/refused_file.hpp"
+#include "rig/parse_toml.hpp"
 
 namespace abs_hil::interchange {
 
@@ -167,7 +169,9 @@ void set_parameters(const fs::path& file, const TheirVariables& variables, const
 toml::table read_mapping(const fs::path& mapping) {
   if (mapping.empty()) return {};
   try {
-    toml::table table = toml::parse_file(mapping.string());
+    std::ifstream in(mapping, std::ios::binary);
+    if (!in) refuse(mapping, "cannot be read; give control.foreign.mapping a TOML file");
+    toml::table table = rig::parse_toml(in, mapping.string());
     for (const auto& [key, node] : table) {
       const bool known = key == "inputs" || key == "outputs" || key == "parameters";
       if (!known || !node.is_table())

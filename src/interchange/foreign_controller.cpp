@@ -75,6 +75,8 @@ ForeignController::ForeignController(const std::string& file, const control::Con
       setup_(setup_of(file, context)),
       fmu_(check(setup_)),
       step_times_(std::make_unique<runtime::LatencyHistogram>()) {
+  // What dies while it is made dies there first, and the program refuses the file.
+  if (home == Home::this_process) static_cast<void>(HostedCode(setup_));
   code_ = home == Home::own_process ? std::make_unique<HostedCode>(setup_) : load_here(setup_);
   for (const std::string& name : code_->signals()) signals_.push_back({name, "signal of the controller's own"});
   try {

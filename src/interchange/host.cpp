@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "interchange/confinement.hpp"
 #include "interchange/host_protocol.hpp"
-#include "interchange/system_call_trap.hpp"
 #include "runtime/clock.hpp"
 
 namespace abs_hil::interchange {
@@ -64,6 +64,9 @@ int run_host(const std::function<std::uint64_t()>& allocations) {
   packet.resize(static_cast<std::size_t>(size));
   std::unique_ptr<ForeignCode> code;
   try {
+    if (const std::string why = confine(host_socket); !why.empty()) {
+      throw std::runtime_error("this kernel cannot confine a controller from a file (" + why + ")");
+    }
     code = load_here(setup_of(nlohmann::json::parse(packet)));
   } catch (const std::exception& error) {
     static_cast<void>(send_json({{"error", error.what()}}));

@@ -40,4 +40,9 @@ struct HostAnswer {
   Offences offences{};
 };
 
+/// The last word of a host whose code asked for a forbidden system call; shorter than any answer.
+struct HostRefusal {
+  std::int32_t system_call{-1};
+};
+
 }  // namespace abs_hil::interchange

@@ -5,6 +5,7 @@
 #include <poll.h>
 #include <spawn.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -14,6 +15,12 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <string_view>
+#include <utility>
+
+#include "interchange/confinement.hpp"
+#include "rig/parse_json.hpp"
+#include "runtime/clock.hpp"
 
 // NOLINTNEXTLINE(readability-redundant-declaration): POSIX wants it declared
 extern char** environ;
@@ -24,20 +31,13 @@ namespace {
 
 constexpr int step_limit_ms = 2'000;
 constexpr int start_limit_ms = 20'000;
+/// All steps of a run may take this long and this many times as long as the time that they simulate.
+constexpr std::int64_t run_grace_ns = 10'000'000'000;
+constexpr double run_slowness_max = 100.0;
+/// What foreign code prints is passed on up to this many bytes.
+constexpr std::size_t printed_max = 65'536;
 
-/// Waits for a packet. 0: the other end is closed; -1: none came in time.
-ssize_t receive(int socket, void* data, std::size_t size, int limit_ms) noexcept {
-  pollfd ready{socket, POLLIN, 0};
-  int polled = 0;
-  do {
-    polled = ::poll(&ready, 1, limit_ms);
-  } while (polled < 0 && errno == EINTR);
-  if (polled == 0) return -1;
-  const ssize_t got = ::recv(socket, data, size, 0);
-  return got < 0 ? 0 : got;
-}
-
-pid_t spawn(const std::string& program, int socket) {
+pid_t spawn(const std::string& program, int socket, int prints) {
   posix_spawn_file_actions_t actions{};
   posix_spawnattr_t attributes{};
   posix_spawn_file_actions_init(&actions);
@@ -51,6 +51,9 @@ pid_t spawn(const std::string& program, int socket) {
   // A session of its own: Ctrl-C ends the run in order and must not kill its controller.
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  // Not the run's own stderr: nothing of the code's may hold that.
+  posix_spawn_file_actions_adddup2(&actions, prints, STDOUT_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, prints, STDERR_FILENO);
   posix_spawn_file_actions_adddup2(&actions, socket, host_socket);
   std::string name = "abs_controller_host";
   std::array<char*, 2> arguments{name.data(), nullptr};
@@ -82,15 +85,23 @@ std::string host_program() {
   return beside.string();
 }
 
-HostedCode::HostedCode(const ForeignSetup& setup) {
-  std::array<int, 2> ends{};
-  if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0) {
-    throw std::runtime_error(std::string("socketpair: ") + std::strerror(errno));
-  }
-  socket_ = ends[0];
+HostedCode::HostedCode(const ForeignSetup& setup) : period_s_(setup.period_s) {
+  std::array<int, 2> ends{-1, -1};
+  std::array<int, 2> pipe{-1, -1};
+  const auto close_theirs = [&] {
+    if (ends[1] >= 0) ::close(std::exchange(ends[1], -1));
+    if (pipe[1] >= 0) ::close(std::exchange(pipe[1], -1));
+  };
   try {
-    pid_ = spawn(host_program(), ends[1]);
-    ::close(std::exchange(ends[1], -1));
+    if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0) {
+      throw std::runtime_error(std::string("socketpair: ") + std::strerror(errno));
+    }
+    socket_ = ends[0];
+    if (::pipe2(pipe.data(), O_CLOEXEC) != 0) throw std::runtime_error(std::string("pipe: ") + std::strerror(errno));
+    prints_ = pipe[0];
+    ::fcntl(prints_, F_SETFL, O_NONBLOCK);
+    pid_ = spawn(host_program(), ends[1], pipe[1]);
+    close_theirs();
     const std::string text = nlohmann::json{
         {"file", std::filesystem::absolute(setup.file).string()},
         {"folder", setup.folder.string()},
@@ -100,16 +111,21 @@ HostedCode::HostedCode(const ForeignSetup& setup) {
          setup.parameters}}.dump();
     std::string answer(host_packet_max, '\0');
     const bool sent = ::send(socket_, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
-    const ssize_t size = sent ? receive(socket_, answer.data(), answer.size(), start_limit_ms) : 0;
-    if (size <= 0) {
-      throw std::invalid_argument(
-          fmt::format("{}: while it was loaded and made, its code {}", setup.file.string(), obituary(size < 0)));
+    const ssize_t size = sent ? receive(answer.data(), answer.size(), start_limit_ms) : 0;
+    if (size <= static_cast<ssize_t>(sizeof(HostRefusal))) {
+      throw std::invalid_argument(fmt::format("{}: while it was loaded and made, its code {}", setup.file.string(),
+                                              obituary(size, answer.data())));
     }
-    const auto json = nlohmann::json::parse(answer.substr(0, static_cast<std::size_t>(size)));
-    if (json.contains("error")) throw std::invalid_argument(json.at("error").get<std::string>());
-    signals_ = json.at("signals").get<std::vector<std::string>>();
+    try {
+      const auto json = rig::parse_json(answer.substr(0, static_cast<std::size_t>(size)));
+      if (json.contains("error")) throw std::invalid_argument(json.at("error").get<std::string>());
+      signals_ = json.at("signals").get<std::vector<std::string>>();
+    } catch (const nlohmann::json::exception&) {
+      throw std::invalid_argument(
+          fmt::format("{}: while it was loaded and made, its code sent an answer of its own", setup.file.string()));
+    }
   } catch (...) {
-    if (ends[1] >= 0) ::close(ends[1]);
+    close_theirs();
     end();
     throw;
   }
@@ -118,20 +134,91 @@ HostedCode::HostedCode(const ForeignSetup& setup) {
 HostedCode::~HostedCode() { end(); }
 
 void HostedCode::end() noexcept {
+  if (pid_ != 0) {
+    // The group as well: on a kernel that could not forbid it, the code may have started other processes.
+    ::kill(-pid_, SIGKILL);
+    ::kill(pid_, SIGKILL);
+    static_cast<void>(::waitpid(std::exchange(pid_, 0), nullptr, 0));
+  }
+  if (prints_ >= 0) {
+    pass_on_prints();
+    ::close(std::exchange(prints_, -1));
+  }
   if (socket_ >= 0) ::close(std::exchange(socket_, -1));
-  if (pid_ == 0) return;
-  ::kill(pid_, SIGKILL);
-  static_cast<void>(::waitpid(std::exchange(pid_, 0), nullptr, 0));
 }
 
-std::string HostedCode::obituary(bool silent) noexcept {
-  if (silent) {
-    end();
-    return "did not answer in time";
+void HostedCode::pass_on_prints() noexcept {
+  std::array<char, 4096> text;
+  constexpr int parts = 32;  // all that a pipe holds; one who prints without end must not keep the run here
+  for (int part = 0; part < parts; ++part) {
+    const ssize_t got = ::read(prints_, text.data(), text.size());
+    if (got <= 0) return;
+    if (printed_ >= printed_max) continue;
+    printed_ += static_cast<std::size_t>(got);
+    // A full pipe behind stderr must not stop the run.
+    pollfd room{STDERR_FILENO, POLLOUT, 0};
+    if (::poll(&room, 1, 0) != 1) continue;
+    static_cast<void>(!::write(STDERR_FILENO, text.data(), static_cast<std::size_t>(got)));
+    constexpr std::string_view enough = "\nabs_hil: the controller prints too much; the rest is left out\n";
+    if (printed_ >= printed_max) static_cast<void>(!::write(STDERR_FILENO, enough.data(), enough.size()));
   }
+}
+
+bool HostedCode::too_many_threads() const noexcept {
+  std::array<char, 32> path{};
+  *fmt::format_to_n(path.data(), path.size() - 1, "/proc/{}/task", pid_).out = '\0';
+  struct stat folder {};
+  constexpr std::uint64_t links_of_a_folder = 2;
+  return ::stat(path.data(), &folder) == 0 && folder.st_nlink > links_of_a_folder + host_threads_max;
+}
+
+ssize_t HostedCode::receive(void* data, std::size_t size, int limit_ms) noexcept {
+  constexpr int slice_ms = 50;
+  runtime::MonotonicClock clock;
+  const std::int64_t until_ns = clock.now_ns() + std::int64_t{limit_ms} * 1'000'000;
+  while (true) {
+    std::array<pollfd, 2> ready{{{socket_, POLLIN, 0}, {prints_, POLLIN, 0}}};
+    const int polled = ::poll(ready.data(), ready.size(), slice_ms);
+    if (polled > 0 && ready[1].revents != 0) pass_on_prints();
+    if (polled > 0 && ready[0].revents != 0) {
+      const ssize_t got = ::recv(socket_, data, size, MSG_TRUNC);
+      return got < 0 ? 0 : got;
+    }
+    const bool closed_prints = polled > 0 && (ready[1].revents & POLLHUP) != 0;
+    if (closed_prints) ::poll(nullptr, 0, 1);  // it closed them, and lives: wait for its answer without haste
+    if (polled == 0 && too_many_threads()) return -1;
+    if (clock.now_ns() > until_ns) return -1;
+  }
+}
+
+std::string HostedCode::obituary(ssize_t got, const void* answer) noexcept {
+  if (got == static_cast<ssize_t>(sizeof(HostRefusal))) {
+    HostRefusal refusal;
+    std::memcpy(&refusal, answer, sizeof refusal);
+    end();
+    return fmt::format(
+        "was ended: it asked for the system call {} ({}); a controller from a file may start no process, touch "
+        "no other process and take no priority",
+        refusal.system_call, name_of_forbidden(refusal.system_call));
+  }
+  if (got != 0) {
+    const bool threads = too_many_threads();
+    end();
+    if (threads) return fmt::format("was ended: it has more than {} threads", host_threads_max);
+    return got < 0 ? "did not answer in time" : fmt::format("was ended: it sent an answer of {} bytes", got);
+  }
+  // The end of a process closes its socket a moment before its status can be had.
+  constexpr int tries = 100;
   int status = 0;
-  const pid_t pid = std::exchange(pid_, 0);
-  if (pid == 0 || ::waitpid(pid, &status, 0) != pid) return "ended";
+  pid_t ended = 0;
+  for (int i = 0; i < tries && pid_ != 0 && (ended = ::waitpid(pid_, &status, WNOHANG)) == 0; ++i)
+    ::poll(nullptr, 0, 2);
+  if (ended <= 0) {
+    end();
+    return "was ended: it closed its connection to the run";
+  }
+  pid_ = 0;
+  end();
   if (WIFSIGNALED(status)) return fmt::format("crashed: {}", ::strsignal(WTERMSIG(status)));
   return fmt::format("ended its process with status {}", WEXITSTATUS(status));
 }
@@ -139,9 +226,11 @@ std::string HostedCode::obituary(bool silent) noexcept {
 bool HostedCode::ask(const HostRequest& request, HostAnswer& answer) noexcept {
   if (socket_ < 0 || !failure_.empty()) return false;
   const bool sent = ::send(socket_, &request, sizeof request, MSG_NOSIGNAL) == static_cast<ssize_t>(sizeof request);
-  const ssize_t got = sent ? receive(socket_, &answer, sizeof answer, step_limit_ms) : 0;
-  if (got == static_cast<ssize_t>(sizeof answer)) return true;
-  failure_ = fmt::format("its code {} in step {}", obituary(got < 0), steps_);
+  const ssize_t got = sent ? receive(&answer, sizeof answer, step_limit_ms) : 0;
+  constexpr std::uint64_t steps_between_looks = 256;
+  const bool crowded = all_steps_ % steps_between_looks == 0 && too_many_threads();
+  if (got == static_cast<ssize_t>(sizeof answer) && !crowded) return true;
+  failure_ = fmt::format("its code {} in step {}", obituary(crowded ? -1 : got, &answer), steps_);
   return false;
 }
 
@@ -154,8 +243,20 @@ void HostedCode::reset(const abs_hil_input& input) noexcept {
 void HostedCode::step(const abs_hil_input& input, abs_hil_output& output) noexcept {
   HostAnswer answer;
   ++steps_;
+  runtime::MonotonicClock clock;
+  const std::int64_t before_ns = clock.now_ns();
   output = ask({.action = HostAction::step, .input = input}, answer) ? answer.output : no_output();
   step_ns_ = answer.step_ns;
+  spent_ns_ += clock.now_ns() - before_ns;
+  ++all_steps_;
+  const double simulated_ns = static_cast<double>(all_steps_) * period_s_ * 1e9;
+  if (failure_.empty() && static_cast<double>(spent_ns_ - run_grace_ns) > run_slowness_max * simulated_ns) {
+    failure_ = fmt::format(
+        "its code is too slow: {} steps of {} s took {:.1f} s together; at most 10 s and {} times the simulated time",
+        all_steps_, period_s_, static_cast<double>(spent_ns_) * 1e-9, run_slowness_max);
+    output = no_output();
+    end();
+  }
 }
 
 StepTimes HostedCode::warm_up_there(double period_s, std::uint32_t steps) {

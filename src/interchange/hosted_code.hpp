@@ -10,8 +10,10 @@
 
 namespace abs_hil::interchange {
 
-/// Foreign code in a process of its own, abs_controller_host: what it breaks, it breaks there. A step costs two changes
-/// of process (about 20 us). Not for boards: `step` waits for the other process.
+/// Foreign code in a process of its own, abs_controller_host: what it breaks, it breaks there. The process is confined
+/// (confinement.hpp), so nothing of the code outlives this object. Every call has a limit of time, and so have all
+/// calls together: 10 s and a hundred times the time that the run simulates. What the code prints goes to stderr, up to
+/// a limit. A step costs two changes of process (about 20 us). Not for boards: `step` waits for the other process.
 class HostedCode final : public ForeignCode {
  public:
   /// Starts the process and makes the controller there. Throws std::invalid_argument, which names the file, if the code
@@ -33,14 +35,25 @@ class HostedCode final : public ForeignCode {
   [[nodiscard]] Offences probe(double period_s, std::uint32_t steps);
 
  private:
+  /// Waits for a packet and passes on what the code prints. Bytes of the packet; 0: the other end is closed; < 0: none
+  /// came in time.
+  [[nodiscard]] ssize_t receive(void* data, std::size_t size, int limit_ms) noexcept;
+  void pass_on_prints() noexcept;
+  [[nodiscard]] bool too_many_threads() const noexcept;
   [[nodiscard]] bool ask(const HostRequest& request, HostAnswer& answer) noexcept;
   void end() noexcept;
-  /// How the process ended, or that it does not answer.
-  [[nodiscard]] std::string obituary(bool silent) noexcept;
+  /// Ends the process. Says how it ended by itself, or what was wrong with its answer.
+  /// @param got  what `receive` returned for `answer`
+  [[nodiscard]] std::string obituary(ssize_t got, const void* answer) noexcept;
 
   pid_t pid_{0};
   int socket_{-1};
-  std::uint64_t steps_{0};
+  int prints_{-1};  ///< pipe with what the code prints
+  std::size_t printed_{0};
+  double period_s_;
+  std::uint64_t steps_{0};      ///< since the last reset
+  std::uint64_t all_steps_{0};  ///< of the run
+  std::int64_t spent_ns_{0};    ///< waiting for them
   std::int64_t step_ns_{0};
   std::string failure_{};
 };

@@ -1,96 +1,153 @@
 #include "program/board_owners.hpp"
 
+#include <dirent.h>
+#include <fcntl.h>
 #include <poll.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <charconv>
 #include <csignal>
-#include <filesystem>
-#include <fstream>
-#include <system_error>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <string_view>
+
+#include "abs_hil/rig/time_units.hpp"
+#include "driver/file_descriptor.hpp"
+#include "driver/monotonic_time.hpp"
 
 namespace abs_hil::program {
 
 namespace {
 
-namespace fs = std::filesystem;
+using driver::FileDescriptor;
 
 /// Device and inode of a file: the same for every path and every descriptor of it.
 struct FileId {
-  dev_t device{0};
-  ino_t inode{0};
+  std::uint32_t major{0};
+  std::uint32_t minor{0};
+  std::uint64_t inode{0};
   [[nodiscard]] bool operator==(const FileId&) const = default;
 };
 
-bool find_id(const std::string& path, FileId& id) {
-  struct stat status {};
-  if (::stat(path.c_str(), &status) != 0) return false;
-  id = {status.st_dev, status.st_ino};
-  return true;
+/// What the kernel remembers of the file: a file system that hangs is not asked.
+std::optional<FileId> id_of(int folder, const char* name) {
+  struct statx found {};
+  if (::statx(folder, name, AT_STATX_DONT_SYNC | AT_NO_AUTOMOUNT, STATX_INO, &found) != 0) return std::nullopt;
+  return FileId{found.stx_dev_major, found.stx_dev_minor, found.stx_ino};
 }
 
-bool has_open(const fs::path& process, const std::vector<FileId>& files) {
-  std::error_code error;
-  for (fs::directory_iterator at(process / "fd", error), end; !error && at != end; at.increment(error)) {
-    FileId id;
-    if (find_id(at->path().string(), id) && std::ranges::find(files, id) != files.end()) return true;
+using Folder = std::unique_ptr<DIR, int (*)(DIR*)>;
+
+Folder open_folder(int in, const char* name) {
+  const int fd = ::openat(in, name, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  return {fd < 0 ? nullptr : ::fdopendir(fd), ::closedir};
+}
+
+/// One small file of /proc, which the kernel writes by itself; empty if it cannot be read.
+std::string text_of(int in, const std::string& name) {
+  const FileDescriptor file(::openat(in, name.c_str(), O_RDONLY | O_CLOEXEC));
+  std::array<char, 256> text{};
+  const ssize_t got = file.get() < 0 ? 0 : ::read(file.get(), text.data(), text.size());
+  return {text.data(), got > 0 ? static_cast<std::size_t>(got) : 0};
+}
+
+struct FileOfBoard {
+  FileId id{};
+  std::size_t board{0};
+};
+
+/// The board of which this process has a file open.
+std::optional<std::size_t> board_of(int proc, const std::string& pid, const std::vector<FileOfBoard>& files) {
+  const Folder open_files = open_folder(proc, (pid + "/fd").c_str());
+  if (!open_files) return std::nullopt;
+  while (const dirent* entry = ::readdir(open_files.get())) {
+    const auto id = id_of(::dirfd(open_files.get()), entry->d_name);
+    const auto file = std::ranges::find_if(files, [&](const FileOfBoard& f) { return id && f.id == *id; });
+    if (file != files.end()) return file->board;
   }
-  return false;
+  return std::nullopt;
 }
 
-std::string name_of_process(const fs::path& process) {
-  std::ifstream in(process / "comm");
-  std::string name;
-  std::getline(in, name);
-  return name;
+bool is_stopped(pid_t pid) {
+  // "PID (NAME) STATE ...": a name may hold brackets.
+  const std::string stat = text_of(AT_FDCWD, "/proc/" + std::to_string(pid) + "/stat");
+  const std::size_t at = stat.rfind(") ");
+  return at != std::string::npos && (stat[at + 2] == 'T' || stat[at + 2] == 't');
 }
 
-bool ends_within(int pidfd, int timeout_ms) {
+/// False if the process may not be ended.
+bool send(int pidfd, int signal) {
+  return ::syscall(SYS_pidfd_send_signal, pidfd, signal, nullptr, 0) == 0 || errno != EPERM;
+}
+
+bool has_ended(int pidfd) {
   pollfd ended{pidfd, POLLIN, 0};
-  return ::poll(&ended, 1, timeout_ms) > 0;
+  return ::poll(&ended, 1, 0) > 0;
 }
 
 }  // namespace
 
-std::vector<BoardOwner> owners_of(const std::vector<std::string>& files) {
-  std::vector<FileId> ids;
-  for (const std::string& file : files) {
-    if (FileId id; find_id(file, id)) ids.push_back(id);
+std::vector<BoardOwner> owners_of(const std::vector<std::vector<std::string>>& files) {
+  std::vector<FileOfBoard> wanted;
+  for (std::size_t board = 0; board < files.size(); ++board) {
+    for (const std::string& file : files[board]) {
+      if (const auto id = id_of(AT_FDCWD, file.c_str())) wanted.push_back({*id, board});
+    }
   }
   std::vector<BoardOwner> owners;
-  std::error_code error;
-  for (fs::directory_iterator at("/proc", error), end; !error && at != end; at.increment(error)) {
-    const std::string number = at->path().filename().string();
+  const Folder proc = open_folder(AT_FDCWD, "/proc");
+  if (wanted.empty() || !proc) return owners;
+  while (const dirent* entry = ::readdir(proc.get())) {
+    const std::string number = entry->d_name;
     pid_t pid = 0;
     const auto [rest, wrong] = std::from_chars(number.data(), number.data() + number.size(), pid);
     if (wrong != std::errc() || rest != number.data() + number.size() || pid == ::getpid()) continue;
-    if (!has_open(at->path(), ids)) continue;
-    const std::string name = name_of_process(at->path());
-    if (name != "abs_guardian") owners.push_back({pid, name});
+    const auto board = board_of(::dirfd(proc.get()), number, wanted);
+    if (!board) continue;
+    std::string name = text_of(::dirfd(proc.get()), number + "/comm");
+    if (name.ends_with('\n')) name.pop_back();
+    if (name != "abs_guardian") owners.push_back({.pid = pid, .name = name, .board = *board});
   }
   return owners;
 }
 
-bool end_owner(const BoardOwner& owner) {
-  constexpr unsigned int no_flags = 0;
-  const int pidfd = static_cast<int>(::syscall(SYS_pidfd_open, owner.pid, no_flags));
-  if (pidfd < 0) return errno == ESRCH;
-  // The first request ends a run in order, which may brake the rig first. The second ends it at once.
-  struct Request {
-    int signal;
-    int wait_ms;
+void end_owners(std::vector<BoardOwner>& owners,
+                const std::function<bool(std::size_t board, std::int64_t asked_ns)>& must_go) {
+  constexpr std::int64_t patience_ns = rig::ns_per_s;
+  constexpr std::int64_t give_up_ns = 2500 * rig::ns_per_ms;
+  constexpr int pause_ms = 2;
+  struct Process {
+    BoardOwner& owner;
+    FileDescriptor pidfd;
+    bool refused{false};  ///< this user may not end it
   };
-  bool ended = false;
-  for (const auto& [signal, wait_ms] : {Request{SIGTERM, 300}, Request{SIGTERM, 300}, Request{SIGKILL, 1500}}) {
-    if (::syscall(SYS_pidfd_send_signal, pidfd, signal, nullptr, 0) != 0 && errno == EPERM) break;
-    if ((ended = ends_within(pidfd, wait_ms))) break;
+  const std::int64_t asked_ns = driver::monotonic_ns();
+  std::vector<Process> left;
+  for (BoardOwner& owner : owners) {
+    constexpr unsigned int no_flags = 0;
+    left.push_back({owner, FileDescriptor(static_cast<int>(::syscall(SYS_pidfd_open, owner.pid, no_flags)))});
+    owner.ended = left.back().pidfd.get() < 0 && errno == ESRCH;
+    if (!is_stopped(owner.pid)) left.back().refused = !send(left.back().pidfd.get(), SIGTERM);
   }
-  ::close(pidfd);
-  return ended;
+  for (std::int64_t now_ns = asked_ns; now_ns < asked_ns + give_up_ns; now_ns = driver::monotonic_ns()) {
+    bool done = true;
+    for (auto& [owner, pidfd, refused] : left) {
+      if (!owner.ended) owner.ended = has_ended(pidfd.get());
+      if (owner.ended || refused) continue;
+      done = false;
+      if (owner.killed) continue;
+      owner.killed = is_stopped(owner.pid) || now_ns - asked_ns > patience_ns || must_go(owner.board, asked_ns);
+      if (owner.killed) refused = !send(pidfd.get(), SIGKILL);
+    }
+    if (done) return;
+    static_cast<void>(::poll(nullptr, 0, pause_ms));
+  }
 }
 
 }  // namespace abs_hil::program

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -18,6 +19,7 @@
 #include "config/plan.hpp"
 #include "driver/injection/injection.hpp"
 #include "program/questions.hpp"
+#include "rig/nearest_name.hpp"
 #include "runtime/board_policy.hpp"
 
 namespace abs_hil::program {
@@ -87,23 +89,43 @@ void check_together(const RunRequest& request) {
   }
 }
 
+/// A misspelt key in the list of consents consents to nothing, and somebody believes that it does.
+void check_consents(const config::Settings& s, const config::KeyTable& keys) {
+  std::vector<std::string_view> names;
+  for (const config::Key& key : keys.keys()) names.push_back(key.name);
+  for (std::size_t begin = 0; begin < s.unsafe.keys.size();) {
+    const std::size_t end = std::min(s.unsafe.keys.find(',', begin), s.unsafe.keys.size());
+    const std::string name = s.unsafe.keys.substr(begin, end - begin);
+    if (config::find_key(keys.keys(), name) == nullptr) {
+      throw config::ConfigError(fmt::format(
+          "unsafe.keys: unknown key \"{}\"; the nearest known key is {}; give keys separated by commas, without blanks",
+          name, fmt::join(rig::nearest_keys(name, names), " or ")));
+    }
+    begin = end + 1;
+  }
+}
+
 /// The policy of the board, after all settings are known.
 void apply_board_policy(config::Settings& s, const config::KeyTable& keys, bool virtual_time) {
-  runtime::refuse_unsafe_use(
+  check_consents(s, keys);
+  const std::vector<std::string> accepted = runtime::refuse_unsafe_use(
       {.driver = s.driver,
        .guarded = s.guardian.enabled,
        .virtual_time = virtual_time,
        .rate_Hz = s.control.rate_Hz,
        .guardian_timeout_ms = s.guardian.timeout_ms,
-       .sample_age_max_s = s.gate.sample_age_max_s,
        .unsafe = s.unsafe,
        .start_speed_rad_s = s.experiment.start_speed_rad_s,
        .injections = driver::parse_injections(s.inject),
-       .controller_file = control::is_controller_file(s.control.controller) ? s.control.controller : ""});
+       .controller_file = control::is_controller_file(s.control.controller) ? s.control.controller : "",
+       .weak = config::weak_values(keys),
+       .model_counts_per_rev = s.model.encoder_counts_per_rev,
+       .rig_counts_per_rev = s.rig.parameters.encoder_counts_per_rev});
+  for (const std::string& weak : accepted) warn_once(weak);
   runtime::refuse_caps_above_board({.brake = keys.was_set("gate.brake_duty_max") ? s.gate.brake_duty_max : 0.0,
                                     .motor = keys.was_set("gate.motor_duty_max") ? s.gate.motor_duty_max : 0.0},
                                    s.driver);
-  runtime::apply_board_limits(s.model, s.control.rate_Hz, s.gate, s.driver);
+  runtime::apply_board_limits(s.rig.parameters, s.control.rate_Hz, s.gate, s.driver);
 }
 
 /// The configuration files of a run, each read once.
@@ -156,6 +178,21 @@ void set_names(config::Settings& s, const RunOptions& options) {
   s.plant_name = s.model_name;
 }
 
+/// What nobody has set of the rig's identity comes from the file that it names: from its [plant], which describes a
+/// rig, before its [model].
+void complete_identity(const config::Settings& s, config::KeyTable& keys) {
+  const std::vector<config::FileValue> values =
+      config::read_file(config::plant_file(s.rig.source, "rig.identity"), config::Tables::of_plant);
+  for (const std::string_view table : {"plant.", "model."}) {
+    for (const config::FileValue& value : values) {
+      if (!value.name.starts_with(table)) continue;
+      const std::string name = "rig." + value.name.substr(table.size());
+      if (config::find_key(keys.keys(), name) != nullptr && !keys.was_set(name))
+        keys.set(name, value.value, value.origin);
+    }
+  }
+}
+
 /// Everything but what the script asks for beyond its settings.
 void fill(config::Settings& s, config::KeyTable& keys, const RunOptions& options, const Files& files,
           const config::Script* script) {
@@ -179,6 +216,7 @@ void fill(config::Settings& s, config::KeyTable& keys, const RunOptions& options
   for (const std::string& assignment : options.assignments) keys.set_text(assignment, "--set");
   for (const std::string& injection : options.injections) s.inject += (s.inject.empty() ? "" : ",") + injection;
   if (options.wait_for_start) keys.set_text("experiment.wait_for_start=true", "--wait-for-start");
+  if (s.on_rig()) complete_identity(s, keys);
   s.realtime.mode = realtime_mode(options.realtime, s);
 }
 

@@ -53,31 +53,31 @@ class GuardedPulse final : public experiment::PulseGuard {
   }
 
   void begin() override {
-    if (!needs_guardian(request_)) return;
-    region_.emplace(1);
-    watch_.emplace(region_->panel(), region_->recorder());
+    if (!guardian::needs_guardian(request_.settings, false)) return;
+    recorder_.emplace(1);
     const std::string launch_config = guardian_launch_json(request_, {});
     if (lease_ != nullptr) {
-      lease_->cover(*region_, launch_config);
+      lease_->cover(*recorder_, launch_config);
       guardian_ = lease_;
     } else {
-      own_guardian_.emplace(*region_, guardian::guardian_program(), launch_config);
+      own_guardian_.emplace(*recorder_, guardian::guardian_program(), launch_config);
       guardian_ = &*own_guardian_;
     }
+    watch_.emplace(guardian_->pages().run(), guardian_->pages().guard(), recorder_->ring());
     // The pulses run in this thread.
     guardian_->arm(runtime::scheduling_of_this_thread());
     driver_.tell_before_making_safe(&*guardian_);
   }
   [[nodiscard]] bool beat() noexcept override {
     if (guardian_ == nullptr || !watch_) return true;
-    watch_->beat();
-    return guardian_->alive() && watch_->taken_back_for() == rig::Reason::none;
+    const runtime::GuardianSign guardian = watch_->beat();
+    return guardian_->alive() && guardian.reason == rig::Reason::none;
   }
   void end(bool safe) noexcept override {
     if (guardian_ == nullptr) return;
     driver_.tell_before_making_safe(nullptr);
     guardian_->outputs_released(safe);
-    static_cast<void>(guardian_->end());
+    static_cast<void>(guardian_->end(guardian::Stage::resting));
     guardian_ = nullptr;
     own_guardian_.reset();
   }
@@ -86,22 +86,23 @@ class GuardedPulse final : public experiment::PulseGuard {
   const RunRequest& request_;
   driver::RigDriver& driver_;
   guardian::GuardianLease* lease_;
-  // The guardian must be destroyed before the region that it uses.
-  std::optional<guardian::SharedRegion> region_{};
-  std::optional<runtime::Heartbeat> watch_{};
+  // The guardian must be destroyed before the recorder that it uses.
+  std::optional<guardian::SharedRecorder> recorder_{};
+  std::optional<guardian::Heartbeat> watch_{};
   std::optional<guardian::GuardianProcess> own_guardian_{};
   guardian::Guard* guardian_{nullptr};
 };
 
 /// The record without which nothing else drives this board. That of an emulator is kept only where somebody asks for
 /// it.
-void keep_record(const RunRequest& request, const driver::BoardIdentity& board, const experiment::OutputTimes& outputs,
-                 Terminal& terminal) {
+void keep_record(const RunRequest& request, const driver::BoardIdentity& board,
+                 const experiment::Commissioning& measured, Terminal& terminal) {
   const driver::DriverOptions& options = request.settings.driver;
   const bool emulated = !runtime::is_real_board(options);
   if (emulated && options.records.empty()) return;
-  experiment::BoardRecord record = experiment::describe_board(options, board, emulated);
-  record.outputs = outputs;
+  experiment::BoardRecord record = experiment::describe_board(options, request.settings.rig, board, emulated);
+  record.outputs = measured.output_times();
+  record.one_turn = measured.one_turn();
   record.date = fmt::format("{:%Y-%m-%d %H:%M:%S %z}", fmt::localtime(std::time(nullptr)));
   record.version = ABS_HIL_VERSION;
   const auto file = experiment::write_record(record, experiment::record_folders(options.records));
@@ -112,7 +113,7 @@ void keep_record(const RunRequest& request, const driver::BoardIdentity& board, 
 
 int commission(const RunRequest& request, const experiment::CommissioningOptions& options) {
   const driver::DriverOptions& driver_options = request.settings.driver;
-  const auto lease = ask_for_lease(request);
+  const auto lease = guardian::ask_for_lease(request.settings, request.outputs.fast);
   const auto driver = driver::make_rig_driver(driver_options);
   runtime::MonotonicClock clock;
   Terminal terminal;
@@ -122,14 +123,19 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
       "The E-stop cuts the drive only, not the brake. A guardian stands by during each pulse (docs/dead-man.md).");
   terminal.tell(
       config::model_origin(request.settings, std::chrono::floor<std::chrono::days>(std::chrono::system_clock::now())));
+  terminal.tell(fmt::format(
+      "identity {}: the limits of gate and checks come from it, and the record will hold it; --set rig.identity=FILE "
+      "names the file of your rig (docs/safety.md)",
+      request.settings.rig.source));
   GuardedPulse guard(request, *driver, lease.get());
   experiment::CommissioningOptions pulses = options;
   pulses.emulated = !runtime::is_real_board(driver_options);
+  pulses.encoder_counts_per_rev = driver_options.encoder_counts_per_rev;
   experiment::Commissioning commissioning(*driver, clock, terminal, guard, pulses,
                                           [] { return signalled() != rig::Reason::none; });
   switch (commissioning.run()) {
     case experiment::CommissioningResult::passed:
-      keep_record(request, driver->identity(), commissioning.output_times(), terminal);
+      keep_record(request, driver->identity(), commissioning, terminal);
       terminal.tell(
           driver_options.emulated
               ? "All four steps passed on an emulator. This does not verify any hardware."

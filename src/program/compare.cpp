@@ -4,8 +4,8 @@
 #include <cctype>
 #include <memory>
 
-#include "analysis/result_file.hpp"
 #include "config/config_error.hpp"
+#include "files/result_file.hpp"
 #include "program/exit_status.hpp"
 #include "program/run_progress.hpp"
 #include "program/study_runs.hpp"
@@ -25,8 +25,8 @@ std::string folder_name(std::string name) {
 }
 
 /// Opens a result file. Called before the runs, so that a bad path is reported at once.
-std::unique_ptr<analysis::ResultFile> open(const std::optional<std::string>& path) try {
-  return path ? std::make_unique<analysis::ResultFile>(*path, "the comparison") : nullptr;
+std::unique_ptr<files::ResultFile> open(const std::optional<std::string>& path) try {
+  return path ? std::make_unique<files::ResultFile>(*path, "comparison") : nullptr;
 } catch (const std::runtime_error& error) {
   throw config::ConfigError(error.what());
 }

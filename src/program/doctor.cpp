@@ -8,9 +8,9 @@
 #include "config/model_origin.hpp"
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
+#include "guardian/guarding.hpp"
 #include "guardian/service_call.hpp"
 #include "program/exit_status.hpp"
-#include "program/guarding.hpp"
 #include "program/run_parts.hpp"
 #include "program/subcommands.hpp"
 #include "runtime/board_policy.hpp"
@@ -49,12 +49,12 @@ int doctor(const RunRequest& request, const std::string& only, bool json) {
                                      .driver = s.driver,
                                      .make_driver = [&] {
                                        // The resident service lets go of the board for the holder of its lease.
-                                       lease = ask_for_lease(request);
+                                       lease = guardian::ask_for_lease(request.settings, request.outputs.fast);
                                        return make_driver(s, false);
                                      }};
   if (s.on_rig() && runtime::is_real_board(s.driver)) {
     examination.require_commissioned = [&s](const driver::RigDriver& driver) {
-      experiment::require_record(s.driver, driver.identity());
+      static_cast<void>(experiment::require_record(s.driver, s.rig, driver.identity()));
     };
   }
   std::vector<diagnosis::Finding> findings = diagnosis::examine(examination);
@@ -72,7 +72,9 @@ int doctor(const RunRequest& request, const std::string& only, bool json) {
   if (json) {
     const nlohmann::ordered_json report{
         {"backend", s.backend}, {"well", well}, {"findings", diagnosis::to_json(findings)}};
-    fmt::print("{}\n", report.dump(2));
+    // Facts of the computer, as an environment variable, may hold any bytes.
+    constexpr auto any_bytes = nlohmann::ordered_json::error_handler_t::replace;
+    fmt::print("{}\n", report.dump(2, ' ', false, any_bytes));
   } else {
     fmt::print("{}", diagnosis::to_text(findings));
   }

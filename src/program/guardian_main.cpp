@@ -4,9 +4,9 @@
 
 #include "abs_hil/driver/backend.hpp"
 #include "abs_hil/program/program.hpp"
-#include "guardian_program/guard_of_run.hpp"
-#include "guardian_program/process_set_up.hpp"
-#include "guardian_program/service.hpp"
+#include "guardian/guard_of_run.hpp"
+#include "guardian/process_set_up.hpp"
+#include "guardian/service.hpp"
 
 namespace abs_hil {
 
@@ -15,10 +15,10 @@ int program::run_guardian(int argc, char** argv, std::span<const driver::Backend
     for (const driver::Backend& board : boards) driver::register_backend(board);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "abs_guardian: %s\n", error.what());
-    return guardian_program::exit_usage;
+    return guardian::exit_usage;
   }
   const std::string_view first = argc > 1 ? argv[1] : "";
-  if (first == "serve") return guardian_program::serve(argc, argv);
+  if (first == "serve") return guardian::serve(argc, argv);
   if (first == "--help" && argc == 2) {
     std::puts(
         "Usage: abs_guardian serve [--socket PATH] [--config FILE] [--set key=value]...\n\n"
@@ -29,14 +29,14 @@ int program::run_guardian(int argc, char** argv, std::span<const driver::Backend
         "a board; do not start that one by hand (docs/dead-man.md).");
     return 0;
   }
-  if (argc != 1 || !guardian_program::started_by_a_run()) {
+  if (argc != 1 || !guardian::started_by_a_run()) {
     std::fputs(
         "abs_guardian: without `serve`, only abs_hil can start this program, as the guardian of a run. The resident "
         "service is `abs_guardian serve` (docs/dead-man.md)\n",
         stderr);
-    return guardian_program::exit_usage;
+    return guardian::exit_usage;
   }
-  return guardian_program::guard_one_run();
+  return guardian::guard_one_run();
 }
 
 }  // namespace abs_hil

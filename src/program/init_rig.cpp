@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
-#include <fstream>
 
 #include "config/config_error.hpp"
 #include "config/rig_file.hpp"
+#include "files/result_file.hpp"
 #include "program/exit_status.hpp"
 #include "program/subcommands.hpp"
 
@@ -18,15 +18,16 @@ int init_rig(const RunRequest& request, const std::string& name) {
     throw config::ConfigError(fmt::format("init-rig: \"{}\": give a name of letters, digits, - and _", name));
   }
   const std::filesystem::path file = name + ".toml";
-  if (std::filesystem::exists(file)) {
+  std::error_code ignored;
+  if (std::filesystem::exists(std::filesystem::symlink_status(file, ignored))) {
     throw config::ConfigError(
         fmt::format("init-rig: {} exists already; give another name or move it away", file.string()));
   }
-  std::ofstream stream(file, std::ios::binary);
-  stream << config::rig_file(request.settings, name);
-  stream.close();
-  if (!stream)
-    throw config::ConfigError(fmt::format("init-rig: {} cannot be written; choose another folder", file.string()));
+  try {
+    files::write_result(file, "model file", config::rig_file(request.settings, name));
+  } catch (const files::FileError& error) {
+    throw config::ConfigError(std::string("init-rig: ") + error.what());
+  }
   fmt::print("{0}: fill in the values of your rig. Then: abs_hil --plant {0}, abs_hil --backend rig --model {0}\n",
              file.string());
   return exit_completed;

@@ -7,8 +7,9 @@ namespace abs_hil::program {
 
 void add_list(cli::Parser& parser, ListCommand& command) {
   command.parser = parser.add_subcommand("list", "list controllers, plants, experiments and backends");
-  command.parser.add(
-      {.names = "--keys", .to = &command.keys, .help = "list all configuration values with unit and range"});
+  command.parser.add({.names = "--keys",
+                      .to = &command.keys,
+                      .help = "list all configuration values with unit, range and safety class"});
   command.parser.add({.names = "--quantities",
                       .to = &command.quantities,
                       .help = "list the quantities of a CSV row and of ABS_TELEMETRY",
@@ -17,8 +18,7 @@ void add_list(cli::Parser& parser, ListCommand& command) {
                       .to = &command.reasons,
                       .help = "list the reasons of phase changes, ends of runs and refused commands",
                       .excludes = {"--keys", "--quantities"}});
-  command.parser.add(
-      {.names = "--json", .to = &command.json, .help = "print quantities or reasons as JSON", .excludes = {"--keys"}});
+  command.parser.add({.names = "--json", .to = &command.json, .help = "print keys, quantities or reasons as JSON"});
 }
 
 void add_doctor(cli::Parser& parser, DoctorCommand& command) {

@@ -7,6 +7,7 @@
 #include "diagnosis/latency_verdict.hpp"
 #include "experiment/run_session.hpp"
 #include "experiment/timing_load.hpp"
+#include "files/result_file.hpp"
 #include "program/exit_status.hpp"
 #include "program/run_parts.hpp"
 #include "program/signals.hpp"
@@ -21,9 +22,9 @@ int latency(const RunRequest& request, const LatencyOptions& options) {
   // Gaps in the simulation are what this command measures; they must not end it.
   constexpr double any_gap_s = 3600.0;
   if (s.backend == "sim") s.realtime.overruns.cycle_gap_max_s = any_gap_s;
-  std::optional<runtime::HistogramFile> histogram;
+  std::optional<files::ResultFile> histogram;
   try {
-    if (request.outputs.histogram_file) histogram.emplace(*request.outputs.histogram_file);
+    if (request.outputs.histogram_file) histogram.emplace(*request.outputs.histogram_file, "histogram");
   } catch (const std::runtime_error& error) {
     throw config::ConfigError(error.what());
   }
@@ -43,7 +44,7 @@ int latency(const RunRequest& request, const LatencyOptions& options) {
                                   .cycles = statistics.cycles(),
                                   .realtime = outcome.realtime.realtime(),
                                   .timing = statistics.summary()};
-  if (histogram) histogram->write(statistics);
+  if (histogram) histogram->write(runtime::cyclictest_histogram(statistics));
   fmt::print("{}", options.json ? to_json(run, facts).dump(2) + "\n" : to_text(run, facts));
   return status_of(outcome);
 }

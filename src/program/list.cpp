@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -29,10 +30,6 @@ void list_signals() {
   }
 }
 
-std::string value_of(const config::Key& key) {
-  return std::visit([](const auto* value) { return fmt::format("{}", *value); }, key.target);
-}
-
 std::string valid_of(const config::Key& key) {
   if (std::holds_alternative<bool*>(key.target)) return "true or false";
   if (!std::holds_alternative<std::string*>(key.target)) return key.range.text();
@@ -44,25 +41,41 @@ std::string valid_of(const config::Key& key) {
   return text;
 }
 
-void list_keys() {
+/// How the key bears on the safety of a run on a board.
+std::string class_of(const config::Key& key) { return config::safety_of(key).in_words(key.unit); }
+
+void list_keys(bool json) {
   config::Settings settings;
   const config::KeyTable table(settings);
   std::size_t name_width = 0, value_width = 0;
-  for (const config::Key& key : table.keys()) {
-    name_width = std::max(name_width, key.name.size());
-    value_width = std::max(value_width, value_of(key).size());
+  if (json) {
+    nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+    for (const config::Key& key : table.keys()) {
+      rows.push_back({{"name", key.name},
+                      {"value", config::value_text(key)},
+                      {"valid", valid_of(key)},
+                      {"unit", key.unit},
+                      {"meaning", key.meaning},
+                      {"safety", class_of(key)}});
+    }
+    fmt::print("{}\n", rows.dump(1));
+    return;
   }
   for (const config::Key& key : table.keys()) {
-    fmt::print("{:<{}}  {:<{}}  {}{}{}; {}\n", key.name, name_width, value_of(key), value_width, valid_of(key),
-               key.unit.empty() ? "" : " ", key.unit, key.meaning);
+    name_width = std::max(name_width, key.name.size());
+    value_width = std::max(value_width, config::value_text(key).size());
+  }
+  for (const config::Key& key : table.keys()) {
+    fmt::print("{:<{}}  {:<{}}  {}{}{}; {} [{}]\n", key.name, name_width, config::value_text(key), value_width,
+               valid_of(key), key.unit.empty() ? "" : " ", key.unit, key.meaning, class_of(key));
   }
 }
 
 }  // namespace
 
-int list(bool keys) {
+int list(bool keys, bool json) {
   if (keys) {
-    list_keys();
+    list_keys(json);
     return exit_completed;
   }
   fmt::print("controllers\n");

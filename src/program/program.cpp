@@ -1,8 +1,13 @@
 #include "abs_hil/program/program.hpp"
 
+#include <poll.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
 #include <exception>
 #include <optional>
 #include <stdexcept>
@@ -12,6 +17,7 @@
 #include "abs_hil/driver/io_result.hpp"
 #include "cli/command_line.hpp"
 #include "config/config_error.hpp"
+#include "config/config_json.hpp"
 #include "interchange/foreign_controller.hpp"
 #include "program/compare_command.hpp"
 #include "program/exit_status.hpp"
@@ -25,7 +31,8 @@
 #include "program/signals.hpp"
 #include "program/study_command.hpp"
 #include "program/subcommands.hpp"
-#include "telemetry/file_error.hpp"
+#include "run_folder/clean_text.hpp"
+#include "runtime/early_end.hpp"
 #include "telemetry/lcm_outlet.hpp"
 
 namespace abs_hil {
@@ -79,12 +86,12 @@ int dispatch(int argc, char** argv) {
     python_programs.push_back(parser.add_subcommand(std::string(python.name), std::string(python.help)));
   }
   if (const std::optional<int> status = parser.parse(argc, argv)) return *status;
-  if (list.json && !list.quantities && !list.reasons) {
-    return parser.refuse("--json requires --quantities or --reasons");
+  if (list.json && !list.quantities && !list.reasons && !list.keys) {
+    return parser.refuse("--json requires --keys, --quantities or --reasons");
   }
   if (list.quantities) return program::list_quantities(list.json);
   if (list.reasons) return program::list_reasons(list.json);
-  if (list.parser.parsed()) return program::list(list.keys);
+  if (list.parser.parsed()) return program::list(list.keys, list.json);
   if (doctor.parser.parsed()) return program::doctor(program::merge(doctor.options), doctor.only, doctor.json);
   if (latency.parser.parsed()) return program::latency(program::merge(latency.options), latency.latency);
   if (validate.parser.parsed()) {
@@ -122,19 +129,33 @@ int fail(int status, const std::exception& error) {
   return status;
 }
 
-}  // namespace
+/// Results that did not reach standard output are lost data. A reader or a terminal that has gone wanted no more.
+int with_stdout(int status) {
+  errno = 0;
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return status;
+  const int why = errno;
+  pollfd output{STDOUT_FILENO, POLLOUT, 0};
+  if (::poll(&output, 1, 0) > 0 && (output.revents & (POLLERR | POLLHUP)) != 0) return status;
+  fprintf(stderr, "abs_hil: cannot write to standard output%s%s\n", why != 0 ? ": " : "",
+          why != 0 ? std::strerror(why) : "");
+  return status == program::exit_completed ? program::exit_ended_early : status;
+}
 
-int program::run_program(int argc, char** argv, std::span<const control::ControllerEntry> own,
-                         std::span<const driver::Backend> boards) {
-  if (const std::optional<int> status = program::start_python_program(argc, argv)) return *status;
-  program::survive_closed_terminals();
-  // Messages go to stderr; stdout carries results.
-  spdlog::set_default_logger(spdlog::stderr_color_mt("abs_hil"));
-  spdlog::set_pattern("%n: %^%l%$: %v");
+/// The command line is part of a run's record. A path that is no text would fail there, after the run.
+void refuse_odd_bytes(int argc, char** argv) {
+  for (int n = 1; n < argc; ++n) {
+    if (config::is_utf8(argv[n])) continue;
+    throw config::ConfigError(fmt::format("argument {} (\"{}\") is not UTF-8 text; give names and paths in UTF-8", n,
+                                          run_folder::clean_text(argv[n])));
+  }
+}
+
+/// The program with its errors as exit statuses.
+int checked(int argc, char** argv, std::span<const control::ControllerEntry> own) {
   try {
+    refuse_odd_bytes(argc, argv);
     for (const control::ControllerEntry& entry : own) control::register_controller(entry);
     interchange::register_foreign_controllers();
-    for (const driver::Backend& board : boards) driver::register_backend(board);
     return dispatch(argc, argv);
   } catch (const config::ConfigError& error) {
     return fail(program::exit_usage, error);
@@ -147,6 +168,25 @@ int program::run_program(int argc, char** argv, std::span<const control::Control
   } catch (const std::exception& error) {
     return fail(program::exit_ended_early, error);
   }
+}
+
+}  // namespace
+
+int program::run_program(int argc, char** argv, std::span<const control::ControllerEntry> own,
+                         std::span<const driver::Backend> boards) {
+  program::survive_closed_terminals();
+  try {
+    for (const driver::Backend& board : boards) driver::register_backend(board);
+    if (const std::optional<int> status = program::safe_at_once(argc, argv)) return with_stdout(*status);
+  } catch (const std::exception& error) {
+    return fail(program::exit_ended_early, error);
+  }
+  if (const std::optional<int> status = program::start_python_program(argc, argv)) return *status;
+  const runtime::EarlyEndWatch end_by_own_decision;
+  // Messages go to stderr; stdout carries results.
+  spdlog::set_default_logger(spdlog::stderr_color_mt("abs_hil"));
+  spdlog::set_pattern("%n: %^%l%$: %v");
+  return with_stdout(checked(argc, argv, own));
 }
 
 }  // namespace abs_hil

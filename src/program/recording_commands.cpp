@@ -1,6 +1,7 @@
 #include "program/recording_commands.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <filesystem>
 #include <utility>
@@ -18,11 +19,20 @@ namespace abs_hil::program {
 
 namespace {
 
-/// The event log of a run folder; any other path as it is.
-std::string log_in(const std::string& recording) {
+/// The event log of a run folder that is as it was recorded; any other path as it is.
+std::string log_in(const std::string& recording) try {
   const std::filesystem::path path(recording);
   std::error_code error;
-  return std::filesystem::is_directory(path, error) ? (path / run_folder::file::log).string() : recording;
+  if (!std::filesystem::is_directory(path, error)) return recording;
+  run_folder::check_seal(path);
+  return (path / run_folder::file::log).string();
+} catch (const run_folder::FolderError& error) {
+  throw config::ConfigError(error.what());
+}
+
+/// Says that a recording is that of a killed run.
+void note(const std::string& cut) {
+  if (!cut.empty()) spdlog::warn("{}", cut);
 }
 
 }  // namespace
@@ -73,6 +83,7 @@ int check_again(const replay::RecordedRun& run) {
 int replay_run(const ReplayCommand& command) {
   try {
     const replay::RecordedRun run = replay::read_run(log_in(command.recording));
+    note(run.cut);
     if (command.check) return check_again(run);
     const config::Settings settings = replay::settings_of(run, {command.controller, command.assignments});
     const std::vector<replay::RerunCycle> rerun =
@@ -112,6 +123,7 @@ int convert(const ConvertCommand& command) {
   try {
     const telemetry::ConversionCounts counts =
         from_csv ? telemetry::csv_to_log(from, command.to) : telemetry::log_to_csv(from, command.to);
+    note(counts.cut);
     fmt::print("{} events", counts.events);
     if (counts.raw > 0) fmt::print(", {} of them of unknown type, kept as hexadecimal digits", counts.raw);
     fmt::print("\n");

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <future>
 #include <optional>
 #include <span>
 #include <thread>
@@ -18,6 +19,7 @@
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
 #include "experiment/run_session.hpp"
+#include "files/result_file.hpp"
 #include "guardian/kept_board.hpp"
 #include "program/board_notes.hpp"
 #include "program/exit_status.hpp"
@@ -31,7 +33,6 @@
 #include "program/subcommands.hpp"
 #include "runtime/board_policy.hpp"
 #include "runtime/overrun_reporter.hpp"
-#include "telemetry/file_error.hpp"
 
 namespace abs_hil::program {
 
@@ -99,7 +100,7 @@ namespace {
 /// Without a limit of its own, the cycle's longest gap is that at which the guardian would act.
 runtime::OverrunOptions overruns_of(const RunRequest& request) {
   runtime::OverrunOptions overruns = request.settings.realtime.overruns;
-  if (overruns.cycle_gap_max_s == 0.0 && needs_guardian(request)) {
+  if (overruns.cycle_gap_max_s == 0.0 && guardian::needs_guardian(request.settings, request.outputs.fast)) {
     constexpr double s_per_ms = 1e-3;
     overruns.cycle_gap_max_s = request.settings.guardian.timeout_ms * s_per_ms;
   }
@@ -121,8 +122,11 @@ void require_own_guardian(const RunRequest& request) {
 void require_resources(const RunRequest& request, driver::RigDriver& driver, bool has_lease) {
   driver.configure();
   const config::Settings& s = request.settings;
-  if (s.on_rig() && runtime::is_real_board(s.driver)) experiment::require_record(s.driver, driver.identity());
-  if (needs_guardian(request) && !has_lease) require_own_guardian(request);
+  if (s.on_rig() && runtime::is_real_board(s.driver)) {
+    const std::string note = experiment::require_record(s.driver, s.rig, driver.identity());
+    if (!note.empty()) spdlog::warn("{}", note);
+  }
+  if (guardian::needs_guardian(s, request.outputs.fast) && !has_lease) require_own_guardian(request);
   if (request.outputs.fast || request.settings.realtime.mode != runtime::RealtimeMode::require) return;
   runtime::RealtimeReport report;
   // Uses a thread of its own: its scheduling class disappears with it.
@@ -133,11 +137,11 @@ void require_resources(const RunRequest& request, driver::RigDriver& driver, boo
 /// Concludes the run: writes its files, reports how it ended, ends the guardian. Returns the exit status.
 /// @param lost  why recorded data was lost; empty: nothing was lost
 int conclude(const RunRequest& request, const experiment::RunSession& session, const experiment::RunOutcome& outcome,
-             driver::RigDriver& driver, RunOutputs& outputs, RunMonitor& run_monitor, const std::string& lost,
-             const ForeignRun& foreign) {
+             std::unique_ptr<driver::RigDriver> driver, RunOutputs& outputs, RunMonitor& run_monitor,
+             const std::string& lost, const ForeignRun& foreign) {
   if (!outcome.safe_state.ok()) {
     spdlog::error("the safe state may not have reached the board ({}): {}. Press the E-stop and switch the rig off",
-                  driver::error_text(outcome.safe_state), driver.what_holds_unsafe());
+                  driver::error_text(outcome.safe_state), driver->what_holds_unsafe());
   }
   const analysis::RunSummary summary = summarise(request, session, outcome,
                                                  {.metrics = outputs.metrics(),
@@ -150,7 +154,7 @@ int conclude(const RunRequest& request, const experiment::RunSession& session, c
     run_monitor.write_record(request, outcome.reason, outcome.reason_value, summary.reason);
   }
   const std::vector<std::string> unwritten =
-      outputs.write(summary, session.executive().statistics(), environment(request, driver, outcome));
+      outputs.write(summary, session.executive().statistics(), environment(request, *driver, outcome));
   if (!request.in_series) {
     std::string text = analysis::to_text(summary);
     if (const auto& folder = outputs.folder()) {
@@ -159,13 +163,23 @@ int conclude(const RunRequest& request, const experiment::RunSession& session, c
     // If the terminal was closed, the exit status must still be the run's.
     static_cast<void>(std::fputs(text.c_str(), stdout));
   }
-  for (const std::string& line : driver.tally()) spdlog::info("{}", line);
+  for (const std::string& line : driver->tally()) spdlog::info("{}", line);
+  // Lets go of the board: the guard reads it back before it believes that the run is over.
+  driver.reset();
   if (!outcome.completed()) spdlog::error("run ended early: {}", summary.reason);
   run_monitor.end();
   for (const std::string& problem : unwritten) spdlog::error("{}", problem);
   if (!lost.empty()) spdlog::error("recorded data was lost: {}", lost);
   if (!lost.empty() || !unwritten.empty()) return exit_ended_early;
   return status_of(outcome);
+}
+
+/// In a thread of its own, where a call of _exit() is caught.
+experiment::RunOutcome run_fast(experiment::RunSession& session, const experiment::RunSession::Poll& poll) {
+  std::packaged_task<experiment::RunOutcome()> task([&] { return session.run_fast(poll, true); });
+  std::future<experiment::RunOutcome> outcome = task.get_future();
+  std::jthread(std::move(task)).join();
+  return outcome.get();
 }
 
 }  // namespace
@@ -177,8 +191,8 @@ int run(const RunRequest& request) {
   runtime::VirtualClock virtual_clock;
   runtime::Clock& clock = request.outputs.fast ? static_cast<runtime::Clock&>(virtual_clock) : real_clock;
   // Outlives the driver: the service takes the board back when nobody has it open any more.
-  const std::unique_ptr<guardian::GuardianLease> lease = ask_for_lease(request);
-  const std::unique_ptr<driver::RigDriver> driver = with_faults(make_driver(s, request.outputs.fast), s, clock);
+  const std::unique_ptr<guardian::GuardianLease> lease = guardian::ask_for_lease(s, request.outputs.fast);
+  std::unique_ptr<driver::RigDriver> driver = with_faults(make_driver(s, request.outputs.fast), s, clock);
   config::Plan plan = config::plan(*request.script, s);
   for (const std::string& problem : config::beyond_limits(plan, s))
     spdlog::warn("{}; the gate limits it to that", problem);
@@ -194,6 +208,8 @@ int run(const RunRequest& request) {
   if (!request.outputs.fast) sinks.push_back(&late_cycles);
   experiment::RunSession session(clock, *driver, std::move(logic), s.gate, std::move(sinks), overruns_of(request));
   TimingMessages timing(request, session, late_cycles);
+  // Beside a board the guardian ends a run whose cycle stands still.
+  if (s.backend == "sim" || request.outputs.fast) session.watch_for_slow_cycles();
   Questions questions(request, outputs.names());
   outputs.attach(session);
   const auto& folder = outputs.folder();
@@ -222,8 +238,8 @@ int run(const RunRequest& request) {
   experiment::RunOutcome outcome;
   std::string lost;
   try {
-    outcome = request.outputs.fast ? session.run_fast(poll) : session.run_realtime(s.realtime, poll);
-  } catch (const telemetry::FileError& error) {
+    outcome = request.outputs.fast ? run_fast(session, poll) : session.run_realtime(s.realtime, poll);
+  } catch (const files::FileError& error) {
     // The run itself completed: report it, and that its record is incomplete.
     lost = error.what();
     outcome = session.outcome();
@@ -238,7 +254,7 @@ int run(const RunRequest& request) {
   if (signals) signals->allow_leaving();
   board_notes.log_once();
   if (request.stop_was_sent && outputs.stop_requested()) request.stop_was_sent();
-  return conclude(request, session, outcome, *driver, outputs, run_monitor, lost, foreign);
+  return conclude(request, session, outcome, std::move(driver), outputs, run_monitor, lost, foreign);
 }
 
 }  // namespace abs_hil::program

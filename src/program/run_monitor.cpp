@@ -55,20 +55,24 @@ RunMonitor::RunMonitor(const RunRequest& request, guardian::GuardianLease* lease
                        rig::RunNames names)
     : names_(std::move(names)),
       record_prefix_(std::move(record_prefix)),
-      region_(runtime::FlightRing::slots_for(recorded_s, request.settings.control.rate_Hz)),
-      heartbeat_(region_.panel(), region_.recorder(),
-                 needs_guardian(request) ? silent_cycles_max(request.settings) : 0),
+      recorder_(runtime::FlightRing::slots_for(recorded_s, request.settings.control.rate_Hz)),
       resident_(lease != nullptr),
       request_(request) {
-  if (!needs_guardian(request)) return;
-  const std::string launch_config = guardian_launch_json(request, record_prefix_, names_.signals);
-  if (lease != nullptr) {
-    lease->cover(region_, launch_config);
-    guardian_ = lease;
+  if (!guardian::needs_guardian(request.settings, request.outputs.fast)) {
+    pages_.emplace();
+    heartbeat_.emplace(pages_->run(), pages_->guard(), recorder_.ring());
     return;
   }
-  own_guardian_.emplace(region_, guardian::guardian_program(), launch_config);
-  guardian_ = &*own_guardian_;
+  const std::string launch_config = guardian_launch_json(request, record_prefix_, names_.signals);
+  if (lease != nullptr) {
+    lease->cover(recorder_, launch_config);
+    guardian_ = lease;
+  } else {
+    own_guardian_.emplace(recorder_, guardian::guardian_program(), launch_config);
+    guardian_ = &*own_guardian_;
+  }
+  const guardian::Pages& pages = guardian_->pages();
+  heartbeat_.emplace(pages.run(), pages.guard(), recorder_.ring(), silent_cycles_max(request.settings));
 }
 
 RunMonitor::~RunMonitor() {
@@ -76,14 +80,14 @@ RunMonitor::~RunMonitor() {
 }
 
 void RunMonitor::attach(experiment::RunSession& session) {
-  session.set_heartbeat(heartbeat_);
+  session.set_watch(*heartbeat_);
   if (guardian_ != nullptr) session.guard_with(*guardian_);
 }
 
 rig::Reason RunMonitor::poll() {
   if (guardian_ == nullptr || !guardian_->armed()) return rig::Reason::none;
   if (!std::exchange(told_notes_, true)) {
-    const std::string who = who_guards(*guardian_, resident_, request_);
+    const std::string who = guardian::who_guards(*guardian_, resident_, request_.settings);
     if (guardian_->notes().empty()) {
       spdlog::info("guardian: {}", who);
     } else {
@@ -91,7 +95,7 @@ rig::Reason RunMonitor::poll() {
     }
   }
   // A guardian that has already taken over the outputs has not died.
-  const guardian::Stage stage = region_.stage();
+  const guardian::Stage stage = guardian_->pages().run().stage.load(std::memory_order_relaxed);
   const bool on_duty = stage == guardian::Stage::guarded || stage == guardian::Stage::making_safe;
   return on_duty && !guardian_->alive() ? rig::Reason::guardian_died : rig::Reason::none;
 }
@@ -99,7 +103,7 @@ rig::Reason RunMonitor::poll() {
 void RunMonitor::write_record(const RunRequest& request, rig::Reason reason, double value, const std::string& account) {
   if (record_prefix_.empty()) return;
   const config::Settings& s = request.settings;
-  const auto records = region_.recorder().contents();
+  const auto records = recorder_.ring().contents();
   std::vector<std::string> problems;
   const auto files = telemetry::write_flight_record(
       record_prefix_, {.records = records, .reason = reason, .reason_value = value, .account = account + '\n'},

@@ -6,9 +6,9 @@
 
 #include "experiment/run_session.hpp"
 #include "guardian/guardian_process.hpp"
+#include "guardian/guarding.hpp"
 #include "guardian/shared_region.hpp"
 #include "program/command_line.hpp"
-#include "program/guarding.hpp"
 
 namespace abs_hil::program {
 
@@ -43,10 +43,11 @@ class RunMonitor {
  private:
   rig::RunNames names_;
   std::filesystem::path record_prefix_;
-  guardian::SharedRegion region_;
+  guardian::SharedRecorder recorder_;
   std::optional<guardian::GuardianProcess> own_guardian_;
   guardian::Guard* guardian_{nullptr};
-  runtime::Heartbeat heartbeat_;
+  std::optional<guardian::Pages> pages_;  ///< of a run without a guardian
+  std::optional<guardian::Heartbeat> heartbeat_;
   bool resident_;
   const RunRequest& request_;
   bool told_notes_{false};

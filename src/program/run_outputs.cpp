@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "config/config_error.hpp"
-#include "telemetry/file_error.hpp"
+#include "runtime/histogram_file.hpp"
 #include "telemetry/lcm_url.hpp"
 
 namespace abs_hil::program {
@@ -46,8 +46,8 @@ RunOutputs::RunOutputs(const RunRequest& request, rig::RunNames names)
 
 void RunOutputs::open_files(const OutputOptions& outputs) {
   if (outputs.csv_file) csv_.emplace_back(*outputs.csv_file, outputs.fast ? 0 : write_period_ns, names_);
-  if (outputs.summary_file) summary_.emplace_back(*outputs.summary_file);
-  if (outputs.histogram_file) histogram_.emplace_back(*outputs.histogram_file);
+  if (outputs.summary_file) summary_.emplace_back(*outputs.summary_file, "summary");
+  if (outputs.histogram_file) histogram_.emplace_back(*outputs.histogram_file, "histogram");
   if (outputs.log_file) {
     log_.emplace_back(*outputs.log_file, outputs.fast ? std::optional(virtual_epoch_us) : std::nullopt,
                       outputs.fast ? 0.0 : static_cast<double>(write_period_ns) * 1e-9);
@@ -178,8 +178,8 @@ std::vector<std::string> RunOutputs::write(const analysis::RunSummary& summary,
       problems.emplace_back(error.what());
     }
   };
-  for (analysis::SummaryFile& file : summary_) attempt([&] { file.write(summary); });
-  for (runtime::HistogramFile& file : histogram_) attempt([&] { file.write(statistics); });
+  for (files::ResultFile& file : summary_) attempt([&] { file.write(analysis::to_json(summary).dump(2) + '\n'); });
+  for (files::ResultFile& file : histogram_) attempt([&] { file.write(runtime::cyclictest_histogram(statistics)); });
   if (!folder_) return problems;
   attempt([&] {
     if (friction_curve_) {

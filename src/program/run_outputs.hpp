@@ -12,11 +12,12 @@
 #include "commands/command_listener.hpp"
 #include "commands/remote_commands.hpp"
 #include "experiment/run_session.hpp"
+#include "files/result_file.hpp"
 #include "program/command_line.hpp"
 #include "rig/record_sink.hpp"
 #include "run_folder/environment.hpp"
 #include "run_folder/run_folder.hpp"
-#include "runtime/histogram_file.hpp"
+#include "runtime/cycle_statistics.hpp"
 #include "telemetry/csv_sink.hpp"
 #include "telemetry/event_csv.hpp"
 #include "telemetry/lcm_outlet.hpp"
@@ -70,8 +71,8 @@ class RunOutputs {
   std::optional<run_folder::RunFolder> folder_;
   // Each list holds up to two: one in the run folder and one for the named file.
   std::list<telemetry::CsvSink> csv_;
-  std::list<analysis::SummaryFile> summary_;
-  std::list<runtime::HistogramFile> histogram_;
+  std::list<files::ResultFile> summary_;
+  std::list<files::ResultFile> histogram_;
   std::list<telemetry::LogOutlet> log_;
   std::optional<telemetry::EventCsv> events_;
   std::optional<telemetry::LcmOutlet> lcm_;

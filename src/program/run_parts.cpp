@@ -31,8 +31,8 @@ std::unique_ptr<driver::RigDriver> with_faults(std::unique_ptr<driver::RigDriver
 
 experiment::RunLogicParts make_logic(const config::Settings& s, std::vector<experiment::PhasePlan> plans,
                                      const experiment::SequenceLimits& limits) {
-  experiment::RunLogicParts parts = experiment::make_logic_parts(s.control, s.model, s.plant.ideal_actuator, s.gate,
-                                                                 s.experiment, std::move(plans), limits);
+  experiment::RunLogicParts parts = experiment::make_logic_parts(
+      s.control, s.model, config::identity(s), s.plant.ideal_actuator, s.gate, s.experiment, std::move(plans), limits);
   parts.recorded_r2_m = s.plant.rig.wheels.r2_m;
   parts.duty_steps = config::output_grid(s).duty_steps;
   return parts;

@@ -13,12 +13,39 @@ namespace abs_hil::program {
 
 namespace {
 
+/// On a board a wheel that does what the identity calls impossible may also mean that the identity is wrong. In
+/// simulation the plant is the identity.
+std::string identity_hint(rig::Reason reason, const config::Settings& s) {
+  if (!s.on_rig()) return {};
+  const rig::RigParameters& rig = s.rig.parameters;
+  const std::string tyre = fmt::format("rig.theta_N = {} N", rig.tyre.theta_N);
+  const std::string motor = fmt::format("rig.motor_stall_torque_Nm = {} N m", rig.motor.stall_torque_Nm);
+  const auto too = [](const std::string& values, const char* size, const char* change) {
+    return fmt::format(
+        "; if the encoders are sound, the rig's identity ({}) may be too {}: {} it in the rig's file (rig.identity) or "
+        "with --set, and commission the board again",
+        values, size, change);
+  };
+  switch (reason) {
+    case rig::Reason::encoder_upper_stuck:
+      return too(fmt::format("{}, rig.b1_Nm = {} N m", tyre, rig.brake.b1_Nm), "small", "raise");
+    case rig::Reason::encoder_lower_stuck:
+    case rig::Reason::encoder_upper_jumped: return too(tyre, "small", "raise");
+    case rig::Reason::encoder_lower_jumped: return too(tyre + ", " + motor, "small", "raise");
+    case rig::Reason::motor_no_response: return too(motor, "large", "lower");
+    case rig::Reason::brake_no_response:
+      return too(fmt::format("rig.b1_Nm = {} N m", rig.brake.b1_Nm), "large", "lower");
+    default: return {};
+  }
+}
+
 std::string reason_text(const experiment::RunOutcome& outcome, const config::Settings& s,
                         std::span<const std::string> own_signals, const nlohmann::ordered_json& foreign) {
   std::string text = rig::reason_text(outcome.reason, outcome.reason_value, own_signals);
   if (rig::is_fault(outcome.reason)) {
     const std::string bound = config::number_text(s, rig::row_of(outcome.reason).value.bound);
-    text = rig::reason_with_value(outcome.reason, outcome.reason_value, own_signals, bound);
+    text = rig::reason_with_value(outcome.reason, outcome.reason_value, own_signals, bound) +
+           identity_hint(outcome.reason, s);
   }
   if (outcome.reason == rig::Reason::controller_not_finite) {
     text += fmt::format(" (controller {})", s.control.controller);

@@ -1,9 +1,13 @@
 #pragma once
 
+#include <optional>
+
 #include "cli/command_line.hpp"
 #include "program/command_line.hpp"
 
 namespace abs_hil::program {
+
+constexpr double most_insist_s = 3600.0;
 
 /// Options of `abs_hil safe` as typed.
 struct SafeCommand {
@@ -14,8 +18,13 @@ struct SafeCommand {
 
 void add_safe(cli::Parser& parser, SafeCommand& command);
 
-/// `abs_hil safe`: ends the runs that drive the configured board, or every board found, and writes and verifies zeros.
-/// Prints what to pull if that fails. Returns the exit status. Throws config::ConfigError, driver::Unavailable.
+/// `abs_hil safe`: writes zeros to the configured board, or to every board found, before anything else; then ends the
+/// runs that drive them, asks the resident service, verifies, and says what it saw and what to pull. Zeros go out all
+/// the while. Nothing in it waits without a bound. Returns the exit status; if something hangs it ends the process.
 int make_boards_safe(const SafeCommand& command);
+
+/// The same for a command line that begins with `safe`, without the time that it takes to build the command lines of
+/// all subcommands. Nothing for any other, for its help, and for a wrong one, after the boards have their zeros.
+[[nodiscard]] std::optional<int> safe_at_once(int argc, char** argv);
 
 }  // namespace abs_hil::program

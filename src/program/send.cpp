@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <charconv>
 
@@ -43,6 +44,11 @@ int send(const RunRequest& request, const SendOptions& options) {
                                                .timeout_s = options.timeout_s});
   if (reply.outcome == commands::Outcome::accepted) {
     fmt::print("{}\n", reply.message);
+    if (!reply.authentic) {
+      spdlog::warn(
+          "this answer is not authenticated: anybody on the network could have sent it; give the run and send the "
+          "same key with --set commands.key_file=FILE, or look at the rig");
+    }
     return exit_completed;
   }
   fmt::print(stderr, "abs_hil: {}\n", reply.message);

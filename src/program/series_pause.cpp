@@ -5,6 +5,7 @@
 #include <string>
 #include <thread>
 
+#include "commands/authority.hpp"
 #include "commands/command_listener.hpp"
 #include "program/signals.hpp"
 #include "telemetry/lcm_outlet.hpp"
@@ -26,6 +27,8 @@ class StopListener {
         stream_({.channel_prefix = run.settings.telemetry.channel_prefix}, {}, {}),
         commands_(lcm_, stream_, {}) {
     stream_.add(lcm_);
+    const config::CommandOptions& commands = run.settings.commands;
+    if (commands.enabled) commands::sign_answers(stream_, commands::read_key(commands.key_file));
     commands_.set_judge([](const command2_t& command) {
       const std::string shown = telemetry::printable(command.command, 64);
       return telemetry::CommandAnswer{rig::Reason::command_not_now,

@@ -9,6 +9,7 @@
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "config/config_error.hpp"
 #include "config/series.hpp"
@@ -126,7 +127,7 @@ std::unique_ptr<run_folder::SeriesFolder> open_folder(const RunRequest& base,
     folder = std::make_unique<run_folder::SeriesFolder>(
         path, run_folder::sha256_of(base.config_json + base.settings.plant_name + base.settings.backend),
         base.script->name, std::move(entries));
-  } catch (const run_folder::FolderError& error) {
+  } catch (const std::runtime_error& error) {
     throw config::ConfigError(error.what());
   }
   return folder;

@@ -11,11 +11,11 @@
 
 #include "abs_hil/driver/io_result.hpp"
 #include "config/config_error.hpp"
+#include "files/result_file.hpp"
 #include "program/exit_status.hpp"
 #include "program/study_command.hpp"
 #include "program/study_runs.hpp"
 #include "study/compute.hpp"
-#include "study/durable_file.hpp"
 
 namespace abs_hil::program {
 
@@ -128,14 +128,15 @@ int submit_study(const StudyCommand& command) {
   const std::string name = plain(file.stem().string());
   const fs::path array = slurm / "array.sh";
   const fs::path merge = slurm / "merge.sh";
-  study::write_durably(array,
-                       script(name, fmt::format("\"{}/%A_%a.log\"", slurm.string()),
-                              {fmt::format("--array=1-{}", tasks), "--requeue", "--open-mode=append"}, command.sbatch,
-                              fmt::format("{} study {} --out {} --shard \"$SLURM_ARRAY_TASK_ID/{}\" --threads "
-                                          "\"${{SLURM_CPUS_PER_TASK:-1}}\"",
-                                          program, quoted(file.string()), quoted(path.string()), tasks)));
-  study::write_durably(merge, script(name + "-merge", fmt::format("\"{}/%j-merge.log\"", slurm.string()), {"--requeue"},
-                                     command.sbatch, fmt::format("{} study merge {}", program, quoted(path.string()))));
+  files::write_result(array, "script",
+                      script(name, fmt::format("\"{}/%A_%a.log\"", slurm.string()),
+                             {fmt::format("--array=1-{}", tasks), "--requeue", "--open-mode=append"}, command.sbatch,
+                             fmt::format("{} study {} --out {} --shard \"$SLURM_ARRAY_TASK_ID/{}\" --threads "
+                                         "\"${{SLURM_CPUS_PER_TASK:-1}}\"",
+                                         program, quoted(file.string()), quoted(path.string()), tasks)));
+  files::write_result(merge, "script",
+                      script(name + "-merge", fmt::format("\"{}/%j-merge.log\"", slurm.string()), {"--requeue"},
+                             command.sbatch, fmt::format("{} study merge {}", program, quoted(path.string()))));
   if (command.write_only) {
     fmt::print("{}\n{}\n", array.string(), merge.string());
     return exit_completed;

@@ -20,7 +20,7 @@ int run_series(const RunOptions& options, const RunRequest& base);
 /// config::ConfigError and std::invalid_argument.
 int compare(const CompareOptions& options, const std::vector<std::string>& command_line);
 /// `abs_hil list`: lists controllers, plants, experiments and backends, or all configuration keys.
-int list(bool keys);
+int list(bool keys, bool json);
 /// `abs_hil list --quantities`: prints the table of rig/quantities.hpp, as text or JSON.
 int list_quantities(bool json);
 /// `abs_hil list --reasons`: prints the table of rig/reason.hpp, as text or JSON.

@@ -7,6 +7,7 @@
 #include "config/config_error.hpp"
 #include "config/config_json.hpp"
 #include "config/key_table.hpp"
+#include "rig/parse_json.hpp"
 #include "telemetry/checked_decode.hpp"
 
 namespace abs_hil::replay {
@@ -45,7 +46,8 @@ class Collector {
     }
   }
 
-  RecordedRun finish() {
+  RecordedRun finish(std::string cut) {
+    run_.cut = std::move(cut);
     if (run_.cycles.empty()) fail("it holds no telemetry of abs_hil (no telemetry_t message)");
     if (!has_experiment_) {
       fail("it holds no configuration (no experiment_t message); record with --log, or for more than 5 s");
@@ -136,15 +138,16 @@ class Collector {
 
 RecordedRun read_run(const std::filesystem::path& recording) {
   Collector collector(recording.string());
-  telemetry::for_each_event(recording, [&collector](const telemetry::LogEvent& event) { collector.take(event); });
-  return collector.finish();
+  return collector.finish(
+      telemetry::for_each_event(recording, [&collector](const telemetry::LogEvent& event) { collector.take(event); }));
 }
 
 config::Settings settings_of(const RecordedRun& run, const Changes& changes) {
   config::Settings settings;
   config::KeyTable keys(settings);
-  const auto config = nlohmann::ordered_json::parse(run.experiment.config_json, nullptr, false);
-  if (config.is_discarded()) throw RecordingError("the recorded configuration is not JSON; the recording is damaged");
+  const auto config = rig::parse_json_if_valid<nlohmann::ordered_json>(run.experiment.config_json);
+  if (config.is_discarded())
+    throw RecordingError("the recorded configuration is not JSON, or nested too deep; the recording is damaged");
   try {
     // Unknown keys of another version are harmless as long as --check finds the same commands.
     static_cast<void>(config::load_json(config, keys, "recorded configuration"));
@@ -156,6 +159,8 @@ config::Settings settings_of(const RecordedRun& run, const Changes& changes) {
   if (settings.on_rig()) {
     settings.model_name = settings.plant_name;
     keys.leave_out_plant();
+    // Before the rig had an identity, the limits came from the model.
+    if (!config.contains("rig")) settings.rig.parameters = settings.model;
   }
   if (changes.controller) keys.set_text("control.controller=" + *changes.controller, "--controller");
   for (const std::string& assignment : changes.assignments) keys.set_text(assignment, "--set");

@@ -22,10 +22,11 @@ struct RecordedRun {
   std::vector<std::int64_t> measured_ns{};  ///< time at which the counters of each cycle were read
   std::vector<event_t> events{};
   std::vector<adjustment_t> adjustments{};  ///< ordered by cycle
+  std::string cut{};                        ///< telemetry::EventLogReader::cut: the recording of a killed run
   bool virtual_time{false};                 ///< a run with --fast: exact wake-ups, computations take no time
 };
 
-/// Reads a recording (event log or converted CSV). Throws telemetry::RecordingError if it is damaged or truncated,
+/// Reads a recording (event log or converted CSV). Throws telemetry::RecordingError if it is damaged,
 /// holds no run or several runs, or lacks a cycle.
 [[nodiscard]] RecordedRun read_run(const std::filesystem::path& recording);
 

@@ -11,6 +11,7 @@
 #include "config/plan.hpp"
 #include "driver/sim/sim_driver.hpp"
 #include "experiment/run_logic.hpp"
+#include "rig/parse_json.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/cyclic_executive.hpp"
 #include "runtime/record_pump.hpp"
@@ -168,7 +169,7 @@ class Collected final : public rig::RecordSink {
 
 /// The recorded script, or, for a recording without one, the script with the recorded name.
 config::Plan plan_of(const RecordedRun& run, const config::Settings& s) {
-  const auto config = nlohmann::json::parse(run.experiment.config_json, nullptr, false);
+  const auto config = rig::parse_json_if_valid(run.experiment.config_json);
   if (!config.is_object() || !config.contains("experiment_script") || !config["experiment_script"].is_string()) {
     return config::plan(s);
   }
@@ -183,8 +184,9 @@ config::Plan plan_of(const RecordedRun& run, const config::Settings& s) {
 
 experiment::RunLogicParts logic_parts(const RecordedRun& run, const config::Settings& s) {
   config::Plan plan = plan_of(run, s);
-  experiment::RunLogicParts parts = experiment::make_logic_parts(s.control, s.model, s.plant.ideal_actuator, s.gate,
-                                                                 s.experiment, std::move(plan.phases), plan.limits);
+  experiment::RunLogicParts parts =
+      experiment::make_logic_parts(s.control, s.model, config::identity(s), s.plant.ideal_actuator, s.gate,
+                                   s.experiment, std::move(plan.phases), plan.limits);
   parts.duty_steps = config::output_grid(s).duty_steps;
   return parts;
 }
@@ -224,8 +226,9 @@ std::vector<RerunCycle> rerun(const RecordedRun& run, const config::Settings& s,
   TimedReading rig(backend, run, clock);
   runtime::RecordRing ring(ring_capacity);
   // Delays are part of the recording and not repeated, so they must not count here.
-  runtime::CyclicExecutive executive(clock, rig, cycle_logic, gate, ring, std::llround(1e9 / s.control.rate_Hz),
-                                     {.startup_cycles = 0, .max_consecutive = 0, .cycle_gap_max_s = ignored_gap_s});
+  runtime::CyclicExecutive executive(
+      clock, rig, cycle_logic, gate, ring, std::llround(1e9 / s.control.rate_Hz),
+      {.startup_cycles = 0, .max_consecutive = 0, .late_max_s = ignored_gap_s, .cycle_gap_max_s = ignored_gap_s});
   Collected collected;
   runtime::RecordPump pump(ring, s.plant.rig.wheels.r2_m, {&collected});
   rig.configure();

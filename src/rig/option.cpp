@@ -42,6 +42,23 @@ bool AllowedNames::contains(std::string_view name) const noexcept {
   return false;
 }
 
+std::string SafetyClass::in_words(std::string_view unit) const {
+  const std::string value =
+      text.empty() ? number_text(bound) + (unit.empty() ? "" : ' ' + std::string(unit)) : std::string(text);
+  switch (kind) {
+    case Kind::unclassed: return "not classed";
+    case Kind::none: return "no effect";
+    case Kind::above: return "weakens above " + value;
+    case Kind::below: return "weakens below " + value;
+    case Kind::unless: return "weakens unless " + value;
+    case Kind::text: return "weakens if " + value;
+    case Kind::commissioned: return "fixed by the commissioning record";
+    case Kind::elsewhere: return "judged by a rule of its own";
+    case Kind::consent: return "a person's consent";
+  }
+  return {};
+}
+
 std::string valid_number_text(const OptionFacts& facts, bool whole) {
   return std::string(whole ? "a whole number in " : "a number in ") + facts.range.text();
 }

@@ -4,13 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
+
+#include "files/result_file.hpp"
 
 namespace abs_hil::run_folder {
 
@@ -33,14 +33,7 @@ RunFolder::RunFolder(fs::path path) : path_(std::move(path)) {
 }
 
 void RunFolder::write(std::string_view name, std::string_view text) const {
-  const fs::path path = of(name);
-  errno = 0;
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) {
-    throw FolderError(fmt::format("cannot write \"{}\": {}", path.string(), std::strerror(errno != 0 ? errno : EIO)));
-  }
+  files::write_result(of(name), "file of the run folder", text);
 }
 
 void RunFolder::write(std::string_view name, const nlohmann::ordered_json& json) const {
@@ -58,6 +51,30 @@ void RunFolder::seal() const {
   std::string sums;
   for (const std::string& name : names) sums += fmt::format("{}  {}\n", sha256_of_file(path_ / name), name);
   write(file::checksums, std::string_view(sums));
+}
+
+void check_seal(const fs::path& folder) {
+  constexpr std::size_t digits = 64;
+  const fs::path sums = folder / file::checksums;
+  std::error_code error;
+  if (!fs::exists(fs::symlink_status(sums, error))) return;
+  std::ifstream lines(sums);
+  std::size_t files = 0;
+  for (std::string line; std::getline(lines, line); ++files) {
+    const std::string name = line.size() > digits + 2 ? line.substr(digits + 2) : std::string();
+    if (name.empty() || fs::path(name).has_parent_path()) {
+      throw FolderError(
+          fmt::format("\"{}\": line {} is damaged; restore this file from a copy", sums.string(), files + 1));
+    }
+    if (fs::exists(folder / name, error) && sha256_of_file(folder / name) != line.substr(0, digits)) {
+      throw FolderError(
+          fmt::format("\"{}\" is not as it was recorded (SHA256SUMS); restore it from a copy, or remove "
+                      "SHA256SUMS to use the folder as it is",
+                      (folder / name).string()));
+    }
+  }
+  if (files == 0)
+    throw FolderError(fmt::format("\"{}\" is empty or cannot be read; restore it from a copy", sums.string()));
 }
 
 fs::path default_runs_dir() {

@@ -46,6 +46,11 @@ class RunFolder {
   std::filesystem::path path_;
 };
 
+/// Compares the files of a folder with its SHA256SUMS. Throws FolderError with the name of the first that has changed,
+/// and for a damaged SHA256SUMS. Missing files are left to the reader that wants them. A folder without SHA256SUMS, of
+/// a run that did not end, is not judged.
+void check_seal(const std::filesystem::path& folder);
+
 /// SHA-256 of a file: 64 hexadecimal digits. Throws FolderError if the file cannot be read.
 [[nodiscard]] std::string sha256_of_file(const std::filesystem::path& path);
 /// SHA-256 of a text: 64 hexadecimal digits.

@@ -9,6 +9,8 @@
 #include <optional>
 #include <utility>
 
+#include "rig/parse_json.hpp"
+
 namespace abs_hil::run_folder {
 
 namespace fs = std::filesystem;
@@ -47,7 +49,9 @@ std::string SeriesFolder::name_of(std::size_t run) { return fmt::format("run-{:0
 
 void SeriesFolder::read_index(const std::string& identity) {
   const fs::path index = path_ / series_index;
-  const auto json = nlohmann::ordered_json::parse(std::ifstream(index), nullptr, false);
+  std::ifstream in(index);
+  const std::string text(std::istreambuf_iterator<char>(in), {});
+  const auto json = rig::parse_json_if_valid<nlohmann::ordered_json>(text);
   const auto has_status = [](const nlohmann::ordered_json& run) { return text_of(run, "status").has_value(); };
   const bool whole = text_of(json, "identity") == identity && json.contains("runs") && json["runs"].is_array() &&
                      json["runs"].size() == runs_.size() && std::ranges::all_of(json["runs"], has_status);
@@ -62,6 +66,7 @@ void SeriesFolder::read_index(const std::string& identity) {
     // The run folders decide: a killed program may leave the index one run behind.
     const bool there = fs::is_directory(path_ / name_of(i));
     const std::string status = text_of(json["runs"][i], "status").value_or("");
+    if (there) check_seal(path_ / name_of(i));
     if (there) runs_[i].status = status == "planned" ? "completed" : status;
   }
 }
@@ -73,17 +78,7 @@ void SeriesFolder::write_index() const {
         {{"folder", name_of(i)}, {"varied", runs_[i].varied}, {"seed", runs_[i].seed}, {"status", runs_[i].status}});
   }
   const nlohmann::ordered_json json{{"experiment", title_}, {"identity", identity_}, {"runs", std::move(runs)}};
-  const fs::path index = path_ / series_index;
-  fs::path part = index;
-  part += ".part";
-  errno = 0;
-  std::ofstream file(part, std::ios::binary);
-  file << json.dump(2) << '\n';
-  file.close();
-  if (!file) {
-    throw FolderError(fmt::format("cannot write \"{}\": {}", part.string(), std::strerror(errno != 0 ? errno : EIO)));
-  }
-  move_to(part, index);
+  files::write_result(path_ / series_index, "index of the series", json.dump(2) + '\n');
 }
 
 bool SeriesFolder::done(std::size_t run) const { return status(run) != "planned"; }

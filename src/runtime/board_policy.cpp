@@ -86,23 +86,32 @@ void refuse_impatient_guardian(const BoardUse& use) {
       use.guardian_timeout_ms, two_periods_ms / 2.0, two_periods_ms));
 }
 
-/// The bounds leave the guardian and the gate 10 ms to act within 50 ms (docs/dead-man.md).
-void refuse_weakened_limits(const BoardUse& use) {
-  if (!is_real_board(use.driver)) return;
-  constexpr double timeout_most_ms = 40.0;
-  constexpr double age_most_s = 0.05;
-  if (use.guardian_timeout_ms > timeout_most_ms && !use.unsafe.outputs_on_after_death) {
-    throw std::invalid_argument(
-        fmt::format("guardian.timeout_ms = {}: motor and brake could stay on for longer than 50 ms after the program's "
-                    "death; give at most {}, or accept the risk with --set unsafe.outputs_on_after_death=true",
-                    use.guardian_timeout_ms, timeout_most_ms));
+/// One rule for all options: what weakens the protection by its row needs a person's consent, and is told.
+std::vector<std::string> refuse_weak_values(const BoardUse& use) {
+  std::vector<std::string> accepted;
+  if (!is_real_board(use.driver)) return accepted;
+  for (const WeakValue& weak : use.weak) {
+    if (!has_consent(weak, use.unsafe)) {
+      const std::string flag = weak.consent.empty() ? "" : fmt::format(" or unsafe.{}=true", weak.consent);
+      throw std::invalid_argument(fmt::format(
+          "{} = {}: this value weakens the protection of a real board ({}; {}); give another one, or accept "
+          "the risk with --set unsafe.keys={}{}",
+          weak.key, weak.value, weak.class_text, weak.meaning, weak.key, flag));
+    }
+    accepted.push_back(fmt::format("{} = {} weakens the protection of this board ({}; {}); unsafe. accepts it",
+                                   weak.key, weak.value, weak.class_text, weak.meaning));
   }
-  if (use.sample_age_max_s > age_most_s && !use.unsafe.blind_control) {
-    throw std::invalid_argument(fmt::format(
-        "gate.sample_age_max_s = {}: motor and brake could stay on for so long without a fresh sample; give "
-        "at most {} s, or accept the risk with --set unsafe.blind_control=true",
-        use.sample_age_max_s, age_most_s));
-  }
+  return accepted;
+}
+
+/// The gate and the ends of phases would see wrong speeds, on an emulator too.
+void refuse_other_counts(const BoardUse& use) {
+  if (use.model_counts_per_rev == 0 || use.model_counts_per_rev == use.rig_counts_per_rev) return;
+  throw std::invalid_argument(
+      fmt::format("model.encoder_counts_per_rev = {0}: the rig's encoders give {1} counts a revolution by its identity "
+                  "(rig.encoder_counts_per_rev); leave the model's out, or correct the identity with --set "
+                  "rig.encoder_counts_per_rev={0} and commission the board again",
+                  use.model_counts_per_rev, use.rig_counts_per_rev));
 }
 
 /// A crash of foreign code ends the program. The guardian makes the outputs safe, but a person must want that.
@@ -139,15 +148,16 @@ bool is_real_board(const driver::DriverOptions& driver) {
   return board.reality == driver::Reality::unknown ? !driver.emulated : is_certainly_real(board);
 }
 
-void refuse_unsafe_use(const BoardUse& use) {
+std::vector<std::string> refuse_unsafe_use(const BoardUse& use) {
   refuse_virtual_time_on_hardware(use);
   refuse_start_speed(use);
   refuse_unfit_options(use);
   refuse_injection_into_hardware(use);
   refuse_hardware_without_guardian(use);
   refuse_impatient_guardian(use);
-  refuse_weakened_limits(use);
   refuse_foreign_code(use);
+  refuse_other_counts(use);
+  return refuse_weak_values(use);
 }
 
 void refuse_caps_above_board(const DutyCaps& asked_for, const driver::DriverOptions& driver) {

@@ -46,6 +46,7 @@ CyclicExecutive::CyclicExecutive(Clock& clock, driver::RigDriver& driver, CycleL
       period_ns_(period_ns),
       startup_cycles_(count_of(overruns.startup_cycles)),
       max_consecutive_(count_of(overruns.max_consecutive)),
+      late_max_ns_(static_cast<std::int64_t>(overruns.late_max_s * static_cast<double>(rig::ns_per_s))),
       gap_max_ns_(longest_gap_ns(overruns.cycle_gap_max_s, period_ns)),
       statistics_(timed ? std::make_unique<CycleStatistics>() : nullptr) {}
 
@@ -85,17 +86,14 @@ void CyclicExecutive::latch_stale_command(std::int64_t age_ns) noexcept {
 }
 
 void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
-  if (heartbeat_ != nullptr) {
-    heartbeat_->beat();
-    if (heartbeat_->guardian_lost()) {
-      gate_.latch(rig::Reason::guardian_silent, static_cast<double>(heartbeat_->silent_cycles()));
-    }
-  }
+  GuardianSign guardian{};
+  if (watch_ != nullptr) guardian = watch_->beat();
+  const bool guardian_silent = guardian.reason == rig::Reason::guardian_silent;
+  if (guardian_silent) gate_.latch(guardian.reason, static_cast<double>(guardian.silent_cycles));
   const std::int64_t woken_ns = clock_.now_ns();
   watch_time(woken_ns);
-  if (heartbeat_ != nullptr) {
-    if (const rig::Reason why = heartbeat_->taken_back_for(); why != rig::Reason::none) gate_.latch(why, 0.0);
-  }
+  // After the clock: a pause of the whole computer is the reason then, not what the guardian made of it.
+  if (!guardian_silent && guardian.reason != rig::Reason::none) gate_.latch(guardian.reason, 0.0);
   if (sequence_ == 0) start_ns_ = woken_ns;
   record.sequence = sequence_++;
   record.stamp_ns = woken_ns;
@@ -166,7 +164,7 @@ void CyclicExecutive::keep(const rig::CycleRecord& record) noexcept {
     if (!starting_up()) statistics_->add(record.timing);
   }
   ring_.push(record);
-  if (heartbeat_ != nullptr) heartbeat_->keep(record);
+  if (watch_ != nullptr) watch_->keep(record);
 }
 
 void CyclicExecutive::schedule_next(const rig::CycleTiming& timing) noexcept {
@@ -174,17 +172,19 @@ void CyclicExecutive::schedule_next(const rig::CycleTiming& timing) noexcept {
   record_ns_ = now_ns - (tick_ns_ + timing.wakeup_latency_ns + timing.cycle_ns);
   periods_skipped_ = 0;
   overrun_cause_ = rig::OverrunCause::none;
-  tick_ns_ += period_ns_;
+  const std::int64_t began_ns = std::exchange(tick_ns_, tick_ns_ + period_ns_);
   if (now_ns < tick_ns_) {
+    late_since_ns_ = -1;
     if (statistics_ != nullptr) statistics_->count_cycle_in_time();
     return;
   }
   const std::int64_t missed = (now_ns - tick_ns_) / period_ns_ + 1;
   tick_ns_ += missed * period_ns_;
-  count_late(timing, missed);
+  count_late(timing, missed, began_ns, now_ns);
 }
 
-void CyclicExecutive::count_late(const rig::CycleTiming& timing, std::int64_t ticks_missed) noexcept {
+void CyclicExecutive::count_late(const rig::CycleTiming& timing, std::int64_t ticks_missed, std::int64_t began_ns,
+                                 std::int64_t now_ns) noexcept {
   periods_skipped_ = static_cast<std::uint32_t>(ticks_missed);
   overrun_cause_ = longest_part(timing, record_ns_);
   if (statistics_ == nullptr) return;
@@ -193,8 +193,10 @@ void CyclicExecutive::count_late(const rig::CycleTiming& timing, std::int64_t ti
     return;
   }
   const std::uint64_t in_a_row = statistics_->count_overrun(overrun_cause_, static_cast<std::uint64_t>(ticks_missed));
+  if (late_since_ns_ < 0) late_since_ns_ = began_ns;
+  const bool too_long = in_a_row > 1 && now_ns - late_since_ns_ >= late_max_ns_;
   // The next cycle finds the fault latched and sends the safe command.
-  if (in_a_row == max_consecutive_) {
+  if (in_a_row == max_consecutive_ || too_long) {
     gate_.latch(rig::Reason::consecutive_overruns, static_cast<double>(in_a_row));
   }
 }

@@ -11,34 +11,39 @@
 #include "runtime/command_gate.hpp"
 #include "runtime/cycle_logic.hpp"
 #include "runtime/cycle_statistics.hpp"
-#include "runtime/heartbeat.hpp"
+#include "runtime/cycle_watch.hpp"
 #include "runtime/spsc_ring.hpp"
 
 namespace abs_hil::runtime {
 
 using RecordRing = SpscRing<rig::CycleRecord>;
 
-/// Which late cycles count, and how many end the run.
+/// Which late cycles count, and which end the run.
 struct OverrunOptions {
   ABS_HIL_OPTIONS(OverrunOptions);
   /// They meet cold caches.
   ABS_HIL_OPTION(std::int32_t, startup_cycles, 10, .meaning = "first cycles of a run, not counted as late or measured",
-                 .range = rig::from_zero(100'000));
+                 .range = rig::from_zero(100'000), .safety = rig::weaker_above(10));
   ABS_HIL_OPTION(std::int32_t, max_consecutive, 50, .key = "max_consecutive_overruns",
-                 .meaning = "late cycles in a row that are a fault; 0: never", .range = rig::from_zero(1'000'000));
+                 .meaning = "late cycles in a row that are a fault; 0: only realtime.late_max_s counts",
+                 .range = rig::from_zero(1'000'000), .safety = rig::no_effect_on_safety);
+  /// Two late cycles in a row count at least, whatever is set.
+  ABS_HIL_OPTION(double, late_max_s, 0.15, .unit = "s",
+                 .meaning = "time over which all cycles were late that is a fault", .range = rig::positive(1000),
+                 .safety = rig::weaker_above(0.15));
   /// At least three periods count, whatever is set.
   ABS_HIL_OPTION(double, cycle_gap_max_s, 0.0, .unit = "s",
                  .meaning =
                      "longest time from one cycle to the next with an output on, longer is a fault; 0: the "
                      "guardian's time-out, without a guardian 0.1 s",
-                 .range = rig::from_zero(10));
+                 .range = rig::from_zero(10), .safety = rig::weaker_above(0.04));
 };
 
 /// Runs the cycle read -> estimate -> sequence -> control -> gate -> write -> record once per period, on absolute
 /// ticks, in real or virtual time. After a late cycle it skips whole periods and keeps the ticks' phase; it does not
-/// catch up. It blames a late cycle on the part that took longest. Too many late cycles in a row latch a fault; so
-/// do one long gap between two cycles and a suspended computer while an output is on. `step` is real-time safe apart
-/// from the clock's sleep and the driver's I/O; the constructor allocates everything.
+/// catch up. It blames a late cycle on the part that took longest. Late cycles in a row latch a fault when they are
+/// too many or last too long; so do one long gap between two cycles and a suspended computer while an output is on.
+/// `step` is real-time safe apart from the clock's sleep and the driver's I/O; the constructor allocates everything.
 class CyclicExecutive {
  public:
   /// @param driver active; the executive leaves it active, and its caller must deactivate it
@@ -49,14 +54,15 @@ class CyclicExecutive {
 
   /// Sets the time of the first tick; otherwise it is the moment of the first step. Call it before the first step.
   void start_at(std::int64_t first_tick_ns) noexcept { first_tick_ns_ = first_tick_ns; }
-  /// Makes each cycle beat, feed the flight recorder, and latch a fault when the guardian is lost. `heartbeat` must
+  /// Makes each cycle beat, feed the flight recorder, and latch a fault when the guardian is lost. `watch` must
   /// outlive the last step. Call it before the first step.
-  void set_heartbeat(Heartbeat& heartbeat) noexcept { heartbeat_ = &heartbeat; }
+  void set_watch(CycleWatch& watch) noexcept { watch_ = &watch; }
   /// Sleeps until the next tick and runs one cycle. False after the run's last cycle.
   bool step() noexcept;
   /// Ends the run in order at the next cycle. Any thread or signal handler may call it. The first reason stays.
   void request_stop(rig::Reason reason) noexcept;
 
+  [[nodiscard]] std::int64_t period_ns() const noexcept { return period_ns_; }
   /// Timing statistics; other threads may read them during the run. Only of an executive that keeps them.
   [[nodiscard]] const CycleStatistics& statistics() const noexcept { return *statistics_; }
   /// The driver's first error, for the report; later errors follow from it.
@@ -69,7 +75,8 @@ class CyclicExecutive {
   void note_wheels_apart(bool apart) noexcept;
   void keep(const rig::CycleRecord& record) noexcept;
   void schedule_next(const rig::CycleTiming& timing) noexcept;
-  void count_late(const rig::CycleTiming& timing, std::int64_t ticks_missed) noexcept;
+  void count_late(const rig::CycleTiming& timing, std::int64_t ticks_missed, std::int64_t began_ns,
+                  std::int64_t now_ns) noexcept;
   [[nodiscard]] bool starting_up() const noexcept { return sequence_ <= startup_cycles_; }
 
   Clock& clock_;
@@ -77,10 +84,12 @@ class CyclicExecutive {
   CycleLogic& logic_;
   CommandGate& gate_;
   RecordRing& ring_;
-  Heartbeat* heartbeat_{nullptr};
+  CycleWatch* watch_{nullptr};
   std::int64_t period_ns_;
   std::uint64_t startup_cycles_;
   std::uint64_t max_consecutive_;
+  std::int64_t late_max_ns_;
+  std::int64_t late_since_ns_{-1};  ///< the tick of the first of the latest late cycles in a row; < 0: none
   std::int64_t gap_max_ns_;
   bool acting_{false};        ///< the latest command has an output on
   bool wheels_apart_{false};  ///< as the logic told in the latest cycle

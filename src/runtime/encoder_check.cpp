@@ -17,11 +17,11 @@ constexpr double disagreement_s = 0.1;
 constexpr double ahead_max_s = 0.05;
 
 /// One reason for each SpeedInterval::Verdict.
-using Reasons = std::array<Reason, 4>;
+using Reasons = std::array<Reason, 5>;
 constexpr Reasons upper_reasons{Reason::none, Reason::encoder_upper_stuck, Reason::encoder_upper_reversed,
-                                Reason::encoder_upper_jumped};
+                                Reason::encoder_upper_jumped, Reason::overspeed};
 constexpr Reasons lower_reasons{Reason::none, Reason::encoder_lower_stuck, Reason::encoder_lower_reversed,
-                                Reason::encoder_lower_jumped};
+                                Reason::encoder_lower_jumped, Reason::overspeed};
 
 Reason reason_of(SpeedInterval::Verdict verdict, const Reasons& reasons) noexcept {
   return reasons[static_cast<std::size_t>(verdict)];
@@ -34,7 +34,8 @@ SpeedInterval::Verdict SpeedInterval::update(double omega_rad_s, double resoluti
   const double slack_rad_s = SpeedBounds<double>::slack_rad_s(omega_rad_s, resolution_rad_s, dt_s, stamp_error_s);
   if (bounds_.take(omega_rad_s, slack_rad_s, dt_s)) {
     outside_ = 0;
-    return Verdict::sound;
+    too_fast_ = std::abs(omega_rad_s) - slack_rad_s > fastest_rad_s_ ? too_fast_ + 1 : 0;
+    return too_fast_ < outside_max ? Verdict::sound : Verdict::too_fast;
   }
   ++outside_;
   if (outside_ < outside_max) return Verdict::sound;

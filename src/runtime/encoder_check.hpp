@@ -11,20 +11,23 @@ namespace abs_hil::runtime {
 /// each sound reading narrows it. A locking wheel stays inside; a reading outside is a fault. Real-time safe.
 class SpeedInterval {
  public:
-  enum class Verdict : std::uint8_t { sound, stuck, reversed, jumped };
+  enum class Verdict : std::uint8_t { sound, stuck, reversed, jumped, too_fast };
 
   SpeedInterval(double gain_rad_s2, double loss_rad_s2, double fastest_rad_s) noexcept
-      : bounds_(gain_rad_s2, loss_rad_s2, fastest_rad_s) {}
+      : bounds_(gain_rad_s2, loss_rad_s2, fastest_rad_s), fastest_rad_s_(fastest_rad_s) {}
 
   /// Takes a mean speed over `dt_s`; `resolution_rad_s` is its uncertainty from counting, `stamp_error_s` < `dt_s` that
-  /// of `dt_s`. The verdict differs from `sound` only after three readings in a row outside the interval.
+  /// of `dt_s`. The verdict differs from `sound` only after three readings in a row outside the interval, or above the
+  /// fastest speed: the counts tell that without any observer.
   Verdict update(double omega_rad_s, double resolution_rad_s, double dt_s, double stamp_error_s = 0.0) noexcept;
   /// True if the latest reading was outside the interval.
   [[nodiscard]] bool doubtful() const noexcept { return outside_ > 0; }
 
  private:
   SpeedBounds<double> bounds_;
-  int outside_{0};  ///< number of readings in a row outside the interval
+  double fastest_rad_s_;
+  int outside_{0};   ///< number of readings in a row outside the interval
+  int too_fast_{0};  ///< number of readings in a row above the fastest speed
 };
 
 /// The ways that both wheels' treads have covered while a condition held, for a comparison over more than one speed

@@ -2,12 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstdio>
-#include <cstring>
-#include <fstream>
-#include <stdexcept>
-#include <utility>
 
 #include "abs_hil/rig/time_units.hpp"
 
@@ -40,12 +35,6 @@ void append_line(std::string& text, const char* title, const char* format, const
   text += '\n';
 }
 
-std::runtime_error cannot_write(const std::filesystem::path& path) {
-  return std::runtime_error("cannot write the histogram to \"" + path.string() +
-                            "\": " + std::strerror(errno != 0 ? errno : EIO) +
-                            "; give a path in an existing, writable directory");
-}
-
 }  // namespace
 
 std::string cyclictest_histogram(const CycleStatistics& statistics) {
@@ -71,19 +60,6 @@ std::string cyclictest_histogram(const CycleStatistics& statistics) {
   append_line(text, "# Max Latencies:", " %05llu", columns, [us](Histogram h) { return us(h.max_ns()); });
   append_line(text, "# Histogram Overflows:", " %05llu", columns, [](Histogram h) { return h.overflows(); });
   return text;
-}
-
-HistogramFile::HistogramFile(std::filesystem::path path) : path_(std::move(path)) {
-  errno = 0;
-  if (!std::ofstream(path_)) throw cannot_write(path_);
-}
-
-void HistogramFile::write(const CycleStatistics& statistics) {
-  errno = 0;
-  std::ofstream file(path_);
-  file << cyclictest_histogram(statistics);
-  file.close();
-  if (!file) throw cannot_write(path_);
 }
 
 }  // namespace abs_hil::runtime

@@ -102,7 +102,7 @@ RealtimeStep lock_memory() {
 RealtimeStep prefault_heap() {
   // One heap for all threads, no memory returned to the kernel, no block in a mapping of its own. Pages once touched
   // therefore stay in memory; mallopt(3). The heap has one lock for all threads: the cycle never allocates, whatever
-  // the driver (the tests runtime_proofs and driver_usb_proofs).
+  // the driver (the tests runtime_proofs and driver_proofs).
   mallopt(M_ARENA_MAX, 1);
   mallopt(M_TRIM_THRESHOLD, -1);
   mallopt(M_MMAP_MAX, 0);

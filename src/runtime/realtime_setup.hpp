@@ -18,9 +18,10 @@ struct RealtimeOptions {
   ABS_HIL_OPTIONS(RealtimeOptions);
   RealtimeMode mode{RealtimeMode::prefer};
   /// 99 belongs to the kernel's own threads.
-  ABS_HIL_OPTION(std::int32_t, priority, 80, .meaning = "SCHED_FIFO priority", .range = rig::between(1, 98));
+  ABS_HIL_OPTION(std::int32_t, priority, 80, .meaning = "SCHED_FIFO priority", .range = rig::between(1, 98),
+                 .safety = rig::no_effect_on_safety);
   ABS_HIL_OPTION(std::int32_t, cpu, -1, .meaning = "CPU that the cycle is bound to; -1: any",
-                 .range = rig::between(-1, 1023));
+                 .range = rig::between(-1, 1023), .safety = rig::no_effect_on_safety);
   ABS_HIL_GROUP(OverrunOptions, overruns, "", {});
 };
 

@@ -29,9 +29,9 @@ RunResult simulate(const PreparedSettings& prepared, const plant_sim::PlantOptio
   driver::SimDriver driver(plant, {.seed = seed,
                                    .start_speed_rad_s = settings.experiment.start_speed_rad_s,
                                    .pwm_mode = driver::pwm_mode_named(settings.driver.sim.pwm_mode)});
-  experiment::RunLogicParts parts =
-      experiment::make_logic_parts(settings.control, settings.model, settings.plant.ideal_actuator, settings.gate,
-                                   settings.experiment, prepared.plan.phases, prepared.plan.limits);
+  experiment::RunLogicParts parts = experiment::make_logic_parts(
+      settings.control, settings.model, plant_sim::identity_of(plant), settings.plant.ideal_actuator, settings.gate,
+      settings.experiment, prepared.plan.phases, prepared.plan.limits);
   parts.duty_steps = driver::simulated_output_grid(settings.driver, plant.ideal_actuator).duty_steps;
   experiment::RunLogic logic(std::move(parts));
   runtime::CommandGate gate = logic.make_gate(settings.gate);

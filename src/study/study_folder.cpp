@@ -11,7 +11,9 @@
 #include <utility>
 
 #include "config/config_error.hpp"
-#include "study/durable_file.hpp"
+#include "files/result_file.hpp"
+#include "rig/parse_json.hpp"
+#include "run_folder/run_folder.hpp"
 #include "study/gzip.hpp"
 
 namespace abs_hil::study {
@@ -45,7 +47,7 @@ StudyFacts read_facts(const fs::path& folder) {
         fmt::format("{}: holds no study ({} is missing); give the folder of a study", folder.string(), file::index));
   }
   try {
-    const auto json = nlohmann::ordered_json::parse(content_of(path));
+    const auto json = rig::parse_json<nlohmann::ordered_json>(content_of(path));
     StudyFacts facts{.identity = json.at("identity"),
                      .program = json.at("program"),
                      .name = json.at("study"),
@@ -64,7 +66,7 @@ StudyFacts read_facts(const fs::path& folder) {
 
 }  // namespace
 
-StudyFolder::StudyFolder(fs::path path) : path_(std::move(path)), facts_(read_facts(path_)) {}
+StudyFolder::StudyFolder(fs::path path) : path_(std::move(path)), facts_(read_facts(path_)) { check_results(); }
 
 StudyFolder::StudyFolder(fs::path path, StudyFacts facts) : path_(std::move(path)), facts_(std::move(facts)) {
   std::error_code error;
@@ -75,6 +77,7 @@ StudyFolder::StudyFolder(fs::path path, StudyFacts facts) : path_(std::move(path
   }
   if (fs::is_regular_file(path_ / file::index, error)) {
     const StudyFacts there = read_facts(path_);
+    check_results();
     if (there.identity != facts_.identity) {
       const char* what = there.program != facts_.program ? "another program"
                          : there.text != facts_.text     ? "another study"
@@ -88,9 +91,17 @@ StudyFolder::StudyFolder(fs::path path, StudyFacts facts) : path_(std::move(path
         fmt::format("{}: holds other files; give a new or empty folder, or that of this study", path_.string()));
   }
   fs::create_directories(path_ / file::parts, error);
-  if (!fs::exists(path_ / file::text, error)) write_durably(path_ / file::text, facts_.text, path_ / file::parts);
+  const fs::path parts = path_ / file::parts;
+  if (!fs::exists(path_ / file::text, error)) files::write_result(path_ / file::text, "study", facts_.text, parts);
   if (!fs::exists(path_ / file::index, error))
-    write_durably(path_ / file::index, to_json(facts_).dump(1) + '\n', path_ / file::parts);
+    files::write_result(path_ / file::index, "study", to_json(facts_).dump(1) + '\n', parts);
+}
+
+/// The results of a complete study are as they were computed.
+void StudyFolder::check_results() const try {
+  if (complete()) run_folder::check_seal(path_);
+} catch (const run_folder::FolderError& error) {
+  throw config::ConfigError(error.what());
 }
 
 bool StudyFolder::complete() const {
@@ -121,7 +132,7 @@ std::vector<bool> StudyFolder::finished() const {
 }
 
 void StudyFolder::write_chunk(std::uint64_t number, std::string_view rows) const try {
-  write_durably(part(number), gzip_member(rows, comment_of(number)));
+  files::write_result(part(number), "chunk of a study", gzip_member(rows, comment_of(number)));
 } catch (const std::runtime_error&) {
   // Another process may have merged the chunks meanwhile; then this one, written again, is in the results already.
   if (!complete()) throw;
@@ -177,13 +188,22 @@ void StudyFolder::merge(const std::vector<StudyFolder>& others) const {
                       path_.string(), missing.size(), facts_.chunks(), list_of(missing), path_.string()));
     }
     fs::create_directories(path_ / file::parts);
-    DurableFile results(path_ / file::results, path_ / file::parts);  // removed below, with what a killed process left
+    files::ResultFile results(path_ / file::results, "results",
+                              path_ / file::parts);  // removed below, with what a killed process left
     std::string header = fmt::format("{}\n", fmt::join(facts_.columns, ","));
     // A file of its own then says what it is. ASCII, since readers take a comment for Latin-1.
     results.append(gzip_member(header, to_json(facts_).dump(-1, ' ', true)));
     for (std::uint64_t number = 0; number < facts_.chunks(); ++number) {
       results.append(checked_chunk(number, folders[source[number]]->part(number)));
     }
+    results.flush();
+    // Before the results themselves: complete results always have checksums.
+    std::string sums;
+    for (const std::string_view name : {file::index, file::text, file::results}) {
+      sums += fmt::format("{}  {}\n", run_folder::sha256_of_file(name == file::results ? results.part() : path_ / name),
+                          name);
+    }
+    files::write_result(path_ / run_folder::file::checksums, "checksums", sums, path_ / file::parts);
     results.commit();
   }
   fs::remove_all(path_ / file::parts, error);

@@ -62,6 +62,7 @@ class StudyFolder {
   void merge(const std::vector<StudyFolder>& others) const;
 
  private:
+  void check_results() const;
   [[nodiscard]] std::filesystem::path part(std::uint64_t number) const;
   [[nodiscard]] std::string comment_of(std::uint64_t number) const;
   [[nodiscard]] std::string checked_chunk(std::uint64_t number, const std::filesystem::path& file) const;

@@ -11,6 +11,7 @@
 
 #include "config/config_error.hpp"
 #include "config/reader.hpp"
+#include "rig/parse_toml.hpp"
 #include "study/contender.hpp"
 #include "study/factor_reader.hpp"
 #include "study/study_grammar.hpp"
@@ -172,7 +173,7 @@ StudyScript parse_study(std::string text, std::string path) {
   StudyScript script{.path = path, .text = std::move(text)};
   const Source source(std::move(path));
   try {
-    const toml::table table = toml::parse(script.text, script.path);
+    const toml::table table = rig::parse_toml(script.text, script.path);
     StudyParser(source, script).read(table);
   } catch (const toml::parse_error& problem) {
     source.fail(config::place_of(problem.source()), fmt::format("not valid TOML: {}", problem.description()));

@@ -1,11 +1,7 @@
 #include "telemetry/csv_sink.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -13,7 +9,6 @@
 #include <utility>
 
 #include "abs_hil/rig/quantities.hpp"
-#include "telemetry/file_error.hpp"
 
 namespace abs_hil::telemetry {
 namespace {
@@ -82,11 +77,11 @@ std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, ch
 }
 
 CsvSink::CsvSink(std::filesystem::path path, std::int64_t write_period_ns, rig::RunNames names)
-    : path_(std::move(path)), buffer_(block_bytes), write_period_ns_(write_period_ns), names_(std::move(names)) {
-  do {
-    file_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  } while (file_ < 0 && errno == EINTR);
-  if (file_ < 0) throw FileError(csv_kind, path_, errno);
+    : file_(std::in_place, path, std::string(csv_kind)),
+      path_(std::move(path)),
+      buffer_(block_bytes),
+      write_period_ns_(write_period_ns),
+      names_(std::move(names)) {
   append(csv_header.data(), csv_header.size());
   if (names_.has_own_phase_names()) {
     append(",", 1);
@@ -99,12 +94,16 @@ CsvSink::CsvSink(std::filesystem::path path, std::int64_t write_period_ns, rig::
   append("\n", 1);
 }
 
-CsvSink::~CsvSink() { close(); }
+CsvSink::~CsvSink() {
+  // An error ended the run: what was recorded stays. Without a single row an older file stays.
+  if (rows_ > 0) close();
+}
 
 void CsvSink::consume(const rig::CycleRecord& record, double distance_m) {
   char row[csv_row_max_bytes];
   append(row, format_csv_row(record, distance_m, row, names_));
   ++rows_buffered_;
+  ++rows_;
   if (write_period_ns_ > 0 && record.stamp_ns - last_write_ns_ >= write_period_ns_) {
     flush();
     last_write_ns_ = record.stamp_ns;
@@ -113,7 +112,7 @@ void CsvSink::consume(const rig::CycleRecord& record, double distance_m) {
 
 void CsvSink::finish() {
   close();
-  if (failed()) throw FileError(csv_kind, path_, error_number_);
+  if (failed()) throw files::FileError(csv_kind, path_, error_number_);
 }
 
 void CsvSink::append(const char* text, std::size_t size) noexcept {
@@ -123,14 +122,14 @@ void CsvSink::append(const char* text, std::size_t size) noexcept {
 }
 
 void CsvSink::flush() noexcept {
-  std::size_t written_bytes = 0;
-  while (!failed() && file_ >= 0 && written_bytes < used_bytes_) {
-    const ssize_t n = ::write(file_, buffer_.data() + written_bytes, used_bytes_ - written_bytes);
-    if (n > 0) {
-      written_bytes += static_cast<std::size_t>(n);
-    } else if (n == 0 || errno != EINTR) {
-      // No retry: a file that ends early is better than a file with a gap.
-      error_number_ = n == 0 ? EIO : errno;
+  // No retry after a failure: a file that ends early is better than a file with a gap.
+  if (!failed() && file_) {
+    try {
+      file_->append({buffer_.data(), used_bytes_});
+      file_->flush();
+      if (write_period_ns_ > 0) file_->show();
+    } catch (const files::FileError& error) {
+      error_number_ = error.error_number();
     }
   }
   if (failed()) rows_lost_ += rows_buffered_;
@@ -140,9 +139,13 @@ void CsvSink::flush() noexcept {
 
 void CsvSink::close() noexcept {
   flush();
-  // Some file systems (NFS, quotas) report lost data only when the file is closed.
-  if (file_ >= 0 && ::close(file_) != 0 && errno != EINTR && !failed()) error_number_ = errno;
-  file_ = -1;
+  try {
+    if (file_ && !failed()) file_->commit();
+  } catch (const files::FileError& error) {
+    error_number_ = error.error_number();
+  }
+  file_.reset();
+  if (failed() && write_period_ns_ == 0) rows_lost_ = rows_;  // a file that is not whole does not appear
 }
 
 }  // namespace abs_hil::telemetry

@@ -3,9 +3,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string_view>
 #include <vector>
 
+#include "files/result_file.hpp"
 #include "rig/record_sink.hpp"
 #include "rig/run_names.hpp"
 
@@ -31,15 +33,16 @@ std::size_t format_csv_row(const rig::CycleRecord& record, double distance_m, ch
 /// Writes one row per cycle to a file, in blocks of whole rows of at most 64 KiB.
 class CsvSink : public rig::RecordSink {
  public:
-  /// Creates or empties the file. Throws FileError when it cannot be opened.
+  /// Throws files::FileError when the file cannot be opened.
   /// @param write_period_ns  longest time, by the records' stamps, until a row is written, so that a killed program
-  ///                         loses no older rows; 0: rows are written only when a block is full
+  ///                         loses no older rows; the first of these writes replaces an older file. 0: rows are written
+  ///                         when a block is full, and the file appears when it is whole
   explicit CsvSink(std::filesystem::path path, std::int64_t write_period_ns = 0, rig::RunNames names = {});
-  /// Writes the buffered rows if finish() was not called. A failure is not reported then.
+  /// As finish() if rows came, without a report of a failure.
   ~CsvSink() override;
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
-  /// Closes the file. Throws FileError if any write has failed since the start, as on a full disk.
+  /// Closes the file. Throws files::FileError if any write has failed since the start, as on a full disk.
   void finish() override;
 
   /// True after a write has failed. Later rows are not in the file.
@@ -52,15 +55,16 @@ class CsvSink : public rig::RecordSink {
   void flush() noexcept;
   void close() noexcept;
 
+  std::optional<files::ResultFile> file_;
   std::filesystem::path path_;
   std::vector<char> buffer_;
   std::int64_t write_period_ns_;
   rig::RunNames names_;
   std::int64_t last_write_ns_{0};  ///< stamp of the record of the last write
   std::size_t used_bytes_{0};
+  std::uint64_t rows_{0};
   std::uint64_t rows_buffered_{0};
   std::uint64_t rows_lost_{0};
-  int file_{-1};
   int error_number_{0};  ///< errno of the first write that failed
 };
 

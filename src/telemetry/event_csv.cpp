@@ -1,20 +1,15 @@
 #include "telemetry/event_csv.hpp"
 
 #include <array>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <utility>
 
 #include "rig/reason_text.hpp"
-#include "telemetry/file_error.hpp"
 
 namespace abs_hil::telemetry {
 
 namespace {
-
-constexpr std::string_view event_list_kind = "list of events";
 
 void append_number(std::string& text, double value) {
   if (std::isnan(value)) {
@@ -28,10 +23,8 @@ void append_number(std::string& text, double value) {
 }  // namespace
 
 EventCsv::EventCsv(std::filesystem::path path, rig::RunNames names)
-    : path_(std::move(path)), text_(event_csv_header), names_(std::move(names)) {
+    : file_(std::move(path), "list of events"), text_(event_csv_header), names_(std::move(names)) {
   text_ += '\n';
-  errno = 0;
-  if (!std::ofstream(path_)) throw FileError(event_list_kind, path_, errno);
 }
 
 void EventCsv::consume(const rig::CycleRecord& record, double /*distance_m*/) {
@@ -43,14 +36,6 @@ void EventCsv::consume(const rig::CycleRecord& record, double /*distance_m*/) {
   text_.append(",\"").append(event->reason).append("\",");
   append_number(text_, record.reason_value);
   text_.append(",").append(names_.phase_of(record)) += '\n';
-}
-
-void EventCsv::finish() {
-  errno = 0;
-  std::ofstream file(path_, std::ios::binary);
-  file << text_;
-  file.close();
-  if (!file) throw FileError(event_list_kind, path_, errno != 0 ? errno : EIO);
 }
 
 }  // namespace abs_hil::telemetry

@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "files/result_file.hpp"
 #include "rig/record_sink.hpp"
 #include "telemetry/event_detector.hpp"
 
@@ -18,15 +19,15 @@ inline constexpr std::string_view event_csv_header = "time_s,event,phase,reason,
 /// `phase_name` the experiment's own name of the phase.
 class EventCsv : public rig::RecordSink {
  public:
-  /// Creates or empties the file. Throws FileError when it cannot be opened.
+  /// Throws files::FileError when the file cannot be opened.
   explicit EventCsv(std::filesystem::path path, rig::RunNames names = {});
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
-  /// Writes the file. Throws FileError when it cannot be written.
-  void finish() override;
+  /// Writes the file. Throws files::FileError when it cannot be written.
+  void finish() override { file_.write(text_); }
 
  private:
-  std::filesystem::path path_;
+  files::ResultFile file_;
   std::string text_;
   rig::RunNames names_;
   EventDetector detector_{names_};

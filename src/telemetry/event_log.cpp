@@ -6,8 +6,6 @@
 #include <limits>
 #include <utility>
 
-#include "telemetry/file_error.hpp"
-
 namespace abs_hil::telemetry {
 namespace {
 
@@ -43,9 +41,21 @@ EventLogReader::EventLogReader(std::filesystem::path path)
   }
 }
 
-void EventLogReader::fail(const std::string& what) const {
-  throw RecordingError("'" + path_.string() + "': event " + std::to_string(events_) + " at byte " +
-                       std::to_string(at_) + ": " + what);
+std::string EventLogReader::place(const std::string& what) const {
+  return "'" + path_.string() + "': event " + std::to_string(events_) + " at byte " + std::to_string(at_) + ": " + what;
+}
+
+/// A log ends in the middle of a message. If another message follows, it is a damaged length that says so.
+std::optional<LogEvent> EventLogReader::end_cut_off() {
+  if (events_ == 0) fail("not an LCM event log");
+  if (std::fseek(file_.get(), static_cast<long>(at_ + sizeof sync_word), SEEK_SET) != 0) fail(std::strerror(errno));
+  std::uint32_t last = 0;
+  for (int byte = std::getc(file_.get()); byte != EOF; byte = std::getc(file_.get())) {
+    last = last << 8U | static_cast<std::uint32_t>(byte);
+    if (last == sync_word) fail("the file is damaged: its length reaches beyond the end, but other events follow");
+  }
+  cut_ = place("the file is cut off, as that of a program that was killed; it is read up to here");
+  return std::nullopt;
 }
 
 std::optional<LogEvent> EventLogReader::next() {
@@ -55,7 +65,7 @@ std::optional<LogEvent> EventLogReader::next() {
   if (read >= sizeof sync_word && big_endian<std::uint32_t>(header.data()) != sync_word) {
     fail(events_ == 0 ? "not an LCM event log" : "the file is damaged: no event begins here");
   }
-  if (read != header.size()) fail(events_ == 0 ? "not an LCM event log" : "the file is cut off");
+  if (read != header.size()) return end_cut_off();
   LogEvent event;
   event.number = static_cast<std::int64_t>(big_endian<std::uint64_t>(&header[4]));
   event.timestamp_us = static_cast<std::int64_t>(big_endian<std::uint64_t>(&header[12]));
@@ -66,41 +76,29 @@ std::optional<LogEvent> EventLogReader::next() {
   }
   if (event.number < events_) fail("the file is damaged: event number " + std::to_string(event.number));
   // Checked before memory is allocated, because a damaged length may have any value.
-  if (size_ - at_ < header_bytes + std::uint64_t{channel_bytes} + data_bytes) fail("the file is cut off");
+  if (size_ - at_ < header_bytes + std::uint64_t{channel_bytes} + data_bytes) return end_cut_off();
   event.channel.resize(channel_bytes);
   event.data.resize(data_bytes);
   if (std::fread(event.channel.data(), 1, channel_bytes, file_.get()) != channel_bytes ||
       std::fread(event.data.data(), 1, data_bytes, file_.get()) != data_bytes) {
-    fail("the file is cut off");
+    fail("it changed while it was read");
   }
   at_ += header_bytes + channel_bytes + data_bytes;
   events_ = event.number == std::numeric_limits<std::int64_t>::max() ? event.number : event.number + 1;
   return event;
 }
 
-EventLogWriter::EventLogWriter(std::filesystem::path path)
-    : path_(std::move(path)), file_(std::fopen(path_.c_str(), "wb")) {
-  if (!file_) throw FileError("event log", path_, errno);
-}
-
-void EventLogWriter::write(const LogEvent& event) {
+void EventLogWriter::write(std::int64_t number, std::int64_t timestamp_us, std::string_view channel,
+                           std::span<const std::uint8_t> data) {
   std::array<std::uint8_t, header_bytes> header{};
   std::uint8_t* to = put_big_endian(header.data(), sync_word);
-  to = put_big_endian(to, static_cast<std::uint64_t>(event.number));
-  to = put_big_endian(to, static_cast<std::uint64_t>(event.timestamp_us));
-  to = put_big_endian(to, static_cast<std::uint32_t>(event.channel.size()));
-  put_big_endian(to, static_cast<std::uint32_t>(event.data.size()));
-  const auto put = [this](const void* bytes, std::size_t size) {
-    if (size != 0 && std::fwrite(bytes, 1, size, file_.get()) != size) throw FileError("event log", path_, errno);
-  };
-  put(header.data(), header.size());
-  put(event.channel.data(), event.channel.size());
-  put(event.data.data(), event.data.size());
-}
-
-void EventLogWriter::finish() {
-  errno = 0;
-  if (std::fclose(file_.release()) != 0) throw FileError("event log", path_, errno != 0 ? errno : EIO);
+  to = put_big_endian(to, static_cast<std::uint64_t>(number));
+  to = put_big_endian(to, static_cast<std::uint64_t>(timestamp_us));
+  to = put_big_endian(to, static_cast<std::uint32_t>(channel.size()));
+  put_big_endian(to, static_cast<std::uint32_t>(data.size()));
+  file_.append({reinterpret_cast<const char*>(header.data()), header.size()});
+  file_.append(channel);
+  file_.append({reinterpret_cast<const char*>(data.data()), data.size()});
 }
 
 }  // namespace abs_hil::telemetry

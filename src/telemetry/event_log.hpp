@@ -5,9 +5,14 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
+
+#include "files/result_file.hpp"
 
 namespace abs_hil::telemetry {
 
@@ -34,36 +39,42 @@ using FilePointer = std::unique_ptr<std::FILE, FileCloser>;
 }  // namespace detail
 
 /// Reads LCM's event logs. It checks sync words, lengths and event numbers. lcm::LogFile skips damage silently instead.
+/// A killed program leaves a part of a message at the end of its log: there the log ends, and `cut` says so.
 class EventLogReader {
  public:
   /// Throws RecordingError when the file cannot be opened.
   explicit EventLogReader(std::filesystem::path path);
 
-  /// Returns the next event, or nothing at the end. Throws RecordingError if the file is damaged or cut off.
+  /// Returns the next event, or nothing at the end. Throws RecordingError if the file is damaged.
   [[nodiscard]] std::optional<LogEvent> next();
+  /// After the end: where the last message is cut off, in words; empty if it is whole.
+  [[nodiscard]] const std::string& cut() const noexcept { return cut_; }
 
  private:
-  [[noreturn]] void fail(const std::string& what) const;
+  [[nodiscard]] std::string place(const std::string& what) const;
+  [[noreturn]] void fail(const std::string& what) const { throw RecordingError(place(what)); }
+  std::optional<LogEvent> end_cut_off();
 
   std::filesystem::path path_;
   detail::FilePointer file_;
   std::uint64_t size_{0};
   std::uint64_t at_{0};
   std::int64_t events_{0};
+  std::string cut_{};
 };
 
-/// Writes events with their own numbers and times.
+/// Writes an event log as LCM does. Its members throw files::FileError.
 class EventLogWriter {
  public:
-  /// Creates or empties the file. Throws FileError.
-  explicit EventLogWriter(std::filesystem::path path);
-  /// Both throw FileError when it cannot be written.
-  void write(const LogEvent& event);
-  void finish();
+  explicit EventLogWriter(std::filesystem::path path) : file_(std::move(path), "event log") {}
+  void write(std::int64_t number, std::int64_t timestamp_us, std::string_view channel,
+             std::span<const std::uint8_t> data);
+  void write(const LogEvent& event) { write(event.number, event.timestamp_us, event.channel, event.data); }
+  [[nodiscard]] files::ResultFile& file() noexcept { return file_; }
+  void finish() { file_.commit(); }
 
  private:
-  std::filesystem::path path_;
-  detail::FilePointer file_;
+  files::ResultFile file_;
 };
 
 }  // namespace abs_hil::telemetry

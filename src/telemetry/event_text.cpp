@@ -9,7 +9,6 @@
 #include "abs_hil/rig/quantities.hpp"
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/csv_text.hpp"
-#include "telemetry/file_error.hpp"
 #include "telemetry/hexadecimal.hpp"
 #include "telemetry/message_codec.hpp"
 

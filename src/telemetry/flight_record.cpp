@@ -1,21 +1,21 @@
 #include "telemetry/flight_record.hpp"
 
-#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <exception>
-#include <fstream>
 
 #include "abs_hil/rig/time_units.hpp"
+#include "files/result_file.hpp"
 #include "rig/reason_text.hpp"
 #include "telemetry/csv_sink.hpp"
-#include "telemetry/file_error.hpp"
 #include "telemetry/log_outlet.hpp"
 #include "telemetry/wall_clock.hpp"
 
 namespace abs_hil::telemetry {
 namespace {
+
+constexpr const char* record_kind = "flight record";
 
 void add_number(std::string& row, double value) {
   row += ',';
@@ -38,14 +38,6 @@ std::string extra_columns(const rig::CycleRecord& r) {
   return row;
 }
 
-void write_text(const std::filesystem::path& path, const std::string& text, std::string_view kind) {
-  errno = 0;
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) throw FileError(kind, path, errno != 0 ? errno : EIO);
-}
-
 void write_csv(const std::filesystem::path& path, const FlightRecord& record, const rig::RunNames& names) {
   std::string text(csv_header);
   if (names.has_own_phase_names()) text.append(",").append(phase_name_column);
@@ -61,7 +53,7 @@ void write_csv(const std::filesystem::path& path, const FlightRecord& record, co
     for (std::size_t n = 0; n < names.signals.size(); ++n) add_number(text, r.control.signals.at(n));
     text += '\n';
   }
-  write_text(path, text, "flight record");
+  files::write_result(path, record_kind, text);
 }
 
 void write_log(const std::filesystem::path& path, const FlightRecord& record, const ExperimentInfo& experiment,
@@ -94,11 +86,10 @@ std::vector<std::filesystem::path> write_flight_record(const std::filesystem::pa
     }
   };
   attempt(".txt", [&](const auto& path) {
-    write_text(path,
-               "reason " + std::to_string(static_cast<int>(record.reason)) + ": " +
-                   rig::reason_with_value(record.reason, record.reason_value, experiment.names.signals) + '\n' +
-                   record.account + std::to_string(record.records.size()) + " cycles recorded\n",
-               "flight record");
+    files::write_result(path, record_kind,
+                        "reason " + std::to_string(static_cast<int>(record.reason)) + ": " +
+                            rig::reason_with_value(record.reason, record.reason_value, experiment.names.signals) +
+                            '\n' + record.account + std::to_string(record.records.size()) + " cycles recorded\n");
   });
   attempt(".csv", [&](const auto& path) { write_csv(path, record, experiment.names); });
   attempt(".lcmlog", [&](const auto& path) { write_log(path, record, experiment, channel_prefix); });

@@ -2,12 +2,11 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <lcm/lcm-cpp.hpp>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 
+#include "telemetry/event_log.hpp"
 #include "telemetry/outlet.hpp"
 
 namespace abs_hil::telemetry {
@@ -15,30 +14,30 @@ namespace abs_hil::telemetry {
 /// Writes an LCM event log as lcm-logger does. lcm-logplayer and lcm-spy can read it. Each cycle takes about 0.4 kB.
 class LogOutlet : public Outlet {
  public:
-  /// Creates or empties the file. Event times are `epoch_us` plus run time, us since 1970. Without an epoch it is the
+  /// Event times are `epoch_us` plus run time, us since 1970. Without an epoch it is the
   /// wall clock at the first message minus its run time. So the times keep the spacing of the cycles, however late the
   /// ring is emptied. Give an epoch for virtual time: then every run gives the same file.
-  /// Throws FileError when it cannot be opened.
+  /// Throws files::FileError when the file cannot be opened.
   /// @param write_period_s  longest run time until a message is written, so that a killed program loses no older
-  ///                        messages; 0: messages are written only when a block of 64 KiB is full
+  ///                        messages; the first of these writes replaces an older file. 0: messages are written when a
+  ///                        block of 64 KiB is full, and the file appears when it is whole
   explicit LogOutlet(std::filesystem::path path, std::optional<std::int64_t> epoch_us = std::nullopt,
                      double write_period_s = 0.0);
   ~LogOutlet() override;
 
   void send(const std::string& channel, std::span<const std::uint8_t> message, double time_s) noexcept override;
-  /// Closes the file. Throws FileError if any write has failed since the start, as on a full disk.
+  /// Closes the file. Throws files::FileError if any write has failed since the start, as on a full disk.
   void finish() override;
   /// Messages that are missing or incomplete in the file.
   [[nodiscard]] std::uint64_t failures() const noexcept override { return failures_; }
 
  private:
   void note_failure(int error_number) noexcept;
-  void write_out(double time_s) noexcept;
 
+  std::optional<EventLogWriter> log_;
   std::filesystem::path path_;
   std::optional<std::int64_t> epoch_us_;
-  std::unique_ptr<lcm::LogFile> file_;
-  lcm::LogEvent event_{};  ///< reused with its channel string, so that writing does not allocate
+  std::int64_t next_number_{0};
   double write_period_s_;
   double last_write_s_{0.0};
   std::uint64_t buffered_{0};  ///< upper limit: messages since our last write

@@ -1,16 +1,15 @@
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <map>
 #include <optional>
 #include <set>
 #include <utility>
+#include <vector>
 
 #include "abs_hil/rig/time_units.hpp"
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/csv_parts.hpp"
 #include "telemetry/event_text.hpp"
-#include "telemetry/file_error.hpp"
 #include "telemetry/message_codec.hpp"
 #include "telemetry/recording.hpp"
 
@@ -28,7 +27,7 @@ fs::path beside(const fs::path& csv, const std::string& part) {
   return path;
 }
 
-/// The files of one conversion. Each is opened for its first row.
+/// The files of one conversion. Each is opened for its first row; all appear at the end.
 class CsvFiles {
  public:
   explicit CsvFiles(fs::path main) : main_(std::move(main)) {}
@@ -50,16 +49,25 @@ class CsvFiles {
 
   void finish() {
     if (!files_.contains({})) open({}, main_, telemetry_header());  // a recording without telemetry
-    for (auto& [key, file] : files_) {
-      errno = 0;
-      if (std::fclose(file.stream.release()) != 0) throw FileError("CSV file", file.path, errno != 0 ? errno : EIO);
+    std::vector<fs::path> done;
+    try {
+      // The main file is the first in the map and appears last: with it there are all others.
+      for (auto file = files_.rbegin(); file != files_.rend(); ++file) {
+        file->second.file.commit();
+        done.push_back(file->second.path);
+      }
+    } catch (const files::FileError&) {
+      std::error_code ignored;
+      for (const fs::path& path : done) fs::remove(path, ignored);
+      throw;
     }
   }
 
  private:
   struct File {
+    explicit File(fs::path place) : path(std::move(place)), file(path, "CSV file") {}
     fs::path path;
-    detail::FilePointer stream;
+    files::ResultFile file;
   };
   /// File names of two channels may collide, and a channel may carry several types. So names get a number if needed.
   fs::path unused(const std::string& part, const std::string& type) {
@@ -71,15 +79,13 @@ class CsvFiles {
     return path;
   }
   std::map<std::string, File>::iterator open(const std::string& key, const fs::path& path, const std::string& header) {
-    detail::FilePointer opened(std::fopen(path.c_str(), "wb"));
-    if (!opened) throw FileError("CSV file", path, errno);
-    const auto file = files_.emplace(key, File{path, std::move(opened)}).first;
+    const auto file = files_.try_emplace(key, path).first;
     put(file->second, header);
     return file;
   }
   static void put(File& file, const std::string& line) {
-    const bool whole = std::fwrite(line.data(), 1, line.size(), file.stream.get()) == line.size();
-    if (!whole || std::fputc('\n', file.stream.get()) == EOF) throw FileError("CSV file", file.path, errno);
+    file.file.append(line);
+    file.file.append("\n");
   }
   fs::path main_;
   std::string channel_;  ///< of the telemetry in the main file
@@ -124,9 +130,10 @@ class LogToCsv {
     }
     write(event, text_of(event));
   }
-  ConversionCounts finish() {
+  ConversionCounts finish(const std::string& cut) {
     for (auto& [prefix, run] : runs_) finish(run);
     files_.finish();
+    counts_.cut = cut;
     return counts_;
   }
 
@@ -170,7 +177,7 @@ ConversionCounts log_to_csv(const fs::path& log, const fs::path& csv) {
   LogToCsv conversion(csv);
   for (;;) {
     auto event = reader.next();
-    if (!event) return conversion.finish();
+    if (!event) return conversion.finish(reader.cut());
     conversion.take(std::move(*event));
   }
 }

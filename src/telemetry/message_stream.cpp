@@ -9,8 +9,8 @@
 
 #include "abs_hil/adjustment_t.hpp"
 #include "abs_hil/checks_t.hpp"
+#include "files/result_file.hpp"
 #include "rig/reason_text.hpp"
-#include "telemetry/file_error.hpp"
 
 namespace abs_hil::telemetry {
 namespace {
@@ -141,7 +141,7 @@ void MessageStream::finish() {
   for (Outlet* outlet : outlets_) {
     try {
       outlet->finish();
-    } catch (const FileError&) {
+    } catch (const files::FileError&) {
       if (!first_error) first_error = std::current_exception();
     }
   }
@@ -194,6 +194,11 @@ void MessageStream::send_event(std::string_view kind, rig::Reason reason, double
   event.reason_text = rig::reason_text(reason, value, names_.signals);
   event.value = value;
   event.message = std::move(message);
+  if (answer_tag_ && kind == event_kind::command) {
+    event.stamp_ns = latest_.stamp_ns;  // as `send` sets them
+    event.sequence = event_.next_sequence;
+    event.message += answer_tag_(event);
+  }
   send(event_, event);
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "abs_hil/command_state_t.hpp"
+#include "abs_hil/event_t.hpp"
 #include "abs_hil/experiment_t.hpp"
 #include "abs_hil/phase_t.hpp"
 #include "abs_hil/sample_t.hpp"
@@ -57,9 +58,12 @@ class MessageStream : public rig::RecordSink {
   /// A function that sends the last messages, after the last record. finish() calls it once, at its beginning.
   void set_farewell(std::function<void()> farewell) { farewell_ = std::move(farewell); }
 
+  /// A function that makes the tag at the end of every answer's message from the answer without it.
+  void set_answer_tag(std::function<std::string(const event_t&)> tag) { answer_tag_ = std::move(tag); }
+
   void consume(const rig::CycleRecord& record, double distance_m) override;
-  /// Calls the farewell, sends a last ABS_STATUS and finishes every outlet. Then it throws the first FileError of an
-  /// outlet.
+  /// Calls the farewell, sends a last ABS_STATUS and finishes every outlet. Then it throws the first files::FileError
+  /// of an outlet.
   void finish() override;
 
   /// Sets the time of the next messages while there are no records, as between two runs.
@@ -120,6 +124,7 @@ class MessageStream : public rig::RecordSink {
   double next_status_s_{0.0};
   double next_experiment_s_{0.0};
   std::function<void()> farewell_;
+  std::function<std::string(const event_t&)> answer_tag_;
   bool started_{false};
   bool finished_{false};
 };

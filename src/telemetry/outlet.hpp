@@ -16,7 +16,7 @@ class Outlet {
 
   /// Sends a message. It never throws: it counts a message that it cannot send. `time_s` is the run time.
   virtual void send(const std::string& channel, std::span<const std::uint8_t> message, double time_s) noexcept = 0;
-  /// Ends the output. Throws FileError if data is missing in a file.
+  /// Ends the output. Throws files::FileError if data is missing in a file.
   virtual void finish() {}
   /// Messages that could not be sent or written so far.
   [[nodiscard]] virtual std::uint64_t failures() const noexcept = 0;

@@ -9,7 +9,6 @@
 #include "telemetry/csv_parts.hpp"
 #include "telemetry/csv_text.hpp"
 #include "telemetry/event_text.hpp"
-#include "telemetry/file_error.hpp"
 
 namespace abs_hil::telemetry {
 
@@ -93,15 +92,15 @@ ConversionCounts csv_to_log(const fs::path& csv, const fs::path& log) {
   return counts;
 }
 
-void for_each_event(const fs::path& recording, const std::function<void(const LogEvent&)>& take) {
+std::string for_each_event(const fs::path& recording, const std::function<void(const LogEvent&)>& take) {
   if (recording.extension() == ".csv") {
     for (const auto& [number, event] : read_all_csv(recording)) take(event);
-    return;
+    return {};
   }
   EventLogReader reader(recording);
   for (;;) {
     const auto event = reader.next();
-    if (!event) return;
+    if (!event) return reader.cut();
     take(*event);
   }
 }

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <string>
 
 #include "telemetry/event_log.hpp"
 
@@ -18,15 +19,16 @@ namespace abs_hil::telemetry {
 struct ConversionCounts {
   std::uint64_t events{0};
   std::uint64_t raw{0};  ///< events written as hexadecimal digits
+  std::string cut{};     ///< EventLogReader::cut of the log
 };
 
-/// Event log -> CSV. Throws RecordingError and FileError.
+/// Event log -> CSV. All files appear, or none. Throws RecordingError and files::FileError.
 ConversionCounts log_to_csv(const std::filesystem::path& log, const std::filesystem::path& csv);
-/// CSV, as log_to_csv wrote it, -> event log, the same bytes. Throws RecordingError and FileError.
+/// CSV, as log_to_csv wrote it, -> event log, the same bytes. Throws RecordingError and files::FileError.
 ConversionCounts csv_to_log(const std::filesystem::path& csv, const std::filesystem::path& log);
 
 /// Calls `take` for every event of a recording, in order. The recording is an event log, or CSV of log_to_csv if its
-/// name ends in .csv. Throws RecordingError, even after some calls.
-void for_each_event(const std::filesystem::path& recording, const std::function<void(const LogEvent&)>& take);
+/// name ends in .csv. Returns EventLogReader::cut. Throws RecordingError, even after some calls.
+std::string for_each_event(const std::filesystem::path& recording, const std::function<void(const LogEvent&)>& take);
 
 }  // namespace abs_hil::telemetry

@@ -1,23 +1,11 @@
 #include "analysis/run_summary.hpp"
 
-#include <unistd.h>
-
-#include <filesystem>
-#include <fstream>
 #include <string>
 
 #include "catch.hpp"
 
 using namespace abs_hil::analysis;
 using Catch::Matchers::Contains;
-
-namespace {
-
-std::filesystem::path temporary_path() {
-  return std::filesystem::temp_directory_path() / ("abs_hil_summary_test_" + std::to_string(getpid()) + ".json");
-}
-
-}  // namespace
 
 TEST_CASE("the summary has the fields that scripts need, and null for unknown values") {
   RunSummary summary;
@@ -120,26 +108,4 @@ TEST_CASE("the text says at which speed the estimate of theta is taken") {
   RunSummary summary;
   summary.metrics.theta_final_N = 23.04;
   CHECK_THAT(to_text(summary), Contains("23.04 N at 3 m/s"));
-}
-
-TEST_CASE("a summary file is either complete or absent") {
-  const auto path = temporary_path();
-  { SummaryFile abandoned(path); }
-  CHECK_FALSE(std::filesystem::exists(path));
-  CHECK_FALSE(std::filesystem::exists(path.string() + ".part"));
-  {
-    SummaryFile file(path);
-    CHECK_FALSE(std::filesystem::exists(path));
-    file.write({});
-  }
-  std::ifstream written(path);
-  CHECK(nlohmann::json::parse(written).contains("stop_time_s"));
-  CHECK_FALSE(std::filesystem::exists(path.string() + ".part"));
-  std::filesystem::remove(path);
-}
-
-TEST_CASE("an unwritable path is reported before the run") {
-  CHECK_THROWS_WITH(SummaryFile("/nonexistent/dir/s.json"),
-                    Contains("/nonexistent/dir/s.json") && Contains("existing"));
-  CHECK_THROWS_WITH(SummaryFile(std::filesystem::temp_directory_path()), Contains("directory"));
 }

@@ -130,7 +130,7 @@ def live_changes(folder, key):
                                 (('gain', 'control.rate_Hz', '100'), 1, 'cannot be changed'),
                                 (('gain', 'nosuch', '1'), 1, 'unknown key'), (('gain', 'zeta0', '1'), 1, 'cannot be changed')]:
         found, said = send(*words)
-        check(found == status and text in said, f'send {" ".join(words)}', found, said)
+        check(found == status and text in said and 'not authenticated' not in said, f'send {" ".join(words)}', found, said)
     # A recorded message cannot be used again, neither forged nor changed.
     state = [m for c, m in events_of(run.log) if c == 'ABS_COMMAND_STATE'][-1]
     wire, good = Wire(), command2(key, state.session, state.last_sequence + 1000, 'slip-ref', value=0.2)
@@ -157,11 +157,27 @@ def not_enabled(folder):
     run = Run(folder)
     found, said = send('slip-ref', '0.2')
     check(found == 1 and 'commands.enabled' in said, 'commands are off unless enabled', found, said)
-    found, said = send('stop')
-    check(found == 0 and 'stop accepted' in said, 'stop needs no key', found, said)
+    stop = subprocess.run([PROGRAM, 'send', 'stop'], capture_output=True, text=True, timeout=30)
+    check(stop.returncode == 0 and 'stop accepted' in stop.stdout and 'not authenticated' in stop.stderr, 'stop needs no key',
+          stop)
     check(run.end() == 1, 'stop ends the run')
     found, said = send('--timeout', '0.5', 'stop')
     check(found == 3 and 'no answer' in said, 'send reports that no run answers', found, said)
+
+
+def forged():
+    """A forger in place of a run answers each stop, with no tag or with the tag of another answer."""
+    ear, wire, words = Ear(), Wire(), [PROGRAM, 'send', 'stop', '--timeout', '2']
+    for tag in ('', f' [mac {"0" * 64}]'):
+        for key, status, text in (([], 0, 'not authenticated'), (KEY, 3, 'no authentic answer')):
+            sender = subprocess.Popen([*words, *key], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            stop = next(ear.heard('ABS_COMMAND', 5))
+            answer = abs_hil.event_t()
+            answer.kind, answer.reason, answer.message = 'command', 34, f"stop accepted (token '{stop.token}'){tag}"
+            wire.message(b'ABS_EVENT', answer.encode())
+            said = ''.join(sender.communicate(timeout=30))
+            check(sender.returncode == status and text in said, f'a forged answer {"with" if key else "without"} a key', said)
+            list(ear.heard('ABS_COMMAND', 0.2))  # the repeated ones
 
 
 def run_ends_meanwhile():
@@ -331,6 +347,7 @@ def main():
             return
         live_changes(folder, key)
         not_enabled(folder)
+        forged()
         run_ends_meanwhile()
         question(folder)
         stop_latency(folder, 5, False)

@@ -56,6 +56,12 @@ REFUSED = [
 ]
 
 
+# Each switched a protection off without a word.
+WEAK = [('guardian.insist_s', 0.001), ('gate.overspeed_rad_s', 2000), ('experiment.cut_speed_rad_s', 1000),
+        ('realtime.cycle_gap_max_s', 1), ('realtime.late_max_s', 10), ('gate.judge_within_s', 1),
+        ('gate.temperature_max_C', 200), ('gate.free_slip_max', 0.5)]
+
+
 class FailClosed(ProgramTest):
     def programs(self, tree, settings):
         chosen = [word for s in (f'driver.pci.root={tree.devices}', *settings) for word in ('--set', s)]
@@ -90,6 +96,34 @@ class FailClosed(ProgramTest):
                 self.assertEqual(result.returncode, 3, result.stdout + result.stderr)
                 self.assertIn('permission denied', result.stdout + result.stderr)
                 self.assertEqual(tree.ports.read_bytes(), tree.content)
+
+    def test_weak_values_need_a_consent_on_a_board(self):
+        # Below the kernel's own folder every card is real; here there is none, so an accepted run ends with 3.
+        for key, value in WEAK:
+            with self.subTest(key):
+                command = ('--backend', 'rig', '--no-lcm', '--rt', 'off', '--set', f'{key}={value}')
+                refused = self.run_program(*command)
+                self.assertEqual(refused.returncode, 2, refused.stderr)
+                self.assertIn(f'{key} = ', refused.stderr)
+                self.assertIn(f'--set unsafe.keys={key}', refused.stderr)
+                accepted = self.run_program(*command, '--set', f'unsafe.keys=gate.free_slip_max,{key}')
+                self.assertEqual(accepted.returncode, 3, accepted.stderr)
+                self.assertIn('weakens the protection of this board', accepted.stderr)
+
+    def test_consents_are_spelled_right_and_come_from_a_person(self):
+        result = self.run_program('--backend', 'rig', '--no-lcm', '--set', 'unsafe.keys=gate.free_slipmax')
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertIn('nearest known key is gate.free_slip_max', result.stderr)
+        script = self.folder / 'own.toml'
+        script.write_text('[settings]\nunsafe.keys = "gate.free_slip_max"\n[[phase]]\nname = "wait"\nuntil = { lasts_s = 1 }\nat_most_s = 2\n')
+        result = self.run_program('validate', script)
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertIn('a script must not set unsafe.keys', result.stderr)
+
+    def test_the_encoders_scale_is_the_identity_s(self):
+        result = self.run_program('--backend', 'rig', '--no-lcm', '--set', 'model.encoder_counts_per_rev=2048')
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertIn('rig.encoder_counts_per_rev', result.stderr)
 
     def test_doctor_says_that_a_good_tree_can_run(self):
         tree = Tree(self.folder / 'good')

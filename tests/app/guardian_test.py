@@ -56,7 +56,8 @@ class Guardian(RigTest):
 
     def start(self, emulator, timeout_ms, *args):
         # Late cycles depend on this computer: they must not end a run here.
-        return self.real_time(emulator, '--recorder', self.record, '--set', 'realtime.max_consecutive_overruns=0', *args,
+        return self.real_time(emulator, '--recorder', self.record, '--set', 'realtime.max_consecutive_overruns=0',
+                              '--set', 'realtime.late_max_s=1000', *args,
                               guardian_timeout_ms=timeout_ms)
 
     def wait_for_phase(self, emulator, program, phase):
@@ -253,7 +254,7 @@ class Guardian(RigTest):
             guardian.chmod(0o755)
             result = subprocess.run([alone / 'abs_hil', '--backend', 'rig', '--no-lcm', '--rt', 'prefer', *settings(
                 f'driver.pci.root={emulator.root}', f'guardian.timeout_ms={PATIENT_MS}',
-                'realtime.max_consecutive_overruns=0', 'experiment.cut_speed_rad_s=10')],
+                'realtime.max_consecutive_overruns=0', 'realtime.late_max_s=1000', 'experiment.cut_speed_rad_s=10')],
                 capture_output=True, text=True, timeout=60, cwd=self.folder)
             if 'NOT IN REAL TIME' in result.stderr:
                 self.skipTest('this computer gives no real time')

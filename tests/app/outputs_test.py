@@ -2,9 +2,13 @@
 import hashlib
 import json
 import math
+import os
+import pathlib
+import stat
+import subprocess
 import unittest
 
-from program import ProgramTest
+from program import PROGRAM, ProgramTest
 
 HEADER = ('time_s,phase,omega1_rad_s,omega2_rad_s,omega1_est_rad_s,omega2_est_rad_s,slip,slip_est,slip_ref,'
           'brake_torque_Nm,brake_torque_ref_Nm,brake_torque_est_Nm,brake_pwm,motor_pwm,motor_enable,theta_N,'
@@ -85,6 +89,86 @@ class Outputs(ProgramTest):
         self.assertIn('/dev/full', result.stderr)
         self.assertIn('stop distance', result.stdout)
 
+    def test_results_replace_regular_files_only(self):
+        real, link, pipe = self.folder / 'real', self.folder / 'link', self.folder / 'pipe'
+        link.symlink_to(real)
+        os.mkfifo(pipe)
+        (self.folder / 'older').write_text('older')
+        device = self.folder / 'null'
+        try:
+            os.mknod(device, 0o666 | stat.S_IFCHR, os.makedev(1, 3))
+        except PermissionError:
+            device = pathlib.Path('/dev/null')
+        comparison = ('compare', '--controllers', 'pi', '--repeat', '1')
+        commands = [(('--fast', '--no-lcm', option), 0) for option in ('--csv', '--log', '--summary')]
+        commands += [((*comparison, option), 0) for option in ('--json', '--csv', '--markdown', '--runs')]
+        commands += [(('export-fmu', '--out'), 0), (('latency', '--duration', '0.05', '--rt', 'off', '--histogram'), 0)]
+        for command, status in commands:
+            for target in (device, link, pipe, self.folder):
+                with self.subTest(command=command, target=target.name):
+                    result = self.run_program(*command, target)
+                    refused = target in (pipe, self.folder)
+                    self.assertEqual(result.returncode, 2 if refused else status, result.stderr)
+                    self.assertIn(str(target) if refused else '', result.stderr)
+            self.assertTrue(device.is_char_device())
+            self.assertTrue(link.is_symlink())
+            self.assertTrue(pipe.is_fifo())
+            self.assertGreater(real.stat().st_size, 0)
+            real.unlink()
+        self.assertEqual([path.name for path in self.folder.iterdir() if path.name.endswith('.part')], [])
+        result = self.run_program('--fast', '--no-lcm', '--summary', '/dev/stdout')
+        self.assertEqual(json.JSONDecoder().raw_decode(result.stdout)[0]['result'], 'completed')
+
+    def test_an_older_file_survives_a_run_that_is_refused(self):
+        older = self.folder / 'older'
+        for option in ('--csv', '--log', '--summary'):
+            older.write_text('older')
+            result = self.run_program('--backend', 'rig', '--no-lcm', option, older)
+            self.assertEqual(result.returncode, 3, result.stderr)
+            result = self.run_program('--fast', '--no-lcm', option, older, '--out', older)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            self.assertEqual(older.read_text(), 'older')
+        self.assertEqual([path.name for path in self.folder.iterdir()], ['older'])
+
+    def test_a_full_disk_behind_stdout_is_said(self):
+        plant = self.folder / 'plant.toml'
+        for command in (['--fast', '--no-lcm'], ['list'], ['list', '--keys'], ['doctor', '--json'], ['--help'], ['--version'],
+                        ['validate', '--schema'], ['validate', 'paper'], ['study', '--help'],
+                        ['compare', '--controllers', 'pi', '--repeat', '1'], ['export-fmu', '--out', self.folder / 'x.fmu'],
+                        ['latency', '--duration', '0.05', '--rt', 'off', '--json'], ['init-rig', plant.stem]):
+            with self.subTest(command), open('/dev/full', 'w') as full:
+                result = subprocess.run([PROGRAM, *map(str, command)], stdout=full, stderr=subprocess.PIPE, text=True,
+                                        timeout=60, cwd=self.folder)
+                self.assertIn(result.returncode, (1, 3), result.stderr)
+                self.assertRegex(result.stderr, 'No space left|cannot write to standard output')
+        # A reader that wanted no more is no failure.
+        with subprocess.Popen([PROGRAM, 'list'], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as reader:
+            reader.stdout.close()
+            self.assertEqual(reader.wait(), 0)
+
+    def test_long_and_odd_names_are_clear_errors(self):
+        long, nowhere = 'n' * 300, self.folder / 'nowhere' / 'file'
+        for option in ('--csv', '--log', '--summary', '--out', '--config', '--plant', '--experiment', '--controller'):
+            for name in (self.folder / long, self.folder / ('d/' * 3000 + 'x'), ''):
+                with self.subTest(option=option, name=str(name)[:60]):
+                    result = self.run_program('--fast', '--no-lcm', option, name)
+                    self.assertEqual(result.returncode, 2, result.stderr[:400])
+                    self.assertRegex(result.stderr, 'abs_hil: [^ ]')
+                    self.assertNotIn('filesystem error', result.stderr)
+        odd = os.fsencode(self.folder) + b'/\xff\xfe'
+        for option in ('--csv', '--out', '--plant', '--recorder', '--lcm-url'):
+            result = subprocess.run([PROGRAM, '--fast', option, odd], capture_output=True, timeout=60)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            self.assertIn(b'argument 3', result.stderr)
+        result = subprocess.run([PROGRAM, 'doctor', '--json'], capture_output=True, timeout=60,
+                                env={**os.environb, b'LCM_DEFAULT_URL': b'udpm://\xff'})
+        self.assertIn('findings', json.loads(result.stdout))
+        for option in ('--csv', '--log', '--summary'):
+            result = self.run_program('--fast', '--no-lcm', option, nowhere)
+            self.assertEqual(result.returncode, 2)
+            self.assertIn('mkdir -p', result.stderr)
+        self.assertEqual(list(self.folder.iterdir()), [])
+
     def test_fault_status(self):
         summary = self.folder / 'summary.json'
         result = self.run_program('--fast', '--no-lcm', '--set', 'experiment.accelerate_limit_s=2', '--summary', summary)
@@ -111,7 +195,7 @@ class Outputs(ProgramTest):
         lines = self.run_program('list', '--keys').stdout.splitlines()
         # A value of the model that nobody sets is the plant's, and not part of the configuration.
         keys = [line.split()[0] for line in lines]
-        self.assertEqual(sorted(key for key in keys if not key.startswith('model.')), sorted(names(config)))
+        self.assertEqual(sorted(key for key in keys if not key.startswith(('model.', 'rig.'))), sorted(names(config)))
         listed = {line.split()[0]: line.split()[1] for line in lines}
         self.assertEqual(listed['control.sliding_mode_smooth.boundary_m_s'], '2.93')
 

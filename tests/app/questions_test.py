@@ -94,10 +94,12 @@ class Questions(ProgramTest):
                                   self.script())
         self.assertEqual(result.returncode, 2, result.stderr)
         self.assertIn('cannot wait', result.stderr)
-        result = self.run_program('--no-lcm', '--backend', 'rig', '--set', 'experiment.answers=itself', '--experiment',
-                                  self.script())
-        self.assertEqual(result.returncode, 2, result.stderr)
-        self.assertIn('only a person', result.stderr)
+        itself = '--no-lcm', '--backend', 'rig', '--set', 'experiment.answers=itself', '--experiment', self.script()
+        for args, words in ((itself, 'weakens the protection'),
+                            ((*itself, '--set', 'unsafe.keys=experiment.answers'), 'only a person')):
+            result = self.run_program(*args)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            self.assertIn(words, result.stderr)
 
     def test_identification_on_every_plant(self):
         for plant in ('paper-table1', 'paper-timing', 'inteco-manual'):

@@ -1,8 +1,10 @@
 """abs_hil replay and convert, as their users run them."""
 import random
+import resource
+import subprocess
 import unittest
 
-from program import ProgramTest
+from program import PROGRAM, ProgramTest
 
 
 class Replay(ProgramTest):
@@ -42,10 +44,48 @@ class Replay(ProgramTest):
             result = self.run_program('replay', damaged, '--check')
             self.assertIn(result.returncode, (1, 2))
             self.assertTrue(result.stderr)
-        damaged.write_bytes(whole[:len(whole) // 2])
-        result = self.run_program('replay', damaged, '--check')
-        self.assertEqual(result.returncode, 2)
-        self.assertIn('cut off', result.stderr)
+
+    def test_the_log_of_a_killed_run_is_read_up_to_its_last_message(self):
+        log, csv, replayed = self.folder / 'run.lcmlog', self.folder / 'cut.csv', self.folder / 'replayed.csv'
+        run = subprocess.Popen([PROGRAM, '--no-lcm', '--rt', 'off', '--log', log], stdout=subprocess.DEVNULL,
+                               stderr=subprocess.DEVNULL)
+        while not log.exists() or log.stat().st_size < 100_000:
+            self.assertIsNone(run.poll())
+        run.kill()
+        run.wait()
+        # Not all writes end in the middle of a message.
+        log.write_bytes(log.read_bytes()[:-5])
+        for command in (('convert', log, csv), ('replay', log, '--csv', replayed), ('replay', log, '--check')):
+            result = self.run_program(*command)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn('cut off', result.stderr)
+        self.assertGreater(len(self.rows(csv)), 100)
+        self.assertEqual([row['time_s'] for row in self.rows(csv)], [row['time_s'] for row in self.rows(replayed)])
+
+    def test_a_failure_leaves_the_older_file(self):
+        log, csv = self.record('--set', 'experiment.start_speed_rad_s=60'), self.folder / 'kept.csv'
+        whole = log.read_bytes()
+        csv.write_text('older')
+        log.write_bytes(whole[:len(whole) // 2] + b'xxxx' + whole[len(whole) // 2 + 4:len(whole) * 3 // 4] + whole[-9000:])
+        self.assertEqual(self.run_program('convert', log, csv).returncode, 2)
+        log.write_bytes(whole)
+        for arguments in (('convert', log, csv), ('replay', log, '--csv', csv)):
+            result = self.run_program(*arguments, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000)))
+            self.assertEqual(result.returncode, 1, result.stderr)
+            self.assertIn('ulimit -f', result.stderr)
+        self.assertEqual(csv.read_text(), 'older')
+        self.assertEqual(sorted(path.name for path in self.folder.iterdir()), ['kept.csv', 'run.lcmlog'])
+
+    def test_a_run_folder_whose_files_changed_is_refused(self):
+        folder = self.folder / 'run'
+        self.fast('--set', 'experiment.start_speed_rad_s=60', '--out', folder)
+        self.assertEqual(self.run_program('replay', folder, '--check').returncode, 0)
+        with open(folder / 'run.lcmlog', 'ab') as file:
+            file.write(b'x')
+        for arguments in (('replay', folder, '--check'), ('convert', folder, self.folder / 'made.csv')):
+            result = self.run_program(*arguments)
+            self.assertEqual(result.returncode, 2)
+            self.assertIn('run.lcmlog" is not as it was recorded', result.stderr)
 
     def test_not_a_log(self):
         for path in ('/etc/passwd', '/dev/null', self.folder, self.folder / 'none.lcmlog'):

@@ -49,6 +49,12 @@ class Emulator(EmulatorProcess):
                           self.command('widths'))
         return Widths(*(number and int(number) for number in found.groups()))
 
+    def write_registers(self, *pairs):
+        """What another process writes: offsets and values, through a descriptor of its own."""
+        with open(next(self.root.glob('0000*')) / 'resource2', 'r+b', buffering=0) as registers:
+            for offset, value in pairs:
+                os.pwrite(registers.fileno(), value.to_bytes(4, 'little'), offset)
+
     def lower_speed(self):
         return float(self.command('status').split('lower ')[1].split()[0])
 
@@ -79,7 +85,7 @@ class RigTest(EmulatorTest):
                 self.assertEqual(emulator.wire(), (0.0, 0.0), f'while it asks: {line}')
                 program.stdin.write(answer(line) + '\n')
             elif line.startswith('Turn the '):
-                emulator.turn('upper' if 'UPPER' in line else 'lower', 0.5)
+                emulator.turn('upper' if 'UPPER' in line else 'lower', 1)
                 program.stdin.write('\n')
         return said
 

@@ -59,6 +59,18 @@ class RigFailures(RigTest):
                 if status != 1 and 'at 0x64' not in words:
                     self.assertNotIn('W ', traffic.read_text(), 'nothing is written to what is not the card')
 
+    def test_an_identity_that_is_too_small_is_named(self):
+        # Full brake on a tyre that holds slows the lower wheel twice as fast as an identity of 23 N allows.
+        strong = ('--controller', 'locked', '--set', 'driver.pci.brake_duty_max=1', '--set', 'experiment.cut_speed_rad_s=120')
+        for identity, status in (('rig.theta_N=23', 1), ('rig.theta_N=120', 0)):
+            with self.subTest(identity):
+                emulator = self.emulator('--lock-step', '--set', 'plant.theta_N=120')
+                result = self.lock_step(emulator, *strong, '--set', 'model.theta_N=23', '--set', identity)
+                self.assertEqual(result.returncode, status, result.stderr)
+                hint = "the rig's identity (rig.theta_N = 23 N, rig.motor_stall_torque_Nm = 2.1122 N m) may be too small"
+                (self.assertIn if status else self.assertNotIn)(hint, result.stderr)
+                emulator.end()
+
     def test_second_owner_is_told_who_holds_the_card(self):
         emulator = self.emulator()
         first = self.real_time(emulator)
@@ -89,6 +101,29 @@ class RigFailures(RigTest):
                     # Nothing can reach the wire: the PWMs hold, and a message asks the user to act.
                     self.assertIn('the safe state may not have reached the board', errors)
                     self.assertGreater(emulator.wire()[0], 0.9)
+                emulator.end()
+
+    def test_another_writer_on_the_card(self):
+        # It writes until the run has seen it and ended its outputs. A write between a cycle's look and its own write has
+        # no effect; after the run only the resident guardian would keep zeros.
+        for name, writes, words in (
+                ('drive', ((0x60, 0), (0x6C, 4094)), 'something else writes to the board'),
+                ('brake while accelerating', ((0x60, 1), (0x6C, 2000)), 'something else writes to the board'),
+                ('brake at 8 bits', ((0x60, 1), (0x64, 0)), 'version or settings changed during the run'),
+                ('overspeed limit', ((0x5C, 0xFFFF),), 'version or settings changed during the run')):
+            with self.subTest(name):
+                emulator = self.emulator()
+                program = self.real_time(emulator)
+                self.wait_until_driving(emulator)
+                for _ in range(5):
+                    emulator.write_registers(*writes)
+                    time.sleep(0.1)
+                    if emulator.wire()[0] == 0.0:
+                        break
+                _, errors = program.communicate(timeout=20)
+                self.assertEqual(program.returncode, 1, errors)
+                self.assertIn(words, errors)
+                self.assertEqual(emulator.wire(), SAFE)
                 emulator.end()
 
     def test_emulator_killed(self):
@@ -201,7 +236,7 @@ class RigFailures(RigTest):
                         if 'Step 3' in line:
                             break
                     elif line.startswith('Turn the '):
-                        emulator.turn('upper' if 'UPPER' in line else 'lower', 0.5)
+                        emulator.turn('upper' if 'UPPER' in line else 'lower', 1)
                         program.stdin.write('\n')
                 deadline = time.monotonic() + 20
                 while emulator.wire()[0] == 0.0:

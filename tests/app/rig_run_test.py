@@ -21,7 +21,7 @@ class RigRun(RigTest):
         result = self.lock_step(emulator, '--summary', rig)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn('not verified on hardware', result.stderr)
-        self.assertIn('11 register accesses a cycle', result.stderr)
+        self.assertIn('12 register accesses a cycle', result.stderr)
         # The rig's brake is capped at 0.7, so the comparison uses the same cap.
         self.fast('--summary', sim, '--set', 'gate.brake_duty_max=0.7')
         r, s = self.summary(rig), self.summary(sim)
@@ -92,21 +92,30 @@ class RigRun(RigTest):
         emulator.end()
         accesses = [line.split() for line in traffic.read_text().splitlines()]
         cycle = documented_cycle()
-        self.assertEqual(len(cycle), 11)
+        self.assertEqual(len(cycle), 12)
         cycles = len(self.rows(csv))
         in_turn = ('AC', '38', 'B4', 'B8')
+        settings = ('64', '00', '64', '04', '64', '68', '64', '68', '64', '50', '64', '5C', '64', 'A4', '64', 'A8')
+        of_drive = (0, 4, 5, 8, 12)  # read while the index is 0
         # Before the first cycle: two reads of `configure`, and the take-over. After the last one: the safe state.
-        start = next(i for i in range(2, len(accesses)) if accesses[i][1] == 'B8') + 1
+        start = next(i for i in range(2, len(accesses)) if accesses[i][1] == 'B8') + 1 + 2 * len(settings)
         self.assertEqual(len(accesses), start + cycles * len(cycle) + 6)
+        last = {'0': '00000000', '1': '00000000'}  # the width of each PWM
         for number in range(cycles):
-            for place, (direction, offset, value) in enumerate(cycle):
+            expected, index, turn = list(cycle), '', number % len(settings)
+            if turn in of_drive:
+                expected.insert(8, expected.pop())
+            for place, (direction, offset, value) in enumerate(expected):
                 got = accesses[start + number * len(cycle) + place]
-                wanted = in_turn[number % 4] if offset == 'health' else offset
+                wanted = {'health': in_turn[number % 4], 'setting': settings[turn]}.get(offset, offset)
                 self.assertEqual(got[:2], [direction, wanted], f'cycle {number}, access {place}')
                 if value in ('0', '1'):
                     self.assertEqual(int(got[2], 16), int(value), f'cycle {number}, access {place}')
-                if value == 'same':
-                    self.assertEqual(got[2], accesses[start + number * len(cycle) + place - 1][2])
+                    index = value
+                if value == 'last':
+                    self.assertEqual(got[2], last[index])
+                if value == 'width':
+                    last[index] = got[2]
         self.assertEqual([' '.join(a) for a in accesses[-6:]],
                          ['W 60 00000000', 'W 6C 00000000', 'R 6C 00000000', 'W 60 00000001', 'W 6C 00000000',
                           'R 6C 00000000'])

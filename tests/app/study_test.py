@@ -101,7 +101,7 @@ class Study(ProgramTest):
         self.complete(out='killed')
         self.assertEqual(self.results('killed'), self.results())
         self.assertEqual(sorted(entry.name for entry in (self.folder / 'killed').iterdir()),
-                         ['results.csv.gz', 'study.json', 'study.toml'])
+                         ['SHA256SUMS', 'results.csv.gz', 'study.json', 'study.toml'])
 
     @unittest.skipIf(KILLS < 30, 'takes a minute')
     def test_memory_does_not_grow_with_the_runs(self):

@@ -19,7 +19,7 @@ def receives_all(program, helper, folder, seconds, rate_Hz, tries=1):
     url = f'{URL}&recv_buf_size={4 << 20}'
     subscriber = Subscriber(helper, url, urgent())
     run = Run(program, folder, *drive_for(folder, seconds), '--rate', rate_Hz, '--set',
-              'realtime.max_consecutive_overruns=0')
+              'realtime.max_consecutive_overruns=0', '--set', 'realtime.late_max_s=1000')
     summary = run.end(timeout=seconds + 60)
     subscriber.note_drops()
     seen = subscriber.result()

@@ -84,7 +84,7 @@ def server_dies(program, helper, folder):
 
 
 # 2 MB/s fill the buffers: those of a server within two seconds, including a subscriber's within eight.
-FAST = ['--rate', 4_000, '--set', 'realtime.max_consecutive_overruns=0', '--lcm-url', URL]
+FAST = ['--rate', 4_000, '--set', 'realtime.max_consecutive_overruns=0', '--set', 'realtime.late_max_s=1000', '--lcm-url', URL]
 
 
 def costs_messages_only(what, run):

@@ -7,6 +7,7 @@
 
 #include "catch.hpp"
 #include "config/config_error.hpp"
+#include "telemetry/message_capture.hpp"
 #include "temporary_folder.hpp"
 
 namespace abs_hil::commands {
@@ -52,6 +53,39 @@ TEST_CASE("A mac is the same for the same message and key, and differs for any c
   CHECK(mac_of(command, key) == mac);
   command.value = 0.2;
   CHECK(mac_of(command, key) != mac);
+}
+
+TEST_CASE("Answers carry a tag that only the key makes, and that fits only their own content") {
+  const std::string key = "0123456789abcdef";
+  telemetry::test::CapturingOutlet sent;
+  telemetry::MessageStream stream({}, {}, {});
+  stream.add(sent);
+  stream.answer_command(rig::Reason::stop_command, "stop accepted (token 'me')", 1.0);
+  sign_answers(stream, key);
+  stream.answer_command(rig::Reason::stop_command, "stop accepted (token 'me')", 1.0);
+  stream.report_fault(rig::Reason::overspeed, 1.0, "too fast");
+  const auto answers = sent.all<event_t>("ABS_EVENT");
+  REQUIRE(answers.size() == 3);
+  event_t bare = answers[0];
+  CHECK_FALSE(take_tag(bare, key));
+  CHECK(bare.message == "stop accepted (token 'me')");
+  event_t good = answers[1];
+  CHECK(take_tag(good, key));
+  CHECK(good.message == "stop accepted (token 'me')");
+  CHECK(answers[2].message == "too fast");
+  const auto refused = [&](auto&& change) {
+    event_t forged = answers[1];
+    change(forged);
+    return !take_tag(forged, key);
+  };
+  CHECK(refused([](event_t& e) { e.message.insert(0, "x"); }));
+  CHECK(refused([](event_t& e) { e.reason = static_cast<std::int16_t>(rig::Reason::command_not_now); }));
+  CHECK(refused([](event_t& e) { e.sequence += 1; }));
+  CHECK(refused([](event_t& e) { e.message.replace(e.message.find("mac ") + 4, 1, "g"); }));
+  CHECK(refused([](event_t& e) { e.message.pop_back(); }));
+  CHECK(refused([](event_t& e) { e.message += ' '; }));
+  event_t other = answers[1];
+  CHECK_FALSE(take_tag(other, key + "0"));
 }
 
 TEST_CASE("A sequence number that leaps is refused and uses none up: a forged state cannot lock senders out") {

@@ -61,8 +61,10 @@ struct Bench {
   }
   [[nodiscard]] std::vector<event_t> answers() const {
     std::vector<event_t> found;
-    for (const event_t& event : captured.all<event_t>("ABS_EVENT")) {
-      if (event.kind == "command") found.push_back(event);
+    for (event_t event : captured.all<event_t>("ABS_EVENT")) {
+      if (event.kind != "command") continue;
+      CHECK(take_tag(event, key));
+      found.push_back(event);
     }
     return found;
   }
@@ -158,7 +160,7 @@ TEST_CASE("continue answers the question of the present phase, and nothing else"
   REQUIRE(adjustments.size() == 1);
   CHECK(adjustments[0].name == "continue");
   CHECK(adjustments[0].cycle == static_cast<std::int64_t>(record.sequence));
-  CHECK(captured.all<event_t>("ABS_EVENT").back().message == "accepted: continue (sender 's')");
+  CHECK(captured.all<event_t>("ABS_EVENT").back().message.starts_with("accepted: continue (sender 's') [mac "));
   REQUIRE(judge().has_value());
 }
 

@@ -19,14 +19,17 @@ const driver::BoardIdentity card{.place = "0000:03:00.0", .logic = "bitstream 27
 struct Lab {
   test::TemporaryFolder folder{};
   driver::DriverOptions options{.kind = "pci", .records = folder.path.string()};
+  RigIdentity rig{};
   driver::pci::PciOptions& pci{options.of<driver::pci::PciOptions>()};
 
+  mutable std::string note{};  ///< of the record that holds
+
   void commission(bool emulated = false) const {
-    write_record(describe_board(options, card, emulated), record_folders(options.records));
+    write_record(describe_board(options, rig, card, emulated), record_folders(options.records));
   }
   [[nodiscard]] std::string refusal(const driver::BoardIdentity& board = card) const {
     try {
-      require_record(options, board);
+      note = require_record(options, rig, board);
     } catch (const driver::Unavailable& error) {
       return error.what();
     }
@@ -91,6 +94,35 @@ TEST_CASE("A record holds for the signs, channels and PWMs that were tried, and 
   }
 }
 
+TEST_CASE("A record holds for the identity of the rig alone, from which the limits come") {
+  Lab lab;
+  lab.rig.parameters.tyre.theta_N = 40.0;
+  lab.commission();
+  CHECK(lab.refusal().empty());
+  CHECK(lab.note.empty());
+  lab.rig.source = "elsewhere.toml";  // the values count
+  CHECK(lab.refusal().empty());
+  for (double* value : {&lab.rig.parameters.tyre.theta_N, &lab.rig.parameters.motor.stall_torque_Nm,
+                        &lab.rig.parameters.brake.b1_Nm, &lab.rig.parameters.wheels.J2_kg_m2}) {
+    const double kept = *value;
+    *value *= 0.1;
+    CHECK_THAT(lab.refusal(), Contains("the rig's identity, from which the limits come, has changed: rig."));
+    *value = kept;
+  }
+  CHECK(lab.refusal().empty());
+}
+
+TEST_CASE("A record from before the identity holds for the default identity, and says so") {
+  Lab lab;
+  BoardRecord record = describe_board(lab.options, {}, card, false);
+  record.identity.clear();
+  write_record(record, record_folders(lab.options.records));
+  CHECK(lab.refusal().empty());
+  CHECK_THAT(lab.note, Contains("older than the rig's identity") && Contains("paper-table1"));
+  lab.rig.parameters.tyre.theta_N = 1000.0;
+  CHECK_THAT(lab.refusal(), Contains("rig.theta_N was 23 then and is 1000 now"));
+}
+
 TEST_CASE("The record of an emulator holds for no hardware") {
   const Lab lab;
   lab.commission(true);
@@ -112,7 +144,7 @@ TEST_CASE("A file that is no record is named, and a record lies there whole or n
 TEST_CASE("A folder that takes no record is skipped; without any, the error names a way out") {
   const Lab lab;
   std::ofstream(lab.folder.path / "file") << "not a folder";
-  const BoardRecord record = describe_board(lab.options, card, false);
+  const BoardRecord record = describe_board(lab.options, {}, card, false);
   const auto closed = lab.folder.path / "file" / "boards";
   CHECK(write_record(record, {closed, lab.folder.path / "open"}).parent_path() == lab.folder.path / "open");
   CHECK_THROWS_WITH(write_record(record, {closed}), Contains("cannot be written") && Contains("driver.records=DIR"));

@@ -3,6 +3,7 @@
 #include <functional>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "catch.hpp"
@@ -19,7 +20,7 @@ namespace {
 
 struct Lab {
   explicit Lab(const driver::pci::PciOptions& options = {}) : driver(options, card.opener()) {
-    person.turn = [this](bool upper) { card.model.turn_by_hand(upper, 0.5); };
+    person.turn = [this](bool upper) { card.model.turn_by_hand(upper, 1.0); };
     person.take_time = [this] { clock.sleep_until(clock.now_ns() + 2'000'000'000); };
     // Nothing may act while a question stands.
     person.before_answer = [this] {
@@ -72,7 +73,7 @@ class OtherBoard final : public driver::RigDriver {
 /// A rig on such a board that does what it should: each test lets one thing go wrong.
 struct OtherLab {
   OtherLab() {
-    person.turn = [this](bool upper) { (upper ? board.counters.upper_counts : board.counters.lower_counts) += 2048; };
+    person.turn = [this](bool upper) { (upper ? board.counters.upper_counts : board.counters.lower_counts) += 4096; };
     board.on_write = [this](const rig::Command& command) {
       if (command.motor_duty > 0.0) ++board.counters.lower_counts;
       return driver::IoResult{};
@@ -107,7 +108,7 @@ TEST_CASE("A good rig passes all four steps, each asked for, and is safe after")
   INFO(lab.person.said);
   CHECK(lab.person.asked.size() == 5);
   CHECK_THAT(lab.person.asked.back(), Contains("see or hear the brake"));
-  CHECK_THAT(lab.person.said, Contains("ok: 2048 counts forward, 0.50 turns"));
+  CHECK_THAT(lab.person.said, Contains("ok: 4096 counts forward, 1.000 turns at 4096 counts a turn"));
   CHECK(lab.card.model.outputs().brake_duty == 0.0);
   CHECK(lab.driver.state() == driver::DriverState::inactive);
   CHECK(largest_width(lab.card) <= 0.5 + 1.0 / 4095.0);  // the brake's pulse is the largest
@@ -116,8 +117,8 @@ TEST_CASE("A good rig passes all four steps, each asked for, and is safe after")
 TEST_CASE("Each pulse has its guard from before it until the outputs are 0 again") {
   Lab lab;
   CHECK(lab.run() == CommissioningResult::passed);
-  CHECK(lab.guard.begun == 3);
-  CHECK(lab.guard.ended_safe == 3);
+  CHECK(lab.guard.begun == 4);
+  CHECK(lab.guard.ended_safe == 4);
   CHECK(lab.guard.beats >= 600);  // once a millisecond
 
   Lab dying;
@@ -125,7 +126,7 @@ TEST_CASE("Each pulse has its guard from before it until the outputs are 0 again
   CHECK(dying.run() == CommissioningResult::failed);
   CHECK_THAT(dying.person.said, Contains("the guardian process has ended"));
   CHECK(dying.guard.beats == 50);
-  CHECK(dying.guard.ended_safe == 1);
+  CHECK(dying.guard.ended_safe == 2);
   CHECK(dying.card.model.outputs().drive_duty == 0.0);
 
   Lab alone;
@@ -235,8 +236,8 @@ TEST_CASE("Wheels that do not turn, or that turn each other, are found") {
   }
   SECTION("wheels in contact") {
     lab.person.turn = [&lab](bool upper) {
-      lab.card.model.turn_by_hand(upper, 0.5);
-      lab.card.model.turn_by_hand(!upper, -0.5);
+      lab.card.model.turn_by_hand(upper, 1.0);
+      lab.card.model.turn_by_hand(!upper, -1.0);
     };
     words = "lift the upper wheel";
   }
@@ -246,6 +247,32 @@ TEST_CASE("Wheels that do not turn, or that turn each other, are found") {
   }
   CHECK(lab.run() == CommissioningResult::failed);
   CHECK_THAT(lab.person.said, Contains(words));
+}
+
+TEST_CASE("An encoder of another scale is found by one turn by hand, within 3 %, and the counts are kept") {
+  // Counts of one turn of the upper and lower wheel; the model says 4096.
+  const auto [upper, lower, passes] =
+      GENERATE(std::tuple(4096, 4096, true), std::tuple(4000, 4200, true), std::tuple(4506, 4506, false),
+               std::tuple(8192, 8192, false), std::tuple(2048, 2048, false), std::tuple(4096, 3900, false));
+  OtherLab lab;
+  lab.person.turn = [&lab, upper = upper, lower = lower](bool is_upper) {
+    (is_upper ? lab.board.counters.upper_counts : lab.board.counters.lower_counts) += is_upper ? upper : lower;
+  };
+  experiment::Commissioning commissioning(lab.board, lab.clock, lab.person, lab.guard, lab.options,
+                                          [] { return false; });
+  CHECK((commissioning.run() == CommissioningResult::passed) == passes);
+  if (passes) {
+    CHECK(commissioning.one_turn().upper == upper);
+    CHECK(commissioning.one_turn().lower == lower);
+  } else {
+    CHECK_THAT(lab.person.said, Contains("model.encoder_counts_per_rev"));
+  }
+  OtherLab coarse;  // the same turn of an encoder that the model knows to be coarser
+  coarse.options.encoder_counts_per_rev = 1024;
+  coarse.person.turn = [&coarse](bool is_upper) {
+    (is_upper ? coarse.board.counters.upper_counts : coarse.board.counters.lower_counts) += 1024;
+  };
+  CHECK(coarse.run() == CommissioningResult::passed);
 }
 
 TEST_CASE("A tripped interlock and a request to stop end a pulse at once") {
@@ -300,8 +327,8 @@ TEST_CASE("A board that fails in a pulse ends it with a message about the failed
   }
   CHECK(lab.run() == CommissioningResult::failed);
   CHECK_THAT(lab.person.said, Contains(words));
-  CHECK(lab.guard.begun == 1);
-  CHECK(lab.guard.ended_safe == pulses_ended_safe);
+  CHECK(lab.guard.begun == 2);
+  CHECK(lab.guard.ended_safe == 1 + pulses_ended_safe);
   CHECK_FALSE(lab.guard.acting);
   CHECK(lab.person.asked.size() == 3);
 }
@@ -311,7 +338,7 @@ TEST_CASE("After the pulses: wheels that do not stop, a brake that drives, one t
   std::string words;
   SECTION("no standstill") {
     lab.board.on_read = [&lab] {
-      if (lab.guard.begun > 0) ++lab.board.counters.lower_counts;
+      if (lab.guard.begun > 1) ++lab.board.counters.lower_counts;
       return driver::IoResult{};
     };
     words = "the wheels still turn after the run-out limit";
@@ -345,14 +372,14 @@ TEST_CASE("A stop while turning by hand or while the wheels run out ends the com
   OtherLab leaving;
   leaving.person.gives_up = true;
   CHECK(leaving.run() == CommissioningResult::declined);
-  CHECK(leaving.guard.begun == 0);
+  CHECK(leaving.guard.begun == 1);
 
   OtherLab stopping;
   stopping.board.on_read = [&] {
-    stopping.stop = stopping.guard.ended_safe == 1 && stopping.clock.now_ns() > 1'000'000'000;
-    if (stopping.guard.begun > 0) ++stopping.board.counters.lower_counts;  // the wheel keeps turning
+    stopping.stop = stopping.guard.ended_safe == 2 && stopping.clock.now_ns() > 1'000'000'000;
+    if (stopping.guard.begun > 1) ++stopping.board.counters.lower_counts;  // the wheel keeps turning
     return driver::IoResult{};
   };
   CHECK(stopping.run() == CommissioningResult::interrupted);
-  CHECK(stopping.guard.begun == 1);
+  CHECK(stopping.guard.begun == 2);
 }

@@ -59,13 +59,16 @@ struct Result {
 /// The phases of the setup's experiment.
 inline std::vector<PhasePlan> phases_of(const Setup& setup) {
   if (!setup.plans.empty()) return setup.plans;
-  config::Settings settings{.plant = setup.plant, .control = setup.control, .experiment = setup.experiment};
+  config::Settings settings;
+  settings.plant = setup.plant;
+  settings.control = setup.control;
+  settings.experiment = setup.experiment;
   return config::plan(settings).phases;
 }
 
 inline RunLogicParts logic_parts(const Setup& setup) {
-  RunLogicParts parts = make_logic_parts(setup.control, setup.believed(), setup.plant.ideal_actuator, setup.gate,
-                                         setup.experiment, phases_of(setup));
+  RunLogicParts parts = make_logic_parts(setup.control, setup.believed(), plant_sim::identity_of(setup.plant),
+                                         setup.plant.ideal_actuator, setup.gate, setup.experiment, phases_of(setup));
   parts.recorded_r2_m = setup.plant.rig.wheels.r2_m;
   parts.duty_steps = driver::full_width(setup.pwm_mode);
   return parts;

@@ -24,20 +24,20 @@ std::string held_up_guardian(const std::filesystem::path& folder) {
 
 TEST_CASE("handed-over outputs stay handed over until the guardian has read it") {
   const test::TemporaryFolder folder;
-  SharedRegion region(1);
-  GuardianProcess guardian(region, held_up_guardian(folder.path), "{}");
+  const SharedRecorder recorder(1);
+  GuardianProcess guardian(recorder, held_up_guardian(folder.path), "{}");
   guardian.arm({});
   const pid_t pid = guardian.pid();
   guardian.outputs_released(false);
   CHECK(guardian.end() == GuardEnd::insisting);
-  CHECK(region.stage() == Stage::handed_over);
+  CHECK(guardian.pages().run().stage.load() == Stage::handed_over);
   REQUIRE(::kill(pid, SIGKILL) == 0);  // the guardian still ran
 }
 
 TEST_CASE("a guardian that is weaker than its controller is refused") {
   const test::TemporaryFolder folder;
-  SharedRegion region(1);
-  GuardianProcess guardian(region, held_up_guardian(folder.path), "{}");
+  const SharedRecorder recorder(1);
+  GuardianProcess guardian(recorder, held_up_guardian(folder.path), "{}");
   CHECK_THROWS_WITH(guardian.arm({.fifo_priority = 80, .memory_locked = true}),
                     Catch::Matchers::Contains("no SCHED_FIFO") && Catch::Matchers::Contains("setcap"));
   CHECK_FALSE(guardian.armed());
@@ -45,12 +45,12 @@ TEST_CASE("a guardian that is weaker than its controller is refused") {
 
 TEST_CASE("a guardian that hangs although the outputs are safe is ended") {
   const test::TemporaryFolder folder;
-  SharedRegion region(1);
-  GuardianProcess guardian(region, held_up_guardian(folder.path), "{}");
+  const SharedRecorder recorder(1);
+  GuardianProcess guardian(recorder, held_up_guardian(folder.path), "{}");
   guardian.arm({});
   guardian.outputs_released(true);
   CHECK(guardian.end() == GuardEnd::failed);
-  CHECK(region.stage() == Stage::closed);
+  CHECK(guardian.pages().run().stage.load() == Stage::closed);
 }
 
 }  // namespace

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
-#include "guardian/guardian_loop.hpp"
+#include "guardian/board_guard.hpp"
 
 namespace abs_hil::guardian::test {
 
@@ -38,52 +40,63 @@ class ScriptedClock final : public runtime::Clock {
 /// Log of all actions in order, as text.
 using Story = std::vector<std::string>;
 
-class ScriptedController final : public ControllerProcess {
+/// Processes that die when the script says so, or some time after they were ended. A handle is the process' number.
+class ScriptedProcesses final : public Processes {
  public:
-  ScriptedController(ScriptedClock& clock, Story& story) : clock_(clock), story_(story) {}
+  ScriptedProcesses(ScriptedClock& clock, Story& story) : clock_(clock), story_(story) {}
 
-  [[nodiscard]] bool gone_by(std::int64_t time_ns) noexcept override {
-    while (!gone() && clock_.now_ns() < time_ns) {
-      clock_.sleep_until(std::min(time_ns, clock_.now_ns() + 100 * us));
-    }
-    if (gone() && !told_) {
-      told_ = true;
-      story_.emplace_back("gone");
-    }
-    return gone();
+  [[nodiscard]] int open(pid_t pid) noexcept override { return lives(pid) ? pid : -1; }
+  void close(int /*handle*/) noexcept override {}
+  [[nodiscard]] bool gone(int handle) noexcept override {
+    const bool is_gone = !lives(handle);
+    if (is_gone && !std::exchange(told_[handle], true)) story_.emplace_back("gone");
+    return is_gone;
   }
-  void end() noexcept override {
-    story_.emplace_back("end");
-    dies_at_ns = std::min(dies_at_ns, clock_.now_ns() + dying_takes_ns);
+  void end(int handle) noexcept override {
+    if (!ended_[handle]) story_.emplace_back("end");
+    ended_[handle] = true;
+    std::int64_t& at_ns = dies_at_ns.try_emplace(handle, INT64_MAX).first->second;
+    at_ns = std::min(at_ns, clock_.now_ns() + dying_takes_ns);
   }
-  [[nodiscard]] bool gone() { return clock_.now_ns() >= dies_at_ns; }
-
-  [[nodiscard]] rig::Reason must_give_back_for() noexcept override {
-    return clock_.now_ns() >= give_back_at_ns ? give_back_for : rig::Reason::none;
+  [[nodiscard]] bool lives(int handle) const {
+    const auto found = dies_at_ns.find(handle);
+    return found == dies_at_ns.end() || clock_.now_ns() < found->second;
   }
 
-  rig::Reason give_back_for{rig::Reason::computer_will_suspend};
-  std::int64_t give_back_at_ns{INT64_MAX};
-  std::int64_t dies_at_ns{INT64_MAX};
+  std::map<int, std::int64_t> dies_at_ns{};
   std::int64_t dying_takes_ns{200 * us};
 
  private:
   ScriptedClock& clock_;
   Story& story_;
-  bool told_{false};
+  std::map<int, bool> told_{};
+  std::map<int, bool> ended_{};
 };
 
-class ScriptedWriter final : public driver::SafeStateWriter {
+/// A board that holds what was last written to it.
+class ScriptedBoard final : public driver::SafeStateWriter {
  public:
-  explicit ScriptedWriter(Story& story) : story_(story) {}
+  explicit ScriptedBoard(Story& story) : story_(story) {}
   [[nodiscard]] std::string_view name() const noexcept override { return "scripted"; }
   void prepare() override {}
   [[nodiscard]] driver::IoResult make_safe() noexcept override {
     story_.emplace_back("write");
     if (fails_first-- > 0) return {driver::IoError::no_answer, 0x6C};
+    duty = 0.0;
     return {};
   }
+  [[nodiscard]] driver::IoResult verify_safe() noexcept override {
+    story_.emplace_back("look");
+    if (fails_first > 0) return make_safe();
+    if (duty == 0.0) return {};
+    duty = 0.0;
+    return {driver::IoError::foreign_writer, 0x6C};
+  }
+  [[nodiscard]] bool works_beside_owner() const noexcept override { return shared; }
   [[nodiscard]] std::int64_t owner_needs_ns() const noexcept override { return 300 * ms; }
+
+  double duty{0.0};
+  bool shared{true};
   int fails_first{0};
 
  private:

@@ -2,7 +2,7 @@
 starts. usage: see foreign.py"""
 import unittest
 
-from foreign import broken, example  # first: it reads the arguments
+from foreign import broken, example, hostile  # first: it reads the arguments
 from rig_emulator import RigTest, skip_unless_possible
 
 
@@ -41,6 +41,36 @@ class EmulatedCard(RigTest):
                 self.assertEqual(status, 0, errors)
                 self.assertEqual(summary['foreign_controller']['trial'][key], 2000)
                 self.assertIn(word, errors)
+
+    def test_what_ends_the_program_does_not_choose_how(self):
+        """Outputs are zero, the status is not 0, and somebody says why."""
+        # deed: status, words of the program (the guardian's where the program has none any more)
+        for deed, (status, words) in {'EXITS': (1, 'called exit() or quick_exit()'),
+                                      'EXITS_QUICKLY': (1, 'called exit() or quick_exit()'),
+                                      'EXITS_AT_ONCE': (1, 'called _exit()'),
+                                      'EXITS_IN_THREAD': (1, 'called exit() or quick_exit()'),
+                                      'ENDS_THREAD': (-6, 'drive 0 and brake 0 written and read back'),
+                                      'ABORTS': (-6, 'drive 0 and brake 0 written and read back')}.items():
+            with self.subTest(deed):
+                emulator = self.emulator()
+                program = self.real_time(emulator, '--controller', hostile(self.folder, deed, 'AT_STEP=2500'), '--rt', 'prefer',
+                                         '--rate', '500', '--recorder', self.folder / deed)
+                _, errors = program.communicate(timeout=60)
+                self.assertEqual(program.returncode, status, errors)
+                self.assertIn(words, errors)
+                if status == 1:
+                    self.assertIn('The outputs are safe', errors)
+                self.wait_for(emulator)
+                if deed != 'EXITS_IN_THREAD':  # the cycle could end in order
+                    self.assertEqual(len(list((self.folder / deed).glob('recorder-*.txt'))), 1, errors)
+
+    def test_what_ends_while_it_is_made_is_refused(self):
+        for deed in ('EXITS', 'EXITS_AT_ONCE', 'FORK_BOMB'):
+            for place in ('IN_CONSTRUCTOR', 'IN_CREATE'):
+                with self.subTest(deed, place=place):
+                    program = self.real_time(self.emulator(), '--controller', hostile(self.folder, deed, place), '--rt', 'prefer')
+                    _, errors = program.communicate(timeout=60)
+                    self.assertEqual(program.returncode, 2, errors)
 
     def test_the_guardian_makes_a_crash_safe(self):
         emulator = self.emulator()

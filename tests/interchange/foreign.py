@@ -36,3 +36,8 @@ def broken(folder, kind):
 
 def example(folder):
     return compiled(folder, SOURCE / 'examples/c_controller/pi_controller.c', 'pi_controller')
+
+
+def hostile(folder, deed, place):
+    return compiled(folder, SOURCE / 'tests/interchange/hostile_controllers.c', f'{deed}-{place}'.lower(), f'-D{deed}',
+                    f'-D{place}', '-pthread', '-Wno-unused-function', '-Wno-unused-result')

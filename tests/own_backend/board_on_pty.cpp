@@ -4,7 +4,7 @@
 // usage: board_on_pty LINK WATCHDOG_MS
 // LINK becomes a link to the pty. The board ends its outputs WATCHDOG_MS after the last command; 0: it holds them.
 // Prints a line "widths DRIVE BRAKE at MILLISECONDS" whenever they change. Lines on stdin: "turn upper" and "turn
-// lower" turn a wheel by half a turn.
+// lower" turn a wheel once.
 
 #include <fcntl.h>
 #include <poll.h>
@@ -63,7 +63,7 @@ class Board {
   }
   void turn(bool upper) {
     PlantState state = plant_.state();
-    (upper ? state.angle1_rad : state.angle2_rad) += std::numbers::pi;
+    (upper ? state.angle1_rad : state.angle2_rad) += 2.0 * std::numbers::pi;
     plant_.reset(state);
   }
 

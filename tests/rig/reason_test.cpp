@@ -57,6 +57,8 @@ constexpr std::pair<std::string_view, int> published[]{
     {"board_supply_tripped", 80},
     {"board_supply_low", 81},
     {"board_too_hot", 82},
+    {"foreign_writer", 83},
+    {"board_reconfigured", 84},
     {"can_node_silent", 100},
     {"can_frames_stale", 101},
     {"can_frames_duplicated", 102},

@@ -40,6 +40,27 @@ TEST_CASE("a folder is created with its parents, and sealed with the checksums o
   CHECK(sums == sha256_of("{\n  \"x\": 1\n}\n") + "  a.json\n" + sha256_of("abc") + "  z.txt\n");
 }
 
+TEST_CASE(
+    "a sealed folder whose file has changed is refused by the file's name; a folder without a seal is not judged") {
+  const TemporaryFolder place;
+  const RunFolder folder(place.path / "run");
+  folder.write("run.csv", std::string_view("rows"));
+  folder.write("summary.json", std::string_view("{}"));
+  CHECK_NOTHROW(check_seal(folder.path()));
+  folder.seal();
+  CHECK_NOTHROW(check_seal(folder.path()));
+  std::ofstream(folder.of("notes.txt")) << "added later";
+  CHECK_NOTHROW(check_seal(folder.path()));
+  std::ofstream(folder.of("summary.json")) << "{} ";
+  CHECK_THROWS_WITH(check_seal(folder.path()), Catch::Matchers::Contains("summary.json\" is not as it was recorded"));
+  fs::remove(folder.of("summary.json"));  // its reader says so
+  CHECK_NOTHROW(check_seal(folder.path()));
+  for (const char* damaged : {"", "abc\n", "../x"}) {
+    std::ofstream(folder.of(file::checksums)) << damaged;
+    CHECK_THROWS_WITH(check_seal(folder.path()), Catch::Matchers::Contains("SHA256SUMS"));
+  }
+}
+
 TEST_CASE("a folder that is not empty, a file, and an unwritable path are refused by name") {
   const TemporaryFolder place;
   std::ofstream(place.path / "file") << "x";

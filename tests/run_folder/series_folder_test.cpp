@@ -46,6 +46,21 @@ TEST_CASE("a series of runs continues where it stopped, and keeps the files of a
   CHECK(index["runs"][2]["seed"] == 3);
 }
 
+TEST_CASE("a series is not continued over a run whose files have changed") {
+  const TemporaryFolder place;
+  const fs::path path = place.path / "series";
+  {
+    SeriesFolder series(path, "id", "paper", three());
+    const RunFolder run(series.begin(0));
+    run.write("run.csv", std::string_view("x"));
+    run.seal();
+    series.end(0, "completed");
+  }
+  CHECK(SeriesFolder(path, "id", "paper", three()).done(0));
+  std::ofstream(path / "run-0001" / "run.csv") << "y";
+  CHECK_THROWS_WITH(SeriesFolder(path, "id", "paper", three()), Contains("run-0001/run.csv"));
+}
+
 TEST_CASE("a folder of another series, or of anything else, is refused") {
   const TemporaryFolder place;
   const fs::path path = place.path / "series";

@@ -27,20 +27,24 @@ struct Asked {
   std::string inject{};
   double rate_Hz{1000.0};
   double guardian_timeout_ms{20.0};
-  double sample_age_max_s{0.02};
+  std::vector<runtime::WeakValue> weak{};
+  int model_counts_per_rev{0};
   runtime::UnsafeOptions unsafe{};
+  mutable std::vector<std::string> accepted{};
 
   [[nodiscard]] std::string refusal() const {
     try {
-      runtime::refuse_unsafe_use({.driver = driver,
-                                  .guarded = guarded,
-                                  .virtual_time = virtual_time,
-                                  .rate_Hz = rate_Hz,
-                                  .guardian_timeout_ms = guardian_timeout_ms,
-                                  .sample_age_max_s = sample_age_max_s,
-                                  .unsafe = unsafe,
-                                  .start_speed_rad_s = start_speed_rad_s,
-                                  .injections = driver::parse_injections(inject)});
+      accepted = runtime::refuse_unsafe_use({.driver = driver,
+                                             .guarded = guarded,
+                                             .virtual_time = virtual_time,
+                                             .rate_Hz = rate_Hz,
+                                             .guardian_timeout_ms = guardian_timeout_ms,
+                                             .unsafe = unsafe,
+                                             .start_speed_rad_s = start_speed_rad_s,
+                                             .injections = driver::parse_injections(inject),
+                                             .weak = weak,
+                                             .model_counts_per_rev = model_counts_per_rev,
+                                             .rig_counts_per_rev = 4096});
     } catch (const std::invalid_argument& error) {
       return error.what();
     }
@@ -188,24 +192,53 @@ TEST_CASE("A guardian that would end a healthy run is refused on every board") {
   CHECK(run.refusal().empty());
 }
 
-TEST_CASE("Weakened limits on hardware need a key that names the risk; an emulator takes them") {
-  Asked slow{.guardian_timeout_ms = 41.0};
-  CHECK_THAT(slow.refusal(), Contains("guardian.timeout_ms = 41") && Contains("unsafe.outputs_on_after_death=true"));
-  slow.guardian_timeout_ms = 40.0;
-  CHECK(slow.refusal().empty());
-  slow.guardian_timeout_ms = 1000.0;
+TEST_CASE("A weak value on hardware needs a person's consent, and is told; an emulator takes it") {
+  const runtime::WeakValue insist{.key = "guardian.insist_s",
+                                  .value = "0.001",
+                                  .class_text = "weakens unless 0 s",
+                                  .meaning = "how long the guardian tries"};
+  Asked run{.weak = {insist}};
+  CHECK_THAT(run.refusal(), Contains("guardian.insist_s = 0.001") && Contains("weakens unless 0 s") &&
+                                Contains("--set unsafe.keys=guardian.insist_s"));
+  run.unsafe.blind_control = true;  // another consent
+  CHECK_FALSE(run.refusal().empty());
+  run.unsafe = {.keys = "gate.overspeed_rad_s,guardian.insist_s"};
+  CHECK(run.refusal().empty());
+  CHECK(run.accepted.size() == 1);
+  CHECK_THAT(run.accepted.at(0), Contains("guardian.insist_s = 0.001 weakens the protection"));
+  run.unsafe.keys = "guardian.insist_s_and_more,guardian.insist";
+  CHECK_FALSE(run.refusal().empty());
+  run.unsafe.keys = "";
+  pci(run.driver).root = "/tmp";
+  CHECK(run.refusal().empty());
+  CHECK(run.accepted.empty());
+}
+
+TEST_CASE("A weak value may have a flag of its own that consents") {
+  const auto weak = [](const char* key, const char* consent) {
+    return Asked{.weak = {runtime::WeakValue{.key = key, .value = "1", .class_text = "c", .consent = consent}}};
+  };
+  Asked slow = weak("guardian.timeout_ms", "outputs_on_after_death");
+  CHECK_THAT(slow.refusal(), Contains("guardian.timeout_ms = 1") && Contains("unsafe.outputs_on_after_death=true"));
   slow.unsafe.outputs_on_after_death = true;
   CHECK(slow.refusal().empty());
   slow.unsafe = {.blind_control = true};
   CHECK_FALSE(slow.refusal().empty());
-  pci(slow.driver).root = "/tmp";
-  CHECK(slow.refusal().empty());
-
-  Asked blind{.sample_age_max_s = 0.051};
-  CHECK_THAT(blind.refusal(), Contains("gate.sample_age_max_s = 0.051") && Contains("unsafe.blind_control=true"));
+  Asked blind = weak("gate.sample_age_max_s", "blind_control");
+  CHECK_FALSE(blind.refusal().empty());
   blind.unsafe.blind_control = true;
   CHECK(blind.refusal().empty());
+}
 
+TEST_CASE("The encoders' scale is the rig's, also on an emulated board") {
+  Asked run{.model_counts_per_rev = 2048};
+  pci(run.driver).root = "/tmp";
+  CHECK_THAT(run.refusal(), Contains("model.encoder_counts_per_rev = 2048") && Contains("give 4096 counts"));
+  run.model_counts_per_rev = 4096;
+  CHECK(run.refusal().empty());
+}
+
+TEST_CASE("A CAN node that would hold its outputs for long needs a person's consent") {
   Asked node{};
   node.driver.kind = "can";
   can(node.driver).interface = "can0";  // not there: taken for hardware

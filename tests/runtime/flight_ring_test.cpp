@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "catch.hpp"
-#include "runtime/heartbeat.hpp"
+#include "guardian/heartbeat.hpp"
 #include "scripted_parts.hpp"
 
 using namespace abs_hil;
@@ -89,14 +89,15 @@ TEST_CASE("two seconds at the cycle's rate") {
 
 TEST_CASE("each cycle beats before it writes, and leaves its record") {
   Bench bench;
-  HeartbeatPanel panel;
+  guardian::RunPage run;
+  guardian::GuardPage guard;
   std::vector<FlightSlot> slots(8);
   FlightRing recorder(slots);
-  Heartbeat heartbeat(panel, recorder);
-  bench.executive.set_heartbeat(heartbeat);
+  guardian::Heartbeat heartbeat(run, guard, recorder);
+  bench.executive.set_watch(heartbeat);
   for (std::uint64_t n = 1; n <= 3; ++n) {
     bench.cycle();
-    CHECK(panel.cycle_beats.load() == n);
+    CHECK(run.cycle_beats.load() == n);
   }
   const auto records = recorder.contents();
   REQUIRE(records.size() == 3);
@@ -107,13 +108,14 @@ TEST_CASE("each cycle beats before it writes, and leaves its record") {
 TEST_CASE("a guardian without heartbeat for the limit of cycles is a fault, a slow one is not") {
   constexpr std::uint64_t limit = 5;
   Bench bench;
-  HeartbeatPanel panel;
+  guardian::RunPage run;
+  guardian::GuardPage guard;
   std::vector<FlightSlot> slots(8);
   FlightRing recorder(slots);
-  Heartbeat heartbeat(panel, recorder, limit);
-  bench.executive.set_heartbeat(heartbeat);
+  guardian::Heartbeat heartbeat(run, guard, recorder, limit);
+  bench.executive.set_watch(heartbeat);
   for (int n = 0; n < 40; ++n) {
-    if (n % 4 == 0) panel.guardian_beats.store(panel.guardian_beats.load() + 1);
+    if (n % 4 == 0) guard.guardian_beats.store(guard.guardian_beats.load() + 1);
     REQUIRE(bench.cycle());
   }
   REQUIRE(bench.logic.ended_by == rig::Reason::none);
@@ -127,10 +129,11 @@ TEST_CASE("a guardian without heartbeat for the limit of cycles is a fault, a sl
 
 TEST_CASE("a run without a guardian has no guardian fault") {
   Bench bench;
-  HeartbeatPanel panel;
+  guardian::RunPage run;
+  guardian::GuardPage guard;
   std::vector<FlightSlot> slots(8);
   FlightRing recorder(slots);
-  Heartbeat heartbeat(panel, recorder, 0);
-  bench.executive.set_heartbeat(heartbeat);
+  guardian::Heartbeat heartbeat(run, guard, recorder, 0);
+  bench.executive.set_watch(heartbeat);
   for (int n = 0; n < 100; ++n) REQUIRE(bench.cycle());
 }

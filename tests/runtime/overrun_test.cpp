@@ -125,8 +125,34 @@ TEST_CASE("so many late cycles in a row latch a fault; one in time between them 
   CHECK(bench.executive.statistics().overruns().longest_run == 3);
 }
 
-TEST_CASE("with a limit of 0 late cycles never end the run") {
-  Bench bench;
+TEST_CASE("late cycles end a run by their time, whatever their number") {
+  // Each lasts 20 ms in cycles of 1 ms, so the next one begins after 21 ms: the eighth ends after 7 x 21 + 20 ms.
+  const CycleScript late{.control_ns = 20 * ms};
+  Bench bench({.startup_cycles = 0, .max_consecutive = 50, .late_max_s = 0.15});
+  for (int i = 0; i < 7; ++i) REQUIRE(bench.cycle(late));
+  REQUIRE(bench.cycle());  // in time: they count anew
+  for (int i = 0; i < 7; ++i) REQUIRE(bench.cycle(late));
+  CHECK(bench.gate.fault() == rig::Reason::none);
+  REQUIRE(bench.cycle(late));
+  CHECK(bench.gate.fault() == rig::Reason::consecutive_overruns);
+  CHECK(bench.gate.fault_value() == 8.0);
+  CHECK_FALSE(bench.cycle());
+}
+
+TEST_CASE("late cycles end a run by their time, too, if their number does not count") {
+  Bench number({.startup_cycles = 0, .max_consecutive = 0, .late_max_s = 0.15});
+  for (int i = 0; i < 8; ++i) REQUIRE(number.cycle({.control_ns = 20 * ms}));
+  CHECK(number.gate.fault() == rig::Reason::consecutive_overruns);
+}
+
+TEST_CASE("one long cycle is a gap, not a row of late cycles") {
+  Bench single({.startup_cycles = 0, .max_consecutive = 50, .late_max_s = 0.05});
+  REQUIRE(single.cycle({.control_ns = 90 * ms}));
+  CHECK(single.gate.fault() == rig::Reason::none);
+}
+
+TEST_CASE("with a limit of 0 and any time late cycles never end the run") {
+  Bench bench({.startup_cycles = 0, .max_consecutive = 0, .late_max_s = 1000.0});
   for (int i = 0; i < 1000; ++i) REQUIRE(bench.cycle({.control_ns = 1'200 * us}));
   CHECK(bench.gate.fault() == rig::Reason::none);
   CHECK(bench.executive.statistics().overruns().longest_run == 1000);

@@ -3,8 +3,8 @@
 #include <array>
 
 #include "catch.hpp"
+#include "guardian/heartbeat.hpp"
 #include "runtime/cyclic_executive.hpp"
-#include "runtime/heartbeat.hpp"
 #include "scripted_parts.hpp"
 
 using namespace abs_hil;
@@ -13,14 +13,15 @@ using namespace abs_hil::runtime::test;
 
 TEST_CASE("a cycle that finds the guardian's mark sends the safe command and ends the run with its reason") {
   Bench bench;
-  HeartbeatPanel panel;
+  guardian::RunPage run;
+  guardian::GuardPage guard;
   std::array<FlightSlot, 4> slots;
   FlightRing recorder(slots);
-  Heartbeat heartbeat(panel, recorder);
-  bench.executive.set_heartbeat(heartbeat);
+  guardian::Heartbeat heartbeat(run, guard, recorder);
+  bench.executive.set_watch(heartbeat);
   bench.cycle();
   CHECK(bench.driver.written.back().brake_duty == 0.5);
-  panel.taken_back_for.store(rig::Reason::computer_will_suspend);
+  guard.taken_back_for.store(rig::Reason::computer_will_suspend);
   CHECK_FALSE(bench.cycle());
   CHECK(rig::acts(bench.driver.written.back()) == false);
   CHECK(bench.logic.ended_by == rig::Reason::computer_will_suspend);
@@ -28,14 +29,15 @@ TEST_CASE("a cycle that finds the guardian's mark sends the safe command and end
 
 TEST_CASE("after a pause of the whole computer the pause is the reason, not the mark that it led to") {
   Bench bench({.startup_cycles = 0, .max_consecutive = 0});
-  HeartbeatPanel panel;
+  guardian::RunPage run;
+  guardian::GuardPage guard;
   std::array<FlightSlot, 4> slots;
   FlightRing recorder(slots);
-  Heartbeat heartbeat(panel, recorder);
-  bench.executive.set_heartbeat(heartbeat);
+  guardian::Heartbeat heartbeat(run, guard, recorder);
+  bench.executive.set_watch(heartbeat);
   bench.cycle();
   bench.cycle();
-  panel.taken_back_for.store(rig::Reason::guardian_paused);
+  guard.taken_back_for.store(rig::Reason::guardian_paused);
   bench.cycle({.wakeup_ns = 600 * ms});
   CHECK(bench.logic.ended_by == rig::Reason::cycle_gap);
   CHECK_FALSE(rig::acts(bench.driver.written.back()));

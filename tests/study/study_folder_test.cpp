@@ -8,7 +8,6 @@
 #include "catch.hpp"
 #include "config/config_error.hpp"
 #include "study/compute.hpp"
-#include "study/durable_file.hpp"
 #include "study/gzip.hpp"
 #include "study/paper_plan.hpp"
 #include "study/result_rows.hpp"
@@ -125,6 +124,26 @@ TEST_CASE("a chunk that is damaged, cut off or another's stops the merge, which 
   CHECK(folder.complete());
 }
 
+TEST_CASE("a complete study whose files have changed is refused by the name of the file") {
+  const Study study = small_study();
+  const StudyFacts facts = facts_of(study, "small");
+  const abs_hil::test::TemporaryFolder scratch;
+  const fs::path path = scratch / "whole";
+  compute_shard(study, StudyFolder(path, facts), {});
+  StudyFolder(path).merge({});
+  CHECK_NOTHROW(StudyFolder(path, facts));
+  for (const std::string_view name : {file::results, file::text}) {
+    const std::string good = bytes_of(path / name);
+    std::string bad = good;
+    bad[bad.size() / 2] = static_cast<char>(bad[bad.size() / 2] ^ 1);
+    std::ofstream(path / name, std::ios::binary) << bad;
+    CHECK_THROWS_WITH(StudyFolder(path, facts), Contains(std::string(name)) && Contains("SHA256SUMS"));
+    CHECK_THROWS_AS(StudyFolder(path), config::ConfigError);
+    std::ofstream(path / name, std::ios::binary) << good;
+  }
+  CHECK(StudyFolder(path).complete());
+}
+
 TEST_CASE("a folder takes one study of one program") {
   const abs_hil::test::TemporaryFolder scratch;
   const Study study = small_study();
@@ -143,28 +162,6 @@ TEST_CASE("a folder takes one study of one program") {
   CHECK(StudyFolder(scratch / "a").facts().columns == facts.columns);
   const StudyFolder other(scratch / "c", facts_of(small_study("# other\n"), "small"));
   CHECK_THROWS_AS(folder.merge({other}), config::ConfigError);
-}
-
-TEST_CASE("a durable file is not there before it is whole, and not at all if it is given up") {
-  const abs_hil::test::TemporaryFolder scratch;
-  const fs::path path = scratch / "chunk";
-  {
-    DurableFile given_up(path);
-    given_up.append("half");
-    CHECK_FALSE(fs::exists(path));
-  }
-  CHECK(fs::is_empty(scratch.path));
-  DurableFile first(path);
-  DurableFile second(path);  // of another task
-  first.append("whole");
-  second.append("whole");
-  CHECK_FALSE(fs::exists(path));
-  first.commit();
-  CHECK(bytes_of(path) == "whole");
-  second.commit();
-  CHECK(bytes_of(path) == "whole");
-  CHECK(std::distance(fs::directory_iterator(scratch.path), fs::directory_iterator()) == 1);
-  CHECK_THROWS_WITH(DurableFile((scratch / "none") / "chunk"), Contains("none"));
 }
 
 TEST_CASE("lists of chunks are short") {

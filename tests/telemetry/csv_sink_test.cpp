@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "catch.hpp"
-#include "telemetry/file_error.hpp"
 #include "telemetry/sample_records.hpp"
 #include "temporary_folder.hpp"
 
@@ -181,6 +180,27 @@ TEST_CASE("with a write period the file is never further behind than that, and e
   }
 }
 
+TEST_CASE("an older file stays until the run has begun, and until the new one is whole") {
+  const abs_hil::test::TemporaryFolder scratch;
+  const auto path = scratch / "run.csv";
+  const auto older = [&path] { return lines_of(path) == std::vector<std::string>{"older"}; };
+  std::ofstream(path) << "older\n";
+  for (const std::int64_t period_ns : {0, 50'000'000}) {
+    {
+      CsvSink refused(path, period_ns);
+    }  // the run never begins
+    CHECK(older());
+  }
+  {
+    CsvSink sink(path);
+    for (std::uint64_t i = 0; i < 1000; ++i) sink.consume(test::sample_record(i), 0.0);
+    CHECK(older());
+    sink.finish();
+  }
+  CHECK(lines_of(path).size() == 1001);
+  CHECK(std::distance(std::filesystem::directory_iterator(scratch.path), std::filesystem::directory_iterator()) == 1);
+}
+
 TEST_CASE("rows that did not reach the disk are counted") {
   CsvSink sink("/dev/full", 10'000'000);
   for (std::uint64_t i = 0; i < 100; ++i) {
@@ -188,7 +208,7 @@ TEST_CASE("rows that did not reach the disk are counted") {
     record.stamp_ns = static_cast<std::int64_t>(i + 1) * 1'000'000;
     sink.consume(record, 0.0);
   }
-  CHECK_THROWS_AS(sink.finish(), FileError);
+  CHECK_THROWS_AS(sink.finish(), files::FileError);
   CHECK(sink.rows_lost() == 100);
 }
 
@@ -199,7 +219,7 @@ TEST_CASE("finish() reports a full disk") {
   try {
     sink.finish();
     FAIL("finish() must throw");
-  } catch (const FileError& error) {
+  } catch (const files::FileError& error) {
     CHECK(error.error_number() == ENOSPC);
     CHECK_THAT(error.what(), Catch::Matchers::Contains("/dev/full") && Catch::Matchers::Contains("No space left") &&
                                  Catch::Matchers::Contains("free some space"));
@@ -209,7 +229,7 @@ TEST_CASE("finish() reports a full disk") {
 TEST_CASE("a full disk is noticed even if everything fitted the buffer") {
   CsvSink sink("/dev/full");
   sink.consume(test::sample_record(0), 0.0);
-  CHECK_THROWS_AS(sink.finish(), FileError);
+  CHECK_THROWS_AS(sink.finish(), files::FileError);
 }
 
 TEST_CASE("a path that cannot be opened is refused with path, reason and fix") {

@@ -6,7 +6,6 @@
 #include <map>
 
 #include "catch.hpp"
-#include "telemetry/file_error.hpp"
 #include "telemetry/message_capture.hpp"
 #include "telemetry/message_stream.hpp"
 #include "telemetry/sample_records.hpp"
@@ -96,11 +95,25 @@ TEST_CASE("finish() reports a full disk; messages that were not written are coun
   CHECK(other.all<telemetry_t>("ABS_TELEMETRY").size() == record_count);  // the other outlet goes on
 }
 
+TEST_CASE("an older log stays until the run has begun") {
+  const abs_hil::test::TemporaryFolder scratch;
+  const auto path = scratch / "run.lcmlog";
+  std::ofstream(path) << "older";
+  { LogOutlet refused(path, 0, 0.05); }
+  CHECK(bytes_of(path) == "older");
+  const test::Bytes bytes{1, 2, 3};
+  LogOutlet log(path, 0, 0.05);
+  log.send("X", bytes, 0.0);
+  CHECK(bytes_of(path) == "older");
+  log.send("X", bytes, 0.06);
+  CHECK(bytes_of(path).size() == 2 * (28 + 1 + 3));  // what a killed program leaves
+}
+
 TEST_CASE("a full disk is noticed even if everything fitted the buffer of the log") {
   LogOutlet log("/dev/full", 0);
   const test::Bytes bytes{1, 2, 3};
   log.send("X", bytes, 0.0);
-  CHECK_THROWS_AS(log.finish(), FileError);
+  CHECK_THROWS_AS(log.finish(), files::FileError);
 }
 
 TEST_CASE("a log that cannot be opened is refused with path, reason and fix") {

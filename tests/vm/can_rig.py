@@ -51,7 +51,8 @@ def put_record(folder, interface):
     keys = re.findall(r'(?m)^(driver\.can\.\w+) +(\S+)', shell(f'{PROGRAM} list --keys'))
     options = {**dict(keys), 'driver.can.watchdog_ms': str(WATCHDOG_MS)}
     record = {'abs_hil_board_record': 1, 'driver_kind': 'can', 'place': interface, 'logic': 'protocol 1',
-              'emulated': False, 'date': '', 'version': '', 'encoder_counts_per_rev': 4096, 'options': options}
+              'emulated': False, 'date': '', 'version': '', 'encoder_counts_per_rev': 4096,
+              'counts_of_one_turn': {'upper': 4096, 'lower': 4096}, 'options': options}
     (folder / f'can-{interface}.json').write_text(json.dumps(record))
 
 
@@ -83,7 +84,8 @@ class CanRigTest(unittest.TestCase):
              self.folder / 'run.json', '--set', 'driver.kind=can', '--set', f'driver.can.interface={self.host}',
              '--set', f'driver.can.watchdog_ms={WATCHDOG_MS}', '--set', f'driver.records={self.folder}',
              # A guardian that cannot verify would go on until a person releases it.
-             '--set', 'driver.emulated=true', '--set', 'guardian.insist_s=1', *map(str, args)],
+             '--set', 'driver.emulated=true', '--set', 'guardian.insist_s=1',
+             '--set', 'unsafe.keys=guardian.insist_s', *map(str, args)],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.ends.append(lambda: (program.kill() if program.poll() is None else None, program.communicate()))
         return program

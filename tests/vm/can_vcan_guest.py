@@ -66,8 +66,11 @@ class Paper(Vcan):
 
     def check_recording(self, log, cycles):
         dbc, counts, brake, last = Dbc(DBC), {}, 0.0, {}
-        for _, identifier, data in frames_of(log):
-            name, values = dbc.decode(identifier, data)
+        frames = [dbc.decode(identifier, data) for _, identifier, data in frames_of(log)]
+        # The guardian believes the run's end when it has read the node back: the last command is its own.
+        end = max(n for n, (name, _) in enumerate(frames) if name == 'ABS_COMMAND')
+        self.assertEqual((frames[end][1]['Sequence'], frames[end][1]['BrakeDuty']), (0, 0))
+        for name, values in frames[:end]:
             counts[name] = counts.get(name, 0) + 1
             brake = max(brake, values.get('BrakeDuty', 0.0))
             if name in ('ABS_SYNC', 'ABS_COMMAND', 'ABS_ENCODERS', 'ABS_LATCH'):
@@ -118,14 +121,14 @@ class Faults(Vcan):
         self.assertEqual(self.check_zero_in_time(node), 'watchdog')
 
     def test_safe_ends_a_run(self):
-        """It makes the node inactive, which then ignores the run's commands."""
+        """It makes the node inactive. The run hears that somebody else commands the node."""
         node = self.node()
         program = self.accelerating(node)
         result = subprocess.run([PROGRAM, 'safe', '--set', 'driver.kind=can', '--set', 'driver.can.interface=vcan0'],
                                 capture_output=True, text=True, timeout=20)
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
         self.assertIn('board of driver.kind=can: drive 0 and brake 0, verified', result.stdout)
-        self.check_ended(program, 'CAN node was restarted or replaced')
+        self.check_ended(program, 'something else writes to the board')
         self.assertEqual(node.wire(), (0.0, 0.0))
 
     def test_node_killed_in_braking(self):
@@ -180,8 +183,8 @@ class Faults(Vcan):
         node = self.node()
         program = self.braking(node)
         self.babbler([0x81])
-        self.check_ended(program, 'CAN node switched its outputs off by itself')
-        self.assertIn('too many commands rejected', self.check_zero_in_time(node))
+        self.check_ended(program, 'something else writes to the board')
+        self.check_zero_in_time(node)
 
     def test_interface_down_and_unknown_at_start(self):
         self.node()

@@ -28,7 +28,7 @@ from program import PROGRAM  # noqa: E402
 from rig_emulator import Emulator  # noqa: E402
 
 BOUND_MS = 50
-# A register access over FUSE takes 0.07 ms here: eleven of them and the plant leave 1 kHz no time to spare.
+# A register access over FUSE takes 0.07 ms here: twelve of them and the plant leave 1 kHz no time to spare.
 RATE_HZ = 500
 PHASES = ('idle', 'accelerate', 'coast', 'brake', 'hold')
 # A process' end is told once the kernel has taken its memory apart, which may take longer than the timeout: then it has

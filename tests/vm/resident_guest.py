@@ -43,7 +43,7 @@ def run(*command, check=True):
 
 def install(card):
     """What the package installs: the programs, the unit and its configuration."""
-    for name in ('abs_hil', 'abs_guardian'):
+    for name in ('abs_hil', 'abs_hil_program', 'abs_guardian'):
         pathlib.Path('/usr/local/bin', name).symlink_to(pathlib.Path(PROGRAM).resolve().parent / name)
     for unit in ('abs-guardian.service', 'abs_guardian.slice'):
         shutil.copy(ROOT / 'packaging/systemd' / unit, '/etc/systemd/system')

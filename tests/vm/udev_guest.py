@@ -36,7 +36,7 @@ def wait_until(condition, what, seconds=30):
 
 def install():
     """What the package installs: programs, unit, configuration, group and udev's rule. Nothing starts the service."""
-    for name in ('abs_hil', 'abs_guardian'):
+    for name in ('abs_hil', 'abs_hil_program', 'abs_guardian'):
         pathlib.Path('/usr/local/bin', name).symlink_to(pathlib.Path(PROGRAM).resolve().parent / name)
     for unit in ('abs-guardian.service', 'abs_guardian.slice'):
         shutil.copy(ROOT / 'packaging/systemd' / unit, '/etc/systemd/system')

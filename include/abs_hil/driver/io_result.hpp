@@ -22,6 +22,7 @@ enum class IoError : std::uint8_t {
   incomplete_answer,     ///< an answer of the wrong length
   transfer_failed,       ///< a transfer failed on the bus
   access_refused,        ///< the system does not allow the access (kernel lockdown, permissions)
+  foreign_writer,        ///< an output has a value that this program did not send: something else writes to the board
 };
 
 [[nodiscard]] constexpr std::string_view description(IoError error) noexcept {
@@ -37,6 +38,7 @@ enum class IoError : std::uint8_t {
     case IoError::incomplete_answer: return "answer of the wrong length";
     case IoError::transfer_failed: return "transfer failed on the bus";
     case IoError::access_refused: return "the system refuses the access";
+    case IoError::foreign_writer: return "something else writes to the board";
   }
   return "unknown error";
 }

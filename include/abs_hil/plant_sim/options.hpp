@@ -119,6 +119,10 @@ struct PlantOptions {
   ABS_HIL_GROUP(EncoderFlaws, lower_encoder_flaws, "lower_encoder_", {});
 };
 
+/// What limits of the rig's motion must know of this plant: its own parameters. Where a lever and the tyre's curve give
+/// more force than theta_N says, theta_N is made larger. Throws std::invalid_argument for a curve without a peak.
+[[nodiscard]] rig::RigParameters identity_of(const PlantOptions& options);
+
 /// Throws std::invalid_argument with the configuration key, its value and its range if an option is out of range.
 void check(const PlantOptions& options);
 

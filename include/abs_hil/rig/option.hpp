@@ -67,6 +67,49 @@ struct FileEndings {
   }
 };
 
+/// How an option bears on the safety of a run on a real board. Values that weaken the protection need the consent of a
+/// person there (runtime/board_policy.hpp); docs/keys.md lists all classes.
+struct SafetyClass {
+  enum class Kind : std::uint8_t {
+    unclassed,     ///< nobody has judged the option
+    none,          ///< no value weakens the protection
+    above,         ///< values above `bound` do
+    below,         ///< values below `bound` do
+    unless,        ///< all values but `bound` do, or of texts all but `text`
+    text,          ///< the value `text` does, "true" or "false" of flags
+    commissioned,  ///< the board's commissioning record holds for one value alone
+    elsewhere,     ///< a rule of its own judges the option on a board
+    consent        ///< the option is such a consent
+  };
+  Kind kind{Kind::unclassed};
+  double bound{0.0};
+  std::string_view text{};
+  std::string_view consent{};  ///< an option of `unsafe.` that consents, too
+
+  [[nodiscard]] bool weakened_by(double value) const noexcept;
+  [[nodiscard]] bool weakened_by(std::string_view value) const noexcept;
+  /// The class in words; `unit` is the option's.
+  [[nodiscard]] std::string in_words(std::string_view unit) const;
+};
+inline constexpr SafetyClass no_effect_on_safety{.kind = SafetyClass::Kind::none};
+inline constexpr SafetyClass commissioned{.kind = SafetyClass::Kind::commissioned};
+inline constexpr SafetyClass judged_elsewhere{.kind = SafetyClass::Kind::elsewhere};
+[[nodiscard]] constexpr SafetyClass weaker_above(double bound, std::string_view consent = {}) noexcept {
+  return {.kind = SafetyClass::Kind::above, .bound = bound, .consent = consent};
+}
+[[nodiscard]] constexpr SafetyClass weaker_below(double bound) noexcept {
+  return {.kind = SafetyClass::Kind::below, .bound = bound};
+}
+[[nodiscard]] constexpr SafetyClass weaker_unless(double bound) noexcept {
+  return {.kind = SafetyClass::Kind::unless, .bound = bound};
+}
+[[nodiscard]] constexpr SafetyClass weaker_unless(std::string_view text) noexcept {
+  return {.kind = SafetyClass::Kind::unless, .text = text};
+}
+[[nodiscard]] constexpr SafetyClass weaker_if(std::string_view text) noexcept {
+  return {.kind = SafetyClass::Kind::text, .text = text};
+}
+
 /// The facts of an option beside its type, its name and its default. Fields of scripts use it too.
 struct OptionFacts {
   std::string_view key{};      ///< its name in the configuration; empty: that of the member
@@ -78,6 +121,7 @@ struct OptionFacts {
   SearchRange search{};        ///< where abs_tune looks for a gain; nowhere by default
   std::string_view on_rig{};   ///< of a rig's parameter: where to read it off the rig; empty for all others
   bool start_value{false};     ///< initial value of slip control: no effect after slip control has begun
+  SafetyClass safety{};        ///< of an option that acts on a board
 
   /// True for an allowed name, for a file with one of the endings, and for any text if none is prescribed.
   [[nodiscard]] bool allows(std::string_view text) const noexcept { return allowed.contains(text) || files.fit(text); }

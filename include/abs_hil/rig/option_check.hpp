@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -41,6 +42,37 @@ void require_valid(const Options& options, double Options::*member, const std::s
       if (row.member == member) require_valid(prefix + std::string(row.facts.key), row.facts, options.*member);
     }
   });
+}
+
+/// True if this value of an option weakens the protection of a run on a board.
+template <class Value>
+[[nodiscard]] bool weakens(const OptionFacts& facts, const Value& value) {
+  if constexpr (std::is_same_v<Value, bool>) {
+    return facts.safety.weakened_by(std::string_view(value ? "true" : "false"));
+  } else if constexpr (std::is_same_v<Value, std::string>) {
+    return facts.safety.weakened_by(std::string_view(value));
+  } else {
+    return facts.safety.weakened_by(static_cast<double>(value));
+  }
+}
+
+/// Of two structs of options the one that protects better, option by option; where the class says nothing, `own`.
+template <class Options>
+[[nodiscard]] Options stricter_of(Options own, const Options& asked) {
+  for_each_row<Options>([&](const auto& row) {
+    auto& value = own.*row.member;
+    const auto& other = asked.*row.member;
+    using Value = std::remove_cvref_t<decltype(value)>;
+    const SafetyClass& safety = row.facts.safety;
+    if constexpr (std::is_arithmetic_v<Value> && !std::is_same_v<Value, bool>) {
+      if (safety.kind == SafetyClass::Kind::above) value = std::min(value, other);
+      if (safety.kind == SafetyClass::Kind::below) value = std::max(value, other);
+    }
+    if (safety.kind == SafetyClass::Kind::unless || safety.kind == SafetyClass::Kind::text) {
+      if (weakens(row.facts, value) && !weakens(row.facts, other)) value = other;
+    }
+  });
+  return own;
 }
 
 }  // namespace abs_hil::rig

@@ -79,14 +79,19 @@ enum class FoundAgain : std::uint8_t {
   ROW(driver_write_failed, 69, fault, no, "writing to the board failed")                                              \
   ROW(board_interlock_tripped, 70, fault, yes, "the board's own interlock tripped",                                   \
       "trip flags", "", "0")                                                                                          \
-  ROW(consecutive_overruns, 71, fault, no, "too many consecutive overruns",                                           \
-      "late cycles in a row", "", "realtime.max_consecutive_overruns")                                                \
+  ROW(consecutive_overruns, 71, fault, no, "too many late cycles in a row, or late for longer than realtime.late_max_s", \
+      "late cycles in a row", "")                                                \
   ROW(board_supply_tripped, 80, fault, yes, "the board's own interlock tripped: supply undervoltage",                 \
       "trip flags", "", "0")                                                                                          \
   ROW(board_supply_low, 81, fault, yes, "the board's supply is below gate.supply_min_V",                              \
       "supply", "V", "gate.supply_min_V")                                                                             \
   ROW(board_too_hot, 82, fault, yes, "the board is hotter than gate.temperature_max_C",                               \
       "temperature", "degrees Celsius", "gate.temperature_max_C")                                                     \
+  ROW(foreign_writer, 83, fault, no,                                                                                  \
+      "an output did not keep the value that was sent: something else writes to the board, or its logic restarted")   \
+  ROW(board_reconfigured, 84, fault, no,                                                                              \
+      "the board's version or settings changed during the run: its logic was loaded again, or something else writes " \
+      "to it")                                                                                                        \
   ROW(can_node_silent, 100, fault, no, "CAN node missed too many answers; its watchdog sets the outputs to zero")     \
   ROW(can_frames_stale, 101, fault, no, "CAN node answers with old sequence numbers")                                 \
   ROW(can_frames_duplicated, 102, fault, no, "CAN frames arrive twice: two nodes answer, or one repeats itself")      \

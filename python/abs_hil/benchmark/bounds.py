@@ -6,7 +6,8 @@ import json
 import pathlib
 from collections.abc import Iterable
 
-from ..files import write_whole
+from ..files import write_text
+from ..nesting import parse_json
 from .cases import END_SPEED_M_S, VERSION, Case
 
 #: what the bound leaves out, which can only shorten the distance
@@ -47,7 +48,7 @@ def found(cases: Iterable[Case], kept: pathlib.Path | None = None) -> dict[str, 
     own: dict[str, dict[str, float]] = {}
     if kept is not None and kept.exists():
         try:
-            own = dict(json.loads(kept.read_text(encoding='utf-8'))['bounds'])
+            own = dict(parse_json(kept.read_text(encoding='utf-8'))['bounds'])
         except (KeyError, TypeError, ValueError):
             raise ValueError(f'{kept}: no file of bounds; give one that --bounds has written, or a new name') from None
     known |= own
@@ -68,7 +69,7 @@ def found(cases: Iterable[Case], kept: pathlib.Path | None = None) -> dict[str, 
 
 def _keep(target: pathlib.Path, own: dict[str, dict[str, float]]) -> None:
     text = json.dumps({'version': VERSION, 'bounds': own}, indent=1) + '\n'
-    write_whole(target, lambda name: pathlib.Path(name).write_text(text, encoding='utf-8'))
+    write_text(target, text)
 
 
 def missing(cases: Iterable[Case], known: dict[str, dict[str, float]]) -> list[Case]:

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from ..core import _core
-from ..files import write_whole
+from ..files import write_text, write_whole
 from ..options import Value
 from ..report.page import Unavailable, plotly_js
 from ..simulation import controllers
@@ -61,7 +61,7 @@ def _chosen(given: argparse.Namespace) -> tuple[list[cases.Case], dict[str, dict
 
 
 def _write(target: pathlib.Path, content: str) -> None:
-    write_whole(target, lambda name: pathlib.Path(name).write_text(content, encoding='utf-8'))
+    write_text(target, content)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..files import write_text
 from .criteria import ACTUATORS, PLANTS
 from .experiments import beyond_table, expected_table, figures_table, theory_phrases
 from .guard import differences, replaced
@@ -73,7 +74,7 @@ class Comparison:
         for name, text in self.pages(maps):
             path = self.out / name
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding='utf-8')
+            write_text(path, text)
             say(f'wrote {path}')
         shown = baseline_of(maps, PLANTS[0])
         if shown is not None:

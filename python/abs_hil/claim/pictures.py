@@ -5,9 +5,11 @@ import pathlib
 import subprocess
 import tempfile
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
+from ..files import write_text, write_whole
 from .laws import Entry
 from .map import FIGURES, PAPER_RATIO, Map
 
@@ -55,7 +57,8 @@ def draw(maps: Sequence[Map], path: pathlib.Path) -> None:
     for columns, label in ((rows[:, :2], 'time, distance'), (rows[:, 2:], 'variation, slip')):
         figure.colorbar(columns[0, 0].collections[0], ax=columns, shrink=0.6, location='bottom',
                         label=f'{label}: adaptive has less below 1')
-    figure.savefig(path, metadata={'Date': None} if path.suffix == '.svg' else None, dpi=110)
+    kind = path.suffix.removeprefix('.')
+    write_whole(path, partial(figure.savefig, format=kind, metadata={'Date': None} if kind == 'svg' else None, dpi=110))
     pyplot.close(figure)
 
 
@@ -71,4 +74,5 @@ def draw_figures(program: pathlib.Path, laws: Sequence[Entry], plant: str, folde
         subprocess.run([program.with_name('abs_report'), '--paper', data / '0', data / '1', '--output', data / 'page.html',
                         '--figures', data], check=True, capture_output=True)
         for name in DRAWN:
-            (folder / f'paper-{name}.svg').write_bytes((data / f'fig{name.partition("-")[0]}.svg').read_bytes())
+            drawn = (data / f'fig{name.partition("-")[0]}.svg').read_text(encoding='utf-8')
+            write_text(folder / f'paper-{name}.svg', drawn)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..files import write_whole
+from ..files import write_text
 from ..tune import PLANTS_SEED, Found, Gain, gains_of, search
 from .criteria import PLANTS, SHARE
 from .laws import LAWS, Entry, gains_file, judge_entries, run_entries
@@ -99,4 +99,4 @@ def write_gains(path: pathlib.Path, controller: str, values: Mapping[str, float]
     text = (''.join(f'# {line}\n' for line in comments) + f'[control]\ncontroller = "{controller}"\n' +
             ''.join(f'\n[{table}]\n' + '\n'.join(lines) + '\n' for table, lines in tables.items()))
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, lambda name: pathlib.Path(name).write_text(text, encoding='utf-8'))
+    write_text(path, text)

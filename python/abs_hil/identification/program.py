@@ -7,7 +7,7 @@ import pathlib
 import sys
 
 from ..core import _core
-from ..files import write_whole
+from ..files import write_text
 from ..report.page import Unavailable, plotly_js
 from ..report.text import clean
 from .estimate import identify
@@ -58,12 +58,8 @@ def _write(found: Identified, o: argparse.Namespace, report: str | None) -> None
         files['report.html'] = report
     for name, text in files.items():
         path = o.out / name
-        _write_text(path, text)
+        write_text(path, text)
         print(path)
-
-
-def _write_text(path: pathlib.Path, text: str) -> None:
-    write_whole(path, lambda to: pathlib.Path(to).write_text(text, encoding='utf-8'))
 
 
 def _identify(o: argparse.Namespace) -> int:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..core import _core
 from ..messages import PHASES, QUANTITIES, REASONS
+from ..nesting import parse_json
 from ..run import COLUMNS, Run, load
 
 #: kinds of events and their levels in a log
@@ -114,7 +115,7 @@ def _read_folder(folder: pathlib.Path, source: Source) -> None:
         if (folder / name).is_file():
             source.attachments[name] = (folder / name).read_bytes()
     try:
-        ended = json.loads(source.attachments.get('environment.json', b'{}')).get('date_utc')
+        ended = parse_json(source.attachments.get('environment.json', b'{}')).get('date_utc')
         if ended:
             end = datetime.datetime.strptime(ended, '%Y-%m-%dT%H:%M:%SZ').replace(tzinfo=datetime.timezone.utc)
             source.start_ns = int(end.timestamp()) * 1_000_000_000 - round(float(source.run['time_s'][-1]) * 1e9)

@@ -5,11 +5,12 @@ import argparse
 import json
 import pathlib
 import sys
+from functools import partial
 
 import numpy as np
 
 from ..core import _core
-from ..files import write_whole
+from ..files import write_text, write_whole
 from .rigs import Task
 from .training import Policy, judge, train
 
@@ -44,7 +45,8 @@ def _draw(path: pathlib.Path, elite: list[float], mean: list[float], laws: dict[
     axes.set_ylim(max(min(mean), 4.0 * min(laws.values(), default=-1.0)), 0.0)
     axes.grid(color='#e4e4e4')
     axes.legend(fontsize=8)
-    picture.savefig(path, metadata={'Date': None} if path.suffix == '.svg' else None)
+    kind = path.suffix.removeprefix('.') or 'png'
+    write_whole(path, partial(picture.savefig, format=kind, metadata={'Date': None} if kind == 'svg' else None))
 
 
 def main(arguments: list[str]) -> int:
@@ -66,7 +68,7 @@ def main(arguments: list[str]) -> int:
         if o.output:
             data = {'weights': policy.weights.tolist(), 'curve': curve.mean, 'elite': curve.elite,
                     'rewards': {name: values.tolist() for name, values in rewards.items()}}
-            write_whole(o.output, lambda name: pathlib.Path(name).write_text(json.dumps(data, indent=1) + '\n'))
+            write_text(o.output, json.dumps(data, indent=1) + '\n')
         if o.figure:
             _draw(o.figure, curve.elite, curve.mean, {law: float(rewards[law].mean()) for law in LAWS})
     except (ValueError, OSError) as error:

@@ -5,6 +5,7 @@ import csv
 import io
 import json
 import math
+import os
 import pathlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -12,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from ..core import _core
+from ..nesting import parse_json, parse_toml
 from ..run import flattened
 from .text import clean, number_text
 
@@ -112,8 +115,8 @@ def read_bytes(path: pathlib.Path) -> bytes:
 
 def read_json(path: pathlib.Path) -> dict[str, Any]:
     try:
-        data = json.loads(read_bytes(path).decode('utf-8', 'replace'))
-    except (ValueError, RecursionError) as error:
+        data = parse_json(read_bytes(path).decode('utf-8', 'replace'))
+    except ValueError as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f'{path}: not valid JSON: {clean(error)}') from None
@@ -133,13 +136,15 @@ def read_toml(path: pathlib.Path) -> dict[str, str]:
         raise InputError(f'{path}: reading it needs Python 3.11 or later')
     text = read_bytes(path).decode('utf-8', 'replace')
     try:
-        return texts_of(tomllib.loads(text))
+        return texts_of(parse_toml(text))
     except tomllib.TOMLDecodeError as error:
         line = getattr(error, 'lineno', None)
         if line is None:
             found = str(error).partition('at line ')[2].split(',')[0]
             line = int(found) if found.isdigit() else text.count('\n') + 1
         raise InputError(f'{path}:{line}: {clean(error)}') from None
+    except ValueError as error:
+        raise InputError(f'{path}: {clean(error)}') from None
 
 
 def read_events(path: pathlib.Path) -> list[Event]:
@@ -240,6 +245,10 @@ def _base_name(path: pathlib.Path) -> str:
 
 def _load_run(path: pathlib.Path) -> RunFiles:
     if path.is_dir():
+        try:
+            _core.check_seal(os.fsencode(path))
+        except ValueError as error:
+            raise InputError(str(error)) from None
         run = RunFiles(path / 'run.csv', _base_name(path), path)
         _read_folder(run, path)
         return run

@@ -3,8 +3,10 @@ from __future__ import annotations
 
 import os
 import pathlib
+from functools import partial
 from typing import Any
 
+from ..files import write_whole
 from .files import InputError
 from .model import Curve, Figure, Panel, phase_colour
 
@@ -105,7 +107,7 @@ def write(figures: list[Figure], folder: pathlib.Path, kind: str, replace: bool)
         raise InputError(f'cannot create the folder "{folder}": {error.strerror}') from None
     paths = [folder / f'{figure.id}.{kind}' for figure in figures]
     for path in paths:
-        if not replace and path.exists():
+        if not replace and path.is_file():
             raise InputError(f'"{path}" exists; give another folder, or --force to replace it')
     os.environ.setdefault('MPLBACKEND', 'agg')
     import logging
@@ -115,8 +117,5 @@ def write(figures: list[Figure], folder: pathlib.Path, kind: str, replace: bool)
     with matplotlib.rc_context(_RC):
         for figure, path in zip(figures, paths):
             stamps: dict[str, dict[str, Any]] = {'svg': {'Date': None}, 'pdf': {'CreationDate': None}}
-            try:
-                _drawn(figure).savefig(path, format=kind, dpi=DPI, metadata=stamps.get(kind, {}))
-            except OSError as error:
-                raise InputError(f'cannot write "{path}": {error.strerror}; give a writable folder') from None
+            write_whole(path, partial(_drawn(figure).savefig, format=kind, dpi=DPI, metadata=stamps.get(kind, {})))
     return paths

@@ -8,7 +8,7 @@ import sys
 from typing import Any
 
 from ..core import _core
-from ..files import write_whole
+from ..files import write_text, write_whole
 from .export import FORMATS as EXPORTS
 from .export import Exporter
 from .figures import Choice
@@ -80,7 +80,7 @@ def _say(notes: list[str]) -> None:
 
 
 def _check_replaceable(path: pathlib.Path, replace: bool) -> None:
-    if replace or not path.exists():
+    if replace or not path.is_file():  # a device or a pipe keeps nothing
         return
     with open(path, 'rb') as file:
         if PAGE_MARK.encode() in file.read(_MARK_BYTES):
@@ -89,7 +89,7 @@ def _check_replaceable(path: pathlib.Path, replace: bool) -> None:
 
 
 def _refuse_existing(path: pathlib.Path, option: str, replace: bool) -> None:
-    if not replace and path.exists():
+    if not replace and path.is_file():
         raise InputError(f'"{path}" exists; give another {option}, or --force to replace it')
 
 
@@ -142,12 +142,7 @@ def _report(o: argparse.Namespace) -> None:
     if o.table:
         _print_table(made)
     else:
-        html = made.html()
-
-        def write(name: str) -> None:
-            with open(name, 'w', encoding='utf-8') as file:
-                file.write(html)
-        write_whole(path, write)
+        write_text(path, made.html())
     _say(made.notes)
     if not o.table:
         print(path)
@@ -169,11 +164,10 @@ def _report_study(o: argparse.Namespace) -> None:
     path = pathlib.Path(o.output or ('study.parquet' if o.export else 'report.html'))
     if o.export:
         _refuse_existing(path, '--output', o.force)
-        write_whole(path, results.to_parquet)
+        results.to_parquet(path)
     else:
         _check_replaceable(path, o.force)
-        html = program.page_of(o, results)
-        write_whole(path, lambda name: pathlib.Path(name).write_text(html, encoding='utf-8'))
+        write_text(path, program.page_of(o, results))
     print(path)
 
 

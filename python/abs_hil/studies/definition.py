@@ -4,10 +4,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-try:
-    import tomllib
-except ImportError:  # Python before 3.11
-    tomllib = None  # type: ignore[assignment]
+from ..nesting import parse_toml
 
 _RANGE_KEYS = {'from', 'to', 'steps', 'mean', 'sd'}
 
@@ -16,9 +13,7 @@ class Definition:
     """design: its kind; ranges: names of the factors whose values a design spreads; levels: of those with lists or steps."""
 
     def __init__(self, text: str) -> None:
-        if tomllib is None:
-            raise ValueError('reading the results of a study needs Python 3.11 or later')
-        parsed = tomllib.loads(text)
+        parsed = parse_toml(text)
         self.description: str = parsed.get('description', '')
         self.design: str = parsed.get('design', {}).get('kind', 'grid')
         self.levels: list[str] = []

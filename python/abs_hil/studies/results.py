@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core import _core
+from ..files import write_whole
+from ..nesting import parse_json
 from .definition import Definition
 
 if TYPE_CHECKING:
@@ -41,10 +43,12 @@ class StudyResults:
             hint = ('; the study is not complete: run it again, or see `abs_hil study status`'
                     if (place / 'study.json').exists() else '; give the folder of a study, or its results.csv.gz')
             raise ValueError(f'{self.path}: no results{hint}')
+        if place.is_dir():
+            _core.check_seal(os.fsencode(place))
         with open(self.path, 'rb') as file:
             head = file.read(_HEADER_BYTES)
         try:
-            self.facts: dict[str, Any] = json.loads(_core.facts_of_results(head))
+            self.facts: dict[str, Any] = parse_json(_core.facts_of_results(head))
             columns = self.facts['columns']
         except (RuntimeError, ValueError, KeyError) as error:
             raise ValueError(f'{self.path}: not the results of a study: {error}') from None
@@ -192,6 +196,9 @@ class StudyResults:
 
     def to_parquet(self, path: str | os.PathLike[str]) -> None:
         """Writes all rows to a Parquet file, with the facts under the key `abs_hil.study` of its metadata. Needs pyarrow."""
+        write_whole(path, self._write_parquet)
+
+    def _write_parquet(self, path: str) -> None:
         try:
             import pyarrow
             from pyarrow import parquet

@@ -10,6 +10,7 @@
 #include "driver/can/interface_facts.hpp"
 #include "driver/can/link.hpp"
 #include "driver/can/options.hpp"
+#include "driver/reopening.hpp"
 
 namespace abs_hil::driver::can {
 
@@ -24,8 +25,12 @@ std::unique_ptr<RigDriver> make_can_driver(const CanOptions& options, const RunF
 }
 
 std::unique_ptr<SafeStateWriter> make_can_writer(const CanOptions& options, const RunFacts& /*run*/) {
-  return std::make_unique<CanSafeState>([options] { return open_link(options); },
-                                        options.interface.starts_with(unix_prefix));
+  const std::string prefix(unix_prefix);
+  const bool socket = options.interface.starts_with(prefix);
+  const std::string file = socket ? options.interface.substr(prefix.size()) : "/sys/class/net/" + options.interface;
+  return std::make_unique<CanSafeState>(
+      [options, again = Reopening{file}]() mutable { return again.due() ? open_link(options, false) : Link{}; },
+      socket);
 }
 
 bool is_virtual(const std::string& interface) {

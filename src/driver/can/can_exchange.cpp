@@ -147,6 +147,7 @@ void CanDriver::take_message(const NodeMessage& message) noexcept {
 
 IoResult CanDriver::take(const Frame& frame) noexcept {
   if (frame.error) return take_error_frame(frame);
+  if (commands_node(frame)) return {IoError::foreign_writer, frame.id, 0, rig::Reason::foreign_writer};
   const Anomaly before = worst_;
   const Decoded decoded = decode(frame);
   switch (decoded.error) {
@@ -243,6 +244,11 @@ IoResult CanDriver::judge_answer(std::int64_t now_ns) noexcept {
   constexpr std::int64_t first_interval_ns = 200'000'000;
   if (!advance_counts(answer, any_answer_ ? interval_ns : first_interval_ns)) {
     return {IoError::implausible_answer, id::encoders, 0, rig::Reason::can_values_implausible};
+  }
+  constexpr std::uint8_t half = 128;
+  const auto behind = static_cast<std::uint8_t>(command_sequence_ - applied_sequence_);
+  if (outputs_known_ && behind >= half) {  // the node took a command that has not been sent yet
+    return {IoError::foreign_writer, id::outputs, 0, rig::Reason::foreign_writer};
   }
   const bool outputs_follow = !outputs_known_ || trip_flags_ != 0 || applied_ == commanded_[applied_sequence_];
   outputs_known_ = false;

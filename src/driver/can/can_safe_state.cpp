@@ -10,8 +10,25 @@ namespace abs_hil::driver::can {
 namespace {
 
 constexpr std::int64_t answer_ns = 100'000'000;
+constexpr std::int64_t look_ns = 5'000'000;
 /// A flooded bus must not keep the next zeros back.
 constexpr int most_frames_of_an_answer = 1000;
+
+/// What a node that somebody activated tells of itself.
+bool shows_activity(const NodeMessage& message) noexcept {
+  if (const auto* status = std::get_if<StatusMessage>(&message)) return status->state != NodeState::inactive;
+  if (const auto* latch = std::get_if<LatchMessage>(&message)) return latch->state != NodeState::inactive;
+  if (const auto* outputs = std::get_if<OutputsMessage>(&message)) return outputs->applied != RawDuties{};
+  const auto* measured = std::get_if<MeasurementMessage>(&message);
+  return measured != nullptr && (measured->state != NodeState::inactive || measured->applied != RawDuties{});
+}
+
+/// True for the last frame of the answer to a SYNC.
+bool ends_answer(const NodeMessage& message, std::uint8_t sync) noexcept {
+  if (const auto* latch = std::get_if<LatchMessage>(&message)) return latch->sequence == sync;
+  const auto* measured = std::get_if<MeasurementMessage>(&message);
+  return measured != nullptr && measured->sequence == sync;
+}
 
 }  // namespace
 
@@ -53,6 +70,31 @@ IoResult CanSafeState::verify() noexcept {
   return {IoError::no_answer, id::control, 0, rig::Reason::can_node_silent};
 }
 
+IoResult CanSafeState::look() noexcept {
+  if (link_.socket->send(sync_frame(++sync_)).outcome != SendOutcome::sent) return {IoError::no_answer, id::sync};
+  const std::int64_t deadline_ns = monotonic_ns() + look_ns;
+  Frame frame;
+  for (int i = 0; i < most_frames_of_an_answer; ++i) {
+    const ReceiveOutcome outcome = link_.socket->receive(frame, deadline_ns).outcome;
+    if (outcome == ReceiveOutcome::malformed) continue;
+    if (outcome != ReceiveOutcome::frame) break;
+    const Decoded decoded = decode(frame);
+    if (commands_node(frame) || shows_activity(decoded.message)) {
+      return {IoError::foreign_writer, frame.id, 0, rig::Reason::foreign_writer};
+    }
+    if (ends_answer(decoded.message, sync_)) return {};
+  }
+  return {IoError::no_answer, id::sync};
+}
+
+IoResult CanSafeState::verify_safe() noexcept {
+  if (!link_.socket) return make_safe();
+  const IoResult seen = look();
+  if (seen.ok()) return seen;
+  const IoResult made_safe = make_safe();
+  return seen.error == IoError::foreign_writer ? seen : made_safe;
+}
+
 IoResult CanSafeState::make_safe() noexcept {
   if (!link_.socket) {
     try {
@@ -60,6 +102,7 @@ IoResult CanSafeState::make_safe() noexcept {
     } catch (...) {
       return {IoError::disconnected};
     }
+    if (!link_.socket) return {IoError::disconnected};
   }
   link_.socket->drain();  // earlier frames must not count as the answer
   IoResult result = send_zeros();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <utility>
 
@@ -15,23 +16,32 @@ namespace abs_hil::driver::can {
 class CanSafeState final : public SafeStateWriter {
  public:
   using OpenLink = std::function<Link()>;
-  /// @param open_link  throws Unavailable
+  /// @param open_link  throws Unavailable, or returns a link without socket if it has tried just before; does not wait
   /// @param one_peer   the link takes one peer only
   CanSafeState(OpenLink open_link, bool one_peer) : open_link_(std::move(open_link)), one_peer_(one_peer) {}
 
   [[nodiscard]] std::string_view name() const noexcept override { return "can"; }
   void prepare() override;
   [[nodiscard]] std::int64_t owner_needs_ns() const noexcept override;
+  void let_go() noexcept override {
+    if (one_peer_) link_ = {};
+  }
   [[nodiscard]] IoResult make_safe() noexcept override;
+  /// One SYNC and its answer, at most 5 ms long. The answer tells that the node is inactive, which keeps its outputs 0;
+  /// an answer with applied duties, on classic CAN every tenth, tells these as well.
+  [[nodiscard]] IoResult verify_safe() noexcept override;
 
  private:
   [[nodiscard]] IoResult send_zeros() noexcept;
   /// Waits until the node reports the safe state.
   [[nodiscard]] IoResult verify() noexcept;
+  /// Asks with a SYNC: `foreign_writer` if any frame shows a node that is not inactive, or duties, or is a command.
+  [[nodiscard]] IoResult look() noexcept;
 
   OpenLink open_link_;
   bool one_peer_;
   Link link_{};
+  std::uint8_t sync_{0};
 };
 
 }  // namespace abs_hil::driver::can

@@ -6,6 +6,7 @@
 #include <net/if.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -35,11 +36,13 @@ void set_option(int descriptor, int name, const void* value, socklen_t size, con
   }
 }
 
-/// Receives only the node's identifiers. The kernel drops all other frames, so that a busy bus costs nothing here.
+/// Receives only the node's identifiers, and those with which another sender would command the node. The kernel drops
+/// all other frames, so that a busy bus costs nothing here.
 std::vector<can_filter> node_filters() {
   std::vector<can_filter> filters;
   for (const Message& message : messages()) {
-    if (message.from_node) filters.push_back({message.id, CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG});
+    const bool commands = message.id == id::command || message.id == id::control;
+    if (message.from_node || commands) filters.push_back({message.id, CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG});
   }
   return filters;
 }
@@ -68,8 +71,8 @@ int open_raw_socket(const InterfaceFacts& facts, bool fd_frames) {
 }
 
 /// Waits for the carrier of an interface that was just set up (the kernel's linkwatch takes up to 1 s).
-std::optional<InterfaceFacts> find_settled_interface(const std::string& name) {
-  constexpr int attempts = 40;
+std::optional<InterfaceFacts> find_settled_interface(const std::string& name, bool wait) {
+  const int attempts = wait ? 40 : 0;
   constexpr std::chrono::milliseconds pause{50};
   std::optional<InterfaceFacts> facts = find_interface(name);
   for (int i = 0; i < attempts && facts && facts->up && !facts->running && facts->state != "bus-off"; ++i) {
@@ -79,8 +82,8 @@ std::optional<InterfaceFacts> find_settled_interface(const std::string& name) {
   return facts;
 }
 
-Link open_interface(const CanOptions& options) {
-  const std::optional<InterfaceFacts> facts = find_settled_interface(options.interface);
+Link open_interface(const CanOptions& options, bool wait) {
+  const std::optional<InterfaceFacts> facts = find_settled_interface(options.interface, wait);
   if (!facts) {
     std::string known;
     for (const InterfaceFacts& other : can_interfaces()) known += (known.empty() ? "" : ", ") + other.name;
@@ -100,7 +103,7 @@ Link open_interface(const CanOptions& options) {
           .facts = facts};
 }
 
-Link open_unix_socket(const std::string& path) {
+Link open_unix_socket(const std::string& path, bool wait) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path.empty() || path.size() >= sizeof address.sun_path) {
@@ -110,6 +113,9 @@ Link open_unix_socket(const std::string& path) {
   std::memcpy(address.sun_path, path.c_str(), path.size());
   const int descriptor = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
   if (descriptor < 0) refuse("cannot open an AF_UNIX socket: " + system_words(errno));
+  // How long to wait for a peer whose queue of connections is full; 0 would be for ever.
+  const timeval limit{.tv_sec = wait ? 2 : 0, .tv_usec = wait ? 0 : 1};
+  ::setsockopt(descriptor, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
   if (::connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     const int error = errno;
     ::close(descriptor);
@@ -131,10 +137,10 @@ bool Link::running() const noexcept {
   return (flags & IFF_UP) != 0 && (flags & IFF_RUNNING) != 0;
 }
 
-Link open_link(const CanOptions& options) {
+Link open_link(const CanOptions& options, bool wait) {
   const std::string prefix(unix_prefix);
-  return options.interface.starts_with(prefix) ? open_unix_socket(options.interface.substr(prefix.size()))
-                                               : open_interface(options);
+  return options.interface.starts_with(prefix) ? open_unix_socket(options.interface.substr(prefix.size()), wait)
+                                               : open_interface(options, wait);
 }
 
 }  // namespace abs_hil::driver::can

@@ -23,7 +23,8 @@ struct Link {
 
 /// Opens the interface that the options name: a raw CAN socket with error frames and kernel filters for the node's
 /// identifiers, or for "unix:PATH" the socket of an emulator. Throws Unavailable with cause and fix.
-[[nodiscard]] Link open_link(const CanOptions& options);
+/// @param wait  for up to 2 s: for the carrier of an interface that was just set up, or for a busy socket
+[[nodiscard]] Link open_link(const CanOptions& options, bool wait = true);
 
 /// Prefix of `driver.can.interface` for a socket in place of a bus.
 inline constexpr const char* unix_prefix = "unix:";

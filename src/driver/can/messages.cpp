@@ -136,6 +136,11 @@ Frame control_frame(const ControlMessage& control) noexcept {
       .with_check();
 }
 
+bool commands_node(const Frame& frame) noexcept {
+  const bool asks_only = frame.data[0] == static_cast<std::uint8_t>(Request::identify);
+  return !frame.error && (frame.id == id::command || (frame.id == id::control && !asks_only));
+}
+
 Decoded decode(const Frame& frame) noexcept {
   const Message* message = frame.error ? nullptr : find_message(frame.id);
   if (message == nullptr || !message->from_node) return {DecodeError::unknown_identifier, {}};

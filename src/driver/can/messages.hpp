@@ -35,6 +35,10 @@ struct ControlMessage {
 };
 [[nodiscard]] Frame control_frame(const ControlMessage& control) noexcept;
 
+/// True for a frame that commands the node, whether or not the node takes it. Received, it is from another sender: a
+/// socket does not receive its own frames. Real-time safe.
+[[nodiscard]] bool commands_node(const Frame& frame) noexcept;
+
 // Messages that the node sends. Every field is within its signal's range.
 
 struct StatusMessage {

@@ -163,8 +163,9 @@ Card open_card(const PciOptions& options, bool lock_step) {
   return card;
 }
 
-std::unique_ptr<RegisterWindow> open_beside_owner(const PciOptions& options, bool beside_guardian) {
+std::unique_ptr<RegisterWindow> open_beside_owner(const PciOptions& options, bool beside_guardian, std::string* file) {
   const fs::path folder = fs::path(options.root) / choose(options);
+  if (file != nullptr) *file = (folder / "resource2").string();
   check_bar2(folder);
   refuse_obstacles(folder, port_obstacles(folder));
   return std::make_unique<SysfsWindow>(folder / "resource2",

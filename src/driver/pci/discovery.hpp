@@ -45,8 +45,9 @@ void check_bar2(const std::filesystem::path& device_folder);
 /// Opens the registers of the same card for a guardian. Finds and checks the card in the same way, but without the
 /// owner's lock. Throws Unavailable, also if another guardian still makes that card safe.
 /// @param beside_guardian  go on even then: both write zeros only
-[[nodiscard]] std::unique_ptr<RegisterWindow> open_beside_owner(const PciOptions& options,
-                                                                bool beside_guardian = false);
+/// @param file  becomes the file of the registers as soon as the card is found; null: not asked for
+[[nodiscard]] std::unique_ptr<RegisterWindow> open_beside_owner(const PciOptions& options, bool beside_guardian = false,
+                                                                std::string* file = nullptr);
 
 /// File in the card's folder that only an emulator in lock-step has.
 inline constexpr const char* emulated_time_file = "emulated_time_ns";

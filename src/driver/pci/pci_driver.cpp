@@ -14,6 +14,8 @@ namespace {
 /// again.
 constexpr std::int64_t late_reading_ns = 250'000;
 constexpr std::uint32_t encoder_wheels = 2;
+/// The sources give the settings 16 bits and say nothing of those above.
+constexpr std::uint32_t low_16_bits = 0xFFFF;
 
 constexpr const char* refusal_hint =
     ". The kernel is probably locked down (Secure Boot): switch Secure Boot off, or boot without lockdown=";
@@ -83,7 +85,6 @@ void PciDriver::do_configure() {
   if (version_ == all_ones) {
     refuse("answers all ones: it is not on the bus; check its power, its slot and that its I/O decoding is enabled");
   }
-  constexpr std::uint32_t low_16_bits = 0xFFFF;
   if (options_.bitstream >= 0 && (version_ & low_16_bits) != static_cast<std::uint32_t>(options_.bitstream)) {
     refuse("bitstream version " + std::to_string(version_ & low_16_bits) + " is not the configured " +
            std::to_string(options_.bitstream) +
@@ -123,8 +124,7 @@ bool PciDriver::outputs_now(rig::Command& applied) noexcept {
 
 void PciDriver::take_over(Access& card) noexcept {
   for (const Pwm pwm : {Pwm::drive, Pwm::brake}) {
-    static_cast<void>(
-        write_pwm(card, pwm, 0));  // before mode and prescaler, which could turn an old width into a pulse
+    set_pwm(card, pwm, 0);  // before mode and prescaler, which could turn an old width into a pulse
     for (const auto& [offset, value] :
          {std::pair(reg::pwm_mode, static_cast<std::uint32_t>(mode_)),
           std::pair(reg::pwm_prescaler, static_cast<std::uint32_t>(options_.pwm_prescaler))}) {
@@ -141,12 +141,14 @@ void PciDriver::take_over(Access& card) noexcept {
   card.write(reg::encoder_reset, 0);
   read_wheels(card);
   for (const std::uint32_t offset : health_registers) read_health(card, offset);
+  note_settings(card);
 }
 
 void PciDriver::do_activate(std::int64_t now_ns) {
   Access card(*card_.window);
   health_ = {};
-  next_health_ = 0;
+  next_health_ = next_setting_ = 0;
+  widths_sent_ = {};
   counts_ = {};
   activated_ns_ = last_read_ns_ = now_ns;
   IoResult result{};
@@ -248,23 +250,70 @@ bool PciDriver::tripped_to_zero(Access& card, std::uint32_t width_read) noexcept
   return card.result().ok() && health_[0] != 0;
 }
 
-std::uint32_t PciDriver::write_pwm(Access& card, Pwm pwm, std::uint32_t width) noexcept {
+void PciDriver::set_pwm(Access& card, Pwm pwm, std::uint32_t width) noexcept {
   card.write(reg::pwm_index, static_cast<std::uint32_t>(pwm));
   card.write(reg::pwm_width, width);
   const std::uint32_t width_read = pwm_bits(reg::pwm_width, card.read(reg::pwm_width));
   if (card.result().ok() && width_read != width && !tripped_to_zero(card, width_read)) {
     card.fail(IoError::read_back_mismatch, reg::pwm_width);
   }
-  return width_read;
+}
+
+std::uint32_t PciDriver::update_pwm(Access& card, Pwm pwm, std::uint32_t width) noexcept {
+  card.write(reg::pwm_index, static_cast<std::uint32_t>(pwm));
+  const std::uint32_t shown = pwm_bits(reg::pwm_width, card.read(reg::pwm_width));
+  std::uint32_t& sent = widths_sent_[static_cast<std::size_t>(pwm)];
+  const bool kept = shown == sent;
+  if (!kept && !tripped_to_zero(card, shown)) card.fail(IoError::read_back_mismatch, reg::pwm_width);
+  card.write(reg::pwm_width, width);
+  sent = width;
+  if (settings[next_setting_].pwm == pwm) check_setting(card);
+  return kept ? width : 0;
+}
+
+void PciDriver::note_settings(Access& card) noexcept {
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    card.write(reg::pwm_index, static_cast<std::uint32_t>(settings[i].pwm));
+    settings_[i] = card.read(settings[i].offset) & low_16_bits;
+  }
+}
+
+void PciDriver::check_setting(Access& card) noexcept {
+  const std::size_t turn = next_setting_;
+  const auto differs = [&] { return (card.read(settings[turn].offset) & low_16_bits) != settings_[turn]; };
+  // Read twice: a run need not end for one access that went wrong.
+  if (differs() && differs()) card.fail(IoError::foreign_writer, settings[turn].offset);
+}
+
+IoResult PciDriver::cause_of_wrong_width() noexcept {
+  static_cast<void>(do_make_safe());
+  constexpr std::uint32_t most_tries = 8;  // the other writer may come between these accesses as well
+  bool takes_values = false;
+  for (std::uint32_t width = 1; width <= most_tries && !takes_values; ++width) {  // of 4095: nothing moves
+    Access card(*card_.window);
+    set_pwm(card, Pwm::brake, width);
+    takes_values = card.result().ok();
+  }
+  if (!takes_values) return {IoError::read_back_mismatch, reg::pwm_width};
+  Access card(*card_.window);
+  const std::array<std::uint32_t, settings.size()> at_activation = settings_;
+  note_settings(card);
+  const bool same = settings_ == at_activation || !card.result().ok();
+  return {IoError::foreign_writer, reg::pwm_width, 0,
+          same ? rig::Reason::foreign_writer : rig::Reason::board_reconfigured};
 }
 
 IoResult PciDriver::do_write(const rig::Command& command, rig::Command& sent) noexcept {
   if (!in_range(command)) return {IoError::command_out_of_range};
   Access card(*card_.window);
   sent = command;
-  sent.motor_duty = rig::duty_of(write_pwm(card, Pwm::drive, grid_.motor_width(command)), grid_.duty_steps);
-  sent.brake_duty = rig::duty_of(write_pwm(card, Pwm::brake, grid_.brake_width(command)), grid_.duty_steps);
-  return checked_for_absence(card);
+  sent.motor_duty = rig::duty_of(update_pwm(card, Pwm::drive, grid_.motor_width(command)), grid_.duty_steps);
+  sent.brake_duty = rig::duty_of(update_pwm(card, Pwm::brake, grid_.brake_width(command)), grid_.duty_steps);
+  next_setting_ = (next_setting_ + 1) % settings.size();
+  IoResult result = checked_for_absence(card);
+  if (result.error == IoError::read_back_mismatch) return cause_of_wrong_width();
+  if (result.error == IoError::foreign_writer) result.reason = rig::Reason::board_reconfigured;
+  return result;
 }
 
 IoResult PciDriver::do_make_safe() noexcept {
@@ -273,7 +322,7 @@ IoResult PciDriver::do_make_safe() noexcept {
   IoResult first{};
   for (const Pwm pwm : {Pwm::drive, Pwm::brake}) {
     Access card(*card_.window);
-    static_cast<void>(write_pwm(card, pwm, 0));
+    set_pwm(card, pwm, 0);
     if (const IoResult result = checked_for_absence(card); first.ok()) first = result;
   }
   return first;

@@ -1,20 +1,17 @@
 #include "driver/pci/pci_safe_state.hpp"
 
+#include <algorithm>
+
 #include "driver/pci/discovery.hpp"
 #include "driver/pci/register_map.hpp"
+#include "driver/pwm.hpp"
+#include "driver/reopening.hpp"
 
 namespace abs_hil::driver::pci {
 
 namespace {
 
 constexpr Pwm both[] = {Pwm::drive, Pwm::brake};
-
-IoResult set_to_zero(RegisterWindow& window, Pwm pwm) noexcept {
-  if (const IoResult result = window.write32(reg::pwm_index, static_cast<std::uint32_t>(pwm)); !result.ok()) {
-    return result;
-  }
-  return window.write32(reg::pwm_width, 0);
-}
 
 IoResult check_for_zero(RegisterWindow& window, Pwm pwm) noexcept {
   const auto index = static_cast<std::uint32_t>(pwm);
@@ -32,21 +29,61 @@ IoResult check_for_zero(RegisterWindow& window, Pwm pwm) noexcept {
 }  // namespace
 
 PciSafeState::PciSafeState(const PciOptions& options, bool beside_guardian)
-    : PciSafeState([options, beside_guardian] { return open_beside_owner(options, beside_guardian); }) {}
+    : PciSafeState(
+          [options, beside_guardian, again = Reopening{}]() mutable -> std::unique_ptr<RegisterWindow> {
+            if (!again.due()) return nullptr;
+            std::string file;
+            auto window = open_beside_owner(options, beside_guardian, &file);
+            again.found(std::move(file));
+            return window;
+          },
+          beside_guardian ? full_width(pwm_mode_named(options.pwm_mode)) : 0) {}
 
-void PciSafeState::prepare() { window_ = open_window_(); }
+void PciSafeState::prepare() {
+  window_ = open_window_();
+  if (!window_) throw Unavailable("backend rig: the card has just been looked for, and was not there");
+}
 
 IoResult PciSafeState::open_again() noexcept {
   window_.reset();
   try {
     window_ = open_window_();
-    return {};
+    return window_ ? IoResult{} : IoResult{IoError::disconnected};
   } catch (...) {
     return {IoError::disconnected};
   }
 }
 
+IoResult PciSafeState::verify_safe() noexcept {
+  bool zero = window_ != nullptr;
+  bool foreign = false;
+  for (const Pwm pwm : both) {
+    std::uint32_t width = 0;
+    zero = zero && window_->write32(reg::pwm_index, static_cast<std::uint32_t>(pwm)).ok() &&
+           window_->read32(reg::pwm_width, width).ok() && pwm_bits(reg::pwm_width, width) == 0;
+    foreign = foreign || (width != all_ones && pwm_bits(reg::pwm_width, width) != 0);
+  }
+  if (zero) return {};
+  const IoResult made_safe = make_safe();
+  return foreign ? IoResult{IoError::foreign_writer, reg::pwm_width, 0, rig::Reason::foreign_writer} : made_safe;
+}
+
+double PciSafeState::look() noexcept {
+  std::uint32_t width = 0;
+  if (!window_->read32(reg::pwm_width, width).ok() || width == all_ones) return 0.0;
+  return std::min(1.0, rig::duty_of(pwm_bits(reg::pwm_width, width), full_width_));
+}
+
+IoResult PciSafeState::set_to_zero(Pwm pwm) noexcept {
+  if (const IoResult result = window_->write32(reg::pwm_index, static_cast<std::uint32_t>(pwm)); !result.ok()) {
+    return result;
+  }
+  if (full_width_ != 0) (pwm == Pwm::drive ? found_->motor_duty : found_->brake_duty) = look();
+  return window_->write32(reg::pwm_width, 0);
+}
+
 IoResult PciSafeState::make_safe() noexcept {
+  found_.reset();
   if (!window_) {
     if (const IoResult opened = open_again(); !opened.ok()) return opened;
   }
@@ -54,7 +91,8 @@ IoResult PciSafeState::make_safe() noexcept {
   const auto note = [&first](const IoResult& result) {
     if (first.ok()) first = result;
   };
-  for (const Pwm pwm : both) note(set_to_zero(*window_, pwm));
+  if (full_width_ != 0) found_.emplace();
+  for (const Pwm pwm : both) note(set_to_zero(pwm));
   for (const Pwm pwm : both) note(check_for_zero(*window_, pwm));
   if (first.error == IoError::disconnected) window_.reset();
   return first;

@@ -13,9 +13,9 @@ constexpr std::string_view abs_only = "in the board's generic logic this is an A
 constexpr std::string_view limit_open = "whether the host may write it; its power-on value";
 
 constexpr std::array table{
-    Register{reg::bitstream_version, "bitstream version", "", "low 16 bits", documented, checked,
+    Register{reg::bitstream_version, "bitstream version", "", "low 16 bits", documented, in_turn,
              "the version word of the ABS logic"},
-    Register{reg::channel_counts, "channel counts", "", "bits 15:12 counters, 11:8 timers", documented, checked},
+    Register{reg::channel_counts, "channel counts", "", "bits 15:12 counters, 11:8 timers", documented, in_turn},
     Register{reg::supply, "supply", "V", "92000 / raw; 0 = none", documented, in_turn},
     Register{reg::dio_direction_low, "digital I/O direction, low half", "", "a bit each", documented, never,
              "which lines the ABS logic uses"},
@@ -23,18 +23,18 @@ constexpr std::array table{
              "as the low half"},
     Register{reg::dio_value_low, "digital I/O value, low half", "", "a bit each", documented, never, "as direction"},
     Register{reg::dio_value_high, "digital I/O value, high half", "", "a bit each", documented, never, "as direction"},
-    Register{reg::velocity_period, "velocity period", "s", "raw / 40 MHz", documented, checked, "its power-on value"},
+    Register{reg::velocity_period, "velocity period", "s", "raw / 40 MHz", documented, in_turn, "its power-on value"},
     Register{reg::velocity_lower, "velocity of the lower wheel", "rad/s",
              "low 16 bits; 2 pi raw (40 MHz / velocity period) / 1024", documented, checked,
              "how it shows backward motion"},
     Register{reg::velocity_upper, "velocity of the upper wheel", "rad/s", "as the lower wheel's", documented, checked,
              "as the lower wheel's"},
-    Register{reg::velocity_limit, "overspeed limit", "rad/s", "as the velocities", documented, checked, limit_open},
+    Register{reg::velocity_limit, "overspeed limit", "rad/s", "as the velocities", documented, in_turn, limit_open},
     Register{reg::pwm_index, "PWM index", "", "0 drive, 1 brake: selects the PWM of 64, 68 and 6C", documented,
              every_cycle},
-    Register{reg::pwm_mode, "PWM mode", "", "0 = 8-bit, 1 = 12-bit; reads back", documented, at_activation},
+    Register{reg::pwm_mode, "PWM mode", "", "0 = 8-bit, 1 = 12-bit; reads back", documented, kept_in_turn},
     Register{reg::pwm_prescaler, "PWM prescaler", "", "f = 40 MHz / ((prescaler + 1) full width); reads back",
-             documented, at_activation, "how many bits it has"},
+             documented, kept_in_turn, "how many bits it has"},
     Register{reg::pwm_width, "PWM width", "", "high time, 0 ... 255 or 4095; reads back", documented, every_cycle,
              "whether it reads 0 while an interlock holds the outputs off"},
     Register{reg::encoder_index, "encoder index", "",
@@ -49,8 +49,8 @@ constexpr std::array table{
     Register{reg::r1_high, "R1 high threshold", "", "", documented, never, "its unit"},
     Register{reg::r2_low, "R2 low threshold", "", "", documented, never, "its unit"},
     Register{reg::r2_high, "R2 high threshold", "", "", documented, never, abs_only},
-    Register{reg::supply_min, "least supply", "V", "92000 / raw", documented, checked, limit_open},
-    Register{reg::temperature_max, "highest temperature", "deg C", "raw", documented, checked, limit_open},
+    Register{reg::supply_min, "least supply", "V", "92000 / raw", documented, in_turn, limit_open},
+    Register{reg::temperature_max, "highest temperature", "deg C", "raw", documented, in_turn, limit_open},
     Register{reg::trip_flags, "trip flags", "", "bit 1 supply; bits 0 and 2 temperature and overspeed", documented,
              in_turn, "which of bits 0 and 2 is temperature and which overspeed: any bit counts as a trip"},
     Register{reg::temperature_high, "temperature sensor, high time", "", "235 - 400 high / low is deg C", inferred,
@@ -68,6 +68,7 @@ std::string_view name_of(Use use) noexcept {
     case every_cycle: return "every cycle";
     case in_turn: return "in turn";
     case at_activation: return "at activation";
+    case kept_in_turn: return "at activation, then in turn";
   }
   return "not used";
 }

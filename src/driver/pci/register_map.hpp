@@ -56,11 +56,12 @@ using driver::Standing;
 
 /// What this driver does with a register.
 enum class Use : std::uint8_t {
-  never,         ///< not used; listed for completeness
-  checked,       ///< read once, in `configure`
-  every_cycle,   ///< read or written in every cycle
-  in_turn,       ///< each cycle reads one of these, in turn
-  at_activation  ///< written and verified when the outputs are taken over
+  never,          ///< not used; listed for completeness
+  checked,        ///< read once, in `configure`
+  every_cycle,    ///< read or written in every cycle
+  in_turn,        ///< each cycle reads one of these, in turn
+  at_activation,  ///< written and verified when the outputs are taken over
+  kept_in_turn    ///< the same, and read in turn from then on
 };
 [[nodiscard]] std::string_view name_of(Use use) noexcept;
 

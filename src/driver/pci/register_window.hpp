@@ -19,6 +19,8 @@ class RegisterWindow {
   /// `value` does not change on error. `IoResult::where` is the offset.
   virtual IoResult read32(std::uint32_t offset, std::uint32_t& value) noexcept = 0;
   virtual IoResult write32(std::uint32_t offset, std::uint32_t value) noexcept = 0;
+  /// Of a guardian's window: whether new owners are refused.
+  virtual void refuse_owners(bool /*refuse*/) noexcept {}
 };
 
 using driver::EmulatedTime;

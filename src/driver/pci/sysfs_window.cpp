@@ -101,11 +101,15 @@ void become_owner(const std::filesystem::path& file, int fd) {
   if (const pid_t guardian = guardian_of(fd); guardian != 0) refuse_while_guarded(file, guardian);
 }
 
-void become_guardian(const std::filesystem::path& file, int fd) {
+bool set_guardian_lock(int fd, short type) noexcept {
   struct flock lock {};
-  lock.l_type = F_WRLCK;
+  lock.l_type = type;
   lock.l_whence = SEEK_SET;
-  if (::fcntl(fd, F_SETLK, &lock) == 0) return;
+  return ::fcntl(fd, F_SETLK, &lock) == 0;
+}
+
+void become_guardian(const std::filesystem::path& file, int fd) {
+  if (set_guardian_lock(fd, F_WRLCK)) return;
   const int error = errno;
   if (const pid_t guardian = guardian_of(fd); guardian != 0) refuse_while_guarded(file, guardian);
   refuse(file, std::string("cannot be locked: ") + std::strerror(error));
@@ -156,6 +160,10 @@ IoResult SysfsWindow::read32(std::uint32_t offset, std::uint32_t& value) noexcep
 IoResult SysfsWindow::write32(std::uint32_t offset, std::uint32_t value) noexcept {
   return whole_access(offset, sizeof value,
                       [&] { return ::pwrite(file_.get(), &value, sizeof value, static_cast<off_t>(offset)); });
+}
+
+void SysfsWindow::refuse_owners(bool refuse) noexcept {
+  static_cast<void>(set_guardian_lock(file_.get(), refuse ? F_WRLCK : F_UNLCK));
 }
 
 EmulatedTimeFile::EmulatedTimeFile(const std::filesystem::path& file) : file_(open_for_access(file)) {}

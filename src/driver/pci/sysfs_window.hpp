@@ -26,6 +26,7 @@ class SysfsWindow final : public RegisterWindow {
 
   IoResult read32(std::uint32_t offset, std::uint32_t& value) noexcept override;
   IoResult write32(std::uint32_t offset, std::uint32_t value) noexcept override;
+  void refuse_owners(bool refuse) noexcept override;
 
  private:
   FileDescriptor file_;

@@ -45,6 +45,7 @@ struct Board {
   std::unique_ptr<EmulatedTime> time{};  ///< only for an emulator in lock-step; uses the link and must end before it
   std::string place{};                   ///< for messages: ids, serial, bus address
   std::string serial{};                  ///< the board's own; without one, its bus address
+  std::string address{};                 ///< its folder below driver.usb.sysfs_root
 };
 
 // Bulk endpoints of the FPGA. 6 OUT and 8 IN are its JTAG: never touched.

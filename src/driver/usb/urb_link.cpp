@@ -266,7 +266,9 @@ class LinkTime final : public EmulatedTime {
 Board open_board(const UsbOptions& options, bool lock_step, bool emulated, Usbfs& usbfs) {
   const UsbDevice device = choose_board(options, lock_step, emulated);
   auto link = std::make_unique<UrbLink>(device, usbfs);
-  Board board{.place = device.text(), .serial = device.serial.empty() ? device.address : device.serial};
+  Board board{.place = device.text(),
+              .serial = device.serial.empty() ? device.address : device.serial,
+              .address = device.address};
   if (lock_step) board.time = std::make_unique<LinkTime>(*link);
   board.link = std::move(link);
   return board;

@@ -7,6 +7,7 @@
 #include "driver/accessible_file.hpp"
 #include "driver/monotonic_time.hpp"
 #include "driver/output_grid.hpp"
+#include "driver/reopening.hpp"
 #include "driver/usb/discovery.hpp"
 #include "driver/usb/options.hpp"
 #include "driver/usb/urb_link.hpp"
@@ -25,7 +26,12 @@ std::unique_ptr<RigDriver> make_usb_driver(const UsbOptions& options, const RunF
 }
 
 std::unique_ptr<SafeStateWriter> make_usb_writer(const UsbOptions& options, const RunFacts& run) {
-  return std::make_unique<UsbSafeState>(options, [options, run] { return open_board(options, false, run.emulated); });
+  return std::make_unique<UsbSafeState>(options, [options, run, again = Reopening{}]() mutable {
+    if (!again.due()) return Board{};
+    Board board = open_board(options, false, run.emulated);
+    again.found(options.sysfs_root + '/' + board.address);
+    return board;
+  });
 }
 
 /// A cycle must not wait for an answer longer than its period.

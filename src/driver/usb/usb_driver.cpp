@@ -171,7 +171,13 @@ IoResult UsbDriver::lost_frame() noexcept {
 IoResult UsbDriver::failed(const IoResult& result) noexcept {
   put_command(0, 0, false);
   if (board_.link->send(frame_).ok()) command_sent_ = rig::safe_command;
-  return with_reason(result);
+  if (result.error != IoError::read_back_mismatch) return with_reason(result);
+  // A board that shows the zeros takes what is sent: what it showed before, something else had sent.
+  Contents contents;
+  std::int64_t ignored = 0;
+  const bool takes_zeros = fresh_frame(options_.answer_timeout_us * rig::ns_per_us, contents, ignored).ok();
+  return takes_zeros ? IoResult{IoError::foreign_writer, endpoint_in, 0, rig::Reason::foreign_writer}
+                     : with_reason(result);
 }
 
 IoResult UsbDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept {

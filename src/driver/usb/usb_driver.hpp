@@ -72,7 +72,8 @@ class UsbDriver final : public RigDriver {
   /// Requests a current frame and waits for it, at most `timeout_ns`. Drops a late frame first.
   IoResult fresh_frame(std::int64_t timeout_ns, Contents& contents, std::int64_t& read_ns) noexcept;
   IoResult lost_frame() noexcept;
-  /// Adds the reason to a failure, and sends the safe frame without waiting.
+  /// Adds the reason to a failure, and sends the safe frame without waiting. Only for frames that show other outputs
+  /// than those sent it waits for one more frame, at most `answer_timeout_us`, to tell why.
   IoResult failed(const IoResult& result) noexcept;
   [[nodiscard]] IoResult checked(const Contents& contents) const noexcept;
   void take_counts(const Contents& contents, std::array<std::int32_t, 2>& counts) const noexcept;

@@ -8,7 +8,9 @@ namespace {
 
 /// A healthy board answers within a millisecond. Zeros wait no longer for its words.
 constexpr std::int64_t answer_ns = 20'000'000;
-constexpr std::int64_t taken_ns = 500'000'000;
+/// It is called again until it succeeds: a single call need not be as patient as the owner's last one.
+constexpr std::int64_t taken_ns = 100'000'000;
+constexpr std::int64_t look_ns = 5'000'000;
 
 /// All lines are inputs, all outputs 0.
 Frame blank_frame() noexcept {
@@ -24,6 +26,7 @@ std::int64_t UsbSafeState::owner_needs_ns() const noexcept { return usb_make_saf
 IoResult UsbSafeState::open() noexcept {
   try {
     board_ = open_board_();
+    if (!board_.link) return {IoError::disconnected};
     shown_ = false;
     frame_ = blank_frame();
     return {};
@@ -56,18 +59,27 @@ IoResult UsbSafeState::send_zeros() noexcept {
   return sent.ok() ? board_.link->flush(taken_ns) : sent;
 }
 
-IoResult UsbSafeState::verify() noexcept {
+IoResult UsbSafeState::verify(std::int64_t timeout_ns) noexcept {
   if (!options_.verify_outputs) return {};
   // An answer that was asked for before the zeros shows the outputs of that moment.
   std::span<const std::uint8_t> bytes;
   if (board_.link->answer_outstanding()) {
-    if (const IoResult late = board_.link->receive(taken_ns, bytes); !late.ok()) return late;
+    if (const IoResult late = board_.link->receive(timeout_ns, bytes); !late.ok()) return late;
   }
   if (const IoResult asked = board_.link->request(); !asked.ok()) return asked;
-  if (const IoResult came = board_.link->receive(taken_ns, bytes); !came.ok()) return came;
+  if (const IoResult came = board_.link->receive(timeout_ns, bytes); !came.ok()) return came;
   Contents contents;
   if (const IoError error = decode(bytes, options_, contents); error != IoError::none) return {error, endpoint_in};
   return shows(contents, zeros_, options_) ? IoResult{} : IoResult{IoError::read_back_mismatch, endpoint_in};
+}
+
+IoResult UsbSafeState::verify_safe() noexcept {
+  if (!board_.link || !shown_ || !options_.verify_outputs) return make_safe();
+  const IoResult look = verify(look_ns);
+  if (look.ok()) return look;
+  const IoResult made_safe = make_safe();
+  const bool foreign = look.error == IoError::read_back_mismatch;
+  return foreign ? IoResult{IoError::foreign_writer, look.where, 0, rig::Reason::foreign_writer} : made_safe;
 }
 
 IoResult UsbSafeState::make_safe() noexcept {
@@ -76,7 +88,7 @@ IoResult UsbSafeState::make_safe() noexcept {
   }
   if (!shown_) learn_words();
   IoResult result = send_zeros();
-  if (result.ok()) result = verify();
+  if (result.ok()) result = verify(taken_ns);
   if (result.ok()) return result;
   if (result.error == IoError::disconnected) {
     board_ = {};

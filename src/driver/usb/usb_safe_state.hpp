@@ -16,7 +16,7 @@ namespace abs_hil::driver::usb {
 class UsbSafeState final : public SafeStateWriter {
  public:
   using OpenBoard = std::function<Board()>;
-  /// @param open_board  throws Unavailable
+  /// @param open_board  throws Unavailable, or returns a board without link at little cost if it has looked just before
   UsbSafeState(UsbOptions options, OpenBoard open_board)
       : options_(std::move(options)), open_board_(std::move(open_board)) {}
 
@@ -24,7 +24,10 @@ class UsbSafeState final : public SafeStateWriter {
   /// Opens nothing: the owner has claimed the board.
   void prepare() override {}
   [[nodiscard]] std::int64_t owner_needs_ns() const noexcept override;
+  void let_go() noexcept override { board_ = {}; }
   [[nodiscard]] IoResult make_safe() noexcept override;
+  /// One frame is asked for, at most 5 ms long. It shows the outputs only with driver.usb.verify_outputs.
+  [[nodiscard]] IoResult verify_safe() noexcept override;
 
  private:
   [[nodiscard]] IoResult open() noexcept;
@@ -32,7 +35,8 @@ class UsbSafeState final : public SafeStateWriter {
   /// Asks for a frame and takes its words over; false without one.
   [[nodiscard]] bool show(Frame& words) noexcept;
   [[nodiscard]] IoResult send_zeros() noexcept;
-  [[nodiscard]] IoResult verify() noexcept;
+  /// `read_back_mismatch`: a frame shows other outputs than zeros.
+  [[nodiscard]] IoResult verify(std::int64_t timeout_ns) noexcept;
 
   UsbOptions options_;
   OpenBoard open_board_;

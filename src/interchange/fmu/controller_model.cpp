@@ -57,7 +57,7 @@ void ControllerModel::start(double time_s) {
                                             .ends_on = {{experiment::EndKind::duration, longest_s, {}, {}}},
                                             .time_limit_s = longest_s}};
   experiment::RunLogicParts parts =
-      experiment::make_logic_parts(control, model, sensors.ideal_actuator, {}, experiment, std::move(plans));
+      experiment::make_logic_parts(control, model, model, sensors.ideal_actuator, {}, experiment, std::move(plans));
   grid_ = {.duty_steps = driver::full_width(driver::pwm_mode_named(board.pwm_mode)),
            .any_brake_duty = sensors.ideal_actuator};
   parts.duty_steps = grid_.any_brake_duty ? 0 : grid_.duty_steps;

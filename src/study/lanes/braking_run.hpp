@@ -53,8 +53,12 @@ struct LaneGate {
     };
     const auto upper_in_reach = upper.take(window.omega1_rad_s, slack(window.omega1_rad_s), window.dt_s);
     const auto lower_in_reach = lower.take(window.omega2_rad_s, slack(window.omega2_rad_s), window.dt_s);
+    const auto too_fast = [&](const S& omega_rad_s) {
+      return rig::magnitude(omega_rad_s) - slack(omega_rad_s) > overspeed_rad_s;
+    };
     const auto ends = momentum.take(window, watch.brake_Nm());
-    const auto quiet_wheels = upper_in_reach && lower_in_reach &&
+    const auto quiet_wheels = upper_in_reach && lower_in_reach && !too_fast(window.omega1_rad_s) &&
+                              !too_fast(window.omega2_rad_s) &&
                               watch.quiet_standing(window, S(window.omega1_rad_s * window.dt_s)) &&
                               watch.quiet_rolling(window) && watch.quiet_slip(window);
     return rig::any(ends) ? quiet_wheels && momentum.conclude(ends).quiet() : quiet_wheels;

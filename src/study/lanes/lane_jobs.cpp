@@ -26,6 +26,7 @@ struct StartingPlant {
   plant_sim::TyreModel tyre;
   double friction_at_most;
   LaneConditions<double> conditions;
+  rig::RigParameters identity;  ///< of the gate's limits
 };
 
 struct Kind {
@@ -81,7 +82,7 @@ struct KindOf {
     run.rig.upper_offset_rad = offsets.upper_rad;
     run.rig.lower_offset_rad = offsets.lower_rad;
     run.rig.duty_steps = parts.duty_steps;
-    run.gate = parts.gate;
+    run.gate = plan_gate(parts, plant.identity, parts.window_cycles);
     run.sequence = parts.sequence;
     run.law = controller->law();
     run.upper.tracker = run.lower.tracker = parts.tracker;
@@ -192,7 +193,8 @@ LaneSettings::LaneSettings(const config::Settings& settings) {
   parts->period_ns = std::llround(1e9 / settings.control.rate_Hz);
   parts->period_s = static_cast<double>(parts->period_ns) * rig::s_per_ns;
   parts->duty_steps = driver::simulated_output_grid(settings.driver, settings.plant.ideal_actuator).duty_steps;
-  if (!plan_gate(*parts)) return;
+  parts->window_cycles = cycles_of_window(*parts, settings.plant.rig.encoder_counts_per_rev);
+  if (parts->window_cycles == 0) return;
   parts->tracker = {settings.control.observer, settings.model.encoder_counts_per_rev};
   parts->tracker.prepare(parts->period_s);
   if (parts->tracker.must_restart()) return;
@@ -213,8 +215,15 @@ const Kind* LaneSettings::begin(Started& run) const {
   if (plant.ideal_actuator != parts_->settings.plant.ideal_actuator) return nullptr;
   try {
     plant_sim::check(plant);
-    StartingPlant starting{
-        plant_sim::make_tyre_model(plant), 1.0, {.wheels = plant_sim::BasicWheels<double>(plant.rig.wheels)}};
+    // Runs of one set of settings go through the kernels together: their speed windows end together.
+    const std::int32_t counts_per_rev = plant.rig.encoder_counts_per_rev;
+    if (counts_per_rev != parts_->settings.plant.rig.encoder_counts_per_rev &&
+        cycles_of_window(*parts_, counts_per_rev) != parts_->window_cycles)
+      return nullptr;
+    StartingPlant starting{plant_sim::make_tyre_model(plant),
+                           1.0,
+                           {.wheels = plant_sim::BasicWheels<double>(plant.rig.wheels)},
+                           plant_sim::identity_of(plant)};
     if (changes(plant)) {
       run.plant = started_plant(plant);
       starting.friction_at_most = plant_sim::FactorProfile(plant.friction_profile).highest();

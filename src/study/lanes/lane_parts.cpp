@@ -38,29 +38,34 @@ bool plan_sequence(const config::Plan& plan, const config::Settings& settings, L
   return settings.model.wheels.r2_m * settings.experiment.start_speed_rad_s > sequence.slow_m_s;
 }
 
-bool plan_gate(LaneSettings::Parts& parts) {
-  const config::Settings& s = parts.settings;
-  const runtime::PlausibilityLimits limits = runtime::plausibility_limits(s.model, s.plant.ideal_actuator, s.gate);
-  const runtime::SpeedWindows windows(limits);
+std::uint32_t cycles_of_window(const LaneSettings::Parts& parts, std::int32_t counts_per_rev) {
+  const runtime::GateOptions& gate = parts.settings.gate;
+  rig::RigParameters rig;
+  rig.encoder_counts_per_rev = counts_per_rev;
+  const runtime::SpeedWindows windows(runtime::plausibility_limits(rig, false, gate));
   const std::int64_t least_ns = std::max(runtime::least_speed_window_ns, windows.resolving_ns());
   const std::int64_t cycles = (least_ns + parts.period_ns - 1) / parts.period_ns;
   constexpr std::int64_t most_cycles = 64;
-  if (cycles > most_cycles || static_cast<double>(cycles * parts.period_ns) * rig::s_per_ns > s.gate.judge_within_s)
-    return false;
-  parts.window_cycles = static_cast<std::uint32_t>(cycles);
-  parts.gate.watch = runtime::WheelWatch<double>(limits);
-  parts.gate.momentum = runtime::MomentumWatch<double>(limits);
-  parts.gate.upper = {limits.upper_gain_rad_s2, limits.upper_loss_rad_s2, limits.overspeed_rad_s};
-  parts.gate.lower = {limits.lower_gain_rad_s2, limits.lower_loss_rad_s2, limits.overspeed_rad_s};
-  parts.gate.brake = rig::BasicBrake<double>(s.model.brake);
-  parts.gate.rad_per_count = limits.rad_per_count;
-  parts.gate.sure_counts = windows.sure_counts();
-  parts.gate.window_s = static_cast<double>(cycles * parts.period_ns) * rig::s_per_ns;
-  parts.gate.overspeed_rad_s = limits.overspeed_rad_s;
-  parts.gate.brake_duty_max = rig::duty_at_most(s.gate.brake_duty_max, static_cast<std::uint32_t>(parts.duty_steps));
-  parts.gate.brake_rate_per_s = s.gate.brake_rate_per_s;
-  parts.gate.brake_free_duty = s.model.brake.u0;
-  return true;
+  const double lasts_s = static_cast<double>(cycles * parts.period_ns) * rig::s_per_ns;
+  return cycles > most_cycles || lasts_s > gate.judge_within_s ? 0 : static_cast<std::uint32_t>(cycles);
+}
+
+LaneGate<double> plan_gate(const LaneSettings::Parts& parts, const rig::RigParameters& identity, std::uint32_t cycles) {
+  const config::Settings& s = parts.settings;
+  const runtime::PlausibilityLimits limits = runtime::plausibility_limits(identity, s.plant.ideal_actuator, s.gate);
+  const runtime::SpeedWindows windows(limits);
+  return {.watch = runtime::WheelWatch<double>(limits),
+          .momentum = runtime::MomentumWatch<double>(limits),
+          .upper = {limits.upper_gain_rad_s2, limits.upper_loss_rad_s2, limits.overspeed_rad_s},
+          .lower = {limits.lower_gain_rad_s2, limits.lower_loss_rad_s2, limits.overspeed_rad_s},
+          .brake = rig::BasicBrake<double>(identity.brake),
+          .rad_per_count = limits.rad_per_count,
+          .sure_counts = static_cast<double>(windows.sure_counts()),
+          .window_s = static_cast<double>(cycles * parts.period_ns) * rig::s_per_ns,
+          .overspeed_rad_s = limits.overspeed_rad_s,
+          .brake_duty_max = rig::duty_at_most(s.gate.brake_duty_max, static_cast<std::uint32_t>(parts.duty_steps)),
+          .brake_rate_per_s = s.gate.brake_rate_per_s,
+          .brake_free_duty = identity.brake.u0};
 }
 
 }  // namespace abs_hil::study::lanes

@@ -14,7 +14,6 @@ namespace abs_hil::study::lanes {
 struct LaneSettings::Parts {
   const config::Settings& settings;
   std::unique_ptr<control::SlipController> controller{};
-  LaneGate<double> gate{};
   LaneSequence<double> sequence{};
   control::SpeedTracker<double> tracker{};
   control::BrakeActuator actuator{};
@@ -28,7 +27,11 @@ struct LaneSettings::Parts {
 /// False for others.
 bool plan_sequence(const config::Plan& plan, const config::Settings& settings, LaneSequence<double>& sequence);
 
-/// The checks of the gate; false if they would not judge often enough.
-bool plan_gate(LaneSettings::Parts& parts);
+/// Cycles of the gate's speed windows; 0 if its checks would not judge often enough.
+std::uint32_t cycles_of_window(const LaneSettings::Parts& parts, std::int32_t counts_per_rev);
+
+/// The checks of the gate, for the rig with this identity.
+/// @param cycles  of its speed windows
+LaneGate<double> plan_gate(const LaneSettings::Parts& parts, const rig::RigParameters& identity, std::uint32_t cycles);
 
 }  // namespace abs_hil::study::lanes

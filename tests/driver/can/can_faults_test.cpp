@@ -203,3 +203,42 @@ TEST_CASE("Commands computed from old measurements do not feed the watchdog") {
   CHECK(cycles >= 8 + 9);   // 8 measurements old are allowed, then the node's bucket fills by 2 a command ...
   CHECK(cycles <= 8 + 20);  // ... or the watchdog ends it
 }
+
+TEST_CASE("Another sender's command ends the run in the next cycle, a question for the identity does not") {
+  for (const bool fd : {false, true}) {
+    for (const driver::can::Frame& frame :
+         {driver::can::command_frame({.duties = {.drive = 5000}, .drive_enable = true}),
+          driver::can::control_frame({.request = driver::can::Request::activate}),
+          driver::can::control_frame({.request = driver::can::Request::deactivate})}) {
+      Active run(fd);
+      run.node.send_as_other(frame);
+      const driver::IoResult result = run.until_failure(5);
+      CHECK(run.cycles == 1);
+      CHECK(result.reason == Reason::foreign_writer);
+      CHECK(result.where == frame.id);
+      CHECK(run.node.wire().drive_duty == 0.0);
+      CHECK(run.node.wire().brake_duty == 0.0);
+    }
+    Active asked(fd);
+    asked.node.send_as_other(driver::can::control_frame({.request = driver::can::Request::identify}));
+    CHECK(asked.until_failure(40).ok());
+  }
+}
+
+TEST_CASE("Commands of another sender that only the node hears are found by the sequence that it names") {
+  for (const bool fd : {false, true}) {
+    Active run(fd);
+    driver::IoResult result{};
+    int cycles = 0;
+    for (; result.ok() && cycles < 20; ++cycles) {
+      // It is ahead of this program's sequence, so that the node takes its commands and refuses the others.
+      const auto ahead = static_cast<std::uint8_t>(20 + cycles + 8);
+      run.node.send_to_node(driver::can::command_frame(
+          {.duties = {.brake = 5000}, .heartbeat = static_cast<std::uint8_t>(20 + cycles), .sequence = ahead}));
+      result = run.cycle();
+    }
+    CAPTURE(fd, cycles);
+    CHECK(result.reason == Reason::foreign_writer);
+    CHECK(cycles <= (fd ? 1 : 10));
+  }
+}

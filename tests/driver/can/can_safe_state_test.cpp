@@ -56,3 +56,36 @@ TEST_CASE("Without a link there is nothing to verify, and the next try opens it 
   down = false;
   CHECK(writer.make_safe().ok());
 }
+
+TEST_CASE("A look at an inactive node commands nothing; an active one is something else's and is deactivated") {
+  NodeOnSocket node{{}};
+  can::CanSafeState writer{node.opener(), false};
+  writer.prepare();
+  REQUIRE(writer.make_safe().ok());
+  const auto writes = [&] {
+    return node.with_node([](emulator::CanNode& n, emulator::NodeFaults&) { return n.writes(); });
+  };
+  const std::uint64_t before = writes();
+  for (int i = 0; i < 300; ++i) REQUIRE(writer.verify_safe().ok());  // the sequence wraps
+  CHECK(writes() == before);
+  {
+    can::CanDriver other({}, node.opener(), true);
+    other.configure();
+    other.activate(0);
+    rig::Measurement measurement;
+    REQUIRE(other.read(1'000'000, measurement).ok());
+    REQUIRE(other.write({.motor_duty = 0.5, .motor_enable = true}).ok());
+    REQUIRE(node.wire().drive_duty > 0.4);
+    const IoResult found = writer.verify_safe();
+    CHECK(found.error == IoError::foreign_writer);
+    CHECK(found.reason == rig::Reason::foreign_writer);
+    CHECK(node.wire().drive_duty == 0.0);
+  }
+  REQUIRE(writer.make_safe().ok());
+  CHECK(writer.verify_safe().ok());
+  // A command that the inactive node refuses still shows that somebody sends them.
+  node.send_as_other(can::command_frame({.duties = {.drive = 5000}, .drive_enable = true}));
+  CHECK(writer.verify_safe().error == IoError::foreign_writer);
+  node.fault("silent");
+  CHECK(writer.verify_safe().error == IoError::no_answer);
+}

@@ -62,10 +62,21 @@ class NodeOnSocket {
   void send_to_node(const emulator::BusFrame& frame) {
     with_node([&](emulator::CanNode& node, emulator::NodeFaults&) { node.receive(frame); });
   }
+  /// A frame of another sender on the bus: node and driver both receive it.
+  void send_as_other(const driver::can::Frame& frame) {
+    const emulator::BusFrame sent = on_bus(frame);
+    send_to_node(sent);
+    send(sent);
+  }
+  /// The same, but the driver's controller misses it.
+  void send_to_node(const driver::can::Frame& frame) { send_to_node(on_bus(frame)); }
   /// Closes the driver's end of the pair.
   void hang_up() { ::shutdown(ends_[1], SHUT_RDWR); }
 
  private:
+  static emulator::BusFrame on_bus(const driver::can::Frame& frame) {
+    return {.id = frame.id, .length = frame.length, .fd = frame.fd, .data = frame.data};
+  }
   class PromptSocket final : public driver::can::FrameSocket {
    public:
     PromptSocket(int descriptor, NodeOnSocket& node) : FrameSocket(descriptor), node_(node) {}

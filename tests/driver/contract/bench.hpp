@@ -31,7 +31,10 @@ class Bench {
   [[nodiscard]] virtual bool tells_health() const { return has_registers(); }
   /// From now on the brake output does not take what is written; false if this backend cannot fail so.
   [[nodiscard]] virtual bool break_brake_output() = 0;
-  /// Cycles until such a failure shows in `read`; 0: `write` itself reads back.
+  /// Another writer than the driver puts the drive's duty on the outputs, with a handle of its own; false if this
+  /// backend has outputs that nothing else can reach.
+  [[nodiscard]] virtual bool write_as_other(double drive_duty) = 0;
+  /// Cycles until a broken output shows in `read`; 0: the next `write` looks.
   [[nodiscard]] virtual int read_back_cycles() const { return 0; }
 };
 

@@ -28,6 +28,11 @@ class CanBench final : public Bench {
     node_.with_node([](emulator::CanNode& node, emulator::NodeFaults&) { node.break_brake_output(0.01); });
     return true;
   }
+  bool write_as_other(double drive_duty) override {
+    node_.send_as_other(driver::can::command_frame(
+        {.duties = {.drive = static_cast<std::uint16_t>(drive_duty * 10'000.0)}, .drive_enable = true}));
+    return true;
+  }
   // OUTPUTS comes with every tenth answer; within an FD frame with each.
   [[nodiscard]] int read_back_cycles() const override { return with_fd ? 1 : 10; }
 

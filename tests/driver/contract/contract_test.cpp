@@ -217,6 +217,29 @@ TEST_CASE("An output that does not take its value is found, and the other output
   CHECK(bench->wire().drive_duty == 0.0);
 }
 
+TEST_CASE("Another writer's duty is found within five cycles, as a fault of its own, and made safe") {
+  for (const rig::Command& command : {rig::safe_command, drive, brake}) {
+    auto bench = active_bench();
+    driver::IoResult result{};
+    int cycles = 0;
+    for (rig::Measurement measurement; result.ok() && cycles < 5;) {
+      result = bench->driver().read(++cycles * ms, measurement);
+      if (result.ok()) result = bench->driver().write(command);
+      if (!result.ok()) break;
+      // It writes after the driver has written: its duty stays for all but the moment of the driver's next write.
+      if (!bench->write_as_other(1.0)) {
+        CHECK_FALSE(bench->has_registers());
+        return;
+      }
+    }
+    CAPTURE(command.motor_duty, command.brake_duty, cycles, driver::error_text(result));
+    CHECK(result.error == IoError::foreign_writer);
+    CHECK(result.reason == rig::Reason::foreign_writer);
+    CHECK(bench->driver().deactivate().ok());
+    check_safe(*bench);
+  }
+}
+
 TEST_CASE("Activation again starts the counters and the measurement anew") {
   auto bench = active_bench();
   const rig::Measurement old = read_until(bench->driver(), 0, 300 * ms);

@@ -63,6 +63,20 @@ class PciFuseBench final : public Bench {
     command("fault 6c:wrong=1");
     return true;
   }
+  bool write_as_other(double drive_duty) override {
+    // A process with a descriptor of its own on the same file.
+    const pid_t other = ::fork();
+    if (other == 0) {
+      const int file = ::open((folder_ / "pci" / "0000:03:00.0" / "resource2").c_str(), O_RDWR);
+      const std::array<std::uint32_t, 2> values{0, static_cast<std::uint32_t>(drive_duty * 4095.0)};
+      const bool written = ::pwrite(file, &values[0], 4, 0x60) == 4 && ::pwrite(file, &values[1], 4, 0x6C) == 4;
+      ::_exit(written ? 0 : 1);
+    }
+    int status = 1;
+    ::waitpid(other, &status, 0);
+    if (status != 0) throw std::runtime_error("the other writer could not write");
+    return true;
+  }
 
  private:
   void start() {

@@ -24,6 +24,11 @@ class PciModelBench final : public Bench {
     // The drive's width is off by one too: its read-back fails first, and both outputs are still made safe.
     return true;
   }
+  bool write_as_other(double drive_duty) override {
+    card_.model.write32(0x60, 0);
+    card_.model.write32(0x6C, static_cast<std::uint32_t>(drive_duty * 4095.0));
+    return true;
+  }
 
  private:
   ModelCard card_{{.start_speed_rad_s = bench_speed_rad_s}};

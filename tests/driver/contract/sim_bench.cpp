@@ -20,6 +20,7 @@ class SimBench final : public Bench {
   std::uint64_t writes() override { return 0; }
   [[nodiscard]] bool has_registers() const override { return false; }
   bool break_brake_output() override { return false; }
+  bool write_as_other(double /*drive_duty*/) override { return false; }
 
  private:
   std::unique_ptr<driver::SimDriver> driver_ = std::make_unique<driver::SimDriver>(

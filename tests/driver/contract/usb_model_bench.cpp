@@ -18,6 +18,12 @@ class UsbModelBench final : public Bench {
     board_.model.break_brake(true);
     return true;
   }
+  bool write_as_other(double drive_duty) override {
+    const auto image = board_.model.image();
+    driver::usb::Frame frame = driver::usb::frame_from(std::span(image).first<driver::usb::frame_bytes>());
+    driver::usb::put_outputs(frame, {}, static_cast<std::uint32_t>(drive_duty * 4095.0), 0, false);
+    return board_.model.take(frame) == emulator::UsbBoardModel::Taken::frame;
+  }
   [[nodiscard]] int read_back_cycles() const override { return 1; }
   [[nodiscard]] bool tells_health() const override { return false; }
 

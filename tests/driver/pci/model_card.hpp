@@ -2,7 +2,9 @@
 
 #include <cerrno>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -32,6 +34,8 @@ struct ModelCard {
   emulator::FaultyCard faulty;
   std::vector<RegisterAccess> traffic{};
   bool unplugged{false};
+  std::optional<std::uint32_t> misread_next{};  ///< the next reading of this offset has a wrong bit
+  std::function<void()> after_access{};         ///< what something else does meanwhile
 };
 
 class ModelWindow final : public driver::pci::RegisterWindow {
@@ -42,13 +46,19 @@ class ModelWindow final : public driver::pci::RegisterWindow {
     const emulator::AccessResult result = card_.faulty.read32(offset);
     if (result.failed) return {driver::IoError::disconnected, offset, EIO};
     value = result.value;
+    if (card_.misread_next == offset) {
+      value ^= 1U;
+      card_.misread_next.reset();
+    }
     card_.traffic.push_back({false, offset, value});
+    if (card_.after_access) card_.after_access();
     return {};
   }
   driver::IoResult write32(std::uint32_t offset, std::uint32_t value) noexcept override {
     if (card_.unplugged) return {driver::IoError::disconnected, offset, ENODEV};
     card_.traffic.push_back({true, offset, value});
     if (card_.faulty.write32(offset, value).failed) return {driver::IoError::disconnected, offset, EIO};
+    if (card_.after_access) card_.after_access();
     return {};
   }
 

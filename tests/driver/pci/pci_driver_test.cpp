@@ -53,25 +53,28 @@ TEST_CASE("Activation takes the outputs over: width 0 first, mode and prescaler 
                                              W(0x64, 1),  R(0x64, 1),  W(0x68, 60), R(0x68, 60), W(0x84, 3),
                                              W(0x84, 0),  W(0x80, 1),  R(0x88, 0),  W(0x80, 0),  R(0x88, 0)};
   const std::vector<RegisterAccess> traffic = card.take_traffic();
-  REQUIRE(traffic.size() == expected.size() + pci::health_registers.size());
+  REQUIRE(traffic.size() == expected.size() + pci::health_registers.size() + 2 * pci::settings.size());
   CHECK(std::equal(expected.begin(), expected.end(), traffic.begin()));
   CHECK(card.model.outputs().brake_duty == 0.0);
 }
 
-TEST_CASE("A cycle has exactly eleven accesses, with the health registers in turn") {
+TEST_CASE("A cycle has exactly twelve accesses, with the health registers and the settings in turn") {
   ModelCard card;
   PciDriver driver({}, card.opener());
   driver.configure();
   driver.activate(0);
   card.take_traffic();
   rig::Measurement measurement;
-  for (std::size_t cycle = 0; cycle < 8; ++cycle) {
+  for (std::size_t cycle = 0; cycle < 40; ++cycle) {
     REQUIRE(driver.read(static_cast<std::int64_t>(cycle) * ms, measurement).ok());
     REQUIRE(driver.write({.brake_duty = 0.5, .brake_torque_Nm = 1.4}).ok());
     const std::vector<RegisterAccess> traffic = card.take_traffic();
     CHECK(traffic.size() == pci::accesses_per_cycle);
-    CHECK(offsets(traffic) == std::vector<std::uint32_t>{0x80, 0x88, 0x80, 0x88, pci::health_registers[cycle % 4], 0x60,
-                                                         0x6C, 0x6C, 0x60, 0x6C, 0x6C});
+    std::vector<std::uint32_t> expected{0x80, 0x88, 0x80, 0x88, pci::health_registers[cycle % 4], 0x60, 0x6C,
+                                        0x6C, 0x60, 0x6C, 0x6C};
+    const pci::Setting& setting = pci::settings[cycle % pci::settings.size()];
+    expected.insert(setting.pwm == pci::Pwm::brake ? expected.end() : expected.begin() + 8, setting.offset);
+    CHECK(offsets(traffic) == expected);
   }
 }
 

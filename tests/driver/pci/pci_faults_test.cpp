@@ -1,5 +1,6 @@
 // Faults of the card or a part of it: the driver's error, and the outputs afterwards.
 
+#include <algorithm>
 #include <string>
 
 #include "catch.hpp"
@@ -155,4 +156,78 @@ TEST_CASE("Supply and temperature reach the measurement within four cycles") {
   CHECK_THAT(run.measurement.temperature_C, Catch::Matchers::WithinAbs(95.0, 0.1));
   CHECK((run.measurement.trip_flags & rig::trip::supply) != 0);
   CHECK((run.measurement.trip_flags & rig::trip::temperature_or_overspeed) != 0);
+}
+
+TEST_CASE("A mode that something else changes is found within five cycles, any other setting within twenty") {
+  // Offset, PWM, new value, most cycles. In 8-bit mode the drive's width would be duty 1.
+  struct Change {
+    std::uint32_t offset, pwm, value;
+    int cycles;
+  };
+  const auto change =
+      GENERATE(Change{0x64, 0, 0, 5}, Change{0x64, 1, 0, 5}, Change{0x68, 0, 0, 20}, Change{0x68, 1, 0, 20},
+               Change{0x50, 0, 1, 20}, Change{0x5C, 0, 0xFFFF, 20}, Change{0xA4, 0, 0, 20}, Change{0xA8, 0, 255, 20});
+  CAPTURE(change.offset, change.pwm);
+  Running run;
+  for (int cycle = 1; cycle <= 7; ++cycle) REQUIRE(run.driver.write(drive).ok());
+  run.card.model.write32(0x60, change.pwm);
+  run.card.model.write32(change.offset, change.value);
+  IoResult result{};
+  int cycles = 0;
+  for (; result.ok() && cycles < 40; ++cycles) result = run.driver.write(drive);
+  CHECK(cycles <= change.cycles);
+  CHECK(result.error == IoError::foreign_writer);
+  CHECK(result.where == change.offset);
+  CHECK(result.reason == rig::Reason::board_reconfigured);
+  CHECK(run.card.model.outputs().drive_duty == 0.0);
+}
+
+TEST_CASE("Logic that is loaded again in mid-run is found within twenty cycles") {
+  Running run;
+  REQUIRE(run.driver.write(rig::safe_command).ok());
+  REQUIRE(run.driver.write(drive).ok());
+  run.card.faulty.set("0:wrong=1");  // another version
+  SECTION("while outputs are 0, by its version") {
+    REQUIRE(run.driver.write(rig::safe_command).ok());
+    IoResult result{};
+    int cycles = 0;
+    for (; result.ok() && cycles < 40; ++cycles) result = run.driver.write(rig::safe_command);
+    CHECK(cycles <= 20);
+    CHECK(result.reason == rig::Reason::board_reconfigured);
+    CHECK(result.where == 0x00);
+  }
+  SECTION("while an output is on, at once, by its width") {
+    run.card.model.write32(0x60, 0);
+    run.card.model.write32(0x6C, 0);
+    CHECK(run.driver.write(drive).reason == rig::Reason::board_reconfigured);
+  }
+}
+
+TEST_CASE("One misread setting is no change, and a trip that clears the widths is no other writer") {
+  Running run({.start_speed_rad_s = 100.0, .trip_clears_width = true});
+  for (std::size_t cycle = 1; cycle <= pci::settings.size(); ++cycle) {  // one was compared in the first write
+    const std::uint32_t offset = pci::settings[cycle % pci::settings.size()].offset;
+    run.card.misread_next = offset;
+    run.card.take_traffic();
+    REQUIRE(run.driver.write(drive).ok());
+    CHECK(std::ranges::count(run.card.traffic, offset, &test::RegisterAccess::offset) == 2);  // wrong, then right
+  }
+  run.card.model.trip_overspeed();
+  for (int cycle = 0; cycle < 40; ++cycle) REQUIRE(run.driver.write(drive).ok());
+}
+
+TEST_CASE("The cause of a wrong width is the other writer even if that one writes at every access") {
+  Running run;
+  run.card.after_access = [&card = run.card, n = 0]() mutable {
+    if (++n % 5 == 0) {
+      card.model.write32(0x60, 0);
+      card.model.write32(0x6C, 4095);
+    }
+  };
+  IoResult result{};
+  for (int cycle = 0; cycle < 5 && result.ok(); ++cycle) result = run.driver.write(drive);
+  CHECK(result.reason == rig::Reason::foreign_writer);
+  run.card.after_access = nullptr;
+  CHECK(run.driver.deactivate().ok());
+  CHECK(run.card.model.outputs().drive_duty == 0.0);
 }

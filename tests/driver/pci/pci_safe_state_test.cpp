@@ -2,6 +2,8 @@
 
 #include "driver/pci/pci_safe_state.hpp"
 
+#include <algorithm>
+
 #include "catch.hpp"
 #include "driver/pci/pci_driver.hpp"
 #include "model_card.hpp"
@@ -152,5 +154,66 @@ TEST_CASE("Bits above the documented 16 of the PWM registers mean nothing, to th
     writer.prepare();
     CHECK(writer.make_safe().ok());
     CHECK(both_zero(card));
+  }
+}
+
+TEST_CASE("A look at a card whose outputs are 0 takes four accesses and writes no width") {
+  ModelCard card;
+  pci::PciSafeState guardian = safe_state_of(card);
+  guardian.prepare();
+  REQUIRE(guardian.make_safe().ok());
+  card.take_traffic();
+  CHECK(guardian.verify_safe().ok());
+  const std::vector<test::RegisterAccess> look{{true, 0x60, 0}, {false, 0x6C, 0}, {true, 0x60, 1}, {false, 0x6C, 0}};
+  CHECK(card.take_traffic() == look);
+}
+
+TEST_CASE("A look finds a duty on either output, makes both zero and says that something else has written") {
+  const std::uint32_t pwm = GENERATE(0U, 1U);
+  ModelCard card;
+  pci::PciSafeState guardian = safe_state_of(card);
+  guardian.prepare();
+  ModelWindow other(card);
+  REQUIRE(other.write32(0x60, pwm).ok());
+  REQUIRE(other.write32(0x6C, 3000).ok());
+  const IoResult found = guardian.verify_safe();
+  CHECK(found.error == IoError::foreign_writer);
+  CHECK(found.reason == rig::Reason::foreign_writer);
+  CHECK(both_zero(card));
+  CHECK(guardian.verify_safe().ok());
+}
+
+TEST_CASE("A look that cannot tell writes zeros, and its result is theirs") {
+  ModelCard card;
+  pci::PciSafeState guardian = safe_state_of(card);
+  CHECK(guardian.verify_safe().ok());  // opens the card
+  card.faulty.answer_all_ones(true);
+  CHECK(guardian.verify_safe().error == IoError::disconnected);
+  card.faulty.answer_all_ones(false);
+  card.unplugged = true;
+  CHECK(guardian.verify_safe().error == IoError::disconnected);
+  card.unplugged = false;
+  card.take_traffic();
+  CHECK(guardian.verify_safe().ok());
+  CHECK(std::ranges::count(card.traffic, 0x6CU, &test::RegisterAccess::offset) == 4);  // zeros, read back
+}
+
+TEST_CASE("it says what it found on, once, and looks only if it is told to") {
+  for (const std::uint32_t full_width : {0U, 4095U}) {
+    ModelCard card;
+    ModelWindow other(card);
+    for (const auto& [offset, value] : {std::pair{0x60U, 0U}, {0x6CU, 4095U}, {0x60U, 1U}, {0x6CU, 1365U}}) {
+      REQUIRE(other.write32(offset, value).ok());
+    }
+    pci::PciSafeState writer([&card] { return std::make_unique<ModelWindow>(card); }, full_width);
+    writer.prepare();
+    CHECK(writer.make_safe().ok());
+    CHECK(both_zero(card));
+    REQUIRE(writer.found().has_value() == (full_width != 0));
+    if (full_width == 0) continue;
+    CHECK(writer.found()->motor_duty == 1.0);
+    CHECK(writer.found()->brake_duty == 1.0 / 3.0);
+    CHECK(writer.make_safe().ok());
+    CHECK_FALSE(rig::acts(*writer.found()));
   }
 }

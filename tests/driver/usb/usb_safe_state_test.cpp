@@ -99,3 +99,39 @@ TEST_CASE("A board that is gone is opened again when it is back") {
   CHECK(left.writer.make_safe().ok());
   CHECK(left.safe());
 }
+
+TEST_CASE("A look sends the board no frame while its outputs are zero, and zeros if they are not") {
+  Left left;
+  REQUIRE(left.writer.make_safe().ok());
+  const std::uint64_t taken = left.board.model.frames_taken();
+  CHECK(left.writer.verify_safe().ok());
+  CHECK(left.board.model.frames_taken() == taken);
+  usb::Frame frame = usb::frame_from(std::span(left.held).first<usb::frame_bytes>());
+  static_cast<void>(left.board.model.take(frame));
+  REQUIRE_FALSE(left.safe());
+  const IoResult found = left.writer.verify_safe();
+  CHECK(found.error == IoError::foreign_writer);
+  CHECK(found.reason == rig::Reason::foreign_writer);
+  CHECK(left.safe());
+  CHECK(left.writer.verify_safe().ok());
+}
+
+TEST_CASE("A look at a board that is silent, that does not show its outputs or was never opened sends zeros") {
+  SECTION("silent") {
+    Left left;
+    REQUIRE(left.writer.make_safe().ok());
+    left.board.faults.silent = true;
+    CHECK(left.writer.verify_safe().error == IoError::no_answer);
+    CHECK(left.safe());
+  }
+  SECTION("does not show them") {
+    Left left({.verify_outputs = false});
+    CHECK(left.writer.verify_safe().ok());
+    CHECK(left.safe());
+  }
+  SECTION("never opened") {
+    Left left;
+    CHECK(left.writer.verify_safe().ok());
+    CHECK(left.safe());
+  }
+}

@@ -210,7 +210,7 @@ double allowed_s(const driver::Injection& fault, const Expectation& expectation,
   const double further_speed_windows_s = speed_window_s - 2e-3;
   constexpr double lost_at_random_s = 1.5;  // the motor has reached 65 rad/s, at which nearly every window shows it
   switch (reason) {
-    case Reason::consecutive_overruns: return std::max(expectation.bound_s, 50.0 * 2.0 * period_s);
+    case Reason::consecutive_overruns: return std::max(expectation.bound_s, 0.15 + 4.0 * period_s);
     case Reason::samples_missing: return std::max(expectation.bound_s, 6.0 * period_s);
     case Reason::speed_rises_with_motor_off:
     case Reason::motor_no_response:

@@ -5,6 +5,7 @@
 
 #include "driver/injection/injecting_driver.hpp"
 #include "experiment/simulated_run.hpp"
+#include "guardian/heartbeat.hpp"
 #include "kept_files.hpp"
 #include "matrix_rig.hpp"
 #include "telemetry/csv_sink.hpp"
@@ -38,13 +39,14 @@ MatrixCase run_with(Backend backend, std::vector<driver::Injection> injections, 
   });
   std::vector<runtime::FlightSlot> slots(recorder_slots);
   runtime::FlightRing flight(slots);
-  runtime::HeartbeatPanel panel;
-  runtime::Heartbeat heartbeat(panel, flight);
+  guardian::RunPage page;
+  const guardian::GuardPage guard_page;
+  guardian::Heartbeat heartbeat(page, guard_page, flight);
   Recorder recorder;
   analysis::RunMetrics metrics(setup.plant.rig.wheels.r2_m, setup.experiment.end_speed_m_s);
   telemetry::CsvSink csv(folder / "run.csv");
   RunSession session(clock, driver, logic_parts(setup), setup.gate, {&recorder, &metrics, &csv});
-  session.set_heartbeat(heartbeat);
+  session.set_watch(heartbeat);
   const RunOutcome outcome = session.run_fast([] { return rig::Reason::none; });
 
   MatrixCase result{.reason = outcome.reason, .metrics = metrics.metrics()};

@@ -101,6 +101,24 @@ TEST_CASE("the readings tell a stuck, a reversed and a jumping encoder apart") {
   CHECK(verdict_of(200.0) == Verdict::jumped);
 }
 
+TEST_CASE("three readings in a row above the fastest speed are overspeed, less what they may be wrong by") {
+  // Gains 1e5 rad/s^2: every reading lies within the interval. 300 rad/s in 10 ms may be wrong by 1 + 300 x 0.15/9.85.
+  const double slack_rad_s = 1.0 + 300.0 * 0.15 / 9.85;
+  const auto verdict_at = [](double fastest_rad_s, double omega_rad_s) {
+    SpeedInterval interval(1e5, 1e5, fastest_rad_s);
+    CHECK(interval.update(omega_rad_s, 1.0, 0.01) == Verdict::sound);
+    CHECK(interval.update(omega_rad_s, 1.0, 0.01) == Verdict::sound);
+    return interval.update(omega_rad_s, 1.0, 0.01);
+  };
+  CHECK(verdict_at(300.0 - slack_rad_s - 0.01, 300.0) == Verdict::too_fast);
+  CHECK(verdict_at(300.0 - slack_rad_s + 0.01, 300.0) == Verdict::sound);
+  SpeedInterval interval(1e5, 1e5, 250.0);
+  for (const double omega_rad_s : {300.0, 300.0, 200.0, 300.0, 300.0})
+    CHECK(interval.update(omega_rad_s, 1.0, 0.01) == Verdict::sound);
+  CHECK(interval.update(300.0, 1.0, 0.01) == Verdict::too_fast);
+  CHECK_FALSE(interval.doubtful());
+}
+
 TEST_CASE("each encoder's fault has its own reason") {
   struct Row {
     double omega1, omega2;
@@ -121,6 +139,19 @@ TEST_CASE("each encoder's fault has its own reason") {
   const CheckResult found = check.update(speed_window(row.omega1, row.omega2));
   CHECK(found.reason == row.reason);
   CHECK(found.value == row.value);
+}
+
+TEST_CASE("either wheel's overspeed is found by its counts") {
+  for (const bool upper : {true, false}) {
+    EncoderCheck check(plausibility_limits({}, false, {.overspeed_rad_s = 100.0, .free_slip_max = 1.0}));
+    double omega = 90.0;
+    CheckResult found;
+    // 150 rad/s^2: both wheels can do that. A window of 2 ms leaves 8.1 % and 1.5 rad/s open.
+    for (; omega < 130.0 && found.sound(); omega += 0.3)
+      found = check.update(upper ? speed_window(omega, 90.0) : speed_window(90.0, omega));
+    CHECK(found.reason == Reason::overspeed);
+    CHECK(found.value == Approx((100.0 + 1.534) / (1.0 - 0.15 / 1.85)).margin(1.0));
+  }
 }
 
 TEST_CASE("both encoders are lost only if both stand still") {

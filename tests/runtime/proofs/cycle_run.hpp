@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "experiment/simulated_run.hpp"
+#include "guardian/heartbeat.hpp"
 
 namespace abs_hil::runtime::test {
 
@@ -46,16 +47,16 @@ class CycleRun {
         ring_(1024),  // full after so many cycles: dropping is part of what is proven
         slots_(FlightRing::slots_for(2.0, rate_Hz)),
         recorder_(slots_),
-        heartbeat_(panel_, recorder_, guardian_never_lost),
+        heartbeat_(page_, guard_page_, recorder_, guardian_never_lost),
         executive_(clock, driver_, planted_, gate_, ring_, static_cast<std::int64_t>(1e9 / rate_Hz)) {
-    executive_.set_heartbeat(heartbeat_);
+    executive_.set_watch(heartbeat_);
     driver_.configure();
     driver_.activate(clock.now_ns());
   }
   /// False after the run's last cycle.
   bool cycle() noexcept { return executive_.step(); }
   /// Number of heartbeats. The flight recorder keeps the record of each of these cycles.
-  [[nodiscard]] std::uint64_t beats() const { return panel_.cycle_beats.load(); }
+  [[nodiscard]] std::uint64_t beats() const { return page_.cycle_beats.load(); }
   [[nodiscard]] std::uint64_t cycles() const { return executive_.statistics().cycles(); }
   [[nodiscard]] rig::Reason end_reason() const { return logic_.end_reason(); }
 
@@ -79,8 +80,9 @@ class CycleRun {
   RecordRing ring_;
   std::vector<FlightSlot> slots_;
   FlightRing recorder_;
-  HeartbeatPanel panel_{};
-  Heartbeat heartbeat_;
+  guardian::RunPage page_{};
+  guardian::GuardPage guard_page_{};
+  guardian::Heartbeat heartbeat_;
   CyclicExecutive executive_;
 };
 

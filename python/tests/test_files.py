@@ -1,0 +1,78 @@
+"""Results of the Python programs are whole or absent, and never take the place of what is no regular file."""
+import os
+import pathlib
+import stat
+import subprocess
+import sys
+
+import pytest
+
+import abs_hil
+from abs_hil.files import write_text, write_whole
+
+LONG = 'n' * 300
+
+
+def test_a_failure_leaves_the_older_file(tmp_path):
+    path = tmp_path / 'result'
+    path.write_text('older')
+
+    def fails(name):
+        pathlib.Path(name).write_text('half')
+        raise RuntimeError('in the middle')
+
+    with pytest.raises(RuntimeError):
+        write_whole(path, fails)
+    write_whole(path, lambda name: None, probe=True)
+    assert path.read_text() == 'older' and os.listdir(tmp_path) == ['result']
+    write_text(path, 'new')
+    assert path.read_text() == 'new' and os.listdir(tmp_path) == ['result']
+
+
+def test_links_devices_and_pipes_stay_what_they_are(tmp_path):
+    link, pipe, device = tmp_path / 'link', tmp_path / 'pipe', tmp_path / 'null'
+    link.symlink_to('far')
+    os.mkfifo(pipe)
+    try:
+        os.mknod(device, 0o666 | stat.S_IFCHR, os.makedev(1, 3))
+    except PermissionError:
+        device = pathlib.Path('/dev/null')
+    run = abs_hil.simulate(set={'experiment.start_speed_rad_s': 30})
+    for write in (lambda path: write_text(path, 'words'), run.to_csv):
+        write(link)
+        write(device)
+        assert link.is_symlink() and (tmp_path / 'far').stat().st_size > 0 and device.is_char_device()
+        with pytest.raises(ValueError, match='nobody reads'):
+            write(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    write_text(pipe, 'through')
+    assert os.read(reader, 100) == b'through' and pipe.is_fifo()
+    os.close(reader)
+
+
+@pytest.mark.parametrize('name', [LONG, 'd/' * 3000 + 'x', 'nowhere/x', '', '.'])
+def test_bad_paths_are_named(tmp_path, name):
+    with pytest.raises(ValueError, match='cannot write'):
+        write_text(tmp_path / name, 'words')
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_changed_run_folder_is_refused_by_the_name_of_the_file(tmp_path, abs_hil_program):
+    abs_hil_program('--fast', '--no-lcm', '--set', 'experiment.start_speed_rad_s=60', '--out', tmp_path / 'run')
+    assert len(abs_hil.load(tmp_path / 'run'))
+    with open(tmp_path / 'run' / 'summary.json', 'a') as file:
+        file.write(' ')
+    with pytest.raises(ValueError, match=r'summary\.json" is not as it was recorded'):
+        abs_hil.load(tmp_path / 'run')
+    report = subprocess.run([sys.executable, '-c', 'from abs_hil.programs import report; report()', str(tmp_path / 'run'),
+                             '--output', str(tmp_path / 'report.html')], capture_output=True, text=True)
+    assert report.returncode == 2 and 'summary.json' in report.stderr and not (tmp_path / 'report.html').exists()
+
+
+def test_a_full_disk_behind_stdout_is_status_1(tmp_path, abs_hil_program):
+    abs_hil_program('--fast', '--no-lcm', '--set', 'experiment.start_speed_rad_s=60', '--out', tmp_path / 'run')
+    for words in (('report', '--help'), ('report', '--table', tmp_path / 'run'), ('report', '--csv', tmp_path / 'run')):
+        with open('/dev/full', 'w') as full:
+            result = subprocess.run([sys.executable, '-c', f'from abs_hil.programs import {words[0]}; {words[0]}()',
+                                     *map(str, words[1:])], stdout=full, stderr=subprocess.PIPE, text=True)
+        assert result.returncode == 1 and 'cannot write to standard output' in result.stderr, result

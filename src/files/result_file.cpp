@@ -1,0 +1,197 @@
+#include "files/result_file.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+namespace abs_hil::files {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t buffer_bytes = 65'536;
+constexpr int links_max = 40;  // as the kernel
+
+std::string folder_of(const fs::path& path) { return path.has_parent_path() ? path.parent_path().string() : "."; }
+
+std::string fix_for(const fs::path& path, int error_number) {
+  switch (error_number) {
+    case ENOENT: return "create the directory first: mkdir -p '" + folder_of(path) + "'";
+    case ENOTDIR: return "a part of the path is a file, not a directory: choose another path";
+    case EISDIR: return "this is a directory: add a file name";
+    case EACCES:
+    case EPERM: return "choose a place that you may write to, or get the right to write to '" + folder_of(path) + "'";
+    case EROFS: return "the file system is read-only: choose another place";
+    case ENOSPC:
+    case EDQUOT: return "free some space on that file system, or choose another";
+    case EFBIG: return "the file reached the size limit: raise it (ulimit -f), or log less";
+    case EMFILE:
+    case ENFILE: return "too many open files: raise the limit (ulimit -n)";
+    case ENAMETOOLONG: return "choose a shorter name: 255 bytes at most, 4095 with all its directories";
+    case ELOOP: return "its symbolic links lead in a circle: remove them";
+    default: return "choose another path";
+  }
+}
+
+std::string text_for(std::string_view kind, const fs::path& path, std::string_view why) {
+  return std::string("cannot write ").append(kind).append(" '").append(path.string()).append("': ").append(why);
+}
+
+/// No other process on any computer writes under this name. It is short, however long the result's name is.
+std::string part_name(const fs::path& target) {
+  static std::atomic<unsigned> number{0};
+  constexpr std::size_t shown = 100;
+  std::array<char, 65> host{};
+  static_cast<void>(::gethostname(host.data(), host.size() - 1));
+  return '.' + target.filename().string().substr(0, shown) + '.' + host.data() + '.' + std::to_string(::getpid()) +
+         '.' + std::to_string(number.fetch_add(1)) + ".part";
+}
+
+/// A descriptor of this program's stdout or stderr, if they are this file. Opened again, it would begin at its start.
+int own_output(const struct stat& facts) {
+  for (const int own : {STDOUT_FILENO, STDERR_FILENO}) {
+    struct stat there {};
+    if (::fstat(own, &there) != 0 || there.st_dev != facts.st_dev || there.st_ino != facts.st_ino) continue;
+    return ::fcntl(own, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
+  }
+  return -1;
+}
+
+}  // namespace
+
+FileError::FileError(std::string_view kind, const fs::path& path, int error_number)
+    : FileError(kind, path, std::generic_category().message(error_number) + "; " + fix_for(path, error_number),
+                error_number) {}
+
+FileError::FileError(std::string_view kind, const fs::path& path, std::string_view why, int error_number)
+    : std::runtime_error(text_for(kind, path, why)), error_number_(error_number) {}
+
+ResultFile::ResultFile(fs::path path, std::string kind, const fs::path& part_folder)
+    : path_(std::move(path)), kind_(std::move(kind)) {
+  buffer_.reserve(buffer_bytes);
+  open_target(path_, 0);
+  if (file_ < 0) open_part(part_folder);
+}
+
+ResultFile::~ResultFile() {
+  if (file_ >= 0) ::close(file_);
+  if (!part_.empty()) ::unlink(part_.c_str());
+}
+
+void ResultFile::fail(int error_number) const {
+  const fs::path& place = target_.empty() ? path_ : target_;  // behind a link
+  throw FileError(kind_, path_, std::generic_category().message(error_number) + "; " + fix_for(place, error_number),
+                  error_number);
+}
+
+/// Opens a stream, or finds the place of the file.
+void ResultFile::open_target(const fs::path& path, int links) {
+  if (!path.has_filename()) fail(path.empty() ? ENOENT : EISDIR);
+  struct stat facts {};
+  if (::stat(path.c_str(), &facts) != 0) {
+    if (errno != ENOENT) fail(errno);
+    std::error_code error;
+    const fs::path named = fs::read_symlink(path, error);
+    if (error) {
+      target_ = path;
+      return;
+    }
+    if (links >= links_max) fail(ELOOP);
+    return open_target(path.parent_path() / named, links + 1);
+  }
+  if (S_ISDIR(facts.st_mode)) fail(EISDIR);
+  if (S_ISBLK(facts.st_mode)) throw FileError(kind_, path_, "it is a block device; choose another path", EINVAL);
+  if (S_ISSOCK(facts.st_mode)) throw FileError(kind_, path_, "it is a socket; choose another path", EINVAL);
+  file_ = own_output(facts);
+  if (file_ >= 0) return;
+  if (S_ISREG(facts.st_mode)) {
+    if (::access(path.c_str(), W_OK) != 0) fail(errno);
+    std::error_code error;
+    target_ = fs::canonical(path, error);
+    if (error) fail(error.value());
+    mode_ = facts.st_mode & (S_IRWXU | S_IRWXG | S_IRWXO);
+    return;
+  }
+  // Without waiting for somebody who reads from a pipe.
+  file_ = ::open(path.c_str(), O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+  if (file_ < 0 && errno == ENXIO && S_ISFIFO(facts.st_mode)) {
+    throw FileError(kind_, path_, "nobody reads from this pipe; start its reader first", ENXIO);
+  }
+  if (file_ < 0 || ::fcntl(file_, F_SETFL, 0) != 0) fail(errno);
+}
+
+void ResultFile::open_part(const fs::path& folder) {
+  do {
+    part_ = (folder.empty() ? target_.parent_path() : folder) / part_name(target_);
+    file_ = ::open(part_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  } while (file_ < 0 && (errno == EEXIST || errno == EINTR));
+  if (file_ >= 0) {
+    if (mode_ != 0) static_cast<void>(::fchmod(file_, mode_));
+    return;
+  }
+  part_.clear();
+  fail(errno);
+}
+
+void ResultFile::put(std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(file_, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) fail(written == 0 ? EIO : errno);
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+void ResultFile::append(std::string_view bytes) {
+  if (buffer_.size() + bytes.size() > buffer_bytes) flush();
+  if (bytes.size() > buffer_bytes) return put(bytes);
+  buffer_ += bytes;
+}
+
+void ResultFile::flush() {
+  put(buffer_);
+  buffer_.clear();
+}
+
+void ResultFile::show() {
+  if (part_.empty()) return;
+  // Somebody may have put something else in its place meanwhile.
+  struct stat facts {};
+  if (::lstat(target_.c_str(), &facts) == 0 && !S_ISREG(facts.st_mode)) {
+    throw FileError(kind_, path_, "something that is no regular file has taken its place; choose another path", EEXIST);
+  }
+  if (::rename(part_.c_str(), target_.c_str()) != 0) fail(errno);
+  part_.clear();
+}
+
+void ResultFile::commit() {
+  flush();
+  if (!target_.empty() && ::fsync(file_) != 0) fail(errno);
+  // Some file systems (NFS, quotas) report lost data only here.
+  if (::close(std::exchange(file_, -1)) != 0 && errno != EINTR) fail(errno);
+  if (target_.empty()) return;
+  show();
+  // The new name, too. A file system that cannot do this for folders does it by itself.
+  const int folder = ::open(folder_of(target_).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder < 0) return;
+  static_cast<void>(::fsync(folder));
+  ::close(folder);
+}
+
+void ResultFile::write(std::string_view whole) {
+  append(whole);
+  commit();
+}
+
+void write_result(const fs::path& path, const std::string& kind, std::string_view bytes, const fs::path& part_folder) {
+  ResultFile(path, kind, part_folder).write(bytes);
+}
+
+}  // namespace abs_hil::files

@@ -1,0 +1,114 @@
+#include "guardian/guard_of_run.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "abs_hil/rig/time_units.hpp"
+#include "config/config_json.hpp"
+#include "config/key_table.hpp"
+#include "guardian/board_guard.hpp"
+#include "guardian/flight_files.hpp"
+#include "guardian/guardian_process.hpp"
+#include "guardian/kept_board.hpp"
+#include "guardian/launch_config.hpp"
+#include "guardian/linux_process.hpp"
+#include "guardian/process_set_up.hpp"
+#include "runtime/board_policy.hpp"
+
+namespace abs_hil::guardian {
+
+namespace {
+
+/// A person has said with SIGUSR1 that the rig is switched off: nothing is left to make safe.
+std::atomic<bool> released_by_person{false};
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+void tell_controller(const std::string& text) {
+  [[maybe_unused]] const auto written = ::write(inherited_ready, text.data(), text.size());
+  ::close(inherited_ready);
+}
+
+/// Everything that the guardian needs, ready before the controller continues.
+struct GuardianSetup {
+  LaunchConfig launch{};
+  config::Settings settings{};
+  std::unique_ptr<driver::SafeStateWriter> writer{};
+  std::unique_ptr<runtime::RealtimeScope> realtime{};
+};
+
+GuardianSetup set_up() {
+  GuardianSetup setup{.launch = parse_launch_config(text_behind(inherited_launch_config))};
+  config::KeyTable keys(setup.settings);
+  // Only these tables: others may name things that the guardian does not know, such as a user's own controller.
+  config::load_tables(setup.launch.config_json, {"driver", "guardian", "realtime", "telemetry"}, keys,
+                      "the controller's configuration");
+  constexpr double emulator_insist_s = 10.0;
+  double& insist_s = setup.settings.guardian.insist_s;
+  if (insist_s == 0.0 && !runtime::is_real_board(setup.settings.driver)) insist_s = emulator_insist_s;
+  setup.writer = safe_state_writer_of(setup.settings.driver);
+  setup.writer->prepare();
+  const runtime::RealtimeOptions realtime = realtime_options(setup.settings, realtime_mode_of(setup.launch.realtime));
+  setup.realtime = std::make_unique<runtime::RealtimeScope>(realtime);
+  if (realtime.mode == runtime::RealtimeMode::require && !setup.realtime->report().realtime()) {
+    throw driver::Unavailable("real time is required, but the guardian cannot get it\n" +
+                              setup.realtime->report().shortcomings());
+  }
+  return setup;
+}
+
+int guard() {
+  Pages pages = Pages::as_guard({inherited_run_page, inherited_guard_page});
+  const SharedRecorder recorder = SharedRecorder::attach(inherited_recorder);
+  const pid_t controller_pid = ::getppid();
+  const GuardianSetup setup = set_up();
+  const runtime::RealtimeReport& realtime = setup.realtime->report();
+  runtime::MonotonicClock clock;
+  LinuxProcesses processes;
+  const runtime::GuardianOptions& options = setup.settings.guardian;
+  BoardGuard guard({.clock = clock,
+                    .board = *setup.writer,
+                    .processes = processes,
+                    .timeout_ns = static_cast<std::int64_t>(options.timeout_ms * rig::ns_per_ms),
+                    .keep_ns = static_cast<std::int64_t>(options.keep_ms * rig::ns_per_ms),
+                    .insist_ns = static_cast<std::int64_t>(options.insist_s * rig::ns_per_s),
+                    .released = &released_by_person});
+  guard.cover_only(std::move(pages), inherited_controller);
+  const bool lacks = setup.launch.realtime == "prefer" && !realtime.realtime();
+  tell_controller(ready_text(realtime.scheduling, lacks ? realtime.shortcomings() : std::string()));
+
+  run_guard(guard, -1, [] {});
+  const GuardianReport& report = guard.report();
+  if (report.reason == rig::Reason::none) return exit_verified;
+  // The outputs are dealt with: the rest need not be real-time safe.
+  const std::string account = to_text(report, controller_pid);
+  std::fprintf(stderr, "abs_guardian: %s", account.c_str());
+  write_flight_files(setup.launch, setup.settings.telemetry.channel_prefix, recorder.ring(), report, account);
+  return !report.acted || report.verified ? exit_verified : exit_not_verified;
+}
+
+}  // namespace
+
+bool started_by_a_run() { return ::fcntl(inherited_launch_config, F_GETFD) >= 0; }
+
+int guard_one_run() {
+  // It ends after the controller, whatever a terminal or a service manager sends.
+  ignore_signals({SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGTSTP, SIGTTIN, SIGTTOU, SIGUSR2, SIGXFSZ});
+  std::signal(SIGUSR1, [](int) { released_by_person.store(true, std::memory_order_relaxed); });
+  spare_from_oom();
+  try {
+    return guard();
+  } catch (const std::exception& error) {
+    tell_controller(std::string("error ") + error.what());
+    return exit_not_started;
+  }
+}
+
+}  // namespace abs_hil::guardian

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <thread>
+
+#include "driver/file_descriptor.hpp"
+#include "guardian/talker.hpp"
+
+namespace abs_hil::guardian {
+
+/// Finds pauses of a virtual machine (QEMU's stop and cont, a migration). All other clocks of the machine stand still
+/// meanwhile, so nothing else in it can know. The real-time clock goes on, and this compares it with the others: every
+/// millisecond while there is a lease. It cannot use the clock's interrupts, because a pause can swallow them. Pauses
+/// below about a second stay unseen.
+class MachinePause {
+ public:
+  /// Does nothing on a computer that is not a virtual machine or has no real-time clock. Its thread has the scheduling
+  /// of the thread that constructs it.
+  /// @param found  called in its thread after each pause during a lease
+  explicit MachinePause(std::function<void()> found);
+  MachinePause(const MachinePause&) = delete;
+  MachinePause& operator=(const MachinePause&) = delete;
+  ~MachinePause() = default;
+
+  [[nodiscard]] bool works() const noexcept { return clock_.get() >= 0; }
+  /// Use it only if it works. It refers to this object.
+  [[nodiscard]] Interruption interruption();
+
+ private:
+  void watch(const std::stop_token& stop);
+  /// True if the real-time clock has gone on while the other clocks stood still.
+  [[nodiscard]] bool paused();
+  /// Seconds; < 0 if the clock cannot be read.
+  [[nodiscard]] std::int64_t clock_s() const;
+
+  std::function<void()> found_;
+  driver::FileDescriptor clock_{-1};
+  driver::FileDescriptor happened_{-1};  ///< eventfd
+  std::atomic<bool> leased_{false};
+  bool saw_change_{false};
+  std::int64_t last_clock_s_{-1};
+  std::int64_t last_change_ns_{0};
+  std::jthread thread_{};
+};
+
+}  // namespace abs_hil::guardian

@@ -1,0 +1,389 @@
+#include "guardian/service.hpp"
+
+#include <fcntl.h>
+#include <grp.h>
+#include <pwd.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <new>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "abs_hil/driver/io_result.hpp"
+#include "abs_hil/rig/time_units.hpp"
+#include "cli/command_line.hpp"
+#include "config/config_error.hpp"
+#include "config/config_file.hpp"
+#include "config/config_json.hpp"
+#include "config/key_table.hpp"
+#include "guardian/flight_files.hpp"
+#include "guardian/kept_board.hpp"
+#include "guardian/launch_config.hpp"
+#include "guardian/linux_process.hpp"
+#include "guardian/machine_pause.hpp"
+#include "guardian/process_set_up.hpp"
+#include "guardian/service_manager.hpp"
+#include "guardian/sleep_watch.hpp"
+#include "guardian/standby.hpp"
+#include "guardian/talker.hpp"
+
+namespace abs_hil::guardian {
+
+namespace {
+
+std::atomic<bool> told_to_end{false};
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+struct ServiceOptions {
+  std::optional<std::string> socket{};
+  std::optional<std::string> config_file{};
+  std::vector<std::string> assignments{};
+};
+
+void say(const std::string& text) { std::fprintf(stderr, "abs_guardian: %s\n", text.c_str()); }
+
+config::Settings read_settings(const ServiceOptions& options) {
+  config::Settings settings;
+  settings.backend = "rig";
+  config::KeyTable keys(settings);
+  if (options.config_file) config::load_file(*options.config_file, keys);
+  for (const std::string& assignment : options.assignments) keys.set_text(assignment, "--set");
+  if (options.socket) keys.set_text("guardian.socket=" + *options.socket, "--socket");
+  return settings;
+}
+
+/// Members of the group abs_hil may ask for leases, as they may open the boards.
+void open_for_group(const std::string& path) {
+  const group* const members = ::getgrnam("abs_hil");
+  if (members != nullptr) {
+    [[maybe_unused]] const int changed = ::chown(path.c_str(), static_cast<uid_t>(-1), members->gr_gid);
+  }
+  ::chmod(path.c_str(), S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP);
+}
+
+/// Throws driver::Unavailable.
+driver::FileDescriptor open_listener(const std::string& path) {
+  const auto refuse = [&path](const std::string& why) {
+    throw driver::Unavailable("guardian.socket = " + path + ": " + why);
+  };
+  std::error_code error;
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  if (!folder.empty()) std::filesystem::create_directories(folder, error);
+  const auto found = std::filesystem::symlink_status(path, error);
+  if (std::filesystem::is_socket(found)) {
+    const driver::FileDescriptor other(connect_to(path));
+    if (other.get() >= 0 || errno == EAGAIN) {
+      refuse("process " + std::to_string(other.get() >= 0 ? peer_of(other.get()).pid : 0) +
+             " listens there already; end it first, or choose another socket");
+    }
+    ::unlink(path.c_str());  // of a service that died
+  } else if (std::filesystem::exists(found)) {
+    refuse("is there and is no socket; choose another path");
+  }
+  driver::FileDescriptor listener(listen_at(path));
+  if (listener.get() < 0) refuse(std::strerror(errno));
+  open_for_group(path);
+  return listener;
+}
+
+/// Takes on the rights of the client for good, so that it gets no file through the service that it could not write
+/// itself.
+bool become(const Peer& client) {
+  if (::geteuid() == client.uid) return true;
+  const passwd* const user = ::getpwuid(client.uid);
+  const bool groups = user != nullptr ? ::initgroups(user->pw_name, client.gid) == 0 : ::setgroups(1, &client.gid) == 0;
+  return groups && ::setresgid(client.gid, client.gid, client.gid) == 0 &&
+         ::setresuid(client.uid, client.uid, client.uid) == 0;
+}
+
+/// Runs `work` in a child process with the client's rights and without the service's descriptors: a slow disk does not
+/// hold up the talker.
+template <typename Work>
+void in_child_of_client(const Peer& client, Work work) {
+  std::fflush(stderr);
+  const pid_t child = ::fork();
+  if (child < 0) say(std::string("no flight record: ") + std::strerror(errno));
+  if (child != 0) return;
+  ::close_range(STDERR_FILENO + 1, ~0U, 0);
+  if (become(client)) {
+    work();
+  } else {
+    say(std::string("no flight record: cannot take on the rights of the client: ") + std::strerror(errno));
+  }
+  std::fflush(stderr);
+  ::_exit(0);
+}
+
+LeaseTerms read_terms(const std::string& json, const Peer& client) {
+  const LaunchConfig launch = parse_launch_config(json);
+  config::Settings settings;
+  config::KeyTable keys(settings);
+  config::load_tables(launch.config_json, {"driver", "guardian", "telemetry"}, keys, "the controller's configuration");
+  const std::string prefix = settings.telemetry.channel_prefix;
+  return {.timeout_ns = static_cast<std::int64_t>(settings.guardian.timeout_ms * rig::ns_per_ms),
+          .board = kept_board(settings.driver),
+          .write_record = [launch, client, prefix](const SharedRecorder& recorder, const GuardianReport& report,
+                                                   const std::string& account) {
+            in_child_of_client(client, [&] { write_flight_files(launch, prefix, recorder.ring(), report, account); });
+          }};
+}
+
+/// The first zeros must not wait for a busy computer. The real-time set-up follows, with its report.
+void be_quick() {
+  constexpr sched_param first{.sched_priority = 1};
+  if (::sched_getscheduler(0) == SCHED_OTHER) ::sched_setscheduler(0, SCHED_FIFO, &first);
+}
+
+/// A child process of the guard without the guard's descriptors, the board's among them. `work` never returns.
+template <typename Work>
+pid_t start_companion(std::vector<int> keeps, Work work) {
+  const pid_t guard = ::getpid();
+  const pid_t child = ::fork();
+  if (child != 0) return child;
+  std::signal(SIGTERM, SIG_IGN);  // they end with the guard
+  std::signal(SIGINT, SIG_IGN);
+  std::ranges::sort(keeps);
+  unsigned int from = STDERR_FILENO + 1;
+  for (const int fd : keeps) {
+    if (fd < STDERR_FILENO + 1) continue;
+    if (static_cast<unsigned int>(fd) > from) ::close_range(from, static_cast<unsigned int>(fd) - 1, 0);
+    from = static_cast<unsigned int>(fd) + 1;
+  }
+  ::close_range(from, ~0U, 0);
+  try {
+    work(guard);
+  } catch (const std::exception& error) {
+    say(error.what());
+  }
+  ::_exit(exit_not_started);
+}
+
+/// The guard's process with its two companions. The guard never waits for them.
+class Service {
+ public:
+  explicit Service(const config::Settings& settings) : settings_(settings) {}
+
+  int run() {
+    // The first thing: zeros. Nothing that can fail or wait stands before it but the configuration.
+    const auto board = safe_state_writer_of(settings_.driver);
+    void* const memory =
+        ::mmap(nullptr, sizeof(ServicePage), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
+    if (memory == MAP_FAILED) throw driver::Unavailable(std::string("guardian: no memory: ") + std::strerror(errno));
+    page_ = new (memory) ServicePage;
+    LinuxProcesses processes;
+    const runtime::GuardianOptions& options = settings_.guardian;
+    BoardGuard guard({.clock = clock_,
+                      .board = *board,
+                      .processes = processes,
+                      .timeout_ns = static_cast<std::int64_t>(options.timeout_ms * rig::ns_per_ms),
+                      .keep_ns = static_cast<std::int64_t>(options.keep_ms * rig::ns_per_ms),
+                      .mail = &mail_,
+                      .page = page_});
+    guard.begin();
+    listener_ = open_listener(options.socket);
+    for (const int signal : {SIGTERM, SIGINT}) {
+      std::signal(signal, [](int) { told_to_end.store(true, std::memory_order_relaxed); });
+    }
+    const runtime::RealtimeScope realtime(realtime_options(settings_, runtime::RealtimeMode::prefer));
+    realtime_ = &realtime.report();
+    if (!realtime_->realtime()) say("NOT IN REAL TIME: it may act late\n" + realtime_->shortcomings());
+    start_standby();
+    start_talker();
+    ServiceManager::ready();
+    run_guard(guard, mail_.order_descriptor(), [&] { between_looks(guard); });
+    page_->over.store(true, std::memory_order_relaxed);
+    ::unlink(options.socket.c_str());
+    end_companions();
+    return guard.safe() ? exit_verified : exit_not_verified;
+  }
+
+ private:
+  static constexpr std::int64_t companions_ns = 50'000'000;
+  static constexpr std::int64_t alive_ns = 100'000'000;
+  /// So long a talker may stand still, for example in a write to a pipe that nobody reads.
+  static constexpr std::int64_t talker_silent_ns = 10'000'000'000;
+
+  void between_looks(BoardGuard& guard) {
+    if (told_to_end.exchange(false, std::memory_order_relaxed)) guard.end();
+    const std::int64_t now_ns = clock_.now_ns();
+    if (now_ns >= next_alive_ns_) {
+      ServiceManager::alive();
+      next_alive_ns_ = now_ns + alive_ns;
+    }
+    if (now_ns < next_companions_ns_) return;
+    next_companions_ns_ = now_ns + companions_ns;
+    const std::uint64_t beats = page_->talker_beats.load(std::memory_order_relaxed);
+    if (beats != talker_beats_) talker_beat_ns_ = now_ns;
+    talker_beats_ = beats;
+    if (talker_ > 0 && now_ns - talker_beat_ns_ > talker_silent_ns) ::kill(talker_, SIGKILL);
+    for (pid_t child = 0; (child = ::waitpid(-1, nullptr, WNOHANG)) > 0;) {
+      if (child == standby_) standby_ = 0;
+      if (child != talker_) continue;
+      talker_ = 0;
+      guard.lost_talker();
+    }
+    // What fails for want of memory or processes is tried again: the guard does not depend on it.
+    if (talker_ <= 0) restart_talker();
+    if (standby_ <= 0) start_standby();
+  }
+
+  void restart_talker() noexcept try {
+    mail_ = Mail();
+    start_talker();
+  } catch (const std::exception&) {
+    talker_ = 0;
+  }
+
+  void start_talker() {
+    talker_beat_ns_ = clock_.now_ns();
+    talker_ =
+        start_companion({listener_.get(), mail_.order_end(), mail_.news_descriptor(), ServiceManager::descriptor()},
+                        [this](pid_t guard) { talk(guard); });
+  }
+  void start_standby() {
+    standby_ = start_companion({}, [this](pid_t guard) { stand_by(guard); });
+  }
+
+  [[noreturn]] void talk(pid_t guard) {
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != guard) ::_exit(exit_not_started);
+    std::signal(SIGCHLD, SIG_IGN);
+    // Its thread keeps the guard's scheduling and goes to the guard directly: the talker may have to wait.
+    MachinePause pause([this] {
+      static_cast<void>(mail_.order({.word = OrderWord::take_back, .reason = rig::Reason::machine_paused}));
+    });
+    constexpr sched_param normal{};
+    ::sched_setscheduler(0, SCHED_OTHER, &normal);
+    SleepWatch sleep(say);
+    ServiceManager manager;
+    TalkerParts parts{.clock = clock_,
+                      .mail = mail_,
+                      .page = *page_,
+                      .listener = listener_.get(),
+                      .board = kept_board(settings_.driver),
+                      .identify =
+                          [](int socket, int pidfd) {
+                            const Peer peer = peer_of(socket);
+                            return process_of(pidfd) == peer.pid ? peer : Peer{};
+                          },
+                      .read_terms = read_terms,
+                      .scheduling = realtime_->scheduling,
+                      .shortcomings = realtime_->realtime() ? std::string() : realtime_->shortcomings(),
+                      .tell = say,
+                      .status = [&manager](const std::string& text) { manager.status(text); }};
+    parts.interruptions.push_back(sleep.interruption());
+    if (pause.works()) {
+      say("compares the real-time clock, to find pauses of this virtual machine");
+      parts.interruptions.push_back(pause.interruption());
+    }
+    Talker talker(std::move(parts));
+    static_cast<void>(mail_.order({.word = OrderWord::look}));
+    say("grants leases at " + settings_.guardian.socket);
+    for (;;) {
+      constexpr int step_ms = 100;
+      talker.step(step_ms);
+      if (page_->over.load(std::memory_order_relaxed)) ::_exit(exit_verified);
+    }
+  }
+
+  [[noreturn]] void stand_by(pid_t guard) {
+    const auto board = safe_state_writer_of(settings_.driver, true);
+    try {
+      if (board->works_beside_owner()) board->prepare();
+    } catch (const std::exception&) {
+      // The board is not there: it is opened when it is needed.
+    }
+    const runtime::RealtimeScope realtime(realtime_options(settings_, runtime::RealtimeMode::prefer));
+    LinuxProcesses processes;
+    const driver::FileDescriptor guard_process(open_pidfd(guard));
+    if (::getppid() != guard || guard_process.get() < 0) ::_exit(exit_not_started);
+    Standby standby({.clock = clock_,
+                     .board = *board,
+                     .processes = processes,
+                     .page = *page_,
+                     .guard = guard_process.get(),
+                     .silence_ns = static_cast<std::int64_t>(settings_.guardian.standby_ms * rig::ns_per_ms)});
+    while (!standby.over()) {
+      standby.look();
+      clock_.sleep_until(standby.next_ns());
+    }
+    if (standby.acted()) say("standby: the guard died or stood still; drive 0 and brake 0 written and read back");
+    ::_exit(standby.acted() ? exit_not_verified : exit_verified);
+  }
+
+  /// They end by themselves; one that stands still is ended.
+  void end_companions() {
+    constexpr std::int64_t patience_ns = 500'000'000;
+    const std::int64_t until_ns = clock_.now_ns() + patience_ns;
+    std::vector<pid_t> left{talker_, standby_};
+    while (!left.empty() && clock_.now_ns() < until_ns) {
+      std::erase_if(left, [](pid_t child) { return child <= 0 || ::waitpid(child, nullptr, WNOHANG) != 0; });
+      clock_.sleep_until(clock_.now_ns() + 2'000'000);
+    }
+    for (const pid_t child : left) {
+      if (child > 0) ::kill(child, SIGKILL);
+    }
+  }
+
+  const config::Settings& settings_;
+  runtime::MonotonicClock clock_;
+  Mail mail_;
+  ServicePage* page_{nullptr};
+  driver::FileDescriptor listener_{-1};
+  const runtime::RealtimeReport* realtime_{nullptr};
+  pid_t talker_{0};
+  pid_t standby_{0};
+  std::int64_t next_alive_ns_{0};
+  std::int64_t next_companions_ns_{0};
+  std::int64_t talker_beat_ns_{0};
+  std::uint64_t talker_beats_{0};
+};
+
+}  // namespace
+
+int serve(int argc, const char* const* argv) {
+  be_quick();
+  ServiceOptions options;
+  cli::Parser program("abs_guardian", "The guardian of the rig's outputs");
+  cli::Parser parser = program.add_subcommand(
+      "serve", "The resident guardian: keeps the board's outputs at zero and grants them to one run at a time");
+  parser.add(
+      {.names = "--socket", .to = &options.socket, .help = "where it grants leases (guardian.socket)", .type = "PATH"});
+  parser.add({.names = "--config", .to = &options.config_file, .help = "configuration file", .type = "FILE"});
+  parser.add({.names = "--set",
+              .to = &options.assignments,
+              .help = "any configuration value, for example driver.kind=can",
+              .repeated = true});
+  if (const auto status = program.parse(argc, argv)) return *status;
+  ignore_signals({SIGHUP, SIGPIPE, SIGTSTP, SIGTTIN, SIGTTOU, SIGUSR1, SIGUSR2, SIGXFSZ});
+  spare_from_oom();
+  try {
+    const config::Settings settings = read_settings(options);
+    return Service(settings).run();
+  } catch (const config::ConfigError& error) {
+    say(error.what());
+    return exit_usage;
+  } catch (const std::invalid_argument& error) {
+    say(error.what());
+    return exit_usage;
+  } catch (const std::exception& error) {
+    say(error.what());
+    return exit_not_started;
+  }
+}
+
+}  // namespace abs_hil::guardian

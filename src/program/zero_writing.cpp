@@ -1,0 +1,151 @@
+#include "program/zero_writing.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "driver/monotonic_time.hpp"
+
+namespace abs_hil::program {
+
+namespace {
+
+/// A live owner writes every ms or so. More often than this would only keep the board from it and from its guardian.
+constexpr std::chrono::milliseconds pause{2};
+
+/// Zeros that cannot be read back did go out.
+bool has_reached(const driver::IoResult& result) {
+  return result.ok() || result.error == driver::IoError::read_back_mismatch ||
+         result.error == driver::IoError::no_answer;
+}
+
+std::unique_ptr<driver::SafeStateWriter> make_writer(const driver::DriverOptions& options) {
+  const driver::ChosenBackend chosen = driver::chosen_backend(options);
+  driver::RunFacts facts = options.facts();
+  facts.beside_guardian = true;
+  auto writer = chosen.entry.make_safe_state_writer(chosen.options, facts);
+  writer->prepare();
+  return writer;
+}
+
+/// The same board, whether the options name its address or not.
+bool is_same(const Target& a, const Target& b) {
+  return a.known_as.substr(0, a.known_as.find('\n')) == b.known_as.substr(0, b.known_as.find('\n'));
+}
+
+}  // namespace
+
+struct ZeroWriting::State {
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<Seen> boards;
+  std::vector<std::string> problems;  ///< of searches
+  int searches{0};
+  int threads{0};
+  std::int64_t counts_from_ns{0};
+  bool ending{false};
+
+  void begin(const std::shared_ptr<State>& self, std::function<void()> work) {
+    ++threads;
+    std::thread([self, work = std::move(work)] {
+      work();
+      const std::lock_guard lock(self->mutex);
+      --self->threads;
+      self->changed.notify_all();
+    }).detach();
+  }
+};
+
+ZeroWriting::ZeroWriting() : state_(std::make_shared<State>()) {}
+
+void ZeroWriting::search(Find find) {
+  const std::lock_guard lock(state_->mutex);
+  ++state_->searches;
+  state_->begin(state_, [state = state_, find = std::move(find)] {
+    std::string problem;
+    try {
+      std::vector<Target> found = find();
+      for (Target& target : found) add(state, std::move(target));
+    } catch (const std::exception& error) {
+      problem = error.what();
+    }
+    const std::lock_guard done(state->mutex);
+    if (!problem.empty()) state->problems.push_back(std::move(problem));
+    --state->searches;
+    state->changed.notify_all();
+  });
+}
+
+void ZeroWriting::add(const std::shared_ptr<State>& state, Target target) {
+  const std::lock_guard lock(state->mutex);
+  if (std::ranges::any_of(state->boards, [&](const Seen& seen) { return is_same(seen.target, target); })) return;
+  state->boards.push_back({.target = std::move(target)});
+  state->begin(state, [state, board = state->boards.size() - 1] { write_zeros(state, board); });
+}
+
+void ZeroWriting::write_zeros(const std::shared_ptr<State>& state, std::size_t board) {
+  std::unique_lock lock(state->mutex);
+  const driver::DriverOptions options = state->boards[board].target.options;
+  std::unique_ptr<driver::SafeStateWriter> writer;
+  while (!state->ending) {
+    lock.unlock();
+    const std::int64_t begin_ns = driver::monotonic_ns();
+    driver::IoResult result{driver::IoError::disconnected};
+    std::string problem;
+    try {
+      if (!writer) writer = make_writer(options);
+      result = writer->make_safe();
+      if (!result.ok()) problem = driver::error_text(result);
+    } catch (const std::exception& error) {
+      problem = error.what();
+    }
+    const std::optional<rig::Command> found = writer ? writer->found() : std::nullopt;
+    const bool on = found && rig::acts(*found);
+    lock.lock();
+    Seen& seen = state->boards[board];
+    seen.reached = has_reached(result);
+    if (seen.reached && seen.zero_ns == 0) seen.zero_ns = driver::monotonic_ns();
+    if (seen.tries++ == 0) seen.before = found;
+    if (on) seen.on_ns = driver::monotonic_ns();
+    seen.quiet_tries = result.ok() && !on && begin_ns >= state->counts_from_ns ? seen.quiet_tries + 1 : 0;
+    seen.problem = std::move(problem);
+    state->changed.notify_all();
+    state->changed.wait_for(lock, pause, [&] { return state->ending; });
+  }
+}
+
+void ZeroWriting::wait_for_first_tries(int most_ms) const {
+  std::unique_lock lock(state_->mutex);
+  state_->changed.wait_for(lock, std::chrono::milliseconds(most_ms), [this] {
+    return state_->searches == 0 &&
+           std::ranges::all_of(state_->boards, [](const Seen& seen) { return seen.tries > 0; });
+  });
+}
+
+std::vector<Seen> ZeroWriting::seen() const {
+  const std::lock_guard lock(state_->mutex);
+  return state_->boards;
+}
+
+std::vector<std::string> ZeroWriting::problems() const {
+  const std::lock_guard lock(state_->mutex);
+  return state_->problems;
+}
+
+void ZeroWriting::count_anew() {
+  const std::lock_guard lock(state_->mutex);
+  state_->counts_from_ns = driver::monotonic_ns();
+  for (Seen& seen : state_->boards) seen.quiet_tries = 0;
+}
+
+bool ZeroWriting::end(int most_ms) {
+  std::unique_lock lock(state_->mutex);
+  state_->ending = true;
+  state_->changed.notify_all();
+  return state_->changed.wait_for(lock, std::chrono::milliseconds(most_ms), [this] { return state_->threads == 0; });
+}
+
+}  // namespace abs_hil::program

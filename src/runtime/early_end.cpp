@@ -1,0 +1,163 @@
+#include "runtime/early_end.hpp"
+
+#include <fmt/format.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <csignal>
+#include <cstddef>
+#include <cstdlib>
+#include <string_view>
+
+namespace abs_hil::runtime {
+
+namespace {
+
+/// Second argument of exit_group, which the kernel does not look at: tells our own end from one of foreign code.
+constexpr std::uint32_t own_end = 0x0AB5'0E1D;
+
+std::atomic<bool> watched{false};
+std::atomic<Outputs*> running{nullptr};
+thread_local Outputs* of_this_thread = nullptr;
+
+void say(std::string_view text) noexcept {
+  pollfd room{STDERR_FILENO, POLLOUT, 0};
+  if (::poll(&room, 1, 0) == 1) static_cast<void>(!::write(STDERR_FILENO, text.data(), text.size()));
+}
+
+[[noreturn]] void end_program(int status) noexcept {
+  while (true) ::syscall(SYS_exit_group, status, own_end);
+}
+
+[[noreturn]] void end_early(std::string_view why, bool make_safe) noexcept {
+  static std::atomic_flag ending;
+  // Another thread ends the program already.
+  while (ending.test_and_set()) ::poll(nullptr, 0, 1000);
+  std::string_view outputs;
+  Outputs* others = running.load();
+  if (make_safe && (of_this_thread != nullptr || others != nullptr)) {
+    const bool safe = of_this_thread != nullptr ? of_this_thread->make_safe_now() : others->have_made_safe();
+    outputs = safe ? " The outputs are safe."
+                   : " The safe state may not have reached the board: press the E-stop and switch the rig off.";
+  }
+  std::array<char, 512> text{};
+  const auto end =
+      fmt::format_to_n(text.data(), text.size(), "abs_hil: {}; the program ends with status 1.{}\n", why, outputs);
+  say({text.data(), std::min(end.size, text.size())});
+  end_program(1);
+}
+
+void on_exit() {
+  if (watched.load()) {
+    end_early("fault: code in this program, such as the controller's, called exit() or quick_exit()", true);
+  }
+}
+
+void catch_exit() noexcept {
+  // The latest function is called first. So each run gives it anew: before what was destroyed first in the meantime.
+  static_cast<void>(std::atexit(on_exit));
+  static_cast<void>(std::at_quick_exit(on_exit));
+}
+
+/// exit_group of the cycle's thread.
+void on_system_call(int /*signal*/, siginfo_t* info, void* /*context*/) {
+  if (info->si_syscall == SYS_exit_group && watched.load()) {
+    end_early("fault: code in the cycle, such as the controller's, called _exit()", true);
+  }
+  end_program(1);
+}
+
+void catch_system_call() noexcept {
+  struct sigaction action {};
+  action.sa_sigaction = on_system_call;
+  action.sa_flags = SA_SIGINFO;
+  if (::sigaction(SIGSYS, &action, nullptr) != 0) return;
+  sigset_t trap{};
+  sigemptyset(&trap);
+  sigaddset(&trap, SIGSYS);
+  ::pthread_sigmask(SIG_UNBLOCK, &trap, nullptr);
+  std::array filter{
+      sock_filter BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
+      sock_filter BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_exit_group, 0, 3),
+      sock_filter BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, args) + sizeof(std::uint64_t)),
+      sock_filter BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, own_end, 1, 0),
+      sock_filter BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_TRAP),
+      sock_filter BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW)};
+  const sock_fprog program{.len = static_cast<unsigned short>(filter.size()), .filter = filter.data()};
+  // Of this thread alone. Speculation stays as it is: the filter is no fence.
+  if (::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0) return;
+  static_cast<void>(::syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, SECCOMP_FILTER_FLAG_SPEC_ALLOW, &program));
+}
+
+constexpr auto tick = std::chrono::milliseconds(100);
+constexpr double tick_s = 0.1;
+constexpr double cycle_max_s = 5.0;
+constexpr double whole_grace_s = 20.0;
+constexpr double slowness_max = 100.0;
+
+}  // namespace
+
+EarlyEndWatch::EarlyEndWatch() {
+  catch_exit();
+  watched = true;
+}
+
+EarlyEndWatch::~EarlyEndWatch() { watched = false; }
+
+CycleInThisThread::CycleInThisThread(Outputs& outputs, bool own_thread) noexcept : before_(of_this_thread) {
+  of_this_thread = &outputs;
+  running = &outputs;
+  if (!watched) return;
+  catch_exit();
+  if (own_thread) catch_system_call();
+}
+
+CycleInThisThread::~CycleInThisThread() {
+  running = nullptr;
+  of_this_thread = before_;
+}
+
+SlowCycleWatch::SlowCycleWatch(std::int64_t period_ns)
+    : period_s_(static_cast<double>(period_ns) * 1e-9), thread_([this] { watch(); }) {}
+
+SlowCycleWatch::~SlowCycleWatch() {
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+  }
+  end_.notify_one();
+  thread_.join();
+}
+
+void SlowCycleWatch::watch() {
+  sigset_t all{};
+  sigfillset(&all);
+  ::pthread_sigmask(SIG_BLOCK, &all, nullptr);
+  std::uint64_t seen = 0;
+  double same_s = 0.0;
+  double whole_s = 0.0;
+  std::unique_lock lock(mutex_);
+  while (!end_.wait_for(lock, tick, [this] { return ending_; })) {
+    const std::uint64_t cycles = cycles_.load(std::memory_order_relaxed);
+    const bool inside = inside_.load(std::memory_order_relaxed);
+    same_s = inside && cycles == seen ? same_s + tick_s : 0.0;
+    if (inside) whole_s += tick_s;
+    seen = cycles;
+    if (same_s > cycle_max_s) {
+      end_early("fault: a cycle takes more than 5 s: the controller in this program does not return", false);
+    }
+    if (period_s_ > 0.0 && whole_s > whole_grace_s + slowness_max * period_s_ * static_cast<double>(cycles)) {
+      end_early(
+          "fault: the run takes more than 20 s and 100 times the time that it simulates: its controller is too slow",
+          false);
+    }
+  }
+}
+
+}  // namespace abs_hil::runtime

@@ -1,0 +1,167 @@
+"""Controllers from files that attack, in simulation: each ends in a refusal (status 2) while it is made and in a fault
+(status 1) in a step, with a reason; the program, its files and other processes are unharmed. Controllers in the program's own
+process end it with status 1 at worst. FMUs and files that would fill memory or stack are refused before that.
+usage: as in foreign.py, and then the program of own_hostile.cpp"""
+import os
+import pathlib
+import resource
+import subprocess
+import sys
+import time
+import unittest
+import zipfile
+
+from foreign import hostile  # first: it reads the arguments
+
+from program import PROGRAM, ProgramTest
+
+OWN = sys.argv.pop(1)
+FORBIDDEN = 'asked for the system call'
+# deed: words of the reason
+DEEDS = {'FORK_BOMB': FORBIDDEN, 'DAEMON': FORBIDDEN, 'CLONE_RAW': '(clone)', 'SHELL': '(execve)', 'NETWORK': 'Aborted',
+         'OTHER_SOCKETS': 'Aborted', 'KILLS_PARENT': '(kill)', 'STOPS_PARENT': '(kill)', 'KILLS_ALL': '(kill)',
+         'SIGNALS_BY_OWNER': '(fcntl)', 'LEAVES_PARENT': '(prctl)', 'TRACES': '(ptrace)', 'LIMITS_PARENT': '(prlimit64)',
+         'PRIORITY': '(sched_setscheduler)', 'NAMESPACE': '(unshare)', 'THREADS': 'threads', 'MEMORY': 'Segmentation fault',
+         'SHARED_MEMORY': 'Segmentation fault', 'SEGMENT': 'Aborted', 'BIG_FILE': 'File size limit exceeded',
+         'DELETES': 'Aborted', 'CLOSES': 'closed its connection', 'FORGES': 'an answer of', 'PRINTS': 'did not answer in time',
+         'STOPS_ITSELF': 'did not answer in time', 'EXITS': 'ended its process with status 0',
+         'EXITS_AT_ONCE': 'ended its process with status 0', 'EXITS_QUICKLY': 'ended its process with status 0',
+         'ENDS_THREAD': 'Aborted', 'ABORTS': 'Aborted', 'LOOPS': 'did not answer in time',
+         'SLOW': 'too slow'}
+# Their end while they are made differs, or takes the 20 s of a slow start.
+SLOW_TO_MAKE = {'ENDS_THREAD', 'PRINTS', 'STOPS_ITSELF', 'LOOPS', 'SLOW', 'THREADS'}
+
+
+def with_environment(text):
+    """Processes that inherited it."""
+    found = []
+    for path in pathlib.Path('/proc').glob('[0-9]*/environ'):
+        try:
+            if text in path.read_bytes().split(b'\0'):
+                found.append(path.parent.name)
+        except OSError:
+            pass  # it ended meanwhile
+    return found
+
+
+class Hostile(ProgramTest):
+    def attack(self, library, *options):
+        """Status, standard error; every process that the code started is gone, and nobody holds our pipe."""
+        kept = pathlib.Path('/var/tmp', f'{library.stem}-{os.getpid()}')  # outside the folder for temporary files
+        kept.write_text('dear to somebody')
+        mode = kept.stat().st_mode
+        mark = {'HOSTILE_FILE': str(kept), 'HOSTILE_BIG_FILE': str(self.folder / 'big')}
+        try:
+            program = subprocess.Popen([PROGRAM, '--controller', library, '--fast', '--no-lcm', '--set',
+                                        'experiment.start_speed_rad_s=170', *map(str, options)], text=True,
+                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, **mark})
+            _, errors = program.communicate(timeout=60)  # returns when nobody holds the pipes any more
+            self.assertEqual((kept.read_text(), kept.stat().st_mode), ('dear to somebody', mode))
+            self.assertEqual(with_environment(f'HOSTILE_FILE={kept}'.encode()), [])
+        finally:
+            kept.unlink(missing_ok=True)
+        return program.returncode, errors
+
+    def test_a_deed_in_a_step_is_a_fault(self):
+        for deed, words in DEEDS.items():
+            with self.subTest(deed):
+                out = self.folder / deed
+                status, errors = self.attack(hostile(self.folder, deed, 'AT_STEP=100'), '--out', out)
+                self.assertEqual(status, 1, errors)
+                summary = self.summary(out / 'summary.json')
+                self.assertEqual(summary['result'], 'fault')
+                self.assertIn(words, summary['reason'])
+                self.assertTrue((out / 'SHA256SUMS').exists())
+                self.assertLess(len(errors), 100_000)
+
+    def test_a_deed_while_it_is_made_is_a_refusal(self):
+        for deed, words in DEEDS.items():
+            for place in ('IN_CONSTRUCTOR', 'IN_CREATE'):
+                if deed not in SLOW_TO_MAKE:
+                    with self.subTest(deed, place=place):
+                        status, errors = self.attack(hostile(self.folder, deed, place))
+                        self.assertEqual(status, 2, errors)
+                        self.assertIn(words, errors)
+
+
+    def test_its_process_ends_with_the_program(self):
+        mark = str(self.folder / 'mark')
+        with subprocess.Popen([PROGRAM, '--controller', hostile(self.folder, 'LOOPS', 'AT_STEP=100'), '--fast', '--no-lcm'],
+                              stderr=subprocess.DEVNULL, env={**os.environ, 'HOSTILE_FILE': mark}) as program:
+            while len(with_environment(f'HOSTILE_FILE={mark}'.encode())) < 2:
+                pass
+            program.kill()
+        end = time.monotonic() + 10
+        while with_environment(f'HOSTILE_FILE={mark}'.encode()):
+            self.assertLess(time.monotonic(), end)
+
+
+class OwnProcess(ProgramTest):
+    """Controllers that are part of the program."""
+
+    def test_the_program_ends_by_its_own_decision(self):
+        real_time = ('--no-lcm', '--no-out', '--rt', 'off', '--set', 'experiment.start_speed_rad_s=170')
+        called = 'called exit() or quick_exit()'
+        for name, options, words in (('exits', ('--fast',), called), ('exits', (), called), ('exits-quickly', ('--fast',), called),
+                                     ('exits-at-once', ('--fast',), 'called _exit()'), ('exits-at-once', (), 'called _exit()'),
+                                     ('loops', ('--fast',), 'a cycle takes more than 5 s'),
+                                     ('loops', (), 'a cycle takes more than 5 s'),
+                                     ('slow', ('--fast',), 'too slow')):
+            with self.subTest(name, options=options):
+                result = subprocess.run([OWN, '--controller', name, *real_time, *options], capture_output=True, text=True, timeout=60)
+                self.assertEqual(result.returncode, 1, result.stderr)
+                self.assertIn(words, result.stderr)
+
+    def test_in_a_comparison_too(self):
+        result = subprocess.run([OWN, 'compare', '--controllers', 'exits', '--repeat', '2'], capture_output=True, text=True, timeout=60)
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn('called exit()', result.stderr)
+
+
+class Files(ProgramTest):
+    def refused(self, words, *arguments):
+        """Status 2 and one line, with little memory and before long."""
+        def little_memory():
+            resource.setrlimit(resource.RLIMIT_DATA, (200 << 20, 200 << 20))
+        with subprocess.Popen([PROGRAM, *map(str, arguments)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                              preexec_fn=little_memory) as program:
+            errors = program.stderr.read()
+            _, status, used = os.wait4(program.pid, 0)
+            program.returncode = os.waitstatus_to_exitcode(status)
+        self.assertEqual(program.returncode, 2, errors)
+        self.assertEqual(len(errors.splitlines()), 1, errors)
+        self.assertIn(words, errors)
+        self.assertLess(used.ru_utime + used.ru_stime, 2.0)  # 0.3 s at most on the computer of the first tests; 52 s once
+
+    def test_an_fmu_that_is_small_and_unpacks_to_much(self):
+        head = '<fmiModelDescription fmiVersion="2.0" guid="a"><CoSimulation modelIdentifier="x"/>'
+        for name, inner, files, words in (('tags', '<a/>' * (60 << 20), 0, '251658'), ('elements', '<a/>' * (3 << 20), 0, '200000 elements'),
+                                          ('attributes', '<a ' + 'a="" ' * (3 << 20) + '/>', 0, '1000000 attributes'),
+                                          ('levels', '<a>' * (1 << 20) + '</a>' * (1 << 20), 0, '64 levels'),
+                                          ('comment', '<!-- ' + '<a>' * 99 + ' --><b a="/>' + '<a' * 99 + '"/>', 0, 'its library'),
+                                          ('files', '', 9900, '9902 files')):
+            with self.subTest(name):
+                path = self.folder / f'{name}.fmu'
+                with zipfile.ZipFile(path, 'w', zipfile.ZIP_DEFLATED) as archive:
+                    archive.writestr('modelDescription.xml', f'{head}{inner}<ModelVariables><ScalarVariable name="brake_torque_Nm" '
+                                     'causality="output"><Real/></ScalarVariable><ScalarVariable name="slip" causality="input"><Real/>'
+                                     '</ScalarVariable></ModelVariables></fmiModelDescription>')
+                    archive.writestr('binaries/linux64/x.so', b'x')
+                    for n in range(files):
+                        archive.writestr(f'resources/{n}', b'')
+                self.refused(words, '--fast', '--no-lcm', '--controller', path)
+
+    def test_toml_that_nests_too_deep(self):
+        for name, text, words in (('name', f'[{"a." * 50_000}a]\n', '16 parts'), ('key', f'{"a." * 50_000}a = 1\n', '16 parts'),
+                                  ('array', f'a = {"[" * 200_000}\n', '64 levels'), ('table', f'a = {"{a=" * 200_000}\n', '64 levels')):
+            path = self.folder / f'{name}.toml'
+            path.write_text(text)
+            run = ('--fast', '--no-lcm')
+            for arguments in ((*run, '--config', path), (*run, '--plant', path), (*run, '--experiment', path), ('validate', path),
+                              ('study', path)):
+                with self.subTest(name, arguments=arguments):
+                    self.refused(words, *arguments)
+
+
+if __name__ == '__main__':
+    unittest.main()
