@@ -4,6 +4,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <chrono>
@@ -18,11 +19,11 @@ namespace abs_hil::guardian {
 
 namespace {
 
-/// By how much the real-time clock must be ahead.
-constexpr std::int64_t least_pause_ns = 500'000'000;
 constexpr std::int64_t ns_per_s = 1'000'000'000;
+constexpr std::int64_t least_pause_ns = ns_per_s / 2;
 /// Longer than any pause: somebody has set the clock.
-constexpr std::int64_t longest_pause_s = 43'200;
+constexpr std::int64_t longest_pause_ns = 43'200 * ns_per_s;
+constexpr std::int64_t drift_divisor = 1000;
 
 bool in_a_virtual_machine() {
   std::ifstream file("/proc/cpuinfo");
@@ -33,6 +34,20 @@ bool in_a_virtual_machine() {
 }
 
 }  // namespace
+
+bool ClockLead::leapt(std::int64_t clock_s, std::int64_t monotonic_ns) noexcept {
+  const std::int64_t least_ns = clock_s * ns_per_s - monotonic_ns;
+  const std::int64_t most_ns = least_ns + ns_per_s;
+  const std::int64_t ahead_ns = least_ns - most_ns_;
+  const std::int64_t drift_ns = (monotonic_ns - looked_ns_) / drift_divisor;
+  looked_ns_ = monotonic_ns;
+  if (first_ || ahead_ns > least_pause_ns) {
+    most_ns_ = most_ns;
+    return !std::exchange(first_, false) && ahead_ns < longest_pause_ns;
+  }
+  most_ns_ = std::min(most_ns, most_ns_ + drift_ns);
+  return false;
+}
 
 MachinePause::MachinePause(std::function<void()> found) : found_(std::move(found)) {
   if (!in_a_virtual_machine()) return;
@@ -53,15 +68,7 @@ std::int64_t MachinePause::clock_s() const {
 
 bool MachinePause::paused() {
   const std::int64_t now_s = clock_s();
-  const std::int64_t now_ns = driver::monotonic_ns();
-  if (now_s < 0 || now_s == last_clock_s_) return false;
-  // The first reading may come late in its second: only the time from one change to the next is known.
-  const bool first = last_clock_s_ < 0 || !std::exchange(saw_change_, last_clock_s_ >= 0);
-  const std::int64_t went_on_s = now_s - last_clock_s_;
-  const std::int64_t lead_ns = went_on_s * ns_per_s - (now_ns - last_change_ns_);
-  last_clock_s_ = now_s;
-  last_change_ns_ = now_ns;
-  return !first && lead_ns > least_pause_ns && went_on_s < longest_pause_s;
+  return now_s >= 0 && lead_.leapt(now_s, driver::monotonic_ns());
 }
 
 void MachinePause::watch(const std::stop_token& stop) {

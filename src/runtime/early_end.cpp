@@ -53,16 +53,24 @@ void say(std::string_view text) noexcept {
   end_program(1);
 }
 
+/// So many threads may call exit() at the same moment. Each call takes the latest function from the list, and goes on to
+/// destroy objects that others still use if the latest is not ours.
+constexpr int threads_at_once = 16;
+
+void on_exit();
+
+void catch_exit() noexcept {
+  // The latest function is called first. So each run gives it anew: before what was destroyed first in the meantime.
+  for (int i = 0; i < threads_at_once; ++i) {
+    static_cast<void>(std::atexit(on_exit));
+    static_cast<void>(std::at_quick_exit(on_exit));
+  }
+}
+
 void on_exit() {
   if (watched.load()) {
     end_early("fault: code in this program, such as the controller's, called exit() or quick_exit()", true);
   }
-}
-
-void catch_exit() noexcept {
-  // The latest function is called first. So each run gives it anew: before what was destroyed first in the meantime.
-  static_cast<void>(std::atexit(on_exit));
-  static_cast<void>(std::at_quick_exit(on_exit));
 }
 
 /// exit_group of the cycle's thread.
