@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
 """usage: mutate.py [--list] [--jobs N] [--only FILE] [--report FILE]
 
-Mutation run of the command gate, its plausibility checks and limits, and of the rule for values that weaken them. The script changes one place at a time in their sources (a
-relation, an operator, a constant, a condition, a statement left out), compiles only that file or, for a header, the
-source that uses it, without optimisation, links it with the test `gate` and runs the test. A mutant that the tests do not notice survives. mutate_equivalent.txt
-must list each survivor with the reason why it changes nothing. Status 1 if a survivor is not listed or a listed mutant
-is killed.
+Mutation run of the command gate, its plausibility checks and limits, of the rule for values that weaken them, and of
+the guard of a board. The script changes one place at a time in their sources (a relation, an operator, a constant, a
+condition, a statement left out), compiles only that file or, for a header, the source that uses it, without
+optimisation, links it with the tests of its group and runs them. A mutant that the tests do not notice survives.
+mutate_equivalent.txt must list each survivor with the reason why it changes nothing. Status 1 if a survivor is not
+listed or a listed mutant is killed.
 
-The run takes some minutes. Start it on demand. Results: docs/quality-mutation.md.
+The run takes some minutes and needs the libraries of build/release. Start it on demand. Results:
+docs/quality-mutation.md.
 """
 import argparse
 import concurrent.futures
@@ -18,18 +20,43 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-SOURCES = ['command_gate', 'speed_window', 'encoder_check', 'response_check', 'plausibility_limits', 'weak_values',
-           'safety_class']
-# File -> the sources that are compiled for its mutants. Of the header of the gate and of constructors in headers the
-# tests have their own copies: they cannot be tried like this.
-FILES = {f'{name}.cpp': [name] for name in SOURCES} | {
-    'speed_window.hpp': ['speed_window', 'encoder_check', 'response_check'], 'wheel_watch.hpp': ['encoder_check'],
-    'response_check.hpp': ['response_check']}
-# Folders of files that do not stand in src/runtime.
-FOLDERS = {'safety_class.cpp': 'rig'}
-TESTS = sorted((ROOT / 'tests/runtime/gate').glob('*_test.cpp'))
+LIBRARIES = ROOT / 'build/release/src'
+
+
+class Group:
+    """Sources that are tested by the same tests."""
+
+    def __init__(self, room, sources, tests, headers, unchanged=(), libraries=(), folders=None):
+        self.sources, self.headers = sources, headers
+        self.unchanged = [ROOT / 'src' / name for name in unchanged]
+        self.tests = [path for test in tests for path in sorted((ROOT / 'tests').glob(test))]
+        self.libraries = [LIBRARIES / name / f'libabs_hil_{name}.a' for name in libraries]
+        self.paths = {name: ROOT / 'src' / (folders or {}).get(name, room) / f'{name}.cpp' for name in sources}
+
+
+GATE = Group('runtime',
+             ['command_gate', 'speed_window', 'encoder_check', 'response_check', 'plausibility_limits', 'weak_values',
+              'safety_class'],
+             ['runtime/gate/*_test.cpp'],
+             ('<algorithm>', '<array>', '<atomic>', '<cmath>', '<utility>', '"abs_hil/rig/brake_map.hpp"',
+              '"abs_hil/rig/command.hpp"', '"abs_hil/rig/measurement.hpp"', '"abs_hil/rig/scalar.hpp"',
+              '"rig/encoder_scale.hpp"', '"runtime/plausibility_limits.hpp"'),
+             folders={'safety_class': 'rig'})
+GUARD = Group('guardian', ['board_guard', 'watchdog', 'standby'],
+              ['guardian/board_guard_test.cpp', 'guardian/resident_guard_test.cpp', 'guardian/standby_test.cpp',
+               'guardian/watchdog_test.cpp'],
+              ('<algorithm>', '<array>', '<atomic>', '<optional>', '<utility>', '"abs_hil/driver/safe_state_writer.hpp"',
+               '"guardian/guardian_report.hpp"', '"guardian/mail.hpp"', '"guardian/shared_region.hpp"',
+               '"runtime/clock.hpp"'),
+              unchanged=('guardian/guardian_report.cpp', 'guardian/mail.cpp', 'guardian/shared_region.cpp'), libraries=('files', 'runtime', 'driver', 'rig'))
+# File -> its group and the sources that are compiled for its mutants. Of the header of the gate and of constructors in
+# headers the tests have their own copies: they cannot be tried like this.
+FILES = {f'{name}.cpp': (group, [name]) for group in (GATE, GUARD) for name in group.sources} | {
+    'speed_window.hpp': (GATE, ['speed_window', 'encoder_check', 'response_check']),
+    'wheel_watch.hpp': (GATE, ['encoder_check']), 'response_check.hpp': (GATE, ['response_check'])}
 COMPILE = ['g++', '-std=c++20', '-O0', '-fPIC', '-I', ROOT / 'include', '-I', ROOT / 'src', '-I', ROOT / 'tests']
 
 RELATIONS = {'<=': ['<', '>'], '>=': ['>', '<'], '<': ['<=', '>='], '>': ['>=', '<='], '==': ['!='], '!=': ['==']}
@@ -40,7 +67,8 @@ EQUIVALENT_FILE = ROOT / 'scripts' / 'mutate_equivalent.txt'
 
 
 def path_of(name):
-    return ROOT / 'src' / FOLDERS.get(name, 'runtime') / name
+    group, sources = FILES[name]
+    return group.paths[sources[0]].with_name(name)
 
 
 def code_of(text):
@@ -80,14 +108,14 @@ def mutants_of(name):
         start, end = match.span()
         if start >= begin and 'for (' not in text[text.rfind('\n', 0, start):start]:
             yield at(start, end, '', '++ left out')
-    for match in re.finditer(r'(?<![\w.])(\d+(?:\.\d+)?(?:e-?\d+)?)(?![\w.])', code):
+    for match in re.finditer(r"(?<![\w.'])(\d+(?:'\d+)*(?:\.\d+)?(?:e-?\d+)?)(?![\w.'])", code):
         start, end = match.span()
         line_text = text[text.rfind('\n', 0, start) + 1:text.find('\n', end)]
         if start < begin or 'std::uint64_t' in line_text or 'size_t i' in line_text:
             continue
-        if text[start - 1] == '{' and float(match.group()) == 0:  # a member that is set before it is read, or begins at rest
+        value = match.group().replace("'", '')
+        if text[start - 1] == '{' and float(value) == 0:  # a member that is set before it is read, or begins at rest
             continue
-        value = match.group()
         if float(value) == 0:
             yield at(start, end, '1' if '.' not in value else '1.0', f'{value} -> 1')
         else:
@@ -147,29 +175,36 @@ class Bench:
     """The tests as one program and the tested code as a shared object. A mutant then costs one short compilation, with
     precompiled headers, and one short link."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, group):
         self.folder = folder
+        self.group = group
+        folder.mkdir()
         # None of FILES may be among these: a mutated header has to be read anew.
-        headers = ('<algorithm>', '<array>', '<atomic>', '<cmath>', '<utility>', '"abs_hil/rig/brake_map.hpp"',
-                   '"abs_hil/rig/command.hpp"', '"abs_hil/rig/measurement.hpp"', '"abs_hil/rig/scalar.hpp"',
-                   '"rig/encoder_scale.hpp"', '"runtime/plausibility_limits.hpp"')
-        (folder / 'headers.hpp').write_text(''.join(f'#include {header}\n' for header in headers))
+        (folder / 'headers.hpp').write_text(''.join(f'#include {header}\n' for header in group.headers))
         require(run_quietly(*COMPILE, '-w', '-x', 'c++-header', folder / 'headers.hpp', '-o',
                             folder / 'headers.hpp.gch'))
-        self.objects = {name: folder / f'{name}.o' for name in SOURCES}
+        self.objects = {name: folder / f'{name}.o' for name in group.sources}
         for name, target in self.objects.items():
-            require(self.compile(path_of(f'{name}.cpp'), target))
+            require(self.compile(group.paths[name], target))
+        self.rest = []
+        for source in group.unchanged:
+            self.rest.append(folder / f'{source.stem}.o')
+            require(self.compile(source, self.rest[-1]))
+        self.rest += group.libraries
         self.place = folder / 'base'
         self.place.mkdir()
         require(self.link(self.objects.values(), self.place))
         tests = []
-        for source in TESTS:
+        for source in group.tests:
             tests.append(folder / f'{source.stem}.o')
             require(run_quietly(*COMPILE, '-w', '-c', source, '-o', tests[-1]))
-        self.program = folder / 'test_gate'
-        require(run_quietly('g++', '-o', self.program, *tests, f'-L{self.place}', '-lgate', '-lCatch2WithMain'))
-        if self.run(self.place) != 0:
+        self.program = folder / 'tests'
+        require(run_quietly('g++', '-o', self.program, *tests, f'-L{self.place}', '-lmutant', '-lCatch2WithMain',
+                            *self.rest, *(['-lfmt', '-lsystemd'] if self.rest else [])))
+        start = time.monotonic()
+        if self.run(self.place, 600) != 0:
             sys.exit('the tests fail without any mutation')
+        self.patience_s = 5 + 10 * (time.monotonic() - start)  # a mutant may loop for ever
 
     def compile(self, source, target, *includes):
         return run_quietly(*COMPILE[:4], *(f'-I{folder}' for folder in includes), *COMPILE[4:], '-w', '-include',
@@ -177,11 +212,11 @@ class Bench:
 
     def link(self, objects, place):
         # The library calls its own functions of the headers, not those that the tests have compiled too.
-        return run_quietly('g++', '-shared', '-Wl,-Bsymbolic', '-o', place / 'libgate.so', *objects)
+        return run_quietly('g++', '-shared', '-Wl,-Bsymbolic', '-o', place / 'libmutant.so', *objects, *self.rest)
 
-    def run(self, place):
+    def run(self, place, patience_s):
         try:
-            return run_quietly(self.program, '-a', timeout=60, env={'LD_LIBRARY_PATH': str(place)}).returncode
+            return run_quietly(self.program, '-a', timeout=patience_s, env={'LD_LIBRARY_PATH': str(place)}).returncode
         except subprocess.TimeoutExpired:
             return 1
 
@@ -189,19 +224,20 @@ class Bench:
         place = self.folder / str(number)
         place.mkdir()
         try:
-            (place / 'runtime').mkdir()
-            (place / 'runtime' / name).write_text(mutated)
+            room = path_of(name).parent.name
+            (place / room).mkdir()
+            (place / room / name).write_text(mutated)
             objects = dict(self.objects)
-            for source in FILES[name]:
+            for source in FILES[name][1]:
                 objects[source] = place / f'{source}.o'
-                changed = place / 'runtime' / f'{source}.cpp'
-                path = changed if changed.exists() else path_of(f'{source}.cpp')
-                if self.compile(path, objects[source], place).returncode:
+                path = self.group.paths[source]
+                changed = place / room / path.name
+                if self.compile(changed if changed.exists() else path, objects[source], place).returncode:
                     return 'not compilable'
             # Of functions in headers the linker takes the first: the mutated ones.
             if self.link(sorted(objects.values(), key=lambda path: path.parent != place), place).returncode:
                 return 'not compilable'
-            return 'killed' if self.run(place) else 'survived'
+            return 'killed' if self.run(place, self.patience_s) else 'survived'
         finally:
             shutil.rmtree(place)
 
@@ -236,9 +272,10 @@ def main():
     used = set()
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(temporary)
-        bench = Bench(folder)
+        groups = {FILES[name][0]: None for name in names}
+        benches = {group: Bench(folder / str(i), group) for i, group in enumerate(groups)}
         with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
-            results = [(m, pool.submit(bench.verdict, i, m[0], m[3])) for i, m in enumerate(mutants)]
+            results = [(m, pool.submit(benches[FILES[m[0]][0]].verdict, i, m[0], m[3])) for i, m in enumerate(mutants)]
             for (name, line, what, _), future in results:
                 result = future.result()
                 text = path_of(name).read_text().splitlines()[line - 1].strip()

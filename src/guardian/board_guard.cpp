@@ -202,7 +202,7 @@ bool BoardGuard::former_gone() noexcept {
 }
 
 void BoardGuard::end_holder(Refusal why) noexcept {
-  if (!gone_) parts_.processes.end(handle_);
+  parts_.processes.end(handle_);
   end_lease(why);
 }
 
@@ -222,7 +222,6 @@ void BoardGuard::end_lease(Refusal why) noexcept {
   const bool may_live = why == Refusal::none && !report_.ended_controller && board_.ok();
   if (may_live && former_handle_ >= 0) parts_.processes.close(std::exchange(former_handle_, -1));
   safe_ = board_.ok() && former_gone();
-  gone_ = false;
   tell(NewsWord::over, why);
   lease_ = 0;
   pages_.reset();
@@ -330,7 +329,7 @@ void BoardGuard::act() noexcept {
   const std::int64_t written_ns = parts_.clock.now_ns();
   if (report_.tries == 1) report_.first_written_ns = written_ns;
   if (!board_.ok()) report_.last_error = board_;
-  if (report_.controller_lives && confirmed_ > 0 && board_.error == driver::IoError::foreign_writer) {
+  if (report_.controller_lives && board_.error == driver::IoError::foreign_writer) {
     // It promised to write zeros only.
     parts_.processes.end(handle_);
     report_.controller_lives = false;

@@ -11,10 +11,10 @@
 namespace abs_hil::guardian {
 
 /// Compares a clock of whole seconds, which never stands, with one of nanoseconds, which stands while the machine is
-/// paused. A reading s at the time m only says that the first clock leads the second by s - m to s - m + 1 s. `most_ns_`
-/// is the least of these upper limits so far. A pause is found when a lower limit is half a second above it: a pause of
-/// 1.5 s at the first look after it, one of 0.6 s within a second, and each once. The limit grows by a thousandth of the
-/// time, because the clocks do not run equally fast.
+/// paused. A reading s at the time m only says that the first clock leads the second by s - m to s - m + 1 s.
+/// `most_ns_` is the least of these upper limits so far. A pause is found when a lower limit is half a second above it:
+/// a pause of 1.5 s at the first look after it, one of 0.6 s within a second, and each once. The limit grows by a
+/// thousandth of the time, because the clocks do not run equally fast.
 class ClockLead {
  public:
   /// True if the second clock has stood since the last call.

@@ -53,8 +53,8 @@ void say(std::string_view text) noexcept {
   end_program(1);
 }
 
-/// So many threads may call exit() at the same moment. Each call takes the latest function from the list, and goes on to
-/// destroy objects that others still use if the latest is not ours.
+/// So many threads may call exit() at the same moment. Each call takes the latest function from the list. If that is
+/// not ours, the call goes on and destroys objects that other threads still use.
 constexpr int threads_at_once = 16;
 
 void on_exit();

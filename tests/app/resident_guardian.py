@@ -1,4 +1,5 @@
 """abs_guardian serve beside an emulated card, and the ways in which a run can end or stop without a word."""
+import contextlib
 import os
 import pathlib
 import random
@@ -48,8 +49,13 @@ class Group:
 
     def remove(self):
         self.write('cgroup.kill', '1')
-        wait_until(lambda: not (self.folder / 'cgroup.procs').read_text().strip(), 'the group is not empty')
-        self.folder.rmdir()
+
+        def removed():
+            """False while a process of the group is about to end."""
+            with contextlib.suppress(OSError):
+                self.folder.rmdir()
+            return not self.folder.exists()
+        wait_until(removed, 'the group is not empty')
 
     @staticmethod
     def why_not():

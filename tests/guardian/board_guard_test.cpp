@@ -94,6 +94,7 @@ TEST_CASE("a run that ends in order is believed after two looks at its board, an
   CHECK(post.story == Story{"write", "look"});
   CHECK(post.guard_page().ends.load() == 1);
   CHECK(post.guard_page().ended_safe.load());
+  CHECK(post.clock.now_ns() - then_ns >= 5 * ms);
   CHECK(post.clock.now_ns() - then_ns <= post.guard.look_period_ns() + 5 * ms + 200 * us);
 }
 
@@ -107,6 +108,7 @@ TEST_CASE("a run that says that it is done and drives on is ended") {
   const GuardianReport report = post.run();
   CHECK(report.reason == Reason::safe_state_unverified);
   CHECK(report.ended_controller);
+  CHECK_FALSE(report.controller_lives);
   CHECK(report.verified);
   CHECK(post.board.duty == 0.0);
   CHECK(report.verified_ns - then_ns <= 40 * ms);
@@ -121,6 +123,12 @@ TEST_CASE("a number that is no stage counts as a run that may drive") {
   const GuardianReport report = post.run();
   CHECK(report.reason == Reason::controller_silent);
   CHECK(report.verified_ns - post.last_cycle_ns <= 20 * ms + post.guard.look_period_ns() + ms);
+}
+
+TEST_CASE("the guard of one run keeps its board open beside the run") {
+  Post post;
+  post.guard.cover_only(Pages::as_guard(post.pages.descriptors()), run_process);
+  CHECK(post.board.held);
 }
 
 TEST_CASE("the guardian beats at each of its looks") {
@@ -153,6 +161,41 @@ TEST_CASE("a silent controller is ended, and seen to have ended, before anything
   CHECK(report.controller_gone_ns <= report.first_written_ns);
 }
 
+TEST_CASE("zeros are written in the same look if a process that is ended is gone at once") {
+  Post post;
+  post.last_cycle_ns = then_ns;
+  post.processes.dying_takes_ns = 0;
+  const GuardianReport report = post.run();
+  CHECK(report.verified_ns == report.noticed_ns);
+}
+
+TEST_CASE("a run whose board cannot be looked at is not believed") {
+  Post post;
+  post.stage_at_ns = then_ns;
+  post.at_then = [&post] { post.board.fails_first = 3; };
+  const GuardianReport report = post.run();
+  CHECK(report.reason == Reason::safe_state_unverified);
+  CHECK(report.ended_controller);
+  CHECK(report.verified);
+}
+
+TEST_CASE("a run that rests with a board that others reach is looked at like any other") {
+  Post post;
+  post.stage_at_ns = then_ns;
+  post.stage = Stage::resting;
+  CHECK(post.run().reason == Reason::none);
+  CHECK(post.story == Story{"write", "look"});
+}
+
+TEST_CASE("a run that rests with a board of its own is believed without a look") {
+  Post post;
+  post.board.shared = false;
+  post.stage_at_ns = then_ns;
+  post.stage = Stage::resting;
+  CHECK(post.run().reason == Reason::none);
+  CHECK(post.story.empty());
+}
+
 TEST_CASE("a run that is covered and never begins a cycle is ended in the end") {
   Post post;
   post.last_cycle_ns = 0;
@@ -173,6 +216,7 @@ TEST_CASE("the guardian does not wait for a controller stuck in the kernel, but 
   const auto gone = std::find(post.story.begin(), post.story.end(), "gone");
   REQUIRE(gone != post.story.end());
   CHECK(std::distance(gone, post.story.end()) == 2);
+  CHECK(report.controller_gone_ns > report.first_written_ns);
   CHECK(report.verified_ns >= report.controller_gone_ns);
 }
 
@@ -234,6 +278,7 @@ TEST_CASE("the guardian makes handed-over outputs safe while the controller live
   CHECK(report.verified);
   CHECK(report.controller_lives);
   CHECK(post.story == Story{"write", "look"});
+  CHECK(report.verified_ns - report.first_written_ns >= 5 * ms);
 }
 
 TEST_CASE("a controller that dies after it released its outputs leaves only a record to be written") {
@@ -301,6 +346,17 @@ TEST_CASE("a controller that makes its board safe twice has the full time for ea
   const GuardianReport report = post.run();
   CHECK(report.reason == Reason::none);
   CHECK_FALSE(report.acted);
+}
+
+TEST_CASE("beats of cycles and of the safe state count together") {
+  Post post;
+  post.stage_at_ns = then_ns;
+  const auto cycles = post.clock.happens;
+  post.clock.happens = [&post, cycles](std::int64_t now_ns) {
+    cycles(now_ns);
+    post.page().safe_beats.store(post.page().cycle_beats.load());
+  };
+  CHECK(post.run().reason == Reason::none);
 }
 
 TEST_CASE("a controller that hangs while it makes its board safe is ended after that board's time") {

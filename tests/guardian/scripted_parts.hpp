@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
 #include <functional>
 #include <map>
 #include <string>
@@ -40,19 +41,22 @@ class ScriptedClock final : public runtime::Clock {
 /// Log of all actions in order, as text.
 using Story = std::vector<std::string>;
 
-/// Processes that die when the script says so, or some time after they were ended. A handle is the process' number.
+/// Processes that die when the script says so, or some time after they were ended. A handle is the process' number less
+/// `first`.
 class ScriptedProcesses final : public Processes {
  public:
   ScriptedProcesses(ScriptedClock& clock, Story& story) : clock_(clock), story_(story) {}
 
-  [[nodiscard]] int open(pid_t pid) noexcept override { return lives(pid) ? pid : -1; }
-  void close(int /*handle*/) noexcept override {}
+  [[nodiscard]] int open(pid_t pid) noexcept override { return lives(pid - first) ? pid - first : -1; }
+  void close(int handle) noexcept override { must_be_one(handle); }
   [[nodiscard]] bool gone(int handle) noexcept override {
+    must_be_one(handle);
     const bool is_gone = !lives(handle);
     if (is_gone && !std::exchange(told_[handle], true)) story_.emplace_back("gone");
     return is_gone;
   }
   void end(int handle) noexcept override {
+    must_be_one(handle);
     if (!ended_[handle]) story_.emplace_back("end");
     ended_[handle] = true;
     std::int64_t& at_ns = dies_at_ns.try_emplace(handle, INT64_MAX).first->second;
@@ -65,8 +69,13 @@ class ScriptedProcesses final : public Processes {
 
   std::map<int, std::int64_t> dies_at_ns{};
   std::int64_t dying_takes_ns{200 * us};
+  pid_t first{0};
 
  private:
+  static void must_be_one(int handle) noexcept {
+    if (handle < 0) std::abort();
+  }
+
   ScriptedClock& clock_;
   Story& story_;
   std::map<int, bool> told_{};
@@ -81,12 +90,14 @@ class ScriptedBoard final : public driver::SafeStateWriter {
   void prepare() override {}
   [[nodiscard]] driver::IoResult make_safe() noexcept override {
     story_.emplace_back("write");
+    held = true;
     if (fails_first-- > 0) return {driver::IoError::no_answer, 0x6C};
     duty = 0.0;
     return {};
   }
   [[nodiscard]] driver::IoResult verify_safe() noexcept override {
     story_.emplace_back("look");
+    held = true;
     if (fails_first > 0) return make_safe();
     if (duty == 0.0) return {};
     duty = 0.0;
@@ -94,8 +105,11 @@ class ScriptedBoard final : public driver::SafeStateWriter {
   }
   [[nodiscard]] bool works_beside_owner() const noexcept override { return shared; }
   [[nodiscard]] std::int64_t owner_needs_ns() const noexcept override { return 300 * ms; }
+  void let_go() noexcept override { held = false; }
+  void take_hold() noexcept override { held = true; }
 
   double duty{0.0};
+  bool held{true};
   bool shared{true};
   int fails_first{0};
 

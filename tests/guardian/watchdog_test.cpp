@@ -126,3 +126,49 @@ TEST_CASE("the guardian takes over handed-over outputs without ending the contro
   CHECK(watchdog.reason() == rig::Reason::safe_state_unverified);
   CHECK_FALSE(watchdog.must_end_controller());
 }
+
+TEST_CASE("silence begins with the first look and grows by the time between two looks") {
+  Watchdog watchdog(timeout_ns, period_ns);
+  CHECK(watchdog.look({.now_ns = 0, .cycle_beats = 0}) == Verdict::wait);
+  CHECK(watchdog.silence_ns() == 0);
+  CHECK(watchdog.look({.now_ns = period_ns, .cycle_beats = 0}) == Verdict::wait);
+  CHECK(watchdog.silence_ns() == period_ns);
+}
+
+TEST_CASE("a pause counts as two look periods of silence if the controller is silent after it") {
+  Watchdog watchdog(timeout_ns, period_ns);
+  REQUIRE(watchdog.look({.now_ns = 0, .cycle_beats = 9}) == Verdict::wait);
+  CHECK(watchdog.look({.now_ns = 1'000 * ms, .cycle_beats = 9}) == Verdict::wait);
+  CHECK(watchdog.silence_ns() == 2 * period_ns);
+}
+
+TEST_CASE("a controller that was asked to give the outputs back has the timeout for it, and then is ended") {
+  constexpr std::int64_t board_needs_ns = 300 * ms;
+  const Stage stage = GENERATE(Stage::guarded, Stage::making_safe);
+  const std::int64_t limit_ns = timeout_ns + (stage == Stage::making_safe ? board_needs_ns : 0);
+  Watchdog watchdog(timeout_ns, period_ns, board_needs_ns);
+  HeartbeatReading reading{.now_ns = 0, .cycle_beats = 9};
+  REQUIRE(watchdog.look(reading) == Verdict::wait);
+  reading.stage = stage;
+  reading.taken_back_for = rig::Reason::safe_state_unverified;
+  Verdict verdict = Verdict::wait;
+  while (verdict == Verdict::wait) {
+    REQUIRE(reading.now_ns < limit_ns);
+    reading.now_ns += period_ns;
+    ++reading.cycle_beats;
+    verdict = watchdog.look(reading);
+  }
+  CHECK(verdict == Verdict::make_safe);
+  CHECK(reading.now_ns == limit_ns);
+  CHECK(watchdog.reason() == rig::Reason::safe_state_unverified);
+  CHECK(watchdog.must_end_controller());
+}
+
+TEST_CASE("a controller that gives the outputs back when it is asked to is not ended") {
+  Watchdog watchdog(timeout_ns, period_ns);
+  const HeartbeatReading given_back{
+      .now_ns = 0, .cycle_beats = 9, .stage = Stage::released, .taken_back_for = rig::Reason::safe_state_unverified};
+  CHECK(watchdog.look(given_back) == Verdict::make_safe);
+  CHECK(watchdog.reason() == rig::Reason::safe_state_unverified);
+  CHECK_FALSE(watchdog.must_end_controller());
+}
