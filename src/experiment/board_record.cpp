@@ -3,14 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "abs_hil/rig/option.hpp"
+#include "files/result_file.hpp"
 #include "rig/formatted_text.hpp"
 #include "rig/parse_json.hpp"
 
@@ -186,19 +185,12 @@ fs::path write_record(const BoardRecord& record, const std::vector<fs::path>& fo
     std::error_code error;
     fs::create_directories(folder, error);
     const fs::path file = folder / file_name(record);
-    const fs::path unfinished = file.string() + ".new";
-    {
-      std::ofstream out(unfinished);
-      out << to_json(record).dump(2) << '\n';
-      out.close();
-      if (!out) {
-        problems += (problems.empty() ? "" : "; ") + unfinished.string() + ": " + std::strerror(errno);
-        continue;
-      }
+    try {
+      files::write_result(file, "commissioning record", to_json(record).dump(2) + '\n');
+      return file;
+    } catch (const files::FileError& failure) {
+      problems += (problems.empty() ? "" : "; ") + file.string() + ": " + std::strerror(failure.error_number());
     }
-    fs::rename(unfinished, file, error);
-    if (!error) return file;
-    problems += (problems.empty() ? "" : "; ") + file.string() + ": " + error.message();
   }
   throw driver::Unavailable(
       "the commissioning record cannot be written (" + problems +

@@ -19,7 +19,6 @@ constexpr std::int64_t end_wait_ns = 5'000'000;
 constexpr int quick_tries = 100;
 constexpr std::int64_t quick_pause_ns = 1'000'000;
 constexpr std::int64_t slow_pause_ns = 10'000'000;
-constexpr std::int64_t least_suspension_ns = 1'000'000;
 constexpr std::int64_t last_tries_ns = 1'000'000'000;
 constexpr int looks_to_believe = 2;
 /// A holder whose board shows duties again and again drives it without being watched. A single one may be another's.
@@ -118,7 +117,7 @@ void BoardGuard::grant(const Order& order) noexcept {
   taken_back_for_ = Reason::none;
   covered_by_ns_ = now_ns_ + cover_within_ns;
   parts_.board.let_go();
-  if (parts_.page != nullptr) parts_.page->holder.store(pid_, std::memory_order_relaxed);
+  parts_.page->holder.store(pid_, std::memory_order_relaxed);
   tell(NewsWord::granted, Refusal::none, descriptors);
 }
 
@@ -133,7 +132,7 @@ void BoardGuard::cover(std::int64_t timeout_ns) noexcept {
   looks_until_believed_ = looks_to_believe;
   foreign_duties_ = 0;
   now_ns_ = last_look_ns_ = parts_.clock.now_ns();
-  suspended_ns_ = parts_.clock.suspended_ns();
+  suspensions_.begin(parts_.clock);
   next_keep_ns_ = next_ns_ = now_ns_;
   if (parts_.mail != nullptr) parts_.board.let_go();  // the owner of the other kind has its board already
   if (parts_.page != nullptr) parts_.page->run_needs_ns.store(timeout_ns, std::memory_order_relaxed);
@@ -213,7 +212,7 @@ void BoardGuard::end_lease(Refusal why) noexcept {
   former_handle_ = std::exchange(handle_, -1);
   former_pid_ = pid_;
   end_former_at_ns_ = now_ns_ + frees_board_within_ns;
-  if (parts_.page != nullptr) parts_.page->holder.store(0, std::memory_order_relaxed);
+  parts_.page->holder.store(0, std::memory_order_relaxed);
   foreign_duties_ = 0;
   parts_.board.take_hold();
   board_ = {driver::IoError::not_active};  // an owner had it: make it safe, then look
@@ -229,21 +228,15 @@ void BoardGuard::end_lease(Refusal why) noexcept {
 
 Reason BoardGuard::must_give_back_for(Stage stage) noexcept {
   const std::int64_t gap_ns = now_ns_ - std::exchange(last_look_ns_, now_ns_);
-  const std::int64_t told_ns = parts_.clock.suspended_ns();
-  const std::int64_t suspended_ns = told_ns - suspended_ns_;
-  suspended_ns_ = std::max(suspended_ns_, told_ns);
+  const std::int64_t suspended_ns = suspensions_.look(parts_.clock);
   const Reason marked = pages_->guard().taken_back_for.load(std::memory_order_relaxed);
   const bool may_drive =
       stage != Stage::released && stage != Stage::handed_over && stage != Stage::closed && stage != Stage::resting;
   if (!may_drive) return marked;
-  if (taken_back_for_ == Reason::none && suspended_ns > least_suspension_ns) {
-    taken_back_for_ = Reason::computer_suspended;
-  }
+  if (taken_back_for_ == Reason::none && suspended_ns > 0) taken_back_for_ = Reason::computer_suspended;
   // The controller's own limit is one timeout, or three of its periods.
   if (taken_back_for_ == Reason::none && gap_ns > 2 * timeout_ns_) taken_back_for_ = Reason::guardian_paused;
-  if (taken_back_for_ != Reason::none) {
-    pages_->guard().taken_back_for.store(taken_back_for_, std::memory_order_relaxed);
-  }
+  pages_->guard().taken_back_for.store(taken_back_for_, std::memory_order_relaxed);
   return taken_back_for_;
 }
 
@@ -313,7 +306,7 @@ void BoardGuard::begin_to_act(bool writes_zeros_only) noexcept {
 }
 
 void BoardGuard::act() noexcept {
-  if (!gone_) gone_ = parts_.processes.gone(handle_);
+  gone_ = gone_ || parts_.processes.gone(handle_);
   const bool may_be_undone = !gone_ && !report_.controller_lives;
   if (gone_ && !report_.controller_lives && report_.controller_gone_ns == 0) {
     report_.controller_gone_ns = parts_.clock.now_ns();

@@ -141,7 +141,7 @@ class BoardGuard {
   std::optional<Watchdog> watchdog_{};
   std::int64_t timeout_ns_{0};
   std::int64_t last_look_ns_{0};
-  std::int64_t suspended_ns_{0};
+  runtime::SuspensionFinder suspensions_{};
   GuardianReport report_{};
   std::int64_t acts_since_ns_{0};
   std::int64_t next_try_ns_{0};

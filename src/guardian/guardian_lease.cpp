@@ -26,9 +26,11 @@ std::unique_ptr<GuardianLease> GuardianLease::ask(const std::string& path, const
   driver::FileDescriptor socket(connect_to(path));
   if (socket.get() < 0) {
     if (errno == ENOENT || errno == ECONNREFUSED) return nullptr;
-    const std::string why = std::strerror(errno);
-    refuse_run("cannot reach the resident service at " + path + ": " + why +
-               (errno == EACCES ? "; join the group abs_hil and log in again" : "; correct guardian.socket"));
+    const int error = errno;
+    const std::string what = "cannot reach the resident service at " + path + ": ";
+    if (error == EAGAIN) refuse_run(what + "it accepts no connection; end it and start it again");
+    refuse_run(what + std::strerror(error) +
+               (error == EACCES ? "; join the group abs_hil and log in again" : "; correct guardian.socket"));
   }
   const driver::FileDescriptor self(open_pidfd(::getpid()));
   if (self.get() < 0) refuse_run(std::string("cannot open a pidfd of this process: ") + std::strerror(errno));

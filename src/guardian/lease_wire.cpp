@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -137,11 +138,13 @@ int listen_at(const std::string& path) {
   return fd;
 }
 
-int connect_to(const std::string& path) {
+int connect_to(const std::string& path, int within_ms) {
   sockaddr_un address{};
   if (!address_of(path, address)) return -1;
   const int fd = new_socket();
   if (fd < 0) return -1;
+  const timeval longest{.tv_sec = within_ms / 1'000, .tv_usec = within_ms % 1'000 * 1'000};
+  ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &longest, sizeof longest);
   if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) return closed_with_errno(fd);
   return fd;
 }

@@ -55,8 +55,9 @@ struct Peer {
 };
 [[nodiscard]] Peer peer_of(int socket) noexcept;
 
-/// A socket bound to `path`, or connected to it. Returns a descriptor, or -1 and errno.
+/// A socket bound to `path`, or connected to it. Returns a descriptor, or -1 and errno. A service that stands still
+/// accepts nobody: once its queue is full, connect_to() fails with EAGAIN after `within_ms`.
 [[nodiscard]] int listen_at(const std::string& path);
-[[nodiscard]] int connect_to(const std::string& path);
+[[nodiscard]] int connect_to(const std::string& path, int within_ms = 2'000);
 
 }  // namespace abs_hil::guardian

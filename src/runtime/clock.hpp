@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 namespace abs_hil::runtime {
@@ -37,6 +38,28 @@ class VirtualClock final : public Clock {
 
  private:
   std::int64_t now_ns_{0};
+};
+
+/// Finds each suspension of the computer between two looks. Real-time safe.
+class SuspensionFinder {
+ public:
+  /// A reading may be too small by as long as the thread was held up in it. A start from such a reading would take the
+  /// missing time for a suspension at the next look, so the largest of several readings is the start.
+  void begin(Clock& clock) noexcept {
+    most_ns_ = clock.suspended_ns();
+    for (int more = 0; more < 7; ++more) most_ns_ = std::max(most_ns_, clock.suspended_ns());
+  }
+  /// The time suspended since the latest look, ns; 0 if it was at most 1 ms, which is far above the resolution of the
+  /// clocks and far below the shortest suspension.
+  [[nodiscard]] std::int64_t look(Clock& clock) noexcept {
+    const std::int64_t told_ns = clock.suspended_ns();
+    const std::int64_t found_ns = told_ns - most_ns_;
+    most_ns_ = std::max(most_ns_, told_ns);
+    return found_ns > 1'000'000 ? found_ns : 0;
+  }
+
+ private:
+  std::int64_t most_ns_{0};  ///< most that the clock has told
 };
 
 }  // namespace abs_hil::runtime

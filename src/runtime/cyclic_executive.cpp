@@ -15,8 +15,6 @@ std::uint64_t count_of(int value) noexcept { return static_cast<std::uint64_t>(s
 
 constexpr double gap_without_guardian_s = 0.1;
 constexpr std::int64_t least_gap_periods = 3;
-/// Far above the resolution of the clocks, far below the shortest suspension.
-constexpr std::int64_t least_suspension_ns = 1'000'000;
 
 std::int64_t longest_gap_ns(double wanted_s, std::int64_t period_ns) noexcept {
   const double gap_s = wanted_s > 0.0 ? wanted_s : gap_without_guardian_s;
@@ -66,12 +64,11 @@ bool CyclicExecutive::step() noexcept {
 }
 
 void CyclicExecutive::watch_time(std::int64_t woken_ns) noexcept {
-  const std::int64_t told_ns = clock_.suspended_ns();
-  const std::int64_t suspended_ns = sequence_ == 0 ? 0 : told_ns - suspended_ns_;
-  suspended_ns_ = sequence_ == 0 ? told_ns : std::max(suspended_ns_, told_ns);
+  if (sequence_ == 0) suspensions_.begin(clock_);
+  const std::int64_t suspended_ns = suspensions_.look(clock_);
   const std::int64_t gap_ns = woken_ns - std::exchange(woken_ns_, woken_ns);
   if (!acting_) return;
-  if (suspended_ns > least_suspension_ns) {
+  if (suspended_ns > 0) {
     gate_.latch(rig::Reason::computer_suspended, static_cast<double>(suspended_ns) * rig::s_per_ns);
   }
   if (gap_ns > gap_max_ns_) gate_.latch(rig::Reason::cycle_gap, static_cast<double>(gap_ns) * rig::s_per_ns);

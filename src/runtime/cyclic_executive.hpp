@@ -94,7 +94,7 @@ class CyclicExecutive {
   bool acting_{false};        ///< the latest command has an output on
   bool wheels_apart_{false};  ///< as the logic told in the latest cycle
   std::int64_t woken_ns_{0};
-  std::int64_t suspended_ns_{0};    ///< most that the clock has told
+  SuspensionFinder suspensions_{};
   std::int64_t first_tick_ns_{-1};  ///< < 0: at once
   std::int64_t tick_ns_{0};
   std::int64_t start_ns_{0};

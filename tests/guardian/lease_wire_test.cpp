@@ -4,6 +4,8 @@
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
+#include <vector>
 
 #include "catch.hpp"
 #include "guardian/guard.hpp"
@@ -61,6 +63,20 @@ TEST_CASE("without a service there is no lease, and a file in its place is an er
   const test::TemporaryFolder folder;
   CHECK(GuardianLease::ask(folder.path / "none.sock", "board") == nullptr);
   CHECK_THROWS_WITH(GuardianLease::ask(std::string(200, 'x'), "board"), Catch::Matchers::Contains("guardian.socket"));
+}
+
+TEST_CASE("nobody waits for ever for a service that accepts nobody") {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.path / "full.sock";
+  const driver::FileDescriptor listener(listen_at(path));
+  REQUIRE(listener.get() >= 0);
+  std::vector<driver::FileDescriptor> queue;
+  do {
+    queue.emplace_back(connect_to(path, 1));
+  } while (queue.back().get() >= 0 && queue.size() < 1'000);
+  CHECK(errno == EAGAIN);
+  CHECK(queue.size() > 10);
+  CHECK(queue.size() < 1'000);
 }
 
 TEST_CASE("a guardian must have what its controller has") {

@@ -414,6 +414,7 @@ TEST_CASE("a covered run that must give the outputs back gets a mark and the tim
   REQUIRE(service.said(NewsWord::acted) != nullptr);
   CHECK(service.said(NewsWord::acted)->report.reason == Reason::machine_paused);
   CHECK(service.said(NewsWord::acted)->report.controller_lives);
+  CHECK(service.said(NewsWord::acted)->report.controller_gone_ns == 0);
   CHECK(service.said(NewsWord::over) != nullptr);
   CHECK(service.count("end") == 0);
   CHECK(service.guard.holder() == -1);
@@ -513,6 +514,97 @@ TEST_CASE("a covered run that dies is zero at once, and its lease is over") {
   CHECK(service.pages->guard().ends.load() == 1);
   CHECK(service.said(NewsWord::over) != nullptr);
   CHECK(service.guard.safe());
+  CHECK_FALSE(service.guard.over());
+}
+
+TEST_CASE("the report of a run that dies after it released its outputs says when") {
+  Service service;
+  service.guard.begin();
+  service.covered();
+  service.pass(50 * ms);
+  service.beats = false;
+  service.stage(Stage::released);
+  service.pass(20 * ms);
+  service.news.clear();
+  const std::int64_t died_ns = service.clock.now_ns();
+  service.processes.dies_at_ns[run_process] = died_ns;
+  service.pass(20 * ms);
+  REQUIRE(service.said(NewsWord::acted) != nullptr);
+  const GuardianReport& report = service.said(NewsWord::acted)->report;
+  CHECK(report.reason == Reason::controller_died);
+  CHECK(report.controller_gone_ns >= died_ns);
+  CHECK_FALSE(report.acted);
+  CHECK(service.said(NewsWord::ended) != nullptr);
+  CHECK_FALSE(service.guard.over());
+}
+
+TEST_CASE("zeros are written first when a run says that it has closed") {
+  Service service;
+  service.guard.begin();
+  service.covered();
+  service.pass(50 * ms);
+  const std::size_t from = service.story.size();
+  service.beats = false;
+  service.stage(Stage::closed);
+  service.pass(20 * ms);
+  REQUIRE(service.story.size() > from);
+  CHECK(service.story[from] == "write");
+  CHECK_FALSE(service.guard.over());
+}
+
+TEST_CASE("a guard that has just written zeros waits keep_ms with its first look") {
+  Service service;
+  service.guard.begin();
+  service.guard.look();
+  CHECK(service.story == Story{"write"});
+}
+
+TEST_CASE("a guard that is told to end looks at once") {
+  Service service;
+  service.guard.begin();
+  service.pass(5 * ms + 200 * us);
+  service.board.duty = 0.5;
+  service.guard.end();
+  service.guard.look();
+  CHECK(service.board.duty == 0.0);
+}
+
+TEST_CASE("no lease is granted on a board that has just shown a foreign duty") {
+  Service service;
+  service.guard.begin();
+  service.pass(5 * ms + 200 * us);
+  service.board.duty = 0.5;
+  const News refused = service.answer({.word = OrderWord::grant, .pid = run_process});
+  CHECK(refused.word == NewsWord::refused);
+  CHECK(refused.why == Refusal::not_safe);
+  CHECK(service.board.duty == 0.0);
+  service.pass(5 * ms);
+  service.granted();
+}
+
+TEST_CASE("a new lease owes nothing to the former one") {
+  Service service;
+  service.guard.begin();
+  // The former holder had a run covered, drove its board now and then, and lost its talker.
+  service.covered();
+  service.pass(50 * ms);
+  service.guard.lost_talker();
+  service.beats = false;
+  service.stage(Stage::closed);
+  service.pass(20 * ms);
+  REQUIRE(service.guard.holder() == -1);
+  const std::uint32_t lease = service.granted(other_process);
+  service.answer({.word = OrderWord::cover, .lease = lease, .timeout_ns = 20 * ms});
+  service.beats = true;
+  service.pass(50 * ms);
+  service.beats = false;
+  service.stage(Stage::closed);
+  service.pass(20 * ms);
+  CHECK(service.guard.holder() == other_process);  // its talker lives
+  service.order({.word = OrderWord::close, .lease = lease});
+  service.granted();
+  service.pass(10'020 * ms);
+  CHECK(service.guard.holder() == -1);  // it has had no run covered
 }
 
 TEST_CASE("a run goes on without the talker, and its lease ends with it") {
@@ -592,6 +684,7 @@ TEST_CASE("the report of a run does not wait for a board that is gone, the tries
   CHECK(service.clock.now_ns() - died_ns <= 220 * ms);
   const GuardianReport& report = service.said(NewsWord::acted)->report;
   CHECK_FALSE(report.verified);
+  CHECK(report.verified_ns == 0);
   // A try a millisecond at first, then one every 10 ms.
   CHECK(report.tries >= 100);
   CHECK(report.tries <= 115);

@@ -252,3 +252,12 @@ TEST_CASE("a suspended computer is a fault with an output on, whatever the origi
     if (on) CHECK(bench.driver.written.back().brake_duty == 0.0);
   }
 }
+
+TEST_CASE("a thread that is held up while it asks for the time before its first cycle finds no suspension") {
+  Bench bench;
+  bench.logic.wanted = {.brake_duty = 0.5};
+  bench.clock.held_up_ns = {11 * ms, 40 * ms, 11 * ms};  // each of these readings is too small
+  for (int i = 0; i < 5; ++i) bench.cycle();
+  CHECK(bench.clock.held_up_ns.empty());
+  CHECK(bench.logic.ended_by == rig::Reason::none);
+}

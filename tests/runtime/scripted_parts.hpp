@@ -33,11 +33,17 @@ class ScriptedClock final : public Clock {
     time_ns_ = std::max(time_ns_, time_ns) + wakeup_ns;
   }
   void pass(std::int64_t duration_ns) noexcept { time_ns_ += duration_ns; }
-  [[nodiscard]] std::int64_t suspended_ns() noexcept override { return suspension_ns; }
+  [[nodiscard]] std::int64_t suspended_ns() noexcept override {
+    if (held_up_ns.empty()) return suspension_ns;
+    const std::int64_t missing_ns = held_up_ns.back();
+    held_up_ns.pop_back();
+    return suspension_ns - missing_ns;
+  }
 
   std::int64_t wakeup_ns{0};
-  std::int64_t suspension_ns{77 * ms};  ///< its origin is arbitrary
-  std::vector<std::int64_t> asked_ns;   ///< every wake-up time asked for
+  std::int64_t suspension_ns{77 * ms};   ///< its origin is arbitrary
+  std::vector<std::int64_t> held_up_ns;  ///< the next readings of the suspended time are too small by these, last first
+  std::vector<std::int64_t> asked_ns;    ///< every wake-up time asked for
 
  private:
   std::int64_t time_ns_{1'000 * ms};
