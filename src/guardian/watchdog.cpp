@@ -21,7 +21,7 @@ std::int64_t Watchdog::patience_ns(const HeartbeatReading& reading) const noexce
 }
 
 Verdict Watchdog::look(const HeartbeatReading& reading) noexcept {
-  if (reason_ != rig::Reason::none) return Verdict::make_safe;
+  if (reason_ != rig::Reason::none) return died_released_ ? Verdict::dismissed : Verdict::make_safe;
   measure_silence(reading);
   if (reading.stage == Stage::closed || reading.stage == Stage::resting) return Verdict::dismissed;
   if (reading.stage == Stage::handed_over) {
@@ -30,7 +30,8 @@ Verdict Watchdog::look(const HeartbeatReading& reading) noexcept {
   }
   if (reading.controller_gone) {
     reason_ = rig::Reason::controller_died;
-    return reading.stage == Stage::released ? Verdict::dismissed : Verdict::make_safe;
+    died_released_ = reading.stage == Stage::released;
+    return died_released_ ? Verdict::dismissed : Verdict::make_safe;
   }
   if (reading.taken_back_for != rig::Reason::none) {
     // The controller has made the outputs safe. The guardian verifies it with its own handle.

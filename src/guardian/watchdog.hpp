@@ -62,6 +62,7 @@ class Watchdog {
   std::int64_t silence_ns_{0};
   std::int64_t asked_back_ns_{0};  ///< time since the controller was asked to give the outputs back
   bool must_end_controller_{false};
+  bool died_released_{false};
   rig::Reason reason_{rig::Reason::none};
 };
 

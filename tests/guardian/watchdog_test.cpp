@@ -88,6 +88,7 @@ TEST_CASE("released outputs need no heartbeat and stay safe if the controller di
       .now_ns = 5'000 * ms, .cycle_beats = 9, .stage = Stage::released, .controller_gone = true};
   CHECK(watchdog.look(died) == Verdict::dismissed);
   CHECK(watchdog.reason() == rig::Reason::controller_died);
+  CHECK(watchdog.look(died) == Verdict::dismissed);  // the guard asks again until it has read the board back
 }
 
 TEST_CASE("a controller that waits for its board to confirm the safe state has that board's time in addition") {
