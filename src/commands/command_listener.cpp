@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "rig/formatted_text.hpp"
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/lcm_url.hpp"
 #include "telemetry/tcpq_server.hpp"
@@ -198,8 +199,8 @@ void CommandListener::answer(const Arrival& arrival) {
   const auto* old = std::get_if<command_t>(&arrival);
   const auto* command = std::get_if<command2_t>(&arrival);
   const std::string& name = old != nullptr ? old->command : command->command;
-  const std::string from = old != nullptr ? " (token '" + printable(old->token, shown_text_max_bytes) + "')"
-                                          : " (sender '" + printable(command->sender, shown_text_max_bytes) + "')";
+  const std::string from = old != nullptr ? " (token '" + rig::printable(old->token, shown_text_max_bytes) + "')"
+                                          : " (sender '" + rig::printable(command->sender, shown_text_max_bytes) + "')";
   if (name == "stop") {
     ++stops_answered_;
     return say(rig::Reason::stop_command, "stop accepted" + from, stops_answered_, stops_answered_ == 1);
@@ -211,7 +212,7 @@ void CommandListener::answer(const Arrival& arrival) {
     return say(judged->reason, judged->message + from, refused_, judged->authentic);
   }
   ++refused_;
-  const std::string shown = "refused '" + printable(name, shown_text_max_bytes) + "': ";
+  const std::string shown = "refused '" + rig::printable(name, shown_text_max_bytes) + "': ";
   if (command != nullptr) {
     return say(rig::Reason::commands_not_enabled,
                shown + "only 'stop' is accepted, as this run has commands.enabled = false" + from, refused_, false);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "config/config_error.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::commands {
 
@@ -18,7 +19,7 @@ constexpr std::string_view continue_name = "continue";
 
 bool has_value(const std::string& key) { return key != start_name && key != continue_name; }
 
-std::string shown(const std::string& text) { return telemetry::printable(text, shown_max_bytes); }
+std::string shown(const std::string& text) { return rig::printable(text, shown_max_bytes); }
 
 std::string why(rig::Reason reason) {
   switch (reason) {

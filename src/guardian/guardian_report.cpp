@@ -19,7 +19,9 @@ std::string to_text(const GuardianReport& report, int controller) {
     text += formatted(": no cycle for %.1f ms; the guardian ended it with SIGKILL before it wrote the safe state",
                       static_cast<double>(report.silence_ns) * 1e-6);
   }
-  if (report.reason != rig::Reason::controller_silent && report.ended_controller) {
+  if (report.reason == rig::Reason::safe_state_unverified && report.ended_controller) {
+    text += ": the outputs did not read back as zero after it had given them back; the guardian ended it with SIGKILL";
+  } else if (report.reason != rig::Reason::controller_silent && report.ended_controller) {
     text += ": the controller did not give the outputs back in time; the guardian ended it with SIGKILL";
   }
   text += '\n';

@@ -13,6 +13,7 @@
 #include <fstream>
 
 #include "abs_hil/rig/time_units.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::guardian {
 
@@ -59,9 +60,7 @@ std::string name_of_process(pid_t pid) {
   std::ifstream file("/proc/" + std::to_string(pid) + "/comm");
   std::string name;
   std::getline(file, name);
-  // A process chooses its name: it must not write lines of ours.
-  std::erase_if(name, [](unsigned char c) { return c < 0x20 || c >= 0x7F; });
-  return "process " + std::to_string(pid) + (name.empty() ? "" : " (" + name + ")");
+  return "process " + std::to_string(pid) + (name.empty() ? "" : " (" + rig::printable(name, 64) + ")");
 }
 
 pid_t process_of(int pidfd) {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "guardian/linux_process.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::guardian {
 
@@ -17,6 +18,7 @@ namespace {
 
 constexpr std::size_t most_clients = 64;
 constexpr std::int64_t speaks_within_ns = 2'000'000'000;
+constexpr std::size_t longest_shown = 500;  ///< of a client's own words
 constexpr short closed_events = POLLHUP | POLLRDHUP | POLLERR | POLLNVAL;
 
 bool names(const std::string& boards, const std::string& board) {
@@ -174,7 +176,7 @@ void Talker::refuse(Client& client, const std::string& why) {
 std::string Talker::why_no_lease(const LeaseMessage& asked, const Peer& peer) const {
   if (peer.pid <= 0) return "the pidfd is not that of the process that asks";
   if (asked.text != parts_.board) {
-    return "it keeps " + parts_.board + ", and the run wants " + asked.text +
+    return "it keeps " + parts_.board + ", and the run wants " + rig::printable(asked.text, longest_shown) +
            "; name that board's service with guardian.socket, or give both the same driver.* keys";
   }
   for (const Interruption& i : parts_.interruptions) {
@@ -221,8 +223,9 @@ void Talker::cover(Client& client, const LeaseMessage& message) {
     held_->terms = std::move(terms);
     order({.word = OrderWord::cover, .lease = held_->lease, .timeout_ns = held_->terms.timeout_ns});
   } catch (const std::exception& error) {
-    parts_.tell("does not guard " + held_->name + ": " + error.what());
-    static_cast<void>(send_message(client.socket.get(), {.word = LeaseWord::refused, .text = error.what()}));
+    const std::string why = rig::printable(error.what(), longest_shown);  // it may quote what the client sent
+    parts_.tell("does not guard " + held_->name + ": " + why);
+    static_cast<void>(send_message(client.socket.get(), {.word = LeaseWord::refused, .text = why}));
   }
 }
 

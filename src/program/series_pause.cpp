@@ -8,6 +8,7 @@
 #include "commands/authority.hpp"
 #include "commands/command_listener.hpp"
 #include "program/signals.hpp"
+#include "rig/formatted_text.hpp"
 #include "telemetry/lcm_outlet.hpp"
 #include "telemetry/lcm_url.hpp"
 #include "telemetry/message_stream.hpp"
@@ -30,7 +31,7 @@ class StopListener {
     const config::CommandOptions& commands = run.settings.commands;
     if (commands.enabled) commands::sign_answers(stream_, commands::read_key(commands.key_file));
     commands_.set_judge([](const command2_t& command) {
-      const std::string shown = telemetry::printable(command.command, 64);
+      const std::string shown = rig::printable(command.command, 64);
       return telemetry::CommandAnswer{rig::Reason::command_not_now,
                                       "refused '" + shown + "': only stop is accepted between two runs of a series"};
     });

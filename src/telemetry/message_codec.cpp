@@ -151,13 +151,4 @@ DecodedCommand decode_command(std::span<const std::uint8_t> packet) {
   return decoded;
 }
 
-std::string printable(std::string_view text, std::size_t max_bytes) {
-  std::string clean(text.substr(0, max_bytes));
-  for (char& c : clean) {
-    if (c < 0x20 || c > 0x7e) c = '?';
-  }
-  if (text.size() > max_bytes) clean += "...";
-  return clean;
-}
-
 }  // namespace abs_hil::telemetry

@@ -63,7 +63,4 @@ struct DecodedCommand {
 /// decode_checked for command_t.
 [[nodiscard]] DecodedCommand decode_command(std::span<const std::uint8_t> packet);
 
-/// `text` for logs and terminals: at most `max_bytes`, with '?' for control and non-ASCII bytes.
-[[nodiscard]] std::string printable(std::string_view text, std::size_t max_bytes);
-
 }  // namespace abs_hil::telemetry

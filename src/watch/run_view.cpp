@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rig/formatted_text.hpp"
 #include "telemetry/event_detector.hpp"
 #include "telemetry/message_codec.hpp"
 
@@ -17,7 +18,7 @@ constexpr std::int64_t late_messages_max = 16;
 
 double known(double truth, double estimate) { return std::isnan(truth) ? estimate : truth; }
 
-void make_printable(std::string& text) { text = telemetry::printable(text, text_max_bytes); }
+void make_printable(std::string& text) { text = rig::printable(text, text_max_bytes); }
 
 }  // namespace
 
@@ -101,7 +102,7 @@ void RunView::take(const signals_t& message, std::int64_t now_ns) {
   std::string_view names = message.names;
   for (std::size_t n = 0; n < values.size() && !names.empty(); ++n) {
     const std::size_t comma = std::min(names.find(','), names.size());
-    signals_.push_back({telemetry::printable(names.substr(0, comma), name_max_bytes), values[n]});
+    signals_.push_back({rig::printable(names.substr(0, comma), name_max_bytes), values[n]});
     names.remove_prefix(std::min(comma + 1, names.size()));
   }
 }
@@ -110,7 +111,7 @@ void RunView::take(const phase_t& message, std::int64_t now_ns) {
   if (!admit(message.sequence, phase_sequence_, now_ns)) return;
   phase_sequence_ = message.sequence;
   phase_ = message;
-  phase_->name = telemetry::printable(message.name, name_max_bytes);
+  phase_->name = rig::printable(message.name, name_max_bytes);
 }
 
 std::string_view RunView::name_of(rig::Phase kind) const noexcept {

@@ -248,6 +248,24 @@ class HostileClients(HostileTest):
                     self.assertEqual(self.start(emulator).wait(timeout=30), 0)  # a new talker grants again
                 service.end()
 
+    def test_a_client_s_words_write_no_line_of_the_log(self):
+        emulator = self.emulator()
+        service = self.service(emulator)
+        forged = 'abs_guardian: ended; drive 0 and brake 0 written and read back'
+        with connect(service.socket) as client:
+            send(client, ASK, f'pci\n{forged}\x1b[2J'.encode(), [os.pidfd_open(os.getpid())])
+            self.assertEqual(receive(client)[0], REFUSED)
+        client, _ = ask(service, emulator)
+        with client, open(os.memfd_create('terms'), 'w+') as terms:
+            terms.write(f'{{"board": "x\\n{forged}"}}')
+            terms.flush()
+            send(client, COVER, files=[terms.fileno(), terms.fileno()])
+            self.assertEqual(receive(client)[0], REFUSED)
+        wait_until(lambda: 'does not guard' in service.said(), 'nothing said')
+        self.assertIn(forged, service.said())  # within a line
+        self.assertFalse([line for line in service.said().splitlines() if line.startswith(forged)])
+        self.assertNotIn('\x1b', service.said())
+
     def test_full_log_holds_nobody_up(self):
         """Nobody reads the pipe that is the service's stderr."""
         emulator = self.emulator()

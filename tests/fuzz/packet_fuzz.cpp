@@ -8,6 +8,7 @@
 
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/lcm_packet.hpp"
+#include "rig/formatted_text.hpp"
 #include "telemetry/message_codec.hpp"
 
 using namespace abs_hil;
@@ -31,7 +32,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::span<const std::uint8_t> raw(data, size);
   const auto decoded = telemetry::decode_command(raw);
   if (decoded.problem.empty() && decoded.command.command.size() > size) std::abort();
-  static_cast<void>(telemetry::printable(decoded.command.token, 64));
+  static_cast<void>(rig::printable(decoded.command.token, 64));
 
   // As it came, and behind each magic word, which chance does not pass either.
   for (const char magic : {'\0', '2', '3'}) {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "catch.hpp"
+#include "rig/formatted_text.hpp"
 #include "telemetry/message_capture.hpp"
 #include "telemetry/sample_records.hpp"
 
@@ -163,8 +164,8 @@ TEST_CASE("a string with a NUL inside is encoded as far as it goes and decodes a
 }
 
 TEST_CASE("text from the network is made fit to print") {
-  CHECK(printable("stop\n\x1b[2J\xce", 64) == "stop??[2J?");
-  CHECK(printable("abcdef", 3) == "abc...");
+  CHECK(rig::printable("stop\n\x1b[2J\xce", 64) == "stop??[2J?");
+  CHECK(rig::printable("abcdef", 3) == "abc...");
 }
 
 }  // namespace
