@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "rig/formatted_text.hpp"
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/lcm_packet.hpp"
-#include "rig/formatted_text.hpp"
 #include "telemetry/message_codec.hpp"
 
 using namespace abs_hil;
