@@ -14,8 +14,6 @@ namespace {
 /// again.
 constexpr std::int64_t late_reading_ns = 250'000;
 constexpr std::uint32_t encoder_wheels = 2;
-/// The sources give the settings 16 bits and say nothing of those above.
-constexpr std::uint32_t low_16_bits = 0xFFFF;
 
 constexpr const char* refusal_hint =
     ". The kernel is probably locked down (Secure Boot): switch Secure Boot off, or boot without lockdown=";

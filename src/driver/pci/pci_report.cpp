@@ -26,7 +26,6 @@ std::string converted(std::uint32_t offset, std::uint32_t raw, std::uint32_t vel
 
 std::vector<std::string> PciDriver::notes() const {
   if (!card_.window) return {};
-  constexpr std::uint32_t low_16_bits = 0xFFFF;
   const auto prescaler = static_cast<std::uint32_t>(options_.pwm_prescaler);
   std::vector<std::string> notes;
   notes.push_back("card " + card_.place + ": BAR 2, I/O ports, opened and locked");

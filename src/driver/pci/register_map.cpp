@@ -84,7 +84,6 @@ std::string_view register_name(std::uint32_t offset) noexcept {
 
 double velocity_rad_s(std::uint32_t raw, std::uint32_t period_ticks) noexcept {
   if (period_ticks == 0) return std::numeric_limits<double>::quiet_NaN();
-  constexpr std::uint32_t low_16_bits = 0xFFFF;
   return 2.0 * std::numbers::pi * static_cast<double>(raw & low_16_bits) *
          (board_clock_Hz / static_cast<double>(period_ticks)) / encoder_lines_per_rev;
 }

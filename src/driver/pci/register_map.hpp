@@ -17,6 +17,7 @@ inline constexpr std::uint32_t vendor_id = 0x10B5;       ///< PLX
 inline constexpr std::uint32_t device_id = 0x2497;       ///< PCI 9030 as the maker programs it
 inline constexpr std::uint32_t window_bytes = 256;       ///< BAR 2, I/O ports, 32-bit accesses
 inline constexpr std::uint32_t all_ones = ~0U;           ///< value that a bus returns without a card
+inline constexpr std::uint32_t low_16_bits = 0xFFFF;     ///< what a 16-bit register has of an access
 inline constexpr double encoder_lines_per_rev = 1024.0;  ///< the velocity registers count lines, not quadrature edges
 
 /// Offsets in the window, bytes.
@@ -92,7 +93,6 @@ using driver::PwmMode;
 /// The bits of a PWM register that count: the sources give these registers 16 bits and say nothing of those above,
 /// which the card may fill with anything.
 [[nodiscard]] constexpr std::uint32_t pwm_bits(std::uint32_t offset, std::uint32_t value) noexcept {
-  constexpr std::uint32_t low_16_bits = 0xFFFF;
   return offset >= reg::pwm_index && offset <= reg::pwm_width ? value & low_16_bits : value;
 }
 
