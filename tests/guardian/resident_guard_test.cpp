@@ -552,6 +552,40 @@ TEST_CASE("zeros are written first when a run says that it has closed") {
   CHECK_FALSE(service.guard.over());
 }
 
+TEST_CASE("the two looks for which a run is believed are keep_ms apart, however dense its watch") {
+  Service service;
+  service.guard.begin();
+  service.covered();  // watched every 2.5 ms
+  service.pass(50 * ms);
+  service.beats = false;
+  service.stage(Stage::closed);
+  service.guard.look();
+  const std::size_t first = service.story.size();
+  CHECK(service.story.back() == "write");
+  service.pass(4'900 * us);
+  CHECK(service.story.size() == first);
+  CHECK_FALSE(service.pages->guard().ended_safe.load());
+  service.pass(200 * us);
+  CHECK(service.story.size() == first + 1);
+  CHECK(service.pages->guard().ended_safe.load());
+}
+
+TEST_CASE("a run that makes its outputs safe again and again is not silent, with cycles or without") {
+  const bool with_cycles = GENERATE(false, true);
+  Service service;
+  service.guard.begin();
+  service.covered();
+  service.pass(50 * ms);
+  service.beats = with_cycles;
+  service.happens = [&](std::int64_t now_ns) {
+    if (now_ns % ms == 0) service.pages->run().safe_beats.fetch_add(1);
+  };
+  service.news.clear();
+  service.pass(100 * ms);
+  CHECK(service.said(NewsWord::acted) == nullptr);
+  CHECK(service.guard.holder() == run_process);
+}
+
 TEST_CASE("a guard that has just written zeros waits keep_ms with its first look") {
   Service service;
   service.guard.begin();
