@@ -26,6 +26,8 @@ namespace abs_hil::program {
 
 namespace {
 
+constexpr const char* experiment_key = "experiment.name";
+
 /// The mode of --rt; none: real time is required on a real board, otherwise preferred.
 runtime::RealtimeMode realtime_mode(const std::optional<std::string>& name, const config::Settings& s) {
   if (!name) {
@@ -195,37 +197,54 @@ void complete_identity(const config::Settings& s, config::KeyTable& keys) {
 
 /// Everything but what the script asks for beyond its settings.
 void fill(config::Settings& s, config::KeyTable& keys, const RunOptions& options, const Files& files,
-          const config::Script* script) {
+          const config::Script& script) {
   s.backend = options.backend;
   if (s.on_rig()) keys.leave_out_plant();
   for (const std::string& assignment : options.defaults) keys.set_text(assignment, "default");
   set_names(s, options);
   config::set_all(files.plant, keys);
   config::set_all(files.model, keys);
-  if (script != nullptr) config::set_all(settings_of(*script, s.on_rig()), keys);
+  config::set_all(settings_of(script, s.on_rig()), keys);
   config::set_all(files.config, keys);
 
   const auto set = [&keys](const char* key, const std::optional<std::string>& value, const char* option) {
     if (value) keys.set_text(std::string(key) + '=' + *value, option);
   };
   set("control.controller", options.controller, "--controller");
-  set("experiment.name", options.experiment, "--experiment");
+  set(experiment_key, options.experiment, "--experiment");
   set("control.slip_ref", options.slip_ref, "--slip-ref");
   set("control.rate_Hz", options.rate_Hz, "--rate");
   set("run.seed", options.seed, "--seed");
   for (const std::string& assignment : options.assignments) keys.set_text(assignment, "--set");
+  config::set_all(options.changes, keys);
   for (const std::string& injection : options.injections) s.inject += (s.inject.empty() ? "" : ",") + injection;
   if (options.wait_for_start) keys.set_text("experiment.wait_for_start=true", "--wait-for-start");
   if (s.on_rig()) complete_identity(s, keys);
   s.realtime.mode = realtime_mode(options.realtime, s);
 }
 
-/// The experiment that options and files name. The settings of its script rank below theirs.
+/// The experiment that options and files name: its script's settings rank below theirs, so it must be known before they
+/// are set. A name that is no text is refused when it is set.
 std::shared_ptr<const config::Script> script_of(const RunOptions& options, const Files& files) {
-  config::Settings settings;
-  config::KeyTable keys(settings);
-  fill(settings, keys, options, files, nullptr);
-  return config::find(settings.experiment.name);
+  std::string name = experiment::ExperimentOptions().name;
+  const std::string prefix = std::string(experiment_key) + '=';
+  const auto look = [&name](const std::vector<config::FileValue>& values) {
+    for (const config::FileValue& value : values) {
+      if (const auto* text = std::get_if<std::string>(&value.value); text != nullptr && value.name == experiment_key)
+        name = *text;
+    }
+  };
+  const auto look_at_texts = [&](const std::vector<std::string>& assignments) {
+    for (const std::string& assignment : assignments) {
+      if (assignment.starts_with(prefix)) name = assignment.substr(prefix.size());
+    }
+  };
+  look_at_texts(options.defaults);
+  look(files.config);
+  name = options.experiment.value_or(name);
+  look_at_texts(options.assignments);
+  look(options.changes);
+  return config::find(name);
 }
 
 /// All of `request` but the texts of the configuration.
@@ -235,7 +254,7 @@ void merge_into(RunRequest& request, config::KeyTable& keys, const RunOptions& o
   request.outputs = options.outputs;
   config::Settings& s = request.settings;
   const config::Script& script = *request.script;
-  fill(s, keys, options, files, &script);
+  fill(s, keys, options, files, script);
   check_together(request);
   if (s.on_rig()) refuse_events(script, s.driver.emulated);
   config::apply(script, s);

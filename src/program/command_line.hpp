@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "config/config_file.hpp"
 #include "config/script.hpp"
 #include "config/settings.hpp"
 
@@ -44,6 +45,7 @@ struct RunOptions {
   std::optional<std::string> seed{};
   std::vector<std::string> defaults{};  ///< assignments of lowest priority, below files and options
   std::vector<std::string> assignments{};
+  std::vector<config::FileValue> changes{};  ///< values as they are, above all others: of a study, a series, Python
   bool wait_for_start{false};
   std::vector<std::string> injections{};  ///< faults to inject, in addition to those of run.inject
   std::optional<std::string> realtime{};  ///< --rt; none: require on a real board, otherwise prefer
@@ -80,10 +82,10 @@ struct RunRequest {
   std::function<void()> stop_was_sent{};
 };
 
-/// Merges defaults, plant file, model file, the script's settings, configuration file, named options and assignments;
-/// later ones win. Throws config::ConfigError.
 /// Refuses an experiment of a series that is a series itself. Throws config::ConfigError.
 void refuse_nested(const config::Script& series, const config::Script& experiment);
+/// Merges defaults, plant file, model file, the script's settings, configuration file, named options, assignments and
+/// changes; later ones win. Throws config::ConfigError.
 [[nodiscard]] RunRequest merge(const RunOptions& options);
 /// The settings alone, without the texts of the configuration for files, which cost as much again.
 [[nodiscard]] config::Settings merged_settings(const RunOptions& options);

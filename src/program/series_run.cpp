@@ -100,10 +100,8 @@ nlohmann::ordered_json varied_json(const config::SeriesMember& member) {
 
 RunOptions options_of(const RunOptions& common, const config::SeriesMember& member) {
   RunOptions options = common;
-  for (const auto& [key, value] : member.varied) {
-    options.assignments.push_back(fmt::format("{}={}", key, config::text_of(value)));
-  }
-  options.seed = std::to_string(member.seed);
+  for (const auto& [key, value] : member.varied) options.changes.push_back({key, value, "[vary]"});
+  options.changes.push_back({"run.seed", member.seed, "[series]"});
   return options;
 }
 
