@@ -1,6 +1,7 @@
 // Emulator of the rig's boards with the simulated rig behind them, as a separate process. It emulates an RT-DAC4/PCI
-// with a tree like /sys/bus/pci/devices (docs/rig-setup.md), a CAN I/O node (docs/can.md), or an RT-DAC/USB2 that is
-// plugged into the kernel's virtual host controller (docs/usb.md).
+// with a tree like /sys/bus/pci/devices (docs/rig-setup.md), a CAN I/O node (docs/can.md), an RT-DAC/USB2 that is
+// plugged into the kernel's virtual host controller (docs/usb.md), or a Mesa 7I92T on the network
+// (docs/hm2-emulator.md).
 
 #include <fmt/format.h>
 #include <poll.h>
@@ -8,6 +9,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
@@ -23,6 +25,7 @@
 #include "control_fifo.hpp"
 #include "driver/pci/discovery.hpp"
 #include "emulated_card.hpp"
+#include "emulated_hm2.hpp"
 #include "emulated_node.hpp"
 #include "emulated_usb.hpp"
 #include "fuse_tree.hpp"
@@ -40,6 +43,7 @@ struct Arguments {
   std::string can_interface{};
   program::UsbEmulatorOptions usb{};
   bool use_usb{false};
+  program::Hm2EmulatorOptions hm2{};
   std::uint16_t watchdog_ms{20};
   std::vector<std::string> bdfs{"0000:03:00.0"};
   std::string plant{"paper-table1"};
@@ -103,11 +107,26 @@ void add_usb_options(cli::Parser& parser, program::UsbEmulatorOptions& usb) {
               .sets = false});
   parser.add({.names = "--enable-line",
               .to = &usb.board.enable_line,
-              .help = "digital line of the USB board that enables the drive"});
+              .help = "digital line of the USB board, or I/O of the 7I92T, that enables the drive"});
   parser.add({.names = "--when-braking",
               .to = &usb.when_braking,
               .help = "control command of the USB board, obeyed once the brake has acted for 0.3 s",
               .repeated = true});
+}
+
+void add_hm2_options(cli::Parser& parser, program::Hm2EmulatorOptions& hm2) {
+  parser.add({.names = "--board-name",
+              .to = &hm2.board.name,
+              .help = "name that the 7I92T reports, for example 7I92",
+              .show_default = true});
+  parser.add({.names = "--mac", .to = &hm2.mac, .help = "MAC address in the 7I92T's EEPROM: 00:60:1b:16:ab:50"});
+  parser.add({.names = "--wrong-board",
+              .to = &hm2.board.lie,
+              .help = "a lie of the 7I92T about itself: " + emulator::Hm2Identity::lies()});
+  parser.add(
+      {.names = "--active-high",
+       .to = &hm2.board.active_high_stage,
+       .help = "the power stages behind the 7I92T act while their pins are high: wrong wiring, a bite gives full PWM"});
 }
 
 void add_board_options(cli::Parser& parser, Arguments& a) {
@@ -123,6 +142,10 @@ void add_board_options(cli::Parser& parser, Arguments& a) {
   board.add({.names = "--usb",
              .to = &a.use_usb,
              .help = "emulate a USB board, plugged into this computer's vhci_hcd (needs root)"});
+  board.add({.names = "--hm2",
+             .to = &a.hm2.address,
+             .help = "emulate a Mesa 7I92T: address at which it takes datagrams, with a port if it is not 27181",
+             .type = "ADDRESS[:PORT]"});
 }
 
 void add_options(cli::Parser& parser, Arguments& a) {
@@ -164,7 +187,7 @@ void add_options(cli::Parser& parser, Arguments& a) {
   parser.add({.names = "--record",
               .to = &a.emulator.traffic_file,
               .help = "log of every register access to the card, one per line",
-              .excludes = {"--can", "--usb"}});
+              .excludes = {"--can", "--usb", "--hm2"}});
   parser.add({.names = "--vendor", .to = &a.vendor, .help = "vendor id of the card", .show_default = true});
   parser.add({.names = "--device", .to = &a.device, .help = "device id of the card", .show_default = true});
   parser.add({.names = "--bar-bytes", .to = &a.bar_bytes, .help = "size of BAR 2", .show_default = true});
@@ -181,9 +204,11 @@ void add_options(cli::Parser& parser, Arguments& a) {
               .show_default = true});
   add_card_options(parser, a.emulator.card);
   add_usb_options(parser, a.usb);
+  add_hm2_options(parser, a.hm2);
   parser.set_footer(std::string("Control commands (--command, --control) of a card:\n") +
                     program::EmulatedCard::commands() + "of a CAN node:\n" + program::EmulatedNode::commands() +
-                    "of a USB board:\n" + program::EmulatedUsb::commands());
+                    "of a USB board:\n" + program::EmulatedUsb::commands() + "of a 7I92T:\n" +
+                    program::EmulatedHm2::commands());
 }
 
 void read_plant(Arguments& a) {
@@ -258,7 +283,12 @@ int serve_until_stopped(const Arguments& a, Board& board, const std::string& pla
   bool serving = true;
   while (serving && !stop_requested) {
     std::array<pollfd, 2> ready{{{host(), POLLIN, 0}, {control.descriptor(), POLLIN, 0}}};
-    static_cast<void>(::ppoll(ready.data(), ready.size(), &idle, nullptr));
+    timespec wait = idle;
+    if constexpr (requires { board.next_due_ns(); }) {
+      const std::int64_t due_ns = board.next_due_ns().value_or(idle.tv_nsec);
+      wait.tv_nsec = std::clamp<std::int64_t>(due_ns, 0, idle.tv_nsec);
+    }
+    static_cast<void>(::ppoll(ready.data(), ready.size(), &wait, nullptr));
     if (ready[0].revents != 0) serving = serve_host();
     if (ready[1].revents != 0) control.take([&board](const std::string& line) { return board.obey(line); });
     board.catch_up();
@@ -300,8 +330,24 @@ int serve_usb(Arguments& a) {
       a, board, board.place(), [&board] { return board.descriptor(); }, [&board] { return board.serve(); });
 }
 
+int serve_hm2(Arguments& a) {
+  a.hm2.board.plant = a.emulator.card.plant;
+  a.hm2.board.start_speed_rad_s = a.emulator.card.start_speed_rad_s;
+  a.hm2.board.enable_pin = a.usb.board.enable_line;
+  a.hm2.board.lock_step = a.emulator.lock_step;
+  a.hm2.seed = a.emulator.seed;
+  a.hm2.truth_file = a.emulator.truth_file;
+  program::EmulatedHm2 board(a.hm2);
+  obey_first(a, board);
+  pin_to(a.cpu);
+  take_priority(a);
+  return serve_until_stopped(
+      a, board, board.place(), [&board] { return board.descriptor(); }, [&board] { return board.serve(), true; });
+}
+
 int serve(Arguments& a) {
   read_plant(a);
+  if (!a.hm2.address.empty()) return serve_hm2(a);
   if (a.use_usb) return serve_usb(a);
   if (!a.can_interface.empty()) return serve_node(a);
   program::prepare_mount_folder(a.pci_root);  // first: the other files are often beside it, in the same new folder
@@ -317,7 +363,8 @@ int serve(Arguments& a) {
 
 int run(int argc, char** argv) {
   // Without a name of its own: its help begins with the path that the user typed.
-  cli::Parser parser("", "The ABS rig behind an emulated board: RT-DAC4/PCI card, CAN I/O node or RT-DAC/USB2");
+  cli::Parser parser("",
+                     "The ABS rig behind an emulated board: RT-DAC4/PCI card, CAN I/O node, RT-DAC/USB2 or Mesa 7I92T");
   Arguments arguments;
   add_options(parser, arguments);
   if (const std::optional<int> status = parser.parse(argc, argv)) return *status;

@@ -1,0 +1,131 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abs_hil/plant_sim/plant.hpp"
+#include "emulator/can_node.hpp"
+#include "emulator/card_model.hpp"
+#include "emulator/hm2_identity.hpp"
+#include "plant_sim/encoder.hpp"
+
+namespace abs_hil::emulator {
+
+/// A change of the duties at the power stages.
+struct OutputChange {
+  std::int64_t time_ns{0};  ///< the board's time
+  Outputs now{};
+};
+
+/// The HostMot2 registers of a 7I92 with firmware G540x2, 32 bits each, and the simulated rig behind its pins. Written
+/// from the documented registers; it shares no code with the driver.
+///
+/// A bite of the watchdog clears DDR and open drain. The pins are then inputs, which resistors pull high. All other
+/// registers stay: counters count on, PWM generators keep their values.
+class Hm2Fpga {
+ public:
+  static constexpr std::int64_t step_ns = 100'000;  ///< the plant runs at 10 kHz
+  static constexpr std::uint32_t clock_low_Hz = 100'000'000;
+  static constexpr std::uint32_t clock_high_Hz = 200'000'000;
+
+  /// Throws std::invalid_argument if an option is outside its range.
+  explicit Hm2Fpga(const Hm2Options& options);
+
+  /// One register at a multiple of 4. Registers that cannot be read give 0.
+  [[nodiscard]] std::uint32_t read32(std::uint32_t address) const noexcept;
+  void write32(std::uint32_t address, std::uint32_t value);
+  /// Advances rig and watchdog to `time_ns` (0 at the first power-on); an earlier time does nothing.
+  void advance_to(std::int64_t time_ns);
+
+  /// All registers as after power-on. The wheels go on turning.
+  void power_on();
+  void bite(const std::string& why);
+  void press_emergency_stop(bool pressed);  ///< cuts the drive only
+  void turn_by_hand(bool upper_wheel, double revolutions);
+  /// Sets the quadrature error bit of a wheel's counter, as a wrong edge does.
+  void make_quadrature_error(bool upper_wheel);
+
+  [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }
+  [[nodiscard]] Outputs outputs() const noexcept;
+  [[nodiscard]] const plant_sim::Plant& plant() const noexcept { return plant_; }
+  [[nodiscard]] bool bitten() const noexcept { return status_ != 0; }
+  /// True while any pin is an output.
+  [[nodiscard]] bool drives_pins() const noexcept;
+  /// Time of the last reload of the watchdog; -1: none since power-on.
+  [[nodiscard]] std::int64_t last_pet_ns() const noexcept { return last_pet_ns_; }
+  [[nodiscard]] std::vector<NodeEvent> take_events();
+  [[nodiscard]] std::vector<OutputChange> take_changes();
+  /// All registers that a host has set, also those that it cannot read: "1100=00020002 ...".
+  [[nodiscard]] std::string registers_text() const;
+
+ private:
+  static constexpr std::uint32_t port_count = 2;
+  static constexpr std::uint32_t pins_per_port = 17;
+  static constexpr std::uint32_t disabled = 0x80000000;
+
+  struct Port {
+    std::uint32_t data{0}, ddr{0}, alternate{0}, open_drain{0}, invert{0};
+  };
+  struct Generator {
+    std::uint32_t value{0};  ///< the value that acts
+    std::uint32_t mode{0};
+    std::optional<std::uint32_t> waiting{};  ///< double buffered: acts from the next period
+    std::int64_t waits_until_ns{0};
+  };
+  struct Counter {
+    std::int64_t position{0};  ///< of the encoder, without wrap
+    std::int64_t zero{0};
+    std::int64_t last_ns{0};  ///< time of the last count
+    std::uint32_t control{0};
+    bool error{false};
+  };
+
+  [[nodiscard]] std::uint32_t read_port(std::uint32_t reg, std::uint32_t i) const noexcept;
+  void write_port(std::uint32_t reg, std::uint32_t i, std::uint32_t value) noexcept;
+  [[nodiscard]] std::uint32_t read_counter(std::uint32_t reg, std::uint32_t i) const noexcept;
+  void write_counter(std::uint32_t reg, std::uint32_t i, std::uint32_t value) noexcept;
+  void write_generator(std::uint32_t reg, std::uint32_t i, std::uint32_t value) noexcept;
+  void load_watchdog(std::uint32_t clocks);
+  [[nodiscard]] std::uint32_t watchdog_counter() const noexcept;
+  [[nodiscard]] std::uint32_t time_stamp(std::int64_t time_ns) const noexcept;
+  [[nodiscard]] double period_ns(const Generator& g) const noexcept;
+  [[nodiscard]] double pwm_high_share(const Generator& g) const noexcept;
+  [[nodiscard]] bool pwm_high_now(const Generator& g) const noexcept;
+  [[nodiscard]] std::uint32_t encoder_lines(const Counter& c) const noexcept;
+  [[nodiscard]] double high_share(std::uint32_t io) const noexcept;
+  [[nodiscard]] bool level(std::uint32_t io) const noexcept;
+  [[nodiscard]] std::int64_t position_of(bool upper_wheel, double angle_rad) const noexcept;
+  [[nodiscard]] Counter& counter_of(bool upper_wheel) noexcept;
+  void count(bool upper_wheel, double from_rad, double to_rad, std::int64_t from_ns, std::int64_t to_ns) noexcept;
+  void note_outputs(const std::string& why);
+
+  Hm2Options options_;
+  Hm2Identity identity_;
+  plant_sim::Plant plant_;
+  plant_sim::Encoder upper_;
+  plant_sim::Encoder lower_;
+  std::int64_t time_ns_{0};
+  std::array<Port, port_count> ports_{};
+  std::array<Generator, 2> generators_{};
+  std::array<Counter, 2> counters_{};
+  std::uint32_t pwm_rate_{0};
+  std::uint32_t pdm_rate_{0};
+  std::uint32_t pwm_enable_{0};
+  std::uint32_t stamp_divisor_{0};
+  std::uint32_t filter_rate_{0};
+  std::uint32_t leds_{0};
+  std::uint32_t watchdog_time_{disabled};
+  std::uint32_t status_{1};  ///< a watchdog that was never set has bitten at the first clock
+  bool armed_{false};
+  std::int64_t bites_ns_{0};  ///< when the armed watchdog bites
+  std::int64_t last_pet_ns_{-1};
+  bool emergency_stop_{false};
+  Outputs told_{};
+  std::vector<NodeEvent> events_{};
+  std::vector<OutputChange> changes_{};
+};
+
+}  // namespace abs_hil::emulator

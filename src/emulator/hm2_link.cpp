@@ -1,0 +1,110 @@
+// Faults of the cable between a host and the emulated 7I92.
+
+#include "emulator/hm2_link.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <utility>
+
+#include "emulator/fault_text.hpp"
+
+namespace abs_hil::emulator {
+
+struct Hm2Link::Name {
+  std::string_view text;
+  Kind kind;
+  double most;  ///< largest number; 0: takes no number
+};
+
+const char* Hm2Link::known() {
+  return "ok loss=PERCENT lose-requests=N lose-answers=N delay=US reorder duplicate stale short=BYTES garbage";
+}
+
+void Hm2Link::set(std::string_view text) {
+  static constexpr std::array<Name, 10> names{{{"ok", Kind::ok, 0},
+                                               {"loss", Kind::loss, 100},
+                                               {"lose-requests", Kind::lose_requests, 1e6},
+                                               {"lose-answers", Kind::lose_answers, 1e6},
+                                               {"delay", Kind::delay, 1e7},
+                                               {"reorder", Kind::reorder, 0},
+                                               {"duplicate", Kind::duplicate, 0},
+                                               {"stale", Kind::stale, 0},
+                                               {"short", Kind::too_short, 1472},
+                                               {"garbage", Kind::garbage, 0}}};
+  const std::string valid = std::string("one of ") + known();
+  const std::size_t equals = text.find('=');
+  for (const Name& name : names) {
+    if (name.text != text.substr(0, equals)) continue;
+    if ((name.most > 0) != (equals != std::string_view::npos)) refuse_fault(text, valid);
+    const auto number = name.most > 0 ? number_in<double>(text.substr(equals + 1)) : std::optional(0.0);
+    if (!number || !(*number >= 0.0 && *number <= name.most)) refuse_fault(text, valid);
+    kind_ = name.kind;
+    number_ = *number;
+    kept_.reset();
+    return;
+  }
+  refuse_fault(text, valid);
+}
+
+void Hm2Link::plug(bool in) {
+  plugged_ = in;
+  waiting_.clear();
+  kept_.reset();
+}
+
+bool Hm2Link::lost(Kind counted) {
+  if (!plugged_) return true;
+  if (kind_ == Kind::loss) return std::uniform_real_distribution<double>(0.0, 100.0)(random_) < number_;
+  if (kind_ != counted || number_ < 1.0) return false;
+  number_ -= 1.0;
+  return true;
+}
+
+bool Hm2Link::request_arrives() { return !lost(Kind::lose_requests); }
+
+void Hm2Link::send(Hm2Datagram answer, std::int64_t now_ns) {
+  if (lost(Kind::lose_answers)) return;
+  const auto leave = [this, now_ns](Hm2Datagram datagram) {
+    const auto later_ns = kind_ == Kind::delay ? static_cast<std::int64_t>(number_ * 1000.0) : 0;
+    waiting_.push_back({now_ns + later_ns, std::move(datagram)});
+  };
+  switch (kind_) {
+    case Kind::reorder:
+      if (!kept_) {
+        kept_ = std::move(answer);
+        return;
+      }
+      leave(std::move(answer));
+      leave(*std::exchange(kept_, std::nullopt));
+      return;
+    case Kind::stale:
+      if (kept_) std::swap(*kept_, answer);
+      if (!kept_) kept_ = answer;
+      break;
+    case Kind::duplicate: leave(answer); break;
+    case Kind::too_short: answer.bytes.resize(std::min(answer.bytes.size(), static_cast<std::size_t>(number_))); break;
+    case Kind::garbage:
+      for (std::uint8_t& byte : answer.bytes) byte = static_cast<std::uint8_t>(random_());
+      break;
+    default: break;
+  }
+  leave(std::move(answer));
+}
+
+std::vector<Hm2Datagram> Hm2Link::take_due(std::int64_t now_ns) {
+  std::vector<Hm2Datagram> due;
+  for (Waiting& waiting : waiting_) {
+    if (waiting.due_ns <= now_ns) due.push_back(std::move(waiting.answer));
+  }
+  std::erase_if(waiting_, [now_ns](const Waiting& waiting) { return waiting.due_ns <= now_ns; });
+  return due;
+}
+
+std::optional<std::int64_t> Hm2Link::next_due_ns() const noexcept {
+  std::optional<std::int64_t> next;
+  for (const Waiting& waiting : waiting_) next = std::min(next.value_or(waiting.due_ns), waiting.due_ns);
+  return next;
+}
+
+}  // namespace abs_hil::emulator
