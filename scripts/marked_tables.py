@@ -28,6 +28,6 @@ def keep(mode, tables):
         if mode == '--write':
             write(page, mark, table)
         elif replaced(page, mark, table) != (ROOT / 'docs' / page).read_text(encoding='utf-8'):
-            print(f'docs/{page}: the table <!-- {mark} --> is stale; scripts/{pathlib.Path(sys.argv[0]).name} --write mends it')
+            print(f'docs/{page}: the table <!-- {mark} --> is stale; {pathlib.Path(sys.argv[0]).resolve().relative_to(ROOT)} --write mends it')
             stale = 1
     return stale

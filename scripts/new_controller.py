@@ -101,7 +101,7 @@ def build(test):
     run(ROOT / 'build' / 'release' / 'tests' / test)
     schema = run(program, 'validate', '--schema', capture_output=True, text=True).stdout
     (ROOT / 'config' / 'experiments' / 'schema.json').write_text(schema, encoding='utf-8')
-    run(sys.executable, 'scripts/model_mismatch.py', '--write')
+    run(sys.executable, 'research/model_mismatch.py', '--write')
     print('renewed config/experiments/schema.json and the table of wrong models in docs/controllers.md')
 
 

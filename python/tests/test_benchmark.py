@@ -62,7 +62,7 @@ def test_every_case_has_a_bound_that_the_plant_confirms():
 
 
 def test_the_shipped_gains_are_those_of_the_search():
-    """scripts/search_braking_gains.py --check also computes their scores again."""
+    """research/search_braking_gains.py --check also computes their scores again."""
     stored = json.loads((pathlib.Path(__file__).parents[2] / 'config/training/gains.json').read_text(encoding='utf-8'))
     defaults = abs_hil.keys()
     for law, found in stored.items():

@@ -29,7 +29,7 @@ def listed_keys(text):
 
 
 def problems(page, controllers, keys):
-    # scripts/model_mismatch.py checks its own table, which has the controllers once more.
+    # research/model_mismatch.py checks its own table, which has the controllers once more.
     page = re.sub(r'<!-- model mismatch -->.*?<!-- end -->', '', page, flags=re.DOTALL)
     rows = [[cell.strip() for cell in line.strip('|').split('|')] for line in page.splitlines() if line.startswith('| `')]
     named = [row[0].strip('`') for row in rows]

@@ -1,4 +1,4 @@
-"""The causal optima of the benchmark's cases: stored with the package, or computed (scripts/benchmark_bounds.py)."""
+"""The causal optima of the benchmark's cases: stored with the package, or computed (research/benchmark_bounds.py)."""
 from __future__ import annotations
 
 import hashlib

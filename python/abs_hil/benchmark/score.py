@@ -152,7 +152,7 @@ def run(entry: Entry, cases: Sequence[Case], bounds: Mapping[str, Mapping[str, f
     """Scores a controller. Raises ValueError if it cannot run, or a case has no bound."""
     for case in cases:
         if identity(case) not in bounds:
-            raise ValueError(f'case {case.key} has no bound; scripts/benchmark_bounds.py computes it')
+            raise ValueError(f'case {case.key} has no bound; research/benchmark_bounds.py computes it')
     found, faults = _figures(entry, _runs(entry, cases, seeds), threads)
     rows = []
     for number, (case, seed) in enumerate((case, seed) for case in cases for seed in seeds):

@@ -9,7 +9,8 @@ from functools import partial
 
 import numpy as np
 
-from ..files import write_text, write_whole
+from abs_hil.files import write_text, write_whole
+
 from .laws import Entry
 from .map import FIGURES, PAPER_RATIO, Map
 

@@ -6,9 +6,12 @@ and the bounds of the nominal cases in docs/optimum.md, between <!-- bounds --> 
 --check fails where a page says something else. Needs the package abs_hil of a build
 (PYTHONPATH=build/release/share/abs_hil/python).
 """
+import pathlib
 import sys
 
-from marked_tables import keep
+sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / 'scripts'))
+from marked_tables import keep  # noqa: E402
+
 
 import abs_hil
 from abs_hil.benchmark import Entry, bounds, cases, page, run

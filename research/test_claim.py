@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 import abs_hil
-from abs_hil.claim.criteria import ACTUATORS, PLANTS, THETA0_N, judge, slip_velocity_gain
-from abs_hil.claim.guard import differences, replaced
-from abs_hil.claim.laws import BASELINES, LAWS, Entry, gains_file, judge_entries, run_entries, shipped
-from abs_hil.claim.map import Map, draw_maps, ratio_of, read_maps, write_maps
-from abs_hil.claim.search import TrackingJudge, find_gains
-from abs_hil.claim.statistics import ratio_interval
 from abs_hil.tune import PLANTS_SEED, gains_of
+from claim.criteria import ACTUATORS, PLANTS, THETA0_N, judge, slip_velocity_gain
+from claim.guard import differences, replaced
+from claim.laws import BASELINES, LAWS, Entry, gains_file, judge_entries, run_entries, shipped
+from claim.map import Map, draw_maps, ratio_of, read_maps, write_maps
+from claim.search import TrackingJudge, find_gains
+from claim.statistics import ratio_interval
 
 SHIPPED = pathlib.Path(__file__).parents[2] / 'config' / 'paper'
 #: plants of `abs_hil compare`, which the search has not seen

@@ -17,7 +17,9 @@ import sys
 import tempfile
 import tomllib
 
-from marked_tables import ROOT, keep
+sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / 'scripts'))
+from marked_tables import ROOT, keep  # noqa: E402
+
 
 PLANT = 'paper-table1'
 WRONG_BY = 0.2

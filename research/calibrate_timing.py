@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Finds the theta with which the paper's experiment stops in the 1.2 s of the paper's plots (plant paper-timing).
 
-usage: scripts/calibrate_timing.py [PROGRAM]    default: build/release/bin/abs_hil
+usage: research/calibrate_timing.py [PROGRAM]    default: build/release/bin/abs_hil
 
 Except for theta, the plant is paper-table1: real actuator, 4096-count encoders, adaptive controller at 1 kHz, braking
 from 170 rad/s (1625 rpm, the paper's initial condition) to 0.3 m/s. The result is the mean over three encoder phases.

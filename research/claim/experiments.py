@@ -6,9 +6,10 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..run import Run
-from ..simulation import simulate
-from ..tune import START_SPEED_RAD_S
+from abs_hil.run import Run
+from abs_hil.simulation import simulate
+from abs_hil.tune import START_SPEED_RAD_S
+
 from .criteria import ACTUATORS, PLANTS
 from .laws import Entry, Settings
 from .page import table

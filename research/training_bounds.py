@@ -2,7 +2,7 @@
 """usage: training_bounds.py BUILD
 
 Computes the causal optimum (python -m abs_hil.optimum) of each run of the training study, config/training/braking.toml, and
-keeps it in config/training/bounds.json: scripts/search_braking_gains.py measures distances against these. Goes on where it was
+keeps it in config/training/bounds.json: research/search_braking_gains.py measures distances against these. Goes on where it was
 interrupted, and takes some seconds a run. Needs casadi and the package abs_hil of a build
 (PYTHONPATH=build/release/share/abs_hil/python).
 """

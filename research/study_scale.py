@@ -13,7 +13,9 @@ import sys
 import tempfile
 import time
 
-from marked_tables import write
+sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / 'scripts'))
+from marked_tables import write  # noqa: E402
+
 
 STUDY = '''controllers = ["adaptive"]
 chunk = {chunk}

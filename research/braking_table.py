@@ -6,11 +6,14 @@ Keeps two tables of adaptive-optimal in docs/theory-beyond.md, next to adaptive-
 <!-- braking mismatch --> and <!-- end -->. Cases and bounds are those of the benchmark. --write puts them there, --check
 fails where the page says something else. Needs the package abs_hil of a build (PYTHONPATH=build/release/share/abs_hil/python).
 """
+import pathlib
 import sys
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / 'scripts'))
+from marked_tables import keep  # noqa: E402
 
 import numpy as np
 
-from marked_tables import keep
 
 from abs_hil.benchmark import Entry, bounds, cases, run
 

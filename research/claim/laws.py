@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..core import _core
-from ..options import options
-from ..simulation import STANDARD_VARIATION, simulate_many
-from ..tune import START_SPEED_RAD_S, gains_of
+from abs_hil.core import _core
+from abs_hil.options import options
+from abs_hil.simulation import STANDARD_VARIATION, simulate_many
+from abs_hil.tune import START_SPEED_RAD_S, gains_of
+
 from .criteria import ACTUATORS, THETA0_N, Verdict, judge, slip_velocity_gain
 
 Settings = Mapping[str, 'float | bool']

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Fits the controllers' tyre model for the plant inteco-manual: theta, B and C of theta sin(C atan(B slip)).
 
-usage: scripts/fit_inteco_tyre.py [PLANT.toml]    default: config/plants/inteco-manual.toml
+usage: research/fit_inteco_tyre.py [PLANT.toml]    default: config/plants/inteco-manual.toml
 
 The plant's tyre force depends on the slip and, through the lever, on the brake torque. In braking at a constant slip
 the slip determines the brake torque. The fit therefore uses the force F(slip) there, at half the initial speed of

@@ -10,12 +10,15 @@ docs/theory-beyond.md between <!-- late release --> and <!-- end -->. Needs casa
 """
 import math
 import os
+import pathlib
 import sys
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / 'scripts'))
+from marked_tables import keep  # noqa: E402
 
 os.environ.setdefault('OMP_NUM_THREADS', '1')
 
 import numpy as np  # noqa: E402
-from marked_tables import keep  # noqa: E402
 
 from abs_hil.benchmark import cases  # noqa: E402
 from abs_hil.optimum.rig import OMEGA2, SLIP, TORQUE, Rig  # noqa: E402

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..files import write_text
-from ..tune import PLANTS_SEED, Found, Gain, gains_of, search
+from abs_hil.files import write_text
+from abs_hil.tune import PLANTS_SEED, Found, Gain, gains_of, search
+
 from .criteria import PLANTS, SHARE
 from .laws import LAWS, Entry, gains_file, judge_entries, run_entries
 

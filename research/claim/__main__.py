@@ -1,4 +1,4 @@
-"""scripts/paper_comparison.sh: searches the gains, draws the map, and writes or checks the pages."""
+"""research/paper_comparison.sh: searches the gains, draws the map, and writes or checks the pages."""
 from __future__ import annotations
 
 import argparse
@@ -10,7 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..files import write_text
+from abs_hil.files import write_text
+
 from .criteria import ACTUATORS, PLANTS
 from .experiments import beyond_table, expected_table, figures_table, theory_phrases
 from .guard import differences, replaced

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..files import write_whole
-from ..simulation import STANDARD_VARIATION
-from ..studies import study
-from ..tune import START_SPEED_RAD_S
+from abs_hil.files import write_whole
+from abs_hil.simulation import STANDARD_VARIATION
+from abs_hil.studies import study
+from abs_hil.tune import START_SPEED_RAD_S
+
 from .criteria import ACTUATORS, PLANTS, judge, slip_velocity_gain
 from .laws import LAWS, MAP_KEYS
 

@@ -11,10 +11,13 @@ in docs/plants.md between the lines
 --write puts it there, --check fails where the page says something else. Needs the package abs_hil of a build
 (PYTHONPATH=build/release/share/abs_hil/python).
 """
+import pathlib
 import sys
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / 'scripts'))
+from marked_tables import keep  # noqa: E402
+
 import numpy as np
-from marked_tables import keep
 
 import abs_hil
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core import _core
-from ..options import options
+from abs_hil.core import _core
+from abs_hil.options import options
 
 #: first estimate of theta of every law, N: theta of Table 1
 THETA0_N = 23.0
