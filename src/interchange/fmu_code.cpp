@@ -7,8 +7,8 @@
 #include <cstring>
 #include <limits>
 
-#include "interchange/fmi/fmi2FunctionTypes.h"
-#include "interchange/fmi/fmi3FunctionTypes.h"
+#include <fmi/fmi2FunctionTypes.h>
+#include <fmi/fmi3FunctionTypes.h>
 #include "interchange/fmu_facts.hpp"
 #include "interchange/loaded_library.hpp"
 #include "interchange/refused_file.hpp"

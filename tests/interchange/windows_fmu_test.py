@@ -31,7 +31,7 @@ class WindowsFmu(ProgramTest):
         self.assertIn('win64', result.stdout)
         zipfile.ZipFile(path).extractall(self.folder / 'fmu')
         program = self.folder / 'windows_fmu.exe'
-        subprocess.run([COMPILER, '-O1', '-I', SOURCE / 'src/interchange/fmi', SOURCE / 'tests/interchange/windows_fmu.c', '-o',
+        subprocess.run([COMPILER, '-O1', '-I', SOURCE / 'third_party/fmi', SOURCE / 'tests/interchange/windows_fmu.c', '-o',
                         program], check=True)
         here = Instance(str(path))
         outputs = ['omega1_rad_s', 'omega2_rad_s', 'slip', 'brake_torque_Nm', 'distance_m']

@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include "interchange/fmi/fmi2Functions.h"
+#include <fmi/fmi2Functions.h>
 #include "interchange/fmu/values.hpp"
 
 namespace {

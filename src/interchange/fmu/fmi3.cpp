@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include "interchange/fmi/fmi3Functions.h"
+#include <fmi/fmi3Functions.h>
 #include "interchange/fmu/values.hpp"
 
 namespace {
