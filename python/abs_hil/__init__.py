@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from .messages import PHASES, QUANTITIES, REASONS, TYPES, decode
 
 if TYPE_CHECKING:
+    from .figures import FigureOfMerit, figures
     from .hand import Controller, Plant, SlipInput, SlipOutput
     from .identification import Identified, identify
     from .network import live
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 globals().update(TYPES)
 
 #: module -> the names that it gives; loaded at first use, so that decoding messages needs only Python
-_LATER = {'hand': ('Controller', 'Plant', 'SlipInput', 'SlipOutput'),
+_LATER = {'figures': ('FigureOfMerit', 'figures'),
+          'hand': ('Controller', 'Plant', 'SlipInput', 'SlipOutput'),
           'identification': ('Identified', 'identify'),
           'network': ('live',),
           'run': ('Run', 'Series', 'load', 'load_series'),
@@ -35,9 +37,10 @@ _LATER = {'hand': ('Controller', 'Plant', 'SlipInput', 'SlipOutput'),
          'simulation': ('Study', 'controllers', 'experiments', 'keys', 'plants', 'simulate', 'simulate_many')}
 _MODULE_OF = {name: module for module, names in _LATER.items() for name in names}
 
-__all__ = ['PHASES', 'QUANTITIES', 'REASONS', 'TYPES', 'Controller', 'Identified', 'Plant', 'Run', 'Series', 'SlipInput',
-           'SlipOutput', 'Study', 'StudyResults', 'controllers', 'decode', 'experiments', 'identify', 'keys', 'live', 'load',
-           'load_series', 'load_study', 'plants', 'simulate', 'simulate_many', 'simulate_run', 'study']
+__all__ = ['PHASES', 'QUANTITIES', 'REASONS', 'TYPES', 'Controller', 'FigureOfMerit', 'Identified', 'Plant', 'Run',
+           'Series', 'SlipInput', 'SlipOutput', 'Study', 'StudyResults', 'controllers', 'decode', 'experiments', 'figures',
+           'identify', 'keys', 'live', 'load', 'load_series', 'load_study', 'plants', 'simulate', 'simulate_many',
+           'simulate_run', 'study']
 
 
 def __getattr__(name: str) -> Any:

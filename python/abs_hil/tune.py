@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from .core import _core
+from .figures import OVERSHOOT
 from .files import write_text, write_whole
 from .options import options
 from .simulation import STANDARD_VARIATION, Study, controllers, simulate_many
@@ -97,7 +98,7 @@ def cost_of(study: Study, follows_slip: bool, locked_m: np.ndarray, obedient_m: 
     distance = study['stop_distance_m']
     cost = 0.5 * study['time_locked_s'] + 1e-4 * study['torque_total_variation_Nm'] / max_torque_Nm
     if follows_slip:
-        cost = cost + np.fmax(distance, obedient_m) / locked_m + 2.0 * study['slip_rms'] + 0.2 * study['slip_overshoot']
+        cost = cost + np.fmax(distance, obedient_m) / locked_m + 2.0 * study['slip_rms'] + 0.2 * study[OVERSHOOT]
         cost = np.where(np.isnan(distance), np.nan, cost)
     else:
         cost = cost + distance / locked_m

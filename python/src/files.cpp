@@ -276,7 +276,9 @@ py::dict metrics_of(const py::dict& columns, double r2_m, double end_speed_m_s) 
   }
   const analysis::Metrics found = metrics.metrics();
   py::dict result;
-  for (const auto& [name, field] : analysis::metric_fields) result[py::str(name.data(), name.size())] = found.*field;
+  for (const analysis::Figure& figure : analysis::figures) {
+    result[py::str(figure.name.data(), figure.name.size())] = figure.of(found);
+  }
   return result;
 }
 

@@ -156,9 +156,8 @@ py::dict simulate_many(const std::vector<py::dict>& options,
     for (const study::RunResult& result : results) values.push_back(value(result));
     columns[name] = array_of(std::move(values));
   };
-  using analysis::Metrics;
-  for (const auto& [name, field] : analysis::metric_fields) {
-    add(std::string(name).c_str(), [field = field](const study::RunResult& r) { return r.metrics.*field; });
+  for (const analysis::Figure& figure : analysis::figures) {
+    add(std::string(figure.name).c_str(), [&](const study::RunResult& r) { return figure.of(r.metrics); });
   }
   std::vector<std::string> faults;
   faults.reserve(results.size());

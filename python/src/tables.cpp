@@ -1,4 +1,5 @@
-// What there is to choose from: controllers, plants, experiments, configuration keys.
+// What there is to choose from: controllers, plants, experiments, configuration keys,
+// figures of merit.
 
 #include <pybind11/stl.h>
 
@@ -6,6 +7,7 @@
 
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/rig/brake_map.hpp"
+#include "analysis/braking_figures.hpp"
 #include "bindings.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
@@ -59,6 +61,24 @@ py::list keys(const py::dict& arguments) {
   return all;
 }
 
+/// One dictionary for each figure of merit, in the order of a study's results.
+py::list figures() {
+  py::list all;
+  for (const analysis::Figure& figure : analysis::figures) {
+    py::dict row;
+    row["name"] = std::string(figure.name);
+    row["title"] = std::string(figure.title);
+    row["unit"] = std::string(figure.unit);
+    row["decimals"] = figure.decimals;
+    row["better"] = std::string(analysis::name_of(figure.better));
+    row["compared"] = figure.compared;
+    row["in_summary"] = figure.summary_place > 0;
+    row["meaning"] = std::string(figure.meaning);
+    all.append(row);
+  }
+  return all;
+}
+
 double max_brake_torque_Nm(const py::dict& arguments) {
   const config::Settings s = program::merge(run_options(arguments)).settings;
   return rig::brake_torque_at(s.plant.rig.brake, s.gate.brake_duty_max);
@@ -70,6 +90,7 @@ void add_tables(py::module_& module) {
   module.def("controllers", &controllers);
   module.def("plants", &plants);
   module.def("experiments", &experiments);
+  module.def("figures", &figures);
   module.def("keys", &keys, py::arg("options"));
   module.def("section_of", [](const std::string& controller) { return config::section_of(controller); });
   module.def("max_brake_torque_Nm", &max_brake_torque_Nm, py::arg("options"));

@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from abs_hil.figures import OVERSHOOT
 from abs_hil.run import Run
 from abs_hil.simulation import simulate
 from abs_hil.tune import START_SPEED_RAD_S
@@ -89,7 +90,7 @@ def beyond_table() -> str:
             run = _braking(controller, plant)
             s = run.summary
             rows.append([f'{plant}, {controller}', f'{s["stop_time_s"]:.3f}', f'{s["stop_distance_m"]:.2f}',
-                         f'{s["slip_overshoot"]:.3f}', _optional(s['slip_settling_s'], 3), f'{s["slip_rms"]:.4f}',
+                         f'{s[OVERSHOOT]:.3f}', _optional(s['slip_settling_s'], 3), f'{s["slip_rms"]:.4f}',
                          _optional(s['theta_settling_s'], 3), f'{s["torque_total_variation_Nm"]:.0f}'])
     return table(['plant, controller', 'time s', 'distance m', 'overshoot', 'within 0.02 after s', 'slip RMS',
                   'θ̂ within 5 % after s', 'torque variation N m'], rows)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from abs_hil.figures import OVERSHOOT, heading_of
 from .criteria import ACTUATORS, PLANTS, Verdict
 from .laws import BASELINES, MAP_KEYS, Entry, entries, judge_entries, run_entries
 from .map import FIGURES, PAPER_RATIO, Map
@@ -14,10 +15,9 @@ from .statistics import mean_interval, ratio_interval
 
 #: seed of the plants on which the page's figures are measured: that of `abs_hil compare`
 EVALUATION_SEED = 1
-#: columns of the tables of all laws: figure, heading, digits
-SHOWN = (('stop_time_s', 'stop time / s', 3), ('stop_distance_m', 'stop distance / m', 2), ('slip_rms', 'slip RMS error', 4),
-         ('slip_overshoot', 'slip overshoot', 3), ('torque_total_variation_Nm', 'torque variation / N m', 0),
-         ('theta_error_final', 'error of θ̂ at 3 m/s', 3))
+#: columns of the tables of all laws, with their digits
+SHOWN = {'stop_time_s': 3, 'stop_distance_m': 2, 'slip_rms': 4, OVERSHOOT: 3, 'torque_total_variation_Nm': 0,
+         'theta_error_final': 3}
 
 
 @dataclass(frozen=True)
@@ -160,14 +160,14 @@ class Page:
                 missing.append(f'{name} ({shares})')
                 continue
             cells = [name]
-            for figure, _, digits in SHOWN:
+            for figure, digits in SHOWN.items():
                 values = result.varied(figure)
                 mean = mean_interval(values)
                 low, median, high = np.nanquantile(values, (0.1, 0.5, 0.9))
                 cells.append(f'{mean.mean:.{digits}f} ± {mean.high - mean.mean:.{digits}f}; {median:.{digits}f} '
                              f'({low:.{digits}f} to {high:.{digits}f})')
             rows.append([*cells, shares])
-        text = table(['law', *(heading for _, heading, _ in SHOWN), 'criteria held / %'], rows)
+        text = table(['law', *map(heading_of, SHOWN), 'criteria held / %'], rows)
         return text + ('\n\nDo not count here (criteria held / %): ' + '; '.join(missing) + '.' if missing else '')
 
 

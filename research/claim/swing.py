@@ -8,6 +8,7 @@ import tempfile
 
 import numpy as np
 
+from abs_hil.figures import OVERSHOOT
 from .criteria import SLIP_REF
 
 PLANT = 'paper-timing'
@@ -39,10 +40,10 @@ def phrases(program: pathlib.Path) -> list[str]:
             rows = list(csv.DictReader(file))
     ours, mended = ([row for row in rows if row['controller'] == law] for law in LAWS)
     numbers = {name: np.array([float(row[name]) for row in ours]) for name in ours[0]
-               if name.startswith('plant.') or name == 'slip_overshoot'}
+               if name.startswith('plant.') or name == OVERSHOOT}
     speed = swing_speed_m_s(numbers)
-    over = numbers['slip_overshoot']
-    other = np.array([float(row['slip_overshoot']) for row in mended])
+    over = numbers[OVERSHOOT]
+    other = np.array([float(row[OVERSHOOT]) for row in mended])
     rank = float(stats.spearmanr(speed, over).statistic)
     return [
         f'the swing speed of run {RUN} is {speed[RUN]:.1f} m/s and its overshoot {over[RUN]:.3f}',

@@ -1,5 +1,17 @@
 #pragma once
 
+// Figures of merit of a braking run: the table that summary, comparison, study, report and benchmark are made from, and
+// the recursion that computes them cycle by cycle.
+//
+// With t from the start of braking, tau the torque reference, judged cycles those of phase brake with v_x > 3 m/s:
+//   rms          sqrt(mean(e^2)) over the judged cycles with t > 0.3 s; e = slip - slip_ref, or theta_est / theta - 1
+//   settling     last entry into the band: |slip - slip_ref| <= 0.02, |theta_est - theta| <= 0.05 theta
+//   variation    sum of |tau_k - tau_(k-1)| over phase brake
+//   locked       sum of the judged cycles' durations with slip > 0.95
+
+#include <array>
+#include <string_view>
+
 #include "abs_hil/rig/measurement.hpp"
 #include "abs_hil/rig/scalar.hpp"
 
@@ -7,6 +19,101 @@ namespace abs_hil::analysis {
 
 /// Car speed above which slip and its estimates are judged. Below it one encoder count is a large part of them.
 inline constexpr double least_judged_speed_m_s = 3.0;
+
+/// The figures of one run; `figures` says what each is. NaN if the run did not get that far or the backend cannot know
+/// the value. Speeds and slip are true values if the backend knows them, else estimates.
+template <class S>
+struct FiguresOf {
+  S brake_start_s{rig::unknown};
+  S stop_time_s{rig::unknown};
+  S stop_distance_m{rig::unknown};
+  S slip_rms{rig::unknown};
+  S slip_reached_s{rig::unknown};
+  S slip_settling_s{rig::unknown};
+  S slip_overshoot{rig::unknown};
+  S slip_largest{rig::unknown};
+  S time_locked_s{rig::unknown};
+  S torque_total_variation_Nm{rig::unknown};
+  S theta_final_N{rig::unknown};
+  S theta_settling_s{rig::unknown};
+  S theta_error_rms{rig::unknown};
+  S theta_error_final{rig::unknown};
+  S theta_error_max_N{rig::unknown};
+  S final_speed_m_s{rig::unknown};
+};
+using Metrics = FiguresOf<double>;
+
+/// Which of two values of a figure is the better one.
+enum class Better { neither, less, nearer_zero };
+[[nodiscard]] constexpr std::string_view name_of(Better better) noexcept {
+  return better == Better::less ? "less" : better == Better::nearer_zero ? "nearer zero" : "neither";
+}
+
+/// A figure of merit. The order of the rows is that of a study's results.
+struct Figure {
+  std::string_view name;  ///< in summary, CSV and Python
+  double Metrics::*value;
+  std::string_view title;  ///< in tables for people
+  std::string_view unit;
+  int decimals;  ///< shown in tables
+  Better better;
+  bool compared;      ///< `abs_hil compare` shows it
+  int summary_place;  ///< place in the run's summary, from 1; 0: not there
+  std::string_view meaning;
+  /// Why a run lacks it, for the summary's `missing`; names in braces stand for values. Empty: without a reason.
+  std::string_view lacking;
+  [[nodiscard]] double of(const Metrics& metrics) const noexcept { return metrics.*value; }
+};
+
+namespace lacking {
+inline constexpr std::string_view stop =
+    "the car still moved at {speed:.3g} m/s when the run ended; it stops below {end:.3g}";
+}
+
+/// A new figure is one row here, a member of FiguresOf, and the line that computes it below.
+inline constexpr std::array<Figure, 16> figures{{
+    {"brake_start_s", &Metrics::brake_start_s, "start of braking", "s", 3, Better::neither, false, 1,
+     "first cycle in phase `brake`", "the run did not brake"},
+    {"stop_time_s", &Metrics::stop_time_s, "stop time", "s", 3, Better::less, true, 2,
+     "from there to the first tick with v_x below `experiment.end_speed_m_s`, whatever the phase; if the experiment "
+     "ends "
+     "at its estimate of that, at most 10 ms early, to the time at which its last deceleration leads there",
+     lacking::stop},
+    {"stop_distance_m", &Metrics::stop_distance_m, "stop distance", "m", 2, Better::less, true, 3,
+     "trapezoid of v_x over the ticks between", lacking::stop},
+    {"slip_rms", &Metrics::slip_rms, "slip RMS error", "", 4, Better::less, true, 4,
+     "of slip − slip_ref, later than 0.3 s after brake start and v_x > 3 m/s",
+     "no braking above {judged:.3g} m/s later than {rms_start} s after its start"},
+    {"slip_reached_s", &Metrics::slip_reached_s, "slip reached", "s", 3, Better::less, false, 5,
+     "time after which slip is within 0.02 of its reference for the first time, while v_x > 3 m/s",
+     "the slip never came within {slip_band} of the wanted one above {judged:.3g} m/s"},
+    {"slip_settling_s", &Metrics::slip_settling_s, "slip settling", "s", 3, Better::less, true, 6,
+     "time after which slip stays within 0.02 of its reference while v_x > 3 m/s",
+     "the slip left its band, {slip_band}, above {judged:.3g} m/s"},
+    {"slip_overshoot", &Metrics::slip_overshoot, "slip overshoot", "", 4, Better::less, true, 10,
+     "largest excess of slip over slip_ref while v_x > 3 m/s, at least 0", ""},
+    {"slip_largest", &Metrics::slip_largest, "largest slip", "", 4, Better::less, false, 11,
+     "largest slip while v_x > 3 m/s", ""},
+    {"time_locked_s", &Metrics::time_locked_s, "time locked", "s", 3, Better::less, true, 12,
+     "braking time with slip > 0.95 while v_x > 3 m/s", ""},
+    {"torque_total_variation_Nm", &Metrics::torque_total_variation_Nm, "torque variation", "N m", 1, Better::less, true,
+     9, "sum of the absolute steps of the requested torque, over phase `brake`: measures chatter", ""},
+    {"theta_final_N", &Metrics::theta_final_N, "theta at 3 m/s", "N", 2, Better::neither, false, 7,
+     "the estimate at 3 m/s: the last one while v_x > 3 m/s, not the one at the end of the run",
+     "no estimate above {judged:.3g} m/s"},
+    {"theta_settling_s", &Metrics::theta_settling_s, "theta settling", "s", 3, Better::less, true, 8,
+     "time after which the estimate stays within 5 % of the truth while v_x > 3 m/s",
+     "no estimate within {theta_per_cent} % of the true theta above {judged:.3g} m/s"},
+    {"theta_error_rms", &Metrics::theta_error_rms, "theta RMS error", "", 4, Better::less, true, 14,
+     "of estimate / truth − 1, over the samples of slip_rms", ""},
+    {"theta_error_final", &Metrics::theta_error_final, "theta error at end", "", 4, Better::nearer_zero, true, 13,
+     "theta_final_N / true theta at that time − 1", ""},
+    {"theta_error_max_N", &Metrics::theta_error_max_N, "largest theta error", "N", 2, Better::less, false, 15,
+     "largest abs(θ̂ − θ), later than 0.3 s after brake start and v_x > 3 m/s", ""},
+    {"final_speed_m_s", &Metrics::final_speed_m_s, "final speed", "m/s", 3, Better::neither, false, 0,
+     "v_x of the last record", ""},
+}};
+static_assert(sizeof(Metrics) == figures.size() * sizeof(double), "each figure has a row");
 
 /// What the metrics of braking need of one cycle.
 template <class S>
@@ -37,11 +144,16 @@ class Settling {
   S since_s_{rig::unknown};
 };
 
-/// The figures behind RunMetrics from the first cycle of braking on. `S` is a `double`, or a pack of them
-/// (rig/scalar.hpp).
+/// The figures from the first cycle of braking on, as far as they are known; `metrics_of` (analysis/run_metrics.hpp)
+/// completes them. `S` is a `double`, or a pack of them (rig/scalar.hpp).
 template <class S>
-class BrakingFigures {
+class BrakingFigures : public FiguresOf<S> {
  public:
+  using FiguresOf<S>::brake_start_s, FiguresOf<S>::stop_time_s, FiguresOf<S>::stop_distance_m;
+  using FiguresOf<S>::slip_reached_s, FiguresOf<S>::slip_overshoot, FiguresOf<S>::slip_largest;
+  using FiguresOf<S>::time_locked_s, FiguresOf<S>::torque_total_variation_Nm, FiguresOf<S>::theta_final_N;
+  using FiguresOf<S>::theta_error_final, FiguresOf<S>::theta_error_max_N, FiguresOf<S>::final_speed_m_s;
+
   BrakingFigures() = default;
   explicit BrakingFigures(const S& end_speed_m_s) noexcept : end_speed_m_s_(end_speed_m_s) {}
 
@@ -56,19 +168,6 @@ class BrakingFigures {
   [[nodiscard]] auto stop_known() const noexcept { return !rig::is_nan(stop_time_s); }
   [[nodiscard]] S end_speed_m_s() const noexcept { return end_speed_m_s_; }
 
-  // NaN: not known so far.
-  S brake_start_s{rig::unknown};
-  S stop_time_s{rig::unknown};
-  S stop_distance_m{rig::unknown};
-  S theta_final_N{rig::unknown};
-  S theta_error_final{rig::unknown};
-  S torque_total_variation_Nm{rig::unknown};
-  S slip_overshoot{rig::unknown};
-  S slip_largest{rig::unknown};
-  S slip_reached_s{rig::unknown};
-  S theta_error_max_N{rig::unknown};
-  S time_locked_s{rig::unknown};
-  S final_speed_m_s{rig::unknown};
   S slip_square_sum{0.0};
   S theta_square_sum{0.0};
   S samples{0.0};  ///< in the two sums

@@ -29,20 +29,9 @@ void RunMetrics::consume(const rig::CycleRecord& record, double distance_m) {
 }
 
 Metrics metrics_of(const BrakingFigures<double>& f) noexcept {
-  Metrics result{.brake_start_s = f.brake_start_s,
-                 .stop_time_s = f.stop_time_s,
-                 .stop_distance_m = f.stop_distance_m,
-                 .slip_reached_s = f.slip_reached_s,
-                 .slip_settling_s = f.slip_settling.since_s(),
-                 .theta_final_N = f.theta_final_N,
-                 .theta_settling_s = f.theta_settling.since_s(),
-                 .torque_total_variation_Nm = f.torque_total_variation_Nm,
-                 .slip_overshoot = f.slip_overshoot,
-                 .slip_largest = f.slip_largest,
-                 .time_locked_s = f.time_locked_s,
-                 .theta_error_final = f.theta_error_final,
-                 .theta_error_max_N = f.theta_error_max_N,
-                 .final_speed_m_s = f.final_speed_m_s};
+  Metrics result = f;
+  result.slip_settling_s = f.slip_settling.since_s();
+  result.theta_settling_s = f.theta_settling.since_s();
   if (f.samples > 0.0) {
     result.slip_rms = std::sqrt(f.slip_square_sum / f.samples);
     result.theta_error_rms = std::sqrt(f.theta_square_sum / f.samples);
@@ -66,25 +55,16 @@ Metrics RunMetrics::metrics() const noexcept {
 
 std::vector<MissingFigure> missing_figures(const Metrics& m, double end_speed_m_s) {
   std::vector<MissingFigure> missing;
-  const bool braked = !std::isnan(m.brake_start_s);
-  const auto note = [&](std::string_view name, double value, const std::string& why) {
-    if (std::isnan(value)) missing.push_back({name, braked ? why : "the run did not brake"});
-  };
-  const std::string moving = fmt::format("the car still moved at {:.3g} m/s when the run ended; it stops below {:.3g}",
-                                         m.final_speed_m_s, end_speed_m_s);
-  const std::string above = fmt::format("above {:.3g} m/s", least_judged_speed_m_s);
-  note("brake_start_s", m.brake_start_s, "");
-  note("stop_time_s", m.stop_time_s, moving);
-  note("stop_distance_m", m.stop_distance_m, moving);
-  note("slip_rms", m.slip_rms,
-       fmt::format("no braking {} later than {} s after its start", above, BrakingFigures<double>::rms_start_s));
-  note("slip_reached_s", m.slip_reached_s,
-       fmt::format("the slip never came within {} of the wanted one {}", BrakingFigures<double>::slip_band, above));
-  note("slip_settling_s", m.slip_settling_s,
-       fmt::format("the slip left its band, {}, {}", BrakingFigures<double>::slip_band, above));
-  note("theta_final_N", m.theta_final_N, fmt::format("no estimate {}", above));
-  note("theta_settling_s", m.theta_settling_s,
-       fmt::format("no estimate within {} % of the true theta {}", 100 * BrakingFigures<double>::theta_band, above));
+  for (const Figure& figure : figures) {
+    if (figure.lacking.empty() || !std::isnan(figure.of(m))) continue;
+    const std::string_view why = std::isnan(m.brake_start_s) ? figures.front().lacking : figure.lacking;
+    missing.push_back(
+        {figure.name, fmt::format(fmt::runtime(why), fmt::arg("speed", m.final_speed_m_s),
+                                  fmt::arg("end", end_speed_m_s), fmt::arg("judged", least_judged_speed_m_s),
+                                  fmt::arg("rms_start", BrakingFigures<double>::rms_start_s),
+                                  fmt::arg("slip_band", BrakingFigures<double>::slip_band),
+                                  fmt::arg("theta_per_cent", 100 * BrakingFigures<double>::theta_band))});
+  }
   return missing;
 }
 

@@ -72,47 +72,35 @@ void add_timing(const rig::TimingSummary& timing, const Line& line) {
 
 nlohmann::ordered_json to_json(const RunSummary& s) {
   const Metrics& m = s.metrics;
-  nlohmann::ordered_json json{{"result", s.result},
-                              {"reason", s.reason},
-                              {"controller", s.controller},
-                              {"plant", s.plant},
-                              {"backend", s.backend},
-                              {"experiment", s.experiment},
-                              {"brake_start_s", number_or_null(m.brake_start_s)},
-                              {"stop_time_s", number_or_null(m.stop_time_s)},
-                              {"stop_distance_m", number_or_null(m.stop_distance_m)},
-                              {"slip_rms", number_or_null(m.slip_rms)},
-                              {"slip_reached_s", number_or_null(m.slip_reached_s)},
-                              {"slip_settling_s", number_or_null(m.slip_settling_s)},
-                              {"theta_final_N", number_or_null(m.theta_final_N)},
-                              {"theta_settling_s", number_or_null(m.theta_settling_s)},
-                              {"torque_total_variation_Nm", number_or_null(m.torque_total_variation_Nm)},
-                              {"slip_overshoot", number_or_null(m.slip_overshoot)},
-                              {"slip_largest", number_or_null(m.slip_largest)},
-                              {"time_locked_s", number_or_null(m.time_locked_s)},
-                              {"theta_error_final", number_or_null(m.theta_error_final)},
-                              {"theta_error_rms", number_or_null(m.theta_error_rms)},
-                              {"theta_error_max_N", number_or_null(m.theta_error_max_N)},
-                              {"truth_known", s.truth_known},
-                              {"cycles", s.cycles},
-                              {"overruns", s.timing.overruns.total},
-                              {"overruns_by_cause", by_cause(s.timing.overruns)},
-                              {"overruns_startup", s.timing.overruns.startup},
-                              {"overruns_longest_run", s.timing.overruns.longest_run},
-                              {"ticks_missed", s.timing.overruns.ticks_missed},
-                              {"realtime", s.realtime},
-                              {"virtual_time", s.virtual_time},
-                              {"wakeup_latency_us", to_json(s.timing.wakeup_latency)},
-                              {"read_us", to_json(s.timing.read)},
-                              {"control_us", to_json(s.timing.control)},
-                              {"write_us", to_json(s.timing.write)},
-                              {"cycle_time_us", to_json(s.timing.cycle_time)},
-                              {"telemetry_drops", s.telemetry_drops},
-                              {"publish_failures", s.publish_failures},
-                              {"csv_rows_lost", s.csv_rows_lost},
-                              {"gate", to_json(s.gate)},
-                              {"checks_unjudged", number_or_null(s.checks_unjudged)},
-                              {"config", s.config}};
+  nlohmann::ordered_json json{{"result", s.result}, {"reason", s.reason},   {"controller", s.controller},
+                              {"plant", s.plant},   {"backend", s.backend}, {"experiment", s.experiment}};
+  // Places count from 1 without a gap.
+  for (std::size_t place = 1; place <= figures.size(); ++place) {
+    for (const Figure& figure : figures) {
+      if (figure.summary_place == static_cast<int>(place))
+        json[std::string(figure.name)] = number_or_null(figure.of(m));
+    }
+  }
+  json["truth_known"] = s.truth_known;
+  json["cycles"] = s.cycles;
+  json["overruns"] = s.timing.overruns.total;
+  json["overruns_by_cause"] = by_cause(s.timing.overruns);
+  json["overruns_startup"] = s.timing.overruns.startup;
+  json["overruns_longest_run"] = s.timing.overruns.longest_run;
+  json["ticks_missed"] = s.timing.overruns.ticks_missed;
+  json["realtime"] = s.realtime;
+  json["virtual_time"] = s.virtual_time;
+  json["wakeup_latency_us"] = to_json(s.timing.wakeup_latency);
+  json["read_us"] = to_json(s.timing.read);
+  json["control_us"] = to_json(s.timing.control);
+  json["write_us"] = to_json(s.timing.write);
+  json["cycle_time_us"] = to_json(s.timing.cycle_time);
+  json["telemetry_drops"] = s.telemetry_drops;
+  json["publish_failures"] = s.publish_failures;
+  json["csv_rows_lost"] = s.csv_rows_lost;
+  json["gate"] = to_json(s.gate);
+  json["checks_unjudged"] = number_or_null(s.checks_unjudged);
+  json["config"] = s.config;
   if (!s.friction_curve.is_null()) json["friction_curve"] = s.friction_curve;
   if (!s.foreign_controller.is_null()) json["foreign_controller"] = s.foreign_controller;
   json["model"] = s.model.empty() ? s.plant : s.model;

@@ -27,7 +27,7 @@ std::string shown(const Estimate& e, std::size_t runs, int decimals, bool with_s
   return text;
 }
 
-std::string title_of(const ComparedMetric& metric) {
+std::string title_of(const analysis::Figure& metric) {
   return metric.unit.empty() ? std::string(metric.title) : fmt::format("{} / {}", metric.title, metric.unit);
 }
 
@@ -36,7 +36,7 @@ Cells mean_cells(const ComparisonTable& table) {
   Cells cells{{""}};
   for (const ControllerColumn& column : table.columns) cells[0].push_back(column.name);
   for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
-    const ComparedMetric& metric = compared_metrics()[m];
+    const analysis::Figure& metric = compared_metrics()[m];
     std::vector<std::string>& row = cells.emplace_back(1, title_of(metric));
     for (const ControllerColumn& column : table.columns) {
       row.push_back(shown(column.means[m], column.runs, metric.decimals, false));
@@ -62,7 +62,7 @@ Cells median_cells(const ComparisonTable& table) {
   Cells cells{{"median [10 %, 90 %]"}};
   for (const ControllerColumn& column : table.columns) cells[0].push_back(column.name);
   for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
-    const ComparedMetric& metric = compared_metrics()[m];
+    const analysis::Figure& metric = compared_metrics()[m];
     std::vector<std::string>& row = cells.emplace_back(1, title_of(metric));
     for (const ControllerColumn& column : table.columns) row.push_back(shown(column.spreads[m], metric.decimals));
   }
@@ -73,7 +73,7 @@ Cells difference_cells(const ComparisonTable& table) {
   Cells cells{{fmt::format("less {}", table.columns.front().name)}};
   for (std::size_t c = 1; c < table.columns.size(); ++c) cells[0].push_back(table.columns[c].name);
   for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
-    const ComparedMetric& metric = compared_metrics()[m];
+    const analysis::Figure& metric = compared_metrics()[m];
     std::vector<std::string>& row = cells.emplace_back(1, title_of(metric));
     for (std::size_t c = 1; c < table.columns.size(); ++c) {
       row.push_back(shown(table.columns[c].differences[m], table.repeat, metric.decimals, true));
@@ -221,7 +221,7 @@ std::string to_csv(const ComparisonTable& table) {
                                                     : column.differences[m];
       const Spread& s = column.spreads[m];
       text +=
-          fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(column.name), compared_metrics()[m].key,
+          fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(column.name), compared_metrics()[m].name,
                       e.n, e.mean, e.standard_deviation, e.low, e.high, d.mean, d.low, d.high, s.p10, s.median, s.p90);
     }
   }
@@ -234,7 +234,7 @@ std::string to_json(const ComparisonTable& t, const std::string& config_json) {
     nlohmann::ordered_json means;
     nlohmann::ordered_json differences;
     for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
-      const std::string key(compared_metrics()[m].key);
+      const std::string key(compared_metrics()[m].name);
       means[key] = json_of(column.means[m]);
       means[key]["p10"] = analysis::number_or_null(column.spreads[m].p10);
       means[key]["median"] = analysis::number_or_null(column.spreads[m].median);
@@ -278,7 +278,7 @@ std::string runs_csv(const ComparisonPlan& plan, const Comparison& comparison) {
   const config::KeyTable keys(drawn);
   const std::vector<const config::Key*> varied = varied_keys(plan, keys, drawn);
   std::string text = "controller,run,result";
-  for (const ComparedMetric& metric : compared_metrics()) text += ',' + std::string(metric.key);
+  for (const analysis::Figure& metric : compared_metrics()) text += ',' + std::string(metric.name);
   for (const config::Key* key : varied) text += ',' + key->name;
   text += ",sensor_seed\n";
   for (std::size_t c = 0; c < comparison.contenders.size(); ++c) {
@@ -286,7 +286,7 @@ std::string runs_csv(const ComparisonPlan& plan, const Comparison& comparison) {
       const RunResult& run = comparison.results[c][k];
       text +=
           fmt::format("{},{},{}", csv_field(comparison.contenders[c].name), k, run.stopped() ? "completed" : "fault");
-      for (const ComparedMetric& metric : compared_metrics()) text += fmt::format(",{}", run.metrics.*metric.value);
+      for (const analysis::Figure& metric : compared_metrics()) text += fmt::format(",{}", metric.of(run.metrics));
       const Perturbation perturbation = draw(plan.variation, plan.seed, k);
       drawn.plant = perturbed(plan.settings.plant, perturbation);
       for (const config::Key* key : varied) text += fmt::format(",{}", *std::get<double*>(key->target));

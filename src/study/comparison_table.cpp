@@ -1,8 +1,8 @@
 #include "study/comparison_table.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <iterator>
 
 #include "config/model.hpp"
 
@@ -10,30 +10,21 @@ namespace abs_hil::study {
 
 namespace {
 
-using analysis::Metrics;
-
-constexpr std::array<ComparedMetric, 10> all_metrics{{
-    {"stop_time_s", "stop time", "s", 3, &Metrics::stop_time_s},
-    {"stop_distance_m", "stop distance", "m", 2, &Metrics::stop_distance_m},
-    {"slip_rms", "slip RMS error", "", 4, &Metrics::slip_rms},
-    {"slip_settling_s", "slip settling", "s", 3, &Metrics::slip_settling_s},
-    {"slip_overshoot", "slip overshoot", "", 4, &Metrics::slip_overshoot},
-    {"time_locked_s", "time locked", "s", 3, &Metrics::time_locked_s},
-    {"torque_total_variation_Nm", "torque variation", "N m", 1, &Metrics::torque_total_variation_Nm},
-    {"theta_settling_s", "theta settling", "s", 3, &Metrics::theta_settling_s},
-    {"theta_error_rms", "theta RMS error", "", 4, &Metrics::theta_error_rms},
-    {"theta_error_final", "theta error at end", "", 4, &Metrics::theta_error_final, true},
-}};
+using analysis::Better, analysis::Figure, analysis::Metrics;
 
 /// A metric of every run, in order; NaN for runs that ended by a fault.
-std::vector<double> values_of(const std::vector<RunResult>& runs, const ComparedMetric& metric) {
+std::vector<double> values_of(const std::vector<RunResult>& runs, double Metrics::*value, bool magnitude = false) {
   std::vector<double> values;
   values.reserve(runs.size());
   for (const RunResult& run : runs) {
-    const double value = run.metrics.*metric.value;
-    values.push_back(run.stopped() ? (metric.magnitude ? std::abs(value) : value) : rig::unknown);
+    const double found = run.stopped() ? run.metrics.*value : rig::unknown;
+    values.push_back(magnitude ? std::abs(found) : found);
   }
   return values;
+}
+
+std::vector<double> values_of(const std::vector<RunResult>& runs, const Figure& figure) {
+  return values_of(runs, figure.value, figure.better == Better::nearer_zero);
 }
 
 ControllerColumn column_of(const Contender& contender, const std::vector<RunResult>& runs,
@@ -47,7 +38,7 @@ ControllerColumn column_of(const Contender& contender, const std::vector<RunResu
                           .runs = runs.size(),
                           .faults = count([](const RunResult& run) { return !run.stopped(); }),
                           .locked = count([](const RunResult& run) { return run.metrics.time_locked_s > 0.0; })};
-  for (const ComparedMetric& metric : all_metrics) {
+  for (const Figure& metric : compared_metrics()) {
     const std::vector<double> values = values_of(runs, metric);
     column.means.push_back(analysis::estimate_mean(values));
     column.spreads.push_back({.p10 = analysis::quantile(values, 0.1),
@@ -71,8 +62,7 @@ std::optional<PaperRatio> paper_ratio(const Comparison& comparison) {
   const auto* theirs = runs_of("sliding-mode");
   if (ours == nullptr || theirs == nullptr) return std::nullopt;
   const auto ratio = [&](double Metrics::*value) {
-    const ComparedMetric metric{.key = {}, .title = {}, .unit = {}, .value = value};
-    return analysis::estimate_ratio(values_of(*ours, metric), values_of(*theirs, metric));
+    return analysis::estimate_ratio(values_of(*ours, value), values_of(*theirs, value));
   };
   return PaperRatio{.stop_time = ratio(&Metrics::stop_time_s),
                     .stop_distance = ratio(&Metrics::stop_distance_m),
@@ -82,7 +72,15 @@ std::optional<PaperRatio> paper_ratio(const Comparison& comparison) {
 
 }  // namespace
 
-std::span<const ComparedMetric> compared_metrics() noexcept { return all_metrics; }
+const std::vector<Figure>& compared_metrics() {
+  static const std::vector<Figure> compared = [] {
+    std::vector<Figure> rows;
+    std::copy_if(analysis::figures.begin(), analysis::figures.end(), std::back_inserter(rows),
+                 [](const Figure& figure) { return figure.compared; });
+    return rows;
+  }();
+  return compared;
+}
 
 ComparisonTable tabulate(const ComparisonPlan& plan, const Comparison& comparison) {
   ComparisonTable table{.plant = plan.settings.plant_name,

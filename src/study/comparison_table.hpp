@@ -12,18 +12,8 @@
 
 namespace abs_hil::study {
 
-/// A metric in the comparison of controllers.
-struct ComparedMetric {
-  std::string_view key;    ///< name in JSON and CSV, as in a run's summary
-  std::string_view title;  ///< name in text and Markdown
-  std::string_view unit;
-  int decimals{0};
-  double analysis::Metrics::*value;
-  bool magnitude{false};  ///< the absolute value counts
-};
-
-/// The metrics of `compare`, in order.
-[[nodiscard]] std::span<const ComparedMetric> compared_metrics() noexcept;
+/// The figures of `compare`, in order.
+[[nodiscard]] const std::vector<analysis::Figure>& compared_metrics();
 
 /// Quantiles over the runs without a fault that have the metric; NaN without any.
 struct Spread {

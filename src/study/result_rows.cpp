@@ -34,7 +34,7 @@ std::vector<std::string> result_columns(const Study& study) {
   std::vector<std::string> columns(std::begin(first_columns), std::end(first_columns));
   for (const Factor& factor : study.script().factors) columns.push_back(factor.key);
   columns.insert(columns.end(), {"result", "reason"});
-  for (const auto& [name, field] : analysis::metric_fields) columns.emplace_back(name);
+  for (const analysis::Figure& figure : analysis::figures) columns.emplace_back(figure.name);
   for (const SignalMetric& metric : study.script().metrics) columns.push_back(metric.name);
   return columns;
 }
@@ -51,8 +51,8 @@ std::string result_row(const Study& study, std::uint64_t run, const Outcome& out
                              : outcome.run.stopped()  ? std::string()
                                                       : std::string(rig::row_of(outcome.run.fault).name);
   fmt::format_to(out, ",{},{}", result_of(outcome), reason);
-  for (const auto& [name, field] : analysis::metric_fields) {
-    fmt::format_to(out, ",{}", outcome.refusal.empty() ? outcome.run.metrics.*field : rig::unknown);
+  for (const analysis::Figure& figure : analysis::figures) {
+    fmt::format_to(out, ",{}", outcome.refusal.empty() ? figure.of(outcome.run.metrics) : rig::unknown);
   }
   for (std::size_t i = 0; i < study.script().metrics.size(); ++i) {
     fmt::format_to(out, ",{}", own.empty() ? rig::unknown : own[i]);

@@ -125,8 +125,8 @@ class Page(ReportTest):
         self.assertEqual(list(read.figures), FIGURES)
         for row, key, decimals in (('stop time / s', 'stop_time_s', 3), ('stop distance / m', 'stop_distance_m', 2),
                                    ('slip RMS error', 'slip_rms', 4), ('slip overshoot', 'slip_overshoot', 4),
-                                   ('estimate of θ at 3 m/s / N', 'theta_final_N', 2),
-                                   ('variation of torque reference / (N m)', 'torque_total_variation_Nm', 1)):
+                                   ('theta at 3 m/s / N', 'theta_final_N', 2),
+                                   ('torque variation / (N m)', 'torque_total_variation_Nm', 1)):
             self.assertEqual(read.cell('metrics', row), f'{summary[key]:.{decimals}f}')
 
     def test_rig_run_without_truth(self):

@@ -92,7 +92,7 @@ TEST_CASE("CSV and JSON contain the table's numbers with full precision") {
       const std::vector<std::string> cells = split(line, ',');
       REQUIRE(cells.size() == header.size());
       CHECK(cells[0] == column.name);
-      CHECK(cells[1] == compared_metrics()[m].key);
+      CHECK(cells[1] == compared_metrics()[m].name);
       const auto& estimate = json["controllers"][c]["metrics"][cells[1]];
       if (std::isnan(column.means[m].mean)) continue;
       CHECK(std::stod(cells[3]) == column.means[m].mean);

@@ -1,6 +1,7 @@
 """The result of the benchmark as text, Markdown and JSON."""
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from collections.abc import Sequence
@@ -9,8 +10,8 @@ from typing import Any
 from .cases import VERSION
 from .score import Result, Score
 
-HEADINGS = ('runs', 'failed', 'locked', 'excess mean %', '90 % %', 'worst %', 'variation median N m', 'worst N m',
-             'slip overshoot', 'peak slip', 'ε')
+_COLUMNS = [field for field in dataclasses.fields(Score) if field.metadata]
+HEADINGS = tuple(field.metadata['heading'] for field in _COLUMNS)
 
 
 def _number(value: float, decimals: int) -> str:
@@ -18,10 +19,7 @@ def _number(value: float, decimals: int) -> str:
 
 
 def _cells(score: Score) -> list[str]:
-    return [str(score.runs), str(score.failed), str(score.locked), *(_number(100.0 * value, 1) for value in
-                                                                     (score.excess_mean, score.excess_p90, score.excess_worst)),
-            _number(score.variation_median_Nm, 0), _number(score.variation_worst_Nm, 0), _number(score.slip_overshoot, 2),
-            _number(score.slip_largest, 2), _number(score.adhesion, 3)]
+    return [_number(field.metadata['scale'] * getattr(score, field.name), field.metadata['decimals']) for field in _COLUMNS]
 
 
 def ranked(results: Sequence[Result], group: str = 'all') -> list[tuple[str, Score]]:

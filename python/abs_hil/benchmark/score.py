@@ -4,11 +4,12 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from ..figures import OVERSHOOT
 from ..hand import Plant
 from ..options import Value
 from ..simulation import keys, simulate, simulate_many
@@ -69,7 +70,7 @@ def _runs(entry: Entry, cases: Sequence[Case], seeds: Sequence[int]) -> list[dic
     return runs
 
 
-FIGURES = ('stop_distance_m', 'stop_time_s', 'torque_total_variation_Nm', 'slip_overshoot', 'slip_largest', 'time_locked_s')
+FIGURES = ('stop_distance_m', 'stop_time_s', 'torque_total_variation_Nm', OVERSHOOT, 'slip_largest', 'time_locked_s')
 
 
 def _figures(entry: Entry, runs: list[dict[str, Any]], threads: int) -> tuple[dict[str, np.ndarray], list[str]]:
@@ -91,6 +92,11 @@ def _figures(entry: Entry, runs: list[dict[str, Any]], threads: int) -> tuple[di
     return {name: np.array(values) for name, values in columns.items()}, faults
 
 
+def _column(heading: str, decimals: int = 0, scale: float = 1.0) -> Any:
+    """A field of Score that the result's tables show, times `scale`."""
+    return field(metadata={'heading': heading, 'decimals': decimals, 'scale': scale})
+
+
 @dataclass(frozen=True)
 class Score:
     """Of one group of cases, or of all.
@@ -100,18 +106,18 @@ class Score:
     failed: runs that a fault ended or that never stopped; no other figure has them.
     """
     group: str
-    runs: int
-    failed: int
-    locked: int
-    excess_mean: float
-    excess_p90: float
-    excess_worst: float
+    runs: int = _column('runs')
+    failed: int = _column('failed')
+    locked: int = _column('locked')
+    excess_mean: float = _column('excess mean %', 1, 100.0)
+    excess_p90: float = _column('90 % %', 1, 100.0)
+    excess_worst: float = _column('worst %', 1, 100.0)
     worst_case: str
-    variation_median_Nm: float
-    variation_worst_Nm: float
-    slip_overshoot: float
-    slip_largest: float
-    adhesion: float
+    variation_median_Nm: float = _column('variation median N m')
+    variation_worst_Nm: float = _column('worst N m')
+    slip_overshoot: float = _column('slip overshoot', 2)
+    slip_largest: float = _column('peak slip', 2)
+    adhesion: float = _column('ε', 3)
 
     def as_row(self) -> dict[str, Any]:
         return dict(self.__dict__)
@@ -143,7 +149,7 @@ def _score(group: str, rows: Sequence[Mapping[str, Any]]) -> Score:
     return Score(group, len(rows), int((~sound).sum()), sum(row['time_locked_s'] > 0 for row in rows),
                  of(excess[sound], np.mean), of(excess[sound], lambda e: np.percentile(e, 90)), of(excess[sound], np.max),
                  str(rows[worst]['case']), of(variation, np.median), of(variation, np.max),
-                 of(np.array([row['slip_overshoot'] for row in rows])[sound], np.max),
+                 of(np.array([row[OVERSHOOT] for row in rows])[sound], np.max),
                  of(np.array([row['slip_largest'] for row in rows])[sound], np.max), of(adhesion, np.mean))
 
 

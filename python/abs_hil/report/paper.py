@@ -5,7 +5,7 @@ import math
 from dataclasses import dataclass
 
 from .files import InputError, RunFiles
-from .survey import METRICS, Survey, value_of
+from .survey import Survey, merits_shown, value_of
 from .tables import Table
 from .text import DASH, shown
 
@@ -61,8 +61,8 @@ def lead(runs: list[RunFiles]) -> str:
 
 
 def pairs_of(runs: list[RunFiles], surveys: list[Survey]) -> dict[str, Pair]:
-    return {metric.key: Pair((value_of(metric, runs[0], surveys[0]), value_of(metric, runs[1], surveys[1])),
-                             metric.decimals) for metric in METRICS}
+    return {metric.name: Pair((value_of(metric, runs[0], surveys[0]), value_of(metric, runs[1], surveys[1])),
+                             metric.decimals) for metric in merits_shown()}
 
 
 def claims(pairs: dict[str, Pair]) -> Table:

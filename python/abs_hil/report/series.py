@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..core import _core
+from ..figures import FigureOfMerit, figures
 from .files import RunFiles, SeriesFiles, differing_keys
 from .model import Curve, Figure, Label, Panel, Style
-from .survey import METRICS, Metric, Survey, value_of
+from .survey import Survey, merits_shown, value_of
 from .tables import Table
 from .text import DASH, clean, shown
 
@@ -69,15 +70,15 @@ def study(series: SeriesFiles, runs: list[RunFiles]) -> SeriesStudy:
     return found
 
 
-def _values(metric: Metric, group: Group, runs: list[RunFiles], surveys: list[Survey]) -> list[float]:
+def _values(metric: FigureOfMerit, group: Group, runs: list[RunFiles], surveys: list[Survey]) -> list[float]:
     return [value_of(metric, runs[number], surveys[number]) for number in group.runs]
 
 
 def group_table(found: SeriesStudy, runs: list[RunFiles], surveys: list[Survey]) -> Table:
     """One row a group: the means of the figures of merit that the runs have."""
     columns = []
-    for metric in METRICS:
-        if metric.key == 'brake_start_s':
+    for metric in merits_shown():
+        if metric.name == 'brake_start_s':
             continue
         cells = []
         for group in found.groups:
@@ -85,7 +86,7 @@ def group_table(found: SeriesStudy, runs: list[RunFiles], surveys: list[Survey])
             half = f' ± {shown(0.5 * (high - low), metric.decimals)}' if n > 1 else ''
             cells.append(shown(mean, metric.decimals) + half if n else DASH)
         if any(cell != DASH for cell in cells):
-            columns.append((metric.name, cells))
+            columns.append((metric.heading, cells))
     rows = [[group.label, str(len(group.runs)), *(cells[number] for _, cells in columns)]
             for number, group in enumerate(found.groups)]
     return Table('groups', ['group', 'runs', *(name for name, _ in columns)], rows)
@@ -94,15 +95,15 @@ def group_table(found: SeriesStudy, runs: list[RunFiles], surveys: list[Survey])
 def series_table(found: SeriesStudy, runs: list[RunFiles], surveys: list[Survey]) -> Table:
     """Mean, standard deviation and 95 % confidence interval of each figure of merit by group."""
     rows = []
-    for metric in METRICS:
-        if metric.key == 'brake_start_s':
+    for metric in merits_shown():
+        if metric.name == 'brake_start_s':
             continue
         for group in found.groups:
             n, mean, deviation, low, high = _core.estimate_mean(_values(metric, group, runs, surveys))
             if n == 0:
                 continue
             digits = metric.decimals + 1
-            rows.append([metric.name, group.label, str(n), shown(mean, digits), shown(deviation, digits),
+            rows.append([metric.heading, group.label, str(n), shown(mean, digits), shown(deviation, digits),
                          DASH if n < 2 else f'{shown(low, digits)} to {shown(high, digits)}'])
     return Table('series', ['figure', ', '.join(found.keys) or 'only the seed varies', 'runs', 'mean', 'standard deviation',
                             '95 % interval of the mean'], rows)
@@ -115,7 +116,7 @@ def series_figure(number: int, found: SeriesStudy, runs: list[RunFiles], surveys
     beside = 0.012 * (x_range[1] - x_range[0])
     panels = []
     for key, label in SHOWN.items():
-        metric = next(metric for metric in METRICS if metric.key == key)
+        metric = figures()[key]
         every: list[tuple[float, float]] = []
         means: list[tuple[float, float, float, float]] = []
         for place, group in zip(places, found.groups):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..core import _core
+from ..figures import FigureOfMerit, figures
 from ..run import COLUMNS, TEXTS, signals_of
 from .files import InputError, RunFiles
 from .text import significant
@@ -25,23 +26,9 @@ _PROFILES = {'plant.friction_profile': 'friction', 'plant.brake_torque_profile':
              'plant.lower_bearing_profile': 'lower bearing'}
 
 
-@dataclass
-class Metric:
-    """A figure of merit of a braking run (docs/telemetry.md)."""
-    key: str
-    name: str
-    decimals: int
-
-
-METRICS = (
-    Metric('brake_start_s', 'braking starts at / s', 3), Metric('stop_time_s', 'stop time / s', 3),
-    Metric('stop_distance_m', 'stop distance / m', 2), Metric('slip_rms', 'slip RMS error', 4),
-    Metric('slip_reached_s', 'slip reached after / s', 3), Metric('slip_settling_s', 'slip settled after / s', 3),
-    Metric('slip_overshoot', 'slip overshoot', 4), Metric('time_locked_s', 'time locked / s', 3),
-    Metric('torque_total_variation_Nm', 'variation of torque reference / (N m)', 1),
-    Metric('theta_final_N', 'estimate of θ at 3 m/s / N', 2), Metric('theta_error_final', 'relative error of θ at 3 m/s', 4),
-    Metric('theta_error_rms', 'relative RMS error of θ', 4), Metric('theta_error_max_N', 'largest error of θ / N', 2),
-    Metric('theta_settling_s', 'estimate of θ settled after / s', 3))
+def merits_shown() -> list[FigureOfMerit]:
+    """The figures of merit of a report: those of a run's summary."""
+    return [figure for figure in figures().values() if figure.in_summary]
 
 
 @dataclass
@@ -173,21 +160,21 @@ def _changes(run: RunFiles, rows: Rows, r2_m: float) -> list[Change]:
     return changes
 
 
-def value_of(metric: Metric, run: RunFiles, found: Survey) -> float:
+def value_of(metric: FigureOfMerit, run: RunFiles, found: Survey) -> float:
     """The summary's value, else the value computed from the rows."""
-    said = run.number(metric.key)
-    return said if math.isfinite(said) else found.metrics[metric.key]
+    said = run.number(metric.name)
+    return said if math.isfinite(said) else found.metrics[metric.name]
 
 
 def contradictions(run: RunFiles, found: Survey) -> list[str]:
     """Notes about figures that differ between summary and rows: then the files belong to different runs."""
     tolerance = 1e-6  # rounding stays below it; a missing row exceeds it
     notes = []
-    for metric in METRICS:
-        said, computed = run.number(metric.key), found.metrics[metric.key]
+    for metric in merits_shown():
+        said, computed = run.number(metric.name), found.metrics[metric.name]
         if not (math.isfinite(said) and math.isfinite(computed)):
             continue
         if abs(said - computed) > tolerance * max(1.0, abs(said)):
-            notes.append(f'{metric.key}: the summary says {significant(said, 6)} but the CSV gives '
+            notes.append(f'{metric.name}: the summary says {significant(said, 6)} but the CSV gives '
                          f'{significant(computed, 6)}; rows are missing, or the files belong to different runs')
     return notes

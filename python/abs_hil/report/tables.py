@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from .files import Event, RunFiles, differing_keys
-from .survey import METRICS, Survey, contradictions, value_of
+from .survey import Survey, contradictions, merits_shown, value_of
 from .text import DASH, shown, significant
 
 if TYPE_CHECKING:
@@ -77,12 +77,12 @@ def metrics_table(runs: list[RunFiles], surveys: list[Survey]) -> tuple[Table, s
     if any(models):
         add('model differs from plant', [model or DASH for model in models])
     add('speeds and slip', ['truth' if 'omega2_rad_s' in found.known else 'estimates' for found in surveys])
-    for metric in METRICS:
+    for metric in merits_shown():
         values = [value_of(metric, run, found) for run, found in zip(runs, surveys)]
         if not any(math.isfinite(value) for value in values):
             continue
-        comparable = pair and metric.key not in ('brake_start_s', 'theta_error_final')
-        add(metric.name, [shown(value, metric.decimals) for value in values],
+        comparable = pair and metric.better == 'less'
+        add(metric.heading, [shown(value, metric.decimals) for value in values],
             _change(values[0], values[1]) if comparable else '')
     add('rows in the CSV', [str(found.rows) for found in surveys])
     return table.arranged(len(runs)), f'All runs: {"; ".join(shared)}.' if shared else ''
@@ -94,7 +94,7 @@ def merits(runs: list[RunFiles], surveys: list[Survey]) -> pandas.DataFrame:
     rows: list[dict[str, Any]] = []
     for run, found in zip(runs, surveys):
         rows.append({'run': run.called, **{key: run.text(key) for key in ('controller', 'plant', 'experiment', 'result')},
-                     **{metric.key: value_of(metric, run, found) for metric in METRICS}})
+                     **{metric.name: value_of(metric, run, found) for metric in merits_shown()}})
     return pandas.DataFrame(rows)
 
 

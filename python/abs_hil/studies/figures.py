@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..figures import heading_of
 from ..report.model import run_style
 from .results import StudyResults, _binned
 
@@ -18,12 +19,6 @@ MOST_BINS, LEAST_BINS = 16, 4
 #: points in a part of a curve
 POINTS_IN_BIN = 8
 MOST_FACTORS, MOST_PAIRS, MOST_CURVES = 6, 3, 7
-TITLES = {'stop_time_s': 'stop time, s', 'stop_distance_m': 'stop distance, m', 'slip_rms': 'slip RMS error',
-          'slip_reached_s': 'slip reached, s', 'slip_settling_s': 'slip settling, s', 'slip_overshoot': 'slip overshoot',
-          'slip_largest': 'largest slip',
-          'time_locked_s': 'time locked, s', 'torque_total_variation_Nm': 'torque variation, N m',
-          'theta_error_rms': 'theta RMS error', 'theta_error_max_N': 'largest theta error, N',
-          'theta_settling_s': 'theta settling, s', 'theta_error_final': 'theta error at end'}
 
 
 @dataclass
@@ -100,11 +95,11 @@ def curves(results: StudyResults, metric: str) -> Drawing | None:
         axes.set_xlabel(factor)
         axes.grid(True, color='#e4e4e4')
     for axes in every[:, 0]:
-        axes.set_ylabel(TITLES.get(metric, metric))
+        axes.set_ylabel(heading_of(metric))
     handles, names = every[0, 0].get_legend_handles_labels()
     if len(groups) > 1:
         every[0, 0].legend(handles, names, loc='lower left', bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False, fontsize=8)
-    return Drawing(f'curves-{metric}', TITLES.get(metric, metric),
+    return Drawing(f'curves-{metric}', heading_of(metric),
                    'Median over each factor, whatever the others are; 80 % of the runs lie in the band.', _svg(picture))
 
 
@@ -129,6 +124,6 @@ def maps(results: StudyResults, metric: str) -> Drawing | None:
             axes.set_xlabel(x)
             axes.set_ylabel(y)
             axes.set_title(name, fontsize=9)
-    picture.colorbar(drawn, ax=every, label=TITLES.get(metric, metric))
-    return Drawing(f'maps-{metric}', TITLES.get(metric, metric),
+    picture.colorbar(drawn, ax=every, label=heading_of(metric))
+    return Drawing(f'maps-{metric}', heading_of(metric),
                    'Median over two factors, whatever the others are. White: no run was completed there.', _svg(picture))

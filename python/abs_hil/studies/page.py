@@ -6,9 +6,10 @@ import pathlib
 from typing import Any
 
 from ..core import _core
+from ..figures import heading_of
 from ..report.tables import Table
 from ..report.text import DASH, significant
-from .figures import TITLES, curve_names, curves, groups_of, maps
+from .figures import curve_names, curves, groups_of, maps
 from .results import StudyResults
 
 _FOLDER = pathlib.Path(__file__).parent
@@ -24,7 +25,7 @@ def quantile_table(results: StudyResults) -> Table:
     every = dict(groups_of(results.columns([*by, 'result']), by))
     rows = []
     for metric in results.metrics:
-        row = [TITLES.get(metric, metric)]
+        row = [heading_of(metric)]
         complete = dict(groups_of(results.completed([*by, metric]), by))
         for name in every:
             values = complete[name][metric].dropna() if name in complete else None
@@ -51,10 +52,10 @@ def sobol_table(results: StudyResults, metrics: list[str]) -> tuple[Table, list[
             try:
                 found = results.sobol_indices(metric, where)
             except ValueError as error:
-                notes.append(f'{", ".join(filter(None, (TITLES.get(metric, metric), name)))}: {error}')
+                notes.append(f'{", ".join(filter(None, (heading_of(metric), name)))}: {error}')
                 continue
             for factor, row in found.iterrows():
-                rows.append([TITLES.get(metric, metric), name or DASH, str(factor),
+                rows.append([heading_of(metric), name or DASH, str(factor),
                              f'{row["S1"]:.3f} ± {row["S1_conf"]:.3f}', f'{row["ST"]:.3f} ± {row["ST_conf"]:.3f}'])
     return Table('sobol', ['metric', 'of', 'factor', 'first order', 'total'], rows, False), notes
 

@@ -43,9 +43,9 @@ std::vector<const char*> sets() {
 }
 
 bool same_bits(const RunResult& a, const RunResult& b) {
-  for (const auto& [name, field] : analysis::metric_fields) {
-    const double x = a.metrics.*field;
-    const double y = b.metrics.*field;
+  for (const analysis::Figure& figure : analysis::figures) {
+    const double x = figure.of(a.metrics);
+    const double y = figure.of(b.metrics);
     if (std::bit_cast<std::uint64_t>(x) != std::bit_cast<std::uint64_t>(y) && !(std::isnan(x) && std::isnan(y)))
       return false;
   }
