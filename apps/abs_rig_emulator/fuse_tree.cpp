@@ -1,7 +1,7 @@
 #include "fuse_tree.hpp"
 
 #define FUSE_USE_VERSION 31
-#include <fuse_lowlevel.h>
+#include <fuse.h>
 #include <spawn.h>
 #include <sys/mount.h>
 #include <sys/stat.h>
@@ -21,175 +21,110 @@ struct FuseTree::State {
   std::vector<std::string> folders;
   std::vector<ServedFile> files;
   FileHandler* handler{nullptr};
-  fuse_session* session{nullptr};
+  fuse* tree{nullptr};
   fuse_buf buffer{};
 };
 
 namespace {
 
-// Inodes: 1 the root; folder f is 2 + f; file i of folder f is first_file + f * files_per_folder + i.
-constexpr fuse_ino_t first_folder = 2;
-constexpr fuse_ino_t first_file = 1000;
-constexpr fuse_ino_t files_per_folder = 100;
-/// The kernel must cache nothing, so that an unplugged card disappears at once.
-constexpr double no_caching = 0.0;
+const FuseTree::State& state() { return *static_cast<FuseTree::State*>(fuse_get_context()->private_data); }
 
-FuseTree::State& state_of(fuse_req_t request) { return *static_cast<FuseTree::State*>(fuse_req_userdata(request)); }
+/// What a path names: the root, a card's folder, or a file in it.
+struct Named {
+  bool exists{false};
+  bool behind{false};               ///< a card is behind the folder
+  const ServedFile* file{nullptr};  ///< null: a folder
+};
 
-bool is_there(const FuseTree::State& s, std::size_t folder) {
-  return folder < s.folders.size() && (folder != 0 || s.handler->present());
+bool is_there(std::size_t folder) { return folder != 0 || state().handler->present(); }
+
+Named named(std::string_view path) {
+  const FuseTree::State& s = state();
+  if (path == "/") return {.exists = true};
+  path.remove_prefix(1);
+  const std::size_t slash = path.find('/');
+  const auto folder = std::find(s.folders.begin(), s.folders.end(), path.substr(0, slash));
+  const auto number = static_cast<std::size_t>(folder - s.folders.begin());
+  if (folder == s.folders.end() || !is_there(number)) return {};
+  if (slash == std::string_view::npos) return {.exists = true};
+  const auto file = std::ranges::find(s.files, path.substr(slash + 1), &ServedFile::name);
+  if (file == s.files.end()) return {};
+  return {.exists = true, .behind = number == 0, .file = &*file};
 }
 
-/// The file behind an inode; null if there is none, or if the card is gone.
-const ServedFile* file_of(const FuseTree::State& s, fuse_ino_t inode) {
-  if (inode < first_file) return nullptr;
-  const std::size_t folder = (inode - first_file) / files_per_folder;
-  const std::size_t file = (inode - first_file) % files_per_folder;
-  return is_there(s, folder) && file < s.files.size() ? &s.files[file] : nullptr;
-}
-bool is_first_folder(fuse_ino_t inode) { return inode < first_file + files_per_folder; }
-
-bool attributes(const FuseTree::State& s, fuse_ino_t inode, struct stat& out) {
-  out = {};
-  out.st_ino = inode;
-  out.st_uid = getuid();
-  out.st_gid = getgid();
-  if (inode == FUSE_ROOT_ID || (inode < first_file && is_there(s, inode - first_folder))) {
-    out.st_mode = S_IFDIR | 0755;
-    out.st_nlink = 2;
-    return true;
+int on_getattr(const char* path, struct stat* out, fuse_file_info* /*info*/) {
+  const Named what = named(path);
+  if (!what.exists) return -ENOENT;
+  *out = {};
+  out->st_uid = getuid();
+  out->st_gid = getgid();
+  out->st_nlink = what.file == nullptr ? 2 : 1;
+  out->st_mode = what.file == nullptr ? S_IFDIR | 0755 : S_IFREG | static_cast<mode_t>(what.file->mode);
+  if (what.file != nullptr) {
+    out->st_size = static_cast<off_t>(what.file->registers ? what.file->bytes : what.file->content.size());
   }
-  const ServedFile* file = file_of(s, inode);
-  if (file == nullptr) return false;
-  out.st_mode = S_IFREG | static_cast<mode_t>(file->mode);
-  out.st_nlink = 1;
-  out.st_size = static_cast<off_t>(file->registers ? file->bytes : file->content.size());
-  return true;
+  return 0;
 }
 
-void on_lookup(fuse_req_t request, fuse_ino_t parent, const char* name) {
-  const FuseTree::State& s = state_of(request);
-  fuse_ino_t inode = 0;
-  if (parent == FUSE_ROOT_ID) {
-    const auto found = std::find(s.folders.begin(), s.folders.end(), name);
-    if (found != s.folders.end()) inode = first_folder + static_cast<fuse_ino_t>(found - s.folders.begin());
-  } else if (parent < first_file) {
-    const auto found = std::find_if(s.files.begin(), s.files.end(), [&](const auto& f) { return f.name == name; });
-    if (found != s.files.end()) {
-      inode =
-          first_file + (parent - first_folder) * files_per_folder + static_cast<fuse_ino_t>(found - s.files.begin());
-    }
+int on_readdir(const char* path, void* buffer, fuse_fill_dir_t fill, off_t /*offset*/, fuse_file_info* /*info*/,
+               fuse_readdir_flags /*flags*/) {
+  const FuseTree::State& s = state();
+  const auto add = [&](const std::string& name) { fill(buffer, name.c_str(), nullptr, 0, fuse_fill_dir_flags{}); };
+  if (!named(path).exists) return -ENOENT;
+  add(".");
+  add("..");
+  if (std::string_view(path) != "/") {
+    for (const ServedFile& file : s.files) add(file.name);
+    return 0;
   }
-  fuse_entry_param entry{};
-  if (inode == 0 || !attributes(s, inode, entry.attr)) {
-    fuse_reply_err(request, ENOENT);
-    return;
+  for (std::size_t i = 0; i < s.folders.size(); ++i) {
+    if (is_there(i)) add(s.folders[i]);
   }
-  entry.ino = inode;
-  entry.attr_timeout = entry.entry_timeout = no_caching;
-  fuse_reply_entry(request, &entry);
+  return 0;
 }
 
-void on_getattr(fuse_req_t request, fuse_ino_t inode, fuse_file_info* /*info*/) {
-  struct stat out {};
-  if (attributes(state_of(request), inode, out)) {
-    fuse_reply_attr(request, &out, no_caching);
-  } else {
-    fuse_reply_err(request, ENOENT);
-  }
-}
-
-/// Called for O_TRUNC and `touch`: changes nothing.
-void on_setattr(fuse_req_t request, fuse_ino_t inode, struct stat* /*wanted*/, int /*which*/, fuse_file_info* info) {
-  on_getattr(request, inode, info);
-}
-
-void on_readdir(fuse_req_t request, fuse_ino_t inode, size_t size, off_t offset, fuse_file_info* /*info*/) {
-  const FuseTree::State& s = state_of(request);
-  std::vector<std::pair<std::string, fuse_ino_t>> entries{{".", inode}, {"..", FUSE_ROOT_ID}};
-  if (inode == FUSE_ROOT_ID) {
-    for (std::size_t i = 0; i < s.folders.size(); ++i) {
-      if (is_there(s, i)) entries.emplace_back(s.folders[i], first_folder + i);
-    }
-  } else if (inode < first_file && is_there(s, inode - first_folder)) {
-    const fuse_ino_t base = first_file + (inode - first_folder) * files_per_folder;
-    for (std::size_t i = 0; i < s.files.size(); ++i) entries.emplace_back(s.files[i].name, base + i);
-  }
-  std::vector<char> buffer(size);
-  std::size_t used = 0;
-  for (auto i = static_cast<std::size_t>(offset); i < entries.size(); ++i) {
-    struct stat out {};
-    static_cast<void>(attributes(s, entries[i].second, out));
-    const std::size_t needed = fuse_add_direntry(request, buffer.data() + used, size - used, entries[i].first.c_str(),
-                                                 &out, static_cast<off_t>(i + 1));
-    if (needed > size - used) break;
-    used += needed;
-  }
-  fuse_reply_buf(request, buffer.data(), used);
-}
-
-void on_open(fuse_req_t request, fuse_ino_t inode, fuse_file_info* info) {
-  const FuseTree::State& s = state_of(request);
-  const ServedFile* file = file_of(s, inode);
-  const int result = file == nullptr ? -ENOENT : (file->registers ? s.handler->open(file->name) : 0);
-  if (result < 0) {
-    fuse_reply_err(request, -result);
-    return;
-  }
+int on_open(const char* path, fuse_file_info* info) {
+  const Named what = named(path);
+  if (what.file == nullptr) return -ENOENT;
   info->direct_io = 1;
-  fuse_reply_open(request, info);
+  return what.file->registers ? state().handler->open(what.file->name) : 0;
 }
 
-void on_read(fuse_req_t request, fuse_ino_t inode, size_t size, off_t offset, fuse_file_info* /*info*/) {
-  const FuseTree::State& s = state_of(request);
-  const ServedFile* file = file_of(s, inode);
-  if (file == nullptr) {
-    fuse_reply_err(request, ENODEV);  // the card was unplugged while the file was open
-    return;
-  }
+int on_read(const char* path, char* data, size_t size, off_t offset, fuse_file_info* /*info*/) {
+  const Named what = named(path);
+  if (what.file == nullptr) return -ENODEV;  // the card was unplugged while the file was open
   const auto at = static_cast<std::size_t>(offset);
-  if (!file->registers) {
-    const std::string_view rest = std::string_view(file->content).substr(std::min(at, file->content.size()), size);
-    fuse_reply_buf(request, rest.data(), rest.size());
-    return;
-  }
-  std::array<char, 8> word{};
-  const int result = is_first_folder(inode) ? s.handler->read(file->name, at, word.data(), std::min(size, word.size()))
-                                            : -EIO;  // a folder without a card behind it
-  if (result < 0) {
-    fuse_reply_err(request, -result);
-  } else {
-    fuse_reply_buf(request, word.data(), static_cast<std::size_t>(result));
-  }
+  if (what.file->registers) return what.behind ? state().handler->read(what.file->name, at, data, size) : -EIO;
+  const std::string& content = what.file->content;
+  return static_cast<int>(content.copy(data, size, std::min(at, content.size())));
 }
 
-void on_write(fuse_req_t request, fuse_ino_t inode, const char* data, size_t size, off_t offset,
-              fuse_file_info* /*info*/) {
-  const FuseTree::State& s = state_of(request);
-  const ServedFile* file = file_of(s, inode);
-  if (file == nullptr) {
-    fuse_reply_err(request, ENODEV);
-    return;
-  }
-  const int result = file->registers && is_first_folder(inode)
-                         ? s.handler->write(file->name, static_cast<std::size_t>(offset), data, size)
-                         : -EACCES;
-  if (result < 0) {
-    fuse_reply_err(request, -result);
-  } else {
-    fuse_reply_write(request, static_cast<std::size_t>(result));
-  }
+int on_write(const char* path, const char* data, size_t size, off_t offset, fuse_file_info* /*info*/) {
+  const Named what = named(path);
+  if (what.file == nullptr) return -ENODEV;
+  if (!what.file->registers || !what.behind) return -EACCES;
+  return state().handler->write(what.file->name, static_cast<std::size_t>(offset), data, size);
 }
 
-fuse_lowlevel_ops operations() {
-  fuse_lowlevel_ops ops{};
-  ops.lookup = on_lookup;
+/// The kernel must cache nothing, so that an unplugged card disappears at once.
+void* on_init(fuse_conn_info* /*connection*/, fuse_config* config) {
+  config->entry_timeout = config->attr_timeout = config->negative_timeout = 0.0;
+  return fuse_get_context()->private_data;
+}
+
+fuse_operations operations() {
+  fuse_operations ops{};
+  ops.init = on_init;
   ops.getattr = on_getattr;
-  ops.setattr = on_setattr;
   ops.readdir = on_readdir;
   ops.open = on_open;
   ops.read = on_read;
   ops.write = on_write;
+  // O_TRUNC, touch, chgrp: taken, and nothing changes.
+  ops.truncate = [](const char*, off_t, fuse_file_info*) { return 0; };
+  ops.utimens = [](const char*, const timespec*, fuse_file_info*) { return 0; };
+  ops.chmod = [](const char*, mode_t, fuse_file_info*) { return 0; };
+  ops.chown = [](const char*, uid_t, gid_t, fuse_file_info*) { return 0; };
   return ops;
 }
 
@@ -221,12 +156,11 @@ FuseTree::FuseTree(const std::string& root, std::vector<std::string> folders, st
   std::array<char*, 4> words{const_cast<char*>("abs_rig_emulator"), const_cast<char*>("-o"),
                              const_cast<char*>("fsname=abs_rig_emulator"), nullptr};
   fuse_args arguments = FUSE_ARGS_INIT(3, words.data());
-  static const fuse_lowlevel_ops ops = operations();
-  state_->session = fuse_session_new(&arguments, &ops, sizeof ops, state_);
+  static const fuse_operations ops = operations();
+  state_->tree = fuse_new(&arguments, &ops, sizeof ops, state_.get());
   fuse_opt_free_args(&arguments);
-  if (state_->session == nullptr || fuse_session_mount(state_->session, root.c_str()) != 0) {
-    if (state_->session != nullptr) fuse_session_destroy(state_->session);
-    delete state_;
+  if (state_->tree == nullptr || fuse_mount(state_->tree, root.c_str()) != 0) {
+    if (state_->tree != nullptr) fuse_destroy(state_->tree);
     throw std::runtime_error(
         "cannot mount a FUSE tree at " + root +
         ": it needs /dev/fuse (sudo modprobe fuse), the package fuse3, and an empty folder that you own");
@@ -234,20 +168,20 @@ FuseTree::FuseTree(const std::string& root, std::vector<std::string> folders, st
 }
 
 FuseTree::~FuseTree() {
-  fuse_session_unmount(state_->session);
-  fuse_session_destroy(state_->session);
+  fuse_unmount(state_->tree);
+  fuse_destroy(state_->tree);
   free(state_->buffer.mem);
-  delete state_;
 }
 
-int FuseTree::descriptor() const { return fuse_session_fd(state_->session); }
+int FuseTree::descriptor() const { return fuse_session_fd(fuse_get_session(state_->tree)); }
 
 bool FuseTree::serve_one() {
-  const int got = fuse_session_receive_buf(state_->session, &state_->buffer);
+  fuse_session* session = fuse_get_session(state_->tree);
+  const int got = fuse_session_receive_buf(session, &state_->buffer);
   if (got == -EINTR || got == -EAGAIN) return true;
   if (got <= 0) return false;
-  fuse_session_process_buf(state_->session, &state_->buffer);
-  return fuse_session_exited(state_->session) == 0;
+  fuse_session_process_buf(session, &state_->buffer);
+  return fuse_session_exited(session) == 0;
 }
 
 }  // namespace abs_hil::program

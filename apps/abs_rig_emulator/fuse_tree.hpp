@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -55,7 +55,7 @@ class FuseTree {
   struct State;
 
  private:
-  State* state_;
+  std::unique_ptr<State> state_;
 };
 
 }  // namespace abs_hil::program

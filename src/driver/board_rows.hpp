@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include "abs_hil/rig/option.hpp"
 
 namespace abs_hil::driver {
@@ -22,5 +24,13 @@ inline constexpr rig::OptionFacts pwm_width{
 inline constexpr rig::OptionFacts encoder_sign{.meaning = "1, or -1 if the channel counts down going forward",
                                                .range = rig::between(-1, 1),
                                                .safety = rig::commissioned};
+
+/// Everything below `driver.sim.` in the configuration: the board of the simulated rig.
+struct SimOptions {
+  ABS_HIL_OPTIONS(SimOptions);
+  /// As the RT-DAC4/PCI in the vendor's demos.
+  ABS_HIL_OPTION(std::string, pwm_mode, "12-bit", .meaning = pwm_width.meaning, .allowed = pwm_width.allowed,
+                 .safety = rig::no_effect_on_safety);
+};
 
 }  // namespace abs_hil::driver

@@ -12,7 +12,7 @@
 
 #include "abs_hil/driver/backend.hpp"
 #include "abs_hil/rig/option.hpp"
-#include "driver/sim_options.hpp"
+#include "driver/board_rows.hpp"
 
 namespace abs_hil::driver {
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string_view>
 
+#include "abs_hil/driver/backend.hpp"
 #include "abs_hil/rig/duty_grid.hpp"
 
 namespace abs_hil::driver {
@@ -27,9 +28,12 @@ enum class PwmMode : std::uint32_t { bits_8 = 0, bits_12 = 1 };
 [[nodiscard]] constexpr double pwm_frequency_Hz(PwmMode mode, std::uint32_t prescaler) noexcept {
   return board_clock_Hz / ((static_cast<double>(prescaler) + 1.0) * static_cast<double>(full_width(mode)));
 }
-/// Width register for a duty in [0, 1], rounded, but never above the cap in [0, 1].
-[[nodiscard]] constexpr std::uint32_t pwm_width_for(PwmMode mode, double duty, double duty_max) noexcept {
-  return rig::width_for(full_width(mode), duty, duty_max);
+/// The grid of a board whose options have `pwm_mode` and the two caps.
+template <typename Options>
+[[nodiscard]] OutputGrid pwm_grid(const Options& options) noexcept {
+  return {.duty_steps = full_width(pwm_mode_named(options.pwm_mode)),
+          .motor_duty_max = options.motor_duty_max,
+          .brake_duty_max = options.brake_duty_max};
 }
 
 }  // namespace abs_hil::driver

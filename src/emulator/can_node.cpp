@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "abs_hil/rig/time_units.hpp"
-#include "emulator/rig_behind.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::emulator {
@@ -60,14 +59,10 @@ bool sound(const BusFrame& frame, unsigned length) {
 }  // namespace
 
 CanNode::CanNode(const CanNodeOptions& options)
-    : options_(options),
-      plant_(options.plant),
-      upper_(plant_sim::upper_encoder(options.plant)),
-      lower_(plant_sim::lower_encoder(options.plant)) {
+    : RigBehind(options.plant, options.start_speed_rad_s), options_(options) {
   if (options.watchdog_ms < 1 || options.watchdog_ms > 10000) {
     throw std::invalid_argument("watchdog " + std::to_string(options.watchdog_ms) + " ms: give 1 to 10000");
   }
-  start_wheels(plant_, options.start_speed_rad_s);
 }
 
 std::uint32_t CanNode::trip_flags() const noexcept {
@@ -77,7 +72,7 @@ std::uint32_t CanNode::trip_flags() const noexcept {
 
 Outputs CanNode::outputs() const noexcept {
   if (state_ != State::active || trip_flags() != 0) return {};
-  return {.drive_duty = emergency_stop_ ? 0.0 : drive_, .brake_duty = std::clamp(brake_ + brake_error_, 0.0, 1.0)};
+  return {.drive_duty = emergency_stop() ? 0.0 : drive_, .brake_duty = std::clamp(brake_ + brake_error_, 0.0, 1.0)};
 }
 
 std::int64_t CanNode::watchdog_ends_ns() const noexcept {
@@ -89,7 +84,7 @@ void CanNode::become(State state, std::uint8_t latch_reason, const std::string& 
   latch_reason_ = latch_reason;
   brake_ = drive_ = 0.0;
   status_due_ = true;
-  events_.push_back({time_ns_, why});
+  events_.push_back({time_ns(), why});
   note_outputs(why);
 }
 
@@ -97,18 +92,18 @@ void CanNode::note_outputs(const std::string& why) {
   const Outputs out = outputs();
   const bool nonzero = out.drive_duty > 0.0 || out.brake_duty > 0.0;
   if (nonzero_ && !nonzero) {
-    const double since_ms = static_cast<double>(time_ns_ - last_command_ns_) * 1e-6;
+    const double since_ms = static_cast<double>(time_ns() - last_command_ns_) * 1e-6;
     events_.push_back(
-        {time_ns_, "outputs zero: " + why +
-                       (last_command_ns_ < 0 ? "" : rig::formatted("; last valid command %.3f ms ago", since_ms))});
+        {time_ns(), "outputs zero: " + why +
+                        (last_command_ns_ < 0 ? "" : rig::formatted("; last valid command %.3f ms ago", since_ms))});
   } else if (!nonzero_ && nonzero) {
-    events_.push_back({time_ns_, "outputs on"});
+    events_.push_back({time_ns(), "outputs on"});
   }
   nonzero_ = nonzero;
 }
 
 void CanNode::check_interlocks() {
-  const double fastest = fastest_rad_s(plant_);
+  const double fastest = fastest_rad_s();
   if (fastest > rad_s_of_rpm(options_.overspeed_rpm)) {
     overspeed_latched_ = true;
   } else if (fastest < standstill_rad_s) {
@@ -117,28 +112,18 @@ void CanNode::check_interlocks() {
   if (trip_flags() != trip_told_) {
     trip_told_ = trip_flags();
     status_due_ = true;
-    events_.push_back({time_ns_, rig::formatted("trip flags %u", trip_told_)});
+    events_.push_back({time_ns(), rig::formatted("trip flags %u", trip_told_)});
     note_outputs("interlock");
   }
 }
 
-void CanNode::advance_to(std::int64_t time_ns) {
-  while (time_ns_ < time_ns) {
-    std::int64_t next = step_end_ns(time_ns_, time_ns, step_ns);
-    const bool guarded = state_ == State::active && (brake_ > 0.0 || drive_ > 0.0);
-    if (guarded) next = std::clamp(watchdog_ends_ns(), time_ns_, next);
-    step(plant_, next - time_ns_, outputs());
-    time_ns_ = next;
-    if (guarded && time_ns_ >= watchdog_ends_ns()) {
-      become(State::latched, 1, "watchdog");
-    }
-    check_interlocks();
-  }
+std::int64_t CanNode::step_end_ns(std::int64_t next_ns) const noexcept {
+  return guarded() ? std::clamp(watchdog_ends_ns(), time_ns(), next_ns) : next_ns;
 }
 
-std::int64_t CanNode::count(bool upper_wheel) const noexcept {
-  const plant_sim::PlantState& s = plant_.state();
-  return upper_wheel ? upper_.position(s.angle1_rad) : lower_.position(s.angle2_rad);
+void CanNode::after_step() {
+  if (guarded() && time_ns() >= watchdog_ends_ns()) become(State::latched, 1, "watchdog");
+  check_interlocks();
 }
 
 std::uint64_t CanNode::duty_raw(double duty) const noexcept {
@@ -162,7 +147,7 @@ void CanNode::on_time(const BusFrame& frame) {
   const std::uint64_t host_time = bytes_of(frame, 0, 6);
   const std::uint64_t step = (host_time - host_time_) % range;
   host_time_ = host_time;
-  if (std::exchange(host_time_known_, true) && step <= most_ns) advance_to(time_ns_ + static_cast<std::int64_t>(step));
+  if (std::exchange(host_time_known_, true) && step <= most_ns) advance_to(time_ns() + static_cast<std::int64_t>(step));
 }
 
 void CanNode::on_sync(const BusFrame& frame) {
@@ -198,7 +183,7 @@ void CanNode::on_command(const BusFrame& frame) {
   if (heartbeat_age > most_heartbeat_age) return reject("heartbeat too old: computed from an old measurement");
   if (state_ != State::active) return;
   command_sequence_ = frame.data[6];
-  last_command_ns_ = time_ns_;
+  last_command_ns_ = time_ns();
   reject_level_ = std::max(0, reject_level_ - 1);
   brake_ = brake;
   drive_ = enable ? drive : 0.0;
@@ -258,7 +243,7 @@ void CanNode::send_outputs() {
   const Outputs out = outputs();
   BusFrame frame{.id = 0x91, .length = 8};
   put_bytes(frame, 0, 2, static_cast<std::int64_t>(duty_raw(out.brake_duty)));
-  put_bytes(frame, 2, 2, static_cast<std::int64_t>(duty_raw(emergency_stop_ ? drive_ : out.drive_duty)));
+  put_bytes(frame, 2, 2, static_cast<std::int64_t>(duty_raw(emergency_stop() ? drive_ : out.drive_duty)));
   frame.data[4] = static_cast<std::uint8_t>(rejected_);
   frame.data[5] = command_sequence_;
   frame.data[6] = sync_sequence_;
@@ -268,7 +253,7 @@ void CanNode::send_outputs() {
 void CanNode::send_encoders(bool fd) {
   const std::int64_t upper = count(true) - upper_zero_;
   const std::int64_t lower = count(false) - lower_zero_;
-  const std::int64_t time_us = time_ns_ / 1000;
+  const std::int64_t time_us = time_ns() / 1000;
   if (fd) {
     const Outputs out = outputs();
     BusFrame frame{.id = 0x94, .length = 24, .fd = true};
@@ -276,7 +261,7 @@ void CanNode::send_encoders(bool fd) {
     put_bytes(frame, 4, 4, lower);
     put_bytes(frame, 12, 4, time_us);
     put_bytes(frame, 16, 2, static_cast<std::int64_t>(duty_raw(out.brake_duty)));
-    put_bytes(frame, 18, 2, static_cast<std::int64_t>(duty_raw(emergency_stop_ ? drive_ : out.drive_duty)));
+    put_bytes(frame, 18, 2, static_cast<std::int64_t>(duty_raw(emergency_stop() ? drive_ : out.drive_duty)));
     frame.data[20] = static_cast<std::uint8_t>(trip_flags() | static_cast<unsigned>(state_) << 4U);
     frame.data[21] = command_sequence_;
     frame.data[22] = sync_sequence_;

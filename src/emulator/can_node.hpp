@@ -5,9 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "abs_hil/plant_sim/plant.hpp"
-#include "emulator/card_model.hpp"
-#include "plant_sim/encoder.hpp"
+#include "emulator/rig_behind.hpp"
 
 namespace abs_hil::emulator {
 
@@ -42,16 +40,13 @@ struct NodeEvent {
 /// The CAN I/O node of docs/can.md with the simulated rig behind it. It latches its counters at a SYNC, applies
 /// commands, and zeroes its outputs when valid commands stop. It was written only from config/can/abs_rig.dbc and
 /// shares no code with the driver.
-class CanNode {
+class CanNode final : public RigBehind {
  public:
-  static constexpr std::int64_t step_ns = 100'000;  ///< the plant and the interlocks run at 10 kHz
   enum class State : std::uint8_t { inactive = 0, active = 1, latched = 2 };
 
   /// Throws std::invalid_argument if an option is outside its range.
   explicit CanNode(const CanNodeOptions& options);
 
-  /// Advances rig and watchdog to `time_ns` (0 at power-on); an earlier time does nothing.
-  void advance_to(std::int64_t time_ns);
   /// Takes any frame from the bus at the current time.
   void receive(const BusFrame& frame);
   /// The frames that it has sent since the last call, in order.
@@ -59,18 +54,15 @@ class CanNode {
   [[nodiscard]] std::vector<NodeEvent> take_events();
 
   // Events from outside the rig.
-  void press_emergency_stop(bool pressed) noexcept { emergency_stop_ = pressed; }  ///< cuts the drive only
   void set_supply_V(double volts) noexcept { options_.supply_V = volts; }
   void set_temperature_C(double celsius) noexcept { options_.temperature_C = celsius; }
   void trip_overspeed() noexcept { overspeed_latched_ = true; }
   /// Fault of the power stage: from now on the brake's duty differs by `error` from the command.
   void break_brake_output(double error) noexcept { brake_error_ = error; }
 
-  [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }
-  [[nodiscard]] Outputs outputs() const noexcept;
+  [[nodiscard]] Outputs outputs() const noexcept override;
   [[nodiscard]] State state() const noexcept { return state_; }
   [[nodiscard]] std::uint32_t trip_flags() const noexcept;
-  [[nodiscard]] const plant_sim::Plant& plant() const noexcept { return plant_; }
   /// Number of received activations, deactivations and commands, valid or not.
   [[nodiscard]] std::uint64_t writes() const noexcept { return writes_; }
   [[nodiscard]] std::uint64_t rejected() const noexcept { return rejected_; }
@@ -85,27 +77,24 @@ class CanNode {
   void reject(const char* why);
   void check_interlocks();
   void note_outputs(const std::string& why);
-  [[nodiscard]] std::int64_t count(bool upper_wheel) const noexcept;
   [[nodiscard]] std::uint64_t duty_raw(double duty) const noexcept;
   void send(BusFrame frame);
   void send_status();
   void send_outputs();
   void send_encoders(bool fd);
   void send_identity();
+  [[nodiscard]] bool guarded() const noexcept { return state_ == State::active && (brake_ > 0.0 || drive_ > 0.0); }
   [[nodiscard]] std::int64_t watchdog_ends_ns() const noexcept;
+  [[nodiscard]] std::int64_t step_end_ns(std::int64_t next_ns) const noexcept override;
+  void after_step() override;
 
   CanNodeOptions options_;
-  plant_sim::Plant plant_;
-  plant_sim::Encoder upper_;
-  plant_sim::Encoder lower_;
-  std::int64_t time_ns_{0};
   State state_{State::inactive};
   std::uint8_t latch_reason_{0};
   double brake_{0.0};
   double drive_{0.0};
   double brake_error_{0.0};
   bool nonzero_{false};  ///< the outputs were not zero at the last check
-  bool emergency_stop_{false};
   bool overspeed_latched_{false};
   std::uint16_t nonce_{0x1234};
   std::uint8_t sync_sequence_{0};

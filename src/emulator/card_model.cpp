@@ -1,12 +1,9 @@
 #include "emulator/card_model.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
-
-#include "emulator/rig_behind.hpp"
 
 namespace abs_hil::emulator {
 
@@ -27,14 +24,10 @@ std::uint32_t supply_raw(double volts) noexcept { return volts > 0.0 ? rounded(s
 }  // namespace
 
 CardModel::CardModel(const CardOptions& options)
-    : options_(options),
-      plant_(options.plant),
-      upper_(plant_sim::upper_encoder(options.plant)),
-      lower_(plant_sim::lower_encoder(options.plant)) {
+    : RigBehind(options.plant, options.start_speed_rad_s), options_(options) {
   if (options.overspeed_bit != 0 && options.overspeed_bit != 2) {
     throw std::invalid_argument("overspeed bit " + std::to_string(options.overspeed_bit) + ": give 0 or 2");
   }
-  start_wheels(plant_, options.start_speed_rad_s);
   plain_[0x50 / 4] = options.velocity_period_ticks;
   plain_[0x5C / 4] = velocity(rad_s_of_rpm(options.overspeed_rpm));
   plain_[0xA4 / 4] = supply_raw(options.supply_min_V);
@@ -47,12 +40,8 @@ std::uint32_t CardModel::velocity(double omega_rad_s) const noexcept {
 }
 
 std::uint32_t CardModel::raw_count(std::uint32_t channel) const noexcept {
-  const plant_sim::PlantState& s = plant_.state();
-  switch (channel) {
-    case 0: return std::bit_cast<std::uint32_t>(lower_.counts(s.angle2_rad));  // lower wheel
-    case 1: return std::bit_cast<std::uint32_t>(upper_.counts(s.angle1_rad));  // upper wheel
-    default: return 0;                                                         // lever: at rest
-  }
+  // 0 is the lower wheel, 1 the upper wheel, 2 the lever, which is at rest.
+  return channel < 2 ? static_cast<std::uint32_t>(count(channel == 1)) : 0;
 }
 
 std::uint32_t CardModel::read_pwm(std::uint32_t offset) const noexcept {
@@ -72,7 +61,7 @@ void CardModel::write_pwm(std::uint32_t offset, std::uint32_t value) noexcept {
   } else if (!options_.trip_clears_width || trip_flags() == 0) {
     channel.width = value & 0xFFFU;
   }
-  if (offset == 0x6C) note_widths(time_ns_);
+  if (offset == 0x6C) note_widths(time_ns());
 }
 
 void CardModel::note_widths(std::int64_t written_ns) noexcept {
@@ -80,11 +69,11 @@ void CardModel::note_widths(std::int64_t written_ns) noexcept {
   widths_.drive = pwm_[0].width;
   widths_.brake = pwm_[1].width;
   widths_.last_written_ns = written_ns;
-  if (!were_zero) widths_.zero_since_ns = time_ns_;
+  if (!were_zero) widths_.zero_since_ns = time_ns();
 }
 
 std::uint32_t CardModel::read32(std::uint32_t offset) const noexcept {
-  const plant_sim::PlantState& s = plant_.state();
+  const plant_sim::PlantState& s = plant().state();
   switch (offset) {
     case 0x00: return options_.bitstream_version;
     case 0x04: return options_.channel_counts;
@@ -154,7 +143,7 @@ Outputs CardModel::outputs() const noexcept {
     const std::uint32_t full = channel.mode == 1 ? 4095 : 255;
     return static_cast<double>(std::min(channel.width, full)) / static_cast<double>(full);
   };
-  return {.drive_duty = emergency_stop_ ? 0.0 : duty(pwm_[0]), .brake_duty = duty(pwm_[1])};
+  return {.drive_duty = emergency_stop() ? 0.0 : duty(pwm_[0]), .brake_duty = duty(pwm_[1])};
 }
 
 void CardModel::trip_overspeed() noexcept {
@@ -163,7 +152,7 @@ void CardModel::trip_overspeed() noexcept {
 }
 
 void CardModel::enforce_limits() noexcept {
-  const double fastest = fastest_rad_s(plant_);
+  const double fastest = fastest_rad_s();
   if (velocity(fastest) > plain_[0x5C / 4]) {
     overspeed_latched_ = true;
   } else if (fastest < standstill_rad_s) {
@@ -172,19 +161,6 @@ void CardModel::enforce_limits() noexcept {
   if (options_.trip_clears_width && trip_flags() != 0) {
     for (PwmChannel& channel : pwm_) channel.width = 0;
     note_widths(widths_.last_written_ns);
-  }
-}
-
-void CardModel::turn_by_hand(bool upper_wheel, double revolutions) noexcept {
-  turn_wheel(plant_, upper_wheel, revolutions);
-}
-
-void CardModel::advance_to(std::int64_t time_ns) noexcept {
-  while (time_ns_ < time_ns) {
-    const std::int64_t next = step_end_ns(time_ns_, time_ns, step_ns);
-    step(plant_, next - time_ns_, outputs());
-    time_ns_ = next;
-    enforce_limits();
   }
 }
 

@@ -3,16 +3,26 @@
 #include <array>
 #include <cstdint>
 
-#include "abs_hil/plant_sim/plant.hpp"
-#include "emulator/card_options.hpp"
-#include "plant_sim/encoder.hpp"
+#include "emulator/rig_behind.hpp"
 
 namespace abs_hil::emulator {
 
-/// Duties that reach the power stage, after mode, width, interlocks and E-stop. No cap applies here.
-struct Outputs {
-  double drive_duty{0.0};
-  double brake_duty{0.0};
+/// Properties of the emulated card and limits of its FPGA. Where the maker's sources give no value, this project chose
+/// the default ("our choice"). Where they are silent or disagree, an option selects the variant, so that tests cover
+/// both.
+struct CardOptions {
+  plant_sim::PlantOptions plant{};
+  double start_speed_rad_s{0.0};                 ///< both wheels' speed at power-on, >= 0
+  std::uint32_t bitstream_version{0xAB5};        ///< our choice: the real word is not public
+  std::uint32_t channel_counts{0x3200};          ///< 3 counters (15:12), 2 timers (11:8); our choice
+  double supply_V{24.0};                         ///< our choice; 0 = no supply
+  double supply_min_V{15.0};                     ///< our choice
+  double temperature_C{30.0};                    ///< our choice
+  std::uint32_t temperature_max_C{90};           ///< our choice
+  double overspeed_rpm{2200.0};                  ///< our choice; in the vendor's demo the lower wheel reaches 1700
+  std::uint32_t velocity_period_ticks{400'000};  ///< ticks of 40 MHz; our choice: 10 ms
+  std::uint32_t overspeed_bit{0};                ///< bit 0 or 2 of the trip flags; temperature has the other one
+  bool trip_clears_width{false};                 ///< a trip zeroes the width registers as well as the outputs
 };
 
 /// Both PWMs' width registers and the times of their changes; card's clock, 0 at power-on.
@@ -26,10 +36,9 @@ struct PwmWidths {
 /// The RT-DAC4/PCI with ABS logic as a host sees it: 256 bytes of 32-bit registers with their side effects, and the
 /// simulated rig behind them. It was written only from the documented registers and does not use the driver's tables.
 /// It has no watchdog: without a host the PWMs hold their duties.
-class CardModel {
+class CardModel final : public RigBehind {
  public:
   static constexpr std::uint32_t bytes = 256;
-  static constexpr std::int64_t step_ns = 100'000;  ///< the plant and the interlocks run at 10 kHz
 
   /// Throws std::invalid_argument if an option is outside its range.
   explicit CardModel(const CardOptions& options);
@@ -37,24 +46,16 @@ class CardModel {
   /// One 32-bit access at a multiple of 4 below `bytes`. Undocumented registers read 0 and ignore writes.
   [[nodiscard]] std::uint32_t read32(std::uint32_t offset) const noexcept;
   void write32(std::uint32_t offset, std::uint32_t value) noexcept;
-  /// Advances the rig to `time_ns` (0 at power-on) in steps of at most `step_ns`; an earlier time does nothing.
-  void advance_to(std::int64_t time_ns) noexcept;
 
   // Events from outside the rig, except those of the host.
-  void press_emergency_stop(bool pressed) noexcept { emergency_stop_ = pressed; }  ///< cuts the drive only
   void set_supply_V(double volts) noexcept { options_.supply_V = volts; }
   void set_temperature_C(double celsius) noexcept { options_.temperature_C = celsius; }
   void trip_overspeed() noexcept;
-  /// Turns a standing wheel by hand.
-  void turn_by_hand(bool upper_wheel, double revolutions) noexcept;
 
-  [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }
-  [[nodiscard]] Outputs outputs() const noexcept;
+  [[nodiscard]] Outputs outputs() const noexcept override;
   [[nodiscard]] std::uint32_t trip_flags() const noexcept;
   /// The width registers, before mode, interlocks and E-stop.
   [[nodiscard]] const PwmWidths& pwm_widths() const noexcept { return widths_; }
-  /// True speeds and torques for the emulator's own log; no register shows them.
-  [[nodiscard]] const plant_sim::Plant& plant() const noexcept { return plant_; }
 
  private:
   struct PwmChannel {
@@ -71,12 +72,9 @@ class CardModel {
   [[nodiscard]] std::uint32_t raw_count(std::uint32_t channel) const noexcept;
   [[nodiscard]] std::uint32_t velocity(double omega_rad_s) const noexcept;
   void enforce_limits() noexcept;
+  void after_step() override { enforce_limits(); }
 
   CardOptions options_;
-  plant_sim::Plant plant_;
-  plant_sim::Encoder upper_;
-  plant_sim::Encoder lower_;
-  std::int64_t time_ns_{0};
   std::uint32_t pwm_index_{0};
   std::array<PwmChannel, pwm_count> pwm_{};
   PwmWidths widths_{};
@@ -85,7 +83,6 @@ class CardModel {
   std::array<std::uint32_t, encoder_count> zero_{};  ///< raw count at which each counter shows 0
   std::array<std::uint32_t, bytes / 4> plain_{};     ///< registers that only store the written value
   bool overspeed_latched_{false};
-  bool emergency_stop_{false};
 };
 
 }  // namespace abs_hil::emulator

@@ -1,25 +1,31 @@
+// The simulated rig behind a board, the same for every board.
+
 #pragma once
 
 #include <cstdint>
 
 #include "abs_hil/plant_sim/plant.hpp"
-#include "emulator/card_model.hpp"
+#include "plant_sim/encoder.hpp"
 
 namespace abs_hil::emulator {
 
-// The simulated rig behind a board, the same for every board.
+/// Duties that reach the power stage, after mode, width, interlocks and E-stop. No cap applies here.
+struct Outputs {
+  double drive_duty{0.0};
+  double brake_duty{0.0};
+};
 
 /// A slower wheel counts as stopped: it moves less than one encoder line in the card's velocity period.
 inline constexpr double standstill_rad_s = 0.5;
+
+/// Converts revolutions per minute to rad/s.
+[[nodiscard]] double rad_s_of_rpm(double rpm) noexcept;
 
 /// State with both wheels at the same speed at power-on. Throws std::invalid_argument unless it is finite and >= 0.
 void start_wheels(plant_sim::Plant& plant, double speed_rad_s);
 
 /// Absolute speed of the faster wheel.
 [[nodiscard]] double fastest_rad_s(const plant_sim::Plant& plant) noexcept;
-
-/// Converts revolutions per minute to rad/s.
-[[nodiscard]] double rad_s_of_rpm(double rpm) noexcept;
 
 /// Turns a standing wheel by hand.
 void turn_wheel(plant_sim::Plant& plant, bool upper_wheel, double revolutions) noexcept;
@@ -30,5 +36,51 @@ void turn_wheel(plant_sim::Plant& plant, bool upper_wheel, double revolutions) n
 
 /// Advances the rig by one step under the given duties at the power stage.
 void step(plant_sim::Plant& plant, std::int64_t duration_ns, const Outputs& out) noexcept;
+
+/// Wheels, encoders, time and E-stop. A board derives from it and gives its outputs.
+class RigBehind {
+ public:
+  static constexpr std::int64_t step_ns = 100'000;  ///< the plant and the board's interlocks run at 10 kHz
+
+  /// Both wheels start at the same speed. Throws std::invalid_argument unless it is finite and >= 0.
+  RigBehind(const plant_sim::PlantOptions& plant, double start_speed_rad_s);
+  virtual ~RigBehind() = default;
+
+  /// Duties that now reach the power stage.
+  [[nodiscard]] virtual Outputs outputs() const noexcept = 0;
+  /// Advances the rig to `time_ns` (0 at power-on); an earlier time does nothing. Steps end on multiples of `step_ns`,
+  /// independent of the times of the host's accesses.
+  void advance_to(std::int64_t time_ns);
+
+  void press_emergency_stop(bool pressed) noexcept { emergency_stop_ = pressed; }  ///< cuts the drive only
+  /// Turns a standing wheel by hand.
+  void turn_by_hand(bool upper_wheel, double revolutions) noexcept;
+
+  [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }
+  /// True speeds and torques for the emulator's own log; the board does not show them.
+  [[nodiscard]] const plant_sim::Plant& plant() const noexcept { return plant_; }
+
+ protected:
+  RigBehind(const RigBehind&) = default;
+  RigBehind& operator=(const RigBehind&) = default;
+
+  /// The end of the step that begins now: `next_ns`, or an earlier time at which the board itself acts.
+  [[nodiscard]] virtual std::int64_t step_end_ns(std::int64_t next_ns) const noexcept { return next_ns; }
+  /// What the board does after each step: interlocks, watchdog.
+  virtual void after_step() {}
+
+  /// Counts since power-on, unwrapped.
+  [[nodiscard]] std::int64_t count(bool upper_wheel) const noexcept;
+  /// Absolute speed of the faster wheel.
+  [[nodiscard]] double fastest_rad_s() const noexcept;
+  [[nodiscard]] bool emergency_stop() const noexcept { return emergency_stop_; }
+
+ private:
+  plant_sim::Plant plant_;
+  plant_sim::Encoder upper_;
+  plant_sim::Encoder lower_;
+  std::int64_t time_ns_{0};
+  bool emergency_stop_{false};
+};
 
 }  // namespace abs_hil::emulator

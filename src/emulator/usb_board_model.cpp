@@ -1,11 +1,8 @@
 #include "emulator/usb_board_model.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <stdexcept>
 #include <string>
-
-#include "emulator/rig_behind.hpp"
 
 namespace abs_hil::emulator {
 
@@ -26,16 +23,12 @@ void check_channels(const char* what, std::uint32_t a, std::uint32_t b, std::uin
 }  // namespace
 
 UsbBoardModel::UsbBoardModel(const UsbBoardOptions& options)
-    : options_(options),
-      plant_(options.plant),
-      upper_(plant_sim::upper_encoder(options.plant)),
-      lower_(plant_sim::lower_encoder(options.plant)) {
+    : RigBehind(options.plant, options.start_speed_rad_s), options_(options) {
   check_channels("PWM", options.drive_pwm, options.brake_pwm, 10);
   check_channels("encoder", options.lower_encoder, options.upper_encoder, 8);
   if (options.enable_line > 14) {
     throw std::invalid_argument("enable line " + std::to_string(options.enable_line) + ": give -1 to 14");
   }
-  start_wheels(plant_, options.start_speed_rad_s);
   written_[12] = written_[13] = 0x7FFF;  // all lines are inputs at power-on
 }
 
@@ -69,14 +62,12 @@ UsbBoardModel::Image UsbBoardModel::image() const noexcept {
   if (options_.shows_outputs) {
     for (std::size_t word = 10; word < words; ++word) shown[word] = written_[word];
   }
-  const plant_sim::PlantState& s = plant_.state();
-  const auto show_counter = [&](std::uint32_t channel, std::int32_t counts) {
-    const auto count = std::bit_cast<std::uint32_t>(counts);
-    shown[53 + 2 * channel] = static_cast<std::uint16_t>(count & 0xFFFFU);
-    shown[54 + 2 * channel] = static_cast<std::uint16_t>(count >> 16U);
-  };
-  show_counter(options_.upper_encoder, upper_.counts(s.angle1_rad));
-  show_counter(options_.lower_encoder, lower_.counts(s.angle2_rad));
+  for (const bool upper : {true, false}) {
+    const std::uint32_t channel = upper ? options_.upper_encoder : options_.lower_encoder;
+    const auto counts = static_cast<std::uint32_t>(count(upper));
+    shown[53 + 2 * channel] = static_cast<std::uint16_t>(counts & 0xFFFFU);
+    shown[54 + 2 * channel] = static_cast<std::uint16_t>(counts >> 16U);
+  }
   Image image{};
   for (std::size_t word = 0; word < words; ++word) {
     image[2 * word] = static_cast<std::uint8_t>(shown[word] % 256U);
@@ -92,24 +83,12 @@ double UsbBoardModel::duty(std::uint32_t channel) const noexcept {
 }
 
 Outputs UsbBoardModel::outputs() const noexcept {
-  bool enabled = !emergency_stop_;
+  bool enabled = !emergency_stop();
   if (options_.enable_line >= 0) {
     const std::uint32_t line = 1U << static_cast<std::uint32_t>(options_.enable_line);
     enabled = enabled && (written_[12] & line) == 0 && (written_[14] & line) != 0;
   }
   return {.drive_duty = enabled ? duty(options_.drive_pwm) : 0.0, .brake_duty = duty(options_.brake_pwm)};
-}
-
-void UsbBoardModel::turn_by_hand(bool upper_wheel, double revolutions) noexcept {
-  turn_wheel(plant_, upper_wheel, revolutions);
-}
-
-void UsbBoardModel::advance_to(std::int64_t time_ns) noexcept {
-  while (time_ns_ < time_ns) {
-    const std::int64_t next = step_end_ns(time_ns_, time_ns, step_ns);
-    step(plant_, next - time_ns_, outputs());
-    time_ns_ = next;
-  }
 }
 
 }  // namespace abs_hil::emulator

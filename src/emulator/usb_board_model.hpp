@@ -4,9 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "abs_hil/plant_sim/plant.hpp"
-#include "emulator/card_model.hpp"
-#include "plant_sim/encoder.hpp"
+#include "emulator/rig_behind.hpp"
 
 namespace abs_hil::emulator {
 
@@ -26,10 +24,9 @@ struct UsbBoardOptions {
 /// The RT-DAC/USB2 with generic logic as a host sees it, frame by frame, and the simulated rig behind it. It was
 /// written only from the documented frames and does not use the driver's table. It has no watchdog: without a host the
 /// PWMs hold their duties.
-class UsbBoardModel {
+class UsbBoardModel final : public RigBehind {
  public:
   static constexpr std::size_t frame_bytes = 504;
-  static constexpr std::int64_t step_ns = 100'000;  ///< the plant runs at 10 kHz
   using Image = std::array<std::uint8_t, frame_bytes>;
 
   /// Throws std::invalid_argument if an option is outside its range.
@@ -42,34 +39,22 @@ class UsbBoardModel {
   Taken take(std::span<const std::uint8_t> transfer) noexcept;
   /// The current frame to the host.
   [[nodiscard]] Image image() const noexcept;
-  /// Advances the rig to `time_ns` (0 at power-on) in steps of at most `step_ns`; an earlier time does nothing.
-  void advance_to(std::int64_t time_ns) noexcept;
 
-  void press_emergency_stop(bool pressed) noexcept { emergency_stop_ = pressed; }  ///< cuts the drive only
   /// Fault: the brake's width ignores writes and shows a value that is 1 too large.
   void break_brake(bool broken) noexcept { brake_broken_ = broken; }
-  /// Turns a standing wheel by hand.
-  void turn_by_hand(bool upper_wheel, double revolutions) noexcept;
 
-  [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }
-  [[nodiscard]] Outputs outputs() const noexcept;
+  [[nodiscard]] Outputs outputs() const noexcept override;
   [[nodiscard]] std::uint64_t frames_taken() const noexcept { return frames_taken_; }
   [[nodiscard]] std::uint64_t nonsense() const noexcept { return nonsense_; }
-  [[nodiscard]] const plant_sim::Plant& plant() const noexcept { return plant_; }
 
  private:
   static constexpr std::size_t words = frame_bytes / 2;
   [[nodiscard]] double duty(std::uint32_t channel) const noexcept;
 
   UsbBoardOptions options_;
-  plant_sim::Plant plant_;
-  plant_sim::Encoder upper_;
-  plant_sim::Encoder lower_;
-  std::int64_t time_ns_{0};
   std::array<std::uint16_t, words> written_{};  ///< words after the last frame
   std::uint64_t frames_taken_{0};
   std::uint64_t nonsense_{0};
-  bool emergency_stop_{false};
   bool brake_broken_{false};
 };
 

@@ -7,7 +7,6 @@
 #include "abs_hil/driver/backend.hpp"
 #include "catch.hpp"
 #include "driver/factory.hpp"
-#include "driver/take_over_writer.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::driver;
@@ -27,8 +26,20 @@ std::unique_ptr<RigDriver> make_shelf(const ShelfOptions& options, const RunFact
   calls.push_back(options.port + (run.lock_step ? " lock-step" : ""));
   throw Unavailable("shelf: empty");
 }
+/// Takes the board over with a driver of its own.
+class ShelfWriter final : public SafeStateWriter {
+ public:
+  ShelfWriter(ShelfOptions options, const RunFacts& run) : options_(std::move(options)), run_(run) {}
+  [[nodiscard]] std::string_view name() const noexcept override { return "shelf"; }
+  void prepare() override { static_cast<void>(make_shelf(options_, run_)); }
+  [[nodiscard]] IoResult make_safe() noexcept override { return {IoError::disconnected}; }
+
+ private:
+  ShelfOptions options_;
+  RunFacts run_;
+};
 std::unique_ptr<SafeStateWriter> make_writer(const ShelfOptions& options, const RunFacts& run) {
-  return std::make_unique<TakeOverWriter>([options, run] { return make_shelf(options, run); });
+  return std::make_unique<ShelfWriter>(options, run);
 }
 OutputGrid outputs(const ShelfOptions& options) {
   return {.duty_steps = 100, .brake_duty_max = options.brake_duty_max};
@@ -71,7 +82,7 @@ TEST_CASE("An entry brings its name, its keys, its driver, its writer and its ca
   options.of<ShelfOptions>().port = "/dev/here";
   CHECK_THROWS_AS(make_rig_driver(options, true), Unavailable);
   CHECK(calls == std::vector<std::string>{"/dev/here lock-step"});
-  CHECK(make_safe_state_writer(options)->name() == "take-over");
+  CHECK(make_safe_state_writer(options)->name() == "shelf");
   CHECK(output_grid(options).brake_duty_max == 0.4);
   CHECK(verification_note(options) ==
         "backend rig, driver.kind=shelf: not verified on hardware. Nobody has seen it, then set "

@@ -10,9 +10,9 @@
 #include "catch.hpp"
 #include "driver/can/can_safe_state.hpp"
 #include "driver/file_descriptor.hpp"
+#include "driver/own_handle_writer.hpp"
 #include "driver/pci/pci_safe_state.hpp"
 #include "driver/pci/register_map.hpp"
-#include "driver/reopening.hpp"
 #include "driver/usb/usb_safe_state.hpp"
 #include "emulator/can_node.hpp"
 

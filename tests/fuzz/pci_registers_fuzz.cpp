@@ -4,8 +4,8 @@
 #include <memory>
 #include <span>
 
+#include "driver/board_kit.hpp"
 #include "driver/pci/pci_driver.hpp"
-#include "driver/plausibility.hpp"
 #include "fuzz_input.hpp"
 
 namespace {

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "driver/plausibility.hpp"
+#include "driver/board_kit.hpp"
 #include "driver/usb/usb_driver.hpp"
 #include "fuzz_input.hpp"
 

@@ -1,12 +1,11 @@
 // How the guardian takes over a board that has one owner at a time, on the emulated CAN node and the emulated USB
 // board: the owner drives and falls silent; the writer brings drive and brake to 0 and releases the board.
 
-#include <memory>
-
 #include "catch.hpp"
+#include "driver/can/can_safe_state.hpp"
 #include "driver/can/node_on_socket.hpp"
-#include "driver/take_over_writer.hpp"
 #include "driver/usb/model_board.hpp"
+#include "driver/usb/usb_safe_state.hpp"
 
 using namespace abs_hil;
 
@@ -34,14 +33,11 @@ TEST_CASE("a CAN node whose owner fell silent is taken over and left safe") {
   for (const bool can_fd : {false, true}) {
     for (const rig::Command& command : {driving, braking}) {
       test::NodeOnSocket node({.start_speed_rad_s = 30.0});
-      const auto make = [&] {
-        return std::make_unique<driver::can::CanDriver>(driver::can::CanOptions{}, node.opener(can_fd), true);
-      };
-      const auto owner = make();
-      drive(*owner, command);
+      driver::can::CanDriver owner(driver::can::CanOptions{}, node.opener(can_fd), true);
+      drive(owner, command);
       CHECK(node.wire().drive_duty + node.wire().brake_duty > 0.4);
 
-      driver::TakeOverWriter writer(make);
+      driver::can::CanSafeState writer(node.opener(can_fd), true);
       writer.prepare();
       CHECK(node.wire().drive_duty + node.wire().brake_duty > 0.4);  // nothing is written beside an owner
       CHECK(writer.make_safe().ok());
@@ -54,13 +50,9 @@ TEST_CASE("a CAN node whose owner fell silent is taken over and left safe") {
 
 TEST_CASE("a CAN node counts as safe only once it answers") {
   test::NodeOnSocket node({.start_speed_rad_s = 30.0});
-  const auto make = [&] {
-    return std::make_unique<driver::can::CanDriver>(driver::can::CanOptions{.answer_timeout_us = 8'000}, node.opener(),
-                                                    true);
-  };
-  const auto owner = make();
-  drive(*owner, driving);
-  driver::TakeOverWriter writer(make);
+  driver::can::CanDriver owner(driver::can::CanOptions{.answer_timeout_us = 8'000}, node.opener(), true);
+  drive(owner, driving);
+  driver::can::CanSafeState writer(node.opener(), true);
   writer.prepare();
   node.fault("silent");
   CHECK_FALSE(writer.make_safe().ok());
@@ -72,15 +64,12 @@ TEST_CASE("a CAN node counts as safe only once it answers") {
 TEST_CASE("a USB board whose owner fell silent is taken over and left safe") {
   for (const rig::Command& command : {driving, braking}) {
     test::ModelBoard board({.start_speed_rad_s = 30.0});
-    const auto make = [&] {
-      return std::make_unique<driver::usb::UsbDriver>(driver::usb::UsbOptions{}, board.opener());
-    };
-    const auto owner = make();
-    drive(*owner, command);
+    driver::usb::UsbDriver owner(driver::usb::UsbOptions{}, board.opener());
+    drive(owner, command);
     const auto acting = [&board] { return board.model.outputs().drive_duty + board.model.outputs().brake_duty; };
     CHECK(acting() > 0.4);
 
-    driver::TakeOverWriter writer(make);
+    driver::usb::UsbSafeState writer(driver::usb::UsbOptions{}, board.opener());
     writer.prepare();
     CHECK(acting() > 0.4);
     board.unplugged = true;

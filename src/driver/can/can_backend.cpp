@@ -10,7 +10,7 @@
 #include "driver/can/interface_facts.hpp"
 #include "driver/can/link.hpp"
 #include "driver/can/options.hpp"
-#include "driver/reopening.hpp"
+#include "driver/own_handle_writer.hpp"
 
 namespace abs_hil::driver::can {
 

@@ -7,14 +7,11 @@
 #include <stdexcept>
 #include <utility>
 
-#include "abs_hil/rig/option_check.hpp"
 #include "abs_hil/rig/time_units.hpp"
+#include "driver/board_kit.hpp"
 #include "driver/can/bus_load.hpp"
 #include "driver/can/signal_codec.hpp"
-#include "driver/encoder_sign.hpp"
-#include "driver/lock_step.hpp"
 #include "driver/monotonic_time.hpp"
-#include "driver/plausibility.hpp"
 
 namespace abs_hil::driver::can {
 
@@ -49,9 +46,7 @@ CanDriver::CanDriver(const CanOptions& options, OpenLink open_link, bool lock_st
       lock_step_(lock_step),
       answer_timeout_ns_(answer_timeout_ns(options, lock_step)),
       bucket_(options.loss_cost, options.loss_relief, options.loss_limit) {
-  rig::require_valid(options, "driver.can.");
-  check_sign("driver.can.upper_sign", options.upper_sign);
-  check_sign("driver.can.lower_sign", options.lower_sign);
+  check_options("driver.can.", options);
 }
 
 CanDriver::~CanDriver() { static_cast<void>(deactivate()); }
@@ -238,9 +233,7 @@ bool CanDriver::outputs_now(rig::Command& applied) noexcept {
   if (!link_.socket) return false;
   link_.socket->drain();
   if (!send_sync(monotonic_ns()).ok() || !await(&CanDriver::hears_outputs, handshake_timeout_ns)) return false;
-  applied = {.motor_duty = rig::duty_of(applied_.drive, signal::duty_steps),
-             .brake_duty = rig::duty_of(applied_.brake, signal::duty_steps)};
-  applied.motor_enable = applied.motor_duty > 0.0;
+  applied = command_shown(applied_.drive, applied_.brake, signal::duty_steps);
   return true;
 }
 

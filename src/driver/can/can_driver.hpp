@@ -13,7 +13,7 @@
 #include "driver/can/messages.hpp"
 #include "driver/can/options.hpp"
 #include "driver/loss_bucket.hpp"
-#include "driver/output_grid.hpp"
+#include "driver/pwm.hpp"
 
 namespace abs_hil::driver::can {
 

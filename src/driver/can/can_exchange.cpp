@@ -6,10 +6,10 @@
 #include <cstdlib>
 
 #include "abs_hil/rig/time_units.hpp"
+#include "driver/board_kit.hpp"
 #include "driver/can/can_driver.hpp"
 #include "driver/can/error_frame.hpp"
 #include "driver/monotonic_time.hpp"
-#include "driver/plausibility.hpp"
 #include "rig/encoder_scale.hpp"
 
 namespace abs_hil::driver::can {

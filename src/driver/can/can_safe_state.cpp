@@ -32,16 +32,12 @@ bool ends_answer(const NodeMessage& message, std::uint8_t sync) noexcept {
 
 }  // namespace
 
-void CanSafeState::prepare() {
-  if (!one_peer_) link_ = open_link_();
-}
-
 std::int64_t CanSafeState::owner_needs_ns() const noexcept { return can_make_safe_bound_ns; }
 
 IoResult CanSafeState::send_zeros() noexcept {
-  const SendResult requested = link_.socket->send(control_frame({.request = Request::deactivate}));
+  const SendResult requested = handle_.socket->send(control_frame({.request = Request::deactivate}));
   // A node that missed the request, or does not obey it, still takes a command of zeros.
-  const SendResult zeros = link_.socket->send(command_frame({}));
+  const SendResult zeros = handle_.socket->send(command_frame({}));
   for (const SendResult& result : {requested, zeros}) {
     if (result.outcome == SendOutcome::down || result.outcome == SendOutcome::failed) {
       return {IoError::disconnected, id::control, result.errno_value, rig::Reason::can_interface_down};
@@ -56,7 +52,7 @@ IoResult CanSafeState::verify() noexcept {
   bool zero = false;
   Frame frame;
   for (int i = 0; i < most_frames_of_an_answer && !(inactive && zero); ++i) {
-    const ReceiveOutcome outcome = link_.socket->receive(frame, deadline_ns).outcome;
+    const ReceiveOutcome outcome = handle_.socket->receive(frame, deadline_ns).outcome;
     if (outcome == ReceiveOutcome::malformed) continue;
     if (outcome != ReceiveOutcome::frame) break;
     const Decoded decoded = decode(frame);
@@ -71,43 +67,27 @@ IoResult CanSafeState::verify() noexcept {
 }
 
 IoResult CanSafeState::look() noexcept {
-  if (link_.socket->send(sync_frame(++sync_)).outcome != SendOutcome::sent) return {IoError::no_answer, id::sync};
+  if (handle_.socket->send(sync_frame(++sync_)).outcome != SendOutcome::sent) return {IoError::no_answer, id::sync};
   const std::int64_t deadline_ns = monotonic_ns() + look_ns;
   Frame frame;
   for (int i = 0; i < most_frames_of_an_answer; ++i) {
-    const ReceiveOutcome outcome = link_.socket->receive(frame, deadline_ns).outcome;
+    const ReceiveOutcome outcome = handle_.socket->receive(frame, deadline_ns).outcome;
     if (outcome == ReceiveOutcome::malformed) continue;
     if (outcome != ReceiveOutcome::frame) break;
     const Decoded decoded = decode(frame);
     if (commands_node(frame) || shows_activity(decoded.message)) {
-      return {IoError::foreign_writer, frame.id, 0, rig::Reason::foreign_writer};
+      return foreign_output(frame.id);
     }
     if (ends_answer(decoded.message, sync_)) return {};
   }
   return {IoError::no_answer, id::sync};
 }
 
-IoResult CanSafeState::verify_safe() noexcept {
-  if (!link_.socket) return make_safe();
-  const IoResult seen = look();
-  if (seen.ok()) return seen;
-  const IoResult made_safe = make_safe();
-  return seen.error == IoError::foreign_writer ? seen : made_safe;
-}
-
-IoResult CanSafeState::make_safe() noexcept {
-  if (!link_.socket) {
-    try {
-      link_ = open_link_();
-    } catch (...) {
-      return {IoError::disconnected};
-    }
-    if (!link_.socket) return {IoError::disconnected};
-  }
-  link_.socket->drain();  // earlier frames must not count as the answer
+IoResult CanSafeState::write_zeros() noexcept {
+  handle_.socket->drain();  // earlier frames must not count as the answer
   IoResult result = send_zeros();
   if (result.ok()) result = verify();
-  if (result.error == IoError::disconnected || (!result.ok() && one_peer_)) link_ = {};
+  if (!result.ok() && one_peer_) handle_ = {};
   return result;
 }
 

@@ -1,46 +1,42 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <utility>
 
-#include "abs_hil/driver/safe_state_writer.hpp"
 #include "driver/can/link.hpp"
-#include "driver/can/messages.hpp"
+#include "driver/own_handle_writer.hpp"
 
 namespace abs_hil::driver::can {
 
 /// Writes the safe state of a CAN node: it sends the request to deactivate, and zeros, without any handshake, and waits
 /// afterwards until the node reports that it is inactive with both outputs 0. A bus takes more than one socket, so this
 /// one is open beside the owner's. An emulator's socket takes one peer only, so it is opened after the owner's end.
-class CanSafeState final : public SafeStateWriter {
+class CanSafeState final : public OwnHandleWriter<Link> {
  public:
-  using OpenLink = std::function<Link()>;
-  /// @param open_link  throws Unavailable, or returns a link without socket if it has tried just before; does not wait
+  /// @param open_link  does not wait
   /// @param one_peer   the link takes one peer only
-  CanSafeState(OpenLink open_link, bool one_peer) : open_link_(std::move(open_link)), one_peer_(one_peer) {}
+  CanSafeState(Open open_link, bool one_peer) : OwnHandleWriter(std::move(open_link)), one_peer_(one_peer) {}
 
   [[nodiscard]] std::string_view name() const noexcept override { return "can"; }
-  void prepare() override;
+  void prepare() override {
+    if (!one_peer_) open_now();
+  }
   [[nodiscard]] std::int64_t owner_needs_ns() const noexcept override;
   void let_go() noexcept override {
-    if (one_peer_) link_ = {};
+    if (one_peer_) handle_ = {};
   }
-  [[nodiscard]] IoResult make_safe() noexcept override;
-  /// One SYNC and its answer, at most 5 ms long. The answer tells that the node is inactive, which keeps its outputs 0;
-  /// an answer with applied duties, on classic CAN every tenth, tells these as well.
-  [[nodiscard]] IoResult verify_safe() noexcept override;
 
  private:
+  [[nodiscard]] IoResult write_zeros() noexcept override;
+  /// One SYNC and its answer, at most 5 ms long. The answer tells that the node is inactive, which keeps its outputs 0;
+  /// an answer with applied duties, on classic CAN every tenth, tells these as well. `foreign_writer` if any frame
+  /// shows a node that is not inactive, or duties, or is a command.
+  [[nodiscard]] IoResult look() noexcept override;
   [[nodiscard]] IoResult send_zeros() noexcept;
   /// Waits until the node reports the safe state.
   [[nodiscard]] IoResult verify() noexcept;
-  /// Asks with a SYNC: `foreign_writer` if any frame shows a node that is not inactive, or duties, or is a command.
-  [[nodiscard]] IoResult look() noexcept;
 
-  OpenLink open_link_;
   bool one_peer_;
-  Link link_{};
   std::uint8_t sync_{0};
 };
 

@@ -101,7 +101,7 @@ InterfaceFacts facts_in(const ifinfomsg& info, const void* attributes, std::size
   return facts;
 }
 
-[[noreturn]] void refuse(const char* what) {
+[[noreturn]] void refuse_interfaces(const char* what) {
   throw Unavailable(std::string("CAN interfaces: ") + what + ": " + std::strerror(errno));
 }
 
@@ -109,7 +109,7 @@ InterfaceFacts facts_in(const ifinfomsg& info, const void* attributes, std::size
 class Netlink {
  public:
   Netlink() : descriptor_(::socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_ROUTE)) {
-    if (descriptor_ < 0) refuse("cannot open an rtnetlink socket");
+    if (descriptor_ < 0) refuse_interfaces("cannot open an rtnetlink socket");
   }
   Netlink(const Netlink&) = delete;
   Netlink& operator=(const Netlink&) = delete;
@@ -129,7 +129,8 @@ void ask_for_links(int descriptor) {
   request.head.nlmsg_type = RTM_GETLINK;
   request.head.nlmsg_flags = NLM_F_REQUEST | NLM_F_DUMP;
   request.info.ifi_family = AF_UNSPEC;
-  if (::send(descriptor, &request, sizeof request, 0) < 0) refuse("cannot send a request to the kernel (rtnetlink)");
+  if (::send(descriptor, &request, sizeof request, 0) < 0)
+    refuse_interfaces("cannot send a request to the kernel (rtnetlink)");
 }
 
 }  // namespace
@@ -162,7 +163,7 @@ std::vector<InterfaceFacts> can_interfaces() {
   alignas(nlmsghdr) static thread_local std::array<unsigned char, 65536> buffer;
   for (bool done = false; !done;) {
     const ssize_t got = ::recv(netlink.get(), buffer.data(), buffer.size(), 0);
-    if (got < 0) refuse("cannot read the kernel's answer (rtnetlink)");
+    if (got < 0) refuse_interfaces("cannot read the kernel's answer (rtnetlink)");
     done = take_links(std::span(buffer).first(static_cast<std::size_t>(got)), found);
   }
   std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.name < b.name; });

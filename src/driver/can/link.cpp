@@ -18,13 +18,12 @@
 #include <vector>
 
 #include "abs_hil/driver/io_result.hpp"
+#include "driver/board_kit.hpp"
 #include "driver/can/protocol.hpp"
 
 namespace abs_hil::driver::can {
 
 namespace {
-
-[[noreturn]] void refuse(const std::string& what) { throw Unavailable("backend rig: " + what); }
 
 std::string system_words(int error) { return std::strerror(error); }
 

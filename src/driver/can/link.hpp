@@ -17,6 +17,7 @@ struct Link {
   bool can_fd{false};                     ///< it carries CAN FD frames
   std::optional<InterfaceFacts> facts{};  ///< only for a real interface
 
+  explicit operator bool() const noexcept { return socket != nullptr; }
   /// True if the interface is up and has a carrier. Makes a system call; the driver calls it when answers are missing.
   [[nodiscard]] bool running() const noexcept;
 };

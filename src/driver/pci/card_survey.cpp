@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-#include "driver/accessible_file.hpp"
+#include "driver/file_descriptor.hpp"
 #include "driver/pci/card_obstacles.hpp"
 #include "driver/pci/discovery.hpp"
 

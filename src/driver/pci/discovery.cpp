@@ -8,7 +8,7 @@
 #include <optional>
 #include <system_error>
 
-#include "driver/lock_step.hpp"
+#include "driver/board_kit.hpp"
 #include "driver/pci/card_obstacles.hpp"
 #include "driver/pci/register_map.hpp"
 #include "driver/pci/sysfs_window.hpp"
@@ -24,8 +24,6 @@ constexpr int bar_number = 2;
 constexpr std::uint64_t ioresource_io = 0x100;
 constexpr std::uint64_t ioresource_disabled = 0x10000000;
 constexpr std::uint64_t ioresource_unset = 0x20000000;
-
-[[noreturn]] void refuse(const std::string& what) { throw Unavailable("backend rig: " + what); }
 
 std::string hex(std::uint64_t value) {
   std::array<char, 32> text{};

@@ -3,12 +3,12 @@
 #include <filesystem>
 
 #include "driver/monotonic_time.hpp"
-#include "driver/output_grid.hpp"
 #include "driver/pci/card_survey.hpp"
 #include "driver/pci/discovery.hpp"
 #include "driver/pci/options.hpp"
 #include "driver/pci/pci_driver.hpp"
 #include "driver/pci/pci_safe_state.hpp"
+#include "driver/pwm.hpp"
 
 namespace abs_hil::driver::pci {
 

@@ -2,9 +2,7 @@
 
 #include <utility>
 
-#include "abs_hil/rig/option_check.hpp"
-#include "driver/encoder_sign.hpp"
-#include "driver/plausibility.hpp"
+#include "driver/board_kit.hpp"
 
 namespace abs_hil::driver::pci {
 
@@ -59,10 +57,7 @@ PciDriver::PciDriver(const PciOptions& options, OpenCard open_card, ReadClock re
       grid_(pwm_grid(options)),
       open_card_(std::move(open_card)),
       read_clock_(read_clock) {
-  rig::require_valid(options, "driver.pci.");
-  check_sign("driver.pci.lower_sign", options.lower_sign);
-  check_sign("driver.pci.upper_sign", options.upper_sign);
-  check_channels("driver.pci.", options.lower_channel, options.upper_channel);
+  check_options("driver.pci.", options);
 }
 
 PciDriver::~PciDriver() { static_cast<void>(deactivate()); }
@@ -111,12 +106,12 @@ BoardIdentity PciDriver::identity() const {
 bool PciDriver::outputs_now(rig::Command& applied) noexcept {
   if (!card_.window) return false;
   Access card(*card_.window);
-  const auto duty = [&](Pwm pwm) {
+  const auto width = [&](Pwm pwm) {
     card.write(reg::pwm_index, static_cast<std::uint32_t>(pwm));
-    return rig::duty_of(pwm_bits(reg::pwm_width, card.read(reg::pwm_width)), grid_.duty_steps);
+    return pwm_bits(reg::pwm_width, card.read(reg::pwm_width));
   };
-  applied = {.motor_duty = duty(Pwm::drive), .brake_duty = duty(Pwm::brake)};
-  applied.motor_enable = applied.motor_duty > 0.0;
+  const std::uint32_t motor = width(Pwm::drive);
+  applied = command_shown(motor, width(Pwm::brake), grid_.duty_steps);
   return card.result().ok();
 }
 

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "abs_hil/driver/rig_driver.hpp"
-#include "driver/output_grid.hpp"
 #include "driver/pci/discovery.hpp"
 #include "driver/pci/options.hpp"
 #include "driver/pci/register_map.hpp"
+#include "driver/pwm.hpp"
 
 namespace abs_hil::driver::pci {
 

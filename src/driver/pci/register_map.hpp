@@ -87,7 +87,6 @@ enum class Pwm : std::uint32_t { drive = 0, brake = 1 };
 using driver::board_clock_Hz;
 using driver::full_width;
 using driver::pwm_frequency_Hz;
-using driver::pwm_width_for;
 using driver::PwmMode;
 
 /// The bits of a PWM register that count: the sources give these registers 16 bits and say nothing of those above,

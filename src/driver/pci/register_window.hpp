@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "abs_hil/driver/io_result.hpp"
-#include "driver/emulated_time.hpp"
+#include "driver/board_kit.hpp"
 
 namespace abs_hil::driver::pci {
 

@@ -19,7 +19,7 @@ static_assert(std::endian::native == std::endian::little, "PCI registers and the
 
 namespace {
 
-[[noreturn]] void refuse(const std::filesystem::path& file, const std::string& problem) {
+[[noreturn]] void refuse_file(const std::filesystem::path& file, const std::string& problem) {
   throw Unavailable("backend rig: " + file.string() + ": " + problem);
 }
 
@@ -28,10 +28,10 @@ int open_for_access(const std::filesystem::path& file) {
   if (fd >= 0) return fd;
   const int error = errno;
   if (error == EACCES || error == EPERM) {
-    refuse(file, std::string("permission denied (") + std::strerror(error) +
-                     "): install config/udev/70-abs-hil.rules and join the group abs_hil (docs/rig-setup.md)");
+    refuse_file(file, std::string("permission denied (") + std::strerror(error) +
+                          "): install config/udev/70-abs-hil.rules and join the group abs_hil (docs/rig-setup.md)");
   }
-  refuse(file, std::string("cannot be opened: ") + std::strerror(error));
+  refuse_file(file, std::string("cannot be opened: ") + std::strerror(error));
 }
 
 /// Name of a process from /proc; empty if unknown.
@@ -83,20 +83,22 @@ bool is_resident(pid_t pid) {
 
 [[noreturn]] void refuse_while_guarded(const std::filesystem::path& file, pid_t guardian) {
   if (is_resident(guardian)) {
-    refuse(file,
-           "process " + std::to_string(guardian) + " (" + process_name(guardian) +
-               "), the resident service, keeps the card and lets go of it for a run with its lease; set "
-               "guardian.resident=require, and guardian.socket to its socket; abs_hil doctor says who has the lease");
+    refuse_file(
+        file,
+        "process " + std::to_string(guardian) + " (" + process_name(guardian) +
+            "), the resident service, keeps the card and lets go of it for a run with its lease; set "
+            "guardian.resident=require, and guardian.socket to its socket; abs_hil doctor says who has the lease");
   }
-  refuse(file, "process " + std::to_string(guardian) + " (" + process_name(guardian) +
-                   ") still brings the card into the safe state after an earlier run; wait until it has ended");
+  refuse_file(file, "process " + std::to_string(guardian) + " (" + process_name(guardian) +
+                        ") still brings the card into the safe state after an earlier run; wait until it has ended");
 }
 
 void become_owner(const std::filesystem::path& file, int fd) {
   if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
     const int error = errno;
-    if (error != EWOULDBLOCK) refuse(file, std::string("cannot be locked: ") + std::strerror(error));
-    refuse(file, "the card is in use by " + lock_holder(fd) + "; a card has only one owner: end that process first");
+    if (error != EWOULDBLOCK) refuse_file(file, std::string("cannot be locked: ") + std::strerror(error));
+    refuse_file(file,
+                "the card is in use by " + lock_holder(fd) + "; a card has only one owner: end that process first");
   }
   if (const pid_t guardian = guardian_of(fd); guardian != 0) refuse_while_guarded(file, guardian);
 }
@@ -112,7 +114,7 @@ void become_guardian(const std::filesystem::path& file, int fd) {
   if (set_guardian_lock(fd, F_WRLCK)) return;
   const int error = errno;
   if (const pid_t guardian = guardian_of(fd); guardian != 0) refuse_while_guarded(file, guardian);
-  refuse(file, std::string("cannot be locked: ") + std::strerror(error));
+  refuse_file(file, std::string("cannot be locked: ") + std::strerror(error));
 }
 
 /// Makes one complete access; a partial access is an error.

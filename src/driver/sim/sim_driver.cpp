@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "driver/plausibility.hpp"
+#include "driver/board_kit.hpp"
 #include "rig/encoder_scale.hpp"
 
 namespace abs_hil::driver {

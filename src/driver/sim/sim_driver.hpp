@@ -5,7 +5,6 @@
 
 #include "abs_hil/driver/rig_driver.hpp"
 #include "abs_hil/plant_sim/plant.hpp"
-#include "driver/output_grid.hpp"
 #include "driver/pwm.hpp"
 #include "plant_sim/encoder.hpp"
 

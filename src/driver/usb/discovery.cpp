@@ -8,7 +8,7 @@
 #include <system_error>
 
 #include "abs_hil/driver/io_result.hpp"
-#include "driver/lock_step.hpp"
+#include "driver/board_kit.hpp"
 
 namespace abs_hil::driver::usb {
 
@@ -63,8 +63,6 @@ std::string wanted_text(const UsbOptions& o) {
   return "driver.usb.manufacturer=\"" + o.manufacturer + "\", ids " + id(o.vendor_id) + ":" + id(o.product_id) +
          (o.serial.empty() ? "" : ", serial " + o.serial);
 }
-
-[[noreturn]] void refuse(const std::string& what) { throw Unavailable("backend rig: " + what); }
 
 }  // namespace
 

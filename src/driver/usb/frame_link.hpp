@@ -6,7 +6,7 @@
 #include <string>
 
 #include "abs_hil/driver/io_result.hpp"
-#include "driver/emulated_time.hpp"
+#include "driver/board_kit.hpp"
 #include "driver/usb/frame.hpp"
 
 namespace abs_hil::driver::usb {
@@ -46,6 +46,7 @@ struct Board {
   std::string place{};                   ///< for messages: ids, serial, bus address
   std::string serial{};                  ///< the board's own; without one, its bus address
   std::string address{};                 ///< its folder below driver.usb.sysfs_root
+  explicit operator bool() const noexcept { return link != nullptr; }
 };
 
 // Bulk endpoints of the FPGA. 6 OUT and 8 IN are its JTAG: never touched.

@@ -20,13 +20,13 @@ namespace {
 /// The kernel cancels synchronously: this passes only if it fails to.
 constexpr std::int64_t give_up_ns = rig::ns_per_s;
 
-[[noreturn]] void refuse(const UsbDevice& device, const std::string& what) {
+[[noreturn]] void refuse_device(const UsbDevice& device, const std::string& what) {
   throw Unavailable("backend rig: USB board " + device.text() + ": " + what);
 }
 
 /// Refuses the device if `result` is -errno.
 void require(const UsbDevice& device, std::int64_t result, const std::string& what) {
-  if (result < 0) refuse(device, what + ": " + std::strerror(static_cast<int>(-result)));
+  if (result < 0) refuse_device(device, what + ": " + std::strerror(static_cast<int>(-result)));
 }
 
 /// @param result 0 or more, or -errno of a system call
@@ -62,7 +62,7 @@ UrbLink::Node::Node(const UsbDevice& device, Usbfs& usbfs) : usbfs_(usbfs), file
     what += ". Put this line into /etc/udev/rules.d/70-abs-hil.rules and plug the board in again (docs/usb.md):\n" +
             udev_rule(device);
   }
-  refuse(device, what);
+  refuse_device(device, what);
 }
 
 std::vector<std::uint8_t> UrbLink::Node::descriptors(const UsbDevice& device) {
@@ -92,18 +92,18 @@ UrbLink::UrbLink(const UsbDevice& device, Usbfs& usbfs) : node_(device, usbfs) {
 
 void UrbLink::claim(const UsbDevice& device) {
   if (device.configuration == 0) {
-    refuse(device, "has no configuration: the kernel has not accepted it (see dmesg); plug it in again");
+    refuse_device(device, "has no configuration: the kernel has not accepted it (see dmesg); plug it in again");
   }
   const std::optional<InterfaceSetting> found = find_interface(node_.descriptors(device), device.configuration);
   if (!found) {
-    refuse(
+    refuse_device(
         device,
         "has no interface with bulk endpoints 02 (out) and 84 (in): it is another device, or its firmware is missing");
   }
   unsigned interface = found->interface;
   const int claimed = node_.ioctl(USBDEVFS_CLAIMINTERFACE, &interface);
   if (claimed == -EBUSY) {
-    refuse(device, "is in use by another process; a board has only one owner: end that process first");
+    refuse_device(device, "is in use by another process; a board has only one owner: end that process first");
   }
   require(device, claimed, "cannot be claimed");
   if (found->alternate == 0) return;

@@ -4,10 +4,10 @@
 #include <stdexcept>
 #include <string>
 
-#include "driver/accessible_file.hpp"
+#include "driver/file_descriptor.hpp"
 #include "driver/monotonic_time.hpp"
-#include "driver/output_grid.hpp"
-#include "driver/reopening.hpp"
+#include "driver/own_handle_writer.hpp"
+#include "driver/pwm.hpp"
 #include "driver/usb/discovery.hpp"
 #include "driver/usb/options.hpp"
 #include "driver/usb/urb_link.hpp"

@@ -4,10 +4,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "abs_hil/rig/option_check.hpp"
 #include "abs_hil/rig/time_units.hpp"
-#include "driver/encoder_sign.hpp"
-#include "driver/plausibility.hpp"
+#include "driver/board_kit.hpp"
 
 namespace abs_hil::driver::usb {
 
@@ -39,10 +37,7 @@ UsbDriver::UsbDriver(const UsbOptions& options, OpenBoard open_board, ReadClock 
       grid_(pwm_grid(options)),
       open_board_(std::move(open_board)),
       read_clock_(read_clock) {
-  rig::require_valid(options, "driver.usb.");
-  check_sign("driver.usb.lower_sign", options.lower_sign);
-  check_sign("driver.usb.upper_sign", options.upper_sign);
-  check_channels("driver.usb.", options.lower_channel, options.upper_channel);
+  check_options("driver.usb.", options);
   if (options.drive_pwm == options.brake_pwm) {
     throw std::invalid_argument("driver.usb.drive_pwm = driver.usb.brake_pwm = " + std::to_string(options.brake_pwm) +
                                 ": drive and brake need different PWM channels");
@@ -238,10 +233,7 @@ bool UsbDriver::outputs_now(rig::Command& applied) noexcept {
   std::int64_t ignored = 0;
   const IoResult read = fresh_frame(patient_ns, contents, ignored);
   if (!read.ok() && read.error != IoError::read_back_mismatch) return false;
-  const std::uint32_t steps = full_width(mode_);
-  applied = {.motor_duty = rig::duty_of(contents.drive[2], steps),
-             .brake_duty = rig::duty_of(contents.brake[2], steps)};
-  applied.motor_enable = applied.motor_duty > 0.0;
+  applied = command_shown(contents.drive[2], contents.brake[2], grid_.duty_steps);
   return options_.verify_outputs;
 }
 

@@ -9,7 +9,6 @@
 
 #include "abs_hil/driver/rig_driver.hpp"
 #include "driver/loss_bucket.hpp"
-#include "driver/output_grid.hpp"
 #include "driver/pwm.hpp"
 #include "driver/usb/frame.hpp"
 #include "driver/usb/frame_link.hpp"

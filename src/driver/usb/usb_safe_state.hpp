@@ -1,9 +1,8 @@
 #pragma once
 
-#include <functional>
 #include <utility>
 
-#include "abs_hil/driver/safe_state_writer.hpp"
+#include "driver/own_handle_writer.hpp"
 #include "driver/usb/frame_link.hpp"
 #include "driver/usb/options.hpp"
 #include "driver/usb/outputs.hpp"
@@ -13,24 +12,22 @@ namespace abs_hil::driver::usb {
 /// Writes the safe state of an RT-DAC/USB2 after its owner's end; only one process can claim the board. It sends zeros
 /// whether or not the board answers, and verifies them afterwards. A frame sets all words of the board: those that are
 /// not of the rig come from a frame that the board has shown. If it shows none, its digital lines become inputs.
-class UsbSafeState final : public SafeStateWriter {
+class UsbSafeState final : public OwnHandleWriter<Board> {
  public:
-  using OpenBoard = std::function<Board()>;
-  /// @param open_board  throws Unavailable, or returns a board without link at little cost if it has looked just before
-  UsbSafeState(UsbOptions options, OpenBoard open_board)
-      : options_(std::move(options)), open_board_(std::move(open_board)) {}
+  UsbSafeState(UsbOptions options, Open open_board)
+      : OwnHandleWriter(std::move(open_board)), options_(std::move(options)) {}
 
   [[nodiscard]] std::string_view name() const noexcept override { return "usb"; }
   /// Opens nothing: the owner has claimed the board.
   void prepare() override {}
   [[nodiscard]] std::int64_t owner_needs_ns() const noexcept override;
-  void let_go() noexcept override { board_ = {}; }
-  [[nodiscard]] IoResult make_safe() noexcept override;
-  /// One frame is asked for, at most 5 ms long. It shows the outputs only with driver.usb.verify_outputs.
-  [[nodiscard]] IoResult verify_safe() noexcept override;
+  void let_go() noexcept override { handle_ = {}; }
 
  private:
-  [[nodiscard]] IoResult open() noexcept;
+  void opened() noexcept override;
+  [[nodiscard]] IoResult write_zeros() noexcept override;
+  /// Asks for one frame, at most 5 ms long. It shows the outputs only with driver.usb.verify_outputs.
+  [[nodiscard]] IoResult look() noexcept override;
   void learn_words() noexcept;
   /// Asks for a frame and takes its words over; false without one.
   [[nodiscard]] bool show(Frame& words) noexcept;
@@ -39,8 +36,6 @@ class UsbSafeState final : public SafeStateWriter {
   [[nodiscard]] IoResult verify(std::int64_t timeout_ns) noexcept;
 
   UsbOptions options_;
-  OpenBoard open_board_;
-  Board board_{};
   Frame frame_{};      ///< the frame to send; all words but the outputs'
   bool shown_{false};  ///< they come from the board
   OutputWords zeros_{};

@@ -4,7 +4,7 @@
 
 #include "abs_hil/plant_sim/options.hpp"
 #include "driver/sim/sim_driver.hpp"
-#include "driver/sim_options.hpp"
+#include "driver/board_rows.hpp"
 #include "experiment/options.hpp"
 #include "interchange/fmu/model.hpp"
 

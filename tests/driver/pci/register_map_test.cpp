@@ -34,16 +34,18 @@ TEST_CASE("PWM frequencies are those of the vendor's demos and manual") {
 }
 
 TEST_CASE("Widths round to the nearest step and never exceed the cap") {
-  CHECK(pwm_width_for(PwmMode::bits_12, 0.0, 1.0) == 0);
-  CHECK(pwm_width_for(PwmMode::bits_12, 1.0, 1.0) == 4095);
-  CHECK(pwm_width_for(PwmMode::bits_8, 1.0, 1.0) == 255);
-  CHECK(pwm_width_for(PwmMode::bits_12, 0.5 / 4095.0 - 1e-9, 1.0) == 0);
-  CHECK(pwm_width_for(PwmMode::bits_12, 0.5 / 4095.0 + 1e-9, 1.0) == 1);
-  CHECK(pwm_width_for(PwmMode::bits_12, 1.0, 0.7) == 2866);  // 0.7 * 4095 = 2866.5: rounding up would exceed it
-  CHECK(pwm_width_for(PwmMode::bits_12, 0.3, 0.7) == 1229);
+  CHECK(abs_hil::rig::width_for(full_width(PwmMode::bits_12), 0.0, 1.0) == 0);
+  CHECK(abs_hil::rig::width_for(full_width(PwmMode::bits_12), 1.0, 1.0) == 4095);
+  CHECK(abs_hil::rig::width_for(full_width(PwmMode::bits_8), 1.0, 1.0) == 255);
+  CHECK(abs_hil::rig::width_for(full_width(PwmMode::bits_12), 0.5 / 4095.0 - 1e-9, 1.0) == 0);
+  CHECK(abs_hil::rig::width_for(full_width(PwmMode::bits_12), 0.5 / 4095.0 + 1e-9, 1.0) == 1);
+  CHECK(abs_hil::rig::width_for(full_width(PwmMode::bits_12), 1.0, 0.7) ==
+        2866);  // 0.7 * 4095 = 2866.5: rounding up would exceed it
+  CHECK(abs_hil::rig::width_for(full_width(PwmMode::bits_12), 0.3, 0.7) == 1229);
   for (std::uint32_t width = 0; width <= 4095; ++width) {
     const double duty = static_cast<double>(width) / 4095.0;
-    REQUIRE(pwm_width_for(PwmMode::bits_12, duty, duty) == width);  // a cap that is a width allows that width
+    REQUIRE(abs_hil::rig::width_for(full_width(PwmMode::bits_12), duty, duty) ==
+            width);  // a cap that is a width allows that width
   }
 }
 

@@ -1,0 +1,115 @@
+// What the drivers of all boards share: refusals, checks of options and commands, counters, an emulator's time.
+
+#pragma once
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+
+#include "abs_hil/driver/io_result.hpp"
+#include "abs_hil/rig/command.hpp"
+#include "abs_hil/rig/duty_grid.hpp"
+#include "abs_hil/rig/option_check.hpp"
+#include "abs_hil/rig/time_units.hpp"
+#include "rig/encoder_scale.hpp"
+
+namespace abs_hil::driver {
+
+/// Ends the program with status 3. `what` names the board, the cause and the fix.
+[[noreturn]] inline void refuse(const std::string& what) { throw Unavailable("backend rig: " + what); }
+
+/// Throws std::invalid_argument, naming the key, unless `sign` is 1 or -1.
+inline void check_sign(const std::string& key, std::int32_t sign) {
+  if (sign == 1 || sign == -1) return;
+  throw std::invalid_argument(key + " = " + std::to_string(sign) + ": give 1 or -1");
+}
+
+/// Throws std::invalid_argument, naming the key, if an option is outside its range, or if both wheels have the same
+/// encoder channel.
+/// @param board  prefix of the keys, "driver.pci."
+template <class Options>
+void check_options(const std::string& board, const Options& options) {
+  rig::require_valid(options, board);
+  check_sign(board + "lower_sign", options.lower_sign);
+  check_sign(board + "upper_sign", options.upper_sign);
+  if constexpr (requires { options.lower_channel; }) {
+    if (options.lower_channel != options.upper_channel) return;
+    throw std::invalid_argument(board + "lower_channel = " + board + "upper_channel = " +
+                                std::to_string(options.upper_channel) + ": each wheel has an encoder of its own");
+  }
+}
+
+/// False if a duty is not in [0, 1], the torque is < 0, or a value is not finite.
+[[nodiscard]] inline bool in_range(const rig::Command& command) noexcept {
+  const auto is_duty = [](double value) { return value >= 0.0 && value <= 1.0; };  // false for NaN
+  return is_duty(command.motor_duty) && is_duty(command.brake_duty) && std::isfinite(command.brake_torque_Nm) &&
+         command.brake_torque_Nm >= 0.0;
+}
+
+/// The command that acts when the outputs have these widths.
+[[nodiscard]] constexpr rig::Command command_shown(std::uint32_t motor_width, std::uint32_t brake_width,
+                                                   std::uint32_t duty_steps) noexcept {
+  return {.motor_duty = rig::duty_of(motor_width, duty_steps),
+          .brake_duty = rig::duty_of(brake_width, duty_steps),
+          .motor_enable = motor_width > 0};
+}
+
+/// The counter as a signed number, negated if `sign` is -1. Real-time safe.
+[[nodiscard]] inline std::int32_t with_sign(std::uint32_t raw, std::int32_t sign) noexcept {
+  return std::bit_cast<std::int32_t>(sign < 0 ? 0U - raw
+                                              : raw);  // unsigned arithmetic: the most negative count has no negative
+}
+
+/// Most counts that a counter can move in `elapsed_ns`, which is >= 0, at a speed of at most `speed_rad_s`.
+[[nodiscard]] inline double most_plausible_counts(std::int64_t elapsed_ns, double speed_rad_s,
+                                                  std::int32_t counts_per_rev) noexcept {
+  /// Counts allowed in addition to what the speed explains, because of vibration, late reads and delays on a bus.
+  constexpr double slack_counts = 256.0;
+  return slack_counts +
+         speed_rad_s * static_cast<double>(elapsed_ns) * rig::s_per_ns / rig::radians_per_count(counts_per_rev);
+}
+
+/// True if a counter can have moved from `before` to `after` in `elapsed_ns`, which is >= 0.
+/// @param speed_rad_s largest plausible speed
+[[nodiscard]] inline bool plausible_travel(std::int32_t before, std::int32_t after, std::int64_t elapsed_ns,
+                                           double speed_rad_s, std::int32_t counts_per_rev) noexcept {
+  return std::abs(static_cast<double>(rig::counts_between(before, after))) <=
+         most_plausible_counts(elapsed_ns, speed_rad_s, counts_per_rev);
+}
+
+/// The clock of an emulated board in lock-step: it advances only when the driver says so. No hardware has such a clock.
+class EmulatedTime {
+ public:
+  EmulatedTime() = default;
+  EmulatedTime(const EmulatedTime&) = delete;
+  EmulatedTime& operator=(const EmulatedTime&) = delete;
+  virtual ~EmulatedTime() = default;
+
+  virtual IoResult now(std::int64_t& time_ns) noexcept = 0;
+  /// Advances the emulated rig to `time_ns` and returns when that is done.
+  virtual IoResult advance_to(std::int64_t time_ns) noexcept = 0;
+};
+
+/// Refuses a board with its own time under --fast, and an emulator in lock-step without --fast. Throws Unavailable.
+/// @param board      how messages name it
+/// @param lock_step  the program advances the board's time
+/// @param waits      the board is an emulator that waits for that
+/// @param start_with options that start such an emulator
+inline void require_lock_step(const std::string& board, bool lock_step, bool waits,
+                              const std::string& start_with = "--lock-step") {
+  if (lock_step && !waits) {
+    refuse(board +
+           " keeps its own time: it is hardware, or an emulator in real time. Omit --fast, or start abs_rig_emulator "
+           "with " +
+           start_with);
+  }
+  if (!lock_step && waits) {
+    refuse(board +
+           " is an emulator in lock-step: give --fast --set driver.emulated=true to advance its time, or start "
+           "abs_rig_emulator without --lock-step");
+  }
+}
+
+}  // namespace abs_hil::driver
