@@ -1,0 +1,3 @@
+#pragma once
+
+#include "driver/board_kit.hpp"

@@ -1,0 +1,3 @@
+#pragma once
+
+#include "driver/own_handle_writer.hpp"
