@@ -26,19 +26,22 @@ inline void check_sign(const std::string& key, std::int32_t sign) {
   throw std::invalid_argument(key + " = " + std::to_string(sign) + ": give 1 or -1");
 }
 
-/// Throws std::invalid_argument, naming the key, if an option is outside its range, or if both wheels have the same
-/// encoder channel.
+/// Throws std::invalid_argument, naming the keys, if both wheels have the same encoder channel.
 /// @param board  prefix of the keys, "driver.pci."
+inline void check_channels(const std::string& board, std::int32_t lower, std::int32_t upper) {
+  if (lower != upper) return;
+  throw std::invalid_argument(board + "lower_channel = " + board + "upper_channel = " + std::to_string(upper) +
+                              ": each wheel has an encoder of its own");
+}
+
+/// Throws std::invalid_argument, naming the key, if an option is outside its range.
 template <class Options>
 void check_options(const std::string& board, const Options& options) {
   rig::require_valid(options, board);
   check_sign(board + "lower_sign", options.lower_sign);
   check_sign(board + "upper_sign", options.upper_sign);
-  if constexpr (requires { options.lower_channel; }) {
-    if (options.lower_channel != options.upper_channel) return;
-    throw std::invalid_argument(board + "lower_channel = " + board + "upper_channel = " +
-                                std::to_string(options.upper_channel) + ": each wheel has an encoder of its own");
-  }
+  if constexpr (requires { options.lower_channel; })
+    check_channels(board, options.lower_channel, options.upper_channel);
 }
 
 /// False if a duty is not in [0, 1], the torque is < 0, or a value is not finite.
