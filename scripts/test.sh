@@ -4,7 +4,7 @@
 #   test.sh PRESET ...       the same for another preset; ARGUMENTs go to ctest and then choose the tests alone
 #   test.sh quick ...        the preset release without the labels of slow_labels below: about a minute after the build
 # With CI=true or ABS_HIL_REQUIRE_VM=1 the tests in a virtual machine must not be skipped. With CI=true the script also
-# installs what the tests of abs-spy, of the Python modules and of abs_report need.
+# installs what the tests of abs-spy, of mesaflash, of the Python modules and of abs_report need.
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
 
@@ -27,7 +27,7 @@ else
     "most of it real-time runs and tests in a virtual machine (scripts/test.sh quick: about a minute)"
 fi
 echo "test: a test is skipped and says why if its tools are missing: a virtual machine (packages-vm.txt), abs-spy" \
-  "(packages-spy.txt), a browser and Octave (packages-report.txt), Windows (packages-windows.txt), Python modules (setup_python.sh), FUSE," \
+  "(packages-spy.txt), mesaflash (packages-mesa.txt), a browser and Octave (packages-report.txt), Windows (packages-windows.txt), Python modules (setup_python.sh), FUSE," \
   "network namespaces"
 scripts/setup.sh
 # The report's page needs plotly. The first of the README's commands installs it too, but nobody has to run that before.
@@ -36,6 +36,7 @@ scripts/setup_python.sh python-packages.txt || echo "test: no plotly from PyPI, 
 scripts/setup.sh packages-vm.txt || { [ "${CI:-}" != true ] && [ "${ABS_HIL_REQUIRE_VM:-}" != 1 ]; }
 if [ "${CI:-}" = true ]; then
   scripts/setup.sh packages-spy.txt
+  scripts/setup.sh packages-mesa.txt
   scripts/setup.sh packages-report.txt
   scripts/setup.sh packages-windows.txt
   scripts/setup_python.sh

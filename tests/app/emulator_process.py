@@ -9,10 +9,10 @@ EMULATOR = pathlib.Path(PROGRAM).parent / 'abs_rig_emulator'
 
 
 class EmulatorProcess:
-    def __init__(self, folder, *args):
+    def __init__(self, folder, *args, program=EMULATOR):
         self.control = folder / 'control'
         self.lines = []  # all of its output lines, stripped
-        self.process = subprocess.Popen([EMULATOR, '--control', self.control, *map(str, args)], stdout=subprocess.PIPE,
+        self.process = subprocess.Popen([program, '--control', self.control, *map(str, args)], stdout=subprocess.PIPE,
                                         stderr=subprocess.STDOUT, text=True)
         self.line('ready')  # "not in real time" may come before
 
