@@ -2,6 +2,7 @@
 
 #define FUSE_USE_VERSION 31
 #include <fuse.h>
+#include <fuse_lowlevel.h>
 #include <spawn.h>
 #include <sys/mount.h>
 #include <sys/stat.h>
