@@ -2,19 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <utility>
 
-#include "control_command.hpp"
 #include "driver/pci/discovery.hpp"
 #include "runtime/clock.hpp"
 
 namespace abs_hil::program {
 
 namespace {
-
-std::int64_t monotonic_ns() { return runtime::MonotonicClock().now_ns(); }
 
 void wait_for(std::int64_t duration_ns) {
   runtime::MonotonicClock clock;
@@ -27,15 +25,13 @@ EmulatedCard::EmulatedCard(const EmulatorOptions& options)
     : model_(options.card),
       faulty_(model_, options.seed),
       lock_step_(options.lock_step),
-      started_ns_(monotonic_ns()),
+      started_ns_(driver::monotonic_ns()),
       truth_(options.truth_file, true) {
-  if (!options.traffic_file.empty()) record_to(options.traffic_file);
+  if (!options.traffic_file.empty()) open_for_writing(traffic_, options.traffic_file);
 }
 
-void EmulatedCard::record_to(const std::string& file) { open_for_writing(traffic_, file); }
-
 void EmulatedCard::catch_up() {
-  if (!lock_step_) truth_.advance(model_, monotonic_ns() - started_ns_);
+  if (!lock_step_) truth_.advance(model_, driver::monotonic_ns() - started_ns_);
 }
 
 void EmulatedCard::record(char direction, std::uint64_t offset, std::uint32_t value) {
@@ -90,12 +86,7 @@ int EmulatedCard::write(std::string_view name, std::uint64_t offset, const void*
 }
 
 std::string EmulatedCard::status() const {
-  const emulator::Outputs out = model_.outputs();
-  const auto& state = model_.plant().state();
-  return fmt::format(
-      "time {:.3f} s, drive {:.4f}, brake {:.4f}, upper {:.2f} rad/s, lower {:.2f} rad/s, trip flags {:#x}",
-      static_cast<double>(model_.time_ns()) * 1e-9, out.drive_duty, out.brake_duty, state.omega1_rad_s,
-      state.omega2_rad_s, model_.trip_flags());
+  return fmt::format("{}, trip flags {:#x}", state_text(model_), model_.trip_flags());
 }
 
 std::string EmulatedCard::widths() const {
@@ -108,52 +99,41 @@ std::string EmulatedCard::widths() const {
                      text(w.last_written_ns));
 }
 
-const char* EmulatedCard::commands() {
-  return "fault OFFSET:KIND[=PARAMETER]   one register: ok stuck wrong= slow= delayed= intermittent= off garbage\n"
-         "unplug | plug                   the card's files disappear, reappear\n"
-         "all-ones on|off                 the card leaves the bus, its files stay\n"
-         "deny on|off                     opening the registers is forbidden\n"
-         "estop on|off                    the emergency stop: cuts the drive only\n"
-         "supply V | temperature C        what the board measures\n"
-         "overspeed                       latches the overspeed interlock until the wheels stop\n"
-         "turn upper|lower REVOLUTIONS    a wheel is turned by hand\n"
-         "record FILE | record off        register accesses: R or W, offset, value\n"
-         "changes FILE | changes off      each change of a PWM's width: when, ns of CLOCK_MONOTONIC, drive, brake\n"
-         "widths                          both PWM width registers, since when both are 0, time of the last write; ns "
-         "of CLOCK_MONOTONIC, in lock-step of the card's time\n"
-         "status                          duties on the wire, speeds, trip flags\n";
+std::span<const ControlRow<EmulatedCard>> EmulatedCard::rows() {
+  using Card = EmulatedCard;
+  using Command = ControlCommand;
+  static constexpr std::array<ControlRow<Card>, 13> all{{
+      {"fault OFFSET:KIND[=PARAMETER]", "one register: ok stuck wrong= slow= delayed= intermittent= off garbage",
+       [](Card& card, const Command& c) { card.faulty_.set(c.text(1)); }},
+      {"unplug", "the card's files disappear", [](Card& card, const Command&) { card.present_ = false; }},
+      {"plug", "they reappear", [](Card& card, const Command&) { card.present_ = true; }},
+      {"all-ones on|off", "the card leaves the bus, its files stay",
+       [](Card& card, const Command& c) { card.faulty_.answer_all_ones(c.on(1)); }},
+      {"deny on|off", "opening the registers is forbidden",
+       [](Card& card, const Command& c) { card.permission_denied_ = c.on(1); }},
+      estop_row<Card>,
+      supply_row<Card>,
+      temperature_row<Card>,
+      overspeed_row<Card>,
+      turn_row<Card>,
+      {"record FILE|off", "register accesses: R or W, offset, value",
+       [](Card& card, const Command& c) { open_for_writing(card.traffic_, c.text(1)); }},
+      {"changes FILE|off", "each change of a PWM's width: when, ns of CLOCK_MONOTONIC, drive, brake",
+       [](Card& card, const Command& c) { open_for_writing(card.changes_, c.text(1)); }},
+      {"widths",
+       "both PWM width registers, since when both are 0, time of the last write; ns of CLOCK_MONOTONIC, in lock-step "
+       "of the card's time",
+       [](Card&, const Command&) {}},
+  }};
+  return all;
 }
 
 std::string EmulatedCard::obey(std::string_view line) {
   catch_up();
   const ControlCommand command(line);
   if (command.empty()) return {};
-  if (command.is("fault", 1)) {
-    faulty_.set(command.text(1));
-  } else if (command.is("unplug", 0) || command.is("plug", 0)) {
-    present_ = command.name() == "plug";
-  } else if (command.is("all-ones", 1)) {
-    faulty_.answer_all_ones(command.on(1));
-  } else if (command.is("deny", 1)) {
-    permission_denied_ = command.on(1);
-  } else if (command.is("record", 1)) {
-    if (command.text(1) == "off") {
-      traffic_.close();
-    } else {
-      record_to(command.text(1));
-    }
-  } else if (command.is("changes", 1)) {
-    if (command.text(1) == "off") {
-      changes_.close();
-    } else {
-      open_for_writing(changes_, command.text(1));
-    }
-  } else if (command.is("widths", 0)) {
-    return widths();
-  } else if (!obey_surroundings(model_, command) && !obey_turn(model_, command) && !command.is("status", 0)) {
-    command.refuse(commands());
-  }
-  return status();
+  obey_row(*this, rows(), command);
+  return command.name() == "widths" ? widths() : status();
 }
 
 }  // namespace abs_hil::program

@@ -2,16 +2,14 @@
 
 #include <cstdint>
 #include <fstream>
-#include <functional>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 
+#include "control.hpp"
 #include "emulator/card_model.hpp"
 #include "emulator/register_faults.hpp"
 #include "fuse_tree.hpp"
-#include "truth_file.hpp"
 
 namespace abs_hil::program {
 
@@ -39,8 +37,8 @@ class EmulatedCard final : public FileHandler {
   void catch_up();
   /// Obeys one control command and returns its answer. Throws std::invalid_argument for an unknown command.
   std::string obey(std::string_view line);
-  /// The commands of `obey`, one per line.
-  [[nodiscard]] static const char* commands();
+  [[nodiscard]] static std::span<const ControlRow<EmulatedCard>> rows();
+  [[nodiscard]] emulator::CardModel& model() noexcept { return model_; }
   /// Current duties at the power stage and other values, as one line.
   [[nodiscard]] std::string status() const;
   /// Both PWMs' width registers and their times, as one line.
@@ -49,7 +47,6 @@ class EmulatedCard final : public FileHandler {
  private:
   void record(char direction, std::uint64_t offset, std::uint32_t value);
   void note_change();
-  void record_to(const std::string& file);
 
   emulator::CardModel model_;
   emulator::FaultyCard faulty_;

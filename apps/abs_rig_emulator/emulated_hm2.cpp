@@ -12,8 +12,6 @@
 #include <stdexcept>
 #include <vector>
 
-#include "control_command.hpp"
-#include "control_fifo.hpp"
 #include "driver/monotonic_time.hpp"
 
 namespace abs_hil::program {
@@ -209,7 +207,9 @@ std::string EmulatedHm2::obey(std::string_view line) {
     if (command.text(1) != "off") open_for_writing(changes_, command.text(1));
   } else if (command.is("registers", 0)) {
     return fpga.registers_text();
-  } else if (!obey_turn(fpga, command) && !command.is("status", 0)) {
+  } else if (command.is("turn", 2)) {
+    fpga.turn_by_hand(command.first_of(1, "upper", "lower"), command.number(2));
+  } else if (!command.is("status", 0)) {
     command.refuse(commands());
   }
   log_events();

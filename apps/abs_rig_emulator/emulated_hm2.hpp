@@ -7,10 +7,10 @@
 #include <string_view>
 #include <utility>
 
+#include "control.hpp"
 #include "driver/file_descriptor.hpp"
 #include "emulator/hm2_board.hpp"
 #include "emulator/hm2_link.hpp"
-#include "truth_file.hpp"
 
 namespace abs_hil::program {
 

@@ -1,12 +1,115 @@
 #include "emulated_node.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <linux/can.h>
+#include <linux/can/raw.h>
+#include <net/if.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
 
-#include "control_command.hpp"
-#include "control_fifo.hpp"
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+
 #include "driver/monotonic_time.hpp"
 
 namespace abs_hil::program {
+
+namespace {
+
+[[noreturn]] void refuse(const std::string& what) { throw std::runtime_error("--can " + what + std::strerror(errno)); }
+
+/// Removes the socket that a killed emulator has left behind. Any other file is somebody's.
+void remove_old_socket(const std::string& path) {
+  struct stat status {};
+  if (::lstat(path.c_str(), &status) != 0) return;
+  if (!S_ISSOCK(status.st_mode)) {
+    throw std::invalid_argument("--can unix:" + path + ": this file exists and is no socket; give another path");
+  }
+  ::unlink(path.c_str());
+}
+
+}  // namespace
+
+BusSocket::BusSocket(const std::string& interface) {
+  if (interface.starts_with("unix:")) {
+    listen_at(interface.substr(5));
+  } else {
+    open_can(interface);
+  }
+}
+
+BusSocket::~BusSocket() {
+  if (!path_.empty()) ::unlink(path_.c_str());
+}
+
+void BusSocket::open_can(const std::string& interface) {
+  client_ = driver::FileDescriptor(::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW));
+  if (client_.get() < 0) refuse(interface + ": no CAN socket (sudo modprobe can_raw): ");
+  // ABS_TIME, ABS_SYNC, ABS_COMMAND, ABS_CONTROL.
+  constexpr canid_t exactly = CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
+  const can_filter filters[] = {{0x7F, exactly}, {0x80, exactly}, {0x81, exactly}, {0x82, exactly}};
+  const int on = 1;
+  if (::setsockopt(client_.get(), SOL_CAN_RAW, CAN_RAW_FILTER, filters, sizeof filters) != 0 ||
+      ::setsockopt(client_.get(), SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on) != 0) {
+    refuse(interface + ": ");
+  }
+  ifreq request{};
+  std::strncpy(request.ifr_name, interface.c_str(), IFNAMSIZ - 1);
+  can_fd_ = ::ioctl(client_.get(), SIOCGIFMTU, &request) == 0 && request.ifr_mtu >= static_cast<int>(CANFD_MTU);
+  sockaddr_can address{};
+  address.can_family = AF_CAN;
+  address.can_ifindex = static_cast<int>(::if_nametoindex(interface.c_str()));
+  if (address.can_ifindex == 0) refuse(interface + ": ");
+  if (::bind(client_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) refuse(interface + ": ");
+}
+
+void BusSocket::listen_at(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.empty() || path.size() >= sizeof address.sun_path) {
+    throw std::invalid_argument("--can unix:" + path + ": give a path of 1 to 107 characters");
+  }
+  std::memcpy(address.sun_path, path.c_str(), path.size());
+  listening_ = driver::FileDescriptor(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  remove_old_socket(path);
+  if (listening_.get() < 0 ||
+      ::bind(listening_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+      ::listen(listening_.get(), 1) != 0) {
+    refuse("unix:" + path + ": ");
+  }
+  path_ = path;
+}
+
+bool BusSocket::receive(emulator::BusFrame& frame) {
+  if (client_.get() < 0) {
+    client_ = driver::FileDescriptor(::accept4(listening_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+  }
+  if (client_.get() < 0) return false;
+  canfd_frame raw{};
+  const ssize_t size = ::recv(client_.get(), &raw, sizeof raw, MSG_DONTWAIT);
+  if (size == 0 && listening_.get() >= 0) client_ = driver::FileDescriptor();
+  // An interface that goes down returns one error. The node then continues and receives nothing.
+  if (size != CAN_MTU && size != CANFD_MTU) return false;
+  frame = {.id = raw.can_id, .length = std::min<std::uint8_t>(raw.len, CANFD_MAX_DLEN), .fd = size == CANFD_MTU};
+  std::memcpy(frame.data.data(), raw.data, frame.length);
+  return true;
+}
+
+void BusSocket::send(const emulator::BusFrame& frame) {
+  canfd_frame raw{};
+  raw.can_id = frame.id;
+  raw.len = frame.length;
+  if (frame.fd) raw.flags = CANFD_BRS;
+  std::memcpy(raw.data, frame.data.data(), frame.length);
+  static_cast<void>(::send(client_.get(), &raw, frame.fd ? CANFD_MTU : CAN_MTU, MSG_DONTWAIT | MSG_NOSIGNAL));
+}
 
 namespace {
 
@@ -52,39 +155,35 @@ void EmulatedNode::serve(BusSocket& bus) {
 }
 
 std::string EmulatedNode::status() const {
-  const emulator::Outputs out = node_.outputs();
-  const auto& state = node_.plant().state();
-  return fmt::format(
-      "time {:.6f} s, drive {:.4f}, brake {:.4f}, upper {:.2f} rad/s, lower {:.2f} rad/s, trip flags {:#x}, {}, "
-      "{} commands rejected",
-      static_cast<double>(node_.time_ns()) * 1e-9, out.drive_duty, out.brake_duty, state.omega1_rad_s,
-      state.omega2_rad_s, node_.trip_flags(), name_of(node_.state()), node_.rejected());
+  constexpr int microseconds = 6;
+  return fmt::format("{}, trip flags {:#x}, {}, {} commands rejected", state_text(node_, microseconds),
+                     node_.trip_flags(), name_of(node_.state()), node_.rejected());
 }
 
-const char* EmulatedNode::commands() {
-  return "fault NAME[=NUMBER]             ok silent deaf drop= no-status stale= ahead= stuck duplicate swapped\n"
-         "                                wrong-size= corrupt nonsense babble=\n"
-         "restart                         the node is switched off and on: inactive, its clock at 0\n"
-         "estop on|off                    the emergency stop: cuts the drive only\n"
-         "supply V | temperature C        what the node measures\n"
-         "overspeed                       latches the overspeed interlock until the wheels stop\n"
-         "brake-error DUTY                the brake's duty is off by this from what is commanded\n"
-         "status                          duties on the wire, speeds, trip flags, state\n";
+std::span<const ControlRow<EmulatedNode>> EmulatedNode::rows() {
+  using Node = EmulatedNode;
+  using Command = ControlCommand;
+  static constexpr std::array<ControlRow<Node>, 7> all{{
+      {"fault NAME[=NUMBER]",
+       "ok silent deaf drop= no-status stale= ahead= stuck duplicate swapped wrong-size= corrupt nonsense babble=",
+       [](Node& node, const Command& c) { node.faults_.set(c.text(1)); }},
+      {"restart", "the node is switched off and on: inactive, its clock at 0",
+       [](Node& node, const Command&) { node.power_on(); }},
+      estop_row<Node>,
+      supply_row<Node>,
+      temperature_row<Node>,
+      overspeed_row<Node>,
+      {"brake-error DUTY", "the brake's duty is off by this from what is commanded",
+       [](Node& node, const Command& c) { node.node_.break_brake_output(c.number(1)); }},
+  }};
+  return all;
 }
 
 std::string EmulatedNode::obey(std::string_view line) {
   catch_up();
   const ControlCommand command(line);
   if (command.empty()) return {};
-  if (command.is("fault", 1)) {
-    faults_.set(command.text(1));
-  } else if (command.is("restart", 0)) {
-    power_on();
-  } else if (command.is("brake-error", 1)) {
-    node_.break_brake_output(command.number(1));
-  } else if (!obey_surroundings(node_, command) && !command.is("status", 0)) {
-    command.refuse(commands());
-  }
+  obey_row(*this, rows(), command);
   return status();
 }
 

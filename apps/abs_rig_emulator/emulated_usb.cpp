@@ -13,7 +13,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "control_command.hpp"
 #include "driver/monotonic_time.hpp"
 
 namespace abs_hil::program {
@@ -147,41 +146,33 @@ std::string EmulatedUsb::place() const {
 }
 
 std::string EmulatedUsb::status() const {
-  const emulator::Outputs out = board_.outputs();
-  const auto& state = board_.plant().state();
-  return fmt::format(
-      "time {:.3f} s, drive {:.4f}, brake {:.4f}, upper {:.2f} rad/s, lower {:.2f} rad/s, frames {}, nonsense {}, JTAG "
-      "{}",
-      static_cast<double>(board_.time_ns()) * 1e-9, out.drive_duty, out.brake_duty, state.omega1_rad_s,
-      state.omega2_rad_s, board_.frames_taken(), board_.nonsense(), device_.jtag_transfers());
+  return fmt::format("{}, frames {}, nonsense {}, JTAG {}", state_text(board_), board_.frames_taken(),
+                     board_.nonsense(), device_.jtag_transfers());
 }
 
-const char* EmulatedUsb::commands() {
-  return "fault KIND                      ok | stall in|out [once] | length BYTES | silent | late US [COUNT] | "
-         "garbage\n"
-         "unplug | plug                   the cable; the outputs hold\n"
-         "break-brake on|off              the brake's PWM ignores writes\n"
-         "estop on|off                    the emergency stop: cuts the drive only\n"
-         "turn upper|lower REVOLUTIONS    a wheel is turned by hand\n"
-         "status                          duties on the wire, speeds, frames taken\n";
+std::span<const ControlRow<EmulatedUsb>> EmulatedUsb::rows() {
+  using Usb = EmulatedUsb;
+  using Command = ControlCommand;
+  static constexpr std::array<ControlRow<Usb>, 6> all{{
+      {"fault KIND", "ok | stall in|out [once] | length BYTES | silent | late US [COUNT] | garbage",
+       [](Usb& usb, const Command& c) { usb.device_.faults.set(c.line().substr(c.line().find("fault") + 5)); }, true},
+      {"unplug", "the cable; the outputs hold", [](Usb& usb, const Command&) { usb.unplug(); }},
+      {"plug", "the cable is plugged in again",
+       [](Usb& usb, const Command&) {
+         if (usb.host_.get() < 0) usb.plug_in();
+       }},
+      {"break-brake on|off", "the brake's PWM ignores writes",
+       [](Usb& usb, const Command& c) { usb.board_.break_brake(c.on(1)); }},
+      estop_row<Usb>,
+      turn_row<Usb>,
+  }};
+  return all;
 }
 
 std::string EmulatedUsb::obey(std::string_view line) {
   const ControlCommand command(line);
   if (command.empty()) return {};
-  if (command.name() == "fault") {
-    device_.faults.set(line.substr(line.find("fault") + 5));
-  } else if (command.is("unplug", 0)) {
-    unplug();
-  } else if (command.is("plug", 0)) {
-    if (host_.get() < 0) plug_in();
-  } else if (command.is("break-brake", 1)) {
-    board_.break_brake(command.on(1));
-  } else if (command.is("estop", 1)) {
-    board_.press_emergency_stop(command.on(1));
-  } else if (!obey_turn(board_, command) && !command.is("status", 0)) {
-    command.refuse(commands());
-  }
+  obey_row(*this, rows(), command);
   return status();
 }
 

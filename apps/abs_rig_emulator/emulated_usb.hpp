@@ -5,10 +5,10 @@
 #include <string_view>
 #include <vector>
 
+#include "control.hpp"
 #include "driver/file_descriptor.hpp"
 #include "emulator/usb_board_model.hpp"
 #include "emulator/usbip_device.hpp"
-#include "truth_file.hpp"
 
 namespace abs_hil::program {
 
@@ -35,8 +35,8 @@ class EmulatedUsb {
   std::string obey(std::string_view line);
   [[nodiscard]] std::string status() const;
   [[nodiscard]] std::string place() const;
-  /// The commands of `obey`, one per line.
-  [[nodiscard]] static const char* commands();
+  [[nodiscard]] static std::span<const ControlRow<EmulatedUsb>> rows();
+  [[nodiscard]] emulator::UsbBoardModel& model() noexcept { return board_; }
 
  private:
   void plug_in();

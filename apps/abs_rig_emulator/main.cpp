@@ -17,12 +17,11 @@
 #include <string>
 #include <vector>
 
-#include "bus_socket.hpp"
 #include "cli/command_line.hpp"
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
-#include "control_fifo.hpp"
+#include "control.hpp"
 #include "driver/pci/discovery.hpp"
 #include "emulated_card.hpp"
 #include "emulated_hm2.hpp"
@@ -59,55 +58,39 @@ struct Arguments {
   int priority{81};
 };
 
+void plain(cli::Parser& parser, const char* names, const cli::Target& to, const char* help) {
+  parser.add({.names = names, .to = to, .help = help});
+}
+/// The help shows its default.
+void shown(cli::Parser& parser, const char* names, const cli::Target& to, const char* help) {
+  parser.add({.names = names, .to = to, .help = help, .show_default = true});
+}
+
 void add_card_options(cli::Parser& parser, emulator::CardOptions& card) {
-  parser.add({.names = "--bitstream",
-              .to = &card.bitstream_version,
-              .help = "version word of the card",
-              .show_default = true});
-  parser.add(
-      {.names = "--start-speed", .to = &card.start_speed_rad_s, .help = "both wheels' speed at the start, rad/s"});
-  parser.add({.names = "--overspeed-rpm",
-              .to = &card.overspeed_rpm,
-              .help = "the FPGA's limit (our choice), rpm",
-              .show_default = true});
-  parser.add({.names = "--supply-min",
-              .to = &card.supply_min_V,
-              .help = "the FPGA's limit (our choice), V",
-              .show_default = true});
-  parser.add({.names = "--temperature-max",
-              .to = &card.temperature_max_C,
-              .help = "the FPGA's limit (our choice), deg C",
-              .show_default = true});
+  shown(parser, "--bitstream", &card.bitstream_version, "version word of the card");
+  plain(parser, "--start-speed", &card.start_speed_rad_s, "both wheels' speed at the start, rad/s");
+  shown(parser, "--overspeed-rpm", &card.overspeed_rpm, "the FPGA's limit (our choice), rpm");
+  shown(parser, "--supply-min", &card.supply_min_V, "the FPGA's limit (our choice), V");
+  shown(parser, "--temperature-max", &card.temperature_max_C, "the FPGA's limit (our choice), deg C");
   parser.add({.names = "--overspeed-bit",
               .to = &card.overspeed_bit,
               .help = "overspeed bit of the trip flags (the sources disagree)",
               .one_of = {"0", "2"},
               .show_default = true});
-  parser.add({.names = "--trip-clears-width",
-              .to = &card.trip_clears_width,
-              .help = "a trip also zeroes the PWM width registers (not known of the real card)"});
+  plain(parser, "--trip-clears-width", &card.trip_clears_width,
+        "a trip also zeroes the PWM width registers (not known of the real card)");
 }
 
 void add_usb_options(cli::Parser& parser, program::UsbEmulatorOptions& usb) {
-  parser.add({.names = "--usb-serial",
-              .to = &usb.identity.serial,
-              .help = "serial number of the USB board",
-              .show_default = true});
-  parser.add({.names = "--usb-manufacturer",
-              .to = &usb.identity.manufacturer,
-              .help = "manufacturer string of the USB board",
-              .show_default = true});
-  parser.add({.names = "--vhci",
-              .to = &usb.controller,
-              .help = "folder of the virtual host controller",
-              .show_default = true});
+  shown(parser, "--usb-serial", &usb.identity.serial, "serial number of the USB board");
+  shown(parser, "--usb-manufacturer", &usb.identity.manufacturer, "manufacturer string of the USB board");
+  shown(parser, "--vhci", &usb.controller, "folder of the virtual host controller");
   parser.add({.names = "--hide-outputs",
               .to = &usb.board.shows_outputs,
               .help = "the USB board's frames do not show the sent words (not known of the real board)",
               .sets = false});
-  parser.add({.names = "--enable-line",
-              .to = &usb.board.enable_line,
-              .help = "digital line of the USB board, or I/O of the 7I92T, that enables the drive"});
+  plain(parser, "--enable-line", &usb.board.enable_line,
+        "digital line of the USB board, or I/O of the 7I92T, that enables the drive");
   parser.add({.names = "--when-braking",
               .to = &usb.when_braking,
               .help = "control command of the USB board, obeyed once the brake has acted for 0.3 s",
@@ -115,18 +98,13 @@ void add_usb_options(cli::Parser& parser, program::UsbEmulatorOptions& usb) {
 }
 
 void add_hm2_options(cli::Parser& parser, program::Hm2EmulatorOptions& hm2) {
-  parser.add({.names = "--board-name",
-              .to = &hm2.board.name,
-              .help = "name that the 7I92T reports, for example 7I92",
-              .show_default = true});
-  parser.add({.names = "--mac", .to = &hm2.mac, .help = "MAC address in the 7I92T's EEPROM: 00:60:1b:16:ab:50"});
+  shown(parser, "--board-name", &hm2.board.name, "name that the 7I92T reports, for example 7I92");
+  plain(parser, "--mac", &hm2.mac, "MAC address in the 7I92T's EEPROM: 00:60:1b:16:ab:50");
   parser.add({.names = "--wrong-board",
               .to = &hm2.board.lie,
               .help = "a lie of the 7I92T about itself: " + emulator::Hm2Identity::lies()});
-  parser.add(
-      {.names = "--active-high",
-       .to = &hm2.board.active_high_stage,
-       .help = "the power stages behind the 7I92T act while their pins are high: wrong wiring, a bite gives full PWM"});
+  plain(parser, "--active-high", &hm2.board.active_high_stage,
+        "the power stages behind the 7I92T act while their pins are high: wrong wiring, a bite gives full PWM");
 }
 
 void add_board_options(cli::Parser& parser, Arguments& a) {
@@ -155,31 +133,21 @@ void add_options(cli::Parser& parser, Arguments& a) {
               .help = "watchdog of the CAN node, ms, until an activation sets another value",
               .range = {1, 10'000},
               .show_default = true});
-  parser.add({.names = "--bdf",
-              .to = &a.bdfs,
-              .help = "the card's address; give it again for more cards, without a rig behind them",
-              .show_default = true});
-  parser.add({.names = "--plant", .to = &a.plant, .help = "plant by name or TOML file", .show_default = true});
+  shown(parser, "--bdf", &a.bdfs, "the card's address; give it again for more cards, without a rig behind them");
+  shown(parser, "--plant", &a.plant, "plant by name or TOML file");
   parser.add({.names = "--set",
               .to = &a.assignments,
               .help = "any plant value, for example plant.theta_N=30",
               .repeated = true});
-  parser.add({.names = "--seed",
-              .to = &a.emulator.seed,
-              .help = "seed of intermittent faults and garbage",
-              .show_default = true});
-  parser.add({.names = "--lock-step",
-              .to = &a.emulator.lock_step,
-              .help = "time advances only when the client says so (abs_hil --fast)"});
+  shown(parser, "--seed", &a.emulator.seed, "seed of intermittent faults and garbage");
+  plain(parser, "--lock-step", &a.emulator.lock_step, "time advances only when the client says so (abs_hil --fast)");
   parser.add({.names = "--fault",
               .to = &a.faults,
               .help = "fault of one register from the start, for example 88:stuck",
               .repeated = true});
   parser.add(
       {.names = "--command", .to = &a.commands, .help = "any control command, obeyed at the start", .repeated = true});
-  parser.add({.names = "--control",
-              .to = &a.control_fifo,
-              .help = "FIFO from which to take commands while running; created if missing"});
+  plain(parser, "--control", &a.control_fifo, "FIFO from which to take commands while running; created if missing");
   parser.add({.names = "--truth",
               .to = &a.emulator.truth_file,
               .help = "CSV of true values that no register or frame shows, every ms",
@@ -188,15 +156,15 @@ void add_options(cli::Parser& parser, Arguments& a) {
               .to = &a.emulator.traffic_file,
               .help = "log of every register access to the card, one per line",
               .excludes = {"--can", "--usb", "--hm2"}});
-  parser.add({.names = "--vendor", .to = &a.vendor, .help = "vendor id of the card", .show_default = true});
-  parser.add({.names = "--device", .to = &a.device, .help = "device id of the card", .show_default = true});
-  parser.add({.names = "--bar-bytes", .to = &a.bar_bytes, .help = "size of BAR 2", .show_default = true});
+  shown(parser, "--vendor", &a.vendor, "vendor id of the card");
+  shown(parser, "--device", &a.device, "device id of the card");
+  shown(parser, "--bar-bytes", &a.bar_bytes, "size of BAR 2");
   parser.add({.names = "--bar-kind",
               .to = &a.bar_kind,
               .help = "io or memory",
               .one_of = {"io", "memory"},
               .show_default = true});
-  parser.add({.names = "--cpu", .to = &a.cpu, .help = "CPU to run on; the client's CPU gives short accesses"});
+  plain(parser, "--cpu", &a.cpu, "CPU to run on; the client's CPU gives short accesses");
   parser.add({.names = "--priority",
               .to = &a.priority,
               .help = "SCHED_FIFO priority, higher than the client's; 0: none",
@@ -206,9 +174,9 @@ void add_options(cli::Parser& parser, Arguments& a) {
   add_usb_options(parser, a.usb);
   add_hm2_options(parser, a.hm2);
   parser.set_footer(std::string("Control commands (--command, --control) of a card:\n") +
-                    program::EmulatedCard::commands() + "of a CAN node:\n" + program::EmulatedNode::commands() +
-                    "of a USB board:\n" + program::EmulatedUsb::commands() + "of a 7I92T:\n" +
-                    program::EmulatedHm2::commands());
+                    help_of(program::EmulatedCard::rows()) + "of a CAN node:\n" +
+                    help_of(program::EmulatedNode::rows()) + "of a USB board:\n" +
+                    help_of(program::EmulatedUsb::rows()) + "of a 7I92T:\n" + program::EmulatedHm2::commands());
 }
 
 void read_plant(Arguments& a) {

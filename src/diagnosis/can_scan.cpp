@@ -5,7 +5,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "driver/can/bus_load.hpp"
+#include "driver/can/protocol.hpp"
 
 namespace abs_hil::diagnosis {
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include "abs_hil/driver/io_result.hpp"
 #include "abs_hil/rig/command.hpp"
@@ -16,6 +17,21 @@
 #include "rig/encoder_scale.hpp"
 
 namespace abs_hil::driver {
+
+/// How well a fact about a board is known.
+enum class Standing : std::uint8_t {
+  documented,  ///< stated in the maker's own driver sources or manual
+  inferred,    ///< concluded from these, but not stated there
+  unknown,     ///< these sources are silent or disagree: the driver never relies on it
+};
+[[nodiscard]] constexpr std::string_view name_of(Standing standing) noexcept {
+  switch (standing) {
+    case Standing::documented: return "documented";
+    case Standing::inferred: return "inferred";
+    case Standing::unknown: return "unknown";
+  }
+  return "unknown";
+}
 
 /// Ends the program with status 3. `what` names the board, the cause and the fix.
 [[noreturn]] inline void refuse(const std::string& what) { throw Unavailable("backend rig: " + what); }
@@ -93,6 +109,18 @@ class EmulatedTime {
   virtual IoResult now(std::int64_t& time_ns) noexcept = 0;
   /// Advances the emulated rig to `time_ns` and returns when that is done.
   virtual IoResult advance_to(std::int64_t time_ns) noexcept = 0;
+
+  /// Its time from now on is ours less a constant: `now_ns` is now.
+  IoResult start(std::int64_t now_ns) noexcept {
+    const IoResult result = now(ahead_ns_);
+    ahead_ns_ -= now_ns;
+    return result;
+  }
+  /// Advances it to our time.
+  IoResult follow(std::int64_t now_ns) noexcept { return advance_to(ahead_ns_ + now_ns); }
+
+ private:
+  std::int64_t ahead_ns_{0};
 };
 
 /// Refuses a board with its own time under --fast, and an emulator in lock-step without --fast. Throws Unavailable.

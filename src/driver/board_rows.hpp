@@ -1,3 +1,5 @@
+// Option rows that every board has, and the options of the simulated one.
+
 #pragma once
 
 #include <string>

@@ -1,3 +1,5 @@
+// PWM outputs of the maker's RT-DAC boards: modes, widths, frequency.
+
 #pragma once
 
 #include <cstdint>
@@ -7,8 +9,6 @@
 #include "abs_hil/rig/duty_grid.hpp"
 
 namespace abs_hil::driver {
-
-// PWM outputs of the maker's RT-DAC4 and RT-DAC boards.
 
 /// Clock of the RT-DAC4/PCI's PWM and velocity periods.
 inline constexpr double board_clock_Hz = 40e6;

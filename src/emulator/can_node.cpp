@@ -22,23 +22,17 @@ constexpr unsigned most_heartbeat_age = 8;
 constexpr int reject_limit = 20;
 constexpr unsigned slow_every = 10;
 
-std::array<std::uint8_t, 256> crc_table() {
-  std::array<std::uint8_t, 256> table{};
-  for (unsigned value = 0; value < 256; ++value) {
-    unsigned crc = value;
-    for (int bit = 0; bit < 8; ++bit) crc = (crc & 0x80U) != 0 ? (crc * 2) ^ 0x11DU : crc * 2;
-    table[value] = static_cast<std::uint8_t>(crc);
-  }
-  return table;
-}
-
-std::uint8_t crc_of(const BusFrame& frame) {
-  static const std::array<std::uint8_t, 256> table = crc_table();
-  std::uint8_t crc = 0xFF;
-  crc = table[crc ^ (frame.id & 0xFFU)];
-  crc = table[crc ^ (frame.id / 256U & 0xFFU)];
-  for (int i = 0; i < frame.length - 1; ++i) crc = table[crc ^ frame.data[static_cast<std::size_t>(i)]];
-  return static_cast<std::uint8_t>(~crc);
+/// CRC-8 SAE J1850 over identifier and data, as config/can/abs_rig.dbc describes the signal Check.
+std::uint8_t crc_of(const BusFrame& frame) noexcept {
+  unsigned crc = 0xFF;
+  const auto add = [&crc](unsigned byte) {
+    crc ^= byte;
+    for (int bit = 0; bit < 8; ++bit) crc = (crc & 0x80U) != 0 ? (crc << 1U ^ 0x11DU) : crc << 1U;
+  };
+  add(frame.id & 0xFFU);
+  add(frame.id >> 8U);
+  for (std::size_t i = 0; i + 1 < frame.length; ++i) add(frame.data[i]);
+  return static_cast<std::uint8_t>(crc ^ 0xFFU);
 }
 
 std::uint64_t bytes_of(const BusFrame& frame, std::size_t first, std::size_t count) {
@@ -57,6 +51,8 @@ bool sound(const BusFrame& frame, unsigned length) {
 }
 
 }  // namespace
+
+void seal(BusFrame& frame) noexcept { frame.data[frame.length - 1U] = crc_of(frame); }
 
 CanNode::CanNode(const CanNodeOptions& options)
     : RigBehind(options.plant, options.start_speed_rad_s), options_(options) {
@@ -121,13 +117,22 @@ std::int64_t CanNode::step_end_ns(std::int64_t next_ns) const noexcept {
   return guarded() ? std::clamp(watchdog_ends_ns(), time_ns(), next_ns) : next_ns;
 }
 
-void CanNode::after_step() {
+void CanNode::after_step(const plant_sim::PlantState& /*before*/, std::int64_t /*from_ns*/) {
   if (guarded() && time_ns() >= watchdog_ends_ns()) become(State::latched, 1, "watchdog");
   check_interlocks();
 }
 
-std::uint64_t CanNode::duty_raw(double duty) const noexcept {
-  return static_cast<std::uint64_t>(std::llround(std::clamp(duty, 0.0, 1.0) * full_duty));
+std::uint8_t CanNode::trips_and_state() const noexcept {
+  return static_cast<std::uint8_t>(trip_flags() | static_cast<unsigned>(state_) << 4U);
+}
+
+void CanNode::put_applied(BusFrame& frame, std::size_t first) const {
+  const auto put = [&](std::size_t at, double duty) {
+    put_bytes(frame, at, 2, std::llround(std::clamp(duty, 0.0, 1.0) * full_duty));
+  };
+  const Outputs out = outputs();
+  put(first, out.brake_duty);
+  put(first + 2, emergency_stop() ? drive_ : out.drive_duty);
 }
 
 void CanNode::receive(const BusFrame& frame) {
@@ -215,8 +220,8 @@ void CanNode::activate(const BusFrame& frame) {
   command_sequence_ = frame.data[6];
   last_command_ns_ = -1;
   reject_level_ = 0;
-  upper_zero_ = count(true);
-  lower_zero_ = count(false);
+  upper_zero_ = position(true);
+  lower_zero_ = position(false);
   syncs_ = 0;
   host_time_known_ = false;
   become(State::active, 0, "activated");
@@ -225,13 +230,13 @@ void CanNode::activate(const BusFrame& frame) {
 }
 
 void CanNode::send(BusFrame frame) {
-  frame.data[frame.length - 1U] = crc_of(frame);
+  seal(frame);
   answers_.push_back(frame);
 }
 
 void CanNode::send_status() {
   BusFrame frame{.id = 0x90, .length = 8};
-  frame.data[0] = static_cast<std::uint8_t>(trip_flags() | static_cast<unsigned>(state_) << 4U);
+  frame.data[0] = trips_and_state();
   frame.data[1] = latch_reason_;
   put_bytes(frame, 2, 2, std::llround(std::clamp(options_.supply_V, 0.0, 65.534) * 1000.0));
   put_bytes(frame, 4, 2, std::llround(std::clamp(options_.temperature_C, -300.0, 300.0) * 100.0));
@@ -240,10 +245,8 @@ void CanNode::send_status() {
 }
 
 void CanNode::send_outputs() {
-  const Outputs out = outputs();
   BusFrame frame{.id = 0x91, .length = 8};
-  put_bytes(frame, 0, 2, static_cast<std::int64_t>(duty_raw(out.brake_duty)));
-  put_bytes(frame, 2, 2, static_cast<std::int64_t>(duty_raw(emergency_stop() ? drive_ : out.drive_duty)));
+  put_applied(frame, 0);
   frame.data[4] = static_cast<std::uint8_t>(rejected_);
   frame.data[5] = command_sequence_;
   frame.data[6] = sync_sequence_;
@@ -251,18 +254,16 @@ void CanNode::send_outputs() {
 }
 
 void CanNode::send_encoders(bool fd) {
-  const std::int64_t upper = count(true) - upper_zero_;
-  const std::int64_t lower = count(false) - lower_zero_;
+  const std::int64_t upper = position(true) - upper_zero_;
+  const std::int64_t lower = position(false) - lower_zero_;
   const std::int64_t time_us = time_ns() / 1000;
   if (fd) {
-    const Outputs out = outputs();
     BusFrame frame{.id = 0x94, .length = 24, .fd = true};
     put_bytes(frame, 0, 4, upper);
     put_bytes(frame, 4, 4, lower);
     put_bytes(frame, 12, 4, time_us);
-    put_bytes(frame, 16, 2, static_cast<std::int64_t>(duty_raw(out.brake_duty)));
-    put_bytes(frame, 18, 2, static_cast<std::int64_t>(duty_raw(emergency_stop() ? drive_ : out.drive_duty)));
-    frame.data[20] = static_cast<std::uint8_t>(trip_flags() | static_cast<unsigned>(state_) << 4U);
+    put_applied(frame, 16);
+    frame.data[20] = trips_and_state();
     frame.data[21] = command_sequence_;
     frame.data[22] = sync_sequence_;
     send(frame);

@@ -17,6 +17,9 @@ struct BusFrame {
   std::array<std::uint8_t, 64> data{};
 };
 
+/// Puts the correct checksum into a frame's last byte.
+void seal(BusFrame& frame) noexcept;
+
 /// Properties of the emulated node. This project chose limits and supply, as for the emulated card.
 struct CanNodeOptions {
   plant_sim::PlantOptions plant{};
@@ -77,7 +80,9 @@ class CanNode final : public RigBehind {
   void reject(const char* why);
   void check_interlocks();
   void note_outputs(const std::string& why);
-  [[nodiscard]] std::uint64_t duty_raw(double duty) const noexcept;
+  [[nodiscard]] std::uint8_t trips_and_state() const noexcept;
+  /// Puts the duties that act, brake first.
+  void put_applied(BusFrame& frame, std::size_t first) const;
   void send(BusFrame frame);
   void send_status();
   void send_outputs();
@@ -86,7 +91,7 @@ class CanNode final : public RigBehind {
   [[nodiscard]] bool guarded() const noexcept { return state_ == State::active && (brake_ > 0.0 || drive_ > 0.0); }
   [[nodiscard]] std::int64_t watchdog_ends_ns() const noexcept;
   [[nodiscard]] std::int64_t step_end_ns(std::int64_t next_ns) const noexcept override;
-  void after_step() override;
+  void after_step(const plant_sim::PlantState& before, std::int64_t from_ns) override;
 
   CanNodeOptions options_;
   State state_{State::inactive};

@@ -44,18 +44,6 @@ void shift_sequence(BusFrame& frame, unsigned by) {
 
 }  // namespace
 
-void seal(BusFrame& frame) noexcept {
-  unsigned crc = 0xFF;
-  const auto add = [&crc](unsigned byte) {
-    crc ^= byte;
-    for (int bit = 0; bit < 8; ++bit) crc = (crc & 0x80U) != 0 ? (crc << 1U ^ 0x11DU) : crc << 1U;
-  };
-  add(frame.id & 0xFFU);
-  add(frame.id >> 8U);
-  for (std::size_t i = 0; i + 1 < frame.length; ++i) add(frame.data[i]);
-  frame.data[frame.length - 1U] = static_cast<std::uint8_t>(crc ^ 0xFFU);
-}
-
 const char* NodeFaults::known() {
   return "ok silent deaf drop=ANSWERS no-status stale=N ahead=N stuck duplicate swapped wrong-size=BYTES corrupt "
          "nonsense "

@@ -50,7 +50,4 @@ class NodeFaults {
   std::mt19937_64 random_;
 };
 
-/// Puts the correct checksum into a frame's last byte.
-void seal(BusFrame& frame) noexcept;
-
 }  // namespace abs_hil::emulator

@@ -19,6 +19,11 @@ std::uint32_t rounded(double value) noexcept {
   return static_cast<std::uint32_t>(std::llround(std::clamp(value, 0.0, 4.0e9)));
 }
 
+/// Digital I/O, velocity period, start resistors, limits: not known whether the host may write them. Here it may.
+constexpr bool only_stores(std::uint32_t offset) noexcept {
+  return (offset >= 0x40 && offset <= 0x50) || offset == 0x5C || (offset >= 0x90 && offset <= 0xA8);
+}
+
 std::uint32_t supply_raw(double volts) noexcept { return volts > 0.0 ? rounded(supply_scale_V / volts) : 0; }
 
 }  // namespace
@@ -41,7 +46,7 @@ std::uint32_t CardModel::velocity(double omega_rad_s) const noexcept {
 
 std::uint32_t CardModel::raw_count(std::uint32_t channel) const noexcept {
   // 0 is the lower wheel, 1 the upper wheel, 2 the lever, which is at rest.
-  return channel < 2 ? static_cast<std::uint32_t>(count(channel == 1)) : 0;
+  return channel < 2 ? static_cast<std::uint32_t>(position(channel == 1)) : 0;
 }
 
 std::uint32_t CardModel::read_pwm(std::uint32_t offset) const noexcept {
@@ -110,21 +115,8 @@ void CardModel::write32(std::uint32_t offset, std::uint32_t value) noexcept {
       }
       reset_mask_ = value & 7U;
       break;
-    // Digital I/O, velocity period, start resistors, limits: not known whether the host may write them. Here it may.
-    case 0x40:
-    case 0x44:
-    case 0x48:
-    case 0x4C:
-    case 0x50:
-    case 0x5C:
-    case 0x90:
-    case 0x94:
-    case 0x98:
-    case 0x9C:
-    case 0xA0:
-    case 0xA4:
-    case 0xA8: plain_[offset / 4] = value; break;
-    default: break;
+    default:
+      if (only_stores(offset)) plain_[offset / 4] = value;
   }
 }
 

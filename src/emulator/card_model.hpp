@@ -72,7 +72,7 @@ class CardModel final : public RigBehind {
   [[nodiscard]] std::uint32_t raw_count(std::uint32_t channel) const noexcept;
   [[nodiscard]] std::uint32_t velocity(double omega_rad_s) const noexcept;
   void enforce_limits() noexcept;
-  void after_step() override { enforce_limits(); }
+  void after_step(const plant_sim::PlantState& /*before*/, std::int64_t /*from_ns*/) override { enforce_limits(); }
 
   CardOptions options_;
   std::uint32_t pwm_index_{0};

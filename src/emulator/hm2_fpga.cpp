@@ -9,7 +9,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "emulator/rig_behind.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::emulator {
@@ -42,17 +41,12 @@ void check_pair(const char* what, std::uint32_t a, std::uint32_t b) {
 }  // namespace
 
 Hm2Fpga::Hm2Fpga(const Hm2Options& options)
-    : options_(options),
-      identity_(options.lie),
-      plant_(options.plant),
-      upper_(plant_sim::upper_encoder(options.plant)),
-      lower_(plant_sim::lower_encoder(options.plant)) {
+    : RigBehind(options.plant, options.start_speed_rad_s), options_(options), identity_(options.lie) {
   check_pair("PWM generators", options.drive_pwm, options.brake_pwm);
   check_pair("counters", options.lower_encoder, options.upper_encoder);
   if (options.enable_pin < -1 || options.enable_pin >= static_cast<std::int32_t>(port_count * pins_per_port)) {
     throw std::invalid_argument("enable pin " + std::to_string(options.enable_pin) + ": give -1 to 33");
   }
-  start_wheels(plant_, options.start_speed_rad_s);
   power_on();
 }
 
@@ -66,16 +60,11 @@ void Hm2Fpga::power_on() {
   armed_ = false;
   last_pet_ns_ = -1;
   for (const bool upper : {false, true}) {
-    const auto& s = plant_.state();
     Counter& c = counter_of(upper);
-    c.position = c.zero = position_of(upper, upper ? s.angle1_rad : s.angle2_rad);
-    c.last_ns = time_ns_;
+    c.position = c.zero = position(upper);
+    c.last_ns = time_ns();
   }
   note_outputs("power-on");
-}
-
-std::int64_t Hm2Fpga::position_of(bool upper_wheel, double angle_rad) const noexcept {
-  return (upper_wheel ? upper_ : lower_).position(angle_rad);
 }
 
 Hm2Fpga::Counter& Hm2Fpga::counter_of(bool upper_wheel) noexcept {
@@ -131,7 +120,7 @@ void Hm2Fpga::write_port(std::uint32_t reg, std::uint32_t i, std::uint32_t value
 
 std::uint32_t Hm2Fpga::read_counter(std::uint32_t reg, std::uint32_t i) const noexcept {
   if (reg == 0x32 || reg == 0x34) return 0;
-  if (reg == 0x33) return i == 0 ? time_stamp(time_ns_) : 0;
+  if (reg == 0x33) return i == 0 ? time_stamp(time_ns()) : 0;
   if (i >= counters_.size()) return 0;
   const Counter& c = counters_[i];
   if (reg == 0x31) return c.control | (c.error ? error_bit : 0U) | encoder_lines(c);
@@ -163,7 +152,7 @@ void Hm2Fpga::write_generator(std::uint32_t reg, std::uint32_t i, std::uint32_t 
     const double period = period_ns(g);
     g.waiting = value;
     g.waits_until_ns =
-        static_cast<std::int64_t>(std::ceil((std::floor(static_cast<double>(time_ns_) / period) + 1.0) * period));
+        static_cast<std::int64_t>(std::ceil((std::floor(static_cast<double>(time_ns()) / period) + 1.0) * period));
   } else {
     g.value = value;
     g.waiting.reset();
@@ -175,22 +164,22 @@ void Hm2Fpga::write_generator(std::uint32_t reg, std::uint32_t i, std::uint32_t 
 void Hm2Fpga::load_watchdog(std::uint32_t clocks) {
   const bool was_armed = armed_;
   watchdog_time_ = clocks;
-  last_pet_ns_ = time_ns_;
+  last_pet_ns_ = time_ns();
   armed_ = clocks < disabled;
-  bites_ns_ = time_ns_ + (std::int64_t{clocks} + watchdog_lag_clocks) * ns_per_clock;
+  bites_ns_ = time_ns() + (std::int64_t{clocks} + watchdog_lag_clocks) * ns_per_clock;
   if (was_armed && !armed_) bite("watchdog switched off");
 }
 
 std::uint32_t Hm2Fpga::watchdog_counter() const noexcept {
   if (!armed_) return watchdog_time_ >= disabled ? watchdog_time_ : 0xFFFFFFFF;
-  return static_cast<std::uint32_t>(std::max<std::int64_t>(0, (bites_ns_ - time_ns_) / ns_per_clock));
+  return static_cast<std::uint32_t>(std::max<std::int64_t>(0, (bites_ns_ - time_ns()) / ns_per_clock));
 }
 
 void Hm2Fpga::bite(const std::string& why) {
   armed_ = false;
   status_ = 1;
   for (Port& port : ports_) port.ddr = port.open_drain = 0;
-  events_.push_back({time_ns_, why});
+  events_.push_back({time_ns(), why});
   note_outputs(why);
 }
 
@@ -215,14 +204,14 @@ std::uint32_t Hm2Fpga::encoder_lines(const Counter& c) const noexcept {
 void Hm2Fpga::count(bool upper_wheel, double from_rad, double to_rad, std::int64_t from_ns,
                     std::int64_t to_ns) noexcept {
   Counter& c = counter_of(upper_wheel);
-  const std::int64_t last = position_of(upper_wheel, to_rad);
+  const std::int64_t last = position_at(upper_wheel, to_rad);
   if (last == std::exchange(c.position, last)) return;
   constexpr int halvings = 24;
   double before = 0.0;
   double after = 1.0;
   for (int n = 0; n < halvings; ++n) {
     const double middle = (before + after) / 2.0;
-    (position_of(upper_wheel, from_rad + middle * (to_rad - from_rad)) == last ? after : before) = middle;
+    (position_at(upper_wheel, from_rad + middle * (to_rad - from_rad)) == last ? after : before) = middle;
   }
   c.last_ns = from_ns + static_cast<std::int64_t>(after * static_cast<double>(to_ns - from_ns));
 }
@@ -248,7 +237,7 @@ double Hm2Fpga::pwm_high_share(const Generator& g) const noexcept {
 bool Hm2Fpga::pwm_high_now(const Generator& g) const noexcept {
   const double share = pwm_high_share(g);
   if (pwm_rate_ == 0) return share > 0.5;
-  const double periods = static_cast<double>(time_ns_) / period_ns(g);
+  const double periods = static_cast<double>(time_ns()) / period_ns(g);
   return periods - std::floor(periods) < share;
 }
 
@@ -282,7 +271,7 @@ Outputs Hm2Fpga::outputs() const noexcept {
     return options_.active_high_stage ? high_share(io) : 1.0 - high_share(io);
   };
   const bool enabled = options_.enable_pin < 0 || acting(static_cast<std::uint32_t>(options_.enable_pin)) > 0.5;
-  return {.drive_duty = emergency_stop_ || !enabled ? 0.0 : acting(options_.drive_pwm * pins_per_port + 1),
+  return {.drive_duty = emergency_stop() || !enabled ? 0.0 : acting(options_.drive_pwm * pins_per_port + 1),
           .brake_duty = acting(options_.brake_pwm * pins_per_port + 1)};
 }
 
@@ -290,52 +279,51 @@ void Hm2Fpga::note_outputs(const std::string& why) {
   const Outputs now = outputs();
   const Outputs before = std::exchange(told_, now);
   if (now.drive_duty == before.drive_duty && now.brake_duty == before.brake_duty) return;
-  changes_.push_back({time_ns_, now});
+  changes_.push_back({time_ns(), now});
   const auto zero = [](const Outputs& out) { return out.drive_duty == 0.0 && out.brake_duty == 0.0; };
   if (zero(now)) {
-    const double since_ms = static_cast<double>(time_ns_ - last_pet_ns_) * 1e-6;
+    const double since_ms = static_cast<double>(time_ns() - last_pet_ns_) * 1e-6;
     events_.push_back(
-        {time_ns_, "outputs zero: " + why +
-                       (last_pet_ns_ < 0 ? "" : rig::formatted("; watchdog last reloaded %.3f ms ago", since_ms))});
+        {time_ns(), "outputs zero: " + why +
+                        (last_pet_ns_ < 0 ? "" : rig::formatted("; watchdog last reloaded %.3f ms ago", since_ms))});
   } else if (zero(before)) {
-    events_.push_back({time_ns_, "outputs on: " + why});
+    events_.push_back({time_ns(), "outputs on: " + why});
   }
 }
 
 // Time.
 
-void Hm2Fpga::advance_to(std::int64_t time_ns) {
-  while (time_ns_ < time_ns) {
-    std::int64_t next = step_end_ns(time_ns_, time_ns, step_ns);
-    if (armed_) next = std::clamp(bites_ns_, time_ns_, next);
-    for (const Generator& g : generators_) {
-      if (g.waiting) next = std::clamp(g.waits_until_ns, time_ns_, next);
-    }
-    const plant_sim::PlantState before = plant_.state();
-    step(plant_, next - time_ns_, outputs());
-    const plant_sim::PlantState& after = plant_.state();
-    count(true, before.angle1_rad, after.angle1_rad, time_ns_, next);
-    count(false, before.angle2_rad, after.angle2_rad, time_ns_, next);
-    time_ns_ = next;
-    for (Generator& g : generators_) {
-      if (!g.waiting || time_ns_ < g.waits_until_ns) continue;
-      g.value = *std::exchange(g.waiting, std::nullopt);
-      note_outputs("commanded");
-    }
-    if (armed_ && time_ns_ >= bites_ns_) bite("watchdog");
+std::int64_t Hm2Fpga::step_end_ns(std::int64_t next_ns) const noexcept {
+  if (armed_) next_ns = std::clamp(bites_ns_, time_ns(), next_ns);
+  for (const Generator& g : generators_) {
+    if (g.waiting) next_ns = std::clamp(g.waits_until_ns, time_ns(), next_ns);
   }
+  return next_ns;
+}
+
+void Hm2Fpga::after_step(const plant_sim::PlantState& before, std::int64_t from_ns) {
+  const plant_sim::PlantState& after = plant().state();
+  count(true, before.angle1_rad, after.angle1_rad, from_ns, time_ns());
+  count(false, before.angle2_rad, after.angle2_rad, from_ns, time_ns());
+  for (Generator& g : generators_) {
+    if (!g.waiting || time_ns() < g.waits_until_ns) continue;
+    g.value = *std::exchange(g.waiting, std::nullopt);
+    note_outputs("commanded");
+  }
+  if (armed_ && time_ns() >= bites_ns_) bite("watchdog");
 }
 
 void Hm2Fpga::press_emergency_stop(bool pressed) {
-  emergency_stop_ = pressed;
+  RigBehind::press_emergency_stop(pressed);
   note_outputs("emergency stop");
 }
 
 void Hm2Fpga::turn_by_hand(bool upper_wheel, double revolutions) {
-  const double from = upper_wheel ? plant_.state().angle1_rad : plant_.state().angle2_rad;
-  turn_wheel(plant_, upper_wheel, revolutions);
-  const double to = upper_wheel ? plant_.state().angle1_rad : plant_.state().angle2_rad;
-  count(upper_wheel, from, to, time_ns_, time_ns_);
+  const plant_sim::PlantState before = plant().state();
+  RigBehind::turn_by_hand(upper_wheel, revolutions);
+  const plant_sim::PlantState& after = plant().state();
+  count(upper_wheel, upper_wheel ? before.angle1_rad : before.angle2_rad,
+        upper_wheel ? after.angle1_rad : after.angle2_rad, time_ns(), time_ns());
 }
 
 void Hm2Fpga::make_quadrature_error(bool upper_wheel) { counter_of(upper_wheel).error = true; }

@@ -6,11 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "abs_hil/plant_sim/plant.hpp"
 #include "emulator/can_node.hpp"
-#include "emulator/card_model.hpp"
 #include "emulator/hm2_identity.hpp"
-#include "plant_sim/encoder.hpp"
+#include "emulator/rig_behind.hpp"
 
 namespace abs_hil::emulator {
 
@@ -25,9 +23,8 @@ struct OutputChange {
 ///
 /// A bite of the watchdog clears DDR and open drain. The pins are then inputs, which resistors pull high. All other
 /// registers stay: counters count on, PWM generators keep their values.
-class Hm2Fpga {
+class Hm2Fpga final : public RigBehind {
  public:
-  static constexpr std::int64_t step_ns = 100'000;  ///< the plant runs at 10 kHz
   static constexpr std::uint32_t clock_low_Hz = 100'000'000;
   static constexpr std::uint32_t clock_high_Hz = 200'000'000;
 
@@ -37,8 +34,6 @@ class Hm2Fpga {
   /// One register at a multiple of 4. Registers that cannot be read give 0.
   [[nodiscard]] std::uint32_t read32(std::uint32_t address) const noexcept;
   void write32(std::uint32_t address, std::uint32_t value);
-  /// Advances rig and watchdog to `time_ns` (0 at the first power-on); an earlier time does nothing.
-  void advance_to(std::int64_t time_ns);
 
   /// All registers as after power-on. The wheels go on turning.
   void power_on();
@@ -48,9 +43,7 @@ class Hm2Fpga {
   /// Sets the quadrature error bit of a wheel's counter, as a wrong edge does.
   void make_quadrature_error(bool upper_wheel);
 
-  [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }
-  [[nodiscard]] Outputs outputs() const noexcept;
-  [[nodiscard]] const plant_sim::Plant& plant() const noexcept { return plant_; }
+  [[nodiscard]] Outputs outputs() const noexcept override;
   [[nodiscard]] bool bitten() const noexcept { return status_ != 0; }
   /// True while any pin is an output.
   [[nodiscard]] bool drives_pins() const noexcept;
@@ -97,17 +90,14 @@ class Hm2Fpga {
   [[nodiscard]] std::uint32_t encoder_lines(const Counter& c) const noexcept;
   [[nodiscard]] double high_share(std::uint32_t io) const noexcept;
   [[nodiscard]] bool level(std::uint32_t io) const noexcept;
-  [[nodiscard]] std::int64_t position_of(bool upper_wheel, double angle_rad) const noexcept;
+  [[nodiscard]] std::int64_t step_end_ns(std::int64_t next_ns) const noexcept override;
+  void after_step(const plant_sim::PlantState& before, std::int64_t from_ns) override;
   [[nodiscard]] Counter& counter_of(bool upper_wheel) noexcept;
   void count(bool upper_wheel, double from_rad, double to_rad, std::int64_t from_ns, std::int64_t to_ns) noexcept;
   void note_outputs(const std::string& why);
 
   Hm2Options options_;
   Hm2Identity identity_;
-  plant_sim::Plant plant_;
-  plant_sim::Encoder upper_;
-  plant_sim::Encoder lower_;
-  std::int64_t time_ns_{0};
   std::array<Port, port_count> ports_{};
   std::array<Generator, 2> generators_{};
   std::array<Counter, 2> counters_{};
@@ -122,7 +112,6 @@ class Hm2Fpga {
   bool armed_{false};
   std::int64_t bites_ns_{0};  ///< when the armed watchdog bites
   std::int64_t last_pet_ns_{-1};
-  bool emergency_stop_{false};
   Outputs told_{};
   std::vector<NodeEvent> events_{};
   std::vector<OutputChange> changes_{};

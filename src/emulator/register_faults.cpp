@@ -1,9 +1,8 @@
 #include "emulator/register_faults.hpp"
 
+#include <algorithm>
 #include <array>
-#include <cmath>
 #include <optional>
-#include <utility>
 
 #include "emulator/fault_text.hpp"
 
@@ -11,15 +10,20 @@ namespace abs_hil::emulator {
 
 namespace {
 
-constexpr std::array<std::pair<std::string_view, FaultKind>, 8> register_faults{
-    {{"ok", FaultKind::ok},
-     {"stuck", FaultKind::stuck},
-     {"wrong", FaultKind::wrong},
-     {"slow", FaultKind::slow},
-     {"delayed", FaultKind::delayed},
-     {"intermittent", FaultKind::intermittent},
-     {"off", FaultKind::off},
-     {"garbage", FaultKind::garbage}}};
+struct RegisterFaultKind {
+  std::string_view name;
+  FaultKind kind;
+  double least{1.0};  ///< of the parameter; above `most`: it takes none
+  double most{0.0};
+};
+constexpr std::array<RegisterFaultKind, 8> register_faults{{{"ok", FaultKind::ok},
+                                                            {"stuck", FaultKind::stuck},
+                                                            {"wrong", FaultKind::wrong, -2147483648.0, 2147483648.0},
+                                                            {"slow", FaultKind::slow, 0.0, 10e6},
+                                                            {"delayed", FaultKind::delayed, 1.0, 1e5},
+                                                            {"intermittent", FaultKind::intermittent, 0.0, 1.0},
+                                                            {"off", FaultKind::off},
+                                                            {"garbage", FaultKind::garbage}}};
 constexpr std::string_view valid_register_fault =
     "OFFSET:KIND, OFFSET a multiple of 4 in hexadecimal below 100, KIND one of ok, stuck, wrong=ADDEND, slow=US, "
     "delayed=READS, intermittent=PROBABILITY, off, garbage";
@@ -28,22 +32,6 @@ std::optional<std::uint32_t> offset_in(std::string_view digits) {
   if (digits.starts_with("0x") || digits.starts_with("0X")) digits.remove_prefix(2);
   const auto offset = number_in<std::uint32_t>(digits, 16);
   return offset && *offset < CardModel::bytes && *offset % 4 == 0 ? offset : std::nullopt;
-}
-
-bool takes_parameter(FaultKind kind) {
-  using enum FaultKind;
-  return kind == wrong || kind == slow || kind == delayed || kind == intermittent;
-}
-
-bool in_range(const Fault& fault) {
-  using enum FaultKind;
-  switch (fault.kind) {
-    case wrong: return std::abs(fault.parameter) <= 2147483648.0;
-    case slow: return fault.parameter >= 0.0 && fault.parameter <= 10e6;
-    case delayed: return fault.parameter >= 1.0 && fault.parameter <= 1e5;
-    case intermittent: return fault.parameter >= 0.0 && fault.parameter <= 1.0;
-    default: return true;
-  }
 }
 
 }  // namespace
@@ -65,14 +53,14 @@ void FaultyCard::set(std::string_view text) {
     if (!parameter) refuse_fault(text, valid_register_fault);
     name = name.substr(0, equals);
   }
-  for (const auto& [known, kind] : register_faults) {
-    if (known != name) continue;
-    const Fault fault{.kind = kind, .parameter = parameter.value_or(0.0)};
-    if (takes_parameter(kind) != parameter.has_value() || !in_range(fault)) refuse_fault(text, valid_register_fault);
-    set(*offset, fault);
-    return;
+  const auto known = std::ranges::find(register_faults, name, &RegisterFaultKind::name);
+  if (known == register_faults.end() || (known->least <= known->most) != parameter.has_value()) {
+    refuse_fault(text, valid_register_fault);
   }
-  refuse_fault(text, valid_register_fault);
+  if (parameter && !(*parameter >= known->least && *parameter <= known->most)) {
+    refuse_fault(text, valid_register_fault);
+  }
+  set(*offset, {.kind = known->kind, .parameter = parameter.value_or(0.0)});
 }
 
 bool FaultyCard::fails(const Fault& fault) {

@@ -21,22 +21,6 @@ inline constexpr double standstill_rad_s = 0.5;
 /// Converts revolutions per minute to rad/s.
 [[nodiscard]] double rad_s_of_rpm(double rpm) noexcept;
 
-/// State with both wheels at the same speed at power-on. Throws std::invalid_argument unless it is finite and >= 0.
-void start_wheels(plant_sim::Plant& plant, double speed_rad_s);
-
-/// Absolute speed of the faster wheel.
-[[nodiscard]] double fastest_rad_s(const plant_sim::Plant& plant) noexcept;
-
-/// Turns a standing wheel by hand.
-void turn_wheel(plant_sim::Plant& plant, bool upper_wheel, double revolutions) noexcept;
-
-/// End of a step from `from_ns` towards `to_ns`. Steps end on multiples of `step_ns`, independent of the times of the
-/// host's accesses.
-[[nodiscard]] std::int64_t step_end_ns(std::int64_t from_ns, std::int64_t to_ns, std::int64_t step_ns) noexcept;
-
-/// Advances the rig by one step under the given duties at the power stage.
-void step(plant_sim::Plant& plant, std::int64_t duration_ns, const Outputs& out) noexcept;
-
 /// Wheels, encoders, time and E-stop. A board derives from it and gives its outputs.
 class RigBehind {
  public:
@@ -67,10 +51,12 @@ class RigBehind {
   /// The end of the step that begins now: `next_ns`, or an earlier time at which the board itself acts.
   [[nodiscard]] virtual std::int64_t step_end_ns(std::int64_t next_ns) const noexcept { return next_ns; }
   /// What the board does after each step: interlocks, watchdog.
-  virtual void after_step() {}
+  /// @param before   the rig at the beginning of the step, at `from_ns`
+  virtual void after_step(const plant_sim::PlantState& /*before*/, std::int64_t /*from_ns*/) {}
 
-  /// Counts since power-on, unwrapped.
-  [[nodiscard]] std::int64_t count(bool upper_wheel) const noexcept;
+  /// Counts of an encoder that does not wrap: of its wheel now, and at any angle.
+  [[nodiscard]] std::int64_t position(bool upper_wheel) const noexcept;
+  [[nodiscard]] std::int64_t position_at(bool upper_wheel, double angle_rad) const noexcept;
   /// Absolute speed of the faster wheel.
   [[nodiscard]] double fastest_rad_s() const noexcept;
   [[nodiscard]] bool emergency_stop() const noexcept { return emergency_stop_; }

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "emulator/usb_board_model.hpp"
-#include "emulator/usb_faults.hpp"
 
 namespace abs_hil::emulator {
 

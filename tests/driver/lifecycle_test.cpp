@@ -5,10 +5,10 @@
 
 #include "abs_hil/driver/rig_driver.hpp"
 #include "catch.hpp"
-#include "driver/can/options.hpp"
+#include "driver/can/can_backend.hpp"
 #include "driver/factory.hpp"
-#include "driver/pci/options.hpp"
-#include "driver/usb/options.hpp"
+#include "driver/pci/pci_backend.hpp"
+#include "driver/usb/usb_backend.hpp"
 
 using namespace abs_hil::driver;
 using abs_hil::rig::Command;

@@ -90,7 +90,8 @@ std::deque<can::Frame> answers_of_a_node() {
   emulator::CanNode node({});
   std::deque<can::Frame> frames;
   for (std::uint8_t i = 1; i <= 10; ++i) {
-    for (const can::Frame& sent : {can::sync_frame(i), can::control_frame({.request = can::Request::deactivate})}) {
+    for (const can::Frame& sent :
+         {can::frame_of(can::id::sync, {.sequence = i}), can::control_frame(can::Request::deactivate)}) {
       node.receive({.id = sent.id, .length = sent.length, .data = sent.data});
     }
     for (const emulator::BusFrame& answer : node.take_answers()) {

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "catch.hpp"
-#include "emulator/usb_faults.hpp"
 
 using namespace abs_hil::emulator;
 using Catch::Matchers::Contains;

@@ -7,13 +7,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <variant>
 
 #include "driver/can/answer_tracker.hpp"
-#include "driver/can/error_frame.hpp"
-#include "driver/can/frame_socket.hpp"
-#include "driver/can/messages.hpp"
-#include "driver/can/signal_codec.hpp"
+#include "driver/can/bus.hpp"
+#include "driver/can/protocol.hpp"
 #include "fuzz_input.hpp"
 
 namespace {
@@ -39,28 +36,20 @@ Frame frame_in(Input& input) {
   return frame;
 }
 
-void expect_duties(const RawDuties& duties) { expect(duties.brake <= 10000 && duties.drive <= 10000); }
-
 void expect_in_range(const Decoded& decoded, AnswerTracker& tracker) {
-  expect((decoded.error == DecodeError::none) != std::holds_alternative<std::monostate>(decoded.message));
-  if (const auto* status = std::get_if<StatusMessage>(&decoded.message)) {
-    expect(status->trip_flags <= 7 && static_cast<unsigned>(status->state) <= 2);
-    expect(static_cast<unsigned>(status->latch_reason) <= 2);
-    expect(std::isnan(status->supply_V) || (status->supply_V >= 0.0 && status->supply_V < 65.535));
-    expect(std::isnan(status->temperature_C) || (status->temperature_C > -327.68 && status->temperature_C <= 300.0));
-  } else if (const auto* outputs = std::get_if<OutputsMessage>(&decoded.message)) {
-    expect_duties(outputs->applied);
-  } else if (const auto* encoders = std::get_if<EncodersMessage>(&decoded.message)) {
-    expect(std::abs(encoders->upper_counts) <= 1 << 23 && std::abs(encoders->lower_counts) <= 1 << 23);
-    static_cast<void>(tracker.take(*encoders));
-  } else if (const auto* latch = std::get_if<LatchMessage>(&decoded.message)) {
-    expect(std::abs(latch->lever_counts) <= 2048 && static_cast<unsigned>(latch->state) <= 2);
-    static_cast<void>(tracker.take(*latch));
-  } else if (const auto* measurement = std::get_if<MeasurementMessage>(&decoded.message)) {
-    expect_duties(measurement->applied);
-    expect(measurement->trip_flags <= 7 && static_cast<unsigned>(measurement->state) <= 2);
-    static_cast<void>(tracker.take(*measurement));
-  }
+  const Values& v = decoded.values;
+  expect((decoded.error == DecodeError::none) == (decoded.id != 0));
+  expect(v.trip_flags >= 0 && v.trip_flags <= 7 && v.node_state >= 0 && v.node_state <= 2);
+  expect(v.latch_reason >= 0 && v.latch_reason <= 2);
+  expect(std::isnan(v.supply_V()) || (v.supply_V() >= 0.0 && v.supply_V() < 65.535));
+  expect(std::isnan(v.temperature_C()) || (v.temperature_C() > -327.68 && v.temperature_C() <= 300.0));
+  expect(v.brake_duty >= 0 && v.brake_duty <= 10000 && v.drive_duty >= 0 && v.drive_duty <= 10000);
+  const bool fd = decoded.id == id::measurement;
+  const std::int64_t most = std::int64_t{1} << (fd ? 31 : 23);
+  expect(std::abs(v.upper_counts) <= most && std::abs(v.lower_counts) <= most);
+  expect(std::abs(v.lever_counts) <= (fd ? most : 2048));
+  const bool answer = fd || decoded.id == id::encoders || decoded.id == id::latch;
+  if (answer) static_cast<void>(tracker.take(decoded.id, v));
 }
 
 /// The same bytes as datagrams of any size, through the socket that makes frames of them.

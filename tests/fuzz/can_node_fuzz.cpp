@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "driver/can/messages.hpp"
+#include "driver/can/protocol.hpp"
 #include "emulator/can_node.hpp"
 #include "emulator/can_node_faults.hpp"
 #include "fuzz_input.hpp"

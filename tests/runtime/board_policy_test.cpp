@@ -5,9 +5,9 @@
 #include <string>
 
 #include "catch.hpp"
-#include "driver/can/options.hpp"
-#include "driver/pci/options.hpp"
-#include "driver/usb/options.hpp"
+#include "driver/can/can_backend.hpp"
+#include "driver/pci/pci_backend.hpp"
+#include "driver/usb/usb_backend.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::Contains;

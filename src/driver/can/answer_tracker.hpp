@@ -1,8 +1,10 @@
+// Which frames of the node belong to the SYNC that was sent last.
+
 #pragma once
 
 #include <cstdint>
 
-#include "driver/can/messages.hpp"
+#include "driver/can/protocol.hpp"
 
 namespace abs_hil::driver::can {
 
@@ -22,29 +24,60 @@ enum class Anomaly : std::uint8_t {
 
 /// The node's counters, clock and state at one SYNC.
 struct Answer {
-  std::int32_t upper_counts{0};
-  std::int32_t lower_counts{0};
-  std::int32_t lever_counts{0};
+  Values values{};
   unsigned count_bits{24};  ///< width of the wheels' counters
-  std::uint32_t node_time_us{0};
-  NodeState state{NodeState::inactive};
-  std::uint8_t sequence{0};
 };
 
 /// Assembles the answer to one SYNC from its frames and finds frames that do not belong to it. Real-time safe.
 class AnswerTracker {
  public:
   /// Starts anew before the first SYNC; `sequence` is the sequence before it.
-  void reset(std::uint8_t sequence) noexcept;
+  void reset(std::uint8_t sequence) noexcept {
+    *this = {};
+    expected_ = last_ = sequence;
+  }
   /// Expects the answer to a SYNC that was sent with this sequence.
-  void expect(std::uint8_t sequence) noexcept;
+  void expect(std::uint8_t sequence) noexcept {
+    expected_ = sequence;
+    has_encoders_ = has_latch_ = false;
+    answer_ = {};
+  }
 
-  Anomaly take(const EncodersMessage& encoders) noexcept;
-  Anomaly take(const LatchMessage& latch) noexcept;
-  Anomaly take(const MeasurementMessage& measurement) noexcept;
+  /// Takes ABS_ENCODERS, ABS_LATCH or ABS_MEASUREMENT.
+  Anomaly take(std::uint32_t identifier, const Values& values) noexcept {
+    if (const Anomaly anomaly = place(values.sequence); anomaly != Anomaly::none) return anomaly;
+    const bool encoders = identifier != id::latch;
+    const bool latch = identifier != id::encoders;
+    if ((encoders && has_encoders_) || (latch && has_latch_)) return Anomaly::duplicate;
+    // The latch should have come last. The answer is still valid.
+    const Anomaly anomaly = encoders && has_latch_ ? Anomaly::out_of_order : Anomaly::none;
+    if (encoders) {
+      answer_.values.upper_counts = values.upper_counts;
+      answer_.values.lower_counts = values.lower_counts;
+      answer_.count_bits = latch ? 32 : 24;
+      has_encoders_ = true;
+    }
+    if (latch) {
+      answer_.values.lever_counts = values.lever_counts;
+      answer_.values.node_time_us = values.node_time_us;
+      answer_.values.node_state = values.node_state;
+      has_latch_ = true;
+    }
+    if (complete()) {
+      last_ = expected_;
+      any_ = true;
+    }
+    return anomaly;
+  }
 
   /// `none` if a frame with this sequence belongs to the expected SYNC.
-  [[nodiscard]] Anomaly place(std::uint8_t sequence) const noexcept;
+  [[nodiscard]] Anomaly place(std::int64_t sequence) const noexcept {
+    constexpr std::uint8_t half = 128;
+    const auto behind = static_cast<std::uint8_t>(expected_ - sequence);
+    if (behind == 0) return Anomaly::none;
+    if (behind >= half) return Anomaly::out_of_order;
+    return any_ && sequence == last_ ? Anomaly::duplicate : Anomaly::stale;
+  }
   [[nodiscard]] bool complete() const noexcept { return has_encoders_ && has_latch_; }
   /// The answer to the expected SYNC; valid once complete.
   [[nodiscard]] const Answer& answer() const noexcept { return answer_; }
@@ -52,8 +85,6 @@ class AnswerTracker {
   [[nodiscard]] std::uint8_t last_sequence() const noexcept { return last_; }
 
  private:
-  void note_complete() noexcept;
-
   std::uint8_t expected_{0};
   std::uint8_t last_{0};
   bool any_{false};  ///< `last_` is the sequence of an answer

@@ -5,11 +5,10 @@
 #include <stdexcept>
 #include <string>
 
+#include "driver/can/bus.hpp"
 #include "driver/can/can_driver.hpp"
 #include "driver/can/can_safe_state.hpp"
 #include "driver/can/interface_facts.hpp"
-#include "driver/can/link.hpp"
-#include "driver/can/options.hpp"
 #include "driver/own_handle_writer.hpp"
 
 namespace abs_hil::driver::can {

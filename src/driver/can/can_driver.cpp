@@ -9,8 +9,6 @@
 
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/board_kit.hpp"
-#include "driver/can/bus_load.hpp"
-#include "driver/can/signal_codec.hpp"
 #include "driver/monotonic_time.hpp"
 
 namespace abs_hil::driver::can {
@@ -56,49 +54,34 @@ Frame CanDriver::in_format(Frame frame) const noexcept {
   return frame;
 }
 
-bool CanDriver::await(bool (CanDriver::*heard)(const NodeMessage&) noexcept, std::int64_t timeout_ns) noexcept {
-  const std::int64_t deadline_ns = monotonic_ns() + timeout_ns;
-  constexpr int most_frames = 1000;  // a flooded bus must not block the handshake for ever
-  Frame frame;
-  for (int i = 0; i < most_frames; ++i) {
-    const ReceiveOutcome outcome = link_.socket->receive(frame, deadline_ns).outcome;
-    if (outcome == ReceiveOutcome::malformed) continue;
-    if (outcome != ReceiveOutcome::frame) return false;
+template <class Heard>
+bool CanDriver::await(Heard heard) noexcept {
+  return link_.socket->listen(monotonic_ns() + handshake_timeout_ns, [&heard](const Frame& frame) {
     const Decoded decoded = decode(frame);
-    if (decoded.error == DecodeError::none && (this->*heard)(decoded.message)) return true;
-  }
-  return false;
+    return decoded.error == DecodeError::none && heard(decoded);
+  });
 }
 
-bool CanDriver::hears_identity(const NodeMessage& message) noexcept {
-  const auto* identity = std::get_if<IdentityMessage>(&message);
-  if (identity == nullptr) return false;
-  identity_ = *identity;
-  return true;
-}
-
-bool CanDriver::hears_safe(const NodeMessage& message) noexcept {
-  if (const auto* status = std::get_if<StatusMessage>(&message)) heard_state_ = status->state == NodeState::inactive;
-  if (const auto* outputs = std::get_if<OutputsMessage>(&message)) heard_outputs_ = outputs->applied == RawDuties{};
-  return heard_state_ && heard_outputs_;
-}
-
-bool CanDriver::hears_active(const NodeMessage& message) noexcept {
-  if (const auto* status = std::get_if<StatusMessage>(&message)) {
-    take_status(*status);
-    heard_state_ = status->state == NodeState::active;
-  }
-  if (const auto* outputs = std::get_if<OutputsMessage>(&message)) {
-    take_outputs(*outputs);
-    heard_outputs_ = outputs->applied == RawDuties{};
-  }
-  return heard_state_ && heard_outputs_;
+bool CanDriver::await_state(NodeState wanted) noexcept {
+  bool state = false;
+  bool zero = false;
+  return await([&](const Decoded& heard) {
+    if (heard.id == id::status) state = heard.values.state() == wanted;
+    if (heard.id == id::outputs) zero = !heard.values.any_duty();
+    if (wanted == NodeState::active && (heard.id == id::status || heard.id == id::outputs)) take_values(heard);
+    return state && zero;
+  });
 }
 
 void CanDriver::identify() {
   for (int attempt = 0; attempt < handshake_attempts; ++attempt) {
-    static_cast<void>(link_.socket->send(control_frame({.request = Request::identify})));
-    if (await(&CanDriver::hears_identity, handshake_timeout_ns)) return;
+    static_cast<void>(link_.socket->send(control_frame(Request::identify)));
+    if (await([this](const Decoded& heard) {
+          if (heard.id == id::identity) identity_ = heard.values;
+          return heard.id == id::identity;
+        })) {
+      return;
+    }
   }
   throw Unavailable("backend rig: " + link_.place +
                     ": no node answers; check the node's power, its bit rate and the bus termination (docs/can.md)");
@@ -133,15 +116,12 @@ void CanDriver::do_configure() {
 }
 
 IoResult CanDriver::activate_node() noexcept {
-  heard_state_ = heard_outputs_ = false;
-  const ControlMessage control{.request = Request::activate,
-                               .nonce = identity_.nonce,
-                               .watchdog_ms = static_cast<std::uint16_t>(options_.watchdog_ms),
-                               .sequence = command_sequence_};
-  if (const IoResult result = sent(link_.socket->send(control_frame(control)), id::control); !result.ok()) {
-    return result;
-  }
-  if (await(&CanDriver::hears_active, handshake_timeout_ns)) return {};
+  const Frame activation = frame_of(id::control, {.request = static_cast<int>(Request::activate),
+                                                  .nonce = identity_.nonce,
+                                                  .watchdog_ms = options_.watchdog_ms,
+                                                  .sequence = command_sequence_});
+  if (const IoResult result = sent(link_.socket->send(activation), id::control); !result.ok()) return result;
+  if (await_state(NodeState::active)) return {};
   return {IoError::no_answer, id::control, 0, rig::Reason::can_node_silent};
 }
 
@@ -184,33 +164,29 @@ IoResult CanDriver::sent(const SendResult& result, std::uint32_t identifier) noe
 
 IoResult CanDriver::do_write(const rig::Command& command, rig::Command& went_out) noexcept {
   if (!driver::in_range(command)) return {IoError::command_out_of_range};
-  const RawDuties duties{.brake = static_cast<std::uint16_t>(grid_.brake_width(command)),
-                         .drive = static_cast<std::uint16_t>(grid_.motor_width(command))};
-  commanded_[++command_sequence_] = duties;
-  const Frame frame = command_frame({.duties = duties,
-                                     .drive_enable = command.motor_enable,
-                                     .heartbeat = tracker_.last_sequence(),
-                                     .sequence = command_sequence_});
-  const SendResult sending = link_.socket->send(in_format(frame));
+  const SendResult sending =
+      send_command({.brake = grid_.brake_width(command), .drive = grid_.motor_width(command)}, command.motor_enable);
   if (sending.outcome == SendOutcome::sent) command_sent_ = grid_.as_sent(command);
   went_out = command_sent_;
   const IoResult result = sent(sending, id::command);
   return result.ok() && bucket_.tripped() ? tripped() : result;
 }
 
-void CanDriver::send_zero() noexcept {
-  commanded_[++command_sequence_] = {};
-  static_cast<void>(link_.socket->send(
-      in_format(command_frame({.heartbeat = tracker_.last_sequence(), .sequence = command_sequence_}))));
+SendResult CanDriver::send_command(const Duties& duties, bool drive_enable) noexcept {
+  commanded_[++command_sequence_] = duties;
+  return link_.socket->send(in_format(frame_of(id::command, {.brake_duty = duties.brake,
+                                                             .drive_duty = duties.drive,
+                                                             .drive_enable = drive_enable ? 1 : 0,
+                                                             .heartbeat = tracker_.last_sequence(),
+                                                             .sequence = command_sequence_})));
 }
 
 IoResult CanDriver::deactivate_node() noexcept {
-  heard_state_ = heard_outputs_ = false;
-  const SendResult result = link_.socket->send(control_frame({.request = Request::deactivate}));
+  const SendResult result = link_.socket->send(control_frame(Request::deactivate));
   if (result.outcome == SendOutcome::down || result.outcome == SendOutcome::failed) {
     return {IoError::disconnected, id::control, result.errno_value};
   }
-  if (await(&CanDriver::hears_safe, handshake_timeout_ns)) return {};
+  if (await_state(NodeState::inactive)) return {};
   return {IoError::no_answer, id::control};
 }
 
@@ -219,22 +195,14 @@ BoardIdentity CanDriver::identity() const {
   return {.place = options_.interface, .logic = "protocol " + std::to_string(identity_.protocol)};
 }
 
-bool CanDriver::hears_outputs(const NodeMessage& message) noexcept {
-  if (const auto* outputs = std::get_if<OutputsMessage>(&message)) {
-    applied_ = outputs->applied;
-    return true;
-  }
-  const auto* measured = std::get_if<MeasurementMessage>(&message);
-  if (measured != nullptr) applied_ = measured->applied;
-  return measured != nullptr;
-}
-
 bool CanDriver::outputs_now(rig::Command& applied) noexcept {
   if (!link_.socket) return false;
   link_.socket->drain();
-  if (!send_sync(monotonic_ns()).ok() || !await(&CanDriver::hears_outputs, handshake_timeout_ns)) return false;
-  applied = command_shown(applied_.drive, applied_.brake, signal::duty_steps);
-  return true;
+  return send_sync(monotonic_ns()).ok() && await([&applied](const Decoded& heard) {
+           const auto width = [](std::int64_t duty) { return static_cast<std::uint32_t>(duty); };
+           applied = command_shown(width(heard.values.drive_duty), width(heard.values.brake_duty), duty_steps);
+           return heard.id == id::outputs || heard.id == id::measurement;
+         });
 }
 
 IoResult CanDriver::do_make_safe() noexcept {
@@ -242,7 +210,7 @@ IoResult CanDriver::do_make_safe() noexcept {
   link_.socket->drain();  // earlier frames must not count as the answer
   IoResult result{};
   for (int attempt = 0; attempt < handshake_attempts; ++attempt) {
-    send_zero();
+    static_cast<void>(send_command({}, false));
     result = deactivate_node();
     if (result.ok()) return {};
   }

@@ -9,9 +9,8 @@
 
 #include "abs_hil/driver/rig_driver.hpp"
 #include "driver/can/answer_tracker.hpp"
-#include "driver/can/link.hpp"
-#include "driver/can/messages.hpp"
-#include "driver/can/options.hpp"
+#include "driver/can/bus.hpp"
+#include "driver/can/can_backend.hpp"
 #include "driver/loss_bucket.hpp"
 #include "driver/pwm.hpp"
 
@@ -19,9 +18,7 @@ namespace abs_hil::driver::can {
 
 /// What ABS_COMMAND makes of a command.
 [[nodiscard]] inline OutputGrid output_grid(const CanOptions& options) noexcept {
-  return {.duty_steps = signal::duty_steps,
-          .motor_duty_max = options.motor_duty_max,
-          .brake_duty_max = options.brake_duty_max};
+  return {.duty_steps = duty_steps, .motor_duty_max = options.motor_duty_max, .brake_duty_max = options.brake_duty_max};
 }
 
 inline constexpr std::int64_t handshake_timeout_ns = 100'000'000;
@@ -78,6 +75,13 @@ class CanDriver final : public RigDriver {
   [[nodiscard]] const CanCounters& counters() const noexcept { return counters_; }
 
  private:
+  /// Raw values: steps of 0.0001.
+  struct Duties {
+    std::int64_t brake{0};
+    std::int64_t drive{0};
+    bool operator==(const Duties&) const = default;
+  };
+
   void do_configure() override;
   void do_activate(std::int64_t now_ns) override;
   IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override;
@@ -88,11 +92,11 @@ class CanDriver final : public RigDriver {
   void identify();
   [[nodiscard]] IoResult deactivate_node() noexcept;
   [[nodiscard]] IoResult activate_node() noexcept;
-  [[nodiscard]] bool await(bool (CanDriver::*heard)(const NodeMessage&) noexcept, std::int64_t timeout_ns) noexcept;
-  [[nodiscard]] bool hears_identity(const NodeMessage& message) noexcept;
-  [[nodiscard]] bool hears_outputs(const NodeMessage& message) noexcept;
-  [[nodiscard]] bool hears_safe(const NodeMessage& message) noexcept;
-  [[nodiscard]] bool hears_active(const NodeMessage& message) noexcept;
+  /// Waits until `heard` returns true for a message of the node, at most `handshake_timeout_ns`.
+  template <class Heard>
+  [[nodiscard]] bool await(Heard heard) noexcept;
+  /// Waits until the node reports this state, and both outputs 0.
+  [[nodiscard]] bool await_state(NodeState wanted) noexcept;
 
   // One cycle.
   [[nodiscard]] IoResult exchange(std::int64_t now_ns) noexcept;
@@ -100,20 +104,18 @@ class CanDriver final : public RigDriver {
   [[nodiscard]] IoResult collect() noexcept;
   [[nodiscard]] IoResult take(const Frame& frame) noexcept;
   [[nodiscard]] IoResult take_error_frame(const Frame& frame) noexcept;
-  void take_message(const NodeMessage& message) noexcept;
-  void take_status(const StatusMessage& status) noexcept;
-  void take_outputs(const OutputsMessage& outputs) noexcept;
-  void take_outputs(RawDuties applied, std::uint8_t command_sequence) noexcept;
+  void take_message(const Decoded& message) noexcept;
+  void take_values(const Decoded& message) noexcept;
   void note(Anomaly anomaly) noexcept;
-  void count(Anomaly anomaly) noexcept;
   void check_drops() noexcept;
   [[nodiscard]] IoResult judge(std::int64_t now_ns) noexcept;
   [[nodiscard]] IoResult judge_answer(std::int64_t now_ns) noexcept;
   [[nodiscard]] IoResult tripped() noexcept;
   [[nodiscard]] bool advance_counts(const Answer& answer, std::int64_t elapsed_ns) noexcept;
+  [[nodiscard]] std::int64_t node_interval_ns(const Answer& answer) const noexcept;
   [[nodiscard]] std::int64_t latch_time_ns(const Answer& answer, std::int64_t now_ns) const noexcept;
   [[nodiscard]] IoResult sent(const SendResult& result, std::uint32_t identifier) noexcept;
-  void send_zero() noexcept;
+  SendResult send_command(const Duties& duties, bool drive_enable) noexcept;
   [[nodiscard]] Frame in_format(Frame frame) const noexcept;
 
   CanOptions options_;
@@ -123,12 +125,8 @@ class CanDriver final : public RigDriver {
   std::int64_t answer_timeout_ns_;
   Link link_{};
   bool fd_{false};
-  IdentityMessage identity_{};
+  Values identity_{};
   CanCounters counters_{};
-
-  // State of the handshake.
-  bool heard_state_{false};
-  bool heard_outputs_{false};
 
   // State of the cycle.
   LossBucket bucket_;
@@ -139,13 +137,13 @@ class CanDriver final : public RigDriver {
   Anomaly worst_{Anomaly::none};
   std::uint32_t worst_id_{0};
   std::uint32_t drops_seen_{0};
-  std::uint8_t rejected_seen_{0};
+  std::int64_t rejected_seen_{0};
 
   // Last values from the node.
   bool any_answer_{false};
   std::array<std::int32_t, 2> raw_counts_{};  ///< upper, lower; the node's own counters
   std::array<std::int32_t, 2> counts_{};      ///< upper, lower; 32 bits, after `upper_sign` and `lower_sign`
-  std::uint32_t node_time_us_{0};
+  std::int64_t node_time_us_{0};
   std::int64_t latched_ns_{0};
   double supply_V_{rig::unknown};
   double temperature_C_{rig::unknown};
@@ -153,10 +151,10 @@ class CanDriver final : public RigDriver {
 
   // Commands sent, by sequence.
   std::uint8_t command_sequence_{0};
-  std::array<RawDuties, 256> commanded_{};
+  std::array<Duties, 256> commanded_{};
   rig::Command command_sent_{};  ///< the last one that the interface took
   bool outputs_known_{false};
-  RawDuties applied_{};
+  Duties applied_{};
   std::uint8_t applied_sequence_{0};
 };
 

@@ -8,7 +8,6 @@
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/board_kit.hpp"
 #include "driver/can/can_driver.hpp"
-#include "driver/can/error_frame.hpp"
 #include "driver/monotonic_time.hpp"
 #include "rig/encoder_scale.hpp"
 
@@ -29,54 +28,34 @@ std::int32_t travelled(std::int32_t before, std::int32_t after, unsigned bits) n
   return std::bit_cast<std::int32_t>(difference << unused) >> unused;
 }
 
-IoError error_of(Anomaly anomaly) noexcept {
-  switch (anomaly) {
-    case Anomaly::wrong_length: return IoError::incomplete_answer;
-    case Anomaly::forged:
-    case Anomaly::implausible:
-    case Anomaly::duplicate:
-    case Anomaly::out_of_order:
-    case Anomaly::stale: return IoError::implausible_answer;
-    default: return IoError::no_answer;
-  }
-}
+/// What a lost cycle is called that an anomaly caused, and what counts it.
+struct AnomalyFacts {
+  IoError error;
+  rig::Reason reason;
+  std::uint64_t CanCounters::*count;  ///< null: counted elsewhere
+};
+/// By number of the anomaly.
+constexpr std::array<AnomalyFacts, 10> facts_of{{
+    {IoError::no_answer, rig::Reason::can_node_silent, nullptr},
+    {IoError::no_answer, rig::Reason::can_node_silent, &CanCounters::lost},
+    {IoError::no_answer, rig::Reason::can_send_queue_full, &CanCounters::queue_full},
+    {IoError::implausible_answer, rig::Reason::can_frames_stale, &CanCounters::stale},
+    {IoError::implausible_answer, rig::Reason::can_frames_out_of_order, &CanCounters::out_of_order},
+    {IoError::implausible_answer, rig::Reason::can_frames_duplicated, &CanCounters::duplicates},
+    {IoError::no_answer, rig::Reason::can_too_many_frames, nullptr},
+    {IoError::implausible_answer, rig::Reason::can_values_implausible, &CanCounters::implausible},
+    {IoError::implausible_answer, rig::Reason::can_frames_forged, &CanCounters::forged},
+    {IoError::incomplete_answer, rig::Reason::can_frame_wrong_length, &CanCounters::wrong_length},
+}};
+static_assert(static_cast<std::size_t>(Anomaly::wrong_length) + 1 == facts_of.size());
 
-rig::Reason reason_of(Anomaly anomaly) noexcept {
-  switch (anomaly) {
-    case Anomaly::none:
-    case Anomaly::missing: return rig::Reason::can_node_silent;
-    case Anomaly::queue_full: return rig::Reason::can_send_queue_full;
-    case Anomaly::stale: return rig::Reason::can_frames_stale;
-    case Anomaly::out_of_order: return rig::Reason::can_frames_out_of_order;
-    case Anomaly::duplicate: return rig::Reason::can_frames_duplicated;
-    case Anomaly::too_many: return rig::Reason::can_too_many_frames;
-    case Anomaly::implausible: return rig::Reason::can_values_implausible;
-    case Anomaly::forged: return rig::Reason::can_frames_forged;
-    case Anomaly::wrong_length: return rig::Reason::can_frame_wrong_length;
-  }
-  return rig::Reason::can_node_silent;
-}
+const AnomalyFacts& facts(Anomaly anomaly) noexcept { return facts_of[static_cast<std::size_t>(anomaly)]; }
 
 }  // namespace
 
-void CanDriver::count(Anomaly anomaly) noexcept {
-  switch (anomaly) {
-    case Anomaly::stale: ++counters_.stale; break;
-    case Anomaly::out_of_order: ++counters_.out_of_order; break;
-    case Anomaly::duplicate: ++counters_.duplicates; break;
-    case Anomaly::implausible: ++counters_.implausible; break;
-    case Anomaly::forged: ++counters_.forged; break;
-    case Anomaly::wrong_length: ++counters_.wrong_length; break;
-    case Anomaly::queue_full: ++counters_.queue_full; break;
-    case Anomaly::missing: ++counters_.lost; break;
-    case Anomaly::too_many:
-    case Anomaly::none: break;
-  }
-}
-
 void CanDriver::note(Anomaly anomaly) noexcept {
   if (anomaly == Anomaly::none) return;
-  count(anomaly);
+  if (const auto counter = facts(anomaly).count; counter != nullptr) ++(counters_.*counter);
   worst_ = std::max(worst_, anomaly);
   // A late answer has already been counted as lost.
   if (anomaly != Anomaly::stale) bucket_.lost();
@@ -88,10 +67,12 @@ IoResult CanDriver::send_sync(std::int64_t now_ns) noexcept {
   worst_ = Anomaly::none;
   worst_id_ = 0;
   if (lock_step_) {
-    if (const IoResult result = sent(link_.socket->send(time_frame(now_ns)), id::time); !result.ok()) return result;
+    if (const IoResult result = sent(link_.socket->send(frame_of(id::time, {.host_time_ns = now_ns})), id::time);
+        !result.ok())
+      return result;
   }
   sent_ns_ = monotonic_ns();
-  return sent(link_.socket->send(in_format(sync_frame(sync_))), id::sync);
+  return sent(link_.socket->send(in_format(frame_of(id::sync, {.sequence = sync_}))), id::sync);
 }
 
 IoResult CanDriver::take_error_frame(const Frame& frame) noexcept {
@@ -104,45 +85,29 @@ IoResult CanDriver::take_error_frame(const Frame& frame) noexcept {
   return {};
 }
 
-void CanDriver::take_outputs(RawDuties applied, std::uint8_t command_sequence) noexcept {
-  outputs_known_ = true;
-  applied_ = applied;
-  applied_sequence_ = command_sequence;
-}
-
-void CanDriver::take_status(const StatusMessage& status) noexcept {
-  trip_flags_ = status.trip_flags;
-  supply_V_ = status.supply_V;
-  temperature_C_ = status.temperature_C;
-}
-
-void CanDriver::take_outputs(const OutputsMessage& outputs) noexcept {
-  take_outputs(outputs.applied, outputs.command_sequence);
-  // Rejections before the activation do not belong to this run.
-  if (any_answer_) counters_.rejected_by_node += static_cast<std::uint8_t>(outputs.rejected - rejected_seen_);
-  rejected_seen_ = outputs.rejected;
-}
-
-void CanDriver::take_message(const NodeMessage& message) noexcept {
-  if (const auto* status = std::get_if<StatusMessage>(&message)) {
-    const Anomaly anomaly = tracker_.place(status->sequence);
-    note(anomaly);
-    if (anomaly == Anomaly::none) take_status(*status);
-  } else if (const auto* outputs = std::get_if<OutputsMessage>(&message)) {
-    const Anomaly anomaly = tracker_.place(outputs->sequence);
-    note(anomaly);
-    if (anomaly == Anomaly::none) take_outputs(*outputs);
-  } else if (const auto* encoders = std::get_if<EncodersMessage>(&message)) {
-    note(tracker_.take(*encoders));
-  } else if (const auto* latch = std::get_if<LatchMessage>(&message)) {
-    note(tracker_.take(*latch));
-  } else if (const auto* measurement = std::get_if<MeasurementMessage>(&message)) {
-    const Anomaly anomaly = tracker_.take(*measurement);
-    note(anomaly);
-    if (anomaly != Anomaly::none) return;
-    trip_flags_ = measurement->trip_flags;
-    take_outputs(measurement->applied, measurement->command_sequence);
+void CanDriver::take_values(const Decoded& message) noexcept {
+  const Values& values = message.values;
+  if (message.id != id::outputs) trip_flags_ = static_cast<std::uint32_t>(values.trip_flags);
+  if (message.id == id::status) {
+    supply_V_ = values.supply_V();
+    temperature_C_ = values.temperature_C();
+    return;
   }
+  outputs_known_ = true;
+  applied_ = {.brake = values.brake_duty, .drive = values.drive_duty};
+  applied_sequence_ = static_cast<std::uint8_t>(values.command_sequence);
+  if (message.id != id::outputs) return;
+  // Rejections before the activation do not belong to this run.
+  if (any_answer_) counters_.rejected_by_node += static_cast<std::uint8_t>(values.rejected - rejected_seen_);
+  rejected_seen_ = values.rejected;
+}
+
+void CanDriver::take_message(const Decoded& message) noexcept {
+  if (message.id == id::identity) return;
+  const bool slow = message.id == id::status || message.id == id::outputs;
+  const Anomaly anomaly = slow ? tracker_.place(message.values.sequence) : tracker_.take(message.id, message.values);
+  note(anomaly);
+  if (anomaly == Anomaly::none && (slow || message.id == id::measurement)) take_values(message);
 }
 
 IoResult CanDriver::take(const Frame& frame) noexcept {
@@ -152,7 +117,7 @@ IoResult CanDriver::take(const Frame& frame) noexcept {
   const Decoded decoded = decode(frame);
   switch (decoded.error) {
     case DecodeError::none:
-      take_message(decoded.message);
+      take_message(decoded);
       received_ns_ = frame.received_ns;
       break;
     case DecodeError::unknown_identifier: ++counters_.ignored; break;
@@ -199,11 +164,12 @@ IoResult CanDriver::tripped() noexcept {
   if (worst_ <= Anomaly::queue_full && !link_.running()) {
     return {IoError::disconnected, id::sync, 0, rig::Reason::can_interface_down};
   }
-  return {error_of(worst_), worst_id_ != 0 ? worst_id_ : id::sync, 0, can::reason_of(worst_)};
+  return {facts(worst_).error, worst_id_ != 0 ? worst_id_ : id::sync, 0, facts(worst_).reason};
 }
 
 bool CanDriver::advance_counts(const Answer& answer, std::int64_t elapsed_ns) noexcept {
-  const std::array<std::int32_t, 2> raw{answer.upper_counts, answer.lower_counts};
+  const std::array<std::int32_t, 2> raw{static_cast<std::int32_t>(answer.values.upper_counts),
+                                        static_cast<std::int32_t>(answer.values.lower_counts)};
   const std::array<std::int32_t, 2> signs{options_.upper_sign, options_.lower_sign};
   const double most =
       most_plausible_counts(elapsed_ns, options_.plausible_speed_rad_s, options_.encoder_counts_per_rev);
@@ -217,27 +183,29 @@ bool CanDriver::advance_counts(const Answer& answer, std::int64_t elapsed_ns) no
   return true;
 }
 
+std::int64_t CanDriver::node_interval_ns(const Answer& answer) const noexcept {
+  return static_cast<std::uint32_t>(answer.values.node_time_us - node_time_us_) * rig::ns_per_us;
+}
+
 std::int64_t CanDriver::latch_time_ns(const Answer& answer, std::int64_t now_ns) const noexcept {
   if (lock_step_) return now_ns;
   const std::int64_t received_ns = std::max(received_ns_, sent_ns_);
   if (!any_answer_) return sent_ns_ + (received_ns - sent_ns_) / 2;
   // The node's clock gives the best interval. The times of SYNC and answer bound the result.
-  const std::uint32_t interval_us = answer.node_time_us - node_time_us_;
-  return std::clamp(latched_ns_ + std::int64_t{interval_us} * rig::ns_per_us, sent_ns_, received_ns);
+  return std::clamp(latched_ns_ + node_interval_ns(answer), sent_ns_, received_ns);
 }
 
 IoResult CanDriver::judge_answer(std::int64_t now_ns) noexcept {
   const Answer& answer = tracker_.answer();
-  if (answer.state == NodeState::inactive) {
+  if (answer.values.state() == NodeState::inactive) {
     return {IoError::implausible_answer, id::latch, 0, rig::Reason::can_node_restarted};
   }
-  if (answer.state == NodeState::latched) {
+  if (answer.values.state() == NodeState::latched) {
     return {IoError::read_back_mismatch, id::latch, 0, rig::Reason::can_node_latched};
   }
   const std::int64_t time_ns = latch_time_ns(answer, now_ns);
-  const std::int64_t node_interval_ns = std::int64_t{answer.node_time_us - node_time_us_} * rig::ns_per_us;
   const std::int64_t interval_ns = any_answer_ ? time_ns - latched_ns_ : 0;
-  if (any_answer_ && std::abs(node_interval_ns - interval_ns) > clock_slack_ns) {
+  if (any_answer_ && std::abs(node_interval_ns(answer) - interval_ns) > clock_slack_ns) {
     return {IoError::implausible_answer, id::latch, 0, rig::Reason::can_node_restarted};
   }
   // Bound on the time between activation and first answer.
@@ -255,7 +223,7 @@ IoResult CanDriver::judge_answer(std::int64_t now_ns) noexcept {
   if (!outputs_follow) {
     return {IoError::read_back_mismatch, id::outputs, 0, rig::Reason::can_outputs_not_taken};
   }
-  node_time_us_ = answer.node_time_us;
+  node_time_us_ = answer.values.node_time_us;
   latched_ns_ = time_ns;
   any_answer_ = true;
   counters_.longest_answer_ns = std::max(counters_.longest_answer_ns, received_ns_ - sent_ns_);
@@ -282,7 +250,7 @@ IoResult CanDriver::exchange(std::int64_t now_ns) noexcept {
 
 IoResult CanDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept {
   if (const IoResult result = exchange(now_ns); !result.ok()) {
-    send_zero();  // at once, because the caller may react late
+    static_cast<void>(send_command({}, false));  // at once, because the caller may react late
     return result;
   }
   measurement = {};

@@ -1,6 +1,8 @@
 // Texts about the bus and the node.
 
-#include "driver/can/bus_load.hpp"
+#include <initializer_list>
+#include <utility>
+
 #include "driver/can/can_driver.hpp"
 #include "driver/monotonic_time.hpp"
 #include "rig/formatted_text.hpp"
@@ -42,25 +44,28 @@ std::vector<std::string> CanDriver::notes() const {
 
 std::vector<std::string> CanDriver::tally() const {
   const CanCounters& c = counters_;
-  using Number = unsigned long long;
-  std::vector<std::string> lines;
-  lines.push_back(formatted("CAN: %llu cycles, %llu without an answer in time; longest answer %.0f us",
-                            static_cast<Number>(c.cycles), static_cast<Number>(c.lost),
-                            static_cast<double>(c.longest_answer_ns) * 1e-3));
+  const auto counts = [](std::initializer_list<std::pair<std::uint64_t, const char*>> all) {
+    std::string text;
+    for (const auto& [count, what] : all) text += (text.empty() ? "" : ", ") + std::to_string(count) + what;
+    return text;
+  };
+  std::vector<std::string> lines{
+      "CAN: " + counts({{c.cycles, " cycles"}, {c.lost, " without an answer in time"}}) +
+      formatted("; longest answer %.0f us", static_cast<double>(c.longest_answer_ns) * 1e-3)};
   const std::uint64_t odd = c.stale + c.duplicates + c.out_of_order + c.wrong_length + c.forged + c.implausible +
                             c.queue_full + c.error_frames + c.dropped_by_kernel + c.rejected_by_node;
   if (odd == 0) return lines;
-  lines.push_back(
-      formatted("CAN frames: %llu stale, %llu duplicate, %llu out of order, %llu of wrong length, %llu forged, "
-                "%llu implausible; %llu dropped by the kernel",
-                static_cast<Number>(c.stale), static_cast<Number>(c.duplicates), static_cast<Number>(c.out_of_order),
-                static_cast<Number>(c.wrong_length), static_cast<Number>(c.forged), static_cast<Number>(c.implausible),
-                static_cast<Number>(c.dropped_by_kernel)));
-  lines.push_back(
-      formatted("CAN bus: send queue full %llu times, %llu error frames (%llu warnings), %llu commands "
-                "rejected by the node",
-                static_cast<Number>(c.queue_full), static_cast<Number>(c.error_frames),
-                static_cast<Number>(c.error_warnings), static_cast<Number>(c.rejected_by_node)));
+  lines.push_back("CAN frames: " + counts({{c.stale, " stale"},
+                                           {c.duplicates, " duplicate"},
+                                           {c.out_of_order, " out of order"},
+                                           {c.wrong_length, " of wrong length"},
+                                           {c.forged, " forged"},
+                                           {c.implausible, " implausible"},
+                                           {c.dropped_by_kernel, " dropped by the kernel"}}));
+  lines.push_back("CAN bus: " + counts({{c.queue_full, " times the send queue was full"},
+                                        {c.error_frames, " error frames"},
+                                        {c.error_warnings, " of them warnings"},
+                                        {c.rejected_by_node, " commands rejected by the node"}}));
   return lines;
 }
 
@@ -69,23 +74,22 @@ std::vector<std::string> CanDriver::inspection() {
   std::vector<std::string> lines = notes();
   link_.socket->drain();
   tracker_.reset(sync_);
-  heard_state_ = false;
   // An inactive node answers a SYNC, too, and the SYNC moves nothing.
   tracker_.expect(++sync_);
-  static_cast<void>(link_.socket->send(sync_frame(sync_)));
+  static_cast<void>(link_.socket->send(frame_of(id::sync, {.sequence = sync_})));
   sent_ns_ = monotonic_ns();
   static_cast<void>(collect());
   if (!tracker_.complete()) {
     lines.emplace_back("no answer to a SYNC");
     return lines;
   }
-  const Answer& answer = tracker_.answer();
-  lines.push_back(formatted("counters: upper wheel %d, lower wheel %d, lever %d", answer.upper_counts,
-                            answer.lower_counts, answer.lever_counts));
-  lines.push_back(formatted("node's clock %.6f s, state %s", 1e-6 * answer.node_time_us,
-                            answer.state == NodeState::inactive ? "inactive"
-                            : answer.state == NodeState::active ? "active"
-                                                                : "latched"));
+  const Values& answer = tracker_.answer().values;
+  lines.push_back(formatted("counters: upper wheel %d, lower wheel %d, lever %d", static_cast<int>(answer.upper_counts),
+                            static_cast<int>(answer.lower_counts), static_cast<int>(answer.lever_counts)));
+  lines.push_back(formatted("node's clock %.6f s, state %s", 1e-6 * static_cast<double>(answer.node_time_us),
+                            answer.state() == NodeState::inactive ? "inactive"
+                            : answer.state() == NodeState::active ? "active"
+                                                                  : "latched"));
   lines.push_back(formatted("supply %.2f V, temperature %.1f deg C, trip flags 0x%x (NaN: not received yet)", supply_V_,
                             temperature_C_, trip_flags_));
   return lines;

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "driver/can/link.hpp"
+#include "driver/can/bus.hpp"
 #include "driver/own_handle_writer.hpp"
 
 namespace abs_hil::driver::can {

@@ -6,7 +6,6 @@
 #include <net/if.h>
 #include <net/if_arp.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -15,6 +14,7 @@
 #include <functional>
 
 #include "abs_hil/driver/io_result.hpp"
+#include "driver/file_descriptor.hpp"
 
 namespace abs_hil::driver::can {
 
@@ -105,21 +105,6 @@ InterfaceFacts facts_in(const ifinfomsg& info, const void* attributes, std::size
   throw Unavailable(std::string("CAN interfaces: ") + what + ": " + std::strerror(errno));
 }
 
-/// A socket that closes itself.
-class Netlink {
- public:
-  Netlink() : descriptor_(::socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_ROUTE)) {
-    if (descriptor_ < 0) refuse_interfaces("cannot open an rtnetlink socket");
-  }
-  Netlink(const Netlink&) = delete;
-  Netlink& operator=(const Netlink&) = delete;
-  ~Netlink() { ::close(descriptor_); }
-  [[nodiscard]] int get() const noexcept { return descriptor_; }
-
- private:
-  int descriptor_;
-};
-
 void ask_for_links(int descriptor) {
   struct {
     nlmsghdr head{};
@@ -157,7 +142,8 @@ bool take_links(std::span<const unsigned char> answer, std::vector<InterfaceFact
 }
 
 std::vector<InterfaceFacts> can_interfaces() {
-  const Netlink netlink;
+  const FileDescriptor netlink(::socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_ROUTE));
+  if (netlink.get() < 0) refuse_interfaces("cannot open an rtnetlink socket");
   ask_for_links(netlink.get());
   std::vector<InterfaceFacts> found;
   alignas(nlmsghdr) static thread_local std::array<unsigned char, 65536> buffer;

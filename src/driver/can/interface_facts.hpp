@@ -1,3 +1,5 @@
+// What the kernel knows of the CAN interfaces (rtnetlink).
+
 #pragma once
 
 #include <cstdint>

@@ -8,6 +8,109 @@
 
 namespace abs_hil::driver {
 
+void EncoderChannel::start(std::int32_t counts) noexcept {
+  last_ = delivered_ = counts;
+  fraction_ = 0.0;
+  held_ = 0;
+  renewed_ns_ = 0;
+  line_.clear();
+}
+
+std::int32_t EncoderChannel::travel(std::int32_t counts) noexcept {
+  const std::int32_t travelled = rig::counts_between(last_, counts);
+  last_ = counts;
+  return travelled;
+}
+
+void EncoderChannel::advance(std::int64_t travel) noexcept {
+  delivered_ =
+      std::bit_cast<std::int32_t>(std::bit_cast<std::uint32_t>(delivered_) + static_cast<std::uint32_t>(travel));
+}
+
+std::int32_t EncoderChannel::pass(std::int32_t travel, const ActiveFault& fault, std::int64_t now_ns,
+                                  std::mt19937_64& random) noexcept {
+  switch (fault.kind) {
+    case InjectionKind::off: delivered_ = 0; break;
+    case InjectionKind::stuck: break;
+    case InjectionKind::garbage:
+      delivered_ = std::bit_cast<std::int32_t>(static_cast<std::uint32_t>(random() >> 32U));
+      break;
+    case InjectionKind::wrong: {
+      const double counted = fraction_ + fault.parameter * travel;
+      fraction_ = counted - std::trunc(counted);
+      advance(static_cast<std::int64_t>(std::trunc(counted)));
+      break;
+    }
+    case InjectionKind::intermittent:
+      if (uniform(random) >= fault.parameter) advance(travel);
+      break;
+    case InjectionKind::slow:
+      held_ += travel;
+      if (now_ns - renewed_ns_ >= ns_of(fault.parameter)) {
+        renewed_ns_ = now_ns;
+        advance(held_);
+        held_ = 0;
+      }
+      break;
+    case InjectionKind::delayed: {
+      line_.push(now_ns, travel);
+      std::int64_t late = 0;
+      while (line_.pop(now_ns - ns_of(fault.parameter), late)) advance(late);
+      break;
+    }
+    case InjectionKind::ok:
+      advance(travel + held_);
+      held_ = 0;
+      for (std::int64_t late = 0; line_.pop(now_ns, late);) advance(late);
+      renewed_ns_ = now_ns;
+      break;
+  }
+  return delivered_;
+}
+
+void NumberChannel::start() noexcept {
+  delivered_ = 0.0;
+  renewed_ns_ = 0;
+  line_.clear();
+}
+
+double NumberChannel::pass(double value, const ActiveFault& fault, std::int64_t now_ns,
+                           std::mt19937_64& random) noexcept {
+  if (fault.kind != InjectionKind::delayed) line_.clear();
+  switch (fault.kind) {
+    case InjectionKind::ok:
+      delivered_ = value;
+      renewed_ns_ = now_ns;
+      break;
+    case InjectionKind::off: delivered_ = faults_.off; break;
+    case InjectionKind::stuck: break;
+    case InjectionKind::garbage: {
+      const double drawn = faults_.garbage_least + (faults_.garbage_most - faults_.garbage_least) * uniform(random);
+      delivered_ = faults_.whole ? std::floor(drawn) : drawn;
+      break;
+    }
+    case InjectionKind::wrong: delivered_ = faults_.wrong(value, fault.parameter); break;
+    case InjectionKind::intermittent: {
+      const bool fails = uniform(random) < fault.parameter;
+      const double failed = faults_.intermittently_wrong ? faults_.wrong(value, 0.0) : faults_.off;
+      delivered_ = fails ? failed : value;
+      break;
+    }
+    case InjectionKind::slow:
+      if (now_ns - renewed_ns_ >= ns_of(fault.parameter)) {
+        renewed_ns_ = now_ns;
+        delivered_ = value;
+      }
+      break;
+    case InjectionKind::delayed:
+      line_.push(now_ns, value);
+      while (line_.pop(now_ns - ns_of(fault.parameter), delivered_)) {
+      }
+      break;
+  }
+  return delivered_;
+}
+
 namespace {
 
 constexpr double longest_run_s = 1e9;  ///< a longer duration, also infinity, means no end
@@ -109,6 +212,34 @@ ActiveFault InjectingDriver::fault_of(InjectionSignal signal) const noexcept {
   return fault;
 }
 
+template <class Value, class Garble, class Spoil>
+IoResult InjectingDriver::fail_whole(InjectionSignal signal, Value& value, const Value& last, DelayLine<Value>& line,
+                                     Garble garble, Spoil spoil) noexcept {
+  const ActiveFault fault = fault_of(signal);
+  if (fault.kind != InjectionKind::delayed) line.clear();
+  switch (fault.kind) {
+    case InjectionKind::ok: break;
+    case InjectionKind::off: return {IoError::no_answer};
+    case InjectionKind::stuck: value = last; break;
+    case InjectionKind::garbage: garble(); break;
+    case InjectionKind::wrong: return spoil(fault.parameter);
+    case InjectionKind::slow:
+      if (pass_time_) pass_time_(ns_of(fault.parameter));
+      break;
+    case InjectionKind::delayed: {
+      line.push(now_ns_, value);
+      value = last;
+      while (line.pop(now_ns_ - ns_of(fault.parameter), value)) {
+      }
+      break;
+    }
+    case InjectionKind::intermittent:
+      if (uniform(random_) < fault.parameter) return {IoError::no_answer};
+      break;
+  }
+  return {};
+}
+
 IoResult InjectingDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept {
   now_ns_ = now_ns;
   // Always read the backend, also under a fault: the read advances an emulator's time.
@@ -121,7 +252,15 @@ IoResult InjectingDriver::do_read(std::int64_t now_ns, rig::Measurement& measure
   const rig::Measurement sound = measurement;
   fail_encoders(measurement);
   fail_numbers(measurement);
-  const IoResult result = fail_whole_answer(measurement);
+  const auto garble = [&] {
+    measurement.upper_counts = any_counts(random_);
+    measurement.lower_counts = any_counts(random_);
+    measurement.time_ns = static_cast<std::int64_t>(uniform(random_) * stamp_faults.garbage_most);
+    measurement.supply_V = uniform(random_) * supply_faults.garbage_most;
+    measurement.trip_flags = static_cast<std::uint32_t>(random_() >> 61U);
+  };
+  const IoResult result = fail_whole(InjectionSignal::read, measurement, delivered_, answers_, garble,
+                                     [](double) { return IoResult{IoError::implausible_answer}; });
   note_effect(!result.ok() || differ(sound, measurement) ||
               fault_of(InjectionSignal::read).kind == InjectionKind::slow);
   if (result.ok()) delivered_ = measurement;
@@ -175,44 +314,23 @@ void InjectingDriver::fail_numbers(rig::Measurement& measurement) noexcept {
   measurement.trip_flags = static_cast<std::uint32_t>(pass(trip_, InjectionSignal::trip, measurement.trip_flags));
 }
 
-IoResult InjectingDriver::fail_whole_answer(rig::Measurement& measurement) noexcept {
-  const ActiveFault fault = fault_of(InjectionSignal::read);
-  if (fault.kind != InjectionKind::delayed) answers_.clear();
-  switch (fault.kind) {
-    case InjectionKind::ok: break;
-    case InjectionKind::off: return {IoError::no_answer};
-    case InjectionKind::stuck: measurement = delivered_; break;
-    case InjectionKind::garbage:
-      measurement.upper_counts = any_counts(random_);
-      measurement.lower_counts = any_counts(random_);
-      measurement.time_ns = static_cast<std::int64_t>(uniform(random_) * stamp_faults.garbage_most);
-      measurement.supply_V = uniform(random_) * supply_faults.garbage_most;
-      measurement.trip_flags = static_cast<std::uint32_t>(random_() >> 61U);
-      break;
-    case InjectionKind::wrong: return {IoError::implausible_answer};
-    case InjectionKind::slow:
-      if (pass_time_) pass_time_(ns_of(fault.parameter));
-      break;
-    case InjectionKind::delayed: {
-      answers_.push(now_ns_, measurement);
-      rig::Measurement late = delivered_;
-      while (answers_.pop(now_ns_ - ns_of(fault.parameter), late)) {
-      }
-      measurement = late;
-      break;
-    }
-    case InjectionKind::intermittent:
-      if (uniform(random_) < fault.parameter) return {IoError::no_answer};
-      break;
-  }
-  return {};
-}
-
 IoResult InjectingDriver::do_write(const rig::Command& command, rig::Command& sent) noexcept {
   rig::Command passed = command;
-  if (const IoResult result = fail_whole_command(passed); !result.ok()) {
+  const auto garble = [&] {
+    passed.motor_duty = uniform(random_);
+    passed.brake_duty = uniform(random_);
+    passed.brake_torque_Nm = uniform(random_) * torque_faults.garbage_most;
+    passed.motor_enable = uniform(random_) < 0.5;
+  };
+  const auto spoil = [&](double factor) {
+    passed.motor_duty = scaled_duty(passed.motor_duty, factor);
+    passed.brake_duty = scaled_duty(passed.brake_duty, factor);
+    passed.brake_torque_Nm *= factor;
+    return IoResult{};
+  };
+  if (const IoResult lost = fail_whole(InjectionSignal::write, passed, passed_, commands_, garble, spoil); !lost.ok()) {
     note_effect(true);
-    return result;
+    return lost;
   }
   passed.motor_duty = motor_.pass(passed.motor_duty, fault_of(InjectionSignal::motor_pwm), now_ns_, random_);
   const ActiveFault brake = fault_of(InjectionSignal::brake_pwm);
@@ -227,42 +345,6 @@ IoResult InjectingDriver::do_write(const rig::Command& command, rig::Command& se
   const IoResult result = inner_->write(passed, sent);
   if (result.ok() && changed) sent = inner_->as_sent(command);
   return result;
-}
-
-IoResult InjectingDriver::fail_whole_command(rig::Command& command) noexcept {
-  const ActiveFault fault = fault_of(InjectionSignal::write);
-  if (fault.kind != InjectionKind::delayed) commands_.clear();
-  switch (fault.kind) {
-    case InjectionKind::ok: break;
-    case InjectionKind::off: return {IoError::no_answer};
-    case InjectionKind::stuck: command = passed_; break;
-    case InjectionKind::garbage:
-      command.motor_duty = uniform(random_);
-      command.brake_duty = uniform(random_);
-      command.brake_torque_Nm = uniform(random_) * torque_faults.garbage_most;
-      command.motor_enable = uniform(random_) < 0.5;
-      break;
-    case InjectionKind::wrong:
-      command.motor_duty = scaled_duty(command.motor_duty, fault.parameter);
-      command.brake_duty = scaled_duty(command.brake_duty, fault.parameter);
-      command.brake_torque_Nm *= fault.parameter;
-      break;
-    case InjectionKind::slow:
-      if (pass_time_) pass_time_(ns_of(fault.parameter));
-      break;
-    case InjectionKind::delayed: {
-      commands_.push(now_ns_, command);
-      rig::Command late = passed_;
-      while (commands_.pop(now_ns_ - ns_of(fault.parameter), late)) {
-      }
-      command = late;
-      break;
-    }
-    case InjectionKind::intermittent:
-      if (uniform(random_) < fault.parameter) return {IoError::no_answer};
-      break;
-  }
-  return {};
 }
 
 }  // namespace abs_hil::driver

@@ -1,23 +1,23 @@
 #include "driver/pci/discovery.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cinttypes>
 #include <cstdio>
 #include <fstream>
-#include <optional>
 #include <system_error>
 
 #include "driver/board_kit.hpp"
-#include "driver/pci/card_obstacles.hpp"
+#include "driver/file_descriptor.hpp"
 #include "driver/pci/register_map.hpp"
-#include "driver/pci/sysfs_window.hpp"
+#include "driver/sysfs.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::pci {
 
 namespace {
 
 namespace fs = std::filesystem;
+using Obstacles = std::vector<FoundBoard::Obstacle>;
 
 constexpr int bar_number = 2;
 // include/linux/ioport.h
@@ -25,32 +25,15 @@ constexpr std::uint64_t ioresource_io = 0x100;
 constexpr std::uint64_t ioresource_disabled = 0x10000000;
 constexpr std::uint64_t ioresource_unset = 0x20000000;
 
-std::string hex(std::uint64_t value) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "0x%04" PRIx64, value);
-  return text.data();
-}
-
-/// The number that a sysfs file holds ("0x10b5"); nothing if it cannot be read.
-std::optional<std::uint64_t> number_in(const fs::path& file) {
-  std::ifstream in(file);
-  std::string text;
-  std::uint64_t value = 0;
-  if (!(in >> text) || std::sscanf(text.c_str(), "%" SCNx64, &value) != 1) return std::nullopt;
-  return value;
-}
-
-bool is_the_card(const fs::path& folder) {
-  return number_in(folder / "vendor") == vendor_id && number_in(folder / "device") == device_id;
-}
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
-
 constexpr const char* how_to_look = "check with lspci -nn -d 10b5:2497 (docs/rig-setup.md)";
+
+std::string ids_in(const fs::path& folder) {
+  return rig::formatted("0x%04x:0x%04x", number_in(folder / "vendor", 16), number_in(folder / "device", 16));
+}
+
+std::string ids_of_the_card() { return rig::formatted("0x%04x:0x%04x", vendor_id, device_id); }
+
+bool is_the_card(const fs::path& folder) { return ids_in(folder) == ids_of_the_card(); }
 
 std::string choose(const PciOptions& options) {
   const fs::path root(options.root);
@@ -61,16 +44,15 @@ std::string choose(const PciOptions& options) {
       refuse("no PCI device " + options.bdf + " in " + options.root + " (driver.pci.bdf); " + how_to_look);
     }
     if (!is_the_card(folder)) {
-      refuse("PCI device " + options.bdf + " (driver.pci.bdf) is " + hex(number_in(folder / "vendor").value_or(0)) +
-             ":" + hex(number_in(folder / "device").value_or(0)) + ", not the RT-DAC4/PCI " + hex(vendor_id) + ":" +
-             hex(device_id));
+      refuse("PCI device " + options.bdf + " (driver.pci.bdf) is " + ids_in(folder) + ", not the RT-DAC4/PCI " +
+             ids_of_the_card());
     }
     return options.bdf;
   }
   const std::vector<std::string> cards = find_cards(root);
   if (cards.empty()) {
-    refuse("no RT-DAC4/PCI card (driver.kind=pci, " + hex(vendor_id) + ":" + hex(device_id) + ") in " + options.root +
-           "; " + how_to_look + ". To run without the rig, use --backend sim");
+    refuse("no RT-DAC4/PCI card (driver.kind=pci, " + ids_of_the_card() + ") in " + options.root + "; " + how_to_look +
+           ". To run without the rig, use --backend sim");
   }
   if (cards.size() > 1) {
     refuse(std::to_string(cards.size()) + " cards in " + options.root + ": " + joined(cards) +
@@ -79,36 +61,46 @@ std::string choose(const PciOptions& options) {
   return cards.front();
 }
 
-void refuse_obstacles(const fs::path& folder, const std::vector<FoundBoard::Obstacle>& obstacles) {
+/// An access would reach something else than the card. A device that is not enabled may still take accesses: the
+/// kernel's `enable` counts users, and 0 does not switch the ports off.
+Obstacles port_obstacles(const fs::path& device) {
+  const BarInfo bar = read_bar2(device);
+  if (bar.bytes == 0 || (!bar.unset && !bar.disabled)) return {};
+  return {{std::string("its I/O ports (BAR 2) are ") + (bar.unset ? "not assigned" : "disabled") +
+               ": an access would reach other devices of this computer",
+           "shut down and put the card into another slot, or let the BIOS assign resources (\"PnP OS\" off); "
+           "lspci -vv shows region 2"}};
+}
+
+void refuse_obstacles(const fs::path& folder, const Obstacles& obstacles) {
   if (obstacles.empty()) return;
   const FoundBoard::Obstacle& first = obstacles.front();
   refuse("card " + folder.string() + ": " + first.what + "; nothing was written. " + first.fix);
 }
 
-}  // namespace
-
-void check_bar2(const fs::path& folder) {
-  const BarInfo bar = read_bar2(folder);
-  const std::string place = (folder / "resource").string() + ": BAR 2 ";
-  if (bar.bytes == 0) {
-    refuse(place + "is missing; the card must have one of " + std::to_string(window_bytes) + " bytes");
-  }
-  if (!bar.io_ports) {
-    refuse(place +
-           "is memory, not I/O ports: this is another card, or it has another board logic; nothing was written");
-  }
-  if (bar.bytes < window_bytes) {
-    refuse(place + "has " + std::to_string(bar.bytes) + " bytes; the register map needs " +
-           std::to_string(window_bytes) + ": this is another card, or it has another board logic; nothing was written");
-  }
-  // sysfs gives the file the size of the BAR, or the size 0, which tells nothing. Otherwise both sizes must agree.
-  std::error_code error;
-  const std::uintmax_t file_bytes = fs::file_size(folder / "resource2", error);
-  if (!error && file_bytes != 0 && file_bytes < window_bytes) {
-    refuse((folder / "resource2").string() + " has " + std::to_string(file_bytes) + " bytes; the register map needs " +
-           std::to_string(window_bytes) + "; nothing was written");
-  }
+Obstacles obstacles_or_error(const fs::path& device) try {
+  check_bar2(device);
+  return card_obstacles(device);
+} catch (const Unavailable& error) {
+  return {{error.what(), "compare with lspci -vv (docs/rig-setup.md)"}};
 }
+
+FoundBoard surveyed(const fs::path& device) {
+  const std::string file = (device / "resource2").string();
+  FoundBoard board{.what = "RT-DAC4/PCI at " + device.filename().string(),
+                   .selection = {"driver.pci.bdf=" + device.filename().string()},
+                   .files = {file},
+                   .obstacles = obstacles_or_error(device)};
+  if (!can_be_opened(file)) {
+    board.obstacles.push_back(
+        {"registers not accessible to this user", "sudo chgrp abs_hil " + file + " && sudo chmod g+rw " + file +
+                                                      "; for good: the udev rule of docs/rig-setup.md"});
+  }
+  if (board.obstacles.empty()) board.detail = "no kernel driver, enabled, registers accessible";
+  return board;
+}
+
+}  // namespace
 
 std::vector<std::string> find_cards(const fs::path& root) {
   std::error_code error;
@@ -146,14 +138,67 @@ BarInfo read_bar2(const fs::path& device_folder) {
           .disabled = (flags & ioresource_disabled) != 0};
 }
 
+void check_bar2(const fs::path& folder) {
+  const BarInfo bar = read_bar2(folder);
+  const std::string place = (folder / "resource").string() + ": BAR 2 ";
+  const std::string needed = std::to_string(window_bytes);
+  constexpr const char* other_card = "this is another card, or it has another board logic; nothing was written";
+  if (bar.bytes == 0) refuse(place + "is missing; the card must have one of " + needed + " bytes");
+  if (!bar.io_ports) refuse(place + "is memory, not I/O ports: " + other_card);
+  if (bar.bytes < window_bytes) {
+    refuse(place + "has " + std::to_string(bar.bytes) + " bytes; the register map needs " + needed + ": " + other_card);
+  }
+  // sysfs gives the file the size of the BAR, or the size 0, which tells nothing. Otherwise both sizes must agree.
+  std::error_code error;
+  const std::uintmax_t file_bytes = fs::file_size(folder / "resource2", error);
+  if (!error && file_bytes != 0 && file_bytes < window_bytes) {
+    refuse((folder / "resource2").string() + " has " + std::to_string(file_bytes) + " bytes; the register map needs " +
+           needed + "; nothing was written");
+  }
+}
+
+bool is_locked_down(const fs::path& devices) {
+  // ROOT/sys/bus/pci/devices -> ROOT/sys/kernel/security/lockdown, "none [integrity] confidentiality"
+  const std::string line = line_in((devices / "../../../kernel/security/lockdown").lexically_normal());
+  return line.find('[') != std::string::npos && line.find("[none]") == std::string::npos;
+}
+
+Obstacles card_obstacles(const fs::path& device) {
+  Obstacles found = port_obstacles(device);
+  if (number_in(device / "enable", 10) == 0) {
+    found.push_back({"not enabled", "echo 1 | sudo tee " + device.string() + "/enable"});
+  }
+  std::error_code none_bound;
+  const fs::path bound = fs::read_symlink(device / "driver", none_bound);
+  if (!none_bound) {
+    found.push_back({"owned by the kernel driver " + bound.filename().string(),
+                     "echo " + device.filename().string() + " | sudo tee " + device.string() + "/driver/unbind"});
+  }
+  if (is_locked_down(device.parent_path())) {
+    found.push_back({"the kernel is locked down (Secure Boot) and refuses every write to I/O ports",
+                     "switch Secure Boot off in the computer's firmware, or boot without lockdown=; cat "
+                     "/sys/kernel/security/lockdown shows it"});
+  }
+  return found;
+}
+
+std::vector<FoundBoard> survey_cards(const PciOptions& options) try {
+  std::vector<FoundBoard> boards;
+  for (const std::string& address : find_cards(options.root)) {
+    if (options.bdf.empty() || options.bdf == address) boards.push_back(surveyed(fs::path(options.root) / address));
+  }
+  return boards;
+} catch (const Unavailable&) {
+  return {};  // no folder of PCI devices
+}
+
 Card open_card(const PciOptions& options, bool lock_step) {
   const std::string bdf = choose(options);
   const fs::path folder = fs::path(options.root) / bdf;
   check_bar2(folder);
   refuse_obstacles(folder, card_obstacles(folder));
   std::error_code ignored;
-  const bool waits_for_lock_step = fs::exists(folder / emulated_time_file, ignored);
-  require_lock_step("the card in " + folder.string(), lock_step, waits_for_lock_step);
+  require_lock_step("the card in " + folder.string(), lock_step, fs::exists(folder / emulated_time_file, ignored));
   Card card{.window = std::make_unique<SysfsWindow>(folder / "resource2"),
             .place = bdf + " in " + options.root,
             .address = bdf};

@@ -1,3 +1,5 @@
+// Finds the RT-DAC4/PCI in sysfs and says what keeps a run from using it.
+
 #pragma once
 
 #include <cstdint>
@@ -6,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "driver/pci/options.hpp"
+#include "driver/pci/pci_backend.hpp"
 #include "driver/pci/register_window.hpp"
 
 namespace abs_hil::driver::pci {
@@ -36,14 +38,27 @@ struct BarInfo {
 /// Throws Unavailable unless BAR 2 has the kind and size of the card's.
 void check_bar2(const std::filesystem::path& device_folder);
 
-/// Finds the card that the options select. Checks its ids, what the kernel says against it (card_obstacles.hpp) and the
-/// kind and size of its BAR, then opens and locks it. Writes nothing. Throws Unavailable with cause and fix.
+/// What the kernel's files say against driving the card in this folder: its ports lead elsewhere or nowhere, another
+/// driver owns it, or the kernel takes no writes. Accesses no register. Empty if nothing does. Throws Unavailable if
+/// the table of regions cannot be read.
+[[nodiscard]] std::vector<FoundBoard::Obstacle> card_obstacles(const std::filesystem::path& device_folder);
+
+/// True if the kernel of this tree of files is locked down and refuses to write to I/O ports.
+[[nodiscard]] bool is_locked_down(const std::filesystem::path& devices_folder);
+
+/// The cards that the options do not exclude, with what keeps a run from using them. Accesses no register. Empty if
+/// there is no card, or no folder of PCI devices.
+[[nodiscard]] std::vector<FoundBoard> survey_cards(const PciOptions& options);
+
+/// Finds the card that the options select. Checks its ids, what the kernel says against it and the kind and size of its
+/// BAR, then opens and locks it. Writes nothing. Throws Unavailable with cause and fix.
 /// @param lock_step  advance the emulator's clock; refused without such a clock, as on all hardware. If false, an
 ///                   emulator in lock-step is refused
 [[nodiscard]] Card open_card(const PciOptions& options, bool lock_step);
 
-/// Opens the registers of the same card for a guardian. Finds and checks the card in the same way, but without the
-/// owner's lock. Throws Unavailable, also if another guardian still makes that card safe.
+/// Opens the registers of the same card for a guardian, without the owner's lock. Of the obstacles only those count
+/// that concern the ports: the others do not keep zeros from a card. Throws Unavailable, also if another guardian still
+/// makes that card safe.
 /// @param beside_guardian  go on even then: both write zeros only
 /// @param file  becomes the file of the registers as soon as the card is found; null: not asked for
 [[nodiscard]] std::unique_ptr<RegisterWindow> open_beside_owner(const PciOptions& options, bool beside_guardian = false,

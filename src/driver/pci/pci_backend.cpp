@@ -3,9 +3,7 @@
 #include <filesystem>
 
 #include "driver/monotonic_time.hpp"
-#include "driver/pci/card_survey.hpp"
 #include "driver/pci/discovery.hpp"
-#include "driver/pci/options.hpp"
 #include "driver/pci/pci_driver.hpp"
 #include "driver/pci/pci_safe_state.hpp"
 #include "driver/pwm.hpp"

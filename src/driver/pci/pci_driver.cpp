@@ -133,7 +133,7 @@ void PciDriver::take_over(Access& card) noexcept {
                                      (1U << static_cast<std::uint32_t>(options_.lower_channel)));
   card.write(reg::encoder_reset, 0);
   read_wheels(card);
-  for (const std::uint32_t offset : health_registers) read_health(card, offset);
+  for (std::size_t which = 0; which < health_registers.size(); ++which) read_health(card, which);
   note_settings(card);
 }
 
@@ -143,9 +143,9 @@ void PciDriver::do_activate(std::int64_t now_ns) {
   next_health_ = next_setting_ = 0;
   widths_sent_ = {};
   counts_ = {};
-  activated_ns_ = last_read_ns_ = now_ns;
+  last_read_ns_ = now_ns;
   IoResult result{};
-  if (card_.time) result = card_.time->now(emulated_ns_);
+  if (card_.time) result = card_.time->start(now_ns);
   if (result.ok()) {
     take_over(card);
     result = checked_for_absence(card);
@@ -170,12 +170,9 @@ void PciDriver::read_wheels(Access& card) noexcept {
   if (card.result().ok()) counts_ = {with_sign(upper, options_.upper_sign), with_sign(lower, options_.lower_sign)};
 }
 
-void PciDriver::read_health(Access& card, std::uint32_t offset) noexcept {
-  const std::uint32_t value = card.read(offset);
-  if (!card.result().ok()) return;
-  for (std::size_t i = 0; i < health_registers.size(); ++i) {
-    if (health_registers[i] == offset) health_[i] = value;
-  }
+void PciDriver::read_health(Access& card, std::size_t which) noexcept {
+  const std::uint32_t value = card.read(health_registers[which]);
+  if (card.result().ok()) health_[which] = value;
 }
 
 bool PciDriver::plausible(std::int64_t read_ns, const std::array<std::int32_t, 2>& before) const noexcept {
@@ -212,14 +209,14 @@ bool PciDriver::read_wheels_at(Access& card, std::int64_t& read_ns) noexcept {
 
 IoResult PciDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept {
   if (card_.time) {
-    const IoResult result = card_.time->advance_to(emulated_ns_ + now_ns - activated_ns_);
+    const IoResult result = card_.time->follow(now_ns);
     if (!result.ok()) return result;
   }
   const std::array<std::int32_t, 2> before = counts_;
   Access card(*card_.window);
   std::int64_t read_ns = now_ns;
   if (!read_wheels_at(card, read_ns)) static_cast<void>(read_wheels_at(card, read_ns));
-  read_health(card, health_registers[next_health_]);
+  read_health(card, next_health_);
   if (const IoResult result = checked_for_absence(card); !result.ok()) return result;
   if (!plausible(read_ns, before)) return {IoError::implausible_answer, reg::encoder_counter};
   next_health_ = (next_health_ + 1) % health_registers.size();
@@ -239,7 +236,8 @@ bool PciDriver::tripped_to_zero(Access& card, std::uint32_t width_read) noexcept
   if (width_read != 0) return false;
   // It is not known whether the width reads 0 while the FPGA holds the outputs off. If it does, the next measurement
   // must report the trip, and this is no register error.
-  read_health(card, reg::trip_flags);
+  static_assert(health_registers[0] == reg::trip_flags);
+  read_health(card, 0);
   return card.result().ok() && health_[0] != 0;
 }
 

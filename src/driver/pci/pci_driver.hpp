@@ -10,7 +10,7 @@
 
 #include "abs_hil/driver/rig_driver.hpp"
 #include "driver/pci/discovery.hpp"
-#include "driver/pci/options.hpp"
+#include "driver/pci/pci_backend.hpp"
 #include "driver/pci/register_map.hpp"
 #include "driver/pwm.hpp"
 
@@ -85,7 +85,7 @@ class PciDriver final : public RigDriver {
   void read_wheels(Access& card) noexcept;
   /// Reads both counters and sets their time stamp; false if that took too long.
   bool read_wheels_at(Access& card, std::int64_t& read_ns) noexcept;
-  void read_health(Access& card, std::uint32_t offset) noexcept;
+  void read_health(Access& card, std::size_t which) noexcept;
   /// Writes a width and reads it back.
   void set_pwm(Access& card, Pwm pwm, std::uint32_t width) noexcept;
   /// Looks whether the PWM still has the width sent last, and writes the next one. Returns the width that the output
@@ -108,8 +108,6 @@ class PciDriver final : public RigDriver {
   std::uint32_t version_{0};
   std::uint32_t channel_counts_{0};
 
-  std::int64_t activated_ns_{0};  ///< time of `activate`
-  std::int64_t emulated_ns_{0};   ///< the emulator's time at `activate`
   std::int64_t last_read_ns_{0};
   std::array<std::int32_t, 2> counts_{};  ///< upper, lower; with their signs
   std::array<std::uint32_t, health_registers.size()> health_{};

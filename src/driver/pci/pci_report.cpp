@@ -53,7 +53,7 @@ std::vector<std::string> PciDriver::inspection() {
     line += result.ok() ? formatted("0x%08x  %-12s", raw, converted(entry.offset, raw, period_ticks).c_str())
                         : formatted("%-24s", error_text(result).c_str());
     line += formatted("%-14s", std::string(name_of(entry.standing)).c_str());
-    line += std::string(name_of(entry.use));
+    line += std::string(entry.use);
     if (!entry.open.empty()) line += "; not known: " + std::string(entry.open);
     lines.push_back(std::move(line));
   }

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "driver/own_handle_writer.hpp"
-#include "driver/pci/options.hpp"
+#include "driver/pci/pci_backend.hpp"
 #include "driver/pci/register_map.hpp"
 #include "driver/pci/register_window.hpp"
 

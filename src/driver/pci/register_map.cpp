@@ -7,7 +7,14 @@ namespace abs_hil::driver::pci {
 namespace {
 
 using enum Standing;
-using enum Use;
+
+// What the driver does with a register.
+constexpr std::string_view never = "not used";
+constexpr std::string_view checked = "read once";
+constexpr std::string_view every_cycle = "every cycle";
+constexpr std::string_view in_turn = "in turn";
+constexpr std::string_view at_activation = "at activation";
+constexpr std::string_view kept_in_turn = "at activation, then in turn";
 
 constexpr std::string_view abs_only = "in the board's generic logic this is an ADC or DAC: check the bitstream first";
 constexpr std::string_view limit_open = "whether the host may write it; its power-on value";
@@ -17,12 +24,11 @@ constexpr std::array table{
              "the version word of the ABS logic"},
     Register{reg::channel_counts, "channel counts", "", "bits 15:12 counters, 11:8 timers", documented, in_turn},
     Register{reg::supply, "supply", "V", "92000 / raw; 0 = none", documented, in_turn},
-    Register{reg::dio_direction_low, "digital I/O direction, low half", "", "a bit each", documented, never,
+    Register{0x40, "digital I/O direction, low half", "", "a bit each", documented, never,
              "which lines the ABS logic uses"},
-    Register{reg::dio_direction_high, "digital I/O direction, high half", "", "a bit each", documented, never,
-             "as the low half"},
-    Register{reg::dio_value_low, "digital I/O value, low half", "", "a bit each", documented, never, "as direction"},
-    Register{reg::dio_value_high, "digital I/O value, high half", "", "a bit each", documented, never, "as direction"},
+    Register{0x44, "digital I/O direction, high half", "", "a bit each", documented, never, "as the low half"},
+    Register{0x48, "digital I/O value, low half", "", "a bit each", documented, never, "as direction"},
+    Register{0x4C, "digital I/O value, high half", "", "a bit each", documented, never, "as direction"},
     Register{reg::velocity_period, "velocity period", "s", "raw / 40 MHz", documented, in_turn, "its power-on value"},
     Register{reg::velocity_lower, "velocity of the lower wheel", "rad/s",
              "low 16 bits; 2 pi raw (40 MHz / velocity period) / 1024", documented, checked,
@@ -45,10 +51,10 @@ constexpr std::array table{
              every_cycle, "which direction is forward: the wiring decides"},
     Register{reg::start_resistors, "start resistors", "", "bit 0 R1, bit 1 R2", documented, at_activation,
              "whether the host should switch them"},
-    Register{reg::r1_low, "R1 low threshold", "", "", documented, never, "its unit"},
-    Register{reg::r1_high, "R1 high threshold", "", "", documented, never, "its unit"},
-    Register{reg::r2_low, "R2 low threshold", "", "", documented, never, "its unit"},
-    Register{reg::r2_high, "R2 high threshold", "", "", documented, never, abs_only},
+    Register{0x94, "R1 low threshold", "", "", documented, never, "its unit"},
+    Register{0x98, "R1 high threshold", "", "", documented, never, "its unit"},
+    Register{0x9C, "R2 low threshold", "", "", documented, never, "its unit"},
+    Register{0xA0, "R2 high threshold", "", "", documented, never, abs_only},
     Register{reg::supply_min, "least supply", "V", "92000 / raw", documented, in_turn, limit_open},
     Register{reg::temperature_max, "highest temperature", "deg C", "raw", documented, in_turn, limit_open},
     Register{reg::trip_flags, "trip flags", "", "bit 1 supply; bits 0 and 2 temperature and overspeed", documented,
@@ -60,18 +66,6 @@ constexpr std::array table{
 };
 
 }  // namespace
-
-std::string_view name_of(Use use) noexcept {
-  switch (use) {
-    case never: return "not used";
-    case checked: return "read once";
-    case every_cycle: return "every cycle";
-    case in_turn: return "in turn";
-    case at_activation: return "at activation";
-    case kept_in_turn: return "at activation, then in turn";
-  }
-  return "not used";
-}
 
 std::span<const Register> registers() noexcept { return table; }
 

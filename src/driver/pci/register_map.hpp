@@ -1,3 +1,5 @@
+// The registers of the RT-DAC4/PCI with ABS logic as one table, with their conversions and open questions.
+
 #pragma once
 
 #include <array>
@@ -6,7 +8,7 @@
 #include <span>
 #include <string_view>
 
-#include "abs_hil/driver/standing.hpp"
+#include "driver/board_kit.hpp"
 #include "driver/pwm.hpp"
 
 namespace abs_hil::driver::pci {
@@ -25,10 +27,6 @@ namespace reg {
 inline constexpr std::uint32_t bitstream_version = 0x00;
 inline constexpr std::uint32_t channel_counts = 0x04;
 inline constexpr std::uint32_t supply = 0x38;
-inline constexpr std::uint32_t dio_direction_low = 0x40;
-inline constexpr std::uint32_t dio_direction_high = 0x44;
-inline constexpr std::uint32_t dio_value_low = 0x48;
-inline constexpr std::uint32_t dio_value_high = 0x4C;
 inline constexpr std::uint32_t velocity_period = 0x50;
 inline constexpr std::uint32_t velocity_lower = 0x54;
 inline constexpr std::uint32_t velocity_upper = 0x58;
@@ -41,10 +39,6 @@ inline constexpr std::uint32_t encoder_index = 0x80;
 inline constexpr std::uint32_t encoder_reset = 0x84;
 inline constexpr std::uint32_t encoder_counter = 0x88;
 inline constexpr std::uint32_t start_resistors = 0x90;
-inline constexpr std::uint32_t r1_low = 0x94;
-inline constexpr std::uint32_t r1_high = 0x98;
-inline constexpr std::uint32_t r2_low = 0x9C;
-inline constexpr std::uint32_t r2_high = 0xA0;
 inline constexpr std::uint32_t supply_min = 0xA4;
 inline constexpr std::uint32_t temperature_max = 0xA8;
 inline constexpr std::uint32_t trip_flags = 0xAC;
@@ -55,25 +49,14 @@ inline constexpr std::uint32_t temperature_low = 0xB8;
 using driver::name_of;
 using driver::Standing;
 
-/// What this driver does with a register.
-enum class Use : std::uint8_t {
-  never,          ///< not used; listed for completeness
-  checked,        ///< read once, in `configure`
-  every_cycle,    ///< read or written in every cycle
-  in_turn,        ///< each cycle reads one of these, in turn
-  at_activation,  ///< written and verified when the outputs are taken over
-  kept_in_turn    ///< the same, and read in turn from then on
-};
-[[nodiscard]] std::string_view name_of(Use use) noexcept;
-
 struct Register {
   std::uint32_t offset;
   std::string_view name;
   std::string_view unit;     ///< unit of the converted value; empty for numbers and bits
   std::string_view meaning;  ///< bits, conversion
   Standing standing;         ///< how well offset and meaning are known
-  Use use;
-  std::string_view open{};  ///< open questions about it, if any
+  std::string_view use;      ///< what this driver does with it
+  std::string_view open{};   ///< open questions about it, if any
 };
 /// Every register of the ABS logic, in order of offset, from the maker's driver sources. `open` has the contradictions
 /// of these sources.

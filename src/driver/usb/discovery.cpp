@@ -1,37 +1,22 @@
 #include "driver/usb/discovery.hpp"
 
+#include <linux/usb/ch9.h>
+
 #include <algorithm>
-#include <array>
-#include <cstdio>
-#include <cstdlib>
-#include <fstream>
+#include <cstddef>
 #include <system_error>
 
 #include "abs_hil/driver/io_result.hpp"
 #include "driver/board_kit.hpp"
+#include "driver/sysfs.hpp"
+#include "driver/usb/urb_link.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::usb {
 
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string line_in(const fs::path& file) {
-  std::ifstream in(file);
-  std::string line;
-  std::getline(in, line);
-  return line;
-}
-
-std::uint32_t number_in(const fs::path& file, int base) {
-  return static_cast<std::uint32_t>(std::strtoul(line_in(file).c_str(), nullptr, base));
-}
-
-std::string hex(std::uint32_t value) {
-  std::array<char, 16> text{};
-  std::snprintf(text.data(), text.size(), "%04x", value);
-  return text.data();
-}
 
 bool fits(std::int32_t wanted, std::uint32_t is) { return wanted < 0 || static_cast<std::uint32_t>(wanted) == is; }
 
@@ -42,9 +27,8 @@ bool fits(const UsbOptions& o, const UsbDevice& d) {
 }
 
 UsbDevice device_in(const fs::path& folder, const fs::path& device_root) {
-  std::array<char, 16> node{};
-  std::snprintf(node.data(), node.size(), "%03u/%03u", number_in(folder / "busnum", 10) % 1000,
-                number_in(folder / "devnum", 10) % 1000);
+  const std::string node =
+      rig::formatted("%03u/%03u", number_in(folder / "busnum", 10), number_in(folder / "devnum", 10));
   constexpr int hexadecimal = 16;
   return {.address = folder.filename().string(),
           .vendor_id = number_in(folder / "idVendor", hexadecimal),
@@ -53,12 +37,12 @@ UsbDevice device_in(const fs::path& folder, const fs::path& device_root) {
           .product = line_in(folder / "product"),
           .serial = line_in(folder / "serial"),
           .configuration = number_in(folder / "bConfigurationValue", 10),
-          .node = device_root / node.data()};
+          .node = device_root / node};
 }
 
 std::string wanted_text(const UsbOptions& o) {
   const auto id = [](std::int32_t value) {
-    return value < 0 ? std::string("any") : hex(static_cast<std::uint32_t>(value));
+    return value < 0 ? std::string("any") : rig::formatted("%04x", static_cast<std::uint32_t>(value));
   };
   return "driver.usb.manufacturer=\"" + o.manufacturer + "\", ids " + id(o.vendor_id) + ":" + id(o.product_id) +
          (o.serial.empty() ? "" : ", serial " + o.serial);
@@ -67,7 +51,8 @@ std::string wanted_text(const UsbOptions& o) {
 }  // namespace
 
 std::string UsbDevice::text() const {
-  return hex(vendor_id) + ":" + hex(product_id) + (serial.empty() ? "" : " serial " + serial) + " at " + address;
+  return rig::formatted("%04x:%04x", vendor_id, product_id) + (serial.empty() ? "" : " serial " + serial) + " at " +
+         address;
 }
 
 std::vector<UsbDevice> find_boards(const UsbOptions& options) {
@@ -89,9 +74,9 @@ UsbDevice choose_board(const UsbOptions& options, bool lock_step, bool emulated)
            "; check with lsusb (docs/usb.md). To run without the rig, use --backend sim");
   }
   if (boards.size() > 1) {
-    std::string all;
-    for (const UsbDevice& board : boards) all += (all.empty() ? "" : ", ") + board.text();
-    refuse(std::to_string(boards.size()) + " boards: " + all +
+    std::vector<std::string> all;
+    for (const UsbDevice& board : boards) all.push_back(board.text());
+    refuse(std::to_string(boards.size()) + " boards: " + joined(all) +
            "; choose one with --set driver.usb.serial=" + boards.front().serial);
   }
   const UsbDevice& board = boards.front();
@@ -105,8 +90,56 @@ UsbDevice choose_board(const UsbOptions& options, bool lock_step, bool emulated)
 }
 
 std::string udev_rule(const UsbDevice& device) {
-  return R"(SUBSYSTEM=="usb", ENV{DEVTYPE}=="usb_device", ATTR{idVendor}==")" + hex(device.vendor_id) +
-         R"(", ATTR{idProduct}==")" + hex(device.product_id) + R"(", GROUP="abs_hil", MODE="0660")";
+  return rig::formatted(
+      R"(SUBSYSTEM=="usb", ENV{DEVTYPE}=="usb_device", ATTR{idVendor}=="%04x", ATTR{idProduct}=="%04x", )"
+      R"(GROUP="abs_hil", MODE="0660")",
+      device.vendor_id, device.product_id);
+}
+
+namespace {
+
+// Bytes of the descriptors (USB 2.0, section 9.6). The first two of each are its length and its type.
+constexpr std::size_t configuration_value = 5;
+constexpr std::size_t interface_number = 2;
+constexpr std::size_t interface_alternate = 3;
+constexpr std::size_t endpoint_address = 2;
+constexpr std::size_t endpoint_attributes = 3;
+
+constexpr unsigned out_found = 1;
+constexpr unsigned in_found = 2;
+
+/// Which of the FPGA's endpoints this is; 0: neither.
+unsigned which(std::span<const std::uint8_t> endpoint) noexcept {
+  if ((endpoint[endpoint_attributes] & USB_ENDPOINT_XFERTYPE_MASK) != USB_ENDPOINT_XFER_BULK) return 0;
+  if (endpoint[endpoint_address] == endpoint_out) return out_found;
+  return endpoint[endpoint_address] == endpoint_in ? in_found : 0;
+}
+
+}  // namespace
+
+std::optional<InterfaceSetting> find_interface(std::span<const std::uint8_t> descriptors,
+                                               std::uint32_t configuration) noexcept {
+  bool active = false;
+  std::optional<InterfaceSetting> setting;  // of the active configuration; the one whose endpoints follow
+  unsigned found = 0;
+  while (descriptors.size() >= 2) {
+    const std::size_t length = descriptors[0];
+    if (length < 2 || length > descriptors.size()) return {};
+    const auto one = descriptors.first(length);
+    descriptors = descriptors.subspan(length);
+    const std::uint8_t type = one[1];
+    if (type == USB_DT_CONFIG && length >= USB_DT_CONFIG_SIZE) {
+      active = one[configuration_value] == configuration;
+      setting.reset();
+    } else if (type == USB_DT_INTERFACE && length >= USB_DT_INTERFACE_SIZE && active) {
+      setting = {.interface = one[interface_number], .alternate = one[interface_alternate]};
+      found = 0;
+    } else if (type == USB_DT_ENDPOINT && length >= USB_DT_ENDPOINT_SIZE && setting) {
+      found |= which(one);
+      if (found == (out_found | in_found)) return setting;
+    }
+  }
+  return {};
 }
 
 }  // namespace abs_hil::driver::usb

@@ -1,11 +1,15 @@
+// Finds the RT-DAC/USB2 in sysfs, and the interface of it that has the endpoints.
+
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "driver/usb/options.hpp"
+#include "driver/usb/usb_backend.hpp"
 
 namespace abs_hil::driver::usb {
 
@@ -41,5 +45,20 @@ inline constexpr const char* lock_step_mark = "emulator in lock-step";
 
 /// Line for /etc/udev/rules.d that gives the group abs_hil access to the device.
 [[nodiscard]] std::string udev_rule(const UsbDevice& device);
+
+/// An interface, and the alternate setting of it.
+struct InterfaceSetting {
+  std::uint8_t interface {
+    0
+  };
+  std::uint8_t alternate{0};
+};
+
+/// Finds the first interface and alternate setting with both bulk endpoints of the FPGA.
+/// @param descriptors   what a device node reads: the device's descriptor, then those of its configurations. Any bytes
+///                      are allowed; what is cut short counts as missing
+/// @param configuration the active one (bConfigurationValue)
+[[nodiscard]] std::optional<InterfaceSetting> find_interface(std::span<const std::uint8_t> descriptors,
+                                                             std::uint32_t configuration) noexcept;
 
 }  // namespace abs_hil::driver::usb

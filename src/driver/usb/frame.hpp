@@ -1,3 +1,5 @@
+// The frames of the RT-DAC/USB2 as one table of words, and the words that hold the outputs.
+
 #pragma once
 
 #include <array>
@@ -7,8 +9,8 @@
 #include <string_view>
 
 #include "abs_hil/driver/io_result.hpp"
-#include "abs_hil/driver/standing.hpp"
-#include "driver/usb/options.hpp"
+#include "driver/board_kit.hpp"
+#include "driver/usb/usb_backend.hpp"
 
 namespace abs_hil::driver::usb {
 
@@ -115,5 +117,19 @@ struct Contents {
 /// Initial frame to the board: the mark, and every kept word with the board's value.
 /// @param shown a frame from the board
 [[nodiscard]] Frame frame_from(std::span<const std::uint8_t, frame_bytes> shown) noexcept;
+
+/// The words of a frame that hold the outputs of drive, brake and enable line.
+struct OutputWords {
+  PwmWords drive{};
+  PwmWords brake{};
+  std::uint16_t digital{0};  ///< all output lines; 0 without an enable line
+};
+
+/// Puts widths and enable line into a frame to the board, and returns these words. Real-time safe.
+OutputWords put_outputs(Frame& frame, const UsbOptions& options, std::uint32_t drive_width, std::uint32_t brake_width,
+                        bool enable) noexcept;
+
+/// True if a frame from the board shows these words.
+[[nodiscard]] bool shows(const Contents& contents, const OutputWords& words, const UsbOptions& options) noexcept;
 
 }  // namespace abs_hil::driver::usb

@@ -9,7 +9,6 @@
 #include "driver/own_handle_writer.hpp"
 #include "driver/pwm.hpp"
 #include "driver/usb/discovery.hpp"
-#include "driver/usb/options.hpp"
 #include "driver/usb/urb_link.hpp"
 #include "driver/usb/usb_driver.hpp"
 #include "driver/usb/usb_safe_state.hpp"

@@ -1,3 +1,5 @@
+// Texts about the board.
+
 #include "driver/usb/usb_driver.hpp"
 
 #include <algorithm>
@@ -6,6 +8,7 @@
 
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/board_kit.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::usb {
 
@@ -58,9 +61,8 @@ void UsbDriver::do_configure() {
     board_ = {};
     throw Unavailable(text);
   };
-  IoResult result = board_.link->request();
   std::span<const std::uint8_t> bytes;
-  if (result.ok()) result = board_.link->receive(patient_ns, bytes);
+  const IoResult result = fresh_answer(*board_.link, patient_ns, bytes);
   if (!result.ok()) refuse("its first frame did not come: " + error_text(result));
   Contents contents;
   if (decode(bytes, options_, contents) != IoError::none) {
@@ -131,9 +133,8 @@ void UsbDriver::do_activate(std::int64_t now_ns) {
   frames_lost_ = 0;
   lost_this_cycle_ = false;
   command_sent_ = {};
-  activated_ns_ = now_ns;
   IoResult result{};
-  if (board_.time) result = board_.time->now(emulated_ns_);
+  if (board_.time) result = board_.time->start(now_ns);
   if (result.ok()) result = take_over(zero_);
   if (!result.ok()) {
     static_cast<void>(do_make_safe());
@@ -178,7 +179,7 @@ IoResult UsbDriver::failed(const IoResult& result) noexcept {
 IoResult UsbDriver::do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept {
   lost_this_cycle_ = false;
   if (board_.time) {
-    const IoResult result = board_.time->advance_to(emulated_ns_ + now_ns - activated_ns_);
+    const IoResult result = board_.time->follow(now_ns);
     if (!result.ok()) return with_reason(result);
   }
   Contents contents;
@@ -243,6 +244,66 @@ IoResult UsbDriver::do_make_safe() noexcept {
   if (result.ok() || result.error == IoError::disconnected) return with_reason(result);
   board_.link->recover();
   return with_reason(send_safe());
+}
+
+namespace {
+
+using rig::formatted;
+
+std::string text_of(std::string_view view) { return std::string(view); }
+
+}  // namespace
+
+std::vector<std::string> UsbDriver::notes() const {
+  if (!board_.link) return {};
+  std::vector<std::string> notes;
+  notes.push_back("USB board " + board_.place + ": opened and claimed");
+  notes.push_back(formatted("version word 0x%04x (%s), channel counts %04x %04x %04x", identity_[word::version],
+                            options_.version >= 0 ? "as configured" : "not compared: driver.usb.version is not set",
+                            identity_[word::channel_counts], identity_[word::channel_counts + 1],
+                            identity_[word::channel_counts + 2]));
+  const auto prescaler = static_cast<std::uint32_t>(options_.pwm_prescaler);
+  notes.push_back(formatted(
+      "PWM %d drive, %d brake, %s, prescaler %u: %.4g Hz if its clock is that of the PCI board; drive duty at "
+      "most %.3g, brake duty at most %.3g",
+      options_.drive_pwm, options_.brake_pwm, options_.pwm_mode.c_str(), prescaler, pwm_frequency_Hz(mode_, prescaler),
+      options_.motor_duty_max, options_.brake_duty_max));
+  notes.push_back(options_.verify_outputs
+                      ? "every frame must show the PWM words that were sent"
+                      : "the driver does not check the PWM words in the frames (driver.usb.verify_outputs=false): the "
+                        "safe state is sent and accepted, but not verified");
+  notes.push_back(
+      formatted("a cycle waits at most %d us for its frame; supply, temperature and interlocks are not known",
+                options_.answer_timeout_us));
+  notes.emplace_back(
+      "the board has no known watchdog: if this program dies or the cable is unplugged, the PWMs are assumed to hold "
+      "their duties: press the E-stop");
+  return notes;
+}
+
+std::vector<std::string> UsbDriver::tally() const {
+  return {formatted("USB board: %llu cycles without their frame", static_cast<unsigned long long>(frames_lost_))};
+}
+
+std::vector<std::string> UsbDriver::inspection() {
+  if (!board_.link) return {};
+  std::span<const std::uint8_t> bytes;
+  const IoResult result = fresh_answer(*board_.link, patient_ns, bytes);
+  if (!result.ok()) return {"no frame: " + error_text(result)};
+  std::vector<std::string> lines;
+  for (const WordGroup& group : words()) {
+    if (group.name == "-") continue;
+    std::string line = formatted("%3zu  %-21s", group.first, text_of(group.name).c_str());
+    constexpr std::size_t most_shown = 16;
+    for (std::size_t i = 0; i < group.count && i < most_shown; ++i) {
+      line += formatted("%04x ", word_at(bytes, group.first + i));
+    }
+    if (group.count > most_shown) line += "... ";
+    line += formatted(" %s, %s", text_of(name_of(group.standing)).c_str(), text_of(name_of(group.use)).c_str());
+    if (!group.open.empty()) line += "; not known: " + text_of(group.open);
+    lines.push_back(std::move(line));
+  }
+  return lines;
 }
 
 }  // namespace abs_hil::driver::usb

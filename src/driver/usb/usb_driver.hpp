@@ -11,9 +11,8 @@
 #include "driver/loss_bucket.hpp"
 #include "driver/pwm.hpp"
 #include "driver/usb/frame.hpp"
-#include "driver/usb/frame_link.hpp"
-#include "driver/usb/options.hpp"
-#include "driver/usb/outputs.hpp"
+#include "driver/usb/urb_link.hpp"
+#include "driver/usb/usb_backend.hpp"
 
 namespace abs_hil::driver::usb {
 
@@ -93,9 +92,7 @@ class UsbDriver final : public RigDriver {
   OutputWords sent_{};           ///< what the board's frames must show
   rig::Command command_sent_{};  ///< the command of the frame sent last
 
-  std::int64_t activated_ns_{0};  ///< time of `activate`
-  std::int64_t emulated_ns_{0};   ///< the emulator's time at `activate`
-  Contents zero_{};               ///< the counters at `activate`
+  Contents zero_{};  ///< the counters at `activate`
   rig::Measurement last_{};
   LossBucket bucket_{2, 1, 10};  ///< trips at the fifth loss in a row
   bool lost_this_cycle_{false};

@@ -53,13 +53,8 @@ IoResult UsbSafeState::send_zeros() noexcept {
 
 IoResult UsbSafeState::verify(std::int64_t timeout_ns) noexcept {
   if (!options_.verify_outputs) return {};
-  // An answer that was asked for before the zeros shows the outputs of that moment.
   std::span<const std::uint8_t> bytes;
-  if (handle_.link->answer_outstanding()) {
-    if (const IoResult late = handle_.link->receive(timeout_ns, bytes); !late.ok()) return late;
-  }
-  if (const IoResult asked = handle_.link->request(); !asked.ok()) return asked;
-  if (const IoResult came = handle_.link->receive(timeout_ns, bytes); !came.ok()) return came;
+  if (const IoResult came = fresh_answer(*handle_.link, timeout_ns, bytes); !came.ok()) return came;
   Contents contents;
   if (const IoError error = decode(bytes, options_, contents); error != IoError::none) return {error, endpoint_in};
   return shows(contents, zeros_, options_) ? IoResult{} : IoResult{IoError::read_back_mismatch, endpoint_in};

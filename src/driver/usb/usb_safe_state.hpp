@@ -3,9 +3,9 @@
 #include <utility>
 
 #include "driver/own_handle_writer.hpp"
-#include "driver/usb/frame_link.hpp"
-#include "driver/usb/options.hpp"
-#include "driver/usb/outputs.hpp"
+#include "driver/usb/frame.hpp"
+#include "driver/usb/urb_link.hpp"
+#include "driver/usb/usb_backend.hpp"
 
 namespace abs_hil::driver::usb {
 

@@ -7,11 +7,11 @@ using namespace abs_hil::driver::can;
 
 namespace {
 
-EncodersMessage encoders(unsigned sequence) {
-  return {.upper_counts = 1, .lower_counts = 2, .sequence = static_cast<std::uint8_t>(sequence)};
+Anomaly take_encoders(AnswerTracker& tracker, unsigned sequence) {
+  return tracker.take(id::encoders, {.upper_counts = 1, .lower_counts = 2, .sequence = sequence % 256});
 }
-LatchMessage latch(unsigned sequence) {
-  return {.node_time_us = 3, .state = NodeState::active, .sequence = static_cast<std::uint8_t>(sequence)};
+Anomaly take_latch(AnswerTracker& tracker, unsigned sequence) {
+  return tracker.take(id::latch, {.node_state = 1, .node_time_us = 3, .sequence = sequence % 256});
 }
 
 }  // namespace
@@ -22,13 +22,13 @@ TEST_CASE("An answer is complete with both its frames, and sequences wrap") {
   for (unsigned cycle = 254; cycle < 600; ++cycle) {
     tracker.expect(static_cast<std::uint8_t>(cycle));
     CHECK_FALSE(tracker.complete());
-    CHECK(tracker.take(encoders(cycle)) == Anomaly::none);
+    CHECK(take_encoders(tracker, cycle) == Anomaly::none);
     CHECK_FALSE(tracker.complete());
-    CHECK(tracker.take(latch(cycle)) == Anomaly::none);
+    CHECK(take_latch(tracker, cycle) == Anomaly::none);
     REQUIRE(tracker.complete());
     CHECK(tracker.last_sequence() == static_cast<std::uint8_t>(cycle));
-    CHECK(tracker.answer().upper_counts == 1);
-    CHECK(tracker.answer().node_time_us == 3);
+    CHECK(tracker.answer().values.upper_counts == 1);
+    CHECK(tracker.answer().values.node_time_us == 3);
   }
 }
 
@@ -36,28 +36,28 @@ TEST_CASE("The tracker tells apart the kinds of frames that do not belong to the
   AnswerTracker tracker;
   tracker.reset(9);
   tracker.expect(10);
-  CHECK(tracker.take(encoders(10)) == Anomaly::none);
-  CHECK(tracker.take(encoders(10)) == Anomaly::duplicate);
-  CHECK(tracker.take(latch(11)) == Anomaly::out_of_order);
-  CHECK(tracker.take(latch(9)) == Anomaly::stale);  // 9 was never answered
+  CHECK(take_encoders(tracker, 10) == Anomaly::none);
+  CHECK(take_encoders(tracker, 10) == Anomaly::duplicate);
+  CHECK(take_latch(tracker, 11) == Anomaly::out_of_order);
+  CHECK(take_latch(tracker, 9) == Anomaly::stale);  // 9 was never answered
   CHECK_FALSE(tracker.complete());
-  CHECK(tracker.take(latch(10)) == Anomaly::none);
-  CHECK(tracker.take(latch(10)) == Anomaly::duplicate);
+  CHECK(take_latch(tracker, 10) == Anomaly::none);
+  CHECK(take_latch(tracker, 10) == Anomaly::duplicate);
 
   tracker.expect(11);
-  CHECK(tracker.take(encoders(10)) == Anomaly::duplicate);  // 10 was answered already
-  CHECK(tracker.take(encoders(8)) == Anomaly::stale);
-  CHECK(tracker.take(latch(11)) == Anomaly::none);
-  CHECK(tracker.take(encoders(11)) == Anomaly::out_of_order);  // the latch comes last
+  CHECK(take_encoders(tracker, 10) == Anomaly::duplicate);  // 10 was answered already
+  CHECK(take_encoders(tracker, 8) == Anomaly::stale);
+  CHECK(take_latch(tracker, 11) == Anomaly::none);
+  CHECK(take_encoders(tracker, 11) == Anomaly::out_of_order);  // the latch comes last
   CHECK(tracker.complete());
 
   tracker.expect(12);  // lost
   tracker.expect(13);
-  CHECK(tracker.take(latch(12)) == Anomaly::stale);
-  CHECK(tracker.take(MeasurementMessage{.sequence = 13}) == Anomaly::none);
+  CHECK(take_latch(tracker, 12) == Anomaly::stale);
+  CHECK(tracker.take(id::measurement, {.sequence = 13}) == Anomaly::none);
   CHECK(tracker.complete());
   CHECK(tracker.answer().count_bits == 32);
-  CHECK(tracker.take(MeasurementMessage{.sequence = 13}) == Anomaly::duplicate);
+  CHECK(tracker.take(id::measurement, {.sequence = 13}) == Anomaly::duplicate);
 }
 
 TEST_CASE("The bucket tolerates single losses, trips at sustained loss, and latches") {

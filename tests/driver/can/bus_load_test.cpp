@@ -1,8 +1,7 @@
-#include "driver/can/bus_load.hpp"
-
 #include <vector>
 
 #include "catch.hpp"
+#include "driver/can/protocol.hpp"
 
 using namespace abs_hil::driver::can;
 using Catch::Matchers::WithinRel;

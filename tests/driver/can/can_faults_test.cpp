@@ -3,7 +3,7 @@
 #include <linux/can/error.h>
 
 #include "catch.hpp"
-#include "driver/can/signal_codec.hpp"
+#include "driver/can/protocol.hpp"
 #include "node_on_socket.hpp"
 
 using namespace abs_hil;
@@ -207,9 +207,9 @@ TEST_CASE("Commands computed from old measurements do not feed the watchdog") {
 TEST_CASE("Another sender's command ends the run in the next cycle, a question for the identity does not") {
   for (const bool fd : {false, true}) {
     for (const driver::can::Frame& frame :
-         {driver::can::command_frame({.duties = {.drive = 5000}, .drive_enable = true}),
-          driver::can::control_frame({.request = driver::can::Request::activate}),
-          driver::can::control_frame({.request = driver::can::Request::deactivate})}) {
+         {driver::can::frame_of(driver::can::id::command, {.drive_duty = 5000, .drive_enable = 1}),
+          driver::can::control_frame(driver::can::Request::activate),
+          driver::can::control_frame(driver::can::Request::deactivate)}) {
       Active run(fd);
       run.node.send_as_other(frame);
       const driver::IoResult result = run.until_failure(5);
@@ -220,7 +220,7 @@ TEST_CASE("Another sender's command ends the run in the next cycle, a question f
       CHECK(run.node.wire().brake_duty == 0.0);
     }
     Active asked(fd);
-    asked.node.send_as_other(driver::can::control_frame({.request = driver::can::Request::identify}));
+    asked.node.send_as_other(driver::can::control_frame(driver::can::Request::identify));
     CHECK(asked.until_failure(40).ok());
   }
 }
@@ -233,8 +233,8 @@ TEST_CASE("Commands of another sender that only the node hears are found by the 
     for (; result.ok() && cycles < 20; ++cycles) {
       // It is ahead of this program's sequence, so that the node takes its commands and refuses the others.
       const auto ahead = static_cast<std::uint8_t>(20 + cycles + 8);
-      run.node.send_to_node(driver::can::command_frame(
-          {.duties = {.brake = 5000}, .heartbeat = static_cast<std::uint8_t>(20 + cycles), .sequence = ahead}));
+      run.node.send_to_node(driver::can::frame_of(driver::can::id::command,
+                                                  {.brake_duty = 5000, .heartbeat = 20 + cycles, .sequence = ahead}));
       result = run.cycle();
     }
     CAPTURE(fd, cycles);

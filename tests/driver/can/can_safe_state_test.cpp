@@ -84,7 +84,7 @@ TEST_CASE("A look at an inactive node commands nothing; an active one is somethi
   REQUIRE(writer.make_safe().ok());
   CHECK(writer.verify_safe().ok());
   // A command that the inactive node refuses still shows that somebody sends them.
-  node.send_as_other(can::command_frame({.duties = {.drive = 5000}, .drive_enable = true}));
+  node.send_as_other(can::frame_of(can::id::command, {.drive_duty = 5000, .drive_enable = 1}));
   CHECK(writer.verify_safe().error == IoError::foreign_writer);
   node.fault("silent");
   CHECK(writer.verify_safe().error == IoError::no_answer);

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <random>
 
-#include "driver/can/signal_codec.hpp"
+#include "driver/can/protocol.hpp"
 
 using namespace abs_hil::driver::can;
 
@@ -14,8 +14,8 @@ int main() {
     for (int example = 0; example < 50; ++example) {
       Frame frame{.id = message.id, .length = message.bytes, .fd = message.fd_only};
       for (const Signal& signal : message.signals) {
-        const std::int64_t least = nearest_raw(signal, signal.least);
-        const std::int64_t most = nearest_raw(signal, signal.most);
+        const std::int64_t least = least_raw(signal);
+        const std::int64_t most = most_raw(signal);
         // The ends of the range first.
         const auto offset = static_cast<std::int64_t>(random() % (static_cast<std::uint64_t>(most - least) + 1));
         set_raw_value(frame, signal, example == 0 ? least : example == 1 ? most : least + offset);

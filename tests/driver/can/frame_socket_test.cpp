@@ -1,5 +1,3 @@
-#include "driver/can/frame_socket.hpp"
-
 #include <linux/can.h>
 #include <linux/can/error.h>
 #include <sys/socket.h>
@@ -9,7 +7,7 @@
 #include <utility>
 
 #include "catch.hpp"
-#include "driver/can/error_frame.hpp"
+#include "driver/can/bus.hpp"
 #include "driver/monotonic_time.hpp"
 
 using namespace abs_hil::driver::can;

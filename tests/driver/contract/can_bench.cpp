@@ -29,8 +29,8 @@ class CanBench final : public Bench {
     return true;
   }
   bool write_as_other(double drive_duty) override {
-    node_.send_as_other(driver::can::command_frame(
-        {.duties = {.drive = static_cast<std::uint16_t>(drive_duty * 10'000.0)}, .drive_enable = true}));
+    node_.send_as_other(driver::can::frame_of(
+        driver::can::id::command, {.drive_duty = static_cast<std::int64_t>(drive_duty * 10'000.0), .drive_enable = 1}));
     return true;
   }
   // OUTPUTS comes with every tenth answer; within an FD frame with each.

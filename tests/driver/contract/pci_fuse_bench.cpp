@@ -15,7 +15,7 @@
 
 #include "bench.hpp"
 #include "driver/factory.hpp"
-#include "driver/pci/options.hpp"
+#include "driver/pci/pci_backend.hpp"
 
 namespace abs_hil::test {
 

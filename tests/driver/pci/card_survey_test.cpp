@@ -1,7 +1,6 @@
-#include "driver/pci/card_survey.hpp"
-
 #include "catch.hpp"
 #include "diagnosis/fake_system.hpp"
+#include "driver/pci/discovery.hpp"
 
 using namespace abs_hil::driver;
 using namespace abs_hil::driver::pci;

@@ -11,7 +11,7 @@
 
 #include "abs_hil/driver/io_result.hpp"
 #include "catch.hpp"
-#include "driver/pci/sysfs_window.hpp"
+#include "driver/pci/register_window.hpp"
 #include "temporary_folder.hpp"
 
 using namespace abs_hil::driver;

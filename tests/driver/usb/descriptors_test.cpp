@@ -1,9 +1,8 @@
 // Finding the FPGA's interface among a device's descriptors, whole and broken ones.
 
-#include "driver/usb/descriptors.hpp"
-
 #include "catch.hpp"
-#include "driver/usb/frame_link.hpp"
+#include "driver/usb/discovery.hpp"
+#include "driver/usb/urb_link.hpp"
 #include "usbfs_stand_in.hpp"
 
 using namespace abs_hil::driver::usb;

@@ -4,7 +4,6 @@
 
 #include "catch.hpp"
 #include "diagnosis/fake_system.hpp"
-#include "driver/usb/options.hpp"
 
 using namespace abs_hil::driver;
 using namespace abs_hil::driver::usb;

@@ -8,7 +8,7 @@
 #include <functional>
 #include <vector>
 
-#include "driver/usb/usbfs.hpp"
+#include "driver/usb/urb_link.hpp"
 
 namespace abs_hil::test {
 

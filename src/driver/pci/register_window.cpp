@@ -1,4 +1,4 @@
-#include "driver/pci/sysfs_window.hpp"
+#include "driver/pci/register_window.hpp"
 
 #include <fcntl.h>
 #include <sys/file.h>

@@ -1,0 +1,109 @@
+#include "control.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+namespace abs_hil::program {
+
+void say(const std::string& text) {
+  fmt::print("{}\n", text);
+  std::fflush(stdout);
+}
+
+ControlCommand::ControlCommand(std::string_view line) : line_(line) {
+  std::string word;
+  for (const char c : line_ + ' ') {
+    if (c != ' ' && c != '\t' && c != '\r') {
+      word += c;
+    } else if (!word.empty()) {
+      words_.push_back(std::exchange(word, {}));
+    }
+  }
+}
+
+bool ControlCommand::is(std::string_view name, std::size_t arguments) const {
+  return words_.size() == arguments + 1 && words_[0] == name;
+}
+
+double ControlCommand::number(std::size_t n) const {
+  const std::string& word = text(n);
+  double value = 0.0;
+  const auto [at, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (error != std::errc() || at != word.data() + word.size()) {
+    throw std::invalid_argument("\"" + word + "\" is not a number");
+  }
+  return value;
+}
+
+bool ControlCommand::first_of(std::size_t n, std::string_view first, std::string_view second) const {
+  const std::string& word = text(n);
+  if (word == first || word == second) return word == first;
+  throw std::invalid_argument(fmt::format("\"{}\": give {} or {}", word, first, second));
+}
+
+void ControlCommand::refuse(const std::string& known) const {
+  throw std::invalid_argument("unknown command \"" + line_ + "\"; known are\n" + known);
+}
+
+ControlFifo::ControlFifo(const std::string& path) {
+  if (path.empty()) return;
+  if (::mkfifo(path.c_str(), 0600) != 0 && errno != EEXIST) {
+    throw std::runtime_error(path + ": cannot create the FIFO: " + std::strerror(errno));
+  }
+  // Open it for writing, too: otherwise it reports end of file whenever it has no writer.
+  fifo_ = driver::FileDescriptor(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
+  if (fifo_.get() < 0) throw std::runtime_error(path + ": cannot open the FIFO: " + std::strerror(errno));
+}
+
+void ControlFifo::take(const Obey& obey) {
+  std::array<char, 512> buffer{};
+  const ssize_t got = ::read(fifo_.get(), buffer.data(), buffer.size());
+  if (got > 0) pending_.append(buffer.data(), static_cast<std::size_t>(got));
+  for (std::size_t end = pending_.find('\n'); end != std::string::npos; end = pending_.find('\n')) {
+    const std::string line = pending_.substr(0, end);
+    pending_.erase(0, end + 1);
+    try {
+      say(line + ": " + obey(line));
+    } catch (const std::exception& error) {
+      say(line + ": error: " + error.what());
+    }
+  }
+}
+
+void open_for_writing(std::ofstream& stream, const std::string& file) {
+  stream.close();
+  if (file == "off") return;
+  stream.open(file);
+  if (!stream) throw std::runtime_error("cannot write \"" + file + "\": " + std::strerror(errno));
+}
+
+TruthFile::TruthFile(const std::string& file, bool with_trip_flags) {
+  if (file.empty()) return;
+  open_for_writing(stream_, file);
+  stream_ << "time_s,omega1_rad_s,omega2_rad_s,slip,brake_torque_Nm,theta_N,drive_duty,brake_duty"
+          << (with_trip_flags ? ",trip_flags\n" : "\n");
+}
+
+void TruthFile::write(std::int64_t time_ns, const rig::PlantTruth& truth, const emulator::Outputs& out) {
+  stream_ << fmt::format("{:.6f},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.6f},{:.6f}", static_cast<double>(time_ns) * 1e-9,
+                         truth.speeds.omega1_rad_s, truth.speeds.omega2_rad_s, truth.slip, truth.brake_torque_Nm,
+                         truth.theta_N, out.drive_duty, out.brake_duty);
+}
+
+std::string state_text(const emulator::RigBehind& rig, int digits_of_time) {
+  const emulator::Outputs out = rig.outputs();
+  const auto& state = rig.plant().state();
+  return fmt::format("time {:.{}f} s, drive {:.4f}, brake {:.4f}, upper {:.2f} rad/s, lower {:.2f} rad/s",
+                     static_cast<double>(rig.time_ns()) * 1e-9, digits_of_time, out.drive_duty, out.brake_duty,
+                     state.omega1_rad_s, state.omega2_rad_s);
+}
+
+}  // namespace abs_hil::program

@@ -1,0 +1,156 @@
+// What the emulated boards share: the main loop's view of them, their control commands, the log of true values.
+
+#pragma once
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <fstream>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "driver/file_descriptor.hpp"
+#include "driver/monotonic_time.hpp"
+#include "emulator/rig_behind.hpp"
+
+namespace abs_hil::program {
+
+/// Prints a line and flushes it.
+void say(const std::string& text);
+
+/// One line of control: a name and its arguments.
+class ControlCommand {
+ public:
+  explicit ControlCommand(std::string_view line);
+
+  [[nodiscard]] bool empty() const noexcept { return words_.empty(); }
+  [[nodiscard]] const std::string& line() const noexcept { return line_; }
+  /// True if it has this name and number of arguments.
+  [[nodiscard]] bool is(std::string_view name, std::size_t arguments) const;
+  [[nodiscard]] const std::string& name() const { return words_.at(0); }
+  /// The nth argument, from 1.
+  [[nodiscard]] const std::string& text(std::size_t n) const { return words_.at(n); }
+  /// The nth argument as a number. Throws std::invalid_argument if it is not one.
+  [[nodiscard]] double number(std::size_t n) const;
+  /// True if the nth argument is the first of these words, false if it is the second. Throws std::invalid_argument if
+  /// it is neither.
+  [[nodiscard]] bool first_of(std::size_t n, std::string_view first, std::string_view second) const;
+  [[nodiscard]] bool on(std::size_t n) const { return first_of(n, "on", "off"); }
+
+  /// Throws std::invalid_argument with the line and the known commands.
+  [[noreturn]] void refuse(const std::string& known) const;
+
+ private:
+  std::string line_;
+  std::vector<std::string> words_{};
+};
+
+/// A command that a board obeys. Its usage begins with its name, then come its arguments.
+template <class Board>
+struct ControlRow {
+  std::string_view usage;
+  std::string_view meaning;
+  void (*obey)(Board&, const ControlCommand&);
+  bool any_arguments{false};
+
+  [[nodiscard]] bool is(const ControlCommand& command) const {
+    const auto arguments = static_cast<std::size_t>(std::count(usage.begin(), usage.end(), ' '));
+    const std::string_view name = usage.substr(0, usage.find(' '));
+    return any_arguments ? command.name() == name : command.is(name, arguments);
+  }
+};
+
+/// The commands of a board, one per line, for the help.
+template <class Board>
+[[nodiscard]] std::string help_of(std::span<const ControlRow<Board>> rows) {
+  std::string text;
+  for (const ControlRow<Board>& row : rows) text += fmt::format("{:<31} {}\n", row.usage, row.meaning);
+  return text + fmt::format("{:<31} {}\n", "status", "duties on the wire, speeds, and what the board tells");
+}
+
+/// Obeys one line. Throws std::invalid_argument for an unknown command.
+template <class Board>
+void obey_row(Board& board, std::span<const ControlRow<Board>> rows, const ControlCommand& command) {
+  if (command.is("status", 0)) return;
+  for (const ControlRow<Board>& row : rows) {
+    if (row.is(command)) return row.obey(board, command);
+  }
+  command.refuse(help_of(rows));
+}
+
+/// Rows that several boards have. `model` of such a board is its emulator.
+template <class Board>
+constexpr ControlRow<Board> estop_row{
+    "estop on|off", "the emergency stop: cuts the drive only",
+    [](Board& b, const ControlCommand& c) { b.model().press_emergency_stop(c.on(1)); }};
+template <class Board>
+constexpr ControlRow<Board> supply_row{"supply V", "what the board measures",
+                                       [](Board& b, const ControlCommand& c) { b.model().set_supply_V(c.number(1)); }};
+template <class Board>
+constexpr ControlRow<Board> temperature_row{
+    "temperature C", "what the board measures",
+    [](Board& b, const ControlCommand& c) { b.model().set_temperature_C(c.number(1)); }};
+template <class Board>
+constexpr ControlRow<Board> overspeed_row{"overspeed", "latches the overspeed interlock until the wheels stop",
+                                          [](Board& b, const ControlCommand&) { b.model().trip_overspeed(); }};
+template <class Board>
+constexpr ControlRow<Board> turn_row{
+    "turn upper|lower REVOLUTIONS", "a wheel is turned by hand",
+    [](Board& b, const ControlCommand& c) { b.model().turn_by_hand(c.first_of(1, "upper", "lower"), c.number(2)); }};
+
+/// FIFO from which the emulator takes commands while it runs. An empty path means no FIFO.
+class ControlFifo {
+ public:
+  /// Creates the FIFO if it does not exist. Throws std::runtime_error.
+  explicit ControlFifo(const std::string& path);
+
+  /// Descriptor for poll(); -1: no FIFO.
+  [[nodiscard]] int descriptor() const noexcept { return fifo_.get(); }
+  /// Obeys all complete lines received, and prints the answer or error of each.
+  using Obey = std::function<std::string(const std::string& line)>;
+  void take(const Obey& obey);
+
+ private:
+  driver::FileDescriptor fifo_{};
+  std::string pending_{};
+};
+
+/// Opens an output file of the emulator; "off" closes it. Throws std::runtime_error.
+void open_for_writing(std::ofstream& stream, const std::string& file);
+
+/// CSV of true values that the board does not show to the host, one row per ms of the board's time.
+class TruthFile {
+ public:
+  /// `with_trip_flags`: adds a last column, for boards that have them. An empty file name writes nothing. Throws
+  /// std::runtime_error.
+  TruthFile(const std::string& file, bool with_trip_flags);
+
+  /// Advances the board to `time_ns` and writes every row that is due in between.
+  template <typename Board>
+  void advance(Board& board, std::int64_t time_ns) {
+    while (stream_.is_open() && next_ns_ <= time_ns) {
+      board.advance_to(next_ns_);
+      write(board.time_ns(), board.plant().truth(), board.outputs());
+      if constexpr (requires { board.trip_flags(); }) stream_ << ',' << board.trip_flags();
+      stream_ << '\n';
+      next_ns_ += period_ns;
+    }
+    board.advance_to(time_ns);
+  }
+
+ private:
+  static constexpr std::int64_t period_ns = 1'000'000;
+  void write(std::int64_t time_ns, const rig::PlantTruth& truth, const emulator::Outputs& out);
+
+  std::ofstream stream_{};
+  std::int64_t next_ns_{0};
+};
+
+/// "time 1.234 s, drive 0.5000, brake 0.0000, upper 12.30 rad/s, lower 12.40 rad/s"
+[[nodiscard]] std::string state_text(const emulator::RigBehind& rig, int digits_of_time = 3);
+
+}  // namespace abs_hil::program

@@ -1,0 +1,116 @@
+// The wire of a CAN node: frames on a raw socket, what the controller reports, how the interface is opened.
+
+#pragma once
+
+#include <net/if.h>
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "driver/can/can_backend.hpp"
+#include "driver/can/interface_facts.hpp"
+#include "driver/can/protocol.hpp"
+#include "driver/file_descriptor.hpp"
+
+namespace abs_hil::driver::can {
+
+enum class SendOutcome : std::uint8_t {
+  sent,  ///< the kernel has it; only the node's answer shows whether it reached the bus
+  full,  ///< not sent: the queue is full (EAGAIN, ENOBUFS)
+  down,  ///< the interface is down or gone, or the peer of a socket pair is
+  failed,
+};
+struct [[nodiscard]] SendResult {
+  SendOutcome outcome{SendOutcome::sent};
+  int errno_value{0};
+};
+
+enum class ReceiveOutcome : std::uint8_t {
+  frame,
+  nothing,    ///< no frame until the deadline
+  malformed,  ///< data with the wrong size for a frame; only a socket other than CAN can deliver it
+  down,       ///< as SendOutcome::down
+  failed,
+};
+struct [[nodiscard]] ReceiveResult {
+  ReceiveOutcome outcome{ReceiveOutcome::nothing};
+  int errno_value{0};
+};
+
+/// Sends and receives frames (`struct can_frame` or `struct canfd_frame`) on a socket that keeps message boundaries: a
+/// raw CAN socket, or for emulators and tests an AF_UNIX socket of type SOCK_SEQPACKET or SOCK_DGRAM. Only `receive`
+/// blocks, up to its deadline. `send` and `receive` are real-time safe apart from their system calls.
+class FrameSocket {
+ public:
+  /// Takes ownership of an open socket. Makes it non-blocking and enables receive time stamps and the drop count.
+  explicit FrameSocket(FileDescriptor descriptor) noexcept;
+  explicit FrameSocket(int descriptor) noexcept : FrameSocket(FileDescriptor(descriptor)) {}
+  FrameSocket(const FrameSocket&) = delete;
+  FrameSocket& operator=(const FrameSocket&) = delete;
+  virtual ~FrameSocket() = default;
+
+  SendResult send(const Frame& frame) noexcept;
+  /// @param deadline_ns monotonic clock; if it is in the past the call does not wait
+  virtual ReceiveResult receive(Frame& frame, std::int64_t deadline_ns) noexcept;
+  /// Hands each frame that comes to `heard` until that returns true: then true. False at the deadline, when the bus is
+  /// down, and after 1000 frames, so that a flooded bus holds nobody for ever.
+  template <class Heard>
+  bool listen(std::int64_t deadline_ns, Heard heard) noexcept {
+    constexpr int most_frames = 1000;
+    Frame frame;
+    for (int i = 0; i < most_frames; ++i) {
+      const ReceiveOutcome outcome = receive(frame, deadline_ns).outcome;
+      if (outcome == ReceiveOutcome::malformed) continue;
+      if (outcome != ReceiveOutcome::frame) return false;
+      if (heard(frame)) return true;
+    }
+    return false;
+  }
+  /// Number of frames that the kernel has dropped because this socket's queue was full.
+  [[nodiscard]] std::uint32_t dropped() const noexcept { return dropped_; }
+  /// Discards the frames received so far, up to a fixed number.
+  void drain() noexcept;
+  /// Gets the flags of the interface that `request` names (SIOCGIFFLAGS); false if it does not exist.
+  [[nodiscard]] bool ask_interface(ifreq& request) const noexcept;
+
+ private:
+  ReceiveResult take(Frame& frame) noexcept;
+
+  FileDescriptor descriptor_;
+  std::uint32_t dropped_{0};
+};
+
+/// State of the CAN controller, from an error frame of the kernel. Several members may be true at once.
+struct BusReport {
+  bool bus_off{false};
+  bool restarted{false};
+  bool error_passive{false};
+  bool error_warning{false};
+  bool receive_overflow{false};  ///< the controller's own queue
+  bool other{false};  ///< bus errors, arbitration, no acknowledgement: only counted; lasting ones show as losses
+};
+[[nodiscard]] BusReport bus_report(const Frame& error_frame) noexcept;
+
+/// A bus ready for use.
+struct Link {
+  std::unique_ptr<FrameSocket> socket{};
+  std::string place{};                    ///< name for messages
+  bool can_fd{false};                     ///< it carries CAN FD frames
+  std::optional<InterfaceFacts> facts{};  ///< only for a real interface
+
+  explicit operator bool() const noexcept { return socket != nullptr; }
+  /// True if the interface is up and has a carrier. Makes a system call; the driver calls it when answers are missing.
+  [[nodiscard]] bool running() const noexcept;
+};
+
+/// Opens the interface that the options name: a raw CAN socket with error frames and kernel filters for the node's
+/// identifiers, or for "unix:PATH" the socket of an emulator. Throws Unavailable with cause and fix.
+/// @param wait  for up to 2 s: for the carrier of an interface that was just set up, or for a busy socket
+[[nodiscard]] Link open_link(const CanOptions& options, bool wait = true);
+
+/// Prefix of `driver.can.interface` for a socket in place of a bus.
+inline constexpr const char* unix_prefix = "unix:";
+
+}  // namespace abs_hil::driver::can

@@ -1,0 +1,33 @@
+// Facts about devices in the kernel's files (sysfs).
+
+#pragma once
+
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+namespace abs_hil::driver {
+
+/// First line of a file; empty if it cannot be read.
+[[nodiscard]] inline std::string line_in(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  std::string line;
+  std::getline(in, line);
+  return line;
+}
+
+/// The number that a file begins with; 0 if it cannot be read. Base 16 allows "0x10b5" as well as "10b5".
+[[nodiscard]] inline std::uint32_t number_in(const std::filesystem::path& file, int base) {
+  return static_cast<std::uint32_t>(std::strtoul(line_in(file).c_str(), nullptr, base));
+}
+
+[[nodiscard]] inline std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+}  // namespace abs_hil::driver
