@@ -2,7 +2,8 @@
 """usage: message_fields.py OUTPUT TYPE.lcm...
 
 Writes the C++ header abs_hil/message_fields.hpp. It gives the fields of each message type by name, which lcm-gen's C++
-does not offer. Each .lcm file must hold one type, whose fields are scalars or strings.
+does not offer. Each .lcm file must hold one type, whose fields are scalars, strings, or arrays of double. The length of an array
+is the field just before it, an int32_t.
 """
 import pathlib
 import re
@@ -11,6 +12,7 @@ import sys
 STRUCT = re.compile(r'\bstruct\s+(\w+)\s*\{(.*)\}', re.DOTALL)
 CONSTANTS = re.compile(r'const\s.*', re.DOTALL)
 FIELD = re.compile(r'(?:int8_t|int16_t|int32_t|int64_t|byte|boolean|float|double|string)\s+(\w+)')
+ARRAY = re.compile(r'double\s+(\w+)\[(\w+)\]')
 
 HEAD = '''#pragma once
 // Made by lcmtypes/message_fields.py from lcmtypes/*.lcm. Do not edit.
@@ -80,9 +82,10 @@ def fields_of(path):
     for statement in filter(None, map(str.strip, struct[2].split(';'))):
         if CONSTANTS.fullmatch(statement):
             continue
-        field = FIELD.fullmatch(statement)
-        if field is None:
-            raise ValueError(f'{path}: "{statement}" is neither a constant nor a field of a scalar type or string')
+        field = FIELD.fullmatch(statement) or ARRAY.fullmatch(statement)
+        if field is None or (field.re is ARRAY and names[-1:] != [field[2]]):
+            raise ValueError(f'{path}: "{statement}" is neither a constant, nor a field of a scalar type or string, nor an '
+                             'array of double that follows its length')
         names.append(field[1])
     return names
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from .messages import PHASES, QUANTITIES, REASONS, TYPES, decode
+from .messages import PHASES, QUANTITIES, REASONS, TYPES, decode, row_of
 
 if TYPE_CHECKING:
     from .figures import FigureOfMerit, figures
@@ -39,8 +39,8 @@ _MODULE_OF = {name: module for module, names in _LATER.items() for name in names
 
 __all__ = ['PHASES', 'QUANTITIES', 'REASONS', 'TYPES', 'Controller', 'FigureOfMerit', 'Identified', 'Plant', 'Run',
            'Series', 'SlipInput', 'SlipOutput', 'Study', 'StudyResults', 'controllers', 'decode', 'experiments', 'figures',
-           'identify', 'keys', 'live', 'load', 'load_series', 'load_study', 'plants', 'simulate', 'simulate_many',
-           'simulate_run', 'study']
+           'identify', 'keys', 'live', 'load', 'load_series', 'load_study', 'plants', 'row_of', 'simulate',
+           'simulate_many', 'simulate_run', 'study']
 
 
 def __getattr__(name: str) -> Any:

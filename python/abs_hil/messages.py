@@ -38,6 +38,12 @@ PHASES: tuple[str, ...] = tuple(QUANTITIES['phase']['values'])
 _BY_FINGERPRINT = {type_._get_packed_fingerprint(): type_ for type_ in TYPES.values()}
 
 
+def row_of(message: Any) -> dict[str, Any]:
+    """The cycle in a telemetry_t: every quantity of the table and every signal of the controller, by name."""
+    row = {name: getattr(message, name) for name in message.__slots__ if name not in ('names', 'value_count', 'values')}
+    return {**row, **dict(zip(filter(None, message.names.split(',')), message.values))}
+
+
 def decode(data: bytes) -> Any:
     """Decodes the message in `data` of any type. Raises ValueError if it is damaged or not from abs_hil."""
     type_ = _BY_FINGERPRINT.get(bytes(data[:8]))

@@ -13,7 +13,7 @@ def live(url: str = '', *, channel: str = 'TELEMETRY', prefix: str = 'ABS_', tim
     """Yields the messages of a running experiment as they come: by default one telemetry_t a cycle.
 
     url:       the LCM network; empty: LCM_DEFAULT_URL, else UDP multicast within this computer.
-    channel:   TELEMETRY, STATUS, EVENT, EXPERIMENT, SIGNALS, ...; the run's telemetry.channel_prefix stands before it.
+    channel:   TELEMETRY, STATUS, EVENT, EXPERIMENT, ...; the run's telemetry.channel_prefix stands before it.
     timeout_s: ends the iteration after this time without a message; None waits for ever.
 
     Subscribes at once. Messages that are damaged or of another type are left out. Raises OSError without a network and

@@ -221,12 +221,15 @@ def load_series(folder: PathLike) -> Series:
 
 
 def _load_log(path: pathlib.Path) -> Run:
-    columns, signals, rows, experiment, unreadable, damage = _core.read_log(str(path))
+    columns, signals, rows, experiment, unreadable, damage, lacks = _core.read_log(str(path))
     notes = [f'the rest of the log is not used: {damage}'] if damage else []
+    if lacks:
+        notes.append(f'{lacks}: another version of abs_hil recorded it')
     if unreadable:
         notes.append(f'{unreadable} messages of the log cannot be read and are left out')
     if rows == 0:
-        raise ValueError(damage or f'"{path}" holds no telemetry of abs_hil')
+        raise ValueError(damage or f'"{path}" holds no telemetry of abs_hil'
+                         + (', or another version of abs_hil recorded it' if unreadable else ''))
     columns['phase'] = phase_names(np.clip(columns['phase'], 0, len(PHASES) - 1))
     if 'phase_name' in columns:
         columns['phase_name'] = np.array(columns['phase_name'], dtype=object)

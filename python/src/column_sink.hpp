@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <string>
@@ -28,16 +27,6 @@ class ColumnSink final : public rig::RecordSink {
     });
     phases_.emplace_back(record.phase, record.phase_index);
     for (std::size_t n = 0; n < rig::signal_max; ++n) signals_[n].push_back(record.control.signals[n]);
-  }
-  /// Replaces the signals of one row.
-  void put_signals(std::size_t row, const rig::SignalValues& values) {
-    for (std::size_t n = 0; n < rig::signal_max; ++n) signals_[n].at(row) = values[n];
-  }
-  /// Replaces the time at which a row's counters were read.
-  void put_sample_time(std::size_t row, double time_s) {
-    static constexpr auto column = std::find(rig::csv_columns.begin(), rig::csv_columns.end(), "sample_time_s");
-    static_assert(column != rig::csv_columns.end());
-    columns_[static_cast<std::size_t>(column - rig::csv_columns.begin())].at(row) = time_s;
   }
   [[nodiscard]] std::size_t rows() const noexcept { return columns_.front().size(); }
   /// Name to array, in the order of the CSV; `phase_name` is a list of texts, and missing if the experiment has no

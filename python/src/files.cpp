@@ -12,15 +12,10 @@
 
 #include "abs_hil/event_t.hpp"
 #include "abs_hil/experiment_t.hpp"
-#include "abs_hil/measurement_t.hpp"
-#include "abs_hil/phase_t.hpp"
 #include "abs_hil/plant_sim/factor_profile.hpp"
 #include "abs_hil/rig/cycle_record.hpp"
 #include "abs_hil/rig/quantities.hpp"
 #include "abs_hil/rig/signals.hpp"
-#include "abs_hil/rig/time_units.hpp"
-#include "abs_hil/sample_t.hpp"
-#include "abs_hil/signals_t.hpp"
 #include "abs_hil/telemetry_t.hpp"
 #include "analysis/run_metrics.hpp"
 #include "analysis/statistics.hpp"
@@ -81,47 +76,28 @@ py::tuple read_csv(const std::string& path) {
   return py::make_tuple(columns, phases, truncated);
 }
 
-/// Telemetry and signals of an event log.
+/// Rows and description of the run in an event log.
 class LogColumns {
  public:
   void take(const telemetry::LogEvent& event) {
-    const bool telemetry = event.channel.ends_with("TELEMETRY");
-    if (event.channel.ends_with("PHASE")) return take_phase(event);
-    if (event.channel.ends_with("SAMPLE")) return take_sample(event);
-    if (event.channel.ends_with("MEASUREMENT")) return take_measurement(event);
-    if (!telemetry && !event.channel.ends_with("SIGNALS") && !event.channel.ends_with("EXPERIMENT")) return;
-    if (telemetry) {
+    if (event.channel.ends_with("TELEMETRY")) {
       telemetry_t message{};
       if (!decode(event, message)) return;
-      cycles_.push_back(message.cycle);
-      rig::CycleRecord record = telemetry::to_record(message);
-      record.phase_index = phase_index_;
-      record.sample_valid = sample_valid_;
-      record.wheels_apart = wheels_apart_;
-      record.sample_time_s = record.time_s;
-      start_ns_ = message.stamp_ns - std::llround(record.time_s * 1e9);
-      columns_.consume(record, message.distance_m);
-    } else if (event.channel.ends_with("SIGNALS")) {
-      signals_t message{};
-      // The message of a cycle follows its telemetry.
-      if (!decode(event, message) || cycles_.empty() || cycles_.back() != message.cycle) return;
-      if (names_.empty()) names_ = message.names;
-      columns_.put_signals(columns_.rows() - 1, telemetry::signals_of(message));
-    } else if (experiment_.empty()) {
+      if (columns_.rows() == 0) {
+        signals_ = telemetry::signals_of(message);
+        for (const std::string_view name : telemetry::lacking_in(message)) {
+          lacks_.append(lacks_.empty() ? "the log lacks " : ", ").append(name);
+        }
+      }
+      note_phase(message);
+      columns_.consume(telemetry::to_record(message), message.distance_m);
+    } else if (event.channel.ends_with("EXPERIMENT") && experiment_.empty()) {
       experiment_t message{};
       if (!decode(event, message)) return;
       experiment_ = {message.experiment, message.controller, message.plant, message.backend, message.config_json};
     }
   }
   py::tuple result(const std::string& damage) {
-    std::vector<std::string> names;
-    for (std::size_t begin = 0; begin < names_.size() && names.size() < rig::signal_max;) {
-      const std::size_t end = std::min(names_.find(',', begin), names_.size());
-      const std::string name = names_.substr(begin, end - begin);
-      if (!rig::is_signal_name(name)) break;
-      names.push_back(name);
-      begin = end + 1;
-    }
     for (std::string& text : experiment_) {
       if (&text != &experiment_.back()) text = run_folder::clean_text(text);
     }
@@ -129,34 +105,21 @@ class LogColumns {
     // The configuration is JSON, as bytes: it may be damaged.
     py::list experiment;
     for (const std::string& text : experiment_) experiment.append(py::bytes(text));
-    return py::make_tuple(columns_.take({.phases = phases_, .signals = names}), names, rows, experiment, unreadable_,
-                          damage);
+    return py::make_tuple(columns_.take({.phases = phases_, .signals = signals_}), signals_, rows, experiment,
+                          unreadable_, damage, lacks_);
   }
 
  private:
-  /// The message of a phase precedes the telemetry of its first cycle.
-  void take_phase(const telemetry::LogEvent& event) {
+  /// A phase that is not planned, as after a fault, keeps the number of the one before.
+  void note_phase(telemetry_t& message) {
     constexpr std::int32_t most_phases = 10'000;
-    phase_t message{};
-    if (!decode(event, message) || message.phase_index < 0 || message.phase_index >= most_phases) return;
-    phase_index_ = static_cast<std::uint16_t>(message.phase_index);
-    if (phases_.size() <= phase_index_) phases_.resize(phase_index_ + std::size_t{1});
-    // A phase that is not planned, as after a fault, keeps the number of the one before.
-    rig::NamedPhase& named = phases_[phase_index_];
-    if (named.name.empty()) named = {static_cast<rig::Phase>(message.phase), run_folder::clean_text(message.name)};
-  }
-  /// It precedes the telemetry of the first cycle for which it holds.
-  void take_sample(const telemetry::LogEvent& event) {
-    sample_t message{};
-    if (!decode(event, message)) return;
-    sample_valid_ = message.sample_valid != 0;
-    wheels_apart_ = message.wheels_apart != 0;
-  }
-  /// It follows the telemetry of its cycle, if the counts have another time than the cycle.
-  void take_measurement(const telemetry::LogEvent& event) {
-    measurement_t message{};
-    if (!decode(event, message) || cycles_.empty() || cycles_.back() != message.cycle) return;
-    columns_.put_sample_time(columns_.rows() - 1, static_cast<double>(message.measured_ns - start_ns_) * rig::s_per_ns);
+    if (message.phase_name.empty() || message.phase_index < 0 || message.phase_index >= most_phases) return;
+    const auto place = static_cast<std::size_t>(message.phase_index);
+    if (phases_.size() <= place) phases_.resize(place + 1);
+    rig::NamedPhase& named = phases_[place];
+    if (named.name.empty()) {
+      named = {static_cast<rig::Phase>(message.phase), run_folder::clean_text(message.phase_name)};
+    }
   }
   template <class Message>
   bool decode(const telemetry::LogEvent& event, Message& message) {
@@ -166,19 +129,15 @@ class LogColumns {
   }
 
   ColumnSink columns_;
-  std::vector<std::int64_t> cycles_;
   std::vector<rig::NamedPhase> phases_;
-  std::uint16_t phase_index_{0};
-  bool sample_valid_{true};
-  bool wheels_apart_{false};
-  std::int64_t start_ns_{0};  ///< of the run, by the clock of the stamps
-  std::string names_;
+  std::vector<std::string> signals_;
   std::vector<std::string> experiment_;
+  std::string lacks_;
   std::size_t unreadable_{0};
 };
 
 /// (columns, signals, rows, [experiment, controller, plant, backend, configuration], number of unreadable messages,
-/// what is wrong with the rest of the file; empty: nothing)
+/// what is wrong with the rest of the file; empty: nothing, what an older log lacks; empty: nothing)
 py::tuple read_log(const std::string& path) {
   LogColumns columns;
   std::string damage;

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from abs_hil.figures import OVERSHOOT, heading_of
+
 from .criteria import ACTUATORS, PLANTS, Verdict
 from .laws import BASELINES, MAP_KEYS, Entry, entries, judge_entries, run_entries
 from .map import FIGURES, PAPER_RATIO, Map

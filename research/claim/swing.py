@@ -9,6 +9,7 @@ import tempfile
 import numpy as np
 
 from abs_hil.figures import OVERSHOOT
+
 from .criteria import SLIP_REF
 
 PLANT = 'paper-timing'

@@ -78,8 +78,8 @@ bool same(std::string_view given, std::string_view expected) {
 
 }  // namespace
 
-std::string mac_of(const command2_t& command, const std::string& key) {
-  command2_t bare = command;
+std::string mac_of(const command_t& command, const std::string& key) {
+  command_t bare = command;
   bare.mac.clear();
   return hmac_of(bare, key);
 }
@@ -106,7 +106,7 @@ Authority::Authority(std::string key) : key_(std::move(key)) {
   session_ = telemetry::hexadecimal(random);
 }
 
-rig::Reason Authority::judge(const command2_t& command) {
+rig::Reason Authority::judge(const command_t& command) {
   if (!same(command.mac, mac_of(command, key_))) return rig::Reason::command_not_authentic;
   if (command.session != session_ || command.sequence <= last_sequence_) return rig::Reason::command_repeated;
   if (command.sequence - last_sequence_ > sequence_leap_max) return rig::Reason::command_repeated;

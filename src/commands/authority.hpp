@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "abs_hil/command2_t.hpp"
+#include "abs_hil/command_t.hpp"
 #include "abs_hil/event_t.hpp"
 #include "abs_hil/rig/reason.hpp"
 #include "telemetry/message_stream.hpp"
@@ -21,7 +21,7 @@ inline constexpr std::int64_t sequence_leap_max = 1000;
 [[nodiscard]] std::string read_key(const std::filesystem::path& file);
 
 /// HMAC-SHA-256, with `key`, of the message encoded with an empty mac: 64 hexadecimal digits.
-[[nodiscard]] std::string mac_of(const command2_t& command, const std::string& key);
+[[nodiscard]] std::string mac_of(const command_t& command, const std::string& key);
 
 /// Ends the message of every answer that the stream sends with a tag: the HMAC-SHA-256, with `key`, of the event
 /// encoded without it. Nobody without the key can make or change such an answer.
@@ -40,7 +40,7 @@ class Authority {
   explicit Authority(std::string key);
 
   /// Returns why the message is refused. `none`: the run obeys it, and its sequence number is used up.
-  [[nodiscard]] rig::Reason judge(const command2_t& command);
+  [[nodiscard]] rig::Reason judge(const command_t& command);
 
   [[nodiscard]] const std::string& session() const noexcept { return session_; }
   [[nodiscard]] std::int64_t last_sequence() const noexcept { return last_sequence_; }

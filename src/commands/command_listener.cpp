@@ -161,15 +161,10 @@ void CommandListener::on_packet(const lcm_recv_buf_t* received, const char* /*ch
 }
 
 void CommandListener::take(std::span<const std::uint8_t> packet) {
-  if (fingerprint_of(packet) == static_cast<std::int64_t>(command2_t::getHash())) {
-    command2_t command{};
-    const std::string_view problem = decode_checked(packet, command);
-    if (!problem.empty()) return hand_over(Problem{problem}, false);
-    const bool is_stop = command.command == "stop";
-    return hand_over(std::move(command), is_stop);
+  command_t command{};
+  if (const std::string_view problem = decode_checked(packet, command); !problem.empty()) {
+    return hand_over(Problem{problem}, false);
   }
-  auto [command, problem] = decode_command(packet);
-  if (!problem.empty()) return hand_over(Problem{problem}, false);
   const bool is_stop = command.command == "stop";
   hand_over(std::move(command), is_stop);
 }
@@ -196,28 +191,20 @@ void CommandListener::answer(const Arrival& arrival) {
     return say(rig::Reason::command_malformed, std::string("refused a packet: ").append(problem->text), malformed_,
                false);
   }
-  const auto* old = std::get_if<command_t>(&arrival);
-  const auto* command = std::get_if<command2_t>(&arrival);
-  const std::string& name = old != nullptr ? old->command : command->command;
-  const std::string from = old != nullptr ? " (token '" + rig::printable(old->token, shown_text_max_bytes) + "')"
-                                          : " (sender '" + rig::printable(command->sender, shown_text_max_bytes) + "')";
-  if (name == "stop") {
+  const auto& command = std::get<command_t>(arrival);
+  const std::string from = " (sender '" + rig::printable(command.sender, shown_text_max_bytes) + "')";
+  if (command.command == "stop") {
     ++stops_answered_;
     return say(rig::Reason::stop_command, "stop accepted" + from, stops_answered_, stops_answered_ == 1);
   }
-  if (command != nullptr && judge_) {
-    const std::optional<CommandAnswer> judged = judge_(*command);
-    if (!judged) return;
-    ++refused_;
-    return say(judged->reason, judged->message + from, refused_, judged->authentic);
-  }
+  const std::optional<CommandAnswer> judged =
+      judge_ ? judge_(command)
+             : CommandAnswer{rig::Reason::commands_not_enabled,
+                             "refused '" + rig::printable(command.command, shown_text_max_bytes) +
+                                 "': only 'stop' is accepted, as this run has commands.enabled = false"};
+  if (!judged) return;
   ++refused_;
-  const std::string shown = "refused '" + rig::printable(name, shown_text_max_bytes) + "': ";
-  if (command != nullptr) {
-    return say(rig::Reason::commands_not_enabled,
-               shown + "only 'stop' is accepted, as this run has commands.enabled = false" + from, refused_, false);
-  }
-  say(rig::Reason::command_unknown, shown + "only 'stop' is accepted" + from, refused_, false);
+  say(judged->reason, judged->message + from, refused_, judged->authentic);
 }
 
 void CommandListener::say(rig::Reason reason, std::string message, std::uint64_t count, bool always) {

@@ -16,26 +16,26 @@
 #include <thread>
 #include <variant>
 
-#include "abs_hil/command2_t.hpp"
+#include "abs_hil/command_t.hpp"
 #include "telemetry/lcm_outlet.hpp"
 #include "telemetry/message_stream.hpp"
 #include "telemetry/udpm_receiver.hpp"
 
 namespace abs_hil::telemetry {
 
-/// The answer to a command2_t.
+/// The answer to a command_t.
 struct CommandAnswer {
   rig::Reason reason{rig::Reason::none};
   std::string message;
   bool authentic{false};  ///< the sender holds the key; such a sender always gets an answer
 };
 
-/// Judges a well-formed command2_t. Returns nothing if the command was accepted; its answer follows when it takes
+/// Judges a well-formed command_t. Returns nothing if the command was accepted; its answer follows when it takes
 /// effect.
-using CommandJudge = std::function<std::optional<CommandAnswer>(const command2_t&)>;
+using CommandJudge = std::function<std::optional<CommandAnswer>(const command_t&)>;
 
-/// Receives ABS_COMMAND from the network. It always accepts `stop`, passes each command2_t to the judge, and refuses
-/// and counts everything else. Answers go out on ABS_EVENT, at most ten per second of run time to unauthenticated
+/// Receives ABS_COMMAND from the network. It always accepts `stop`, passes every other command to the judge, and
+/// counts what is no command. Answers go out on ABS_EVENT, at most ten per second of run time to unauthenticated
 /// senders. Messages are received by poll() or, after listen(), in a thread of its own, where a `stop` takes effect at
 /// once.
 class CommandListener {
@@ -58,7 +58,7 @@ class CommandListener {
   CommandListener& operator=(const CommandListener&) = delete;
   ~CommandListener();
 
-  /// Sets the judge. Without one every command2_t is refused as not enabled.
+  /// Sets the judge. Without one every command_t is refused as not enabled.
   void set_judge(CommandJudge judge) { judge_ = std::move(judge); }
   /// Starts the listening thread. Does nothing if the provider cannot receive (file://).
   void listen();
@@ -86,7 +86,7 @@ class CommandListener {
   struct Problem {
     std::string_view text;
   };
-  using Arrival = std::variant<Problem, command_t, command2_t>;
+  using Arrival = std::variant<Problem, command_t>;
 
   static void on_packet(const lcm_recv_buf_t* received, const char* channel, void* self) noexcept;
   [[nodiscard]] int file_descriptor() noexcept { return udpm_ ? udpm_->file_descriptor() : lcm_get_fileno(lcm_); }

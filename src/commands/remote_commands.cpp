@@ -44,7 +44,7 @@ RemoteCommands::RemoteCommands(const config::Settings& settings, telemetry::Mess
   sign_answers(stream_, key);
 }
 
-std::optional<telemetry::CommandAnswer> RemoteCommands::judge(const command2_t& command) {
+std::optional<telemetry::CommandAnswer> RemoteCommands::judge(const command_t& command) {
   const std::string refused = "refused '" + shown(command.command) + "': ";
   if (!authority_) {
     return telemetry::CommandAnswer{rig::Reason::commands_not_enabled,
@@ -64,7 +64,7 @@ std::optional<telemetry::CommandAnswer> RemoteCommands::judge(const command2_t& 
   return answer;
 }
 
-telemetry::CommandAnswer RemoteCommands::carry_out(const command2_t& command, bool& taken) {
+telemetry::CommandAnswer RemoteCommands::carry_out(const command_t& command, bool& taken) {
   using rig::Reason;
   if (mailbox_ == nullptr) return {Reason::command_not_now, "the run has not begun yet"};
   if (over_) return {Reason::command_not_now, "the run has ended"};

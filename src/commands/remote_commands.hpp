@@ -30,7 +30,7 @@ class RemoteCommands final : public rig::RecordSink {
   void set_listener(const telemetry::CommandListener& listener) { listener_ = &listener; }
 
   /// Judges a command for the command listener (CommandJudge).
-  [[nodiscard]] std::optional<telemetry::CommandAnswer> judge(const command2_t& command);
+  [[nodiscard]] std::optional<telemetry::CommandAnswer> judge(const command_t& command);
 
   void consume(const rig::CycleRecord& record, double distance_m) override;
 
@@ -46,7 +46,7 @@ class RemoteCommands final : public rig::RecordSink {
     double value{0.0};
     std::string sender;
   };
-  telemetry::CommandAnswer carry_out(const command2_t& command, bool& taken);
+  telemetry::CommandAnswer carry_out(const command_t& command, bool& taken);
   void settle(rig::Reason reason, std::map<std::uint32_t, Pending>::iterator pending);
   void settle_named(rig::Reason reason, std::string_view name);
   void send_state();

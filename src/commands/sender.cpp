@@ -136,7 +136,7 @@ Reply send(const Order& order, const SenderOptions& options) {
   if (is_stop) {
     command_t stop{};
     stop.command = "stop";
-    stop.token = sender;
+    stop.sender = sender;
     while (!answered() && Clock::now() < end) {
       publish(lcm, channel, stop);
       answers.wait(std::min(end, Clock::now() + stop_again), answered);
@@ -154,7 +154,7 @@ Reply send(const Order& order, const SenderOptions& options) {
                                   std::to_string(answers.state->last_sequence) +
                                   ": another sender forges it; look for it with abs-spy, or use ttl=0"};
   }
-  command2_t command{};
+  command_t command{};
   command.session = answers.state->session;
   command.sequence = answers.state->last_sequence + 1;
   command.command = order.command;

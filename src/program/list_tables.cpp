@@ -46,7 +46,6 @@ Json quantities() {
                {"type", type_name<Value>()},
                {"topic", name_of(row.topic)},
                {"csv_column", row.in_csv() ? Json(++column) : Json()},
-               {"lcm", row.in_lcm()},
                {"since", row.since},
                {"meaning", row.meaning}};
     if constexpr (std::is_same_v<Value, rig::Phase>) {
@@ -82,11 +81,10 @@ int list_quantities(bool json) {
     print(rows);
     return exit_completed;
   }
-  fmt::print("{:<24}  {:<15}  {:>3}  {:<3}  {}\n", "quantity", "unit", "CSV", "LCM", "meaning");
+  fmt::print("{:<24}  {:<15}  {:>3}  {}\n", "quantity", "unit", "CSV", "meaning");
   for (const Json& row : rows) {
-    fmt::print("{:<24}  {:<15}  {:>3}  {:<3}  {}\n", row["name"].get<std::string>(), row["unit"].get<std::string>(),
-               row["csv_column"].is_null() ? "" : row["csv_column"].dump(), row["lcm"].get<bool>() ? "yes" : "",
-               row["meaning"].get<std::string>());
+    fmt::print("{:<24}  {:<15}  {:>3}  {}\n", row["name"].get<std::string>(), row["unit"].get<std::string>(),
+               row["csv_column"].is_null() ? "" : row["csv_column"].dump(), row["meaning"].get<std::string>());
   }
   return exit_completed;
 }

@@ -14,6 +14,7 @@
 #include "replay/rerun.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/csv_sink.hpp"
+#include "telemetry/log_to_csv.hpp"
 
 namespace abs_hil::program {
 
@@ -41,7 +42,7 @@ void add_replay(cli::Parser& parser, ReplayCommand& command) {
   command.parser = parser.add_subcommand("replay", "feed a recorded run to its own or another controller, open loop");
   command.parser.add({.names = "recording",
                       .to = &command.recording,
-                      .help = "event log (--log), its CSV from abs_hil convert, or a run folder (--out)",
+                      .help = "event log (--log), or a run folder (--out)",
                       .type = "LOG",
                       .required = true});
   command.parser.add({.names = "--check",
@@ -102,28 +103,25 @@ int replay_run(const ReplayCommand& command) {
 
 void add_convert(cli::Parser& parser, ConvertCommand& command) {
   command.parser = parser.add_subcommand(
-      "convert",
-      "convert an event log (.lcmlog) to CSV or back, without loss; a run to .mcap or .parquet (abs_convert --help)");
+      "convert", "convert an event log (.lcmlog) to CSV; a run to .mcap or .parquet (abs_convert --help)");
   command.parser.add(
-      {.names = "from", .to = &command.from, .help = "event log, run folder or CSV", .type = "IN", .required = true});
+      {.names = "from", .to = &command.from, .help = "event log or run folder", .type = "IN", .required = true});
   command.parser.add({.names = "to",
                       .to = &command.to,
-                      .help = "CSV or event log; FILE.mcap or FILE.parquet",
+                      .help = "FILE.csv, FILE.mcap or FILE.parquet",
                       .type = "OUT",
                       .required = true});
 }
 
 int convert(const ConvertCommand& command) {
   const std::string from = log_in(command.from);
-  const bool from_csv = std::filesystem::path(from).extension() == ".csv";
-  const bool to_csv = std::filesystem::path(command.to).extension() == ".csv";
-  if (from_csv == to_csv) {
-    throw config::ConfigError("convert: exactly one of IN and OUT must end in .csv; the other is the event log");
+  if (std::filesystem::path(command.to).extension() != ".csv") {
+    throw config::ConfigError("convert: OUT = " + command.to + ": give a name that ends in .csv, .mcap or .parquet");
   }
   try {
-    const telemetry::ConversionCounts counts =
-        from_csv ? telemetry::csv_to_log(from, command.to) : telemetry::log_to_csv(from, command.to);
+    const telemetry::ConversionCounts counts = telemetry::log_to_csv(from, command.to);
     note(counts.cut);
+    if (!counts.lacks.empty()) spdlog::warn("'{}' lacks {}: another version wrote it", from, counts.lacks);
     fmt::print("{} events", counts.events);
     if (counts.raw > 0) fmt::print(", {} of them of unknown type, kept as hexadecimal digits", counts.raw);
     fmt::print("\n");

@@ -127,7 +127,7 @@ void RunOutputs::attach(experiment::RunSession& session) {
   if (!remote_commands_ || !command_listener_ || !stream_) return;
   remote_commands_->set_mailbox(session.adjustments());
   remote_commands_->set_listener(*command_listener_);
-  command_listener_->set_judge([this](const command2_t& command) { return remote_commands_->judge(command); });
+  command_listener_->set_judge([this](const command_t& command) { return remote_commands_->judge(command); });
   command_listener_->listen();
   stream_->set_farewell([this] {
     command_listener_->finish();

@@ -30,7 +30,7 @@ class StopListener {
     stream_.add(lcm_);
     const config::CommandOptions& commands = run.settings.commands;
     if (commands.enabled) commands::sign_answers(stream_, commands::read_key(commands.key_file));
-    commands_.set_judge([](const command2_t& command) {
+    commands_.set_judge([](const command_t& command) {
       const std::string shown = rig::printable(command.command, 64);
       return telemetry::CommandAnswer{rig::Reason::command_not_now,
                                       "refused '" + shown + "': only stop is accepted between two runs of a series"};

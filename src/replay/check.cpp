@@ -22,15 +22,19 @@ struct FieldValue {
 };
 
 std::map<std::string_view, FieldValue> values_of(const telemetry_t& message) {
+  const auto of = [](double value) {
+    return FieldValue{std::bit_cast<std::uint64_t>(value), fmt::format("{} ({:a})", value, value)};
+  };
   std::map<std::string_view, FieldValue> values;
-  telemetry::visit_fields(message, [&values](std::string_view name, const auto& value) {
+  telemetry::visit_fields(message, [&values, &of](std::string_view name, const auto& value) {
     using Value = std::decay_t<decltype(value)>;
     if constexpr (std::is_same_v<Value, double>) {
-      values[name] = {std::bit_cast<std::uint64_t>(value), fmt::format("{} ({:a})", value, value)};
-    } else {
+      values[name] = of(value);
+    } else if constexpr (std::is_integral_v<Value>) {
       values[name] = {static_cast<std::uint64_t>(static_cast<std::int64_t>(value)), fmt::format("{}", value)};
     }
   });
+  for (const telemetry::NamedValue& named : telemetry::values_of(message)) values[named.name] = of(named.value);
   return values;
 }
 
@@ -42,12 +46,13 @@ bool same_bits(const telemetry_t& a, const telemetry_t& b) {
 }
 
 /// Compares a rerun with the recording and adds one line about the result.
-bool compare(const RecordedRun& run, const std::vector<RerunCycle>& rerun, bool with_timing, const std::string& what,
-             CheckResult& result) {
+bool compare(const RecordedRun& run, const rig::RunNames& names, const std::vector<RerunCycle>& rerun, bool with_timing,
+             const std::string& what, CheckResult& result) {
   const std::size_t common = std::min(run.cycles.size(), rerun.size());
   for (std::size_t n = 0; n < common; ++n) {
     const telemetry_t& recorded = run.cycles[n];
-    telemetry_t computed = telemetry::to_message(rerun[n].record, rerun[n].distance_m, recorded.sequence);
+    telemetry_t computed = telemetry::to_message(rerun[n].record, rerun[n].distance_m, recorded.sequence, names);
+    computed.sample_valid = recorded.sample_valid;  // a rerun gets the latest usable counts, not why
     if (ended_from_outside(run, n, WheelFaults::found_again)) computed.reason_value = recorded.reason_value;
     if (same_bits(recorded, computed)) continue;
     const Difference difference = first_difference(recorded, computed, with_timing);
@@ -73,19 +78,23 @@ Difference first_difference(const telemetry_t& recorded, const telemetry_t& comp
   const auto b = values_of(computed);
   Difference difference;
   // Fields are compared in the message's order: causes come before effects, except for estimates.
-  telemetry::visit_fields(recorded, [&](std::string_view name, const auto&) {
+  const auto compare = [&](std::string_view name) {
     const bool is_timing = rig::topic_of(name) == rig::Topic::timing;
-    if (!difference.field.empty() || (is_timing && !with_timing)) return;
+    // What one of the two lacks is another version's.
+    if (!difference.field.empty() || (is_timing && !with_timing) || !a.contains(name) || !b.contains(name)) return;
     if (a.at(name).bits != b.at(name).bits) difference = {std::string(name), a.at(name).text, b.at(name).text};
-  });
+  };
+  telemetry::visit_fields(recorded, [&compare](std::string_view name, const auto&) { compare(name); });
+  for (const telemetry::NamedValue& named : telemetry::values_of(recorded)) compare(named.name);
   return difference;
 }
 
 CheckResult check(const RecordedRun& run) {
   const config::Settings settings = settings_of(run);
+  const rig::RunNames names = names_of(run, settings);
   CheckResult result;
   const auto compared = [&](const std::vector<RerunCycle>& rerun, bool with_timing, const std::string& what) {
-    result.equal = compare(run, rerun, with_timing, what, result) && result.equal;
+    result.equal = compare(run, names, rerun, with_timing, what, result) && result.equal;
   };
   compared(rerun_open_loop(run, settings, WheelFaults::found_again), run.virtual_time,
            "open loop (commands, phases and estimates from the recorded measurements)");

@@ -9,6 +9,7 @@
 #include "config/key_table.hpp"
 #include "rig/parse_json.hpp"
 #include "telemetry/checked_decode.hpp"
+#include "telemetry/message_codec.hpp"
 
 namespace abs_hil::replay {
 
@@ -33,16 +34,15 @@ class Collector {
       take_cycle(decoded<telemetry_t>(event), event.channel);
     } else if (is(experiment_t{})) {
       take_experiment(decoded<experiment_t>(event));
-    } else if (is(measurement_t{})) {
-      measurements_.push_back(decoded<measurement_t>(event));
     } else if (is(event_t{})) {
       run_.events.push_back(decoded<event_t>(event));
     } else if (is(adjustment_t{})) {
       run_.adjustments.push_back(decoded<adjustment_t>(event));
     } else if (is(status_t{})) {
       static_cast<void>(decoded<status_t>(event));
-    } else if (!channel_.empty() && event.channel == channel_) {
-      fail("a message on " + channel_ + " is not a telemetry_t");
+    } else if (event.channel == channel_ || event.channel.ends_with("TELEMETRY")) {
+      fail("event " + std::to_string(event.number) + " on " + event.channel +
+           " is not a telemetry_t of this version of abs_hil; replay it with the version that recorded it");
     }
   }
 
@@ -52,12 +52,9 @@ class Collector {
     if (!has_experiment_) {
       fail("it holds no configuration (no experiment_t message); record with --log, or for more than 5 s");
     }
-    for (const telemetry_t& cycle : run_.cycles) run_.measured_ns.push_back(cycle.stamp_ns);
-    for (const measurement_t& measurement : measurements_) {
-      if (measurement.cycle < 0 || static_cast<std::size_t>(measurement.cycle) >= run_.cycles.size()) {
-        fail("a measurement_t of cycle " + std::to_string(measurement.cycle) + ", but the recording lacks that cycle");
-      }
-      run_.measured_ns[static_cast<std::size_t>(measurement.cycle)] = measurement.measured_ns;
+    if (const auto lacking = telemetry::lacking_in(run_.cycles.front()); !lacking.empty()) {
+      run_.cut.append(run_.cut.empty() ? "" : "; ").append("'" + name_ + "' lacks ").append(lacking.front());
+      run_.cut.append(", as another version recorded it: it counts as unknown");
     }
     for (std::size_t n = 1; n < run_.adjustments.size(); ++n) {
       if (run_.adjustments[n].cycle < run_.adjustments[n - 1].cycle)
@@ -130,7 +127,6 @@ class Collector {
   std::string name_;
   std::string channel_;  ///< telemetry channel
   RecordedRun run_{};
-  std::vector<measurement_t> measurements_{};
   bool has_experiment_{false};
 };
 

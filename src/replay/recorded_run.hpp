@@ -11,22 +11,21 @@
 #include "abs_hil/experiment_t.hpp"
 #include "abs_hil/telemetry_t.hpp"
 #include "config/settings.hpp"
-#include "telemetry/recording.hpp"
+#include "telemetry/event_log.hpp"
 
 namespace abs_hil::replay {
 
 /// A recorded run: every cycle from the first.
 struct RecordedRun {
-  experiment_t experiment{};                ///< first such message of the recording: names and effective configuration
-  std::vector<telemetry_t> cycles{};        ///< index: cycle number; not empty
-  std::vector<std::int64_t> measured_ns{};  ///< time at which the counters of each cycle were read
+  experiment_t experiment{};          ///< first such message of the recording: names and effective configuration
+  std::vector<telemetry_t> cycles{};  ///< index: cycle number; not empty
   std::vector<event_t> events{};
   std::vector<adjustment_t> adjustments{};  ///< ordered by cycle
-  std::string cut{};                        ///< telemetry::EventLogReader::cut: the recording of a killed run
+  std::string cut{};                        ///< what the recording lacks, in words: that of a killed run, an older one
   bool virtual_time{false};                 ///< a run with --fast: exact wake-ups, computations take no time
 };
 
-/// Reads a recording (event log or converted CSV). Throws telemetry::RecordingError if it is damaged,
+/// Reads an event log. Throws telemetry::RecordingError if it is damaged,
 /// holds no run or several runs, or lacks a cycle.
 [[nodiscard]] RecordedRun read_run(const std::filesystem::path& recording);
 

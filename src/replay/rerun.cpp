@@ -61,7 +61,6 @@ class RecordedRig final : public driver::RigDriver {
   driver::IoResult do_read(std::int64_t /*now_ns*/, rig::Measurement& measurement) noexcept override {
     const rig::CycleRecord record = telemetry::to_record(run_.cycles[next_]);
     measurement = record.measurement;
-    measurement.time_ns = run_.measured_ns[next_];
     truth_ = record.truth;
     // With ideal sensors the simulator hands its true speeds to the controller. Fault injections may have changed them;
     // then the estimates hold what the controller received.
@@ -260,7 +259,7 @@ bool ended_from_outside(const RecordedRun& run, std::size_t n, WheelFaults fault
     case rig::FoundAgain::yes: return false;
     case rig::FoundAgain::jumped_counts:
       // The gate refuses such counts; the recording then repeats the previous cycle's counts.
-      if (n > 0 && run.measured_ns[n] == run.measured_ns[n - 1]) return true;
+      if (n > 0 && run.cycles[n].measured_ns == run.cycles[n - 1].measured_ns) return true;
       return faults == WheelFaults::as_recorded;
     case rig::FoundAgain::wheel_checks: return faults == WheelFaults::as_recorded;
   }

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <vector>
 
 #include "abs_hil/message_fields.hpp"
 
@@ -22,10 +23,18 @@ class FieldReader {
     std::uint64_t bits = 0;
     if (!read(bits, sizeof value)) return;
     value = static_cast<Number>(bits);
+    if constexpr (sizeof value == sizeof(std::int32_t)) last_whole_ = static_cast<std::int32_t>(value);
   }
   void operator()(std::string_view /*name*/, double& value) {
     std::uint64_t bits = 0;
     if (read(bits, sizeof value)) value = std::bit_cast<double>(bits);
+  }
+  /// The length is the field before, an int32_t (lcmtypes/message_fields.py).
+  void operator()(std::string_view name, std::vector<double>& values) {
+    sound_ = sound_ && last_whole_ >= 0 && static_cast<std::uint64_t>(last_whole_) <= rest_.size() / sizeof(double);
+    if (!sound_) return;
+    values.resize(static_cast<std::size_t>(last_whole_));
+    for (double& value : values) (*this)(name, value);
   }
   /// A string is its length with the final NUL, then its bytes with the NUL.
   void operator()(std::string_view /*name*/, std::string& value) {
@@ -51,6 +60,7 @@ class FieldReader {
   }
 
   std::span<const std::uint8_t> rest_;
+  std::int32_t last_whole_{0};
   bool sound_{true};
 };
 
@@ -68,7 +78,8 @@ class FieldReader {
 template <class Message>
 [[nodiscard]] std::string_view decode_checked(std::span<const std::uint8_t> packet, Message& message) {
   if (packet.size() < sizeof(std::int64_t)) return "shorter than a fingerprint";
-  if (fingerprint_of(packet) != static_cast<std::int64_t>(Message::getHash())) return "wrong fingerprint";
+  if (fingerprint_of(packet) != static_cast<std::int64_t>(Message::getHash()))
+    return "wrong fingerprint: it is of another type or of another version's type";
   FieldReader reader(packet.subspan(sizeof(std::int64_t)));
   visit_fields(message, reader);
   if (!reader.sound()) return "truncated or damaged";

@@ -16,7 +16,6 @@ std::optional<DetectedEvent> EventDetector::observe(const rig::CycleRecord& reco
   if (!phase_changed && !reason_is_new) return std::nullopt;
 
   DetectedEvent event;
-  event.phase_changed = phase_changed;
   event.reason = rig::reason_text(record.reason, record.reason_value, names_.signals);
   if (rig::is_fault(record.reason) || (phase_changed && record.phase == rig::Phase::fault)) {
     event.kind = event_kind::fault;

@@ -24,7 +24,6 @@ struct DetectedEvent {
   std::string_view kind;
   std::string message;  ///< for people, one line
   std::string reason;   ///< the record's reason in words
-  bool phase_changed{false};
 };
 
 /// Finds events in the stream of records, so that the real-time thread handles numbers only. Each change of phase and

@@ -88,6 +88,12 @@ std::optional<LogEvent> EventLogReader::next() {
   return event;
 }
 
+std::string for_each_event(const std::filesystem::path& log, const std::function<void(const LogEvent&)>& take) {
+  EventLogReader reader(log);
+  while (const auto event = reader.next()) take(*event);
+  return reader.cut();
+}
+
 void EventLogWriter::write(std::int64_t number, std::int64_t timestamp_us, std::string_view channel,
                            std::span<const std::uint8_t> data) {
   std::array<std::uint8_t, header_bytes> header{};

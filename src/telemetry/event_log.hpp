@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -62,6 +63,10 @@ class EventLogReader {
   std::int64_t events_{0};
   std::string cut_{};
 };
+
+/// Calls `take` for every event of a log, in order. Returns EventLogReader::cut. Throws RecordingError, even after some
+/// calls.
+std::string for_each_event(const std::filesystem::path& log, const std::function<void(const LogEvent&)>& take);
 
 /// Writes an event log as LCM does. Its members throw files::FileError.
 class EventLogWriter {

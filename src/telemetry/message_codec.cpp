@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <tuple>
@@ -25,13 +25,6 @@ static_assert(telemetry_t::PHASE_HOLD == static_cast<int>(rig::Phase::hold));
 static_assert(telemetry_t::PHASE_STOPPED == static_cast<int>(rig::Phase::stopped));
 static_assert(telemetry_t::PHASE_FAULT == static_cast<int>(rig::Phase::fault));
 
-/// A name as a template argument, so that the compiler's message shows it.
-template <std::size_t size>
-struct Name {
-  constexpr explicit Name(std::string_view name) { std::copy(name.begin(), name.end(), text); }
-  char text[size]{};
-};
-
 constexpr std::size_t field_count = std::tuple_size_v<std::remove_const_t<decltype(fields<telemetry_t>)>>;
 
 /// Index of the field of that name in telemetry_t; field_count if there is none.
@@ -45,48 +38,32 @@ constexpr std::size_t field_of(std::string_view name) {
       fields<telemetry_t>);
 }
 
-template <Name name, bool is_there>
-constexpr bool row_has_field() {
-  static_assert(is_there, "this row of rig/quantities.hpp goes to LCM, but telemetry_t.lcm has no field of its name");
-  return is_there;
-}
-template <Name name, bool is_there>
-constexpr bool field_has_row() {
-  static_assert(is_there, "this field of telemetry_t.lcm has no row for LCM in rig/quantities.hpp");
-  return is_there;
-}
+/// The table's rows without a field of their own: their values travel in `values`, in this order.
+template <std::size_t n>
+constexpr bool has_field = field_of(std::get<n>(rig::quantities).name) < field_count;
 
-constexpr bool goes_to_lcm(std::string_view name) {
-  bool found = false;
-  rig::for_each_quantity([&](const auto& row) { found = found || (row.in_lcm() && row.name == name); });
-  return found;
-}
+/// Fields that no row fills: what `values` needs, and texts.
+constexpr std::array fields_beside{std::string_view("phase_name"), std::string_view("names"),
+                                   std::string_view("value_count"), std::string_view("values")};
+constexpr std::size_t rows_with_field = []<std::size_t... n>(std::index_sequence<n...>) {
+  return (std::size_t{0} + ... + std::size_t{has_field<n>});
+}(std::make_index_sequence<rig::quantity_count>{});
+static_assert(rows_with_field + fields_beside.size() == field_count,
+              "a field of telemetry_t.lcm has no row in rig/quantities.hpp");
 
-template <std::size_t... n>
-constexpr bool every_field_has_row(std::index_sequence<n...>) {
-  constexpr auto& all = fields<telemetry_t>;
-  return (field_has_row<Name<std::get<n>(all).name.size() + 1>(std::get<n>(all).name),
-                        goes_to_lcm(std::get<n>(all).name)>() &&
-          ...);
-}
-static_assert(every_field_has_row(std::make_index_sequence<field_count>{}));
-
-template <std::size_t n, class Message, class Parts, class Use>
-void use_match(Message& message, const Parts& parts, const Use& use) {
-  constexpr auto& row = std::get<n>(rig::quantities);
-  if constexpr (row.in_lcm()) {
-    constexpr std::size_t place = field_of(row.name);
-    if constexpr (row_has_field<Name<row.name.size() + 1>(row.name), (place < field_count)>()) {
-      use(message.*std::get<place>(fields<telemetry_t>).member, row.at(parts));
+/// Calls `use(row, field)` for each row with a field in the message, and `other(row)` for each row without.
+template <class Message, class Use, class Other>
+void for_each_row(Message& message, const Use& use, const Other& other) {
+  const auto one = [&]<std::size_t n>(std::integral_constant<std::size_t, n>) {
+    constexpr auto& row = std::get<n>(rig::quantities);
+    if constexpr (has_field<n>) {
+      use(row, message.*std::get<field_of(row.name)>(fields<telemetry_t>).member);
+    } else {
+      other(row);
     }
-  }
-}
-
-/// Calls `use(field, value)` with each field of the message and the value of the cycle that has its name.
-template <class Message, class Parts, class Use>
-void for_each_match(Message& message, const Parts& parts, const Use& use) {
+  };
   [&]<std::size_t... n>(std::index_sequence<n...>) {
-    (use_match<n>(message, parts, use), ...);
+    (one(std::integral_constant<std::size_t, n>{}), ...);
   }(std::make_index_sequence<rig::quantity_count>{});
 }
 
@@ -102,53 +79,92 @@ void read(const std::int8_t& field, rig::Phase& value) {
 
 }  // namespace
 
-telemetry_t to_message(const rig::CycleRecord& record, double distance_m, std::int64_t sequence) noexcept {
+telemetry_t blank_message(const rig::RunNames& names) {
   telemetry_t message{};
-  for_each_match(message, rig::CycleParts<const rig::CycleRecord>{record, distance_m, sequence},
-                 [](auto& field, const auto& value) { field = static_cast<std::decay_t<decltype(field)>>(value); });
+  const auto add = [&message](std::string_view name) {
+    message.names.append(message.names.empty() ? "" : ",").append(name);
+    ++message.value_count;
+  };
+  for_each_row(
+      message, [](const auto&, const auto&) {}, [&add](const auto& row) { add(row.name); });
+  for (const std::string& signal : names.signals) add(signal);
+  message.values.assign(static_cast<std::size_t>(message.value_count), rig::unknown);
   return message;
 }
 
-rig::CycleRecord to_record(const telemetry_t& message) noexcept {
+void put_record(const rig::CycleRecord& record, double distance_m, const rig::RunNames& names, telemetry_t& message) {
+  const std::int64_t sequence = message.sequence;
+  const rig::CycleParts<const rig::CycleRecord> parts{record, distance_m, sequence};
+  auto value = message.values.begin();
+  for_each_row(
+      message,
+      [&parts](const auto& row, auto& field) { field = static_cast<std::decay_t<decltype(field)>>(row.at(parts)); },
+      [&](const auto& row) { *value++ = static_cast<double>(row.at(parts)); });
+  for (std::size_t n = 0; value != message.values.end(); ++value, ++n) *value = record.control.signals.at(n);
+  if (names.has_own_phase_names()) message.phase_name = names.phase_of(record);
+}
+
+telemetry_t to_message(const rig::CycleRecord& record, double distance_m, std::int64_t sequence,
+                       const rig::RunNames& names) {
+  telemetry_t message = blank_message(names);
+  message.sequence = sequence;
+  put_record(record, distance_m, names, message);
+  return message;
+}
+
+rig::CycleRecord to_record(const telemetry_t& message) {
   rig::CycleRecord record;
   double distance_m = 0.0;
   std::int64_t sequence = 0;
-  for_each_match(message, rig::CycleParts<rig::CycleRecord>{record, distance_m, sequence},
-                 [](const auto& field, auto& value) { read(field, value); });
-  record.measurement.time_ns = message.stamp_ns;
+  const rig::CycleParts<rig::CycleRecord> parts{record, distance_m, sequence};
+  const std::vector<NamedValue> values = values_of(message);
+  std::size_t signals = 0;
+  for (const NamedValue& named : values) {
+    if (!rig::is_quantity(named.name) && signals < rig::signal_max) record.control.signals[signals++] = named.value;
+  }
+  for_each_row(
+      message, [&parts](const auto& row, const auto& field) { read(field, row.at(parts)); },
+      [&](const auto& row) {
+        using Value = std::decay_t<decltype(row.at(parts))>;
+        const auto found = std::ranges::find(values, row.name, &NamedValue::name);
+        const double value = found != values.end() ? found->value : rig::unknown;
+        if constexpr (std::is_floating_point_v<Value>) {
+          row.at(parts) = value;
+        } else {
+          row.at(parts) = std::isnan(value) ? Value{} : static_cast<Value>(value);
+        }
+      });
   return record;
 }
 
-measurement_t measured_at(const rig::CycleRecord& record) noexcept {
-  measurement_t m{};
-  m.cycle = std::bit_cast<std::int64_t>(record.sequence);
-  m.measured_ns = record.measurement.time_ns;
-  return m;
-}
-
-namespace {
-constexpr std::array signal_fields{&signals_t::value1, &signals_t::value2, &signals_t::value3, &signals_t::value4,
-                                   &signals_t::value5, &signals_t::value6, &signals_t::value7, &signals_t::value8};
-static_assert(signal_fields.size() == rig::signal_max, "signals_t.lcm has a field for every signal");
-}  // namespace
-
-void put_signals(const rig::CycleRecord& record, std::size_t count, signals_t& message) noexcept {
-  message.cycle = std::bit_cast<std::int64_t>(record.sequence);
-  for (std::size_t n = 0; n < rig::signal_max; ++n) {
-    message.*signal_fields[n] = n < count ? record.control.signals[n] : rig::unknown;
+std::vector<NamedValue> values_of(const telemetry_t& message) {
+  std::vector<NamedValue> all;
+  std::string_view names = message.names;
+  for (std::size_t n = 0; n < message.values.size() && !names.empty(); ++n) {
+    const std::size_t comma = std::min(names.find(','), names.size());
+    all.push_back({names.substr(0, comma), message.values[n]});
+    names.remove_prefix(std::min(comma + 1, names.size()));
   }
+  return all;
 }
 
-rig::SignalValues signals_of(const signals_t& message) noexcept {
-  rig::SignalValues values{};
-  for (std::size_t n = 0; n < rig::signal_max; ++n) values[n] = message.*signal_fields[n];
-  return values;
+std::vector<std::string> signals_of(const telemetry_t& message) {
+  std::vector<std::string> names;
+  for (const NamedValue& named : values_of(message)) {
+    if (names.size() < rig::signal_max && rig::is_signal_name(named.name)) names.emplace_back(named.name);
+  }
+  return names;
 }
 
-DecodedCommand decode_command(std::span<const std::uint8_t> packet) {
-  DecodedCommand decoded;
-  decoded.problem = decode_checked(packet, decoded.command);
-  return decoded;
+std::vector<std::string_view> lacking_in(const telemetry_t& message) {
+  std::vector<std::string_view> lacking;
+  const std::vector<NamedValue> values = values_of(message);
+  for_each_row(
+      message, [](const auto&, const auto&) {},
+      [&](const auto& row) {
+        if (std::ranges::find(values, row.name, &NamedValue::name) == values.end()) lacking.push_back(row.name);
+      });
+  return lacking;
 }
 
 }  // namespace abs_hil::telemetry

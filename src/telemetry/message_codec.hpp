@@ -1,5 +1,7 @@
 #pragma once
 
+// A cycle's record as a telemetry message, and back.
+
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -8,30 +10,34 @@
 #include <string_view>
 #include <vector>
 
-#include "abs_hil/command_t.hpp"
-#include "abs_hil/event_t.hpp"
-#include "abs_hil/experiment_t.hpp"
-#include "abs_hil/measurement_t.hpp"
 #include "abs_hil/rig/cycle_record.hpp"
-#include "abs_hil/signals_t.hpp"
-#include "abs_hil/status_t.hpp"
 #include "abs_hil/telemetry_t.hpp"
+#include "rig/run_names.hpp"
 
 namespace abs_hil::telemetry {
 
-/// The record as a message. `distance_m`: distance of the car since braking started; `sequence`: of the channel.
-[[nodiscard]] telemetry_t to_message(const rig::CycleRecord& record, double distance_m, std::int64_t sequence) noexcept;
+/// A message with the names of its values, for put_record.
+[[nodiscard]] telemetry_t blank_message(const rig::RunNames& names);
+/// Fills in the record; sequence, stamp of the channel and names stay. `message` is of blank_message with these names.
+void put_record(const rig::CycleRecord& record, double distance_m, const rig::RunNames& names, telemetry_t& message);
+/// Both at once. `distance_m`: distance of the car since braking started; `sequence`: of the channel.
+[[nodiscard]] telemetry_t to_message(const rig::CycleRecord& record, double distance_m, std::int64_t sequence,
+                                     const rig::RunNames& names = {});
 
-/// The inverse of to_message for the fields of the message. The message lacks the command's torque and the true speeds
-/// given to the controller. The time of the counters is the stamp, unless a measurement_t gives another time.
-[[nodiscard]] rig::CycleRecord to_record(const telemetry_t& message) noexcept;
-/// The record's cycle and the time of its counters.
-[[nodiscard]] measurement_t measured_at(const rig::CycleRecord& record) noexcept;
+/// The inverse of put_record: each message is a whole row. The message lacks the command's torque and the true speeds
+/// given to the controller. What the message of another version lacks (`lacking_in`) is NaN, or 0 if it is no double.
+[[nodiscard]] rig::CycleRecord to_record(const telemetry_t& message);
 
-/// Fills in the cycle and the first `count` values; the others are NaN, and `names` stays.
-void put_signals(const rig::CycleRecord& record, std::size_t count, signals_t& message) noexcept;
-/// The values of the message.
-[[nodiscard]] rig::SignalValues signals_of(const signals_t& message) noexcept;
+/// A value of `values` and its name; the name is a part of the message.
+struct NamedValue {
+  std::string_view name;
+  double value{rig::unknown};
+};
+[[nodiscard]] std::vector<NamedValue> values_of(const telemetry_t& message);
+/// Names of the controller's own signals in the message.
+[[nodiscard]] std::vector<std::string> signals_of(const telemetry_t& message);
+/// Quantities of this version's table that the message lacks, because another version sent it.
+[[nodiscard]] std::vector<std::string_view> lacking_in(const telemetry_t& message);
 
 /// A buffer for encoding. It grows to the size of the largest message and allocates nothing after that.
 class EncodeBuffer {
@@ -53,14 +59,5 @@ class EncodeBuffer {
  private:
   std::vector<std::uint8_t> bytes_;
 };
-
-/// A decoded message of ABS_COMMAND. `problem` is empty if `command` is valid; otherwise it gives the reason.
-struct DecodedCommand {
-  command_t command{};
-  std::string_view problem{};
-};
-
-/// decode_checked for command_t.
-[[nodiscard]] DecodedCommand decode_command(std::span<const std::uint8_t> packet);
 
 }  // namespace abs_hil::telemetry

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "abs_hil/adjustment_t.hpp"
-#include "abs_hil/checks_t.hpp"
 #include "files/result_file.hpp"
 #include "rig/formatted_text.hpp"
 #include "rig/reason_text.hpp"
@@ -51,13 +50,6 @@ void put_parts(const StatusSnapshot& snapshot, status_t& m) {
   m.ticks_missed = static_cast<std::int64_t>(snapshot.late.ticks_missed);
 }
 
-/// Outside of slip control no signal is known, and a message would say nothing.
-bool knows_signals(const rig::CycleRecord& record, std::size_t count) noexcept {
-  const auto& values = record.control.signals;
-  return std::any_of(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(count),
-                     [](double value) { return !std::isnan(value); });
-}
-
 }  // namespace
 
 void check_channel_prefix(std::string_view prefix) {
@@ -79,11 +71,6 @@ MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, S
   status_channel_.name = options_.channel_prefix + "STATUS";
   adjustment_.name = options_.channel_prefix + "ADJUSTMENT";
   command_state_.name = options_.channel_prefix + "COMMAND_STATE";
-  measurement_.name = options_.channel_prefix + "MEASUREMENT";
-  phase_.name = options_.channel_prefix + "PHASE";
-  sample_.name = options_.channel_prefix + "SAMPLE";
-  signals_.name = options_.channel_prefix + "SIGNALS";
-  checks_.name = options_.channel_prefix + "CHECKS";
   event_.name = options_.channel_prefix + "EVENT";
   experiment_.name = options_.channel_prefix + "EXPERIMENT";
   command_channel_ = options_.channel_prefix + "COMMAND";
@@ -93,37 +80,23 @@ MessageStream::MessageStream(StreamOptions options, ExperimentInfo experiment, S
   experiment_message_.backend = std::move(experiment.backend);
   experiment_message_.config_json = std::move(experiment.config_json);
   experiment_message_.version = std::move(experiment.version);
-  sample_message_.sample_valid = 1;
-  for (const std::string& signal : names_.signals) {
-    signals_message_.names.append(signals_message_.names.empty() ? "" : ",").append(signal);
-  }
+  telemetry_message_ = blank_message(names_);
 }
 
 void MessageStream::consume(const rig::CycleRecord& record, double distance_m) {
   latest_ = record;
   if (!started_ || record.time_s >= next_experiment_s_) {
     send_experiment();
-    send_phase();
     next_experiment_s_ = next_on_grid(record.time_s, options_.experiment_period_s);
   }
-  send_sample(record);
   // A replay needs the answer. It may have come from a person or from the simulation.
   if (record.reason == rig::Reason::question_answered) send_adjustment("continue", 0.0);
   if (auto event = detector_.observe(record)) {
     send_event(event->kind, record.reason, record.reason_value, std::move(event->message));
-    if (event->phase_changed && started_) send_phase();
   }
   if (record.sequence >= next_telemetry_cycle_) {
-    telemetry_t message = to_message(record, distance_m, 0);
-    send(telemetry_, message);
-    if (record.measurement.time_ns != record.stamp_ns) {
-      measurement_t measurement = measured_at(record);
-      send(measurement_, measurement);
-    }
-    if (knows_signals(record, names_.signals.size())) {
-      put_signals(record, names_.signals.size(), signals_message_);
-      send(signals_, signals_message_);
-    }
+    put_record(record, distance_m, names_, telemetry_message_);
+    send(telemetry_, telemetry_message_);
     next_telemetry_cycle_ = (record.sequence / options_.telemetry_every_cycles + 1) * options_.telemetry_every_cycles;
   }
   if (!started_ || record.time_s >= next_status_s_) {
@@ -221,33 +194,9 @@ void MessageStream::send_status() {
   m.cycle_time_p99_us = snapshot.cycle_time.p99_us;
   m.cycle_time_p99_9_us = snapshot.cycle_time.p99_9_us;
   m.cycle_time_max_us = snapshot.cycle_time.max_us;
+  m.unjudged_share = snapshot.checks_unjudged;
   put_parts(snapshot, m);
   send(status_channel_, m);
-  if (std::isnan(snapshot.checks_unjudged)) return;
-  checks_t checks{};
-  checks.time_s = latest_.time_s;
-  checks.unjudged_share = snapshot.checks_unjudged;
-  send(checks_, checks);
-}
-
-void MessageStream::send_phase() {
-  phase_t message{};
-  message.time_s = latest_.time_s;
-  message.phase = static_cast<std::int8_t>(latest_.phase);
-  message.phase_index = latest_.phase_index;
-  message.name = names_.phase_of(latest_);
-  send(phase_, message);
-}
-
-/// Nearly all samples are valid and most runs keep the wheels together: only changes are sent.
-void MessageStream::send_sample(const rig::CycleRecord& record) {
-  const auto valid = static_cast<std::int8_t>(record.sample_valid);
-  const auto apart = static_cast<std::int8_t>(record.wheels_apart);
-  if (valid == sample_message_.sample_valid && apart == sample_message_.wheels_apart) return;
-  sample_message_.cycle = static_cast<std::int64_t>(record.sequence);
-  sample_message_.sample_valid = valid;
-  sample_message_.wheels_apart = apart;
-  send(sample_, sample_message_);
 }
 
 void MessageStream::send_experiment() { send(experiment_, experiment_message_); }

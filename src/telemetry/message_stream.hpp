@@ -10,9 +10,7 @@
 #include "abs_hil/command_state_t.hpp"
 #include "abs_hil/event_t.hpp"
 #include "abs_hil/experiment_t.hpp"
-#include "abs_hil/phase_t.hpp"
-#include "abs_hil/sample_t.hpp"
-#include "abs_hil/signals_t.hpp"
+#include "abs_hil/status_t.hpp"
 #include "rig/record_sink.hpp"
 #include "rig/run_names.hpp"
 #include "telemetry/event_detector.hpp"
@@ -30,7 +28,7 @@ struct ExperimentInfo {
   std::string backend;
   std::string config_json;  ///< effective configuration
   std::string version;
-  rig::RunNames names{};  ///< for events, ABS_PHASE and ABS_SIGNALS
+  rig::RunNames names{};  ///< of phases and signals, for events and telemetry
 };
 
 /// Channel prefix and rates of the messages.
@@ -95,27 +93,19 @@ class MessageStream : public rig::RecordSink {
   void send_event(std::string_view kind, rig::Reason reason, double value, std::string message);
   void send_status();
   void send_experiment();
-  void send_phase();
-  void send_sample(const rig::CycleRecord& record);
 
   StreamOptions options_;
   StatusSource status_;
   std::vector<Outlet*> outlets_;
   Channel telemetry_;
-  Channel measurement_;
-  Channel signals_;
-  Channel phase_;
-  Channel sample_;
   Channel adjustment_;
   Channel command_state_;
   Channel status_channel_;
-  Channel checks_;
   Channel event_;
   Channel experiment_;
   std::string command_channel_;
   experiment_t experiment_message_{};
-  signals_t signals_message_{};
-  sample_t sample_message_{};
+  telemetry_t telemetry_message_{};
   rig::RunNames names_;
   EventDetector detector_;
   EncodeBuffer buffer_;

@@ -34,8 +34,6 @@ void RunListener::subscribe() {
   subscribe<status_t>(prefix_ + "STATUS");
   subscribe<event_t>(prefix_ + "EVENT");
   subscribe<experiment_t>(prefix_ + "EXPERIMENT");
-  subscribe<signals_t>(prefix_ + "SIGNALS");
-  subscribe<phase_t>(prefix_ + "PHASE");
 }
 
 void RunListener::look_for_server() {

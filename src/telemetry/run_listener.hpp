@@ -9,8 +9,6 @@
 
 #include "abs_hil/event_t.hpp"
 #include "abs_hil/experiment_t.hpp"
-#include "abs_hil/phase_t.hpp"
-#include "abs_hil/signals_t.hpp"
 #include "abs_hil/status_t.hpp"
 #include "abs_hil/telemetry_t.hpp"
 #include "telemetry/lcm_outlet.hpp"
@@ -29,8 +27,6 @@ class RunObserver {
   virtual void take(const status_t& message) = 0;
   virtual void take(const event_t& message) = 0;
   virtual void take(const experiment_t& message) = 0;
-  virtual void take(const signals_t& message) = 0;
-  virtual void take(const phase_t& message) = 0;
   /// Receives a message that does not have the type of its channel.
   virtual void take_malformed() = 0;
 };

@@ -12,7 +12,8 @@ namespace {
 
 constexpr std::size_t samples_max = 600'000;  // 60 s at 10 kHz
 constexpr std::size_t text_max_bytes = 200;
-constexpr std::size_t name_max_bytes = 32;
+constexpr std::size_t name_max_bytes = 40;
+constexpr std::size_t values_max = 16;
 /// Networks may deliver a few messages out of order. A sequence number further back belongs to another run.
 constexpr std::int64_t late_messages_max = 16;
 
@@ -40,10 +41,7 @@ void RunView::begin_run() noexcept {
   telemetry_.reset();
   status_.reset();
   experiment_.reset();
-  signals_.clear();
-  phase_.reset();
   telemetry_sequence_ = status_sequence_ = event_sequence_ = experiment_sequence_ = -1;
-  signals_sequence_ = phase_sequence_ = -1;
   lost_ = 0;
 }
 
@@ -94,29 +92,19 @@ void RunView::take(const experiment_t& message, std::int64_t now_ns) {
   for (std::string* text : {&e.experiment, &e.controller, &e.plant, &e.backend, &e.version}) make_printable(*text);
 }
 
-void RunView::take(const signals_t& message, std::int64_t now_ns) {
-  if (!admit(message.sequence, signals_sequence_, now_ns)) return;
-  signals_sequence_ = message.sequence;
-  const rig::SignalValues values = telemetry::signals_of(message);
-  signals_.clear();
-  std::string_view names = message.names;
-  for (std::size_t n = 0; n < values.size() && !names.empty(); ++n) {
-    const std::size_t comma = std::min(names.find(','), names.size());
-    signals_.push_back({rig::printable(names.substr(0, comma), name_max_bytes), values[n]});
-    names.remove_prefix(std::min(comma + 1, names.size()));
+std::string RunView::name_of(rig::Phase kind) const {
+  const bool named =
+      telemetry_ && telemetry_->phase == static_cast<std::int8_t>(kind) && !telemetry_->phase_name.empty();
+  return named ? rig::printable(telemetry_->phase_name, name_max_bytes) : std::string(rig::name_of(kind));
+}
+
+std::vector<NamedValue> RunView::values() const {
+  std::vector<NamedValue> shown;
+  if (!telemetry_) return shown;
+  for (const telemetry::NamedValue& named : telemetry::values_of(*telemetry_)) {
+    if (shown.size() < values_max) shown.push_back({rig::printable(named.name, name_max_bytes), named.value});
   }
-}
-
-void RunView::take(const phase_t& message, std::int64_t now_ns) {
-  if (!admit(message.sequence, phase_sequence_, now_ns)) return;
-  phase_sequence_ = message.sequence;
-  phase_ = message;
-  phase_->name = rig::printable(message.name, name_max_bytes);
-}
-
-std::string_view RunView::name_of(rig::Phase kind) const noexcept {
-  const bool named = phase_ && phase_->phase == static_cast<std::int8_t>(kind) && !phase_->name.empty();
-  return named ? std::string_view(phase_->name) : rig::name_of(kind);
+  return shown;
 }
 
 std::optional<double> RunView::silence_s(std::int64_t now_ns) const noexcept {

@@ -8,9 +8,7 @@
 
 #include "abs_hil/event_t.hpp"
 #include "abs_hil/experiment_t.hpp"
-#include "abs_hil/phase_t.hpp"
 #include "abs_hil/rig/phase.hpp"
-#include "abs_hil/signals_t.hpp"
 #include "abs_hil/status_t.hpp"
 #include "abs_hil/telemetry_t.hpp"
 
@@ -30,7 +28,7 @@ struct Sample {
   bool after_gap{false};  ///< messages just before this one were lost
 };
 
-/// A signal of the controller.
+/// A value of telemetry_t's `values`.
 struct NamedValue {
   std::string name;
   double value{0.0};  ///< NaN: not known
@@ -47,8 +45,6 @@ class RunView {
   void take(const status_t& message, std::int64_t now_ns);
   void take(const event_t& message, std::int64_t now_ns);
   void take(const experiment_t& message, std::int64_t now_ns);
-  void take(const signals_t& message, std::int64_t now_ns);
-  void take(const phase_t& message, std::int64_t now_ns);
   /// Counts a packet that is no message of a known type.
   void note_malformed() noexcept { ++malformed_; }
 
@@ -57,10 +53,10 @@ class RunView {
   [[nodiscard]] const std::optional<telemetry_t>& telemetry() const noexcept { return telemetry_; }
   [[nodiscard]] const std::optional<status_t>& status() const noexcept { return status_; }
   [[nodiscard]] const std::optional<experiment_t>& experiment() const noexcept { return experiment_; }
-  /// The controller's own signals, the latest values.
-  [[nodiscard]] const std::vector<NamedValue>& signals() const noexcept { return signals_; }
+  /// The latest values without a field of their own: mostly the controller's own signals.
+  [[nodiscard]] std::vector<NamedValue> values() const;
   /// The experiment's own name of the phase, if it is of that kind; otherwise the kind's.
-  [[nodiscard]] std::string_view name_of(rig::Phase kind) const noexcept;
+  [[nodiscard]] std::string name_of(rig::Phase kind) const;
   /// The newest first, at most `events_max`.
   [[nodiscard]] const std::deque<event_t>& events() const noexcept { return events_; }
   static constexpr std::size_t events_max = 20;
@@ -85,8 +81,6 @@ class RunView {
   std::optional<telemetry_t> telemetry_;
   std::optional<status_t> status_;
   std::optional<experiment_t> experiment_;
-  std::vector<NamedValue> signals_;
-  std::optional<phase_t> phase_;
   std::deque<event_t> events_;
   std::optional<std::int64_t> last_received_ns_;
   // Latest sequence number of each channel; -1: none in this run.
@@ -94,8 +88,6 @@ class RunView {
   std::int64_t status_sequence_{-1};
   std::int64_t event_sequence_{-1};
   std::int64_t experiment_sequence_{-1};
-  std::int64_t signals_sequence_{-1};
-  std::int64_t phase_sequence_{-1};
   std::int64_t lost_{0};
   std::int64_t malformed_{0};
   int runs_{0};

@@ -163,7 +163,7 @@ class Screen {
   int draw_foot() {
     const int events = std::clamp(grid_.rows() - 20, 1, 6);
     const int first = std::max(2, grid_.rows() - 1 - events - 2);
-    const bool has_signals = !view_.signals().empty() && first > 2;
+    const bool has_signals = !view_.values().empty() && first > 2;
     if (has_signals) draw_signals(first - 1);
     draw_timing(first);
     draw_counts(first + 1);
@@ -181,7 +181,7 @@ class Screen {
   /// Draws the controller's own signals, as many as there is room for.
   void draw_signals(int row) {
     int column = 0;
-    for (const NamedValue& signal : view_.signals()) {
+    for (const NamedValue& signal : view_.values()) {
       column = grid_.write(column, row, fmt::format("{} {}  ", signal.name, number(signal.value, 4)));
     }
   }

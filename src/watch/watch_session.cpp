@@ -38,8 +38,6 @@ class ViewFeed : public telemetry::RunObserver {
   void take(const status_t& message) override { view_.take(message, monotonic_ns()); }
   void take(const event_t& message) override { view_.take(message, monotonic_ns()); }
   void take(const experiment_t& message) override { view_.take(message, monotonic_ns()); }
-  void take(const signals_t& message) override { view_.take(message, monotonic_ns()); }
-  void take(const phase_t& message) override { view_.take(message, monotonic_ns()); }
   void take_malformed() override { view_.note_malformed(); }
   [[nodiscard]] const RunView& view() const noexcept { return view_; }
 

@@ -70,8 +70,8 @@ class Ear:
                 yield abs_hil.decode(data)
 
 
-def command2(key, session, sequence, command, name='', value=0.0):
-    message = abs_hil.command2_t()
+def signed(key, session, sequence, command, name='', value=0.0):
+    message = abs_hil.command_t()
     message.session, message.sequence, message.sender = session, sequence, 'wire'
     message.command, message.name, message.value, message.mac = command, name, value, ''
     message.mac = hmac.new(key.encode(), message.encode(), hashlib.sha256).hexdigest()
@@ -133,11 +133,11 @@ def live_changes(folder, key):
         check(found == status and text in said and 'not authenticated' not in said, f'send {" ".join(words)}', found, said)
     # A recorded message cannot be used again, neither forged nor changed.
     state = [m for c, m in events_of(run.log) if c == 'ABS_COMMAND_STATE'][-1]
-    wire, good = Wire(), command2(key, state.session, state.last_sequence + 1000, 'slip-ref', value=0.2)
+    wire, good = Wire(), signed(key, state.session, state.last_sequence + 1000, 'slip-ref', value=0.2)
     wire.message(b'ABS_COMMAND', good)
     wire.message(b'ABS_COMMAND', good)
-    wire.message(b'ABS_COMMAND', command2('another key 0123456789', state.session, 1 << 40, 'slip-ref', value=0.3))
-    wire.message(b'ABS_COMMAND', command2(key, '0' * 32, 1 << 41, 'slip-ref', value=0.3))
+    wire.message(b'ABS_COMMAND', signed('another key 0123456789', state.session, 1 << 40, 'slip-ref', value=0.3))
+    wire.message(b'ABS_COMMAND', signed(key, '0' * 32, 1 << 41, 'slip-ref', value=0.3))
     time.sleep(0.3)
     check(send('start')[0] == 0, 'send start')
     time.sleep(6.4)
@@ -173,7 +173,7 @@ def forged():
             sender = subprocess.Popen([*words, *key], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
             stop = next(ear.heard('ABS_COMMAND', 5))
             answer = abs_hil.event_t()
-            answer.kind, answer.reason, answer.message = 'command', 34, f"stop accepted (token '{stop.token}'){tag}"
+            answer.kind, answer.reason, answer.message = 'command', 34, f"stop accepted (sender '{stop.sender}'){tag}"
             wire.message(b'ABS_EVENT', answer.encode())
             said = ''.join(sender.communicate(timeout=30))
             check(sender.returncode == status and text in said, f'a forged answer {"with" if key else "without"} a key', said)
@@ -287,7 +287,7 @@ def series(folder, key):
     ear, wire, answers = Ear(), Wire(), []
 
     def refused():
-        wire.message(b'ABS_COMMAND', command2(key, '0' * 32, 1, 'slip-ref', value=0.3))
+        wire.message(b'ABS_COMMAND', signed(key, '0' * 32, 1, 'slip-ref', value=0.3))
         answers.extend(ear.heard('ABS_EVENT', 0.2))
         return any('wire' in answer.message for answer in answers)
 

@@ -41,7 +41,7 @@ TEST_CASE("A key that is not secret, or missing, is refused with its file and th
 }
 
 TEST_CASE("A mac is the same for the same message and key, and differs for any change of either") {
-  command2_t command{};
+  command_t command{};
   command.command = "slip-ref";
   command.value = 0.15;
   const std::string key = "0123456789abcdef";
@@ -60,18 +60,18 @@ TEST_CASE("Answers carry a tag that only the key makes, and that fits only their
   telemetry::test::CapturingOutlet sent;
   telemetry::MessageStream stream({}, {}, {});
   stream.add(sent);
-  stream.answer_command(rig::Reason::stop_command, "stop accepted (token 'me')", 1.0);
+  stream.answer_command(rig::Reason::stop_command, "stop accepted (sender 'me')", 1.0);
   sign_answers(stream, key);
-  stream.answer_command(rig::Reason::stop_command, "stop accepted (token 'me')", 1.0);
+  stream.answer_command(rig::Reason::stop_command, "stop accepted (sender 'me')", 1.0);
   stream.report_fault(rig::Reason::overspeed, 1.0, "too fast");
   const auto answers = sent.all<event_t>("ABS_EVENT");
   REQUIRE(answers.size() == 3);
   event_t bare = answers[0];
   CHECK_FALSE(take_tag(bare, key));
-  CHECK(bare.message == "stop accepted (token 'me')");
+  CHECK(bare.message == "stop accepted (sender 'me')");
   event_t good = answers[1];
   CHECK(take_tag(good, key));
-  CHECK(good.message == "stop accepted (token 'me')");
+  CHECK(good.message == "stop accepted (sender 'me')");
   CHECK(answers[2].message == "too fast");
   const auto refused = [&](auto&& change) {
     event_t forged = answers[1];
@@ -92,7 +92,7 @@ TEST_CASE("A sequence number that leaps is refused and uses none up: a forged st
   const std::string key = "0123456789abcdef";
   Authority authority(key);
   const auto judge = [&](std::int64_t sequence) {
-    command2_t command{};
+    command_t command{};
     command.session = authority.session();
     command.sequence = sequence;
     command.command = "slip-ref";

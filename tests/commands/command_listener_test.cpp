@@ -26,10 +26,10 @@ struct Bench {
   void send(std::span<const std::uint8_t> packet) {
     REQUIRE(outlet.lcm().publish("ABS_COMMAND", packet.data(), static_cast<unsigned int>(packet.size())) == 0);
   }
-  void send(const std::string& command, const std::string& token = {}) {
+  void send(const std::string& command, const std::string& sender = {}) {
     command_t message{};
     message.command = command;
-    message.token = token;
+    message.sender = sender;
     EncodeBuffer buffer;
     send(buffer.encode(message));
   }
@@ -44,7 +44,7 @@ TEST_CASE("polling without any message returns at once") {
   CHECK(bench.answers().empty());
 }
 
-TEST_CASE("stop is accepted with any token and answered") {
+TEST_CASE("stop is accepted from any sender and answered") {
   Bench bench;
   bench.send("stop", "tok\n1");
   bench.listener.poll();
@@ -54,7 +54,7 @@ TEST_CASE("stop is accepted with any token and answered") {
   REQUIRE(answers.size() == 1);
   CHECK(answers[0].kind == "command");
   CHECK(answers[0].reason == static_cast<int>(rig::Reason::stop_command));
-  CHECK(answers[0].message == "stop accepted (token 'tok?1')");
+  CHECK(answers[0].message == "stop accepted (sender 'tok?1')");
   CHECK(answers[0].stamp_ns == test::sample_record(0).stamp_ns);
 }
 
@@ -67,8 +67,9 @@ TEST_CASE("any other command is refused with a reason") {
   CHECK(bench.listener.counts().refused == 5);
   const auto answers = bench.answers();
   REQUIRE(answers.size() == 5);
-  CHECK(answers[0].message == "refused 'start': only 'stop' is accepted (token 't')");
-  CHECK(answers[0].reason == static_cast<int>(rig::Reason::command_unknown));
+  CHECK(answers[0].message ==
+        "refused 'start': only 'stop' is accepted, as this run has commands.enabled = false (sender 't')");
+  CHECK(answers[0].reason == static_cast<int>(rig::Reason::commands_not_enabled));
 }
 
 TEST_CASE("garbage, truncated, foreign and oversized packets are only counted and answered") {
@@ -104,7 +105,7 @@ TEST_CASE("a flood gets few answers, but a stop in it is accepted and answered")
   CHECK(bench.stop_calls == 1);
   auto answers = bench.answers();
   REQUIRE(answers.size() == 11);
-  CHECK(answers.back().message == "stop accepted (token 'me')");
+  CHECK(answers.back().message == "stop accepted (sender 'me')");
 
   bench.stream.consume(test::sample_record(1000), 0.0);  // a second later there are answers again
   bench.send("flood");
@@ -121,7 +122,7 @@ TEST_CASE("a stop that the thread received is answered at the end; later packets
   bench.listener.finish();
   const auto answers = bench.answers();
   REQUIRE(answers.size() == 1);
-  CHECK(answers[0].message == "stop accepted (token 'me')");
+  CHECK(answers[0].message == "stop accepted (sender 'me')");
   CHECK(answers[0].stamp_ns == 7'000'000'000);
   CHECK(answers[0].time_s == 3.5);
 

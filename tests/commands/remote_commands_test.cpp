@@ -48,9 +48,9 @@ struct Bench {
     stream.consume(record, 0.0);
     remote.consume(record, 0.0);
   }
-  command2_t slip_ref(std::int64_t sequence, double value) { return command(sequence, "slip-ref", value); }
-  command2_t command(std::int64_t sequence, const std::string& what, double value) {
-    command2_t command{};
+  command_t slip_ref(std::int64_t sequence, double value) { return command(sequence, "slip-ref", value); }
+  command_t command(std::int64_t sequence, const std::string& what, double value) {
+    command_t command{};
     command.session = captured.all<command_state_t>("ABS_COMMAND_STATE").back().session;
     command.sequence = sequence;
     command.command = what;
@@ -137,7 +137,7 @@ TEST_CASE("continue answers the question of the present phase, and nothing else"
   };
   std::int64_t sequence = 0;
   const auto judge = [&] {
-    command2_t command{};
+    command_t command{};
     command.session = captured.all<command_state_t>("ABS_COMMAND_STATE").back().session;
     command.sequence = ++sequence;
     command.command = "continue";

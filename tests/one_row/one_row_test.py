@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """usage: one_row_test.py SOURCE BUILD [FOLDER]
 
-A quantity is one row and one line of .lcm, an option is one row, a reason is one row. The test adds a made-up one of
-each to a copy of the tree, builds the program and the Python module, and looks for them wherever they must show. It
-also takes the line of .lcm away again, and the row, and expects the compiler to say what is missing.
+A quantity, an option, a reason and a figure of merit are one row each, and for quantity and figure the line that fills
+it. The test adds a made-up one of each to a copy of the tree, builds the program and the Python module, and looks for
+them wherever they must show: a quantity in CSV, event log, MCAP and Python. It reads a log from before the row, too, and
+expects to be told what that log lacks.
 
 SOURCE is the source tree, BUILD a build of it, whose compiler, generator and compiler cache are used. The copy stands
 in a temporary folder, or in FOLDER, which stays.
@@ -19,14 +20,15 @@ import tempfile
 from scratch_copy import ScratchCopy
 
 QUANTITIES = 'include/abs_hil/rig/quantities.hpp'
-MESSAGE = 'lcmtypes/telemetry_t.lcm'
+FIGURES = 'src/analysis/braking_figures.hpp'
 OPTIONS = 'include/abs_hil/control/baseline_options.hpp'
 REASONS = 'include/abs_hil/rig/reason.hpp'
 
-# phase_index is part of every record and no other quantity: what comes out of a log went into it by this row.
-QUANTITY_ROW = ('    Quantity{"made_up_index", "", "9.9", Topic::board, Outlet::both, '
-                '[](auto& c) -> auto& { return c.record.phase_index; }, "made-up meaning"},')
-MESSAGE_LINE = '    int16_t made_up_index;  // made-up meaning'
+# The torque of the command is part of every record and no other quantity: what comes out of a log went into it by this row.
+QUANTITY_ROW = ('    Quantity{"made_up_Nm", "N m", "9.9", Topic::board, Outlet::both, '
+                '[](auto& c) -> auto& { return c.record.command.brake_torque_Nm; }, "made-up meaning"},')
+FIGURE_ROW = ('    {"made_up_s", &Metrics::made_up_s, "made-up figure", "s", 3, Better::less, true, 16, "made-up figure of merit", '
+              '""},')
 OPTION = 'control.relay.made_up_gain'
 OPTION_ROW = ('  ABS_HIL_OPTION(double, made_up_gain, 1.5, .unit = "N m", .meaning = "made-up gain", '
               '.range = rig::between(0.25, 4));')
@@ -34,18 +36,24 @@ REASON_TEXT = 'made-up end of a run'
 
 
 def add_rows(copy):
-    """One line each. Returns the number of the reason."""
-    for name in (QUANTITIES, MESSAGE, OPTIONS, REASONS):
+    """One line each, and for the figure its member, the line that computes it and the length of the table. Returns the
+    number of the reason."""
+    for name in (QUANTITIES, FIGURES, OPTIONS, REASONS):
         assert 'made_up' not in (copy.tree / name).read_text(encoding='utf-8'), name
     copy.insert_before(QUANTITIES, 'inline constexpr std::tuple quantities{', '};', QUANTITY_ROW)
-    copy.insert_before(MESSAGE, 'struct telemetry_t {', '}', MESSAGE_LINE)
     copy.insert_before(OPTIONS, 'struct RelayOptions {', '};', OPTION_ROW)
     numbers = re.findall(r'^  ROW\(\w+, (\d+),', (copy.tree / REASONS).read_text(encoding='utf-8'), re.MULTILINE)
     number = max(map(int, numbers)) + 1
     copy.insert_before(REASONS, '#define ABS_HIL_REASONS(ROW)', '  /* the end of the rows */',
                        f'  ROW(made_up, {number}, fault, no, "{REASON_TEXT}") \\')
-    for name in (QUANTITIES, MESSAGE, OPTIONS, REASONS):
+    for name in (QUANTITIES, OPTIONS, REASONS):
         assert copy.changed_lines(name) == (1, 0), f'{name}: {copy.changed_lines(name)} lines added and removed'
+    copy.insert_before(FIGURES, 'struct FiguresOf {', '};', '  S made_up_s{rig::unknown};')
+    copy.insert_before(FIGURES, 'inline constexpr std::array<Figure, ', '}};', FIGURE_ROW)
+    copy.change(FIGURES, '  final_speed_m_s = sample.v_x_m_s;\n',
+                '  final_speed_m_s = sample.v_x_m_s;\n  this->made_up_s = since_brake_s;\n')
+    copy.change(FIGURES, 'std::array<Figure, 16> figures', 'std::array<Figure, 17> figures')
+    assert copy.changed_lines(FIGURES) == (4, 1), copy.changed_lines(FIGURES)
     return number
 
 
@@ -54,30 +62,43 @@ def columns_of(path):
         return list(csv.DictReader(file))
 
 
-def quantity_in_generated_types(copy):
-    types = copy.build / 'lcmtypes' / 'cpp' / 'abs_hil'
-    assert 'Field{"made_up_index", &telemetry_t::made_up_index}' in (types / 'message_fields.hpp').read_text()
-    assert 'made_up_index;' in (types / 'telemetry_t.hpp').read_text()
-
-
 def quantity_in_files(copy, program):
     """In the CSV of a run, and by way of an event log in the CSV that `convert` makes of it."""
-    run = copy.build / 'run.csv'
-    log = copy.build / 'run.lcmlog'
-    converted = copy.build / 'converted.csv'
+    run, log, converted = copy.build / 'run.csv', copy.build / 'run.lcmlog', copy.build / 'converted.csv'
     copy.run(program, '--fast', '--no-lcm', '--csv', run, '--log', log)
     columns = run.read_text().split('\n', 1)[0].split(',')
     # The phase's name and the controller's own signals follow the table's columns.
-    assert columns[columns.index('wheels_apart') + 1] == 'made_up_index', columns
+    assert columns[columns.index('wheels_apart') + 1] == 'made_up_Nm', columns
     rows = columns_of(run)
-    phases = list(dict.fromkeys(row['phase'] for row in rows))
-    assert len(phases) > 3, phases
-    for row in rows:  # the paper's experiment names each phase once, and all begin one after the other
-        assert row['made_up_index'] == str(phases.index(row['phase'])), row
+    values = [row['made_up_Nm'] for row in rows]
+    assert len(set(values)) > 100, values[:10]
+    for row in rows:  # it is the torque of the command: 0 without one, near the reference with one
+        assert abs(float(row['made_up_Nm']) - float(row['brake_torque_ref_Nm'])) < 1.0, row
     converted.unlink(missing_ok=True)
     copy.run(program, 'convert', log, converted)
-    again = [row['made_up_index'] for row in columns_of(converted) if row['type'] == 'telemetry_t']
-    assert again == [row['made_up_index'] for row in rows]
+    assert [row['made_up_Nm'] for row in columns_of(converted)] == values
+
+
+def quantity_in_an_older_log(copy, program, older):
+    """A log from before the row: it is read, and what it lacks is said."""
+    converted = copy.build / 'older.csv'
+    converted.unlink(missing_ok=True)
+    said = subprocess.run([program, 'convert', older, converted], env=copy.environment, check=True, capture_output=True,
+                          text=True)
+    assert 'lacks made_up_Nm' in said.stderr, said.stderr
+    assert {row['made_up_Nm'] for row in columns_of(converted)} == {'NaN'}
+    said = subprocess.run([program, 'replay', older, '--check'], env=copy.environment, capture_output=True, text=True)
+    assert said.returncode == 0 and 'lacks made_up_Nm' in said.stderr, said.stdout + said.stderr
+
+
+def figure_in_files(copy, program):
+    """In the summary, in a comparison and in a study's results."""
+    summary, table = copy.build / 'run.json', copy.build / 'compare.csv'
+    copy.run(program, '--fast', '--no-lcm', '--summary', summary)
+    figures = json.loads(summary.read_text())
+    assert figures['made_up_s'] > 1.0, figures['made_up_s']
+    copy.run(program, 'compare', '--controllers', 'adaptive,locked', '--repeat', '2', '--csv', table)
+    assert [row for row in columns_of(table) if 'made_up_s' in row.values()], table.read_text()
 
 
 def option_in_lists(copy, program):
@@ -106,10 +127,10 @@ def option_takes_values(copy, program):
 
 def tables_of_the_program(copy, program, number):
     row = json.loads(copy.run(program, 'list', '--quantities', '--json'))[-1]
-    assert (row['name'], row['since'], row['lcm'], row['meaning']) == ('made_up_index', '9.9', True, 'made-up meaning')
+    assert (row['name'], row['since'], row['meaning']) == ('made_up_Nm', '9.9', 'made-up meaning')
     columns = (copy.build / 'run.csv').read_text().split('\n', 1)[0].split(',')
-    assert columns[row['csv_column'] - 1] == 'made_up_index', row
-    assert 'made_up_index' in copy.run(program, 'list', '--quantities')
+    assert columns[row['csv_column'] - 1] == 'made_up_Nm', row
+    assert 'made_up_Nm' in copy.run(program, 'list', '--quantities')
     rows = json.loads(copy.run(program, 'list', '--reasons', '--json'))
     made_up = {'number': number, 'name': 'made_up', 'kind': 'fault', 'found_again': 'no', 'text': REASON_TEXT,
                'quantity': '', 'unit': '', 'bound': ''}
@@ -124,61 +145,55 @@ def tables_of_the_pages(copy):
     copy.run(sys.executable, *script, '--write', copy.build)
     copy.run(sys.executable, *script, '--check', copy.build)
     page = (copy.tree / 'docs' / 'telemetry.md').read_text(encoding='utf-8')
-    assert page.count('| `made_up_index` |') == 1 and page.count(f'| {REASON_TEXT} |') == 1
+    assert page.count('| `made_up_Nm` |') == 1 and page.count(f'| {REASON_TEXT} |') == 1
     assert copy.changed_lines('docs/telemetry.md') == (2, 0), copy.changed_lines('docs/telemetry.md')
 
 
 def tables_of_python(copy, number):
-    code = ('import abs_hil\n'
-            'print(abs_hil.QUANTITIES["made_up_index"]["meaning"])\n'
+    """Tables, the rows of a log, a figure of merit and an MCAP file, in Python."""
+    code = ('import abs_hil, sys\n'
+            'print(abs_hil.QUANTITIES["made_up_Nm"]["meaning"])\n'
             f'print(abs_hil.REASONS[{number}]["text"])\n'
-            'message = abs_hil.telemetry_t()\n'
-            'message.made_up_index = 7\n'
-            'print(abs_hil.decode(message.encode()).made_up_index)\n')
+            'print(abs_hil.figures()["made_up_s"].heading)\n'
+            'log = abs_hil.load(sys.argv[1])\n'
+            'print(log["made_up_Nm"].max() > 1.0, list(log.signals)[:1])\n'
+            'from abs_hil.interchange import recorded, source\n'
+            'recorded.to_mcap(source.read(sys.argv[1]), sys.argv[2])\n')
     environment = {**copy.environment, 'PYTHONPATH': str(copy.build / 'share' / 'abs_hil' / 'python')}
-    said = subprocess.run([sys.executable, '-c', code], env=environment, check=True, capture_output=True, text=True)
-    assert said.stdout.splitlines() == ['made-up meaning', REASON_TEXT, '7'], said.stdout
+    mcap = copy.build / 'run.mcap'
+    own = copy.root / 'build' / 'python' / 'bin' / 'python'  # it has the modules that the package needs
+    said = subprocess.run([own, '-c', code, copy.build / 'run.lcmlog', mcap], env=environment, check=True,
+                          capture_output=True, text=True)
+    assert said.stdout.splitlines() == ['made-up meaning', REASON_TEXT, 'made-up figure / s', "True ['I_m']"], said.stdout
+    assert b'made_up_nm  # made_up_Nm: [N m] made-up meaning' in mcap.read_bytes()
 
 
-def halves_are_refused(copy):
-    """The line of .lcm without the row, and the row without the line: the compiler names what is missing."""
-    codec = 'src/telemetry/message_codec.cpp'
-    assert copy.compiler_says('telemetry', codec) == ''
-    copy.change(MESSAGE, MESSAGE_LINE + '\n', '')
-    copy.make('abs_hil_lcmtypes_generate')
-    message = copy.compiler_says('telemetry', codec)
-    assert 'telemetry_t.lcm has no field of its name' in message and 'made_up_index' in message, message
-    copy.insert_before(MESSAGE, 'struct telemetry_t {', '}', MESSAGE_LINE)
-    copy.change(QUANTITIES, QUANTITY_ROW + '\n', '')
-    copy.make('abs_hil_lcmtypes_generate')
-    message = copy.compiler_says('telemetry', codec)
-    assert 'has no row for LCM in rig/quantities.hpp' in message and 'made_up_index' in message, message
-
-
-def test(copy):
+def test(copy, built):
+    older = copy.build / 'older.lcmlog'
+    copy.build.mkdir(parents=True, exist_ok=True)
+    copy.run(built / 'bin' / 'abs_hil', '--fast', '--no-lcm', '--log', older)
     number = add_rows(copy)
-    copy.configure()
-    copy.make('abs_hil_lcmtypes_generate')
-    quantity_in_generated_types(copy)
+    copy.configure(python=True)
     copy.make('abs_hil_executable', 'abs_hil_python')
     program = copy.build / 'bin' / 'abs_hil'
     quantity_in_files(copy, program)
+    quantity_in_an_older_log(copy, program, older)
+    figure_in_files(copy, program)
     option_in_lists(copy, program)
     option_takes_values(copy, program)
     tables_of_the_program(copy, program, number)
     tables_of_the_pages(copy)
     tables_of_python(copy, number)
-    halves_are_refused(copy)
 
 
 def main():
     root, build, *folder = (pathlib.Path(path).resolve() for path in sys.argv[1:])
     if folder:
-        test(ScratchCopy(root, build, folder[0]))
+        test(ScratchCopy(root, build, folder[0]), build)
     else:
         with tempfile.TemporaryDirectory(prefix='abs_hil_one_row.') as temporary:
-            test(ScratchCopy(root, build, pathlib.Path(temporary)))
-    print('one row each: quantity, option and reason show everywhere')
+            test(ScratchCopy(root, build, pathlib.Path(temporary)), build)
+    print('one row each: quantity, figure of merit, option and reason show everywhere')
     return 0
 
 

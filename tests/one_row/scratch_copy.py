@@ -68,11 +68,12 @@ class ScratchCopy:
                                  f'{result.stdout[-6000:]}{result.stderr[-6000:]}')
         return result.stdout + result.stderr
 
-    def configure(self):
+    def configure(self, python=False):
         """Without optimisation and without tests: the cheapest build that runs."""
         same = [f'-D{name}={self.cache[name]}' for name in SAME if self.cache.get(name)]
         self.run('cmake', '-S', self.tree, '-B', self.build, '-G', self.cache['CMAKE_GENERATOR'], *same,
-                 '-DCMAKE_BUILD_TYPE=Debug', '-DCMAKE_CXX_FLAGS_DEBUG=', '-DABS_HIL_TESTS=OFF', '-DABS_HIL_BENCH=OFF', '-DABS_HIL_PYTHON=OFF')
+                 '-DCMAKE_BUILD_TYPE=Debug', '-DCMAKE_CXX_FLAGS_DEBUG=', '-DABS_HIL_TESTS=OFF', '-DABS_HIL_BENCH=OFF', 
+                 f'-DABS_HIL_PYTHON={"ON" if python else "OFF"}')
 
     def make(self, *targets):
         self.run('cmake', '--build', self.build, '--target', *targets)

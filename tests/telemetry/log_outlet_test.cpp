@@ -58,8 +58,7 @@ TEST_CASE("a log read back holds every record, consecutively, at its run time") 
   CHECK(count == std::map<std::string, std::int64_t>{{"ABS_TELEMETRY", static_cast<std::int64_t>(record_count)},
                                                      {"ABS_STATUS", 4},
                                                      {"ABS_EVENT", 1},
-                                                     {"ABS_EXPERIMENT", 1},
-                                                     {"ABS_PHASE", 1}});
+                                                     {"ABS_EXPERIMENT", 1}});
 }
 
 TEST_CASE("logs on virtual time are byte-identical") {

@@ -5,8 +5,10 @@
 #include <limits>
 #include <string>
 
+#include "abs_hil/command_t.hpp"
 #include "catch.hpp"
 #include "rig/formatted_text.hpp"
+#include "telemetry/checked_decode.hpp"
 #include "telemetry/message_capture.hpp"
 #include "telemetry/sample_records.hpp"
 
@@ -62,6 +64,11 @@ void check_fields(const rig::CycleRecord& r, double distance_m) {
   CHECK(m.periods_skipped == static_cast<std::int64_t>(r.timing.periods_skipped));
   CHECK(m.record_ns == r.timing.record_ns);
   CHECK(m.overrun_cause == static_cast<int>(r.timing.overrun_cause));
+  CHECK((m.sample_valid != 0) == r.sample_valid);
+  check_same(m.sample_time_s, r.sample_time_s);
+  CHECK(m.measured_ns == r.measurement.time_ns);
+  CHECK((m.wheels_apart != 0) == r.wheels_apart);
+  CHECK(m.phase_index == r.phase_index);
 }
 
 TEST_CASE("every field of a record arrives") {
@@ -69,6 +76,39 @@ TEST_CASE("every field of a record arrives") {
   r.reason = rig::Reason::overspeed;
   r.reason_value = 181.5;
   check_fields(r, 0.125);
+}
+
+TEST_CASE("signals come by their names, and a phase by its own; a record without names has none") {
+  rig::CycleRecord r = test::sample_record(7);
+  r.phase_index = 1;
+  r.control.signals = {0.5, rig::unknown, 7.0};
+  const rig::RunNames names{.phases = {{rig::Phase::brake, "brake"}, {rig::Phase::brake, "brake-high"}},
+                            .signals = {"I_m", "zeta_N"}};
+  const telemetry_t m = through_bytes(to_message(r, 1.0, 3, names));
+  CHECK(m.phase_name == "brake-high");
+  CHECK(m.names == "I_m,zeta_N");
+  REQUIRE(m.values.size() == 2);  // there is no third signal
+  CHECK(m.values[0] == 0.5);
+  CHECK(std::isnan(m.values[1]));
+  CHECK(signals_of(m) == names.signals);
+  CHECK(to_record(m).control.signals[0] == 0.5);
+  CHECK(std::isnan(to_record(m).control.signals[2]));
+  CHECK(lacking_in(m).empty());
+  CHECK(to_message(r, 1.0, 3).phase_name.empty());
+  CHECK(to_message(r, 1.0, 3).names.empty());
+}
+
+TEST_CASE("a message with more values than names, and names that no value has, is read as far as both go") {
+  telemetry_t m = to_message(test::sample_record(7), 1.0, 3, {.signals = {"I_m", "zeta_N"}});
+  m.names = "I_m";
+  CHECK(values_of(m).size() == 1);
+  m.names = ",,a,b,c,d,e,f,g,h,i,j";
+  CHECK(values_of(m).size() == 2);
+  m.values.assign(20, 1.0);
+  m.value_count = 20;
+  CHECK(values_of(m).size() == 12);
+  CHECK(signals_of(m).size() == rig::signal_max);
+  CHECK(to_record(m).control.signals[7] == 1.0);
 }
 
 TEST_CASE("the default record arrives, NaN and all") { check_fields({}, 0.0); }
@@ -97,9 +137,19 @@ command_t stop_command() {
   command.stamp_ns = 1;
   command.sequence = 2;
   command.command = "stop";
-  command.argument = "now";
-  command.token = "abc";
+  command.name = "now";
+  command.sender = "abc";
   return command;
+}
+
+struct DecodedCommand {
+  command_t command{};
+  std::string_view problem{};
+};
+DecodedCommand decoded_command(std::span<const std::uint8_t> packet) {
+  DecodedCommand decoded;
+  decoded.problem = decode_checked(packet, decoded.command);
+  return decoded;
 }
 
 test::Bytes bytes_of(const command_t& command) {
@@ -109,18 +159,18 @@ test::Bytes bytes_of(const command_t& command) {
 }
 
 TEST_CASE("a well-formed command is decoded") {
-  const auto [command, problem] = decode_command(bytes_of(stop_command()));
+  const auto [command, problem] = decoded_command(bytes_of(stop_command()));
   CHECK(problem.empty());
   CHECK(command.command == "stop");
-  CHECK(command.argument == "now");
-  CHECK(command.token == "abc");
+  CHECK(command.name == "now");
+  CHECK(command.sender == "abc");
 }
 
 TEST_CASE("a command cut short anywhere is refused") {
   const test::Bytes whole = bytes_of(stop_command());
   for (std::size_t size = 0; size < whole.size(); ++size) {
     INFO("cut to " << size);
-    CHECK_FALSE(decode_command(std::span(whole).first(size)).problem.empty());
+    CHECK_FALSE(decoded_command(std::span(whole).first(size)).problem.empty());
   }
 }
 
@@ -132,7 +182,7 @@ TEST_CASE("string lengths that lie are refused, those included that the generate
       packet[first_length_at + i] = static_cast<std::uint8_t>(lie >> (24U - 8U * static_cast<unsigned>(i)));
     }
     INFO("length " << lie);
-    CHECK_FALSE(decode_command(packet).problem.empty());
+    CHECK_FALSE(decoded_command(packet).problem.empty());
   }
 }
 
@@ -142,7 +192,7 @@ TEST_CASE("every single changed byte is either refused or gives strings within t
     for (const unsigned change : {0x01U, 0x80U, 0xFFU}) {
       test::Bytes packet = whole;
       packet[at] = static_cast<std::uint8_t>(packet[at] ^ change);
-      const auto [command, problem] = decode_command(packet);
+      const auto [command, problem] = decoded_command(packet);
       CHECK((!problem.empty() || command.command.size() < packet.size()));
       if (at < 8) CHECK_FALSE(problem.empty());
     }
@@ -151,16 +201,16 @@ TEST_CASE("every single changed byte is either refused or gives strings within t
 
 TEST_CASE("another type's message is refused by its fingerprint") {
   EncodeBuffer buffer;
-  CHECK_THAT(std::string(decode_command(buffer.encode(telemetry_t{})).problem),
+  CHECK_THAT(std::string(decoded_command(buffer.encode(telemetry_t{})).problem),
              Catch::Matchers::Contains("fingerprint"));
 }
 
 TEST_CASE("a string with a NUL inside is encoded as far as it goes and decodes again") {
   command_t command = stop_command();
-  command.token = std::string("a\0b", 3);
-  const auto result = decode_command(bytes_of(command));
+  command.sender = std::string("a\0b", 3);
+  const auto result = decoded_command(bytes_of(command));
   CHECK(result.problem.empty());
-  CHECK(result.command.token == "a");
+  CHECK(result.command.sender == "a");
 }
 
 TEST_CASE("text from the network is made fit to print") {

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <stdexcept>
-#include <tuple>
 #include <vector>
 
 #include "catch.hpp"
@@ -34,7 +33,7 @@ TEST_CASE("every record becomes a telemetry message with consecutive sequence nu
   CHECK(messages[321].omega1_rad_s == test::sample_record(321).truth.speeds.omega1_rad_s);
 }
 
-TEST_CASE("a controller's own signals come with their names, one message with each telemetry message") {
+TEST_CASE("a controller's own signals come with their names in each telemetry message") {
   test::CapturingOutlet outlet;
   ExperimentInfo with_signals = info();
   with_signals.names.signals = {"I_m", "zeta_N"};
@@ -48,67 +47,32 @@ TEST_CASE("a controller's own signals come with their names, one message with ea
     stream.consume(record, 0.0);
   }
   const auto telemetry = outlet.all<telemetry_t>("ABS_TELEMETRY");
-  const auto messages = outlet.all<signals_t>("ABS_SIGNALS");
-  check_consecutive(messages);
-  REQUIRE(messages.size() == telemetry.size());
-  for (std::size_t n = 0; n < messages.size(); ++n) {
-    CHECK(messages[n].stamp_ns == telemetry[n].stamp_ns);
-    CHECK(messages[n].cycle == telemetry[n].cycle);
-    CHECK(messages[n].names == "I_m,zeta_N");
-    CHECK(messages[n].value1 == static_cast<double>(telemetry[n].cycle));
-    CHECK(messages[n].value2 == -1.5);
-    CHECK(std::isnan(messages[n].value3));  // there is no third signal
-    CHECK(std::isnan(messages[n].value8));
+  REQUIRE(telemetry.size() == 10);
+  for (const telemetry_t& message : telemetry) {
+    CHECK(message.names == "I_m,zeta_N");
+    REQUIRE(message.values.size() == 2);  // there is no third signal
+    CHECK(message.values[0] == static_cast<double>(message.cycle));
+    CHECK(message.values[1] == -1.5);
   }
 }
 
-TEST_CASE("each phase is told with the experiment's own name, and again for late receivers") {
+TEST_CASE("each cycle tells the experiment's own name of its phase") {
   test::CapturingOutlet outlet;
   ExperimentInfo named = info();
   named.names.phases = {{rig::Phase::brake, "brake-low"}, {rig::Phase::brake, "brake-high"}};
-  MessageStream stream({.experiment_period_s = 1.0}, named, {});
+  MessageStream stream({}, named, {});
   stream.add(outlet);
   rig::CycleRecord record = test::sample_record(0);
-  record.phase = rig::Phase::brake;
-  for (int n = 0; n < 150; ++n) {
-    record.time_s = 0.01 * n;
-    record.phase_index = n < 50 ? 0 : 1;
+  for (int n = 0; n < 3; ++n) {
+    record.phase_index = n < 2 ? 0 : 1;
+    if (n == 1) record.phase = rig::Phase::fault;  // it keeps the number
     stream.consume(record, 0.0);
     ++record.sequence;
+    record.phase = rig::Phase::brake;
   }
-  const auto phases = outlet.all<phase_t>("ABS_PHASE");
-  REQUIRE(phases.size() == 3);
-  CHECK(phases[0].name == "brake-low");
-  CHECK(phases[1].name == "brake-high");
-  CHECK(phases[1].phase_index == 1);
-  CHECK(phases[1].phase == telemetry_t::PHASE_BRAKE);
-  CHECK(phases[1].time_s == 0.5);
-  CHECK(phases[2].name == "brake-high");
-  CHECK(phases[2].time_s == 1.0);
-}
-
-TEST_CASE("signals are not sent while none is known") {
-  test::CapturingOutlet outlet;
-  ExperimentInfo with_signals = info();
-  with_signals.names.signals = {"I_m", "zeta_N"};
-  MessageStream stream({}, with_signals, {});
-  stream.add(outlet);
-  rig::CycleRecord record = test::sample_record(0);
-  record.control.signals = rig::no_signals;
-  stream.consume(record, 0.0);
-  record.sequence = 1;
-  record.control.signals[1] = 3.0;
-  stream.consume(record, 0.0);
-  REQUIRE(outlet.all<signals_t>("ABS_SIGNALS").size() == 1);
-  CHECK(outlet.all<signals_t>("ABS_SIGNALS").front().cycle == 1);
-}
-
-TEST_CASE("a controller without signals sends none") {
-  test::CapturingOutlet outlet;
-  MessageStream stream({}, info(), {});
-  stream.add(outlet);
-  stream.consume(test::sample_record(0), 0.0);
-  CHECK(outlet.all<signals_t>("ABS_SIGNALS").empty());
+  std::vector<std::string> told;
+  for (const telemetry_t& message : outlet.all<telemetry_t>("ABS_TELEMETRY")) told.push_back(message.phase_name);
+  CHECK(told == std::vector<std::string>{"brake-low", "fault", "brake-high"});
 }
 
 TEST_CASE("decimation keeps one cycle in N, whatever records are missing") {
@@ -133,6 +97,7 @@ TEST_CASE("status comes at the start, once a second of run time and at the end")
   snapshot.realtime = true;
   snapshot.overruns = 3;
   snapshot.telemetry_drops = 4;
+  snapshot.checks_unjudged = 0.125;
   snapshot.wakeup_latency = {1.0, 2.0, 3.0, 4.0};
   snapshot.cycle_time = {5.0, 6.0, 7.0, 8.0};
   std::uint64_t cycles = 0;
@@ -153,6 +118,7 @@ TEST_CASE("status comes at the start, once a second of run time and at the end")
   CHECK(last.cycles == 3500);
   CHECK(last.overruns == 3);
   CHECK(last.telemetry_drops == 4);
+  CHECK(last.unjudged_share == 0.125);
   CHECK(last.realtime != 0);
   CHECK(last.publish_failures == 0);
   CHECK(last.phase == telemetry_t::PHASE_BRAKE);
@@ -237,8 +203,8 @@ TEST_CASE("the channel prefix is configurable and checked") {
   CHECK(stream.command_channel() == "LAB2/ABS_COMMAND");
   std::vector<std::string> channels;
   for (const auto& [channel, messages] : outlet.messages) channels.push_back(channel);
-  CHECK(channels == std::vector<std::string>{"LAB2/ABS_EVENT", "LAB2/ABS_EXPERIMENT", "LAB2/ABS_PHASE",
-                                             "LAB2/ABS_STATUS", "LAB2/ABS_TELEMETRY"});
+  CHECK(channels ==
+        std::vector<std::string>{"LAB2/ABS_EVENT", "LAB2/ABS_EXPERIMENT", "LAB2/ABS_STATUS", "LAB2/ABS_TELEMETRY"});
   for (const char* bad : {"ABS.*", "(", "ABS ", "\xc3\xa4"}) {
     options.channel_prefix = bad;
     CHECK_THROWS_AS(MessageStream(options, info(), {}), std::invalid_argument);
@@ -257,39 +223,6 @@ TEST_CASE("options out of range are refused") {
   options = {};
   options.experiment_period_s = rig::unknown;
   CHECK_THROWS_WITH(MessageStream(options, info(), {}), Catch::Matchers::Contains("experiment_period_s"));
-}
-
-TEST_CASE("ABS_SAMPLE tells when samples become invalid or the wheels part, and nothing in an ordinary run") {
-  test::CapturingOutlet outlet;
-  MessageStream stream({}, info(), {});
-  stream.add(outlet);
-  rig::CycleRecord record;
-  const auto cycle = [&](bool valid, bool apart) {
-    record.sample_valid = valid;
-    record.wheels_apart = apart;
-    record.stamp_ns = 1'000'000 * static_cast<std::int64_t>(record.sequence);
-    stream.consume(record, 0.0);
-    ++record.sequence;
-  };
-  cycle(true, false);
-  CHECK(outlet.all<sample_t>("ABS_SAMPLE").empty());
-  cycle(false, false);
-  cycle(false, false);
-  cycle(true, false);
-  cycle(true, true);
-  cycle(false, true);
-  const auto messages = outlet.all<sample_t>("ABS_SAMPLE");
-  check_consecutive(messages);
-  REQUIRE(messages.size() == 4);
-  const std::vector<std::tuple<std::int64_t, bool, bool>> expected{
-      {1, false, false}, {3, true, false}, {4, true, true}, {5, false, true}};
-  for (std::size_t n = 0; n < messages.size(); ++n) {
-    CAPTURE(n);
-    CHECK(messages[n].cycle == std::get<0>(expected[n]));
-    CHECK(messages[n].stamp_ns == 1'000'000 * std::get<0>(expected[n]));
-    CHECK((messages[n].sample_valid != 0) == std::get<1>(expected[n]));
-    CHECK((messages[n].wheels_apart != 0) == std::get<2>(expected[n]));
-  }
 }
 
 }  // namespace

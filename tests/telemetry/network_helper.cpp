@@ -112,8 +112,6 @@ class LossCounter : public RunObserver {
   }
   void take(const event_t& /*message*/) override {}
   void take(const experiment_t& /*message*/) override {}
-  void take(const signals_t& /*message*/) override {}
-  void take(const phase_t& /*message*/) override {}
   void take_malformed() override { ++malformed; }
 
   std::int64_t received{0};
@@ -180,7 +178,7 @@ int command(const std::string& url, const char* text) {
   lcm::LCM lcm(url);
   command_t message{};
   message.command = text;
-  message.token = "network_test";
+  message.sender = "network_test";
   return lcm.good() && lcm.publish("ABS_COMMAND", &message) == 0 ? 0 : 1;
 }
 

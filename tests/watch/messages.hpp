@@ -7,7 +7,6 @@
 #include "abs_hil/event_t.hpp"
 #include "abs_hil/experiment_t.hpp"
 #include "abs_hil/rig/measurement.hpp"
-#include "abs_hil/signals_t.hpp"
 #include "abs_hil/status_t.hpp"
 #include "abs_hil/telemetry_t.hpp"
 #include "watch/run_view.hpp"
@@ -62,17 +61,16 @@ inline experiment_t experiment(std::int64_t sequence) {
   return m;
 }
 
-/// Messages `from` to `to` - 1, each arriving when it was sent.
-inline signals_t signals(std::int64_t sequence) {
-  signals_t m{};
-  m.sequence = m.cycle = sequence;
-  m.stamp_ns = sequence * ms;
+/// The same with signals of the controller.
+inline telemetry_t with_signals(std::int64_t sequence) {
+  telemetry_t m = telemetry(sequence);
   m.names = "I_m,zeta_N";
-  m.value1 = 0.125;
-  m.value2 = 15.5;
+  m.values = {0.125, 15.5};
+  m.value_count = 2;
   return m;
 }
 
+/// Messages `from` to `to` - 1, each arriving when it was sent.
 inline void feed(RunView& view, std::int64_t from, std::int64_t to) {
   for (std::int64_t i = from; i < to; ++i) view.take(telemetry(i), i * ms);
 }

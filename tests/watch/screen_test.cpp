@@ -56,33 +56,37 @@ TEST_CASE("the screen of a run shows all its quantities") {
 TEST_CASE("the controller's own signals stand above the timing, for as long as they come") {
   RunView view = whole_run();
   CHECK_THAT(shown(view, 4999 * ms), !Contains("zeta_N"));
-  view.take(signals(4999), 4999 * ms);
-  CHECK_THAT(shown(view, 4999 * ms), Contains("I_m 0.1250  zeta_N 15.5000") && Contains("wake-up 11/12/13/14"));
+  view.take(with_signals(5000), 5000 * ms);
+  CHECK_THAT(shown(view, 5000 * ms), Contains("I_m 0.1250  zeta_N 15.5000") && Contains("wake-up 11/12/13/14"));
   view.take(telemetry(0), 5000 * ms);  // another run, whose controller has none
   CHECK_THAT(shown(view, 5000 * ms), !Contains("zeta_N"));
 }
 
 TEST_CASE("a phase has the name that the experiment gives it") {
   RunView view = whole_run();
-  phase_t phase{};
-  phase.phase = telemetry_t::PHASE_BRAKE;
-  phase.name = "brake-low";
-  view.take(phase, 4999 * ms);
-  CHECK_THAT(shown(view, 4999 * ms), Contains("brake-low    4.999 s"));
-  CHECK_THAT(one_line(view, 4999 * ms, {}), StartsWith("brake-low    4.999 s"));
-  telemetry_t last = telemetry(5000);
-  last.phase = telemetry_t::PHASE_FAULT;  // the name belongs to another phase
-  view.take(last, 5000 * ms);
-  CHECK_THAT(one_line(view, 5000 * ms, {}), StartsWith("fault "));
+  telemetry_t named = telemetry(5000);
+  named.phase_name = "brake-low";
+  view.take(named, 5000 * ms);
+  CHECK_THAT(shown(view, 5000 * ms), Contains("brake-low    5.000 s"));
+  CHECK_THAT(one_line(view, 5000 * ms, {}), StartsWith("brake-low    5.000 s"));
+  telemetry_t last = telemetry(5001);
+  last.phase = telemetry_t::PHASE_FAULT;  // no phase of the experiment
+  view.take(last, 5001 * ms);
+  CHECK_THAT(one_line(view, 5001 * ms, {}), StartsWith("fault "));
 }
 
 TEST_CASE("names of signals from the network are made printable") {
   RunView view(10.0);
-  signals_t hostile = signals(0);
+  telemetry_t hostile = telemetry(0);
   hostile.names = "\x1b[2J,,a,b,c,d,e,f,g,h,i";
+  hostile.values.assign(100, 1.0);
   view.take(hostile, 0);
-  REQUIRE(view.signals().size() == 8);
-  CHECK(view.signals()[0].name == "?[2J");
+  REQUIRE(view.values().size() == 11);
+  CHECK(view.values()[0].name == "?[2J");
+  hostile = telemetry(1);
+  hostile.phase_name = "\x1b[2J";
+  view.take(hostile, ms);
+  CHECK(view.name_of(rig::Phase::brake) == "?[2J");
 }
 
 TEST_CASE("ASCII is ASCII everywhere") {

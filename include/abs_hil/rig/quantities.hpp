@@ -23,8 +23,9 @@ struct CycleParts {
   Part<std::int64_t>& sequence;  ///< of the message on its channel
 };
 
-/// The outputs of a quantity. telemetry_t is published and does not change, so a new quantity can be a CSV column only.
-enum class Outlet : std::uint8_t { csv, lcm, both };
+/// Where a quantity goes: into telemetry (LCM and event log) only, or into the columns of a run, too (CSV, MCAP,
+/// Parquet, Python).
+enum class Outlet : std::uint8_t { telemetry, both };
 
 /// The topic of a quantity. A timing belongs to one run: a replay cannot reproduce it.
 enum class Topic : std::uint8_t { sequence, motion, board, timing };
@@ -32,7 +33,7 @@ enum class Topic : std::uint8_t { sequence, motion, board, timing };
 /// A row of the table. `Access` takes CycleParts and returns a reference to the value, to read and to write it.
 template <class Access>
 struct Quantity {
-  std::string_view name;   ///< of the CSV column and of the field of telemetry_t, with its unit
+  std::string_view name;   ///< of the column and in telemetry_t, with its unit
   std::string_view unit;   ///< empty if it has none
   std::string_view since;  ///< first version of the program that writes it, into the CSV if it is a column
   Topic topic;
@@ -40,8 +41,7 @@ struct Quantity {
   Access at;
   std::string_view meaning;
 
-  [[nodiscard]] constexpr bool in_csv() const noexcept { return outlet != Outlet::lcm; }
-  [[nodiscard]] constexpr bool in_lcm() const noexcept { return outlet != Outlet::csv; }
+  [[nodiscard]] constexpr bool in_csv() const noexcept { return outlet == Outlet::both; }
 };
 
 template <class Access>
@@ -52,21 +52,22 @@ Quantity(std::string_view, std::string_view, std::string_view, Topic, Outlet, Ac
 inline constexpr std::string_view first_version = "0.1";
 
 // clang-format off
-/// Every quantity of a cycle, in the order of the CSV columns and of the fields of telemetry_t. Append new rows.
+/// Every quantity of a cycle, in the order of the CSV columns. Append new rows. A row needs no field in telemetry_t:
+/// without one its value travels in telemetry_t's `values`, by its name.
 inline constexpr std::tuple quantities{
-    Quantity{"stamp_ns", "ns", "0.1", Topic::sequence, Outlet::lcm, [](auto& c) -> auto& { return c.record.stamp_ns; },
+    Quantity{"stamp_ns", "ns", "0.1", Topic::sequence, Outlet::telemetry, [](auto& c) -> auto& { return c.record.stamp_ns; },
              "monotonic clock at the wake-up; virtual time with --fast"},
-    Quantity{"sequence", "", "0.1", Topic::sequence, Outlet::lcm, [](auto& c) -> auto& { return c.sequence; },
+    Quantity{"sequence", "", "0.1", Topic::sequence, Outlet::telemetry, [](auto& c) -> auto& { return c.sequence; },
              "messages of this channel from 0; a gap is a message lost on the way"},
-    Quantity{"cycle", "", "0.1", Topic::sequence, Outlet::lcm, [](auto& c) -> auto& { return c.record.sequence; },
+    Quantity{"cycle", "", "0.1", Topic::sequence, Outlet::telemetry, [](auto& c) -> auto& { return c.record.sequence; },
              "control cycles from 0; a gap without one in sequence is decimation or a dropped record"},
     Quantity{"time_s", "s", "0.1", Topic::sequence, Outlet::both, [](auto& c) -> auto& { return c.record.time_s; },
              "time since the start of the run"},
     Quantity{"phase", "", "0.1", Topic::sequence, Outlet::both, [](auto& c) -> auto& { return c.record.phase; },
              "phase of the experiment: its name in CSV, its number in LCM"},
-    Quantity{"reason", "", "0.1", Topic::sequence, Outlet::lcm, [](auto& c) -> auto& { return c.record.reason; },
+    Quantity{"reason", "", "0.1", Topic::sequence, Outlet::telemetry, [](auto& c) -> auto& { return c.record.reason; },
              "why this phase was entered or the command refused; 0: nothing happened"},
-    Quantity{"reason_value", "", "0.1", Topic::sequence, Outlet::lcm,
+    Quantity{"reason_value", "", "0.1", Topic::sequence, Outlet::telemetry,
              [](auto& c) -> auto& { return c.record.reason_value; },
              "the value that led to it, in the SI unit of its quantity; 0: none"},
 
@@ -126,50 +127,56 @@ inline constexpr std::tuple quantities{
     Quantity{"lower_counts", "counts", "0.2", Topic::board, Outlet::both,
              [](auto& c) -> auto& { return c.record.measurement.lower_counts; },
              "encoder counter of the lower wheel as read; wraps around at 32 bit"},
-    Quantity{"supply_V", "V", "0.1", Topic::board, Outlet::lcm,
+    Quantity{"supply_V", "V", "0.1", Topic::board, Outlet::telemetry,
              [](auto& c) -> auto& { return c.record.measurement.supply_V; },
              "power supply; NaN where the board does not measure it"},
-    Quantity{"temperature_C", "degrees Celsius", "0.1", Topic::board, Outlet::lcm,
+    Quantity{"temperature_C", "degrees Celsius", "0.1", Topic::board, Outlet::telemetry,
              [](auto& c) -> auto& { return c.record.measurement.temperature_C; },
              "power stage; NaN where the board does not measure it"},
-    Quantity{"trip_flags", "", "0.1", Topic::board, Outlet::lcm,
+    Quantity{"trip_flags", "", "0.1", Topic::board, Outlet::telemetry,
              [](auto& c) -> auto& { return c.record.measurement.trip_flags; },
              "bits of the board's own interlocks; 0: none tripped"},
 
-    Quantity{"wakeup_latency_ns", "ns", "0.1", Topic::timing, Outlet::lcm,
+    Quantity{"wakeup_latency_ns", "ns", "0.1", Topic::timing, Outlet::telemetry,
              [](auto& c) -> auto& { return c.record.timing.wakeup_latency_ns; },
              "lateness of the wake-up against its tick"},
-    Quantity{"read_ns", "ns", "0.1", Topic::timing, Outlet::lcm,
+    Quantity{"read_ns", "ns", "0.1", Topic::timing, Outlet::telemetry,
              [](auto& c) -> auto& { return c.record.timing.read_ns; },
              "duration of reading the board"},
-    Quantity{"control_ns", "ns", "0.1", Topic::timing, Outlet::lcm,
+    Quantity{"control_ns", "ns", "0.1", Topic::timing, Outlet::telemetry,
              [](auto& c) -> auto& { return c.record.timing.control_ns; },
              "duration of estimate, sequence, control and gate"},
-    Quantity{"write_ns", "ns", "0.1", Topic::timing, Outlet::lcm,
+    Quantity{"write_ns", "ns", "0.1", Topic::timing, Outlet::telemetry,
              [](auto& c) -> auto& { return c.record.timing.write_ns; },
              "duration of writing to the board"},
-    Quantity{"cycle_ns", "ns", "0.1", Topic::timing, Outlet::lcm,
+    Quantity{"cycle_ns", "ns", "0.1", Topic::timing, Outlet::telemetry,
              [](auto& c) -> auto& { return c.record.timing.cycle_ns; },
              "wake-up to end of write"},
-    Quantity{"periods_skipped", "", "0.1", Topic::timing, Outlet::lcm,
+    Quantity{"periods_skipped", "", "0.1", Topic::timing, Outlet::telemetry,
              [](auto& c) -> auto& { return c.record.timing.periods_skipped; },
              "ticks missed before this one"},
-    Quantity{"record_ns", "ns", "0.1", Topic::timing, Outlet::lcm,
+    Quantity{"record_ns", "ns", "0.1", Topic::timing, Outlet::telemetry,
              [](auto& c) -> auto& { return c.record.timing.record_ns; },
              "recording of the cycle before"},
-    Quantity{"overrun_cause", "", "0.1", Topic::timing, Outlet::lcm,
+    Quantity{"overrun_cause", "", "0.1", Topic::timing, Outlet::telemetry,
              [](auto& c) -> auto& { return c.record.timing.overrun_cause; },
              "why ticks were missed: 0 none, 1 wake-up, 2 read, 3 control, 4 write, 5 record"},
 
-    Quantity{"sample_valid", "", "0.2", Topic::board, Outlet::csv,
+    Quantity{"sample_valid", "", "0.2", Topic::board, Outlet::both,
              [](auto& c) -> auto& { return c.record.sample_valid; },
              "1: the counts are of this cycle; 0: they are the latest usable ones"},
-    Quantity{"sample_time_s", "s", "0.2", Topic::board, Outlet::csv,
+    Quantity{"sample_time_s", "s", "0.2", Topic::board, Outlet::both,
              [](auto& c) -> auto& { return c.record.sample_time_s; },
              "when the counters were read, since the start of the run"},
-    Quantity{"wheels_apart", "", "0.2", Topic::sequence, Outlet::csv,
+    Quantity{"wheels_apart", "", "0.2", Topic::sequence, Outlet::both,
              [](auto& c) -> auto& { return c.record.wheels_apart; },
              "1: the experiment says that the upper wheel is lifted off the lower one"},
+    Quantity{"measured_ns", "ns", "0.2", Topic::board, Outlet::telemetry,
+             [](auto& c) -> auto& { return c.record.measurement.time_ns; },
+             "monotonic clock at which the counters were read"},
+    Quantity{"phase_index", "", "0.2", Topic::sequence, Outlet::telemetry,
+             [](auto& c) -> auto& { return c.record.phase_index; },
+             "phases of the experiment from 0; an early end keeps the last number"},
 };
 // clang-format on
 

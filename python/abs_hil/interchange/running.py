@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..core import _core
-from ..messages import QUANTITIES, decode
+from ..messages import QUANTITIES, decode, row_of
 from ..run import COLUMNS
 from . import messages
 from .mcap_file import McapFile
@@ -40,16 +40,12 @@ def received(url: str, prefix: str, idle_s: float | None, seconds: float | None)
 
 
 class Recorder:
-    """Puts messages into a file. A row waits for the next one, because messages that belong to it may follow it."""
+    """Puts messages into a file."""
 
     def __init__(self, mcap: McapFile) -> None:
         self._mcap = mcap
         self._mcap.add_struct(CYCLE_TOPIC, CYCLE_TYPE, [(name, comment(name)) for name in COLUMNS])
-        self._waiting: dict[str, float] = {}
-        self._waiting_ns = 0
-        self._stamp_ns = 0  # of the waiting row, by the run's clock
-        self._cycle = -1
-        self._facts = {'sample_valid': 1.0, 'wheels_apart': 0.0}
+        self._last_ns = 0  # Unix time of the last row
         self._offset_ns: int | None = None  # from the run's clock to Unix time
         self._signals: list[str] = []
         self._sequence: dict[str, int] = {}
@@ -73,9 +69,8 @@ class Recorder:
             handler(message)
 
     def finish(self) -> None:
-        self._put_row()
         if self.experiment is not None:
-            self._mcap.attach('config.json', 'application/json', self.experiment.config_json.encode(), self._waiting_ns)
+            self._mcap.attach('config.json', 'application/json', self.experiment.config_json.encode(), self._last_ns)
         names = ('experiment', 'controller', 'plant', 'backend', 'version')
         facts = {name: str(getattr(self.experiment, name)) for name in names} if self.experiment is not None else {}
         self._mcap.describe('abs_hil', {'source': 'live', 'rows': str(self.rows), 'lost_messages': str(self.lost),
@@ -88,33 +83,19 @@ class Recorder:
             self._offset_ns = time.time_ns() - stamp_ns
         return stamp_ns + self._offset_ns
 
-    def _put_row(self) -> None:
-        if self._waiting:
-            self._mcap.write(CYCLE_TOPIC, self._waiting_ns, messages.row(list(self._waiting.values())))
-            self.rows += 1
-            self._waiting = {}
-
     def _telemetry_t(self, message: Any) -> None:
-        self._put_row()
-        self._cycle, self._stamp_ns, self._waiting_ns = message.cycle, message.stamp_ns, self._time_ns(message.stamp_ns)
-        self._waiting = {name: float(getattr(message, name)) if hasattr(message, name) else self._facts.get(name, math.nan)
-                         for name in COLUMNS}
-        self._waiting['sample_time_s'] = message.time_s
-
-    def _measurement_t(self, message: Any) -> None:
-        if self._waiting and message.cycle == self._cycle:
-            start_ns = self._stamp_ns - round(self._waiting['time_s'] * 1e9)
-            self._waiting['sample_time_s'] = (message.measured_ns - start_ns) * 1e-9
-
-    def _sample_t(self, message: Any) -> None:
-        self._facts = {'sample_valid': float(message.sample_valid), 'wheels_apart': float(message.wheels_apart)}
-
-    def _signals_t(self, message: Any) -> None:
+        row = row_of(message)
+        self._last_ns = self._time_ns(message.stamp_ns)
+        self._mcap.write(CYCLE_TOPIC, self._last_ns, messages.row([float(row.get(name, math.nan)) for name in COLUMNS]))
+        self.rows += 1
         if not self._signals:
-            self._signals = [name for name in message.names.split(',') if _core.is_signal_name(name)]
-            self._mcap.add_struct(SIGNALS_TOPIC, SIGNALS_TYPE, [(name, comment(name)) for name in self._signals])
-        self._mcap.write(SIGNALS_TOPIC, self._time_ns(message.stamp_ns),
-                         messages.row([getattr(message, f'value{n}') for n in range(1, len(self._signals) + 1)]))
+            self._signals = [name for name in row if name not in QUANTITIES and _core.is_signal_name(name)
+                             and name not in message.__slots__]
+            if self._signals:
+                self._mcap.add_struct(SIGNALS_TOPIC, SIGNALS_TYPE, [(name, comment(name)) for name in self._signals])
+        values = [float(row.get(name, math.nan)) for name in self._signals]
+        if not all(map(math.isnan, values)):
+            self._mcap.write(SIGNALS_TOPIC, self._last_ns, messages.row(values))
 
     def _status_t(self, message: Any) -> None:
         values = {name: float(getattr(message, name)) for name in message.__slots__}

@@ -9,8 +9,8 @@
 
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/csv_sink.hpp"
+#include "telemetry/event_log.hpp"
 #include "telemetry/flight_record.hpp"
-#include "telemetry/recording.hpp"
 
 namespace abs_hil::experiment::test {
 

@@ -1,6 +1,5 @@
 package abs_hil.spy;
 
-import abs_hil.signals_t;
 import abs_hil.telemetry_t;
 import java.awt.Dimension;
 import java.awt.Window;
@@ -10,15 +9,16 @@ import javax.swing.AbstractAction;
 import javax.swing.Action;
 import javax.swing.JDesktopPane;
 import javax.swing.JInternalFrame;
+import javax.swing.JTabbedPane;
 import javax.swing.SwingUtilities;
 import lcm.spy.ChannelData;
 import lcm.spy.SpyPlugin;
 
-/** lcm-spy finds this on its class path and opens it for channels of telemetry_t and signals_t, on a double click. */
+/** lcm-spy finds this on its class path and opens it for channels of telemetry_t, on a double click. */
 public final class ChartsPlugin implements SpyPlugin {
     @Override
     public boolean canHandle(long fingerprint) {
-        return fingerprint == telemetry_t.LCM_FINGERPRINT || fingerprint == signals_t.LCM_FINGERPRINT;
+        return fingerprint == telemetry_t.LCM_FINGERPRINT;
     }
 
     /** lcm-spy asks once without a desktop, for the name alone, and once with the desktop to open in. */
@@ -41,8 +41,10 @@ public final class ChartsPlugin implements SpyPlugin {
             window.validate();
         }
         JInternalFrame frame = new JInternalFrame(channel.name + " charts", true, true, true, true);
-        boolean signals = channel.fingerprint == signals_t.LCM_FINGERPRINT;
-        frame.add(signals ? new SignalsPanel(() -> channel.last) : new ChartsPanel(() -> channel.last));
+        JTabbedPane tabs = new JTabbedPane();
+        tabs.addTab("run", new ChartsPanel(() -> channel.last));
+        tabs.addTab("controller's signals", new SignalsPanel(() -> channel.last));
+        frame.add(tabs);
         frame.pack();
         desktop.add(frame);
         frame.setVisible(true);

@@ -1,13 +1,14 @@
 package abs_hil.spy;
 
-import abs_hil.signals_t;
+import abs_hil.telemetry_t;
+import java.util.Arrays;
 import java.util.function.Supplier;
 
-/** A chart for each of a controller's own signals, sampled from the latest message 50 times a second. */
+/** A chart for each value of a telemetry message beside its fields, as a controller's own signals, sampled from the latest message 50 times a second. */
 final class SignalsPanel extends SampledPanel {
-    private static final int SIGNALS = 8;
+    private static final int MOST = 16;
 
-    private final SampleHistory history = new SampleHistory(SIGNALS, WINDOW_S, 1024);
+    private final SampleHistory history = new SampleHistory(MOST, WINDOW_S, 1024);
     private String names = "";
     private long firstNs;
 
@@ -20,23 +21,25 @@ final class SignalsPanel extends SampledPanel {
     @Override
     void sample() {
         Object message = latest();
-        if (!(message instanceof signals_t)) {
+        if (!(message instanceof telemetry_t)) {
             return;
         }
-        signals_t s = (signals_t) message;
-        if (!names.equals(s.names) || s.stamp_ns < firstNs) {
-            begin(s);
+        telemetry_t t = (telemetry_t) message;
+        if (!names.equals(t.names) || t.stamp_ns < firstNs) {
+            begin(t);
         }
-        history.add((s.stamp_ns - firstNs) * 1e-9, s.value1, s.value2, s.value3, s.value4, s.value5, s.value6, s.value7,
-            s.value8);
+        double[] values = new double[MOST];
+        Arrays.fill(values, Double.NaN);
+        System.arraycopy(t.values, 0, values, 0, Math.min(t.value_count, MOST));
+        history.add((t.stamp_ns - firstNs) * 1e-9, values);
     }
 
-    private void begin(signals_t s) {
-        names = s.names;
-        firstNs = s.stamp_ns;
+    private void begin(telemetry_t t) {
+        names = t.names;
+        firstNs = t.stamp_ns;
         removeAll();
-        String[] each = names.split(",");
-        for (int signal = 0; signal < Math.min(each.length, SIGNALS); ++signal) {
+        String[] each = names.isEmpty() ? new String[0] : names.split(",");
+        for (int signal = 0; signal < Math.min(each.length, MOST); ++signal) {
             add(new StripChart(each[signal], history, new int[] {signal}, new String[] {""}, 0.0, 0.0));
         }
         revalidate();

@@ -1,6 +1,5 @@
 package abs_hil.spy;
 
-import abs_hil.signals_t;
 import abs_hil.telemetry_t;
 import java.awt.image.BufferedImage;
 import javax.swing.JTable;
@@ -114,14 +113,13 @@ public final class ChartsTest {
         check(Double.isNaN(history.lastValue(0)), "slip at standstill is a gap");
     }
 
-    private static signals_t signals(long stampNs, String names, double first, double second) {
-        signals_t s = new signals_t();
-        s.stamp_ns = stampNs;
-        s.names = names;
-        s.value1 = first;
-        s.value2 = second;
-        s.value3 = s.value4 = s.value5 = s.value6 = s.value7 = s.value8 = Double.NaN;
-        return s;
+    private static telemetry_t signals(long stampNs, String names, double first, double second) {
+        telemetry_t t = new telemetry_t();
+        t.stamp_ns = stampNs;
+        t.names = names;
+        t.values = new double[] {first, second};
+        t.value_count = t.values.length;
+        return t;
     }
 
     private static void signalsPanelHasAChartForEachSignal() {
@@ -141,10 +139,9 @@ public final class ChartsTest {
         check(panel.getComponentCount() == 1 && panel.history().lastTime() == 0, "another run has other charts");
     }
 
-    private static void pluginIsForTelemetryAndSignalsOnly() {
+    private static void pluginIsForTelemetryOnly() {
         ChartsPlugin plugin = new ChartsPlugin();
         check(plugin.canHandle(telemetry_t.LCM_FINGERPRINT), "telemetry_t");
-        check(plugin.canHandle(signals_t.LCM_FINGERPRINT), "signals_t");
         check(!plugin.canHandle(abs_hil.status_t.LCM_FINGERPRINT), "status_t");
         plugin.getAction(null, null).actionPerformed(null);  // lcm-spy asks for the name without a desktop
     }
@@ -170,7 +167,7 @@ public final class ChartsTest {
         axesAreRound();
         chartDrawsLinesWhereTheValuesAre();
         panelTakesTruthElseEstimates();
-        pluginIsForTelemetryAndSignalsOnly();
+        pluginIsForTelemetryOnly();
         buttonFindsTheTelemetryRow();
         System.out.println("all charts tests pass");
     }
