@@ -16,7 +16,7 @@ set(ABS_HIL_ROOM_TABLE
   "telemetry | LCM messages, event log, CSV, flight record, status line | files rig lcmtypes"
   "watch | `abs_hil watch`: the view of a running experiment, its screen, the terminal | files rig telemetry lcmtypes"
   "analysis | metrics, summary | rig"
-  "run_folder | run folders: layout, environment, checksums, the index of a series, the reader of a run's CSV | files rig"
+  "run_folder | run folders: layout, environment, checksums, the index of a series | files rig"
   "diagnosis | the checks of `abs_hil doctor`, the verdict of `abs_hil latency` | files rig driver runtime telemetry"
   "config | configuration keys from the option rows, files, experiment files: grammar, parser, schema, plan | files rig control plant_sim driver runtime experiment"
   "guardian | the guard of the outputs and its companions, the lease and the own guardian as a run sees them, the program abs_guardian | cli files rig control plant_sim driver runtime experiment lcmtypes telemetry config"

@@ -13,14 +13,16 @@ from .files import write_whole
 from .messages import PHASES, QUANTITIES
 from .nesting import parse_json
 from .options import PathLike
+from .rows import TEXTS, read_rows
 
 if TYPE_CHECKING:
     import pandas
 
 #: columns of every run's CSV, in order
 COLUMNS = tuple(name for name, row in QUANTITIES.items() if row['csv_column'] is not None)
-#: columns that hold texts
-TEXTS = ('phase', 'phase_name')
+
+#: side files are small; a larger file is not one, and must not fill the memory
+MOST_BYTES = 64 << 20
 
 
 class Run:
@@ -147,10 +149,9 @@ def flattened(values: Mapping[str, Any], prefix: str = '') -> dict[str, Any]:
 
 def read_csv(path: PathLike) -> tuple[dict[str, np.ndarray], tuple[str, ...], list[str]]:
     """(columns, signals, notes) of a run's CSV. ValueError, with file and line, for a file that is no run's."""
-    rows, names, truncated = _core.read_csv(os.fspath(path))
-    columns = {name: phase_names(values, tuple(names)) if name in TEXTS else values for name, values in rows}
-    notes = ['the last row of the CSV is incomplete, as after a crash, and is left out'] if truncated else []
-    return columns, signals_of([name for name, _ in rows]), notes
+    rows = read_rows(path)
+    notes = ['the last row of the CSV is incomplete, as after a crash, and is left out'] if rows.truncated else []
+    return rows.columns, signals_of(list(rows.columns)), notes
 
 
 def signals_of(columns: list[str]) -> tuple[str, ...]:
@@ -187,34 +188,51 @@ def load(path: PathLike) -> Run:
     columns, signals, notes = read_csv(place / 'run.csv')
     summary: dict[str, Any] = {}
     try:
-        summary = parse_json((place / 'summary.json').read_text(encoding='utf-8'))
-        if not isinstance(summary, dict):
-            raise ValueError('the file must contain a JSON object')
-    except OSError:
+        summary = read_object(place / 'summary.json')
+    except FileNotFoundError:
         notes.append('no summary.json: names, figures and configuration are unknown')
-    except ValueError as error:
+    except (ValueError, OSError) as error:
         notes.append(f'summary.json is not used: {error}')
-        summary = {}
     return Run(columns, summary, signals, notes=notes, folder=place, name=place.resolve().name)
+
+
+def read_object(path: pathlib.Path) -> dict[str, Any]:
+    """A JSON file that holds an object. Raises OSError, and ValueError with file, line and reason."""
+    if path.stat().st_size > MOST_BYTES:
+        raise ValueError(f'{path}: {path.stat().st_size} bytes are too many for this kind of file')
+    try:
+        data = parse_json(path.read_bytes().decode('utf-8', 'replace'))
+    except ValueError as error:
+        raise ValueError(f'{path}: not valid JSON: {_core.clean_text(str(error).encode())}') from None
+    if not isinstance(data, dict):
+        raise ValueError(f'{path}:1: the file must contain a JSON object')
+    return data
+
+
+def runs_in_series(place: pathlib.Path) -> tuple[list[pathlib.Path], list[str]]:
+    """The folders of the complete runs of a series, in order, and notes about the others. Raises ValueError if there is
+    none."""
+    try:
+        folders = sorted(path for path in place.iterdir() if path.name.startswith('run-') and path.is_dir())
+    except OSError as error:
+        raise ValueError(f'cannot read "{place}": {error.strerror}') from None
+    if not folders:
+        raise ValueError(f'"{place}" is no series folder (it has no run-0001/)')
+    complete = [path for path in folders if (path / 'run.csv').exists() and (path / 'summary.json').exists()]
+    notes = [f'{path} is not complete and is left out' for path in folders if path not in complete]
+    if not complete:
+        raise ValueError(f'"{place}": this series folder has no complete run (as run-0001/ with run.csv and summary.json)')
+    return complete, notes
 
 
 def load_series(folder: PathLike) -> Series:
     """Loads the complete runs of a series' folder, in order; `Series.notes` names those that are left out."""
     place = pathlib.Path(folder)
-    folders = sorted(path for path in place.glob('run-*') if path.is_dir()) if place.is_dir() else []
-    if not folders:
-        raise ValueError(f'"{place}" is no series folder (it has no run-0001/)')
-    runs, notes = [], []
-    for path in folders:
-        if (path / 'run.csv').exists() and (path / 'summary.json').exists():
-            runs.append(load(path))
-        else:
-            notes.append(f'{path} is not complete and is left out')
-    if not runs:
-        raise ValueError(f'"{place}": this series folder has no complete run (as run-0001/ with run.csv and summary.json)')
+    folders, notes = runs_in_series(place)
+    runs = [load(path) for path in folders]
     index: dict[str, Any] = {}
     try:
-        index = parse_json((place / 'series.json').read_text(encoding='utf-8'))
+        index = read_object(place / 'series.json')
     except (OSError, ValueError):
         notes.append('no readable series.json')
     return Series(runs, index, notes)

@@ -1,4 +1,4 @@
-// Files of runs: rows of a CSV, messages of an event log, and figures of merit of rows.
+// Files of runs: messages of an event log, and figures of merit of rows.
 
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
@@ -24,8 +24,6 @@
 #include "column_sink.hpp"
 #include "files/result_file.hpp"
 #include "run_folder/clean_text.hpp"
-#include "run_folder/csv_reader.hpp"
-#include "run_folder/input_error.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/checked_decode.hpp"
 #include "telemetry/csv_text.hpp"
@@ -35,46 +33,6 @@
 namespace abs_hil::python {
 
 namespace {
-
-using run_folder::InputError;
-
-/// Number of a phase's name among those that occurred.
-double number_of(std::string_view phase, std::vector<std::string>& names) {
-  const auto place = std::find(names.begin(), names.end(), phase) - names.begin();
-  if (place == static_cast<std::ptrdiff_t>(names.size())) names.emplace_back(phase);
-  return static_cast<double>(place);
-}
-
-/// (columns, names of the phases that `phase` and `phase_name` count, whether the last row is cut off)
-py::tuple read_csv(const std::string& path) {
-  std::vector<std::string> names;
-  std::vector<std::vector<double>> values;
-  std::vector<std::string> phases;
-  bool truncated = false;
-  {
-    const py::gil_scoped_release release;
-    run_folder::CsvReader csv(path);
-    names = csv.columns();
-    const std::size_t phase = *csv.find("phase");
-    const std::optional<std::size_t> own_name = csv.find(run_folder::phase_name_column);
-    values.resize(names.size());
-    while (csv.next()) {
-      for (std::size_t n = 0; n < names.size(); ++n) values[n].push_back(csv.values()[n]);
-      values[phase].back() = number_of(run_folder::clean_text(csv.phase()), phases);
-      if (own_name) values[*own_name].back() = number_of(run_folder::clean_text(csv.phase_name()), phases);
-    }
-    truncated = csv.truncated();
-    if (values.front().empty()) {
-      throw InputError(path, truncated ? 2 : 1,
-                       truncated ? "the only row is incomplete: the file holds no data of the run"
-                                 : "no rows after the header: the file holds no data of the run");
-    }
-  }
-  py::list columns;
-  for (std::size_t n = 0; n < names.size(); ++n)
-    columns.append(py::make_tuple(names[n], array_of(std::move(values[n]))));
-  return py::make_tuple(columns, phases, truncated);
-}
 
 /// Rows and description of the run in an event log.
 class LogColumns {
@@ -283,7 +241,6 @@ py::tuple profile_of(const std::string& text, const std::string& key) {
 }  // namespace
 
 void add_files(py::module_& module) {
-  module.def("read_csv", &read_csv, py::arg("path"));
   module.def(
       "check_seal", [](const std::string& folder) { run_folder::check_seal(folder); }, py::arg("folder"));
   module.def("write_result", &write_result, py::arg("path"), py::arg("write"), py::arg("probe"));

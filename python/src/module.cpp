@@ -11,7 +11,6 @@
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
 #include "files/result_file.hpp"
-#include "run_folder/input_error.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/event_log.hpp"
 #include "telemetry/lcm_outlet.hpp"
@@ -27,8 +26,6 @@ void translate(std::exception_ptr error) {
   } catch (const config::ConfigError& e) {
     PyErr_SetString(PyExc_ValueError, e.what());
   } catch (const telemetry::RecordingError& e) {
-    PyErr_SetString(PyExc_ValueError, e.what());
-  } catch (const run_folder::InputError& e) {
     PyErr_SetString(PyExc_ValueError, e.what());
   } catch (const run_folder::FolderError& e) {
     PyErr_SetString(PyExc_ValueError, e.what());

@@ -10,7 +10,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from ..run import TEXTS, csv_bytes, phase_names
+from ..rows import TEXTS
+from ..run import csv_bytes
 from .files import InputError, RunFiles
 from .page import Unavailable
 from .survey import Rows
@@ -44,8 +45,7 @@ class Exporter:
                     raise InputError(f'{run.csv}:1: no column "{name}"; the file has the columns {", ".join(rows.names)}')
             if rows.truncated:
                 self.notes.append(f'{run.csv}: the last row is incomplete, as after a crash, and is left out')
-            yield run, {name: phase_names(rows.columns[name], tuple(rows.phases)) if name in TEXTS else rows.columns[name]
-                        for name in self._columns}
+            yield run, {name: rows.columns[name] for name in self._columns}
 
     def _csv(self, out: BinaryIO) -> None:
         for number, (run, columns) in enumerate(self._tables()):

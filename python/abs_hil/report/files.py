@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from ..core import _core
-from ..nesting import parse_json, parse_toml
-from ..run import flattened
+from ..nesting import parse_toml
+from ..run import MOST_BYTES, flattened, read_object, runs_in_series
 from .text import clean, number_text
 
 try:
@@ -24,8 +24,6 @@ except ImportError:  # Python before 3.11
     tomllib = None  # type: ignore[assignment]
 
 NAME_CHARACTERS = 40
-#: side files are small; a larger file is not one, and must not fill the memory
-MOST_BYTES = 64 << 20
 #: largest accepted bin of a histogram, 10 s
 MOST_US = 10_000_000
 PARTS = ('wake-up latency', 'read', 'control', 'write', 'whole cycle')
@@ -115,14 +113,11 @@ def read_bytes(path: pathlib.Path) -> bytes:
 
 def read_json(path: pathlib.Path) -> dict[str, Any]:
     try:
-        data = parse_json(read_bytes(path).decode('utf-8', 'replace'))
+        return read_object(path)
+    except OSError as error:
+        raise InputError(f'cannot read "{path}": {error.strerror}') from None
     except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f'{path}: not valid JSON: {clean(error)}') from None
-    if not isinstance(data, dict):
-        raise InputError(f'{path}:1: the file must contain a JSON object')
-    return data
+        raise InputError(str(error)) from None
 
 
 def texts_of(values: dict[str, Any]) -> dict[str, str]:
@@ -257,24 +252,14 @@ def _load_run(path: pathlib.Path) -> RunFiles:
         'radius and end speed'])
 
 
-def _folders_of(series: pathlib.Path) -> list[pathlib.Path]:
-    try:
-        return sorted(path for path in series.iterdir() if path.name.startswith('run-') and path.is_dir())
-    except OSError as error:
-        raise InputError(f'cannot read "{series}": {error.strerror}') from None
-
-
 def _load_series(path: pathlib.Path, found: FoundRuns) -> None:
-    series = SeriesFiles(_base_name(path), [])
-    for folder in _folders_of(path):
-        if not (folder / 'run.csv').exists() or not (folder / 'summary.json').exists():
-            found.notes.append(f'{clean(folder)} is not complete and is left out')
-            continue
-        series.runs.append(len(found.runs))
-        found.runs.append(_load_run(folder))
-    if not series.runs:
-        raise InputError(f'"{path}": this series folder has no complete run (as run-0001/ with run.csv and summary.json)')
-    found.series.append(series)
+    try:
+        folders, notes = runs_in_series(path)
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    found.notes += [clean(note) for note in notes]
+    found.series.append(SeriesFiles(_base_name(path), [len(found.runs) + number for number in range(len(folders))]))
+    found.runs += [_load_run(folder) for folder in folders]
 
 
 def find_runs(arguments: Iterable[str | pathlib.Path], labels: list[str] | None = None) -> FoundRuns:
@@ -286,7 +271,7 @@ def find_runs(arguments: Iterable[str | pathlib.Path], labels: list[str] | None 
             raise InputError(f'"{path}" does not exist; give a run folder, a run\'s CSV file or a series folder')
         if not path.is_dir() or (path / 'run.csv').exists():
             found.runs.append(_load_run(path))
-        elif (path / 'series.json').exists() or _folders_of(path):
+        elif (path / 'series.json').exists() or any(path.glob('run-*/')):
             _load_series(path, found)
         else:
             raise InputError(f'"{path}" is neither a run folder (no run.csv) nor a series folder (no series.json, no '

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..core import _core
 from ..figures import FigureOfMerit, figures
-from ..run import COLUMNS, TEXTS, signals_of
+from ..rows import TEXTS, read_rows
+from ..run import COLUMNS, signals_of
 from .files import InputError, RunFiles
 from .text import significant
 
@@ -55,14 +56,22 @@ class Rows:
 
     def __init__(self, path: os.PathLike[str] | str) -> None:
         try:
-            rows, self.phases, self.truncated = _core.read_csv(os.fspath(path))
+            rows = read_rows(path)
         except ValueError as error:
             raise InputError(str(error)) from None
-        self.columns: dict[str, np.ndarray] = dict(rows)
-        self.names = [name for name, _ in rows]
-        self.phase = self.columns['phase'].astype(np.int32)
-        own = self.columns.get('phase_name')
-        self.own_name = None if own is None else own.astype(np.int32)
+        self.columns, self.truncated = rows.columns, rows.truncated
+        self.names = list(self.columns)
+        # Texts as numbers into `phases`: changes are then quick to find.
+        self.phases: list[str] = []
+        self.phase = self._numbered('phase')
+        self.own_name = self._numbered('phase_name') if 'phase_name' in self.columns else None
+
+    def _numbered(self, name: str) -> np.ndarray:
+        texts = self.columns[name]
+        place: dict[str, int] = {text: number for number, text in enumerate(self.phases)}
+        numbers = np.array([place.setdefault(text, len(place)) for text in texts], dtype=np.int32)
+        self.phases = list(place)
+        return numbers
 
     @property
     def time_s(self) -> np.ndarray:

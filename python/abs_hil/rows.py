@@ -1,0 +1,124 @@
+"""Reads the rows of a run's CSV with pandas, and says file and line of whatever is no row of a run."""
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+import pathlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from .core import _core
+from .messages import QUANTITIES
+
+#: columns that every run's CSV has, whatever version wrote it; others may follow in any order
+CONTRACT = tuple(name for name, row in QUANTITIES.items() if row['csv_column'] is not None and row['since'] == '0.1')
+#: columns that hold texts
+TEXTS = ('phase', 'phase_name')
+MOST_SHOWN = 40
+
+
+@dataclass
+class Rows:
+    """columns: name -> float64, or texts for `phase` and `phase_name`, in the order of the file.
+    truncated: the last line has no end, as after a crash; it is no row."""
+    columns: dict[str, np.ndarray]
+    truncated: bool
+
+
+def read_rows(path: str | os.PathLike[str]) -> Rows:
+    """Raises ValueError with file and line: missing columns, fields that are no numbers, decreasing time, no row."""
+    import pandas
+    place = pathlib.Path(path)
+    try:
+        data = place.read_bytes()
+    except OSError as error:
+        raise ValueError(f'cannot read "{place}": {error.strerror}; give a run\'s CSV file or folder') from None
+    end = data.rfind(b'\n') + 1
+    truncated, body = end < len(data), data[:end]
+    names, first = _header(place, body, truncated)
+    if len(body) == first:
+        raise ValueError(f'{place}:2: the only row is incomplete: the file holds no data of the run' if truncated else
+                         f'{place}:1: no rows after the header: the file holds no data of the run')
+    try:
+        if not _rectangular(body[first:], len(names)):
+            raise ValueError
+        types = {number: str if name in TEXTS else np.float64 for number, name in enumerate(names)}
+        frame = pandas.read_csv(io.BytesIO(body[first:]), header=None, dtype=types, na_values=_no_number(names),
+                                keep_default_na=False, float_precision='round_trip', quoting=csv.QUOTE_NONE,
+                                skip_blank_lines=False, encoding_errors='surrogateescape')
+        columns = {name: frame[number].to_numpy() for number, name in enumerate(names)}
+    except ValueError as error:
+        _refuse(place, body[first:], names)
+        raise ValueError(f'{place}: {error}') from None
+    time_s = columns['time_s']
+    if not np.isfinite(time_s).all() or (np.diff(time_s) < 0).any():
+        _refuse(place, body[first:], names)
+    for name in TEXTS:
+        if name in columns:
+            columns[name] = _cleaned(columns[name])
+    return Rows(columns, truncated)
+
+
+def _header(place: pathlib.Path, body: bytes, truncated: bool) -> tuple[list[str], int]:
+    """Names of the columns, and where the rows begin."""
+    first = body.find(b'\n') + 1
+    if first == 0:
+        raise ValueError(f'{place}:1: the file ends within its first line: the recording stopped before the first row'
+                         if truncated else f'{place}:1: the file is empty: the run wrote nothing')
+    line = body[:first].rstrip(b'\r\n').removeprefix(b'\xef\xbb\xbf')  # a spreadsheet's byte order mark
+    names = [_core.clean_text(name) for name in line.split(b',')]
+    missing = [name for name in CONTRACT if name not in names]
+    if missing:
+        raise ValueError(f'{place}:1: the header lacks {", ".join(missing)}; a run\'s CSV, as abs_hil --csv writes it, '
+                         f'begins with "{",".join(CONTRACT[:3])},…"')
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f'{place}:1: the header has the column {twice} twice')
+    return names, first
+
+
+def _rectangular(body: bytes, columns: int) -> bool:
+    """Whether every line has this number of fields: pandas fills up short ones."""
+    text = np.frombuffer(body, dtype=np.uint8)
+    ends = np.flatnonzero(text == ord('\n'))
+    commas = np.searchsorted(np.flatnonzero(text == ord(',')), ends)
+    return bool((np.diff(commas, prepend=0) == columns - 1).all())
+
+
+def _no_number(names: list[str]) -> dict[int, list[str]]:
+    return {number: [] if name in TEXTS else ['NaN'] for number, name in enumerate(names)}
+
+
+def _cleaned(texts: np.ndarray) -> np.ndarray:
+    """Texts of a column, fit to show. There are few different ones."""
+    clean = {text: _core.clean_text(str(text).encode('utf-8', 'surrogateescape'), MOST_SHOWN) for text in set(texts)}
+    return np.array([clean[text] for text in texts], dtype=object)
+
+
+def _refuse(place: pathlib.Path, body: bytes, names: list[str]) -> None:
+    """Raises ValueError for the first line that is no row."""
+    last_s = -math.inf
+    for number, line in enumerate(body.split(b'\n')[:-1], 2):
+        fields = line.removesuffix(b'\r').split(b',')
+        for name, field in zip(names, fields):
+            try:
+                value = math.nan if name in TEXTS else float(field)
+            except ValueError:
+                shown = _core.clean_text(field, MOST_SHOWN)
+                raise ValueError(f'{place}:{number}: {name}: "{shown}" is not a number (a run writes NaN for an unknown '
+                                 'value)') from None
+            if name == 'time_s':
+                time_s = value
+        if len(fields) < len(names):
+            raise ValueError(f'{place}:{number}: the row has {len(fields)} fields instead of {len(names)} and ends before '
+                             f'{names[len(fields)]}')
+        if len(fields) > len(names):
+            raise ValueError(f'{place}:{number}: the row has more than the header\'s {len(names)} fields')
+        if not math.isfinite(time_s):
+            raise ValueError(f'{place}:{number}: time_s is not a finite number')
+        if time_s < last_s:
+            raise ValueError(f'{place}:{number}: time_s decreases from {last_s:g} to {time_s:g}')
+        last_s = time_s
