@@ -19,7 +19,7 @@
 #include "run_folder/run_folder.hpp"
 #include "runtime/cycle_statistics.hpp"
 #include "telemetry/csv_sink.hpp"
-#include "telemetry/event_csv.hpp"
+#include "telemetry/events.hpp"
 #include "telemetry/lcm_outlet.hpp"
 #include "telemetry/log_outlet.hpp"
 #include "telemetry/message_stream.hpp"

@@ -1,6 +1,5 @@
 #include "telemetry/flight_record.hpp"
 
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -9,6 +8,7 @@
 #include "files/result_file.hpp"
 #include "rig/reason_text.hpp"
 #include "telemetry/csv_sink.hpp"
+#include "telemetry/csv_text.hpp"
 #include "telemetry/log_outlet.hpp"
 #include "telemetry/wall_clock.hpp"
 
@@ -17,15 +17,7 @@ namespace {
 
 constexpr const char* record_kind = "flight record";
 
-void add_number(std::string& row, double value) {
-  row += ',';
-  if (std::isnan(value)) {
-    row += "NaN";
-    return;
-  }
-  char text[32];
-  row.append(text, std::to_chars(text, text + sizeof text, value).ptr);
-}
+void add_number(std::string& row, double value) { row.append(",").append(CsvRow::text_of(value)); }
 
 std::string extra_columns(const rig::CycleRecord& r) {
   std::string row = ',' + std::to_string(r.sequence) + ',' + std::to_string(r.stamp_ns);

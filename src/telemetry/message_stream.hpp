@@ -13,7 +13,7 @@
 #include "abs_hil/status_t.hpp"
 #include "rig/record_sink.hpp"
 #include "rig/run_names.hpp"
-#include "telemetry/event_detector.hpp"
+#include "telemetry/events.hpp"
 #include "telemetry/message_codec.hpp"
 #include "telemetry/outlet.hpp"
 #include "telemetry/status_snapshot.hpp"

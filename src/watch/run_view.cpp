@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "rig/formatted_text.hpp"
-#include "telemetry/event_detector.hpp"
+#include "telemetry/events.hpp"
 #include "telemetry/message_codec.hpp"
 
 namespace abs_hil::watch {

@@ -8,8 +8,8 @@
 
 #include "rig/formatted_text.hpp"
 #include "telemetry/checked_decode.hpp"
-#include "telemetry/lcm_packet.hpp"
 #include "telemetry/message_codec.hpp"
+#include "telemetry/udpm_receiver.hpp"
 
 using namespace abs_hil;
 

@@ -1,6 +1,9 @@
-#include "telemetry/event_detector.hpp"
+#include "telemetry/events.hpp"
+
+#include <utility>
 
 #include "rig/reason_text.hpp"
+#include "telemetry/csv_text.hpp"
 
 namespace abs_hil::telemetry {
 
@@ -35,6 +38,22 @@ std::optional<DetectedEvent> EventDetector::observe(const rig::CycleRecord& reco
   // The change and its reason may be in a lost record.
   if (records_lost > 0) event.message.append(" (").append(std::to_string(records_lost)).append(" records lost before)");
   return event;
+}
+
+EventCsv::EventCsv(std::filesystem::path path, rig::RunNames names)
+    : file_(std::move(path), "list of events"), text_(event_csv_header), names_(std::move(names)) {
+  text_ += '\n';
+}
+
+void EventCsv::consume(const rig::CycleRecord& record, double /*distance_m*/) {
+  const auto event = detector_.observe(record);
+  if (!event) return;
+  text_ += CsvRow::text_of(record.time_s);
+  text_.append(",").append(event->kind).append(",").append(rig::name_of(record.phase));
+  // Quoted, because the text of a reason may contain a comma.
+  text_.append(",\"").append(event->reason).append("\",");
+  text_ += CsvRow::text_of(record.reason_value);
+  text_.append(",").append(names_.phase_of(record)) += '\n';
 }
 
 }  // namespace abs_hil::telemetry

@@ -1,9 +1,8 @@
-#include "telemetry/lcm_packet.hpp"
-
 #include <string>
 #include <vector>
 
 #include "catch.hpp"
+#include "telemetry/udpm_receiver.hpp"
 
 namespace abs_hil::telemetry {
 namespace {

@@ -1,4 +1,4 @@
-#include "telemetry/event_detector.hpp"
+#include "telemetry/events.hpp"
 
 #include "catch.hpp"
 
