@@ -28,6 +28,7 @@ TEST_CASE("An answer is complete with both its frames, and sequences wrap") {
     REQUIRE(tracker.complete());
     CHECK(tracker.last_sequence() == static_cast<std::uint8_t>(cycle));
     CHECK(tracker.answer().values.upper_counts == 1);
+    CHECK(tracker.answer().count_bits == 24);
     CHECK(tracker.answer().values.node_time_us == 3);
   }
 }
