@@ -92,9 +92,9 @@ def _figures(entry: Entry, runs: list[dict[str, Any]], threads: int) -> tuple[di
     return {name: np.array(values) for name, values in columns.items()}, faults
 
 
-def _column(heading: str, decimals: int = 0, scale: float = 1.0) -> Any:
-    """A field of Score that the result's tables show, times `scale`."""
-    return field(metadata={'heading': heading, 'decimals': decimals, 'scale': scale})
+def _column(heading: str, decimals: int = 0, scale: float = 1.0) -> dict[str, Any]:
+    """For a field of Score that the result's tables show, times `scale`."""
+    return {'heading': heading, 'decimals': decimals, 'scale': scale}
 
 
 @dataclass(frozen=True)
@@ -106,18 +106,18 @@ class Score:
     failed: runs that a fault ended or that never stopped; no other figure has them.
     """
     group: str
-    runs: int = _column('runs')
-    failed: int = _column('failed')
-    locked: int = _column('locked')
-    excess_mean: float = _column('excess mean %', 1, 100.0)
-    excess_p90: float = _column('90 % %', 1, 100.0)
-    excess_worst: float = _column('worst %', 1, 100.0)
+    runs: int = field(metadata=_column('runs'))
+    failed: int = field(metadata=_column('failed'))
+    locked: int = field(metadata=_column('locked'))
+    excess_mean: float = field(metadata=_column('excess mean %', 1, 100.0))
+    excess_p90: float = field(metadata=_column('90 % %', 1, 100.0))
+    excess_worst: float = field(metadata=_column('worst %', 1, 100.0))
     worst_case: str
-    variation_median_Nm: float = _column('variation median N m')
-    variation_worst_Nm: float = _column('worst N m')
-    slip_overshoot: float = _column('slip overshoot', 2)
-    slip_largest: float = _column('peak slip', 2)
-    adhesion: float = _column('ε', 3)
+    variation_median_Nm: float = field(metadata=_column('variation median N m'))
+    variation_worst_Nm: float = field(metadata=_column('worst N m'))
+    slip_overshoot: float = field(metadata=_column('slip overshoot', 2))
+    slip_largest: float = field(metadata=_column('peak slip', 2))
+    adhesion: float = field(metadata=_column('ε', 3))
 
     def as_row(self) -> dict[str, Any]:
         return dict(self.__dict__)
