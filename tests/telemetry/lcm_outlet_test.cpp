@@ -27,7 +27,7 @@ TEST_CASE("every message that tcpq cannot deliver for want of a server is counte
   MessageStream stream({}, {}, {});
   stream.add(outlet);
   for (std::uint64_t i = 0; i < 2500; ++i) stream.consume(test::sample_record(i), 0.0);
-  CHECK(outlet.failures() == 2500 + 3 + 1 + 1 + 1);  // telemetry, status, event, experiment, phase
+  CHECK(outlet.failures() == 2500 + 3 + 1 + 1);  // telemetry, status, event, experiment
   CHECK(stream.failures() == outlet.failures());
 }
 

@@ -83,7 +83,9 @@ TEST_CASE("names of phases and signals follow the columns of --csv as they do th
   {
     LogOutlet log(scratch / "run.lcmlog", 0);
     CsvSink csv(scratch / "own.csv", 0, names);
-    MessageStream stream({}, {.names = names}, {});
+    ExperimentInfo info{};
+    info.names = names;
+    MessageStream stream({}, info, {});
     stream.add(log);
     for (std::uint64_t n = 0; n < 10; ++n) {
       rig::CycleRecord r = test::sample_record(n);
