@@ -16,7 +16,7 @@ using experiment::test::braking;
 
 /// The braking phase of a run with the adaptive controller.
 const std::vector<rig::CycleRecord>& braking_records() {
-  static const auto records = experiment::test::run(braking("adaptive")).in_phase(rig::Phase::brake);
+  static const auto records = experiment::test::simulated(braking("adaptive")).in_phase(rig::Phase::brake);
   return records;
 }
 

@@ -14,7 +14,7 @@ void paper_run(benchmark::State& state) {
   const Setup setup;
   double simulated_s = 0.0;
   for (auto _ : state) {
-    const Result result = run(setup);
+    const Result result = simulated(setup);
     simulated_s = result.records.back().time_s;
   }
   state.counters["simulated_s"] = simulated_s;
@@ -23,7 +23,7 @@ void paper_run(benchmark::State& state) {
 void braking_run(benchmark::State& state, const std::string& controller) {
   const Setup setup = braking(controller);
   double stop_m = 0.0;
-  for (auto _ : state) stop_m = run(setup).metrics.stop_distance_m;
+  for (auto _ : state) stop_m = simulated(setup).metrics.stop_distance_m;
   state.counters["stop_m"] = stop_m;
 }
 

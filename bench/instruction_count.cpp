@@ -17,7 +17,7 @@ extern "C" {
 /// Both speed observers, sequence, adaptive controller, actuator, then the gate: the control part of a cycle.
 [[gnu::noinline]] void counted_control(experiment::RunLogic& logic, runtime::CommandGate& gate,
                                        const rig::Measurement& measurement, rig::CycleRecord& record) {
-  const rig::Command wanted = logic.step(measurement, record);
+  const rig::Command wanted = logic.step(measurement, gate, record);
   record.command = gate.check(wanted, {record.control.speeds_est, record.phase, measurement.time_ns}).command;
 }
 

@@ -32,23 +32,11 @@ struct Braking {
 
 /// Brakes the plant with a controller whose nominal parameters are `believed`.
 Braking brake(const Setup& setup, const rig::RigParameters& believed) {
-  runtime::VirtualClock clock;
-  driver::SimDriver driver(setup.plant, {.seed = setup.seed, .start_speed_rad_s = setup.experiment.start_speed_rad_s});
-  experiment::test::Recorder recorder;
-  analysis::RunMetrics metrics(setup.plant.rig.wheels.r2_m, setup.experiment.end_speed_m_s);
-  experiment::RunSession session(
-      clock, driver,
-      {.control = setup.control,
-       .rig = believed,
-       .identity = plant_sim::identity_of(setup.plant),
-       .controller = control::make_controller(setup.control.controller, {setup.control, believed}),
-       .sequence = experiment::Sequence(experiment::test::phases_of(setup)),
-       .max_brake_duty = setup.gate.brake_duty_max,
-       .start_speed_rad_s = setup.experiment.start_speed_rad_s},
-      setup.gate, {&recorder, &metrics});
-  session.run_fast([] { return rig::Reason::none; });
-  Braking result{.distance_m = metrics.metrics().stop_distance_m};
-  for (const auto& record : recorder.records) {
+  Setup informed = setup;
+  informed.model = believed;
+  const experiment::test::Result run = experiment::test::simulated(informed);
+  Braking result{.distance_m = run.metrics.stop_distance_m};
+  for (const auto& record : run.records) {
     const bool counts =
         record.phase == rig::Phase::brake && setup.plant.rig.wheels.r2_m * record.truth.speeds.omega2_rad_s > slow_m_s;
     if (counts) result.largest_slip = std::max(result.largest_slip, record.truth.slip);

@@ -11,7 +11,7 @@ set(ABS_HIL_ROOM_TABLE
   "driver_sim | the simulated backend (`driver/sim`) | rig driver plant_sim"
   "emulator | the device side of the boards, for tests and `abs_rig_emulator`, shares no line with the drivers | rig plant_sim"
   "runtime | clocks, cyclic executive, command gate with its plausibility checks, rings, histograms, real-time set-up | rig driver"
-  "experiment | sequence of phases, the logic of a run, a run from start to safe state, commissioning | files rig control driver runtime"
+  "experiment | sequence of phases, the logic of a run, commissioning | files rig control driver runtime"
   "lcmtypes | the message types, generated from `lcmtypes/*.lcm` | "
   "telemetry | LCM messages, event log, CSV, flight record, status line | files rig lcmtypes"
   "watch | `abs_hil watch`: the view of a running experiment, its screen, the terminal | files rig telemetry lcmtypes"
@@ -20,11 +20,12 @@ set(ABS_HIL_ROOM_TABLE
   "diagnosis | the checks of `abs_hil doctor`, the verdict of `abs_hil latency` | files rig driver runtime telemetry"
   "config | configuration keys from the option rows, files, experiment files: grammar, parser, schema, plan | files rig control plant_sim driver runtime experiment"
   "guardian | the guard of the outputs and its companions, the lease and the own guardian as a run sees them, the program abs_guardian | cli files rig control plant_sim driver runtime experiment lcmtypes telemetry config"
-  "study | simulated runs in this process: studies and their designs, chunks and folders, controllers side by side over varied plants | files rig control plant_sim driver driver_sim runtime experiment analysis run_folder config"
+  "run | one run, put together from its settings in one place: driver, faults, plan, logic, gate, ring, metrics, in real time, in virtual time or cycle by cycle | files rig control plant_sim driver driver_sim runtime experiment analysis config"
+  "study | simulated runs in this process: studies and their designs, chunks and folders, controllers side by side over varied plants | files rig control plant_sim driver driver_sim runtime experiment analysis run_folder config run"
   "commands | remote commands over LCM: authority, listener, sender | files rig control plant_sim driver runtime experiment config telemetry lcmtypes"
-  "replay | recorded runs through the cycle again: proof of equal commands, other controllers open loop | files rig control plant_sim driver driver_sim runtime experiment config telemetry lcmtypes"
+  "replay | recorded runs through the cycle again: proof of equal commands, other controllers open loop | files rig control plant_sim driver driver_sim runtime experiment analysis config run telemetry lcmtypes"
   "interchange | what other tools bring or take: controllers from shared libraries and FMUs, the process that runs them, plant and laws as FMUs | files rig control plant_sim driver driver_sim runtime experiment"
-  "program | what `abs_hil` decides between its command line and the other rooms | cli files rig control plant_sim driver driver_sim runtime experiment lcmtypes telemetry watch analysis run_folder diagnosis config guardian study commands replay interchange"
+  "program | what `abs_hil` decides between its command line and the other rooms | cli files rig control plant_sim driver driver_sim runtime experiment lcmtypes telemetry watch analysis run_folder diagnosis config guardian run study commands replay interchange"
 )
 
 # Rooms whose code neither runs in the cycle nor takes a noticeable time beside it. A release compiles them with -O1,

@@ -12,15 +12,10 @@
 #include <utility>
 #include <vector>
 
-#include "abs_hil/control/registry.hpp"
+#include "abs_hil/control/slip_controller.hpp"
 #include "abs_hil/rig/brake_map.hpp"
 #include "bindings.hpp"
-#include "config/plan.hpp"
-#include "driver/sim/sim_driver.hpp"
-#include "experiment/run_logic.hpp"
-#include "runtime/clock.hpp"
-#include "runtime/cyclic_executive.hpp"
-#include "runtime/record_pump.hpp"
+#include "run/run.hpp"
 #include "study/parallel.hpp"
 #include "study/variation.hpp"
 
@@ -63,16 +58,6 @@ class Observed final : public control::SlipController {
   std::int64_t calls_{0};
 };
 
-/// The latest record of a run.
-class Latest final : public rig::RecordSink {
- public:
-  void consume(const rig::CycleRecord& record, double /*distance_m*/) override { record_ = record; }
-  [[nodiscard]] const rig::CycleRecord& record() const noexcept { return record_; }
-
- private:
-  rig::CycleRecord record_{};
-};
-
 enum State : int { braking = 0, over = 1, fault = 2 };
 
 /// One braking of one rig, through the program's own cycle.
@@ -80,17 +65,13 @@ class Episode {
  public:
   Episode(const config::Settings& settings, const plant_sim::PlantOptions& plant, std::uint64_t seed, bool law)
       : settings_(settings),
-        driver_(plant, {.seed = seed,
-                        .start_speed_rad_s = settings_.experiment.start_speed_rad_s,
-                        .pwm_mode = driver::pwm_mode_named(settings_.driver.sim.pwm_mode)}),
-        logic_(parts(plant, law)),
-        gate_(logic_.make_gate(settings_.gate)),
-        ring_(ring_capacity),
-        executive_(clock_, driver_, logic_, gate_, ring_, std::llround(1e9 / settings_.control.rate_Hz)),
-        pump_(ring_, plant.rig.wheels.r2_m, {&latest_}),
+        prepared_(settings_),
+        run_(prepared_, {.stepped = true,
+                         .plant = &plant,
+                         .sensor_seed = seed,
+                         .controller = [this, law](auto controller) { return observed(std::move(controller), law); }}),
         r2_m_(plant.rig.wheels.r2_m) {
-    driver_.configure();
-    driver_.activate(clock_.now_ns());
+    run_.begin();
     for (int n = 0; n < most_cycles_before_brake && observed_->calls() == 0 && state_ == braking; ++n) cycle();
   }
 
@@ -103,7 +84,7 @@ class Episode {
   static constexpr std::size_t value_count = 13;
   [[nodiscard]] std::array<double, value_count> values() const noexcept {
     const SlipInput& i = observed_->input();
-    const rig::CycleRecord& r = latest_.record();
+    const rig::CycleRecord& r = run_.latest();
     return {i.slip,
             i.slip_ref,
             settings_.model.wheels.r2_m * i.speeds.omega2_rad_s,
@@ -120,26 +101,17 @@ class Episode {
   }
 
  private:
-  static constexpr std::size_t ring_capacity = 2;
-
-  experiment::RunLogicParts parts(const plant_sim::PlantOptions& plant, bool law) {
-    config::Plan plan = config::plan(settings_);
-    experiment::RunLogicParts parts = experiment::make_logic_parts(
-        settings_.control, settings_.model, plant_sim::identity_of(plant), settings_.plant.ideal_actuator,
-        settings_.gate, settings_.experiment, std::move(plan.phases), plan.limits);
-    parts.duty_steps = driver::simulated_output_grid(settings_.driver, plant.ideal_actuator).duty_steps;
-    auto observed = std::make_unique<Observed>(law ? std::move(parts.controller) : nullptr,
+  std::unique_ptr<control::SlipController> observed(std::unique_ptr<control::SlipController> controller, bool law) {
+    auto observed = std::make_unique<Observed>(law ? std::move(controller) : nullptr,
                                                rig::brake_torque_at(settings_.model.brake, 1.0));
     observed_ = observed.get();
-    parts.controller = std::move(observed);
-    return parts;
+    return observed;
   }
   void cycle() {
-    const bool running = executive_.step();
-    pump_.drain();
-    const rig::Phase phase = latest_.record().phase;
+    const bool running = run_.cycle();
+    const rig::Phase phase = run_.latest().phase;
     const bool has_braked = observed_->calls() > 0 && phase != rig::Phase::brake;
-    if (phase == rig::Phase::fault || rig::is_fault(logic_.end_reason())) {
+    if (phase == rig::Phase::fault || rig::is_fault(run_.end_reason())) {
       state_ = fault;
     } else if (!running || has_braked) {
       state_ = over;
@@ -148,14 +120,8 @@ class Episode {
 
   config::Settings settings_;
   Observed* observed_{nullptr};
-  runtime::VirtualClock clock_;
-  driver::SimDriver driver_;
-  experiment::RunLogic logic_;
-  runtime::CommandGate gate_;
-  runtime::RecordRing ring_;
-  runtime::CyclicExecutive executive_;
-  Latest latest_;
-  runtime::RecordPump pump_;
+  run::Prepared prepared_;
+  run::Run run_;
   double r2_m_;
   State state_{braking};
 };

@@ -1,7 +1,5 @@
 // Whole runs in virtual time: one with its records, or many with their figures of merit.
 
-#include "program/simulation.hpp"
-
 #include <pybind11/functional.h>
 #include <pybind11/stl.h>
 
@@ -19,6 +17,7 @@
 #include "column_sink.hpp"
 #include "config/config_error.hpp"
 #include "program/study_runs.hpp"
+#include "run/run_summary.hpp"
 #include "study/batch.hpp"
 #include "study/parallel.hpp"
 #include "study/variation.hpp"
@@ -64,14 +63,15 @@ py::tuple simulate(const py::dict& arguments, py::object controller,
     options.controller = python_controller;
   }
   ColumnSink columns;
-  program::Simulation simulation;
+  run::Simulation simulation;
   std::string config_toml;
   PythonPoll poll(scope ? &*scope : nullptr);
   {
     const py::gil_scoped_release release;
     program::RunRequest request = program::merge(options);
-    config_toml = request.config_toml;
-    simulation = program::simulate(std::move(request), {&columns}, std::ref(poll));
+    simulation = run::simulate(request.settings, *request.script, {&columns}, std::ref(poll));
+    simulation.summary.config = nlohmann::ordered_json::parse(request.config_json);
+    config_toml = std::move(request.config_toml);
   }
   poll.rethrow();
   if (scope) scope->rethrow();

@@ -24,10 +24,19 @@ class AdjustmentMailbox {
   AdjustmentMailbox() = default;
   AdjustmentMailbox(const AdjustmentMailbox&) = delete;
   AdjustmentMailbox& operator=(const AdjustmentMailbox&) = delete;
-  ~AdjustmentMailbox();
+  ~AdjustmentMailbox() {
+    Arrived waiting{};
+    while (inbox_.pop(waiting)) delete waiting.controller;
+    free_retired();
+  }
 
   /// Slow thread. Returns the number of the change, from 1 on; 0 if too many changes wait.
-  [[nodiscard]] std::uint32_t put(Adjustment adjustment);
+  [[nodiscard]] std::uint32_t put(Adjustment adjustment) {
+    free_retired();
+    if (!inbox_.push({adjustment.kind, last_number_ + 1, adjustment.slip_ref, adjustment.controller.get()})) return 0;
+    static_cast<void>(adjustment.controller.release());
+    return ++last_number_;
+  }
 
   /// A change as the real-time thread receives it.
   struct Arrived {
@@ -42,7 +51,10 @@ class AdjustmentMailbox {
   void retire(control::SlipController* controller) noexcept { static_cast<void>(retired_.push(controller)); }
 
  private:
-  void free_retired();
+  void free_retired() {
+    control::SlipController* controller = nullptr;
+    while (retired_.pop(controller)) delete controller;
+  }
 
   static constexpr std::size_t most_waiting = 16;
   runtime::SpscRing<Arrived> inbox_{most_waiting};

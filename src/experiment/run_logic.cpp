@@ -172,8 +172,7 @@ double RunLogic::slip_control(double dt_s, bool begins, rig::ControlState& state
 inline bool RunLogic::breaks(std::size_t n, double value, bool begins) noexcept {
   if (begins) not_given_[n] = n != 0 && std::isnan(value);
   if (std::isfinite(value) || (not_given_[n] && std::isnan(value))) return false;
-  sequence_.end_early(rig::Reason::controller_not_finite, static_cast<double>(n));
-  refused_ = true;
+  refused_output_ = static_cast<int>(n);
   return true;
 }
 
@@ -227,7 +226,8 @@ void RunLogic::adjust(rig::CycleRecord& record) noexcept {
   record.reason_value = arrived.number;
 }
 
-rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept {
+rig::Command RunLogic::step(const rig::Measurement& measurement, runtime::RunLatch& latch,
+                            rig::CycleRecord& record) noexcept {
   if (!started_) start_ns_ = last_ns_ = measurement.time_ns;
   const double dt_s = static_cast<double>(measurement.time_ns - last_ns_) * rig::s_per_ns;
   last_ns_ = measurement.time_ns;
@@ -244,7 +244,8 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
                         .answered = answered_,
                         .wheels_sound = wheels_sound_,
                         .slip = slip_,
-                        .distance_m = distance_m_});
+                        .distance_m = distance_m_},
+                       latch);
   if (change.entered && sequence_.finished()) end_ = change;
   const PhasePlan& plan = sequence_.current();
   if (learns_eccentricity_ && dt_s > 0.0) learn_eccentricity(measurement, plan);
@@ -281,7 +282,10 @@ rig::Command RunLogic::step(const rig::Measurement& measurement, rig::CycleRecor
     brake_duty = target.duty;
   }
   if (replaced_ != nullptr) adjustments_.retire(std::exchange(replaced_, nullptr));
-  if (refused_) return rig::safe_command;
+  if (refused_output_ >= 0) {
+    latch.latch(rig::Reason::controller_not_finite, refused_output_);
+    return rig::safe_command;
+  }
   state.brake_torque_ref_Nm = target_Nm_ = torque_Nm;
 
   const double motor_duty = plan.motor_duty_at(phase_time_s);

@@ -34,11 +34,10 @@ struct RunLogicParts {
   rig::RunNames names{};
   Sequence sequence;
   bool ideal_actuator{false};
-  double max_brake_duty{1.0};             ///< limit of the command gate
-  double start_speed_rad_s{0.0};          ///< both wheels' speed at the first measurement
-  double recorded_r2_m{rig.wheels.r2_m};  ///< lower wheel's radius behind the recorded speeds: the plant's, if known
-  bool answers_itself{true};              ///< questions of phases are answered at once, without a person
-  std::uint32_t duty_steps{0};            ///< of the driver's PWMs, from duty 0 to duty 1; 0: any duty can be sent
+  double max_brake_duty{1.0};     ///< limit of the command gate
+  double start_speed_rad_s{0.0};  ///< both wheels' speed at the first measurement
+  bool answers_itself{true};      ///< questions of phases are answered at once, without a person
+  std::uint32_t duty_steps{0};    ///< of the driver's PWMs, from duty 0 to duty 1; 0: any duty can be sent
 };
 
 /// Makes the parts of a run with the controller named in `control`. Throws std::invalid_argument for unusable options.
@@ -56,13 +55,13 @@ class RunLogic final : public runtime::CycleLogic {
   explicit RunLogic(RunLogicParts parts);
 
   void wheels_judged(bool sound) noexcept override { wheels_sound_ = sound; }
-  [[nodiscard]] rig::Command step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept override;
+  [[nodiscard]] rig::Command step(const rig::Measurement& measurement, runtime::RunLatch& latch,
+                                  rig::CycleRecord& record) noexcept override;
   void commanded(const rig::Command& sent) noexcept override { commanded(sent, sent); }
   /// The same where the logic's own command did not act: a recorded one did.
   /// @param acted  the command that acted on the rig; the actuator model follows it
   /// @param own  what became of the logic's own command; its integrals follow it
   void commanded(const rig::Command& acted, const rig::Command& own) noexcept;
-  void end_early(rig::Reason reason, double value) noexcept override { sequence_.end_early(reason, value); }
   [[nodiscard]] bool finished() const noexcept override { return sequence_.finished(); }
   /// The command gate of this run: its options, the permissions of the plans, the limits of the rig's physics. Its caps
   /// are duties that the driver can send, so that no rounding exceeds them.
@@ -77,6 +76,7 @@ class RunLogic final : public runtime::CycleLogic {
   /// Why the run ended; `none` while it goes on.
   [[nodiscard]] rig::Reason end_reason() const noexcept { return end_.reason; }
   [[nodiscard]] double end_value() const noexcept { return end_.value; }
+  [[nodiscard]] control::SlipController& controller() noexcept { return *controller_; }
   /// Changes put here take effect one per cycle, in cycles in which no phase begins. The cycle's record has an
   /// adjustment as its reason and the change's number as its value. A start command shows in the next cycle's record,
   /// with value 0.
@@ -127,7 +127,7 @@ class RunLogic final : public runtime::CycleLogic {
   bool in_slip_control_{false};  ///< the phase of the latest cycle used the slip controller
   std::size_t own_signal_count_;
   std::array<bool, rig::controller_output_max> not_given_{};  ///< outputs that the controller does not give
-  bool refused_{false};                                       ///< its output was not finite
+  int refused_output_{-1};                                    ///< the first that was not finite; < 0: none
   double bump_Nm_{0.0};                                       ///< remaining offset that keeps the torque continuous
   bool start_given_{false};
   bool answers_itself_;

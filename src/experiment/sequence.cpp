@@ -7,8 +7,6 @@
 #include <string>
 #include <utility>
 
-#include "runtime/fault_brake.hpp"
-
 namespace abs_hil::experiment {
 
 namespace {
@@ -175,40 +173,37 @@ Sequence::Change Sequence::end(rig::Phase phase, rig::Reason reason, double valu
   return {true, reason, value};
 }
 
-Sequence::Change Sequence::stop(const SequenceInput& input) noexcept {
+Sequence::Change Sequence::stop(const SequenceInput& input, const runtime::RunLatch& latch) noexcept {
   const bool brakes = stop_plan_.brake == BrakeAction::duty && started_ && !input.stands_still;
   const bool in_time = !stopping_ || input.time_s - entered_at_s_ < stop_plan_.time_limit_s;
-  if (!brakes || !in_time) return end(rig::Phase::stopped, early_reason_, early_value_);
+  if (!brakes || !in_time) return end(rig::Phase::stopped, latch.stop_request(), 0.0);
   if (stopping_) return {};
   enter(index_, input);
   stopping_ = true;
-  return {true, early_reason_, early_value_};
+  return {true, latch.stop_request(), 0.0};
 }
 
-Sequence::Change Sequence::fail(const SequenceInput& input) noexcept {
-  const bool brakes = fault_plan_.brake == BrakeAction::duty && !barred_ && started_ && !input.stands_still;
+Sequence::Change Sequence::fail(const SequenceInput& input, const runtime::RunLatch& latch) noexcept {
+  const bool barred = latch.brake_barred_by() != rig::Reason::none;
+  const bool brakes = fault_plan_.brake == BrakeAction::duty && !barred && started_ && !input.stands_still;
   const bool in_time = !failing_ || input.time_s - entered_at_s_ < fault_plan_.time_limit_s;
-  if (!brakes || !in_time) return end(rig::Phase::fault, early_reason_, early_value_);
+  if (!brakes || !in_time) return end(rig::Phase::fault, latch.fault(), latch.fault_value());
   if (failing_) return {};
   enter(index_, input);
   failing_ = true;
-  return {true, early_reason_, early_value_};
+  return {true, latch.fault(), latch.fault_value()};
 }
 
-Sequence::Change Sequence::fault(rig::Reason reason, double value, const SequenceInput& input) noexcept {
-  end_early(reason, value);
-  return fail(input);
-}
-
-Sequence::Change Sequence::update(const SequenceInput& input) noexcept {
+Sequence::Change Sequence::update(const SequenceInput& input, runtime::RunLatch& latch) noexcept {
   if (ended_) return {};
-  const Change change = advance(input);
+  const Change change = advance(input, latch);
   now_s_ = input.time_s;
   return change;
 }
 
-Sequence::Change Sequence::advance(const SequenceInput& input) noexcept {
-  if (early_reason_ != rig::Reason::none) return rig::is_stop_request(early_reason_) ? stop(input) : fail(input);
+Sequence::Change Sequence::advance(const SequenceInput& input, runtime::RunLatch& latch) noexcept {
+  if (latch.fault() != rig::Reason::none) return fail(input, latch);
+  if (latch.stop_request() != rig::Reason::none) return stop(input, latch);
   if (!started_) {
     enter(0, input);
     return {true, rig::Reason::run_started, input.speeds.omega2_rad_s};
@@ -220,22 +215,18 @@ Sequence::Change Sequence::advance(const SequenceInput& input) noexcept {
     }
     if (input.wheels_sound) return end(rig::Phase::stopped, rig::Reason::sequence_complete, input.time_s);
   }
-  if (input.time_s > limits_.run_time_s) return fault(rig::Reason::run_time_limit, input.time_s, input);
-  if (input.distance_m > limits_.distance_m) return fault(rig::Reason::run_distance_limit, input.distance_m, input);
   const double lasted_s = input.time_s - entered_at_s_;
-  if (lasted_s > plans_[index_].time_limit_s) {
+  if (input.time_s > limits_.run_time_s) {
+    latch.latch(rig::Reason::run_time_limit, input.time_s);
+  } else if (input.distance_m > limits_.distance_m) {
+    latch.latch(rig::Reason::run_distance_limit, input.distance_m);
+  } else if (lasted_s > plans_[index_].time_limit_s) {
     const bool asks = !plans_[index_].question.empty();
-    return fault(asks ? rig::Reason::question_unanswered : rig::Reason::phase_time_limit, lasted_s, input);
+    latch.latch(asks ? rig::Reason::question_unanswered : rig::Reason::phase_time_limit, lasted_s);
+  } else {
+    return {};
   }
-  return {};
-}
-
-void Sequence::end_early(rig::Reason reason, double value) noexcept {
-  barred_ = barred_ || (rig::is_fault(reason) && !runtime::brake_may_hold_after(reason));
-  const bool fault_while_stopping = stopping_ && rig::is_stop_request(early_reason_) && rig::is_fault(reason);
-  if (early_reason_ != rig::Reason::none && !fault_while_stopping) return;
-  early_reason_ = reason;
-  early_value_ = value;
+  return fail(input, latch);
 }
 
 }  // namespace abs_hil::experiment

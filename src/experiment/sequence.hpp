@@ -11,6 +11,7 @@
 #include "abs_hil/rig/reason.hpp"
 #include "experiment/profile.hpp"
 #include "runtime/gate_options.hpp"
+#include "runtime/run_latch.hpp"
 
 namespace abs_hil::experiment {
 
@@ -113,13 +114,12 @@ class Sequence {
     rig::Reason reason{rig::Reason::none};
     double value{0.0};
   };
-  /// Enters the first phase on the first call, and later the next phase as soon as an end condition holds.
-  Change update(const SequenceInput& input) noexcept;
-  /// Leaves the plans for one last cycle in phase `stopped` (stop request) or `fault`. With a stop brake, a stop
-  /// request first enters the phase `hold`. With a fault brake, the phase `fault` lasts until standstill or the brake's
-  /// limit, unless a fault bars the brake (runtime::brake_may_hold_after). The first reason stays, unless a fault
-  /// occurs in `hold`.
-  void end_early(rig::Reason reason, double value) noexcept;
+  /// Enters the first phase on the first call, and later the next phase as soon as an end condition holds. Where the
+  /// latch has a fault or a stop request, it leaves the plans for one last cycle in phase `fault` or `stopped`. With a
+  /// stop brake, a stop request first enters the phase `hold`. With a fault brake, the phase `fault` lasts until
+  /// standstill or the brake's limit, unless a fault bars the brake (runtime::brake_may_hold_after). A limit of the
+  /// plans that is exceeded is latched.
+  Change update(const SequenceInput& input, runtime::RunLatch& latch) noexcept;
 
   /// Which outputs the plans permit in each phase.
   [[nodiscard]] runtime::PhasePermissions permissions() const noexcept;
@@ -143,10 +143,9 @@ class Sequence {
   [[nodiscard]] bool holds(const EndCondition& condition, const SequenceInput& input) const noexcept;
   [[nodiscard]] bool all_hold(const std::vector<EndCondition>& parts, const SequenceInput& input) const noexcept;
   void enter(std::size_t index, const SequenceInput& input) noexcept;
-  Change stop(const SequenceInput& input) noexcept;
-  Change fail(const SequenceInput& input) noexcept;
-  Change fault(rig::Reason reason, double value, const SequenceInput& input) noexcept;
-  Change advance(const SequenceInput& input) noexcept;
+  Change stop(const SequenceInput& input, const runtime::RunLatch& latch) noexcept;
+  Change fail(const SequenceInput& input, const runtime::RunLatch& latch) noexcept;
+  Change advance(const SequenceInput& input, runtime::RunLatch& latch) noexcept;
   Change end(rig::Phase phase, rig::Reason reason, double value) noexcept;
 
   std::vector<PhasePlan> plans_;
@@ -160,10 +159,7 @@ class Sequence {
   bool wheels_apart_{false};
   bool stopping_{false};  ///< the stop brake acts
   bool failing_{false};   ///< the fault brake acts
-  bool barred_{false};    ///< a fault does not permit the fault brake
   bool ended_{false};
-  rig::Reason early_reason_{rig::Reason::none};
-  double early_value_{0.0};
   double now_s_{-1.0};  ///< time of the latest sample
   double entered_at_s_{0.0};
   double entered_at_m_{0.0};

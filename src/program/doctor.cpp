@@ -11,8 +11,8 @@
 #include "guardian/guarding.hpp"
 #include "guardian/service_call.hpp"
 #include "program/exit_status.hpp"
-#include "program/run_parts.hpp"
 #include "program/subcommands.hpp"
+#include "run/run.hpp"
 #include "runtime/board_policy.hpp"
 #include "telemetry/lcm_url.hpp"
 
@@ -50,7 +50,7 @@ int doctor(const RunRequest& request, const std::string& only, bool json) {
                                      .make_driver = [&] {
                                        // The resident service lets go of the board for the holder of its lease.
                                        lease = guardian::ask_for_lease(request.settings, request.outputs.fast);
-                                       return make_driver(s, false);
+                                       return run::make_driver(s);
                                      }};
   if (s.on_rig() && runtime::is_real_board(s.driver)) {
     examination.require_commissioned = [&s](const driver::RigDriver& driver) {

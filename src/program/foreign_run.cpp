@@ -15,15 +15,15 @@ double us(std::int64_t duration_ns) { return static_cast<double>(duration_ns) * 
 
 }  // namespace
 
-ForeignRun::ForeignRun(const RunRequest& request) : request_(request) {
-  interchange::set_home(request.settings.on_rig() ? interchange::Home::this_process : interchange::Home::own_process);
+ForeignRun::ForeignRun(bool on_rig) : on_rig_(on_rig) {
+  interchange::set_home(on_rig ? interchange::Home::this_process : interchange::Home::own_process);
 }
 
-void ForeignRun::look_at(const experiment::RunLogicParts& logic) {
-  controller_ = dynamic_cast<interchange::ForeignController*>(logic.controller.get());
+void ForeignRun::look_at(control::SlipController& controller, bool try_out) {
+  controller_ = dynamic_cast<interchange::ForeignController*>(&controller);
   if (controller_ == nullptr) return;
   sha256_ = run_folder::sha256_of_file(controller_->file());
-  if (request_.outputs.fast) return;
+  if (!try_out) return;
   trial_ = controller_->try_out();
   const interchange::Offences& found = trial_->offences;
   if (found.allocations > 0) {
@@ -49,7 +49,7 @@ nlohmann::ordered_json ForeignRun::summary() const {
   const rig::DurationQuantiles steps = controller_->step_times().summary();
   nlohmann::ordered_json json{{"file", controller_->file()},
                               {"sha256", sha256_},
-                              {"own_process", !request_.settings.on_rig()},
+                              {"own_process", !on_rig_},
                               {"steps", controller_->step_times().count()},
                               {"step_us",
                                {{"p50", steps.p50_us},

@@ -1,24 +1,65 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <stdexcept>
+#include <string>
 
 #include "config/config_error.hpp"
 #include "diagnosis/latency_verdict.hpp"
-#include "experiment/run_session.hpp"
-#include "experiment/timing_load.hpp"
+#include "experiment/sequence.hpp"
 #include "files/result_file.hpp"
 #include "program/exit_status.hpp"
-#include "program/run_parts.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
 #include "runtime/histogram_file.hpp"
 
 namespace abs_hil::program {
 
+namespace {
+
+constexpr double longest_load_s = 86'400.0;
+constexpr double accelerate_s = 1.0;
+constexpr double brake_s = 0.3;
+/// Initial speed of both wheels. It keeps the wheels far from standstill: there the simulation takes so many small
+/// steps that its cost would hide the computer's own latency.
+constexpr double start_speed_rad_s = 50.0;
+
+experiment::PhasePlan timed(rig::Phase phase, double duration_s) {
+  constexpr double slack_s = 1.0;
+  return {.phase = phase,
+          .ends_on = {{experiment::EndKind::duration, duration_s, rig::Reason::phase_duration_over}},
+          .time_limit_s = duration_s + slack_s};
+}
+
+/// Phases that load a cycle as an experiment does: they alternate acceleration and braking under slip control, last
+/// `duration_s` in all, and end with the brake released. For the simulated rig only: no phase waits for a speed. Throws
+/// std::invalid_argument unless 0 < duration_s <= 86400.
+config::Plan timing_load(double duration_s) {
+  if (!(duration_s > 0.0 && duration_s <= longest_load_s)) {
+    throw std::invalid_argument("duration " + std::to_string(duration_s) + " s: give a time in (0, 86400] s");
+  }
+  config::Plan plan;
+  for (double left_s = duration_s; left_s > 0.0;) {
+    experiment::PhasePlan accelerate = timed(rig::Phase::accelerate, std::min(accelerate_s, left_s));
+    accelerate.motor_duty = 1.0;
+    plan.phases.push_back(accelerate);
+    left_s -= accelerate_s;
+    if (left_s <= 0.0) break;
+    experiment::PhasePlan brake = timed(rig::Phase::brake, std::min(brake_s, left_s));
+    brake.brake = experiment::BrakeAction::slip_control;
+    plan.phases.push_back(brake);
+    left_s -= brake_s;
+  }
+  return plan;
+}
+
+}  // namespace
+
 int latency(const RunRequest& request, const LatencyOptions& options) {
   config::Settings s = request.settings;
-  s.experiment.start_speed_rad_s = experiment::timing_load_start_speed_rad_s;
+  s.experiment.start_speed_rad_s = start_speed_rad_s;
   // Gaps in the simulation are what this command measures; they must not end it.
   constexpr double any_gap_s = 3600.0;
   if (s.backend == "sim") s.realtime.overruns.cycle_gap_max_s = any_gap_s;
@@ -28,24 +69,22 @@ int latency(const RunRequest& request, const LatencyOptions& options) {
   } catch (const std::runtime_error& error) {
     throw config::ConfigError(error.what());
   }
-  const std::unique_ptr<driver::RigDriver> driver = make_driver(s, false);
-  runtime::MonotonicClock clock;
-  experiment::RunSession session(clock, *driver, make_logic(s, experiment::plan_timing_load(options.duration_s)),
-                                 s.gate, {}, s.realtime.overruns);
-  if (options.second_offset_us) session.align_to_second(std::int64_t{*options.second_offset_us} * 1000);
+  const run::Prepared prepared(s, timing_load(options.duration_s));
+  run::Run run(prepared, {.real_time = true});
+  if (options.second_offset_us) run.align_to_second(std::int64_t{*options.second_offset_us} * 1000);
   note_signals();
   const diagnosis::MachineFacts facts = diagnosis::read_machine_facts();
-  const experiment::RunOutcome outcome = session.run_realtime(s.realtime, signalled);
+  const run::RunOutcome outcome = run.go(signalled);
   if (!outcome.ran) throw driver::Unavailable(realtime_refusal(outcome.realtime));
 
-  const runtime::CycleStatistics& statistics = session.executive().statistics();
-  const diagnosis::LatencyRun run{.rate_Hz = s.control.rate_Hz,
-                                  .duration_s = options.duration_s,
-                                  .cycles = statistics.cycles(),
-                                  .realtime = outcome.realtime.realtime(),
-                                  .timing = statistics.summary()};
+  const runtime::CycleStatistics& statistics = run.executive().statistics();
+  const diagnosis::LatencyRun measured{.rate_Hz = s.control.rate_Hz,
+                                       .duration_s = options.duration_s,
+                                       .cycles = statistics.cycles(),
+                                       .realtime = outcome.realtime.realtime(),
+                                       .timing = statistics.summary()};
   if (histogram) histogram->write(runtime::cyclictest_histogram(statistics));
-  fmt::print("{}", options.json ? to_json(run, facts).dump(2) + "\n" : to_text(run, facts));
+  fmt::print("{}", options.json ? to_json(measured, facts).dump(2) + "\n" : to_text(measured, facts));
   return status_of(outcome);
 }
 

@@ -61,8 +61,8 @@ void check_questions(const RunRequest& request) {
   }
 }
 
-Questions::Questions(const RunRequest& request, const rig::RunNames& names)
-    : names_(names),
+Questions::Questions(const RunRequest& request, run::Run& run)
+    : run_(run),
       by_person_(request.settings.experiment.answers == person),
       commands_(hears_commands(request)),
       terminal_(at_terminal()) {
@@ -70,10 +70,10 @@ Questions::Questions(const RunRequest& request, const rig::RunNames& names)
   spdlog::info("the simulation answers the questions of experiment {} itself, at once", request.script->name);
 }
 
-void Questions::poll(experiment::RunSession& session) {
+void Questions::poll() {
   if (!by_person_) return;
-  const rig::CycleRecord& latest = session.latest();
-  const std::string_view question = names_.question_of(latest);
+  const rig::CycleRecord& latest = run_.latest();
+  const std::string_view question = run_.names().question_of(latest);
   if (question.empty()) {
     asked_ = -1;
     return;
@@ -86,8 +86,7 @@ void Questions::poll(experiment::RunSession& session) {
     std::fflush(stderr);
     return;
   }
-  if (terminal_ && entered())
-    static_cast<void>(session.adjustments().put({.kind = experiment::Adjustment::Kind::answer}));
+  if (terminal_ && entered()) static_cast<void>(run_.adjustments().put({.kind = experiment::Adjustment::Kind::answer}));
 }
 
 bool Questions::entered() {

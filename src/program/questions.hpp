@@ -1,8 +1,7 @@
 #pragma once
 
-#include "experiment/run_session.hpp"
 #include "program/command_line.hpp"
-#include "rig/run_names.hpp"
+#include "run/run.hpp"
 
 namespace abs_hil::program {
 
@@ -17,14 +16,15 @@ void check_questions(const RunRequest& request);
 /// Puts the questions of a run's phases to the terminal and hands Enter to the run. For the slow thread.
 class Questions {
  public:
-  Questions(const RunRequest& request, const rig::RunNames& names);
+  /// @param run  must outlive it
+  Questions(const RunRequest& request, run::Run& run);
   /// Call it every few milliseconds. Never waits.
-  void poll(experiment::RunSession& session);
+  void poll();
 
  private:
   [[nodiscard]] bool entered();
 
-  const rig::RunNames& names_;
+  run::Run& run_;
   bool by_person_;
   bool commands_;
   bool terminal_;

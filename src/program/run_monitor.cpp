@@ -79,9 +79,9 @@ RunMonitor::~RunMonitor() {
   if (guardian_ != nullptr) static_cast<void>(guardian_->end());
 }
 
-void RunMonitor::attach(experiment::RunSession& session) {
-  session.set_watch(*heartbeat_);
-  if (guardian_ != nullptr) session.guard_with(*guardian_);
+void RunMonitor::attach(run::Run& run) {
+  run.set_watch(*heartbeat_);
+  if (guardian_ != nullptr) run.guard_with(*guardian_);
 }
 
 rig::Reason RunMonitor::poll() {

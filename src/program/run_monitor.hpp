@@ -4,11 +4,11 @@
 #include <optional>
 #include <string>
 
-#include "experiment/run_session.hpp"
 #include "guardian/guardian_process.hpp"
 #include "guardian/guarding.hpp"
 #include "guardian/shared_region.hpp"
 #include "program/command_line.hpp"
+#include "run/run.hpp"
 
 namespace abs_hil::program {
 
@@ -30,8 +30,8 @@ class RunMonitor {
   /// Ends the guardian unless `end` did: it uses this object's memory.
   ~RunMonitor();
 
-  /// Attaches the monitor to the session, which must not run after this object is destroyed.
-  void attach(experiment::RunSession& session);
+  /// Attaches the monitor to the run, which must be over before this object is destroyed.
+  void attach(run::Run& run);
   [[nodiscard]] bool has_guardian() const noexcept { return guardian_ != nullptr; }
   /// Called every few milliseconds. Returns the stop reason if the guardian died, else `none`.
   [[nodiscard]] rig::Reason poll();

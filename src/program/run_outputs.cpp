@@ -18,9 +18,7 @@ constexpr std::int64_t virtual_epoch_us = 946'684'800'000'000;
 constexpr std::int64_t write_period_ns = 50'000'000;
 }  // namespace
 
-RunOutputs::RunOutputs(const RunRequest& request, rig::RunNames names)
-    : names_(std::move(names)),
-      metrics_(request.settings.plant.rig.wheels.r2_m, request.settings.experiment.end_speed_m_s) {
+RunOutputs::RunOutputs(const RunRequest& request, run::Run& run) : run_(run) {
   // Check the network first: a failure then leaves the files unchanged. In virtual time 8,000 messages would flood the
   // network at once, so publish only if --lcm-url is given.
   if (!request.outputs.no_lcm && (!request.outputs.fast || request.outputs.lcm_url)) {
@@ -35,17 +33,14 @@ RunOutputs::RunOutputs(const RunRequest& request, rig::RunNames names)
   } catch (const std::runtime_error& error) {
     throw config::ConfigError(error.what());
   }
-  if (request.script->analysis == "friction-curve") {
-    // As on a rig, where only the model is known: the force is found from the encoders.
-    const rig::RigParameters& rig = request.settings.model;
-    friction_curve_.emplace(rig.wheels, rig.encoder_counts_per_rev);
-  }
   if (!log_.empty() || lcm_) open_stream(request);
-  if (!request.outputs.fast && !request.in_series) status_line_.emplace([this] { return snapshot(); });
+  if (run.real_time() && !request.in_series) status_line_.emplace([this] { return snapshot(); });
+  run.record_into(sinks());
+  listen();
 }
 
 void RunOutputs::open_files(const OutputOptions& outputs) {
-  if (outputs.csv_file) csv_.emplace_back(*outputs.csv_file, outputs.fast ? 0 : write_period_ns, names_);
+  if (outputs.csv_file) csv_.emplace_back(*outputs.csv_file, outputs.fast ? 0 : write_period_ns, run_.names());
   if (outputs.summary_file) summary_.emplace_back(*outputs.summary_file, "summary");
   if (outputs.histogram_file) histogram_.emplace_back(*outputs.histogram_file, "histogram");
   if (outputs.log_file) {
@@ -82,7 +77,7 @@ void RunOutputs::open_folder(const RunRequest& request) {
        .log_file = folder_->of(run_folder::file::log),
        .summary_file = folder_->of(run_folder::file::summary),
        .histogram_file = o.fast ? std::nullopt : std::optional(folder_->of(run_folder::file::histogram).string())});
-  events_.emplace(folder_->of(run_folder::file::events), names_);
+  events_.emplace(folder_->of(run_folder::file::events), run_.names());
 }
 
 void RunOutputs::open_stream(const RunRequest& request) {
@@ -97,22 +92,19 @@ void RunOutputs::open_stream(const RunRequest& request) {
                                             .backend = s.backend,
                                             .config_json = request.config_json,
                                             .version = ABS_HIL_VERSION,
-                                            .names = names_},
+                                            .names = run_.names()},
                   [this] { return snapshot(); });
   for (telemetry::LogOutlet& log : log_) stream_->add(log);
   if (lcm_) {
     stream_->add(*lcm_);
-    if (!request.outputs.fast) remote_commands_.emplace(s, *stream_, names_);
+    if (!request.outputs.fast) remote_commands_.emplace(s, *stream_, run_.names());
     // This runs in the listening thread: the next cycle sees the request.
-    command_listener_.emplace(*lcm_, *stream_, [this] {
-      if (session_ != nullptr) session_->request_stop(rig::Reason::stop_command);
-    });
+    command_listener_.emplace(*lcm_, *stream_, [this] { run_.request_stop(rig::Reason::stop_command); });
   }
 }
 
 std::vector<rig::RecordSink*> RunOutputs::sinks() {
-  std::vector<rig::RecordSink*> sinks{&metrics_};
-  if (friction_curve_) sinks.push_back(&*friction_curve_);
+  std::vector<rig::RecordSink*> sinks;
   for (telemetry::CsvSink& csv : csv_) sinks.push_back(&csv);
   if (events_) sinks.push_back(&*events_);
   if (stream_) sinks.push_back(&*stream_);
@@ -122,10 +114,9 @@ std::vector<rig::RecordSink*> RunOutputs::sinks() {
   return sinks;
 }
 
-void RunOutputs::attach(experiment::RunSession& session) {
-  session_ = &session;
+void RunOutputs::listen() {
   if (!remote_commands_ || !command_listener_ || !stream_) return;
-  remote_commands_->set_mailbox(session.adjustments());
+  remote_commands_->set_mailbox(run_.adjustments());
   remote_commands_->set_listener(*command_listener_);
   command_listener_->set_judge([this](const command_t& command) { return remote_commands_->judge(command); });
   command_listener_->listen();
@@ -133,10 +124,6 @@ void RunOutputs::attach(experiment::RunSession& session) {
     command_listener_->finish();
     remote_commands_->refuse_pending();
   });
-}
-
-nlohmann::ordered_json RunOutputs::friction_curve_json() const {
-  return friction_curve_ ? analysis::to_json(friction_curve_->result()) : nlohmann::ordered_json();
 }
 
 void RunOutputs::poll() {
@@ -150,15 +137,14 @@ std::uint64_t RunOutputs::csv_rows_lost() const {
 }
 
 telemetry::StatusSnapshot RunOutputs::snapshot() const {
-  if (session_ == nullptr) return {};
-  const runtime::CycleStatistics& statistics = session_->executive().statistics();
+  const runtime::CycleStatistics& statistics = run_.executive().statistics();
   const rig::TimingSummary timing = statistics.summary();
   return {.cycles = statistics.cycles(),
           .overruns = timing.overruns.total,
-          .telemetry_drops = session_->record_drops(),
-          .gate_interventions = rig::interventions(session_->gate().counts()),
-          .checks_unjudged = session_->gate().unjudged_share(),
-          .realtime = session_->realtime(),
+          .telemetry_drops = run_.record_drops(),
+          .gate_interventions = rig::interventions(run_.gate().counts()),
+          .checks_unjudged = run_.gate().unjudged_share(),
+          .realtime = run_.realtime_report().realtime(),
           .wakeup_latency = timing.wakeup_latency,
           .cycle_time = timing.cycle_time,
           .read = timing.read,
@@ -168,7 +154,6 @@ telemetry::StatusSnapshot RunOutputs::snapshot() const {
 }
 
 std::vector<std::string> RunOutputs::write(const analysis::RunSummary& summary,
-                                           const runtime::CycleStatistics& statistics,
                                            const run_folder::RunEnvironment& environment) {
   std::vector<std::string> problems;
   const auto attempt = [&problems](auto&& work) {
@@ -179,11 +164,12 @@ std::vector<std::string> RunOutputs::write(const analysis::RunSummary& summary,
     }
   };
   for (files::ResultFile& file : summary_) attempt([&] { file.write(analysis::to_json(summary).dump(2) + '\n'); });
-  for (files::ResultFile& file : histogram_) attempt([&] { file.write(runtime::cyclictest_histogram(statistics)); });
+  for (files::ResultFile& file : histogram_)
+    attempt([&] { file.write(runtime::cyclictest_histogram(run_.executive().statistics())); });
   if (!folder_) return problems;
   attempt([&] {
-    if (friction_curve_) {
-      folder_->write("friction_curve.csv", std::string_view(analysis::to_csv(friction_curve_->result())));
+    if (const auto& curve = run_.friction_curve()) {
+      folder_->write("friction_curve.csv", std::string_view(analysis::to_csv(curve->result())));
     }
     folder_->write(run_folder::file::environment, run_folder::environment_json(environment));
     folder_->seal();

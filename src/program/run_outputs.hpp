@@ -6,18 +6,14 @@
 #include <string>
 #include <vector>
 
-#include "analysis/friction_curve.hpp"
-#include "analysis/run_metrics.hpp"
 #include "analysis/run_summary.hpp"
 #include "commands/command_listener.hpp"
 #include "commands/remote_commands.hpp"
-#include "experiment/run_session.hpp"
 #include "files/result_file.hpp"
 #include "program/command_line.hpp"
-#include "rig/record_sink.hpp"
+#include "run/run.hpp"
 #include "run_folder/environment.hpp"
 #include "run_folder/run_folder.hpp"
-#include "runtime/cycle_statistics.hpp"
 #include "telemetry/csv_sink.hpp"
 #include "telemetry/events.hpp"
 #include "telemetry/lcm_outlet.hpp"
@@ -27,47 +23,36 @@
 
 namespace abs_hil::program {
 
-/// All destinations of a run's records, opened before anything moves: metrics, CSV, LCM, event log, summary, status
-/// line, and a run folder with all of them.
+/// All destinations of a run's records, opened before anything moves: CSV, LCM, event log, summary, status line, and a
+/// run folder with all of them.
 class RunOutputs {
  public:
-  /// Throws config::ConfigError for files and folders that cannot be written, and telemetry::LcmError without a
-  /// network.
-  RunOutputs(const RunRequest& request, rig::RunNames names);
+  /// The outputs of the run, which must outlive them: the run hands them its records, ABS_STATUS and the status line
+  /// show its state, and remote commands act on it from here on. Throws config::ConfigError for files and folders that
+  /// cannot be written, and telemetry::LcmError without a network.
+  RunOutputs(const RunRequest& request, run::Run& run);
 
-  [[nodiscard]] std::vector<rig::RecordSink*> sinks();
-  /// Attaches the session, whose state ABS_STATUS and the status line then show; it must outlive the use of the
-  /// outputs. Remote commands are accepted from here on.
-  void attach(experiment::RunSession& session);
   /// Handles remote commands from LCM.
   void poll();
   [[nodiscard]] bool stop_requested() const { return command_listener_ && command_listener_->stop_requested(); }
-  [[nodiscard]] analysis::Metrics metrics() const { return metrics_.metrics(); }
-  /// True if the car has braked but not stopped.
-  [[nodiscard]] bool moves_on() const noexcept { return metrics_.moves_on(); }
   [[nodiscard]] std::uint64_t publish_failures() const { return stream_ ? stream_->failures() : 0; }
   [[nodiscard]] std::uint64_t csv_rows_lost() const;
   /// Writes summary and histogram if requested, and completes the run folder. Tries each, even after a failure. Returns
   /// what could not be written, as text.
   [[nodiscard]] std::vector<std::string> write(const analysis::RunSummary& summary,
-                                               const runtime::CycleStatistics& statistics,
                                                const run_folder::RunEnvironment& environment);
-  /// Result of the script's analysis; null without one.
-  [[nodiscard]] nlohmann::ordered_json friction_curve_json() const;
-  [[nodiscard]] const rig::RunNames& names() const noexcept { return names_; }
   /// The run folder, if there is one.
   [[nodiscard]] const std::optional<run_folder::RunFolder>& folder() const noexcept { return folder_; }
 
  private:
+  [[nodiscard]] std::vector<rig::RecordSink*> sinks();
   [[nodiscard]] telemetry::StatusSnapshot snapshot() const;
   void open_folder(const RunRequest& request);
   void open_files(const OutputOptions& outputs);
   void open_stream(const RunRequest& request);
+  void listen();
 
-  rig::RunNames names_;
-  experiment::RunSession* session_{nullptr};
-  analysis::RunMetrics metrics_;
-  std::optional<analysis::FrictionCurve> friction_curve_;
+  run::Run& run_;
   std::optional<run_folder::RunFolder> folder_;
   // Each list holds up to two: one in the run folder and one for the named file.
   std::list<telemetry::CsvSink> csv_;

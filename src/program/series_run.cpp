@@ -9,17 +9,25 @@
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
+#include <string>
+#include <thread>
 
+#include "commands/authority.hpp"
+#include "commands/command_listener.hpp"
 #include "config/config_error.hpp"
 #include "config/series.hpp"
 #include "program/exit_status.hpp"
 #include "program/questions.hpp"
-#include "program/series_pause.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
+#include "rig/formatted_text.hpp"
 #include "run_folder/series_folder.hpp"
 #include "study/parallel.hpp"
+#include "telemetry/lcm_outlet.hpp"
+#include "telemetry/lcm_url.hpp"
+#include "telemetry/message_stream.hpp"
 
 namespace abs_hil::program {
 
@@ -131,6 +139,60 @@ std::unique_ptr<run_folder::SeriesFolder> open_folder(const RunRequest& base,
   return folder;
 }
 
+/// Receives commands between two runs.
+class StopListener {
+ public:
+  explicit StopListener(const RunRequest& run)
+      : lcm_(run.outputs.lcm_url.value_or(telemetry::default_lcm_url())),
+        stream_({.channel_prefix = run.settings.telemetry.channel_prefix}, {}, {}),
+        commands_(lcm_, stream_, {}) {
+    stream_.add(lcm_);
+    const config::CommandOptions& commands = run.settings.commands;
+    if (commands.enabled) commands::sign_answers(stream_, commands::read_key(commands.key_file));
+    commands_.set_judge([](const command_t& command) {
+      const std::string shown = rig::printable(command.command, 64);
+      return telemetry::CommandAnswer{rig::Reason::command_not_now,
+                                      "refused '" + shown + "': only stop is accepted between two runs of a series"};
+    });
+    commands_.listen();
+  }
+
+  /// @param time_s  time since the pause began
+  [[nodiscard]] bool stop_heard(Clock::time_point now, double time_s) {
+    stream_.pass_time(std::chrono::nanoseconds(now.time_since_epoch()).count(), time_s);
+    if (!commands_.stop_requested()) {
+      commands_.poll();
+      return false;
+    }
+    commands_.finish();
+    return true;
+  }
+
+ private:
+  telemetry::LcmOutlet lcm_;
+  telemetry::MessageStream stream_;
+  telemetry::CommandListener commands_;
+};
+
+/// Waits in real time between two runs of a series, so that the brake cools. A signal or a `stop` on the LCM network of
+/// `run` (not with --no-lcm) ends the wait. A stop is answered as during a run.
+/// @param run  the run that has ended
+/// @return the reason to end the series; `none` after the whole pause
+/// Throws telemetry::LcmError without a network.
+rig::Reason pause_between_runs(const RunRequest& run, double duration_s) {
+  std::optional<StopListener> listener;
+  if (!run.outputs.no_lcm) listener.emplace(run);
+  const auto start = Clock::now();
+  while (true) {
+    const auto now = Clock::now();
+    const double time_s = std::chrono::duration<double>(now - start).count();
+    if (signalled() != rig::Reason::none) return signalled();
+    if (listener && listener->stop_heard(now, time_s)) return rig::Reason::stop_command;
+    if (time_s >= duration_s) return rig::Reason::none;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+}
+
 /// True if a signal ended the run: then it must be repeated.
 bool is_interrupted(int status) { return status > 128; }
 
@@ -162,7 +224,7 @@ class SeriesRun {
     study::for_each_index(left_.size(), at_once ? study::machine_threads() : 1, [this](std::size_t k) { run_one(k); });
     progress_.end();
     if (interrupted_ == 0 && signalled() != rig::Reason::none) {
-      experiment::RunOutcome outcome;
+      run::RunOutcome outcome;
       outcome.reason = signalled();
       interrupted_ = status_of(outcome);
     }

@@ -13,10 +13,9 @@ namespace {
 constexpr int exit_of_signal = 128;
 
 std::atomic<rig::Reason> noted{rig::Reason::none};
-std::atomic<experiment::RunSession*> running{nullptr};
+std::atomic<run::Run*> running{nullptr};
 std::atomic<bool> may_leave_now{false};
-static_assert(std::atomic<rig::Reason>::is_always_lock_free &&
-                  std::atomic<experiment::RunSession*>::is_always_lock_free,
+static_assert(std::atomic<rig::Reason>::is_always_lock_free && std::atomic<run::Run*>::is_always_lock_free,
               "a signal handler may touch nothing else");
 
 rig::Reason reason_of(int signal) noexcept {
@@ -28,7 +27,7 @@ void note(int signal) {
   rig::Reason none = rig::Reason::none;
   const bool first = noted.compare_exchange_strong(none, reason_of(signal));
   if (!first && may_leave_now.load()) ::_exit(exit_of_signal + signal);
-  if (experiment::RunSession* session = running.load(); session != nullptr) session->request_stop(reason_of(signal));
+  if (run::Run* run = running.load(); run != nullptr) run->request_stop(reason_of(signal));
 }
 
 bool ignored(int signal) noexcept {
@@ -59,9 +58,9 @@ void note_signals() {
 
 rig::Reason signalled() noexcept { return noted.load(); }
 
-SignalsStop::SignalsStop(experiment::RunSession& session, bool may_leave) noexcept {
+SignalsStop::SignalsStop(run::Run& run, bool may_leave) noexcept {
   may_leave_now = may_leave;
-  running = &session;
+  running = &run;
 }
 
 SignalsStop::~SignalsStop() {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "abs_hil/rig/reason.hpp"
-#include "experiment/run_session.hpp"
+#include "run/run.hpp"
 
 namespace abs_hil::program {
 
@@ -14,12 +14,12 @@ void note_signals();
 /// The stop reason of a noted signal; `none` if there was none.
 [[nodiscard]] rig::Reason signalled() noexcept;
 
-/// While this object lives, a signal ends the session's run at its next cycle, directly from the handler: a slow thread
+/// While this object lives, a signal ends the run at its next cycle, directly from the handler: a slow thread
 /// that hangs at a disk or network causes no delay. A second signal ends the program at once, if that is safe.
 class SignalsStop {
  public:
   /// @param may_leave  true if a guardian protects the outputs, or if there are no real outputs
-  SignalsStop(experiment::RunSession& session, bool may_leave) noexcept;
+  SignalsStop(run::Run& run, bool may_leave) noexcept;
   SignalsStop(const SignalsStop&) = delete;
   SignalsStop& operator=(const SignalsStop&) = delete;
   ~SignalsStop();

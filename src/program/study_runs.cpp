@@ -11,8 +11,8 @@
 #include "config/library.hpp"
 #include "config/series.hpp"
 #include "program/questions.hpp"
-#include "program/simulation.hpp"
 #include "program/subcommands.hpp"
+#include "run/run_summary.hpp"
 #include "study/workbench.hpp"
 
 namespace abs_hil::program {
@@ -80,15 +80,13 @@ study::Study make_study(study::StudyScript script) {
 std::vector<double> own_metrics(const study::Study& study, std::uint64_t number) {
   const study::RunIndex index = study.index_of(number);
   study::Workbench bench(study);
-  RunRequest request{.settings = bench.settings_of(index), .config_json = "{}"};
+  config::Settings s = bench.settings_of(index);
   const study::Workbench::Drawn drawn = bench.drawn(index);
-  config::Settings& s = request.settings;
   s.plant = drawn.plant;
   s.sensor_seed = std::to_string(drawn.seed);
-  request.script = config::find(s.experiment.name);
   const auto controller = control::make_controller(s.control.controller, {s.control, s.model});
   study::SignalMetrics metrics(study.script().metrics, controller->signals(), s.plant.rig.wheels.r2_m);
-  static_cast<void>(simulate(std::move(request), {&metrics}, [] { return rig::Reason::none; }));
+  static_cast<void>(run::simulate(s, *config::find(s.experiment.name), {&metrics}, [] { return rig::Reason::none; }));
   return metrics.values();
 }
 

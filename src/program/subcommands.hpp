@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "experiment/commissioning.hpp"
-#include "experiment/run_session.hpp"
 #include "program/command_line.hpp"
+#include "run/run.hpp"
 #include "watch/watch_session.hpp"
 
 namespace abs_hil::program {
@@ -56,7 +56,7 @@ struct SendOptions {
 int send(const RunRequest& request, const SendOptions& options);
 
 /// The exit status for the outcome of a run.
-[[nodiscard]] int status_of(const experiment::RunOutcome& outcome);
+[[nodiscard]] int status_of(const run::RunOutcome& outcome);
 /// The message for a run that requires real time and did not start.
 [[nodiscard]] std::string realtime_refusal(const runtime::RealtimeReport& report);
 

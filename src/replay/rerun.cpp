@@ -9,12 +9,8 @@
 #include "config/config_error.hpp"
 #include "config/live_settings.hpp"
 #include "config/plan.hpp"
-#include "driver/sim/sim_driver.hpp"
-#include "experiment/run_logic.hpp"
 #include "rig/parse_json.hpp"
-#include "runtime/clock.hpp"
-#include "runtime/cyclic_executive.hpp"
-#include "runtime/record_pump.hpp"
+#include "run/run.hpp"
 #include "telemetry/message_codec.hpp"
 
 namespace abs_hil::replay {
@@ -22,7 +18,6 @@ namespace abs_hil::replay {
 namespace {
 
 constexpr double ignored_gap_s = 1e6;
-constexpr std::size_t ring_capacity = 2;  // the ring is emptied after every cycle
 
 /// A clock that stands still within a cycle and moves to the recorded time of the next cycle.
 class RecordedClock final : public runtime::Clock {
@@ -138,9 +133,10 @@ class RecordedActuation final : public runtime::CycleLogic {
   RecordedActuation(experiment::RunLogic& logic, const RecordedRun& run) : logic_(logic), run_(run) {}
 
   void wheels_judged(bool sound) noexcept override { logic_.wheels_judged(sound); }
-  [[nodiscard]] rig::Command step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept override {
+  [[nodiscard]] rig::Command step(const rig::Measurement& measurement, runtime::RunLatch& latch,
+                                  rig::CycleRecord& record) noexcept override {
     cycle_ = record.sequence;
-    return logic_.step(measurement, record);
+    return logic_.step(measurement, latch, record);
   }
   void commanded(const rig::Command& command) noexcept override {
     const telemetry_t& recorded = run_.cycles[cycle_];
@@ -151,7 +147,6 @@ class RecordedActuation final : public runtime::CycleLogic {
     acted.brake_torque_Nm = same ? command.brake_torque_Nm : (ended ? 0.0 : recorded.brake_torque_ref_Nm);
     logic_.commanded(acted, command);
   }
-  void end_early(rig::Reason reason, double value) noexcept override { logic_.end_early(reason, value); }
   [[nodiscard]] bool finished() const noexcept override { return logic_.finished(); }
 
  private:
@@ -181,15 +176,6 @@ config::Plan plan_of(const RecordedRun& run, const config::Settings& s) {
   return config::plan(config::parse(config["experiment_script"].get<std::string>(), "recorded script", read_file), s);
 }
 
-experiment::RunLogicParts logic_parts(const RecordedRun& run, const config::Settings& s) {
-  config::Plan plan = plan_of(run, s);
-  experiment::RunLogicParts parts =
-      experiment::make_logic_parts(s.control, s.model, config::identity(s), s.plant.ideal_actuator, s.gate,
-                                   s.experiment, std::move(plan.phases), plan.limits);
-  parts.duty_steps = config::output_grid(s).duty_steps;
-  return parts;
-}
-
 constexpr std::string_view start_name = "start";
 constexpr std::string_view continue_name = "continue";
 
@@ -215,33 +201,33 @@ void put(const adjustment_t& adjustment, config::LiveSettings& live, experiment:
   }
 }
 
-/// Runs the program's own cycle at the recorded times.
+/// Runs the recorded cycles at the recorded times.
+/// @param backend  whose reading takes the recorded time
+/// @param given  the rest of what the rerun does not take from the settings
 std::vector<RerunCycle> rerun(const RecordedRun& run, const config::Settings& s, driver::RigDriver& backend,
-                              runtime::CycleLogic& cycle_logic, experiment::AdjustmentMailbox& mailbox,
-                              runtime::CommandGate& gate, WheelFaults faults) {
+                              run::Given given, WheelFaults faults) {
   config::LiveSettings live(s);
   auto adjustment = run.adjustments.begin();
   RecordedClock clock(run.cycles.front().stamp_ns);
   TimedReading rig(backend, run, clock);
-  runtime::RecordRing ring(ring_capacity);
+  given.stepped = true;
+  given.driver = &rig;
+  given.clock = &clock;
   // Delays are part of the recording and not repeated, so they must not count here.
-  runtime::CyclicExecutive executive(
-      clock, rig, cycle_logic, gate, ring, std::llround(1e9 / s.control.rate_Hz),
-      {.startup_cycles = 0, .max_consecutive = 0, .late_max_s = ignored_gap_s, .cycle_gap_max_s = ignored_gap_s});
+  given.overruns = {.late_max_s = ignored_gap_s, .cycle_gap_max_s = ignored_gap_s};
+  const run::Prepared prepared(s, plan_of(run, s));
+  run::Run again(prepared, given);
   Collected collected;
-  runtime::RecordPump pump(ring, s.plant.rig.wheels.r2_m, {&collected});
-  rig.configure();
-  rig.activate(clock.now_ns());
+  again.record_into({&collected});
+  again.begin();
   for (std::size_t n = 0; n < run.cycles.size(); ++n) {
     const telemetry_t& cycle = run.cycles[n];
     clock.set(cycle.stamp_ns);
     for (; adjustment != run.adjustments.end() && put_before(*adjustment) <= cycle.cycle; ++adjustment) {
-      put(*adjustment, live, mailbox);
+      put(*adjustment, live, again.adjustments());
     }
-    if (ended_from_outside(run, n, faults)) executive.request_stop(static_cast<rig::Reason>(cycle.reason));
-    const bool goes_on = executive.step();
-    pump.drain();
-    if (!goes_on) break;
+    if (ended_from_outside(run, n, faults)) again.request_stop(static_cast<rig::Reason>(cycle.reason));
+    if (!again.cycle()) break;
   }
   return std::move(collected.cycles);
 }
@@ -267,26 +253,21 @@ bool ended_from_outside(const RecordedRun& run, std::size_t n, WheelFaults fault
 }
 
 rig::RunNames names_of(const RecordedRun& run, const config::Settings& settings) {
-  return logic_parts(run, settings).names;
+  return run::Prepared(settings, plan_of(run, settings)).logic_parts(settings.plant).names;
 }
 
 std::vector<RerunCycle> rerun_open_loop(const RecordedRun& run, const config::Settings& settings, WheelFaults faults) {
-  experiment::RunLogic logic(logic_parts(run, settings));
-  RecordedActuation actuation(logic, run);
-  RecordedRig rig(run, settings);
   // Commands of another controller never acted, so the gate must not judge the wheels by them.
-  runtime::CommandGate gate = faults == WheelFaults::found_again ? logic.make_gate(settings.gate)
-                                                                 : logic.make_gate_without_wheels(settings.gate);
-  return rerun(run, settings, rig, actuation, logic.adjustments(), gate, faults);
+  RecordedRig rig(run, settings);
+  return rerun(
+      run, settings, rig,
+      {.checks_wheels = faults == WheelFaults::found_again,
+       .logic = [&run](experiment::RunLogic& logic) { return std::make_unique<RecordedActuation>(logic, run); }},
+      faults);
 }
 
 std::vector<RerunCycle> rerun_simulation(const RecordedRun& run, const config::Settings& settings) {
-  experiment::RunLogic logic(logic_parts(run, settings));
-  driver::SimDriver rig(settings.plant, {.seed = config::sensor_seed(settings),
-                                         .start_speed_rad_s = settings.experiment.start_speed_rad_s,
-                                         .pwm_mode = driver::pwm_mode_named(settings.driver.sim.pwm_mode)});
-  runtime::CommandGate gate = logic.make_gate(settings.gate);
-  return rerun(run, settings, rig, logic, logic.adjustments(), gate, WheelFaults::found_again);
+  return rerun(run, settings, *run::make_driver(settings), {}, WheelFaults::found_again);
 }
 
 }  // namespace abs_hil::replay

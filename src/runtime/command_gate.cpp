@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "abs_hil/rig/time_units.hpp"
-#include "runtime/fault_brake.hpp"
 #include "runtime/single_writer.hpp"
 
 namespace abs_hil::runtime {
@@ -21,14 +20,6 @@ void stop_motor(rig::Command& command) noexcept {
 }
 
 }  // namespace
-
-void CommandGate::latch(Reason fault, double value) noexcept {
-  if (fault == Reason::none) return;
-  if (barring_ == Reason::none && !brake_may_hold_after(fault)) barring_ = fault;
-  if (fault_ != Reason::none) return;
-  fault_ = fault;
-  fault_value_ = value;
-}
 
 double CommandGate::unjudged_share() const noexcept {
   const auto watched_ns = static_cast<double>(watched_ns_.load(std::memory_order_relaxed));
@@ -126,7 +117,7 @@ rig::Command CommandGate::after_fault(const rig::Command& wanted, std::int64_t n
   const double held_s = static_cast<double>(now_ns - fault_ns_) * rig::s_per_ns;
   const double duty = std::min(wanted.brake_duty, options_.fault_brake_duty);
   const bool holds = duty > 0.0 && std::isfinite(wanted.brake_torque_Nm);  // false for NaN
-  if (!holds || barring_ != Reason::none || held_s > options_.fault_brake_limit_s) return {};
+  if (!holds || brake_barred_by() != Reason::none || held_s > options_.fault_brake_limit_s) return {};
   return {.brake_duty = duty, .brake_torque_Nm = wanted.brake_torque_Nm * (duty / wanted.brake_duty)};
 }
 
@@ -154,8 +145,8 @@ void CommandGate::interlock(rig::Command& command, const PhasePermission& may) n
 [[gnu::flatten]] GateResult CommandGate::check(const rig::Command& wanted, const GateInput& input) noexcept {
   last_action_ = GateAction::passed;
   require_finite(wanted, input.speeds);
-  GateResult result{.fault = fault_, .fault_value = fault_value_};
-  const bool faulty = fault_ != Reason::none;
+  GateResult result;
+  const bool faulty = fault() != Reason::none;
   rig::Command& command = result.command;
   command = faulty ? after_fault(wanted, input.now_ns) : wanted;
   if (!faulty || rig::acts(command)) {

@@ -15,6 +15,7 @@
 #include "runtime/gate_options.hpp"
 #include "runtime/plausibility_limits.hpp"
 #include "runtime/response_check.hpp"
+#include "runtime/run_latch.hpp"
 #include "runtime/speed_window.hpp"
 
 namespace abs_hil::runtime {
@@ -38,15 +39,13 @@ struct GateInput {
 struct GateResult {
   rig::Command command{};                 ///< the command that may be sent
   GateAction action{GateAction::passed};  ///< the last action taken on it
-  rig::Reason fault{rig::Reason::none};   ///< the latched fault; `none` before the first
-  double fault_value{0.0};
 };
 
 /// Safety gate between controller and driver. It checks each command for finite values, range, rate and interlocks. It
 /// checks that each measurement agrees with physics and with the commands sent; checks that cannot judge for long are a
-/// fault, too. A fault latches: from then on only the
-/// safe command passes; each run has a new gate. docs/safety.md lists every check with its reason. Real-time safe.
-class CommandGate {
+/// fault, too. It is the run's latch: after a fault, its own or one latched here, only the safe command passes. Each
+/// run has a new gate. docs/safety.md lists every check with its reason. Real-time safe.
+class CommandGate : public RunLatch {
  public:
   /// @param permissions which actuators each phase allows
   /// @param limits      bounds for the plausibility checks; not `enabled`: the wheels are not checked
@@ -82,13 +81,6 @@ class CommandGate {
     encoders_.note_wheels_apart(apart);
     response_.note_wheels_apart(apart);
   }
-  /// Latches a fault found elsewhere (driver, executive). The first fault stays.
-  void latch(rig::Reason fault, double value) noexcept;
-
-  [[nodiscard]] rig::Reason fault() const noexcept { return fault_; }
-  [[nodiscard]] double fault_value() const noexcept { return fault_value_; }
-  /// The first fault after which the brake must not hold `fault_brake_duty`, also if another fault latched before it.
-  [[nodiscard]] rig::Reason brake_barred_by() const noexcept { return barring_; }
   /// How often each action was taken; any thread may call it.
   [[nodiscard]] rig::GateCounts counts() const noexcept;
   /// Share of the run's time in which a verdict of the wheels' checks was due and could not be given; 0 if the gate
@@ -131,9 +123,6 @@ class CommandGate {
   bool supply_known_{false};
   bool temperature_known_{false};
   GateAction last_action_{GateAction::passed};
-  rig::Reason fault_{rig::Reason::none};
-  double fault_value_{0.0};
-  rig::Reason barring_{rig::Reason::none};
   std::int64_t fault_ns_{-1};  ///< the first command after the fault; < 0: none yet
   std::array<std::atomic<std::uint64_t>, gate_action_count> counts_{};  ///< only the cycle's thread adds
 };

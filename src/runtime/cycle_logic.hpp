@@ -3,7 +3,7 @@
 #include "abs_hil/rig/command.hpp"
 #include "abs_hil/rig/cycle_record.hpp"
 #include "abs_hil/rig/measurement.hpp"
-#include "abs_hil/rig/reason.hpp"
+#include "runtime/run_latch.hpp"
 
 namespace abs_hil::runtime {
 
@@ -20,13 +20,13 @@ class CycleLogic {
   /// it, or a verdict is due, a run does not count as complete.
   virtual void wheels_judged(bool sound) noexcept = 0;
   /// One cycle: takes the measurement, fills `record.phase`, `.reason`, `.reason_value`, `.wheels_apart` and
-  /// `.control`, and returns the command wanted. A pure function of the measurements so far.
-  [[nodiscard]] virtual rig::Command step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept = 0;
+  /// `.control`, and returns the command wanted. A pure function of measurements and latch so far.
+  /// @param latch  asked whether the run must end; faults found here are latched. The brake may hold after a fault
+  ///   (`gate.fault_brake_duty`); a further fault that bars it ends this
+  [[nodiscard]] virtual rig::Command step(const rig::Measurement& measurement, RunLatch& latch,
+                                          rig::CycleRecord& record) noexcept = 0;
   /// Takes the command that the rig now executes: as the driver sent it, after gate, limits and the PWM's steps.
   virtual void commanded(const rig::Command& sent) noexcept = 0;
-  /// Ends the run, because of a stop request or a fault found outside. Takes effect in the next `step`. The first
-  /// reason stays. The brake may hold after a fault (`gate.fault_brake_duty`); a further fault that bars it ends this.
-  virtual void end_early(rig::Reason reason, double value) noexcept = 0;
   /// True if the latest step was the run's last.
   [[nodiscard]] virtual bool finished() const noexcept = 0;
 };

@@ -76,10 +76,7 @@ void CyclicExecutive::watch_time(std::int64_t woken_ns) noexcept {
 
 // The program stood still between the wake-up and the write. What it computed before must not be sent afterwards.
 void CyclicExecutive::latch_stale_command(std::int64_t age_ns) noexcept {
-  if (!acting_) return;
-  const double age_s = static_cast<double>(age_ns) * rig::s_per_ns;
-  gate_.latch(rig::Reason::cycle_gap, age_s);
-  logic_.end_early(rig::Reason::cycle_gap, age_s);
+  if (acting_) gate_.latch(rig::Reason::cycle_gap, static_cast<double>(age_ns) * rig::s_per_ns);
 }
 
 void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
@@ -118,17 +115,14 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   record.truth = driver_.truth();
 
   if (const rig::Reason stop = stop_request_.load(std::memory_order_relaxed); stop != rig::Reason::none) {
-    logic_.end_early(stop, 0.0);
+    gate_.latch(stop, 0.0);
   }
-  if (gate_.fault() != rig::Reason::none) logic_.end_early(gate_.fault(), gate_.fault_value());
-  if (const rig::Reason barring = gate_.brake_barred_by(); barring != rig::Reason::none) logic_.end_early(barring, 0.0);
   logic_.wheels_judged(gate_.wheels_sound());
-  const rig::Command wanted = logic_.step(measurement_, record);
+  const rig::Command wanted = logic_.step(measurement_, gate_, record);
   driver_.note_phase(record.phase);
   if (record.wheels_apart != wheels_apart_) note_wheels_apart(record.wheels_apart);
   const GateResult gated = gate_.check(wanted, {record.control.speeds_est, record.phase, woken_ns});
   acting_ = rig::acts(gated.command);
-  if (gated.fault != rig::Reason::none) logic_.end_early(gated.fault, gated.fault_value);
   const std::int64_t control_ns = clock_.now_ns();
   const bool stale = control_ns - woken_ns > gap_max_ns_;
   if (stale) latch_stale_command(control_ns - woken_ns);
@@ -136,9 +130,7 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
   const driver::IoResult written = driver_.write(stale ? rig::safe_command : gated.command, record.command);
   if (!written.ok()) {
     if (io_error_.ok()) io_error_ = written;
-    const rig::Reason reason = driver::reason_of(written, rig::Reason::driver_write_failed);
-    gate_.latch(reason, static_cast<double>(written.error));
-    logic_.end_early(reason, static_cast<double>(written.error));
+    gate_.latch(driver::reason_of(written, rig::Reason::driver_write_failed), static_cast<double>(written.error));
   }
   gate_.note_sent(record.command);
   logic_.commanded(record.command);

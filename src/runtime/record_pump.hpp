@@ -17,6 +17,8 @@ class RecordPump {
  public:
   /// @param r2_m lower wheel's radius, m
   RecordPump(RecordRing& ring, double r2_m, std::vector<rig::RecordSink*> sinks);
+  /// One more sink, behind the others. Before the first record.
+  void add(rig::RecordSink& sink) { sinks_.push_back(&sink); }
 
   /// Moves the records in the ring, at most `at_most`. Returns their number.
   std::size_t drain(std::size_t at_most = std::numeric_limits<std::size_t>::max());

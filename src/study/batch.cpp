@@ -23,12 +23,12 @@ constexpr std::size_t most_together = 768;
 /// What the runs with the same settings share, each made when the first run needs it.
 struct SharedBySettings {
   std::unique_ptr<lanes::LaneSettings> lanes{};
-  std::unique_ptr<PreparedSettings> prepared{};
+  std::unique_ptr<run::Prepared> prepared{};
 };
 
 Outcome outcome_of(const Job& job, SharedBySettings& shared) {
   try {
-    if (!shared.prepared) shared.prepared = std::make_unique<PreparedSettings>(*job.settings);
+    if (!shared.prepared) shared.prepared = std::make_unique<run::Prepared>(*job.settings);
     return {.run = simulate(*shared.prepared, job.plant, job.seed)};
   } catch (const config::ConfigError& error) {
     return {.refusal = error.what()};

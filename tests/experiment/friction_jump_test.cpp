@@ -37,7 +37,7 @@ TEST_CASE("only friction-jump has a changing road") {
 
 TEST_CASE("friction-jump takes theta from 23 to 12 and back to 23 N in mid-braking, after a run-up or at once") {
   for (const Setup& start : {Setup{}, braking("adaptive")}) {
-    const Result result = run(friction_jump(start));
+    const Result result = simulated(friction_jump(start));
     REQUIRE(result.outcome.completed());
     int low = 0;
     for (const auto& record : result.records) {
@@ -49,14 +49,14 @@ TEST_CASE("friction-jump takes theta from 23 to 12 and back to 23 N in mid-braki
     }
     CHECK(low == 400);
     // 0.4 s of less grip cost time and distance compared with the same run without.
-    const Result plain = run(start);
+    const Result plain = simulated(start);
     CHECK(result.metrics.stop_time_s > plain.metrics.stop_time_s + 0.1);
     CHECK(result.metrics.stop_distance_m > plain.metrics.stop_distance_m + 1.0);
   }
 }
 
 TEST_CASE("the adaptive controller's estimate follows both jumps of friction-jump") {
-  const Result result = run(friction_jump(ideal_braking("adaptive")));
+  const Result result = simulated(friction_jump(ideal_braking("adaptive")));
   for (const auto& record : result.records) {
     const double since_s = record.time_s - result.metrics.brake_start_s;
     if (std::abs(since_s - 0.95) < 1e-4) CHECK_THAT(record.control.theta_est_N, WithinRel(12.0, 0.05));
@@ -68,7 +68,7 @@ TEST_CASE("the adaptive controller's estimate follows both jumps of friction-jum
 TEST_CASE("under slip control at 0.15 the maker's plant stops in 1.245 s within 10.49 m") {
   Setup setup = on_makers_plant(ideal_braking("nominal"));
   setup.experiment.end_speed_m_s = setup.control.v_min_m_s = 0.1;
-  const Result result = run(setup);
+  const Result result = simulated(setup);
   REQUIRE(result.outcome.completed());
   CHECK_THAT(result.metrics.stop_time_s, WithinRel(1.245, 0.02));
   CHECK_THAT(result.metrics.stop_distance_m, WithinRel(10.49, 0.02));
@@ -76,7 +76,7 @@ TEST_CASE("under slip control at 0.15 the maker's plant stops in 1.245 s within 
 
 TEST_CASE("the nominal parameters of the maker's plant fit it: theta's estimate is within 5 % of the truth") {
   for (const Setup& start : {ideal_braking("adaptive"), braking("adaptive")}) {
-    const Result result = run(on_makers_plant(start));
+    const Result result = simulated(on_makers_plant(start));
     REQUIRE(result.outcome.completed());
     CHECK_THAT(result.metrics.theta_final_N, WithinRel(34.31, 0.05));
     CHECK(result.metrics.theta_settling_s < 0.3);  // NaN fails

@@ -13,7 +13,7 @@ namespace abs_hil::experiment::test {
 
 /// A simulated run into which faults were injected.
 struct InjectedResult {
-  RunOutcome outcome{};
+  run::RunOutcome outcome{};
   std::vector<rig::CycleRecord> records{};
   plant_sim::PlantInput outputs{};  ///< those that acted on the rig when the run was over
 };
@@ -32,8 +32,9 @@ inline InjectedResult run_injected(const Setup& setup, const std::vector<driver:
     clock.sleep_until(clock.now_ns() + duration_ns);
   });
   Recorder recorder;
-  RunSession session(clock, driver, logic_parts(setup), setup.gate, {&recorder});
-  const RunOutcome outcome = session.run_fast([] { return rig::Reason::none; });
+  SetupRun run(setup, {.clock = &clock, .driver = &driver});
+  run->record_into({&recorder});
+  const run::RunOutcome outcome = run->go(go_on);
   return {.outcome = outcome, .records = std::move(recorder.records), .outputs = sim.outputs()};
 }
 

@@ -47,8 +47,9 @@ double exposure_s(const config::Settings& s, const std::string& fault) {
       std::make_unique<driver::SimDriver>(setup.plant, driver::SimStart{.seed = 1}), {injection}, 1,
       [&clock](std::int64_t duration_ns) { clock.sleep_until(clock.now_ns() + duration_ns); });
   Recorder recorder;
-  RunSession session(clock, driver, logic_parts(setup), setup.gate, {&recorder}, s.realtime.overruns);
-  static_cast<void>(session.run_fast([&] {
+  SetupRun run(setup, {.clock = &clock, .driver = &driver, .overruns = s.realtime.overruns});
+  run->record_into({&recorder});
+  static_cast<void>(run->go([&] {
     const bool too_long = static_cast<double>(clock.now_ns()) * 1e-9 > longest_s;
     return too_long ? rig::Reason::stop_command : rig::Reason::none;
   }));

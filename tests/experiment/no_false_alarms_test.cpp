@@ -38,7 +38,7 @@ config::Settings configured(const std::string& plant, const std::string& experim
 
 rig::Reason end_of(const config::Settings& s) {
   const test::Setup setup{s.plant, s.control, s.experiment, s.gate, static_cast<std::uint64_t>(s.seed)};
-  return test::run(setup).outcome.reason;
+  return test::simulated(setup).outcome.reason;
 }
 
 const std::vector<std::string> plants{"paper-table1", "paper-timing", "inteco-manual"};
@@ -117,13 +117,10 @@ TEST_CASE("plants that differ by 20 % from the gate's parameters trip no check, 
       for (std::uint64_t index = 0; index < 5; ++index) {
         CAPTURE(plant, controller, index);
         const study::Perturbation drawn = study::draw(variation, 7, index);
-        runtime::VirtualClock clock;
         driver::SimDriver driver(study::perturbed(nominal.plant, drawn), {.seed = drawn.sensor_seed});
-        RunSession session(clock, driver,
-                           make_logic_parts(nominal.control, nominal.plant.rig, nominal.plant.rig, false, nominal.gate,
-                                            nominal.experiment, config::plan(nominal).phases),
-                           nominal.gate, {});
-        CHECK(session.run_fast([] { return rig::Reason::none; }).reason == rig::Reason::sequence_complete);
+        const run::Prepared prepared(nominal);  // the gate knows the nominal plant only
+        run::Run run(prepared, {.driver = &driver});
+        CHECK(run.go(test::go_on).reason == rig::Reason::sequence_complete);
       }
     }
   }
@@ -217,7 +214,7 @@ TEST_CASE("drawn rigs with wrong models trip no check from rest to standstill ei
   std::mt19937_64 generator(63);
   for (std::uint64_t n = 0; n < 400; ++n) {
     const Drawn d = drawn(generator, 0.0);
-    const study::RunResult result = study::simulate(study::PreparedSettings(d.settings), d.plant, n + 1);
+    const study::RunResult result = study::simulate(run::Prepared(d.settings), d.plant, n + 1);
     CAPTURE(n, d.settings.control.controller, d.plant.friction_profile, d.plant.drift.motor_torque,
             static_cast<int>(result.fault));
     CHECK_FALSE(is_alarm(result.fault));

@@ -8,7 +8,7 @@ using rig::Phase;
 using rig::Reason;
 
 TEST_CASE("the paper's experiment goes through its phases in order") {
-  const Result result = run({});
+  const Result result = simulated({});
   CHECK(result.outcome.completed());
   std::vector<Phase> phases;
   std::vector<Reason> reasons;
@@ -27,7 +27,7 @@ TEST_CASE("the paper's experiment goes through its phases in order") {
 }
 
 TEST_CASE("motor and brake never act together, and the last command is the safe one") {
-  const Result result = run({});
+  const Result result = simulated({});
   for (const auto& record : result.records) {
     if (record.phase != Phase::accelerate) {
       CHECK(record.command.motor_duty == 0.0);
@@ -42,7 +42,7 @@ TEST_CASE("motor and brake never act together, and the last command is the safe 
 }
 
 TEST_CASE("distance counts from the start of braking and never falls") {
-  const Result result = run({});
+  const Result result = simulated({});
   for (std::size_t i = 1; i < result.records.size(); ++i) {
     if (result.records[i].time_s <= result.metrics.brake_start_s) CHECK(result.distances_m[i] == 0.0);
     CHECK(result.distances_m[i] >= result.distances_m[i - 1]);
@@ -55,7 +55,7 @@ TEST_CASE("the motor is also cut at the detected peak of the upper wheel's speed
   setup.experiment.cut = "peak";
   setup.experiment.motor_duty = 0.6;
   setup.experiment.accelerate_limit_s = 60.0;
-  const Result result = run(setup);
+  const Result result = simulated(setup);
   CHECK(result.outcome.completed());
   const auto accelerating = result.in_phase(Phase::accelerate);
   double fastest = 0.0;
@@ -68,7 +68,7 @@ TEST_CASE("a motor too weak for the threshold runs into the time limit: a fault,
   Setup setup;
   setup.experiment.motor_duty = 0.3;
   setup.experiment.accelerate_limit_s = 3.0;
-  const Result result = run(setup);
+  const Result result = simulated(setup);
   CHECK_FALSE(result.outcome.completed());
   CHECK(result.outcome.reason == Reason::phase_time_limit);
   CHECK(result.records.back().phase == Phase::fault);
@@ -78,7 +78,7 @@ TEST_CASE("a motor too weak for the threshold runs into the time limit: a fault,
 TEST_CASE("overspeed latches a fault in the cycle that sees it") {
   Setup setup;
   setup.gate.overspeed_rad_s = 100.0;
-  const Result result = run(setup);
+  const Result result = simulated(setup);
   CHECK(result.outcome.reason == Reason::overspeed);
   CHECK_THAT(result.outcome.reason_value, WithinAbs(100.0, 1.0));
   for (const auto& record : result.records) {
@@ -90,7 +90,7 @@ TEST_CASE("overspeed latches a fault in the cycle that sees it") {
 
 TEST_CASE("a stop request ends the run with everything off") {
   int polls = 0;
-  const Result result = run({}, [&polls] { return ++polls > 2 ? Reason::interrupt_signal : Reason::none; });
+  const Result result = simulated({}, [&polls] { return ++polls > 2 ? Reason::interrupt_signal : Reason::none; });
   CHECK(result.outcome.reason == Reason::interrupt_signal);
   CHECK(result.records.back().phase == Phase::stopped);
   CHECK(result.records.back().command.motor_duty == 0.0);
@@ -101,7 +101,7 @@ TEST_CASE("the same seed gives the same run; another seed gives other encoder ph
   const auto last_counts = [](std::uint64_t seed) {
     Setup setup = braking("adaptive");
     setup.seed = seed;
-    const Result result = run(setup);
+    const Result result = simulated(setup);
     double sum = 0.0;
     for (const auto& record : result.records)
       sum += record.control.theta_est_N == record.control.theta_est_N ? record.control.theta_est_N : 0.0;
@@ -114,8 +114,8 @@ TEST_CASE("the same seed gives the same run; another seed gives other encoder ph
 TEST_CASE("an end speed below the least speed for slip control: the brake holds in between") {
   Setup setup = braking("adaptive");
   setup.experiment.end_speed_m_s = 0.1;
-  const Result result = run(setup);
+  const Result result = simulated(setup);
   CHECK(result.outcome.completed());
   CHECK(result.in_phase(Phase::hold).front().reason == Reason::slip_control_left_at_low_speed);
-  CHECK(result.metrics.stop_time_s > run(braking("adaptive")).metrics.stop_time_s);
+  CHECK(result.metrics.stop_time_s > simulated(braking("adaptive")).metrics.stop_time_s);
 }

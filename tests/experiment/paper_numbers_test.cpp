@@ -23,7 +23,7 @@ double closed_form(double t_s, double ks0, double ks1) {
 }
 
 double worst_against_closed_form(const Setup& setup) {
-  const Result result = run(setup);
+  const Result result = simulated(setup);
   const auto braking = result.in_phase(rig::Phase::brake);
   const double start_m_s = braking.front().control.slip_velocity_error_m_s;
   double worst = 0.0;
@@ -40,7 +40,7 @@ double worst_against_closed_form(const Setup& setup) {
 
 TEST_CASE("nominal, ideal actuator and sensors: stop, distance, and the error's closed form") {
   const Setup setup = ideal_braking("nominal");
-  const Result result = run(setup);
+  const Result result = simulated(setup);
   CHECK(result.outcome.completed());
   CHECK_THAT(result.metrics.stop_time_s, WithinRel(2.277, 0.005));
   CHECK_THAT(result.metrics.stop_distance_m, WithinRel(19.36, 0.005));
@@ -61,7 +61,7 @@ TEST_CASE("the error follows its closed form at other rates, gains and plants") 
 }
 
 TEST_CASE("adaptive, ideal actuator and sensors: stop, distance, convergence of theta") {
-  const Result result = run(ideal_braking("adaptive"));
+  const Result result = simulated(ideal_braking("adaptive"));
   CHECK_THAT(result.metrics.stop_time_s, WithinRel(2.283, 0.005));
   CHECK_THAT(result.metrics.stop_distance_m, WithinRel(19.32, 0.005));
   const auto braking = result.in_phase(rig::Phase::brake);
@@ -76,17 +76,17 @@ TEST_CASE("adaptive finds the plant's theta at 3 m/s although its model has anot
   Setup setup = braking("adaptive");
   setup.model = setup.plant.rig;
   setup.plant.rig.tyre.theta_N = 40.0;
-  const Result result = run(setup);
+  const Result result = simulated(setup);
   CHECK(result.outcome.completed());
   CHECK_THAT(result.metrics.theta_final_N, WithinRel(40.0, 0.03));
 }
 
 TEST_CASE("distance and stop are the plant's, whatever radius the model has") {
   Setup setup = braking("locked");
-  const Result right = run(setup);
+  const Result right = simulated(setup);
   setup.model = setup.plant.rig;
   setup.model->wheels.r2_m *= 1.1;
-  const Result wrong = run(setup);
+  const Result wrong = simulated(setup);
   CHECK_THAT(wrong.metrics.stop_distance_m, WithinRel(right.metrics.stop_distance_m, 1e-3));
   CHECK_THAT(wrong.distances_m.back(), WithinRel(right.distances_m.back(), 5e-3));
 }
@@ -94,13 +94,13 @@ TEST_CASE("distance and stop are the plant's, whatever radius the model has") {
 TEST_CASE("adaptive, theta = 45, ideal: the paper's 1.2 s") {
   Setup setup = ideal_braking("adaptive");
   setup.plant.rig.tyre.theta_N = 45.0;
-  const Result result = run(setup);
+  const Result result = simulated(setup);
   CHECK_THAT(result.metrics.stop_time_s, WithinRel(1.208, 0.005));
   CHECK_THAT(result.metrics.stop_distance_m, WithinRel(10.08, 0.005));
 }
 
 TEST_CASE("adaptive with the real actuator and 4096-count encoders") {
-  const Result result = run(braking("adaptive"));
+  const Result result = simulated(braking("adaptive"));
   CHECK_THAT(result.metrics.stop_time_s, WithinRel(2.325, 0.01));
   CHECK_THAT(result.metrics.stop_distance_m, WithinRel(19.72, 0.01));
   CHECK(result.metrics.slip_rms <= 0.010);
@@ -111,7 +111,7 @@ TEST_CASE("adaptive with the real actuator and 4096-count encoders") {
 }
 
 TEST_CASE("locked wheel: the bound without ABS") {
-  const Result result = run(braking("locked"));
+  const Result result = simulated(braking("locked"));
   CHECK_THAT(result.metrics.stop_time_s, WithinRel(3.19, 0.005));
   CHECK_THAT(result.metrics.stop_distance_m, WithinRel(26.9, 0.005));
   for (const auto& record : result.records) {
@@ -126,7 +126,7 @@ TEST_CASE("the result does not depend on the rate of control") {
   double most = 0.0;
   for (const double rate_Hz : {500.0, 1000.0, 2000.0, 5000.0}) {
     setup.control.rate_Hz = rate_Hz;
-    const double distance_m = run(setup).metrics.stop_distance_m;
+    const double distance_m = simulated(setup).metrics.stop_distance_m;
     least = std::min(least, distance_m);
     most = std::max(most, distance_m);
   }

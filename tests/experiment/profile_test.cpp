@@ -5,8 +5,10 @@
 
 #include "catch.hpp"
 #include "experiment/sequence.hpp"
+#include "latched_sequence.hpp"
 
 using namespace abs_hil::experiment;
+using abs_hil::experiment::test::LatchedSequence;
 using abs_hil::rig::Reason;
 
 TEST_CASE("a profile is constant outside its points and straight or held between them") {
@@ -34,8 +36,8 @@ TEST_CASE("a profile that goes back in time or is not finite is refused") {
 namespace {
 
 Reason end_of(const EndCondition& condition, const SequenceInput& input, const SequenceLimits& limits = {}) {
-  Sequence sequence({{.ends_on = {condition}, .time_limit_s = 100.0}, {.ends_on = {condition}, .time_limit_s = 100.0}},
-                    limits);
+  LatchedSequence sequence(
+      {{.ends_on = {condition}, .time_limit_s = 100.0}, {.ends_on = {condition}, .time_limit_s = 100.0}}, limits);
   sequence.update({});
   SequenceInput before = input;  // speeds and slip count after two samples
   before.time_s -= 0.001;
@@ -77,7 +79,7 @@ TEST_CASE("all of several conditions must hold at the same time") {
 
 TEST_CASE("the distance of a phase counts from its beginning") {
   const EndCondition way{EndKind::distance, 2.0, Reason::distance_reached};
-  Sequence sequence({{.ends_on = {way}, .time_limit_s = 9.0}, {.ends_on = {way}, .time_limit_s = 9.0}});
+  LatchedSequence sequence({{.ends_on = {way}, .time_limit_s = 9.0}, {.ends_on = {way}, .time_limit_s = 9.0}});
   sequence.update({.distance_m = 1.0});
   CHECK_FALSE(sequence.update({.time_s = 0.1, .distance_m = 2.9}).entered);
   CHECK(sequence.update({.time_s = 0.2, .distance_m = 3.1}).reason == Reason::distance_reached);

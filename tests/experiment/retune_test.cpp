@@ -26,7 +26,7 @@ struct Bench {
     rig::Measurement measurement;
     rig::CycleRecord record;
     REQUIRE(driver.read(now_ns, measurement).ok());
-    const rig::Command wanted = logic.step(measurement, record);
+    const rig::Command wanted = logic.step(measurement, gate, record);
     record.command = gate.check(wanted, {record.control.speeds_est, record.phase, now_ns}).command;
     REQUIRE(driver.write(record.command).ok());
     logic.commanded(record.command);
@@ -179,12 +179,13 @@ TEST_CASE("a run that waits stays idle and safe until the start command") {
   driver.configure();
   driver.activate(0);
   RunLogic logic(test::logic_parts(setup));
+  runtime::RunLatch latch;
   std::int64_t now_ns = 0;
   const auto step = [&] {
     rig::Measurement measurement;
     rig::CycleRecord record;
     REQUIRE(driver.read(now_ns, measurement).ok());
-    record.command = logic.step(measurement, record);
+    record.command = logic.step(measurement, latch, record);
     now_ns += ms;
     return record;
   };

@@ -17,22 +17,24 @@ using namespace abs_hil::experiment::test;
 
 TEST_CASE("a measurement repeated with the same time stamp changes no estimate") {
   RunLogic logic(logic_parts(braking("adaptive")));
+  runtime::RunLatch latch;
   rig::CycleRecord record;
-  static_cast<void>(logic.step({.time_ns = 1000}, record));
+  static_cast<void>(logic.step({.time_ns = 1000}, latch, record));
   logic.commanded(rig::safe_command);
   const rig::WheelSpeeds before = record.control.speeds_est;
-  static_cast<void>(logic.step({.time_ns = 1000}, record));
+  static_cast<void>(logic.step({.time_ns = 1000}, latch, record));
   CHECK(record.control.speeds_est.omega1_rad_s == before.omega1_rad_s);
   CHECK(record.control.speeds_est.omega2_rad_s == before.omega2_rad_s);
 }
 
 TEST_CASE("the torque estimate follows the sent command, not the wanted one") {
   RunLogic logic(logic_parts(braking("adaptive")));
+  runtime::RunLatch latch;
   rig::CycleRecord record;
-  static_cast<void>(logic.step({.time_ns = 0}, record));
+  static_cast<void>(logic.step({.time_ns = 0}, latch, record));
   CHECK(record.control.brake_torque_ref_Nm > 0.0);
   logic.commanded(rig::safe_command);  // the gate blocked the command
-  static_cast<void>(logic.step({.time_ns = 1'000'000}, record));
+  static_cast<void>(logic.step({.time_ns = 1'000'000}, latch, record));
   CHECK(record.control.brake_torque_est_Nm == 0.0);
 }
 
@@ -64,6 +66,7 @@ TEST_CASE("controllers get the observers' accelerations, or the mean over the pa
     parts.controller = std::make_unique<Probe>(seen);
     RunLogic logic(std::move(parts));
     control::TrackingObserver upper(observer, per_rev), lower(observer, per_rev);
+    runtime::RunLatch latch;
     rig::CycleRecord record;
     double omega1_before = 0.0, omega2_before = 0.0;
     for (int n = 0; n <= 300; ++n) {
@@ -76,7 +79,7 @@ TEST_CASE("controllers get the observers' accelerations, or the mean over the pa
       rig::Measurement measurement{
           .time_ns = n * 1'000'000, .upper_counts = counts(170.0, -90.0), .lower_counts = counts(170.0, -70.0)};
       if (ideal) measurement.ideal_speeds = rig::WheelSpeeds{omega1, omega2};
-      static_cast<void>(logic.step(measurement, record));
+      static_cast<void>(logic.step(measurement, latch, record));
       logic.commanded(rig::safe_command);
       if (n == 0) {
         upper.reset(0, 170.0);
@@ -104,7 +107,7 @@ TEST_CASE("the stop brake acts within the gate's cap until standstill and is the
   setup.experiment.stop_brake_duty = 0.9;
   setup.gate.brake_duty_max = 0.7;
   // The stop request comes after a second of acceleration.
-  const Result result = run(setup, [] { return rig::Reason::terminate_signal; });
+  const Result result = simulated(setup, [] { return rig::Reason::terminate_signal; });
   CHECK(result.outcome.reason == rig::Reason::terminate_signal);
   CHECK(result.outcome.safe_state.ok());
   const auto braking = result.in_phase(rig::Phase::hold);
@@ -121,9 +124,9 @@ TEST_CASE("the stop brake acts within the gate's cap until standstill and is the
   CHECK(last.truth.speeds.omega2_rad_s < 0.5);
 
   setup.experiment.stop_brake_limit_s = 0.2;
-  CHECK(run(setup, [] { return rig::Reason::terminate_signal; }).in_phase(rig::Phase::hold).size() == 200);
+  CHECK(simulated(setup, [] { return rig::Reason::terminate_signal; }).in_phase(rig::Phase::hold).size() == 200);
   setup.experiment.stop_brake_duty = 0.0;
-  CHECK(run(setup, [] { return rig::Reason::terminate_signal; }).in_phase(rig::Phase::hold).empty());
+  CHECK(simulated(setup, [] { return rig::Reason::terminate_signal; }).in_phase(rig::Phase::hold).empty());
 }
 
 TEST_CASE("a controller goes on over consecutive phases that use it, unless the second restarts it") {
@@ -142,7 +145,7 @@ TEST_CASE("a controller goes on over consecutive phases that use it, unless the 
     one.plans = {whole};
     two.plans = {half, half};
     restarted.plans = {half, anew};
-    const auto expected = run(one).records, split = run(two).records, begun = run(restarted).records;
+    const auto expected = simulated(one).records, split = simulated(two).records, begun = simulated(restarted).records;
     std::size_t differing = 0;
     for (std::size_t n = 0; n + 1 < expected.size(); ++n) {
       CHECK(split[n].command.brake_duty == expected[n].command.brake_duty);

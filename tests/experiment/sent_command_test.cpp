@@ -46,7 +46,7 @@ TEST_CASE("wherever the dead zone ends, torque and theta are estimated from what
       Setup setup = braking("adaptive");
       setup.plant.rig.brake.u0 = 0.40 + 0.005 * n;
       setup.pwm_mode = mode;
-      const Result result = run(setup);
+      const Result result = simulated(setup);
       const double steps = driver::full_width(mode);
       CAPTURE(setup.plant.rig.brake.u0, steps);
       CHECK(result.outcome.completed());
@@ -67,7 +67,7 @@ TEST_CASE("u0 = 0.55, which 12 bits round into the dead zone, is as good as its 
   for (const double u0 : {0.55, 0.55031}) {
     Setup setup = braking("adaptive");
     setup.plant.rig.brake.u0 = u0;
-    const Result result = run(setup);
+    const Result result = simulated(setup);
     CHECK_THAT(theta_at_3_m_s(setup, result), WithinRel(23.0, 0.03));  // 29.2 before
     double sum_Nm = 0.0;
     const auto braking_records = result.in_phase(rig::Phase::brake);
@@ -84,9 +84,9 @@ TEST_CASE("a slow rise of the brake takes no time in the dead zone and does not 
     Setup setup;
     setup.control.controller = controller;
     setup.experiment.start_speed_rad_s = 0.0;  // the gate does not limit the first command of a run
-    const double free_slip = run(setup).metrics.slip_overshoot;
+    const double free_slip = simulated(setup).metrics.slip_overshoot;
     setup.gate.brake_rate_per_s = 0.5;  // 7.6 N m/s: 0.3 s to the torque of full grip
-    const Result slow = run(setup);
+    const Result slow = simulated(setup);
     CHECK(slow.outcome.completed());
     CHECK(slow.metrics.slip_overshoot < free_slip + 0.05);
     const auto braking_records = slow.in_phase(rig::Phase::brake);
@@ -106,7 +106,7 @@ TEST_CASE("a standing upper wheel teaches nothing about the tyre") {
   setup.control.adaptive.zeta0 = 100.0;
   for (const bool ideal : {false, true}) {
     setup.plant.ideal_sensors = ideal;
-    const Result result = run(setup);
+    const Result result = simulated(setup);
     double at_lock_N = rig::unknown;
     for (const rig::CycleRecord& record : result.in_phase(rig::Phase::brake)) {
       if (record.truth.speeds.omega1_rad_s != 0.0) continue;
@@ -151,7 +151,7 @@ TEST_CASE("an output of the controller that is no number ends the run before it 
     for (std::size_t signal = 0; signal < rig::controller_signals.size(); ++signal) {
       for (const bool gives_all : {true, false}) {
         CAPTURE(value, signal, gives_all);
-        const Result result = run(
+        const Result result = simulated(
             braking("adaptive"), [] { return rig::Reason::none; },
             std::make_unique<Breaking>(signal, value, gives_all));
         // NaN of a signal that the controller never gave means that it still does not give it.
@@ -208,13 +208,13 @@ class Reporting final : public control::SlipController {
 TEST_CASE("a signal of the controller's own that becomes no number ends the run, with its name") {
   const double infinity = std::numeric_limits<double>::infinity();
   const auto outcome = [](double first, double later) {
-    return run(
+    return simulated(
                braking("adaptive"), [] { return rig::Reason::none; }, std::make_unique<Reporting>(first, later))
         .outcome;
   };
   const std::array<std::string, 2> names{"one_m", "two_m"};
   for (const double broken : {rig::unknown, infinity, -infinity}) {
-    const RunOutcome ended = outcome(2.0, broken);
+    const run::RunOutcome ended = outcome(2.0, broken);
     CHECK(ended.reason == rig::Reason::controller_not_finite);
     CHECK(rig::controller_signal(ended.reason_value, names) == "two_m");
     CHECK(rig::controller_signal(ended.reason_value) == "own signal 2");

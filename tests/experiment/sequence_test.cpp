@@ -5,19 +5,21 @@
 #include <utility>
 
 #include "catch.hpp"
+#include "latched_sequence.hpp"
 
 using namespace abs_hil::experiment;
+using abs_hil::experiment::test::LatchedSequence;
 using abs_hil::rig::Phase;
 using abs_hil::rig::Reason;
 
 namespace {
 
-Sequence two_phases(EndCondition first_end) {
-  return Sequence({{.phase = Phase::accelerate, .motor_duty = 0.8, .ends_on = {first_end}, .time_limit_s = 5.0},
-                   {.phase = Phase::brake,
-                    .brake = BrakeAction::slip_control,
-                    .ends_on = {{EndKind::duration, 1.0, Reason::phase_duration_over}},
-                    .time_limit_s = 2.0}});
+LatchedSequence two_phases(EndCondition first_end) {
+  return LatchedSequence({{.phase = Phase::accelerate, .motor_duty = 0.8, .ends_on = {first_end}, .time_limit_s = 5.0},
+                          {.phase = Phase::brake,
+                           .brake = BrakeAction::slip_control,
+                           .ends_on = {{EndKind::duration, 1.0, Reason::phase_duration_over}},
+                           .time_limit_s = 2.0}});
 }
 
 SequenceInput at(double time_s, double omega1_rad_s = 0.0) {
@@ -31,11 +33,11 @@ TEST_CASE("an unsafe phase is refused by name") {
                         .motor_duty = 0.3,
                         .ends_on = {{EndKind::duration, 1.0, Reason::phase_duration_over}},
                         .time_limit_s = 600.0};
-  CHECK_NOTHROW(Sequence({sound}));
+  CHECK_NOTHROW(LatchedSequence({sound}));
   const auto refused = [&](auto&& change, const char* what) {
     PhasePlan plan = sound;
     change(plan);
-    CHECK_THROWS_WITH(Sequence({plan}), Catch::Matchers::Contains("hold") && Catch::Matchers::Contains(what));
+    CHECK_THROWS_WITH(LatchedSequence({plan}), Catch::Matchers::Contains("hold") && Catch::Matchers::Contains(what));
   };
   constexpr double infinite = std::numeric_limits<double>::infinity();
   refused([](PhasePlan& p) { p.time_limit_s = infinite; }, "time limit inf");
@@ -56,11 +58,11 @@ TEST_CASE("an unsafe phase is refused by name") {
   PhasePlan meant = sound;
   meant.brake = BrakeAction::slip_control;
   meant.motor_with_brake = true;
-  CHECK_NOTHROW(Sequence({meant}));
+  CHECK_NOTHROW(LatchedSequence({meant}));
 }
 
 TEST_CASE("phases follow one another in the cycle in which a condition holds for the second time") {
-  Sequence sequence = two_phases({EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached});
+  LatchedSequence sequence = two_phases({EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached});
   const auto first = sequence.update(at(0.0));
   CHECK(first.entered);
   CHECK(first.reason == Reason::run_started);
@@ -81,7 +83,7 @@ TEST_CASE("phases follow one another in the cycle in which a condition holds for
 }
 
 TEST_CASE("exceeding a time limit is a fault with the phase's duration as value") {
-  Sequence sequence = two_phases({EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached});
+  LatchedSequence sequence = two_phases({EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached});
   sequence.update(at(0.0));
   CHECK_FALSE(sequence.update(at(5.0, 50.0)).entered);
   const auto end = sequence.update(at(5.01, 50.0));
@@ -93,7 +95,7 @@ TEST_CASE("exceeding a time limit is a fault with the phase's duration as value"
 }
 
 TEST_CASE("a peak is a maximum that was not exceeded for a while; standstill before the start is not a peak") {
-  Sequence sequence = two_phases({EndKind::upper_wheel_peak, 0.3, Reason::upper_wheel_peak_detected});
+  LatchedSequence sequence = two_phases({EndKind::upper_wheel_peak, 0.3, Reason::upper_wheel_peak_detected});
   sequence.update(at(0.0));
   CHECK_FALSE(sequence.update(at(0.5)).entered);
   double time_s = 0.5;
@@ -104,13 +106,13 @@ TEST_CASE("a peak is a maximum that was not exceeded for a while; standstill bef
 }
 
 TEST_CASE("car speed and standstill end phases") {
-  Sequence slow = two_phases({EndKind::car_speed_below, 0.3, Reason::end_speed_reached});
+  LatchedSequence slow = two_phases({EndKind::car_speed_below, 0.3, Reason::end_speed_reached});
   slow.update(at(0.0, 50.0));
   CHECK_FALSE(slow.update(at(0.1, 0.3 / 0.099 + 0.01)).entered);
   CHECK_FALSE(slow.update(at(0.2, 0.3 / 0.099 - 0.01)).entered);
   CHECK(slow.update(at(0.21, 0.3 / 0.099 - 0.01)).reason == Reason::end_speed_reached);
 
-  Sequence still = two_phases({EndKind::standstill, 0.0, Reason::standstill_reached});
+  LatchedSequence still = two_phases({EndKind::standstill, 0.0, Reason::standstill_reached});
   still.update(at(0.0));
   CHECK_FALSE(still.update(at(0.1)).entered);
   SequenceInput standing = at(0.2);
@@ -118,16 +120,25 @@ TEST_CASE("car speed and standstill end phases") {
   CHECK(still.update(standing).reason == Reason::standstill_reached);
 }
 
-TEST_CASE("an early end: a stop request leads to stopped, a fault to fault, and the first reason stays") {
-  for (const auto& [reason, phase] :
-       {std::pair{Reason::interrupt_signal, Phase::stopped}, std::pair{Reason::overspeed, Phase::fault}}) {
-    Sequence sequence = two_phases({EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached});
+TEST_CASE(
+    "an early end: a stop request leads to stopped, a fault to fault; the first of each stays, a fault counts more") {
+  struct Case {
+    Reason first, second, ends_by;
+    double value;
+    Phase phase;
+  };
+  for (const auto& [first, second, ends_by, value, phase] :
+       {Case{Reason::interrupt_signal, Reason::stop_command, Reason::interrupt_signal, 0.0, Phase::stopped},
+        Case{Reason::overspeed, Reason::driver_read_failed, Reason::overspeed, 7.0, Phase::fault},
+        Case{Reason::overspeed, Reason::interrupt_signal, Reason::overspeed, 7.0, Phase::fault},
+        Case{Reason::interrupt_signal, Reason::driver_read_failed, Reason::driver_read_failed, 8.0, Phase::fault}}) {
+    LatchedSequence sequence = two_phases({EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached});
     sequence.update(at(0.0));
-    sequence.end_early(reason, 7.0);
-    sequence.end_early(Reason::driver_read_failed, 8.0);
+    sequence.latch.latch(first, 7.0);
+    sequence.latch.latch(second, 8.0);
     const auto end = sequence.update(at(0.1, 200.0));
-    CHECK(end.reason == reason);
-    CHECK(end.value == 7.0);
+    CHECK(end.reason == ends_by);
+    CHECK(end.value == value);
     CHECK(sequence.current().phase == phase);
     CHECK(sequence.current().motor_duty == 0.0);
     CHECK(sequence.finished());
@@ -137,27 +148,27 @@ TEST_CASE("an early end: a stop request leads to stopped, a fault to fault, and 
 TEST_CASE(
     "a stop request may first brake with the motor off until standstill or its limit; a fault ends that at once") {
   const auto stopping = [](StopBrake brake, Reason reason) {
-    Sequence sequence({{.phase = Phase::accelerate,
-                        .motor_duty = 0.8,
-                        .ends_on = {{EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached}},
-                        .time_limit_s = 5.0}},
-                      {}, brake);
+    LatchedSequence sequence({{.phase = Phase::accelerate,
+                               .motor_duty = 0.8,
+                               .ends_on = {{EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached}},
+                               .time_limit_s = 5.0}},
+                             {}, brake);
     CHECK(sequence.permissions()[static_cast<std::size_t>(Phase::hold)].brake == (brake.duty > 0.0));
     sequence.update(at(0.0));
-    sequence.end_early(reason, 0.0);
+    sequence.latch.latch(reason, 0.0);
     return sequence;
   };
   SequenceInput standing = at(1.5);
   standing.stands_still = true;
   {
-    Sequence sequence = stopping({.duty = 0.6, .limit_s = 2.0}, Reason::interrupt_signal);
+    LatchedSequence sequence = stopping({.duty = 0.6, .limit_s = 2.0}, Reason::interrupt_signal);
     const Sequence::Change begun = sequence.update(at(1.0, 50.0));
     CHECK(begun.entered);
     CHECK(begun.reason == Reason::interrupt_signal);
     CHECK(sequence.current().phase == Phase::hold);
     CHECK(sequence.current().motor_duty_at(0.0) == 0.0);
     CHECK(sequence.current().brake_duty_at(0.0) == 0.6);
-    sequence.end_early(Reason::terminate_signal, 0.0);  // a repeated request
+    sequence.latch.latch(Reason::terminate_signal, 0.0);  // a repeated request
     CHECK_FALSE(sequence.update(at(2.9, 50.0)).entered);
     CHECK_FALSE(sequence.finished());
     CHECK(sequence.update(at(3.0, 50.0)).reason == Reason::interrupt_signal);  // its 2 s are over
@@ -166,16 +177,16 @@ TEST_CASE(
     CHECK(sequence.current().phase == Phase::stopped);
   }
   {
-    Sequence sequence = stopping({.duty = 0.6}, Reason::stop_command);
+    LatchedSequence sequence = stopping({.duty = 0.6}, Reason::stop_command);
     sequence.update(at(1.0, 50.0));
     CHECK(sequence.update(standing).reason == Reason::stop_command);
     CHECK(sequence.finished());
   }
   {
-    Sequence sequence = stopping({.duty = 0.6}, Reason::hangup_signal);
+    LatchedSequence sequence = stopping({.duty = 0.6}, Reason::hangup_signal);
     sequence.update(at(1.0, 50.0));
-    sequence.end_early(Reason::driver_read_failed, 8.0);
-    sequence.end_early(Reason::driver_write_failed, 9.0);
+    sequence.latch.latch(Reason::driver_read_failed, 8.0);
+    sequence.latch.latch(Reason::driver_write_failed, 9.0);
     const Sequence::Change end = sequence.update(at(1.001, 50.0));
     CHECK(end.reason == Reason::driver_read_failed);
     CHECK(end.value == 8.0);
@@ -183,13 +194,13 @@ TEST_CASE(
     CHECK(sequence.current().brake == BrakeAction::released);
   }
   {
-    Sequence sequence = stopping({.duty = 0.6}, Reason::interrupt_signal);
+    LatchedSequence sequence = stopping({.duty = 0.6}, Reason::interrupt_signal);
     sequence.update(standing);  // both wheels stand
     CHECK(sequence.finished());
   }
   for (const auto& [brake, reason] :
        {std::pair(StopBrake{}, Reason::interrupt_signal), std::pair(StopBrake{.duty = 0.6}, Reason::guardian_died)}) {
-    Sequence sequence = stopping(brake, reason);
+    LatchedSequence sequence = stopping(brake, reason);
     sequence.update(at(1.0, 50.0));
     CHECK(sequence.finished());
   }
@@ -217,7 +228,7 @@ TEST_CASE("one sample of speed or slip ends no phase, nor does the same sample t
     for (const bool part_of_all : {false, true}) {
       const EndCondition alone{row.kind, row.value, Reason::speed_condition_met};
       const EndCondition all{EndKind::all, 0.0, Reason::all_conditions_met, {{EndKind::duration, 0.0}, alone}};
-      Sequence sequence = two_phases(part_of_all ? all : alone);
+      LatchedSequence sequence = two_phases(part_of_all ? all : alone);
       const auto entered_at = [&](double time_s, SequenceInput input) {
         input.time_s = time_s;
         return sequence.update(input).entered;
@@ -237,9 +248,9 @@ TEST_CASE("one sample of speed or slip ends no phase, nor does the same sample t
 
 TEST_CASE("a sample that held in one phase does not count in the next") {
   const EndCondition fast{EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached};
-  Sequence sequence({{.phase = Phase::accelerate, .motor_duty = 0.8, .ends_on = {fast}, .time_limit_s = 5.0},
-                     {.phase = Phase::coast, .ends_on = {fast}, .time_limit_s = 5.0},
-                     {.phase = Phase::hold, .ends_on = {fast}, .time_limit_s = 5.0}});
+  LatchedSequence sequence({{.phase = Phase::accelerate, .motor_duty = 0.8, .ends_on = {fast}, .time_limit_s = 5.0},
+                            {.phase = Phase::coast, .ends_on = {fast}, .time_limit_s = 5.0},
+                            {.phase = Phase::hold, .ends_on = {fast}, .time_limit_s = 5.0}});
   sequence.update(at(0.0, 150.0));
   CHECK_FALSE(sequence.update(at(0.001, 150.0)).entered);
   CHECK(sequence.update(at(0.002, 150.0)).entered);
@@ -249,18 +260,18 @@ TEST_CASE("a sample that held in one phase does not count in the next") {
 
 TEST_CASE("after a fault that permits it the brake holds until standstill or its limit") {
   const auto failing = [](StopBrake brake, Reason reason) {
-    Sequence sequence({{.phase = Phase::accelerate,
-                        .motor_duty = 0.8,
-                        .ends_on = {{EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached}},
-                        .time_limit_s = 5.0}},
-                      {}, {}, brake);
+    LatchedSequence sequence({{.phase = Phase::accelerate,
+                               .motor_duty = 0.8,
+                               .ends_on = {{EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached}},
+                               .time_limit_s = 5.0}},
+                             {}, {}, brake);
     CHECK(sequence.permissions()[static_cast<std::size_t>(Phase::fault)].brake == (brake.duty > 0.0));
     sequence.update(at(0.0));
-    sequence.end_early(reason, 7.0);
+    sequence.latch.latch(reason, 7.0);
     return sequence;
   };
   {
-    Sequence sequence = failing({.duty = 0.4, .limit_s = 2.0}, Reason::encoder_upper_stuck);
+    LatchedSequence sequence = failing({.duty = 0.4, .limit_s = 2.0}, Reason::encoder_upper_stuck);
     const Sequence::Change begun = sequence.update(at(1.0, 50.0));
     CHECK(begun.reason == Reason::encoder_upper_stuck);
     CHECK(begun.value == 7.0);
@@ -268,15 +279,15 @@ TEST_CASE("after a fault that permits it the brake holds until standstill or its
     CHECK(sequence.current().brake_duty_at(0.0) == 0.4);
     CHECK(sequence.current().motor_duty_at(0.0) == 0.0);
     CHECK_FALSE(sequence.finished());
-    sequence.end_early(Reason::encoder_upper_stuck, 7.0);  // told in each cycle
-    sequence.end_early(Reason::interrupt_signal, 0.0);
+    sequence.latch.latch(Reason::encoder_upper_stuck, 7.0);  // told in each cycle
+    sequence.latch.latch(Reason::interrupt_signal, 0.0);
     CHECK_FALSE(sequence.update(at(2.9, 50.0)).entered);
     CHECK(sequence.update(at(3.0, 50.0)).reason == Reason::encoder_upper_stuck);
     CHECK(sequence.finished());
     CHECK(sequence.current().brake == BrakeAction::released);
   }
   {
-    Sequence sequence = failing({.duty = 0.4, .limit_s = 2.0}, Reason::overspeed);
+    LatchedSequence sequence = failing({.duty = 0.4, .limit_s = 2.0}, Reason::overspeed);
     sequence.update(at(1.0, 50.0));
     SequenceInput standing = at(1.5);
     standing.stands_still = true;
@@ -284,9 +295,9 @@ TEST_CASE("after a fault that permits it the brake holds until standstill or its
     CHECK(sequence.finished());
   }
   {
-    Sequence sequence = failing({.duty = 0.4, .limit_s = 2.0}, Reason::overspeed);
+    LatchedSequence sequence = failing({.duty = 0.4, .limit_s = 2.0}, Reason::overspeed);
     sequence.update(at(1.0, 50.0));
-    sequence.end_early(Reason::driver_write_failed, 3.0);  // a second fault bars the brake
+    sequence.latch.latch(Reason::driver_write_failed, 3.0);  // a second fault bars the brake
     CHECK(sequence.update(at(1.001, 50.0)).reason == Reason::overspeed);
     CHECK(sequence.finished());
   }
@@ -294,12 +305,12 @@ TEST_CASE("after a fault that permits it the brake holds until standstill or its
        {std::pair(StopBrake{}, Reason::overspeed), std::pair(StopBrake{.duty = 0.4}, Reason::driver_write_failed),
         std::pair(StopBrake{.duty = 0.4}, Reason::brake_no_response),
         std::pair(StopBrake{.duty = 0.4}, Reason::guardian_died)}) {
-    Sequence sequence = failing(brake, reason);
+    LatchedSequence sequence = failing(brake, reason);
     CHECK(sequence.update(at(1.0, 50.0)).reason == reason);
     CHECK(sequence.finished());
   }
   // The sequence's own faults are treated alike.
-  Sequence late = failing({.duty = 0.4, .limit_s = 2.0}, Reason::none);
+  LatchedSequence late = failing({.duty = 0.4, .limit_s = 2.0}, Reason::none);
   CHECK(late.update(at(5.1, 50.0)).reason == Reason::phase_time_limit);
   CHECK_FALSE(late.finished());
   CHECK(late.current().phase == Phase::fault);
@@ -308,14 +319,14 @@ TEST_CASE("after a fault that permits it the brake holds until standstill or its
 }
 
 TEST_CASE("plans that could never end are refused") {
-  CHECK_THROWS_AS(Sequence({}), std::invalid_argument);
-  CHECK_THROWS_AS(Sequence({{.phase = Phase::idle, .time_limit_s = 1.0}}), std::invalid_argument);
-  CHECK_THROWS_AS(Sequence({{.phase = Phase::idle, .ends_on = {{EndKind::duration, 1.0, Reason::none}}}}),
+  CHECK_THROWS_AS(LatchedSequence(std::vector<PhasePlan>{}), std::invalid_argument);
+  CHECK_THROWS_AS(LatchedSequence({{.phase = Phase::idle, .time_limit_s = 1.0}}), std::invalid_argument);
+  CHECK_THROWS_AS(LatchedSequence({{.phase = Phase::idle, .ends_on = {{EndKind::duration, 1.0, Reason::none}}}}),
                   std::invalid_argument);
 }
 
 TEST_CASE("a run is not complete while the checks of the wheels doubt the speeds") {
-  Sequence sequence = two_phases({EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached});
+  LatchedSequence sequence = two_phases({EndKind::upper_speed_above, 100.0, Reason::speed_threshold_reached});
   const auto doubted = [](double time_s, double omega1_rad_s = 0.0) {
     SequenceInput input = at(time_s, omega1_rad_s);
     input.wheels_sound = false;
@@ -326,7 +337,7 @@ TEST_CASE("a run is not complete while the checks of the wheels doubt the speeds
   CHECK(sequence.update(doubted(0.2, 100.0)).entered);  // other phases end
   CHECK_FALSE(sequence.update(doubted(1.3)).entered);
   CHECK_FALSE(sequence.update(doubted(1.5)).entered);
-  Sequence doubted_for_long = sequence;
+  LatchedSequence doubted_for_long = sequence;
   CHECK(sequence.update(at(1.6)).reason == Reason::sequence_complete);
   CHECK(sequence.finished());
   CHECK(doubted_for_long.update(doubted(2.3)).reason == Reason::phase_time_limit);
@@ -340,7 +351,7 @@ TEST_CASE("a phase that asks ends when the question is answered, and in time") {
                        .question = "Lift the wheel."};
   const PhasePlan after{
       .phase = Phase::hold, .ends_on = {{EndKind::duration, 1.0, Reason::phase_duration_over}}, .time_limit_s = 2.0};
-  Sequence answered({asks, after});
+  LatchedSequence answered({asks, after});
   CHECK_FALSE(answered.wheels_apart());
   CHECK(answered.update(at(0.0)).entered);
   CHECK(answered.wheels_apart());
@@ -353,7 +364,7 @@ TEST_CASE("a phase that asks ends when the question is answered, and in time") {
   CHECK(answered.index() == 1);
   CHECK_FALSE(answered.wheels_apart());
 
-  Sequence alone({asks, after}, {}, {}, {.duty = 0.5});
+  LatchedSequence alone({asks, after}, {}, {}, {.duty = 0.5});
   static_cast<void>(alone.update(at(0.0, 50.0)));
   const Sequence::Change late = alone.update(at(5.1, 50.0));
   CHECK(late.reason == Reason::question_unanswered);
@@ -364,6 +375,6 @@ TEST_CASE("a phase that asks ends when the question is answered, and in time") {
     PhasePlan acts = asks;
     if (motor) acts.motor_duty = 0.1;
     if (!motor) acts.brake = BrakeAction::duty;
-    CHECK_THROWS_WITH(Sequence({acts}), Catch::Matchers::Contains("asks a person"));
+    CHECK_THROWS_WITH(LatchedSequence({acts}), Catch::Matchers::Contains("asks a person"));
   }
 }

@@ -10,7 +10,7 @@
 #include "analysis/run_metrics.hpp"
 #include "config/plan.hpp"
 #include "driver/sim/sim_driver.hpp"
-#include "experiment/run_session.hpp"
+#include "run/run.hpp"
 
 namespace abs_hil::experiment::test {
 
@@ -41,7 +41,7 @@ struct Setup {
 
 /// Its result.
 struct Result {
-  RunOutcome outcome{};
+  run::RunOutcome outcome{};
   analysis::Metrics metrics{};
   std::vector<rig::CycleRecord> records{};
   std::vector<double> distances_m{};
@@ -69,26 +69,49 @@ inline std::vector<PhasePlan> phases_of(const Setup& setup) {
 inline RunLogicParts logic_parts(const Setup& setup) {
   RunLogicParts parts = make_logic_parts(setup.control, setup.believed(), plant_sim::identity_of(setup.plant),
                                          setup.plant.ideal_actuator, setup.gate, setup.experiment, phases_of(setup));
-  parts.recorded_r2_m = setup.plant.rig.wheels.r2_m;
   parts.duty_steps = driver::full_width(setup.pwm_mode);
   return parts;
 }
 
+/// A run of the setup, made as the program makes it, but for what is given.
+class SetupRun {
+ public:
+  explicit SetupRun(const Setup& setup, const run::Given& given = {})
+      : settings_(settings_of(setup)),
+        prepared_(settings_, config::Plan{.phases = phases_of(setup)}),
+        run_(prepared_, given) {}
+  run::Run* operator->() noexcept { return &run_; }
+
+ private:
+  static config::Settings settings_of(const Setup& setup) {
+    config::Settings s;
+    s.plant = setup.plant;
+    s.model = setup.believed();
+    s.control = setup.control;
+    s.experiment = setup.experiment;
+    s.gate = setup.gate;
+    s.seed = static_cast<std::int64_t>(setup.seed);
+    s.driver.sim.pwm_mode = setup.pwm_mode == driver::PwmMode::bits_8 ? "8-bit" : "12-bit";
+    return s;
+  }
+
+  config::Settings settings_;
+  run::Prepared prepared_;
+  run::Run run_;
+};
+
+inline rig::Reason go_on() noexcept { return rig::Reason::none; }
+
 /// Runs the setup in virtual time with the program's own code, and with another controller if one is given.
-inline Result run(
-    const Setup& setup, const RunSession::Poll& poll = [] { return rig::Reason::none; },
-    std::unique_ptr<control::SlipController> controller = nullptr) {
-  runtime::VirtualClock clock;
-  driver::SimDriver driver(
-      setup.plant,
-      {.seed = setup.seed, .start_speed_rad_s = setup.experiment.start_speed_rad_s, .pwm_mode = setup.pwm_mode});
+inline Result simulated(const Setup& setup, const run::Run::Poll& poll = go_on,
+                        std::unique_ptr<control::SlipController> controller = nullptr) {
+  run::Given given;
+  if (controller) given.controller = [&controller](auto) { return std::move(controller); };
   Recorder recorder;
-  analysis::RunMetrics metrics(setup.plant.rig.wheels.r2_m, setup.experiment.end_speed_m_s);
-  RunLogicParts parts = logic_parts(setup);
-  if (controller) parts.controller = std::move(controller);
-  RunSession session(clock, driver, std::move(parts), setup.gate, {&recorder, &metrics});
-  const RunOutcome outcome = session.run_fast(poll);
-  return {outcome, metrics.metrics(), std::move(recorder.records), std::move(recorder.distances_m)};
+  SetupRun run(setup, given);
+  run->record_into({&recorder});
+  const run::RunOutcome outcome = run->go(poll);
+  return {outcome, run->metrics().metrics(), std::move(recorder.records), std::move(recorder.distances_m)};
 }
 
 /// Braking from 170 rad/s without a run-up, as in the paper's initial conditions.

@@ -13,7 +13,7 @@ using Catch::Matchers::WithinRel;
 namespace {
 
 analysis::FrictionCurveResult swept(const Setup& setup) {
-  const Result result = run(setup);
+  const Result result = simulated(setup);
   REQUIRE(result.outcome.completed());
   analysis::FrictionCurve curve(setup.plant.rig.wheels, setup.plant.rig.encoder_counts_per_rev);
   for (rig::CycleRecord record : result.records) {

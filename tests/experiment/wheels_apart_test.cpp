@@ -54,7 +54,7 @@ TEST_CASE("wheels that part and join in a run trip no check, and the records tel
     CAPTURE(load);
     Setup setup = lifted();
     setup.plant.load = load;
-    const Result result = run(setup);
+    const Result result = simulated(setup);
     CHECK(result.outcome.reason == Reason::sequence_complete);
     for (const rig::CycleRecord& record : result.records) {
       const bool apart = record.phase_index >= 1 && record.phase_index <= 3;
@@ -95,8 +95,9 @@ TEST_CASE("the same run with wheels that nobody said are apart would not pass") 
     driver::SimDriver sim_;
   } driver(setup);
   Recorder recorder;
-  RunSession session(clock, driver, logic_parts(setup), setup.gate, {&recorder});
-  const RunOutcome outcome = session.run_fast([] { return Reason::none; });
+  SetupRun run(setup, {.clock = &clock, .driver = &driver});
+  run->record_into({&recorder});
+  const run::RunOutcome outcome = run->go(go_on);
   CHECK((outcome.reason == Reason::released_wheel_stands || outcome.reason == Reason::encoders_disagree ||
          outcome.reason == Reason::encoder_upper_stuck));
 }
@@ -128,7 +129,7 @@ TEST_CASE("faults of one wheel are found while the wheels are apart") {
 TEST_CASE("a run that ends early leaves the wheels as they are") {
   Setup setup = lifted();
   int polls = 0;
-  const Result result = run(setup, [&polls] { return ++polls == 4 ? Reason::stop_command : Reason::none; });
+  const Result result = simulated(setup, [&polls] { return ++polls == 4 ? Reason::stop_command : Reason::none; });
   CHECK(result.outcome.reason == Reason::stop_command);
   CHECK(result.records.back().wheels_apart);
 }

@@ -114,11 +114,10 @@ void record_run(const std::filesystem::path& path, const Recipe& recipe) {
           recipe.loses_every),
       driver::parse_injections(s.inject), static_cast<std::uint64_t>(s.seed),
       [&clock](std::int64_t duration_ns) { clock.sleep_until(clock.now_ns() + duration_ns); });
-  experiment::RunLogicParts parts = experiment::make_logic_parts(
-      s.control, s.plant.rig, s.plant.rig, s.plant.ideal_actuator, s.gate, s.experiment, config::plan(s).phases);
-  parts.duty_steps = config::output_grid(s).duty_steps;
-  experiment::RunSession session(clock, driver, std::move(parts), s.gate, {&late});
-  session.run_fast([&recipe] { return recipe.stop; });
+  const run::Prepared prepared(s);
+  run::Run run(prepared, {.clock = &clock, .driver = &driver});
+  run.record_into({&late});
+  run.go([&recipe] { return recipe.stop; });
 }
 
 std::string content(const std::filesystem::path& path) {

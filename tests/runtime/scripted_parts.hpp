@@ -100,8 +100,14 @@ class ScriptedLogic final : public CycleLogic {
   explicit ScriptedLogic(ScriptedClock& clock) : clock_(clock) {}
 
   void wheels_judged(bool sound) noexcept override { wheels_sound = sound; }
-  [[nodiscard]] rig::Command step(const rig::Measurement&, rig::CycleRecord& record) noexcept override {
+  [[nodiscard]] rig::Command step(const rig::Measurement&, RunLatch& latch,
+                                  rig::CycleRecord& record) noexcept override {
     clock_.pass(script.control_ns);
+    if (ended_by == rig::Reason::none) {
+      const bool fault = latch.fault() != rig::Reason::none;
+      ended_by = fault ? latch.fault() : latch.stop_request();
+      ended_value = fault ? latch.fault_value() : 0.0;
+    }
     finished_ = ended_by != rig::Reason::none;
     record.phase = finished_ ? rig::Phase::fault : rig::Phase::brake;
     record.reason = ended_by;
@@ -109,11 +115,6 @@ class ScriptedLogic final : public CycleLogic {
     return finished_ ? rig::safe_command : wanted;
   }
   void commanded(const rig::Command& command) noexcept override { last = command; }
-  void end_early(rig::Reason reason, double value) noexcept override {
-    if (ended_by != rig::Reason::none) return;
-    ended_by = reason;
-    ended_value = value;
-  }
   [[nodiscard]] bool finished() const noexcept override { return finished_; }
 
   CycleScript script{};

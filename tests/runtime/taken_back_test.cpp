@@ -51,7 +51,8 @@ TEST_CASE("a command that was computed before a pause is not sent after it") {
     bench.cycle(script);
     CHECK_FALSE(rig::acts(bench.driver.written.back()));
     CHECK_FALSE(rig::acts(bench.logic.last));
-    CHECK(bench.logic.ended_by == rig::Reason::cycle_gap);
+    CHECK(bench.gate.fault() == rig::Reason::cycle_gap);
     CHECK_FALSE(bench.cycle());
+    CHECK(bench.logic.ended_by == rig::Reason::cycle_gap);
   }
 }

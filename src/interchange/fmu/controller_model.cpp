@@ -62,6 +62,7 @@ void ControllerModel::start(double time_s) {
            .any_brake_duty = sensors.ideal_actuator};
   parts.duty_steps = grid_.any_brake_duty ? 0 : grid_.duty_steps;
   logic_ = std::make_unique<experiment::RunLogic>(std::move(parts));
+  latch_ = {};
   start_s_ = time_s_ = time_s;
   brake_torque_ref_Nm_ = brake_duty_ = estimated_torque_Nm_ = slip_est_ = theta_est_N_ = 0.0;
   omega1_est_rad_s_ = omega2_est_rad_s_ = experiment.start_speed_rad_s;
@@ -79,8 +80,8 @@ void ControllerModel::step(double duration_s) {
   rig::CycleRecord record{.stamp_ns = now_ns};
   rig::Measurement measurement{.time_ns = now_ns, .upper_counts = upper_counts_, .lower_counts = lower_counts_};
   if (sensors.speeds_given) measurement.ideal_speeds = rig::WheelSpeeds{omega1_rad_s_, omega2_rad_s_};
-  const rig::Command wanted = logic_->step(measurement, record);
-  if (logic_->finished() || !std::isfinite(wanted.brake_duty)) {
+  const rig::Command wanted = logic_->step(measurement, latch_, record);
+  if (logic_->finished() || latch_.fault() != rig::Reason::none) {
     throw std::invalid_argument("the controller gave an output that is not a finite number, or " +
                                 std::to_string(longest_s) + " s of braking are over");
   }

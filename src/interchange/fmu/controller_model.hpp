@@ -36,6 +36,7 @@ class ControllerModel final : public Model {
 
  private:
   std::unique_ptr<experiment::RunLogic> logic_{};
+  runtime::RunLatch latch_{};
   driver::OutputGrid grid_{};
   double start_s_{0.0};
   double time_s_{0.0};

@@ -185,14 +185,15 @@ LaneSettings::LaneSettings(const config::Settings& settings) {
   if (settings.experiment.wait_for_start || !(start_speed_rad_s > 0.0) || eccentric(settings.model)) return;
   auto parts = std::make_unique<Parts>(Parts{.settings = settings});
   try {
+    const run::Prepared prepared(settings);
     parts->controller = control::make_controller(settings.control.controller, {settings.control, settings.model});
-    if (!plan_sequence(config::plan(settings), settings, parts->sequence)) return;
+    if (!plan_sequence(prepared.plan, settings, parts->sequence)) return;
+    parts->period_ns = prepared.period_ns;
+    parts->duty_steps = prepared.grid(settings.plant).duty_steps;
   } catch (const std::exception&) {
     return;  // `simulate` says what is wrong
   }
-  parts->period_ns = std::llround(1e9 / settings.control.rate_Hz);
   parts->period_s = static_cast<double>(parts->period_ns) * rig::s_per_ns;
-  parts->duty_steps = driver::simulated_output_grid(settings.driver, settings.plant.ideal_actuator).duty_steps;
   parts->window_cycles = cycles_of_window(*parts, settings.plant.rig.encoder_counts_per_rev);
   if (parts->window_cycles == 0) return;
   parts->tracker = {settings.control.observer, settings.model.encoder_counts_per_rev};

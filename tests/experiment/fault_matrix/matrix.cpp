@@ -43,20 +43,20 @@ MatrixCase run_with(Backend backend, std::vector<driver::Injection> injections, 
   const guardian::GuardPage guard_page;
   guardian::Heartbeat heartbeat(page, guard_page, flight);
   Recorder recorder;
-  analysis::RunMetrics metrics(setup.plant.rig.wheels.r2_m, setup.experiment.end_speed_m_s);
   telemetry::CsvSink csv(folder / "run.csv");
-  RunSession session(clock, driver, logic_parts(setup), setup.gate, {&recorder, &metrics, &csv});
-  session.set_watch(heartbeat);
-  const RunOutcome outcome = session.run_fast([] { return rig::Reason::none; });
+  SetupRun run(setup, {.clock = &clock, .driver = &driver});
+  run->record_into({&recorder, &csv});
+  run->set_watch(heartbeat);
+  const run::RunOutcome outcome = run->go(go_on);
 
-  MatrixCase result{.reason = outcome.reason, .metrics = metrics.metrics()};
+  MatrixCase result{.reason = outcome.reason, .metrics = run->metrics().metrics()};
   const rig::CycleRecord& last = recorder.records.back();
   const std::int64_t effect_ns = driver.first_effect_ns();
   result.reaction_s = effect_ns < 0 ? 0.0 : static_cast<double>(clock.now_ns() - effect_ns) * 1e-9;
   result.safe = outcome.safe_state.ok() && rig->at_rest() && last.command.motor_duty == 0.0 &&
                 last.command.brake_duty == 0.0 && !last.command.motor_enable;
-  result.complete = session.record_drops() == 0 && last.reason == outcome.reason &&
-                    recorder.records.size() == session.executive().statistics().cycles();
+  result.complete = run->record_drops() == 0 && last.reason == outcome.reason &&
+                    recorder.records.size() == run->executive().statistics().cycles();
   for (std::size_t i = 0; i < recorder.records.size(); ++i) {
     result.complete = result.complete && recorder.records[i].sequence == i;
   }

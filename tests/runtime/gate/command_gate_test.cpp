@@ -54,7 +54,7 @@ TEST_CASE("a value that is not finite latches a fault; from then on only the saf
     const GateResult later = gate.check({.brake_duty = 0.5}, moderate);
     CHECK(is_safe(later.command));
     CHECK(later.action == GateAction::refused);
-    CHECK(later.fault == rig::Reason::command_not_finite);
+    CHECK(gate.fault() == rig::Reason::command_not_finite);
 
     CommandGate blind(GateOptions{});
     CHECK(is_safe(blind.check({.brake_duty = 0.5}, {.speeds = {bad, 1.0}}).command));
@@ -84,9 +84,7 @@ TEST_CASE("the first fault stays") {
   CommandGate gate(GateOptions{});
   gate.latch(rig::Reason::driver_read_failed, 2.0);
   gate.latch(rig::Reason::overspeed, 300.0);
-  const GateResult refused = gate.check({}, moderate);
-  CHECK(refused.fault == rig::Reason::driver_read_failed);
-  CHECK(refused.fault_value == 2.0);
+  static_cast<void>(gate.check({}, moderate));
   CHECK(gate.fault() == rig::Reason::driver_read_failed);
   CHECK(gate.fault_value() == 2.0);
 }
@@ -232,8 +230,8 @@ TEST_CASE("a motor that is not enabled stays disabled, and the result tells the 
   const GateResult next = gate.check({.motor_enable = true}, {.now_ns = ms});
   CHECK(next.action == GateAction::passed);
   CHECK(next.command.motor_enable);
-  CHECK(next.fault == Reason::none);
-  CHECK(next.fault_value == 0.0);
+  CHECK(gate.fault() == Reason::none);
+  CHECK(gate.fault_value() == 0.0);
 }
 
 TEST_CASE("after a duty that the board did not take, the next rise begins at what it took and half a step of 8 bits") {

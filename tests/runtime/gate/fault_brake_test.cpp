@@ -1,13 +1,12 @@
 // The brake after a fault.
 
-#include "runtime/fault_brake.hpp"
-
 #include <limits>
 #include <tuple>
 
 #include "catch.hpp"
 #include "gate_inputs.hpp"
 #include "runtime/command_gate.hpp"
+#include "runtime/run_latch.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::runtime;
@@ -27,7 +26,7 @@ TEST_CASE("after a fault the brake holds at most its duty for the fault, motor o
   CHECK(first.command.motor_duty == 0.0);
   CHECK_FALSE(first.command.motor_enable);
   CHECK(first.action == GateAction::refused);
-  CHECK(first.fault == Reason::encoder_upper_stuck);
+  CHECK(gate.fault() == Reason::encoder_upper_stuck);
   CHECK(gate.check({.brake_duty = 0.2}, {.now_ns = 15 * ms}).command.brake_duty == 0.2);
   CHECK(is_safe(gate.check({.brake_duty = 0.2}, {.now_ns = 15 * ms + 1}).command));
   CHECK(gate.count(GateAction::passed) == 0);

@@ -17,12 +17,12 @@ class PlantedLogic final : public CycleLogic {
       : inner_(inner), offence_(offence), cycles_left_(in_cycle) {}
 
   void wheels_judged(bool sound) noexcept override { inner_.wheels_judged(sound); }
-  [[nodiscard]] rig::Command step(const rig::Measurement& measurement, rig::CycleRecord& record) noexcept override {
+  [[nodiscard]] rig::Command step(const rig::Measurement& measurement, RunLatch& latch,
+                                  rig::CycleRecord& record) noexcept override {
     if (offence_ != nullptr && cycles_left_-- == 0) offence_();
-    return inner_.step(measurement, record);
+    return inner_.step(measurement, latch, record);
   }
   void commanded(const rig::Command& command) noexcept override { inner_.commanded(command); }
-  void end_early(rig::Reason reason, double value) noexcept override { inner_.end_early(reason, value); }
   [[nodiscard]] bool finished() const noexcept override { return inner_.finished(); }
 
  private:

@@ -1,15 +1,16 @@
-#include "program/run_results.hpp"
+#include "run/run_summary.hpp"
 
 #include <fmt/format.h>
 
 #include <span>
 #include <string>
 
+#include "config/config_error.hpp"
 #include "config/key_table.hpp"
 #include "config/model.hpp"
 #include "rig/reason_text.hpp"
 
-namespace abs_hil::program {
+namespace abs_hil::run {
 
 namespace {
 
@@ -39,8 +40,8 @@ std::string identity_hint(rig::Reason reason, const config::Settings& s) {
   }
 }
 
-std::string reason_text(const experiment::RunOutcome& outcome, const config::Settings& s,
-                        std::span<const std::string> own_signals, const nlohmann::ordered_json& foreign) {
+std::string reason_text(const RunOutcome& outcome, const config::Settings& s, std::span<const std::string> own_signals,
+                        const nlohmann::ordered_json& foreign) {
   std::string text = rig::reason_text(outcome.reason, outcome.reason_value, own_signals);
   if (rig::is_fault(outcome.reason)) {
     const std::string bound = config::number_text(s, rig::row_of(outcome.reason).value.bound);
@@ -69,34 +70,49 @@ nlohmann::ordered_json differences_json(const config::Settings& s) {
 
 }  // namespace
 
-analysis::RunSummary summarise(const RunRequest& request, const experiment::RunSession& session,
-                               const experiment::RunOutcome& outcome, const RunResults& results) {
-  const config::Settings& s = request.settings;
+analysis::RunSummary summarise(const Run& run, const RunOutcome& outcome,
+                               const nlohmann::ordered_json& foreign_controller) {
+  const config::Settings& s = run.settings();
   const std::string result = outcome.completed() ? "completed" : (rig::is_fault(outcome.reason) ? "fault" : "stopped");
+  const runtime::CycleStatistics& statistics = run.executive().statistics();
   return {.result = result,
-          .reason = reason_text(outcome, s, results.names.signals, results.foreign_controller),
+          .reason = reason_text(outcome, s, run.names().signals, foreign_controller),
           .controller = s.control.controller,
           .plant = s.plant_name,
           .backend = s.backend,
           .experiment = s.experiment.name,
-          .metrics = results.metrics,
-          .cycles = session.executive().statistics().cycles(),
-          .telemetry_drops = session.record_drops(),
-          .publish_failures = results.publish_failures,
-          .csv_rows_lost = results.csv_rows_lost,
+          .metrics = run.metrics().metrics(),
+          .cycles = statistics.cycles(),
+          .telemetry_drops = run.record_drops(),
           .realtime = outcome.realtime.realtime(),
-          .virtual_time = request.outputs.fast,
-          .truth_known = s.backend == "sim",
-          .timing = request.outputs.fast ? rig::TimingSummary{} : session.executive().statistics().summary(),
-          .gate = session.gate().counts(),
-          .checks_unjudged = session.gate().unjudged_share(),
-          .config = nlohmann::ordered_json::parse(request.config_json),
-          .friction_curve = results.friction_curve,
+          .virtual_time = !run.real_time(),
+          .truth_known = !s.on_rig(),
+          .timing = run.real_time() ? statistics.summary() : rig::TimingSummary{},
+          .gate = run.gate().counts(),
+          .checks_unjudged = run.gate().unjudged_share(),
+          .friction_curve = run.friction_curve() ? analysis::to_json(run.friction_curve()->result()) : nullptr,
           .model = s.model_name,
           .model_differences = differences_json(s),
           .model_note = config::in_words(config::model_differences(s)),
-          .foreign_controller = results.foreign_controller,
+          .foreign_controller = foreign_controller,
           .end_speed_m_s = s.experiment.end_speed_m_s};
 }
 
-}  // namespace abs_hil::program
+Simulation simulate(const config::Settings& s, const config::Script& script, const std::vector<rig::RecordSink*>& sinks,
+                    const Run::Poll& poll) {
+  if (s.on_rig()) throw config::ConfigError("backend rig: only the simulated rig runs here; leave out the backend");
+  if (s.experiment.wait_for_start) {
+    throw config::ConfigError("experiment.wait_for_start: a run in virtual time cannot wait; leave it out");
+  }
+  if (script.series.given) {
+    throw config::ConfigError("experiment " + script.name +
+                              ": a series of runs, and this is one run; give an experiment without [series]");
+  }
+  const Prepared prepared(s, script);
+  Run run(prepared);
+  run.record_into(sinks);
+  const RunOutcome outcome = run.go(poll);
+  return {.names = run.names(), .summary = summarise(run, outcome)};
+}
+
+}  // namespace abs_hil::run

@@ -1,0 +1,292 @@
+#include "run/run.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <cmath>
+#include <future>
+#include <thread>
+#include <utility>
+
+#include "config/library.hpp"
+#include "driver/factory.hpp"
+#include "driver/injection/injecting_driver.hpp"
+#include "driver/injection/injection.hpp"
+#include "driver/sim/sim_driver.hpp"
+
+namespace abs_hil::run {
+
+namespace {
+
+constexpr std::int64_t poll_interval_ns = 2'000'000;
+/// When this thread was delayed, it hands on the gathered records in bursts of this size. LCM's receivers queue 30
+/// messages of a channel and drop the rest.
+constexpr std::size_t records_per_burst = 16;
+constexpr std::int64_t burst_interval_ns = 500'000;
+/// Records the ring holds: 0.8 s at 10 kHz, long enough for a slow disk.
+constexpr std::size_t ring_capacity = 8192;
+/// The ring of a stepped run is emptied after every cycle, and clearing a large one would cost more than the run.
+constexpr std::size_t stepped_ring_capacity = 2;
+constexpr int fast_cycles_per_drain = 1000;
+
+/// Time for the cycle's thread to start.
+constexpr std::int64_t start_margin_ns = 100'000'000;
+
+std::int64_t next_second_ns(std::int64_t now_ns) noexcept {
+  constexpr std::int64_t second_ns = 1'000'000'000;
+  return (now_ns / second_ns + 1) * second_ns;
+}
+
+/// Puts the rig in the safe state, however the run ends.
+class ActiveDriver {
+ public:
+  ActiveDriver(driver::RigDriver& driver, std::int64_t now_ns) : driver_(driver) {
+    driver_.configure();
+    driver_.activate(now_ns);
+  }
+  ActiveDriver(const ActiveDriver&) = delete;
+  ActiveDriver& operator=(const ActiveDriver&) = delete;
+  ~ActiveDriver() { static_cast<void>(driver_.deactivate()); }
+
+ private:
+  driver::RigDriver& driver_;
+};
+
+std::unique_ptr<runtime::Clock> clock_of(const Given& given) {
+  if (given.clock != nullptr) return nullptr;
+  if (given.real_time) return std::make_unique<runtime::MonotonicClock>();
+  return std::make_unique<runtime::VirtualClock>();
+}
+
+/// The driver with the injected faults of the settings around it, if there are any.
+std::unique_ptr<driver::RigDriver> with_faults(std::unique_ptr<driver::RigDriver> driver, const config::Settings& s,
+                                               runtime::Clock& clock) {
+  std::vector<driver::Injection> injections = driver::parse_injections(s.inject);
+  if (injections.empty()) return driver;
+  for (const driver::Injection& injection : injections) spdlog::warn("fault injected: {}", driver::to_text(injection));
+  return std::make_unique<driver::InjectingDriver>(
+      std::move(driver), std::move(injections), static_cast<std::uint64_t>(s.seed),
+      [&clock](std::int64_t duration_ns) { clock.sleep_until(clock.now_ns() + duration_ns); });
+}
+
+const plant_sim::PlantOptions& plant_of(const Prepared& prepared, const Given& given) noexcept {
+  return given.plant != nullptr ? *given.plant : prepared.settings.plant;
+}
+
+std::unique_ptr<driver::RigDriver> make_driver(const config::Settings& s, bool virtual_time,
+                                               const plant_sim::PlantOptions& plant, std::uint64_t sensor_seed) {
+  if (s.on_rig()) return driver::make_rig_driver(s.driver, virtual_time);
+  return std::make_unique<driver::SimDriver>(
+      plant, driver::SimStart{.seed = sensor_seed,
+                              .start_speed_rad_s = s.experiment.start_speed_rad_s,
+                              .pwm_mode = driver::pwm_mode_named(s.driver.sim.pwm_mode)});
+}
+
+std::unique_ptr<driver::RigDriver> driver_of(const Prepared& prepared, const Given& given, runtime::Clock& clock) {
+  if (given.driver != nullptr) return nullptr;
+  const config::Settings& s = prepared.settings;
+  const std::uint64_t seed = given.sensor_seed ? *given.sensor_seed : config::sensor_seed(s);
+  return with_faults(make_driver(s, !given.real_time, plant_of(prepared, given), seed), s, clock);
+}
+
+experiment::RunLogicParts parts_of(const Prepared& prepared, const Given& given) {
+  experiment::RunLogicParts parts = prepared.logic_parts(plant_of(prepared, given));
+  if (given.controller) parts.controller = given.controller(std::move(parts.controller));
+  return parts;
+}
+
+}  // namespace
+
+std::unique_ptr<driver::RigDriver> make_driver(const config::Settings& s) {
+  return make_driver(s, false, s.plant, config::sensor_seed(s));
+}
+
+Prepared::Prepared(const config::Settings& s) : Prepared(s, *config::find(s.experiment.name)) {}
+
+Prepared::Prepared(const config::Settings& s, const config::Script& script) : Prepared(s, config::plan(script, s)) {
+  analysis = script.analysis;
+}
+
+Prepared::Prepared(const config::Settings& s, config::Plan its_plan)
+    : settings(s),
+      plan(std::move(its_plan)),
+      period_ns(std::llround(1e9 / s.control.rate_Hz)),
+      to_stop(config::means_to_stop(plan, s.experiment.end_speed_m_s)) {}
+
+driver::OutputGrid Prepared::grid(const plant_sim::PlantOptions& plant) const {
+  return settings.on_rig() ? driver::output_grid(settings.driver)
+                           : driver::simulated_output_grid(settings.driver, plant.ideal_actuator);
+}
+
+experiment::RunLogicParts Prepared::logic_parts(const plant_sim::PlantOptions& plant) const {
+  const config::Settings& s = settings;
+  experiment::RunLogicParts parts =
+      experiment::make_logic_parts(s.control, s.model, s.on_rig() ? s.rig.parameters : plant_sim::identity_of(plant),
+                                   s.plant.ideal_actuator, s.gate, s.experiment, plan.phases, plan.limits);
+  parts.duty_steps = grid(plant).duty_steps;
+  return parts;
+}
+
+Run::Run(const Prepared& prepared, const Given& given) : Run(prepared, given, parts_of(prepared, given)) {}
+
+Run::Run(const Prepared& prepared, const Given& given, experiment::RunLogicParts parts)
+    : prepared_(prepared),
+      real_time_(given.real_time),
+      names_(std::move(parts.names)),
+      own_clock_(clock_of(given)),
+      clock_(own_clock_ ? *own_clock_ : *given.clock),
+      own_driver_(driver_of(prepared, given, clock_)),
+      driver_(own_driver_ ? *own_driver_ : *given.driver),
+      logic_(std::move(parts)),
+      outer_logic_(given.logic ? given.logic(logic_) : nullptr),
+      gate_(given.checks_wheels ? logic_.make_gate(settings().gate) : logic_.make_gate_without_wheels(settings().gate)),
+      ring_(given.stepped ? stepped_ring_capacity : ring_capacity),
+      executive_(clock_, driver_, outer_logic_ ? *outer_logic_ : logic_, gate_, ring_, prepared.period_ns,
+                 given.overruns.value_or(settings().realtime.overruns), !given.stepped),
+      metrics_(plant_of(prepared, given).rig.wheels.r2_m, settings().experiment.end_speed_m_s),
+      pump_(ring_, plant_of(prepared, given).rig.wheels.r2_m, {&metrics_}) {
+  if (prepared.analysis != "friction-curve") return;
+  // As on a rig, where only the model is known: the force is found from the encoders.
+  friction_curve_.emplace(settings().model.wheels, settings().model.encoder_counts_per_rev);
+  pump_.add(*friction_curve_);
+}
+
+void Run::record_into(const std::vector<rig::RecordSink*>& sinks) {
+  for (rig::RecordSink* sink : sinks) pump_.add(*sink);
+}
+
+void Run::begin() {
+  driver_.configure();
+  driver_.activate(clock_.now_ns());
+}
+
+rig::Reason Run::end_reason() const noexcept {
+  const rig::Reason reason = logic_.end_reason();
+  const bool moves_on = reason == rig::Reason::sequence_complete && prepared_.to_stop && metrics_.moves_on();
+  return moves_on ? rig::Reason::braking_without_stop : reason;
+}
+
+RunOutcome Run::outcome() const {
+  const rig::Reason reason = end_reason();
+  return {.reason = reason,
+          .reason_value =
+              reason == rig::Reason::braking_without_stop ? metrics_.metrics().final_speed_m_s : logic_.end_value(),
+          .io_error = executive_.io_error(),
+          .safe_state = safe_state_,
+          .realtime = realtime_,
+          .ran = ran_};
+}
+
+RunOutcome Run::go_guarded(const Poll& poll) {
+  if (real_time_) return run_realtime(poll);
+  std::packaged_task<RunOutcome()> task([&] { return run_fast(poll, true); });
+  std::future<RunOutcome> outcome = task.get_future();
+  std::jthread(std::move(task)).join();
+  return outcome.get();
+}
+
+bool Run::make_safe_now() noexcept { return driver_.deactivate().ok(); }
+
+bool Run::have_made_safe() noexcept {
+  constexpr int tries = 100;
+  executive_.request_stop(rig::Reason::terminate_signal);
+  for (int i = 0; i < tries && !made_safe_.load(std::memory_order_acquire); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return made_safe_.load(std::memory_order_acquire) && safe_state_.ok();
+}
+
+bool Run::step() noexcept {
+  if (!slow_cycles_) return executive_.step();
+  slow_cycles_->cycle_begins();
+  const bool more = executive_.step();
+  slow_cycles_->cycle_ended();
+  return more;
+}
+
+RunOutcome Run::run_fast(const Poll& poll, bool own_thread) {
+  const ActiveDriver active(driver_, clock_.now_ns());
+  const runtime::CycleInThisThread cycle(*this, own_thread);
+  if (watch_slow_cycles_) slow_cycles_.emplace(executive_.period_ns());
+  ran_ = true;
+  bool running = true;
+  while (running) {
+    for (int i = 0; i < fast_cycles_per_drain && running; ++i) running = step();
+    pump_.drain();
+    if (const rig::Reason stop = poll(); stop != rig::Reason::none) executive_.request_stop(stop);
+  }
+  slow_cycles_.reset();
+  safe_state_ = driver_.deactivate();
+  made_safe_.store(true, std::memory_order_release);
+  pump_.finish();
+  return outcome();
+}
+
+RunOutcome Run::run_realtime(const Poll& poll) {
+  const runtime::RealtimeOptions& options = settings().realtime;
+  std::promise<runtime::RealtimeReport> set_up;
+  std::promise<bool> go;
+  std::atomic<bool> running{true};
+  std::jthread cycle([&] {
+    runtime::keep_signals_away();
+    const runtime::RealtimeScope realtime(options);
+    set_up.set_value(realtime.report());
+    if (go.get_future().get()) {
+      const runtime::CycleInThisThread here(*this, true);
+      while (step()) {
+      }
+      // Called here and not in the slow thread: nothing must delay the safe state.
+      safe_state_ = driver_.deactivate();
+      made_safe_.store(true, std::memory_order_release);
+      driver_.tell_before_making_safe(nullptr);
+      if (guard_ != nullptr) guard_->outputs_released(safe_state_.ok());
+    }
+    running.store(false, std::memory_order_release);
+  });
+
+  realtime_ = set_up.get_future().get();
+  if (options.mode == runtime::RealtimeMode::require && !realtime_.realtime()) {
+    go.set_value(false);
+    return outcome();
+  }
+  try {
+    driver_.configure();
+    if (guard_ != nullptr) {
+      guard_->arm(realtime_.scheduling);
+      driver_.tell_before_making_safe(guard_);
+    }
+    std::int64_t start_ns = clock_.now_ns();
+    if (second_offset_ns_ >= 0) {
+      start_ns = next_second_ns(start_ns + start_margin_ns) + second_offset_ns_;
+      executive_.start_at(start_ns);
+    }
+    // The time of a simulated rig begins with the first cycle.
+    driver_.activate(start_ns);
+  } catch (...) {
+    driver_.tell_before_making_safe(nullptr);
+    go.set_value(false);
+    throw;
+  }
+  ran_ = true;
+  if (watch_slow_cycles_) slow_cycles_.emplace(0);
+  go.set_value(true);
+  try {
+    while (running.load(std::memory_order_acquire)) {
+      const bool more = pump_.drain(records_per_burst) == records_per_burst;
+      if (const rig::Reason stop = poll(); stop != rig::Reason::none) executive_.request_stop(stop);
+      clock_.sleep_until(clock_.now_ns() + (more ? burst_interval_ns : poll_interval_ns));
+    }
+  } catch (...) {
+    // Without the slow thread nothing is recorded: end the run in order, then report the error.
+    executive_.request_stop(rig::Reason::terminate_signal);
+    cycle.join();
+    throw;
+  }
+  cycle.join();
+  slow_cycles_.reset();
+  static_cast<void>(poll());  // answers the command that ended the run
+  pump_.finish();
+  return outcome();
+}
+
+}  // namespace abs_hil::run
