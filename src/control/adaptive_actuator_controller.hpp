@@ -1,3 +1,4 @@
+// The adaptive law (17)-(18) stepped back through the brake's lag.
 #pragma once
 
 #include "abs_hil/control/slip_error_dynamics.hpp"

@@ -1,3 +1,4 @@
+// The paper's adaptive law (17)-(18).
 #pragma once
 
 #include "abs_hil/control/slip_error_dynamics.hpp"

@@ -1,3 +1,4 @@
+// The gains of (16)-(18) from their options, and the checks of these.
 #include "control/adaptive_gains.hpp"
 
 #include <cmath>

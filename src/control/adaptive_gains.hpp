@@ -1,3 +1,4 @@
+// The gains of (16)-(18) and the matrices P and Q of Theorem 3.1.
 #pragma once
 
 #include "abs_hil/control/options.hpp"

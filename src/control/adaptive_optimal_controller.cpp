@@ -1,3 +1,4 @@
+// The loop of adaptive-optimal: learns the curve, chooses the slip, computes the torque (docs/theory-beyond.md).
 #include "control/adaptive_optimal_controller.hpp"
 
 #include <algorithm>

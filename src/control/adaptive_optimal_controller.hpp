@@ -1,3 +1,4 @@
+// Brakes at the unknown peak of friction with as little motion of the brake as possible.
 #pragma once
 
 #include "abs_hil/control/slip_error_dynamics.hpp"

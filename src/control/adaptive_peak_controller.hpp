@@ -1,3 +1,4 @@
+// Seeks the slip of the peak of friction with a small sine on the slip reference.
 #pragma once
 
 #include "abs_hil/control/slip_error_dynamics.hpp"

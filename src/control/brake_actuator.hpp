@@ -1,3 +1,4 @@
+// The controllers' model of the brake: b(u) of (7) and its inverse, the lag (6), and the duties that the board has.
 #pragma once
 
 #include <cstdint>

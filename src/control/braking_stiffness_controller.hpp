@@ -1,3 +1,4 @@
+// Raises the slip while the measured tyre force still grows with it.
 #pragma once
 
 #include "abs_hil/control/paper_laws.hpp"

@@ -1,3 +1,4 @@
+// Corrects and fits the eccentricity of an encoder's disc.
 #include "control/encoder_disc.hpp"
 
 #include <cmath>

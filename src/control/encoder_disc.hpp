@@ -1,3 +1,4 @@
+// An encoder's disc that is not centred: its error in the readings, and a fit of it while the wheel coasts.
 #pragma once
 
 #include <array>

@@ -1,3 +1,4 @@
+// Production-style anti-lock logic on thresholds of the wheel's acceleration.
 #pragma once
 
 #include <cstdint>

@@ -1,3 +1,4 @@
+// The bank's filters, weights and means. friction_bank.hpp has the equations.
 #include "control/friction_bank.hpp"
 
 #include <Eigen/LU>

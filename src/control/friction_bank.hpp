@@ -1,3 +1,28 @@
+// The tyre's curve F(slip) from readings of slip and force: a bank of Kalman filters. docs/theory-beyond.md derives it
+// ("adaptive-optimal"). Multiple-model estimation (Magill 1965) with fixed share (Herbster and Warmuth 1998).
+//
+// Member i is a curve of (4) with its own shape factor C and slip L of its peak, and two unknowns: its height theta, N,
+// and the zero z of the slip reading (which is -z where no force acts). l is the slip as read, H the delay of
+// LowerWheelForce, h the time since the last reading, s, f the control rate, Hz.
+//
+//   curve        phi(s) = sin(C atan(B s)),  B = tan(pi / (2 C)) / L,  F(l) = theta phi(l + z)
+//   prediction   Ptt += q theta^2,  Pzz += qz                                 variances of theta, N^2, and of z
+//   gradient     g = (H phi - phi' (H l - l'), theta phi'(l' + z))            l': the reading that is as late as F
+//   noise        R = f (N + T (eF F)^2) + (theta phi')^2 f T ((et l.)^2 + (sv / v)^2),  T = 5 ms,  v: car speed;
+//                10^6 f (N + ...) in the first `start_s`
+//   update       S = g P g' + R,  K = P g' / S,  r = F - theta g_1,  (theta, z) += K r,  P -= K (P g')'
+//   weight       w <- (w + a h w0) exp(-r^2 / (2 S)) / sqrt(S),  then all weights are divided by their sum
+//   force        F(l) = sum w theta phi(l + z),  peak force = sum w theta,  zero = sum w z
+//   peak         sum w c L / sum w c,  c = -phi''(L) (1 + past_peak_cost Ri [L < the last peak])
+//   runaway      Ri = runaway_per_N theta (-phi''(L)) L / 10                  of the slip, a tenth past the peak
+//
+// N, eF, et, sv and a are the options force_noise_N2_s, force_error, timing_error_s, slip_noise_m_s and share_per_s.
+// q = h (level_drift_per_s + level_drift_unexplained_per_s (unexplained force / peak force)^2).
+// qz = h zero_drift_per_s. l. is the rate of the slip, 1/s. The radii are known to 1 % only, hence the zero. The share
+// a of the prior w0 keeps every member alive.
+//
+// Friction has jumped when the quick force differs from the curve's for `jump_confirm_s`. For `jump_hold_s` then
+// nothing is learnt but one factor of all heights: theta <- theta (1 + (1 - exp(-h / jump_time_constant_s)) r / F).
 #pragma once
 
 #include <array>
@@ -9,12 +34,7 @@
 
 namespace abs_hil::control {
 
-/// Learns the tyre's curve F(slip) from slip and force. A bank of shapes of (4), with different peak slips and shape
-/// factors, explains the data side by side. Each member is a Kalman filter of two unknowns, its height theta and the
-/// slip reading at no force (the radii are known to 1 % only). The likelihood of the data weighs the members; a small
-/// share returns to the prior, so that no member dies (fixed share). Peak and force are means over the bank. Friction
-/// that jumps scales all members alike: a quick estimate of the force tells it. Real-time safe except for the
-/// constructor.
+/// Learns the tyre's curve by the equations above. Real-time safe except for the constructor.
 class FrictionBank {
  public:
   static constexpr std::size_t peaks = 8;   ///< different slips of the peak
@@ -33,7 +53,8 @@ class FrictionBank {
     double force_N{0.0};        ///< of LowerWheelForce
     double covered{0.0};        ///< of LowerWheelForce
     double quick_force_N{0.0};  ///< less exact and less delayed
-    /// By how fast the slip runs away where the force falls by a newton, over the rate at which the brake acts.
+    /// The rate at which the slip grows for each newton that the force falls per unit of slip, r1^2 / (J1 v), over the
+    /// brake's rate c31; 1/N.
     double runaway_per_N{0.0};
   };
   /// Readings as braking begins: without force, they are the slip at no force.
@@ -53,16 +74,16 @@ class FrictionBank {
   [[nodiscard]] Force at(double slip) const noexcept;
   /// Expected force at the last reading.
   [[nodiscard]] double force_N() const noexcept { return force_N_; }
-  /// Reading of the slip at which the expected loss is least, without the reading at no force. The members are taken as
-  /// parabolas at their peaks, and a peak that is passed costs more by `past_peak_cost` times its runaway.
+  /// The slip at which the expected loss of force is least. It counts from no force: the reading there is this less
+  /// `slip_zero`.
   [[nodiscard]] double peak_slip() const noexcept { return peak_slip_; }
-  /// Reading of the slip at no force is minus this.
+  /// z: the slip reads -z where no force acts.
   [[nodiscard]] double slip_zero() const noexcept { return slip_zero_; }
-  /// Expected runaway of the slip a tenth past the peak, over the rate at which the brake acts: from 1 on, the brake is
-  /// too slow to catch it.
+  /// Rate at which the slip grows a tenth past the peak, over the brake's rate c31. From 1 on the brake is too slow to
+  /// catch it.
   [[nodiscard]] double runaway() const noexcept { return runaway_; }
   [[nodiscard]] double peak_force_N() const noexcept { return peak_force_N_; }
-  /// Force of the curve at the readings of late, as late as the quick force.
+  /// Force of the curve at the readings, delayed as the quick force is.
   [[nodiscard]] double late_force_N() const noexcept { return late_force_N_; }
   [[nodiscard]] bool jumping() const noexcept { return hold_s_ > 0.0; }
   [[nodiscard]] int jumps() const noexcept { return jumps_; }

@@ -1,3 +1,4 @@
+// The brake's full torque.
 #pragma once
 
 #include "abs_hil/rig/brake_map.hpp"

@@ -1,3 +1,4 @@
+// An angle brought within half a turn of 0.
 #pragma once
 
 #include <numbers>

@@ -1,3 +1,4 @@
+// A slip controller from a law that is written over its scalar.
 #pragma once
 
 #include "abs_hil/control/controller_context.hpp"

@@ -1,3 +1,4 @@
+// Braking without ABS: full torque throughout.
 #pragma once
 
 #include "abs_hil/control/slip_error_dynamics.hpp"

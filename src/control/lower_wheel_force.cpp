@@ -1,3 +1,4 @@
+// The tyre force from the lower wheel. lower_wheel_force.hpp has the equations.
 #include "control/lower_wheel_force.hpp"
 
 #include "abs_hil/rig/scalar.hpp"

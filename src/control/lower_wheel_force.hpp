@@ -1,3 +1,11 @@
+// The tyre force from the lower wheel alone, from (2) without the motor: neither the brake nor its model enters.
+//
+//   F_n = -(J2 a_n + d2 omega2 + M20) / r2,  a_n = (p_n / h_n - p_(n-1) / h_(n-1)) / ((h_n + h_(n-1)) / 2)
+//   three lags in a row:  y_i += q (y_(i-1) - y_i),  y_0 = F_n,  q = 1 - exp(-bandwidth h_n)
+//
+// p_n is the wheel's travel in cycle n, rad, h_n its time, s, a_n the acceleration, rad/s^2, F the force, N. A force
+// that is linear over a cycle answers with (F_n + 2 F_(n-1) + F_(n-2)) / 4 before the lags: `ForceDelay` is that and
+// the lags. A curve that is compared with F passes through it, so that the delay cancels (docs/theory-beyond.md).
 #pragma once
 
 #include <array>
@@ -44,10 +52,7 @@ struct ForceDelay {
   }
 };
 
-/// Tyre force from the lower wheel alone, J2 omega2' = -r2 F - d2 omega2 - M20: neither the brake nor its model enters.
-/// The second difference of the wheel's angle gives it, and three equal lags take the noise of the counts away. So the
-/// response to F is known exactly. To compare F with a curve, pass the curve through the same delay (`ForceDelay`).
-/// Real-time safe.
+/// The tyre force by the equations above. The lags remove the noise of the counts. Real-time safe.
 class LowerWheelForce {
  public:
   /// @param bandwidth_rad_s  of the lags, > 0
@@ -71,8 +76,8 @@ class LowerWheelForce {
   double force_N_{0.0};
 };
 
-/// The speeds of both wheels from their travel alone, as late as ForceDelay makes a force. An observer that is told the
-/// brake torque is ahead of the tyre force, and so wrong about the slip, while the torque rises. Real-time safe.
+/// The speeds of both wheels from their travel alone, delayed as ForceDelay delays a force. An observer that knows the
+/// brake torque learns of the tyre force later, so its slip is wrong while the torque rises. Real-time safe.
 class DelayedSpeeds {
  public:
   void reset(const rig::WheelSpeeds& speeds) noexcept;

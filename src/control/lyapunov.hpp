@@ -1,3 +1,4 @@
+// The Lyapunov equation of Theorem 3.1.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,3 +1,4 @@
+// PI on a sum of slip and wheel deceleration.
 #pragma once
 
 #include "abs_hil/control/slip_error_dynamics.hpp"

@@ -1,3 +1,4 @@
+// The paper's law (16) for a known peak tyre force.
 #pragma once
 
 #include "abs_hil/control/slip_error_dynamics.hpp"

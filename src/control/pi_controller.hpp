@@ -1,3 +1,4 @@
+// PI on the slip, scheduled with the speed, with the measured tyre force fed forward.
 #pragma once
 
 #include "abs_hil/control/slip_error_dynamics.hpp"

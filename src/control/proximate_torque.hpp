@@ -1,3 +1,4 @@
+// The torque that brings e_v to 0 through a slow brake.
 #pragma once
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// The table of all controllers, and the making of one by its name.
 #include "abs_hil/control/registry.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// The rig maker's relay on a slip threshold.
 #pragma once
 
 #include "abs_hil/control/slip_error_dynamics.hpp"

@@ -1,3 +1,4 @@
+// Settings that have no effect.
 #pragma once
 
 #include <string>

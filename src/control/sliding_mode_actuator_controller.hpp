@@ -1,3 +1,4 @@
+// The sliding mode with a boundary layer, stepped back through the brake's lag.
 #pragma once
 
 #include "control/law_controller.hpp"

@@ -1,3 +1,4 @@
+// The textbook sliding mode, with the sign of e_v.
 #pragma once
 
 #include "control/law_controller.hpp"

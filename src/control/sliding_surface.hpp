@@ -1,3 +1,4 @@
+// What the laws that slide on e_v = 0 have in common: the estimate of theta and the equivalent control.
 #pragma once
 
 #include "abs_hil/control/equivalent_control.hpp"

@@ -1,3 +1,4 @@
+// The sampled gains of (14) by the matrix exponential, and the checks of the options that enter them.
 #include "abs_hil/control/slip_error_dynamics.hpp"
 
 #include <unsupported/Eigen/MatrixFunctions>

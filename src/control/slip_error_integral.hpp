@@ -1,3 +1,4 @@
+// The integral I of the slip velocity error, which does not wind up.
 #pragma once
 
 #include "abs_hil/control/slip_controller.hpp"

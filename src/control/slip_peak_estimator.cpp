@@ -1,3 +1,4 @@
+// Makes a peak estimator from its options. slip_peak_estimator.hpp has the equations.
 #include "control/slip_peak_estimator.hpp"
 
 #include <algorithm>

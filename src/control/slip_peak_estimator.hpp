@@ -1,3 +1,17 @@
+// The slip of the largest tyre force from pairs of slip and force: an extended Kalman filter (docs/theory-beyond.md).
+//
+// l is the slip as read, F the force, N. Unknowns: ln Fp (Fp: peak force, N), ln w (w: width), the shape c, and the
+// zero z of the slip reading, which is -z where no force acts.
+//
+//   curve       F = Fp g(x),  g(x) = (2 + c) x / D,  D = 1 + c |x| + x^2,  x = (l + z) / w;  the peak is at x = 1
+//   gradient    dF/d ln Fp = Fp g,  dF/d ln w = -Fp x g',  dF/dc = Fp x (1 - |x|)^2 / D^2,  dF/dz = Fp g' / w
+//               with g' = (2 + c) (1 - x^2) / D^2
+//   prediction  P += h diag(force_drift_per_s, slip_drift_per_s, shape_drift_per_s, 0)      h: time step, s
+//   update      S = G P G' + R,  R = force_noise_N2_s times the control rate,  r = F - Fp g,
+//               unknowns += P G' r / S,  P -= (P G') (P G')' / S
+//   jump        |F - F(15 ms ago) - (curve(l) - curve(l 15 ms ago))| > max(3 N, Fp (jump_level + |l - l ago| / w))
+//
+// g is the simplest curve that rises to a peak and falls after it, more slowly for larger c. It is not the plant's.
 #pragma once
 
 #include <array>
@@ -10,15 +24,9 @@
 
 namespace abs_hil::control {
 
-/// Estimates the slip of the largest tyre force from pairs of slip and force only. It is an extended Kalman filter for
-///   F = Fp (2 + c) x / (1 + c |x| + x^2),   x = (slip + zero) / width,
-/// which rises to Fp at x = 1 and then falls, more slowly for larger c. This is the simplest curve with a peak, not the
-/// plant's own curve. Unknowns: ln Fp, ln width, c and `zero`, the error of the measured slip at no force (wheel
-/// radii). All unknowns drift as random walks, the level Fp fastest. So the filter learns the peak's slip from the
-/// response of the force to the search, not from the level of the force.
-///
-/// If the force changes over 15 ms and no move along the curve explains the change, the friction has jumped. Then the
-/// filter learns the level again, for `jump_hold_s` only the level, and discards what it learnt in the last 30 ms.
+/// Estimates the slip of the largest tyre force by the equations above. The level drifts fastest, so the filter learns
+/// the peak's slip from the response of the force to the search, not from the level of the force. After a jump of
+/// friction it learns the level again, for `jump_hold_s` only the level, and discards what it learnt in the last 30 ms.
 /// `reset` and `update` are real-time safe.
 template <class S>
 class BasicSlipPeakEstimator {

@@ -1,3 +1,4 @@
+// The sliding mode with a boundary layer.
 #pragma once
 
 #include "control/law_controller.hpp"

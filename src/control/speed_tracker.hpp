@@ -1,3 +1,4 @@
+// Speed and acceleration of a wheel from the counts of its encoder.
 #pragma once
 
 #include <cstdint>

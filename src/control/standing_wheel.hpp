@@ -1,3 +1,4 @@
+// Whether a wheel turns, as far as an encoder can tell.
 #pragma once
 
 namespace abs_hil::control {

@@ -1,3 +1,4 @@
+// Super-twisting: a second-order sliding mode with a continuous torque.
 #pragma once
 
 #include "control/law_controller.hpp"

@@ -1,3 +1,4 @@
+// The estimate of theta of the laws that slide on e_v = 0.
 #pragma once
 
 #include <type_traits>

@@ -1,3 +1,4 @@
+// The estimate of theta in (17), in sampled-data form with projection.
 #pragma once
 
 #include <type_traits>

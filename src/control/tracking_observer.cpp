@@ -1,3 +1,4 @@
+// Decides which readings of an encoder count, and predicts the speed while they do not.
 #include "control/tracking_observer.hpp"
 
 #include <cmath>

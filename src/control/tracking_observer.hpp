@@ -1,3 +1,4 @@
+// A wheel's speed from its encoder: SpeedTracker behind a check of the readings.
 #pragma once
 
 #include <cstdint>

@@ -1,3 +1,4 @@
+// The observer's gains: the steady state of a Kalman filter, and how late its force is.
 #include "control/wheel_force_observer.hpp"
 
 #include <Eigen/LU>

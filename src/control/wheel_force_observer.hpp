@@ -1,3 +1,4 @@
+// An observer of both wheels, the tyre force and the brake's error.
 #pragma once
 
 #include <array>

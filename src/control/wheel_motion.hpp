@@ -1,3 +1,4 @@
+// Rates of the wheels and of the slip as a controller models them.
 #pragma once
 
 #include <type_traits>

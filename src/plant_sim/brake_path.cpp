@@ -1,3 +1,4 @@
+// Dead time, hysteresis and fading of the brake.
 #include "plant_sim/brake_path.hpp"
 
 #include <algorithm>

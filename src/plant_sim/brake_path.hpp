@@ -1,3 +1,4 @@
+// The flaws of a real brake before its lag.
 #pragma once
 
 #include <cstddef>

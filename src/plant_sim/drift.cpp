@@ -1,3 +1,4 @@
+// Parameters of the plant that drift with time.
 #include "abs_hil/plant_sim/drift.hpp"
 
 #include <algorithm>

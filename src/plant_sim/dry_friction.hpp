@@ -1,3 +1,4 @@
+// Whether a standing wheel is held, and how far a sliding one is from standing.
 #pragma once
 
 #include "plant_sim/torque_balance.hpp"

@@ -1,3 +1,4 @@
+// Counts of the encoders, with the flaws of their discs.
 #include "plant_sim/encoder.hpp"
 
 #include <bit>

@@ -1,3 +1,4 @@
+// The simulated encoders: counts from a wheel's angle.
 #pragma once
 
 #include <cstdint>

@@ -1,3 +1,4 @@
+// Reads profiles of factors, and follows a plant through one.
 #include "abs_hil/plant_sim/factor_profile.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Checks of the plant's options, and what limits must know of a plant.
 #include "abs_hil/plant_sim/options.hpp"
 
 #include <algorithm>

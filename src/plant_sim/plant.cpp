@@ -1,3 +1,4 @@
+// The plant from cycle to cycle: inputs, drift, flaws of the brake, integration.
 #include "abs_hil/plant_sim/plant.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// The classical Runge-Kutta step of fourth order: x(t + h) = x + h/6 (k1 + 2 k2 + 2 k3 + k4).
 #pragma once
 
 #include <cstddef>

@@ -1,3 +1,4 @@
+// Rolls while both wheels turn on an even road, slides to the next event otherwise.
 #include "plant_sim/stepping.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Integration of the plant: steps between the instants at which a wheel stops or breaks away.
 #pragma once
 
 #include "plant_sim/torque_balance.hpp"

@@ -1,3 +1,4 @@
+// The right-hand side of the wheels' and the brake's differential equations (1), (2) and (6).
 #pragma once
 
 #include <array>

@@ -1,3 +1,4 @@
+// `abs_hil compare` as typed.
 #pragma once
 
 #include "cli/command_line.hpp"

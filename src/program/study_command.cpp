@@ -1,3 +1,4 @@
+// `abs_hil study` with merge, status and submit.
 #include "program/study_command.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// `abs_hil study` and its subcommands as typed.
 #pragma once
 
 #include <cstddef>

@@ -1,3 +1,4 @@
+// Makes a study of its file, and its single runs.
 #include "program/study_runs.hpp"
 
 #include <fmt/format.h>

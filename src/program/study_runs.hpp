@@ -1,3 +1,4 @@
+// A study as the program runs it, and single runs of it with everything recorded.
 #pragma once
 
 #include <cstdint>

@@ -1,3 +1,4 @@
+// `abs_hil study submit`: an array job and a merge on a Slurm cluster.
 #include <fmt/format.h>
 #include <sys/wait.h>
 

@@ -1,3 +1,4 @@
+// Parts of a batch: runs begin in lanes if lanes know them, and go on alone if not.
 #include "study/batch.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Many simulated runs, as many as possible side by side in the lanes of vectors.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +28,7 @@ struct Outcome {
 /// How the runs of a batch were computed.
 struct BatchCounts {
   std::size_t lanes{0};      ///< side by side, in the lanes of packs
-  std::size_t disturbed{0};  ///< begun in lanes, then by `simulate`, because something happened that lanes do not know
+  std::size_t disturbed{0};  ///< begun in lanes, then computed anew by `simulate`: lanes know no limits and no alarms
   std::size_t scalar{0};     ///< by `simulate` alone
 };
 

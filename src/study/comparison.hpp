@@ -1,3 +1,4 @@
+// Controllers side by side: a study of one case, its runs by controller.
 #pragma once
 
 #include <cstddef>

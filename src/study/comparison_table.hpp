@@ -1,3 +1,4 @@
+// The statistics of a comparison, and its table as text, Markdown, CSV and JSON.
 #pragma once
 
 #include <optional>

@@ -1,3 +1,4 @@
+// Runs the chunks of a study, several at once, and writes their rows.
 #include "study/compute.hpp"
 
 #include <algorithm>

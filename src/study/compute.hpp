@@ -1,3 +1,4 @@
+// Computes the runs of a study: chunks of rows in the study's folder.
 #pragma once
 
 #include <cstddef>

@@ -1,3 +1,4 @@
+// Reads LABEL=CONTROLLER{KEY=VALUE,...} over common settings.
 #include "study/contender.hpp"
 
 #include <fmt/format.h>

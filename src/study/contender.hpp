@@ -1,3 +1,4 @@
+// The controllers of a study, each with the settings of its own.
 #pragma once
 
 #include <string>

@@ -1,3 +1,4 @@
+// Random numbers that depend on a counter alone, so that any point can be drawn without those before it.
 #pragma once
 
 #include <array>

@@ -1,3 +1,4 @@
+// The points of each kind of design.
 #include "study/design.hpp"
 
 #include <boost/random/sobol.hpp>

@@ -1,3 +1,4 @@
+// Designs of studies: how points are spread over the ranges of factors.
 #pragma once
 
 #include <array>

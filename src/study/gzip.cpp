@@ -1,3 +1,4 @@
+// Members of gzip files by zlib.
 #include "study/gzip.hpp"
 
 #include <zlib.h>

@@ -1,3 +1,4 @@
+// Members of gzip files, each with a comment in its header.
 #pragma once
 
 #include <string>

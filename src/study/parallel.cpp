@@ -1,3 +1,4 @@
+// A pool of threads for one loop. It keeps the failure of the lowest index, so that errors do not depend on threads.
 #include "study/parallel.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// A loop over several threads.
 #pragma once
 
 #include <cstddef>

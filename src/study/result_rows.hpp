@@ -1,3 +1,4 @@
+// The columns and rows of a study's results.
 #pragma once
 
 #include <cstdint>

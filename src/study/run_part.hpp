@@ -1,3 +1,4 @@
+// Runs some of a study's runs.
 #pragma once
 
 #include <cstddef>

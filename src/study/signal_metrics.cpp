@@ -1,3 +1,4 @@
+// Reduces a signal's values to one number while the records pass.
 #include "study/signal_metrics.hpp"
 
 #include <algorithm>

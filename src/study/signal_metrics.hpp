@@ -1,3 +1,4 @@
+// Metrics that a study defines for itself: one number made of a signal's values.
 #pragma once
 
 #include <cstddef>

@@ -1,3 +1,4 @@
+// Numbers the runs of a study and checks it before any run.
 #include "study/study.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// A study ready to run: which runs it has and what each is made of.
 #pragma once
 
 #include <cstddef>

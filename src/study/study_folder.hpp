@@ -1,3 +1,4 @@
+// The folder of a study's results (docs/studies.md).
 #pragma once
 
 #include <cstdint>

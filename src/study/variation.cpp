@@ -1,3 +1,4 @@
+// Reads what varies, draws factors, and applies them to a plant.
 #include "study/variation.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// Plants that vary around a nominal one, drawn from a seed and a number.
 #pragma once
 
 #include <cstdint>

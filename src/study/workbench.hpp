@@ -1,3 +1,4 @@
+// Makes the settings of a study's runs.
 #pragma once
 
 #include <cstdint>

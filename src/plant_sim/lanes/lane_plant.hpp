@@ -1,3 +1,4 @@
+// Plants side by side in lanes that pass the inputs of a recorded window.
 #pragma once
 
 #include "abs_hil/plant_sim/load_models.hpp"

@@ -1,3 +1,4 @@
+// What the compiled kernels of windows take, one for each instruction set.
 #pragma once
 
 #include <cstddef>

@@ -1,3 +1,17 @@
+// One braking run in virtual time, from its first cycle to the stop, over a scalar S: a `double`, or a pack in which
+// every lane is a run. Each cycle of h seconds, as `study::simulate` computes it and with its bits:
+//
+//   1. plant     LaneRig::advance over h under the duty u that was sent
+//   2. speeds    omega1, omega2 from the counters (SpeedTracker), slip = 1 - r1 omega1 / (r2 omega2), regularised (5)
+//   3. sequence  slip control until r2 omega2 < slow speed in two samples in a row, then a constant torque
+//   4. law       wanted torque from slip, speeds and the estimated torque
+//   5. gate      u = min(wanted duty, largest duty, max(last u, free duty) + rate h), u >= 0; checks of the wheels
+//   6. figures   BrakingFigures of the cycle
+//
+// Only the undisturbed course of a run is computed here. Where a check of the gate would look closer, or a limit ends
+// the run, `disturbed` is set, and `simulate` computes the run.
+//
+// A run has nothing but scalars as members, so that run and lane have the same words (rig/pack.hpp).
 #pragma once
 
 #include "abs_hil/control/slip_controller.hpp"
@@ -11,15 +25,10 @@
 #include "runtime/command_gate.hpp"
 #include "study/lanes/lane_rig.hpp"
 
-/// One braking run in virtual time, from its first cycle to the stop, over a scalar: a `double`, or a pack in which
-/// every lane is a run. It consists of the same plant, observers, law, checks and figures as `study::simulate`, and
-/// gives the same bits. It knows the undisturbed course of a run only. A run in which anything else happens (a check of
-/// the gate looks closer, a limit ends it) says so, and `simulate` has to compute it.
-///
-/// A run has nothing but scalars as members, so that run and lane have the same words (rig/pack.hpp).
 namespace abs_hil::study::lanes {
 
-/// What of the command gate acts in an undisturbed run: its limits, and whether its checks of the wheels are quiet.
+/// The part of the command gate that acts in an undisturbed run: its limits on the duty, and its checks of the wheels,
+/// which must all be quiet.
 template <class S>
 struct LaneGate {
   runtime::WheelWatch<S> watch{};

@@ -1,3 +1,4 @@
+// Fills the lanes of a pack with runs and steps them until each is complete or disturbed.
 #pragma once
 
 #include <bit>

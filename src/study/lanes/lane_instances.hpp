@@ -1,3 +1,4 @@
+// The kernels of one instruction set.
 #pragma once
 
 // The kernels of one instruction set. A source defines ABS_HIL_LANE_ISA and ABS_HIL_LANE_VECTORS and includes this; it

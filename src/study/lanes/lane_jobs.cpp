@@ -1,3 +1,4 @@
+// Which runs lanes know, and the words of each as it begins.
 #include "study/lanes/lane_jobs.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Runs of a batch in lanes: which runs lanes know, how one begins, goes on and ends.
 #pragma once
 
 #include <cstddef>

@@ -1,3 +1,4 @@
+// What the compiled loops over packs take, one for each instruction set and kind of run.
 #pragma once
 
 #include <cstddef>

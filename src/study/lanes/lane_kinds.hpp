@@ -1,3 +1,4 @@
+// The table of laws and plants that have lanes.
 #pragma once
 
 #include "abs_hil/plant_sim/load_models.hpp"

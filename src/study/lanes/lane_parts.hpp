@@ -1,3 +1,4 @@
+// The parts of a run in lanes that do not depend on its plant.
 #pragma once
 
 #include <cstdint>

@@ -1,3 +1,15 @@
+// The simulated rig of a run in lanes, and what its controller sees of it. The same equations as plant_sim::Plant,
+// plant_sim::Encoder and SimDriver, over a scalar S: a `double`, or a pack in which every lane is a run.
+//
+//   wheels    J1 omega1' = r1 F - d1 omega1 - M10 - Tb,  J2 omega2' = -r2 F - d2 omega2 - M20        (1), (2)
+//   brake     Tb' = c31 (b(u) - Tb),  b of (7); ideal: Tb = the torque that is sent                  (6)
+//   standing  omega1' = 0 while |r1 F| <= M10 + Tb
+//   counts    floor((angle + offset) / (2 pi / counts per revolution))
+//   board     duty that is sent = floor(duty * steps + 1/2) / steps
+//
+// Speeds in rad/s, angles in rad, torques in N m, F in N by the tyre and load models. plant_sim/runge_kutta.hpp solves
+// them over a cycle. Where a wheel stops or starts, or the road or a drift changes, the scalar plant computes the cycle
+// ("assist").
 #pragma once
 
 #include <limits>
@@ -6,10 +18,9 @@
 #include "control/speed_tracker.hpp"
 #include "plant_sim/runge_kutta.hpp"
 
-/// The simulated rig of a run in lanes, and what its controller sees of it.
 namespace abs_hil::study::lanes {
 
-/// What road and drift make of the rig, as long as it stays as it is: plant_sim::PlantConditions.
+/// The values of road and drift, and until when they hold: plant_sim::PlantConditions.
 template <class S>
 struct LaneConditions {
   plant_sim::BasicWheels<S> wheels{};
@@ -111,7 +122,7 @@ struct LaneRig {
   }
 };
 
-/// What is known of one wheel.
+/// A wheel as the controller sees it: its counter, and the speed and acceleration that the tracker makes of it.
 template <class S>
 struct LaneWheel {
   control::SpeedTracker<S> tracker{};
