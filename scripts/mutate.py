@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """usage: mutate.py [--list] [--jobs N] [--only FILE] [--report FILE]
 
-Mutation run of the command gate, its plausibility checks and limits, of the rule for values that weaken them, and of
-the guard of a board. The script changes one place at a time in their sources (a relation, an operator, a constant, a
+Mutation run of the command gate, its plausibility checks and limits, of the rule for values that weaken them, of the
+guard of a board, and of the node's core (firmware/). The script changes one place at a time in their sources (a relation, an operator, a constant, a
 condition, a statement left out), compiles only that file or, for a header, the source that uses it, without
 optimisation, links it with the tests of its group and runs them. A mutant that the tests do not notice survives.
 mutate_equivalent.txt must list each survivor with the reason why it changes nothing. Status 1 if a survivor is not
@@ -29,12 +29,13 @@ LIBRARIES = ROOT / 'build/release/src'
 class Group:
     """Sources that are tested by the same tests."""
 
-    def __init__(self, room, sources, tests, headers, unchanged=(), libraries=(), folders=None):
+    def __init__(self, room, sources, tests, headers, unchanged=(), libraries=(), folders=None,
+                 top='src', suffix='.cpp'):
         self.sources, self.headers = sources, headers
         self.unchanged = [ROOT / 'src' / name for name in unchanged]
         self.tests = [path for test in tests for path in sorted((ROOT / 'tests').glob(test))]
         self.libraries = [LIBRARIES / name / f'libabs_hil_{name}.a' for name in libraries]
-        self.paths = {name: ROOT / 'src' / (folders or {}).get(name, room) / f'{name}.cpp' for name in sources}
+        self.paths = {name: ROOT / top / (folders or {}).get(name, room) / f'{name}{suffix}' for name in sources}
 
 
 GATE = Group('runtime',
@@ -52,12 +53,14 @@ GUARD = Group('guardian', ['board_guard', 'watchdog', 'standby'],
                '"guardian/guardian_report.hpp"', '"guardian/mail.hpp"', '"guardian/shared_region.hpp"',
                '"runtime/clock.hpp"'),
               unchanged=('guardian/guardian_report.cpp', 'guardian/mail.cpp', 'guardian/shared_region.cpp'), libraries=('files', 'runtime', 'driver', 'rig'))
+NODE = Group('', ['node_core'], ['firmware/node_core_test.cpp'], ('<stdint.h>',), top='firmware', suffix='.c')
 # File -> its group and the sources that are compiled for its mutants. Of the header of the gate and of constructors in
 # headers the tests have their own copies: they cannot be tried like this.
 FILES = {f'{name}.cpp': (group, [name]) for group in (GATE, GUARD) for name in group.sources} | {
     'speed_window.hpp': (GATE, ['speed_window', 'encoder_check', 'response_check']),
-    'wheel_watch.hpp': (GATE, ['encoder_check']), 'response_check.hpp': (GATE, ['response_check'])}
-COMPILE = ['g++', '-std=c++20', '-O0', '-fPIC', '-I', ROOT / 'include', '-I', ROOT / 'src', '-I', ROOT / 'tests']
+    'node_core.c': (NODE, ['node_core']), 'wheel_watch.hpp': (GATE, ['encoder_check']), 'response_check.hpp': (GATE, ['response_check'])}
+COMPILE = ['g++', '-std=c++20', '-O0', '-fPIC', '-I', ROOT / 'include', '-I', ROOT / 'src', '-I', ROOT / 'tests', '-I',
+           ROOT / 'firmware']
 
 RELATIONS = {'<=': ['<', '>'], '>=': ['>', '<'], '<': ['<=', '>='], '>': ['>=', '<='], '==': ['!='], '!=': ['==']}
 ARITHMETIC = {'+': '-', '-': '+', '*': '/', '/': '*'}
@@ -75,6 +78,7 @@ def code_of(text):
     """The text with comments and strings blanked out, same length."""
     blank = lambda match: re.sub(r'[^\n]', ' ', match.group())
     text = re.sub(r'//[^\n]*', blank, text)
+    text = re.sub(r'/\*.*?\*/', lambda match: re.sub(r'[^\n]', ' ', match.group()), text, flags=re.DOTALL)
     return re.sub(r'"(?:\\.|[^"\\])*"', blank, text)
 
 
@@ -82,7 +86,7 @@ def mutants_of(name):
     """Yields (line number, what, mutated text)."""
     text = path_of(name).read_text()
     code = code_of(text)
-    begin = code.index('namespace abs_hil::')
+    begin = code.index('namespace abs_hil::') if 'namespace abs_hil::' in code else code.index('static ')  # C++ or C
 
     def at(start, end, new, what):
         line = text.count('\n', 0, start) + 1
@@ -163,7 +167,7 @@ def mutants_of(name):
 
 
 def run_quietly(*command, **options):
-    return subprocess.run([str(word) for word in command], capture_output=True, text=True, **options)
+    return subprocess.run([str(word) for word in command], capture_output=True, text=True, errors='replace', **options)
 
 
 def require(result):

@@ -13,6 +13,8 @@
 #include <vector>
 
 #include "driver/monotonic_time.hpp"
+#include "emulator/hm2_board.hpp"
+#include "emulator/node_board.hpp"
 
 namespace abs_hil::program {
 
@@ -58,11 +60,18 @@ emulator::Hm2Options with_address(const Hm2EmulatorOptions& options, std::uint32
   return board;
 }
 
+std::unique_ptr<emulator::UdpBoard> make_board(const Hm2EmulatorOptions& options, std::uint32_t& ip,
+                                               std::uint16_t& port) {
+  const emulator::Hm2Options board = with_address(options, ip, port);
+  if (options.is_node) return std::make_unique<emulator::NodeBoard>(board);
+  return std::make_unique<emulator::Hm2Board>(board);
+}
+
 }  // namespace
 
 EmulatedHm2::EmulatedHm2(Hm2EmulatorOptions options)
     : options_(std::move(options)),
-      board_(with_address(options_, ip_, port_)),
+      board_(make_board(options_, ip_, port_)),
       link_(options_.seed),
       started_ns_(driver::monotonic_ns()),
       truth_(options_.truth_file, false) {
@@ -90,8 +99,8 @@ void EmulatedHm2::serve() {
         ::recvfrom(socket_.get(), buffer.data(), buffer.size(), 0, reinterpret_cast<sockaddr*>(&from), &length);
     if (got < 0) break;
     if (!link_.request_arrives()) continue;
-    if (!options_.board.lock_step) truth_.advance(board_, driver::monotonic_ns() - started_ns_);
-    emulator::Hm2Datagram answer{board_.answer(std::span(buffer).first(static_cast<std::size_t>(got))),
+    if (!options_.board.lock_step) truth_.advance(*board_, driver::monotonic_ns() - started_ns_);
+    emulator::Hm2Datagram answer{board_->answer(std::span(buffer).first(static_cast<std::size_t>(got))),
                                  std::uint64_t{from.sin_addr.s_addr} << 16U | from.sin_port};
     if (!answer.bytes.empty()) link_.send(std::move(answer), driver::monotonic_ns());
     send_due();
@@ -116,26 +125,26 @@ std::optional<std::int64_t> EmulatedHm2::next_due_ns() const {
 }
 
 void EmulatedHm2::talk() {
-  if (talker_ == Talker::off || board_.time_ns() < talks_ns_) return;
-  talks_ns_ = board_.time_ns() + talks_every_ns;
-  if (talker_ == Talker::read) static_cast<void>(board_.answer(reads_the_clock));
-  if (talker_ == Talker::write) static_cast<void>(board_.answer(writes_its_number));
-  if (talker_ == Talker::drive) static_cast<void>(board_.answer(drives_the_brake));
+  if (talker_ == Talker::off || board_->time_ns() < talks_ns_) return;
+  talks_ns_ = board_->time_ns() + talks_every_ns;
+  if (talker_ == Talker::read) static_cast<void>(board_->answer(reads_the_clock));
+  if (talker_ == Talker::write) static_cast<void>(board_->answer(writes_its_number));
+  if (talker_ == Talker::drive) static_cast<void>(board_->answer(drives_the_brake));
 }
 
 void EmulatedHm2::catch_up() {
-  if (!options_.board.lock_step) truth_.advance(board_, driver::monotonic_ns() - started_ns_);
+  if (!options_.board.lock_step) truth_.advance(*board_, driver::monotonic_ns() - started_ns_);
   talk();
   send_due();
   log_events();
 }
 
 void EmulatedHm2::log_events() {
-  for (const emulator::NodeEvent& event : board_.fpga().take_events()) {
+  for (const emulator::NodeEvent& event : board_->log().take_events()) {
     say(fmt::format("event {:.6f} {}", static_cast<double>(event.time_ns) * 1e-9, event.text));
   }
   const std::int64_t start_ns = options_.board.lock_step ? 0 : started_ns_;
-  for (const emulator::OutputChange& change : board_.fpga().take_changes()) {
+  for (const emulator::OutputChange& change : board_->log().take_changes()) {
     if (!changes_.is_open()) continue;
     changes_ << fmt::format("{} {:.6f} {:.6f}\n", start_ns + change.time_ns, change.now.drive_duty,
                             change.now.brake_duty)
@@ -148,14 +157,14 @@ std::string EmulatedHm2::place() const {
 }
 
 std::string EmulatedHm2::status() const {
-  const emulator::Outputs out = board_.outputs();
-  const auto& state = board_.plant().state();
+  const emulator::Outputs out = board_->outputs();
+  const auto& state = board_->plant().state();
   return fmt::format(
       "time {:.6f} s, drive {:.4f}, brake {:.4f}, upper {:.2f} rad/s, lower {:.2f} rad/s, {}, pins {}, cable {}, "
       "writes {}",
-      static_cast<double>(board_.time_ns()) * 1e-9, out.drive_duty, out.brake_duty, state.omega1_rad_s,
-      state.omega2_rad_s, board_.fpga().bitten() ? "watchdog has bitten" : "watchdog has not bitten",
-      board_.fpga().drives_pins() ? "driven" : "pulled high", link_.plugged() ? "in" : "out", board_.writes());
+      static_cast<double>(board_->time_ns()) * 1e-9, out.drive_duty, out.brake_duty, state.omega1_rad_s,
+      state.omega2_rad_s, board_->bitten() ? "watchdog has bitten" : "watchdog has not bitten",
+      board_->drives_pins() ? "driven" : "pulled high", link_.plugged() ? "in" : "out", board_->writes());
 }
 
 const char* EmulatedHm2::commands() {
@@ -180,7 +189,7 @@ std::string EmulatedHm2::obey(std::string_view line) {
   catch_up();
   const ControlCommand command(line);
   if (command.empty()) return {};
-  emulator::Hm2Fpga& fpga = board_.fpga();
+  emulator::UdpBoard& board = *board_;
   const auto first_is = [&command](std::string_view a, std::string_view b) {
     return command.text(1) == a || command.text(1) == b;
   };
@@ -189,9 +198,9 @@ std::string EmulatedHm2::obey(std::string_view line) {
   } else if (command.is("link", 1) && first_is("up", "down")) {
     link_.plug(command.text(1) == "up");
   } else if (command.is("bite", 0)) {
-    fpga.bite("watchdog");
+    board.bite();
   } else if (command.is("power-cycle", 0)) {
-    board_.power_cycle();
+    board_->power_cycle();
   } else if (command.is("talker", 1) && (first_is("read", "write") || first_is("drive", "off"))) {
     const std::string& what = command.text(1);
     talker_ = what == "read"    ? Talker::read
@@ -199,16 +208,16 @@ std::string EmulatedHm2::obey(std::string_view line) {
               : what == "drive" ? Talker::drive
                                 : Talker::off;
   } else if (command.is("quadrature-error", 1) && first_is("upper", "lower")) {
-    fpga.make_quadrature_error(command.text(1) == "upper");
+    board.make_quadrature_error(command.text(1) == "upper");
   } else if (command.is("estop", 1)) {
-    fpga.press_emergency_stop(command.on(1));
+    board.press_emergency_stop(command.on(1));
   } else if (command.is("changes", 1)) {
     changes_.close();
     if (command.text(1) != "off") open_for_writing(changes_, command.text(1));
   } else if (command.is("registers", 0)) {
-    return fpga.registers_text();
+    return board.registers_text();
   } else if (command.is("turn", 2)) {
-    fpga.turn_by_hand(command.first_of(1, "upper", "lower"), command.number(2));
+    board.turn_by_hand(command.first_of(1, "upper", "lower"), command.number(2));
   } else if (!command.is("status", 0)) {
     command.refuse(commands());
   }

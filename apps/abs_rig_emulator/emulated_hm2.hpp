@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <fstream>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -14,16 +15,17 @@
 
 namespace abs_hil::program {
 
-/// Options of the emulated 7I92T.
+/// Options of the emulated 7I92T and of the node.
 struct Hm2EmulatorOptions {
   emulator::Hm2Options board{};
   std::string address{};  ///< ADDRESS or ADDRESS:PORT at which it takes datagrams
+  bool is_node{false};    ///< the node of docs/node.md instead of a 7I92T
   std::string mac{};      ///< "00:60:1b:16:ab:50"; empty: the default
   std::uint64_t seed{1};
   std::string truth_file{};  ///< CSV of true values that no register shows; empty: none
 };
 
-/// The 7I92T behind a UDP socket: time, cable, logs and the control commands.
+/// The 7I92T or the node behind a UDP socket: time, cable, logs and the control commands.
 class EmulatedHm2 {
  public:
   /// Throws std::invalid_argument, or std::runtime_error if the address cannot be bound.
@@ -56,7 +58,7 @@ class EmulatedHm2 {
   Hm2EmulatorOptions options_;
   std::uint32_t ip_{0};
   std::uint16_t port_{emulator::Hm2Board::port};
-  emulator::Hm2Board board_;
+  std::unique_ptr<emulator::UdpBoard> board_;
   emulator::Hm2Link link_;
   driver::FileDescriptor socket_{-1};
   std::int64_t started_ns_;

@@ -43,6 +43,7 @@ struct Arguments {
   program::UsbEmulatorOptions usb{};
   bool use_usb{false};
   program::Hm2EmulatorOptions hm2{};
+  std::string node_address{};
   std::uint16_t watchdog_ms{20};
   std::vector<std::string> bdfs{"0000:03:00.0"};
   std::string plant{"paper-table1"};
@@ -98,8 +99,10 @@ void add_usb_options(cli::Parser& parser, program::UsbEmulatorOptions& usb) {
 }
 
 void add_hm2_options(cli::Parser& parser, program::Hm2EmulatorOptions& hm2) {
-  shown(parser, "--board-name", &hm2.board.name, "name that the 7I92T reports, for example 7I92");
-  plain(parser, "--mac", &hm2.mac, "MAC address in the 7I92T's EEPROM: 00:60:1b:16:ab:50");
+  hm2.board.name.clear();
+  plain(parser, "--board-name", &hm2.board.name,
+        "name that the 7I92T or the node reports, for example 7I92 [7I92T, abs-node]");
+  plain(parser, "--mac", &hm2.mac, "MAC address in the EEPROM of the 7I92T or the node: 00:60:1b:16:ab:50");
   parser.add({.names = "--wrong-board",
               .to = &hm2.board.lie,
               .help = "a lie of the 7I92T about itself: " + emulator::Hm2Identity::lies()});
@@ -123,6 +126,10 @@ void add_board_options(cli::Parser& parser, Arguments& a) {
   board.add({.names = "--hm2",
              .to = &a.hm2.address,
              .help = "emulate a Mesa 7I92T: address at which it takes datagrams, with a port if it is not 27181",
+             .type = "ADDRESS[:PORT]"});
+  board.add({.names = "--node",
+             .to = &a.node_address,
+             .help = "emulate the node with the firmware of firmware/: address, as for --hm2",
              .type = "ADDRESS[:PORT]"});
 }
 
@@ -155,7 +162,7 @@ void add_options(cli::Parser& parser, Arguments& a) {
   parser.add({.names = "--record",
               .to = &a.emulator.traffic_file,
               .help = "log of every register access to the card, one per line",
-              .excludes = {"--can", "--usb", "--hm2"}});
+              .excludes = {"--can", "--usb", "--hm2", "--node"}});
   shown(parser, "--vendor", &a.vendor, "vendor id of the card");
   shown(parser, "--device", &a.device, "device id of the card");
   shown(parser, "--bar-bytes", &a.bar_bytes, "size of BAR 2");
@@ -173,10 +180,10 @@ void add_options(cli::Parser& parser, Arguments& a) {
   add_card_options(parser, a.emulator.card);
   add_usb_options(parser, a.usb);
   add_hm2_options(parser, a.hm2);
-  parser.set_footer(std::string("Control commands (--command, --control) of a card:\n") +
-                    help_of(program::EmulatedCard::rows()) + "of a CAN node:\n" +
-                    help_of(program::EmulatedNode::rows()) + "of a USB board:\n" +
-                    help_of(program::EmulatedUsb::rows()) + "of a 7I92T:\n" + program::EmulatedHm2::commands());
+  parser.set_footer(
+      std::string("Control commands (--command, --control) of a card:\n") + help_of(program::EmulatedCard::rows()) +
+      "of a CAN node:\n" + help_of(program::EmulatedNode::rows()) + "of a USB board:\n" +
+      help_of(program::EmulatedUsb::rows()) + "of a 7I92T or a node:\n" + program::EmulatedHm2::commands());
 }
 
 void read_plant(Arguments& a) {
@@ -305,6 +312,11 @@ int serve_hm2(Arguments& a) {
   a.hm2.board.lock_step = a.emulator.lock_step;
   a.hm2.seed = a.emulator.seed;
   a.hm2.truth_file = a.emulator.truth_file;
+  if (!a.node_address.empty()) {
+    a.hm2.address = a.node_address;
+    a.hm2.is_node = true;
+  }
+  if (a.hm2.board.name.empty()) a.hm2.board.name = a.hm2.is_node ? "abs-node" : "7I92T";
   program::EmulatedHm2 board(a.hm2);
   obey_first(a, board);
   pin_to(a.cpu);
@@ -315,7 +327,7 @@ int serve_hm2(Arguments& a) {
 
 int serve(Arguments& a) {
   read_plant(a);
-  if (!a.hm2.address.empty()) return serve_hm2(a);
+  if (!a.hm2.address.empty() || !a.node_address.empty()) return serve_hm2(a);
   if (a.use_usb) return serve_usb(a);
   if (!a.can_interface.empty()) return serve_node(a);
   program::prepare_mount_folder(a.pci_root);  // first: the other files are often beside it, in the same new folder

@@ -179,7 +179,7 @@ void Hm2Fpga::bite(const std::string& why) {
   armed_ = false;
   status_ = 1;
   for (Port& port : ports_) port.ddr = port.open_drain = 0;
-  events_.push_back({time_ns(), why});
+  log_.add(time_ns(), why);
   note_outputs(why);
 }
 
@@ -275,21 +275,7 @@ Outputs Hm2Fpga::outputs() const noexcept {
           .brake_duty = acting(options_.brake_pwm * pins_per_port + 1)};
 }
 
-void Hm2Fpga::note_outputs(const std::string& why) {
-  const Outputs now = outputs();
-  const Outputs before = std::exchange(told_, now);
-  if (now.drive_duty == before.drive_duty && now.brake_duty == before.brake_duty) return;
-  changes_.push_back({time_ns(), now});
-  const auto zero = [](const Outputs& out) { return out.drive_duty == 0.0 && out.brake_duty == 0.0; };
-  if (zero(now)) {
-    const double since_ms = static_cast<double>(time_ns() - last_pet_ns_) * 1e-6;
-    events_.push_back(
-        {time_ns(), "outputs zero: " + why +
-                        (last_pet_ns_ < 0 ? "" : rig::formatted("; watchdog last reloaded %.3f ms ago", since_ms))});
-  } else if (zero(before)) {
-    events_.push_back({time_ns(), "outputs on: " + why});
-  }
-}
+void Hm2Fpga::note_outputs(const std::string& why) { log_.note(time_ns(), outputs(), why, last_pet_ns_); }
 
 // Time.
 
@@ -327,9 +313,6 @@ void Hm2Fpga::turn_by_hand(bool upper_wheel, double revolutions) {
 }
 
 void Hm2Fpga::make_quadrature_error(bool upper_wheel) { counter_of(upper_wheel).error = true; }
-
-std::vector<NodeEvent> Hm2Fpga::take_events() { return std::exchange(events_, {}); }
-std::vector<OutputChange> Hm2Fpga::take_changes() { return std::exchange(changes_, {}); }
 
 std::string Hm2Fpga::registers_text() const {
   std::string text;

@@ -4,19 +4,12 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <vector>
 
-#include "emulator/can_node.hpp"
 #include "emulator/hm2_identity.hpp"
 #include "emulator/rig_behind.hpp"
+#include "emulator/udp_board.hpp"
 
 namespace abs_hil::emulator {
-
-/// A change of the duties at the power stages.
-struct OutputChange {
-  std::int64_t time_ns{0};  ///< the board's time
-  Outputs now{};
-};
 
 /// The HostMot2 registers of a 7I92 with firmware G540x2, 32 bits each, and the simulated rig behind its pins. Written
 /// from the documented registers; it shares no code with the driver.
@@ -49,8 +42,7 @@ class Hm2Fpga final : public RigBehind {
   [[nodiscard]] bool drives_pins() const noexcept;
   /// Time of the last reload of the watchdog; -1: none since power-on.
   [[nodiscard]] std::int64_t last_pet_ns() const noexcept { return last_pet_ns_; }
-  [[nodiscard]] std::vector<NodeEvent> take_events();
-  [[nodiscard]] std::vector<OutputChange> take_changes();
+  [[nodiscard]] OutputLog& log() noexcept { return log_; }
   /// All registers that a host has set, also those that it cannot read: "1100=00020002 ...".
   [[nodiscard]] std::string registers_text() const;
 
@@ -112,9 +104,7 @@ class Hm2Fpga final : public RigBehind {
   bool armed_{false};
   std::int64_t bites_ns_{0};  ///< when the armed watchdog bites
   std::int64_t last_pet_ns_{-1};
-  Outputs told_{};
-  std::vector<NodeEvent> events_{};
-  std::vector<OutputChange> changes_{};
+  OutputLog log_{};
 };
 
 }  // namespace abs_hil::emulator

@@ -149,7 +149,7 @@ TEST_CASE("The watchdog bites N + 3 or 4 clocks after the load; a bite clears DD
   CHECK(read32(board, 0x1100) == 0);
   CHECK(read32(board, 0x1104) == 0);
   CHECK_THAT(board.fpga().registers_text(), Contains("1300=00000000") && Contains("4004=07d00000"));
-  const auto events = board.fpga().take_events();
+  const auto events = board.log().take_events();
   REQUIRE(events.size() >= 2);
   CHECK(events.back().text == "outputs zero: watchdog; watchdog last reloaded 5.000 ms ago");
   CHECK(events.back().time_ns == 8'000'030);

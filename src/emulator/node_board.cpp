@@ -1,0 +1,134 @@
+// The core of the node's firmware in place of a chip: it gets the time, the encoders' counts and the datagrams, and its
+// duties act on the rig. In lock-step this file, not the core, answers space 5 (docs/hm2-emulator.md).
+
+#include "emulator/node_board.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <stdexcept>
+
+namespace abs_hil::emulator {
+
+namespace {
+
+constexpr std::array<std::uint8_t, 4> advances_time{0x82, 0xD6, 0x00, 0x00};  // then 8 bytes
+constexpr std::array<std::uint8_t, 4> reads_time{0x82, 0x56, 0x00, 0x00};
+constexpr std::array<std::uint8_t, 4> reads_cookie{0x01, 0x75, 0x00, 0x00};
+constexpr std::size_t time_bytes = 8;
+
+bool begins(std::span<const std::uint8_t> datagram, const std::array<std::uint8_t, 4>& command) {
+  return datagram.size() >= command.size() && std::equal(command.begin(), command.end(), datagram.begin());
+}
+
+}  // namespace
+
+NodeBoard::NodeBoard(const Hm2Options& options) : options_(options), rig_(*this, options) {
+  if (options.name.empty() || options.name.size() > 16) {
+    throw std::invalid_argument("board name \"" + options.name + "\": give 1 to 16 characters");
+  }
+  std::memcpy(identity_.name, options.name.data(), options.name.size());
+  std::memcpy(identity_.idrom_name, options.name.starts_with("7I92") ? "MESA7I92" : "ABS-NODE", 8);
+  std::memcpy(identity_.mac, options.mac.data(), sizeof identity_.mac);
+  std::memcpy(identity_.address, options.address.data(), sizeof identity_.address);
+  power_cycle();
+}
+
+void NodeBoard::power_cycle() {
+  node_init(&core_, &identity_);
+  look();
+  for (std::uint32_t& count : core_.count) count = 0;
+  note("power-on");
+}
+
+Outputs NodeBoard::Rig::outputs() const noexcept {
+  const auto duty = [this](std::uint32_t channel) { return node_duty(&board_.core_, channel) / 4096.0; };
+  const bool enabled = board_.options_.enable_pin < 0 || node_output(&board_.core_);
+  return {.drive_duty = emergency_stop() || !enabled ? 0.0 : duty(board_.options_.drive_pwm),
+          .brake_duty = duty(board_.options_.brake_pwm)};
+}
+
+std::int64_t NodeBoard::Rig::step_end_ns(std::int64_t next_ns) const noexcept {
+  const node_core& core = board_.core_;
+  if (!core.armed) return next_ns;
+  const auto left_us = static_cast<std::int32_t>(core.fed_us + core.allowed_us - board_.now_us());
+  return std::clamp<std::int64_t>((time_ns() / 1000 + left_us) * 1000, time_ns(), next_ns);
+}
+
+void NodeBoard::look() {
+  for (const bool upper : {false, true}) {
+    node_count(&core_, upper ? options_.upper_encoder : options_.lower_encoder,
+               static_cast<std::uint16_t>(rig_.position(upper)), now_us());
+  }
+  const bool was_latched = core_.latched;
+  node_poll(&core_, now_us());
+  if (core_.latched && !was_latched) log_.add(time_ns(), "watchdog");
+  note("watchdog");
+}
+
+void NodeBoard::note(const std::string& why) {
+  const auto since_us = static_cast<std::int64_t>(now_us() - core_.fed_us);
+  const bool never = core_.watchdog_clocks == 0x80000000U;
+  log_.note(time_ns(), outputs(), why, never ? -1 : time_ns() - 1000 * since_us);
+}
+
+std::vector<std::uint8_t> NodeBoard::answer(std::span<const std::uint8_t> datagram) {
+  std::vector<std::uint8_t> reply;
+  if (options_.lock_step && begins(datagram, advances_time) && datagram.size() >= reads_time.size() + time_bytes) {
+    std::int64_t wanted_ns = 0;
+    std::memcpy(&wanted_ns, datagram.data() + advances_time.size(), time_bytes);
+    constexpr std::int64_t longest_ns = 10'000'000'000;
+    advance_to(std::clamp(wanted_ns, time_ns(), time_ns() + longest_ns));
+    datagram = datagram.subspan(advances_time.size() + time_bytes);
+    if (datagram.empty()) return {};
+  } else if (options_.lock_step && begins(datagram, reads_time)) {
+    reply.resize(time_bytes);
+    const std::int64_t now_ns = time_ns();
+    std::memcpy(reply.data(), &now_ns, time_bytes);
+    return reply;
+  } else if (options_.lock_step && begins(datagram, reads_cookie)) {
+    return {0x05, 0x5A};
+  }
+  look();
+  const std::uint32_t number = core_.write_number;
+  const std::uint32_t fed_us = core_.fed_us;
+  const bool was_latched = core_.latched;
+  reply.resize(NODE_MOST_BYTES);
+  reply.resize(node_datagram(&core_, now_us(), datagram.data(), datagram.size(), reply.data()));
+  if (reply.empty() || core_.write_number != number || core_.fed_us != fed_us) ++writes_;
+  if (core_.latched && !was_latched) log_.add(time_ns(), "watchdog");
+  note(core_.latched && !was_latched ? "watchdog" : "commanded");
+  return reply;
+}
+
+void NodeBoard::bite() {
+  core_.armed = true;
+  core_.allowed_us = 0;
+  look();
+}
+
+void NodeBoard::press_emergency_stop(bool pressed) {
+  rig_.press_emergency_stop(pressed);
+  note("emergency stop");
+}
+
+void NodeBoard::turn_by_hand(bool upper_wheel, double revolutions) {
+  // In parts that the 16 bits of the hardware's counter can tell from turns backwards.
+  constexpr int parts = 64;
+  for (int n = 0; n < parts; ++n) {
+    rig_.turn_by_hand(upper_wheel, revolutions / parts);
+    look();
+  }
+}
+
+std::string NodeBoard::registers_text() const {
+  std::string text = rig::formatted("0C00=%08x 0D00=%08x", core_.watchdog_clocks, core_.latched ? 1U : 0U);
+  for (unsigned i = 0; i < NODE_CHANNELS; ++i) {
+    for (unsigned k = 0; k < 5; ++k) text += rig::formatted(" %04X=%08x", 0x1000 + 0x100 * k + 4 * i, core_.port[k][i]);
+    text += rig::formatted(" %04X=%08x %04X=%08x %04X=%08x", 0x3100 + 4 * i, core_.counter_control[i], 0x4000 + 4 * i,
+                           core_.pwm_value[i], 0x4100 + 4 * i, core_.pwm_mode[i]);
+  }
+  return text + rig::formatted(" 3200=%08x 3400=%08x 4200=%08x 4300=%08x 4400=%08x", core_.stamp_divisor, core_.filter,
+                               core_.pwm_rate, core_.pdm_rate, core_.pwm_enable);
+}
+
+}  // namespace abs_hil::emulator
