@@ -27,7 +27,7 @@ else
     "most of it real-time runs and tests in a virtual machine (scripts/test.sh quick: about a minute)"
 fi
 echo "test: a test is skipped and says why if its tools are missing: a virtual machine (packages-vm.txt), abs-spy" \
-  "(packages-spy.txt), mesaflash (packages-mesa.txt), a browser and Octave (packages-report.txt), Windows (packages-windows.txt), Python modules (setup_python.sh), FUSE," \
+  "(packages-spy.txt), mesaflash (packages-mesa.txt), the firmware (packages-firmware.txt), a browser and Octave (packages-report.txt), Windows (packages-windows.txt), Python modules (setup_python.sh), FUSE," \
   "network namespaces"
 scripts/setup.sh
 # The report's page needs plotly. The first of the README's commands installs it too, but nobody has to run that before.
@@ -37,6 +37,7 @@ scripts/setup.sh packages-vm.txt || { [ "${CI:-}" != true ] && [ "${ABS_HIL_REQU
 if [ "${CI:-}" = true ]; then
   scripts/setup.sh packages-spy.txt
   scripts/setup.sh packages-mesa.txt
+  scripts/setup.sh packages-firmware.txt
   scripts/setup.sh packages-report.txt
   scripts/setup.sh packages-windows.txt
   scripts/setup_python.sh

@@ -72,6 +72,10 @@ class Mesaflash(EmulatorTest):
         self.start_emulator(EmulatorProcess, '--hm2', BOARD, '--board-name', '7I92', '--priority', 0)
         self.check_read_out(self.read_out())
 
+    def test_mesaflash_reads_the_node_that_presents_itself_as_a_7i92(self):
+        self.start_emulator(EmulatorProcess, '--node', BOARD, '--board-name', '7I92', '--priority', 0)
+        self.check_read_out(self.read_out())
+
     def test_mesaflash_sees_the_lie(self):
         self.start_emulator(EmulatorProcess, '--hm2', BOARD, '--board-name', '7I92', '--priority', 0, '--wrong-board',
                             'one-counter')
