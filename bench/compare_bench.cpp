@@ -24,7 +24,7 @@ void thousand_runs(benchmark::State& state) {
 void one_run(benchmark::State& state, const char* controller) {
   ComparisonPlan p = plan(1, 1);
   p.settings.control.controller = controller;
-  const PreparedSettings prepared(p.settings);
+  const abs_hil::run::Prepared prepared(p.settings);
   for (auto _ : state) benchmark::DoNotOptimize(simulate(prepared, p.settings.plant, 1));
 }
 
