@@ -23,6 +23,8 @@ namespace {
 constexpr std::uint32_t own_end = 0x0AB5'0E1D;
 
 std::atomic<bool> watched{false};
+/// A child process that foreign code made must not touch the board beside its parent.
+std::atomic<pid_t> own_process{0};
 std::atomic<Outputs*> running{nullptr};
 thread_local Outputs* of_this_thread = nullptr;
 
@@ -36,6 +38,8 @@ void say(std::string_view text) noexcept {
 }
 
 [[noreturn]] void end_early(std::string_view why, bool make_safe) noexcept {
+  const pid_t own = own_process.load();  // 0: nobody watches
+  if (own != 0 && own != ::getpid()) end_program(1);
   static std::atomic_flag ending;
   // Another thread ends the program already.
   while (ending.test_and_set()) ::poll(nullptr, 0, 1000);
@@ -60,6 +64,7 @@ constexpr int threads_at_once = 16;
 void on_exit();
 
 void catch_exit() noexcept {
+  own_process = ::getpid();
   // The latest function is called first. So each run gives it anew: before what was destroyed first in the meantime.
   for (int i = 0; i < threads_at_once; ++i) {
     static_cast<void>(std::atexit(on_exit));
@@ -73,12 +78,13 @@ void on_exit() {
   }
 }
 
-/// exit_group of the cycle's thread.
+/// exit_group or exec of the cycle's thread.
 void on_system_call(int /*signal*/, siginfo_t* info, void* /*context*/) {
-  if (info->si_syscall == SYS_exit_group && watched.load()) {
-    end_early("fault: code in the cycle, such as the controller's, called _exit()", true);
-  }
-  end_program(1);
+  if (!watched.load()) end_program(1);
+  end_early(info->si_syscall == SYS_exit_group
+                ? "fault: code in the cycle, such as the controller's, called _exit()"
+                : "fault: code in the cycle, such as the controller's, put another program in this one's place",
+            true);
 }
 
 void catch_system_call() noexcept {
@@ -92,6 +98,8 @@ void catch_system_call() noexcept {
   ::pthread_sigmask(SIG_UNBLOCK, &trap, nullptr);
   std::array filter{
       sock_filter BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
+      sock_filter BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_execve, 4, 0),
+      sock_filter BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_execveat, 3, 0),
       sock_filter BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_exit_group, 0, 3),
       sock_filter BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, args) + sizeof(std::uint64_t)),
       sock_filter BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, own_end, 1, 0),

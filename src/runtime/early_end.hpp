@@ -9,7 +9,7 @@
 namespace abs_hil::runtime {
 
 /// A program must end by its own decision. Code of a controller in this process that calls exit(), quick_exit() or, in
-/// the cycle's thread, _exit(), would otherwise end a run in mid-braking with a status of its own choice.
+/// the cycle's thread, _exit() or exec(), would otherwise end a run in mid-braking with a status of its own choice.
 
 /// The outputs of a run, for the moment in which the program is about to end.
 class Outputs {
@@ -37,9 +37,8 @@ class EarlyEndWatch {
 /// Lives in the thread that runs the cycle, as long as it runs. Does nothing in a program without an EarlyEndWatch.
 class CycleInThisThread {
  public:
-  /// @param own_thread  true: the thread ends after the cycle, and starts no program. From now on _exit() in it is
-  /// caught
-  ///   as well, by a filter of system calls, if the kernel can do that.
+  /// @param own_thread  true: the thread ends after the cycle, and starts no program. From now on _exit() and exec() in
+  ///   it are caught as well, by a filter of system calls, if the kernel can do that.
   CycleInThisThread(Outputs& outputs, bool own_thread) noexcept;
   CycleInThisThread(const CycleInThisThread&) = delete;
   CycleInThisThread& operator=(const CycleInThisThread&) = delete;

@@ -104,6 +104,7 @@ class OwnProcess(ProgramTest):
         called = 'called exit() or quick_exit()'
         for name, options, words in (('exits', ('--fast',), called), ('exits', (), called), ('exits-quickly', ('--fast',), called),
                                      ('exits-at-once', ('--fast',), 'called _exit()'), ('exits-at-once', (), 'called _exit()'),
+                                     ('execs', ('--fast',), "in this one's place"), ('execs', (), "in this one's place"),
                                      ('loops', ('--fast',), 'a cycle takes more than 5 s'),
                                      ('loops', (), 'a cycle takes more than 5 s'),
                                      ('slow', ('--fast',), 'too slow')):
@@ -111,6 +112,16 @@ class OwnProcess(ProgramTest):
                 result = subprocess.run([OWN, '--controller', name, *real_time, *options], capture_output=True, text=True, timeout=60)
                 self.assertEqual(result.returncode, 1, result.stderr)
                 self.assertIn(words, result.stderr)
+
+    def test_a_child_of_foreign_code_ends_alone(self):
+        """It neither touches the parent's board nor speaks for it."""
+        for name in ('forks', 'forks-and-exits'):
+            with self.subTest(name):
+                result = subprocess.run([OWN, '--controller', name, '--fast', '--no-lcm', '--no-out'], capture_output=True,
+                                        text=True, timeout=60)
+                self.assertNotIn('outputs are safe', result.stderr)
+                self.assertNotIn('called', result.stderr)
+                self.assertEqual(result.returncode, 0, result.stderr)
 
     def test_in_a_comparison_too(self):
         result = subprocess.run([OWN, 'compare', '--controllers', 'exits', '--repeat', '2'], capture_output=True, text=True, timeout=60)

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <utility>
 
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/program/program.hpp"
@@ -14,6 +15,16 @@ using namespace abs_hil;
 void exits() { std::exit(0); }
 void exits_at_once() { ::_exit(0); }
 void exits_quickly() { std::quick_exit(0); }
+void execs() { static_cast<void>(::execl("/bin/true", "true", nullptr)); }
+/// Its child ends at once. The run goes on.
+void forks() {
+  static bool done = false;
+  if (!std::exchange(done, true) && ::fork() == 0) ::_exit(0);
+}
+void forks_and_exits() {
+  static bool done = false;
+  if (!std::exchange(done, true) && ::fork() == 0) std::exit(0);
+}
 void loops() {
   for (volatile bool for_ever = true; for_ever;) {
   }
@@ -40,6 +51,9 @@ constexpr control::ControllerEntry own[]{
     control::controller_entry<Hostile<exits>>("exits", "calls exit"),
     control::controller_entry<Hostile<exits_at_once>>("exits-at-once", "calls _exit"),
     control::controller_entry<Hostile<exits_quickly>>("exits-quickly", "calls quick_exit"),
+    control::controller_entry<Hostile<execs>>("execs", "becomes another program"),
+    control::controller_entry<Hostile<forks>>("forks", "has a child that calls _exit"),
+    control::controller_entry<Hostile<forks_and_exits>>("forks-and-exits", "has a child that calls exit"),
     control::controller_entry<Hostile<loops>>("loops", "does not return"),
     control::controller_entry<Hostile<is_slow>>("slow", "takes a second"),
 };
