@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -67,13 +68,24 @@ double exposure_s(const config::Settings& s, const std::string& fault) {
   return exposed_s;
 }
 
-/// The bound in cycles of this rate: windows and late cycles are longer in slower ones.
-double bound_s(const Fault& fault, double rate_Hz) {
+/// The bound in cycles of this rate: windows and late cycles are longer in slower ones. Old samples count for as long
+/// as `gate.sample_age_max_s` says.
+double bound_s(const Fault& fault, const config::Settings& s) {
+  const double rate_Hz = s.control.rate_Hz;
   const double window_s = std::ceil(1.8e-3 * rate_Hz) / rate_Hz;
-  return fault.bound_s + 4.0 * std::max(0.0, window_s - 2e-3) + 1.0 / rate_Hz;
+  const bool is_of_age = fault.text.find("stamp") != std::string::npos;
+  const double older_s =
+      is_of_age ? std::max(0.0, s.gate.sample_age_max_s - runtime::GateOptions{}.sample_age_max_s) : 0.0;
+  return fault.bound_s + older_s + 4.0 * std::max(0.0, window_s - 2e-3) + 1.0 / rate_Hz;
 }
 
-/// Texts of the values at the ends of a key's range.
+std::string digits_of(double value) {
+  char digits[40];
+  std::snprintf(digits, sizeof(digits), "%.17g", value);
+  return digits;
+}
+
+/// Texts of the values at the ends of a key's range, and of the weakest one that a board takes without a consent.
 std::vector<std::string> ends_of(const config::Key& key) {
   if (std::holds_alternative<bool*>(key.target)) return {"true", "false"};
   if (std::holds_alternative<std::string*>(key.target)) {
@@ -81,15 +93,12 @@ std::vector<std::string> ends_of(const config::Key& key) {
     for (const std::string_view name : key.allowed.list()) names.emplace_back(name);
     return names;
   }
-  if (!std::holds_alternative<double*>(key.target))
-    return {std::to_string(std::llround(key.range.least)), std::to_string(std::llround(key.range.most))};
-  const double inside = 1e-6 * std::min(1.0, key.range.most - key.range.least);
-  const auto text = [](double value) {
-    char digits[40];
-    std::snprintf(digits, sizeof(digits), "%.17g", value);
-    return std::string(digits);
-  };
-  return {text(key.range.least + inside), text(key.range.most - inside)};
+  const bool whole = !std::holds_alternative<double*>(key.target);
+  const double inside = whole ? 0.0 : 1e-6 * std::min(1.0, key.range.most - key.range.least);
+  std::vector<std::string> ends{digits_of(key.range.least + inside), digits_of(key.range.most - inside)};
+  using Kind = rig::SafetyClass::Kind;
+  if (key.safety.kind == Kind::above || key.safety.kind == Kind::below) ends.push_back(digits_of(key.safety.bound));
+  return ends;
 }
 
 /// True for a key that bears on the cycle of the default controller in this test.
@@ -138,7 +147,7 @@ TEST_CASE("a model of any size hides no fault") {
     for (const Fault& fault : ten_faults(s.control.rate_Hz)) {
       CAPTURE(fault.text, s.model.tyre.theta_N, s.model.motor.stall_torque_Nm, s.model.brake.b1_Nm,
               s.model.wheels.J1_kg_m2);
-      CHECK(exposure_s(s, fault.text) <= bound_s(fault, s.control.rate_Hz));
+      CHECK(exposure_s(s, fault.text) <= bound_s(fault, s));
     }
   }
 }
@@ -151,6 +160,51 @@ TEST_CASE("overspeed is found by the counts alone, however slow the observers ar
   const InjectedResult run = run_injected(setup, {});
   CHECK(run.outcome.reason == rig::Reason::overspeed);
   CHECK(run.records.back().truth.speeds.omega2_rad_s < 100.0 / (1.0 - 150e-6 / 1.85e-3) + 5.0);
+}
+
+TEST_CASE("no set of values that a board takes hides a fault") {
+  config::Settings defaults;
+  const config::KeyTable table(defaults);
+  std::vector<const config::Key*> drawn;
+  for (const config::Key& key : table.keys()) {
+    if (acts_here(key.name) && std::holds_alternative<double*>(key.target)) drawn.push_back(&key);
+  }
+  std::mt19937_64 random(36);
+  int runs = 0;
+  for (int set = 0; set < 40; ++set) {
+    std::vector<std::string> values;
+    const auto settings_with = [&](const std::string& last, config::Settings& s) {
+      config::KeyTable keys(s);
+      for (const std::string& value : values) keys.set_text(value, "test");
+      keys.set_text(last, "test");
+      return !refused_on_a_board(s, keys);
+    };
+    while (values.size() < 6) {
+      const config::Key& key = *drawn[std::uniform_int_distribution<std::size_t>(0, drawn.size() - 1)(random)];
+      // Half of them within a factor of three of the default, where runs are possible; the others anywhere.
+      const double share = std::uniform_real_distribution<double>(0.0, 1.0)(random);
+      const double near = **std::get_if<double*>(&key.target) * std::pow(3.0, 2.0 * share - 1.0);
+      const double anywhere = key.range.least + share * (key.range.most - key.range.least);
+      const std::string value = key.name + '=' + digits_of(values.size() % 2 == 0 ? near : anywhere);
+      try {
+        config::Settings s;
+        if (settings_with(value, s)) values.push_back(value);
+      } catch (const config::ConfigError&) {
+      }
+    }
+    config::Settings s;
+    static_cast<void>(settings_with(values.back(), s));
+    for (const Fault& fault : ten_faults(s.control.rate_Hz)) {
+      CAPTURE(values, fault.text);
+      try {
+        const double exposed_s = exposure_s(s, fault.text);
+        ++runs;
+        CHECK(exposed_s <= bound_s(fault, s));
+      } catch (const std::invalid_argument&) {
+      }
+    }
+  }
+  CHECK(runs >= 200);
 }
 
 TEST_CASE("every key at its ends is refused on a board, or ten faults are found as soon") {
@@ -180,7 +234,7 @@ TEST_CASE("every key at its ends is refused on a board, or ten faults are found 
         } catch (const std::invalid_argument&) {
           continue;  // no run begins with this value beside the others' defaults
         }
-        CHECK(exposed_s <= bound_s(fault, s.control.rate_Hz));
+        CHECK(exposed_s <= bound_s(fault, s));
       }
     }
   }
