@@ -11,7 +11,7 @@
 #include "runtime/command_gate.hpp"
 #include "runtime/guardian_options.hpp"
 #include "runtime/realtime_setup.hpp"
-#include "runtime/unsafe_options.hpp"
+#include "runtime/weak_values.hpp"
 
 namespace abs_hil::config {
 

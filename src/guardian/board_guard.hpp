@@ -7,7 +7,6 @@
 #include <optional>
 
 #include "abs_hil/driver/safe_state_writer.hpp"
-#include "guardian/guardian_report.hpp"
 #include "guardian/mail.hpp"
 #include "guardian/shared_region.hpp"
 #include "guardian/watchdog.hpp"

@@ -1,9 +1,72 @@
 #include "guardian/guard.hpp"
 
+#include <fcntl.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <utility>
+
 #include "abs_hil/driver/io_result.hpp"
+#include "guardian/linux_process.hpp"
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::guardian {
+
+namespace {
+
+constexpr const char* ready_format = "ready %d %d:%n";
+constexpr int ready_within_ms = 5000;
+constexpr int ends_within_ms = 500;
+
+[[noreturn]] void refuse_for(const std::string& what, int error) { refuse_run(what + ": " + std::strerror(error)); }
+
+/// A copy numbered above the descriptors that the child inherits.
+driver::FileDescriptor high_copy(int fd) {
+  constexpr int above = 10;
+  driver::FileDescriptor copy(::fcntl(fd, F_DUPFD_CLOEXEC, above));
+  if (copy.get() < 0) refuse_for("cannot copy a file descriptor for it", errno);
+  return copy;
+}
+/// The same of a descriptor that nobody needs besides.
+driver::FileDescriptor high_copy(driver::FileDescriptor fd) {
+  if (fd.get() < 0) refuse_for("cannot open a file descriptor for it", errno);
+  return high_copy(fd.get());
+}
+
+class SpawnSetUp {
+ public:
+  SpawnSetUp() {
+    posix_spawn_file_actions_init(&actions);
+    posix_spawnattr_init(&attributes);
+    sigset_t none;
+    sigset_t all;
+    sigemptyset(&none);
+    sigfillset(&all);
+    posix_spawnattr_setsigmask(&attributes, &none);
+    posix_spawnattr_setsigdefault(&attributes, &all);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  }
+  SpawnSetUp(const SpawnSetUp&) = delete;
+  SpawnSetUp& operator=(const SpawnSetUp&) = delete;
+  ~SpawnSetUp() {
+    posix_spawn_file_actions_destroy(&actions);
+    posix_spawnattr_destroy(&attributes);
+  }
+  posix_spawn_file_actions_t actions{};
+  posix_spawnattr_t attributes{};
+};
+
+}  // namespace
 
 void refuse_run(const std::string& what) {
   throw driver::Unavailable("guardian: " + what +
@@ -48,6 +111,125 @@ void Guard::refuse_weaker(const runtime::Scheduling& guardian, const runtime::Sc
              ": a controller in an endless loop would keep it from the processor. Give " + program +
              " the rights of abs_hil (the limits of docs/real-time.md, or sudo setcap cap_sys_nice,cap_ipc_lock+ep " +
              program + "), or set a lower realtime.priority");
+}
+
+std::string ready_text(const runtime::Scheduling& guardian, const std::string& notes) {
+  return rig::formatted("ready %d %d:", guardian.fifo_priority, guardian.memory_locked ? 1 : 0) + notes;
+}
+
+std::string guardian_program() {
+  std::error_code error;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  const std::filesystem::path beside = self.parent_path() / "abs_guardian";
+  // A program that embeds the library uses the installed guardian.
+  const std::filesystem::path installed = std::filesystem::path(ABS_HIL_INSTALLED_BIN_DIR) / "abs_guardian";
+  if (!std::filesystem::exists(beside, error) && std::filesystem::exists(installed, error)) return installed.string();
+  return beside.string();
+}
+
+GuardianProcess::GuardianProcess(const SharedRecorder& recorder, std::string program, std::string launch_config_json)
+    : recorder_(recorder), program_(std::move(program)), launch_config_(std::move(launch_config_json)) {}
+
+GuardianProcess::~GuardianProcess() { static_cast<void>(end()); }
+
+void GuardianProcess::arm(const runtime::Scheduling& controller) {
+  start();
+  try {
+    refuse_weaker(wait_until_ready(), controller, program_);
+  } catch (...) {
+    ::kill(pid_, SIGKILL);
+    static_cast<void>(end());
+    throw;
+  }
+}
+
+void GuardianProcess::start() {
+  std::array<int, 2> pipe{-1, -1};
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) refuse_for("cannot open a pipe", errno);
+  ready_ = driver::FileDescriptor(pipe[0]);
+  const auto ready = high_copy(driver::FileDescriptor(pipe[1]));
+  reset_page();
+  const auto recorder = high_copy(recorder_.descriptor());
+  const auto run_page = high_copy(pages_.descriptors().run);
+  const auto guard_page = high_copy(pages_.descriptors().guard);
+  const auto controller = high_copy(driver::FileDescriptor(open_pidfd(::getpid())));
+  const auto launch_config = high_copy(driver::FileDescriptor(text_in_memory(launch_config_)));
+
+  SpawnSetUp set_up;
+  for (const auto& [from, to] : {std::pair(recorder.get(), inherited_recorder),
+                                 {controller.get(), inherited_controller},
+                                 {ready.get(), inherited_ready},
+                                 {launch_config.get(), inherited_launch_config},
+                                 {run_page.get(), inherited_run_page},
+                                 {guard_page.get(), inherited_guard_page}}) {
+    posix_spawn_file_actions_adddup2(&set_up.actions, from, to);
+  }
+  posix_spawn_file_actions_addclosefrom_np(&set_up.actions, inherited_guard_page + 1);
+  std::string name = program_;
+  std::array<char*, 2> arguments{name.data(), nullptr};
+  const int error =
+      ::posix_spawn(&pid_, program_.c_str(), &set_up.actions, &set_up.attributes, arguments.data(), environ);
+  if (error != 0) {
+    pid_ = 0;
+    refuse_for("cannot start " + program_, error);
+  }
+  process_ = driver::FileDescriptor(open_pidfd(pid_));
+  if (process_.get() < 0) {
+    const int reason = errno;
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+    pid_ = 0;
+    refuse_for("cannot open a pidfd of its process", reason);
+  }
+}
+
+runtime::Scheduling GuardianProcess::wait_until_ready() {
+  std::string said;
+  for (;;) {
+    pollfd readable{ready_.get(), POLLIN, 0};
+    const int ready = ::poll(&readable, 1, ready_within_ms);
+    if (ready < 0 && errno == EINTR) continue;
+    if (ready <= 0) refuse_run(program_ + " was not ready within " + std::to_string(ready_within_ms / 1000) + " s");
+    std::array<char, 512> part{};
+    const ssize_t got = ::read(ready_.get(), part.data(), part.size());
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) break;
+    said.append(part.data(), static_cast<std::size_t>(got));
+  }
+  constexpr std::string_view ready_word = "ready ";
+  constexpr std::string_view error_word = "error ";
+  if (said.starts_with(error_word)) refuse_run(said.substr(error_word.size()));
+  if (!said.starts_with(ready_word)) refuse_run(program_ + " ended before it was ready");
+  runtime::Scheduling has;
+  int locked = 0;
+  int notes_at = 0;
+  if (std::sscanf(said.c_str(), ready_format, &has.fifo_priority, &locked, &notes_at) < 2 || notes_at == 0) {
+    refuse_run(program_ + " comes from another build of abs_hil");
+  }
+  has.memory_locked = locked != 0;
+  notes_ = said.substr(static_cast<std::size_t>(notes_at));
+  return has;
+}
+
+bool GuardianProcess::alive() const noexcept { return pid_ == 0 || !has_ended(process_.get()); }
+
+GuardEnd GuardianProcess::end(Stage stage) noexcept {
+  ready_ = driver::FileDescriptor(-1);
+  if (pid_ == 0) return GuardEnd::none;
+  const bool handed_over = close_page(stage);
+  const bool ended = has_ended(process_.get(), ends_within_ms);
+  GuardEnd how = GuardEnd::insisting;
+  if (!ended && !handed_over)
+    ::kill(pid_, SIGKILL);  // the guardian is stopped or hung, and the outputs are already safe
+  if (ended || !handed_over) {
+    int status = 0;
+    while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
+    }
+    how = WIFEXITED(status) && WEXITSTATUS(status) == 0 ? GuardEnd::ended : GuardEnd::failed;
+  }
+  process_ = driver::FileDescriptor(-1);
+  pid_ = 0;
+  return how;
 }
 
 }  // namespace abs_hil::guardian

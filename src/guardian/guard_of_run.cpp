@@ -1,8 +1,7 @@
-#include "guardian/guard_of_run.hpp"
-
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
@@ -15,12 +14,11 @@
 #include "config/config_json.hpp"
 #include "config/key_table.hpp"
 #include "guardian/board_guard.hpp"
-#include "guardian/flight_files.hpp"
-#include "guardian/guardian_process.hpp"
-#include "guardian/kept_board.hpp"
+#include "guardian/guard.hpp"
+#include "guardian/guardian_program.hpp"
+#include "guardian/guarding.hpp"
 #include "guardian/launch_config.hpp"
 #include "guardian/linux_process.hpp"
-#include "guardian/process_set_up.hpp"
 #include "runtime/board_policy.hpp"
 
 namespace abs_hil::guardian {
@@ -55,7 +53,7 @@ GuardianSetup set_up() {
   if (insist_s == 0.0 && !runtime::is_real_board(setup.settings.driver)) insist_s = emulator_insist_s;
   setup.writer = safe_state_writer_of(setup.settings.driver);
   setup.writer->prepare();
-  const runtime::RealtimeOptions realtime = realtime_options(setup.settings, realtime_mode_of(setup.launch.realtime));
+  const runtime::RealtimeOptions realtime = realtime_options(setup.settings, setup.launch.realtime);
   setup.realtime = std::make_unique<runtime::RealtimeScope>(realtime);
   if (realtime.mode == runtime::RealtimeMode::require && !setup.realtime->report().realtime()) {
     throw driver::Unavailable("real time is required, but the guardian cannot get it\n" +
@@ -81,7 +79,7 @@ int guard() {
                     .insist_ns = static_cast<std::int64_t>(options.insist_s * rig::ns_per_s),
                     .released = &released_by_person});
   guard.cover_only(std::move(pages), inherited_controller);
-  const bool lacks = setup.launch.realtime == "prefer" && !realtime.realtime();
+  const bool lacks = setup.launch.realtime == runtime::RealtimeMode::prefer && !realtime.realtime();
   tell_controller(ready_text(realtime.scheduling, lacks ? realtime.shortcomings() : std::string()));
 
   run_guard(guard, -1, [] {});
@@ -95,6 +93,24 @@ int guard() {
 }
 
 }  // namespace
+
+void ignore_signals(std::initializer_list<int> signals) {
+  for (const int signal : signals) std::signal(signal, SIG_IGN);
+}
+
+void spare_from_oom() {
+  const int file = ::open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
+  if (file < 0) return;
+  [[maybe_unused]] const auto written = ::write(file, "-1000", 5);
+  ::close(file);
+}
+
+runtime::RealtimeOptions realtime_options(const config::Settings& settings, runtime::RealtimeMode mode) {
+  constexpr int highest = 99;
+  runtime::RealtimeOptions options{.priority = std::min(settings.realtime.priority + 1, highest)};
+  options.mode = mode;
+  return options;
+}
 
 bool started_by_a_run() { return ::fcntl(inherited_launch_config, F_GETFD) >= 0; }
 

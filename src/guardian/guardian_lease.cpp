@@ -3,11 +3,14 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <utility>
 
 #include "abs_hil/driver/io_result.hpp"
+#include "abs_hil/rig/time_units.hpp"
+#include "driver/monotonic_time.hpp"
 #include "guardian/linux_process.hpp"
 
 namespace abs_hil::guardian {
@@ -19,6 +22,34 @@ constexpr int answers_within_ms = 20'000;
 constexpr int covers_within_ms = 5'000;
 constexpr int dismissed_within_ms = 500;
 constexpr int looks_every_ms = 1;
+
+constexpr std::int64_t state_within_ns = 2000 * rig::ns_per_ms;
+constexpr std::int64_t safe_within_ns = 300 * rig::ns_per_ms;
+
+std::string why_not(int error) {
+  if (error == EAGAIN) return "its queue of visitors is full";
+  return std::string(std::strerror(error)) + (error == EACCES ? ": join the group abs_hil and log in again" : "");
+}
+
+std::optional<ServiceAnswer> call(const std::string& path, const LeaseMessage& message, std::int64_t within_ns) {
+  const std::int64_t end_ns = driver::monotonic_ns() + within_ns;
+  const driver::FileDescriptor socket(connect_to(path, within_ns));
+  if (socket.get() < 0) {
+    if (errno == ENOENT || errno == ECONNREFUSED) return std::nullopt;
+    return ServiceAnswer{.text = why_not(errno)};
+  }
+  ServiceAnswer said{.service = peer_of(socket.get()).pid,
+                     .text = "it gave no answer within " + std::to_string(within_ns / rig::ns_per_ms) + " ms"};
+  static_cast<void>(send_message(socket.get(), message));
+  const std::int64_t left_ms = std::max<std::int64_t>(0, end_ns - driver::monotonic_ns()) / rig::ns_per_ms;
+  if (const auto answer = receive_message(socket.get(), static_cast<int>(left_ms))) {
+    said.answered = true;
+    said.keeps_it = answer->word == LeaseWord::answer;
+    said.safe = said.keeps_it && answer->safe;
+    said.text = answer->text;
+  }
+  return said;
+}
 
 }  // namespace
 
@@ -90,6 +121,14 @@ GuardEnd GuardianLease::end(Stage stage) noexcept {
     ::poll(nullptr, 0, looks_every_ms);
   }
   return handed_over && alive() ? GuardEnd::insisting : GuardEnd::failed;
+}
+
+std::optional<ServiceAnswer> service_state(const std::string& socket) {
+  return call(socket, {.word = LeaseWord::state}, state_within_ns);
+}
+
+std::optional<ServiceAnswer> service_makes_safe(const std::string& socket, const std::string& boards) {
+  return call(socket, {.word = LeaseWord::make_safe, .text = boards}, safe_within_ns);
 }
 
 }  // namespace abs_hil::guardian

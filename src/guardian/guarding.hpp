@@ -4,9 +4,19 @@
 #include <string>
 
 #include "config/settings.hpp"
+#include "driver/factory.hpp"
 #include "guardian/guardian_lease.hpp"
 
 namespace abs_hil::guardian {
+
+/// Kind and place of the board that the options name, as text. Two processes that mean the same board have the same
+/// text.
+[[nodiscard]] std::string kept_board(const driver::DriverOptions& options);
+
+/// The writer of that board's safe state. @param beside_guardian  it works although a guardian keeps the board. Throws
+/// driver::Unavailable for a kind without one.
+[[nodiscard]] std::unique_ptr<driver::SafeStateWriter> safe_state_writer_of(const driver::DriverOptions& options,
+                                                                            bool beside_guardian = false);
 
 /// Whether a run needs a guardian: only in real time on a board. In simulation and in virtual time nothing real moves.
 [[nodiscard]] bool needs_guardian(const config::Settings& settings, bool virtual_time);

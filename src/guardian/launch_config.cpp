@@ -1,17 +1,24 @@
 #include "guardian/launch_config.hpp"
 
+#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <utility>
 
 #include "rig/parse_json.hpp"
+#include "telemetry/flight_record.hpp"
 
 namespace abs_hil::guardian {
 
 std::string to_json(const LaunchConfig& config) {
-  return nlohmann::json{{"config_json", config.config_json}, {"experiment", config.experiment},
-                        {"controller", config.controller},   {"plant", config.plant},
-                        {"backend", config.backend},         {"version", config.version},
-                        {"realtime", config.realtime},       {"record_prefix", config.record_prefix},
+  return nlohmann::json{{"config_json", config.config_json},
+                        {"experiment", config.experiment},
+                        {"controller", config.controller},
+                        {"plant", config.plant},
+                        {"backend", config.backend},
+                        {"version", config.version},
+                        {"realtime", static_cast<int>(config.realtime)},
+                        {"record_prefix", config.record_prefix},
                         {"signals", config.signals}}
       .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
@@ -25,10 +32,32 @@ LaunchConfig parse_launch_config(const std::string& json) try {
           .backend = object.at("backend"),
           .version = object.at("version"),
           .signals = object.at("signals"),
-          .realtime = object.at("realtime"),
+          .realtime = static_cast<runtime::RealtimeMode>(object.at("realtime").get<int>()),
           .record_prefix = object.at("record_prefix")};
 } catch (const nlohmann::json::exception& error) {
   throw std::runtime_error(std::string("guardian: not a launch configuration: ") + error.what());
+}
+
+void write_flight_files(const LaunchConfig& launch, const std::string& channel_prefix,
+                        const runtime::FlightRing& recorder, const GuardianReport& report, std::string account) {
+  if (launch.record_prefix.empty()) return;
+  const auto records = recorder.contents();
+  std::vector<std::string> problems;
+  const auto files = telemetry::write_flight_record(launch.record_prefix,
+                                                    {.records = records,
+                                                     .reason = report.reason,
+                                                     .reason_value = static_cast<double>(report.silence_ns) * 1e-9,
+                                                     .account = std::move(account)},
+                                                    {.experiment = launch.experiment,
+                                                     .controller = launch.controller,
+                                                     .plant = launch.plant,
+                                                     .backend = launch.backend,
+                                                     .config_json = launch.config_json,
+                                                     .version = launch.version,
+                                                     .names = {.phases = {}, .signals = launch.signals}},
+                                                    channel_prefix, problems);
+  for (const auto& file : files) std::fprintf(stderr, "abs_guardian: wrote %s\n", file.c_str());
+  for (const auto& problem : problems) std::fprintf(stderr, "abs_guardian: %s\n", problem.c_str());
 }
 
 }  // namespace abs_hil::guardian

@@ -3,6 +3,10 @@
 #include <string>
 #include <vector>
 
+#include "guardian/mail.hpp"
+#include "runtime/flight_ring.hpp"
+#include "runtime/realtime_setup.hpp"
+
 namespace abs_hil::guardian {
 
 /// What the controller passes to the guardian when it starts it.
@@ -14,12 +18,16 @@ struct LaunchConfig {
   std::string backend{};
   std::string version{};
   std::vector<std::string> signals{};  ///< names of the controller's own signals, for the flight recorder's files
-  std::string realtime{};              ///< "require", "prefer" or "off"
-  std::string record_prefix{};         ///< path prefix of the files that the guardian writes; empty: it writes none
+  runtime::RealtimeMode realtime{runtime::RealtimeMode::prefer};
+  std::string record_prefix{};  ///< path prefix of the files that the guardian writes; empty: it writes none
 };
 
 [[nodiscard]] std::string to_json(const LaunchConfig& config);
 /// Throws std::runtime_error if `json` is not a launch configuration.
 [[nodiscard]] LaunchConfig parse_launch_config(const std::string& json);
+
+/// Writes the flight record of a run to the files that its launch config names, if it names any. Tells on stderr.
+void write_flight_files(const LaunchConfig& launch, const std::string& channel_prefix,
+                        const runtime::FlightRing& recorder, const GuardianReport& report, std::string account);
 
 }  // namespace abs_hil::guardian

@@ -1,16 +1,16 @@
 #include "guardian/lease_wire.hpp"
 
-#include <fcntl.h>
 #include <poll.h>
 #include <sys/socket.h>
-#include <sys/time.h>
 #include <sys/un.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
+
+#include "driver/monotonic_time.hpp"
+#include "guardian/linux_process.hpp"
 
 namespace abs_hil::guardian {
 
@@ -18,7 +18,6 @@ namespace {
 
 constexpr std::uint32_t lease_magic = 0x6C656132;  // a later protocol has another number
 constexpr std::size_t longest_text = 60'000;
-constexpr std::size_t most_files = 4;
 
 struct LeaseHeader {
   std::uint32_t magic{lease_magic};
@@ -27,11 +26,6 @@ struct LeaseHeader {
   std::uint8_t memory_locked{0};
   std::uint8_t safe{0};
   std::uint8_t unused[2]{};
-};
-
-union FileSpace {
-  cmsghdr header;
-  std::array<char, CMSG_SPACE(sizeof(int) * most_files)> bytes;
 };
 
 bool address_of(const std::string& path, sockaddr_un& address) {
@@ -45,7 +39,7 @@ bool address_of(const std::string& path, sockaddr_un& address) {
   return true;
 }
 
-int new_socket() { return ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0); }
+int new_socket() { return ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0); }
 
 int closed_with_errno(int fd) {
   const int error = errno;
@@ -62,22 +56,8 @@ bool send_message(int socket, const LeaseMessage& message, std::initializer_list
                      .memory_locked = static_cast<std::uint8_t>(message.scheduling.memory_locked),
                      .safe = static_cast<std::uint8_t>(message.safe)};
   std::string text = message.text.substr(0, longest_text);
-  std::array<iovec, 2> parts{iovec{&header, sizeof header}, iovec{text.data(), text.size()}};
-  msghdr packet{};
-  packet.msg_iov = parts.data();
-  packet.msg_iovlen = parts.size();
-  FileSpace space{};
-  if (files.size() > 0 && files.size() <= most_files) {
-    packet.msg_control = space.bytes.data();
-    packet.msg_controllen = CMSG_SPACE(sizeof(int) * files.size());
-    cmsghdr* const control = CMSG_FIRSTHDR(&packet);
-    control->cmsg_level = SOL_SOCKET;
-    control->cmsg_type = SCM_RIGHTS;
-    control->cmsg_len = CMSG_LEN(sizeof(int) * files.size());
-    std::memcpy(CMSG_DATA(control), files.begin(), sizeof(int) * files.size());
-  }
-  const ssize_t sent = ::sendmsg(socket, &packet, MSG_NOSIGNAL | MSG_DONTWAIT);
-  return sent == static_cast<ssize_t>(sizeof header + text.size());
+  const std::array<iovec, 2> parts{iovec{&header, sizeof header}, iovec{text.data(), text.size()}};
+  return send_packet(socket, parts, {files.begin(), files.size()});
 }
 
 std::optional<LeaseMessage> receive_message(int socket, int timeout_ms) {
@@ -91,23 +71,8 @@ std::optional<LeaseMessage> receive_message(int socket, int timeout_ms) {
   LeaseHeader header{};
   std::string text(longest_text, '\0');
   std::array<iovec, 2> parts{iovec{&header, sizeof header}, iovec{text.data(), text.size()}};
-  FileSpace space{};
-  msghdr packet{};
-  packet.msg_iov = parts.data();
-  packet.msg_iovlen = parts.size();
-  packet.msg_control = space.bytes.data();
-  packet.msg_controllen = space.bytes.size();
-  ssize_t got = ::recvmsg(socket, &packet, MSG_CMSG_CLOEXEC | MSG_DONTWAIT);
-  // The other side closed with a message of ours unread. What it had said before is still there.
-  if (got < 0 && errno == ECONNRESET) got = ::recvmsg(socket, &packet, MSG_CMSG_CLOEXEC | MSG_DONTWAIT);
   LeaseMessage message;
-  for (cmsghdr* c = CMSG_FIRSTHDR(&packet); got >= 0 && c != nullptr; c = CMSG_NXTHDR(&packet, c)) {
-    if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SCM_RIGHTS) continue;
-    const std::size_t count = (c->cmsg_len - CMSG_LEN(0)) / sizeof(int);
-    std::array<int, most_files> files{};
-    std::memcpy(files.data(), CMSG_DATA(c), sizeof(int) * std::min(count, most_files));
-    for (std::size_t i = 0; i < std::min(count, most_files); ++i) message.files.emplace_back(files[i]);
-  }
+  const ssize_t got = receive_packet(socket, parts, message.files);
   if (got < static_cast<ssize_t>(sizeof header) || header.magic != lease_magic) return std::nullopt;
   message.word = static_cast<LeaseWord>(header.word);
   message.scheduling = {header.fifo_priority, header.memory_locked != 0};
@@ -128,24 +93,24 @@ int listen_at(const std::string& path) {
   sockaddr_un address{};
   if (!address_of(path, address)) return -1;
   const int fd = new_socket();
-  if (fd < 0) return -1;
   constexpr int waiting = 64;
-  const bool listens = ::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 &&
-                       ::listen(fd, waiting) == 0 && ::fcntl(fd, F_SETFL, O_NONBLOCK) == 0;
-  if (!listens) {
-    return closed_with_errno(fd);
-  }
-  return fd;
+  const bool listens = fd >= 0 && ::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 &&
+                       ::listen(fd, waiting) == 0;
+  return listens ? fd : closed_with_errno(fd);
 }
 
-int connect_to(const std::string& path, int within_ms) {
+int connect_to(const std::string& path, std::int64_t within_ns) {
   sockaddr_un address{};
   if (!address_of(path, address)) return -1;
   const int fd = new_socket();
   if (fd < 0) return -1;
-  const timeval longest{.tv_sec = within_ms / 1'000, .tv_usec = within_ms % 1'000 * 1'000};
-  ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &longest, sizeof longest);
-  if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) return closed_with_errno(fd);
+  const std::int64_t end_ns = driver::monotonic_ns() + within_ns;
+  // A connect that may wait would wait for as long as the service's queue is full. This one may not, and is repeated.
+  while (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    constexpr int pause_ms = 5;
+    if ((errno != EAGAIN && errno != EINTR) || driver::monotonic_ns() >= end_ns) return closed_with_errno(fd);
+    static_cast<void>(::poll(nullptr, 0, pause_ms));
+  }
   return fd;
 }
 

@@ -8,8 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "abs_hil/rig/time_units.hpp"
 #include "driver/file_descriptor.hpp"
-#include "runtime/scheduling.hpp"
+#include "runtime/cycle_watch.hpp"
 
 namespace abs_hil::guardian {
 
@@ -56,8 +57,8 @@ struct Peer {
 [[nodiscard]] Peer peer_of(int socket) noexcept;
 
 /// A socket bound to `path`, or connected to it. Returns a descriptor, or -1 and errno. A service that stands still
-/// accepts nobody: once its queue is full, connect_to() fails with EAGAIN after `within_ms`.
+/// accepts nobody: once its queue is full, connect_to() fails with EAGAIN after `within_ns`.
 [[nodiscard]] int listen_at(const std::string& path);
-[[nodiscard]] int connect_to(const std::string& path, int within_ms = 2'000);
+[[nodiscard]] int connect_to(const std::string& path, std::int64_t within_ns = 2 * rig::ns_per_s);
 
 }  // namespace abs_hil::guardian

@@ -2,6 +2,7 @@
 
 #include <poll.h>
 #include <sys/mman.h>
+#include <sys/socket.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -9,6 +10,7 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
+#include <cstring>
 #include <ctime>
 #include <fstream>
 
@@ -16,6 +18,16 @@
 #include "rig/formatted_text.hpp"
 
 namespace abs_hil::guardian {
+
+namespace {
+
+constexpr std::size_t most_files = 4;
+union FileSpace {
+  cmsghdr header;
+  std::array<char, CMSG_SPACE(sizeof(int) * most_files)> bytes;
+};
+
+}  // namespace
 
 int open_pidfd(pid_t process) noexcept {
   constexpr unsigned int no_flags = 0;  // a pidfd is always close-on-exec
@@ -71,6 +83,45 @@ pid_t process_of(int pidfd) {
     if (field == "Pid:" && info >> pid) return std::max(pid, 0);
   }
   return 0;
+}
+
+bool send_packet(int socket, std::span<const iovec> parts, std::span<const int> files) noexcept {
+  msghdr packet{};
+  packet.msg_iov = const_cast<iovec*>(parts.data());  // sendmsg changes nothing of it
+  packet.msg_iovlen = parts.size();
+  FileSpace space{};
+  if (!files.empty() && files.size() <= most_files) {
+    packet.msg_control = space.bytes.data();
+    packet.msg_controllen = CMSG_SPACE(files.size_bytes());
+    cmsghdr* const control = CMSG_FIRSTHDR(&packet);
+    control->cmsg_level = SOL_SOCKET;
+    control->cmsg_type = SCM_RIGHTS;
+    control->cmsg_len = CMSG_LEN(files.size_bytes());
+    std::memcpy(CMSG_DATA(control), files.data(), files.size_bytes());
+  }
+  std::size_t size = 0;
+  for (const iovec& part : parts) size += part.iov_len;
+  return ::sendmsg(socket, &packet, MSG_NOSIGNAL | MSG_DONTWAIT) == static_cast<ssize_t>(size);
+}
+
+ssize_t receive_packet(int socket, std::span<iovec> parts, std::vector<driver::FileDescriptor>& files) {
+  FileSpace space{};
+  msghdr packet{};
+  packet.msg_iov = parts.data();
+  packet.msg_iovlen = parts.size();
+  packet.msg_control = space.bytes.data();
+  packet.msg_controllen = space.bytes.size();
+  ssize_t got = ::recvmsg(socket, &packet, MSG_CMSG_CLOEXEC | MSG_DONTWAIT);
+  // The other side closed with a message of ours unread. What it had said before is still there.
+  if (got < 0 && errno == ECONNRESET) got = ::recvmsg(socket, &packet, MSG_CMSG_CLOEXEC | MSG_DONTWAIT);
+  for (cmsghdr* c = CMSG_FIRSTHDR(&packet); got >= 0 && c != nullptr; c = CMSG_NXTHDR(&packet, c)) {
+    if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SCM_RIGHTS) continue;
+    std::array<int, most_files> passed{};
+    const std::size_t count = std::min((c->cmsg_len - CMSG_LEN(0)) / sizeof(int), passed.size());
+    std::memcpy(passed.data(), CMSG_DATA(c), sizeof(int) * count);
+    for (std::size_t i = 0; i < count; ++i) files.emplace_back(passed[i]);
+  }
+  return got;
 }
 
 int text_in_memory(const std::string& text) {

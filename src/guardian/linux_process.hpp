@@ -1,9 +1,13 @@
 #pragma once
 
 #include <sys/types.h>
+#include <sys/uio.h>
 
+#include <span>
 #include <string>
+#include <vector>
 
+#include "driver/file_descriptor.hpp"
 #include "guardian/board_guard.hpp"
 
 namespace abs_hil::guardian {
@@ -39,6 +43,13 @@ void run_guard(BoardGuard& guard, int orders, Between between) {
     if (!guard.over()) wait_for_guard(guard, orders);
   }
 }
+
+/// Sends one packet, made of `parts` in a row, with copies of `files`, at most 4. False and errno if it could not be
+/// sent whole, at once. Real-time safe.
+[[nodiscard]] bool send_packet(int socket, std::span<const iovec> parts, std::span<const int> files) noexcept;
+/// Receives the packet that waits: its bytes into `parts`, its descriptors into `files`. Returns its size; -1 and errno
+/// if there is none.
+[[nodiscard]] ssize_t receive_packet(int socket, std::span<iovec> parts, std::vector<driver::FileDescriptor>& files);
 
 /// A file in memory that holds the text; -1 and errno on failure.
 [[nodiscard]] int text_in_memory(const std::string& text);

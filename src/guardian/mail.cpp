@@ -7,20 +7,22 @@
 #include <array>
 #include <cerrno>
 #include <climits>
-#include <cstring>
 #include <system_error>
+#include <utility>
+#include <vector>
+
+#include "guardian/linux_process.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::guardian {
 
 namespace {
 
 static_assert(sizeof(Order) <= PIPE_BUF, "an order is written whole or not at all");
-constexpr std::size_t page_files = 2;
 
-union FileSpace {
-  cmsghdr header;
-  std::array<char, CMSG_SPACE(sizeof(int) * page_files)> bytes;
-};
+using rig::formatted;
+
+double ms_between(std::int64_t from_ns, std::int64_t to_ns) { return static_cast<double>(to_ns - from_ns) * 1e-6; }
 
 }  // namespace
 
@@ -47,42 +49,51 @@ bool Mail::next(Order& order) noexcept {
 
 void Mail::tell(const News& news, const Pages::Descriptors& pages) noexcept {
   News copy = news;
-  iovec part{&copy, sizeof copy};
-  msghdr packet{};
-  packet.msg_iov = &part;
-  packet.msg_iovlen = 1;
-  FileSpace space{};
-  if (pages.run >= 0) {
-    const std::array<int, page_files> files{pages.run, pages.guard};
-    packet.msg_control = space.bytes.data();
-    packet.msg_controllen = CMSG_SPACE(sizeof files);
-    cmsghdr* const control = CMSG_FIRSTHDR(&packet);
-    control->cmsg_level = SOL_SOCKET;
-    control->cmsg_type = SCM_RIGHTS;
-    control->cmsg_len = CMSG_LEN(sizeof files);
-    std::memcpy(CMSG_DATA(control), files.data(), sizeof files);
-  }
-  static_cast<void>(::sendmsg(news_out_.get(), &packet, MSG_NOSIGNAL | MSG_DONTWAIT));
+  const iovec whole{&copy, sizeof copy};
+  const std::array<int, 2> files{pages.run, pages.guard};
+  static_cast<void>(send_packet(news_out_.get(), {&whole, 1}, {files.data(), pages.run < 0 ? 0 : files.size()}));
 }
 
-bool Mail::next(News& news, driver::FileDescriptor& run_page, driver::FileDescriptor& guard_page) noexcept {
-  iovec part{&news, sizeof news};
-  msghdr packet{};
-  packet.msg_iov = &part;
-  packet.msg_iovlen = 1;
-  FileSpace space{};
-  packet.msg_control = space.bytes.data();
-  packet.msg_controllen = space.bytes.size();
-  if (::recvmsg(news_in_.get(), &packet, MSG_CMSG_CLOEXEC | MSG_DONTWAIT) != static_cast<ssize_t>(sizeof news)) {
-    return false;
-  }
-  const cmsghdr* const control = CMSG_FIRSTHDR(&packet);
-  if (control == nullptr || control->cmsg_len != CMSG_LEN(sizeof(int) * page_files)) return true;
-  std::array<int, page_files> files{};
-  std::memcpy(files.data(), CMSG_DATA(control), sizeof files);
-  run_page = driver::FileDescriptor(files[0]);
-  guard_page = driver::FileDescriptor(files[1]);
+bool Mail::next(News& news, driver::FileDescriptor& run_page, driver::FileDescriptor& guard_page) {
+  iovec whole{&news, sizeof news};
+  std::vector<driver::FileDescriptor> files;
+  if (receive_packet(news_in_.get(), {&whole, 1}, files) != static_cast<ssize_t>(sizeof news)) return false;
+  if (files.size() != 2) return true;
+  run_page = std::move(files[0]);
+  guard_page = std::move(files[1]);
   return true;
+}
+
+std::string to_text(const GuardianReport& report, int controller) {
+  std::string text(rig::description(report.reason));
+  text += formatted(" (reason %d, process %d)", static_cast<int>(report.reason), controller);
+  if (report.reason == rig::Reason::controller_silent) {
+    text += formatted(": no cycle for %.1f ms; the guardian ended it with SIGKILL before it wrote the safe state",
+                      static_cast<double>(report.silence_ns) * 1e-6);
+  }
+  if (report.reason == rig::Reason::safe_state_unverified && report.ended_controller) {
+    text += ": the outputs did not read back as zero after it had given them back; the guardian ended it with SIGKILL";
+  } else if (report.reason != rig::Reason::controller_silent && report.ended_controller) {
+    text += ": the controller did not give the outputs back in time; the guardian ended it with SIGKILL";
+  }
+  text += '\n';
+  if (!report.acted) return text + "the controller had already made the outputs safe: the guardian wrote nothing\n";
+  if (report.controller_gone_ns != 0) {
+    text += formatted("the controller's process had ended %.3f ms after the guardian noticed\n",
+                      ms_between(report.noticed_ns, report.controller_gone_ns));
+  } else if (!report.controller_lives) {
+    text += "THE CONTROLLER'S PROCESS DID NOT END: it hangs in the kernel\n";
+  }
+  if (report.verified) {
+    text += formatted("drive 0 and brake 0 written and read back %.3f ms after the guardian noticed, at try %d\n",
+                      ms_between(report.noticed_ns, report.verified_ns), report.tries);
+    return text;
+  }
+  text += formatted("SAFE STATE NOT VERIFIED after %d tries%s: ", report.tries,
+                    report.released ? ", then released by a person" : "");
+  text += driver::error_text(report.last_error);
+  text += "\nthe board may hold its last duties: press the E-stop (it cuts the drive only) and switch the rig off\n";
+  return text;
 }
 
 }  // namespace abs_hil::guardian

@@ -1,5 +1,3 @@
-#include "guardian/service.hpp"
-
 #include <fcntl.h>
 #include <grp.h>
 #include <pwd.h>
@@ -30,15 +28,13 @@
 #include "config/config_file.hpp"
 #include "config/config_json.hpp"
 #include "config/key_table.hpp"
-#include "guardian/flight_files.hpp"
-#include "guardian/kept_board.hpp"
+#include "guardian/guardian_program.hpp"
+#include "guardian/guarding.hpp"
 #include "guardian/launch_config.hpp"
 #include "guardian/linux_process.hpp"
 #include "guardian/machine_pause.hpp"
-#include "guardian/process_set_up.hpp"
-#include "guardian/service_manager.hpp"
-#include "guardian/sleep_watch.hpp"
 #include "guardian/standby.hpp"
+#include "guardian/systemd.hpp"
 #include "guardian/talker.hpp"
 
 namespace abs_hil::guardian {

@@ -39,13 +39,11 @@ Verdict Watchdog::look(const HeartbeatReading& reading) noexcept {
     const std::int64_t limit_ns = timeout_ns_ + (reading.stage == Stage::making_safe ? making_safe_ns_ : 0);
     if (!given_back && asked_back_ns_ < limit_ns) return Verdict::wait;
     reason_ = reading.taken_back_for;
-    must_end_controller_ = !given_back;
     return Verdict::make_safe;
   }
   // Any number that is no stage counts as `guarded`.
   if (reading.stage != Stage::released && silence_ns_ >= patience_ns(reading)) {
     reason_ = rig::Reason::controller_silent;
-    must_end_controller_ = true;
     return Verdict::make_safe;
   }
   return Verdict::wait;

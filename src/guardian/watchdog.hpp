@@ -46,8 +46,6 @@ class Watchdog {
   [[nodiscard]] rig::Reason reason() const noexcept { return reason_; }
   /// Time without a heartbeat up to the last look.
   [[nodiscard]] std::int64_t silence_ns() const noexcept { return silence_ns_; }
-  /// True if the controller may still write and must be ended first.
-  [[nodiscard]] bool must_end_controller() const noexcept { return must_end_controller_; }
 
  private:
   void measure_silence(const HeartbeatReading& reading) noexcept;
@@ -61,7 +59,6 @@ class Watchdog {
   std::uint64_t last_beats_{0};
   std::int64_t silence_ns_{0};
   std::int64_t asked_back_ns_{0};  ///< time since the controller was asked to give the outputs back
-  bool must_end_controller_{false};
   bool died_released_{false};
   rig::Reason reason_{rig::Reason::none};
 };

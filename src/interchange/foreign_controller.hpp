@@ -9,7 +9,7 @@
 #include "interchange/extracted_fmu.hpp"
 #include "interchange/foreign_code.hpp"
 #include "interchange/host_protocol.hpp"
-#include "runtime/latency_histogram.hpp"
+#include "runtime/cycle_statistics.hpp"
 
 namespace abs_hil::interchange {
 

@@ -4,7 +4,6 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/stat.h>
-#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -20,6 +19,7 @@
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/file_descriptor.hpp"
 #include "driver/monotonic_time.hpp"
+#include "guardian/linux_process.hpp"
 
 namespace abs_hil::program {
 
@@ -82,14 +82,7 @@ bool is_stopped(pid_t pid) {
 }
 
 /// False if the process may not be ended.
-bool send(int pidfd, int signal) {
-  return ::syscall(SYS_pidfd_send_signal, pidfd, signal, nullptr, 0) == 0 || errno != EPERM;
-}
-
-bool has_ended(int pidfd) {
-  pollfd ended{pidfd, POLLIN, 0};
-  return ::poll(&ended, 1, 0) > 0;
-}
+bool send(int pidfd, int signal) { return guardian::send_signal(pidfd, signal) || errno != EPERM; }
 
 }  // namespace
 
@@ -130,15 +123,14 @@ void end_owners(std::vector<BoardOwner>& owners,
   const std::int64_t asked_ns = driver::monotonic_ns();
   std::vector<Process> left;
   for (BoardOwner& owner : owners) {
-    constexpr unsigned int no_flags = 0;
-    left.push_back({owner, FileDescriptor(static_cast<int>(::syscall(SYS_pidfd_open, owner.pid, no_flags)))});
+    left.push_back({owner, FileDescriptor(guardian::open_pidfd(owner.pid))});
     owner.ended = left.back().pidfd.get() < 0 && errno == ESRCH;
     if (!is_stopped(owner.pid)) left.back().refused = !send(left.back().pidfd.get(), SIGTERM);
   }
   for (std::int64_t now_ns = asked_ns; now_ns < asked_ns + give_up_ns; now_ns = driver::monotonic_ns()) {
     bool done = true;
     for (auto& [owner, pidfd, refused] : left) {
-      if (!owner.ended) owner.ended = has_ended(pidfd.get());
+      if (!owner.ended) owner.ended = guardian::has_ended(pidfd.get());
       if (owner.ended || refused) continue;
       done = false;
       if (owner.killed) continue;

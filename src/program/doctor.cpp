@@ -9,7 +9,6 @@
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
 #include "guardian/guarding.hpp"
-#include "guardian/service_call.hpp"
 #include "program/exit_status.hpp"
 #include "program/subcommands.hpp"
 #include "run/run.hpp"

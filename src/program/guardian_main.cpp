@@ -4,9 +4,7 @@
 
 #include "abs_hil/driver/backend.hpp"
 #include "abs_hil/program/program.hpp"
-#include "guardian/guard_of_run.hpp"
-#include "guardian/process_set_up.hpp"
-#include "guardian/service.hpp"
+#include "guardian/guardian_program.hpp"
 
 namespace abs_hil {
 

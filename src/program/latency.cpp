@@ -13,7 +13,6 @@
 #include "program/exit_status.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
-#include "runtime/histogram_file.hpp"
 
 namespace abs_hil::program {
 

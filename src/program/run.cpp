@@ -18,7 +18,7 @@
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
 #include "files/result_file.hpp"
-#include "guardian/kept_board.hpp"
+#include "guardian/guarding.hpp"
 #include "program/exit_status.hpp"
 #include "program/foreign_run.hpp"
 #include "program/questions.hpp"
@@ -28,7 +28,7 @@
 #include "program/subcommands.hpp"
 #include "run/run_summary.hpp"
 #include "runtime/board_policy.hpp"
-#include "runtime/overrun_reporter.hpp"
+#include "runtime/record_pump.hpp"
 
 namespace abs_hil::program {
 

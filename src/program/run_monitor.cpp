@@ -26,15 +26,6 @@ std::uint64_t silent_cycles_max(const config::Settings& s) {
   return static_cast<std::uint64_t>(std::max(least, cycles));
 }
 
-std::string name_of(runtime::RealtimeMode mode) {
-  switch (mode) {
-    case runtime::RealtimeMode::require: return "require";
-    case runtime::RealtimeMode::prefer: return "prefer";
-    case runtime::RealtimeMode::off: return "off";
-  }
-  return "off";
-}
-
 }  // namespace
 
 std::string guardian_launch_json(const RunRequest& request, const std::filesystem::path& record_prefix,
@@ -47,7 +38,7 @@ std::string guardian_launch_json(const RunRequest& request, const std::filesyste
                                         .backend = s.backend,
                                         .version = ABS_HIL_VERSION,
                                         .signals = signals,
-                                        .realtime = name_of(s.realtime.mode),
+                                        .realtime = s.realtime.mode,
                                         .record_prefix = record_prefix.string()});
 }
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "guardian/guardian_process.hpp"
+#include "guardian/guard.hpp"
 #include "guardian/guarding.hpp"
 #include "guardian/shared_region.hpp"
 #include "program/command_line.hpp"

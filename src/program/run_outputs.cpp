@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 
 #include "config/config_error.hpp"
-#include "runtime/histogram_file.hpp"
 #include "telemetry/lcm_url.hpp"
 
 namespace abs_hil::program {

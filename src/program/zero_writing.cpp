@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "driver/monotonic_time.hpp"
+#include "guardian/guarding.hpp"
 
 namespace abs_hil::program {
 
@@ -20,15 +21,6 @@ constexpr std::chrono::milliseconds pause{2};
 bool has_reached(const driver::IoResult& result) {
   return result.ok() || result.error == driver::IoError::read_back_mismatch ||
          result.error == driver::IoError::no_answer;
-}
-
-std::unique_ptr<driver::SafeStateWriter> make_writer(const driver::DriverOptions& options) {
-  const driver::ChosenBackend chosen = driver::chosen_backend(options);
-  driver::RunFacts facts = options.facts();
-  facts.beside_guardian = true;
-  auto writer = chosen.entry.make_safe_state_writer(chosen.options, facts);
-  writer->prepare();
-  return writer;
 }
 
 /// The same board, whether the options name its address or not.
@@ -96,7 +88,11 @@ void ZeroWriting::write_zeros(const std::shared_ptr<State>& state, std::size_t b
     driver::IoResult result{driver::IoError::disconnected};
     std::string problem;
     try {
-      if (!writer) writer = make_writer(options);
+      if (!writer) {
+        auto made = guardian::safe_state_writer_of(options, true);
+        made->prepare();
+        writer = std::move(made);
+      }
       result = writer->make_safe();
       if (!result.ok()) problem = driver::error_text(result);
     } catch (const std::exception& error) {

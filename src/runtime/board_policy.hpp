@@ -7,7 +7,6 @@
 #include "driver/factory.hpp"
 #include "driver/injection/injection.hpp"
 #include "runtime/gate_options.hpp"
-#include "runtime/unsafe_options.hpp"
 #include "runtime/weak_values.hpp"
 
 namespace abs_hil::runtime {

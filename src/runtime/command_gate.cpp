@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "abs_hil/rig/time_units.hpp"
-#include "runtime/single_writer.hpp"
+#include "runtime/cycle_statistics.hpp"
 
 namespace abs_hil::runtime {
 

@@ -1,11 +1,84 @@
 #include "runtime/cycle_statistics.hpp"
 
-#include "runtime/single_writer.hpp"
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "abs_hil/rig/time_units.hpp"
 
 namespace abs_hil::runtime {
 
 namespace {
+
 constexpr std::uint64_t one = 1;
+
+using Columns = std::array<const LatencyHistogram*, 5>;
+
+/// Index one past the last bin in use, at least 1.
+std::size_t bins_in_use(const Columns& columns) {
+  std::size_t used = 1;
+  for (const LatencyHistogram* column : columns) {
+    const auto greatest = static_cast<std::size_t>(column->max_ns() / rig::ns_per_us);
+    used = std::max(used, std::min(greatest + 1, LatencyHistogram::bins));
+  }
+  return used;
+}
+
+void append_number(std::string& text, fmt::string_view format, std::uint64_t value) {
+  fmt::format_to(std::back_inserter(text), fmt::runtime(format), value);
+}
+
+template <typename Value>
+void append_line(std::string& text, const char* title, fmt::string_view format, const Columns& columns, Value value) {
+  text += title;
+  for (const LatencyHistogram* column : columns) append_number(text, format, value(*column));
+  text += '\n';
+}
+
+}  // namespace
+
+void LatencyHistogram::add(std::int64_t duration_ns) noexcept {
+  const std::int64_t ns = std::max<std::int64_t>(duration_ns, 0);
+  const auto bin = static_cast<std::size_t>(ns / rig::ns_per_us);
+  if (bin < bins) {
+    add_as_single_writer(counts_[bin], std::uint32_t{1});
+  } else {
+    add_as_single_writer(overflows_, one);
+  }
+  add_as_single_writer(count_, one);
+  add_as_single_writer(sum_ns_, ns);
+  if (ns < min_ns_.load(std::memory_order_relaxed)) min_ns_.store(ns, std::memory_order_relaxed);
+  if (ns > max_ns()) max_ns_.store(ns, std::memory_order_relaxed);
+}
+
+std::int64_t LatencyHistogram::min_ns() const noexcept {
+  return count() == 0 ? 0 : min_ns_.load(std::memory_order_relaxed);
+}
+
+rig::DurationQuantiles LatencyHistogram::summary() const noexcept {
+  const std::uint64_t total = count();
+  if (total == 0) return {};
+  const double max_us = rig::in_us(max_ns());
+  rig::DurationQuantiles result{max_us, max_us, max_us, max_us};
+
+  struct Wanted {
+    double fraction;
+    double& value_us;
+  };
+  const std::array<Wanted, 3> wanted{{{0.5, result.p50_us}, {0.99, result.p99_us}, {0.999, result.p99_9_us}}};
+  std::size_t next = 0;
+  std::uint64_t seen = 0;
+  // Stops at the last quantile: the loop visits only few of the bins.
+  for (std::size_t bin = 0; bin < bins && next < wanted.size(); ++bin) {
+    seen += in_bin(bin);
+    while (next < wanted.size() &&
+           static_cast<double>(seen) >= std::ceil(wanted[next].fraction * static_cast<double>(total))) {
+      wanted[next++].value_us = std::min(static_cast<double>(bin + 1), max_us);
+    }
+  }
+  return result;
 }
 
 void CycleStatistics::add(const rig::CycleTiming& timing) noexcept {
@@ -46,6 +119,31 @@ rig::TimingSummary CycleStatistics::summary() const noexcept {
           .write = write_.summary(),
           .cycle_time = cycle_time_.summary(),
           .overruns = overruns()};
+}
+
+std::string cyclictest_histogram(const CycleStatistics& statistics) {
+  const Columns columns{&statistics.wakeup_latency(), &statistics.read(), &statistics.control(), &statistics.write(),
+                        &statistics.cycle_time()};
+  std::string text =
+      "# abs_hil, us; columns: wake-up latency, read, control, write, whole cycle\n"
+      "# Histogram\n";
+  const std::size_t used = bins_in_use(columns);
+  for (std::size_t bin = 0; bin < used; ++bin) {
+    append_number(text, "{:06}", bin);
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      append_number(text, i == 0 ? " {:06}" : "\t{:06}", columns[i]->in_bin(bin));
+    }
+    text += '\n';
+  }
+  using Histogram = const LatencyHistogram&;
+  const auto us = [](std::int64_t ns) { return static_cast<std::uint64_t>(ns / rig::ns_per_us); };
+  append_line(text, "# Total:", " {:09}", columns, [](Histogram h) { return h.count() - h.overflows(); });
+  append_line(text, "# Min Latencies:", " {:05}", columns, [us](Histogram h) { return us(h.min_ns()); });
+  append_line(text, "# Avg Latencies:", " {:05}", columns,
+              [us](Histogram h) { return h.count() == 0 ? 0 : us(h.sum_ns() / static_cast<std::int64_t>(h.count())); });
+  append_line(text, "# Max Latencies:", " {:05}", columns, [us](Histogram h) { return us(h.max_ns()); });
+  append_line(text, "# Histogram Overflows:", " {:05}", columns, [](Histogram h) { return h.overflows(); });
+  return text;
 }
 
 }  // namespace abs_hil::runtime

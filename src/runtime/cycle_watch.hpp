@@ -5,9 +5,18 @@
 #include "abs_hil/driver/rig_driver.hpp"
 #include "abs_hil/rig/cycle_record.hpp"
 #include "abs_hil/rig/reason.hpp"
-#include "runtime/scheduling.hpp"
 
 namespace abs_hil::runtime {
+
+/// What a thread has of the real-time set-up, as the kernel tells it.
+struct Scheduling {
+  int fifo_priority{0};       ///< SCHED_FIFO priority; 0: another policy
+  bool memory_locked{false};  ///< some memory of its process is locked
+  /// True if a thread that needs `other` can be supervised from here: neither weaker in the scheduler nor in memory.
+  [[nodiscard]] constexpr bool at_least(const Scheduling& other) const noexcept {
+    return fifo_priority >= other.fifo_priority && (memory_locked || !other.memory_locked);
+  }
+};
 
 /// What a cycle learns from its guardian when it beats.
 struct GuardianSign {

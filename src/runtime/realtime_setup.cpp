@@ -1,24 +1,167 @@
 #include "runtime/realtime_setup.hpp"
 
 #include <fcntl.h>
+#include <malloc.h>
 #include <pthread.h>
 #include <sched.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <csignal>
+#include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
-
-#include "runtime/memory_locking.hpp"
-#include "runtime/realtime_fixes.hpp"
+#include <fstream>
 
 namespace abs_hil::runtime {
 
 namespace {
+
+/// This program, and the guardian beside it: a guardian with fewer rights than its controller is refused.
+std::string program_paths() {
+  std::array<char, 4096> path{};
+  const ssize_t size = ::readlink("/proc/self/exe", path.data(), path.size());
+  if (size <= 0) return "$(command -v abs_hil) $(command -v abs_guardian)";
+  const std::string program(path.data(), static_cast<std::size_t>(size));
+  const std::string guardian = program.substr(0, program.rfind('/') + 1) + "abs_guardian";
+  const bool has_guardian = guardian != program && ::access(guardian.c_str(), F_OK) == 0;
+  return has_guardian ? program + " " + guardian : program;
+}
+
+/// Shell commands that permit this program SCHED_FIFO and locked memory permanently.
+std::string privilege_fix() {
+  return "sudo groupadd -f realtime && sudo usermod -aG realtime $USER\n"
+         "printf '@realtime - rtprio 98\\n@realtime - memlock unlimited\\n' | sudo tee "
+         "/etc/security/limits.d/99-realtime.conf   # then log in again\n"
+         "or, for these programs alone: sudo setcap cap_sys_nice,cap_ipc_lock+ep " +
+         program_paths();
+}
+
+/// The same commands, and fixes for other causes that keep the scheduler from granting `priority`.
+std::string fifo_fix(int priority) {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_RTPRIO, &limit) == 0 && limit.rlim_cur > 0 && limit.rlim_cur < static_cast<rlim_t>(priority)) {
+    return "--set realtime.priority=" + std::to_string(limit.rlim_cur) + ", which the limit allows, or:\n" +
+           privilege_fix();
+  }
+  if (::geteuid() == 0) {
+    // Root can fail in a container without CAP_SYS_NICE, or in a control group without real-time bandwidth.
+    return "in a container: docker run --cap-add SYS_NICE --cap-add IPC_LOCK --ulimit rtprio=98 --ulimit memlock=-1 "
+           "...\n"
+           "in a control group without real-time bandwidth: sudo sysctl -w kernel.sched_rt_runtime_us=-1\n" +
+           privilege_fix();
+  }
+  return privilege_fix();
+}
+
+/// Shell commands that let the group realtime open /dev/cpu_dma_latency.
+std::string cpu_latency_fix() {
+  return "echo 'KERNEL==\"cpu_dma_latency\", GROUP=\"realtime\", MODE=\"0660\"' | sudo tee "
+         "/etc/udev/rules.d/99-cpu-dma-latency.rules\n"
+         "sudo udevadm control --reload && sudo udevadm trigger --name-match=cpu_dma_latency";
+}
+
+constexpr std::size_t heap_bytes = 4U << 20U;
+constexpr std::size_t stack_bytes = 256U << 10U;
+constexpr std::size_t page_bytes = 4096;
+
+/// "VmLck" of /proc/self/status, kB; 0 if it cannot be read.
+long locked_kB() {
+  std::ifstream status("/proc/self/status");
+  std::string field;
+  while (status >> field) {
+    long kB = 0;
+    if (field == "VmLck:" && status >> kB) return kB;
+  }
+  return 0;
+}
+
+void touch(volatile unsigned char* memory, std::size_t bytes) {
+  for (std::size_t at = 0; at < bytes; at += page_bytes) memory[at] = 0;
+}
+
+long faults() {
+  rusage usage{};
+  getrusage(RUSAGE_THREAD, &usage);
+  return usage.ru_minflt + usage.ru_majflt;
+}
+
+/// Touches the stack below this frame; returns the number of page faults.
+[[gnu::noinline]] long touch_stack() {
+  // Written by touch(). NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init)
+  std::array<volatile unsigned char, stack_bytes> pages;
+  const long before = faults();
+  touch(pages.data(), pages.size());
+  return faults() - before;
+}
+
+/// Touches a block of the heap and frees it; returns the number of page faults, -1 if there is no memory.
+long touch_heap() {
+  void* const block = std::malloc(heap_bytes);
+  if (block == nullptr) return -1;
+  const long before = faults();
+  touch(static_cast<volatile unsigned char*>(block), heap_bytes);
+  const long count = faults() - before;
+  std::free(block);
+  return count;
+}
+
+RealtimeStep judged(RealtimeStep step, long faults_when_repeated) {
+  step.obtained = faults_when_repeated == 0;
+  if (faults_when_repeated < 0) {
+    step.detail = "cannot allocate memory: the limit for locked memory (RLIMIT_MEMLOCK) is too low";
+    step.fix = privilege_fix();
+  } else {
+    step.detail = std::to_string(faults_when_repeated) + " page faults when touched again";
+    if (!step.obtained) step.fix = privilege_fix();
+  }
+  return step;
+}
+
+/// Locks all memory of this process, present and future.
+RealtimeStep lock_memory() {
+  RealtimeStep step{.what = "memory locked (mlockall)"};
+  const int result = mlockall(MCL_CURRENT | MCL_FUTURE);
+  const int error = errno;
+  const long kB = locked_kB();
+  step.obtained = result == 0 && kB > 0;
+  if (step.obtained) {
+    step.detail = std::to_string(kB / 1024) + " MB locked";
+  } else {
+    rlimit limit{};
+    getrlimit(RLIMIT_MEMLOCK, &limit);
+    step.detail = result != 0 ? std::strerror(error) : "the kernel shows no locked memory";
+    step.detail += " (RLIMIT_MEMLOCK " +
+                   (limit.rlim_cur == RLIM_INFINITY ? "unlimited" : std::to_string(limit.rlim_cur / 1024) + " kB") +
+                   ")";
+    step.fix = privilege_fix();
+  }
+  return step;
+}
+
+/// Grows the heap once, touches it, and keeps it from shrinking.
+RealtimeStep prefault_heap() {
+  // One heap for all threads, no memory returned to the kernel, no block in a mapping of its own. Pages once touched
+  // therefore stay in memory; mallopt(3). The heap has one lock for all threads: the cycle never allocates, whatever
+  // the driver (the tests runtime_proofs and driver_proofs).
+  mallopt(M_ARENA_MAX, 1);
+  mallopt(M_TRIM_THRESHOLD, -1);
+  mallopt(M_MMAP_MAX, 0);
+  static_cast<void>(touch_heap());
+  return judged({.what = "heap prefaulted, 4 MB"}, touch_heap());
+}
+
+/// Touches the part of the calling thread's stack that a cycle may use.
+RealtimeStep prefault_stack() {
+  static_cast<void>(touch_stack());
+  return judged({.what = "stack prefaulted, 256 kB"}, touch_stack());
+}
 
 std::string limit_text(int resource) {
   rlimit limit{};
@@ -79,6 +222,16 @@ RealtimeStep least_timer_slack() {
 }
 
 }  // namespace
+
+Scheduling scheduling_of_this_thread() {
+  int policy = SCHED_OTHER;
+  sched_param parameters{};
+  const bool known = pthread_getschedparam(pthread_self(), &policy, &parameters) == 0;
+  // The flag means that children do not inherit the policy.
+  constexpr int reset_on_fork = 0x40000000;
+  const bool fifo = known && (policy & ~reset_on_fork) == SCHED_FIFO;
+  return {.fifo_priority = fifo ? parameters.sched_priority : 0, .memory_locked = locked_kB() > 0};
+}
 
 bool RealtimeReport::realtime() const noexcept {
   return !steps.empty() &&

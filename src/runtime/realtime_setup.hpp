@@ -6,9 +6,11 @@
 
 #include "abs_hil/rig/option.hpp"
 #include "runtime/cyclic_executive.hpp"
-#include "runtime/scheduling.hpp"
 
 namespace abs_hil::runtime {
+
+/// Of the calling thread and its process. Not real-time safe: it reads a file.
+[[nodiscard]] Scheduling scheduling_of_this_thread();
 
 /// Values of `--rt`.
 enum class RealtimeMode { require, prefer, off };

@@ -3,7 +3,6 @@
 #include <type_traits>
 
 #include "abs_hil/rig/scalar.hpp"
-#include "runtime/asked_lanes.hpp"
 #include "runtime/speed_window.hpp"
 
 namespace abs_hil::runtime {

@@ -1,4 +1,4 @@
-#include "guardian/guardian_process.hpp"
+#include "guardian/guard.hpp"
 
 #include <sys/stat.h>
 

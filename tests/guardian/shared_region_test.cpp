@@ -84,12 +84,13 @@ TEST_CASE("a launch configuration reads back; other text is refused") {
                             .backend = "rig",
                             .version = "1",
                             .signals = {"I_m", "zeta_N"},
-                            .realtime = "prefer",
+                            .realtime = runtime::RealtimeMode::require,
                             .record_prefix = "/tmp/a b/recorder"};
   const LaunchConfig read = parse_launch_config(to_json(config));
   CHECK(read.config_json == config.config_json);
   CHECK(read.record_prefix == config.record_prefix);
   CHECK(read.signals == config.signals);
+  CHECK(read.realtime == config.realtime);
   CHECK_THROWS_WITH(parse_launch_config("{}"), Catch::Matchers::Contains("not a launch configuration"));
   CHECK_THROWS_WITH(parse_launch_config("nonsense"), Catch::Matchers::Contains("not a launch configuration"));
 }

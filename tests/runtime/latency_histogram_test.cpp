@@ -1,5 +1,3 @@
-#include "runtime/latency_histogram.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -8,7 +6,7 @@
 #include <vector>
 
 #include "catch.hpp"
-#include "runtime/histogram_file.hpp"
+#include "runtime/cycle_statistics.hpp"
 
 using namespace abs_hil::runtime;
 

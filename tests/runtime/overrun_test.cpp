@@ -4,7 +4,7 @@
 
 #include "catch.hpp"
 #include "runtime/cyclic_executive.hpp"
-#include "runtime/overrun_reporter.hpp"
+#include "runtime/record_pump.hpp"
 #include "scripted_parts.hpp"
 
 using namespace abs_hil;

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <initializer_list>
-#include <string>
 
 #include "config/settings.hpp"
 #include "runtime/realtime_setup.hpp"
@@ -19,7 +18,13 @@ void ignore_signals(std::initializer_list<int> signals);
 void spare_from_oom();
 /// One priority above the controller's: a controller in an endless loop must not block its guardian.
 [[nodiscard]] runtime::RealtimeOptions realtime_options(const config::Settings& settings, runtime::RealtimeMode mode);
-/// "require", "off", or anything else for "prefer".
-[[nodiscard]] runtime::RealtimeMode realtime_mode_of(const std::string& name);
+
+/// True if abs_hil started this program as the guardian of one run.
+[[nodiscard]] bool started_by_a_run();
+/// The guardian of one run. Returns the exit status.
+[[nodiscard]] int guard_one_run();
+
+/// `abs_guardian serve ...`: the resident service. Returns the exit status.
+[[nodiscard]] int serve(int argc, const char* const* argv);
 
 }  // namespace abs_hil::guardian

@@ -1,12 +1,17 @@
-#include "guardian/sleep_watch.hpp"
+#include "guardian/systemd.hpp"
 
 #include <poll.h>
 #include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
+#include <cstddef>
+#include <cstdlib>
 #include <cstring>
+#include <string_view>
 #include <utility>
 
 #include "runtime/realtime_setup.hpp"
@@ -18,6 +23,27 @@
 namespace abs_hil::guardian {
 
 namespace {
+
+/// A socket connected to systemd's, made once. A path that begins with '@' is in the abstract namespace.
+int open_socket() noexcept {
+  const char* const path = std::getenv("NOTIFY_SOCKET");  // NOLINT(concurrency-mt-unsafe): before any thread
+  sockaddr_un address{};
+  if (path == nullptr || *path == '\0' || std::strlen(path) >= sizeof address.sun_path) return -1;
+  const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (fd < 0) return -1;
+  address.sun_family = AF_UNIX;
+  std::memcpy(address.sun_path, path, std::strlen(path) + 1);
+  if (*path == '@') address.sun_path[0] = '\0';
+  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + std::strlen(path));
+  if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), size) == 0) return fd;
+  ::close(fd);
+  return -1;
+}
+
+void notify(std::string_view text) noexcept {
+  if (ServiceManager::descriptor() < 0) return;
+  static_cast<void>(::send(ServiceManager::descriptor(), text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT));
+}
 
 void signal_event(const driver::FileDescriptor& event) {
   constexpr std::uint64_t one = 1;
@@ -144,6 +170,21 @@ Interruption SleepWatch::interruption() {
               [this](bool) {
                 if (going_to_sleep_) signal_event(dealt_with_);
               }};
+}
+
+int ServiceManager::descriptor() noexcept {
+  static const int fd = open_socket();
+  return fd;
+}
+
+void ServiceManager::ready() noexcept { notify("READY=1"); }
+
+void ServiceManager::alive() noexcept { notify("WATCHDOG=1"); }
+
+void ServiceManager::status(const std::string& text) {
+  if (text == told_) return;
+  told_ = text;
+  notify("STATUS=" + text);
 }
 
 }  // namespace abs_hil::guardian
