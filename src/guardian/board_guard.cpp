@@ -80,7 +80,7 @@ void BoardGuard::take(const Order& order) noexcept {
   switch (order.word) {
     case OrderWord::grant: return grant(order);
     case OrderWord::look:
-      if (duty_ == Duty::keep && lease_ == 0) look_at_board();
+      if (duty_ == Duty::keep && lease_ == 0 && looked_ns_ != now_ns_) look_at_board();  // once, whoever floods it
       return tell(NewsWord::looked);
     case OrderWord::take_back: return take_back(order.reason);
     case OrderWord::close:
@@ -182,6 +182,7 @@ driver::IoResult BoardGuard::access(bool only_look) noexcept {
 
 void BoardGuard::look_at_board() noexcept {
   const driver::IoError before = board_.error;
+  looked_ns_ = now_ns_;
   board_ = access(board_.ok());
   const bool foreign = board_.error == driver::IoError::foreign_writer;
   foreign_duties_ =

@@ -118,6 +118,7 @@ class BoardGuard {
   driver::IoResult board_{driver::IoError::not_active};
   bool safe_{false};
   std::int64_t next_keep_ns_{0};
+  std::int64_t looked_ns_{-1};
   int looks_until_believed_{0};  ///< of a run that says that its outputs are safe
   int foreign_duties_{0};        ///< grows with each look that finds an output on
 

@@ -128,7 +128,9 @@ std::string guardian_program() {
 }
 
 GuardianProcess::GuardianProcess(const SharedRecorder& recorder, std::string program, std::string launch_config_json)
-    : recorder_(recorder), program_(std::move(program)), launch_config_(std::move(launch_config_json)) {}
+    : recorder_(recorder), program_(std::move(program)), launch_config_(std::move(launch_config_json)) {
+  static_cast<void>(pages_.leave_guard_page());
+}
 
 GuardianProcess::~GuardianProcess() { static_cast<void>(end()); }
 

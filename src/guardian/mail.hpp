@@ -48,6 +48,7 @@ struct Order {
   pid_t pid{0};
   rig::Reason reason{rig::Reason::none};
   std::int64_t timeout_ns{0};
+  [[nodiscard]] bool operator==(const Order&) const = default;
 };
 
 /// What the guard tells the talker.

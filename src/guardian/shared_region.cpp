@@ -68,6 +68,8 @@ bool SharedMemory::refuse_further_writers() const noexcept {
   return ::fcntl(fd_.get(), F_ADD_SEALS, F_SEAL_FUTURE_WRITE | F_SEAL_SEAL) == 0;
 }
 
+bool SharedMemory::make_read_only() const noexcept { return ::mprotect(data_, bytes_, PROT_READ) == 0; }
+
 SharedMemory::~SharedMemory() {
   if (data_ != nullptr) ::munmap(data_, bytes_);
 }

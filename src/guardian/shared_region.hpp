@@ -32,6 +32,8 @@ class SharedMemory {
 
   /// From now on nobody can map it for writing; mappings that exist stay writable. False if the kernel cannot do it.
   [[nodiscard]] bool refuse_further_writers() const noexcept;
+  /// From now on this process can only read it here. False if the kernel cannot do it.
+  [[nodiscard]] bool make_read_only() const noexcept;
   [[nodiscard]] int descriptor() const noexcept { return fd_.get(); }
   [[nodiscard]] void* data() const noexcept { return data_; }
 
@@ -67,6 +69,8 @@ class Pages {
   /// Of pages that this object made.
   [[nodiscard]] Descriptors descriptors() const noexcept { return {run_.descriptor(), guard_.descriptor()}; }
   [[nodiscard]] bool refuse_further_writers() const noexcept { return guard_.refuse_further_writers(); }
+  /// A run that made the pages itself gives up writing the guard's: no stray pointer can forge its guardian's beats.
+  [[nodiscard]] bool leave_guard_page() const noexcept { return guard_.make_read_only(); }
 
  private:
   Pages(SharedMemory run, SharedMemory guard) : run_(std::move(run)), guard_(std::move(guard)) {}

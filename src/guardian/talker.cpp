@@ -117,7 +117,10 @@ void Talker::close_holder() {
   order({.word = OrderWord::close, .lease = held_->lease});
 }
 
-void Talker::order(const Order& order) { outbox_.push_back(order); }
+/// One that waits already is not put in again: a flood of requests must not grow the outbox.
+void Talker::order(const Order& order) {
+  if (std::ranges::find(outbox_, order) == outbox_.end()) outbox_.push_back(order);
+}
 
 void Talker::hear(Client& client) {
   auto said = receive_message(client.socket.get(), 0);

@@ -208,11 +208,30 @@ class HostileClients(HostileTest):
             send(self.holder, COVER, b'', [deep, deep])
             os.close(deep)
 
+        def blocking_close():
+            """Of a descriptor with unsent data and nobody who reads: the talker waits in close() for a second."""
+            with socket.create_server(('127.0.0.1', 0)) as server:
+                lingers = socket.create_connection(server.getsockname())
+                lingers.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack('ii', 1, 1))
+                lingers.setblocking(False)
+                with contextlib.suppress(BlockingIOError):
+                    while True:
+                        lingers.send(bytes(65536))
+                begin = time.monotonic()
+                with connect(service.socket) as client:
+                    send(client, ASK, b'a board', [lingers.fileno()])
+                    lingers.close()
+                    receive(client)  # the refusal
+                with connect(service.socket) as client:
+                    send(client, STATE)
+                    receive(client)
+                self.assertGreater(time.monotonic() - begin, 0.5, 'the talker did not wait')
+
         def garbage():
             with connect(service.socket) as client, contextlib.suppress(OSError):
                 for n in range(1000):
                     client.send(os.urandom(n % 200 + 1))
-        return messages, connections, huge_memory, nested_json, garbage
+        return messages, connections, huge_memory, nested_json, blocking_close, garbage
 
     def test_guard_looks_on(self):
         emulator = self.emulator()
@@ -221,14 +240,37 @@ class HostileClients(HostileTest):
         page = mmap.mmap(files[1], 0, mmap.MAP_SHARED, mmap.PROT_READ)
         with self.assertRaises(PermissionError):
             mmap.mmap(files[1], 0, mmap.MAP_SHARED, mmap.PROT_READ | mmap.PROT_WRITE)
-        pauses = []
-        for attack in self.attacks(service):
-            pauses.append(self.longest_pause(page, attack))
-            print(f'{attack.__name__}: the guard looked at least every {pauses[-1]:.1f} ms', flush=True)
+        for attack in self.attacks(service):  # 5 ms from look to look; the rest is this computer's
+            self.hold([self.longest_pause(page, attack) for _ in range(TRIES)],
+                      f'longest time without a look under {attack.__name__}', 10)
         writer = ForeignWriter(emulator)
         self.foreign_duty(emulator, writer)
-        # 5 ms from look to look; the rest is this computer's.
-        self.assertLessEqual(sorted(pauses)[len(pauses) // 2], 10.0, pauses)
+        self.assertIsNone(service.process.poll())
+
+    def test_a_flood_of_requests_for_zeros(self):
+        """Each makes the talker ask the guard for a look at the board."""
+        emulator = self.emulator()
+        service = self.service(emulator)
+        over = threading.Event()
+
+        def flood():
+            with contextlib.ExitStack() as all_of_them:
+                visitors = [all_of_them.enter_context(connect(service.socket)) for _ in range(20)]
+                for visitor in visitors:
+                    visitor.setblocking(False)
+                while not over.is_set():
+                    for visitor in visitors:
+                        with contextlib.suppress(OSError):
+                            send(visitor, MAKE_SAFE, f'pci, root {emulator.root}, bdf the only one'.encode())
+        flooding = threading.Thread(target=flood)
+        flooding.start()
+        try:
+            writer = ForeignWriter(emulator)
+            self.hold([self.foreign_duty(emulator, writer, n % 2) for n in range(4 * TRIES)],
+                      'foreign duty under a flood of requests for zeros', 20)
+        finally:
+            over.set()
+            flooding.join()
         self.assertIsNone(service.process.poll())
 
     def test_talker_that_hangs_or_dies_leaves_the_run_alone(self):

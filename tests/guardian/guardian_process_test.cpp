@@ -1,11 +1,12 @@
-#include "guardian/guard.hpp"
-
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <fstream>
 
 #include "catch.hpp"
+#include "guardian/guard.hpp"
 #include "guardian/linux_process.hpp"
 #include "temporary_folder.hpp"
 
@@ -32,6 +33,22 @@ TEST_CASE("handed-over outputs stay handed over until the guardian has read it")
   CHECK(guardian.end() == GuardEnd::insisting);
   CHECK(guardian.pages().run().stage.load() == Stage::handed_over);
   REQUIRE(::kill(pid, SIGKILL) == 0);  // the guardian still ran
+}
+
+TEST_CASE("a run cannot forge its guardian's beats by a stray pointer") {
+  const SharedRecorder recorder(1);
+  GuardianProcess guardian(recorder, "none", "{}");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    std::signal(SIGSEGV, SIG_DFL);
+    guardian.pages().guard().guardian_beats.store(1);
+    ::_exit(0);
+  }
+  int status = 0;
+  REQUIRE(::waitpid(child, &status, 0) == child);
+  CHECK(WIFSIGNALED(status));
+  CHECK(WTERMSIG(status) == SIGSEGV);
+  CHECK(guardian.pages().guard().guardian_beats.load() == 0);
 }
 
 TEST_CASE("a guardian that is weaker than its controller is refused") {
