@@ -9,6 +9,7 @@
 #include <sstream>
 #include <utility>
 
+#include "abs_hil/rig/time_units.hpp"
 #include "guardian/linux_process.hpp"
 #include "rig/formatted_text.hpp"
 
@@ -81,7 +82,10 @@ void Talker::step(int timeout_ms) {
   }
   if (files[0].revents != 0) accept_clients();
   ask_guard_for_next();
-  while (!outbox_.empty() && parts_.mail.order(outbox_.front())) outbox_.erase(outbox_.begin());
+  while (!outbox_.empty() && now_ns >= next_look_ns_ && parts_.mail.order(outbox_.front())) {
+    if (outbox_.front().word == OrderWord::look) next_look_ns_ = now_ns + rig::ns_per_ms;
+    outbox_.erase(outbox_.begin());
+  }
 }
 
 /// Takes all that wait, so that no queue of silent ones keeps others out. Of too many, the longest silent one goes.

@@ -113,7 +113,8 @@ class Talker {
   TalkerParts parts_;
   std::vector<Client> clients_{};
   std::vector<Order> outbox_{};
-  int asking_{-1};  ///< socket of the client for whom the guard was asked for a lease
+  std::int64_t next_look_ns_{0};  ///< a flood of requests must not keep the guard at the board
+  int asking_{-1};                ///< socket of the client for whom the guard was asked for a lease
   std::optional<Held> held_{};
   News latest_{};
   bool knows_board_{false};
