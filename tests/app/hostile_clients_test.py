@@ -23,7 +23,7 @@ import unittest
 TRIES = int(sys.argv.pop(2)) if len(sys.argv) > 2 and sys.argv[2].isdigit() else 5
 
 from program import PROGRAM  # noqa: E402
-from resident_guardian import GUARDIAN, ResidentTest, SAFE, connect, settings, wait_until  # noqa: E402
+from resident_guardian import GUARDIAN, ResidentTest, SAFE, connect, not_held_up, settings, wait_until  # noqa: E402
 from rig_emulator import skip_unless_possible  # noqa: E402
 
 MAGIC = 0x6C656132
@@ -86,8 +86,9 @@ class HostileTest(ResidentTest):
 
     def foreign_duty(self, emulator, writer, pwm=0):
         """ms until it is gone, by the card's clock."""
-        before_ns = time.monotonic_ns()
-        writer.write(pwm, 3000)
+        with not_held_up():
+            before_ns = time.monotonic_ns()
+            writer.write(pwm, 3000)
         wait_until(lambda: emulator.widths().zero_since_ns is not None, 'a foreign duty stays on')
         return max(0, emulator.widths().zero_since_ns - before_ns) * 1e-6
 
@@ -103,12 +104,13 @@ class HostileTest(ResidentTest):
         def watch():
             nonlocal worst
             seen, since = None, time.monotonic()
-            while not done.is_set():
-                now, beats = time.monotonic(), struct.unpack_from('<Q', page)[0]
-                if beats != seen:
-                    seen, since = beats, now
-                worst = max(worst, (now - since) * 1e3)
-                time.sleep(0.0005)
+            with not_held_up():
+                while not done.is_set():
+                    now, beats = time.monotonic(), struct.unpack_from('<Q', page)[0]
+                    if beats != seen:
+                        seen, since = beats, now
+                    worst = max(worst, (now - since) * 1e3)
+                    time.sleep(0.0005)
         watcher = threading.Thread(target=watch)
         watcher.start()
         try:

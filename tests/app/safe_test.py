@@ -18,7 +18,7 @@ import unittest
 TRIES = int(sys.argv.pop(2)) if len(sys.argv) > 2 and sys.argv[2].isdigit() else 3
 
 from program import PROGRAM  # noqa: E402
-from resident_guardian import EXPERIMENT, ResidentTest, SAFE, settings, wait_until  # noqa: E402
+from resident_guardian import EXPERIMENT, ResidentTest, SAFE, not_held_up, settings, wait_until  # noqa: E402
 from rig_emulator import RigTest, skip_unless_possible  # noqa: E402
 
 COMMAND = pathlib.Path(PROGRAM).resolve().parent / 'abs_hil'  # as people start it
@@ -253,18 +253,6 @@ def timed_safe(emulator, folder, *args):
               f'read from a disk, {stolen_ticks() - stolen_before} ticks taken by other virtual machines; in the whole '
               f'try the emulated card waited {card_ns * 1e-6:.1f} ms for a processor', flush=True)
     return result, took_ms, waited_ns * 1e-6
-
-
-@contextlib.contextmanager
-def not_held_up():
-    """This process has the processor before others, where that is permitted; those that it starts have not."""
-    with contextlib.suppress(PermissionError):
-        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(1))
-    try:
-        yield
-    finally:
-        with contextlib.suppress(PermissionError):
-            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 def waited_for_processor_ns(pid):
