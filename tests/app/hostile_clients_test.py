@@ -298,7 +298,7 @@ class HostileClients(HostileTest):
                 talker = int(children.split()[1])  # the standby was started first
                 os.kill(talker, number)
                 _, words = program.communicate(timeout=30)
-                self.assertEqual(program.returncode, 0, words)
+                self.assertEqual(program.returncode, 0, words + service.said())
                 self.assertEqual(emulator.wire(), SAFE)
                 if number == signal.SIGKILL:
                     self.assertEqual(self.start(emulator).wait(timeout=30), 0)  # a new talker grants again
