@@ -7,7 +7,7 @@ set(ABS_HIL_ROOM_TABLE
   "rig | the vocabulary: measurement, command, parameters, brake map, tyre curve, cycle record, the tables of quantities, reasons and options' rows | "
   "control | the paper's laws, slip controllers, speed observer, brake actuator model, their options | rig"
   "plant_sim | the simulated wheels, tyre, brake, motor, encoders, roads, their options | rig"
-  "driver | `RigDriver` and its lifecycle, backends (`driver/pci`, `driver/can`, `driver/usb`), injected faults (`driver/injection`) | rig"
+  "driver | `RigDriver` and its lifecycle, backends (`driver/pci`, `driver/can`, `driver/usb`, `driver/hm2`), injected faults (`driver/injection`) | rig"
   "driver_sim | the simulated backend (`driver/sim`) | rig driver plant_sim"
   "emulator | the device side of the boards, for tests and `abs_rig_emulator`, shares no line with the drivers | rig plant_sim"
   "runtime | clocks, cyclic executive, command gate with its plausibility checks, rings, histograms, real-time set-up | rig driver"

@@ -5,6 +5,7 @@
 
 #include "abs_hil/driver/backend.hpp"
 #include "driver/can/can_backend.hpp"
+#include "driver/hm2/hm2_driver.hpp"
 #include "driver/pci/pci_backend.hpp"
 #include "driver/usb/usb_backend.hpp"
 
@@ -13,7 +14,7 @@ namespace abs_hil::driver {
 namespace {
 
 std::vector<Backend>& backend_table() {
-  static std::vector<Backend> entries{pci::pci_backend(), can::can_backend(), usb::usb_backend()};
+  static std::vector<Backend> entries{pci::pci_backend(), can::can_backend(), usb::usb_backend(), hm2::hm2_backend()};
   return entries;
 }
 

@@ -151,7 +151,9 @@ int conclude(const RunRequest& request, run::Run& run, const run::RunOutcome& ou
   summary.publish_failures = outputs.publish_failures();
   summary.csv_rows_lost = outputs.csv_rows_lost();
   if (rig::is_fault(outcome.reason)) {
-    run_monitor.write_record(request, outcome.reason, outcome.reason_value, summary.reason);
+    std::string account = summary.reason;
+    for (const std::string& line : driver->traffic()) account += '\n' + line;
+    run_monitor.write_record(request, outcome.reason, outcome.reason_value, account);
   }
   const std::vector<std::string> unwritten = outputs.write(summary, environment(request.command_line, run, outcome));
   if (!request.in_series) {

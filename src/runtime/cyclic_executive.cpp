@@ -106,6 +106,10 @@ void CyclicExecutive::run_cycle(rig::CycleRecord& record) noexcept {
     if (io_error_.ok()) io_error_ = read;
     gate_.latch(driver::reason_of(read, rig::Reason::driver_read_failed), static_cast<double>(read.error));
   } else {
+    if (rig::Command acted; driver_.took_other_command(acted)) {
+      gate_.note_sent(acted);
+      logic_.commanded(acted);
+    }
     valid = gate_.check_measurement(latest, woken_ns, record.timing.read_ns);
     if (valid || record.sequence == 0) measurement_ = latest;
   }

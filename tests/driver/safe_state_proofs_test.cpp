@@ -3,6 +3,7 @@
 
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <array>
 #include <deque>
 
@@ -10,11 +11,13 @@
 #include "catch.hpp"
 #include "driver/can/can_safe_state.hpp"
 #include "driver/file_descriptor.hpp"
+#include "driver/hm2/hm2_safe_state.hpp"
 #include "driver/own_handle_writer.hpp"
 #include "driver/pci/pci_safe_state.hpp"
 #include "driver/pci/register_map.hpp"
 #include "driver/usb/usb_safe_state.hpp"
 #include "emulator/can_node.hpp"
+#include "hm2/register_board.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::driver;
@@ -101,7 +104,61 @@ std::deque<can::Frame> answers_of_a_node() {
   return frames;
 }
 
+/// An hm2 board that describes itself, then shows inputs only, without allocating.
+struct HonestThenFixed final : hm2::Link {
+  explicit HonestThenFixed(const bool& answers) : answers_(answers) {}
+  int send(std::span<const std::uint8_t> bytes) noexcept override {
+    size_ = 0;
+    if (described_) {
+      // The look's answer: its number and a word for each port.
+      constexpr std::size_t number_at = 4;
+      std::copy_n(bytes.begin() + number_at, 4, answer_.begin());
+      size_ = answers_ && bytes.size() == 16 ? 12 : 0;
+      return 0;
+    }
+    const auto answer = board_.handle(bytes);
+    std::copy(answer.begin(), answer.end(), answer_.begin());
+    size_ = answer.size();
+    return 0;
+  }
+  std::size_t receive(std::span<std::uint8_t> buffer, std::int64_t) noexcept override {
+    std::copy_n(answer_.begin(), size_, buffer.begin());
+    return std::exchange(size_, 0);
+  }
+  void end_description() {
+    described_ = true;
+    answer_ = {};
+  }
+
+ private:
+  const bool& answers_;
+  bool described_{false};
+  test::RegisterBoard board_{};
+  std::array<std::uint8_t, 1024> answer_{};
+  std::size_t size_{0};
+};
+
 }  // namespace
+
+TEST_CASE("The hm2 writer, with a board that answers, that does not, and with none") {
+  bool answers = true;
+  HonestThenFixed* link = nullptr;
+  hm2::Hm2SafeState writer({}, [&] {
+    auto made = std::make_unique<HonestThenFixed>(answers);
+    link = made.get();
+    return made;
+  });
+  writer.prepare();
+  link->end_description();
+  CHECK(offences_of(writer) == 0);
+  CHECK(writer.verify_safe().ok());
+  answers = false;
+  CHECK(offences_of(writer) == 0);
+  CHECK(writer.make_safe().error == IoError::no_answer);
+  hm2::Hm2SafeState absent({}, []() -> std::unique_ptr<hm2::Link> { return nullptr; });
+  CHECK_FALSE(absent.make_safe().ok());
+  CHECK(offences_of(absent) == 0);
+}
 
 TEST_CASE("The PCI writer, with a card that answers, that does not, and with none") {
   bool answers = true;

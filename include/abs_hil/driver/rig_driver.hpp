@@ -78,6 +78,16 @@ class RigDriver {
   /// simulated rig then parts or joins its wheels; on a rig a person does so. Real-time safe.
   virtual void note_wheels_apart(bool /*apart*/) noexcept {}
 
+  /// True if the last `read` showed that the board has not taken the command that was sent last; `command` becomes the
+  /// one that it has. Real-time safe.
+  [[nodiscard]] virtual bool took_other_command(rig::Command& /*command*/) const noexcept { return false; }
+  /// The cable whose loss makes the board drop its outputs by itself, as it does whenever no command comes for a while;
+  /// empty for a board without such a watchdog. The commissioning tries it.
+  [[nodiscard]] virtual std::string_view watched_cable() const noexcept { return {}; }
+  /// Says that no command comes for a while: a board that would drop its outputs then does so now, and `read` goes on.
+  /// The first `write` after it sets them up again with duties 0. Call it with both duties 0. Not real-time safe.
+  IoResult rest() noexcept { return state_ == DriverState::active ? do_rest() : IoResult{}; }
+
   /// Longest time that a failed `write`, or `deactivate`, waits for the board to confirm the safe state, ns. 0: it does
   /// not wait; only the board's accesses take time.
   [[nodiscard]] virtual std::int64_t make_safe_bound_ns() const noexcept { return 0; }
@@ -93,6 +103,8 @@ class RigDriver {
   [[nodiscard]] virtual std::vector<std::string> notes() const { return {}; }
   /// Counts of the run's traffic, one per line, for the log after a run. Empty for backends that count nothing.
   [[nodiscard]] virtual std::vector<std::string> tally() const { return {}; }
+  /// The last exchanges with the board, with their times, one per line, for the flight record.
+  [[nodiscard]] virtual std::vector<std::string> traffic() const { return {}; }
   /// Message for the user: what the outputs do if the safe state did not reach the board.
   [[nodiscard]] virtual std::string_view what_holds_unsafe() const noexcept {
     return "its PWMs may hold their last duties";
@@ -117,6 +129,7 @@ class RigDriver {
   virtual IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept = 0;
   /// Writes the safe state in any situation. Tries all outputs even if one fails.
   virtual IoResult do_make_safe() noexcept = 0;
+  virtual IoResult do_rest() noexcept { return {}; }
 
   IoResult make_safe() noexcept;
 

@@ -179,6 +179,15 @@ enum class FoundAgain : std::uint8_t {
   ROW(braking_without_stop, 230, fault, no,                                                                           \
       "the experiment ran to its end, but the car was still faster than experiment.end_speed_m_s",                    \
       "car speed", "m/s", "experiment.end_speed_m_s")                                                                 \
+  ROW(hm2_silent, 240, fault, no,                                                                                     \
+      "hm2 board and program lost ten datagrams in a row: the board's watchdog drops all outputs")                    \
+  ROW(hm2_watchdog_bit, 241, fault, no,                                                                               \
+      "hm2 board's watchdog dropped all outputs: no command came in its time")                                        \
+  ROW(hm2_outputs_off, 242, fault, no, "hm2 board's pins are no longer the outputs that were set up (DDR)")           \
+  ROW(hm2_quadrature_error, 243, fault, no,                                                                           \
+      "hm2 board's counter saw both signals of an encoder change at once: encoder, cable or interference")            \
+  ROW(hm2_values_implausible, 244, fault, no, "hm2 board sends counts that the wheels cannot reach")                  \
+  ROW(hm2_restarted, 245, fault, no, "hm2 board was restarted: its supply or its program")                            \
   ROW(lease_closed, 250, fault, no,                                                                                   \
       "the controller closed its connection to the resident guardian while it had the outputs")                       \
   ROW(guardian_paused, 251, fault, no,                                                                                \

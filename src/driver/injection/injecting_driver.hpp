@@ -140,6 +140,11 @@ class InjectingDriver final : public RigDriver {
   [[nodiscard]] BoardIdentity identity() const override { return inner_->identity(); }
   [[nodiscard]] bool outputs_now(rig::Command& applied) noexcept override { return inner_->outputs_now(applied); }
   [[nodiscard]] std::vector<std::string> tally() const override { return inner_->tally(); }
+  [[nodiscard]] std::vector<std::string> traffic() const override { return inner_->traffic(); }
+  [[nodiscard]] std::string_view watched_cable() const noexcept override { return inner_->watched_cable(); }
+  [[nodiscard]] bool took_other_command(rig::Command& command) const noexcept override {
+    return inner_->took_other_command(command);
+  }
   [[nodiscard]] std::string_view what_holds_unsafe() const noexcept override { return inner_->what_holds_unsafe(); }
   [[nodiscard]] std::vector<std::string> inspection() override { return inner_->inspection(); }
   [[nodiscard]] std::int64_t make_safe_bound_ns() const noexcept override { return inner_->make_safe_bound_ns(); }
@@ -163,6 +168,7 @@ class InjectingDriver final : public RigDriver {
   IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override;
   IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override;
   IoResult do_make_safe() noexcept override { return inner_->deactivate(); }
+  IoResult do_rest() noexcept override { return inner_->rest(); }
 
   [[nodiscard]] ActiveFault fault_of(InjectionSignal signal) const noexcept;
   void note_effect(bool differs) noexcept;

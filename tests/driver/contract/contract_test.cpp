@@ -36,10 +36,14 @@ void check_safe(Bench& bench) {
   CHECK(wire.brake_duty == 0.0);
 }
 
-/// Reads once a millisecond, as a run does, and returns the last measurement.
-rig::Measurement read_until(driver::RigDriver& driver, std::int64_t from_ns, std::int64_t to_ns) {
+/// Reads and commands once a millisecond, as a run does, and returns the last measurement.
+rig::Measurement read_until(driver::RigDriver& driver, std::int64_t from_ns, std::int64_t to_ns,
+                            const rig::Command& command = rig::safe_command) {
   rig::Measurement measurement;
-  for (std::int64_t now = from_ns; now <= to_ns; now += ms) REQUIRE(driver.read(now, measurement).ok());
+  for (std::int64_t now = from_ns; now <= to_ns; now += ms) {
+    REQUIRE(driver.read(now, measurement).ok());
+    REQUIRE(driver.write(command).ok());
+  }
   return measurement;
 }
 
@@ -147,7 +151,7 @@ TEST_CASE("The brake slows the upper wheel, in the units of the measurement") {
   rig::Measurement before = read_until(bench->driver(), 0, 100 * ms);
   const std::int32_t free_counts = before.upper_counts;
   REQUIRE(bench->driver().write(brake).ok());
-  const rig::Measurement braked = read_until(bench->driver(), 101 * ms, 200 * ms);
+  const rig::Measurement braked = read_until(bench->driver(), 101 * ms, 200 * ms, brake);
   CHECK(rig::counts_between(before.upper_counts, braked.upper_counts) < free_counts * 97 / 100);
 }
 

@@ -1,0 +1,235 @@
+// One cycle of the driver: the datagram that reads and what its answer tells, the datagram that writes.
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <span>
+
+#include "abs_hil/rig/time_units.hpp"
+#include "driver/board_kit.hpp"
+#include "driver/hm2/hm2_driver.hpp"
+#include "driver/monotonic_time.hpp"
+
+namespace abs_hil::driver::hm2 {
+
+namespace {
+
+constexpr unsigned value_shift = 16;  // of a PWM's value register
+
+}  // namespace
+
+int RecordedLink::send(std::span<const std::uint8_t> bytes) noexcept {
+  const int error = link_->send(bytes);
+  if (error == 0) ++sent_;
+  keep(true, bytes);
+  return error;
+}
+
+std::size_t RecordedLink::receive(std::span<std::uint8_t> buffer, std::int64_t deadline_ns) noexcept {
+  const std::size_t size = link_->receive(buffer, deadline_ns);
+  if (size > 0) keep(false, buffer.first(size));
+  return size;
+}
+
+void RecordedLink::keep(bool sent, std::span<const std::uint8_t> bytes) noexcept {
+  Datagram& datagram = datagrams_[kept_++ % datagrams_.size()];
+  datagram = {.time_ns = monotonic_ns(), .sent = sent, .size = static_cast<std::uint16_t>(bytes.size())};
+  std::copy_n(bytes.begin(), std::min(bytes.size(), datagram.bytes.size()), datagram.bytes.begin());
+}
+
+IoResult Hm2Driver::await_answer(std::int64_t sent_ns, CycleAnswer& answer, std::int64_t& received_ns) noexcept {
+  // Without a clock of its own the emulated time does not advance meanwhile.
+  const std::int64_t deadline_ns =
+      read_clock_ == nullptr ? monotonic_ns() + rig::ns_per_s : sent_ns + answer_timeout_ns_;
+  std::array<std::uint8_t, 256> bytes{};
+  constexpr int most = 64;  // a flood must not hold the cycle
+  for (int i = 0; i < most; ++i) {
+    const std::size_t size = link_->receive(bytes, deadline_ns);
+    if (size == 0) break;
+    if (!wire_.decode({bytes.data(), size}, answer)) {
+      ++counters_.wrong_length;
+    } else if (answer.read_number != read_number_) {
+      ++counters_.stale;
+    } else {
+      received_ns = clock_ns(sent_ns);
+      counters_.answers_ns += received_ns - sent_ns;
+      counters_.longest_answer_ns = std::max(counters_.longest_answer_ns, received_ns - sent_ns);
+      return {};
+    }
+  }
+  return {IoError::no_answer, addresses_.bitten, last_errno_, rig::Reason::hm2_silent};
+}
+
+IoResult Hm2Driver::lost_answer() noexcept {
+  ++counters_.unanswered;
+  unanswered_ = true;
+  took_other_ = false;
+  bucket_.lost();
+  if (!bucket_.tripped()) return {};
+  return {IoError::no_answer, addresses_.bitten, last_errno_, rig::Reason::hm2_silent};
+}
+
+// Each datagram of ours raises the board's count by one, unless it is lost or late.
+IoResult Hm2Driver::judge_talkers(const CycleAnswer& answer) noexcept {
+  const auto came = static_cast<std::uint16_t>(answer.received - received_);
+  const std::uint32_t ours = link_->sent() - sent_before_;
+  const bool strict = driving_ && any_answer_;
+  received_ = answer.received;
+  sent_before_ = link_->sent();
+  if (!strict) {
+    missing_ = 0;
+    return {};
+  }
+  const std::uint32_t behind = write_number_ - answer.write_number;
+  const bool is_ours = behind <= write_number_ - first_write_ && behind < commands_.size();
+  if (!is_ours && answer.write_number == 0 && all_off(answer.direction)) {
+    return {IoError::implausible_answer, at::write_number, 0, rig::Reason::hm2_restarted};
+  }
+  if (!is_ours || came > ours + missing_) {
+    return {IoError::foreign_writer, is_ours ? at::received : at::write_number, 0, rig::Reason::foreign_writer};
+  }
+  constexpr int forgotten_after = 10;  // what has not come by then was lost
+  constexpr std::uint32_t most_missing = 4;
+  missing_ = std::min(missing_ + ours - came, most_missing);
+  answers_since_missing_ = came < ours ? 0 : answers_since_missing_ + 1;
+  if (answers_since_missing_ > forgotten_after) missing_ = 0;
+  took_other_ = behind > 0;
+  if (took_other_) {
+    ++counters_.writes_lost;
+    command_ = commands_[answer.write_number % commands_.size()];
+    bucket_.lost();
+    if (bucket_.tripped()) return {IoError::no_answer, at::write_number, last_errno_, rig::Reason::hm2_silent};
+  } else {
+    bucket_.good();
+  }
+  return {};
+}
+
+IoResult Hm2Driver::judge(const CycleAnswer& answer) noexcept {
+  if (const IoResult talkers = judge_talkers(answer); !talkers.ok()) return talkers;
+  const bool bitten = (answer.bitten & 1U) != 0;
+  const bool as_set = std::ranges::equal(of_ports(answer.direction, board_), of_ports(output_pins_, board_));
+  // The first write was lost, and the board has had none in time: still the slow start before the first write.
+  if (driving_ && bitten && answer.write_number == first_write_) driving_ = false;
+  if (driving_ && bitten) {
+    return {IoError::read_back_mismatch, addresses_.bitten, 0, rig::Reason::hm2_watchdog_bit};
+  }
+  if (driving_ && !as_set) {
+    return {IoError::read_back_mismatch, addresses_.direction, 0, rig::Reason::hm2_outputs_off};
+  }
+  at_rest_ = bitten || !as_set;
+  for (std::size_t i = 0; i < 2; ++i) {
+    if ((answer.control[i] & quadrature_error) == 0) continue;
+    return {IoError::implausible_answer, addresses_.control[i], 0, rig::Reason::hm2_quadrature_error};
+  }
+  return {};
+}
+
+std::int64_t Hm2Driver::time_of(const CycleAnswer& answer, std::int64_t sent_ns,
+                                std::int64_t received_ns) const noexcept {
+  const std::int64_t middle_ns = sent_ns + (received_ns - sent_ns) / 2;
+  // The board's clock gives the best interval, but wraps after 65.5 ms. The times of request and answer bound it.
+  constexpr std::int64_t wrap_ns = 65'000'000;
+  if (!any_answer_ || middle_ns - last_.time_ns > wrap_ns) return middle_ns;
+  const auto interval_us = static_cast<std::uint16_t>(answer.clock_us - clock_us_);
+  return std::clamp(last_.time_ns + interval_us * rig::ns_per_us, sent_ns, std::max(sent_ns, received_ns));
+}
+
+IoResult Hm2Driver::take_counts(const CycleAnswer& answer, std::int64_t time_ns) noexcept {
+  const std::array<std::int32_t, 2> signs{options_.upper_sign, options_.lower_sign};
+  std::array<std::int32_t, 2> moved{};
+  for (std::size_t wheel = 0; wheel < 2 && any_answer_; ++wheel) {
+    const auto step = static_cast<std::uint16_t>(static_cast<std::uint16_t>(answer.count[wheel]) - raw_counts_[wheel]);
+    moved[wheel] = std::bit_cast<std::int16_t>(step) * signs[wheel];
+    if (!plausible_travel(0, moved[wheel], time_ns - last_.time_ns, options_.plausible_speed_rad_s,
+                          options_.encoder_counts_per_rev)) {
+      return {IoError::implausible_answer, addresses_.count[wheel], 0, rig::Reason::hm2_values_implausible};
+    }
+  }
+  const auto sum = [](std::int32_t a, std::int32_t b) {
+    return std::bit_cast<std::int32_t>(std::bit_cast<std::uint32_t>(a) + std::bit_cast<std::uint32_t>(b));
+  };
+  last_.upper_counts = sum(last_.upper_counts, moved[0]);
+  last_.lower_counts = sum(last_.lower_counts, moved[1]);
+  last_.time_ns = time_ns;
+  for (std::size_t wheel = 0; wheel < 2; ++wheel) raw_counts_[wheel] = static_cast<std::uint16_t>(answer.count[wheel]);
+  clock_us_ = answer.clock_us;
+  any_answer_ = true;
+  return {};
+}
+
+IoResult Hm2Driver::latch(const IoResult& fault) noexcept {
+  if (fault_.ok()) fault_ = fault;
+  send_safe();  // at once, because the caller may react late
+  return fault;
+}
+
+IoResult Hm2Driver::do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept {
+  ++counters_.cycles;
+  const std::int64_t sent_ns = clock_ns(now_ns);
+  if (lock_step_) tell_time(emulated_ns_ + now_ns - activated_ns_);
+  if (const int error = link_->send(wire_.read(++read_number_).bytes()); error != 0) last_errno_ = error;
+  CycleAnswer answer;
+  std::int64_t received_ns = sent_ns;
+  IoResult result = await_answer(sent_ns, answer, received_ns);
+  if (!result.ok()) {
+    measurement = last_;
+    result = lost_answer();
+    return result.ok() ? result : latch(result);
+  }
+  unanswered_ = false;
+  result = judge(answer);
+  if (result.ok()) result = take_counts(answer, time_of(answer, sent_ns, received_ns));
+  if (!result.ok()) return latch(result);
+  measurement = last_;
+  return {};
+}
+
+IoResult Hm2Driver::do_write(const rig::Command& command, rig::Command& sent) noexcept {
+  if (!in_range(command)) return {IoError::command_out_of_range};
+  if (!fault_.ok()) {
+    send_safe();
+    sent = rig::safe_command;
+    return rig::acts(command) ? fault_ : IoResult{};
+  }
+  sent = command_;
+  if (unanswered_) {
+    ++counters_.withheld;
+    return {};
+  }
+  const bool sets_up = !driving_ && at_rest_;
+  const rig::Command out = sets_up ? rig::safe_command : grid_.as_sent(command);
+  ++write_number_;
+  Packet packet;
+  if (sets_up) {
+    packet = set_up_packet();
+    put_outputs_on(packet);
+  } else {
+    PortWords data{};
+    for (unsigned port = 0; port < board_.ports; ++port) {
+      data[port] = (out.motor_enable ? enable_bit_[port] : 0) | ((write_number_ & 1U) != 0 ? relay_bit_[port] : 0);
+    }
+    packet = wire_.write(data, {grid_.motor_width(out) << value_shift, grid_.brake_width(out) << value_shift},
+                         write_number_);
+  }
+  commands_[write_number_ % commands_.size()] = out;
+  if (const int error = link_->send(packet.bytes()); error != 0) {
+    last_errno_ = error;
+    --write_number_;  // the next one has its number
+    ++counters_.writes_lost;
+    bucket_.lost();
+    return bucket_.tripped() ? IoResult{IoError::disconnected, at::write_number, error, rig::Reason::hm2_silent}
+                             : IoResult{};
+  }
+  driving_ = true;
+  at_rest_ = false;
+  sent = command_ = out;
+  return {};
+}
+
+bool Hm2Driver::took_other_command(rig::Command& command) const noexcept {
+  if (took_other_) command = command_;
+  return took_other_;
+}
+
+}  // namespace abs_hil::driver::hm2

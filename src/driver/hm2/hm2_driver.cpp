@@ -1,0 +1,351 @@
+// Lifecycle of the driver: finding its pins, setting the outputs up, making them safe.
+
+#include "driver/hm2/hm2_driver.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "abs_hil/rig/time_units.hpp"
+#include "driver/board_kit.hpp"
+#include "driver/monotonic_time.hpp"
+#include "rig/formatted_text.hpp"
+
+namespace abs_hil::driver::hm2 {
+
+using rig::formatted;
+
+namespace {
+
+constexpr std::uint32_t pwm_steps = 4096;
+constexpr double answer_share = 0.8;  // of the period
+constexpr std::uint32_t unbuffered_12_bit = 0x03;
+constexpr std::uint32_t count_filter = 0x0800;  // 15 clocks instead of 3
+constexpr std::uint32_t stamps_at_2_MHz = 48;   // at 100 MHz: the clock / (48 + 2)
+constexpr std::uint32_t filter_at_25_MHz = 2;
+
+std::int64_t answer_timeout_ns(const Hm2Options& options) {
+  const double most_us = answer_share * 1e6 / options.rate_Hz;
+  if (options.answer_timeout_us > most_us) {
+    throw std::invalid_argument(
+        formatted("driver.hm2.answer_timeout_us = %d: give at most %.0f us (80 %% of the "
+                  "period), or 0 for that",
+                  options.answer_timeout_us, most_us));
+  }
+  const double us = options.answer_timeout_us > 0 ? options.answer_timeout_us : most_us;
+  return static_cast<std::int64_t>(us * static_cast<double>(rig::ns_per_us));
+}
+
+std::uint32_t pwm_rate(const Hm2Options& options, const Board& board) {
+  constexpr double rate_steps = 65536.0;
+  return static_cast<std::uint32_t>(options.pwm_frequency_Hz * rate_steps * pwm_steps / board.pwm.clock_Hz);
+}
+
+/// The watchdog bites (time + 1) clocks after its last pet.
+std::uint32_t watchdog_time(const Hm2Options& options, const Board& board) {
+  return static_cast<std::uint32_t>(std::llround(1e-3 * options.watchdog_ms * board.watchdog.clock_Hz)) - 1;
+}
+
+}  // namespace
+
+OutputGrid output_grid(const Hm2Options& options) noexcept {
+  constexpr double largest = (pwm_steps - 1.0) / pwm_steps;
+  return {.duty_steps = pwm_steps,
+          .motor_duty_max = std::min(options.motor_duty_max, largest),
+          .brake_duty_max = std::min(options.brake_duty_max, largest)};
+}
+
+Packet safe_packet(const Board& board, const CycleAddresses::Pair& pwm) noexcept {
+  Packet packet;
+  write_pair(packet, pwm, {0, 0});
+  packet.write32(board.pwm.address(reg::enable), 0);
+  packet.write32(board.watchdog.address(reg::time), 1);
+  return packet;
+}
+
+Hm2Driver::Hm2Driver(const Hm2Options& options, OpenLink open_link, ReadClock read_clock, bool lock_step)
+    : options_(options),
+      grid_(output_grid(options)),
+      open_link_(std::move(open_link)),
+      read_clock_(lock_step ? nullptr : read_clock),
+      lock_step_(lock_step),
+      answer_timeout_ns_(answer_timeout_ns(options)) {
+  check_options("driver.hm2.", options);
+  if (options.drive_pwm == options.brake_pwm) {
+    throw std::invalid_argument(
+        formatted("driver.hm2.drive_pwm = driver.hm2.brake_pwm = %d: drive and brake need different PWM instances",
+                  options.brake_pwm));
+  }
+}
+
+Hm2Driver::~Hm2Driver() { static_cast<void>(deactivate()); }
+
+void Hm2Driver::claim_pin(std::int32_t pin, const char* key) {
+  const auto index = static_cast<std::size_t>(pin);
+  if (index >= board_.pins.size()) {
+    throw Unavailable(formatted("backend rig: driver.hm2.%s = %d: the board has the I/O pins 0 to %zu", key, pin,
+                                board_.pins.size() - 1));
+  }
+  const std::uint32_t bit = 1U << (index % board_.port_width);
+  std::uint32_t& outputs = output_pins_[index / board_.port_width];
+  if ((outputs & bit) != 0) throw Unavailable(formatted("backend rig: I/O pin %d has two uses", pin));
+  outputs |= bit;
+  if (options_.active_low) inverted_pins_[index / board_.port_width] |= bit;
+}
+
+void Hm2Driver::find_pins() {
+  output_pins_ = module_pins_ = inverted_pins_ = enable_bit_ = relay_bit_ = {};
+  const auto require_instance = [](std::int32_t instance, const Module& module, const char* key) {
+    if (static_cast<unsigned>(instance) < module.instances) return;
+    throw Unavailable(formatted("backend rig: driver.hm2.%s = %d: the board has the instances 0 to %u", key, instance,
+                                module.instances - 1));
+  };
+  require_instance(options_.drive_pwm, board_.pwm, "drive_pwm");
+  require_instance(options_.brake_pwm, board_.pwm, "brake_pwm");
+  require_instance(options_.lower_channel, board_.counter, "lower_channel");
+  require_instance(options_.upper_channel, board_.counter, "upper_channel");
+  std::int32_t drive_pin = -1;
+  std::int32_t brake_pin = -1;
+  for (std::size_t i = 0; i < board_.pins.size(); ++i) {
+    const Pin& pin = board_.pins[i];
+    const bool is_output = pin.tag == tag::pwm && pin.function == pwm_output;
+    const bool drives = is_output && pin.unit == options_.drive_pwm;
+    const bool brakes = is_output && pin.unit == options_.brake_pwm;
+    const bool counts =
+        pin.tag == tag::counter && (pin.unit == options_.lower_channel || pin.unit == options_.upper_channel);
+    if (drives || brakes || counts) module_pins_[i / board_.port_width] |= 1U << (i % board_.port_width);
+    if (drives) drive_pin = static_cast<std::int32_t>(i);
+    if (brakes) brake_pin = static_cast<std::int32_t>(i);
+  }
+  const auto require_pin = [this](std::int32_t has, std::int32_t wanted, const char* key) {
+    if (has >= 0 && (wanted < 0 || wanted == has)) return claim_pin(has, key);
+    throw Unavailable(
+        formatted("backend rig: driver.hm2.%s = %d, but the board has that PWM at I/O pin %d (-1: none): "
+                  "its firmware is another one; correct the key, or load G540x2",
+                  key, wanted, has));
+  };
+  require_pin(drive_pin, options_.drive_pin, "drive_pin");
+  require_pin(brake_pin, options_.brake_pin, "brake_pin");
+  const auto line = [this](std::int32_t pin, const char* key, PortWords& bits) {
+    if (pin < 0) return;
+    claim_pin(pin, key);
+    const auto index = static_cast<std::size_t>(pin);
+    bits[index / board_.port_width] |= 1U << (index % board_.port_width);
+  };
+  line(options_.enable_pin, "enable_pin", enable_bit_);
+  line(options_.relay_pin, "relay_pin", relay_bit_);
+}
+
+void Hm2Driver::do_configure() {
+  link_.reset();
+  link_ = std::make_unique<RecordedLink>(open_link_());
+  read_number_ = static_cast<std::uint32_t>(monotonic_ns()) ^ static_cast<std::uint32_t>(::getpid()) << 16U;
+  board_ = read_board(*link_, options_.address, read_number_);
+  // A board in real time is not asked: what hardware answers there is not known.
+  if (lock_step_) require_lock_step("the hm2 board at " + options_.address, true, waits_for_time());
+  find_pins();
+  const std::uint32_t rate = pwm_rate(options_, board_);
+  constexpr std::uint32_t most_rate = 65535;
+  if (rate < 1 || rate > most_rate) {
+    throw Unavailable(
+        formatted("backend rig: driver.hm2.pwm_frequency_Hz = %g: with its clock of %.0f Hz the board "
+                  "makes %.1f to %.0f Hz",
+                  options_.pwm_frequency_Hz, board_.pwm.clock_Hz, board_.pwm.clock_Hz / 65536.0 / pwm_steps,
+                  board_.pwm.clock_Hz / pwm_steps));
+  }
+  const auto pair = [](const Module& module, unsigned of, std::int32_t first, std::int32_t second) {
+    return CycleAddresses::Pair{module.address(of, static_cast<unsigned>(first)),
+                                module.address(of, static_cast<unsigned>(second))};
+  };
+  addresses_ = {.ports = board_.ports,
+                .port_data = board_.port.address(reg::data),
+                .direction = board_.port.address(reg::direction),
+                .bitten = board_.watchdog.address(reg::bitten),
+                .pet = board_.watchdog.address(reg::pet),
+                .stamp_clock = board_.counter.address(reg::stamp_clock),
+                .count = pair(board_.counter, reg::count, options_.upper_channel, options_.lower_channel),
+                .control = pair(board_.counter, reg::control, options_.upper_channel, options_.lower_channel),
+                .pwm = pair(board_.pwm, reg::value, options_.drive_pwm, options_.brake_pwm)};
+  wire_ = CycleWire(addresses_);
+  Outputs outputs;
+  if (!ask_outputs(outputs, safe_answer_ns, safe_tries)) throw Unavailable("backend rig: the hm2 board went silent");
+  if (!all_off(outputs.direction)) {
+    throw Unavailable("backend rig: outputs of the hm2 board at " + options_.address +
+                      " are on (its DDR is not 0): another program drives it. End that one, or make the board safe "
+                      "with abs_hil safe --set driver.kind=hm2");
+  }
+}
+
+bool Hm2Driver::waits_for_time() {
+  constexpr std::uint16_t cookie = 0x5A00 | space::lock_step;
+  Packet packet;
+  const std::size_t cookie_at = packet.read_cookie(space::lock_step);
+  std::array<std::uint8_t, 2> answer{};
+  if (!ask(*link_, packet, answer, read_number_) || word16(answer, cookie_at) != cookie) return false;
+  Packet time;
+  time.read_time();
+  std::array<std::uint8_t, 8> ns{};
+  if (!ask(*link_, time, ns, read_number_)) return false;
+  emulated_ns_ = told_ns_ = static_cast<std::int64_t>(word32(ns, 0) | std::uint64_t{word32(ns, 4)} << 32U);
+  return true;
+}
+
+bool Hm2Driver::all_off(const PortWords& direction) const noexcept {
+  return std::ranges::all_of(of_ports(direction, board_), [](std::uint32_t bits) { return bits == 0; });
+}
+
+bool Hm2Driver::ask_outputs(Outputs& outputs, std::int64_t wait_ns, int tries) noexcept {
+  Packet packet;
+  const std::size_t direction_at = packet.read(space::hostmot2, addresses_.direction, board_.ports);
+  const std::size_t bitten_at = packet.read(space::hostmot2, addresses_.bitten);
+  const auto control_at = read_pair(packet, addresses_.control);
+  const std::size_t number_at = packet.read(space::timers, at::write_number, 2);
+  std::array<std::uint8_t, 128> answer{};
+  if (!ask(*link_, packet, answer, read_number_, wait_ns, tries)) return false;
+  for (unsigned port = 0; port < board_.ports; ++port) {
+    outputs.direction[port] = word32(answer, direction_at + std::size_t{4} * port);
+  }
+  outputs.bitten = word32(answer, bitten_at);
+  outputs.control = {word32(answer, control_at[0]), word32(answer, control_at[1])};
+  outputs.write_number = word32(answer, number_at);
+  return true;
+}
+
+// The order keeps the old PWM values, which the board holds over a bite, from the pins: direction comes last.
+Packet Hm2Driver::set_up_packet() const noexcept {
+  const auto pwm_mode = CycleAddresses::Pair{board_.pwm.address(reg::mode, static_cast<unsigned>(options_.drive_pwm)),
+                                             board_.pwm.address(reg::mode, static_cast<unsigned>(options_.brake_pwm))};
+  const std::uint32_t both =
+      1U << static_cast<unsigned>(options_.drive_pwm) | 1U << static_cast<unsigned>(options_.brake_pwm);
+  constexpr PortWords none{};
+  Packet packet;
+  write_pair(packet, addresses_.pwm, {0, 0});
+  write_pair(packet, pwm_mode, {unbuffered_12_bit, unbuffered_12_bit});
+  packet.write32(board_.pwm.address(reg::rate), pwm_rate(options_, board_));
+  packet.write32(board_.pwm.address(reg::enable), both);
+  packet.write32(board_.port.address(reg::invert), of_ports(inverted_pins_, board_));
+  packet.write32(board_.port.address(reg::open_drain), of_ports(none, board_));
+  packet.write32(board_.port.address(reg::alternate_source), of_ports(module_pins_, board_));
+  packet.write32(addresses_.port_data, of_ports(none, board_));
+  write_pair(packet, addresses_.control, {count_filter, count_filter});
+  packet.write32(board_.counter.address(reg::stamp_divisor), stamps_at_2_MHz);
+  packet.write32(board_.counter.address(reg::filter), filter_at_25_MHz);
+  packet.write32(board_.watchdog.address(reg::time), watchdog_time(options_, board_));
+  packet.write32(addresses_.bitten, 0);
+  packet.write_number(at::write_number, write_number_);
+  return packet;
+}
+
+void Hm2Driver::put_outputs_on(Packet& packet) const noexcept {
+  packet.write32(addresses_.direction, of_ports(output_pins_, board_));
+  packet.write_number(at::write_number, write_number_);
+}
+
+bool Hm2Driver::set_up_outputs(std::string& why) {
+  Outputs outputs;
+  const auto shown = [&] {
+    if (ask_outputs(outputs, safe_answer_ns, safe_tries)) return true;
+    why = "the board does not answer";
+    return false;
+  };
+  if (!shown()) return false;
+  if (!all_off(outputs.direction)) {
+    why = "its outputs are on (DDR is not 0): another program drives it";
+    return false;
+  }
+  ++write_number_;
+  static_cast<void>(link_->send(set_up_packet().bytes()));
+  if (!shown()) return false;
+  if (outputs.write_number != write_number_ || outputs.bitten != 0) {
+    why = outputs.bitten != 0 ? "its watchdog bit while it was set up" : "it did not take what was written";
+    return false;
+  }
+  for (const std::uint32_t control : outputs.control) {
+    if ((control & quadrature_error) == 0) continue;
+    why = "a counter reports a quadrature error that does not clear: check its encoder and cable, power the board anew";
+    return false;
+  }
+  Packet on;
+  on.write32(addresses_.pet, 0x5A000000);
+  ++write_number_;
+  put_outputs_on(on);
+  static_cast<void>(link_->send(on.bytes()));
+  if (!shown()) return false;
+  why = "its watchdog or another program switched them off at once, or it did not take what was written";
+  return outputs.write_number == write_number_ && outputs.bitten == 0 &&
+         std::ranges::equal(of_ports(outputs.direction, board_), of_ports(output_pins_, board_));
+}
+
+void Hm2Driver::do_activate(std::int64_t now_ns) {
+  fault_ = {};
+  driving_ = at_rest_ = unanswered_ = took_other_ = any_answer_ = false;
+  missing_ = 0;
+  command_ = {};
+  bucket_.reset();
+  counters_ = {};
+  last_ = {};
+  last_.time_ns = now_ns;
+  last_errno_ = 0;
+  activated_ns_ = now_ns;
+  if (lock_step_) static_cast<void>(waits_for_time());
+  // No other program's numbers are likely to be near this one.
+  write_number_ = first_write_ = static_cast<std::uint32_t>(monotonic_ns() >> 8U) ^ 0x5EED0000U;
+  constexpr int tries = 5;  // a slow computer may miss the watchdog's time between two datagrams
+  std::string why;
+  for (int attempt = 0; attempt < tries; ++attempt) {
+    if (set_up_outputs(why)) {
+      first_write_ = write_number_;
+      commands_[write_number_ % commands_.size()] = rig::safe_command;
+      return;
+    }
+    send_safe();
+  }
+  throw Unavailable("backend rig: the hm2 board at " + options_.address +
+                    " could not be activated; it was made safe again: " + why);
+}
+
+void Hm2Driver::send_safe() noexcept {
+  command_ = rig::safe_command;
+  static_cast<void>(link_->send(safe_packet(board_, addresses_.pwm).bytes()));
+  constexpr std::int64_t bite_takes_ns = 1000;
+  if (lock_step_) tell_time(told_ns_ + bite_takes_ns);
+}
+
+void Hm2Driver::tell_time(std::int64_t time_ns) noexcept {
+  told_ns_ = std::max(told_ns_, time_ns);
+  Packet time;
+  time.write_time(static_cast<std::uint64_t>(told_ns_));
+  static_cast<void>(link_->send(time.bytes()));
+}
+
+IoResult Hm2Driver::do_make_safe() noexcept {
+  if (!link_) return {IoError::disconnected};
+  Outputs outputs;
+  bool answered = false;
+  for (int attempt = 0; attempt < safe_tries; ++attempt) {
+    send_safe();
+    answered = ask_outputs(outputs, safe_answer_ns, 1);
+    if (answered && all_off(outputs.direction)) return {};
+  }
+  if (answered) return {IoError::read_back_mismatch, addresses_.direction};
+  return {IoError::no_answer, addresses_.direction, last_errno_, rig::Reason::hm2_silent};
+}
+
+IoResult Hm2Driver::do_rest() noexcept {
+  const IoResult result = do_make_safe();
+  driving_ = false;
+  at_rest_ = true;
+  return result;
+}
+
+bool Hm2Driver::outputs_now(rig::Command& applied) noexcept {
+  Outputs outputs;
+  if (!link_ || !ask_outputs(outputs, safe_answer_ns, safe_tries)) return false;
+  applied = all_off(outputs.direction) ? rig::safe_command : commands_[outputs.write_number % commands_.size()];
+  return true;
+}
+
+}  // namespace abs_hil::driver::hm2

@@ -1,0 +1,242 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "abs_hil/driver/backend.hpp"
+#include "abs_hil/driver/rig_driver.hpp"
+#include "driver/board_rows.hpp"
+#include "driver/hm2/board.hpp"
+#include "driver/loss_bucket.hpp"
+
+namespace abs_hil::driver::hm2 {
+
+/// Everything below `driver.hm2.` in the configuration. The defaults fit the stock firmware `G540x2` of a 7I92.
+struct Hm2Options {
+  ABS_HIL_OPTIONS(Hm2Options);
+  ABS_HIL_OPTION(std::string, address, "192.168.1.121:27181", .meaning = "the board's IPv4 address, or address:port",
+                 .safety = rig::no_effect_on_safety);
+  ABS_HIL_OPTION(std::int32_t, watchdog_ms, 20, .unit = "ms",
+                 .meaning = "the board drops all outputs so long after the last command", .range = rig::between(5, 20),
+                 .safety = rig::commissioned);
+  ABS_HIL_OPTION(std::int32_t, drive_pwm, 0, .meaning = "PWM instance of the drive", .range = rig::between(0, 31),
+                 .safety = rig::commissioned);
+  ABS_HIL_OPTION(std::int32_t, brake_pwm, 1, .meaning = "PWM instance of the brake", .range = rig::between(0, 31),
+                 .safety = rig::commissioned);
+  ABS_HIL_OPTION(std::int32_t, drive_pin, 1,
+                 .meaning = "I/O pin at which the board must have the drive's PWM; -1: any one",
+                 .range = rig::between(-1, 255), .safety = rig::commissioned);
+  ABS_HIL_OPTION(std::int32_t, brake_pin, 18,
+                 .meaning = "I/O pin at which the board must have the brake's PWM; -1: any one",
+                 .range = rig::between(-1, 255), .safety = rig::commissioned);
+  ABS_HIL_OPTION(bool, active_low, true,
+                 .meaning = "the outputs are inverted: a pin that is pulled high is off (docs/hm2.md)",
+                 .safety = rig::commissioned);
+  ABS_HIL_OPTION(double, pwm_frequency_Hz, 160.0, .unit = "Hz", .meaning = "frequency of both PWMs",
+                 .range = rig::between(20, 48'000), .safety = rig::commissioned);
+  ABS_HIL_OPTION(std::int32_t, enable_pin, -1, .meaning = "I/O pin that enables the motor; -1: none",
+                 .range = rig::between(-1, 255), .safety = rig::commissioned);
+  ABS_HIL_OPTION(std::int32_t, relay_pin, -1,
+                 .meaning = "I/O pin that changes with each command, for a watchdog relay; -1: none",
+                 .range = rig::between(-1, 255), .safety = rig::commissioned);
+  ABS_HIL_OPTION(std::int32_t, lower_channel, 0, .meaning = "counter instance of the lower wheel",
+                 .range = rig::between(0, 31), .safety = rig::commissioned);
+  ABS_HIL_OPTION(std::int32_t, upper_channel, 1, .meaning = "counter instance of the upper wheel",
+                 .range = rig::between(0, 31), .safety = rig::commissioned);
+  ABS_HIL_OPTION(std::int32_t, lower_sign, 1, encoder_sign);
+  ABS_HIL_OPTION(std::int32_t, upper_sign, 1, encoder_sign);
+  ABS_HIL_OPTION(double, motor_duty_max, 1.0, motor_duty_cap);
+  /// As on the RT-DAC4/PCI.
+  ABS_HIL_OPTION(double, brake_duty_max, 0.7, brake_duty_cap);
+  ABS_HIL_OPTION(std::int32_t, answer_timeout_us, 0, .unit = "us",
+                 .meaning = "longest wait for the board's answer, at most 80 % of the period; 0: 80 % of it",
+                 .range = rig::from_zero(8000), .safety = rig::no_effect_on_safety);
+  ABS_HIL_OPTION(double, plausible_speed_rad_s, 1000.0, plausible_speed);
+  // Known from elsewhere in the configuration.
+  std::int32_t encoder_counts_per_rev{4096};
+  double rate_Hz{1000.0};  ///< cycles per second
+};
+
+/// 12 bits: value/4096, so the largest duty is 4095/4096.
+[[nodiscard]] OutputGrid output_grid(const Hm2Options& options) noexcept;
+
+/// The registry's entry for driver.kind=hm2.
+[[nodiscard]] Backend hm2_backend();
+
+using OpenLink = std::function<std::unique_ptr<Link>()>;
+
+/// Keeps the last datagrams with their times, and counts those that were sent. Real-time safe.
+class RecordedLink final : public Link {
+ public:
+  struct Datagram {
+    std::int64_t time_ns{0};
+    bool sent{false};
+    std::uint16_t size{0};
+    std::array<std::uint8_t, 64> bytes{};  ///< its first ones
+  };
+  explicit RecordedLink(std::unique_ptr<Link> link) : link_(std::move(link)) {}
+  int send(std::span<const std::uint8_t> bytes) noexcept override;
+  std::size_t receive(std::span<std::uint8_t> buffer, std::int64_t deadline_ns) noexcept override;
+  [[nodiscard]] std::uint32_t sent() const noexcept { return sent_; }
+  /// The last 64, oldest first, one line each.
+  [[nodiscard]] std::vector<std::string> lines() const;
+
+ private:
+  void keep(bool sent, std::span<const std::uint8_t> bytes) noexcept;
+  std::unique_ptr<Link> link_;
+  std::uint32_t sent_{0};
+  std::uint64_t kept_{0};
+  std::array<Datagram, 64> datagrams_{};
+};
+
+inline constexpr std::uint32_t quadrature_error = 0x8000;  ///< of a counter's control register
+
+/// Longest that making safe waits for the board's word. The watchdog has acted by then.
+inline constexpr int safe_tries = 3;
+inline constexpr std::int64_t safe_answer_ns = 20'000'000;
+inline constexpr std::int64_t hm2_make_safe_bound_ns = safe_tries * safe_answer_ns;
+
+/// `PWM 0, enable 0, watchdog bites now`: the datagram that drops all outputs, whoever sends it.
+[[nodiscard]] Packet safe_packet(const Board& board, const CycleAddresses::Pair& pwm) noexcept;
+
+/// The rig behind a HostMot2 board over Ethernet (docs/hm2.md). Not verified on hardware.
+///
+/// One cycle: `read` sends one datagram and waits for its answer; `write` sends one and does not wait. The board's
+/// watchdog is petted by that one alone. The number of the last write that the board took comes with each answer: a
+/// lost write is counted, and the command that acts is known. A cycle without an answer keeps the measurement before,
+/// and nothing is written before status and direction have been read again.
+///
+/// The board ends its outputs `watchdog_ms` after the last write. Before the first write of an activation, and after
+/// `rest`, this is no fault; the first write then sets the outputs up again, with duties 0. Afterwards nothing but a
+/// new activation does.
+class Hm2Driver final : public RigDriver {
+ public:
+  using ReadClock = std::int64_t (*)() noexcept;
+  /// Throws std::invalid_argument, naming the key, if an option is outside its range.
+  /// @param open_link   called by `configure`; throws Unavailable
+  /// @param read_clock  the clock of `now_ns`; null in virtual time, where reading takes no time
+  /// @param lock_step   this driver advances the time of the board, which must be an emulator in lock-step
+  Hm2Driver(const Hm2Options& options, OpenLink open_link, ReadClock read_clock = nullptr, bool lock_step = false);
+  ~Hm2Driver() override;
+
+  [[nodiscard]] std::string_view name() const noexcept override { return "hm2"; }
+  [[nodiscard]] rig::Command as_sent(const rig::Command& command) const noexcept override {
+    return grid_.as_sent(command);
+  }
+  [[nodiscard]] std::vector<std::string> notes() const override;
+  [[nodiscard]] std::vector<std::string> tally() const override;
+  [[nodiscard]] std::vector<std::string> inspection() override;
+  [[nodiscard]] std::vector<std::string> traffic() const override;
+  [[nodiscard]] BoardIdentity identity() const override;
+  [[nodiscard]] bool outputs_now(rig::Command& applied) noexcept override;
+  [[nodiscard]] std::int64_t make_safe_bound_ns() const noexcept override { return hm2_make_safe_bound_ns; }
+  [[nodiscard]] std::string_view watched_cable() const noexcept override { return "Ethernet cable"; }
+  [[nodiscard]] bool took_other_command(rig::Command& command) const noexcept override;
+  [[nodiscard]] std::string_view what_holds_unsafe() const noexcept override {
+    return "its watchdog drops them at most 20 ms after the last command";
+  }
+
+  /// Counts since `activate`.
+  struct Counters {
+    std::uint64_t cycles{0};
+    std::uint64_t unanswered{0};    ///< cycles without their answer in time
+    std::uint64_t writes_lost{0};   ///< the board did not take them
+    std::uint64_t withheld{0};      ///< writes not sent, because status and direction were not known
+    std::uint64_t stale{0};         ///< answers to earlier requests, dropped
+    std::uint64_t wrong_length{0};  ///< answers that are none, dropped
+    std::int64_t longest_answer_ns{0};
+    std::int64_t answers_ns{0};  ///< sum of their times
+  };
+  [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
+  [[nodiscard]] const Board& board() const noexcept { return board_; }
+
+ private:
+  void do_configure() override;
+  void do_activate(std::int64_t now_ns) override;
+  IoResult do_read(std::int64_t now_ns, rig::Measurement& measurement) noexcept override;
+  IoResult do_write(const rig::Command& command, rig::Command& sent) noexcept override;
+  IoResult do_make_safe() noexcept override;
+  IoResult do_rest() noexcept override;
+
+  void find_pins();
+  void claim_pin(std::int32_t pin, const char* key);
+  [[nodiscard]] Packet set_up_packet() const noexcept;
+  void put_outputs_on(Packet& packet) const noexcept;
+  /// What the board says of its outputs, outside the cycle.
+  struct Outputs {
+    std::uint32_t bitten{0};
+    std::uint32_t write_number{0};
+    PortWords direction{};
+    std::array<std::uint32_t, 2> control{};
+  };
+  [[nodiscard]] bool ask_outputs(Outputs& outputs, std::int64_t wait_ns, int tries) noexcept;
+  [[nodiscard]] bool all_off(const PortWords& direction) const noexcept;
+  [[nodiscard]] bool set_up_outputs(std::string& why);
+  /// True for an emulator that waits for its time; `emulated_ns_` becomes that.
+  [[nodiscard]] bool waits_for_time();
+  IoResult await_answer(std::int64_t sent_ns, CycleAnswer& answer, std::int64_t& received_ns) noexcept;
+  IoResult judge(const CycleAnswer& answer) noexcept;
+  IoResult judge_talkers(const CycleAnswer& answer) noexcept;
+  IoResult take_counts(const CycleAnswer& answer, std::int64_t time_ns) noexcept;
+  [[nodiscard]] std::int64_t time_of(const CycleAnswer& answer, std::int64_t sent_ns,
+                                     std::int64_t received_ns) const noexcept;
+  IoResult lost_answer() noexcept;
+  IoResult latch(const IoResult& fault) noexcept;
+  void send_safe() noexcept;
+  void tell_time(std::int64_t time_ns) noexcept;
+  [[nodiscard]] std::int64_t clock_ns(std::int64_t otherwise) const noexcept {
+    return read_clock_ == nullptr ? otherwise : read_clock_();
+  }
+
+  Hm2Options options_;
+  OutputGrid grid_;
+  OpenLink open_link_;
+  ReadClock read_clock_;
+  bool lock_step_;
+  std::int64_t answer_timeout_ns_;
+
+  std::unique_ptr<RecordedLink> link_{};
+  Board board_{};
+  CycleAddresses addresses_{};
+  CycleWire wire_{};
+  PortWords output_pins_{};  ///< direction while active
+  PortWords module_pins_{};  ///< pins that carry their module
+  PortWords inverted_pins_{};
+  PortWords enable_bit_{};
+  PortWords relay_bit_{};
+
+  std::uint32_t read_number_{0};
+  std::uint32_t write_number_{0};
+  std::uint32_t first_write_{0};             ///< number before the first write of this activation
+  std::array<rig::Command, 64> commands_{};  ///< by the number of their write
+  rig::Command command_{};                   ///< what the board has, as far as is known
+  bool driving_{false};                      ///< a write has been sent since the activation or the rest
+  bool at_rest_{false};                      ///< the outputs are off before the first write
+  bool unanswered_{false};                   ///< the last read had no answer
+  bool took_other_{false};                   ///< by the last answer the board has not taken what was sent last
+  IoResult fault_{};
+  int last_errno_{0};
+
+  std::int64_t activated_ns_{0};  ///< in lock-step: time of `activate`, and the emulator's then
+  std::int64_t emulated_ns_{0};
+  std::int64_t told_ns_{0};  ///< the emulator's time now
+  bool any_answer_{false};
+  std::uint16_t received_{0};     ///< the board's count of packets at the last answer
+  std::uint32_t sent_before_{0};  ///< datagrams sent before the last answer
+  std::uint32_t missing_{0};      ///< of those, how many the board has not received; they may still come
+  int answers_since_missing_{0};
+  std::uint16_t clock_us_{0};
+  std::array<std::uint16_t, 2> raw_counts_{};
+  rig::Measurement last_{};
+  LossBucket bucket_{2, 1, 20};  ///< trips at the tenth loss in a row
+  Counters counters_{};
+};
+
+}  // namespace abs_hil::driver::hm2

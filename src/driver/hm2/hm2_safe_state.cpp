@@ -1,0 +1,96 @@
+#include "driver/hm2/hm2_safe_state.hpp"
+
+#include <unistd.h>
+
+#include <array>
+
+#include "driver/monotonic_time.hpp"
+
+namespace abs_hil::driver::hm2 {
+
+namespace {
+
+constexpr std::int64_t answer_ns = 5'000'000;
+
+/// Bases and strides that all firmware known to us has. A board whose answers are lost must get its zeros too.
+Board usual_board() {
+  constexpr std::uint16_t stride = 256;
+  Board board;
+  board.ports = 2;
+  board.watchdog = {.instances = 1, .base = 0x0C00, .register_stride = stride, .instance_stride = 4};
+  board.port = {.instances = 2, .base = 0x1000, .register_stride = stride, .instance_stride = 4};
+  board.pwm = {.instances = 2, .base = 0x4000, .register_stride = stride, .instance_stride = 4};
+  return board;
+}
+
+}  // namespace
+
+Hm2SafeState::Hm2SafeState(const Hm2Options& options, OpenLink open_link)
+    : options_(options), open_link_(std::move(open_link)) {
+  number_ = static_cast<std::uint32_t>(monotonic_ns()) ^ static_cast<std::uint32_t>(::getpid()) << 8U;
+  learn(usual_board());
+}
+
+void Hm2SafeState::learn(const Board& board) noexcept {
+  ports_ = board.ports;
+  direction_ = board.port.address(reg::direction);
+  zeros_ = safe_packet(board, {board.pwm.address(reg::value, static_cast<unsigned>(options_.drive_pwm)),
+                               board.pwm.address(reg::value, static_cast<unsigned>(options_.brake_pwm))});
+}
+
+void Hm2SafeState::prepare() {
+  if (!link_) link_ = open_link_();
+  known_ = false;
+  learn(read_board(*link_, options_.address, number_));
+  known_ = true;
+}
+
+bool Hm2SafeState::find_board() noexcept {
+  try {
+    if (!link_) link_ = open_link_();
+    if (!link_) return false;
+    // Zeros first: reading the descriptors takes many datagrams.
+    static_cast<void>(link_->send(zeros_.bytes()));
+    if (look(answer_ns).error == IoError::no_answer) return false;
+    prepare();
+    return true;
+  } catch (...) {
+    return false;  // the usual addresses serve until the board can be read
+  }
+}
+
+IoResult Hm2SafeState::look(std::int64_t wait_ns) noexcept {
+  Packet packet;
+  const std::size_t where = packet.read(space::hostmot2, direction_, ports_);
+  std::array<std::uint8_t, 4 * most_ports> answer{};
+  if (!ask(*link_, packet, answer, number_, wait_ns, 1)) {
+    return {IoError::no_answer, direction_, 0, rig::Reason::hm2_silent};
+  }
+  for (unsigned port = 0; port < ports_; ++port) {
+    if (word32(answer, where + std::size_t{4} * port) != 0) return {IoError::read_back_mismatch, direction_};
+  }
+  return {};
+}
+
+IoResult Hm2SafeState::make_safe() noexcept {
+  if (!known_) {
+    const bool due = again_.due();
+    if (!due && link_) static_cast<void>(link_->send(zeros_.bytes()));
+    if (!due || !find_board()) return {IoError::disconnected, direction_, 0, rig::Reason::hm2_silent};
+  }
+  if (const int error = link_->send(zeros_.bytes()); error != 0) {
+    return {IoError::disconnected, direction_, error, rig::Reason::hm2_silent};
+  }
+  return look(answer_ns);
+}
+
+IoResult Hm2SafeState::verify_safe() noexcept {
+  if (!known_) return make_safe();
+  const IoResult seen = look(answer_ns);
+  if (seen.ok()) return seen;
+  const IoResult made_safe = make_safe();
+  if (seen.error != IoError::read_back_mismatch) return made_safe;
+  return {IoError::foreign_writer, direction_, 0, rig::Reason::foreign_writer};
+}
+
+}  // namespace abs_hil::driver::hm2

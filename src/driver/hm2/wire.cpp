@@ -1,0 +1,231 @@
+// LBP16 packets and the UDP socket.
+
+#include "driver/hm2/wire.hpp"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+#include "abs_hil/driver/io_result.hpp"
+#include "abs_hil/rig/time_units.hpp"
+#include "driver/monotonic_time.hpp"
+
+namespace abs_hil::driver::hm2 {
+
+void Packet::put(std::uint32_t value, unsigned bytes) noexcept {
+  for (unsigned i = 0; i < bytes && size_ < bytes_.size(); ++i) bytes_[size_++] = (value >> (8U * i)) & 0xFFU;
+}
+
+void Packet::command(bool write, unsigned in_space, unsigned units, std::uint16_t address, bool increment) noexcept {
+  const unsigned width = in_space == space::hostmot2 ? 2 : 1;
+  put((write ? 0x8000U : 0U) | 0x4000U | in_space << 10U | width << 8U | (increment ? 0x80U : 0U) | units, 2);
+  put(address, 2);
+}
+
+std::size_t Packet::read(unsigned from_space, std::uint16_t address, unsigned units) noexcept {
+  const std::size_t where = answer_bytes_;
+  command(false, from_space, units, address, from_space == space::hostmot2 || units > 1);
+  answer_bytes_ += units * (from_space == space::hostmot2 ? 4U : 2U);
+  return where;
+}
+
+void Packet::write32(std::uint16_t address, std::span<const std::uint32_t> values) noexcept {
+  command(true, space::hostmot2, static_cast<unsigned>(values.size()), address, true);
+  for (const std::uint32_t value : values) put(value, 4);
+}
+
+std::size_t Packet::read_cookie(unsigned of_space) noexcept {
+  put(0x6101U | of_space << 10U, 2);
+  put(0, 2);
+  return std::exchange(answer_bytes_, answer_bytes_ + 2);
+}
+
+std::size_t Packet::read_time() noexcept {
+  put(0x4282U | space::lock_step << 10U, 2);
+  put(0, 2);
+  return std::exchange(answer_bytes_, answer_bytes_ + 8);
+}
+
+void Packet::write_time(std::uint64_t time_ns) noexcept {
+  put(0xC282U | space::lock_step << 10U, 2);
+  put(0, 2);
+  put(static_cast<std::uint32_t>(time_ns), 4);
+  put(static_cast<std::uint32_t>(time_ns >> 32U), 4);
+}
+
+void Packet::write_number(std::uint16_t address, std::uint32_t number) noexcept {
+  command(true, space::timers, 2, address, true);
+  put(number, 4);
+}
+
+UdpLink::UdpLink(const sockaddr_in& board) : socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)) {
+  // A connected socket takes datagrams of this address and port alone.
+  if (socket_.get() < 0 || ::connect(socket_.get(), reinterpret_cast<const sockaddr*>(&board), sizeof board) != 0) {
+    throw Unavailable(std::string("backend rig: no UDP socket to the hm2 board: ") + std::strerror(errno));
+  }
+}
+
+int UdpLink::send(std::span<const std::uint8_t> bytes) noexcept {
+  // An ICMP message about an earlier datagram is reported once, in place of sending this one.
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    if (::send(socket_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL) >= 0) return 0;
+    if (errno != ECONNREFUSED && errno != EHOSTUNREACH && errno != ENETUNREACH) break;
+  }
+  return errno;
+}
+
+std::size_t UdpLink::receive(std::span<std::uint8_t> buffer, std::int64_t deadline_ns) noexcept {
+  for (;;) {
+    const std::int64_t left_ns = std::max<std::int64_t>(deadline_ns - monotonic_ns(), 0);
+    const timespec left{.tv_sec = left_ns / rig::ns_per_s, .tv_nsec = left_ns % rig::ns_per_s};
+    pollfd waiting{socket_.get(), POLLIN, 0};
+    if (::ppoll(&waiting, 1, &left, nullptr) > 0) {
+      const ssize_t size = ::recv(socket_.get(), buffer.data(), buffer.size(), 0);
+      if (size > 0) return static_cast<std::size_t>(size);
+    }
+    if (monotonic_ns() >= deadline_ns) return 0;
+  }
+}
+
+sockaddr_in parse_address(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  std::uint16_t port = standard_port;
+  bool good = ::inet_pton(AF_INET, text.substr(0, colon).c_str(), &address.sin_addr) == 1;
+  if (colon != std::string::npos) {
+    const char* const end = text.data() + text.size();
+    const auto [rest, error] = std::from_chars(text.data() + colon + 1, end, port);
+    good = good && error == std::errc{} && rest == end && port != 0;
+  }
+  address.sin_port = htons(port);
+  if (good) return address;
+  throw std::invalid_argument("driver.hm2.address = \"" + text +
+                              "\": give an IPv4 address or address:port, such as 192.168.1.121:27181");
+}
+
+bool ask(Link& link, const Packet& packet, std::span<std::uint8_t> answer, std::uint32_t& number, std::int64_t wait_ns,
+         int tries) noexcept {
+  std::array<std::uint8_t, most_bytes> request{};
+  std::array<std::uint8_t, most_bytes> taken{};
+  for (int attempt = 0; attempt < tries; ++attempt) {
+    Packet numbered;
+    numbered.write_number(at::read_number, ++number);
+    const std::size_t number_at = numbered.read(space::timers, at::read_number, 2);
+    const auto head = numbered.bytes();
+    const auto body = packet.bytes();
+    if (head.size() + body.size() > request.size()) return false;
+    std::copy(body.begin(), body.end(), std::copy(head.begin(), head.end(), request.begin()));
+    if (link.send({request.data(), head.size() + body.size()}) != 0) continue;
+    const std::int64_t deadline_ns = monotonic_ns() + wait_ns;
+    const std::size_t size = numbered.answer_bytes() + packet.answer_bytes();
+    constexpr int most_stale = 64;  // a board that floods must not hold the caller
+    for (int i = 0; i < most_stale; ++i) {
+      const std::size_t came = link.receive(taken, deadline_ns);
+      if (came == 0) break;
+      if (came != size || word32(taken, number_at) != number) continue;
+      std::copy_n(taken.begin() + static_cast<std::ptrdiff_t>(numbered.answer_bytes()),
+                  std::min(answer.size(), packet.answer_bytes()), answer.begin());
+      return true;
+    }
+  }
+  return false;
+}
+
+void write_pair(Packet& packet, const CycleAddresses::Pair& address,
+                const std::array<std::uint32_t, 2>& values) noexcept {
+  const auto [a, b] = address;
+  if (b == a + 4) {
+    packet.write32(a, values);
+  } else if (a == b + 4) {
+    packet.write32(b, std::array{values[1], values[0]});
+  } else {
+    packet.write32(a, values[0]);
+    packet.write32(b, values[1]);
+  }
+}
+
+std::array<std::size_t, 2> read_pair(Packet& packet, const CycleAddresses::Pair& address) noexcept {
+  const auto [a, b] = address;
+  if (b == a + 4 || a == b + 4) {
+    const std::size_t where = packet.read(space::hostmot2, std::min(a, b), 2);
+    return a < b ? std::array{where, where + 4} : std::array{where + 4, where};
+  }
+  const std::size_t first = packet.read(space::hostmot2, a);
+  return {first, packet.read(space::hostmot2, b)};
+}
+
+namespace {
+
+/// Where an answer has its words.
+struct Places {
+  std::size_t clock_us, levels, direction, bitten, stamp_clock;
+  std::array<std::size_t, 2> count, control;
+  std::size_t received, read_number, write_number;
+};
+
+Places put_reads(Packet& packet, const CycleAddresses& a, std::uint32_t number) noexcept {
+  Places places{};
+  places.clock_us = packet.read(space::timers, at::microseconds);
+  places.levels = packet.read(space::hostmot2, a.port_data, a.ports);
+  places.direction = packet.read(space::hostmot2, a.direction, a.ports);
+  places.bitten = packet.read(space::hostmot2, a.bitten);
+  places.stamp_clock = packet.read(space::hostmot2, a.stamp_clock);  // must come before the counts
+  places.count = read_pair(packet, a.count);
+  places.control = read_pair(packet, a.control);
+  places.received = packet.read(space::status, at::received);
+  packet.write_number(at::read_number, number);
+  places.read_number = packet.read(space::timers, at::read_number, 4);
+  places.write_number = places.read_number + 4;
+  return places;
+}
+
+}  // namespace
+
+Packet CycleWire::read(std::uint32_t read_number) const noexcept {
+  Packet packet;
+  put_reads(packet, addresses_, read_number);
+  return packet;
+}
+
+bool CycleWire::decode(std::span<const std::uint8_t> bytes, CycleAnswer& answer) const noexcept {
+  Packet asked;
+  const Places places = put_reads(asked, addresses_, 0);
+  if (bytes.size() != asked.answer_bytes()) return false;
+  answer.clock_us = word16(bytes, places.clock_us);
+  for (unsigned port = 0; port < addresses_.ports; ++port) {
+    answer.levels[port] = word32(bytes, places.levels + std::size_t{4} * port);
+    answer.direction[port] = word32(bytes, places.direction + std::size_t{4} * port);
+  }
+  answer.bitten = word32(bytes, places.bitten);
+  answer.stamp_clock = static_cast<std::uint16_t>(word32(bytes, places.stamp_clock));
+  for (std::size_t i = 0; i < 2; ++i) {
+    answer.count[i] = word32(bytes, places.count[i]);
+    answer.control[i] = word32(bytes, places.control[i]);
+  }
+  answer.received = word16(bytes, places.received);
+  answer.read_number = word32(bytes, places.read_number);
+  answer.write_number = word32(bytes, places.write_number);
+  return true;
+}
+
+Packet CycleWire::write(const PortWords& data, const std::array<std::uint32_t, 2>& pwm_values,
+                        std::uint32_t write_number) const noexcept {
+  constexpr std::uint32_t reload = 0x5A000000;
+  Packet packet;
+  packet.write32(addresses_.port_data, {data.data(), addresses_.ports});
+  packet.write32(addresses_.pet, reload);
+  write_pair(packet, addresses_.pwm, pwm_values);
+  packet.write_number(at::write_number, write_number);
+  return packet;
+}
+
+}  // namespace abs_hil::driver::hm2

@@ -1,0 +1,163 @@
+#pragma once
+
+// LBP16, the protocol of HostMot2 boards over UDP (docs/hm2.md).
+//
+// A datagram is a list of commands: a 16-bit word, a 16-bit byte address, then the data of a write, all little-endian.
+//   word = write << 15 | address follows << 14 | space << 10 | unit (0: 8 bit, 1: 16, 2: 32) << 8 | increment << 7 |
+//   units
+// The board answers all reads of one datagram, in order, with one datagram; it does not answer writes.
+
+#include <netinet/in.h>
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "driver/file_descriptor.hpp"
+
+namespace abs_hil::driver::hm2 {
+
+inline constexpr std::uint16_t standard_port = 27181;
+inline constexpr std::size_t most_bytes = 1024;  ///< of a datagram that this driver sends or takes
+
+namespace space {
+inline constexpr unsigned hostmot2 = 0;  ///< 32 bit
+inline constexpr unsigned eeprom = 2;    ///< these and all below: 16 bit
+inline constexpr unsigned timers = 4;
+inline constexpr unsigned lock_step = 5;  ///< of emulators in lock-step alone: their time, ns, 64 bit
+inline constexpr unsigned status = 6;
+inline constexpr unsigned board_info = 7;
+}  // namespace space
+
+/// Addresses that do not depend on the board's descriptors.
+namespace at {
+inline constexpr std::uint16_t cookie = 0x0100;      ///< of HostMot2: 0x55AACAFE, then "HOSTMOT2" and the IDROM's place
+inline constexpr std::uint16_t microseconds = 0x00;  ///< of the timers: free-running clock
+inline constexpr std::uint16_t read_number = 0x10;   ///< of the timers: scratch, 32 bit
+inline constexpr std::uint16_t write_number = 0x14;  ///< of the timers: scratch, 32 bit
+inline constexpr std::uint16_t received = 0x08;      ///< of the status: packets that the board has received
+inline constexpr std::uint16_t board_name = 0x00;    ///< of the board's info, then version of LBP16, of the firmware
+inline constexpr std::uint16_t mac = 0x02;           ///< of the EEPROM: 3 words, the last byte first
+}  // namespace at
+
+/// One datagram in the making. Real-time safe.
+class Packet {
+ public:
+  /// Asks for `units` units. Returns where the answer has them.
+  std::size_t read(unsigned from_space, std::uint16_t address, unsigned units = 1) noexcept;
+  void write32(std::uint16_t address, std::span<const std::uint32_t> values) noexcept;
+  void write32(std::uint16_t address, std::uint32_t value) noexcept { write32(address, {&value, 1}); }
+  /// Asks for the cookie of a space that may not be there.
+  std::size_t read_cookie(unsigned of_space) noexcept;
+  std::size_t read_time() noexcept;
+  void write_time(std::uint64_t time_ns) noexcept;
+  /// Writes a number into the scratch words.
+  void write_number(std::uint16_t address, std::uint32_t number) noexcept;
+
+  [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return {bytes_.data(), size_}; }
+  [[nodiscard]] std::size_t answer_bytes() const noexcept { return answer_bytes_; }
+
+ private:
+  void put(std::uint32_t value, unsigned bytes) noexcept;
+  void command(bool write, unsigned in_space, unsigned units, std::uint16_t address, bool increment) noexcept;
+
+  std::array<std::uint8_t, most_bytes> bytes_{};
+  std::size_t size_{0};
+  std::size_t answer_bytes_{0};
+};
+
+[[nodiscard]] constexpr std::uint16_t word16(std::span<const std::uint8_t> bytes, std::size_t where) noexcept {
+  return static_cast<std::uint16_t>(bytes[where] | bytes[where + 1] << 8U);
+}
+[[nodiscard]] constexpr std::uint32_t word32(std::span<const std::uint8_t> bytes, std::size_t where) noexcept {
+  return word16(bytes, where) | static_cast<std::uint32_t>(word16(bytes, where + 2)) << 16U;
+}
+
+/// Sends and receives datagrams.
+class Link {
+ public:
+  Link() = default;
+  Link(const Link&) = delete;
+  Link& operator=(const Link&) = delete;
+  virtual ~Link() = default;
+  /// Returns 0 or the system's error. Does not wait. Real-time safe, like `receive`.
+  virtual int send(std::span<const std::uint8_t> bytes) noexcept = 0;
+  /// Waits for a datagram until `deadline_ns` (CLOCK_MONOTONIC). Returns its size, cut to the buffer's; 0: none came.
+  virtual std::size_t receive(std::span<std::uint8_t> buffer, std::int64_t deadline_ns) noexcept = 0;
+};
+
+/// A UDP socket that takes datagrams of the board alone.
+class UdpLink final : public Link {
+ public:
+  /// Throws Unavailable.
+  explicit UdpLink(const sockaddr_in& board);
+  int send(std::span<const std::uint8_t> bytes) noexcept override;
+  std::size_t receive(std::span<std::uint8_t> buffer, std::int64_t deadline_ns) noexcept override;
+
+ private:
+  FileDescriptor socket_;
+};
+
+/// "192.168.1.121" or "192.168.1.121:27181". Throws std::invalid_argument, naming the key.
+[[nodiscard]] sockaddr_in parse_address(const std::string& text);
+
+/// Sends a datagram that reads and waits for its answer; a number in the scratch words tells it from older ones. It
+/// repeats the datagram up to `tries` times. False: no answer.
+/// @param answer  becomes what `packet` reads
+bool ask(Link& link, const Packet& packet, std::span<std::uint8_t> answer, std::uint32_t& number,
+         std::int64_t wait_ns = 50'000'000, int tries = 3) noexcept;
+
+/// Addresses of one cycle's registers, from the board's descriptors. Of two, the upper wheel or the drive comes first.
+struct CycleAddresses {
+  using Pair = std::array<std::uint16_t, 2>;
+  unsigned ports{0};
+  std::uint16_t port_data{0};
+  std::uint16_t direction{0};
+  std::uint16_t bitten{0};
+  std::uint16_t pet{0};
+  std::uint16_t stamp_clock{0};
+  Pair count{};
+  Pair control{};
+  Pair pwm{};
+};
+inline constexpr unsigned most_ports = 8;
+using PortWords = std::array<std::uint32_t, most_ports>;
+
+/// What the datagram of a cycle reads.
+struct CycleAnswer {
+  std::uint16_t clock_us{0};
+  PortWords levels{};
+  PortWords direction{};
+  std::uint32_t bitten{0};
+  std::uint16_t stamp_clock{0};
+  std::array<std::uint32_t, 2> count{};    ///< low half: count; high half: time stamp of the last count
+  std::array<std::uint32_t, 2> control{};  ///< bit 15: quadrature error
+  std::uint16_t received{0};
+  std::uint32_t read_number{0};
+  std::uint32_t write_number{0};
+};
+
+/// The two datagrams of a cycle: one that reads, one that writes. Real-time safe.
+class CycleWire {
+ public:
+  CycleWire() = default;
+  explicit CycleWire(const CycleAddresses& addresses) noexcept : addresses_(addresses) {}
+  [[nodiscard]] Packet read(std::uint32_t read_number) const noexcept;
+  /// False: the answer has another length.
+  [[nodiscard]] bool decode(std::span<const std::uint8_t> bytes, CycleAnswer& answer) const noexcept;
+  /// PWM values, the watchdog's pet, the write's number.
+  [[nodiscard]] Packet write(const PortWords& data, const std::array<std::uint32_t, 2>& pwm_values,
+                             std::uint32_t write_number) const noexcept;
+
+ private:
+  CycleAddresses addresses_{};
+};
+
+/// Two registers of a module's instances: one command if they stand side by side, otherwise two.
+void write_pair(Packet& packet, const CycleAddresses::Pair& address,
+                const std::array<std::uint32_t, 2>& values) noexcept;
+[[nodiscard]] std::array<std::size_t, 2> read_pair(Packet& packet, const CycleAddresses::Pair& address) noexcept;
+
+}  // namespace abs_hil::driver::hm2

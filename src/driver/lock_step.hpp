@@ -1,3 +1,0 @@
-#pragma once
-
-#include "driver/board_kit.hpp"

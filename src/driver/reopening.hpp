@@ -1,3 +1,0 @@
-#pragma once
-
-#include "driver/own_handle_writer.hpp"
