@@ -72,7 +72,7 @@ CommissioningResult Commissioning::unless_stopped(CommissioningResult result) co
 CommissioningResult Commissioning::run() {
   const SafeAtEnd safe(driver_);
   for (const auto step : {&Commissioning::read_board, &Commissioning::turn_by_hand, &Commissioning::drive_pulse,
-                          &Commissioning::brake_pulse}) {
+                          &Commissioning::pull_cable, &Commissioning::brake_pulse}) {
     const CommissioningResult result = (this->*step)();
     if (result != CommissioningResult::passed) return unless_stopped(result);
   }
@@ -96,8 +96,8 @@ bool Commissioning::read(rig::Measurement& measurement) {
 }
 
 CommissioningResult Commissioning::read_board() {
-  if (!dialog_.ask("Step 1 of 4: the program opens the board and reads its registers. It writes nothing; nothing can "
-                   "move. Go on?")) {
+  if (!dialog_.ask(step(1) + "the program opens the board and reads its registers. It writes nothing; nothing can "
+                             "move. Go on?")) {
     return CommissioningResult::declined;
   }
   driver_.configure();
@@ -144,21 +144,33 @@ bool Commissioning::judge_turn(Wheel wheel, const Travel& travel) {
   return false;
 }
 
-CommissioningResult Commissioning::turn_by_hand() {
-  if (!dialog_.ask(
-          "Step 2 of 4: the program sets both PWMs and the counters to 0; then you turn the wheels by hand. Press the "
-          "E-stop and lift the upper wheel off the lower one. Go on?")) {
-    return CommissioningResult::declined;
-  }
+std::string Commissioning::step(int number) const {
+  return formatted("Step %d of %d: ", number, driver_.watched_cable().empty() ? 4 : 5);
+}
+
+bool Commissioning::activate_and_rest() {
   // The guard looks at an idle board all the time. It must not while the driver sets the board up.
   guard_.begin();
+  driver::IoResult rests{};
   try {
     driver_.activate(clock_.now_ns());
+    rests = driver_.rest();
   } catch (...) {
     guard_.end(false);
     throw;
   }
-  guard_.end(true);
+  guard_.end(rests.ok());
+  if (!rests.ok()) dialog_.tell("FAILED: the board's outputs are not off: " + driver::error_text(rests));
+  return rests.ok();
+}
+
+CommissioningResult Commissioning::turn_by_hand() {
+  if (!dialog_.ask(step(2) +
+                   "the program sets both PWMs and the counters to 0; then you turn the wheels by hand. Press the "
+                   "E-stop and lift the upper wheel off the lower one. Go on?")) {
+    return CommissioningResult::declined;
+  }
+  if (!activate_and_rest()) return CommissioningResult::failed;
   for (const Wheel wheel : {Wheel::upper, Wheel::lower}) {
     rig::Measurement before;
     rig::Measurement after;
@@ -201,8 +213,9 @@ bool Commissioning::pulse(const rig::Command& command, double duration_s, Travel
   guard_.begin();
   bool good = read(first) && drive(command, clock_.now_ns() + std::llround(duration_s / rig::s_per_ns));
   // A driver that failed has already made its outputs safe; it reports the result again.
-  const driver::IoResult ended =
-      driver_.state() == driver::DriverState::active ? driver_.write(rig::safe_command) : driver_.deactivate();
+  const bool active = driver_.state() == driver::DriverState::active;
+  driver::IoResult ended = active ? driver_.write(rig::safe_command) : driver_.deactivate();
+  if (active && ended.ok()) ended = driver_.rest();
   guard_.end(ended.ok());
   if (good && !ended.ok()) {
     dialog_.tell("FAILED: cannot end the pulse: " + driver::error_text(ended));
@@ -237,10 +250,10 @@ bool Commissioning::wait_for_standstill() {
 }
 
 CommissioningResult Commissioning::drive_pulse() {
-  if (!dialog_.ask(
-          formatted("Step 3 of 4: the drive gets duty %.2f for %.2f s. Close the cover, stand clear and keep a hand "
-                    "at the E-stop; release the E-stop and let the upper wheel down. Go on?",
-                    options_.drive_duty, options_.drive_pulse_s))) {
+  if (!dialog_.ask(step(3) +
+                   formatted("the drive gets duty %.2f for %.2f s. Close the cover, stand clear and keep a hand "
+                             "at the E-stop; release the E-stop and let the upper wheel down. Go on?",
+                             options_.drive_duty, options_.drive_pulse_s))) {
     return CommissioningResult::declined;
   }
   Travel travel;
@@ -260,9 +273,101 @@ CommissioningResult Commissioning::drive_pulse() {
   return wait_for_standstill() ? CommissioningResult::passed : CommissioningResult::failed;
 }
 
+bool Commissioning::drive_until_silent(Travel& before) {
+  constexpr std::int64_t longest_ns = 30 * rig::ns_per_s;
+  constexpr std::int64_t window_ns = rig::ns_per_s / 10;
+  rig::Measurement now;
+  rig::Measurement mark;
+  const std::int64_t end_ns = clock_.now_ns() + longest_ns;
+  for (std::int64_t tick_ns = clock_.now_ns(); tick_ns < end_ns && !stop_requested_(); tick_ns += cycle_ns) {
+    clock_.sleep_until(tick_ns);
+    if (!guard_.beat()) {
+      dialog_.tell("FAILED: the guardian process has ended; the drive was stopped");
+      return false;
+    }
+    const driver::IoResult result = driver_.read(clock_.now_ns(), now);
+    if (result.error == driver::IoError::no_answer) return true;
+    if (const driver::IoResult io =
+            result.ok() ? driver_.write({.motor_duty = options_.drive_duty, .motor_enable = true}) : result;
+        !io.ok()) {
+      dialog_.tell("FAILED: " + driver::error_text(io));
+      return false;
+    }
+    if (now.time_ns - mark.time_ns < window_ns) continue;
+    before = {.upper = rig::counts_between(mark.upper_counts, now.upper_counts),
+              .lower = rig::counts_between(mark.lower_counts, now.lower_counts)};
+    mark = now;
+  }
+  dialog_.tell("FAILED: the cable was not pulled, or the board works without it");
+  return false;
+}
+
+bool Commissioning::await_board() {
+  rig::Measurement ignored;
+  const std::int64_t end_ns = clock_.now_ns() + std::llround(options_.run_out_limit_s / rig::s_per_ns);
+  for (std::int64_t tick_ns = clock_.now_ns(); tick_ns < end_ns && !stop_requested_(); tick_ns += cycle_ns) {
+    clock_.sleep_until(tick_ns);
+    if (!guard_.beat()) return false;
+    if (driver_.read(clock_.now_ns(), ignored).error != driver::IoError::no_answer) return true;
+  }
+  dialog_.tell("FAILED: the board does not answer again");
+  return false;
+}
+
+bool Commissioning::counts_in_0_1_s(Travel& travel) {
+  rig::Measurement first;
+  rig::Measurement last;
+  if (!read(first)) return false;
+  clock_.sleep_until(clock_.now_ns() + rig::ns_per_s / 10);
+  if (!read(last)) return false;
+  travel = {.upper = rig::counts_between(first.upper_counts, last.upper_counts),
+            .lower = rig::counts_between(first.lower_counts, last.lower_counts)};
+  return true;
+}
+
+CommissioningResult Commissioning::pull_cable() {
+  const std::string cable(driver_.watched_cable());
+  if (cable.empty()) return CommissioningResult::passed;
+  if (!dialog_.ask(step(4) +
+                   formatted("the drive gets duty %.2f until you pull the %s. The wheels must then coast. If they go "
+                             "faster, press the E-stop at once: the outputs have the wrong polarity. Close the cover, "
+                             "stand clear, one hand at the cable and one at the E-stop. Go on?",
+                             options_.drive_duty, cable.c_str()))) {
+    return CommissioningResult::declined;
+  }
+  guard_.begin();
+  dialog_.tell("Pull the " + cable + " now, at the board. Plug it in again after a second or two.");
+  Travel before;
+  const bool back = drive_until_silent(before) && await_board();
+  const driver::IoResult ended = driver_.deactivate();
+  guard_.end(ended.ok());
+  if (stop_requested_()) return CommissioningResult::interrupted;
+  if (!back || !ended.ok()) return CommissioningResult::failed;
+  driver_.configure();
+  Travel after;
+  if (!activate_and_rest() || !counts_in_0_1_s(after)) return CommissioningResult::failed;
+  if (after.lower > before.lower + still_counts / 4) {
+    dialog_.tell(
+        formatted("FAILED: the lower wheel made %d counts in 0.1 s before and %d after: the outputs are on while "
+                  "the board is off. Wire them active-low (docs/hm2.md, \"Wiring\")",
+                  before.lower, after.lower));
+    return CommissioningResult::failed;
+  }
+  if (!dialog_.ask("Did the wheels coast while the cable was out?")) {
+    dialog_.tell("FAILED: wire the outputs active-low (docs/hm2.md, \"Wiring\")");
+    return CommissioningResult::failed;
+  }
+  dialog_.tell(
+      formatted("ok: the lower wheel made %d counts in 0.1 s before the cable was pulled and %d after it was "
+                "back; waiting for both wheels to stop",
+                before.lower, after.lower));
+  return wait_for_standstill() ? CommissioningResult::passed : CommissioningResult::failed;
+}
+
 CommissioningResult Commissioning::brake_pulse() {
   if (!dialog_.ask(
-          formatted("Step 4 of 4: the upper wheel stands and its brake gets duty %.2f for %.2f s, then once more while "
+          step(driver_.watched_cable().empty() ? 4 : 5) +
+          formatted("the upper wheel stands and its brake gets duty %.2f for %.2f s, then once more while "
                     "the program sends nothing for %.2f s, to see whether the board holds its outputs. Keep your hands "
                     "away from it. Go on?",
                     options_.brake_duty, options_.brake_pulse_s, options_.silence_s))) {

@@ -57,7 +57,7 @@ struct CommissioningOptions {
 enum class CommissioningResult : std::uint8_t { passed, failed, declined, interrupted };
 
 /// The first steps with a rig. Each needs the person's consent: read the board, turn the wheels by hand, a small drive
-/// pulse, a small brake pulse. A guard stands by during both pulses. The first step that fails ends the commissioning.
+/// pulse, the cable pulled if the board watches it, a small brake pulse. A guard stands by whenever an output is on. The first step that fails ends the commissioning.
 /// The outputs are safe however it ends.
 class Commissioning {
  public:
@@ -82,11 +82,20 @@ class Commissioning {
   [[nodiscard]] CommissioningResult read_board();
   [[nodiscard]] CommissioningResult turn_by_hand();
   [[nodiscard]] CommissioningResult drive_pulse();
+  /// Of a board that drops its outputs without its cable: the drive is on while a person pulls it. Shows the outputs'
+  /// polarity too, because then the pins are pulled high.
+  [[nodiscard]] CommissioningResult pull_cable();
   [[nodiscard]] CommissioningResult brake_pulse();
   [[nodiscard]] bool judge_turn(Wheel wheel, const Travel& travel);
   [[nodiscard]] bool read(rig::Measurement& measurement);
   [[nodiscard]] bool pulse(const rig::Command& command, double duration_s, Travel& travel);
   [[nodiscard]] bool drive(const rig::Command& command, std::int64_t end_ns);
+  /// Drives until the board is silent; `before` are then the speeds of the wheels, counts/s.
+  [[nodiscard]] bool drive_until_silent(Travel& before);
+  [[nodiscard]] bool await_board();
+  [[nodiscard]] bool counts_in_0_1_s(Travel& travel);
+  [[nodiscard]] bool activate_and_rest();
+  [[nodiscard]] std::string step(int number) const;
   [[nodiscard]] bool wait_for_standstill();
   /// Falls silent with the brake on and sees what the board does by itself; then measures how soon it is safe.
   [[nodiscard]] bool measure_outputs();

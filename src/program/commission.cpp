@@ -119,7 +119,7 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
   Terminal terminal;
   note_signals();
   terminal.tell(
-      "Commissioning in four steps; the program asks before each. First do what docs/rig-setup.md requires.\n"
+      "Commissioning in steps; the program asks before each. First do what docs/rig-setup.md requires.\n"
       "The E-stop cuts the drive only, not the brake. A guardian stands by during each pulse (docs/dead-man.md).");
   terminal.tell(
       config::model_origin(request.settings, std::chrono::floor<std::chrono::days>(std::chrono::system_clock::now())));
@@ -138,8 +138,8 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
       keep_record(request, driver->identity(), commissioning, terminal);
       terminal.tell(
           driver_options.emulated
-              ? "All four steps passed on an emulator. This does not verify any hardware."
-              : "All four steps passed. Continue with docs/rig-setup.md, \"What is not verified\", and then set "
+              ? "All steps passed on an emulator. This does not verify any hardware."
+              : "All steps passed. Continue with docs/rig-setup.md, \"What is not verified\", and then set "
                 "driver.verified_on_hardware=true in your configuration.");
       return exit_completed;
     case experiment::CommissioningResult::declined:

@@ -84,6 +84,9 @@ int latency(const RunRequest& request, const LatencyOptions& options) {
                                        .timing = statistics.summary()};
   if (histogram) histogram->write(runtime::cyclictest_histogram(statistics));
   fmt::print("{}", options.json ? to_json(measured, facts).dump(2) + "\n" : to_text(measured, facts));
+  if (!options.json) {
+    for (const std::string& line : run.driver().tally()) fmt::print("{}\n", line);
+  }
   return status_of(outcome);
 }
 

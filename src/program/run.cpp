@@ -152,7 +152,7 @@ int conclude(const RunRequest& request, run::Run& run, const run::RunOutcome& ou
   summary.csv_rows_lost = outputs.csv_rows_lost();
   if (rig::is_fault(outcome.reason)) {
     std::string account = summary.reason;
-    for (const std::string& line : driver->traffic()) account += '\n' + line;
+    for (const std::string& line : run.driver().traffic()) account += '\n' + line;
     run_monitor.write_record(request, outcome.reason, outcome.reason_value, account);
   }
   const std::vector<std::string> unwritten = outputs.write(summary, environment(request.command_line, run, outcome));

@@ -51,6 +51,9 @@ class OtherBoard final : public driver::RigDriver {
   driver::IoResult made_safe{};
   std::function<bool(rig::Command&)> on_outputs{[](rig::Command&) { return false; }};
   [[nodiscard]] bool outputs_now(rig::Command& applied) noexcept override { return on_outputs(applied); }
+  std::string_view cable{};
+  [[nodiscard]] std::string_view watched_cable() const noexcept override { return cable; }
+  int rests{0};
 
  private:
   void do_configure() override {}
@@ -66,6 +69,10 @@ class OtherBoard final : public driver::RigDriver {
     return on_write(command);
   }
   driver::IoResult do_make_safe() noexcept override { return made_safe; }
+  driver::IoResult do_rest() noexcept override {
+    ++rests;
+    return {};
+  }
 
   std::string_view kind_;
 };
@@ -382,4 +389,53 @@ TEST_CASE("A stop while turning by hand or while the wheels run out ends the com
   };
   CHECK(stopping.run() == CommissioningResult::interrupted);
   CHECK(stopping.guard.begun == 2);
+}
+
+namespace {
+
+/// The person pulls the cable after 0.3 s of driving, and plugs it in again 0.05 s later; `runs_away` counts come
+/// between two reads from then on.
+struct CableLab : OtherLab {
+  explicit CableLab(std::int32_t counts_when_back) : runs_away(counts_when_back) {
+    board.cable = "Ethernet cable";
+    board.on_read = [this]() -> driver::IoResult {
+      constexpr int pulled_at = 300;
+      constexpr int plugged_at = 350;
+      if (person.said.find("Pull the Ethernet cable now") == std::string::npos) return {};
+      ++reads;
+      if (reads < pulled_at) return {};
+      if (reads < plugged_at) return {driver::IoError::no_answer};
+      if (reads == plugged_at) return {driver::IoError::read_back_mismatch};
+      if (reads <= plugged_at + 2) board.counters.lower_counts += runs_away;
+      return {};
+    };
+  }
+  std::int32_t runs_away;
+  int reads{0};
+};
+
+}  // namespace
+
+TEST_CASE("A board that watches its cable has it pulled while the drive is on: the wheels must coast") {
+  CableLab lab(90);
+  CHECK(lab.run() == CommissioningResult::passed);
+  INFO(lab.person.said);
+  CHECK(lab.person.asked.size() == 7);
+  CHECK_THAT(lab.person.asked.at(3), Contains("Step 4 of 5"));
+  CHECK_THAT(lab.person.said, Contains("made 100 counts in 0.1 s before the cable was pulled and 90 after"));
+  CHECK(lab.board.rests == 4);  // after each activation and each pulse
+}
+
+TEST_CASE("Wheels that go faster without the cable show outputs of the wrong polarity") {
+  CableLab lab(200);
+  CHECK(lab.run() == CommissioningResult::failed);
+  CHECK_THAT(lab.person.said, Contains("Wire them active-low"));
+}
+
+TEST_CASE("A cable that nobody pulls ends the commissioning, the drive off") {
+  OtherLab lab;
+  lab.board.cable = "Ethernet cable";
+  CHECK(lab.run() == CommissioningResult::failed);
+  CHECK_THAT(lab.person.said, Contains("the cable was not pulled"));
+  CHECK(lab.board.state() == driver::DriverState::inactive);
 }
