@@ -9,6 +9,7 @@
 
 #include "diagnosis/board_scan.hpp"
 #include "diagnosis/can_scan.hpp"
+#include "diagnosis/hm2_scan.hpp"
 #include "diagnosis/machine_facts.hpp"
 #include "telemetry/route_probe.hpp"
 
@@ -75,6 +76,12 @@ Findings check_can(const Examination& e) {
   }
 }
 
+Findings check_hm2(const Examination& e) {
+  // It sends datagrams, so only to a board that is named.
+  if (e.driver.kind == "hm2") return scan_hm2(e.driver.of<driver::hm2::Hm2Options>());
+  return {{.check = "hm2", .what = "no hm2 board is configured (driver.kind)", .standing = Standing::note}};
+}
+
 Finding commissioning_finding(const Examination& e, const driver::RigDriver& driver) {
   Finding finding{.check = "backend", .what = "commissioning of the board", .detail = "its record holds"};
   try {
@@ -122,13 +129,14 @@ struct Check {
   std::string_view name;
   Findings (*make)(const Examination&);
 };
-constexpr std::array<Check, 8> checks{{
+constexpr std::array<Check, 9> checks{{
     {"kernel", [](const Examination&) { return machine_part("kernel"); }},
     {"realtime", check_realtime},
     {"clock", [](const Examination&) { return machine_part("clock"); }},
     {"cpu", [](const Examination&) { return machine_part("cpu"); }},
     {"lcm", check_lcm},
     {"can", check_can},
+    {"hm2", check_hm2},
     {"boards", check_boards},
     {"backend", check_backend},
 }};

@@ -1,0 +1,183 @@
+// The network between this computer and an hm2 board, as `abs_hil doctor` sees it.
+
+#include "diagnosis/hm2_scan.hpp"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <ifaddrs.h>
+#include <linux/ethtool.h>
+#include <linux/sockios.h>
+#include <net/if.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <sstream>
+
+#include "driver/file_descriptor.hpp"
+#include "driver/monotonic_time.hpp"
+
+namespace abs_hil::diagnosis {
+
+namespace {
+
+using driver::FileDescriptor;
+
+std::string text_of(const in_addr& address) {
+  std::array<char, INET_ADDRSTRLEN> text{};
+  return ::inet_ntop(AF_INET, &address, text.data(), text.size()) == nullptr ? "" : text.data();
+}
+
+/// The interface that datagrams to the board leave through; empty: none.
+std::string interface_to(const sockaddr_in& board, int socket) {
+  sockaddr_in own{};
+  socklen_t size = sizeof own;
+  if (::connect(socket, reinterpret_cast<const sockaddr*>(&board), sizeof board) != 0 ||
+      ::getsockname(socket, reinterpret_cast<sockaddr*>(&own), &size) != 0) {
+    return {};
+  }
+  ifaddrs* raw = nullptr;
+  if (::getifaddrs(&raw) != 0) return {};
+  const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> all(raw, ::freeifaddrs);
+  for (const ifaddrs* one = all.get(); one != nullptr; one = one->ifa_next) {
+    if (one->ifa_addr == nullptr || one->ifa_addr->sa_family != AF_INET) continue;
+    sockaddr_in address{};
+    std::memcpy(&address, one->ifa_addr, sizeof address);
+    if (address.sin_addr.s_addr == own.sin_addr.s_addr) return one->ifa_name;
+  }
+  return {};
+}
+
+Finding judge_coalescing(const std::string& interface, int socket) {
+  Finding f{.check = "hm2", .what = "interrupt coalescing of " + interface, .standing = Standing::note};
+  ethtool_coalesce coalescing{};
+  coalescing.cmd = ETHTOOL_GCOALESCE;
+  ifreq request{};
+  interface.copy(static_cast<char*>(request.ifr_name), IFNAMSIZ - 1);
+  request.ifr_data = reinterpret_cast<char*>(&coalescing);
+  if (::ioctl(socket, SIOCETHTOOL, &request) != 0) {
+    f.detail = "this interface has none to set";
+    return f;
+  }
+  f.detail = fmt::format("rx-usecs {}", coalescing.rx_coalesce_usecs);
+  f.standing = coalescing.rx_coalesce_usecs == 0 ? Standing::good : Standing::warning;
+  if (f.standing == Standing::warning) f.fix = "sudo ethtool -C " + interface + " rx-usecs 0";
+  return f;
+}
+
+/// Requests of one small read each; `foreign` becomes the number of packets that others sent meanwhile.
+Finding measure_round_trips(const sockaddr_in& board) {
+  constexpr int asked = 500;
+  constexpr std::int64_t wait_ns = 5'000'000;
+  driver::hm2::UdpLink link(board);
+  driver::hm2::Packet packet;
+  packet.read(driver::hm2::space::status, driver::hm2::at::received);
+  std::array<std::uint8_t, 2> answer{};
+  std::uint32_t number = static_cast<std::uint32_t>(driver::monotonic_ns());
+  std::vector<double> times_us;
+  int foreign = 0;
+  int silent = 0;
+  std::uint16_t received = 0;
+  for (int i = 0; i < asked && silent < 10; ++i) {
+    const std::int64_t sent_ns = driver::monotonic_ns();
+    if (!driver::hm2::ask(link, packet, answer, number, wait_ns, 1)) {
+      ++silent;
+      continue;
+    }
+    times_us.push_back(1e-3 * static_cast<double>(driver::monotonic_ns() - sent_ns));
+    const std::uint16_t now = driver::hm2::word16(answer, 0);
+    if (times_us.size() > 1) foreign += std::max(static_cast<std::uint16_t>(now - received) - 1 - silent, 0);
+    received = now;
+    silent = 0;
+  }
+  return judge_round_trips(std::move(times_us), asked, foreign);
+}
+
+}  // namespace
+
+Finding judge_round_trips(std::vector<double> times_us, int asked, int foreign) {
+  Finding f{.check = "hm2", .what = "round trips to the board"};
+  if (times_us.empty()) {
+    f.standing = Standing::failure;
+    f.detail = "no answer";
+    f.fix = "check the board's power, the cable, and the address of this computer's interface (docs/hm2.md)";
+    return f;
+  }
+  std::ranges::sort(times_us);
+  const auto part = [&](double share) {
+    return times_us[static_cast<std::size_t>(share * static_cast<double>(times_us.size() - 1))];
+  };
+  const auto lost = asked - static_cast<int>(times_us.size());
+  f.detail = fmt::format("{} of {} answered; least {:.0f}, half {:.0f}, 90 % {:.0f}, 99 % {:.0f}, most {:.0f} us",
+                         times_us.size(), asked, times_us.front(), part(0.5), part(0.9), part(0.99), times_us.back());
+  constexpr double longest_us = 800.0;  // 80 % of a period of 1 ms
+  if (lost > 0 || times_us.back() > longest_us) {
+    f.standing = Standing::warning;
+    f.fix = "own interface, static ARP, coalescing off, --rt require (docs/hm2.md, \"The network\")";
+  }
+  if (foreign > 0) {
+    f.standing = Standing::warning;
+    f.detail += fmt::format("; {} packets came from others", foreign);
+    f.fix =
+        "end the other program, or keep the interface for the board alone (docs/hm2.md, \"The network\"); a "
+        "guardian that keeps this board looks at it and counts here, too";
+  }
+  return f;
+}
+
+Finding judge_arp(const std::string& table, const std::string& address, const std::string& interface) {
+  Finding f{.check = "hm2", .what = "ARP entry of " + address, .standing = Standing::warning};
+  std::string mac = "MAC";
+  std::istringstream lines(table);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string ip;
+    std::string type;
+    std::string flags;
+    words >> ip >> type >> flags >> mac;
+    if (ip != address) continue;
+    constexpr unsigned long permanent = 0x4;
+    f.detail = mac;
+    if ((std::strtoul(flags.c_str(), nullptr, 16) & permanent) != 0) {
+      f.standing = Standing::good;
+      f.detail += ", permanent";
+      return f;
+    }
+    f.detail +=
+        ", not permanent: the kernel asks again from time to time, and the board counts that as another's packet";
+    f.fix = fmt::format("sudo ip neigh replace {} lladdr {} nud permanent dev {}", address, mac, interface);
+    return f;
+  }
+  f.detail = "none";
+  f.fix = fmt::format("sudo ip neigh replace {} lladdr MAC nud permanent dev {}", address, interface);
+  return f;
+}
+
+std::vector<Finding> scan_hm2(const driver::hm2::Hm2Options& options) {
+  const sockaddr_in board = driver::hm2::parse_address(options.address);
+  const FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  const std::string interface = interface_to(board, socket.get());
+  Finding where{.check = "hm2", .what = "interface to " + options.address, .detail = interface};
+  if (interface.empty()) {
+    where.standing = Standing::failure;
+    where.detail = "no route";
+    where.fix = "give an interface an address in the board's network: sudo ip addr add 192.168.1.1/24 dev IFACE";
+    return {where};
+  }
+  std::vector<Finding> findings{where};
+  if (interface != "lo") {
+    std::ifstream arp("/proc/net/arp");
+    const std::string table{std::istreambuf_iterator<char>(arp), {}};
+    findings.push_back(judge_arp(table, text_of(board.sin_addr), interface));
+    findings.push_back(judge_coalescing(interface, socket.get()));
+  }
+  findings.push_back(measure_round_trips(board));
+  return findings;
+}
+
+}  // namespace abs_hil::diagnosis
