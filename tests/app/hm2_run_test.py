@@ -1,0 +1,165 @@
+"""The paper's experiment through driver.kind=hm2, against the emulated 7I92T in another process: in lock-step it agrees with
+the simulator; in real time the board's watchdog ends what nobody else can. Outcomes and the board's own clock are asserted,
+never this computer's timing."""
+import os
+import pathlib
+import re
+import signal
+import socket
+import time
+import unittest
+
+from can_emulator import skip_unless_possible
+from emulator_process import EmulatorProcess, EmulatorTest
+
+SAFE = (0.0, 0.0)
+WATCHDOG_MS = 20
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(('127.0.0.1', 0))
+        return probe.getsockname()[1]
+
+
+class Board(EmulatorProcess):
+    """A running abs_rig_emulator --hm2."""
+
+    def __init__(self, folder, *args):
+        self.address = f'127.0.0.1:{free_port()}'
+        super().__init__(folder, '--hm2', self.address, *args)
+
+
+class Hm2Run(EmulatorTest):
+    def board(self, *args):
+        return self.start_emulator(Board, *args)
+
+    def arguments(self, board, *args):
+        return ['--backend', 'rig', '--no-lcm', '--no-out', '--set', 'driver.kind=hm2', '--set',
+                f'driver.hm2.address={board.address}', *map(str, args)]
+
+    def lock_step(self, board, *args):
+        return self.run_program(*self.arguments(board, '--fast', '--set', 'driver.emulated=true', *args))
+
+    def start_real_time(self, board, *args):
+        # A computer under load wakes its programs late.
+        return self.start_program(*self.arguments(
+            board, '--set', 'guardian.timeout_ms=1000', '--set', 'realtime.cycle_gap_max_s=1', *args))
+
+    def wait_for_drive(self, board, program):
+        for _ in range(400):
+            if board.wire()[0] > 0.0:
+                return
+            if program.poll() is not None:
+                raise AssertionError(f'the run ended: {program.communicate()[1]}')
+            time.sleep(0.05)
+        raise AssertionError('the drive did not come on')
+
+    def zeros(self, board):
+        """ms since the last reload of the watchdog, of each event in which it bit."""
+        board.command('status')  # reads what it has printed so far
+        return [float(found[1]) for line in board.lines
+                if 'bit' in line and (found := re.search(r'([\d.]+) ms after', line))]
+
+    def test_lock_step_agrees_with_the_simulator(self):
+        rig, sim = self.folder / 'rig.json', self.folder / 'sim.json'
+        self.fast('--summary', sim, '--set', 'gate.brake_duty_max=0.7')
+        board = self.board('--lock-step')
+        result = self.lock_step(board, '--summary', rig)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn('not verified on hardware', result.stderr)
+        self.assertIn('0 without an answer in time; 0 writes lost', result.stderr)
+        r, s = self.summary(rig), self.summary(sim)
+        self.assertEqual(r['telemetry_drops'], 0)
+        for key in ('stop_time_s', 'stop_distance_m', 'theta_final_N', 'brake_start_s'):
+            self.assertAlmostEqual(r[key] / s[key], 1.0, delta=0.01, msg=key)
+        self.assertEqual(board.wire(), SAFE)
+
+    def test_faults_of_the_board_end_a_run_with_their_reasons(self):
+        for command, words in (('fault lose-answers=10', 'lost ten datagrams in a row'),
+                               ('bite', 'watchdog dropped all outputs'),
+                               ('power-cycle', 'was restarted'),
+                               ('quadrature-error upper', 'both signals of an encoder'),
+                               ('talker read', 'something else writes')):
+            with self.subTest(command):
+                board = self.board()
+                program = self.start_real_time(board)
+                self.wait_for_drive(board, program)
+                board.command(command)
+                error = program.communicate(timeout=120)[1]
+                self.assertEqual(program.returncode, 1, error)
+                self.assertIn(words, error)
+                board.command('talker off')
+                self.assertEqual(board.wire(), SAFE)
+                board.end()
+
+    def test_program_and_guardian_dead_or_stopped_the_watchdog_acts_in_its_time(self):
+        for stop in (signal.SIGKILL, signal.SIGSTOP):
+            with self.subTest(stop):
+                board = self.board()
+                program = self.start_real_time(board)
+                self.wait_for_drive(board, program)
+                guardians = self.guardians_of(program.pid)
+                self.assertEqual(len(guardians), 1)
+                for pid in (*guardians, program.pid):  # the guardian first, or it would act
+                    self.send(pid, stop)
+                time.sleep(0.5)
+                self.assertEqual(board.wire(), SAFE)
+                self.assertLessEqual(self.zeros(board)[-1], WATCHDOG_MS + 2)
+                for pid in (*guardians, program.pid):
+                    self.send(pid, signal.SIGKILL)
+                program.communicate(timeout=20)
+                board.end()
+
+    def test_cable_out_and_in_again_the_outputs_stay_off(self):
+        board = self.board()
+        program = self.start_real_time(board, '--set', 'guardian.insist_s=30')
+        self.wait_for_drive(board, program)
+        board.command('link down')
+        time.sleep(0.5)
+        self.assertEqual(board.wire(), SAFE)
+        self.assertLessEqual(self.zeros(board)[-1], WATCHDOG_MS + 2)
+        board.command('link up')
+        error = program.communicate(timeout=60)[1]
+        self.assertEqual(program.returncode, 1, error)
+        self.assertIn('lost ten datagrams in a row', error)
+        for _ in range(20):
+            self.assertEqual(board.wire(), SAFE)
+            time.sleep(0.02)
+
+    def test_paper_in_real_time(self):
+        summary = self.folder / 'real.json'
+        board = self.board()
+        program = self.start_real_time(board, '--summary', summary, '--set', 'gate.brake_duty_max=0.7')
+        error = program.communicate(timeout=180)[1]
+        self.assertEqual(program.returncode, 0, error)
+        self.assertEqual(self.summary(summary)['telemetry_drops'], 0)
+        self.assertEqual(board.wire(), SAFE)
+
+    def test_safe_and_doctor_reach_a_board_that_is_named(self):
+        board = self.board()
+        named = ('--set', 'driver.kind=hm2', '--set', f'driver.hm2.address={board.address}')
+        result = self.run_program('safe', *named)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn('board of driver.kind=hm2: drive 0 and brake 0, verified', result.stdout)
+        doctor = self.run_program('doctor', '--only', 'hm2', *named)
+        self.assertIn('round trips to the board', doctor.stdout)
+        self.assertRegex(doctor.stdout, r'\d+ of 500 answered')
+
+    @staticmethod
+    def send(pid, number):
+        try:
+            os.kill(pid, number)
+        except ProcessLookupError:
+            pass
+
+    @staticmethod
+    def guardians_of(pid):
+        return [int(child) for children in pathlib.Path(f'/proc/{pid}/task').glob('*/children')
+                for child in children.read_text().split()
+                if pathlib.Path(f'/proc/{child}/comm').read_text().startswith('abs_guardian')]
+
+
+if __name__ == '__main__':
+    skip_unless_possible()
+    unittest.main()
