@@ -1,5 +1,7 @@
+// Configuration files, plants by name, and the folders in which they stand.
 #include "config/config_file.hpp"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
@@ -62,7 +64,7 @@ bool is_of_plant(std::string_view name) { return name.starts_with("plant."); }
 std::vector<FileValue> read_file(const fs::path& file, Tables tables) {
   toml::table table = parse(file);
   table.erase("description");
-  if (tables == Tables::of_plant) table.erase("identified");  // its date, see model_origin
+  if (tables == Tables::of_plant) table.erase("identified");  // its date, see model_origin()
   if (tables == Tables::of_plant) {
     for (const auto& [key, node] : table) {
       if ((key.str() == "plant" || key.str() == "model") && node.is_table()) continue;
@@ -173,6 +175,17 @@ fs::path plant_file(std::string_view name_or_file, std::string_view option) {
   for (const PlantEntry& plant : known) names.push_back(plant.name);
   throw ConfigError(fmt::format("{}: unknown plant \"{}\"; the nearest known is {}; known: {}; or give a TOML file",
                                 option, name_or_file, rig::nearest_name(name_or_file, names), fmt::join(names, ", ")));
+}
+
+std::string model_origin(const Settings& settings, std::chrono::sys_days today) {
+  const std::string& name = settings.model_name.empty() ? settings.plant_name : settings.model_name;
+  const auto date = parse(plant_file(name, "--model"))["identified"].value<toml::date>();
+  if (!date) {
+    return fmt::format("model {}: not identified from the rig's own logs; abs_hil identify does that", name);
+  }
+  const std::chrono::sys_days day = std::chrono::year{date->year} / date->month / date->day;
+  return fmt::format("model {}: identified on {:04}-{:02}-{:02}, {} days ago", name, date->year, date->month, date->day,
+                     (today - day).count());
 }
 
 std::vector<PlantEntry> known_plants() {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -52,6 +53,11 @@ void set_own_config_dir(std::filesystem::path folder);
 /// A plant by name or file: `name` alone is config_dir()/plants/name.toml. Throws ConfigError, naming `option` and the
 /// known plants.
 [[nodiscard]] std::filesystem::path plant_file(std::string_view name_or_file, std::string_view option = "--plant");
+
+/// Where the model's values come from, in a sentence: "model rig.toml: identified on 2026-11-22, 3 days ago". The date
+/// is the line `identified = DATE` that abs_identify writes into a model's file. Throws ConfigError for an unreadable
+/// file.
+[[nodiscard]] std::string model_origin(const Settings& settings, std::chrono::sys_days today);
 
 struct PlantEntry {
   std::string name;

@@ -1,12 +1,11 @@
+// An experiment in words, as `abs_hil validate` prints it.
 #include "config/explain.hpp"
 
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "config/events.hpp"
 #include "config/plan.hpp"
-#include "config/series.hpp"
 
 namespace abs_hil::config {
 
@@ -40,34 +39,14 @@ std::string in_words(const experiment::Profile& profile, double constant, std::s
 }
 
 std::string in_words(const experiment::EndCondition& end) {
-  const std::string value = number(end.value);
-  switch (end.kind) {
-    case EndKind::duration: return fmt::format("it has lasted {} s", value);
-    case EndKind::upper_speed_above: return fmt::format("the upper wheel reaches {} rad/s", value);
-    case EndKind::upper_speed_below: return fmt::format("the upper wheel is slower than {} rad/s", value);
-    case EndKind::upper_wheel_peak: return fmt::format("the upper wheel has gained no speed for {} s", value);
-    case EndKind::lower_speed_above: return fmt::format("the lower wheel reaches {} rad/s", value);
-    case EndKind::lower_speed_below: return fmt::format("the lower wheel is slower than {} rad/s", value);
-    case EndKind::car_speed_above: return fmt::format("the car reaches {} m/s", value);
-    case EndKind::car_speed_below:
-      return fmt::format(
-          "the car is slower than {} m/s{}", value,
-          end.reason == rig::Reason::slip_control_left_at_low_speed ? " (least speed for slip control)" : "");
-    case EndKind::standstill: return "both wheels stand";
-    case EndKind::start_command: return "the start is given";
-    case EndKind::answer: return "the question is answered";
-    case EndKind::slip_above: return fmt::format("the slip reaches {}", value);
-    case EndKind::slip_below: return fmt::format("the slip is less than {}", value);
-    case EndKind::distance: return fmt::format("the car has travelled {} m in it", value);
-    case EndKind::all: break;
-  }
-  std::string text;
+  std::string text = fmt::format(fmt::runtime(experiment::row_of(end.kind).in_words), number(end.value));
+  if (end.reason == rig::Reason::slip_control_left_at_low_speed) text += " (least speed for slip control)";
   for (const experiment::EndCondition& part : end.parts) text += (text.empty() ? "" : " and ") + in_words(part);
   return text;
 }
 
 /// @param goes_on  the phase before used the controller too, and this one does not restart it
-std::string brake_in_words(const experiment::PhasePlan& phase, const config::Settings& s, bool goes_on) {
+std::string brake_in_words(const experiment::PhasePlan& phase, const Settings& s, bool goes_on) {
   switch (phase.brake) {
     case BrakeAction::released: return "off";
     case BrakeAction::torque: return "torque " + in_words(phase.brake_profile, phase.brake_torque_Nm, " N m");
@@ -78,35 +57,36 @@ std::string brake_in_words(const experiment::PhasePlan& phase, const config::Set
                      in_words(phase.slip_ref_profile, s.control.slip_ref, ""));
 }
 
-void add_series(const SeriesScript& series, const config::Settings& s, std::string& text) {
+void add_series(const Script& script, const Settings& s, std::string& text) {
+  const SeriesScript& series = script.series;
   if (!series.given) return;
-  std::size_t runs = series.seeds.empty() ? static_cast<std::size_t>(series.repeat) : series.seeds.size();
+  const std::vector<SeriesMember> members = members_of(script, s.seed);
   std::string varied;
-  for (const Varied& v : series.vary) {
-    runs *= v.values.size();
-    std::string values;
-    for (const config::Value& value : v.values) values += (values.empty() ? "" : ", ") + text_of(value);
-    varied += fmt::format("  {}: {}\n", v.key, values);
+  if (!series.experiments.empty()) varied = fmt::format("  experiment.name: {}\n", fmt::join(series.experiments, ", "));
+  for (const Factor& factor : script.factors) {
+    std::vector<std::string> values;
+    for (const Value& value : std::get<Levels>(factor.values).values) values.push_back(text_of(value));
+    varied += fmt::format("  {}: {}\n", factor.key, fmt::join(values, ", "));
   }
   const std::string seeds =
       series.seeds.empty() ? fmt::format("{} of each with seeds from {}", series.repeat, series.seed.value_or(s.seed))
                            : fmt::format("with the seeds {}", fmt::join(series.seeds, ", "));
-  text +=
-      fmt::format("Series of {} runs, {}, in real time {} s apart\n{}", runs, seeds, number(series.pause_s), varied);
+  text += fmt::format("Series of {} runs, {}, in real time {} s apart\n{}", members.size(), seeds,
+                      number(series.pause_s), varied);
 }
 
 }  // namespace
 
-std::string explain(const Script& script, const config::Settings& settings) {
-  config::Settings s = settings;
+std::string explain(const Script& script, const Settings& settings) {
+  Settings s = settings;
   apply(script, s);
   std::string text =
       fmt::format("{}: {}\n", script.name, script.description.empty() ? "no description" : script.description);
-  if (script.series.of_experiments) {
-    add_series(script.series, s, text);
+  if (!script.series.experiments.empty()) {
+    add_series(script, s, text);
     return text;
   }
-  const Plan plan = config::plan(script, s);
+  const Plan plan = abs_hil::config::plan(script, s);
   for (std::size_t i = 0; i < plan.phases.size(); ++i) {
     const experiment::PhasePlan& phase = plan.phases[i];
     const bool goes_on = i > 0 && plan.phases[i - 1].brake == BrakeAction::slip_control && !phase.restart;
@@ -134,7 +114,7 @@ std::string explain(const Script& script, const config::Settings& settings) {
     text += fmt::format("Setting: {} = {}\n", setting.key, text_of(setting.value));
   }
   if (!script.analysis.empty()) text += fmt::format("Analysis: {}\n", script.analysis);
-  add_series(script.series, s, text);
+  add_series(script, s, text);
   return text;
 }
 

@@ -1,3 +1,4 @@
+// From an experiment's file and a configuration to the phases that run.
 #include "config/plan.hpp"
 
 #include <fmt/format.h>
@@ -7,7 +8,6 @@
 
 #include "abs_hil/rig/brake_map.hpp"
 #include "config/config_error.hpp"
-#include "config/events.hpp"
 #include "config/library.hpp"
 
 namespace abs_hil::config {
@@ -21,7 +21,7 @@ using rig::Reason;
 /// Slack on the time limit of phases that end by their duration.
 constexpr double duration_slack_s = 1.0;
 
-std::optional<double> number_of(const config::Key& key) {
+std::optional<double> number_of(const Key& key) {
   return std::visit(
       [](const auto* target) -> std::optional<double> {
         using Target = std::decay_t<decltype(*target)>;
@@ -34,45 +34,19 @@ std::optional<double> number_of(const config::Key& key) {
       key.target);
 }
 
-std::string text_of(const config::Key& key) {
-  return std::visit([](const auto* target) { return fmt::format("{}", *target); }, key.target);
-}
-
-Reason reason_of(EndKind kind) {
-  switch (kind) {
-    case EndKind::duration: return Reason::phase_duration_over;
-    case EndKind::upper_speed_above: return Reason::speed_threshold_reached;
-    case EndKind::upper_wheel_peak: return Reason::upper_wheel_peak_detected;
-    case EndKind::car_speed_below: return Reason::end_speed_reached;
-    case EndKind::standstill: return Reason::standstill_reached;
-    case EndKind::start_command: return Reason::start_command;
-    case EndKind::answer: return Reason::question_answered;
-    case EndKind::upper_speed_below:
-    case EndKind::lower_speed_above:
-    case EndKind::lower_speed_below:
-    case EndKind::car_speed_above: return Reason::speed_condition_met;
-    case EndKind::slip_above:
-    case EndKind::slip_below: return Reason::slip_condition_met;
-    case EndKind::distance: return Reason::distance_reached;
-    case EndKind::all: return Reason::all_conditions_met;
-  }
-  return Reason::none;
-}
-
 /// The kind of a phase in the CSV, derived where the script gives none.
 rig::Phase kind_of(const PhaseScript& phase) {
   if (phase.kind) return *phase.kind;
-  for (const rig::Phase kind : {rig::Phase::idle, rig::Phase::accelerate, rig::Phase::coast, rig::Phase::brake,
-                                rig::Phase::hold, rig::Phase::stopped}) {
-    if (rig::name_of(kind) == phase.name) return kind;
+  for (const auto& [word, kind] : words_of<rig::Phase>) {
+    if (word == phase.name) return kind;
   }
-  if (phase.brake != BrakeAction::released) return rig::Phase::brake;
+  if (phase.brake.action() != BrakeAction::released) return rig::Phase::brake;
   return phase.motor ? rig::Phase::accelerate : rig::Phase::coast;
 }
 
 class Planner {
  public:
-  Planner(const Script& script, const config::Settings& settings)
+  Planner(const Script& script, const Settings& settings)
       : script_(script), settings_(settings), keys_(settings_) {}
 
   [[nodiscard]] Plan make() const {
@@ -82,7 +56,7 @@ class Planner {
       plan.phases.push_back(planned(phase));
     }
     if (plan.phases.empty()) {
-      throw config::ConfigError(
+      throw ConfigError(
           fmt::format("{}: this configuration leaves out every phase by its \"when\"; change one", script_.path));
     }
     if (script_.limits.run_time) plan.limits.run_time_s = value(*script_.limits.run_time);
@@ -100,7 +74,7 @@ class Planner {
     try {
       return experiment::Profile(std::move(points), script.between);
     } catch (const std::invalid_argument& error) {
-      throw config::ConfigError(fmt::format("{}: {}", script_.at(script.place), error.what()));
+      throw ConfigError(fmt::format("{}: {}", script_.at(script.place), error.what()));
     }
   }
   /// Stores a constant in `constant` and returns an empty profile; returns any other profile.
@@ -112,40 +86,38 @@ class Planner {
   }
 
   [[nodiscard]] experiment::EndCondition condition(const ConditionScript& script) const {
-    experiment::EndCondition end{.kind = script.kind, .reason = reason_of(script.kind)};
-    if (script.kind == EndKind::all) {
-      for (const ConditionScript& part : script.parts) end.parts.push_back(condition(part));
-    } else if (script.kind != EndKind::standstill && script.kind != EndKind::answer) {
-      end.value = value(script.value);
-    }
+    const experiment::EndRow& row = experiment::row_of(script.kind);
+    experiment::EndCondition end{.kind = script.kind, .reason = row.reason};
+    for (const ConditionScript& part : script.parts) end.parts.push_back(condition(part));
+    if (row.takes_value()) end.value = value(script.value);
     return end;
   }
 
   [[nodiscard]] experiment::PhasePlan planned(const PhaseScript& phase) const {
+    const std::optional<ProfileScript>& brake = phase.brake.profile();
     experiment::PhasePlan plan{.phase = kind_of(phase),
                                .name = phase.name,
-                               .brake = phase.brake,
+                               .brake = phase.brake.action(),
                                .restart = phase.restart,
                                .wheels_apart = phase.wheels_apart,
                                .question = phase.ask};
     plan.motor_profile = profile_or(phase.motor, plan.motor_duty);
-    if (phase.brake == BrakeAction::slip_control) {
+    if (plan.brake == BrakeAction::slip_control) {
       // A constant too: it stands in place of control.slip_ref.
-      if (phase.brake_profile) plan.slip_ref_profile = profile(*phase.brake_profile);
+      if (brake) plan.slip_ref_profile = profile(*brake);
     } else {
-      plan.brake_profile =
-          profile_or(phase.brake_profile, phase.brake == BrakeAction::duty ? plan.brake_duty : plan.brake_torque_Nm);
+      plan.brake_profile = profile_or(brake, plan.brake == BrakeAction::duty ? plan.brake_duty : plan.brake_torque_Nm);
     }
     for (const ConditionScript& script : phase.until) {
       if (!script.when || holds(*script.when, keys_)) plan.ends_on.push_back(condition(script));
     }
     if (plan.ends_on.empty()) {
-      throw config::ConfigError(
+      throw ConfigError(
           fmt::format("{}: this configuration leaves phase \"{}\" without an end condition; give one",
                       script_.at(phase.place), phase.name));
     }
     plan.time_limit_s = time_limit_s(phase, plan);
-    if (phase.brake == BrakeAction::slip_control && !ends_above(settings_.control.v_min_m_s, plan)) {
+    if (plan.brake == BrakeAction::slip_control && !ends_above(settings_.control.v_min_m_s, plan)) {
       // The laws are steep in 1 / v_x. Below this speed slip control ends, whatever the script says.
       plan.ends_on.push_back(
           {EndKind::car_speed_below, settings_.control.v_min_m_s, Reason::slip_control_left_at_low_speed});
@@ -170,8 +142,8 @@ class Planner {
   }
 
   const Script& script_;
-  mutable config::Settings settings_;
-  config::KeyTable keys_;
+  mutable Settings settings_;
+  KeyTable keys_;
 };
 
 double highest(const experiment::Profile& profile, double constant) {
@@ -182,23 +154,23 @@ double highest(const experiment::Profile& profile, double constant) {
 
 }  // namespace
 
-double value_of(const Script& script, const Number& number, const config::KeyTable& keys) {
+double value_of(const Script& script, const Number& number, const KeyTable& keys) {
   if (number.key.empty()) return number.value;
-  const config::Key* key = find_key(keys.keys(), number.key);
+  const Key* key = find_key(keys.keys(), number.key);
   const double value = key == nullptr ? std::nan("") : number_of(*key).value_or(std::nan(""));
   if (!number.range.contains(value)) {
-    throw config::ConfigError(fmt::format("{}: ${} is {} in this configuration; give a value in {}{}{}",
+    throw ConfigError(fmt::format("{}: ${} is {} in this configuration; give a value in {}{}{}",
                                           script.at(number.place), number.key, value, number.range.text(),
                                           number.unit.empty() ? "" : " ", number.unit));
   }
   return value;
 }
 
-bool holds(const When& when, const config::KeyTable& keys) {
-  const config::Key* key = find_key(keys.keys(), when.key);
+bool holds(const When& when, const KeyTable& keys) {
+  const Key* key = find_key(keys.keys(), when.key);
   if (key == nullptr) return false;
   if (const std::optional<double> value = number_of(*key)) {
-    const config::Value wanted = config::parse_value(*key, when.value);
+    const Value wanted = parse_value(*key, when.value);
     const auto* whole = std::get_if<std::int64_t>(&wanted);
     const double other = whole != nullptr ? static_cast<double>(*whole) : std::get<double>(wanted);
     if (when.operation == "=") return *value == other;
@@ -207,7 +179,7 @@ bool holds(const When& when, const config::KeyTable& keys) {
     if (when.operation == ">") return *value > other;
     return when.operation == "<=" ? *value <= other : *value >= other;
   }
-  return (text_of(*key) == when.value) == (when.operation == "=");
+  return (value_text(*key) == when.value) == (when.operation == "=");
 }
 
 bool means_to_stop(const Plan& plan, double end_speed_m_s) {
@@ -230,12 +202,12 @@ bool means_to_stop(const Plan& plan, double end_speed_m_s) {
   });
 }
 
-Plan plan(const Script& script, const config::Settings& settings) { return Planner(script, settings).make(); }
+Plan plan(const Script& script, const Settings& settings) { return Planner(script, settings).make(); }
 
-Plan plan(const config::Settings& settings) { return plan(*find(settings.experiment.name), settings); }
+Plan plan(const Settings& settings) { return plan(*find(settings.experiment.name), settings); }
 
-void apply(const Script& script, config::Settings& s) {
-  const config::KeyTable keys(s);
+void apply(const Script& script, Settings& s) {
+  const KeyTable keys(s);
   const LimitsScript& limits = script.limits;
   const auto tighten = [&](double& limit, const std::optional<Number>& wanted) {
     if (wanted) limit = std::min(limit, value_of(script, *wanted, keys));
@@ -253,7 +225,7 @@ void apply(const Script& script, config::Settings& s) {
   }
 }
 
-std::vector<std::string> beyond_limits(const Plan& plan, const config::Settings& s) {
+std::vector<std::string> beyond_limits(const Plan& plan, const Settings& s) {
   std::vector<std::string> problems;
   const double most_torque_Nm =
       s.plant.ideal_actuator ? 1e9 : rig::brake_torque_at(s.model.brake, s.gate.brake_duty_max);

@@ -2,6 +2,8 @@
 
 #include <toml++/toml.h>
 
+#include <algorithm>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -10,29 +12,39 @@
 #include "config/grammar.hpp"
 #include "config/script.hpp"
 
+// Reads the tables of experiment and study files into the structs whose rows describe them.
+
 namespace abs_hil::config {
 
 [[nodiscard]] inline Place place_of(const toml::source_region& region) noexcept {
   return {region.begin.line, region.begin.column};
 }
 
-/// The script's path, for errors, and the table of configuration keys, for look-ups.
+/// The file that is read: its path, for errors, the configuration keys, for look-ups, and the files that it names.
 class Source {
  public:
-  explicit Source(std::string path) : path_(std::move(path)), keys_(settings_) {}
+  explicit Source(std::string path, FileReader read_file = {})
+      : path_(std::move(path)), read_file_(std::move(read_file)), keys_(settings_) {}
   [[noreturn]] void fail(Place place, std::string_view message) const;
   [[nodiscard]] std::string at(Place place) const;
   /// Returns the configuration key of that name. Fails for an unknown name, with the nearest known one.
-  [[nodiscard]] const config::Key& key(std::string_view name, Place place) const;
+  [[nodiscard]] const Key& key(std::string_view name, Place place) const;
   /// True for a configuration key, and for a table of them, as in "control".
   [[nodiscard]] bool is_setting(std::string_view name) const;
   /// Fails unless the configuration key takes that value.
-  void check_value(std::string_view name, const config::Value& value, Place place) const;
+  void check_value(std::string_view name, const Value& value, Place place) const;
+  /// The text as TOML. Fails where it is none.
+  [[nodiscard]] toml::table parsed(const std::string& text) const;
+  /// The text of a file that the script names; empty if there is none. It is kept.
+  [[nodiscard]] std::optional<std::string> named_file(const std::string& name) const;
+  [[nodiscard]] const std::map<std::string, std::string>& named_files() const noexcept { return files_; }
 
  private:
   std::string path_;
-  mutable config::Settings settings_{};
-  mutable config::KeyTable keys_;
+  FileReader read_file_;
+  mutable std::map<std::string, std::string> files_{};
+  mutable Settings settings_{};
+  mutable KeyTable keys_;
 };
 
 /// One key of a table with its value.
@@ -45,31 +57,41 @@ struct Entry {
   Place key_place{};
 };
 
-/// Reads a table by its grammar. The constructor refuses unknown and missing keys. The other members read values.
+/// The keys of one table. The constructor refuses unknown and missing keys. The other members read values; they fail
+/// for a value that its row does not allow.
 class TableReader {
  public:
   /// @param place where the table stands if TOML does not say
   TableReader(const Source& source, const toml::table& table, const Grammar& grammar, Place place);
 
+  [[nodiscard]] const Source& source() const noexcept { return source_; }
   [[nodiscard]] const Entry* find(std::string_view name) const noexcept;
+  /// In the order of the file.
   [[nodiscard]] const std::vector<Entry>& entries() const noexcept { return entries_; }
   [[nodiscard]] Place place() const noexcept { return place_; }
+  [[noreturn]] void fail(Place place, std::string_view message) const { source_.fail(place, message); }
 
   [[nodiscard]] std::string text(const Entry& entry) const;
-  [[nodiscard]] std::string choice(const Entry& entry) const;
+  void flag(const Entry& entry) const;  ///< the value must be true
   [[nodiscard]] Number number(const Entry& entry) const;
+  [[nodiscard]] double plain_number(const Entry& entry) const;  ///< no $key
   [[nodiscard]] std::int64_t whole(const Entry& entry) const;
   [[nodiscard]] std::vector<std::int64_t> wholes(const Entry& entry) const;
   [[nodiscard]] std::vector<std::string> texts(const Entry& entry) const;
   [[nodiscard]] When when(const Entry& entry) const;
+  [[nodiscard]] ProfileScript profile(const Entry& entry) const;
+  [[nodiscard]] std::vector<ConditionScript> conditions(const Entry& entry) const;
+  [[nodiscard]] std::vector<Setting> settings(const Entry& entry) const;
+  [[nodiscard]] std::vector<Factor> factors(const Entry& entry) const;
   [[nodiscard]] const toml::table& table(const Entry& entry) const;
   /// The tables of a list; not empty.
   [[nodiscard]] std::vector<const toml::table*> tables(const Entry& entry) const;
+  /// True if the value is one of the texts that the row allows in place of a profile or a table.
+  [[nodiscard]] static bool is_allowed_text(const Entry& entry) noexcept;
 
-  // The same for optional keys.
-  [[nodiscard]] std::string text_or_empty(std::string_view name) const;
-  [[nodiscard]] std::optional<Number> optional_number(std::string_view name) const;
-  [[nodiscard]] std::optional<When> optional_when() const;
+  /// Reads a value of any type that a member of a table may have.
+  template <class Member>
+  void read(const Entry& entry, Member& member) const;
 
  private:
   const Source& source_;
@@ -77,29 +99,72 @@ class TableReader {
   std::vector<Entry> entries_;
 };
 
+/// Reads a table. Rules over several keys are those of `T::check(reader)`, if it has one.
+template <class T>
+void read_table(const Source& source, const toml::table& table, Place place, T& value) {
+  const TableReader reader(source, table, grammar_of<T>(), place);
+  if constexpr (requires { value.place; }) value.place = reader.place();
+  rig::for_each_row<T>([&](const auto& row) {
+    if (const Entry* entry = reader.find(row.facts.key)) reader.read(*entry, value.*row.member);
+  });
+  if constexpr (requires { value.check(reader); }) value.check(reader);
+}
+
+template <class Member>
+void TableReader::read(const Entry& entry, Member& member) const {
+  using Element = typename ElementOf<Member>::type;
+  if constexpr (std::is_same_v<Member, std::string>) {
+    member = text(entry);
+  } else if constexpr (std::is_enum_v<Member>) {
+    const std::string word = text(entry);
+    member = std::ranges::find(words_of<Member>, word, [](const auto& row) { return row.first; })->second;
+  } else if constexpr (std::is_same_v<Member, bool>) {
+    flag(entry);
+    member = true;
+  } else if constexpr (std::is_integral_v<Member>) {
+    member = static_cast<Member>(whole(entry));
+  } else if constexpr (std::is_same_v<Member, double>) {
+    member = plain_number(entry);
+  } else if constexpr (std::is_same_v<Member, Number>) {
+    member = number(entry);
+  } else if constexpr (std::is_same_v<Member, When>) {
+    member = when(entry);
+  } else if constexpr (std::is_same_v<Member, ProfileScript>) {
+    member = profile(entry);
+  } else if constexpr (std::is_same_v<Element, std::string>) {
+    member = texts(entry);
+  } else if constexpr (std::is_same_v<Element, std::int64_t>) {
+    member = wholes(entry);
+  } else if constexpr (std::is_same_v<Element, Setting>) {
+    member = settings(entry);
+  } else if constexpr (std::is_same_v<Element, Factor>) {
+    member = factors(entry);
+  } else if constexpr (std::is_same_v<Element, ConditionScript>) {
+    member = conditions(entry);
+  } else if constexpr (Table<Element>) {
+    for (const toml::table* one : tables(entry)) read_table(source_, *one, entry.place, member.emplace_back());
+  } else if constexpr (Table<Member>) {
+    if constexpr (requires { member.word; }) {
+      if (is_allowed_text(entry)) {
+        member.word = text(entry);
+        return;
+      }
+    }
+    read_table(source_, table(entry), entry.place, member);
+  } else {  // an optional value; "off" leaves it empty
+    if (!is_allowed_text(entry) || !std::is_same_v<typename Member::value_type, ProfileScript>)
+      read(entry, member.emplace());
+  }
+}
+
 /// Formats a value for messages: on one line, shortened if long.
 [[nodiscard]] std::string shown(const toml::node& node);
-/// "a whole number", "a table", ...
-[[nodiscard]] std::string_view kind_of(const toml::node& node);
-
-/// Reads a number of the field's quantity and range, by the rules for units.
+/// Reads a number with the unit and the range of the row.
 /// @param what the key, for messages
 /// @param unit_is_named true if the key's name gives the unit
-[[nodiscard]] Number read_number(const Source& source, const toml::node& node, const Field& field,
+[[nodiscard]] Number read_number(const Source& source, const toml::node& node, const rig::OptionFacts& facts,
                                  std::string_view what, bool unit_is_named);
-
-/// Reads the profile of `entry`. Adds the files that it names to `files`.
-[[nodiscard]] ProfileScript read_profile_script(const Source& source, const Entry& entry, const FileReader& read_file,
-                                                std::map<std::string, std::string>& files);
-
-/// Reads the end conditions of a phase from its `until` table.
-[[nodiscard]] std::vector<ConditionScript> read_until(const Source& source, const toml::table& table, Place place);
-
-/// Reads [series] and [vary].
-[[nodiscard]] SeriesScript read_series(const Source& source, const TableReader& root);
-/// False for the keys that say who runs a script, and on what.
-[[nodiscard]] bool script_may_set(std::string_view key) noexcept;
-/// Reads [settings].
-[[nodiscard]] std::vector<Setting> read_settings(const Source& source, const TableReader& root);
+/// A configuration value as TOML holds it.
+[[nodiscard]] Value read_value(const Source& source, std::string_view key, const toml::node& node);
 
 }  // namespace abs_hil::config

@@ -1,10 +1,10 @@
+// The JSON Schema of experiments, from the rows that the reader uses.
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "config/explain.hpp"
 #include "config/grammar.hpp"
 #include "config/key_table.hpp"
-#include "config/reader.hpp"
+#include "config/script.hpp"
 
 namespace abs_hil::config {
 
@@ -32,13 +32,12 @@ std::string definition_of(const Grammar& grammar) {
 Json pointer_to(const Grammar& grammar) { return {{"$ref", "#/$defs/" + definition_of(grammar)}}; }
 
 Json with_unit(const Field& field) {
-  return {{"type", "string"}, {"description", "a number with one of the units " + units_text(field.quantity)}};
+  return {{"type", "string"}, {"description", "a number with one of the units " + units_text(field.facts.unit)}};
 }
 
 Json number(const Field& field, bool unit_is_named) {
-  const bool plain = field.quantity == Quantity::none;
   if (unit_is_named) return {{"anyOf", {bounds(field.facts.range), reference}}};
-  if (plain) return {{"anyOf", {bounds(field.facts.range), with_unit(field), reference}}};
+  if (field.facts.unit.empty()) return {{"anyOf", {bounds(field.facts.range), with_unit(field), reference}}};
   return {{"anyOf", {with_unit(field), reference}}};
 }
 
@@ -90,39 +89,42 @@ Json settings_table() {
   return json;
 }
 
+Json whole(const Field& field) {
+  Json json = bounds(field.facts.range);
+  json["type"] = "integer";
+  return json;
+}
+
+/// A profile or a table, or one of the texts that the row allows in its place.
+Json or_text(const Field& field, Json json) {
+  if (field.facts.allowed.empty()) return json;
+  if (!json.contains("anyOf")) json = {{"anyOf", {std::move(json)}}};
+  json["anyOf"].push_back({{"enum", field.facts.allowed.list()}});
+  return json;
+}
+
 Json value_of(const Field& field, bool unit_is_named) {
   switch (field.shape) {
     case Shape::text:
+      return field.facts.allowed.empty() ? Json{{"type", "string"}} : Json{{"enum", field.facts.allowed.list()}};
     case Shape::condition: return {{"type", "string"}};
-    case Shape::choice: return {{"enum", field.facts.allowed.list()}};
     case Shape::flag_true: return {{"const", true}};
     case Shape::number: return number(field, unit_is_named);
-    case Shape::whole: {
-      Json json = bounds(field.facts.range);
-      json["type"] = "integer";
-      return json;
-    }
+    case Shape::whole: return whole(field);
     case Shape::texts: return list_of({{"type", "string"}});
-    case Shape::wholes: {
-      Json json = bounds(field.facts.range);
-      json["type"] = "integer";
-      return list_of(std::move(json));
-    }
-    case Shape::motor:
+    case Shape::wholes: return list_of(whole(field));
     case Shape::profile: {
       Json json = number(field, unit_is_named);
-      json["anyOf"].push_back(pointer_to(profile_grammar()));
-      if (field.shape == Shape::motor) json["anyOf"].push_back({{"const", "off"}});
-      return json;
+      json["anyOf"].push_back(pointer_to(grammar_of<ProfileForm>()));
+      return or_text(field, std::move(json));
     }
-    case Shape::brake: return {{"anyOf", {{{"enum", field.facts.allowed.list()}}, pointer_to(*field.grammar)}}};
-    case Shape::table: return pointer_to(*field.grammar);
-    case Shape::tables: return list_of(pointer_to(*field.grammar));
+    case Shape::table: return or_text(field, pointer_to(field.grammar()));
+    case Shape::tables: return list_of(pointer_to(field.grammar()));
     case Shape::points:
       return list_of(
           {{"type", "array"}, {"minItems", 2}, {"maxItems", 2}, {"items", {{"type", {"number", "string"}}}}});
     case Shape::settings: return settings_table();
-    case Shape::grid: return {{"type", "object"}};
+    case Shape::factors: return {{"type", "object"}};
   }
   return {};
 }
@@ -136,10 +138,10 @@ Json table(const Grammar& grammar) {
       json["description"] = field.facts.meaning;
       properties[name] = std::move(json);
     };
-    add(std::string(field.facts.key), false);
-    if (field.quantity != Quantity::none)
-      add(std::string(field.facts.key) + std::string(suffix_of(field.quantity)), true);
-    if (field.required) required.push_back(field.facts.key);
+    const std::string key(field.facts.key);
+    add(key, false);
+    if (!field.facts.unit.empty()) add(key + suffix_of(field.facts.unit), true);
+    if (field.facts.required) required.push_back(key);
   }
   Json json{{"type", "object"}, {"description", grammar.meaning}, {"properties", std::move(properties)}};
   if (!required.empty()) json["required"] = std::move(required);
@@ -147,12 +149,15 @@ Json table(const Grammar& grammar) {
   return json;
 }
 
-void define(const Grammar& grammar, Json& definitions) {
-  const std::string name = definition_of(grammar);
-  if (definitions.contains(name)) return;
-  definitions[name] = table(grammar);
+/// Defines the tables below a table, and itself if it has a name.
+void define_below(const Grammar& grammar, Json& definitions) {
   for (const Field& field : grammar.fields) {
-    if (field.grammar != nullptr) define(*field.grammar, definitions);
+    const Grammar* below = field.shape == Shape::profile ? &grammar_of<ProfileForm>()
+                           : field.grammar != nullptr    ? &field.grammar()
+                                                         : nullptr;
+    if (below == nullptr || definitions.contains(definition_of(*below))) continue;
+    definitions[definition_of(*below)] = table(*below);
+    define_below(*below, definitions);
   }
 }
 
@@ -160,13 +165,9 @@ void define(const Grammar& grammar, Json& definitions) {
 
 Json schema() {
   Json json{{"$schema", "https://json-schema.org/draft/2020-12/schema"}, {"title", "Experiment of abs_hil"}};
-  json.update(table(script_grammar()));
+  json.update(table(grammar_of<Script>()));
   Json definitions = Json::object();
-  for (const Field& field : script_grammar().fields) {
-    if (field.grammar != nullptr) define(*field.grammar, definitions);
-  }
-  define(steps_grammar(), definitions);
-  define(profile_grammar(), definitions);
+  define_below(grammar_of<Script>(), definitions);
   json["$defs"] = std::move(definitions);
   return json;
 }

@@ -4,23 +4,23 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "config/factors.hpp"
 #include "config/grammar.hpp"
 #include "config/key_table.hpp"
 #include "experiment/profile.hpp"
 #include "experiment/sequence.hpp"
 
+// An experiment's file, table by table (docs/experiments.md). Each key is one row: see config/grammar.hpp.
+
 namespace abs_hil::config {
 
-/// A place in a script. Line and column count from 1.
-struct Place {
-  unsigned int line{0};
-  unsigned int column{0};
-};
+class TableReader;
 
 /// A number of a script: a constant, or the value of a configuration key, which is looked up when the run is planned.
 struct Number {
@@ -39,6 +39,20 @@ struct When {
   Place place{};
 };
 
+inline constexpr rig::Range any_number = rig::between(-1e15, 1e15);
+inline constexpr double day_s = 86'400.0;
+
+template <>
+inline constexpr std::array<Word<experiment::Between>, 2> words_of<experiment::Between>{
+    {{"line", experiment::Between::line}, {"hold", experiment::Between::hold}}};
+template <>
+inline constexpr std::array<Word<rig::Phase>, 6> words_of<rig::Phase>{{{"idle", rig::Phase::idle},
+                                                                      {"accelerate", rig::Phase::accelerate},
+                                                                      {"coast", rig::Phase::coast},
+                                                                      {"brake", rig::Phase::brake},
+                                                                      {"hold", rig::Phase::hold},
+                                                                      {"stopped", rig::Phase::stopped}}};
+
 /// A value over the time of a phase; one point at time 0 is a constant.
 struct ProfileScript {
   std::vector<std::pair<Number, Number>> points{};  ///< time, value
@@ -47,7 +61,29 @@ struct ProfileScript {
   [[nodiscard]] bool constant() const noexcept { return points.size() == 1; }
 };
 
+/// The keys that give a profile. The row of the phase's key gives the values their unit and their range.
+struct ProfileForm {
+  ABS_HIL_OPTIONS(ProfileForm);
+  static constexpr std::string_view title = "a profile";
+  static constexpr std::string_view meaning =
+      "A value over the time since the phase began: a ramp, a step, points or a file";
+  ABS_HIL_OPTION(Number, from, {}, .meaning = "ramp: first value", .range = any_number);
+  ABS_HIL_OPTION(Number, to, {}, .meaning = "ramp: last value", .range = any_number);
+  ABS_HIL_OPTION(Number, over, {}, .unit = "s", .meaning = "ramp: how long it takes", .range = rig::positive(day_s));
+  ABS_HIL_OPTION(Number, before, {}, .meaning = "step: first value", .range = any_number);
+  ABS_HIL_OPTION(Number, after, {}, .meaning = "step: second value", .range = any_number);
+  ABS_HIL_OPTION(Number, at, {}, .unit = "s", .meaning = "step: when", .range = rig::from_zero(day_s));
+  ABS_HIL_OPTION(Points, points, {}, .meaning = "profile: [[time in s, value], ...], times rising");
+  ABS_HIL_OPTION(std::string, file, {},
+                 .meaning = "profile: CSV file beside the script, header time_s,value, times rising");
+  ABS_HIL_OPTION(experiment::Between, between, {}, .meaning = "profile: what happens between two points");
+};
+
+/// One of the conditions of experiment/end_conditions.hpp, or all of several.
 struct ConditionScript {
+  static constexpr std::string_view title = "until";
+  static constexpr std::string_view meaning = "What ends a phase";
+  static const Grammar& grammar();
   experiment::EndKind kind{experiment::EndKind::duration};
   Number value{};
   std::optional<When> when{};
@@ -55,98 +91,209 @@ struct ConditionScript {
   Place place{};
 };
 
+struct BrakeScript {
+  ABS_HIL_OPTIONS(BrakeScript);
+  static constexpr std::string_view title = "brake";
+  static constexpr std::string_view meaning = "What drives the brake: one of these";
+  ABS_HIL_OPTION(std::optional<ProfileScript>, duty, {}, .meaning = "brake PWM", .range = rig::from_zero(1));
+  ABS_HIL_OPTION(std::optional<ProfileScript>, torque, {}, .unit = "N m",
+                 .meaning = "brake torque, through the inverse of the brake's map", .range = rig::from_zero(100));
+  ABS_HIL_OPTION(std::optional<ProfileScript>, slip_ref, {},
+                 .meaning = "the slip controller, with this reference in place of control.slip_ref",
+                 .range = rig::open_between(0, 1));
+  std::string word{"off"};  ///< "off" or "controller", unless a member is given
+
+  void check(const TableReader& reader);
+  [[nodiscard]] experiment::BrakeAction action() const noexcept;
+  /// Of the duty, the torque or the slip reference; none for the slip reference: control.slip_ref.
+  [[nodiscard]] const std::optional<ProfileScript>& profile() const noexcept;
+};
+
 struct PhaseScript {
-  std::string name;
-  std::optional<rig::Phase> kind{};
-  std::optional<When> when{};
-  std::optional<ProfileScript> motor{};
-  experiment::BrakeAction brake{experiment::BrakeAction::released};
-  std::optional<ProfileScript> brake_profile{};  ///< duty, torque or slip reference; none: control.slip_ref
-  std::vector<ConditionScript> until{};          ///< any of them
-  std::optional<Number> at_most{};
-  bool restart{false};  ///< of the slip controller
-  bool wheels_apart{false};
-  std::string ask{};  ///< empty: nothing
+  ABS_HIL_OPTIONS(PhaseScript);
+  static constexpr std::string_view title = "[[phase]]";
+  static constexpr std::string_view meaning = "One phase: what acts, and what ends it";
+  ABS_HIL_OPTION(std::string, name, {}, .meaning = "its name, in displays and events", .required = true);
+  ABS_HIL_OPTION(std::optional<rig::Phase>, kind, {},
+                 .meaning = "the CSV's word for it; without: the name if it is one of these, else by what acts");
+  ABS_HIL_OPTION(std::optional<When>, when, {},
+                 .meaning = "the phase is left out unless this holds for the configuration");
+  ABS_HIL_OPTION(std::optional<ProfileScript>, motor, {}, .meaning = "drive PWM of the lower wheel's motor",
+                 .range = rig::from_zero(1), .allowed = {"off"});
+  ABS_HIL_OPTION(BrakeScript, brake, {},
+                 .meaning = "what drives the brake; or a table of duty, torque_Nm or slip_ref",
+                 .allowed = {"off", "controller"});
+  ABS_HIL_OPTION(bool, restart, false,
+                 .meaning = "the slip controller begins anew; without: it goes on from the phase before");
+  ABS_HIL_OPTION(
+      bool, wheels_apart, false,
+      .meaning = "the upper wheel is lifted off the lower one: a simulator parts them, on a rig a person does");
+  ABS_HIL_OPTION(std::string, ask, {},
+                 .meaning = "what a person is asked to do; the phase ends when the person has answered, motor and "
+                            "brake are off meanwhile");
+  ABS_HIL_OPTION(std::vector<ConditionScript>, until, {},
+                 .meaning = "what ends the phase: one condition, or any or all of several; required unless it asks");
+  /// The longest time limit of a phase (experiment::Sequence).
+  ABS_HIL_OPTION(std::optional<Number>, at_most, {}, .unit = "s",
+                 .meaning = "a phase that lasts longer is a fault; may be left out if the phase ends by its duration",
+                 .range = rig::positive(600));
   Place place{};
+  Place name_place{};
+
+  void check(const TableReader& reader);
 };
 
 struct LimitsScript {
-  std::optional<Number> wheel_speed{};
-  std::optional<Number> motor_duty{};
-  std::optional<Number> brake_duty{};
-  std::optional<Number> run_time{};
-  std::optional<Number> distance{};
-};
-
-/// One factor that an event sets for a part of the simulated plant.
-struct Change {
-  std::string_view what;  ///< as in changing_parts(): "friction"
-  double factor{1.0};
+  ABS_HIL_OPTIONS(LimitsScript);
+  static constexpr std::string_view title = "[limits]";
+  static constexpr std::string_view meaning = "Limits of the experiment";
+  ABS_HIL_OPTION(std::optional<Number>, wheel_speed, {}, .unit = "rad/s",
+                 .meaning = "a faster wheel is a fault (gate.overspeed_rad_s)", .range = rig::positive(2000));
+  ABS_HIL_OPTION(std::optional<Number>, motor_duty, {}, .meaning = "largest drive PWM (gate.motor_duty_max)",
+                 .range = rig::positive(1));
+  ABS_HIL_OPTION(std::optional<Number>, brake_duty, {}, .meaning = "largest brake PWM (gate.brake_duty_max)",
+                 .range = rig::positive(1));
+  ABS_HIL_OPTION(std::optional<Number>, run_time, {}, .unit = "s", .meaning = "a longer run is a fault",
+                 .range = rig::positive(day_s));
+  ABS_HIL_OPTION(std::optional<Number>, distance, {}, .unit = "m",
+                 .meaning = "a car that comes further in the run is a fault", .range = rig::positive(1e5));
 };
 
 /// One event of the simulated plant.
 struct EventScript {
-  double at_s{0.0};
-  double end_s{0.0};  ///< the same as `at_s` for a jump
-  bool from_braking{false};
-  std::vector<Change> changes{};
-  std::string inject{};  ///< if not empty: a fault; then the other members do not count
+  ABS_HIL_OPTIONS(EventScript);
+  static constexpr std::string_view title = "[[event]]";
+  static constexpr std::string_view meaning = "One thing that happens to the simulated plant";
+  ABS_HIL_OPTION(double, at_s, 0.0, .key = "at", .unit = "s", .meaning = "when", .range = rig::from_zero(day_s));
+  ABS_HIL_OPTION(std::string, counted_from, "start", .meaning = "what `at` counts from; without: start",
+                 .allowed = {"start", "braking"});
+  ABS_HIL_OPTION(double, over_s, 0.0, .key = "over", .unit = "s",
+                 .meaning = "how long the change takes; without: a jump", .range = rig::positive(day_s));
+  /// After the check, with `over` too. The same as `at_s` for a jump.
+  ABS_HIL_OPTION(double, end_s, 0.0, .key = "until", .unit = "s",
+                 .meaning = "when the change has ended, in place of over", .range = rig::positive(day_s));
+  ABS_HIL_OPTION(std::optional<double>, friction, {},
+                 .meaning = "friction of the road from then on, over that of the tyre model",
+                 .range = rig::positive(10));
+  ABS_HIL_OPTION(std::optional<double>, brake_torque, {},
+                 .meaning = "torque of the brake from then on, over that of its map: fading",
+                 .range = rig::positive(10));
+  ABS_HIL_OPTION(std::optional<double>, motor_torque, {},
+                 .meaning = "torque of the motor from then on, over that of the plant's parameters",
+                 .range = rig::positive(10));
+  ABS_HIL_OPTION(std::optional<double>, upper_bearing, {},
+                 .meaning = "friction of the upper wheel's bearing (M10, d1) from then on, over that of the plant's "
+                            "parameters",
+                 .range = rig::positive(10));
+  ABS_HIL_OPTION(std::optional<double>, lower_bearing, {},
+                 .meaning = "friction of the lower wheel's bearing (M20, d2) from then on, over that of the plant's "
+                            "parameters",
+                 .range = rig::positive(10));
+  ABS_HIL_OPTION(
+      std::string, inject, {},
+      .meaning = "a fault at the I/O seam, as after --inject; it says itself when (docs/fault-injection.md)");
   Place place{};
+
+  void check(const TableReader& reader);
+  [[nodiscard]] bool from_braking() const noexcept { return counted_from == "braking"; }
+};
+
+/// A part of the simulated plant that events may change during a run.
+struct ChangingPart {
+  std::string_view what;                        ///< key of an event: "friction"
+  std::string_view in_words;                    ///< "friction of the road"
+  std::string& (*profile)(Settings& settings);  ///< the configuration value with its profile
+  std::optional<double> EventScript::*factor;
+};
+[[nodiscard]] std::span<const ChangingPart> changing_parts() noexcept;
+
+struct SeriesScript {
+  ABS_HIL_OPTIONS(SeriesScript);
+  static constexpr std::string_view title = "[series]";
+  static constexpr std::string_view meaning = "The experiment is run several times";
+  ABS_HIL_OPTION(std::vector<std::string>, experiments, {},
+                 .meaning = "the experiments that are run, one after the other, in place of phases: names or TOML "
+                            "files");
+  ABS_HIL_OPTION(std::int64_t, repeat, 1, .meaning = "runs of each combination, with seeds that count up",
+                 .range = rig::between(1, 100'000));
+  ABS_HIL_OPTION(std::optional<std::int64_t>, seed, {}, .meaning = "seed of the first repetition",
+                 .range = rig::from_zero(9e15));
+  ABS_HIL_OPTION(std::vector<std::int64_t>, seeds, {}, .meaning = "the seeds themselves, in place of repeat and seed",
+                 .range = rig::from_zero(9e15));
+  ABS_HIL_OPTION(double, pause_s, 0.0, .key = "pause", .unit = "s",
+                 .meaning = "between two runs in real time, for the brake to cool", .range = rig::from_zero(day_s));
+  bool given{false};  ///< the script has a [series] or [factors]; then even a single run gets the folder of a series
+
+  void check(const TableReader& reader) const;
+  [[nodiscard]] std::size_t repetitions() const noexcept {
+    return seeds.empty() ? static_cast<std::size_t>(repeat) : seeds.size();
+  }
 };
 
 /// A configuration value that the script sets.
 struct Setting {
   std::string key;
-  config::Value value;
+  Value value;
   Place place{};
-};
-
-/// A configuration value that the runs of a series differ in.
-struct Varied {
-  std::string key;
-  std::vector<config::Value> values;
-  Place place{};
-};
-
-struct SeriesScript {
-  bool given{false};  ///< the script has a [series] or [vary]; then even a single run gets the folder of a series
-  std::int64_t repeat{1};
-  std::optional<std::int64_t> seed{};
-  std::vector<std::int64_t> seeds{};  ///< if not empty, they replace repeat and seed
-  double pause_s{0.0};
-  std::vector<Varied> vary{};
-  bool of_experiments{false};  ///< the first of `vary` is experiment.name, and the script has no phases
 };
 
 /// An experiment as read from its file. It is checked by itself, but not yet against a configuration.
 struct Script {
-  std::string name;                            ///< "paper", or the path of a file
-  std::string path;                            ///< its name in errors
-  std::string text;                            ///< of the file, byte by byte
+  ABS_HIL_OPTIONS(Script);
+  static constexpr std::string_view title = "the script";
+  static constexpr std::string_view meaning = "An experiment of abs_hil (docs/experiments.md)";
+  ABS_HIL_OPTION(std::string, description, {}, .meaning = "what the experiment is, in a line");
+  ABS_HIL_OPTION(std::string, author, {}, .meaning = "who wrote it");
+  ABS_HIL_OPTION(std::string, notes, {}, .meaning = "anything else worth keeping with the results");
+  ABS_HIL_OPTION(std::string, analysis, {}, .meaning = "what is computed from the run beside its metrics",
+                 .allowed = {"friction-curve"});
+  ABS_HIL_OPTION(
+      std::vector<Setting>, settings, {},
+      .meaning = "configuration values of the experiment; --config, options and --set override them");
+  ABS_HIL_OPTION(std::vector<PhaseScript>, phases, {}, .key = "phase",
+                 .meaning = "the phases, in order; required unless [series] names experiments");
+  ABS_HIL_OPTION(LimitsScript, limits, {},
+                 .meaning = "limits of this experiment; they can only tighten those of the configuration");
+  ABS_HIL_OPTION(std::vector<EventScript>, events, {}, .key = "event",
+                 .meaning = "what happens to the simulated plant; the rig refuses it");
+  ABS_HIL_OPTION(SeriesScript, series, {}, .meaning = "the experiment is run several times");
+  ABS_HIL_OPTION(std::vector<Factor>, factors, {},
+                 .meaning = "configuration values that the runs of a series differ in: every combination is run");
+  std::string name{};                          ///< "paper", or the path of a file
+  std::string path{};                          ///< its name in errors
+  std::string text{};                          ///< of the file, byte by byte
   std::map<std::string, std::string> files{};  ///< the files that it names, by these names
-  std::string description{};
-  std::string author{};
-  std::string notes{};
-  std::string analysis{};  ///< empty: none
-  std::vector<Setting> settings{};
-  std::vector<PhaseScript> phases{};
-  LimitsScript limits{};
-  std::vector<EventScript> events{};
-  SeriesScript series{};
 
+  void check(const TableReader& reader);
   /// "FILE:LINE:COLUMN".
   [[nodiscard]] std::string at(Place place) const;
 };
 
+/// The profile that the script's events give one of the changing parts, in the form of its configuration value
+/// ("braking time: 1; 0.5 at 0.6; 1 from 1 to 3"). Empty: no event changes the part. Throws ConfigError with line and
+/// column for events that contradict each other.
+[[nodiscard]] std::string profile(const Script& script, std::string_view what);
+
+/// One run of a series: its varied values and its seed.
+struct SeriesMember {
+  std::vector<std::pair<std::string, Value>> varied{};  ///< the experiment, if several are named, then the factors
+  std::int64_t seed{0};
+};
+
+/// The runs of a series, in order: all combinations of the varied values, the last key fastest, each with all seeds.
+/// The k-th repetitions of all combinations have the same seed, so that the combinations meet the same noise.
+/// @param seed of the first repetition if the script gives none
+[[nodiscard]] std::vector<SeriesMember> members_of(const Script& script, std::int64_t seed);
+
 /// Returns the text of a file that a script names, or nothing if there is no such file.
 using FileReader = std::function<std::optional<std::string>(const std::string& name)>;
 
-/// Reads a script. Throws config::ConfigError with one line, "FILE:LINE:COLUMN: ...". It names the error, what is valid
-/// and, for an unknown key, the nearest known one.
+/// Reads a script. Throws ConfigError with one line, "FILE:LINE:COLUMN: ...". It names the error, what is valid and,
+/// for an unknown key, the nearest known one.
 /// @param path the script's name in errors
 [[nodiscard]] Script parse(std::string text, std::string path, const FileReader& read_file);
 
-/// The script of that file. Throws config::ConfigError.
+/// The script of that file. Throws ConfigError.
 [[nodiscard]] Script load(const std::string& path);
 
 }  // namespace abs_hil::config

@@ -65,18 +65,8 @@ PhasePlan braking(rig::Phase phase, const StopBrake& brake) {
 
 /// True if one wrong sample of speed or slip could make the condition hold.
 bool on_estimates(const EndCondition& condition) noexcept {
-  switch (condition.kind) {
-    case EndKind::upper_speed_above:
-    case EndKind::upper_speed_below:
-    case EndKind::lower_speed_above:
-    case EndKind::lower_speed_below:
-    case EndKind::car_speed_above:
-    case EndKind::car_speed_below:
-    case EndKind::slip_above:
-    case EndKind::slip_below: return true;
-    case EndKind::all: return std::any_of(condition.parts.begin(), condition.parts.end(), on_estimates);
-    default: return false;
-  }
+  return row_of(condition.kind).on_estimates ||
+         std::any_of(condition.parts.begin(), condition.parts.end(), on_estimates);
 }
 }  // namespace
 
@@ -124,22 +114,10 @@ void Sequence::enter(std::size_t index, const SequenceInput& input) noexcept {
 inline bool Sequence::holds(const EndCondition& condition, const SequenceInput& input) const noexcept {
   const double value = condition.value;
   switch (condition.kind) {
-    case EndKind::duration: return input.time_s - entered_at_s_ >= value;
-    case EndKind::upper_speed_above: return input.speeds.omega1_rad_s >= value;
-    case EndKind::upper_speed_below: return input.speeds.omega1_rad_s < value;
-    // A wheel that has not begun to turn has no peak yet.
-    case EndKind::upper_wheel_peak: return peak_speed_rad_s_ > peak_margin_rad_s && input.time_s - peak_at_s_ >= value;
-    case EndKind::lower_speed_above: return input.speeds.omega2_rad_s >= value;
-    case EndKind::lower_speed_below: return input.speeds.omega2_rad_s < value;
-    case EndKind::car_speed_above: return input.car_speed_m_s >= value;
-    case EndKind::car_speed_below: return input.car_speed_m_s < value;
-    case EndKind::standstill: return input.stands_still;
-    case EndKind::start_command: return input.start_given;
-    case EndKind::answer: return input.answered;
-    case EndKind::slip_above: return input.slip >= value;
-    case EndKind::slip_below: return input.slip < value;
-    case EndKind::distance: return input.distance_m - entered_at_m_ >= value;
-    case EndKind::all: return all_hold(condition.parts, input);
+#define ABS_HIL_HOLDS(kind, key, unit, range, meaning, in_words, reason, precision, ...) \
+  case EndKind::kind: return __VA_ARGS__;
+    ABS_HIL_END_CONDITIONS(ABS_HIL_HOLDS)
+#undef ABS_HIL_HOLDS
   }
   return false;
 }

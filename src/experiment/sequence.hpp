@@ -9,6 +9,7 @@
 #include "abs_hil/rig/measurement.hpp"
 #include "abs_hil/rig/phase.hpp"
 #include "abs_hil/rig/reason.hpp"
+#include "experiment/end_conditions.hpp"
 #include "experiment/profile.hpp"
 #include "runtime/gate_options.hpp"
 #include "runtime/run_latch.hpp"
@@ -17,25 +18,6 @@ namespace abs_hil::experiment {
 
 /// What sets the brake during a phase.
 enum class BrakeAction : std::uint8_t { released, torque, duty, slip_control };
-
-/// What ends a phase. All speeds are estimates.
-enum class EndKind : std::uint8_t {
-  duration,           ///< value: s since the phase began
-  upper_speed_above,  ///< value: rad/s of the upper wheel
-  upper_wheel_peak,   ///< value: s without a new maximum of the upper wheel's speed
-  car_speed_below,    ///< value: m/s
-  standstill,         ///< both wheels stand; no value
-  start_command,      ///< a start command arrived; no value
-  answer,             ///< the phase's question was answered; no value
-  upper_speed_below,  ///< value: rad/s
-  lower_speed_above,  ///< value: rad/s of the lower wheel
-  lower_speed_below,  ///< value: rad/s
-  car_speed_above,    ///< value: m/s
-  slip_above,         ///< value: slip
-  slip_below,         ///< value: slip
-  distance,           ///< value: m of the car since the phase began
-  all,                ///< all of `parts` hold at the same time; no value
-};
 
 struct EndCondition {
   EndKind kind{EndKind::duration};

@@ -12,7 +12,6 @@
 #include "abs_hil/control/registry.hpp"
 #include "config/config_error.hpp"
 #include "config/config_file.hpp"
-#include "config/events.hpp"
 #include "config/key_table.hpp"
 #include "config/library.hpp"
 #include "config/model.hpp"
@@ -63,11 +62,12 @@ void check_start(const RunRequest& request) {
 /// Refuses events that only a simulated plant can carry out, and fault injection into real hardware.
 void refuse_events(const config::Script& script, bool emulated) {
   for (const config::EventScript& event : script.events) {
-    for (const config::Change& change : event.changes) {
+    for (const config::ChangingPart& part : config::changing_parts()) {
+      if (!(event.*part.factor)) continue;
       throw config::ConfigError(
           fmt::format("{}: [[event]] {}: only a simulated plant can change on command; run experiment {} with "
                       "--backend sim, or leave its events out for the rig",
-                      script.at(event.place), change.what, script.name));
+                      script.at(event.place), part.what, script.name));
     }
     if (!emulated) {
       throw config::ConfigError(

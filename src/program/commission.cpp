@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "config/model_origin.hpp"
+#include "config/config_file.hpp"
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
 #include "experiment/commissioning.hpp"

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
-#include "config/model_origin.hpp"
+#include "config/config_file.hpp"
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
 #include "guardian/guarding.hpp"

@@ -17,7 +17,7 @@
 #include "commands/authority.hpp"
 #include "commands/command_listener.hpp"
 #include "config/config_error.hpp"
-#include "config/series.hpp"
+#include "config/script.hpp"
 #include "program/exit_status.hpp"
 #include "program/questions.hpp"
 #include "program/signals.hpp"
@@ -319,12 +319,12 @@ int run_series(const RunOptions& common, const RunRequest& base) {
         "--histogram",
         base.script->path));
   }
-  const std::vector<config::SeriesMember> members = config::members_of(base.script->series, base.settings.seed);
+  const std::vector<config::SeriesMember> members = config::members_of(*base.script, base.settings.seed);
   std::vector<run_folder::SeriesEntry> entries;
   // Check every run's configuration before the first run moves anything.
   for (const config::SeriesMember& member : members) {
     const RunRequest one = merge(options_of(common, member));
-    if (base.script->series.of_experiments) refuse_nested(*base.script, *one.script);
+    if (!base.script->series.experiments.empty()) refuse_nested(*base.script, *one.script);
     check_questions(one);
     entries.push_back({.varied = varied_json(member), .seed = member.seed});
   }

@@ -10,7 +10,7 @@
 #include "config/config_error.hpp"
 #include "config/key_table.hpp"
 #include "config/library.hpp"
-#include "config/series.hpp"
+#include "config/factors.hpp"
 #include "program/questions.hpp"
 #include "program/subcommands.hpp"
 #include "run/run_summary.hpp"

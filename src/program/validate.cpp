@@ -17,12 +17,12 @@ int validate(const RunOptions& options) {
   const RunRequest request = merge(options);
   const config::Script& script = *request.script;
   fmt::print("{}", config::explain(script, request.settings));
-  if (script.series.of_experiments) {
+  if (!script.series.experiments.empty()) {
     int status = exit_completed;
-    for (const config::Value& name : script.series.vary.front().values) {
+    for (const std::string& name : script.series.experiments) {
       fmt::print("\n");
       RunOptions one = options;
-      one.experiment = std::get<std::string>(name);
+      one.experiment = name;
       refuse_nested(script, *config::find(*one.experiment));
       status = std::max(status, validate(one));
     }

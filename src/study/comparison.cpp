@@ -10,11 +10,9 @@ namespace abs_hil::study {
 
 Study study_of(const ComparisonPlan& plan) {
   if (plan.repeat < 1) throw std::invalid_argument("--repeat: give a number of at least 1");
-  StudyScript script{.path = "compare",
-                     .controllers = plan.controllers,
-                     .repeat = plan.repeat,
-                     .repeat_seed = plan.seed,
-                     .variation = plan.variation};
+  StudyScript script{.controllers = plan.controllers,
+                     .repeat = {.runs = plan.repeat, .seed = plan.seed, .variation = plan.variation},
+                     .path = "compare"};
   return {
       std::move(script),
       {{.plant = plan.settings.plant_name, .experiment = plan.settings.experiment.name, .settings = plan.settings}}};

@@ -16,15 +16,36 @@ namespace abs_hil::study {
 
 enum class Reduction : std::uint8_t { max, min, mean, rms, last };
 
-/// A metric that a study defines: one number made of a signal's values in a phase.
+}  // namespace abs_hil::study
+
+template <>
+inline constexpr std::array<abs_hil::config::Word<abs_hil::study::Reduction>, 5>
+    abs_hil::config::words_of<abs_hil::study::Reduction>{{{"max", study::Reduction::max},
+                                                          {"min", study::Reduction::min},
+                                                          {"mean", study::Reduction::mean},
+                                                          {"rms", study::Reduction::rms},
+                                                          {"last", study::Reduction::last}}};
+
+namespace abs_hil::study {
+
+/// A metric that a study defines, in a table of its file: one number made of a signal's values in a phase.
 struct SignalMetric {
-  std::string name{};  ///< of its column in the results
-  std::string of{};    ///< a column of a run's CSV, or a signal of the controller
-  Reduction take{Reduction::max};
-  rig::Phase phase{rig::Phase::brake};
-  double after_s{0.0};    ///< only from this time after the phase's begin on
-  double above_m_s{0.0};  ///< only while the car is faster
+  ABS_HIL_OPTIONS(SignalMetric);
+  static constexpr std::string_view title = "[[metric]]";
+  static constexpr std::string_view meaning = "One number made of a signal's values in a phase";
+  ABS_HIL_OPTION(std::string, name, {}, .meaning = "of its column in the results", .required = true);
+  ABS_HIL_OPTION(std::string, of, {}, .meaning = "a column of a run's CSV, or a controller's signal",
+                 .required = true);
+  ABS_HIL_OPTION(Reduction, take, Reduction::max, .meaning = "what is made of the values", .required = true);
+  ABS_HIL_OPTION(rig::Phase, phase, rig::Phase::brake, .meaning = "in which kind of phase; without: brake",
+                 .allowed = {"accelerate", "coast", "brake", "hold", "stopped"});
+  ABS_HIL_OPTION(double, after_s, 0.0, .key = "after", .unit = "s",
+                 .meaning = "from this time after its begin on", .range = rig::from_zero(600));
+  ABS_HIL_OPTION(double, above_m_s, 0.0, .key = "above", .unit = "m/s",
+                 .meaning = "only while the car is faster than this", .range = rig::from_zero(200));
   config::Place place{};  ///< in the study's file
+
+  void check(const config::TableReader& reader);
 };
 
 /// Computes such metrics from the records of a run.

@@ -50,8 +50,8 @@ std::vector<Contender> contenders_of(const std::vector<std::string>& texts, cons
 Study::Study(StudyScript script, std::vector<StudyCase> cases)
     : script_(std::move(script)),
       cases_(std::move(cases)),
-      design_(script_.design, script_.points, script_.design_seed, names_of_ranges(script_)) {
-  double runs = static_cast<double>(cases_.size()) * static_cast<double>(script_.repeat) *
+      design_(script_.design.kind, script_.design.points, script_.design.seed, names_of_ranges(script_)) {
+  double runs = static_cast<double>(cases_.size()) * static_cast<double>(script_.repeat.runs) *
                 static_cast<double>(script_.controllers.size()) * static_cast<double>(design_.rows());
   for (const Factor& factor : script_.factors) {
     range_of_factor_.push_back(static_cast<std::size_t>(std::ranges::count_if(
@@ -76,7 +76,7 @@ Study::Study(StudyScript script, std::vector<StudyCase> cases)
     contenders_.push_back(contenders_of(script_.controllers, one.settings));
   }
   check_metrics();
-  runs_ = cases_.size() * level_combinations_ * design_.rows() * script_.repeat * contenders_.front().size();
+  runs_ = cases_.size() * level_combinations_ * design_.rows() * script_.repeat.runs * contenders_.front().size();
   shares_settings_ = can_share_settings();
 }
 
@@ -108,7 +108,7 @@ void Study::check_metrics() const {
 
 bool Study::can_share_settings() const {
   if (script_.factors.empty()) return true;
-  if (script_.model_follows_factors) return false;
+  if (script_.model_follows_factors()) return false;
   config::Settings settings;
   const config::KeyTable keys(settings);
   const bool numbers_of_plant = std::ranges::all_of(script_.factors, [&keys](const Factor& factor) {
@@ -130,7 +130,7 @@ RunIndex Study::index_of(std::uint64_t run) const noexcept {
   RunIndex index;
   const auto take = [&run](std::uint64_t count) { return std::exchange(run, run / count) % count; };
   index.contender = take(contenders_.front().size());
-  index.repetition = take(script_.repeat);
+  index.repetition = take(script_.repeat.runs);
   index.point = take(design_.rows());
   index.levels = take(level_combinations_);
   index.study_case = run;

@@ -1,39 +1,96 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "config/script.hpp"
 #include "study/design.hpp"
-#include "study/factor.hpp"
 #include "study/signal_metrics.hpp"
 #include "study/variation.hpp"
 
+// A study's file, table by table (docs/studies.md). Each key is one row: see config/grammar.hpp.
+
+template <>
+inline constexpr std::array<abs_hil::config::Word<abs_hil::study::DesignKind>, 5>
+    abs_hil::config::words_of<abs_hil::study::DesignKind>{
+        {{"grid", study::DesignKind::grid},
+         {"random", study::DesignKind::random},
+         {"sobol", study::DesignKind::sobol},
+         {"latin-hypercube", study::DesignKind::latin_hypercube},
+         {"saltelli", study::DesignKind::saltelli}}};
+
 namespace abs_hil::study {
 
-/// A study as read from its file (docs/studies.md). It is checked by itself, but not yet against plants and
-/// experiments.
+using config::Factor;
+using config::Levels;
+using config::Normal;
+using config::quantile;
+using config::Uniform;
+
+struct DesignScript {
+  ABS_HIL_OPTIONS(DesignScript);
+  static constexpr std::string_view title = "[design]";
+  static constexpr std::string_view meaning = "How points are spread over the ranges of the factors";
+  ABS_HIL_OPTION(DesignKind, kind, DesignKind::grid,
+                 .meaning = "random, sobol, latin-hypercube, saltelli (for Sobol indices), or grid", .required = true);
+  ABS_HIL_OPTION(std::uint64_t, points, 1, .meaning = "how many points", .range = rig::between(1, 1e10));
+  ABS_HIL_OPTION(std::uint64_t, seed, 1, .meaning = "seed of the design; without: 1", .range = rig::from_zero(9e15));
+  bool has_points{false};
+  config::Place place{};
+
+  void check(const config::TableReader& reader);
+};
+
+struct RepeatScript {
+  ABS_HIL_OPTIONS(RepeatScript);
+  static constexpr std::string_view title = "[repeat]";
+  static constexpr std::string_view meaning =
+      "Every point is run on several varied plants, the same for all points and controllers";
+  ABS_HIL_OPTION(std::uint64_t, runs, 1, .meaning = "how many varied plants", .range = rig::between(1, 1e9),
+                 .required = true);
+  ABS_HIL_OPTION(std::string, vary, {}, .meaning = "what varies, as after compare --vary");
+  ABS_HIL_OPTION(std::uint64_t, seed, 1, .meaning = "seed of the varied plants; without: 1",
+                 .range = rig::from_zero(9e15));
+  Variation variation{};  ///< of `vary`; without [repeat] nothing varies
+
+  void check(const config::TableReader& reader);
+};
+
+/// A study as read from its file. It is checked by itself, but not yet against plants and experiments.
 struct StudyScript {
+  ABS_HIL_OPTIONS(StudyScript);
+  static constexpr std::string_view title = "the study";
+  static constexpr std::string_view meaning = "A study of abs_hil (docs/studies.md)";
+  ABS_HIL_OPTION(std::string, description, {}, .meaning = "what the study is for, in a line");
+  ABS_HIL_OPTION(std::vector<std::string>, plants, {"paper-table1"},
+                 .meaning = "simulated plants: names or TOML files");
+  ABS_HIL_OPTION(std::vector<std::string>, experiments, {"paper"}, .meaning = "experiments: names or TOML files");
+  ABS_HIL_OPTION(std::vector<std::string>, controllers, {"adaptive"},
+                 .meaning = "controllers, each as after compare --controllers");
+  ABS_HIL_OPTION(std::optional<std::string>, model, {}, .meaning = "every controller's model; without: the plant");
+  ABS_HIL_OPTION(std::string, model_follows, "nominal",
+                 .meaning = "what the controllers know of factors of the plant: nothing, or their values",
+                 .allowed = {"nominal", "factors"});
+  ABS_HIL_OPTION(std::uint64_t, chunk, 1000,
+                 .meaning = "runs in one file of results: what an interruption can lose",
+                 .range = rig::between(1, 1'000'000));
+  ABS_HIL_OPTION(std::vector<config::Setting>, settings, {}, .meaning = "configuration values of all runs");
+  ABS_HIL_OPTION(DesignScript, design, {}, .meaning = "how points are spread over the ranges of the factors");
+  ABS_HIL_OPTION(RepeatScript, repeat, {}, .meaning = "every point is run on several varied plants");
+  ABS_HIL_OPTION(std::vector<SignalMetric>, metrics, {}, .key = "metric",
+                 .meaning = "figures made of signals, beside those of every run");
+  ABS_HIL_OPTION(std::vector<Factor>, factors, {}, .meaning = "configuration values in which the runs differ");
   std::string path{};  ///< its name in errors
   std::string text{};  ///< of the file, byte by byte
-  std::string description{};
-  std::vector<std::string> plants{"paper-table1"};
-  std::vector<std::string> experiments{"paper"};
-  std::optional<std::string> model{};
-  bool model_follows_factors{false};  ///< else the model is the plant's before factors and variation change that
-  std::vector<std::string> controllers{"adaptive"};
-  std::uint64_t chunk{1000};  ///< runs in one file of results
-  DesignKind design{DesignKind::grid};
-  std::uint64_t points{1};
-  std::uint64_t design_seed{1};
-  std::uint64_t repeat{1};
-  std::uint64_t repeat_seed{1};
-  Variation variation{};
-  std::vector<config::Setting> settings{};
-  std::vector<SignalMetric> metrics{};  ///< of its own, beside those of every run
-  std::vector<Factor> factors{};        ///< in the order of the file
+
+  /// Else the model is the plant's before factors and variation change that.
+  [[nodiscard]] bool model_follows_factors() const noexcept { return model_follows == "factors"; }
+  void check(const config::TableReader& reader);
 };
 
 /// Reads a study. Throws config::ConfigError with one line, "FILE:LINE:COLUMN: ...", which names the error and what is

@@ -36,7 +36,7 @@ Workbench::Workbench(const Study& study) : study_(study), settings_(study.cases(
     const bool is_factor = model != nullptr && std::ranges::any_of(study.script().factors, [&](const Factor& other) {
                              return other.key == model->name;
                            });
-    if (study.script().model_follows_factors && model != nullptr && !is_factor) target.model = model->target;
+    if (study.script().model_follows_factors() && model != nullptr && !is_factor) target.model = model->target;
   }
   follows_.resize(targets_.size());
 }
@@ -67,10 +67,10 @@ Workbench::Drawn Workbench::drawn(const RunIndex& index) {
   const config::Settings& settings = settings_of(index);
   const StudyScript& script = study_.script();
   const auto seed = config::sensor_seed(settings);
-  if (script.variation == Variation{}) return {.plant = settings.plant, .seed = seed};
-  const Perturbation perturbation = draw(script.variation, script.repeat_seed, index.repetition);
+  if (script.repeat.variation == Variation{}) return {.plant = settings.plant, .seed = seed};
+  const Perturbation perturbation = draw(script.repeat.variation, script.repeat.seed, index.repetition);
   return {.plant = perturbed(settings.plant, perturbation),
-          .seed = script.variation.phase ? perturbation.sensor_seed : seed};
+          .seed = script.repeat.variation.phase ? perturbation.sensor_seed : seed};
 }
 
 }  // namespace abs_hil::study

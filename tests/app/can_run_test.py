@@ -27,7 +27,7 @@ name = "hold"
 brake = { torque_Nm = 2 }
 until = { standstill = true }
 at_most_s = 20
-[vary]
+[factors]
 gate.overspeed_rad_s = [50, 250]
 '''
 

@@ -33,7 +33,7 @@ class Series(ProgramTest):
         return json.loads((out / 'series.json').read_text())['runs']
 
     def test_a_grid_with_repetitions(self):
-        script = self.script(SHORT + '[series]\nrepeat = 2\nseed = 5\n[vary]\ncontrol.controller = ["adaptive", "pi"]\n'
+        script = self.script(SHORT + '[series]\nrepeat = 2\nseed = 5\n[factors]\ncontrol.controller = ["adaptive", "pi"]\n'
                              'control.slip_ref = [0.1, 0.2]\n')
         out = self.folder / 'out'
         self.fast('--experiment', script, '--out', out)
@@ -97,7 +97,7 @@ class Series(ProgramTest):
         self.assertGreaterEqual(int(re.search(r'1 of 2 runs, (\d+) s left', result.stderr).group(1)), 3)
 
     def test_a_fault_does_not_stop_the_others(self):
-        script = self.script(SHORT + '[vary]\ngate.overspeed_rad_s = [50, 250]\n')
+        script = self.script(SHORT + '[factors]\ngate.overspeed_rad_s = [50, 250]\n')
         out = self.folder / 'out'
         result = self.run_program('--fast', '--no-lcm', '--experiment', script, '--out', out)
         self.assertEqual(result.returncode, 1)

@@ -11,7 +11,6 @@
 #include "config/config_file.hpp"
 #include "config/config_json.hpp"
 #include "config/key_table.hpp"
-#include "config/model_origin.hpp"
 #include "config/plan.hpp"
 #include "temporary_folder.hpp"
 

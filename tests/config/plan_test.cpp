@@ -1,7 +1,6 @@
 #include "config/plan.hpp"
 
 #include "catch.hpp"
-#include "config/events.hpp"
 #include "config/library.hpp"
 
 using namespace abs_hil;

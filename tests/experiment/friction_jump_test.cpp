@@ -1,7 +1,6 @@
 #include <cmath>
 
 #include "catch.hpp"
-#include "config/events.hpp"
 #include "config/library.hpp"
 #include "simulated_run.hpp"
 

@@ -9,7 +9,6 @@
 #include "abs_hil/control/registry.hpp"
 #include "catch.hpp"
 #include "config/config_file.hpp"
-#include "config/events.hpp"
 #include "config/key_table.hpp"
 #include "config/library.hpp"
 #include "config/plan.hpp"

@@ -80,8 +80,8 @@ TEST_CASE("bad studies are refused with line and column") {
 TEST_CASE("an empty study is one run of the paper's controller") {
   const study::StudyScript script = study::parse_study("", "s.toml");
   CHECK(script.controllers == std::vector<std::string>{"adaptive"});
-  CHECK(script.repeat == 1);
-  CHECK(script.variation == study::Variation{});
+  CHECK(script.repeat.runs == 1);
+  CHECK(script.repeat.variation == study::Variation{});
 }
 
 TEST_CASE("factors keep the order of the file") {

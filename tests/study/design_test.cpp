@@ -8,7 +8,7 @@
 
 #include "catch.hpp"
 #include "study/counter_random.hpp"
-#include "study/factor.hpp"
+#include "config/factors.hpp"
 
 using namespace abs_hil::study;
 using Catch::Matchers::WithinAbs;

@@ -1,16 +1,26 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
+#include "abs_hil/rig/option.hpp"
 #include "config/key_table.hpp"
 
-namespace abs_hil::study {
+// The table [factors] of experiments and studies: configuration values in which runs differ.
+
+namespace abs_hil::config {
+
+/// A place in a file. Line and column count from 1.
+struct Place {
+  unsigned int line{0};
+  unsigned int column{0};
+};
 
 /// Every value is combined with every value of the other factors.
 struct Levels {
-  std::vector<config::Value> values{};
+  std::vector<Value> values{};
 };
 
 /// Uniform between its ends, or uniform in the logarithm.
@@ -28,10 +38,11 @@ struct Normal {
   double most{0.0};
 };
 
-/// A configuration key and the values that it takes in a study.
+/// A configuration key and the values that it takes.
 struct Factor {
   std::string key{};
   std::variant<Levels, Uniform, Normal> values{};
+  Place place{};  ///< of the key
   [[nodiscard]] bool has_range() const noexcept { return !std::holds_alternative<Levels>(values); }
 };
 
@@ -39,4 +50,10 @@ struct Factor {
 /// rounding. Throws std::bad_variant_access for levels.
 [[nodiscard]] double quantile(const Factor& factor, double u);
 
-}  // namespace abs_hil::study
+/// False for the keys that say who runs a script, and on what: neither settings nor factors of a script may name them.
+[[nodiscard]] bool script_may_set(std::string_view key) noexcept;
+
+/// Formats a value as --set takes it.
+[[nodiscard]] std::string text_of(const Value& value);
+
+}  // namespace abs_hil::config
