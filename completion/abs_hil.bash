@@ -27,6 +27,7 @@ _abs_hil() {
       words=$("$program" $subcommand --help 2>/dev/null | grep -oE '^ +(--?[a-zA-Z][a-z-]*|[a-z]+)' | tr -d ' ')
       # shellcheck disable=SC2086
       words+=" $("$program" $subcommand --help 2>/dev/null | grep -oE -- '--[a-z-]+' | tr '\n' ' ')"
+      [ "$subcommand" = validate ] && words+=" $(_abs_hil_names experiments)"
       ;;
   esac
   mapfile -t COMPREPLY < <(compgen -W "$words" -- "$current")

@@ -5,6 +5,8 @@
 #include <iostream>
 #include <type_traits>
 
+#include "rig/nearest_name.hpp"
+
 namespace abs_hil::cli {
 
 namespace {
@@ -38,6 +40,33 @@ void limit_values(CLI::Option& option, const Option& row) {
     option.check(CLI::IsMember(row.one_of));
   }
   if (!row.words.empty()) option.transform(CLI::CheckedTransformer(row.words));
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text.append(text.empty() ? "" : ", ").append(name);
+  return text;
+}
+
+/// The first word that the command line should not have, and the valid one that is nearest to it.
+std::string unexpected(const CLI::App& program) {
+  const CLI::App* app = &program;
+  while (app->remaining().empty() && !app->get_subcommands().empty()) app = app->get_subcommands().front();
+  std::string word = app->remaining().front();
+  std::vector<std::string> names;
+  if (word.starts_with('-')) {
+    word = word.substr(0, word.find('='));
+    for (const CLI::Option* option : app->get_options()) {
+      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    }
+    return "unknown option " + word + "; the nearest is " + std::string(rig::nearest_name(word, names));
+  }
+  for (const CLI::App* subcommand : app->get_subcommands({})) {
+    if (!subcommand->get_name().empty()) names.push_back(subcommand->get_name());
+  }
+  if (names.empty() || !app->get_subcommands().empty()) return "unexpected argument " + word;
+  return "unknown subcommand " + word + "; the nearest is " + std::string(rig::nearest_name(word, names)) +
+         "; known: " + joined(names);
 }
 
 }  // namespace
@@ -78,6 +107,8 @@ std::optional<int> Parser::parse(int argc, const char* const* argv) {
   try {
     app_->parse(argc, argv);
     return std::nullopt;
+  } catch (const CLI::ExtrasError& error) {
+    return named ? refuse(unexpected(*app_)) : app_->exit(error) == 0 ? 0 : usage_error;
   } catch (const CLI::ParseError& error) {
     if (named && error.get_exit_code() != 0) return refuse(error.what());
     return app_->exit(error) == 0 ? 0 : usage_error;

@@ -124,8 +124,7 @@ When TableReader::when(const Entry& entry) const {
     }
     return when;
   }
-  fail(entry.place,
-       fmt::format("when = \"{}\": give a comparison, \"KEY = VALUE\", with one of = != < > <= >=", all));
+  fail(entry.place, fmt::format("when = \"{}\": give a comparison, \"KEY = VALUE\", with one of = != < > <= >=", all));
 }
 
 }  // namespace abs_hil::config

@@ -227,7 +227,8 @@ std::vector<Factor> TableReader::factors(const Entry& entry) const {
     factors.push_back(std::move(factor));
   });
   // The file's order numbers the runs. toml++ does not keep it.
-  std::ranges::sort(factors, {}, [](const Factor& factor) { return std::pair(factor.place.line, factor.place.column); });
+  std::ranges::sort(factors, {},
+                    [](const Factor& factor) { return std::pair(factor.place.line, factor.place.column); });
   return factors;
 }
 

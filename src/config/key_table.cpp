@@ -35,6 +35,19 @@ std::string value_text(const Value& value) {
   throw ConfigError(fmt::format("{}: {}", origin, rig::refusal(key.name, value, valid, key)));
 }
 
+/// ", nearest to it x" if the text looks like one of the allowed names.
+std::string nearest_of(const Key& key, const std::string* text) {
+  const std::string_view nearest = text == nullptr ? "" : rig::nearest_name(*text, key.allowed.list());
+  if (nearest.empty() || 2 * rig::edit_distance(*text, nearest) > text->size()) return {};
+  return fmt::format(", nearest to it {}", nearest);
+}
+
+std::string_view trimmed(std::string_view text) {
+  while (text.starts_with(' ')) text.remove_prefix(1);
+  while (text.ends_with(' ')) text.remove_suffix(1);
+  return text;
+}
+
 template <typename Number>
 void assign_number(const Key& key, Number& target, const Value& value, std::string_view origin) {
   constexpr bool whole = std::is_integral_v<Number>;
@@ -150,7 +163,7 @@ std::string section_of(std::string_view controller) {
 }
 
 Value parse_value(const Key& key, std::string_view text) {
-  return std::holds_alternative<std::string*>(key.target) ? Value(std::string(text)) : parse_value(text);
+  return std::holds_alternative<std::string*>(key.target) ? Value(std::string(text)) : parse_value(trimmed(text));
 }
 
 const Key& KeyTable::find(std::string_view name, std::string_view origin) const {
@@ -207,7 +220,7 @@ void KeyTable::set(std::string_view name, const Value& value, std::string_view o
         } else if constexpr (std::is_same_v<Target, std::string>) {
           const auto* text = std::get_if<std::string>(&value);
           if (text == nullptr || !key.allows(*text)) {
-            refuse(key, value_text(value), rig::valid_name_text(key), origin);
+            refuse(key, value_text(value), rig::valid_name_text(key) + nearest_of(key, text), origin);
           }
           if (!is_utf8(*text)) {
             throw ConfigError(fmt::format("{}: {} is not UTF-8 text; give UTF-8 ({})", origin, key.name, key.meaning));
@@ -228,7 +241,7 @@ void KeyTable::set_text(std::string_view assignment, std::string_view origin) {
     throw ConfigError(
         fmt::format("{}: \"{}\" is not an assignment; write key=value, as in plant.theta_N=30", origin, assignment));
   }
-  const std::string_view name = assignment.substr(0, equals);
+  const std::string_view name = trimmed(assignment.substr(0, equals));
   const std::string_view text = assignment.substr(equals + 1);
   set(name, parse_value(find(name, origin), text), origin);
 }

@@ -16,6 +16,8 @@ double as_double(const Key& key) {
   return *std::get<double*>(key.target);
 }
 
+std::string shown(double value) { return fmt::format("{:.6g}", value); }
+
 }  // namespace
 
 std::vector<ModelDifference> model_differences(const Settings& settings) {
@@ -33,7 +35,8 @@ std::vector<ModelDifference> model_differences(const Settings& settings) {
 std::string in_words(const std::vector<ModelDifference>& differences) {
   std::string text;
   for (const ModelDifference& d : differences) {
-    text += fmt::format("{}{} {:.6g} (plant {:.6g})", text.empty() ? "" : ", ", d.name, d.model, d.plant);
+    if (shown(d.model) == shown(d.plant)) continue;  // a rounding, which nobody would see here
+    text += fmt::format("{}{} {} (plant {})", text.empty() ? "" : ", ", d.name, shown(d.model), shown(d.plant));
   }
   return text;
 }

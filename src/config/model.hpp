@@ -17,7 +17,7 @@ struct ModelDifference {
 /// Where the model differs from the simulated plant; nowhere on a rig, whose plant is unknown.
 [[nodiscard]] std::vector<ModelDifference> model_differences(const Settings& settings);
 
-/// "theta_N 23 (plant 40), c31_per_s 16 (plant 20.37)"; empty for no difference.
+/// "theta_N 23 (plant 40), c31_per_s 16 (plant 20.37)"; empty if no difference is visible in six digits.
 [[nodiscard]] std::string in_words(const std::vector<ModelDifference>& differences);
 
 /// Says where the true theta, or on a rig the model's, lies outside the bounds of the controller's estimate; empty:

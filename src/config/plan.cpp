@@ -46,8 +46,7 @@ rig::Phase kind_of(const PhaseScript& phase) {
 
 class Planner {
  public:
-  Planner(const Script& script, const Settings& settings)
-      : script_(script), settings_(settings), keys_(settings_) {}
+  Planner(const Script& script, const Settings& settings) : script_(script), settings_(settings), keys_(settings_) {}
 
   [[nodiscard]] Plan make() const {
     Plan plan;
@@ -112,9 +111,8 @@ class Planner {
       if (!script.when || holds(*script.when, keys_)) plan.ends_on.push_back(condition(script));
     }
     if (plan.ends_on.empty()) {
-      throw ConfigError(
-          fmt::format("{}: this configuration leaves phase \"{}\" without an end condition; give one",
-                      script_.at(phase.place), phase.name));
+      throw ConfigError(fmt::format("{}: this configuration leaves phase \"{}\" without an end condition; give one",
+                                    script_.at(phase.place), phase.name));
     }
     plan.time_limit_s = time_limit_s(phase, plan);
     if (plan.brake == BrakeAction::slip_control && !ends_above(settings_.control.v_min_m_s, plan)) {
@@ -160,8 +158,8 @@ double value_of(const Script& script, const Number& number, const KeyTable& keys
   const double value = key == nullptr ? std::nan("") : number_of(*key).value_or(std::nan(""));
   if (!number.range.contains(value)) {
     throw ConfigError(fmt::format("{}: ${} is {} in this configuration; give a value in {}{}{}",
-                                          script.at(number.place), number.key, value, number.range.text(),
-                                          number.unit.empty() ? "" : " ", number.unit));
+                                  script.at(number.place), number.key, value, number.range.text(),
+                                  number.unit.empty() ? "" : " ", number.unit));
   }
   return value;
 }

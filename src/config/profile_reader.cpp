@@ -72,9 +72,8 @@ class ProfileReader {
   [[nodiscard]] Number value_of(const toml::node& node, std::string_view what) const {
     const Place place = place_of(node.source());
     if (!facts_.unit.empty() && node.is_number() && !outer_.has_suffix) {
-      reader_.fail(
-          place, fmt::format("{} = {} has no unit; name it in the key {}{} = ... or write \"{} {}\"", what, shown(node),
-                             facts_.key, suffix_of(facts_.unit), shown(node), facts_.unit));
+      reader_.fail(place, fmt::format("{} = {} has no unit; name it in the key {}{} = ... or write \"{} {}\"", what,
+                                      shown(node), facts_.key, suffix_of(facts_.unit), shown(node), facts_.unit));
     }
     if (outer_.has_suffix && node.is_string() && !node.as_string()->get().starts_with('$')) {
       reader_.fail(place, fmt::format("{} = {}: the key {} names the unit already; write a plain number", what,

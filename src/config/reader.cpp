@@ -61,7 +61,7 @@ std::string_view kind_of(const toml::node& node) {
 std::optional<std::int64_t> whole_in(const toml::node& node, const rig::Range& range) {
   const auto* number = node.as_integer();
   return number != nullptr && range.contains(static_cast<double>(number->get())) ? std::optional(number->get())
-                                                                                   : std::nullopt;
+                                                                                 : std::nullopt;
 }
 
 /// Calls `add` for each element of a list.
@@ -234,8 +234,8 @@ std::vector<std::string> TableReader::texts(const Entry& entry) const {
     all.push_back(text->get());
   });
   if (all.empty()) {
-    fail(entry.place, fmt::format("{} = {}: give a list of texts ({})", entry.key, shown(*entry.node),
-                                  entry.field->facts.meaning));
+    fail(entry.place,
+         fmt::format("{} = {}: give a list of texts ({})", entry.key, shown(*entry.node), entry.field->facts.meaning));
   }
   return all;
 }
@@ -263,8 +263,7 @@ const toml::table& TableReader::table(const Entry& entry) const {
   const auto* table = entry.node->as_table();
   if (table == nullptr) {
     const std::string words = facts.allowed.empty() ? "" : quoted(facts.allowed.list()) + " or ";
-    fail(entry.place,
-         fmt::format("{} = {}: give {}a table ({})", entry.key, shown(*entry.node), words, facts.meaning));
+    fail(entry.place, fmt::format("{} = {}: give {}a table ({})", entry.key, shown(*entry.node), words, facts.meaning));
   }
   return *table;
 }
@@ -278,9 +277,9 @@ std::vector<const toml::table*> TableReader::tables(const Entry& entry) const {
     tables.push_back(node.as_table());
   });
   if (tables.empty()) {
-    fail(entry.place, fmt::format("{} is {}: give a list of tables ({})", entry.key,
-                                  entry.node->is_array() ? "an empty list" : kind_of(*entry.node),
-                                  entry.field->facts.meaning));
+    fail(entry.place,
+         fmt::format("{} is {}: give a list of tables ({})", entry.key,
+                     entry.node->is_array() ? "an empty list" : kind_of(*entry.node), entry.field->facts.meaning));
   }
   return tables;
 }

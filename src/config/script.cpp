@@ -51,8 +51,8 @@ void check_ask(PhaseScript& phase, const TableReader& reader) {
   const bool plain = !phase.ask.empty() && phase.ask.size() <= longest &&
                      std::ranges::all_of(phase.ask, [](char c) { return c >= ' ' && c <= '~'; });
   if (!plain) {
-    reader.fail(entry.place,
-                fmt::format("ask = {}: give a line of 1 to {} printable ASCII characters", shown(*entry.node), longest));
+    reader.fail(entry.place, fmt::format("ask = {}: give a line of 1 to {} printable ASCII characters",
+                                         shown(*entry.node), longest));
   }
   const auto refuse = [&](std::string_view key, std::string_view why) {
     reader.fail(reader.find(key)->key_place,
@@ -106,8 +106,8 @@ std::span<const ChangingPart> changing_parts() noexcept { return parts; }
 
 void BrakeScript::check(const TableReader& reader) {
   if (reader.entries().size() != 1) {
-    reader.fail(reader.place(), fmt::format("brake holds {} keys: give one of duty, torque_Nm and slip_ref",
-                                            reader.entries().size()));
+    reader.fail(reader.place(),
+                fmt::format("brake holds {} keys: give one of duty, torque_Nm and slip_ref", reader.entries().size()));
   }
   word.clear();
 }
@@ -209,8 +209,9 @@ void Script::check(const TableReader& reader) {
   for (auto phase = phases.begin(); phase != phases.end(); ++phase) {
     const auto same = std::find_if(phases.begin(), phase, [&](const auto& other) { return other.name == phase->name; });
     if (same == phase) continue;
-    reader.fail(phase->name_place, fmt::format("the phase in line {} is also named \"{}\"; give each phase its own name",
-                                               same->place.line, phase->name));
+    reader.fail(phase->name_place,
+                fmt::format("the phase in line {} is also named \"{}\"; give each phase its own name", same->place.line,
+                            phase->name));
   }
   double runs = static_cast<double>(series.repetitions() * std::max<std::size_t>(1, series.experiments.size()));
   for (const Factor& factor : factors) {
@@ -221,8 +222,9 @@ void Script::check(const TableReader& reader) {
       reader.fail(factor.place, "[factors] of a series takes no run.seed; give repeat or seeds in [series]");
     }
     if (factor.has_range()) {
-      reader.fail(factor.place, fmt::format("{}: a series runs every value; give steps in its range, or a list of values",
-                                            factor.key));
+      reader.fail(
+          factor.place,
+          fmt::format("{}: a series runs every value; give steps in its range, or a list of values", factor.key));
     }
     runs *= static_cast<double>(std::get<Levels>(factor.values).values.size());
   }

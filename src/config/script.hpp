@@ -47,11 +47,11 @@ inline constexpr std::array<Word<experiment::Between>, 2> words_of<experiment::B
     {{"line", experiment::Between::line}, {"hold", experiment::Between::hold}}};
 template <>
 inline constexpr std::array<Word<rig::Phase>, 6> words_of<rig::Phase>{{{"idle", rig::Phase::idle},
-                                                                      {"accelerate", rig::Phase::accelerate},
-                                                                      {"coast", rig::Phase::coast},
-                                                                      {"brake", rig::Phase::brake},
-                                                                      {"hold", rig::Phase::hold},
-                                                                      {"stopped", rig::Phase::stopped}}};
+                                                                       {"accelerate", rig::Phase::accelerate},
+                                                                       {"coast", rig::Phase::coast},
+                                                                       {"brake", rig::Phase::brake},
+                                                                       {"hold", rig::Phase::hold},
+                                                                       {"stopped", rig::Phase::stopped}}};
 
 /// A value over the time of a phase; one point at time 0 is a constant.
 struct ProfileScript {
@@ -120,8 +120,7 @@ struct PhaseScript {
                  .meaning = "the phase is left out unless this holds for the configuration");
   ABS_HIL_OPTION(std::optional<ProfileScript>, motor, {}, .meaning = "drive PWM of the lower wheel's motor",
                  .range = rig::from_zero(1), .allowed = {"off"});
-  ABS_HIL_OPTION(BrakeScript, brake, {},
-                 .meaning = "what drives the brake; or a table of duty, torque_Nm or slip_ref",
+  ABS_HIL_OPTION(BrakeScript, brake, {}, .meaning = "what drives the brake; or a table of duty, torque_Nm or slip_ref",
                  .allowed = {"off", "controller"});
   ABS_HIL_OPTION(bool, restart, false,
                  .meaning = "the slip controller begins anew; without: it goes on from the phase before");
@@ -129,8 +128,9 @@ struct PhaseScript {
       bool, wheels_apart, false,
       .meaning = "the upper wheel is lifted off the lower one: a simulator parts them, on a rig a person does");
   ABS_HIL_OPTION(std::string, ask, {},
-                 .meaning = "what a person is asked to do; the phase ends when the person has answered, motor and "
-                            "brake are off meanwhile");
+                 .meaning =
+                     "what a person is asked to do; the phase ends when the person has answered, motor and "
+                     "brake are off meanwhile");
   ABS_HIL_OPTION(std::vector<ConditionScript>, until, {},
                  .meaning = "what ends the phase: one condition, or any or all of several; required unless it asks");
   /// The longest time limit of a phase (experiment::Sequence).
@@ -182,12 +182,14 @@ struct EventScript {
                  .meaning = "torque of the motor from then on, over that of the plant's parameters",
                  .range = rig::positive(10));
   ABS_HIL_OPTION(std::optional<double>, upper_bearing, {},
-                 .meaning = "friction of the upper wheel's bearing (M10, d1) from then on, over that of the plant's "
-                            "parameters",
+                 .meaning =
+                     "friction of the upper wheel's bearing (M10, d1) from then on, over that of the plant's "
+                     "parameters",
                  .range = rig::positive(10));
   ABS_HIL_OPTION(std::optional<double>, lower_bearing, {},
-                 .meaning = "friction of the lower wheel's bearing (M20, d2) from then on, over that of the plant's "
-                            "parameters",
+                 .meaning =
+                     "friction of the lower wheel's bearing (M20, d2) from then on, over that of the plant's "
+                     "parameters",
                  .range = rig::positive(10));
   ABS_HIL_OPTION(
       std::string, inject, {},
@@ -212,8 +214,9 @@ struct SeriesScript {
   static constexpr std::string_view title = "[series]";
   static constexpr std::string_view meaning = "The experiment is run several times";
   ABS_HIL_OPTION(std::vector<std::string>, experiments, {},
-                 .meaning = "the experiments that are run, one after the other, in place of phases: names or TOML "
-                            "files");
+                 .meaning =
+                     "the experiments that are run, one after the other, in place of phases: names or TOML "
+                     "files");
   ABS_HIL_OPTION(std::int64_t, repeat, 1, .meaning = "runs of each combination, with seeds that count up",
                  .range = rig::between(1, 100'000));
   ABS_HIL_OPTION(std::optional<std::int64_t>, seed, {}, .meaning = "seed of the first repetition",
@@ -247,9 +250,8 @@ struct Script {
   ABS_HIL_OPTION(std::string, notes, {}, .meaning = "anything else worth keeping with the results");
   ABS_HIL_OPTION(std::string, analysis, {}, .meaning = "what is computed from the run beside its metrics",
                  .allowed = {"friction-curve"});
-  ABS_HIL_OPTION(
-      std::vector<Setting>, settings, {},
-      .meaning = "configuration values of the experiment; --config, options and --set override them");
+  ABS_HIL_OPTION(std::vector<Setting>, settings, {},
+                 .meaning = "configuration values of the experiment; --config, options and --set override them");
   ABS_HIL_OPTION(std::vector<PhaseScript>, phases, {}, .key = "phase",
                  .meaning = "the phases, in order; required unless [series] names experiments");
   ABS_HIL_OPTION(LimitsScript, limits, {},

@@ -87,8 +87,6 @@ inline constexpr std::array end_rows{
     // NOLINTEND(cppcoreguidelines-macro-usage)
 };
 
-[[nodiscard]] constexpr const EndRow& row_of(EndKind kind) noexcept {
-  return end_rows[static_cast<std::size_t>(kind)];
-}
+[[nodiscard]] constexpr const EndRow& row_of(EndKind kind) noexcept { return end_rows[static_cast<std::size_t>(kind)]; }
 
 }  // namespace abs_hil::experiment

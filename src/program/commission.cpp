@@ -13,6 +13,7 @@
 #include "experiment/board_record.hpp"
 #include "experiment/commissioning.hpp"
 #include "program/exit_status.hpp"
+#include "program/run_arguments.hpp"
 #include "program/run_monitor.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
@@ -109,8 +110,6 @@ void keep_record(const RunRequest& request, const driver::BoardIdentity& board,
   terminal.tell("commissioning record: " + file.string());
 }
 
-}  // namespace
-
 int commission(const RunRequest& request, const experiment::CommissioningOptions& options) {
   const driver::DriverOptions& driver_options = request.settings.driver;
   const auto lease = guardian::ask_for_lease(request.settings, request.outputs.fast);
@@ -152,6 +151,27 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
                                                           : exit_terminated;
   }
   return exit_ended_early;
+}
+
+struct CommissionOptions {
+  RunOptions options{.backend = "rig"};
+  experiment::CommissioningOptions pulses{};
+};
+
+}  // namespace
+
+Action add_commission(cli::Parser& parser, const Words&) {
+  const auto o = std::make_shared<CommissionOptions>();
+  add_configuration_options(parser, o->options);
+  parser.add({.names = "--drive-duty",
+              .to = &o->pulses.drive_duty,
+              .help = "duty of the drive pulse, in (0, 0.3]",
+              .show_default = true});
+  parser.add({.names = "--brake-duty",
+              .to = &o->pulses.brake_duty,
+              .help = "duty of the brake pulse, in (0, 0.7]",
+              .show_default = true});
+  return [o] { return commission(merge(o->options), o->pulses); };
 }
 
 }  // namespace abs_hil::program

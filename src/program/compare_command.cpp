@@ -1,11 +1,14 @@
-#include "program/compare_command.hpp"
+// The options of `abs_hil compare`.
+#include <memory>
 
 #include "program/run_arguments.hpp"
+#include "program/subcommands.hpp"
 
 namespace abs_hil::program {
 
-cli::Parser add_compare(cli::Parser& parser, CompareOptions& o) {
-  cli::Parser compare = parser.add_subcommand("compare", "compare controllers in simulation on the same varied plants");
+Action add_compare(cli::Parser& compare, const Words& words) {
+  const auto options = std::make_shared<CompareOptions>();
+  CompareOptions& o = *options;
   compare.add({.names = "--plant", .to = &o.run.plant, .help = "plant by name or TOML file", .type = "NAME|FILE"});
   compare.add({.names = "--model",
                .to = &o.run.model,
@@ -54,7 +57,7 @@ cli::Parser add_compare(cli::Parser& parser, CompareOptions& o) {
                .type = "DIR",
                .needs = {"--run"}});
   compare.set_footer("To compare runs that are already recorded, use abs_report RUN RUN.");
-  return compare;
+  return [options, words] { return program::compare(*options, words); };
 }
 
 }  // namespace abs_hil::program

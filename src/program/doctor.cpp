@@ -1,8 +1,10 @@
+// `abs_hil doctor`: what this computer and the boards at it can do.
 #include "diagnosis/doctor.hpp"
 
 #include <fmt/format.h>
 
 #include <chrono>
+#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "config/config_file.hpp"
@@ -10,6 +12,7 @@
 #include "experiment/board_record.hpp"
 #include "guardian/guarding.hpp"
 #include "program/exit_status.hpp"
+#include "program/run_arguments.hpp"
 #include "program/subcommands.hpp"
 #include "run/run.hpp"
 #include "runtime/board_policy.hpp"
@@ -35,8 +38,7 @@ diagnosis::Finding service_finding(const std::string& socket) {
   return finding;
 }
 
-}  // namespace
-
+/// Runs all checks of this computer or the named one, and prints a fix for each shortcoming.
 int doctor(const RunRequest& request, const std::string& only, bool json) {
   const config::Settings& s = request.settings;
   std::unique_ptr<guardian::GuardianLease> lease;
@@ -78,6 +80,23 @@ int doctor(const RunRequest& request, const std::string& only, bool json) {
     fmt::print("{}", diagnosis::to_text(findings));
   }
   return well ? exit_completed : exit_unavailable;
+}
+
+struct DoctorOptions {
+  RunOptions options{};
+  std::string only{};
+  bool json{false};
+};
+
+}  // namespace
+
+Action add_doctor(cli::Parser& parser, const Words&) {
+  const auto o = std::make_shared<DoctorOptions>();
+  add_backend_option(parser, o->options);
+  add_configuration_options(parser, o->options);
+  parser.add({.names = "--only", .to = &o->only, .help = "run only this check", .one_of = diagnosis::check_names()});
+  parser.add({.names = "--json", .to = &o->json, .help = "print JSON instead of text"});
+  return [o] { return doctor(merge(o->options), o->only, o->json); };
 }
 
 }  // namespace abs_hil::program

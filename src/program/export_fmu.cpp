@@ -1,6 +1,7 @@
-#include "program/export_fmu.hpp"
-
+// `abs_hil export-fmu`: the simulated rig or a slip controller as an FMU.
 #include <fmt/format.h>
+
+#include <memory>
 
 #include "abs_hil/control/registry.hpp"
 #include "config/config_error.hpp"
@@ -9,6 +10,7 @@
 #include "interchange/fmu/plant_model.hpp"
 #include "program/exit_status.hpp"
 #include "program/run_arguments.hpp"
+#include "program/subcommands.hpp"
 
 namespace abs_hil::program {
 
@@ -30,18 +32,13 @@ void fill(interchange::fmu::ControllerModel& model, const config::Settings& s) {
   model.sensors.speeds_given = s.plant.ideal_sensors;
 }
 
-}  // namespace
+struct ExportOptions {
+  RunOptions options{};
+  int fmi{2};
+  std::string out{};
+};
 
-void add_export_fmu(cli::Parser& parser, ExportFmuCommand& command) {
-  command.parser = parser.add_subcommand(
-      "export-fmu", "write the simulated rig, or with --controller a slip controller, as an FMU for other tools");
-  add_configuration_options(command.parser, command.options);
-  command.parser.add({.names = "--fmi", .to = &command.fmi, .help = "version of FMI, 2 or 3", .show_default = true});
-  command.parser.add(
-      {.names = "--out", .to = &command.out, .help = "file to write", .type = "FILE.fmu", .required = true});
-}
-
-int export_fmu(const ExportFmuCommand& command) {
+int export_fmu(const ExportOptions& command) {
   if (command.fmi != 2 && command.fmi != 3) {
     throw config::ConfigError(fmt::format("export-fmu: --fmi {}: give 2 or 3", command.fmi));
   }
@@ -78,6 +75,16 @@ int export_fmu(const ExportFmuCommand& command) {
     throw config::ConfigError(std::string("export-fmu: ") + error.what());
   }
   return exit_completed;
+}
+
+}  // namespace
+
+Action add_export_fmu(cli::Parser& parser, const Words&) {
+  const auto o = std::make_shared<ExportOptions>();
+  add_configuration_options(parser, o->options);
+  parser.add({.names = "--fmi", .to = &o->fmi, .help = "version of FMI, 2 or 3", .show_default = true});
+  parser.add({.names = "--out", .to = &o->out, .help = "file to write", .type = "FILE.fmu", .required = true});
+  return [o] { return export_fmu(*o); };
 }
 
 }  // namespace abs_hil::program

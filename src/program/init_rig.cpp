@@ -1,8 +1,10 @@
+// `abs_hil init-rig NAME`: a plant's file to fill in for a rig of one's own.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <memory>
 
 #include "config/config_error.hpp"
 #include "config/rig_file.hpp"
@@ -11,6 +13,8 @@
 #include "program/subcommands.hpp"
 
 namespace abs_hil::program {
+
+namespace {
 
 int init_rig(const RunRequest& request, const std::string& name) {
   const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_'; };
@@ -31,6 +35,19 @@ int init_rig(const RunRequest& request, const std::string& name) {
   fmt::print("{0}: fill in the values of your rig. Then: abs_hil --plant {0}, abs_hil --backend rig --model {0}\n",
              file.string());
   return exit_completed;
+}
+
+}  // namespace
+
+Action add_init_rig(cli::Parser& parser, const Words&) {
+  const auto o = std::make_shared<RunOptions>();
+  const auto name = std::make_shared<std::string>();
+  parser.add({.names = "name", .to = name.get(), .help = "name of the rig", .type = "NAME", .required = true});
+  parser.add({.names = "--plant",
+              .to = &o->plant,
+              .help = "plant whose values it begins with, by name or TOML file",
+              .type = "NAME|FILE"});
+  return [o, name] { return init_rig(merge(*o), *name); };
 }
 
 }  // namespace abs_hil::program

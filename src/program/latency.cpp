@@ -1,3 +1,4 @@
+// `abs_hil latency`: the real-time cycle on the simulated rig, and a verdict on this computer's timing.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,12 +12,20 @@
 #include "experiment/sequence.hpp"
 #include "files/result_file.hpp"
 #include "program/exit_status.hpp"
+#include "program/run_arguments.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
 
 namespace abs_hil::program {
 
 namespace {
+
+struct LatencyOptions {
+  RunOptions options{};
+  double duration_s{10.0};
+  std::optional<int> second_offset_us{};  ///< offset of the first cycle from a whole second, us
+  bool json{false};
+};
 
 constexpr double longest_load_s = 86'400.0;
 constexpr double accelerate_s = 1.0;
@@ -54,8 +63,6 @@ config::Plan timing_load(double duration_s) {
   return plan;
 }
 
-}  // namespace
-
 int latency(const RunRequest& request, const LatencyOptions& options) {
   config::Settings s = request.settings;
   s.experiment.start_speed_rad_s = start_speed_rad_s;
@@ -88,6 +95,26 @@ int latency(const RunRequest& request, const LatencyOptions& options) {
     for (const std::string& line : run.driver().tally()) fmt::print("{}\n", line);
   }
   return status_of(outcome);
+}
+
+}  // namespace
+
+Action add_latency(cli::Parser& parser, const Words&) {
+  const auto o = std::make_shared<LatencyOptions>();
+  add_configuration_options(parser, o->options);
+  add_timing_options(parser, o->options);
+  parser.add({.names = "--duration",
+              .to = &o->duration_s,
+              .help = "duration of the test, s",
+              .type = "S",
+              .show_default = true});
+  parser.add({.names = "--secaligned",
+              .to = &o->second_offset_us,
+              .help = "begin at a whole second plus this many us, like cyclictest's option of the same name",
+              .type = "US",
+              .range = {0, 999'999}});
+  parser.add({.names = "--json", .to = &o->json, .help = "print JSON instead of text"});
+  return [o] { return latency(merge(o->options), *o); };
 }
 
 }  // namespace abs_hil::program

@@ -1,11 +1,17 @@
+// `abs_hil list`: names of what there is, and the tables of keys, quantities and reasons.
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "abs_hil/control/registry.hpp"
+#include "abs_hil/rig/quantities.hpp"
+#include "abs_hil/rig/reason.hpp"
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
 #include "config/library.hpp"
@@ -16,6 +22,65 @@
 namespace abs_hil::program {
 
 namespace {
+
+using Json = nlohmann::ordered_json;  // keeps the order of insertion
+
+void print_json(const Json& rows) { fmt::print("{}\n", rows.dump(1)); }
+
+std::string_view name_of(rig::Topic topic) {
+  switch (topic) {
+    case rig::Topic::sequence: return "sequence";
+    case rig::Topic::motion: return "motion";
+    case rig::Topic::board: return "board";
+    case rig::Topic::timing: return "timing";
+  }
+  return "";
+}
+
+template <class Value>
+std::string_view type_name() {
+  if constexpr (std::is_same_v<Value, bool>) return "boolean";
+  if constexpr (std::is_same_v<Value, rig::Phase>) return "name";
+  return std::is_floating_point_v<Value> ? "number" : "integer";
+}
+
+/// One object per row of the table. `csv_column` counts from 1; null if the CSV lacks the quantity.
+Json quantities() {
+  Json rows = Json::array();
+  int column = 0;
+  rig::for_each_quantity([&](const auto& row) {
+    using Value = rig::ValueOf<std::decay_t<decltype(row)>>;
+    Json entry{{"name", row.name},
+               {"unit", row.unit},
+               {"type", type_name<Value>()},
+               {"topic", name_of(row.topic)},
+               {"csv_column", row.in_csv() ? Json(++column) : Json()},
+               {"since", row.since},
+               {"meaning", row.meaning}};
+    if constexpr (std::is_same_v<Value, rig::Phase>) {
+      for (int phase = 0; phase <= static_cast<int>(rig::Phase::fault); ++phase) {
+        entry["values"].push_back(rig::name_of(static_cast<rig::Phase>(phase)));
+      }
+    }
+    rows.push_back(std::move(entry));
+  });
+  return rows;
+}
+
+Json reasons() {
+  Json rows = Json::array();
+  for (const rig::ReasonRow& row : rig::reasons) {
+    rows.push_back({{"number", static_cast<std::uint16_t>(row.reason)},
+                    {"name", row.name},
+                    {"kind", rig::name_of(row.kind)},
+                    {"found_again", rig::name_of(row.found_again)},
+                    {"text", row.text},
+                    {"quantity", row.value.quantity},
+                    {"unit", row.value.unit},
+                    {"bound", row.value.bound}});
+  }
+  return rows;
+}
 
 void print(std::string_view name, std::string_view summary) { fmt::print("  {:<21} {}\n", name, summary); }
 
@@ -49,7 +114,7 @@ void list_keys(bool json) {
   const config::KeyTable table(settings);
   std::size_t name_width = 0, value_width = 0;
   if (json) {
-    nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+    Json rows = Json::array();
     for (const config::Key& key : table.keys()) {
       rows.push_back({{"name", key.name},
                       {"value", config::value_text(key)},
@@ -58,7 +123,7 @@ void list_keys(bool json) {
                       {"meaning", key.meaning},
                       {"safety", class_of(key)}});
     }
-    fmt::print("{}\n", rows.dump(1));
+    print_json(rows);
     return;
   }
   for (const config::Key& key : table.keys()) {
@@ -71,13 +136,32 @@ void list_keys(bool json) {
   }
 }
 
-}  // namespace
-
-int list(bool keys, bool json) {
-  if (keys) {
-    list_keys(json);
-    return exit_completed;
+void list_quantities(bool json) {
+  const Json rows = quantities();
+  if (json) {
+    print_json(rows);
+    return;
   }
+  fmt::print("{:<24}  {:<15}  {:>3}  {}\n", "quantity", "unit", "CSV", "meaning");
+  for (const Json& row : rows) {
+    fmt::print("{:<24}  {:<15}  {:>3}  {}\n", row["name"].get<std::string>(), row["unit"].get<std::string>(),
+               row["csv_column"].is_null() ? "" : row["csv_column"].dump(), row["meaning"].get<std::string>());
+  }
+}
+
+void list_reasons(bool json) {
+  if (json) {
+    print_json(reasons());
+    return;
+  }
+  fmt::print("{:>6}  {:<12}  {:<32}  {}\n", "number", "kind", "found again by replay", "reason");
+  for (const rig::ReasonRow& row : rig::reasons) {
+    fmt::print("{:>6}  {:<12}  {:<32}  {}\n", static_cast<std::uint16_t>(row.reason), rig::name_of(row.kind),
+               rig::name_of(row.found_again), row.text);
+  }
+}
+
+void list_names() {
   fmt::print("controllers\n");
   for (const auto& entry : control::controllers()) print(entry.name, entry.summary);
   fmt::print("plants\n");
@@ -89,7 +173,45 @@ int list(bool keys, bool json) {
   fmt::print("boards (driver.kind of backend rig; none is verified on hardware)\n");
   for (const auto& entry : driver::registered_backends()) print(entry.name, entry.summary);
   list_signals();
-  return exit_completed;
+}
+
+struct ListOptions {
+  bool keys{false};
+  bool quantities{false};
+  bool reasons{false};
+  bool json{false};
+};
+
+}  // namespace
+
+Action add_list(cli::Parser& parser, const Words&) {
+  const auto o = std::make_shared<ListOptions>();
+  parser.add(
+      {.names = "--keys", .to = &o->keys, .help = "list all configuration values with unit, range and safety class"});
+  parser.add({.names = "--quantities",
+              .to = &o->quantities,
+              .help = "list the quantities of a CSV row and of ABS_TELEMETRY",
+              .excludes = {"--keys"}});
+  parser.add({.names = "--reasons",
+              .to = &o->reasons,
+              .help = "list the reasons of phase changes, ends of runs and refused commands",
+              .excludes = {"--keys", "--quantities"}});
+  parser.add({.names = "--json", .to = &o->json, .help = "print keys, quantities or reasons as JSON"});
+  return [o, parser] {
+    if (o->json && !o->quantities && !o->reasons && !o->keys) {
+      return parser.refuse("--json requires --keys, --quantities or --reasons");
+    }
+    if (o->quantities) {
+      list_quantities(o->json);
+    } else if (o->reasons) {
+      list_reasons(o->json);
+    } else if (o->keys) {
+      list_keys(o->json);
+    } else {
+      list_names();
+    }
+    return int{exit_completed};
+  };
 }
 
 }  // namespace abs_hil::program

@@ -1,3 +1,4 @@
+// From a command line to what it asks for, and from errors to exit statuses.
 #include "abs_hil/program/program.hpp"
 
 #include <poll.h>
@@ -5,6 +6,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -19,17 +21,10 @@
 #include "config/config_error.hpp"
 #include "config/config_json.hpp"
 #include "interchange/foreign_controller.hpp"
-#include "program/compare_command.hpp"
 #include "program/exit_status.hpp"
-#include "program/export_fmu.hpp"
-#include "program/inspection_commands.hpp"
-#include "program/live_commands.hpp"
-#include "program/python_programs.hpp"
-#include "program/recording_commands.hpp"
 #include "program/run_arguments.hpp"
 #include "program/safe.hpp"
 #include "program/signals.hpp"
-#include "program/study_command.hpp"
 #include "program/subcommands.hpp"
 #include "run_folder/clean_text.hpp"
 #include "runtime/early_end.hpp"
@@ -39,88 +34,37 @@ namespace abs_hil {
 
 namespace {
 
-/// Refuses run options before a subcommand that would ignore them.
-void refuse_run_options(const cli::Parser& parser, const std::string& command) {
-  for (const std::string& option : parser.given()) {
-    throw config::ConfigError(
-        fmt::format("{}: give the options of `abs_hil {}` after the word {}", option, command, command));
-  }
-}
-
 int dispatch(int argc, char** argv) {
+  const program::Words words(argv, argv + argc);
   cli::Parser parser("abs_hil", "Driver, adaptive slip controller and simulator of the Inteco ABS laboratory rig");
   parser.set_version(ABS_HIL_VERSION);
   program::RunOptions options;
   program::add_run_options(parser, options);
-  program::ListCommand list;
-  program::add_list(parser, list);
-  program::DoctorCommand doctor;
-  program::add_doctor(parser, doctor);
-  program::LatencyCommand latency;
-  program::add_latency(parser, latency);
-  program::CompareOptions compare_options;
-  const cli::Parser compare = program::add_compare(parser, compare_options);
-  program::StudyCommand study;
-  program::add_study(parser, study);
-  program::ValidateCommand validate;
-  program::add_validate(parser, validate);
-  program::CommissionCommand commission;
-  program::add_commission(parser, commission);
-  program::InitRigCommand init_rig;
-  program::add_init_rig(parser, init_rig);
-  program::SafeCommand safe;
-  program::add_safe(parser, safe);
-  program::ReplayCommand replay_command;
-  program::add_replay(parser, replay_command);
-  program::ConvertCommand convert_command;
-  program::add_convert(parser, convert_command);
-  program::ExportFmuCommand export_command;
-  program::add_export_fmu(parser, export_command);
-  watch::WatchOptions watch_options;
-  const cli::Parser watch = program::add_watch(parser, watch_options);
-  program::SendCommand send;
-  program::add_send(parser, send);
-  // Only for the help: these words are looked for before the command line is read.
-  std::vector<cli::Parser> python_programs;
-  for (const program::PythonProgram& python : program::python_programs) {
-    python_programs.push_back(parser.add_subcommand(std::string(python.name), std::string(python.help)));
+  struct Command {
+    std::string_view name;
+    cli::Parser parser;
+    program::Action act;
+  };
+  std::vector<Command> commands;
+  for (const program::Subcommand& row : program::subcommands()) {
+    Command& command =
+        commands.emplace_back(row.name, parser.add_subcommand(std::string(row.name), std::string(row.help)));
+    // Building options takes time: only a subcommand that the line may name gets its own.
+    const bool named = std::ranges::find(words, row.name) != words.end();
+    if (row.add != nullptr && named) command.act = row.add(command.parser, words);
   }
   if (const std::optional<int> status = parser.parse(argc, argv)) return *status;
-  if (list.json && !list.quantities && !list.reasons && !list.keys) {
-    return parser.refuse("--json requires --keys, --quantities or --reasons");
+  for (const Command& command : commands) {
+    if (!command.parser.parsed()) continue;
+    for (const std::string& option : parser.given()) {
+      throw config::ConfigError(
+          fmt::format("{}: give the options of `abs_hil {}` after the word {}", option, command.name, command.name));
+    }
+    if (command.act) return command.act();
+    return parser.refuse("give the name of a program in Python first, its options after it");
   }
-  if (list.quantities) return program::list_quantities(list.json);
-  if (list.reasons) return program::list_reasons(list.json);
-  if (list.parser.parsed()) return program::list(list.keys, list.json);
-  if (doctor.parser.parsed()) return program::doctor(program::merge(doctor.options), doctor.only, doctor.json);
-  if (latency.parser.parsed()) return program::latency(program::merge(latency.options), latency.latency);
-  if (validate.parser.parsed()) {
-    return validate.schema ? program::print_schema() : program::validate(validate.options);
-  }
-  if (compare.parsed()) {
-    refuse_run_options(parser, "compare");
-    return program::compare(compare_options, {argv, argv + argc});
-  }
-  if (study.parser.parsed()) {
-    refuse_run_options(parser, "study");
-    return program::study(study, {argv, argv + argc});
-  }
-  if (watch.parsed()) {
-    refuse_run_options(parser, "watch");
-    return program::watch(watch_options);
-  }
-  if (commission.parser.parsed()) return program::commission(program::merge(commission.options), commission.pulses);
-  if (safe.parser.parsed()) return program::make_boards_safe(safe);
-  if (send.parser.parsed()) return program::send(program::merge(send.options), send.send);
-  if (init_rig.parser.parsed()) return program::init_rig(program::merge(init_rig.options), init_rig.name);
-  for (const cli::Parser& python : python_programs) {
-    if (python.parsed()) return parser.refuse("give the name of a program in Python first, its options after it");
-  }
-  if (replay_command.parser.parsed()) return program::replay_run(replay_command);
-  if (convert_command.parser.parsed()) return program::convert(convert_command);
-  if (export_command.parser.parsed()) return program::export_fmu(export_command);
   program::RunRequest request = program::merge(options);
-  request.command_line.assign(argv, argv + argc);
+  request.command_line = words;
   return request.script->series.given ? program::run_series(options, request) : program::run(request);
 }
 

@@ -1,13 +1,14 @@
-#include "program/recording_commands.hpp"
-
+// `abs_hil replay` and `abs_hil convert`: what was recorded.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <filesystem>
+#include <memory>
 #include <utility>
 
 #include "config/config_error.hpp"
 #include "program/exit_status.hpp"
+#include "program/subcommands.hpp"
 #include "replay/check.hpp"
 #include "replay/recorded_run.hpp"
 #include "replay/report.hpp"
@@ -36,37 +37,18 @@ void note(const std::string& cut) {
   if (!cut.empty()) spdlog::warn("{}", cut);
 }
 
-}  // namespace
+struct ReplayCommand {
+  std::string recording{};
+  std::optional<std::string> controller{};
+  std::vector<std::string> assignments{};
+  bool check{false};
+  std::optional<std::string> csv_file{};
+};
 
-void add_replay(cli::Parser& parser, ReplayCommand& command) {
-  command.parser = parser.add_subcommand("replay", "feed a recorded run to its own or another controller, open loop");
-  command.parser.add({.names = "recording",
-                      .to = &command.recording,
-                      .help = "event log (--log), or a run folder (--out)",
-                      .type = "LOG",
-                      .required = true});
-  command.parser.add({.names = "--check",
-                      .to = &command.check,
-                      .help = "run the recorded configuration again and check that all commands are bit-equal"});
-  command.parser.add({.names = "--controller",
-                      .to = &command.controller,
-                      .help = "use another slip controller",
-                      .type = "NAME",
-                      .excludes = {"--check"}});
-  command.parser.add({.names = "--set",
-                      .to = &command.assignments,
-                      .help = "change a recorded configuration value",
-                      .type = "key=value",
-                      .repeated = true,
-                      .excludes = {"--check"}});
-  command.parser.add({.names = "--csv",
-                      .to = &command.csv_file,
-                      .help = "write the replayed commands, with the columns of a run's CSV",
-                      .type = "FILE",
-                      .excludes = {"--check"}});
-}
-
-namespace {
+struct ConvertCommand {
+  std::string from{};
+  std::string to{};
+};
 
 int check_again(const replay::RecordedRun& run) {
   const replay::CheckResult result = replay::check(run);
@@ -79,8 +61,7 @@ int check_again(const replay::RecordedRun& run) {
   return exit_ended_early;
 }
 
-}  // namespace
-
+/// With --check 0 if all commands are bit-equal and 1 if not; 2 for a file that is no recording or is damaged.
 int replay_run(const ReplayCommand& command) {
   try {
     const replay::RecordedRun run = replay::read_run(log_in(command.recording));
@@ -101,18 +82,6 @@ int replay_run(const ReplayCommand& command) {
   }
 }
 
-void add_convert(cli::Parser& parser, ConvertCommand& command) {
-  command.parser = parser.add_subcommand(
-      "convert", "convert an event log (.lcmlog) to CSV; a run to .mcap or .parquet (abs_convert --help)");
-  command.parser.add(
-      {.names = "from", .to = &command.from, .help = "event log or run folder", .type = "IN", .required = true});
-  command.parser.add({.names = "to",
-                      .to = &command.to,
-                      .help = "FILE.csv, FILE.mcap or FILE.parquet",
-                      .type = "OUT",
-                      .required = true});
-}
-
 int convert(const ConvertCommand& command) {
   const std::string from = log_in(command.from);
   if (std::filesystem::path(command.to).extension() != ".csv") {
@@ -129,6 +98,45 @@ int convert(const ConvertCommand& command) {
   } catch (const telemetry::RecordingError& error) {
     throw config::ConfigError(error.what());
   }
+}
+
+}  // namespace
+
+Action add_replay(cli::Parser& parser, const Words&) {
+  const auto o = std::make_shared<ReplayCommand>();
+  parser.add({.names = "recording",
+              .to = &o->recording,
+              .help = "event log (--log), or a run folder (--out)",
+              .type = "LOG",
+              .required = true});
+  parser.add({.names = "--check",
+              .to = &o->check,
+              .help = "run the recorded configuration again and check that all commands are bit-equal"});
+  parser.add({.names = "--controller",
+              .to = &o->controller,
+              .help = "use another slip controller",
+              .type = "NAME",
+              .excludes = {"--check"}});
+  parser.add({.names = "--set",
+              .to = &o->assignments,
+              .help = "change a recorded configuration value",
+              .type = "key=value",
+              .repeated = true,
+              .excludes = {"--check"}});
+  parser.add({.names = "--csv",
+              .to = &o->csv_file,
+              .help = "write the replayed commands, with the columns of a run's CSV",
+              .type = "FILE",
+              .excludes = {"--check"}});
+  return [o] { return replay_run(*o); };
+}
+
+Action add_convert(cli::Parser& parser, const Words&) {
+  const auto o = std::make_shared<ConvertCommand>();
+  parser.add({.names = "from", .to = &o->from, .help = "event log or run folder", .type = "IN", .required = true});
+  parser.add(
+      {.names = "to", .to = &o->to, .help = "FILE.csv, FILE.mcap or FILE.parquet", .type = "OUT", .required = true});
+  return [o] { return convert(*o); };
 }
 
 }  // namespace abs_hil::program

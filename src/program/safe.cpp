@@ -23,6 +23,7 @@
 #include "program/board_owners.hpp"
 #include "program/exit_status.hpp"
 #include "program/first_place.hpp"
+#include "program/subcommands.hpp"
 #include "program/zero_writing.hpp"
 
 namespace abs_hil::program {
@@ -275,24 +276,24 @@ bool print(std::string good, std::string bad) {
 
 }  // namespace
 
-void add_safe(cli::Parser& parser, SafeCommand& command) {
-  command.parser = parser.add_subcommand(
-      "safe", "make the configured board, or every board found, safe and verify it; ends the run that drives it");
-  command.parser.add({.names = "--config",
-                      .to = &command.options.config_file,
-                      .help = "TOML file whose table [driver] names the board",
-                      .type = "FILE"});
-  command.parser.add({.names = "--set",
-                      .to = &command.options.assignments,
-                      .help = "set a value of driver., or guardian.socket (abs_hil list --keys)",
-                      .type = "key=value",
-                      .repeated = true});
-  command.parser.add({.names = "--insist",
-                      .to = &command.insist_s,
-                      .help = "how long to try to verify the safe state, s",
-                      .type = "S",
-                      .range = {0.0, most_insist_s},
-                      .show_default = true});
+Action add_safe(cli::Parser& parser, const Words&) {
+  const auto o = std::make_shared<SafeCommand>();
+  parser.add({.names = "--config",
+              .to = &o->options.config_file,
+              .help = "TOML file whose table [driver] names the board",
+              .type = "FILE"});
+  parser.add({.names = "--set",
+              .to = &o->options.assignments,
+              .help = "set a value of driver., or guardian.socket (abs_hil list --keys)",
+              .type = "key=value",
+              .repeated = true});
+  parser.add({.names = "--insist",
+              .to = &o->insist_s,
+              .help = "how long to try to verify the safe state, s",
+              .type = "S",
+              .range = {0.0, most_insist_s},
+              .show_default = true});
+  return [o] { return make_boards_safe(*o); };
 }
 
 int make_boards_safe(const SafeCommand& command) {

@@ -2,7 +2,6 @@
 
 #include <optional>
 
-#include "cli/command_line.hpp"
 #include "program/command_line.hpp"
 
 namespace abs_hil::program {
@@ -13,10 +12,7 @@ constexpr double most_insist_s = 3600.0;
 struct SafeCommand {
   RunOptions options{.backend = "rig"};  ///< only the configuration file and the assignments are used
   double insist_s{3.0};                  ///< how long it tries to verify
-  cli::Parser parser{};
 };
-
-void add_safe(cli::Parser& parser, SafeCommand& command);
 
 /// `abs_hil safe`: writes zeros to the configured board, or to every board found, before anything else; then ends the
 /// runs that drive them, asks the resident service, verifies, and says what it saw and what to pull. Zeros go out all

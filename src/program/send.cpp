@@ -1,7 +1,9 @@
+// `abs_hil send`: a command to a running abs_hil, and its answer.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <charconv>
+#include <memory>
 
 #include "commands/sender.hpp"
 #include "config/config_error.hpp"
@@ -33,7 +35,11 @@ commands::Order order_of(const std::vector<std::string>& words) {
   throw config::ConfigError("send: give one of stop | start | continue | slip-ref X | gain NAME X");
 }
 
-}  // namespace
+struct SendOptions {
+  RunOptions options{};
+  std::vector<std::string> order{};  ///< "stop", "start", "continue", "slip-ref X", "gain NAME X"
+  double timeout_s{3.0};
+};
 
 int send(const RunRequest& request, const SendOptions& options) {
   const config::Settings& s = request.settings;
@@ -53,6 +59,32 @@ int send(const RunRequest& request, const SendOptions& options) {
   }
   fmt::print(stderr, "abs_hil: {}\n", reply.message);
   return reply.outcome == commands::Outcome::refused ? exit_ended_early : exit_unavailable;
+}
+
+}  // namespace
+
+Action add_send(cli::Parser& parser, const Words&) {
+  const auto o = std::make_shared<SendOptions>();
+  parser.add({.names = "order",
+              .to = &o->order,
+              .help = "stop | start | continue | slip-ref X | gain NAME X",
+              .count = {1, 3},
+              .required = true});
+  parser.add(
+      {.names = "--config", .to = &o->options.config_file, .help = "TOML file with commands.key_file", .type = "FILE"});
+  parser.add({.names = "--set",
+              .to = &o->options.assignments,
+              .help = "set any configuration value",
+              .type = "key=value",
+              .repeated = true});
+  parser.add({.names = "--lcm-url", .to = &o->options.outputs.lcm_url, .help = "LCM network"});
+  parser.add({.names = "--timeout",
+              .to = &o->timeout_s,
+              .help = "longest wait for the answer, s",
+              .type = "S",
+              .range = {0.1, 60.0},
+              .show_default = true});
+  return [o] { return send(merge(o->options), *o); };
 }
 
 }  // namespace abs_hil::program

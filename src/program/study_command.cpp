@@ -7,11 +7,13 @@
 #include <charconv>
 #include <chrono>
 #include <filesystem>
+#include <memory>
 
 #include "config/config_error.hpp"
 #include "program/exit_status.hpp"
 #include "program/run_progress.hpp"
 #include "program/study_runs.hpp"
+#include "program/subcommands.hpp"
 #include "run_folder/run_folder.hpp"
 #include "study/compute.hpp"
 #include "study/parallel.hpp"
@@ -42,11 +44,7 @@ void add_submit(cli::Parser& study, StudyCommand& command) {
                       .type = "OPTION"});
 }
 
-}  // namespace
-
-void add_study(cli::Parser& parser, StudyCommand& command) {
-  command.parser = parser.add_subcommand(
-      "study", "simulate the runs that a file describes; repeat the command to go on after an interruption");
+void add_options(StudyCommand& command) {
   command.parser.add({.names = "file", .to = &command.file, .help = "the study (docs/studies.md)", .type = "FILE"});
   command.parser.add({.names = "--out",
                       .to = &command.folder,
@@ -79,6 +77,15 @@ void add_study(cli::Parser& parser, StudyCommand& command) {
   command.status.add(
       {.names = "folder", .to = &command.looked_at, .help = "folder of a study", .type = "DIR", .required = true});
   add_submit(command.parser, command);
+}
+
+}  // namespace
+
+Action add_study(cli::Parser& parser, const Words& words) {
+  const auto command = std::make_shared<StudyCommand>();
+  command->parser = parser;
+  add_options(*command);
+  return [command, words] { return study(*command, words); };
 }
 
 std::string study_folder(const std::string& file, const std::optional<std::string>& given) {

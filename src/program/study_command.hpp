@@ -33,7 +33,6 @@ struct StudyCommand {
   std::vector<std::string> sbatch{};
   cli::Parser submit{};
 };
-void add_study(cli::Parser& parser, StudyCommand& command);
 
 /// Runs the subcommand. Returns the exit status. Throws config::ConfigError, std::invalid_argument, driver::Unavailable
 /// and, for files that cannot be written, std::runtime_error.

@@ -8,9 +8,9 @@
 
 #include "abs_hil/control/registry.hpp"
 #include "config/config_error.hpp"
+#include "config/factors.hpp"
 #include "config/key_table.hpp"
 #include "config/library.hpp"
-#include "config/factors.hpp"
 #include "program/questions.hpp"
 #include "program/subcommands.hpp"
 #include "run/run_summary.hpp"

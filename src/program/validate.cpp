@@ -1,6 +1,8 @@
+// `abs_hil validate`: an experiment in words, checked against the limits of its backend.
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "abs_hil/plant_sim/plant.hpp"
@@ -9,9 +11,12 @@
 #include "config/model.hpp"
 #include "config/plan.hpp"
 #include "program/exit_status.hpp"
+#include "program/run_arguments.hpp"
 #include "program/subcommands.hpp"
 
 namespace abs_hil::program {
+
+namespace {
 
 int validate(const RunOptions& options) {
   const RunRequest request = merge(options);
@@ -44,9 +49,21 @@ int validate(const RunOptions& options) {
   return exit_completed;
 }
 
-int print_schema() {
-  fmt::print("{}\n", config::schema().dump(2));
-  return exit_completed;
+}  // namespace
+
+Action add_validate(cli::Parser& parser, const Words&) {
+  const auto o = std::make_shared<RunOptions>();
+  const auto schema = std::make_shared<bool>(false);
+  parser.add(
+      {.names = "EXPERIMENT", .to = &o->experiment, .help = "experiment by name or TOML file", .type = "NAME|FILE"});
+  parser.add({.names = "--schema", .to = schema.get(), .help = "print the JSON Schema of experiment files instead"});
+  add_backend_option(parser, *o);
+  add_configuration_options(parser, *o);
+  return [o, schema] {
+    if (!*schema) return validate(*o);
+    fmt::print("{}\n", config::schema().dump(2));
+    return int{exit_completed};
+  };
 }
 
 }  // namespace abs_hil::program

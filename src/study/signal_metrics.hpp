@@ -34,13 +34,12 @@ struct SignalMetric {
   static constexpr std::string_view title = "[[metric]]";
   static constexpr std::string_view meaning = "One number made of a signal's values in a phase";
   ABS_HIL_OPTION(std::string, name, {}, .meaning = "of its column in the results", .required = true);
-  ABS_HIL_OPTION(std::string, of, {}, .meaning = "a column of a run's CSV, or a controller's signal",
-                 .required = true);
+  ABS_HIL_OPTION(std::string, of, {}, .meaning = "a column of a run's CSV, or a controller's signal", .required = true);
   ABS_HIL_OPTION(Reduction, take, Reduction::max, .meaning = "what is made of the values", .required = true);
   ABS_HIL_OPTION(rig::Phase, phase, rig::Phase::brake, .meaning = "in which kind of phase; without: brake",
                  .allowed = {"accelerate", "coast", "brake", "hold", "stopped"});
-  ABS_HIL_OPTION(double, after_s, 0.0, .key = "after", .unit = "s",
-                 .meaning = "from this time after its begin on", .range = rig::from_zero(600));
+  ABS_HIL_OPTION(double, after_s, 0.0, .key = "after", .unit = "s", .meaning = "from this time after its begin on",
+                 .range = rig::from_zero(600));
   ABS_HIL_OPTION(double, above_m_s, 0.0, .key = "above", .unit = "m/s",
                  .meaning = "only while the car is faster than this", .range = rig::from_zero(200));
   config::Place place{};  ///< in the study's file

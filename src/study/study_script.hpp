@@ -17,12 +17,11 @@
 
 template <>
 inline constexpr std::array<abs_hil::config::Word<abs_hil::study::DesignKind>, 5>
-    abs_hil::config::words_of<abs_hil::study::DesignKind>{
-        {{"grid", study::DesignKind::grid},
-         {"random", study::DesignKind::random},
-         {"sobol", study::DesignKind::sobol},
-         {"latin-hypercube", study::DesignKind::latin_hypercube},
-         {"saltelli", study::DesignKind::saltelli}}};
+    abs_hil::config::words_of<abs_hil::study::DesignKind>{{{"grid", study::DesignKind::grid},
+                                                           {"random", study::DesignKind::random},
+                                                           {"sobol", study::DesignKind::sobol},
+                                                           {"latin-hypercube", study::DesignKind::latin_hypercube},
+                                                           {"saltelli", study::DesignKind::saltelli}}};
 
 namespace abs_hil::study {
 
@@ -76,8 +75,7 @@ struct StudyScript {
   ABS_HIL_OPTION(std::string, model_follows, "nominal",
                  .meaning = "what the controllers know of factors of the plant: nothing, or their values",
                  .allowed = {"nominal", "factors"});
-  ABS_HIL_OPTION(std::uint64_t, chunk, 1000,
-                 .meaning = "runs in one file of results: what an interruption can lose",
+  ABS_HIL_OPTION(std::uint64_t, chunk, 1000, .meaning = "runs in one file of results: what an interruption can lose",
                  .range = rig::between(1, 1'000'000));
   ABS_HIL_OPTION(std::vector<config::Setting>, settings, {}, .meaning = "configuration values of all runs");
   ABS_HIL_OPTION(DesignScript, design, {}, .meaning = "how points are spread over the ranges of the factors");

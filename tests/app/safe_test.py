@@ -112,7 +112,7 @@ class Safe(RigTest):
                              ('driver.kind', '--set', 'driver.kind=pcie'),
                              ('no such file', '--config', self.folder / 'missing.toml'),
                              ('not valid TOML', '--config', not_toml),
-                             ('not expected: --nonsense', '--nonsense'),
+                             ('unknown option --nonsense', '--nonsense'),
                              ('--insist', '--insist', 'soon')):
             with self.subTest(words):
                 emulator = self.emulator()

@@ -168,7 +168,7 @@ TEST_CASE("a list takes all values that follow, or one each time") {
   const cli::Option repeated{.names = "--set", .to = &each, .help = "", .repeated = true};
   CHECK(error_of(answer_of(repeated, {"--set", "a=1", "--set", "b=2"})) == "none");
   CHECK(each == Texts{"a=1", "b=2"});
-  CHECK(error_of(answer_of(repeated, {"--set", "a=1", "b=2"})) == "The following argument was not expected: b=2");
+  CHECK(error_of(answer_of(repeated, {"--set", "a=1", "b=2"})) == "unexpected argument b=2");
   Texts split;
   const cli::Option commas{.names = "--columns", .to = &split, .help = "", .delimiter = ','};
   CHECK(error_of(answer_of(commas, {"--columns", "a,b"})) == "none");
@@ -253,7 +253,26 @@ TEST_CASE("a command line has one subcommand at most, and errors name it") {
   CHECK(parser.given().empty());
   const Answer two = answer_of(parser, {"list", "watch"});
   CHECK(two.status == 2);
-  CHECK(two.err == "rig: The following argument was not expected: watch (rig list --help shows all options)\n");
+  CHECK(two.err == "rig: unexpected argument watch (rig list --help shows all options)\n");
+}
+
+TEST_CASE("a misspelt word names the nearest valid one") {
+  bool fast = false;
+  bool json = false;
+  cli::Parser parser("rig", "");
+  parser.add({.names = "--fast", .to = &fast, .help = ""});
+  cli::Parser list = parser.add_subcommand("list", "");
+  list.add({.names = "--json", .to = &json, .help = ""});
+  static_cast<void>(parser.add_subcommand("watch", ""));
+  const auto refusal = [&parser](const std::vector<const char*>& words) { return answer_of(parser, words).err; };
+  CHECK(refusal({"wach", "--fast"}) ==
+        "rig: unknown subcommand wach; the nearest is watch; known: list, watch (rig --help shows all options)\n");
+  CHECK(refusal({"--fst", "x"}) == "rig: unknown option --fst; the nearest is --fast (rig --help shows all options)\n");
+  CHECK(refusal({"list", "--jason=3"}) ==
+        "rig: unknown option --jason; the nearest is --json (rig list --help shows all options)\n");
+  // The word that is wrong is the first one, not the last.
+  CHECK(refusal({"--fst", "list"}) ==
+        "rig: unknown option --fst; the nearest is --fast (rig list --help shows all options)\n");
 }
 
 TEST_CASE("help and version go to the standard output and end the program well") {

@@ -26,8 +26,7 @@ Script parsed(const std::string& text) {
 TEST_CASE("quantities take their own units only") {
   CHECK(parse_quantity("20 ms", "s") == 0.02);
   CHECK(parse_quantity("1.5min", "s") == 90.0);
-  CHECK_THAT(*parse_quantity("1700 rpm", "rad/s"),
-             WithinRel(1700.0 * 2.0 * std::numbers::pi / 60.0, 1e-15));
+  CHECK_THAT(*parse_quantity("1700 rpm", "rad/s"), WithinRel(1700.0 * 2.0 * std::numbers::pi / 60.0, 1e-15));
   CHECK_THAT(*parse_quantity("36 km/h", "m/s"), WithinRel(10.0, 1e-15));
   CHECK(parse_quantity("-3 mm", "m") == -0.003);
   CHECK(parse_quantity("2 N m", "N m") == 2.0);

@@ -7,8 +7,8 @@
 #include <set>
 
 #include "catch.hpp"
-#include "study/counter_random.hpp"
 #include "config/factors.hpp"
+#include "study/counter_random.hpp"
 
 using namespace abs_hil::study;
 using Catch::Matchers::WithinAbs;

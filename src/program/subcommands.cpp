@@ -1,0 +1,83 @@
+// The table of subcommands, and the programs in Python among them.
+#include "program/subcommands.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "program/exit_status.hpp"
+
+namespace abs_hil::program {
+
+namespace {
+
+constexpr std::array table{
+    Subcommand{"list", "list controllers, plants, experiments and backends", &add_list},
+    Subcommand{"doctor", "check this computer and give a fix for each shortcoming", &add_doctor},
+    Subcommand{"latency", "run the real-time cycle on the simulated rig and judge this computer's timing",
+               &add_latency},
+    Subcommand{"compare", "compare controllers in simulation on the same varied plants", &add_compare},
+    Subcommand{"study", "simulate the runs that a file describes; repeat the command to go on after an interruption",
+               &add_study},
+    Subcommand{"validate", "describe an experiment and check it against the limits", &add_validate},
+    Subcommand{"commission", "first steps with a real rig; asks before each step", &add_commission},
+    Subcommand{"init-rig", "write NAME.toml, the parameters of a rig of your own to fill in", &add_init_rig},
+    Subcommand{"safe",
+               "make the configured board, or every board found, safe and verify it; ends the run that drives it",
+               &add_safe},
+    Subcommand{"replay", "feed a recorded run to its own or another controller, open loop", &add_replay},
+    Subcommand{"convert", "convert an event log (.lcmlog) to CSV; a run to .mcap or .parquet (abs_convert --help)",
+               &add_convert},
+    Subcommand{"export-fmu",
+               "write the simulated rig, or with --controller a slip controller, as an FMU for other tools",
+               &add_export_fmu},
+    Subcommand{"watch", "show a running experiment in this terminal, over LCM; q quits", &add_watch},
+    Subcommand{"send", "send a command to a running abs_hil over LCM", &add_send},
+    Subcommand{"report", "make a page with figures and tables of recorded runs, or export their rows"},
+    Subcommand{"tune", "search for a controller's gains in simulation"},
+    Subcommand{"identify", "estimate the rig's parameters from its own logs, with intervals"},
+    Subcommand{"benchmark", "score controllers against the shortest braking, over a fixed set of cases"},
+    Subcommand{"learn", "train a small controller in simulation, from nothing but trial and error"},
+};
+
+/// `abs_hil convert` itself knows event logs and CSV. Other formats need libraries that only the Python package has.
+bool converts_in_python(std::span<char* const> arguments) {
+  return std::ranges::any_of(arguments, [](std::string_view argument) {
+    return argument.ends_with(".mcap") || argument.ends_with(".parquet") || argument.starts_with("--live");
+  });
+}
+
+}  // namespace
+
+std::span<const Subcommand> subcommands() noexcept { return table; }
+
+std::optional<int> start_python_program(int argc, char** argv) {
+  if (argc < 2) return std::nullopt;
+  const std::string_view name = argv[1];
+  const bool listed =
+      std::ranges::any_of(table, [&](const Subcommand& row) { return row.add == nullptr && row.name == name; });
+  if (!listed && !(name == "convert" && converts_in_python({argv + 2, argv + argc}))) return std::nullopt;
+
+  const std::string file = fmt::format("abs_{}", name);
+  std::error_code error;
+  const std::string beside = (std::filesystem::read_symlink("/proc/self/exe", error).parent_path() / file).string();
+  std::vector<char*> arguments{const_cast<char*>(file.c_str())};  // exec changes none of them
+  arguments.insert(arguments.end(), argv + 2, argv + argc);
+  arguments.push_back(nullptr);
+  ::execv(beside.c_str(), arguments.data());
+  if (errno == ENOENT) ::execvp(file.c_str(), arguments.data());
+  const int why = errno;
+  fmt::print(
+      stderr,
+      "abs_hil: {}: {}: `abs_hil {}` is a program in Python; install the package python3-abs-hil, or `pip install "
+      ".` in the source folder\n",
+      beside, std::strerror(why), name);
+  return exit_unavailable;
+}
+
+}  // namespace abs_hil::program
