@@ -59,34 +59,11 @@ void collect(const toml::table& table, const std::string& prefix, const fs::path
 
 bool is_of_plant(std::string_view name) { return name.starts_with("plant."); }
 
-}  // namespace
-
-std::vector<FileValue> read_file(const fs::path& file, Tables tables) {
-  toml::table table = parse(file);
-  table.erase("description");
-  if (tables == Tables::of_plant) table.erase("identified");  // its date, see model_origin()
-  if (tables == Tables::of_plant) {
-    for (const auto& [key, node] : table) {
-      if ((key.str() == "plant" || key.str() == "model") && node.is_table()) continue;
-      throw ConfigError(fmt::format("{}:{}: {} does not belong in this file; give the tables [plant] and [model] only",
-                                    file.string(), node.source().begin.line, std::string_view(key.str())));
-    }
-  }
-  std::vector<FileValue> values;
-  collect(table, {}, file, values);
-  return values;
-}
-
-void set_all(const std::vector<FileValue>& values, KeyTable& keys) {
-  for (const FileValue& value : values) keys.set(value.name, value.value, value.origin);
-}
-
-void load_file(const fs::path& file, KeyTable& keys, Tables tables) { set_all(read_file(file, tables), keys); }
-
 bool names_plant(const std::vector<FileValue>& values) {
   return std::any_of(values.begin(), values.end(), [](const FileValue& value) { return is_of_plant(value.name); });
 }
 
+/// Values of the plant as values of the model. The file's own [model] takes precedence over its [plant].
 std::vector<FileValue> as_model(const std::vector<FileValue>& values) {
   Settings defaults;
   const KeyTable table(defaults);
@@ -111,6 +88,30 @@ std::vector<FileValue> as_model(const std::vector<FileValue>& values) {
   }
   return model;
 }
+
+}  // namespace
+
+std::vector<FileValue> read_file(const fs::path& file, Tables tables) {
+  toml::table table = parse(file);
+  table.erase("description");
+  if (tables == Tables::of_plant) table.erase("identified");  // its date, see model_origin()
+  if (tables == Tables::of_plant) {
+    for (const auto& [key, node] : table) {
+      if ((key.str() == "plant" || key.str() == "model") && node.is_table()) continue;
+      throw ConfigError(fmt::format("{}:{}: {} does not belong in this file; give the tables [plant] and [model] only",
+                                    file.string(), node.source().begin.line, std::string_view(key.str())));
+    }
+  }
+  std::vector<FileValue> values;
+  collect(table, {}, file, values);
+  return values;
+}
+
+void set_all(const std::vector<FileValue>& values, KeyTable& keys) {
+  for (const FileValue& value : values) keys.set(value.name, value.value, value.origin);
+}
+
+void load_file(const fs::path& file, KeyTable& keys, Tables tables) { set_all(read_file(file, tables), keys); }
 
 std::vector<FileValue> read_model(const fs::path& file) {
   const std::vector<FileValue> given = read_file(file, Tables::of_plant);

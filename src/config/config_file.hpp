@@ -30,13 +30,10 @@ void set_all(const std::vector<FileValue>& values, KeyTable& table);
 /// Reads a TOML file and sets every value in it.
 void load_file(const std::filesystem::path& file, KeyTable& table, Tables tables = Tables::all);
 
-/// Values of the plant as values of the model, for a rig. The file's own [model] takes precedence over its [plant].
-/// Values that only a simulated plant has are left out. Throws ConfigError for a profile, which no rig can follow.
-[[nodiscard]] std::vector<FileValue> as_model(const std::vector<FileValue>& values);
-/// True if as_model would change one of the values.
-[[nodiscard]] bool names_plant(const std::vector<FileValue>& values);
-/// Reads the file of a model. Its table [plant] is a whole model: values that it does not name have their defaults. A
-/// table [model] alone gives only the values that it names. Throws ConfigError, naming file and line.
+/// Reads the file of a plant or a model as a model. Its table [plant] is a whole model: values that it does not name
+/// have their defaults, and those that only a simulated plant has are left out. Its table [model] takes precedence;
+/// alone it gives only the values that it names. Throws ConfigError, naming file and line, also for a profile, which no
+/// rig can follow.
 [[nodiscard]] std::vector<FileValue> read_model(const std::filesystem::path& file);
 
 /// The folder of configuration files that belongs to this program: $ABS_HIL_CONFIG_DIR, else the installed one beside

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <concepts>
 #include <cstdint>
@@ -41,6 +42,7 @@ struct Field {
   rig::OptionFacts facts;  ///< key without the unit's suffix; unit and range in SI units; allowed texts
   Shape shape{Shape::text};
   const Grammar& (*grammar)(){nullptr};  ///< of tables
+  bool required{false};
 };
 
 /// One kind of table.
@@ -78,7 +80,8 @@ struct Factor;
 /// Stands for `points` of a profile.
 struct Points {};
 
-/// A struct with rows that is a table of a file.
+/// A struct with rows that is a table of a file. It has a `title` and a `meaning`, and perhaps an array `required` of
+/// keys without which it is not valid.
 template <class T>
 concept Table = requires {
   { T::title } -> std::convertible_to<std::string_view>;
@@ -167,6 +170,9 @@ const Grammar& grammar_of() {
       Grammar made{T::title, T::meaning};
       rig::for_each_row<T>([&made]<class Member>(const rig::OptionRow<T, Member>& row) {
         made.fields.push_back(field_of<Member>(row.facts));
+        if constexpr (requires { T::required; }) {
+          made.fields.back().required = std::ranges::find(T::required, row.facts.key) != T::required.end();
+        }
       });
       return made;
     }();

@@ -163,7 +163,7 @@ std::string section_of(std::string_view controller) {
 }
 
 Value parse_value(const Key& key, std::string_view text) {
-  return std::holds_alternative<std::string*>(key.target) ? Value(std::string(text)) : parse_value(trimmed(text));
+  return std::holds_alternative<std::string*>(key.target) ? Value(std::string(text)) : parse_value(text);
 }
 
 const Key& KeyTable::find(std::string_view name, std::string_view origin) const {
@@ -235,14 +235,17 @@ void KeyTable::set(std::string_view name, const Value& value, std::string_view o
   carry_over(key);
 }
 
-void KeyTable::set_text(std::string_view assignment, std::string_view origin) {
+std::pair<std::string_view, std::string_view> split_assignment(std::string_view assignment, std::string_view origin) {
   const std::size_t equals = assignment.find('=');
   if (equals == std::string_view::npos || equals == 0) {
     throw ConfigError(
         fmt::format("{}: \"{}\" is not an assignment; write key=value, as in plant.theta_N=30", origin, assignment));
   }
-  const std::string_view name = trimmed(assignment.substr(0, equals));
-  const std::string_view text = assignment.substr(equals + 1);
+  return {trimmed(assignment.substr(0, equals)), trimmed(assignment.substr(equals + 1))};
+}
+
+void KeyTable::set_text(std::string_view assignment, std::string_view origin) {
+  const auto [name, text] = split_assignment(assignment, origin);
   set(name, parse_value(find(name, origin), text), origin);
 }
 

@@ -6,6 +6,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -23,6 +24,10 @@ struct Key : rig::OptionFacts {
 
 /// A value from a file or from the command line, before its key has checked the type.
 using Value = std::variant<double, std::int64_t, bool, std::string>;
+
+/// The name and the value of "name=value", without blanks around them. Throws ConfigError for any other text.
+[[nodiscard]] std::pair<std::string_view, std::string_view> split_assignment(std::string_view assignment,
+                                                                             std::string_view origin);
 
 /// Converts `text` to a value for the key. A key of text takes it unchanged; other keys read it as TOML would.
 [[nodiscard]] Value parse_value(const Key& key, std::string_view text);

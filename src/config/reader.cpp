@@ -167,7 +167,7 @@ TableReader::TableReader(const Source& source, const toml::table& table, const G
     return std::pair(a.key_place.line, a.key_place.column) < std::pair(b.key_place.line, b.key_place.column);
   });
   for (const Field& field : grammar.fields) {
-    if (field.facts.required && find(field.facts.key) == nullptr) {
+    if (field.required && find(field.facts.key) == nullptr) {
       source.fail(place_,
                   fmt::format("{} has no \"{}\" ({}); give one", grammar.title, field.facts.key, field.facts.meaning));
     }

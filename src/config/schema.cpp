@@ -141,7 +141,7 @@ Json table(const Grammar& grammar) {
     const std::string key(field.facts.key);
     add(key, false);
     if (!field.facts.unit.empty()) add(key + suffix_of(field.facts.unit), true);
-    if (field.facts.required) required.push_back(key);
+    if (field.required) required.push_back(key);
   }
   Json json{{"type", "object"}, {"description", grammar.meaning}, {"properties", std::move(properties)}};
   if (!required.empty()) json["required"] = std::move(required);

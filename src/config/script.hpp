@@ -113,7 +113,8 @@ struct PhaseScript {
   ABS_HIL_OPTIONS(PhaseScript);
   static constexpr std::string_view title = "[[phase]]";
   static constexpr std::string_view meaning = "One phase: what acts, and what ends it";
-  ABS_HIL_OPTION(std::string, name, {}, .meaning = "its name, in displays and events", .required = true);
+  static constexpr std::array<std::string_view, 1> required{"name"};
+  ABS_HIL_OPTION(std::string, name, {}, .meaning = "its name, in displays and events");
   ABS_HIL_OPTION(std::optional<rig::Phase>, kind, {},
                  .meaning = "the CSV's word for it; without: the name if it is one of these, else by what acts");
   ABS_HIL_OPTION(std::optional<When>, when, {},

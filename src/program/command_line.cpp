@@ -137,38 +137,25 @@ struct Files {
   std::vector<config::FileValue> config{};
 };
 
-/// A rig has no simulated plant: values of the plant are taken as values of the model, with a warning.
-std::vector<config::FileValue> taken_as_model(const std::vector<config::FileValue>& values, const std::string& where) {
-  if (!config::names_plant(values)) return values;
-  warn_once(where +
-            ": a rig has no simulated plant; its table [plant] is taken as [model]. Write [model]: a later "
-            "version will refuse [plant]");
-  return config::as_model(values);
-}
-
 Files read_files(const RunOptions& options, const std::string& default_plant) {
+  const bool on_rig = options.backend == "rig";
+  if (on_rig && options.plant) {
+    throw config::ConfigError(fmt::format(
+        "--plant {0}: a rig has no simulated plant; tell the controllers about it with --model {0}", *options.plant));
+  }
   const std::filesystem::path plant = config::plant_file(options.plant.value_or(default_plant));
-  Files files{.plant = config::read_file(plant, config::Tables::of_plant)};
+  Files files{.plant = on_rig ? config::read_model(plant) : config::read_file(plant, config::Tables::of_plant)};
   if (options.model) files.model = config::read_model(config::plant_file(*options.model, "--model"));
   if (options.config_file) files.config = config::read_file(*options.config_file);
-  if (options.backend != "rig") return files;
-  if (options.plant) {
-    warn_once(
-        fmt::format("--plant {0}: a rig has no simulated plant; it is taken as --model {0}. Write --model: a "
-                    "later version will refuse --plant",
-                    *options.plant));
-  }
-  files.plant = config::as_model(files.plant);
-  files.config = taken_as_model(files.config, options.config_file.value_or(""));
   return files;
 }
 
-std::vector<config::FileValue> settings_of(const config::Script& script, bool on_rig) {
+std::vector<config::FileValue> settings_of(const config::Script& script) {
   std::vector<config::FileValue> values;
   for (const config::Setting& setting : script.settings) {
     values.push_back({setting.key, setting.value, script.at(setting.place)});
   }
-  return on_rig ? taken_as_model(values, script.path) : values;
+  return values;
 }
 
 /// The names of plant and model. On a rig the plant's name is the model's.
@@ -204,7 +191,7 @@ void fill(config::Settings& s, config::KeyTable& keys, const RunOptions& options
   set_names(s, options);
   config::set_all(files.plant, keys);
   config::set_all(files.model, keys);
-  config::set_all(settings_of(script, s.on_rig()), keys);
+  config::set_all(settings_of(script), keys);
   config::set_all(files.config, keys);
 
   const auto set = [&keys](const char* key, const std::optional<std::string>& value, const char* option) {
@@ -227,7 +214,6 @@ void fill(config::Settings& s, config::KeyTable& keys, const RunOptions& options
 /// are set. A name that is no text is refused when it is set.
 std::shared_ptr<const config::Script> script_of(const RunOptions& options, const Files& files) {
   std::string name = experiment::ExperimentOptions().name;
-  const std::string prefix = std::string(experiment_key) + '=';
   const auto look = [&name](const std::vector<config::FileValue>& values) {
     for (const config::FileValue& value : values) {
       if (const auto* text = std::get_if<std::string>(&value.value); text != nullptr && value.name == experiment_key)
@@ -236,7 +222,8 @@ std::shared_ptr<const config::Script> script_of(const RunOptions& options, const
   };
   const auto look_at_texts = [&](const std::vector<std::string>& assignments) {
     for (const std::string& assignment : assignments) {
-      if (assignment.starts_with(prefix)) name = assignment.substr(prefix.size());
+      const auto [key, text] = config::split_assignment(assignment, "--set");
+      if (key == experiment_key) name = text;
     }
   };
   look_at_texts(options.defaults);

@@ -33,9 +33,10 @@ struct SignalMetric {
   ABS_HIL_OPTIONS(SignalMetric);
   static constexpr std::string_view title = "[[metric]]";
   static constexpr std::string_view meaning = "One number made of a signal's values in a phase";
-  ABS_HIL_OPTION(std::string, name, {}, .meaning = "of its column in the results", .required = true);
-  ABS_HIL_OPTION(std::string, of, {}, .meaning = "a column of a run's CSV, or a controller's signal", .required = true);
-  ABS_HIL_OPTION(Reduction, take, Reduction::max, .meaning = "what is made of the values", .required = true);
+  static constexpr std::array<std::string_view, 3> required{"name", "of", "take"};
+  ABS_HIL_OPTION(std::string, name, {}, .meaning = "of its column in the results");
+  ABS_HIL_OPTION(std::string, of, {}, .meaning = "a column of a run's CSV, or a controller's signal");
+  ABS_HIL_OPTION(Reduction, take, Reduction::max, .meaning = "what is made of the values");
   ABS_HIL_OPTION(rig::Phase, phase, rig::Phase::brake, .meaning = "in which kind of phase; without: brake",
                  .allowed = {"accelerate", "coast", "brake", "hold", "stopped"});
   ABS_HIL_OPTION(double, after_s, 0.0, .key = "after", .unit = "s", .meaning = "from this time after its begin on",

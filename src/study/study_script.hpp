@@ -35,8 +35,9 @@ struct DesignScript {
   ABS_HIL_OPTIONS(DesignScript);
   static constexpr std::string_view title = "[design]";
   static constexpr std::string_view meaning = "How points are spread over the ranges of the factors";
+  static constexpr std::array<std::string_view, 1> required{"kind"};
   ABS_HIL_OPTION(DesignKind, kind, DesignKind::grid,
-                 .meaning = "random, sobol, latin-hypercube, saltelli (for Sobol indices), or grid", .required = true);
+                 .meaning = "random, sobol, latin-hypercube, saltelli (for Sobol indices), or grid");
   ABS_HIL_OPTION(std::uint64_t, points, 1, .meaning = "how many points", .range = rig::between(1, 1e10));
   ABS_HIL_OPTION(std::uint64_t, seed, 1, .meaning = "seed of the design; without: 1", .range = rig::from_zero(9e15));
   bool has_points{false};
@@ -50,8 +51,8 @@ struct RepeatScript {
   static constexpr std::string_view title = "[repeat]";
   static constexpr std::string_view meaning =
       "Every point is run on several varied plants, the same for all points and controllers";
-  ABS_HIL_OPTION(std::uint64_t, runs, 1, .meaning = "how many varied plants", .range = rig::between(1, 1e9),
-                 .required = true);
+  static constexpr std::array<std::string_view, 1> required{"runs"};
+  ABS_HIL_OPTION(std::uint64_t, runs, 1, .meaning = "how many varied plants", .range = rig::between(1, 1e9));
   ABS_HIL_OPTION(std::string, vary, {}, .meaning = "what varies, as after compare --vary");
   ABS_HIL_OPTION(std::uint64_t, seed, 1, .meaning = "seed of the varied plants; without: 1",
                  .range = rig::from_zero(9e15));

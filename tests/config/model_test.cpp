@@ -147,10 +147,7 @@ TEST_CASE("on a rig only the model exists") {
 
 TEST_CASE("the plant's table of a file is a rig's model; its own model takes precedence") {
   const File file("[plant]\ntheta_N = 30\nB = 20\ntyre = \"inteco-mu\"\nfriction_profile = \"\"\n[model]\nB = 25\n");
-  const std::vector<FileValue> given = read_file(file.path());
-  CHECK(names_plant(given));
-  const std::vector<FileValue> values = as_model(given);
-  CHECK_FALSE(names_plant(values));
+  const std::vector<FileValue> values = read_model(file.path());
   Fixture f;
   f.table.leave_out_plant();
   set_all(values, f.table);
@@ -158,9 +155,9 @@ TEST_CASE("the plant's table of a file is a rig's model; its own model takes pre
   CHECK(f.settings.model.tyre.B == 25.0);
 
   const File profile("[plant]\nfriction_profile = \"time: 0.5\"\n");
-  CHECK_THROWS_WITH(as_model(read_file(profile.path())), Contains("plant.friction_profile") && Contains(":2"));
+  CHECK_THROWS_WITH(read_model(profile.path()), Contains("plant.friction_profile") && Contains(":2"));
   const File misspelt("[plant]\nthetaN = 3\n");
-  CHECK_THROWS_WITH(set_all(as_model(read_file(misspelt.path())), f.table), Contains("unknown key plant.thetaN"));
+  CHECK_THROWS_WITH(set_all(read_model(misspelt.path()), f.table), Contains("unknown key plant.thetaN"));
 }
 
 TEST_CASE("a plant's file is a whole model; a table model gives only its own values") {

@@ -122,7 +122,6 @@ struct OptionFacts {
   std::string_view on_rig{};   ///< of a rig's parameter: where to read it off the rig; empty for all others
   bool start_value{false};     ///< initial value of slip control: no effect after slip control has begun
   SafetyClass safety{};        ///< of an option that acts on a board
-  bool required{false};        ///< of a file's key: the table is not valid without it
 
   /// True for an allowed name, for a file with one of the endings, and for any text if none is prescribed.
   [[nodiscard]] bool allows(std::string_view text) const noexcept { return allowed.contains(text) || files.fit(text); }
