@@ -228,7 +228,7 @@ def parser() -> argparse.ArgumentParser:
                       help='plants to tune on [paper-table1,paper-timing]')
     made.add_argument('--model', metavar='NAME|FILE', help="the controllers' model, by name or TOML file (default: each plant)")
     made.add_argument('--folder', metavar='DIR', required=True, type=pathlib.Path,
-                      help='existing folder for CONTROLLER.toml')
+                      help='folder for CONTROLLER.toml; made if there is none')
     made.add_argument('--cases', metavar='N', default=6, type=_number(1, 1000), help='varied plants for each plant [6]')
     made.add_argument('--generations', metavar='N', default=24, type=_number(1, 10_000),
                       help='generations of the search [24]')
@@ -242,6 +242,7 @@ def parser() -> argparse.ArgumentParser:
 def _tune(controller: str, o: argparse.Namespace) -> None:
     plants = [name for name in o.plants.split(',') if name]
     judge = Judge(controller, Training(plants, o.cases, o.model, o.threads))
+    o.folder.mkdir(parents=True, exist_ok=True)
     path = o.folder / f'{controller}.toml'
     write_whole(path, lambda name: None, probe=True)
 

@@ -99,13 +99,16 @@ class OnTheRig(ProgramTest):
                 self.assertIn(word, result.stderr)
         self.assertEqual(self.rig('--set', 'model.theta_N=30').returncode, 3)
 
-    def test_a_plants_table_is_the_model_with_a_warning(self):
+    def test_a_rig_has_a_model_and_no_plant(self):
         config = self.folder / 'config.toml'
-        config.write_text('[plant]\nb1_Nm = 5\nideal_actuator = true\n')
-        for args, word in ((('--config', config), f'{config}'), (('--plant', 'paper-timing'), '--plant paper-timing')):
+        config.write_text('[plant]\nb1_Nm = 5\n')
+        for args, words in ((('--config', config), (f'{config}:2: plant.b1_Nm: a rig has no', 'set model.b1_Nm')),
+                            (('--plant', 'paper-timing'), ('--plant paper-timing: a rig has no', '--model paper-timing'))):
             result = self.rig(*args)
-            self.assertEqual(result.returncode, 3, result.stderr)
-            self.assertIn(f'{word}: a rig has no simulated plant', result.stderr)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            for word in words:
+                self.assertIn(word, result.stderr)
+        config.write_text('[model]\nb1_Nm = 5\n')
         for args in ((), ('--model', 'paper-timing')):
             self.assertNotIn('simulated plant', self.rig(*args).stderr)
         strong = self.folder / 'strong.toml'

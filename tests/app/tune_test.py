@@ -34,7 +34,6 @@ class Tune(ProgramTest):
     def test_threads_change_nothing_and_the_seed_does(self):
         texts = []
         for number, changed in enumerate(({'--threads': 1}, {'--threads': 3}, {'--threads': 1, '--seed': 9})):
-            (self.folder / str(number)).mkdir()
             self.assertEqual(self.tune(str(number), changed).returncode, 0)
             text = (self.folder / str(number) / 'sliding-mode.toml').read_text()
             texts.append([line for line in text.splitlines() if not line.startswith('#')])
@@ -49,9 +48,10 @@ class Tune(ProgramTest):
             self.assertEqual(result.returncode, 2, result.stderr)
             self.assertIn(words, result.stderr)
             self.assertEqual(list(self.folder.iterdir()), [])
-        result = self.tune('nowhere')
+        (self.folder / 'no-folder').write_text('')
+        result = self.tune('no-folder')
         self.assertEqual(result.returncode, 2)
-        self.assertIn('nowhere', result.stderr)
+        self.assertIn('no-folder', result.stderr)
 
 
 if __name__ == '__main__':

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """usage: one_row_test.py SOURCE BUILD [FOLDER]
 
-A quantity, an option, a reason and a figure of merit are one row each, and for quantity and figure the line that fills
-it. The test adds a made-up one of each to a copy of the tree, builds the program and the Python module, and looks for
+A quantity, an option, a reason, an end condition of phases and a figure of merit are one row each, and for quantity and
+figure the line that fills it. The test adds a made-up one of each to a copy of the tree, builds the program and the Python module, and looks for
 them wherever they must show: a quantity in CSV, event log, MCAP and Python. It reads a log from before the row, too, and
 expects to be told what that log lacks.
 
@@ -23,6 +23,7 @@ QUANTITIES = 'include/abs_hil/rig/quantities.hpp'
 FIGURES = 'src/analysis/braking_figures.hpp'
 OPTIONS = 'include/abs_hil/control/baseline_options.hpp'
 REASONS = 'include/abs_hil/rig/reason.hpp'
+ENDS = 'src/experiment/end_conditions.hpp'
 
 # The torque of the command is part of every record and no other quantity: what comes out of a log went into it by this row.
 QUANTITY_ROW = ('    Quantity{"made_up_Nm", "N m", "9.9", Topic::board, Outlet::both, '
@@ -33,12 +34,14 @@ OPTION = 'control.relay.made_up_gain'
 OPTION_ROW = ('  ABS_HIL_OPTION(double, made_up_gain, 1.5, .unit = "N m", .meaning = "made-up gain", '
               '.range = rig::between(0.25, 4));')
 REASON_TEXT = 'made-up end of a run'
+END_ROW = ('  ROW(made_up, "made_up", "s", rig::positive(10), "made-up time since the start", "{} s of the run are over", '
+           'phase_duration_over, exact, input.time_s >= value) \\')
 
 
 def add_rows(copy):
     """One line each, and for the figure its member, the line that computes it and the length of the table. Returns the
     number of the reason."""
-    for name in (QUANTITIES, FIGURES, OPTIONS, REASONS):
+    for name in (QUANTITIES, FIGURES, OPTIONS, REASONS, ENDS):
         assert 'made_up' not in (copy.tree / name).read_text(encoding='utf-8'), name
     copy.insert_before(QUANTITIES, 'inline constexpr std::tuple quantities{', '};', QUANTITY_ROW)
     copy.insert_before(OPTIONS, 'struct RelayOptions {', '};', OPTION_ROW)
@@ -46,7 +49,10 @@ def add_rows(copy):
     number = max(map(int, numbers)) + 1
     copy.insert_before(REASONS, '#define ABS_HIL_REASONS(ROW)', '  /* the end of the rows */',
                        f'  ROW(made_up, {number}, fault, no, "{REASON_TEXT}") \\')
-    for name in (QUANTITIES, OPTIONS, REASONS):
+    lines = (copy.tree / ENDS).read_text(encoding='utf-8').split('\n')
+    copy.insert_before(ENDS, '#define ABS_HIL_END_CONDITIONS(ROW)',
+                       next(line for line in lines if line.startswith('  ROW(start_command,')), END_ROW)
+    for name in (QUANTITIES, OPTIONS, REASONS, ENDS):
         assert copy.changed_lines(name) == (1, 0), f'{name}: {copy.changed_lines(name)} lines added and removed'
     copy.insert_before(FIGURES, 'struct FiguresOf {', '};', '  S made_up_s{rig::unknown};')
     copy.insert_before(FIGURES, 'inline constexpr std::array<Figure, ', '}};', FIGURE_ROW)
@@ -125,6 +131,24 @@ def option_takes_values(copy, program):
         assert part in refusal, refusal
 
 
+def end_condition_in_experiments(copy, program):
+    """In the schema and in words; a phase ends by it; a value out of range and a misspelt name are refused."""
+    until = json.loads(copy.run(program, 'validate', '--schema'))['$defs']['until']['properties']
+    assert until['made_up_s']['anyOf'][0]['maximum'] == 10, until['made_up_s']
+    script = copy.build / 'made_up_end.toml'
+    events = copy.build / 'made_up_end.csv'
+    for until, status, words in (('made_up = "250 ms"', 0, '0.25 s of the run are over'),
+                                 ('made_up_s = 11', 2, 'made_up_s = 11 is not valid; give a number in (0, 10] s'),
+                                 ('maed_up_s = 1', 2, 'the nearest known key is "made_up_s"')):
+        script.write_text(f'[[phase]]\nname = "a"\nuntil = {{ {until} }}\nat_most_s = 1\n')
+        said = copy.run(program, 'validate', script, status=status)
+        assert words in said, said
+    script.write_text('[[phase]]\nname = "a"\nuntil = { made_up_s = 0.25 }\nat_most_s = 1\n')
+    copy.run(program, '--fast', '--no-lcm', '--experiment', script, '--csv', events)
+    times = [float(row['time_s']) for row in columns_of(events)]
+    assert abs(times[-1] - 0.25) < 0.01, times[-1]
+
+
 def tables_of_the_program(copy, program, number):
     row = json.loads(copy.run(program, 'list', '--quantities', '--json'))[-1]
     assert (row['name'], row['since'], row['meaning']) == ('made_up_Nm', '9.9', 'made-up meaning')
@@ -181,6 +205,7 @@ def test(copy, built):
     figure_in_files(copy, program)
     option_in_lists(copy, program)
     option_takes_values(copy, program)
+    end_condition_in_experiments(copy, program)
     tables_of_the_program(copy, program, number)
     tables_of_the_pages(copy)
     tables_of_python(copy, number)
@@ -193,7 +218,7 @@ def main():
     else:
         with tempfile.TemporaryDirectory(prefix='abs_hil_one_row.') as temporary:
             test(ScratchCopy(root, build, pathlib.Path(temporary)), build)
-    print('one row each: quantity, figure of merit, option and reason show everywhere')
+    print('one row each: quantity, figure of merit, option, reason and end condition show everywhere')
     return 0
 
 
