@@ -16,7 +16,7 @@ double as_double(const Key& key) {
   return *std::get<double*>(key.target);
 }
 
-std::string shown(double value) { return fmt::format("{:.6g}", value); }
+std::string six_digits(double value) { return fmt::format("{:.6g}", value); }
 
 }  // namespace
 
@@ -35,8 +35,8 @@ std::vector<ModelDifference> model_differences(const Settings& settings) {
 std::string in_words(const std::vector<ModelDifference>& differences) {
   std::string text;
   for (const ModelDifference& d : differences) {
-    if (shown(d.model) == shown(d.plant)) continue;  // a rounding, which nobody would see here
-    text += fmt::format("{}{} {} (plant {})", text.empty() ? "" : ", ", d.name, shown(d.model), shown(d.plant));
+    if (six_digits(d.model) == six_digits(d.plant)) continue;  // a rounding, which nobody would see here
+    text += fmt::format("{}{} {} (plant {})", text.empty() ? "" : ", ", d.name, six_digits(d.model), six_digits(d.plant));
   }
   return text;
 }
