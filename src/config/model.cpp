@@ -36,7 +36,8 @@ std::string in_words(const std::vector<ModelDifference>& differences) {
   std::string text;
   for (const ModelDifference& d : differences) {
     if (six_digits(d.model) == six_digits(d.plant)) continue;  // a rounding, which nobody would see here
-    text += fmt::format("{}{} {} (plant {})", text.empty() ? "" : ", ", d.name, six_digits(d.model), six_digits(d.plant));
+    text +=
+        fmt::format("{}{} {} (plant {})", text.empty() ? "" : ", ", d.name, six_digits(d.model), six_digits(d.plant));
   }
   return text;
 }
