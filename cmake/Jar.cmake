@@ -51,8 +51,8 @@ function(abs_hil_jar name)
   add_custom_command(OUTPUT ${JAR_OUTPUT}
     COMMAND ${CMAKE_COMMAND} -E rm -rf ${classes}
     COMMAND ${CMAKE_COMMAND} -E make_directory ${classes} ${output_dir}
-    # -options: no warning that support of old releases will end.
-    COMMAND ${Java_JAVAC_EXECUTABLE} --release ${ABS_HIL_JAVA_RELEASE} -Xlint:all,-options,-serial,-processing -Werror
+    # -options: no warning that support of old releases will end. -cast: lcm-gen casts the lengths of arrays.
+    COMMAND ${Java_JAVAC_EXECUTABLE} --release ${ABS_HIL_JAVA_RELEASE} -Xlint:all,-options,-serial,-processing,-cast -Werror
       -encoding UTF-8 -cp ${classpath} -d ${classes} ${JAR_SOURCES}
     COMMAND ${Java_JAR_EXECUTABLE} ${create} -C ${classes} .
     DEPENDS ${JAR_SOURCES} ${JAR_CLASSPATH} ${JAR_MANIFEST}
