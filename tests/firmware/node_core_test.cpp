@@ -95,6 +95,8 @@ TEST_CASE("After power-on the node is latched, drives nothing, and no DDR can be
   CHECK(node.duty(0) == 0);
   CHECK(node.errors() == 4);
   CHECK(node.read16("01590600") == 2);  // both writes
+  node.write(0x1100, 0);                // 0 may always be written
+  CHECK(node.read16("01590600") == 2);
 }
 
 TEST_CASE("Activated, each generator's duty is its value; inverted or not, direction backwards or another mode: 0") {
