@@ -5,32 +5,26 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <deque>
-#include <fstream>
 #include <functional>
 #include <map>
 #include <memory>
-#include <numbers>
-#include <random>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "abs_hil/plant_sim/plant.hpp"
 #include "driver/hm2/hm2_driver.hpp"
 #include "emulator/rig_behind.hpp"
 
 namespace abs_hil::test {
 
-class RegisterBoard {
+class RegisterBoard final : public emulator::RigBehind {
  public:
   using Bytes = std::vector<std::uint8_t>;
 
-  explicit RegisterBoard(double start_speed_rad_s = 0.0) : plant_(plant_sim::PlantOptions{}) {
-    emulator::start_wheels(plant_, start_speed_rad_s);
+  explicit RegisterBoard(double start_speed_rad_s = 0.0) : RigBehind({}, start_speed_rad_s) {
     const std::array<std::uint32_t, 16> idrom{
         3, 64, 512, text("MESA"), text("7I92"), 9, 34, 2, 34, 17, 100'000'000, 200'000'000, 4, 64, 256, 4};
     rom[0x100] = 0x55AACAFE;
@@ -61,18 +55,10 @@ class RegisterBoard {
     eeprom_ = {0, 0, 0x10, 0x3B, 0x60, 0x1B, 0, 0};
   }
 
-  /// Advances rig and watchdog to `time_ns`, 0 at power-on.
-  void advance_to(std::int64_t time_ns) {
-    while (time_ns_ < time_ns) {
-      std::int64_t end_ns = emulator::step_end_ns(time_ns_, time_ns, 100'000);
-      if (armed_) end_ns = std::min(end_ns, std::max(bites_ns_, time_ns_ + 1));
-      emulator::step(plant_, end_ns - time_ns_, outputs());
-      time_ns_ = end_ns;
-      if (armed_ && time_ns_ >= bites_ns_) bite();
-    }
-  }
   /// What acts on the rig: the pins are pulled high, and high is off.
-  [[nodiscard]] emulator::Outputs outputs() const { return {.drive_duty = duty(0, 1), .brake_duty = duty(1, 18 - 17)}; }
+  [[nodiscard]] emulator::Outputs outputs() const noexcept override {
+    return {.drive_duty = duty(0, 1), .brake_duty = duty(1, 18 - 17)};
+  }
   /// Takes a datagram; the answer is empty if it reads nothing.
   Bytes handle(std::span<const std::uint8_t> request) {
     ++received;
@@ -141,9 +127,13 @@ class RegisterBoard {
     return (at(0x1400) & bit) != 0 ? high : 1.0 - high;
   }
   [[nodiscard]] std::uint32_t count(bool upper) const {
-    const double angle = upper ? plant_.state().angle1_rad : plant_.state().angle2_rad;
-    const auto counts = static_cast<std::int64_t>(std::floor(angle / (2 * std::numbers::pi) * 4096.0));
-    return static_cast<std::uint16_t>(counts + time_jump_counts);
+    return static_cast<std::uint16_t>(position(upper) + time_jump_counts);
+  }
+  [[nodiscard]] std::int64_t step_end_ns(std::int64_t next_ns) const noexcept override {
+    return armed_ ? std::min(next_ns, std::max(bites_ns_, time_ns() + 1)) : next_ns;
+  }
+  void after_step(const plant_sim::PlantState& /*before*/, std::int64_t /*from_ns*/) override {
+    if (armed_ && time_ns() >= bites_ns_) bite();
   }
   std::uint32_t read(unsigned space, std::uint16_t address) {
     if (space == 0) {
@@ -164,7 +154,7 @@ class RegisterBoard {
     };
     if (space == 2) return word(eeprom_);
     if (space == 4) {
-      if (address == 0) return static_cast<std::uint16_t>(time_ns_ / 1000);
+      if (address == 0) return static_cast<std::uint16_t>(time_ns() / 1000);
       return address >= 0x10 && address < 0x18 ? word_of_scratch(address) : 0;
     }
     if (space == 6) return address == 8 ? received : 0;
@@ -191,11 +181,9 @@ class RegisterBoard {
   void arm(std::uint32_t time) {
     if (time <= 1) return bite();
     armed_ = true;
-    bites_ns_ = time_ns_ + std::int64_t{time + 1} * 10;
+    bites_ns_ = time_ns() + std::int64_t{time + 1} * 10;
   }
 
-  plant_sim::Plant plant_;
-  std::int64_t time_ns_{0};
   bool armed_{false};
   std::int64_t bites_ns_{0};
   std::array<std::uint32_t, 2> ddr_{};
