@@ -10,6 +10,7 @@
 #include "config/plan.hpp"
 #include "experiment/sequence.hpp"
 #include "fuzz_input.hpp"
+#include "runtime/run_latch.hpp"
 
 namespace {
 
@@ -24,9 +25,10 @@ void use(const config::Script& script) {
   expect(!plan.phases.empty() && !plan.phases.front().name.empty());
   static_cast<void>(config::beyond_limits(plan, settings));
   experiment::Sequence sequence(plan.phases, plan.limits);
+  runtime::RunLatch latch;
   for (int i = 0; i < 50; ++i) {
     sequence.update(
-        {.time_s = i * 0.1, .speeds = {i * 10.0, i * 10.0}, .car_speed_m_s = i * 1.0, .distance_m = i * 0.5});
+        {.time_s = i * 0.1, .speeds = {i * 10.0, i * 10.0}, .car_speed_m_s = i * 1.0, .distance_m = i * 0.5}, latch);
     const experiment::PhasePlan& now = sequence.current();
     const double time_s = sequence.phase_time_s();
     expect(now.motor_duty_at(time_s) >= 0.0 && now.motor_duty_at(time_s) <= 1.0);

@@ -11,6 +11,9 @@
 #include "study/counter_random.hpp"
 
 using namespace abs_hil::study;
+using abs_hil::config::Factor;
+using abs_hil::config::Normal;
+using abs_hil::config::quantile;
 using Catch::Matchers::WithinAbs;
 
 TEST_CASE("Philox gives the known answers of Random123") {

@@ -12,7 +12,7 @@ TEST_CASE("a simulated run gives the metrics of a whole run session, bit for bit
     INFO(controller);
     experiment::test::Setup setup = experiment::test::braking(controller);
     setup.seed = 11;
-    const analysis::Metrics whole = experiment::test::run(setup).metrics;
+    const analysis::Metrics whole = experiment::test::simulated(setup).metrics;
     config::Settings settings = study::test::paper_settings();
     settings.control.controller = controller;
     const study::RunResult run = simulate(settings, settings.plant, 11);
