@@ -14,6 +14,7 @@ using namespace abs_hil::study;
 using abs_hil::config::Factor;
 using abs_hil::config::Normal;
 using abs_hil::config::quantile;
+using abs_hil::config::Uniform;
 using Catch::Matchers::WithinAbs;
 
 TEST_CASE("Philox gives the known answers of Random123") {
