@@ -186,9 +186,9 @@ int run(const RunRequest& request) {
   const run::Prepared prepared(s, *request.script);
   for (const std::string& problem : config::beyond_limits(prepared.plan, s))
     spdlog::warn("{}; the gate limits it to that", problem);
-  for (const std::string& problem : control::silent_settings(s.control)) spdlog::warn("{}", problem);
   ForeignRun foreign(s.on_rig());
   run::Run run(prepared, {.real_time = !virtual_time, .overruns = overruns_of(s, virtual_time)});
+  for (const std::string& problem : control::silent_settings(s.control)) spdlog::warn("{}", problem);
   require_resources(run, lease != nullptr);
   foreign.look_at(run.controller(), run.real_time());
   RunOutputs outputs(request, run);
