@@ -214,6 +214,8 @@ def runs_in_series(place: pathlib.Path) -> tuple[list[pathlib.Path], list[str]]:
     none."""
     try:
         folders = sorted(path for path in place.iterdir() if path.name.startswith('run-') and path.is_dir())
+    except (FileNotFoundError, NotADirectoryError):
+        folders = []
     except OSError as error:
         raise ValueError(f'cannot read "{place}": {error.strerror}') from None
     if not folders:

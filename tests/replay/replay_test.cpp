@@ -98,10 +98,12 @@ void record_run(const std::filesystem::path& path, const Recipe& recipe) {
     s.model = s.plant.rig;
     keys.leave_out_plant();
   }
+  const run::Prepared prepared(s);
   telemetry::LogOutlet log(path, 0);
-  telemetry::MessageStream stream(
-      {.telemetry_every_cycles = recipe.decimation},
-      {s.experiment.name, s.control.controller, s.plant_name, s.backend, keys.to_json().dump(), "test"}, {});
+  telemetry::MessageStream stream({.telemetry_every_cycles = recipe.decimation},
+                                  {s.experiment.name, s.control.controller, s.plant_name, s.backend,
+                                   keys.to_json().dump(), "test", prepared.logic_parts(s.plant).names},
+                                  {});
   stream.add(log);
   LateMeasurement late(stream, recipe);
   runtime::VirtualClock clock;
@@ -114,7 +116,6 @@ void record_run(const std::filesystem::path& path, const Recipe& recipe) {
           recipe.loses_every),
       driver::parse_injections(s.inject), static_cast<std::uint64_t>(s.seed),
       [&clock](std::int64_t duration_ns) { clock.sleep_until(clock.now_ns() + duration_ns); });
-  const run::Prepared prepared(s);
   run::Run run(prepared, {.clock = &clock, .driver = &driver});
   run.record_into({&late});
   run.go([&recipe] { return recipe.stop; });
