@@ -57,8 +57,8 @@ struct CommissioningOptions {
 enum class CommissioningResult : std::uint8_t { passed, failed, declined, interrupted };
 
 /// The first steps with a rig. Each needs the person's consent: read the board, turn the wheels by hand, a small drive
-/// pulse, the cable pulled if the board watches it, a small brake pulse. A guard stands by whenever an output is on. The first step that fails ends the commissioning.
-/// The outputs are safe however it ends.
+/// pulse, the cable pulled if the board watches it, a small brake pulse. A guard stands by whenever an output is on.
+/// The first step that fails ends the commissioning. The outputs are safe however it ends.
 class Commissioning {
  public:
   /// Throws std::invalid_argument if an option is outside its range.

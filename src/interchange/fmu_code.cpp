@@ -1,5 +1,7 @@
 #include "interchange/fmu_code.hpp"
 
+#include <fmi/fmi2FunctionTypes.h>
+#include <fmi/fmi3FunctionTypes.h>
 #include <fmt/format.h>
 
 #include <cstdarg>
@@ -7,8 +9,6 @@
 #include <cstring>
 #include <limits>
 
-#include <fmi/fmi2FunctionTypes.h>
-#include <fmi/fmi3FunctionTypes.h>
 #include "interchange/fmu_facts.hpp"
 #include "interchange/loaded_library.hpp"
 #include "interchange/refused_file.hpp"

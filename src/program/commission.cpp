@@ -135,11 +135,10 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
   switch (commissioning.run()) {
     case experiment::CommissioningResult::passed:
       keep_record(request, driver->identity(), commissioning, terminal);
-      terminal.tell(
-          driver_options.emulated
-              ? "All steps passed on an emulator. This does not verify any hardware."
-              : "All steps passed. Continue with docs/rig-setup.md, \"What is not verified\", and then set "
-                "driver.verified_on_hardware=true in your configuration.");
+      terminal.tell(driver_options.emulated
+                        ? "All steps passed on an emulator. This does not verify any hardware."
+                        : "All steps passed. Continue with docs/rig-setup.md, \"What is not verified\", and then set "
+                          "driver.verified_on_hardware=true in your configuration.");
       return exit_completed;
     case experiment::CommissioningResult::declined:
       terminal.tell("Stopped at your request; the outputs are safe.");

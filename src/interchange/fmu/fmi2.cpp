@@ -1,8 +1,9 @@
 // The functions of FMI 2.0 for co-simulation (https://fmi-standard.org, version 2.0.4).
 
+#include <fmi/fmi2Functions.h>
+
 #include <cstring>
 
-#include <fmi/fmi2Functions.h>
 #include "interchange/fmu/values.hpp"
 
 namespace {

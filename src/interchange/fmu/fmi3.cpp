@@ -1,8 +1,9 @@
 // The functions of FMI 3.0 for co-simulation (https://fmi-standard.org, version 3.0.1).
 
+#include <fmi/fmi3Functions.h>
+
 #include <cstring>
 
-#include <fmi/fmi3Functions.h>
 #include "interchange/fmu/values.hpp"
 
 namespace {
