@@ -18,6 +18,8 @@ CONTRACT = tuple(name for name, row in QUANTITIES.items() if row['csv_column'] i
 #: columns that hold texts
 TEXTS = ('phase', 'phase_name')
 MOST_SHOWN = 40
+#: lines are counted in blocks of this size, so that the count takes little memory
+BLOCK_BYTES = 1 << 24
 
 
 @dataclass
@@ -37,25 +39,29 @@ def read_rows(path: str | os.PathLike[str]) -> Rows:
     except OSError as error:
         raise ValueError(f'cannot read "{place}": {error.strerror}; give a run\'s CSV file or folder') from None
     end = data.rfind(b'\n') + 1
-    truncated, body = end < len(data), data[:end]
-    names, first = _header(place, body, truncated)
-    if len(body) == first:
+    truncated = end < len(data)
+    if truncated:
+        data = data[:end]
+    names, first = _header(place, data, truncated)
+    if len(data) == first:
         raise ValueError(f'{place}:2: the only row is incomplete: the file holds no data of the run' if truncated else
                          f'{place}:1: no rows after the header: the file holds no data of the run')
     try:
-        if not _rectangular(body[first:], len(names)):
+        if not _rectangular(data, first, len(names)):
             raise ValueError
+        rows = io.BytesIO(data)  # shares the bytes: a long run's rows fill the memory once
+        rows.seek(first)
         types = {number: str if name in TEXTS else np.float64 for number, name in enumerate(names)}
-        frame = pandas.read_csv(io.BytesIO(body[first:]), header=None, dtype=types, na_values=_no_number(names),
+        frame = pandas.read_csv(rows, header=None, dtype=types, na_values=_no_number(names),
                                 keep_default_na=False, float_precision='round_trip', quoting=csv.QUOTE_NONE,
                                 skip_blank_lines=False, encoding_errors='surrogateescape')
         columns = {name: frame[number].to_numpy() for number, name in enumerate(names)}
     except ValueError as error:
-        _refuse(place, body[first:], names)
+        _refuse(place, data[first:], names)
         raise ValueError(f'{place}: {error}') from None
     time_s = columns['time_s']
     if not np.isfinite(time_s).all() or (np.diff(time_s) < 0).any():
-        _refuse(place, body[first:], names)
+        _refuse(place, data[first:], names)
     for name in TEXTS:
         if name in columns:
             columns[name] = _cleaned(columns[name])
@@ -80,12 +86,24 @@ def _header(place: pathlib.Path, body: bytes, truncated: bool) -> tuple[list[str
     return names, first
 
 
-def _rectangular(body: bytes, columns: int) -> bool:
-    """Whether every line has this number of fields: pandas fills up short ones."""
-    text = np.frombuffer(body, dtype=np.uint8)
-    ends = np.flatnonzero(text == ord('\n'))
-    commas = np.searchsorted(np.flatnonzero(text == ord(',')), ends)
-    return bool((np.diff(commas, prepend=0) == columns - 1).all())
+def _rectangular(data: bytes, first: int, columns: int) -> bool:
+    """Whether every line from `first` on has this number of fields: pandas fills up short ones."""
+    text = np.frombuffer(data, dtype=np.uint8)[first:]
+    unended = 0  # commas after the last line's end
+    for start in range(0, text.size, BLOCK_BYTES):
+        block = text[start:start + BLOCK_BYTES]
+        ends = np.flatnonzero(block == ord('\n'))
+        commas = np.flatnonzero(block == ord(','))
+        before = np.searchsorted(commas, ends)
+        counts = np.diff(before, prepend=0)
+        if ends.size == 0:
+            unended += commas.size
+            continue
+        counts[0] += unended
+        if (counts != columns - 1).any():
+            return False
+        unended = commas.size - int(before[-1])
+    return True
 
 
 def _no_number(names: list[str]) -> dict[int, list[str]]:

@@ -55,7 +55,7 @@ std::string unexpected(const CLI::App& program) {
   std::string word = app->remaining().front();
   std::vector<std::string> names;
   if (word.starts_with('-')) {
-    word = word.substr(0, word.find('='));
+    word.resize(std::min(word.find('='), word.size()));
     for (const CLI::Option* option : app->get_options()) {
       for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
     }
