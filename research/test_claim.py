@@ -13,7 +13,7 @@ from claim.map import Map, draw_maps, ratio_of, read_maps, write_maps
 from claim.search import TrackingJudge, find_gains
 from claim.statistics import ratio_interval
 
-SHIPPED = pathlib.Path(__file__).parents[2] / 'config' / 'paper'
+SHIPPED = pathlib.Path(__file__).parents[1] / 'config' / 'paper'
 #: plants of `abs_hil compare`, which the search has not seen
 SEED = 1
 CASES = 40
