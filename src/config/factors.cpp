@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <array>
-#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 
 #include "config/reader.hpp"
@@ -96,11 +95,10 @@ class RangeValues {
 
   [[nodiscard]] Levels steps() const {
     const Uniform range = uniform();
-    const Factor between{.key = key_.name, .values = range};
     Levels levels;
     for (std::int64_t i = 0; i < form_.steps; ++i) {
       const double part = static_cast<double>(i) / static_cast<double>(form_.steps - 1);
-      levels.values.emplace_back(i + 1 == form_.steps ? range.to : quantile(between, part));
+      levels.values.emplace_back(i + 1 == form_.steps ? range.to : at(range, part));
       source_.check_value(key_.name, levels.values.back(), form_.place);
     }
     return levels;
@@ -172,21 +170,10 @@ std::string text_of(const Value& value) {
   return std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
 }
 
-double quantile(const Factor& factor, double u) {
-  if (const auto* range = std::get_if<Uniform>(&factor.values)) {
-    const double value =
-        range->logarithmic ? range->from * std::pow(range->to / range->from, u) : std::lerp(range->from, range->to, u);
-    return std::clamp(value, std::min(range->from, range->to), std::max(range->from, range->to));
-  }
-  const Normal& n = std::get<Normal>(factor.values);
-  const boost::math::normal distribution(n.mean, n.sd);
-  const double below = boost::math::cdf(distribution, n.least);
-  const double within = boost::math::cdf(distribution, n.most) - below;
-  const double probability = below + u * within;
-  // Rounding may reach an end, whose quantile is infinite.
-  if (!(probability > 0.0)) return n.least;
-  if (!(probability < 1.0)) return n.most;
-  return std::clamp(boost::math::quantile(distribution, probability), n.least, n.most);
+double at(const Uniform& range, double u) noexcept {
+  const double value =
+      range.logarithmic ? range.from * std::pow(range.to / range.from, u) : std::lerp(range.from, range.to, u);
+  return std::clamp(value, std::min(range.from, range.to), std::max(range.from, range.to));
 }
 
 Value read_value(const Source& source, std::string_view key, const toml::node& node) {

@@ -49,6 +49,8 @@ struct Factor {
 /// The value at the probability `u` in (0, 1), for a factor with a range. It lies within the range, whatever the
 /// rounding. Throws std::bad_variant_access for levels.
 [[nodiscard]] double quantile(const Factor& factor, double u);
+/// The value of a range at `u` in [0, 1]: its ends at 0 and 1. Real-time safe.
+[[nodiscard]] double at(const Uniform& range, double u) noexcept;
 
 /// False for the keys that say who runs a script, and on what: neither settings nor factors of a script may name them.
 [[nodiscard]] bool script_may_set(std::string_view key) noexcept;

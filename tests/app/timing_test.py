@@ -51,7 +51,7 @@ class Timing(ProgramTest):
         report = json.loads(result.stdout)
         self.assertTrue(report['well'])
         checks = {finding['check'] for finding in report['findings']}
-        self.assertEqual(checks, {'kernel', 'realtime', 'clock', 'cpu', 'lcm', 'can', 'boards', 'backend'})
+        self.assertEqual(checks, {'kernel', 'realtime', 'clock', 'cpu', 'lcm', 'can', 'boards', 'backend', 'hm2'})
 
     def test_doctor_of_a_rig_without_board(self):
         result = self.run_program('doctor', '--backend', 'rig', '--only', 'backend')
