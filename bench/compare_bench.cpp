@@ -9,23 +9,26 @@ namespace {
 
 using namespace abs_hil::study;
 
-ComparisonPlan plan(std::size_t repeat, std::size_t threads) {
-  ComparisonPlan plan{.controllers = {"adaptive", "sliding-mode"}, .repeat = repeat, .seed = 3, .threads = threads};
-  plan.settings.experiment.start_speed_rad_s = 170.0;
-  return plan;
+abs_hil::config::Settings settings_of(const char* controller) {
+  abs_hil::config::Settings settings;
+  settings.experiment.start_speed_rad_s = 170.0;
+  settings.control.controller = controller;
+  return settings;
 }
 
 void thousand_runs(benchmark::State& state) {
-  const ComparisonPlan p = plan(500, machine_threads());
-  for (auto _ : state) benchmark::DoNotOptimize(compare(p));
-  state.counters["threads"] = static_cast<double>(p.threads);
+  const Study study({.controllers = {"adaptive", "sliding-mode"},
+                     .repeat = {.runs = 500, .seed = 3, .variation = Variation::standard()}},
+                    {{.settings = settings_of("adaptive")}});
+  const std::size_t threads = machine_threads();
+  for (auto _ : state) benchmark::DoNotOptimize(run_by_controller(study, threads));
+  state.counters["threads"] = static_cast<double>(threads);
 }
 
 void one_run(benchmark::State& state, const char* controller) {
-  ComparisonPlan p = plan(1, 1);
-  p.settings.control.controller = controller;
-  const abs_hil::run::Prepared prepared(p.settings);
-  for (auto _ : state) benchmark::DoNotOptimize(simulate(prepared, p.settings.plant, 1));
+  const abs_hil::config::Settings settings = settings_of(controller);
+  const abs_hil::run::Prepared prepared(settings);
+  for (auto _ : state) benchmark::DoNotOptimize(simulate(prepared, settings.plant, 1));
 }
 
 BENCHMARK(thousand_runs)->Unit(benchmark::kMillisecond)->UseRealTime();

@@ -1,13 +1,39 @@
 """The arguments that abs_hil.simulate, Plant and Controller share, as the program's options."""
 from __future__ import annotations
 
+import functools
 import os
+import pathlib
+import shutil
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, Union
+
+from .core import _core
 
 #: a configuration value as Python has it
 Value = Union[bool, int, float, str]
 PathLike = Union[str, 'os.PathLike[str]']
+
+
+def program() -> str:
+    """The program abs_hil: of this build tree, beside this Python, or in the PATH. Raises ValueError without one."""
+    try:
+        from ._build_tree import PROGRAM
+    except ImportError:
+        beside = pathlib.Path(sys.executable).with_name('abs_hil')
+        found = str(beside) if beside.exists() else shutil.which('abs_hil')
+    else:
+        found = str(PROGRAM)
+    if found is None:
+        raise ValueError('controllers from files need the program abs_hil, which is not in the PATH; install it')
+    return found
+
+
+@functools.cache
+def _take_controller_files() -> None:
+    """Lets controllers come from files: their code runs in a process that lies beside the program."""
+    _core.take_controller_files(program())
 
 
 def text_of(value: Value) -> str:
@@ -28,6 +54,8 @@ def options(*, controller: Any = None, plant: PathLike | None = None, model: Pat
         if value is not None:
             given[name] = os.fspath(value)
     if isinstance(controller, str):
+        if controller.endswith(('.so', '.fmu')):
+            _take_controller_files()
         given['controller'] = controller
     if seed is not None:
         given['seed'] = str(int(seed))

@@ -26,10 +26,11 @@ def simulate(controller: Any = 'adaptive', plant: PathLike = 'paper-table1', exp
              vary: str = STANDARD_VARIATION, vary_seed: int = 1) -> Run:
     """Runs an experiment on the simulated rig in virtual time, as `abs_hil --fast` with the same options does.
 
-    controller: a name (abs_hil.controllers()), or an object with `reset(input)` and `step(input)` (abs_hil.SlipInput).
-                `step` returns the wanted brake torque in N m, or an abs_hil.SlipOutput. An attribute `signals`, a
-                dictionary name -> meaning of at most 8 signals, adds columns. The object runs through the same cycle as
-                any law, the command gate included. An exception in it ends the run safely and is raised here.
+    controller: a name (abs_hil.controllers()), FILE.so or FILE.fmu (docs/interchange.md), or an object with
+                `reset(input)` and `step(input)` (abs_hil.SlipInput). `step` returns the wanted brake torque in N m, or an
+                abs_hil.SlipOutput. An attribute `signals`, a dictionary name -> meaning of at most 8 signals, adds
+                columns. The object runs through the same cycle as any law, the command gate included. An exception in it
+                ends the run safely and is raised here.
     plant, model, experiment: names or TOML files. config: a TOML file with any configuration values.
     seed:       seed of everything random in the simulator, an integer >= 0.
     set:        configuration values by dotted key, as --set: {"control.slip_ref": 0.1, "plant.theta_N": 30}.
@@ -53,7 +54,11 @@ def simulate(controller: Any = 'adaptive', plant: PathLike = 'paper-table1', exp
     if repetition is not None and repetition < 0:
         raise ValueError(f'repetition {repetition}: give the number of a varied plant, from 0')
     varied = None if repetition is None else (vary, vary_seed, repetition)
-    columns, signals, summary, config_toml = _core.simulate(given, law, varied)
+    return run_of(*_core.simulate(given, law, varied))
+
+
+def run_of(columns: dict[str, Any], signals: Sequence[str], summary: str, config_toml: str) -> Run:
+    """The Run of what the core returns for a simulation."""
     columns['phase'] = phase_names(columns['phase'])
     if 'phase_name' in columns:
         columns['phase_name'] = np.array(columns['phase_name'], dtype=object)

@@ -2,6 +2,7 @@
 
 #include <pybind11/pybind11.h>
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,11 @@ void add_tables(py::module_& module);
 
 /// The options of a run from the arguments of abs_hil.simulate: text, or lists of text.
 [[nodiscard]] program::RunOptions run_options(const py::dict& arguments);
+
+class PythonControllerScope;
+/// Makes the run that `request` makes, outside of Python's lock: its columns, its signals, its summary as JSON, its
+/// configuration as TOML. @param scope  of a controller in Python, or null
+[[nodiscard]] py::tuple recorded_run(const std::function<program::RunRequest()>& request, PythonControllerScope* scope);
 
 /// A NumPy array that takes over the values.
 template <class Value>

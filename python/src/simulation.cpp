@@ -16,7 +16,6 @@
 #include "bindings.hpp"
 #include "column_sink.hpp"
 #include "config/config_error.hpp"
-#include "program/study_runs.hpp"
 #include "run/run_summary.hpp"
 #include "study/batch.hpp"
 #include "study/parallel.hpp"
@@ -49,56 +48,35 @@ class PythonPoll {
   bool interrupted_{false};
 };
 
+/// The request with the plant number `index` that `abs_hil compare` draws. The model stays.
+program::RunRequest on_varied_plant(config::Settings settings, const std::string& vary, std::uint64_t seed,
+                                    std::uint64_t index) {
+  const study::Perturbation drawn = study::draw(study::Variation::parse(vary), seed, index);
+  settings.plant = study::perturbed(settings.plant, drawn);
+  settings.sensor_seed = std::to_string(drawn.sensor_seed);
+  return program::request_of(std::move(settings), {});
+}
+
 /// @param varied  what varies, the seed of the plants and the number of one: a run on that plant
 py::tuple simulate(const py::dict& arguments, py::object controller,
                    const std::optional<std::tuple<std::string, std::uint64_t, std::uint64_t>>& varied) {
   program::RunOptions options = run_options(arguments);
-  if (varied) {
-    const auto& [vary, seed, index] = *varied;
-    options = program::on_varied_plant(std::move(options), study::Variation::parse(vary), seed, index);
-  }
   std::optional<PythonControllerScope> scope;
   if (!controller.is_none()) {
     scope.emplace(std::move(controller));
     options.controller = python_controller;
   }
-  ColumnSink columns;
-  run::Simulation simulation;
-  std::string config_toml;
-  PythonPoll poll(scope ? &*scope : nullptr);
-  {
-    const py::gil_scoped_release release;
-    program::RunRequest request = program::merge(options);
-    simulation = run::simulate(request.settings, *request.script, {&columns}, std::ref(poll));
-    simulation.summary.config = nlohmann::ordered_json::parse(request.config_json);
-    config_toml = std::move(request.config_toml);
-  }
-  poll.rethrow();
-  if (scope) scope->rethrow();
-  return py::make_tuple(columns.take(simulation.names), simulation.names.signals, to_json(simulation.summary).dump(),
-                        config_toml);
+  return recorded_run(
+      [&] {
+        if (!varied) return program::merge(options);
+        const auto& [vary, seed, index] = *varied;
+        return on_varied_plant(program::merged_settings(options), vary, seed, index);
+      },
+      scope ? &*scope : nullptr);
 }
 
-/// A run of a study: the options, and the perturbation of the plant that `abs_hil compare` draws.
-struct Job {
-  std::size_t options{0};  ///< index of its options
-  std::optional<std::uint64_t> index{};
-};
-
-struct Study {
-  std::vector<program::RunOptions> options{};
-  std::vector<config::Settings> settings{};
-  std::vector<Job> jobs{};
-  study::Variation variation{};
-  std::uint64_t seed{1};
-};
-
-study::Job job_of(const Study& study, const Job& job) {
-  const config::Settings& s = study.settings[job.options];
-  if (!job.index) return {.settings = &s, .plant = s.plant, .seed = config::sensor_seed(s)};
-  const study::Perturbation drawn = study::draw(study.variation, study.seed, *job.index);
-  return {.settings = &s, .plant = study::perturbed(s.plant, drawn), .seed = drawn.sensor_seed};
-}
+/// Of many runs one: the index of its options, and the number of the plant that `abs_hil compare` draws for it.
+using OneRun = std::pair<std::size_t, std::optional<std::uint64_t>>;
 
 /// Why the options cannot be used; empty if they can.
 template <class Work>
@@ -114,32 +92,36 @@ std::string refusal(const Work& work) {
 }
 
 /// @param jobs  pairs (index into `options`, index of the perturbation or None)
-py::dict simulate_many(const std::vector<py::dict>& options,
-                       const std::vector<std::pair<std::size_t, std::optional<std::uint64_t>>>& jobs,
-                       const std::string& vary, std::uint64_t seed, std::size_t threads,
-                       const std::function<void(std::size_t)>& progress) {
-  Study study{.variation = study::Variation::parse(vary), .seed = seed};
-  for (const py::dict& arguments : options) study.options.push_back(run_options(arguments));
-  for (const auto& [at, index] : jobs) study.jobs.push_back({at, index});
+py::dict simulate_many(const std::vector<py::dict>& options, const std::vector<OneRun>& jobs, const std::string& vary,
+                       std::uint64_t seed, std::size_t threads, const std::function<void(std::size_t)>& progress) {
+  const study::Variation variation = study::Variation::parse(vary);
+  std::vector<program::RunOptions> typed;
+  for (const py::dict& arguments : options) typed.push_back(run_options(arguments));
   std::vector<study::RunResult> results(jobs.size());
   std::vector<std::string> errors(jobs.size());
   {
     const py::gil_scoped_release release;
     if (threads == 0) threads = study::machine_threads();
-    study.settings.resize(study.options.size());
-    std::vector<std::string> unusable(study.options.size());
-    study::for_each_index(study.options.size(), threads, [&](std::size_t i) {
-      unusable[i] = refusal([&] { study.settings[i] = program::merged_settings(study.options[i]); });
+    std::vector<config::Settings> settings(typed.size());
+    std::vector<std::string> unusable(typed.size());
+    study::for_each_index(typed.size(), threads, [&](std::size_t i) {
+      unusable[i] = refusal([&] { settings[i] = program::merged_settings(typed[i]); });
     });
     std::atomic<std::size_t> finished{0};
     const std::size_t step = std::max<std::size_t>(1, jobs.size() / 100);
     std::vector<std::size_t> usable;
     for (std::size_t i = 0; i < jobs.size(); ++i) {
-      errors[i] = unusable[study.jobs[i].options];
+      errors[i] = unusable[jobs[i].first];
       if (errors[i].empty()) usable.push_back(i);
     }
-    const auto source = [&](std::size_t k) { return job_of(study, study.jobs[usable[k]]); };
-    study::run_batch(usable.size(), threads, source, [&](std::size_t k, study::Outcome outcome) {
+    const study::JobSource job_of = [&](std::size_t k) -> study::Job {
+      const auto& [at, plant] = jobs[usable[k]];
+      const config::Settings& s = settings[at];
+      if (!plant) return {.settings = &s, .plant = s.plant, .seed = config::sensor_seed(s)};
+      const study::Perturbation drawn = study::draw(variation, seed, *plant);
+      return {.settings = &s, .plant = study::perturbed(s.plant, drawn), .seed = drawn.sensor_seed};
+    };
+    study::run_batch(usable.size(), threads, job_of, [&](std::size_t k, study::Outcome outcome) {
       results[usable[k]] = outcome.run;
       errors[usable[k]] = std::move(outcome.refusal);
       const std::size_t done = finished.fetch_add(1) + 1;
@@ -172,6 +154,24 @@ py::dict simulate_many(const std::vector<py::dict>& options,
 std::vector<std::string> texts(const py::handle& values) { return py::cast<std::vector<std::string>>(values); }
 
 }  // namespace
+
+py::tuple recorded_run(const std::function<program::RunRequest()>& request, PythonControllerScope* scope) {
+  ColumnSink columns;
+  run::Simulation simulation;
+  std::string config_toml;
+  PythonPoll poll(scope);
+  {
+    const py::gil_scoped_release release;
+    program::RunRequest made = request();
+    simulation = run::simulate(made.settings, *made.script, {&columns}, std::ref(poll));
+    simulation.summary.config = nlohmann::ordered_json::parse(made.config_json);
+    config_toml = std::move(made.config_toml);
+  }
+  poll.rethrow();
+  if (scope != nullptr) scope->rethrow();
+  return py::make_tuple(columns.take(simulation.names), simulation.names.signals, to_json(simulation.summary).dump(),
+                        config_toml);
+}
 
 program::RunOptions run_options(const py::dict& arguments) {
   program::RunOptions options;

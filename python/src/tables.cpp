@@ -12,6 +12,8 @@
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
 #include "config/library.hpp"
+#include "interchange/foreign_controller.hpp"
+#include "interchange/hosted_code.hpp"
 
 namespace abs_hil::python {
 
@@ -84,10 +86,17 @@ double max_brake_torque_Nm(const py::dict& arguments) {
   return rig::brake_torque_at(s.plant.rig.brake, s.gate.brake_duty_max);
 }
 
+/// From now on controllers may come from shared libraries and FMUs. @param program  path of abs_hil
+void take_controller_files(const std::string& program) {
+  interchange::set_host_beside(program);
+  interchange::register_foreign_controllers();
+}
+
 }  // namespace
 
 void add_tables(py::module_& module) {
   module.def("controllers", &controllers);
+  module.def("take_controller_files", &take_controller_files, py::arg("program"));
   module.def("plants", &plants);
   module.def("experiments", &experiments);
   module.def("figures", &figures);

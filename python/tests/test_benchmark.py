@@ -181,7 +181,7 @@ def test_a_controller_from_a_shared_library(tmp_path):
 
 
 def test_a_controller_from_an_fmu(tmp_path):
-    from abs_hil.benchmark.from_file import program
+    from abs_hil.options import program
     law, names = tmp_path / 'pi.fmu', tmp_path / 'map.toml'
     subprocess.run([program(), 'export-fmu', '--controller', 'pi', '--set', 'plant.ideal_sensors=true', '--out', str(law)],
                    check=True, capture_output=True)

@@ -71,9 +71,22 @@ pid_t spawn(const std::string& program, int socket, int prints) {
 
 }  // namespace
 
+namespace {
+
+/// Empty: the running program.
+std::filesystem::path& program_of_the_host() {
+  static std::filesystem::path program;
+  return program;
+}
+
+}  // namespace
+
+void set_host_beside(const std::string& program) { program_of_the_host() = program; }
+
 std::string host_program() {
   std::error_code error;
-  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  const std::filesystem::path& told = program_of_the_host();
+  const std::filesystem::path self = told.empty() ? std::filesystem::read_symlink("/proc/self/exe", error) : told;
   constexpr const char* name = "abs_controller_host";
   const std::filesystem::path beside = self.parent_path() / name;
   // An installation may have been moved as a whole. A program that embeds the library uses the installed one.

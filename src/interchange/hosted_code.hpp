@@ -58,6 +58,10 @@ class HostedCode final : public ForeignCode {
   std::string failure_{};
 };
 
+/// For a process that is not abs_hil itself, as Python: the path of abs_hil, beside which the host's program is looked
+/// for. Call it before any controller is made.
+void set_host_beside(const std::string& program);
+
 /// Path of the host's program: abs_controller_host beside the running program, otherwise the installed one.
 [[nodiscard]] std::string host_program();
 

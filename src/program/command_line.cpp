@@ -267,10 +267,10 @@ config::Settings merged_settings(const RunOptions& options) {
   return std::move(request.settings);
 }
 
-RunRequest merge(const RunOptions& options) {
-  RunRequest request;
-  config::KeyTable keys(request.settings);
-  merge_into(request, keys, options);
+namespace {
+
+/// The texts of the effective configuration.
+void write_configuration(RunRequest& request, const config::KeyTable& keys) {
   const config::Settings& s = request.settings;
   const config::Script& script = *request.script;
   nlohmann::ordered_json config = keys.to_json();
@@ -282,6 +282,29 @@ RunRequest merge(const RunOptions& options) {
   request.config_toml = fmt::format(
       "# Effective configuration of a run. To run it again: abs_hil --backend {}{}{} --config THIS_FILE\n{}", s.backend,
       plant, model, keys.to_toml());
+}
+
+}  // namespace
+
+RunRequest merge(const RunOptions& options) {
+  RunRequest request;
+  config::KeyTable keys(request.settings);
+  merge_into(request, keys, options);
+  write_configuration(request, keys);
+  return request;
+}
+
+RunRequest request_of(config::Settings settings, OutputOptions outputs) {
+  RunRequest request{.settings = std::move(settings), .outputs = std::move(outputs)};
+  request.script = config::find(request.settings.experiment.name);
+  config::KeyTable keys(request.settings);
+  // The whole model, so that its values follow neither a plant nor a model's file when the configuration is read again.
+  const bool differs = !request.settings.model_name.empty() || request.settings.model != request.settings.plant.rig;
+  for (const config::Key& key : keys.keys()) {
+    if (!differs || !key.name.starts_with("model.")) continue;
+    std::visit([&](const auto* value) { keys.set(key.name, *value, "model"); }, key.target);
+  }
+  write_configuration(request, keys);
   return request;
 }
 

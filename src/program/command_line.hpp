@@ -87,6 +87,8 @@ void refuse_nested(const config::Script& series, const config::Script& experimen
 /// Merges defaults, plant file, model file, the script's settings, configuration file, named options, assignments and
 /// changes; later ones win. Throws config::ConfigError.
 [[nodiscard]] RunRequest merge(const RunOptions& options);
+/// The request of a run with these settings, as a merge left them or with other values since.
+[[nodiscard]] RunRequest request_of(config::Settings settings, OutputOptions outputs);
 /// The settings alone, without the texts of the configuration for files, which cost as much again.
 [[nodiscard]] config::Settings merged_settings(const RunOptions& options);
 

@@ -1,3 +1,4 @@
+// `abs_hil compare`: a study of one case, whose runs are put side by side.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,10 +8,11 @@
 #include "config/config_error.hpp"
 #include "files/result_file.hpp"
 #include "program/exit_status.hpp"
+#include "program/run_arguments.hpp"
 #include "program/run_progress.hpp"
 #include "program/study_runs.hpp"
 #include "program/subcommands.hpp"
-#include "study/comparison_table.hpp"
+#include "study/comparison.hpp"
 #include "study/parallel.hpp"
 
 namespace abs_hil::program {
@@ -41,21 +43,19 @@ void refuse_number(const std::optional<std::string>& file) {
 }
 
 /// Repeats one run of each controller with everything recorded, each in a folder of its own if there are several.
-int record(const CompareOptions& options, const study::Study& study, const RunOptions& run,
-           const std::vector<std::string>& command_line) {
-  const std::size_t kinds = study.contenders(0).size();
-  const auto first = static_cast<std::uint64_t>(*options.recorded_run) * kinds;
-  if (first >= study.runs()) {
+int record(const CompareOptions& options, const study::Study& study, const std::vector<std::string>& command_line) {
+  const auto repetition = static_cast<std::uint64_t>(*options.recorded_run);
+  const std::vector<study::Contender>& contenders = study.contenders(0);
+  if (repetition >= options.repeat) {
     throw config::ConfigError(
-        fmt::format("--run {}: each controller has {} runs; give a number in [0, {}], or a larger "
-                    "--repeat",
-                    *options.recorded_run, options.repeat, options.repeat - 1));
+        fmt::format("--run {}: each controller has {} runs; give a number in [0, {}], or a larger --repeat", repetition,
+                    options.repeat, options.repeat - 1));
   }
   int status = exit_completed;
-  for (std::size_t c = 0; c < kinds; ++c) {
+  for (std::size_t c = 0; c < contenders.size(); ++c) {
     std::optional<std::string> folder = options.run_folder;
-    if (folder && kinds > 1) *folder += '/' + folder_name(study.contenders(0)[c].name);
-    status = std::max(status, record_run(study, first + c, run, folder, command_line));
+    if (folder && contenders.size() > 1) *folder += '/' + folder_name(contenders[c].name);
+    status = std::max(status, record_run(study, repetition * contenders.size() + c, folder, command_line));
   }
   return status;
 }
@@ -67,30 +67,86 @@ int compare(const CompareOptions& options, const std::vector<std::string>& comma
   RunOptions run = options.run;
   run.defaults.push_back(fmt::format("experiment.start_speed_rad_s={}", study_start_speed_rad_s));
   const RunRequest request = merge(run);
-  const study::ComparisonPlan plan{
-      .settings = request.settings,
-      .controllers = study::split_contenders(options.controllers),
-      .repeat = options.repeat,
-      .seed = options.seed,
-      .variation = options.vary ? study::Variation::parse(*options.vary) : study::Variation::standard(),
-      .threads = options.threads > 0 ? options.threads : study::machine_threads()};
-  if (options.recorded_run) return record(options, study::study_of(plan), run, command_line);
+  const config::Settings& s = request.settings;
+  const study::Study study(
+      {.controllers = study::split_contenders(options.controllers),
+       .repeat = {.runs = options.repeat,
+                  .seed = options.seed,
+                  .variation = options.vary ? study::Variation::parse(*options.vary) : study::Variation::standard()},
+       .path = "compare"},
+      {{.plant = s.plant_name, .experiment = s.experiment.name, .settings = s}});
+  if (options.recorded_run) return record(options, study, command_line);
   auto json = open(options.json_file);
   auto csv = open(options.csv_file);
   auto markdown = open(options.markdown_file);
-  auto runs = open(options.runs_file);
+  auto runs_file = open(options.runs_file);
 
-  const study::Comparison results = [&] {
-    RunProgress progress(plan.repeat * plan.controllers.size());
-    return study::compare(plan, [&progress](std::size_t done) { progress.show(done); });
+  const study::RunsByController runs = [&] {
+    RunProgress progress(study.runs());
+    const std::size_t threads = options.threads > 0 ? options.threads : study::machine_threads();
+    return study::run_by_controller(study, threads, [&progress](std::size_t done) { progress.show(done); });
   }();
-  const study::ComparisonTable table = study::tabulate(plan, results);
+  const study::ComparisonTable table = study::tabulate(study, runs);
   if (json) json->write(study::to_json(table, request.config_json));
   if (csv) csv->write(study::to_csv(table));
   if (markdown) markdown->write(study::to_markdown(table));
-  if (runs) runs->write(study::runs_csv(plan, results));
+  if (runs_file) runs_file->write(study::runs_csv(study, runs));
   fmt::print("{}", study::to_text(table));
   return exit_completed;
+}
+
+Action add_compare(cli::Parser& compare, const Words& words) {
+  const auto options = std::make_shared<CompareOptions>();
+  CompareOptions& o = *options;
+  compare.add({.names = "--plant", .to = &o.run.plant, .help = "plant by name or TOML file", .type = "NAME|FILE"});
+  compare.add({.names = "--model",
+               .to = &o.run.model,
+               .help = "every controller's model (default: the plant, before it varies)",
+               .type = "NAME|FILE"});
+  compare.add({.names = "--controllers",
+               .to = &o.controllers,
+               .help = "controllers, the first one the baseline: NAME, NAME{key=value,...}, a TOML file, each with "
+                       "LABEL= before it if you like; or all",
+               .type = "A,B,...",
+               .show_default = true});
+  compare.add({.names = "--repeat",
+               .to = &o.repeat,
+               .help = "runs of each controller",
+               .type = "N",
+               .range = {1, 1'000'000},
+               .show_default = true});
+  compare.add(
+      {.names = "--seed", .to = &o.seed, .help = "seed of the varied plants", .type = "N", .show_default = true});
+  compare.add({.names = "--vary",
+               .to = &o.vary,
+               .help = "what varies: parameters (wheels, brake, tyre), theta, radii, phase, or none",
+               .type = "SPEC",
+               .default_text = "parameters=0.1,theta=0.1,phase"});
+  add_config_file(compare, o.run);
+  add_assignments(compare, o.run);
+  compare.add({.names = "--threads",
+               .to = &o.threads,
+               .help = "number of threads, 0: one for each processor; does not change the results",
+               .type = "N",
+               .range = {0, 1024},
+               .show_default = true});
+  compare.add({.names = "--json", .to = &o.json_file, .help = "write the table as JSON", .type = "FILE"});
+  compare.add({.names = "--csv", .to = &o.csv_file, .help = "write the table as CSV", .type = "FILE"});
+  compare.add({.names = "--markdown", .to = &o.markdown_file, .help = "write the table as Markdown", .type = "FILE"});
+  compare.add({.names = "--runs", .to = &o.runs_file, .help = "write each run's results as CSV", .type = "FILE"});
+  compare.add({.names = "--run",
+               .to = &o.recorded_run,
+               .help = "repeat run K of each controller (see --runs) with everything recorded, and compare nothing",
+               .type = "K",
+               .range = {0, 999'999},
+               .excludes = {"--json", "--csv", "--markdown", "--runs"}});
+  compare.add({.names = "--out",
+               .to = &o.run_folder,
+               .help = "run folder of --run; with several controllers one below it for each",
+               .type = "DIR",
+               .needs = {"--run"}});
+  compare.set_footer("To compare runs that are already recorded, use abs_report RUN RUN.");
+  return [options, words] { return program::compare(*options, words); };
 }
 
 }  // namespace abs_hil::program

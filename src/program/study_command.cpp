@@ -16,7 +16,6 @@
 #include "program/subcommands.hpp"
 #include "run_folder/run_folder.hpp"
 #include "study/compute.hpp"
-#include "study/parallel.hpp"
 
 namespace abs_hil::program {
 
@@ -116,16 +115,14 @@ int run_study(const StudyCommand& command) {
   const study::Study study = make_study(study::load_study(command.file));
   const study::StudyFolder folder(study_folder(command.file, command.folder),
                                   study::facts_of(study, name_of(command.file)));
-  const std::vector<std::uint64_t> chunks = study::missing_chunks(folder, shard);
-  std::uint64_t runs = 0;
-  for (const std::uint64_t chunk : chunks) runs += study.runs_in(chunk);
   const auto start = std::chrono::steady_clock::now();
   study::Tally tally;
   {
-    RunProgress progress(runs);
-    const std::size_t threads = command.threads > 0 ? command.threads : study::machine_threads();
-    tally =
-        study::compute(study, folder, chunks, threads, own_metrics, [&](std::uint64_t done) { progress.show(done); });
+    std::optional<RunProgress> progress;
+    tally = compute_study(study, folder, shard, command.threads, [&progress](std::uint64_t done, std::uint64_t all) {
+      if (done == 0) progress.emplace(all);
+      if (done > 0) progress->show(done);
+    });
   }
   const double spent_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const std::string path = folder.path().string();
@@ -136,7 +133,6 @@ int run_study(const StudyCommand& command) {
     spdlog::warn("{} runs could not begin; the column `reason` of the results says why", tally.refused);
   }
   if (shard.of == 1) {
-    folder.merge({});
     fmt::print("results: {}/{}\n", path, study::file::results);
   } else {
     fmt::print("part {} of {} is done, in {}; when all are: abs_hil study merge {}\n", shard.number, shard.of, path,
@@ -177,15 +173,6 @@ int show_status(const std::string& path) {
   return exit_completed;
 }
 
-int record(const StudyCommand& command, const std::vector<std::string>& command_line) {
-  const study::Study study = make_study(study::load_study(command.file));
-  const auto number = static_cast<std::uint64_t>(*command.run);
-  require_run(study, number);
-  const study::StudyCase& one = study.cases()[study.index_of(number).study_case];
-  return record_run(study, number, options_of_case(study.script(), one.plant, one.experiment), command.folder,
-                    command_line);
-}
-
 }  // namespace
 
 int study(const StudyCommand& command, const std::vector<std::string>& command_line) {
@@ -200,7 +187,9 @@ int study(const StudyCommand& command, const std::vector<std::string>& command_l
   if (command.file.empty()) {
     throw config::ConfigError("study: give a study, a TOML file (docs/studies.md), or merge, status or submit");
   }
-  return command.run ? record(command, command_line) : run_study(command);
+  if (!command.run) return run_study(command);
+  return record_run(make_study(study::load_study(command.file)), static_cast<std::uint64_t>(*command.run),
+                    command.folder, command_line);
 }
 
 }  // namespace abs_hil::program

@@ -85,7 +85,7 @@ class Part {
 
 }  // namespace
 
-BatchCounts run_batch(std::size_t count, std::size_t threads, const std::function<Job(std::size_t)>& job_of,
+BatchCounts run_batch(std::size_t count, std::size_t threads, const std::function<JobSource()>& new_source,
                       const std::function<void(std::size_t, Outcome)>& take) {
   const lanes::InstructionSet set = lanes::instruction_set();
   const std::size_t share = (count + std::max<std::size_t>(threads, 1) - 1) / std::max<std::size_t>(threads, 1);
@@ -94,6 +94,7 @@ BatchCounts run_batch(std::size_t count, std::size_t threads, const std::functio
   std::atomic<std::size_t> disturbed{0};
   std::atomic<std::size_t> scalar{0};
   for_each_index((count + together - 1) / together, threads, [&](std::size_t part_index) {
+    const JobSource job_of = new_source();
     Part part(set, take);
     const std::size_t end = std::min(count, (part_index + 1) * together);
     for (std::size_t index = part_index * together; index < end; ++index) part.start(index, job_of(index));

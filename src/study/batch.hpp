@@ -14,7 +14,7 @@ namespace abs_hil::study {
 
 /// One run of a batch: the arguments of `simulate`.
 struct Job {
-  const config::Settings* settings{nullptr};  ///< must outlive the batch
+  const config::Settings* settings{nullptr};  ///< must outlive the job's source
   plant_sim::PlantOptions plant{};
   std::uint64_t seed{1};
 };
@@ -32,15 +32,25 @@ struct BatchCounts {
   std::size_t scalar{0};     ///< by `simulate` alone
 };
 
+/// Gives job number `index`. It owns what its jobs point to.
+using JobSource = std::function<Job(std::size_t index)>;
+
 /// Runs jobs 0 to count - 1 in any order. The result of a job depends on the job alone: not on its neighbours, the
 /// number of threads or the order.
-/// @param job_of  gives job number `index`; called from several threads
+/// @param new_source  makes the source of a part of neighbouring jobs, which lives until the part is done and is asked
+///   in the order of the index; called from several threads
 /// @param take  takes the outcome of job number `index`; called from several threads. An exception of either ends the
 ///   batch and leaves it.
 /// Runs that brake from a start speed are computed side by side in the lanes of vectors, with the bits of `simulate`:
 /// ABS_HIL_LANES=none, portable, avx2 or avx512 chooses the vectors, otherwise the computer does. Throws
 /// std::invalid_argument for a choice that the computer has not.
-BatchCounts run_batch(std::size_t count, std::size_t threads, const std::function<Job(std::size_t index)>& job_of,
+BatchCounts run_batch(std::size_t count, std::size_t threads, const std::function<JobSource()>& new_source,
                       const std::function<void(std::size_t index, Outcome outcome)>& take);
+
+/// The same for jobs whose settings outlive the batch. @param job_of  called from several threads
+inline BatchCounts run_batch(std::size_t count, std::size_t threads, const JobSource& job_of,
+                             const std::function<void(std::size_t index, Outcome outcome)>& take) {
+  return run_batch(count, threads, std::function<JobSource()>([&job_of] { return job_of; }), take);
+}
 
 }  // namespace abs_hil::study

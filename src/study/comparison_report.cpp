@@ -1,5 +1,4 @@
-// Writes the comparison as text, Markdown, CSV and JSON.
-
+// Writes a comparison as text, Markdown, CSV and JSON.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,8 +7,9 @@
 
 #include "analysis/json_number.hpp"
 #include "config/key_table.hpp"
-#include "study/comparison_table.hpp"
-#include "study/result_rows.hpp"
+#include "config/model.hpp"
+#include "study/comparison.hpp"
+#include "study/compute.hpp"
 
 namespace abs_hil::study {
 
@@ -27,65 +27,60 @@ std::string shown(const Estimate& e, std::size_t runs, int decimals, bool with_s
   return text;
 }
 
-std::string title_of(const analysis::Figure& metric) {
-  return metric.unit.empty() ? std::string(metric.title) : fmt::format("{} / {}", metric.title, metric.unit);
-}
-
-/// Rows of means: one row per metric, one column per controller.
-Cells mean_cells(const ComparisonTable& table) {
-  Cells cells{{""}};
-  for (const ControllerColumn& column : table.columns) cells[0].push_back(column.name);
-  for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
-    const analysis::Figure& metric = compared_metrics()[m];
-    std::vector<std::string>& row = cells.emplace_back(1, title_of(metric));
-    for (const ControllerColumn& column : table.columns) {
-      row.push_back(shown(column.means[m], column.runs, metric.decimals, false));
-    }
-  }
-  cells.push_back({"runs ended by a fault"});
-  cells.push_back({"runs that locked"});
-  for (const ControllerColumn& column : table.columns) {
-    cells[cells.size() - 2].push_back(fmt::format("{}", column.faults));
-    cells.back().push_back(fmt::format("{}", column.locked));
-  }
-  return cells;
-}
-
 /// "2.331 [2.301, 2.377]".
 std::string shown(const Spread& spread, int decimals) {
   if (std::isnan(spread.median)) return "-";
   return fmt::format("{:.{}f} [{:.{}f}, {:.{}f}]", spread.median, decimals, spread.p10, decimals, spread.p90, decimals);
 }
 
-/// Rows of medians with the 10th and the 90th percentile.
-Cells median_cells(const ComparisonTable& table) {
-  Cells cells{{"median [10 %, 90 %]"}};
-  for (const ControllerColumn& column : table.columns) cells[0].push_back(column.name);
+const std::string& name_of(const ComparisonTable& table, std::size_t column) {
+  return table.study.contenders(0)[column].name;
+}
+
+/// A row for each metric and a column for each controller from number `first` on.
+/// @param cell  (column, number of the metric, decimals)
+template <class Cell>
+Cells cells_of(const ComparisonTable& table, const std::string& corner, std::size_t first, const Cell& cell) {
+  Cells cells{{corner}};
+  for (std::size_t c = first; c < table.columns.size(); ++c) cells[0].push_back(name_of(table, c));
   for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
     const analysis::Figure& metric = compared_metrics()[m];
-    std::vector<std::string>& row = cells.emplace_back(1, title_of(metric));
-    for (const ControllerColumn& column : table.columns) row.push_back(shown(column.spreads[m], metric.decimals));
+    std::vector<std::string>& row = cells.emplace_back();
+    row.push_back(metric.unit.empty() ? std::string(metric.title) : fmt::format("{} / {}", metric.title, metric.unit));
+    for (std::size_t c = first; c < table.columns.size(); ++c)
+      row.push_back(cell(table.columns[c], m, metric.decimals));
   }
   return cells;
 }
 
-Cells difference_cells(const ComparisonTable& table) {
-  Cells cells{{fmt::format("less {}", table.columns.front().name)}};
-  for (std::size_t c = 1; c < table.columns.size(); ++c) cells[0].push_back(table.columns[c].name);
-  for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
-    const analysis::Figure& metric = compared_metrics()[m];
-    std::vector<std::string>& row = cells.emplace_back(1, title_of(metric));
-    for (std::size_t c = 1; c < table.columns.size(); ++c) {
-      row.push_back(shown(table.columns[c].differences[m], table.repeat, metric.decimals, true));
-    }
-  }
+Cells mean_cells(const ComparisonTable& table) {
+  Cells cells = cells_of(table, "", 0, [](const ControllerColumn& column, std::size_t m, int decimals) {
+    return shown(column.means[m], column.runs, decimals, false);
+  });
+  cells.push_back({"runs ended by a fault"});
+  for (const ControllerColumn& column : table.columns) cells.back().push_back(fmt::format("{}", column.faults));
+  cells.push_back({"runs that locked"});
+  for (const ControllerColumn& column : table.columns) cells.back().push_back(fmt::format("{}", column.locked));
   return cells;
+}
+
+Cells median_cells(const ComparisonTable& table) {
+  return cells_of(table, "median [10 %, 90 %]", 0, [](const ControllerColumn& column, std::size_t m, int decimals) {
+    return shown(column.spreads[m], decimals);
+  });
+}
+
+Cells difference_cells(const ComparisonTable& table) {
+  return cells_of(table, fmt::format("less {}", name_of(table, 0)), 1,
+                  [](const ControllerColumn& column, std::size_t m, int decimals) {
+                    return shown(column.differences[m], column.runs, decimals, true);
+                  });
 }
 
 /// Number of characters, not bytes.
 std::size_t width_of(const std::string& text) {
   return static_cast<std::size_t>(
-      std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+      std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
 }
 
 std::string aligned(const Cells& cells) {
@@ -95,17 +90,17 @@ std::string aligned(const Cells& cells) {
   }
   std::string text;
   for (const auto& row : cells) {
-    std::string line;
+    text += "  ";
     for (std::size_t i = 0; i < row.size(); ++i) {
       const std::string pad(widths[i] - width_of(row[i]), ' ');
-      line += i == 0 ? row[i] + pad : "   " + pad + row[i];
+      text += i == 0 ? row[i] + pad : "   " + pad + row[i];
     }
-    text += "  " + line + '\n';
+    text += '\n';
   }
   return text;
 }
 
-std::string markdown(const Cells& cells) {
+std::string in_markdown(const Cells& cells) {
   std::string text;
   for (std::size_t r = 0; r < cells.size(); ++r) {
     text += '|';
@@ -120,29 +115,32 @@ std::string markdown(const Cells& cells) {
 }
 
 /// What the labels stand for.
-std::string labels(const ComparisonTable& t) {
+std::string labels(const Study& study) {
   std::string text;
-  for (const ControllerColumn& column : t.columns) {
-    if (column.changes.empty() || column.name.find('{') != std::string::npos) continue;
-    text += fmt::format("{} is {} with", column.name, column.controller);
-    for (std::size_t n = 0; n < column.changes.size(); ++n) {
-      text += fmt::format("{} {} = {}", n == 0 ? "" : ",", column.changes[n].first, column.changes[n].second);
+  for (const Contender& contender : study.contenders(0)) {
+    if (contender.changes.empty() || contender.name.find('{') != std::string::npos) continue;
+    text += fmt::format("{} is {} with", contender.name, contender.settings.control.controller);
+    for (std::size_t n = 0; n < contender.changes.size(); ++n) {
+      text += fmt::format("{} {} = {}", n == 0 ? "" : ",", contender.changes[n].first, contender.changes[n].second);
     }
     text += ".\n";
   }
   return text;
 }
 
-std::string heading(const ComparisonTable& t) {
-  const std::string start =
-      t.start_speed_rad_s > 0.0 ? fmt::format("braking from {} rad/s", t.start_speed_rad_s) : "from standstill";
-  return fmt::format("Plant {}, experiment {}, {} to {} m/s, slip reference {}.\n", t.plant, t.experiment, start,
-                     t.end_speed_m_s, t.slip_ref) +
-         (t.model_note.empty() ? "" : fmt::format("The model differs from the plant: {}.\n", t.model_note)) +
-         labels(t) +
-         fmt::format("{} run{} of each controller, seed {}, plants varied by {}{}.\n", t.repeat,
-                     t.repeat == 1 ? "" : "s", t.seed, t.variation.text(),
-                     t.repeat > 1 ? "; mean ± half of the 95 % confidence interval" : "");
+std::string heading(const Study& study) {
+  const StudyCase& one = study.cases().front();
+  const config::Settings& s = one.settings;
+  const RepeatScript& repeat = study.script().repeat;
+  const double start_rad_s = s.experiment.start_speed_rad_s;
+  const std::string start = start_rad_s > 0.0 ? fmt::format("braking from {} rad/s", start_rad_s) : "from standstill";
+  const std::string differs = config::in_words(config::model_differences(s));
+  return fmt::format("Plant {}, experiment {}, {} to {} m/s, slip reference {}.\n", one.plant, one.experiment, start,
+                     s.experiment.end_speed_m_s, s.control.slip_ref) +
+         (differs.empty() ? "" : fmt::format("The model differs from the plant: {}.\n", differs)) + labels(study) +
+         fmt::format("{} run{} of each controller, seed {}, plants varied by {}{}.\n", repeat.runs,
+                     repeat.runs == 1 ? "" : "s", repeat.seed, repeat.variation.text(),
+                     repeat.runs > 1 ? "; mean ± half of the 95 % confidence interval" : "");
 }
 
 std::string shown_ratio(const Estimate& ratio) {
@@ -151,34 +149,23 @@ std::string shown_ratio(const Estimate& ratio) {
   return ratio.n > 1 ? fmt::format("{} [{:.4f}, {:.4f}]", mean, ratio.low, ratio.high) : mean;
 }
 
-std::string ratio_line(const PaperRatio& r) {
-  return fmt::format(
-      "adaptive / sliding-mode: stop time {}, stop distance {}, slip RMS error {}, torque variation {}; the paper: "
-      "{:.3f} for time and "
-      "distance ({:.1f} % less).\n",
-      shown_ratio(r.stop_time), shown_ratio(r.stop_distance), shown_ratio(r.slip_rms),
-      shown_ratio(r.torque_total_variation), 1.0 - paper_saving, 100.0 * paper_saving);
+std::string ratio_line(const ComparisonTable& table) {
+  std::string text = "adaptive / sliding-mode: ";
+  for (std::size_t i = 0; i < paper_metrics.size(); ++i) {
+    const auto* figure = std::ranges::find(analysis::figures, paper_metrics[i].value, &analysis::Figure::value);
+    text += fmt::format("{}{} {}", i == 0 ? "" : ", ", figure->title, shown_ratio((*table.paper_ratios)[i]));
+  }
+  return text + fmt::format("; the paper: {:.3f} for time and distance ({:.1f} % less).\n", 1.0 - paper_saving,
+                            100.0 * paper_saving);
 }
 
-/// The keys of the plant's values that the plan's variation changes.
-/// @param drawn  the settings behind `keys`; left as they were
-std::vector<const config::Key*> varied_keys(const ComparisonPlan& plan, const config::KeyTable& keys,
-                                            config::Settings& drawn) {
-  std::vector<double> before;
-  const auto is_number = [](const config::Key& key) {
-    return key.name.starts_with("plant.") && std::holds_alternative<double*>(key.target);
-  };
-  for (const config::Key& key : keys.keys()) {
-    if (is_number(key)) before.push_back(*std::get<double*>(key.target));
-  }
-  drawn.plant = perturbed(plan.settings.plant, smallest(plan.variation));
-  std::vector<const config::Key*> varied;
-  auto at = before.begin();
-  for (const config::Key& key : keys.keys()) {
-    if (is_number(key) && *std::get<double*>(key.target) != *at++) varied.push_back(&key);
-  }
-  drawn.plant = plan.settings.plant;
-  return varied;
+/// @param differences  what stands above the table of differences
+std::string report(const ComparisonTable& table, std::string (*in_format)(const Cells&), const char* differences) {
+  std::string text = heading(table.study) + '\n' + in_format(mean_cells(table));
+  if (table.study.script().repeat.runs > 1) text += '\n' + in_format(median_cells(table));
+  if (table.columns.size() > 1) text += differences + in_format(difference_cells(table));
+  if (table.paper_ratios) text += '\n' + ratio_line(table);
+  return text;
 }
 
 nlohmann::ordered_json json_of(const Estimate& e) {
@@ -189,106 +176,108 @@ nlohmann::ordered_json json_of(const Estimate& e) {
           {"ci95_high", analysis::number_or_null(e.high)}};
 }
 
+nlohmann::ordered_json json_of(const Contender& contender, const ControllerColumn& column) {
+  nlohmann::ordered_json means;
+  nlohmann::ordered_json differences;
+  for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
+    const std::string key(compared_metrics()[m].name);
+    means[key] = json_of(column.means[m]);
+    means[key]["p10"] = analysis::number_or_null(column.spreads[m].p10);
+    means[key]["median"] = analysis::number_or_null(column.spreads[m].median);
+    means[key]["p90"] = analysis::number_or_null(column.spreads[m].p90);
+    if (!column.differences.empty()) differences[key] = json_of(column.differences[m]);
+  }
+  nlohmann::ordered_json changes = nlohmann::ordered_json::object();
+  for (const auto& [key, value] : contender.changes) changes[key] = value;
+  return {{"name", contender.name},  {"controller", contender.settings.control.controller},
+          {"settings", changes},     {"runs", column.runs},
+          {"faults", column.faults}, {"locked", column.locked},
+          {"metrics", means},        {"difference_from_first", differences}};
+}
+
 }  // namespace
 
 std::string to_text(const ComparisonTable& table) {
-  std::string text = heading(table) + '\n' + aligned(mean_cells(table));
-  if (table.repeat > 1) text += '\n' + aligned(median_cells(table));
-  if (table.columns.size() > 1) {
-    text += "\nDifferences, paired by plant:\n" + aligned(difference_cells(table));
-  }
-  if (table.paper_ratio) text += '\n' + ratio_line(*table.paper_ratio);
-  return text;
+  return report(table, aligned, "\nDifferences, paired by plant:\n");
 }
 
-std::string to_markdown(const ComparisonTable& table) {
-  std::string text = heading(table) + '\n' + markdown(mean_cells(table));
-  if (table.repeat > 1) text += '\n' + markdown(median_cells(table));
-  if (table.columns.size() > 1) text += '\n' + markdown(difference_cells(table));
-  if (table.paper_ratio) text += '\n' + ratio_line(*table.paper_ratio);
-  return text;
-}
+std::string to_markdown(const ComparisonTable& table) { return report(table, in_markdown, "\n"); }
 
 std::string to_csv(const ComparisonTable& table) {
+  constexpr double unknown = rig::unknown;
   std::string text =
       "controller,metric,n,mean,standard_deviation,ci95_low,ci95_high,difference,difference_ci95_low,"
       "difference_ci95_high,p10,median,p90\n";
-  for (const ControllerColumn& column : table.columns) {
+  for (std::size_t c = 0; c < table.columns.size(); ++c) {
+    const ControllerColumn& column = table.columns[c];
     for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
       const Estimate& e = column.means[m];
-      const double unknown = rig::unknown;
       const Estimate d = column.differences.empty() ? Estimate{.mean = unknown, .low = unknown, .high = unknown}
                                                     : column.differences[m];
       const Spread& s = column.spreads[m];
-      text +=
-          fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(column.name), compared_metrics()[m].name,
-                      e.n, e.mean, e.standard_deviation, e.low, e.high, d.mean, d.low, d.high, s.p10, s.median, s.p90);
+      text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(name_of(table, c)),
+                          compared_metrics()[m].name, e.n, e.mean, e.standard_deviation, e.low, e.high, d.mean, d.low,
+                          d.high, s.p10, s.median, s.p90);
     }
   }
   return text;
 }
 
-std::string to_json(const ComparisonTable& t, const std::string& config_json) {
+std::string to_json(const ComparisonTable& table, const std::string& config_json) {
+  const StudyCase& one = table.study.cases().front();
+  const RepeatScript& repeat = table.study.script().repeat;
   nlohmann::ordered_json controllers = nlohmann::ordered_json::array();
-  for (const ControllerColumn& column : t.columns) {
-    nlohmann::ordered_json means;
-    nlohmann::ordered_json differences;
-    for (std::size_t m = 0; m < compared_metrics().size(); ++m) {
-      const std::string key(compared_metrics()[m].name);
-      means[key] = json_of(column.means[m]);
-      means[key]["p10"] = analysis::number_or_null(column.spreads[m].p10);
-      means[key]["median"] = analysis::number_or_null(column.spreads[m].median);
-      means[key]["p90"] = analysis::number_or_null(column.spreads[m].p90);
-      if (!column.differences.empty()) differences[key] = json_of(column.differences[m]);
-    }
-    nlohmann::ordered_json changes = nlohmann::ordered_json::object();
-    for (const auto& [key, value] : column.changes) changes[key] = value;
-    controllers.push_back({{"name", column.name},
-                           {"controller", column.controller},
-                           {"settings", changes},
-                           {"runs", column.runs},
-                           {"faults", column.faults},
-                           {"locked", column.locked},
-                           {"metrics", means},
-                           {"difference_from_first", differences}});
-  }
-  nlohmann::ordered_json root{{"plant", t.plant},
-                              {"experiment", t.experiment},
-                              {"start_speed_rad_s", t.start_speed_rad_s},
-                              {"end_speed_m_s", t.end_speed_m_s},
-                              {"slip_ref", t.slip_ref},
-                              {"repeat", t.repeat},
-                              {"seed", t.seed},
-                              {"vary", t.variation.text()},
+  for (std::size_t c = 0; c < table.columns.size(); ++c)
+    controllers.push_back(json_of(table.study.contenders(0)[c], table.columns[c]));
+  nlohmann::ordered_json root{{"plant", one.plant},
+                              {"experiment", one.experiment},
+                              {"start_speed_rad_s", one.settings.experiment.start_speed_rad_s},
+                              {"end_speed_m_s", one.settings.experiment.end_speed_m_s},
+                              {"slip_ref", one.settings.control.slip_ref},
+                              {"repeat", repeat.runs},
+                              {"seed", repeat.seed},
+                              {"vary", repeat.variation.text()},
                               {"controllers", controllers}};
-  if (t.paper_ratio) {
-    root["adaptive_over_sliding_mode"] = {{"stop_time", json_of(t.paper_ratio->stop_time)},
-                                          {"stop_distance", json_of(t.paper_ratio->stop_distance)},
-                                          {"slip_rms", json_of(t.paper_ratio->slip_rms)},
-                                          {"torque_total_variation", json_of(t.paper_ratio->torque_total_variation)},
-                                          {"paper", 1.0 - paper_saving}};
+  if (table.paper_ratios) {
+    nlohmann::ordered_json& ratios = root["adaptive_over_sliding_mode"];
+    for (std::size_t i = 0; i < paper_metrics.size(); ++i)
+      ratios[std::string(paper_metrics[i].key)] = json_of((*table.paper_ratios)[i]);
+    ratios["paper"] = 1.0 - paper_saving;
   }
   root["config"] = nlohmann::ordered_json::parse(config_json);
   return root.dump(2) + '\n';
 }
 
-std::string runs_csv(const ComparisonPlan& plan, const Comparison& comparison) {
-  // The drawn plants, by the keys of what may differ between them.
-  config::Settings drawn = plan.settings;
+std::string runs_csv(const Study& study, const RunsByController& runs) {
+  const RepeatScript& repeat = study.script().repeat;
+  // The numbers of the plant that the variation changes, by their keys.
+  const config::Settings nominal = study.cases().front().settings;
+  config::Settings drawn = nominal;
   const config::KeyTable keys(drawn);
-  const std::vector<const config::Key*> varied = varied_keys(plan, keys, drawn);
+  drawn.plant = perturbed(nominal.plant, smallest(repeat.variation));
+  std::vector<const config::Key*> varied;
+  std::vector<double> least;
+  for (const config::Key& key : keys.keys()) {
+    if (!key.name.starts_with("plant.") || !std::holds_alternative<double*>(key.target)) continue;
+    varied.push_back(&key);
+    least.push_back(*std::get<double*>(key.target));
+  }
+  drawn.plant = nominal.plant;
+  for (std::size_t i = varied.size(); i-- > 0;) {
+    if (*std::get<double*>(varied[i]->target) == least[i])
+      varied.erase(varied.begin() + static_cast<std::ptrdiff_t>(i));
+  }
   std::string text = "controller,run,result";
   for (const analysis::Figure& metric : compared_metrics()) text += ',' + std::string(metric.name);
   for (const config::Key* key : varied) text += ',' + key->name;
   text += ",sensor_seed\n";
-  for (std::size_t c = 0; c < comparison.contenders.size(); ++c) {
-    for (std::size_t k = 0; k < comparison.results[c].size(); ++k) {
-      const RunResult& run = comparison.results[c][k];
-      text +=
-          fmt::format("{},{},{}", csv_field(comparison.contenders[c].name), k, run.stopped() ? "completed" : "fault");
+  for (std::size_t c = 0; c < runs.size(); ++c) {
+    for (std::size_t k = 0; k < runs[c].size(); ++k) {
+      const RunResult& run = runs[c][k];
+      text += fmt::format("{},{},{}", csv_field(study.contenders(0)[c].name), k, run.stopped() ? "completed" : "fault");
       for (const analysis::Figure& metric : compared_metrics()) text += fmt::format(",{}", metric.of(run.metrics));
-      const Perturbation perturbation = draw(plan.variation, plan.seed, k);
-      drawn.plant = perturbed(plan.settings.plant, perturbation);
+      const Perturbation perturbation = draw(repeat.variation, repeat.seed, k);
+      drawn.plant = perturbed(nominal.plant, perturbation);
       for (const config::Key* key : varied) text += fmt::format(",{}", *std::get<double*>(key->target));
       text += fmt::format(",{}\n", perturbation.sensor_seed);
     }

@@ -1,15 +1,58 @@
 // Runs the chunks of a study, several at once, and writes their rows.
 #include "study/compute.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <atomic>
+#include <iterator>
 #include <memory>
 #include <utility>
 
-#include "study/result_rows.hpp"
-#include "study/run_part.hpp"
+#include "study/parallel.hpp"
+#include "study/runs.hpp"
 
 namespace abs_hil::study {
+
+namespace {
+
+std::string text_of(const config::Value& value) {
+  if (const auto* text = std::get_if<std::string>(&value)) return csv_field(*text);
+  return std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
+}
+
+/// What the columns `result` and `reason` say.
+std::string ending_of(const Outcome& outcome) {
+  if (!outcome.refusal.empty()) return "refused," + csv_field(outcome.refusal);
+  return outcome.run.stopped() ? "completed," : fmt::format("fault,{}", rig::row_of(outcome.run.fault).name);
+}
+
+}  // namespace
+
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + '"';
+}
+
+std::string result_row(const Study& study, std::uint64_t run, const Outcome& outcome, const std::vector<double>& own) {
+  const RunIndex index = study.index_of(run);
+  const StudyCase& one = study.cases()[index.study_case];
+  std::string row;
+  auto out = std::back_inserter(row);
+  fmt::format_to(out, "{},{},{},{},{},{}", run, csv_field(one.plant), csv_field(one.experiment),
+                 csv_field(study.contenders(index.study_case)[index.contender].name), index.point, index.repetition);
+  for (std::size_t i = 0; i < study.script().factors.size(); ++i) row += ',' + text_of(study.value_of(index, i));
+  row += ',' + ending_of(outcome);
+  for (const analysis::Figure& figure : analysis::figures) {
+    fmt::format_to(out, ",{}", outcome.refusal.empty() ? figure.of(outcome.run.metrics) : rig::unknown);
+  }
+  for (std::size_t i = 0; i < study.script().metrics.size(); ++i) {
+    fmt::format_to(out, ",{}", own.empty() ? rig::unknown : own[i]);
+  }
+  return row + '\n';
+}
 
 namespace {
 
@@ -27,8 +70,8 @@ struct OpenChunk {
 class Computation {
  public:
   Computation(const Study& study, const StudyFolder& folder, std::size_t threads, const OwnMetrics& own,
-              const std::function<void(std::uint64_t)>& done)
-      : study_(study), folder_(folder), threads_(threads), own_(own), done_(done) {}
+              std::function<void(std::uint64_t)> done)
+      : study_(study), folder_(folder), threads_(threads), own_(own), done_(std::move(done)) {}
 
   /// @param first  number of the first chunk, of `count` with the same number of runs except for the last
   void run(const std::uint64_t* first, std::size_t count) {
@@ -51,7 +94,7 @@ class Computation {
       chunk.outcomes[i % size] = std::move(outcome);
       if (chunk.left.fetch_sub(1) == 1) write(chunk);
       const std::uint64_t finished = runs_.fetch_add(1) + 1;
-      if (done_) done_(finished);
+      done_(finished);
     });
   }
 
@@ -80,7 +123,7 @@ class Computation {
   const StudyFolder& folder_;
   std::size_t threads_;
   const OwnMetrics& own_;
-  const std::function<void(std::uint64_t)>& done_;
+  std::function<void(std::uint64_t)> done_;
   std::atomic<std::uint64_t> runs_{0};
   std::atomic<std::uint64_t> faults_{0};
   std::atomic<std::uint64_t> refused_{0};
@@ -98,9 +141,16 @@ std::vector<std::uint64_t> missing_chunks(const StudyFolder& folder, const Shard
   return missing;
 }
 
-Tally compute(const Study& study, const StudyFolder& folder, const std::vector<std::uint64_t>& chunks,
-              std::size_t threads, const OwnMetrics& own, const std::function<void(std::uint64_t)>& done) {
-  Computation computation(study, folder, threads, own, done);
+Tally compute(const Study& study, const StudyFolder& folder, const Shard& shard, std::size_t threads,
+              const OwnMetrics& own, const Progress& progress) {
+  const std::vector<std::uint64_t> chunks = missing_chunks(folder, shard);
+  std::uint64_t all = 0;
+  for (const std::uint64_t chunk : chunks) all += study.runs_in(chunk);
+  const auto tell = [&progress, all](std::uint64_t done) {
+    if (progress) progress(done, all);
+  };
+  tell(0);
+  Computation computation(study, folder, threads > 0 ? threads : machine_threads(), own, tell);
   const std::uint64_t at_once = std::max<std::uint64_t>(1, runs_at_once / study.script().chunk);
   for (std::size_t at = 0; at < chunks.size(); at += at_once) {
     computation.run(chunks.data() + at, std::min<std::size_t>(at_once, chunks.size() - at));

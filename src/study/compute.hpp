@@ -4,12 +4,23 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <vector>
 
+#include "study/batch.hpp"
 #include "study/study.hpp"
 #include "study/study_folder.hpp"
 
 namespace abs_hil::study {
+
+/// A row of a study's results with a line end; the same for the same run on every computer. The columns are those of
+/// `facts_of`.
+/// @param own  the study's own metrics, in order; empty: all unknown
+[[nodiscard]] std::string result_row(const Study& study, std::uint64_t run, const Outcome& outcome,
+                                     const std::vector<double>& own = {});
+
+/// A field of CSV, in quotes if it needs them.
+[[nodiscard]] std::string csv_field(const std::string& text);
 
 /// One of several shares of a study's chunks: every `of`-th one.
 struct Shard {
@@ -31,12 +42,16 @@ struct Tally {
 /// Computes the study's own metrics of a run: `SignalMetrics` over its records. Called from several threads.
 using OwnMetrics = std::function<std::vector<double>(const Study& study, std::uint64_t run)>;
 
-/// Runs these chunks and writes each as soon as it is finished. The bytes do not depend on the threads. Memory does not
-/// grow with the number of chunks.
+/// Tells how many of all runs that have to be computed are done. Called from several threads, after each run, and once
+/// before the first.
+using Progress = std::function<void(std::uint64_t done, std::uint64_t all)>;
+
+/// Computes the chunks of a shard that the folder lacks, and writes each as soon as it is finished. The bytes do not
+/// depend on the threads. Memory does not grow with the number of chunks.
+/// @param threads  0: one for each processor
 /// @param own  called for the runs of a study that has metrics of its own
-/// @param done  called after each run, from several threads, with the number of finished runs
 /// Throws std::runtime_error if a file cannot be written.
-Tally compute(const Study& study, const StudyFolder& folder, const std::vector<std::uint64_t>& chunks,
-              std::size_t threads, const OwnMetrics& own, const std::function<void(std::uint64_t)>& done);
+Tally compute(const Study& study, const StudyFolder& folder, const Shard& shard, std::size_t threads,
+              const OwnMetrics& own, const Progress& progress);
 
 }  // namespace abs_hil::study

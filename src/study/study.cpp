@@ -9,10 +9,10 @@
 
 #include "abs_hil/control/registry.hpp"
 #include "abs_hil/rig/quantities.hpp"
+#include "analysis/run_metrics.hpp"
 #include "config/config_error.hpp"
 #include "config/library.hpp"
 #include "rig/nearest_name.hpp"
-#include "study/result_rows.hpp"
 
 namespace abs_hil::study {
 
@@ -47,10 +47,20 @@ std::vector<Contender> contenders_of(const std::vector<std::string>& texts, cons
 
 }  // namespace
 
+std::vector<std::string> result_columns(const StudyScript& script) {
+  std::vector<std::string> columns{"run", "plant", "experiment", "controller", "point", "repetition"};
+  for (const Factor& factor : script.factors) columns.push_back(factor.key);
+  columns.insert(columns.end(), {"result", "reason"});
+  for (const analysis::Figure& figure : analysis::figures) columns.emplace_back(figure.name);
+  for (const SignalMetric& metric : script.metrics) columns.push_back(metric.name);
+  return columns;
+}
+
 Study::Study(StudyScript script, std::vector<StudyCase> cases)
     : script_(std::move(script)),
       cases_(std::move(cases)),
       design_(script_.design.kind, script_.design.points, script_.design.seed, names_of_ranges(script_)) {
+  if (script_.repeat.runs < 1) throw std::invalid_argument("--repeat: give a number of at least 1");
   double runs = static_cast<double>(cases_.size()) * static_cast<double>(script_.repeat.runs) *
                 static_cast<double>(script_.controllers.size()) * static_cast<double>(design_.rows());
   for (const Factor& factor : script_.factors) {
@@ -81,7 +91,7 @@ Study::Study(StudyScript script, std::vector<StudyCase> cases)
 }
 
 void Study::check_metrics() const {
-  std::vector<std::string> taken = result_columns(*this);
+  std::vector<std::string> taken = result_columns(script_);
   taken.resize(taken.size() - script_.metrics.size());
   std::vector<std::string_view> known(rig::csv_columns.begin(), rig::csv_columns.end());
   for (const Contender& contender : contenders_.front()) {

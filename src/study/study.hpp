@@ -36,6 +36,9 @@ struct RunIndex {
   }
 };
 
+/// The columns of a study's results: number of the run, what it is made of, how it ended, its metrics.
+[[nodiscard]] std::vector<std::string> result_columns(const StudyScript& script);
+
 /// A study ready to run. What run number k is depends on the study and k alone. Immutable, so thread-safe.
 class Study {
  public:

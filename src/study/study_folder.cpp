@@ -1,3 +1,4 @@
+// The folder of a study and the facts in it.
 #include "study/study_folder.hpp"
 
 #include <fmt/format.h>
@@ -11,8 +12,10 @@
 #include <utility>
 
 #include "config/config_error.hpp"
+#include "config/key_table.hpp"
 #include "files/result_file.hpp"
 #include "rig/parse_json.hpp"
+#include "run_folder/environment.hpp"
 #include "run_folder/run_folder.hpp"
 #include "study/gzip.hpp"
 
@@ -32,11 +35,48 @@ std::string content_of(const fs::path& path) {
   return text.str();
 }
 
+/// The facts in the order of study.json. visit(key, member)
+template <class Facts, class Visit>
+void for_each_fact(Facts& facts, const Visit& visit) {
+  visit("study", facts.name);
+  visit("identity", facts.identity);
+  visit("program", facts.program);
+  visit("runs", facts.runs);
+  visit("chunk", facts.chunk);
+  visit("columns", facts.columns);
+  visit("description", facts.description);
+  visit("design", facts.design);
+  visit("ranges", facts.ranges);
+  visit("levels", facts.levels);
+  visit("metrics", facts.metrics);
+  visit("text", facts.text);
+}
+
 nlohmann::ordered_json to_json(const StudyFacts& facts) {
-  return {{"study", facts.name},      {"identity", facts.identity},
-          {"program", facts.program}, {"runs", facts.runs},
-          {"chunk", facts.chunk},     {"columns", facts.columns},
-          {"text", facts.text},       {"configurations", nlohmann::ordered_json::parse(facts.configurations)}};
+  nlohmann::ordered_json json;
+  for_each_fact(facts, [&json](const char* key, const auto& value) { json[key] = value; });
+  json["configurations"] = nlohmann::ordered_json::parse(facts.configurations);
+  return json;
+}
+
+/// The whole configuration of every case and controller: files that the study names count with their content.
+nlohmann::ordered_json configurations_of(const Study& study) {
+  nlohmann::ordered_json all = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < study.cases().size(); ++i) {
+    const StudyCase& one = study.cases()[i];
+    nlohmann::ordered_json controllers = nlohmann::ordered_json::object();
+    for (const Contender& contender : study.contenders(i)) {
+      config::Settings settings = contender.settings;
+      nlohmann::ordered_json config = config::KeyTable(settings).to_json();
+      // What a simulated run in this process does not depend on.
+      for (const char* table : {"driver", "guardian", "commands", "realtime", "telemetry", "unsafe"}) {
+        config.erase(table);
+      }
+      controllers[contender.name] = std::move(config);
+    }
+    all.push_back({{"plant", one.plant}, {"experiment", one.experiment}, {"controllers", std::move(controllers)}});
+  }
+  return all;
 }
 
 StudyFacts read_facts(const fs::path& folder) {
@@ -48,14 +88,8 @@ StudyFacts read_facts(const fs::path& folder) {
   }
   try {
     const auto json = rig::parse_json<nlohmann::ordered_json>(content_of(path));
-    StudyFacts facts{.identity = json.at("identity"),
-                     .program = json.at("program"),
-                     .name = json.at("study"),
-                     .text = json.at("text"),
-                     .runs = json.at("runs"),
-                     .chunk = json.at("chunk"),
-                     .columns = json.at("columns"),
-                     .configurations = json.at("configurations").dump()};
+    StudyFacts facts{.configurations = json.at("configurations").dump()};
+    for_each_fact(facts, [&json](const char* key, auto& value) { json.at(key).get_to(value); });
     if (facts.runs == 0 || facts.chunk == 0) throw std::runtime_error("no runs");
     return facts;
   } catch (const std::exception& problem) {
@@ -65,6 +99,26 @@ StudyFacts read_facts(const fs::path& folder) {
 }
 
 }  // namespace
+
+StudyFacts facts_of(const Study& study, const std::string& name) {
+  const run_folder::BuildFacts build = run_folder::build_facts();
+  const StudyScript& script = study.script();
+  StudyFacts facts{.program = fmt::format("abs_hil {} ({})", build.version, build.git_revision),
+                   .name = name,
+                   .text = script.text,
+                   .description = script.description,
+                   .design = std::string(config::word_at<DesignKind>(static_cast<std::size_t>(script.design.kind))),
+                   .runs = study.runs(),
+                   .chunk = script.chunk,
+                   .columns = result_columns(script),
+                   .configurations = configurations_of(study).dump()};
+  for (const Factor& factor : script.factors) {
+    (factor.has_range() ? facts.ranges : facts.levels).push_back(factor.key);
+  }
+  facts.metrics.assign(std::ranges::find(facts.columns, "reason") + 1, facts.columns.end());
+  facts.identity = run_folder::sha256_of(fmt::format("{}\n{}\n{}\n", facts.program, facts.text, facts.configurations));
+  return facts;
+}
 
 StudyFolder::StudyFolder(fs::path path) : path_(std::move(path)), facts_(read_facts(path_)) { check_results(); }
 

@@ -1,6 +1,7 @@
 // The folder of a study's results (docs/studies.md).
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
@@ -25,13 +26,20 @@ struct StudyFacts {
   std::string program{};   ///< version and revision
   std::string name{};
   std::string text{};  ///< of the study's file
+  std::string description{};
+  std::string design{};  ///< its kind
   std::uint64_t runs{0};
   std::uint64_t chunk{0};
-  std::vector<std::string> columns{};
-  std::string configurations{};  ///< effective configuration of each case, as JSON
+  std::vector<std::string> columns{};  ///< of the results: what a run is made of, how it ended, its metrics
+  std::vector<std::string> ranges{};   ///< keys of the factors whose values the design spreads
+  std::vector<std::string> levels{};   ///< keys of the others
+  std::vector<std::string> metrics{};  ///< of every run, then the study's own
+  std::string configurations{};        ///< effective configuration of each case, as JSON
 
   [[nodiscard]] std::uint64_t chunks() const noexcept { return (runs + chunk - 1) / chunk; }
-  [[nodiscard]] std::uint64_t runs_in(std::uint64_t number) const noexcept;
+  [[nodiscard]] std::uint64_t runs_in(std::uint64_t number) const noexcept {
+    return std::min(chunk, runs - number * chunk);
+  }
 };
 
 /// @param name  of the study, for people

@@ -5,7 +5,7 @@
 
 #include "catch.hpp"
 #include "paper_plan.hpp"
-#include "study/comparison_table.hpp"
+#include "study/comparison.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::study;
@@ -32,11 +32,10 @@ RunResult faulty() {
 
 /// Made-up runs: 2.0, 2.2, 2.4 s and 2.5, 2.7, 3.2 s, of which one more is a fault.
 struct Sample {
-  ComparisonPlan plan = study::test::paper_plan({"adaptive", "sliding-mode"}, 4);
-  Comparison comparison{{{run_of(2.0, 30), run_of(2.2, 40), run_of(2.4, 50), faulty()},
-                         {run_of(2.5, 600), run_of(2.7, 800, 0.2), run_of(3.2, 1000), run_of(2.6, 700)}},
-                        contenders_of(plan)};
-  ComparisonTable table = tabulate(plan, comparison);
+  Study study = study::test::paper_study({"adaptive", "sliding-mode"}, 4);
+  RunsByController runs{{run_of(2.0, 30), run_of(2.2, 40), run_of(2.4, 50), faulty()},
+                        {run_of(2.5, 600), run_of(2.7, 800, 0.2), run_of(3.2, 1000), run_of(2.6, 700)}};
+  ComparisonTable table = tabulate(study, runs);
 };
 
 std::vector<std::string> split(const std::string& line, char separator) {
@@ -49,7 +48,8 @@ std::vector<std::string> split(const std::string& line, char separator) {
 }  // namespace
 
 TEST_CASE("the table holds the statistics of the runs") {
-  const ComparisonTable table = Sample().table;
+  const Sample sample;
+  const ComparisonTable& table = sample.table;
   const ControllerColumn& ours = table.columns[0];
   CHECK(ours.faults == 1);
   CHECK(ours.means[0].n == 3);  // runs with a fault are left out
@@ -59,15 +59,16 @@ TEST_CASE("the table holds the statistics of the runs") {
   CHECK(theirs.locked == 1);
   CHECK(theirs.differences[0].n == 3);  // incomplete pairs are left out
   CHECK_THAT(theirs.differences[0].mean, WithinAbs((0.5 + 0.5 + 0.8) / 3.0, 1e-12));
-  REQUIRE(table.paper_ratio);
-  CHECK_THAT(table.paper_ratio->stop_time.mean, WithinAbs(std::cbrt(2.0 / 2.5 * 2.2 / 2.7 * 2.4 / 3.2), 1e-12));
+  REQUIRE(table.paper_ratios);
+  REQUIRE(paper_metrics.front().key == "stop_time");
+  CHECK_THAT(table.paper_ratios->front().mean, WithinAbs(std::cbrt(2.0 / 2.5 * 2.2 / 2.7 * 2.4 / 3.2), 1e-12));
   // Errors of either sign count alike.
   CHECK_THAT(ours.means.back().mean, WithinAbs(0.02, 1e-12));
 }
 
 TEST_CASE("the ratio is there only with both controllers of the paper") {
-  ComparisonPlan plan = study::test::paper_plan({"adaptive", "nominal"}, 1);
-  CHECK_FALSE(tabulate(plan, {{{run_of(2, 30)}, {run_of(2, 30)}}, contenders_of(plan)}).paper_ratio);
+  const Study study = study::test::paper_study({"adaptive", "nominal"}, 1);
+  CHECK_FALSE(tabulate(study, {{run_of(2, 30)}, {run_of(2, 30)}}).paper_ratios);
 }
 
 TEST_CASE("CSV and JSON contain the table's numbers with full precision") {
@@ -76,7 +77,7 @@ TEST_CASE("CSV and JSON contain the table's numbers with full precision") {
   CHECK(json["config"]["run"]["seed"] == 1);
   CHECK(json["repeat"] == 4);
   CHECK(json["vary"] == "parameters=0.1,theta=0.1,phase");
-  CHECK(json["adaptive_over_sliding_mode"]["stop_time"]["mean"] == sample.table.paper_ratio->stop_time.mean);
+  CHECK(json["adaptive_over_sliding_mode"]["stop_time"]["mean"] == sample.table.paper_ratios->front().mean);
   CHECK(json["controllers"][0]["metrics"]["slip_rms"]["mean"].is_null());
 
   std::istringstream csv(to_csv(sample.table));
@@ -91,7 +92,7 @@ TEST_CASE("CSV and JSON contain the table's numbers with full precision") {
       REQUIRE(std::getline(csv, line));
       const std::vector<std::string> cells = split(line, ',');
       REQUIRE(cells.size() == header.size());
-      CHECK(cells[0] == column.name);
+      CHECK(cells[0] == sample.study.contenders(0)[c].name);
       CHECK(cells[1] == compared_metrics()[m].name);
       const auto& estimate = json["controllers"][c]["metrics"][cells[1]];
       if (std::isnan(column.means[m].mean)) continue;
@@ -122,9 +123,10 @@ TEST_CASE("text and Markdown show the same figures, to their decimals") {
 }
 
 TEST_CASE("every row of a Markdown table has its header's number of cells") {
+  const Sample sample;
   std::ptrdiff_t bars = 0;
   int rows = 0;
-  for (const std::string& line : split(to_markdown(Sample().table), '\n')) {
+  for (const std::string& line : split(to_markdown(sample.table), '\n')) {
     if (line.empty() || line.front() != '|') {
       bars = 0;  // the next table begins with its own header
       continue;
@@ -138,14 +140,14 @@ TEST_CASE("every row of a Markdown table has its header's number of cells") {
 }
 
 TEST_CASE("a single run has no interval") {
-  ComparisonPlan plan = study::test::paper_plan({"adaptive"}, 1);
-  const std::string text = to_text(tabulate(plan, {{{run_of(2.0, 30)}}, contenders_of(plan)}));
+  const Study study = study::test::paper_study({"adaptive"}, 1);
+  const std::string text = to_text(tabulate(study, {{run_of(2.0, 30)}}));
   CHECK_THAT(text, Contains("2.000\n") && !Contains("±") && !Contains("Differences") && !Contains("median"));
 }
 
 TEST_CASE("the runs are listed with their results") {
   const Sample sample;
-  const std::vector<std::string> lines = split(runs_csv(sample.plan, sample.comparison), '\n');
+  const std::vector<std::string> lines = split(runs_csv(sample.study, sample.runs), '\n');
   REQUIRE(lines.size() == 9);
   CHECK(lines[0].rfind("controller,run,result,stop_time_s,stop_distance_m,", 0) == 0);
   CHECK(lines[1].rfind("adaptive,0,completed,2,20,", 0) == 0);

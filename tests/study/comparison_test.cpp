@@ -2,60 +2,55 @@
 
 #include "catch.hpp"
 #include "paper_plan.hpp"
-#include "study/comparison_table.hpp"
 
 using namespace abs_hil::study;
 using namespace abs_hil::study::test;
 using Catch::Matchers::Contains;
 
 TEST_CASE("the report is the same, byte for byte, with any number of threads") {
-  ComparisonPlan plan = paper_plan({"adaptive", "nominal", "locked"}, 6);
-  const Comparison once = compare(plan);
-  const std::string text = to_text(tabulate(plan, once));
-  const std::string runs = runs_csv(plan, once);
+  const Study study = paper_study({"adaptive", "nominal", "locked"}, 6);
+  const RunsByController once = run_by_controller(study, 1);
+  const std::string text = to_text(tabulate(study, once));
+  const std::string runs = runs_csv(study, once);
   for (const std::size_t threads : {2U, 7U}) {
-    plan.threads = threads;
-    const Comparison again = compare(plan);
-    CHECK(to_text(tabulate(plan, again)) == text);
-    CHECK(runs_csv(plan, again) == runs);
+    const RunsByController again = run_by_controller(study, threads);
+    CHECK(to_text(tabulate(study, again)) == text);
+    CHECK(runs_csv(study, again) == runs);
   }
-  plan.seed = 4;
-  CHECK(to_text(tabulate(plan, compare(plan))) != text);
+  const Study other = paper_study({"adaptive", "nominal", "locked"}, 6, Variation::standard(), 4);
+  CHECK(to_text(tabulate(other, run_by_controller(other, 1))) != text);
 }
 
 TEST_CASE("every controller gets the same plants") {
   // The error of a known estimate shows the true theta of run k, which must not depend on the controller.
-  ComparisonPlan plan = paper_plan({"nominal", "adaptive"}, 4);
-  const Comparison both = compare(plan);
-  plan.controllers = {"adaptive"};
-  const Comparison alone = compare(plan);
-  for (std::size_t k = 0; k < plan.repeat; ++k) {
-    const double factor = draw(plan.variation, plan.seed, k).theta;
-    CHECK(both.results[0][k].metrics.theta_error_final == Catch::Detail::Approx(1.0 / factor - 1.0));
-    CHECK(both.results[1][k].metrics.stop_time_s == alone.results[0][k].metrics.stop_time_s);
-    CHECK(both.results[1][k].metrics.theta_error_rms == alone.results[0][k].metrics.theta_error_rms);
+  const Study study = paper_study({"nominal", "adaptive"}, 4);
+  const RunsByController both = run_by_controller(study, 1);
+  const RunsByController alone = run_by_controller(paper_study({"adaptive"}, 4), 1);
+  for (std::size_t k = 0; k < 4; ++k) {
+    const double factor = draw(study.script().repeat.variation, study.script().repeat.seed, k).theta;
+    CHECK(both[0][k].metrics.theta_error_final == Catch::Detail::Approx(1.0 / factor - 1.0));
+    CHECK(both[1][k].metrics.stop_time_s == alone[0][k].metrics.stop_time_s);
+    CHECK(both[1][k].metrics.theta_error_rms == alone[0][k].metrics.theta_error_rms);
   }
 }
 
 TEST_CASE("without variation every run is the same") {
-  ComparisonPlan plan = paper_plan({"adaptive"}, 3);
-  plan.variation = {};
-  const Comparison comparison = compare(plan);
-  const auto column = tabulate(plan, comparison).columns.front();
-  CHECK(column.means.front().standard_deviation == 0.0);
-  CHECK(comparison.results[0][0].metrics.stop_distance_m == comparison.results[0][2].metrics.stop_distance_m);
+  const Study study = paper_study({"adaptive"}, 3, {});
+  const RunsByController runs = run_by_controller(study, 1);
+  CHECK(tabulate(study, runs).columns.front().means.front().standard_deviation == 0.0);
+  CHECK(runs[0][0].metrics.stop_distance_m == runs[0][2].metrics.stop_distance_m);
 }
 
-TEST_CASE("an invalid plan is refused before any run") {
-  CHECK_THROWS_WITH(compare(paper_plan({"adaptive", "nope"}, 1)), Contains("nope"));
-  CHECK_THROWS_WITH(compare(paper_plan({"adaptive", "adaptive"}, 1)), Contains("adaptive") && Contains("twice"));
-  CHECK_THROWS_WITH(compare(paper_plan({}, 1)), Contains("--controllers"));
-  CHECK_THROWS_WITH(compare(paper_plan({"adaptive"}, 0)), Contains("--repeat"));
+TEST_CASE("an invalid comparison is refused before any run") {
+  CHECK_THROWS_WITH(paper_study({"adaptive", "nope"}, 1), Contains("nope"));
+  CHECK_THROWS_WITH(paper_study({"adaptive", "adaptive"}, 1), Contains("adaptive") && Contains("twice"));
+  CHECK_THROWS_WITH(paper_study({}, 1), Contains("--controllers"));
+  CHECK_THROWS_WITH(paper_study({"adaptive"}, 0), Contains("--repeat"));
 }
 
 TEST_CASE("every run is reported as done, once") {
-  ComparisonPlan plan = paper_plan({"adaptive", "locked"}, 3);
   std::vector<std::size_t> seen;
-  static_cast<void>(compare(plan, [&seen](std::size_t done) { seen.push_back(done); }));
+  static_cast<void>(run_by_controller(paper_study({"adaptive", "locked"}, 3), 1,
+                                      [&seen](std::size_t done) { seen.push_back(done); }));
   CHECK(seen == std::vector<std::size_t>{1, 2, 3, 4, 5, 6});
 }

@@ -7,7 +7,7 @@
 #include "catch.hpp"
 #include "config/config_error.hpp"
 #include "paper_plan.hpp"
-#include "study/comparison_table.hpp"
+#include "study/comparison.hpp"
 #include "temporary_folder.hpp"
 
 using namespace abs_hil;
@@ -82,27 +82,27 @@ TEST_CASE("bad contenders are refused with the entry, the key and the fix") {
 }
 
 TEST_CASE("a variant with the default gain equals the plain controller, and another gain differs") {
-  const ComparisonPlan plan = paper_plan({"adaptive", "same=adaptive{gamma=21}", "adaptive{gamma=80}"}, 3);
-  REQUIRE(plan.settings.control.adaptive.gamma == 21.0);
-  const Comparison comparison = compare(plan);
-  const auto distance = [&](std::size_t c) { return comparison.results[c][1].metrics.stop_distance_m; };
+  const Study study = paper_study({"adaptive", "same=adaptive{gamma=21}", "adaptive{gamma=80}"}, 3);
+  REQUIRE(paper_settings().control.adaptive.gamma == 21.0);
+  const RunsByController runs = run_by_controller(study, 1);
+  const auto distance = [&](std::size_t c) { return runs[c][1].metrics.stop_distance_m; };
   CHECK(distance(1) == distance(0));
   CHECK(distance(2) != distance(0));
-  const ComparisonTable table = tabulate(plan, comparison);
-  CHECK(table.columns[2].name == "adaptive{gamma=80}");
-  CHECK(table.columns[2].controller == "adaptive");
-  CHECK_THAT(to_text(table), Contains("same is adaptive with control.adaptive.gamma = 21.\n"));
+  CHECK(study.contenders(0)[2].name == "adaptive{gamma=80}");
+  CHECK(study.contenders(0)[2].settings.control.controller == "adaptive");
+  CHECK_THAT(to_text(tabulate(study, runs)), Contains("same is adaptive with control.adaptive.gamma = 21.\n"));
 }
 
 TEST_CASE("the single runs come with the drawn plants") {
-  ComparisonPlan plan = paper_plan({"adaptive{slip_ref=0.1,gamma=60}"}, 2);
-  plan.variation = Variation::parse("theta=0.2");
-  const std::string text = runs_csv(plan, compare(plan));
+  const Study study = paper_study({"adaptive{slip_ref=0.1,gamma=60}"}, 2, Variation::parse("theta=0.2"));
+  const std::string text = runs_csv(study, run_by_controller(study, 1));
   const std::string header = text.substr(0, text.find('\n'));
   CHECK_THAT(header, Catch::Matchers::EndsWith(",theta_error_final,plant.theta_N,sensor_seed"));
   CHECK_THAT(text, Contains("\n\"adaptive{slip_ref=0.1,gamma=60}\",0,completed,"));
-  const double theta_N = plan.settings.plant.rig.tyre.theta_N * draw(plan.variation, plan.seed, 1).theta;
+  const double theta_N = paper_settings().plant.rig.tyre.theta_N *
+                         draw(study.script().repeat.variation, study.script().repeat.seed, 1).theta;
   CHECK_THAT(text, Catch::Matchers::EndsWith(fmt::format(",{},1\n", theta_N)));
-  plan.variation = Variation::standard();
-  CHECK_THAT(runs_csv(plan, compare(plan)), Contains("plant.J1_kg_m2") && Contains("plant.u0") && Contains("plant.B"));
+  const Study varied = paper_study({"adaptive"}, 2);
+  CHECK_THAT(runs_csv(varied, run_by_controller(varied, 1)),
+             Contains("plant.J1_kg_m2") && Contains("plant.u0") && Contains("plant.B"));
 }

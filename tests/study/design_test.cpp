@@ -8,7 +8,6 @@
 
 #include "catch.hpp"
 #include "config/factors.hpp"
-#include "study/counter_random.hpp"
 
 using namespace abs_hil::study;
 using abs_hil::config::Factor;

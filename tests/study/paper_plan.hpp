@@ -1,6 +1,6 @@
 #pragma once
 
-#include "study/comparison.hpp"
+#include "study/study.hpp"
 
 namespace abs_hil::study::test {
 
@@ -11,13 +11,14 @@ inline config::Settings paper_settings() {
   return settings;
 }
 
-inline ComparisonPlan paper_plan(std::vector<std::string> controllers, std::size_t repeat) {
-  return {.settings = paper_settings(),
-          .controllers = std::move(controllers),
-          .repeat = repeat,
-          .seed = 3,
-          .variation = Variation::standard(),
-          .threads = 1};
+/// A comparison of controllers on `repeat` varied plants.
+inline Study paper_study(std::vector<std::string> controllers, std::uint64_t repeat,
+                         Variation variation = Variation::standard(), std::uint64_t seed = 3) {
+  const config::Settings settings = paper_settings();
+  return {{.controllers = std::move(controllers),
+           .repeat = {.runs = repeat, .seed = seed, .variation = variation},
+           .path = "test"},
+          {{.plant = settings.plant_name, .experiment = settings.experiment.name, .settings = settings}}};
 }
 
 }  // namespace abs_hil::study::test

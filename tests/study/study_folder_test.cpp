@@ -10,7 +10,6 @@
 #include "study/compute.hpp"
 #include "study/gzip.hpp"
 #include "study/paper_plan.hpp"
-#include "study/result_rows.hpp"
 #include "temporary_folder.hpp"
 
 using namespace abs_hil;
@@ -46,9 +45,9 @@ std::string results_of(const StudyFolder& folder) { return bytes_of(folder.path(
 
 /// Computes a shard and returns its number of chunks.
 std::size_t compute_shard(const Study& study, const StudyFolder& folder, Shard shard, std::size_t threads = 1) {
-  const std::vector<std::uint64_t> chunks = missing_chunks(folder, shard);
-  static_cast<void>(compute(study, folder, chunks, threads, {}, {}));
-  return chunks.size();
+  const std::size_t chunks = missing_chunks(folder, shard).size();
+  static_cast<void>(compute(study, folder, shard, threads, {}, {}));
+  return chunks;
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include "catch.hpp"
 #include "config/config_error.hpp"
 #include "study/paper_plan.hpp"
-#include "study/workbench.hpp"
+#include "study/runs.hpp"
 
 using namespace abs_hil;
 using namespace abs_hil::study;
@@ -63,11 +63,11 @@ TEST_CASE("every combination of plant, levels, point, repetition and controller 
 
 TEST_CASE("controllers, levels and plants meet the same points and the same varied plants") {
   const Study study = study_of_text(mixed);
-  Workbench bench(study);
+  RunSettings runs(study);
   std::map<std::pair<std::uint64_t, std::uint64_t>, std::set<std::pair<double, std::uint64_t>>> by_point;
   for (std::uint64_t run = 0; run < study.runs(); ++run) {
     const RunIndex index = study.index_of(run);
-    const Workbench::Drawn drawn = bench.drawn(index);
+    const RunSettings::Drawn drawn = runs.drawn(index);
     const double theta_N = drawn.plant.rig.tyre.theta_N;
     by_point[{index.point, index.repetition}].emplace(theta_N, drawn.seed);
   }
@@ -77,30 +77,59 @@ TEST_CASE("controllers, levels and plants meet the same points and the same vari
 
 TEST_CASE("a run's settings do not depend on the runs before it") {
   const Study study = study_of_text(mixed);
-  Workbench forward(study);
+  RunSettings forward(study);
   std::vector<config::Settings> settings;
-  for (std::uint64_t run = 0; run < study.runs(); ++run) settings.push_back(forward.settings_of(study.index_of(run)));
+  for (std::uint64_t run = 0; run < study.runs(); ++run) settings.push_back(forward.of(study.index_of(run)));
   for (std::uint64_t run = study.runs(); run-- > 0;) {
-    Workbench alone(study);
-    config::Settings one = alone.settings_of(study.index_of(run));
+    RunSettings alone(study);
+    config::Settings one = alone.of(study.index_of(run));
     CHECK(config::KeyTable(one).to_json() == config::KeyTable(settings[run]).to_json());
   }
   CHECK(settings[0].control.adaptive.gamma != settings[1].control.adaptive.gamma);
   CHECK(settings[1].control.adaptive.gamma == 20.0);
 }
 
+TEST_CASE("every run that a part computes is the run of its own settings, wherever the part begins") {
+  const Study study = study_of_text(R"(
+controllers = ["adaptive", "pi"]
+[settings]
+experiment.end_speed_m_s = 12.0
+[repeat]
+runs = 2
+[factors]
+plant.theta_N = [18, 25]
+control.slip_ref = [0.1, 0.15]
+)");
+  RunSettings settings(study);
+  for (const std::uint64_t first : {0U, 3U, 7U}) {
+    std::vector<Outcome> outcomes(study.runs() - first);
+    run_part(
+        study, outcomes.size(), 2, [first](std::size_t i) { return first + i; },
+        [&outcomes](std::size_t i, Outcome outcome) { outcomes[i] = std::move(outcome); });
+    for (std::size_t i = 0; i < outcomes.size(); ++i) {
+      INFO("run " << first + i << " of a part from run " << first);
+      const config::Settings alone = settings.whole(study.index_of(first + i));
+      const RunResult expected = simulate(alone, alone.plant, config::sensor_seed(alone));
+      REQUIRE(outcomes[i].refusal.empty());
+      CHECK(outcomes[i].run.fault == expected.fault);
+      CHECK(outcomes[i].run.metrics.stop_distance_m == expected.metrics.stop_distance_m);
+      CHECK(outcomes[i].run.metrics.torque_total_variation_Nm == expected.metrics.torque_total_variation_Nm);
+    }
+  }
+}
+
 TEST_CASE("the model stays nominal unless it is asked to follow the factors") {
   const std::string factor = "[factors]\nplant.theta_N = [10, 40]\n";
   {
     const Study study = study_of_text(factor);
-    Workbench bench(study);
-    CHECK(bench.settings_of(study.index_of(1)).model.tyre.theta_N == 23.0);
-    CHECK(bench.drawn(study.index_of(1)).plant.rig.tyre.theta_N == 40.0);
+    RunSettings runs(study);
+    CHECK(runs.of(study.index_of(1)).model.tyre.theta_N == 23.0);
+    CHECK(runs.drawn(study.index_of(1)).plant.rig.tyre.theta_N == 40.0);
   }
   const Study study = study_of_text("model_follows = \"factors\"\n" + factor);
-  Workbench bench(study);
-  CHECK(bench.settings_of(study.index_of(1)).model.tyre.theta_N == 40.0);
-  CHECK(bench.settings_of(study.index_of(0)).model.tyre.theta_N == 10.0);
+  RunSettings runs(study);
+  CHECK(runs.of(study.index_of(1)).model.tyre.theta_N == 40.0);
+  CHECK(runs.of(study.index_of(0)).model.tyre.theta_N == 10.0);
   CHECK_FALSE(study.shares_settings());
 }
 
@@ -108,8 +137,8 @@ TEST_CASE("a model value that is a factor itself, or set, does not follow the pl
   const Study study = study_of_text(
       "model_follows = \"factors\"\ncontrollers = [\"adaptive{model.B=9}\"]\n[factors]\nplant.theta_N = [10, 40]\n"
       "model.theta_N = [11]\nplant.B = [20]\n");
-  Workbench bench(study);
-  const config::Settings& settings = bench.settings_of(study.index_of(1));
+  RunSettings runs(study);
+  const config::Settings& settings = runs.of(study.index_of(1));
   CHECK(settings.plant.rig.tyre.theta_N == 40.0);
   CHECK(settings.model.tyre.theta_N == 11.0);
   CHECK(settings.plant.rig.tyre.B == 20.0);

@@ -16,7 +16,6 @@ from ..simulation import keys, simulate, simulate_many
 from .adhesion import least_time_s
 from .bounds import identity
 from .cases import COAST_S, END_SPEED_M_S, Case
-from .from_file import summaries_of
 
 EXPERIMENT = 'coast-and-brake'
 
@@ -28,12 +27,8 @@ class Entry:
     settings: Mapping[str, Value]
 
     @property
-    def from_file(self) -> bool:
-        return self.name.endswith(('.so', '.fmu'))
-
-    @property
     def in_python(self) -> bool:
-        return ':' in self.name and not self.from_file
+        return ':' in self.name and not self.name.endswith(('.so', '.fmu'))
 
     def made(self) -> Any:
         """A new object of the class. Raises ValueError."""
@@ -75,13 +70,10 @@ FIGURES = ('stop_distance_m', 'stop_time_s', 'torque_total_variation_Nm', OVERSH
 
 def _figures(entry: Entry, runs: list[dict[str, Any]], threads: int) -> tuple[dict[str, np.ndarray], list[str]]:
     """Each figure, shape (runs,), and the reason of each run's early end."""
-    if not (entry.in_python or entry.from_file):
+    if not entry.in_python:
         study = simulate_many(runs, threads=threads)
         return {name: study[name] for name in FIGURES}, [str(fault) for fault in study['fault']]
-    if entry.from_file:
-        summaries = summaries_of(runs, threads)
-    else:
-        summaries = [simulate(**{**run, 'controller': entry.made()}).summary for run in runs]
+    summaries = [simulate(**{**run, 'controller': entry.made()}).summary for run in runs]
     columns: dict[str, list[float]] = {name: [] for name in FIGURES}
     faults = []
     for summary in summaries:

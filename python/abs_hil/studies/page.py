@@ -44,7 +44,7 @@ def quantile_table(results: StudyResults) -> Table:
 def sobol_table(results: StudyResults, metrics: list[str]) -> tuple[Table, list[str]]:
     """First-order and total index of each factor, for each metric and controller; and what could not be computed."""
     rows, notes = [], []
-    names = ['plant', 'experiment', 'controller', *results.definition.levels]
+    names = ['plant', 'experiment', 'controller', *results.levels]
     by = [name for name, different in results.columns(names).nunique().items() if different > 1]
     for metric in metrics:
         for name, part in groups_of(results.columns(by), by):
@@ -68,7 +68,7 @@ def reasons_table(results: StudyResults) -> Table:
 def page(results: StudyResults, metrics: list[str], title: str = '') -> str:
     """The page as HTML that needs no network. metrics: whose curves and maps it shows."""
     sobol, notes = Table('sobol', [], []), list[str]()
-    if results.definition.design == 'saltelli':
+    if results.facts['design'] == 'saltelli':
         sobol, notes = sobol_table(results, metrics)
     drawings = [drawing for metric in metrics for drawing in (curves(results, metric), maps(results, metric)) if drawing]
     views: list[dict[str, Any]] = [
@@ -79,6 +79,6 @@ def page(results: StudyResults, metrics: list[str], title: str = '') -> str:
                                      loader=jinja2.FileSystemLoader([_FOLDER, _REPORT]))
     return environment.get_template('study.html.j2').render(
         version=_core.version, title=title or f'Study {results.facts["study"]}', facts=results.facts,
-        description=results.definition.description, quantiles=quantile_table(results), sobol=sobol,
+        description=results.facts['description'], quantiles=quantile_table(results), sobol=sobol,
         reasons=reasons_table(results), drawings=views, notes=notes,
         css=(_REPORT / 'page.css').read_text(encoding='utf-8')) + '\n'

@@ -13,7 +13,6 @@ import numpy as np
 from ..core import _core
 from ..files import write_whole
 from ..nesting import parse_json
-from .definition import Definition
 
 if TYPE_CHECKING:
     import pandas
@@ -21,8 +20,6 @@ if TYPE_CHECKING:
 RESULTS = 'results.csv.gz'
 #: a header with the study's text and configurations is longer than any buffer of a reader
 _HEADER_BYTES = 1 << 24
-#: columns before the factors, and between factors and metrics
-BEFORE, BETWEEN = ('run', 'plant', 'experiment', 'controller', 'point', 'repetition'), ('result', 'reason')
 #: columns of texts that few values fill
 _FEW = ('plant', 'experiment', 'controller', 'result')
 
@@ -31,7 +28,8 @@ class StudyResults:
     """Results of a study, read from its folder or from results.csv.gz alone.
 
     facts:   dictionary: study (its name), text, identity (SHA-256 of all that the results depend on), program, runs, ...
-    factors: names of the factors' columns. metrics: names of the metrics' columns, those of a run's summary.
+    factors: names of the factors' columns; `ranges` are those whose values a design spreads, `levels` the others.
+    metrics: names of the metrics' columns, those of a run's summary.
 
     A column is read from the file when it is first wanted, and kept: 8 bytes a row.
     """
@@ -49,12 +47,12 @@ class StudyResults:
             head = file.read(_HEADER_BYTES)
         try:
             self.facts: dict[str, Any] = parse_json(_core.facts_of_results(head))
-            columns = self.facts['columns']
+            self.ranges: list[str] = self.facts['ranges']
+            self.levels: list[str] = self.facts['levels']
+            self.metrics: list[str] = self.facts['metrics']
+            self.factors = [name for name in self.facts['columns'] if name in (*self.ranges, *self.levels)]
         except (RuntimeError, ValueError, KeyError) as error:
             raise ValueError(f'{self.path}: not the results of a study: {error}') from None
-        self.factors: list[str] = columns[len(BEFORE):columns.index(BETWEEN[0])]
-        self.metrics: list[str] = columns[columns.index(BETWEEN[-1]) + 1:]
-        self.definition = Definition(self.facts['text'])
         self._columns: dict[str, Any] = {}  # arrays of numpy or pandas; a Series would keep an index of 8 bytes a row
         self._data: pandas.DataFrame | None = None
 
@@ -114,7 +112,7 @@ class StudyResults:
     def data(self) -> pandas.DataFrame:
         """All columns of all rows as a pandas DataFrame, the same one each time."""
         if self._data is None:
-            self._data = self.columns([*BEFORE, *self.factors, *BETWEEN, *self.metrics])
+            self._data = self.columns(self.facts['columns'])
             self._columns.clear()
         return self._data
 
@@ -132,7 +130,7 @@ class StudyResults:
     @property
     def groups(self) -> list[str]:
         """Columns of what has few values and more than one: plant, experiment, controller, factors with levels."""
-        names = ['plant', 'experiment', 'controller', *(name for name in self.definition.levels if name in self.factors)]
+        names = ['plant', 'experiment', 'controller', *self.levels]
         return [name for name, different in self.columns(names).nunique().items() if different > 1]
 
     def quantiles(self, by: str | Sequence[str] | None = None, metrics: Sequence[str] | None = None,
@@ -171,28 +169,26 @@ class StudyResults:
         their 95 % intervals; index: factors with ranges. For the design `saltelli` alone. Raises ValueError for another
         design, for runs that lack the metric, and if `where` leaves several groups."""
         import pandas
-        definition = self.definition
-        if definition.design != 'saltelli':
-            raise ValueError(f'design {definition.design}: Sobol indices need the design saltelli')
+        if self.facts['design'] != 'saltelli':
+            raise ValueError(f'design {self.facts["design"]}: Sobol indices need the design saltelli')
         try:
             from SALib.analyze import sobol
         except ImportError:
             raise ValueError('Sobol indices need SALib: pip install "SALib<1.5", or scripts/setup_python.sh in the source '
                              'folder') from None
-        rows = self.columns(['point', 'plant', 'experiment', 'controller', *definition.levels, *(where or {}), metric])
+        rows = self.columns(['point', 'plant', 'experiment', 'controller', *self.levels, *(where or {}), metric])
         for name, value in (where or {}).items():
             rows = rows[rows[name] == value]
-        ranges = [name for name in self.factors if name in definition.ranges]
-        others = [name for name in ('plant', 'experiment', 'controller', *definition.levels) if rows[name].nunique() > 1]
+        others = [name for name in ('plant', 'experiment', 'controller', *self.levels) if rows[name].nunique() > 1]
         if others:
             raise ValueError(f'where: give values of {", ".join(others)}')
         values = rows.groupby('point', sort=True)[metric].mean().to_numpy()  # over the repetitions
         if not np.isfinite(values).all():
             raise ValueError(f'{metric}: {np.count_nonzero(~np.isfinite(values))} of {len(values)} points have none; Sobol '
                              'indices need all')
-        problem = {'num_vars': len(ranges), 'names': ranges, 'bounds': [[0.0, 1.0]] * len(ranges)}
+        problem = {'num_vars': len(self.ranges), 'names': self.ranges, 'bounds': [[0.0, 1.0]] * len(self.ranges)}
         found = sobol.analyze(problem, values, calc_second_order=False, seed=seed)
-        return pandas.DataFrame({name: found[name] for name in ('S1', 'S1_conf', 'ST', 'ST_conf')}, index=ranges)
+        return pandas.DataFrame({name: found[name] for name in ('S1', 'S1_conf', 'ST', 'ST_conf')}, index=self.ranges)
 
     def to_parquet(self, path: str | os.PathLike[str]) -> None:
         """Writes all rows to a Parquet file, with the facts under the key `abs_hil.study` of its metadata. Needs pyarrow."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core import _core
 from ..run import Run
-from ..simulation import _Progress, simulate
+from ..simulation import _Progress, run_of
 from .results import StudyResults, load_study
 
 StudyLike = Union[str, 'os.PathLike[str]', Mapping[str, Any]]
@@ -52,9 +52,7 @@ def simulate_run(study: StudyLike, run: int) -> Run:
     if int(run) < 0:
         raise ValueError(f'run {run}: give a number of at least 0')
     with _file_of(study) as (file, _):
-        given = _core.run_of_study(str(file), int(run))
-    assignments = dict(assignment.split('=', 1) for assignment in given.pop('set'))
-    return simulate(controller=assignments.pop('control.controller', 'adaptive'), set=assignments, **given)
+        return run_of(*_core.simulate_run(str(file), int(run)))
 
 
 class _Bar:
