@@ -169,9 +169,6 @@ void AdaptiveActuatorLaw<S>::take_over(const AdaptiveActuatorLaw& before) noexce
   tuning_ = before.tuning_;
 }
 
-class AdaptiveActuatorController final : public LawController<AdaptiveActuatorLaw> {
- public:
-  using LawController::LawController;
-};
+using AdaptiveActuatorController = LawController<AdaptiveActuatorLaw>;
 
 }  // namespace abs_hil::control

@@ -11,8 +11,8 @@
 #include "abs_hil/rig/option_check.hpp"
 #include "abs_hil/rig/scalar.hpp"
 #include "abs_hil/rig/tyre_curve.hpp"
-#include "control/full_torque.hpp"
-#include "control/half_turn.hpp"
+#include "control/classic_controllers.hpp"
+#include "control/wheel_motion.hpp"
 
 namespace abs_hil::control {
 namespace {

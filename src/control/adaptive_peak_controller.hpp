@@ -2,7 +2,6 @@
 #pragma once
 
 #include "abs_hil/control/slip_error_dynamics.hpp"
-#include "control/half_turn.hpp"
 #include "control/law_controller.hpp"
 #include "control/slip_error_integral.hpp"
 #include "control/slip_peak_estimator.hpp"
@@ -142,9 +141,6 @@ S AdaptivePeakLaw<S>::command_Nm(const BasicSlipInput<S>& input, const S& slip, 
                      wanted_Nm);
 }
 
-class AdaptivePeakController final : public LawController<AdaptivePeakLaw> {
- public:
-  using LawController::LawController;
-};
+using AdaptivePeakController = LawController<AdaptivePeakLaw>;
 
 }  // namespace abs_hil::control

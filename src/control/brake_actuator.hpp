@@ -21,7 +21,17 @@ class BasicBrakeActuator {
   /// @param duty_steps steps of the PWM from duty 0 to duty 1; 0: any duty can be sent
   BasicBrakeActuator(const rig::BrakeParameters& brake, bool ideal, double max_duty,
                      std::uint32_t duty_steps = 0) noexcept
-    requires std::is_same_v<S, double>;
+    requires std::is_same_v<S, double>
+      : brake_{brake},
+        ideal_{ideal ? 1.0 : 0.0},
+        duties_{brake, max_duty, ideal ? 0 : duty_steps},
+        max_torque_Nm_{ideal ? std::numeric_limits<double>::infinity()
+                             : rig::brake_torque_at(brake, rig::duty_at_most(max_duty, duty_steps))},
+        half_step_Nm_{ideal || duty_steps == 0 ? 0.0 : 0.5 * brake.b1_Nm / static_cast<double>(duty_steps)} {
+    if (ideal) return;
+    least_.duty = rig::duty_at_least(brake.u0, duty_steps);
+    least_.torque_Nm = rig::brake_torque_at(brake, least_.duty);
+  }
 
   /// Starts from a brake that has long been released.
   void reset() noexcept {

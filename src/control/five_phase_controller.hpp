@@ -3,11 +3,13 @@
 
 #include <cstdint>
 #include <limits>
+#include <stdexcept>
 
 #include "abs_hil/control/slip_error_dynamics.hpp"
-#include "control/full_torque.hpp"
+#include "abs_hil/rig/option_check.hpp"
+#include "control/classic_controllers.hpp"
 #include "control/law_controller.hpp"
-#include "control/standing_wheel.hpp"
+#include "control/wheel_motion.hpp"
 
 namespace abs_hil::control {
 
@@ -35,7 +37,31 @@ class FivePhaseLaw {
   FivePhaseLaw() = default;
   /// Throws std::invalid_argument if thresholds are out of order or a ramp or limit is not > 0.
   explicit FivePhaseLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>;
+    requires std::is_same_v<S, double>
+      : laws_{paper::laws(context.rig.wheels)},
+        brake_{context.rig.brake},
+        hold_below_m_s2_{context.options.five_phase.hold_below_m_s2},
+        release_below_m_s2_{context.options.five_phase.release_below_m_s2},
+        recover_above_m_s2_{context.options.five_phase.recover_above_m_s2},
+        reapply_below_m_s2_{context.options.five_phase.reapply_below_m_s2},
+        hold_limit_s_{context.options.five_phase.hold_limit_s},
+        recover_limit_s_{context.options.five_phase.recover_limit_s},
+        apply_Nm_s_{context.options.five_phase.apply_Nm_s},
+        release_Nm_s_{context.options.five_phase.release_Nm_s},
+        reapply_Nm_s_{context.options.five_phase.reapply_Nm_s},
+        period_s_{1.0 / context.options.rate_Hz} {
+    rig::require_valid(context.options.five_phase, "control.five_phase.");
+    if (!(release_below_m_s2_ <= hold_below_m_s2_)) {
+      throw std::invalid_argument("control.five_phase.release_below_m_s2 must not be above hold_below_m_s2");
+    }
+    if (!(recover_above_m_s2_ > release_below_m_s2_)) {
+      throw std::invalid_argument("control.five_phase.recover_above_m_s2 must be above release_below_m_s2");
+    }
+    if (!(reapply_below_m_s2_ > hold_below_m_s2_)) {
+      throw std::invalid_argument("control.five_phase.reapply_below_m_s2 must be above hold_below_m_s2");
+    }
+    if (!(context.options.rate_Hz > 0.0)) throw std::invalid_argument("control.rate_Hz must be > 0 Hz");
+  }
 
   void reset(const BasicSlipInput<S>& /*input*/) noexcept {
     phase_ = number(BrakePhase::apply);

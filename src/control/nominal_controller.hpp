@@ -2,6 +2,7 @@
 #pragma once
 
 #include "abs_hil/control/slip_error_dynamics.hpp"
+#include "abs_hil/rig/option_check.hpp"
 #include "control/law_controller.hpp"
 #include "control/slip_error_integral.hpp"
 
@@ -18,7 +19,14 @@ class NominalLaw {
   NominalLaw() = default;
   /// Throws std::invalid_argument for options out of range.
   explicit NominalLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>;
+    requires std::is_same_v<S, double>
+      : laws_{paper::laws(context.rig.wheels)},
+        tyre_{context.rig.tyre},
+        dynamics_{context},
+        theta0_N_{context.options.nominal.theta0_N != 0.0 ? context.options.nominal.theta0_N
+                                                          : context.rig.tyre.theta_N} {
+    rig::require_valid(context.options.nominal, "control.nominal.");
+  }
 
   void reset(const BasicSlipInput<S>& input) noexcept {
     integral_.reset(slip_velocity_error_m_s(laws_, input.speeds, input.slip_ref), input.slip_ref);
@@ -41,9 +49,6 @@ class NominalLaw {
   BasicSlipErrorIntegral<S> integral_{};
 };
 
-class NominalController final : public LawController<NominalLaw> {
- public:
-  using LawController::LawController;
-};
+using NominalController = LawController<NominalLaw>;
 
 }  // namespace abs_hil::control

@@ -14,16 +14,11 @@
 #include "control/adaptive_optimal_controller.hpp"
 #include "control/adaptive_peak_controller.hpp"
 #include "control/braking_stiffness_controller.hpp"
+#include "control/classic_controllers.hpp"
 #include "control/five_phase_controller.hpp"
-#include "control/locked_controller.hpp"
-#include "control/mixed_slip_deceleration_controller.hpp"
 #include "control/nominal_controller.hpp"
-#include "control/pi_controller.hpp"
-#include "control/relay_controller.hpp"
 #include "control/sliding_mode_actuator_controller.hpp"
-#include "control/sliding_mode_controller.hpp"
-#include "control/smooth_sliding_mode_controller.hpp"
-#include "control/super_twisting_controller.hpp"
+#include "control/sliding_mode_controllers.hpp"
 #include "rig/nearest_name.hpp"
 
 namespace abs_hil::control {

@@ -1,9 +1,10 @@
 // The sliding mode with a boundary layer, stepped back through the brake's lag.
 #pragma once
 
+#include "abs_hil/rig/option_check.hpp"
 #include "control/law_controller.hpp"
+#include "control/sliding_mode_controllers.hpp"
 #include "control/sliding_surface.hpp"
-#include "control/smooth_sliding_mode_controller.hpp"
 #include "control/wheel_force_observer.hpp"
 #include "control/wheel_motion.hpp"
 
@@ -25,7 +26,21 @@ class SlidingModeActuatorLaw {
   SlidingModeActuatorLaw() = default;
   /// Throws std::invalid_argument for options out of range.
   explicit SlidingModeActuatorLaw(const ControllerContext& context)
-    requires std::is_same_v<S, double>;
+    requires std::is_same_v<S, double>
+      : laws_{paper::laws(context.rig.wheels)},
+        tyre_{context.rig.tyre},
+        lag_{context.rig.brake.c31_per_s, 1.0 / context.options.rate_Hz},
+        surface_{context, context.options.sliding_mode_actuator.adaptation},
+        wheels_observer_{context.options.sliding_mode_actuator.observer, context.rig, context.options.rate_Hz},
+        gain_m_s2_{context.options.sliding_mode_actuator.gain_m_s2},
+        width_m_s_{context.options.sliding_mode_actuator.boundary_m_s},
+        lag_decay_per_s_{
+            rig::exponential_less_one(-context.options.sliding_mode_actuator.lag_gain_per_s / context.options.rate_Hz) *
+            context.options.rate_Hz},
+        gamma_{context.options.sliding_mode_actuator.adaptation.gamma},
+        v_min_m_s_{context.options.v_min_m_s} {
+    rig::require_valid(context.options.sliding_mode_actuator, "control.sliding_mode_actuator.");
+  }
 
   void reset(const BasicSlipInput<S>& input) noexcept {
     surface_.reset(input);
@@ -96,9 +111,6 @@ S SlidingModeActuatorLaw<S>::reference_rate_m_s3(const BasicSlipInput<S>& input,
          motion.drift_rate_m_s3;
 }
 
-class SlidingModeActuatorController final : public LawController<SlidingModeActuatorLaw> {
- public:
-  using LawController::LawController;
-};
+using SlidingModeActuatorController = LawController<SlidingModeActuatorLaw>;
 
 }  // namespace abs_hil::control

@@ -6,7 +6,7 @@
 #include "abs_hil/control/options.hpp"
 #include "abs_hil/control/paper_laws.hpp"
 #include "abs_hil/rig/scalar.hpp"
-#include "control/standing_wheel.hpp"
+#include "control/wheel_motion.hpp"
 
 namespace abs_hil::control {
 
@@ -52,7 +52,14 @@ class BasicThetaEstimator {
   BasicThetaEstimator() = default;
   /// @param options  gamma, ka1, zeta0, theta_min_N <= theta_max_N; AdaptiveController checks them
   BasicThetaEstimator(const AdaptiveOptions& options, const rig::WheelParameters& wheels) noexcept
-    requires std::is_same_v<S, double>;
+    requires std::is_same_v<S, double>
+      : laws_{paper::laws(wheels)},
+        innovation_gain_{options.gamma * options.ka1},
+        zeta0_N_{rig::clamped(options.zeta0, options.theta_min_N, options.theta_max_N)},
+        theta_min_N_{options.theta_min_N},
+        theta_max_N_{options.theta_max_N},
+        theta_N_{zeta0_N_},
+        zeta_N_{zeta0_N_} {}
 
   /// omega1_hat = omega1, so theta_hat = zeta0, projected.
   void reset() noexcept {

@@ -1,6 +1,7 @@
-// Rates of the wheels and of the slip as a controller models them.
+// Rates of the wheels and of the slip as a controller models them, and small helpers of laws that use them.
 #pragma once
 
+#include <numbers>
 #include <type_traits>
 
 #include "abs_hil/control/paper_laws.hpp"
@@ -9,6 +10,23 @@
 #include "abs_hil/rig/tyre_curve.hpp"
 
 namespace abs_hil::control {
+
+/// Below this speed an encoder cannot tell a turning wheel from a standing one.
+inline constexpr double standing_rad_s = 1.0;
+
+/// On a wheel that does not turn, brake and friction hold each other, and the motion says nothing about the tyre force.
+/// Real-time safe.
+template <class S>
+[[nodiscard]] constexpr auto turns(const S& omega_rad_s) noexcept {
+  return omega_rad_s >= standing_rad_s;
+}
+
+/// The same direction within half a turn of 0: sines of angles that grow for ever lose digits. Real-time safe.
+template <class S>
+[[nodiscard]] S within_half_turn_rad(const S& angle_rad) noexcept {
+  constexpr double turn_rad = 2.0 * std::numbers::pi;
+  return angle_rad - turn_rad * rig::round_down(S(angle_rad / turn_rad + 0.5));
+}
 
 /// The controller's estimate of the loads on the wheels.
 template <class S>

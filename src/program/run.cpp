@@ -14,7 +14,7 @@
 
 #include "analysis/run_summary.hpp"
 #include "config/plan.hpp"
-#include "control/silent_settings.hpp"
+#include "control/adaptive_gains.hpp"
 #include "driver/factory.hpp"
 #include "experiment/board_record.hpp"
 #include "files/result_file.hpp"

@@ -8,9 +8,9 @@
 
 #include "catch.hpp"
 #include "control/adaptive_controller.hpp"
+#include "control/adaptive_gains.hpp"
 #include "control/braking_bench.hpp"
 #include "control/drawn_gains.hpp"
-#include "control/lyapunov.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;

@@ -1,11 +1,12 @@
 // Relay and PI.
 
+#include "control/classic_controllers.hpp"
+
 #include <cmath>
 #include <random>
 
 #include "catch.hpp"
 #include "control/baseline_bench.hpp"
-#include "control/pi_controller.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;

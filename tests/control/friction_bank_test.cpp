@@ -12,7 +12,7 @@
 
 #include "abs_hil/rig/tyre_curve.hpp"
 #include "catch.hpp"
-#include "control/proximate_torque.hpp"
+#include "control/adaptive_optimal_controller.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;

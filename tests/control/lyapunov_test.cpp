@@ -1,5 +1,3 @@
-#include "control/lyapunov.hpp"
-
 #include <Eigen/LU>
 #include <limits>
 #include <random>
@@ -7,6 +5,7 @@
 
 #include "abs_hil/control/slip_error_dynamics.hpp"
 #include "catch.hpp"
+#include "control/adaptive_gains.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;

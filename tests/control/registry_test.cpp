@@ -7,7 +7,7 @@
 #include <string>
 
 #include "catch.hpp"
-#include "control/locked_controller.hpp"
+#include "control/classic_controllers.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::Contains;

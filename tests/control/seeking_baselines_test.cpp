@@ -6,7 +6,7 @@
 
 #include "catch.hpp"
 #include "control/braking_stiffness_controller.hpp"
-#include "control/mixed_slip_deceleration_controller.hpp"
+#include "control/classic_controllers.hpp"
 #include "control/peak_bench.hpp"
 
 using namespace abs_hil;

@@ -1,11 +1,10 @@
-#include "control/super_twisting_controller.hpp"
-
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <random>
 
 #include "catch.hpp"
 #include "control/baseline_bench.hpp"
+#include "control/sliding_mode_controllers.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;

@@ -1,11 +1,10 @@
-#include "control/switching_theta_estimator.hpp"
-
 #include <cmath>
 #include <limits>
 #include <random>
 #include <stdexcept>
 
 #include "catch.hpp"
+#include "control/sliding_surface.hpp"
 
 using namespace abs_hil;
 using Catch::Matchers::WithinAbs;

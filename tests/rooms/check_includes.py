@@ -84,7 +84,7 @@ def self_test(rooms):
                if other != room and other not in known and other not in ('driver_sim', 'lcmtypes')]
     planted += [('src/experiment', 'driver/sim/sim_driver.hpp'), ('src/control', 'chrono'), ('src/control', 'fmt/format.h'),
                 ('src/driver', 'lcm/lcm-cpp.hpp'), ('src/report', 'abs_hil/event_t.hpp'), ('src/nowhere', 'vector'),
-                ('include/abs_hil/control', 'control/lyapunov.hpp')]
+                ('include/abs_hil/control', 'control/adaptive_gains.hpp')]
     missed = []
     for folder, include in planted:
         with tempfile.TemporaryDirectory() as copy:

@@ -7,16 +7,11 @@
 #include "control/adaptive_controller.hpp"
 #include "control/adaptive_peak_controller.hpp"
 #include "control/braking_stiffness_controller.hpp"
+#include "control/classic_controllers.hpp"
 #include "control/five_phase_controller.hpp"
-#include "control/locked_controller.hpp"
-#include "control/mixed_slip_deceleration_controller.hpp"
 #include "control/nominal_controller.hpp"
-#include "control/pi_controller.hpp"
-#include "control/relay_controller.hpp"
 #include "control/sliding_mode_actuator_controller.hpp"
-#include "control/sliding_mode_controller.hpp"
-#include "control/smooth_sliding_mode_controller.hpp"
-#include "control/super_twisting_controller.hpp"
+#include "control/sliding_mode_controllers.hpp"
 #include "study/lanes/lane_kernels.hpp"
 
 /// Calls `each(law, tyre, load)` for every combination that has lanes. A run with another one takes the scalar path.
