@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "plant_sim/brake_path.hpp"
-#include "plant_sim/dry_friction.hpp"
 #include "plant_sim/stepping.hpp"
 
 namespace abs_hil::plant_sim {

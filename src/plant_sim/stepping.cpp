@@ -4,10 +4,64 @@
 #include <algorithm>
 #include <cmath>
 
-#include "plant_sim/dry_friction.hpp"
 #include "plant_sim/runge_kutta.hpp"
 
 namespace abs_hil::plant_sim {
+namespace {
+
+double sign_of(double value) noexcept { return value > 0.0 ? 1.0 : value < 0.0 ? -1.0 : 0.0; }
+
+/// Torque on the standing upper wheel without friction, N m.
+double pull_on_upper_Nm(const WheelModel& model, double force_N) noexcept { return model.wheels().r1_m * force_N; }
+
+/// Torque on the standing lower wheel without friction, N m.
+double pull_on_lower_Nm(const WheelModel& model, const HeldTorques& held, double force_N) noexcept {
+  return motor_torque_Nm(held, 0.0) - model.wheels().r2_m * force_N;
+}
+
+/// Largest friction torque on the standing upper wheel, N m: bearing and brake.
+double hold_of_upper_Nm(const WheelModel& model, const StateVector& x) noexcept {
+  return model.wheels().M10_Nm + x[brake_torque];
+}
+
+double direction(double speed_rad_s, double pull_Nm, double hold_Nm) noexcept {
+  if (speed_rad_s != 0.0) return sign_of(speed_rad_s);
+  return std::abs(pull_Nm) <= hold_Nm ? 0.0 : sign_of(pull_Nm);
+}
+
+}  // namespace
+
+Sliding sliding_from(TorqueBalance balance, const StateVector& x) noexcept {
+  // Assume first that a standing upper wheel is held. If its friction cannot hold it then, it cannot hold it with the
+  // force of the sliding wheel either, which differs for a load that depends on the brake.
+  balance.sliding = {sign_of(x[omega1]), sign_of(x[omega2])};
+  if (x[omega1] != 0.0 && x[omega2] != 0.0) return balance.sliding;
+  const WheelModel& model = balance.model;
+  const double force_N = balance.tyre_force_N(x, 0.0);
+  return {direction(x[omega1], pull_on_upper_Nm(model, force_N), hold_of_upper_Nm(model, x)),
+          direction(x[omega2], pull_on_lower_Nm(model, balance.held, force_N), model.wheels().M20_Nm)};
+}
+
+double margin(const TorqueBalance& balance, const StateVector& x, double time_s) noexcept {
+  const WheelModel& model = balance.model;
+  const Sliding& sliding = balance.sliding;
+  const double to_roll_rad = balance.friction.end_angle2_rad - x[angle2];
+  if (sliding.upper != 0.0 && sliding.lower != 0.0) {
+    return std::min({sliding.upper * x[omega1], sliding.lower * x[omega2], to_roll_rad});
+  }
+  const double force_N = balance.tyre_force_N(x, time_s);
+  const double upper = sliding.upper != 0.0 ? sliding.upper * x[omega1]
+                                            : hold_of_upper_Nm(model, x) - std::abs(pull_on_upper_Nm(model, force_N));
+  const double lower = sliding.lower != 0.0
+                           ? sliding.lower * x[omega2]
+                           : model.wheels().M20_Nm - std::abs(pull_on_lower_Nm(model, balance.held, force_N));
+  return std::min({upper, lower, to_roll_rad});
+}
+
+bool stands_for_good(const WheelModel& model, const HeldTorques& held, const StateVector& x) noexcept {
+  return x[omega1] == 0.0 && x[omega2] == 0.0 && std::abs(pull_on_lower_Nm(model, held, 0.0)) <= model.wheels().M20_Nm;
+}
+
 namespace {
 
 /// If a wheel breaks away and is held again within this time, the torque on it equalled its friction within rounding.
@@ -71,18 +125,9 @@ double step_to_event(TorqueBalance& balance, double step_s, StateVector& x) noex
   return taken_s;
 }
 
-/// Makes up to `steps` steps of `step_s`. It stops before a step in which `breaks(end of the step)`, and after one with
-/// which a wheel comes to stand. Returns the number of steps made.
-template <class Balance, class Breaks>
-double go_on(const Balance& balance, double steps, double step_s, StateVector& x, const Breaks& breaks) noexcept {
-  for (double made = 0.0; made < steps; made += 1.0) {
-    const StateVector end = runge_kutta_step(balance, x, step_s);
-    if (breaks(end)) return made;
-    const bool turned = x[omega1] != 0.0 && x[omega2] != 0.0;
-    x = end;
-    if (turned && (x[omega1] == 0.0 || x[omega2] == 0.0)) return made + 1.0;
-  }
-  return steps;
+/// A step with which a turning wheel comes to stand.
+bool halts(const StateVector& before, const StateVector& end) noexcept {
+  return before[omega1] != 0.0 && before[omega2] != 0.0 && (end[omega1] == 0.0 || end[omega2] == 0.0);
 }
 
 /// What `roll` needs besides the models.
@@ -101,9 +146,10 @@ template <class Tyre, class Load>
   const RollingBalance<double, Tyre, Load, HeldTorques> balance{tyre, load, r.wheels, r.held, r.friction};
   const double steps = steps_for(r.duration_s, r.max_step_s, balance.fastest_rate_per_s(x));
   const double step_s = r.duration_s / steps;
-  const double made = go_on(balance, steps, step_s, x, [&r](const StateVector& end) {
-    return !(end[omega1] >= 0.0 && end[omega2] >= 0.0 && end[angle2] <= r.end_angle2_rad);
-  });
+  const auto rolls = [&r](const StateVector& end) {
+    return end[omega1] >= 0.0 && end[omega2] >= 0.0 && end[angle2] <= r.end_angle2_rad;
+  };
+  const double made = steps_made(balance, steps, step_s, true, x, rolls, halts);
   return made == steps ? r.duration_s : made * step_s;
 }
 
@@ -142,8 +188,8 @@ double slide(const WheelModel& model, double max_step_s, const HeldTorques& held
   balance.sliding = sliding_from(balance, x);
   const double steps = steps_for(duration_s, max_step_s, fastest_rate_per_s(balance, x));
   const double step_s = duration_s / steps;
-  const double made = go_on(balance, several ? steps : 1.0, step_s, x,
-                            [&](const StateVector& end) { return margin(balance, end, step_s) < 0.0; });
+  const auto goes_on = [&](const StateVector& end) { return !(margin(balance, end, step_s) < 0.0); };
+  const double made = steps_made(balance, several ? steps : 1.0, step_s, true, x, goes_on, halts);
   if (made == steps) return duration_s;
   return made > 0.0 ? made * step_s : step_to_event(balance, step_s, x);
 }

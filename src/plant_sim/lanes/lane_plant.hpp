@@ -82,17 +82,9 @@ class WindowPass {
   }
   template <class Balance>
   [[gnu::always_inline]] auto go_on(const Balance& balance, const S& steps, const S& duration_s) noexcept {
-    BasicState<S>& x = plant_.x;
-    const S step_s = duration_s / steps;
-    auto stopped = !turns(x);
-    for (double made = 0.0;; made += 1.0) {
-      const auto goes_on = S(made) < steps;
-      if (!rig::any(goes_on)) break;
-      const BasicState<S> end = runge_kutta_step(balance, x, step_s);
-      for (std::size_t i = 0; i < x.size(); ++i) x[i] = rig::select(goes_on, end[i], x[i]);
-      stopped = stopped || !turns(x);
-    }
-    return stopped;
+    const auto where = turns(plant_.x);
+    const auto turning = [this](const BasicState<S>& end) { return turns(end); };
+    return !(where && steps_made(balance, steps, S(duration_s / steps), where, plant_.x, turning) == steps);
   }
   [[nodiscard, gnu::always_inline]] auto turns(const BasicState<S>& x) const noexcept {
     return (x[omega1] > 0.0 || plant_.upper_turns == S(0.0)) && x[omega2] > 0.0;

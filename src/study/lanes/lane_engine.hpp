@@ -6,6 +6,7 @@
 #include "rig/pack.hpp"
 #include "study/lanes/braking_run.hpp"
 #include "study/lanes/lane_kernels.hpp"
+#include "study/lanes/lane_kinds.hpp"
 
 namespace abs_hil::study::lanes {
 
@@ -123,5 +124,18 @@ void run_in_lanes(const LaneWork& work) noexcept {
   static_assert(std::is_trivially_copyable_v<Run> && std::is_trivially_copyable_v<One>);
   LaneEngine<Run>(work).run();
 }
+
+#ifdef ABS_HIL_LANE_ISA
+// The kernels of one instruction set. A source defines ABS_HIL_LANE_ISA and ABS_HIL_LANE_VECTORS and includes this; it
+// is compiled for that set alone, so it must define no function that other sources define too: tests/study/lanes checks
+// the names.
+#define ABS_HIL_LANE_KERNEL(law, tyre, load)                                            \
+  template <>                                                                           \
+  LaneKernel lane_kernel<rig::ABS_HIL_LANE_ISA, LaneKind<law, tyre, load>>() noexcept { \
+    return &run_in_lanes<rig::ABS_HIL_LANE_ISA, ABS_HIL_LANE_VECTORS, law, tyre, load>; \
+  }
+ABS_HIL_LANE_KINDS(ABS_HIL_LANE_KERNEL)
+#undef ABS_HIL_LANE_KERNEL
+#endif
 
 }  // namespace abs_hil::study::lanes

@@ -93,23 +93,14 @@ struct LaneRig {
  private:
   using HeldBalance = plant_sim::RollingBalance<S, Tyre, Load, plant_sim::BrakeAlone<S>, plant_sim::Held>;
 
-  /// Makes all steps of a cycle in these lanes. True where `well(end)` after each of them.
+  /// Makes all steps of a cycle in these lanes. True where `well(end)` at the end of each.
   template <class Balance, class Condition, class Well>
   [[gnu::always_inline]] Condition go_on(const Balance& balance, const S& duration_s, const Condition& where,
                                          const Well& well) noexcept {
     using namespace plant_sim;
     const S needed = steps_for(duration_s, max_step_s, balance.fastest_rate_per_s(x));
-    const S step_s = duration_s / needed;
     steps = rig::select(where, needed, steps);
-    Condition all_well = where;
-    for (double made = 0.0;; made += 1.0) {
-      const auto goes_on = where && S(made) < needed;
-      if (!rig::any(goes_on)) break;
-      const BasicState<S> end = runge_kutta_step(balance, x, step_s);
-      for (std::size_t i = 0; i < x.size(); ++i) x[i] = rig::select(goes_on, end[i], x[i]);
-      all_well = all_well && well(x);
-    }
-    return all_well;
+    return where && steps_made(balance, needed, S(duration_s / needed), where, x, well) == needed;
   }
   /// A cycle in which the brake holds the upper wheel. True where it does so throughout.
   template <class Condition>
