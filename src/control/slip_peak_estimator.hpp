@@ -9,7 +9,7 @@
 //   prediction  P += h diag(force_drift_per_s, slip_drift_per_s, shape_drift_per_s, 0)      h: time step, s
 //   update      S = G P G' + R,  R = force_noise_N2_s times the control rate,  r = F - Fp g,
 //               unknowns += P G' r / S,  P -= (P G') (P G')' / S
-//   jump        |F - F(15 ms ago) - (curve(l) - curve(l 15 ms ago))| > max(3 N, Fp (jump_level + |l - l ago| / w))
+//   jump        |F - F(15 ms ago) - (curve(l) - curve(l 15 ms ago))| > max(3 N, Fp (jump_part_ + |l - l ago| / w))
 //
 // g is the simplest curve that rises to a peak and falls after it, more slowly for larger c. It is not the plant's.
 #pragma once

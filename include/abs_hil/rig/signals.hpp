@@ -16,7 +16,7 @@ inline constexpr std::size_t signal_max = 8;
 /// A signal of a controller. The text must outlive the controller: use literals.
 struct Signal {
   /// With its unit at the end, as in "zeta_N". Letters, digits and '_', a letter first, at most 32 characters, not the
-  /// name of a quantity. It is the name of the CSV column and stands in signals_t.
+  /// name of a quantity. It is the name of the CSV column and stands in telemetry_t.
   std::string_view name;
   std::string_view meaning;  ///< for people, with the unit in words
 };
