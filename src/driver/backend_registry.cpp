@@ -13,8 +13,10 @@ namespace abs_hil::driver {
 
 namespace {
 
+/// Never destroyed: a controller may call exit() while another thread of a comparison makes settings from the table.
 std::vector<Backend>& backend_table() {
-  static std::vector<Backend> entries{pci::pci_backend(), can::can_backend(), usb::usb_backend(), hm2::hm2_backend()};
+  static auto& entries =
+      *new std::vector<Backend>{pci::pci_backend(), can::can_backend(), usb::usb_backend(), hm2::hm2_backend()};
   return entries;
 }
 
