@@ -80,7 +80,7 @@ void BoardGuard::take(const Order& order) noexcept {
   switch (order.word) {
     case OrderWord::grant: return grant(order);
     case OrderWord::look:
-      if (duty_ == Duty::keep && lease_ == 0 && looked_ns_ != now_ns_) look_at_board();  // once, whoever floods it
+      if (duty_ == Duty::keep && lease_ == 0 && looked_ns_ != now_ns_) look_at_board();  // once a pass
       return tell(NewsWord::looked);
     case OrderWord::take_back: return take_back(order.reason);
     case OrderWord::close:

@@ -18,7 +18,7 @@ class SharedMemory {
   /// New memory of zeros. Throws std::system_error.
   explicit SharedMemory(std::size_t bytes);
   /// Maps what stands behind a descriptor, which the caller keeps. Throws std::runtime_error unless it is sealed memory
-  /// of exactly `bytes` bytes: whoever sent it cannot make this process map more.
+  /// of exactly `bytes` bytes: its sender cannot make this process map more.
   SharedMemory(int fd, std::size_t bytes, Access access);
   SharedMemory(SharedMemory&& other) noexcept { swap(other); }
   SharedMemory& operator=(SharedMemory&& other) noexcept {

@@ -293,7 +293,7 @@ TEST_CASE("a controller that dies after it released its outputs leaves only a re
   CHECK(std::count(post.story.begin(), post.story.end(), "end") == 0);
 }
 
-TEST_CASE("released outputs are kept at zero, whoever writes to the board") {
+TEST_CASE("released outputs are kept at zero against any other writer") {
   Post post;
   post.stage = Stage::released;
   post.stage_at_ns = then_ns;

@@ -103,7 +103,7 @@ inline constexpr int safe_tries = 3;
 inline constexpr std::int64_t safe_answer_ns = 20'000'000;
 inline constexpr std::int64_t hm2_make_safe_bound_ns = safe_tries * safe_answer_ns;
 
-/// `PWM 0, enable 0, watchdog bites now`: the datagram that drops all outputs, whoever sends it.
+/// `PWM 0, enable 0, watchdog bites now`: the datagram that drops all outputs from any sender.
 [[nodiscard]] Packet safe_packet(const Board& board, const CycleAddresses::Pair& pwm) noexcept;
 
 /// The rig behind a HostMot2 board over Ethernet (docs/hm2.md). Not verified on hardware.
