@@ -1,14 +1,17 @@
 #!/usr/bin/env bash
 # setup.sh [LIST]: installs the Debian packages of scripts/LIST that are not there yet. LIST is packages.txt by default;
-# packages-vm.txt holds those of the tests in a virtual machine. What apt prints goes to build/setup.log. The script may
-# be repeated without harm.
+# packages-vm.txt holds those of the tests in a virtual machine. A line PACKAGE|PROGRAM is there as soon as PROGRAM is in
+# the path: Node.js of another source brings npm itself, and Debian's npm refuses to stand beside it. What apt prints goes
+# to build/setup.log. The script may be repeated without harm.
 set -euo pipefail
 here=$(dirname "$(realpath "$0")")
 list=${1:-packages.txt}
 
 mapfile -t wanted < <(sed 's/#.*//; s/[[:space:]]*$//; /^$/d' "$here/$list")
 missing=()
-for package in "${wanted[@]}"; do
+for line in "${wanted[@]}"; do
+  package=${line%|*}
+  if [[ $line == *"|"* ]] && command -v "${line#*|}" >/dev/null; then continue; fi
   [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)" = installed ] || missing+=("$package")
 done
 if [ ${#missing[@]} -eq 0 ]; then
