@@ -1,5 +1,6 @@
 #include "runtime/early_end.hpp"
 
+#include <dlfcn.h>
 #include <fmt/format.h>
 #include <linux/filter.h>
 #include <linux/seccomp.h>
@@ -57,25 +58,24 @@ void say(std::string_view text) noexcept {
   end_program(1);
 }
 
-/// So many threads may call exit() at the same moment. Each call takes the latest function from the list. If that is
-/// not ours, the call goes on and destroys objects that other threads still use.
-constexpr int threads_at_once = 16;
-
-void on_exit();
-
-void catch_exit() noexcept {
-  own_process = ::getpid();
-  // The latest function is called first. So each run gives it anew: before what was destroyed first in the meantime.
-  for (int i = 0; i < threads_at_once; ++i) {
-    static_cast<void>(std::atexit(on_exit));
-    static_cast<void>(std::at_quick_exit(on_exit));
-  }
-}
-
-void on_exit() {
+void on_exit() noexcept {
   if (watched.load()) {
     end_early("fault: code in this program, such as the controller's, called exit() or quick_exit()", true);
   }
+}
+
+/// For quick_exit(), and for a call that does not meet our exit() below, such as one within the C library.
+void catch_exit() noexcept {
+  own_process = ::getpid();
+  // The latest function is called first. So each run registers it anew, before the destructors of what was made since.
+  static_cast<void>(std::atexit(on_exit));
+  static_cast<void>(std::at_quick_exit(on_exit));
+}
+
+[[noreturn]] void exit_of_the_library(int status) noexcept {
+  const auto function = reinterpret_cast<void (*)(int)>(::dlsym(RTLD_NEXT, "exit"));
+  if (function != nullptr) function(status);
+  end_program(status);
 }
 
 /// exit_group or exec of the cycle's thread.
@@ -118,6 +118,17 @@ constexpr double whole_grace_s = 20.0;
 constexpr double slowness_max = 100.0;
 
 }  // namespace
+
+}  // namespace abs_hil::runtime
+
+// Stands before the C library's exit(), which calls destructors of objects that other threads still use (the runs of a
+// comparison) before it calls a function that was registered earlier.
+extern "C" [[noreturn]] void exit(int status) noexcept {
+  abs_hil::runtime::on_exit();
+  abs_hil::runtime::exit_of_the_library(status);
+}
+
+namespace abs_hil::runtime {
 
 EarlyEndWatch::EarlyEndWatch() {
   catch_exit();

@@ -127,6 +127,7 @@ class OwnProcess(ProgramTest):
         result = subprocess.run([OWN, 'compare', '--controllers', 'exits', '--repeat', '2'], capture_output=True, text=True, timeout=60)
         self.assertEqual(result.returncode, 1, result.stderr)
         self.assertIn('called exit()', result.stderr)
+        self.assertNotIn('destroyed', result.stderr, 'the other run still uses it')
 
 
 class Files(ProgramTest):

@@ -12,7 +12,15 @@ namespace {
 
 using namespace abs_hil;
 
-void exits() { std::exit(0); }
+/// An object that the run makes: another run still uses it when exit() is called.
+struct SharedByRuns {
+  ~SharedByRuns() { static_cast<void>(!::write(STDERR_FILENO, "destroyed\n", 10)); }
+};
+
+void exits() {
+  static const SharedByRuns shared;
+  std::exit(0);
+}
 void exits_at_once() { ::_exit(0); }
 void exits_quickly() { std::quick_exit(0); }
 void execs() { static_cast<void>(::execl("/bin/true", "true", nullptr)); }

@@ -105,7 +105,7 @@ class Slcan(CanRigTest):
         program = self.braking(node)
         ADAPTER.say('sw100096\r')
         errors = self.finish(program, 0)
-        self.assertIn('1 warnings', errors)
+        self.assertIn('1 of them warnings', errors)
 
     def test_bus_off_at_start_is_told_with_its_fix(self):
         self.node()
