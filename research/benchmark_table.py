@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """usage: benchmark_table.py --check|--write
 
-Keeps two tables: the standing of all controllers in docs/benchmark.md, between the lines <!-- benchmark --> and <!-- end -->,
-and the bounds of the nominal cases in docs/optimum.md, between <!-- bounds --> and <!-- end -->. --write puts them there,
---check fails where a page says something else. Needs the package abs_hil of a build
+Keeps two tables of docs/benchmark.md: the standing of all controllers, between the lines <!-- benchmark --> and <!-- end -->,
+and the bounds of the nominal cases, between <!-- bounds --> and <!-- end -->. --write puts them there, --check fails where
+the page says something else. Needs the package abs_hil of a build
 (PYTHONPATH=build/release/share/abs_hil/python).
 """
 import pathlib
@@ -41,7 +41,7 @@ def main():
     if sys.argv[1:] not in (['--check'], ['--write']):
         print(__doc__, file=sys.stderr)
         return 2
-    return keep(sys.argv[1], [('optimum.md', 'bounds', nominal_bounds), ('benchmark.md', 'benchmark', standing)])
+    return keep(sys.argv[1], [('benchmark.md', 'bounds', nominal_bounds), ('benchmark.md', 'benchmark', standing)])
 
 
 if __name__ == '__main__':

@@ -101,7 +101,7 @@ def _all_mismatches() -> list[Case]:
 
 
 def _in_version_1(case: Case) -> bool:
-    """A limited rate on patches was left out while its optimum could not be confirmed on the plant (docs/optimum.md)."""
+    """A limited rate on patches was left out while its optimum could not be confirmed on the plant (docs/benchmark.md)."""
     return not (case.road == 'patches' and case.name.startswith('rate'))
 
 

@@ -1,4 +1,4 @@
-"""How short a braking can be: optimal control of the rig's own equations (docs/optimum.md). Needs casadi."""
+"""How short a braking can be: optimal control of the rig's own equations (docs/benchmark.md). Needs casadi."""
 from __future__ import annotations
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""python -m abs_hil.optimum: the bound of one plant and road, or the table of docs/optimum.md."""
+"""python -m abs_hil.optimum: the bound of one plant and road, or the table of docs/benchmark.md."""
 from __future__ import annotations
 
 import argparse
