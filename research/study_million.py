@@ -2,7 +2,7 @@
 """usage: study_million.py BUILD [--points N] [--slurm] [--write]
 
 Runs examples/studies/million.toml on all processors, then reads its results in Python: quantiles of all metrics, and a map of
-the stop distance over theta and B. Prints times and memory, or writes them into docs/cluster.md (--write).
+the stop distance over theta and B. Prints times and memory, or writes them into docs/studies.md (--write).
 --slurm: the same study as seven tasks of an array job on a Slurm of two nodes, which the script starts in a private network
 namespace (root; scripts/setup.sh packages-slurm.txt); ends with status 1 unless the results are the same bytes.
 --points: fewer runs, for a try.
@@ -95,7 +95,7 @@ def main():
         text = table(o, pathlib.Path(folder))
     print(text, end='')
     if o.write:
-        write('cluster.md', 'million', text)
+        write('studies.md', 'million', text)
     return 0
 
 

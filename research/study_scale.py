@@ -2,7 +2,7 @@
 """usage: study_scale.py BUILD [--write]
 
 Measures what a study costs beside its runs, for planning: start of a task, bytes of a run, time to write a chunk, memory,
-and what becomes of the rate if a study is parted into short tasks. Prints the table of docs/cluster.md, or writes it there.
+and what becomes of the rate if a study is parted into short tasks. Prints the table of docs/studies.md, or writes it there.
 Rates are ratios to the rate of one process, measured side by side, since other programs may load this computer.
 """
 import gzip
@@ -90,7 +90,7 @@ def main():
     if '--write' not in sys.argv:
         print(text)
         return 0
-    write('cluster.md', 'plan', text)
+    write('studies.md', 'plan', text)
     return 0
 
 

@@ -3,7 +3,7 @@
 
 Builds the programs (what scripts/run.sh needs) of each revision from nothing, without ccache, and prints the CPU time
 of each build and its ratio to the first one. Takes some minutes for each revision; nothing else should run meanwhile.
---write puts the table into docs/performance.md.
+--write puts the table into docs/reference/performance.md.
 """
 import argparse
 import os
@@ -55,13 +55,13 @@ def table(revisions):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[1])
     parser.add_argument('revisions', nargs='+', metavar='REVISION')
-    parser.add_argument('--write', action='store_true', help='put the table into docs/performance.md')
+    parser.add_argument('--write', action='store_true', help='put the table into docs/reference/performance.md')
     arguments = parser.parse_args()
     text = table(arguments.revisions)
     if not arguments.write:
         print(text, end='')
         return
-    write('performance.md', 'build cost', text)
+    write('reference/performance.md', 'build cost', text)
 
 
 if __name__ == '__main__':

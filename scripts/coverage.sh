@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Writes the lines and branches that the tests reach, room by room, into the tables of docs/quality.md.
+# Prints the lines and branches that the tests reach, room by room, and keeps the table in build/coverage/coverage.md.
 # build/coverage/html/index.html shows every line. The script builds with clang's source-based coverage. It leaves out
 # the tests in a virtual machine and the long ones. Status 1 if the tests reach fewer of the lines outside apps than
 # coverage_table.py requires.
@@ -26,4 +26,4 @@ shared=("${programs[@]:1}" -instr-profile "$build/all.profdata" -compilation-dir
   -ignore-filename-regex '/(build|tests|usr)/')
 llvm-cov-16 export -format=lcov "${shared[@]}" >"$build/lines.lcov"
 llvm-cov-16 show -format=html -show-branches=count -output-dir "$build/html" "${shared[@]}"
-python3 scripts/coverage_table.py "$build/lines.lcov"
+python3 scripts/coverage_table.py "$build/lines.lcov" | tee "$build/coverage.md"

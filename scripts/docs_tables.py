@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """usage: docs_tables.py --check|--write [BUILD] | --self-test
 
-Keeps the tables in README.md and docs/*.md that a program can print. Between the lines
+Keeps the tables in README.md and the pages of docs/ that a program can print. Between the lines
 
     <!-- table: NAME -->
     <!-- end -->
@@ -39,11 +39,6 @@ def tsv_rows(file):
 TABLES = {
     'quantities': (json_rows('abs_hil', 'list', '--quantities', '--json'),
                    {'name': '`{name}`', 'unit': '{unit}', 'CSV column': '{csv_column}', 'meaning': '{meaning}'}),
-    'reasons': (json_rows('abs_hil', 'list', '--reasons', '--json'),
-                {'number': '{number}', 'kind': '{kind}', 'reason': '{text}', 'value': '{quantity}',
-                 'unit': '{unit}', 'bound': '{bound}'}),
-    'keys': (json_rows('abs_hil', 'list', '--keys', '--json'),
-             {'key': '`{name}`', 'default': '{value}', 'valid': '{valid}', 'unit': '{unit}', 'on a real board': '{safety}'}),
     'rooms': (tsv_rows('rooms.tsv'), {'room': '`{room}`', 'holds': '{holds}', 'may know': '{may know}'}),
 }
 MARKED = re.compile(r'^(<!-- table: (\S+) -->\n)(.*?)^(<!-- end -->)$', re.MULTILINE | re.DOTALL)
@@ -85,7 +80,7 @@ def main():
         return 2
     folder = pathlib.Path(build[0] if build else ROOT / 'build' / 'release').resolve()
     stale = []
-    for path in [ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md'))]:
+    for path in [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]:
         page = path.read_text(encoding='utf-8')
         current = filled(page, folder, TABLES)
         if current != page:

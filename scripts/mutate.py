@@ -9,7 +9,7 @@ mutate_equivalent.txt must list each survivor with the reason why it changes not
 listed or a listed mutant is killed.
 
 The run takes some minutes and needs the libraries of build/release. Start it on demand. Results:
-docs/quality-mutation.md.
+docs/reference/quality.md.
 """
 import argparse
 import concurrent.futures

@@ -2,7 +2,7 @@
 """usage: performance.py [--output FILE] [--lanes]
 
 Runs the benchmarks of build/release, and the same braking in Octave and SciPy if they are installed. Writes
-docs/performance.md. Each figure is the median of repetitions. The repetitions of one program's benchmarks are
+docs/reference/performance.md. Each figure is the median of repetitions. The repetitions of one program's benchmarks are
 interleaved. --lanes renews the section on many runs alone. `scripts/setup_python.sh python-packages-bench.txt` installs
 numba for it, which it compares with if it is there.
 """
@@ -224,42 +224,19 @@ def bare_rows(found):
             for name in sorted(rates, key=rates.get, reverse=True)]
 
 
-def memory_rows():
-    """Memory of studies of many short runs."""
-    rows = []
-    with tempfile.TemporaryDirectory() as scratch:
-        for runs in (10_000, 100_000, 1_000_000):
-            study = pathlib.Path(scratch, f'{runs}.toml')
-            study.write_text(f'''[settings]
-experiment.start_speed_rad_s = 155
-experiment.end_speed_m_s = 15.0
-[design]
-kind = "random"
-points = {runs}
-[factors]
-plant.theta_N = {{ from = 15, to = 30 }}
-''')
-            command = ['abs_hil', 'study', str(study), '--out', f'{scratch}/{runs}', '--threads', '1']
-            silent = [(os.POSIX_SPAWN_OPEN, stream, '/dev/null', os.O_WRONLY, 0) for stream in (1, 2)]
-            pid = os.posix_spawn(BIN / 'abs_hil', command, os.environ, file_actions=silent)
-            _, status, usage = os.wait4(pid, 0)
-            if status:
-                sys.exit(f'the study of {runs} runs ended with status {status}')
-            rows.append([f'{runs:,}', f'{usage.ru_maxrss / 1024:.0f} MB'])
-    return rows
-
-
 def lanes():
     """The section on runs in lanes of packs."""
     found = bench('bench_lanes', LANES_REPETITIONS)
     names = [name.removesuffix('/none') for name in found if name.endswith('/none')]
+    names = [name for name in names if name.startswith('paper-table1') or name.endswith('/adaptive')]
     names.sort(key=lambda name: (' on ' in name, not name.startswith('paper'), name))
     return f'''{LANES}
 
 Braking runs a second of CPU time, medians of {LANES_REPETITIONS} interleaved repetitions: from 170 rad/s to 0.3 m/s at
 1 kHz, with the real actuator and encoders, on plants varied as `abs_hil compare` does, set-up included. In parentheses:
 against the scalar path. The last column is the share of the runs that stayed in lanes; the scalar path computed the others
-again. On patches, the friction is halved in every second stretch of 2 m.
+again. On patches, the friction is halved in every second stretch of 2 m. `bench_lanes` measures the other laws on
+`inteco-manual` too.
 
 {machine()}
 
@@ -271,10 +248,6 @@ The limit is the bare plant: (1)-(7) with both wheels turning, without controlle
 all the rest. One core, in the same minutes:
 
 {table(['the bare plant', 'runs a second'], bare_rows(found))}
-
-What a study needs does not grow with its runs:
-
-{table(['short runs of a study', 'memory at most'], memory_rows())}
 '''
 
 
@@ -286,7 +259,7 @@ def build_cost(page):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[1])
-    parser.add_argument('--output', type=pathlib.Path, default=ROOT / 'docs' / 'performance.md')
+    parser.add_argument('--output', type=pathlib.Path, default=ROOT / 'docs' / 'reference' / 'performance.md')
     parser.add_argument('--lanes', action='store_true', help='renew the section on many runs alone')
     arguments = parser.parse_args()
     if not (BIN / ('bench_lanes' if arguments.lanes else 'bench_integration')).exists():

@@ -15,7 +15,7 @@ class FolderError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// File names in a run folder (docs/run-folders.md).
+/// File names in a run folder (docs/experiments.md, "Run folders").
 namespace file {
 inline constexpr std::string_view csv = "run.csv";
 inline constexpr std::string_view log = "run.lcmlog";

@@ -27,7 +27,7 @@ struct UnsafeOptions {
   ABS_HIL_OPTION(std::string, keys, "",
                  .meaning =
                      "accept the values of these keys, separated by commas, although they weaken the protection of a "
-                     "board: docs/keys.md",
+                     "board: docs/rig-setup.md",
                  .safety = {.kind = rig::SafetyClass::Kind::consent});
 };
 

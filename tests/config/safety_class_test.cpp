@@ -1,4 +1,4 @@
-// How each key bears on the safety of a run on a board: docs/keys.md is made from the same rows.
+// How each key bears on the safety of a run on a board: `abs_hil list --keys` prints the same rows.
 
 #include <set>
 #include <stdexcept>

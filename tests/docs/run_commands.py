@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """usage: run_commands.py ROOT BUILD [PAGE...] | --self-test
 
-Runs every command that README.md, CONTRIBUTING.md and docs/*.md show, page by page, each page in a scratch folder that
+Runs every command that README.md, CONTRIBUTING.md and the pages of docs/ show, page by page, each page in a scratch folder that
 looks like the top of the tree. A command must end with status 0, within its time. not_run.txt lists commands that
 cannot run here, with the reason. An entry that matches no command is an error.
 
@@ -214,7 +214,7 @@ def main():
         print(__doc__, file=sys.stderr)
         return 2
     root, build = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
-    everything = [root / 'README.md', root / 'CONTRIBUTING.md', *sorted((root / 'docs').glob('*.md'))]
+    everything = [root / 'README.md', root / 'CONTRIBUTING.md', *sorted((root / 'docs').rglob('*.md'))]
     everything.remove(root / 'docs' / 'tutorial.md')  # it changes the tree: tutorial_test.py runs it in a copy
     pages = [root / page for page in sys.argv[3:]] or everything
     exceptions = Exceptions(pathlib.Path(__file__).parent / 'not_run.txt')

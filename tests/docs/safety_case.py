@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """usage: safety_case.py BUILD PAGE | --self-test
 
-Every layer of docs/safety-case.md names tests, all of which exist, and at least one of which CI runs without being asked
+Every layer of docs/safety.md names tests, all of which exist, and at least one of which CI runs without being asked
 (not of the label on-demand).
 """
 import json

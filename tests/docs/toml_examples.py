@@ -67,7 +67,7 @@ def main():
     problems, seen = [], dict.fromkeys(KINDS, 0)
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        for path in sorted([*root.glob('*.md'), *root.glob('docs/*.md'), *root.glob('examples/**/*.md')]):
+        for path in sorted([*root.glob('*.md'), *root.glob('docs/**/*.md'), *root.glob('examples/**/*.md')]):
             whole = None
             try:
                 blocks = blocks_of(path.read_text())

@@ -50,7 +50,7 @@ struct Matrix {
   std::vector<MatrixCase> cases{};
   double nominal_m{0.0};  ///< stopping distance without a fault
 };
-/// The text of docs/fault-matrix.md.
-[[nodiscard]] std::string page(const Matrix& sim, const Matrix& card);
+/// The text of docs/reference/fault-matrix.csv.
+[[nodiscard]] std::string stored(const Matrix& sim, const Matrix& card);
 
 }  // namespace abs_hil::experiment::test

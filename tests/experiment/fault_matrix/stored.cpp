@@ -1,0 +1,44 @@
+// The results of all runs as they stand in docs/reference/fault-matrix.csv.
+
+#include <array>
+#include <cstdio>
+
+#include "matrix.hpp"
+
+namespace abs_hil::experiment::test {
+
+namespace {
+
+template <typename... Values>
+std::string formatted(const char* format, Values... values) {
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(), format, values...);
+  return text.data();
+}
+
+/// Reason and time of a run that stopped; the change of the stop distance of one that went on, if one can see it.
+std::string result(const MatrixCase& c, double nominal_m) {
+  if (!c.survived()) return formatted("%d,%.0f,", static_cast<int>(c.reason), c.reaction_s * 1e3);
+  const double longer = 100.0 * (c.metrics.stop_distance_m / nominal_m - 1.0);
+  return longer > 0.05 || longer < -0.05 ? formatted(",,%+.1f", longer) : ",,";
+}
+
+std::string rows(const Matrix& matrix, const std::string& backend) {
+  std::string text;
+  for (const MatrixCase& c : matrix.cases) {
+    if (c.injection.kind == driver::InjectionKind::ok) continue;
+    text.append(backend).append(",").append(rig::name_of(c.injection.phase.value())).append(",");
+    text.append(driver::name_of(c.injection.signal)).append(",").append(driver::name_of(c.injection.kind));
+    text += ',' + result(c, matrix.nominal_m) + '\n';
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string stored(const Matrix& sim, const Matrix& card) {
+  return "backend,phase,signal,fault,reason,after_ms,stop_distance_change_percent\n" + rows(sim, "sim") +
+         rows(card, "card");
+}
+
+}  // namespace abs_hil::experiment::test
