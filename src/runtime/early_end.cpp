@@ -38,12 +38,16 @@ void say(std::string_view text) noexcept {
   while (true) ::syscall(SYS_exit_group, status, own_end);
 }
 
+/// Another thread ends the program already.
+std::atomic_flag ending;
+[[noreturn]] void wait_for_the_end() noexcept {
+  while (true) ::poll(nullptr, 0, 1000);
+}
+
 [[noreturn]] void end_early(std::string_view why, bool make_safe) noexcept {
   const pid_t own = own_process.load();  // 0: nobody watches
   if (own != 0 && own != ::getpid()) end_program(1);
-  static std::atomic_flag ending;
-  // Another thread ends the program already.
-  while (ending.test_and_set()) ::poll(nullptr, 0, 1000);
+  if (ending.test_and_set()) wait_for_the_end();
   std::string_view outputs;
   Outputs* others = running.load();
   if (make_safe && (of_this_thread != nullptr || others != nullptr)) {
@@ -135,7 +139,11 @@ EarlyEndWatch::EarlyEndWatch() {
   watched = true;
 }
 
-EarlyEndWatch::~EarlyEndWatch() { watched = false; }
+EarlyEndWatch::~EarlyEndWatch() {
+  watched = false;
+  // A thread that called exit() ended the run. The status is that thread's, however late it gets a processor.
+  if (ending.test()) wait_for_the_end();
+}
 
 CycleInThisThread::CycleInThisThread(Outputs& outputs, bool own_thread) noexcept : before_(of_this_thread) {
   of_this_thread = &outputs;

@@ -141,13 +141,15 @@ class OwnBackend(unittest.TestCase):
     def test_safe_ends_the_run_and_its_outputs(self):
         board = self.board()
         self.assertEqual(self.commission(board)[0], 0)
-        program = subprocess.Popen(self.run_command(board), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        errors = self.folder / 'errors'
+        with errors.open('w') as stderr:
+            program = subprocess.Popen(self.run_command(board), stdout=subprocess.DEVNULL, stderr=stderr)
         board.wait_for('widths 255 0')
         result = subprocess.run([PROGRAM, 'safe', *self.options(board)], capture_output=True, text=True, timeout=60)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn('drive 0 and brake 0, verified', result.stdout)
         self.assertIn('; ended process', result.stdout)
-        self.assertIn(program.wait(timeout=20), (143, -signal.SIGKILL))
+        self.assertIn(program.wait(timeout=20), (143, -signal.SIGKILL), errors.read_text())
         self.assertEqual(board.widths(), (0, 0))
 
 
