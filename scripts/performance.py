@@ -2,7 +2,7 @@
 """usage: performance.py [--output FILE] [--lanes]
 
 Runs the benchmarks of build/release, and the same braking in Octave and SciPy if they are installed. Writes
-docs/reference/performance.md. Each figure is the median of repetitions. The repetitions of one program's benchmarks are
+build/release/performance.md; docs/reference/performance.md has the main figures. Each figure is the median of repetitions. The repetitions of one program's benchmarks are
 interleaved. --lanes renews the section on many runs alone. `scripts/setup_python.sh python-packages-bench.txt` installs
 numba for it, which it compares with if it is there.
 """
@@ -228,15 +228,13 @@ def lanes():
     """The section on runs in lanes of packs."""
     found = bench('bench_lanes', LANES_REPETITIONS)
     names = [name.removesuffix('/none') for name in found if name.endswith('/none')]
-    names = [name for name in names if name.startswith('paper-table1') or name.endswith('/adaptive')]
     names.sort(key=lambda name: (' on ' in name, not name.startswith('paper'), name))
     return f'''{LANES}
 
 Braking runs a second of CPU time, medians of {LANES_REPETITIONS} interleaved repetitions: from 170 rad/s to 0.3 m/s at
 1 kHz, with the real actuator and encoders, on plants varied as `abs_hil compare` does, set-up included. In parentheses:
 against the scalar path. The last column is the share of the runs that stayed in lanes; the scalar path computed the others
-again. On patches, the friction is halved in every second stretch of 2 m. `bench_lanes` measures the other laws on
-`inteco-manual` too.
+again. On patches, the friction is halved in every second stretch of 2 m.
 
 {machine()}
 
@@ -251,15 +249,9 @@ all the rest. One core, in the same minutes:
 '''
 
 
-def build_cost(page):
-    """The section that scripts/build_cost.py writes, from the page as it is."""
-    begin = page.find('## Building the programs')
-    return page[begin:] if begin >= 0 else ''
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[1])
-    parser.add_argument('--output', type=pathlib.Path, default=ROOT / 'docs' / 'reference' / 'performance.md')
+    parser.add_argument('--output', type=pathlib.Path, default=ROOT / 'build' / 'release' / 'performance.md')
     parser.add_argument('--lanes', action='store_true', help='renew the section on many runs alone')
     arguments = parser.parse_args()
     if not (BIN / ('bench_lanes' if arguments.lanes else 'bench_integration')).exists():
@@ -267,10 +259,9 @@ def main():
     before = arguments.output.read_text() if arguments.output.exists() else ''
     if arguments.lanes:
         begin = before.find(LANES)
-        head = before[:begin if begin >= 0 else before.find('## Building the programs')]
-        arguments.output.write_text(head + lanes() + '\n' + build_cost(before))
+        arguments.output.write_text((before[:begin] if begin >= 0 else before) + lanes())
         return
-    arguments.output.write_text(page() + '\n' + lanes() + '\n' + build_cost(before))
+    arguments.output.write_text(page() + '\n' + lanes())
 
 
 if __name__ == '__main__':
