@@ -14,7 +14,6 @@ set(ABS_HIL_ROOM_TABLE
   "experiment | sequence of phases, the logic of a run, commissioning | files rig control driver runtime"
   "lcmtypes | the message types, generated from `lcmtypes/*.lcm` | "
   "telemetry | LCM messages, event log, CSV, flight record, status line | files rig lcmtypes"
-  "watch | `abs_hil watch`: the view of a running experiment, its screen, the terminal | files rig telemetry lcmtypes"
   "analysis | metrics, summary | rig"
   "run_folder | run folders: layout, environment, checksums, the index of a series | files rig"
   "diagnosis | the checks of `abs_hil doctor`, the verdict of `abs_hil latency` | files rig driver runtime telemetry"
@@ -25,9 +24,9 @@ set(ABS_HIL_ROOM_TABLE
   "commands | remote commands over LCM: authority, listener, sender | files rig control plant_sim driver runtime experiment config telemetry lcmtypes"
   "replay | recorded runs through the cycle again: proof of equal commands, other controllers open loop | files rig control plant_sim driver driver_sim runtime experiment analysis config run telemetry lcmtypes"
   "interchange | what other tools bring or take: controllers from shared libraries and FMUs, the process that runs them, plant and laws as FMUs | files rig control plant_sim driver driver_sim runtime experiment"
-  "program | what `abs_hil` decides between its command line and the other rooms | cli files rig control plant_sim driver driver_sim runtime experiment lcmtypes telemetry watch analysis run_folder diagnosis config guardian run study commands replay interchange"
+  "program | what `abs_hil` decides between its command line and the other rooms | cli files rig control plant_sim driver driver_sim runtime experiment lcmtypes telemetry analysis run_folder diagnosis config guardian run study commands replay interchange"
 )
 
 # Rooms whose code neither runs in the cycle nor takes a noticeable time beside it. A release compiles them with -O1,
 # which saves about a third of their compile time.
-set(ABS_HIL_ROOMS_BESIDE_THE_CYCLE cli files watch analysis run_folder diagnosis config study commands replay interchange program)
+set(ABS_HIL_ROOMS_BESIDE_THE_CYCLE cli files analysis run_folder diagnosis config study commands replay interchange program)

@@ -1,5 +1,5 @@
 """The programs in Python: abs_report, abs_tune, abs_learn, abs_identify, abs_benchmark,
-abs_convert. `abs_hil report ...` starts them too."""
+abs_convert, abs_watch. `abs_hil report ...` starts them too."""
 from __future__ import annotations
 
 import contextlib
@@ -12,7 +12,7 @@ import sys
 #: name -> module with main(arguments) -> exit status
 PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn': 'abs_hil.learning.program',
             'identify': 'abs_hil.identification.program', 'benchmark': 'abs_hil.benchmark.program',
-            'convert': 'abs_hil.interchange.program'}
+            'convert': 'abs_hil.interchange.program', 'watch': 'abs_hil.watch.program'}
 
 
 class _Stdout(io.FileIO):
@@ -85,3 +85,7 @@ def benchmark() -> None:
 
 def convert() -> None:
     sys.exit(start('convert', sys.argv[1:]))
+
+
+def watch() -> None:
+    sys.exit(start('watch', sys.argv[1:]))

@@ -36,7 +36,7 @@ constexpr std::array table{
     Subcommand{"export-fmu",
                "write the simulated rig, or with --controller a slip controller, as an FMU for other tools",
                &add_export_fmu},
-    Subcommand{"watch", "show a running experiment in this terminal, over LCM; q quits", &add_watch},
+    Subcommand{"watch", "show a running experiment in this terminal, over LCM; q quits"},
     Subcommand{"send", "send a command to a running abs_hil over LCM", &add_send},
     Subcommand{"report", "make a page with figures and tables of recorded runs, or export their rows"},
     Subcommand{"tune", "search for a controller's gains in simulation"},

@@ -44,7 +44,6 @@ Action add_safe(cli::Parser& parser, const Words& words);
 Action add_replay(cli::Parser& parser, const Words& words);
 Action add_convert(cli::Parser& parser, const Words& words);
 Action add_export_fmu(cli::Parser& parser, const Words& words);
-Action add_watch(cli::Parser& parser, const Words& words);
 Action add_send(cli::Parser& parser, const Words& words);
 
 /// Compares controllers in simulation, or records one run of the comparison. Throws config::ConfigError and

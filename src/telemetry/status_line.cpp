@@ -1,13 +1,11 @@
 #include "telemetry/status_line.hpp"
 
+#include <fmt/format.h>
 #include <poll.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <utility>
 
@@ -22,35 +20,29 @@ int columns_of(int file) {
   return ::ioctl(file, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
 }
 
+/// "-" for an unknown number.
+std::string number(double value, int width, int decimals) {
+  return std::isnan(value) ? fmt::format("{:>{}}", "-", width) : fmt::format("{:{}.{}f}", value, width, decimals);
+}
+
 /// Wake-up latency and cycle time as p50/p99/p99.9/max; empty while nothing has been measured.
-std::array<char, 128> timing_text(const StatusSnapshot& status) {
-  std::array<char, 128> text{};
+std::string timing_text(const StatusSnapshot& status) {
   const rig::DurationQuantiles& wakeup = status.wakeup_latency;
   const rig::DurationQuantiles& cycle = status.cycle_time;
-  if (std::isfinite(wakeup.p50_us) && std::isfinite(cycle.p50_us)) {
-    std::snprintf(text.data(), text.size(), "  wake-up %.0f/%.0f/%.0f/%.0f  cycle %.0f/%.0f/%.0f/%.0f us",
-                  wakeup.p50_us, wakeup.p99_us, wakeup.p99_9_us, wakeup.max_us, cycle.p50_us, cycle.p99_us,
-                  cycle.p99_9_us, cycle.max_us);
-  }
-  return text;
+  if (!std::isfinite(wakeup.p50_us) || !std::isfinite(cycle.p50_us)) return {};
+  return fmt::format("  wake-up {:.0f}/{:.0f}/{:.0f}/{:.0f}  cycle {:.0f}/{:.0f}/{:.0f}/{:.0f} us", wakeup.p50_us,
+                     wakeup.p99_us, wakeup.p99_9_us, wakeup.max_us, cycle.p50_us, cycle.p99_us, cycle.p99_9_us,
+                     cycle.max_us);
 }
 
 }  // namespace
 
 std::string format_status_line(const rig::CycleRecord& record, const StatusSnapshot& status) {
   const rig::WheelSpeeds speeds = rig::best_speeds(record);
-  const std::string_view phase = rig::name_of(record.phase);
-  std::array<char, 256> text{};
-  const int size = std::snprintf(
-      text.data(), text.size(),
-      "%-10.*s ω1 %6.1f  ω2 %6.1f rad/s  slip %5.2f  θ̂ %6.2f N  overruns %llu  drops %llu  gate %llu%s",
-      static_cast<int>(phase.size()), phase.data(), speeds.omega1_rad_s, speeds.omega2_rad_s, rig::best_slip(record),
-      record.control.theta_est_N, static_cast<unsigned long long>(status.overruns),
-      static_cast<unsigned long long>(status.telemetry_drops),
-      static_cast<unsigned long long>(status.gate_interventions), timing_text(status).data());
-  // A speed of 1e300 fills the buffer. Then the text is cut.
-  if (size < 0) return {};
-  return {text.data(), std::min(static_cast<std::size_t>(size), text.size() - 1)};
+  return fmt::format("{:<10} ω1 {}  ω2 {} rad/s  slip {}  θ̂ {} N  overruns {}  drops {}  gate {}{}",
+                     rig::name_of(record.phase), number(speeds.omega1_rad_s, 6, 1), number(speeds.omega2_rad_s, 6, 1),
+                     number(rig::best_slip(record), 5, 2), number(record.control.theta_est_N, 6, 2), status.overruns,
+                     status.telemetry_drops, status.gate_interventions, timing_text(status));
 }
 
 std::string_view cut_to_columns(std::string_view text, int columns) noexcept {

@@ -77,7 +77,7 @@ def port_drops(pid=None):
 
 
 class Subscriber:
-    """The project's own receiver of runs (`RunListener`, as in `abs_hil watch`) in its own process."""
+    """The project's own receiver (`telemetry::Receiver`, as in `abs_hil watch`) in its own process."""
 
     def __init__(self, helper, url, precedence=(), silence_s=2):
         self.process = subprocess.Popen([*precedence, helper, 'receive', url, str(silence_s)], stdout=subprocess.PIPE, text=True)

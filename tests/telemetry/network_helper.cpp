@@ -12,10 +12,11 @@
 #include <thread>
 
 #include "commands/command_listener.hpp"
+#include "telemetry/checked_decode.hpp"
 #include "telemetry/lcm_outlet.hpp"
 #include "telemetry/log_outlet.hpp"
 #include "telemetry/message_stream.hpp"
-#include "telemetry/run_listener.hpp"
+#include "telemetry/receiver.hpp"
 #include "telemetry/sample_records.hpp"
 
 namespace abs_hil::telemetry {
@@ -98,21 +99,24 @@ int subscribe(const std::string& url, std::int64_t count) {
 }
 
 /// Counts telemetry by its sequence numbers, as one who shows or keeps it would.
-class LossCounter : public RunObserver {
+class LossCounter {
  public:
-  void take(const telemetry_t& message) override {
-    ++received;
-    if (message.sequence < next) return;  // late: counted as lost before
-    lost += message.sequence - next;
-    next = message.sequence + 1;
+  void take(const std::string& channel, std::span<const std::uint8_t> packet) {
+    if (channel == "ABS_TELEMETRY") {
+      telemetry_t message{};
+      if (!decode_checked(packet, message).empty()) {
+        ++malformed;
+        return;
+      }
+      ++received;
+      if (message.sequence < next) return;  // late: counted as lost before
+      lost += message.sequence - next;
+      next = message.sequence + 1;
+    }
+    if (channel == "ABS_STATUS") {
+      subscribed = decode_checked(packet, status).empty() || subscribed;
+    }
   }
-  void take(const status_t& message) override {
-    status = message;
-    subscribed = true;
-  }
-  void take(const event_t& /*message*/) override {}
-  void take(const experiment_t& /*message*/) override {}
-  void take_malformed() override { ++malformed; }
 
   std::int64_t received{0};
   std::int64_t next{0};
@@ -123,9 +127,8 @@ class LossCounter : public RunObserver {
 };
 
 /// A tcpq server hears of a subscription when its thread comes to it, up to some 0.1 s later. Waits until it hands on
-/// what another client publishes. Of one client the server takes everything in order, and telemetry is subscribed to
-/// before the status. False if that does not come within 10 s.
-bool await_subscription(const std::string& url, RunListener& listener, const LossCounter& counter) {
+/// what another client publishes. False if that does not come within 10 s.
+bool await_subscription(const std::string& url, Receiver& listener, const LossCounter& counter) {
   lcm::LCM other(url);
   const status_t message{};
   for (int tries = 0; tries < 1'000 && !counter.subscribed; ++tries) {
@@ -139,7 +142,8 @@ bool await_subscription(const std::string& url, RunListener& listener, const Los
 /// Until nothing has come for `silence_s`, 30 s for the first.
 int receive(const std::string& url, int silence_s) {
   LossCounter counter;
-  RunListener listener(url, "ABS_", counter);
+  Receiver listener(url, "ABS_(TELEMETRY|STATUS|EVENT|EXPERIMENT)",
+                    [&](const std::string& channel, auto packet) { counter.take(channel, packet); });
   if (url.starts_with("tcpq:") && !await_subscription(url, listener, counter)) {
     std::fprintf(stderr, "the server of %s does not hand on what is published\n", url.c_str());
     return 3;

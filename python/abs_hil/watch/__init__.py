@@ -1,0 +1,1 @@
+"""`abs_hil watch`: a running experiment in a terminal."""

@@ -1,0 +1,169 @@
+"""abs_watch: a running experiment in this terminal, over LCM. `abs_hil watch` starts it (docs/watching.md)."""
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import re
+import select
+import signal
+import sys
+import termios
+import time
+import tty
+from collections.abc import Iterator
+
+from rich.console import Console, Group
+from rich.live import Live
+
+from ..core import _core
+from ..messages import decode
+from .screen import Screen, draw, one_line
+from .view import RunView
+
+CHANNELS = ('TELEMETRY', 'STATUS', 'EVENT', 'EXPERIMENT')
+DRAW_PERIOD_S = 0.2
+LINE_PERIOD_S = 1.0
+PICTURE = (100, 32)  # columns and rows of --once
+ENDING = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 143, signal.SIGQUIT: 131}
+
+
+def parser() -> argparse.ArgumentParser:
+    p = argparse.ArgumentParser('abs_watch', allow_abbrev=False, description='Shows a running experiment in this terminal, over '
+                                'LCM; q quits (docs/watching.md)')
+    p.add_argument('--lcm-url', default='', metavar='URL', help='LCM network (default: LCM_DEFAULT_URL, else UDP multicast)')
+    p.add_argument('--prefix', default='ABS_', help="the run's telemetry.channel_prefix [%(default)s]")
+    p.add_argument('--window', type=float, default=10.0, metavar='S', help='width of the plots, 1 to 60 s [%(default)g]')
+    p.add_argument('--ascii', action='store_true', help='use ASCII only, for a terminal that shows braille badly')
+    how = p.add_mutually_exclusive_group()
+    how.add_argument('--plain', action='store_true', help='print a line a second, no screen; always so without a terminal')
+    how.add_argument('--once', action='store_true', help='print one screen as text; exit status 3 if no message arrives')
+    p.add_argument('--timeout', type=float, metavar='S', help='longest wait of --once for messages, s [5]')
+    p.add_argument('--version', action='version', version=_core.version)
+    return p
+
+
+class Ended(Exception):
+    """A signal ends the program."""
+
+
+class Feed:
+    """Puts the messages of a run into its view."""
+
+    def __init__(self, url: str, prefix: str, window_s: float) -> None:
+        self.view = RunView(window_s)
+        self._prefix = len(prefix)
+        self._subscription = _core.Subscription(url, f'{re.escape(prefix)}({"|".join(CHANNELS)})')
+        self.url = self._subscription.url
+
+    def take_until(self, end_s: float) -> None:
+        while (left_s := end_s - time.monotonic()) > 0.0:
+            packet = self._subscription.next(left_s)
+            if packet is None:
+                return
+            try:
+                message = decode(packet[1])
+                if type(message).__name__ != packet[0][self._prefix:].lower() + '_t':
+                    raise ValueError('a message of another channel')
+            except ValueError:
+                self.view.malformed += 1
+            else:
+                self.view.take(message, time.monotonic())
+
+
+@contextlib.contextmanager
+def keys() -> Iterator[None]:
+    """Keys come at once and unseen. What libraries print to the terminal as errors must not disturb the picture."""
+    before = termios.tcgetattr(0)
+    errors = os.dup(2)
+    try:
+        tty.setcbreak(0)
+        if os.isatty(2):
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, 2)
+            os.close(nowhere)
+        yield
+    finally:
+        with contextlib.suppress(termios.error):  # the terminal is gone
+            termios.tcsetattr(0, termios.TCSANOW, before)
+        os.dup2(errors, 2)
+        os.close(errors)
+
+
+def on_terminal(feed: Feed, screen: Screen) -> None:
+    console = Console(highlight=False, emoji=False, markup=False)
+    with keys(), Live(console=console, screen=True, auto_refresh=False, redirect_stdout=False, redirect_stderr=False) as live:
+        while True:
+            size = console.size
+            screen = Screen(size.width, size.height, screen.unicode, screen.source, screen.channel)
+            live.update(Group(*draw(feed.view, time.monotonic(), screen)), refresh=True)
+            feed.take_until(time.monotonic() + DRAW_PERIOD_S)
+            while select.select([0], [], [], 0.0)[0]:
+                if os.read(0, 1) in (b'q', b'Q', b''):  # nothing: the terminal was closed
+                    return
+
+
+def in_lines(feed: Feed, screen: Screen) -> None:
+    next_s = time.monotonic()
+    while True:
+        next_s += LINE_PERIOD_S
+        while time.monotonic() < next_s:
+            feed.take_until(next_s)
+        print(one_line(feed.view, time.monotonic(), screen), flush=True)
+
+
+def one_picture(feed: Feed, screen: Screen, timeout_s: float) -> bool:
+    """Complete with a status and a second of telemetry, so that there is a rate to show. False if nothing came."""
+    view, end_s, first_s = feed.view, time.monotonic() + timeout_s, None
+    while (now_s := time.monotonic()) < end_s:
+        first_s = now_s if first_s is None and view.telemetry is not None else first_s
+        if view.status is not None and first_s is not None and now_s > first_s + 1.0:
+            break
+        feed.take_until(min(now_s + DRAW_PERIOD_S, end_s))
+    if view.telemetry is None and view.status is None:
+        return False
+    print('\n'.join(line.plain.rstrip() for line in draw(view, time.monotonic(), screen)))
+    return True
+
+
+def main(arguments: list[str]) -> int:
+    p = parser()
+    o = p.parse_args(arguments)
+    if not 1.0 <= o.window <= 60.0:
+        p.error(f'--window {o.window:g}: must be in [1, 60] s')
+    if o.timeout is not None and not o.once:
+        p.error('--timeout belongs to --once')
+    timeout_s = 5.0 if o.timeout is None else o.timeout
+    if not timeout_s > 0.0:
+        p.error(f'--timeout {timeout_s:g}: must be above 0 s')
+    if not re.fullmatch('[A-Za-z0-9_/-]{0,48}', o.prefix):
+        p.error(f"--prefix '{o.prefix}': give at most 48 letters, digits, '_', '-' and '/'")
+    locale = os.environ.get('LC_ALL') or os.environ.get('LC_CTYPE') or os.environ.get('LANG') or ''
+    unicode = not o.ascii and 'utf' in locale.lower()
+    status = 0
+
+    def end(number: int, _frame: object) -> None:
+        nonlocal status
+        status = ENDING[signal.Signals(number)]
+        raise Ended
+
+    for number in ENDING:
+        signal.signal(number, end)
+    try:
+        try:
+            feed = Feed(o.lcm_url, o.prefix, o.window)
+        except (ValueError, OSError) as error:
+            print(f'abs_watch: {error}', file=sys.stderr)
+            return 3 if isinstance(error, OSError) else 2
+        screen = Screen(*PICTURE, unicode, feed.url, f'{o.prefix}TELEMETRY')
+        if o.once:
+            if not one_picture(feed, screen, timeout_s):
+                print(f'abs_watch: no message arrived within {timeout_s:g} s on {screen.channel}', file=sys.stderr)
+                return 3
+        elif o.plain or not (os.isatty(0) and os.isatty(1)) or os.environ.get('TERM', 'dumb') in ('dumb', 'unknown', ''):
+            in_lines(feed, screen)
+        else:
+            on_terminal(feed, screen)
+    except Ended:
+        return status
+    return 0
