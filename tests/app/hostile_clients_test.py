@@ -304,6 +304,24 @@ class HostileClients(HostileTest):
                     self.assertEqual(self.start(emulator).wait(timeout=30), 0)  # a new talker grants again
                 service.end()
 
+    def test_foreign_duties_while_a_talker_is_replaced(self):
+        """The guard forks for each new talker."""
+        emulator = self.emulator()
+        service = self.service(emulator)
+        writer = ForeignWriter(emulator)
+        children = pathlib.Path(f'/proc/{service.process.pid}/task/{service.process.pid}/children')
+
+        def longest_duty():
+            wait_until(lambda: len(children.read_text().split()) == 2, 'no talker')
+            old = children.read_text().split()
+            os.kill(int(old[-1]), signal.SIGKILL)  # the standby was started first
+            times = []
+            while children.read_text().split() in (old, old[:1]):
+                times.append(self.foreign_duty(emulator, writer))
+            return max([*times, self.foreign_duty(emulator, writer)])
+        self.hold([longest_duty() for _ in range(TRIES)], 'foreign duty while a talker is replaced', 20)
+        self.assertIsNone(service.process.poll())
+
     def test_a_client_s_words_write_no_line_of_the_log(self):
         emulator = self.emulator()
         service = self.service(emulator)
