@@ -59,14 +59,13 @@ std::string unexpected(const CLI::App& program) {
     for (const CLI::Option* option : app->get_options()) {
       for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
     }
-    return "unknown option " + word + "; the nearest is " + std::string(rig::nearest_name(word, names));
+    return "unknown option " + word + rig::nearest_hint(word, names);
   }
   for (const CLI::App* subcommand : app->get_subcommands({})) {
     if (!subcommand->get_name().empty()) names.push_back(subcommand->get_name());
   }
   if (names.empty() || !app->get_subcommands().empty()) return "unexpected argument " + word;
-  return "unknown subcommand " + word + "; the nearest is " + std::string(rig::nearest_name(word, names)) +
-         "; known: " + joined(names);
+  return "unknown subcommand " + word + rig::nearest_hint(word, names) + "; known: " + joined(names);
 }
 
 }  // namespace

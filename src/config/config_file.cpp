@@ -174,8 +174,8 @@ fs::path plant_file(std::string_view name_or_file, std::string_view option) {
   const std::vector<PlantEntry> known = known_plants();
   names.reserve(known.size());
   for (const PlantEntry& plant : known) names.push_back(plant.name);
-  throw ConfigError(fmt::format("{}: unknown plant \"{}\"; the nearest known is {}; known: {}; or give a TOML file",
-                                option, name_or_file, rig::nearest_name(name_or_file, names), fmt::join(names, ", ")));
+  throw ConfigError(fmt::format("{}: unknown plant \"{}\"{}; known: {}; or give a TOML file", option, name_or_file,
+                                rig::nearest_hint(name_or_file, names), fmt::join(names, ", ")));
 }
 
 std::string model_origin(const Settings& settings, std::chrono::sys_days today) {

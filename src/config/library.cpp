@@ -41,9 +41,8 @@ fs::path file_of(const std::string& name_or_file) {
   if (std::error_code error; fs::is_regular_file(named, error)) return named;
   const std::vector<std::string> known = known_names();
   const std::vector<std::string_view> views(known.begin(), known.end());
-  throw config::ConfigError(
-      fmt::format("--experiment: unknown experiment \"{}\"; the nearest known is {}; known: {}; or give a TOML file",
-                  name_or_file, rig::nearest_name(name_or_file, views), fmt::join(known, ", ")));
+  throw config::ConfigError(fmt::format("--experiment: unknown experiment \"{}\"{}; known: {}; or give a TOML file",
+                                        name_or_file, rig::nearest_hint(name_or_file, views), fmt::join(known, ", ")));
 }
 
 std::shared_ptr<const Script> read_once(const std::string& name, const fs::path& file) {

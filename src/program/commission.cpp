@@ -144,10 +144,7 @@ int commission(const RunRequest& request, const experiment::CommissioningOptions
       terminal.tell("Stopped at your request; the outputs are safe.");
       return exit_ended_early;
     case experiment::CommissioningResult::failed: return exit_ended_early;
-    case experiment::CommissioningResult::interrupted:
-      return signalled() == rig::Reason::interrupt_signal ? exit_interrupted
-             : signalled() == rig::Reason::hangup_signal  ? exit_hung_up
-                                                          : exit_terminated;
+    case experiment::CommissioningResult::interrupted: return status_of(signalled());
   }
   return exit_ended_early;
 }

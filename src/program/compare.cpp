@@ -1,5 +1,6 @@
 // `abs_hil compare`: a study of one case, whose runs are put side by side.
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cctype>
@@ -10,6 +11,7 @@
 #include "program/exit_status.hpp"
 #include "program/run_arguments.hpp"
 #include "program/run_progress.hpp"
+#include "program/signals.hpp"
 #include "program/study_runs.hpp"
 #include "program/subcommands.hpp"
 #include "study/comparison.hpp"
@@ -81,11 +83,18 @@ int compare(const CompareOptions& options, const std::vector<std::string>& comma
   auto markdown = open(options.markdown_file);
   auto runs_file = open(options.runs_file);
 
-  const study::RunsByController runs = [&] {
+  study::RunsByController runs;
+  try {
     RunProgress progress(study.runs());
     const std::size_t threads = options.threads > 0 ? options.threads : study::machine_threads();
-    return study::run_by_controller(study, threads, [&progress](std::size_t done) { progress.show(done); });
-  }();
+    runs = study::run_by_controller(study, threads, [&progress](std::size_t done) { progress.show(done); });
+  } catch (const Interrupted& interrupted) {
+    spdlog::warn(
+        "interrupted after {} of {} runs. A comparison keeps nothing: repeat it, with fewer --repeat if it takes too "
+        "long; `abs_hil study` can go on after an interruption (docs/studies.md)",
+        interrupted.done, study.runs());
+    return status_of(signalled());
+  }
   const study::ComparisonTable table = study::tabulate(study, runs);
   if (json) json->write(study::to_json(table, request.config_json));
   if (csv) csv->write(study::to_csv(table));

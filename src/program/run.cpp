@@ -87,10 +87,7 @@ class TimingMessages {
 
 int status_of(const run::RunOutcome& outcome) {
   if (outcome.completed()) return exit_completed;
-  if (outcome.reason == rig::Reason::interrupt_signal) return exit_interrupted;
-  if (outcome.reason == rig::Reason::terminate_signal) return exit_terminated;
-  if (outcome.reason == rig::Reason::hangup_signal) return exit_hung_up;
-  return exit_ended_early;
+  return is_signal(outcome.reason) ? status_of(outcome.reason) : exit_ended_early;
 }
 
 std::string realtime_refusal(const runtime::RealtimeReport& report) {

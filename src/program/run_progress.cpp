@@ -5,21 +5,27 @@
 
 #include <cstdio>
 
+#include "program/signals.hpp"
+
 namespace abs_hil::program {
 
 namespace {
 
 constexpr auto least_pause = std::chrono::milliseconds(100);
+constexpr double believable_after_s = 2.0;
 
 }  // namespace
 
-RunProgress::RunProgress(std::uint64_t runs) : runs_(runs), terminal_(isatty(STDERR_FILENO) == 1) {}
+RunProgress::RunProgress(std::uint64_t runs) : runs_(runs), terminal_(isatty(STDERR_FILENO) == 1) {
+  note_signals(true);
+}
 
 RunProgress::~RunProgress() {
   if (terminal_) std::fputs("\r\033[K", stderr);
 }
 
 void RunProgress::show(std::uint64_t done) {
+  if (signalled() != rig::Reason::none) throw Interrupted{done};
   if (!terminal_) return;
   const std::unique_lock lock(mutex_, std::try_to_lock);
   const auto now = Clock::now();
@@ -27,8 +33,12 @@ void RunProgress::show(std::uint64_t done) {
   shown_ = now;
   const double spent_s = std::chrono::duration<double>(now - start_).count();
   const double rate_Hz = static_cast<double>(done) / spent_s;
-  fmt::print(stderr, "\r\033[K{} of {} runs, {:.0f} runs/s, {} left", done, runs_, rate_Hz,
-             duration_text(static_cast<double>(runs_ - done) / rate_Hz));
+  // Threads begin with many runs at once, which end together: the first seconds tell no rate.
+  const std::string left = spent_s < believable_after_s
+                               ? ""
+                               : fmt::format(", {:.0f} runs/s, {} left", rate_Hz,
+                                             duration_text(static_cast<double>(runs_ - done) / rate_Hz));
+  fmt::print(stderr, "\r\033[K{} of {} runs{}", done, runs_, left);
   std::fflush(stderr);
 }
 

@@ -7,8 +7,14 @@
 
 namespace abs_hil::program {
 
+/// A signal came while many runs were computed.
+struct Interrupted {
+  std::uint64_t done{0};  ///< runs that are complete
+};
+
 /// Shows the progress of many runs on stderr if that is a terminal: how many, how fast, how long it will take. Silent
-/// otherwise. Thread-safe.
+/// otherwise. While it lives, a first signal (SIGINT, SIGTERM, SIGHUP) makes `show` throw Interrupted; a second one
+/// ends the program at once. Thread-safe.
 class RunProgress {
  public:
   /// @param runs  that will be done
@@ -17,6 +23,7 @@ class RunProgress {
   RunProgress& operator=(const RunProgress&) = delete;
   /// Clears the line.
   ~RunProgress();
+  /// @throws Interrupted  after a signal
   void show(std::uint64_t done);
 
  private:

@@ -6,6 +6,8 @@
 #include <atomic>
 #include <csignal>
 
+#include "program/exit_status.hpp"
+
 namespace abs_hil::program {
 
 namespace {
@@ -46,13 +48,22 @@ void survive_closed_terminals() {
   std::signal(SIGXFSZ, SIG_IGN);  // a file at its size limit is reported by the failed write, like a full disk
 }
 
-void note_signals() {
+void note_signals(bool may_leave) {
+  may_leave_now = may_leave;
   struct sigaction action {};
   action.sa_handler = note;
   sigemptyset(&action.sa_mask);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     if (signal == SIGHUP && ignored(signal)) continue;
     ::sigaction(signal, &action, nullptr);
+  }
+}
+
+int status_of(rig::Reason signal) noexcept {
+  switch (signal) {
+    case rig::Reason::interrupt_signal: return exit_interrupted;
+    case rig::Reason::hangup_signal: return exit_hung_up;
+    default: return exit_terminated;
   }
 }
 

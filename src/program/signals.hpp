@@ -10,7 +10,14 @@ namespace abs_hil::program {
 void survive_closed_terminals();
 
 /// From now on SIGINT, SIGTERM and SIGHUP are noted and do not end the program. Under nohup SIGHUP stays ignored.
-void note_signals();
+/// @param may_leave  a second signal ends the program at once: there are no outputs
+void note_signals(bool may_leave = false);
+[[nodiscard]] constexpr bool is_signal(rig::Reason reason) noexcept {
+  return reason == rig::Reason::interrupt_signal || reason == rig::Reason::terminate_signal ||
+         reason == rig::Reason::hangup_signal;
+}
+/// Exit status of a program that a signal ended.
+[[nodiscard]] int status_of(rig::Reason signal) noexcept;
 /// The stop reason of a noted signal; `none` if there was none.
 [[nodiscard]] rig::Reason signalled() noexcept;
 

@@ -12,6 +12,7 @@
 #include "config/config_error.hpp"
 #include "program/exit_status.hpp"
 #include "program/run_progress.hpp"
+#include "program/signals.hpp"
 #include "program/study_runs.hpp"
 #include "program/subcommands.hpp"
 #include "run_folder/run_folder.hpp"
@@ -116,16 +117,28 @@ int run_study(const StudyCommand& command) {
   const study::StudyFolder folder(study_folder(command.file, command.folder),
                                   study::facts_of(study, name_of(command.file)));
   const auto start = std::chrono::steady_clock::now();
+  const std::string path = folder.path().string();
   study::Tally tally;
-  {
+  std::uint64_t to_compute = 0;
+  try {
     std::optional<RunProgress> progress;
-    tally = compute_study(study, folder, shard, command.threads, [&progress](std::uint64_t done, std::uint64_t all) {
+    tally = compute_study(study, folder, shard, command.threads, [&](std::uint64_t done, std::uint64_t all) {
+      to_compute = all;
       if (done == 0) progress.emplace(all);
       if (done > 0) progress->show(done);
     });
+  } catch (const Interrupted& interrupted) {
+    spdlog::warn(
+        "interrupted after {} of {} runs. {} keeps each chunk that is complete ({} runs each); the same command goes "
+        "on from there, and `abs_hil study status {}` shows how much is done",
+        interrupted.done, to_compute, path, study.script().chunk, path);
+    return status_of(signalled());
+  }
+  if (tally.runs == 0 && shard.of == 1) {
+    fmt::print("study {}: complete already; results: {}/{}\n", name_of(command.file), path, study::file::results);
+    return exit_completed;
   }
   const double spent_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  const std::string path = folder.path().string();
   fmt::print("study {}: {} runs in {}, {:.0f} runs/s; {} ended by a fault, {} refused\n", name_of(command.file),
              tally.runs, duration_text(spent_s), spent_s > 0.0 ? static_cast<double>(tally.runs) / spent_s : 0.0,
              tally.faults, tally.refused);

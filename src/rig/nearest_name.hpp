@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -36,6 +37,15 @@ template <typename Names>
     }
   }
   return best;
+}
+
+/// "; the nearest is NAME" for an unknown name that looks like one of `names`: at most half of its letters differ.
+/// Otherwise empty, since a name that is not like it would only mislead.
+template <typename Names>
+[[nodiscard]] std::string nearest_hint(std::string_view name, const Names& names) {
+  const std::string_view nearest = nearest_name(name, names);
+  if (nearest.empty() || 2 * edit_distance(name, nearest) > name.size()) return {};
+  return "; the nearest is " + std::string(nearest);
 }
 
 /// Suggestions for the unknown dotted key `name`, which may lack its first parts. A tail is a whole key or the text

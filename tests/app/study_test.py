@@ -4,6 +4,7 @@ usage: study_test.py ABS_HIL [KILLS]: the number of random kills, 4 by default.
 """
 import gzip
 import os
+import pathlib
 import random
 import re
 import signal
@@ -75,7 +76,7 @@ class Study(ProgramTest):
         self.assertIn('240 of 480 runs (50.0 %)', self.run_program('study', 'status', self.folder / 'whole').stdout)
         self.assertIn(f'{RUNS // 2} runs in', self.complete().stdout)
         self.assertIn('complete', self.run_program('study', 'status', self.folder / 'whole').stdout)
-        self.assertIn('0 runs in', self.complete().stdout)
+        self.assertIn('complete already; results: ', self.complete().stdout)
         self.complete(out='other')
         self.assertEqual(self.results(), self.results('other'))
 
@@ -102,6 +103,26 @@ class Study(ProgramTest):
         self.assertEqual(self.results('killed'), self.results())
         self.assertEqual(sorted(entry.name for entry in (self.folder / 'killed').iterdir()),
                          ['SHA256SUMS', 'results.csv.gz', 'study.json', 'study.toml'])
+
+    def interrupted(self, *args):
+        """What the program says after one Ctrl-C, as soon as it listens to it."""
+        with subprocess.Popen([PROGRAM, *map(str, args)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+            listens = 1 << (signal.SIGINT - 1)
+            while not int(re.search(r'SigCgt:\s*(\w+)', pathlib.Path(f'/proc/{process.pid}/status').read_text())[1], 16) & listens:
+                time.sleep(0.01)
+            process.send_signal(signal.SIGINT)
+            errors = process.stderr.read()
+        self.assertEqual(process.returncode, 130, errors)
+        return errors
+
+    def test_interrupted_it_says_what_is_kept(self):
+        many = self.folder / 'many.toml'
+        many.write_text(STUDY.replace('points = 60', 'points = 100000'))
+        errors = self.interrupted('study', many, '--out', self.folder / 'many')
+        self.assertRegex(errors, r'interrupted after \d+ of 800000 runs.*many keeps each chunk that is complete \(20 runs each\)')
+        self.assertIn('the same command goes on from there', errors)
+        errors = self.interrupted('compare', '--repeat', 100_000)
+        self.assertRegex(errors, r'interrupted after \d+ of 200000 runs. A comparison keeps nothing')
 
     @unittest.skipIf(KILLS < 30, 'takes a minute')
     def test_memory_does_not_grow_with_the_runs(self):

@@ -267,6 +267,8 @@ TEST_CASE("a misspelt word names the nearest valid one") {
   const auto refusal = [&parser](const std::vector<const char*>& words) { return answer_of(parser, words).err; };
   CHECK(refusal({"wach", "--fast"}) ==
         "rig: unknown subcommand wach; the nearest is watch; known: list, watch (rig --help shows all options)\n");
+  // A name that nothing is like.
+  CHECK(refusal({"drive"}) == "rig: unknown subcommand drive; known: list, watch (rig --help shows all options)\n");
   CHECK(refusal({"--fst", "x"}) == "rig: unknown option --fst; the nearest is --fast (rig --help shows all options)\n");
   CHECK(refusal({"list", "--jason=3"}) ==
         "rig: unknown option --jason; the nearest is --json (rig list --help shows all options)\n");

@@ -77,7 +77,7 @@ TEST_CASE("a missing file is named") {
 TEST_CASE("plants are found by name; an unknown one names the known") {
   CHECK(plant_file("paper-timing").filename() == "paper-timing.toml");
   CHECK(plant_file("some/where.toml") == "some/where.toml");
-  CHECK_THROWS_WITH(plant_file("paper-table2"), Contains("nearest known is paper-table1"));
+  CHECK_THROWS_WITH(plant_file("paper-table2"), Contains("the nearest is paper-table1"));
 }
 
 TEST_CASE("every shipped plant loads, sets every plant key and has a description") {

@@ -100,7 +100,7 @@ TEST_CASE("every shipped experiment has a description and an explanation") {
 }
 
 TEST_CASE("an unknown experiment names the nearest and all known ones") {
-  CHECK_THROWS_WITH(find("papr"), Contains("papr") && Contains("nearest known is paper") && Contains("friction-jump"));
+  CHECK_THROWS_WITH(find("papr"), Contains("papr") && Contains("the nearest is paper") && Contains("friction-jump"));
   CHECK_THROWS_WITH(find("/nowhere/x.toml"), Contains("/nowhere/x.toml"));
 }
 
