@@ -6,10 +6,12 @@ Keeps the tables in README.md and the pages of docs/ that a program can print. B
     <!-- table: NAME -->
     <!-- end -->
 
-stands the table NAME of TABLES below. --write puts it there, --check fails where the page says something else.
+stands the table NAME of TABLES below. --write puts it there, --check fails where the page says something else. The long
+tables of FILES are CSV files of their own.
 BUILD is the folder of a build, by default build/release.
 """
 import csv
+import io
 import json
 import pathlib
 import re
@@ -41,6 +43,8 @@ TABLES = {
                    {'name': '`{name}`', 'unit': '{unit}', 'CSV column': '{csv_column}', 'meaning': '{meaning}'}),
     'rooms': (tsv_rows('rooms.tsv'), {'room': '`{room}`', 'holds': '{holds}', 'may know': '{may know}'}),
 }
+# file -> where its rows come from; the columns are the rows' own
+FILES = {'docs/reference/keys.csv': json_rows('abs_hil', 'list', '--keys', '--json')}
 MARKED = re.compile(r'^(<!-- table: (\S+) -->\n)(.*?)^(<!-- end -->)$', re.MULTILINE | re.DOTALL)
 
 
@@ -61,7 +65,18 @@ def filled(page, build, tables):
     return MARKED.sub(fill, page)
 
 
+def csv_text(rows):
+    """CSV of rows with the same columns."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, rows[0], lineterminator='\n')
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
 def self_test():
+    assert csv_text([{'a': 1, 'b': 'x, y'}]) == 'a,b\n1,"x, y"\n'
+
     tables = {'two': (lambda build: [{'a': 1, 'b': None}, {'a': 'x|y', 'b': build}], {'A': '`{a}`', 'B': '{b}'})}
     page = 'before\n<!-- table: two -->\nold\n<!-- end -->\nafter\n'
     wanted = 'before\n<!-- table: two -->\n| A | B |\n|---|---|\n| `1` |  |\n| `x\\|y` | z |\n<!-- end -->\nafter\n'
@@ -79,11 +94,12 @@ def main():
         print(__doc__, file=sys.stderr)
         return 2
     folder = pathlib.Path(build[0] if build else ROOT / 'build' / 'release').resolve()
+    pages = [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]
+    wanted = {path: filled(path.read_text(encoding='utf-8'), folder, TABLES) for path in pages}
+    wanted |= {ROOT / file: csv_text(rows(folder)) for file, rows in FILES.items()}
     stale = []
-    for path in [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]:
-        page = path.read_text(encoding='utf-8')
-        current = filled(page, folder, TABLES)
-        if current != page:
+    for path, current in wanted.items():
+        if not path.exists() or path.read_text(encoding='utf-8') != current:
             stale.append(path.relative_to(ROOT))
             if mode == '--write':
                 path.write_text(current, encoding='utf-8')
