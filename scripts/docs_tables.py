@@ -39,12 +39,11 @@ def tsv_rows(file):
 
 # name -> where its rows come from, {heading: format of the cell}
 TABLES = {
-    'quantities': (json_rows('abs_hil', 'list', '--quantities', '--json'),
-                   {'name': '`{name}`', 'unit': '{unit}', 'CSV column': '{csv_column}', 'meaning': '{meaning}'}),
     'rooms': (tsv_rows('rooms.tsv'), {'room': '`{room}`', 'holds': '{holds}', 'may know': '{may know}'}),
 }
 # file -> where its rows come from; the columns are the rows' own
-FILES = {'docs/reference/keys.csv': json_rows('abs_hil', 'list', '--keys', '--json')}
+FILES = {f'docs/reference/{name}.csv': json_rows('abs_hil', 'list', f'--{name}', '--json')
+         for name in ('keys', 'quantities', 'reasons')}
 MARKED = re.compile(r'^(<!-- table: (\S+) -->\n)(.*?)^(<!-- end -->)$', re.MULTILINE | re.DOTALL)
 
 
@@ -66,16 +65,16 @@ def filled(page, build, tables):
 
 
 def csv_text(rows):
-    """CSV of rows with the same columns."""
+    """CSV of rows; the columns of all of them, empty where a row has none."""
     text = io.StringIO()
-    writer = csv.DictWriter(text, rows[0], lineterminator='\n')
+    writer = csv.DictWriter(text, dict.fromkeys(name for row in rows for name in row), lineterminator='\n')
     writer.writeheader()
     writer.writerows(rows)
     return text.getvalue()
 
 
 def self_test():
-    assert csv_text([{'a': 1, 'b': 'x, y'}]) == 'a,b\n1,"x, y"\n'
+    assert csv_text([{'a': 1, 'b': 'x, y'}, {'a': 2, 'c': 3}]) == 'a,b,c\n1,"x, y",\n2,,3\n'
 
     tables = {'two': (lambda build: [{'a': 1, 'b': None}, {'a': 'x|y', 'b': build}], {'A': '`{a}`', 'B': '{b}'})}
     page = 'before\n<!-- table: two -->\nold\n<!-- end -->\nafter\n'

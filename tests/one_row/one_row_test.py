@@ -162,15 +162,16 @@ def tables_of_the_program(copy, program, number):
     assert REASON_TEXT in copy.run(program, 'list', '--reasons')
 
 
-def tables_of_the_pages(copy):
-    """The documentation's table lacks the row, is found out, and gets it."""
+def tables_of_the_docs(copy):
+    """The documentation's files lack the rows, are found out, and get them."""
     script = ('scripts/docs_tables.py',)
-    assert 'docs/telemetry.md' in copy.run(sys.executable, *script, '--check', copy.build, status=1)
+    said = copy.run(sys.executable, *script, '--check', copy.build, status=1)
     copy.run(sys.executable, *script, '--write', copy.build)
     copy.run(sys.executable, *script, '--check', copy.build)
-    page = (copy.tree / 'docs' / 'telemetry.md').read_text(encoding='utf-8')
-    assert page.count('| `made_up_Nm` |') == 1
-    assert copy.changed_lines('docs/telemetry.md') == (1, 0), copy.changed_lines('docs/telemetry.md')
+    for name in ('keys', 'quantities', 'reasons'):
+        file = f'docs/reference/{name}.csv'
+        assert file in said, said
+        assert copy.changed_lines(file) == (1, 0), copy.changed_lines(file)
 
 
 def tables_of_python(copy, number):
@@ -207,7 +208,7 @@ def test(copy, built):
     option_takes_values(copy, program)
     end_condition_in_experiments(copy, program)
     tables_of_the_program(copy, program, number)
-    tables_of_the_pages(copy)
+    tables_of_the_docs(copy)
     tables_of_python(copy, number)
 
 
