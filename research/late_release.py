@@ -1,20 +1,16 @@
 #!/usr/bin/env python3
-"""usage: late_release.py --check|--write
+"""usage: late_release.py
 
 What a late release of the brake costs on steep tyres, whatever the law. A driver brakes with full torque until some time after
 the slip has passed the peak, and is optimal from then on (python -m abs_hil.optimum, even road). The last column says when
 the encoders could first tell the tyre from one of the same stiffness whose peak is half as far away again: either wheel's
-angle is then COUNTS counts off. The cases are the steep tyres at slow starts among those that DRAW draws. Keeps the table in
-docs/theory-beyond.md between <!-- late release --> and <!-- end -->. Needs casadi and the package abs_hil of a build
+angle is then COUNTS counts off. The cases are the steep tyres at slow starts among those that DRAW draws. Prints the table
+of which docs/theory-beyond.md has the figures for 10 ms. Needs casadi and the package abs_hil of a build
 (PYTHONPATH=build/release/share/abs_hil/python).
 """
 import math
 import os
-import pathlib
 import sys
-
-sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / 'scripts'))
-from marked_tables import keep  # noqa: E402
 
 os.environ.setdefault('OMP_NUM_THREADS', '1')
 
@@ -88,10 +84,11 @@ def table():
 
 
 def main():
-    if sys.argv[1:] not in (['--check'], ['--write']):
+    if sys.argv[1:]:
         print(__doc__, file=sys.stderr)
         return 2
-    return keep(sys.argv[1], [('theory-beyond.md', 'late release', table)])
+    print(table(), end='')
+    return 0
 
 
 if __name__ == '__main__':
