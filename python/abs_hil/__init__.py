@@ -44,6 +44,9 @@ __all__ = ['PHASES', 'QUANTITIES', 'REASONS', 'TYPES', 'Controller', 'FigureOfMe
 
 
 def __getattr__(name: str) -> Any:
+    if name == '__version__':
+        from .core import _core
+        return _core.version
     if name not in _MODULE_OF:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
     value = getattr(importlib.import_module(f'.{_MODULE_OF[name]}', __name__), name)

@@ -44,10 +44,10 @@ py::tuple simulate_run(const std::string& file, std::uint64_t number) {
       nullptr);
 }
 
-/// The facts of a study, as JSON: the comment of the first member of its results.
+/// The facts of a study, as JSON: the note of the first member of its results.
 std::string facts_of_results(const py::bytes& first_bytes) {
   const std::string_view bytes = first_bytes;
-  return study::gzip_comment(bytes);
+  return study::gzip_note(bytes);
 }
 
 }  // namespace

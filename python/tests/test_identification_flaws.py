@@ -1,7 +1,8 @@
 """abs_hil.identify finds a limit of the brake's rate and eccentric encoders where a rig has them, and only there."""
+import tomllib
+
 import numpy as np
 import pytest
-import tomllib
 
 import abs_hil
 from abs_hil.identification.advice import log_of

@@ -196,7 +196,7 @@ void check_count(const fs::path& file) {
 ExtractedFmu::ExtractedFmu(const fs::path& file) {
   check_count(file);
   int code = 0;
-  const std::unique_ptr<zip_t, Closer> archive(zip_open(file.c_str(), ZIP_RDONLY | ZIP_CHECKCONS, &code));
+  const std::unique_ptr<zip_t, Closer> archive(zip_open(file.c_str(), ZIP_RDONLY, &code));
   if (!archive) {
     zip_error_t reason;
     zip_error_init_with_code(&reason, code);

@@ -14,23 +14,23 @@ namespace {
 constexpr int gzip_window = MAX_WBITS + 16;  // zlib's way to ask for gzip's header
 constexpr int memory_level = 8;              // zlib's default
 constexpr int system_unknown = 255;
-constexpr std::size_t longest_comment = 1U << 24U;
+constexpr std::size_t longest_note = 1U << 24U;
 
 Bytef* bytes_of(const char* text) { return reinterpret_cast<Bytef*>(const_cast<char*>(text)); }
 
 }  // namespace
 
-std::string gzip_member(std::string_view content, const std::string& comment) {
+std::string gzip_member(std::string_view content, const std::string& note) {
   z_stream stream{};
   if (deflateInit2(&stream, Z_BEST_SPEED, Z_DEFLATED, gzip_window, memory_level, Z_DEFAULT_STRATEGY) != Z_OK) {
     throw std::runtime_error("zlib cannot start to compress");
   }
-  std::string text = comment;  // zlib takes a pointer that may write
+  std::string text = note;  // zlib takes a pointer that may write
   gz_header header{};
   header.os = system_unknown;
-  header.comment = bytes_of(text.data());
+  header.name = bytes_of(text.data());
   deflateSetHeader(&stream, &header);
-  std::string packed(deflateBound(&stream, content.size()) + comment.size(), '\0');
+  std::string packed(deflateBound(&stream, content.size()) + note.size(), '\0');
   stream.next_in = bytes_of(content.data());
   stream.avail_in = static_cast<uInt>(content.size());
   stream.next_out = bytes_of(packed.data());
@@ -42,13 +42,13 @@ std::string gzip_member(std::string_view content, const std::string& comment) {
   return packed;
 }
 
-std::string gzip_comment(std::string_view bytes) {
+std::string gzip_note(std::string_view bytes) {
   z_stream stream{};
   if (inflateInit2(&stream, gzip_window) != Z_OK) throw std::runtime_error("zlib cannot start to read");
-  std::vector<char> comment(bytes.size() + 1);
+  std::vector<char> note(bytes.size() + 1);
   gz_header header{};
-  header.comment = bytes_of(comment.data());
-  header.comm_max = static_cast<uInt>(bytes.size());
+  header.name = bytes_of(note.data());
+  header.name_max = static_cast<uInt>(bytes.size());
   inflateGetHeader(&stream, &header);
   std::array<char, 1> nothing{};
   stream.next_in = bytes_of(bytes.data());
@@ -57,17 +57,17 @@ std::string gzip_comment(std::string_view bytes) {
   stream.avail_out = static_cast<uInt>(nothing.size());
   inflate(&stream, Z_BLOCK);  // ends behind the header
   inflateEnd(&stream);
-  if (header.done != 1 || comment.front() == '\0') throw std::runtime_error("no gzip file with a comment");
-  return comment.data();
+  if (header.done != 1 || note.front() == '\0') throw std::runtime_error("no gzip file with a note");
+  return note.data();
 }
 
 GzipMember read_gzip_member(std::string_view bytes) {
   z_stream stream{};
   if (inflateInit2(&stream, gzip_window) != Z_OK) throw std::runtime_error("zlib cannot start to read");
-  std::vector<char> comment(std::min(longest_comment, bytes.size() + 1));
+  std::vector<char> note(std::min(longest_note, bytes.size() + 1));
   gz_header header{};
-  header.comment = bytes_of(comment.data());
-  header.comm_max = static_cast<uInt>(comment.size() - 1);
+  header.name = bytes_of(note.data());
+  header.name_max = static_cast<uInt>(note.size() - 1);
   inflateGetHeader(&stream, &header);
   GzipMember member;
   std::array<char, 65'536> block{};
@@ -83,7 +83,7 @@ GzipMember read_gzip_member(std::string_view bytes) {
   const bool whole = status == Z_STREAM_END && stream.avail_in == 0;
   inflateEnd(&stream);
   if (!whole) throw std::runtime_error("damaged or cut off");
-  member.comment = comment.data();
+  member.note = note.data();
   return member;
 }
 

@@ -167,7 +167,7 @@ fs::path StudyFolder::part(std::uint64_t number) const {
   return path_ / file::parts / fmt::format("{:08}{}", number, part_ending);
 }
 
-std::string StudyFolder::comment_of(std::uint64_t number) const {
+std::string StudyFolder::note_of(std::uint64_t number) const {
   return fmt::format("abs_hil study {} chunk {}", facts_.identity, number);
 }
 
@@ -186,7 +186,7 @@ std::vector<bool> StudyFolder::finished() const {
 }
 
 void StudyFolder::write_chunk(std::uint64_t number, std::string_view rows) const try {
-  files::write_result(part(number), "chunk of a study", gzip_member(rows, comment_of(number)));
+  files::write_result(part(number), "chunk of a study", gzip_member(rows, note_of(number)));
 } catch (const std::runtime_error&) {
   // Another process may have merged the chunks meanwhile; then this one, written again, is in the results already.
   if (!complete()) throw;
@@ -203,7 +203,7 @@ std::string StudyFolder::checked_chunk(std::uint64_t number, const fs::path& fil
   } catch (const std::runtime_error& error) {
     refuse(error.what());
   }
-  if (member.comment != comment_of(number)) refuse("belongs to another study, another program or another chunk");
+  if (member.note != note_of(number)) refuse("belongs to another study, another program or another chunk");
   const std::uint64_t first = number * facts_.chunk;
   std::uint64_t rows = 0;
   for (std::size_t at = 0; at < member.content.size(); ++rows) {
@@ -245,7 +245,7 @@ void StudyFolder::merge(const std::vector<StudyFolder>& others) const {
     files::ResultFile results(path_ / file::results, "results",
                               path_ / file::parts);  // removed below, with what a killed process left
     std::string header = fmt::format("{}\n", fmt::join(facts_.columns, ","));
-    // A file of its own then says what it is. ASCII, since readers take a comment for Latin-1.
+    // A file of its own then says what it is. ASCII, since readers take a note for Latin-1.
     results.append(gzip_member(header, to_json(facts_).dump(-1, ' ', true)));
     for (std::uint64_t number = 0; number < facts_.chunks(); ++number) {
       results.append(checked_chunk(number, folders[source[number]]->part(number)));

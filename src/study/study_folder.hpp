@@ -73,7 +73,7 @@ class StudyFolder {
  private:
   void check_results() const;
   [[nodiscard]] std::filesystem::path part(std::uint64_t number) const;
-  [[nodiscard]] std::string comment_of(std::uint64_t number) const;
+  [[nodiscard]] std::string note_of(std::uint64_t number) const;
   [[nodiscard]] std::string checked_chunk(std::uint64_t number, const std::filesystem::path& file) const;
 
   std::filesystem::path path_;

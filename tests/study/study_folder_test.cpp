@@ -90,7 +90,7 @@ TEST_CASE("results hold a row for every run, in order, and say which study they 
   compute_shard(study, folder, {});
   // Chunks are members of their own.
   const GzipMember first = read_gzip_member(bytes_of(folder.path() / file::parts / "00000000.csv.gz"));
-  CHECK(first.comment == "abs_hil study " + folder.facts().identity + " chunk 0");
+  CHECK(first.note == "abs_hil study " + folder.facts().identity + " chunk 0");
   CHECK(std::count(first.content.begin(), first.content.end(), '\n') == 4);
   const RunResult alone = simulate(study.contenders(0)[0].settings, study.cases()[0].settings.plant, 1);
   CHECK(alone.stopped());
@@ -112,7 +112,7 @@ TEST_CASE("a chunk that is damaged, cut off or another's stops the merge, which 
   const std::string fewer = member.content.substr(0, member.content.rfind("\n7,") + 1);
   for (const std::string& bad :
        {flipped, good.substr(0, good.size() - 3), std::string(), good + good, gzip_member(member.content, "another"),
-        gzip_member(fewer, member.comment), gzip_member("9" + member.content, member.comment),
+        gzip_member(fewer, member.note), gzip_member("9" + member.content, member.note),
         bytes_of(folder.path() / file::parts / "00000002.csv.gz")}) {
     write(bad);
     CHECK_THROWS_WITH(folder.merge({}), Contains("00000001.csv.gz") && Contains("remove this file"));

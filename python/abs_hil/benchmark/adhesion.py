@@ -4,6 +4,7 @@ from __future__ import annotations
 import functools
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 from ..core import _core
 from ..options import options
@@ -34,7 +35,7 @@ def _least_time_s(plant: str, values: tuple[tuple[str, object], ...], start_spee
             torque = np.clip(r1 * force - of('d1_Nms_rad') * omega1 - of('M10_Nm') - J1 * upper, 0.0,
                              of('b1_Nm') + of('b2_Nm'))
         per_rate.append(1.0 / np.max(-lower))
-    return float(np.trapz(per_rate, speeds))
+    return float(trapezoid(per_rate, speeds))
 
 
 def least_time_s(case: Case) -> float:

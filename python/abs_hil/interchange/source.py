@@ -117,7 +117,7 @@ def _read_folder(folder: pathlib.Path, source: Source) -> None:
     try:
         ended = parse_json(source.attachments.get('environment.json', b'{}')).get('date_utc')
         if ended:
-            end = datetime.datetime.strptime(ended, '%Y-%m-%dT%H:%M:%SZ').replace(tzinfo=datetime.timezone.utc)
+            end = datetime.datetime.strptime(ended, '%Y-%m-%dT%H:%M:%SZ').replace(tzinfo=datetime.UTC)
             source.start_ns = int(end.timestamp()) * 1_000_000_000 - round(float(source.run['time_s'][-1]) * 1e9)
     except (ValueError, AttributeError):
         source.losses.append('environment.json cannot be read: the times begin at 1970-01-01')
