@@ -3,6 +3,7 @@ import io
 import os
 import pathlib
 import stat
+import subprocess
 import sys
 import sysconfig
 import unittest
@@ -62,6 +63,15 @@ class ForeignFmu(RigTest):
             self.assertAlmostEqual(its['stop_distance_m'] / own['stop_distance_m'], 1.0, delta=0.001)
         other = self.stop('--controller', self.export(2), *self.mapping(OUTPUT + '[parameters]\n"control.slip_ref" = 0.3\n'))
         self.assertNotAlmostEqual(other['stop_distance_m'] / own['stop_distance_m'], 1.0, delta=0.001)
+
+    def test_an_fmu_packed_by_cmake(self):
+        """As the Modelica Association's Reference-FMUs are: with libarchive, which tells sizes behind the data."""
+        own, contents, packed = self.export(), self.folder / 'contents', self.folder / 'packed.fmu'
+        zipfile.ZipFile(own).extractall(contents)
+        subprocess.run(['cmake', '-E', 'tar', 'cf', packed, '--format=zip', *os.listdir(contents)], cwd=contents, check=True)
+        self.assertTrue(all(entry.flag_bits & 8 for entry in zipfile.ZipFile(packed).infolist() if not entry.is_dir()))
+        stops = [self.stop('--controller', path, *self.mapping(OUTPUT))['stop_distance_m'] for path in (own, packed)]
+        self.assertEqual(*stops)
 
     def test_an_fmu_of_another_exporter(self):
         names = self.mapping('[inputs]\nw1 = "omega1_rad_s"\nw2 = "omega2_rad_s"\n[outputs]\nTb = "brake_torque_Nm"\n')
