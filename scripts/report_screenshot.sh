@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes docs/figures/report.png with a browser: a part of abs_report's page of two runs of the paper's experiment.
+# Makes docs/figures/report.png with a browser: the first screen of abs_report's page of two runs of the paper's experiment.
 # usage: scripts/report_screenshot.sh [PICTURE.png]      (needs build/release, or ABS_BIN=FOLDER of the programs)
 set -euo pipefail
 cd "$(dirname "$(realpath "$0")")/.."
@@ -15,12 +15,8 @@ for controller in adaptive sliding-mode; do
   "$programs/abs_hil" --backend sim --fast --no-lcm --controller "$controller" --out "$data/$controller" >/dev/null
 done
 "$programs/abs_report" "$data/adaptive" "$data/sliding-mode" --output "$data/report.html" >/dev/null
-# Keep two of the page's figures: slip and torque.
-hidden='h1, h2, p, footer, details, .wide, #notes, figure:not(#figure-fig7):not(#figure-fig8)'
-sed -i "s|</head>|<style>$hidden { display: none } body { margin: 0 auto } figure { margin: 0 0 1.4em }</style></head>|" \
-  "$data/report.html"
 chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --user-data-dir="$data/profile" \
-  --force-device-scale-factor=1.4 --window-size=900,905 --screenshot="$picture" "file://$data/report.html" >/dev/null 2>&1
+  --virtual-time-budget=10000 --window-size=1400,900 --screenshot="$picture" "file://$data/report.html" >/dev/null 2>&1
 # 64 colours show the same and need a third of the bytes. Pillow comes with the report's matplotlib.
 /usr/bin/python3 -c 'import sys, PIL.Image
 picture = PIL.Image.open(sys.argv[1]).convert("RGB")

@@ -12,22 +12,30 @@ need('chromium', 'chromium')
 BEFORE_AFTER_S = 0.2  # margin around braking in the figures
 # The second with gains whose braking has less than 2800 rows.
 RUNS = {'adaptive': (), 'sliding-mode': ('--set', 'control.sliding_mode.gain_m_s2=14', '--set', 'control.sliding_mode.gamma=4.5')}
-OF_BRAKING = ('fig5', 'fig6', 'fig7', 'fig8', 'fig9', 'fig10', 'signals')
+OF_BRAKING = ('braking', 'fig5', 'fig6', 'fig7', 'fig8', 'fig9', 'fig10', 'signals')
 
 
 class Browser(ReportTest):
-    def setUp(self):
-        super().setUp()
+    page = None  # of one making for all tests
+
+    def make_page(self):
         folders = [self.make_run(controller, '--controller', controller, *gains) for controller, gains in RUNS.items()]
         self.report(*folders)
-        self.rows_of = []
+        Browser.rows_of = []
         for folder in folders:
             rows = self.rows(folder)
             braking = [i for i, row in enumerate(rows) if row['phase'] == 'brake']
             start, end = float(rows[braking[0]]['time_s']), float(rows[braking[-1] + 1]['time_s'])
             self.rows_of.append([row for row in rows
                                  if start - BEFORE_AFTER_S <= float(row['time_s']) <= end + BEFORE_AFTER_S])
-        self.read = PageReader((self.folder / 'report.html').read_text())
+        Browser.page = (self.folder / 'report.html').read_text()
+
+    def setUp(self):
+        super().setUp()
+        if self.page is None:
+            self.make_page()
+        (self.folder / 'report.html').write_text(self.page)
+        self.read = PageReader(self.page)
         self.browser = Chromium(self.folder, (self.folder / 'report.html').as_uri())
         self.browser.wait_for(f'document.body && document.body.dataset.drawn == "{len(self.read.plots)}"', 'all figures')
 
@@ -37,6 +45,7 @@ class Browser(ReportTest):
 
     def test_curves(self):
         expected = {
+            'braking': ['omega1'] * 2 + ['omega2'] * 2 + ['slip'] * 2 + ['slip_ref'] + ['torque_ref'] * 2,
             'profile': ['omega2'] * 2,
             'fig5': ['omega1'] * 2,
             'fig6': ['omega2'] * 2,
@@ -125,6 +134,68 @@ class Browser(ReportTest):
         for name in RUNS:
             self.assertIn(name, text)
         self.assertRegex(text, r'\d')
+
+    def test_the_pointer_is_told_name_value_unit_and_time(self):
+        left, top, width, height = self.area('fig8')
+        for step in range(5):
+            self.browser.mouse('mouseMoved', left + (0.5 + 0.002 * step) * width, top + 0.1 * height)
+        text = self.browser.wait_for('document.querySelector("#plot-fig8 .hoverlayer").textContent', 'the values')
+        self.assertRegex(text, r'^-?[\d.−]+ s')
+        for name in RUNS:
+            self.assertRegex(text, rf'{name}[^:]* : torque asked for [\d.−]+ N m')
+
+    def test_y_follows_a_zoom_where_one_asks_for_it(self):
+        def y_range(figure):
+            return self.browser.value(f'document.getElementById("plot-{figure}").layout.yaxis.range.map(Number)')
+        before = y_range('fig8')
+        left, top, width, height = self.area('fig6')
+        self.browser.drag(left + 0.5 * width, left + 0.6 * width, top + 0.5 * height)
+        self.browser.wait_for('document.getElementById("plot-signals").layout.xaxis.range[0] > 0.1', 'the zoom')
+        self.assertEqual(y_range('fig8'), before, 'not asked for')
+        self.browser.value('document.getElementById("follow").click()')
+        low, high = self.ranges(['fig8'])[0]
+        inside = [y for run in (1, 2) for x, y in self.read.curve('fig8', 'a', run)['xy'] if low <= x <= high]
+        room = 0.05 * (max(inside) - min(inside))
+        self.browser.wait_for('document.getElementById("plot-fig10").layout.yaxis.range[0] > 1', 'the last figure')
+        found = y_range('fig8')
+        self.assertAlmostEqual(found[0], min(inside) - room, delta=1e-4)
+        self.assertAlmostEqual(found[1], max(inside) + room, delta=1e-4)
+        self.browser.value('document.getElementById("follow").click()')
+        self.browser.wait_for('document.getElementById("plot-fig10").layout.yaxis.range[0] < 1', 'as before')
+        self.assertEqual(self.browser.said, [])
+
+    def test_the_first_screen_has_braking_and_the_figures_of_merit_beside_it(self):
+        self.browser.call('Emulation.setDeviceMetricsOverride', width=1400, height=900, deviceScaleFactor=1, mobile=False)
+        self.browser.wait_for('innerWidth == 1400', 'the width')
+        self.browser.value('scrollTo(0, 0)')
+        figure, table = (self.browser.value(f'''(() => {{ const r = document.querySelector("{place}").getBoundingClientRect();
+            return [r.left, r.right, r.top, r.bottom]; }})()''') for place in ('#figure-braking', '#metrics'))
+        self.assertLess(figure[1], table[0] + 1, 'beside')
+        self.assertLess(max(figure[3], table[3]), 900)
+        self.assertLess(table[1], 1400)
+        self.assertEqual(self.browser.value('document.documentElement.scrollWidth'), 1400)
+
+    def test_a_dark_screen_gets_a_dark_page(self):
+        def colours():
+            return self.browser.value('''[getComputedStyle(document.body).backgroundColor,
+                document.getElementById("plot-fig5")._fullLayout.plot_bgcolor,
+                document.getElementById("plot-fig7").data.find((t) => t.meta.quantity == "slip_ref").line.color]''')
+        self.assertEqual(colours(), ['rgb(255, 255, 255)', '#ffffff', '#000000'])
+        self.browser.call('Emulation.setEmulatedMedia', features=[{'name': 'prefers-color-scheme', 'value': 'dark'}])
+        self.browser.wait_for('document.getElementById("plot-signals")._fullLayout.plot_bgcolor != "#ffffff"', 'dark figures')
+        self.assertEqual(colours(), ['rgb(21, 23, 26)', '#15171a', '#f4f4f4'])
+        self.assertEqual(self.browser.said, [])
+
+    def test_a_reader_of_the_screen_finds_names_and_landmarks(self):
+        nodes = self.browser.call('Accessibility.getFullAXTree')['nodes']
+        roles = [(node['role']['value'], node.get('name', {}).get('value', '')) for node in nodes if not node['ignored']]
+        for role in ('main', 'banner', 'contentinfo', 'table', 'checkbox'):
+            self.assertIn(role, [found for found, _ in roles])
+        pictures = {name for role, name in roles if role in ('image', 'img')}
+        self.assertEqual(len(self.read.alternatives), len(self.read.plots))
+        for name in self.read.alternatives.values():
+            self.assertIn(name, pictures)
+            self.assertRegex(name, r': .* to ')
 
     def test_print_and_picture(self):
         pdf = base64.b64decode(self.browser.call('Page.printToPDF')['data'])

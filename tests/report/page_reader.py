@@ -1,17 +1,14 @@
 """Reads a report's page like a browser: figures with their curves, tables, elements, the page's text."""
-import array
 import base64
+import gzip
 import html.parser
 import json
-import sys
+import struct
 
 
-def numbers(packed):
-    """The values of packed little-endian floats."""
-    values = array.array({'f4': 'f', 'f8': 'd'}[packed['type']], base64.b64decode(packed['data']))
-    if sys.byteorder == 'big':
-        values.byteswap()
-    return list(values)
+def unpacked(text):
+    """The bytes of a compressed script element."""
+    return gzip.decompress(base64.b64decode(text))
 
 
 class PageReader(html.parser.HTMLParser):
@@ -24,19 +21,30 @@ class PageReader(html.parser.HTMLParser):
         self.tables = {}
         self.plots = {}
         self.scripts = []
+        self.alternatives = {}
+        self.headings = {}
         self.policy = ''
         self._table = None
         self._in_cell = False
+        self._heading = None
         self._script = None
         self.feed(page)
         self._read_plots()
 
     def _read_plots(self):
-        for plot in json.loads(next(text for kind, text in self.scripts if kind == 'application/json')):
+        data = unpacked(self.scripts[0][1])
+        begin = 4 + struct.unpack_from('<I', data)[0]
+        text = json.loads(data[4:begin])
+        self.dark = text['dark']
+
+        def numbers(array):
+            return struct.unpack_from(f'<{array["size"]}{"f" if array["floats"] == 32 else "d"}', data, begin + array['at'])
+
+        for plot in text['plots']:
             self.plots[plot['id']] = plot
             for trace in plot['data']:
                 meta = trace['meta']
-                if meta is None:  # an empty panel's
+                if meta is None or meta['quantity'] == 'phase':  # an empty panel's, or a colour's in the legend
                     continue
                 xy = [(x, y) for x, y in zip(numbers(trace['x']), numbers(trace['y'])) if y == y]
                 self.figures[plot['id']].append({'run': meta['run'], 'quantity': meta['quantity'], 'said': meta['points'],
@@ -55,7 +63,11 @@ class PageReader(html.parser.HTMLParser):
         if tag == 'meta' and attrs.get('http-equiv') == 'Content-Security-Policy':
             self.policy = attrs['content']
         if tag == 'script':
-            self._script = attrs.get('type', '')
+            self._script, self._more = attrs.get('type', ''), False
+        if tag == 'div' and 'aria-label' in attrs:
+            self.alternatives[attrs['id'].removeprefix('plot-')] = attrs['aria-label']
+        if tag == 'b':
+            self._heading = ''
         if tag == 'table':
             self._table = self.tables.setdefault(attrs['id'], [])
         if tag == 'tr':
@@ -67,15 +79,20 @@ class PageReader(html.parser.HTMLParser):
     def handle_endtag(self, tag):
         if tag == 'script':
             self._script = None
+        if tag == 'b':
+            self.headings[list(self.figures)[-1]], self._heading = self._heading, None
         if tag in ('td', 'th'):
             self._in_cell = False
 
     def handle_data(self, data):
         if self._script is not None:
-            if self.scripts and self.scripts[-1][0] == self._script and self._script == 'application/json':
+            if self.scripts and self.scripts[-1][0] == self._script and self._script == 'application/gzip' and self._more:
                 self.scripts[-1] = (self._script, self.scripts[-1][1] + data)
             else:
                 self.scripts.append((self._script, data))
+            self._more = True
+        if self._heading is not None:
+            self._heading += data
         if self._in_cell:
             self._table[-1][-1] += data
 

@@ -5,16 +5,21 @@ import hashlib
 import json
 import os
 import random
+import re
 import shutil
 import subprocess
 import unittest
 
-from page_reader import PageReader
+from page_reader import PageReader, unpacked
 from program import ABS_HIL, ABS_REPORT, ReportTest
 
 # of runs with the controller adaptive, which reports signals of its own
-FIGURES = ['profile', 'fig5', 'fig6', 'fig7', 'fig8', 'fig9', 'fig10', 'signals']
+FIGURES = ['braking', 'profile', 'fig5', 'fig6', 'fig7', 'fig8', 'fig9', 'fig10', 'signals']
 TRUTH = ('omega1_rad_s', 'omega2_rad_s', 'slip', 'brake_torque_Nm', 'theta_N')
+
+
+def brightness(colour):
+    return sum(int(colour[at:at + 2], 16) for at in (1, 3, 5)) / 765
 
 
 class Page(ReportTest):
@@ -36,13 +41,80 @@ class Page(ReportTest):
 
     def test_only_the_pages_own_scripts_may_run_and_nothing_is_fetched(self):
         read = PageReader(self.page(self.make_run('a'))[0])
-        self.assertEqual([kind for kind, _ in read.scripts], ['application/json', '', ''])
-        hashes = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-                  for kind, text in read.scripts if not kind]
+        self.assertEqual([kind for kind, _ in read.scripts], ['application/gzip', 'application/gzip', ''])
+        hashes = [base64.b64encode(hashlib.sha256(data).digest()).decode()
+                  for data in (unpacked(read.scripts[1][1]), read.scripts[2][1].encode())]
         self.assertEqual(read.policy, "default-src 'none'; style-src 'unsafe-inline'; img-src data: blob:; script-src "
                          + ' '.join(f"'sha256-{value}'" for value in hashes))
         for tag in ('link', 'img', 'iframe', 'object', 'base', 'form'):
             self.assertNotIn(tag, read.elements)
+
+    def test_runs_are_called_by_what_differs_in_them_and_no_two_alike(self):
+        def labels(*runs):
+            found = PageReader(self.page(*runs)[0])
+            self.assertEqual(found.tables['metrics'][-1][1:1 + len(runs)], [run.name for run in runs])
+            return found.tables['metrics'][0][1:1 + len(runs)]
+        one, other, third = (self.make_run(f'2026-01-01T00-00-0{n}', '--set', f'control.adaptive.gamma={gamma}')
+                             for n, gamma in enumerate((80, 60, 60)))
+        pi = self.make_run('pi-run', '--controller', 'pi')
+        self.assertEqual(labels(one, other), ['gamma=80', 'gamma=60'])
+        self.assertEqual(labels(one, pi), ['adaptive, gamma=80', 'pi'])
+        self.assertEqual(labels(one, other, third), ['gamma=80', *(f'gamma=60, {run.name}' for run in (other, third))])
+        self.assertEqual(labels(other, third), [other.name, third.name], 'nothing but the folder differs')
+        for name, seed in ((other, 2), (third, 3)):
+            summary = self.summary(name)
+            summary['config']['run']['seed'] = seed
+            (name / 'summary.json').write_text(json.dumps(summary))
+        self.assertEqual(labels(other, third), ['seed=2', 'seed=3'])
+
+    def test_figures_are_numbered_named_and_described(self):
+        read = PageReader(self.page(self.make_run('a'))[0])
+        self.assertEqual(list(read.headings), FIGURES)
+        self.assertEqual(list(read.headings.values())[:3], ['Figure 1: Braking.', 'Figure 2: Time history of the run.',
+                                                           'Figure 3: Upper wheel speed (the paper’s figure 5).'])
+        distance = read.curve('fig10', 'a', 1)['xy']
+        self.assertIn(f'distance, adaptive: 0 to {distance[-1][1]:.3g} m', read.alternatives['fig10'])
+        for plot in read.plots.values():
+            for trace in plot['data']:
+                self.assertNotIn('undefined', trace.get('hovertemplate', ''))
+        units = {figure: read.plots[figure]['data'][0]['hovertemplate'].split('}')[1].strip() for figure in FIGURES[:-1]}
+        self.assertEqual(units, {'braking': 'rad/s', 'profile': 'rad/s', 'fig5': 'rad/s', 'fig6': 'rad/s', 'fig7': '', 'fig8': 'N m',
+                                 'fig9': 'N', 'fig10': 'm'})
+
+    def test_each_colour_has_one_for_dark_screens(self):
+        read = PageReader(self.page(self.make_run('a'), self.make_run('b', '--controller', 'locked'))[0])
+        light = {colour for colour in re.findall(r'"(#[0-9a-fA-F]{6})"', json.dumps(read.plots)) if brightness(colour) > 0.8}
+        self.assertGreater(len(light), 3, 'the phases')
+        for colour in light:
+            self.assertLess(brightness(read.dark[colour]), 0.3, colour)
+        for colour in ('#000000', '#1a1a1a'):
+            self.assertGreater(brightness(read.dark[colour]), 0.8)
+
+    def test_each_phase_of_braking_has_its_own_figures_of_merit(self):
+        run = self.make_run('pulses', '--experiment', 'pulses')
+        page, _ = self.page(run)
+        read = PageReader(page)
+        names = [line[0] for line in read.tables['phases'][1:]]
+        self.assertEqual(names, ['1: pulses-fast', '2: pulses-medium', '3: pulses-slow'])
+        rows = self.rows(run)
+        for line in read.tables['phases'][1:]:
+            own = [row for row in rows if row['phase_name'] == line[0][3:]]
+            cell = dict(zip(read.tables['phases'][0], line))
+            self.assertEqual(cell['start of braking / s'], f'{float(own[0]["time_s"]):.3f}')
+            torques = [float(row['brake_torque_ref_Nm']) for row in own]
+            self.assertEqual(cell['torque variation / (N m)'],
+                             f'{sum(abs(b - a) for a, b in zip(torques, torques[1:])):.1f}')
+            judged = [float(row['slip']) for row in own if float(row['omega2_rad_s']) * 0.099 > 3.0]
+            self.assertEqual(cell['largest slip'], f'{max(judged):.4f}')
+        last = dict(zip(read.tables['phases'][0], read.tables['phases'][-1]))
+        begin = next(row for row in rows if row['phase_name'] == 'pulses-slow')
+        stopped = next(row for row in rows if float(row['time_s']) > float(begin['time_s']) and float(row['omega2_rad_s']) * 0.099 < 0.3)
+        self.assertAlmostEqual(float(last['stop distance / m']), float(stopped['distance_m']) - float(begin['distance_m']), delta=0.02)
+        self.assertNotIn('phases', PageReader(self.page(self.make_run('a'))[0]).tables)
+
+    def test_two_runs_take_less_than_3_MB(self):
+        page, _ = self.page(self.make_run('a'), self.make_run('b', '--controller', 'sliding-mode'))
+        self.assertLess(len(page.encode()), 3_000_000)
 
     def test_runs_of_several_experiments_are_named(self):
         a, b = self.make_run('a'), self.make_run('b', '--experiment', 'brake-step')
@@ -52,7 +124,7 @@ class Page(ReportTest):
         one, other = self.make_run('a-name-longer-than-the-margin'), self.make_run('b')
         names = [PageReader(self.page(*runs)[0]).plots['profile']['layout']['yaxis2']['ticktext']
                  for runs in ((one, other), (one,))]
-        self.assertEqual(names, [['a-name-l…', 'b'], ['']])
+        self.assertEqual(names, [['a-name-longer-th…', 'b'], ['']])
 
     def test_a_label_stands_everywhere_for_the_runs_name(self):
         a, b = self.make_run('a'), self.make_run('b')
@@ -60,8 +132,8 @@ class Page(ReportTest):
         read = PageReader(page)
         self.assertEqual(read.tables['metrics'][0], ['', 'first', 'second <b>', 'second relative to first'])
         self.assertEqual({line[1] for line in read.tables['events'][1:]}, {'first', 'second <b>'})
-        self.assertEqual(read.plots['profile']['layout']['yaxis2']['ticktext'], ['first', 'second &lt;…'])
-        self.assertIn('outside braking of first.', page)
+        self.assertEqual(read.plots['profile']['layout']['yaxis2']['ticktext'], ['first', 'second &lt;b&gt;'])
+        self.assertIn('the phases of first:', page)
         self.assertEqual({curve['name'] for curve in read.figures['fig5']}, {'first', 'second &lt;b&gt;'})
 
     def test_own_names_of_phases_stand_in_strips_figures_and_events(self):
@@ -174,7 +246,7 @@ class Page(ReportTest):
         page, _ = self.page(a)
         read = PageReader(page)
         self.assertEqual([line for line in read.tables['events'] if line[2] == 'fault'],
-                         [['7.000', 'a', 'fault', 'fault', 'wheel speed, above the limit', '251.5']])
+                         [['7.000', 'adaptive', 'fault', 'fault', 'wheel speed, above the limit', '251.5']])
         self.assertEqual([c['drawn'] for c in read.figures['profile'] if c['quantity'] == 'events'], [1])
         self.assertIn('fault', read.texts('fig5'))
 
@@ -184,7 +256,7 @@ class Page(ReportTest):
         self.assertEqual([c['drawn'] for c in PageReader(page).figures['profile'] if c['quantity'] == 'events'], [2])
         one, two = PageReader(page), PageReader(self.page(a, b)[0])
         for label in ('friction × 0.522', 'friction × 1'):
-            for figure in FIGURES[1:]:
+            for figure in ('braking', *FIGURES[2:]):
                 self.assertEqual(one.texts(figure).count(label), 1, label)
                 self.assertEqual(two.texts(figure).count(label), 1, 'once for runs that change alike')
 
@@ -208,7 +280,7 @@ class Page(ReportTest):
         page, _ = self.page(hostile, self.make_run('b'), '--title', '<h6>', '--figures', 'figures')
         read = PageReader(page)
         self.assertEqual(list(read.figures), FIGURES)
-        self.assertEqual([kind for kind, _ in read.scripts], ['application/json', '', ''])
+        self.assertEqual([kind for kind, _ in read.scripts], ['application/gzip', 'application/gzip', ''])
         for tag in ('img', 'b', 'i', 'u', 's', 'q', 'h6', 'svg'):
             self.assertEqual(read.elements.get(tag, 0), len(read.figures) if tag == 'b' else 0, tag)
         for plot in read.plots.values():  # plotly.js reads markup in these texts
@@ -222,7 +294,7 @@ class Page(ReportTest):
     def test_paper(self):
         a, b = self.make_run('a', '--controller', 'adaptive'), self.make_run('b', '--controller', 'sliding-mode')
         read = PageReader(self.page('--paper', b, a)[0])
-        self.assertEqual(list(read.figures), FIGURES[1:-1])
+        self.assertEqual(list(read.figures), FIGURES[2:-1])
         ours = 100.0 * (self.summary(a)['stop_time_s'] / self.summary(b)['stop_time_s'] - 1.0)
         self.assertEqual(read.cell('claims', 'stop time, adaptive against sliding mode', 1), '−6.7 %')
         self.assertEqual(read.cell('claims', 'stop time, adaptive against sliding mode', 2),
@@ -243,7 +315,7 @@ class Series(ReportTest):
         page, said = self.page(series)
         self.assertIn('run-0007 is not complete', said)
         read = PageReader(page)
-        self.assertEqual(list(read.figures), ['series1', *FIGURES])
+        self.assertEqual(list(read.figures), ['braking', 'series1', *FIGURES[1:]])
         lines = [line for line in read.tables['series'][1:] if line[0] == 'stop time / s']
         self.assertEqual([line[1] for line in lines], ['theta_N = 20', 'theta_N = 23', 'theta_N = 26'])
         groups = read.tables['groups']

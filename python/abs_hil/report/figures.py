@@ -35,6 +35,7 @@ LEAST_STRETCHES = 80
 MOST_LEGEND_ENTRIES = 12
 MOST_MARKS = 200
 MOST_STRIPS = 12
+STRIP_CHARACTERS = 16
 MOST_BARS = 60  # of a run; more would be unreadable
 DOUBLE_PX = 165.0
 PX_A_MARK = 34.0
@@ -155,8 +156,7 @@ class FigureMaker:
         self._add_marks()
 
     def figures(self) -> list[Figure]:
-        made = [self._profile(), self._speed('fig5', 'Figure 5. Upper wheel speed', 1),
-                self._speed('fig6', 'Figure 6. Lower wheel speed', 2), self._slip(), self._torque(), self._theta(),
+        made = [self._braking(), self._profile(), self._speed(1), self._speed(2), self._slip(), self._torque(), self._theta(),
                 self._distance()]
         signals = self._signals()
         return [*made, signals] if signals.panels else made
@@ -191,14 +191,16 @@ class FigureMaker:
                     self.marks.append(mark)
         del self.marks[MOST_MARKS:]
 
-    def _begin(self, id_: str, heading: str, caption: str, panels: list[Panel]) -> Figure:
-        return Figure(id_, heading, self.x_label, panels, caption.strip(), self.x_range, self.axis, self.shades, self.marks)
+    def _begin(self, id_: str, heading: str, caption: str, panels: list[Panel], paper: int = 0) -> Figure:
+        return Figure(id_, heading, self.x_label, panels, caption.strip(), self.x_range, self.axis, self.shades, self.marks,
+                      paper)
 
-    def _add(self, panel: Panel, run: int, quantity: str, style: Style, legend: str = '', group: str = '') -> None:
+    def _add(self, panel: Panel, run: int, quantity: str, style: Style, legend: str = '', group: str = '',
+             title: str = '') -> None:
         profile = self.profiles[run].get(quantity)
         if profile is not None and len(profile.x):
             panel.curves.append(Curve(run, quantity.removeprefix('signal '), style, profile.x, profile.y, legend=legend,
-                                      group=group))
+                                      group=group, title=title))
 
     def _add_all(self, panel: Panel, quantity: str) -> None:
         for run in range(len(self.runs)):
@@ -214,7 +216,7 @@ class FigureMaker:
             if any(np.array_equal(values, other, equal_nan=True) for other in drawn):
                 continue
             drawn.append(values)
-            self._add(panel, run, quantity, REFERENCE, legend, legend)
+            self._add(panel, run, quantity, REFERENCE, legend, legend, f'{legend} of {panel.title}')
 
     def _relevant(self, quantities: tuple[str, ...], least: tuple[float, float]) -> tuple[float, float] | None:
         """Range of y above 3 m/s; towards standstill slip and its estimates diverge."""
@@ -232,39 +234,58 @@ class FigureMaker:
 
     # ---- the figures
 
-    def _speed(self, id_: str, heading: str, wheel: int) -> Figure:
-        caption = self._estimated(f'omega{wheel}_rad_s')
-        if wheel == 1:
-            caption += ' In this and the following figures the background is grey outside braking'
-            caption += '.' if len(self.runs) == 1 else f' of {self.runs[0].called}.'
-        panel = Panel(_symbol('ω', str(wheel), ' / (rad/s)'), height_px=240.0)
-        if len(self.runs) == 1 and f'omega{wheel}_rad_s' in self.surveys[0].known:
-            self._add(panel, 0, f'omega{wheel}', self._style(0), 'wheel', 'wheel')
-            self._add(panel, 0, f'omega{wheel}_est', SECOND, 'estimate', 'estimate')
+    def _braking(self) -> Figure:
+        speeds = Panel(Label('<i>ω</i> / (rad/s)', r'$\omega$ / (rad/s)'), height_px=180.0, unit='rad/s')
+        for run in range(len(self.runs)):
+            legend, group = self._legend(run)
+            style = self._style(run)
+            self._add(speeds, run, 'omega1', style, legend, group, 'ω₁')
+            self._add(speeds, run, 'omega2', Style(style.colour, (1, 3), style.width), legend, group, 'ω₂')
+        caption = ('(a) speeds of the upper wheel ω₁, which brakes, and dotted of the lower wheel ω₂, the road; (b) slip and its '
+                   'reference (dotted), over the range above 3 m/s; (c) the torque that the controller asks for. ')
+        of_run = '' if len(self.runs) == 1 else f' of {self.runs[0].label}'
+        caption += (f'The background of all figures has the colours of the phases{of_run}: white is braking, the next figure '
+                    'names the others.')
+        return self._begin('braking', 'Braking', caption + self._estimated('omega1_rad_s'),
+                           [speeds, self._slip_panel(), self._asked_panel('torque / (N m)')])
+
+    def _speed(self, wheel: int) -> Figure:
+        name, upper = f'omega{wheel}', wheel == 1
+        panel = Panel(_symbol('ω', str(wheel), ' / (rad/s)'), height_px=240.0, title=f'ω{"₁" if upper else "₂"}', unit='rad/s')
+        if len(self.runs) == 1 and f'{name}_rad_s' in self.surveys[0].known:
+            self._add(panel, 0, name, self._style(0), 'wheel', 'wheel')
+            self._add(panel, 0, f'{name}_est', SECOND, 'estimate', 'estimate')
         else:
-            self._add_all(panel, f'omega{wheel}')
-        return self._begin(id_, heading, caption, [panel])
+            self._add_all(panel, name)
+        return self._begin(f'fig{4 + wheel}', f'{"Upper" if upper else "Lower"} wheel speed', self._estimated(f'{name}_rad_s'),
+                           [panel], 4 + wheel)
+
+    def _slip_panel(self) -> Panel:
+        panel = Panel(Label('slip <i>λ</i>', r'slip $\lambda$'), height_px=DOUBLE_PX, title='slip',
+                      y_range=self._relevant(('slip', 'slip_ref'), (0.0, 0.2)))
+        self._add_all(panel, 'slip')
+        self._add_reference(panel, 'slip_ref', 'reference')
+        return panel
+
+    def _asked_panel(self, label: str) -> Panel:
+        panel = Panel(Label.plain(label), height_px=DOUBLE_PX, title='torque asked for', unit='N m')
+        self._add_all(panel, 'torque_ref')
+        return panel
 
     def _slip(self) -> Figure:
-        slip = Panel(Label('slip <i>λ</i>', r'slip $\lambda$'), height_px=DOUBLE_PX,
-                     y_range=self._relevant(('slip', 'slip_ref'), (0.0, 0.2)))
-        self._add_all(slip, 'slip')
-        self._add_reference(slip, 'slip_ref', 'reference')
         error = Panel(Label('<i>λ</i> − <i>λ</i><sub>ref</sub>', r'$\lambda - \lambda_\mathrm{ref}$'), height_px=DOUBLE_PX,
-                      y_range=self._relevant(('slip_error',), (-0.05, 0.05)))
+                      y_range=self._relevant(('slip_error',), (-0.05, 0.05)), title='slip minus reference')
         self._add_all(error, 'slip_error')
-        return self._begin('fig7', 'Figure 7. Wheel slip and tracking error',
+        return self._begin('fig7', 'Wheel slip and tracking error',
                            '(a) slip and its reference (dotted), (b) slip minus reference. The axes cover the range above '
-                           '3 m/s; slip diverges towards standstill.' + self._estimated('slip'), [slip, error])
+                           '3 m/s; slip diverges towards standstill.' + self._estimated('slip'), [self._slip_panel(), error], 7)
 
     def _torque(self) -> Figure:
-        asked = Panel(Label.plain('reference / (N m)'), height_px=DOUBLE_PX)
-        self._add_all(asked, 'torque_ref')
-        acting = Panel(Label.plain('acting / (N m)'), height_px=DOUBLE_PX)
+        acting = Panel(Label.plain('acting / (N m)'), height_px=DOUBLE_PX, title='acting torque', unit='N m')
         self._add_all(acting, 'torque')
-        return self._begin('fig8', 'Figure 8. Brake torque',
+        return self._begin('fig8', 'Brake torque',
                            "(a) the controller's torque reference, (b) the torque that acts behind the brake's lag."
-                           + self._estimated('brake_torque_Nm'), [asked, acting])
+                           + self._estimated('brake_torque_Nm'), [self._asked_panel('reference / (N m)'), acting], 8)
 
     def _theta(self) -> Figure:
         truth = any('theta_N' in found.known for found in self.surveys)
@@ -273,27 +294,28 @@ class FigureMaker:
         if not any('theta_est_N' in found.known for found in self.surveys):
             caption += ' No controller of these runs estimates θ.'
         theta = Panel(_symbol('θ', '', ' / N'), height_px=DOUBLE_PX if truth else 240.0,
+                      title='θ estimate', unit='N',
                       y_range=self._relevant(('theta_est', 'theta'), (0.0, 1.0)))
         self._add_all(theta, 'theta_est')
         panels = [theta]
         if truth:
-            self._add_reference(theta, 'theta', 'plant')
+            self._add_reference(theta, 'theta', "plant's value")
             error = Panel(Label('error of <i>θ</i> / N', r'error of $\theta$ / N'), height_px=DOUBLE_PX,
-                          y_range=self._relevant(('theta_error',), (-1.0, 1.0)))
+                          y_range=self._relevant(('theta_error',), (-1.0, 1.0)), title='error of θ', unit='N')
             self._add_all(error, 'theta_error')
             panels.append(error)
-        return self._begin('fig9', 'Figure 9. Estimate of the friction parameter θ', caption, panels)
+        return self._begin('fig9', 'Estimate of the friction parameter θ', caption, panels, 9)
 
     def _distance(self) -> Figure:
-        panel = Panel(Label.plain('distance / m'), height_px=240.0)
+        panel = Panel(Label.plain('distance / m'), height_px=240.0, title='distance', unit='m')
         self._add_all(panel, 'distance')
-        return self._begin('fig10', 'Figure 10. Braking distance', 'Distance of the car since the start of braking.', [panel])
+        return self._begin('fig10', 'Braking distance', 'Distance of the car since the start of braking.', [panel], 10)
 
     def _signals(self) -> Figure:
         names = list(dict.fromkeys(name for found in self.surveys for name in found.signals))
         panels = []
         for name in names:
-            panel = Panel(Label.plain(name), height_px=110.0)
+            panel = Panel(Label.plain(name), height_px=max(110.0, 9.0 * len(name)), title=name)
             self._add_all(panel, f'signal {name}')
             panels.append(panel)
         return self._begin('signals', "The controllers' own signals",
@@ -301,7 +323,7 @@ class FigureMaker:
 
     def _profile(self) -> Figure:
         one = len(self.runs) == 1
-        speeds = Panel(Label.plain('speed / (rad/s)'), height_px=200.0)
+        speeds = Panel(Label.plain('speed / (rad/s)'), height_px=200.0, title='speed', unit='rad/s')
         if one:
             self._add(speeds, 0, 'profile_omega2', self._style(0), 'lower wheel ω₂ (the road)', 'lower')
             self._add(speeds, 0, 'profile_omega1', Style('#909090', (3, 3), 1.0), 'upper wheel ω₁ (braked)', 'upper')
@@ -310,7 +332,8 @@ class FigureMaker:
         for curve in speeds.curves:
             curve.quantity = curve.quantity.removeprefix('profile_')
         caption = '(a) Speeds of both wheels. ' if one else '(a) Speed of the lower wheel, the road. '
-        caption += f'(b) Phases of the run{"" if one else "s"}; a triangle marks an event other than a change of phase.'
+        caption += (f'(b) Phases of the run{"" if one else "s"}, in the colours of the legend; a triangle marks an '
+                    'event other than a change of phase.')
         if len(self.runs) > MOST_STRIPS:
             caption += f' Only the first {MOST_STRIPS} of {len(self.runs)} runs are shown.'
         return Figure('profile', 'Time history of the run' if one else 'Time histories of the runs', TIME,
@@ -321,7 +344,7 @@ class FigureMaker:
         """One strip a run with its phases, and marks at unusual events."""
         strips = min(len(self.runs), MOST_STRIPS)
         panel = Panel(Label.plain(''), y_range=(0.0, float(strips)), height_px=max(30.0, 24.0 * strips), grid=False)
-        names = short_names([run.called if strips > 1 else '' for run in self.runs[:strips]], 8)
+        names = short_names([run.label if strips > 1 else '' for run in self.runs[:strips]], STRIP_CHARACTERS)
         for number in range(strips):
             run, found, bottom = self.runs[number], self.surveys[number], float(strips - 1 - number)
             panel.y_tics.append((bottom + 0.5, '' if strips == 1 else names[number]))
@@ -333,7 +356,10 @@ class FigureMaker:
             times = (times + [change.time_s for change in found.changes])[:MOST_BARS]
             if times:
                 panel.curves.append(Curve(number, 'events', Style('#D55E00'), np.array(times),
-                                          np.full(len(times), bottom + 0.5), 'markers', 'triangle'))
+                                          np.full(len(times), bottom + 0.5), 'markers', 'triangle', title='event'))
+        for kind in dict.fromkeys(p.phase for found in self.surveys[:strips] for p in found.phases[:MOST_BARS]):
+            panel.curves.append(Curve(0, 'phase', Style(phase_colour(kind)), np.zeros(1), np.full(1, np.nan), 'markers', 'square',
+                                      legend=kind, group=f'phase {kind}'))
         return panel
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from ..core import _core
 from ..nesting import parse_toml
 from ..run import MOST_BYTES, flattened, read_object, runs_in_series
-from .text import clean, number_text
+from .text import DASH, clean, number_text
 
 try:
     import tomllib
@@ -24,6 +24,7 @@ except ImportError:  # Python before 3.11
     tomllib = None  # type: ignore[assignment]
 
 NAME_CHARACTERS = 40
+MOST_DIFFERENCES = 3
 #: largest accepted bin of a histogram, 10 s
 MOST_US = 10_000_000
 PARTS = ('wake-up latency', 'read', 'control', 'write', 'whole cycle')
@@ -62,8 +63,8 @@ class RunFiles:
     csv: pathlib.Path
     name: str
     folder: pathlib.Path | None = None
-    label: str = ''    # in legends and table heads
-    called: str = ''   # beside a time or in a sentence: the given label, else the name
+    label: str = ''    # in legends and table heads: the given one, else in what it differs from the others
+    called: str = ''   # in notes and files: the given label, else the name
     summary: dict[str, Any] = field(default_factory=dict)
     config: dict[str, str] = field(default_factory=dict)
     environment: dict[str, str] = field(default_factory=dict)
@@ -293,12 +294,38 @@ def _name_apart(runs: list[RunFiles]) -> None:
 def _label(runs: list[RunFiles], labels: list[str]) -> None:
     if labels and len(labels) != len(runs):
         raise InputError(f'{len(labels)} labels for {len(runs)} runs; give one --label for each run')
-    for number, run in enumerate(runs):
-        controller = run.text('controller')
+    differences = _what_differs(runs)
+    for run, differs in zip(runs, differences):
+        unique = differs and differences.count(differs) == 1
         run.called = run.name
-        run.label = f'{run.name}: {controller}' if controller and controller not in run.name else run.name
-        if labels:
-            run.label = run.called = clean(labels[number], 2 * NAME_CHARACTERS)
+        run.label = differs if unique else ', '.join(filter(None, [differs, run.name]))
+    for run, label in zip(runs, labels):
+        run.label = run.called = clean(label, 2 * NAME_CHARACTERS)
+
+
+def _what_differs(runs: list[RunFiles]) -> list[str]:
+    """In what each run differs from the others, as "pi, gamma=60"; of one run its controller."""
+    named = [key for key in ('controller', 'plant', 'experiment', 'backend')
+             if (len(runs) == 1 and key == 'controller') or len({run.text(key) for run in runs}) > 1]
+    keys = []
+    for key in differing_keys(runs):
+        room, _, name = key.rpartition('.')
+        # What a name says, and what a model has from its plant, is not said again.
+        if room in named or (room == 'model' and all(run.config.get(key) == run.config.get(f'plant.{name}') for run in runs)):
+            continue
+        if key not in ('control.controller', 'run.seed'):
+            keys.append(key)
+    if not named and not keys:
+        keys = [key for key in ('run.seed',) if key in differing_keys(runs)]
+    sections = {_core.section_of(run.text('controller')) for run in runs}
+    found = []
+    for run in runs:
+        parts = [run.text(key) or DASH for key in named]
+        others = tuple(sections - {_core.section_of(run.text('controller'))})  # gains of other controllers say nothing
+        parts += [f'{key.rpartition(".")[2]}={run.config.get(key, DASH)}' for key in keys if not key.startswith(others)]
+        more = ['…'] if len(parts) > MOST_DIFFERENCES else []
+        found.append(clean(', '.join(parts[:MOST_DIFFERENCES] + more), 2 * NAME_CHARACTERS))
+    return found
 
 
 def differing_keys(runs: list[RunFiles]) -> list[str]:

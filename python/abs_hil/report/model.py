@@ -21,8 +21,13 @@ _RUN_STYLES = (Style('#0072B2', (), 1.5), Style('#E69F00', (14, 3), 1.5), Style(
 STYLES = len(_RUN_STYLES)
 REFERENCE = Style('#000000', (2, 3), 1.1)
 SECOND = Style('#D55E00', (7, 4), 1.3)
-_PHASE_COLOURS = {'idle': '#f3f3f3', 'accelerate': '#e6e6e6', 'coast': '#f3f3f3', 'brake': '#ffffff', 'hold': '#e6e6e6',
-                  'stopped': '#f3f3f3', 'fault': '#f7d9cc'}
+_PHASE_COLOURS = {'idle': '#f1f1f1', 'accelerate': '#d9ecd9', 'coast': '#e2e2f0', 'brake': '#fdfdfd', 'hold': '#e6e6e6',
+                  'stopped': '#f3f3f2', 'fault': '#f7d9cc'}
+#: what page.js draws instead of each colour on a dark page
+DARK = {'#000000': '#f4f4f4', '#1a1a1a': '#e6e6e6', '#ffffff': '#15171a', '#333333': '#9a9a9a', '#e4e4e4': '#33373c',
+        '#666666': '#a6a6a6', '#888888': '#777777', '#0072B2': '#4aa8e0', '#D55E00': '#f0803c', '#909090': '#8c8c8c',
+        '#f1f1f1': '#1e2125', '#d9ecd9': '#1f3524', '#e2e2f0': '#272740', '#fdfdfd': '#16181b', '#e6e6e6': '#2b2f34',
+        '#f3f3f2': '#222529', '#f7d9cc': '#57301f', '#ececec': '#303439'}
 
 
 def run_style(run: int) -> Style:
@@ -57,6 +62,7 @@ class Curve:
     marker: str = 'circle'
     legend: str = ''     # text of its legend entry: plain text; only in the first curve with this text
     group: str = ''      # curves of one group are hidden and shown together
+    title: str = ''      # what the pointer calls it; plain text; else its panel's title
     bounds: list[tuple[float, float]] = field(default_factory=list)  # of intervals
 
 
@@ -82,6 +88,8 @@ class Panel:
     x_tics: list[tuple[float, str]] = field(default_factory=list)
     bars: list[Bar] = field(default_factory=list)
     grid: bool = True
+    title: str = ''  # of its quantity, for the pointer and the text alternative; plain text
+    unit: str = ''
 
 
 @dataclass
@@ -111,6 +119,7 @@ class Figure:
     axis: str = ''
     shades: list[Shade] = field(default_factory=list)
     marks: list[Mark] = field(default_factory=list)
+    paper: int = 0  # number of the paper's figure that it repeats; 0: none
 
     def curves(self) -> list[Curve]:
         return [curve for panel in self.panels for curve in panel.curves]

@@ -4,19 +4,23 @@ from __future__ import annotations
 import base64
 import hashlib
 import importlib.util
-import json
 import pathlib
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from .model import Figure
-from .plots import plot
+from .plots import compressed, packed, plot
 from .tables import Table
+from .text import significant
 
 _FOLDER = pathlib.Path(__file__).parent
 #: marks a file as a page of abs_report
 PAGE_MARK = '<meta name="generator" content="abs_report'
 MOST_OPEN_ROWS = 12
+MOST_TOLD = 12  # curves of a panel in its text alternative
+MOST_BESIDE = 3  # runs whose figures of merit stand beside the first figure
 
 
 class Unavailable(RuntimeError):
@@ -46,6 +50,7 @@ class Contents:
     runs: int
     metrics: Table
     shared: str
+    phases: Table
     differences: Table
     timing: Table
     events: Table
@@ -75,44 +80,58 @@ def _hash(script: str) -> str:
     return "'sha256-" + base64.b64encode(hashlib.sha256(script.encode('utf-8')).digest()).decode() + "'"
 
 
-def _as_script_data(data: Any) -> str:
-    """JSON that cannot end its script element."""
-    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(',', ':'))
-    return text.replace('<', '\\u003c').replace('\u2028', '\\u2028').replace('\u2029', '\\u2029')
-
-
-def render(template: str, drawn: list[Figure], folder: pathlib.Path = _FOLDER, **context: Any) -> str:
+def render(template: str, drawn: list[Figure] | list[dict[str, Any]], folder: pathlib.Path = _FOLDER, **context: Any) -> str:
     """A page from a template of `folder`, with these figures as data and the policy that only its own scripts run."""
     import jinja2
+    from markupsafe import Markup
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined,
                                      loader=jinja2.FileSystemLoader([folder, _FOLDER]))
-    plotly = plotly_js().replace('</script', '<\\/script')
+    plotly = plotly_js()
     js = (_FOLDER / 'page.js').read_text(encoding='utf-8')
+    plots = [figure if isinstance(figure, dict) else plot(figure) for figure in drawn]
     # No script but these two runs, and nothing is fetched: a run's files cannot inject active content.
     policy = (f"default-src 'none'; style-src 'unsafe-inline'; img-src data: blob:; "
               f'script-src {_hash(plotly)} {_hash(js)}')
     return environment.get_template(template).render(
-        **context, plots=_as_script_data([plot(figure) for figure in drawn]), plotly=plotly, js=js, policy=policy,
+        **context, policy=policy, scripts=Markup(
+            f'<script type="application/gzip" id="plots">{packed(plots)}</script>\n'
+            f'<script type="application/gzip" id="plotly">{compressed(plotly.encode())}</script>\n<script>{js}</script>'),
         css=(_FOLDER / 'page.css').read_text(encoding='utf-8')) + '\n'
 
 
-def view(figure: Figure) -> dict[str, Any]:
+def _alternative(figure: Figure) -> str:
+    """What a reader without the picture is told: each curve's quantity and range."""
+    parts = []
+    for panel in figure.panels:
+        for curve in panel.curves[:MOST_TOLD]:
+            y = curve.y[np.isfinite(curve.y)]
+            if len(y):
+                low, high = significant(float(y.min()), 3), significant(float(y.max()), 3)
+                name = ', '.join(filter(None, dict.fromkeys([curve.title or panel.title or curve.quantity, curve.legend])))
+                parts.append(f'{name}: {low} to {high} {panel.unit}'.rstrip())
+    return f'{figure.heading}. {"; ".join(parts)}.'
+
+
+def view(figure: Figure, heading: str = '') -> dict[str, Any]:
     """What a template shows of a figure beside its plot."""
-    return {'id': figure.id, 'heading': figure.heading, 'caption': figure.caption, 'height': plot(figure)['height']}
+    return {'id': figure.id, 'heading': heading or figure.heading, 'caption': figure.caption, 'height': plot(figure)['height'],
+            'alternative': _alternative(figure)}
 
 
 def page(contents: Contents) -> str:
-    shown = [part.figure for part in contents.series]
-    shown += [figure for figure in contents.figures
-              if contents.paper is None or figure.id in contents.paper.statements]
-    if contents.timing_figure is not None and contents.paper is None:
-        shown.append(contents.timing_figure)
-    names = {figure.id for figure in shown}
-    seen = [figure for figure in contents.figures if figure.id in names]
-    timing = contents.timing_figure
-    views: dict[str, Any] = {
-        'series': [{**vars(part), 'figure': view(part.figure)} for part in contents.series],
-        'figures': [view(figure) for figure in seen],
-        'timing_figure': view(timing) if timing is not None and timing.id in names else None,
-        'many': contents.runs > MOST_OPEN_ROWS}
-    return render('page.html.j2', shown, **{**vars(contents), **views})
+    shown = [figure for figure in contents.figures if contents.paper is None or figure.id in contents.paper.statements]
+    if contents.paper is None:
+        shown[1:1] = [part.figure for part in contents.series]
+        shown += [contents.timing_figure] if contents.timing_figure is not None else []
+    views = {}
+    for number, figure in enumerate(shown, 1):
+        if contents.paper is not None:
+            heading = f'The paper’s figure {figure.paper}: {figure.heading}'
+        else:
+            heading = f'Figure {number}: {figure.heading}' + (f' (the paper’s figure {figure.paper})' if figure.paper else '')
+        views[figure.id] = view(figure, heading)
+    series = [{**vars(part), 'figure': views.get(part.figure.id)} for part in contents.series]
+    return render('page.html.j2', shown, **{
+        **vars(contents), 'series': series, 'many': contents.runs > MOST_OPEN_ROWS,
+        'beside': contents.runs <= MOST_BESIDE, 'timing_figure': views.get('timing'),
+        'figures': [views[figure.id] for figure in contents.figures if figure.id in views]})

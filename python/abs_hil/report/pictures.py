@@ -28,7 +28,7 @@ def _draw_curve(axes: Any, curve: Curve, label: str) -> None:
     if curve.drawn == 'line':
         axes.plot(curve.x, curve.y, color=curve.style.colour, linestyle=dash, linewidth=0.8 * curve.style.width, label=label)
         return
-    marker = {'triangle': '^', 'open circle': 'o', 'circle': 'o'}[curve.marker]
+    marker = {'triangle': '^', 'open circle': 'o', 'circle': 'o', 'square': 's'}[curve.marker]
     if curve.drawn == 'intervals':
         axes.errorbar(curve.x, curve.y, [[y - low for (low, _), y in zip(curve.bounds, curve.y)],
                                          [high - y for (_, high), y in zip(curve.bounds, curve.y)]],

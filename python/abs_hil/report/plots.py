@@ -2,13 +2,15 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import html
+import json
 import math
 from typing import Any
 
 import numpy as np
 
-from .model import Curve, Figure, Panel, Style
+from .model import DARK, Curve, Figure, Panel, Style, phase_colour
 
 GAP_PX = 14.0
 MARKS_PX = 16.0  # a line of names of marks above the first panel
@@ -19,6 +21,8 @@ LEGEND_LINE_PX = 20.0
 #: a mark's name needs this much of the axis; names without room are left out
 LABEL_WIDTH = 0.0075
 LABEL_GAP = 0.02
+TIME_AXES = ('braking', 'run')
+SYMBOLS = {'triangle': 'triangle-up', 'open circle': 'circle-open', 'circle': 'circle', 'square': 'square'}
 
 
 def _escaped(text: str) -> str:
@@ -26,9 +30,32 @@ def _escaped(text: str) -> str:
     return html.escape(text, quote=False)
 
 
-def _numbers(values: np.ndarray, kind: str) -> dict[str, str]:
-    """Base64 of little-endian floats, which are shorter than digits and read at once."""
-    return {'type': kind, 'data': base64.b64encode(np.ascontiguousarray(values, dtype='<' + kind).tobytes()).decode()}
+def _numbers(values: np.ndarray, kind: str = 'f8') -> np.ndarray:
+    """Little-endian floats; `packed` puts them beside the JSON."""
+    return np.ascontiguousarray(values, dtype='<' + kind)
+
+
+def compressed(data: bytes) -> str:
+    """Base64 of gzip, as text of a page; the same bytes give the same text."""
+    return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
+
+
+def packed(plots: list[dict[str, Any]]) -> str:
+    """All plots, for page.js: the length of a JSON text (4 bytes), the text, and behind it the numbers, each array once."""
+    numbers = bytearray()
+    known: dict[tuple[str, bytes], int] = {}
+
+    def reference(array: np.ndarray) -> dict[str, Any]:
+        key = (array.dtype.str, array.tobytes())
+        if key not in known:
+            known[key] = len(numbers)
+            numbers.extend(key[1])
+        return {'floats': 8 * array.dtype.itemsize, 'at': known[key], 'size': array.size,
+                'columns': array.shape[1] if array.ndim == 2 else 0}
+
+    text = json.dumps({'plots': plots, 'dark': DARK}, ensure_ascii=False, allow_nan=False, separators=(',', ':'),
+                      default=reference).encode()
+    return compressed(len(text).to_bytes(4, 'little') + text + bytes(numbers))
 
 
 def _line(style: Style) -> dict[str, Any]:
@@ -38,15 +65,19 @@ def _line(style: Style) -> dict[str, Any]:
     return line
 
 
-def _trace(curve: Curve, number: int, new_in_legend: bool) -> dict[str, Any]:
+def _trace(curve: Curve, panel: Panel, number: int, new_in_legend: bool) -> dict[str, Any]:
     trace: dict[str, Any] = {
-        'x': _numbers(curve.x, 'f8'), 'y': _numbers(curve.y, 'f4'), 'name': _escaped(curve.legend or curve.quantity),
+        'x': _numbers(curve.x), 'y': _numbers(curve.y, 'f4'), 'name': _escaped(curve.legend or curve.quantity),
         'xaxis': f'x{number}', 'yaxis': f'y{number}', 'showlegend': new_in_legend, 'legendgroup': _escaped(curve.group),
         'meta': {'run': curve.run + 1, 'quantity': curve.quantity, 'points': int(np.isfinite(curve.y).sum())}}
+    title = curve.title or panel.title
+    trace['hovertemplate'] = _escaped(f'{title} %{{y:.5~g}} {panel.unit}'.strip())
     if curve.drawn == 'line':
         return {**trace, 'mode': 'lines', 'line': _line(curve.style)}
-    symbol = {'triangle': 'triangle-up', 'open circle': 'circle-open', 'circle': 'circle'}[curve.marker]
+    symbol = SYMBOLS[curve.marker]
     trace.update(mode='markers', marker={'color': curve.style.colour, 'symbol': symbol, 'size': 8})
+    if symbol == 'square':  # explains a colour of phases
+        trace['marker'].update(size=12, line={'color': '#888888', 'width': 1})
     if curve.drawn == 'intervals':
         trace['error_y'] = {'type': 'data', 'symmetric': False, 'color': curve.style.colour, 'thickness': 1.2, 'width': 4,
                             'array': [high - y for (_, high), y in zip(curve.bounds, curve.y.tolist())],
@@ -56,7 +87,7 @@ def _trace(curve: Curve, number: int, new_in_legend: bool) -> dict[str, Any]:
 
 def _nothing(number: int, panel: Panel) -> dict[str, Any]:
     """An invisible point: plotly.js draws no axes without a curve."""
-    return {'x': _numbers(np.zeros(1), 'f8'), 'y': _numbers(np.zeros(1), 'f4'), 'xaxis': f'x{number}', 'yaxis': f'y{number}',
+    return {'x': _numbers(np.zeros(1)), 'y': _numbers(np.zeros(1), 'f4'), 'xaxis': f'x{number}', 'yaxis': f'y{number}',
             'mode': 'markers', 'opacity': 0, 'showlegend': False, 'hoverinfo': 'skip', 'meta': None}
 
 
@@ -75,6 +106,8 @@ def _y_axis(panel: Panel, domain: tuple[float, float], number: int) -> dict[str,
 
 def _x_axis(figure: Figure, panel: Panel, number: int, last: bool) -> dict[str, Any]:
     axis: dict[str, Any] = {'anchor': f'y{number}', 'showticklabels': last, 'showgrid': panel.grid}
+    if figure.axis in TIME_AXES:
+        axis['unifiedhovertitle'] = {'text': '%{x:.4~f} s'}
     if number > 1:
         axis['matches'] = 'x'
     if last:
@@ -97,7 +130,7 @@ def _shapes(figure: Figure) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]
     for shade in figure.shades:
         if shade.phase != 'brake' and shade.x1 > low and shade.x0 < high:
             shapes.append({'type': 'rect', 'xref': 'x', 'yref': 'paper', 'x0': shade.x0, 'x1': shade.x1, 'y0': 0, 'y1': 1,
-                           'fillcolor': _shade_colour(shade.phase), 'line': {'width': 0}, 'layer': 'below'})
+                           'fillcolor': phase_colour(shade.phase), 'line': {'width': 0}, 'layer': 'below'})
     free_from = [-math.inf] * MARK_LINES
     for mark in sorted(figure.marks, key=lambda mark: mark.x):
         if not low <= mark.x <= high:
@@ -125,11 +158,6 @@ def _shapes(figure: Figure) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]
     return shapes, texts
 
 
-def _shade_colour(phase: str) -> str:
-    from .model import phase_colour
-    return phase_colour(phase)
-
-
 def plot(figure: Figure) -> dict[str, Any]:
     """The figure as {id, axis, height, data, layout}."""
     inner = sum(panel.height_px for panel in figure.panels) + GAP_PX * (len(figure.panels) - 1)
@@ -147,7 +175,7 @@ def plot(figure: Figure) -> dict[str, Any]:
         for curve in panel.curves:
             new = bool(curve.legend) and curve.legend not in seen
             seen.add(curve.legend)
-            data.append(_trace(curve, number, new))
+            data.append(_trace(curve, panel, number, new))
     if len(figure.panels) > 1 and len(figure.panels) < 6:
         for number, panel in enumerate(figure.panels):
             if panel.y_label.html:
@@ -162,7 +190,8 @@ def plot(figure: Figure) -> dict[str, Any]:
     legend_px = LEGEND_LINE_PX * (1 + (names - 1) // 3) if names else 0.0
     above = TOP_PX + (MARKS_PX * MARK_LINES if figure.marks else 0.0)
     # The buttons of plotly.js stand in the first line too.
-    margin = {'l': 74, 'r': 12, 't': above + max(legend_px, LEGEND_LINE_PX), 'b': BOTTOM_PX}
+    named = max([len(text) for panel in figure.panels for _, text in panel.y_tics], default=0)
+    margin = {'l': max(74, 20 + 8 * named), 'r': 12, 't': above + max(legend_px, LEGEND_LINE_PX), 'b': BOTTOM_PX}
     layout.update(margin=margin, legend={'orientation': 'h', 'x': 0, 'y': 1 + above / inner, 'yanchor': 'bottom',
                                          'font': {'size': 12}})
     return {'id': figure.id, 'axis': figure.axis, 'height': inner + margin['t'] + margin['b'], 'data': data, 'layout': layout}

@@ -19,6 +19,7 @@ from .tables import (
     environment_table,
     events_table,
     metrics_table,
+    phases_table,
     timing_table,
 )
 from .text import clean
@@ -56,10 +57,10 @@ def _title(request: Request, found: FoundRuns) -> str:
     if found.series:
         return f'Series {found.series[0].name}'
     if len(runs) == 1:
-        return f'Run {runs[0].label}'
+        return f'Run {runs[0].label}' if runs[0].label == runs[0].called else f'Run {runs[0].name}: {runs[0].label}'
     if len(runs) == 2:
         return f'Runs {runs[0].label} and {runs[1].label}'
-    return f'{len(runs)} runs, {runs[0].called} to {runs[-1].called}'
+    return f'{len(runs)} runs, {runs[0].label} to {runs[-1].label}'
 
 
 def _lead(runs: list[RunFiles]) -> str:
@@ -104,8 +105,8 @@ def make(request: Request, progress: Callable[[int, int], None] = lambda done, t
     metrics, shared = metrics_table(runs, surveys)
     events, left_out = events_table(runs, surveys)
     contents = Contents(_title(request, found), _core.version, paper.lead(runs) if request.paper else _lead(runs), len(runs),
-                        metrics, shared, differences_table(runs), timing_table(runs), events, left_out,
-                        environment_table(runs), notes, figures, timing, series)
+                        metrics, shared, phases_table(runs, surveys), differences_table(runs), timing_table(runs), events,
+                        left_out, environment_table(runs), notes, figures, timing, series)
     if request.paper:
         pairs = paper.pairs_of(runs, surveys)
         contents.paper = PaperPart(paper.claims(pairs), paper.statements(pairs))

@@ -20,6 +20,7 @@ PAPER_R2_M = 0.099
 DEFAULT_END_SPEED_M_S = 0.3
 #: a run has a handful
 MOST_PHASES = 2000
+MOST_BRAKINGS = 60
 _METRIC_COLUMNS = ('time_s', 'omega1_rad_s', 'omega2_rad_s', 'omega1_est_rad_s', 'omega2_est_rad_s', 'slip', 'slip_est',
                    'slip_ref', 'brake_torque_ref_Nm', 'theta_N', 'theta_est_N', 'distance_m')
 _PROFILES = {'plant.friction_profile': 'friction', 'plant.brake_torque_profile': 'brake torque',
@@ -96,6 +97,7 @@ class Survey:
     known: set[str] = field(default_factory=set)
     signals: list[str] = field(default_factory=list)
     metrics: dict[str, float] = field(default_factory=dict)
+    brakings: list[tuple[str, dict[str, float]]] = field(default_factory=list)  # (phase, figures) of each, if there are several
     r2_m: float = PAPER_R2_M
 
     @property
@@ -125,9 +127,18 @@ def survey(run: RunFiles, rows: Rows) -> Survey:
         found.brake_to_s = float(time[min(places[-1] + 1, len(time) - 1)])
     found.known = {name for name in rows.names if name in TEXTS or not np.isnan(rows.columns[name]).all()}
     found.signals = [name for name in signals_of(rows.names) if name in found.known]
-    columns = {name: rows.columns[name] for name in _METRIC_COLUMNS}
-    found.metrics = _core.metrics_of({**columns, 'braking': braking.astype(np.float64)}, found.r2_m,
-                                     run.config_number('experiment.end_speed_m_s', DEFAULT_END_SPEED_M_S))
+    end_speed_m_s = run.config_number('experiment.end_speed_m_s', DEFAULT_END_SPEED_M_S)
+
+    def figures_from(first: int, last: int) -> dict[str, float]:
+        columns = {name: rows.columns[name][first:last] for name in _METRIC_COLUMNS}
+        columns['distance_m'] = columns['distance_m'] - (columns['distance_m'][0] if first else 0.0)
+        return _core.metrics_of({**columns, 'braking': braking[first:last].astype(np.float64)}, found.r2_m, end_speed_m_s)
+    found.metrics = figures_from(0, len(time))
+    brakings = [int(start) for start in starts[:MOST_BRAKINGS] if braking[start]]
+    if len(brakings) > 1:
+        for number, (first, last) in enumerate(zip(brakings, [*brakings[1:], len(time)]), 1):
+            name = next(phase.shown for phase in found.phases if phase.from_s == time[first])
+            found.brakings.append((f'{number}: {name}', figures_from(first, last)))
     found.changes = _changes(run, rows, found.r2_m)
     assert set(COLUMNS) & found.known
     return found

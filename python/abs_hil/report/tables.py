@@ -85,7 +85,17 @@ def metrics_table(runs: list[RunFiles], surveys: list[Survey]) -> tuple[Table, s
         add(metric.heading, [shown(value, metric.decimals) for value in values],
             _change(values[0], values[1]) if comparable else '')
     add('rows in the CSV', [str(found.rows) for found in surveys])
+    add('run', [run.name for run in runs])
     return table.arranged(len(runs)), f'All runs: {"; ".join(shared)}.' if shared else ''
+
+
+def phases_table(runs: list[RunFiles], surveys: list[Survey]) -> Table:
+    """One row a phase of braking of each run that has several, one column a figure of merit."""
+    several = [(run, name, values) for run, found in zip(runs, surveys) for name, values in found.brakings]
+    metrics = [metric for metric in merits_shown() if any(math.isfinite(values[metric.name]) for _, _, values in several)]
+    return Table('phases', ['phase', *(['of'] if len(runs) > 1 else []), *(metric.heading for metric in metrics)],
+                 [[name, *([run.label] if len(runs) > 1 else []),
+                   *(shown(values[metric.name], metric.decimals) for metric in metrics)] for run, name, values in several])
 
 
 def merits(runs: list[RunFiles], surveys: list[Survey]) -> pandas.DataFrame:
@@ -146,7 +156,7 @@ def _phase_text(event: Event) -> str:
 
 def events_table(runs: list[RunFiles], surveys: list[Survey]) -> tuple[Table, int]:
     """The events of all runs, and how many more there are."""
-    rows = [[shown(event.time_s, 3), run.called, event.event, _phase_text(event), event.reason, event.value]
+    rows = [[shown(event.time_s, 3), run.label, event.event, _phase_text(event), event.reason, event.value]
             for run, found in zip(runs, surveys) for event in _events_of(run, found)]
     return (Table('events', ['time / s', 'run', 'event', 'phase', 'reason', 'value'], rows[:MOST_EVENTS], False),
             max(0, len(rows) - MOST_EVENTS))
