@@ -17,7 +17,7 @@ from .messages import PHASES, QUANTITIES, REASONS, TYPES, decode, row_of
 
 if TYPE_CHECKING:
     from .figures import FigureOfMerit, figures
-    from .hand import Controller, Plant, SlipInput, SlipOutput
+    from .hand import Controller, Plant, PlantState, SlipInput, SlipOutput
     from .identification import Identified, identify
     from .network import live
     from .run import Run, Series, load, load_series
@@ -29,7 +29,7 @@ globals().update(TYPES)
 
 #: module -> the names that it gives; loaded at first use, so that decoding messages needs only Python
 _LATER = {'figures': ('FigureOfMerit', 'figures'),
-          'hand': ('Controller', 'Plant', 'SlipInput', 'SlipOutput'),
+          'hand': ('Controller', 'Plant', 'PlantState', 'SlipInput', 'SlipOutput'),
           'identification': ('Identified', 'identify'),
           'network': ('live',),
           'run': ('Run', 'Series', 'load', 'load_series'),
@@ -37,7 +37,7 @@ _LATER = {'figures': ('FigureOfMerit', 'figures'),
          'simulation': ('Study', 'controllers', 'experiments', 'keys', 'plants', 'simulate', 'simulate_many')}
 _MODULE_OF = {name: module for module, names in _LATER.items() for name in names}
 
-__all__ = ['PHASES', 'QUANTITIES', 'REASONS', 'TYPES', 'Controller', 'FigureOfMerit', 'Identified', 'Plant', 'Run',
+__all__ = ['PHASES', 'QUANTITIES', 'REASONS', 'TYPES', 'Controller', 'FigureOfMerit', 'Identified', 'Plant', 'PlantState', 'Run',
            'Series', 'SlipInput', 'SlipOutput', 'Study', 'StudyResults', 'controllers', 'decode', 'experiments', 'figures',
            'identify', 'keys', 'live', 'load', 'load_series', 'load_study', 'plants', 'row_of', 'simulate',
            'simulate_many', 'simulate_run', 'study']

@@ -7,6 +7,7 @@ from typing import Any
 from .core import _core
 from .options import PathLike, Value, options
 
+PlantState = _core.PlantState
 SlipInput = _core.SlipInput
 SlipOutput = _core.SlipOutput
 
@@ -19,13 +20,27 @@ class Plant(_core.Plant):  # type: ignore[misc]
     reset(omega1_rad_s=0, omega2_rad_s=0, brake_torque_Nm=0, angle1_rad=0, angle2_rad=0): sets the state, and returns
         every profile to its start. Index 1: the upper, braked wheel; 2: the lower wheel.
     advance(duration_s, motor_duty=0, brake_duty=0, brake_torque_Nm=0): advances the plant by duration_s in [0, 1e6] s
-        under constant inputs: duties in [0, 1]; brake_torque_Nm counts only with plant.ideal_actuator.
-    state: angle1_rad, angle2_rad, omega1_rad_s, omega2_rad_s, brake_torque_Nm. slip, tyre_force_N, theta_N (the largest
-        force that any slip could give now) and friction are the present values.
+        under constant inputs: duties in [0, 1]; brake_torque_Nm >= 0 needs plant.ideal_actuator.
+    state: an abs_hil.PlantState: angle1_rad, angle2_rad, omega1_rad_s, omega2_rad_s, brake_torque_Nm. It can be set; the
+        profiles of road and drift then stay where they are.
+    copy(), copy.copy(plant): the same plant with all of its state, to branch from (a controller that predicts).
+    slip, tyre_force_N, theta_N (the largest force that any slip could give now) and friction are the present values.
+    Raises ValueError for an input that is no number or outside its range.
     """
 
     def __init__(self, plant: PathLike = 'paper-table1', set: Mapping[str, Value] | None = None) -> None:
         super().__init__(options(plant=plant, set=set))
+
+    def copy(self) -> Plant:
+        """The same plant with all of its state."""
+        other = Plant.__new__(Plant)
+        _core.Plant.__init__(other, self)
+        return other
+
+    __copy__ = copy
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Plant:
+        return self.copy()
 
 
 class Controller(_core.Controller):  # type: ignore[misc]

@@ -1,5 +1,7 @@
 """Controllers in Python run through the program's own cycle; plant and laws can be stepped by hand."""
+import copy
 import math
+import pickle
 import sys
 
 import numpy as np
@@ -180,10 +182,38 @@ def test_plant_by_hand_keeps_its_energy_balance():
         angle += 0.5e-3 * (speeds[-1] + speeds[-2])
     assert plant.state.angle2_rad == pytest.approx(angle, rel=1e-6)
     assert all(b < a for a, b in zip(speeds, speeds[1:]))
-    for wrong in ({'duration_s': -1.0}, {'duration_s': math.nan}, {'duration_s': 0.1, 'brake_duty': 1.5}):
-        with pytest.raises(ValueError):
+    for wrong in ({'duration_s': -1.0}, {'duration_s': math.nan}, {'duration_s': 0.1, 'brake_duty': 1.5},
+                  {'duration_s': 0.1, 'motor_duty': math.nan}, {'duration_s': 0.1, 'brake_torque_Nm': -1.0},
+                  {'duration_s': 0.1, 'brake_torque_Nm': math.inf}):
+        with pytest.raises(ValueError, match=[*wrong][-1]):
             plant.advance(**wrong)
+    with pytest.raises(ValueError, match='plant.ideal_actuator'):
+        plant.advance(1e-3, brake_torque_Nm=1.0)
+    with pytest.raises(ValueError, match='omega1_rad_s'):
+        plant.reset(omega1_rad_s=math.nan)
     assert abs_hil.Plant(set={'plant.theta_N': 31}).theta_N == 31.0
+
+
+def test_plant_branches():
+    """A copy goes on as its original does, on a road that changes, with a brake that lags; a state is set and pickled."""
+    drive = {'motor_duty': 0.0, 'brake_duty': 0.4}
+    plant = abs_hil.Plant('inteco-manual', set={'plant.friction_profile': 'time: 1; 0.5 at 0.2'})
+    plant.reset(omega1_rad_s=150.0, omega2_rad_s=150.0)
+    plant.advance(0.15, **drive)
+    branches = [plant.copy(), copy.copy(plant), copy.deepcopy(plant)]
+    plant.advance(0.1, **drive)
+    assert plant.friction == 0.5
+    for branch in branches:
+        assert branch.friction == 1.0, 'the copies stood still'
+        branch.advance(0.1, **drive)
+        assert repr(branch.state) == repr(plant.state)
+    kept = pickle.loads(pickle.dumps(plant.state))
+    plant.advance(0.1, **drive)
+    after = repr(plant.state)
+    plant.state = kept
+    assert repr(plant.state) == repr(kept) != after
+    plant.advance(0.1, **drive)
+    assert repr(plant.state) == after, 'on an even road the state is all'
 
 
 def test_law_by_hand():
