@@ -6,11 +6,14 @@ import pathlib
 import re
 import signal
 import socket
+import subprocess
 import time
 import unittest
 
 from can_emulator import skip_unless_possible
 from emulator_process import EmulatorProcess, EmulatorTest
+from program import PROGRAM
+from resident_guardian import Group, Service
 
 SAFE = (0.0, 0.0)
 WATCHDOG_MS = 20
@@ -41,10 +44,13 @@ class Hm2Run(EmulatorTest):
     def lock_step(self, board, *args):
         return self.run_program(*self.arguments(board, '--fast', '--set', 'driver.emulated=true', *args))
 
-    def start_real_time(self, board, *args):
+    def start_real_time(self, board, *args, enter=None):
         # A computer under load wakes its programs late.
-        return self.start_program(*self.arguments(
-            board, '--set', 'guardian.timeout_ms=1000', '--set', 'realtime.cycle_gap_max_s=1', *args))
+        words = self.arguments(board, '--set', 'guardian.timeout_ms=1000', '--set', 'realtime.cycle_gap_max_s=1', *args)
+        self._programs.append(subprocess.Popen([pathlib.Path(PROGRAM).resolve(), *words], cwd=self.folder,
+                                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                               preexec_fn=enter))
+        return self._programs[-1]
 
     def wait_for_drive(self, board, program):
         for _ in range(400):
@@ -60,6 +66,17 @@ class Hm2Run(EmulatorTest):
         board.command('status')  # reads what it has printed so far
         return [float(found[1]) for line in board.lines
                 if (found := re.search(r'outputs zero: watchdog; watchdog last reloaded ([\d.]+) ms ago', line))]
+
+    def ms_until_zero(self, board):
+        """The same, whoever zeroed them last."""
+        self.assertEqual(board.wire(), SAFE)
+        return float([found[1] for line in board.lines
+                      if (found := re.search(r'outputs zero: .*last reloaded ([\d.]+) ms ago', line))][-1])
+
+    def stays_off(self, board):
+        for _ in range(20):
+            self.assertEqual(board.wire(), SAFE)
+            time.sleep(0.02)
 
     def test_lock_step_agrees_with_the_simulator(self):
         rig, sim = self.folder / 'rig.json', self.folder / 'sim.json'
@@ -125,9 +142,110 @@ class Hm2Run(EmulatorTest):
         error = program.communicate(timeout=60)[1]
         self.assertEqual(program.returncode, 1, error)
         self.assertIn('lost ten datagrams in a row', error)
-        for _ in range(20):
-            self.assertEqual(board.wire(), SAFE)
-            time.sleep(0.02)
+        self.stays_off(board)
+
+    def test_cable_in_again_while_nobody_lives_the_outputs_stay_off(self):
+        board = self.board()
+        program = self.start_real_time(board)
+        self.wait_for_drive(board, program)
+        board.command('link down')
+        for pid in (*self.guardians_of(program.pid), program.pid):
+            self.send(pid, signal.SIGKILL)
+        program.communicate(timeout=20)
+        time.sleep(0.1)
+        self.assertLessEqual(self.ms_until_zero(board), WATCHDOG_MS + 2)
+        board.command('link up')
+        self.stays_off(board)
+
+    def test_stopped_program_that_goes_on_brings_no_output_back(self):
+        board = self.board()
+        program = self.start_real_time(board)
+        self.wait_for_drive(board, program)
+        guardians = self.guardians_of(program.pid)
+        for pid in (*guardians, program.pid):
+            self.send(pid, signal.SIGSTOP)
+        time.sleep(0.3)
+        self.assertLessEqual(self.ms_until_zero(board), WATCHDOG_MS + 2)
+        for pid in (program.pid, *guardians):
+            self.send(pid, signal.SIGCONT)
+        self.stays_off(board)
+        error = program.communicate(timeout=60)[1]
+        self.assertEqual(program.returncode, 1, error)
+
+    def test_end_of_the_whole_control_group(self):
+        why_not = Group.why_not()
+        if why_not:
+            self.skipTest(why_not)
+        board = self.board()
+        group = Group('hm2')
+        try:
+            program = self.start_real_time(board, enter=group.enter)
+            self.wait_for_drive(board, program)
+            self.assertEqual(len(self.guardians_of(program.pid)), 1)
+            group.write('cgroup.kill', '1')
+            program.communicate(timeout=20)
+            self.assertEqual(program.returncode, -signal.SIGKILL)
+            time.sleep(0.1)
+            self.assertLessEqual(self.ms_until_zero(board), WATCHDOG_MS + 2)
+            self.stays_off(board)
+        finally:
+            group.remove()
+
+    def resident(self, board):
+        service = Service(self.folder, 'driver.kind=hm2', f'driver.hm2.address={board.address}',
+                          'guardian.timeout_ms=1000')
+        self.addCleanup(service.end, signal.SIGKILL)
+        return service
+
+    def start_resident(self, board, service):
+        program = self.start_real_time(board, '--set', 'guardian.resident=require', '--set',
+                                       f'guardian.socket={service.socket}')
+        self.wait_for_drive(board, program)
+        self.assertEqual(self.guardians_of(program.pid), [])
+        return program
+
+    def test_run_under_the_resident_guardian(self):
+        board = self.board()
+        service = self.resident(board)
+        summary = self.folder / 'resident.json'
+        program = self.start_real_time(board, '--set', 'guardian.resident=require', '--set',
+                                       f'guardian.socket={service.socket}', '--summary', summary, '--set',
+                                       'gate.brake_duty_max=0.7')
+        error = program.communicate(timeout=120)[1]
+        self.assertEqual(program.returncode, 0, error)
+        self.assertEqual(self.summary(summary)['result'], 'completed')
+        self.assertEqual(board.wire(), SAFE)
+
+    def test_program_killed_or_stopped_under_the_resident_guardian(self):
+        for stop in (signal.SIGKILL, signal.SIGSTOP):
+            with self.subTest(stop):
+                board = self.board()
+                service = self.resident(board)
+                program = self.start_resident(board, service)
+                self.send(program.pid, stop)
+                time.sleep(0.3)
+                self.assertLessEqual(self.ms_until_zero(board), WATCHDOG_MS + 2)
+                self.stays_off(board)
+                self.send(program.pid, signal.SIGKILL)
+                program.communicate(timeout=20)
+                service.end()
+                board.end()
+
+    def test_program_and_resident_guardian_dead_and_the_cable_out_and_in(self):
+        board = self.board()
+        service = self.resident(board)
+        program = self.start_resident(board, service)
+        for child in self.children_of(service.process.pid):  # its standby, too
+            self.send(child, signal.SIGKILL)
+        for process in (service.process, program):
+            process.kill()
+        program.communicate(timeout=20)
+        time.sleep(0.1)
+        self.assertLessEqual(self.zeros(board)[-1], WATCHDOG_MS + 2)
+        board.command('link down')
+        time.sleep(0.1)
+        board.command('link up')
+        self.stays_off(board)
 
     def test_paper_in_real_time(self):
         summary = self.folder / 'real.json'
@@ -156,9 +274,12 @@ class Hm2Run(EmulatorTest):
             pass
 
     @staticmethod
-    def guardians_of(pid):
+    def children_of(pid):
         return [int(child) for children in pathlib.Path(f'/proc/{pid}/task').glob('*/children')
-                for child in children.read_text().split()
+                for child in children.read_text().split()]
+
+    def guardians_of(self, pid):
+        return [child for child in self.children_of(pid)
                 if pathlib.Path(f'/proc/{child}/comm').read_text().startswith('abs_guardian')]
 
 
