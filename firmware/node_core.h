@@ -3,8 +3,9 @@
 
    A host sees a HostMot2 (docs/node.md) with watchdog, two ports of 17 I/O, two counters and two PWM generators. The node
    differs from one where that is safer:
-     - A bite is latched. Until the host activates again, no pin is driven: a write to the status clears the latch only
-       while both PWM values are 0.
+     - A bite is latched. Until the host activates again, no pin is driven: a write of 0 to the status clears the latch
+       only while both PWM values are 0, and if the watchdog has not been fed since the bite. A host that has fed it
+       must first switch the watchdog off, or let it bite now.
      - The watchdog's time is at most NODE_LONGEST_US, and without an armed watchdog no pin is driven.
      - A datagram acts as a whole or not at all. While outputs are permitted, one with a write number that is not newer
        than the last does not act.
@@ -41,10 +42,10 @@ struct node_core {
   uint32_t count[NODE_CHANNELS];    /* since the last clear, extended */
   uint32_t counted_us[NODE_CHANNELS];
   uint32_t watchdog_clocks, allowed_us, fed_us;
-  bool armed, latched;
+  bool armed, latched, fed_latched;
   uint32_t write_number;
   bool number_known;
-  uint8_t scratch[8], timers[16];
+  uint8_t timers[24]; /* space 4; the last 8 are scratch */
   uint16_t control[16]; /* space 6, by words */
   uint16_t pointer[8];
 };

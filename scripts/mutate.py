@@ -86,7 +86,8 @@ def mutants_of(name):
     """Yields (line number, what, mutated text)."""
     text = path_of(name).read_text()
     code = code_of(text)
-    begin = code.index('namespace abs_hil::') if 'namespace abs_hil::' in code else code.index('static ')  # C++ or C
+    in_c = 'namespace abs_hil::' not in code
+    begin = code.index('enum') if in_c else code.index('namespace abs_hil::')
 
     def at(start, end, new, what):
         line = text.count('\n', 0, start) + 1
@@ -112,6 +113,12 @@ def mutants_of(name):
         start, end = match.span()
         if start >= begin and 'for (' not in text[text.rfind('\n', 0, start):start]:
             yield at(start, end, '', '++ left out')
+    if in_c:  # masks, addresses and bounds are hexadecimal or end with U
+        for match in re.finditer(r'(?<!\w)(0x[0-9A-F]+U?|\d+U)(?!\w)', code):
+            start, end = match.span()
+            value = int(match.group().rstrip('U'), 0)
+            for new in (2 * value & 0xFFFFFFFF, 0) if start >= begin and value else ():
+                yield at(start, end, f'{new}U', f'{match.group()} -> {new:#x}')
     for match in re.finditer(r"(?<![\w.'])(\d+(?:'\d+)*(?:\.\d+)?(?:e-?\d+)?)(?![\w.'])", code):
         start, end = match.span()
         line_text = text[text.rfind('\n', 0, start) + 1:text.find('\n', end)]

@@ -35,8 +35,12 @@ struct Node {
   Node() { node_init(&core, &identity); }
 
   Bytes ask(const Bytes& datagram) {
-    Bytes answer(NODE_MOST_BYTES);
-    answer.resize(node_datagram(&core, now_us, datagram.data(), datagram.size(), answer.data()));
+    constexpr std::uint8_t untouched = 0xA5;
+    Bytes answer(NODE_MOST_BYTES + 1, untouched);
+    const std::size_t size = node_datagram(&core, now_us, datagram.data(), datagram.size(), answer.data());
+    REQUIRE(size <= NODE_MOST_BYTES);
+    CHECK(answer[size] == untouched);
+    answer.resize(size);
     return answer;
   }
   Bytes ask(const std::string& text) { return ask(hex(text)); }
@@ -60,8 +64,9 @@ struct Node {
     node_poll(&core, now_us);
   }
   void feed() { write(0x0E00, 0x5A000000); }
-  /// As a driver activates: values 0, mode of 12 bits, PWM pins, watchdog, status, DDR.
+  /// As a driver activates: a bite, values 0, mode of 12 bits, PWM pins, watchdog, status, DDR.
   void activate(std::uint32_t clocks = 499'999) {
+    write(0x0C00, 1);
     for (const std::uint32_t i : {0U, 4U}) {
       write(0x4000 + i, 0);
       write(0x4100 + i, 3);
@@ -115,8 +120,17 @@ TEST_CASE("Activated, each generator's duty is its value; inverted or not, direc
   CHECK(node.duty(0) == 0);
   CHECK(node.read(0x1000) == 0x1FFFF);
   node.set_duty(0, 1024);
-  node.write(0x4100, 0x13);
-  CHECK(node.duty(0) == 0);
+  CHECK(node.read(0x1000) == 0x1FFFD);
+  for (const std::uint32_t outputs : {1U, 2U, 3U}) {  // swapped, up and down, PDM
+    node.write(0x4100, 3 | outputs << 3U);
+    CHECK(node.duty(0) == 0);
+  }
+  node.write(0x4100, 0x63);  // double buffered and with dither: as without
+  node.write(0x4000, 0x70000000U | 1024U << 16 | 0xFFFF);
+  CHECK(node.duty(0) == 1024);
+  node.set_duty(0, 1);
+  CHECK(node.duty(0) == 1);
+  CHECK(node.read(0x1000) == 0x1FFFD);
   node.write(0x4100, 0);  // 9 bits
   node.set_duty(0, 511);
   CHECK(node.duty(0) == 511U * 8U);
@@ -190,18 +204,20 @@ TEST_CASE("The armed time is (value + 1) / 100 MHz, at most 20 ms, and a loop th
   CHECK(node.core.allowed_us == 20'000);
 }
 
-TEST_CASE("The latch holds: feeding, DDR and status do not bring outputs back while a value is not 0") {
+TEST_CASE("The latch holds: DDR and status do not bring outputs back while a value is not 0") {
   Node node;
   node.activate();
   node.set_duty(0, 1000);
   node.poll(6'000);
-  node.feed();
+  CHECK(node.read(0x0D00) == 1);
   node.set_duty(0, 1000);
   node.write(0x1100, 2);
   CHECK(node.duty(0) == 0);
-  node.write(0x0D00, 0);  // LinuxCNC's soft reset: its values stand in the same datagram
+  CHECK(node.read16("01590600") == 1);
+  node.write(0x0D00, 0);
   CHECK(node.read(0x0D00) == 1);
   CHECK(node.errors() == 4);
+  CHECK(node.read16("01590600") == 2);
   node.write(0x0D00, 1);
   CHECK(node.read(0x0D00) == 1);
   node.set_duty(0, 0);
@@ -209,15 +225,75 @@ TEST_CASE("The latch holds: feeding, DDR and status do not bring outputs back wh
   node.write(0x0D00, 0);
   CHECK(node.read(0x0D00) == 1);
   node.set_duty(1, 0);
+  for (const std::uint32_t other : {1U, 2U, 0x100U, 0x80000000U}) node.write(0x0D00, other);  // only 0 opens it
+  CHECK(node.read(0x0D00) == 1);
+  CHECK(node.read16("01590600") == 3);
   node.write(0x0D00, 0);
   CHECK(node.read(0x0D00) == 0);
-  CHECK_FALSE(node.drives(0));  // the bite has cleared DDR
   node.write(0x1100, 2);
   node.set_duty(0, 1000);
+  CHECK_FALSE(node.drives(0));  // the bite has disarmed it
+  node.poll(50'000);
+  CHECK(node.read(0x0D00) == 0);
+  node.write(0x0C00, 499'999);
   CHECK(node.duty(0) == 1000);
   // Without a latch the status may be written at any value.
   node.write(0x0D00, 0);
   CHECK(node.duty(0) == 1000);
+  CHECK(node.read16("01590600") == 3);
+}
+
+TEST_CASE("A host that feeds after a bite has not noticed it: its status does not open the latch until it disarms") {
+  for (const std::uint32_t disarms : {0x80000000U, 0xFFFFFFFFU, 0U, 1U, 98U}) {
+    Node node;
+    node.activate();
+    node.poll(6'000);
+    node.feed();  // goes on, with the duty 0 that it commands just now
+    node.set_duty(0, 0);
+    node.set_duty(1, 0);
+    for (const std::uint32_t clocks : {499'999U, 99U, 0x7FFFFFFFU}) {  // LinuxCNC's soft reset: time, status, DDR
+      node.write(0x0C00, clocks);
+      node.write(0x0D00, 0);
+      node.write(0x1100, 2);
+      CHECK(node.read(0x0D00) == 1);
+      CHECK(node.read(0x1100) == 0);
+    }
+    node.write(0x0C00, 0x80000000);  // armed: a bite
+    node.feed();
+    node.write(0x0D00, 0);
+    CHECK(node.read(0x0D00) == 1);
+    node.write(0x0C00, 1);
+    node.feed();  // of a time that bites at once
+    node.write(0x0C00, 499'999);
+    node.write(0x0D00, 0);
+    CHECK(node.read(0x0D00) == 1);
+    node.write(0x0C00, disarms);
+    node.write(0x0D00, 0);
+    CHECK(node.read(0x0D00) == 0);
+    CHECK_FALSE(node.drives(0));
+    node.write(0x0C00, 499'999);
+    node.write(0x1100, 2);
+    node.set_duty(0, 1000);
+    CHECK(node.duty(0) == 1000);
+    node.feed();  // in time: no sign of anything
+    node.set_duty(0, 0);
+    node.poll(20'000);
+    node.write(0x0D00, 0);
+    CHECK(node.read(0x0D00) == 0);
+  }
+}
+
+TEST_CASE("After power-on too a feed keeps the latch shut, and a bite forgets it") {
+  Node node;
+  node.feed();
+  node.write(0x0D00, 0);
+  CHECK(node.read(0x0D00) == 1);
+  node.write(0x0C00, 0x80000000);
+  node.write(0x0D00, 0);
+  CHECK(node.read(0x0D00) == 0);
+  CHECK_FALSE(node.core.armed);
+  node.feed();  // off stays off
+  CHECK_FALSE(node.core.armed);
 }
 
 TEST_CASE("Switching the armed watchdog off bites, a time below a us too; unarmed nothing is driven; only 5A feeds") {
@@ -230,6 +306,11 @@ TEST_CASE("Switching the armed watchdog off bites, a time below a us too; unarme
   node.set_duty(0, 1000);
   CHECK(node.ask("81C2000C01000000 8142000D") == hex("01000000"));
   CHECK(node.duty(0) == 0);
+  for (const std::uint32_t clocks : {0U, 98U}) {
+    node.activate();
+    node.write(0x0C00, clocks);
+    CHECK(node.read(0x0D00) == 1);
+  }
   node.activate(99);  // 1 us
   CHECK(node.read(0x0D00) == 0);
   node.poll(1);
@@ -287,14 +368,48 @@ TEST_CASE("Counts of 16 bits are extended in both directions; a clear, stamps, c
   CHECK(node.errors() == 0);
 }
 
+TEST_CASE("A write changes the register of its address, and no other") {
+  Node node;
+  node.activate();
+  node_count(&node.core, 0, 100, 0);
+  node_count(&node.core, 1, 200, 0);
+  for (std::uint32_t group = 0; group < 0x100; ++group) {
+    for (const std::uint32_t i : {0U, 1U, 2U, 3U, 63U}) {
+      if (group == 0x0C || group == 0x0D || group == 0x0E) continue;
+      node_core before = node.core;
+      node.write(group << 8U | 4 * i, 0x0FFF0FF8);
+      ++before.control[4];
+      ++before.control[5];
+      before.pointer[0] = static_cast<std::uint16_t>((group << 8U | 4 * i) + 4);
+      constexpr std::uint32_t pins = 0x0FFF0FF8U & 0x1FFFFU;
+      if (i < 2 && group >= 0x10 && group <= 0x14) before.port[group - 0x10][i] = pins;
+      if (i < 2 && group == 0x30) before.count[i] = 0;
+      if (i < 2 && group == 0x31) before.counter_control[i] = 0x0FF8;
+      if (i < 2 && group == 0x40) before.pwm_value[i] = 0x0FFF0FF8;
+      if (i < 2 && group == 0x41) before.pwm_mode[i] = 0x0FFF0FF8;
+      if (i == 0 && group == 0x32) before.stamp_divisor = 0x0FF8;
+      if (i == 0 && group == 0x34) before.filter = 0x0FFF0FF8;
+      if (i == 0 && group == 0x42) before.pwm_rate = 0x0FF8;
+      if (i == 0 && group == 0x43) before.pdm_rate = 0x0FFF0FF8;
+      if (i == 0 && group == 0x44) before.pwm_enable = 0x0FFF0FF8;
+      CAPTURE(group, i);
+      CHECK(std::memcmp(&before, &node.core, sizeof before) == 0);
+      node_count(&node.core, 0, static_cast<std::uint16_t>(node.core.hardware[0] + 1), 0);
+    }
+  }
+}
+
 TEST_CASE("PWM frequency: the divider of 125 MHz for 200 MHz rate / 2^28, within the chip's range") {
   Node node;
   CHECK(node_pwm_divider(&node.core) == 4095);
   node.write(0x4200, 0xD6);
   const double frequency = 125e6 / (node_pwm_divider(&node.core) / 16.0) / 4096.0;
   CHECK(frequency == Approx(200e6 * 214 / 268435456.0).epsilon(1e-3));
-  node.write(0x4200, 1);
-  CHECK(node_pwm_divider(&node.core) == 4095);
+  for (const auto& [rate, divider] :
+       {std::pair{1U, 4095U}, {160U, 4095U}, {161U, 4070U}, {320U, 2048U}, {30'000U, 21U}}) {
+    node.write(0x4200, rate);
+    CHECK(node_pwm_divider(&node.core) == divider);
+  }
   node.write(0x4200, 0xFFFF);
   CHECK(node_pwm_divider(&node.core) == 16);
   node.write(0x4300, 6);
@@ -320,6 +435,10 @@ TEST_CASE("Identity: name, versions, MAC, address, cookie, IDROM, modules and pi
             "00c2eb0b 04000000 40000000 00010000 04000000"));
   CHECK(node.ask("8F424004") == hex("02000101 000c0300 00000000 03000102 00100500 1f000000 04020102 00300500 03000000 "
                                     "06000202 00400500 03000000 00000000 00000000 00000000"));
+  for (std::uint32_t at = 0x470; at < 0x600; at += 4) CHECK(node.read(at) == 0);
+  for (const std::uint32_t at : {0x000U, 0x0FCU, 0x200U, 0x204U, 0x300U, 0x700U, 0x704U, 0xC04U, 0xD04U, 0x1304U}) {
+    CHECK(node.read(at) == 0);
+  }
   for (std::uint32_t pin = 0; pin < 35; ++pin) {
     const std::uint32_t port = pin / 17;
     const std::uint32_t place = pin % 17;
@@ -349,13 +468,32 @@ TEST_CASE("Clock, scratch, packet counts, errors, pointers, info areas") {
   CHECK(node.errors() == 4);
   CHECK(node.ask("81D90000 0000").empty());
   CHECK(node.errors() == 0);
+  node.ask("81D11800 0000");
+  CHECK(node.ask("81511800 01590000") == hex("0000 0400"));  // beyond: nothing; the errors are another space's
+  node.ask("81D90000 0000");
+  CHECK(node.ask("81D90200 0000").empty());
+  CHECK(node.errors() == 4);
+  node.ask("81D90000 0000");
+  CHECK(node.errors() == 0);
   CHECK(node.ask("81D90400 0000 81C92000 0000").empty());
-  CHECK(node.read16("01590600") == 2 + 2 + 2 + 2);  // two bytes each
+  CHECK(node.read16("01590600") == 2 + 2 + 2 + 2 + 2 + 2);  // two bytes each
   CHECK(node.ask("01610000 01650000") == hex("005a 015a"));
   CHECK(node.ask("84610800") == Bytes({'H', 'o', 's', 't', 'M', 'o', 't', '2'}));
   CHECK(node.ask("01610200 01710200 01611000") == hex("0400 0200 0000"));
   // A pointer moves with an increment only; the info area shows it and moves nothing.
   CHECK(node.ask("81420001 0102 0102 0161 0600") == hex("fecaaa55 484f5354 484f5354 0401"));
+  CHECK(node.ask("0102") == hex("484f5354"));
+  CHECK(node.ask("01592000") == hex("0000"));  // beyond the last word, whatever the pointers are
+  for (int n = 0; n < 300; ++n) node.ask("0102");
+  const std::uint32_t received = node.read16("01590800");
+  CHECK(received > 300);
+  CHECK(node.read16("01591000") > 256);
+  CHECK(node.ask("01590900") ==
+        Bytes{static_cast<std::uint8_t>(received >> 8U), static_cast<std::uint8_t>(received + 2)});
+  const std::uint32_t sent = node.read16("01590E00");
+  CHECK(node.ask("01400000") == hex("00"));  // an answer of one byte is one too
+  CHECK(node.ask("00420000").empty());       // and none is none
+  CHECK(node.read16("01590E00") == sent + 2);
 }
 
 TEST_CASE("A command that its space does not take reads zeros and is counted, a write to one does nothing") {
@@ -377,9 +515,16 @@ TEST_CASE("A datagram that breaks off, or asks for more than a packet, does noth
     CHECK(node.ask(text).empty());
   }
   CHECK(node.ask("81C2000C 1FA10700 FF420001 FF420001 FF420001").empty());
+  // What there is of the data of a write would be two whole commands.
+  CHECK(node.ask("81C2000C 1FA10700 82C20040 00000000").empty());
   CHECK(node.read(0x0C00) == 0x80000000);
   CHECK(node.errors() == 1);
-  CHECK(node.read16("01590200") == 6);
+  CHECK(node.read16("01590200") == 7);
+  // Data that are written are no answer.
+  Bytes both = hex("FFC20050");
+  both.resize(both.size() + std::size_t{127} * 4);
+  for (const std::uint8_t byte : hex("FF420001 FF420001 F2420001")) both.push_back(byte);
+  CHECK(node.ask(both).size() == NODE_MOST_BYTES);
   CHECK(node.ask("FF420001 FF420001 F0420001").size() == 127 * 8 + 112 * 4);
   CHECK(node.ask("FF420001 FF420001 F1420001").size() == 127 * 8 + 113 * 4);
   CHECK(node.ask("FF420001 FF420001 F2420001").size() == NODE_MOST_BYTES - 4 + 4);
