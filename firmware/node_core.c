@@ -19,34 +19,10 @@ enum { CONTROL_PARSE = 1, CONTROL_MEMORY = 2, CONTROL_WRITE = 3, CONTROL_RX = 4,
 
 /* The page 0x400: the IDROM, in which the board's name stands at 3 and 4, then the modules at 16: tag, version, clock,
    instances | base, registers | registers of each instance. */
-static const uint32_t idrom[64] = {3,
-                                   0x40,
-                                   0x200,
-                                   0,
-                                   0,
-                                   0,
-                                   0,
-                                   NODE_CHANNELS,
-                                   NODE_CHANNELS* PINS_PER_PORT,
-                                   PINS_PER_PORT,
-                                   NODE_CLOCK_MHZ * 1000000U,
-                                   200000000U,
-                                   4,
-                                   64,
-                                   256,
-                                   4,
-                                   0x01010002U,
-                                   0x00030C00U,
-                                   0,
-                                   0x02010003U,
-                                   0x00051000U,
-                                   0x1FU,
-                                   0x02010204U,
-                                   0x00053000U,
-                                   3,
-                                   0x02020006U,
-                                   0x00054000U,
-                                   3};
+static const uint32_t idrom[64] = {
+    3, 0x40, 0x200, 0, 0, 0, 0, NODE_CHANNELS, NODE_CHANNELS * PINS_PER_PORT, PINS_PER_PORT, NODE_CLOCK_MHZ * 1000000U,
+    200000000U, 4, 64, 256, 4, 0x01010002U, 0x00030C00U, 0, 0x02010003U, 0x00051000U, 0x1FU, 0x02010204U, 0x00053000U,
+    3, 0x02020006U, 0x00054000U, 3};
 
 static uint32_t word16(const uint8_t* bytes) { return bytes[0] | (uint32_t)bytes[1] << 8; }
 
@@ -62,7 +38,7 @@ static void count_error(struct node_core* node, unsigned which, unsigned bit) {
 static void bite(struct node_core* node) {
   node->armed = false;
   node->latched = true;
-  node->fed_latched = false;
+  node->fed_since_bite = false;
   for (unsigned i = 0; i < NODE_CHANNELS; ++i) {
     node->port[PORT_DDR][i] = node->port[PORT_OPEN_DRAIN][i] = 0;
     node->pwm_value[i] = 0;
@@ -74,7 +50,7 @@ static void load_watchdog(struct node_core* node, uint32_t clocks) {
   const bool off = clocks >= WATCHDOG_OFF;
   const uint32_t us = (clocks + 1) / NODE_CLOCK_MHZ;
   const bool now = off ? node->armed : us == 0;
-  if (off) node->fed_latched = false;
+  if (off) node->fed_since_bite = false;
   node->watchdog_clocks = clocks;
   node->armed = !off;
   node->allowed_us = us < NODE_LONGEST_US ? us : NODE_LONGEST_US;
@@ -84,13 +60,13 @@ static void load_watchdog(struct node_core* node, uint32_t clocks) {
 
 static void feed(struct node_core* node) {
   load_watchdog(node, node->watchdog_clocks);
-  if (node->latched) node->fed_latched = true; /* also if the time that it reloads is off, or now */
+  node->fed_since_bite = true; /* also if the time that it reloads is off, or now */
 }
 
 /* A host that feeds a latched node has not noticed the bite; what it writes is no activation. */
 static void write_status(struct node_core* node, uint32_t value) {
   if (value != 0 || !node->latched) return;
-  if (node->fed_latched || node->pwm_value[0] != 0 || node->pwm_value[1] != 0) {
+  if (node->fed_since_bite || node->pwm_value[0] != 0 || node->pwm_value[1] != 0) {
     count_error(node, CONTROL_WRITE, WRITE_ERROR);
     return;
   }
@@ -321,8 +297,8 @@ static bool take_command(const struct node_core* node, const uint8_t* bytes, siz
   if (length - *at < data_bytes) return false;
   *at += data_bytes;
   const bool in_use = command->space != SPACE_CHIP && command->space != SPACE_FLASH && command->space != SPACE_UNUSED;
-  command->known = command->info ? !command->write && command->unit == 2
-                                 : in_use && command->unit == (command->space == SPACE_HOSTMOT2 ? 4U : 2U);
+  const uint32_t unit = command->info || command->space != SPACE_HOSTMOT2 ? 2 : 4;
+  command->known = in_use && command->unit == unit && !(command->info && command->write);
   return true;
 }
 

@@ -42,10 +42,9 @@ struct node_core {
   uint32_t count[NODE_CHANNELS];    /* since the last clear, extended */
   uint32_t counted_us[NODE_CHANNELS];
   uint32_t watchdog_clocks, allowed_us, fed_us;
-  bool armed, latched, fed_latched;
   uint32_t write_number;
-  bool number_known;
-  uint8_t timers[24]; /* space 4; the last 8 are scratch */
+  bool armed, latched, fed_since_bite, number_known;
+  uint8_t timers[24];   /* space 4; the last 8 are scratch */
   uint16_t control[16]; /* space 6, by words */
   uint16_t pointer[8];
 };

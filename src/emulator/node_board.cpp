@@ -11,13 +11,27 @@ namespace abs_hil::emulator {
 
 namespace {
 
-constexpr std::array<std::uint8_t, 4> advances_time{0x82, 0xD6, 0x00, 0x00};  // then 8 bytes
-constexpr std::array<std::uint8_t, 4> reads_time{0x82, 0x56, 0x00, 0x00};
-constexpr std::array<std::uint8_t, 4> reads_cookie{0x01, 0x75, 0x00, 0x00};
+// Words of LBP16 commands in space 5.
+constexpr unsigned advances_time = 0xD682;  // then 8 bytes, ns
+constexpr unsigned reads_time = 0x5682;
+constexpr unsigned reads_cookie = 0x7501;
 constexpr std::size_t time_bytes = 8;
+constexpr std::array<std::uint8_t, 2> cookie{0x05, 0x5A};
 
-bool begins(std::span<const std::uint8_t> datagram, const std::array<std::uint8_t, 4>& command) {
-  return datagram.size() >= command.size() && std::equal(command.begin(), command.end(), datagram.begin());
+/// Calls `use` with each whole command's word, the place of its data, and the bytes of the answer before its own.
+template <typename Use>
+void for_each_command(std::span<const std::uint8_t> datagram, Use use) {
+  std::size_t answered = 0;
+  for (std::size_t at = 0; at + 2 <= datagram.size();) {
+    const unsigned word = datagram[at] | static_cast<unsigned>(datagram[at + 1]) << 8U;
+    const std::size_t bytes = std::size_t{word & 0x7FU} << ((word >> 8U) & 3U);
+    const bool write = (word & 0x8000U) != 0;
+    const std::size_t data_at = at + ((word & 0x4000U) != 0 ? 4 : 2);
+    at = data_at + (write ? bytes : 0);
+    if (at > datagram.size()) return;
+    use(word, data_at, answered);
+    if (!write) answered += bytes;
+  }
 }
 
 }  // namespace
@@ -71,30 +85,37 @@ void NodeBoard::note(const std::string& why) {
   log_.note(time_ns(), outputs(), why, never ? -1 : time_ns() - 1000 * since_us);
 }
 
-std::vector<std::uint8_t> NodeBoard::answer(std::span<const std::uint8_t> datagram) {
-  std::vector<std::uint8_t> reply;
-  if (options_.lock_step && begins(datagram, advances_time) && datagram.size() >= reads_time.size() + time_bytes) {
+void NodeBoard::obey_lock_step(std::span<const std::uint8_t> datagram) {
+  for_each_command(datagram, [&](unsigned word, std::size_t data_at, std::size_t /*answered*/) {
+    if (word != advances_time) return;
     std::int64_t wanted_ns = 0;
-    std::memcpy(&wanted_ns, datagram.data() + advances_time.size(), time_bytes);
+    std::memcpy(&wanted_ns, datagram.data() + data_at, time_bytes);
     constexpr std::int64_t longest_ns = 10'000'000'000;
     advance_to(std::clamp(wanted_ns, time_ns(), time_ns() + longest_ns));
-    datagram = datagram.subspan(advances_time.size() + time_bytes);
-    if (datagram.empty()) return {};
-  } else if (options_.lock_step && begins(datagram, reads_time)) {
-    reply.resize(time_bytes);
-    const std::int64_t now_ns = time_ns();
-    std::memcpy(reply.data(), &now_ns, time_bytes);
-    return reply;
-  } else if (options_.lock_step && begins(datagram, reads_cookie)) {
-    return {0x05, 0x5A};
-  }
+  });
+}
+
+void NodeBoard::answer_lock_step(std::span<const std::uint8_t> datagram, std::span<std::uint8_t> reply) const {
+  const std::int64_t now_ns = time_ns();
+  for_each_command(datagram, [&](unsigned word, std::size_t /*data_at*/, std::size_t answered) {
+    if (word == reads_time) std::memcpy(reply.subspan(answered, time_bytes).data(), &now_ns, time_bytes);
+    if (word == reads_cookie) std::memcpy(reply.subspan(answered, cookie.size()).data(), cookie.data(), cookie.size());
+  });
+}
+
+std::vector<std::uint8_t> NodeBoard::answer(std::span<const std::uint8_t> datagram) {
+  if (options_.lock_step) obey_lock_step(datagram);
   look();
-  const std::uint32_t number = core_.write_number;
-  const std::uint32_t fed_us = core_.fed_us;
   const bool was_latched = core_.latched;
-  reply.resize(NODE_MOST_BYTES);
+  std::vector<std::uint8_t> reply(NODE_MOST_BYTES);
   reply.resize(node_datagram(&core_, now_us(), datagram.data(), datagram.size(), reply.data()));
-  if (reply.empty() || core_.write_number != number || core_.fed_us != fed_us) ++writes_;
+  if (options_.lock_step && !reply.empty()) answer_lock_step(datagram, reply);
+  bool writes = false;
+  for_each_command(datagram, [&writes](unsigned word, std::size_t /*data_at*/, std::size_t /*answered*/) {
+    constexpr unsigned write_and_space = 0x9C00;
+    if ((word & write_and_space) == 0x8000U) writes = true;
+  });
+  if (writes) ++writes_;
   if (core_.latched && !was_latched) log_.add(time_ns(), "watchdog");
   note(core_.latched && !was_latched ? "watchdog" : "commanded");
   return reply;

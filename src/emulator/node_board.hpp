@@ -49,6 +49,10 @@ class NodeBoard final : public UdpBoard {
   };
 
   [[nodiscard]] std::uint32_t now_us() const noexcept { return static_cast<std::uint32_t>(rig_.time_ns() / 1000); }
+  /// Advances the time as the commands of space 5 say.
+  void obey_lock_step(std::span<const std::uint8_t> datagram);
+  /// Puts what space 5 answers in place of the core's zeros.
+  void answer_lock_step(std::span<const std::uint8_t> datagram, std::span<std::uint8_t> reply) const;
   /// What the chip's loop does: counters, then the watchdog.
   void look();
   void note(const std::string& why);

@@ -34,8 +34,16 @@ class Board(EmulatorProcess):
 
 
 class Hm2Run(EmulatorTest):
+    BOARD = Board
+    #: Commands of the emulator, and words of the error that they must give.
+    FAULTS = [('fault lose-answers=10', 'lost ten datagrams in a row'),
+              ('bite', 'watchdog dropped all outputs'),
+              ('power-cycle', 'was restarted'),
+              ('quadrature-error upper', 'both signals of an encoder'),
+              ('talker read', 'something else writes')]
+
     def board(self, *args):
-        return self.start_emulator(Board, *args)
+        return self.start_emulator(self.BOARD, *args)
 
     def arguments(self, board, *args):
         return ['--backend', 'rig', '--no-lcm', '--no-out', '--set', 'driver.kind=hm2', '--set',
@@ -93,11 +101,7 @@ class Hm2Run(EmulatorTest):
         self.assertEqual(board.wire(), SAFE)
 
     def test_faults_of_the_board_end_a_run_with_their_reasons(self):
-        for command, words in (('fault lose-answers=10', 'lost ten datagrams in a row'),
-                               ('bite', 'watchdog dropped all outputs'),
-                               ('power-cycle', 'was restarted'),
-                               ('quadrature-error upper', 'both signals of an encoder'),
-                               ('talker read', 'something else writes')):
+        for command, words in self.FAULTS:
             with self.subTest(command):
                 board = self.board()
                 program = self.start_real_time(board)

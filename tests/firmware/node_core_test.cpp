@@ -428,6 +428,8 @@ TEST_CASE("Identity: name, versions, MAC, address, cookie, IDROM, modules and pi
   CHECK(node.ask("83491000") == hex("6162732d6e6f"));
   CHECK(node.ask("82492000") == hex("7901a8c0"));
   CHECK(node.ask("81490000 81490800 81492400") == hex("0000 0000 0000"));
+  node.activate();
+  CHECK(node.ask("88490000") == hex("0000 03020150ab02 0000000000000000"));
   CHECK(node.ask("84420001") == hex("fecaaa55 484f5354 4d4f5432 00040000"));
   CHECK(node.read(0x110) == 0);
   CHECK(node.ask("90420004") ==
@@ -462,6 +464,8 @@ TEST_CASE("Clock, scratch, packet counts, errors, pointers, info areas") {
   CHECK(node.read16("01590A00") == 8);
   CHECK(node.read16("01590E00") == 6);
   CHECK(node.read16("01591000") == 7);
+  CHECK(node.ask("82D11100 AABBCCDD").empty());  // an odd address is followed by odd ones
+  CHECK(node.ask("84511000") == hex("01AABBCCDD060708"));
   CHECK(node.read16("01592000") == 0);
   CHECK(node.ask("81D11800 0000 81D10000 0000").empty());
   CHECK(node.ask("82510000").size() == 4);
@@ -477,7 +481,8 @@ TEST_CASE("Clock, scratch, packet counts, errors, pointers, info areas") {
   CHECK(node.errors() == 0);
   CHECK(node.ask("81D90400 0000 81C92000 0000").empty());
   CHECK(node.read16("01590600") == 2 + 2 + 2 + 2 + 2 + 2);  // two bytes each
-  CHECK(node.ask("01610000 01650000") == hex("005a 015a"));
+  CHECK(node.ask("01610000 01690000 01710000 01790000 017D0000") == hex("005a 025a 045a 065a 075a"));
+  CHECK(node.ask("01650000 016D0000 01750000") == hex("0000 0000 0000"));  // no such spaces; 5 is the emulator's
   CHECK(node.ask("84610800") == Bytes({'H', 'o', 's', 't', 'M', 'o', 't', '2'}));
   CHECK(node.ask("01610200 01710200 01611000") == hex("0400 0200 0000"));
   // A pointer moves with an increment only; the info area shows it and moves nothing.

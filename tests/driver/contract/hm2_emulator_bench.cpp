@@ -1,4 +1,5 @@
-// The same driver against the emulated 7I92T in another process, over UDP, in lock-step.
+// The same driver against the emulated 7I92T, or the core of the node's firmware, in another process, over UDP, in
+// lock-step.
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -23,6 +24,12 @@ namespace abs_hil::test {
 namespace {
 
 namespace fs = std::filesystem;
+
+#ifdef ABS_HIL_CONTRACT_NODE
+constexpr const char* board_option = "--node";
+#else
+constexpr const char* board_option = "--hm2";
+#endif
 
 /// Counts the commands that write to HostMot2.
 class CountingLink final : public driver::hm2::Link {
@@ -112,8 +119,8 @@ class Hm2EmulatorBench final : public Bench {
     emulator_ = ::fork();
     if (emulator_ == 0) {
       ::dup2(pipe[1], STDOUT_FILENO);
-      ::execl(ABS_RIG_EMULATOR, ABS_RIG_EMULATOR, "--hm2", place.c_str(), "--control", control_.c_str(), "--lock-step",
-              "--start-speed", "60", static_cast<char*>(nullptr));
+      ::execl(ABS_RIG_EMULATOR, ABS_RIG_EMULATOR, board_option, place.c_str(), "--control", control_.c_str(),
+              "--lock-step", "--start-speed", "60", static_cast<char*>(nullptr));
       ::_exit(127);
     }
     ::close(pipe[1]);
