@@ -98,7 +98,10 @@ IoResult Hm2Driver::judge_talkers(const CycleAnswer& answer) noexcept {
     ++counters_.writes_lost;
     command_ = commands_[answer.write_number % commands_.size()];
     bucket_.lost();
-    if (bucket_.tripped()) return {IoError::no_answer, at::write_number, last_errno_, rig::Reason::hm2_silent};
+    // Once that has ended the run, an answer is one again: else a board that is back would stay silent to its reader.
+    if (bucket_.tripped() && fault_.ok()) {
+      return {IoError::no_answer, at::write_number, last_errno_, rig::Reason::hm2_silent};
+    }
   } else {
     bucket_.good();
   }

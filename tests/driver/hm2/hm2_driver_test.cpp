@@ -227,6 +227,26 @@ TEST_CASE("The cable is out for a while: outputs off in the watchdog's time, and
   }
 }
 
+TEST_CASE("A cable that was pulled between answer and write: in again, the board is heard, and says that it bit") {
+  Rig rig;
+  REQUIRE(rig.cycles(5, drive).ok());
+  rig.cable.loses_request = is_cycle_write;
+  REQUIRE(rig.cycle(drive).ok());
+  rig.cable.loses_request = [](const auto&) { return false; };
+  rig.cable.out = true;
+  IoResult result{};
+  for (int n = 0; n < 30; ++n) {
+    rig.board.advance_to(rig.now_ns += ms);
+    result = rig.driver.read(rig.now_ns, rig.measurement);
+  }
+  CHECK(result.error == IoError::no_answer);
+  rig.cable.out = false;
+  rig.board.advance_to(rig.now_ns += ms);
+  result = rig.driver.read(rig.now_ns, rig.measurement);
+  CHECK(result.error == IoError::read_back_mismatch);
+  CHECK(result.reason == Reason::hm2_watchdog_bit);
+}
+
 TEST_CASE("A lost write is known by its number: the command that acts is the one before") {
   Rig rig;
   REQUIRE(rig.cycles(5, drive).ok());
