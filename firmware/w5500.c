@@ -61,6 +61,12 @@ static uint16_t get16(uint16_t address) {
   return (uint16_t)(bytes[0] << 8 | bytes[1]);
 }
 
+/* Bytes that wait. A datagram may come between the two bytes of the register: only two looks that agree count. */
+static uint16_t bytes_waiting(void) {
+  const uint16_t first = get16(S_RX_RECEIVED);
+  return first != 0 && get16(S_RX_RECEIVED) == first ? first : 0;
+}
+
 /* A command is taken when the register reads 0 again, within some us. */
 static void command(uint8_t what) {
   put8(SOCKET, S_COMMAND, what);
@@ -88,7 +94,7 @@ bool w5500_start(const uint8_t mac[6], const uint8_t address[4], uint16_t port) 
 
 size_t w5500_receive(uint8_t *data, size_t most, struct w5500_peer *from) {
   uint8_t header[HEADER];
-  const uint16_t waiting = get16(S_RX_RECEIVED);
+  const uint16_t waiting = bytes_waiting();
   if (waiting < HEADER) return 0;
   const uint16_t at = get16(S_RX_READ);
   get(RX_BUFFER, at, header, sizeof header);

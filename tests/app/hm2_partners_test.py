@@ -76,6 +76,12 @@ class Mesaflash(EmulatorTest):
         self.start_emulator(EmulatorProcess, '--node', BOARD, '--board-name', '7I92', '--priority', 0)
         self.check_read_out(self.read_out())
 
+    def test_mesaflash_refuses_the_nodes_own_name_with_it(self):
+        self.start_emulator(EmulatorProcess, '--node', BOARD, '--priority', 0)
+        result = subprocess.run(['mesaflash', '--device', '7I92', '--addr', BOARD, '--readhmid'], capture_output=True,
+                                text=True, timeout=20)
+        self.assertIn(f'Unsupported ethernet device abs-node at {BOARD}', result.stdout + result.stderr)
+
     def test_mesaflash_sees_the_lie(self):
         self.start_emulator(EmulatorProcess, '--hm2', BOARD, '--board-name', '7I92', '--priority', 0, '--wrong-board',
                             'one-counter')
@@ -115,10 +121,13 @@ loadusr -w sleep 1
 
 
 class LinuxCnc(EmulatorTest):
-    def setUp(self):
-        super().setUp()
+    @classmethod
+    def setUpClass(cls):
         # `ip netns` keeps its names below /run, which this test has for itself. LinuxCNC's process is another user there.
         subprocess.run(['mount', '-t', 'tmpfs', '-o', 'mode=1777', 'none', '/run'], check=True)
+
+    def setUp(self):
+        super().setUp()
         ip('link', 'set', 'lo', 'up')
         ip('netns', 'add', 'board')
         ip('link', 'add', 'to-board', 'type', 'veth', 'peer', 'name', 'to-host', 'address', MAC, 'netns', 'board')
@@ -126,6 +135,11 @@ class LinuxCnc(EmulatorTest):
         ip('link', 'set', 'to-board', 'up')
         ip('-n', 'board', 'addr', 'add', f'{BOARD}/24', 'dev', 'to-host')
         ip('-n', 'board', 'link', 'set', 'to-host', 'up')
+
+    def tearDown(self):
+        super().tearDown()
+        ip('link', 'del', 'to-board')
+        ip('netns', 'del', 'board')
 
     def drive(self, board):
         """LinuxCNC drives the board for 1 s. Its output, and the board's registers and speeds meanwhile."""
@@ -175,6 +189,20 @@ class LinuxCnc(EmulatorTest):
         events = [line.split(' ', 2)[2] for line in board.lines if line.startswith('event')]
         self.assertEqual(events[-2], 'watchdog')
         self.assertIn('outputs zero: watchdog', events[-1])
+
+    def test_linuxcnc_drives_the_node_once_and_its_soft_reset_brings_nothing_back(self):
+        board = self.start_emulator(OtherNamespace, '--node', BOARD, '--board-name', '7I92', '--mac', MAC, '--start-speed', 40)
+        output, registers, _ = self.drive(board)
+        self.assertIn('discovered 7I92', output)
+        expected = {'1200': '0000e002', '1204': '0000e002', '4100': '00000023', '4200': '000000d6', '3200': '00000030'}
+        self.assertEqual({name: registers[name] for name in expected}, expected)
+        end = board.command('status')
+        self.assertIn('drive 0.0000, brake 0.0000', end)
+        self.assertIn('watchdog has bitten', end)
+        events = [line.split(' ', 2)[2] for line in board.lines if line.startswith('event')]
+        # The node cuts LinuxCNC's watchdog to 20 ms, which this computer may miss: the bite then holds.
+        self.assertEqual(sum('outputs on' in event for event in events), 1, events)
+        self.assertIn('outputs zero', events[-1])
 
 
 if __name__ == '__main__':

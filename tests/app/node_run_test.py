@@ -1,10 +1,15 @@
 """The paper's experiment and the faults of hm2_run_test.py through driver.kind=hm2, against the core of the node's firmware
 (docs/node.md) in another process. The node latches a bite, which no 7I92T does: a host that goes on stays without outputs."""
+import pathlib
+import subprocess
+import threading
+import time
 import unittest
 
 import hm2_run_test
 from can_emulator import skip_unless_possible
 from emulator_process import EmulatorProcess
+from program import PROGRAM
 
 
 class Node(EmulatorProcess):
@@ -36,6 +41,48 @@ class NodeRun(hm2_run_test.Hm2Run):
         self.wait_for_drive(board, again)
         again.kill()
         again.communicate()
+
+    def test_commission_goes_through_all_steps_with_the_cable_pulled(self):
+        board = self.board()
+        # Before other programs: a computer under load pauses it for longer than the watchdog's time.
+        first = ['chrt', '-f', '50']
+        if subprocess.run([*first, 'true'], stderr=subprocess.DEVNULL).returncode != 0:
+            first = []
+        program = subprocess.Popen(
+            [*first, pathlib.Path(PROGRAM).resolve(), 'commission', '--set', 'driver.kind=hm2', '--set', f'driver.hm2.address={board.address}', '--set',
+             'guardian.timeout_ms=1000', '--set', f'driver.records={self.folder}/records'],
+            cwd=self.folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, bufsize=1)
+        self._programs.append(program)
+        pulls = []
+
+        def pull():
+            time.sleep(0.2)
+            board.command('link down')
+            time.sleep(0.5)
+            pulls.append(board.wire())
+            board.command('link up')
+
+        said = ''
+        while line := program.stdout.readline():
+            said += line
+            if '[y/N]' in line:
+                for thread in threading.enumerate():
+                    if thread is not threading.current_thread():
+                        thread.join()
+                self.assertEqual(board.wire(), (0.0, 0.0), f'while it asks: {line}')
+                program.stdin.write('y\n')
+            elif line.startswith('Turn the '):
+                wheel = 'upper' if 'UPPER' in line else 'lower'
+                for _ in range(20):
+                    board.command(f'turn {wheel} 0.05')
+                    time.sleep(0.01)
+                program.stdin.write('\n')
+            elif line.startswith('Pull the '):
+                threading.Thread(target=pull).start()
+        program.wait(timeout=20)
+        self.assertEqual(program.returncode, 0, said)
+        self.assertIn('All steps passed', said)
+        self.assertEqual(pulls, [(0.0, 0.0)])
 
 
 if __name__ == '__main__':

@@ -16,6 +16,7 @@ export class W5500 {
     this.rxWrite = 0;
     this.sent = []; // datagrams that the chip has sent: {to, bytes, ns}
     this.linked = true;
+    this.torn = null; // a datagram that comes between the two bytes of the next read of how many bytes wait
     this.chip = chip;
     this.place = 0;
     chip.gpio[SELECT].addListener((state) => { if (state === 0) this.place = 0; });
@@ -45,7 +46,12 @@ export class W5500 {
     if (block === 0) return this.common[at];
     if (block === 3) return this.rx[at % RING];
     if (block !== 1) return 0;
-    if (at === 0x26) return this.received >> 8;
+    if (at === 0x26) {
+      const high = this.received >> 8;
+      if (this.torn) this.deliver(this.torn);
+      this.torn = null;
+      return high;
+    }
     if (at === 0x27) return this.received & 0xff;
     return this.socket[at];
   }
