@@ -9,6 +9,7 @@ missing() {
   exit 77
 }
 for program in arm-none-eabi-gcc node npm; do command -v "$program" >/dev/null || missing "$program"; done
+scripts/firmware.sh 7I92
 scripts/firmware.sh
 modules=build/firmware/chip
 mkdir -p "$modules"
@@ -16,4 +17,5 @@ cp tests/firmware/chip/* "$modules"/
 (cd "$modules" && npm ci --silent --no-audit --no-fund) || missing "rp2040js from the npm registry"
 size=$(stat -c %s build/firmware/abs-node.bin)
 [ "$size" -le 16384 ] || { echo "the image has $size bytes, more than 16384"; exit 1; }
+node "$modules/chip_test.mjs" build/firmware/7I92.bin 0 7I92 # its identity only
 node "$modules/chip_test.mjs" build/firmware/abs-node.bin "${1:-0.5}"
