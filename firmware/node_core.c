@@ -343,15 +343,17 @@ static void obey_write(struct node_core* node, const struct command* command, ui
   }
 }
 
-static void obey_read(const struct node_core* node, const struct command* command, uint32_t address, uint8_t* answer) {
-  const bool is_register = command->known && !command->info && command->space == SPACE_HOSTMOT2;
-  const uint32_t word = is_register ? read_register(node, address & 0xFFFCU) : 0;
+static void obey_read(const struct node_core *node, const struct command *command, uint32_t address, uint8_t *answer) {
+  if (command->known && !command->info && command->space == SPACE_HOSTMOT2) {
+    const uint32_t word = read_register(node, address & 0xFFFCU);
+    for (unsigned i = 0; i < 4; ++i) answer[i] = (uint8_t)(word >> 8 * i);
+    return;
+  }
   for (uint32_t i = 0; i < command->unit; ++i) {
-    if (is_register || !command->known) {
-      answer[i] = (uint8_t)(word >> 8 * i);
+    if (!command->known) {
+      answer[i] = 0;
     } else {
-      answer[i] =
-          command->info ? info_byte(node, command->space, address + i) : read_byte(node, command->space, address + i);
+      answer[i] = command->info ? info_byte(node, command->space, address + i) : read_byte(node, command->space, address + i);
     }
   }
 }

@@ -43,6 +43,19 @@ void add_command(std::vector<std::uint8_t>& datagram) {
   }
 }
 
+/// What a driver sends: a bite, values 0, mode of 12 bits, PWM pins, watchdog of 5 ms, status 0, DDR, then a duty.
+void add_activation(std::vector<std::uint8_t>& datagram) {
+  static constexpr std::uint8_t bytes[] = {0x81, 0xC2, 0x00, 0x0C, 1,    0,    0,    0,              // watchdog
+                                           0x82, 0xC2, 0x00, 0x40, 0,    0,    0,    0, 0, 0, 0, 0,  // values
+                                           0x82, 0xC2, 0x00, 0x41, 3,    0,    0,    0, 3, 0, 0, 0,  // modes
+                                           0x82, 0xC2, 0x00, 0x12, 2,    0,    0,    0, 2, 0, 0, 0,  // alternate source
+                                           0x81, 0xC2, 0x00, 0x0C, 0x1F, 0xA1, 0x07, 0,              // watchdog
+                                           0x81, 0xC2, 0x00, 0x0D, 0,    0,    0,    0,              // status
+                                           0x82, 0xC2, 0x00, 0x11, 3,    0,    0,    0, 2, 0, 0, 0,  // DDR
+                                           0x81, 0xC2, 0x00, 0x40, 0,    0,    0,    4};
+  datagram.insert(datagram.end(), std::begin(bytes), std::end(bytes));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -59,6 +72,7 @@ int main(int argc, char** argv) {
       datagram.resize(any() % 64);
       for (std::uint8_t& b : datagram) b = byte();
     } else {
+      if (any() % 64 == 0) add_activation(datagram);
       for (std::uint32_t commands = any() % 5; commands > 0; --commands) add_command(datagram);
       if (any() % 16 == 0 && !datagram.empty()) datagram.pop_back();
     }

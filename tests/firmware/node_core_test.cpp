@@ -504,13 +504,14 @@ TEST_CASE("Clock, scratch, packet counts, errors, pointers, info areas") {
 TEST_CASE("A command that its space does not take reads zeros and is counted, a write to one does nothing") {
   Node node;
   CHECK(node.ask("81410001") == hex("0000"));
+  CHECK(node.ask("81430001") == Bytes(8, 0));
   CHECK(node.ask("01460000 014E0000 01550000") == hex("00000000 00000000 0000"));
   CHECK(node.ask("01620000") == hex("00000000"));
   CHECK(node.ask("01E10000 0000").empty());
   CHECK(node.ask("81C1000C FFFF").empty());
   CHECK(node.read(0x0C00) == 0x80000000);
   CHECK(node.errors() == 2);
-  CHECK(node.read16("01590400") == 7);
+  CHECK(node.read16("01590400") == 8);
 }
 
 TEST_CASE("A datagram that breaks off, or asks for more than a packet, does nothing at all") {
