@@ -24,18 +24,18 @@ static const uint32_t idrom[64] = {
     200000000U, 4, 64, 256, 4, 0x01010002U, 0x00030C00U, 0, 0x02010003U, 0x00051000U, 0x1FU, 0x02010204U, 0x00053000U,
     3, 0x02020006U, 0x00054000U, 3};
 
-static uint32_t word16(const uint8_t* bytes) { return bytes[0] | (uint32_t)bytes[1] << 8; }
+static uint32_t word16(const uint8_t *bytes) { return bytes[0] | (uint32_t)bytes[1] << 8; }
 
-static uint32_t word32(const uint8_t* bytes) { return word16(bytes) | word16(bytes + 2) << 16; }
+static uint32_t word32(const uint8_t *bytes) { return word16(bytes) | word16(bytes + 2) << 16; }
 
-static void count_error(struct node_core* node, unsigned which, unsigned bit) {
+static void count_error(struct node_core *node, unsigned which, unsigned bit) {
   node->control[0] |= (uint16_t)bit;
   ++node->control[which];
 }
 
 /* Watchdog and latch. */
 
-static void bite(struct node_core* node) {
+static void bite(struct node_core *node) {
   node->armed = false;
   node->latched = true;
   node->fed_since_bite = false;
@@ -46,7 +46,7 @@ static void bite(struct node_core* node) {
 }
 
 /* (clocks + 1) / ClockLow. Less than a us, or off while armed, is "now". Off says that the host knows. */
-static void load_watchdog(struct node_core* node, uint32_t clocks) {
+static void load_watchdog(struct node_core *node, uint32_t clocks) {
   const bool off = clocks >= WATCHDOG_OFF;
   const uint32_t us = (clocks + 1) / NODE_CLOCK_MHZ;
   const bool now = off ? node->armed : us == 0;
@@ -58,13 +58,13 @@ static void load_watchdog(struct node_core* node, uint32_t clocks) {
   if (now) bite(node);
 }
 
-static void feed(struct node_core* node) {
+static void feed(struct node_core *node) {
   load_watchdog(node, node->watchdog_clocks);
   node->fed_since_bite = true; /* also if the time that it reloads is off, or now */
 }
 
 /* A host that feeds a latched node has not noticed the bite; what it writes is no activation. */
-static void write_status(struct node_core* node, uint32_t value) {
+static void write_status(struct node_core *node, uint32_t value) {
   if (value != 0 || !node->latched) return;
   if (node->fed_since_bite || node->pwm_value[0] != 0 || node->pwm_value[1] != 0) {
     count_error(node, CONTROL_WRITE, WRITE_ERROR);
@@ -74,12 +74,12 @@ static void write_status(struct node_core* node, uint32_t value) {
   node->number_known = false;
 }
 
-void node_poll(struct node_core* node, uint32_t now_us) {
+void node_poll(struct node_core *node, uint32_t now_us) {
   node->now_us = now_us;
   if (node->armed && now_us - node->fed_us >= node->allowed_us) bite(node);
 }
 
-void node_init(struct node_core* node, const struct node_identity* identity) {
+void node_init(struct node_core *node, const struct node_identity *identity) {
   const struct node_core off = {.identity = *identity};
   *node = off;
   node->watchdog_clocks = WATCHDOG_OFF;
@@ -88,13 +88,13 @@ void node_init(struct node_core* node, const struct node_identity* identity) {
 
 /* Outputs. */
 
-static bool permitted(const struct node_core* node) { return node->armed && !node->latched; }
+static bool permitted(const struct node_core *node) { return node->armed && !node->latched; }
 
-bool node_drives(const struct node_core* node, unsigned channel) {
+bool node_drives(const struct node_core *node, unsigned channel) {
   return permitted(node) && (node->port[PORT_DDR][channel] & node->port[PORT_ALTERNATE][channel] & PWM_PIN) != 0;
 }
 
-uint32_t node_duty(const struct node_core* node, unsigned channel) {
+uint32_t node_duty(const struct node_core *node, unsigned channel) {
   const uint32_t mode = node->pwm_mode[channel];
   const uint32_t bits = 9 + (mode & 3);
   const bool plain = (mode >> 3 & 3) == 0 && node->pwm_value[channel] >> 31 == 0;
@@ -102,12 +102,12 @@ uint32_t node_duty(const struct node_core* node, unsigned channel) {
   return (node->pwm_value[channel] >> 16 & ((1U << bits) - 1)) << (12 - bits);
 }
 
-bool node_output(const struct node_core* node) {
+bool node_output(const struct node_core *node) {
   const bool high = ((node->port[PORT_OUTPUT][0] ^ node->port[PORT_INVERT][0]) & 1) != 0;
   return permitted(node) && (node->port[PORT_DDR][0] & 1) != 0 && !high;
 }
 
-uint32_t node_pwm_divider(const struct node_core* node) {
+uint32_t node_pwm_divider(const struct node_core *node) {
   /* 125 MHz / (4096 f) with f = 200 MHz rate / 2^28, in 1/16; a slower one than the chip has is the slowest */
   const uint32_t divider = node->pwm_rate > 160 ? 655360U / node->pwm_rate : 4095U;
   return divider < 16 ? 16 : divider;
@@ -115,7 +115,7 @@ uint32_t node_pwm_divider(const struct node_core* node) {
 
 /* Counters. */
 
-void node_count(struct node_core* node, unsigned channel, uint16_t hardware, uint32_t now_us) {
+void node_count(struct node_core *node, unsigned channel, uint16_t hardware, uint32_t now_us) {
   const uint16_t step = (uint16_t)(hardware - node->hardware[channel]);
   if (step == 0) return;
   node->hardware[channel] = hardware;
@@ -123,11 +123,11 @@ void node_count(struct node_core* node, unsigned channel, uint16_t hardware, uin
   node->counted_us[channel] = now_us;
 }
 
-static uint32_t stamp(const struct node_core* node, uint32_t us) {
+static uint32_t stamp(const struct node_core *node, uint32_t us) {
   return (uint32_t)((uint64_t)us * NODE_CLOCK_MHZ / (node->stamp_divisor + 2)) & 0xFFFFU;
 }
 
-static uint32_t read_counter(const struct node_core* node, uint32_t group, uint32_t i) {
+static uint32_t read_counter(const struct node_core *node, uint32_t group, uint32_t i) {
   if (group == 0x33 && i == 0) return stamp(node, node->now_us);
   if (i >= NODE_CHANNELS) return 0;
   if (group == 0x30) return (node->count[i] & 0xFFFFU) | stamp(node, node->counted_us[i]) << 16;
@@ -155,17 +155,17 @@ static uint32_t read_cookie(uint32_t address) {
   }
 }
 
-static uint32_t read_idrom(const struct node_core* node, uint32_t i) {
-  const uint8_t* name = (const uint8_t*)node->identity.idrom_name;
+static uint32_t read_idrom(const struct node_core *node, uint32_t i) {
+  const uint8_t *name = (const uint8_t*)node->identity.idrom_name;
   return i == 3 ? word32(name) : i == 4 ? word32(name + 4) : idrom[i];
 }
 
 /* The levels that the pins of a 7I92 in the rig's wiring would have: high is off. */
-static uint32_t read_levels(const struct node_core* node, uint32_t i) {
+static uint32_t read_levels(const struct node_core *node, uint32_t i) {
   return node_duty(node, i) != 0 ? PIN_MASK & ~PWM_PIN : PIN_MASK;
 }
 
-static uint32_t read_register(const struct node_core* node, uint32_t address) {
+static uint32_t read_register(const struct node_core *node, uint32_t address) {
   const uint32_t group = address >> 8;
   const uint32_t i = (address & 0xFFU) / 4;
   if (address == 0x0C00) return node->watchdog_clocks;
@@ -180,7 +180,7 @@ static uint32_t read_register(const struct node_core* node, uint32_t address) {
   }
 }
 
-static void write_port(struct node_core* node, uint32_t which, uint32_t i, uint32_t value) {
+static void write_port(struct node_core *node, uint32_t which, uint32_t i, uint32_t value) {
   if ((which == PORT_DDR || which == PORT_OPEN_DRAIN) && node->latched && value != 0) {
     count_error(node, CONTROL_WRITE, WRITE_ERROR);
   } else {
@@ -188,7 +188,7 @@ static void write_port(struct node_core* node, uint32_t which, uint32_t i, uint3
   }
 }
 
-static void write_of_channel(struct node_core* node, uint32_t group, uint32_t i, uint32_t value) {
+static void write_of_channel(struct node_core *node, uint32_t group, uint32_t i, uint32_t value) {
   if (group >= 0x10 && group <= 0x14) write_port(node, group - 0x10, i, value);
   if (group == 0x30) node->count[i] = 0;
   if (group == 0x31) node->counter_control[i] = value & 0x0FF8U;
@@ -196,7 +196,7 @@ static void write_of_channel(struct node_core* node, uint32_t group, uint32_t i,
   if (group == 0x41) node->pwm_mode[i] = value;
 }
 
-static void write_register(struct node_core* node, uint32_t address, uint32_t value) {
+static void write_register(struct node_core *node, uint32_t address, uint32_t value) {
   const uint32_t group = address >> 8;
   const uint32_t i = (address & 0xFFU) / 4;
   if (i < NODE_CHANNELS) write_of_channel(node, group, i, value);
@@ -217,23 +217,23 @@ static void write_register(struct node_core* node, uint32_t address, uint32_t va
 
 /* The other spaces, by bytes. */
 
-static uint8_t eeprom_byte(const struct node_identity* identity, uint32_t address) {
+static uint8_t eeprom_byte(const struct node_identity *identity, uint32_t address) {
   if (address >= 2 && address < 8) return identity->mac[7 - address];
   if (address >= 0x10 && address < 0x20) return (uint8_t)identity->name[address - 0x10];
   return address >= 0x20 && address < 0x24 ? identity->address[0x23 - address] : 0;
 }
 
-static uint8_t board_byte(const struct node_identity* identity, uint32_t address) {
+static uint8_t board_byte(const struct node_identity *identity, uint32_t address) {
   if (address < 0x10) return (uint8_t)identity->name[address];
   return address == 0x10 ? 3 : address == 0x12 ? 15 : 0; /* versions of LBP16 and of the firmware */
 }
 
-static uint8_t timer_byte(const struct node_core* node, uint32_t address) {
+static uint8_t timer_byte(const struct node_core *node, uint32_t address) {
   if (address < 2) return (uint8_t)(node->now_us >> 8 * address);
   return address < sizeof node->timers ? node->timers[address] : 0;
 }
 
-static uint8_t info_byte(const struct node_core* node, uint32_t space, uint32_t address) {
+static uint8_t info_byte(const struct node_core *node, uint32_t space, uint32_t address) {
   static const char names[8][9] = {"HostMot2", "        ", "EtherEEP", "        ",
                                    "LBP16Tmr", "        ", "LBPCtlRg", "BrdInfo "};
   switch (address) {
@@ -246,7 +246,7 @@ static uint8_t info_byte(const struct node_core* node, uint32_t space, uint32_t 
   }
 }
 
-static uint8_t read_byte(const struct node_core* node, uint32_t space, uint32_t address) {
+static uint8_t read_byte(const struct node_core *node, uint32_t space, uint32_t address) {
   switch (space) {
     case SPACE_EEPROM: return eeprom_byte(&node->identity, address);
     case SPACE_TIMERS: return timer_byte(node, address);
@@ -256,7 +256,7 @@ static uint8_t read_byte(const struct node_core* node, uint32_t space, uint32_t 
   }
 }
 
-static void write_bytes(struct node_core* node, uint32_t space, uint32_t address, const uint8_t* data, uint32_t count) {
+static void write_bytes(struct node_core *node, uint32_t space, uint32_t address, const uint8_t *data, uint32_t count) {
   for (; count > 0; --count, ++address, ++data) {
     if (space == SPACE_TIMERS && address >= 2 && address < sizeof node->timers) {
       node->timers[address] = *data;
@@ -273,12 +273,12 @@ static void write_bytes(struct node_core* node, uint32_t space, uint32_t address
 struct command {
   bool write, info, increment, known;
   uint32_t space, unit, units, address;
-  const uint8_t* data; /* of a write */
+  const uint8_t *data; /* of a write */
 };
 
 /* Takes the command at `*at` and moves on. False if the datagram breaks off in it. */
-static bool take_command(const struct node_core* node, const uint8_t* bytes, size_t length, size_t* at,
-                         struct command* command) {
+static bool take_command(const struct node_core *node, const uint8_t *bytes, size_t length, size_t *at,
+                         struct command *command) {
   if (length - *at < 2) return false;
   const uint32_t word = word16(bytes + *at);
   const bool has_address = (word & 0x4000U) != 0;
@@ -303,11 +303,11 @@ static bool take_command(const struct node_core* node, const uint8_t* bytes, siz
 }
 
 /* True if every command is whole, the answer fits, and a write number in it is newer than the last. */
-static bool acceptable(struct node_core* node, const uint8_t* bytes, size_t length) {
+static bool acceptable(struct node_core *node, const uint8_t *bytes, size_t length) {
   size_t answer = 0;
   size_t at = 0;
   struct command command;
-  const uint8_t* number = NULL;
+  const uint8_t *number = NULL;
   while (at < length) {
     if (!take_command(node, bytes, length, &at, &command)) {
       count_error(node, CONTROL_PARSE, PARSE_ERROR);
@@ -334,8 +334,8 @@ static bool acceptable(struct node_core* node, const uint8_t* bytes, size_t leng
   return true;
 }
 
-static void obey_write(struct node_core* node, const struct command* command, uint32_t address, uint32_t unit) {
-  const uint8_t* data = command->data + (size_t)unit * command->unit;
+static void obey_write(struct node_core *node, const struct command *command, uint32_t address, uint32_t unit) {
+  const uint8_t *data = command->data + (size_t)unit * command->unit;
   if (command->space == SPACE_HOSTMOT2) {
     write_register(node, address, word32(data));
   } else {
@@ -358,7 +358,7 @@ static void obey_read(const struct node_core *node, const struct command *comman
   }
 }
 
-size_t node_datagram(struct node_core* node, uint32_t now_us, const uint8_t* datagram, size_t length, uint8_t* answer) {
+size_t node_datagram(struct node_core *node, uint32_t now_us, const uint8_t *datagram, size_t length, uint8_t *answer) {
   size_t at = 0;
   size_t answered = 0;
   struct command command;
