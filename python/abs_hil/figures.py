@@ -10,6 +10,10 @@ from .core import _core
 OVERSHOOT = 'slip_overshoot'
 
 
+#: endings of names, and how a heading writes them
+_UNITS = {'_rad_s': '(rad/s)', '_m_s': '(m/s)', '_Nm': '(N m)', '_N': 'N', '_m': 'm', '_s': 's'}
+
+
 @dataclass(frozen=True)
 class FigureOfMerit:
     """One figure. better: 'less', 'nearer zero' or 'neither'; compared: `abs_hil compare` shows it."""
@@ -36,5 +40,9 @@ def figures() -> dict[str, FigureOfMerit]:
 
 
 def heading_of(name: str) -> str:
-    """A figure's heading; a name that the table lacks, as of a study's own metric, is its own heading."""
-    return figures()[name].heading if name in figures() else name
+    """A figure's heading; of a name that the table lacks, as of a study's own metric, its words and unit."""
+    if name in figures():
+        return figures()[name].heading
+    ending = next((ending for ending in _UNITS if name.endswith(ending)), '')
+    words = name.removesuffix(ending).replace('_', ' ')
+    return f'{words} / {_UNITS[ending]}' if ending else words

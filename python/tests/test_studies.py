@@ -1,4 +1,5 @@
 """Studies from Python: the program's bytes, single runs of them, quantiles, maps, Sobol indices, the page, Parquet."""
+import base64
 import gzip
 import json
 import struct
@@ -10,6 +11,7 @@ import pytest
 
 import abs_hil
 from abs_hil.report import program as report
+from abs_hil.report.text import rounded
 from abs_hil.studies.running import toml_of
 
 #: short runs: braking ends at 5 m/s
@@ -195,18 +197,67 @@ def test_parquet_has_the_rows_and_the_study(tmp_path, folder):
 
 
 def test_the_page_and_the_table_of_a_study(tmp_path, folder, capsys):
+    pytest.importorskip('plotly')
     page = tmp_path / 'report.html'
     assert report.main([str(folder), '--output', str(page)]) == 0
-    html = page.read_text()
-    for words in ('Study study', 'figure-maps-slip_rms', 'figure-curves-stop_distance_m', 'median [10 %, 90 %]', 'Sobol indices'):
+    html, plots = page.read_text(), plots_of(page)
+    for words in ('Study study', 'figure-maps-slip_rms', 'figure-curves-stop_distance_m', 'median [10 %, 90 %]', 'Sobol indices',
+                  'Worst runs', 'peak tyre force / N'):
         assert words in html
-    assert html.count('data:image/svg+xml') == 6
+    assert len(plots) == 6
+    for title in (axis['title']['text'] for plot in plots for name, axis in plot['layout'].items() if 'axis' in name[:5]):
+        assert 'plant.' not in title and '_' not in title
     assert report.main([str(folder), '--metric', 'stop_time_s', '--output', str(page)]) == 0
-    assert page.read_text().count('data:image/svg+xml') == 2
+    assert [plot['id'] for plot in plots_of(page)] == ['curves-stop_time_s', 'maps-stop_time_s']
     capsys.readouterr()
     assert report.main([str(folder), '--table']) == 0
     printed = capsys.readouterr().out
     assert 'adaptive' in printed and 'runs ended by a fault' in printed
+
+
+def plots_of(page):
+    data = gzip.decompress(base64.b64decode(page.read_text().partition('id="plots">')[2].partition('</script>')[0]))
+    return json.loads(data[4:4 + int.from_bytes(data[:4], 'little')])['plots']
+
+
+def page_of(study, tmp_path):
+    pytest.importorskip('plotly')
+    abs_hil.study(study, out=tmp_path / 'out')
+    assert report.main([str(tmp_path / 'out'), '--output', str(tmp_path / 'page.html')]) == 0
+    return plots_of(tmp_path / 'page.html'), (tmp_path / 'page.html').read_text()
+
+
+def test_a_map_is_as_fine_as_its_grid_and_shows_the_border_of_success(tmp_path):
+    """Faster than the gate allows is a fault: the border is the diagonal of the two speeds."""
+    plots, _ = page_of({'controllers': ['locked'], 'factors': {
+        'experiment.start_speed_rad_s': {'from': 100, 'to': 290, 'steps': 20},
+        'gate.overspeed_rad_s': {'from': 105, 'to': 285, 'steps': 19}}}, tmp_path)
+    heat, border = next(plot for plot in plots if plot['id'] == 'maps-stop_distance_m')['data']
+    assert (heat['type'], *(heat[name]['size'] for name in 'xyz'), heat['z']['columns']) == ('heatmap', 20, 19, 380, 20)
+    assert (border['type'], border['contours']['start'], border['contours']['end']) == ('contour', 0.5, 0.5)
+
+
+def test_a_study_without_factors_shows_distributions_and_the_worst_runs(tmp_path):
+    plots, html = page_of({'controllers': ['adaptive'], 'repeat': {'runs': 30, 'vary': 'theta=0.2'},
+                           'settings': SMALL['settings']}, tmp_path)
+    assert [plot['id'] for plot in plots] == ['distributions']
+    assert len(plots[0]['data']) > 5
+    data = abs_hil.load_study(tmp_path / 'out').data
+    worst = data.loc[data['stop_distance_m'].idxmax()]
+    assert f'<th scope="row">stop distance / m</th><td>{worst["stop_distance_m"]:.4g}</td><td>{worst["run"]}</td>' in html
+
+
+def test_rows_that_are_cut_are_called_so(folder, tmp_path):
+    whole = (folder / 'results.csv.gz').read_bytes()
+    (tmp_path / 'results.csv.gz').write_bytes(whole[:len(whole) - 500])
+    with pytest.raises(ValueError, match='the rows are cut or damaged'):
+        abs_hil.load_study(tmp_path).quantiles()
+
+
+def test_numbers_have_the_decimals_that_their_spread_tells():
+    assert rounded([19.91104, 18.3, 21.5], 3.2) == ['19.9', '18.3', '21.5']
+    assert rounded([0.0075230], 0.00012) == ['0.00752']
+    assert rounded([2.5], 0.0) == ['2.5']
 
 
 @pytest.mark.parametrize('arguments, words', [

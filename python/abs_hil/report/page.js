@@ -51,7 +51,7 @@
     for (const name of Object.keys(layout)) {
       if (!/^[xy]axis/.test(name)) continue;
       Object.assign(layout[name], { zeroline: false, gridcolor: colour('#e4e4e4'), linecolor: colour('#333333'), mirror: true,
-        ticks: 'outside', ticklen: 4, automargin: false });
+        ticks: 'outside', ticklen: 4, automargin: false, ...layout[name] });
     }
     return layout;
   }
@@ -95,7 +95,7 @@
     if (linking || (given[0] === undefined && !whole)) return;
     linking = true;
     const y_too = Object.keys(change).some((name) => /^yaxis/.test(name));  // a drag over a rectangle is as it is
-    const others = drawn.filter((other) => other.axis === source.axis && (other !== source || whole || !y_too));
+    const others = drawn.filter((other) => other.range.length && other.axis === source.axis && (other !== source || whole || !y_too));
     Promise.all(others.map((other) => show(other, whole ? other.range : given))).finally(() => { linking = false; });
   }
 

@@ -30,7 +30,7 @@ def _escaped(text: str) -> str:
     return html.escape(text, quote=False)
 
 
-def _numbers(values: np.ndarray, kind: str = 'f8') -> np.ndarray:
+def numbers(values: np.ndarray, kind: str = 'f8') -> np.ndarray:
     """Little-endian floats; `packed` puts them beside the JSON."""
     return np.ascontiguousarray(values, dtype='<' + kind)
 
@@ -42,20 +42,20 @@ def compressed(data: bytes) -> str:
 
 def packed(plots: list[dict[str, Any]]) -> str:
     """All plots, for page.js: the length of a JSON text (4 bytes), the text, and behind it the numbers, each array once."""
-    numbers = bytearray()
+    floats = bytearray()
     known: dict[tuple[str, bytes], int] = {}
 
     def reference(array: np.ndarray) -> dict[str, Any]:
         key = (array.dtype.str, array.tobytes())
         if key not in known:
-            known[key] = len(numbers)
-            numbers.extend(key[1])
+            known[key] = len(floats)
+            floats.extend(key[1])
         return {'floats': 8 * array.dtype.itemsize, 'at': known[key], 'size': array.size,
                 'columns': array.shape[1] if array.ndim == 2 else 0}
 
     text = json.dumps({'plots': plots, 'dark': DARK}, ensure_ascii=False, allow_nan=False, separators=(',', ':'),
                       default=reference).encode()
-    return compressed(len(text).to_bytes(4, 'little') + text + bytes(numbers))
+    return compressed(len(text).to_bytes(4, 'little') + text + bytes(floats))
 
 
 def _line(style: Style) -> dict[str, Any]:
@@ -67,7 +67,7 @@ def _line(style: Style) -> dict[str, Any]:
 
 def _trace(curve: Curve, panel: Panel, number: int, new_in_legend: bool) -> dict[str, Any]:
     trace: dict[str, Any] = {
-        'x': _numbers(curve.x), 'y': _numbers(curve.y, 'f4'), 'name': _escaped(curve.legend or curve.quantity),
+        'x': numbers(curve.x), 'y': numbers(curve.y, 'f4'), 'name': _escaped(curve.legend or curve.quantity),
         'xaxis': f'x{number}', 'yaxis': f'y{number}', 'showlegend': new_in_legend, 'legendgroup': _escaped(curve.group),
         'meta': {'run': curve.run + 1, 'quantity': curve.quantity, 'points': int(np.isfinite(curve.y).sum())}}
     title = curve.title or panel.title
@@ -87,7 +87,7 @@ def _trace(curve: Curve, panel: Panel, number: int, new_in_legend: bool) -> dict
 
 def _nothing(number: int, panel: Panel) -> dict[str, Any]:
     """An invisible point: plotly.js draws no axes without a curve."""
-    return {'x': _numbers(np.zeros(1)), 'y': _numbers(np.zeros(1), 'f4'), 'xaxis': f'x{number}', 'yaxis': f'y{number}',
+    return {'x': numbers(np.zeros(1)), 'y': numbers(np.zeros(1), 'f4'), 'xaxis': f'x{number}', 'yaxis': f'y{number}',
             'mode': 'markers', 'opacity': 0, 'showlegend': False, 'hoverinfo': 'skip', 'meta': None}
 
 

@@ -51,6 +51,14 @@ def shown(value: float | None, decimals: int) -> str:
     return text.replace('-', MINUS)
 
 
+def rounded(values: list[float], spread: float) -> list[str]:
+    """Values with the decimals that their spread tells: two digits of it."""
+    if not (math.isfinite(spread) and spread > 0.0):
+        return [significant(value, 4) for value in values]
+    decimals = max(0, 1 - math.floor(math.log10(spread)))
+    return [shown(value, decimals) for value in values]
+
+
 def significant(value: float, digits: int) -> str:
     return f'{value:.{digits}g}'.replace('-', MINUS) if math.isfinite(value) else DASH
 

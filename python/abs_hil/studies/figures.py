@@ -1,24 +1,31 @@
-"""Figures of a study's results: curves over one factor, maps over two. Drawn by matplotlib as SVG."""
+"""Figures of a study's results for plotly.js: curves over one factor, maps over two, and distributions without factors."""
 from __future__ import annotations
 
+import html
 import itertools
-import os
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..core import _core
 from ..figures import heading_of
 from ..report.model import run_style
+from ..report.plots import numbers
 from .results import StudyResults, _binned
 
 if TYPE_CHECKING:
     import pandas
 
-MOST_BINS, LEAST_BINS = 16, 4
+LEAST_BINS, MOST_BINS, MOST_BINS_OF_CURVE = 4, 60, 16
+#: levels up to this many are cells of their own: a map is as fine as its design
+MOST_LEVELS = 400
 #: points in a part of a curve
 POINTS_IN_BIN = 8
 MOST_FACTORS, MOST_PAIRS, MOST_CURVES = 6, 3, 7
+BINS_OF_DISTRIBUTION = 40
+CELL_PX, TOP_PX, BOTTOM_PX = 260.0, 46.0, 56.0
 
 
 @dataclass
@@ -26,7 +33,34 @@ class Drawing:
     id: str
     heading: str
     caption: str
-    svg: bytes
+    alternative: str
+    plot: dict[str, Any]
+
+    @property
+    def height(self) -> float:
+        return float(self.plot['height'])
+
+
+@dataclass
+class Cell:
+    """One pair of axes. title: of the runs that it shows."""
+    traces: list[dict[str, Any]]
+    x: str
+    y: str
+    title: str = ''
+    log: tuple[bool, bool] = (False, False)
+
+
+@cache
+def _meanings() -> dict[str, tuple[str, str]]:
+    return {row['name']: (row['meaning'], row['unit']) for row in _core.keys({})}
+
+
+def title_of(key: str) -> str:
+    """What a factor is, with its unit: "peak tyre force / N". A key without a meaning is its own title."""
+    meaning, unit = _meanings().get(key, ('', ''))
+    short = meaning.removeprefix('simulation: ').partition(',')[0].partition(';')[0].partition(':')[0].strip()
+    return (f'{short} / ({unit})' if ' ' in unit or '/' in unit else f'{short} / {unit}' if unit else short) or key
 
 
 def numeric_factors(results: StudyResults) -> list[str]:
@@ -35,39 +69,63 @@ def numeric_factors(results: StudyResults) -> list[str]:
     return [name for name in results.factors if np.issubdtype(columns[name].dtype, np.number) and columns[name].nunique() > 1]
 
 
-def _points(results: StudyResults) -> int:
-    return int(results.columns(['point'])['point'].nunique())
-
-
-def _bins(wanted: float) -> int:
-    return int(np.clip(wanted, LEAST_BINS, MOST_BINS))
-
-
 def curve_names(results: StudyResults) -> list[str]:
     """What tells curves apart: plants, experiments, controllers, and levels that are no numbers."""
-    numbers = set(numeric_factors(results))
-    return [name for name in results.groups if name not in numbers]
+    numeric = set(numeric_factors(results))
+    return [name for name in results.groups if name not in numeric]
 
 
 def groups_of(frame: pandas.DataFrame, by: list[str]) -> list[tuple[str, pandas.DataFrame]]:
     """(name, rows) of each group; one of all rows without columns."""
     if not by:
         return [('', frame)]
-    return [(', '.join(str(value) for value in (key if isinstance(key, tuple) else (key,))), part)
+    return [(', '.join(str(value) if '.' not in name else f'{title_of(name)} = {value}'
+                       for name, value in zip(by, key if isinstance(key, tuple) else (key,))), part)
             for key, part in frame.groupby(by if len(by) > 1 else by[0], observed=True, sort=False)]
 
 
-def _svg(picture: Any) -> bytes:
-    import io
-    file = io.BytesIO()
-    picture.savefig(file, format='svg', metadata={'Date': None})
-    return file.getvalue()
+def _bins(results: StudyResults, factor: str, wanted: float, most: int) -> int:
+    """Cells along a factor: its levels, or as many parts of its range as the runs can fill."""
+    return MOST_LEVELS if factor in results.levels else int(np.clip(wanted, LEAST_BINS, most))
 
 
-def _picture(width: float, height: float) -> Any:
-    os.environ.setdefault('MPLBACKEND', 'agg')
-    from matplotlib.figure import Figure
-    return Figure(figsize=(width, height), layout='constrained')
+def _is_log(values: np.ndarray) -> bool:
+    values = np.sort(np.unique(values))
+    if len(values) < 3 or values[0] <= 0.0:
+        return False
+    steps = np.diff(np.log(values))
+    return bool(np.allclose(steps, steps[0], rtol=1e-3) and steps[0] > 1e-3 and values[-1] / values[0] > 3.0
+                and not np.allclose(np.diff(values), values[1] - values[0], rtol=1e-3))
+
+
+def _band(colour: str) -> str:
+    return f'rgba({", ".join(str(int(colour[at:at + 2], 16)) for at in (1, 3, 5))}, 0.15)'
+
+
+def _drawing(id_: str, heading: str, caption: str, cells: list[Cell], columns: int, **layout: Any) -> Drawing:
+    """Cells beside and below each other, each with axes of its own."""
+    rows = -(-len(cells) // columns)
+    legend = 22.0 if any(trace.get('showlegend') for cell in cells for trace in cell.traces) else 0.0
+    height = rows * (CELL_PX + TOP_PX + BOTTOM_PX) + legend
+    layout.update(hovermode='closest', annotations=[], shapes=[], margin={'l': 0, 'r': 90, 't': legend, 'b': 0},
+                  legend={'orientation': 'h', 'x': 0.05, 'y': 1, 'yanchor': 'bottom'})
+    data = []
+    for number, cell in enumerate(cells, 1):
+        suffix = str(number) if number > 1 else ''
+        row, column = divmod(number - 1, columns)
+        left, top = (column + 0.2) / columns, 1.0 - (row + TOP_PX / (CELL_PX + TOP_PX + BOTTOM_PX)) / rows
+        bottom = 1.0 - (row + 1.0 - BOTTOM_PX / (CELL_PX + TOP_PX + BOTTOM_PX)) / rows
+        for letter, other, domain, title, log in (('x', 'y', [left, (column + 0.95) / columns], cell.x, cell.log[0]),
+                                                  ('y', 'x', [bottom, top], cell.y, cell.log[1])):
+            layout[f'{letter}axis{suffix}'] = {'domain': domain, 'anchor': f'{other}{suffix}', 'type': 'log' if log else 'linear',
+                                               'title': {'text': title, 'standoff': 6, 'font': {'size': 13}}}
+        if cell.title:
+            layout['annotations'].append({'x': left, 'y': top, 'xref': 'paper', 'yref': 'paper', 'yanchor': 'bottom',
+                                          'xanchor': 'left', 'text': cell.title, 'showarrow': False, 'font': {'size': 13}})
+        data += [{**trace, 'xaxis': f'x{suffix}', 'yaxis': f'y{suffix}'} for trace in cell.traces]
+    told = '; '.join(dict.fromkeys(f'{cell.y} over {cell.x}{" of " if cell.title else ""}{cell.title}' for cell in cells))
+    return Drawing(id_, heading, caption, f'{heading}: {told}', {'id': id_, 'axis': id_, 'height': height, 'data': data,
+                                                                'layout': layout})
 
 
 def curves(results: StudyResults, metric: str) -> Drawing | None:
@@ -77,53 +135,83 @@ def curves(results: StudyResults, metric: str) -> Drawing | None:
     frame = results.completed([*by, *factors, metric])
     if not factors or not frame[metric].notna().any():
         return None
-    groups = groups_of(frame, by)[:MOST_CURVES]
-    bins = _bins(_points(results) / POINTS_IN_BIN)
-    columns = min(3, len(factors))
-    rows = -(-len(factors) // columns)
-    picture = _picture(3.4 * columns, 2.6 * rows + 0.4)
-    every = picture.subplots(rows, columns, squeeze=False, sharey=True)
-    for axes, factor in itertools.zip_longest(every.flat, factors):
-        if factor is None:
-            axes.set_visible(False)
-            continue
+    groups = [(html.escape(name, quote=False), part) for name, part in groups_of(frame, by)[:MOST_CURVES]]
+    points = int(results.columns(['point'])['point'].nunique())
+    cells = []
+    for factor in factors:
+        cell = Cell([], title_of(factor), heading_of(metric), log=(_is_log(frame[factor].to_numpy()), False))
+        bins = _bins(results, factor, points / POINTS_IN_BIN, MOST_BINS_OF_CURVE)
         for number, (name, part) in enumerate(groups):
             found = part.groupby(_binned(part[factor], bins))[metric].quantile([0.1, 0.5, 0.9]).unstack()
-            style = run_style(number)
-            axes.plot(found.index, found[0.5], color=style.colour, marker='.', label=name or None)
-            axes.fill_between(found.index, found[0.1], found[0.9], color=style.colour, alpha=0.15, linewidth=0)
-        axes.set_xlabel(factor)
-        axes.grid(True, color='#e4e4e4')
-    for axes in every[:, 0]:
-        axes.set_ylabel(heading_of(metric))
-    handles, names = every[0, 0].get_legend_handles_labels()
-    if len(groups) > 1:
-        every[0, 0].legend(handles, names, loc='lower left', bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False, fontsize=8)
-    return Drawing(f'curves-{metric}', heading_of(metric),
-                   'Median over each factor, whatever the others are; 80 % of the runs lie in the band.', _svg(picture))
+            x, style = numbers(found.index.to_numpy()), run_style(number)
+            shared = {'x': x, 'legendgroup': name, 'mode': 'lines', 'hoverinfo': 'skip', 'showlegend': False}
+            line = {'width': 0, 'color': style.colour}
+            cell.traces += [
+                {**shared, 'y': numbers(found[0.1].to_numpy()), 'line': line},
+                {**shared, 'y': numbers(found[0.9].to_numpy()), 'line': line, 'fill': 'tonexty',
+                 'fillcolor': _band(style.colour)},
+                {'x': x, 'y': numbers(found[0.5].to_numpy()), 'mode': 'lines+markers', 'name': name, 'legendgroup': name,
+                 'line': {'color': style.colour, 'simplify': False}, 'marker': {'size': 4, 'color': style.colour},
+                 'showlegend': len(groups) > 1 and factor == factors[0],
+                 'hovertemplate': f'{name} {heading_of(metric)}: %{{y:.4~g}}<br>{title_of(factor)}: %{{x:.4~g}}<extra></extra>'}]
+        cells.append(cell)
+    return _drawing(f'curves-{metric}', heading_of(metric),
+                    'Median over each factor, whatever the others are; 80 % of the runs lie in the band.', cells,
+                    min(3, len(cells)))
 
 
 def maps(results: StudyResults, metric: str) -> Drawing | None:
     """Medians over pairs of factors, a row of maps for each controller; None with fewer than two factors."""
     pairs = list(itertools.combinations(numeric_factors(results), 2))[:MOST_PAIRS]
     by = curve_names(results)
-    frame = results.completed([*dict.fromkeys([*by, *itertools.chain(*pairs)]), metric])
+    frame = results.columns([*dict.fromkeys([*by, *itertools.chain(*pairs)]), 'result', metric])
     if not pairs or not frame[metric].notna().any():
         return None
-    groups = groups_of(frame, by)[:MOST_CURVES]
-    bins = _bins(np.sqrt(_points(results) / 2))
-    picture = _picture(3.6 * len(pairs) + 0.4, 2.8 * len(groups))
-    every = picture.subplots(len(groups), len(pairs), squeeze=False)
+    groups = [(html.escape(name, quote=False), part) for name, part in groups_of(frame, by)[:MOST_CURVES]]
+    wanted = np.sqrt(len(frame) / len(groups) / 2)
+    cells = []
+    for (name, part), (x, y) in itertools.product(groups, pairs):
+        place = [_binned(part[y], _bins(results, y, wanted, MOST_BINS)), _binned(part[x], _bins(results, x, wanted, MOST_BINS))]
+        success = (part['result'] == 'completed').astype(float).groupby(place).mean().unstack()
+        table = part[metric].where(part['result'] == 'completed').groupby(place).median().unstack()
+        at = {'x': numbers(table.columns.to_numpy()), 'y': numbers(table.index.to_numpy())}
+        traces: list[dict[str, Any]] = [
+            {**at, 'type': 'heatmap', 'z': numbers(table.to_numpy(), 'f4'), 'coloraxis': 'coloraxis', 'hoverongaps': False,
+             'hovertemplate': f'{heading_of(metric)}: %{{z:.4~g}}<br>{title_of(x)}: %{{x:.4~g}}<br>{title_of(y)}: %{{y:.4~g}}'
+                              '<extra></extra>'}]
+        if min(success.shape) > 1 and np.nanmin(success) < 0.5 <= np.nanmax(success):
+            traces.append({**at, 'type': 'contour', 'z': numbers(success.to_numpy(), 'f4'), 'hoverinfo': 'skip',
+                           'showscale': False, 'showlegend': False, 'contours': {'start': 0.5, 'end': 0.5, 'size': 1.0, 'coloring': 'none'},
+                           'name': 'border of success', 'line': {'color': '#D55E00', 'width': 2.5}})
+        cells.append(Cell(traces, title_of(x), title_of(y), name, (_is_log(part[x].to_numpy()), _is_log(part[y].to_numpy()))))
     low, high = frame[metric].quantile([0.02, 0.98])
-    drawn = None
-    for row, (name, part) in zip(every, groups):
-        for axes, (x, y) in zip(row, pairs):
-            table = part.groupby([_binned(part[y], bins), _binned(part[x], bins)])[metric].median().unstack()
-            drawn = axes.pcolormesh(table.columns, table.index, table.to_numpy(), vmin=low, vmax=high,
-                                    cmap='viridis', shading='nearest', rasterized=True)
-            axes.set_xlabel(x)
-            axes.set_ylabel(y)
-            axes.set_title(name, fontsize=9)
-    picture.colorbar(drawn, ax=every, label=heading_of(metric))
-    return Drawing(f'maps-{metric}', heading_of(metric),
-                   'Median over two factors, whatever the others are. White: no run was completed there.', _svg(picture))
+    return _drawing(f'maps-{metric}', heading_of(metric),
+                    'Median over two factors, whatever the others are. Empty: no run was completed there. Outside the orange '
+                    'line, where there is one, fewer than half of the runs were completed.', cells, len(pairs),
+                    coloraxis={'cmin': float(low), 'cmax': float(high), 'colorscale': 'Viridis',
+                               'colorbar': {'title': {'text': heading_of(metric), 'side': 'right'}, 'thickness': 14}})
+
+
+def distributions(results: StudyResults, metrics: list[str]) -> Drawing | None:
+    """How often each value of the metrics occurs; None if they have one value each."""
+    by = curve_names(results)
+    cells = []
+    for metric in metrics:
+        frame = results.completed([*by, metric])
+        values = frame[metric].dropna()
+        if values.nunique() < 2:
+            continue
+        edges = np.linspace(values.min(), values.max(), int(np.clip(np.sqrt(len(values)), 5, BINS_OF_DISTRIBUTION)) + 1)
+        cell = Cell([], heading_of(metric), 'runs')
+        groups = [(html.escape(name, quote=False), part) for name, part in groups_of(frame, by)[:MOST_CURVES]]
+        for number, (name, part) in enumerate(groups):
+            counts = np.histogram(part[metric].dropna(), edges)[0]
+            cell.traces.append({
+                'x': numbers(np.concatenate([edges[:1], 0.5 * (edges[:-1] + edges[1:]), edges[-1:]])),
+                'y': numbers(np.concatenate([[0], counts, [0]])), 'mode': 'lines', 'name': name, 'legendgroup': name,
+                'line': {'shape': 'hvh', 'color': run_style(number).colour}, 'showlegend': bool(name) and not cells,
+                'hovertemplate': f'{name}: %{{y}} runs around {heading_of(metric)} = %{{x:.4~g}}<extra></extra>'})
+        cells.append(cell)
+    if not cells:
+        return None
+    return _drawing('distributions', 'Distributions', 'How many runs have which value.', cells, min(3, len(cells)))

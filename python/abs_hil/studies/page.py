@@ -1,19 +1,18 @@
 """The page of a study: quantiles, curves, maps, Sobol indices."""
 from __future__ import annotations
 
-import base64
 import pathlib
-from typing import Any
 
 from ..core import _core
-from ..figures import heading_of
+from ..figures import figures, heading_of
+from ..report.page import render
 from ..report.tables import Table
-from ..report.text import DASH, significant
-from .figures import curve_names, curves, groups_of, maps
+from ..report.text import DASH, rounded, significant
+from .figures import curve_names, curves, distributions, groups_of, maps, numeric_factors, title_of
 from .results import StudyResults
 
 _FOLDER = pathlib.Path(__file__).parent
-_REPORT = _FOLDER.parent / 'report'
+WORST = 3  # runs of each metric
 #: whose curves and maps the page shows, if no metric is asked for
 SHOWN = ('stop_distance_m', 'slip_rms', 'torque_total_variation_Nm')
 
@@ -33,7 +32,8 @@ def quantile_table(results: StudyResults) -> Table:
                 row.append(DASH)
                 continue
             low, median, high = values.quantile([0.1, 0.5, 0.9])
-            row.append(f'{significant(median, 4)} [{significant(low, 4)}, {significant(high, 4)}]')
+            texts = rounded([median, low, high], high - low)
+            row.append(f'{texts[0]} [{texts[1]}, {texts[2]}]')
         rows.append(row)
     for title, result in (('runs ended by a fault', 'fault'), ('runs that could not begin', 'refused')):
         rows.append([title, *(str(int((part['result'] == result).sum())) for part in every.values())])
@@ -55,8 +55,9 @@ def sobol_table(results: StudyResults, metrics: list[str]) -> tuple[Table, list[
                 notes.append(f'{", ".join(filter(None, (heading_of(metric), name)))}: {error}')
                 continue
             for factor, row in found.iterrows():
-                rows.append([heading_of(metric), name or DASH, str(factor),
-                             f'{row["S1"]:.3f} ± {row["S1_conf"]:.3f}', f'{row["ST"]:.3f} ± {row["ST_conf"]:.3f}'])
+                rows.append([heading_of(metric), name or DASH, title_of(str(factor)),
+                             *(' ± '.join(rounded([row[index], row[f'{index}_conf']], row[f'{index}_conf']))
+                               for index in ('S1', 'ST'))])
     return Table('sobol', ['metric', 'of', 'factor', 'first order', 'total'], rows, False), notes
 
 
@@ -65,20 +66,27 @@ def reasons_table(results: StudyResults) -> Table:
     return Table('reasons', ['reason', 'runs'], [[str(reason), str(count)] for reason, count in counts.items() if reason])
 
 
+def worst_table(results: StudyResults, metrics: list[str]) -> Table:
+    """The completed runs with the largest values of metrics of which less is better."""
+    names = ['run', *curve_names(results), *numeric_factors(results)]
+    rows = []
+    for metric in metrics:
+        if metric in figures() and figures()[metric].better == 'less':
+            for _, row in results.completed([*names, metric]).nlargest(WORST, metric).iterrows():
+                rows.append([heading_of(metric), significant(row[metric], 4),
+                             *(value if isinstance(value := row[name], str) else f'{value:.5g}' for name in names)])
+    return Table('worst', ['of', 'value', *(title_of(name) for name in names)], rows, False)
+
+
 def page(results: StudyResults, metrics: list[str], title: str = '') -> str:
     """The page as HTML that needs no network. metrics: whose curves and maps it shows."""
     sobol, notes = Table('sobol', [], []), list[str]()
     if results.facts['design'] == 'saltelli':
         sobol, notes = sobol_table(results, metrics)
     drawings = [drawing for metric in metrics for drawing in (curves(results, metric), maps(results, metric)) if drawing]
-    views: list[dict[str, Any]] = [
-        {'id': drawing.id, 'heading': drawing.heading, 'caption': drawing.caption,
-         'source': 'data:image/svg+xml;base64,' + base64.b64encode(drawing.svg).decode()} for drawing in drawings]
-    import jinja2
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined,
-                                     loader=jinja2.FileSystemLoader([_FOLDER, _REPORT]))
-    return environment.get_template('study.html.j2').render(
-        version=_core.version, title=title or f'Study {results.facts["study"]}', facts=results.facts,
-        description=results.facts['description'], quantiles=quantile_table(results), sobol=sobol,
-        reasons=reasons_table(results), drawings=views, notes=notes,
-        css=(_REPORT / 'page.css').read_text(encoding='utf-8')) + '\n'
+    if not numeric_factors(results) and (drawing := distributions(results, results.metrics)):
+        drawings.append(drawing)
+    return render('study.html.j2', [drawing.plot for drawing in drawings], _FOLDER,
+                  version=_core.version, title=title or f'Study {results.facts["study"]}', facts=results.facts,
+                  description=results.facts['description'], quantiles=quantile_table(results), sobol=sobol,
+                  worst=worst_table(results, metrics), reasons=reasons_table(results), drawings=drawings, notes=notes)

@@ -5,7 +5,9 @@ import gzip
 import json
 import os
 import pathlib
+import zlib
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,7 +40,9 @@ class StudyResults:
         place = pathlib.Path(path)
         self.path = place / RESULTS if place.is_dir() else place
         if not self.path.is_file():
-            hint = ('; the study is not complete: run it again, or see `abs_hil study status`'
+            done = len(list((place / 'parts').glob('[0-9]*.csv.gz')))
+            hint = (f'; the study is not complete: {done} of its chunks are done. The same command goes on where it was '
+                    'interrupted; `abs_hil study status` names what is missing'
                     if (place / 'study.json').exists() else '; give the folder of a study, or its results.csv.gz')
             raise ValueError(f'{self.path}: no results{hint}')
         if place.is_dir():
@@ -65,7 +69,7 @@ class StudyResults:
     def chunks(self, columns: Sequence[str] | None = None, rows: int = 100_000) -> Iterator[pandas.DataFrame]:
         """The rows as an iterator of DataFrames of at most `rows` rows: for studies that do not fit into the memory."""
         import pandas
-        with gzip.open(self.path, 'rb') as file:
+        with gzip.open(self.path, 'rb') as file, _whole(self.path):
             yield from pandas.read_csv(file, usecols=None if columns is None else list(columns), chunksize=rows,
                                        dtype={**{name: 'category' for name in _FEW}, 'reason': 'string'},
                                        keep_default_na=False,
@@ -214,6 +218,17 @@ class StudyResults:
         finally:
             if writer is not None:
                 writer.close()
+
+
+@contextmanager
+def _whole(path: pathlib.Path) -> Iterator[None]:
+    """Says of rows that are cut or damaged what they are, instead of what a parser or a decompressor calls them."""
+    import pandas
+    try:
+        yield
+    except (pandas.errors.ParserError, EOFError, zlib.error, gzip.BadGzipFile) as error:
+        raise ValueError(f'{path}: the rows are cut or damaged ({str(error).splitlines()[0]}); run or merge the study again'
+                         ) from None
 
 
 def _binned(values: pandas.Series, bins: int) -> pandas.Series:
