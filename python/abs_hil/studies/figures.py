@@ -181,7 +181,8 @@ def maps(results: StudyResults, metric: str) -> Drawing | None:
                               '<extra></extra>'}]
         if min(success.shape) > 1 and np.nanmin(success) < 0.5 <= np.nanmax(success):
             traces.append({**at, 'type': 'contour', 'z': numbers(success.to_numpy(), 'f4'), 'hoverinfo': 'skip',
-                           'showscale': False, 'showlegend': False, 'contours': {'start': 0.5, 'end': 0.5, 'size': 1.0, 'coloring': 'none'},
+                           'showscale': False, 'showlegend': False,
+                           'contours': {'start': 0.5, 'end': 0.5, 'size': 1.0, 'coloring': 'none'},
                            'name': 'border of success', 'line': {'color': '#D55E00', 'width': 2.5}})
         cells.append(Cell(traces, title_of(x), title_of(y), name, (_is_log(part[x].to_numpy()), _is_log(part[y].to_numpy()))))
     low, high = frame[metric].quantile([0.02, 0.98])
@@ -195,7 +196,7 @@ def maps(results: StudyResults, metric: str) -> Drawing | None:
 def distributions(results: StudyResults, metrics: list[str]) -> Drawing | None:
     """How often each value of the metrics occurs; None if they have one value each."""
     by = curve_names(results)
-    cells = []
+    cells: list[Cell] = []
     for metric in metrics:
         frame = results.completed([*by, metric])
         values = frame[metric].dropna()
