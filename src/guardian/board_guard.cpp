@@ -127,13 +127,11 @@ void BoardGuard::cover(std::int64_t timeout_ns) noexcept {
   timeout_ns_ = timeout_ns;
   look_period_ns_ = look_period_for(timeout_ns);
   watchdog_.emplace(timeout_ns, look_period_ns_, parts_.board.owner_needs_ns());
-  taken_back_for_ = Reason::none;
   report_ = {};
   looks_until_believed_ = looks_to_believe;
   foreign_duties_ = 0;
   now_ns_ = last_look_ns_ = parts_.clock.now_ns();
   suspensions_.begin(parts_.clock);
-  next_keep_ns_ = next_ns_ = now_ns_;
   if (parts_.mail != nullptr) parts_.board.let_go();  // the owner of the other kind has its board already
   if (parts_.page != nullptr) parts_.page->run_needs_ns.store(timeout_ns, std::memory_order_relaxed);
   pages_->guard().covers.fetch_add(1, std::memory_order_release);
@@ -143,7 +141,6 @@ void BoardGuard::cover(std::int64_t timeout_ns) noexcept {
 void BoardGuard::take_back(Reason reason) noexcept {
   if (duty_ == Duty::watch) {
     if (taken_back_for_ == Reason::none) taken_back_for_ = reason;
-    next_ns_ = now_ns_;
   } else if (duty_ == Duty::keep && lease_ != 0) {
     end_lease();
   }
@@ -214,7 +211,6 @@ void BoardGuard::end_lease(Refusal why) noexcept {
   former_pid_ = pid_;
   end_former_at_ns_ = now_ns_ + frees_board_within_ns;
   parts_.page->holder.store(0, std::memory_order_relaxed);
-  foreign_duties_ = 0;
   parts_.board.take_hold();
   board_ = {driver::IoError::not_active};  // an owner had it: make it safe, then look
   look_at_board();
@@ -311,7 +307,6 @@ void BoardGuard::act() noexcept {
   const bool may_be_undone = !gone_ && !report_.controller_lives;
   if (gone_ && !report_.controller_lives && report_.controller_gone_ns == 0) {
     report_.controller_gone_ns = parts_.clock.now_ns();
-    next_try_ns_ = now_ns_;
   }
   constexpr std::int64_t look_for_end_ns = 100'000;
   if ((may_be_undone && now_ns_ < gone_by_ns_) || now_ns_ < next_try_ns_) {

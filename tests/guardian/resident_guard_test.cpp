@@ -1,4 +1,7 @@
 // The guard of the resident service: leases, orders, and the board while no run is covered. Mailbox and pages are real.
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <atomic>
 #include <optional>
 #include <vector>
@@ -324,6 +327,81 @@ TEST_CASE("a holder is not ended for duties that another program writes now and 
   service.pass(3'000 * ms);
   CHECK(service.guard.holder() == run_process);
   CHECK(service.count("end") == 0);
+}
+
+TEST_CASE("foreign duties before a lease are not the holder's, and those before a cover not its run's") {
+  Service service;
+  service.guard.begin();
+  const auto foreign_duties = [&service](int number) {
+    for (int n = 0; n < number; ++n) {
+      service.board.duty = 0.5;
+      service.pass(ms);
+    }
+  };
+  foreign_duties(6);  // one more than half of what ends a holder
+  service.pass(5 * ms);
+  const std::uint32_t lease = service.granted();
+  foreign_duties(4);
+  CHECK(service.guard.holder() == run_process);
+  service.answer({.word = OrderWord::cover, .lease = lease, .timeout_ns = 20 * ms});
+  service.beats = true;
+  service.pass(50 * ms);
+  // The run says that it is done. A program writes while the guard looks whether that is so.
+  service.beats = false;
+  service.stage(Stage::closed);
+  service.pass(ms);
+  foreign_duties(3);
+  service.pass(20 * ms);
+  CHECK(service.said(NewsWord::ended) != nullptr);
+  CHECK(service.said(NewsWord::acted) == nullptr);
+  CHECK(service.guard.holder() == run_process);
+}
+
+TEST_CASE("the board refuses owners between leases, and the page of a lease that is over stands still") {
+  Service service;
+  service.guard.begin();
+  const std::uint32_t lease = service.granted();
+  CHECK_FALSE(service.board.refuses_owners);
+  service.pass(10 * ms);
+  service.order({.word = OrderWord::close, .lease = lease});
+  CHECK(service.board.refuses_owners);
+  const std::uint64_t beats = service.pages->guard().guardian_beats.load();
+  CHECK(beats >= 2);
+  service.pass(50 * ms);
+  CHECK(service.pages->guard().guardian_beats.load() == beats);
+}
+
+TEST_CASE("each run that dies gets zeros first, the second as the first") {
+  Service service;
+  service.guard.begin();
+  for (const pid_t process : {run_process, other_process}) {
+    service.covered(process);
+    service.pass(50 * ms);
+    const std::size_t from = service.story.size();
+    service.processes.dies_at_ns[process] = service.clock.now_ns();
+    service.pass(20 * ms);
+    REQUIRE(service.story.size() > from + 1);
+    CHECK(service.story[from] == "gone");
+    CHECK(service.story[from + 1] == "write");
+    service.beats = false;
+  }
+}
+
+TEST_CASE("a process for which there is no memory gets no lease, and its handle is closed") {
+  Service service;
+  service.guard.begin();
+  rlimit before{};
+  REQUIRE(::getrlimit(RLIMIT_NOFILE, &before) == 0);
+  const int next_free = ::dup(0);
+  ::close(next_free);
+  const rlimit none_left{static_cast<rlim_t>(next_free), before.rlim_max};
+  REQUIRE(::setrlimit(RLIMIT_NOFILE, &none_left) == 0);
+  const News said = service.answer({.word = OrderWord::grant, .pid = run_process});
+  REQUIRE(::setrlimit(RLIMIT_NOFILE, &before) == 0);
+  CHECK(said.word == NewsWord::refused);
+  CHECK(said.why == Refusal::no_memory);
+  CHECK(service.processes.handles == 0);
+  service.granted();
 }
 
 TEST_CASE("the stricter timeout counts: the run's or the service's") {

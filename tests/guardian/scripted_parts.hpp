@@ -47,8 +47,15 @@ class ScriptedProcesses final : public Processes {
  public:
   ScriptedProcesses(ScriptedClock& clock, Story& story) : clock_(clock), story_(story) {}
 
-  [[nodiscard]] int open(pid_t pid) noexcept override { return lives(pid - first) ? pid - first : -1; }
-  void close(int handle) noexcept override { must_be_one(handle); }
+  [[nodiscard]] int open(pid_t pid) noexcept override {
+    if (!lives(pid - first)) return -1;
+    ++handles;
+    return pid - first;
+  }
+  void close(int handle) noexcept override {
+    must_be_one(handle);
+    --handles;
+  }
   [[nodiscard]] bool gone(int handle) noexcept override {
     must_be_one(handle);
     const bool is_gone = !lives(handle);
@@ -70,6 +77,7 @@ class ScriptedProcesses final : public Processes {
   std::map<int, std::int64_t> dies_at_ns{};
   std::int64_t dying_takes_ns{200 * us};
   pid_t first{0};
+  int handles{0};  ///< that are open
 
  private:
   static void must_be_one(int handle) noexcept {
@@ -105,11 +113,12 @@ class ScriptedBoard final : public driver::SafeStateWriter {
   }
   [[nodiscard]] bool works_beside_owner() const noexcept override { return shared; }
   [[nodiscard]] std::int64_t owner_needs_ns() const noexcept override { return 300 * ms; }
-  void let_go() noexcept override { held = false; }
-  void take_hold() noexcept override { held = true; }
+  void let_go() noexcept override { held = refuses_owners = false; }
+  void take_hold() noexcept override { refuses_owners = true; }
 
   double duty{0.0};
-  bool held{true};
+  bool held{true};  ///< its handle is open
+  bool refuses_owners{true};
   bool shared{true};
   int fails_first{0};
 
