@@ -338,19 +338,19 @@ TEST_CASE("foreign duties before a lease are not the holder's, and those before 
       service.pass(ms);
     }
   };
-  foreign_duties(6);  // one more than half of what ends a holder
-  service.pass(5 * ms);
+  foreign_duties(30);
+  service.pass(ms);
   const std::uint32_t lease = service.granted();
-  foreign_duties(4);
+  foreign_duties(9);
   CHECK(service.guard.holder() == run_process);
   service.answer({.word = OrderWord::cover, .lease = lease, .timeout_ns = 20 * ms});
   service.beats = true;
   service.pass(50 * ms);
-  // The run says that it is done. A program writes while the guard looks whether that is so.
+  // The run says that it is done. After duties the guard looks every ms; this run had none.
   service.beats = false;
   service.stage(Stage::closed);
-  service.pass(ms);
-  foreign_duties(3);
+  service.pass(4 * ms);
+  CHECK(service.said(NewsWord::ended) == nullptr);
   service.pass(20 * ms);
   CHECK(service.said(NewsWord::ended) != nullptr);
   CHECK(service.said(NewsWord::acted) == nullptr);
