@@ -1,5 +1,5 @@
 """The programs in Python: abs_report, abs_tune, abs_learn, abs_identify, abs_benchmark,
-abs_convert, abs_watch. `abs_hil report ...` starts them too."""
+abs_convert, abs_watch, abs_export-fmu. `abs_hil report ...` starts them too."""
 from __future__ import annotations
 
 import contextlib
@@ -12,7 +12,8 @@ import sys
 #: name -> module with main(arguments) -> exit status
 PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn': 'abs_hil.learning.program',
             'identify': 'abs_hil.identification.program', 'benchmark': 'abs_hil.benchmark.program',
-            'convert': 'abs_hil.interchange.program', 'watch': 'abs_hil.watch.program'}
+            'convert': 'abs_hil.interchange.program', 'watch': 'abs_hil.watch.program',
+            'export-fmu': 'abs_hil.interchange.export_fmu'}
 
 
 class _Stdout(io.FileIO):
@@ -89,3 +90,7 @@ def convert() -> None:
 
 def watch() -> None:
     sys.exit(start('watch', sys.argv[1:]))
+
+
+def export_fmu() -> None:
+    sys.exit(start('export-fmu', sys.argv[1:]))

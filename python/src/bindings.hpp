@@ -16,6 +16,7 @@ namespace py = pybind11;
 void add_controllers(py::module_& module);
 void add_episodes(py::module_& module);
 void add_files(py::module_& module);
+void add_fmus(py::module_& module);
 void add_identification(py::module_& module);
 void add_identification_filter(py::module_& module);
 void add_network(py::module_& module);

@@ -55,6 +55,7 @@ PYBIND11_MODULE(_core, module) {
   python::add_episodes(module);
   python::add_studies(module);
   python::add_files(module);
+  python::add_fmus(module);
   python::add_identification(module);
   python::add_identification_filter(module);
   python::add_network(module);

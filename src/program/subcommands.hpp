@@ -43,7 +43,6 @@ Action add_init_rig(cli::Parser& parser, const Words& words);
 Action add_safe(cli::Parser& parser, const Words& words);
 Action add_replay(cli::Parser& parser, const Words& words);
 Action add_convert(cli::Parser& parser, const Words& words);
-Action add_export_fmu(cli::Parser& parser, const Words& words);
 Action add_send(cli::Parser& parser, const Words& words);
 
 /// Compares controllers in simulation, or records one run of the comparison. Throws config::ConfigError and

@@ -153,6 +153,13 @@ class FmuTest(ProgramTest):
             self.assertIn(str(word), result.stderr)
             self.assertEqual(len(result.stderr.strip().splitlines()), 1)
         self.assertEqual(list(self.folder.iterdir()), [])
+        older = self.folder / 'older.fmu'
+        older.write_text('older')
+        result = self.run_program('export-fmu', '--out', older)
+        self.assertEqual((result.returncode, older.read_text()), (2, 'older'))
+        self.assertIn('--force', result.stderr)
+        self.assertEqual(self.run_program('export-fmu', '--out', older, '--force').returncode, 0)
+        self.assertTrue(zipfile.is_zipfile(older))
 
     def test_binary_brings_everything(self):
         if platform.system() != 'Linux':
