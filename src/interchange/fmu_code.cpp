@@ -171,7 +171,7 @@ class FmuCode final : public ForeignCode {
  public:
   FmuCode(const ForeignSetup& setup, FmuFacts facts)
       : facts_(std::move(facts)),
-        library_(facts_.library),
+        library_(facts_.library, setup.file),
         instance_(library_, facts_, (setup.folder / "resources").string()),
         period_s_(setup.period_s) {
     if (!instance_.made()) refuse(setup.file, "it cannot be instantiated; the line above says why, if the FMU did");

@@ -11,7 +11,6 @@
 #include <sstream>
 #include <string_view>
 
-#include "interchange/elf_library.hpp"
 #include "interchange/refused_file.hpp"
 #include "rig/parse_toml.hpp"
 
@@ -48,28 +47,6 @@ constexpr std::array our_outputs{ABS_HIL_OUT(brake_torque_Nm), ABS_HIL_OUT(slip_
 
 #undef ABS_HIL_IN
 #undef ABS_HIL_OUT
-
-constexpr std::array functions2{"fmi2Instantiate",
-                                "fmi2FreeInstance",
-                                "fmi2SetupExperiment",
-                                "fmi2EnterInitializationMode",
-                                "fmi2ExitInitializationMode",
-                                "fmi2Reset",
-                                "fmi2SetReal",
-                                "fmi2GetReal",
-                                "fmi2SetBoolean",
-                                "fmi2SetInteger",
-                                "fmi2DoStep"};
-constexpr std::array functions3{"fmi3InstantiateCoSimulation",
-                                "fmi3FreeInstance",
-                                "fmi3EnterInitializationMode",
-                                "fmi3ExitInitializationMode",
-                                "fmi3Reset",
-                                "fmi3SetFloat64",
-                                "fmi3GetFloat64",
-                                "fmi3SetBoolean",
-                                "fmi3SetInt32",
-                                "fmi3DoStep"};
 
 struct TheirVariable {
   std::uint32_t reference{0};
@@ -224,24 +201,6 @@ FmuFacts facts_of(const fs::path& file, const fs::path& folder, const fs::path& 
   }
   if (facts.inputs.empty()) {
     refuse(file, "none of its inputs has a name of ours (docs/interchange.md); name them in control.foreign.mapping");
-  }
-  const auto check_functions = [&](const auto& functions) {
-    try {
-      const ElfLibrary library(facts.library);
-      for (const char* function : functions) {
-        if (!library.has_function(function))
-          refuse(file, fmt::format("its library does not define the function {}", function));
-      }
-    } catch (const std::invalid_argument& error) {
-      const std::string text = error.what();
-      if (text.starts_with(file.string())) throw;
-      refuse(file, "its library " + text);
-    }
-  };
-  if (facts.fmi == 3) {
-    check_functions(functions3);
-  } else {
-    check_functions(functions2);
   }
   return facts;
 }

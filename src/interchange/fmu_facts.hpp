@@ -36,7 +36,7 @@ struct FmuFacts {
   std::vector<FmuLink> integers{};
 };
 
-/// Reads the description in an extracted FMU, and the mapping if there is one, and checks the library's functions.
+/// Reads the description in an extracted FMU, and the mapping if there is one.
 /// Throws std::invalid_argument, which names `file`, the FMU as typed.
 [[nodiscard]] FmuFacts facts_of(const std::filesystem::path& file, const std::filesystem::path& folder,
                                 const std::filesystem::path& mapping);

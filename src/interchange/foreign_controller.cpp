@@ -9,7 +9,6 @@
 #include "abs_hil/control/registry.hpp"
 #include "interchange/fmu_facts.hpp"
 #include "interchange/hosted_code.hpp"
-#include "interchange/library_code.hpp"
 #include "runtime/clock.hpp"
 
 namespace abs_hil::interchange {
@@ -38,12 +37,9 @@ ForeignSetup setup_of(const std::string& file, const control::ControllerContext&
   return setup;
 }
 
-/// Everything that can be checked without running the file's code. Unpacks an FMU.
+/// An FMU, unpacked, if it is one. Its description can be checked without running the file's code.
 std::unique_ptr<ExtractedFmu> check(ForeignSetup& setup) {
-  if (setup.file.extension() == ".so") {
-    check_library(setup.file);
-    return nullptr;
-  }
+  if (setup.file.extension() == ".so") return nullptr;
   auto fmu = std::make_unique<ExtractedFmu>(setup.file);
   setup.folder = fmu->folder();
   static_cast<void>(facts_of(setup.file, setup.folder, setup.mapping));

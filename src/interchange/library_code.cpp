@@ -6,7 +6,6 @@
 #include <cstring>
 #include <string_view>
 
-#include "interchange/elf_library.hpp"
 #include "interchange/loaded_library.hpp"
 #include "interchange/refused_file.hpp"
 
@@ -15,8 +14,7 @@ namespace abs_hil::interchange {
 namespace {
 
 constexpr const char* interface_name = "abs_hil_controller_interface";
-constexpr std::array functions{"abs_hil_controller_create", "abs_hil_controller_reset", "abs_hil_controller_step",
-                               "abs_hil_controller_signal", "abs_hil_controller_destroy"};
+constexpr const char* create_name = "abs_hil_controller_create";
 constexpr const char* header_name = "abs_hil/interchange/controller.h";
 
 void check_size(const std::filesystem::path& file, const char* what, std::uint32_t its, std::size_t ours) {
@@ -25,14 +23,32 @@ void check_size(const std::filesystem::path& file, const char* what, std::uint32
                            its, ours, header_name));
 }
 
+/// Version and sizes that the library states for itself.
+void check_interface(const std::filesystem::path& file, const LoadedLibrary& library) {
+  const abs_hil_controller_interface_t* its = nullptr;
+  library.find(interface_name, its);
+  if (its->magic != ABS_HIL_CONTROLLER_MAGIC) {
+    refuse(file, fmt::format("its {} does not begin as it should; build it with {}", interface_name, header_name));
+  }
+  if (its->version != ABS_HIL_CONTROLLER_VERSION) {
+    refuse(file, fmt::format("it has version {} of the interface, this program has version {}; build it with this "
+                             "program's {}",
+                             its->version, ABS_HIL_CONTROLLER_VERSION, header_name));
+  }
+  check_size(file, "abs_hil_setup", its->setup_size, sizeof(abs_hil_setup));
+  check_size(file, "abs_hil_input", its->input_size, sizeof(abs_hil_input));
+  check_size(file, "abs_hil_output", its->output_size, sizeof(abs_hil_output));
+}
+
 class LibraryCode final : public ForeignCode {
  public:
-  explicit LibraryCode(const ForeignSetup& setup) : library_(setup.file) {
-    library_.find(functions[0], create_);
-    library_.find(functions[1], reset_);
-    library_.find(functions[2], step_);
-    library_.find(functions[3], signal_);
-    library_.find(functions[4], destroy_);
+  explicit LibraryCode(const ForeignSetup& setup) : library_(setup.file, setup.file) {
+    check_interface(setup.file, library_);
+    library_.find(create_name, create_);
+    library_.find("abs_hil_controller_reset", reset_);
+    library_.find("abs_hil_controller_step", step_);
+    library_.find("abs_hil_controller_signal", signal_);
+    library_.find("abs_hil_controller_destroy", destroy_);
     make(setup);
     for (std::uint32_t n = 0; const char* name = signal_(controller_, n); ++n) {
       if (n == ABS_HIL_CONTROLLER_SIGNALS) {
@@ -63,7 +79,7 @@ class LibraryCode final : public ForeignCode {
     controller_ = create_(&told, error.data(), error.size());
     if (controller_ != nullptr) return;
     const std::string_view reason(error.data(), ::strnlen(error.data(), error.size()));
-    refuse(setup.file, fmt::format("{} failed: {}", functions[0], reason.empty() ? "it gives no reason" : reason));
+    refuse(setup.file, fmt::format("{} failed: {}", create_name, reason.empty() ? "it gives no reason" : reason));
   }
 
   LoadedLibrary library_;
@@ -77,39 +93,6 @@ class LibraryCode final : public ForeignCode {
 
 }  // namespace
 
-void check_library(const std::filesystem::path& file) {
-  const ElfLibrary library(file);
-  if (!library.has_object(interface_name)) {
-    refuse(file,
-           fmt::format("not a controller: it has no symbol {}; write ABS_HIL_CONTROLLER_INTERFACE; once in it ({})",
-                       interface_name, header_name));
-  }
-  abs_hil_controller_interface_t its{};
-  const auto bytes = library.object(interface_name);
-  if (bytes.size() != sizeof its) {
-    refuse(file, fmt::format("its {} has {} bytes instead of {}; build it with this program's {}", interface_name,
-                             bytes.size(), sizeof its, header_name));
-  }
-  std::memcpy(&its, bytes.data(), sizeof its);
-  if (its.magic != ABS_HIL_CONTROLLER_MAGIC) {
-    refuse(file, fmt::format("its {} does not begin as it should; build it with {}", interface_name, header_name));
-  }
-  if (its.version != ABS_HIL_CONTROLLER_VERSION) {
-    refuse(file, fmt::format("it has version {} of the interface, this program has version {}; build it with this "
-                             "program's {}",
-                             its.version, ABS_HIL_CONTROLLER_VERSION, header_name));
-  }
-  check_size(file, "abs_hil_setup", its.setup_size, sizeof(abs_hil_setup));
-  check_size(file, "abs_hil_input", its.input_size, sizeof(abs_hil_input));
-  check_size(file, "abs_hil_output", its.output_size, sizeof(abs_hil_output));
-  for (const char* function : functions) {
-    if (!library.has_function(function)) refuse(file, fmt::format("it does not define the function {}", function));
-  }
-}
-
-std::unique_ptr<ForeignCode> load_library(const ForeignSetup& setup) {
-  check_library(setup.file);
-  return std::make_unique<LibraryCode>(setup);
-}
+std::unique_ptr<ForeignCode> load_library(const ForeignSetup& setup) { return std::make_unique<LibraryCode>(setup); }
 
 }  // namespace abs_hil::interchange

@@ -4,31 +4,37 @@
 
 #include <filesystem>
 #include <memory>
-#include <stdexcept>
 #include <string>
+
+#include "interchange/refused_file.hpp"
 
 namespace abs_hil::interchange {
 
-/// A shared library in this process. Its constructors have run.
+/// A shared library in this process, which is the confined one of foreign code first (hosted_code.hpp). Its
+/// constructors have run.
 class LoadedLibrary {
  public:
-  /// Throws std::invalid_argument with the loader's reason.
-  explicit LoadedLibrary(const std::filesystem::path& file)
-      // With RTLD_NOW a missing function of another library shows here, before any code runs. A name without a slash
-      // would be looked for elsewhere.
-      : handle_(::dlopen(std::filesystem::absolute(file).c_str(), RTLD_NOW | RTLD_LOCAL)) {
-    if (!handle_) throw std::invalid_argument(file.string() + ": " + ::dlerror());
+  /// Throws std::invalid_argument, which names `file` (the library, or the FMU that it is of) and the loader's reason.
+  LoadedLibrary(const std::filesystem::path& library, std::filesystem::path file)
+      // With RTLD_NOW a missing function of another library shows here. A name without a slash would be looked for
+      // elsewhere.
+      : file_(std::move(file)), handle_(::dlopen(std::filesystem::absolute(library).c_str(), RTLD_NOW | RTLD_LOCAL)) {
+    if (handle_) return;
+    refuse(file_, std::string("not a shared library that this computer can load (") + ::dlerror() +
+                      "); build it here, with cc -shared -fPIC");
   }
-  /// The function of that name; null if there is none.
-  template <class Function>
-  void find(const char* name, Function*& function) const noexcept {
-    function = reinterpret_cast<Function*>(::dlsym(handle_.get(), name));
+  /// The function or object of that name. Throws std::invalid_argument if there is none.
+  template <class Symbol>
+  void find(const char* name, Symbol*& symbol) const {
+    symbol = reinterpret_cast<Symbol*>(::dlsym(handle_.get(), name));
+    if (symbol == nullptr) refuse(file_, std::string("it does not define ") + name);
   }
 
  private:
   struct Close {
     void operator()(void* handle) const noexcept { ::dlclose(handle); }
   };
+  std::filesystem::path file_;
   std::unique_ptr<void, Close> handle_;
 };
 
