@@ -26,7 +26,7 @@ IDEAL = ['--set', 'plant.ideal_sensors=true', '--set', 'plant.ideal_actuator=tru
 class FmuTest(ProgramTest):
     def export(self, name, *options, fmi=2):
         path = self.folder / f'{name}{fmi}.fmu'
-        result = self.run_program('export-fmu', '--fmi', fmi, '--out', path, *options)
+        result = self.run_program('export-fmu', '--fmi', fmi, '--out', path, '--force', *options)
         self.assertEqual(result.returncode, 0, result.stderr)
         return str(path)
 

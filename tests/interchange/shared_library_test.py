@@ -67,7 +67,7 @@ class SharedLibraryTest(ProgramTest):
         sound = self.broken('SOUND').read_bytes()
         for name, data, word in (
                 ('empty', b'', 'not a shared library'), ('text', b'#!/bin/sh\n' * 20, 'not a shared library'),
-                ('short', sound[:40], 'not a shared library'), ('half', sound[:len(sound) // 2], 'not a shared library'),
+                ('short', sound[:40], 'not a shared library'), ('half', sound[:len(sound) // 2], 'while it was loaded'),
                 ('other', sound[:18] + struct.pack('<H', 183) + sound[20:], 'not a shared library'),
                 ('executable', sound[:16] + struct.pack('<H', 2) + sound[18:], 'not a shared library')):
             with self.subTest(name):

@@ -27,7 +27,7 @@ if reason:
 class WindowsFmu(ProgramTest):
     def test_the_library_gives_the_same(self):
         path = self.folder / 'plant.fmu'
-        result = self.run_program('export-fmu', '--out', path, '--set', 'experiment.start_speed_rad_s=170')
+        result = self.run_program('export-fmu', '--out', path, '--force', '--set', 'experiment.start_speed_rad_s=170')
         self.assertIn('win64', result.stdout)
         zipfile.ZipFile(path).extractall(self.folder / 'fmu')
         program = self.folder / 'windows_fmu.exe'

@@ -67,7 +67,8 @@ def _add_variables(root: Element, variables: list[dict[str, Any]], fmi: int) -> 
         _add(rows, 'Float64', name='time', valueReference=0, causality='independent', variability='continuous', unit='s')
     for reference, v in enumerate(variables, 1):
         tag = TYPES[v['type']][fmi - 2]
-        meaning = v['meaning'] + (': one of ' + ', '.join(v['allowed']) if v['allowed'] else '')
+        allowed = [name for name in v['allowed'] if name != 'python']  # controllers that only this package has
+        meaning = v['meaning'] + (': one of ' + ', '.join(allowed) if allowed else '')
         parameter = v['causality'] == 'parameter'
         node = _add(rows, tag if fmi == 3 else 'ScalarVariable', name=v['name'], valueReference=reference, description=meaning,
                     causality=v['causality'],
