@@ -19,22 +19,30 @@ SLIP, OMEGA2, TORQUE, DISTANCE = range(4)
 
 @dataclass(frozen=True)
 class Rig:
-    """Both wheels in contact while they turn forwards, and the brake without dead time, hysteresis and fading."""
+    """Both wheels in contact: the lower one turns forwards, the upper one turns forwards or stands. The brake is without dead
+    time, hysteresis and fading.
+
+    values: of the plant.  brake_duty_max: the gate's limit, which no command passes.
+    """
     values: Mapping[str, Any]
+    brake_duty_max: float = 1.0
 
     @classmethod
     def of(cls, **arguments: Any) -> Rig:
-        """The plant that these arguments of abs_hil.simulate give."""
-        prefix = 'plant.'
-        return cls({name[len(prefix):]: row['value'] for name, row in keys(**arguments).items() if name.startswith(prefix)})
+        """The plant and the gate that these arguments of abs_hil.simulate give."""
+        prefix, rows = 'plant.', keys(**arguments)
+        return cls({name[len(prefix):]: row['value'] for name, row in rows.items() if name.startswith(prefix)},
+                   float(rows['gate.brake_duty_max']['value']))
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[name])
 
     @property
     def max_torque_Nm(self) -> float:
-        """The largest static torque of the brake, b(1)."""
-        return max(0.0, self['b1_Nm'] + self['b2_Nm'])
+        """The largest static torque of the brake, b(1), or that of the largest duty."""
+        if self.brake_duty_max < self['u0']:
+            return 0.0
+        return max(0.0, self['b1_Nm'] * self.brake_duty_max + self['b2_Nm'])
 
     @property
     def rate_limit_Nm_s(self) -> float:
@@ -50,7 +58,7 @@ class Rig:
 
     def _curve(self, slip: Any) -> Any:
         """The friction curve of the tyre model, without its scale; odd in the slip."""
-        if self.values['tyre'] == 'magic-formula':
+        if self._magic:
             return ca.sin(self['C'] * ca.atan(self['B'] * slip))
         # In traction this curve's slip is that over the wheel's speed.
         pulled = ca.fmin(slip, 0.0)
@@ -69,14 +77,42 @@ class Rig:
 
     def force_N(self, x: Any, friction: Any) -> Any:
         """Tyre force while both wheels turn forwards."""
-        magic = self.values['tyre'] == 'magic-formula'
-        shape = self._curve(x[SLIP]) / (1.0 if magic else self._highest)
         if self.values['load'] == 'constant':
-            return self['theta_N'] * friction * shape
-        mu = (self['mu_peak'] if magic else self._highest) * friction * shape
-        phi = math.radians(self['lever_phi_deg'])
+            return self._constant_load_N(x[SLIP], friction)
+        mu = self._friction_coefficient(x[SLIP], friction)
         pressed_Nm = self['lever_Mg_Nm'] + x[TORQUE] + self['M10_Nm'] + self['d1_Nms_rad'] * self.omega1_rad_s(x)
-        return mu * pressed_Nm / (self['lever_L_m'] * (math.sin(phi) - mu * math.cos(phi)))
+        return mu * pressed_Nm / self._arm_m(mu)
+
+    def standing_force_N(self, friction: Any) -> Any:
+        """Tyre force while the brake holds the upper wheel: it then passes on only the torque that turns the wheel."""
+        slip = ca.DM(1.0)
+        if self.values['load'] == 'constant':
+            return self._constant_load_N(slip, friction)
+        mu = self._friction_coefficient(slip, friction)
+        return mu * self['lever_Mg_Nm'] / (self._arm_m(mu) - self['r1_m'] * mu)
+
+    def holds_Nm(self, friction: Any) -> Any:
+        """The least brake torque that holds the upper wheel while the lower one turns."""
+        return self['r1_m'] * self.standing_force_N(friction) - self['M10_Nm']
+
+    def _constant_load_N(self, slip: Any, friction: Any) -> Any:
+        return self['theta_N'] * friction * self._shape(slip)
+
+    def _friction_coefficient(self, slip: Any, friction: Any) -> Any:
+        return (self['mu_peak'] if self._magic else self._highest) * friction * self._shape(slip)
+
+    def _arm_m(self, mu: Any) -> Any:
+        """Of the lever: its arm less what friction takes of it."""
+        phi = math.radians(self['lever_phi_deg'])
+        return self['lever_L_m'] * (math.sin(phi) - mu * math.cos(phi))
+
+    @property
+    def _magic(self) -> bool:
+        return bool(self.values['tyre'] == 'magic-formula')
+
+    def _shape(self, slip: Any) -> Any:
+        """The friction curve with a peak of 1."""
+        return self._curve(slip) / (1.0 if self._magic else self._highest)
 
     @property
     def limited(self) -> bool:
@@ -93,16 +129,19 @@ class Rig:
         lower = -self['r2_m'] * force_N - self['d2_Nms_rad'] * x[OMEGA2] - self['M20_Nm']
         return upper / self['J1_kg_m2'], lower / self['J2_kg_m2']
 
-    def rates(self, x: Any, torque_rate_Nm_s: Any, friction: Any) -> Any:
-        """Time derivative of the state."""
+    def rates(self, x: Any, torque_rate_Nm_s: Any, friction: Any, stands: bool = False) -> Any:
+        """Time derivative of the state. stands: the brake holds the upper wheel, so the slip stays 1."""
+        if stands:
+            _, lower = self.wheel_rates(x, self.standing_force_N(friction))
+            return ca.vertcat(0.0, lower, torque_rate_Nm_s, self['r2_m'] * x[OMEGA2])
         upper, lower = self.wheel_rates(x, self.force_N(x, friction))
         slip_rate = ((1.0 - x[SLIP]) * lower - self['r1_m'] / self['r2_m'] * upper) / x[OMEGA2]
         return ca.vertcat(slip_rate, lower, torque_rate_Nm_s, self['r2_m'] * x[OMEGA2])
 
-    def rates_function(self) -> ca.Function:
+    def rates_function(self, stands: bool = False) -> ca.Function:
         """`rates` of (state, torque rate, friction)."""
         x, w, f = ca.SX.sym('x', 4), ca.SX.sym('w'), ca.SX.sym('f')
-        return ca.Function('rates', [x, w, f], [self.rates(x, w, f)])
+        return ca.Function('rates', [x, w, f], [self.rates(x, w, f, stands)])
 
     def force_function(self) -> ca.Function:
         """`force_N` of (state, friction)."""
