@@ -1,5 +1,6 @@
 # `cpack` makes three Debian packages: abs-hil (programs), libabs-hil-dev (find_package(abs_hil)) and python3-abs-hil (the
-# Python package, abs_report, abs_tune, abs_learn, abs_identify, abs_benchmark, abs_watch). scripts/package.sh builds and checks them.
+# Python package, abs_report, abs_tune, abs_learn, abs_identify, abs_benchmark, abs_watch,
+# abs_serve). scripts/package.sh builds and checks them.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_VENDOR "abs_hil")
 set(ABS_HIL_MAINTAINER "The abs_hil authors <abs-hil@no-address.invalid>" CACHE STRING
@@ -41,7 +42,7 @@ set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION
 set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-abs-hil)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
-  "abs-hil (= ${PROJECT_VERSION}), python3 (>= 3.11), python3 (<< 3.12), python3-numpy, python3-pandas, python3-matplotlib, python3-jinja2, python3-scipy, python3-tqdm, python3-rich")
+  "abs-hil (= ${PROJECT_VERSION}), python3 (>= 3.11), python3 (<< 3.12), python3-numpy, python3-pandas, python3-matplotlib, python3-jinja2, python3-scipy, python3-tqdm, python3-rich, python3-aiohttp")
 set(CPACK_DEBIAN_PYTHON_DESCRIPTION
   "ABS rig in Python: simulation, reports, tuning, learning
  Simulates runs of the Inteco ABS laboratory rig with the program's own cycle,

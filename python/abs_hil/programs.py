@@ -1,5 +1,5 @@
 """The programs in Python: abs_report, abs_tune, abs_learn, abs_identify, abs_benchmark,
-abs_convert, abs_watch, abs_export-fmu. `abs_hil report ...` starts them too."""
+abs_convert, abs_watch, abs_export-fmu, abs_serve. `abs_hil report ...` starts them too."""
 from __future__ import annotations
 
 import contextlib
@@ -13,7 +13,7 @@ import sys
 PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn': 'abs_hil.learning.program',
             'identify': 'abs_hil.identification.program', 'benchmark': 'abs_hil.benchmark.program',
             'convert': 'abs_hil.interchange.program', 'watch': 'abs_hil.watch.program',
-            'export-fmu': 'abs_hil.interchange.export_fmu'}
+            'export-fmu': 'abs_hil.interchange.export_fmu', 'serve': 'abs_hil.serve.program'}
 
 
 class _Stdout(io.FileIO):
@@ -94,3 +94,7 @@ def watch() -> None:
 
 def export_fmu() -> None:
     sys.exit(start('export-fmu', sys.argv[1:]))
+
+
+def serve() -> None:
+    sys.exit(start('serve', sys.argv[1:]))

@@ -1,4 +1,4 @@
-// Messages of a running rig.
+// Messages of a running rig, and commands to it.
 
 #include <poll.h>
 
@@ -8,6 +8,9 @@
 #include <utility>
 
 #include "bindings.hpp"
+#include "commands/authority.hpp"
+#include "commands/sender.hpp"
+#include "telemetry/lcm_url.hpp"
 #include "telemetry/receiver.hpp"
 
 namespace abs_hil::python {
@@ -44,6 +47,17 @@ class Subscription {
     received_.pop_front();
     return py::make_tuple(channel, py::bytes(data));
   }
+  /// [(channel, bytes)] of the messages that have arrived; never waits.
+  py::list waiting() {
+    {
+      const py::gil_scoped_release release;
+      receiver_.poll();
+    }
+    py::list messages;
+    for (const auto& [channel, data] : received_) messages.append(py::make_tuple(channel, py::bytes(data)));
+    received_.clear();
+    return messages;
+  }
   [[nodiscard]] const std::string& url() const { return receiver_.url(); }
 
  private:
@@ -51,13 +65,33 @@ class Subscription {
   telemetry::Receiver receiver_;
 };
 
+/// Sends what `abs_hil send` sends, with the same authority. (accepted, the answer in words)
+py::tuple send_command(const std::string& command, const std::string& name, double value, const std::string& url,
+                       const std::string& prefix, const std::string& key_file, double timeout_s) {
+  commands::Reply reply;
+  {
+    const py::gil_scoped_release release;
+    reply = commands::send({.command = command, .name = name, .value = value},
+                           {.url = url.empty() ? telemetry::default_lcm_url() : url,
+                            .channel_prefix = prefix,
+                            .key_file = key_file,
+                            .timeout_s = timeout_s});
+  }
+  return py::make_tuple(reply.outcome == commands::Outcome::accepted, reply.message);
+}
+
 }  // namespace
 
 void add_network(py::module_& module) {
   py::class_<Subscription>(module, "Subscription")
       .def(py::init<const std::string&, const std::string&>(), py::arg("url"), py::arg("channels"))
       .def("next", &Subscription::next, py::arg("timeout_s"))
+      .def("waiting", &Subscription::waiting)
       .def_property_readonly("url", &Subscription::url);
+  module.def("send_command", &send_command, py::arg("command"), py::arg("name"), py::arg("value"), py::arg("url"),
+             py::arg("prefix"), py::arg("key_file"), py::arg("timeout_s"));
+  module.def(
+      "check_key", [](const std::string& file) { static_cast<void>(commands::read_key(file)); }, py::arg("file"));
 }
 
 }  // namespace abs_hil::python

@@ -36,6 +36,7 @@ constexpr std::array table{
     Subcommand{"export-fmu",
                "write the simulated rig, or with --controller a slip controller, as an FMU for other tools"},
     Subcommand{"watch", "show a running experiment in this terminal, over LCM; q quits"},
+    Subcommand{"serve", "show a running experiment, or a recorded one, as a scope in the browser"},
     Subcommand{"send", "send a command to a running abs_hil over LCM", &add_send},
     Subcommand{"report", "make a page with figures and tables of recorded runs, or export their rows"},
     Subcommand{"tune", "search for a controller's gains in simulation"},

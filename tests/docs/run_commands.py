@@ -25,7 +25,7 @@ PROGRAMS = {'sudo', 'ip', 'cmake', 'git', 'python3', 'octave', 'perf', 'candump'
             'lcm-spy', 'apt', 'apt-get', 'modprobe', 'kill', 'echo', 'tail', 'cat', 'rm', 'mkdir', 'cp', 'cd', 'export',
             'dpkg', 'sha256sum', 'pip', 'doxygen', 'cmp', 'cc'}
 OURS = re.compile(r'^(\./)?((build/\w+/bin/|build/\w+/tests/)\S+|scripts/\S+|research/\S+|\.ci/run|/tmp/\S+/my_abs_hil|abs_hil|abs_report|'
-                  r'abs_tune|abs_learn|abs_identify|abs_benchmark|abs_guardian|abs-spy|abs_rig_emulator)$')
+                  r'abs_tune|abs_learn|abs_identify|abs_benchmark|abs_serve|abs_guardian|abs-spy|abs_rig_emulator)$')
 SERVERS = {'abs_rig_emulator', 'abs_guardian', 'abs-spy', 'lcm-logger'}
 SYNOPSIS = re.compile(r'\[-|\w\|\w|\.\.\.|<\w+>|\s[A-Z]{4,}(\s|$)')
 TIMEOUT_S = 240

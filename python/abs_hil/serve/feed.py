@@ -1,0 +1,192 @@
+"""From LCM's packets, live or of a log, to the history and the facts of runs."""
+from __future__ import annotations
+
+import math
+import pathlib
+import re
+import struct
+import time
+from collections.abc import Callable, Iterator
+from operator import attrgetter
+from typing import Any
+
+import numpy as np
+
+from ..core import _core
+from ..messages import QUANTITIES, decode
+from . import force
+from .history import COLUMNS, DERIVED_PLACE, OWN, PLACE, WIDTH, History, bin_numbers
+from .runs import MOST_RUNS, RunFacts
+
+Packet = tuple[str, bytes]
+#: a listener gets the run and its new rows, of shape (cycles, WIDTH)
+Listener = Callable[[RunFacts, np.ndarray], None]
+#: no message for this time: the bin that grows is shown
+IDLE_S = 0.2
+MOST_PACKETS = 5000
+#: cycles of 60 ms at 10 kHz
+MOST_IN_WINDOW = 600
+
+
+class Feed:
+    """Takes packets, in the order in which they came. `runs` has the newest runs, the current one last."""
+
+    def __init__(self, history: History, prefix: str) -> None:
+        self.history = history
+        self.runs: dict[int, RunFacts] = {}
+        self.listeners: list[Listener] = []
+        self.damaged = 0
+        self._prefix = prefix
+        self._rows: list[tuple[float, ...]] = []
+        self._phase_names: list[str] = []
+        self._names = ''
+        self._last_cycle = -1
+        self._heard = 0.0
+        self._run: RunFacts | None = None
+        self._early: dict[str, object] = {}  # the next cycle says whether it belongs to the present run or the next
+        made = decode_fields()
+        self._get = attrgetter(*made)
+        self._later = [name for name in COLUMNS if name not in made]
+
+    def take(self, packets: list[Packet]) -> None:
+        now = time.monotonic()
+        for channel, data in packets:
+            if channel.startswith(self._prefix):
+                self._one(channel, data)
+        self._flush()
+        if packets:
+            self._heard = now
+        elif now > self._heard + IDLE_S:
+            self.history.close_bin()
+
+    def _one(self, channel: str, data: bytes) -> None:
+        try:
+            message = decode(data)
+        except ValueError:
+            self.damaged += 1
+            return
+        kind = type(message).__name__
+        if kind == 'telemetry_t':
+            self._cycle(message)
+            return
+        handler = {'event_t': 'take_event', 'experiment_t': 'take_experiment', 'status_t': 'take_status',
+                   'command_state_t': 'take_commands'}.get(kind)
+        if handler is None:
+            return
+        self._flush()
+        if kind == 'experiment_t' or self._run is None:
+            self._early[handler] = message
+        else:
+            getattr(self._run, handler)(message)
+
+    def _cycle(self, message: Any) -> None:
+        cycle, names = message.cycle, message.names
+        if self._run is None or cycle < self._last_cycle:
+            self._flush()
+            self._begin()
+        if names != self._names:
+            self._flush()
+            self._names = names
+            if self._run is not None:
+                self._run.own = tuple(name for name in names.split(',') if name and name not in PLACE)[:OWN]
+        if self._early and self._run is not None:
+            for handler, early in self._early.items():
+                getattr(self._run, handler)(early)
+            self._early.clear()
+        self._last_cycle = cycle
+        values = dict(zip(names.split(','), message.values))
+        own = self._run.own if self._run is not None else ()
+        tail = [values.get(name, math.nan) for name in (*self._later, *own)]
+        self._rows.append((*self._get(message), *tail, *([math.nan] * (WIDTH - len(COLUMNS) - len(own)))))
+        self._phase_names.append(message.phase_name)
+
+    def _begin(self) -> None:
+        number = self._run.number + 1 if self._run is not None else 0
+        self._run = RunFacts(number, time.time())
+        self._names = ''
+        self.runs[number] = self._run
+        while len(self.runs) > MOST_RUNS:
+            del self.runs[next(iter(self.runs))]
+
+    def _flush(self) -> None:
+        if not self._rows or self._run is None:
+            return
+        rows = np.array(self._rows, dtype=np.float64)
+        rows[np.isnan(rows[:, PLACE['time_s']]), PLACE['time_s']] = 0.0
+        names, self._phase_names = self._phase_names, []
+        self._rows.clear()
+        self._add_force(rows)
+        self._run.take_rows(rows, names)
+        self.history.add(self._run.number, rows)
+        for listener in list(self.listeners):
+            listener(self._run, rows)
+
+    def _add_force(self, rows: np.ndarray) -> None:
+        """A point for each bin of these rows: that of the window that ends with the bin's last row."""
+        assert self._run is not None
+        if (rows[:, PLACE['phase']] != force.BRAKE).all():
+            return
+        cycles = self.history.cycles
+        before = cycles.places(cycles.head - MOST_IN_WINDOW, cycles.head)
+        known = np.concatenate((cycles.values[before[cycles.run[before] == self._run.number]], rows))
+        time_s = known[:, PLACE['time_s']]
+        numbers = bin_numbers(time_s)
+        for last in np.flatnonzero(np.diff(numbers, append=-1)).tolist():
+            if last < len(known) - len(rows):
+                continue
+            first = int(np.searchsorted(time_s, time_s[last] - 2 * force.HALF_WINDOW_S))
+            found = force.point(known[first:last + 1], self._run.config)
+            if found is not None:
+                rows[last - len(known), DERIVED_PLACE:] = found
+
+
+def decode_fields() -> list[str]:
+    """Quantities that are fields of telemetry_t, in the order of COLUMNS, which must begin with them."""
+    from ..messages import TYPES
+    fields = [name for name in QUANTITIES if name in TYPES['telemetry_t'].__slots__]
+    if list(COLUMNS[:len(fields)]) != fields:
+        raise ImportError('quantities.json: a quantity without a field in telemetry_t stands before one with a field')
+    return fields
+
+
+class Live:
+    """Packets of an LCM network. Raises OSError without a network, ValueError for a URL that is none."""
+
+    def __init__(self, url: str, prefix: str) -> None:
+        self._subscription = _core.Subscription(url, re.escape(prefix) + '.*')
+
+    def waiting(self) -> list[Packet]:
+        return self._subscription.waiting()
+
+
+class Played:
+    """Packets of an event log, at the pace at which they were recorded, times `speed`; 0: at once."""
+
+    def __init__(self, path: pathlib.Path, speed: float) -> None:
+        self._events = log_events(path)
+        self._next = next(self._events, None)
+        if self._next is None:
+            raise ValueError(f'"{path}" holds no message of LCM; give an event log (.lcmlog) that abs_hil or lcm-logger wrote')
+        self._speed = speed
+        self._first_us = self._next[0]
+        self._began = time.monotonic()
+
+    def waiting(self) -> list[Packet]:
+        found: list[Packet] = []
+        until_us = self._first_us + (time.monotonic() - self._began) * self._speed * 1e6
+        while self._next is not None and len(found) < MOST_PACKETS and (self._speed == 0 or self._next[0] <= until_us):
+            found.append(self._next[1:])
+            self._next = next(self._events, None)
+        return found
+
+
+def log_events(path: pathlib.Path) -> Iterator[tuple[int, str, bytes]]:
+    """(time in us, channel, data) of an event log, up to the first place that is damaged."""
+    with open(path, 'rb') as file:
+        while len(head := file.read(28)) == 28:
+            sync, _, stamp_us, channel_bytes, data_bytes = struct.unpack('>Iqqii', head)
+            if sync != 0xEDA1DA01 or not 0 < channel_bytes < 1000 or not 0 <= data_bytes < 1 << 24:
+                return
+            channel, data = file.read(channel_bytes), file.read(data_bytes)
+            if len(data) == data_bytes:
+                yield stamp_us, channel.decode(errors='replace'), data

@@ -1,0 +1,111 @@
+"""The command line of abs_serve; `abs_hil serve` starts it."""
+from __future__ import annotations
+
+import argparse
+import asyncio
+import pathlib
+import secrets
+import signal
+import sys
+from typing import Any
+
+from ..core import _core
+from .feed import Feed, Live, Played
+from .history import BIN_S, History
+from .server import Command, Server, is_loopback
+
+PORT = 8265
+COMMANDS = ('stop', 'start', 'continue', 'slip-ref', 'gain')
+ANSWER_S = 3.0
+
+
+def parser() -> argparse.ArgumentParser:
+    p = argparse.ArgumentParser(
+        prog='abs_serve', allow_abbrev=False, description='Shows a running experiment, or a recorded one, as a scope in the '
+        'browser (docs/serve.md). It only watches unless --commands is given.')
+    p.add_argument('log', nargs='?', metavar='LOG', help='event log (.lcmlog), or a run folder that has one, to play instead of '
+                   'receiving')
+    p.add_argument('--speed', type=float, default=1.0, metavar='X', help='with LOG: times as fast as recorded; 0: at once '
+                   '(default: %(default)g)')
+    p.add_argument('--lcm-url', default='', metavar='URL', help="the LCM network (default: the run's own default)")
+    p.add_argument('--prefix', default='ABS_', help="the run's telemetry.channel_prefix (default: %(default)s)")
+    p.add_argument('--host', default='127.0.0.1', help='address to listen at; other than this computer\'s own, the link has a '
+                   'token (default: %(default)s)')
+    p.add_argument('--port', type=int, default=PORT, help='port to listen at; 0: any free one (default: %(default)d)')
+    p.add_argument('--commands', metavar='KEYFILE', help='the page may send what `abs_hil send` may, with this key '
+                   '(commands.key_file of the run); the link has a token')
+    return p
+
+
+def main(arguments: list[str]) -> int:
+    given = parser().parse_args(arguments)
+    try:
+        source = _source(given)
+        if given.commands is not None:
+            _core.check_key(given.commands)
+        return 128 + asyncio.run(_serve(given, source))
+    except ValueError as error:
+        print(f'abs_serve: {error}', file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f'abs_serve: {error}', file=sys.stderr)
+        return 3
+
+
+def _source(given: Any) -> Live | Played:
+    if not 0 <= given.port < 65536:
+        raise ValueError(f'--port {given.port}: give a number in [0, 65535]')
+    if given.log is None:
+        if given.speed != 1.0:
+            raise ValueError('--speed belongs to LOG')
+        return Live(given.lcm_url, given.prefix)
+    if given.commands is not None:
+        raise ValueError('--commands belongs to a running experiment, not to LOG')
+    if not 0 <= given.speed <= 1000:
+        raise ValueError(f'--speed {given.speed:g}: give a number in [0, 1000]')
+    place = pathlib.Path(given.log)
+    place = place / 'run.lcmlog' if place.is_dir() else place
+    if not place.is_file():
+        raise ValueError(f'"{place}" is no event log: give a .lcmlog (abs_hil --log FILE), or a run folder that has one')
+    return Played(place, given.speed)
+
+
+def _sender(given: Any) -> Command:
+    async def send(command: str, name: str, value: float) -> tuple[bool, str]:
+        if command not in COMMANDS:
+            return False, f'"{command}" is no command: give one of {" ".join(COMMANDS)}'
+        try:
+            return await asyncio.get_running_loop().run_in_executor(
+                None, _core.send_command, command, name, value, given.lcm_url, given.prefix, given.commands, ANSWER_S)
+        except (OSError, ValueError) as error:
+            return False, str(error)
+    return send
+
+
+async def _serve(given: Any, source: Live | Played) -> int:
+    """Serves until a signal comes; its number."""
+    feed = Feed(History(), given.prefix)
+    # Another user of this computer could connect to its own address too, so commands always need the token.
+    token = secrets.token_urlsafe(24) if given.commands is not None or not is_loopback(given.host) else ''
+    shown = given.log or given.lcm_url or 'LCM'
+    server = Server(feed, given.host, given.port, token, shown, _sender(given) if given.commands is not None else None)
+    try:
+        await server.start()
+    except OSError as error:
+        raise OSError(f'cannot listen at {given.host}, port {given.port}: {error.strerror}; give another --host or '
+                      '--port') from None
+    print(f'abs_hil serve: {server.link}', flush=True)
+    end: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+
+    def finish(number: int) -> None:
+        if not end.done():
+            end.set_result(number)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, finish, int(number))
+    try:
+        while not end.done():
+            feed.take(source.waiting())
+            await asyncio.wait((end,), timeout=BIN_S)
+        return end.result()
+    finally:
+        await server.stop()

@@ -1,0 +1,189 @@
+"""The HTTP side: the page and its files, the WebSocket, downloads; and who may have them."""
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hmac
+import ipaddress
+import json
+import pathlib
+import socket
+import time
+from collections.abc import Awaitable, Callable
+from typing import Any
+from urllib.parse import urlsplit
+
+from aiohttp import web
+
+from ..messages import PHASES, QUANTITIES
+from .download import TYPES, make
+from .feed import Feed
+from .history import BIN_S, DERIVED
+from .viewer import Bad, Viewer, real, whole
+
+_FOLDER = pathlib.Path(__file__).resolve().parent
+#: what a browser may fetch: no script, style or connection but this server's own
+POLICY = ("default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; "
+          "base-uri 'none'; form-action 'none'; frame-ancestors 'none'")
+HEADERS = {'Content-Security-Policy': POLICY, 'X-Content-Type-Options': 'nosniff', 'Referrer-Policy': 'no-referrer',
+           'Cache-Control': 'no-store', 'Cross-Origin-Resource-Policy': 'same-origin',
+           'Cross-Origin-Opener-Policy': 'same-origin', 'X-Frame-Options': 'DENY'}
+KINDS = {'.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css'}
+MOST_CONNECTIONS, MOST_VIEWERS = 128, 64
+#: a connection that has not become a viewer by then is closed, so that idle ones cannot keep others out
+UNDECIDED_S = 10.0
+REQUEST_BYTES = 4096
+SEND_BUFFER_BYTES = 1 << 17
+Command = Callable[[str, str, float], Awaitable[tuple[bool, str]]]
+
+
+def page_files() -> dict[str, pathlib.Path]:
+    """Name -> file. In the source tree uPlot stands in third_party."""
+    installed = _FOLDER / 'uplot'
+    uplot = installed if installed.is_dir() else _FOLDER.parents[2] / 'third_party' / 'uplot'
+    found = [*(_FOLDER / 'page').iterdir(), *uplot.iterdir()]
+    files = {path.name: path for path in found if path.suffix in KINDS}
+    if 'uPlot.iife.min.js' not in files:
+        raise ImportError(f'"{uplot}" lacks uPlot.iife.min.js, which draws the charts')
+    return files
+
+
+class Door(web.Server):
+    """Counts connections. One too many is closed at once; so is one that does not decide what it wants."""
+
+    def __init__(self, handler: Any) -> None:
+        super().__init__(handler)
+        self.refused = 0
+        self._timers: dict[Any, asyncio.TimerHandle] = {}
+
+    def connection_made(self, handler: Any, transport: Any) -> None:
+        super().connection_made(handler, transport)
+        if len(self.connections) > MOST_CONNECTIONS:
+            self.refused += 1
+            transport.abort()
+        else:
+            self._timers[transport] = asyncio.get_running_loop().call_later(UNDECIDED_S, transport.abort)
+
+    def connection_lost(self, handler: Any, exc: Any = None) -> None:
+        super().connection_lost(handler, exc)
+        self._timers = {transport: timer for transport, timer in self._timers.items() if not transport.is_closing()}
+
+    def stays(self, transport: Any) -> None:
+        """A viewer or a download has begun on this connection."""
+        if transport in self._timers:
+            self._timers.pop(transport).cancel()
+
+
+class Server:
+    """Serves the feed. host, port: where it listens; token: part of every path, empty where none is needed."""
+
+    def __init__(self, feed: Feed, host: str, port: int, token: str, source: str, command: Command | None) -> None:
+        self.feed, self.host, self.port, self.token = feed, host, port, token
+        self._command = command
+        self._viewers: set[Viewer] = set()
+        self._download = asyncio.Lock()
+        self._files = {name: path.read_bytes() for name, path in page_files().items()}
+        self._door = Door(self._answer)
+        self._runner = web.ServerRunner(self._door, handle_signals=False)
+        self._hello = {'kind': 'hello', 'source': source, 'bin_s': BIN_S, 'phases': PHASES, 'commands': command is not None,
+                       'signals': {name: {'unit': row['unit'], 'meaning': row['meaning'], 'topic': row['topic']}
+                                   for name, row in QUANTITIES.items()},
+                       'derived': DERIVED}
+
+    @property
+    def link(self) -> str:
+        host = f'[{self.host}]' if ':' in self.host else self.host
+        return f'http://{host}:{self.port}/' + (f'{self.token}/' if self.token else '')
+
+    async def start(self) -> None:
+        """Raises OSError if it cannot listen there."""
+        await self._runner.setup()
+        site = web.TCPSite(self._runner, self.host, self.port, shutdown_timeout=1.0)
+        await site.start()
+        self.port = self._runner.addresses[0][1]
+
+    async def stop(self) -> None:
+        await self._runner.cleanup()
+
+    async def _answer(self, request: web.BaseRequest) -> web.StreamResponse:
+        why = self._refusal(request)
+        if why:
+            return web.Response(status=403, text=f'abs_hil serve: {why}\n', headers=HEADERS)
+        path = request.path[len(self.token) + 1:] if self.token else request.path
+        if path == '/ws':
+            return await self._view(request)
+        if path.startswith('/download.'):
+            return await self._send_file(request, path.removeprefix('/download.'))
+        name = path[1:] or 'index.html'
+        if name not in self._files:
+            return web.Response(status=404, text='abs_hil serve: no such page\n', headers=HEADERS)
+        kind = KINDS[pathlib.PurePath(name).suffix]
+        return web.Response(body=self._files[name], content_type=kind, charset='utf-8', headers=HEADERS)
+
+    def _refusal(self, request: web.BaseRequest) -> str:
+        """Why this request is refused; empty: it is not."""
+        if request.method != 'GET':
+            return 'only GET is answered'
+        if self.token:
+            given = request.path.split('/')[1]
+            if not hmac.compare_digest(given.encode(), self.token.encode()):
+                return 'the token in the link is wrong or missing; use the whole link that abs_hil serve printed'
+        host = request.headers.get('Host', '')
+        # A foreign name that leads here is an attack by DNS. With a token the name does not matter.
+        if not self.token and not is_loopback(urlsplit(f'//{host}').hostname or ''):
+            return f'"{host[:100]}" is not the name of this page; use localhost'
+        origin = request.headers.get('Origin')
+        if origin is not None and urlsplit(origin).netloc != host:
+            return f'a page of {origin[:100]} may not use this one'
+        if request.headers.get('Sec-Fetch-Site', 'none') not in ('none', 'same-origin'):
+            return 'another page may not use this one'
+        return ''
+
+    async def _view(self, request: web.BaseRequest) -> web.StreamResponse:
+        if len(self._viewers) >= MOST_VIEWERS:
+            return web.Response(status=503, text=f'abs_hil serve: {MOST_VIEWERS} viewers watch already\n', headers=HEADERS)
+        answer = web.WebSocketResponse(max_msg_size=REQUEST_BYTES, compress=False, heartbeat=30.0)
+        await answer.prepare(request)
+        transport: Any = request.transport
+        self._door.stays(transport)
+        # What waits in the kernel for a slow viewer is old when it arrives.
+        transport.get_extra_info('socket').setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
+        viewer = Viewer(answer, self.feed, self._hello, self._command, transport.abort)
+        self._viewers.add(viewer)
+        try:
+            await viewer.serve()
+        finally:
+            self._viewers.discard(viewer)
+        return answer
+
+    async def _send_file(self, request: web.BaseRequest, kind: str) -> web.StreamResponse:
+        """The cycles that the page shows, as a file."""
+        if kind not in TYPES:
+            return web.Response(status=404, text=f'abs_hil serve: give {" or ".join(TYPES)}\n', headers=HEADERS)
+        if self._download.locked():
+            return web.Response(status=503, text='abs_hil serve: another download is under way\n', headers=HEADERS)
+        try:
+            asked = {name: json.loads(value) for name, value in request.query.items()}
+            run = self.feed.runs.get(whole(asked, 'run'))
+            if run is None:
+                raise Bad('this run is no longer kept')
+            rows = self.feed.history.rows_of(run.number, real(asked, 'from_s'), real(asked, 'to_s'), 1 << 30)
+            if len(rows) == 0:
+                raise Bad('no cycle of this time is kept: the server has the newest ones only')
+        except ValueError as error:
+            return web.Response(status=400, text=f'abs_hil serve: {error}\n', headers=HEADERS)
+        self._door.stays(request.transport)
+        async with self._download:
+            try:
+                data = await asyncio.get_running_loop().run_in_executor(None, make, kind, run, rows)
+            except ImportError as error:
+                return web.Response(status=501, text=f'abs_hil serve: {error}; pip install mcap\n', headers=HEADERS)
+        name = f'abs_hil-run-{run.number}-{time.strftime("%Y%m%d-%H%M%S", time.localtime(run.began))}.{kind}'
+        return web.Response(body=data, content_type=TYPES[kind],
+                            headers={**HEADERS, 'Content-Disposition': f'attachment; filename="{name}"'})
+
+
+def is_loopback(host: str) -> bool:
+    with contextlib.suppress(ValueError):
+        return ipaddress.ip_address(host).is_loopback
+    return host == 'localhost'

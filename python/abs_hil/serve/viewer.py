@@ -1,0 +1,290 @@
+"""One viewer: a WebSocket with two cursors, one into the bins and one into the facts of the runs. It holds no queue of
+data, so a slow viewer costs no memory: what it falls behind too far is left out, counted and told."""
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from aiohttp import WSCloseCode, WSMsgType, web
+
+from ..messages import PHASES
+from .feed import Feed
+from .history import PLACE, own_place
+from .runs import RunFacts
+
+TICK_S = 0.05
+FACTS_S = 0.25
+#: values of one frame; bins (5 s) that a viewer may be late once it has caught up
+MOST_VALUES, LATE_BINS = 8000, 250
+MOST_SIGNALS, MOST_ROWS, MOST_REPLIES = 40, 20_000, 8
+#: requests that a viewer may make at once, and a second
+BURST, RATE_PER_S = 60.0, 20.0
+MOST_BAD = 20
+STUCK_S = 20.0
+BINS, ROWS = 1, 2
+
+
+class Bad(ValueError):
+    """A request that is none; the text says what is wrong."""
+
+
+class Trigger:
+    """Looks at each cycle until one meets the condition."""
+
+    def __init__(self, asked: dict[str, Any]) -> None:
+        self._kind = asked.get('on')
+        self.caught: dict[str, Any] | None = None
+        self._before = math.nan
+        self._run = -1
+        self._wanted: int | None = None
+        if self._kind == 'level':
+            self._signal, self._level, self._edge = text(asked, 'signal'), real(asked, 'level'), text(asked, 'edge')
+            if self._edge not in ('rise', 'fall', 'either'):
+                raise Bad(f'edge "{self._edge}": give rise, fall or either')
+        elif self._kind == 'phase':
+            name = text(asked, 'phase')
+            if name and name not in PHASES:
+                raise Bad(f'phase "{name}": give one of {" ".join(PHASES)}, or "" for any')
+            self._signal, self._wanted = 'phase_index', PHASES.index(name) if name else None
+        elif self._kind == 'event':
+            self._signal = 'reason'
+        else:
+            raise Bad(f'on "{self._kind}": give level, phase or event')
+
+    def look(self, run: RunFacts, rows: np.ndarray) -> None:
+        place = own_place(run.own, self._signal)
+        if self.caught is not None or place is None:
+            return
+        values = rows[:, place]
+        first = run.number != self._run
+        before = np.concatenate(([math.nan if first else self._before], values[:-1]))
+        self._run, self._before = run.number, float(values[-1])
+        hit = np.flatnonzero(self._hits(before, values, rows))
+        if hit.size:
+            row = rows[hit[0]]
+            self.caught = {'kind': 'caught', 'run': run.number, 'time_s': float(row[PLACE['time_s']]),
+                           'cycle': int(row[PLACE['cycle']]), 'value': float(values[hit[0]])}
+
+    def _hits(self, before: np.ndarray, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        if self._kind == 'event':
+            return values != 0
+        if self._kind == 'phase':
+            changed = (values != before) & ~np.isnan(before)
+            return changed if self._wanted is None else changed & (rows[:, PLACE['phase']] == self._wanted)
+        rise = (before < self._level) & (values >= self._level)
+        fall = (before > self._level) & (values <= self._level)
+        return rise if self._edge == 'rise' else fall if self._edge == 'fall' else rise | fall
+
+
+class Viewer:
+    """Sends to one WebSocket until it closes.
+
+    command: sends a command, None where the page may only watch; (accepted, answer in words).
+    abort: ends the connection at once.
+    """
+
+    def __init__(self, socket: web.WebSocketResponse, feed: Feed, hello: dict[str, Any], command: Any,
+                 abort: Callable[[], None]) -> None:
+        self._socket, self._feed, self._hello, self._command, self._abort = socket, feed, hello, command, abort
+        self._replies: deque[str | bytes] = deque()
+        self._signals: list[str] = []
+        self._version = 0
+        self._cursor = feed.history.bins.tail
+        self._caught_up = False
+        self._told: dict[int, int] = {}
+        self._trigger: Trigger | None = None
+        self._tokens, self._refilled = BURST, time.monotonic()
+        self._bad = 0
+        self._tasks: set[asyncio.Task[None]] = set()
+        self.dropped = 0  # bins
+
+    async def serve(self) -> None:
+        self._feed.listeners.append(self._look)
+        sender = asyncio.create_task(self._send())
+        try:
+            async for message in self._socket:
+                if message.type is not WSMsgType.TEXT:
+                    self._note_bad('a request is text')
+                else:
+                    self._take(message.data)
+                if self._bad > MOST_BAD:
+                    await self._socket.close(code=WSCloseCode.POLICY_VIOLATION, message=b'too many bad requests')
+                    return
+        finally:
+            self._feed.listeners.remove(self._look)
+            sender.cancel()
+
+    def _look(self, run: RunFacts, rows: np.ndarray) -> None:
+        if self._trigger is not None and self._trigger.caught is None:
+            self._trigger.look(run, rows)
+            if self._trigger.caught is not None:
+                self._reply(self._trigger.caught)
+
+    # ---- requests
+    def _take(self, data: str) -> None:
+        now = time.monotonic()
+        self._tokens = min(BURST, self._tokens + (now - self._refilled) * RATE_PER_S)
+        self._refilled = now
+        if self._tokens < 1.0:
+            self._note_bad(f'more than {RATE_PER_S:g} requests a second')
+            return
+        self._tokens -= 1.0
+        try:
+            asked = json.loads(data)
+            if not isinstance(asked, dict):
+                raise Bad('a request is a JSON object')
+            handler = {'show': self._show, 'trigger': self._arm, 'rows': self._rows,
+                       'command': self._send_command}.get(asked.get('do', ''))
+            if handler is None:
+                raise Bad('do: give show, trigger, rows or command')
+            handler(asked)
+        except RecursionError:
+            self._note_bad('JSON too deep')
+        except (ValueError, TypeError) as error:
+            self._note_bad(str(error))
+
+    def _note_bad(self, why: str) -> None:
+        self._bad += 1
+        if self._bad <= MOST_BAD:
+            self._reply({'kind': 'refused', 'text': why[:200]})
+
+    def _reply(self, answer: dict[str, Any] | bytes) -> None:
+        if len(self._replies) < MOST_REPLIES:
+            self._replies.append(answer if isinstance(answer, bytes) else as_json(answer))
+
+    def _show(self, asked: dict[str, Any]) -> None:
+        self._signals, self._version = signals(asked), whole(asked, 'version')
+        self._cursor, self._caught_up = self._feed.history.bins.tail, False
+
+    def _arm(self, asked: dict[str, Any]) -> None:
+        self._trigger = None if asked.get('on') == 'off' else Trigger(asked)
+
+    def _rows(self, asked: dict[str, Any]) -> None:
+        run = self._feed.runs.get(whole(asked, 'run'))
+        if run is None:
+            raise Bad('this run is no longer kept')
+        names = ['time_s', 'cycle', *signals(asked)]
+        rows = self._feed.history.rows_of(run.number, real(asked, 'from_s'), real(asked, 'to_s'), MOST_ROWS)
+        head = np.array([ROWS, whole(asked, 'version'), run.number, len(rows), len(names), 0, 0, 0], dtype='<i4')
+        self._reply(head.tobytes() + columns_of(run, rows, names).astype('<f8').tobytes())
+
+    def _send_command(self, asked: dict[str, Any]) -> None:
+        if self._command is None:
+            raise Bad('this page may only watch: abs_hil serve was started without --commands KEYFILE')
+        if self._tasks and asked.get('command') != 'stop':
+            raise Bad('the command before has no answer yet')
+        if len(self._tasks) > 2:
+            return  # stops under way: each repeats itself until it is answered
+        order = (text(asked, 'command'), str(asked.get('name', ''))[:200], real({'value': asked.get('value') or 0.0}, 'value'))
+
+        async def run() -> None:
+            accepted, answer = await self._command(*order)
+            self._reply({'kind': 'answer', 'command': order[0], 'accepted': accepted, 'text': answer})
+        task = asyncio.create_task(run())
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    # ---- what goes out
+    async def _send(self) -> None:
+        try:
+            await self._put(as_json(self._hello))
+            next_facts = 0.0
+            while not self._socket.closed:
+                now = time.monotonic()
+                if now >= next_facts:
+                    next_facts = now + FACTS_S
+                    for run in list(self._feed.runs.values()):
+                        if self._told.get(run.number) != run.version:
+                            self._told[run.number] = run.version
+                            await self._put(as_json(run.told()))
+                    self._told = {number: version for number, version in self._told.items() if number in self._feed.runs}
+                while self._replies:
+                    await self._put(self._replies.popleft())
+                if not await self._send_bins():
+                    await asyncio.sleep(TICK_S)
+        except (ConnectionError, asyncio.TimeoutError):
+            self._abort()  # it does not read: a farewell would not arrive
+
+    async def _put(self, data: str | bytes) -> None:
+        await asyncio.wait_for(self._socket.send_str(data) if isinstance(data, str) else self._socket.send_bytes(data), STUCK_S)
+
+    async def _send_bins(self) -> bool:
+        """Sends one frame. True: there is more to send at once."""
+        bins = self._feed.history.bins
+        if not self._signals:
+            return False
+        behind = bins.tail - self._cursor
+        if self._caught_up and bins.head - self._cursor > LATE_BINS:
+            behind = bins.head - 1 - self._cursor
+        if behind > 0:
+            self.dropped += behind
+            self._cursor += behind
+        if self._cursor == bins.head:
+            self._caught_up = True
+            return False
+        places = bins.places(self._cursor, self._cursor + MOST_VALUES // len(self._signals))
+        number = bins.run[places[0]]
+        places = places[:int(np.argmin(bins.run[places] == number)) or len(places)]  # of one run
+        run = self._feed.runs.get(int(number))
+        self._cursor += len(places)
+        if run is not None:
+            await self._put(self._frame(run, places))
+        return self._cursor < bins.head
+
+    def _frame(self, run: RunFacts, places: np.ndarray) -> bytes:
+        history = self._feed.history
+        count = len(places)
+        head = np.array([BINS, self._version, run.number, count, len(self._signals), self.dropped, 0, 0], dtype='<i4')
+        numbers = np.zeros(count + count % 2, dtype='<i4')  # the values behind them begin at a multiple of 8 bytes
+        numbers[:count] = history.numbers[places]
+        values = history.bins.values[places]
+        low, high = (columns_of(run, values[:, side], self._signals).astype('<f8') for side in (0, 1))
+        return b''.join(part.tobytes() for part in (head, numbers, low, high))
+
+
+def columns_of(run: RunFacts, rows: np.ndarray, names: list[str]) -> np.ndarray:
+    """The signals of rows of WIDTH values, of shape (signals, rows); NaN for one that the run lacks."""
+    kept = np.full((len(names), len(rows)), np.nan)
+    for line, name in zip(kept, names):
+        place = own_place(run.own, name)
+        if place is not None:
+            line[:] = rows[:, place]
+    return kept
+
+
+def as_json(answer: dict[str, Any]) -> str:
+    return json.dumps(answer, allow_nan=False, separators=(',', ':'), default=list)
+
+
+def text(asked: dict[str, Any], name: str) -> str:
+    value = asked.get(name)
+    if not isinstance(value, str) or len(value) > 200:
+        raise Bad(f'{name}: give a text')
+    return value
+
+
+def real(asked: dict[str, Any], name: str) -> float:
+    value = asked.get(name)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise Bad(f'{name}: give a number')
+    return float(value)
+
+
+def whole(asked: dict[str, Any], name: str) -> int:
+    value = asked.get(name)
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 1 << 31:
+        raise Bad(f'{name}: give a whole number')
+    return value
+
+
+def signals(asked: dict[str, Any]) -> list[str]:
+    value = asked.get('signals')
+    if not isinstance(value, list) or len(value) > MOST_SIGNALS or not all(isinstance(name, str) for name in value):
+        raise Bad(f'signals: give at most {MOST_SIGNALS} names')
+    return value
