@@ -15,8 +15,10 @@ import tempfile
 import time
 from urllib.parse import urlsplit
 
+import abs_hil
+import lcm
 import websockets
-from live import Run, check, compare_timing, drive_for, enter_private_network
+from live import URL, Run, check, compare_timing, drive_for, enter_private_network
 from scope import Served, Viewer
 
 GARBAGE_FRAMES, CONNECTIONS = 100_000, 200
@@ -157,12 +159,38 @@ async def slow_reader(server, program, folder):
         await process.wait()
 
 
+def forged(kind, **fields):
+    message = getattr(abs_hil, kind)()
+    for name, value in fields.items():
+        setattr(message, name, value)
+    return message.encode()
+
+
+async def hostile_network(server, program, folder):
+    """Messages that nothing of abs_hil sends, then a run: it is shown as if they had not come."""
+    network, nan = lcm.LCM(URL), float('nan')
+    async with Viewer(server.socket, ['omega2_est_rad_s', 'cycle']) as good:
+        for data in (b'', b'x' * 50_000, forged('telemetry_t')[:-3], forged('telemetry_t', time_s=nan),
+                     forged('telemetry_t', time_s=1e300), forged('telemetry_t', cycle=-1), forged('telemetry_t', phase=99),
+                     forged('telemetry_t', cycle=100, names=',,a,a' * 5000, value_count=3, values=[nan] * 3, phase_name='x' * 40_000,
+                            reason=-5, wakeup_latency_ns=-1 << 62)):
+            network.publish('ABS_TELEMETRY', data)
+        for config in ('[' * 20_000, '{"plant": 7}', '{"model": {"r2_m": [], "r1_m": "x"}}', 'NaN'):
+            network.publish('ABS_EXPERIMENT', forged('experiment_t', config_json=config, plant='<script>alert(1)</script>'))
+        network.publish('ABS_EVENT', forged('event_t', time_s=nan, value=nan, kind='fault', reason=-1, message='x' * 50_000))
+        network.publish('ABS_STATUS', forged('status_t', unjudged_share=nan))
+        summary = Run(program, folder, *drive_for(folder, 3)).end()
+        number = max(good.facts)
+        await good.until(lambda: good.facts[number]['cycles'] + good.facts[number]['lost'] == summary['cycles'], 'all cycles')
+        check(good.facts[number]['names']['plant'] == 'paper-table1', 'the run after forged messages is shown')
+
+
 def main():
     program, serve, private_network = sys.argv[1:4]
     enter_private_network(private_network, sys.argv)
     with tempfile.TemporaryDirectory() as folder:
         who_may_enter(serve, folder)
-        for trial in (attack, slow_reader):
+        for trial in (hostile_network, attack, slow_reader):
             server = Served(serve)
             try:
                 asyncio.run(trial(server, program, folder))

@@ -16,7 +16,7 @@ from ..core import _core
 from ..messages import QUANTITIES, decode
 from . import force
 from .history import COLUMNS, DERIVED_PLACE, OWN, PLACE, WIDTH, History, bin_numbers
-from .runs import MOST_RUNS, RunFacts
+from .runs import MOST_RUNS, MOST_TEXT, RunFacts
 
 Packet = tuple[str, bytes]
 #: a listener gets the run and its new rows, of shape (cycles, WIDTH)
@@ -24,6 +24,10 @@ Listener = Callable[[RunFacts, np.ndarray], None]
 #: no message for this time: the bin that grows is shown
 IDLE_S = 0.2
 MOST_PACKETS = 5000
+#: networks may deliver a few messages out of order; a cycle further back belongs to another run
+LATE_CYCLES = 16
+#: no run is longer
+LONGEST_S = 1e6
 #: cycles of 60 ms at 10 kHz
 MOST_IN_WINDOW = 600
 
@@ -81,7 +85,12 @@ class Feed:
 
     def _cycle(self, message: Any) -> None:
         cycle, names = message.cycle, message.names
-        if self._run is None or cycle < self._last_cycle:
+        if not (0.0 <= message.time_s <= LONGEST_S and 0 <= cycle < 1 << 53):
+            self.damaged += 1  # nothing of abs_hil sends this
+            return
+        if 0 < cycle <= self._last_cycle < cycle + LATE_CYCLES:
+            return  # out of order, or twice
+        if self._run is None or cycle <= self._last_cycle:
             self._flush()
             self._begin()
         if names != self._names:
@@ -98,7 +107,7 @@ class Feed:
         own = self._run.own if self._run is not None else ()
         tail = [values.get(name, math.nan) for name in (*self._later, *own)]
         self._rows.append((*self._get(message), *tail, *([math.nan] * (WIDTH - len(COLUMNS) - len(own)))))
-        self._phase_names.append(message.phase_name)
+        self._phase_names.append(message.phase_name[:MOST_TEXT])
 
     def _begin(self) -> None:
         number = self._run.number + 1 if self._run is not None else 0
@@ -112,7 +121,6 @@ class Feed:
         if not self._rows or self._run is None:
             return
         rows = np.array(self._rows, dtype=np.float64)
-        rows[np.isnan(rows[:, PLACE['time_s']]), PLACE['time_s']] = 0.0
         names, self._phase_names = self._phase_names, []
         self._rows.clear()
         self._add_force(rows)

@@ -2,15 +2,17 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from typing import Any
 
 import numpy as np
 
 from ..messages import PHASES, REASONS
+from ..nesting import parse_json
 from .history import PLACE
 
 MOST_MARKS, MOST_EVENTS, MOST_RUNS = 200, 200, 20
+#: characters of a text from the network
+MOST_TEXT = 300
 #: bounds of the histograms' classes: ten a decade from 1 us to 100 ms; below and above are classes too
 EDGES_NS = 1e3 * 10.0 ** (np.arange(51) / 10.0)
 TIMED = ('wakeup_latency_ns', 'cycle_ns')
@@ -72,19 +74,23 @@ class RunFacts:
     def take_event(self, event: Any) -> None:
         self.version += 1
         known = REASONS.get(event.reason, {})
-        self.events.append({'time_s': event.time_s, 'kind': event.kind, 'text': event.message or event.reason_text,
-                            'reason': event.reason_text, 'value': number(event.value),
+        self.events.append({'time_s': number(event.time_s) or 0.0, 'kind': event.kind[:MOST_TEXT],
+                            'text': (event.message or event.reason_text)[:MOST_TEXT],
+                            'reason': event.reason_text[:MOST_TEXT], 'value': number(event.value),
                             **{key: known.get(key, '') for key in ('quantity', 'unit', 'bound')}})
         del self.events[:-MOST_EVENTS]
 
     def take_experiment(self, message: Any) -> None:
         self.version += 1
-        self.names = {name: str(getattr(message, name)) for name in ('experiment', 'controller', 'plant', 'backend', 'version')}
+        self.names = {name: str(getattr(message, name))[:MOST_TEXT]
+                      for name in ('experiment', 'controller', 'plant', 'backend', 'version')}
         try:
-            config = json.loads(message.config_json)
+            config = parse_json(message.config_json)
         except ValueError:
             return
-        self.config = config if isinstance(config, dict) else {}
+        # Of the configuration, force.py wants these two.
+        self.config = {part: config[part] for part in ('plant', 'model')
+                       if isinstance(config, dict) and isinstance(config.get(part), dict)}
 
     def take_status(self, message: Any) -> None:
         self.version += 1
