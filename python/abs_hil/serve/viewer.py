@@ -208,7 +208,7 @@ class Viewer:
                     await self._put(self._replies.popleft())
                 if not await self._send_bins():
                     await asyncio.sleep(TICK_S)
-        except (ConnectionError, asyncio.TimeoutError):
+        except (TimeoutError, ConnectionError):
             self._abort()  # it does not read: a farewell would not arrive
 
     async def _put(self, data: str | bytes) -> None:
