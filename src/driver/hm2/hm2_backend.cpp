@@ -85,7 +85,7 @@ std::vector<std::string> Hm2Driver::tally() const {
   std::vector<std::string> lines;
   lines.push_back(
       formatted("hm2: %llu cycles, %llu without an answer in time; %llu writes lost, %llu withheld until the "
-                "board answered again; an answer took %.1f us on average, %.0f us at most",
+                "board answered again; an answer took %.0f us at most",
                 static_cast<Number>(counters_.cycles), static_cast<Number>(counters_.unanswered),
                 static_cast<Number>(counters_.writes_lost), static_cast<Number>(counters_.withheld),
                 static_cast<double>(counters_.longest_answer_ns) * 1e-3));
