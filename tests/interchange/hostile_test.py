@@ -150,7 +150,7 @@ class Files(ProgramTest):
         for name, inner, files, words in (('tags', '<a/>' * (60 << 20), 0, '251658'), ('elements', '<a/>' * (3 << 20), 0, '200000 elements'),
                                           ('attributes', '<a ' + 'a="" ' * (3 << 20) + '/>', 0, '1000000 attributes'),
                                           ('levels', '<a>' * (1 << 20) + '</a>' * (1 << 20), 0, '64 levels'),
-                                          ('comment', '<!-- ' + '<a>' * 99 + ' --><b a="/>' + '<a' * 99 + '"/>', 0, 'its library'),
+                                          ('comment', '<!-- ' + '<a>' * 99 + ' --><b a="/>' + '<a' * 99 + '"/>', 0, 'not a shared library'),
                                           ('files', '', 9900, '9902 files')):
             with self.subTest(name):
                 path = self.folder / f'{name}.fmu'
