@@ -57,8 +57,8 @@ def test_data_frame_has_the_columns():
 
 
 @pytest.mark.parametrize('options, words', [
-    ({'plant': 'paper-tabel1'}, 'the nearest known is paper-table1'), ({'controller': 'slidng-mode'}, 'sliding-mode'),
-    ({'experiment': 'papr'}, 'the nearest known is paper'), ({'set': {'control.slip_ref': 2}}, 'control.slip_ref = 2'),
+    ({'plant': 'paper-tabel1'}, 'the nearest is paper-table1'), ({'controller': 'slidng-mode'}, 'sliding-mode'),
+    ({'experiment': 'papr'}, 'the nearest is paper'), ({'set': {'control.slip_ref': 2}}, 'control.slip_ref = 2'),
     ({'set': {'control.slipref': 0.1}}, 'control.slip_ref'), ({'seed': -1}, 'run.seed'),
     ({'inject': ['nonsense']}, 'nonsense'), ({'controller': 'python'}, 'reset and step'),
     ({'controller': object()}, 'reset and step'), ({'experiment': 'series-of-ten'}, 'a series of runs')])
