@@ -39,7 +39,7 @@ def tsv_rows(file):
 
 # name -> where its rows come from, {heading: format of the cell}
 TABLES = {
-    'rooms': (tsv_rows('rooms.tsv'), {'room': '`{room}`', 'holds': '{holds}', 'may know': '{may know}'}),
+    'rooms': (tsv_rows('rooms.tsv'), {'room': '`{room}`', 'holds': '{holds}'}),
 }
 # file -> where its rows come from; the columns are the rows' own
 FILES = {f'docs/reference/{name}.csv': json_rows('abs_hil', 'list', f'--{name}', '--json')
