@@ -150,6 +150,16 @@ TEST_CASE("after the controller's death the safe state is written at once") {
   CHECK(report.verified_ns - then_ns <= 200 * us);
 }
 
+TEST_CASE("the report keeps the time at which the controller was seen to be gone, however long the board fails") {
+  Post post;
+  post.last_cycle_ns = then_ns;
+  post.board.fails_first = 50;
+  const GuardianReport report = post.run();
+  CHECK(report.verified);
+  CHECK(report.tries == 51);
+  CHECK(report.controller_gone_ns <= report.first_written_ns);
+}
+
 TEST_CASE("a silent controller is ended, and seen to have ended, before anything is written") {
   Post post;
   post.last_cycle_ns = then_ns;
