@@ -36,9 +36,14 @@ class Page(Chromium):
         self.call('Input.dispatchKeyEvent', type='keyUp', key=key, windowsVirtualKeyCode=codes.get(key, ord(key[0].upper())))
 
     def place(self, selector):
-        self.value(f'document.querySelector("{selector}").scrollIntoView({{block: "center"}})')
-        return self.value(f'(() => {{ const r = document.querySelector("{selector}").getBoundingClientRect(); '
-                          'return [r.left, r.top, r.width, r.height]; })()')
+        """Where it stands once it stands still: new charts move what is below them."""
+        places = [None]
+        while len(places) < 2 or places[-1] != places[-2]:
+            self.value(f'document.querySelector("{selector}").scrollIntoView({{block: "center"}})')
+            self.value('new Promise((done) => setTimeout(done, 100))')
+            places.append(self.value(f'(() => {{ const r = document.querySelector("{selector}").getBoundingClientRect(); '
+                                     'return [r.left, r.top, r.width, r.height]; })()'))
+        return places[-1]
 
     def click(self, selector, x=0.5, y=0.5):
         left, top, width, height = self.place(selector)
