@@ -127,7 +127,7 @@ constexpr double slowness_max = 100.0;
 
 // Stands before the C library's exit(), which calls destructors of objects that other threads still use (the runs of a
 // comparison) before it calls a function that was registered earlier.
-extern "C" [[noreturn]] void exit(int status) noexcept {
+extern "C" [[gnu::noreturn]] void exit(int status) noexcept {
   abs_hil::runtime::on_exit();
   abs_hil::runtime::exit_of_the_library(status);
 }
