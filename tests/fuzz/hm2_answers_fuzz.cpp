@@ -18,6 +18,8 @@ namespace {
 using namespace abs_hil::driver;
 using namespace abs_hil::fuzz;
 
+unsigned word_of(std::uint8_t low, std::uint8_t high) { return low | static_cast<unsigned>(high) << 8U; }
+
 /// The words that a 7I92 would answer, and the input's bytes in place of some of them.
 class FuzzLink final : public hm2::Link {
  public:
@@ -25,8 +27,8 @@ class FuzzLink final : public hm2::Link {
   int send(std::span<const std::uint8_t> request) noexcept override {
     std::vector<std::uint8_t> answer;
     for (std::size_t i = 0; i + 4 <= request.size();) {
-      const unsigned word = request[i] | request[i + 1] << 8U;
-      unsigned address = request[i + 2] | request[i + 3] << 8U;
+      const unsigned word = word_of(request[i], request[i + 1]);
+      unsigned address = word_of(request[i + 2], request[i + 3]);
       i += 4;
       const unsigned width = 1U << ((word >> 8U) & 3U);
       const bool scratch = ((word >> 10U) & 7U) == hm2::space::timers && address >= 0x10;
@@ -43,7 +45,8 @@ class FuzzLink final : public hm2::Link {
     const unsigned kind = input_.byte();
     if ((kind & 1U) != 0) {  // some words lie, the numbers do not
       for (int lies = input_.byte() % 8; lies > 0; --lies) {
-        answer[(input_.byte() | input_.byte() << 8U) % answer.size()] = input_.byte();
+        const std::uint8_t low = input_.byte();
+        answer[word_of(low, input_.byte()) % answer.size()] = input_.byte();
       }
     }
     if ((kind & 6U) == 6U) answer.resize(input_.byte());
