@@ -76,7 +76,7 @@ class Hm2Run(EmulatorTest):
                 if (found := re.search(r'outputs zero: watchdog; watchdog last reloaded ([\d.]+) ms ago', line))]
 
     def ms_until_zero(self, board):
-        """The same, whoever zeroed them last."""
+        """The same for any last writer of the zeros."""
         self.assertEqual(board.wire(), SAFE)
         return float([found[1] for line in board.lines
                       if (found := re.search(r'outputs zero: .*last reloaded ([\d.]+) ms ago', line))][-1])
