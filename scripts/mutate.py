@@ -47,7 +47,7 @@ GATE = Group('runtime',
               '"rig/encoder_scale.hpp"', '"runtime/plausibility_limits.hpp"'),
              folders={'safety_class': 'rig'})
 GUARD = Group('guardian', ['board_guard', 'watchdog', 'standby'],
-              ['guardian/board_guard_test.cpp', 'guardian/resident_guard_test.cpp', 'guardian/standby_test.cpp',
+              ['guardian/board_guard_test.cpp', 'guardian/resident_*_test.cpp', 'guardian/standby_test.cpp',
                'guardian/watchdog_test.cpp'],
               ('<algorithm>', '<array>', '<atomic>', '<optional>', '<utility>', '"abs_hil/driver/safe_state_writer.hpp"',
                '"guardian/mail.hpp"', '"guardian/shared_region.hpp"', '"runtime/clock.hpp"'),

@@ -1,0 +1,219 @@
+// The guard of the resident service: runs that it covers, and what it takes back.
+#include "resident_service.hpp"
+
+using namespace abs_hil;
+using namespace abs_hil::guardian;
+using namespace abs_hil::guardian::test;
+using rig::Reason;
+
+TEST_CASE("the stricter timeout counts: the run's or the service's") {
+  const std::int64_t asked_ms = GENERATE(8, 20, 500);
+  Service service;
+  service.guard.begin();
+  const std::uint32_t lease = service.granted();
+  service.answer({.word = OrderWord::cover, .lease = lease, .timeout_ns = asked_ms * ms});
+  const std::int64_t timeout_ns = std::min<std::int64_t>(asked_ms, 20) * ms;
+  CHECK(service.page.run_needs_ns.load() == timeout_ns);
+  CHECK(service.guard.look_period_ns() == timeout_ns / 8);
+  service.beats = true;
+  service.pass(100 * ms);
+  service.beats = false;
+  const std::int64_t silent_ns = service.clock.now_ns();
+  service.news.clear();
+  while (service.said(NewsWord::acted) == nullptr) service.pass(ms);
+  const GuardianReport& report = service.said(NewsWord::acted)->report;
+  CHECK(report.reason == Reason::controller_silent);
+  CHECK(report.noticed_ns - silent_ns >= timeout_ns - ms);
+  CHECK(report.noticed_ns - silent_ns <= timeout_ns + timeout_ns / 8 + ms);
+  CHECK(report.verified);
+  CHECK(service.said(NewsWord::over) != nullptr);
+  CHECK_FALSE(service.pages->guard().taken_back_for.load() == Reason::none);
+  CHECK(service.pages->guard().ended_safe.load());
+}
+
+TEST_CASE("looks are neither denser than 0.25 ms nor rarer than 5 ms") {
+  Service service;
+  service.guard.begin();
+  const std::uint32_t lease = service.granted();
+  service.answer({.word = OrderWord::cover, .lease = lease, .timeout_ns = ms});
+  CHECK(service.guard.look_period_ns() == 250 * us);
+  BoardGuard slow({.clock = service.clock,
+                   .board = service.board,
+                   .processes = service.processes,
+                   .timeout_ns = 500 * ms,
+                   .keep_ns = 5 * ms});
+  slow.cover_only(Pages{}, run_process);
+  CHECK(slow.look_period_ns() == 5 * ms);
+}
+
+TEST_CASE("a series: each run is covered anew, and the pauses are kept at zero") {
+  Service service;
+  service.guard.begin();
+  const std::uint32_t lease = service.covered();
+  for (int run = 1; run <= 3; ++run) {
+    CHECK(service.pages->guard().covers.load() == static_cast<std::uint32_t>(run));
+    service.board.duty = 0.6;
+    const std::size_t from = service.story.size();
+    service.pass(200 * ms);
+    CHECK(service.story.size() == from);  // the board is the run's
+    CHECK(service.board.duty == 0.6);
+    service.board.duty = 0.0;
+    service.beats = false;
+    service.news.clear();
+    service.stage(Stage::closed);
+    service.pass(20 * ms);
+    CHECK(service.said(NewsWord::ended) != nullptr);
+    CHECK(service.said(NewsWord::over) == nullptr);
+    CHECK(service.said(NewsWord::acted) == nullptr);
+    CHECK(service.pages->guard().ends.load() == static_cast<std::uint32_t>(run));
+    CHECK(service.pages->guard().ended_safe.load());
+    service.board.duty = 0.73;
+    service.pass(5 * ms);
+    CHECK(service.board.duty == 0.0);
+    service.pass(100 * ms);
+    service.stage(Stage::guarded);
+    CHECK(service.board.held);
+    CHECK(service.answer({.word = OrderWord::cover, .lease = lease, .timeout_ns = 20 * ms}).word == NewsWord::covered);
+    CHECK_FALSE(service.board.held);  // the run opens it
+    service.beats = true;
+  }
+}
+
+TEST_CASE("a covered run that must give the outputs back gets a mark and the time to do it") {
+  Service service;
+  service.guard.begin();
+  service.covered();
+  service.pass(50 * ms);
+  service.news.clear();
+  service.order({.word = OrderWord::take_back, .reason = Reason::machine_paused});
+  service.pass(3 * ms);
+  CHECK(service.pages->guard().taken_back_for.load() == Reason::machine_paused);
+  CHECK(service.guard.holder() == run_process);
+  service.stage(Stage::released);
+  service.pass(30 * ms);
+  REQUIRE(service.said(NewsWord::acted) != nullptr);
+  CHECK(service.said(NewsWord::acted)->report.reason == Reason::machine_paused);
+  CHECK(service.said(NewsWord::acted)->report.controller_lives);
+  CHECK(service.said(NewsWord::acted)->report.controller_gone_ns == 0);
+  CHECK(service.said(NewsWord::over) != nullptr);
+  CHECK(service.count("end") == 0);
+  CHECK(service.guard.holder() == -1);
+  CHECK(service.guard.safe());
+}
+
+TEST_CASE("a suspension takes back the outputs of a run that was covered then, and of no later one") {
+  Service service;
+  service.guard.begin();
+  service.clock.suspend(3'000 * ms);
+  const std::uint32_t lease = service.covered();
+  service.pass(50 * ms);
+  CHECK(service.pages->guard().taken_back_for.load() == Reason::none);
+  for (int i = 0; i < 2; ++i) {
+    service.clock.suspend(900 * us);
+    service.guard.look();
+    CHECK(service.pages->guard().taken_back_for.load() == Reason::none);
+  }
+  service.clock.suspend(1'200 * us);
+  service.guard.look();
+  CHECK(service.pages->guard().taken_back_for.load() == Reason::computer_suspended);
+  service.stage(Stage::released);
+  service.pass(50 * ms);
+  CHECK(service.guard.holder() == -1);
+  service.beats = false;
+  CHECK(service.covered() == lease + 1);
+  service.pass(50 * ms);
+  CHECK(service.pages->guard().taken_back_for.load() == Reason::none);
+}
+
+TEST_CASE("the first reason for which outputs are taken back stays") {
+  Service service;
+  service.guard.begin();
+  service.covered();
+  service.pass(50 * ms);
+  REQUIRE(service.mail.order({.word = OrderWord::take_back, .reason = Reason::machine_paused}));
+  REQUIRE(service.mail.order({.word = OrderWord::take_back, .reason = Reason::computer_suspended}));
+  service.pass(3 * ms);
+  CHECK(service.pages->guard().taken_back_for.load() == Reason::machine_paused);
+}
+
+TEST_CASE("a run that is asked for its outputs is not covered again") {
+  Service service;
+  service.guard.begin();
+  const std::uint32_t lease = service.covered();
+  service.pass(50 * ms);
+  service.beats = false;
+  service.stage(Stage::closed);
+  service.news.clear();
+  service.order({.word = OrderWord::close, .lease = lease});
+  service.pass(20 * ms);
+  CHECK(service.said(NewsWord::over) != nullptr);
+  CHECK(service.guard.holder() == -1);
+}
+
+TEST_CASE("outputs that nobody covers are taken back at once") {
+  Service service;
+  service.guard.begin();
+  service.granted();
+  service.board.duty = 0.5;
+  service.order({.word = OrderWord::take_back, .reason = Reason::computer_suspended});
+  CHECK(service.said(NewsWord::over) != nullptr);
+  CHECK(service.board.duty == 0.0);
+  CHECK(service.count("end") == 0);
+}
+
+TEST_CASE("the lease of a holder that dies between its runs is over at the next look") {
+  Service service;
+  service.guard.begin();
+  service.granted();
+  service.board.duty = 0.5;
+  service.processes.dies_at_ns[run_process] = 0;
+  service.guard.look();
+  service.take_news();
+  CHECK(service.said(NewsWord::over) != nullptr);
+  CHECK(service.board.duty == 0.0);
+  CHECK(service.guard.holder() == -1);
+  CHECK(service.granted(other_process) != 0);
+  CHECK(service.guard.holder() == other_process);
+}
+
+TEST_CASE("a covered run that dies is zero at once, and its lease is over") {
+  Service service;
+  service.guard.begin();
+  service.covered();
+  service.pass(50 * ms);
+  service.board.duty = 0.5;
+  service.beats = false;
+  service.processes.dies_at_ns[run_process] = 0;
+  service.news.clear();
+  service.guard.look();
+  service.take_news();
+  CHECK(service.board.duty == 0.0);
+  REQUIRE(service.said(NewsWord::acted) != nullptr);
+  CHECK(service.said(NewsWord::acted)->report.reason == Reason::controller_died);
+  CHECK(service.said(NewsWord::acted)->report.tries == 1);
+  CHECK(service.pages->guard().ends.load() == 1);
+  CHECK(service.said(NewsWord::over) != nullptr);
+  CHECK(service.guard.safe());
+  CHECK_FALSE(service.guard.over());
+}
+
+TEST_CASE("the report of a run that dies after it released its outputs says when") {
+  Service service;
+  service.guard.begin();
+  service.covered();
+  service.pass(50 * ms);
+  service.beats = false;
+  service.stage(Stage::released);
+  service.pass(20 * ms);
+  service.news.clear();
+  const std::int64_t died_ns = service.clock.now_ns();
+  service.processes.dies_at_ns[run_process] = died_ns;
+  service.pass(20 * ms);
+  REQUIRE(service.said(NewsWord::acted) != nullptr);
+  const GuardianReport& report = service.said(NewsWord::acted)->report;
+  CHECK(report.reason == Reason::controller_died);
+  CHECK(report.controller_gone_ns >= died_ns);
+  CHECK_FALSE(report.acted);
+  CHECK(service.said(NewsWord::ended) != nullptr);
+  CHECK_FALSE(service.guard.over());
+}
