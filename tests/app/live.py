@@ -1,6 +1,7 @@
 """Shared by the tests of a run on a network: a network namespace, runs of a set length, subscribers, and the
 datagrams that the kernel dropped."""
 import json
+import math
 import os
 import pathlib
 import signal
@@ -36,8 +37,11 @@ def urgent():
 def drive_for(folder, seconds):
     """An experiment that only drives for the given time."""
     path = pathlib.Path(folder, f'drive-{seconds}.toml')
-    path.write_text('description = "drive"\n[[phase]]\nname = "accelerate"\nmotor = 0.3\n'
-                    f'until = {{ lasts_s = {seconds} }}\n')
+    # A phase lasts less than 600 s.
+    phases = [min(300, seconds - begin) for begin in range(0, math.ceil(seconds), 300)]
+    path.write_text('description = "drive"\n' + ''.join(
+        f'[[phase]]\nname = "accelerate-{number}"\nmotor = 0.3\nuntil = {{ lasts_s = {lasts_s} }}\n'
+        for number, lasts_s in enumerate(phases)))
     return ['--experiment', path]
 
 

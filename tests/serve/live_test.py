@@ -111,7 +111,7 @@ def downloaded(server, number, csv_file):
 async def for_a_while(program, server, folder, seconds):
     """Memory and processor over a long run."""
     async with Viewer(server.socket, SIGNALS[:4]) as viewer:
-        run = await asyncio.create_subprocess_exec(program, *drive_for(folder, seconds), '--set', 'experiment.run_time_s=1e4',
+        run = await asyncio.create_subprocess_exec(program, *drive_for(folder, seconds),
                                                    stdout=subprocess.DEVNULL)
         await asyncio.sleep(min(20, seconds / 3))
         memory_kB, cpu_s = server.memory_kB(), server.cpu_s()
