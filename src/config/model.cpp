@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <variant>
 
+#include "abs_hil/rig/brake_map.hpp"
+#include "abs_hil/rig/tyre_curve.hpp"
 #include "config/key_table.hpp"
 #include "rig/encoder_scale.hpp"
 
@@ -14,6 +17,15 @@ namespace {
 double as_double(const Key& key) {
   if (const auto* whole = std::get_if<std::int32_t*>(&key.target)) return static_cast<double>(**whole);
   return *std::get<double*>(key.target);
+}
+
+/// Brake torque that holds a slip while the car slows down, from (1) and (2) at a constant slip; slow, so without
+/// viscous friction.
+double holding_torque_Nm(const rig::RigParameters& rig, double slip) {
+  const rig::WheelParameters& w = rig.wheels;
+  const double force_N = rig.tyre.theta_N * rig::normalised_tyre_force(rig.tyre, slip);
+  const double lower_slows_rad_s2 = (w.r2_m * force_N + w.M20_Nm) / w.J2_kg_m2;
+  return w.r1_m * force_N - w.M10_Nm + w.J1_kg_m2 * (1.0 - slip) * w.r2_m / w.r1_m * lower_slows_rad_s2;
 }
 
 std::string six_digits(double value) { return fmt::format("{:.6g}", value); }
@@ -52,6 +64,32 @@ std::string standstill_too_early(const Settings& s) {
       "experiment.end_speed_m_s = {:.3g} m/s gives a count every {:.3g} s and seems to stand; give more "
       "than that",
       s.control.observer.standstill_time_s, s.model.encoder_counts_per_rev, s.experiment.end_speed_m_s, count_s);
+}
+
+std::string slip_out_of_reach(const Script& script, const Settings& s) {
+  const bool wanted = std::ranges::any_of(script.phases, [](const PhaseScript& phase) {
+    return phase.brake.action() == experiment::BrakeAction::slip_control && !phase.brake.profile();
+  });
+  if (!wanted || s.gate.brake_duty_max >= 1.0 || s.plant.ideal_actuator) return {};
+  // The lever's tyre has no theta of its own; the model's is fitted to it.
+  const bool of_plant = !s.on_rig() && s.plant.load == "constant";
+  const rig::RigParameters& rig = of_plant ? s.plant.rig : s.model;
+  const rig::BrakeParameters& brake = s.on_rig() ? s.model.brake : s.plant.rig.brake;
+  const double most_Nm = rig::brake_torque_at(brake, s.gate.brake_duty_max);
+  const double least_slip = std::min(s.control.slip_ref, rig::peak_slip(rig.tyre));
+  const double needed_Nm = holding_torque_Nm(rig, least_slip);
+  if (needed_Nm <= most_Nm) return {};
+  double reached = 0.0;
+  for (double step = 0.5 * least_slip; step > 1e-4 * least_slip; step *= 0.5) {
+    if (holding_torque_Nm(rig, reached + step) <= most_Nm) reached += step;
+  }
+  return fmt::format(
+      "gate.brake_duty_max = {:.3g}: the brake gives at most {:.3g} N m, but a slip "
+      "of {:.3g} takes {:.3g} N m at {}.theta_N = {:.6g} N, so control.slip_ref = {:.3g} is out of reach and the slip "
+      "stays "
+      "below about {:.2g}; raise the cap if brake and supply bear it, or give a control.slip_ref below {:.2g}",
+      s.gate.brake_duty_max, most_Nm, least_slip, needed_Nm, of_plant ? "plant" : "model", rig.tyre.theta_N,
+      s.control.slip_ref, reached, reached);
 }
 
 std::vector<std::string> theta_out_of_bounds(const Settings& settings) {

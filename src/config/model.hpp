@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "config/script.hpp"
 #include "config/settings.hpp"
 
 namespace abs_hil::config {
@@ -27,5 +28,10 @@ struct ModelDifference {
 /// Says if a wheel that still turns at the experiment's end speed can seem to stand: it then takes longer from count to
 /// count than control.observer.standstill_time_s. Empty: it cannot.
 [[nodiscard]] std::string standstill_too_early(const Settings& settings);
+
+/// Says if the gate's cap of the brake's duty keeps the wheel from the wanted slip on the tyre of (10): below the peak
+/// it must hold more torque than the capped brake gives. Empty: it does not, or no phase controls the slip that
+/// control.slip_ref gives.
+[[nodiscard]] std::string slip_out_of_reach(const Script& script, const Settings& settings);
 
 }  // namespace abs_hil::config

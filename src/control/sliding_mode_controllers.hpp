@@ -8,7 +8,7 @@
 namespace abs_hil::control {
 
 /// Sliding-mode slip control, the type of the paper's own baseline:
-///   Tb = (J1/r1) xi_1 of (18), with nu = -K sign(e_v) in place of -ks0 I - ks1 e_v,
+///   Tb = (J1/r1) xi_1 of (18), with nu = -K sign(e_v) - q e_v in place of -ks0 I - ks1 e_v; q is 0 by default,
 ///   theta_hat' = -gamma k(slip_ref) phi(slip) sign(e_v), projected.
 /// The law and the gains of the paper's baseline are not public. This is the textbook law for the error (13), not a
 /// copy. The sign is held for a period, so e_v chatters around 0 with an amplitude of about K times the period. The
@@ -22,7 +22,9 @@ class SlidingModeLaw {
   /// Throws std::invalid_argument for options out of range.
   explicit SlidingModeLaw(const ControllerContext& context)
     requires std::is_same_v<S, double>
-      : surface_{context, context.options.sliding_mode.adaptation}, gain_m_s2_{context.options.sliding_mode.gain_m_s2} {
+      : surface_{context, context.options.sliding_mode.adaptation},
+        gain_m_s2_{context.options.sliding_mode.gain_m_s2},
+        reaching_per_s_{context.options.sliding_mode.reaching_per_s} {
     rig::require_valid(context.options.sliding_mode, "control.sliding_mode.");
   }
 
@@ -30,7 +32,7 @@ class SlidingModeLaw {
   [[nodiscard]] BasicSlipOutput<S> step(const BasicSlipInput<S>& input) noexcept {
     const S error_m_s = surface_.observe(input);
     const S sign = rig::select(error_m_s > 0.0, S(1.0), rig::select(error_m_s < 0.0, S(-1.0), S(0.0)));
-    const S rate_m_s2 = -gain_m_s2_ * sign;
+    const S rate_m_s2 = -gain_m_s2_ * sign - reaching_per_s_ * error_m_s;
     const BasicWantedMotion<S> wanted{.mean_rate_m_s2 = rate_m_s2,
                                       .error_at_mid_m_s = error_m_s + 0.5 * surface_.period_s() * rate_m_s2};
     return surface_.drive(input, error_m_s, wanted, sign);
@@ -40,6 +42,7 @@ class SlidingModeLaw {
  private:
   BasicSlidingSurface<S> surface_{};
   S gain_m_s2_{0.0};
+  S reaching_per_s_{0.0};
 };
 
 using SlidingModeController = LawController<SlidingModeLaw>;

@@ -249,6 +249,7 @@ void merge_into(RunRequest& request, config::KeyTable& keys, const RunOptions& o
   if (s.on_rig()) apply_board_policy(s, keys, request.outputs.fast);
   for (const std::string& problem : config::theta_out_of_bounds(s)) warn_once(problem);
   if (const std::string problem = config::standstill_too_early(s); !problem.empty()) warn_once(problem);
+  if (const std::string problem = config::slip_out_of_reach(script, s); !problem.empty()) warn_once(problem);
   if (s.experiment.answers == "auto" && asks(script)) s.experiment.answers = who_answers(request);
 }
 

@@ -11,6 +11,7 @@
 #include "config/config_file.hpp"
 #include "config/config_json.hpp"
 #include "config/key_table.hpp"
+#include "config/library.hpp"
 #include "config/plan.hpp"
 #include "temporary_folder.hpp"
 
@@ -204,6 +205,33 @@ TEST_CASE("a theta outside the bounds of the estimate is named") {
   rig.set({"model.theta_N=300"});
   REQUIRE(theta_out_of_bounds(rig.settings).size() == 1);
   CHECK_THAT(theta_out_of_bounds(rig.settings)[0], Contains("model.theta_N = 300"));
+}
+
+TEST_CASE("a cap of the brake that keeps the wheel from the wanted slip is named") {
+  const Script braking = parse(
+      "[[phase]]\nname = \"brake\"\nbrake = \"controller\"\nuntil = { standstill = true }\n"
+      "at_most_s = 9\n",
+      "mine.toml", {});
+  Fixture f;
+  CHECK(slip_out_of_reach(braking, f.settings).empty());  // the whole brake
+  f.set({"gate.brake_duty_max=0.7"});
+  CHECK(slip_out_of_reach(braking, f.settings).empty());  // 4.46 N m, and Table 1's tyre takes 2.95 N m
+  f.set({"plant.theta_N=47"});
+  CHECK_THAT(slip_out_of_reach(braking, f.settings),
+             Contains("gate.brake_duty_max = 0.7") && Contains("at most 4.46 N m") && Contains("takes 6 N m") &&
+                 Contains("plant.theta_N = 47 N") && Contains("below about 0.019"));
+  // A slip below that is within reach; past the peak the torque of the peak has to be passed.
+  f.set({"control.slip_ref=0.018"});
+  CHECK(slip_out_of_reach(braking, f.settings).empty());
+  f.set({"control.slip_ref=0.9"});
+  CHECK_THAT(slip_out_of_reach(braking, f.settings), Contains("takes 6 N m"));
+  // Without a phase that controls slip there is none to reach.
+  CHECK(slip_out_of_reach(*find("coast-down"), f.settings).empty());
+
+  Fixture rig;
+  rig.settings.backend = "rig";
+  rig.set({"gate.brake_duty_max=0.7", "model.theta_N=47"});
+  CHECK_THAT(slip_out_of_reach(braking, rig.settings), Contains("model.theta_N = 47 N"));
 }
 
 TEST_CASE("limits of a plan are judged by the model") {

@@ -95,6 +95,23 @@ TEST_CASE("limits of a script only tighten") {
   CHECK(plan(script, s).limits.run_time_s == 5.0);
 }
 
+TEST_CASE("the simulated board's cap of the brake caps the gate, as a board's does") {
+  const Script script = parsed(brake);
+  config::Settings s;
+  s.plant.brake_duty_max = 0.7;
+  apply(script, s);
+  CHECK(s.gate.brake_duty_max == 0.7);
+  s.gate.brake_duty_max = 0.5;
+  apply(script, s);
+  CHECK(s.gate.brake_duty_max == 0.5);
+
+  config::Settings rig;  // whose own driver has a cap; it has no simulated plant
+  rig.backend = "rig";
+  rig.plant.brake_duty_max = 0.7;
+  apply(script, rig);
+  CHECK(rig.gate.brake_duty_max == 1.0);
+}
+
 TEST_CASE("values beyond the rig's limits are named with phase, value and limit") {
   config::Settings s;
   s.gate.brake_duty_max = 0.7;

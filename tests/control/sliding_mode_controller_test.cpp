@@ -39,6 +39,7 @@ TEST_CASE("For vanishing periods the sliding-mode torque is the law as written")
   std::uniform_real_distribution<double> unit{0.0, 1.0};
   for (int i = 0; i < 50; ++i) {
     auto s = setup(2 + 20 * unit(random), 0.0, 10 + 40 * unit(random), 1e7);
+    s.options.sliding_mode.reaching_per_s = i % 2 == 0 ? 0.0 : 40 * unit(random);
     const auto controller = control::make_controller("sliding-mode", {s.options, s.rig});
     const double error = 4 * unit(random) - 3;
     const auto in = baseline::input_at(s.rig, 40 + 130 * unit(random), error, 0.0);
@@ -48,7 +49,8 @@ TEST_CASE("For vanishing periods the sliding-mode torque is the law as written")
     const double written =
         s.rig.wheels.J1_kg_m2 / s.rig.wheels.r1_m *
         (baseline::gain(s.rig, 0.15) * s.options.sliding_mode.adaptation.theta0_N * baseline::phi(s.rig, in.slip) +
-         baseline::drift(s.rig, in.speeds, 0.15) - s.options.sliding_mode.gain_m_s2 * sign);
+         baseline::drift(s.rig, in.speeds, 0.15) - s.options.sliding_mode.gain_m_s2 * sign -
+         s.options.sliding_mode.reaching_per_s * error);
     CHECK_THAT(out.brake_torque_Nm, WithinAbs(written, 1e-4));
     CHECK_THAT(out.slip_velocity_error_m_s, WithinAbs(error, 1e-12));
     CHECK(out.theta_est_N == s.options.sliding_mode.adaptation.theta0_N);
@@ -77,6 +79,16 @@ TEST_CASE("Sliding mode reaches e_v = 0 within |e_v(0)|/eta when K exceeds the m
     REQUIRE(std::abs(tick.output.slip_velocity_error_m_s) <= 1.5 * band);
     REQUIRE(tick.slip < 0.5);  // no wheel lock
   }
+}
+
+TEST_CASE("With a reaching term the surface is reached after ln(1 + q |e_v(0)| / K) / q") {
+  const double q = GENERATE(5.0, 32.0);
+  const double K = 12.0, rate_Hz = 10'000.0;
+  auto s = setup(K, 0.0, 23.0, rate_Hz);  // the exact theta
+  s.options.sliding_mode.reaching_per_s = q;
+  const auto run = bench::brake(s, "sliding-mode");
+  const double error0 = std::abs(run.ticks.front().output.slip_velocity_error_m_s);
+  CHECK_THAT(first_time_at_surface(run), WithinAbs(std::log1p(q * error0 / K) / q, 3.0 / rate_Hz));
 }
 
 TEST_CASE("With adaptation V = |e_v| + theta_tilde^2/(2 gamma) falls by eta or more until the surface is reached") {

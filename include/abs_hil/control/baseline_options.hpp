@@ -25,6 +25,9 @@ struct SlidingModeOptions {
   ABS_HIL_OPTIONS(SlidingModeOptions);
   ABS_HIL_OPTION(double, gain_m_s2, 25.2, .unit = "m/s^2", .meaning = "K of -K sign(e_v)", .range = rig::positive(200),
                  .search = rig::search(0.5, 100));
+  /// With it e_v arrives exponentially, and K only has to cover what the estimate leaves over.
+  ABS_HIL_OPTION(double, reaching_per_s, 0.0, .unit = "1/s", .meaning = "q of -K sign(e_v) - q e_v",
+                 .range = rig::from_zero(1e4));
   ABS_HIL_GROUP(SwitchingAdaptationOptions, adaptation, "", {.gamma = 55.5});
 };
 

@@ -111,6 +111,10 @@ struct PlantOptions {
                  .meaning = "simulation: friction over time or distance (docs/plants.md)");
   ABS_HIL_GROUP(DriftProfiles, drift, "", {});
   ABS_HIL_GROUP(BrakeFlaws, brake_flaws, "brake_", {});
+  /// The drivers of the boards have a cap of their own, 0.7 by default.
+  ABS_HIL_OPTION(double, brake_duty_max, 1.0,
+                 .meaning = "simulation: largest brake PWM the rig's board sends; caps gate.brake_duty_max",
+                 .range = ::abs_hil::rig::positive(1), .on_rig = "driver.pci.brake_duty_max, or that of your board");
   ABS_HIL_OPTION(
       double, encoder_eccentricity_rad, 0.0, .unit = "rad",
       .meaning = "simulation: eccentricity of both encoders that the model does not know, beside each one's own",

@@ -22,7 +22,7 @@ class Rig:
     """Both wheels in contact: the lower one turns forwards, the upper one turns forwards or stands. The brake is without dead
     time, hysteresis and fading.
 
-    values: of the plant.  brake_duty_max: the gate's limit, which no command passes.
+    values: of the plant.  brake_duty_max: the limit of gate and plant, which no command passes.
     """
     values: Mapping[str, Any]
     brake_duty_max: float = 1.0
@@ -32,7 +32,7 @@ class Rig:
         """The plant and the gate that these arguments of abs_hil.simulate give."""
         prefix, rows = 'plant.', keys(**arguments)
         return cls({name[len(prefix):]: row['value'] for name, row in rows.items() if name.startswith(prefix)},
-                   float(rows['gate.brake_duty_max']['value']))
+                   float(min(rows[f'{part}.brake_duty_max']['value'] for part in ('gate', 'plant'))))
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[name])
