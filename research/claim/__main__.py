@@ -102,7 +102,7 @@ def check_cells(maps: list[Map], cases: int, threads: int) -> list[str]:
     found = []
     random = np.random.default_rng(1)
     for one in maps:
-        cells = [cell for cell in (one.best(), one.median()) if cell is not None]
+        cells = [cell for cell in (one.best(), one.median(), one.least_favourable()) if cell is not None]
         cells += [(int(i), int(j)) for i, j in random.integers(0, one.gain_m_s2.size, (CHECKED_CELLS - len(cells), 2))]
         for i, j in cells:
             fresh = draw_maps(one.actuator, one.gain_m_s2[i:i + 1], one.gamma[j:j + 1], cases, threads,

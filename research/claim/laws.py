@@ -58,8 +58,8 @@ class Entry:
         return None if key is None else float(self.gains[key])
 
     def settings(self, actuator: str) -> dict[str, float | bool]:
-        return {'experiment.start_speed_rad_s': START_SPEED_RAD_S, **ACTUATORS[actuator], **LAWS[self.controller].fixed(),
-                **self.gains}
+        fixed = LAWS[self.controller].fixed() if self.controller in LAWS else {}  # `locked` estimates nothing
+        return {'experiment.start_speed_rad_s': START_SPEED_RAD_S, **ACTUATORS[actuator], **fixed, **self.gains}
 
 
 def gains_file(folder: pathlib.Path, actuator: str, controller: str) -> pathlib.Path:

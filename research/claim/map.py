@@ -6,6 +6,7 @@ import csv
 import pathlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from abs_hil.studies import study
 from abs_hil.tune import START_SPEED_RAD_S
 
 from .criteria import ACTUATORS, PLANTS, judge, slip_velocity_gain
-from .laws import LAWS, MAP_KEYS
+from .laws import LAWS, MAP_KEYS, Settings
 
 #: seed of the map's varied plants: neither the search nor an evaluation uses it
 MAP_SEED = 24
@@ -56,6 +57,16 @@ class Map:
         error = np.where(self.admissible, self.slip_rms, np.nan)
         return _least(np.abs(error - np.nanmedian(error))) if self.admissible.any() else None
 
+    def least_favourable(self) -> tuple[int, int] | None:
+        """Indices of the admissible baseline against which the adaptive law gains least time."""
+        return _least(np.where(self.admissible, -self.ratio['stop_time_s'], np.nan))
+
+    def span(self, name: str) -> tuple[float, float, float]:
+        """Least, median and largest ratio of a figure over the admissible baselines; NaN if there is none."""
+        held = self.ratio[name][self.admissible]
+        held = held[np.isfinite(held)]
+        return (float(held.min()), float(np.median(held)), float(held.max())) if held.size else (np.nan, np.nan, np.nan)
+
 
 def _least(values: np.ndarray) -> tuple[int, int] | None:
     if np.isnan(values).all():
@@ -77,11 +88,11 @@ Progress = Callable[[int, int], None]
 
 
 def _runs(plants: Sequence[str], actuator: str, controller: str, factors: Mapping[str, np.ndarray], cases: int,
-          threads: int, progress: bool | Progress) -> dict[str, np.ndarray]:
+          threads: int, progress: bool | Progress, settings: Settings) -> dict[str, np.ndarray]:
     """Figures of shape (plants, each factor's values, 1 + cases): the nominal plant, then varied ones."""
     law: dict[str, Any] = {'plants': list(plants), 'controllers': [controller],
                            'settings': {'experiment.start_speed_rad_s': START_SPEED_RAD_S, **ACTUATORS[actuator],
-                                        **LAWS[controller].fixed()}}
+                                        **LAWS[controller].fixed(), **settings}}
     if factors:
         law['factors'] = {name: [float(value) for value in values] for name, values in factors.items()}
     shape = (len(plants), *(len(values) for values in factors.values()))
@@ -96,11 +107,12 @@ def _runs(plants: Sequence[str], actuator: str, controller: str, factors: Mappin
 
 
 def draw_maps(actuator: str, gain: np.ndarray, gamma: np.ndarray, cases: int = 50, threads: int = 0,
-              progress: bool | Progress = False, plants: Sequence[str] = PLANTS) -> list[Map]:
+              progress: bool | Progress = False, plants: Sequence[str] = PLANTS,
+              settings: Settings = MappingProxyType({})) -> list[Map]:
     """One map for each plant: the sliding-mode law at all pairs of gains, and the adaptive law in the paper's gains, on the
-    same `cases` varied plants."""
-    theirs = _runs(plants, actuator, 'sliding-mode', dict(zip(MAP_KEYS, (gain, gamma))), cases, threads, progress)
-    ours = _runs(plants, actuator, 'adaptive', {}, cases, threads, False)
+    same `cases` varied plants. settings: others of the sliding-mode law."""
+    theirs = _runs(plants, actuator, 'sliding-mode', dict(zip(MAP_KEYS, (gain, gamma))), cases, threads, progress, settings)
+    ours = _runs(plants, actuator, 'adaptive', {}, cases, threads, False, {})
     K = np.reshape(gain, (-1, 1, 1))
     maps = []
     for index, plant in enumerate(plants):

@@ -10,12 +10,17 @@ import numpy as np
 from abs_hil.figures import OVERSHOOT, heading_of
 
 from .criteria import ACTUATORS, PLANTS, Verdict
-from .laws import BASELINES, MAP_KEYS, Entry, entries, judge_entries, run_entries
-from .map import FIGURES, PAPER_RATIO, Map
+from .laws import BASELINES, MAP_KEYS, PAPER_GAINS, Entry, entries, judge_entries, run_entries
+from .map import FIGURES, PAPER_RATIO, Map, axes, draw_maps
+from .parts import Parts
 from .statistics import ratio_interval
 
 #: seed of the plants on which the page's figures are measured: that of `abs_hil compare`
 EVALUATION_SEED = 1
+#: q of the reaching terms, 1/s; the last is ks1 of the paper's law. Size and cases of their maps.
+REACHING_PER_S, REACHING_SIZE, REACHING_CASES = (8.0, 32.0), 10, 20
+#: the largest brake duty that the boards' drivers send by default
+CAP = {'plant.brake_duty_max': 0.7}
 #: columns of the tables of all laws, with their digits
 SHOWN = {'stop_time_s': 3, 'stop_distance_m': 2, 'slip_rms': 4, OVERSHOOT: 3, 'torque_total_variation_Nm': 0,
          'theta_error_final': 3}
@@ -56,6 +61,12 @@ def first_order(one: Map, found: tuple[int, int], name: str) -> Entry:
     return Entry(name, 'sliding-mode', dict(zip(MAP_KEYS, (float(one.gain_m_s2[found[0]]), float(one.gamma[found[1]])))))
 
 
+def baselines(one: Map) -> list[Entry]:
+    """Those of the map that the page names."""
+    cells = {'best': one.best(), 'median': one.median(), 'least favourable': one.least_favourable()}
+    return [first_order(one, cell, name) for name, cell in cells.items() if cell is not None]
+
+
 class Page:
     """All evaluations behind the page."""
 
@@ -63,14 +74,15 @@ class Page:
         self.maps = {(one.plant, one.actuator): one for one in maps}
         self.runs = runs
         self.names = [entry.name for entry in entries(folder, next(iter(ACTUATORS)))]
+        self.threads = threads
+        self.parts = Parts(runs, EVALUATION_SEED, threads)
         self.found: dict[tuple[str, str, str], Result] = {}
         for actuator in ACTUATORS:
             for (plant, name), result in results(entries(folder, actuator), PLANTS, actuator, runs, threads).items():
                 self.found[plant, actuator, name] = result
             for plant in PLANTS:
                 one = self.maps[plant, actuator]
-                chosen = [first_order(one, cell, name) for name, cell in (('best', one.best()), ('median', one.median()))
-                          if cell is not None]
+                chosen = baselines(one)
                 if chosen:
                     for (_, name), result in results(chosen, [plant], actuator, runs, threads).items():
                         self.found[plant, actuator, name] = result
@@ -84,6 +96,10 @@ class Page:
         yield 'claim', self.claim()
         yield 'others', self.others()
         yield 'map', self.map_table()
+        yield 'reaching', self.reaching()
+        yield 'parts', table(['plant', 'law', 'stop time / s', 'stop distance / m', 'time / adaptive', 'distance / adaptive',
+                              'θ̂ within 5 % after / s (plants)'], list(self.parts.table_rows()))
+        yield 'capped', self.capped()
         for plant in PLANTS:
             yield f'laws {plant} real', self.laws(plant, 'real')
 
@@ -96,7 +112,7 @@ class Page:
         for plant in PLANTS:
             for actuator in ACTUATORS:
                 ours = self.found[plant, actuator, self.names[0]]
-                for name in ('best', 'median'):
+                for name in ('best', 'median', 'least favourable'):
                     theirs = self.baseline(plant, actuator, name)
                     if theirs is None:
                         rows.append([plant, actuator, name, 'none counts', *[''] * (1 + len(FIGURES))])
@@ -119,6 +135,11 @@ class Page:
 
     def phrases(self) -> Iterator[str]:
         """Sentences of the page with fresh numbers."""
+        one = self.maps[PLANTS[0], 'real']
+        (least_s, median_s, most_s), (least_m, median_m, most_m) = (one.span(name) for name in ('stop_time_s', 'stop_distance_m'))
+        yield f'between {least_s:.2f} and {most_s:.2f} times the time and {least_m:.2f} and {most_m:.2f} times the distance'
+        yield f'the median is {median_s:.2f} and {median_m:.2f}'
+        yield from self.parts.phrases()
         for name in ('best', 'median'):
             theirs = self.baseline(PLANTS[0], 'real', name)
             if theirs is None:
@@ -135,15 +156,42 @@ class Page:
             for actuator in ACTUATORS:
                 one = self.maps[plant, actuator]
                 row = [plant, actuator, f'{one.admissible.sum()} of {one.admissible.size}']
-                for name in ('stop_time_s', 'stop_distance_m', 'torque_total_variation_Nm', 'slip_rms'):
-                    held = one.ratio[name][one.admissible]
-                    held = held[np.isfinite(held)]
-                    row.append(f'{held.min():.3f} to {held.max():.3f}' if held.size else '')
+                for name in FIGURES:
+                    row.append(_span(one, name))
                     if name in ('stop_time_s', 'stop_distance_m'):
+                        held = one.ratio[name][one.admissible]
+                        held = held[np.isfinite(held)]
                         row.append(f'{100.0 * np.mean(held <= PAPER_RATIO):.0f}' if held.size else '')
                 rows.append(row)
         return table(['plant', 'actuator', 'gains that count', 'stop time', '≤ 0.933 / %', 'stop distance', '≤ 0.933 / %',
                       'torque variation', 'slip RMS error'], rows)
+
+    def reaching(self) -> str:
+        """How the ratios lie if the baseline has a reaching term, behind the real actuator."""
+        rows = []
+        for q in REACHING_PER_S:
+            maps = draw_maps('real', *axes(REACHING_SIZE), cases=REACHING_CASES, threads=self.threads,
+                             settings={'control.sliding_mode.reaching_per_s': q})
+            rows += [[one.plant, f'{q:g}', f'{one.admissible.sum()} of {one.admissible.size}',
+                      *(_span(one, name) for name in FIGURES)] for one in maps]
+        rows.sort(key=lambda row: PLANTS.index(row[0]))
+        return table(['plant', 'q / (1/s)', 'gains that count', *FIGURES.values()], rows)
+
+    def capped(self) -> str:
+        """The claim's baselines where the brake's duty is capped as the boards do."""
+        rows = []
+        for plant in PLANTS:
+            chosen = [Entry(PAPER_GAINS, 'adaptive'), *baselines(self.maps[plant, 'real'])]
+            held = results([Entry(one.name, one.controller, {**one.gains, **CAP}) for one in chosen], [plant], 'real', self.runs,
+                           self.threads)
+            ours = held[plant, PAPER_GAINS]
+            for one in chosen:
+                theirs = held[plant, one.name]
+                times = ['', ''] if theirs is ours else [
+                    ratio_interval(ours.varied(name), theirs.varied(name)).text() for name in ('stop_time_s', 'stop_distance_m')]
+                rows.append([plant, one.name, f'{100.0 * theirs.verdict.shares()["reaches"]:.0f}',
+                             'yes' if theirs.counts else 'no', *times])
+        return table(['plant', 'law', 'reaches the slip on / %', 'counts', 'stop time', 'stop distance'], rows)
 
     def laws(self, plant: str, actuator: str) -> str:
         """Every law's figures: median and 10th and 90th percentile."""
@@ -162,6 +210,11 @@ class Page:
             rows.append([*cells, shares])
         text = table(['law', *map(heading_of, SHOWN), 'criteria held / %'], rows)
         return text + ('\n\nDo not count here (criteria held / %): ' + '; '.join(missing) + '.' if missing else '')
+
+
+def _span(one: Map, name: str) -> str:
+    least, _, most = one.span(name)
+    return '' if np.isnan(least) else f'{least:.3f} to {most:.3f}'
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
