@@ -51,7 +51,7 @@ def cells():
 
 
 def mismatches():
-    chosen = [*(case for case in cases.whole_set() if case.group == 'mismatch'), *cases.beside_the_set()]
+    chosen = [case for case in cases.whole_set() if case.group == 'mismatch']
     own, peak = figures('adaptive-optimal', chosen), figures('adaptive-peak', chosen)
     lines = ['| wrong | above the bound %: mean, worst | worst in | torque variation N m: median, worst '
              '| `adaptive-peak` %: mean, worst | N m: median, worst |', '|---|---:|---|---:|---:|---:|']

@@ -43,6 +43,6 @@ def least_time_s(case: Case) -> float:
 
     NaN on a road whose friction changes, where no single coefficient k_M exists.
     """
-    if case.road != 'even':
+    if case.profile:
         return float('nan')
     return _least_time_s(case.plant, tuple(sorted(case.plant_values().items())), case.start_speed_rad_s)

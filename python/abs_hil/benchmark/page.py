@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from . import bounds, cases
 from .cases import VERSION
 from .score import Result, Score
 
@@ -58,7 +59,8 @@ def as_json(results: Sequence[Result], whole: bool, program: str) -> str:
     def known(value: Any) -> Any:
         return None if isinstance(value, float) and math.isnan(value) else value
 
-    document = {'benchmark': 'abs_hil', 'version': VERSION, 'whole': whole, 'program': program, 'controllers': [
+    document = {'benchmark': 'abs_hil', 'version': VERSION, 'set': cases.checksum(), 'bounds': bounds.checksum(bounds.stored()),
+                'whole': whole, 'program': program, 'controllers': [
         {'name': result.entry.name, 'settings': dict(result.entry.settings),
          'scores': [{key: known(value) for key, value in score.as_row().items()} for score in result.scores],
          'runs': [{key: known(value) for key, value in row.items()} for row in result.rows]} for result in results]}

@@ -15,6 +15,10 @@ from . import bounds, cases
 from .html import html
 from .page import as_json, table, text
 from .score import Entry, run
+from .verify import verified
+
+#: differences that --verify prints
+SHOWN = 20
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -29,6 +33,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--count', metavar='N', type=int, default=cases.DRAWN, help=f'how many of them ({cases.DRAWN})')
     parser.add_argument('--bounds', metavar='FILE', type=pathlib.Path,
                         help='keeps the bounds of drawn cases, so that they need not be computed again')
+    parser.add_argument('--verify', metavar='FILE', type=pathlib.Path,
+                        help='makes the runs of a file of --json again; status 1 if anything differs')
     parser.add_argument('--threads', metavar='N', type=int, default=0, help='0: one for each processor')
     parser.add_argument('--json', metavar='FILE', type=pathlib.Path, help='all scores and runs')
     parser.add_argument('--page', metavar='FILE', type=pathlib.Path,
@@ -60,13 +66,19 @@ def _chosen(given: argparse.Namespace) -> tuple[list[cases.Case], dict[str, dict
     return [case for case in drawn if case not in without], found
 
 
-def _write(target: pathlib.Path, content: str) -> None:
-    write_text(target, content)
+def _verify(path: pathlib.Path, threads: int) -> int:
+    found = verified(path, threads)
+    for line in found[:SHOWN]:
+        print(line)
+    print(f'{len(found)} differences from fresh runs' if found else f'{path}: fresh runs give the same')
+    return int(bool(found))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     given = _parser().parse_args(arguments)
     try:
+        if given.verify is not None:
+            return _verify(given.verify, given.threads)
         settings = _settings(given.set)
         for target in (given.json, given.page):
             if target is not None:
@@ -78,7 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         whole = not given.quick and given.draw is None
         results = []
         for entry in entries:
-            results.append(run(entry, chosen, known, (1,) if given.quick else (1, 2), given.threads))
+            results.append(run(entry, chosen, known, cases.SEEDS[:1] if given.quick else cases.SEEDS, given.threads))
             print(table(results[-1:]).splitlines()[-1], file=sys.stderr)
     except (ValueError, RuntimeError, OSError) as error:
         print(f'abs_hil benchmark: {error}', file=sys.stderr)
@@ -91,7 +103,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     for target, content in ((given.json, as_json(results, whole, _core.version)), (given.page, page)):
         if target is not None and content is not None:
-            _write(target, content)
+            write_text(target, content)
     return 0
 
 

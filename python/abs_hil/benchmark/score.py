@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 from ..figures import OVERSHOOT
-from ..hand import Plant
 from ..options import Value
 from ..simulation import keys, simulate, simulate_many
 from .adhesion import least_time_s
-from .bounds import identity
-from .cases import COAST_S, END_SPEED_M_S, Case
+from .bounds import coasted, identity
+from .cases import COAST_S, END_SPEED_M_S, SEEDS, Case
 
 EXPERIMENT = 'coast-and-brake'
 
@@ -40,17 +39,6 @@ class Entry:
                              'arguments, on PYTHONPATH') from None
 
 
-def coasting_speed_rad_s(case: Case) -> float:
-    """The speed of both wheels from which they coast down to the case's speed at the start of braking."""
-    plant = Plant(case.plant, case.plant_values())
-    speed = case.start_speed_rad_s
-    for _ in range(8):
-        plant.reset(omega1_rad_s=speed, omega2_rad_s=speed)
-        plant.advance(COAST_S)
-        speed += case.start_speed_rad_s - plant.state.omega2_rad_s
-    return speed
-
-
 def _runs(entry: Entry, cases: Sequence[Case], seeds: Sequence[int]) -> list[dict[str, Any]]:
     nominal: dict[str, dict[str, Value]] = {}
     runs = []
@@ -58,7 +46,7 @@ def _runs(entry: Entry, cases: Sequence[Case], seeds: Sequence[int]) -> list[dic
         if case.plant not in nominal:
             nominal[case.plant] = {name: row['value'] for name, row in keys(plant=case.plant).items()}
         values: dict[str, Value] = {
-            **case.values(nominal[case.plant]), 'experiment.start_speed_rad_s': coasting_speed_rad_s(case),
+            **case.values(nominal[case.plant]), 'experiment.start_speed_rad_s': coasted(case)[0],
                   'experiment.coast_s': COAST_S, 'experiment.end_speed_m_s': END_SPEED_M_S, **entry.settings}
         runs += [{'controller': entry.name, 'plant': case.plant, 'experiment': EXPERIMENT, 'seed': seed, 'set': values}
                  for seed in seeds]
@@ -103,6 +91,7 @@ class Score:
     locked: int = field(metadata=_column('locked'))
     excess_mean: float = field(metadata=_column('excess mean %', 1, 100.0))
     excess_p90: float = field(metadata=_column('90 % %', 1, 100.0))
+    excess_p95: float = field(metadata=_column('95 % %', 1, 100.0))
     excess_worst: float = field(metadata=_column('worst %', 1, 100.0))
     worst_case: str
     variation_median_Nm: float = field(metadata=_column('variation median N m'))
@@ -139,13 +128,14 @@ def _score(group: str, rows: Sequence[Mapping[str, Any]]) -> Score:
         return float(function(values)) if len(values) else math.nan
 
     return Score(group, len(rows), int((~sound).sum()), sum(row['time_locked_s'] > 0 for row in rows),
-                 of(excess[sound], np.mean), of(excess[sound], lambda e: np.percentile(e, 90)), of(excess[sound], np.max),
+                 of(excess[sound], np.mean), of(excess[sound], lambda e: np.percentile(e, 90)),
+                 of(excess[sound], lambda e: np.percentile(e, 95)), of(excess[sound], np.max),
                  str(rows[worst]['case']), of(variation, np.median), of(variation, np.max),
                  of(np.array([row[OVERSHOOT] for row in rows])[sound], np.max),
                  of(np.array([row['slip_largest'] for row in rows])[sound], np.max), of(adhesion, np.mean))
 
 
-def run(entry: Entry, cases: Sequence[Case], bounds: Mapping[str, Mapping[str, float]], seeds: Sequence[int] = (1, 2),
+def run(entry: Entry, cases: Sequence[Case], bounds: Mapping[str, Mapping[str, float]], seeds: Sequence[int] = SEEDS,
         threads: int = 0) -> Result:
     """Scores a controller. Raises ValueError if it cannot run, or a case has no bound."""
     for case in cases:
