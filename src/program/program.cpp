@@ -129,7 +129,8 @@ int program::run_program(int argc, char** argv, std::span<const control::Control
   const runtime::EarlyEndWatch end_by_own_decision;
   // Messages go to stderr; stdout carries results.
   spdlog::set_default_logger(spdlog::stderr_color_mt("abs_hil"));
-  spdlog::set_pattern("%n: %^%l%$: %v");
+  // On a terminal a message takes the place of a line that shows progress; that is drawn again below it.
+  spdlog::set_pattern(isatty(STDERR_FILENO) == 1 ? "\r\x1b[K%n: %^%l%$: %v" : "%n: %^%l%$: %v");
   return with_stdout(checked(argc, argv, own));
 }
 

@@ -71,7 +71,7 @@ Cells median_cells(const ComparisonTable& table) {
 }
 
 Cells difference_cells(const ComparisonTable& table) {
-  return cells_of(table, fmt::format("less {}", name_of(table, 0)), 1,
+  return cells_of(table, fmt::format("difference from {}", name_of(table, 0)), 1,
                   [](const ControllerColumn& column, std::size_t m, int decimals) {
                     return shown(column.differences[m], column.runs, decimals, true);
                   });

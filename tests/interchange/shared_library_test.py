@@ -114,7 +114,7 @@ class SharedLibraryTest(ProgramTest):
         library = self.example()
         result = self.run_program('compare', '--controllers', f'pi,c={library}', '--repeat', 2)
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertIn('less pi', result.stdout)
+        self.assertIn('difference from pi', result.stdout)
 
 
 if __name__ == '__main__':
