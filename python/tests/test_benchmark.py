@@ -220,12 +220,15 @@ def test_anybody_can_check_a_result(tmp_path, capsys):
         return status, ''.join(capsys.readouterr())
     for change, words in ((lambda d: d['controllers'][0]['runs'][3].update(stop_distance_m=9.0), 'stop_distance_m is 9.0'),
                           (lambda d: d['controllers'][0]['scores'][-1].update(excess_mean=0.001), 'all: excess_mean is 0.001'),
+                          (lambda d: d['controllers'][0]['scores'].append(d['controllers'][0]['scores'][-1]), 'one score each'),
                           (lambda d: d['controllers'][0]['settings'].clear(), 'differences from fresh runs'),
                           (lambda d: d.update(bounds='0'), 'checksum of the bounds'),
                           (lambda d: d.update(whole=True), 'has not all runs')):
         status, text = verdict(change)
         assert status == 1 and words in text, words
     for change, words in ((lambda d: d.update(version=1), 'version 1'), (lambda d: d.pop('controllers'), 'no result'),
+                          (lambda d: d['controllers'][0]['scores'].append(1), 'no result'),
+                          (lambda d: d['controllers'][0]['runs'][0].update(seed=float('inf')), 'no result'),
                           (lambda d: d['controllers'][0]['runs'][0].update(case='mine'), 'not of the set')):
         status, text = verdict(change)
         assert status == 2 and words in text, words

@@ -35,10 +35,10 @@ def verified(path: pathlib.Path, threads: int = 0) -> list[str]:
     try:
         document = parse_json(path.read_text(encoding='utf-8'))
         version, stated = document['version'], (document['set'], document['bounds'])
-        entries = [(Entry(str(one['name']), dict(one['settings'])), list(one['runs']), list(one['scores']))
-                   for one in document['controllers']]
+        entries = [(Entry(str(one['name']), dict(one['settings'])), [dict(row) for row in one['runs']],
+                    [dict(score) for score in one['scores']]) for one in document['controllers']]
         keys = [[(str(row['case']), int(row['seed'])) for row in rows] for _, rows, _ in entries]
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         raise ValueError(f'{path}: no result of the benchmark; give a file that --json has written') from None
     if version != cases.VERSION:
         raise ValueError(f'{path}: of version {version} of the benchmark, this is version {cases.VERSION}')
@@ -59,7 +59,10 @@ def verified(path: pathlib.Path, threads: int = 0) -> list[str]:
         fresh = run(entry, chosen, known, seeds, threads)
         for stored, row in zip(rows, fresh.rows):
             found += _differences(f'{entry.name}, {row["case"]}, seed {row["seed"]}', stored, row)
-        for score in fresh.scores:
-            same = [one for one in scores if one.get('group') == score.group]
-            found += _differences(f'{entry.name}, group {score.group}', same[0] if same else {}, score.as_row())
+        groups = [score.group for score in fresh.scores]
+        if [score.get('group') for score in scores] != groups:
+            found.append(f'{entry.name}: the file has not one score each for the groups {", ".join(groups)}')
+            continue
+        for stored, score in zip(scores, fresh.scores):
+            found += _differences(f'{entry.name}, group {score.group}', stored, score.as_row())
     return found
