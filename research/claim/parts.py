@@ -9,7 +9,7 @@ from abs_hil.core import _core
 from abs_hil.options import options
 from abs_hil.simulation import simulate
 
-from .criteria import PLANTS, slip_velocity_gain
+from .criteria import PLANTS, SLIP_REF, slip_velocity_gain
 from .laws import PAPER_GAINS, Entry, run_entries
 from .statistics import ratio_interval
 
@@ -19,8 +19,6 @@ NO_Q = {'control.adaptive.q11': 1e-9, 'control.adaptive.q22': 1e-9}
 LARGE_Q = {'control.adaptive.q11': 170.0, 'control.adaptive.q22': 170.0}
 #: so small a weight that the innovation is nothing
 NO_INNOVATION = {'control.adaptive.ka1': 1e-6}
-#: phi at the wanted slip of 0.15 on Table 1's tyre
-PHI = 0.78
 #: by then `locked` has the wheel standing; and a time at which all still brake, s
 STANDS_S, BRAKES_S = 0.4, 1.1
 
@@ -79,7 +77,8 @@ def lyapunov_share() -> float:
     values = {row['name']: row['value'] for row in _core.keys(options(plant='paper-table1', controller='adaptive'))}
     gains = {name: float(values[f'control.adaptive.{name}']) for name in ('q11', 'ks0', 'ka1')}
     k = slip_velocity_gain('paper-table1')
-    return k * k * PHI * gains['q11'] / (gains['ks0'] ** 2 * gains['ka1'])
+    phi = float(np.sin(values['plant.C'] * np.arctan(values['plant.B'] * SLIP_REF)))  # (10)
+    return k * k * phi * gains['q11'] / (gains['ks0'] ** 2 * gains['ka1'])
 
 
 def slowing(entry: Entry) -> tuple[float, float]:
