@@ -70,6 +70,14 @@ def lease(service, emulator):
         wait_until(lambda: service.said().count('lease ended') > ended, 'the lease did not end')
 
 
+def enough(measure):
+    """The times of `measure`, repeated until there are at least TRIES."""
+    times = []
+    while len(times) < TRIES:
+        times += measure()
+    return times
+
+
 class ForeignWriter:
     """Another process with a handle on the card."""
 
@@ -140,21 +148,14 @@ class ZeroUnlessCovered(HostileTest):
             return [self.foreign_duty(emulator, writer, n % 2) for n in range(2 * TRIES)]
 
         def granted():
-            times = []
-            for _ in range(TRIES):
-                with lease(service, emulator):
-                    times += [self.foreign_duty(emulator, writer, pwm) for pwm in (0, 1)]
-            return times
-        for what, measure in (('without', no_lease), ('granted, not covered', granted), ('after a lease', no_lease)):
+            with lease(service, emulator):
+                return [self.foreign_duty(emulator, writer, pwm) for pwm in (0, 1)]
+        for what, measure in (('without a lease', no_lease), ('granted, not covered', lambda: enough(granted)),
+                              ('after a lease', no_lease)):
             self.hold(measure, f'foreign duty {what}', 20)
 
     def test_foreign_duty_while_commission_asks_a_person_to_turn_a_wheel(self):
-        def measure():
-            times = []
-            while len(times) < TRIES:
-                times += self.duties_while_commission_asks()
-            return times
-        self.hold(measure, 'foreign duty while commission waits for a person', 20)
+        self.hold(lambda: enough(self.duties_while_commission_asks), 'foreign duty while commission waits for a person', 20)
 
     def duties_while_commission_asks(self):
         emulator = self.emulator()
@@ -178,12 +179,7 @@ class ZeroUnlessCovered(HostileTest):
         return times
 
     def test_holder_that_stops_before_the_cover_is_ended(self):
-        def measure():
-            times = []
-            while len(times) < TRIES:
-                times += self.duties_while_the_holder_is_stopped()
-            return times
-        self.hold(measure, 'foreign duty, holder stopped', 20)
+        self.hold(lambda: enough(self.duties_while_the_holder_is_stopped), 'foreign duty, holder stopped', 20)
 
     def duties_while_the_holder_is_stopped(self):
         emulator = self.emulator()
