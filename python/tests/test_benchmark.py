@@ -228,6 +228,8 @@ def test_anybody_can_check_a_result(tmp_path, capsys):
         assert status == 1 and words in text, words
     for change, words in ((lambda d: d.update(version=1), 'version 1'), (lambda d: d.pop('controllers'), 'no result'),
                           (lambda d: d['controllers'][0]['scores'].append(1), 'no result'),
+                          (lambda d: d['controllers'][0]['runs'].clear(), 'has no runs'),
+                          (lambda d: d['controllers'][0].update(name='nobody'), 'nobody'),
                           (lambda d: d['controllers'][0]['runs'][0].update(seed=float('inf')), 'no result'),
                           (lambda d: d['controllers'][0]['runs'][0].update(case='mine'), 'not of the set')):
         status, text = verdict(change)

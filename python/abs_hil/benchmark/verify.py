@@ -51,6 +51,8 @@ def verified(path: pathlib.Path, threads: int = 0) -> list[str]:
         found += [f'{entry.name}: the file says that it is whole, and has not all runs of the set'
                   for (entry, _, _), own in zip(entries, keys) if own != complete]
     for (entry, rows, scores), own in zip(entries, keys):
+        if not own:
+            raise ValueError(f'{path}: {entry.name} has no runs')
         names, seeds = list(dict.fromkeys(key for key, _ in own)), list(dict.fromkeys(seed for _, seed in own))
         chosen = [case for case in every if case.key in names]
         if [(case.key, seed) for case in chosen for seed in seeds] != own:
