@@ -34,6 +34,8 @@ QUANTITIES = _table('quantities.json', 'name')
 REASONS = _table('reasons.json', 'number')
 #: names of the values of the field `phase`, as in the CSV
 PHASES: tuple[str, ...] = tuple(QUANTITIES['phase']['values'])
+#: a controller has at most this many signals of its own
+MOST_SIGNALS = 8
 
 _BY_FINGERPRINT = {type_._get_packed_fingerprint(): type_ for type_ in TYPES.values()}
 

@@ -37,6 +37,9 @@ class McapFile:
     def has(self, topic: str) -> bool:
         return topic in self._channels
 
+    def wants(self, topic: str) -> bool:
+        return True
+
     def write(self, topic: str, time_ns: int, data: bytes) -> None:
         self._writer.add_message(channel_id=self._channels[topic], log_time=time_ns, publish_time=time_ns, data=data,
                                  sequence=self._sequence[topic])

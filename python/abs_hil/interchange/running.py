@@ -1,14 +1,14 @@
-"""Records a running experiment into MCAP."""
+"""The messages of a running experiment as topics for other tools, and their recording into MCAP."""
 from __future__ import annotations
 
 import math
 import re
 import time
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import Any, Protocol
 
 from ..core import _core
-from ..messages import QUANTITIES, decode, row_of
+from ..messages import MOST_SIGNALS, QUANTITIES, decode, row_of
 from ..run import COLUMNS
 from . import messages
 from .mcap_file import McapFile
@@ -16,6 +16,8 @@ from .recorded import CYCLE_TOPIC, CYCLE_TYPE, EVENT_TOPIC, SIGNALS_TOPIC, SIGNA
 from .source import LEVELS, comment
 
 STATUS_TOPIC, STATUS_TYPE = '/abs_hil/status', 'abs_hil/msg/Status'
+#: ROS 2's stamps hold no later time
+LAST_NS = (2 ** 31 - 1) * 10 ** 9
 
 
 def received(url: str, prefix: str, idle_s: float | None, seconds: float | None) -> Iterator[tuple[str, Any]]:
@@ -39,15 +41,78 @@ def received(url: str, prefix: str, idle_s: float | None, seconds: float | None)
             yield packet[0][len(prefix):], None
 
 
-class Recorder:
-    """Puts messages into a file."""
+class Topics(Protocol):
+    """Where messages go: McapFile, or the channels of a server."""
 
-    def __init__(self, mcap: McapFile) -> None:
-        self._mcap = mcap
-        self._mcap.add_struct(CYCLE_TOPIC, CYCLE_TYPE, [(name, comment(name)) for name in COLUMNS])
+    def add_struct(self, topic: str, type_name: str, fields: Sequence[tuple[str, str]]) -> None: ...
+    def has(self, topic: str) -> bool: ...
+    def wants(self, topic: str) -> bool: ...
+    def write(self, topic: str, time_ns: int, data: bytes) -> None: ...
+    def log(self, topic: str, time_ns: int, level: int, name: str, text: str) -> None: ...
+
+
+class Translator:
+    """Puts LCM's messages into topics."""
+
+    def __init__(self, topics: Topics) -> None:
+        self._topics = topics
+        self._topics.add_struct(CYCLE_TOPIC, CYCLE_TYPE, [(name, comment(name)) for name in COLUMNS])
         self._last_ns = 0  # Unix time of the last row
         self._offset_ns: int | None = None  # from the run's clock to Unix time
+        self._names = ''
         self._signals: list[str] = []
+        self._cycle = -1
+
+    def translate(self, message: Any) -> None:
+        handler = getattr(self, f'_{type(message).__name__}', None)
+        if handler is not None:
+            handler(message)
+
+    def _time_ns(self, stamp_ns: int) -> int:
+        """Unix time: that of the arrival of a run's first cycle, then the run's own clock."""
+        if self._offset_ns is None:
+            self._offset_ns = time.time_ns() - stamp_ns
+        return max(0, min(stamp_ns + self._offset_ns, LAST_NS))
+
+    def _telemetry_t(self, message: Any) -> None:
+        if message.cycle <= self._cycle:
+            self._offset_ns = None  # another run, perhaps of another computer
+        self._cycle = message.cycle
+        self._last_ns = self._time_ns(message.stamp_ns)
+        if message.names != self._names:
+            self._names = message.names
+            self._signals = [name for name in row_of(message) if name not in QUANTITIES and _core.is_signal_name(name)
+                             and name not in message.__slots__][:MOST_SIGNALS]
+            if self._signals:
+                self._topics.add_struct(SIGNALS_TOPIC, SIGNALS_TYPE, [(name, comment(name)) for name in self._signals])
+        wanted = [self._topics.wants(topic) for topic in (CYCLE_TOPIC, SIGNALS_TOPIC)]
+        if not any(wanted):
+            return
+        row = row_of(message)
+        if wanted[0]:
+            self._topics.write(CYCLE_TOPIC, self._last_ns, messages.row([float(row.get(name, math.nan)) for name in COLUMNS]))
+        values = [float(row.get(name, math.nan)) for name in self._signals]
+        if wanted[1] and not all(map(math.isnan, values)):
+            self._topics.write(SIGNALS_TOPIC, self._last_ns, messages.row(values))
+
+    def _status_t(self, message: Any) -> None:
+        values = {name: float(getattr(message, name)) for name in message.__slots__}
+        if not self._topics.has(STATUS_TOPIC):
+            self._topics.add_struct(STATUS_TOPIC, STATUS_TYPE,
+                                    [(name, comment(name) if name in QUANTITIES else '') for name in values])
+        self._topics.write(STATUS_TOPIC, self._time_ns(message.stamp_ns), messages.row(list(values.values())))
+
+    def _event_t(self, message: Any) -> None:
+        text = message.message or message.reason_text
+        self._topics.log(EVENT_TOPIC, self._time_ns(message.stamp_ns), LEVELS.get(message.kind, 20), message.kind, text)
+
+
+class Recorder(Translator):
+    """Puts messages into a file, and counts what is missing."""
+
+    def __init__(self, mcap: McapFile) -> None:
+        super().__init__(mcap)
+        self._mcap = mcap
         self._sequence: dict[str, int] = {}
         self.experiment: Any = None
         self.rows = 0
@@ -64,9 +129,10 @@ class Recorder:
             if before is not None and message.sequence > before + 1:
                 self.lost += message.sequence - before - 1
             self._sequence[channel] = message.sequence
-        handler = getattr(self, f'_{kind}', None)
-        if handler is not None:
-            handler(message)
+        self.rows += kind == 'telemetry_t'
+        if kind == 'experiment_t':
+            self.experiment = message
+        self.translate(message)
 
     def finish(self) -> None:
         if self.experiment is not None:
@@ -76,37 +142,3 @@ class Recorder:
         self._mcap.describe('abs_hil', {'source': 'live', 'rows': str(self.rows), 'lost_messages': str(self.lost),
                                         'damaged_messages': str(self.damaged), **facts})
         self._mcap.finish()
-
-    def _time_ns(self, stamp_ns: int) -> int:
-        """Unix time: that of the first message's arrival, then the run's own clock."""
-        if self._offset_ns is None:
-            self._offset_ns = time.time_ns() - stamp_ns
-        return stamp_ns + self._offset_ns
-
-    def _telemetry_t(self, message: Any) -> None:
-        row = row_of(message)
-        self._last_ns = self._time_ns(message.stamp_ns)
-        self._mcap.write(CYCLE_TOPIC, self._last_ns, messages.row([float(row.get(name, math.nan)) for name in COLUMNS]))
-        self.rows += 1
-        if not self._signals:
-            self._signals = [name for name in row if name not in QUANTITIES and _core.is_signal_name(name)
-                             and name not in message.__slots__]
-            if self._signals:
-                self._mcap.add_struct(SIGNALS_TOPIC, SIGNALS_TYPE, [(name, comment(name)) for name in self._signals])
-        values = [float(row.get(name, math.nan)) for name in self._signals]
-        if not all(map(math.isnan, values)):
-            self._mcap.write(SIGNALS_TOPIC, self._last_ns, messages.row(values))
-
-    def _status_t(self, message: Any) -> None:
-        values = {name: float(getattr(message, name)) for name in message.__slots__}
-        if not self._mcap.has(STATUS_TOPIC):
-            self._mcap.add_struct(STATUS_TOPIC, STATUS_TYPE,
-                                  [(name, comment(name) if name in QUANTITIES else '') for name in values])
-        self._mcap.write(STATUS_TOPIC, self._time_ns(message.stamp_ns), messages.row(list(values.values())))
-
-    def _event_t(self, message: Any) -> None:
-        text = message.message or message.reason_text
-        self._mcap.log(EVENT_TOPIC, self._time_ns(message.stamp_ns), LEVELS.get(message.kind, 20), message.kind, text)
-
-    def _experiment_t(self, message: Any) -> None:
-        self.experiment = message

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from ..core import _core
-from ..messages import QUANTITIES, decode
+from ..messages import MOST_SIGNALS, QUANTITIES, decode
 from . import force
-from .history import COLUMNS, DERIVED_PLACE, OWN, PLACE, WIDTH, History, bin_numbers
+from .history import COLUMNS, DERIVED_PLACE, PLACE, WIDTH, History, bin_numbers
 from .runs import MOST_RUNS, MOST_TEXT, RunFacts
 
 Packet = tuple[str, bytes]
@@ -39,6 +39,7 @@ class Feed:
         self.history = history
         self.runs: dict[int, RunFacts] = {}
         self.listeners: list[Listener] = []
+        self.message_listeners: list[Callable[[Any], None]] = []  # each gets every message as it came
         self.damaged = 0
         self._prefix = prefix
         self._rows: list[tuple[float, ...]] = []
@@ -69,6 +70,8 @@ class Feed:
         except ValueError:
             self.damaged += 1
             return
+        for listener in self.message_listeners:
+            listener(message)
         kind = type(message).__name__
         if kind == 'telemetry_t':
             self._cycle(message)
@@ -97,7 +100,7 @@ class Feed:
             self._flush()
             self._names = names
             if self._run is not None:
-                self._run.own = tuple(name for name in names.split(',') if name and name not in PLACE)[:OWN]
+                self._run.own = tuple(name for name in names.split(',') if name and name not in PLACE)[:MOST_SIGNALS]
         if self._early and self._run is not None:
             for handler, early in self._early.items():
                 getattr(self._run, handler)(early)

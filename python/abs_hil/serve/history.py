@@ -6,18 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..messages import QUANTITIES
+from ..messages import MOST_SIGNALS, QUANTITIES
 
 #: length of a bin: 50 a second
 BIN_S = 0.02
-#: a controller has at most this many signals of its own
-OWN = 8
 #: what the server itself computes (force.py)
 DERIVED = ('tyre_slip', 'tyre_force_N')
 #: columns of the quantities; then come the places of a controller's own signals, then DERIVED
 COLUMNS = tuple(QUANTITIES)
 PLACE = {name: place for place, name in enumerate(COLUMNS)}
-WIDTH = len(COLUMNS) + OWN + len(DERIVED)
+WIDTH = len(COLUMNS) + MOST_SIGNALS + len(DERIVED)
 DERIVED_PLACE = WIDTH - len(DERIVED)
 #: 10 minutes of bins; 2 minutes of cycles at 1 kHz
 BINS, ROWS = 30_000, 120_000

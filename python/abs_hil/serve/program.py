@@ -14,7 +14,7 @@ from .feed import Feed, Live, Played
 from .history import BIN_S, History
 from .server import Command, Server, is_loopback
 
-PORT = 8265
+PORT, FOXGLOVE_PORT = 8265, 8765
 COMMANDS = ('stop', 'start', 'continue', 'slip-ref', 'gain')
 ANSWER_S = 3.0
 
@@ -34,7 +34,15 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument('--port', type=int, default=PORT, help='port to listen at; 0: any free one (default: %(default)d)')
     p.add_argument('--commands', metavar='KEYFILE', help='the page may send what `abs_hil send` may, with this key '
                    '(commands.key_file of the run); the link has a token')
+    p.add_argument('--foxglove', nargs='?', const=FOXGLOVE_PORT, type=_port, metavar='PORT', help='serve Foxglove, Lichtblick '
+                   'and PlotJuggler too (foxglove.sdk.v1), always at 127.0.0.1 (default: %(const)d; 0: any free one)')
     return p
+
+
+def _port(text: str) -> int:
+    if not text.isdecimal() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f'"{text}" is no number in [0, 65535]; LOG stands before --foxglove')
+    return int(text)
 
 
 def main(arguments: list[str]) -> int:
@@ -47,6 +55,9 @@ def main(arguments: list[str]) -> int:
     except ValueError as error:
         print(f'abs_serve: {error}', file=sys.stderr)
         return 2
+    except ImportError as error:
+        print(f'abs_serve: {error}', file=sys.stderr)
+        return 3
     except OSError as error:
         print(f'abs_serve: {error}', file=sys.stderr)
         return 3
@@ -63,6 +74,8 @@ def _source(given: Any) -> Live | Played:
         raise ValueError('--commands belongs to a running experiment, not to LOG')
     if not 0 <= given.speed <= 1000:
         raise ValueError(f'--speed {given.speed:g}: give a number in [0, 1000]')
+    if given.foxglove is not None and given.speed == 0:
+        raise ValueError('--foxglove shows what comes while it is looked at: give --speed above 0')
     place = pathlib.Path(given.log)
     place = place / 'run.lcmlog' if place.is_dir() else place
     if not place.is_file():
@@ -89,12 +102,19 @@ async def _serve(given: Any, source: Live | Played) -> int:
     token = secrets.token_urlsafe(24) if given.commands is not None or not is_loopback(given.host) else ''
     shown = given.log or given.lcm_url or 'LCM'
     server = Server(feed, given.host, given.port, token, shown, _sender(given) if given.commands is not None else None)
+    foxglove = None
+    if given.foxglove is not None:
+        from .foxglove import Foxglove
+        foxglove = Foxglove(given.foxglove)
+        feed.message_listeners.append(foxglove.translate)
     try:
         await server.start()
     except OSError as error:
         raise OSError(f'cannot listen at {given.host}, port {given.port}: {error.strerror}; give another --host or '
                       '--port') from None
     print(f'abs_hil serve: {server.link}', flush=True)
+    if foxglove is not None:
+        print(f'abs_hil serve: for Foxglove, Lichtblick, PlotJuggler: {foxglove.link}', flush=True)
     end: asyncio.Future[int] = asyncio.get_running_loop().create_future()
 
     def finish(number: int) -> None:
@@ -109,3 +129,5 @@ async def _serve(given: Any, source: Live | Played) -> int:
         return end.result()
     finally:
         await server.stop()
+        if foxglove is not None:
+            foxglove.stop()

@@ -1,0 +1,78 @@
+"""The same messages as an MCAP file's (interchange/running.py), live, for Foxglove, Lichtblick and PlotJuggler: the protocol
+foxglove.sdk.v1 by the package foxglove-sdk, whose threads are this process's only."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from ..interchange import messages
+from ..interchange.recorded import EVENT_TOPIC
+from ..interchange.running import Translator
+
+#: the protocol knows no token, so other computers get in by ssh only
+HOST = '127.0.0.1'
+#: messages that wait for one viewer, 8 s at 1 kHz; the oldest give way
+BACKLOG = 8192
+#: the package keeps a closed channel's object, so a hostile network may not open ever more
+MOST_CHANNELS = 1000
+
+
+class Foxglove(Translator):
+    """Serves from now on. Raises ImportError without the package, OSError if the port cannot be used."""
+
+    def __init__(self, port: int) -> None:
+        self._channels = Channels(port)
+        super().__init__(self._channels)
+        self._channels.add(EVENT_TOPIC, messages.LOG_TYPE, messages.LOG_DEFINITION)  # now, so that a viewer gets the first one
+        self.link = f'ws://{HOST}:{self._channels.server.port}'
+
+    def stop(self) -> None:
+        self._channels.server.stop()
+
+
+class Channels:
+    """The topics of one server."""
+
+    def __init__(self, port: int) -> None:
+        try:
+            import foxglove
+        except ImportError as error:
+            raise ImportError(f'--foxglove needs the Python package foxglove-sdk ({error}): pip install foxglove-sdk, or '
+                              'scripts/setup_python.sh in the source folder') from None
+        self._package: Any = foxglove
+        self._context: Any = foxglove.Context()
+        self._channels: dict[str, Any] = {}
+        self._made = 0
+        try:
+            # Without capabilities: a client can send nothing but what it wants to see.
+            self.server: Any = foxglove.start_server(name='abs_hil', host=HOST, port=port, capabilities=[],
+                                                     context=self._context, message_backlog_size=BACKLOG)
+        except RuntimeError as error:
+            raise OSError(f'--foxglove cannot listen at {HOST}, port {port}: {error}; give another port') from None
+
+    def add_struct(self, topic: str, type_name: str, fields: Sequence[tuple[str, str]]) -> None:
+        self.add(topic, type_name, messages.definition(fields))
+
+    def has(self, topic: str) -> bool:
+        return topic in self._channels
+
+    def wants(self, topic: str) -> bool:
+        """Whether any viewer has asked for it."""
+        return topic in self._channels and bool(self._channels[topic].has_sinks())
+
+    def write(self, topic: str, time_ns: int, data: bytes) -> None:
+        if topic in self._channels:
+            self._channels[topic].log(data, log_time=time_ns)
+
+    def log(self, topic: str, time_ns: int, level: int, name: str, text: str) -> None:
+        self.write(topic, time_ns, messages.log(time_ns, level, name, text))
+
+    def add(self, topic: str, type_name: str, definition: str) -> None:
+        """A topic that exists already gets another definition."""
+        if topic in self._channels:
+            self._channels.pop(topic).close()
+        if self._made == MOST_CHANNELS:
+            return
+        self._made += 1
+        schema = self._package.Schema(name=type_name, encoding='ros2msg', data=definition.encode())
+        self._channels[topic] = self._package.Channel(topic, message_encoding='cdr', schema=schema, context=self._context)
