@@ -82,7 +82,7 @@ install(FILES ${CMAKE_BINARY_DIR}/abs_hilConfig.cmake ${CMAKE_BINARY_DIR}/abs_hi
 
 # Builds what `cmake --install` needs: the programs with their pages and modules, without tests and benchmarks.
 add_custom_target(abs_hil_installed)
-foreach(target abs_hil_programs abs_hil_manual_pages abs_hil_python abs_hil_types_jar abs_hil_spy_jar)
+foreach(target abs_hil_programs abs_hil_manual_pages abs_hil_python abs_hil_types_jar)
   if(TARGET ${target})
     add_dependencies(abs_hil_installed ${target})
   endif()

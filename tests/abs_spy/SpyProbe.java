@@ -10,15 +10,13 @@ import java.nio.file.Files;
 import java.nio.file.Path;
 import java.nio.file.Paths;
 import java.nio.file.StandardCopyOption;
-import javax.swing.AbstractButton;
 import javax.swing.JTable;
 import javax.swing.SwingUtilities;
 
 /**
  * A Java agent for tests: twice a second writes what stands in the windows of the program it is loaded into, lcm-spy's
  * table among it, to the file named as its argument. It only looks. Lines of words with tabs between:
- * window TITLE X Y WIDTH HEIGHT; cell ROW COLUMN TEXT X Y (its middle on the screen); button TEXT ENABLED X Y;
- * other CLASS toString().
+ * window TITLE X Y WIDTH HEIGHT; cell ROW COLUMN TEXT X Y (its middle on the screen).
  */
 public final class SpyProbe {
     public static void premain(String file) {
@@ -65,12 +63,6 @@ public final class SpyProbe {
             Point at = component.getLocationOnScreen();
             if (component instanceof JTable) {
                 describe(out, (JTable) component, at);
-            } else if (component instanceof AbstractButton && ((AbstractButton) component).getText() != null) {
-                AbstractButton button = (AbstractButton) component;
-                line(out, "button", button.getText(), button.isEnabled(), at.x + button.getWidth() / 2,
-                    at.y + button.getHeight() / 2);
-            } else if (component.getClass().getName().startsWith("abs_hil.")) {
-                line(out, "other", component.getClass().getName(), component);
             }
             if (component instanceof Container) {
                 describe(out, (Container) component);
