@@ -1,11 +1,14 @@
-# abs_hil_room(NAME SOURCES ... USES ... PRIVATE ...): the library of one room of the table (cmake/Rooms.cmake). USES
-# names libraries that its headers need, PRIVATE ones that only its sources need.
+# abs_hil_room(NAME SOURCES ... BEYOND_CORE ... USES ... PRIVATE ...): the library of one room of the table
+# (cmake/Rooms.cmake). BEYOND_CORE names sources that do not belong to the simulation core (cmake/Core.cmake): they need the
+# network, a terminal or a library that the core has not. USES names libraries that its headers need, PRIVATE ones that only
+# its sources need.
 #
 # Public headers stand in include/abs_hil/NAME and are included as "abs_hil/NAME/x.hpp"; the others stand beside their
 # sources in src/NAME and are included as "NAME/x.hpp". Each room has an include folder of its own that holds nothing
 # but links to these two. A room's sources see its own and those of the rooms that it may know, and no others: rooms are
 # linked privately, so what a known room knows is not seen.
 include(Rooms)
+include(Core)
 
 option(ABS_HIL_UNITY "Compile the sources of a room together: half the time from scratch, more after a small change" ON)
 set(ABS_HIL_ROOM_FOLDERS ${CMAKE_BINARY_DIR}/rooms)
@@ -42,8 +45,25 @@ function(abs_hil_room_folder room)
   endif()
 endfunction()
 
+# Compiles the sources beyond the core together, but never with one of the core: who links the core alone gets none of their
+# objects, and so none of their libraries.
+function(abs_hil_apart_from_core core beyond)
+  if(NOT beyond)
+    return()
+  endif()
+  set(place 0)
+  foreach(source IN LISTS core)
+    math(EXPR group "${place} / 12")
+    set_source_files_properties(${source} PROPERTIES UNITY_GROUP core_${group})
+    math(EXPR place "${place} + 1")
+  endforeach()
+  set_source_files_properties(${beyond} PROPERTIES UNITY_GROUP beyond_core)
+  set(ABS_HIL_UNITY_MODE GROUP PARENT_SCOPE)
+endfunction()
+
 function(abs_hil_room name)
-  cmake_parse_arguments(ROOM "" "" "SOURCES;USES;PRIVATE" ${ARGN})
+  set(ABS_HIL_UNITY_MODE BATCH)
+  cmake_parse_arguments(ROOM "" "" "SOURCES;BEYOND_CORE;USES;PRIVATE" ${ARGN})
   if(NOT name IN_LIST ABS_HIL_ROOM_NAMES)
     message(FATAL_ERROR "cmake/Rooms.cmake has no room ${name}")
   endif()
@@ -52,12 +72,14 @@ function(abs_hil_room name)
   abs_hil_room_folder(${name})
   set(folder $<BUILD_INTERFACE:${ABS_HIL_ROOM_FOLDERS}/${name}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   if(ROOM_SOURCES)
-    add_library(abs_hil_${name} STATIC ${ROOM_SOURCES})
+    abs_hil_apart_from_core("${ROOM_SOURCES}" "${ROOM_BEYOND_CORE}")
+    add_library(abs_hil_${name} STATIC ${ROOM_SOURCES} ${ROOM_BEYOND_CORE})
     target_link_libraries(abs_hil_${name} PUBLIC ${ROOM_USES}
       PRIVATE $<BUILD_INTERFACE:abs_hil_warnings> ${known} ${ROOM_PRIVATE})
     target_include_directories(abs_hil_${name} PUBLIC ${folder})
     # Several sources at a time: most of a source's cost are the headers that its neighbours need as well.
-    set_target_properties(abs_hil_${name} PROPERTIES UNITY_BUILD ${ABS_HIL_UNITY} UNITY_BUILD_BATCH_SIZE 12)
+    set_target_properties(abs_hil_${name} PROPERTIES UNITY_BUILD ${ABS_HIL_UNITY} UNITY_BUILD_BATCH_SIZE 12
+      UNITY_BUILD_MODE ${ABS_HIL_UNITY_MODE})
     # The Python module is a shared object. Hidden symbols cost the same as without position-independent code.
     set_target_properties(abs_hil_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden
       VISIBILITY_INLINES_HIDDEN ON)

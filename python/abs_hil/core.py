@@ -1,9 +1,11 @@
 """Loads the compiled module abs_hil._core and tells it where the configuration files are."""
 from __future__ import annotations
 
+import importlib
 import pathlib
 import sys
 import sysconfig
+from typing import Any
 
 try:
     from . import _core
@@ -11,7 +13,7 @@ except ImportError as error:  # a build without it, or for another Python
     raise ImportError(f'abs_hil: the compiled module is missing ({error}); build it for this Python '
                       f'({sys.version.split()[0]}): `pip install .` in the source folder') from error
 
-__all__ = ['_core']
+__all__ = ['_core', 'load_network']
 
 
 def _config_dir() -> pathlib.Path | None:
@@ -25,6 +27,16 @@ def _config_dir() -> pathlib.Path | None:
         if folder.is_dir():
             return folder
     return None
+
+
+def load_network(purpose: str) -> Any:
+    """The compiled module abs_hil._network. Raises OSError, which names the purpose, where it is missing."""
+    try:
+        return importlib.import_module('._network', __package__)
+    except ImportError as error:
+        raise OSError(f'{purpose} needs the module abs_hil._network, which this installation lacks ({error}): wheels have the '
+                      'simulator only. On Linux, `pip install .` in the source folder builds it, and the Debian package '
+                      'python3-abs-hil has it; Windows and macOS have no such module') from error
 
 
 if (_folder := _config_dir()) is not None:

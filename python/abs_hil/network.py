@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from .core import _core
+from .core import load_network
 from .messages import decode
 
 
@@ -19,7 +19,7 @@ def live(url: str = '', *, channel: str = 'TELEMETRY', prefix: str = 'ABS_', tim
     Subscribes at once. Messages that are damaged or of another type are left out. Raises OSError without a network and
     ValueError for a URL that is none.
     """
-    subscription = _core.Subscription(url, re.escape(prefix + channel))
+    subscription = load_network('abs_hil.live').Subscription(url, re.escape(prefix + channel))
     return _messages(subscription, timeout_s)
 
 

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, Union
 
-from .core import _core
+from .core import _core, load_network
 
 #: a configuration value as Python has it
 Value = Union[bool, int, float, str]
@@ -33,7 +33,8 @@ def program() -> str:
 @functools.cache
 def _take_controller_files() -> None:
     """Lets controllers come from files: their code runs in a process that lies beside the program."""
-    _core.take_controller_files(program())
+    for ending, maker in load_network('a controller from a file').controller_files(program()).items():
+        _core.take_controller_files(ending, maker)
 
 
 def text_of(value: Value) -> str:

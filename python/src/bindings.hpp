@@ -19,7 +19,6 @@ void add_files(py::module_& module);
 void add_fmus(py::module_& module);
 void add_identification(py::module_& module);
 void add_identification_filter(py::module_& module);
-void add_network(py::module_& module);
 void add_plant(py::module_& module);
 void add_simulation(py::module_& module);
 void add_studies(py::module_& module);

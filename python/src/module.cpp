@@ -1,4 +1,5 @@
-// abs_hil._core: the C++ that the Python package is made of. Its docstrings are those of the package around it.
+// abs_hil._core: the C++ that the Python package is made of, which is the simulation core (cmake/Core.cmake). Its
+// docstrings are those of the package around it.
 
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -13,7 +14,6 @@
 #include "files/result_file.hpp"
 #include "run_folder/run_folder.hpp"
 #include "telemetry/event_log.hpp"
-#include "telemetry/lcm_outlet.hpp"
 
 namespace {
 
@@ -30,8 +30,6 @@ void translate(std::exception_ptr error) {
   } catch (const run_folder::FolderError& e) {
     PyErr_SetString(PyExc_ValueError, e.what());
   } catch (const files::FileError& e) {
-    PyErr_SetString(PyExc_OSError, e.what());
-  } catch (const telemetry::LcmError& e) {
     PyErr_SetString(PyExc_OSError, e.what());
   } catch (const driver::Unavailable& e) {
     PyErr_SetString(PyExc_OSError, e.what());
@@ -58,6 +56,5 @@ PYBIND11_MODULE(_core, module) {
   python::add_fmus(module);
   python::add_identification(module);
   python::add_identification_filter(module);
-  python::add_network(module);
   python::add_tables(module);
 }

@@ -1,21 +1,37 @@
-// Messages of a running rig, and commands to it.
+// abs_hil._network: what the simulation core has not. Messages of a running rig, commands to it, and controllers from
+// shared libraries and FMUs. Wheels have no such module.
 
 #include <poll.h>
+#include <pybind11/pybind11.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <deque>
+#include <exception>
+#include <span>
 #include <string>
 #include <utility>
 
-#include "bindings.hpp"
 #include "commands/authority.hpp"
 #include "commands/sender.hpp"
+#include "interchange/foreign_controller.hpp"
+#include "interchange/hosted_code.hpp"
+#include "telemetry/lcm_outlet.hpp"
 #include "telemetry/lcm_url.hpp"
 #include "telemetry/receiver.hpp"
 
-namespace abs_hil::python {
-
 namespace {
+
+namespace py = pybind11;
+using namespace abs_hil;
+
+void translate(std::exception_ptr error) {
+  try {
+    if (error) std::rethrow_exception(error);
+  } catch (const telemetry::LcmError& e) {
+    PyErr_SetString(PyExc_OSError, e.what());
+  }
+}
 
 /// Channels of an LCM network. Used by one thread.
 class Subscription {
@@ -80,9 +96,22 @@ py::tuple send_command(const std::string& command, const std::string& name, doub
   return py::make_tuple(reply.outcome == commands::Outcome::accepted, reply.message);
 }
 
+/// Controllers from files run in a process that lies beside the program. @param program  path of abs_hil
+/// @return {ending of the files: what makes the controller}, for the registry of abs_hil._core, which is another one
+py::dict controller_files(const std::string& program) {
+  interchange::set_host_beside(program);
+  py::dict makers;
+  for (const control::ControllerFiles& files : interchange::foreign_controllers()) {
+    makers[py::str(files.ending.data(), files.ending.size())] = py::capsule(reinterpret_cast<void*>(files.make));
+  }
+  return makers;
+}
+
 }  // namespace
 
-void add_network(py::module_& module) {
+PYBIND11_MODULE(_network, module) {
+  module.doc() = "What the package abs_hil needs for a network. Use the package abs_hil.";
+  py::register_local_exception_translator(&translate);
   py::class_<Subscription>(module, "Subscription")
       .def(py::init<const std::string&, const std::string&>(), py::arg("url"), py::arg("channels"))
       .def("next", &Subscription::next, py::arg("timeout_s"))
@@ -92,6 +121,5 @@ void add_network(py::module_& module) {
              py::arg("prefix"), py::arg("key_file"), py::arg("timeout_s"));
   module.def(
       "check_key", [](const std::string& file) { static_cast<void>(commands::read_key(file)); }, py::arg("file"));
+  module.def("controller_files", &controller_files, py::arg("program"));
 }
-
-}  // namespace abs_hil::python

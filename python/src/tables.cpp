@@ -3,6 +3,7 @@
 
 #include <pybind11/stl.h>
 
+#include <set>
 #include <string>
 
 #include "abs_hil/control/registry.hpp"
@@ -12,8 +13,6 @@
 #include "config/config_file.hpp"
 #include "config/key_table.hpp"
 #include "config/library.hpp"
-#include "interchange/foreign_controller.hpp"
-#include "interchange/hosted_code.hpp"
 
 namespace abs_hil::python {
 
@@ -86,17 +85,19 @@ double max_brake_torque_Nm(const py::dict& arguments) {
   return rig::brake_torque_at(s.plant.rig.brake, s.gate.brake_duty_max);
 }
 
-/// From now on controllers may come from shared libraries and FMUs. @param program  path of abs_hil
-void take_controller_files(const std::string& program) {
-  interchange::set_host_beside(program);
-  interchange::register_foreign_controllers();
+/// From now on controllers may come from files with this ending. @param maker  of abs_hil._network
+void take_controller_files(const std::string& ending, const py::capsule& maker) {
+  static std::set<std::string> endings;
+  control::register_controller_files(
+      {*endings.insert(ending).first,
+       reinterpret_cast<decltype(control::ControllerFiles::make)>(maker.get_pointer<void>())});
 }
 
 }  // namespace
 
 void add_tables(py::module_& module) {
   module.def("controllers", &controllers);
-  module.def("take_controller_files", &take_controller_files, py::arg("program"));
+  module.def("take_controller_files", &take_controller_files, py::arg("ending"), py::arg("maker"));
   module.def("plants", &plants);
   module.def("experiments", &experiments);
   module.def("figures", &figures);

@@ -1,4 +1,5 @@
 """Results of the Python programs are whole or absent, and never take the place of what is no regular file."""
+import hashlib
 import os
 import pathlib
 import stat
@@ -8,6 +9,7 @@ import sys
 import pytest
 
 import abs_hil
+from abs_hil.core import _core
 from abs_hil.files import write_text, write_whole
 
 LONG = 'n' * 300
@@ -67,6 +69,20 @@ def test_a_changed_run_folder_is_refused_by_the_name_of_the_file(tmp_path, abs_h
     report = subprocess.run([sys.executable, '-c', 'from abs_hil.programs import report; report()', str(tmp_path / 'run'),
                              '--output', str(tmp_path / 'report.html')], capture_output=True, text=True)
     assert report.returncode == 2 and 'summary.json' in report.stderr and not (tmp_path / 'report.html').exists()
+
+
+def test_the_checksums_of_files_of_any_length_are_sha_256(tmp_path):
+    sums = tmp_path / 'SHA256SUMS'
+    names = [(f'{size}.bin', bytes(n * n % 251 for n in range(size))) for size in (*range(200), 262144, 262145)]
+    lines = []
+    for name, content in names:
+        (tmp_path / name).write_bytes(content)
+        lines.append(f'{hashlib.sha256(content).hexdigest()}  {name}\n')
+    sums.write_text(''.join(lines))
+    _core.check_seal(os.fsencode(tmp_path))
+    (tmp_path / '119.bin').write_bytes(b'x' * 119)
+    with pytest.raises(ValueError, match='119.bin'):
+        _core.check_seal(os.fsencode(tmp_path))
 
 
 def test_a_full_disk_behind_stdout_is_status_1(tmp_path, abs_hil_program):

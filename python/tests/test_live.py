@@ -51,3 +51,10 @@ def test_bad_network():
 
 def test_silence_ends_the_iteration():
     assert list(abs_hil.live('memq://', timeout_s=0.05)) == []
+
+
+def test_an_installation_without_network_says_what_is_missing(monkeypatch):
+    monkeypatch.setitem(sys.modules, 'abs_hil._network', None)  # as a wheel
+    for use in (abs_hil.live, lambda: abs_hil.simulate('law.so')):
+        with pytest.raises(OSError, match=r'needs the module abs_hil\._network.*pip install \.'):
+            use()

@@ -6,7 +6,6 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "abs_hil/control/registry.hpp"
 #include "interchange/fmu_facts.hpp"
 #include "interchange/hosted_code.hpp"
 #include "runtime/clock.hpp"
@@ -124,13 +123,16 @@ ForeignTrial ForeignController::try_out() {
   return trial;
 }
 
-void register_foreign_controllers() {
+std::array<control::ControllerFiles, 2> foreign_controllers() noexcept {
   const auto make = [](const std::string& file,
                        const control::ControllerContext& context) -> std::unique_ptr<control::SlipController> {
     return std::make_unique<ForeignController>(file, context, chosen_home.load());
   };
-  control::register_controller_files({".so", make});
-  control::register_controller_files({".fmu", make});
+  return {{{".so", make}, {".fmu", make}}};
+}
+
+void register_foreign_controllers() {
+  for (const control::ControllerFiles& files : foreign_controllers()) control::register_controller_files(files);
 }
 
 void set_home(Home home) noexcept { chosen_home.store(home); }

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "abs_hil/control/controller_context.hpp"
+#include "abs_hil/control/registry.hpp"
 #include "abs_hil/control/slip_controller.hpp"
 #include "interchange/extracted_fmu.hpp"
 #include "interchange/foreign_code.hpp"
@@ -55,8 +57,10 @@ class ForeignController final : public control::SlipController {
   double time_s_{0.0};
 };
 
-/// Lets the registry make controllers from files (docs/interchange.md). Their code runs in a process of its own until
-/// `set_home` says otherwise.
+/// What makes controllers from files (docs/interchange.md). Their code runs in a process of its own until `set_home`
+/// says otherwise.
+[[nodiscard]] std::array<control::ControllerFiles, 2> foreign_controllers() noexcept;
+/// Lets the registry make them.
 void register_foreign_controllers();
 void set_home(Home home) noexcept;
 

@@ -17,7 +17,7 @@
 #include "config/model.hpp"
 #include "config/plan.hpp"
 #include "driver/injection/injection.hpp"
-#include "program/questions.hpp"
+#include "program/answers.hpp"
 #include "rig/nearest_name.hpp"
 #include "runtime/board_policy.hpp"
 

@@ -10,60 +10,13 @@
 #include <array>
 #include <cstdio>
 
-#include "config/config_error.hpp"
+#include "program/answers.hpp"
 
 namespace abs_hil::program {
 
-namespace {
-
-constexpr const char* person = "person";
-constexpr const char* itself = "itself";
-
-bool hears_commands(const RunRequest& request) {
-  return request.settings.commands.enabled && !request.outputs.no_lcm && !request.outputs.fast;
-}
-
-bool at_terminal() noexcept { return ::isatty(STDIN_FILENO) == 1; }
-
-}  // namespace
-
-bool asks(const config::Script& script) noexcept {
-  return std::any_of(script.phases.begin(), script.phases.end(),
-                     [](const config::PhaseScript& phase) { return !phase.ask.empty(); });
-}
-
-const char* who_answers(const RunRequest& request) {
-  if (request.settings.on_rig()) return person;
-  return request.outputs.fast || !at_terminal() ? itself : person;
-}
-
-void check_questions(const RunRequest& request) {
-  const config::Settings& s = request.settings;
-  if (!asks(*request.script)) return;
-  const std::string name = "experiment " + request.script->name;
-  if (s.experiment.answers == person) {
-    if (request.outputs.fast) {
-      throw config::ConfigError(name +
-                                " asks a person: a run in virtual time (--fast) cannot wait; leave out --fast, or "
-                                "experiment.answers = person");
-    }
-    if (!at_terminal() && !hears_commands(request)) {
-      throw config::ConfigError(
-          name +
-          " asks a person, but stdin is no terminal and remote commands are not enabled: start it in a terminal, "
-          "or with --set commands.enabled=true --set commands.key_file=FILE and without --no-lcm, and answer with "
-          "abs_hil send continue");
-    }
-  } else if (s.on_rig() && !s.driver.emulated) {
-    throw config::ConfigError(name +
-                              ": experiment.answers = itself: on a rig only a person can say that it is done; "
-                              "leave it out");
-  }
-}
-
 Questions::Questions(const RunRequest& request, run::Run& run)
     : run_(run),
-      by_person_(request.settings.experiment.answers == person),
+      by_person_(request.settings.experiment.answers == answers_person),
       commands_(hears_commands(request)),
       terminal_(at_terminal()) {
   if (by_person_ || !asks(*request.script) || request.in_series) return;

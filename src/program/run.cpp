@@ -21,6 +21,7 @@
 #include "guardian/guarding.hpp"
 #include "program/exit_status.hpp"
 #include "program/foreign_run.hpp"
+#include "program/answers.hpp"
 #include "program/questions.hpp"
 #include "program/run_monitor.hpp"
 #include "program/run_outputs.hpp"

@@ -19,7 +19,7 @@
 #include "config/config_error.hpp"
 #include "config/script.hpp"
 #include "program/exit_status.hpp"
-#include "program/questions.hpp"
+#include "program/answers.hpp"
 #include "program/signals.hpp"
 #include "program/subcommands.hpp"
 #include "rig/formatted_text.hpp"

@@ -8,8 +8,7 @@
 #include "abs_hil/control/registry.hpp"
 #include "config/config_error.hpp"
 #include "config/library.hpp"
-#include "program/questions.hpp"
-#include "program/subcommands.hpp"
+#include "program/answers.hpp"
 #include "run/run_summary.hpp"
 #include "study/runs.hpp"
 
@@ -69,13 +68,6 @@ config::Settings settings_of_run(const study::Study& study, std::uint64_t number
         fmt::format("--run {}: there are {} runs; give a number in [0, {}]", number, study.runs(), study.runs() - 1));
   }
   return study::RunSettings(study).whole(study.index_of(number));
-}
-
-int record_run(const study::Study& study, std::uint64_t number, const std::optional<std::string>& folder,
-               const std::vector<std::string>& command_line) {
-  RunRequest request = request_of(settings_of_run(study, number), {.fast = true, .no_lcm = true, .run_folder = folder});
-  request.command_line = command_line;
-  return run(request);
 }
 
 }  // namespace abs_hil::program

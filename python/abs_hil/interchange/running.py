@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
-from ..core import _core
+from ..core import _core, load_network
 from ..messages import MOST_SIGNALS, QUANTITIES, decode, row_of
 from ..run import COLUMNS
 from . import messages
@@ -23,7 +23,7 @@ LAST_NS = (2 ** 31 - 1) * 10 ** 9
 def received(url: str, prefix: str, idle_s: float | None, seconds: float | None) -> Iterator[tuple[str, Any]]:
     """(channel without prefix, message or None if damaged) as they come. Ends after `idle_s` without a message once one
     has come, after `seconds`, or by an interrupt."""
-    subscription = _core.Subscription(url, re.escape(prefix) + '.*')
+    subscription = load_network('abs_hil convert --live').Subscription(url, re.escape(prefix) + '.*')
     begin = time.monotonic()
     heard = None
     slice_s = 0.2

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core import _core
+from ..core import _core, load_network
 from ..messages import MOST_SIGNALS, QUANTITIES, decode
 from . import force
 from .history import COLUMNS, DERIVED_PLACE, PLACE, WIDTH, History, bin_numbers
@@ -164,7 +164,7 @@ class Live:
     """Packets of an LCM network. Raises OSError without a network, ValueError for a URL that is none."""
 
     def __init__(self, url: str, prefix: str) -> None:
-        self._subscription = _core.Subscription(url, re.escape(prefix) + '.*')
+        self._subscription = load_network('abs_hil serve').Subscription(url, re.escape(prefix) + '.*')
 
     def waiting(self) -> list[Packet]:
         return self._subscription.waiting()

@@ -9,7 +9,7 @@ import signal
 import sys
 from typing import Any
 
-from ..core import _core
+from ..core import _core, load_network
 from .feed import Feed, Live, Played
 from .history import BIN_S, History
 from .server import Command, Server, is_loopback
@@ -50,7 +50,7 @@ def main(arguments: list[str]) -> int:
     try:
         source = _source(given)
         if given.commands is not None:
-            _core.check_key(given.commands)
+            load_network('--commands').check_key(given.commands)
         return 128 + asyncio.run(_serve(given, source))
     except ValueError as error:
         print(f'abs_serve: {error}', file=sys.stderr)
@@ -89,7 +89,8 @@ def _sender(given: Any) -> Command:
             return False, f'"{command}" is no command: give one of {" ".join(COMMANDS)}'
         try:
             return await asyncio.get_running_loop().run_in_executor(
-                None, _core.send_command, command, name, value, given.lcm_url, given.prefix, given.commands, ANSWER_S)
+                None, load_network('a command').send_command, command, name, value, given.lcm_url, given.prefix,
+                given.commands, ANSWER_S)
         except (OSError, ValueError) as error:
             return False, str(error)
     return send

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from rich.console import Console, Group
 from rich.live import Live
 
-from ..core import _core
+from ..core import _core, load_network
 from ..messages import decode
 from .screen import Screen, draw, one_line
 from .view import RunView
@@ -53,7 +53,7 @@ class Feed:
     def __init__(self, url: str, prefix: str, window_s: float) -> None:
         self.view = RunView(window_s)
         self._prefix = len(prefix)
-        self._subscription = _core.Subscription(url, f'{re.escape(prefix)}({"|".join(CHANNELS)})')
+        self._subscription = load_network('abs_hil watch').Subscription(url, f'{re.escape(prefix)}({"|".join(CHANNELS)})')
         self.url = self._subscription.url
 
     def take_until(self, end_s: float) -> None:
