@@ -72,6 +72,10 @@ std::string to_text(const LatencyRun& run, const MachineFacts& facts) {
                       run.realtime ? "in real time" : "NOT in real time (abs_hil doctor gives the reason)");
   line("wake-up latency", quantiles_text(t.wakeup_latency));
   line("read", quantiles_text(t.read));
+  if (run.wire) {
+    line("  of it the wire", fmt::format("from request to answer {:.1f} us on average, {:.1f} us at most, {} answers",
+                                         run.wire->mean_us, run.wire->longest_us, run.wire->answers));
+  }
   line("control", quantiles_text(t.control));
   line("write", quantiles_text(t.write));
   line("cycle time", quantiles_text(t.cycle_time));
@@ -104,12 +108,17 @@ nlohmann::ordered_json to_json(const LatencyRun& run, const MachineFacts& facts)
   for (std::size_t i = 1; i < rig::overrun_cause_count; ++i) {
     causes[std::string(rig::name_of(static_cast<rig::OverrunCause>(i)))] = t.overruns.by_cause[i];
   }
+  nlohmann::ordered_json wire;  // null for a board that answers at once
+  if (run.wire) {
+    wire = {{"answers", run.wire->answers}, {"mean", run.wire->mean_us}, {"max", run.wire->longest_us}};
+  }
   return {{"rate_Hz", run.rate_Hz},
           {"duration_s", run.duration_s},
           {"cycles", run.cycles},
           {"realtime", run.realtime},
           {"wakeup_latency_us", quantiles_json(t.wakeup_latency)},
           {"read_us", quantiles_json(t.read)},
+          {"wire_us", wire},
           {"control_us", quantiles_json(t.control)},
           {"write_us", quantiles_json(t.write)},
           {"cycle_time_us", quantiles_json(t.cycle_time)},

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
+#include "abs_hil/driver/rig_driver.hpp"
 #include "diagnosis/machine_facts.hpp"
 #include "rig/timing_summary.hpp"
 
@@ -15,6 +17,7 @@ struct LatencyRun {
   std::uint64_t cycles{0};
   bool realtime{false};
   rig::TimingSummary timing{};
+  std::optional<driver::RigDriver::AnswerTimes> wire{};  ///< of a board that answers over a network
 };
 
 /// Grades of a computer's timing.

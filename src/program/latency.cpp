@@ -88,7 +88,8 @@ int latency(const RunRequest& request, const LatencyOptions& options) {
                                        .duration_s = options.duration_s,
                                        .cycles = statistics.cycles(),
                                        .realtime = outcome.realtime.realtime(),
-                                       .timing = statistics.summary()};
+                                       .timing = statistics.summary(),
+                                       .wire = run.driver().answer_times()};
   if (histogram) histogram->write(runtime::cyclictest_histogram(statistics));
   fmt::print("{}", options.json ? to_json(measured, facts).dump(2) + "\n" : to_text(measured, facts));
   if (!options.json) {

@@ -48,7 +48,14 @@ TEST_CASE("figures, verdict and machine stand side by side, as text and as JSON"
   for (const char* part : {"verdict: good", "6.1-rt, preemption PREEMPT_RT", "governor performance", "1.50"}) {
     CHECK(text.find(part) != std::string::npos);
   }
+  CHECK(text.find("wire") == std::string::npos);
+  LatencyRun over_network = run(30.0);
+  over_network.wire = {.answers = 100, .mean_us = 58.25, .longest_us = 141.5};
+  CHECK(to_text(over_network, facts).find("58.2 us on average, 141.5 us at most, 100 answers") != std::string::npos);
+  CHECK(to_json(over_network, facts)["wire_us"] ==
+        nlohmann::ordered_json{{"answers", 100}, {"mean", 58.25}, {"max", 141.5}});
   const auto json = to_json(run(30.0), facts);
+  CHECK(json["wire_us"].is_null());
   CHECK(json["wakeup_latency_us"]["max"] == 30.0);
   CHECK(json["verdict"]["overall"] == "good");
   CHECK(json["machine"]["kernel"] == "6.1-rt");

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -103,6 +104,13 @@ class RigDriver {
   [[nodiscard]] virtual std::vector<std::string> notes() const { return {}; }
   /// Counts of the run's traffic, one per line, for the log after a run. Empty for backends that count nothing.
   [[nodiscard]] virtual std::vector<std::string> tally() const { return {}; }
+  /// How long the board took to answer since `activate`; empty for a backend that waits for no answer.
+  struct AnswerTimes {
+    std::uint64_t answers{0};
+    double mean_us{0.0};
+    double longest_us{0.0};
+  };
+  [[nodiscard]] virtual std::optional<AnswerTimes> answer_times() const { return std::nullopt; }
   /// The last exchanges with the board, with their times, one per line, for the flight record.
   [[nodiscard]] virtual std::vector<std::string> traffic() const { return {}; }
   /// Message for the user: what the outputs do if the safe state did not reach the board.

@@ -140,6 +140,7 @@ class InjectingDriver final : public RigDriver {
   [[nodiscard]] BoardIdentity identity() const override { return inner_->identity(); }
   [[nodiscard]] bool outputs_now(rig::Command& applied) noexcept override { return inner_->outputs_now(applied); }
   [[nodiscard]] std::vector<std::string> tally() const override { return inner_->tally(); }
+  [[nodiscard]] std::optional<AnswerTimes> answer_times() const override { return inner_->answer_times(); }
   [[nodiscard]] std::vector<std::string> traffic() const override { return inner_->traffic(); }
   [[nodiscard]] std::string_view watched_cable() const noexcept override { return inner_->watched_cable(); }
   [[nodiscard]] bool took_other_command(rig::Command& command) const noexcept override {
