@@ -70,19 +70,20 @@ Finding judge_coalescing(const std::string& interface, int socket) {
   return f;
 }
 
-/// Requests of one small read each; `foreign` becomes the number of packets that others sent meanwhile.
+/// Requests of one small read each. Datagrams of others show in the board's count of datagrams, or of all packets where
+/// it does not count datagrams apart.
 Finding measure_round_trips(const sockaddr_in& board) {
   constexpr int asked = 500;
   constexpr std::int64_t wait_ns = 5'000'000;
   driver::hm2::UdpLink link(board);
   driver::hm2::Packet packet;
-  packet.read(driver::hm2::space::status, driver::hm2::at::received);
-  std::array<std::uint8_t, 2> answer{};
+  packet.read(driver::hm2::space::status, driver::hm2::at::received, 2);
+  std::array<std::uint8_t, 4> answer{};
   std::uint32_t number = static_cast<std::uint32_t>(driver::monotonic_ns());
   std::vector<double> times_us;
   int foreign = 0;
   int silent = 0;
-  std::uint16_t received = 0;
+  driver::hm2::Received received;
   for (int i = 0; i < asked && silent < 10; ++i) {
     const std::int64_t sent_ns = driver::monotonic_ns();
     if (!driver::hm2::ask(link, packet, answer, number, wait_ns, 1)) {
@@ -90,8 +91,12 @@ Finding measure_round_trips(const sockaddr_in& board) {
       continue;
     }
     times_us.push_back(1e-3 * static_cast<double>(driver::monotonic_ns() - sent_ns));
-    const std::uint16_t now = driver::hm2::word16(answer, 0);
-    if (times_us.size() > 1) foreign += std::max(static_cast<std::uint16_t>(now - received) - 1 - silent, 0);
+    const driver::hm2::Received now{.all = driver::hm2::word16(answer, 0), .udp = driver::hm2::word16(answer, 2)};
+    if (times_us.size() > 1) {
+      const auto came =
+          static_cast<std::uint16_t>(now.udp != received.udp ? now.udp - received.udp : now.all - received.all);
+      foreign += std::max(came - 1 - silent, 0);
+    }
     received = now;
     silent = 0;
   }
@@ -148,8 +153,7 @@ Finding judge_arp(const std::string& table, const std::string& address, const st
       f.detail += ", permanent";
       return f;
     }
-    f.detail +=
-        ", not permanent: the kernel asks again from time to time, and the board counts that as another's packet";
+    f.detail += ", not permanent: the kernel asks again from time to time, and a cycle then waits for that answer, too";
     f.fix = fmt::format("sudo ip neigh replace {} lladdr {} nud permanent dev {}", address, mac, interface);
     return f;
   }

@@ -94,8 +94,8 @@ void RunLogic::estimate(const rig::Measurement& measurement, double dt_s, double
     lower_.reset(measurement.lower_counts, start_speed_rad_s_);
     actuator_.reset();
   } else if (dt_s > 0.0) {
-    upper_.update(measurement.upper_counts, dt_s, stamp_error_s);
-    lower_.update(measurement.lower_counts, dt_s, stamp_error_s);
+    upper_.update(measurement.upper_counts, dt_s, stamp_error_s, measurement.upper_edge_age_ns * rig::s_per_ns);
+    lower_.update(measurement.lower_counts, dt_s, stamp_error_s, measurement.lower_edge_age_ns * rig::s_per_ns);
     actuator_.advance(dt_s);
   }
   note_travel(measurement, dt_s);

@@ -77,6 +77,13 @@ void read(const std::int8_t& field, rig::Phase& value) {
   value = field >= 0 && field <= telemetry_t::PHASE_FAULT ? static_cast<rig::Phase>(field) : rig::Phase::fault;
 }
 
+/// False for NaN and for what an integer of this type cannot hold.
+template <class Value>
+bool fits(double value) noexcept {
+  using Limits = std::numeric_limits<Value>;
+  return value >= static_cast<double>(Limits::min()) && value < std::ldexp(1.0, Limits::digits);
+}
+
 }  // namespace
 
 telemetry_t blank_message(const rig::RunNames& names) {
@@ -130,8 +137,8 @@ rig::CycleRecord to_record(const telemetry_t& message) {
         const double value = found != values.end() ? found->value : rig::unknown;
         if constexpr (std::is_floating_point_v<Value>) {
           row.at(parts) = value;
-        } else {
-          row.at(parts) = std::isnan(value) ? Value{} : static_cast<Value>(value);
+        } else if (fits<Value>(value)) {  // otherwise the record's own default stays
+          row.at(parts) = static_cast<Value>(value);
         }
       });
   return record;

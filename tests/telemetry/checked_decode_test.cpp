@@ -79,7 +79,7 @@ TEST_CASE("a record survives the way through a message") {
       if (name != "value_count") fill(name, value);
     }
   });
-  message.values = {0.5, -0.0};
+  message.values = {250.0, -1.0, 0.5, -0.0};
   message.sample_valid = message.wheels_apart = 1;
   message.phase_index = 7;
   message.phase = telemetry_t::PHASE_HOLD;
@@ -95,8 +95,8 @@ TEST_CASE("a record survives the way through a message") {
 TEST_CASE("an array whose length lies is refused") {
   telemetry_t message = to_message({}, 0.0, 0, {.signals = {"a", "b"}});
   const test::Bytes whole = bytes_of(message);
-  const std::size_t length_at = whole.size() - 2 * sizeof(double) - sizeof(std::int32_t);
-  for (const std::uint32_t lie : {0U, 1U, 3U, 0x7FFFFFFFU, 0x80000000U, 0xFFFFFFFFU}) {
+  const std::size_t length_at = whole.size() - message.values.size() * sizeof(double) - sizeof(std::int32_t);
+  for (const std::uint32_t lie : {0U, 1U, 3U, 5U, 0x7FFFFFFFU, 0x80000000U, 0xFFFFFFFFU}) {
     test::Bytes packet = whole;
     for (std::size_t i = 0; i < 4; ++i) packet[length_at + i] = static_cast<std::uint8_t>(lie >> (24U - 8U * i));
     INFO("length " << lie);

@@ -69,7 +69,8 @@ TEST_CASE("the CSV of a log begins with the whole rows of --csv, and every other
   REQUIRE(own.size() == 1201);
   REQUIRE(made.size() == own.size());
   for (std::size_t n = 0; n < own.size(); ++n) REQUIRE(made[n].starts_with(own[n] + ','));
-  CHECK(made[0].ends_with(",overrun_cause,measured_ns,phase_index,log_event,log_time_us,channel,type"));
+  CHECK(made[0].ends_with(
+      ",measured_ns,phase_index,upper_edge_age_ns,lower_edge_age_ns,log_event,log_time_us,channel,type"));
   CHECK(made[8].find(",1007000040,0,") != std::string::npos);  // a board's own time
   const std::vector<std::string> events = lines_of(scratch / "made.ABS_EVENT.csv");
   CHECK(events.back().find("\"quoted \"\"text\"\", with comma\"") != std::string::npos);

@@ -86,16 +86,32 @@ TEST_CASE("signals come by their names, and a phase by its own; a record without
                             .signals = {"I_m", "zeta_N"}};
   const telemetry_t m = through_bytes(to_message(r, 1.0, 3, names));
   CHECK(m.phase_name == "brake-high");
-  CHECK(m.names == "I_m,zeta_N");
-  REQUIRE(m.values.size() == 2);  // there is no third signal
-  CHECK(m.values[0] == 0.5);
-  CHECK(std::isnan(m.values[1]));
+  CHECK(m.names == "upper_edge_age_ns,lower_edge_age_ns,I_m,zeta_N");
+  REQUIRE(m.values.size() == 4);  // there is no third signal
+  CHECK(m.values[2] == 0.5);
+  CHECK(std::isnan(m.values[3]));
   CHECK(signals_of(m) == names.signals);
   CHECK(to_record(m).control.signals[0] == 0.5);
   CHECK(std::isnan(to_record(m).control.signals[2]));
   CHECK(lacking_in(m).empty());
   CHECK(to_message(r, 1.0, 3).phase_name.empty());
-  CHECK(to_message(r, 1.0, 3).names.empty());
+  CHECK(to_message(r, 1.0, 3).names == "upper_edge_age_ns,lower_edge_age_ns");
+}
+
+TEST_CASE("a quantity that an older log lacks, or that its type cannot hold, keeps the record's default") {
+  rig::CycleRecord r = test::sample_record(7);
+  r.measurement.upper_edge_age_ns = 250;
+  r.measurement.lower_edge_age_ns = 0;
+  telemetry_t m = to_message(r, 1.0, 3);
+  CHECK(to_record(m).measurement.upper_edge_age_ns == 250);
+  CHECK(to_record(m).measurement.lower_edge_age_ns == 0);
+  for (const double strange : {rig::unknown, 1e300, -1e300, 2147483648.0}) {
+    m.values[0] = strange;
+    CHECK(to_record(m).measurement.upper_edge_age_ns == rig::no_edge_age);
+  }
+  m.names.clear();
+  CHECK(to_record(m).measurement.lower_edge_age_ns == rig::no_edge_age);
+  CHECK(lacking_in(m) == std::vector<std::string_view>{"upper_edge_age_ns", "lower_edge_age_ns"});
 }
 
 TEST_CASE("a message with more values than names, and names that no value has, is read as far as both go") {
@@ -103,7 +119,7 @@ TEST_CASE("a message with more values than names, and names that no value has, i
   m.names = "I_m";
   CHECK(values_of(m).size() == 1);
   m.names = ",,a,b,c,d,e,f,g,h,i,j";
-  CHECK(values_of(m).size() == 2);
+  CHECK(values_of(m).size() == 4);
   m.values.assign(20, 1.0);
   m.value_count = 20;
   CHECK(values_of(m).size() == 12);

@@ -49,10 +49,11 @@ TEST_CASE("a controller's own signals come with their names in each telemetry me
   const auto telemetry = outlet.all<telemetry_t>("ABS_TELEMETRY");
   REQUIRE(telemetry.size() == 10);
   for (const telemetry_t& message : telemetry) {
-    CHECK(message.names == "I_m,zeta_N");
-    REQUIRE(message.values.size() == 2);  // there is no third signal
-    CHECK(message.values[0] == static_cast<double>(message.cycle));
-    CHECK(message.values[1] == -1.5);
+    CHECK(message.names.ends_with(",I_m,zeta_N"));
+    const std::size_t size = message.values.size();
+    REQUIRE(size == blank_message({}).values.size() + 2);  // there is no third signal
+    CHECK(message.values[size - 2] == static_cast<double>(message.cycle));
+    CHECK(message.values[size - 1] == -1.5);
   }
 }
 

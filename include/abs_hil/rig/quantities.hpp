@@ -177,6 +177,12 @@ inline constexpr std::tuple quantities{
     Quantity{"phase_index", "", "0.2", Topic::sequence, Outlet::telemetry,
              [](auto& c) -> auto& { return c.record.phase_index; },
              "phases of the experiment from 0; an early end keeps the last number"},
+    Quantity{"upper_edge_age_ns", "ns", "0.2", Topic::board, Outlet::telemetry,
+             [](auto& c) -> auto& { return c.record.measurement.upper_edge_age_ns; },
+             "time since the upper wheel's last count, by the board's time stamp; -1: not known"},
+    Quantity{"lower_edge_age_ns", "ns", "0.2", Topic::board, Outlet::telemetry,
+             [](auto& c) -> auto& { return c.record.measurement.lower_edge_age_ns; },
+             "time since the lower wheel's last count, by the board's time stamp; -1: not known"},
 };
 // clang-format on
 

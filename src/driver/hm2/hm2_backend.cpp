@@ -80,15 +80,29 @@ std::vector<std::string> Hm2Driver::notes() const {
                     options_.watchdog_ms)};
 }
 
+std::optional<RigDriver::AnswerTimes> Hm2Driver::answer_times() const {
+  const std::uint64_t answers = counters_.cycles - counters_.unanswered;
+  return AnswerTimes{.answers = answers,
+                     .mean_us = 1e-3 * static_cast<double>(counters_.answers_ns) /
+                                static_cast<double>(std::max<std::uint64_t>(answers, 1)),
+                     .longest_us = 1e-3 * static_cast<double>(counters_.longest_answer_ns)};
+}
+
 std::vector<std::string> Hm2Driver::tally() const {
   using Number = unsigned long long;
   std::vector<std::string> lines;
   lines.push_back(
       formatted("hm2: %llu cycles, %llu without an answer in time; %llu writes lost, %llu withheld until the "
-                "board answered again; an answer took %.0f us at most",
+                "board answered again; an answer took %.0f us on average, %.0f us at most",
                 static_cast<Number>(counters_.cycles), static_cast<Number>(counters_.unanswered),
                 static_cast<Number>(counters_.writes_lost), static_cast<Number>(counters_.withheld),
-                static_cast<double>(counters_.longest_answer_ns) * 1e-3));
+                answer_times()->mean_us, answer_times()->longest_us));
+  if (counters_.not_udp > 0) {
+    lines.push_back(
+        formatted("hm2: %llu other packets on the wire (ARP, for example); give the board a permanent ARP "
+                  "entry and an interface of its own (docs/hm2.md, \"The network\")",
+                  static_cast<Number>(counters_.not_udp)));
+  }
   if (counters_.stale + counters_.wrong_length > 0) {
     lines.push_back(formatted("hm2 datagrams dropped: %llu late or repeated, %llu of wrong length",
                               static_cast<Number>(counters_.stale), static_cast<Number>(counters_.wrong_length)));

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
+#include <limits>
 #include <span>
 
 #include "abs_hil/rig/time_units.hpp"
@@ -69,9 +71,12 @@ IoResult Hm2Driver::lost_answer() noexcept {
   return {IoError::no_answer, addresses_.bitten, last_errno_, rig::Reason::hm2_silent};
 }
 
-// Each datagram of ours raises the board's count by one, unless it is lost or late.
+// Each datagram of ours raises the board's count by one, unless it is lost or late. A packet that is no datagram cannot
+// command: the kernel's ARP must not end a run.
 IoResult Hm2Driver::judge_talkers(const CycleAnswer& answer) noexcept {
-  const auto came = static_cast<std::uint16_t>(answer.received - received_);
+  const auto all = static_cast<std::uint16_t>(answer.received.all - received_.all);
+  const auto udp = static_cast<std::uint16_t>(answer.received.udp - received_.udp);
+  const std::uint16_t came = counts_udp_ ? udp : all;
   const std::uint32_t ours = link_->sent() - sent_before_;
   const bool strict = driving_ && any_answer_;
   received_ = answer.received;
@@ -80,6 +85,7 @@ IoResult Hm2Driver::judge_talkers(const CycleAnswer& answer) noexcept {
     missing_ = 0;
     return {};
   }
+  if (counts_udp_ && all > udp) counters_.not_udp += static_cast<std::uint16_t>(all - udp);
   const std::uint32_t behind = write_number_ - answer.write_number;
   const bool is_ours = behind <= write_number_ - first_write_ && behind < commands_.size();
   if (!is_ours && answer.write_number == 0 && all_off(answer.direction)) {
@@ -138,6 +144,22 @@ std::int64_t Hm2Driver::time_of(const CycleAnswer& answer, std::int64_t sent_ns,
   return std::clamp(last_.time_ns + interval_us * rig::ns_per_us, sent_ns, std::max(sent_ns, received_ns));
 }
 
+// A stamp wraps after 65,536 ticks: that of a new edge is clear while less time has passed since the answer before.
+std::int32_t Hm2Driver::edge_age_ns(const CycleAnswer& answer, std::size_t wheel, bool moved, std::int64_t since_ns,
+                                    std::int32_t before_ns) const noexcept {
+  constexpr double wrap_ticks = 65536.0;
+  const auto stamp = static_cast<std::uint16_t>(answer.count[wheel] >> 16U);
+  if (!moved) {
+    // An edge to and fro: which of the two was last is not known.
+    if (stamp != stamps_[wheel] || before_ns < 0) return rig::no_edge_age;
+    const std::int64_t age_ns = before_ns + since_ns;
+    return age_ns <= std::numeric_limits<std::int32_t>::max() ? static_cast<std::int32_t>(age_ns) : rig::no_edge_age;
+  }
+  if (!any_answer_ || static_cast<double>(since_ns) >= wrap_ticks * stamp_tick_ns_) return rig::no_edge_age;
+  const auto ticks = static_cast<std::uint16_t>(answer.stamp_clock - stamp);
+  return static_cast<std::int32_t>(std::lround(ticks * stamp_tick_ns_));
+}
+
 IoResult Hm2Driver::take_counts(const CycleAnswer& answer, std::int64_t time_ns) noexcept {
   const std::array<std::int32_t, 2> signs{options_.upper_sign, options_.lower_sign};
   std::array<std::int32_t, 2> moved{};
@@ -154,8 +176,14 @@ IoResult Hm2Driver::take_counts(const CycleAnswer& answer, std::int64_t time_ns)
   };
   last_.upper_counts = sum(last_.upper_counts, moved[0]);
   last_.lower_counts = sum(last_.lower_counts, moved[1]);
+  const std::int64_t since_ns = time_ns - last_.time_ns;
+  last_.upper_edge_age_ns = edge_age_ns(answer, 0, moved[0] != 0, since_ns, last_.upper_edge_age_ns);
+  last_.lower_edge_age_ns = edge_age_ns(answer, 1, moved[1] != 0, since_ns, last_.lower_edge_age_ns);
   last_.time_ns = time_ns;
-  for (std::size_t wheel = 0; wheel < 2; ++wheel) raw_counts_[wheel] = static_cast<std::uint16_t>(answer.count[wheel]);
+  for (std::size_t wheel = 0; wheel < 2; ++wheel) {
+    raw_counts_[wheel] = static_cast<std::uint16_t>(answer.count[wheel]);
+    stamps_[wheel] = static_cast<std::uint16_t>(answer.count[wheel] >> 16U);
+  }
   clock_us_ = answer.clock_us;
   any_answer_ = true;
   return {};

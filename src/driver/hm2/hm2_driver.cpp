@@ -170,6 +170,7 @@ void Hm2Driver::do_configure() {
                 .control = pair(board_.counter, reg::control, options_.upper_channel, options_.lower_channel),
                 .pwm = pair(board_.pwm, reg::value, options_.drive_pwm, options_.brake_pwm)};
   wire_ = CycleWire(addresses_);
+  stamp_tick_ns_ = (stamps_at_2_MHz + 2) * static_cast<double>(rig::ns_per_s) / board_.counter.clock_Hz;
   Outputs outputs;
   if (!ask_outputs(outputs, safe_answer_ns, safe_tries)) throw Unavailable("backend rig: the hm2 board went silent");
   if (!all_off(outputs.direction)) {
@@ -202,6 +203,7 @@ bool Hm2Driver::ask_outputs(Outputs& outputs, std::int64_t wait_ns, int tries) n
   const std::size_t direction_at = packet.read(space::hostmot2, addresses_.direction, board_.ports);
   const std::size_t bitten_at = packet.read(space::hostmot2, addresses_.bitten);
   const auto control_at = read_pair(packet, addresses_.control);
+  const std::size_t received_at = packet.read(space::status, at::received, 2);
   const std::size_t number_at = packet.read(space::timers, at::write_number, 2);
   std::array<std::uint8_t, 128> answer{};
   if (!ask(*link_, packet, answer, read_number_, wait_ns, tries)) return false;
@@ -210,6 +212,7 @@ bool Hm2Driver::ask_outputs(Outputs& outputs, std::int64_t wait_ns, int tries) n
   }
   outputs.bitten = word32(answer, bitten_at);
   outputs.control = {word32(answer, control_at[0]), word32(answer, control_at[1])};
+  outputs.received = {.all = word16(answer, received_at), .udp = word16(answer, received_at + 2)};
   outputs.write_number = word32(answer, number_at);
   return true;
 }
@@ -256,9 +259,11 @@ bool Hm2Driver::set_up_outputs(std::string& why) {
     why = "its outputs are on (DDR is not 0): another program drives it";
     return false;
   }
+  const Received before = outputs.received;
   ++write_number_;
   static_cast<void>(link_->send(set_up_packet().bytes()));
   if (!shown()) return false;
+  counts_udp_ = outputs.received.udp != before.udp;
   if (outputs.write_number != write_number_ || outputs.bitten != 0) {
     why = outputs.bitten != 0 ? "its watchdog bit while it was set up" : "it did not take what was written";
     return false;

@@ -132,6 +132,7 @@ class Hm2Driver final : public RigDriver {
   }
   [[nodiscard]] std::vector<std::string> notes() const override;
   [[nodiscard]] std::vector<std::string> tally() const override;
+  [[nodiscard]] std::optional<AnswerTimes> answer_times() const override;
   [[nodiscard]] std::vector<std::string> inspection() override;
   [[nodiscard]] std::vector<std::string> traffic() const override;
   [[nodiscard]] BoardIdentity identity() const override;
@@ -151,6 +152,7 @@ class Hm2Driver final : public RigDriver {
     std::uint64_t withheld{0};      ///< writes not sent, because status and direction were not known
     std::uint64_t stale{0};         ///< answers to earlier requests, dropped
     std::uint64_t wrong_length{0};  ///< answers that are none, dropped
+    std::uint64_t not_udp{0};       ///< packets that the board got beside datagrams, such as ARP's
     std::int64_t longest_answer_ns{0};
     std::int64_t answers_ns{0};  ///< sum of their times
   };
@@ -173,6 +175,7 @@ class Hm2Driver final : public RigDriver {
   struct Outputs {
     std::uint32_t bitten{0};
     std::uint32_t write_number{0};
+    Received received{};
     PortWords direction{};
     std::array<std::uint32_t, 2> control{};
   };
@@ -185,6 +188,8 @@ class Hm2Driver final : public RigDriver {
   IoResult judge(const CycleAnswer& answer) noexcept;
   IoResult judge_talkers(const CycleAnswer& answer) noexcept;
   IoResult take_counts(const CycleAnswer& answer, std::int64_t time_ns) noexcept;
+  [[nodiscard]] std::int32_t edge_age_ns(const CycleAnswer& answer, std::size_t wheel, bool moved,
+                                         std::int64_t since_ns, std::int32_t before_ns) const noexcept;
   [[nodiscard]] std::int64_t time_of(const CycleAnswer& answer, std::int64_t sent_ns,
                                      std::int64_t received_ns) const noexcept;
   IoResult lost_answer() noexcept;
@@ -201,6 +206,7 @@ class Hm2Driver final : public RigDriver {
   ReadClock read_clock_;
   bool lock_step_;
   std::int64_t answer_timeout_ns_;
+  double stamp_tick_ns_{0.0};
 
   std::unique_ptr<RecordedLink> link_{};
   Board board_{};
@@ -228,12 +234,14 @@ class Hm2Driver final : public RigDriver {
   std::int64_t emulated_ns_{0};
   std::int64_t told_ns_{0};  ///< the emulator's time now
   bool any_answer_{false};
-  std::uint16_t received_{0};     ///< the board's count of packets at the last answer
+  bool counts_udp_{false};        ///< the board counts datagrams apart from other packets
+  Received received_{};           ///< at the last answer
   std::uint32_t sent_before_{0};  ///< datagrams sent before the last answer
   std::uint32_t missing_{0};      ///< of those, how many the board has not received; they may still come
   int answers_since_missing_{0};
   std::uint16_t clock_us_{0};
   std::array<std::uint16_t, 2> raw_counts_{};
+  std::array<std::uint16_t, 2> stamps_{};  ///< of the last edges, by the board's clock for them
   rig::Measurement last_{};
   LossBucket bucket_{2, 1, 20};  ///< trips at the tenth loss in a row
   Counters counters_{};

@@ -181,7 +181,7 @@ Places put_reads(Packet& packet, const CycleAddresses& a, std::uint32_t number) 
   places.stamp_clock = packet.read(space::hostmot2, a.stamp_clock);  // must come before the counts
   places.count = read_pair(packet, a.count);
   places.control = read_pair(packet, a.control);
-  places.received = packet.read(space::status, at::received);
+  places.received = packet.read(space::status, at::received, 2);
   packet.write_number(at::read_number, number);
   places.read_number = packet.read(space::timers, at::read_number, 4);
   places.write_number = places.read_number + 4;
@@ -211,7 +211,7 @@ bool CycleWire::decode(std::span<const std::uint8_t> bytes, CycleAnswer& answer)
     answer.count[i] = word32(bytes, places.count[i]);
     answer.control[i] = word32(bytes, places.control[i]);
   }
-  answer.received = word16(bytes, places.received);
+  answer.received = {.all = word16(bytes, places.received), .udp = word16(bytes, places.received + 2)};
   answer.read_number = word32(bytes, places.read_number);
   answer.write_number = word32(bytes, places.write_number);
   return true;

@@ -37,7 +37,7 @@ inline constexpr std::uint16_t cookie = 0x0100;      ///< of HostMot2: 0x55AACAF
 inline constexpr std::uint16_t microseconds = 0x00;  ///< of the timers: free-running clock
 inline constexpr std::uint16_t read_number = 0x10;   ///< of the timers: scratch, 32 bit
 inline constexpr std::uint16_t write_number = 0x14;  ///< of the timers: scratch, 32 bit
-inline constexpr std::uint16_t received = 0x08;      ///< of the status: packets that the board has received
+inline constexpr std::uint16_t received = 0x08;      ///< of the status: packets that the board got, then those of UDP
 inline constexpr std::uint16_t board_name = 0x00;    ///< of the board's info, then version of LBP16, of the firmware
 inline constexpr std::uint16_t mac = 0x02;           ///< of the EEPROM: 3 words, the last byte first
 }  // namespace at
@@ -125,6 +125,12 @@ struct CycleAddresses {
 inline constexpr unsigned most_ports = 8;
 using PortWords = std::array<std::uint32_t, most_ports>;
 
+/// How many packets the board has got since power-on; both numbers wrap.
+struct Received {
+  std::uint16_t all{0};
+  std::uint16_t udp{0};  ///< of those; a board that does not keep it shows 0
+};
+
 /// What the datagram of a cycle reads.
 struct CycleAnswer {
   std::uint16_t clock_us{0};
@@ -134,7 +140,7 @@ struct CycleAnswer {
   std::uint16_t stamp_clock{0};
   std::array<std::uint32_t, 2> count{};    ///< low half: count; high half: time stamp of the last count
   std::array<std::uint32_t, 2> control{};  ///< bit 15: quadrature error
-  std::uint16_t received{0};
+  Received received{};
   std::uint32_t read_number{0};
   std::uint32_t write_number{0};
 };

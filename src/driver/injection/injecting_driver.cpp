@@ -258,6 +258,8 @@ IoResult InjectingDriver::do_read(std::int64_t now_ns, rig::Measurement& measure
     measurement.time_ns = static_cast<std::int64_t>(uniform(random_) * stamp_faults.garbage_most);
     measurement.supply_V = uniform(random_) * supply_faults.garbage_most;
     measurement.trip_flags = static_cast<std::uint32_t>(random_() >> 61U);
+    measurement.upper_edge_age_ns = any_counts(random_);
+    measurement.lower_edge_age_ns = any_counts(random_);
   };
   const IoResult result = fail_whole(InjectionSignal::read, measurement, delivered_, answers_, garble,
                                      [](double) { return IoResult{IoError::implausible_answer}; });
@@ -281,6 +283,10 @@ void InjectingDriver::fail_encoders(rig::Measurement& measurement) noexcept {
   }
   measurement.upper_counts = upper_.pass(upper_travel, upper, now_ns_, random_);
   measurement.lower_counts = lower_.pass(lower_travel, lower, now_ns_, random_);
+  // A faulty encoder's edges come at other times, which nobody stamps.
+  if (both.kind == InjectionKind::wrong) std::swap(measurement.upper_edge_age_ns, measurement.lower_edge_age_ns);
+  if (upper.kind != InjectionKind::ok) measurement.upper_edge_age_ns = rig::no_edge_age;
+  if (lower.kind != InjectionKind::ok) measurement.lower_edge_age_ns = rig::no_edge_age;
   if (!measurement.ideal_speeds) return;
   // The true speed holds only for a sound encoder. For a faulty one it is scaled by the counts that are delivered.
   const double dt_s = static_cast<double>(measurement.time_ns - before.time_ns) * 1e-9;

@@ -88,7 +88,7 @@ TEST_CASE("The cycle's datagrams have the sizes of docs/hm2.md") {
   };
   REQUIRE(rig.cycle(drive).ok());
   CHECK(sizes == std::vector<std::size_t>{44, 40});
-  CHECK(answer == 52);
+  CHECK(answer == 54);
 }
 
 TEST_CASE(
@@ -353,7 +353,7 @@ TEST_CASE("Faults of the board have reasons of their own and drop the outputs at
   }
   SECTION("another program leaves its number") {
     rig.board.handle(std::array<std::uint8_t, 8>{0x82, 0xD1, 0x14, 0, 77, 0, 0, 0});
-    --rig.board.received;
+    rig.board.forget_last_packet();
     expected = Reason::foreign_writer;
   }
   SECTION("quadrature error") {
@@ -366,7 +366,7 @@ TEST_CASE("Faults of the board have reasons of their own and drop the outputs at
   }
   SECTION("a pin is no output any more") {
     rig.board.handle(std::array<std::uint8_t, 8>{0x81, 0xC2, 0x00, 0x11, 0, 0, 0, 0});
-    --rig.board.received;
+    rig.board.forget_last_packet();
     expected = Reason::hm2_outputs_off;
   }
   SECTION("counts jump") {
@@ -377,6 +377,68 @@ TEST_CASE("Faults of the board have reasons of their own and drop the outputs at
   CHECK(result.reason == expected);
   CHECK_FALSE(rig.is_on());
   CHECK(rig.driver.deactivate().ok());
+}
+
+TEST_CASE("The ages of the encoders' edges are the board's, to its tick of 0.5 us, also while a wheel stands") {
+  Rig rig({}, 3.0);
+  std::int32_t oldest_ns = 0;
+  int cycles = 0;
+  int unknown = 0;
+  // A stamp of 16 bits wraps after 33 ms.
+  for (; oldest_ns < 200 * ms && cycles < 6000; ++cycles) {
+    REQUIRE(rig.cycle(rig::safe_command).ok());
+    for (const bool upper : {false, true}) {
+      const std::int32_t age_ns = upper ? rig.measurement.upper_edge_age_ns : rig.measurement.lower_edge_age_ns;
+      unknown += age_ns == rig::no_edge_age ? 1 : 0;
+      if (age_ns != rig::no_edge_age) REQUIRE(std::abs(rig.now_ns - rig.board.last_edge_ns(upper) - age_ns) <= 1000);
+    }
+    oldest_ns = std::min(rig.measurement.upper_edge_age_ns, rig.measurement.lower_edge_age_ns);
+  }
+  CHECK(cycles > 500);
+  CHECK(unknown <= 2);  // before a wheel's first edge
+  CHECK(oldest_ns >= 200 * ms);
+}
+
+TEST_CASE("An edge that may lie a wrap of its stamp back has no age") {
+  Rig rig({}, 60.0);
+  REQUIRE(rig.driver.rest().ok());
+  for (const std::int64_t pause_ns : {20 * ms, 40 * ms, 20 * ms}) {
+    rig.board.advance_to(rig.now_ns += pause_ns);
+    REQUIRE(rig.driver.read(rig.now_ns, rig.measurement).ok());
+    if (pause_ns == 40 * ms) CHECK(rig.measurement.lower_edge_age_ns == rig::no_edge_age);
+  }
+  CHECK(rig.measurement.lower_edge_age_ns >= 0);
+  CHECK(rig.measurement.lower_edge_age_ns < 100'000);  // 39 counts a ms
+}
+
+TEST_CASE("Packets that are no datagrams are counted and end no run") {
+  Rig rig;
+  REQUIRE(rig.cycles(10, drive).ok());
+  for (int i = 0; i < 20; ++i) {
+    ++rig.board.received.all;  // an ARP request
+    REQUIRE(rig.cycle(drive).ok());
+  }
+  CHECK(rig.driver.counters().not_udp == 20);
+  CHECK(rig.is_on());
+}
+
+TEST_CASE("On a board that does not count datagrams apart any packet of others ends the run") {
+  RegisterBoard board;
+  board.counts_udp = false;
+  Cable cable(board);
+  Hm2Driver driver({}, cable.opener());
+  driver.configure();
+  driver.activate(0);
+  rig::Measurement measurement;
+  std::int64_t now_ns = 0;
+  for (int i = 0; i < 10; ++i) {
+    board.advance_to(now_ns += ms);
+    REQUIRE(driver.read(now_ns, measurement).ok());
+    REQUIRE(driver.write(drive).ok());
+  }
+  ++board.received.all;
+  board.advance_to(now_ns += ms);
+  CHECK(driver.read(now_ns, measurement).reason == Reason::foreign_writer);
 }
 
 TEST_CASE("Another program is found although datagrams are lost") {
@@ -502,7 +564,7 @@ TEST_CASE("The last 64 datagrams are kept with their times") {
   const auto lines = rig.driver.traffic();
   REQUIRE(lines.size() == 64);
   CHECK_THAT(lines.back(), Contains(" sent  40 82c20010"));
-  CHECK_THAT(lines[lines.size() - 2], Contains(" got   52 "));
+  CHECK_THAT(lines[lines.size() - 2], Contains(" got   54 "));
 }
 
 TEST_CASE("The safe-state writer drops all outputs beside a stopped owner, whether or not it is answered") {

@@ -107,18 +107,25 @@ TEST_CASE("Every recorded answer of a cycle is understood") {
   std::size_t understood = 0;
   for (const Frame& frame : frames()) {
     if (frame.to_board || frame.bytes.size() != 42) continue;
-    // LinuxCNC asks for neither the clock nor the direction.
-    Bytes answer{0x34, 0x12};
-    answer.insert(answer.end(), frame.bytes.begin(), frame.bytes.begin() + 8);
-    answer.insert(answer.end(), {2, 0, 0, 0, 2, 0, 0, 0});
-    answer.insert(answer.end(), frame.bytes.begin() + 8, frame.bytes.end());
+    // LinuxCNC asks for neither the clock nor the direction, and for one count of packets.
+    const Bytes clock{0x34, 0x12};
+    const Bytes direction{2, 0, 0, 0, 2, 0, 0, 0};
+    const Bytes datagrams{0x78, 0x56};
+    const std::span<const std::uint8_t> recorded(frame.bytes);
+    Bytes answer;
+    for (const std::span<const std::uint8_t> part :
+         {std::span(clock), recorded.first(8), std::span(direction), recorded.subspan(8, 26), std::span(datagrams),
+          recorded.subspan(34)}) {
+      answer.insert(answer.end(), part.begin(), part.end());
+    }
     CycleAnswer got;
     REQUIRE(wire.decode(answer, got));
     CHECK(got.clock_us == 0x1234);
     CHECK(got.direction[1] == 2);
     CHECK(got.bitten == driver::hm2::word32(frame.bytes, 8));
     CHECK(got.count[1] == driver::hm2::word32(frame.bytes, 20));
-    CHECK(got.received == driver::hm2::word16(frame.bytes, 32));
+    CHECK(got.received.all == driver::hm2::word16(frame.bytes, 32));
+    CHECK(got.received.udp == 0x5678);
     CHECK(got.write_number == driver::hm2::word32(frame.bytes, 38));
     answer.pop_back();
     CHECK_FALSE(wire.decode(answer, got));

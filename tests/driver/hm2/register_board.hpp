@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <deque>
@@ -24,7 +25,8 @@ class RegisterBoard final : public emulator::RigBehind {
  public:
   using Bytes = std::vector<std::uint8_t>;
 
-  explicit RegisterBoard(double start_speed_rad_s = 0.0) : RigBehind({}, start_speed_rad_s) {
+  explicit RegisterBoard(double start_speed_rad_s = 0.0, const plant_sim::PlantOptions& plant = {})
+      : RigBehind(plant, start_speed_rad_s) {
     const std::array<std::uint32_t, 16> idrom{
         3, 64, 512, text("MESA"), text("7I92"), 9, 34, 2, 34, 17, 100'000'000, 200'000'000, 4, 64, 256, 4};
     rom[0x100] = 0x55AACAFE;
@@ -61,7 +63,8 @@ class RegisterBoard final : public emulator::RigBehind {
   }
   /// Takes a datagram; the answer is empty if it reads nothing.
   Bytes handle(std::span<const std::uint8_t> request) {
-    ++received;
+    ++received.all;
+    if (counts_udp) ++received.udp;
     Bytes answer;
     for (std::size_t i = 0; i + 4 <= request.size();) {
       const unsigned word = request[i] | request[i + 1] << 8U;
@@ -87,19 +90,26 @@ class RegisterBoard final : public emulator::RigBehind {
     bitten = 1;
     ddr_ = {};
   }
+  /// As if the last packet had come from the driver.
+  void forget_last_packet() {
+    --received.all;
+    --received.udp;
+  }
   /// As after a loss of its supply.
   void restart() {
     bite();
     pwm_ = {};
     scratch_ = {};
-    received = 0;
+    received = {};
   }
   [[nodiscard]] const std::array<std::uint32_t, 2>& ddr() const { return ddr_; }
+  [[nodiscard]] std::int64_t last_edge_ns(bool upper) const { return edge_ns_[upper ? 1 : 0]; }
 
   std::map<std::uint16_t, std::uint32_t> rom{};      ///< identity and descriptors
   std::map<std::uint16_t, std::uint32_t> written{};  ///< last value of each register of HostMot2
   std::uint64_t writes{0};
-  std::uint16_t received{0};
+  driver::hm2::Received received{};
+  bool counts_udp{true};
   std::uint32_t bitten{1};
   std::array<std::uint32_t, 2> control{};  ///< bits that the counters report beside what was written
   std::uint32_t broken_pins{0};            ///< pins of port 1 that never become outputs
@@ -132,8 +142,25 @@ class RegisterBoard final : public emulator::RigBehind {
   [[nodiscard]] std::int64_t step_end_ns(std::int64_t next_ns) const noexcept override {
     return armed_ ? std::min(next_ns, std::max(bites_ns_, time_ns() + 1)) : next_ns;
   }
-  void after_step(const plant_sim::PlantState& /*before*/, std::int64_t /*from_ns*/) override {
+  void after_step(const plant_sim::PlantState& before, std::int64_t from_ns) override {
+    stamp(true, before.angle1_rad, plant().state().angle1_rad, from_ns);
+    stamp(false, before.angle2_rad, plant().state().angle2_rad, from_ns);
     if (armed_ && time_ns() >= bites_ns_) bite();
+  }
+  /// Time of the last edge of a step at constant speed: the share of its way at which its last count begins.
+  void stamp(bool upper, double from_rad, double to_rad, std::int64_t from_ns) {
+    const std::int64_t last = position_at(upper, to_rad);
+    if (last == position_at(upper, from_rad)) return;
+    double without = 0.0;
+    double with = 1.0;
+    while (with - without > 1e-6) {
+      const double share = (without + with) / 2;
+      (position_at(upper, from_rad + share * (to_rad - from_rad)) == last ? with : without) = share;
+    }
+    edge_ns_[upper ? 1 : 0] = from_ns + std::llround(with * static_cast<double>(time_ns() - from_ns));
+  }
+  [[nodiscard]] std::uint32_t ticks(std::int64_t at_ns) const {
+    return static_cast<std::uint16_t>(at_ns / (10 * (std::int64_t{reg(0x3200)} + 2)));
   }
   std::uint32_t read(unsigned space, std::uint16_t address) {
     if (space == 0) {
@@ -142,10 +169,11 @@ class RegisterBoard final : public emulator::RigBehind {
         case 0x0D00: return bitten;
         case 0x1100: return ddr_[0];
         case 0x1104: return ddr_[1];
-        case 0x3000: return count(false);
-        case 0x3004: return count(true);
+        case 0x3000: return count(false) | ticks(edge_ns_[0]) << 16U;
+        case 0x3004: return count(true) | ticks(edge_ns_[1]) << 16U;
         case 0x3100: return reg(0x3100) | control[0];
         case 0x3104: return reg(0x3104) | control[1];
+        case 0x3300: return ticks(time_ns());
         default: return 0;
       }
     }
@@ -157,7 +185,7 @@ class RegisterBoard final : public emulator::RigBehind {
       if (address == 0) return static_cast<std::uint16_t>(time_ns() / 1000);
       return address >= 0x10 && address < 0x18 ? word_of_scratch(address) : 0;
     }
-    if (space == 6) return address == 8 ? received : 0;
+    if (space == 6) return address == 8 ? received.all : address == 10 ? received.udp : 0;
     return space == 7 ? word(info_) : 0;
   }
   [[nodiscard]] std::uint32_t word_of_scratch(std::uint16_t address) const {
@@ -186,6 +214,7 @@ class RegisterBoard final : public emulator::RigBehind {
 
   bool armed_{false};
   std::int64_t bites_ns_{0};
+  std::array<std::int64_t, 2> edge_ns_{};  ///< of the lower and the upper wheel's last count
   std::array<std::uint32_t, 2> ddr_{};
   std::array<std::uint32_t, 2> pwm_{};
   std::array<std::uint8_t, 8> scratch_{};
