@@ -24,7 +24,7 @@ Setup matrix_setup(Backend backend) {
   setup.experiment.coast_s = 0.3;
   setup.experiment.stopped_s = 0.3;
   setup.gate.supply_min_V = 15.0;
-  if (backend == Backend::card) setup.gate.brake_duty_max = 0.7;  // the driver's own cap
+  if (backend != Backend::sim) setup.gate.brake_duty_max = 0.7;  // the drivers' own cap
   return setup;
 }
 
@@ -70,7 +70,7 @@ MatrixCase run_with(Backend backend, std::vector<driver::Injection> injections, 
 }  // namespace
 
 std::vector<rig::Phase> phases_of(Backend backend) {
-  if (backend == Backend::card) return {Phase::accelerate, Phase::brake};
+  if (backend != Backend::sim) return {Phase::accelerate, Phase::brake};
   return {Phase::idle, Phase::accelerate, Phase::coast, Phase::brake, Phase::hold, Phase::stopped};
 }
 

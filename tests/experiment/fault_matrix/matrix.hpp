@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -12,8 +13,10 @@
 
 namespace abs_hil::experiment::test {
 
-/// Where the faults are injected: the simulated rig, or the driver of the PCI card on the emulated card's registers.
-enum class Backend : std::uint8_t { sim, card };
+/// Where the faults are injected: the simulated rig, the driver of the PCI card on the emulated card's registers, or
+/// the driver of a HostMot2 board on the registers of one.
+enum class Backend : std::uint8_t { sim, card, hm2 };
+inline constexpr std::array backends{Backend::sim, Backend::card, Backend::hm2};
 
 /// One fault in one phase, and its result.
 struct MatrixCase {
@@ -34,7 +37,7 @@ struct Expectation {
   double bound_s{0.0};  ///< longest time to the safe state
 };
 
-/// Every signal x kind x phase, in this order. On the card, whose emulation takes ten times as long, only the phases of
+/// Every signal x kind x phase, in this order. On boards, whose emulation takes ten times as long, only the phases of
 /// acceleration and braking.
 [[nodiscard]] std::vector<driver::Injection> all_injections(Backend backend);
 /// @param folder  folder of its files
@@ -51,6 +54,6 @@ struct Matrix {
   double nominal_m{0.0};  ///< stopping distance without a fault
 };
 /// The text of docs/reference/fault-matrix.csv.
-[[nodiscard]] std::string stored(const Matrix& sim, const Matrix& card);
+[[nodiscard]] std::string stored(const std::array<Matrix, backends.size()>& matrices);
 
 }  // namespace abs_hil::experiment::test

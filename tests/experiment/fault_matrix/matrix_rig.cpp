@@ -1,5 +1,6 @@
 #include "matrix_rig.hpp"
 
+#include "driver/hm2/register_board.hpp"
 #include "driver/pci/model_card.hpp"
 #include "experiment/simulated_run.hpp"
 
@@ -39,10 +40,29 @@ class EmulatedCard final : public MatrixRig {
   abs_hil::test::ModelCard card_;
 };
 
+/// The same for a HostMot2 board.
+class EmulatedHm2 final : public MatrixRig {
+ public:
+  explicit EmulatedHm2(const Setup& setup) : board_(0.0, setup.plant) {}
+  std::unique_ptr<driver::RigDriver> driver() override {
+    return std::make_unique<abs_hil::test::TimedDriver>(
+        board_, std::make_unique<driver::hm2::Hm2Driver>(driver::hm2::Hm2Options{}, cable_.opener()));
+  }
+  bool at_rest() const override {
+    const emulator::Outputs out = board_.outputs();
+    return out.drive_duty == 0.0 && out.brake_duty == 0.0;
+  }
+
+ private:
+  abs_hil::test::RegisterBoard board_;
+  abs_hil::test::Cable cable_{board_};
+};
+
 }  // namespace
 
 std::unique_ptr<MatrixRig> make_matrix_rig(Backend backend, const Setup& setup) {
   if (backend == Backend::card) return std::make_unique<EmulatedCard>(setup);
+  if (backend == Backend::hm2) return std::make_unique<EmulatedHm2>(setup);
   return std::make_unique<SimulatedRig>(setup);
 }
 

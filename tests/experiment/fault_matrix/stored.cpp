@@ -36,9 +36,11 @@ std::string rows(const Matrix& matrix, const std::string& backend) {
 
 }  // namespace
 
-std::string stored(const Matrix& sim, const Matrix& card) {
-  return "backend,phase,signal,fault,reason,after_ms,stop_distance_change_percent\n" + rows(sim, "sim") +
-         rows(card, "card");
+std::string stored(const std::array<Matrix, backends.size()>& matrices) {
+  constexpr std::array names{"sim", "card", "hm2"};
+  std::string text = "backend,phase,signal,fault,reason,after_ms,stop_distance_change_percent\n";
+  for (std::size_t i = 0; i < matrices.size(); ++i) text += rows(matrices[i], names[i]);
+  return text;
 }
 
 }  // namespace abs_hil::experiment::test
