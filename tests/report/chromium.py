@@ -15,6 +15,7 @@ class Chromium:
         command = f'exec chromium "$@" 3<&{to_browser} 4>&{from_browser}'
         self._process = subprocess.Popen(
             ['bash', '-c', command, 'bash', '--headless', '--no-sandbox', '--disable-gpu', '--hide-scrollbars',
+             '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync',
              '--remote-debugging-pipe', f'--user-data-dir={folder}/profile', f'--window-size={width},{height}'],
             pass_fds=(to_browser, from_browser), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=folder)
         os.close(to_browser)

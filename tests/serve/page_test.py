@@ -146,6 +146,10 @@ def charts_and_runs(page):
     page.wait_for('[...document.querySelectorAll(".chart b")].some(b => b.textContent.startsWith("zeta_N"))', 'a chart more')
     page.choose('#add', 'own')
     page.wait_for('document.querySelectorAll(".chart").length == 10', 'charts of the own signals')
+    page.choose('#align', 'brake')
+    page.wait_for('Math.abs(document.getElementById("ribbon").dataset.end - (document.querySelector(".chart .u-over")'
+                  '.getBoundingClientRect().right - document.getElementById("ribbon").getBoundingClientRect().left)) < 1.5',
+                  'the ribbon ends where the charts do')
     page.click('.chart:last-of-type .close')
     page.wait_for('document.querySelectorAll(".chart").length == 9', 'a chart less')
 

@@ -46,7 +46,7 @@ function exact(rows, signals, shift) {
 }
 
 export class Chart {
-  // scope: {window(), lines(), shown() -> [{run, shift}], rows, bin, place(time), zoom(from, to), whole()}
+  // scope: {window(), lines(), shown() -> [{run, shift}], rows, bin, place(time), zoom(from, to), whole(), drawn(chart)}
   constructor(parent, scope, title, signals, range, remove) {
     Object.assign(this, { scope, title, signals, range });
     this.element = document.createElement('figure');
@@ -89,7 +89,7 @@ export class Chart {
       axes: [{ ...axis, size: 26, values: (_, ticks) => ticks.map((tick) => `${+tick.toFixed(4)} s`) },
         { ...axis, size: AXIS_PX }],
       hooks: {
-        draw: [(plot) => this.lines(plot)],
+        draw: [(plot) => { this.lines(plot); this.scope.drawn(this); }],
         setSelect: [(plot) => {
           if (plot.select.width < 4) return;
           const [from, to] = [plot.select.left, plot.select.left + plot.select.width].map((px) => plot.posToVal(px, 'x'));
@@ -115,8 +115,8 @@ export class Chart {
 
   lines(plot) {
     const { ctx, bbox } = plot;
-    for (const { at, name, style } of this.scope.lines()) {
-      const x = plot.valToPos(at, 'x', true);
+    for (const { at: time, name, style } of this.scope.lines()) {
+      const x = plot.valToPos(time, 'x', true);
       if (x < bbox.left || x > bbox.left + bbox.width) continue;
       ctx.save();
       ctx.strokeStyle = ctx.fillStyle = colour(style);
@@ -127,7 +127,11 @@ export class Chart {
       ctx.stroke();
       ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
       ctx.textAlign = 'left';
-      ctx.fillText(name, x + 3 * devicePixelRatio, bbox.top + 11 * devicePixelRatio);
+      const at = [x + 3 * devicePixelRatio, bbox.top + 11 * devicePixelRatio];
+      ctx.lineWidth = 4 * devicePixelRatio;  // readable over curves
+      ctx.strokeStyle = colour('--card');
+      ctx.strokeText(name, ...at);
+      ctx.fillText(name, ...at);
       ctx.restore();
     }
   }
@@ -178,6 +182,7 @@ export function drawRibbon(scope, chart) {
   const [first] = scope.shown();
   if (!first || !chart?.plot) return;
   const start = chart.plot.bbox.left / devicePixelRatio, width = chart.plot.bbox.width / devicePixelRatio;
+  document.getElementById('ribbon').dataset.end = start + width;
   const [from, to] = scope.window();
   const marks = first.run.facts.marks;
   const x = (time) => start + (time - first.shift - from) / (to - from) * width;

@@ -38,6 +38,7 @@ const scope = {
   },
   place(time) { line = time; changed(); },
   zoom(from, to) { freeze(from, to); },
+  drawn(chart) { if (chart === charts[0]) drawRibbon(scope, chart); },  // only now the plot knows where its axes stand
   whole() { if (frozen) freeze(frozen.to - $('window').value, frozen.to); },
 };
 
@@ -216,8 +217,10 @@ function tellRuns() {
       disabled: run === stream.current, id: `run-${run.number}` });
     box.onchange = () => { chosen[box.checked ? 'add' : 'delete'](run.number); changed(); };
     const { names: n, last_s, lost } = run.facts;
-    label.append(box, ` ${run.number}: ${[n.experiment, n.controller, n.plant].filter(Boolean).join(' · ') || 'names not received yet'}, `
-      + `${last_s.toFixed(1)} s${lost ? `, ${lost} messages lost` : ''}`);
+    const place = scope.shown().findIndex((other) => other.run === run);
+    label.append(box, Object.assign(document.createElement('span'), { className: place < 0 ? '' : `key line-${place % 4 + 1}`, textContent:
+      `${run.number}: ${[n.experiment, n.controller, n.plant].filter(Boolean).join(' · ') || 'names not received yet'}, `
+      + `${last_s.toFixed(1)} s${lost ? `, ${lost} messages lost` : ''}` }));
     return item;
   }));
 }
@@ -234,12 +237,17 @@ function facts() {
   if (!f) return;
   const values = [['phase', mark?.name ?? '–'], ['time', `${f.last_s.toFixed(2)} s`], ['slip', short(newest(run, 'slip_est'), 3)],
     ['wanted', short(newest(run, 'slip_ref'), 3)], ['θ̂', `${short(newest(run, 'theta_est_N'), 3)} N`]];
-  $('readouts').replaceChildren(...values.flatMap(([name, value]) => [Object.assign(document.createElement('dt'), { textContent: name }),
-    Object.assign(document.createElement('dd'), { textContent: value })]));
+  $('readouts').replaceChildren(...values.map(([name, value]) => {
+    const pair = document.createElement('div');
+    pair.append(Object.assign(document.createElement('dt'), { textContent: name }),
+      Object.assign(document.createElement('dd'), { textContent: value }));
+    return pair;
+  }));
   $('readouts').dataset.phase = mark?.phase ?? '';
   $('counts').textContent = `lost on the way ${f.lost} · not sent to this page ${stream.dropped}`;
   $('counts').className = f.lost || stream.dropped ? 'bad' : '';
-  const told = JSON.stringify([...stream.runs.values()].map((r) => [r.number, r.facts?.names, Math.round(r.facts?.last_s ?? 0), r.facts?.lost])) + [...chosen];
+  const told = JSON.stringify([...stream.runs.values()].map((r) => [r.number, r.facts?.names, Math.round(r.facts?.last_s ?? 0), r.facts?.lost]))
+    + [...chosen] + scope.shown().map(({ run: { number } }) => number);
   if (told !== runsTold && !$('runs').contains(document.activeElement)) {
     runsTold = told;
     tellRuns();
@@ -262,7 +270,7 @@ function frame(now) {
   if (!dirty) return;
   dirty = false;
   for (const chart of charts) chart.draw();
-  drawRibbon(scope, charts[0]);
+  if (!charts.length) drawRibbon(scope);
   tellCursors();
 }
 

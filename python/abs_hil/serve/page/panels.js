@@ -11,7 +11,10 @@ export const short = (value, digits = 4) => (value == null || Number.isNaN(value
 function rows(id, lines) {
   document.getElementById(id).replaceChildren(...lines.map((cells, l) => {
     const line = document.createElement('tr');
-    for (const text of cells) line.append(Object.assign(document.createElement(l ? 'td' : 'th'), { textContent: text }));
+    for (const text of cells) {
+      line.append(Object.assign(document.createElement(l ? 'td' : 'th'),
+        { textContent: text, className: String(text).length < 12 ? 'short' : '' }));
+    }
     return line;
   }));
 }
@@ -44,6 +47,13 @@ export function drawWheels(run, live) {
     `upper ${short(omega[0], 3)}, lower ${short(omega[1], 3)} rad/s; drawn ${SLOWER} times slower`;
 }
 
+// 0 and multiples of 1, 2 or 5 times a power of ten up to `most`: two to five.
+function ticks(most) {
+  const power = 10 ** Math.floor(Math.log10(most / 2));
+  const step = power * [5, 2, 1].find((factor) => factor * power * 2 <= most);
+  return Array.from({ length: Math.floor(most / step + 1e-9) + 1 }, (_, i) => +(i * step).toPrecision(3));
+}
+
 export function drawSlipCurve(runs) {
   const { ctx, width, height } = canvas('slip');
   const left = 30, bottom = 18, most = [0.3, 10];
@@ -57,18 +67,21 @@ export function drawSlipCurve(runs) {
   const y = (force) => height - bottom - force / (1.1 * most[1]) * (height - bottom - 4);
   ctx.strokeStyle = colour('--grid');
   ctx.fillStyle = colour('--text');
-  for (let i = 0; i <= 3; ++i) {
-    const [slip, force] = [most[0] * i / 3, most[1] * i / 3];
+  const line = (x1, y1, x2, y2) => {
     ctx.beginPath();
-    ctx.moveTo(x(slip), 4);
-    ctx.lineTo(x(slip), height - bottom);
-    ctx.moveTo(left, y(force));
-    ctx.lineTo(width - 6, y(force));
+    ctx.moveTo(x1, y1);
+    ctx.lineTo(x2, y2);
     ctx.stroke();
-    ctx.textAlign = i === 3 ? 'right' : 'center';
-    ctx.fillText(slip.toFixed(2), x(slip), height - 5);
-    ctx.textAlign = 'right';
-    ctx.fillText(force.toFixed(0), left - 4, y(force) + 4);
+  };
+  for (const slip of ticks(most[0])) {
+    ctx.textAlign = x(slip) > width - 14 ? 'right' : 'center';
+    line(x(slip), 4, x(slip), height - bottom);
+    ctx.fillText(String(slip), x(slip), height - 5);
+  }
+  ctx.textAlign = 'right';
+  for (const force of ticks(1.1 * most[1])) {
+    line(left, y(force), width - 6, y(force));
+    ctx.fillText(String(force), left - 4, y(force) + 4);
   }
   points.forEach((list, r) => {
     ctx.fillStyle = colour(`--line-${r % 4 + 1}`);
@@ -96,21 +109,21 @@ export function drawLatency(facts) {
   const s = facts.status;
   const of = (name) => ['p50', 'p99', 'p99_9', 'max'].map((part) => short(s[`${name}_${part}_us`], 3)).join(' / ');
   document.getElementById('latency-text').textContent = s.cycles == null ? 'cycles by lateness and length, logarithmic' :
-    `wake-up ${of('wakeup_latency')}, cycle ${of('cycle_time')} µs (p50 / p99 / p99.9 / max); ${s.overruns} overruns, `
-    + `${s.telemetry_drops} records dropped by the run`;
+    `wake-up ${of('wakeup_latency')}, cycle ${of('cycle_time')} µs (p50 / p99 / p99.9 / max); late cycles: `
+    + `${s.overruns}; records dropped by the run: ${s.telemetry_drops}`;
 }
 
 const withUnit = (value, unit) => `${short(value)}${unit ? ' ' + unit : ''}`;
 
 export function tell(facts) {
   rows('verdicts', facts.verdicts.length ? [['verdict', 'times', 'last at', 'value', 'bound'], ...facts.verdicts.map((v) =>
-    [v.text, v.count, `${short(v.last_s, 6)} s`, v.quantity ? `${v.quantity} ${withUnit(v.value, v.unit)}` : '', v.bound])]
+    [v.text, v.count, `${v.last_s.toFixed(3)} s`, v.quantity ? `${v.quantity} ${withUnit(v.value, v.unit)}` : '', v.bound])]
     : [['nothing refused, no fault']]);
   const fault = facts.events.filter((event) => event.kind === 'fault').at(-1);
   const banner = document.getElementById('fault');
   banner.hidden = !fault;
   if (fault) {
-    banner.textContent = `Fault at ${short(fault.time_s, 6)} s: ${fault.reason || fault.text}`
+    banner.textContent = `Fault at ${fault.time_s.toFixed(3)} s: ${fault.reason || fault.text}`
       + (fault.quantity ? ` (${fault.quantity} ${withUnit(fault.value, fault.unit)}, bound ${fault.bound || 'none'})` : '')
       + '. The outputs are at their safe values; only a new run can go on.';
   }
