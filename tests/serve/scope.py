@@ -1,10 +1,12 @@
 """Shared by the tests of `abs_hil serve`: the server as a process, and a viewer by the library websockets."""
 import asyncio
+import http.client
 import json
 import os
 import pathlib
 import subprocess
 import sys
+from urllib.parse import urlsplit
 
 import numpy as np
 
@@ -127,3 +129,20 @@ def outside(envelope, cycles, signals):
         if not np.array_equal(met, bounds, equal_nan=True):
             wrong.append((number, signals[place], met, bounds))
     return wrong
+
+
+def answer(server, path, **headers):
+    connection = http.client.HTTPConnection(urlsplit(server.link).netloc, timeout=10)
+    connection.request('GET', path, headers={name.replace('_', '-'): value for name, value in headers.items()})
+    got = connection.getresponse()
+    return got.status, got.read().decode(errors='replace'), got.headers
+
+
+async def stuck(server):
+    """Asks for all signals and never reads."""
+    host = urlsplit(server.link)
+    reader, writer = await asyncio.open_connection(host.hostname, host.port, limit=1)
+    reader._transport.pause_reading()
+    writer.write(f'GET /ws HTTP/1.1\r\nHost: {host.netloc}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n'
+                 'Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n'.encode())
+    return writer
