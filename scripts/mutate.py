@@ -47,13 +47,13 @@ GATE = Group('runtime',
               '"rig/encoder_scale.hpp"', '"runtime/plausibility_limits.hpp"'),
              folders={'safety_class': 'rig'})
 GUARD = Group('guardian', ['board_guard', 'watchdog', 'standby'],
-              ['guardian/board_guard_test.cpp', 'guardian/resident_*_test.cpp', 'guardian/standby_test.cpp',
-               'guardian/watchdog_test.cpp'],
+              ['guardian/board_guard_test.cpp', 'guardian/guard_*_test.cpp', 'guardian/resident_*_test.cpp',
+               'guardian/standby_test.cpp', 'guardian/watchdog_test.cpp'],
               ('<algorithm>', '<array>', '<atomic>', '<optional>', '<utility>', '"abs_hil/driver/safe_state_writer.hpp"',
                '"guardian/mail.hpp"', '"guardian/shared_region.hpp"', '"runtime/clock.hpp"'),
               unchanged=('guardian/linux_process.cpp', 'guardian/mail.cpp', 'guardian/shared_region.cpp'),
               libraries=('files', 'runtime', 'driver', 'rig'))
-NODE = Group('', ['node_core'], ['firmware/node_core_test.cpp'], ('<stdint.h>',), top='firmware', suffix='.c')
+NODE = Group('', ['node_core'], ['firmware/node_*_test.cpp'], ('<stdint.h>',), top='firmware', suffix='.c')
 # File -> its group and the sources that are compiled for its mutants. Of the header of the gate and of constructors in
 # headers the tests have their own copies: they cannot be tried like this.
 FILES = {f'{name}.cpp': (group, [name]) for group in (GATE, GUARD) for name in group.sources} | {

@@ -15,7 +15,6 @@ namespace {
 
 using rig::formatted;
 
-constexpr std::int64_t cycle_ns = 1'000'000;
 /// Turning by hand gives more than this part of a turn, trembling gives less.
 constexpr double least_turn = 0.125;
 /// A person sets a mark on the rim to a pointer within a few degrees: 3 % are 11. An encoder of another number of
@@ -23,8 +22,6 @@ constexpr double least_turn = 0.125;
 /// run would be wrong by that factor, and nothing in a run can tell: both wheels look slower or faster, as on another
 /// rig.
 constexpr double turn_tolerance = 0.03;
-/// Largest movement of the other wheel, which nobody touches meanwhile.
-constexpr std::int32_t still_counts = 64;
 /// A wheel counts as standing if it moves less than `still_counts` in this time.
 constexpr std::int64_t standstill_ns = 500'000'000;
 
@@ -270,97 +267,6 @@ CommissioningResult Commissioning::drive_pulse() {
   }
   dialog_.tell(formatted("ok: lower wheel %d counts forward, upper wheel %d; waiting for both wheels to stop",
                          travel.lower, travel.upper));
-  return wait_for_standstill() ? CommissioningResult::passed : CommissioningResult::failed;
-}
-
-bool Commissioning::drive_until_silent(Travel& before) {
-  constexpr std::int64_t longest_ns = 30 * rig::ns_per_s;
-  constexpr std::int64_t window_ns = rig::ns_per_s / 10;
-  rig::Measurement now;
-  rig::Measurement mark;
-  const std::int64_t end_ns = clock_.now_ns() + longest_ns;
-  for (std::int64_t tick_ns = clock_.now_ns(); tick_ns < end_ns && !stop_requested_(); tick_ns += cycle_ns) {
-    clock_.sleep_until(tick_ns);
-    if (!guard_.beat()) {
-      dialog_.tell("FAILED: the guardian process has ended; the drive was stopped");
-      return false;
-    }
-    const driver::IoResult result = driver_.read(clock_.now_ns(), now);
-    if (result.error == driver::IoError::no_answer) return true;
-    if (const driver::IoResult io =
-            result.ok() ? driver_.write({.motor_duty = options_.drive_duty, .motor_enable = true}) : result;
-        !io.ok()) {
-      dialog_.tell("FAILED: " + driver::error_text(io));
-      return false;
-    }
-    if (now.time_ns - mark.time_ns < window_ns) continue;
-    before = {.upper = rig::counts_between(mark.upper_counts, now.upper_counts),
-              .lower = rig::counts_between(mark.lower_counts, now.lower_counts)};
-    mark = now;
-  }
-  dialog_.tell("FAILED: the cable was not pulled, or the board works without it");
-  return false;
-}
-
-bool Commissioning::await_board() {
-  rig::Measurement ignored;
-  const std::int64_t end_ns = clock_.now_ns() + std::llround(options_.run_out_limit_s / rig::s_per_ns);
-  for (std::int64_t tick_ns = clock_.now_ns(); tick_ns < end_ns && !stop_requested_(); tick_ns += cycle_ns) {
-    clock_.sleep_until(tick_ns);
-    if (!guard_.beat()) return false;
-    if (driver_.read(clock_.now_ns(), ignored).error != driver::IoError::no_answer) return true;
-  }
-  dialog_.tell("FAILED: the board does not answer again");
-  return false;
-}
-
-bool Commissioning::counts_in_0_1_s(Travel& travel) {
-  rig::Measurement first;
-  rig::Measurement last;
-  if (!read(first)) return false;
-  clock_.sleep_until(clock_.now_ns() + rig::ns_per_s / 10);
-  if (!read(last)) return false;
-  travel = {.upper = rig::counts_between(first.upper_counts, last.upper_counts),
-            .lower = rig::counts_between(first.lower_counts, last.lower_counts)};
-  return true;
-}
-
-CommissioningResult Commissioning::pull_cable() {
-  const std::string cable(driver_.watched_cable());
-  if (cable.empty()) return CommissioningResult::passed;
-  if (!dialog_.ask(step(4) +
-                   formatted("the drive gets duty %.2f until you pull the %s. The wheels must then coast. If they go "
-                             "faster, press the E-stop at once: the outputs have the wrong polarity. Close the cover, "
-                             "stand clear, one hand at the cable and one at the E-stop. Go on?",
-                             options_.drive_duty, cable.c_str()))) {
-    return CommissioningResult::declined;
-  }
-  guard_.begin();
-  dialog_.tell("Pull the " + cable + " now, at the board. Plug it in again after a second or two.");
-  Travel before;
-  const bool back = drive_until_silent(before) && await_board();
-  const driver::IoResult ended = driver_.deactivate();
-  guard_.end(ended.ok());
-  if (stop_requested_()) return CommissioningResult::interrupted;
-  if (!back || !ended.ok()) return CommissioningResult::failed;
-  driver_.configure();
-  Travel after;
-  if (!activate_and_rest() || !counts_in_0_1_s(after)) return CommissioningResult::failed;
-  if (after.lower > before.lower + still_counts / 4) {
-    dialog_.tell(
-        formatted("FAILED: the lower wheel made %d counts in 0.1 s before and %d after: the outputs are on while "
-                  "the board is off. Wire them active-low (docs/hm2.md, \"Wiring\")",
-                  before.lower, after.lower));
-    return CommissioningResult::failed;
-  }
-  if (!dialog_.ask("Did the wheels coast while the cable was out?")) {
-    dialog_.tell("FAILED: wire the outputs active-low (docs/hm2.md, \"Wiring\")");
-    return CommissioningResult::failed;
-  }
-  dialog_.tell(
-      formatted("ok: the lower wheel made %d counts in 0.1 s before the cable was pulled and %d after it was "
-                "back; waiting for both wheels to stop",
-                before.lower, after.lower));
   return wait_for_standstill() ? CommissioningResult::passed : CommissioningResult::failed;
 }
 

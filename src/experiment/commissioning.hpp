@@ -73,6 +73,10 @@ class Commissioning {
   [[nodiscard]] const TurnCounts& one_turn() const noexcept { return one_turn_; }
 
  private:
+  static constexpr std::int64_t cycle_ns = 1'000'000;
+  /// Largest movement of a wheel that nobody touches and nothing drives.
+  static constexpr std::int32_t still_counts = 64;
+
   enum class Wheel : std::uint8_t { upper, lower };
   struct Travel {
     std::int32_t upper{0};

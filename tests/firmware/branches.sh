@@ -6,8 +6,10 @@ command -v gcov >/dev/null || { echo "SKIPPED: no gcov"; exit 77; }
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 gcc -std=c99 -O0 --coverage -c "$PWD/firmware/node_core.c" -o "$folder/node_core.o"
-g++ -std=c++20 -O0 -Ifirmware -Itests -c tests/firmware/node_core_test.cpp -o "$folder/test.o"
-g++ --coverage "$folder/node_core.o" "$folder/test.o" -lCatch2WithMain -o "$folder/node_test"
+for source in tests/firmware/node_*_test.cpp; do
+  g++ -std=c++20 -O0 -Ifirmware -Itests -c "$source" -o "$folder/$(basename "$source").o"
+done
+g++ --coverage "$folder"/*.o -lCatch2WithMain -o "$folder/node_test"
 cd "$folder"
 ./node_test | tail -2
 gcov -b node_core.o | tee report | head -5
