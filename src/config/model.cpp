@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <string_view>
 #include <variant>
 
 #include "abs_hil/rig/brake_map.hpp"
@@ -90,6 +92,27 @@ std::string slip_out_of_reach(const Script& script, const Settings& s) {
       "the cap if brake and supply bear it, or give a control.slip_ref below {:.2g}",
       s.gate.brake_duty_max, most_Nm, least_slip, needed_Nm, of_plant ? "plant" : "model", rig.tyre.theta_N,
       s.control.slip_ref, reached, reached);
+}
+
+std::vector<std::string> negative_at_dead_zone(const Settings& s) {
+  std::vector<std::string> problems;
+  const auto judge = [&](std::string_view section, const rig::BrakeParameters& brake) {
+    const double torque_Nm = brake.b1_Nm * brake.u0 + brake.b2_Nm;
+    if (torque_Nm >= 0.0) return;
+    const double ends_at = std::ceil(-brake.b2_Nm / brake.b1_Nm * 1e4) / 1e4;  // rounded up: b is not negative there
+    problems.push_back(fmt::format(
+        "{0}.u0 = {1:.6g}: the brake's map b(u) = b1_Nm u + b2_Nm is {2:.3g} N m there, below 0, so the brake gives "
+        "nothing up to a duty of {3:.4g} and no log tells {0}.u0; {4}measure {0}.b1_Nm = {5:.6g} and "
+        "{0}.b2_Nm = {6:.6g} again",
+        section, brake.u0, torque_Nm, ends_at,
+        ends_at < 1.0 ? fmt::format("give {}.u0 = {:.4g}, or ", section, ends_at) : "", brake.b1_Nm, brake.b2_Nm));
+  };
+  const rig::BrakeParameters& plant = s.plant.rig.brake;
+  const rig::BrakeParameters& model = s.model.brake;
+  const bool same = plant.u0 == model.u0 && plant.b1_Nm == model.b1_Nm && plant.b2_Nm == model.b2_Nm;
+  if (!s.on_rig()) judge("plant", plant);
+  if (s.on_rig() || !same) judge("model", model);
+  return problems;
 }
 
 std::vector<std::string> theta_out_of_bounds(const Settings& settings) {

@@ -34,4 +34,8 @@ struct ModelDifference {
 /// control.slip_ref gives.
 [[nodiscard]] std::string slip_out_of_reach(const Script& script, const Settings& settings);
 
+/// Says where the brake's map (7) is negative at the end u0 of its dead zone, in the plant or, on a rig or where it
+/// differs, in the model; empty: nowhere. The dead zone is then wider than u0 says.
+[[nodiscard]] std::vector<std::string> negative_at_dead_zone(const Settings& settings);
+
 }  // namespace abs_hil::config

@@ -248,6 +248,7 @@ void merge_into(RunRequest& request, config::KeyTable& keys, const RunOptions& o
   static_cast<void>(driver::parse_injections(s.inject));  // in simulation too, a fault is spelled right or refused
   if (s.on_rig()) apply_board_policy(s, keys, request.outputs.fast);
   for (const std::string& problem : config::theta_out_of_bounds(s)) warn_once(problem);
+  for (const std::string& problem : config::negative_at_dead_zone(s)) warn_once(problem);
   if (const std::string problem = config::standstill_too_early(s); !problem.empty()) warn_once(problem);
   if (const std::string problem = config::slip_out_of_reach(script, s); !problem.empty()) warn_once(problem);
   if (s.experiment.answers == "auto" && asks(script)) s.experiment.answers = who_answers(request);

@@ -234,6 +234,30 @@ TEST_CASE("a cap of the brake that keeps the wheel from the wanted slip is named
   CHECK_THAT(slip_out_of_reach(braking, rig.settings), Contains("model.theta_N = 47 N"));
 }
 
+TEST_CASE("a brake map that is negative at the end of its dead zone is named with the duty that it needs") {
+  Fixture f;
+  CHECK(negative_at_dead_zone(f.settings).empty());
+  f.set({"plant.u0=0.35", "plant.b1_Nm=15", "plant.b2_Nm=-6"});  // b(0.35) = -0.75; b(0.4) = 0
+  REQUIRE(negative_at_dead_zone(f.settings).size() == 1);        // the model follows the plant
+  CHECK_THAT(negative_at_dead_zone(f.settings)[0], Contains("plant.u0 = 0.35") && Contains("is -0.75 N m") &&
+                                                       Contains("give plant.u0 = 0.4,") &&
+                                                       Contains("plant.b1_Nm = 15") && Contains("plant.b2_Nm = -6"));
+  f.set({"plant.u0=0.4"});  // what the message said
+  CHECK(negative_at_dead_zone(f.settings).empty());
+  f.set({"plant.b2_Nm=-20"});  // no duty brakes, and no u0 would mend it
+  REQUIRE(negative_at_dead_zone(f.settings).size() == 1);
+  CHECK_THAT(negative_at_dead_zone(f.settings)[0], Contains("plant.b2_Nm = -20") && !Contains("give plant.u0"));
+  f.set({"plant.b2_Nm=-6", "model.u0=0.3", "plant.u0=0.2"});
+  REQUIRE(negative_at_dead_zone(f.settings).size() == 2);
+  CHECK_THAT(negative_at_dead_zone(f.settings)[1], Contains("model.u0 = 0.3"));
+
+  Fixture rig;
+  rig.settings.backend = "rig";
+  rig.set({"model.u0=0.35", "plant.u0=0.1"});
+  REQUIRE(negative_at_dead_zone(rig.settings).size() == 1);  // there is no simulated plant
+  CHECK_THAT(negative_at_dead_zone(rig.settings)[0], Contains("model.u0 = 0.35"));
+}
+
 TEST_CASE("limits of a plan are judged by the model") {
   Fixture f;
   f.set({"experiment.name=paper", "model.b1_Nm=1"});
