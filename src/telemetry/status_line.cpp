@@ -5,9 +5,11 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace abs_hil::telemetry {
 namespace {
@@ -25,37 +27,47 @@ std::string number(double value, int width, int decimals) {
   return std::isnan(value) ? fmt::format("{:>{}}", "-", width) : fmt::format("{:{}.{}f}", value, width, decimals);
 }
 
-/// Wake-up latency and cycle time as p50/p99/p99.9/max; empty while nothing has been measured.
-std::string timing_text(const StatusSnapshot& status) {
-  const rig::DurationQuantiles& wakeup = status.wakeup_latency;
-  const rig::DurationQuantiles& cycle = status.cycle_time;
-  if (!std::isfinite(wakeup.p50_us) || !std::isfinite(cycle.p50_us)) return {};
-  return fmt::format("  wake-up {:.0f}/{:.0f}/{:.0f}/{:.0f}  cycle {:.0f}/{:.0f}/{:.0f}/{:.0f} us", wakeup.p50_us,
-                     wakeup.p99_us, wakeup.p99_9_us, wakeup.max_us, cycle.p50_us, cycle.p99_us, cycle.p99_9_us,
-                     cycle.max_us);
+/// Columns that a terminal needs for UTF-8. Combining marks take none.
+int columns_for(std::string_view text) {
+  return static_cast<int>(std::ranges::count_if(text, [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool continuation = (byte & 0xC0U) == 0x80U;
+    const bool combining = byte == 0xCC;  // U+0300 to U+033F: the hat of theta
+    return !continuation && !combining;
+  }));
+}
+
+std::string quantiles(const rig::DurationQuantiles& q) {
+  return fmt::format("{:.0f}/{:.0f}/{:.0f}/{:.0f}", q.p50_us, q.p99_us, q.p99_9_us, q.max_us);
+}
+
+std::vector<std::string> fields_of(const rig::CycleRecord& record, const StatusSnapshot& status) {
+  const rig::WheelSpeeds speeds = rig::best_speeds(record);
+  std::vector<std::string> fields{fmt::format("{:<10} ω1 {}  ω2 {} rad/s", rig::name_of(record.phase),
+                                              number(speeds.omega1_rad_s, 6, 1), number(speeds.omega2_rad_s, 6, 1)),
+                                  fmt::format("slip {}", number(rig::best_slip(record), 5, 2)),
+                                  fmt::format("θ̂ {} N", number(record.control.theta_est_N, 6, 2)),
+                                  fmt::format("overruns {}", status.overruns),
+                                  fmt::format("drops {}", status.telemetry_drops),
+                                  fmt::format("gate {}", status.gate_interventions)};
+  const bool timed = std::isfinite(status.wakeup_latency.p50_us) && std::isfinite(status.cycle_time.p50_us);
+  if (timed) {
+    fields.push_back(fmt::format("wake-up {} us", quantiles(status.wakeup_latency)));
+    fields.push_back(fmt::format("cycle {} us", quantiles(status.cycle_time)));
+  }
+  return fields;
 }
 
 }  // namespace
 
-std::string format_status_line(const rig::CycleRecord& record, const StatusSnapshot& status) {
-  const rig::WheelSpeeds speeds = rig::best_speeds(record);
-  return fmt::format("{:<10} ω1 {}  ω2 {} rad/s  slip {}  θ̂ {} N  overruns {}  drops {}  gate {}{}",
-                     rig::name_of(record.phase), number(speeds.omega1_rad_s, 6, 1), number(speeds.omega2_rad_s, 6, 1),
-                     number(rig::best_slip(record), 5, 2), number(record.control.theta_est_N, 6, 2), status.overruns,
-                     status.telemetry_drops, status.gate_interventions, timing_text(status));
-}
-
-std::string_view cut_to_columns(std::string_view text, int columns) noexcept {
-  int used = 0;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const auto byte = static_cast<unsigned char>(text[i]);
-    const bool continuation = (byte & 0xC0U) == 0x80U;
-    const bool combining = byte == 0xCC;  // U+0300 to U+033F: the hat of theta
-    if (continuation || combining) continue;
-    if (used == columns) return text.substr(0, i);
-    ++used;
+std::string format_status_line(const rig::CycleRecord& record, const StatusSnapshot& status, int columns) {
+  std::string line;
+  for (const std::string& field : fields_of(record, status)) {
+    const std::string_view gap = line.empty() ? "" : "  ";
+    if (columns_for(line) + columns_for(gap) + columns_for(field) > columns) break;
+    line.append(gap).append(field);
   }
-  return text;
+  return line;
 }
 
 StatusLine::StatusLine(StatusSource status, int file)
@@ -66,9 +78,9 @@ StatusLine::~StatusLine() { erase(); }
 void StatusLine::consume(const rig::CycleRecord& record, double /*distance_m*/) {
   if (!active_ || (next_draw_ns_ && record.stamp_ns < *next_draw_ns_)) return;
   next_draw_ns_ = record.stamp_ns + draw_period_ns;
-  const std::string text = format_status_line(record, status_ ? status_() : StatusSnapshot{});
   std::string line(erase_line);
-  line += cut_to_columns(text, columns_of(file_) - 1);  // a full line would make some terminals scroll
+  const int columns = columns_of(file_) - 1;  // a full line would make some terminals scroll
+  line += format_status_line(record, status_ ? status_() : StatusSnapshot{}, columns);
   put(line);
   drawn_ = true;
 }

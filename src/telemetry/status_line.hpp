@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -11,11 +12,9 @@
 namespace abs_hil::telemetry {
 
 /// The text of the status line: phase, speeds, slip, theta estimate, overruns, drops, then wake-up latency and cycle
-/// time as p50/p99/p99.9/max. UTF-8, no line end.
-[[nodiscard]] std::string format_status_line(const rig::CycleRecord& record, const StatusSnapshot& status);
-
-/// `text` cut to `columns` of a terminal. Combining marks count as 0 columns.
-[[nodiscard]] std::string_view cut_to_columns(std::string_view text, int columns) noexcept;
+/// time as p50/p99/p99.9/max. UTF-8, no line end. Ends before the first field that does not fit into `columns`.
+[[nodiscard]] std::string format_status_line(const rig::CycleRecord& record, const StatusSnapshot& status,
+                                             int columns = std::numeric_limits<int>::max());
 
 /// A status line on a terminal, for runs in real time. It is redrawn at most ten times a second by the records' stamps.
 /// It does nothing if the file is not a terminal, and does not wait for a terminal that is held (Ctrl-S).

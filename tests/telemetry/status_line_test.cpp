@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <stdlib.h>
+#include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -70,15 +71,36 @@ TEST_CASE("an unknown number is a dash, a huge one does no harm") {
   r.control.theta_est_N = rig::unknown;
   const std::string line = format_status_line(r, {});
   CHECK_THAT(line, Catch::Matchers::Contains("ω2  150.0 rad/s  slip  0.18  θ̂      - N  overruns 0"));
-  CHECK(cut_to_columns(line, 80).size() < 100);
+  CHECK(format_status_line(r, {}, 80).empty());  // the first field alone is too long
 }
 
-TEST_CASE("a text is cut at columns, not bytes") {
-  CHECK(cut_to_columns("abc", 5) == "abc");
-  CHECK(cut_to_columns("abc", 2) == "ab");
-  CHECK(cut_to_columns("ω1", 1) == "ω");
-  CHECK(cut_to_columns("θ̂x", 1) == "θ̂");
-  CHECK(cut_to_columns("abc", -1).size() == 3);
+TEST_CASE("the line ends at a whole field, and columns are not bytes") {
+  rig::CycleRecord r = test::sample_record(0);
+  r.truth.speeds = {123.44, 150.0};
+  r.truth.slip = 0.18;
+  r.control.theta_est_N = 22.876;
+  const std::string up_to_slip = "brake      ω1  123.4  ω2  150.0 rad/s  slip  0.18";
+  const std::string up_to_theta = up_to_slip + "  θ̂  22.88 N";
+  const std::string up_to_overruns = up_to_theta + "  overruns 0";
+  CHECK(format_status_line(r, {}, 73) == up_to_overruns);
+  CHECK(format_status_line(r, {}, 72) == up_to_theta);
+  CHECK(format_status_line(r, {}, 61) == up_to_theta);
+  CHECK(format_status_line(r, {}, 60) == up_to_slip);
+  CHECK(format_status_line(r, {}, 0).empty());
+}
+
+TEST_CASE("on a terminal of 80 columns the line is no field shorter than it has to be, and none is cut") {
+  const Terminal pty;
+  const winsize size{.ws_row = 24, .ws_col = 80, .ws_xpixel = 0, .ws_ypixel = 0};
+  REQUIRE(::ioctl(pty.terminal, TIOCSWINSZ, &size) == 0);
+  StatusLine line({}, pty.terminal);
+  rig::CycleRecord r = test::sample_record(0);
+  r.control.theta_est_N = rig::unknown;
+  line.consume(r, 0.0);
+  const std::string shown = pty.shown();
+  CHECK_THAT(shown, Catch::Matchers::EndsWith(format_status_line(r, {}, 79)));
+  CHECK_THAT(shown, Catch::Matchers::EndsWith(" N  overruns 0"));
+  CHECK_THAT(shown, !Catch::Matchers::Contains("nan"));
 }
 
 TEST_CASE("a terminal shows the line at most ten times a second and nothing after the end") {

@@ -61,6 +61,6 @@ TEST_CASE("ABS_TELEMETRY carries the recording time and why ticks were missed") 
 
 TEST_CASE("the status line ends with wake-up latency and cycle time once there are any") {
   CHECK_THAT(format_status_line(test::sample_record(0), timed()),
-             Catch::Matchers::EndsWith("drops 9  gate 0  wake-up 1/2/3/4  cycle 17/18/19/20 us"));
+             Catch::Matchers::EndsWith("drops 9  gate 0  wake-up 1/2/3/4 us  cycle 17/18/19/20 us"));
   CHECK_THAT(format_status_line(test::sample_record(0), {}), Catch::Matchers::EndsWith("drops 0  gate 0"));
 }
