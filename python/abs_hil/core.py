@@ -5,6 +5,8 @@ import importlib
 import pathlib
 import sys
 import sysconfig
+import warnings
+from collections.abc import Iterable
 from typing import Any
 
 try:
@@ -39,5 +41,23 @@ def load_network(purpose: str) -> Any:
                       'python3-abs-hil has it; Windows and macOS have no such module') from error
 
 
+def _newer_than(module: pathlib.Path, libraries: Iterable[str]) -> list[str]:
+    """The libraries that were built after the module, which was linked from an earlier state of them."""
+    linked = module.stat().st_mtime
+    return [library for library in libraries if (path := pathlib.Path(library)).exists() and path.stat().st_mtime > linked]
+
+
+def _warn_if_old() -> None:
+    try:
+        from ._build_tree import CORE_LIBRARIES, PROGRAM
+    except ImportError:
+        return  # installed: the program and the module came together
+    if _newer_than(pathlib.Path(_core.__file__), CORE_LIBRARIES):
+        build = pathlib.Path(PROGRAM).parent.parent
+        warnings.warn(f'abs_hil: the compiled module {_core.__file__} is older than the program {PROGRAM}: laws, keys and '
+                      f'results can differ; build it too: `cmake --build {build} --target abs_hil_python`', stacklevel=2)
+
+
+_warn_if_old()
 if (_folder := _config_dir()) is not None:
     _core.set_config_dir(str(_folder))
