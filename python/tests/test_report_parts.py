@@ -110,3 +110,29 @@ def test_survey_of_rows_gives_the_summarys_figures(tmp_path):
         assert found.metrics[metric.name] == pytest.approx(said, abs=1e-9) if said is not None else True
     assert found.brake_from_s == pytest.approx(run.summary['brake_start_s'])
     assert [phase.phase for phase in found.phases] == list(dict.fromkeys(run['phase'].tolist()))
+
+
+def pulses_of(tmp_path, torque_Nm, slip_ref):
+    """Names and starts of the parts of a braking, a row every 10 ms; torque and wanted slip are functions of the row."""
+    lines = [','.join(COLUMNS)]
+    for i in range(200):
+        row = {**dict.fromkeys(COLUMNS, '1'), 'time_s': f'{0.01 * i:.2f}', 'phase': 'coast' if i < 10 else 'brake',
+               'brake_torque_ref_Nm': torque_Nm(i), 'slip_ref': slip_ref(i)}
+        lines.append(','.join(map(str, row.values())))
+    (tmp_path / 'run.csv').write_text('\n'.join(lines) + '\n')
+    run = files.RunFiles(tmp_path / 'run.csv', 'run')
+    return [(name, values['brake_start_s']) for name, values in survey.survey(run, survey.Rows(run.csv)).brakings]
+
+
+def test_a_brake_that_acts_again_after_a_release_begins_a_pulse(tmp_path):
+    def twice(released):
+        return lambda i: 0 if i < 20 or 50 <= i < 50 + released else 2
+    assert pulses_of(tmp_path, twice(40), lambda i: 0.15) == [('1: brake', 0.1), ('2: brake, pulse 2', 0.9)]
+    assert pulses_of(tmp_path, twice(15), lambda i: 0.15) == []  # as laws that switch do
+
+
+def test_a_step_of_the_wanted_slip_begins_a_pulse_and_a_ramp_or_a_search_does_not(tmp_path):
+    assert pulses_of(tmp_path, lambda i: 2, lambda i: 0.05 if i < 60 else 0.15 if i < 120 else 0.1) == [
+        ('1: brake', 0.1), ('2: brake, pulse 2', 0.6), ('3: brake, pulse 3', 1.2)]
+    for ramp in (lambda i: 0.1 + 0.02 * i, lambda i: 0.15 + 0.0001 * i, lambda i: 0.1 + 0.05 * (i % 2), lambda i: 'NaN'):
+        assert pulses_of(tmp_path, lambda i: 2, ramp) == []

@@ -90,15 +90,23 @@ class Page(ReportTest):
         for colour in ('#000000', '#1a1a1a'):
             self.assertGreater(brightness(read.dark[colour]), 0.8)
 
-    def test_each_phase_of_braking_has_its_own_figures_of_merit(self):
+    def test_each_pulse_of_braking_has_its_own_figures_of_merit(self):
         run = self.make_run('pulses', '--experiment', 'pulses')
         page, _ = self.page(run)
         read = PageReader(page)
         names = [line[0] for line in read.tables['phases'][1:]]
-        self.assertEqual(names, ['1: pulses-fast', '2: pulses-medium', '3: pulses-slow'])
+        self.assertEqual(names, ['1: pulses-fast', '2: pulses-fast, pulse 2', '3: pulses-fast, pulse 3',
+                                 '4: pulses-medium', '5: pulses-medium, pulse 2', '6: pulses-medium, pulse 3',
+                                 '7: pulses-slow', '8: pulses-slow, pulse 2'])
         rows = self.rows(run)
-        for line in read.tables['phases'][1:]:
-            own = [row for row in rows if row['phase_name'] == line[0][3:]]
+        pulses = []  # a brake that was off, or another phase, begins one
+        for before, row in zip(rows, rows[1:]):
+            if row['phase'] == 'brake':
+                if row['phase_name'] != before['phase_name'] or float(row['brake_pwm']) > 0 == float(before['brake_pwm']):
+                    pulses.append([])
+                pulses[-1].append(row)
+        self.assertEqual(len(pulses), len(names))
+        for line, own in zip(read.tables['phases'][1:], pulses):
             cell = dict(zip(read.tables['phases'][0], line))
             self.assertEqual(cell['start of braking / s'], f'{float(own[0]["time_s"]):.3f}')
             torques = [float(row['brake_torque_ref_Nm']) for row in own]
@@ -106,8 +114,7 @@ class Page(ReportTest):
                              f'{sum(abs(b - a) for a, b in zip(torques, torques[1:])):.1f}')
             judged = [float(row['slip']) for row in own if float(row['omega2_rad_s']) * 0.099 > 3.0]
             self.assertEqual(cell['largest slip'], f'{max(judged):.4f}')
-        last = dict(zip(read.tables['phases'][0], read.tables['phases'][-1]))
-        begin = next(row for row in rows if row['phase_name'] == 'pulses-slow')
+        last, begin = dict(zip(read.tables['phases'][0], read.tables['phases'][-1])), pulses[-1][0]
         stopped = next(row for row in rows if float(row['time_s']) > float(begin['time_s']) and float(row['omega2_rad_s']) * 0.099 < 0.3)
         self.assertAlmostEqual(float(last['stop distance / m']), float(stopped['distance_m']) - float(begin['distance_m']), delta=0.02)
         self.assertNotIn('phases', PageReader(self.page(self.make_run('a'))[0]).tables)

@@ -21,6 +21,10 @@ DEFAULT_END_SPEED_M_S = 0.3
 #: a run has a handful
 MOST_PHASES = 2000
 MOST_BRAKINGS = 60
+#: a brake that asked for no torque for so long ends a pulse; laws that switch release it for less
+RELEASED_S = 0.2
+#: a wanted slip that stands, changes by this much in a cycle and stands again begins a pulse; laws that seek theirs drift
+SLIP_STEP = 0.01
 _METRIC_COLUMNS = ('time_s', 'omega1_rad_s', 'omega2_rad_s', 'omega1_est_rad_s', 'omega2_est_rad_s', 'slip', 'slip_est',
                    'slip_ref', 'brake_torque_ref_Nm', 'theta_N', 'theta_est_N', 'distance_m')
 _PROFILES = {'plant.friction_profile': 'friction', 'plant.brake_torque_profile': 'brake torque',
@@ -97,7 +101,8 @@ class Survey:
     known: set[str] = field(default_factory=set)
     signals: list[str] = field(default_factory=list)
     metrics: dict[str, float] = field(default_factory=dict)
-    brakings: list[tuple[str, dict[str, float]]] = field(default_factory=list)  # (phase, figures) of each, if there are several
+    # (phase and pulse, figures) of each, if there are several
+    brakings: list[tuple[str, dict[str, float]]] = field(default_factory=list)
     r2_m: float = PAPER_R2_M
 
     @property
@@ -134,14 +139,27 @@ def survey(run: RunFiles, rows: Rows) -> Survey:
         columns['distance_m'] = columns['distance_m'] - (columns['distance_m'][0] if first else 0.0)
         return _core.metrics_of({**columns, 'braking': braking[first:last].astype(np.float64)}, found.r2_m, end_speed_m_s)
     found.metrics = figures_from(0, len(time))
-    brakings = [int(start) for start in starts[:MOST_BRAKINGS] if braking[start]]
+    brakings = [(int(place), pulse) for start, end in zip(starts, [*starts[1:], len(time)]) if braking[start]
+                for pulse, place in enumerate([start, *_pulses(rows, start, end)], 1)][:MOST_BRAKINGS]
     if len(brakings) > 1:
-        for number, (first, last) in enumerate(zip(brakings, [*brakings[1:], len(time)]), 1):
-            name = next(phase.shown for phase in found.phases if phase.from_s == time[first])
-            found.brakings.append((f'{number}: {name}', figures_from(first, last)))
+        ends = [place for place, _ in brakings[1:]] + [len(time)]
+        for number, ((first, pulse), last) in enumerate(zip(brakings, ends), 1):
+            name = next(phase.shown for phase in reversed(found.phases) if phase.from_s <= time[first])
+            found.brakings.append((f'{number}: {name}{f", pulse {pulse}" if pulse > 1 else ""}', figures_from(first, last)))
     found.changes = _changes(run, rows, found.r2_m)
     assert set(COLUMNS) & found.known
     return found
+
+
+def _pulses(rows: Rows, start: int, end: int) -> np.ndarray:
+    """The rows within a phase of braking, from `start` to before `end`, at which another pulse begins: the brake acts again
+    after a release, or the wanted slip steps to another value."""
+    acts = np.flatnonzero(rows.columns['brake_torque_ref_Nm'][start:end] > 0.0)
+    again = acts[1:][np.diff(rows.time_s[start + acts]) > RELEASED_S]
+    change = np.abs(np.diff(rows.columns['slip_ref'][start:end]))
+    stands = change == 0.0
+    steps = np.flatnonzero((change[1:-1] >= SLIP_STEP) & stands[:-2] & stands[2:]) + 2
+    return start + np.union1d(again, steps)
 
 
 def _changes(run: RunFiles, rows: Rows, r2_m: float) -> list[Change]:
