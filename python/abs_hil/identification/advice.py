@@ -13,10 +13,10 @@ from ..simulation import simulate
 from .found import Identified
 from .linear import keep_normals, linearise, run_filter
 from .logs import Log, motion_of, segments_of
+from .parameters import EXPERIMENTS
 from .problem import QUIET, WINDOW_DISTURBED_S, WINDOW_S, Disturbances, Fit, Problem, pieces_of
 from .results import plant_settings
 
-EXPERIMENTS = ('lifted', 'duty-ramp', 'pulses', 'slip-sweep', 'locked-stop', 'coast-down')
 #: factors below this are worth a word
 NARROWER = 0.8
 
@@ -42,7 +42,7 @@ def log_of(name: str, settings: Mapping[str, Value], phases: Sequence[float] | N
     counts = np.stack([columns['upper_counts'], columns['lower_counts']], axis=1)
     log = Log(name, pathlib.Path(name), '', columns['time_s'], counts - counts[0], np.nan_to_num(columns['brake_pwm']),
               np.nan_to_num(columns['motor_pwm']), columns['wheels_apart'], columns.get('phase_name', columns['phase']),
-              np.zeros((len(counts), 2)), first_counts=counts[0].astype(float))
+              np.zeros((len(counts), 2)), first_counts=counts[0].astype(float), experiment=name)
     if phases is not None:
         base = _core.PlantOptions(options(set=settings))
         per_count = 2 * np.pi / int(base.values()['encoder_counts_per_rev'])

@@ -1,6 +1,7 @@
 """What identify() found: estimates with their intervals, statuses and combinations, and which logs disagree."""
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,8 +10,8 @@ import numpy as np
 from . import discs, intervals, rate_limit
 from .fit import describe
 from .logs import Log
-from .parameters import COMBINATIONS, DELAY, GIVEN, RATE_LIMIT, WHEELS
-from .problem import Disturbances, Fit
+from .parameters import COMBINATIONS, DELAY, EXPERIMENTS, GIVEN, RATE_LIMIT, WHEELS
+from .problem import Disturbances, Fit, Problem
 
 #: an estimate whose standard deviation is above this share of its value is not called identified
 LARGEST_SD = 0.05
@@ -73,7 +74,7 @@ def interrupted(fit: Fit, start: str, notes: list[str]) -> Identified:
     size = len(fit.problem.parameters)
     nothing = np.full((size, size), np.nan)
     found = assembled(Finished(fit, intervals.Spread(nothing, np.zeros(size), 0, nothing), [], None, {}), start,
-                       ['interrupted: the values are provisional, and no interval is given'])
+                       ['interrupted: the values so far are kept, without intervals; for all, the same command with --force'])
     found.notes[1:] = notes
     without_intervals(found)
     found.interrupted = True
@@ -105,6 +106,8 @@ def assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
             continue
         if p.key == 'u0':
             parameters[p.key] = _u0(fit, finished.gaps if _known(parameters.get('b1_Nm')) else [])
+            if _told_by_no_log(parameters, notes):
+                continue
             if parameters[p.key].status != 'identified':
                 cures.setdefault(p.cure, []).append(p.key)
             continue
@@ -136,15 +139,42 @@ def assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
         combinations[name] = Estimate(value, value - intervals.WIDTH * sd, value + intervals.WIDTH * sd,
                                       'identified' if known else 'not-identifiable', unit)
         if known:
+            apart = _run(cure, problem, 'to part them, ')
             joined = ' and '.join((', '.join(parts[:-1]), parts[-1]))
-            notes.append(f'{joined} are known better together, as {name} = {value:.5g} {unit}; to part them, run: {cure}')
+            notes.append(f'{joined} are known better together, as {name} = {value:.5g} {unit}{apart}')
     for cure, keys in cures.items():
         if cure:
-            notes.append(f'the logs do not tell {", ".join(keys)}; run: {cure}')
+            notes.append(f'the logs do not tell {", ".join(keys)}{_run(cure, problem)}')
     if disturbances is not None:
         notes.append(f'the rig wanders ({describe(disturbances)}); the intervals count with it')
     return Identified(problem.form.name, start, parameters, combinations, fit.rms_counts, disturbances, notes,
                       list(problem.logs), fit, spread)
+
+
+def _run(cure: str, problem: Problem, why: str = '') -> str:
+    """The end of a note: what to run of the experiments that `cure` names, or that all of them were run."""
+    run = {log.experiment for log in problem.logs}
+    named = [word for word in cure.split() if word in EXPERIMENTS]
+    missing = [name for name in named if name not in run]
+    if named and not missing:
+        return f'; {cure} is among the logs and did not suffice; the report says what to run next'
+    return f'; {why}run: {cure if len(missing) == len(named) else " and ".join(missing)}'
+
+
+def _told_by_no_log(parameters: dict[str, Estimate], notes: list[str]) -> bool:
+    """Whether the brake's line crosses zero above the least u0 that the logs allow. Wherever u0 lies below that duty, the
+    brake gives nothing there, so the crossing is as good a u0 as any: it is taken."""
+    u0, slope, offset = parameters['u0'], parameters.get('b1_Nm'), parameters.get('b2_Nm')
+    if not _known(slope) or not _known(offset) or u0.status == 'fixed' or u0.low is None or u0.high is None:
+        return False
+    assert slope is not None and offset is not None
+    crossing = math.ceil(-offset.value / slope.value * 1e6) / 1e6  # rounded up: the map is not negative there
+    if not u0.low < crossing <= u0.high or u0.status == 'identified':
+        return False
+    u0.value = crossing
+    notes.append(f'up to a duty of {crossing:.4g} the brake\'s map b1_Nm u + b2_Nm is negative and the brake gives nothing, so no '
+                 'log tells where below it u0 lies; u0 is that duty here, which changes no torque')
+    return True
 
 
 def _no_rate_limit(fit: Fit, notes: list[str], cures: dict[str, list[str]]) -> Estimate:

@@ -1,6 +1,7 @@
 """Logs for identification: what was measured and what was sent, from run folders, event logs and plain CSV files."""
 from __future__ import annotations
 
+import dataclasses
 import gzip
 import hashlib
 import io
@@ -34,6 +35,7 @@ class Log:
     counts: unwrapped, from 0 at the first row; NaN where there was no valid reading
     read_late_s: how much later than time_s each wheel was read (sample_time_s - time_s)
     first_counts: shape (2,), what the counters held where counts is 0
+    experiment: its name; empty if the log does not say it
     """
     name: str
     path: pathlib.Path
@@ -47,6 +49,7 @@ class Log:
     read_late_s: np.ndarray
     notes: list[str] = field(default_factory=list)
     first_counts: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    experiment: str = ''
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -69,16 +72,17 @@ def load_log(path: PathLike) -> Log:
     """
     place = pathlib.Path(path)
     if place.is_dir() or place.suffix == '.lcmlog':
-        columns, notes, content = _from_run(place)
+        columns, notes, content, experiment = _from_run(place)
     else:
         columns, notes, content = _from_csv(place)
+        experiment = ''
     try:
-        return _log(place, columns, notes, hashlib.sha256(content).hexdigest())
+        return dataclasses.replace(_log(place, columns, notes, hashlib.sha256(content).hexdigest()), experiment=experiment)
     except ValueError as error:
         raise ValueError(f'"{place}": {error}') from None
 
 
-def _from_run(place: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str], bytes]:
+def _from_run(place: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str], bytes, str]:
     run = load(place)
     content = b''
     for name in ('run.csv', 'run.lcmlog'):
@@ -90,7 +94,7 @@ def _from_run(place: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str], by
     if 'upper_counts' not in columns and (place / 'run.lcmlog').exists():
         columns = load(place / 'run.lcmlog').columns
     notes = [note for note in run.notes if 'figures of merit' not in note]
-    return columns, notes, content
+    return columns, notes, content, str(run.summary.get('experiment') or '')
 
 
 def _from_csv(place: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str], bytes]:

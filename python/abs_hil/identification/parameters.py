@@ -67,6 +67,8 @@ def disc_of(wheel: str, log: int) -> tuple[Parameter, Parameter]:
     return sine, cosine
 
 
+#: the shipped ones that serve, in the order in which a report weighs them
+EXPERIMENTS = ('lifted', 'duty-ramp', 'pulses', 'slip-sweep', 'locked-stop', 'coast-down')
 #: given by the person: no log tells the scale of all torques and inertias, nor the scale of length
 GIVEN = {'J2_kg_m2': 'kg m^2', 'r2_m': 'm'}
 

@@ -13,6 +13,7 @@ from ..report.text import clean
 from .estimate import identify
 from .found import Identified
 from .parameters import FORMS
+from .progress import Progress
 from .results import as_json, as_toml, validate, words
 
 INTERRUPTED = 130
@@ -71,10 +72,12 @@ def _identify(o: argparse.Namespace) -> int:
     if not o.no_report:
         plotly_js()  # what the page needs, before the work rather than behind it
 
-    def say(text: str) -> None:
-        print(f'abs_identify: {text}', file=sys.stderr, flush=True)
-
-    found = identify(o.logs, o.start, fix=fixed, drift=o.drift, form=o.form, seed=o.seed, say=say)
+    progress = Progress()
+    say = progress.say
+    try:
+        found = identify(o.logs, o.start, fix=fixed, drift=o.drift, form=o.form, seed=o.seed, say=say, check=progress.check)
+    finally:
+        progress.clear()
     if o.validate and not found.interrupted:
         found.validation = validate(found, o.validate)
         say(f'{o.validate}: stop distance {found.validation["stop_distance_m"]:.5g} m, predicted '
@@ -84,8 +87,9 @@ def _identify(o: argparse.Namespace) -> int:
         from .advice import advise
         from .page import page
         say('what to run next')
-        report = page(found, advise(found))
-    print('\n'.join(words(found)))
+        report = page(found, advise(found, progress.check))
+    progress.end()
+    print('\n'.join(words(found)), flush=True)
     for note in found.notes:
         say(clean(note, 2000))
     _write(found, o, report)
