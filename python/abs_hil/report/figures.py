@@ -244,7 +244,7 @@ class FigureMaker:
         caption = ('(a) speeds of the upper wheel ω₁, which brakes, and dotted of the lower wheel ω₂, the road; (b) slip and its '
                    'reference (dotted), over the range above 3 m/s; (c) the torque that the controller asks for. ')
         of_run = '' if len(self.runs) == 1 else f' of {self.runs[0].label}'
-        caption += (f'The background of all figures has the colours of the phases{of_run}: white is braking, the time '
+        caption += (f'The background of all figures has the colours of the phases{of_run}: braking has none, the time '
                     'history names the others.')
         return self._begin('braking', 'Braking', caption + self._estimated('omega1_rad_s'),
                            [speeds, self._slip_panel(), self._asked_panel('torque / (N m)')])

@@ -183,14 +183,19 @@ def maps(results: StudyResults, metric: str) -> Drawing | None:
             traces.append({**at, 'type': 'contour', 'z': numbers(success.to_numpy(), 'f4'), 'hoverinfo': 'skip',
                            'showscale': False, 'showlegend': False,
                            'contours': {'start': 0.5, 'end': 0.5, 'size': 1.0, 'coloring': 'none'},
-                           'name': 'border of success', 'line': {'color': '#D55E00', 'width': 2.5}})
+                           'name': 'border of success', 'line': {'color': '#D55E00', 'width': 2.5, 'smoothing': 0}})
         cells.append(Cell(traces, title_of(x), title_of(y), name, (_is_log(part[x].to_numpy()), _is_log(part[y].to_numpy()))))
     low, high = frame[metric].quantile([0.02, 0.98])
-    return _drawing(f'maps-{metric}', heading_of(metric),
+    drawing = _drawing(f'maps-{metric}', heading_of(metric),
                     'Median over two factors, whatever the others are. Empty: no run was completed there. Outside the orange '
                     'line, where there is one, fewer than half of the runs were completed.', cells, len(pairs),
                     coloraxis={'cmin': float(low), 'cmax': float(high), 'colorscale': 'Viridis',
                                'colorbar': {'title': {'text': heading_of(metric), 'side': 'right'}, 'thickness': 14}})
+    # The scale stands beside the maps and ends with them: above them are the buttons.
+    layout = drawing.plot['layout']
+    ends = [end for name, axis in layout.items() if name.startswith('yaxis') for end in axis['domain']]
+    layout['coloraxis']['colorbar'].update(y=(min(ends) + max(ends)) / 2, len=max(ends) - min(ends))
+    return drawing
 
 
 def distributions(results: StudyResults, metrics: list[str]) -> Drawing | None:

@@ -5,6 +5,7 @@ import pathlib
 
 from ..core import _core
 from ..figures import figures, heading_of
+from ..messages import REASONS
 from ..report.page import render
 from ..report.tables import Table
 from ..report.text import DASH, rounded, significant
@@ -63,7 +64,9 @@ def sobol_table(results: StudyResults, metrics: list[str]) -> tuple[Table, list[
 
 def reasons_table(results: StudyResults) -> Table:
     counts = results.columns(['reason'])['reason'].value_counts()
-    return Table('reasons', ['reason', 'runs'], [[str(reason), str(count)] for reason, count in counts.items() if reason])
+    words = {row['name']: row['text'] for row in REASONS.values()}
+    return Table('reasons', ['reason', 'runs'], [[words.get(str(reason), str(reason)), str(count)]
+                                                 for reason, count in counts.items() if reason])
 
 
 def worst_table(results: StudyResults, metrics: list[str]) -> Table:
