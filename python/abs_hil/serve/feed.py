@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core import _core, load_network
+from ..core import load_network
 from ..messages import MOST_SIGNALS, QUANTITIES, decode
 from . import force
 from .history import COLUMNS, DERIVED_PLACE, PLACE, WIDTH, History, bin_numbers

@@ -9,7 +9,7 @@ import signal
 import sys
 from typing import Any
 
-from ..core import _core, load_network
+from ..core import load_network
 from .feed import Feed, Live, Played
 from .history import BIN_S, History
 from .server import Command, Server, is_loopback

@@ -19,7 +19,7 @@ from ..messages import PHASES, QUANTITIES
 from .download import TYPES, make
 from .feed import Feed
 from .history import BIN_S, DERIVED
-from .viewer import Bad, Viewer, real, whole
+from .viewer import REASON_KINDS, Bad, Viewer, real, whole
 
 _FOLDER = pathlib.Path(__file__).resolve().parent
 #: what a browser may fetch: no script, style or connection but this server's own
@@ -85,7 +85,8 @@ class Server:
         self._files = {name: path.read_bytes() for name, path in page_files().items()}
         self._door = Door(self._answer)
         self._runner = web.ServerRunner(self._door, handle_signals=False)
-        self._hello = {'kind': 'hello', 'source': source, 'bin_s': BIN_S, 'phases': PHASES, 'commands': command is not None,
+        self._hello = {'kind': 'hello', 'source': source, 'bin_s': BIN_S, 'phases': PHASES, 'reason_kinds': REASON_KINDS,
+                       'commands': command is not None,
                        'signals': {name: {'unit': row['unit'], 'meaning': row['meaning'], 'topic': row['topic']}
                                    for name, row in QUANTITIES.items()},
                        'derived': DERIVED}

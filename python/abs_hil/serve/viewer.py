@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from ..messages import PHASES
+from ..messages import PHASES, REASONS
 from .feed import Feed
 from .history import PLACE, own_place
 from .runs import RunFacts
@@ -28,6 +28,7 @@ BURST, RATE_PER_S = 60.0, 20.0
 MOST_BAD = 20
 STUCK_S = 20.0
 BINS, ROWS = 1, 2
+REASON_KINDS = tuple(dict.fromkeys(row['kind'] for number, row in REASONS.items() if number))
 
 
 class Bad(ValueError):
@@ -53,7 +54,11 @@ class Trigger:
                 raise Bad(f'phase "{name}": give one of {" ".join(PHASES)}, or "" for any')
             self._signal, self._wanted = 'phase_index', PHASES.index(name) if name else None
         elif self._kind == 'event':
+            name = text(asked, 'event')
+            if name and name not in REASON_KINDS:
+                raise Bad(f'event "{name}": give one of {", ".join(REASON_KINDS)}, or "" for any')
             self._signal = 'reason'
+            self._reasons = [number for number, row in REASONS.items() if number and name in ('', row['kind'])]
         else:
             raise Bad(f'on "{self._kind}": give level, phase or event')
 
@@ -69,11 +74,18 @@ class Trigger:
         if hit.size:
             row = rows[hit[0]]
             self.caught = {'kind': 'caught', 'run': run.number, 'time_s': float(row[PLACE['time_s']]),
-                           'cycle': int(row[PLACE['cycle']]), 'value': float(values[hit[0]])}
+                           'cycle': int(row[PLACE['cycle']]), 'value': float(values[hit[0]]),
+                           'text': self._in_words(row)}
+
+    def _in_words(self, row: np.ndarray) -> str:
+        if self._kind == 'event':
+            return str(REASONS[int(row[PLACE['reason']])]['text'])
+        phase = int(row[PLACE['phase']])
+        return PHASES[phase] if self._kind == 'phase' and 0 <= phase < len(PHASES) else ''
 
     def _hits(self, before: np.ndarray, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
         if self._kind == 'event':
-            return values != 0
+            return np.isin(values, self._reasons)
         if self._kind == 'phase':
             changed = (values != before) & ~np.isnan(before)
             return changed if self._wanted is None else changed & (rows[:, PLACE['phase']] == self._wanted)

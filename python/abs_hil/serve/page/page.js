@@ -106,13 +106,13 @@ function arm() {
   $('caught').textContent = 'waiting';
   const on = $('on').value;
   stream.send({ do: 'trigger', on, ...(on === 'level' ? { signal: $('signal').value, edge: $('edge').value,
-    level: $('level').valueAsNumber } : on === 'phase' ? { phase: $('phase').value } : {}) });
+    level: $('level').valueAsNumber } : on === 'phase' ? { phase: $('phase').value } : { event: $('event').value }) });
   changed();
 }
 stream.addEventListener('caught', ({ detail }) => {
   caught = { ...detail, pending: true, since: performance.now() };
   armed = false;
-  $('caught').textContent = `caught at ${detail.time_s.toFixed(4)} s, cycle ${detail.cycle}, value ${short(detail.value)}`;
+  $('caught').textContent = `caught at ${detail.time_s.toFixed(4)} s, cycle ${detail.cycle}, ${detail.text || `value ${short(detail.value)}`}`;
 });
 function showCaught() {
   if (!caught?.pending) return;
@@ -194,6 +194,7 @@ function stop() {
 stream.addEventListener('hello', () => {
   offer();
   $('phase').replaceChildren(new Option('any', ''), ...stream.hello.phases.map((name) => new Option(name, name)));
+  $('event').replaceChildren(new Option('any kind', ''), ...stream.hello.reason_kinds.map((name) => new Option(name, name)));
   $('stop').hidden = $('order').hidden = $('stop-key').hidden = !stream.hello.commands;
   document.title = `abs_hil serve: ${stream.hello.source}`;
   if (!charts.length) FIRST.forEach((chart) => add(...chart));
@@ -306,7 +307,7 @@ $('add').onchange = () => {
 };
 const scopeTitle = (name) => { const unit = stream.hello.signals[name]?.unit; return unit ? `${name}, ${unit}` : name; };
 $('on').onchange = () => {
-  for (const kind of ['level', 'phase'])
+  for (const kind of ['level', 'phase', 'event'])
     for (const label of document.querySelectorAll(`.of-${kind}`)) label.hidden = $('on').value !== kind;
 };
 $('trigger').onsubmit = (event) => { event.preventDefault(); (armed ? disarm : arm)(); $('caught').textContent ||= ''; };
