@@ -1,6 +1,5 @@
 // Whole runs in virtual time: one with its records, or many with their figures of merit.
 
-#include <pybind11/functional.h>
 #include <pybind11/stl.h>
 
 #include <atomic>
@@ -16,6 +15,7 @@
 #include "bindings.hpp"
 #include "column_sink.hpp"
 #include "config/config_error.hpp"
+#include "interruptible.hpp"
 #include "run/run_summary.hpp"
 #include "study/batch.hpp"
 #include "study/parallel.hpp"
@@ -93,14 +93,14 @@ std::string refusal(const Work& work) {
 
 /// @param jobs  pairs (index into `options`, index of the perturbation or None)
 py::dict simulate_many(const std::vector<py::dict>& options, const std::vector<OneRun>& jobs, const std::string& vary,
-                       std::uint64_t seed, std::size_t threads, const std::function<void(std::size_t)>& progress) {
+                       std::uint64_t seed, std::size_t threads, Interruptible::Progress progress) {
   const study::Variation variation = study::Variation::parse(vary);
   std::vector<program::RunOptions> typed;
   for (const py::dict& arguments : options) typed.push_back(run_options(arguments));
   std::vector<study::RunResult> results(jobs.size());
   std::vector<std::string> errors(jobs.size());
-  {
-    const py::gil_scoped_release release;
+  Interruptible loop(std::move(progress));
+  loop.run([&] {
     if (threads == 0) threads = study::machine_threads();
     std::vector<config::Settings> settings(typed.size());
     std::vector<std::string> unusable(typed.size());
@@ -108,7 +108,6 @@ py::dict simulate_many(const std::vector<py::dict>& options, const std::vector<O
       unusable[i] = refusal([&] { settings[i] = program::merged_settings(typed[i]); });
     });
     std::atomic<std::size_t> finished{0};
-    const std::size_t step = std::max<std::size_t>(1, jobs.size() / 100);
     std::vector<std::size_t> usable;
     for (std::size_t i = 0; i < jobs.size(); ++i) {
       errors[i] = unusable[jobs[i].first];
@@ -125,12 +124,9 @@ py::dict simulate_many(const std::vector<py::dict>& options, const std::vector<O
       results[usable[k]] = outcome.run;
       errors[usable[k]] = std::move(outcome.refusal);
       const std::size_t done = finished.fetch_add(1) + 1;
-      if (done % step != 0 && done != usable.size()) return;
-      const py::gil_scoped_acquire gil;
-      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-      if (progress) progress(jobs.size() - usable.size() + done);
+      loop.after(jobs.size() - usable.size() + done, jobs.size());
     });
-  }
+  });
   py::dict columns;
   const auto add = [&](const char* name, auto&& value) {
     std::vector<double> values;

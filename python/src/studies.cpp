@@ -1,14 +1,13 @@
 // Studies as `abs_hil study` computes them, and single runs of them.
 
-#include <pybind11/functional.h>
 #include <pybind11/stl.h>
 
-#include <algorithm>
 #include <cstdint>
-#include <functional>
 #include <string>
+#include <utility>
 
 #include "bindings.hpp"
+#include "interruptible.hpp"
 #include "program/study_runs.hpp"
 #include "study/gzip.hpp"
 #include "study/study_folder.hpp"
@@ -19,19 +18,17 @@ namespace {
 
 /// As `abs_hil study FILE --out FOLDER --shard NUMBER/OF`. Returns the number of runs that it computed.
 std::uint64_t run_study(const std::string& file, const std::string& name, const std::string& folder,
-                        std::uint64_t number, std::uint64_t of, std::size_t threads,
-                        const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
-  const py::gil_scoped_release release;
-  const study::Study study = program::make_study(study::load_study(file));
-  const auto tell = [&progress](std::uint64_t done, std::uint64_t all) {
-    if (done % std::max<std::uint64_t>(1, all / 100) != 0 && done != all) return;
-    const py::gil_scoped_acquire gil;
-    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-    if (progress && done > 0) progress(done, all);
-  };
-  return program::compute_study(study, study::StudyFolder(folder, study::facts_of(study, name)),
-                                {.number = number, .of = of}, threads, tell)
-      .runs;
+                        std::uint64_t number, std::uint64_t of, std::size_t threads, Interruptible::Progress progress) {
+  Interruptible loop(std::move(progress));
+  std::uint64_t runs = 0;
+  loop.run([&] {
+    const study::Study study = program::make_study(study::load_study(file));
+    const auto tell = [&loop](std::uint64_t done, std::uint64_t all) { loop.after(done, all); };
+    runs = program::compute_study(study, study::StudyFolder(folder, study::facts_of(study, name)),
+                                  {.number = number, .of = of}, threads, tell)
+               .runs;
+  });
+  return runs;
 }
 
 /// What abs_hil.simulate returns, for a run of a study.

@@ -2,7 +2,9 @@
 import csv
 import json
 import math
+import signal
 import struct
+import time
 
 import numpy as np
 import pytest
@@ -135,6 +137,27 @@ def test_an_exception_in_the_progress_ends_the_study():
         raise KeyError('stop')
     with pytest.raises(KeyError):
         abs_hil.simulate_many({'seed': [1, 2, 3], 'experiment.start_speed_rad_s': [50.0]}, progress=progress)
+
+
+@pytest.mark.parametrize('threads', [1, 2])
+def test_a_signal_ends_many_slow_runs_at_once(threads):
+    """Minutes of work; parts of the batch have hundreds of runs each, and none of them is finished first."""
+    def interrupt(*_):
+        raise KeyboardInterrupt
+    seen = []
+    before = signal.signal(signal.SIGALRM, interrupt)
+    due_s = time.monotonic() + 0.3
+    signal.setitimer(signal.ITIMER_REAL, 0.3)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            abs_hil.simulate_many([{'controller': 'adaptive-optimal'}], repeat=20000, threads=threads,
+                                  progress=lambda done, total: seen.append(done))
+        late_s = time.monotonic() - due_s
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert all(done < 20000 for done in seen)
+    assert late_s < 2.0  # 0.06 s on an idle computer; a part of the batch takes ten
 
 
 def test_lists():

@@ -61,7 +61,7 @@ class _Bar:
     def __init__(self, wanted: bool | Callable[[int, int], None]) -> None:
         self._wanted = wanted
         self._progress: _Progress | None = None
-        self._show: Callable[[int], None] | None = None
+        self._show: Callable[[int, int], None] | None = None
 
     def __enter__(self) -> Callable[[int, int], None] | None:
         return self._report if self._wanted else None
@@ -71,7 +71,7 @@ class _Bar:
             self._progress = _Progress(self._wanted, total)
             self._show = self._progress.__enter__()
         if self._show is not None:
-            self._show(done)
+            self._show(done, total)
 
     def __exit__(self, *details: object) -> None:
         if self._progress is not None:
