@@ -83,6 +83,18 @@ class FmuTest(ProgramTest):
                     runs.append(speeds)
             self.assertEqual(*runs)
 
+    def test_long_steps_are_the_control_period(self):
+        """FMPy makes its own steps of 4 ms for three seconds. The loop then stops as the program does at 250 Hz."""
+        for fmi in (2, 3):
+            with self.subTest(fmi=fmi):
+                path = self.export('law', '--controller', 'adaptive', fmi=fmi)
+                self.assertGreater(len(fmpy.simulate_fmu(path, stop_time=3.0)), 700)
+                expected = self.fast_stop('--controller', 'adaptive', '--rate', '250')
+                time_s, distance_m, _ = stop(*self.pair(fmi), ideal_sensors=False, step_s=4e-3)
+                print(f'FMI {fmi}, steps of 4 ms: {distance_m:.4f} m; abs_hil at 250 Hz {expected["stop_distance_m"]:.4f} m')
+                self.assertAlmostEqual(distance_m / expected['stop_distance_m'], 1.0, delta=0.01)
+                self.assertAlmostEqual(time_s / expected['stop_time_s'], 1.0, delta=0.01)
+
     def test_state_is_kept_set_and_serialised(self):
         for fmi in (2, 3):
             plant, law = self.pair(fmi)
@@ -128,7 +140,7 @@ class FmuTest(ProgramTest):
                            lambda plant=plant: plant.set('brake_duty', float('nan')),
                            lambda plant=plant: plant.set('plant.theta_N', 20.0), lambda plant=plant: plant.set('slip', 0.1),
                            lambda plant=plant: plant.step(5.0, 1e-3), lambda plant=plant: plant.step(0.0, -1.0),
-                           lambda law=law: law.step(0.0, 5e-3)):
+                           lambda law=law: law.step(0.0, 0.5e-3), lambda law=law: law.step(0.0, 25e-3)):
                 with self.assertRaises(FMICallException):
                     action()
             plant.step(0.0, 1e-3)  # and it goes on
