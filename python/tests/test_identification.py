@@ -51,6 +51,18 @@ def truth_of(name):
     return abs_hil.keys(set=TRUTH)[f'plant.{name}']['value']
 
 
+def test_a_run_is_a_log(tmp_path):
+    run = abs_hil.simulate(experiment='pulses', set=TRUTH)
+    run.to_csv(tmp_path / 'run.csv')
+    of_run, of_file = load_log(run), load_log(tmp_path / 'run.csv')
+    for name in ('time_s', 'counts', 'brake_pwm', 'motor_pwm', 'wheels_apart', 'phase', 'read_late_s', 'first_counts'):
+        np.testing.assert_array_equal(getattr(of_run, name), getattr(of_file, name))
+    assert (of_run.name, of_run.experiment) == ('pulses', 'pulses')
+    with pytest.raises(ValueError, match='lacks the columns upper_counts'):
+        load_log(abs_hil.Run({'time_s': run['time_s'], 'lower_counts': run['lower_counts'], 'brake_pwm': run['brake_pwm'],
+                              'motor_pwm': run['motor_pwm']}))
+
+
 def test_every_parameter_is_found(found):
     assert found.form == 'magic-formula'
     assert found.residual_counts_rms == pytest.approx(np.sqrt(COUNT_VARIANCE), rel=0.02)

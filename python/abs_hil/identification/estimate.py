@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core import _core
 from ..options import PathLike, options
+from ..run import Run
 from . import discs, intervals, rate_limit
 from .delay import with_delay
 from .fit import ROUNDS, disturbed_fit, finish_fit, likely_u0, start_fit
@@ -32,12 +33,12 @@ def _silent(_: str) -> None:
     pass
 
 
-def identify(logs: Sequence[PathLike | Log], start: PathLike = 'paper-table1', *,
+def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-table1', *,
              fix: Mapping[str, float | None] | None = None, drift: Sequence[str] = (), form: str = 'auto', seed: int = 1,
              say: Callable[[str], None] = _silent, check: Callable[[], None] = lambda: None) -> Identified:
     """Estimates the rig's parameters from logs of counts and duties.
 
-    logs:  run folders, event logs or CSV files (see load_log), or Log objects
+    logs:  runs of `simulate` or `load`, run folders, event logs or CSV files (see load_log), or Log objects
     start: plant that gives J2_kg_m2, r2_m, the encoder's counts and what the logs do not tell
     fix:   parameters to leave alone: at their start value (None) or at the given one
     drift: factors that may differ from log to log: brake_torque

@@ -14,7 +14,7 @@ import scipy.ndimage
 import scipy.signal
 
 from ..options import PathLike
-from ..run import load
+from ..run import Run, load
 
 NEEDED = ('time_s', 'upper_counts', 'lower_counts', 'brake_pwm', 'motor_pwm')
 LEAST_ROWS = 200
@@ -63,13 +63,15 @@ class Log:
                 'wheels_apart': self.wheels_apart}
 
 
-def load_log(path: PathLike) -> Log:
-    """Reads a run folder, an event log (.lcmlog) or a CSV file, gzip or not, with the columns time_s, upper_counts,
+def load_log(path: PathLike | Run) -> Log:
+    """Reads a Run, a run folder, an event log (.lcmlog) or a CSV file, gzip or not, with the columns time_s, upper_counts,
     lower_counts, brake_pwm, motor_pwm and, if they are there, phase and wheels_apart. Row n holds the counts at time_s
     and the duties (0 to 1, as sent) from then on.
 
     Raises ValueError for a file that cannot serve, with its name and the reason; what is cut off is left out and noted.
     """
+    if isinstance(path, Run):
+        return _of_run(path)
     place = pathlib.Path(path)
     if place.is_dir() or place.suffix == '.lcmlog':
         columns, notes, content, experiment = _from_run(place)
@@ -80,6 +82,13 @@ def load_log(path: PathLike) -> Log:
         return dataclasses.replace(_log(place, columns, notes, hashlib.sha256(content).hexdigest()), experiment=experiment)
     except ValueError as error:
         raise ValueError(f'"{place}": {error}') from None
+
+
+def _of_run(run: Run) -> Log:
+    experiment = str(run.summary.get('experiment') or '')
+    content = b''.join(np.ascontiguousarray(run.columns[name]).tobytes() for name in NEEDED if name in run.columns)
+    log = _log(pathlib.Path(run.folder or experiment or 'run'), run.columns, list(run.notes), hashlib.sha256(content).hexdigest())
+    return dataclasses.replace(log, experiment=experiment)
 
 
 def _from_run(place: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str], bytes, str]:
@@ -116,7 +125,8 @@ def _from_csv(place: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str], by
             notes.append(f'the last row of "{place}" is incomplete and is left out')
     try:
         wanted = {*NEEDED, 'phase', 'wheels_apart', 'phase_name', 'sample_valid', 'sample_time_s'}
-        frame = pandas.read_csv(io.BytesIO(text), usecols=lambda name: name.strip() in wanted, skipinitialspace=True)
+        frame = pandas.read_csv(io.BytesIO(text), usecols=lambda name: name.strip() in wanted, skipinitialspace=True,
+                                float_precision='round_trip')
     except Exception as error:  # pandas raises many kinds
         raise ValueError(f'"{place}" is no CSV file of a log: {error}') from None
     frame.columns = [name.strip() for name in frame.columns]
