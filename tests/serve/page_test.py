@@ -133,7 +133,7 @@ def downloads(page, folder, cycles):
     page.value('document.activeElement.blur()')
     for kind, key in (('csv', 'c'), ('mcap', 'm')):
         page.press(key)
-        for _ in range(100):
+        for _ in range(300):
             found = [file for file in folder.glob(f'*.{kind}') if file.stat().st_size]
             if found:
                 break

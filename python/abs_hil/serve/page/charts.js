@@ -128,7 +128,7 @@ export class Chart {
       ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
       ctx.textAlign = 'left';
       const at = [x + 3 * devicePixelRatio, bbox.top + 11 * devicePixelRatio];
-      ctx.lineWidth = 4 * devicePixelRatio;  // readable over curves
+      ctx.lineWidth = 2 * devicePixelRatio;  // readable over curves, which stay visible
       ctx.strokeStyle = colour('--card');
       ctx.strokeText(name, ...at);
       ctx.fillText(name, ...at);
