@@ -15,6 +15,21 @@ from chromium import Chromium
 from live import check, enter_private_network
 from scope import Served, Viewer, cycles_of
 
+#: time enough for everything, on a busy computer too
+LONG = '''description = "brake early, then drive"
+[[phase]]
+name = "accelerate"
+motor = 1.0
+until = { lasts_s = 3 }
+[[phase]]
+name = "brake"
+brake = "controller"
+until = { lasts_s = 0.8 }
+[[phase]]
+name = "drive"
+motor = 0.2
+until = { lasts_s = 300 }
+'''
 SIZES = {'wide': (1400, 900), 'phone': (390, 844)}
 
 
@@ -75,6 +90,13 @@ def looks(folder, server):
             check(page.picture(f'{size}-{scheme}') > 20_000, f'{size}, {scheme}: a picture')
             wide = page.value('document.documentElement.scrollWidth')
             check(wide <= SIZES[size][0], f'{size}: nothing stands beyond the edge', wide)
+            page.wait_for('document.getElementById("state").textContent == "no messages"', 'the end of the log')
+            other = {'light': 'dark', 'dark': 'light'}[scheme]
+            page.call('Emulation.setEmulatedMedia', features=[{'name': 'prefers-color-scheme', 'value': other}])  # makes new plots
+            page.value('new Promise((done) => setTimeout(done, 500))')
+            ends = page.value('[+document.getElementById("ribbon").dataset.end, document.querySelector(".chart .u-over")'
+                              '.getBoundingClientRect().right - document.getElementById("ribbon").getBoundingClientRect().left]')
+            check(abs(ends[0] - ends[1]) < 1.5, f'{size}: the ribbon ends where the charts do', ends)
             check(page.said == [], f'{size}, {scheme}: no error, nothing fetched from elsewhere', page.said)
             page.close()
 
@@ -146,10 +168,6 @@ def charts_and_runs(page):
     page.wait_for('[...document.querySelectorAll(".chart b")].some(b => b.textContent.startsWith("zeta_N"))', 'a chart more')
     page.choose('#add', 'own')
     page.wait_for('document.querySelectorAll(".chart").length == 10', 'charts of the own signals')
-    page.choose('#align', 'brake')
-    page.wait_for('Math.abs(document.getElementById("ribbon").dataset.end - (document.querySelector(".chart .u-over")'
-                  '.getBoundingClientRect().right - document.getElementById("ribbon").getBoundingClientRect().left)) < 1.5',
-                  'the ribbon ends where the charts do')
     page.click('.chart:last-of-type .close')
     page.wait_for('document.querySelectorAll(".chart").length == 9', 'a chart less')
 
@@ -161,8 +179,10 @@ def triggers(program, serve, folder):
     key.chmod(0o600)
     server = Served(serve, '--commands', key)
     log = folder / 'live.lcmlog'
-    run = subprocess.Popen([program, '--log', log, '--set', 'commands.enabled=true', '--set', f'commands.key_file={key}',
-                            '--wait-for-start'], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    (folder / 'long.toml').write_text(LONG)
+    run = subprocess.Popen([program, '--experiment', folder / 'long.toml', '--log', log, '--wait-for-start', '--set',
+                            'commands.enabled=true', '--set', f'commands.key_file={key}'], stdout=subprocess.DEVNULL,
+                           stderr=subprocess.PIPE, text=True)
     page = Page(folder / 'live', server.link)
     try:
         page.wait_for('window.scope.shown()[0]?.run.facts.commands.waiting === true', 'the run that waits')
@@ -177,15 +197,15 @@ def triggers(program, serve, folder):
         page.wait_for('document.getElementById("state").textContent == "frozen" && !!window.scope.rows', 'the trigger freezes')
         page.picture('trigger')
         said = page.text('#caught')
-        page.choose('#command', 'slip-ref')
-        page.value('document.getElementById("value").value = 0.1')
-        page.click('#order button')
-        page.wait_for('document.getElementById("answer").textContent.includes("0.1")', 'a slip reference is answered')
         page.press('f')
         page.choose('#on', 'event')
         page.choose('#event', 'stop request')
         page.click('#arm')
         page.wait_for('document.getElementById("caught").textContent == "waiting"', 'armed again')
+        page.choose('#command', 'slip-ref')
+        page.value('document.getElementById("value").value = 0.1')
+        page.click('#order button')
+        page.wait_for('document.getElementById("answer").textContent.includes("0.1")', 'a slip reference is answered')
         page.value('document.getElementById("before").focus()')
         page.press('Escape')
         page.wait_for('/stop/.test(document.getElementById("answer").textContent) && '
