@@ -14,7 +14,8 @@ import pytest
 from conftest import ABS_HIL
 
 import abs_hil
-from abs_hil.interchange import program, recorded, source
+from abs_hil.interchange import program, recorded, running, source
+from abs_hil.interchange.mcap_file import McapFile
 from abs_hil.interchange.messages import field_names
 from abs_hil.run import COLUMNS
 
@@ -235,6 +236,26 @@ def test_live(tmp_path):
     assert topics['/abs_hil/status'] and topics['/abs_hil/event'] and topics['/abs_hil/signals']
     lost = int(result.stdout.rsplit('lost: ', 1)[1].split()[0])
     assert lost >= np.sum(np.diff(rows) - 1)
+
+
+def test_signals_of_a_second_run(tmp_path):
+    """Another controller's signals get a definition of their own, and times begin anew where the clock is another."""
+    file = open(tmp_path / 'two.mcap', 'wb')
+    recorder = running.Recorder(McapFile(file, library='abs_hil'))
+    cycles = ((0, 'zeta_N', 1.0, 10**12), (1, 'zeta_N', 2.0, 10**12 + 10**6), (0, 'peak_slip', 3.0, 5))
+    for cycle, names, value, stamp_ns in cycles:
+        message = abs_hil.telemetry_t()
+        message.cycle, message.names, message.values, message.value_count = cycle, names, [value], 1
+        message.stamp_ns = stamp_ns
+        recorder.take('TELEMETRY', message)
+    recorder.finish()
+    file.close()
+    found = decoded_by_mcap_ros2(tmp_path / 'two.mcap')['/abs_hil/signals']
+    of_first = [(time_ns, message.zeta_n) for time_ns, message in found if hasattr(message, 'zeta_n')]
+    of_second = [(time_ns, message.peak_slip) for time_ns, message in found if hasattr(message, 'peak_slip')]
+    assert [value for _, value in of_first + of_second] == [1.0, 2.0, 3.0]
+    assert of_first[1][0] - of_first[0][0] == 10**6
+    assert all(abs(time_ns - time.time_ns()) < 60 * 10**9 for time_ns, _ in found)
 
 
 def test_source_of_an_old_csv_is_refused(folder, tmp_path):
