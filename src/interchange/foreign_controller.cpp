@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "interchange/agent_controller.hpp"
 #include "interchange/fmu_facts.hpp"
 #include "interchange/hosted_code.hpp"
 #include "runtime/clock.hpp"
@@ -133,6 +134,7 @@ std::array<control::ControllerFiles, 2> foreign_controllers() noexcept {
 
 void register_foreign_controllers() {
   for (const control::ControllerFiles& files : foreign_controllers()) control::register_controller_files(files);
+  control::register_controller_files(agent_controllers());
 }
 
 void set_home(Home home) noexcept { chosen_home.store(home); }

@@ -60,7 +60,7 @@ class ForeignController final : public control::SlipController {
 /// What makes controllers from files (docs/interchange.md). Their code runs in a process of its own until `set_home`
 /// says otherwise.
 [[nodiscard]] std::array<control::ControllerFiles, 2> foreign_controllers() noexcept;
-/// Lets the registry make them.
+/// Lets the registry make them, and those of agents.
 void register_foreign_controllers();
 void set_home(Home home) noexcept;
 

@@ -29,7 +29,7 @@ void add_configuration_options(cli::Parser& parser, RunOptions& o) {
               .type = "NAME|FILE"});
   parser.add({.names = "--controller",
               .to = &o.controller,
-              .help = "slip controller, by name or FILE.so or FILE.fmu",
+              .help = "slip controller, by name or FILE.so, FILE.fmu or FILE.agent",
               .type = "NAME|FILE"});
   add_assignments(parser, o);
 }

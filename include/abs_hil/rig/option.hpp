@@ -58,7 +58,7 @@ class AllowedNames {
 
 /// Endings of file names, each with its dot. A text that ends in one of them names a file.
 struct FileEndings {
-  std::array<std::string_view, 2> endings{};
+  std::array<std::string_view, 3> endings{};
   [[nodiscard]] constexpr bool fit(std::string_view text) const noexcept {
     for (const std::string_view ending : endings) {
       if (!ending.empty() && text.size() > ending.size() && text.ends_with(ending)) return true;

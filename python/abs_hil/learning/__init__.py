@@ -10,7 +10,9 @@ import contextlib
 from .rigs import Rigs, Task
 
 ID = 'abs_hil/SlipControl-v0'
-__all__ = ['ID', 'Rigs', 'Task', 'register']
+#: a rig in real time
+RIG_ID = 'abs_hil/RigSlipControl-v0'
+__all__ = ['ID', 'RIG_ID', 'Rigs', 'Task', 'register']
 
 
 def register() -> None:
@@ -19,6 +21,8 @@ def register() -> None:
     if ID not in gymnasium.registry:
         gymnasium.register(ID, entry_point='abs_hil.learning.environment:SlipControl',
                            vector_entry_point='abs_hil.learning.environment:SlipControlVector')
+    if RIG_ID not in gymnasium.registry:
+        gymnasium.register(RIG_ID, entry_point='abs_hil.learning.rig_environment:RigSlipControl')
 
 
 with contextlib.suppress(ImportError):  # training in NumPy alone needs no gymnasium

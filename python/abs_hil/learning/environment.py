@@ -15,11 +15,11 @@ from .rigs import HIGH, LOW, TRAINING_SEED, Rigs, Task
 MOST_STEPS = 1000
 
 
-def _observation_space() -> gymnasium.spaces.Box:
+def observation_space() -> gymnasium.spaces.Box:
     return gymnasium.spaces.Box(LOW, HIGH, dtype=np.float32)
 
 
-def _action_space() -> gymnasium.spaces.Box:
+def action_space() -> gymnasium.spaces.Box:
     return gymnasium.spaces.Box(np.float32(0.0), np.float32(1.0), (1,), np.float32)
 
 
@@ -46,8 +46,8 @@ class SlipControl(gymnasium.Env):
 
     def __init__(self, plants_seed: int = TRAINING_SEED, render_mode: str | None = None, **task: Any) -> None:
         self.render_mode = render_mode
-        self.observation_space = _observation_space()
-        self.action_space = _action_space()
+        self.observation_space = observation_space()
+        self.action_space = action_space()
         self._rigs = Rigs(1, Task(**task), seed=plants_seed)
         self._steps = 0
 
@@ -72,7 +72,7 @@ class SlipControlVector(VectorEnv):
                  threads: int = 0, **task: Any) -> None:
         self.num_envs = num_envs
         self.render_mode = render_mode
-        self.single_observation_space, self.single_action_space = _observation_space(), _action_space()
+        self.single_observation_space, self.single_action_space = observation_space(), action_space()
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.metadata = {'autoreset_mode': AutoresetMode.NEXT_STEP, 'render_modes': []}
