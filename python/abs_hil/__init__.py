@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from .messages import PHASES, QUANTITIES, REASONS, TYPES, decode, row_of
 
 if TYPE_CHECKING:
+    __version__: str
     from .figures import FigureOfMerit, figures
     from .hand import Controller, Plant, PlantState, SlipInput, SlipOutput
     from .identification import Identified, identify
@@ -43,15 +44,16 @@ __all__ = ['PHASES', 'QUANTITIES', 'REASONS', 'TYPES', 'Controller', 'FigureOfMe
            'simulate_many', 'simulate_run', 'study']
 
 
-def __getattr__(name: str) -> Any:
-    if name == '__version__':
-        from .core import _core
-        return _core.version
-    if name not in _MODULE_OF:
-        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-    value = getattr(importlib.import_module(f'.{_MODULE_OF[name]}', __name__), name)
-    globals()[name] = value
-    return value
+if not TYPE_CHECKING:  # a checker of types must see a name that does not exist
+    def __getattr__(name: str) -> Any:
+        if name == '__version__':
+            from .core import _core
+            return _core.version
+        if name not in _MODULE_OF:
+            raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+        value = getattr(importlib.import_module(f'.{_MODULE_OF[name]}', __name__), name)
+        globals()[name] = value
+        return value
 
 
 def __dir__() -> list[str]:

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import functools
+import operator
 import os
 import pathlib
 import shutil
@@ -38,12 +39,34 @@ def _take_controller_files() -> None:
 
 
 def text_of(value: Value) -> str:
-    """The value as --set takes it: numbers in full, true and false."""
+    """The value as --set takes it: numbers in full, true and false. NumPy's scalars count as Python's."""
+    value = getattr(value, 'item', lambda: value)()
     if isinstance(value, bool):
         return 'true' if value else 'false'
     if isinstance(value, (int, str)):
         return str(value)
-    return repr(float(value))
+    if isinstance(value, float):
+        return repr(value)
+    raise ValueError(f'{value!r} is no configuration value; give a number, True, False or a text')
+
+
+def _assignments(values: Any) -> list[str]:
+    if not isinstance(values, Mapping):
+        raise ValueError(f'set {values!r}: give a dictionary of values by dotted key, as {{"plant.theta_N": 30}}')
+    assignments = []
+    for key, value in values.items():
+        try:
+            assignments.append(f'{key}={text_of(value)}')
+        except ValueError as error:
+            raise ValueError(f'set: {key}: {error}') from None
+    return assignments
+
+
+def _seed(seed: Any) -> str:
+    try:
+        return str(operator.index(seed))
+    except TypeError:
+        raise ValueError(f'seed {seed!r}: give an integer of at least 0') from None
 
 
 def options(*, controller: Any = None, plant: PathLike | None = None, model: PathLike | None = None,
@@ -59,9 +82,9 @@ def options(*, controller: Any = None, plant: PathLike | None = None, model: Pat
             _take_controller_files()
         given['controller'] = controller
     if seed is not None:
-        given['seed'] = str(int(seed))
+        given['seed'] = _seed(seed)
     if set:
-        given['set'] = [f'{key}={text_of(value)}' for key, value in set.items()]
+        given['set'] = _assignments(set)
     if inject:
         given['inject'] = [inject] if isinstance(inject, str) else list(inject)
     return given

@@ -51,11 +51,14 @@ class Run:
 
     @property
     def data(self) -> pandas.DataFrame:
-        """The columns as a pandas DataFrame of shape (cycles, columns). `phase` and `phase_name` are categorical."""
+        """The columns as a pandas DataFrame of shape (cycles, columns). `phase` and `phase_name` are categorical. The frame's
+        attrs["units"] has the unit of each column that has one."""
         import pandas
         frame: dict[str, Any] = {name: pandas.Categorical(values) if name in TEXTS else values
                  for name, values in self.columns.items()}
-        return pandas.DataFrame(frame)
+        data = pandas.DataFrame(frame)
+        data.attrs['units'] = {name: str(row['unit']) for name, row in QUANTITIES.items() if name in frame and row['unit']}
+        return data
 
     @property
     def config(self) -> dict[str, Any]:
@@ -69,7 +72,10 @@ class Run:
         return len(self.columns['time_s'])
 
     def during(self, phase: str) -> dict[str, np.ndarray]:
-        """The columns in one phase, as in run.during("brake")."""
+        """The columns in one phase, as in run.during("brake"); of shape (0,) if the run did not come there. Raises ValueError
+        for what is no phase."""
+        if phase not in PHASES and phase not in self.columns['phase']:
+            raise ValueError(f'"{phase}" is no phase; give one of {", ".join(PHASES)}')
         chosen = self.columns['phase'] == phase
         return {name: values[chosen] for name, values in self.columns.items()}
 

@@ -47,14 +47,21 @@ def simulate(controller: Any = 'adaptive', plant: PathLike = 'paper-table1', exp
                     plant=None if plant == 'paper-table1' else plant,
                     experiment=None if experiment == 'paper' else experiment, model=model, config=config,
                     seed=None if seed == 1 else seed, set=set, inject=inject)
-    law = None if isinstance(controller, str) else controller
-    if law is not None and not (callable(getattr(law, 'reset', None)) and callable(getattr(law, 'step', None))):
-        raise ValueError(f'controller: {type(law).__name__} has no methods reset and step; give a controller\'s name or an '
-                         'object with both')
+    law = _law_of(controller)
     if repetition is not None and repetition < 0:
         raise ValueError(f'repetition {repetition}: give the number of a varied plant, from 0')
     varied = None if repetition is None else (vary, vary_seed, repetition)
     return run_of(*_core.simulate(given, law, varied))
+
+
+def _law_of(controller: Any) -> Any:
+    """The controller's object; None for a name. Raises ValueError for an object that is no controller."""
+    if controller is None or isinstance(controller, str):
+        return None
+    if callable(getattr(controller, 'reset', None)) and callable(getattr(controller, 'step', None)):
+        return controller
+    raise ValueError(f'controller: {type(controller).__name__} has no methods reset and step; give a controller\'s name or an '
+                     'object with both')
 
 
 def run_of(columns: dict[str, Any], signals: Sequence[str], summary: str, config_toml: str) -> Run:
@@ -99,7 +106,8 @@ def simulate_many(runs: Iterable[Mapping[str, Any]] | Mapping[str, Sequence[Any]
 
     runs:      a list of arguments of `simulate`, as in [{"controller": "pi"}, {"set": {"plant.theta_N": 30}}]; or a grid:
                {"controller": ["adaptive", "pi"], "plant.theta_N": [20, 23, 26]} means all combinations, in which a key
-               with a dot is a configuration value. A controller must be a name.
+               with a dot is a configuration value. A controller in Python runs in the calling thread, one run after the
+               other: its `reset` begins each braking. Faults are not injected here; `simulate` does.
     vary, repeat, vary_seed: each run is repeated on `repeat` varied plants, those of `abs_hil compare --vary --repeat
                --seed`, in that order: all runs meet the same plants. By default nothing varies.
     threads:   number of threads, without effect on the results; 0: one for each processor.
@@ -115,18 +123,18 @@ def simulate_many(runs: Iterable[Mapping[str, Any]] | Mapping[str, Sequence[Any]
         raise ValueError(f'repeat {repeat}: give a number of at least 1')
     if not 0 <= threads <= 1024:
         raise ValueError(f'threads {threads}: give a number in [0, 1024]')
-    given = []
+    given, laws = [], []
     for run in jobs:
-        if not isinstance(run.get('controller', ''), str):
-            raise ValueError('simulate_many: a controller written in Python cannot run in C++ threads; use simulate, or '
-                             'give the name of a controller')
+        if run.get('inject'):
+            raise ValueError(f'inject {run["inject"]!r}: many runs are simulated without faults; use simulate for this one')
+        laws.append(_law_of(run.get('controller')))
         given.append(options(**run))
     drawn = vary is not None or repeat > 1
     pairs = [(number, index if drawn else None) for number in range(len(jobs)) for index in range(repeat)]
     if vary is None:
         vary = STANDARD_VARIATION if repeat > 1 else 'none'
     with _Progress(progress, len(pairs)) as report:
-        found = _core.simulate_many(given, pairs, vary, vary_seed, threads, report)
+        found = _core.simulate_many(given, pairs, vary, vary_seed, threads, report, laws)
     errors = found.pop('error')
     if not keep_going:
         for (number, _), error in zip(pairs, errors):
@@ -134,6 +142,9 @@ def simulate_many(runs: Iterable[Mapping[str, Any]] | Mapping[str, Sequence[Any]
                 raise ValueError(f'run {number}: {error}' if len(jobs) > 1 else error)
     columns: dict[str, np.ndarray] = {}
     flat = [{**run, **run.get('set', {})} for run in jobs]
+    for run, law in zip(flat, laws):
+        if law is not None:
+            run['controller'] = type(law).__name__
     for name in sorted({name for run in flat for name in run if name != 'set'}):
         values = [run.get(name) for run in flat]
         if len(jobs) == 1 or any(value != values[0] for value in values):

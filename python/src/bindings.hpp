@@ -2,6 +2,7 @@
 
 #include <pybind11/pybind11.h>
 
+#include <exception>
 #include <functional>
 #include <string>
 #include <vector>
@@ -48,6 +49,7 @@ class PythonControllerScope {
   PythonControllerScope& operator=(const PythonControllerScope&) = delete;
   ~PythonControllerScope();
   void rethrow() const;
+  [[nodiscard]] std::exception_ptr raised() const noexcept;
   [[nodiscard]] bool failed() const noexcept;
 
  private:

@@ -1,5 +1,6 @@
 // Slip controllers: those of the registry stepped by hand, and controllers written in Python.
 
+#include <fmt/format.h>
 #include <pybind11/stl.h>
 
 #include <deque>
@@ -59,9 +60,13 @@ class PythonController final : public control::SlipController {
       const py::object returned = controller_.attr("step")(input);
       if (py::isinstance<SlipOutput>(returned)) {
         output = py::cast<SlipOutput>(returned);
-      } else {
-        output.brake_torque_Nm = py::cast<double>(returned);
+        return;
       }
+      output.brake_torque_Nm = PyFloat_AsDouble(returned.ptr());
+      if (PyErr_Occurred() == nullptr) return;
+      PyErr_Clear();
+      throw py::type_error("the controller's step returned " + std::string(py::repr(returned)) +
+                           "; give the wanted brake torque in N m, a number, or an abs_hil.SlipOutput");
     });
     return output;
   }
@@ -151,7 +156,11 @@ void add_input(py::module_& module) {
       .def_readonly("upper_travel_rad", &SlipInput::upper_travel_rad)
       .def_readonly("lower_travel_rad", &SlipInput::lower_travel_rad)
       .def_readonly("sent_brake_torque_Nm", &SlipInput::sent_brake_torque_Nm)
-      .def_readonly("unsent_torque_Nm", &SlipInput::unsent_torque_Nm);
+      .def_readonly("unsent_torque_Nm", &SlipInput::unsent_torque_Nm)
+      .def("__repr__", [](const SlipInput& i) {
+        return fmt::format("SlipInput(dt_s={}, omega1_rad_s={}, omega2_rad_s={}, slip={}, slip_ref={}, ...)", i.dt_s,
+                           i.speeds.omega1_rad_s, i.speeds.omega2_rad_s, i.slip, i.slip_ref);
+      });
 }
 
 void add_output(py::module_& module) {
@@ -177,7 +186,11 @@ void add_output(py::module_& module) {
       .def_readonly("theta_est_N", &SlipOutput::theta_est_N)
       .def_readonly("slip_ref", &SlipOutput::slip_ref)
       .def_property_readonly(
-          "signals", [](const SlipOutput& o) { return std::vector<double>(o.signals.begin(), o.signals.end()); });
+          "signals", [](const SlipOutput& o) { return std::vector<double>(o.signals.begin(), o.signals.end()); })
+      .def("__repr__", [](const SlipOutput& o) {
+        return fmt::format("SlipOutput({}, slip_velocity_error_m_s={}, theta_est_N={}, slip_ref={})", o.brake_torque_Nm,
+                           o.slip_velocity_error_m_s, o.theta_est_N, o.slip_ref);
+      });
 }
 
 }  // namespace
@@ -187,6 +200,7 @@ PythonControllerScope::PythonControllerScope(py::object controller) : controller
 }
 PythonControllerScope::~PythonControllerScope() { runs.pop_back(); }
 bool PythonControllerScope::failed() const noexcept { return runs.back().error != nullptr; }
+std::exception_ptr PythonControllerScope::raised() const noexcept { return runs.back().error; }
 void PythonControllerScope::rethrow() const {
   if (runs.back().error) std::rethrow_exception(runs.back().error);
 }

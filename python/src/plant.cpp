@@ -111,10 +111,16 @@ void add_plant(py::module_& module) {
       .def_property(
           "state", [](const Plant& plant) { return plant.state(); },
           [](Plant& plant, const PlantState& state) { plant.take_over(state, 0.0, 0); })
-      .def_property_readonly("slip", &Plant::slip)
-      .def_property_readonly("tyre_force_N", &Plant::tyre_force_N)
-      .def_property_readonly("theta_N", [](const Plant& plant) { return plant.truth().theta_N; })
-      .def_property_readonly("friction", &Plant::friction);
+      .def_property_readonly("slip", &Plant::slip, "slip now: 0 rolling, 1 locked, negative driven")
+      .def_property_readonly("tyre_force_N", &Plant::tyre_force_N, "force between the wheels now, N")
+      .def_property_readonly(
+          "theta_N", [](const Plant& plant) { return plant.truth().theta_N; },
+          "the largest force that any slip could give now, N")
+      .def_property_readonly("friction", &Plant::friction, "factor of the road's friction now")
+      .def("__repr__", [](const Plant& plant) {
+        return fmt::format("<abs_hil.Plant: omega1 {:.4g} rad/s, omega2 {:.4g} rad/s, slip {:.4g}>",
+                           plant.state().omega1_rad_s, plant.state().omega2_rad_s, plant.slip());
+      });
 }
 
 }  // namespace abs_hil::python

@@ -2,8 +2,10 @@
 
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
+#include <exception>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -19,6 +21,7 @@
 #include "run/run_summary.hpp"
 #include "study/batch.hpp"
 #include "study/parallel.hpp"
+#include "study/simulated_run.hpp"
 #include "study/variation.hpp"
 
 namespace abs_hil::python {
@@ -91,12 +94,40 @@ std::string refusal(const Work& work) {
   return {};
 }
 
+/// Runs one job whose controller is a Python object, in this thread. Returns why its options cannot be used, and throws
+/// what the controller raised. Called without Python's lock.
+std::string run_with_law(const py::object& law, program::RunOptions options,
+                         const std::function<study::Job(const config::Settings&)>& job_of, study::RunResult& result) {
+  std::optional<PythonControllerScope> scope;
+  const auto locked = [](const auto& work) {
+    const py::gil_scoped_acquire gil;
+    work();
+  };
+  locked([&] { scope.emplace(law); });
+  options.controller = python_controller;
+  std::string unusable = refusal([&] {
+    const config::Settings settings = program::merged_settings(options);
+    const study::Job job = job_of(settings);
+    result = study::simulate(run::Prepared(settings), job.plant, job.seed);
+  });
+  locked([&] {
+    const std::exception_ptr raised = scope->raised();
+    scope.reset();
+    if (raised) std::rethrow_exception(raised);
+  });
+  return unusable;
+}
+
 /// @param jobs  pairs (index into `options`, index of the perturbation or None)
+/// @param laws  of each of the options the controller's object, or None for one of the program's
 py::dict simulate_many(const std::vector<py::dict>& options, const std::vector<OneRun>& jobs, const std::string& vary,
-                       std::uint64_t seed, std::size_t threads, Interruptible::Progress progress) {
+                       std::uint64_t seed, std::size_t threads, Interruptible::Progress progress,
+                       const std::vector<py::object>& laws) {
   const study::Variation variation = study::Variation::parse(vary);
   std::vector<program::RunOptions> typed;
   for (const py::dict& arguments : options) typed.push_back(run_options(arguments));
+  std::vector<bool> in_python;
+  for (const py::object& law : laws) in_python.push_back(!law.is_none());
   std::vector<study::RunResult> results(jobs.size());
   std::vector<std::string> errors(jobs.size());
   Interruptible loop(std::move(progress));
@@ -105,27 +136,40 @@ py::dict simulate_many(const std::vector<py::dict>& options, const std::vector<O
     std::vector<config::Settings> settings(typed.size());
     std::vector<std::string> unusable(typed.size());
     study::for_each_index(typed.size(), threads, [&](std::size_t i) {
-      unusable[i] = refusal([&] { settings[i] = program::merged_settings(typed[i]); });
+      if (!in_python[i]) unusable[i] = refusal([&] { settings[i] = program::merged_settings(typed[i]); });
     });
     std::atomic<std::size_t> finished{0};
     std::vector<std::size_t> usable;
     for (std::size_t i = 0; i < jobs.size(); ++i) {
       errors[i] = unusable[jobs[i].first];
-      if (errors[i].empty()) usable.push_back(i);
+      if (errors[i].empty() && !in_python[jobs[i].first]) usable.push_back(i);
     }
-    const study::JobSource job_of = [&](std::size_t k) -> study::Job {
-      const auto& [at, plant] = jobs[usable[k]];
-      const config::Settings& s = settings[at];
+    const std::size_t others =
+        static_cast<std::size_t>(std::ranges::count_if(jobs, [&](const OneRun& job) { return in_python[job.first]; }));
+    const auto on_plant = [&](const config::Settings& s, const std::optional<std::uint64_t>& plant) -> study::Job {
       if (!plant) return {.settings = &s, .plant = s.plant, .seed = config::sensor_seed(s)};
       const study::Perturbation drawn = study::draw(variation, seed, *plant);
       return {.settings = &s, .plant = study::perturbed(s.plant, drawn), .seed = drawn.sensor_seed};
+    };
+    const study::JobSource job_of = [&](std::size_t k) {
+      const auto& [at, plant] = jobs[usable[k]];
+      return on_plant(settings[at], plant);
     };
     study::run_batch(usable.size(), threads, job_of, [&](std::size_t k, study::Outcome outcome) {
       results[usable[k]] = outcome.run;
       errors[usable[k]] = std::move(outcome.refusal);
       const std::size_t done = finished.fetch_add(1) + 1;
-      loop.after(jobs.size() - usable.size() + done, jobs.size());
+      loop.after(jobs.size() - others - usable.size() + done, jobs.size());
     });
+    std::size_t left = others;
+    for (std::size_t i = 0; i < jobs.size() && left > 0; ++i) {
+      const auto& [at, plant] = jobs[i];
+      if (!in_python[at]) continue;
+      errors[i] = run_with_law(
+          laws[at], typed[at], [&on_plant, &plant = plant](const config::Settings& s) { return on_plant(s, plant); },
+          results[i]);
+      loop.after(jobs.size() - --left, jobs.size());
+    }
   });
   py::dict columns;
   const auto add = [&](const char* name, auto&& value) {
@@ -195,7 +239,7 @@ void add_simulation(py::module_& module) {
   module.def("simulate", &simulate, py::arg("options"), py::arg("controller") = py::none(),
              py::arg("varied") = py::none());
   module.def("simulate_many", &simulate_many, py::arg("options"), py::arg("jobs"), py::arg("vary"), py::arg("seed"),
-             py::arg("threads"), py::arg("progress") = nullptr);
+             py::arg("threads"), py::arg("progress"), py::arg("laws"));
 }
 
 }  // namespace abs_hil::python

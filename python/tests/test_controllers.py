@@ -113,7 +113,8 @@ def test_an_exception_ends_the_run_and_is_raised(where):
             return 2.0
 
     law = Broken()
-    with pytest.raises((RuntimeError, TypeError), match={'type': '', 'exit': 'asked Python to exit'}.get(where, 'my')):
+    words = {'type': "step returned 'much'; give", 'exit': 'asked Python to exit'}.get(where, 'my')
+    with pytest.raises((RuntimeError, TypeError), match=words):
         abs_hil.simulate(law, set=QUICK)
     assert law.steps <= 101, 'not called again after its exception'
     assert abs_hil.simulate('pi', set=QUICK).summary['result'] == 'completed', 'nothing of it is left'

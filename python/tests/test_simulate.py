@@ -126,10 +126,62 @@ def test_bad_runs_of_a_study():
     study = abs_hil.simulate_many(runs, keep_going=True)
     assert study['error'][0] == '' and 'control.adaptive.gamma' in study['error'][1]
     assert np.isnan(study['stop_time_s'][1]) and study['stop_time_s'][0] > 0
-    with pytest.raises(ValueError, match='Python'):
+    with pytest.raises(ValueError, match='object has no methods reset and step'):
         abs_hil.simulate_many([{'controller': object()}])
+    with pytest.raises(ValueError, match='without faults'):
+        abs_hil.simulate_many([{'inject': ['brake@encoder_upper:stuck']}])
     with pytest.raises(ValueError, match='list of values'):
         abs_hil.simulate_many({'controller': 'pi'})
+
+
+class Constant:
+    """A controller in Python."""
+
+    def __init__(self, torque_Nm=4.0, fails=False):
+        self.torque_Nm, self.fails = torque_Nm, fails
+
+    def reset(self, input):
+        pass
+
+    def step(self, input):
+        if self.fails:
+            raise KeyError('my law')
+        return self.torque_Nm
+
+
+@pytest.mark.parametrize('repeat', [1, 3])
+def test_controllers_in_python_beside_those_of_the_program(repeat):
+    told = []
+    runs = [{'controller': law, 'set': QUICK} for law in (Constant(), 'pi', Constant(5.0))]
+    many = abs_hil.simulate_many(runs, repeat=repeat, threads=2, progress=lambda done, total: told.append((done, total)))
+    assert told[-1] == (3 * repeat, 3 * repeat)
+    assert many['controller'].tolist() == [name for name in ('Constant', 'pi', 'Constant') for _ in range(repeat)]
+    for n, run in enumerate(runs):
+        for k in range(repeat):
+            one = abs_hil.simulate(**run, repetition=k if repeat > 1 else None).summary
+            assert many['stop_distance_m'][n * repeat + k] == one['stop_distance_m']
+    with pytest.raises(KeyError, match='my law'):
+        abs_hil.simulate_many([{'controller': 'pi', 'set': QUICK}, {'controller': Constant(fails=True), 'set': QUICK}])
+    assert len(abs_hil.simulate_many(runs)) == 3, 'nothing of it is left'
+
+
+def test_values_of_numpy_and_values_that_are_none():
+    run = abs_hil.simulate(set={**QUICK, 'plant.ideal_sensors': np.bool_(True), 'plant.theta_N': np.float32(20)},
+                           seed=np.int64(3))
+    assert run.config['plant.ideal_sensors'] is True and run.config['plant.theta_N'] == 20.0
+    bad = [({'seed': 1.5}, 'seed 1.5: give an integer'), ({'seed': 'x'}, "seed 'x'"), ({'set': 5}, 'set 5: give'),
+           ({'set': {'plant.theta_N': None}}, 'set: plant.theta_N: None is no')]
+    for arguments, words in bad:
+        with pytest.raises(ValueError, match=words):
+            abs_hil.simulate(**arguments)
+
+
+def test_a_phase_that_is_none_and_units():
+    run = abs_hil.simulate(set=QUICK)
+    assert len(run.during('accelerate')['time_s']) == 0  # it began at speed
+    with pytest.raises(ValueError, match='"typo" is no phase; give one of idle, '):
+        run.during('typo')
+    assert run.data.attrs['units']['omega1_rad_s'] == 'rad/s' and 'slip' not in run.data.attrs['units']
 
 
 def test_an_exception_in_the_progress_ends_the_study():

@@ -153,6 +153,10 @@ def test_a_run_of_a_study_with_all_its_rows(small):
             abs_hil.simulate_run(varied, bad)
 
 
+def test_any_text_may_describe_a_study():
+    assert len(abs_hil.study({**SMALL, 'description': 'glatt \u2744 \U0001f600 "quoted"'}).data) > 0
+
+
 def test_an_interrupted_study_goes_on(tmp_path):
     def stop(done, total):
         if done > total * 0.8:

@@ -99,7 +99,7 @@ def toml_of(values: Mapping[str, Any]) -> str:
 def _key(key: Any) -> str:
     if not isinstance(key, str) or not key:
         raise ValueError(f'a study has texts as keys, not {key!r}')
-    return '.'.join(part if part.replace('_', '').replace('-', '').isalnum() and part.isascii() else json.dumps(part)
+    return '.'.join(part if part.replace('_', '').replace('-', '').isalnum() and part.isascii() else _value(part)
                     for part in key.split('.'))
 
 
@@ -109,7 +109,7 @@ def _value(value: Any) -> str:
     if isinstance(value, Mapping):
         return '{ ' + ', '.join(f'{_key(key)} = {_value(inner)}' for key, inner in value.items()) + ' }'
     if isinstance(value, str):
-        return json.dumps(value)
+        return json.dumps(value, ensure_ascii=False)
     if isinstance(value, bool):
         return 'true' if value else 'false'
     if isinstance(value, (int, float)):
