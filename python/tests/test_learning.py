@@ -6,6 +6,7 @@ from gymnasium.utils.env_checker import check_env
 
 import abs_hil
 from abs_hil.learning import ID, Rigs, Task
+from abs_hil.learning.rigs import FAULT_REWARD
 from abs_hil.learning.training import Policy, judge, returns, train
 
 QUICK = {'start_speed_rad_s': 60.0}
@@ -50,11 +51,30 @@ def test_reward_is_as_stated():
     before = np.zeros(2)
     for actions in (np.array([0.4, 0.9]), np.array([0.6, 0.9]), np.array([0.6, 0.1])):
         _, rewards, _ = rigs.step(actions)
-        np.testing.assert_allclose(rewards, -np.abs(rigs.true_slip - 0.15) - 0.02 * np.abs(actions - before), rtol=1e-12)
+        np.testing.assert_allclose(rewards, -np.abs(rigs.true_slip - 0.15) - 0.1 * np.abs(actions - before), rtol=1e-12)
         before = actions
     observation = rigs.observations()
     assert observation.shape == (2, 7) and observation.dtype == np.float32
     assert observation[:, 1] == pytest.approx([0.15, 0.15])
+
+
+def test_no_braking_costs_as_much_as_a_fault():
+    chatter = Rigs(1, STANDARD)
+    chatter.reset(0, 0)
+    total, ended, n = 0.0, False, 0
+    while not ended:
+        _, rewards, over = chatter.step(np.array([float(n % 2)]))
+        total, ended, n = total + rewards[0], bool(over[0]), n + 1
+    assert FAULT_REWARD < total < -0.1 * (n - 1)
+    faulty = Rigs(1, Task(set={'gate.overspeed_rad_s': 100.0}))
+    faulty.reset(0, 0)
+    rewards, steps = [], 0
+    ended = False
+    while not ended and steps < 100:
+        _, reward, over = faulty.step(np.array([0.3]))
+        rewards.append(reward[0])
+        ended, steps = bool(over[0]), steps + 1
+    assert FAULT_REWARD in rewards
 
 
 def test_full_brake_locks_and_no_brake_rolls():
@@ -79,8 +99,11 @@ def test_threads_and_neighbours_change_nothing():
 
 def test_vector_environment():
     environment = gymnasium.make_vec(ID, num_envs=3, vectorization_mode='vector_entry_point', **QUICK)
-    observations, _ = environment.reset(seed=3)
-    assert observations.shape == (3, 7)
+    chosen, info = environment.reset(options={'index': [5, 6, 5]})
+    assert info['index'].tolist() == [5, 6, 5]
+    np.testing.assert_array_equal(chosen[0], chosen[2])
+    observations, info = environment.reset(seed=3)
+    assert observations.shape == (3, 7) and info['true_slip'].shape == info['_index'].shape == (3,)
     ended = np.zeros(3, dtype=int)
     for _ in range(400):
         observations, rewards, terminated, truncated, _ = environment.step(np.full((3, 1), 0.6, dtype=np.float32))

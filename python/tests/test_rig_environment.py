@@ -17,6 +17,7 @@ from conftest import ABS_HIL  # noqa: E402
 
 import abs_hil.learning  # noqa: E402
 from abs_hil.learning.rig_environment import RigSlipControl  # noqa: E402
+from abs_hil.learning.rigs import FAULT_REWARD  # noqa: E402
 
 #: what a busy computer needs
 PATIENT = {'guardian.timeout_ms': 1000, 'realtime.cycle_gap_max_s': 1, 'realtime.max_consecutive_overruns': 0,
@@ -121,7 +122,7 @@ def test_behind_gate_and_guardian_of_a_board(board, tmp_path):
         _, reward, terminated, _, info = environment.step([0.2])
         if terminated:
             break
-    assert terminated and reward == -10.0
+    assert terminated and reward == FAULT_REWARD
     assert info['result'] == 'fault' and 'watchdog' in info['reason']
     with pytest.raises(RuntimeError, match='call reset'):
         environment.step([0.2])
@@ -136,7 +137,7 @@ def test_a_program_that_dies_ends_the_episode(tmp_path):
         _, reward, terminated, _, info = environment.step([0.2])
         if terminated:
             break
-    assert terminated and reward == -10.0 and info['result'] == 'died'
+    assert terminated and reward == FAULT_REWARD and info['result'] == 'died'
     environment.close()
 
 

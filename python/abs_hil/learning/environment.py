@@ -35,7 +35,8 @@ class SlipControl(gymnasium.Env):
         5 brake_torque_est  torque estimated to act behind the brake's lag, over the largest, in [0, 1]
         6 action_before     the action before, in [0, 1]
     Action, float32 of shape (1,): the wanted brake torque over the largest, in [0, 1], held for `period_s`.
-    Reward of a step: -|true slip - slip_ref| - 0.02 |change of the action|; -10 if a fault ends the run.
+    Reward of a step: -|true slip - slip_ref| - 0.1 |change of the action|; -450 if a fault ends the run, which is more than any
+    braking costs.
     Terminated: the car is below 3 m/s, or a fault has ended the run. Truncated after 1000 steps.
 
     Every episode has another plant: see abs_hil.learning.Task (plant, set, vary, randomise, period_s, start_speed_rad_s),
@@ -79,24 +80,36 @@ class SlipControlVector(VectorEnv):
         self._rigs = Rigs(num_envs, Task(**task), seed=plants_seed, threads=threads)
         self._steps = np.zeros(num_envs, dtype=int)
         self._over = np.zeros(num_envs, dtype=bool)
+        self._plants = np.zeros(num_envs, dtype=np.int64)
 
     def reset(self, *, seed: Any = None, options: Mapping[str, Any] | None = None) -> tuple[np.ndarray, dict[str, Any]]:
         super().reset(seed=seed)
         self._over[:] = False
         self._steps[:] = 0
-        for rig in range(self.num_envs):
-            self._rigs.reset(rig, int(self.np_random.integers(2**31)))
-        return self._rigs.observations(), {}
+        """options: {"index": [n, ...]} chooses the plant of each rig."""
+        if options and 'index' in options:
+            self._plants = np.broadcast_to(np.asarray(options['index'], dtype=np.int64), (self.num_envs,)).copy()
+        else:
+            self._plants = self.np_random.integers(2**31, size=self.num_envs)
+        for rig, index in enumerate(self._plants):
+            self._rigs.reset(rig, int(index))
+        return self._rigs.observations(), self._info()
 
     def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         again = self._over.copy()
         observations, rewards, ended = self._rigs.step(np.asarray(actions).reshape(self.num_envs))
         for rig in np.flatnonzero(again):
-            self._rigs.reset(int(rig), int(self.np_random.integers(2**31)))
+            self._plants[rig] = self.np_random.integers(2**31)
+            self._rigs.reset(int(rig), int(self._plants[rig]))
         if again.any():
             observations = self._rigs.observations()
         self._steps = np.where(again, 0, self._steps + 1)
         terminated = ended & ~again
         truncated = ~terminated & (self._steps >= MOST_STEPS)
         self._over = terminated | truncated
-        return observations, np.where(again, 0.0, rewards), terminated, truncated, {}
+        return observations, np.where(again, 0.0, rewards), terminated, truncated, self._info()
+
+    def _info(self) -> dict[str, Any]:
+        """As gymnasium's vectors have it: of each rig the number of its plant and its true slip."""
+        there = np.ones(self.num_envs, dtype=bool)
+        return {'index': self._plants.copy(), '_index': there, 'true_slip': self._rigs.true_slip, '_true_slip': there.copy()}

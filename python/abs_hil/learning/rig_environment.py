@@ -34,7 +34,7 @@ class RigSlipControl(gymnasium.Env):
 
     `reset` starts `abs_hil`, waits until the rig has run up and braking begins: one run-up an episode. `step` gives an action
     and returns after `period_s` of the rig's time. Observation and action are those of abs_hil.learning.environment.SlipControl.
-    Reward: -|estimated slip - wanted slip| - 0.02 |change of the action|; -10 if a fault ends the run.
+    Reward: -|estimated slip - wanted slip| - 0.1 |change of the action|; -450 if a fault ends the run.
 
     An action that comes late changes nothing for `hold_s` after the one before: that one acts on. Then the brake is off until
     an action comes; info["late_cycles"] counts such cycles. Terminated: the run has ended, below 3 m/s or by a fault;

@@ -16,8 +16,10 @@ LOW = np.array([-1.0, 0.0, 0.0, -3000.0, -1000.0, 0.0, 0.0], dtype=np.float32)
 HIGH = np.array([1.0, 1.0, 30.0, 3000.0, 1000.0, 1.0, 1.0], dtype=np.float32)
 #: an episode ends below this car speed, where slip is no longer judged
 END_SPEED_M_S = 3.0
-FAULT_REWARD = -10.0
-CHANGE_PRICE = 0.02
+#: as much as the longest braking, 450 steps of 10 ms, at a slip that is wholly wrong: no fault may pay
+FAULT_REWARD = -450.0
+#: of a change of the action; chatter between 0 and 1 then costs as much as a slip that is wrong by 0.1
+CHANGE_PRICE = 0.1
 #: seed of the series of plants on which a learner trains; judge it on another
 TRAINING_SEED = 1
 _STATE_FAULT = 2.0
@@ -57,7 +59,7 @@ class Rigs:
     shape (count,), each the wanted brake torque over the largest, in [0, 1], returns (observations (count, 7), rewards
     (count,), ended (count,)). A rig whose episode has ended stands still until its reset and earns 0.
 
-    Reward of a step: -|slip - slip_ref| (the true slip) - 0.02 |change of the action|; -10 at the end by a fault.
+    Reward of a step: -|slip - slip_ref| (the true slip) - 0.1 |change of the action|; -450 at the end by a fault.
 
     law: the name of a controller that drives instead of the actions, to compare with.
     """
