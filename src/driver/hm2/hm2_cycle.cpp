@@ -76,7 +76,7 @@ IoResult Hm2Driver::lost_answer() noexcept {
 IoResult Hm2Driver::judge_talkers(const CycleAnswer& answer) noexcept {
   const auto all = static_cast<std::uint16_t>(answer.received.all - received_.all);
   const auto udp = static_cast<std::uint16_t>(answer.received.udp - received_.udp);
-  const std::uint16_t came = counts_udp_ ? udp : all;
+  const std::uint16_t came = counts_udp_ ? std::min(udp, all) : all;  // no datagram is not a packet
   const std::uint32_t ours = link_->sent() - sent_before_;
   const bool strict = driving_ && any_answer_;
   received_ = answer.received;
@@ -155,6 +155,7 @@ std::int32_t Hm2Driver::edge_age_ns(const CycleAnswer& answer, std::size_t wheel
     const std::int64_t age_ns = before_ns + since_ns;
     return age_ns <= std::numeric_limits<std::int32_t>::max() ? static_cast<std::int32_t>(age_ns) : rig::no_edge_age;
   }
+  if (stamp == stamps_[wheel]) return rig::no_edge_age;  // a board without stamps
   if (!any_answer_ || static_cast<double>(since_ns) >= wrap_ticks * stamp_tick_ns_) return rig::no_edge_age;
   const auto ticks = static_cast<std::uint16_t>(answer.stamp_clock - stamp);
   return static_cast<std::int32_t>(std::lround(ticks * stamp_tick_ns_));

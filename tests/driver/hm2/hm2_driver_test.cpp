@@ -399,6 +399,16 @@ TEST_CASE("The ages of the encoders' edges are the board's, to its tick of 0.5 u
   CHECK(oldest_ns >= 200 * ms);
 }
 
+TEST_CASE("A board that stamps no edges gives no ages") {
+  Rig rig({}, 60.0);
+  rig.board.stamps_edges = false;
+  for (int i = 0; i < 100; ++i) {
+    REQUIRE(rig.cycle(rig::safe_command).ok());
+    REQUIRE(rig.measurement.upper_edge_age_ns == rig::no_edge_age);
+    REQUIRE(rig.measurement.lower_edge_age_ns == rig::no_edge_age);
+  }
+}
+
 TEST_CASE("An edge that may lie a wrap of its stamp back has no age") {
   Rig rig({}, 60.0);
   REQUIRE(rig.driver.rest().ok());

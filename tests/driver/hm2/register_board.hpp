@@ -110,6 +110,7 @@ class RegisterBoard final : public emulator::RigBehind {
   std::uint64_t writes{0};
   driver::hm2::Received received{};
   bool counts_udp{true};
+  bool stamps_edges{true};
   std::uint32_t bitten{1};
   std::array<std::uint32_t, 2> control{};  ///< bits that the counters report beside what was written
   std::uint32_t broken_pins{0};            ///< pins of port 1 that never become outputs
@@ -160,6 +161,7 @@ class RegisterBoard final : public emulator::RigBehind {
     edge_ns_[upper ? 1 : 0] = from_ns + std::llround(with * static_cast<double>(time_ns() - from_ns));
   }
   [[nodiscard]] std::uint32_t ticks(std::int64_t at_ns) const {
+    if (!stamps_edges) return 0;
     return static_cast<std::uint16_t>(at_ns / (10 * (std::int64_t{reg(0x3200)} + 2)));
   }
   std::uint32_t read(unsigned space, std::uint16_t address) {
