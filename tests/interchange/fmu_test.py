@@ -55,7 +55,12 @@ class FmuTest(ProgramTest):
 
     def test_parameters_come_from_the_rows(self):
         for fmi in (2, 3):
-            description = fmpy.read_model_description(self.export('plant', '--set', 'plant.theta_N=30', fmi=fmi))
+            for name, options in (('law', ('--controller', 'adaptive-optimal')), ('plant', ('--set', 'plant.theta_N=30'))):
+                description = fmpy.read_model_description(self.export(name, *options, fmi=fmi))
+                self.assertEqual((description.license, description.author), ('BSD-3-Clause', 'The abs_hil authors'))
+                # FMI has whole exponents alone.
+                without = {unit.name for unit in description.unitDefinitions if unit.baseUnit is None}
+                self.assertLessEqual(without, {'m^0.5/s^1.5'})
             variables = {v.name: v for v in description.modelVariables}
             theta = variables['plant.theta_N']
             self.assertEqual((float(theta.start), theta.unit, float(theta.max)), (30.0, 'N', 500.0))

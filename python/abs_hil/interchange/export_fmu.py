@@ -25,7 +25,11 @@ BASE_UNITS: dict[str, dict[str, float]] = {
     'm/s': {'m': 1, 's': -1}, 'm/s^2': {'m': 1, 's': -2}, 'm/s^3': {'m': 1, 's': -3}, 'rad/s': {'s': -1, 'rad': 1},
     'rad': {'rad': 1}, 'deg': {'rad': 1, 'factor': 0.017453292519943295}, 'N': {'kg': 1, 'm': 1, 's': -2},
     'N m': {'kg': 1, 'm': 2, 's': -2}, 'N m/s': {'kg': 1, 'm': 2, 's': -3}, 'N m s': {'kg': 1, 'm': 2, 's': -1},
-    'kg m^2': {'kg': 1, 'm': 2}, 'kg^2/s^2': {'kg': 2, 's': -2}}
+    'kg m^2': {'kg': 1, 'm': 2}, 'kg^2/s^2': {'kg': 2, 's': -2}, 'N m s/rad': {'kg': 1, 'm': 2, 's': -1, 'rad': -1},
+    'rad/s^2': {'rad': 1, 's': -2}, 'ms': {'s': 1, 'factor': 1e-3}, 'us': {'s': 1, 'factor': 1e-6}, 's^2': {'s': 2},
+    'V': {'kg': 1, 'm': 2, 's': -3, 'A': -1}, 'deg C': {'K': 1, 'offset': 273.15}, 's/kg^2': {'s': 1, 'kg': -2},
+    'kg^2 m/s^3': {'kg': 2, 'm': 1, 's': -3}, 'N^2/s': {'kg': 2, 'm': 2, 's': -5}, 'N^2 s': {'kg': 2, 'm': 2, 's': -3},
+    '(N m)^2/s': {'kg': 2, 'm': 4, 's': -5}, '1/N': {'kg': -1, 'm': -1, 's': 2}, '1/J': {'kg': -1, 'm': -2, 's': 2}}
 
 
 def _add(parent: Element, tag: str, **attributes: Any) -> Element:
@@ -93,6 +97,9 @@ def description(model: dict[str, Any], fmi: int) -> bytes:
     variables, step_s, state = model['variables'], model['step_s'], 'State' if fmi == 3 else 'state'
     root = Element('fmiModelDescription', {
         'fmiVersion': f'{fmi}.0', 'modelName': model['name'], 'instantiationToken' if fmi == 3 else 'guid': model['token'],
+        'description': 'Inteco ABS laboratory rig, simulated' if model['varied_step'] else
+                       'slip controller for the Inteco ABS laboratory rig',
+        'author': 'The abs_hil authors', 'version': _core.version, 'license': 'BSD-3-Clause',
         'generationTool': f'abs_hil {_core.version}', 'variableNamingConvention': 'flat'})
     _add(root, 'CoSimulation', modelIdentifier=IDENTIFIER, canHandleVariableCommunicationStepSize=model['varied_step'],
          **{f'canGetAndSetFMU{state}': True, f'canSerializeFMU{state}': True},
