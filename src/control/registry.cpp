@@ -63,6 +63,11 @@ std::vector<ControllerFiles>& file_table() noexcept {
 }
 
 std::string unknown_name_message(std::string_view name) {
+  if (name.find(':') != std::string_view::npos) {
+    return "controller " + std::string(name) +
+           ": a class in Python runs in abs_hil benchmark, and in abs_hil.simulate and abs_hil.simulate_many of the "
+           "Python package, over the same plants (docs/python.md); here give a name or a file";
+  }
   const auto nearest = std::ranges::min_element(
       table(), {}, [name](const ControllerEntry& entry) { return rig::edit_distance(name, entry.name); });
   std::string message = "unknown controller '" + std::string(name) + "'; did you mean '" + std::string(nearest->name) +

@@ -41,6 +41,8 @@ TEST_CASE("An unknown name is answered with the nearest and all known ones") {
       Contains("'adaptve'") && Contains("did you mean 'adaptive'") && Contains("nominal") && Contains("locked"));
   CHECK_THROWS_WITH(control::make_controller("loked", {options, parameters}), Contains("did you mean 'locked'"));
   CHECK_THROWS_AS(control::make_controller("", {options, parameters}), std::invalid_argument);
+  CHECK_THROWS_WITH(control::make_controller("my_law:Law", {options, parameters}),
+                    Contains("my_law:Law") && Contains("abs_hil.simulate_many") && !Contains("did you mean"));
 }
 
 TEST_CASE("A registered controller stands beside ours; a taken or empty name is refused") {
