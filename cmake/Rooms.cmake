@@ -23,7 +23,7 @@ set(ABS_HIL_ROOM_TABLE
   "study | simulated runs in this process: studies and their designs, chunks and folders, controllers side by side over varied plants | files rig control plant_sim driver driver_sim runtime experiment analysis run_folder config run"
   "commands | remote commands over LCM: authority, listener, sender | files rig control plant_sim driver runtime experiment config telemetry lcmtypes"
   "replay | recorded runs through the cycle again: proof of equal commands, other controllers open loop | files rig control plant_sim driver driver_sim runtime experiment analysis config run telemetry lcmtypes"
-  "interchange | what other tools bring or take: controllers from shared libraries and FMUs, the process that runs them, plant and laws as FMUs | files rig control plant_sim driver driver_sim runtime experiment"
+  "interchange | what other tools bring or take: controllers from shared libraries, FMUs and agents, the process that runs them, plant and laws as FMUs | files rig control plant_sim driver driver_sim runtime experiment"
   "program | what `abs_hil` decides between its command line and the other rooms | cli files rig control plant_sim driver driver_sim runtime experiment lcmtypes telemetry analysis run_folder diagnosis config guardian run study commands replay interchange"
 )
 
