@@ -28,6 +28,7 @@ std::map<std::string_view, FieldValue> values_of(const telemetry_t& message) {
   std::map<std::string_view, FieldValue> values;
   telemetry::visit_fields(message, [&values, &of](std::string_view name, const auto& value) {
     using Value = std::decay_t<decltype(value)>;
+    if (name == "value_count") return;  // another version's messages have others; each counts by its name
     if constexpr (std::is_same_v<Value, double>) {
       values[name] = of(value);
     } else if constexpr (std::is_integral_v<Value>) {
