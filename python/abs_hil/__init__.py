@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .identification import Identified, identify
     from .network import live
     from .run import Run, Series, load, load_series
-    from .simulation import Study, controllers, experiments, keys, plants, simulate, simulate_many
+    from .simulation import Study, controllers, experiments, keys, plants, simulate, simulate_many, simulate_series
     from .studies import StudyResults, load_study, simulate_run, study
 
 # Importing the types' modules has put modules under these names.
@@ -35,13 +35,14 @@ _LATER = {'figures': ('FigureOfMerit', 'figures'),
           'network': ('live',),
           'run': ('Run', 'Series', 'load', 'load_series'),
           'studies': ('StudyResults', 'load_study', 'simulate_run', 'study'),
-         'simulation': ('Study', 'controllers', 'experiments', 'keys', 'plants', 'simulate', 'simulate_many')}
+         'simulation': ('Study', 'controllers', 'experiments', 'keys', 'plants', 'simulate', 'simulate_many',
+                        'simulate_series')}
 _MODULE_OF = {name: module for module, names in _LATER.items() for name in names}
 
 __all__ = ['PHASES', 'QUANTITIES', 'REASONS', 'TYPES', 'Controller', 'FigureOfMerit', 'Identified', 'Plant', 'PlantState', 'Run',
            'Series', 'SlipInput', 'SlipOutput', 'Study', 'StudyResults', 'controllers', 'decode', 'experiments', 'figures',
            'identify', 'keys', 'live', 'load', 'load_series', 'load_study', 'plants', 'row_of', 'simulate',
-           'simulate_many', 'simulate_run', 'study']
+           'simulate_many', 'simulate_run', 'simulate_series', 'study']
 
 
 if not TYPE_CHECKING:  # a checker of types must see a name that does not exist

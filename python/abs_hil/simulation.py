@@ -11,7 +11,7 @@ import numpy as np
 
 from .core import _core
 from .options import PathLike, Value, options
-from .run import Run, phase_names
+from .run import Run, Series, phase_names
 
 if TYPE_CHECKING:
     import pandas
@@ -70,6 +70,29 @@ def run_of(columns: dict[str, Any], signals: Sequence[str], summary: str, config
     if 'phase_name' in columns:
         columns['phase_name'] = np.array(columns['phase_name'], dtype=object)
     return Run(columns, json.loads(summary), tuple(signals), config_toml=config_toml)
+
+
+def simulate_series(experiment: PathLike = 'series-of-ten', controller: str = 'adaptive', plant: PathLike = 'paper-table1',
+                    seed: int = 1, set: Mapping[str, Value] | None = None, *, model: PathLike | None = None,
+                    config: PathLike | None = None) -> Series:
+    """Runs all runs of a series (docs/experiments.md) on the simulated rig in virtual time, one after the other.
+
+    experiment: a name or TOML file with [series] or [factors]; one without is a series of one run. The other arguments are
+    those of `simulate`; `seed` is that of the first repetition if the file gives none.
+
+    Returns a Series: its runs equal those of `abs_hil --fast` in their folders, and its index has what series.json has of
+    them. Raises ValueError before the first run for options that cannot be used.
+    """
+    given = options(controller=None if controller == 'adaptive' else controller,
+                    plant=None if plant == 'paper-table1' else plant, experiment=experiment, model=model, config=config,
+                    seed=None if seed == 1 else seed, set=set)
+    runs, rows = [], []
+    for number, (varied, its_seed, parts) in enumerate(_core.simulate_series(given), 1):
+        runs.append(run_of(*parts))
+        runs[-1].name = f'run-{number:04}'
+        rows.append({'folder': runs[-1].name, 'varied': json.loads(varied), 'seed': its_seed,
+                     'status': runs[-1].summary['result']})
+    return Series(runs, {'experiment': str(experiment), 'runs': rows}, [])
 
 
 class Study:

@@ -191,6 +191,25 @@ py::dict simulate_many(const std::vector<py::dict>& options, const std::vector<O
   return columns;
 }
 
+/// The runs of a series in its order: for each its varied values as JSON, its seed, and what `simulate` returns. All
+/// configurations are checked before the first run.
+py::list simulate_series(const py::dict& arguments) {
+  const program::RunOptions common = run_options(arguments);
+  const program::RunRequest base = program::merge(common);
+  const std::vector<config::SeriesMember> members = config::members_of(*base.script, base.settings.seed);
+  std::vector<program::RunRequest> requests;
+  for (const config::SeriesMember& member : members) {
+    requests.push_back(program::merge(program::options_of(common, member)));
+    if (!base.script->series.experiments.empty()) program::refuse_nested(*base.script, *requests.back().script);
+  }
+  py::list runs;
+  for (std::size_t n = 0; n < members.size(); ++n) {
+    const py::tuple run = recorded_run([&] { return std::move(requests[n]); }, nullptr);
+    runs.append(py::make_tuple(program::varied_json(members[n]).dump(), members[n].seed, run));
+  }
+  return runs;
+}
+
 std::vector<std::string> texts(const py::handle& values) { return py::cast<std::vector<std::string>>(values); }
 
 }  // namespace
@@ -238,6 +257,7 @@ program::RunOptions run_options(const py::dict& arguments) {
 void add_simulation(py::module_& module) {
   module.def("simulate", &simulate, py::arg("options"), py::arg("controller") = py::none(),
              py::arg("varied") = py::none());
+  module.def("simulate_series", &simulate_series, py::arg("options"));
   module.def("simulate_many", &simulate_many, py::arg("options"), py::arg("jobs"), py::arg("vary"), py::arg("seed"),
              py::arg("threads"), py::arg("progress"), py::arg("laws"));
 }

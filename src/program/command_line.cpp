@@ -296,6 +296,21 @@ RunRequest merge(const RunOptions& options) {
   return request;
 }
 
+nlohmann::ordered_json varied_json(const config::SeriesMember& member) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (const auto& [key, value] : member.varied) {
+    std::visit([&json, &key = key](const auto& v) { json[key] = v; }, value);
+  }
+  return json;
+}
+
+RunOptions options_of(const RunOptions& common, const config::SeriesMember& member) {
+  RunOptions options = common;
+  for (const auto& [key, value] : member.varied) options.changes.push_back({key, value, "[vary]"});
+  options.changes.push_back({"run.seed", member.seed, "[series]"});
+  return options;
+}
+
 RunRequest request_of(config::Settings settings, OutputOptions outputs) {
   RunRequest request{.settings = std::move(settings), .outputs = std::move(outputs)};
   request.script = config::find(request.settings.experiment.name);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -82,6 +83,10 @@ struct RunRequest {
   std::function<void()> stop_was_sent{};
 };
 
+/// The options of one run of a series.
+[[nodiscard]] RunOptions options_of(const RunOptions& common, const config::SeriesMember& member);
+/// Its varied values as a JSON object.
+[[nodiscard]] nlohmann::ordered_json varied_json(const config::SeriesMember& member);
 /// Refuses an experiment of a series that is a series itself. Throws config::ConfigError.
 void refuse_nested(const config::Script& series, const config::Script& experiment);
 /// Merges defaults, plant file, model file, the script's settings, configuration file, named options, assignments and

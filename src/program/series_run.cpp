@@ -98,21 +98,6 @@ std::string text_of(const config::SeriesMember& member) {
   return text + fmt::format("seed {}", member.seed);
 }
 
-nlohmann::ordered_json varied_json(const config::SeriesMember& member) {
-  nlohmann::ordered_json json = nlohmann::ordered_json::object();
-  for (const auto& [key, value] : member.varied) {
-    std::visit([&json, &key = key](const auto& v) { json[key] = v; }, value);
-  }
-  return json;
-}
-
-RunOptions options_of(const RunOptions& common, const config::SeriesMember& member) {
-  RunOptions options = common;
-  for (const auto& [key, value] : member.varied) options.changes.push_back({key, value, "[vary]"});
-  options.changes.push_back({"run.seed", member.seed, "[series]"});
-  return options;
-}
-
 /// Opens the folder of the series; null if no folder is wanted. Throws config::ConfigError.
 std::unique_ptr<run_folder::SeriesFolder> open_folder(const RunRequest& base,
                                                       std::vector<run_folder::SeriesEntry> entries) {

@@ -1,4 +1,6 @@
 // Runs recorded by the program's own parts: replayed, checked, and damaged.
+#include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <functional>
 #include <iterator>
