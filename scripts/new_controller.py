@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """usage: new_controller.sh [--no-build] NAME | --out DIR NAME
 
-Adds the controller NAME, for example my-law, to this tree: a pair of files in src/control, its first test, the line of
-the registry, the lines of both CMakeLists.txt and the row of docs/controllers.md. Then builds abs_hil and the test,
-runs the test, and renews what lists all controllers. The new law is the example of docs/writing-a-controller.md under
-its new name; replace it by yours.
+Adds the controller NAME, for example my-law, to this tree: a pair of files in src/control with the keys of its gains,
+control.my_law.*, its first test, the line of the registry, the lines of both CMakeLists.txt and the row of
+docs/controllers.md. Then builds abs_hil and the test, runs the test, and renews what lists all controllers. The new law
+is the proportional one of docs/writing-a-controller.md under its new name; replace it by yours.
 
 --out DIR writes a project of its own instead, a copy of examples/own_controller under the new name.
 """
@@ -29,12 +29,14 @@ class Names:
         if not re.fullmatch(r'[a-z][a-z0-9]*(-[a-z0-9]+)*', name) or len(name) > 40:
             refuse(f'"{name}": give a name of lower-case words, as in my-law, at most 40 characters')
         self.name = name
-        self.file = name.replace('-', '_') + '_controller'
+        self.section = name.replace('-', '_')
+        self.file = self.section + '_controller'
         self.stem = ''.join(word.capitalize() for word in name.split('-'))
 
     def renamed(self, text):
         """The example's text under the new name."""
         text = text.replace('Proportional', self.stem).replace('proportional_controller', self.file)
+        text = text.replace('control.proportional.', f'control.{self.section}.')
         return text.replace('"proportional"', f'"{self.name}"')
 
 
@@ -64,11 +66,14 @@ def in_tree(names):
     new = {
         room / f'{names.file}.hpp': (EXAMPLE / 'proportional_controller.hpp'),
         room / f'{names.file}.cpp': (EXAMPLE / 'proportional_controller.cpp'),
-        tests / f'{names.file}_test.cpp': (EXAMPLE / 'proportional_controller_test.cpp'),
+        tests / f'{names.file}_test.cpp': (EXAMPLE / 'promises_test.cpp'),
     }
     registry = room / 'registry.cpp'
     if f'"{names.name}"' in registry.read_text(encoding='utf-8'):
         refuse(f'there is a controller {names.name} already')
+    options = ROOT / 'include' / 'abs_hil' / 'control' / 'options.hpp'
+    if f'"{names.section}."' in options.read_text(encoding='utf-8'):
+        refuse(f'there are keys control.{names.section}.* already; give another name')
     for path in new:
         if path.exists():
             refuse(f'{path.relative_to(ROOT)} exists already')
@@ -76,7 +81,13 @@ def in_tree(names):
         text = names.renamed(example.read_text(encoding='utf-8'))
         text = text.replace('namespace example', 'namespace abs_hil::control').replace('example::', 'control::')
         text = text.replace(f'"{names.file}.hpp"', f'"control/{names.file}.hpp"')
-        path.write_text(text.replace('using namespace abs_hil;\n\n' + names.stem, names.stem), encoding='utf-8')
+        text = text.replace('using namespace abs_hil;\n\n' + names.stem, names.stem)
+        if path.parent == room:
+            text = re.sub(r'(?<![\w:])control::', '', text.replace('abs_hil::control::', '').replace('abs_hil::rig::', 'rig::'))
+        else:
+            text = (f'// The first test of {names.name}: what every slip controller promises. Add what your law promises.\n\n'
+                    + text[text.index('#include'):])
+        path.write_text(text, encoding='utf-8')
         print(f'wrote {path.relative_to(ROOT)}')
     changed(registry, add_sorted(f'#include "control/{names.file}.hpp"', r'#include "control/.*"'))
     entry = f'    controller_entry<{names.stem}Controller>("{names.name}", "torque proportional to the slip error"),\n'
@@ -135,9 +146,11 @@ def main():
             build(test)
         except subprocess.CalledProcessError as error:
             sys.exit(f'new_controller.sh: {error}')
-    print(f'''{names.name} is ready. Change its law in src/control/{names.file}.cpp, then
+    print(f'''{names.name} is ready. Its gains are keys:
+  build/release/bin/abs_hil compare --controllers 'adaptive,{names.name},{names.name}{{gain_Nm=20}}'
+Change its law in src/control/{names.file}.cpp, then
   scripts/build.sh release --target abs_hil_executable {test} && build/release/tests/{test}
-  build/release/bin/abs_hil compare --controllers adaptive,{names.name}''')
+Python and reports know it after scripts/build.sh release --target abs_hil_python''')
 
 
 if __name__ == '__main__':

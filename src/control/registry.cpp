@@ -78,6 +78,19 @@ std::string unknown_name_message(std::string_view name) {
 
 }  // namespace
 
+OwnOptions::OwnOptions() {
+  for (const ControllerEntry& entry : table()) {
+    if (entry.own_options == nullptr) continue;
+    std::string section(entry.name);
+    std::ranges::replace(section, '-', '_');
+    options_.emplace_back(section + '.', entry.own_options());
+  }
+}
+
+void OwnOptions::visit_options(const std::string& prefix, const rig::OptionVisitor& visit) {
+  for (auto& [section, options] : options_) options.visit_options(prefix + section, visit);
+}
+
 bool SlipController::take_over(const SlipController& /*before*/) noexcept { return false; }
 
 std::string_view controller_name(std::size_t index) noexcept {

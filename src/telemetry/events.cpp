@@ -1,5 +1,6 @@
 #include "telemetry/events.hpp"
 
+#include <cmath>
 #include <utility>
 
 #include "rig/reason_text.hpp"
@@ -48,7 +49,7 @@ EventCsv::EventCsv(std::filesystem::path path, rig::RunNames names)
 void EventCsv::consume(const rig::CycleRecord& record, double /*distance_m*/) {
   const auto event = detector_.observe(record);
   if (!event) return;
-  text_ += CsvRow::text_of(record.time_s);
+  text_ += CsvRow::text_of(std::round(record.time_s * 1e6) / 1e6);  // in us, without the rounding of its arithmetic
   text_.append(",").append(event->kind).append(",").append(rig::name_of(record.phase));
   // Quoted, because the text of a reason may contain a comma.
   text_.append(",\"").append(event->reason).append("\",");

@@ -34,6 +34,8 @@ class RunFolder(ProgramTest):
         self.assertEqual(list(events[0]), ['time_s', 'event', 'phase', 'reason', 'value', 'phase_name'])
         self.assertEqual([e['phase'] for e in events if e['event'] == 'phase'],
                          ['idle', 'accelerate', 'coast', 'brake', 'hold', 'stopped'])
+        for event in events:  # 8.549, not 8.549000000000001
+            self.assertRegex(event['time_s'], r'^\d+(\.\d{1,6})?$')
 
     def test_its_configuration_gives_the_same_run(self):
         first, second = self.folder / 'first', self.folder / 'second'

@@ -1,18 +1,15 @@
 #include "proportional_controller.hpp"
 
-#include <stdexcept>
-
 #include "abs_hil/control/slip_error_dynamics.hpp"
+#include "abs_hil/rig/option_check.hpp"
 
 namespace example {
 
 using namespace abs_hil;
 
-ProportionalController::ProportionalController(const control::ControllerContext& context,
-                                               const ProportionalOptions& options)
+ProportionalController::ProportionalController(const control::ControllerContext& context, const Options& options)
     : wheels_{context.rig.wheels}, options_{options} {
-  if (!(options.base_Nm >= 0.0)) throw std::invalid_argument("base_Nm must be >= 0");
-  if (!(options.gain_Nm > 0.0)) throw std::invalid_argument("gain_Nm must be > 0");
+  rig::require_valid(options_, "control.proportional.");
 }
 
 void ProportionalController::reset(const control::SlipInput&) noexcept {}

@@ -3,9 +3,12 @@
 #include <cstddef>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "abs_hil/control/baseline_options.hpp"
 #include "abs_hil/rig/option.hpp"
+#include "abs_hil/rig/option_box.hpp"
 
 namespace abs_hil::control {
 
@@ -283,6 +286,26 @@ struct ForeignOptions {
                  .meaning = "TOML file with the names that an FMU's variables have, and its parameters");
 };
 
+/// The options of those controllers that bring a struct of their own (`controller_entry`), each below its controller's
+/// name. So a new controller has keys without a change here, also outside this library.
+class OwnOptions {
+ public:
+  /// Those of the controllers that are registered now.
+  OwnOptions();
+  void visit_options(const std::string& prefix, const rig::OptionVisitor& visit);
+  /// The options of this type; their defaults if no registered controller has them.
+  template <class Options>
+  [[nodiscard]] Options get() const {
+    for (const auto& [section, options] : options_) {
+      if (const Options* found = options.template as<Options>()) return *found;
+    }
+    return Options{};
+  }
+
+ private:
+  std::vector<std::pair<std::string, rig::OptionBox>> options_{};
+};
+
 /// The keys `control.` of the configuration.
 struct ControlOptions {
   ABS_HIL_OPTIONS(ControlOptions);
@@ -309,6 +332,7 @@ struct ControlOptions {
   ABS_HIL_GROUP(BrakingStiffnessOptions, braking_stiffness, "braking_stiffness.", {});
   ABS_HIL_GROUP(SlidingModeActuatorOptions, sliding_mode_actuator, "sliding_mode_actuator.", {});
   ABS_HIL_GROUP(ForeignOptions, foreign, "foreign.", {});
+  ABS_HIL_GROUP(OwnOptions, own, "", {});
 };
 
 }  // namespace abs_hil::control

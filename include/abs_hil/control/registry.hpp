@@ -4,9 +4,11 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include "abs_hil/control/controller_context.hpp"
 #include "abs_hil/control/slip_controller.hpp"
+#include "abs_hil/rig/option_box.hpp"
 
 namespace abs_hil::control {
 
@@ -15,15 +17,33 @@ struct ControllerEntry {
   std::string_view name;
   std::string_view summary;  ///< for `abs_hil list`
   std::unique_ptr<SlipController> (*make)(const ControllerContext&);
+  rig::OptionBox (*own_options)(){nullptr};  ///< defaults of the options that it brings; null: it brings none
 };
 
-/// Makes the table's entry for a class with the constructor `Controller(const ControllerContext&)`. Programs outside
-/// this library use it for their own controllers.
+/// A controller that brings its options: `Controller::Options`, a struct of option rows (abs_hil/rig/option.hpp).
+template <class Controller>
+concept BringsOptions = requires {
+  typename Controller::Options;
+} && std::is_constructible_v<Controller, const ControllerContext&, const typename Controller::Options&>;
+
+/// Makes the table's entry for a class with the constructor `Controller(const ControllerContext&)`, or for one that
+/// brings options with `Controller(const ControllerContext&, const Options&)`. Their keys are `control.NAME.OPTION`,
+/// with `_` for each `-` of the name; no two controllers share a type of options. Programs outside this library use it
+/// for their own controllers.
 template <class Controller>
 [[nodiscard]] constexpr ControllerEntry controller_entry(std::string_view name, std::string_view summary) noexcept {
-  return {name, summary, [](const ControllerContext& context) -> std::unique_ptr<SlipController> {
-            return std::make_unique<Controller>(context);
-          }};
+  if constexpr (BringsOptions<Controller>) {
+    using Options = typename Controller::Options;
+    return {name, summary,
+            [](const ControllerContext& context) -> std::unique_ptr<SlipController> {
+              return std::make_unique<Controller>(context, context.options.own.template get<Options>());
+            },
+            [] { return rig::OptionBox::of(Options{}); }};
+  } else {
+    return {name, summary, [](const ControllerContext& context) -> std::unique_ptr<SlipController> {
+              return std::make_unique<Controller>(context);
+            }};
+  }
 }
 
 /// All controllers, in the order of `abs_hil list`: those of this library, then the registered ones. The span is valid

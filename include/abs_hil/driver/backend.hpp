@@ -14,6 +14,7 @@
 #include "abs_hil/rig/command.hpp"
 #include "abs_hil/rig/duty_grid.hpp"
 #include "abs_hil/rig/option.hpp"
+#include "abs_hil/rig/option_box.hpp"
 
 // A board behind `--backend rig` is one entry: its name, its option rows, its driver, its safe-state writer, how well
 // it is known. The program, the guardian, the doctor and the commissioning all use this entry
@@ -76,62 +77,8 @@ struct FoundBoard {
   std::vector<Obstacle> obstacles{};
 };
 
-/// The options of one backend. Only the backend knows their type. A copy is a copy of the options.
-class BoardOptions {
- public:
-  template <class Options>
-  [[nodiscard]] static BoardOptions of(Options options) {
-    BoardOptions held;
-    held.box_ = std::make_unique<Box<Options>>(std::move(options));
-    return held;
-  }
-  BoardOptions(const BoardOptions& other) : box_(other.box_ ? other.box_->copy() : nullptr) {}
-  BoardOptions& operator=(const BoardOptions& other) {
-    box_ = other.box_ ? other.box_->copy() : nullptr;
-    return *this;
-  }
-  BoardOptions(BoardOptions&&) noexcept = default;
-  BoardOptions& operator=(BoardOptions&&) noexcept = default;
-  ~BoardOptions() = default;
-
-  /// The options if they have this type, otherwise null.
-  template <class Options>
-  [[nodiscard]] Options* as() noexcept {
-    auto* box = dynamic_cast<Box<Options>*>(box_.get());
-    return box == nullptr ? nullptr : &box->options;
-  }
-  template <class Options>
-  [[nodiscard]] const Options* as() const noexcept {
-    const auto* box = dynamic_cast<const Box<Options>*>(box_.get());
-    return box == nullptr ? nullptr : &box->options;
-  }
-  void visit_options(const std::string& prefix, const rig::OptionVisitor& visit) { box_->visit(prefix, visit); }
-
- private:
-  struct AnyBox {
-    AnyBox() = default;
-    AnyBox(const AnyBox&) = delete;
-    AnyBox& operator=(const AnyBox&) = delete;
-    virtual ~AnyBox() = default;
-    [[nodiscard]] virtual std::unique_ptr<AnyBox> copy() const = 0;
-    virtual void visit(const std::string& prefix, const rig::OptionVisitor& visit) = 0;
-  };
-  template <class Options>
-  struct Box final : AnyBox {
-    explicit Box(Options held) : options(std::move(held)) {}
-    [[nodiscard]] std::unique_ptr<AnyBox> copy() const override { return std::make_unique<Box>(options); }
-    void visit(const std::string& prefix, const rig::OptionVisitor& visit) override {
-      rig::for_each_option(options, prefix,
-                           [&visit](const std::string& name, const rig::OptionFacts& facts, auto& value) {
-                             visit(name, facts, &value);
-                           });
-    }
-    Options options;
-  };
-
-  BoardOptions() = default;
-  std::unique_ptr<AnyBox> box_{};
-};
+/// The options of one backend.
+using BoardOptions = rig::OptionBox;
 
 /// One entry of the registry, for code that does not know the type of the options. Make it from a `BackendRow`.
 struct Backend {
