@@ -1,7 +1,7 @@
 # abs_hil_room(NAME SOURCES ... BEYOND_CORE ... USES ... PRIVATE ...): the library of one room of the table
 # (cmake/Rooms.cmake). BEYOND_CORE names sources that do not belong to the simulation core (cmake/Core.cmake): they need the
 # network, a terminal or a library that the core has not. USES names libraries that its headers need, PRIVATE ones that only
-# its sources need.
+# its sources need, LIBRARIES_BEYOND_CORE ones that only those beyond the core need.
 #
 # Public headers stand in include/abs_hil/NAME and are included as "abs_hil/NAME/x.hpp"; the others stand beside their
 # sources in src/NAME and are included as "NAME/x.hpp". Each room has an include folder of its own that holds nothing
@@ -63,11 +63,16 @@ endfunction()
 
 function(abs_hil_room name)
   set(ABS_HIL_UNITY_MODE BATCH)
-  cmake_parse_arguments(ROOM "" "" "SOURCES;BEYOND_CORE;USES;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ROOM "" "" "SOURCES;BEYOND_CORE;LIBRARIES_BEYOND_CORE;USES;PRIVATE" ${ARGN})
   if(NOT name IN_LIST ABS_HIL_ROOM_NAMES)
     message(FATAL_ERROR "cmake/Rooms.cmake has no room ${name}")
   endif()
   set(known ${ABS_HIL_KNOWN_TO_${name}})
+  if(ABS_HIL_CORE_ONLY)
+    set(ROOM_BEYOND_CORE)
+    set(ROOM_LIBRARIES_BEYOND_CORE)
+    list(REMOVE_ITEM known ${ABS_HIL_ROOMS_BEYOND_CORE})
+  endif()
   list(TRANSFORM known PREPEND abs_hil_)
   abs_hil_room_folder(${name})
   set(folder $<BUILD_INTERFACE:${ABS_HIL_ROOM_FOLDERS}/${name}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
@@ -75,7 +80,7 @@ function(abs_hil_room name)
     abs_hil_apart_from_core("${ROOM_SOURCES}" "${ROOM_BEYOND_CORE}")
     add_library(abs_hil_${name} STATIC ${ROOM_SOURCES} ${ROOM_BEYOND_CORE})
     target_link_libraries(abs_hil_${name} PUBLIC ${ROOM_USES}
-      PRIVATE $<BUILD_INTERFACE:abs_hil_warnings> ${known} ${ROOM_PRIVATE})
+      PRIVATE $<BUILD_INTERFACE:abs_hil_warnings> ${known} ${ROOM_PRIVATE} ${ROOM_LIBRARIES_BEYOND_CORE})
     target_include_directories(abs_hil_${name} PUBLIC ${folder})
     # Several sources at a time: most of a source's cost are the headers that its neighbours need as well.
     set_target_properties(abs_hil_${name} PROPERTIES UNITY_BUILD ${ABS_HIL_UNITY} UNITY_BUILD_BATCH_SIZE 12

@@ -1,7 +1,6 @@
 // The bank's filters, weights and means. friction_bank.hpp has the equations.
 #include "control/friction_bank.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -81,22 +80,17 @@ void set_lane(Row& row, std::size_t lane, double value) noexcept {
   row.v[lane / rig::Portable::lanes][lane % rig::Portable::lanes] = value;
 }
 
-/// Coefficients of the polynomial that meets `f` at the Chebyshev nodes of (0, 1).
-template <std::size_t N>
-std::array<double, N> fitted(auto f) {
-  Eigen::Matrix<double, N, N> powers;
-  Eigen::Matrix<double, N, 1> values;
-  for (std::size_t row = 0; row < N; ++row) {
-    const double u = 0.5 - 0.5 * std::cos(std::numbers::pi * (static_cast<double>(row) + 0.5) / N);
-    const auto at = static_cast<Eigen::Index>(row);
-    for (std::size_t n = 0; n < N; ++n) powers(at, static_cast<Eigen::Index>(n)) = std::pow(u, n);
-    values(at) = f(u);
-  }
-  const Eigen::Matrix<double, N, 1> solved = powers.fullPivLu().solve(values);
-  std::array<double, N> c{};
-  for (std::size_t n = 0; n < N; ++n) c[n] = solved(static_cast<Eigen::Index>(n));
-  return c;
-}
+/// For each C the coefficients of the polynomial in u = B s / (1 + B s) that meets sin(C atan(B s)) / u at the
+/// Chebyshev nodes of (0, 1). They are numbers because a solver's rounding depends on the compiler, and every platform
+/// computes the same bits.
+constexpr std::array<std::array<double, 10>, FrictionBank::shapes> curves{
+    {{0x1.266ccf142c2cbp+0, 0x1.216f5725c5018p+0, 0x1.204329cf3fc6dp+0, -0x1.fdee1083627cp+2, 0x1.3477b71ff3cd3p+5,
+      -0x1.f1c11634415f9p+6, 0x1.7fb3a7b1bc924p+7, -0x1.23170ca85a028p+7, 0x1.980a58609c7dcp+5, -0x1.796fac91ff7fbp+2},
+     {0x1.867653c51eb33p+0, 0x1.7a0a1d8dc779ep+0, 0x1.f714160d4583dp+0, -0x1.4349359013b5p+4, 0x1.9cb2f0fdf044p+6,
+      -0x1.54d4d85d30d4cp+8, 0x1.205d725e2fd6bp+9, -0x1.fe061f658e3efp+8, 0x1.c6451b596b1cdp+7, -0x1.42235fd0c3f34p+5},
+     {0x1.e687537b974ecp+0, 0x1.ccd046493bb27p+0, 0x1.aa8ba6554ba69p+1, -0x1.52d38b75ba953p+5, 0x1.c07c56891cc48p+7,
+      -0x1.79462da21ea11p+9, 0x1.50532cbdd5c16p+10, -0x1.3fbac82564e1bp+10, 0x1.36d1ca7a234ddp+9,
+      -0x1.e8f3987e65308p+6}}};
 
 }  // namespace
 
@@ -112,7 +106,7 @@ FrictionBank::FrictionBank(const FrictionBankOptions& options, double rate_Hz, d
     const double at_peak = std::tan(std::numbers::pi / (2.0 * c));
     const double curvature = square(c * at_peak / (1.0 + square(at_peak)));  // slip in units of the peak's
     Shape& shape = shapes_[k];
-    shape.value = fitted<terms>([c](double u) { return std::sin(c * std::atan(u / (1.0 - u))) / u; });
+    shape.value = curves[k];
     for (std::size_t i = 0; i < terms; ++i) shape.slope[i] = static_cast<double>(i + 1) * shape.value[i];
     for (std::size_t j = 0; j < peaks; ++j) {
       const double peak =

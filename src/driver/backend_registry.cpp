@@ -5,7 +5,7 @@
 
 #include "abs_hil/driver/backend.hpp"
 #include "driver/can/can_backend.hpp"
-#include "driver/hm2/hm2_driver.hpp"
+#include "driver/hm2/hm2_backend.hpp"
 #include "driver/pci/pci_backend.hpp"
 #include "driver/usb/usb_backend.hpp"
 

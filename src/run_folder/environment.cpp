@@ -2,13 +2,16 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
-#include <sys/utsname.h>
 
+#include <cstdlib>
 #include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <thread>
+#ifndef _WIN32
+#include <sys/utsname.h>
+#endif
 
 #include "abs_hil_revision.hpp"
 
@@ -28,6 +31,30 @@ std::string processor_model() {
 
 }  // namespace
 
+namespace {
+
+struct System {
+  std::string host{"unknown"};
+  std::string kernel{"unknown"};
+  std::string machine{"unknown"};
+};
+
+System system_facts() {
+#ifdef _WIN32
+  const char* host = std::getenv("COMPUTERNAME");
+  const char* machine = std::getenv("PROCESSOR_ARCHITECTURE");
+  return {.host = host != nullptr ? host : "unknown",
+          .kernel = "Windows",
+          .machine = machine != nullptr ? machine : "unknown"};
+#else
+  utsname system{};
+  if (::uname(&system) != 0) return {};
+  return {system.nodename, fmt::format("{} {} {}", system.sysname, system.release, system.version), system.machine};
+#endif
+}
+
+}  // namespace
+
 BuildFacts build_facts() {
 #ifdef __clang__
   const std::string compiler = "clang " __clang_version__;
@@ -39,8 +66,7 @@ BuildFacts build_facts() {
 
 nlohmann::ordered_json environment_json(const RunEnvironment& run) {
   const BuildFacts build = build_facts();
-  utsname system{};
-  const bool known = ::uname(&system) == 0;
+  const System system = system_facts();
   std::error_code ignored;
   return {
       {"date_utc", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)))},
@@ -50,9 +76,9 @@ nlohmann::ordered_json environment_json(const RunEnvironment& run) {
       {"git_revision", build.git_revision},
       {"build_type", build.build_type},
       {"compiler", build.compiler},
-      {"host", known ? system.nodename : "unknown"},
-      {"kernel", known ? fmt::format("{} {} {}", system.sysname, system.release, system.version) : "unknown"},
-      {"machine", known ? system.machine : "unknown"},
+      {"host", system.host},
+      {"kernel", system.kernel},
+      {"machine", system.machine},
       {"processor", processor_model()},
       {"processors", std::thread::hardware_concurrency()},
       {"backend", run.backend},

@@ -32,7 +32,7 @@ std::uint8_t* put_big_endian(std::uint8_t* to, Unsigned value) {
 }  // namespace
 
 EventLogReader::EventLogReader(std::filesystem::path path)
-    : path_(std::move(path)), file_(std::fopen(path_.c_str(), "rb")) {
+    : path_(std::move(path)), file_(std::fopen(path_.string().c_str(), "rb")) {
   std::error_code error;
   if (file_) size_ = std::filesystem::file_size(path_, error);
   if (!file_ || error) {

@@ -1,0 +1,59 @@
+// The boards on platforms that only simulate: in place of the folders can, hm2, pci and usb. Their options are there,
+// so that every platform reads every configuration; a driver is not.
+#include "abs_hil/driver/backend.hpp"
+#include "abs_hil/driver/io_result.hpp"
+#include "driver/can/can_backend.hpp"
+#include "driver/hm2/hm2_backend.hpp"
+#include "driver/pci/pci_backend.hpp"
+#include "driver/pwm.hpp"
+#include "driver/usb/usb_backend.hpp"
+
+namespace abs_hil::driver {
+
+namespace {
+
+[[noreturn]] void refuse() {
+  throw Unavailable("--backend rig: only Linux has drivers for boards; run it there, or use --backend sim");
+}
+
+template <class Options>
+std::unique_ptr<RigDriver> no_driver(const Options& /*options*/, const RunFacts& /*run*/) {
+  refuse();
+}
+
+template <class Options>
+std::unique_ptr<SafeStateWriter> no_writer(const Options& /*options*/, const RunFacts& /*run*/) {
+  refuse();
+}
+
+template <class Options>
+OutputGrid no_outputs(const Options& /*options*/) {
+  refuse();
+}
+
+template <class Options>
+Backend named(std::string_view name) {
+  return backend<Options>({.name = name,
+                           .summary = "a board; only Linux has its driver",
+                           .not_verified = "Only Linux has its driver",
+                           .make_driver = no_driver<Options>,
+                           .make_safe_state_writer = no_writer<Options>,
+                           .outputs = no_outputs<Options>});
+}
+
+}  // namespace
+
+namespace can {
+Backend can_backend() { return named<CanOptions>("can"); }
+}  // namespace can
+namespace hm2 {
+Backend hm2_backend() { return named<Hm2Options>("hm2"); }
+}  // namespace hm2
+namespace pci {
+Backend pci_backend() { return named<PciOptions>("pci"); }
+}  // namespace pci
+namespace usb {
+Backend usb_backend() { return named<UsbOptions>("usb"); }
+}  // namespace usb
+
+}  // namespace abs_hil::driver
