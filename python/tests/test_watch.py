@@ -157,6 +157,12 @@ def test_any_size_can_be_drawn():
     assert '*****' in shown(view, unicode=False)
 
 
+def test_signals_are_the_controllers_own():
+    view = RunView(10.0)
+    view.take(cycle(0, names='upper_edge_age_ns,lower_edge_age_ns,zeta_N', values=[250.0, -1.0, 15.0], value_count=3), 0.0)
+    assert view.signals() == {'zeta_N': 15.0}
+
+
 def test_texts_from_the_network_are_made_printable():
     view = RunView(10.0)
     view.take(cycle(0, names='\x1b[2J,,a,b', values=[1.0] * 4, value_count=4, phase_name='\x1b[2J'), 0.0)

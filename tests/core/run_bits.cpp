@@ -1,9 +1,9 @@
 // usage: run_bits TABLE CONFIG_FOLDER [--write | --rows WORDS]
 //
-// Every platform computes the same bits: makes the runs of the table and compares the SHA-256 of their rows, in the CSV's
-// text, with those in the table. Needs no Python, so that it tries the simulation core on any platform, under an emulator
-// too. --write prints the table anew, --rows the rows of the
-// run of the options WORDS, to see where two platforms part. python/tests/test_bits.py holds the package to the same table.
+// Every platform computes the same bits: makes the runs of the table and compares the SHA-256 of their rows, in the
+// CSV's text, with those in the table. Needs no Python, so that it tries the simulation core on any platform, under an
+// emulator too. --write prints the table anew, --rows the rows of the run of the options WORDS, to see where two
+// platforms part. python/tests/test_bits.py holds the package to the same table.
 #include <cstdio>
 #include <exception>
 #include <fstream>
@@ -43,12 +43,18 @@ program::RunOptions options_of(const std::string& words) {
   program::RunOptions options;
   std::istringstream text(words);
   for (std::string option, value; text >> option >> value;) {
-    if (option == "--controller") options.controller = value;
-    else if (option == "--plant") options.plant = value;
-    else if (option == "--experiment") options.experiment = value;
-    else if (option == "--seed") options.seed = value;
-    else if (option == "--set") options.assignments.push_back(value);
-    else throw std::invalid_argument("the table of runs has an unknown option " + option);
+    if (option == "--controller")
+      options.controller = value;
+    else if (option == "--plant")
+      options.plant = value;
+    else if (option == "--experiment")
+      options.experiment = value;
+    else if (option == "--seed")
+      options.seed = value;
+    else if (option == "--set")
+      options.assignments.push_back(value);
+    else
+      throw std::invalid_argument("the table of runs has an unknown option " + option);
   }
   options.outputs.fast = true;
   options.outputs.no_lcm = true;

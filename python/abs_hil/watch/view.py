@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..messages import PHASES, REASONS, row_of
+from ..messages import PHASES, QUANTITIES, REASONS, row_of
 
 #: The plotted quantities. Speeds and slip are true values where they are known, else estimates.
 PLOTTED = ('slip', 'slip_ref', 'omega1', 'omega2', 'theta_est', 'theta')
@@ -130,9 +130,9 @@ class RunView:
         return printable(own)[:40] if own and self.kind_of_phase() != 'fault' else self.kind_of_phase()
 
     def signals(self) -> dict[str, float]:
-        """The latest values without a field of their own: mostly the controller's signals."""
+        """The latest values of the controller's own signals."""
         row = row_of(self.telemetry) if self.telemetry is not None else {}
-        own = [name for name in row if name not in type(self.telemetry).__slots__][:MOST_SIGNALS]
+        own = [name for name in row if name not in QUANTITIES and name != 'phase_name'][:MOST_SIGNALS]
         return {printable(name)[:40]: row[name] for name in own}
 
     def fault(self) -> str:
