@@ -121,7 +121,8 @@ std::vector<FileValue> read_model(const fs::path& file) {
     const KeyTable table(defaults);
     for (const Key& key : table.keys()) {
       if (!key.name.starts_with("model.")) continue;
-      model.push_back({key.name, std::visit([](const auto* value) { return Value(*value); }, key.target), file.string()});
+      model.push_back(
+          {key.name, std::visit([](const auto* value) { return Value(*value); }, key.target), file.string()});
     }
   }
   for (FileValue& value : as_model(given)) model.push_back(std::move(value));
