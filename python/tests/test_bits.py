@@ -19,7 +19,7 @@ def test_bits(checksum, words):
             key, assignment = value.split('=')
             assignments[key] = assignment
         else:
-            given[option.removeprefix('--')] = value
+            given[option.removeprefix('--')] = int(value) if option == '--seed' else value
     run = abs_hil.simulate(set=assignments, **given)
     rows = csv_bytes(run.columns, header=False)
     assert hashlib.sha256(rows).hexdigest() == checksum
