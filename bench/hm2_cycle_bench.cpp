@@ -101,7 +101,7 @@ void hm2_cycle(benchmark::State& state) {
     const std::int64_t middle_ns = driver::monotonic_ns();
     std::array<std::uint8_t, 256> answer{};
     if (::send(bare, read.bytes().data(), read.bytes().size(), 0) < 0 ||
-        ::recv(bare, answer.data(), answer.size(), 0) != 52 ||
+        ::recv(bare, answer.data(), answer.size(), 0) != static_cast<ssize_t>(read.answer_bytes()) ||
         ::send(bare, write.bytes().data(), write.bytes().size(), 0) < 0) {
       std::abort();
     }
