@@ -16,7 +16,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t buffer_bytes = 65'536;
 constexpr int links_max = 40;  // as the kernel
 
 std::string folder_of(const fs::path& path) { return path.has_parent_path() ? path.parent_path().string() : "."; }
@@ -149,17 +148,6 @@ void ResultFile::put(std::string_view bytes) {
   }
 }
 
-void ResultFile::append(std::string_view bytes) {
-  if (buffer_.size() + bytes.size() > buffer_bytes) flush();
-  if (bytes.size() > buffer_bytes) return put(bytes);
-  buffer_ += bytes;
-}
-
-void ResultFile::flush() {
-  put(buffer_);
-  buffer_.clear();
-}
-
 void ResultFile::show() {
   if (part_.empty()) return;
   // Somebody may have put something else in its place meanwhile.
@@ -183,15 +171,6 @@ void ResultFile::commit() {
   if (folder < 0) return;
   static_cast<void>(::fsync(folder));
   ::close(folder);
-}
-
-void ResultFile::write(std::string_view whole) {
-  append(whole);
-  commit();
-}
-
-void write_result(const fs::path& path, const std::string& kind, std::string_view bytes, const fs::path& part_folder) {
-  ResultFile(path, kind, part_folder).write(bytes);
 }
 
 }  // namespace abs_hil::files

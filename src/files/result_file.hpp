@@ -54,6 +54,8 @@ class ResultFile {
   [[nodiscard]] const std::filesystem::path& part() const noexcept { return part_; }
 
  private:
+  static constexpr std::size_t buffer_bytes = 65'536;
+
   void open_target(const std::filesystem::path& path, int links);
   void open_part(const std::filesystem::path& folder);
   void put(std::string_view bytes);

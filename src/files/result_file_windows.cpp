@@ -17,7 +17,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t buffer_bytes = 65'536;
 constexpr std::size_t write_bytes = 1U << 20U;  // at once: the call takes a number of 32 bits
 
 std::string fix_for(const fs::path& path, int error_number) {
@@ -93,17 +92,6 @@ void ResultFile::put(std::string_view bytes) {
   }
 }
 
-void ResultFile::append(std::string_view bytes) {
-  if (buffer_.size() + bytes.size() > buffer_bytes) flush();
-  if (bytes.size() > buffer_bytes) return put(bytes);
-  buffer_ += bytes;
-}
-
-void ResultFile::flush() {
-  put(buffer_);
-  buffer_.clear();
-}
-
 /// Windows renames no open file: a file that is not whole stays beside its place.
 void ResultFile::show() {}
 
@@ -115,15 +103,6 @@ void ResultFile::commit() {
   fs::rename(part_, target_, error);
   if (error) fail(EACCES);
   part_.clear();
-}
-
-void ResultFile::write(std::string_view whole) {
-  append(whole);
-  commit();
-}
-
-void write_result(const fs::path& path, const std::string& kind, std::string_view bytes, const fs::path& part_folder) {
-  ResultFile(path, kind, part_folder).write(bytes);
 }
 
 }  // namespace abs_hil::files
