@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# run.sh [ARGUMENT...]: the main job. Installs packages of Debian and plotly of PyPI and builds the programs. Without arguments it then runs the
-# paper's experiment in real time on the simulated rig and makes a report, in a folder below runs/. Arguments go to
+# run.sh [ARGUMENT...]: the main job. Installs packages of Debian and plotly of PyPI and builds the programs. Without arguments it
+# then runs the paper's experiment in real time on the simulated rig and makes a report, in a folder below runs/. Arguments go to
 # abs_hil. Without a route for LCM's multicast the script says which command adds one and records to a log instead.
+# scripts/packages-analysis.txt is left out: no run and no report needs it.
 set -euo pipefail
 root=$(realpath "$(dirname "$(realpath "$0")")/..")
 

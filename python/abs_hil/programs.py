@@ -49,13 +49,11 @@ def _start(name: str, arguments: list[str]) -> int:
     # Our matrices are small. More threads of BLAS would only spin, and wear other programs' cores.
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
     try:
-        module = importlib.import_module(PROGRAMS[name])
-    except ImportError as error:
-        print(f'abs_{name}: {error}. On Debian, scripts/setup.sh in the source folder installs what it needs; elsewhere: '
-              'pip install .', file=sys.stderr)
+        return int(importlib.import_module(PROGRAMS[name]).main(arguments))
+    except ImportError as error:  # some modules are imported only where they are needed
+        print(f'abs_{name}: {error}. On Debian, "scripts/setup.sh packages-analysis.txt" in the source folder installs what it '
+              'needs; elsewhere: pip install .', file=sys.stderr)
         return 3
-    try:
-        return int(module.main(arguments))
     except SystemExit as end:  # of argparse
         return end.code if isinstance(end.code, int) else 0
     except KeyboardInterrupt:
