@@ -1,35 +1,25 @@
 #!/usr/bin/env python3
 """usage: benchmark_table.py --check|--write
 
-Keeps the tables of docs/benchmark.md: the standing of all controllers, over all cases and over the groups of combined
-mismatches and of the capped brake; what version 2 changed; the bounds of the nominal cases. Each stands between a line
-<!-- NAME --> and <!-- end -->. --write puts them there, --check fails where the page says something else. Needs the package
-abs_hil of a build (PYTHONPATH=build/release/share/abs_hil/python).
+Keeps the tables of docs/benchmark.md: the standing of all controllers over all cases, and the bounds of the nominal cases. Each
+stands between a line <!-- NAME --> and <!-- end -->. docs/reference/benchmark.csv has the standing in each group of cases. --write
+puts them there, --check fails where a file says something else. Needs the package abs_hil of a build
+(PYTHONPATH=build/release/share/abs_hil/python).
 """
 import functools
 import pathlib
 import sys
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / 'scripts'))
-from marked_tables import keep  # noqa: E402
+from marked_tables import csv_text, keep  # noqa: E402
 
 
 import abs_hil
 from abs_hil.benchmark import Entry, bounds, cases, page, run
 
 
-#: excess in per cent over the 126 cases of version 1, mean and worst, as version 1 published them with its own bounds
-BEFORE = {
-    'adaptive-optimal': (1.7, 9.2), 'adaptive-peak': (2.9, 19.7), 'braking-stiffness': (6.5, 23.2),
-    'mixed-slip-deceleration': (10.4, 48.2), 'relay': (11.8, 50.7), 'adaptive-actuator': (14.2, 50.4),
-    'sliding-mode-actuator': (14.4, 53.3), 'pi': (17.2, 146.7), 'nominal': (19.3, 72.0), 'adaptive': (20.7, 76.1),
-    'sliding-mode-smooth': (20.8, 92.1), 'super-twisting': (21.1, 65.5), 'sliding-mode': (30.1, 77.4),
-    'five-phase': (33.8, 129.5), 'locked': (42.8, 158.8)}
-
-
-def of_version_1(case):
-    """Version 1 had neither the last two groups nor a limited rate on patches."""
-    return case.group not in ('capped', 'combined') and not (case.road == 'patches' and case.name.startswith('rate'))
+#: of the page's table
+SHOWN = ('locked', 'excess mean %', '95 % %', 'worst %', 'variation median N m', 'ε')
 
 
 @functools.cache
@@ -38,20 +28,19 @@ def results():
     return [run(Entry(name, {}), cases.whole_set(), known) for name in abs_hil.controllers()]
 
 
-def standing(group='all'):
-    return page.table(results(), group)
-
-
-def changed():
-    same = {case.key for case in cases.whole_set() if of_version_1(case)}
-    lines = ['| excess %: mean, worst | version 1 | version 2, the same 126 cases | version 2, all |', '|---|---:|---:|---:|']
-    for name, score in page.ranked(results()):
-        result = next(one for one in results() if one.entry.name == name)
-        excess = [100.0 * row['excess'] for row in result.rows if row['case'] in same]
-        mean, worst = BEFORE[name]
-        lines.append(f'| `{name}` | {mean:.1f}, {worst:.1f} | {sum(excess) / len(excess):.1f}, {max(excess):.1f} '
-                     f'| {100.0 * score.excess_mean:.1f}, {100.0 * score.excess_worst:.1f} |')
+def standing():
+    """The columns that the page speaks of; the CSV file has all."""
+    shown = [page.HEADINGS.index(heading) for heading in SHOWN]
+    lines = ['| controller | ' + ' | '.join(SHOWN) + ' |', '|---' + '|---:' * len(SHOWN) + '|']
+    lines += [f'| `{name}` | ' + ' | '.join(figures[column] for column in shown) + ' |'
+              for name, *figures in page.cells(results())]
     return '\n'.join(lines) + '\n'
+
+
+
+def groups():
+    rows = [[score.group, *cells] for score in results()[0].scores for cells in page.cells(results(), score.group)]
+    return csv_text(['group', 'controller', *page.HEADINGS], rows)
 
 
 def nominal_bounds():
@@ -73,9 +62,8 @@ def main():
     if sys.argv[1:] not in (['--check'], ['--write']):
         print(__doc__, file=sys.stderr)
         return 2
-    return keep(sys.argv[1], [('benchmark.md', name, table) for name, table in (
-        ('bounds', nominal_bounds), ('benchmark', standing), ('benchmark combined', lambda: standing('combined')),
-        ('benchmark capped', lambda: standing('capped')), ('benchmark changed', changed))])
+    return keep(sys.argv[1], [('benchmark.md', 'bounds', nominal_bounds), ('benchmark.md', 'benchmark', standing),
+                              ('reference/benchmark.csv', None, groups)])
 
 
 if __name__ == '__main__':

@@ -2,12 +2,7 @@
 """usage: model_mismatch.py --check|--write [BUILD]
 
 Every controller brakes the plant paper-table1 with models that are wrong in one part by 20 %. The table of stop distance
-and slip error stands in docs/controllers.md between the lines
-
-    <!-- model mismatch -->
-    <!-- end -->
-
---write puts it there, --check fails where the page says something else. BUILD is the folder of a build, by default
+and slip error is docs/reference/model-mismatch.csv. --write makes it, --check fails where it says something else. BUILD is the folder of a build, by default
 build/release.
 """
 import json
@@ -18,7 +13,7 @@ import tempfile
 import tomllib
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / 'scripts'))
-from marked_tables import ROOT, keep  # noqa: E402
+from marked_tables import ROOT, csv_text, keep  # noqa: E402
 
 
 PLANT = 'paper-table1'
@@ -57,11 +52,9 @@ def table(program):
         for sign, factor in (('−', 1 - WRONG_BY), ('+', 1 + WRONG_BY)):
             model = {key: round(nominal[key] * factor, 9) for key in keys}
             columns[f'{part} {sign}{100 * WRONG_BY:.0f} %'] = braking(program, names, model)
-    lines = ['| stop distance in m, slip RMS | ' + ' | '.join(columns) + ' |', '|---' + '|---:' * len(columns) + '|']
-    for name in names:
-        cells = ['fault' if found[name] is None else '{:.2f}, {:.3f}'.format(*found[name]) for found in columns.values()]
-        lines.append(f'| `{name}` | ' + ' | '.join(cells) + ' |')
-    return '\n'.join(lines) + '\n'
+    rows = [[name, model, *(['', ''] if found[name] is None else ['{:.2f}'.format(found[name][0]), '{:.3f}'.format(found[name][1])])]
+            for name in names for model, found in columns.items()]
+    return csv_text(['controller', 'model', 'stop_distance_m', 'slip_rms'], rows)
 
 
 def main():
@@ -70,7 +63,7 @@ def main():
         print(__doc__, file=sys.stderr)
         return 2
     program = pathlib.Path(build[0] if build else ROOT / 'build' / 'release').resolve() / 'bin' / 'abs_hil'
-    return keep(mode, [('controllers.md', 'model mismatch', lambda: table(program))])
+    return keep(mode, [('reference/model-mismatch.csv', None, lambda: table(program))])
 
 
 if __name__ == '__main__':

@@ -1,20 +1,14 @@
 #!/usr/bin/env python3
 """usage: docs_tables.py --check|--write [BUILD] | --self-test
 
-Keeps the tables in README.md and the pages of docs/ that a program can print. Between the lines
-
-    <!-- table: NAME -->
-    <!-- end -->
-
-stands the table NAME of TABLES below. --write puts it there, --check fails where the page says something else. The long
-tables of FILES are CSV files of their own.
-BUILD is the folder of a build, by default build/release.
+Keeps the CSV files of docs/reference that a build can print: FILES below. --write makes them, --check fails where one says
+something else. BUILD is the folder of a build, by default build/release.
 """
 import csv
 import io
 import json
+import os
 import pathlib
-import re
 import subprocess
 import sys
 
@@ -37,31 +31,26 @@ def tsv_rows(file):
     return rows
 
 
-# name -> where its rows come from, {heading: format of the cell}
-TABLES = {
-    'rooms': (tsv_rows('rooms.tsv'), {'room': '`{room}`', 'holds': '{holds}'}),
-}
-# file -> where its rows come from; the columns are the rows' own
+def python_of(build):
+    return build / 'share' / 'abs_hil' / 'python'
+
+
+def figure_rows(build):
+    """The figures of merit, from the Python package of the build."""
+    code = ('import dataclasses, json, abs_hil; '
+            'print(json.dumps([dataclasses.asdict(one) for one in abs_hil.figures().values()]))')
+    path = {**os.environ, 'PYTHONPATH': str(python_of(build))}
+    return json.loads(subprocess.run([PYTHON, '-c', code], check=True, capture_output=True, text=True, env=path).stdout)
+
+
+#: Debian's Python has the modules of the package
+PYTHON = '/usr/bin/python3' if pathlib.Path('/usr/bin/python3').exists() else sys.executable
+#: file -> where its rows come from; the columns are the rows' own
 FILES = {f'docs/reference/{name}.csv': json_rows('abs_hil', 'list', f'--{name}', '--json')
          for name in ('keys', 'quantities', 'reasons')}
-MARKED = re.compile(r'^(<!-- table: (\S+) -->\n)(.*?)^(<!-- end -->)$', re.MULTILINE | re.DOTALL)
-
-
-def table(rows, columns):
-    """Markdown of the rows; a value that is None is an empty cell."""
-    lines = ['| ' + ' | '.join(columns) + ' |', '|---' * len(columns) + '|']
-    for row in rows:
-        shown = {key: '' if value is None else str(value).replace('|', '\\|') for key, value in row.items()}
-        lines.append('| ' + ' | '.join(cell.format(**shown) for cell in columns.values()) + ' |')
-    return '\n'.join(lines) + '\n'
-
-
-def filled(page, build, tables):
-    """The page with every marked table as it should be. KeyError for a name that is not in `tables`."""
-    def fill(match):
-        rows, columns = tables[match[2]]
-        return match[1] + table(rows(build), columns) + match[4]
-    return MARKED.sub(fill, page)
+FILES['docs/reference/rooms.csv'] = tsv_rows('rooms.tsv')
+FIGURES = 'docs/reference/figures.csv'
+FILES[FIGURES] = figure_rows
 
 
 def csv_text(rows):
@@ -76,13 +65,6 @@ def csv_text(rows):
 def self_test():
     assert csv_text([{'a': 1, 'b': 'x, y'}, {'a': 2, 'c': 3}]) == 'a,b,c\n1,"x, y",\n2,,3\n'
 
-    tables = {'two': (lambda build: [{'a': 1, 'b': None}, {'a': 'x|y', 'b': build}], {'A': '`{a}`', 'B': '{b}'})}
-    page = 'before\n<!-- table: two -->\nold\n<!-- end -->\nafter\n'
-    wanted = 'before\n<!-- table: two -->\n| A | B |\n|---|---|\n| `1` |  |\n| `x\\|y` | z |\n<!-- end -->\nafter\n'
-    assert filled(page, 'z', tables) == wanted, filled(page, 'z', tables)
-    assert filled(wanted, 'z', tables) == wanted
-    assert filled('no table\n', 'z', tables) == 'no table\n'
-
 
 def main():
     mode, *build = sys.argv[1:] or ['']
@@ -93,9 +75,10 @@ def main():
         print(__doc__, file=sys.stderr)
         return 2
     folder = pathlib.Path(build[0] if build else ROOT / 'build' / 'release').resolve()
-    pages = [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]
-    wanted = {path: filled(path.read_text(encoding='utf-8'), folder, TABLES) for path in pages}
-    wanted |= {ROOT / file: csv_text(rows(folder)) for file, rows in FILES.items()}
+    files = dict(FILES)
+    if not any((python_of(folder) / 'abs_hil').glob('_core*.so')):
+        del files[FIGURES]  # a build with sanitizers has no Python package
+    wanted = {ROOT / file: csv_text(rows(folder)) for file, rows in files.items()}
     stale = []
     for path, current in wanted.items():
         if not path.exists() or path.read_text(encoding='utf-8') != current:
@@ -105,7 +88,7 @@ def main():
     if mode == '--write':
         return 0
     for path in stale:
-        print(f'{path}: a table is not what the program prints; scripts/docs_tables.py --write mends it')
+        print(f'{path}: this is not what the build prints; scripts/docs_tables.py --write mends it')
     return 1 if stale else 0
 
 

@@ -1,4 +1,7 @@
-"""Tables that scripts keep in pages, each between the lines <!-- MARK --> and <!-- end -->. Imported by these scripts."""
+"""Tables that scripts keep: short ones in pages, each between the lines <!-- MARK --> and <!-- end -->; long ones in CSV files of
+docs/reference. Imported by these scripts."""
+import csv
+import io
 import pathlib
 import re
 import sys
@@ -15,19 +18,27 @@ def replaced(page, mark, table):
     return marked.sub(lambda match: match[1] + table + match[2], text)
 
 
+def csv_text(head, rows):
+    text = io.StringIO()
+    csv.writer(text, lineterminator='\n').writerows([head, *rows])
+    return text.getvalue()
+
+
 def write(page, mark, table):
     (ROOT / 'docs' / page).write_text(replaced(page, mark, table), encoding='utf-8')
 
 
 def keep(mode, tables):
-    """--write puts each table there, --check says where a page has another one. tables: (page, mark, function that makes it).
-    Returns the status of the program."""
+    """--write puts each table there, --check says where a page has another one. tables: (page, mark, function that makes it);
+    without a mark the table is the whole file. Returns the status of the program."""
     stale = 0
     for page, mark, make in tables:
-        table = make()
+        path, table = ROOT / 'docs' / page, make()
+        wanted = replaced(page, mark, table) if mark else table
         if mode == '--write':
-            write(page, mark, table)
-        elif replaced(page, mark, table) != (ROOT / 'docs' / page).read_text(encoding='utf-8'):
-            print(f'docs/{page}: the table <!-- {mark} --> is stale; {pathlib.Path(sys.argv[0]).resolve().relative_to(ROOT)} --write mends it')
+            path.write_text(wanted, encoding='utf-8')
+        elif not path.exists() or path.read_text(encoding='utf-8') != wanted:
+            print(f'docs/{page}: {f"the table <!-- {mark} -->" if mark else "this file"} is stale; '
+                  f'{pathlib.Path(sys.argv[0]).resolve().relative_to(ROOT)} --write mends it')
             stale = 1
     return stale

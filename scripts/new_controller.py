@@ -113,7 +113,7 @@ def build(test):
     schema = run(program, 'validate', '--schema', capture_output=True, text=True).stdout
     (ROOT / 'config' / 'experiments' / 'schema.json').write_text(schema, encoding='utf-8')
     run(sys.executable, 'research/model_mismatch.py', '--write')
-    print('renewed config/experiments/schema.json and the table of wrong models in docs/controllers.md')
+    print('renewed config/experiments/schema.json and docs/reference/model-mismatch.csv')
 
 
 def out_of_tree(names, folder):

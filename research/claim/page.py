@@ -1,7 +1,11 @@
-"""The tables of docs/paper.md about the claim, from fresh runs on plants that neither the search nor the map has seen."""
+"""The tables of docs/paper.md about the claim, from fresh runs on plants that neither the search nor the map has seen. Those that
+are long stand in CSV files; the page has the rows that its text speaks of."""
 from __future__ import annotations
 
+import csv
+import io
 import pathlib
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -17,6 +21,8 @@ from .statistics import ratio_interval
 
 #: seed of the plants on which the page's figures are measured: that of `abs_hil compare`
 EVALUATION_SEED = 1
+#: headings and rows
+Table = tuple[list[str], list[list[str]]]
 #: q of the reaching terms, 1/s; the last is ks1 of the paper's law. Size and cases of their maps.
 REACHING_PER_S, REACHING_SIZE, REACHING_CASES = (8.0, 32.0), 10, 20
 #: the largest brake duty that the boards' drivers send by default
@@ -93,20 +99,25 @@ class Page:
         return result if result is not None and result.counts else None
 
     def sections(self) -> Iterator[tuple[str, str]]:
-        yield 'claim', self.claim()
-        yield 'others', self.others()
+        head, rows = self.claim()
+        yield 'claim', table(head, [row for row in rows if row[1] != 'ideal'])
         yield 'map', self.map_table()
         yield 'reaching', self.reaching()
-        yield 'parts', table(['plant', 'law', 'stop time / s', 'stop distance / m', 'time / adaptive', 'distance / adaptive',
-                              'θ̂ within 5 % after / s (plants)'], list(self.parts.table_rows()))
-        yield 'capped', self.capped()
-        for plant in PLANTS:
-            yield f'laws {plant} real', self.laws(plant, 'real')
+        head, rows = self.parts.table()
+        yield 'parts', table(head[1:], [row[1:] for row in rows if row[0] == PLANTS[0]])
+
+    def files(self) -> Iterator[tuple[str, str]]:
+        """The CSV files in docs/reference: all rows."""
+        yield 'docs/reference/paper-claim.csv', csv_text(*self.claim())
+        yield 'docs/reference/paper-baselines.csv', csv_text(*self.others())
+        yield 'docs/reference/paper-capped.csv', csv_text(*self.capped())
+        yield 'docs/reference/paper-parts.csv', csv_text(*self.parts.table())
+        yield 'docs/reference/paper-laws.csv', csv_text(*self.laws('real'))
 
     def _ratios(self, ours: Result, theirs: Result) -> list[str]:
         return [ratio_interval(ours.varied(name), theirs.varied(name)).text() for name in FIGURES]
 
-    def claim(self) -> str:
+    def claim(self) -> Table:
         """adaptive in the paper's gains against the first-order baselines of the map."""
         rows = []
         for plant in PLANTS:
@@ -121,9 +132,9 @@ class Page:
                     rows.append([plant, actuator, name, *(f'{gains[key]:.3g}' for key in MAP_KEYS), *self._ratios(ours, theirs)])
         rows.append(['the paper', 'its rig', '', 'not given', 'not given', f'{PAPER_RATIO}', f'{PAPER_RATIO}', 'not given',
                      'not given'])
-        return table(['plant', 'actuator', 'baseline', 'K / (m/s²)', 'γ / (kg² m/s³)', *FIGURES.values()], rows)
+        return ['plant', 'actuator', 'baseline', 'K / (m/s²)', 'γ / (kg² m/s³)', *FIGURES.values()], rows
 
-    def others(self) -> str:
+    def others(self) -> Table:
         """adaptive in the paper's gains against every shipped baseline that counts, behind the real actuator."""
         rows = []
         for plant in PLANTS:
@@ -131,7 +142,7 @@ class Page:
                 theirs = self.baseline(plant, 'real', other)
                 if theirs is not None:
                     rows.append([plant, other, *self._ratios(self.found[plant, 'real', self.names[0]], theirs)])
-        return table(['plant', 'baseline', *FIGURES.values()], rows)
+        return ['plant', 'baseline', *FIGURES.values()], rows
 
     def phrases(self) -> Iterator[str]:
         """Sentences of the page with fresh numbers."""
@@ -156,15 +167,12 @@ class Page:
             for actuator in ACTUATORS:
                 one = self.maps[plant, actuator]
                 row = [plant, actuator, f'{one.admissible.sum()} of {one.admissible.size}']
-                for name in FIGURES:
-                    row.append(_span(one, name))
-                    if name in ('stop_time_s', 'stop_distance_m'):
-                        held = one.ratio[name][one.admissible]
-                        held = held[np.isfinite(held)]
-                        row.append(f'{100.0 * np.mean(held <= PAPER_RATIO):.0f}' if held.size else '')
+                for name in ('stop_time_s', 'stop_distance_m'):
+                    held = one.ratio[name][one.admissible]
+                    held = held[np.isfinite(held)]
+                    row += [_span(one, name), f'{100.0 * np.mean(held <= PAPER_RATIO):.0f}' if held.size else '']
                 rows.append(row)
-        return table(['plant', 'actuator', 'gains that count', 'stop time', '≤ 0.933 / %', 'stop distance', '≤ 0.933 / %',
-                      'torque variation', 'slip RMS error'], rows)
+        return table(['plant', 'actuator', 'gains that count', 'stop time', '≤ 0.933 / %', 'stop distance', '≤ 0.933 / %'], rows)
 
     def reaching(self) -> str:
         """How the ratios lie if the baseline has a reaching term, behind the real actuator."""
@@ -177,7 +185,7 @@ class Page:
         rows.sort(key=lambda row: PLANTS.index(row[0]))
         return table(['plant', 'q / (1/s)', 'gains that count', *FIGURES.values()], rows)
 
-    def capped(self) -> str:
+    def capped(self) -> Table:
         """The claim's baselines where the brake's duty is capped as the boards do."""
         rows = []
         for plant in PLANTS:
@@ -191,25 +199,22 @@ class Page:
                     ratio_interval(ours.varied(name), theirs.varied(name)).text() for name in ('stop_time_s', 'stop_distance_m')]
                 rows.append([plant, one.name, f'{100.0 * theirs.verdict.shares()["reaches"]:.0f}',
                              'yes' if theirs.counts else 'no', *times])
-        return table(['plant', 'law', 'reaches the slip on / %', 'counts', 'stop time', 'stop distance'], rows)
+        return ['plant', 'law', 'reaches the slip on / %', 'counts', 'stop time', 'stop distance'], rows
 
-    def laws(self, plant: str, actuator: str) -> str:
-        """Every law's figures: median and 10th and 90th percentile."""
-        rows, missing = [], []
-        for name in self.names:
-            result = self.found[plant, actuator, name]
-            shares = ', '.join(f'{100 * share:.0f}' for share in result.verdict.shares().values())
-            if name in BASELINES and not result.counts:
-                missing.append(f'{name} ({shares})')
-                continue
-            cells = [name]
-            for figure, digits in SHOWN.items():
-                values = result.varied(figure)
-                low, median, high = np.nanquantile(values, (0.1, 0.5, 0.9))
-                cells.append(f'{median:.{digits}f} ({low:.{digits}f}…{high:.{digits}f})')
-            rows.append([*cells, shares])
-        text = table(['law', *map(heading_of, SHOWN), 'criteria held / %'], rows)
-        return text + ('\n\nDo not count here (criteria held / %): ' + '; '.join(missing) + '.' if missing else '')
+    def laws(self, actuator: str) -> Table:
+        """Every law's figures: median and 10th and 90th percentile, and the shares of the criteria."""
+        rows, head = [], []
+        for plant in PLANTS:
+            for name in self.names:
+                result = self.found[plant, actuator, name]
+                shares = result.verdict.shares()
+                head = ['plant', 'law', 'counts', *map(heading_of, SHOWN), *(f'{criterion} / %' for criterion in shares)]
+                cells = [plant, name, 'no' if name in BASELINES and not result.counts else 'yes']
+                for figure, digits in SHOWN.items():
+                    low, median, high = np.nanquantile(result.varied(figure), (0.1, 0.5, 0.9))
+                    cells.append(f'{median:.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]')
+                rows.append([*cells, *(f'{100 * share:.0f}' for share in shares.values())])
+        return head, rows
 
 
 def _span(one: Map, name: str) -> str:
@@ -220,3 +225,19 @@ def _span(one: Map, name: str) -> str:
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     rule = '|' + '---|' * len(head)
     return '\n'.join(['| ' + ' | '.join(head) + ' |', rule, *('| ' + ' | '.join(row) + ' |' for row in rows)])
+
+
+def csv_text(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """CSV in which a column of "value [low, high]" is three columns."""
+    found = [[re.match(r'(\S+) \[(\S+), (\S+)\]$', cell) for cell in row] for row in rows]
+    three = [any(column) for column in zip(*found)]
+
+    def wide(cells: Sequence[str], parts: Sequence[Sequence[str]]) -> list[str]:
+        return [text for cell, of, is_three in zip(cells, parts, three) for text in (of if is_three else [cell])]
+
+    text = io.StringIO()
+    write = csv.writer(text, lineterminator='\n').writerow
+    write(wide(head, [[name, f'{name}: low', f'{name}: high'] for name in head]))
+    for row, matches in zip(rows, found):
+        write(wide(row, [match.groups() if match else [cell, '', ''] for cell, match in zip(row, matches)]))
+    return text.getvalue()

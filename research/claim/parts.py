@@ -43,7 +43,12 @@ class Parts:
     def __init__(self, runs: int, seed: int, threads: int = 0) -> None:
         self.figures = run_entries(ENTRIES, PLANTS, 'real', runs, seed, threads)
 
-    def table_rows(self) -> Iterator[list[str]]:
+    def table(self) -> tuple[list[str], list[list[str]]]:
+        """Headings and rows."""
+        return (['plant', 'law', 'stop time / s', 'stop distance / m', 'time / adaptive', 'distance / adaptive',
+                 'θ̂ within 5 % after / s (plants)'], list(self._rows()))
+
+    def _rows(self) -> Iterator[list[str]]:
         for number, plant in enumerate(PLANTS):
             for index, entry in enumerate(ENTRIES):
                 own = {name: _own(self.figures, index, number, name)

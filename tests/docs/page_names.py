@@ -8,7 +8,7 @@ Checks README.md, CONTRIBUTING.md and the pages in docs: what they name must exi
   - `folder/file` and `file.hpp` are files of the tree.
 Words with a place holder (capitals, *, {, <, …, `plant.x`) are left out. unchecked_names.txt lists what is named although no
 source contains it, with the reason; an entry that no page needs is an error. Links must lead to files, and docs/index.md, or a
-page that it leads to, must lead to every page.
+page that it leads to, must lead to every page. All pages together have at most WORDS_AT_MOST words, as `wc -w` counts.
 """
 import pathlib
 import re
@@ -16,6 +16,8 @@ import subprocess
 import sys
 import tempfile
 
+#: of all pages together. Say each thing once; long tables are CSV files of docs/reference.
+WORDS_AT_MOST = 60_000
 FOLDERS = ('src', 'include', 'apps', 'python', 'tests', 'research', 'scripts', 'lcmtypes', 'firmware', 'examples', 'cmake',
            'packaging', 'completion', 'config', 'bench', '.ci')
 FILES = ('CMakeLists.txt', 'CMakePresets.json', 'pyproject.toml')
@@ -128,6 +130,11 @@ def check_links(root):
     return wrong
 
 
+def check_words(root, at_most=WORDS_AT_MOST):
+    count = sum(len(page.read_text(encoding='utf-8').split()) for page in pages(root))
+    return [f'{count} words on all pages, above {at_most}: say less, or say it once'] if count > at_most else []
+
+
 def read_unchecked(path):
     """NAME, two spaces or more, reason."""
     lines = [line for line in path.read_text(encoding='utf-8').splitlines() if line.strip() and not line.startswith('#')]
@@ -156,6 +163,9 @@ def self_test():
         assert check_names(root, sources, set()) == ['docs/a.md: `RunLock`: no source contains RunLock']
         assert check_names(root, sources, {'RunLock'}) == []
         assert check_names(root, sources, {'RunLock', 'other'}) == ['unchecked_names.txt: no page needs `other`']
+        words = sum(len(page.read_text(encoding='utf-8').split()) for page in pages(root))
+        assert check_words(root, words) == []
+        assert check_words(root, words - 1) == [f'{words} words on all pages, above {words - 1}: say less, or say it once']
         assert check_links(root) == ['docs/alone.md: (none.md): no such file', 'docs/index.md: nothing leads to docs/alone.md']
 
 
@@ -170,7 +180,7 @@ def main():
     listed = subprocess.run([sys.argv[2], 'list', '--keys'], capture_output=True, text=True, check=True).stdout
     keys = [line.split()[0] for line in listed.splitlines() if re.match(r'^\w+\.\w', line)]
     wrong = check_names(root, Sources(root, keys), read_unchecked(pathlib.Path(__file__).with_name('unchecked_names.txt')))
-    wrong += check_links(root)
+    wrong += check_links(root) + check_words(root)
     print('\n'.join(wrong), file=sys.stderr)
     return 1 if wrong else 0
 
