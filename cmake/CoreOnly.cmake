@@ -1,5 +1,5 @@
 # The simulation core alone (ABS_HIL_CORE_ONLY, cmake/Core.cmake), for any platform that the compiler makes programs for:
-# its rooms, the library of the exported FMUs, and a Python module for each Python.
+# its rooms, the library of the exported FMUs, and a Python module for each Python; for WebAssembly the module of `abs_hil lab`.
 #
 # ABS_HIL_SYSTEM_INCLUDE  where the headers of the header-only libraries are (/usr/include)
 # ABS_HIL_ZLIB_SOURCES    folder of zlib's sources
@@ -14,7 +14,11 @@ set(ABS_HIL_JAVA OFF)
 # Links to the libraries' headers: those of this system's C library beside them are not the platform's.
 set(headers ${CMAKE_BINARY_DIR}/headers)
 file(MAKE_DIRECTORY ${headers})
-foreach(library boost fmt spdlog toml++ nlohmann lcm eigen3/Eigen eigen3/unsupported)
+set(libraries boost fmt spdlog toml++ nlohmann lcm eigen3/Eigen eigen3/unsupported)
+if(CMAKE_SYSTEM_PROCESSOR STREQUAL wasm32)
+  list(APPEND libraries simde)
+endif()
+foreach(library IN LISTS libraries)
   get_filename_component(name ${library} NAME)
   if(NOT EXISTS ${ABS_HIL_SYSTEM_INCLUDE}/${library})
     message(FATAL_ERROR "${ABS_HIL_SYSTEM_INCLUDE}/${library} is missing: scripts/setup.sh installs it")
@@ -38,15 +42,19 @@ abs_hil_headers_only(nlohmann_json::nlohmann_json)
 abs_hil_headers_only(spdlog::spdlog FMT_HEADER_ONLY=1 SPDLOG_FMT_EXTERNAL=1)
 abs_hil_headers_only(tomlplusplus::tomlplusplus TOML_HEADER_ONLY=1)
 
-file(GLOB zlib_sources ${ABS_HIL_ZLIB_SOURCES}/*.c)
-if(NOT zlib_sources)
-  message(FATAL_ERROR "ABS_HIL_ZLIB_SOURCES=\"${ABS_HIL_ZLIB_SOURCES}\" holds no sources of zlib")
+if(CMAKE_SYSTEM_PROCESSOR STREQUAL wasm32)  # of a page (scripts/lab.sh), which reads no compressed files
+  add_library(ZLIB::ZLIB INTERFACE IMPORTED GLOBAL)
+else()
+  file(GLOB zlib_sources ${ABS_HIL_ZLIB_SOURCES}/*.c)
+  if(NOT zlib_sources)
+    message(FATAL_ERROR "ABS_HIL_ZLIB_SOURCES=\"${ABS_HIL_ZLIB_SOURCES}\" holds no sources of zlib")
+  endif()
+  list(FILTER zlib_sources EXCLUDE REGEX "/gz[a-z]*\\.c$")  # its own files, which need more of the system
+  add_library(abs_hil_zlib STATIC ${zlib_sources})
+  target_include_directories(abs_hil_zlib SYSTEM PUBLIC ${ABS_HIL_ZLIB_SOURCES})
+  set_target_properties(abs_hil_zlib PROPERTIES POSITION_INDEPENDENT_CODE ON C_VISIBILITY_PRESET hidden)
+  add_library(ZLIB::ZLIB ALIAS abs_hil_zlib)
 endif()
-list(FILTER zlib_sources EXCLUDE REGEX "/gz[a-z]*\\.c$")  # its own files, which need more of the system
-add_library(abs_hil_zlib STATIC ${zlib_sources})
-target_include_directories(abs_hil_zlib SYSTEM PUBLIC ${ABS_HIL_ZLIB_SOURCES})
-set_target_properties(abs_hil_zlib PROPERTIES POSITION_INDEPENDENT_CODE ON C_VISIBILITY_PRESET hidden)
-add_library(ZLIB::ZLIB ALIAS abs_hil_zlib)
 
 # zig writes facts for debuggers unless it is told not to. Without them the module is a twentieth as large.
 add_compile_options(-g0)
@@ -59,5 +67,9 @@ foreach(room IN LISTS ABS_HIL_ROOM_NAMES)
     add_subdirectory(src/${room})
   endif()
 endforeach()
-add_subdirectory(python)
-add_subdirectory(tests/core)
+if(CMAKE_SYSTEM_PROCESSOR STREQUAL wasm32)
+  add_subdirectory(python/lab)
+else()
+  add_subdirectory(python)
+  add_subdirectory(tests/core)
+endif()
