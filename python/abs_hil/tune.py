@@ -222,7 +222,7 @@ def _number(least: int, most: int) -> Callable[[str], int]:
 def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser('abs_tune', allow_abbrev=False, description="Searches for a controller's gains in "
                                    'simulation and writes them as a configuration file')
-    made.add_argument('--controllers', metavar='A,B,...', default='',
+    made.add_argument('--controllers', '--controller', metavar='A,B,...', default='',
                       help='controllers to tune (default: all that have gains)')
     made.add_argument('--plants', metavar='A,B,...', default='paper-table1,paper-timing',
                       help='plants to tune on [paper-table1,paper-timing]')

@@ -112,7 +112,7 @@ Action add_compare(cli::Parser& compare, const Words& words) {
                .to = &o.run.model,
                .help = "every controller's model (default: the plant, before it varies)",
                .type = "NAME|FILE"});
-  compare.add({.names = "--controllers",
+  compare.add({.names = "--controllers,--controller",
                .to = &o.controllers,
                .help = "controllers, the first one the baseline: NAME, NAME{key=value,...}, a TOML file, each with "
                        "LABEL= before it if you like; or all",

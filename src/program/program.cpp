@@ -34,7 +34,20 @@ namespace abs_hil {
 
 namespace {
 
+/// `abs_hil` without a word starts nothing: who types it wants to know what there is. Nothing has moved.
+int say_what_to_type() {
+  fputs(
+      "abs_hil: say what to run. These three first:\n"
+      "  abs_hil --fast --no-lcm --out runs/a   the paper's braking on the simulated rig, in virtual time: 15 ms\n"
+      "  abs_hil report runs/a                  a page with its figures: report.html\n"
+      "  abs_hil --backend sim                  the same in real time; --backend rig drives a board\n"
+      "`abs_hil list` has controllers, rigs and experiments, `abs_hil --help` every option and subcommand.\n",
+      stderr);
+  return program::exit_usage;
+}
+
 int dispatch(int argc, char** argv) {
+  if (argc < 2) return say_what_to_type();
   const program::Words words(argv, argv + argc);
   cli::Parser parser("abs_hil", "Driver, adaptive slip controller and simulator of the Inteco ABS laboratory rig");
   parser.set_version(ABS_HIL_VERSION);

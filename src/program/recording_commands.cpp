@@ -112,7 +112,7 @@ Action add_replay(cli::Parser& parser, const Words&) {
   parser.add({.names = "--check",
               .to = &o->check,
               .help = "run the recorded configuration again and check that all commands are bit-equal"});
-  parser.add({.names = "--controller",
+  parser.add({.names = "--controller,--controllers",
               .to = &o->controller,
               .help = "use another slip controller",
               .type = "NAME",

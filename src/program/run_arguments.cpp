@@ -27,7 +27,7 @@ void add_configuration_options(cli::Parser& parser, RunOptions& o) {
               .to = &o.model,
               .help = "the controllers' model of the rig, by name or TOML file (default: the plant)",
               .type = "NAME|FILE"});
-  parser.add({.names = "--controller",
+  parser.add({.names = "--controller,--controllers",
               .to = &o.controller,
               .help = "slip controller, by name or FILE.so, FILE.fmu or FILE.agent",
               .type = "NAME|FILE"});

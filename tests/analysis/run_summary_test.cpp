@@ -109,3 +109,12 @@ TEST_CASE("the text says at which speed the estimate of theta is taken") {
   summary.metrics.theta_final_N = 23.04;
   CHECK_THAT(to_text(summary), Contains("23.04 N at 3 m/s"));
 }
+
+TEST_CASE("after a fault while braking the last estimate of theta is not shown") {
+  RunSummary summary;
+  summary.metrics.theta_final_N = 0.0;
+  summary.metrics.final_speed_m_s = 16.6;
+  CHECK_THAT(to_text(summary), Contains("0.00 N at 17 m/s"));
+  summary.result = "fault";
+  CHECK_THAT(to_text(summary), !Contains("0.00 N") && Contains("theta estimate        - (a fault ended the braking)"));
+}

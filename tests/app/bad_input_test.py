@@ -18,6 +18,14 @@ class BadInput(ProgramTest):
             self.assertFalse(summary.exists())
             self.assertFalse(csv.exists(), 'a refused run must not touch files')
 
+    def test_no_argument_at_all(self):
+        """It says what to type, and starts nothing."""
+        result = self.run_program(cwd=self.folder)
+        self.assertEqual(result.returncode, 2)
+        for words in ('abs_hil --fast --no-lcm --out runs/a', 'abs_hil report runs/a', 'abs_hil --backend sim', 'abs_hil --help'):
+            self.assertIn(words, result.stderr)
+        self.assertEqual(list(self.folder.iterdir()), [])
+
     def test_usb_board(self):
         usb = ['--backend', 'rig', '--set', 'driver.kind=usb', '--set', 'driver.emulated=true']
         none = ['--set', f'driver.usb.sysfs_root={self.folder}']

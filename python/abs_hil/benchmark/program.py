@@ -23,8 +23,8 @@ SHOWN = 20
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog='abs_hil benchmark', allow_abbrev=False, description=__doc__.split(' (docs')[0] + '.')
-    parser.add_argument('--controller', metavar='C', action='append', default=[],
-                        help='a name, FILE.so, FILE.fmu, or MODULE:CLASS of a controller in Python; may be repeated '
+    parser.add_argument('--controller', '--controllers', metavar='C,...', action='append', default=[],
+                        help='names, FILE.so, FILE.fmu, or MODULE:CLASS of controllers in Python; may be repeated '
                              '(all controllers of the program)')
     parser.add_argument('--set', metavar='KEY=VALUE', action='append', default=[],
                         help='a value under control. for every controller; may be repeated')
@@ -85,7 +85,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 write_whole(target, lambda name: None, probe=True)
         if given.page is not None and given.page.suffix == '.html':
             plotly_js()
-        entries = [Entry(name, settings) for name in given.controller or controllers()]
+        names = [name for text in given.controller for name in text.split(',')]
+        entries = [Entry(name, settings) for name in names or controllers()]
         chosen, known = _chosen(given)
         whole = not given.quick and given.draw is None
         results = []
