@@ -35,7 +35,8 @@ function(abs_hil_headers_only target)
 endfunction()
 # Boost 1.74 uses a base class that C++17 has removed and that the library of clang gives on demand only.
 abs_hil_headers_only(Boost::headers _LIBCPP_ENABLE_CXX17_REMOVED_UNARY_BINARY_FUNCTION)
-abs_hil_headers_only(Eigen3::Eigen)
+# Eigen takes clang for an old GCC on Windows, by this number, and wraps its vectors in a way that AVX-512 does not compile with.
+abs_hil_headers_only(Eigen3::Eigen $<$<BOOL:${WIN32}>:__GXX_ABI_VERSION=1016>)
 abs_hil_headers_only(LCM::LCM)
 abs_hil_headers_only(fmt::fmt FMT_HEADER_ONLY=1)
 abs_hil_headers_only(nlohmann_json::nlohmann_json)

@@ -227,9 +227,9 @@ void BrakingFigures<S>::note_braking(const BrakingSample<S>& sample, const Condi
   time_locked_s = rig::select(judged && rig::is_nan(time_locked_s), S(0.0), time_locked_s);
   const auto locked = judged && sample.slip > locked_slip && !rig::is_nan(last_time_s);
   time_locked_s = rig::select(locked, S(time_locked_s + (sample.time_s - last_time_s)), time_locked_s);
-  const auto near = rig::magnitude(slip_error) <= slip_band;
-  slip_reached_s = rig::select(judged && near && rig::is_nan(slip_reached_s), since_brake_s, slip_reached_s);
-  slip_settling.observe(judged, since_brake_s, near);
+  const auto in_band = rig::magnitude(slip_error) <= slip_band;
+  slip_reached_s = rig::select(judged && in_band && rig::is_nan(slip_reached_s), since_brake_s, slip_reached_s);
+  slip_settling.observe(judged, since_brake_s, in_band);
   theta_final_N = rig::select(judged, sample.theta_est_N, theta_final_N);
   const S theta_relative = sample.theta_est_N / sample.theta_N - 1.0;
   theta_error_final = rig::select(judged, theta_relative, theta_error_final);
