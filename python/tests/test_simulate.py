@@ -208,6 +208,7 @@ def test_a_series_is_that_of_the_program(tmp_path, abs_hil_program):
         abs_hil.simulate_series('no-such')
 
 
+@pytest.mark.skipif(not hasattr(signal, 'SIGALRM'), reason='Windows has no alarm')
 @pytest.mark.parametrize('threads', [1, 2])
 def test_a_signal_ends_many_slow_runs_at_once(threads):
     """Minutes of work; parts of the batch have hundreds of runs each, and none of them is finished first."""
