@@ -38,6 +38,9 @@ def files_below(folder: pathlib.Path, place: str) -> dict[str, bytes]:
 def package(given: argparse.Namespace) -> dict[str, bytes]:
     files = files_below(ROOT / 'python' / 'abs_hil', 'abs_hil')
     files |= {f'abs_hil/serve/{name}': content for name, content in files_below(ROOT / 'third_party/uplot', 'uplot').items()}
+    lab = ROOT / 'build' / 'lab' / 'abs_hil_lab.wasm'  # where scripts/lab.sh has made it
+    if lab.exists():
+        files[f'abs_hil/lab/{lab.name}'] = lab.read_bytes()
     tables = [*given.built.glob('*_t.py'), given.built / 'quantities.json', given.built / 'reasons.json']
     files |= {f'abs_hil/{file.name}': file.read_bytes() for file in tables}
     files |= files_below(given.fmu, 'abs_hil/fmu')

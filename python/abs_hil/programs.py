@@ -1,5 +1,5 @@
 """The programs in Python: abs_report, abs_tune, abs_learn, abs_identify, abs_benchmark,
-abs_convert, abs_watch, abs_export-fmu, abs_serve. `abs_hil report ...` starts them too."""
+abs_convert, abs_watch, abs_export-fmu, abs_serve, abs_lab. `abs_hil report ...` starts them too."""
 from __future__ import annotations
 
 import contextlib
@@ -13,7 +13,8 @@ import sys
 PROGRAMS = {'report': 'abs_hil.report.program', 'tune': 'abs_hil.tune', 'learn': 'abs_hil.learning.program',
             'identify': 'abs_hil.identification.program', 'benchmark': 'abs_hil.benchmark.program',
             'convert': 'abs_hil.interchange.program', 'watch': 'abs_hil.watch.program',
-            'export-fmu': 'abs_hil.interchange.export_fmu', 'serve': 'abs_hil.serve.program'}
+            'export-fmu': 'abs_hil.interchange.export_fmu', 'serve': 'abs_hil.serve.program',
+            'lab': 'abs_hil.lab.program'}
 
 
 class _Stdout(io.FileIO):
@@ -96,3 +97,7 @@ def export_fmu() -> None:
 
 def serve() -> None:
     sys.exit(start('serve', sys.argv[1:]))
+
+
+def lab() -> None:
+    sys.exit(start('lab', sys.argv[1:]))

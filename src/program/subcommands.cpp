@@ -37,6 +37,7 @@ constexpr std::array table{
                "write the simulated rig, or with --controller a slip controller, as an FMU for other tools"},
     Subcommand{"watch", "show a running experiment in this terminal, over LCM; q quits"},
     Subcommand{"serve", "show a running experiment, or a recorded one, as a scope in the browser"},
+    Subcommand{"lab", "make a page that simulates the rig and its controllers in the browser, without a server"},
     Subcommand{"send", "send a command to a running abs_hil over LCM", &add_send},
     Subcommand{"report", "make a page with figures and tables of recorded runs, or export their rows"},
     Subcommand{"tune", "search for a controller's gains in simulation"},

@@ -19,6 +19,7 @@ from ..messages import PHASES, QUANTITIES
 from .download import TYPES, make
 from .feed import Feed
 from .history import BIN_S, DERIVED
+from .uplot import uplot
 from .viewer import REASON_KINDS, Bad, Viewer, real, whole
 
 _FOLDER = pathlib.Path(__file__).resolve().parent
@@ -38,14 +39,9 @@ Command = Callable[[str, str, float], Awaitable[tuple[bool, str]]]
 
 
 def page_files() -> dict[str, pathlib.Path]:
-    """Name -> file. In the source tree uPlot stands in third_party."""
-    installed = _FOLDER / 'uplot'
-    uplot = installed if installed.is_dir() else _FOLDER.parents[2] / 'third_party' / 'uplot'
-    found = [*(_FOLDER / 'page').iterdir(), *uplot.iterdir()]
-    files = {path.name: path for path in found if path.suffix in KINDS}
-    if 'uPlot.iife.min.js' not in files:
-        raise ImportError(f'"{uplot}" lacks uPlot.iife.min.js, which draws the charts')
-    return files
+    """Name -> file."""
+    found = [*(_FOLDER / 'page').iterdir(), *uplot().iterdir()]
+    return {path.name: path for path in found if path.suffix in KINDS}
 
 
 class Door(web.Server):

@@ -1,0 +1,1 @@
+"""The lab in a page: `abs_hil lab`."""

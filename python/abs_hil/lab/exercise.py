@@ -1,0 +1,90 @@
+"""Exercises of the lab: what a page says, hides and offers, from a TOML file."""
+from __future__ import annotations
+
+import pathlib
+import tomllib
+from typing import Any
+
+from ..core import _core
+from ..messages import QUANTITIES
+from ..simulation import simulate
+
+#: table -> key -> type
+_SHAPE: dict[str, dict[str, type]] = {
+    '': {'title': str, 'task': str, 'start': dict, 'hidden': dict, 'offered': dict, 'goal': list},
+    'start': {'controller': str, 'plant': str, 'experiment': str, 'set': dict},
+    'hidden': {'set': dict, 'columns': list, 'figures': list},
+    'offered': {'controllers': list, 'plants': list, 'experiments': list, 'keys': list},
+    'goal': {'figure': str, 'at_most': float, 'at_least': float, 'says': str}}
+
+
+def known() -> list[pathlib.Path]:
+    """The ready exercises."""
+    return sorted((pathlib.Path(__file__).parent / 'exercises').glob('*.toml'))
+
+
+def find(name_or_file: str) -> pathlib.Path:
+    """A ready exercise by name, or a file."""
+    for path in known():
+        if path.stem == name_or_file:
+            return path
+    return pathlib.Path(name_or_file)
+
+
+def _check(given: dict[str, Any], table: str, place: str) -> None:
+    for key, value in given.items():
+        wanted = _SHAPE[table].get(key)
+        name = f'{table}.{key}'.lstrip('.')
+        if wanted is None:
+            raise ValueError(f'{place}: unknown key {name}; known: {", ".join(_SHAPE[table])}')
+        if not isinstance(value, (int, float) if wanted is float else wanted) or isinstance(value, bool):
+            raise ValueError(f'{place}: {name} = {value!r}: give a {"number" if wanted is float else wanted.__name__}')
+
+
+def _among(names: list[Any], valid: list[str], key: str, place: str) -> None:
+    for name in names:
+        if name not in valid:
+            some = ', '.join(valid[:20]) + (' ...' if len(valid) > 20 else '')
+            raise ValueError(f'{place}: {key}: unknown "{name}"; known: {some}')
+
+
+def read(path: pathlib.Path) -> dict[str, Any]:
+    """The exercise as the page takes it. Raises ValueError, naming the file, the value and what is valid."""
+    place = str(path)
+    try:
+        given = tomllib.loads(path.read_text(encoding='utf-8'))
+    except OSError as error:
+        names = ', '.join(exercise.stem for exercise in known())
+        raise ValueError(f'--exercise "{path}": {error.strerror}; give a TOML file, or one of {names}') from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f'{place}: not valid TOML: {error}') from None
+    _check(given, '', place)
+    for needed in ('title', 'task'):
+        if not given.get(needed):
+            raise ValueError(f'{place}: {needed} is missing; give a text')
+    for table in ('start', 'hidden', 'offered'):
+        _check(given.get(table, {}), table, place)
+    for goal in given.get('goal', []):
+        _check(goal, 'goal', place)
+    start, hidden, offered = ({'set': {}, **given.get(table, {})} for table in ('start', 'hidden', 'offered'))
+    figures = [row['name'] for row in _core.figures()]
+    keys = [row['name'] for row in _core.keys({})]
+    _among(hidden.get('columns', []), list(QUANTITIES), 'hidden.columns', place)
+    _among(hidden.get('figures', []), figures, 'hidden.figures', place)
+    _among(offered.get('keys', []), keys, 'offered.keys', place)
+    for key in offered.get('keys', []):
+        if key in hidden['set']:
+            raise ValueError(f'{place}: offered.keys: {key} is in hidden.set too; leave it out of one of the two')
+    for choice, valid in (('controllers', _core.controllers()), ('plants', _core.plants()), ('experiments', _core.experiments())):
+        _among(offered.get(choice, []), list(valid), f'offered.{choice}', place)
+    goals = given.get('goal', [])
+    for goal in goals:
+        _among([goal.get('figure')], figures, 'goal.figure', place)
+        if not goal.get('says') or not {'at_most', 'at_least'} & goal.keys():
+            raise ValueError(f'{place}: goal of {goal["figure"]}: give says, and at_most or at_least')
+    try:  # what the program would refuse, the page must not bring
+        simulate(**{name: value for name, value in start.items() if name != 'set'}, set={**start['set'], **hidden['set']})
+    except ValueError as error:
+        raise ValueError(f'{place}: {error}') from None
+    return {'title': given['title'], 'task': given['task'].strip(), 'start': start, 'offered': offered, 'goals': goals,
+            'hidden': {'columns': [], 'figures': [], **hidden}}

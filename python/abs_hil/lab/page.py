@@ -1,0 +1,55 @@
+"""The lab as one HTML file: the simulation core as WebAssembly, uPlot, and the page's own scripts."""
+from __future__ import annotations
+
+import json
+import pathlib
+from typing import Any
+
+from ..core import _core
+from ..report.page import Unavailable, _hash
+from ..report.plots import compressed
+from ..serve.uplot import SCRIPT, STYLE, uplot
+
+_FOLDER = pathlib.Path(__file__).resolve().parent
+#: in this order one script
+_SCRIPTS = ('engine.js', 'settings.js', 'controls.js', 'figures.js', 'lab.js')
+MOST_BYTES = 3_000_000
+
+
+def module() -> bytes:
+    """The simulation core as WebAssembly: installed beside this file, in the source tree where scripts/lab.sh makes it."""
+    places = [_FOLDER / 'abs_hil_lab.wasm']
+    if len(_FOLDER.parents) > 2:
+        places.append(_FOLDER.parents[2] / 'build' / 'lab' / 'abs_hil_lab.wasm')
+    for place in places:
+        if place.exists():
+            return place.read_bytes()
+    raise Unavailable('the simulation core for browsers (abs_hil_lab.wasm) is missing; scripts/lab.sh in the source folder '
+                      'makes it, in about 5 minutes')
+
+
+def _text(name: str) -> str:
+    return (_FOLDER / 'page' / name).read_text(encoding='utf-8')
+
+
+def page(exercise: dict[str, Any] | None, *, turn: bool = True) -> str:
+    """@param turn  the wheels turn as soon as the page is open, where its reader does not want fewer motions"""
+    import jinja2
+    from markupsafe import Markup
+    wasm = module()
+    charts = (uplot() / SCRIPT).read_text(encoding='utf-8')
+    own = "'use strict';\n(() => {\n" + ''.join(_text(name) for name in _SCRIPTS) + '})();\n'
+    # No script but these two runs, and nothing is fetched.
+    policy = ("default-src 'none'; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; "
+              f"script-src {_hash(charts)} {_hash(own)} 'wasm-unsafe-eval'")
+    data = json.dumps({'exercise': exercise, 'turn': turn})
+    scripts = Markup(f'<script type="application/gzip" id="module">{compressed(wasm)}</script>\n'
+                     f'<script type="application/gzip" id="page">{compressed(data.encode())}</script>\n'
+                     f'<script>{charts}</script>\n<script>{own}</script>')
+    css = ((uplot() / STYLE).read_text(encoding='utf-8')
+           + (_FOLDER.parent / 'serve' / 'page' / 'serve.css').read_text(encoding='utf-8') + _text('lab.css'))
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined,
+                                     loader=jinja2.FileSystemLoader(_FOLDER / 'page'))
+    return environment.get_template('lab.html.j2').render(
+        title=exercise['title'] if exercise else 'The ABS lab', exercise=exercise, version=_core.version, policy=policy,
+        css=Markup(css), scripts=scripts) + '\n'
