@@ -92,7 +92,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         results = []
         for entry in entries:
             results.append(run(entry, chosen, known, cases.SEEDS[:1] if given.quick else cases.SEEDS, given.threads))
-            print(table(results[-1:]).splitlines()[-1], file=sys.stderr)
+            if len(entries) > 1:
+                print(f'abs_hil benchmark: {entry.name}: {len(results)} of {len(entries)} controllers done', file=sys.stderr)
     except (ValueError, RuntimeError, OSError) as error:
         print(f'abs_hil benchmark: {error}', file=sys.stderr)
         return 2

@@ -8,6 +8,7 @@ import sys
 from typing import Any
 
 from ..files import write_whole
+from ..missing import how_to_install
 
 TARGETS = ('.mcap', '.parquet')
 
@@ -41,8 +42,7 @@ def main(arguments: list[str]) -> int:
         print(_record(given, output) if given.live is not None else _convert(given.input, output))
         return 0
     except ImportError as error:
-        print(f'abs_convert: {error}: install it: pip install {error.name or "mcap"}, or scripts/setup_python.sh in the source '
-              'folder', file=sys.stderr)
+        print(f'abs_convert: {error}: install it: {how_to_install(error.name or "mcap")}', file=sys.stderr)
         return 3
     except (ValueError, OSError) as error:
         print(f'abs_convert: {error}', file=sys.stderr)

@@ -10,6 +10,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from ..missing import how_to_install
 from ..rows import TEXTS
 from ..run import csv_bytes
 from .files import InputError, RunFiles
@@ -92,8 +93,8 @@ class Exporter:
             pandas.concat(frames, ignore_index=True).to_parquet(out, index=False)
         except ImportError:
             # pandas says only that no engine is usable. pyarrow itself says why, for instance that NumPy is too old.
-            raise Unavailable(f'Parquet files need the Python package pyarrow ({_why_not("pyarrow")}); install it: pip '
-                              'install pyarrow, or scripts/setup_python.sh in the source folder') from None
+            raise Unavailable(f'Parquet files need the Python package pyarrow ({_why_not("pyarrow")}); install it: '
+                              f'{how_to_install("pyarrow")}') from None
 
 
 def _why_not(package: str) -> str:

@@ -14,11 +14,14 @@ import numpy as np
 
 from ..core import _core
 from ..files import write_whole
+from ..missing import how_to_install
 from ..nesting import parse_json
 
 if TYPE_CHECKING:
     import pandas
 
+#: what pip is asked for
+SALIB, PYARROW = '"SALib<1.5"', '"pyarrow<24"'
 RESULTS = 'results.csv.gz'
 #: a header with the study's text and configurations is longer than any buffer of a reader
 _HEADER_BYTES = 1 << 24
@@ -178,8 +181,7 @@ class StudyResults:
         try:
             from SALib.analyze import sobol
         except ImportError:
-            raise ValueError('Sobol indices need SALib: pip install "SALib<1.5", or scripts/setup_python.sh in the source '
-                             'folder') from None
+            raise ValueError(f"Sobol indices need SALib: {how_to_install(SALIB)}") from None
         rows = self.columns(['point', 'plant', 'experiment', 'controller', *self.levels, *(where or {}), metric])
         for name, value in (where or {}).items():
             rows = rows[rows[name] == value]
@@ -203,8 +205,7 @@ class StudyResults:
             import pyarrow
             from pyarrow import parquet
         except ImportError:
-            raise ValueError('Parquet needs pyarrow: pip install "pyarrow<24", or scripts/setup_python.sh in the source '
-                             'folder') from None
+            raise ValueError(f"Parquet needs pyarrow: {how_to_install(PYARROW)}") from None
         writer = None
         try:
             for frame in self.chunks():
