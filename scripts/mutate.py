@@ -8,8 +8,7 @@ optimisation, links it with the tests of its group and runs them. A mutant that 
 mutate_equivalent.txt must list each survivor with the reason why it changes nothing. Status 1 if a survivor is not
 listed or a listed mutant is killed.
 
-The run takes some minutes and needs the libraries of build/release. Start it on demand. Results:
-docs/reference/quality.md.
+The run takes some minutes and needs the libraries of build/release. Start it on demand. Summary: docs/reference/quality.md.
 """
 import argparse
 import concurrent.futures

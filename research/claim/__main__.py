@@ -17,7 +17,7 @@ from .experiments import beyond_table, expected_table, figures_table, theory_phr
 from .guard import differences, replaced
 from .laws import LAWS, PAPER_GAINS, Entry
 from .map import FIGURES, Map, axes, draw_maps, read_maps, write_maps
-from .page import Page, first_order
+from .page import Page, csv_text, first_order
 from .pictures import draw, draw_figures
 from .search import find_gains
 from .swing import phrases
@@ -63,9 +63,10 @@ class Comparison:
         """The pages as they should be: path below the root, and text."""
         page = Page(self.out / GAINS, maps, self.runs, self.threads)
         figures = figures_table(Entry(PAPER_GAINS, 'adaptive'), {plant: baseline_of(maps, plant) for plant in PLANTS})
-        yield PAGE, replaced(self._text(PAGE), [*page.sections(), ('figures', figures)],
+        yield PAGE, replaced(self._text(PAGE), page.sections(),
                              [*page.phrases(), *phrases(self.program)])
         yield from page.files()
+        yield 'docs/reference/paper-figures.csv', csv_text(*figures)
         yield THEORY, replaced(self._text(THEORY), [('expected', expected_table())], theory_phrases())
         yield BEYOND, replaced(self._text(BEYOND), [('measured', beyond_table())])
 

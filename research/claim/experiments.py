@@ -65,16 +65,16 @@ QUANTITIES: tuple[tuple[str, str, Callable[[Braking], str]], ...] = (
     ('10', 'stop distance / m', lambda b: f'{b.summary["stop_distance_m"]:.2f}'))
 
 
-def figures_table(adaptive: Entry, baselines: Mapping[str, Entry | None]) -> str:
-    """One row for each quantity in the paper's figures, for the adaptive law and a baseline on each plant."""
+def figures_table(adaptive: Entry, baselines: Mapping[str, Entry | None]) -> tuple[list[str], list[list[str]]]:
+    """Headings, and one row for each quantity in the paper's figures, for the adaptive law and a baseline on each plant."""
     columns = []
     for plant in PLANTS:
         other = baselines[plant]
         columns.append((f'{plant}: adaptive', Braking(whole_run(adaptive, plant))))
         if other is not None:
             columns.append((f'{plant}: sliding-mode', Braking(whole_run(other, plant))))
-    return table(['figure', 'quantity', *(name for name, _ in columns)],
-                 [[figure, quantity, *(value(run) for _, run in columns)] for figure, quantity, value in QUANTITIES])
+    return (['figure', 'quantity', *(name for name, _ in columns)],
+            [[figure, quantity, *(value(run) for _, run in columns)] for figure, quantity, value in QUANTITIES])
 
 
 def _braking(controller: str, plant: str = 'paper-table1', values: Settings = MappingProxyType({})) -> Braking:
