@@ -45,13 +45,13 @@ def values_of(plant):
             if name.startswith('plant.')}
 
 
-def drawn(plant, random):
-    """(form, truth, start values): by the plant's keys."""
+def drawn(plant, random, most=SPREAD):
+    """(form, truth, start values): by the plant's keys; the truth within `most` of the plant's."""
     values = values_of(plant)
     form = FORMS[values['tyre']]
     truth, start = {}, {}
     for p in form.parameters:
-        spread = SPREADS.get(p.key, SPREAD)
+        spread = SPREADS.get(p.key, most)
         truth[p.key] = values[p.key] * (1 + spread * random.uniform(-1, 1))
         start[p.key] = values[p.key] * (1 + SPREAD * random.uniform(-1, 1))
     # b2 follows from the torque at the dead zone's end, which is small and not negative.

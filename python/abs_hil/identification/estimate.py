@@ -9,11 +9,11 @@ import numpy as np
 from ..core import _core
 from ..options import PathLike, options
 from ..run import Run
-from . import discs, intervals, rate_limit
+from . import discs, intervals, rate_limit, structure
 from .delay import with_delay
-from .fit import ROUNDS, disturbed_fit, finish_fit, likely_u0, start_fit
+from .fit import ROUNDS, disturbed_fit, finish_fit, likely_u0, search_u0, start_fit
 from .forms import better_form
-from .found import Finished, Identified, assembled, interrupted, name_disagreement, without_intervals
+from .found import LARGEST_DISAGREEMENT, Finished, Identified, assembled, interrupted, leave_form_open, name_disagreement, refuse
 from .linear import step
 from .logs import Log, load_log
 from .parameters import FORMS, WHEELS, checked_keys
@@ -81,28 +81,40 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
             notes.append(f'{FORMS[name].meaning}: cannot be fitted ({error})')
     if not fits:
         raise ValueError(f'no form of the plant can be fitted to these logs: {"; ".join(notes[-2:])}')
-    fit = fits[0] if len(fits) == 1 else better_form(fits, start_form, check, say, notes)
+    fit, decided = (fits[0], True) if len(fits) == 1 else better_form(fits, start_form, check, say, notes)
     try:
         finished = _finished(fit, seed, say, check)
     except KeyboardInterrupt:
         return interrupted(fit, str(start), notes)
+    of_logs = list(notes)
     found = assembled(finished, str(start), notes)
     name_disagreement(found)
-    if found.residual_counts_rms > LARGEST_RMS:
-        found.notes.insert(0, f'the model does not follow the logs: residual {found.residual_counts_rms:.3g} counts RMS, at most '
-                           f'{LARGEST_RMS:g} is expected even of a rig that wanders. No interval is given')
-        without_intervals(found)
-    elif found.disturbances is not None and found.fit.last_step > LARGEST_LAST_STEP:
-        found.notes.insert(0, 'the fit does not settle: the logs tell too little, or the model does not follow them. No interval '
-                           'is given')
-        without_intervals(found)
-    elif found.disturbances is not None and found.disturbances.sd[:3].max() > LARGEST_WANDER:
-        odd = max(found.disagreement, key=lambda name: found.disagreement[name], default='')
-        found.notes.insert(0, f'the logs disagree{f", {odd} most" if odd else ""}: only a rig that wanders by '
-                           f'{100 * found.disturbances.sd[:3].max():.2g} % would explain them with one set of parameters. Are '
-                           'they of one rig, and of one state of its brake and tyre? No interval is given')
-        without_intervals(found)
+    if why := _doubt(found, finished):
+        refuse(found, why, of_logs)
+    elif not decided:
+        leave_form_open(found)
     return found
+
+
+def _doubt(found: Identified, finished: Finished) -> str:
+    """Why the logs do not fit this plant; empty if they do."""
+    if finished.causes:
+        return structure.sentence(finished.causes, finished.fit)
+    if found.residual_counts_rms > LARGEST_RMS:
+        return (f'the model does not follow the logs: residual {found.residual_counts_rms:.3g} counts RMS, at most '
+                f'{LARGEST_RMS:g} is expected even of a rig that wanders')
+    odd = max(found.disagreement, key=lambda name: found.disagreement[name], default='')
+    factor = max(found.disturbances.sd[:3]) if found.disturbances is not None else 0.0
+    if found.disturbances is not None and found.fit.last_step > LARGEST_LAST_STEP:
+        return 'the fit does not settle: the logs tell too little, or the model does not follow them'
+    if factor > LARGEST_WANDER:
+        return (f'the logs disagree{f", {odd} most" if odd else ""}: only a rig that wanders by {100 * factor:.2g} % would '
+                'explain them with one set of parameters. Are they of one rig, and of one state of its brake and tyre?')
+    if found.disagreement.get(odd, 0.0) > LARGEST_DISAGREEMENT:
+        return (f'the logs disagree: {odd} most (chi-square per degree of freedom {found.disagreement[odd]:.3g}, expected 1); '
+                'is it of another rig, has something changed between the logs, or is the brake weaker in some of them '
+                '(--drift brake_torque)?')
+    return ''
 
 
 def _with_names(logs: list[Log]) -> list[Log]:
@@ -120,15 +132,19 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
     # Without disturbances a fit to the logs of a rig that wanders may go anywhere: the other one begins where this one does.
     undisturbed = _undisturbed(fit.copy(), check, say)
     quiet = undisturbed is not None and undisturbed.rms_counts <= LARGEST_QUIET_RMS
+    causes: list[structure.Found] = []
     if undisturbed is not None and quiet:
         fit = undisturbed
     else:
         left = f'residual {undisturbed.rms_counts:.3g} counts RMS' if undisturbed is not None else 'no fit without disturbances'
         say(f'{left}: the rig wanders, or the model lacks something')
         try:
+            fit = _explained_first(fit, check, say)
             fit = disturbed_fit(fit, check, say)
             limited = rate_limit.started(fit, check)
             fit = fit if limited is fit else disturbed_fit(limited, check, say)
+            again, causes = structure.explained(fit, fit.disturbances, check, say)
+            fit = fit if again is fit else disturbed_fit(again, check, say)
         except (ValueError, np.linalg.LinAlgError) as error:
             raise ValueError(f'the fit does not converge: these logs are not of a rig that the plant describes ({error})'
                              ) from None
@@ -139,7 +155,22 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
     gaps = likely_u0(fit, QUIET if quiet else fit.disturbances, check)
     say('intervals')
     spread = intervals.bootstrap(fit, seed, check=check) if quiet else intervals.information(fit)
-    return Finished(fit, spread, gaps, None if quiet else fit.disturbances, round_discs)
+    return Finished(fit, spread, gaps, None if quiet else fit.disturbances, round_discs, causes)
+
+
+def _explained_first(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit:
+    """The fit with the flaws of the brake that it shows while small disturbances are allowed: those that the likelihood asks
+    for would take the flaws up."""
+    disturbances = ROUNDS[1][0]
+    near = rate_limit.without(fit)  # a limit that was found may stand for a flaw
+    for _ in range(3):
+        step(near, disturbances, check)
+    if search_u0(near, disturbances, 0.01, 9, check):
+        step(near, disturbances, check)
+    flawed, _ = structure.explained(near, disturbances, check, say)
+    if flawed is near:
+        return fit
+    return structure.explained(rate_limit.started(flawed, check), disturbances, check, say)[0]
 
 
 def _undisturbed(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit | None:

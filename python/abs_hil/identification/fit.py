@@ -52,10 +52,10 @@ def other_costs(fit: Fit, disturbances: Disturbances, affected: Sequence[bool],
     problem = fit.problem
     settings = (_relative(problem, fit.values, fit.scale), disturbances, COUNT_VARIANCE * problem.radians_per_count**2)
     rest = filtered(problem, [piece for piece, hit in zip(fit.pieces, affected) if not hit], *settings)
-    inputs = [log.inputs() for log in problem.logs]
 
     def costs(values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray, float]:
         changed = []
+        inputs = [problem.flawed(number, values)[0].inputs() for number in range(len(problem.logs))]
         for piece, hit in zip(fit.pieces, affected):
             if hit:
                 other = _core.linearise(problem.base, problem.plant_values(values, piece.log), [], inputs[piece.log],

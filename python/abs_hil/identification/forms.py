@@ -17,9 +17,9 @@ CLEAR_AT_FIRST = 5000.0
 
 
 def better_form(fits: Sequence[Fit], start_form: str, check: Callable[[], None], say: Callable[[str], None],
-                notes: list[str]) -> Fit:
+                notes: list[str]) -> tuple[Fit, bool]:
     """The form that better predicts each log from all the others, by the likelihood. Large disturbances and first values
-    are enough if they show a clear difference already."""
+    are enough if they show a clear difference already. False: the logs do not tell, and the form is the start's."""
     costs = [_cross_validated(fit) for fit in fits]
     if abs(costs[0] - costs[1]) < CLEAR_AT_FIRST:
         for number, fit in enumerate(fits):
@@ -30,17 +30,16 @@ def better_form(fits: Sequence[Fit], start_form: str, check: Callable[[], None],
         if sum(follow) == 1:
             best = follow.index(True)
             notes.append(f'form: {fits[best].problem.form.meaning}; it alone follows the logs to the steps of the counts')
-            return fits[best]
+            return fits[best], True
     for fit, cost in zip(fits, costs):
         say(f'{fit.problem.form.meaning}: -2 log likelihood of left-out logs {cost:.6g}')
     best = int(np.argmin(costs))
     starts = [i for i, fit in enumerate(fits) if fit.problem.form.name == start_form]
     if abs(costs[0] - costs[1]) < CLEAR_DIFFERENCE and starts:
-        notes.append('the logs do not tell the form of tyre and load; it is that of the start. Run: slip-sweep or locked-stop')
-        return fits[starts[0]]
+        return fits[starts[0]], False
     notes.append(f'form: {fits[best].problem.form.meaning}; it predicts left-out logs better (-2 log likelihood lower by '
                  f'{abs(costs[0] - costs[1]):.3g})')
-    return fits[best]
+    return fits[best], True
 
 
 def _follows(fit: Fit, check: Callable[[], None]) -> bool:

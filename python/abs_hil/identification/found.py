@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from . import discs, intervals, rate_limit
+from . import discs, intervals, rate_limit, structure
 from .fit import describe
 from .logs import Log
-from .parameters import COMBINATIONS, DELAY, EXPERIMENTS, GIVEN, RATE_LIMIT, WHEELS
+from .parameters import COMBINATIONS, DELAY, EXPERIMENTS, FORMS, GIVEN, RATE_LIMIT, WHEELS
 from .problem import Disturbances, Fit, Problem
 
 #: an estimate whose standard deviation is above this share of its value is not called identified
@@ -38,7 +38,8 @@ class Estimate:
 
 @dataclass
 class Identified:
-    """What identify() found. parameters: by name with unit; notes: sentences about what the logs do not tell."""
+    """What identify() found. parameters: by name with unit; notes: sentences about what the logs do not tell; misfit: why the
+    logs give no model of the plant, empty if they do; undecided: they do not tell the form, which is then the start's."""
     form: str
     start: str
     parameters: dict[str, Estimate]
@@ -52,6 +53,8 @@ class Identified:
     disagreement: dict[str, float] = field(default_factory=dict)
     validation: dict[str, Any] | None = None
     interrupted: bool = False
+    misfit: str = ''
+    undecided: bool = False
 
     def values(self) -> dict[str, float]:
         """The plant's keys without "plant." and their values."""
@@ -60,13 +63,14 @@ class Identified:
 
 @dataclass
 class Finished:
-    """The last fit, what its intervals are made of, the disturbances if there are any, and the largest eccentricity of
-    the discs that no log shows."""
+    """The last fit, what its intervals are made of, the disturbances if there are any, the largest eccentricity of the
+    discs that no log shows, and what the disturbances have in common that the plant lacks."""
     fit: Fit
     spread: intervals.Spread
     gaps: list[tuple[float, float, float]]
     disturbances: Disturbances | None
     round_discs: dict[str, float]
+    causes: list[structure.Found] = field(default_factory=list)
 
 
 def interrupted(fit: Fit, start: str, notes: list[str]) -> Identified:
@@ -81,8 +85,25 @@ def interrupted(fit: Fit, start: str, notes: list[str]) -> Identified:
     return found
 
 
+def refuse(found: Identified, why: str, of_logs: list[str]) -> None:
+    """The logs do not fit the plant: the values are the last ones of the fit, and nothing is promised of them."""
+    found.misfit = why
+    found.notes[:] = [f'{why}{"" if why.endswith("?") else "."} So no interval is given and no model.toml is written', *of_logs]
+    without_intervals(found)
+
+
+def leave_form_open(found: Identified) -> None:
+    """The logs do not tell the form of tyre and load. What both forms share is kept."""
+    found.undecided = True
+    found.misfit = ('the logs do not tell the form of tyre and load. Run: slip-sweep or locked-stop, or name it with --form')
+    found.notes.insert(0, f'{found.misfit}. The tyre has no interval, and no model.toml is written')
+    for p in FORMS[found.form].tyre:
+        found.parameters[p.key].status = 'not-identifiable'
+        found.parameters[p.key].low = found.parameters[p.key].high = None
+    found.combinations.pop('theta_B_C_N', None)
+
+
 def without_intervals(found: Identified) -> None:
-    """The values are the last ones of the fit; nothing is promised of them."""
     for estimate in found.parameters.values():
         if estimate.status != 'fixed':
             estimate.status, estimate.low, estimate.high = 'not-identifiable', None, None
@@ -248,12 +269,3 @@ def name_disagreement(found: Identified) -> None:
         if kept.any():
             z = (vectors.T @ (d * nl[told]))[kept] / np.sqrt(values[kept])
             found.disagreement[log.name] = float(z @ z / kept.sum())
-    odd = {name: ratio for name, ratio in found.disagreement.items() if ratio > LARGEST_DISAGREEMENT}
-    if odd:
-        worst = max(odd, key=lambda name: odd[name])
-        found.notes.append(f'the logs disagree: {worst} most (chi-square per degree of freedom {odd[worst]:.3g}, expected '
-                           '1); is it of another rig, has something changed between the logs, or does the brake fade '
-                           '(--drift brake_torque)? So no interval is given')
-        for estimate in (*found.parameters.values(), *found.combinations.values()):
-            if estimate.status != 'fixed':
-                estimate.status, estimate.low, estimate.high = 'not-identifiable', None, None

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from ..core import _core
-from .parameters import DELAY, WHEELS, disc_of
+from .brake_flaws import amounts
+from .parameters import DEAD_TIME, DELAY, WHEELS, disc_of
 from .problem import COUNT_VARIANCE, Disturbances, Fit, Move, Piece, Problem
 
 #: largest change of a parameter in one iteration, over its size
@@ -16,6 +17,8 @@ LARGEST_STEP = 0.3
 #: plant, and not exact to less
 LARGEST_RISE = 10.0
 MOST_HALVINGS = 6
+#: the disturbance that is a factor over the brake's torque
+BRAKE_FACTOR = 1
 #: how far a piece's first state may move in one iteration: angles, speeds, brake torque
 NEAR_SD = np.array([0.005, 0.005, 0.5, 0.5, 0.1])
 
@@ -36,16 +39,21 @@ def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Pi
         if p.key == DELAY:
             size = 1e-5
         steps.append(size if values[p.key] + size <= p.most else -size)
-    for number, log in enumerate(problem.logs):
+    for number in range(len(problem.logs)):
+        log, brake = problem.flawed(number, values)
         inputs = log.inputs()
         there = problem.columns(number)
-        simulated = np.array([problem.parameters[i].acts != 'reading' for i in there])
+        simulated = np.array([problem.parameters[i].acts not in ('reading', 'flaw') for i in there])
         nominal = problem.plant_values(values, number)
         moved = []
         for i in there[simulated]:
             p = problem.parameters[i]
             other = problem.plant_values({**values, p.key: values[p.key] + steps[i]}, number)
             moved.append((other, steps[i] / scale[i], p.acts))
+        if DEAD_TIME.key in problem.flaws:  # the derivative by a delay of the brake alone
+            later = {**values, DELAY: values.get(DELAY, 0.0) + 1e-5}
+            moved.append((problem.plant_values(later, number), 1e-5, 'brake'))
+        amount = amounts(log, problem.motions[number], brake) if problem.flaws else {}
         for piece in pieces:
             if piece.log != number:
                 continue
@@ -53,13 +61,34 @@ def linearise(problem: Problem, values: Mapping[str, float], pieces: Sequence[Pi
             piece.linear = _core.linearise(problem.base, nominal, moved, inputs, piece.first, piece.states)
             piece.columns = there
             if not simulated.all():
-                for name in ('by_parameter', 'end_by_parameter'):
-                    few = piece.linear[name]
-                    piece.linear[name] = np.zeros((*few.shape[:2], len(there)))
-                    piece.linear[name][:, :, simulated] = few
+                few = {name: piece.linear[name] for name in ('by_parameter', 'end_by_parameter')}
+                for name, simulated_ones in few.items():
+                    piece.linear[name] = np.zeros((*simulated_ones.shape[:2], len(there)))
+                    piece.linear[name][:, :, simulated] = simulated_ones[:, :, :simulated.sum()]
+                _by_flaws(problem, values, scale, piece, amount, {name: one[:, :, -1] for name, one in few.items()})
                 _read_by_discs(problem, scale, piece)
             _measure(problem, values, piece)
     return scale
+
+
+def by_windows(piece: Piece, per_row: np.ndarray) -> np.ndarray:
+    """The mean of a log's rows in each window, shape (windows,)."""
+    first = piece.first - piece.first[0]
+    return np.asarray(np.add.reduceat(per_row[piece.rows], first[:-1]) / np.diff(first))
+
+
+def _by_flaws(problem: Problem, values: Mapping[str, float], scale: np.ndarray, piece: Piece, amount: Mapping[str, np.ndarray],
+              by_delay: Mapping[str, np.ndarray]) -> None:
+    """Derivatives by the brake's flaws, from those by its torque and by a delay. A flaw acts alike within a window."""
+    keys = [p.key for p in problem.parameters]
+    torque = _relative(problem, values, scale)[BRAKE_FACTOR, piece.columns]
+    lengths = np.diff(piece.first)
+    for key in problem.flaws:
+        column = int(np.flatnonzero(piece.columns == keys.index(key))[0])
+        share = scale[keys.index(key)] * by_windows(piece, amount[key])
+        for name, of in (('by_parameter', np.repeat(share, lengths)), ('end_by_parameter', share)):
+            by = by_delay[name] if key == DEAD_TIME.key else piece.linear[name] @ torque
+            piece.linear[name][:, :, column] = of[:, None] * by
 
 
 def _read_by_discs(problem: Problem, scale: np.ndarray, piece: Piece) -> None:

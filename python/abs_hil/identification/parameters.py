@@ -56,6 +56,11 @@ _LEVER = (
 )
 #: the fastest change of the brake's torque; fitted where the logs show one
 RATE_LIMIT = Parameter('brake_rate_limit_Nm_s', 'N m/s', 'brake', 'locked-stop or pulses', least=0.5, most=9e5)
+#: flaws of the brake (brake_flaws.py); fitted where the logs show them. The prior is wide: it must not hold them at 0
+FADING = Parameter('brake_fading_per_J', '1/J', 'flaw', '', floor=1e-4, most=0.1, prior=20.0)
+HYSTERESIS = Parameter('brake_hysteresis', '1', 'flaw', '', floor=0.05, most=0.5, prior=20.0)
+DEAD_TIME = Parameter('brake_dead_time_s', 's', 'flaw', '', floor=1e-3, most=0.05, prior=20.0)
+FLAWS = (FADING, HYSTERESIS, DEAD_TIME)
 WHEELS = ('upper', 'lower')
 
 
@@ -81,6 +86,11 @@ class Form:
     settings: Mapping[str, str]
     parameters: tuple[Parameter, ...]
     road: tuple[str, ...]
+
+    @property
+    def tyre(self) -> tuple[Parameter, ...]:
+        """What no other form has."""
+        return tuple(p for p in self.parameters if p not in _SHARED)
 
 
 FORMS = {

@@ -10,8 +10,9 @@ import numpy as np
 
 from ..core import _core
 from ..options import options
+from .brake_flaws import act, with_flaws
 from .logs import Log, Motion, motion_of, segments_of
-from .parameters import DELAY, RATE_LIMIT, Form, Parameter, base_options, disc_of
+from .parameters import DELAY, FLAWS, RATE_LIMIT, Form, Parameter, base_options, disc_of
 from .start import brake_torques
 
 #: an even distribution within one count, counts^2
@@ -55,7 +56,8 @@ class Piece:
 
 @dataclass
 class Problem:
-    """All logs, and the plant's form with what is fixed. `discs` names the wheels whose encoders may be eccentric."""
+    """All logs, and the plant's form with what is fixed. `discs` names the wheels whose encoders may be eccentric, `flaws` the
+    keys of the brake's flaws that are fitted."""
     form: Form
     base: Any
     logs: Sequence[Log]
@@ -68,6 +70,7 @@ class Problem:
     with_delay: bool = False
     with_rate_limit: bool = False
     discs: tuple[str, ...] = ()
+    flaws: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, form: Form, start: Any, logs: Sequence[Log], fixed: Mapping[str, float | None],
@@ -89,7 +92,8 @@ class Problem:
         factors = tuple(Parameter(key, '1', 'brake', '') for key in self.factors) if self.drifts else ()
         limit = (RATE_LIMIT,) if self.with_rate_limit else ()
         discs = tuple(p for log in range(len(self.logs)) for wheel in self.discs for p in disc_of(wheel, log))
-        return self.form.parameters + limit + factors + discs + delay
+        flaws = tuple(flaw for flaw in FLAWS if flaw.key in self.flaws)
+        return self.form.parameters + limit + factors + flaws + discs + delay
 
     def columns(self, log: int) -> np.ndarray:
         """Places of the parameters that act in one log."""
@@ -106,9 +110,14 @@ class Problem:
         """The plant of one log, as `_core` takes it."""
         factor = values[self.factors[log - 1]] if self.drifts and log > 0 else 1.0
         scaled = [(p.key, values[p.key] * (factor if p.key in ('b1_Nm', 'b2_Nm') else 1.0))
-                  for p in self.form.parameters]
+                  for p in self.form.parameters if p.key != 'u0']
+        scaled.append(('u0', 0.0 if act(values) else values['u0']))
         return [*self.given.items(), *scaled, (RATE_LIMIT.key, values.get(RATE_LIMIT.key, 0.0)),
                 (DELAY, values.get(DELAY, 0.0))]
+
+    def flawed(self, log: int, values: Mapping[str, float]) -> tuple[Log, Mapping[str, float]]:
+        """A log with the duties that a brake without flaws would need, and the values of that (brake_flaws.py)."""
+        return with_flaws(self.logs[log], self.motions[log], values)
 
     def disc_angles_rad(self, log: int, angles_rad: np.ndarray) -> np.ndarray:
         """Angles of the discs from their counters' zeros, shape (rows, 2)."""
@@ -181,7 +190,7 @@ def pieces_of(problem: Problem, values: Mapping[str, float], window_s: float) ->
     """Windows over every segment, with states from the counts and the brake's torque from the model."""
     pieces = []
     for number, (log, motion, segments) in enumerate(zip(problem.logs, problem.motions, problem.segments)):
-        torque = brake_torques(log, values)
+        torque = brake_torques(*problem.flawed(number, values))
         step = max(4, round(window_s / log.period_s))
         for begin, end in segments:
             count = max(1, (end - begin - 1) // step)

@@ -16,6 +16,7 @@ from .parameters import FORMS
 from .progress import Progress
 from .results import as_json, as_toml, validate, words
 
+MISFIT = 1
 INTERRUPTED = 130
 
 
@@ -54,7 +55,11 @@ def _fixed(texts: list[str]) -> dict[str, float | None]:
 
 
 def _write(found: Identified, o: argparse.Namespace, report: str | None) -> None:
-    files = {'identified.json': json.dumps(as_json(found), indent=1, allow_nan=False) + '\n', 'model.toml': as_toml(found)}
+    files = {'identified.json': json.dumps(as_json(found), indent=1, allow_nan=False) + '\n'}
+    if not (found.misfit or found.interrupted):
+        files['model.toml'] = as_toml(found)
+    else:
+        (o.out / 'model.toml').unlink(missing_ok=True)  # of an earlier fit: these logs do not bear it out
     if report is not None:
         files['report.html'] = report
     for name, text in files.items():
@@ -78,7 +83,7 @@ def _identify(o: argparse.Namespace) -> int:
         found = identify(o.logs, o.start, fix=fixed, drift=o.drift, form=o.form, seed=o.seed, say=say, check=progress.check)
     finally:
         progress.clear()
-    if o.validate and not found.interrupted:
+    if o.validate and not (found.interrupted or found.misfit):
         found.validation = validate(found, o.validate)
         say(f'{o.validate}: stop distance {found.validation["stop_distance_m"]:.5g} m, predicted '
             f'{found.validation["predicted_stop_distance_m"]:.5g} m')
@@ -87,13 +92,13 @@ def _identify(o: argparse.Namespace) -> int:
         from .advice import advise
         from .page import page
         say('what to run next')
-        report = page(found, advise(found, progress.check))
+        report = page(found, [] if found.misfit else advise(found, progress.check))
     progress.end()
     print('\n'.join(words(found)), flush=True)
     for note in found.notes:
         say(clean(note, 2000))
     _write(found, o, report)
-    return INTERRUPTED if found.interrupted else 0
+    return INTERRUPTED if found.interrupted else MISFIT if found.misfit else 0
 
 
 def main(arguments: list[str]) -> int:

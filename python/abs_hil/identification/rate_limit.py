@@ -84,9 +84,17 @@ def settle(fit: Fit, disturbances: Disturbances, check: Callable[[], None] = lam
     sd = float(np.sqrt(fit.covariance()[np.count_nonzero(fit.free[:at]), np.count_nonzero(fit.free[:at])]) * fit.scale[at])
     if sd < LEAST_SURE * value and value < fastest_Nm_s(fit, fit.problem.logs):
         return fit
-    fit = fit.copy(problem=dataclasses.replace(fit.problem, with_rate_limit=False),
-                   values={**fit.values, RATE_LIMIT.key: 0.0}, free=np.delete(fit.free, at))
+    fit = without(fit)
     for _ in range(4):
         if step(fit, disturbances, check) < CONVERGED:
             break
     return fit
+
+
+def without(fit: Fit) -> Fit:
+    """A copy of the fit in which the lag alone holds the brake's torque back."""
+    if not fit.problem.with_rate_limit:
+        return fit.copy()
+    at = fit.keys.index(RATE_LIMIT.key)
+    return fit.copy(problem=dataclasses.replace(fit.problem, with_rate_limit=False),
+                    values={**fit.values, RATE_LIMIT.key: 0.0}, free=np.delete(fit.free, at))

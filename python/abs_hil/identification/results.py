@@ -28,13 +28,14 @@ def as_json(found: Identified) -> dict[str, Any]:
         return {'value': estimate.value, 'low': estimate.low, 'high': estimate.high, 'status': estimate.status}
     return {'parameters': {name: row(e) for name, e in {**found.parameters, **found.combinations}.items()},
             'residual_counts_rms': found.residual_counts_rms,
-            'form': found.form,
+            'form': 'undecided' if found.undecided else found.form,
             'start': found.start,
             'disturbances': None if found.disturbances is None else {
                 'sd': found.disturbances.sd.tolist(), 'time_constant_s': float(found.disturbances.time_constant_s[0])},
             'logs': [{'name': log.name, 'path': str(log.path), 'sha256': log.sha256, 'rows': len(log),
                       'duration_s': float(log.time_s[-1] - log.time_s[0]),
                       'disagreement': found.disagreement.get(log.name)} for log in found.logs],
+            'misfit': found.misfit or None,
             'notes': found.notes,
             'validation': found.validation,
             'version': _core.version,

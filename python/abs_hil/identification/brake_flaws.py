@@ -1,0 +1,81 @@
+"""Flaws of the brake that the plant has (docs/plants.md) and that are fitted where the logs show them.
+
+Dead time d, fading k and hysteresis h change the torque that the duty u asks for, before the lag (6):
+
+    b(t)    static torque of u(t - d) by (7)
+    f(t)    b exp(-k E),  E the energy that the brake has taken since the log began, J
+    y(t)    f pulls y along only from outside of (1 - h) f ... (1 + h) f
+
+The fit simulates a brake without flaws and without u0 on the duties that ask for y: `with_flaws`. How its readings change
+with k and h follows from how they change with the torque, and with d from how they change with a delay: `amounts`.
+"""
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+
+from .logs import Log, Motion
+from .parameters import DEAD_TIME, FADING, FLAWS, HYSTERESIS
+from .start import brake_torques, static_torques
+
+
+def act(values: Mapping[str, float]) -> bool:
+    """Whether there are flaws, on a map that has a duty for each torque from 0 up."""
+    return any(values.get(flaw.key, 0.0) for flaw in FLAWS) and values['b1_Nm'] > 0.0 and values['b2_Nm'] < 0.0
+
+
+def with_flaws(log: Log, motion: Motion, values: Mapping[str, float]) -> tuple[Log, Mapping[str, float]]:
+    """The log with the brake's duties as a brake without flaws would need them, and the values of that brake: without u0,
+    below which a brake with flaws may well hold."""
+    if not act(values):
+        return log, values
+    target = _late(log, static_torques(log, values), values.get(DEAD_TIME.key, 0.0))
+    if fading := values.get(FADING.key, 0.0):
+        asked = target
+        for _ in range(3):  # the energy depends on the fading, weakly
+            target = asked * np.exp(-fading * energy_J(_asking(log, target, values), motion, {**values, 'u0': 0.0}))
+    if hysteresis := values.get(HYSTERESIS.key, 0.0):
+        target = _hanging(target, hysteresis)
+    return _asking(log, target, values), {**values, 'u0': 0.0}
+
+
+def amounts(log: Log, motion: Motion, values: Mapping[str, float]) -> dict[str, np.ndarray]:
+    """Of log and values as `with_flaws` gives them, at each row: by how much the torque's factor grows with k and h, and
+    whether the brake alone acts, so that a delay of the inputs is a dead time."""
+    static = static_torques(log, values)
+    alone = (log.motor_pwm == 0.0) & (static + brake_torques(log, values) > 0.0)
+    return {FADING.key: -energy_J(log, motion, values), HYSTERESIS.key: fallen(static), DEAD_TIME.key: alone.astype(float)}
+
+
+def energy_J(log: Log, motion: Motion, values: Mapping[str, float]) -> np.ndarray:
+    """What the brake has taken since the log began, at each row."""
+    power = brake_torques(log, values) * np.where(motion.stands[:, 0], 0.0, np.maximum(motion.speed_rad_s[:, 0], 0.0))
+    return np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(log.time_s))])
+
+
+def fallen(target: np.ndarray) -> np.ndarray:
+    """-1 from where the target rose last, 1 from where it fell last, 0 before either."""
+    change = np.sign(np.diff(target, prepend=target[0]))
+    return change[np.maximum.accumulate(np.where(change != 0, np.arange(len(change)), 0))] * -1.0
+
+
+def _asking(log: Log, target_Nm: np.ndarray, values: Mapping[str, float]) -> Log:
+    duty = (target_Nm - values['b2_Nm']) / values['b1_Nm']
+    return dataclasses.replace(log, brake_pwm=np.where(target_Nm > 0.0, duty, 0.0))
+
+
+def _late(log: Log, target: np.ndarray, dead_s: float) -> np.ndarray:
+    """The target of `dead_s` before. A part of a row is averaged: the lag is far longer than a row."""
+    whole, part = divmod(dead_s / log.period_s, 1.0)
+    rows = np.arange(len(target)) - int(whole)
+    return (1.0 - part) * target[np.maximum(rows, 0)] + part * target[np.maximum(rows - 1, 0)]
+
+
+def _hanging(target: np.ndarray, hysteresis: float) -> np.ndarray:
+    held, out = 0.0, []
+    for low, high in zip(((1.0 - hysteresis) * target).tolist(), ((1.0 + hysteresis) * target).tolist()):
+        held = min(max(held, low), high)
+        out.append(held)
+    return np.array(out)

@@ -1,0 +1,244 @@
+"""What the disturbances of a fit have in common: structure that the plant lacks, and its cause.
+
+A fit to a rig that the plant does not describe follows the logs all the same: its random factors take up what the plant
+lacks, and the parameters are wrong. But then the factors are not random. They follow something: the energy in the brake, the
+direction of its duty, a speed, an angle. For each such cause the plant's derivatives by a factor, times what the factor would
+follow, are one more column of the fit. Its coefficient c and standard deviation s come from the same filter, with the
+disturbances as noise and all parameters free: |c| / s is about 1 for a rig that wanders at random, whatever the cause.
+"""
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core import _core
+from .brake_flaws import energy_J, fallen
+from .fit import CONVERGED
+from .linear import _relative, by_windows, linearise, step
+from .parameters import DEAD_TIME, DELAY, FADING, HYSTERESIS
+from .problem import COUNT_VARIANCE, DISTURBANCES, Disturbances, Fit
+from .start import brake_torques, static_torques
+
+#: a cause is believed if its coefficient is this many standard deviations from 0
+SURE = 5.0
+#: a flaw is tried in place of a surer cause if it is this share as sure, and taken if that cause is then half as sure
+WORTH_A_TRY = 0.3
+STILL_THERE = 0.5
+
+
+@dataclass
+class Signals:
+    """What a cause may follow, at each row of a log."""
+    torque_Nm: np.ndarray
+    static_Nm: np.ndarray
+    most_Nm: float
+    energy_J: np.ndarray
+    omega_rad_s: np.ndarray
+    angle_rad: np.ndarray
+    sliding_m_s: np.ndarray
+    brakes_alone: np.ndarray
+    time_s: np.ndarray
+
+
+@dataclass(frozen=True)
+class Cause:
+    """acts: the disturbance that it would be (problem.DISTURBANCES), or the parameter; follows: what that would follow, at
+    each row, in `unit`; flaw: the parameter of the plant that describes it, if there is one."""
+    words: str
+    unit: str
+    acts: str
+    follows: Callable[[Signals], np.ndarray]
+    flaw: str = ''
+
+
+CAUSES = (
+    Cause('the brake gets weaker with the energy put in', 'per J', 'brake', lambda s: -s.energy_J, FADING.key),
+    Cause('the brake holds more after its duty fell than after it rose', 'of its torque', 'brake', lambda s: fallen(s.static_Nm),
+          HYSTERESIS.key),
+    Cause('the brake acts late', 's', DELAY, lambda s: s.brakes_alone, DEAD_TIME.key),
+    Cause('the brake lets go faster than it takes hold', 'of its lag', 'c31_per_s',
+          lambda s: (s.static_Nm < s.torque_Nm).astype(float)),
+    Cause("the brake's torque is no straight line of its duty", 'of its torque at the largest', 'brake',
+          lambda s: s.static_Nm / s.most_Nm),
+    Cause("the brake's torque changes with the upper wheel's speed", 'per rad/s', 'brake', lambda s: s.omega_rad_s[:, 0]),
+    Cause('the friction changes with the sliding speed', 'per m/s', 'road', lambda s: s.sliding_m_s),
+    Cause("the friction changes with the lower wheel's speed", 'per rad/s', 'road', lambda s: s.omega_rad_s[:, 1]),
+    Cause('the friction changes with time', 'per s', 'road', lambda s: s.time_s),
+    Cause("the friction follows the lower wheel's angle", 'at the sine', 'road', lambda s: np.sin(s.angle_rad[:, 1])),
+    Cause("the friction follows the lower wheel's angle", 'at the cosine', 'road', lambda s: np.cos(s.angle_rad[:, 1])),
+    Cause("the friction follows the upper wheel's angle", 'at the sine', 'road', lambda s: np.sin(s.angle_rad[:, 0])),
+    Cause("the friction follows the upper wheel's angle", 'at the cosine', 'road', lambda s: np.cos(s.angle_rad[:, 0])),
+    Cause('the motor changes with time', 'per s', 'motor', lambda s: s.time_s),
+    Cause("the upper wheel's bearing drags with the square of its speed", 'N m s^2', 'upper bearing',
+          lambda s: s.omega_rad_s[:, 0]**2),
+    Cause("the lower wheel's bearing drags with the square of its speed", 'N m s^2', 'lower bearing',
+          lambda s: s.omega_rad_s[:, 1]**2),
+)
+
+
+@dataclass
+class Found:
+    """A cause with its coefficient, and by how many standard deviations it moves the parameters."""
+    cause: Cause
+    coefficient: float
+    sd: float
+    shift: np.ndarray
+
+    @property
+    def sure(self) -> float:
+        return abs(self.coefficient) / self.sd
+
+
+def causes_of(fit: Fit, disturbances: Disturbances) -> list[Found]:
+    """Each cause that the problem has no parameter for, alone, surest first. Linearises a copy of the fit."""
+    if fit.problem.with_delay:
+        wide = fit.copy()
+    else:
+        wide = fit.copy(problem=dataclasses.replace(fit.problem, with_delay=True), values={**fit.values, DELAY: 0.0},
+                        free=np.append(fit.free, False))
+    wide.scale = linearise(wide.problem, wide.values, wide.pieces)
+    causes = [one for one in CAUSES if one.flaw not in wide.problem.flaws]
+    N, n = _normals(wide, disturbances, causes)
+    size = len(wide.scale)
+    precision, towards = wide.prior()
+    N[np.arange(size), np.arange(size)] += precision
+    n[:size] += towards
+    free = np.flatnonzero(wide.free)
+    without, _ = _solved(N, n, free)
+    out = []
+    for number, cause in enumerate(causes):
+        place = size + number
+        if not N[place, place] > 0.0:
+            continue  # nothing in these logs would show it
+        with_it, covariance = _solved(N, n, np.append(free, place))
+        shift = np.zeros(size)
+        shift[free] = with_it[:-1] - without
+        out.append(Found(cause, float(with_it[-1]), float(np.sqrt(covariance[-1, -1])), shift[:len(fit.scale)]))
+    return sorted(out, key=lambda one: -one.sure)
+
+
+def _solved(N: np.ndarray, n: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    d = 1 / np.sqrt(np.diag(N)[at])
+    covariance = np.linalg.inv(N[np.ix_(at, at)] * np.outer(d, d)) * np.outer(d, d)
+    return covariance @ n[at], covariance
+
+
+def _signals(fit: Fit, number: int, most_Nm: float) -> Signals:
+    problem, values = fit.problem, fit.values
+    (log, brake), motion = problem.flawed(number, values), problem.motions[number]
+    torque, static = brake_torques(log, brake), static_torques(log, brake)
+    omega = np.where(motion.stands, 0.0, motion.speed_rad_s)
+    sliding = np.abs(problem.given['r2_m'] * omega[:, 1] - values['r1_m'] * omega[:, 0])
+    alone = ((log.motor_pwm == 0.0) & (static + torque > 0.0)).astype(float)
+    return Signals(torque, static, most_Nm, energy_J(log, motion, brake), omega, motion.smooth_rad, sliding, alone,
+                   log.time_s - log.time_s[0])
+
+
+def _normals(fit: Fit, disturbances: Disturbances, causes: Sequence[Cause]) -> tuple[np.ndarray, np.ndarray]:
+    """The normal equations with a column for each cause behind the parameters'."""
+    problem, keys = fit.problem, fit.keys
+    way = _relative(problem, fit.values, fit.scale)
+    most = max(max(float(static_torques(log, fit.values).max()) for log in problem.logs), 1e-9)
+    signals = [_signals(fit, number, most) for number in range(len(problem.logs))]
+    follows = [[cause.follows(one) for cause in causes] for one in signals]
+    directions = np.zeros((len(keys), len(causes)))
+    for number, cause in enumerate(causes):
+        if cause.acts in DISTURBANCES:
+            directions[:, number] = way[DISTURBANCES.index(cause.acts)]
+        else:
+            i = keys.index(cause.acts)
+            directions[i, number] = 1.0 / fit.scale[i] if cause.acts == DELAY else fit.values[cause.acts] / fit.scale[i]
+    size = len(keys)
+    N, n = np.zeros((size + len(causes),) * 2), np.zeros(size + len(causes))
+    for piece in fit.pieces:
+        at, linear = piece.columns, dict(piece.linear)
+        share = np.stack([by_windows(piece, per_row) for per_row in follows[piece.log]], axis=1)
+        rows = np.repeat(share, np.diff(piece.first), axis=0)
+        for name, of in (('by_parameter', rows), ('end_by_parameter', share)):
+            more = linear[name] @ directions[at] * of[:, None, :]
+            linear[name] = np.ascontiguousarray(np.concatenate([linear[name], more], axis=2))
+        linear.update(_core.condense(linear))
+        wider = np.concatenate([way[:, at], np.zeros((len(way), len(causes)))], axis=1)
+        part, right, *_ = _core.filter_pieces([linear], np.ascontiguousarray(wider), disturbances.sd,
+                                              disturbances.time_constant_s, COUNT_VARIANCE * problem.radians_per_count**2)[0]
+        place = np.concatenate([at, size + np.arange(len(causes))])
+        N[np.ix_(place, place)] += part
+        n[place] += right[:, 0]
+    return N, n
+
+
+def explained(fit: Fit, disturbances: Disturbances, check: Callable[[], None],
+              say: Callable[[str], None]) -> tuple[Fit, list[Found]]:
+    """The fit with those flaws of the brake that explain what the disturbances have in common, and the causes that are left,
+    surest first: none of them is in the plant."""
+    while True:
+        check()
+        causes = causes_of(fit, disturbances)
+        left = [one for one in causes if one.sure > SURE]
+        better = _with_a_flaw(fit, causes, disturbances, check) if left else None
+        if better is None:
+            return fit, left
+        fit, taken = better
+        say(f'{taken.words}: fitted as {taken.flaw} = {fit.values[taken.flaw]:.3g}')
+
+
+def _with_a_flaw(fit: Fit, causes: Sequence[Found], disturbances: Disturbances,
+                 check: Callable[[], None]) -> tuple[Fit, Cause] | None:
+    surest = causes[0]
+    for one in causes:
+        if not one.cause.flaw or not one.coefficient > 0.0 or one.sure < max(SURE, WORTH_A_TRY * surest.sure):
+            continue
+        flawed = _with_flaw(fit, one, disturbances, check)
+        if flawed is None:
+            continue
+        if one is surest or all(other.cause is not surest.cause or other.sure < STILL_THERE * surest.sure
+                                for other in causes_of(flawed, disturbances)):
+            return flawed, one.cause
+    return None
+
+
+def _with_flaw(fit: Fit, found: Found, disturbances: Disturbances, check: Callable[[], None]) -> Fit | None:
+    """The fit with one more flaw; None if it is not there after all."""
+    key = found.cause.flaw
+    problem = dataclasses.replace(fit.problem, flaws=(*fit.problem.flaws, key))
+    at = [p.key for p in problem.parameters].index(key)
+    value = min(found.coefficient, 0.9 * problem.parameters[at].most)
+    flawed = fit.copy(problem=problem, values={**fit.values, key: value}, free=np.insert(fit.free, at, True), moved=None)
+    for _ in range(6):
+        if step(flawed, disturbances, check) < CONVERGED:
+            break
+    place = np.count_nonzero(flawed.free[:at])
+    sd = float(np.sqrt(flawed.covariance()[place, place]) * flawed.scale[at])
+    return flawed if flawed.values[key] > SURE * sd else None
+
+
+def sentence(causes: Sequence[Found], fit: Fit) -> str:
+    """What does not fit, where it shows most, and what that means."""
+    surest = causes[0]
+    log, phase = _where(surest.cause, fit)
+    also = ', '.join(dict.fromkeys(one.cause.words for one in causes[1:3] if one.cause.words != surest.cause.words))
+    return (f'the logs do not fit this plant: {surest.cause.words} ({surest.coefficient:.3g} {surest.cause.unit}, '
+            f'{surest.sure:.0f} standard deviations from none), most in {log}{f", phase {phase}" if phase else ""}. The plant '
+            f'has no parameter for it{f"; {also} would show so as well" if also else ""}')
+
+
+def _where(cause: Cause, fit: Fit) -> tuple[str, str]:
+    """The log and its phase that say most of a cause."""
+    weight: dict[tuple[str, str], float] = {}
+    most = max(max(float(static_torques(log, fit.values).max()) for log in fit.problem.logs), 1e-9)
+    turning = [np.zeros(len(log), dtype=bool) for log in fit.problem.logs]
+    for piece in fit.pieces:
+        turning[piece.log][piece.rows] = True
+    for number, log in enumerate(fit.problem.logs):
+        signals = _signals(fit, number, most)
+        follows = cause.follows(signals) * turning[number]
+        if cause.acts in ('brake', 'c31_per_s', DELAY):
+            follows = follows * (signals.torque_Nm > 0.0)
+        if cause.acts == 'road':
+            follows = follows * (log.wheels_apart == 0.0)
+        for phase in dict.fromkeys(log.phase):
+            weight[log.name, str(phase)] = float(np.sum(follows[log.phase == phase]**2) * log.period_s)
+    return max(weight, key=lambda place: weight[place])

@@ -1,0 +1,100 @@
+"""abs_hil.identify on rigs with a brake or tyre of their own: it finds what the plant has, and refuses the rest by name."""
+import pathlib
+import sys
+import tomllib
+
+import numpy as np
+import pytest
+
+import abs_hil
+from abs_hil.identification import program
+from abs_hil.identification.advice import log_of
+from abs_hil.identification.results import as_toml
+
+sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / 'research'))
+from other_rig import driven  # noqa: E402
+
+START = 'paper-timing'
+EXPERIMENTS = ('lifted', 'duty-ramp', 'locked-stop', 'pulses')
+VALUES = {name.removeprefix('plant.'): row['value'] for name, row in abs_hil.keys(plant=START).items()
+          if name.startswith('plant.')}
+TRUTH = VALUES | {'theta_N': 44.0, 'J1_kg_m2': 8.0e-3, 'c31_per_s': 21.5, 'u0': 0.41, 'b2_Nm': 0.1 - VALUES['b1_Nm'] * 0.41}
+SETTINGS = {f'plant.{key}': value for key, value in TRUTH.items()}
+
+
+def wandering(random):
+    """Factors over friction, brake and motor: straight lines between values every 0.2 s."""
+    out = {}
+    for name, sd in (('friction', 0.01), ('brake_torque', 0.01), ('motor_torque', 0.005)):
+        values = 1 + sd * random.standard_normal(300)
+        pieces = [f'{value:.6f} from {0.2 * i:.1f} to {0.2 * i + 0.2:.1f}' for i, value in enumerate(values[1:])]
+        out[f'plant.{name}_profile'] = 'time: ' + '; '.join([f'{values[0]:.6f}', *pieces])
+    return out
+
+
+def logs_of(flaws, seed, more=()):
+    random = np.random.default_rng(seed)
+    return [log_of(name, SETTINGS | flaws | wandering(random), random.uniform(size=2)) for name in (*EXPERIMENTS, *more)]
+
+
+def others(seed, **lacks):
+    """Logs of a rig that shares no line with the simulator and wanders."""
+    random = np.random.default_rng(seed)
+    return [driven(log_of(name, SETTINGS), TRUTH, random, **lacks) for name in EXPERIMENTS]
+
+
+def identify(logs):
+    return abs_hil.identify(logs, START, form='magic-formula')
+
+
+def holds(found, name, truth):
+    estimate = found.parameters[name]
+    assert estimate.status in ('identified', 'bounded'), name
+    # Three half widths, so that a right interval of 95 % does not fail by chance.
+    assert abs(estimate.value - truth) < 1.5 * (estimate.high - estimate.low), name
+
+
+@pytest.mark.parametrize('flaws', [{'brake_fading_per_J': 2.5e-4, 'brake_dead_time_s': 3e-3}, {'brake_hysteresis': 0.08}])
+def test_flaws_of_the_brake_are_found_on_a_rig_that_wanders(flaws, tmp_path):
+    # Hysteresis shows where a duty falls while the brake holds on.
+    found = identify(logs_of({f'plant.{key}': value for key, value in flaws.items()}, 1, ['slip-sweep']))
+    assert not found.misfit, found.misfit
+    assert set(found.fit.problem.flaws) == set(flaws)
+    for key, value in flaws.items():
+        assert found.parameters[key].value == pytest.approx(value, rel=0.15), key
+    for key in (*flaws, 'theta_N', 'J1_kg_m2', 'c31_per_s', 'b1_Nm'):
+        holds(found, key, (TRUTH | flaws)[key])
+    file = tmp_path / 'model.toml'
+    file.write_text(as_toml(found))
+    plant = tomllib.loads(file.read_text())['plant']
+    assert all(plant[key] == found.parameters[key].value for key in flaws)
+    # As a plant and as a controllers' model, which has no such keys.
+    assert abs_hil.simulate(plant=file, model=file).summary['stop_distance_m'] > 1.0
+
+
+def test_a_rig_that_wanders_at_random_has_no_flaws():
+    for logs in (logs_of({}, 2), others(3)):
+        found = identify(logs)
+        assert not found.misfit, found.misfit
+        assert found.fit.problem.flaws == ()
+        for key in ('theta_N', 'J1_kg_m2', 'c31_per_s', 'b1_Nm'):
+            holds(found, key, TRUTH[key])
+
+
+def test_a_brake_with_two_lags_is_refused_by_name(tmp_path, monkeypatch, capsys):
+    logs = others(4, release=1.5)
+    found = identify(logs)
+    assert 'the brake lets go faster than it takes hold' in found.misfit
+    assert any(log.name in found.misfit for log in logs)
+    assert all(estimate.low is None for estimate in found.parameters.values() if estimate.status != 'fixed')
+    # The program says so, by its status too, and leaves no model behind, not even an older one.
+    monkeypatch.setattr(program, 'identify', lambda *_, **__: found)
+    (tmp_path / 'model.toml').write_text('an older one')
+    assert program.main(['any', '--no-report', '--force', '--out', str(tmp_path)]) == program.MISFIT
+    assert 'the brake lets go faster than it takes hold' in capsys.readouterr().err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['identified.json']
+
+
+def test_friction_that_falls_with_the_sliding_speed_is_refused_by_name():
+    found = identify(others(5, by_sliding_s_m=0.02))
+    assert 'the friction changes with the sliding speed (-0.0' in found.misfit

@@ -1,0 +1,92 @@
+#!/usr/bin/env python3
+"""usage: flawed_rigs.py [--rigs N] [--seed N] [--jobs N] [--check]
+
+Tries abs_identify on rigs with features that a fit lacks or has, N of each kind, with parameters within 15 % of the plant's
+(those of identification_study.py) and the logs of five experiments. All but those called quiet wander. Prints for each kind
+how many were refused and for what cause, how many intervals of 95 % hold the truth, and how many forms are right.
+--check: status 1 unless, of the intervals given, 90 % hold, all forms are right or undecided, and each refusal names the cause.
+"""
+import argparse
+import os
+import sys
+from concurrent.futures import ProcessPoolExecutor
+
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+import numpy as np  # noqa: E402
+from identification_study import EXPERIMENTS, drawn, values_of, wandering  # noqa: E402
+from other_rig import driven  # noqa: E402
+
+import abs_hil  # noqa: E402
+from abs_hil.identification.advice import log_of  # noqa: E402
+
+FLAWS = {'fading': ('brake_fading_per_J', 1e-4, 4e-4), 'dead time': ('brake_dead_time_s', 1e-3, 6e-3),
+         'hysteresis': ('brake_hysteresis', 0.03, 0.12), 'rate limit': ('brake_rate_limit_Nm_s', 60.0, 140.0),
+         'eccentric disc': ('upper_encoder_eccentricity_rad', 1e-3, 4e-3)}
+#: of rigs with equations of their own: arguments of other_rig.driven, and the words that a refusal must hold
+OTHERS = {'two lags': ({'release': 1.5}, 'lets go faster'),
+          'friction by sliding speed': ({'by_sliding_s_m': 0.02}, 'changes with the sliding speed')}
+#: features of each kind, joined by " + "
+KINDS = ('', 'fading', 'dead time', 'hysteresis', 'rate limit', 'eccentric disc', 'fading + dead time', 'hysteresis + rate limit',
+         'fading + dead time + hysteresis + rate limit + eccentric disc', 'quiet', 'quiet + fading', 'quiet + dead time')
+KINDS_OF_OTHERS = ('other', 'two lags', 'friction by sliding speed', 'two lags + quiet')
+
+
+def one(plant, kind, seed):
+    """(form is right or undecided, intervals that hold, intervals, misfit, the cause that it must name)."""
+    random = np.random.default_rng([seed, *f'{plant} {kind}'.encode()])
+    features = [word for word in kind.split(' + ') if word]
+    form, truth, _ = drawn(plant, random, 0.15)
+    for word in features:
+        if word in FLAWS:
+            key, low, high = FLAWS[word]
+            truth[key] = random.uniform(low, high)
+    if 'eccentric disc' in features:
+        truth['upper_encoder_phase_rad'] = random.uniform(-3, 3)
+    settings = {f'plant.{key}': value for key, value in {**values_of(plant), **truth}.items()}
+    lacks = {key: value for word in features if word in OTHERS for key, value in OTHERS[word][0].items()}
+    by_others = bool(lacks) or 'other' in features
+    logs = []
+    for name in EXPERIMENTS:
+        quiet = 'quiet' in features or by_others
+        log = log_of(name, settings if quiet else {**settings, **wandering(60.0, random)}, random.uniform(size=2))
+        if by_others:
+            values = {key.removeprefix('plant.'): value for key, value in settings.items()}
+            log = driven(log, values, random, wander=0.0 if 'quiet' in features else 1.0, **lacks)
+        logs.append(log)
+    found = abs_hil.identify(logs, plant, seed=seed)
+    held = [e.low <= truth[key] <= e.high for key, e in found.parameters.items() if key in truth and e.low is not None]
+    cause = next((OTHERS[word][1] for word in features if word in OTHERS), '')
+    return found.undecided or found.form == form.name, sum(held), len(held), found.misfit, cause
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--rigs', type=int, default=3)
+    parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--jobs', type=int, default=os.cpu_count())
+    parser.add_argument('--check', action='store_true')
+    o = parser.parse_args()
+    kinds = [(plant, kind) for kind in KINDS for plant in ('paper-timing', 'inteco-manual')]
+    kinds += [('paper-timing', kind) for kind in KINDS_OF_OTHERS]
+    wrong, held, given = [], 0, 0
+    with ProcessPoolExecutor(o.jobs) as pool:
+        jobs = [(kind, [pool.submit(one, *kind, o.seed + i) for i in range(o.rigs)]) for kind in kinds]
+        print('| plant | features | right form | refused | intervals that hold |\n|---|---|---|---|---|', flush=True)
+        for (plant, kind), runs in jobs:
+            rows = [run.result() for run in runs]
+            for number, (right, _, _, misfit, cause) in enumerate(rows):
+                if not right or bool(misfit) != bool(cause) or cause not in misfit:
+                    wrong.append(f'{plant}, {kind or "none"}, seed {o.seed + number}: '
+                                 f'{"" if right else "wrong form; "}{misfit or "not refused"}')
+            hold, of = sum(row[1] for row in rows), sum(row[2] for row in rows)
+            held, given = held + hold, given + of
+            print(f'| `{plant}` | {kind or "none"} | {sum(row[0] for row in rows)} of {len(rows)} | '
+                  f'{sum(bool(row[3]) for row in rows)} | {f"{hold} of {of}" if of else "–"} |', flush=True)
+    print(f'\n{held} of {given} intervals hold: {100 * held / max(given, 1):.1f} %')
+    print('\n'.join(wrong))
+    if o.check and (wrong or held < 0.9 * given):
+        sys.exit(1)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,66 @@
+"""A rig by equations of its own, in Python, with a brake or a tyre that the plant lacks (docs/identification.md).
+
+Wheels: J1 w1' = r1 F - T - M10 - d1 w1,  J2 w2' = M - r2 F - M20 - d2 w2. Magic formula under a constant load:
+F = theta sin(C atan(B s)), s = (r2 w2 - r1 w1) / max(r2 w2, r1 w1). Brake: T' = c31 (b(u) - T). Motor:
+M = stall u (1 - w2 / no-load).
+It shares no line with plant_sim, and takes half a millisecond a step (midpoint rule).
+"""
+import dataclasses
+import math
+
+import numpy as np
+
+#: of friction, brake, motor, upper and lower bearing: standard deviation of the factors, in straight lines over WANDER_S
+WANDER = (0.01, 0.01, 0.005, 0.05, 0.05)
+WANDER_S = 0.2
+STEP_S = 5e-4
+PER_COUNT_RAD = 2 * math.pi / 4096
+
+
+def driven(log, values, random, wander=1.0, release=1.0, by_sliding_s_m=0.0):
+    """The log whose duties drive such a rig, with other counts.
+
+    values: the plant's keys; wander: over WANDER; release: how much faster the brake lets go than it takes hold;
+    by_sliding_s_m: by how much of itself the friction falls for each m/s between the wheels' surfaces
+    """
+    v = values
+    angle1, angle2 = random.uniform(size=2) * PER_COUNT_RAD
+    moved = (log.counts[40] - log.counts[0]) * PER_COUNT_RAD / (log.time_s[40] - log.time_s[0])
+    w1, w2 = (float(speed) if moved[1] > 1.0 else 0.0 for speed in moved)
+    torque = 0.0
+    places = int(log.time_s[-1] / WANDER_S) + 3
+    factors = [1 + wander * sd * random.standard_normal(places) for sd in WANDER]
+
+    def rates(w1, w2, torque, brake, motor, apart, factor):
+        target = max(0.0, v['b1_Nm'] * brake + v['b2_Nm']) * factor[1] if brake >= v['u0'] else 0.0
+        speed1, speed2 = v['r1_m'] * w1, v['r2_m'] * w2
+        force, fastest = 0.0, max(abs(speed1), abs(speed2))
+        if not apart and fastest > 0.02:
+            theta = v['theta_N'] * factor[0] * (1 - by_sliding_s_m * abs(speed2 - speed1))
+            force = theta * math.sin(v['C'] * math.atan(v['B'] * (speed2 - speed1) / fastest))
+        drive = v['motor_stall_torque_Nm'] * factor[2] * motor * (1 - w2 / v['motor_no_load_speed_rad_s'])
+        held1 = torque + factor[3] * (v['M10_Nm'] + v['d1_Nms_rad'] * w1)
+        held2 = factor[4] * (v['M20_Nm'] + v['d2_Nms_rad'] * w2)
+        push1, push2 = v['r1_m'] * force, drive - v['r2_m'] * force
+        return (0.0 if w1 <= 1e-9 and push1 <= held1 else (push1 - held1) / v['J1_kg_m2'],
+                0.0 if w2 <= 1e-9 and push2 <= held2 else (push2 - held2) / v['J2_kg_m2'],
+                v['c31_per_s'] * (release if target < torque else 1.0) * (target - torque))
+
+    counts = np.zeros((len(log), 2))
+    for row in range(len(log)):
+        counts[row] = math.floor(angle1 / PER_COUNT_RAD), math.floor(angle2 / PER_COUNT_RAD)
+        if row + 1 == len(log):
+            break
+        interval = log.time_s[row + 1] - log.time_s[row]
+        steps = max(1, round(interval / STEP_S))
+        h = interval / steps
+        place, part = divmod(log.time_s[row] / WANDER_S, 1.0)
+        factor = [one[int(place)] * (1 - part) + one[int(place) + 1] * part for one in factors]
+        acts = log.brake_pwm[row], log.motor_pwm[row], log.wheels_apart[row] != 0, factor
+        for _ in range(steps):
+            a = rates(w1, w2, torque, *acts)
+            b = rates(w1 + 0.5 * h * a[0], w2 + 0.5 * h * a[1], torque + 0.5 * h * a[2], *acts)
+            angle1 += h * (w1 + 0.5 * h * a[0])
+            angle2 += h * (w2 + 0.5 * h * a[1])
+            w1, w2, torque = max(0.0, w1 + h * b[0]), max(0.0, w2 + h * b[1]), max(0.0, torque + h * b[2])
+    return dataclasses.replace(log, counts=counts - counts[0], first_counts=counts[0])
