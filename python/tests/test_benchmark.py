@@ -262,3 +262,12 @@ def test_a_controller_from_an_fmu(tmp_path):
     for from_file, built_in in zip(of_fmu.rows, of_program.rows):
         assert from_file['fault'] == ''
         assert from_file['stop_distance_m'] == pytest.approx(built_in['stop_distance_m'], rel=2e-2)
+
+
+def test_a_class_is_found_in_the_present_folder(tmp_path, monkeypatch):
+    (tmp_path / 'law_of_this_folder.py').write_text('class Law:\n    pass\n')
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, 'path', [folder for folder in sys.path if folder != ''])
+    assert type(Entry('law_of_this_folder:Law', {}).made()).__name__ == 'Law'
+    with pytest.raises(ValueError, match='in this folder or on PYTHONPATH'):
+        Entry('law_of_no_folder:Law', {}).made()

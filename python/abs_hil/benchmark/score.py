@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import importlib
+import sys
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -32,11 +33,13 @@ class Entry:
     def made(self) -> Any:
         """A new object of the class. Raises ValueError."""
         module, _, name = self.name.partition(':')
+        if '' not in sys.path:
+            sys.path.append('')  # the folder in which the program was started, as of `python -m`
         try:
             return getattr(importlib.import_module(module), name)()
         except (ImportError, AttributeError, TypeError) as error:
             raise ValueError(f'controller "{self.name}": {error}; give MODULE:CLASS, a class that is made without '
-                             'arguments, on PYTHONPATH') from None
+                             'arguments, in this folder or on PYTHONPATH') from None
 
 
 def _runs(entry: Entry, cases: Sequence[Case], seeds: Sequence[int]) -> list[dict[str, Any]]:
