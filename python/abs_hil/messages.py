@@ -10,21 +10,20 @@ from __future__ import annotations
 
 import importlib
 import json
-import pathlib
 import pkgutil
 from typing import Any
 
-_FOLDER = pathlib.Path(__file__).parent
+from .places import folders, place_of
 
 #: name -> class of every message type
 TYPES: dict[str, Any] = {}
-for _module in pkgutil.iter_modules([str(_FOLDER)]):
+for _module in pkgutil.iter_modules(folders()):
     if _module.name.endswith('_t'):
         TYPES[_module.name] = getattr(importlib.import_module(f'.{_module.name}', __package__), _module.name)
 
 
 def _table(name: str, key: str) -> dict[Any, dict[str, Any]]:
-    rows = json.loads((_FOLDER / name).read_text(encoding='utf-8'))
+    rows = json.loads(place_of(name).read_text(encoding='utf-8'))
     return {row[key]: row for row in rows}
 
 

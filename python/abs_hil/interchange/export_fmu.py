@@ -12,9 +12,10 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ..core import _core
 from ..files import write_whole
+from ..places import place_of
 
 #: the libraries in an FMU: folder and file as this package has them, folder by FMI 2 and 3
-FOLDER = pathlib.Path(__file__).parents[1] / 'fmu'
+FOLDER = place_of('fmu')
 IDENTIFIER = 'abs_hil_fmu'
 PLATFORMS = (('linux64', '.so', 'linux64', 'x86_64-linux'), ('win64', '.dll', 'win64', 'x86_64-windows'))
 TYPES = {'real': ('Real', 'Float64'), 'integer': ('Integer', 'Int32'), 'boolean': ('Boolean', 'Boolean'),
