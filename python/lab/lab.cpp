@@ -235,8 +235,7 @@ Json run(const Json& words) {
           {"events", a.rows->events(a.names)},
           {"figures", std::move(figures)},
           {"summary", analysis::to_json(simulation.summary)},
-          {"config", Json::parse(request.config_json)},
-          {"config_toml", request.config_toml}};
+          {"config", Json::parse(request.config_json)}};
 }
 
 template <class Work>

@@ -3,6 +3,7 @@
 usage: page_test.py ABS_HIL ABS_LAB MODULE TABLE
 """
 import base64
+import csv
 import hashlib
 import html
 import json
@@ -106,8 +107,8 @@ class Page(ReportTest):
         self.open()
         rows = [line.split('\t') for line in TABLE.read_text().splitlines()]
         for checksum, words in rows:
-            csv = self.value(f'window.lab.then(({{engine}}) => engine.csv({words.split()!r}))')
-            self.assertEqual(hashlib.sha256(csv.partition('\n')[2].encode()).hexdigest(), checksum, words)
+            rows_text = self.value(f'window.lab.then(({{engine}}) => engine.csv({words.split()!r}))')
+            self.assertEqual(hashlib.sha256(rows_text.partition('\n')[2].encode()).hexdigest(), checksum, words)
         self.assertEqual(len(rows), 15)
         self.assertEqual(self.browser.said, [])
 
@@ -157,7 +158,7 @@ class Page(ReportTest):
 
     def test_files_are_those_of_the_program(self):
         self.lab()
-        self.open('#' + words_of(**{'control.adaptive.gamma': 60, 'plant.theta_N': 31.5,
+        self.open('#' + words_of(**{'control.adaptive.gamma': 60, 'plant.theta_N': 31.5, 'experiment.cut': 'peak',
                                     'plant.friction_profile': 'braking distance: 1; 0.4 at 5'}))
         self.value('document.getElementById("save-csv").click()')
         page = self.downloaded('run-1.csv').read_bytes()
@@ -172,6 +173,27 @@ class Page(ReportTest):
         rig = self.value('document.getElementById("line-rig").value')
         self.assertIn('--backend rig --model paper-table1', rig)
         self.assertNotRegex(rig, r'plant\.|start_speed')
+
+    def test_curves_are_the_programs_rows(self):
+        self.lab()
+        self.open('#' + words_of() + '&&' + words_of(**{'control.rate_Hz': 500}).replace('adaptive', 'pi'))
+        for run in (0, 1):
+            self.value(f'document.querySelectorAll(".tab")[{run}].click()')
+            self.program(self.value('document.getElementById("line-simulator").value'))
+            rows = self.rows_of('program.csv')
+            for chart, columns in {'slip': ['slip', 'slip_ref'], 'torque': ['brake_torque_Nm', 'brake_torque_ref_Nm'],
+                                   'speeds': ['omega1_rad_s', 'omega2_rad_s'], 'distance': ['distance_m']}.items():
+                for place, column in enumerate(columns):
+                    drawn = self.value(f'window.lab.then(({{figures}}) => {{ const {{plot}} = figures.charts.find(({{id}}) => id === '
+                                       f'"{chart}"); const y = plot.data[1 + {run * len(columns) + place}]; '
+                                       'return plot.data[0].map((x, n) => [x, y[n]]).filter((pair) => pair[1] != null); })')
+                    said = [[round(float(row['time_s']), 6), float(row[column])] for row in rows if row[column] != 'NaN']
+                    self.assertTrue(drawn == said, (run, column, len(drawn), len(said)))
+        self.assertEqual(self.browser.said, [])
+
+    def rows_of(self, name):
+        with open(self.folder / name, newline='') as file:
+            return list(csv.DictReader(file))
 
     def test_runs_beside_each_other(self):
         self.lab()
@@ -266,6 +288,8 @@ class Page(ReportTest):
         self.open()
         text = (self.folder / 'lab.html').read_text()
         self.assertFalse('33.5' in text)
+        task = self.value('document.getElementById("task").textContent').splitlines()
+        self.assertEqual([line[:2] for line in task[1:]], ['', '1.', '2.', '3.'])
         self.assertIsNone(self.value('document.getElementById("option-plant-theta_N")'))
         self.assertNotIn('33.5', self.value('document.body.innerText + location.hash + document.getElementById("line-simulator").value'))
         self.assertNotIn('theta at 3 m/s, N', self.figures())
@@ -280,6 +304,7 @@ class Page(ReportTest):
         reached = self.figures()
         self.open(self.value('location.hash') + '&plant.theta_N=23')
         self.assertEqual(self.figures(), reached)
+        self.assertNotIn('plant.theta_N', self.value('document.getElementById("line-simulator").value + location.hash'))
         self.assertEqual(self.browser.said, [])
 
     def test_every_exercise_can_be_done_and_is_not_done_at_first(self):

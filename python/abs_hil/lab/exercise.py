@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import pathlib
+import re
 import tomllib
 from typing import Any
 
@@ -86,5 +87,7 @@ def read(path: pathlib.Path) -> dict[str, Any]:
         simulate(**{name: value for name, value in start.items() if name != 'set'}, set={**start['set'], **hidden['set']})
     except ValueError as error:
         raise ValueError(f'{place}: {error}') from None
-    return {'title': given['title'], 'task': given['task'].strip(), 'start': start, 'offered': offered, 'goals': goals,
+    # A line of the page begins at a blank line, a number or a dash; the file's own lines are as long as its writer likes.
+    task = re.sub(r'(?<!\n)\n(?!\n|\d+\. |- ) *', ' ', given['task'].strip())
+    return {'title': given['title'], 'task': task, 'start': start, 'offered': offered, 'goals': goals,
             'hidden': {'columns': [], 'figures': [], **hidden}}

@@ -176,7 +176,7 @@ async function lab() {
   state.runs.forEach((_, n) => compute(n));
   choose(0);
   if (!matchMedia('(prefers-reduced-motion: reduce)').matches && page.turn) play(true);
-  return { engine, state };
+  return { engine, state, figures };
 }
 
 window.lab = lab().catch((error) => {
