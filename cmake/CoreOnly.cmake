@@ -37,6 +37,12 @@ endfunction()
 abs_hil_headers_only(Boost::headers _LIBCPP_ENABLE_CXX17_REMOVED_UNARY_BINARY_FUNCTION)
 # Eigen takes clang for an old GCC on Windows, by this number, and wraps its vectors in a way that AVX-512 does not compile with.
 abs_hil_headers_only(Eigen3::Eigen $<$<BOOL:${WIN32}>:__GXX_ABI_VERSION=1016>)
+# On ARM it multiplies and adds in one rounding where the processor can, which changes the last bit. The compiler's own header
+# needs to know that the processor can, so it comes first.
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
+  file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/no_fused_eigen.hpp CONTENT "#include <arm_neon.h>\n#undef __ARM_FEATURE_FMA\n")
+  target_compile_options(Eigen3::Eigen INTERFACE "SHELL:-include ${CMAKE_BINARY_DIR}/no_fused_eigen.hpp")
+endif()
 abs_hil_headers_only(LCM::LCM)
 abs_hil_headers_only(fmt::fmt FMT_HEADER_ONLY=1)
 abs_hil_headers_only(nlohmann_json::nlohmann_json)
@@ -60,6 +66,10 @@ endif()
 # zig writes facts for debuggers unless it is told not to. Without them the module is a twentieth as large.
 add_compile_options(-g0)
 add_link_options(-s)
+# zig's headers for macOS give <cfloat>'s numbers only if it comes before <cmath>.
+if(APPLE)
+  add_compile_options("$<$<COMPILE_LANGUAGE:CXX>:SHELL:-include cfloat>")
+endif()
 
 foreach(room IN LISTS ABS_HIL_ROOM_NAMES)
   if(room STREQUAL lcmtypes)

@@ -22,12 +22,13 @@ platforms=("$@")
 [ "${platforms[*]}" != all ] || platforms=("${everything[@]}")
 
 # platform | target of zig | CMake's system and processor | platform in Maven | tag of the wheel | ending of the module
+# Headers of x86-64 serve 64-bit ARM as well; Maven has none of ARM for every Python.
 row_of() {
   case $1 in
     linux-x86_64) echo "x86_64-linux-gnu.2.28 Linux x86_64 linux-x86_64 manylinux_2_28_x86_64 .cpython-%s-x86_64-linux-gnu.so" ;;
     linux-aarch64) echo "aarch64-linux-gnu.2.28 Linux aarch64 linux-x86_64 manylinux_2_28_aarch64 .cpython-%s-aarch64-linux-gnu.so" ;;
     windows-x86_64) echo "x86_64-windows-gnu Windows x86_64 windows-x86_64 win_amd64 .cp%s-win_amd64.pyd" ;;
-    macos-arm64) echo "aarch64-macos.11.0 Darwin arm64 macosx-arm64 macosx_11_0_arm64 .cpython-%s-darwin.so" ;;
+    macos-arm64) echo "aarch64-macos.11.0 Darwin arm64 macosx-x86_64 macosx_11_0_arm64 .cpython-%s-darwin.so" ;;
     macos-x86_64) echo "x86_64-macos.11.0 Darwin x86_64 macosx-x86_64 macosx_11_0_x86_64 .cpython-%s-darwin.so" ;;
     *) echo "wheels: no platform $1; they are: ${everything[*]}" >&2; exit 2 ;;
   esac
