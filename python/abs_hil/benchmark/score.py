@@ -2,8 +2,8 @@
 from __future__ import annotations
 
 import importlib
-import sys
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
