@@ -66,8 +66,9 @@ endif()
 # zig writes facts for debuggers unless it is told not to. Without them the module is a twentieth as large.
 add_compile_options(-g0)
 add_link_options(-s)
-# zig's headers for macOS give <cfloat>'s numbers only if it comes before <cmath>.
+# Of zig's headers for macOS, <cmath> and <cfloat> take each other's numbers away, whichever comes first, but not here.
 if(APPLE)
+  set(CMAKE_CXX_EXTENSIONS ON)
   add_compile_options("$<$<COMPILE_LANGUAGE:CXX>:SHELL:-include cfloat>")
 endif()
 
