@@ -254,7 +254,8 @@ class Page(ReportTest):
         before = self.value(turned)
         self.value('document.getElementById("play").click()')
         self.browser.wait_for(f'{turned} !== {before!r}', 'a turn')
-        self.value('document.getElementById("play").click()')
+        self.value('document.getElementById("moment").focus()')
+        self.press('ArrowRight')  # who looks at a moment stops them
         still = self.value(turned)
         self.value('new Promise((done) => setTimeout(done, 200))')
         self.assertEqual(self.value(turned), still)

@@ -13,7 +13,6 @@ from ..serve.uplot import SCRIPT, STYLE, uplot
 _FOLDER = pathlib.Path(__file__).resolve().parent
 #: in this order one script
 _SCRIPTS = ('engine.js', 'settings.js', 'controls.js', 'figures.js', 'lab.js')
-MOST_BYTES = 3_000_000
 
 
 def module() -> bytes:
@@ -32,8 +31,7 @@ def _text(name: str) -> str:
     return (_FOLDER / 'page' / name).read_text(encoding='utf-8')
 
 
-def page(exercise: dict[str, Any] | None, *, turn: bool = True) -> str:
-    """@param turn  the wheels turn as soon as the page is open, where its reader does not want fewer motions"""
+def page(exercise: dict[str, Any] | None) -> str:
     import jinja2
     from markupsafe import Markup
     wasm = module()
@@ -42,7 +40,7 @@ def page(exercise: dict[str, Any] | None, *, turn: bool = True) -> str:
     # No script but these two runs, and nothing is fetched.
     policy = ("default-src 'none'; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; "
               f"script-src {_hash(charts)} {_hash(own)} 'wasm-unsafe-eval'")
-    data = json.dumps({'exercise': exercise, 'turn': turn})
+    data = json.dumps({'exercise': exercise})
     scripts = Markup(f'<script type="application/gzip" id="module">{compressed(wasm)}</script>\n'
                      f'<script type="application/gzip" id="page">{compressed(data.encode())}</script>\n'
                      f'<script>{charts}</script>\n<script>{own}</script>')

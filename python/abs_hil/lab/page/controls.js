@@ -1,6 +1,7 @@
 // Choices, sliders and fields of one run, made from the rows of the program's options: unit, range, default, meaning.
 const STEPS = 1000;
-const ROADS = [['the same grip everywhere', ''], ['grip halves from 4 to 6 m of braking', 'braking distance: 1; 0.5 at 4; 1 from 6 to 7'],
+const ROADS = [['the same grip everywhere', ''],
+  ['grip halves from 4 to 6 m of braking', 'braking distance: 1; 0.5 at 4; 1 from 6 to 7'],
   ['grip falls to 0.4 after 5 m of braking', 'braking distance: 1; 0.4 at 5'],
   ['grip rises from 0.5 to 1 after 5 m of braking', 'braking distance: 0.5; 1 at 5'],
   ['grip changes every 3 m of braking', 'braking distance: 1; 0.6 at 3; 1 at 6; 0.6 at 9; 1 at 12; 0.6 at 15']];
@@ -65,10 +66,12 @@ class Option {
       this.field = element('input', { type: 'checkbox', id, onchange: take });
     } else if (key.name.endsWith('friction_profile')) {
       this.label.textContent = 'road';
-      this.field = element('select', { id, onchange: take }, ...ROADS.map(([name, value]) => element('option', { value, textContent: name })));
+      this.field = element('select', { id, onchange: take },
+        ...ROADS.map(([name, value]) => element('option', { value, textContent: name })));
     } else if (key.type === 'text') {
       this.field = key.allowed && key.allowed.length < 30
-        ? element('select', { id, onchange: take }, ...key.allowed.map((value) => element('option', { value, textContent: value })))
+        ? element('select', { id, onchange: take },
+          ...key.allowed.map((value) => element('option', { value, textContent: value })))
         : element('input', { type: 'text', id, onchange: take });
     } else {
       this.field = element('input', { type: 'number', id, step: 'any', onchange: take });
@@ -122,7 +125,8 @@ class Controls {
     const own = this.tables.keys.map(({ name }) => name).filter((name) => name.startsWith(section));
     const groups = GROUPS.map(([title, names], n) => [title, n ? names : [...names, ...own]]);
     const shown = new Set(groups.flatMap(([, names]) => names));
-    const others = [...new Set([...Object.keys(run.set), ...this.more])].filter((name) => !shown.has(name) && this.keys.has(name));
+    const others = [...new Set([...Object.keys(run.set), ...this.more])]
+      .filter((name) => !shown.has(name) && this.keys.has(name));
     return [...groups, ['Other options', others]];
   }
 
@@ -130,12 +134,16 @@ class Controls {
     const rows = this.tables[`${name}s`];
     const offered = this.exercise?.offered[`${name}s`];
     const choices = rows.filter((row) => !offered?.length || offered.includes(row.name));
-    const about = element('span', { className: 'about', id: `choice-${name}-about`, textContent: rows.find((row) => row.name === run[name])?.meaning ?? '' });
+    const about = element('span', { className: 'about', id: `choice-${name}-about`,
+      textContent: rows.find((row) => row.name === run[name])?.meaning ?? '' });
     const select = element('select', { id: `choice-${name}`, 'aria-describedby': about.id, disabled: choices.length < 2,
       onchange: () => this.changed(name, select.value) }, ...choices.map((row) =>
       element('option', { value: row.name, textContent: row.name, title: row.meaning, selected: row.name === run[name] })));
-    if (select.value !== run[name]) select.append(element('option', { value: run[name], textContent: run[name], selected: true }));
-    return element('div', { className: 'option choice' }, element('label', { htmlFor: select.id, textContent: name }), select, about);
+    if (select.value !== run[name]) {
+      select.append(element('option', { value: run[name], textContent: run[name], selected: true }));
+    }
+    return element('div', { className: 'option choice' },
+      element('label', { htmlFor: select.id, textContent: name }), select, about);
   }
 
   build(run, values) {
@@ -143,12 +151,16 @@ class Controls {
     this.options.clear();
     this.place.replaceChildren(...CHOICES.map((name) => this.choice(name, run)));
     this.groups(run).forEach(([title, names], n) => {
-      const rows = names.filter((name) => this.keys.has(name) && !(name in (this.exercise?.hidden.set ?? {}))).map((name) => {
-        const option = new Option(this.keys.get(name), run.set[name] ?? values.get(name) ?? this.keys.get(name).value, this.changed);
+      const hidden = this.exercise?.hidden.set ?? {};
+      const rows = names.filter((name) => this.keys.has(name) && !(name in hidden)).map((name) => {
+        const key = this.keys.get(name);
+        const option = new Option(key, run.set[name] ?? values.get(name) ?? key.value, this.changed);
         this.options.set(name, option);
         return option.element;
       });
-      if (rows.length) this.place.append(element('details', { open: n < 2 || title === 'Other options' }, element('summary', { textContent: title }), ...rows));
+      if (!rows.length) return;
+      this.place.append(element('details', { open: n < 2 || title === 'Other options' },
+        element('summary', { textContent: title }), ...rows));
     });
     if (!this.exercise) this.place.append(this.finder(run, values));
     this.show(run, values);
@@ -159,13 +171,15 @@ class Controls {
   finder(run, values) {
     const list = element('datalist', { id: 'all-options' }, ...this.tables.keys.map(({ name, meaning }) =>
       element('option', { value: name, textContent: meaning })));
-    const field = element('input', { type: 'text', id: 'find-option', list: list.id, placeholder: 'plant.J2_kg_m2', onchange: () => {
+    const field = element('input', { type: 'text', id: 'find-option', list: list.id, placeholder: 'plant.J2_kg_m2' });
+    field.addEventListener('change', () => {
       if (!this.keys.has(field.value)) return;
       this.more.add(field.value);
       this.build(run, values);
       this.options.get(field.value)?.field.focus();
-    } });
-    return element('div', { className: 'option choice' }, element('label', { htmlFor: field.id, textContent: 'add an option' }), field, list);
+    });
+    return element('div', { className: 'option choice' },
+      element('label', { htmlFor: field.id, textContent: 'add an option' }), field, list);
   }
 
   // A value that nobody has set is the plant's, the experiment's or the program's; a model's follows its plant.

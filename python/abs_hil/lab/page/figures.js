@@ -1,9 +1,12 @@
 // The paper's figures of up to three runs, over the time since the start of braking; and what was at one moment.
 const CHARTS = [
   { id: 'slip', paper: 'figure 7', unit: '', columns: { slip: 'Slip', slip_ref: 'and what was asked for' } },
-  { id: 'speeds', paper: 'figures 5 and 6', unit: 'rad/s', columns: { omega1_rad_s: 'Speed of the upper wheel', omega2_rad_s: 'and of the lower one' } },
-  { id: 'torque', paper: 'figure 8', unit: 'N m', columns: { brake_torque_Nm: 'Brake torque', brake_torque_ref_Nm: 'and what was asked for' } },
-  { id: 'theta', paper: 'figure 9', unit: 'N', columns: { theta_est_N: 'Estimated peak tyre force', theta_N: 'and the true one' } },
+  { id: 'speeds', paper: 'figures 5 and 6', unit: 'rad/s', 
+    columns: { omega1_rad_s: 'Speed of the upper wheel', omega2_rad_s: 'and of the lower one' } },
+  { id: 'torque', paper: 'figure 8', unit: 'N m', 
+    columns: { brake_torque_Nm: 'Brake torque', brake_torque_ref_Nm: 'and what was asked for' } },
+  { id: 'theta', paper: 'figure 9', unit: 'N', 
+    columns: { theta_est_N: 'Estimated peak tyre force', theta_N: 'and the true one' } },
   { id: 'distance', paper: 'figure 10', unit: 'm', columns: { distance_m: 'Distance since the start of braking' } },
   { id: 'duty', paper: '', unit: '', columns: { brake_pwm: 'Brake duty as it was sent' } }];
 const DASHES = [[], [5, 4]];
@@ -37,27 +40,33 @@ class Figures {
       chart.plotted = element('div', { className: 'plotted', role: 'img', id: `plot-${chart.id}` });
       chart.element = element('figure', { className: 'chart' }, element('figcaption', {},
         element('b', { textContent: chart.title }), ` ${chart.unit && `in ${chart.unit} `}`,
-        element('span', { className: 'soft', textContent: chart.paper && `(the paper’s ${chart.paper})` })), chart.plotted);
+        element('span', { className: 'soft', textContent: chart.paper && `(the paper’s ${chart.paper})` })),
+      chart.plotted);
       place.append(chart.element);
     }
     addEventListener('resize', () => this.resize());
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { this.key = ''; this.draw(this.runs, this.whole); });
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
+      this.key = '';
+      this.draw(this.runs, this.whole);
+    });
   }
 
   make(count) {
     const sync = uPlot.sync('lab');
     for (const chart of this.charts) {
       chart.plot?.destroy();
-      const axis = { stroke: colour('--text'), grid: { stroke: colour('--grid'), width: 1 }, ticks: { stroke: colour('--grid'), width: 1 },
+      const lines = { stroke: colour('--grid'), width: 1 };
+      const axis = { stroke: colour('--text'), grid: lines, ticks: lines,
         font: '11px system-ui, sans-serif' };
       const series = Array.from({ length: count }, (_, run) => chart.columns.map((name, n) => ({
-        label: name, stroke: colour(`--line-${run + 1}`), dash: DASHES[n], width: n ? 1 : 1.5, points: { show: false }, spanGaps: false })));
+        label: name, stroke: colour(`--line-${run + 1}`), dash: DASHES[n], width: n ? 1 : 1.5,
+        points: { show: false }, spanGaps: false })));
       chart.plot = new uPlot({
         width: Math.max(200, chart.plotted.clientWidth), height: HEIGHT_PX, legend: { show: false }, padding: [6, 8, 0, 0],
         cursor: { sync: { key: sync.key }, drag: { x: true, y: false }, points: { show: false }, y: false },
         scales: { x: { time: false } }, series: [{}, ...series.flat()],
         axes: [{ ...axis, size: 26, space: 60 }, { ...axis, size: 46, space: 30 }],
-        hooks: { setCursor: [(plot) => { if (plot.cursor.event && plot.cursor.idx != null) this.moved(plot.data[0][plot.cursor.idx]); }] },
+        hooks: { setCursor: [({ cursor, data }) => { if (cursor.event && cursor.idx != null) this.moved(data[0][cursor.idx]); }] },
       }, [[], ...series.flat().map(() => [])], chart.plotted);
       chart.plotted.querySelector('canvas').setAttribute('aria-hidden', 'true');
     }
@@ -75,7 +84,9 @@ class Figures {
     const joined = tables.length > 1 ? uPlot.join(tables) : tables[0];
     for (const chart of this.charts) {
       const data = [joined[0]];
-      runs.forEach((run, n) => { for (const name of chart.columns) data.push(joined[1 + n * names.length + names.indexOf(name)]); });
+      runs.forEach((_, n) => {
+        for (const name of chart.columns) data.push(joined[1 + n * names.length + names.indexOf(name)]);
+      });
       chart.plot.setData(data);
       chart.plotted.setAttribute('aria-label', this.alternative(chart, runs));
     }
@@ -128,9 +139,11 @@ function drawFigures(place, rows, runs, hidden, goals) {
   const changed = ({ summary: { gate } }) => Object.entries(gate).filter(([action, count]) => action !== 'passed' && count)
     .map(([action, count]) => `${action.replaceAll('_', ' ')}: ${count}`).join(', ');
   const gate = element('tr', { title: 'cycles in which the command gate changed the command' },
-    element('th', { scope: 'row', textContent: 'the gate changed' }), ...runs.map((run) => element('td', { textContent: changed(run) || 'nothing' })));
+    element('th', { scope: 'row', textContent: 'the gate changed' }),
+    ...runs.map((run) => element('td', { textContent: changed(run) || 'nothing' })));
   const ended = element('tr', {}, element('th', { scope: 'row', textContent: 'end' }),
-    ...runs.map(({ summary }) => element('td', { className: summary.result === 'fault' ? 'bad' : '', textContent: summary.reason })));
+    ...runs.map(({ summary: { result, reason } }) =>
+      element('td', { className: result === 'fault' ? 'bad' : '', textContent: reason })));
   place.replaceChildren(element('thead', {}, head), element('tbody', {}, ...lines, gate, ended));
   return goals.map((goal) => {
     const met = runs.some(({ figures: { [goal.figure]: value } }) =>
@@ -140,9 +153,11 @@ function drawFigures(place, rows, runs, hidden, goals) {
 }
 
 // ---- why did it do that: everything about one cycle
-const TOLD = [['slip', 'slip'], ['slip_est', 'slip, estimated'], ['slip_ref', 'slip asked for'], ['omega1_rad_s', 'upper wheel'],
+const TOLD = [
+  ['slip', 'slip'], ['slip_est', 'slip, estimated'], ['slip_ref', 'slip asked for'], ['omega1_rad_s', 'upper wheel'],
   ['omega1_est_rad_s', 'upper wheel, estimated'], ['omega2_rad_s', 'lower wheel'], ['omega2_est_rad_s', 'lower wheel, estimated'],
-  ['slip_velocity_error_m_s', 'slip velocity error e_v'], ['theta_est_N', 'θ̂, estimated peak force'], ['theta_N', 'θ, true peak force'],
+  ['slip_velocity_error_m_s', 'slip velocity error e_v'], ['theta_est_N', 'θ̂, estimated peak force'],
+  ['theta_N', 'θ, true peak force'],
   ['brake_torque_ref_Nm', 'torque asked for'], ['brake_torque_est_Nm', 'torque, estimated'], ['brake_torque_Nm', 'torque, true'],
   ['brake_pwm', 'brake duty sent'], ['motor_pwm', 'motor duty sent']];
 
@@ -169,18 +184,22 @@ function drawWhy(place, tables, runs, time, hidden) {
   const line = (title, unit, texts) => element('tr', {}, element('th', { scope: 'row', textContent: title + (unit && `, ${unit}`) }),
     ...texts.map((text) => element('td', { textContent: text })));
   const at = (run, n, name) => run.columns.get(name)?.values[rows[n]];
-  const latest = (run, n, test) => run.events.filter(({ time_s: time, kind }) => test(kind) && time <= at(run, n, 'time_s') + 1e-9).at(-1);
+  const latest = (run, n, wanted) =>
+    run.events.filter(({ time_s: time, kind }) => kind === wanted && time <= at(run, n, 'time_s') + 1e-9).at(-1);
   const lines = [line('phase', '', runs.map((run, n) => phaseOf(run, rows[n]))),
     line('why this phase', '', runs.map((run, n) => {
-      const event = latest(run, n, (kind) => kind === 'phase');
+      const event = latest(run, n, 'phase');
       return event ? `${event.message.replace(/^.*: /, '')}, ${short(event.time_s - braked(run))} s` : '–';
     })),
-    line('gate', '', runs.map((run, n) => latest(run, n, (kind) => kind === 'fault')?.message ?? 'no fault'))];
+    line('gate', '', runs.map((run, n) => latest(run, n, 'fault')?.message ?? 'no fault'))];
   for (const [name, title] of TOLD) {
-    if (!hidden.includes(name)) lines.push(line(title, runs[0].columns.get(name).unit, runs.map((run, n) => short(at(run, n, name)))));
+    if (hidden.includes(name)) continue;
+    lines.push(line(title, runs[0].columns.get(name).unit, runs.map((run, n) => short(at(run, n, name)))));
   }
-  const own = new Set(runs.flatMap((run) => [...run.columns].filter(([, column]) => column.own).map(([name]) => name)));
-  for (const name of own) lines.push(line(name, '', runs.map((run, n) => (run.columns.has(name) ? short(at(run, n, name)) : ''))));
+  const own = new Set(runs.flatMap(({ columns }) => [...columns].filter(([, column]) => column.own).map(([name]) => name)));
+  for (const name of own) {
+    lines.push(line(name, '', runs.map((run, n) => (run.columns.has(name) ? short(at(run, n, name)) : ''))));
+  }
   place.replaceChildren(element('thead', {}, element('tr', {}, element('th', { scope: 'col', textContent: `at ${short(time)} s` }),
     ...runs.map((_, n) => element('th', { scope: 'col', className: `run-${n + 1}`, textContent: `run ${n + 1}` })))),
   element('tbody', {}, ...lines));
@@ -206,7 +225,9 @@ class Wheels {
       this.angles = ['omega1_rad_s', 'omega2_rad_s'].map((name) => {
         const omega = this.run.columns.get(name).values;
         const angle = new Float64Array(omega.length);
-        for (let n = 1; n < omega.length; ++n) angle[n] = angle[n - 1] + 0.5 * (omega[n] + omega[n - 1]) * (time[n] - time[n - 1]);
+        for (let n = 1; n < omega.length; ++n) {
+          angle[n] = angle[n - 1] + 0.5 * (omega[n] + omega[n - 1]) * (time[n] - time[n - 1]);
+        }
         return angle;
       });
     }
@@ -217,10 +238,12 @@ class Wheels {
     if (!this.run) return;
     const row = rowAt(this.run, time);
     this.turned().forEach((angle, n) => {  // one turns against the other
-      this.wheels[n].setAttribute('transform', `${this.wheels[n].dataset.place} rotate(${((n ? 1 : -1) * angle[row] * 180 / Math.PI) % 360})`);
+      const degrees = ((n ? 1 : -1) * angle[row] * 180 / Math.PI) % 360;
+      this.wheels[n].setAttribute('transform', `${this.wheels[n].dataset.place} rotate(${degrees})`);
     });
     const at = (name) => short(this.run.columns.get(name).values[row], 3);
-    this.text.textContent = `${short(time, 3)} s: upper ${at('omega1_rad_s')}, lower ${at('omega2_rad_s')} rad/s, slip ${at('slip')}`;
+    this.text.textContent =
+      `${short(time, 3)} s: upper ${at('omega1_rad_s')}, lower ${at('omega2_rad_s')} rad/s, slip ${at('slip')}`;
     this.svg.setAttribute('aria-label', `The two wheels at ${this.text.textContent}`);
   }
 }

@@ -2,12 +2,12 @@
 async function lab() {
   const page = JSON.parse(await (await unpacked('page')).text());
   const { exercise } = page;
-  const hidden = { set: exercise?.hidden.set ?? {}, columns: exercise?.hidden.columns ?? [], figures: exercise?.hidden.figures ?? [] };
+  const hidden = exercise?.hidden ?? { set: {}, columns: [], figures: [] };
   const engine = await Engine.load();
   const at = (id) => document.getElementById(id);
   const state = { runs: runsOf(location.hash, exercise), chosen: 0, results: [], time: 0.5, whole: false, playing: false };
 
-  const figures = new Figures(at('charts'), hidden.columns, (time) => moment(time, false));
+  const figures = new Figures(at('charts'), hidden.columns, (time) => { play(false); moment(time, false); });
   const wheels = new Wheels(at('wheels'), at('wheels-text'));
   const controls = new Controls(at('controls'), engine.tables, exercise, change);
 
@@ -72,16 +72,25 @@ async function lab() {
       element('li', { className: met ? 'met' : '', textContent: `${met ? '✓ reached' : '○ not yet'}: ${says}` })));
   }
 
+  function add() {
+    state.runs.push(copyOf(state.runs[state.chosen]));
+    choose(state.runs.length - 1, true);
+  }
+
+  function remove() {
+    state.runs.splice(state.chosen, 1);
+    state.results.splice(state.chosen, 1);
+    choose(Math.max(0, state.chosen - 1));
+  }
+
   function tabs() {
-    at('runs').replaceChildren(...state.runs.map((_, n) => element('button', { type: 'button', className: `tab run-${n + 1}`,
-      textContent: `run ${n + 1}`, 'aria-pressed': String(n === state.chosen), onclick: () => choose(n) })),
-    ...(state.runs.length < MOST_RUNS ? [element('button', { type: 'button', id: 'add-run', textContent: '+ run', title: 'another run with the values of this one',
-      onclick: () => { state.runs.push(copyOf(state.runs[state.chosen])); choose(state.runs.length - 1, true); } })] : []),
-    ...(state.runs.length > 1 ? [element('button', { type: 'button', id: 'remove-run', textContent: '− run', title: 'take this run away', onclick: () => {
-      state.runs.splice(state.chosen, 1);
-      state.results.splice(state.chosen, 1);
-      choose(Math.max(0, state.chosen - 1));
-    } })] : []));
+    const button = (textContent, onclick, more) => element('button', { type: 'button', textContent, onclick, ...more });
+    at('runs').replaceChildren(...state.runs.map((_, n) => button(`run ${n + 1}`, () => choose(n),
+      { className: `tab run-${n + 1}`, 'aria-pressed': String(n === state.chosen) })));
+    if (state.runs.length < MOST_RUNS) {
+      at('runs').append(button('+ run', add, { id: 'add-run', title: 'another run with the values of this one' }));
+    }
+    if (state.runs.length > 1) at('runs').append(button('− run', remove, { id: 'remove-run', title: 'take this run away' }));
   }
 
   function choose(number, fresh = false) {
@@ -112,19 +121,21 @@ async function lab() {
     if (mark) figures.mark(time);
   }
 
+  // Who looks at a moment stops the wheels.
   function play(on) {
+    if (!on && !state.playing) return;
     state.playing = on;
     at('play').setAttribute('aria-pressed', String(on));
     at('play').textContent = on ? 'stop the wheels' : 'turn the wheels';
+    cancelAnimationFrame(state.frame);
     let before = performance.now();
     const turn = (now) => {
-      if (!state.playing) return;
       const time = state.time + (now - before) / 1000 / SLOWER;
       before = now;
       moment(time > +at('moment').max ? +at('moment').min : time, true);
-      requestAnimationFrame(turn);
+      state.frame = requestAnimationFrame(turn);
     };
-    if (on) requestAnimationFrame(turn);
+    if (on) state.frame = requestAnimationFrame(turn);
   }
 
   // ---- files
@@ -135,10 +146,10 @@ async function lab() {
   }
 
   function csv() {
-    const lines = engine.csv(wordsOf(state.runs[state.chosen], hidden.set)).trimEnd().split('\n');
-    const kept = lines[0].split(',').map((name, place) => (hidden.columns.includes(name) ? -1 : place)).filter((place) => place >= 0);
-    const text = hidden.columns.length ? lines.map((line) => { const cells = line.split(','); return kept.map((place) => cells[place]).join(','); }) : lines;
-    save(`run-${state.chosen + 1}.csv`, text.join('\n') + '\n', 'text/csv');
+    const lines = engine.csv(wordsOf(state.runs[state.chosen], hidden.set)).trimEnd().split('\n').map((line) => line.split(','));
+    const kept = [...lines[0].keys()].filter((place) => !hidden.columns.includes(lines[0][place]));
+    const text = lines.map((cells) => kept.map((place) => cells[place]).join(',')).join('\n');
+    save(`run-${state.chosen + 1}.csv`, `${text}\n`, 'text/csv');
   }
 
   function experiment() {
@@ -160,7 +171,7 @@ async function lab() {
 
   at('controls').addEventListener('submit', (event) => event.preventDefault());
   at('whole').addEventListener('change', () => { state.whole = at('whole').checked; draw(); });
-  at('moment').addEventListener('input', () => moment(+at('moment').value, true));
+  at('moment').addEventListener('input', () => { play(false); moment(+at('moment').value, true); });
   at('play').addEventListener('click', () => play(!state.playing));
   at('save-csv').addEventListener('click', csv);
   at('save-experiment').addEventListener('click', experiment);
@@ -175,7 +186,6 @@ async function lab() {
 
   state.runs.forEach((_, n) => compute(n));
   choose(0);
-  if (!matchMedia('(prefers-reduced-motion: reduce)').matches && page.turn) play(true);
   return { engine, state, figures };
 }
 
