@@ -227,4 +227,9 @@ std::span<const rig::Signal> AdaptiveOptimalController::signals() const noexcept
   return rows;
 }
 
+bool AdaptiveOptimalController::exchange_state(rig::StateBytes& state) {
+  state(observer_, force_, speeds_, bank_, reference_, model_error_Nm_, sent_Nm_, search_rad_, last_speeds_, unlearnt_);
+  return true;
+}
+
 }  // namespace abs_hil::control

@@ -47,6 +47,7 @@ class AdaptiveOptimalController final : public SlipController {
   void reset(const SlipInput& input) noexcept override;
   [[nodiscard]] SlipOutput step(const SlipInput& input) noexcept override;
   [[nodiscard]] std::span<const rig::Signal> signals() const noexcept override;
+  [[nodiscard]] bool exchange_state(rig::StateBytes& state) override;
 
  private:
   /// The torques that hold the slip: as it is wanted, and as it is.

@@ -1,6 +1,8 @@
 // A slip controller from a law that is written over its scalar.
 #pragma once
 
+#include <type_traits>
+
 #include "abs_hil/control/controller_context.hpp"
 #include "abs_hil/control/slip_controller.hpp"
 
@@ -26,6 +28,12 @@ class LawController : public SlipController {
     } else {
       return SlipController::take_over(before);
     }
+  }
+
+  [[nodiscard]] bool exchange_state(rig::StateBytes& state) override {
+    static_assert(std::is_trivially_copyable_v<Law<double>>, "the state of a law is a copy of its scalars");
+    state(law_);
+    return true;
   }
 
   [[nodiscard]] const Law<double>& law() const noexcept { return law_; }

@@ -92,6 +92,7 @@ void OwnOptions::visit_options(const std::string& prefix, const rig::OptionVisit
 }
 
 bool SlipController::take_over(const SlipController& /*before*/) noexcept { return false; }
+bool SlipController::exchange_state(rig::StateBytes& /*state*/) { return false; }
 
 std::string_view controller_name(std::size_t index) noexcept {
   return index < table().size() ? table()[index].name : std::string_view{};

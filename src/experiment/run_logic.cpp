@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include "abs_hil/control/registry.hpp"
@@ -81,6 +82,15 @@ RunLogic::RunLogic(RunLogicParts parts)
       actuator_(parts.rig.brake, parts.ideal_actuator, parts.max_brake_duty, parts.duty_steps),
       own_signal_count_(std::min(controller_->signals().size(), rig::signal_max)),
       answers_itself_(parts.answers_itself) {}
+
+void RunLogic::exchange_state(rig::StateBytes& state) {
+  if (!controller_->exchange_state(state)) throw std::invalid_argument("this controller cannot give its state");
+  sequence_.exchange_state(state);
+  state(upper_, lower_, upper_fit_, lower_fit_, actuator_);
+  state(slip_ref_, speeds_, upper_travel_rad_, lower_travel_rad_, distance_m_, slip_, alpha1_rad_s2_, alpha2_rad_s2_);
+  state(asked_Nm_, target_Nm_, sent_Nm_, unsent_Nm_, in_slip_control_, not_given_, refused_output_, bump_Nm_);
+  state(start_given_, answered_, end_, stands_still_, wheels_sound_, started_, start_ns_, last_ns_);
+}
 
 runtime::GateOptions RunLogic::on_grid(runtime::GateOptions options) const noexcept {
   options.motor_duty_max = rig::duty_at_most(options.motor_duty_max, duty_steps_);

@@ -77,6 +77,8 @@ class RunLogic final : public runtime::CycleLogic {
   [[nodiscard]] rig::Reason end_reason() const noexcept { return end_.reason; }
   [[nodiscard]] double end_value() const noexcept { return end_.value; }
   [[nodiscard]] control::SlipController& controller() noexcept { return *controller_; }
+  /// Between cycles, without adjustments on their way. Throws std::invalid_argument for a controller that cannot.
+  void exchange_state(rig::StateBytes& state);
   /// Changes put here take effect one per cycle, in cycles in which no phase begins. The cycle's record has an
   /// adjustment as its reason and the change's number as its value. A start command shows in the next cycle's record,
   /// with value 0.

@@ -9,6 +9,7 @@
 #include "abs_hil/rig/measurement.hpp"
 #include "abs_hil/rig/phase.hpp"
 #include "abs_hil/rig/reason.hpp"
+#include "abs_hil/rig/state_bytes.hpp"
 #include "experiment/end_conditions.hpp"
 #include "experiment/profile.hpp"
 #include "runtime/gate_options.hpp"
@@ -119,6 +120,11 @@ class Sequence {
   [[nodiscard]] double phase_time_s() const noexcept { return now_s_ - entered_at_s_; }
   /// True in the run's last cycle, in which the safe command goes out.
   [[nodiscard]] bool finished() const noexcept { return ended_; }
+
+  void exchange_state(rig::StateBytes& state) {
+    state(held_, last_.phase, index_, started_, wheels_apart_, stopping_, failing_, ended_, now_s_, entered_at_s_,
+          entered_at_m_, peak_speed_rad_s_, peak_at_s_);
+  }
 
  private:
   [[nodiscard]] const EndCondition* ending(const SequenceInput& input) noexcept;

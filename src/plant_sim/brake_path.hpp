@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "abs_hil/plant_sim/options.hpp"
+#include "abs_hil/rig/state_bytes.hpp"
 
 namespace abs_hil::plant_sim {
 
@@ -32,6 +33,10 @@ class BrakePath {
   /// Advances the time by one part.
   /// @param energy_J  that the brake has taken in it, >= 0
   void pass(double part_s, double energy_J) noexcept;
+
+  void exchange_state(rig::StateBytes& state) {
+    state(changes_, first_, count_, time_s_, newest_, duty_, held_Nm_, energy_J_);
+  }
 
  private:
   struct Change {

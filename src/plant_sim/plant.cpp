@@ -64,6 +64,14 @@ void Plant::reset(const PlantState& state) noexcept {
   let_bearings_drift(drift_.after(0.0));
 }
 
+void Plant::exchange_state(rig::StateBytes& state) {
+  state(state_);
+  profile_.exchange_state(state);
+  drift_.exchange_state(state);
+  model_.exchange_state(state);
+  if (brake_path_) brake_path_->exchange_state(state);
+}
+
 PlantConditions Plant::conditions() const noexcept {
   const bool drifts = drift_.any();
   return {.friction = friction(),

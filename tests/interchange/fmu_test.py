@@ -126,6 +126,42 @@ class FmuTest(ProgramTest):
                     self.assertEqual([instance.get(name) for name in outputs], before)
                     self.assertEqual(go_on(), after)
 
+    def test_a_kept_state_goes_on_as_all_steps_again_do(self):
+        """In a new instance, for every law: the bytes of a state give the bits that a run from the start gives."""
+        flaws = (*START, '--set', 'plant.brake_dead_time_s=0.004', '--set', 'plant.brake_hysteresis=0.05')
+        plant_path = self.export('plant', *flaws)
+        rows = self.run_program('list').stdout.partition('\nplants')[0].splitlines()[1:]
+        for law in [row.split()[0] for row in rows]:
+            path = self.export('law', *START, '--controller', law)
+
+            def step(pair, n):
+                plant, controller = pair
+                for name in ('upper_counts', 'lower_counts'):
+                    controller.set(name, plant.get(name))
+                controller.step(n * 1e-3, 1e-3)
+                plant.set('brake_duty', controller.get('brake_duty'))
+                plant.step(n * 1e-3, 1e-3)
+                return [one.get(v.name) for one in pair for v in one.description.modelVariables if v.causality == 'output']
+
+            whole = Instance(plant_path), Instance(path)
+            for n in range(150):
+                step(whole, n)
+            kept = [one.fmu.serializeFMUstate(one.fmu.getFMUstate()) for one in whole]
+            expected = [step(whole, n) for n in range(150, 300)]
+            later = [one.fmu.serializeFMUstate(one.fmu.getFMUstate()) for one in whole]
+            for before, after in zip(kept, later):  # inputs are in it as texts
+                self.assertAlmostEqual(len(before), len(after), delta=100, msg='the state does not grow with the steps')
+            branch = Instance(plant_path), Instance(path)
+            for one, data in zip(branch, kept):
+                one.fmu.setFMUstate(one.fmu.deSerializeFMUstate(data))
+            self.assertEqual([step(branch, n) for n in range(150, 300)], expected, law)
+            damaged = bytearray(kept[1])
+            damaged[len(damaged) // 2] ^= 1
+            with self.assertRaises(FMICallException):
+                branch[1].fmu.deSerializeFMUstate(bytes(damaged))
+            for one in (*whole, *branch):
+                one.close()
+
     def test_several_instances(self):
         path = self.export('plant', *START)
         instances = [Instance(path, f'rig {n}', plant__theta_N=15.0 + n) for n in range(3)]

@@ -5,6 +5,7 @@
 
 #include "abs_hil/rig/measurement.hpp"
 #include "abs_hil/rig/signals.hpp"
+#include "abs_hil/rig/state_bytes.hpp"
 
 namespace abs_hil::control {
 
@@ -71,6 +72,10 @@ class SlipController {
   /// braking. Integrals and estimates are kept, and estimates are limited to their new bounds. Returns false and
   /// changes nothing for another class. By default a law cannot take over and returns false.
   [[nodiscard]] virtual bool take_over(const SlipController& before) noexcept;
+  /// Writes the whole state, or reads one that a controller of the same class and options has written, so that a
+  /// simulation can branch. Returns false and does nothing if the law cannot, as by default. Not called in the
+  /// real-time thread.
+  [[nodiscard]] virtual bool exchange_state(rig::StateBytes& state);
 };
 
 }  // namespace abs_hil::control

@@ -35,6 +35,12 @@ class Drift {
   /// The factors `time_s` from now, within a part.
   [[nodiscard]] DriftFactors after(double time_s) const noexcept;
 
+  void exchange_state(rig::StateBytes& state) {
+    for (FactorProgress* factor : {&brake_torque_, &motor_torque_, &upper_bearing_, &lower_bearing_}) {
+      factor->exchange_state(state);
+    }
+  }
+
  private:
   FactorProgress brake_torque_;
   FactorProgress motor_torque_;

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "abs_hil/plant_sim/factor_profile.hpp"
+#include "abs_hil/rig/state_bytes.hpp"
 
 namespace abs_hil::plant_sim {
 
@@ -66,6 +67,7 @@ class FactorProgress {
   }
   /// True if the factor never changes.
   [[nodiscard]] bool steady() const noexcept { return !changes_; }
+  void exchange_state(rig::StateBytes& state) { state(index_, time_s_, origin_time_s_, origin_angle2_rad_, counting_); }
   /// False if the factor is always 1.
   [[nodiscard]] bool changes_anything() const noexcept { return changes_ || constant_ != 1.0; }
   [[nodiscard]] PresentFactor present(double angle2_rad) const noexcept {

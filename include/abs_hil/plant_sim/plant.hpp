@@ -9,6 +9,7 @@
 #include "abs_hil/plant_sim/wheel_model.hpp"
 #include "abs_hil/rig/cycle_record.hpp"
 #include "abs_hil/rig/measurement.hpp"
+#include "abs_hil/rig/state_bytes.hpp"
 
 namespace abs_hil::plant_sim {
 
@@ -61,6 +62,9 @@ class Plant {
   /// Takes over a state that somebody else computed: `cycles` times `cycle_s` in which the conditions stayed as they
   /// were.
   void take_over(const PlantState& state, double cycle_s, std::int64_t cycles) noexcept;
+
+  /// All of the state, the profiles' places and the brake's path included.
+  void exchange_state(rig::StateBytes& state);
 
   /// Lifts the upper wheel off the lower one, which takes the tyre force away, or lowers it again.
   void part_wheels(bool apart) noexcept { model_.part(apart); }

@@ -2,6 +2,7 @@
 
 #include "abs_hil/plant_sim/load_models.hpp"
 #include "abs_hil/plant_sim/tyre_models.hpp"
+#include "abs_hil/rig/state_bytes.hpp"
 
 namespace abs_hil::plant_sim {
 
@@ -71,6 +72,7 @@ class WheelModel {
     return std::visit(visitor, tyre_, load_);
   }
   [[nodiscard]] bool apart() const noexcept { return apart_; }
+  void exchange_state(rig::StateBytes& state) { state(wheels_, apart_); }
 
  private:
   using Torques = UpperWheelTorques<double, double>;

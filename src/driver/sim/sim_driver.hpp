@@ -43,6 +43,11 @@ class SimDriver final : public RigDriver {
   /// For tests: the command that acts on the simulated rig.
   [[nodiscard]] const plant_sim::PlantInput& outputs() const noexcept { return input_; }
   [[nodiscard]] const plant_sim::Plant& plant() const noexcept { return plant_; }
+  /// Of an active driver.
+  void exchange_state(rig::StateBytes& state) {
+    plant_.exchange_state(state);
+    state(input_, time_ns_, offsets_);
+  }
 
  private:
   void do_configure() override;

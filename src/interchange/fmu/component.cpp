@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <fstream>
 #include <stdexcept>
-#include <type_traits>
+#include <utility>
 
 namespace abs_hil::interchange::fmu {
 
@@ -18,71 +17,43 @@ std::string_view kind_in(const std::string& token) {
   return {};
 }
 
-void put(std::string& bytes, const void* data, std::size_t size) { bytes.append(static_cast<const char*>(data), size); }
-void put_size(std::string& bytes, std::uint64_t size) { put(bytes, &size, sizeof size); }
+constexpr std::string_view state_mark = "abs_hil state 2\n";
 
-/// Takes numbers and texts off the front of bytes.
-class Bytes {
- public:
-  explicit Bytes(const std::string& bytes) : bytes_(bytes) {}
-  void take(void* data, std::size_t size) {
-    if (size > bytes_.size() - place_) throw std::invalid_argument("the serialised state is cut short or damaged");
-    std::memcpy(data, bytes_.data() + place_, size);
-    place_ += size;
-  }
-  std::uint64_t take_size(std::size_t each) {
-    std::uint64_t size = 0;
-    take(&size, sizeof size);
-    if (size > (bytes_.size() - place_) / each) throw std::invalid_argument("the serialised state is damaged");
-    return size;
-  }
+/// FNV-1a: finds damage, no ill will.
+std::uint64_t checksum_of(std::string_view bytes) {
+  std::uint64_t sum = 0xcbf29ce484222325ULL;
+  for (const char c : bytes) sum = (sum ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
+  return sum;
+}
 
- private:
-  const std::string& bytes_;
-  std::size_t place_{0};
-};
-
-constexpr std::string_view state_mark = "abs_hil state 1\n";
+void exchange_text(rig::StateBytes& bytes, std::string& text) {
+  std::vector<char> characters(text.begin(), text.end());
+  bytes(characters);
+  text.assign(characters.begin(), characters.end());
+}
 
 }  // namespace
 
 std::string to_bytes(const State& state) {
-  std::string bytes(state_mark);
-  put_size(bytes, state.values.size());
-  for (const std::string& value : state.values) {
-    put_size(bytes, value.size());
-    bytes += value;
-  }
-  const std::uint64_t started = state.started ? 1 : 0;
-  put_size(bytes, started);
-  put(bytes, &state.start_s, sizeof state.start_s);
-  put_size(bytes, state.steps.size());
-  put(bytes, state.steps.data(), state.steps.size() * sizeof(double));
-  return bytes;
+  std::string content = state.content;
+  rig::StateBytes end;
+  std::uint64_t sum = checksum_of(content);
+  end(sum);
+  return std::string(state_mark) + content + end.written();
 }
 
 State state_of(const std::string& bytes) {
-  if (!bytes.starts_with(state_mark)) throw std::invalid_argument("not a serialised state of this FMU");
-  Bytes rest(bytes);
-  std::string mark(state_mark.size(), '\0');
-  rest.take(mark.data(), mark.size());
-  State state;
-  state.values.resize(rest.take_size(sizeof(std::uint64_t)));
-  for (std::string& value : state.values) {
-    value.resize(rest.take_size(1));
-    rest.take(value.data(), value.size());
+  constexpr std::size_t around = state_mark.size() + sizeof(std::uint64_t);
+  if (bytes.size() < around || !bytes.starts_with(state_mark)) {
+    throw std::invalid_argument("not a serialised state of this FMU");
   }
-  std::uint64_t started = 0;
-  rest.take(&started, sizeof started);
-  state.started = started != 0;
-  rest.take(&state.start_s, sizeof state.start_s);
-  state.steps.resize(rest.take_size(sizeof(double)));
-  rest.take(state.steps.data(), state.steps.size() * sizeof(double));
+  State state{.content = bytes.substr(state_mark.size(), bytes.size() - around)};
+  if (to_bytes(state) != bytes) throw std::invalid_argument("the serialised state is cut short or damaged");
   return state;
 }
 
 Component::Component(std::string name, const std::string& token, const std::string& resources, Logger logger)
-    : name_(std::move(name)), model_(make_model(kind_in(token))), logger_(std::move(logger)) {
+    : name_(std::move(name)), token_(token), model_(make_model(kind_in(token))), logger_(std::move(logger)) {
   if (!model_ || token != token_of(kind_in(token), *model_)) {
     throw std::invalid_argument("the description (token " + token +
                                 ") does not belong to this binary; export the FMU again");
@@ -92,7 +63,6 @@ Component::Component(std::string name, const std::string& token, const std::stri
   if (!file) throw std::invalid_argument("cannot read the parameters in " + path);
   std::string line;
   for (const Variable& variable : model_->variables()) {
-    if (variable.causality == Causality::input) ++input_count_;
     if (variable.causality != Causality::parameter) continue;
     const std::string key = variable.name + '=';
     if (!std::getline(file, line) || !line.starts_with(key)) {
@@ -100,7 +70,7 @@ Component::Component(std::string name, const std::string& token, const std::stri
     }
     set_text(variable, line.substr(key.size()));
   }
-  first_values_ = state().values;
+  first_ = state();
 }
 
 const Variable& Component::variable(std::uint32_t reference) const {
@@ -124,37 +94,6 @@ void Component::start() {
   model_->start(start_s_);
   started_ = true;
   time_s_ = start_s_;
-  steps_.clear();
-}
-
-std::vector<double> Component::inputs() const {
-  std::vector<double> values;
-  for (const Variable& variable : model_->variables()) {
-    if (variable.causality != Causality::input) continue;
-    std::visit(
-        [&](const auto* value) {
-          using Value = std::remove_cvref_t<decltype(*value)>;
-          if constexpr (!std::is_same_v<Value, std::string>) values.push_back(static_cast<double>(*value));
-        },
-        variable.value);
-  }
-  return values;
-}
-
-void Component::set_inputs(const double* values) const {
-  for (const Variable& variable : model_->variables()) {
-    if (variable.causality != Causality::input) continue;
-    std::visit(
-        [&](auto* value) {
-          using Value = std::remove_cvref_t<decltype(*value)>;
-          if constexpr (std::is_same_v<Value, bool>) {
-            *value = *values++ != 0.0;
-          } else if constexpr (!std::is_same_v<Value, std::string>) {
-            *value = static_cast<Value>(*values++);
-          }
-        },
-        variable.value);
-  }
 }
 
 void Component::step(double time_s, double duration_s) {
@@ -170,46 +109,45 @@ void Component::step(double time_s, double duration_s) {
   for (const Variable& variable : model_->variables()) {
     if (variable.causality == Causality::input) check(variable);
   }
-  const std::vector<double> given = inputs();
   model_->step(duration_s);
-  steps_.push_back(duration_s);
-  steps_.insert(steps_.end(), given.begin(), given.end());
   time_s_ += duration_s;
 }
 
-State Component::state() const {
-  State state{.started = started_, .start_s = start_s_, .steps = steps_};
+void Component::exchange_state(rig::StateBytes& bytes) {
+  std::string token = token_;
+  exchange_text(bytes, token);
+  if (token != token_) throw std::invalid_argument("the state belongs to another FMU");
+  bool started = started_;
+  bytes(started, start_s_);
+  started_ = false;  // until all of it is read
   for (const Variable& variable : model_->variables()) {
-    if (variable.causality != Causality::output) state.values.push_back(text_of(variable));
+    if (variable.causality == Causality::output) continue;
+    const std::string now = text_of(variable);
+    std::string text = now;
+    exchange_text(bytes, text);
+    if (text != now) set_text(variable, text);
   }
-  return state;
+  if (started) {
+    if (bytes.reads()) start();
+    model_->exchange_state(bytes);
+    bytes(time_s_);
+  }
+  bytes.end();
+  started_ = started;
+}
+
+State Component::state() {
+  rig::StateBytes bytes;
+  exchange_state(bytes);
+  return {.content = bytes.written()};
 }
 
 void Component::restore(const State& state) {
-  const std::size_t width = 1 + input_count_;
-  if (state.values.size() != first_values_.size() || state.steps.size() % width != 0) {
-    throw std::invalid_argument("the state belongs to another FMU");
-  }
-  const auto set_values = [&](const std::vector<std::string>& values) {
-    std::size_t place = 0;
-    for (const Variable& variable : model_->variables()) {
-      if (variable.causality != Causality::output) set_text(variable, values[place++]);
-    }
-  };
-  started_ = false;
-  steps_.clear();
-  set_values(state.values);
-  start_s_ = state.start_s;
-  if (!state.started) return;
-  start();
-  for (std::size_t at = 0; at < state.steps.size(); at += width) {
-    set_inputs(state.steps.data() + at + 1);
-    step(time_s_, state.steps[at]);
-  }
-  set_values(state.values);
+  rig::StateBytes bytes(state.content);
+  exchange_state(bytes);
 }
 
-void Component::reset() { restore({.values = first_values_}); }
+void Component::reset() { restore(first_); }
 
 void Component::log(bool error, const std::string& text) const {
   if (logger_) logger_(error, text);

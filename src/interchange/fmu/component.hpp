@@ -13,14 +13,10 @@ namespace abs_hil::interchange::fmu {
 /// Log message of an instance: true for an error.
 using Logger = std::function<void(bool error, const std::string& text)>;
 
-/// The state of an instance: the values of its parameters, and what it was given in every step since its start. To set
-/// it, the instance starts again and repeats the steps. That is exact, because a model is a function of its inputs; and
-/// it works for every law, whose state is its own.
+/// The state of an instance at one time, as bytes of this build: parameters, inputs, outputs and what the model is made
+/// of.
 struct State {
-  std::vector<std::string> values{};  ///< texts of all variables but outputs
-  bool started{false};
-  double start_s{0.0};
-  std::vector<double> steps{};  ///< for each step: duration and inputs, as numbers
+  std::string content{};
 };
 
 [[nodiscard]] std::string to_bytes(const State& state);
@@ -43,23 +39,21 @@ class Component {
   /// As after instantiation.
   void reset();
 
-  [[nodiscard]] State state() const;
+  [[nodiscard]] State state();
   void restore(const State& state);
   void log(bool error, const std::string& text) const;
 
  private:
-  [[nodiscard]] std::vector<double> inputs() const;
-  void set_inputs(const double* values) const;
+  void exchange_state(rig::StateBytes& bytes);
 
   std::string name_;
+  std::string token_;
   std::unique_ptr<Model> model_;
-  std::vector<std::string> first_values_{};
+  State first_{};
   Logger logger_;
   bool started_{false};
   double start_s_{0.0};
   double time_s_{0.0};
-  std::vector<double> steps_{};
-  std::size_t input_count_{0};
 };
 
 }  // namespace abs_hil::interchange::fmu

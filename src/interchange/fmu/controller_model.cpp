@@ -101,4 +101,11 @@ void ControllerModel::step(double duration_s) {
   estimated_torque_Nm_ = record.control.brake_torque_est_Nm;
 }
 
+void ControllerModel::exchange_state(rig::StateBytes& state) {
+  logic_->exchange_state(state);
+  state(latch_, start_s_, time_s_);
+  state(brake_torque_ref_Nm_, brake_duty_, omega1_est_rad_s_, omega2_est_rad_s_, slip_est_, theta_est_N_,
+        estimated_torque_Nm_);
+}
+
 }  // namespace abs_hil::interchange::fmu

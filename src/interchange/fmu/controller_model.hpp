@@ -27,6 +27,7 @@ class ControllerModel final : public Model {
   ControllerModel();
   void start(double time_s) override;
   void step(double duration_s) override;
+  void exchange_state(rig::StateBytes& state) override;
 
   control::ControlOptions control{};
   rig::RigParameters model{};

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "abs_hil/rig/option.hpp"
+#include "abs_hil/rig/state_bytes.hpp"
 
 namespace abs_hil::interchange::fmu {
 
@@ -35,6 +36,8 @@ class Model {
   virtual void start(double time_s) = 0;
   /// Goes on by `duration_s` > 0 under the present inputs. Throws std::invalid_argument for a bad input or duration.
   virtual void step(double duration_s) = 0;
+  /// All that `start` and `step` have made, but not the variables. Between `start` and the end.
+  virtual void exchange_state(rig::StateBytes& state) = 0;
 
  protected:
   /// The rows of `options` as parameters; rows that `wanted` refuses are left out.

@@ -78,4 +78,11 @@ void PlantModel::step(double duration_s) {
   read();
 }
 
+void PlantModel::exchange_state(rig::StateBytes& state) {
+  driver_->exchange_state(state);
+  state(start_s_, time_s_);
+  state(upper_counts_, lower_counts_, omega1_rad_s_, omega2_rad_s_, slip_, brake_torque_Nm_, theta_N_, car_speed_m_s_,
+        distance_m_);
+}
+
 }  // namespace abs_hil::interchange::fmu

@@ -23,6 +23,7 @@ class PlantModel final : public Model {
   PlantModel();
   void start(double time_s) override;
   void step(double duration_s) override;
+  void exchange_state(rig::StateBytes& state) override;
 
   plant_sim::PlantOptions options{};
   experiment::ExperimentOptions experiment{};
