@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 #: what `abs_hil compare` varies by default
 STANDARD_VARIATION = 'parameters=0.1,theta=0.1,phase'
+_ARGUMENTS = {'controller', 'plant', 'model', 'experiment', 'config', 'seed', 'set', 'inject'}
 
 
 def simulate(controller: Any = 'adaptive', plant: PathLike = 'paper-table1', experiment: PathLike = 'paper',
@@ -148,6 +149,9 @@ def simulate_many(runs: Iterable[Mapping[str, Any]] | Mapping[str, Sequence[Any]
         raise ValueError(f'threads {threads}: give a number in [0, 1024]')
     given, laws = [], []
     for run in jobs:
+        if unknown := run.keys() - _ARGUMENTS:
+            raise ValueError(f'{sorted(unknown)[0]!r} is no argument of a run; give some of {", ".join(sorted(_ARGUMENTS))}, and '
+                             'configuration values in "set", or by dotted key in a grid')
         if run.get('inject'):
             raise ValueError(f'inject {run["inject"]!r}: many runs are simulated without faults; use simulate for this one')
         laws.append(_law_of(run.get('controller')))

@@ -208,6 +208,12 @@ def test_a_series_is_that_of_the_program(tmp_path, abs_hil_program):
         abs_hil.simulate_series('no-such')
 
 
+def test_an_argument_that_no_run_has_is_refused_by_name():
+    for runs in ([{'thresold': 1}], {'thresold': [1, 2]}):
+        with pytest.raises(ValueError, match="'thresold' is no argument of a run; give some of config, controller, .*"):
+            abs_hil.simulate_many(runs)
+
+
 @pytest.mark.skipif(not hasattr(signal, 'SIGALRM'), reason='Windows has no alarm')
 @pytest.mark.parametrize('threads', [1, 2])
 def test_a_signal_ends_many_slow_runs_at_once(threads):
