@@ -173,6 +173,27 @@ class Page(ReportTest):
         self.assertIn('--backend rig --model paper-table1', rig)
         self.assertNotRegex(rig, r'plant\.|start_speed')
 
+    def test_an_experiment_of_ones_own(self):
+        self.lab()
+        self.open('#' + words_of())
+        own = self.folder / 'mine.toml'
+
+        def give(text):
+            own.write_text(text)
+            root = self.browser.call('DOM.getDocument')['root']['nodeId']
+            field = self.browser.call('DOM.querySelector', nodeId=root, selector='#own-experiment')['nodeId']
+            self.after(lambda: self.browser.call('DOM.setFileInputFiles', nodeId=field, files=[str(own)]))
+        give('[[phase]]\nname = "brake"\nbrake = 2\n')
+        self.assertRegex(self.value('document.getElementById("problem").textContent'), r'mine\.toml:3')
+        give('[[phase]]\nname = "pull"\nbrake = "controller"\nuntil = { lasts_s = 0.7 }\n')
+        self.assertEqual(self.value('document.getElementById("problem").textContent'), '')
+        self.assertIn('phasepull', self.value('document.getElementById("why").textContent'))
+        line = self.value('document.getElementById("line-simulator").value')
+        self.assertIn('--experiment mine.toml', line)
+        self.value('document.getElementById("save-csv").click()')
+        self.assertEqual(self.program(line), self.downloaded('run-1.csv').read_bytes())
+        self.assertEqual(self.browser.said, [])
+
     def test_curves_are_the_programs_rows(self):
         self.lab()
         self.open('#' + words_of() + '&&' + words_of(**{'control.rate_Hz': 500}).replace('adaptive', 'pi'))

@@ -138,7 +138,7 @@ class Controls {
       textContent: rows.find((row) => row.name === run[name])?.meaning ?? '' });
     const select = element('select', { id: `choice-${name}`, 'aria-describedby': about.id, disabled: choices.length < 2,
       onchange: () => this.changed(name, select.value) }, ...choices.map((row) =>
-      element('option', { value: row.name, textContent: row.name, title: row.meaning, selected: row.name === run[name] })));
+      element('option', { value: row.name, textContent: nameOf(row.name), title: row.meaning, selected: row.name === run[name] })));
     if (select.value !== run[name]) {
       select.append(element('option', { value: run[name], textContent: run[name], selected: true }));
     }

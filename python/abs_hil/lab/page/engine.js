@@ -19,12 +19,21 @@ class Engine {
     return new TextDecoder().decode(new Uint8Array(this.exports.memory.buffer, address, this.exports.lab_size()));
   }
 
-  // Throws an Error with the program's own message for words that it refuses.
-  run(words) {
-    const bytes = new TextEncoder().encode(JSON.stringify(words));
+  passed(text) {
+    const bytes = new TextEncoder().encode(text);
     const address = this.exports.lab_take(bytes.length);
     new Uint8Array(this.exports.memory.buffer, address, bytes.length).set(bytes);
-    const answer = JSON.parse(this.text(this.exports.lab_run(address, bytes.length)));
+    return [address, bytes.length];
+  }
+
+  // From now on there is a file of this name.
+  give(name, text) {
+    this.exports.lab_give_file(...this.passed(name), ...this.passed(text));
+  }
+
+  // Throws an Error with the program's own message for words that it refuses.
+  run(words) {
+    const answer = JSON.parse(this.text(this.exports.lab_run(...this.passed(JSON.stringify(words)))));
     if (answer.error) throw new Error(answer.error);
     const columns = new Map();
     for (const { name, unit, own, address: at } of answer.columns) {

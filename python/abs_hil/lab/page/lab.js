@@ -158,6 +158,15 @@ async function lab() {
     save('lab-experiment.toml', experimentFile(run, text, controls.keys), 'application/toml');
   }
 
+  // A reader's own experiment. Each file is another one, because the program reads each once.
+  async function own(file) {
+    const text = await file.text();
+    const name = `/given/${engine.tables.experiments.length}/${file.name}`;
+    engine.give(name, text);
+    engine.tables.experiments.push({ name, meaning: `your file ${file.name}`, text });
+    change('experiment', name);
+  }
+
   async function copy(button, text) {
     const before = button.textContent;
     try {
@@ -173,6 +182,10 @@ async function lab() {
   at('whole').addEventListener('change', () => { state.whole = at('whole').checked; draw(); });
   at('moment').addEventListener('input', () => { play(false); moment(+at('moment').value, true); });
   at('play').addEventListener('click', () => play(!state.playing));
+  at('own-experiment')?.addEventListener('change', ({ target }) => {
+    if (target.files[0]) own(target.files[0]);
+    target.value = '';  // the same file may come again, with other contents
+  });
   at('save-csv').addEventListener('click', csv);
   at('save-experiment').addEventListener('click', experiment);
   at('copy-link').addEventListener('click', () => copy(at('copy-link'), location.href));

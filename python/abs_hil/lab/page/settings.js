@@ -20,16 +20,19 @@ function wordsOf(run, hidden = {}) {
 const quoted = (word) => (/^[\w./=:+-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
 const commandOf = (words) => words.map(quoted).join(' ');
 
+// Of a reader's own experiment the file's name without the folder that it has in the page.
+const nameOf = (experiment) => experiment.split('/').at(-1);
+
 // The same run in the simulator, from the experiment's file and these words.
 function simulatorLine(run) {
-  return `abs_hil --fast --no-lcm ${commandOf(wordsOf(run))} --out runs/lab`;
+  return `abs_hil --fast --no-lcm ${commandOf(wordsOf({ ...run, experiment: nameOf(run.experiment) }))} --out runs/lab`;
 }
 
 // A rig has no plant to set, and its wheels stand at first.
 const onRig = (key) => !key.startsWith('plant.') && key !== 'experiment.start_speed_rad_s' && key !== 'run.seed';
 
 function rigLine(run) {
-  const words = ['--backend', 'rig', '--model', run.plant, '--controller', run.controller, '--experiment', run.experiment];
+  const words = ['--backend', 'rig', '--model', run.plant, '--controller', run.controller, '--experiment', nameOf(run.experiment)];
   for (const [key, value] of Object.entries(run.set)) if (onRig(key)) words.push('--set', `${key}=${value}`);
   return `abs_hil ${commandOf(words)} --out runs/rig`;
 }
