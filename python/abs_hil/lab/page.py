@@ -24,7 +24,7 @@ def module() -> bytes:
         if place.exists():
             return place.read_bytes()
     raise Unavailable('the simulation core for browsers (abs_hil_lab.wasm) is missing; scripts/lab.sh in the source folder '
-                      'makes it, in about 5 minutes')
+                      'makes it, in a few minutes')
 
 
 def _text(name: str) -> str:
