@@ -17,22 +17,23 @@ STEP_S = 5e-4
 PER_COUNT_RAD = 2 * math.pi / 4096
 
 
-def driven(log, values, random, wander=1.0, release=1.0, by_sliding_s_m=0.0):
+def driven(log, values, random, wander=1.0, release=1.0, by_sliding_s_m=0.0, fading_per_J=0.0, cools_in_s=math.inf):
     """The log whose duties drive such a rig, with other counts.
 
     values: the plant's keys; wander: over WANDER; release: how much faster the brake lets go than it takes hold;
-    by_sliding_s_m: by how much of itself the friction falls for each m/s between the wheels' surfaces
+    by_sliding_s_m: by how much of itself the friction falls for each m/s between the wheels' surfaces;
+    fading_per_J: share of the brake's torque lost for each joule in it, which leaves it over `cools_in_s`
     """
     v = values
     angle1, angle2 = random.uniform(size=2) * PER_COUNT_RAD
     moved = (log.counts[40] - log.counts[0]) * PER_COUNT_RAD / (log.time_s[40] - log.time_s[0])
     w1, w2 = (float(speed) if moved[1] > 1.0 else 0.0 for speed in moved)
-    torque = 0.0
+    torque = heat_J = 0.0
     places = int(log.time_s[-1] / WANDER_S) + 3
     factors = [1 + wander * sd * random.standard_normal(places) for sd in WANDER]
 
-    def rates(w1, w2, torque, brake, motor, apart, factor):
-        target = max(0.0, v['b1_Nm'] * brake + v['b2_Nm']) * factor[1] if brake >= v['u0'] else 0.0
+    def rates(w1, w2, torque, hot, brake, motor, apart, factor):
+        target = max(0.0, v['b1_Nm'] * brake + v['b2_Nm']) * factor[1] * hot if brake >= v['u0'] else 0.0
         speed1, speed2 = v['r1_m'] * w1, v['r2_m'] * w2
         force, fastest = 0.0, max(abs(speed1), abs(speed2))
         if not apart and fastest > 0.02:
@@ -58,8 +59,10 @@ def driven(log, values, random, wander=1.0, release=1.0, by_sliding_s_m=0.0):
         factor = [one[int(place)] * (1 - part) + one[int(place) + 1] * part for one in factors]
         acts = log.brake_pwm[row], log.motor_pwm[row], log.wheels_apart[row] != 0, factor
         for _ in range(steps):
-            a = rates(w1, w2, torque, *acts)
-            b = rates(w1 + 0.5 * h * a[0], w2 + 0.5 * h * a[1], torque + 0.5 * h * a[2], *acts)
+            hot = math.exp(-fading_per_J * heat_J)
+            heat_J += h * (torque * w1 - heat_J / cools_in_s)
+            a = rates(w1, w2, torque, hot, *acts)
+            b = rates(w1 + 0.5 * h * a[0], w2 + 0.5 * h * a[1], torque + 0.5 * h * a[2], hot, *acts)
             angle1 += h * (w1 + 0.5 * h * a[0])
             angle2 += h * (w2 + 0.5 * h * a[1])
             w1, w2, torque = max(0.0, w1 + h * b[0]), max(0.0, w2 + h * b[1]), max(0.0, torque + h * b[2])

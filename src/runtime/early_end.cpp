@@ -158,18 +158,6 @@ CycleInThisThread::~CycleInThisThread() {
   of_this_thread = before_;
 }
 
-SlowCycleWatch::SlowCycleWatch(std::int64_t period_ns)
-    : period_s_(static_cast<double>(period_ns) * 1e-9), thread_([this] { watch(); }) {}
-
-SlowCycleWatch::~SlowCycleWatch() {
-  {
-    const std::lock_guard lock(mutex_);
-    ending_ = true;
-  }
-  end_.notify_one();
-  thread_.join();
-}
-
 void SlowCycleWatch::watch() {
   sigset_t all{};
   sigfillset(&all);

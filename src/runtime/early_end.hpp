@@ -54,10 +54,18 @@ class CycleInThisThread {
 class SlowCycleWatch {
  public:
   /// @param period_ns  of virtual time; 0: real time, which limits no whole
-  explicit SlowCycleWatch(std::int64_t period_ns);
+  explicit SlowCycleWatch(std::int64_t period_ns)
+      : period_s_(static_cast<double>(period_ns) * 1e-9), thread_([this] { watch(); }) {}
   SlowCycleWatch(const SlowCycleWatch&) = delete;
   SlowCycleWatch& operator=(const SlowCycleWatch&) = delete;
-  ~SlowCycleWatch();
+  ~SlowCycleWatch() {
+    {
+      const std::lock_guard lock(mutex_);
+      ending_ = true;
+    }
+    end_.notify_one();
+    thread_.join();
+  }
   /// Real-time safe.
   void cycle_begins() noexcept { inside_.store(true, std::memory_order_relaxed); }
   void cycle_ended() noexcept {

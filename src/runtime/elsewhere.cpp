@@ -41,18 +41,6 @@ EarlyEndWatch::~EarlyEndWatch() = default;
 CycleInThisThread::CycleInThisThread(Outputs& outputs, bool /*own_thread*/) noexcept : before_(&outputs) {}
 CycleInThisThread::~CycleInThisThread() = default;
 
-SlowCycleWatch::SlowCycleWatch(std::int64_t period_ns)
-    : period_s_(static_cast<double>(period_ns) * 1e-9), thread_([this] { watch(); }) {}
-
-SlowCycleWatch::~SlowCycleWatch() {
-  {
-    const std::lock_guard lock(mutex_);
-    ending_ = true;
-  }
-  end_.notify_one();
-  thread_.join();
-}
-
 void SlowCycleWatch::watch() {
   constexpr auto tick = std::chrono::milliseconds(100);
   constexpr int ticks_max = 50;
