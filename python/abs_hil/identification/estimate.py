@@ -14,7 +14,7 @@ from .delay import with_delay
 from .fit import ROUNDS, disturbed_fit, finish_fit, likely_u0, search_u0, start_fit
 from .forms import better_form
 from .found import LARGEST_DISAGREEMENT, Finished, Identified, assembled, interrupted, leave_form_open, name_disagreement, refuse
-from .linear import step
+from .linear import run_filter, step
 from .logs import Log, load_log
 from .parameters import FORMS, WHEELS, checked_keys
 from .problem import LARGEST_QUIET_RMS, QUIET, Fit, Problem
@@ -84,6 +84,8 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
     fit, decided = (fits[0], True) if len(fits) == 1 else better_form(fits, start_form, check, say, notes)
     try:
         finished = _finished(fit, seed, say, check)
+        if finished.causes and len(fits) > 1:
+            finished = _other_form(finished, next(one for one in fits if one is not fit), seed, say, check)
     except KeyboardInterrupt:
         return interrupted(fit, str(start), notes)
     of_logs = list(notes)
@@ -133,18 +135,20 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
     undisturbed = _undisturbed(fit.copy(), check, say)
     quiet = undisturbed is not None and undisturbed.rms_counts <= LARGEST_QUIET_RMS
     causes: list[structure.Found] = []
+    cost = 0.0
     if undisturbed is not None and quiet:
         fit = undisturbed
     else:
         left = f'residual {undisturbed.rms_counts:.3g} counts RMS' if undisturbed is not None else 'no fit without disturbances'
         say(f'{left}: the rig wanders, or the model lacks something')
         try:
-            fit = _explained_first(fit, check, say)
+            fit, first_causes, cost = _explained_first(fit, check, say)
             fit = disturbed_fit(fit, check, say)
             limited = rate_limit.started(fit, check)
             fit = fit if limited is fit else disturbed_fit(limited, check, say)
             again, causes = structure.explained(fit, fit.disturbances, check, say)
             fit = fit if again is fit else disturbed_fit(again, check, say)
+            causes = first_causes or causes if causes else []  # the first ones are surer
         except (ValueError, np.linalg.LinAlgError) as error:
             raise ValueError(f'the fit does not converge: these logs are not of a rig that the plant describes ({error})'
                              ) from None
@@ -155,22 +159,34 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
     gaps = likely_u0(fit, QUIET if quiet else fit.disturbances, check)
     say('intervals')
     spread = intervals.bootstrap(fit, seed, check=check) if quiet else intervals.information(fit)
-    return Finished(fit, spread, gaps, None if quiet else fit.disturbances, round_discs, causes)
+    return Finished(fit, spread, gaps, None if quiet else fit.disturbances, round_discs, causes, cost)
 
 
-def _explained_first(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit:
+def _other_form(finished: Finished, other: Fit, seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
+    """The fit of the form that needs no causes which the plant lacks, or else of the one that is likelier with its cause."""
+    try:
+        again = _finished(other, seed, say, check)
+    except ValueError:
+        return finished
+    if bool(again.causes) != bool(finished.causes):
+        return finished if again.causes else again
+    return min(finished, again, key=lambda one: one.cost)
+
+
+def _explained_first(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> tuple[Fit, list[structure.Found], float]:
     """The fit with the flaws of the brake that it shows while small disturbances are allowed: those that the likelihood asks
-    for would take the flaws up."""
+    for would take the flaws up. With the causes that are left, and -2 log likelihood with the surest of them."""
     disturbances = ROUNDS[1][0]
     near = rate_limit.without(fit)  # a limit that was found may stand for a flaw
     for _ in range(3):
         step(near, disturbances, check)
     if search_u0(near, disturbances, 0.01, 9, check):
         step(near, disturbances, check)
-    flawed, _ = structure.explained(near, disturbances, check, say)
-    if flawed is near:
-        return fit
-    return structure.explained(rate_limit.started(flawed, check), disturbances, check, say)[0]
+    flawed, left = structure.explained(near, disturbances, check, say)
+    if flawed is not near:
+        flawed, left = structure.explained(rate_limit.started(flawed, check), disturbances, check, say)
+    cost = run_filter(flawed, disturbances)[0] - (left[0].sure**2 if left else 0.0)
+    return (fit if flawed is near else flawed), left, cost
 
 
 def _undisturbed(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> Fit | None:

@@ -64,13 +64,15 @@ class Identified:
 @dataclass
 class Finished:
     """The last fit, what its intervals are made of, the disturbances if there are any, the largest eccentricity of the
-    discs that no log shows, and what the disturbances have in common that the plant lacks."""
+    discs that no log shows, what the disturbances have in common that the plant lacks, and
+    -2 log likelihood with small disturbances and the surest of those causes."""
     fit: Fit
     spread: intervals.Spread
     gaps: list[tuple[float, float, float]]
     disturbances: Disturbances | None
     round_discs: dict[str, float]
     causes: list[structure.Found] = field(default_factory=list)
+    cost: float = 0.0
 
 
 def interrupted(fit: Fit, start: str, notes: list[str]) -> Identified:

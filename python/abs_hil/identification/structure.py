@@ -45,22 +45,25 @@ class Signals:
 
 @dataclass(frozen=True)
 class Cause:
-    """acts: the disturbance that it would be (problem.DISTURBANCES), or the parameter; follows: what that would follow, at
-    each row, in `unit`; flaw: the parameter of the plant that describes it, if there is one."""
+    """words, against: what a positive and a negative coefficient mean; acts: the disturbance that it would be
+    (problem.DISTURBANCES), or the parameter; follows: what that would follow, at each row, in `unit`; flaw: the parameter of
+    the plant that describes it, if there is one."""
     words: str
     unit: str
     acts: str
     follows: Callable[[Signals], np.ndarray]
     flaw: str = ''
+    against: str = ''
 
 
 CAUSES = (
-    Cause('the brake gets weaker with the energy put in', 'per J', 'brake', lambda s: -s.energy_J, FADING.key),
+    Cause('the brake gets weaker with the energy put in', 'per J', 'brake', lambda s: -s.energy_J, FADING.key,
+          'the brake gets stronger with the energy put in'),
     Cause('the brake holds more after its duty fell than after it rose', 'of its torque', 'brake', lambda s: fallen(s.static_Nm),
-          HYSTERESIS.key),
-    Cause('the brake acts late', 's', DELAY, lambda s: s.brakes_alone, DEAD_TIME.key),
+          HYSTERESIS.key, 'the brake holds less after its duty fell than after it rose'),
+    Cause('the brake acts late', 's', DELAY, lambda s: s.brakes_alone, DEAD_TIME.key, 'the brake acts early'),
     Cause('the brake lets go faster than it takes hold', 'of its lag', 'c31_per_s',
-          lambda s: (s.static_Nm < s.torque_Nm).astype(float)),
+          lambda s: (s.static_Nm < s.torque_Nm).astype(float), against='the brake lets go more slowly than it takes hold'),
     Cause("the brake's torque is no straight line of its duty", 'of its torque at the largest', 'brake',
           lambda s: s.static_Nm / s.most_Nm),
     Cause("the brake's torque changes with the upper wheel's speed", 'per rad/s', 'brake', lambda s: s.omega_rad_s[:, 0]),
@@ -90,6 +93,10 @@ class Found:
     @property
     def sure(self) -> float:
         return abs(self.coefficient) / self.sd
+
+    @property
+    def words(self) -> str:
+        return self.cause.against if self.coefficient < 0.0 and self.cause.against else self.cause.words
 
 
 def causes_of(fit: Fit, disturbances: Disturbances) -> list[Found]:
@@ -219,8 +226,8 @@ def sentence(causes: Sequence[Found], fit: Fit) -> str:
     """What does not fit, where it shows most, and what that means."""
     surest = causes[0]
     log, phase = _where(surest.cause, fit)
-    also = ', '.join(dict.fromkeys(one.cause.words for one in causes[1:3] if one.cause.words != surest.cause.words))
-    return (f'the logs do not fit this plant: {surest.cause.words} ({surest.coefficient:.3g} {surest.cause.unit}, '
+    also = ', '.join(dict.fromkeys(one.words for one in causes[1:3] if one.words != surest.words))
+    return (f'the logs do not fit this plant: {surest.words} ({surest.coefficient:.3g} {surest.cause.unit}, '
             f'{surest.sure:.0f} standard deviations from none), most in {log}{f", phase {phase}" if phase else ""}. The plant '
             f'has no parameter for it{f"; {also} would show so as well" if also else ""}')
 
