@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "abs_hil/rig/state_bytes.hpp"
 #include "program/command_line.hpp"
 
 namespace abs_hil::python {
@@ -55,5 +56,21 @@ class PythonControllerScope {
  private:
   py::object controller_;
 };
+
+/// The methods state_bytes and take_state_bytes of a class with `exchange_state`, for copies and pickles.
+template <class Class>
+void add_state_bytes(py::class_<Class>& type) {
+  type.def("state_bytes",
+           [](Class& self) {
+             rig::StateBytes bytes;
+             self.exchange_state(bytes);
+             return py::bytes(bytes.written());
+           })
+      .def("take_state_bytes", [](Class& self, const std::string& kept) {
+        rig::StateBytes bytes(kept);
+        self.exchange_state(bytes);
+        bytes.end();
+      });
+}
 
 }  // namespace abs_hil::python

@@ -105,6 +105,12 @@ class LawByHand {
   }
   void reset(const SlipInput& input) { controller_->reset(input); }
   SlipOutput step(const SlipInput& input) { return controller_->step(input); }
+  /// Throws std::invalid_argument for a law that cannot.
+  void exchange_state(rig::StateBytes& state) {
+    if (controller_->exchange_state(state)) return;
+    throw std::invalid_argument("controller " + name_ + ": its state cannot be copied or pickled; those of " +
+                                "abs_hil.controllers() can");
+  }
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] py::dict signals() const {
     py::dict signals;
@@ -143,20 +149,27 @@ void add_input(py::module_& module) {
            py::arg("mean_brake_torque_Nm") = 0.0, py::arg("alpha1_rad_s2") = 0.0, py::arg("alpha2_rad_s2") = 0.0,
            py::arg("upper_travel_rad") = rig::unknown, py::arg("lower_travel_rad") = rig::unknown,
            py::arg("sent_brake_torque_Nm") = 0.0, py::arg("unsent_torque_Nm") = 0.0)
-      .def_readonly("dt_s", &SlipInput::dt_s)
-      .def_property_readonly("omega1_rad_s", [](const SlipInput& i) { return i.speeds.omega1_rad_s; })
-      .def_property_readonly("omega2_rad_s", [](const SlipInput& i) { return i.speeds.omega2_rad_s; })
-      .def_readonly("slip", &SlipInput::slip)
-      .def_readonly("slip_ref", &SlipInput::slip_ref)
-      .def_readonly("mean_brake_torque_Nm", &SlipInput::mean_brake_torque_Nm)
-      .def_readonly("brake_torque_Nm", &SlipInput::brake_torque_Nm)
-      .def_readonly("max_brake_torque_Nm", &SlipInput::max_brake_torque_Nm)
-      .def_readonly("alpha1_rad_s2", &SlipInput::alpha1_rad_s2)
-      .def_readonly("alpha2_rad_s2", &SlipInput::alpha2_rad_s2)
-      .def_readonly("upper_travel_rad", &SlipInput::upper_travel_rad)
-      .def_readonly("lower_travel_rad", &SlipInput::lower_travel_rad)
-      .def_readonly("sent_brake_torque_Nm", &SlipInput::sent_brake_torque_Nm)
-      .def_readonly("unsent_torque_Nm", &SlipInput::unsent_torque_Nm)
+      .def_readonly("dt_s", &SlipInput::dt_s, "time since the previous step, s")
+      .def_property_readonly(
+          "omega1_rad_s", [](const SlipInput& i) { return i.speeds.omega1_rad_s; }, "estimated speed, rad/s")
+      .def_property_readonly(
+          "omega2_rad_s", [](const SlipInput& i) { return i.speeds.omega2_rad_s; }, "estimated speed, rad/s")
+      .def_readonly("slip", &SlipInput::slip, "estimated slip")
+      .def_readonly("slip_ref", &SlipInput::slip_ref, "its reference")
+      .def_readonly("mean_brake_torque_Nm", &SlipInput::mean_brake_torque_Nm,
+                    "mean of the torque over the past interval, N m")
+      .def_readonly("brake_torque_Nm", &SlipInput::brake_torque_Nm, "torque estimated to act now, N m")
+      .def_readonly("max_brake_torque_Nm", &SlipInput::max_brake_torque_Nm,
+                    "the largest that the actuator can give, N m")
+      .def_readonly("alpha1_rad_s2", &SlipInput::alpha1_rad_s2, "estimated acceleration of the upper wheel, rad/s^2")
+      .def_readonly("alpha2_rad_s2", &SlipInput::alpha2_rad_s2, "estimated acceleration of the lower wheel, rad/s^2")
+      .def_readonly("upper_travel_rad", &SlipInput::upper_travel_rad,
+                    "angle over the past interval, rad; NaN if unknown")
+      .def_readonly("lower_travel_rad", &SlipInput::lower_travel_rad,
+                    "angle over the past interval, rad; NaN if unknown")
+      .def_readonly("sent_brake_torque_Nm", &SlipInput::sent_brake_torque_Nm,
+                    "static torque sent in the previous cycle, N m")
+      .def_readonly("unsent_torque_Nm", &SlipInput::unsent_torque_Nm, "what was missing in it, N m")
       .def("__repr__", [](const SlipInput& i) {
         return fmt::format("SlipInput(dt_s={}, omega1_rad_s={}, omega2_rad_s={}, slip={}, slip_ref={}, ...)", i.dt_s,
                            i.speeds.omega1_rad_s, i.speeds.omega2_rad_s, i.slip, i.slip_ref);
@@ -181,12 +194,14 @@ void add_output(py::module_& module) {
            py::arg("brake_torque_Nm"), py::kw_only(), py::arg("slip_velocity_error_m_s") = rig::unknown,
            py::arg("theta_est_N") = rig::unknown, py::arg("slip_ref") = rig::unknown,
            py::arg("signals") = std::vector<double>())
-      .def_readonly("brake_torque_Nm", &SlipOutput::brake_torque_Nm)
-      .def_readonly("slip_velocity_error_m_s", &SlipOutput::slip_velocity_error_m_s)
-      .def_readonly("theta_est_N", &SlipOutput::theta_est_N)
-      .def_readonly("slip_ref", &SlipOutput::slip_ref)
+      .def_readonly("brake_torque_Nm", &SlipOutput::brake_torque_Nm, "wanted static torque, N m")
+      .def_readonly("slip_velocity_error_m_s", &SlipOutput::slip_velocity_error_m_s,
+                    "error of the slip velocity, m/s; NaN if the controller gives none")
+      .def_readonly("theta_est_N", &SlipOutput::theta_est_N, "estimated peak tyre force, N; NaN if none")
+      .def_readonly("slip_ref", &SlipOutput::slip_ref, "own reference of slip; NaN if none")
       .def_property_readonly(
-          "signals", [](const SlipOutput& o) { return std::vector<double>(o.signals.begin(), o.signals.end()); })
+          "signals", [](const SlipOutput& o) { return std::vector<double>(o.signals.begin(), o.signals.end()); },
+          "values of the controller's own signals")
       .def("__repr__", [](const SlipOutput& o) {
         return fmt::format("SlipOutput({}, slip_velocity_error_m_s={}, theta_est_N={}, slip_ref={})", o.brake_torque_Nm,
                            o.slip_velocity_error_m_s, o.theta_est_N, o.slip_ref);
@@ -208,8 +223,9 @@ void PythonControllerScope::rethrow() const {
 void add_controllers(py::module_& module) {
   add_input(module);
   add_output(module);
-  py::class_<LawByHand>(module, "Controller")
-      .def(py::init<const py::dict&>())
+  py::class_<LawByHand> controller_class(module, "Controller");
+  add_state_bytes(controller_class);
+  controller_class.def(py::init<const py::dict&>())
       .def("reset", &LawByHand::reset, py::arg("input"))
       .def("step", &LawByHand::step, py::arg("input"))
       .def_property_readonly("name", &LawByHand::name)

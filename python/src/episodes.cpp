@@ -153,6 +153,12 @@ class Episodes {
     const py::gil_scoped_release release;
     study::for_each_index(episodes_.size(), threads_, [&](std::size_t i) { at(i).step(action[i], cycles); });
   }
+  /// Steps one rig through the actions, for `cycles` control periods each.
+  void replay(std::size_t rig, const Values& actions, int cycles) {
+    const double* action = actions.data();
+    const py::gil_scoped_release release;
+    for (py::ssize_t i = 0; i < actions.size(); ++i) at(rig).step(action[i], cycles);
+  }
   /// Shape (rigs, values).
   [[nodiscard]] py::array_t<double> values() {
     py::array_t<double> all({episodes_.size(), Episode::value_count});
@@ -181,6 +187,7 @@ void add_episodes(py::module_& module) {
       .def("reset", &Episodes::reset, py::arg("rig"), py::arg("options"), py::arg("vary"), py::arg("seed"),
            py::arg("index"), py::arg("law"))
       .def("step", &Episodes::step, py::arg("actions"), py::arg("cycles"))
+      .def("replay", &Episodes::replay, py::arg("rig"), py::arg("actions"), py::arg("cycles"))
       .def("values", &Episodes::values);
 }
 

@@ -4,10 +4,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
 
+#include "abs_hil/rig/brake_map.hpp"
 #include "bindings.hpp"
 
 namespace abs_hil::python {
@@ -51,7 +53,19 @@ void advance(Plant& plant, double duration_s, double motor_duty, double brake_du
                     "set={{\"plant.ideal_actuator\": True}}",
                     brake_torque_Nm));
   }
-  plant.advance(duration_s, {motor_duty, brake_duty, brake_torque_Nm});
+  constexpr double uninterrupted_s = 5.0;  // takes a tenth of a second
+  for (double left_s = duration_s; left_s > 0.0; left_s -= uninterrupted_s) {
+    plant.advance(std::min(left_s, uninterrupted_s), {motor_duty, brake_duty, brake_torque_Nm});
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  }
+}
+
+double brake_duty_for(const Plant& plant, double torque_Nm) {
+  if (!(torque_Nm >= 0.0 && std::isfinite(torque_Nm))) {
+    throw std::invalid_argument(fmt::format("torque_Nm = {}: give a finite torque of 0 or more", torque_Nm));
+  }
+  const rig::BrakeParameters& brake = plant.options().rig.brake;
+  return rig::brake_duty_for(brake, torque_Nm, rig::BrakeDuties<double>(brake, 1.0, 0));
 }
 
 constexpr const char* state_help =
@@ -70,11 +84,11 @@ void add_plant(py::module_& module) {
            }),
            py::kw_only(), py::arg("angle1_rad") = 0.0, py::arg("angle2_rad") = 0.0, py::arg("omega1_rad_s") = 0.0,
            py::arg("omega2_rad_s") = 0.0, py::arg("brake_torque_Nm") = 0.0)
-      .def_readonly("angle1_rad", &PlantState::angle1_rad)
-      .def_readonly("angle2_rad", &PlantState::angle2_rad)
-      .def_readonly("omega1_rad_s", &PlantState::omega1_rad_s)
-      .def_readonly("omega2_rad_s", &PlantState::omega2_rad_s)
-      .def_readonly("brake_torque_Nm", &PlantState::brake_torque_Nm)
+      .def_readonly("angle1_rad", &PlantState::angle1_rad, "angle of the upper wheel, rad")
+      .def_readonly("angle2_rad", &PlantState::angle2_rad, "angle of the lower wheel, rad")
+      .def_readonly("omega1_rad_s", &PlantState::omega1_rad_s, "speed of the upper, braked wheel, rad/s")
+      .def_readonly("omega2_rad_s", &PlantState::omega2_rad_s, "speed of the lower wheel, the road, rad/s")
+      .def_readonly("brake_torque_Nm", &PlantState::brake_torque_Nm, "torque of the brake that acts, N m")
       .def("__repr__",
            [](const PlantState& s) {
              return fmt::format(
@@ -92,9 +106,9 @@ void add_plant(py::module_& module) {
             check_state(state);
             return state;
           }));
-  py::class_<Plant>(module, "Plant")
-      .def(py::init([](const py::dict& arguments) { return Plant(options_of(arguments)); }))
-      .def(py::init<const Plant&>())
+  py::class_<Plant> plant_class(module, "Plant");
+  add_state_bytes(plant_class);
+  plant_class.def(py::init([](const py::dict& arguments) { return Plant(options_of(arguments)); }))
       .def(
           "reset",
           [](Plant& plant, double omega1_rad_s, double omega2_rad_s, double brake_torque_Nm, double angle1_rad,
@@ -107,6 +121,7 @@ void add_plant(py::module_& module) {
           py::arg("angle1_rad") = 0.0, py::arg("angle2_rad") = 0.0)
       .def("advance", &advance, py::arg("duration_s"), py::kw_only(), py::arg("motor_duty") = 0.0,
            py::arg("brake_duty") = 0.0, py::arg("brake_torque_Nm") = 0.0)
+      .def("brake_duty_for", &brake_duty_for, py::arg("torque_Nm"))
       // The profiles of road and drift stay where they are.
       .def_property(
           "state", [](const Plant& plant) { return plant.state(); },

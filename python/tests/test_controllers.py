@@ -2,6 +2,7 @@
 import copy
 import math
 import pickle
+import signal
 import sys
 
 import numpy as np
@@ -201,7 +202,7 @@ def test_plant_branches():
     plant = abs_hil.Plant('inteco-manual', set={'plant.friction_profile': 'time: 1; 0.5 at 0.2'})
     plant.reset(omega1_rad_s=150.0, omega2_rad_s=150.0)
     plant.advance(0.15, **drive)
-    branches = [plant.copy(), copy.copy(plant), copy.deepcopy(plant)]
+    branches = [plant.copy(), copy.copy(plant), copy.deepcopy(plant), pickle.loads(pickle.dumps(plant))]
     plant.advance(0.1, **drive)
     assert plant.friction == 0.5
     for branch in branches:
@@ -215,6 +216,65 @@ def test_plant_branches():
     assert repr(plant.state) == repr(kept) != after
     plant.advance(0.1, **drive)
     assert repr(plant.state) == after, 'on an even road the state is all'
+
+
+def test_a_duty_for_a_torque_and_a_long_time():
+    plant = abs_hil.Plant('paper-table1')
+    plant.advance(1.0, brake_duty=plant.brake_duty_for(4.0))
+    assert plant.state.brake_torque_Nm == pytest.approx(4.0, rel=1e-6)
+    assert plant.brake_duty_for(0.0) == 0.0 and plant.brake_duty_for(1e3) == 1.0
+    with pytest.raises(ValueError, match='torque_Nm'):
+        plant.brake_duty_for(float('nan'))
+    with pytest.raises(ValueError, match='bogus.*no argument'):
+        abs_hil.simulate_many([{'bogus': 1}])
+    if hasattr(signal, 'SIGALRM'):
+        def interrupt(*_):
+            raise KeyboardInterrupt
+        before = signal.signal(signal.SIGALRM, interrupt)
+        signal.setitimer(signal.ITIMER_REAL, 0.1)
+        try:
+            with pytest.raises(KeyboardInterrupt):
+                plant.advance(1e6, motor_duty=0.5)
+        finally:
+            signal.signal(signal.SIGALRM, before)
+
+
+def test_a_plant_with_every_flaw_is_copied_whole():
+    """Dead time, hysteresis, fading, drift: a copy in the middle of them goes on as its original."""
+    plant = abs_hil.Plant('inteco-manual', set={'plant.brake_dead_time_s': 0.02, 'plant.brake_hysteresis': 0.1,
+                                                'plant.brake_fading_per_J': 1e-3,
+                                                'plant.brake_torque_profile': 'time: 1; 0.7 at 0.3',
+                                                'plant.friction_profile': 'distance: 1; 0.6 at 1'})
+    plant.reset(omega1_rad_s=150.0, omega2_rad_s=150.0)
+    for duty in (0.4, 0.1, 0.5, 0.3):
+        plant.advance(0.007, brake_duty=duty)
+    branch = pickle.loads(pickle.dumps(plant))
+    for duty in (0.2, 0.6) * 20:
+        plant.advance(0.011, brake_duty=duty)
+        branch.advance(0.011, brake_duty=duty)
+        assert repr(branch.state) == repr(plant.state)
+
+
+@pytest.mark.parametrize('name', [name for name in abs_hil.controllers() if name != 'python'])
+def test_laws_branch(name):
+    """Copies of a law in the middle of a braking give what it gives; the law itself has moved on."""
+    law = abs_hil.Controller(name)
+
+    def inputs(n):
+        omega2 = 170.0 - 0.05 * n
+        slip = 0.1 + 0.05 * math.sin(0.02 * n)
+        return abs_hil.SlipInput(dt_s=0.001 if n else 0.0, omega1_rad_s=omega2 * (1 - slip), omega2_rad_s=omega2, slip=slip,
+                                 slip_ref=0.15, max_brake_torque_Nm=8.0, brake_torque_Nm=4.0, mean_brake_torque_Nm=4.0,
+                                 alpha1_rad_s2=-50.0, alpha2_rad_s2=-50.0, upper_travel_rad=omega2 * (1 - slip) * 1e-3,
+                                 lower_travel_rad=omega2 * 1e-3, sent_brake_torque_Nm=4.0)
+
+    law.reset(inputs(0))
+    for n in range(200):
+        law.step(inputs(n))
+    branches = [law.copy(), copy.deepcopy(law), pickle.loads(pickle.dumps(law))]
+    expected = [repr(law.step(inputs(n))) for n in range(200, 400)]
+    for branch in branches:
+        assert [repr(branch.step(inputs(n))) for n in range(200, 400)] == expected
 
 
 def test_law_by_hand():

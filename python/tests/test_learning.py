@@ -1,4 +1,7 @@
 """The learning environments: gymnasium's own checker, the same bits for the same seed, rewards as stated."""
+import copy
+import pickle
+
 import gymnasium
 import numpy as np
 import pytest
@@ -141,3 +144,35 @@ def test_training_improves_and_repeats():
     start = returns(Rigs(4, task, seed=9), Policy(np.zeros(Policy.SIZE)), 0).mean()
     assert returns(Rigs(4, task, seed=9), policy, 0).mean() > start
     assert judge(task, None, 'adaptive', 3).shape == (3,)
+
+
+def test_environments_branch():
+    """A copy in the middle of an episode goes on as its original does, a vector's too, in which episodes began at other times."""
+    env = gymnasium.make(ID).unwrapped
+    env.reset(seed=3)
+    for n in range(40):
+        env.step(np.array([0.3 + 0.01 * (n % 20)], dtype=np.float32))
+    branches = [copy.deepcopy(env), pickle.loads(pickle.dumps(env))]
+    other = copy.deepcopy(env)
+    other.step(np.array([1.0], dtype=np.float32))
+
+    def go_on(one):
+        steps = [one.step(np.array([0.5], dtype=np.float32)) for _ in range(30)]
+        return repr([(step[0].tolist(), *step[1:]) for step in steps] + [one.reset()[1]])
+
+    expected = go_on(env)
+    assert [go_on(branch) for branch in branches] == [expected] * 2
+    assert go_on(other) != expected
+
+    rigs = Rigs(3, seed=5)
+    rigs.reset_all()
+    generator = np.random.default_rng(1)
+    for n in range(60):
+        if n in (20, 45):
+            rigs.reset(n % 3, 10 + n)
+        rigs.step(generator.uniform(0.0, 0.6, 3))
+    branch = copy.deepcopy(rigs)
+    for _ in range(20):
+        actions = generator.uniform(0.0, 0.6, 3)
+        for ours, theirs in zip(rigs.step(actions), branch.step(actions)):
+            np.testing.assert_array_equal(ours, theirs)

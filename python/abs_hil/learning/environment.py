@@ -39,6 +39,9 @@ class SlipControl(gymnasium.Env):
     braking costs.
     Terminated: the car is below 3 m/s, or a fault has ended the run. Truncated after 1000 steps.
 
+    copy.deepcopy(env) and pickle keep its state, for a search that branches; a copy repeats the episode's actions, which takes
+    some milliseconds.
+
     Every episode has another plant: see abs_hil.learning.Task (plant, set, vary, randomise, period_s, start_speed_rad_s),
     whose fields are this environment's arguments. The same seed of `reset` gives the same plants.
     """

@@ -1,6 +1,7 @@
 """Simulated rigs for a learner: what it observes, what it is paid, which plants it meets. Needs NumPy only."""
 from __future__ import annotations
 
+import collections
 import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -61,6 +62,8 @@ class Rigs:
 
     Reward of a step: -|slip - slip_ref| (the true slip) - 0.1 |change of the action|; -450 at the end by a fault.
 
+    copy.deepcopy(rigs) and pickle keep the state of all of them; a copy repeats the episode's actions, some milliseconds.
+
     law: the name of a controller that drives instead of the actions, to compare with.
     """
 
@@ -70,23 +73,49 @@ class Rigs:
         self.task = task or Task()
         self.seed = seed
         self._law = law
+        self._threads = threads
         self._cycles = self.task.cycles
         self._episodes = _core.Episodes(count, 1 if count == 1 else threads)
+        self._index = np.full(count, -1)
+        # What a copy has to repeat: the actions of all rigs, the number of the first of these steps, and of each rig's first.
+        self._log: collections.deque[np.ndarray] = collections.deque()
+        self._first = 0
+        self._begun = np.zeros(count, dtype=np.int64)
         self._action = np.zeros(count)
         self._ended = np.ones(count, dtype=bool)
         self._values = np.full((count, 13), np.nan)
 
     def reset(self, rig: int, index: int) -> np.ndarray:
+        self._begin(rig, index)
+        self._index[rig] = index
+        self._begun[rig] = self._first + len(self._log)
+        while self._first < self._begun.min():
+            self._log.popleft()
+            self._first += 1
+        self._action[rig] = 0.0
+        self._ended[rig] = False
+        self._read()
+        return self.observations()[rig]
+
+    def _begin(self, rig: int, index: int) -> None:
         task = self.task
         drawn = np.random.default_rng([self.seed, index])
         values = {key: float(drawn.uniform(*bounds)) for key, bounds in task.randomise.items()}
         given = options(plant=task.plant, controller=self._law or None,
                         set={'experiment.start_speed_rad_s': task.start_speed_rad_s, **task.set, **values})
         self._episodes.reset(rig, given, task.vary, self.seed, index, bool(self._law))
-        self._action[rig] = 0.0
-        self._ended[rig] = False
-        self._read()
-        return self.observations()[rig]
+
+    def __getstate__(self) -> dict[str, object]:
+        return {name: value for name, value in self.__dict__.items() if name != '_episodes'}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """A copy begins each rig's episode again and repeats its actions: exact, as a simulated rig has no chance in it."""
+        self.__dict__.update(state)
+        self._episodes = _core.Episodes(self.count, 1 if self.count == 1 else self._threads)
+        log = np.array(self._log).reshape(-1, self.count)
+        for rig in np.flatnonzero(self._index >= 0):
+            self._begin(int(rig), int(self._index[rig]))
+            self._episodes.replay(int(rig), log[self._begun[rig] - self._first:, rig].copy(), self._cycles)
 
     def reset_all(self, first: int = 0) -> np.ndarray:
         """Begins an episode of every rig, on the plants first, first + 1, ..."""
@@ -99,6 +128,7 @@ class Rigs:
         if not np.isfinite(actions).all():
             raise ValueError('actions: give numbers in [0, 1]')
         before, done_before = self._action, self._ended.copy()
+        self._log.append(actions)
         self._episodes.step(actions, self._cycles)
         self._read()
         values = self._values
