@@ -70,6 +70,9 @@ add_link_options(-s)
 if(APPLE)
   set(CMAKE_CXX_EXTENSIONS ON)
   add_compile_options("$<$<COMPILE_LANGUAGE:CXX>:SHELL:-include cfloat>")
+  # zig's linker crashes over a bundle of this size; Python takes a library as well.
+  set(CMAKE_SHARED_MODULE_CREATE_CXX_FLAGS -shared)
+  add_link_options(-Wl,-x)
 endif()
 
 foreach(room IN LISTS ABS_HIL_ROOM_NAMES)
