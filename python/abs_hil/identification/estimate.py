@@ -83,9 +83,7 @@ def identify(logs: Sequence[PathLike | Run | Log], start: PathLike = 'paper-tabl
         raise ValueError(f'no form of the plant can be fitted to these logs: {"; ".join(notes[-2:])}')
     fit, decided = (fits[0], True) if len(fits) == 1 else better_form(fits, start_form, check, say, notes)
     try:
-        finished = _finished(fit, seed, say, check)
-        if finished.causes and len(fits) > 1:
-            finished = _other_form(finished, next(one for one in fits if one is not fit), seed, say, check)
+        finished = _likelier([fit, *(one for one in fits if one is not fit)], seed, say, check)
     except KeyboardInterrupt:
         return interrupted(fit, str(start), notes)
     of_logs = list(notes)
@@ -148,7 +146,8 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
             fit = fit if limited is fit else disturbed_fit(limited, check, say)
             again, causes = structure.explained(fit, fit.disturbances, check, say)
             fit = fit if again is fit else disturbed_fit(again, check, say)
-            causes = first_causes or causes if causes else []  # the first ones are surer
+            if first_causes and any(one.cause is first_causes[0].cause for one in causes):
+                causes = first_causes  # surer
         except (ValueError, np.linalg.LinAlgError) as error:
             raise ValueError(f'the fit does not converge: these logs are not of a rig that the plant describes ({error})'
                              ) from None
@@ -162,15 +161,21 @@ def _finished(fit: Fit, seed: int, say: Callable[[str], None], check: Callable[[
     return Finished(fit, spread, gaps, None if quiet else fit.disturbances, round_discs, causes, cost)
 
 
-def _other_form(finished: Finished, other: Fit, seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
-    """The fit of the form that needs no causes which the plant lacks, or else of the one that is likelier with its cause."""
-    try:
-        again = _finished(other, seed, say, check)
-    except ValueError:
-        return finished
-    if bool(again.causes) != bool(finished.causes):
-        return finished if again.causes else again
-    return min(finished, again, key=lambda one: one.cost)
+def _likelier(fits: Sequence[Fit], seed: int, say: Callable[[str], None], check: Callable[[], None]) -> Finished:
+    """The first form that needs no cause which the plant lacks, or else the one that is likelier with its surest cause."""
+    done: list[Finished] = []
+    failed = ''
+    for fit in fits:
+        try:
+            done.append(_finished(fit, seed, say, check))
+        except ValueError as error:
+            failed = failed or str(error)
+            continue
+        if not done[-1].causes:
+            return done[-1]
+    if not done:
+        raise ValueError(failed)
+    return min(done, key=lambda one: one.cost)
 
 
 def _explained_first(fit: Fit, check: Callable[[], None], say: Callable[[str], None]) -> tuple[Fit, list[structure.Found], float]:
@@ -182,6 +187,8 @@ def _explained_first(fit: Fit, check: Callable[[], None], say: Callable[[str], N
         step(near, disturbances, check)
     if search_u0(near, disturbances, 0.01, 9, check):
         step(near, disturbances, check)
+    if not near.rms_counts <= LARGEST_RMS:
+        return fit, [], np.inf  # too far off to tell anything
     flawed, left = structure.explained(near, disturbances, check, say)
     if flawed is not near:
         flawed, left = structure.explained(rate_limit.started(flawed, check), disturbances, check, say)
