@@ -39,7 +39,8 @@ class Estimate:
 @dataclass
 class Identified:
     """What identify() found. parameters: by name with unit; notes: sentences about what the logs do not tell; misfit: why the
-    logs give no model of the plant, empty if they do; undecided: they do not tell the form, which is then the start's."""
+    logs give no model of the plant, empty if they do; undecided: they do not tell the form, which is then the start's;
+    wanted: those notes that say what to run."""
     form: str
     start: str
     parameters: dict[str, Estimate]
@@ -55,6 +56,7 @@ class Identified:
     interrupted: bool = False
     misfit: str = ''
     undecided: bool = False
+    wanted: list[str] = field(default_factory=list)
 
     def values(self) -> dict[str, float]:
         """The plant's keys without "plant." and their values."""
@@ -90,7 +92,8 @@ def interrupted(fit: Fit, start: str, notes: list[str]) -> Identified:
 def refuse(found: Identified, why: str, of_logs: list[str]) -> None:
     """The logs do not fit the plant: the values are the last ones of the fit, and nothing is promised of them."""
     found.misfit = why
-    found.notes[:] = [f'{why}{"" if why.endswith("?") else "."} So no interval is given and no model.toml is written', *of_logs]
+    found.notes[:] = [f'{why}{"" if why.endswith("?") else "."} So no interval is given and no model.toml is written',
+                      *of_logs, *found.wanted]
     without_intervals(found)
 
 
@@ -165,13 +168,12 @@ def assembled(finished: Finished, start: str, notes: list[str]) -> Identified:
             apart = _run(cure, problem, 'to part them, ')
             joined = ' and '.join((', '.join(parts[:-1]), parts[-1]))
             notes.append(f'{joined} are known better together, as {name} = {value:.5g} {unit}{apart}')
-    for cure, keys in cures.items():
-        if cure:
-            notes.append(f'the logs do not tell {", ".join(keys)}{_run(cure, problem)}')
+    wanted = [f'the logs do not tell {", ".join(keys)}{_run(cure, problem)}' for cure, keys in cures.items() if cure]
+    notes += wanted
     if disturbances is not None:
         notes.append(f'the rig wanders ({describe(disturbances)}); the intervals count with it')
     return Identified(problem.form.name, start, parameters, combinations, fit.rms_counts, disturbances, notes,
-                      list(problem.logs), fit, spread)
+                      list(problem.logs), fit, spread, wanted=wanted)
 
 
 def _run(cure: str, problem: Problem, why: str = '') -> str:
