@@ -27,3 +27,15 @@ env/bin/abs_report run
 test -s report.html
 env/bin/abs_hil report run --output again.html
 test -s again.html
+# An editable install imports the sources themselves, with what CMake has made beside them.
+"${pip[@]}" install "$@" --no-deps --editable "$source"
+env/bin/python - "$source" <<'PYTHON'
+import sys
+import abs_hil
+import abs_hil.report.page
+assert abs_hil.__file__.startswith(sys.argv[1]), abs_hil.__file__
+assert abs_hil.report.page.__file__.startswith(sys.argv[1]), abs_hil.report.page.__file__
+assert abs_hil.simulate(set={'experiment.start_speed_rad_s': 170}).summary['result'] == 'completed'
+PYTHON
+env/bin/abs_report run --output editable.html
+test -s editable.html
