@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "abs_hil/plant_sim/factor_progress.hpp"
+#include "abs_hil/plant_sim/drift.hpp"
 
 namespace abs_hil::plant_sim {
 namespace {

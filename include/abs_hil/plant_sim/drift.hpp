@@ -1,9 +1,100 @@
 #pragma once
 
-#include "abs_hil/plant_sim/factor_progress.hpp"
+// A plant's position in the profiles of its drifting parameters (docs/plants.md).
+
+#include <cstddef>
+#include <limits>
+
+#include "abs_hil/plant_sim/factor_profile.hpp"
 #include "abs_hil/plant_sim/options.hpp"
+#include "abs_hil/rig/state_bytes.hpp"
 
 namespace abs_hil::plant_sim {
+
+/// A factor from one instant to the end of the profile's piece: linear in the time since then and in the lower wheel's
+/// angle.
+struct PresentFactor {
+  double value{1.0};
+  double per_s{0.0};
+  double per_rad{0.0};
+  double angle2_rad{0.0};                                          ///< angle at which `value` holds
+  double end_angle2_rad{std::numeric_limits<double>::infinity()};  ///< end of the piece along the distance
+  double highest{1.0};                                             ///< highest value on the piece
+
+  [[nodiscard]] double after(double time_s, double angle2) const noexcept {
+    return value + per_s * time_s + per_rad * (angle2 - angle2_rad);
+  }
+  /// True if the factor does not change on this piece.
+  [[nodiscard]] bool holds() const noexcept { return per_s == 0.0 && per_rad == 0.0; }
+};
+
+/// A plant's position in a profile. Passed pieces do not return, even if the lower wheel rolls back. Real-time safe
+/// except for the constructor.
+class FactorProgress {
+ public:
+  /// @param r2_m  radius of the lower wheel
+  FactorProgress(const FactorProfile& profile, double r2_m)
+      : profile_(profile),
+        r2_m_(r2_m),
+        changes_(profile.pieces().size() > 1),
+        constant_(profile.pieces().front().value) {
+    start(0.0);
+  }
+
+  [[nodiscard]] const FactorProfile& profile() const noexcept { return profile_; }
+
+  /// Returns to the start, with the lower wheel at that angle.
+  void start(double angle2_rad) noexcept;
+  /// Call when the brake acts. The first call sets the origin of profiles that count from braking.
+  void brake_applied(double angle2_rad) noexcept;
+  /// Advances the time.
+  void pass(double duration_s) noexcept { time_s_ += duration_s; }
+  /// Moves to the piece that holds from now on.
+  void settle(double angle2_rad) noexcept {
+    if (changes_) settle_on_changes(angle2_rad);
+  }
+
+  /// Time until the piece ends; infinite if it has no end or ends by distance.
+  [[nodiscard]] double time_left_s() const noexcept {
+    if (!changes_ || !counting_ || !along_time()) return std::numeric_limits<double>::infinity();
+    return origin_time_s_ + piece().end - time_s_;
+  }
+  /// How long the factor stays as it is; 0 while it changes, and until the brake is applied if it counts from there.
+  [[nodiscard]] double steady_s() const noexcept {
+    if (!changes_) return std::numeric_limits<double>::infinity();
+    return counting_ && piece().slope == 0.0 ? time_left_s() : 0.0;
+  }
+  /// The lower wheel's angle up to which it stays so.
+  [[nodiscard]] double steady_to_angle2_rad() const noexcept {
+    return !changes_ || along_time() ? std::numeric_limits<double>::infinity() : end_angle2_rad();
+  }
+  /// True if the factor never changes.
+  [[nodiscard]] bool steady() const noexcept { return !changes_; }
+  void exchange_state(rig::StateBytes& state) { state(index_, time_s_, origin_time_s_, origin_angle2_rad_, counting_); }
+  /// False if the factor is always 1.
+  [[nodiscard]] bool changes_anything() const noexcept { return changes_ || constant_ != 1.0; }
+  [[nodiscard]] PresentFactor present(double angle2_rad) const noexcept {
+    if (changes_) return present_of_changes(angle2_rad);
+    return {.value = constant_, .angle2_rad = angle2_rad, .highest = constant_};
+  }
+
+ private:
+  void settle_on_changes(double angle2_rad) noexcept;
+  [[nodiscard]] PresentFactor present_of_changes(double angle2_rad) const noexcept;
+  [[nodiscard]] bool along_time() const noexcept { return profile_.axis() == FactorProfile::Axis::time; }
+  [[nodiscard]] const FactorProfile::Piece& piece() const noexcept { return profile_.pieces()[index_]; }
+  [[nodiscard]] double end_angle2_rad() const noexcept { return origin_angle2_rad_ + piece().end / r2_m_; }
+
+  FactorProfile profile_;
+  double r2_m_;
+  bool changes_;     ///< false: the factor is constant, and updates cost almost nothing
+  double constant_;  ///< the factor if it is constant
+  std::size_t index_{0};
+  double time_s_{0.0};
+  double origin_time_s_{0.0};
+  double origin_angle2_rad_{0.0};
+  bool counting_{true};  ///< the origin has been passed
+};
 
 /// Factors of the drifting parameters at one instant.
 struct DriftFactors {

@@ -4,7 +4,6 @@
 #include <memory>
 
 #include "abs_hil/plant_sim/drift.hpp"
-#include "abs_hil/plant_sim/factor_progress.hpp"
 #include "abs_hil/plant_sim/options.hpp"
 #include "abs_hil/plant_sim/wheel_model.hpp"
 #include "abs_hil/rig/cycle_record.hpp"
