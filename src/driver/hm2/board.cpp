@@ -1,4 +1,4 @@
-// Reads a board's description of itself, and refuses what cannot be true.
+// Reads a board's description of itself, refuses what cannot be true, and finds the pins that the rig uses.
 
 #include "driver/hm2/board.hpp"
 
@@ -218,10 +218,81 @@ class Reader {
   Board board_{};
 };
 
+/// Finds the pins that the options name.
+class PinFinder {
+ public:
+  PinFinder(const Board& board, const Hm2Options& options) : board_(board), options_(options) {}
+
+  UsedPins find() {
+    require_instance(options_.drive_pwm, board_.pwm, "drive_pwm");
+    require_instance(options_.brake_pwm, board_.pwm, "brake_pwm");
+    require_instance(options_.lower_channel, board_.counter, "lower_channel");
+    require_instance(options_.upper_channel, board_.counter, "upper_channel");
+    std::int32_t drive_pin = -1;
+    std::int32_t brake_pin = -1;
+    for (std::size_t i = 0; i < board_.pins.size(); ++i) {
+      const Pin& pin = board_.pins[i];
+      const bool is_output = pin.tag == tag::pwm && pin.function == pwm_output;
+      const bool drives = is_output && pin.unit == options_.drive_pwm;
+      const bool brakes = is_output && pin.unit == options_.brake_pwm;
+      const bool counts =
+          pin.tag == tag::counter && (pin.unit == options_.lower_channel || pin.unit == options_.upper_channel);
+      if (drives || brakes || counts) word(used_.modules, i) |= bit(i);
+      if (drives) drive_pin = static_cast<std::int32_t>(i);
+      if (brakes) brake_pin = static_cast<std::int32_t>(i);
+    }
+    claim_pwm(drive_pin, options_.drive_pin, "drive_pin");
+    claim_pwm(brake_pin, options_.brake_pin, "brake_pin");
+    claim_line(options_.enable_pin, "enable_pin", used_.enable);
+    claim_line(options_.relay_pin, "relay_pin", used_.relay);
+    return used_;
+  }
+
+ private:
+  [[nodiscard]] std::uint32_t& word(PortWords& words, std::size_t pin) const { return words[pin / board_.port_width]; }
+  [[nodiscard]] std::uint32_t bit(std::size_t pin) const { return 1U << (pin % board_.port_width); }
+
+  static void require_instance(std::int32_t instance, const Module& module, const char* key) {
+    if (static_cast<unsigned>(instance) < module.instances) return;
+    throw Unavailable(formatted("backend rig: driver.hm2.%s = %d: the board has the instances 0 to %u", key, instance,
+                                module.instances - 1));
+  }
+  void claim(std::int32_t pin, const char* key) {
+    const auto index = static_cast<std::size_t>(pin);
+    if (index >= board_.pins.size()) {
+      throw Unavailable(formatted("backend rig: driver.hm2.%s = %d: the board has the I/O pins 0 to %zu", key, pin,
+                                  board_.pins.size() - 1));
+    }
+    if ((word(used_.outputs, index) & bit(index)) != 0) {
+      throw Unavailable(formatted("backend rig: I/O pin %d has two uses", pin));
+    }
+    word(used_.outputs, index) |= bit(index);
+    if (options_.active_low) word(used_.inverted, index) |= bit(index);
+  }
+  void claim_pwm(std::int32_t has, std::int32_t wanted, const char* key) {
+    if (has >= 0 && (wanted < 0 || wanted == has)) return claim(has, key);
+    throw Unavailable(
+        formatted("backend rig: driver.hm2.%s = %d, but the board has that PWM at I/O pin %d (-1: none): "
+                  "its firmware is another one; correct the key, or load G540x2",
+                  key, wanted, has));
+  }
+  void claim_line(std::int32_t pin, const char* key, PortWords& words) {
+    if (pin < 0) return;
+    claim(pin, key);
+    word(words, static_cast<std::size_t>(pin)) |= bit(static_cast<std::size_t>(pin));
+  }
+
+  const Board& board_;
+  const Hm2Options& options_;
+  UsedPins used_{};
+};
+
 }  // namespace
 
 Board read_board(Link& link, const std::string& place, std::uint32_t& number) {
   return Reader(link, place, number).read();
 }
+
+UsedPins find_pins(const Board& board, const Hm2Options& options) { return PinFinder(board, options).find(); }
 
 }  // namespace abs_hil::driver::hm2

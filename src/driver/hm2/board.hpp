@@ -1,12 +1,14 @@
 #pragma once
 
 // A HostMot2 board as its own descriptors show it: cookie, IDROM, modules, pins, clocks. Nothing about it is assumed.
+// Then the pins that the options name.
 
 #include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "driver/hm2/hm2_backend.hpp"
 #include "driver/hm2/wire.hpp"
 
 namespace abs_hil::driver::hm2 {
@@ -74,5 +76,18 @@ struct Board {
 /// Throws Unavailable, naming the fact, for a board that does not answer, that describes something impossible, or that
 /// lacks a watchdog, two counters or two PWMs of a known version.
 [[nodiscard]] Board read_board(Link& link, const std::string& place, std::uint32_t& number);
+
+/// The pins that a rig uses, as words for the ports' registers.
+struct UsedPins {
+  PortWords outputs{};   ///< the direction register while active
+  PortWords modules{};   ///< pins that carry their module
+  PortWords inverted{};  ///< outputs that are active low
+  PortWords enable{};    ///< the motor's enable line
+  PortWords relay{};     ///< the line that changes with each command
+};
+
+/// Finds the pins of the options' PWMs, counters and lines.
+/// Throws Unavailable, naming the key, if the board has them elsewhere or lacks them, or if a pin has two uses.
+[[nodiscard]] UsedPins find_pins(const Board& board, const Hm2Options& options);
 
 }  // namespace abs_hil::driver::hm2

@@ -130,22 +130,6 @@ std::vector<std::string> Hm2Driver::inspection() {
   return lines;
 }
 
-std::vector<std::string> RecordedLink::lines() const {
-  std::vector<std::string> lines;
-  const std::uint64_t first = kept_ > datagrams_.size() ? kept_ - datagrams_.size() : 0;
-  for (std::uint64_t i = first; i < kept_; ++i) {
-    const Datagram& datagram = datagrams_[i % datagrams_.size()];
-    std::string line = formatted("%.6f %s %3u", 1e-9 * static_cast<double>(datagram.time_ns),
-                                 datagram.sent ? "sent" : "got ", static_cast<unsigned>(datagram.size));
-    line += ' ';
-    for (std::size_t at = 0; at < std::min<std::size_t>(datagram.size, datagram.bytes.size()); ++at) {
-      line += formatted("%02x", static_cast<unsigned>(datagram.bytes[at]));
-    }
-    lines.push_back(std::move(line));
-  }
-  return lines;
-}
-
 std::vector<std::string> Hm2Driver::traffic() const { return link_ ? link_->lines() : std::vector<std::string>{}; }
 
 }  // namespace abs_hil::driver::hm2

@@ -5,7 +5,6 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <span>
 
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/board_kit.hpp"
@@ -19,25 +18,6 @@ namespace {
 constexpr unsigned value_shift = 16;  // of a PWM's value register
 
 }  // namespace
-
-int RecordedLink::send(std::span<const std::uint8_t> bytes) noexcept {
-  const int error = link_->send(bytes);
-  if (error == 0) ++sent_;
-  keep(true, bytes);
-  return error;
-}
-
-std::size_t RecordedLink::receive(std::span<std::uint8_t> buffer, std::int64_t deadline_ns) noexcept {
-  const std::size_t size = link_->receive(buffer, deadline_ns);
-  if (size > 0) keep(false, buffer.first(size));
-  return size;
-}
-
-void RecordedLink::keep(bool sent, std::span<const std::uint8_t> bytes) noexcept {
-  Datagram& datagram = datagrams_[kept_++ % datagrams_.size()];
-  datagram = {.time_ns = monotonic_ns(), .sent = sent, .size = static_cast<std::uint16_t>(bytes.size())};
-  std::copy_n(bytes.begin(), std::min(bytes.size(), datagram.bytes.size()), datagram.bytes.begin());
-}
 
 IoResult Hm2Driver::await_answer(std::int64_t sent_ns, CycleAnswer& answer, std::int64_t& received_ns) noexcept {
   // Without a clock of its own the emulated time does not advance meanwhile.
@@ -117,7 +97,7 @@ IoResult Hm2Driver::judge_talkers(const CycleAnswer& answer) noexcept {
 IoResult Hm2Driver::judge(const CycleAnswer& answer) noexcept {
   if (const IoResult talkers = judge_talkers(answer); !talkers.ok()) return talkers;
   const bool bitten = (answer.bitten & 1U) != 0;
-  const bool as_set = std::ranges::equal(of_ports(answer.direction, board_), of_ports(output_pins_, board_));
+  const bool as_set = std::ranges::equal(of_ports(answer.direction, board_), of_ports(pins_.outputs, board_));
   // The first write was lost, and the board has had none in time: still the slow start before the first write.
   if (driving_ && bitten && answer.write_number == first_write_) driving_ = false;
   if (driving_ && bitten) {
@@ -239,7 +219,7 @@ IoResult Hm2Driver::do_write(const rig::Command& command, rig::Command& sent) no
   } else {
     PortWords data{};
     for (unsigned port = 0; port < board_.ports; ++port) {
-      data[port] = (out.motor_enable ? enable_bit_[port] : 0) | ((write_number_ & 1U) != 0 ? relay_bit_[port] : 0);
+      data[port] = (out.motor_enable ? pins_.enable[port] : 0) | ((write_number_ & 1U) != 0 ? pins_.relay[port] : 0);
     }
     packet = wire_.write(data, {grid_.motor_width(out) << value_shift, grid_.brake_width(out) << value_shift},
                          write_number_);

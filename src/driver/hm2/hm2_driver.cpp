@@ -83,62 +83,6 @@ Hm2Driver::Hm2Driver(const Hm2Options& options, OpenLink open_link, ReadClock re
 
 Hm2Driver::~Hm2Driver() { static_cast<void>(deactivate()); }
 
-void Hm2Driver::claim_pin(std::int32_t pin, const char* key) {
-  const auto index = static_cast<std::size_t>(pin);
-  if (index >= board_.pins.size()) {
-    throw Unavailable(formatted("backend rig: driver.hm2.%s = %d: the board has the I/O pins 0 to %zu", key, pin,
-                                board_.pins.size() - 1));
-  }
-  const std::uint32_t bit = 1U << (index % board_.port_width);
-  std::uint32_t& outputs = output_pins_[index / board_.port_width];
-  if ((outputs & bit) != 0) throw Unavailable(formatted("backend rig: I/O pin %d has two uses", pin));
-  outputs |= bit;
-  if (options_.active_low) inverted_pins_[index / board_.port_width] |= bit;
-}
-
-void Hm2Driver::find_pins() {
-  output_pins_ = module_pins_ = inverted_pins_ = enable_bit_ = relay_bit_ = {};
-  const auto require_instance = [](std::int32_t instance, const Module& module, const char* key) {
-    if (static_cast<unsigned>(instance) < module.instances) return;
-    throw Unavailable(formatted("backend rig: driver.hm2.%s = %d: the board has the instances 0 to %u", key, instance,
-                                module.instances - 1));
-  };
-  require_instance(options_.drive_pwm, board_.pwm, "drive_pwm");
-  require_instance(options_.brake_pwm, board_.pwm, "brake_pwm");
-  require_instance(options_.lower_channel, board_.counter, "lower_channel");
-  require_instance(options_.upper_channel, board_.counter, "upper_channel");
-  std::int32_t drive_pin = -1;
-  std::int32_t brake_pin = -1;
-  for (std::size_t i = 0; i < board_.pins.size(); ++i) {
-    const Pin& pin = board_.pins[i];
-    const bool is_output = pin.tag == tag::pwm && pin.function == pwm_output;
-    const bool drives = is_output && pin.unit == options_.drive_pwm;
-    const bool brakes = is_output && pin.unit == options_.brake_pwm;
-    const bool counts =
-        pin.tag == tag::counter && (pin.unit == options_.lower_channel || pin.unit == options_.upper_channel);
-    if (drives || brakes || counts) module_pins_[i / board_.port_width] |= 1U << (i % board_.port_width);
-    if (drives) drive_pin = static_cast<std::int32_t>(i);
-    if (brakes) brake_pin = static_cast<std::int32_t>(i);
-  }
-  const auto require_pin = [this](std::int32_t has, std::int32_t wanted, const char* key) {
-    if (has >= 0 && (wanted < 0 || wanted == has)) return claim_pin(has, key);
-    throw Unavailable(
-        formatted("backend rig: driver.hm2.%s = %d, but the board has that PWM at I/O pin %d (-1: none): "
-                  "its firmware is another one; correct the key, or load G540x2",
-                  key, wanted, has));
-  };
-  require_pin(drive_pin, options_.drive_pin, "drive_pin");
-  require_pin(brake_pin, options_.brake_pin, "brake_pin");
-  const auto line = [this](std::int32_t pin, const char* key, PortWords& bits) {
-    if (pin < 0) return;
-    claim_pin(pin, key);
-    const auto index = static_cast<std::size_t>(pin);
-    bits[index / board_.port_width] |= 1U << (index % board_.port_width);
-  };
-  line(options_.enable_pin, "enable_pin", enable_bit_);
-  line(options_.relay_pin, "relay_pin", relay_bit_);
-}
-
 void Hm2Driver::do_configure() {
   link_.reset();
   link_ = std::make_unique<RecordedLink>(open_link_());
@@ -146,7 +90,7 @@ void Hm2Driver::do_configure() {
   board_ = read_board(*link_, options_.address, read_number_);
   // A board in real time is not asked: what hardware answers there is not known.
   if (lock_step_) require_lock_step("the hm2 board at " + options_.address, true, waits_for_time());
-  find_pins();
+  pins_ = find_pins(board_, options_);
   const std::uint32_t rate = pwm_rate(options_, board_);
   constexpr std::uint32_t most_rate = 65535;
   if (rate < 1 || rate > most_rate) {
@@ -229,9 +173,9 @@ Packet Hm2Driver::set_up_packet() const noexcept {
   write_pair(packet, pwm_mode, {unbuffered_12_bit, unbuffered_12_bit});
   packet.write32(board_.pwm.address(reg::rate), pwm_rate(options_, board_));
   packet.write32(board_.pwm.address(reg::enable), both);
-  packet.write32(board_.port.address(reg::invert), of_ports(inverted_pins_, board_));
+  packet.write32(board_.port.address(reg::invert), of_ports(pins_.inverted, board_));
   packet.write32(board_.port.address(reg::open_drain), of_ports(none, board_));
-  packet.write32(board_.port.address(reg::alternate_source), of_ports(module_pins_, board_));
+  packet.write32(board_.port.address(reg::alternate_source), of_ports(pins_.modules, board_));
   packet.write32(addresses_.port_data, of_ports(none, board_));
   write_pair(packet, addresses_.control, {count_filter, count_filter});
   packet.write32(board_.counter.address(reg::stamp_divisor), stamps_at_2_MHz);
@@ -243,7 +187,7 @@ Packet Hm2Driver::set_up_packet() const noexcept {
 }
 
 void Hm2Driver::put_outputs_on(Packet& packet) const noexcept {
-  packet.write32(addresses_.direction, of_ports(output_pins_, board_));
+  packet.write32(addresses_.direction, of_ports(pins_.outputs, board_));
   packet.write_number(at::write_number, write_number_);
 }
 
@@ -281,7 +225,7 @@ bool Hm2Driver::set_up_outputs(std::string& why) {
   if (!shown()) return false;
   why = "its watchdog or another program switched them off at once, or it did not take what was written";
   return outputs.write_number == write_number_ && outputs.bitten == 0 &&
-         std::ranges::equal(of_ports(outputs.direction, board_), of_ports(output_pins_, board_));
+         std::ranges::equal(of_ports(outputs.direction, board_), of_ports(pins_.outputs, board_));
 }
 
 void Hm2Driver::do_activate(std::int64_t now_ns) {

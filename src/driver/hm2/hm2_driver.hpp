@@ -1,13 +1,13 @@
 #pragma once
 
+// The driver of a HostMot2 board: its lifecycle (hm2_driver.cpp) and its cycle (hm2_cycle.cpp).
+
 #include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <span>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "abs_hil/driver/backend.hpp"
@@ -22,30 +22,6 @@ namespace abs_hil::driver::hm2 {
 [[nodiscard]] OutputGrid output_grid(const Hm2Options& options) noexcept;
 
 using OpenLink = std::function<std::unique_ptr<Link>()>;
-
-/// Keeps the last datagrams with their times, and counts those that were sent. Real-time safe.
-class RecordedLink final : public Link {
- public:
-  struct Datagram {
-    std::int64_t time_ns{0};
-    bool sent{false};
-    std::uint16_t size{0};
-    std::array<std::uint8_t, 64> bytes{};  ///< its first ones
-  };
-  explicit RecordedLink(std::unique_ptr<Link> link) : link_(std::move(link)) {}
-  int send(std::span<const std::uint8_t> bytes) noexcept override;
-  std::size_t receive(std::span<std::uint8_t> buffer, std::int64_t deadline_ns) noexcept override;
-  [[nodiscard]] std::uint32_t sent() const noexcept { return sent_; }
-  /// The last 64, oldest first, one line each.
-  [[nodiscard]] std::vector<std::string> lines() const;
-
- private:
-  void keep(bool sent, std::span<const std::uint8_t> bytes) noexcept;
-  std::unique_ptr<Link> link_;
-  std::uint32_t sent_{0};
-  std::uint64_t kept_{0};
-  std::array<Datagram, 64> datagrams_{};
-};
 
 inline constexpr std::uint32_t quadrature_error = 0x8000;  ///< of a counter's control register
 
@@ -118,8 +94,6 @@ class Hm2Driver final : public RigDriver {
   IoResult do_make_safe() noexcept override;
   IoResult do_rest() noexcept override;
 
-  void find_pins();
-  void claim_pin(std::int32_t pin, const char* key);
   [[nodiscard]] Packet set_up_packet() const noexcept;
   void put_outputs_on(Packet& packet) const noexcept;
   /// What the board says of its outputs, outside the cycle.
@@ -163,11 +137,7 @@ class Hm2Driver final : public RigDriver {
   Board board_{};
   CycleAddresses addresses_{};
   CycleWire wire_{};
-  PortWords output_pins_{};  ///< direction while active
-  PortWords module_pins_{};  ///< pins that carry their module
-  PortWords inverted_pins_{};
-  PortWords enable_bit_{};
-  PortWords relay_bit_{};
+  UsedPins pins_{};
 
   std::uint32_t read_number_{0};
   std::uint32_t write_number_{0};

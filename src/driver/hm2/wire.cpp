@@ -17,8 +17,11 @@
 #include "abs_hil/driver/io_result.hpp"
 #include "abs_hil/rig/time_units.hpp"
 #include "driver/monotonic_time.hpp"
+#include "rig/formatted_text.hpp"
 
 namespace abs_hil::driver::hm2 {
+
+using rig::formatted;
 
 void Packet::put(std::uint32_t value, unsigned bytes) noexcept {
   for (unsigned i = 0; i < bytes && size_ < bytes_.size(); ++i) bytes_[size_++] = (value >> (8U * i)) & 0xFFU;
@@ -93,6 +96,41 @@ std::size_t UdpLink::receive(std::span<std::uint8_t> buffer, std::int64_t deadli
     }
     if (monotonic_ns() >= deadline_ns) return 0;
   }
+}
+
+int RecordedLink::send(std::span<const std::uint8_t> bytes) noexcept {
+  const int error = link_->send(bytes);
+  if (error == 0) ++sent_;
+  keep(true, bytes);
+  return error;
+}
+
+std::size_t RecordedLink::receive(std::span<std::uint8_t> buffer, std::int64_t deadline_ns) noexcept {
+  const std::size_t size = link_->receive(buffer, deadline_ns);
+  if (size > 0) keep(false, buffer.first(size));
+  return size;
+}
+
+void RecordedLink::keep(bool sent, std::span<const std::uint8_t> bytes) noexcept {
+  Datagram& datagram = datagrams_[kept_++ % datagrams_.size()];
+  datagram = {.time_ns = monotonic_ns(), .sent = sent, .size = static_cast<std::uint16_t>(bytes.size())};
+  std::copy_n(bytes.begin(), std::min(bytes.size(), datagram.bytes.size()), datagram.bytes.begin());
+}
+
+std::vector<std::string> RecordedLink::lines() const {
+  std::vector<std::string> lines;
+  const std::uint64_t first = kept_ > datagrams_.size() ? kept_ - datagrams_.size() : 0;
+  for (std::uint64_t i = first; i < kept_; ++i) {
+    const Datagram& datagram = datagrams_[i % datagrams_.size()];
+    std::string line = formatted("%.6f %s %3u", 1e-9 * static_cast<double>(datagram.time_ns),
+                                 datagram.sent ? "sent" : "got ", static_cast<unsigned>(datagram.size));
+    line += ' ';
+    for (std::size_t at = 0; at < std::min<std::size_t>(datagram.size, datagram.bytes.size()); ++at) {
+      line += formatted("%02x", static_cast<unsigned>(datagram.bytes[at]));
+    }
+    lines.push_back(std::move(line));
+  }
+  return lines;
 }
 
 sockaddr_in parse_address(const std::string& text) {

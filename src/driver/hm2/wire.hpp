@@ -14,6 +14,8 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "driver/file_descriptor.hpp"
 
@@ -98,6 +100,30 @@ class UdpLink final : public Link {
 
  private:
   FileDescriptor socket_;
+};
+
+/// Keeps the last datagrams with their times, and counts those that were sent. Real-time safe.
+class RecordedLink final : public Link {
+ public:
+  struct Datagram {
+    std::int64_t time_ns{0};
+    bool sent{false};
+    std::uint16_t size{0};
+    std::array<std::uint8_t, 64> bytes{};  ///< its first ones
+  };
+  explicit RecordedLink(std::unique_ptr<Link> link) : link_(std::move(link)) {}
+  int send(std::span<const std::uint8_t> bytes) noexcept override;
+  std::size_t receive(std::span<std::uint8_t> buffer, std::int64_t deadline_ns) noexcept override;
+  [[nodiscard]] std::uint32_t sent() const noexcept { return sent_; }
+  /// The last 64, oldest first, one line each.
+  [[nodiscard]] std::vector<std::string> lines() const;
+
+ private:
+  void keep(bool sent, std::span<const std::uint8_t> bytes) noexcept;
+  std::unique_ptr<Link> link_;
+  std::uint32_t sent_{0};
+  std::uint64_t kept_{0};
+  std::array<Datagram, 64> datagrams_{};
 };
 
 /// "192.168.1.121" or "192.168.1.121:27181". Throws std::invalid_argument, naming the key.

@@ -1,0 +1,159 @@
+// The protocol of the emulated 7I92T: spaces, commands, time, lies, and the recording of LinuxCNC.
+
+#include <cmath>
+#include <fstream>
+#include <random>
+#include <sstream>
+
+#include "hm2_datagrams.hpp"
+
+using namespace abs_hil;
+using namespace abs_hil::emulator;
+using namespace abs_hil::test;
+using Catch::Matchers::Contains;
+
+TEST_CASE("Spaces: name, versions, MAC, address, clock, scratch, packet counts, info areas, pointers") {
+  Hm2Board board({.name = "7I92", .mac = {0, 0x60, 0x1B, 1, 2, 3}, .address = {10, 10, 10, 10}});
+  CHECK(ask(board, "885D0000") == hex("37493932000000000000000000000000"));
+  CHECK(ask(board, "835D1000") == hex("030011000000"));
+  CHECK(ask(board, "83490200") == hex("0302011b6000"));
+  CHECK(ask(board, "82492000") == hex("0a0a0a0a"));
+  board.advance_to(70'001'999);
+  CHECK(number(ask(board, "01510000"), 0, 2) == 70'001 - 65'536);
+  CHECK(ask(board, "82D114002A000000").empty());
+  CHECK(ask(board, "84511000") == hex("000000002a000000"));
+  CHECK(number(ask(board, "01590800"), 0, 2) == 8);
+  CHECK(number(ask(board, "01590E00"), 0, 2) == 7);  // without the one of this answer
+  CHECK(ask(board, "01610000 016D0000 017D0000") == hex("005a 035a 075a"));
+  CHECK(ask(board, "84610800") == Bytes({'H', 'o', 's', 't', 'M', 'o', 't', '2'}));
+  // A pointer stays after the last unit; without increment it stays where it was.
+  CHECK(ask(board, "81420001") == hex("fecaaa55"));
+  CHECK(ask(board, "8202") == Bytes({'H', 'O', 'S', 'T', 'M', 'O', 'T', '2'}));
+  CHECK(ask(board, "0142000181028102") == hex("fecaaa55 fecaaa55 484f5354"));
+}
+
+TEST_CASE(
+    "Commands that no space takes count as errors and read as zeros; broken datagrams are obeyed up to the break") {
+  Hm2Board board({});
+  CHECK(ask(board, "81410001") == hex("0000"));              // HostMot2 by 16 bits
+  CHECK(ask(board, "84550000") == hex("0000000000000000"));  // space 5
+  CHECK(ask(board, "81DD0000FFFF").empty());                 // the name is read-only
+  CHECK(ask(board, "81C920000102").empty());                 // the EEPROM is locked
+  CHECK(ask(board, "8142000181C2000E0000").size() == 4);     // a write without all of its data
+  CHECK(ask(board, "81").empty());
+  CHECK(ask(board, "84590000") == hex("0700 0200 0200 0200"));
+  CHECK(ask(board, "82492000") == hex("7901a8c0"));
+  // The key opens the EEPROM for one write.
+  CHECK(ask(board, "81D91A00025A 81C920000102 81C922000304").empty());
+  CHECK(ask(board, "82492000") == hex("0102a8c0"));
+  // An answer ends where the next one would not fit into a packet.
+  Bytes many;
+  for (int n = 0; n < 64; ++n) {
+    for (const std::uint8_t byte : hex("FF420001")) many.push_back(byte);
+  }
+  CHECK(board.answer(many).size() == 2 * 127 * 4);
+}
+
+TEST_CASE("In lock-step only a write of all of space 5 advances the time") {
+  Hm2Board board({.lock_step = true});
+  CHECK(ask(board, "82D6000040420F0000000000").empty());
+  CHECK(board.time_ns() == 1 * ms);
+  CHECK(number(ask(board, "82560000"), 0, 8) == 1'000'000);
+  CHECK(ask(board, "81D6000080841E00").empty());
+  CHECK(board.time_ns() == 1 * ms);
+  CHECK(ask(board, "81D6040000000000").empty());
+  CHECK(board.time_ns() == 2 * ms);
+  CHECK(board.writes() == 0);
+}
+
+TEST_CASE("Each lie changes what the board says about itself; an unknown one is refused with all known ones") {
+  const auto says = [](Hm2Board& board) {
+    Bytes all;
+    for (const char* const part : {"FF420001", "FF42FC02", "FF42F804", "825D1000"}) {
+      const Bytes answer = ask(board, part);
+      all.insert(all.end(), answer.begin(), answer.end());
+    }
+    return all;
+  };
+  Hm2Board truthful({});
+  std::istringstream names(Hm2Identity::lies());
+  std::vector<Bytes> told{says(truthful)};
+  for (std::string name; names >> name;) {
+    INFO(name);
+    Hm2Board liar({.lie = name});
+    CHECK(std::find(told.begin(), told.end(), says(liar)) == told.end());
+    told.push_back(says(liar));
+  }
+  CHECK(told.size() == 23);
+  CHECK_THROWS_WITH(Hm2Board({.lie = "honest"}), Contains("honest") && Contains("255-instances"));
+  CHECK_THROWS_WITH(Hm2Board({.name = ""}), Contains("1 to 16 characters"));
+  CHECK_THROWS_WITH(Hm2Board({.drive_pwm = 1}), Contains("PWM generators 1 and 1"));
+  CHECK_THROWS_WITH(Hm2Board({.enable_pin = 34}), Contains("-1 to 33"));
+}
+
+TEST_CASE("Any datagram is answered within a packet, and two boards answer the same") {
+  Hm2Board one({});
+  Hm2Board two({});
+  std::mt19937 random(7);
+  for (int n = 0; n < 50'000; ++n) {
+    Bytes datagram(random() % 60);
+    for (std::uint8_t& byte : datagram) byte = static_cast<std::uint8_t>(random());
+    one.advance_to(n * std::int64_t{20'000});
+    two.advance_to(n * std::int64_t{20'000});
+    const Bytes answer = one.answer(datagram);
+    if (answer.size() > Hm2Board::largest_answer || answer != two.answer(datagram)) FAIL("datagram " << n);
+  }
+  CHECK(one.fpga().registers_text() == two.fpga().registers_text());
+}
+
+TEST_CASE("LinuxCNC's recorded datagrams get the recorded answers, but for levels, counts and times") {
+  // Recorded with another emulator of a 7I92, whose wheels, clock and open pins were other ones.
+  std::ifstream file(ABS_HIL_HM2_FRAMES);
+  REQUIRE(file);
+  Hm2Board board({.name = "7I92", .mac = {0, 0, 0x1B, 0x60, 0x3B, 0x10}});
+  int compared = 0;
+  double last_write_s = 0.0;
+  std::uint64_t packets_left_out = 0;  // of the recording, where it says "..."
+  bool after_gap = false;
+  Bytes answer;
+  for (std::string line; std::getline(file, line);) {
+    std::istringstream words(line);
+    double time_s = 0.0;
+    std::string direction;
+    std::size_t size = 0;
+    std::string text;
+    if (!(words >> time_s >> direction >> size >> text)) {
+      after_gap = true;
+      answer.clear();
+      continue;
+    }
+    INFO(line);
+    const Bytes frame = hex(text);
+    REQUIRE(frame.size() == size);
+    if (direction == "RX") {
+      board.advance_to(static_cast<std::int64_t>(time_s * 1e9));
+      answer = board.answer(frame);
+      if (size >= 40) last_write_s = time_s;
+      continue;
+    }
+    if (answer.empty()) continue;  // its request is among those left out
+    ++compared;
+    if (size != 42) {
+      CHECK(answer == frame);
+      continue;
+    }
+    REQUIRE(answer.size() == frame.size());
+    // Status of the watchdog of 5 ms: not judged where the clocks of the two emulators may disagree.
+    if (std::abs(time_s - last_write_s - 0.005) > 0.001) CHECK(number(answer, 8, 4) == number(frame, 8, 4));
+    CHECK(number(answer, 14, 2) == 0);  // the time-stamp counter has 16 bits
+    for (const std::size_t control : {24U, 28U}) {
+      CHECK((number(answer, control, 4) & ~7U) == (number(frame, control, 4) & ~7U));
+    }
+    if (after_gap) packets_left_out = number(frame, 32, 2) - number(answer, 32, 2);
+    CHECK(number(answer, 32, 2) + packets_left_out == number(frame, 32, 2));
+    CHECK(number(answer, 34, 4) == number(frame, 34, 4));
+    if (!after_gap) CHECK(number(answer, 38, 4) == number(frame, 38, 4));
+    after_gap = false;
+  }
+  CHECK(compared == 168);
+}
