@@ -29,4 +29,4 @@ set(ABS_HIL_ROOM_TABLE
 
 # Rooms whose code neither runs in the cycle nor takes a noticeable time beside it. A release compiles them with -O1,
 # which saves about a third of their compile time.
-set(ABS_HIL_ROOMS_BESIDE_THE_CYCLE cli files analysis run_folder diagnosis config study commands replay interchange program)
+set(ABS_HIL_ROOMS_BESIDE_THE_CYCLE cli files emulator guardian analysis run_folder diagnosis config study commands replay interchange program)

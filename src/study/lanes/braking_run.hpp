@@ -106,15 +106,15 @@ struct LaneSequence {
   }
 };
 
-template <class S, template <class> class Law, template <class> class Tyre, template <class> class Load>
-struct BrakingRun {
+/// All of a run but its law. It is a class of its own so that the compiler sees it once a rig and not once a law.
+template <class S, template <class> class Tyre, template <class> class Load>
+struct BrakingCourse {
   using Scalar = S;
   using Condition = decltype(S(0.0) < S(0.0));
 
   LaneRig<S, Tyre<S>, Load<S>> rig{};
   LaneGate<S> gate{};
   LaneSequence<S> sequence{};
-  Law<S> law{};
   LaneWheel<S> upper{};
   LaneWheel<S> lower{};
   S ideal_sensors{0.0};  ///< 1: the controller reads the true speeds
@@ -133,34 +133,13 @@ struct BrakingRun {
   S complete{0.0};   ///< 1: the figures are complete
   S disturbed{0.0};  ///< 1: `simulate` has to compute the run
 
-  /// The first cycle: both wheels turn at this speed, and the controller begins.
-  void begin(const S& start_speed_rad_s) noexcept {
-    rig.x[plant_sim::omega1] = rig.x[plant_sim::omega2] = start_speed_rad_s;
-    upper.begin(gate.begin_upper = rig.upper_counts(), start_speed_rad_s);
-    lower.begin(gate.begin_lower = rig.lower_counts(), start_speed_rad_s);
-    actuator.reset();
-    decide(S(0.0), true);
-  }
-  /// Every later cycle.
-  /// @param window_ends  the gate's speed window ends with it
-  /// @param assist  called as assist(where, before) if a wheel stops or starts, or road or drift change: it has to set
-  ///   the plant's state and conditions there, from the state before the cycle
-  template <class Assist>
-  void cycle(bool window_ends, const Assist& assist) noexcept {
-    time_ns += period_ns;
-    const plant_sim::BasicState<S> before = rig.x;
-    if (const Condition wrong = rig.advance(period_s, time_ns, duty, sent_Nm); rig::any(wrong)) assist(wrong, before);
-    // With a lever the peak force depends on the direction in which the wheel turns.
-    if constexpr (Load<S>::knows_sliding) disturb(!(rig.x[plant_sim::omega1] >= 0.0));
-    observe(window_ends);
-    decide(period_s, false);
-  }
-
- private:
+ protected:
   void disturb(const Condition& where) noexcept { disturbed = rig::select(where, S(1.0), disturbed); }
 
   /// Reads the encoders, and asks the gate whether all is quiet.
   [[gnu::noinline, gnu::flatten]] void observe(bool window_ends) noexcept {
+    // With a lever the peak force depends on the direction in which the wheel turns.
+    if constexpr (Load<S>::knows_sliding) disturb(!(rig.x[plant_sim::omega1] >= 0.0));
     const Condition ideal = ideal_sensors > 0.0;
     upper.take(rig.upper_counts(), ideal, rig.x[plant_sim::omega1], period_s);
     lower.take(rig.lower_counts(), ideal, rig.x[plant_sim::omega2], period_s);
@@ -170,61 +149,51 @@ struct BrakingRun {
     if (window_ends) disturb(!gate.quiet(upper.counts, lower.counts));
     actuator.advance(period_s);
   }
-  /// Phase, law and gate, from the estimates to the duty, and the figures of the cycle.
-  void decide(const S& dt_s, bool begins) noexcept;
-
-  [[gnu::noinline, gnu::flatten]] static control::BasicSlipOutput<S> ask(Law<S>& law,
-                                                                         const control::BasicSlipInput<S>& input,
-                                                                         bool begins) noexcept {
-    if (begins) law.reset(input);
-    return law.step(input);
+  /// The phase, and what the law is told.
+  [[gnu::noinline, gnu::flatten]] control::BasicSlipInput<S> situation(const S& dt_s) noexcept {
+    const S time_s = time_ns * rig::s_per_ns;
+    const Condition ideal = ideal_sensors > 0.0;
+    const S slip =
+        rig::wheel_slip(S(r1_m * upper.omega_rad_s), S(r2_m * lower.omega_rad_s), S(experiment::slip_floor_m_s));
+    disturb(
+        sequence.update(time_s, S(r2_m * lower.omega_rad_s), upper.stands_still(ideal) && lower.stands_still(ideal)));
+    return {.dt_s = dt_s,
+            .speeds = {upper.omega_rad_s, lower.omega_rad_s},
+            .slip = slip,
+            .slip_ref = slip_ref,
+            .mean_brake_torque_Nm = actuator.mean_torque_Nm(),
+            .brake_torque_Nm = actuator.torque_Nm(),
+            .max_brake_torque_Nm = actuator.max_torque_Nm(),
+            .alpha1_rad_s2 = upper.alpha_rad_s2,
+            .alpha2_rad_s2 = lower.alpha_rad_s2,
+            .upper_travel_rad = upper.travel_rad,
+            .lower_travel_rad = lower.travel_rad,
+            .sent_brake_torque_Nm = sent_Nm,
+            .unsent_torque_Nm = unsent_Nm};
   }
-  [[gnu::noinline, gnu::flatten]] void send(const S& wanted_Nm, const S& dt_s, const Condition& braking,
-                                            analysis::BrakingSample<S>& sample) noexcept;
+  /// Gate and board, from the law's answer to the duty, and the figures of the cycle.
+  [[gnu::noinline, gnu::flatten]] void send(const control::BasicSlipOutput<S>& output, bool estimates_theta,
+                                            const S& dt_s) noexcept;
 };
 
-template <class S, template <class> class Law, template <class> class Tyre, template <class> class Load>
-void BrakingRun<S, Law, Tyre, Load>::decide(const S& dt_s, bool begins) noexcept {
-  const S time_s = time_ns * rig::s_per_ns;
-  const Condition ideal = ideal_sensors > 0.0;
-  const S omega1_rad_s = upper.omega_rad_s;
-  const S omega2_rad_s = lower.omega_rad_s;
-  const S slip = rig::wheel_slip(S(r1_m * omega1_rad_s), S(r2_m * omega2_rad_s), S(experiment::slip_floor_m_s));
-  disturb(sequence.update(time_s, S(r2_m * omega2_rad_s), upper.stands_still(ideal) && lower.stands_still(ideal)));
-  const Condition braking = sequence.holds == 0.0;
-  const control::BasicSlipInput<S> input{.dt_s = dt_s,
-                                         .speeds = {omega1_rad_s, omega2_rad_s},
-                                         .slip = slip,
-                                         .slip_ref = slip_ref,
-                                         .mean_brake_torque_Nm = actuator.mean_torque_Nm(),
-                                         .brake_torque_Nm = actuator.torque_Nm(),
-                                         .max_brake_torque_Nm = actuator.max_torque_Nm(),
-                                         .alpha1_rad_s2 = upper.alpha_rad_s2,
-                                         .alpha2_rad_s2 = lower.alpha_rad_s2,
-                                         .upper_travel_rad = upper.travel_rad,
-                                         .lower_travel_rad = lower.travel_rad,
-                                         .sent_brake_torque_Nm = sent_Nm,
-                                         .unsent_torque_Nm = unsent_Nm};
-  const control::BasicSlipOutput<S> output = ask(law, input, begins);
+template <class S, template <class> class Tyre, template <class> class Load>
+void BrakingCourse<S, Tyre, Load>::send(const control::BasicSlipOutput<S>& output, bool estimates_theta,
+                                        const S& dt_s) noexcept {
   // A controller's output must be finite, and what the gate sees too. Numbers that large are no part of a sound run.
   constexpr double sound = 1e30;
-  const S theta_N = Law<S>::estimates_theta ? output.theta_est_N : S(0.0);
+  const S theta_N = estimates_theta ? output.theta_est_N : S(0.0);
   disturb(!(rig::magnitude(output.brake_torque_Nm) < sound && rig::magnitude(output.slip_velocity_error_m_s) < sound &&
-            rig::magnitude(theta_N) < sound && rig::magnitude(omega1_rad_s) <= gate.overspeed_rad_s &&
-            rig::magnitude(omega2_rad_s) <= gate.overspeed_rad_s));
-  analysis::BrakingSample<S> sample{.time_s = time_s,
+            rig::magnitude(theta_N) < sound && rig::magnitude(upper.omega_rad_s) <= gate.overspeed_rad_s &&
+            rig::magnitude(lower.omega_rad_s) <= gate.overspeed_rad_s));
+  const Condition braking = sequence.holds == 0.0;
+  const S wanted_Nm = rig::select(braking, output.brake_torque_Nm, sequence.hold_torque_Nm);
+  const auto target = actuator.next(wanted_Nm, dt_s);
+  analysis::BrakingSample<S> sample{.time_s = time_ns * rig::s_per_ns,
                                     .v_x_m_s = rig.v_x_m_s(),
                                     .slip = rig.slip(),
                                     .slip_ref = rig::select(rig::is_nan(output.slip_ref), slip_ref, output.slip_ref),
                                     .theta_est_N = output.theta_est_N,
                                     .theta_N = rig.peak_force_N()};
-  send(rig::select(braking, output.brake_torque_Nm, sequence.hold_torque_Nm), dt_s, braking, sample);
-}
-
-template <class S, template <class> class Law, template <class> class Tyre, template <class> class Load>
-void BrakingRun<S, Law, Tyre, Load>::send(const S& wanted_Nm, const S& dt_s, const Condition& braking,
-                                          analysis::BrakingSample<S>& sample) noexcept {
-  const auto target = actuator.next(wanted_Nm, dt_s);
   sample.torque_ref_Nm = target.torque_Nm;
   const S passed = gate.passed_duty(target.duty, dt_s);
   duty = rig.sent_duty(passed);
@@ -238,5 +207,45 @@ void BrakingRun<S, Law, Tyre, Load>::send(const S& wanted_Nm, const S& dt_s, con
   figures.note(sample, braking);
   complete = rig::select(!braking && figures.stop_known(), S(1.0), complete);
 }
+
+/// What a law answers. Seen once a law, whatever the rig.
+template <class S, class Law>
+[[gnu::noinline, gnu::flatten]] control::BasicSlipOutput<S> answer_of(
+    Law& law, const control::BasicSlipInput<S>& input) noexcept {
+  return law.step(input);
+}
+
+template <class S, template <class> class Law, template <class> class Tyre, template <class> class Load>
+struct BrakingRun : BrakingCourse<S, Tyre, Load> {
+  using Course = BrakingCourse<S, Tyre, Load>;
+  using typename Course::Condition;
+
+  Law<S> law{};
+
+  /// The first cycle: both wheels turn at this speed, and the controller begins.
+  void begin(const S& start_speed_rad_s) noexcept {
+    this->rig.x[plant_sim::omega1] = this->rig.x[plant_sim::omega2] = start_speed_rad_s;
+    this->upper.begin(this->gate.begin_upper = this->rig.upper_counts(), start_speed_rad_s);
+    this->lower.begin(this->gate.begin_lower = this->rig.lower_counts(), start_speed_rad_s);
+    this->actuator.reset();
+    const control::BasicSlipInput<S> input = this->situation(S(0.0));
+    law.reset(input);
+    this->send(answer_of<S>(law, input), Law<S>::estimates_theta, S(0.0));
+  }
+  /// Every later cycle.
+  /// @param window_ends  the gate's speed window ends with it
+  /// @param assist  called as assist(where, before) if a wheel stops or starts, or road or drift change: it has to set
+  ///   the plant's state and conditions there, from the state before the cycle
+  template <class Assist>
+  void cycle(bool window_ends, const Assist& assist) noexcept {
+    this->time_ns += this->period_ns;
+    const plant_sim::BasicState<S> before = this->rig.x;
+    if (const Condition wrong = this->rig.advance(this->period_s, this->time_ns, this->duty, this->sent_Nm);
+        rig::any(wrong))
+      assist(wrong, before);
+    this->observe(window_ends);
+    this->send(answer_of<S>(law, this->situation(this->period_s)), Law<S>::estimates_theta, this->period_s);
+  }
+};
 
 }  // namespace abs_hil::study::lanes
