@@ -7,10 +7,13 @@ set -euo pipefail
 root=$(realpath "$(dirname "$(realpath "$0")")/..")
 
 "$root/scripts/setup.sh"
-# The report shows its figures with plotly.js. Without it the run goes on and has no page.
-"$root/scripts/setup_python.sh" python-packages.txt || echo "run: no plotly from PyPI, see above: no report" >&2
+# The report shows its figures with plotly.js, which comes while the compiler works. Without it the run goes on and has no page.
+("$root/scripts/setup_python.sh" python-packages.txt || echo "run: no plotly from PyPI, see above: no report" >&2) &
 # The programs only. They are half of the whole build; a run does not need the tests.
-"$root/scripts/build.sh" release --target abs_hil_programs
+status=0
+"$root/scripts/build.sh" release --target abs_hil_programs || status=$?
+wait
+[ "$status" = 0 ] || exit "$status"
 program="$root/build/release/bin/abs_hil"
 
 arguments=("$@")

@@ -248,20 +248,27 @@ struct Pack {
 
 // Lanes in memory: a T<Pack> has the words of T<double>, each once for every lane.
 
-/// Writes the words of one run into lane `lane`.
-template <class S, class Run>
-inline void put_lane(Run& packed, std::size_t lane, const double* words) noexcept {
-  constexpr std::size_t count = sizeof(Run) / sizeof(S);
-  auto* all = reinterpret_cast<unsigned char*>(&packed);
+/// Writes the `count` words of one run into lane `lane`.
+template <class S>
+inline void put_lane(void* packed, std::size_t count, std::size_t lane, const double* words) noexcept {
+  auto* all = static_cast<unsigned char*>(packed);
   for (std::size_t i = 0; i < count; ++i)
     std::memcpy(all + (i * S::lanes + lane) * sizeof(double), words + i, sizeof(double));
 }
-template <class S, class Run>
-inline void take_lane(const Run& packed, std::size_t lane, double* words) noexcept {
-  constexpr std::size_t count = sizeof(Run) / sizeof(S);
-  const auto* all = reinterpret_cast<const unsigned char*>(&packed);
+template <class S>
+inline void take_lane(const void* packed, std::size_t count, std::size_t lane, double* words) noexcept {
+  const auto* all = static_cast<const unsigned char*>(packed);
   for (std::size_t i = 0; i < count; ++i)
     std::memcpy(words + i, all + (i * S::lanes + lane) * sizeof(double), sizeof(double));
+}
+/// The same with the words of a type.
+template <class S, class Run>
+inline void put_lane(Run& packed, std::size_t lane, const double* words) noexcept {
+  put_lane<S>(static_cast<void*>(&packed), sizeof(Run) / sizeof(S), lane, words);
+}
+template <class S, class Run>
+inline void take_lane(const Run& packed, std::size_t lane, double* words) noexcept {
+  take_lane<S>(static_cast<const void*>(&packed), sizeof(Run) / sizeof(S), lane, words);
 }
 
 }  // namespace abs_hil::rig

@@ -106,7 +106,7 @@ struct LaneSequence {
   }
 };
 
-/// All of a run but its law. It is a class of its own so that the compiler sees it once a rig and not once a law.
+/// All of a run but its law. It is a class of its own so that the compiler meets it once a rig and not once a law.
 template <class S, template <class> class Tyre, template <class> class Load>
 struct BrakingCourse {
   using Scalar = S;
@@ -132,6 +132,20 @@ struct BrakingCourse {
   S unsent_Nm{0.0};
   S complete{0.0};   ///< 1: the figures are complete
   S disturbed{0.0};  ///< 1: `simulate` has to compute the run
+
+  /// Every cycle but the first.
+  /// @param window_ends  the gate's speed window ends with it
+  /// @param assist  called as assist(where, before) if a wheel stops or starts, or road or drift change: it has to set
+  ///   the plant's state and conditions there, from the state before the cycle
+  /// @param answer  the law's, called as answer(input)
+  template <class Assist, class Answer>
+  void cycle(bool window_ends, const Assist& assist, const Answer& answer, bool estimates_theta) noexcept {
+    time_ns += period_ns;
+    const plant_sim::BasicState<S> before = rig.x;
+    if (const Condition wrong = rig.advance(period_s, time_ns, duty, sent_Nm); rig::any(wrong)) assist(wrong, before);
+    observe(window_ends);
+    send(answer(situation(period_s)), estimates_theta, period_s);
+  }
 
  protected:
   void disturb(const Condition& where) noexcept { disturbed = rig::select(where, S(1.0), disturbed); }
@@ -208,17 +222,9 @@ void BrakingCourse<S, Tyre, Load>::send(const control::BasicSlipOutput<S>& outpu
   complete = rig::select(!braking && figures.stop_known(), S(1.0), complete);
 }
 
-/// What a law answers. Seen once a law, whatever the rig.
-template <class S, class Law>
-[[gnu::noinline, gnu::flatten]] control::BasicSlipOutput<S> answer_of(
-    Law& law, const control::BasicSlipInput<S>& input) noexcept {
-  return law.step(input);
-}
-
 template <class S, template <class> class Law, template <class> class Tyre, template <class> class Load>
 struct BrakingRun : BrakingCourse<S, Tyre, Load> {
   using Course = BrakingCourse<S, Tyre, Load>;
-  using typename Course::Condition;
 
   Law<S> law{};
 
@@ -230,21 +236,7 @@ struct BrakingRun : BrakingCourse<S, Tyre, Load> {
     this->actuator.reset();
     const control::BasicSlipInput<S> input = this->situation(S(0.0));
     law.reset(input);
-    this->send(answer_of<S>(law, input), Law<S>::estimates_theta, S(0.0));
-  }
-  /// Every later cycle.
-  /// @param window_ends  the gate's speed window ends with it
-  /// @param assist  called as assist(where, before) if a wheel stops or starts, or road or drift change: it has to set
-  ///   the plant's state and conditions there, from the state before the cycle
-  template <class Assist>
-  void cycle(bool window_ends, const Assist& assist) noexcept {
-    this->time_ns += this->period_ns;
-    const plant_sim::BasicState<S> before = this->rig.x;
-    if (const Condition wrong = this->rig.advance(this->period_s, this->time_ns, this->duty, this->sent_Nm);
-        rig::any(wrong))
-      assist(wrong, before);
-    this->observe(window_ends);
-    this->send(answer_of<S>(law, this->situation(this->period_s)), Law<S>::estimates_theta, this->period_s);
+    this->send(law.step(input), Law<S>::estimates_theta, S(0.0));
   }
 };
 

@@ -2,6 +2,9 @@
 #pragma once
 
 #include <bit>
+#include <cstddef>
+#include <cstring>
+#include <new>
 
 #include "rig/pack.hpp"
 #include "study/lanes/braking_run.hpp"
@@ -12,13 +15,23 @@ namespace abs_hil::study::lanes {
 
 /// Runs all of `work` in the lanes of `Run`. The number of integration steps that a run needs for a cycle rises as the
 /// car slows down, and the lanes of a pack take as many steps as the neediest. So runs go on among their like: one that
-/// needs more than its class allows is parked until the runs of that class have passed.
-template <class Run>
+/// needs more than its class allows is parked until the runs of that class have passed. The law is behind a pointer, so
+/// that the compiler meets the engine once a rig and not once a law.
+template <class Course>
 class LaneEngine {
  public:
-  using S = typename Run::Scalar;
+  using S = typename Course::Scalar;
 
-  explicit LaneEngine(const LaneWork& work) noexcept : work_(work) {
+  /// A law in lanes: its words stand behind those of the course.
+  struct PackedLaw {
+    void* law;
+    control::BasicSlipOutput<S> (*answer)(void* law, const control::BasicSlipInput<S>& input) noexcept;
+    bool estimates_theta;
+    std::size_t run_words;  ///< of one run: course and law
+  };
+
+  LaneEngine(const LaneWork& work, Course& packed, const PackedLaw& law) noexcept
+      : work_(work), packed_(packed), law_(law) {
     for (std::uint32_t& head : heads_) head = none;
     for (std::uint32_t i = work.count; i-- > 0;) park(i, 0);
   }
@@ -28,8 +41,10 @@ class LaneEngine {
       const double most_steps = level_steps[level];
       while (fill(level)) {
         for (std::uint32_t c = 1; c <= work_.window_cycles; ++c) {
-          packed_.cycle(c == work_.window_cycles,
-                        [this](const auto& where, const auto& before) { assist(active_ & lane_bits(where), before); });
+          packed_.cycle(
+              c == work_.window_cycles,
+              [this](const auto& where, const auto& before) { assist(active_ & lane_bits(where), before); },
+              [this](const auto& input) { return law_.answer(law_.law, input); }, law_.estimates_theta);
           // Later cycles would change the figures of a complete run.
           const std::uint32_t ended = active_ & lane_bits(packed_.complete + packed_.disturbed > S(0.0));
           if (ended != 0) store(ended);
@@ -63,7 +78,7 @@ class LaneEngine {
       const std::uint32_t run = heads_[level];
       heads_[level] = work_.next[run];
       runs_[lane] = run;
-      rig::put_lane<S>(packed_, lane, work_.runs[run]);
+      rig::put_lane<S>(&packed_, law_.run_words, lane, work_.runs[run]);
       active_ |= 1U << lane;
       free &= free - 1;
     }
@@ -74,9 +89,11 @@ class LaneEngine {
                                         lane_bits(packed_.rig.steps > S(level_steps[level])));
     copies_ = free;
     for (std::uint32_t left = stale; left != 0; left &= left - 1) {
-      double words[sizeof(Run) / sizeof(S)];
-      rig::take_lane<S>(packed_, static_cast<std::size_t>(std::countr_zero(active_)), words);
-      rig::put_lane<S>(packed_, static_cast<std::size_t>(std::countr_zero(left)), words);
+      const auto original = static_cast<std::size_t>(std::countr_zero(active_));
+      const auto copy = static_cast<std::size_t>(std::countr_zero(left));
+      auto* word = reinterpret_cast<unsigned char*>(&packed_);
+      for (std::size_t i = 0; i < law_.run_words; ++i, word += sizeof(S))
+        std::memcpy(word + copy * sizeof(double), word + original * sizeof(double), sizeof(double));
     }
     return true;
   }
@@ -101,28 +118,39 @@ class LaneEngine {
   void store(std::uint32_t lanes) noexcept {
     for (std::uint32_t left = lanes; left != 0; left &= left - 1) {
       const auto lane = static_cast<std::uint32_t>(std::countr_zero(left));
-      rig::take_lane<S>(packed_, lane, work_.runs[runs_[lane]]);
+      rig::take_lane<S>(&packed_, law_.run_words, lane, work_.runs[runs_[lane]]);
     }
     active_ &= ~lanes;
     copies_ &= ~lanes;
   }
 
   const LaneWork& work_;
-  Run packed_{};
+  Course& packed_;
+  const PackedLaw law_;
   std::uint32_t runs_[S::lanes]{};
   std::uint32_t heads_[levels]{};
   std::uint32_t active_{0};
   std::uint32_t copies_{0};
 };
 
+template <class S, class Law>
+[[gnu::flatten]] control::BasicSlipOutput<S> answer_of(void* law, const control::BasicSlipInput<S>& input) noexcept {
+  return static_cast<Law*>(law)->step(input);
+}
+
 template <class Isa, std::size_t Vectors, template <class> class Law, template <class> class Tyre,
           template <class> class Load>
 void run_in_lanes(const LaneWork& work) noexcept {
-  using Run = BrakingRun<rig::Pack<Isa, Vectors>, Law, Tyre, Load>;
+  using S = rig::Pack<Isa, Vectors>;
+  using Run = BrakingRun<S, Law, Tyre, Load>;
   using One = BrakingRun<double, Law, Tyre, Load>;
-  static_assert(sizeof(Run) == sizeof(One) * Run::Scalar::lanes, "lane and run have the same words");
+  static_assert(sizeof(Run) == sizeof(One) * S::lanes, "lane and run have the same words");
   static_assert(std::is_trivially_copyable_v<Run> && std::is_trivially_copyable_v<One>);
-  LaneEngine<Run>(work).run();
+  alignas(Run) std::byte words[sizeof(Run)]{};  // the runs' words take their place
+  auto& run = *std::launder(reinterpret_cast<Run*>(words));
+  LaneEngine<typename Run::Course>(
+      work, run, {&run.law, &answer_of<S, Law<S>>, Law<S>::estimates_theta, sizeof(One) / sizeof(double)})
+      .run();
 }
 
 #ifdef ABS_HIL_LANE_ISA
